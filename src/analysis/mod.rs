@@ -1,0 +1,1 @@
+//! Energy and trajectory errors, comparisons of learned and exact Lagrangians.

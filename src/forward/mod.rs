@@ -1,0 +1,1 @@
+//! Forward numbers: values with directional derivatives.

@@ -1,0 +1,24 @@
+//! Lagrangian mechanics: one trait for a Lagrangian, one place for the Euler-Lagrange terms.
+//!
+//! State `x = (q, v)`, `v = dq/dt`, both in `R^n`. `p = dL/dv`, `g = dL/dq`, `M = d2L/dv dv`, `c = (d2L/dv dq) v`,
+//! `a = M^-1 (g - c)`, `E = p.v - L`. Batches are row-major: `(batch, n)` and `(batch, n, n)`.
+
+mod terms;
+
+pub use terms::{EulerLagrange, MechanicsError, Request, Terms};
+
+use crate::scalar::Real;
+
+/// A Lagrangian `L(q, v; parameters)` written once over [`Real`].
+///
+/// The same code then gives values, first and second derivatives with respect to `q`, `v` and the parameters
+/// (masses, lengths, ...), in every precision, for one state or a recorded batch.
+pub trait Lagrangian: Send + Sync {
+    /// Number of coordinates `n`.
+    fn coordinates(&self) -> usize;
+
+    /// `L(q, v)` in joules (or the unit of action per unit of the evolution parameter).
+    ///
+    /// `parameters` in the order the system declares, `q` and `v` of length `n`.
+    fn lagrangian<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> R;
+}

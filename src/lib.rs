@@ -1,0 +1,33 @@
+//! Stabilized Lagrangian neural networks: learn `L(q, dq/dt)` from motion, predict motion that keeps its energy, read
+//! physics off the learned function.
+//!
+//! Rooms, each importing only from those above it: [`scalar`], [`ops`], [`forward`], [`linalg`], [`tape`],
+//! [`lagrangian`], [`network`], [`training`], [`rollout`], [`analysis`], `report`, `cli`.
+#![forbid(unsafe_code)]
+#![warn(missing_docs)]
+
+pub mod scalar;
+
+pub mod ops;
+
+pub mod forward;
+
+pub mod linalg;
+
+pub mod tape;
+
+pub mod lagrangian;
+
+pub mod network;
+
+pub mod training;
+
+pub mod rollout;
+
+pub mod analysis;
+
+#[cfg(feature = "plot")]
+pub mod report;
+
+#[cfg(feature = "cli")]
+pub mod cli;

@@ -1,0 +1,1 @@
+//! Batched small dense linear algebra: solve, symmetric eigen, inertia, minors.

@@ -1,0 +1,205 @@
+//! Numbers: [`Real`] is what model code may call, [`Scalar`] is an innermost floating-point number.
+//!
+//! Everything above this room is generic over [`Scalar`] (`f32`, `f64`, [`Dd`]). A Lagrangian is written over
+//! [`Real`], which forward numbers and tape variables implement too; nothing in a model may name a float type.
+
+mod dd;
+mod primitive;
+mod simd;
+
+pub use dd::Dd;
+pub use simd::vectorized;
+
+use std::fmt::{Debug, Display};
+use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
+
+/// A real number that model code computes with: a float, a forward number over one, a tape variable over either.
+///
+/// Methods follow the usual definitions of the elementary functions. Derivatives at kinks are fixed by convention:
+/// `abs`, `max` and `min` use the derivative 0 of `|x|` at `x = 0` (both signed zeros) and pass `NaN` on.
+pub trait Real:
+    Copy
+    + Debug
+    + Neg<Output = Self>
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + AddAssign
+    + SubAssign
+    + MulAssign
+    + DivAssign
+{
+    /// The floating-point type at the bottom.
+    type Scalar: Scalar;
+
+    /// A number without derivatives; never recorded on a tape.
+    fn constant(value: Self::Scalar) -> Self;
+
+    /// The floating-point value at the bottom, derivatives dropped.
+    ///
+    /// On a tape that records a replayable program this is a data-dependent read and refused (see `tape`).
+    fn primal(self) -> Self::Scalar;
+
+    /// The constant nearest to `value`: exact unless the scalar is `f32`.
+    #[inline]
+    fn from_f64(value: f64) -> Self {
+        Self::constant(Self::Scalar::of_f64(value))
+    }
+    /// The constant `numerator / denominator`, rounded once in the working precision.
+    #[inline]
+    fn ratio(numerator: i32, denominator: i32) -> Self {
+        Self::constant(Self::Scalar::of_f64(f64::from(numerator)) / Self::Scalar::of_f64(f64::from(denominator)))
+    }
+    /// 0.
+    #[inline]
+    fn zero() -> Self {
+        Self::from_f64(0.0)
+    }
+    /// 1.
+    #[inline]
+    fn one() -> Self {
+        Self::from_f64(1.0)
+    }
+    /// 2.
+    #[inline]
+    fn two() -> Self {
+        Self::from_f64(2.0)
+    }
+    /// 1/2.
+    #[inline]
+    fn half() -> Self {
+        Self::from_f64(0.5)
+    }
+
+    /// `1 / self`.
+    fn recip(self) -> Self;
+    /// Square root.
+    fn sqrt(self) -> Self;
+    /// `e^self`.
+    fn exp(self) -> Self;
+    /// `e^self - 1`, accurate near 0.
+    fn exp_m1(self) -> Self;
+    /// Natural logarithm.
+    fn ln(self) -> Self;
+    /// `ln(1 + self)`, accurate near 0.
+    fn ln_1p(self) -> Self;
+    /// Sine of an angle in radians, arguments of any size reduced correctly.
+    fn sin(self) -> Self;
+    /// Cosine of an angle in radians, arguments of any size reduced correctly.
+    fn cos(self) -> Self;
+    /// Tangent of an angle in radians.
+    fn tan(self) -> Self;
+    /// Inverse sine in radians.
+    fn asin(self) -> Self;
+    /// Inverse cosine in radians.
+    fn acos(self) -> Self;
+    /// Inverse tangent in radians.
+    fn atan(self) -> Self;
+    /// Hyperbolic sine.
+    fn sinh(self) -> Self;
+    /// Hyperbolic cosine.
+    fn cosh(self) -> Self;
+    /// Hyperbolic tangent.
+    fn tanh(self) -> Self;
+    /// Complementary error function `2/sqrt(pi) * integral from self to infinity of exp(-t^2)`.
+    fn erfc(self) -> Self;
+    /// `1 / (1 + e^-self)`, relatively accurate in both tails.
+    fn logistic(self) -> Self;
+    /// `ln(1 + e^self)`, relatively accurate in both tails.
+    fn softplus(self) -> Self;
+    /// Absolute value; derivative 0 at 0.
+    fn abs(self) -> Self;
+    /// `self^exponent` for an integer exponent.
+    fn powi(self, exponent: i32) -> Self;
+    /// `self^exponent`, `self > 0`.
+    fn powf(self, exponent: Self) -> Self;
+    /// Angle of the point `(x, self)` in radians.
+    fn atan2(self, x: Self) -> Self;
+    /// The larger of two numbers; `NaN` if either is.
+    fn max(self, other: Self) -> Self;
+    /// The smaller of two numbers; `NaN` if either is.
+    fn min(self, other: Self) -> Self;
+    /// `if_positive` where `self > 0`, `otherwise` where it is not; `NaN` where `self` is. The recordable branch.
+    fn select(self, if_positive: Self, otherwise: Self) -> Self;
+
+    /// `self * self`.
+    #[inline]
+    fn sqr(self) -> Self {
+        self * self
+    }
+    /// Sine and cosine together.
+    #[inline]
+    fn sin_cos(self) -> (Self, Self) {
+        (self.sin(), self.cos())
+    }
+    /// `self * factor + summand`; fused where the hardware does it.
+    #[inline]
+    fn mul_add(self, factor: Self, summand: Self) -> Self {
+        self * factor + summand
+    }
+    /// `max(self, 0)`; derivative 0 at 0, `NaN` passed on.
+    #[inline]
+    fn relu(self) -> Self {
+        self.select(self, Self::zero())
+    }
+}
+
+/// An innermost floating-point number: `f32`, `f64` or [`Dd`].
+pub trait Scalar:
+    Real<Scalar = Self>
+    + PartialEq
+    + PartialOrd
+    + Default
+    + Display
+    + num_traits::Zero
+    + num_traits::One
+    + Send
+    + Sync
+    + 'static
+{
+    /// `"f32"`, `"f64"` or `"dd"`.
+    const NAME: &'static str;
+    /// Distance from 1 to the next number (for [`Dd`]: `2^-104`, the precision its operations keep).
+    const EPSILON: Self;
+    /// Smallest positive normal number.
+    const MIN_POSITIVE: Self;
+    /// Largest finite number.
+    const MAX: Self;
+    /// Positive infinity.
+    const INFINITY: Self;
+    /// Not a number.
+    const NAN: Self;
+    /// The circle constant.
+    const PI: Self;
+
+    /// Nearest number to an `f64`.
+    fn of_f64(value: f64) -> Self;
+    /// Nearest `f64`.
+    fn to_f64(self) -> f64;
+    /// Nearest number to a decimal text such as `-1.25e-3`; the grammar of Rust's `f64`, infinities and `NaN` included.
+    fn parse(text: &str) -> Option<Self>;
+    /// Decimal text that [`Scalar::parse`] reads back to the same number.
+    fn to_text(self) -> String;
+    /// Neither infinite nor `NaN`.
+    fn is_finite(self) -> bool;
+    /// `NaN`.
+    fn is_nan(self) -> bool;
+    /// `self` reduced to `[0, 2 pi)` by an exact quotient, for angles of any finite size.
+    fn wrap_angle(self) -> Self;
+    /// Largest integer not above `self`.
+    fn floor(self) -> Self;
+    /// `2^exponent * self`, exact barring overflow and underflow.
+    fn ldexp(self, exponent: i32) -> Self;
+    /// The exponent `e` with `2^e <= |self| < 2^(e+1)`; `i32::MIN` for zero.
+    fn ilogb(self) -> i32;
+
+    /// Leading and trailing part: their exact sum is the number.
+    fn parts(self) -> (f64, f64);
+    /// Converts between innermost numbers; widening is exact, narrowing rounds to nearest.
+    #[inline]
+    fn cast<T: Scalar>(self) -> T {
+        let (high, low) = self.parts();
+        T::of_f64(high) + T::of_f64(low)
+    }
+}

@@ -1,0 +1,1 @@
+//! The tape: record, replay, reverse sweep.

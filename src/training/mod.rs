@@ -1,0 +1,1 @@
+//! Datasets, losses, regularizers, optimisers hosted by argmin, the trainer.
