@@ -1,1 +1,3 @@
-//! Batched small dense linear algebra: solve, symmetric eigen, inertia, minors.
+//! Batched small dense linear algebra: solve, symmetric eigen, inertia, minors; products.
+
+pub mod matmul;

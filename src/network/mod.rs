@@ -2,6 +2,9 @@
 
 mod activation;
 mod config;
+mod features;
+mod layout;
 
 pub use activation::Activation;
+pub use layout::{Layer, Layout};
 pub use config::{Architecture, Initialization};

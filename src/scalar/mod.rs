@@ -145,6 +145,28 @@ pub trait Real:
     }
 }
 
+/// What a slice of scalars is made of.
+#[derive(Clone, Copy, Debug)]
+pub enum View<'a> {
+    /// Single precision.
+    F32(&'a [f32]),
+    /// Double precision.
+    F64(&'a [f64]),
+    /// Numbers computed in software.
+    Software,
+}
+
+/// What a mutable slice of scalars is made of.
+#[derive(Debug)]
+pub enum ViewMut<'a> {
+    /// Single precision.
+    F32(&'a mut [f32]),
+    /// Double precision.
+    F64(&'a mut [f64]),
+    /// Numbers computed in software.
+    Software,
+}
+
 /// An innermost floating-point number: `f32`, `f64` or [`Dd`].
 pub trait Scalar:
     Real<Scalar = Self>
@@ -194,6 +216,16 @@ pub trait Scalar:
     /// The exponent `e` with `2^e <= |self| < 2^(e+1)`; `i32::MIN` for zero.
     fn ilogb(self) -> i32;
 
+    /// The slice as hardware floats, if it is one; how generic code reaches kernels that exist for these alone.
+    #[inline(always)]
+    fn view(_slice: &[Self]) -> View<'_> {
+        View::Software
+    }
+    /// The slice as mutable hardware floats, if it is one.
+    #[inline(always)]
+    fn view_mut(_slice: &mut [Self]) -> ViewMut<'_> {
+        ViewMut::Software
+    }
     /// Leading and trailing part: their exact sum is the number.
     fn parts(self) -> (f64, f64);
     /// Converts between innermost numbers; widening is exact, narrowing rounds to nearest.

@@ -1,9 +1,9 @@
 //! `f32` and `f64` as [`Real`] and [`Scalar`].
 
-use super::{Real, Scalar};
+use super::{Real, Scalar, View, ViewMut};
 
 macro_rules! impl_primitive {
-    ($float:ident, $bits:ty, $erfc:path) => {
+    ($float:ident, $variant:ident, $bits:ty, $erfc:path) => {
         impl Real for $float {
             type Scalar = $float;
 
@@ -91,6 +91,14 @@ macro_rules! impl_primitive {
                 f64::from(self)
             }
             #[inline(always)]
+            fn view(slice: &[Self]) -> View<'_> {
+                View::$variant(slice)
+            }
+            #[inline(always)]
+            fn view_mut(slice: &mut [Self]) -> ViewMut<'_> {
+                ViewMut::$variant(slice)
+            }
+            #[inline(always)]
             fn parts(self) -> (f64, f64) {
                 (f64::from(self), 0.0)
             }
@@ -157,5 +165,5 @@ macro_rules! impl_primitive {
     };
 }
 
-impl_primitive!(f32, u32, libm::erfcf);
-impl_primitive!(f64, u64, libm::erfc);
+impl_primitive!(f32, F32, u32, libm::erfcf);
+impl_primitive!(f64, F64, u64, libm::erfc);
