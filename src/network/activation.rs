@@ -17,3 +17,17 @@ pub enum Activation {
     /// `x^2`.
     Quadratic,
 }
+
+// TEMP
+impl Activation {
+    pub fn variance_gain(self) -> f64 { 1.0 }
+    pub fn apply<R: crate::scalar::Real>(self, x: R) -> R { let k=R::half(); x * (x*k).tanh() }
+    fn d<S: crate::scalar::Scalar>(x:S)->[S;4]{
+        let k = <S as crate::scalar::Real>::half(); let one=<S as crate::scalar::Real>::one(); let t=(k*x).tanh(); let s=one-t*t; let two=one+one;
+        [x*t, t+k*x*s, two*k*s - two*k*k*x*s*t, -two*two*k*k*s*t - two*k*k*(s*t + x*k*s*s - two*x*k*s*t*t)]
+    }
+    pub fn value<S: crate::scalar::Scalar>(self, z:&[S], f:&mut[S]){ for i in 0..z.len(){ f[i]=Self::d(z[i])[0]; } }
+    pub fn jet1<S: crate::scalar::Scalar>(self, z:&[S], f:&mut[S], a:&mut[S]){ for i in 0..z.len(){ let d=Self::d(z[i]); f[i]=d[0]; a[i]=d[1]; } }
+    pub fn jet2<S: crate::scalar::Scalar>(self, z:&[S], f:&mut[S], a:&mut[S], b:&mut[S]){ for i in 0..z.len(){ let d=Self::d(z[i]); f[i]=d[0]; a[i]=d[1]; b[i]=d[2];} }
+    pub fn jet3<S: crate::scalar::Scalar>(self, z:&[S], f:&mut[S], a:&mut[S], b:&mut[S], c:&mut[S]){ for i in 0..z.len(){ let d=Self::d(z[i]); f[i]=d[0]; a[i]=d[1]; b[i]=d[2]; c[i]=d[3];} }
+}

@@ -1,10 +1,16 @@
 //! The network Lagrangian: a multilayer perceptron as `L(q, v)`, evaluated in batches.
 
 mod activation;
+mod adjoint;
+mod chunk;
 mod config;
 mod features;
+mod init;
 mod layout;
 
 pub use activation::Activation;
+pub use adjoint::{Adjoint, Jets};
+pub use chunk::{Chunk, Depth};
+pub use init::initial_weights;
 pub use layout::{Layer, Layout};
 pub use config::{Architecture, Initialization};

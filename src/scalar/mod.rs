@@ -6,9 +6,11 @@
 mod dd;
 mod primitive;
 mod simd;
+mod sum;
 
 pub use dd::Dd;
 pub use simd::vectorized;
+pub use sum::Sum;
 
 use std::fmt::{Debug, Display};
 use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
