@@ -6,9 +6,11 @@
 mod dd;
 mod primitive;
 mod simd;
+mod slices;
 
 pub use dd::Dd;
 pub use simd::vectorized;
+pub use slices::{Slice, SliceMut};
 
 use std::fmt::{Debug, Display};
 use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
@@ -40,6 +42,12 @@ pub trait Real:
     ///
     /// On a tape that records a replayable program this is a data-dependent read and refused (see `tape`).
     fn primal(self) -> Self::Scalar;
+
+    /// Exactly 0 with all its derivatives: what a sum may leave out and a product may answer with.
+    #[inline(always)]
+    fn is_exact_zero(self) -> bool {
+        self.primal() == Self::Scalar::of_f64(0.0)
+    }
 
     /// The constant nearest to `value`: exact unless the scalar is `f32`.
     #[inline]
@@ -194,6 +202,16 @@ pub trait Scalar:
     /// The exponent `e` with `2^e <= |self| < 2^(e+1)`; `i32::MIN` for zero.
     fn ilogb(self) -> i32;
 
+    /// A slice by its concrete type.
+    #[inline(always)]
+    fn slice(values: &[Self]) -> Slice<'_, Self> {
+        Slice::Other(values)
+    }
+    /// A mutable slice by its concrete type.
+    #[inline(always)]
+    fn slice_mut(values: &mut [Self]) -> SliceMut<'_, Self> {
+        SliceMut::Other(values)
+    }
     /// Leading and trailing part: their exact sum is the number.
     fn parts(self) -> (f64, f64);
     /// Converts between innermost numbers; widening is exact, narrowing rounds to nearest.

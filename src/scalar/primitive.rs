@@ -1,6 +1,6 @@
 //! `f32` and `f64` as [`Real`] and [`Scalar`].
 
-use super::{Real, Scalar};
+use super::{Real, Scalar, Slice, SliceMut};
 
 macro_rules! impl_primitive {
     ($float:ident, $bits:ty, $erfc:path) => {
@@ -89,6 +89,14 @@ macro_rules! impl_primitive {
             #[inline(always)]
             fn to_f64(self) -> f64 {
                 f64::from(self)
+            }
+            #[inline(always)]
+            fn slice(values: &[Self]) -> Slice<'_, Self> {
+                values.into()
+            }
+            #[inline(always)]
+            fn slice_mut(values: &mut [Self]) -> SliceMut<'_, Self> {
+                values.into()
             }
             #[inline(always)]
             fn parts(self) -> (f64, f64) {

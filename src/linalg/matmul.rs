@@ -1,0 +1,201 @@
+//! Matrix products `C = alpha A B` or `C += alpha A B`: faer's kernels for `f32` and `f64`, a plain loop otherwise.
+
+use crate::scalar::{Real, Scalar, Slice, SliceMut};
+use faer::linalg::matmul::matmul;
+use faer::{Accum, Par};
+
+/// A matrix view over row-major storage, possibly transposed.
+#[derive(Clone, Copy, Debug)]
+pub struct MatRef<'a, S> {
+    data: &'a [S],
+    rows: usize,
+    cols: usize,
+    stride: usize,
+    transposed: bool,
+}
+
+/// A mutable matrix view over row-major storage.
+#[derive(Debug)]
+pub struct MatMut<'a, S> {
+    data: &'a mut [S],
+    rows: usize,
+    cols: usize,
+    stride: usize,
+}
+
+/// Numbers a `rows x cols` row-major matrix with `stride` between its rows occupies.
+fn extent(rows: usize, cols: usize, stride: usize) -> usize {
+    if rows == 0 || cols == 0 { 0 } else { (rows - 1) * stride + cols }
+}
+
+impl<'a, S> MatRef<'a, S> {
+    /// `rows x cols` matrix stored row after row without gaps.
+    ///
+    /// # Panics
+    /// If `data` is shorter than `rows * cols`.
+    pub fn new(data: &'a [S], rows: usize, cols: usize) -> Self {
+        Self::with_stride(data, rows, cols, cols)
+    }
+    /// `rows x cols` matrix whose rows start `stride >= cols` apart.
+    ///
+    /// # Panics
+    /// If `data` is too short or `stride < cols`.
+    pub fn with_stride(data: &'a [S], rows: usize, cols: usize, stride: usize) -> Self {
+        assert!(stride >= cols && data.len() >= extent(rows, cols, stride), "matrix view past the end of its storage");
+        Self { data, rows, cols, stride, transposed: false }
+    }
+    /// The transpose; nothing is moved.
+    #[must_use]
+    pub fn t(self) -> Self {
+        Self { transposed: !self.transposed, ..self }
+    }
+    /// Number of rows as seen.
+    pub fn rows(&self) -> usize {
+        if self.transposed { self.cols } else { self.rows }
+    }
+    /// Number of columns as seen.
+    pub fn cols(&self) -> usize {
+        if self.transposed { self.rows } else { self.cols }
+    }
+}
+
+impl<'a, S> MatMut<'a, S> {
+    /// `rows x cols` matrix stored row after row without gaps.
+    ///
+    /// # Panics
+    /// If `data` is shorter than `rows * cols`.
+    pub fn new(data: &'a mut [S], rows: usize, cols: usize) -> Self {
+        Self::with_stride(data, rows, cols, cols)
+    }
+    /// `rows x cols` matrix whose rows start `stride >= cols` apart.
+    ///
+    /// # Panics
+    /// If `data` is too short or `stride < cols`.
+    pub fn with_stride(data: &'a mut [S], rows: usize, cols: usize, stride: usize) -> Self {
+        assert!(stride >= cols && data.len() >= extent(rows, cols, stride), "matrix view past the end of its storage");
+        Self { data, rows, cols, stride }
+    }
+}
+
+/// `C = alpha A B`, or `C += alpha A B` if `accumulate`; one thread.
+///
+/// The result does not depend on the thread count of the caller: nothing here is parallel.
+///
+/// # Panics
+/// If the shapes do not fit.
+pub fn gemm<S: Scalar>(c: MatMut<'_, S>, accumulate: bool, alpha: S, a: MatRef<'_, S>, b: MatRef<'_, S>) {
+    assert!(c.rows == a.rows() && c.cols == b.cols() && a.cols() == b.rows(), "matrix product of unfit shapes");
+    if c.rows == 0 || c.cols == 0 {
+        return;
+    }
+    let MatMut { data, rows, cols, stride } = c;
+    match (S::slice_mut(data), S::slice(a.data), S::slice(b.data)) {
+        (SliceMut::F32(c), Slice::F32(x), Slice::F32(y)) => {
+            fast(MatMut { data: c, rows, cols, stride }, accumulate, alpha.cast(), over(a, x), over(b, y));
+        }
+        (SliceMut::F64(c), Slice::F64(x), Slice::F64(y)) => {
+            fast(MatMut { data: c, rows, cols, stride }, accumulate, alpha.cast(), over(a, x), over(b, y));
+        }
+        (SliceMut::Other(c), _, _) => plain(MatMut { data: c, rows, cols, stride }, accumulate, alpha, a, b),
+        _ => unreachable!("one scalar type has one kind of slice"),
+    }
+}
+
+/// The same view over storage whose type is known.
+fn over<'a, S, T>(view: MatRef<'a, S>, data: &'a [T]) -> MatRef<'a, T> {
+    MatRef { data, rows: view.rows, cols: view.cols, stride: view.stride, transposed: view.transposed }
+}
+
+/// The product by faer.
+fn fast<T: faer::traits::ComplexField>(
+    c: MatMut<'_, T>,
+    accumulate: bool,
+    alpha: T,
+    a: MatRef<'_, T>,
+    b: MatRef<'_, T>,
+) {
+    fn view<'a, T>(m: MatRef<'a, T>) -> faer::MatRef<'a, T> {
+        let view = faer::MatRef::from_row_major_slice_with_stride(m.data, m.rows, m.cols, m.stride);
+        if m.transposed { view.transpose() } else { view }
+    }
+    // Not `from_row_major_slice_with_stride_mut`: faer 0.24.4 swaps its strides and writes past the slice.
+    let target =
+        faer::MatMut::from_column_major_slice_with_stride_mut(c.data, c.cols, c.rows, c.stride).transpose_mut();
+    let accum = if accumulate { Accum::Add } else { Accum::Replace };
+    matmul(target, accum, view(a), view(b), alpha, Par::Seq);
+}
+
+/// The product by loops, for scalars without a kernel: row `i` of `C` gathers rows of `B`.
+fn plain<S: Scalar>(c: MatMut<'_, S>, accumulate: bool, alpha: S, a: MatRef<'_, S>, b: MatRef<'_, S>) {
+    let at = |m: &MatRef<'_, S>, i: usize, j: usize| {
+        if m.transposed { m.data[j * m.stride + i] } else { m.data[i * m.stride + j] }
+    };
+    for i in 0..c.rows {
+        let row = &mut c.data[i * c.stride..i * c.stride + c.cols];
+        if !accumulate {
+            row.fill(<S as Real>::zero());
+        }
+        for k in 0..a.cols() {
+            let factor = alpha * at(&a, i, k);
+            if b.transposed {
+                for (j, target) in row.iter_mut().enumerate() {
+                    *target += factor * b.data[j * b.stride + k];
+                }
+            } else {
+                let source = &b.data[k * b.stride..k * b.stride + b.cols];
+                for (target, &value) in row.iter_mut().zip(source) {
+                    *target += factor * value;
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scalar::Dd;
+
+    /// Small integers: every product and sum is exact in every precision.
+    fn numbers<S: Scalar>(count: usize, seed: i32) -> Vec<S> {
+        (0..count as i32).map(|i| S::of_f64(f64::from((i * 7 + seed * 5) % 11 - 5))).collect()
+    }
+
+    fn check<S: Scalar>() {
+        for (m, k, n) in [(1, 1, 1), (3, 4, 5), (17, 9, 33), (2, 0, 3), (0, 3, 2)] {
+            for (ta, tb) in [(false, false), (true, false), (false, true), (true, true)] {
+                let (a, b) = (numbers::<S>(m * k, 1), numbers::<S>(k * n, 2));
+                let (stride, mut c) = (n + 3, numbers::<S>(m * (n + 3), 3));
+                let before = c.clone();
+                let va = if ta { MatRef::new(&a, k, m).t() } else { MatRef::new(&a, m, k) };
+                let vb = if tb { MatRef::new(&b, n, k).t() } else { MatRef::new(&b, k, n) };
+                let element = |i: usize, j: usize| {
+                    (0..k).fold(S::of_f64(0.0), |sum, l| {
+                        let x = if ta { a[l * m + i] } else { a[i * k + l] };
+                        let y = if tb { b[j * k + l] } else { b[l * n + j] };
+                        sum + x * y
+                    })
+                };
+                for accumulate in [false, true] {
+                    c.copy_from_slice(&before);
+                    gemm(MatMut::with_stride(&mut c, m, n, stride), accumulate, S::of_f64(2.0), va, vb);
+                    for i in 0..m {
+                        for j in 0..stride {
+                            let old = before[i * stride + j];
+                            let sum = if j < n { element(i, j) * S::of_f64(2.0) } else { old };
+                            let want = if j < n && accumulate { old + sum } else { sum };
+                            assert!(c[i * stride + j] == want, "{} {m}x{k}x{n} at {i},{j}", S::NAME);
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn products_of_integers_are_exact_in_every_precision() {
+        check::<f32>();
+        check::<f64>();
+        check::<Dd>();
+    }
+}
