@@ -1,3 +1,5 @@
-//! Batched small dense linear algebra: solve, symmetric eigen, inertia, minors; products.
+//! Batched small dense linear algebra: solve, symmetric eigen, inertia, minors.
 
-pub mod matmul;
+mod matmul;
+
+pub use matmul::{MatMut, MatRef, gemm};

@@ -9,7 +9,6 @@
 //! the adjoint of the mixed channel is the `dL/dz` it left: one forward pass, three reverse passes and four for the
 //! weights, beside the `n + 3` of the evaluation.
 
-use crate::linalg::matmul::{Matrix, Update, multiply};
 use crate::network::chunk::{Chunk, Hidden, plane};
 use crate::scalar::{Real, Scalar, vectorized};
 
@@ -91,7 +90,7 @@ impl<S: Scalar> Adjoint<S> {
             let velocity = &chunk.features.velocity[state * n..][..n];
             let drift = |factor: &[S], i: usize| if jets.moving { factor[i] } else { zero };
             let (arch, features) = (&chunk.architecture, &chunk.features);
-            let mut row = |k: usize| k * size + j * width..k * size + (j + 1) * width;
+            let row = |k: usize| k * size + j * width..k * size + (j + 1) * width;
             self.phi[row(0)].copy_from_slice(&features.value[state * width..][..width]);
             features.tangent(arch, state, |_| zero, |i| s[i], &mut self.phi[row(1)]);
             features.tangent(arch, state, |i| drift(velocity, i), |i| t[i], &mut self.phi[row(2)]);
@@ -110,12 +109,7 @@ impl<S: Scalar> Adjoint<S> {
         let zero = <S as Real>::zero();
         out.z.resize(3 * size, zero);
         out.h.resize(4 * size, zero);
-        multiply(
-            Matrix::new(plane(input, 3, count * layer.inputs), count, layer.inputs),
-            Matrix::new(&weights[layer.weight_range()], layer.outputs, layer.inputs).transposed(),
-            &mut out.z[2 * size..],
-            Update::Replace,
-        );
+        layer.apply(weights, count, plane(input, 3, count * layer.inputs), &mut out.z[2 * size..]);
         let n = chunk.architecture.coordinates;
         vectorized(|| {
             for (j, &state) in jets.state.iter().enumerate() {
@@ -154,25 +148,14 @@ impl<S: Scalar> Adjoint<S> {
         let shape = chunk.layout.layers[l];
         let (before, after) = self.layers.split_at_mut(l);
         let layer = &after[0];
-        let adjoint = Matrix::new(&layer.z_adjoint, 4 * count, shape.outputs);
         let input = before.last().map_or(&self.phi, |previous| &previous.h);
-        multiply(
-            adjoint.transposed(),
-            Matrix::new(&input[..4 * count * shape.inputs], 4 * count, shape.inputs),
-            &mut gradient[shape.weight_range()],
-            Update::Add,
-        );
+        shape.add_weight_gradient(4 * count, &layer.z_adjoint, input, gradient);
         // A bias enters the value channel alone.
         let value = plane(&layer.z_adjoint, 0, count * shape.outputs);
         vectorized(|| add_rows(value, &mut gradient[shape.bias_range()]));
         if let Some(previous) = before.last_mut() {
             previous.h_adjoint.resize(3 * count * shape.inputs, <S as Real>::zero());
-            multiply(
-                Matrix::new(&layer.z_adjoint[..3 * count * shape.outputs], 3 * count, shape.outputs),
-                Matrix::new(&weights[shape.weight_range()], shape.outputs, shape.inputs),
-                &mut previous.h_adjoint,
-                Update::Replace,
-            );
+            shape.pull_back(weights, 3 * count, &layer.z_adjoint, &mut previous.h_adjoint);
         }
     }
 }

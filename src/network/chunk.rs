@@ -7,7 +7,6 @@
 //! Buffers are planes `(channel, state, unit)`, so that the channels of a layer lie side by side and one matrix product
 //! serves them all.
 
-use crate::linalg::matmul::{Matrix, Update, multiply};
 use crate::network::features::FeatureBatch;
 use crate::network::{Architecture, Layout};
 use crate::scalar::{Real, Scalar, vectorized};
@@ -148,7 +147,13 @@ impl<S: Scalar> Chunk<S> {
                 let out = &mut self.phi[k * size + state * width..][..width];
                 let velocity = &self.features.velocity[state * n..][..n];
                 if k <= n {
-                    self.features.tangent(&self.architecture, state, |_| zero, |i| if i + 1 == k { one } else { zero }, out);
+                    self.features.tangent(
+                        &self.architecture,
+                        state,
+                        |_| zero,
+                        |i| if i + 1 == k { one } else { zero },
+                        out,
+                    );
                 } else {
                     self.features.tangent(&self.architecture, state, |i| velocity[i], |_| zero, out);
                 }
@@ -164,12 +169,7 @@ impl<S: Scalar> Chunk<S> {
         let (rows, size) = (channels * self.batch, self.batch * hidden.width);
         resize(&mut hidden.z, channels * size);
         resize(&mut hidden.h, channels * size);
-        multiply(
-            Matrix::new(&input[..rows * layer.inputs], rows, layer.inputs),
-            Matrix::new(&weights[layer.weight_range()], layer.outputs, layer.inputs).transposed(),
-            &mut hidden.z,
-            Update::Replace,
-        );
+        layer.apply(weights, rows, input, &mut hidden.z);
         let bias = &weights[layer.bias_range()];
         let (z, tangents) = hidden.z.split_at_mut(size);
         vectorized(|| add_to_rows(z, bias));
@@ -260,12 +260,7 @@ impl<S: Scalar> Chunk<S> {
                 }
                 None => &mut self.phi_adjoint,
             };
-            multiply(
-                Matrix::new(&hidden.z_adjoint, batch, layer.outputs),
-                Matrix::new(&weights[layer.weight_range()], layer.outputs, layer.inputs),
-                target,
-                Update::Replace,
-            );
+            layer.pull_back(weights, batch, &hidden.z_adjoint, target);
         }
         self.finish_gradient(has_mass);
     }

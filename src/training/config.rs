@@ -169,7 +169,12 @@ impl Config {
         check_bounds("data.validation_position", &self.data.validation_position, n)?;
         check_bounds("data.validation_velocity", &self.data.validation_velocity, n)?;
         let hidden = &self.network.hidden;
-        check(!hidden.is_empty() && hidden.len() <= 64, "network.hidden", "1 to 64 widths", format!("{}", hidden.len()))?;
+        check(
+            !hidden.is_empty() && hidden.len() <= 64,
+            "network.hidden",
+            "1 to 64 widths",
+            format!("{}", hidden.len()),
+        )?;
         for (k, &width) in hidden.iter().enumerate() {
             count(width, &format!("network.hidden[{k}]"), 1 << 16)?;
         }

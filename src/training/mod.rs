@@ -9,13 +9,11 @@ mod schedule;
 mod solver;
 mod trainer;
 
-pub use config::{
-    Config, ConfigError, Data, Network, OnFailure, Optimizer, Phase, Precision, Scaling,
-};
+pub use config::{Config, ConfigError, Data, Network, OnFailure, Optimizer, Phase, Precision, Scaling};
 pub use dataset::{Dataset, DatasetError};
 pub use objective::{BatchReport, Failure, Objective};
 pub use optimizer::{Method, Moments, Update};
 pub use penalty::Penalty;
 pub use schedule::Schedule;
-pub use solver::{EpochSolver, Epoch, Progress, StepError, TrainingProblem, TrainingState, Watcher};
+pub use solver::{Epoch, EpochSolver, Progress, StepError, TrainingProblem, TrainingState, Watcher};
 pub use trainer::{Datasets, Hooks, Stop, Stream, Trained, TrainingError, train};

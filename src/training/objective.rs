@@ -186,7 +186,13 @@ impl<S: Scalar> Stripe<S> {
             self.residual.add(residual.abs());
             if let Some(weight) = weight {
                 // The sign of zero is zero.
-                let sign = if residual > zero { weight } else if residual < zero { -weight } else { zero };
+                let sign = if residual > zero {
+                    weight
+                } else if residual < zero {
+                    -weight
+                } else {
+                    zero
+                };
                 self.jets.s.push(-sign);
             }
         }
@@ -220,7 +226,11 @@ impl<S: Scalar> Objective<S> {
     ///
     /// # Errors
     /// When the threads cannot be started.
-    pub fn new(architecture: &Architecture, penalty: Penalty, threads: usize) -> Result<Self, rayon::ThreadPoolBuildError> {
+    pub fn new(
+        architecture: &Architecture,
+        penalty: Penalty,
+        threads: usize,
+    ) -> Result<Self, rayon::ThreadPoolBuildError> {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.max(1)).build()?;
         Ok(Self { architecture: architecture.clone(), penalty, pool, stripes: Vec::new() })
     }
@@ -308,27 +318,43 @@ mod temporary {
         for k in 0..n {
             let mut p = k;
             for i in k + 1..n {
-                if a[i * n + k].abs() > a[p * n + k].abs() { p = i; }
+                if a[i * n + k].abs() > a[p * n + k].abs() {
+                    p = i;
+                }
             }
-            if !a[p * n + k].is_finite() { return Err(None); }
-            if a[p * n + k].abs() <= S::EPSILON * m[0].abs() { return Err(Some(f64::INFINITY)); }
-            for j in 0..n { a.swap(k * n + j, p * n + j); }
+            if !a[p * n + k].is_finite() {
+                return Err(None);
+            }
+            if a[p * n + k].abs() <= S::EPSILON * m[0].abs() {
+                return Err(Some(f64::INFINITY));
+            }
+            for j in 0..n {
+                a.swap(k * n + j, p * n + j);
+            }
             x.swap(k, p);
             for i in k + 1..n {
                 let f = a[i * n + k] / a[k * n + k];
-                for j in k..n { let t = a[k * n + j]; a[i * n + j] -= f * t; }
+                for j in k..n {
+                    let t = a[k * n + j];
+                    a[i * n + j] -= f * t;
+                }
                 let t = x[k];
                 x[i] -= f * t;
             }
         }
         for k in (0..n).rev() {
-            for j in k + 1..n { let t = a[k * n + j] * x[j]; x[k] -= t; }
+            for j in k + 1..n {
+                let t = a[k * n + j] * x[j];
+                x[k] -= t;
+            }
             x[k] /= a[k * n + k];
         }
         if x.iter().all(|x| x.is_finite()) { Ok(()) } else { Err(None) }
     }
     pub fn negative<S: Scalar>(n: usize, m: &[S], mut f: impl FnMut(S, &[S])) {
-        if !m.iter().all(|x| x.is_finite()) { return; }
+        if !m.iter().all(|x| x.is_finite()) {
+            return;
+        }
         let e = nalgebra::DMatrix::from_fn(n, n, |i, j| m[i * n + j].to_f64()).symmetric_eigen();
         for k in 0..n {
             if e.eigenvalues[k] < 0.0 {
