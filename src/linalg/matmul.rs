@@ -1,94 +1,151 @@
-//! Matrix products on row-major slices: the only place that names the product of a library.
+//! Matrix products `C = alpha A B` or `C += alpha A B`: faer's kernels for `f32` and `f64`, a plain loop otherwise.
 
-use crate::scalar::{Real, Scalar, View, ViewMut};
+use crate::scalar::{Real, Scalar, Slice, SliceMut};
 use faer::linalg::matmul::matmul;
-use faer::traits::ComplexField;
-use faer::{Accum, MatMut, MatRef, Par};
+use faer::{Accum, Par};
 
-/// A matrix in a slice: element `(i, j)` at `i * row_stride + j * column_stride`.
+/// A matrix view over row-major storage, possibly transposed.
 #[derive(Clone, Copy, Debug)]
-pub struct Matrix<'a, S> {
+pub struct MatRef<'a, S> {
     data: &'a [S],
     rows: usize,
-    columns: usize,
-    row_stride: usize,
-    column_stride: usize,
+    cols: usize,
+    stride: usize,
+    transposed: bool,
 }
 
-impl<'a, S> Matrix<'a, S> {
-    /// A row-major `(rows, columns)` matrix. Panics if the slice is shorter.
-    pub fn new(data: &'a [S], rows: usize, columns: usize) -> Self {
-        assert!(data.len() >= rows * columns, "matrix of {rows} x {columns} in a slice of {}", data.len());
-        Self { data, rows, columns, row_stride: columns, column_stride: 1 }
+/// A mutable matrix view over row-major storage.
+#[derive(Debug)]
+pub struct MatMut<'a, S> {
+    data: &'a mut [S],
+    rows: usize,
+    cols: usize,
+    stride: usize,
+}
+
+/// Numbers a `rows x cols` row-major matrix with `stride` between its rows occupies.
+fn extent(rows: usize, cols: usize, stride: usize) -> usize {
+    if rows == 0 || cols == 0 { 0 } else { (rows - 1) * stride + cols }
+}
+
+impl<'a, S> MatRef<'a, S> {
+    /// `rows x cols` matrix stored row after row without gaps.
+    ///
+    /// # Panics
+    /// If `data` is shorter than `rows * cols`.
+    pub fn new(data: &'a [S], rows: usize, cols: usize) -> Self {
+        Self::with_stride(data, rows, cols, cols)
     }
-    /// The transpose, without moving a number.
-    pub fn transposed(self) -> Self {
-        Self {
-            rows: self.columns,
-            columns: self.rows,
-            row_stride: self.column_stride,
-            column_stride: self.row_stride,
-            ..self
-        }
+    /// `rows x cols` matrix whose rows start `stride >= cols` apart.
+    ///
+    /// # Panics
+    /// If `data` is too short or `stride < cols`.
+    pub fn with_stride(data: &'a [S], rows: usize, cols: usize, stride: usize) -> Self {
+        assert!(stride >= cols && data.len() >= extent(rows, cols, stride), "matrix view past the end of its storage");
+        Self { data, rows, cols, stride, transposed: false }
+    }
+    /// The transpose; nothing is moved.
+    #[must_use]
+    pub fn t(self) -> Self {
+        Self { transposed: !self.transposed, ..self }
+    }
+    /// Number of rows as seen.
+    pub fn rows(&self) -> usize {
+        if self.transposed { self.cols } else { self.rows }
+    }
+    /// Number of columns as seen.
+    pub fn cols(&self) -> usize {
+        if self.transposed { self.rows } else { self.cols }
     }
 }
 
-/// What happens to the numbers that stand in the destination.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Update {
-    /// They are replaced.
-    Replace,
-    /// The product is added to them.
-    Add,
+impl<'a, S> MatMut<'a, S> {
+    /// `rows x cols` matrix stored row after row without gaps.
+    ///
+    /// # Panics
+    /// If `data` is shorter than `rows * cols`.
+    pub fn new(data: &'a mut [S], rows: usize, cols: usize) -> Self {
+        Self::with_stride(data, rows, cols, cols)
+    }
+    /// `rows x cols` matrix whose rows start `stride >= cols` apart.
+    ///
+    /// # Panics
+    /// If `data` is too short or `stride < cols`.
+    pub fn with_stride(data: &'a mut [S], rows: usize, cols: usize, stride: usize) -> Self {
+        assert!(stride >= cols && data.len() >= extent(rows, cols, stride), "matrix view past the end of its storage");
+        Self { data, rows, cols, stride }
+    }
 }
 
-/// `destination (+)= left right`, destination row-major `(left rows, right columns)`; on the calling thread.
+/// `C = alpha A B`, or `C += alpha A B` if `accumulate`; one thread.
 ///
-/// Hardware floats go through faer (run-time dispatch to AVX-512, AVX2, NEON), software numbers through a plain loop.
-/// Panics if the inner dimensions or the destination's length disagree.
-pub fn multiply<S: Scalar>(left: Matrix<'_, S>, right: Matrix<'_, S>, destination: &mut [S], update: Update) {
-    assert_eq!(left.columns, right.rows, "inner dimensions of a matrix product");
-    assert_eq!(destination.len(), left.rows * right.columns, "destination of a matrix product");
-    if destination.is_empty() {
+/// The result does not depend on the thread count of the caller: nothing here is parallel.
+///
+/// # Panics
+/// If the shapes do not fit.
+pub fn gemm<S: Scalar>(c: MatMut<'_, S>, accumulate: bool, alpha: S, a: MatRef<'_, S>, b: MatRef<'_, S>) {
+    assert!(c.rows == a.rows() && c.cols == b.cols() && a.cols() == b.rows(), "matrix product of unfit shapes");
+    if c.rows == 0 || c.cols == 0 {
         return;
     }
-    match (S::view(left.data), S::view(right.data), S::view_mut(destination)) {
-        (View::F32(l), View::F32(r), ViewMut::F32(d)) => through_faer((l, left), (r, right), d, update),
-        (View::F64(l), View::F64(r), ViewMut::F64(d)) => through_faer((l, left), (r, right), d, update),
-        _ => plain(left, right, destination, update),
+    let MatMut { data, rows, cols, stride } = c;
+    match (S::slice_mut(data), S::slice(a.data), S::slice(b.data)) {
+        (SliceMut::F32(c), Slice::F32(x), Slice::F32(y)) => {
+            fast(MatMut { data: c, rows, cols, stride }, accumulate, alpha.cast(), over(a, x), over(b, y));
+        }
+        (SliceMut::F64(c), Slice::F64(x), Slice::F64(y)) => {
+            fast(MatMut { data: c, rows, cols, stride }, accumulate, alpha.cast(), over(a, x), over(b, y));
+        }
+        (SliceMut::Other(c), _, _) => plain(MatMut { data: c, rows, cols, stride }, accumulate, alpha, a, b),
+        _ => unreachable!("one scalar type has one kind of slice"),
     }
 }
 
-fn through_faer<S, F: ComplexField + Copy>(
-    (left, l): (&[F], Matrix<'_, S>),
-    (right, r): (&[F], Matrix<'_, S>),
-    destination: &mut [F],
-    update: Update,
-) {
-    // Strides of a transpose are swapped back: faer sees the stored orientation.
-    let view = |data, m: &Matrix<'_, S>| -> MatRef<'_, F> {
-        if m.column_stride == 1 {
-            MatRef::from_row_major_slice(data, m.rows, m.columns)
-        } else {
-            MatRef::from_column_major_slice(data, m.rows, m.columns)
-        }
-    };
-    let left = view(&left[..l.rows * l.columns], &l);
-    let right = view(&right[..r.rows * r.columns], &r);
-    let accumulate = if update == Update::Add { Accum::Add } else { Accum::Replace };
-    let destination: MatMut<'_, F> = MatMut::from_row_major_slice_mut(destination, l.rows, r.columns);
-    matmul(destination, accumulate, left, right, F::one_impl(), Par::Seq);
+/// The same view over storage whose type is known.
+fn over<'a, S, T>(view: MatRef<'a, S>, data: &'a [T]) -> MatRef<'a, T> {
+    MatRef { data, rows: view.rows, cols: view.cols, stride: view.stride, transposed: view.transposed }
 }
 
-fn plain<S: Scalar>(left: Matrix<'_, S>, right: Matrix<'_, S>, destination: &mut [S], update: Update) {
-    for (i, row) in destination.chunks_exact_mut(right.columns).enumerate() {
-        if update == Update::Replace {
+/// The product by faer.
+fn fast<T: faer::traits::ComplexField>(
+    c: MatMut<'_, T>,
+    accumulate: bool,
+    alpha: T,
+    a: MatRef<'_, T>,
+    b: MatRef<'_, T>,
+) {
+    fn view<'a, T>(m: MatRef<'a, T>) -> faer::MatRef<'a, T> {
+        let view = faer::MatRef::from_row_major_slice_with_stride(m.data, m.rows, m.cols, m.stride);
+        if m.transposed { view.transpose() } else { view }
+    }
+    // Not `from_row_major_slice_with_stride_mut`: faer 0.24.4 swaps its strides and writes past the slice.
+    let target =
+        faer::MatMut::from_column_major_slice_with_stride_mut(c.data, c.cols, c.rows, c.stride).transpose_mut();
+    let accum = if accumulate { Accum::Add } else { Accum::Replace };
+    matmul(target, accum, view(a), view(b), alpha, Par::Seq);
+}
+
+/// The product by loops, for scalars without a kernel: row `i` of `C` gathers rows of `B`.
+fn plain<S: Scalar>(c: MatMut<'_, S>, accumulate: bool, alpha: S, a: MatRef<'_, S>, b: MatRef<'_, S>) {
+    let at = |m: &MatRef<'_, S>, i: usize, j: usize| {
+        if m.transposed { m.data[j * m.stride + i] } else { m.data[i * m.stride + j] }
+    };
+    for i in 0..c.rows {
+        let row = &mut c.data[i * c.stride..i * c.stride + c.cols];
+        if !accumulate {
             row.fill(<S as Real>::zero());
         }
-        for k in 0..left.columns {
-            let factor = left.data[i * left.row_stride + k * left.column_stride];
-            for (j, element) in row.iter_mut().enumerate() {
-                *element += factor * right.data[k * right.row_stride + j * right.column_stride];
+        for k in 0..a.cols() {
+            let factor = alpha * at(&a, i, k);
+            if b.transposed {
+                for (j, target) in row.iter_mut().enumerate() {
+                    *target += factor * b.data[j * b.stride + k];
+                }
+            } else {
+                let source = &b.data[k * b.stride..k * b.stride + b.cols];
+                for (target, &value) in row.iter_mut().zip(source) {
+                    *target += factor * value;
+                }
             }
         }
     }
@@ -99,29 +156,38 @@ mod tests {
     use super::*;
     use crate::scalar::Dd;
 
+    /// Small integers: every product and sum is exact in every precision.
+    fn numbers<S: Scalar>(count: usize, seed: i32) -> Vec<S> {
+        (0..count as i32).map(|i| S::of_f64(f64::from((i * 7 + seed * 5) % 11 - 5))).collect()
+    }
+
     fn check<S: Scalar>() {
-        let at = |k: usize| S::of_f64(((k * 7919) % 31) as f64 - 15.0);
-        let (m, k, n) = (5, 7, 3);
-        let left: Vec<S> = (0..m * k).map(at).collect();
-        let right: Vec<S> = (0..k * n).map(|i| at(i + 3)).collect();
-        let expected: Vec<S> = (0..m * n)
-            .map(|e| {
-                (0..k).fold(<S as Real>::zero(), |sum, p| sum + left[e / n * k + p] * right[p * n + e % n])
-            })
-            .collect();
-        let mut out = vec![S::NAN; m * n];
-        multiply(Matrix::new(&left, m, k), Matrix::new(&right, k, n), &mut out, Update::Replace);
-        assert_eq!(out, expected, "integers multiply exactly");
-        multiply(Matrix::new(&left, m, k), Matrix::new(&right, k, n), &mut out, Update::Add);
-        let twice: Vec<S> = expected.iter().map(|&e| e + e).collect();
-        assert_eq!(out, twice);
-        // (A B)^T = B^T A^T
-        let mut flipped = vec![S::NAN; m * n];
-        let (l, r) = (Matrix::new(&right, k, n).transposed(), Matrix::new(&left, m, k).transposed());
-        multiply(l, r, &mut flipped, Update::Replace);
-        for i in 0..m {
-            for j in 0..n {
-                assert_eq!(flipped[j * m + i], expected[i * n + j]);
+        for (m, k, n) in [(1, 1, 1), (3, 4, 5), (17, 9, 33), (2, 0, 3), (0, 3, 2)] {
+            for (ta, tb) in [(false, false), (true, false), (false, true), (true, true)] {
+                let (a, b) = (numbers::<S>(m * k, 1), numbers::<S>(k * n, 2));
+                let (stride, mut c) = (n + 3, numbers::<S>(m * (n + 3), 3));
+                let before = c.clone();
+                let va = if ta { MatRef::new(&a, k, m).t() } else { MatRef::new(&a, m, k) };
+                let vb = if tb { MatRef::new(&b, n, k).t() } else { MatRef::new(&b, k, n) };
+                let element = |i: usize, j: usize| {
+                    (0..k).fold(S::of_f64(0.0), |sum, l| {
+                        let x = if ta { a[l * m + i] } else { a[i * k + l] };
+                        let y = if tb { b[j * k + l] } else { b[l * n + j] };
+                        sum + x * y
+                    })
+                };
+                for accumulate in [false, true] {
+                    c.copy_from_slice(&before);
+                    gemm(MatMut::with_stride(&mut c, m, n, stride), accumulate, S::of_f64(2.0), va, vb);
+                    for i in 0..m {
+                        for j in 0..stride {
+                            let old = before[i * stride + j];
+                            let sum = if j < n { element(i, j) * S::of_f64(2.0) } else { old };
+                            let want = if j < n && accumulate { old + sum } else { sum };
+                            assert!(c[i * stride + j] == want, "{} {m}x{k}x{n} at {i},{j}", S::NAME);
+                        }
+                    }
+                }
             }
         }
     }

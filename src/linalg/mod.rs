@@ -14,7 +14,7 @@ mod inverse;
 mod jacobi;
 mod large;
 mod lu;
-pub mod matmul;
+mod matmul;
 mod minors;
 mod solve;
 
@@ -24,5 +24,6 @@ pub use eigh::{eigenvalues, eigh};
 pub use error::{Failure, LinalgError};
 pub use inertia::{Inertia, inertia, is_positive_definite};
 pub use inverse::inverse;
+pub use matmul::{MatMut, MatRef, gemm};
 pub use minors::{Scaled, adjugate, leading_minors};
 pub use solve::solve;

@@ -6,9 +6,13 @@
 mod dd;
 mod primitive;
 mod simd;
+mod slices;
+mod sum;
 
 pub use dd::Dd;
 pub use simd::vectorized;
+pub use slices::{Slice, SliceMut};
+pub use sum::Sum;
 
 use std::fmt::{Debug, Display};
 use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
@@ -40,6 +44,12 @@ pub trait Real:
     ///
     /// On a tape that records a replayable program this is a data-dependent read and refused (see `tape`).
     fn primal(self) -> Self::Scalar;
+
+    /// Exactly 0 with all its derivatives: what a sum may leave out and a product may answer with.
+    #[inline(always)]
+    fn is_exact_zero(self) -> bool {
+        self.primal() == Self::Scalar::of_f64(0.0)
+    }
 
     /// The constant nearest to `value`: exact unless the scalar is `f32`.
     #[inline]
@@ -145,28 +155,6 @@ pub trait Real:
     }
 }
 
-/// What a slice of scalars is made of.
-#[derive(Clone, Copy, Debug)]
-pub enum View<'a> {
-    /// Single precision.
-    F32(&'a [f32]),
-    /// Double precision.
-    F64(&'a [f64]),
-    /// Numbers computed in software.
-    Software,
-}
-
-/// What a mutable slice of scalars is made of.
-#[derive(Debug)]
-pub enum ViewMut<'a> {
-    /// Single precision.
-    F32(&'a mut [f32]),
-    /// Double precision.
-    F64(&'a mut [f64]),
-    /// Numbers computed in software.
-    Software,
-}
-
 /// An innermost floating-point number: `f32`, `f64` or [`Dd`].
 pub trait Scalar:
     Real<Scalar = Self>
@@ -216,15 +204,15 @@ pub trait Scalar:
     /// The exponent `e` with `2^e <= |self| < 2^(e+1)`; `i32::MIN` for zero.
     fn ilogb(self) -> i32;
 
-    /// The slice as hardware floats, if it is one; how generic code reaches kernels that exist for these alone.
+    /// A slice by its concrete type.
     #[inline(always)]
-    fn view(_slice: &[Self]) -> View<'_> {
-        View::Software
+    fn slice(values: &[Self]) -> Slice<'_, Self> {
+        Slice::Other(values)
     }
-    /// The slice as mutable hardware floats, if it is one.
+    /// A mutable slice by its concrete type.
     #[inline(always)]
-    fn view_mut(_slice: &mut [Self]) -> ViewMut<'_> {
-        ViewMut::Software
+    fn slice_mut(values: &mut [Self]) -> SliceMut<'_, Self> {
+        SliceMut::Other(values)
     }
     /// Leading and trailing part: their exact sum is the number.
     fn parts(self) -> (f64, f64);

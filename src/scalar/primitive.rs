@@ -1,9 +1,9 @@
 //! `f32` and `f64` as [`Real`] and [`Scalar`].
 
-use super::{Real, Scalar, View, ViewMut};
+use super::{Real, Scalar, Slice, SliceMut};
 
 macro_rules! impl_primitive {
-    ($float:ident, $variant:ident, $bits:ty, $erfc:path) => {
+    ($float:ident, $bits:ty, $erfc:path) => {
         impl Real for $float {
             type Scalar = $float;
 
@@ -91,12 +91,12 @@ macro_rules! impl_primitive {
                 f64::from(self)
             }
             #[inline(always)]
-            fn view(slice: &[Self]) -> View<'_> {
-                View::$variant(slice)
+            fn slice(values: &[Self]) -> Slice<'_, Self> {
+                values.into()
             }
             #[inline(always)]
-            fn view_mut(slice: &mut [Self]) -> ViewMut<'_> {
-                ViewMut::$variant(slice)
+            fn slice_mut(values: &mut [Self]) -> SliceMut<'_, Self> {
+                values.into()
             }
             #[inline(always)]
             fn parts(self) -> (f64, f64) {
@@ -165,5 +165,5 @@ macro_rules! impl_primitive {
     };
 }
 
-impl_primitive!(f32, F32, u32, libm::erfcf);
-impl_primitive!(f64, F64, u64, libm::erfc);
+impl_primitive!(f32, u32, libm::erfcf);
+impl_primitive!(f64, u64, libm::erfc);

@@ -1,1 +1,19 @@
 //! Datasets, losses, regularizers, optimisers hosted by argmin, the trainer.
+
+mod config;
+mod dataset;
+mod objective;
+mod optimizer;
+mod penalty;
+mod schedule;
+mod solver;
+mod trainer;
+
+pub use config::{Config, ConfigError, Data, Network, OnFailure, Optimizer, Phase, Precision, Scaling};
+pub use dataset::{Dataset, DatasetError};
+pub use objective::{BatchReport, Failure, Objective};
+pub use optimizer::{Method, Moments, Update};
+pub use penalty::Penalty;
+pub use schedule::Schedule;
+pub use solver::{Epoch, EpochSolver, Progress, StepError, TrainingProblem, TrainingState, Watcher};
+pub use trainer::{Datasets, Hooks, Stop, Stream, Trained, TrainingError, train};

@@ -1,0 +1,222 @@
+//! Everything that determines a training run; written beside every model as `config.toml`.
+
+use crate::network::{Activation, Initialization};
+use crate::training::optimizer::Method;
+use crate::training::penalty::Penalty;
+use crate::training::schedule::Schedule;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use thiserror::Error;
+
+/// Precision of weights and arithmetic in training.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Precision {
+    /// Single precision.
+    F32,
+    /// Double precision.
+    F64,
+}
+
+/// What happens when a step meets a state without a finite acceleration or a gradient that is not finite.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum OnFailure {
+    /// States with a singular mass matrix are left out; a step that is not finite is skipped, weights unchanged.
+    Skip,
+    /// Training stops before the weights change and says step and row.
+    Stop,
+}
+
+/// How coordinates are scaled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Scaling {
+    /// `s_i` is the largest of `|q_i|` and `|v_i|` over the training set of the first phase.
+    Physical,
+    /// All `s_i` are 1.
+    None,
+}
+
+/// A complete training run. Keys that are not listed are refused.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Config {
+    /// Name of the system.
+    pub system: String,
+    /// Seed of everything random: states, weights, order of the data.
+    pub seed: u64,
+    /// Precision of weights and arithmetic.
+    pub precision: Precision,
+    /// Parameters of the system that differ from its defaults.
+    #[serde(default)]
+    pub parameters: BTreeMap<String, f64>,
+    /// Sampled states.
+    pub data: Data,
+    /// Shape of the network.
+    pub network: Network,
+    /// Penalty on the mass matrix.
+    #[serde(default)]
+    pub penalty: Penalty,
+    /// Update rule.
+    pub optimizer: Optimizer,
+    /// Phases in order, each from the best weights of the one before.
+    #[serde(rename = "phase")]
+    pub phases: Vec<Phase>,
+}
+
+/// States that are sampled uniformly within bounds.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Data {
+    /// Number of training states.
+    pub training: usize,
+    /// Number of validation states; the best epoch is chosen on them.
+    pub validation: usize,
+    /// Number of fresh states on which the final model is judged.
+    pub test: usize,
+    /// Validation and test bounds of each coordinate.
+    pub validation_position: Vec<[f64; 2]>,
+    /// Validation and test bounds of each velocity.
+    pub validation_velocity: Vec<[f64; 2]>,
+}
+
+/// Shape of the network.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Network {
+    /// Widths of the hidden layers.
+    pub hidden: Vec<usize>,
+    /// Activation of the hidden layers.
+    pub activation: Activation,
+    /// Factor of the added `|v|^2` of scaled velocities.
+    pub alpha: f64,
+    /// Scaling of the coordinates.
+    pub scaling: Scaling,
+    /// Feed sine and cosine of periodic coordinates.
+    pub embed_periodic: bool,
+    /// Distribution of the initial weights.
+    pub initialization: Initialization,
+}
+
+/// Update rule.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Optimizer {
+    /// Adam or RAdam.
+    pub method: Method,
+    /// States per step.
+    pub batch: usize,
+    /// L2 weight decay, added to the gradient.
+    pub weight_decay: f64,
+    /// The gradient's norm is cut to this.
+    pub clip: f64,
+    /// Weights are averaged over about `1/(1 - averaging)` steps for validation and the final model; 0: not averaged.
+    pub averaging: f64,
+    /// What happens when a step fails.
+    pub on_failure: OnFailure,
+}
+
+/// A stretch of training with its own states and learning rates.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Phase {
+    /// Passes through the training states.
+    pub epochs: usize,
+    /// Initial learning rate.
+    pub rate: f64,
+    /// Lowest learning rate.
+    pub eta_min: f64,
+    /// How the rate moves.
+    pub schedule: Schedule,
+    /// Epochs from highest to lowest rate of `cosine-annealing`.
+    pub t_max: f64,
+    /// Training bounds of each coordinate.
+    pub position: Vec<[f64; 2]>,
+    /// Training bounds of each velocity.
+    pub velocity: Vec<[f64; 2]>,
+}
+
+/// A value of a configuration that is out of range.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[error("{field}: expected {expected}, found {found}")]
+pub struct ConfigError {
+    /// Path of the value, such as `phase[0].rate`.
+    pub field: String,
+    /// What would have been right.
+    pub expected: &'static str,
+    /// What stands there.
+    pub found: String,
+}
+
+impl Config {
+    /// Checks every range, for a system of `n` coordinates.
+    ///
+    /// # Errors
+    /// The first value out of range.
+    pub fn validate(&self, n: usize) -> Result<(), ConfigError> {
+        let check = |ok: bool, field: &str, expected: &'static str, found: String| {
+            if ok { Ok(()) } else { Err(ConfigError { field: field.to_string(), expected, found }) }
+        };
+        let count = |value: usize, field: &str, most: usize| {
+            check((1..=most).contains(&value), field, "a positive number of sensible size", value.to_string())
+        };
+        let fraction = |value: f64, field: &str, ok: bool, expected| check(ok, field, expected, format!("{value}"));
+        const STATES: usize = 1 << 30;
+        count(self.data.training, "data.training", STATES)?;
+        count(self.data.validation, "data.validation", STATES)?;
+        count(self.data.test, "data.test", STATES)?;
+        check_bounds("data.validation_position", &self.data.validation_position, n)?;
+        check_bounds("data.validation_velocity", &self.data.validation_velocity, n)?;
+        let hidden = &self.network.hidden;
+        check(
+            !hidden.is_empty() && hidden.len() <= 64,
+            "network.hidden",
+            "1 to 64 widths",
+            format!("{}", hidden.len()),
+        )?;
+        for (k, &width) in hidden.iter().enumerate() {
+            count(width, &format!("network.hidden[{k}]"), 1 << 16)?;
+        }
+        let finite = "a finite number";
+        fraction(self.network.alpha, "network.alpha", self.network.alpha.is_finite(), finite)?;
+        if let Penalty::Eigenvalue { lambda } = self.penalty {
+            let ok = lambda.is_finite() && lambda >= 0.0;
+            fraction(lambda, "penalty.lambda", ok, "a finite number of at least 0")?;
+        }
+        let optimizer = &self.optimizer;
+        count(optimizer.batch, "optimizer.batch", STATES)?;
+        let decay = optimizer.weight_decay;
+        let ok = decay.is_finite() && decay >= 0.0;
+        fraction(decay, "optimizer.weight_decay", ok, "a finite number of at least 0")?;
+        fraction(optimizer.clip, "optimizer.clip", optimizer.clip > 0.0, "a positive number")?;
+        let averaging = optimizer.averaging;
+        fraction(averaging, "optimizer.averaging", (0.0..1.0).contains(&averaging), "a number from 0 to below 1")?;
+        check(!self.phases.is_empty(), "phase", "at least one phase", "none".to_string())?;
+        for (k, phase) in self.phases.iter().enumerate() {
+            let field = |name: &str| format!("phase[{k}].{name}");
+            count(phase.epochs, &field("epochs"), 1 << 24)?;
+            let positive = |x: f64| x.is_finite() && x > 0.0;
+            fraction(phase.rate, &field("rate"), positive(phase.rate), "a positive number")?;
+            let ok = (0.0..=phase.rate).contains(&phase.eta_min);
+            fraction(phase.eta_min, &field("eta_min"), ok, "a number from 0 to the rate")?;
+            fraction(phase.t_max, &field("t_max"), positive(phase.t_max), "a positive number of epochs")?;
+            check_bounds(&field("position"), &phase.position, n)?;
+            check_bounds(&field("velocity"), &phase.velocity, n)?;
+        }
+        Ok(())
+    }
+}
+
+fn check_bounds(field: &str, bounds: &[[f64; 2]], n: usize) -> Result<(), ConfigError> {
+    let fault = |field: String, expected, found| Err(ConfigError { field, expected, found });
+    if bounds.len() != n {
+        return fault(field.to_string(), "one [low, high] per coordinate", format!("{} for {n}", bounds.len()));
+    }
+    for (k, &[low, high]) in bounds.iter().enumerate() {
+        if !(low.is_finite() && high.is_finite() && low <= high) {
+            return fault(format!("{field}[{k}]"), "finite [low, high] in order", format!("[{low}, {high}]"));
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,126 @@
+//! States with their accelerations: what a network learns from.
+
+use crate::scalar::Scalar;
+use thiserror::Error;
+
+/// States and accelerations in physical units, all `(states, n)` row-major.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Dataset<S> {
+    coordinates: usize,
+    q: Vec<S>,
+    v: Vec<S>,
+    a: Vec<S>,
+}
+
+/// Why numbers do not make a dataset.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+pub enum DatasetError {
+    /// Lengths disagree.
+    #[error("{what}: expected {expected} numbers, found {found}")]
+    Shape {
+        /// Which array.
+        what: &'static str,
+        /// Numbers expected.
+        expected: usize,
+        /// Numbers found.
+        found: usize,
+    },
+    /// A number is infinite or `NaN`.
+    #[error("{what} {column} of state {row} is not finite")]
+    NotFinite {
+        /// Which array.
+        what: &'static str,
+        /// State, from 0.
+        row: usize,
+        /// Coordinate, from 0.
+        column: usize,
+    },
+    /// No states.
+    #[error("a dataset needs at least one state")]
+    Empty,
+}
+
+impl<S: Scalar> Dataset<S> {
+    /// Checks shapes and finiteness.
+    ///
+    /// # Errors
+    /// [`DatasetError`] naming the first offending array, row and column.
+    pub fn new(coordinates: usize, q: Vec<S>, v: Vec<S>, a: Vec<S>) -> Result<Self, DatasetError> {
+        if coordinates == 0 || q.is_empty() {
+            return Err(DatasetError::Empty);
+        }
+        let expected = q.len() / coordinates * coordinates;
+        for (what, values) in [("coordinate", &q), ("velocity", &v), ("acceleration", &a)] {
+            if values.len() != expected {
+                return Err(DatasetError::Shape { what, expected, found: values.len() });
+            }
+            if let Some(k) = values.iter().position(|x| !x.is_finite()) {
+                return Err(DatasetError::NotFinite { what, row: k / coordinates, column: k % coordinates });
+            }
+        }
+        Ok(Self { coordinates, q, v, a })
+    }
+
+    /// Number of coordinates `n`.
+    pub fn coordinates(&self) -> usize {
+        self.coordinates
+    }
+    /// Number of states.
+    pub fn len(&self) -> usize {
+        self.q.len() / self.coordinates
+    }
+    /// Whether there is no state; never, once built.
+    pub fn is_empty(&self) -> bool {
+        self.q.is_empty()
+    }
+    /// Coordinates `(states, n)`.
+    pub fn q(&self) -> &[S] {
+        &self.q
+    }
+    /// Velocities `(states, n)`.
+    pub fn v(&self) -> &[S] {
+        &self.v
+    }
+    /// Accelerations `(states, n)`.
+    pub fn a(&self) -> &[S] {
+        &self.a
+    }
+
+    /// One scale per coordinate: the largest of `|q_i|` and `|v_i|` over all states, 1 where both vanish.
+    pub fn physical_scale(&self) -> Vec<f64> {
+        let n = self.coordinates;
+        (0..n)
+            .map(|i| {
+                let largest = |x: &[S]| x.iter().skip(i).step_by(n).fold(0.0_f64, |m, x| m.max(x.to_f64().abs()));
+                let scale = largest(&self.q).max(largest(&self.v));
+                if scale > 0.0 { scale } else { 1.0 }
+            })
+            .collect()
+    }
+
+    /// The same states in another precision.
+    pub fn cast<T: Scalar>(&self) -> Dataset<T> {
+        let cast = |x: &[S]| x.iter().map(|&x| x.cast()).collect();
+        Dataset { coordinates: self.coordinates, q: cast(&self.q), v: cast(&self.v), a: cast(&self.a) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn offending_numbers_are_named() {
+        let bad = Dataset::new(2, vec![0.0; 4], vec![0.0, 0.0, 0.0, f64::NAN], vec![0.0; 4]);
+        assert_eq!(bad, Err(DatasetError::NotFinite { what: "velocity", row: 1, column: 1 }));
+        let short = Dataset::new(2, vec![0.0; 4], vec![0.0; 2], vec![0.0; 4]);
+        assert_eq!(short, Err(DatasetError::Shape { what: "velocity", expected: 4, found: 2 }));
+        assert_eq!(Dataset::<f64>::new(2, vec![], vec![], vec![]), Err(DatasetError::Empty));
+    }
+
+    #[test]
+    fn the_scale_is_the_largest_of_coordinate_and_velocity() {
+        let data = Dataset::new(2, vec![1.0, -3.0, 0.5, 0.0], vec![-2.0, 1.0, 0.0, 0.0], vec![9.0; 4]).unwrap();
+        assert_eq!(data.physical_scale(), vec![2.0, 3.0]);
+    }
+}
