@@ -279,7 +279,7 @@ fn a_singular_mass_matrix_stops_or_is_left_out_by_choice() {
     let mut objective = Objective::new(&architecture, Penalty::None, 1).unwrap();
     let mut gradient = vec![f64::NAN; weights.len()];
     let report = objective.step(&weights, &data, &[3, 4], &mut gradient);
-    assert_eq!(report.singular, 2);
+    assert_eq!(report.left_out, 2);
     assert!(matches!(report.failure, Some(Failure::Singular { row: 3, .. })), "{:?}", report.failure);
     assert!(gradient.iter().all(|&g| g == 0.0));
 }
