@@ -24,8 +24,7 @@ impl Activation {
         1.0
     }
     pub fn apply<R: crate::scalar::Real>(self, x: R) -> R {
-        let k = R::half();
-        x * (x * k).tanh()
+        x * R::half() * (-(x * R::half().sqrt())).erfc()
     }
     fn d<S: crate::scalar::Scalar>(x: S) -> [S; 4] {
         let x = x.to_f64();

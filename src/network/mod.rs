@@ -8,6 +8,7 @@ mod config;
 mod features;
 mod init;
 mod layout;
+mod model;
 mod reference;
 
 pub use activation::Activation;
@@ -15,4 +16,5 @@ pub use adjoint::{Adjoint, Jets};
 pub use chunk::{Chunk, Depth};
 pub use config::{Architecture, Initialization};
 pub use init::initial_weights;
+pub use model::{NetworkError, NetworkLagrangian};
 pub use layout::{Layer, Layout};

@@ -1,6 +1,7 @@
 //! A trained network as a mechanical system in physical units.
 
 use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Terms};
+use crate::linalg;
 use crate::network::{Architecture, Chunk, Depth, Layout};
 use crate::scalar::{Real, Scalar};
 use std::sync::{Mutex, PoisonError};
@@ -26,6 +27,7 @@ pub struct NetworkLagrangian<S> {
 struct Workspace<S> {
     chunk: Chunk<S>,
     wrapped: Vec<S>,
+    linalg: linalg::Workspace<S>,
 }
 
 /// Why weights do not make a network.
@@ -153,5 +155,33 @@ impl<S: Scalar> Workspace<S> {
             let element = |(k, &m): (usize, &S)| m * (inverse(k / n % n) * inverse(k % n));
             terms.mass_matrix.extend(chunk.mass_matrix.iter().enumerate().map(element));
         }
+    }
+}
+
+impl<S: Scalar> EulerLagrange<S> for NetworkLagrangian<S> {
+    fn coordinates(&self) -> usize {
+        self.architecture.coordinates
+    }
+
+    fn terms(&self, q: &[S], v: &[S], request: Request, terms: &mut Terms<S>) -> Result<(), MechanicsError> {
+        let n = self.architecture.coordinates;
+        let shape = |what, expected, found| Err(MechanicsError::Shape { what, expected, found });
+        if q.len() % n != 0 {
+            return shape("coordinates", q.len().next_multiple_of(n), q.len());
+        }
+        if v.len() != q.len() {
+            return shape("velocities", q.len(), v.len());
+        }
+        terms.clear();
+        let mut workspace = self.idle.lock().unwrap_or_else(PoisonError::into_inner).pop().unwrap_or_else(|| {
+            Workspace { chunk: Chunk::new(&self.architecture), wrapped: Vec::new(), linalg: linalg::Workspace::new() }
+        });
+        let depth = Self::depth(request);
+        for states in q.chunks(CHUNK * n).zip(v.chunks(CHUNK * n)) {
+            workspace.append(self, states, (request, depth), terms);
+        }
+        let outcome = terms.complete(n, v, request, &mut workspace.linalg);
+        self.idle.lock().unwrap_or_else(PoisonError::into_inner).push(workspace);
+        outcome
     }
 }
