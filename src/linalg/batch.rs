@@ -110,24 +110,16 @@ pub(super) fn scatter<S: Scalar, const W: usize>(lanes: &[Lane<S, W>], rows: &mu
     }
 }
 
-/// Calls `$kernel!(n)` with sizes 1 to 4 as constants, so that their loops unroll.
+/// Runs a kernel with sizes 2 and 3 as constants, so that their loops unroll.
 macro_rules! with_size {
     ($n:expr, |$size:ident| $body:expr) => {
         match $n {
-            1 => {
-                let $size = 1_usize;
-                $body
-            }
             2 => {
                 let $size = 2_usize;
                 $body
             }
             3 => {
                 let $size = 3_usize;
-                $body
-            }
-            4 => {
-                let $size = 4_usize;
                 $body
             }
             $size => $body,

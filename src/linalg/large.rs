@@ -1,6 +1,6 @@
 //! faer's decompositions for matrices too large for lanes.
 
-use crate::scalar::{Scalar, View, ViewMut};
+use crate::scalar::{Scalar, Slice, SliceMut};
 use faer::traits::RealField;
 use faer::{MatRef, Side};
 
@@ -9,14 +9,14 @@ const EIGEN: usize = 32;
 
 /// Whether faer has an eigensolver for this scalar and this size.
 pub(super) fn serves<S: Scalar>(n: usize) -> bool {
-    n > EIGEN && !matches!(S::view(&[]), View::Software)
+    n > EIGEN && !matches!(S::slice(&[]), Slice::Other(_))
 }
 
 /// Eigenvalues, ascending, and eigenvectors as rows (if asked for) of one symmetric matrix; `NaN` if faer gives up.
 pub(super) fn eigh<S: Scalar>(n: usize, matrix: &[S], values: &mut [S], vectors: &mut [S]) {
-    match (S::view(matrix), S::view_mut(values), S::view_mut(vectors)) {
-        (View::F32(m), ViewMut::F32(w), ViewMut::F32(u)) => through_faer(n, m, w, u, f32::NAN),
-        (View::F64(m), ViewMut::F64(w), ViewMut::F64(u)) => through_faer(n, m, w, u, f64::NAN),
+    match (S::slice(matrix), S::slice_mut(values), S::slice_mut(vectors)) {
+        (Slice::F32(m), SliceMut::F32(w), SliceMut::F32(u)) => through_faer(n, m, w, u, f32::NAN),
+        (Slice::F64(m), SliceMut::F64(w), SliceMut::F64(u)) => through_faer(n, m, w, u, f64::NAN),
         _ => {}
     }
 }
