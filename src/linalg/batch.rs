@@ -20,6 +20,8 @@ pub struct Workspace<S> {
     pub(super) dense: Dense<S>,
     /// Right-hand sides and solutions of an inverse.
     pub(super) columns: Vec<S>,
+    /// Lent to callers.
+    vector: Vec<S>,
     failures: Vec<(usize, Failure)>,
 }
 
@@ -75,6 +77,14 @@ impl<S: Scalar> Workspace<S> {
     /// Rows that failed in the last operation and how, in ascending order.
     pub fn failures(&self) -> &[(usize, Failure)] {
         &self.failures
+    }
+    /// Lends a vector, to be given back after use.
+    pub(crate) fn take_vector(&mut self) -> Vec<S> {
+        std::mem::take(&mut self.vector)
+    }
+    /// Takes the vector back.
+    pub(crate) fn give_vector(&mut self, vector: Vec<S>) {
+        self.vector = vector;
     }
     pub(super) fn clear_failures(&mut self) {
         self.failures.clear();
