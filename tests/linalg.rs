@@ -79,7 +79,7 @@ fn matrices<S: Scalar>(n: usize, rng: &mut ChaCha8Rng) -> Vec<(String, Vec<S>)> 
     }
     // Units of very different size: D A D.
     let base: Vec<S> = with_spectrum(&(0..n).map(|k| 1.0 + k as f64).collect::<Vec<_>>(), rng);
-    for step in [-3, 3] {
+    for step in if n > 20 { [-1, 1] } else { [-3, 3] } {
         let m = (0..n * n).map(|k| base[k].ldexp(step * (k / n + k % n) as i32)).collect();
         list.push((format!("scaled {step}"), m));
     }
@@ -387,8 +387,8 @@ fn gradient_of_the_determinant_is_right_where_it_vanishes() {
         }
     }
     let mut zero = vec![1.0; 9];
-    linalg::adjugate(3, &[1.0; 9], &mut zero, &mut ws).unwrap();
-    assert!(zero.iter().all(|z| z.abs() < 1e-14), "rank one: the gradient vanishes");
+    let e = linalg::adjugate(3, &[1.0; 9], &mut zero, &mut ws).unwrap();
+    assert!(zero.iter().all(|&z| Scalar::ldexp(z, e as i32).abs() < 1e-14), "rank one: the gradient vanishes");
 }
 
 #[test]

@@ -20,6 +20,8 @@ pub struct Workspace<S> {
     pub(super) dense: Dense<S>,
     /// Right-hand sides and solutions of an inverse.
     pub(super) columns: Vec<S>,
+    /// Lent to callers.
+    vector: Vec<S>,
     failures: Vec<(usize, Failure)>,
 }
 
@@ -76,6 +78,14 @@ impl<S: Scalar> Workspace<S> {
     pub fn failures(&self) -> &[(usize, Failure)] {
         &self.failures
     }
+    /// Lends a vector, to be given back after use.
+    pub(crate) fn take_vector(&mut self) -> Vec<S> {
+        std::mem::take(&mut self.vector)
+    }
+    /// Takes the vector back.
+    pub(crate) fn give_vector(&mut self, vector: Vec<S>) {
+        self.vector = vector;
+    }
     pub(super) fn clear_failures(&mut self) {
         self.failures.clear();
     }
@@ -110,24 +120,16 @@ pub(super) fn scatter<S: Scalar, const W: usize>(lanes: &[Lane<S, W>], rows: &mu
     }
 }
 
-/// Calls `$kernel!(n)` with sizes 1 to 4 as constants, so that their loops unroll.
+/// Runs a kernel with sizes 2 and 3 as constants, so that their loops unroll.
 macro_rules! with_size {
     ($n:expr, |$size:ident| $body:expr) => {
         match $n {
-            1 => {
-                let $size = 1_usize;
-                $body
-            }
             2 => {
                 let $size = 2_usize;
                 $body
             }
             3 => {
                 let $size = 3_usize;
-                $body
-            }
-            4 => {
-                let $size = 4_usize;
                 $body
             }
             $size => $body,

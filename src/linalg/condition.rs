@@ -24,12 +24,19 @@ pub(super) fn condition_2<S: Scalar>(n: usize, matrix: &[S], scratch: &mut Dense
     if least > <S as Real>::zero() { (most / least).to_f64() } else { f64::INFINITY }
 }
 
-/// Whether a finite symmetric matrix, scaled to unit diagonal (Bunch 1971), has a condition number above `1/eps`.
+/// Whether a finite symmetric matrix has a condition number above `1/eps`, as given and scaled to rows of size 1
+/// (Bunch 1971).
 ///
-/// The scaling is by powers of two on both sides: a choice of units cannot make a matrix singular.
+/// The scaling is by powers of two on both sides: a choice of units cannot make a matrix singular. It may spoil a
+/// well-conditioned indefinite matrix, therefore both are asked.
 pub(super) fn is_singular<S: Scalar>(n: usize, matrix: &[S], scratch: &mut Dense<S>) -> bool {
     scratch.load(matrix);
-    let Dense { matrix: a, scale, .. } = scratch;
+    let (least, most) = scratch.extreme_eigenvalues(n);
+    if least > S::EPSILON * most {
+        return false;
+    }
+    scratch.load(matrix);
+    let Dense { matrix: a, scale } = scratch;
     scale.clear();
     let zero = <S as Real>::zero();
     for i in 0..n {
