@@ -4,10 +4,12 @@
 //! [`Real`], which forward numbers and tape variables implement too; nothing in a model may name a float type.
 
 mod dd;
+mod lanes;
 mod primitive;
 mod simd;
 
 pub use dd::Dd;
+pub use lanes::{Exponential, Lanes};
 pub use simd::vectorized;
 
 use std::fmt::{Debug, Display};
@@ -148,6 +150,7 @@ pub trait Real:
 /// An innermost floating-point number: `f32`, `f64` or [`Dd`].
 pub trait Scalar:
     Real<Scalar = Self>
+    + Lanes
     + PartialEq
     + PartialOrd
     + Default
