@@ -16,5 +16,5 @@ pub use adjoint::{Adjoint, Jets};
 pub use chunk::{Chunk, Depth};
 pub use config::{Architecture, Initialization};
 pub use init::initial_weights;
-pub use model::{NetworkError, NetworkLagrangian};
 pub use layout::{Layer, Layout};
+pub use model::{NetworkError, NetworkLagrangian};

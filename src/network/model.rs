@@ -3,7 +3,7 @@
 use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Terms};
 use crate::linalg;
 use crate::network::{Architecture, Chunk, Depth, Layout};
-use crate::scalar::{Real, Scalar};
+use crate::scalar::Scalar;
 use std::sync::{Mutex, PoisonError};
 use thiserror::Error;
 
@@ -138,7 +138,8 @@ impl<S: Scalar> Workspace<S> {
         let chunk = &mut self.chunk;
         chunk.evaluate(&network.weights, &self.wrapped, v, depth);
         let inverse = |i: usize| S::of_f64(architecture.scale[i]).recip();
-        let unscale = |from: &[S], to: &mut Vec<S>| to.extend(from.iter().enumerate().map(|(k, &x)| x * inverse(k % n)));
+        let unscale =
+            |from: &[S], to: &mut Vec<S>| to.extend(from.iter().enumerate().map(|(k, &x)| x * inverse(k % n)));
         if request.includes(Request::LAGRANGIAN) {
             terms.lagrangian.extend_from_slice(&chunk.lagrangian);
         }

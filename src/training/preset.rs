@@ -1,6 +1,7 @@
 //! Configurations that ship with the program.
 
-use crate::lagrangian::{Bounds, Configured};
+use crate::lagrangian::Configured;
+use crate::lagrangian::system::Bounds;
 use crate::network::{Activation, Initialization};
 use crate::training::config::{Config, Data, Network, OnFailure, Optimizer, Phase, Precision, Scaling};
 use crate::training::optimizer::Method;
@@ -86,20 +87,14 @@ fn quick(system: &Configured<f64>) -> Config {
         position: boxes(&bounds.positions),
         velocity: boxes(&bounds.velocities),
     };
-    Config {
-        penalty: Penalty::Eigenvalue { lambda: 100.0 },
-        phases: vec![phase],
-        ..base(system, 60_000, network)
-    }
+    Config { penalty: Penalty::Eigenvalue { lambda: 100.0 }, phases: vec![phase], ..base(system, 60_000, network) }
 }
 
 /// Appendix "Training details" of Hamzaogullari and Ozakin.
 fn paper(system: &Configured<f64>) -> Option<Config> {
     let n = system.coordinates;
     let (states, hidden, phases): (usize, Vec<usize>, &[(usize, f64, f64)]) = match system.system.name {
-        "double-pendulum" => {
-            (60_000, vec![500; 3], &[(300, 1e-3, 1e-6), (200, 4e-5, 1e-7), (200, 1e-5, 1e-8)])
-        }
+        "double-pendulum" => (60_000, vec![500; 3], &[(300, 1e-3, 1e-6), (200, 4e-5, 1e-7), (200, 1e-5, 1e-8)]),
         "triple-pendulum" => (60_000, vec![500; 3], &[(500, 1e-3, 1e-7)]),
         "spring-pendulum" => (60_000, vec![600; 2], &[(500, 5e-4, 1e-7)]),
         "sphere-geodesic" => (50_000, vec![500; 3], &[(50, 1e-3, 1e-6)]),
