@@ -21,5 +21,5 @@ pub use preset::Preset;
 pub use recipe::{Outcome, RecipeError, run};
 pub use sampling::{SamplingError, sample, sample_all};
 pub use schedule::Schedule;
-pub use solver::{Epoch, EpochSolver, Progress, StepError, TrainingProblem, TrainingState, Watcher};
-pub use trainer::{Datasets, Hooks, Stop, Stream, Trained, TrainingError, train};
+pub use solver::{Epoch, EpochSolver, Hooks, Progress, StepError, TrainingProblem, TrainingState, Watcher};
+pub use trainer::{Datasets, Stop, Stream, Trained, TrainingError, train};

@@ -5,7 +5,8 @@ use crate::network::{Architecture, NetworkError, NetworkLagrangian};
 use crate::scalar::Scalar;
 use crate::training::config::{Config, Scaling};
 use crate::training::sampling::{SamplingError, sample_all};
-use crate::training::trainer::{Hooks, Trained, TrainingError, train};
+use crate::training::solver::Hooks;
+use crate::training::trainer::{Trained, TrainingError, train};
 use thiserror::Error;
 
 /// A trained network with what led to it.
