@@ -6,8 +6,10 @@ mod affine;
 mod chunk;
 mod config;
 mod features;
+pub mod file;
 mod init;
 mod layout;
+pub mod storage;
 mod reference;
 
 pub use activation::Activation;
