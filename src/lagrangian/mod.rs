@@ -3,8 +3,16 @@
 //! State `x = (q, v)`, `v = dq/dt`, both in `R^n`. `p = dL/dv`, `g = dL/dq`, `M = d2L/dv dv`, `c = (d2L/dv dq) v`,
 //! `a = M^-1 (g - c)`, `E = p.v - L`. Batches are row-major: `(batch, n)` and `(batch, n, n)`.
 
+mod catalogue;
+mod complete;
+mod derivatives;
+mod hand_written;
+pub mod system;
+pub mod systems;
 mod terms;
 
+pub use catalogue::{Configured, Given, SystemError, build, configure, exact_acceleration, find, systems};
+pub use hand_written::HandWritten;
 pub use terms::{EulerLagrange, MechanicsError, Request, Terms};
 
 use crate::scalar::Real;

@@ -1,5 +1,29 @@
-//! Batched small dense linear algebra: solve, symmetric eigen, inertia, minors.
+//! Batched small dense linear algebra: solve, symmetric eigen, inertia, minors; products.
+//!
+//! Matrices are row-major `(batch, n, n)` slices, vectors `(batch, n)`. Kernels run on lanes: element `(i, j)` of
+//! [`LANES`] matrices side by side, every lane through the same branch-free steps, so that a matrix gives the same
+//! bits wherever it stands in a batch. A [`Workspace`] is reused; nothing else allocates for matrices up to the size
+//! from which faer takes over.
 
+mod batch;
+mod condition;
+mod eigh;
+mod error;
+mod inertia;
+mod inverse;
+mod jacobi;
+mod large;
+mod lu;
 mod matmul;
+mod minors;
+mod solve;
 
+pub use batch::{LANES, Workspace};
+pub use condition::condition_number;
+pub use eigh::{eigenvalues, eigh};
+pub use error::{Failure, LinalgError};
+pub use inertia::{Inertia, inertia, is_positive_definite};
+pub use inverse::inverse;
 pub use matmul::{MatMut, MatRef, gemm};
+pub use minors::{Scaled, adjugate, leading_minors};
+pub use solve::solve;

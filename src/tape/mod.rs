@@ -1,1 +1,30 @@
 //! The tape: record, replay, reverse sweep.
+//!
+//! Two ways to a derivative in reverse mode, both generic over the number:
+//!
+//! - [`Tape`] records while it computes; one reverse sweep gives the gradient at those very numbers. The code under
+//!   it may branch on values. Elements are any [`Real`](crate::scalar::Real): a tape over forward numbers gives
+//!   Hessians.
+//! - [`Program`] records once, without numbers, and is replayed on many states side by side (lanes) by a [`Replay`],
+//!   forward and backward, without allocating. A branch on a value cannot be recorded and is refused;
+//!   [`Real::select`](crate::scalar::Real::select) can. Block operations (affine maps, jets of activations, solves,
+//!   eigenvalues) carry their own adjoint rules.
+//!
+//! In both, constants are never recorded, variables of two recordings never mix silently, and a zero adjoint times an
+//! infinite partial derivative contributes 0, so that a branch not taken leaves no `NaN`.
+
+mod block;
+mod driver;
+mod eager;
+mod error;
+mod program;
+mod var;
+
+pub use block::{Block, JetFunction, JetKind};
+pub use driver::{
+    ScalarFunction, VectorFunction, derivative, gradient, gradient_on, hessian, hessian_vector, jacobian,
+};
+pub use eager::{Adjoints, Statistics, Tape};
+pub use error::TapeError;
+pub use program::{LANES, Program, Recorder, Replay, Tracer};
+pub use var::Var;

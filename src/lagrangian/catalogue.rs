@@ -1,0 +1,310 @@
+//! The hand-written systems by name: description, Euler-Lagrange terms, closed-form acceleration.
+
+use super::system::{Closed, Size, System};
+use super::{EulerLagrange, HandWritten};
+use crate::scalar::Scalar;
+
+/// Why a system could not be built.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum SystemError {
+    /// No system of this name.
+    #[error("unknown system `{name}`; did you mean `{nearest}`?")]
+    UnknownSystem {
+        /// The name asked for.
+        name: String,
+        /// The most similar name there is.
+        nearest: &'static str,
+    },
+    /// No parameter of this symbol.
+    #[error("{system} has no parameter `{symbol}`; did you mean `{nearest}`?")]
+    UnknownParameter {
+        /// The system.
+        system: &'static str,
+        /// The symbol given.
+        symbol: String,
+        /// The most similar symbol there is.
+        nearest: &'static str,
+    },
+    /// A parameter given twice.
+    #[error("parameter `{symbol}` is given twice")]
+    Repeated {
+        /// The symbol.
+        symbol: String,
+    },
+    /// A value that is not a number or outside the allowed range.
+    #[error("parameter `{symbol}` of {system} must be {demand}, found `{found}`")]
+    Value {
+        /// The system.
+        system: &'static str,
+        /// The symbol.
+        symbol: &'static str,
+        /// What is allowed.
+        demand: String,
+        /// The text given.
+        found: String,
+    },
+    /// A state of the wrong length.
+    #[error("{system}: expected {expected} coordinates and velocities, found {found}")]
+    State {
+        /// The system.
+        system: &'static str,
+        /// Number of coordinates.
+        expected: usize,
+        /// Numbers found.
+        found: usize,
+    },
+}
+
+/// Parameters as given: symbol and decimal text.
+pub type Given = [(String, String)];
+
+/// A system with its size and the values of its parameters.
+#[derive(Clone, Debug)]
+pub struct Configured<S> {
+    /// Description.
+    pub system: &'static System,
+    /// Number of coordinates.
+    pub coordinates: usize,
+    /// Values in the order of [`System::parameters`].
+    pub parameters: Vec<S>,
+}
+
+/// One line per system: its module and how it is made from the number of coordinates.
+macro_rules! catalogue {
+    ($($module:ident: $make:expr;)*) => {
+        static SYSTEMS: &[System] = &[$(super::systems::$module::SYSTEM),*];
+
+        /// The Euler-Lagrange terms of a configured system.
+        fn construct<S: Scalar>(configured: &Configured<S>) -> Option<Box<dyn EulerLagrange<S>>> {
+            let n = configured.coordinates;
+            $(if configured.system.name == super::systems::$module::SYSTEM.name {
+                let make: fn(usize) -> _ = $make;
+                return Some(Box::new(HandWritten::new(make(n), configured.parameters.clone())));
+            })*
+            None
+        }
+
+        /// The closed-form acceleration of a configured system.
+        fn closed<S: Scalar>(configured: &Configured<S>, q: &[S], v: &[S]) -> Vec<S> {
+            let n = configured.coordinates;
+            $(if configured.system.name == super::systems::$module::SYSTEM.name {
+                let make: fn(usize) -> _ = $make;
+                return make(n).acceleration(&configured.parameters, q, v);
+            })*
+            vec![S::NAN; n]
+        }
+    };
+}
+
+catalogue! {
+    double_pendulum: |_| super::systems::double_pendulum::DoublePendulum;
+    triple_pendulum: |_| super::systems::triple_pendulum::TriplePendulum;
+    n_pendulum: |n| super::systems::n_pendulum::NPendulum { n };
+    spring_pendulum: |_| super::systems::spring_pendulum::SpringPendulum;
+    sphere_geodesic: |_| super::systems::sphere_geodesic::SphereGeodesic;
+}
+
+/// All systems.
+pub fn systems() -> &'static [System] {
+    SYSTEMS
+}
+
+/// The system of a name.
+///
+/// # Errors
+/// [`SystemError::UnknownSystem`] with the nearest name.
+pub fn find(name: &str) -> Result<&'static System, SystemError> {
+    SYSTEMS.iter().find(|system| system.name == name).ok_or_else(|| SystemError::UnknownSystem {
+        name: name.into(),
+        nearest: nearest(name, SYSTEMS.iter().map(|system| system.name)),
+    })
+}
+
+/// Reads the parameters of a system in the working precision; those not given take their defaults.
+///
+/// # Errors
+/// [`SystemError`] for an unknown name or symbol, a repeated symbol, a value that is no number or out of range.
+pub fn configure<S: Scalar>(name: &str, given: &Given) -> Result<Configured<S>, SystemError> {
+    let system = find(name)?;
+    let count = match system.size {
+        Size::Fixed(_) => None,
+        Size::Chosen { symbol, .. } => Some(symbol),
+    };
+    for (i, (symbol, _)) in given.iter().enumerate() {
+        let mut known = system.parameters.iter().map(|p| p.symbol).chain(count);
+        if !known.clone().any(|k| k == symbol) {
+            let nearest = if known.next().is_some() { nearest(symbol, symbols(system, count)) } else { "" };
+            return Err(SystemError::UnknownParameter { system: system.name, symbol: symbol.clone(), nearest });
+        }
+        if given[..i].iter().any(|(earlier, _)| earlier == symbol) {
+            return Err(SystemError::Repeated { symbol: symbol.clone() });
+        }
+    }
+    let text = |symbol: &str| given.iter().find(|(s, _)| s == symbol).map(|(_, text)| text.trim());
+    let coordinates = match system.size {
+        Size::Fixed(n) => n,
+        Size::Chosen { symbol, default, least, most } => match text(symbol) {
+            None => default,
+            Some(found) => {
+                found.parse().ok().filter(|n| (least..=most).contains(n)).ok_or_else(|| SystemError::Value {
+                    system: system.name,
+                    symbol,
+                    demand: format!("an integer from {least} to {most}"),
+                    found: found.into(),
+                })?
+            }
+        },
+    };
+    let mut parameters = Vec::with_capacity(system.parameters.len());
+    for parameter in system.parameters {
+        let found = text(parameter.symbol).unwrap_or(parameter.default);
+        let zero = S::of_f64(0.0);
+        let allowed = |value: &S| {
+            use super::system::Range;
+            value.is_finite()
+                && match parameter.range {
+                    Range::Any => true,
+                    Range::AtLeastZero => *value >= zero,
+                    Range::Positive => *value > zero,
+                }
+        };
+        parameters.push(S::parse(found).filter(allowed).ok_or_else(|| SystemError::Value {
+            system: system.name,
+            symbol: parameter.symbol,
+            demand: parameter.range.text().into(),
+            found: found.into(),
+        })?);
+    }
+    Ok(Configured { system, coordinates, parameters })
+}
+
+/// The Euler-Lagrange terms of a system with the given parameters.
+///
+/// # Errors
+/// As [`configure`].
+pub fn build<S: Scalar>(name: &str, given: &Given) -> Result<Box<dyn EulerLagrange<S>>, SystemError> {
+    configure(name, given)?.build()
+}
+
+/// The acceleration of one state by the closed form, which shares nothing with [`build`] but the parameters.
+///
+/// # Errors
+/// As [`configure`]; [`SystemError::State`] for a state of the wrong length.
+pub fn exact_acceleration<S: Scalar>(name: &str, given: &Given, q: &[S], v: &[S]) -> Result<Vec<S>, SystemError> {
+    configure(name, given)?.exact_acceleration(q, v)
+}
+
+impl<S: Scalar> Configured<S> {
+    /// As [`build`].
+    ///
+    /// # Errors
+    /// [`SystemError::UnknownSystem`] if the description is not of the catalogue.
+    pub fn build(&self) -> Result<Box<dyn EulerLagrange<S>>, SystemError> {
+        construct(self).ok_or_else(|| SystemError::UnknownSystem { name: self.system.name.into(), nearest: "" })
+    }
+    /// As [`exact_acceleration`].
+    ///
+    /// # Errors
+    /// [`SystemError::State`] for a state of the wrong length.
+    pub fn exact_acceleration(&self, q: &[S], v: &[S]) -> Result<Vec<S>, SystemError> {
+        let expected = self.coordinates;
+        match [q, v].into_iter().find(|x| x.len() != expected) {
+            Some(x) => Err(SystemError::State { system: self.system.name, expected, found: x.len() }),
+            None => Ok(closed(self, q, v)),
+        }
+    }
+    /// Refuses coordinates where the system's chart ends (`r <= 0`, a pole); the text says what is demanded.
+    ///
+    /// # Errors
+    /// What the coordinates must satisfy.
+    pub fn check_domain(&self, q: &[S]) -> Result<(), &'static str> {
+        let leading: Vec<f64> = q.iter().map(|q| q.to_f64()).collect();
+        self.system.domain.map_or(Ok(()), |domain| domain(&leading))
+    }
+}
+
+/// Symbols of a system.
+fn symbols(system: &'static System, count: Option<&'static str>) -> impl Iterator<Item = &'static str> {
+    system.parameters.iter().map(|p| p.symbol).chain(count)
+}
+
+/// The candidate at the smallest edit distance (Levenshtein).
+fn nearest(name: &str, candidates: impl Iterator<Item = &'static str>) -> &'static str {
+    candidates.min_by_key(|candidate| distance(name, candidate)).unwrap_or("")
+}
+
+fn distance(a: &str, b: &str) -> usize {
+    let b: Vec<char> = b.chars().collect();
+    let mut row: Vec<usize> = (0..=b.len()).collect();
+    for (i, x) in a.chars().enumerate() {
+        let mut corner = row[0];
+        row[0] = i + 1;
+        for (j, &y) in b.iter().enumerate() {
+            let replaced = corner + usize::from(x != y);
+            corner = row[j + 1];
+            row[j + 1] = replaced.min(row[j] + 1).min(corner + 1);
+        }
+    }
+    row[b.len()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scalar::Dd;
+
+    fn given(list: &[(&str, &str)]) -> Vec<(String, String)> {
+        list.iter().map(|&(s, t)| (s.into(), t.into())).collect()
+    }
+
+    #[test]
+    fn every_entry_is_complete() {
+        for system in systems() {
+            let n = system.size.default();
+            let configured = configure::<f64>(system.name, &[]).unwrap();
+            assert_eq!(configured.build().unwrap().coordinates(), n);
+            assert_eq!((system.coordinates)(n).len(), n);
+            assert_eq!(system.columns(n).len(), 2 * n);
+            for bounds in [(system.training)(n), (system.validation)(n), (system.trajectory)(n).start] {
+                assert_eq!((bounds.positions.len(), bounds.velocities.len()), (n, n));
+                assert!(bounds.positions.iter().chain(&bounds.velocities).all(|b| b.0 < b.1));
+            }
+            let middle: Vec<f64> = (system.training)(n).positions.iter().map(|b| 0.4 * b.0 + 0.6 * b.1).collect();
+            assert_eq!(configured.check_domain(&middle), Ok(()));
+        }
+        let pendulum = find("double-pendulum").unwrap();
+        assert_eq!(pendulum.columns(2), ["theta1", "theta2", "theta1_dot", "theta2_dot"]);
+        assert_eq!(find("sphere-geodesic").unwrap().columns(2), ["theta", "phi", "theta_dot", "phi_dot"]);
+        assert!(configure::<f64>("spring-pendulum", &[]).unwrap().check_domain(&[0.0, 1.0]).is_err());
+        assert!(configure::<f64>("sphere-geodesic", &[]).unwrap().check_domain(&[0.0, 1.0]).is_err());
+    }
+
+    #[test]
+    fn parameters_are_read_and_refused() {
+        let configured = configure::<Dd>("double-pendulum", &given(&[("l2", " 0.5 "), ("g", "0")])).unwrap();
+        let expected: Vec<Dd> = ["1", "1", "1", "0.5", "0"].iter().map(|t| Dd::parse(t).unwrap()).collect();
+        assert_eq!(configured.parameters, expected);
+        assert_eq!(configure::<f32>("n-pendulum", &given(&[("n", "7")])).unwrap().coordinates, 7);
+        let error = |name: &str, list: &[(&str, &str)]| configure::<f64>(name, &given(list)).unwrap_err();
+        assert_eq!(
+            error("duble-pendulum", &[]),
+            SystemError::UnknownSystem { name: "duble-pendulum".into(), nearest: "double-pendulum" }
+        );
+        assert!(matches!(
+            error("spring-pendulum", &[("L0", "1")]),
+            SystemError::UnknownParameter { nearest: "l0", .. }
+        ));
+        assert!(matches!(error("n-pendulum", &[("N", "3")]), SystemError::UnknownParameter { .. }));
+        assert!(matches!(error("double-pendulum", &[("g", "1"), ("g", "2")]), SystemError::Repeated { .. }));
+        for bad in ["0", "-1", "nan", "inf", "1e999", "one", ""] {
+            assert!(matches!(error("double-pendulum", &[("m1", bad)]), SystemError::Value { symbol: "m1", .. }));
+        }
+        for bad in ["0", "21", "-1", "2.5", "18446744073709551616"] {
+            assert!(matches!(error("n-pendulum", &[("n", bad)]), SystemError::Value { symbol: "n", .. }));
+        }
+        assert!(matches!(
+            exact_acceleration::<f64>("double-pendulum", &[], &[1.0], &[1.0, 2.0]),
+            Err(SystemError::State { expected: 2, found: 1, .. })
+        ));
+    }
+}

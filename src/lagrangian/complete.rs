@@ -1,0 +1,147 @@
+//! The Euler-Lagrange formula: acceleration and energy from `L`, `p`, `g`, `M`, `c`, whoever computed them.
+
+use super::{MechanicsError, Request, Terms};
+use crate::linalg::{self, Failure, Workspace};
+use crate::scalar::{Real, Scalar};
+
+impl<S: Scalar> Terms<S> {
+    /// Empties every field, keeping the buffers.
+    pub fn clear(&mut self) {
+        let Self { lagrangian, momentum, dl_dq, mass_matrix, coriolis, acceleration, energy } = self;
+        for field in [lagrangian, momentum, dl_dq, mass_matrix, coriolis, acceleration, energy] {
+            field.clear();
+        }
+    }
+
+    /// Adds `a = M^-1 (g - c)` and `E = p.v - L` if requested, then checks every filled field.
+    ///
+    /// `v` is `(batch, n)`; `L`, `p`, `g`, `M`, `c` must be filled as far as the request needs them. One coordinate is
+    /// divided, not factored.
+    ///
+    /// # Errors
+    /// [`MechanicsError`] naming the first row with a singular mass matrix or a term that is not finite; accelerations
+    /// of such rows are `NaN`, everything else is filled.
+    pub fn complete(
+        &mut self,
+        n: usize,
+        v: &[S],
+        request: Request,
+        workspace: &mut Workspace<S>,
+    ) -> Result<(), MechanicsError> {
+        let batch = v.len() / n.max(1);
+        let expect = |what, expected: usize, found: usize| {
+            if expected == found { Ok(()) } else { Err(MechanicsError::Shape { what, expected, found }) }
+        };
+        let mut first = None;
+        if request.includes(Request::ENERGY) {
+            expect("Lagrangians", batch, self.lagrangian.len())?;
+            expect("momenta", batch * n, self.momentum.len())?;
+            self.energy.clear();
+            for (row, &lagrangian) in self.lagrangian.iter().enumerate() {
+                let range = row * n..(row + 1) * n;
+                let action = self.momentum[range.clone()].iter().zip(&v[range]).fold(-lagrangian, |e, (&p, &v)| e + p * v);
+                self.energy.push(action);
+            }
+        }
+        if request.includes(Request::ACCELERATION) {
+            expect("mass matrices", batch * n * n, self.mass_matrix.len())?;
+            expect("dL/dq", batch * n, self.dl_dq.len())?;
+            expect("coriolis terms", batch * n, self.coriolis.len())?;
+            self.acceleration.clear();
+            self.acceleration.resize(batch * n, S::NAN);
+            let mut force = workspace.take_vector();
+            force.clear();
+            force.extend(self.dl_dq.iter().zip(&self.coriolis).map(|(&g, &c)| g - c));
+            first = if n == 1 {
+                divide(&self.mass_matrix, &force, &mut self.acceleration)
+            } else {
+                let solved = linalg::solve(n, &self.mass_matrix, &force, &mut self.acceleration, workspace);
+                solved.err().and_then(|_| workspace.failures().first().copied())
+            };
+            workspace.give_vector(force);
+        }
+        // What was not finite before the solve is named rather than the solve.
+        let fields: [(&'static str, &[S], usize); 6] = [
+            ("Lagrangian", &self.lagrangian, 1),
+            ("momentum", &self.momentum, n),
+            ("dL/dq", &self.dl_dq, n),
+            ("mass matrix", &self.mass_matrix, n * n),
+            ("coriolis term", &self.coriolis, n),
+            ("energy", &self.energy, 1),
+        ];
+        let foreign = fields
+            .into_iter()
+            .filter_map(|(what, field, width)| {
+                field.iter().position(|x| !x.is_finite()).map(|at| (at / width.max(1), what))
+            })
+            .min_by_key(|&(row, _)| row);
+        match (foreign, first) {
+            (None, None) => Ok(()),
+            (Some((row, what)), first) if first.is_none_or(|(failed, _)| row <= failed) => {
+                Err(MechanicsError::NotFinite { row, what })
+            }
+            (_, Some((row, Failure::Singular { condition }))) => Err(MechanicsError::Singular { row, condition }),
+            (_, Some((row, Failure::NotFinite))) => Err(MechanicsError::NotFinite { row, what: "acceleration" }),
+            (Some((row, what)), None) => Err(MechanicsError::NotFinite { row, what }),
+        }
+    }
+}
+
+/// One coordinate: `a = f / M`; the first row that fails.
+fn divide<S: Scalar>(mass: &[S], force: &[S], acceleration: &mut [S]) -> Option<(usize, Failure)> {
+    let mut first = None;
+    for (row, ((a, &f), &m)) in acceleration.iter_mut().zip(force).zip(mass).enumerate() {
+        *a = f / m;
+        if !a.is_finite() {
+            *a = S::NAN;
+            let singular = m == <S as Real>::zero();
+            let failure = if singular { Failure::Singular { condition: f64::INFINITY } } else { Failure::NotFinite };
+            first = first.or(Some((row, failure)));
+        }
+    }
+    first
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn formula_and_failures() {
+        let mut terms = Terms {
+            lagrangian: vec![1.0, 2.0, 3.0],
+            momentum: vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0],
+            dl_dq: vec![3.0, 4.0, 1.0, 1.0, 1.0, 1.0],
+            coriolis: vec![1.0; 6],
+            mass_matrix: vec![1.0, 0.0, 0.0, -1.0, 1.0, 1.0, 1.0, 1.0, 2.0, 0.0, 0.0, 2.0],
+            ..Terms::default()
+        };
+        let v = [1.0, 1.0, 2.0, 2.0, 0.0, 1.0];
+        let mut workspace = Workspace::new();
+        let error = terms.complete(2, &v, Request::ALL, &mut workspace).unwrap_err();
+        assert_eq!(error, MechanicsError::Singular { row: 1, condition: f64::INFINITY });
+        assert_eq!(terms.energy, [2.0, 12.0, 3.0]);
+        assert_eq!(terms.acceleration[..2], [2.0, -3.0]);
+        assert!(terms.acceleration[2].is_nan() && terms.acceleration[3].is_nan());
+        assert_eq!(terms.acceleration[4..], [0.0, 0.0]);
+        terms.momentum[1] = f64::NAN;
+        let error = terms.complete(2, &v, Request::ALL, &mut workspace).unwrap_err();
+        assert_eq!(error, MechanicsError::NotFinite { row: 0, what: "momentum" });
+        let error = terms.complete(3, &v, Request::ALL, &mut workspace).unwrap_err();
+        assert!(matches!(error, MechanicsError::Shape { .. }));
+    }
+
+    #[test]
+    fn one_coordinate_is_divided() {
+        let mut terms = Terms {
+            dl_dq: vec![6.0, 1.0, 1e300],
+            coriolis: vec![0.0; 3],
+            mass_matrix: vec![-2.0, 0.0, 1e-300],
+            ..Terms::default()
+        };
+        let error = terms.complete(1, &[0.0; 3], Request::ACCELERATION, &mut Workspace::new()).unwrap_err();
+        assert_eq!(error, MechanicsError::Singular { row: 1, condition: f64::INFINITY });
+        assert_eq!(terms.acceleration[0], -3.0);
+        assert!(terms.acceleration[1].is_nan() && terms.acceleration[2].is_nan());
+    }
+}

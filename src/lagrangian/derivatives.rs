@@ -1,0 +1,196 @@
+//! `L`, `p`, `g`, `M`, `c` of one state by forward numbers over any base: floats, or tracers that record a program.
+
+use super::{Lagrangian, Request};
+use crate::forward::{Dual, HyperDual, Jet2};
+use crate::scalar::Real;
+use std::array::from_fn;
+
+/// Which derivatives a request needs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Need {
+    pub lagrangian: bool,
+    pub momentum: bool,
+    pub dl_dq: bool,
+    pub mass_matrix: bool,
+    pub coriolis: bool,
+}
+
+impl Need {
+    pub fn of(request: Request) -> Self {
+        Self {
+            lagrangian: request.includes(Request::LAGRANGIAN),
+            momentum: request.includes(Request::MOMENTUM),
+            dl_dq: request.includes(Request::DL_DQ),
+            mass_matrix: request.includes(Request::MASS_MATRIX),
+            coriolis: request.includes(Request::CORIOLIS),
+        }
+    }
+    /// A number below 32 that names the combination.
+    pub fn index(self) -> usize {
+        [self.lagrangian, self.momentum, self.dl_dq, self.mass_matrix, self.coriolis]
+            .into_iter()
+            .enumerate()
+            .map(|(bit, needed)| usize::from(needed) << bit)
+            .sum()
+    }
+    fn second_order(self) -> bool {
+        self.mass_matrix || self.coriolis
+    }
+}
+
+/// Where the numbers of one state go; slices that are not needed may be empty.
+pub(super) struct State<'a, R> {
+    pub lagrangian: &'a mut [R],
+    pub momentum: &'a mut [R],
+    pub dl_dq: &'a mut [R],
+    pub mass_matrix: &'a mut [R],
+    pub coriolis: &'a mut [R],
+}
+
+/// Fills what is needed.
+pub(super) fn evaluate<L: Lagrangian, R: Real>(
+    system: &L,
+    parameters: &[R],
+    q: &[R],
+    v: &[R],
+    need: Need,
+    out: &mut State<'_, R>,
+) {
+    if !need.second_order() {
+        return first_order(system, parameters, q, v, need, out);
+    }
+    match q.len() {
+        1 => jets::<L, R, 1, 2>(system, parameters, q, v, need, out),
+        2 => jets::<L, R, 2, 4>(system, parameters, q, v, need, out),
+        3 => jets::<L, R, 3, 6>(system, parameters, q, v, need, out),
+        4 => jets::<L, R, 4, 8>(system, parameters, q, v, need, out),
+        _ => directions(system, parameters, q, v, need, out),
+    }
+}
+
+/// Numbers in an array where they fit, so that a single state allocates nothing.
+struct Few<T> {
+    array: [T; 8],
+    vector: Vec<T>,
+    length: usize,
+}
+
+impl<T: Real> Few<T> {
+    fn new<R: Copy>(numbers: &[R], lift: impl Fn(R) -> T) -> Self {
+        let length = numbers.len();
+        if length <= 8 {
+            let array = from_fn(|i| numbers.get(i).map_or_else(T::zero, |&x| lift(x)));
+            Self { array, vector: Vec::new(), length }
+        } else {
+            Self { array: [T::zero(); 8], vector: numbers.iter().map(|&x| lift(x)).collect(), length }
+        }
+    }
+    fn get(&mut self) -> &mut [T] {
+        if self.length <= 8 { &mut self.array[..self.length] } else { &mut self.vector }
+    }
+}
+
+/// Value and first derivatives, one direction at a time.
+fn first_order<L: Lagrangian, R: Real>(
+    system: &L,
+    parameters: &[R],
+    q: &[R],
+    v: &[R],
+    need: Need,
+    out: &mut State<'_, R>,
+) {
+    if need.lagrangian {
+        out.lagrangian[0] = system.lagrangian(parameters, q, v);
+    }
+    let mut lifted = Few::new(parameters, Dual::lift);
+    let (mut dq, mut dv) = (Few::new(q, Dual::lift), Few::new(v, Dual::lift));
+    let (parameters, dq, dv) = (lifted.get(), dq.get(), dv.get());
+    for i in 0..q.len() {
+        if need.dl_dq {
+            dq[i].tangent = R::one();
+            out.dl_dq[i] = system.lagrangian(parameters, dq, dv).tangent;
+            dq[i].tangent = R::zero();
+        }
+        if need.momentum {
+            dv[i].tangent = R::one();
+            out.momentum[i] = system.lagrangian(parameters, dq, dv).tangent;
+            dv[i].tangent = R::zero();
+        }
+    }
+}
+
+/// Everything from one evaluation with all second derivatives; `N = 2 H`.
+fn jets<L: Lagrangian, R: Real, const H: usize, const N: usize>(
+    system: &L,
+    parameters: &[R],
+    q: &[R],
+    v: &[R],
+    need: Need,
+    out: &mut State<'_, R>,
+) {
+    let mut lifted = Few::new(parameters, Jet2::<R, N>::lift);
+    let jet_q: [Jet2<R, N>; H] = from_fn(|i| Jet2::variable(q[i], i));
+    let jet_v: [Jet2<R, N>; H] = from_fn(|i| Jet2::variable(v[i], H + i));
+    let found = system.lagrangian(lifted.get(), &jet_q, &jet_v);
+    if need.lagrangian {
+        out.lagrangian[0] = found.value;
+    }
+    for i in 0..H {
+        if need.dl_dq {
+            out.dl_dq[i] = found.gradient[i];
+        }
+        if need.momentum {
+            out.momentum[i] = found.gradient[H + i];
+        }
+        if need.mass_matrix {
+            for j in 0..H {
+                out.mass_matrix[i * H + j] = found.second(H + i, H + j);
+            }
+        }
+        if need.coriolis {
+            let mut sum = found.second(H + i, 0) * v[0];
+            for j in 1..H {
+                sum += found.second(H + i, j) * v[j];
+            }
+            out.coriolis[i] = sum;
+        }
+    }
+}
+
+/// One evaluation per pair of directions: `(0, e_i) x (0, e_j)` for `M`, `(0, e_i) x (v, 0)` for `c`.
+fn directions<L: Lagrangian, R: Real>(
+    system: &L,
+    parameters: &[R],
+    q: &[R],
+    v: &[R],
+    need: Need,
+    out: &mut State<'_, R>,
+) {
+    first_order(system, parameters, q, v, need, out);
+    let n = q.len();
+    let mut lifted = Few::new(parameters, HyperDual::lift);
+    let (mut hq, mut hv) = (Few::new(q, HyperDual::lift), Few::new(v, HyperDual::lift));
+    let (parameters, hq, hv) = (lifted.get(), hq.get(), hv.get());
+    for i in 0..n {
+        hv[i].s = R::one();
+        if need.mass_matrix {
+            for j in 0..=i {
+                hv[j].t = R::one();
+                let mixed = system.lagrangian(parameters, hq, hv).st;
+                hv[j].t = R::zero();
+                out.mass_matrix[i * n + j] = mixed;
+                out.mass_matrix[j * n + i] = mixed;
+            }
+        }
+        if need.coriolis {
+            for (number, &speed) in hq.iter_mut().zip(v) {
+                number.t = speed;
+            }
+            out.coriolis[i] = system.lagrangian(parameters, hq, hv).st;
+            for number in hq.iter_mut() {
+                number.t = R::zero();
+            }
+        }
+        hv[i].s = R::zero();
+    }
+}

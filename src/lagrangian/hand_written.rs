@@ -1,0 +1,180 @@
+//! A Lagrangian written by hand, with values for its parameters, as a source of Euler-Lagrange terms.
+
+use super::derivatives::{Need, State, evaluate};
+use super::{EulerLagrange, Lagrangian, MechanicsError, Request, Terms};
+use crate::linalg::Workspace;
+use crate::scalar::{Real, Scalar};
+use crate::tape::{Program, Replay, Tracer};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+
+/// Batches from this size on are replayed from a recorded program; a chunk of lanes is not worth it below.
+const REPLAY_FROM: usize = 24;
+/// Programs of more coordinates are not recorded: their expressions outgrow the caches.
+const REPLAY_COORDINATES: usize = 8;
+
+/// A Lagrangian and the values of its parameters.
+///
+/// Few states are evaluated one at a time by forward numbers on the stack; large batches replay a program recorded on
+/// first use, its lanes side by side. Both give the same numbers up to rounding. A Lagrangian that branches on its
+/// data cannot be recorded and is always evaluated state by state.
+#[derive(Debug)]
+pub struct HandWritten<L, S> {
+    system: L,
+    parameters: Vec<S>,
+    /// One program per combination of needed terms.
+    programs: [OnceLock<Option<Arc<Program<S>>>>; 32],
+    /// Buffers not in use; as many as there were callers at a time.
+    pool: Mutex<Vec<Scratch<S>>>,
+}
+
+#[derive(Debug, Default)]
+struct Scratch<S> {
+    workspace: Workspace<S>,
+    inputs: Vec<S>,
+    outputs: Vec<S>,
+    replays: Vec<(usize, Replay<S>)>,
+}
+
+impl<L: Lagrangian, S: Scalar> HandWritten<L, S> {
+    /// A Lagrangian with parameter values in the order it takes them.
+    pub fn new(system: L, parameters: Vec<S>) -> Self {
+        Self { system, parameters, programs: [const { OnceLock::new() }; 32], pool: Mutex::new(Vec::new()) }
+    }
+    /// The values of the parameters.
+    pub fn parameters(&self) -> &[S] {
+        &self.parameters
+    }
+
+    /// The program that computes what is needed, recorded on first use.
+    fn program(&self, need: Need) -> Option<Arc<Program<S>>> {
+        let recorded = self.programs[need.index()].get_or_init(|| {
+            let n = self.system.coordinates();
+            let record = Program::record(2 * n, self.parameters.len(), |_, inputs, parameters| {
+                record(&self.system, parameters, &inputs[..n], &inputs[n..], need)
+            });
+            record.ok().map(Arc::new)
+        });
+        recorded.clone()
+    }
+
+    /// Fills the needed fields of a batch by replaying a program; whether that was possible.
+    fn replay(&self, n: usize, q: &[S], v: &[S], need: Need, terms: &mut Terms<S>, scratch: &mut Scratch<S>) -> bool {
+        let Some(program) = self.program(need) else { return false };
+        let batch = q.len() / n;
+        let Scratch { inputs, outputs, replays, .. } = scratch;
+        inputs.clear();
+        for (q, v) in q.chunks_exact(n).zip(v.chunks_exact(n)) {
+            inputs.extend_from_slice(q);
+            inputs.extend_from_slice(v);
+        }
+        let width = program.outputs();
+        outputs.clear();
+        outputs.resize(batch * width, S::NAN);
+        let index = need.index();
+        let at = replays.iter().position(|(i, _)| *i == index).unwrap_or_else(|| {
+            replays.push((index, Replay::new(program)));
+            replays.len() - 1
+        });
+        if replays[at].1.forward(batch, inputs, &self.parameters, outputs).is_err() {
+            return false;
+        }
+        for (row, state) in outputs.chunks_exact(width.max(1)).enumerate() {
+            let mut next = state.iter().copied();
+            let mut fill = |field: &mut [S]| field.iter_mut().zip(&mut next).for_each(|(x, y)| *x = y);
+            if need.lagrangian {
+                fill(&mut terms.lagrangian[row..=row]);
+            }
+            if need.momentum {
+                fill(&mut terms.momentum[row * n..(row + 1) * n]);
+            }
+            if need.dl_dq {
+                fill(&mut terms.dl_dq[row * n..(row + 1) * n]);
+            }
+            if need.mass_matrix {
+                fill(&mut terms.mass_matrix[row * n * n..(row + 1) * n * n]);
+            }
+            if need.coriolis {
+                fill(&mut terms.coriolis[row * n..(row + 1) * n]);
+            }
+        }
+        true
+    }
+
+    fn compute(
+        &self,
+        q: &[S],
+        v: &[S],
+        request: Request,
+        terms: &mut Terms<S>,
+        scratch: &mut Scratch<S>,
+    ) -> Result<(), MechanicsError> {
+        let n = self.system.coordinates();
+        let batch = q.len() / n.max(1);
+        let shape = |what, found| MechanicsError::Shape { what, expected: batch * n, found };
+        if q.len() != batch * n {
+            return Err(shape("coordinates", q.len()));
+        }
+        if v.len() != q.len() {
+            return Err(shape("velocities", v.len()));
+        }
+        let need = Need::of(request);
+        terms.clear();
+        let size = |needed: bool, width: usize| if needed { batch * width } else { 0 };
+        terms.lagrangian.resize(size(need.lagrangian, 1), S::NAN);
+        terms.momentum.resize(size(need.momentum, n), S::NAN);
+        terms.dl_dq.resize(size(need.dl_dq, n), S::NAN);
+        terms.mass_matrix.resize(size(need.mass_matrix, n * n), S::NAN);
+        terms.coriolis.resize(size(need.coriolis, n), S::NAN);
+        let by_program = batch >= REPLAY_FROM && n <= REPLAY_COORDINATES;
+        if !(by_program && self.replay(n, q, v, need, terms, scratch)) {
+            for (row, (q, v)) in q.chunks_exact(n.max(1)).zip(v.chunks_exact(n.max(1))).enumerate() {
+                let part = |needed: bool, width: usize| if needed { row * width..(row + 1) * width } else { 0..0 };
+                let mut state = State {
+                    lagrangian: &mut terms.lagrangian[part(need.lagrangian, 1)],
+                    momentum: &mut terms.momentum[part(need.momentum, n)],
+                    dl_dq: &mut terms.dl_dq[part(need.dl_dq, n)],
+                    mass_matrix: &mut terms.mass_matrix[part(need.mass_matrix, n * n)],
+                    coriolis: &mut terms.coriolis[part(need.coriolis, n)],
+                };
+                evaluate(&self.system, &self.parameters, q, v, need, &mut state);
+            }
+        }
+        terms.complete(n, v, request, &mut scratch.workspace)
+    }
+}
+
+/// The needed terms of one state, one after the other.
+fn record<'t, L: Lagrangian, S: Scalar>(
+    system: &L,
+    parameters: &[Tracer<'t, S>],
+    q: &[Tracer<'t, S>],
+    v: &[Tracer<'t, S>],
+    need: Need,
+) -> Vec<Tracer<'t, S>> {
+    let n = q.len();
+    let field = |needed: bool, width: usize| vec![Tracer::zero(); if needed { width } else { 0 }];
+    let mut fields = [
+        field(need.lagrangian, 1),
+        field(need.momentum, n),
+        field(need.dl_dq, n),
+        field(need.mass_matrix, n * n),
+        field(need.coriolis, n),
+    ];
+    let [lagrangian, momentum, dl_dq, mass_matrix, coriolis] = &mut fields;
+    evaluate(system, parameters, q, v, need, &mut State { lagrangian, momentum, dl_dq, mass_matrix, coriolis });
+    fields.concat()
+}
+
+impl<L: Lagrangian, S: Scalar> EulerLagrange<S> for HandWritten<L, S> {
+    fn coordinates(&self) -> usize {
+        self.system.coordinates()
+    }
+
+    fn terms(&self, q: &[S], v: &[S], request: Request, terms: &mut Terms<S>) -> Result<(), MechanicsError> {
+        let pooled = || self.pool.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut scratch = pooled().pop().unwrap_or_default();
+        let outcome = self.compute(q, v, request, terms, &mut scratch);
+        pooled().push(scratch);
+        outcome
+    }
+}

@@ -1,0 +1,157 @@
+//! What is known about a hand-written system apart from its Lagrangian.
+
+use super::Lagrangian;
+use crate::scalar::Real;
+use std::borrow::Cow;
+
+/// A coordinate of a system.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Coordinate {
+    /// Name, also of its CSV column; the velocity's column is the name and `_dot`.
+    pub name: Cow<'static, str>,
+    /// Unit of the coordinate; velocities are in this unit per second.
+    pub unit: &'static str,
+    /// An angle: adding `2 pi` changes nothing.
+    pub periodic: bool,
+}
+
+impl Coordinate {
+    /// A periodic angle in radians.
+    pub fn angle(name: impl Into<Cow<'static, str>>) -> Self {
+        Self { name: name.into(), unit: "rad", periodic: true }
+    }
+    /// A length in metres.
+    pub fn length(name: impl Into<Cow<'static, str>>) -> Self {
+        Self { name: name.into(), unit: "m", periodic: false }
+    }
+}
+
+/// Values a parameter may take, besides being finite.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Range {
+    /// Any finite number.
+    Any,
+    /// Zero or more.
+    AtLeastZero,
+    /// More than zero.
+    Positive,
+}
+
+impl Range {
+    /// The condition in words.
+    pub const fn text(self) -> &'static str {
+        match self {
+            Self::Any => "finite",
+            Self::AtLeastZero => "finite and at least 0",
+            Self::Positive => "finite and above 0",
+        }
+    }
+}
+
+/// A physical constant of a system.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Parameter {
+    /// The paper's symbol.
+    pub symbol: &'static str,
+    /// Default as decimal text, read in the working precision.
+    pub default: &'static str,
+    /// Unit.
+    pub unit: &'static str,
+    /// Allowed values.
+    pub range: Range,
+}
+
+/// Number of coordinates of a system.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Size {
+    /// Always the same.
+    Fixed(usize),
+    /// Chosen by an integer parameter.
+    Chosen {
+        /// Symbol of the parameter.
+        symbol: &'static str,
+        /// Its default.
+        default: usize,
+        /// Smallest value.
+        least: usize,
+        /// Largest value.
+        most: usize,
+    },
+}
+
+impl Size {
+    /// The number of coordinates unless chosen otherwise.
+    pub const fn default(self) -> usize {
+        match self {
+            Self::Fixed(n) => n,
+            Self::Chosen { default, .. } => default,
+        }
+    }
+}
+
+/// A box of states: `(low, high)` per coordinate, in the system's units.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Bounds {
+    /// Of the coordinates.
+    pub positions: Vec<(f64, f64)>,
+    /// Of the velocities.
+    pub velocities: Vec<(f64, f64)>,
+}
+
+impl Bounds {
+    /// The same for each of `n` coordinates.
+    pub fn uniform(n: usize, position: (f64, f64), velocity: (f64, f64)) -> Self {
+        Self { positions: vec![position; n], velocities: vec![velocity; n] }
+    }
+}
+
+/// The paper's trajectory test of a system.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TrajectoryTest {
+    /// Box of the random starts.
+    pub start: Bounds,
+    /// End of the time span that starts at 0, in seconds.
+    pub t_end: f64,
+    /// Step of the output, in seconds.
+    pub dt: f64,
+}
+
+/// Catalogue entry of a system; functions take the number of coordinates.
+#[derive(Clone, Copy, Debug)]
+pub struct System {
+    /// Name on the command line.
+    pub name: &'static str,
+    /// Name in a title.
+    pub title: &'static str,
+    /// Number of coordinates.
+    pub size: Size,
+    /// Coordinates, in order.
+    pub coordinates: fn(usize) -> Vec<Coordinate>,
+    /// Constants, in the order the Lagrangian takes them; [`Size::Chosen`] adds one more.
+    pub parameters: &'static [Parameter],
+    /// The coordinate that is a time (Lorentzian systems).
+    pub time_like: Option<usize>,
+    /// Box of the training states.
+    pub training: fn(usize) -> Bounds,
+    /// Box of the states on which errors are stated.
+    pub validation: fn(usize) -> Bounds,
+    /// Trajectory test.
+    pub trajectory: fn(usize) -> TrajectoryTest,
+    /// Where the coordinates make sense; the error says what is demanded.
+    pub domain: Option<fn(&[f64]) -> Result<(), &'static str>>,
+}
+
+impl System {
+    /// Names of the columns of a state of `n` coordinates: coordinates, then velocities (`theta1_dot`).
+    pub fn columns(&self, n: usize) -> Vec<String> {
+        let coordinates = (self.coordinates)(n);
+        let positions = coordinates.iter().map(|c| c.name.to_string());
+        positions.chain(coordinates.iter().map(|c| format!("{}_dot", c.name))).collect()
+    }
+}
+
+/// A Lagrangian with a closed-form acceleration to compare with.
+pub trait Closed: Lagrangian {
+    /// `a(q, v)`, written down without differentiating the Lagrangian.
+    fn acceleration<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> Vec<R>;
+}

@@ -1,0 +1,64 @@
+//! Double pendulum: two point masses on massless rods, angles from the downward vertical.
+
+use super::{ACCELERATION_OF_GRAVITY, LENGTH, MASS, angles};
+use crate::lagrangian::Lagrangian;
+use crate::lagrangian::system::{Bounds, Closed, Parameter, Size, System, TrajectoryTest};
+use crate::scalar::Real;
+use std::f64::consts::PI;
+
+/// `L = (m1 + m2) l1^2 v1^2 / 2 + m2 l2^2 v2^2 / 2 + m2 l1 l2 v1 v2 cos(q1 - q2) + (m1 + m2) g l1 cos q1 + m2 g l2 cos q2`.
+#[derive(Clone, Copy, Debug)]
+pub struct DoublePendulum;
+
+const PARAMETERS: [Parameter; 5] = [
+    Parameter { symbol: "m1", ..MASS },
+    Parameter { symbol: "m2", ..MASS },
+    Parameter { symbol: "l1", ..LENGTH },
+    Parameter { symbol: "l2", ..LENGTH },
+    ACCELERATION_OF_GRAVITY,
+];
+
+/// Catalogue entry.
+pub const SYSTEM: System = System {
+    name: "double-pendulum",
+    title: "Double pendulum",
+    coordinates: angles,
+    parameters: &PARAMETERS,
+    size: Size::Fixed(2),
+    time_like: None,
+    training: |n| Bounds::uniform(n, (-0.1 * PI, 2.1 * PI), (-10.0, 10.0)),
+    validation: |n| Bounds::uniform(n, (0.0, 2.0 * PI), (-10.0, 10.0)),
+    trajectory: |n| TrajectoryTest {
+        start: Bounds::uniform(n, (0.0, 2.0 * PI), (-0.1, 0.1)),
+        t_end: 100.0,
+        dt: 0.1,
+    },
+    domain: None,
+};
+
+impl Lagrangian for DoublePendulum {
+    fn coordinates(&self) -> usize {
+        2
+    }
+    fn lagrangian<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> R {
+        let [m1, m2, l1, l2, g] = *parameters else { return R::constant(crate::scalar::Scalar::NAN) };
+        let (u1, u2) = (l1 * v[0], l2 * v[1]);
+        let total = m1 + m2;
+        let kinetic = R::half() * (total * u1.sqr() + m2 * u2.sqr()) + m2 * u1 * u2 * (q[0] - q[1]).cos();
+        kinetic + g * (total * l1 * q[0].cos() + m2 * l2 * q[1].cos())
+    }
+}
+
+impl Closed for DoublePendulum {
+    /// The paper's formulas with the denominator `1 - a1 a2` written without cancellation, `m1 + m2 sin^2 (q1 - q2)`.
+    fn acceleration<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> Vec<R> {
+        let [m1, m2, l1, l2, g] = *parameters else { return Vec::new() };
+        let (sin, cos) = (q[0] - q[1]).sin_cos();
+        let total = m1 + m2;
+        // Torques divided by the lengths: l1 total a1 + m2 l2 cos a2 = f1, l2 a2 + l1 cos a1 = f2.
+        let f1 = -(m2 * l2 * v[1].sqr() * sin + total * g * q[0].sin());
+        let f2 = l1 * v[0].sqr() * sin - g * q[1].sin();
+        let denominator = m1 + m2 * sin.sqr();
+        vec![(f1 - m2 * cos * f2) / (l1 * denominator), (total * f2 - cos * f1) / (l2 * denominator)]
+    }
+}

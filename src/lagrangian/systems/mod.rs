@@ -1,0 +1,22 @@
+//! Hand-written systems, one file each: Lagrangian, closed-form acceleration, catalogue entry.
+
+mod chain;
+pub mod double_pendulum;
+pub mod n_pendulum;
+pub mod sphere_geodesic;
+pub mod spring_pendulum;
+pub mod triple_pendulum;
+
+use super::system::{Coordinate, Parameter, Range};
+
+/// A mass of 1 kg.
+const MASS: Parameter = Parameter { symbol: "m", default: "1", unit: "kg", range: Range::Positive };
+/// A length of 1 m.
+const LENGTH: Parameter = Parameter { symbol: "l", default: "1", unit: "m", range: Range::Positive };
+/// The paper's acceleration of gravity; zero and negative values are allowed.
+const ACCELERATION_OF_GRAVITY: Parameter = Parameter { symbol: "g", default: "9.8", unit: "m/s^2", range: Range::Any };
+
+/// `theta1`, `theta2`, ..; `theta` if there is one.
+fn angles(n: usize) -> Vec<Coordinate> {
+    (1..=n).map(|i| Coordinate::angle(if n == 1 { "theta".into() } else { format!("theta{i}") })).collect()
+}

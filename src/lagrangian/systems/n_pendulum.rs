@@ -1,0 +1,57 @@
+//! Chain of n equal pendula.
+
+use super::{ACCELERATION_OF_GRAVITY, LENGTH, MASS, angles, chain};
+use crate::lagrangian::Lagrangian;
+use crate::lagrangian::system::{Bounds, Closed, Parameter, Size, System, TrajectoryTest};
+use crate::scalar::Real;
+use std::f64::consts::PI;
+
+/// `n` equal masses `m` on rods of equal length `l`: rod `i` carries `(n - i) m`, `i` from 0.
+#[derive(Clone, Copy, Debug)]
+pub struct NPendulum {
+    /// Number of pendula.
+    pub n: usize,
+}
+
+const PARAMETERS: [Parameter; 3] =
+    [Parameter { symbol: "m", ..MASS }, Parameter { symbol: "l", ..LENGTH }, ACCELERATION_OF_GRAVITY];
+
+/// Catalogue entry.
+pub const SYSTEM: System = System {
+    name: "n-pendulum",
+    title: "Chain of n equal pendula",
+    coordinates: angles,
+    parameters: &PARAMETERS,
+    size: Size::Chosen { symbol: "n", default: 4, least: 1, most: 20 },
+    time_like: None,
+    training: |n| Bounds::uniform(n, (-0.5 * PI, 2.5 * PI), (-10.0, 10.0)),
+    validation: |n| Bounds::uniform(n, (0.0, 2.0 * PI), (-10.0, 10.0)),
+    trajectory: |n| TrajectoryTest { start: Bounds::uniform(n, (0.2, 3.0), (-0.1, 0.1)), t_end: 50.0, dt: 0.1 },
+    domain: None,
+};
+
+impl NPendulum {
+    /// Masses carried by each rod, lengths, acceleration of gravity.
+    fn loads<R: Real>(&self, parameters: &[R]) -> Option<(Vec<R>, Vec<R>, R)> {
+        let [m, l, g] = *parameters else { return None };
+        let loads = (0..self.n).map(|i| R::from_f64((self.n - i) as f64) * m).collect();
+        Some((loads, vec![l; self.n], g))
+    }
+}
+
+impl Lagrangian for NPendulum {
+    fn coordinates(&self) -> usize {
+        self.n
+    }
+    fn lagrangian<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> R {
+        let Some((loads, lengths, g)) = self.loads(parameters) else { return R::constant(crate::scalar::Scalar::NAN) };
+        chain::lagrangian(&loads, &lengths, g, q, v)
+    }
+}
+
+impl Closed for NPendulum {
+    fn acceleration<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> Vec<R> {
+        let Some((loads, lengths, g)) = self.loads(parameters) else { return Vec::new() };
+        chain::acceleration(&loads, &lengths, g, q, v)
+    }
+}

@@ -1,0 +1,57 @@
+//! Free motion on a sphere in polar angle and azimuth.
+
+use super::{LENGTH, MASS};
+use crate::lagrangian::Lagrangian;
+use crate::lagrangian::system::{Bounds, Closed, Coordinate, Parameter, Size, System, TrajectoryTest};
+use crate::scalar::Real;
+use std::f64::consts::PI;
+
+/// `L = m R^2 (v_theta^2 + sin^2 theta v_phi^2) / 2`.
+#[derive(Clone, Copy, Debug)]
+pub struct SphereGeodesic;
+
+const PARAMETERS: [Parameter; 2] = [Parameter { symbol: "m", ..MASS }, Parameter { symbol: "R", ..LENGTH }];
+
+/// Catalogue entry.
+pub const SYSTEM: System = System {
+    name: "sphere-geodesic",
+    title: "Geodesic on a sphere",
+    coordinates: |_| vec![Coordinate { periodic: false, ..Coordinate::angle("theta") }, Coordinate::angle("phi")],
+    parameters: &PARAMETERS,
+    size: Size::Fixed(2),
+    time_like: None,
+    training: |_| Bounds {
+        positions: vec![(0.1 * PI, 0.9 * PI), (-0.5 * PI, 2.5 * PI)],
+        velocities: vec![(-5.0, 5.0), (-5.0, 5.0)],
+    },
+    validation: |_| Bounds {
+        positions: vec![(0.1 * PI, 0.9 * PI), (0.0, 2.0 * PI)],
+        velocities: vec![(-5.0, 5.0), (-5.0, 5.0)],
+    },
+    trajectory: |_| TrajectoryTest {
+        start: Bounds {
+            positions: vec![(0.25 * PI, 0.75 * PI), (0.0, 2.0 * PI)],
+            velocities: vec![(-2.0, 2.0), (-2.0, 2.0)],
+        },
+        t_end: 20.0,
+        dt: 0.05,
+    },
+    domain: Some(|q| if q[0].sin() != 0.0 { Ok(()) } else { Err("theta must keep away from the poles") }),
+};
+
+impl Lagrangian for SphereGeodesic {
+    fn coordinates(&self) -> usize {
+        2
+    }
+    fn lagrangian<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> R {
+        let [m, radius] = *parameters else { return R::constant(crate::scalar::Scalar::NAN) };
+        R::half() * m * radius.sqr() * (v[0].sqr() + (q[0].sin() * v[1]).sqr())
+    }
+}
+
+impl Closed for SphereGeodesic {
+    fn acceleration<R: Real>(&self, _parameters: &[R], q: &[R], v: &[R]) -> Vec<R> {
+        let (sin, cos) = q[0].sin_cos();
+        vec![sin * cos * v[1].sqr(), -R::two() * (cos / sin) * v[0] * v[1]]
+    }
+}

@@ -1,0 +1,64 @@
+//! Spring pendulum: a point mass on a spring that swings in a plane.
+
+use super::{ACCELERATION_OF_GRAVITY, LENGTH, MASS};
+use crate::lagrangian::Lagrangian;
+use crate::lagrangian::system::{Bounds, Closed, Coordinate, Parameter, Range, Size, System, TrajectoryTest};
+use crate::scalar::Real;
+use std::f64::consts::PI;
+
+/// `L = m (v_r^2 + r^2 v_theta^2) / 2 + m g r cos theta - k (r - l0)^2 / 2`.
+#[derive(Clone, Copy, Debug)]
+pub struct SpringPendulum;
+
+const PARAMETERS: [Parameter; 4] = [
+    Parameter { symbol: "m", ..MASS },
+    Parameter { symbol: "k", default: "40", unit: "N/m", range: Range::AtLeastZero },
+    Parameter { symbol: "l0", ..LENGTH },
+    ACCELERATION_OF_GRAVITY,
+];
+
+/// Catalogue entry.
+pub const SYSTEM: System = System {
+    name: "spring-pendulum",
+    title: "Spring pendulum",
+    coordinates: |_| vec![Coordinate::length("r"), Coordinate::angle("theta")],
+    parameters: &PARAMETERS,
+    size: Size::Fixed(2),
+    time_like: None,
+    training: |_| Bounds {
+        positions: vec![(0.05, 5.0), (-0.5 * PI, 2.5 * PI)],
+        velocities: vec![(-5.0, 5.0), (-5.0, 5.0)],
+    },
+    validation: |_| Bounds {
+        positions: vec![(0.05, 5.0), (0.0, 2.0 * PI)],
+        velocities: vec![(-5.0, 5.0), (-5.0, 5.0)],
+    },
+    trajectory: |_| TrajectoryTest {
+        start: Bounds {
+            positions: vec![(0.5, 1.5), (0.0, 2.0 * PI)],
+            velocities: vec![(-1.0, 1.0), (-1.0, 1.0)],
+        },
+        t_end: 50.0,
+        dt: 0.1,
+    },
+    domain: Some(|q| if q[0] > 0.0 { Ok(()) } else { Err("r must be positive") }),
+};
+
+impl Lagrangian for SpringPendulum {
+    fn coordinates(&self) -> usize {
+        2
+    }
+    fn lagrangian<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> R {
+        let [m, k, l0, g] = *parameters else { return R::constant(crate::scalar::Scalar::NAN) };
+        let (r, theta) = (q[0], q[1]);
+        m * (R::half() * (v[0].sqr() + (r * v[1]).sqr()) + g * r * theta.cos()) - R::half() * k * (r - l0).sqr()
+    }
+}
+
+impl Closed for SpringPendulum {
+    fn acceleration<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> Vec<R> {
+        let [m, k, l0, g] = *parameters else { return Vec::new() };
+        let (r, (sin, cos)) = (q[0], q[1].sin_cos());
+        vec![r * v[1].sqr() + g * cos - k * (r - l0) / m, -(g * sin + R::two() * v[0] * v[1]) / r]
+    }
+}

@@ -1,0 +1,59 @@
+//! Triple pendulum: three point masses on massless rods, angles from the downward vertical.
+
+use super::{ACCELERATION_OF_GRAVITY, LENGTH, MASS, angles, chain};
+use crate::lagrangian::Lagrangian;
+use crate::lagrangian::system::{Bounds, Closed, Parameter, Size, System, TrajectoryTest};
+use crate::scalar::Real;
+use std::f64::consts::PI;
+
+/// `L = sum_ij mu_max(i,j) l_i l_j v_i v_j cos(q_i - q_j) / 2 + g sum_i mu_i l_i cos q_i`, `mu_i = m_i + .. + m_3`.
+#[derive(Clone, Copy, Debug)]
+pub struct TriplePendulum;
+
+const PARAMETERS: [Parameter; 7] = [
+    Parameter { symbol: "m1", ..MASS },
+    Parameter { symbol: "m2", ..MASS },
+    Parameter { symbol: "m3", ..MASS },
+    Parameter { symbol: "l1", ..LENGTH },
+    Parameter { symbol: "l2", ..LENGTH },
+    Parameter { symbol: "l3", ..LENGTH },
+    ACCELERATION_OF_GRAVITY,
+];
+
+/// Catalogue entry.
+pub const SYSTEM: System = System {
+    name: "triple-pendulum",
+    title: "Triple pendulum",
+    coordinates: angles,
+    parameters: &PARAMETERS,
+    size: Size::Fixed(3),
+    time_like: None,
+    training: |n| Bounds::uniform(n, (-0.5 * PI, 2.5 * PI), (-10.0, 10.0)),
+    validation: |n| Bounds::uniform(n, (0.0, 2.0 * PI), (-10.0, 10.0)),
+    trajectory: |n| TrajectoryTest { start: Bounds::uniform(n, (0.2, 3.0), (-0.1, 0.1)), t_end: 50.0, dt: 0.1 },
+    domain: None,
+};
+
+/// Masses carried by each rod, lengths, acceleration of gravity.
+fn loads<R: Real>(parameters: &[R]) -> Option<([R; 3], [R; 3], R)> {
+    let [m1, m2, m3, l1, l2, l3, g] = *parameters else { return None };
+    Some(([m1 + (m2 + m3), m2 + m3, m3], [l1, l2, l3], g))
+}
+
+impl Lagrangian for TriplePendulum {
+    fn coordinates(&self) -> usize {
+        3
+    }
+    fn lagrangian<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> R {
+        let Some((loads, lengths, g)) = loads(parameters) else { return R::constant(crate::scalar::Scalar::NAN) };
+        chain::lagrangian(&loads, &lengths, g, q, v)
+    }
+}
+
+impl Closed for TriplePendulum {
+    /// `M a = F` with the paper's mass matrix and forces.
+    fn acceleration<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> Vec<R> {
+        let Some((loads, lengths, g)) = loads(parameters) else { return Vec::new() };
+        chain::acceleration(&loads, &lengths, g, q, v)
+    }
+}

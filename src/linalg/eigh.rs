@@ -1,0 +1,115 @@
+//! Batched symmetric eigendecomposition.
+
+use super::batch::{Buffers, LANES, Workspace, gather, scatter, with_size};
+use super::error::{Failure, LinalgError, expect_length};
+use super::{jacobi, large};
+use crate::scalar::{Scalar, vectorized};
+
+/// Eigenvalues, ascending, and eigenvectors of a batch of symmetric matrices: `M = sum_k w_k u_k u_k^T`.
+///
+/// `matrices` is `(batch, n, n)` (the upper triangle is read), `values` `(batch, n)`, `vectors` `(batch, n, n)` with
+/// `u_k` as ROW `k`.
+///
+/// # Errors
+/// [`LinalgError::Shape`]; [`LinalgError::NotFinite`] names the first matrix with an infinity or a `NaN`, its results
+/// are `NaN`, the others are right.
+pub fn eigh<S: Scalar>(
+    n: usize,
+    matrices: &[S],
+    values: &mut [S],
+    vectors: &mut [S],
+    workspace: &mut Workspace<S>,
+) -> Result<(), LinalgError> {
+    expect_length("eigenvectors", matrices.len(), vectors.len())?;
+    run(n, matrices, values, vectors, workspace)
+}
+
+/// Eigenvalues alone, ascending; arguments and errors as in [`eigh`].
+///
+/// # Errors
+/// As [`eigh`].
+pub fn eigenvalues<S: Scalar>(
+    n: usize,
+    matrices: &[S],
+    values: &mut [S],
+    workspace: &mut Workspace<S>,
+) -> Result<(), LinalgError> {
+    run(n, matrices, values, &mut [], workspace)
+}
+
+/// Both; `vectors` may be empty.
+fn run<S: Scalar>(
+    n: usize,
+    matrices: &[S],
+    values: &mut [S],
+    vectors: &mut [S],
+    workspace: &mut Workspace<S>,
+) -> Result<(), LinalgError> {
+    workspace.clear_failures();
+    let size = n * n;
+    let batch = matrices.len() / size.max(1);
+    expect_length("matrices", batch * size, matrices.len())?;
+    expect_length("eigenvalues", batch * n, values.len())?;
+    if batch == 0 {
+        return Ok(());
+    }
+    if large::serves::<S>(n) {
+        for (row, (m, w)) in matrices.chunks_exact(size).zip(values.chunks_exact_mut(n)).enumerate() {
+            let u = if vectors.is_empty() { &mut [][..] } else { &mut vectors[row * size..(row + 1) * size] };
+            large::eigh(n, m, w, u);
+        }
+    } else {
+        let (wide, single) = (&mut workspace.wide, &mut workspace.single);
+        let mut start = 0;
+        while start < batch {
+            let count = (batch - start).min(LANES);
+            if count == 1 {
+                block(n, matrices, values, vectors, start, single);
+            } else {
+                block(n, matrices, values, vectors, start, wide);
+            }
+            start += count;
+        }
+    }
+    for (row, m) in matrices.chunks_exact(size).enumerate() {
+        let values = &mut values[row * n..(row + 1) * n];
+        if m.iter().any(|m| !m.is_finite()) || values.iter().any(|w| !w.is_finite()) {
+            values.fill(S::NAN);
+            if !vectors.is_empty() {
+                vectors[row * size..(row + 1) * size].fill(S::NAN);
+            }
+            workspace.failures_mut().push((row, Failure::NotFinite));
+        }
+    }
+    workspace.outcome()
+}
+
+/// Rows `start..start + W`.
+fn block<S: Scalar, const W: usize>(
+    n: usize,
+    matrices: &[S],
+    values: &mut [S],
+    vectors: &mut [S],
+    start: usize,
+    buffers: &mut Buffers<S, W>,
+) {
+    buffers.reserve(n);
+    let Buffers { matrix, factor, rhs, .. } = buffers;
+    vectorized(
+        #[inline(always)]
+        || {
+            with_size!(n, |n| {
+                let matrix = &mut matrix[..n * n];
+                gather(matrices, n * n, start, matrix);
+                let u = if vectors.is_empty() { &mut [][..] } else { &mut factor[..n * n] };
+                let exponents = jacobi::rescale(matrix);
+                jacobi::diagonalize(n, matrix, u);
+                jacobi::sorted(n, matrix, &exponents, u, rhs);
+                scatter(rhs, values, n, start);
+                if !vectors.is_empty() {
+                    scatter(u, vectors, n * n, start);
+                }
+            })
+        },
+    );
+}

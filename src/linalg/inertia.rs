@@ -1,0 +1,145 @@
+//! Signs of the eigenvalues without the eigenvalues.
+
+use super::error::{LinalgError, expect_length};
+use crate::scalar::{Real, Scalar};
+
+/// How many eigenvalues are positive, zero and negative (Sylvester's law: invariant under congruence).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Inertia {
+    /// Positive eigenvalues.
+    pub positive: usize,
+    /// Eigenvalues indistinguishable from zero.
+    pub zero: usize,
+    /// Negative eigenvalues.
+    pub negative: usize,
+}
+
+/// Whether every pivot of `M = L D L^T` without exchanges is positive.
+///
+/// `scratch` holds `n^2` numbers. Wrong only where an eigenvalue is within rounding of zero; `false` for `NaN`.
+pub fn is_positive_definite<S: Scalar>(n: usize, matrix: &[S], scratch: &mut [S]) -> bool {
+    let zero = <S as Real>::zero();
+    let a = &mut scratch[..n * n];
+    a.copy_from_slice(&matrix[..n * n]);
+    for k in 0..n {
+        let pivot = a[k * n + k];
+        if !(pivot > zero && pivot.is_finite()) {
+            return false;
+        }
+        for i in k + 1..n {
+            let factor = a[i * n + k] / pivot;
+            for j in k + 1..=i {
+                let update = factor * a[j * n + k];
+                a[i * n + j] -= update;
+            }
+        }
+    }
+    true
+}
+
+/// Inertia of one symmetric `(n, n)` matrix from the pivots of `P M P^T = L D L^T` with complete pivoting, blocks of
+/// 1x1 and 2x2 (Bunch and Parlett 1971).
+///
+/// Signs are right for every eigenvalue larger than rounding, zero diagonals and tiny pivots included; a remainder
+/// below `n eps max|M|` counts as zero. Reads the lower triangle; `scratch` holds `n^2` numbers.
+///
+/// # Errors
+/// [`LinalgError::Shape`]; [`LinalgError::NotFinite`] (row 0) for an infinity or a `NaN`.
+pub fn inertia<S: Scalar>(n: usize, matrix: &[S], scratch: &mut [S]) -> Result<Inertia, LinalgError> {
+    expect_length("matrix", n * n, matrix.len())?;
+    if scratch.len() < n * n {
+        return Err(LinalgError::Shape { what: "scratch", expected: n * n, found: scratch.len() });
+    }
+    if matrix.iter().any(|m| !m.is_finite()) {
+        return Err(LinalgError::NotFinite { row: 0 });
+    }
+    let (zero, one) = (<S as Real>::zero(), <S as Real>::one());
+    let a = &mut scratch[..n * n];
+    a.copy_from_slice(matrix);
+    let largest = a.iter().fold(zero, |m, x| if x.abs() > m { x.abs() } else { m });
+    let mut found = Inertia::default();
+    if largest == zero {
+        found.zero = n;
+        return Ok(found);
+    }
+    // Near 1: products of pivots neither overflow nor vanish.
+    let exponent = largest.ilogb();
+    a.iter_mut().for_each(|x| *x = x.ldexp(-exponent));
+    let floor = S::EPSILON * S::of_f64(2.0 * n as f64);
+    // (1 + sqrt 17) / 8 bounds the growth.
+    let alpha = (one + S::of_f64(17.0).sqrt()) / S::of_f64(8.0);
+    let mut k = 0;
+    while k < n {
+        let (mut diagonal, mut p) = (zero, k);
+        let (mut off, mut r, mut s) = (zero, k, k);
+        for i in k..n {
+            for j in k..=i {
+                let size = a[i * n + j].abs();
+                if i == j && size > diagonal {
+                    (diagonal, p) = (size, i);
+                } else if i != j && size > off {
+                    (off, r, s) = (size, i, j);
+                }
+            }
+        }
+        if diagonal <= floor && off <= floor {
+            found.zero += n - k;
+            break;
+        }
+        if diagonal >= alpha * off {
+            exchange(n, a, k, p);
+            let pivot = a[k * n + k];
+            if pivot > zero {
+                found.positive += 1;
+            } else {
+                found.negative += 1;
+            }
+            for i in k + 1..n {
+                let factor = a[i * n + k] / pivot;
+                for j in k + 1..=i {
+                    let update = factor * a[j * n + k];
+                    a[i * n + j] -= update;
+                }
+            }
+            k += 1;
+        } else {
+            // A 2x2 block whose determinant is negative: one eigenvalue of each sign. s < r.
+            exchange(n, a, k, s);
+            exchange(n, a, k + 1, r);
+            found.positive += 1;
+            found.negative += 1;
+            let (d, b, e) = (a[k * n + k], a[(k + 1) * n + k], a[(k + 1) * n + k + 1]);
+            // Divided by b twice: no overflow, and d e / b^2 <= alpha^2 < 1.
+            let (x, y) = (d / b, e / b);
+            let scale = (b * (x * y - one)).recip();
+            for i in k + 2..n {
+                let (u, w) = (a[i * n + k], a[i * n + k + 1]);
+                let (first, second) = ((y * u - w) * scale, (x * w - u) * scale);
+                for j in k + 2..=i {
+                    let update = first * a[j * n + k] + second * a[j * n + k + 1];
+                    a[i * n + j] -= update;
+                }
+            }
+            k += 2;
+        }
+    }
+    Ok(found)
+}
+
+/// Exchanges rows and columns `i <= j` of a symmetric matrix in its lower triangle.
+fn exchange<S: Scalar>(n: usize, a: &mut [S], i: usize, j: usize) {
+    if i == j {
+        return;
+    }
+    let mut at = |x: usize, y: usize, z: usize, w: usize| a.swap(x * n + y, z * n + w);
+    at(i, i, j, j);
+    for k in 0..i {
+        at(i, k, j, k);
+    }
+    for k in i + 1..j {
+        at(k, i, j, k);
+    }
+    for k in j + 1..n {
+        at(k, i, k, j);
+    }
+}

@@ -1,0 +1,138 @@
+//! Forward replay of one chunk: each operation over all lanes.
+
+use super::{Instruction, LANES, Node, Row};
+use crate::ops::{Binary, Unary};
+use crate::scalar::{Scalar, vectorized};
+
+/// What an instruction may read besides the rows of its own section.
+pub(super) struct Environment<'a, S> {
+    /// Uniform rows (empty while they themselves are computed).
+    pub(super) uniform: &'a [Row<S>],
+    /// Lane inputs of the chunk, `(lanes, inputs)`; lanes past the end repeat the last state.
+    pub(super) inputs: &'a [S],
+    /// Number of lane inputs.
+    pub(super) width: usize,
+    /// Parameters.
+    pub(super) parameters: &'a [S],
+}
+
+/// Computes the rows of `program` in order.
+pub(super) fn forward<S: Scalar>(
+    program: &[Instruction<S>],
+    environment: &Environment<'_, S>,
+    rows: &mut [Row<S>],
+    scratch: &mut [S],
+) {
+    let uniform = environment.uniform;
+    let base = uniform.len();
+    vectorized(
+        #[inline(always)]
+        || {
+            for instruction in program {
+                let (before, after) = rows.split_at_mut(instruction.out as usize - base);
+                let get = |row: u32| {
+                    let row = row as usize;
+                    if row < base { &uniform[row] } else { &before[row - base] }
+                };
+                let Some((out, rest)) = after.split_first_mut() else { continue };
+                match &instruction.node {
+                    Node::Input(index) => load(environment, *index as usize, out),
+                    Node::Parameter(index) => out.fill(environment.parameters[*index as usize]),
+                    Node::Constant(value) => out.fill(*value),
+                    Node::Unary(f, a) => unary(*f, get(*a), out),
+                    Node::SinCos(a) => {
+                        if let Some(cos) = rest.first_mut() {
+                            sin_cos(get(*a), out, cos);
+                        }
+                    }
+                    Node::Binary(f, a, b) => binary(*f, get(*a), get(*b), out),
+                    Node::Select(c, a, b) => {
+                        let (c, a, b) = (get(*c), get(*a), get(*b));
+                        for l in 0..LANES {
+                            out[l] = c[l].select(a[l], b[l]);
+                        }
+                    }
+                    Node::Block(op) => {
+                        let out = instruction.out as usize - base;
+                        op.forward(uniform, rows, out, environment.parameters, scratch);
+                    }
+                }
+            }
+        },
+    );
+}
+
+/// One input of all lanes.
+#[inline(always)]
+fn load<S: Scalar>(environment: &Environment<'_, S>, index: usize, out: &mut Row<S>) {
+    let states = environment.inputs.chunks_exact(environment.width);
+    let mut value = S::NAN;
+    let mut filled = 0;
+    for (target, state) in out.iter_mut().zip(states) {
+        value = state[index];
+        *target = value;
+        filled += 1;
+    }
+    out[filled..].fill(value);
+}
+
+#[inline(always)]
+fn map<S: Scalar>(x: &Row<S>, out: &mut Row<S>, f: impl Fn(S) -> S) {
+    for l in 0..LANES {
+        out[l] = f(x[l]);
+    }
+}
+
+/// The cheap functions are compiled for the widest vectors; the others are calls.
+#[inline(always)]
+fn unary<S: Scalar>(f: Unary, x: &Row<S>, out: &mut Row<S>) {
+    match f {
+        Unary::Neg => map(x, out, |x| -x),
+        Unary::Recip => map(x, out, S::recip),
+        Unary::Sqrt => map(x, out, S::sqrt),
+        Unary::Abs => map(x, out, S::abs),
+        Unary::Powi(2) => map(x, out, |x| x * x),
+        _ => elementary(f, x, out),
+    }
+}
+
+/// The one place where elementary functions meet lanes.
+#[inline(never)]
+fn elementary<S: Scalar>(f: Unary, x: &Row<S>, out: &mut Row<S>) {
+    map(x, out, |x| f.value(x));
+}
+
+/// Sine and cosine of all lanes.
+#[inline(never)]
+fn sin_cos<S: Scalar>(x: &Row<S>, sin: &mut Row<S>, cos: &mut Row<S>) {
+    for l in 0..LANES {
+        (sin[l], cos[l]) = x[l].sin_cos();
+    }
+}
+
+#[inline(always)]
+fn binary<S: Scalar>(f: Binary, a: &Row<S>, b: &Row<S>, out: &mut Row<S>) {
+    #[inline(always)]
+    fn zip<S: Scalar>(a: &Row<S>, b: &Row<S>, out: &mut Row<S>, f: impl Fn(S, S) -> S) {
+        for l in 0..LANES {
+            out[l] = f(a[l], b[l]);
+        }
+    }
+    match f {
+        Binary::Add => zip(a, b, out, |a, b| a + b),
+        Binary::Sub => zip(a, b, out, |a, b| a - b),
+        Binary::Mul => zip(a, b, out, |a, b| a * b),
+        Binary::Div => zip(a, b, out, |a, b| a / b),
+        Binary::Max => zip(a, b, out, |a, b| Binary::Max.value(a, b)),
+        Binary::Min => zip(a, b, out, |a, b| Binary::Min.value(a, b)),
+        Binary::Powf | Binary::Atan2 => call(f, a, b, out),
+    }
+}
+
+/// Functions of two numbers that are calls.
+#[inline(never)]
+fn call<S: Scalar>(f: Binary, a: &Row<S>, b: &Row<S>, out: &mut Row<S>) {
+    for l in 0..LANES {
+        out[l] = f.value(a[l], b[l]);
+    }
+}

@@ -1,0 +1,164 @@
+//! Programs: recorded once, replayed over the lanes of a batch.
+//!
+//! A row is one expression for [`LANES`] states side by side; rows that depend on parameters and constants alone are
+//! uniform and computed once for the batch. The interpreter visits one operation at a time for one chunk of lanes, so
+//! its cost per operation is shared by the lanes and the loops are SIMD. The chunk does not depend on the number of
+//! threads: the same batch gives the same bytes.
+
+mod backward;
+mod forward;
+mod recorder;
+mod replay;
+mod tracer;
+
+pub use recorder::Recorder;
+pub use replay::Replay;
+pub use tracer::Tracer;
+
+pub(super) use backward::Sweep;
+pub(super) use recorder::Node;
+pub(super) use replay::pairwise;
+
+use super::error::TapeError;
+use crate::scalar::Scalar;
+
+/// Lanes of a chunk.
+pub const LANES: usize = 64;
+
+/// One number for each lane of a chunk.
+pub(super) type Row<S> = [S; LANES];
+
+/// An operation and the first row it fills.
+#[derive(Clone, Debug)]
+pub(super) struct Instruction<S> {
+    pub(super) node: Node<S>,
+    pub(super) out: u32,
+}
+
+/// A recorded function of lane inputs and parameters; see [`Program::record`].
+///
+/// Only what the outputs need is kept, equal expressions are computed once, constants are folded.
+#[derive(Clone, Debug)]
+pub struct Program<S> {
+    /// Rows below are constants; adjoints do not reach them.
+    pub(super) constants: usize,
+    /// Rows below are uniform over the lanes.
+    pub(super) uniform_rows: usize,
+    pub(super) lane_rows: usize,
+    pub(super) uniform: Vec<Instruction<S>>,
+    pub(super) lanes: Vec<Instruction<S>>,
+    pub(super) outputs: Vec<u32>,
+    pub(super) inputs: usize,
+    pub(super) parameters: usize,
+    pub(super) scratch: usize,
+}
+
+impl<S: Scalar> Program<S> {
+    /// Records `f(recorder, inputs, parameters)`, which returns the outputs.
+    ///
+    /// Inputs differ from lane to lane (a state), parameters are the same for all (masses, weights). The recorder is
+    /// needed for block operations only. `f` may itself use forward numbers over the [`Tracer`]s.
+    ///
+    /// # Errors
+    /// [`TapeError::DataDependentBranch`] if `f` reads a value, [`TapeError::MixedTapes`] if it uses numbers of
+    /// another recording, [`TapeError::Block`] if blocks do not fit.
+    pub fn record<F>(inputs: usize, parameters: usize, f: F) -> Result<Self, TapeError>
+    where
+        F: for<'t> FnOnce(&'t Recorder<S>, &[Tracer<'t, S>], &[Tracer<'t, S>]) -> Vec<Tracer<'t, S>>,
+    {
+        let recorder = Recorder::new(parameters);
+        let outputs: Vec<u32> = {
+            let number = |node| recorder.tracer(recorder.row(node));
+            let x: Vec<Tracer<'_, S>> = (0..inputs as u32).map(|i| number(Node::Input(i))).collect();
+            let p: Vec<Tracer<'_, S>> = (0..parameters as u32).map(|i| number(Node::Parameter(i))).collect();
+            f(&recorder, &x, &p).into_iter().map(|y| recorder.row_of(y)).collect()
+        };
+        let graph = recorder.finish()?;
+        Ok(Self::compile(&graph, &outputs, inputs, parameters))
+    }
+
+    /// Keeps what the outputs need and sorts it: constants, other uniform rows, lane rows.
+    fn compile(graph: &recorder::Graph<S>, outputs: &[u32], inputs: usize, parameters: usize) -> Self {
+        let count = graph.nodes.len();
+        let node_of = |row: u32| graph.node_of_row[row as usize] as usize;
+        let mut needed = vec![false; count];
+        for &row in outputs {
+            needed[node_of(row)] = true;
+        }
+        let mut uniform = vec![false; count];
+        for index in (0..count).rev() {
+            if needed[index] {
+                graph.nodes[index].operands(|row| needed[node_of(row)] = true);
+            }
+        }
+        for (index, node) in graph.nodes.iter().enumerate() {
+            uniform[index] = match node {
+                Node::Input(_) | Node::Block(_) => false,
+                node => {
+                    let mut all = true;
+                    node.operands(|row| all &= uniform[node_of(row)]);
+                    all
+                }
+            };
+        }
+        let mut place = vec![0u32; count];
+        let mut rows = 0u32;
+        let mut boundaries = [0usize; 3];
+        for (section, boundary) in boundaries.iter_mut().enumerate() {
+            for (index, node) in graph.nodes.iter().enumerate() {
+                let home = match node {
+                    Node::Constant(_) => 0,
+                    _ if uniform[index] => 1,
+                    _ => 2,
+                };
+                if needed[index] && home == section {
+                    place[index] = rows;
+                    rows += node.rows() as u32;
+                }
+            }
+            *boundary = rows as usize;
+        }
+        let [constants, uniform_rows, all_rows] = boundaries;
+        let moved = |row: u32| place[node_of(row)] + (row - graph.first[node_of(row)]);
+        let mut program = Self {
+            constants,
+            uniform_rows,
+            lane_rows: all_rows - uniform_rows,
+            uniform: Vec::new(),
+            lanes: Vec::new(),
+            outputs: outputs.iter().map(|&row| moved(row)).collect(),
+            inputs,
+            parameters,
+            scratch: 0,
+        };
+        for (index, node) in graph.nodes.iter().enumerate().filter(|&(index, _)| needed[index]) {
+            if let Node::Block(op) = node {
+                program.scratch = program.scratch.max(op.scratch());
+            }
+            let instruction = Instruction { node: node.renumbered(moved), out: place[index] };
+            if uniform[index] { &mut program.uniform } else { &mut program.lanes }.push(instruction);
+        }
+        program
+    }
+
+    /// Number of lane inputs.
+    pub fn inputs(&self) -> usize {
+        self.inputs
+    }
+    /// Number of parameters.
+    pub fn parameters(&self) -> usize {
+        self.parameters
+    }
+    /// Number of outputs.
+    pub fn outputs(&self) -> usize {
+        self.outputs.len()
+    }
+    /// Operations done for each lane, inputs included.
+    pub fn lane_operations(&self) -> usize {
+        self.lanes.len()
+    }
+    /// Operations done once for the batch, constants and parameters included.
+    pub fn uniform_operations(&self) -> usize {
+        self.uniform.len()
+    }
+}

@@ -1,0 +1,179 @@
+//! Replay of a program over a batch: forward, then reverse.
+
+use super::backward::Sweep;
+use super::forward::{Environment, forward};
+use super::{LANES, Node, Program, Row};
+use crate::scalar::{Real, Scalar};
+use crate::tape::error::{TapeError, check_length};
+use std::sync::Arc;
+
+/// Buffers for replaying a [`Program`]; they grow to the largest batch seen and are reused after that, so repeated
+/// replays of a size allocate nothing.
+#[derive(Clone, Debug)]
+pub struct Replay<S> {
+    program: Arc<Program<S>>,
+    lanes: Option<usize>,
+    uniform: Vec<Row<S>>,
+    /// Values of the lane rows, chunk after chunk.
+    values: Vec<Row<S>>,
+    adjoints: Vec<Row<S>>,
+    uniform_adjoints: Vec<Row<S>>,
+    parameters: Vec<S>,
+    scratch: Vec<S>,
+}
+
+impl<S: Scalar> Replay<S> {
+    /// Buffers for a program.
+    pub fn new(program: Arc<Program<S>>) -> Self {
+        let zero = <S as Real>::zero();
+        Self {
+            lanes: None,
+            uniform: vec![[zero; LANES]; program.uniform_rows],
+            values: Vec::new(),
+            adjoints: vec![[zero; LANES]; program.lane_rows],
+            uniform_adjoints: vec![[zero; LANES]; program.uniform_rows],
+            parameters: vec![zero; program.parameters],
+            scratch: vec![zero; program.scratch],
+            program,
+        }
+    }
+    /// The program.
+    pub fn program(&self) -> &Program<S> {
+        &self.program
+    }
+
+    /// Computes `outputs` `(lanes, outputs)` from `inputs` `(lanes, inputs)` and `parameters`, all row-major.
+    ///
+    /// # Errors
+    /// [`TapeError::Shape`] if a slice has the wrong length.
+    pub fn forward(
+        &mut self,
+        lanes: usize,
+        inputs: &[S],
+        parameters: &[S],
+        outputs: &mut [S],
+    ) -> Result<(), TapeError> {
+        let program = Arc::clone(&self.program);
+        self.lanes = None;
+        check_length("inputs", lanes * program.inputs, inputs.len())?;
+        check_length("parameters", program.parameters, parameters.len())?;
+        check_length("outputs", lanes * program.outputs.len(), outputs.len())?;
+        let rows = program.lane_rows;
+        self.values.resize(self.values.len().max(lanes.div_ceil(LANES) * rows), [<S as Real>::zero(); LANES]);
+        self.parameters.copy_from_slice(parameters);
+        let environment = Environment { uniform: &[], inputs: &[], width: 0, parameters };
+        forward(&program.uniform, &environment, &mut self.uniform, &mut self.scratch);
+        for (chunk, start) in (0..lanes).step_by(LANES).enumerate() {
+            let count = LANES.min(lanes - start);
+            let environment = Environment {
+                uniform: &self.uniform,
+                inputs: &inputs[start * program.inputs..(start + count) * program.inputs],
+                width: program.inputs,
+                parameters,
+            };
+            let values = &mut self.values[chunk * rows..(chunk + 1) * rows];
+            forward(&program.lanes, &environment, values, &mut self.scratch);
+            let width = program.outputs.len();
+            for (column, &row) in program.outputs.iter().enumerate() {
+                let row = row as usize;
+                let source =
+                    if row < program.uniform_rows { &self.uniform[row] } else { &values[row - program.uniform_rows] };
+                for (lane, &value) in source[..count].iter().enumerate() {
+                    outputs[(start + lane) * width + column] = value;
+                }
+            }
+        }
+        self.lanes = Some(lanes);
+        Ok(())
+    }
+
+    /// Adjoints of the last forward replay: from `output_adjoints` `(lanes, outputs)` to `input_adjoints`
+    /// `(lanes, inputs)` and `parameter_adjoints` `(parameters)`, summed over the lanes in a fixed order.
+    ///
+    /// # Errors
+    /// [`TapeError::NoForward`] without a forward replay before it, [`TapeError::Shape`] for wrong lengths.
+    pub fn reverse(
+        &mut self,
+        output_adjoints: &[S],
+        input_adjoints: &mut [S],
+        parameter_adjoints: &mut [S],
+    ) -> Result<(), TapeError> {
+        let program = Arc::clone(&self.program);
+        let lanes = self.lanes.ok_or(TapeError::NoForward)?;
+        check_length("output adjoints", lanes * program.outputs.len(), output_adjoints.len())?;
+        check_length("input adjoints", lanes * program.inputs, input_adjoints.len())?;
+        check_length("parameter adjoints", program.parameters, parameter_adjoints.len())?;
+        let zero = <S as Real>::zero();
+        let (rows, base, width) = (program.lane_rows, program.uniform_rows, program.outputs.len());
+        self.uniform_adjoints.fill([zero; LANES]);
+        input_adjoints.fill(zero);
+        parameter_adjoints.fill(zero);
+        for (chunk, start) in (0..lanes).step_by(LANES).enumerate() {
+            let count = LANES.min(lanes - start);
+            self.adjoints.fill([zero; LANES]);
+            for (column, &row) in program.outputs.iter().enumerate() {
+                let row = row as usize;
+                let target = if row < base { &mut self.uniform_adjoints[row] } else { &mut self.adjoints[row - base] };
+                for (lane, value) in target[..count].iter_mut().enumerate() {
+                    *value += output_adjoints[(start + lane) * width + column];
+                }
+            }
+            let mut sweep = Sweep {
+                constants: program.constants,
+                uniform: &self.uniform,
+                rows: &self.values[chunk * rows..(chunk + 1) * rows],
+                uniform_adjoints: &mut self.uniform_adjoints,
+                adjoints: &mut self.adjoints,
+                parameters: &self.parameters,
+                parameter_adjoints,
+                scratch: &mut self.scratch,
+            };
+            sweep.run(&program.lanes);
+            for instruction in &program.lanes {
+                if let Node::Input(index) = instruction.node {
+                    let source = &self.adjoints[instruction.out as usize - base];
+                    for (lane, &value) in source[..count].iter().enumerate() {
+                        input_adjoints[(start + lane) * program.inputs + index as usize] = value;
+                    }
+                }
+            }
+        }
+        // Uniform rows: sum over the lanes once, then sweep once.
+        for row in &mut self.uniform_adjoints {
+            let sum = pairwise(row);
+            row.fill(zero);
+            row[0] = sum;
+        }
+        let mut sweep = Sweep {
+            constants: program.constants,
+            uniform: &[],
+            rows: &self.uniform,
+            uniform_adjoints: &mut [],
+            adjoints: &mut self.uniform_adjoints,
+            parameters: &self.parameters,
+            parameter_adjoints: &mut [],
+            scratch: &mut self.scratch,
+        };
+        sweep.run(&program.uniform);
+        for instruction in &program.uniform {
+            if let Node::Parameter(index) = instruction.node {
+                parameter_adjoints[index as usize] += self.uniform_adjoints[instruction.out as usize][0];
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Sum over the lanes of a chunk by halves: a fixed order with a small error.
+pub(in crate::tape) fn pairwise<S: Scalar>(row: &Row<S>) -> S {
+    let mut sums = *row;
+    let mut half = LANES / 2;
+    while half > 0 {
+        for l in 0..half {
+            let other = sums[l + half];
+            sums[l] += other;
+        }
+        half /= 2;
+    }
+    sums[0]
+}

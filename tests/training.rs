@@ -1,0 +1,313 @@
+//! The training objective against forward mode through the whole loss; the trainer's promises.
+
+mod common;
+
+use common::solve;
+use lnn::forward::{Dual, HyperDual};
+use lnn::lagrangian::Lagrangian;
+use lnn::network::{Activation, Architecture, Initialization, initial_weights};
+use lnn::scalar::{Dd, Real, Scalar};
+use lnn::training::{
+    Config, Data, Dataset, Datasets, Failure, Hooks, Method, Network, Objective, OnFailure, Optimizer, Penalty, Phase,
+    Precision, Scaling, Schedule, Stop, Trained, TrainingError, train,
+};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+fn architecture(n: usize, hidden: &[usize]) -> Architecture {
+    Architecture {
+        coordinates: n,
+        hidden: hidden.to_vec(),
+        activation: Activation::Gelu,
+        alpha: 0.3,
+        scale: (0..n).map(|i| 2.0 + i as f64).collect(),
+        periodic: vec![true; n],
+        embed_periodic: true,
+    }
+}
+
+fn random_data<S: Scalar>(n: usize, states: usize, seed: u64) -> Dataset<S> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut draw = |size: f64| (0..states * n).map(|_| S::of_f64(rng.random_range(-size..size))).collect();
+    Dataset::new(n, draw(3.0), draw(4.0), draw(5.0)).unwrap()
+}
+
+/// Loss of one state in the paper's convention plus the penalty, over any number type; eigenvectors are those of `M`.
+fn whole_loss<T: Real>(
+    architecture: &Architecture,
+    weights: &[T],
+    [q, v, a]: [&[T]; 3],
+    negative: &[Vec<f64>],
+    lambda: f64,
+) -> T {
+    let n = architecture.coordinates;
+    let lifted: Vec<HyperDual<T>> = weights.iter().map(|&w| HyperDual::lift(w)).collect();
+    let jet = |s: &[T], t: &[T]| {
+        let x: Vec<HyperDual<T>> = (0..2 * n)
+            .map(|k| HyperDual::new(if k < n { q[k] } else { v[k - n] }, s[k], t[k], T::zero()))
+            .collect();
+        architecture.lagrangian(&lifted, &x[..n], &x[n..])
+    };
+    let unit = |k: usize| -> Vec<T> { (0..2 * n).map(|i| if i == k { T::one() } else { T::zero() }).collect() };
+    let moving: Vec<T> = v.iter().copied().chain((0..n).map(|_| T::zero())).collect();
+    let mass: Vec<T> = (0..n * n).map(|k| jet(&unit(n + k / n), &unit(n + k % n)).st).collect();
+    let force: Vec<T> = (0..n).map(|i| jet(&unit(i), &unit(i)).s - jet(&unit(n + i), &moving).st).collect();
+    let scale = |i: usize| T::from_f64(architecture.scale[i]);
+    let predicted = solve(n, &mass, &force);
+    let mut loss = T::zero();
+    for i in 0..n {
+        loss += ((predicted[i] - a[i]) / scale(i)).abs();
+    }
+    loss = loss / T::from_f64(2.0 * n as f64);
+    for u in negative {
+        for i in 0..n {
+            for j in 0..n {
+                // First-order change of an eigenvalue of the scaled mass matrix: u^T dM u.
+                let element = mass[i * n + j] * scale(i) * scale(j);
+                loss -= T::from_f64(lambda * u[i] * u[j]) * element;
+            }
+        }
+    }
+    loss
+}
+
+/// Loss and gradient of a batch by forward mode, one weight at a time.
+fn reference<S: Scalar>(
+    architecture: &Architecture,
+    weights: &[S],
+    data: &Dataset<S>,
+    negative: &[Vec<Vec<f64>>],
+    lambda: f64,
+) -> (S, Vec<S>) {
+    let n = architecture.coordinates;
+    let count = S::of_f64(data.len() as f64);
+    let constant = |x: &[S]| -> Vec<Dual<S>> { x.iter().map(|&x| Dual::constant(x)).collect() };
+    let mut value = <S as Real>::zero();
+    let gradient = (0..weights.len())
+        .map(|k| {
+            let mut moved = constant(weights);
+            moved[k] = Dual::new(weights[k], <S as Real>::one());
+            let mut total = Dual::constant(<S as Real>::zero());
+            for (row, negative) in negative.iter().enumerate() {
+                let part = |x: &[S]| constant(&x[row * n..(row + 1) * n]);
+                let state = [part(data.q()), part(data.v()), part(data.a())];
+                total += whole_loss(architecture, &moved, state.each_ref().map(|x| x.as_slice()), negative, lambda);
+            }
+            value = total.value / count;
+            total.tangent / count
+        })
+        .collect();
+    (value, gradient)
+}
+
+fn gradient_agrees<S: Scalar>(n: usize, alpha: f64, penalty: Penalty, tolerance: f64) {
+    let architecture = Architecture { alpha, ..architecture(n, &[5, 4]) };
+    let mut rng = ChaCha8Rng::seed_from_u64(11);
+    let weights: Vec<S> = initial_weights(&architecture, Initialization::Default, &mut rng);
+    let data = random_data::<S>(n, 7, 12);
+    let mut objective = Objective::new(&architecture, penalty, 2).unwrap();
+    let mut gradient = vec![S::NAN; weights.len()];
+    let report = objective.step(&weights, &data, &[0, 1, 2, 3, 4, 5, 6], &mut gradient);
+    assert_eq!(report.failure, None);
+
+    // Negative eigenpairs of the scaled mass matrices, from a separate evaluation in double precision.
+    let lambda = if let Penalty::Eigenvalue { lambda } = penalty { lambda } else { 0.0 };
+    let mut chunk = lnn::network::Chunk::new(&architecture);
+    chunk.evaluate(&weights, data.q(), data.v(), lnn::network::Depth::MassMatrix);
+    let negative: Vec<Vec<Vec<f64>>> = chunk
+        .mass_matrix
+        .chunks_exact(n * n)
+        .map(|m| {
+            let eigen = nalgebra::DMatrix::from_fn(n, n, |i, j| m[i * n + j].to_f64()).symmetric_eigen();
+            let active = (0..n).filter(|&k| lambda > 0.0 && eigen.eigenvalues[k] < 0.0);
+            active.map(|k| eigen.eigenvectors.column(k).iter().copied().collect()).collect()
+        })
+        .collect();
+    assert_eq!(report.penalised, negative.iter().filter(|u| !u.is_empty()).count());
+    let (value, expected) = reference(&architecture, &weights, &data, &negative, lambda);
+    let size = expected.iter().fold(0.0, |m: f64, x| m.max(x.to_f64().abs()));
+    for (&found, &expected) in gradient.iter().zip(&expected) {
+        let error = (found - expected).to_f64().abs() / size;
+        assert!(error <= tolerance, "gradient {found} for {expected}: {error:.2e}");
+    }
+    let error = (report.loss + report.penalty - value).to_f64().abs() / value.to_f64().abs();
+    assert!(error <= tolerance, "loss {} + {} for {value}", report.loss, report.penalty);
+}
+
+#[test]
+fn the_gradient_is_that_of_the_whole_loss() {
+    for n in 1..=4 {
+        gradient_agrees::<f64>(n, 0.6, Penalty::None, 1e-12);
+        gradient_agrees::<Dd>(n, 0.6, Penalty::None, 1e-26);
+    }
+}
+
+#[test]
+fn the_gradient_of_an_active_penalty_is_right() {
+    for n in 1..=3 {
+        // A negative quadratic term makes every mass matrix negative; eigenvectors of the reference are f64.
+        gradient_agrees::<f64>(n, -0.4, Penalty::Eigenvalue { lambda: 3.0 }, 1e-11);
+    }
+}
+
+#[test]
+fn an_inactive_penalty_is_exactly_zero() {
+    let architecture = Architecture { alpha: 5.0, ..architecture(2, &[6, 6]) };
+    let weights: Vec<f64> =
+        initial_weights(&architecture, Initialization::Default, &mut ChaCha8Rng::seed_from_u64(1));
+    let data = random_data(2, 40, 2);
+    let rows: Vec<u32> = (0..40).collect();
+    let run = |penalty| {
+        let mut gradient = vec![0.0; weights.len()];
+        let report = Objective::new(&architecture, penalty, 1).unwrap().step(&weights, &data, &rows, &mut gradient);
+        (report, gradient)
+    };
+    let (with, gradient) = run(Penalty::Eigenvalue { lambda: 1000.0 });
+    assert_eq!((with.penalty, with.penalised), (0.0, 0));
+    assert_eq!((with, gradient), run(Penalty::None));
+}
+
+fn config(epochs: usize) -> Config {
+    Config {
+        system: "none".to_string(),
+        seed: 3,
+        precision: Precision::F32,
+        parameters: Default::default(),
+        data: Data {
+            training: 700,
+            validation: 100,
+            test: 100,
+            validation_position: vec![[-1.0, 1.0]; 2],
+            validation_velocity: vec![[-1.0, 1.0]; 2],
+        },
+        network: Network {
+            hidden: vec![16, 16],
+            activation: Activation::Gelu,
+            alpha: 1.0,
+            scaling: Scaling::Physical,
+            embed_periodic: true,
+            initialization: Initialization::Default,
+        },
+        penalty: Penalty::Eigenvalue { lambda: 10.0 },
+        optimizer: Optimizer {
+            method: Method::Radam,
+            batch: 150,
+            weight_decay: 1e-6,
+            clip: 1.0,
+            averaging: 0.9,
+            on_failure: OnFailure::Skip,
+        },
+        phases: vec![
+            Phase {
+                epochs,
+                rate: 3e-3,
+                eta_min: 0.0,
+                schedule: Schedule::Cosine,
+                t_max: 1.0,
+                position: vec![[-1.0, 1.0]; 2],
+                velocity: vec![[-1.0, 1.0]; 2],
+            };
+            2
+        ],
+    }
+}
+
+/// Two uncoupled oscillators.
+fn oscillators(states: usize, seed: u64) -> Dataset<f32> {
+    let data = random_data::<f32>(2, states, seed);
+    let a = data.q().iter().enumerate().map(|(k, &q)| if k % 2 == 0 { -q } else { -2.0 * q }).collect();
+    Dataset::new(2, data.q().to_vec(), data.v().to_vec(), a).unwrap()
+}
+
+fn datasets() -> Datasets<f32> {
+    Datasets {
+        training: vec![oscillators(700, 1), oscillators(700, 2)],
+        validation: oscillators(100, 3),
+        test: oscillators(100, 4),
+    }
+}
+
+fn run(config: &Config, data: Datasets<f32>, threads: usize, hooks: &Hooks) -> Result<Trained<f32>, TrainingError> {
+    let activation = config.network.activation;
+    let architecture = Architecture { embed_periodic: false, activation, ..architecture(2, &config.network.hidden) };
+    train(config, &architecture, data, threads, hooks)
+}
+
+#[test]
+fn training_learns_and_keeps_the_best_epoch() {
+    let mut config = config(12);
+    config.optimizer.batch = 20;
+    let trained = run(&config, datasets(), 2, &Hooks::default()).unwrap();
+    assert_eq!((trained.stop, trained.history.len()), (Stop::Finished, 24));
+    let losses: Vec<f64> = trained.history.iter().map(|e| e.validation_loss).collect();
+    let best = losses.iter().copied().fold(f64::INFINITY, f64::min);
+    assert_eq!(trained.validation_loss, best);
+    assert!(best < 0.25 * losses[0], "{losses:?}");
+    assert!(f64::from(trained.test.loss) < 2.0 * best);
+    assert_eq!(trained.states, 24 * 700);
+}
+
+#[test]
+fn the_same_seed_gives_the_same_bytes_on_any_number_of_threads() {
+    let bits = |threads| {
+        let trained = run(&config(3), datasets(), threads, &Hooks::default()).unwrap();
+        trained.weights.iter().map(|w| w.to_bits()).collect::<Vec<_>>()
+    };
+    let one = bits(1);
+    assert_eq!(one, bits(2));
+    assert_eq!(one, bits(3));
+    let mut other = config(3);
+    other.seed = 4;
+    let trained = run(&other, datasets(), 1, &Hooks::default()).unwrap();
+    assert_ne!(one, trained.weights.iter().map(|w| w.to_bits()).collect::<Vec<_>>());
+}
+
+#[test]
+fn an_interrupt_ends_training_with_the_best_so_far() {
+    let interrupt = Arc::new(AtomicBool::new(false));
+    let raise = interrupt.clone();
+    let watcher: lnn::training::Watcher = Arc::new(move |progress| {
+        if let lnn::training::Progress::Epoch(epoch) = progress {
+            raise.store(epoch.epoch == 4, Ordering::Relaxed);
+        }
+    });
+    let trained = run(&config(12), datasets(), 2, &Hooks { watcher: Some(watcher), interrupt }).unwrap();
+    assert_eq!((trained.stop, trained.history.len()), (Stop::Interrupted, 4));
+    assert!(trained.validation_loss.is_finite());
+}
+
+/// A network whose mass matrix vanishes: no hidden curvature in the velocities, no quadratic term.
+#[test]
+fn a_singular_mass_matrix_stops_or_is_left_out_by_choice() {
+    let architecture = Architecture { alpha: 0.0, ..architecture(2, &[4]) };
+    let weights = vec![0.0_f64; lnn::network::Layout::new(&architecture).parameters];
+    let data = random_data(2, 5, 1);
+    let mut objective = Objective::new(&architecture, Penalty::None, 1).unwrap();
+    let mut gradient = vec![f64::NAN; weights.len()];
+    let report = objective.step(&weights, &data, &[3, 4], &mut gradient);
+    assert_eq!(report.singular, 2);
+    assert!(matches!(report.failure, Some(Failure::Singular { row: 3, .. })), "{:?}", report.failure);
+    assert!(gradient.iter().all(|&g| g == 0.0));
+}
+
+#[test]
+fn one_number_that_is_not_finite_is_named_and_never_reaches_the_weights() {
+    let bad = oscillators(700, 1);
+    let mut q = bad.q().to_vec();
+    q[2 * 50] = 1e30;
+    let bad = Dataset::new(2, q, bad.v().to_vec(), bad.a().to_vec()).unwrap();
+    let mut data = datasets();
+    data.training[0] = bad;
+    let mut skipping = config(2);
+    skipping.network.activation = Activation::Quadratic;
+    let mut stopping = skipping.clone();
+    stopping.optimizer.on_failure = OnFailure::Stop;
+    let error = run(&stopping, data.clone(), 2, &Hooks::default()).unwrap_err().to_string();
+    assert!(error.contains("step ") && error.contains("row 50"), "{error}");
+    let trained = run(&skipping, data, 2, &Hooks::default()).unwrap();
+    assert!(trained.weights.iter().all(|w| w.is_finite()));
+    assert!(trained.history[0].skipped > 0);
+    assert!(trained.validation_loss.is_finite());
+}
