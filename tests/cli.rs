@@ -83,7 +83,9 @@ fn systems_are_listed() {
             assert_eq!(system[key].as_array().unwrap().len(), length, "{key} of {}", system["name"]);
         }
         for parameter in system["parameters"].as_array().unwrap() {
-            assert!(parameter["symbol"].is_string() && parameter["default"].is_number() && parameter["unit"].is_string());
+            assert!(
+                parameter["symbol"].is_string() && parameter["default"].is_number() && parameter["unit"].is_string()
+            );
         }
         assert_eq!(system["bounds"]["validation"]["position"].as_array().unwrap().len(), n);
     }
@@ -102,7 +104,10 @@ fn inspect_prints_every_term() {
     let close = |value: &Value, expected: &[f64]| {
         let found = numbers(value);
         assert_eq!(found.len(), expected.len());
-        assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() <= 1e-14 * b.abs().max(1.0)), "{found:?} {expected:?}");
+        assert!(
+            found.iter().zip(expected).all(|(a, b)| (a - b).abs() <= 1e-14 * b.abs().max(1.0)),
+            "{found:?} {expected:?}"
+        );
     };
     let level = &objects[0];
     close(&level["mass_matrix"][0], &[2.0, 1.0]);

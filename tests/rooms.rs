@@ -6,7 +6,17 @@ use std::path::{Path, PathBuf};
 
 /// Rooms from top to bottom; a file may name its own room and those before it.
 const ROOMS: [&str; 12] = [
-    "scalar", "ops", "forward", "linalg", "tape", "lagrangian", "network", "training", "rollout", "analysis", "report",
+    "scalar",
+    "ops",
+    "forward",
+    "linalg",
+    "tape",
+    "lagrangian",
+    "network",
+    "training",
+    "rollout",
+    "analysis",
+    "report",
     "cli",
 ];
 
@@ -197,7 +207,11 @@ fn leaked_crates(source: &str, path: &str) -> Vec<&'static str> {
             token == foreign && !own && (path || (k > 0 && tokens[k - 1] == "use"))
         })
     };
-    ADAPTERS.iter().filter(|(foreign, home)| !path.starts_with(home) && names(foreign)).map(|(foreign, _)| *foreign).collect()
+    ADAPTERS
+        .iter()
+        .filter(|(foreign, home)| !path.starts_with(home) && names(foreign))
+        .map(|(foreign, _)| *foreign)
+        .collect()
 }
 
 fn rust_files(directory: &Path, found: &mut Vec<PathBuf>) {
@@ -221,7 +235,8 @@ fn sources() -> Vec<(String, String, usize, String)> {
     let mut tests = BTreeSet::new();
     for (file, text) in files.iter().zip(&texts) {
         let stem = file.file_stem().unwrap();
-        let folder = if stem == "mod" || stem == "lib" { file.parent().unwrap().into() } else { file.with_extension("") };
+        let folder =
+            if stem == "mod" || stem == "lib" { file.parent().unwrap().into() } else { file.with_extension("") };
         for module in without_tests(&tokens(text)).1 {
             tests.insert(folder.join(format!("{module}.rs")));
             tests.insert(folder.join(module).join("mod.rs"));

@@ -17,7 +17,8 @@ const MAX_BYTES: u64 = 1 << 20;
 /// A file that cannot be read is a data error, everything in it a usage error: `FILE:LINE: KEY: problem`.
 pub fn load<T: DeserializeOwned>(path: &Path) -> Result<T, CliError> {
     let bytes = read_regular(path, MAX_BYTES).map_err(|e| CliError::file(path, e))?;
-    let text = String::from_utf8(bytes).map_err(|_| CliError::usage(format_args!("{}: not UTF-8 text", path.display())))?;
+    let text =
+        String::from_utf8(bytes).map_err(|_| CliError::usage(format_args!("{}: not UTF-8 text", path.display())))?;
     parse(&text).map_err(|(line, problem)| CliError::usage(format_args!("{}:{line}: {problem}", path.display())))
 }
 
@@ -60,7 +61,8 @@ fn key_at(table: &DeTable<'_>, span: &Range<usize>) -> Option<String> {
     table.iter().find_map(|(key, value)| {
         let name: &str = key.get_ref();
         let below = within(value.get_ref(), span);
-        (below.is_some() || holds(key.span()) || holds(value.span())).then(|| format!("{name}{}", below.unwrap_or_default()))
+        (below.is_some() || holds(key.span()) || holds(value.span()))
+            .then(|| format!("{name}{}", below.unwrap_or_default()))
     })
 }
 
@@ -138,7 +140,10 @@ mod tests {
 
     #[test]
     fn types_duplicates_and_syntax_are_placed() {
-        assert_eq!(refusal("epochs = 3", "epochs = \"x\""), "6: phase[0].epochs: invalid type: string \"x\", expected usize");
+        assert_eq!(
+            refusal("epochs = 3", "epochs = \"x\""),
+            "6: phase[0].epochs: invalid type: string \"x\", expected usize"
+        );
         assert!(refusal("epochs = 3", "epochs = -3").starts_with("6: phase[0].epochs: invalid value"));
         assert!(refusal("2.5]", "true]").starts_with("7: phase[0].rates[1]: invalid type: boolean"));
         assert!(refusal("clip = 1", "clip = 1\nclip = 2").starts_with("5: "));

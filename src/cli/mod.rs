@@ -82,7 +82,8 @@ fn answer(error: &clap::Error) -> ExitCode {
         }
         _ => {
             let text = error.to_string();
-            let problem = ["\n\nUsage:", "\n\nFor more"].iter().fold(text.as_str(), |t, end| t.split(end).next().unwrap_or(t));
+            let problem =
+                ["\n\nUsage:", "\n\nFor more"].iter().fold(text.as_str(), |t, end| t.split(end).next().unwrap_or(t));
             let failed = CliError::usage(problem.strip_prefix("error: ").unwrap_or(problem));
             report(&failed);
             failed.exit_code()

@@ -136,15 +136,17 @@ fn read_header(row: usize, header: &str, columns: &[String]) -> Result<Vec<usize
     let mut order = Vec::with_capacity(columns.len());
     for name in header.split(',').map(unquoted) {
         let Some(column) = columns.iter().position(|known| known == name) else {
-            return Err(StatesError::Unknown { row, problem: unknown("column", name, columns.iter().map(String::as_str)) });
+            return Err(StatesError::Unknown {
+                row,
+                problem: unknown("column", name, columns.iter().map(String::as_str)),
+            });
         };
         if order.contains(&column) {
             return Err(StatesError::Duplicate { row, name: name.to_string() });
         }
         order.push(column);
     }
-    let missing: Vec<&str> =
-        (0..columns.len()).filter(|k| !order.contains(k)).map(|k| columns[k].as_str()).collect();
+    let missing: Vec<&str> = (0..columns.len()).filter(|k| !order.contains(k)).map(|k| columns[k].as_str()).collect();
     if missing.is_empty() { Ok(order) } else { Err(StatesError::Missing { row, names: missing.join(", ") }) }
 }
 
@@ -179,10 +181,16 @@ mod tests {
     #[test]
     fn headers_are_checked() {
         assert!(refusal("").starts_with("the file is empty"));
-        assert_eq!(refusal("theta1;theta2;theta1_dot;theta2_dot\n"), "row 1: fields are separated by ';', expected commas");
+        assert_eq!(
+            refusal("theta1;theta2;theta1_dot;theta2_dot\n"),
+            "row 1: fields are separated by ';', expected commas"
+        );
         assert_eq!(refusal("theta1\ttheta2\n"), "row 1: fields are separated by '\\t', expected commas");
         assert_eq!(refusal("theta1,theta2,theta1\n"), "row 1: column theta1 stands there twice");
-        assert_eq!(refusal("theta1,theta2,theta1_dto\n"), "row 1: unknown column \"theta1_dto\", did you mean \"theta1_dot\"?");
+        assert_eq!(
+            refusal("theta1,theta2,theta1_dto\n"),
+            "row 1: unknown column \"theta1_dto\", did you mean \"theta1_dot\"?"
+        );
         assert_eq!(refusal("\ntheta1,theta2_dot\n"), "row 2: missing column theta2, theta1_dot");
         assert_eq!(refusal("theta1,theta2,theta1_dot,theta2_dot\n\n"), "no states below the header");
     }
@@ -191,7 +199,10 @@ mod tests {
     fn fields_are_checked() {
         let with = |row: &str| refusal(&format!("theta1,theta2,theta1_dot,theta2_dot\n1,2,3,4\n{row}\n"));
         for bad in ["nan", "NaN", "inf", "-infinity", "1e999", "", "x", "0x10", "1_000", "1;2"] {
-            assert_eq!(with(&format!("1,2,{bad},4")), format!("row 3, column theta1_dot: expected a finite number, found {bad:?}"));
+            assert_eq!(
+                with(&format!("1,2,{bad},4")),
+                format!("row 3, column theta1_dot: expected a finite number, found {bad:?}")
+            );
         }
         assert_eq!(with("1,2,3"), "row 3: expected 4 fields, found 3");
         assert_eq!(with("1,2,3,4,"), "row 3: expected 4 fields, found 5");

@@ -9,8 +9,8 @@ mod features;
 pub mod file;
 mod init;
 mod layout;
-pub mod storage;
 mod reference;
+pub mod storage;
 
 pub use activation::Activation;
 pub use adjoint::{Adjoint, Jets};

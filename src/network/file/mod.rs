@@ -70,7 +70,9 @@ impl<S: Scalar> ModelFile<S> {
             let mut bytes = Vec::with_capacity(slot.range.len() * 8);
             for (index, &x) in self.weights[slot.range].iter().enumerate() {
                 let finite = match self.header.precision {
-                    StoredPrecision::F32 => put(&x.cast::<f32>().to_le_bytes(), x.cast::<f32>().is_finite(), &mut bytes),
+                    StoredPrecision::F32 => {
+                        put(&x.cast::<f32>().to_le_bytes(), x.cast::<f32>().is_finite(), &mut bytes)
+                    }
                     StoredPrecision::F64 => put(&x.to_f64().to_le_bytes(), x.to_f64().is_finite(), &mut bytes),
                 };
                 if !finite {
@@ -192,7 +194,8 @@ fn read_header(text: &str, payload: &[u8]) -> Result<Header, ModelFileError> {
     let missing = || ModelFileError::Header("no checksum".to_string());
     let cut = text.len().checked_sub(checksum_field(0).len()).ok_or_else(missing)?;
     let (body, field) = text.split_at_checked(cut).ok_or_else(missing)?;
-    let digits = field.strip_prefix(",\"checksum\":\"").and_then(|rest| rest.strip_suffix("\"}")).ok_or_else(missing)?;
+    let digits =
+        field.strip_prefix(",\"checksum\":\"").and_then(|rest| rest.strip_suffix("\"}")).ok_or_else(missing)?;
     let expected = u32::from_str_radix(digits, 16).map_err(|_| missing())?;
     let mut checksum = crc32fast::Hasher::new();
     checksum.update(body.as_bytes());

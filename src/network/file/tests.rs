@@ -131,7 +131,8 @@ fn foreign_newer_and_ambiguous_files_are_named() {
     let twice = rebuilt(&bytes, |body, _| *body = body.replace("\"seed\"", "\"seed\":1,\"seed\""));
     assert!(matches!(refusal(&twice), ModelFileError::Header(_)));
 
-    let text = r#"{"w":{"dtype":"U8","shape":[1],"data_offsets":[0,1]},"w":{"dtype":"U8","shape":[1],"data_offsets":[0,1]}}"#;
+    let text =
+        r#"{"w":{"dtype":"U8","shape":[1],"data_offsets":[0,1]},"w":{"dtype":"U8","shape":[1],"data_offsets":[0,1]}}"#;
     let mut two = (text.len() as u64).to_le_bytes().to_vec();
     two.extend(text.as_bytes());
     two.push(0);
