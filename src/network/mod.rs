@@ -9,6 +9,7 @@ mod features;
 pub mod file;
 mod init;
 mod layout;
+mod model;
 mod reference;
 pub mod storage;
 
@@ -18,3 +19,4 @@ pub use chunk::{Chunk, Depth};
 pub use config::{Architecture, Initialization};
 pub use init::initial_weights;
 pub use layout::{Layer, Layout};
+pub use model::{NetworkError, NetworkLagrangian};

@@ -1,8 +1,9 @@
 //! A trained network as a mechanical system in physical units.
 
 use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Terms};
+use crate::linalg;
 use crate::network::{Architecture, Chunk, Depth, Layout};
-use crate::scalar::{Real, Scalar};
+use crate::scalar::Scalar;
 use std::sync::{Mutex, PoisonError};
 use thiserror::Error;
 
@@ -26,6 +27,7 @@ pub struct NetworkLagrangian<S> {
 struct Workspace<S> {
     chunk: Chunk<S>,
     wrapped: Vec<S>,
+    linalg: linalg::Workspace<S>,
 }
 
 /// Why weights do not make a network.
@@ -136,7 +138,8 @@ impl<S: Scalar> Workspace<S> {
         let chunk = &mut self.chunk;
         chunk.evaluate(&network.weights, &self.wrapped, v, depth);
         let inverse = |i: usize| S::of_f64(architecture.scale[i]).recip();
-        let unscale = |from: &[S], to: &mut Vec<S>| to.extend(from.iter().enumerate().map(|(k, &x)| x * inverse(k % n)));
+        let unscale =
+            |from: &[S], to: &mut Vec<S>| to.extend(from.iter().enumerate().map(|(k, &x)| x * inverse(k % n)));
         if request.includes(Request::LAGRANGIAN) {
             terms.lagrangian.extend_from_slice(&chunk.lagrangian);
         }
@@ -153,5 +156,33 @@ impl<S: Scalar> Workspace<S> {
             let element = |(k, &m): (usize, &S)| m * (inverse(k / n % n) * inverse(k % n));
             terms.mass_matrix.extend(chunk.mass_matrix.iter().enumerate().map(element));
         }
+    }
+}
+
+impl<S: Scalar> EulerLagrange<S> for NetworkLagrangian<S> {
+    fn coordinates(&self) -> usize {
+        self.architecture.coordinates
+    }
+
+    fn terms(&self, q: &[S], v: &[S], request: Request, terms: &mut Terms<S>) -> Result<(), MechanicsError> {
+        let n = self.architecture.coordinates;
+        let shape = |what, expected, found| Err(MechanicsError::Shape { what, expected, found });
+        if q.len() % n != 0 {
+            return shape("coordinates", q.len().next_multiple_of(n), q.len());
+        }
+        if v.len() != q.len() {
+            return shape("velocities", q.len(), v.len());
+        }
+        terms.clear();
+        let mut workspace = self.idle.lock().unwrap_or_else(PoisonError::into_inner).pop().unwrap_or_else(|| {
+            Workspace { chunk: Chunk::new(&self.architecture), wrapped: Vec::new(), linalg: linalg::Workspace::new() }
+        });
+        let depth = Self::depth(request);
+        for states in q.chunks(CHUNK * n).zip(v.chunks(CHUNK * n)) {
+            workspace.append(self, states, (request, depth), terms);
+        }
+        let outcome = terms.complete(n, v, request, &mut workspace.linalg);
+        self.idle.lock().unwrap_or_else(PoisonError::into_inner).push(workspace);
+        outcome
     }
 }
