@@ -1,7 +1,10 @@
 //! The program from outside: results, exit codes and the one line that says what is wrong.
 #![cfg(feature = "cli")]
 
+use lnn::network::file::{FORMAT, Header, ModelFile, StoredPrecision};
+use lnn::network::{Activation, Architecture, Layout};
 use serde_json::Value;
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -179,6 +182,79 @@ fn a_singular_mass_matrix_leaves_the_other_rows_right() {
         assert!(objects[k]["error"].is_null());
         assert_eq!(numbers(&objects[k]["acceleration"]).len(), 2);
     }
+}
+
+/// A small network with weights of no meaning.
+fn model() -> ModelFile<f32> {
+    let architecture = Architecture {
+        coordinates: 2,
+        hidden: vec![8, 8],
+        activation: Activation::Softplus,
+        alpha: 0.5,
+        scale: vec![3.0, 4.0],
+        periodic: vec![true, true],
+        embed_periodic: true,
+    };
+    let count = Layout::new(&architecture).parameters;
+    let header = Header {
+        format: FORMAT,
+        crate_version: env!("CARGO_PKG_VERSION").to_string(),
+        architecture,
+        system: "double-pendulum".to_string(),
+        parameters: ["m1", "m2", "l1", "l2"].map(|s| (s.to_string(), 1.0)).into_iter().collect::<BTreeMap<_, _>>(),
+        columns: ["theta1", "theta2", "theta1_dot", "theta2_dot"].map(String::from).to_vec(),
+        precision: StoredPrecision::F32,
+        position: vec![[0.0, 6.0]; 2],
+        velocity: vec![[-10.0, 10.0]; 2],
+        seed: 1,
+        validation_loss: 0.25,
+    };
+    ModelFile { header, weights: (0..count).map(|k| (k as f32 * 0.7).sin() / 4.0).collect() }
+}
+
+#[test]
+fn a_model_is_inspected_like_a_system() {
+    let folder = Folder::new();
+    let path = folder.path("model.safetensors");
+    model().save(&path).unwrap();
+    let states = folder.file("s.csv", format!("{HEADER}0.1,0.2,3,4\n{:?},0.2,3,4\n", 0.1 + std::f64::consts::TAU));
+    let run = |precision| lnn(&["inspect", "--model", &text(&path), "--states", &states, "--precision", precision]);
+    let (single, double, judge) = (run("f32").objects(), run("f64").objects(), run("dd").objects());
+    for key in ["momentum", "dl_dq", "eigenvalues", "coriolis", "acceleration"] {
+        for (k, exact) in numbers(&judge[0][key]).into_iter().enumerate() {
+            let size = exact.abs().max(1.0);
+            assert!((numbers(&double[0][key])[k] - exact).abs() < 1e-12 * size, "{key}");
+            assert!((numbers(&single[0][key])[k] - exact).abs() < 1e-3 * size, "{key}");
+            // A turn further the network sees the same angle.
+            assert!((numbers(&double[1][key])[k] - exact).abs() < 1e-11 * size, "{key}");
+        }
+    }
+}
+
+#[test]
+fn files_that_are_no_models_are_data_errors() {
+    let folder = Folder::new();
+    let states = folder.file("s.csv", format!("{HEADER}1,2,3,4\n"));
+    let refused = |path: &str, parts: &[&str]| {
+        lnn(&["inspect", "--model", path, "--states", &states]).refused(1, &[&[path], parts].concat());
+    };
+    refused(&text(&folder.path("missing.safetensors")), &["no such file"]);
+    refused(&text(folder.0.path()), &["expected a regular file, found a directory"]);
+    refused(&states, &["not a whole safetensors file"]);
+    let bytes = model().to_bytes().unwrap();
+    refused(&folder.file("cut", &bytes[..bytes.len() - 5]), &["not a whole safetensors file"]);
+    let mut flipped = bytes.clone();
+    *flipped.last_mut().unwrap() ^= 4;
+    refused(&folder.file("flipped", flipped), &["damaged: checksum"]);
+    let empty = br#"{"w":{"dtype":"F32","shape":[0],"data_offsets":[0,0]}}"#;
+    let foreign = [&(empty.len() as u64).to_le_bytes()[..], empty].concat();
+    refused(&folder.file("foreign", foreign), &["not of an lnn model"]);
+
+    let path = folder.file("model", bytes);
+    let both = ["inspect", "--model", &path, "--states", &states, "--system", "double-pendulum"];
+    lnn(&both).refused(2, &["--system", "--model"]);
+    lnn(&["inspect", "--model", &path, "--states", &states, "--param", "m1=1"]).refused(2, &["--param", "--model"]);
+    lnn(&["inspect", "--states", &states]).refused(2, &["--system"]);
 }
 
 #[test]

@@ -15,10 +15,13 @@ const CHUNK: usize = 256;
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// A system by name (`lnn systems` lists them).
-    #[arg(long, value_name = "NAME")]
-    system: String,
+    #[arg(long, value_name = "NAME", required_unless_present = "model", conflicts_with = "model")]
+    system: Option<String>,
+    /// A trained model.
+    #[arg(long, value_name = "FILE")]
+    model: Option<PathBuf>,
     /// A parameter of the system, decimal text read in the working precision; may be repeated.
-    #[arg(long, value_name = "SYMBOL=VALUE", num_args = 1.., value_parser = parameter)]
+    #[arg(long, value_name = "SYMBOL=VALUE", num_args = 1.., value_parser = parameter, conflicts_with = "model")]
     param: Vec<(String, String)>,
     /// CSV of states: the system's columns as header, in any order.
     #[arg(long, value_name = "FILE.csv")]
@@ -58,7 +61,10 @@ pub fn run(args: &Args) -> Result<(), CliError> {
 }
 
 fn inspect<S: Scalar>(args: &Args) -> Result<(), CliError> {
-    let source = Source::<S>::system(&args.system, &args.param)?;
+    let source = match &args.model {
+        Some(path) => Source::<S>::model(path)?,
+        None => Source::<S>::system(args.system.as_deref().unwrap_or_default(), &args.param)?,
+    };
     let bytes = read_regular(&args.states, states::MAX_BYTES).map_err(|e| CliError::file(&args.states, e))?;
     let states: States<S> = parse_states(&bytes, &source.columns).map_err(|e| CliError::file(&args.states, e))?;
     drop(bytes);

@@ -2,7 +2,10 @@
 
 use crate::cli::CliError;
 use crate::lagrangian::{EulerLagrange, configure};
+use crate::network::NetworkLagrangian;
+use crate::network::file::ModelFile;
 use crate::scalar::Scalar;
+use std::path::Path;
 
 /// Something that moves by a Lagrangian, with the names of its state's components.
 pub struct Source<S> {
@@ -21,6 +24,17 @@ impl<S: Scalar> Source<S> {
         let configured = configure::<S>(name, given).map_err(CliError::usage)?;
         let model = configured.build().map_err(CliError::usage)?;
         Ok(Self { model, columns: configured.system.columns(configured.coordinates) })
+    }
+
+    /// A trained model; its weights are converted to the precision of `S`.
+    ///
+    /// # Errors
+    /// A data error for a file that is not a whole model file.
+    pub fn model(path: &Path) -> Result<Self, CliError> {
+        let file = ModelFile::<S>::load(path).map_err(|e| CliError::file(path, e))?;
+        let network =
+            NetworkLagrangian::new(file.header.architecture, file.weights).map_err(|e| CliError::file(path, e))?;
+        Ok(Self { model: Box::new(network), columns: file.header.columns })
     }
 }
 

@@ -64,15 +64,10 @@ impl Header {
     pub fn validate(&self) -> Result<(), ModelFileError> {
         check_version(self.format, &self.crate_version)?;
         let require = |ok: bool, text: &str| if ok { Ok(()) } else { Err(ModelFileError::Header(text.to_string())) };
-        let shape = &self.architecture;
-        let n = shape.coordinates;
-        require(n > 0, "coordinates: expected at least 1")?;
-        require(shape.scale.len() == n, "scale: expected one number per coordinate")?;
-        require(shape.scale.iter().all(|s| s.is_finite() && *s > 0.0), "scale: expected positive numbers")?;
-        require(shape.periodic.len() == n, "periodic: expected one flag per coordinate")?;
-        require(shape.alpha.is_finite(), "alpha: expected a finite number")?;
-        require((1..=64).contains(&shape.hidden.len()), "hidden: expected 1 to 64 widths")?;
-        require(shape.hidden.iter().all(|w| (1..=1 << 20).contains(w)), "hidden: expected widths of 1 to 1048576")?;
+        self.architecture.validate().map_err(|e| ModelFileError::Header(e.to_string()))?;
+        let (n, hidden) = (self.architecture.coordinates, &self.architecture.hidden);
+        require(hidden.len() <= 64, "hidden: expected at most 64 widths")?;
+        require(hidden.iter().all(|w| *w <= 1 << 20), "hidden: expected widths of at most 1048576")?;
         require(self.columns.len() == 2 * n, "columns: expected two per coordinate")?;
         let distinct: std::collections::BTreeSet<_> = self.columns.iter().collect();
         require(distinct.len() == 2 * n, "columns: expected distinct names")?;
