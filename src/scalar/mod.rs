@@ -8,8 +8,10 @@ mod lanes;
 mod primitive;
 mod simd;
 
-pub use dd::Dd;
-pub use lanes::{Exponential, Lanes};
+pub use dd::{Dd, UnreadableNumber};
+pub use lanes::{
+    Exponential, Lanes, cos_lanes, exp_lanes, ln_lanes, sin_cos_lanes, sin_lanes, sqrt_lanes, tanh_lanes,
+};
 pub use simd::vectorized;
 
 use std::fmt::{Debug, Display};
