@@ -2,7 +2,7 @@
 
 use lnn::lagrangian::{self, Configured, EulerLagrange, Request, Terms};
 use lnn::linalg::{self, Workspace};
-use lnn::scalar::{Dd, Real, Scalar};
+use lnn::scalar::{Dd, Scalar};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
