@@ -91,7 +91,7 @@ fn main() {
                     e.penalised,
                     e.validation_loss,
                     e.gradient_norm,
-                    e.singular,
+                    e.left_out,
                     e.skipped,
                     e.seconds
                 )

@@ -35,8 +35,7 @@ fn with_spectrum<S: Scalar>(w: &[f64], rng: &mut ChaCha8Rng) -> Vec<S> {
     let mut m = vec![S::of_f64(0.0); n * n];
     for i in 0..n {
         for j in 0..=i {
-            let sum =
-                (0..n).fold(<Dd as Real>::zero(), |s, k| s + q[i * n + k] * q[j * n + k] * Dd::of_f64(w[k]));
+            let sum = (0..n).fold(<Dd as Real>::zero(), |s, k| s + q[i * n + k] * q[j * n + k] * Dd::of_f64(w[k]));
             m[i * n + j] = sum.cast();
             m[j * n + i] = m[i * n + j];
         }
@@ -263,7 +262,9 @@ fn a_matrix_gives_the_same_bits_anywhere_in_a_batch() {
     for n in 1..=6 {
         let batch = 21;
         let m: Vec<f64> = (0..batch)
-            .flat_map(|_| with_spectrum::<f64>(&(0..n).map(|_| rng.random_range(-2.0..2.0)).collect::<Vec<_>>(), &mut rng))
+            .flat_map(|_| {
+                with_spectrum::<f64>(&(0..n).map(|_| rng.random_range(-2.0..2.0)).collect::<Vec<_>>(), &mut rng)
+            })
             .collect();
         let r: Vec<f64> = (0..batch * n).map(|_| rng.random_range(-1.0..1.0)).collect();
         let mut ws = Workspace::new();
@@ -328,7 +329,8 @@ fn inertia_by_pivots_agrees_with_the_spectrum() {
     let mut scratch = vec![0.0; 400];
     for n in 1..=20 {
         for negative in 0..=n {
-            let w: Vec<f64> = (0..n).map(|k| rng.random_range(0.01..3.0) * if k < negative { -1.0 } else { 1.0 }).collect();
+            let w: Vec<f64> =
+                (0..n).map(|k| rng.random_range(0.01..3.0) * if k < negative { -1.0 } else { 1.0 }).collect();
             let m: Vec<f64> = with_spectrum(&w, &mut rng);
             let found = linalg::inertia(n, &m, &mut scratch).unwrap();
             assert_eq!(found, Inertia { positive: n - negative, zero: 0, negative });
@@ -395,7 +397,12 @@ fn inverses_are_symmetric_and_invert() {
     for n in 1..=8 {
         let batch = 11;
         let m: Vec<f64> = (0..batch)
-            .flat_map(|b| with_spectrum::<f64>(&(0..n).map(|k| if (k + b) % 3 == 0 { -0.5 } else { 2.0 }).collect::<Vec<_>>(), &mut rng))
+            .flat_map(|b| {
+                with_spectrum::<f64>(
+                    &(0..n).map(|k| if (k + b) % 3 == 0 { -0.5 } else { 2.0 }).collect::<Vec<_>>(),
+                    &mut rng,
+                )
+            })
             .collect();
         let mut inverse = m.clone();
         linalg::inverse(n, &m, &mut inverse, &mut Workspace::new()).unwrap();

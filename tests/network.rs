@@ -1,11 +1,13 @@
 //! Batched network derivatives against nested forward numbers of the same network written over `Real`.
 
-use lnn::forward::{Dual, HyperDual};
+mod common;
+
+use common::of_scalar;
+use lnn::forward::HyperDual;
 use lnn::lagrangian::Lagrangian;
-use lnn::network::{
-    Activation, Adjoint, Architecture, Chunk, Depth, Initialization, Jets, Layout, initial_weights,
-};
+use lnn::network::{Activation, Adjoint, Architecture, Chunk, Depth, Initialization, Jets, Layout, initial_weights};
 use lnn::scalar::{Dd, Real, Scalar};
+use lnn::tape::{ScalarFunction, gradient};
 use proptest::prelude::*;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -55,13 +57,8 @@ struct Case {
 }
 
 fn cases() -> impl Strategy<Value = Case> {
-    let activations = [
-        Activation::Gelu,
-        Activation::Softplus,
-        Activation::XTanh,
-        Activation::Tanh,
-        Activation::Quadratic,
-    ];
+    let activations =
+        [Activation::Gelu, Activation::Softplus, Activation::XTanh, Activation::Tanh, Activation::Quadratic];
     let shape = (1_usize..=6, prop::collection::vec(1_usize..24, 1..4), 0..activations.len());
     (shape, prop::collection::vec(any::<bool>(), 6), any::<bool>(), any::<u64>()).prop_map(
         move |((n, hidden, activation), periodic, embed_periodic, seed)| Case {
@@ -126,7 +123,39 @@ fn forward_identity<S: Scalar>(case: &Case, tolerance: f64) {
     }
 }
 
-/// Gradient of a sum of mixed Taylor coefficients by every weight, forward mode over the reference.
+/// A sum of mixed Taylor coefficients as a function of the weights.
+struct SumOfCoefficients<'a, S> {
+    architecture: &'a Architecture,
+    q: &'a [S],
+    v: &'a [S],
+    jets: [&'a Jets<S>; 2],
+}
+
+impl<S: Scalar> ScalarFunction for SumOfCoefficients<'_, S> {
+    fn eval<R: Real>(&self, weights: &[R]) -> R {
+        let n = self.architecture.coordinates;
+        let constant = |x: &[S]| -> Vec<R> { x.iter().map(|&x| of_scalar(x)).collect() };
+        let mut total = R::zero();
+        for jets in self.jets {
+            for (j, &state) in jets.state.iter().enumerate() {
+                let row = state * n..(state + 1) * n;
+                let r = reference(self.architecture, weights, &constant(&self.q[row.clone()]), &constant(&self.v[row]));
+                let (s, t) = (constant(&jets.s[j * n..][..n]), constant(&jets.t[j * n..][..n]));
+                for i in 0..n {
+                    for k in 0..n {
+                        total += s[i] * r.m[i * n + k] * t[k];
+                    }
+                    if jets.moving {
+                        total += s[i] * (r.c[i] - r.g[i]);
+                    }
+                }
+            }
+        }
+        total
+    }
+}
+
+/// Gradient of a sum of mixed Taylor coefficients by every weight, against nested forward numbers on the scalar tape.
 fn adjoint_identity<S: Scalar>(case: &Case, tolerance: f64) {
     let architecture = &case.architecture;
     let n = architecture.coordinates;
@@ -142,30 +171,8 @@ fn adjoint_identity<S: Scalar>(case: &Case, tolerance: f64) {
     adjoint.add_gradient(&chunk, &weights, &moving, &mut found);
     adjoint.add_gradient(&chunk, &weights, &still, &mut found);
 
-    let constant = |x: &[S]| -> Vec<Dual<S>> { x.iter().map(|&x| Dual::constant(x)).collect() };
-    let expected: Vec<S> = (0..weights.len())
-        .map(|k| {
-            let mut moved = constant(&weights);
-            moved[k] = Dual::new(weights[k], <S as Real>::one());
-            let mut total = Dual::constant(<S as Real>::zero());
-            for jets in [&moving, &still] {
-                for (j, &state) in jets.state.iter().enumerate() {
-                    let row = state * n..(state + 1) * n;
-                    let r = reference(architecture, &moved, &constant(&q[row.clone()]), &constant(&v[row]));
-                    let (s, t) = (constant(&jets.s[j * n..][..n]), constant(&jets.t[j * n..][..n]));
-                    for i in 0..n {
-                        for k in 0..n {
-                            total += s[i] * r.m[i * n + k] * t[k];
-                        }
-                        if jets.moving {
-                            total += s[i] * (r.c[i] - r.g[i]);
-                        }
-                    }
-                }
-            }
-            total.tangent
-        })
-        .collect();
+    let sum = SumOfCoefficients { architecture, q: &q, v: &v, jets: [&moving, &still] };
+    let (_, expected) = gradient(&sum, &weights).unwrap();
     let error = difference(&found, &expected);
     assert!(error <= tolerance, "gradient: {error:.2e} > {tolerance:.2e}");
 }
@@ -189,7 +196,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(12))]
 
     #[test]
-    fn the_adjoint_identity_agrees_with_nested_forward_numbers(case in cases()) {
+    fn the_adjoint_identity_agrees_with_nested_forward_numbers_on_the_tape(case in cases()) {
         let mut case = case;
         case.architecture.hidden.iter_mut().for_each(|w| *w = 1 + *w % 7);
         adjoint_identity::<f64>(&case, 1e-12);

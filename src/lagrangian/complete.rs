@@ -39,7 +39,8 @@ impl<S: Scalar> Terms<S> {
             self.energy.clear();
             for (row, &lagrangian) in self.lagrangian.iter().enumerate() {
                 let range = row * n..(row + 1) * n;
-                let action = self.momentum[range.clone()].iter().zip(&v[range]).fold(-lagrangian, |e, (&p, &v)| e + p * v);
+                let action =
+                    self.momentum[range.clone()].iter().zip(&v[range]).fold(-lagrangian, |e, (&p, &v)| e + p * v);
                 self.energy.push(action);
             }
         }

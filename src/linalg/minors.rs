@@ -154,9 +154,8 @@ pub fn adjugate<S: Scalar>(
     let mut values = vec![<S as Real>::zero(); n];
     let mut vectors = vec![<S as Real>::zero(); n * n];
     eigh(n, matrix, &mut values, &mut vectors, workspace)?;
-    let products: Vec<Scaled<S>> = (0..n)
-        .map(|k| (0..n).filter(|&l| l != k).fold(Scaled::one(), |product, l| product.times(values[l])))
-        .collect();
+    let products: Vec<Scaled<S>> =
+        (0..n).map(|k| (0..n).filter(|&l| l != k).fold(Scaled::one(), |product, l| product.times(values[l]))).collect();
     let zero = <S as Real>::zero();
     let exponent = products.iter().filter(|p| p.mantissa != zero).map(|p| p.exponent).max().unwrap_or(0);
     gradient.fill(zero);

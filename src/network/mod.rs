@@ -8,6 +8,7 @@ mod config;
 mod features;
 mod init;
 mod layout;
+mod model;
 mod reference;
 
 pub use activation::Activation;
@@ -16,3 +17,4 @@ pub use chunk::{Chunk, Depth};
 pub use config::{Architecture, Initialization};
 pub use init::initial_weights;
 pub use layout::{Layer, Layout};
+pub use model::{NetworkError, NetworkLagrangian};

@@ -4,12 +4,14 @@
 //! [`Real`], which forward numbers and tape variables implement too; nothing in a model may name a float type.
 
 mod dd;
+mod lanes;
 mod primitive;
 mod simd;
 mod slices;
 mod sum;
 
 pub use dd::Dd;
+pub use lanes::{Exponential, Lanes};
 pub use simd::vectorized;
 pub use slices::{Slice, SliceMut};
 pub use sum::Sum;
@@ -158,6 +160,7 @@ pub trait Real:
 /// An innermost floating-point number: `f32`, `f64` or [`Dd`].
 pub trait Scalar:
     Real<Scalar = Self>
+    + Lanes
     + PartialEq
     + PartialOrd
     + Default

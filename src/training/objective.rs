@@ -6,6 +6,7 @@
 //! A batch is cut into stripes and chunks whose sizes do not depend on the number of threads, and every sum is taken in
 //! their order: the same numbers on any number of threads.
 
+use crate::linalg::{self, Workspace, eigh, is_positive_definite, solve};
 use crate::network::{Adjoint, Architecture, Chunk, Depth, Jets};
 use crate::scalar::{Real, Scalar, Sum};
 use crate::training::dataset::Dataset;
@@ -26,8 +27,8 @@ pub struct BatchReport<S> {
     pub penalty: S,
     /// States whose penalty is active.
     pub penalised: usize,
-    /// States left out because their mass matrix is singular.
-    pub singular: usize,
+    /// States left out because they give no finite acceleration.
+    pub left_out: usize,
     /// First state, by its row in the dataset, that failed, and why.
     pub failure: Option<Failure>,
 }
@@ -69,12 +70,16 @@ struct Stripe<S> {
     q: Vec<S>,
     v: Vec<S>,
     acceleration: Vec<S>,
-    solved: Vec<bool>,
+    right: Vec<S>,
+    multiplier: Vec<S>,
+    values: Vec<S>,
+    vectors: Vec<S>,
+    workspace: Workspace<S>,
     inverse_scale: Vec<S>,
     residual: Sum<S>,
     penalty: Sum<S>,
     penalised: usize,
-    singular: usize,
+    left_out: usize,
     failure: Option<Failure>,
 }
 
@@ -90,12 +95,16 @@ impl<S: Scalar> Stripe<S> {
             q: Vec::new(),
             v: Vec::new(),
             acceleration: Vec::new(),
-            solved: Vec::new(),
+            right: Vec::new(),
+            multiplier: Vec::new(),
+            values: Vec::new(),
+            vectors: Vec::new(),
+            workspace: Workspace::new(),
             inverse_scale: architecture.scale.iter().map(|&s| S::of_f64(s).recip()).collect(),
             residual: Sum::default(),
             penalty: Sum::default(),
             penalised: 0,
-            singular: 0,
+            left_out: 0,
             failure: None,
         }
     }
@@ -104,7 +113,7 @@ impl<S: Scalar> Stripe<S> {
         self.gradient.clear();
         self.gradient.resize(parameters, <S as Real>::zero());
         (self.residual, self.penalty) = (Sum::default(), Sum::default());
-        (self.penalised, self.singular, self.failure) = (0, 0, None);
+        (self.penalised, self.left_out, self.failure) = (0, 0, None);
     }
 
     /// Copies the states of these rows side by side.
@@ -123,17 +132,14 @@ impl<S: Scalar> Stripe<S> {
     fn add_chunk(&mut self, weights: &[S], data: &Dataset<S>, rows: &[u32], weight: S, lambda: Option<S>) {
         self.gather(data, rows);
         self.chunk.evaluate(weights, &self.q, &self.v, Depth::Training);
-        self.jets.clear(true);
-        self.penalty_jets.clear(false);
         self.solve(rows);
-        for (state, &row) in rows.iter().enumerate() {
-            self.add_residual(data, state, row as usize, Some(weight));
-        }
-        if let Some(lambda) = lambda {
-            self.add_penalties(lambda);
-        }
+        self.add_residuals(data, rows, weight);
+        self.add_motion_jets();
         self.adjoint.add_gradient(&self.chunk, weights, &self.jets, &mut self.gradient);
-        self.adjoint.add_gradient(&self.chunk, weights, &self.penalty_jets, &mut self.gradient);
+        if let Some(lambda) = lambda {
+            self.add_penalty_jets(lambda);
+            self.adjoint.add_gradient(&self.chunk, weights, &self.penalty_jets, &mut self.gradient);
+        }
     }
 
     /// Losses of one chunk, no gradient.
@@ -141,82 +147,98 @@ impl<S: Scalar> Stripe<S> {
         self.gather(data, rows);
         self.chunk.evaluate(weights, &self.q, &self.v, Depth::Motion);
         self.solve(rows);
-        for (state, &row) in rows.iter().enumerate() {
-            self.add_residual(data, state, row as usize, None);
-        }
+        self.add_residuals(data, rows, <S as Real>::one());
     }
 
-    /// Accelerations of the chunk, scaled; failures are noted with their rows.
+    /// Accelerations of the chunk, scaled; `NaN` where a state fails, which is noted with its row.
     fn solve(&mut self, rows: &[u32]) {
         let n = self.chunk.coordinates();
-        let count = rows.len();
-        self.acceleration.resize(count * n, <S as Real>::zero());
-        self.solved.clear();
-        for state in 0..count {
-            let range = state * n..(state + 1) * n;
-            for i in range.clone() {
-                self.acceleration[i] = self.chunk.dl_dq[i] - self.chunk.coriolis[i];
-            }
-            let matrix = &self.chunk.mass_matrix[state * n * n..(state + 1) * n * n];
-            let solved = temporary::solve(n, matrix, &mut self.acceleration[range]);
-            self.solved.push(solved.is_ok());
-            if let Err(condition) = solved {
-                let row = rows[state] as usize;
-                self.singular += 1;
-                self.failure.get_or_insert(match condition {
-                    Some(condition) => Failure::Singular { row, condition },
-                    None => Failure::NotFinite { row },
-                });
-            }
+        self.right.clear();
+        self.right.extend(self.chunk.dl_dq.iter().zip(&self.chunk.coriolis).map(|(&g, &c)| g - c));
+        self.acceleration.resize(self.right.len(), <S as Real>::zero());
+        let (matrices, solution) = (&self.chunk.mass_matrix, &mut self.acceleration);
+        if solve(n, matrices, &self.right, solution, &mut self.workspace).is_ok() {
+            return;
+        }
+        for &(state, failure) in self.workspace.failures() {
+            let row = rows[state] as usize;
+            self.left_out += 1;
+            self.failure.get_or_insert(match failure {
+                linalg::Failure::Singular { condition } => Failure::Singular { row, condition },
+                linalg::Failure::NotFinite => Failure::NotFinite { row },
+            });
         }
     }
 
-    /// Absolute residual of a state, and with `weight` its jet: `s = -lam = -M^-1 dl/da`, `t = a`.
-    fn add_residual(&mut self, data: &Dataset<S>, state: usize, row: usize, weight: Option<S>) {
-        if !self.solved[state] {
-            return;
-        }
+    /// Absolute residuals of the states; leaves `-dl/da`, with `l` weighted by `weight`, in `right`.
+    fn add_residuals(&mut self, data: &Dataset<S>, rows: &[u32], weight: S) {
         let n = data.coordinates();
-        let a = &self.acceleration[state * n..(state + 1) * n];
-        let target = &data.a()[row * n..(row + 1) * n];
         let zero = <S as Real>::zero();
-        let start = self.jets.s.len();
-        for i in 0..n {
-            let residual = a[i] - target[i] * self.inverse_scale[i];
-            self.residual.add(residual.abs());
-            if let Some(weight) = weight {
+        for (state, &row) in rows.iter().enumerate() {
+            let range = state * n..(state + 1) * n;
+            let a = &self.acceleration[range.clone()];
+            let right = &mut self.right[range];
+            if a[0].is_nan() {
+                right.fill(zero);
+                continue;
+            }
+            let target = &data.a()[row as usize * n..][..n];
+            for i in 0..n {
+                let residual = a[i] - target[i] * self.inverse_scale[i];
+                self.residual.add(residual.abs());
                 // The sign of zero is zero.
-                let sign = if residual > zero {
-                    weight
-                } else if residual < zero {
+                right[i] = if residual > zero {
                     -weight
+                } else if residual < zero {
+                    weight
                 } else {
                     zero
                 };
-                self.jets.s.push(-sign);
             }
-        }
-        if weight.is_some() {
-            let matrix = &self.chunk.mass_matrix[state * n * n..(state + 1) * n * n];
-            let _ = temporary::solve(n, matrix, &mut self.jets.s[start..]);
-            self.jets.t.extend_from_slice(a);
-            self.jets.state.push(state);
         }
     }
 
-    /// `lambda sum relu(-eigenvalue)`: one jet per negative eigenvalue.
-    fn add_penalties(&mut self, lambda: S) {
+    /// Jets of the loss: `s = -lam = -M^-1 dl/da`, `t = a`, for every state that has an acceleration.
+    fn add_motion_jets(&mut self) {
         let n = self.chunk.coordinates();
-        for state in 0..self.chunk.mass_matrix.len() / (n * n) {
-            let matrix = &self.chunk.mass_matrix[state * n * n..(state + 1) * n * n];
-            let before = self.penalty_jets.state.len();
-            temporary::negative(n, matrix, |value, vector: &[S]| {
-                self.penalty.add(-lambda * value);
+        self.jets.clear(true);
+        self.multiplier.resize(self.right.len(), <S as Real>::zero());
+        // The same matrices failed before, and their rows are passed over.
+        let _ = solve(n, &self.chunk.mass_matrix, &self.right, &mut self.multiplier, &mut self.workspace);
+        let rows = self.acceleration.chunks_exact(n).zip(self.multiplier.chunks_exact(n));
+        for (state, (a, s)) in rows.enumerate() {
+            if !a[0].is_nan() {
+                self.jets.state.push(state);
+                self.jets.s.extend_from_slice(s);
+                self.jets.t.extend_from_slice(a);
+            }
+        }
+    }
+
+    /// `lambda sum relu(-eigenvalue)`: one jet per negative eigenvalue `w = u^T M u`, with `s = -lambda u`, `t = u`.
+    ///
+    /// Exact at repeated eigenvalues, where any basis of their space gives the same sum. Definite matrices are told by
+    /// their pivots and cost no spectrum.
+    fn add_penalty_jets(&mut self, lambda: S) {
+        let n = self.chunk.coordinates();
+        let zero = <S as Real>::zero();
+        self.penalty_jets.clear(false);
+        self.values.resize(n, zero);
+        self.vectors.resize(n * n, zero);
+        for (state, matrix) in self.chunk.mass_matrix.chunks_exact(n * n).enumerate() {
+            if is_positive_definite(n, matrix, &mut self.vectors)
+                || eigh(n, matrix, &mut self.values, &mut self.vectors, &mut self.workspace).is_err()
+            {
+                continue;
+            }
+            let negative = self.values.iter().take_while(|&&w| w < zero).count();
+            for (&w, u) in self.values[..negative].iter().zip(self.vectors.chunks_exact(n)) {
+                self.penalty.add(-lambda * w);
                 self.penalty_jets.state.push(state);
-                self.penalty_jets.s.extend(vector.iter().map(|&u| -lambda * u));
-                self.penalty_jets.t.extend_from_slice(vector);
-            });
-            self.penalised += usize::from(self.penalty_jets.state.len() > before);
+                self.penalty_jets.s.extend(u.iter().map(|&u| -lambda * u));
+                self.penalty_jets.t.extend_from_slice(u);
+            }
+            self.penalised += usize::from(negative > 0);
         }
     }
 }
@@ -285,16 +307,16 @@ impl<S: Scalar> Objective<S> {
 
     fn report(&self, stripes: usize, states: usize, n: usize) -> BatchReport<S> {
         let (mut residual, mut penalty) = (Sum::default(), Sum::default());
-        let (mut penalised, mut singular, mut failure) = (0, 0, None);
+        let (mut penalised, mut left_out, mut failure) = (0, 0, None);
         for stripe in &self.stripes[..stripes] {
             residual.add(stripe.residual.value());
             penalty.add(stripe.penalty.value());
             penalised += stripe.penalised;
-            singular += stripe.singular;
+            left_out += stripe.left_out;
             failure = failure.or(stripe.failure);
         }
-        let loss = residual.value() / S::of_f64((2 * n * (states - singular).max(1)) as f64);
-        BatchReport { loss, penalty: penalty.value(), penalised, singular, failure }
+        let loss = residual.value() / S::of_f64((2 * n * (states - left_out).max(1)) as f64);
+        BatchReport { loss, penalty: penalty.value(), penalised, left_out, failure }
     }
 }
 
@@ -308,60 +330,5 @@ fn sum_gradients<S: Scalar>(stripes: &[Stripe<S>], block: usize, out: &mut [S]) 
         for (sum, &g) in out.iter_mut().zip(&stripe.gradient[range.clone()]) {
             *sum += g;
         }
-    }
-}
-
-mod temporary {
-    use crate::scalar::{Real, Scalar};
-    pub fn solve<S: Scalar>(n: usize, m: &[S], x: &mut [S]) -> Result<(), Option<f64>> {
-        let mut a = m.to_vec();
-        for k in 0..n {
-            let mut p = k;
-            for i in k + 1..n {
-                if a[i * n + k].abs() > a[p * n + k].abs() {
-                    p = i;
-                }
-            }
-            if !a[p * n + k].is_finite() {
-                return Err(None);
-            }
-            if a[p * n + k].abs() <= S::EPSILON * m[0].abs() {
-                return Err(Some(f64::INFINITY));
-            }
-            for j in 0..n {
-                a.swap(k * n + j, p * n + j);
-            }
-            x.swap(k, p);
-            for i in k + 1..n {
-                let f = a[i * n + k] / a[k * n + k];
-                for j in k..n {
-                    let t = a[k * n + j];
-                    a[i * n + j] -= f * t;
-                }
-                let t = x[k];
-                x[i] -= f * t;
-            }
-        }
-        for k in (0..n).rev() {
-            for j in k + 1..n {
-                let t = a[k * n + j] * x[j];
-                x[k] -= t;
-            }
-            x[k] /= a[k * n + k];
-        }
-        if x.iter().all(|x| x.is_finite()) { Ok(()) } else { Err(None) }
-    }
-    pub fn negative<S: Scalar>(n: usize, m: &[S], mut f: impl FnMut(S, &[S])) {
-        if !m.iter().all(|x| x.is_finite()) {
-            return;
-        }
-        let e = nalgebra::DMatrix::from_fn(n, n, |i, j| m[i * n + j].to_f64()).symmetric_eigen();
-        for k in 0..n {
-            if e.eigenvalues[k] < 0.0 {
-                let u: Vec<S> = e.eigenvectors.column(k).iter().map(|&x| S::of_f64(x)).collect();
-                f(S::of_f64(e.eigenvalues[k]), &u);
-            }
-        }
-        let _ = <S as Real>::zero();
     }
 }

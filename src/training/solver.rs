@@ -39,8 +39,8 @@ pub struct Epoch {
     pub validation_loss: f64,
     /// Mean norm of the gradients before clipping.
     pub gradient_norm: f64,
-    /// States left out because of a singular mass matrix.
-    pub singular: usize,
+    /// States left out because they gave no finite acceleration.
+    pub left_out: usize,
     /// Steps skipped because they were not finite.
     pub skipped: usize,
     /// Seconds since the start of training.
@@ -136,7 +136,7 @@ struct Means {
     penalty: f64,
     norm: f64,
     penalised: usize,
-    singular: usize,
+    left_out: usize,
     skipped: usize,
     taken: usize,
     last_failure: Option<Failure>,
@@ -162,7 +162,7 @@ impl<S: Scalar> EpochSolver<S> {
         let report = problem.objective.step(&self.weights, &problem.training, rows, &mut self.gradient);
         if let Some(failure) = report.failure {
             means.last_failure = Some(failure);
-            means.singular += report.singular;
+            means.left_out += report.left_out;
             if self.optimizer.on_failure == OnFailure::Stop {
                 return Err(StepError::State { step, failure });
             }
@@ -286,7 +286,7 @@ impl<S: Scalar> Solver<TrainingProblem<S>, TrainingState<S>> for EpochSolver<S> 
             penalised: means.penalised as f64 / self.order.len() as f64,
             validation_loss: cost,
             gradient_norm: means.norm / taken,
-            singular: means.singular,
+            left_out: means.left_out,
             skipped: means.skipped,
             seconds: self.started.elapsed().as_secs_f64(),
         };

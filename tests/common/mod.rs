@@ -1,6 +1,7 @@
 //! What several test programs share.
+#![allow(dead_code, reason = "each test program uses its part")]
 
-use lnn::scalar::Real;
+use lnn::scalar::{Real, Scalar};
 
 /// Gaussian elimination without exchanges over any number type, for small well-conditioned systems.
 pub fn solve<T: Real>(n: usize, matrix: &[T], right: &[T]) -> Vec<T> {
@@ -24,4 +25,9 @@ pub fn solve<T: Real>(n: usize, matrix: &[T], right: &[T]) -> Vec<T> {
         x[k] = x[k] / m[k * n + k];
     }
     x
+}
+
+/// A scalar as a constant of any number over any scalar; exact where the target is at least as precise.
+pub fn of_scalar<R: Real>(x: impl Scalar) -> R {
+    R::constant(x.cast())
 }

@@ -28,11 +28,7 @@ pub const SYSTEM: System = System {
     time_like: None,
     training: |n| Bounds::uniform(n, (-0.1 * PI, 2.1 * PI), (-10.0, 10.0)),
     validation: |n| Bounds::uniform(n, (0.0, 2.0 * PI), (-10.0, 10.0)),
-    trajectory: |n| TrajectoryTest {
-        start: Bounds::uniform(n, (0.0, 2.0 * PI), (-0.1, 0.1)),
-        t_end: 100.0,
-        dt: 0.1,
-    },
+    trajectory: |n| TrajectoryTest { start: Bounds::uniform(n, (0.0, 2.0 * PI), (-0.1, 0.1)), t_end: 100.0, dt: 0.1 },
     domain: None,
 };
 

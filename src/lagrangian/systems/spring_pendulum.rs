@@ -34,10 +34,7 @@ pub const SYSTEM: System = System {
         velocities: vec![(-5.0, 5.0), (-5.0, 5.0)],
     },
     trajectory: |_| TrajectoryTest {
-        start: Bounds {
-            positions: vec![(0.5, 1.5), (0.0, 2.0 * PI)],
-            velocities: vec![(-1.0, 1.0), (-1.0, 1.0)],
-        },
+        start: Bounds { positions: vec![(0.5, 1.5), (0.0, 2.0 * PI)], velocities: vec![(-1.0, 1.0), (-1.0, 1.0)] },
         t_end: 50.0,
         dt: 0.1,
     },

@@ -1,5 +1,7 @@
 //! Double-double numbers: the judge of `f32` and `f64`.
 
+mod error_function;
+
 use super::{Real, Scalar};
 use std::cmp::Ordering;
 use std::fmt;
@@ -14,6 +16,9 @@ pub struct Dd {
 }
 
 impl Dd {
+    /// `1 / sqrt(2)`.
+    pub const SQRT_HALF: Self = Self { high: std::f64::consts::FRAC_1_SQRT_2, low: -4.833646656726457e-17 };
+
     /// The sum `high + low`, renormalised so that `high` is its nearest `f64`.
     #[inline]
     pub fn new(high: f64, low: f64) -> Self {
@@ -132,7 +137,7 @@ impl Real for Dd {
     }
     through_float! { recip sqrt exp exp_m1 ln ln_1p sin cos tan asin acos atan sinh cosh tanh abs }
     fn erfc(self) -> Self {
-        unimplemented!()
+        self.erfc_accurate()
     }
     fn logistic(self) -> Self {
         let one = <Self as Real>::one();

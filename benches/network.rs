@@ -1,0 +1,108 @@
+//! Throughput of network Lagrangians: mass matrices and motion per state, and the whole training step.
+//!
+//! `cargo bench --bench network`; the suffix of a name is `n`, hidden width, batch, precision. Elements are states.
+
+use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use lnn::network::{Activation, Architecture, Chunk, Depth, Initialization, initial_weights};
+use lnn::scalar::Scalar;
+use lnn::training::{Dataset, Method, Moments, Objective, Penalty, Update};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use std::hint::black_box;
+use std::time::Duration;
+
+/// Three hidden layers: the paper's "4 layers".
+fn architecture(n: usize, width: usize) -> Architecture {
+    Architecture {
+        coordinates: n,
+        hidden: vec![width; 3],
+        activation: Activation::Gelu,
+        alpha: 1.0,
+        scale: vec![10.0; n],
+        periodic: vec![false; n],
+        embed_periodic: false,
+    }
+}
+
+struct Setup<S> {
+    architecture: Architecture,
+    weights: Vec<S>,
+    data: Dataset<S>,
+}
+
+fn setup<S: Scalar>(n: usize, width: usize, batch: usize) -> Setup<S> {
+    let architecture = architecture(n, width);
+    let mut rng = ChaCha8Rng::seed_from_u64(7);
+    let weights = initial_weights(&architecture, Initialization::Default, &mut rng);
+    let mut draw = || (0..batch * n).map(|_| S::of_f64(rng.random_range(-10.0..10.0))).collect();
+    let data = Dataset::new(n, draw(), draw(), draw()).expect("finite numbers");
+    Setup { architecture, weights, data }
+}
+
+fn evaluation<S: Scalar>(c: &mut Criterion, n: usize, width: usize, batch: usize) {
+    let Setup { architecture, weights, data } = setup::<S>(n, width, batch);
+    let mut chunk = Chunk::new(&architecture);
+    let mut group = c.benchmark_group("one thread");
+    group.throughput(Throughput::Elements(batch as u64));
+    for (name, depth) in [
+        ("value", Depth::Value),
+        ("gradient", Depth::Gradient),
+        ("mass matrix", Depth::MassMatrix),
+        ("motion", Depth::Motion),
+    ] {
+        let id = BenchmarkId::new(name, format!("n{n} w{width} b{batch} {}", S::NAME));
+        group.bench_function(id, |b| {
+            b.iter(|| chunk.evaluate(&weights, black_box(data.q()), black_box(data.v()), depth));
+        });
+    }
+    group.finish();
+}
+
+fn step<S: Scalar>(c: &mut Criterion, n: usize, width: usize, batch: usize) {
+    let Setup { architecture, mut weights, data } = setup::<S>(n, width, batch);
+    let rows: Vec<u32> = (0..batch as u32).collect();
+    let mut gradient = weights.clone();
+    let mut group = c.benchmark_group("training step");
+    group.throughput(Throughput::Elements(batch as u64));
+    for threads in [1, 2] {
+        let penalty = Penalty::Eigenvalue { lambda: 5.0 };
+        let mut objective = Objective::new(&architecture, penalty, threads).expect("threads");
+        let mut moments = Moments::new(weights.len());
+        let update = Update { method: Method::Radam, rate: 1e-5, weight_decay: 1e-6, clip: 1.0 };
+        let id = BenchmarkId::new(format!("{threads} threads"), format!("n{n} w{width} b{batch} {}", S::NAME));
+        group.bench_function(id, |b| {
+            b.iter(|| {
+                objective.step(&weights, &data, &rows, &mut gradient);
+                moments.update(&mut weights, &gradient, &update)
+            });
+        });
+    }
+    group.finish();
+}
+
+fn all(c: &mut Criterion) {
+    step::<f32>(c, 2, 500, 128);
+    step::<f32>(c, 4, 500, 128);
+    step::<f64>(c, 2, 500, 128);
+    step::<f32>(c, 2, 128, 128);
+    for n in [1, 2, 4, 8, 20] {
+        evaluation::<f32>(c, n, 128, 128);
+    }
+    for width in [64, 256, 500, 1000] {
+        evaluation::<f32>(c, 2, width, 128);
+        evaluation::<f64>(c, 2, width, 128);
+    }
+    for batch in [1, 16, 1024, 4096] {
+        evaluation::<f32>(c, 2, 128, batch);
+    }
+}
+
+criterion_group! {
+    name = benches;
+    config = Criterion::default()
+        .sample_size(20)
+        .warm_up_time(Duration::from_millis(300))
+        .measurement_time(Duration::from_millis(1500));
+    targets = all
+}
+criterion_main!(benches);

@@ -1,0 +1,135 @@
+//! Speed of the tapes: nanoseconds per node, gradients of the double pendulum's acceleration error.
+
+use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use lnn::forward::Jet2;
+use lnn::scalar::{Dd, Real, Scalar};
+use lnn::tape::{Adjoints, Program, Replay, Tape, Tracer, Var};
+use std::hint::black_box;
+use std::sync::Arc;
+
+/// Squared difference between the double pendulum's accelerations and `target`; parameters `m1, m2, l1, l2, g`, state
+/// `theta1, theta2, omega1, omega2`.
+fn error<R: Real>(p: &[R], x: &[R], target: &[R]) -> R {
+    let [m1, m2, l1, l2, g] = [p[0], p[1], p[2], p[3], p[4]];
+    let (sin, cos) = (x[0] - x[1]).sin_cos();
+    let a1 = (l2 / l1) * (m2 / (m1 + m2)) * cos;
+    let a2 = (l1 / l2) * cos;
+    let f1 = -(l2 / l1) * (m2 / (m1 + m2)) * x[3].sqr() * sin - (g / l1) * x[0].sin();
+    let f2 = (l1 / l2) * x[2].sqr() * sin - (g / l2) * x[1].sin();
+    let det = R::one() - a1 * a2;
+    let (u, v) = ((f1 - a1 * f2) / det, (f2 - a2 * f1) / det);
+    (u - target[0]).sqr() + (v - target[1]).sqr()
+}
+
+fn states<S: Scalar>(count: usize) -> Vec<S> {
+    (0..6 * count).map(|i| S::of_f64((i as f64 * 0.7391).sin() * 2.0)).collect()
+}
+
+const PARAMETERS: [f64; 5] = [1.0, 0.8, 1.1, 0.9, 9.81];
+
+fn nodes(c: &mut Criterion) {
+    let mut group = c.benchmark_group("eager tape, record and sweep");
+    let count = 10_000;
+    group.throughput(Throughput::Elements(count));
+    let (mut tape, mut adjoints) = (Tape::<f64>::new(), Adjoints::new());
+    group.bench_function("products and sums, per node", |b| {
+        b.iter(|| {
+            tape.reset();
+            let x = tape.variable(black_box(1.0001));
+            let mut y = x;
+            for _ in 0..count / 2 {
+                y = y * x;
+                y = y + x;
+            }
+            tape.reverse(y, &mut adjoints).unwrap();
+            adjoints.of(x)
+        });
+    });
+    group.finish();
+}
+
+fn pendulum<S: Scalar>(c: &mut Criterion) {
+    let mut group = c.benchmark_group(format!("double pendulum acceleration error, {}", S::NAME));
+    let parameters = PARAMETERS.map(S::of_f64);
+    for count in [100, 1024] {
+        let data = states::<S>(count);
+        group.throughput(Throughput::Elements(count as u64));
+        group.bench_function(BenchmarkId::new("value, floats", count), |b| {
+            b.iter(|| {
+                let p = black_box(&parameters);
+                data.chunks(6).fold(S::of_f64(0.0), |sum, row| sum + error(p, &row[..4], &row[4..]))
+            });
+        });
+        let (mut tape, mut adjoints) = (Tape::<S>::new(), Adjoints::new());
+        group.bench_function(BenchmarkId::new("gradient, eager tape", count), |b| {
+            b.iter(|| {
+                tape.reset();
+                let p = black_box(parameters).map(|p| tape.variable(p));
+                let mut sum = Var::zero();
+                for row in data.chunks(6) {
+                    let z: [Var<'_, S>; 6] = std::array::from_fn(|i| Var::lift(row[i]));
+                    sum += error(&p, &z[..4], &z[4..]);
+                }
+                tape.reverse(sum, &mut adjoints).unwrap();
+                p.map(|p| adjoints.of(p))
+            });
+        });
+        let program = Program::<S>::record(6, 5, |_, x, p| vec![error(p, &x[..4], &x[4..])]).unwrap();
+        let mut replay = Replay::new(Arc::new(program));
+        let (mut y, w) = (vec![S::of_f64(0.0); count], vec![S::of_f64(1.0); count]);
+        let (mut dx, mut dp) = (vec![S::of_f64(0.0); 6 * count], [S::of_f64(0.0); 5]);
+        group.bench_function(BenchmarkId::new("value, lanes", count), |b| {
+            b.iter(|| replay.forward(count, &data, black_box(&parameters), &mut y).unwrap());
+        });
+        group.bench_function(BenchmarkId::new("gradient, lanes", count), |b| {
+            b.iter(|| {
+                replay.forward(count, &data, black_box(&parameters), &mut y).unwrap();
+                replay.reverse(&w, &mut dx, &mut dp).unwrap();
+                dp
+            });
+        });
+    }
+    group.finish();
+}
+
+/// Lagrangian of the double pendulum with unit masses and lengths.
+fn lagrangian<R: Real>(q: [R; 2], v: [R; 2]) -> R {
+    let g = R::from_f64(9.81);
+    v[0].sqr() + R::half() * v[1].sqr() + v[0] * v[1] * (q[0] - q[1]).cos() + g * (R::two() * q[0].cos() + q[1].cos())
+}
+
+fn second_order(c: &mut Criterion) {
+    let mut group = c.benchmark_group("double pendulum Lagrangian, second derivatives, one state");
+    let x = [0.3f64, -0.7, 1.1, 0.2];
+    group.bench_function("all four variables", |b| {
+        b.iter(|| {
+            let z: [Jet2<f64, 4>; 4] = std::array::from_fn(|i| Jet2::variable(black_box(x[i]), i));
+            lagrangian([z[0], z[1]], [z[2], z[3]])
+        });
+    });
+    group.bench_function("velocities only", |b| {
+        b.iter(|| {
+            let z: [Jet2<f64, 2>; 4] =
+                std::array::from_fn(|i| if i < 2 { Jet2::lift(black_box(x[i])) } else { Jet2::variable(x[i], i - 2) });
+            lagrangian([z[0], z[1]], [z[2], z[3]])
+        });
+    });
+    let program = Program::<f64>::record(4, 0, |_, x, _| {
+        let z: [Jet2<Tracer<'_, f64>, 4>; 4] = std::array::from_fn(|i| Jet2::variable(x[i], i));
+        let jet = lagrangian([z[0], z[1]], [z[2], z[3]]);
+        jet.gradient
+            .into_iter()
+            .chain((0..10).map(|k| jet.second([0, 1, 1, 2, 2, 2, 3, 3, 3, 3][k], [0, 0, 1, 0, 1, 2, 0, 1, 2, 3][k])))
+            .collect()
+    })
+    .unwrap();
+    let mut replay = Replay::new(Arc::new(program));
+    let (data, mut out) = (states::<f64>(1024)[..4096].to_vec(), vec![0.0; 14 * 1024]);
+    group.bench_function("all four, 1024 states in lanes", |b| {
+        b.iter(|| replay.forward(1024, black_box(&data), &[], &mut out).unwrap());
+    });
+    group.finish();
+}
+
+criterion_group!(benches, nodes, pendulum::<f32>, pendulum::<f64>, pendulum::<Dd>, second_order);
+criterion_main!(benches);

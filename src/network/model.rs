@@ -1,0 +1,188 @@
+//! A trained network as a mechanical system in physical units.
+
+use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Terms};
+use crate::linalg;
+use crate::network::{Architecture, Chunk, Depth, Layout};
+use crate::scalar::Scalar;
+use std::sync::{Mutex, PoisonError};
+use thiserror::Error;
+
+/// States evaluated together.
+const CHUNK: usize = 64;
+
+/// A network with its weights: `L(q, v)` and everything that follows from it.
+///
+/// The network works in scaled coordinates `q_i/s_i`, `v_i/s_i`; terms are returned in physical units, `L` in the
+/// network's own unit (a factor and a total derivative of `L` move nothing). Periodic coordinates are reduced to
+/// `[0, 2 pi)` before the network sees them.
+#[derive(Debug)]
+pub struct NetworkLagrangian<S> {
+    architecture: Architecture,
+    weights: Vec<S>,
+    /// Workspaces that no call holds at the moment.
+    idle: Mutex<Vec<Workspace<S>>>,
+}
+
+#[derive(Debug)]
+struct Workspace<S> {
+    chunk: Chunk<S>,
+    wrapped: Vec<S>,
+    linalg: linalg::Workspace<S>,
+}
+
+/// Why weights do not make a network.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+pub enum NetworkError {
+    /// A list of the architecture has the wrong length, or there is no coordinate or hidden layer.
+    #[error("architecture: {0}")]
+    Architecture(String),
+    /// There are too few or too many weights.
+    #[error("weights: expected {expected} numbers, found {found}")]
+    Weights {
+        /// Parameters of the architecture.
+        expected: usize,
+        /// Numbers given.
+        found: usize,
+    },
+}
+
+impl Architecture {
+    /// Checks that the lists fit each other and that nothing is empty or not finite.
+    ///
+    /// # Errors
+    /// The first thing that does not fit, in words.
+    pub fn validate(&self) -> Result<(), NetworkError> {
+        let n = self.coordinates;
+        let fault = |text: String| Err(NetworkError::Architecture(text));
+        if n == 0 {
+            return fault("expected at least one coordinate".to_string());
+        }
+        if self.hidden.is_empty() || self.hidden.contains(&0) {
+            return fault(format!("expected hidden layers of positive width, found {:?}", self.hidden));
+        }
+        if self.periodic.len() != n || self.scale.len() != n {
+            let (scales, flags) = (self.scale.len(), self.periodic.len());
+            return fault(format!("expected {n} scales and periodic flags, found {scales} and {flags}"));
+        }
+        if let Some(scale) = self.scale.iter().find(|s| !(s.is_finite() && **s > 0.0)) {
+            return fault(format!("expected positive scales, found {scale}"));
+        }
+        if !self.alpha.is_finite() {
+            return fault(format!("expected a finite alpha, found {}", self.alpha));
+        }
+        Ok(())
+    }
+}
+
+impl<S: Scalar> NetworkLagrangian<S> {
+    /// A network of this shape with these flat parameters (see [`Layout`]).
+    ///
+    /// # Errors
+    /// [`NetworkError`] if the architecture contradicts itself or the number of weights is not its own.
+    pub fn new(architecture: Architecture, weights: Vec<S>) -> Result<Self, NetworkError> {
+        architecture.validate()?;
+        let expected = Layout::new(&architecture).parameters;
+        if weights.len() != expected {
+            return Err(NetworkError::Weights { expected, found: weights.len() });
+        }
+        Ok(Self { architecture, weights, idle: Mutex::new(Vec::new()) })
+    }
+
+    /// Shape of the network.
+    pub fn architecture(&self) -> &Architecture {
+        &self.architecture
+    }
+    /// Flat parameters.
+    pub fn weights(&self) -> &[S] {
+        &self.weights
+    }
+    /// The same network in another precision.
+    pub fn cast<T: Scalar>(&self) -> NetworkLagrangian<T> {
+        let weights = self.weights.iter().map(|&w| w.cast()).collect();
+        NetworkLagrangian { architecture: self.architecture.clone(), weights, idle: Mutex::new(Vec::new()) }
+    }
+
+    fn depth(request: Request) -> Depth {
+        if request.includes(Request::CORIOLIS) {
+            Depth::Motion
+        } else if request.includes(Request::MASS_MATRIX) {
+            Depth::MassMatrix
+        } else if request.includes(Request::MOMENTUM) || request.includes(Request::DL_DQ) {
+            Depth::Gradient
+        } else {
+            Depth::Value
+        }
+    }
+}
+
+impl<S: Scalar> Workspace<S> {
+    /// Evaluates one chunk and appends its terms in physical units.
+    fn append(
+        &mut self,
+        network: &NetworkLagrangian<S>,
+        (q, v): (&[S], &[S]),
+        (request, depth): (Request, Depth),
+        terms: &mut Terms<S>,
+    ) {
+        let architecture = &network.architecture;
+        let n = architecture.coordinates;
+        self.wrapped.clear();
+        self.wrapped.extend_from_slice(q);
+        for row in self.wrapped.chunks_exact_mut(n) {
+            for (q, &periodic) in row.iter_mut().zip(&architecture.periodic) {
+                if periodic {
+                    *q = q.wrap_angle();
+                }
+            }
+        }
+        let chunk = &mut self.chunk;
+        chunk.evaluate(&network.weights, &self.wrapped, v, depth);
+        let inverse = |i: usize| S::of_f64(architecture.scale[i]).recip();
+        let unscale =
+            |from: &[S], to: &mut Vec<S>| to.extend(from.iter().enumerate().map(|(k, &x)| x * inverse(k % n)));
+        if request.includes(Request::LAGRANGIAN) {
+            terms.lagrangian.extend_from_slice(&chunk.lagrangian);
+        }
+        if request.includes(Request::MOMENTUM) {
+            unscale(&chunk.momentum, &mut terms.momentum);
+        }
+        if request.includes(Request::DL_DQ) {
+            unscale(&chunk.dl_dq, &mut terms.dl_dq);
+        }
+        if request.includes(Request::CORIOLIS) {
+            unscale(&chunk.coriolis, &mut terms.coriolis);
+        }
+        if request.includes(Request::MASS_MATRIX) {
+            let element = |(k, &m): (usize, &S)| m * (inverse(k / n % n) * inverse(k % n));
+            terms.mass_matrix.extend(chunk.mass_matrix.iter().enumerate().map(element));
+        }
+    }
+}
+
+impl<S: Scalar> EulerLagrange<S> for NetworkLagrangian<S> {
+    fn coordinates(&self) -> usize {
+        self.architecture.coordinates
+    }
+
+    fn terms(&self, q: &[S], v: &[S], request: Request, terms: &mut Terms<S>) -> Result<(), MechanicsError> {
+        let n = self.architecture.coordinates;
+        let shape = |what, expected, found| Err(MechanicsError::Shape { what, expected, found });
+        if q.len() % n != 0 {
+            return shape("coordinates", q.len().next_multiple_of(n), q.len());
+        }
+        if v.len() != q.len() {
+            return shape("velocities", q.len(), v.len());
+        }
+        terms.clear();
+        let mut workspace = self.idle.lock().unwrap_or_else(PoisonError::into_inner).pop().unwrap_or_else(|| {
+            Workspace { chunk: Chunk::new(&self.architecture), wrapped: Vec::new(), linalg: linalg::Workspace::new() }
+        });
+        let depth = Self::depth(request);
+        for states in q.chunks(CHUNK * n).zip(v.chunks(CHUNK * n)) {
+            workspace.append(self, states, (request, depth), terms);
+        }
+        let outcome = terms.complete(n, v, request, &mut workspace.linalg);
+        self.idle.lock().unwrap_or_else(PoisonError::into_inner).push(workspace);
+        outcome
+    }
+}

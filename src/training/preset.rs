@@ -1,0 +1,123 @@
+//! Configurations that ship with the program.
+
+use crate::lagrangian::Configured;
+use crate::lagrangian::system::Bounds;
+use crate::network::{Activation, Initialization};
+use crate::training::config::{Config, Data, Network, OnFailure, Optimizer, Phase, Precision, Scaling};
+use crate::training::optimizer::Method;
+use crate::training::penalty::Penalty;
+use crate::training::schedule::Schedule;
+use std::f64::consts::PI;
+
+/// A configuration by name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Preset {
+    /// A useful model within a minute on two cores.
+    Quick,
+    /// The paper's own budget and choices.
+    Paper,
+}
+
+/// Bounds in the form of a configuration.
+fn boxes(bounds: &[(f64, f64)]) -> Vec<[f64; 2]> {
+    bounds.iter().map(|&(low, high)| [low, high]).collect()
+}
+
+impl Preset {
+    /// The configuration of a system; `None` if the preset has none for it.
+    pub fn config(self, system: &Configured<f64>) -> Option<Config> {
+        match self {
+            Self::Quick => Some(quick(system)),
+            Self::Paper => paper(system),
+        }
+    }
+}
+
+fn base(system: &Configured<f64>, states: usize, network: Network) -> Config {
+    let validation: Bounds = (system.system.validation)(system.coordinates);
+    Config {
+        system: system.system.name.to_string(),
+        seed: 0,
+        precision: Precision::F32,
+        parameters: Default::default(),
+        data: Data {
+            training: states,
+            validation: states / 5,
+            test: states / 5,
+            validation_position: boxes(&validation.positions),
+            validation_velocity: boxes(&validation.velocities),
+        },
+        network,
+        penalty: Penalty::Eigenvalue { lambda: 5.0 },
+        optimizer: Optimizer {
+            method: Method::Radam,
+            batch: 128,
+            weight_decay: 1e-6,
+            clip: 1.0,
+            averaging: 0.0,
+            on_failure: OnFailure::Skip,
+        },
+        phases: Vec::new(),
+    }
+}
+
+fn quick(system: &Configured<f64>) -> Config {
+    let network = Network {
+        hidden: vec![128; 3],
+        activation: Activation::Gelu,
+        alpha: 1.0,
+        scaling: Scaling::Physical,
+        embed_periodic: true,
+        initialization: Initialization::Default,
+    };
+    let n = system.coordinates;
+    let mut bounds: Bounds = (system.system.training)(n);
+    // Embedded angles repeat: one turn is all there is.
+    for (bound, coordinate) in bounds.positions.iter_mut().zip((system.system.coordinates)(n)) {
+        if coordinate.periodic {
+            *bound = (0.0, 2.0 * PI);
+        }
+    }
+    let phase = Phase {
+        epochs: 50,
+        rate: 3e-3,
+        eta_min: 0.0,
+        schedule: Schedule::Cosine,
+        t_max: 50.0,
+        position: boxes(&bounds.positions),
+        velocity: boxes(&bounds.velocities),
+    };
+    Config { penalty: Penalty::Eigenvalue { lambda: 100.0 }, phases: vec![phase], ..base(system, 60_000, network) }
+}
+
+/// Appendix "Training details" of Hamzaogullari and Ozakin.
+fn paper(system: &Configured<f64>) -> Option<Config> {
+    let n = system.coordinates;
+    let (states, hidden, phases): (usize, Vec<usize>, &[(usize, f64, f64)]) = match system.system.name {
+        "double-pendulum" => (60_000, vec![500; 3], &[(300, 1e-3, 1e-6), (200, 4e-5, 1e-7), (200, 1e-5, 1e-8)]),
+        "triple-pendulum" => (60_000, vec![500; 3], &[(500, 1e-3, 1e-7)]),
+        "spring-pendulum" => (60_000, vec![600; 2], &[(500, 5e-4, 1e-7)]),
+        "sphere-geodesic" => (50_000, vec![500; 3], &[(50, 1e-3, 1e-6)]),
+        _ => return None,
+    };
+    let network = Network {
+        hidden,
+        activation: Activation::Gelu,
+        alpha: 1.0,
+        scaling: Scaling::Physical,
+        embed_periodic: false,
+        initialization: Initialization::Default,
+    };
+    let bounds: Bounds = (system.system.training)(n);
+    let phase = |(k, &(epochs, rate, eta_min)): (usize, &(usize, f64, f64))| {
+        let mut position = boxes(&bounds.positions);
+        if system.system.name == "double-pendulum" {
+            // The first phase sees three turns, the others one turn and a little more.
+            position = vec![if k == 0 { [-3.0 * PI, 3.0 * PI] } else { [-PI / 10.0, 21.0 * PI / 10.0] }; n];
+        }
+        let velocity = boxes(&bounds.velocities);
+        Phase { epochs, rate, eta_min, schedule: Schedule::CosineAnnealing, t_max: 30.0, position, velocity }
+    };
+    let phases = phases.iter().enumerate().map(phase).collect();
+    Some(Config { phases, ..base(system, states, network) })
+}

@@ -1,0 +1,284 @@
+//! Replayed programs against the eager tape, block operations against the same thing in scalars.
+
+use lnn::forward::{Dual, HyperDual};
+use lnn::scalar::{Dd, Real, Scalar};
+use lnn::tape::{JetFunction, JetKind, Program, Replay, ScalarFunction, TapeError, Tracer, gradient};
+use std::sync::Arc;
+
+/// Numbers in `(-1, 1)`, the same every time.
+fn numbers<S: Scalar>(count: usize, seed: u32) -> Vec<S> {
+    let mut state = seed.wrapping_mul(2_654_435_761).wrapping_add(12345);
+    let mut next = || {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        f64::from(state >> 8) / f64::from(1u32 << 23) - 1.0
+    };
+    (0..count).map(|_| S::of_f64(next())).collect()
+}
+
+/// Outputs, input adjoints and parameter adjoints for output adjoints `w`.
+fn run<S: Scalar>(program: Program<S>, lanes: usize, x: &[S], p: &[S], w: &[S]) -> [Vec<S>; 3] {
+    let zero = S::of_f64(0.0);
+    let mut out = [vec![zero; lanes * program.outputs()], vec![zero; x.len()], vec![zero; p.len()]];
+    let mut replay = Replay::new(Arc::new(program));
+    let [y, dx, dp] = &mut out;
+    replay.forward(lanes, x, p, y).unwrap();
+    replay.reverse(w, dx, dp).unwrap();
+    out
+}
+
+fn close<S: Scalar>(a: &[S], b: &[S], tolerance: f64) {
+    assert_eq!(a.len(), b.len());
+    let scale = b.iter().fold(1.0f64, |most, x| most.max(x.to_f64().abs()));
+    for (i, (&x, &y)) in a.iter().zip(b).enumerate() {
+        let gap = (x - y).to_f64().abs() / scale;
+        assert!(gap <= tolerance, "{i}: {x:?} {y:?} differ by {gap:e}");
+    }
+}
+
+/// Two states, three parameters, every kind of scalar operation.
+struct Mixture;
+impl ScalarFunction for Mixture {
+    fn eval<R: Real>(&self, z: &[R]) -> R {
+        let [a, b, m, k, l] = [z[0], z[1], z[2], z[3], z[4]];
+        let inertia = m * m + k.exp() * R::two();
+        let (sin, cos) = (a - b).sin_cos();
+        let energy = R::half() * inertia * b.sqr() - l * cos.powi(3) + (sin * m).tanh() / (inertia + a.sqr());
+        let clipped = a.max(b).min(l) + (a * b).abs() + a.relu() * k.softplus();
+        let rest = inertia.powf(sin) + a.atan2(inertia) + inertia.sqrt().recip() + (b * k).erfc() + b.cos();
+        energy + clipped * rest + b.logistic().ln() + a.sinh() - (a * a).ln_1p()
+    }
+}
+
+#[test]
+fn replay_agrees_with_the_eager_tape_lane_by_lane() {
+    let record = || {
+        Program::<f64>::record(2, 3, |_, x, p| {
+            let z = [x[0], x[1], p[0], p[1], p[2]];
+            vec![Mixture.eval(&z), x[0] * p[0], p[1] * p[2]]
+        })
+        .unwrap()
+    };
+    let parameters = numbers::<f64>(3, 1);
+    for lanes in [0, 1, 3, 64, 65, 200] {
+        let (x, w) = (numbers::<f64>(2 * lanes, 2), numbers::<f64>(3 * lanes, 3));
+        let [y, dx, dp] = run(record(), lanes, &x, &parameters, &w);
+        let mut sum = vec![0.0; 3];
+        for lane in 0..lanes {
+            let state = &x[2 * lane..2 * lane + 2];
+            let weight = &w[3 * lane..3 * lane + 3];
+            let (value, d) = gradient(&Mixture, &[state, &parameters].concat()).unwrap();
+            assert_eq!(&y[3 * lane..3 * lane + 3], [value, state[0] * parameters[0], parameters[1] * parameters[2]]);
+            let want = [weight[0] * d[0] + weight[1] * parameters[0], weight[0] * d[1]];
+            close(&dx[2 * lane..2 * lane + 2], &want, 1e-13);
+            sum[0] += weight[0] * d[2] + weight[1] * state[0];
+            sum[1] += weight[0] * d[3] + weight[2] * parameters[2];
+            sum[2] += weight[0] * d[4] + weight[2] * parameters[1];
+            // One lane alone: the same bits.
+            let [y1, dx1, _] = run(record(), 1, state, &parameters, weight);
+            assert_eq!(y1, &y[3 * lane..3 * lane + 3]);
+            assert_eq!(dx1, &dx[2 * lane..2 * lane + 2]);
+        }
+        close(&dp, &sum, 1e-12);
+    }
+}
+
+#[test]
+fn forward_numbers_ride_on_programs_and_records_are_lean() {
+    // d/dx of x^2 sin p, written twice: the second costs nothing; nor does what no output needs.
+    let program = Program::<f64>::record(1, 1, |_, x, p| {
+        let f = |x| {
+            let x = Dual::new(x, Tracer::one());
+            (x * x * Dual::lift(p[0].sin())).tangent
+        };
+        let unused = x[0].exp();
+        let _ = unused * unused;
+        vec![f(x[0]), f(x[0])]
+    })
+    .unwrap();
+    // x; p and (sin p, cos p); x + x; (x + x) sin p.
+    assert_eq!((program.lane_operations(), program.uniform_operations()), (3, 2));
+    let [y, dx, dp] = run(program, 1, &[3.0], &[0.5], &[1.0, 0.0]);
+    assert_eq!(y, [6.0 * 0.5f64.sin(); 2]);
+    assert_eq!((dx[0], dp[0]), (2.0 * 0.5f64.sin(), 6.0 * 0.5f64.cos()));
+}
+
+#[test]
+fn dead_lanes_and_nan() {
+    let program = Program::<f64>::record(1, 0, |_, x, _| vec![x[0].select(x[0].sqrt().ln(), Real::zero())]).unwrap();
+    let [y, dx, _] = run(program, 4, &[0.0, -1.0, 4.0, f64::NAN], &[], &[1.0; 4]);
+    assert_eq!(y[..3], [0.0, 0.0, 2.0f64.ln()]);
+    assert_eq!(dx[..3], [0.0, 0.0, 0.125]);
+    assert!(y[3].is_nan() && dx[3].is_nan());
+}
+
+#[test]
+fn errors_are_typed() {
+    let program = Program::<f64>::record(2, 1, |_, x, p| vec![x[0] * x[1] + p[0]]).unwrap();
+    let mut replay = Replay::new(Arc::new(program));
+    assert_eq!(replay.reverse(&[], &mut [], &mut [0.0]), Err(TapeError::NoForward));
+    let short = replay.forward(2, &[1.0; 3], &[1.0], &mut [0.0; 2]);
+    assert_eq!(short, Err(TapeError::Shape { what: "inputs", expected: 4, found: 3 }));
+    let unfit = Program::<f64>::record(2, 1, |recorder, x, _| recorder.solve(x, &[x[0], x[1]]));
+    assert_eq!(unfit.map(|_| ()), Err(TapeError::Block { what: "matrix of a solve", expected: 4, found: 2 }));
+    let unfit = Program::<f64>::record(2, 5, |recorder, x, _| {
+        let y = recorder.affine(recorder.pack(x, 1), 3, 0, None);
+        vec![y.get(0, 0)]
+    });
+    assert_eq!(unfit.map(|_| ()), Err(TapeError::Block { what: "parameters of an affine map", expected: 6, found: 5 }));
+    let mut foreign = Ok(());
+    let outer = Program::<f64>::record(1, 0, |_, x, _| {
+        foreign = Program::<f64>::record(1, 0, |_, y, _| {
+            let _ = y[0] * x[0];
+            vec![y[0]]
+        })
+        .map(|_| ());
+        vec![x[0]]
+    });
+    assert_eq!((outer.map(|_| ()), foreign), (Err(TapeError::MixedTapes), Err(TapeError::MixedTapes)));
+}
+
+/// `tanh` with its derivatives.
+#[derive(Debug)]
+struct Tanh;
+impl<S: Scalar> JetFunction<S> for Tanh {
+    fn derivatives(&self, x: S) -> [S; 4] {
+        let (y, one, two) = (x.tanh(), <S as Real>::one(), <S as Real>::two());
+        let d = one - y * y;
+        let s = -two * y * d;
+        [y, d, s, -two * (d * d + y * s)]
+    }
+}
+
+/// A layer `tanh(W x + b)` on three inputs, its outputs weighted by `c`: parameters `W (2,3)`, `b (2)`.
+fn layer<R: Real>(p: &[R], x: &[R]) -> [R; 2] {
+    [0, 1].map(|i| (p[3 * i] * x[0] + p[3 * i + 1] * x[1] + p[3 * i + 2] * x[2] + p[6 + i]).tanh())
+}
+
+fn jets_agree<S: Scalar>(tolerance: f64) {
+    let lanes = 70;
+    let p = numbers::<S>(8, 4);
+    // Mixed: inputs (value, s, t, st) of three coordinates.
+    let block = Program::<S>::record(12, 8, |recorder, x, _| {
+        let z = recorder.affine(recorder.pack(x, 4), 2, 0, Some(6));
+        let h = recorder.jet(z, JetKind::Mixed, Arc::new(Tanh));
+        (0..8).map(|i| h.get(i / 4, i % 4)).collect()
+    })
+    .unwrap();
+    let scalar = Program::<S>::record(12, 8, |_, x, p| {
+        let x: Vec<_> = x.chunks(4).map(|c| HyperDual::new(c[0], c[1], c[2], c[3])).collect();
+        let p: Vec<_> = p.iter().map(|&p| HyperDual::lift(p)).collect();
+        layer(&p, &x).into_iter().flat_map(|h| [h.value, h.s, h.t, h.st]).collect()
+    })
+    .unwrap();
+    let (x, w) = (numbers::<S>(12 * lanes, 5), numbers::<S>(8 * lanes, 6));
+    for (a, b) in run(block, lanes, &x, &p, &w).iter().zip(&run(scalar, lanes, &x, &p, &w)) {
+        close(a, b, tolerance);
+    }
+    // Two tangents: inputs (value, t1, t2).
+    let block = Program::<S>::record(9, 8, |recorder, x, _| {
+        let z = recorder.affine(recorder.pack(x, 3), 2, 0, Some(6));
+        let h = recorder.jet(z, JetKind::Tangents(2), Arc::new(Tanh));
+        (0..6).map(|i| h.get(i / 3, i % 3)).collect()
+    })
+    .unwrap();
+    let scalar = Program::<S>::record(9, 8, |_, x, p| {
+        let along = |k: usize| {
+            let x: Vec<_> = x.chunks(3).map(|c| Dual::new(c[0], c[k])).collect();
+            layer(&p.iter().map(|&p| Dual::lift(p)).collect::<Vec<_>>(), &x)
+        };
+        let (first, second) = (along(1), along(2));
+        (0..2).flat_map(|i| [first[i].value, first[i].tangent, second[i].tangent]).collect()
+    })
+    .unwrap();
+    let (x, w) = (numbers::<S>(9 * lanes, 7), numbers::<S>(6 * lanes, 8));
+    for (a, b) in run(block, lanes, &x, &p, &w).iter().zip(&run(scalar, lanes, &x, &p, &w)) {
+        close(a, b, tolerance);
+    }
+}
+
+#[test]
+fn affine_maps_and_jets_agree_with_scalars() {
+    jets_agree::<f32>(3e-5);
+    jets_agree::<f64>(1e-13);
+    jets_agree::<Dd>(1e-28);
+}
+
+#[test]
+fn solve_agrees_with_cramer() {
+    fn check<S: Scalar>(tolerance: f64) {
+        let block = Program::<S>::record(6, 0, |recorder, x, _| recorder.solve(&x[..4], &x[4..])).unwrap();
+        let cramer = Program::<S>::record(6, 0, |_, x, _| {
+            let det = x[0] * x[3] - x[1] * x[2];
+            vec![(x[4] * x[3] - x[1] * x[5]) / det, (x[0] * x[5] - x[4] * x[2]) / det]
+        })
+        .unwrap();
+        let lanes = 66;
+        let mut x = numbers::<S>(6 * lanes, 9);
+        for state in x.chunks_mut(6) {
+            // Off-diagonally dominant: a pivot is needed.
+            state[0] *= S::of_f64(0.01);
+            state[1] += S::of_f64(3.0);
+            state[2] -= S::of_f64(3.0);
+        }
+        let w = numbers::<S>(2 * lanes, 10);
+        for (a, b) in run(block, lanes, &x, &[], &w).iter().zip(&run(cramer, lanes, &x, &[], &w)) {
+            close(a, b, tolerance);
+        }
+    }
+    check::<f64>(1e-14);
+    check::<Dd>(1e-29);
+}
+
+#[test]
+fn eigenvalue_penalty_is_right_at_repeated_eigenvalues() {
+    // sum relu(-l): its gradient is minus the projector on the negative subspace.
+    let penalty = |n: usize| {
+        Program::<f64>::record(n * n, 0, |recorder, x, _| {
+            let (values, _) = recorder.symmetric_eigen(n, x);
+            vec![values.into_iter().fold(Tracer::zero(), |sum, l| sum + (-l).relu())]
+        })
+        .unwrap()
+    };
+    for n in 1..5 {
+        let minus: Vec<f64> = (0..n * n).map(|i| if i % (n + 1) == 0 { -1.0 } else { 0.0 }).collect();
+        let [y, dx, _] = run(penalty(n), 1, &minus, &[], &[1.0]);
+        assert_eq!(y[0], n as f64);
+        assert_eq!(dx, minus);
+        // -2 I + 2^-k E, E the matrix of ones: all negative still.
+        let split: Vec<f64> = minus.iter().map(|m| 2.0 * m + 2f64.powi(-40)).collect();
+        let [_, dx, _] = run(penalty(n), 1, &split, &[], &[1.0]);
+        close(&dx, &minus, 30.0 * f64::EPSILON);
+    }
+    // diag(-1, 1, 1) and a reflection with eigenvalues -1, 1, 1.
+    let third = 1.0 / 3.0;
+    let reflection: Vec<f64> = (0..9).map(|i| if i % 4 == 0 { third } else { -2.0 * third }).collect();
+    let [y, dx, _] = run(penalty(3), 1, &reflection, &[], &[1.0]);
+    close(&y, &[1.0], 4.0 * f64::EPSILON);
+    close(&dx, &[-third; 9], 30.0 * f64::EPSILON);
+}
+
+#[test]
+fn eigenvector_adjoints_agree_with_differences_in_double_double() {
+    let n = 3;
+    let record = || {
+        Program::<Dd>::record(6, 0, |recorder, x, _| {
+            let matrix = [x[0], x[1], x[2], x[1], x[3], x[4], x[2], x[4], x[5]];
+            let (values, vectors) = recorder.symmetric_eigen(n, &matrix);
+            [values, vectors].concat()
+        })
+        .unwrap()
+    };
+    let (x, w) = (numbers::<Dd>(6, 11), numbers::<Dd>(12, 12));
+    let [_, dx, _] = run(record(), 1, &x, &[], &w);
+    let h = Dd::of_f64(1e-8);
+    for i in 0..6 {
+        let weighted = |step: Dd| {
+            let mut x = x.clone();
+            x[i] += step;
+            let [y, _, _] = run(record(), 1, &x, &[], &w);
+            y.iter().zip(&w).fold(Dd::of_f64(0.0), |sum, (&y, &w)| sum + y * w)
+        };
+        let difference = (weighted(h) - weighted(-h)) / (h + h);
+        assert!((difference - dx[i]).to_f64().abs() < 1e-13, "{i}: {difference:?} {:?}", dx[i]);
+    }
+}
