@@ -38,8 +38,8 @@ fn nodes(c: &mut Criterion) {
             let x = tape.variable(black_box(1.0001));
             let mut y = x;
             for _ in 0..count / 2 {
-                y = y * x;
-                y = y + x;
+                y *= x;
+                y += x;
             }
             tape.reverse(y, &mut adjoints).unwrap();
             adjoints.of(x)

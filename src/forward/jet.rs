@@ -117,6 +117,8 @@ impl<T: Real, const N: usize> Sub for Jet2<T, N> {
 }
 impl<T: Real, const N: usize> Mul for Jet2<T, N> {
     type Output = Self;
+    // The product rule adds.
+    #[allow(clippy::suspicious_arithmetic_impl)]
     #[inline(always)]
     fn mul(self, other: Self) -> Self {
         let (a, b) = (&self, &other);
@@ -131,6 +133,7 @@ impl<T: Real, const N: usize> Mul for Jet2<T, N> {
 impl<T: Real, const N: usize> Div for Jet2<T, N> {
     type Output = Self;
     /// From `a = y b`: each order of the quotient solves the product rule.
+    #[allow(clippy::suspicious_arithmetic_impl)]
     #[inline(always)]
     fn div(self, other: Self) -> Self {
         let (a, b) = (&self, &other);

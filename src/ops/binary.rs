@@ -50,6 +50,13 @@ fn shares<R: Real>(a: R, b: R) -> (R, R) {
     (R::half() + half, R::half() - half)
 }
 
+/// Second derivatives of a piecewise linear function: 0, or `NaN` where the first one is.
+#[inline(always)]
+fn flat<R: Real>(first: R) -> (R, R, R) {
+    let zero = first * R::zero();
+    (zero, zero, zero)
+}
+
 /// `ln a`, 0 at `a = 0`, where `a^b ln a` tends to 0.
 #[inline(always)]
 fn log<R: Real>(a: R) -> R {
@@ -80,7 +87,7 @@ table! {
         (twice, db * db - da * da, -twice)
     };
     /// The larger one.
-    Max max(a, b, y, da, db) = shares(a, b), (da - da, da - da, da - da);
+    Max max(a, b, y, da, db) = shares(a, b), flat(da);
     /// The smaller one.
-    Min min(a, b, y, da, db) = shares(b, a), (da - da, da - da, da - da);
+    Min min(a, b, y, da, db) = shares(b, a), flat(da);
 }

@@ -120,7 +120,7 @@ table! {
     /// `ln(1 + e^x)`.
     Softplus softplus(x, y, d) = x.logistic(), d * (-x).logistic();
     /// Absolute value; 0 at 0 for the derivative, `NaN` passed on.
-    Abs abs(x, y, d) = sign(x), d - d;
+    Abs abs(x, y, d) = sign(x), d * R::zero();
 }
 
 impl Unary {
