@@ -131,9 +131,7 @@ fn every_output_is_within_rounding_of_double_double() {
 #[test]
 fn double_double_agrees_with_an_independent_table() {
     let table = include_str!("data/mechanics.csv");
-    let numbers = |text: &str| -> Vec<Dd> {
-        text.split(' ').map(|t| Dd::of_f64(t.parse().unwrap())).collect()
-    };
+    let numbers = |text: &str| -> Vec<Dd> { text.split(' ').map(|t| Dd::of_f64(t.parse().unwrap())).collect() };
     let mut current: Vec<(&'static str, Vec<Dd>)> = Vec::new();
     let (mut checked, mut worst, mut kappa, mut exact) = (0, 0f64, 1.0, Vec::new());
     for line in table.lines() {
@@ -226,7 +224,8 @@ fn batches_replayed_agree_with_single_states_and_requests_with_each_other() {
             close("acceleration", &one.acceleration, &all.acceleration[row * n..][..n]);
             close("energy", &one.energy, &all.energy[row..=row]);
         }
-        for (request, rows) in [(Request::ENERGY, batch), (Request::ENERGY, 3), (Request::MOMENTUM | Request::DL_DQ, 2)] {
+        for (request, rows) in [(Request::ENERGY, batch), (Request::ENERGY, 3), (Request::MOMENTUM | Request::DL_DQ, 2)]
+        {
             let mut some = Terms::default();
             built.terms(&q[..rows * n], &v[..rows * n], request, &mut some).unwrap();
             close("momentum", &some.momentum, &all.momentum[..rows * n]);
