@@ -1,1 +1,110 @@
-//! Arguments to library calls.
+//! The command-line program: arguments to library calls.
+//!
+//! Results go to standard output, messages and progress to standard error. Exit codes: 0 done, 1 data or files, 2
+//! arguments or configuration, 130 Ctrl-C. A failure is one line, `error: FILE: row 3, column theta1: ...`.
+
+mod config;
+mod error;
+mod inspect;
+mod interrupt;
+mod json;
+mod nearest;
+mod number;
+mod output;
+mod progress;
+mod source;
+mod states;
+mod systems;
+
+pub use error::{CliError, Kind};
+pub use states::{States, StatesError, parse_states};
+
+use clap::{Parser, Subcommand};
+use std::ffi::OsString;
+use std::io::Write;
+use std::process::ExitCode;
+
+/// Learn a Lagrangian from motion, predict motion that keeps its energy, read physics off the learned function.
+#[derive(Debug, Parser)]
+#[command(name = "lnn", version, arg_required_else_help = true, max_term_width = 100)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// List the systems that can be learned.
+    Systems(systems::Args),
+    /// Print the Euler-Lagrange terms of states, every digit of them.
+    Inspect(inspect::Args),
+}
+
+/// Runs the program with its arguments, the first being its own name.
+pub fn main(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
+    let cli = match Cli::try_parse_from(arguments) {
+        Ok(cli) => cli,
+        Err(error) => return answer(&error),
+    };
+    match watch_log().and_then(|()| run(cli.command)) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            if error.kind() != Kind::ClosedPipe {
+                report(&error);
+            }
+            error.exit_code()
+        }
+    }
+}
+
+fn run(command: Command) -> Result<(), CliError> {
+    match command {
+        Command::Systems(args) => systems::run(&args),
+        Command::Inspect(args) => inspect::run(&args),
+    }
+}
+
+/// Help and version go where they are asked for; a wrong argument is one line like any other error.
+fn answer(error: &clap::Error) -> ExitCode {
+    use clap::error::ErrorKind::{DisplayHelp, DisplayHelpOnMissingArgumentOrSubcommand, DisplayVersion};
+    match error.kind() {
+        DisplayHelp | DisplayVersion => match output::print(&error.to_string()) {
+            Err(failed) if failed.kind() != Kind::ClosedPipe => {
+                report(&failed);
+                failed.exit_code()
+            }
+            _ => ExitCode::SUCCESS,
+        },
+        DisplayHelpOnMissingArgumentOrSubcommand => {
+            // Nothing more can be done if even this cannot be shown.
+            let _ = error.print();
+            ExitCode::from(2)
+        }
+        _ => {
+            let text = error.to_string();
+            let problem =
+                ["\n\nUsage:", "\n\nFor more"].iter().fold(text.as_str(), |t, end| t.split(end).next().unwrap_or(t));
+            let failed = CliError::usage(problem.strip_prefix("error: ").unwrap_or(problem));
+            report(&failed);
+            failed.exit_code()
+        }
+    }
+}
+
+/// One line on standard error; if that is closed too, there is nobody to tell.
+fn report(error: &CliError) {
+    let _ = writeln!(std::io::stderr(), "error: {error}");
+}
+
+/// Diagnostics go to standard error, chosen by the environment variable `LNN_LOG` (such as `debug`).
+fn watch_log() -> Result<(), CliError> {
+    use tracing_subscriber::EnvFilter;
+    let filter = match std::env::var("LNN_LOG") {
+        Ok(text) => EnvFilter::try_new(&text).map_err(|e| CliError::usage(format_args!("LNN_LOG: {e}")))?,
+        Err(std::env::VarError::NotPresent) => EnvFilter::new("warn"),
+        Err(error) => return Err(CliError::usage(format_args!("LNN_LOG: {error}"))),
+    };
+    // Already installed when several commands run in one process (tests): keep the first.
+    let _ = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).try_init();
+    Ok(())
+}

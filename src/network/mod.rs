@@ -6,10 +6,12 @@ mod affine;
 mod chunk;
 mod config;
 mod features;
+pub mod file;
 mod init;
 mod layout;
 mod model;
 mod reference;
+pub mod storage;
 
 pub use activation::Activation;
 pub use adjoint::{Adjoint, Jets};

@@ -68,6 +68,15 @@ pub enum Progress<'a> {
 /// Called while training runs.
 pub type Watcher = Arc<dyn Fn(Progress<'_>) + Send + Sync>;
 
+/// Who watches a run and who may end it.
+#[derive(Clone, Default)]
+pub struct Hooks {
+    /// Called after every step and epoch.
+    pub watcher: Option<Watcher>,
+    /// Raise it to end training after the current step.
+    pub interrupt: Arc<AtomicBool>,
+}
+
 /// Why a step stopped the training.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum StepError {
@@ -125,8 +134,7 @@ pub struct EpochSolver<S> {
     pub(super) started: std::time::Instant,
     pub(super) history: Vec<Epoch>,
     pub(super) stopped: Option<StepError>,
-    pub(super) interrupt: Arc<AtomicBool>,
-    pub(super) watcher: Option<Watcher>,
+    pub(super) hooks: Hooks,
 }
 
 /// Running means over the steps of an epoch.
@@ -143,6 +151,36 @@ struct Means {
 }
 
 impl<S: Scalar> EpochSolver<S> {
+    /// A solver for one phase over `states` training states, shuffled by `rng`; host it in an argmin `Executor` whose
+    /// state starts with the initial weights and runs for `phase.epochs` iterations.
+    pub fn new(optimizer: Optimizer, phase: Phase, rng: ChaCha8Rng, states: usize) -> Self {
+        let steps = phase.epochs * states.div_ceil(optimizer.batch.min(states).max(1));
+        Self {
+            optimizer,
+            phase,
+            phase_number: 1,
+            rng,
+            order: (0..states as u32).collect(),
+            weights: Vec::new(),
+            moments: Moments::new(0),
+            average: Vec::new(),
+            averaged_steps: 0,
+            gradient: Vec::new(),
+            epoch: 0,
+            step: 0,
+            steps,
+            started: std::time::Instant::now(),
+            history: Vec::new(),
+            stopped: None,
+            hooks: Hooks::default(),
+        }
+    }
+
+    /// One row per epoch so far.
+    pub fn history(&self) -> &[Epoch] {
+        &self.history
+    }
+
     fn rate(&self, epoch_of_phase: f64) -> f64 {
         let p = &self.phase;
         p.schedule.rate(p.rate, p.eta_min, p.t_max, epoch_of_phase, p.epochs as f64)
@@ -193,7 +231,7 @@ impl<S: Scalar> EpochSolver<S> {
         means.penalty += report.penalty.to_f64();
         means.penalised += report.penalised;
         means.norm += norm;
-        if let Some(watcher) = &self.watcher {
+        if let Some(watcher) = &self.hooks.watcher {
             watcher(Progress::Step { step, steps: self.steps, rate, loss });
         }
         Ok(())
@@ -265,7 +303,7 @@ impl<S: Scalar> Solver<TrainingProblem<S>, TrainingState<S>> for EpochSolver<S> 
                 self.stopped = Some(error);
                 return Ok((state, None));
             }
-            if self.interrupt.load(Ordering::Relaxed) {
+            if self.hooks.interrupt.load(Ordering::Relaxed) {
                 return Ok((state, None));
             }
         }
@@ -291,7 +329,7 @@ impl<S: Scalar> Solver<TrainingProblem<S>, TrainingState<S>> for EpochSolver<S> 
             seconds: self.started.elapsed().as_secs_f64(),
         };
         let record = kv!("training_loss" => epoch.training_loss; "rate" => epoch.rate; "penalty" => epoch.penalty;);
-        if let Some(watcher) = &self.watcher {
+        if let Some(watcher) = &self.hooks.watcher {
             watcher(Progress::Epoch(&epoch));
         }
         self.history.push(epoch);
@@ -304,7 +342,7 @@ impl<S: Scalar> Solver<TrainingProblem<S>, TrainingState<S>> for EpochSolver<S> 
     fn terminate(&mut self, _state: &TrainingState<S>) -> TerminationStatus {
         match &self.stopped {
             Some(error) => TerminationStatus::Terminated(TerminationReason::SolverExit(error.to_string())),
-            None if self.interrupt.load(Ordering::Relaxed) => {
+            None if self.hooks.interrupt.load(Ordering::Relaxed) => {
                 TerminationStatus::Terminated(TerminationReason::Interrupt)
             }
             None => TerminationStatus::NotTerminated,

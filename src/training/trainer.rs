@@ -5,13 +5,11 @@ use crate::scalar::Scalar;
 use crate::training::config::{Config, Phase};
 use crate::training::dataset::Dataset;
 use crate::training::objective::{BatchReport, Objective};
-use crate::training::optimizer::Moments;
-use crate::training::solver::{Epoch, EpochSolver, StepError, TrainingProblem, TrainingState, Watcher};
-use argmin::core::{Executor, State, TerminationReason, TerminationStatus};
+use crate::training::solver::{Epoch, EpochSolver, Hooks, StepError, TrainingProblem, TrainingState};
+use argmin::core::observers::{Observe, ObserverMode};
+use argmin::core::{Error, Executor, KV, State, TerminationReason, TerminationStatus};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
-use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 use thiserror::Error;
 
@@ -108,15 +106,6 @@ pub struct Datasets<S> {
     pub test: Dataset<S>,
 }
 
-/// Who watches a run and who may end it.
-#[derive(Clone, Default)]
-pub struct Hooks {
-    /// Called after every step and epoch.
-    pub watcher: Option<Watcher>,
-    /// Raise it to end training after the current step.
-    pub interrupt: Arc<AtomicBool>,
-}
-
 /// Trains a network of this shape; the configuration must have been validated.
 ///
 /// The same configuration, data and seed give the same bytes on any number of `threads`.
@@ -143,26 +132,18 @@ pub fn train<S: Scalar>(
     let mut progress = Run { history: Vec::new(), step: 0, states: 0, stop: Stop::Finished, best: f64::INFINITY };
     for (number, (phase, training)) in config.phases.iter().zip(data.training).enumerate() {
         let problem = TrainingProblem { objective: objective()?, training, validation: data.validation.clone() };
-        let solver = EpochSolver {
-            optimizer: config.optimizer.clone(),
-            phase: phase.clone(),
-            phase_number: number + 1,
-            rng: Stream::Order(number).generator(config.seed),
-            order: (0..problem.training.len() as u32).collect(),
-            weights: Vec::new(),
-            moments: Moments::new(0),
-            average: Vec::new(),
-            averaged_steps: 0,
-            gradient: Vec::new(),
-            epoch: progress.history.len(),
-            step: progress.step,
-            steps,
-            started,
-            history: Vec::new(),
-            stopped: None,
-            interrupt: hooks.interrupt.clone(),
-            watcher: hooks.watcher.clone(),
-        };
+        let mut solver = EpochSolver::new(
+            config.optimizer.clone(),
+            phase.clone(),
+            Stream::Order(number).generator(config.seed),
+            problem.training.len(),
+        );
+        solver.phase_number = number + 1;
+        solver.epoch = progress.history.len();
+        solver.step = progress.step;
+        solver.steps = steps;
+        solver.started = started;
+        solver.hooks = hooks.clone();
         if let Some(best) = progress.run_phase(problem, solver, phase, weights.clone())? {
             weights = best;
         }
@@ -187,6 +168,17 @@ pub fn train<S: Scalar>(
     })
 }
 
+/// Writes every epoch to the log.
+struct Log;
+
+impl<I: State> Observe<I> for Log {
+    fn observe_iter(&mut self, state: &I, kv: &KV) -> Result<(), Error> {
+        let (epoch, cost, best) = (state.get_iter(), state.get_cost(), state.get_best_cost());
+        tracing::info!(epoch, %cost, %best, record = ?kv.kv, "epoch");
+        Ok(())
+    }
+}
+
 /// What the phases have come to so far.
 struct Run {
     history: Vec<Epoch>,
@@ -207,6 +199,7 @@ impl Run {
     ) -> Result<Option<Vec<S>>, TrainingError> {
         let states = problem.training.len();
         let result = Executor::new(problem, solver)
+            .add_observer(Log, ObserverMode::Always)
             .configure(|state: TrainingState<S>| state.param(start).max_iters(phase.epochs as u64))
             .timer(false)
             .run()

@@ -1,0 +1,165 @@
+//! TOML configurations with errors that name file, line, key and the nearest known key.
+
+use crate::cli::CliError;
+use crate::cli::nearest::nearest;
+use crate::network::storage::read_regular;
+use serde::de::DeserializeOwned;
+use std::ops::Range;
+use std::path::Path;
+use toml::de::{DeTable, DeValue};
+
+/// Largest configuration that is read, in bytes.
+const MAX_BYTES: u64 = 1 << 20;
+
+/// Reads a configuration; its text is returned beside it.
+///
+/// # Errors
+/// A file that cannot be read is a data error, everything in it a usage error: `FILE:LINE: KEY: problem`.
+pub fn load<T: DeserializeOwned>(path: &Path) -> Result<T, CliError> {
+    let bytes = read_regular(path, MAX_BYTES).map_err(|e| CliError::file(path, e))?;
+    let text =
+        String::from_utf8(bytes).map_err(|_| CliError::usage(format_args!("{}: not UTF-8 text", path.display())))?;
+    parse(&text).map_err(|(line, problem)| CliError::usage(format_args!("{}:{line}: {problem}", path.display())))
+}
+
+/// Parses a configuration.
+///
+/// # Errors
+/// Line, from 1, and what is wrong there.
+pub fn parse<T: DeserializeOwned>(text: &str) -> Result<T, (usize, String)> {
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    toml::from_str(text).map_err(|error| {
+        let span = error.span().unwrap_or(0..0);
+        let line = 1 + text.as_bytes()[..span.start.min(text.len())].iter().filter(|b| **b == b'\n').count();
+        let problem = explain(error.message());
+        match DeTable::parse(text).ok().and_then(|table| key_at(table.get_ref(), &span)) {
+            Some(key) => (line, format!("{key}: {problem}")),
+            None => (line, problem),
+        }
+    })
+}
+
+/// serde's message with the nearest known name instead of a long list.
+fn explain(message: &str) -> String {
+    let quoted: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
+    let unknown = ["unknown field", "unknown variant"].iter().any(|start| message.starts_with(start));
+    match quoted.split_first() {
+        Some((name, known)) if unknown => {
+            let what = if message.starts_with("unknown field") { "key" } else { "value" };
+            match nearest(name, known.iter().copied()) {
+                Some(near) => format!("unknown {what} {name:?}, did you mean {near:?}?"),
+                None => format!("unknown {what} {name:?}, expected one of {}", known.join(", ")),
+            }
+        }
+        _ => message.to_string(),
+    }
+}
+
+/// Path of the innermost key whose name or value holds `span`, such as `phase[0].rate`.
+fn key_at(table: &DeTable<'_>, span: &Range<usize>) -> Option<String> {
+    let holds = |outer: Range<usize>| outer.start <= span.start && span.end <= outer.end && !span.is_empty();
+    table.iter().find_map(|(key, value)| {
+        let name: &str = key.get_ref();
+        let below = within(value.get_ref(), span);
+        (below.is_some() || holds(key.span()) || holds(value.span()))
+            .then(|| format!("{name}{}", below.unwrap_or_default()))
+    })
+}
+
+/// The rest of the path below a value.
+fn within(value: &DeValue<'_>, span: &Range<usize>) -> Option<String> {
+    match value {
+        DeValue::Table(table) => key_at(table, span).map(|rest| format!(".{rest}")),
+        DeValue::Array(items) => items.iter().enumerate().find_map(|(k, item)| {
+            let below = within(item.get_ref(), span);
+            let outer = item.span();
+            let here = matches!(item.get_ref(), DeValue::Table(_)) || outer.start > span.start || span.end > outer.end;
+            (below.is_some() || !here).then(|| format!("[{k}]{}", below.unwrap_or_default()))
+        }),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde::Deserialize;
+
+    #[derive(Debug, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    #[allow(dead_code)]
+    struct Config {
+        seed: u64,
+        optimizer: Optimizer,
+        phase: Vec<Phase>,
+    }
+    #[derive(Debug, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    #[allow(dead_code)]
+    struct Optimizer {
+        method: Method,
+        clip: f64,
+    }
+    #[derive(Debug, Deserialize)]
+    #[serde(rename_all = "kebab-case")]
+    enum Method {
+        Adam,
+        RAdam,
+    }
+    #[derive(Debug, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    #[allow(dead_code)]
+    struct Phase {
+        epochs: usize,
+        rates: Vec<f64>,
+    }
+
+    const GOOD: &str = "seed = 1\n[optimizer]\nmethod = \"adam\"\nclip = 1\n[[phase]]\nepochs = 3\nrates = [1, 2.5]\n\
+                        [[phase]]\nepochs = 4\nrates = []\n";
+
+    fn refusal(old: &str, new: &str) -> String {
+        assert!(GOOD.contains(old));
+        let (line, problem) = parse::<Config>(&GOOD.replacen(old, new, 1)).unwrap_err();
+        format!("{line}: {problem}")
+    }
+
+    #[test]
+    fn good_files_are_read() {
+        let config: Config = parse(GOOD).unwrap();
+        assert_eq!((config.seed, config.phase[0].rates.as_slice()), (1, [1.0, 2.5].as_slice()));
+    }
+
+    #[test]
+    fn unknown_names_are_met_with_near_ones() {
+        assert!(refusal("epochs = 4", "epcohs = 4").contains("unknown key \"epcohs\", did you mean \"epochs\"?"));
+        assert!(refusal("epochs = 4", "epcohs = 4").starts_with("9: "));
+        assert!(refusal("seed = 1", "seeed = 1").contains("1: seeed: unknown key \"seeed\", did you mean \"seed\"?"));
+        assert!(refusal("\"adam\"", "\"adma\"").contains("unknown value \"adma\", did you mean \"adam\"?"));
+        assert!(refusal("clip = 1", "zzzz = 1").contains("expected one of method, clip"));
+    }
+
+    #[test]
+    fn types_duplicates_and_syntax_are_placed() {
+        assert_eq!(
+            refusal("epochs = 3", "epochs = \"x\""),
+            "6: phase[0].epochs: invalid type: string \"x\", expected usize"
+        );
+        assert!(refusal("epochs = 3", "epochs = -3").starts_with("6: phase[0].epochs: invalid value"));
+        assert!(refusal("2.5]", "true]").starts_with("7: phase[0].rates[1]: invalid type: boolean"));
+        assert!(refusal("clip = 1", "clip = 1\nclip = 2").starts_with("5: "));
+        assert!(refusal("seed = 1", "seed = 1\nseed = 2").contains("duplicate key"));
+        assert!(refusal("seed = 1", "seed = ").starts_with("1: "));
+        assert!(refusal("seed = 1\n", "").contains("missing field `seed`"));
+    }
+
+    #[test]
+    fn files_are_named() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("c.toml");
+        assert_eq!(load::<Config>(&path).unwrap_err().kind(), crate::cli::Kind::Data);
+        std::fs::write(&path, "seed = 1\nseeed = 2\n").unwrap();
+        let error = load::<Config>(&path).unwrap_err();
+        assert_eq!(error.kind(), crate::cli::Kind::Usage);
+        assert!(error.to_string().contains("c.toml:2: "), "{error}");
+    }
+}

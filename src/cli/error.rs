@@ -1,0 +1,103 @@
+//! How a command fails: one line and an exit code.
+
+use std::fmt;
+use std::io;
+use std::path::Path;
+use std::process::ExitCode;
+
+/// What went wrong, as far as a calling script cares.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Arguments or configuration: exit code 2.
+    Usage,
+    /// Data or files: exit code 1.
+    Data,
+    /// Ctrl-C: exit code 130.
+    Interrupted,
+    /// Whoever read our output has gone: no message, exit code 0.
+    ClosedPipe,
+}
+
+/// A failed command.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct CliError {
+    kind: Kind,
+    message: String,
+}
+
+impl CliError {
+    /// Wrong arguments or configuration.
+    pub fn usage(message: impl fmt::Display) -> Self {
+        Self { kind: Kind::Usage, message: one_line(&message.to_string()) }
+    }
+    /// Wrong data, or a file that cannot be read or written.
+    pub fn data(message: impl fmt::Display) -> Self {
+        Self { kind: Kind::Data, message: one_line(&message.to_string()) }
+    }
+    /// Wrong data in a file, or a file that cannot be read or written.
+    pub fn file(path: &Path, problem: impl fmt::Display) -> Self {
+        Self::data(format_args!("{}: {problem}", path.display()))
+    }
+    /// Ctrl-C; says what was kept.
+    pub fn interrupted(message: impl fmt::Display) -> Self {
+        Self { kind: Kind::Interrupted, message: one_line(&message.to_string()) }
+    }
+    /// A write to standard output that failed.
+    pub fn output(error: &io::Error) -> Self {
+        if error.kind() == io::ErrorKind::BrokenPipe {
+            return Self { kind: Kind::ClosedPipe, message: "standard output was closed".to_string() };
+        }
+        Self::data(format_args!("standard output: {error}"))
+    }
+    /// What went wrong.
+    pub fn kind(&self) -> Kind {
+        self.kind
+    }
+    /// The exit code of the program.
+    pub fn exit_code(&self) -> ExitCode {
+        ExitCode::from(match self.kind {
+            Kind::Usage => 2,
+            Kind::Data => 1,
+            Kind::Interrupted => 130,
+            Kind::ClosedPipe => 0,
+        })
+    }
+}
+
+impl fmt::Display for CliError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.message)
+    }
+}
+
+impl std::error::Error for CliError {}
+
+/// Lines joined by a space, control characters written out: an error is one line whatever a file name contains.
+fn one_line(text: &str) -> String {
+    let joined = text.lines().map(str::trim).filter(|line| !line.is_empty()).collect::<Vec<_>>().join(" ");
+    joined.chars().fold(String::with_capacity(joined.len()), |mut line, c| {
+        if c.is_control() {
+            line.extend(c.escape_default())
+        } else {
+            line.push(c)
+        }
+        line
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn messages_are_one_line() {
+        assert_eq!(CliError::usage("a\n\n  b\u{7}").to_string(), "a b\\u{7}");
+    }
+
+    #[test]
+    fn a_closed_pipe_is_no_failure() {
+        let closed = CliError::output(&io::ErrorKind::BrokenPipe.into());
+        assert_eq!(closed.kind(), Kind::ClosedPipe);
+        assert_eq!(CliError::output(&io::ErrorKind::StorageFull.into()).kind(), Kind::Data);
+    }
+}

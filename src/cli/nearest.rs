@@ -1,0 +1,71 @@
+//! "Did you mean": the known name nearest to a mistyped one.
+
+/// The candidate that fewest edits (insert, delete, replace, swap neighbours) turn `name` into; none if all are far.
+pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    let name: Vec<char> = name.to_lowercase().chars().take(64).collect();
+    let limit = (name.len() / 3).max(1);
+    candidates
+        .into_iter()
+        .map(|candidate| (edits(&name, &candidate.to_lowercase().chars().collect::<Vec<_>>()), candidate))
+        .filter(|(distance, _)| *distance <= limit)
+        .min_by_key(|(distance, _)| *distance)
+        .map(|(_, candidate)| candidate)
+}
+
+/// `unknown WHAT "NAME"` with the nearest candidate, or all of them when none is near.
+pub fn unknown<'a>(what: &str, name: &str, candidates: impl IntoIterator<Item = &'a str> + Clone) -> String {
+    let shown: String = name.chars().take(40).collect();
+    match nearest(name, candidates.clone()) {
+        Some(near) => format!("unknown {what} {shown:?}, did you mean {near:?}?"),
+        None => {
+            let all: Vec<&str> = candidates.into_iter().collect();
+            if all.is_empty() {
+                return format!("unknown {what} {shown:?}: there are none");
+            }
+            format!("unknown {what} {shown:?}, expected one of {}", all.join(", "))
+        }
+    }
+}
+
+/// Optimal string alignment distance (Damerau 1964, Levenshtein 1966).
+fn edits(a: &[char], b: &[char]) -> usize {
+    let mut before = vec![0; b.len() + 1];
+    let mut above: Vec<usize> = (0..=b.len()).collect();
+    for i in 0..a.len() {
+        let mut row = vec![i + 1];
+        for j in 0..b.len() {
+            let replaced = above[j] + usize::from(a[i] != b[j]);
+            let mut least = replaced.min(above[j + 1] + 1).min(row[j] + 1);
+            if i > 0 && j > 0 && a[i] == b[j - 1] && a[i - 1] == b[j] {
+                least = least.min(before[j - 1] + 1);
+            }
+            row.push(least);
+        }
+        before = std::mem::replace(&mut above, row);
+    }
+    above[b.len()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn edits_are_counted() {
+        let distance = |a: &str, b: &str| edits(&a.chars().collect::<Vec<_>>(), &b.chars().collect::<Vec<_>>());
+        assert_eq!(distance("", "abc"), 3);
+        assert_eq!(distance("kitten", "sitting"), 3);
+        assert_eq!(distance("epcohs", "epochs"), 1);
+        assert_eq!(distance("same", "same"), 0);
+    }
+
+    #[test]
+    fn only_near_names_are_offered() {
+        let names = ["double-pendulum", "triple-pendulum", "sphere-geodesic"];
+        assert_eq!(nearest("duoble-pendulm", names), Some("double-pendulum"));
+        assert_eq!(nearest("Sphere-Geodesic", names), Some("sphere-geodesic"));
+        assert_eq!(nearest("kepler", names), None);
+        assert_eq!(nearest("", names), None);
+        assert!(unknown("system", "kepler", names).ends_with("double-pendulum, triple-pendulum, sphere-geodesic"));
+    }
+}

@@ -1,0 +1,37 @@
+//! Numbers of the command line, with their ranges.
+
+/// A finite decimal number.
+pub fn finite(text: &str) -> Result<f64, String> {
+    match text.trim().parse::<f64>() {
+        Ok(x) if x.is_finite() => Ok(x),
+        _ => Err("expected a finite number".to_string()),
+    }
+}
+
+/// A finite decimal number above 0.
+pub fn positive(text: &str) -> Result<f64, String> {
+    finite(text).ok().filter(|x| *x > 0.0).ok_or_else(|| "expected a finite number above 0".to_string())
+}
+
+/// A whole number above 0.
+pub fn count(text: &str) -> Result<usize, String> {
+    text.trim().parse().ok().filter(|n| *n > 0).ok_or_else(|| "expected a whole number above 0".to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranges_are_kept() {
+        assert_eq!(finite("-1.5e3"), Ok(-1500.0));
+        for bad in ["nan", "inf", "1e999", "", "x", "1,5"] {
+            assert!(finite(bad).is_err() && positive(bad).is_err() && count(bad).is_err(), "{bad}");
+        }
+        for bad in ["0", "-1", "-0.0"] {
+            assert!(positive(bad).is_err() && count(bad).is_err(), "{bad}");
+        }
+        assert!(count("1.0").is_err() && count("99999999999999999999").is_err());
+        assert_eq!((positive("1e-3"), count("7")), (Ok(1e-3), Ok(7)));
+    }
+}

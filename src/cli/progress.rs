@@ -1,0 +1,43 @@
+//! A progress bar on standard error: loss, learning rate, remaining time.
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::io::IsTerminal;
+
+/// Progress through a known number of steps; silent when standard error is not a terminal.
+pub struct Progress {
+    bar: ProgressBar,
+}
+
+impl Progress {
+    /// A bar of `total` steps, such as epochs.
+    pub fn new(total: u64, unit: &str) -> Self {
+        let target = if std::io::stderr().is_terminal() {
+            ProgressDrawTarget::stderr_with_hz(5)
+        } else {
+            ProgressDrawTarget::hidden()
+        };
+        let bar = ProgressBar::with_draw_target(Some(total), target);
+        let template = format!("{{bar:24}} {{pos}}/{{len}} {unit}  {{msg}}  {{eta}} left");
+        if let Ok(style) = ProgressStyle::with_template(&template) {
+            bar.set_style(style.progress_chars("=> "));
+        }
+        Self { bar }
+    }
+
+    /// `done` steps are done, with this loss and learning rate.
+    pub fn show(&self, done: u64, loss: f64, rate: f64) {
+        self.bar.set_message(format!("loss {loss:.4e}  rate {rate:.2e}"));
+        self.bar.set_position(done);
+    }
+
+    /// `done` steps are done.
+    pub fn advance(&self, done: u64) {
+        self.bar.set_position(done);
+    }
+}
+
+impl Drop for Progress {
+    fn drop(&mut self) {
+        self.bar.finish_and_clear();
+    }
+}

@@ -1,0 +1,49 @@
+//! Where Euler-Lagrange terms come from: a hand-written system or a trained model.
+
+use crate::cli::CliError;
+use crate::lagrangian::{EulerLagrange, configure};
+use crate::network::NetworkLagrangian;
+use crate::network::file::ModelFile;
+use crate::scalar::Scalar;
+use std::path::Path;
+
+/// Something that moves by a Lagrangian, with the names of its state's components.
+pub struct Source<S> {
+    /// Its terms.
+    pub model: Box<dyn EulerLagrange<S>>,
+    /// Coordinates, then velocities.
+    pub columns: Vec<String>,
+}
+
+impl<S: Scalar> Source<S> {
+    /// A hand-written system; its parameters, defaults included, are read in the precision of `S`.
+    ///
+    /// # Errors
+    /// A usage error for an unknown name or a wrong parameter.
+    pub fn system(name: &str, given: &[(String, String)]) -> Result<Self, CliError> {
+        let configured = configure::<S>(name, given).map_err(CliError::usage)?;
+        let model = configured.build().map_err(CliError::usage)?;
+        Ok(Self { model, columns: configured.system.columns(configured.coordinates) })
+    }
+
+    /// A trained model; its weights are converted to the precision of `S`.
+    ///
+    /// # Errors
+    /// A data error for a file that is not a whole model file.
+    pub fn model(path: &Path) -> Result<Self, CliError> {
+        let file = ModelFile::<S>::load(path).map_err(|e| CliError::file(path, e))?;
+        let network =
+            NetworkLagrangian::new(file.header.architecture, file.weights).map_err(|e| CliError::file(path, e))?;
+        Ok(Self { model: Box::new(network), columns: file.header.columns })
+    }
+}
+
+/// `symbol=value`.
+pub fn parameter(text: &str) -> Result<(String, String), String> {
+    match text.split_once('=') {
+        Some((symbol, value)) if !symbol.trim().is_empty() && !value.trim().is_empty() => {
+            Ok((symbol.trim().to_string(), value.trim().to_string()))
+        }
+        _ => Err("expected SYMBOL=VALUE".to_string()),
+    }
+}

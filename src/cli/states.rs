@@ -1,0 +1,231 @@
+//! States from CSV files.
+
+use crate::cli::nearest::unknown;
+use crate::scalar::Scalar;
+use thiserror::Error;
+
+/// Largest file of states that is read, in bytes.
+pub const MAX_BYTES: u64 = 1 << 28;
+
+/// States of a file, in its order.
+#[derive(Clone, Debug, PartialEq)]
+pub struct States<S> {
+    /// Coordinates `(states, n)` in physical units.
+    pub q: Vec<S>,
+    /// Velocities `(states, n)` in physical units.
+    pub v: Vec<S>,
+    /// Line of the file, from 1, that each state stands on.
+    pub rows: Vec<usize>,
+}
+
+/// What is wrong with a file of states; rows are lines of the file, from 1.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+pub enum StatesError {
+    /// Nothing in it.
+    #[error("the file is empty, expected a header with the columns {0}")]
+    Empty(String),
+    /// Bytes that are not text.
+    #[error("row {0}: not UTF-8 text")]
+    NotText(usize),
+    /// Separated by something else than commas.
+    #[error("row {row}: fields are separated by {separator:?}, expected commas")]
+    Separator {
+        /// Row of the header.
+        row: usize,
+        /// What stands there.
+        separator: char,
+    },
+    /// A column stands twice in the header.
+    #[error("row {row}: column {name} stands there twice")]
+    Duplicate {
+        /// Row of the header.
+        row: usize,
+        /// Its name.
+        name: String,
+    },
+    /// A column that the system does not have.
+    #[error("row {row}: {problem}")]
+    Unknown {
+        /// Row of the header.
+        row: usize,
+        /// Its name and the nearest known one.
+        problem: String,
+    },
+    /// Columns that are not there.
+    #[error("row {row}: missing column {names}")]
+    Missing {
+        /// Row of the header.
+        row: usize,
+        /// Their names.
+        names: String,
+    },
+    /// A row with too few or too many fields.
+    #[error("row {row}: expected {expected} fields, found {found}")]
+    Ragged {
+        /// The row.
+        row: usize,
+        /// Fields of the header.
+        expected: usize,
+        /// Fields of the row.
+        found: usize,
+    },
+    /// A field that is not a finite number.
+    #[error("row {row}, column {column}: expected a finite number, found {found:?}")]
+    Field {
+        /// The row.
+        row: usize,
+        /// Name of the column.
+        column: String,
+        /// What stands there.
+        found: String,
+    },
+    /// A header and nothing below.
+    #[error("no states below the header")]
+    NoStates,
+}
+
+/// Reads states from CSV text.
+///
+/// The first line that is not blank names the columns, all of `columns` (coordinates, then velocities) in any order and
+/// no others. Fields are separated by commas; spaces around them, double quotes, a byte order mark, blank lines and
+/// Windows line ends are accepted. Numbers are read in the precision of `S`: a double-double sees the decimal text, not
+/// its nearest `f64`.
+///
+/// # Errors
+/// [`StatesError`] naming the first offending row and column.
+pub fn parse_states<S: Scalar>(bytes: &[u8], columns: &[String]) -> Result<States<S>, StatesError> {
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    let text = std::str::from_utf8(bytes).map_err(|e| {
+        let row = 1 + bytes[..e.valid_up_to()].iter().filter(|b| **b == b'\n').count();
+        StatesError::NotText(row)
+    })?;
+    let mut lines = text.lines().enumerate().map(|(k, line)| (k + 1, line)).filter(|(_, line)| !line.trim().is_empty());
+    let (row, header) = lines.next().ok_or_else(|| StatesError::Empty(columns.join(",")))?;
+    let order = read_header(row, header, columns)?;
+
+    let n = columns.len() / 2;
+    let mut states = States { q: Vec::new(), v: Vec::new(), rows: Vec::new() };
+    let mut state = vec![S::default(); columns.len()];
+    for (row, line) in lines {
+        let found = line.split(',').count();
+        if found != order.len() {
+            return Err(StatesError::Ragged { row, expected: order.len(), found });
+        }
+        for (field, &column) in line.split(',').zip(&order) {
+            let field = unquoted(field);
+            state[column] = S::parse(field).filter(|x| x.is_finite()).ok_or_else(|| StatesError::Field {
+                row,
+                column: columns[column].clone(),
+                found: field.chars().take(40).collect(),
+            })?;
+        }
+        states.q.extend_from_slice(&state[..n]);
+        states.v.extend_from_slice(&state[n..]);
+        states.rows.push(row);
+    }
+    if states.rows.is_empty() { Err(StatesError::NoStates) } else { Ok(states) }
+}
+
+/// For every field of a row, the index of its column.
+fn read_header(row: usize, header: &str, columns: &[String]) -> Result<Vec<usize>, StatesError> {
+    if !header.contains(',')
+        && let Some(separator) = [';', '\t', '|'].into_iter().find(|c| header.contains(*c))
+    {
+        return Err(StatesError::Separator { row, separator });
+    }
+    let mut order = Vec::with_capacity(columns.len());
+    for name in header.split(',').map(unquoted) {
+        let Some(column) = columns.iter().position(|known| known == name) else {
+            return Err(StatesError::Unknown {
+                row,
+                problem: unknown("column", name, columns.iter().map(String::as_str)),
+            });
+        };
+        if order.contains(&column) {
+            return Err(StatesError::Duplicate { row, name: name.to_string() });
+        }
+        order.push(column);
+    }
+    let missing: Vec<&str> = (0..columns.len()).filter(|k| !order.contains(k)).map(|k| columns[k].as_str()).collect();
+    if missing.is_empty() { Ok(order) } else { Err(StatesError::Missing { row, names: missing.join(", ") }) }
+}
+
+/// A field without the spaces and quotes around it.
+fn unquoted(field: &str) -> &str {
+    let field = field.trim();
+    field.strip_prefix('"').and_then(|rest| rest.strip_suffix('"')).map_or(field, str::trim)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn columns() -> Vec<String> {
+        ["theta1", "theta2", "theta1_dot", "theta2_dot"].map(String::from).to_vec()
+    }
+
+    fn refusal(text: &str) -> String {
+        parse_states::<f64>(text.as_bytes(), &columns()).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn columns_come_in_any_order_and_dress() {
+        let text = "\u{feff}\r\n\"theta2\", theta1 ,theta2_dot,theta1_dot\r\n 2,+1e0 ,4.,\"3\"\r\n\r\n-6,5,.8,7";
+        let states = parse_states::<f64>(text.as_bytes(), &columns()).unwrap();
+        assert_eq!(states.q, [1.0, 2.0, 5.0, -6.0]);
+        assert_eq!(states.v, [3.0, 4.0, 7.0, 0.8]);
+        assert_eq!(states.rows, [3, 5]);
+    }
+
+    #[test]
+    fn headers_are_checked() {
+        assert!(refusal("").starts_with("the file is empty"));
+        assert_eq!(
+            refusal("theta1;theta2;theta1_dot;theta2_dot\n"),
+            "row 1: fields are separated by ';', expected commas"
+        );
+        assert_eq!(refusal("theta1\ttheta2\n"), "row 1: fields are separated by '\\t', expected commas");
+        assert_eq!(refusal("theta1,theta2,theta1\n"), "row 1: column theta1 stands there twice");
+        assert_eq!(
+            refusal("theta1,theta2,theta1_dto\n"),
+            "row 1: unknown column \"theta1_dto\", did you mean \"theta1_dot\"?"
+        );
+        assert_eq!(refusal("\ntheta1,theta2_dot\n"), "row 2: missing column theta2, theta1_dot");
+        assert_eq!(refusal("theta1,theta2,theta1_dot,theta2_dot\n\n"), "no states below the header");
+    }
+
+    #[test]
+    fn fields_are_checked() {
+        let with = |row: &str| refusal(&format!("theta1,theta2,theta1_dot,theta2_dot\n1,2,3,4\n{row}\n"));
+        for bad in ["nan", "NaN", "inf", "-infinity", "1e999", "", "x", "0x10", "1_000", "1;2"] {
+            assert_eq!(
+                with(&format!("1,2,{bad},4")),
+                format!("row 3, column theta1_dot: expected a finite number, found {bad:?}")
+            );
+        }
+        assert_eq!(with("1,2,3"), "row 3: expected 4 fields, found 3");
+        assert_eq!(with("1,2,3,4,"), "row 3: expected 4 fields, found 5");
+        let bytes = b"theta1,theta2,theta1_dot,theta2_dot\n1,2,3,4\n1,\xff,3,4\n";
+        assert_eq!(parse_states::<f64>(bytes, &columns()), Err(StatesError::NotText(3)));
+    }
+
+    proptest! {
+        #[test]
+        fn numbers_survive(values in prop::collection::vec(prop::num::f64::NORMAL | prop::num::f64::ZERO, 4)) {
+            let fields: Vec<String> = values.iter().map(|x| format!("{x:?}")).collect();
+            let text = format!("theta1,theta2,theta1_dot,theta2_dot\n{}", fields.join(","));
+            let states = parse_states::<f64>(text.as_bytes(), &columns()).unwrap();
+            prop_assert_eq!([states.q, states.v].concat(), values);
+        }
+
+        #[test]
+        fn arbitrary_bytes_do_not_panic(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
+            let text = [b"theta1,theta2,theta1_dot,theta2_dot\n".as_slice(), &bytes].concat();
+            let _ = parse_states::<f32>(&bytes, &columns());
+            if let Ok(states) = parse_states::<f64>(&text, &columns()) {
+                prop_assert!(states.q.iter().chain(&states.v).all(|x| x.is_finite()));
+            }
+        }
+    }
+}

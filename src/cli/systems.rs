@@ -1,0 +1,81 @@
+//! `lnn systems`: what can be learned.
+
+use crate::cli::{CliError, output};
+use crate::lagrangian::system::{Bounds, Size, System};
+use crate::lagrangian::systems;
+use serde_json::{Value, json};
+
+/// Arguments.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// One JSON array instead of a table.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Prints the catalogue.
+pub fn run(args: &Args) -> Result<(), CliError> {
+    if args.json {
+        let all: Vec<Value> = systems().iter().map(describe).collect();
+        return output::print(&format!("{:#}\n", Value::from(all)));
+    }
+    output::print(&systems().iter().map(table).collect::<Vec<_>>().join("\n"))
+}
+
+/// Symbol, default, unit and allowed values of every parameter.
+fn parameters(system: &System) -> Vec<[String; 4]> {
+    let mut rows: Vec<_> =
+        system.parameters.iter().map(|p| [p.symbol, p.default, p.unit, p.range.text()].map(String::from)).collect();
+    if let Size::Chosen { symbol, default, least, most } = system.size {
+        let range = format!("an integer from {least} to {most}");
+        rows.push([symbol.to_string(), default.to_string(), "1".to_string(), range]);
+    }
+    rows
+}
+
+fn describe(system: &System) -> Value {
+    let n = system.size.default();
+    let coordinates = (system.coordinates)(n);
+    let box_of = |b: Bounds| json!({ "position": b.positions, "velocity": b.velocities });
+    let number = |text: &str| serde_json::from_str::<Value>(text).unwrap_or_else(|_| Value::from(text));
+    let parameters: Vec<Value> = parameters(system)
+        .iter()
+        .map(|[symbol, default, unit, range]| {
+            json!({ "symbol": symbol, "default": number(default), "unit": unit, "range": range })
+        })
+        .collect();
+    json!({
+        "name": system.name,
+        "title": system.title,
+        "coordinates": coordinates.iter().map(|c| c.name.as_ref()).collect::<Vec<_>>(),
+        "columns": system.columns(n),
+        "units": column_units(system, n),
+        "periodic": coordinates.iter().map(|c| c.periodic).collect::<Vec<_>>(),
+        "parameters": parameters,
+        "bounds": { "training": box_of((system.training)(n)), "validation": box_of((system.validation)(n)) },
+    })
+}
+
+/// Units of the columns of a state.
+fn column_units(system: &System, n: usize) -> Vec<String> {
+    let coordinates = (system.coordinates)(n);
+    let positions = coordinates.iter().map(|c| c.unit.to_string());
+    positions.chain(coordinates.iter().map(|c| format!("{}/s", c.unit))).collect()
+}
+
+fn table(system: &System) -> String {
+    let n = system.size.default();
+    let bounds = (system.validation)(n);
+    let ranges = bounds.positions.iter().chain(&bounds.velocities);
+    let periodic = (system.coordinates)(n).into_iter().map(|c| if c.periodic { "  periodic" } else { "" });
+    let mut text = format!("{}  ({})\n", system.name, system.title);
+    for (((column, unit), (low, high)), periodic) in
+        system.columns(n).iter().zip(column_units(system, n)).zip(ranges).zip(periodic.chain(std::iter::repeat("")))
+    {
+        text += &format!("  {column:<12} {unit:<6} {low:>7.3} .. {high:<7.3}{periodic}\n");
+    }
+    for [symbol, default, unit, range] in parameters(system) {
+        text += &format!("  --param {:<12} {unit:<6} {range}\n", format!("{symbol}={default}"));
+    }
+    text
+}

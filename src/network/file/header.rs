@@ -1,0 +1,90 @@
+//! What a model file says about its model.
+
+use super::ModelFileError;
+use crate::network::Architecture;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Format that this version writes and reads.
+pub const FORMAT: u32 = 1;
+
+/// Number type of the stored weights.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum StoredPrecision {
+    /// Single precision.
+    F32,
+    /// Double precision.
+    F64,
+}
+
+impl StoredPrecision {
+    /// `"f32"` or `"f64"`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::F32 => "f32",
+            Self::F64 => "f64",
+        }
+    }
+}
+
+/// Everything needed to rebuild a model but its weights.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Header {
+    /// Format of the file, [`FORMAT`].
+    pub format: u32,
+    /// Version of the crate that wrote it.
+    pub crate_version: String,
+    /// Shape of the network, scales and periodic coordinates.
+    pub architecture: Architecture,
+    /// Name of the system it learned.
+    pub system: String,
+    /// Values of all parameters of that system, in their units.
+    pub parameters: BTreeMap<String, f64>,
+    /// Names of the components of a state: coordinates, then velocities.
+    pub columns: Vec<String>,
+    /// Number type of the weights.
+    pub precision: StoredPrecision,
+    /// Bounds of each coordinate in training, in physical units.
+    pub position: Vec<[f64; 2]>,
+    /// Bounds of each velocity in training, in physical units.
+    pub velocity: Vec<[f64; 2]>,
+    /// Seed of the training.
+    pub seed: u64,
+    /// Validation loss of these weights, paper convention.
+    pub validation_loss: f64,
+}
+
+impl Header {
+    /// Checks that lengths agree, numbers are finite and sizes are sensible.
+    ///
+    /// # Errors
+    /// [`ModelFileError::Header`] or [`ModelFileError::Version`].
+    pub fn validate(&self) -> Result<(), ModelFileError> {
+        check_version(self.format, &self.crate_version)?;
+        let require = |ok: bool, text: &str| if ok { Ok(()) } else { Err(ModelFileError::Header(text.to_string())) };
+        self.architecture.validate().map_err(|e| ModelFileError::Header(e.to_string()))?;
+        let (n, hidden) = (self.architecture.coordinates, &self.architecture.hidden);
+        require(hidden.len() <= 64, "hidden: expected at most 64 widths")?;
+        require(hidden.iter().all(|w| *w <= 1 << 20), "hidden: expected widths of at most 1048576")?;
+        require(self.columns.len() == 2 * n, "columns: expected two per coordinate")?;
+        let distinct: std::collections::BTreeSet<_> = self.columns.iter().collect();
+        require(distinct.len() == 2 * n, "columns: expected distinct names")?;
+        require(self.parameters.values().all(|x| x.is_finite()), "parameters: expected finite numbers")?;
+        for (bounds, text) in [(&self.position, "position"), (&self.velocity, "velocity")] {
+            let ordered = bounds.iter().all(|&[low, high]| low.is_finite() && high.is_finite() && low <= high);
+            require(bounds.len() == n && ordered, &format!("{text}: expected one finite [low, high] per coordinate"))?;
+        }
+        require(self.validation_loss.is_finite(), "validation_loss: expected a finite number")
+    }
+}
+
+/// Refuses formats that this version does not read.
+pub(super) fn check_version(format: u32, writer: &str) -> Result<(), ModelFileError> {
+    if format == FORMAT {
+        return Ok(());
+    }
+    let (reader, writer) = (env!("CARGO_PKG_VERSION"), writer.escape_debug().take(40).collect());
+    Err(ModelFileError::Version { writer, found: format, reader, supported: FORMAT })
+}

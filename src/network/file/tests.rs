@@ -1,0 +1,237 @@
+//! Round trips, damage and foreign files.
+
+use super::*;
+use crate::network::Activation;
+use proptest::prelude::*;
+use std::collections::BTreeMap;
+
+fn header(hidden: Vec<usize>, embed_periodic: bool, precision: StoredPrecision) -> Header {
+    Header {
+        format: FORMAT,
+        crate_version: "0.1.0".to_string(),
+        architecture: Architecture {
+            coordinates: 2,
+            hidden,
+            activation: Activation::Gelu,
+            alpha: 0.1,
+            scale: vec![0.1 + 0.2, 10.0 / 3.0],
+            periodic: vec![true, false],
+            embed_periodic,
+        },
+        system: "spring-pendulum".to_string(),
+        parameters: BTreeMap::from([("m".to_string(), 1.0), ("g".to_string(), 9.81)]),
+        columns: ["theta", "r", "theta_dot", "r_dot"].map(String::from).to_vec(),
+        precision,
+        position: vec![[0.0, std::f64::consts::TAU], [0.5, 1.5]],
+        velocity: vec![[-10.0, 10.0]; 2],
+        seed: u64::MAX,
+        validation_loss: 0.1 / 3.0,
+    }
+}
+
+fn model(hidden: Vec<usize>, precision: StoredPrecision) -> ModelFile<f64> {
+    let header = header(hidden, true, precision);
+    let count = Layout::new(&header.architecture).parameters;
+    let weights = (0..count).map(|k| f64::from((k as f32 * 0.37).sin())).collect();
+    ModelFile { header, weights }
+}
+
+/// Takes the file apart and puts it together again with other metadata or tensors.
+fn rebuilt(bytes: &[u8], change: impl FnOnce(&mut String, &mut Vec<(String, Dtype, Vec<usize>, Vec<u8>)>)) -> Vec<u8> {
+    let (_, metadata) = SafeTensors::read_metadata(bytes).unwrap();
+    let file = SafeTensors::deserialize(bytes).unwrap();
+    let text = &metadata.metadata().as_ref().unwrap()[KEY];
+    let mut body = text[..text.len() - checksum_field(0).len()].to_string();
+    let mut tensors: Vec<_> =
+        file.iter().map(|(n, t)| (n.to_string(), t.dtype(), t.shape().to_vec(), t.data().to_vec())).collect();
+    tensors.sort();
+    change(&mut body, &mut tensors);
+    let views: Vec<_> =
+        tensors.iter().map(|(n, d, s, b)| (n.clone(), TensorView::new(*d, s.clone(), b).unwrap())).collect();
+    let start = |text: &str| {
+        let views = views.iter().map(|(n, v)| (n.clone(), v.clone()));
+        safetensors::serialize(views, Some(HashMap::from([(KEY.to_string(), text.to_string())]))).unwrap()
+    };
+    let draft = start(&body);
+    let (length, _) = SafeTensors::read_metadata(&draft).unwrap();
+    let mut checksum = crc32fast::Hasher::new();
+    checksum.update(body.as_bytes());
+    checksum.update(&draft[8 + length..]);
+    start(&format!("{body}{}", checksum_field(checksum.finalize())))
+}
+
+fn refusal(bytes: &[u8]) -> ModelFileError {
+    ModelFile::<f64>::from_bytes(bytes).unwrap_err()
+}
+
+#[test]
+fn saves_and_loads_the_same_bytes() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("model.safetensors");
+    for precision in [StoredPrecision::F32, StoredPrecision::F64] {
+        let model = model(vec![3, 4], precision);
+        model.save(&path).unwrap();
+        let loaded = ModelFile::<f64>::load(&path).unwrap();
+        assert_eq!(loaded, model);
+        assert_eq!(loaded.to_bytes().unwrap(), std::fs::read(&path).unwrap());
+        let narrow = ModelFile::<f32>::load(&path).unwrap();
+        assert!(narrow.weights.iter().zip(&model.weights).all(|(&a, &b)| f64::from(a) == b));
+        let wide = ModelFile::<crate::scalar::Dd>::load(&path).unwrap();
+        assert_eq!(wide.to_bytes().unwrap(), model.to_bytes().unwrap());
+    }
+    assert_eq!(std::fs::read_dir(&directory).unwrap().count(), 1);
+}
+
+#[test]
+fn tensors_have_the_documented_names_and_shapes() {
+    let bytes = model(vec![3, 4], StoredPrecision::F32).to_bytes().unwrap();
+    let file = SafeTensors::deserialize(&bytes).unwrap();
+    let mut shapes: Vec<_> = file.iter().map(|(name, t)| (name, t.shape().to_vec())).collect();
+    shapes.sort();
+    let expected = [
+        ("layers.0.bias", vec![3]),
+        ("layers.0.weight", vec![3, 5]),
+        ("layers.1.bias", vec![4]),
+        ("layers.1.weight", vec![4, 3]),
+        ("layers.2.weight", vec![1, 4]),
+    ];
+    assert_eq!(shapes, expected);
+}
+
+#[test]
+fn every_prefix_and_every_flipped_bit_is_refused() {
+    for precision in [StoredPrecision::F32, StoredPrecision::F64] {
+        let bytes = model(vec![2], precision).to_bytes().unwrap();
+        for length in 0..bytes.len() {
+            assert!(ModelFile::<f64>::from_bytes(&bytes[..length]).is_err(), "prefix of {length} bytes");
+        }
+        let mut flipped = bytes.clone();
+        for bit in 0..8 * bytes.len() {
+            flipped[bit / 8] ^= 1 << (bit % 8);
+            assert!(ModelFile::<f64>::from_bytes(&flipped).is_err(), "bit {bit}");
+            flipped[bit / 8] ^= 1 << (bit % 8);
+        }
+        flipped.push(0);
+        assert!(matches!(refusal(&flipped), ModelFileError::NotSafetensors(_)));
+    }
+}
+
+#[test]
+fn foreign_newer_and_ambiguous_files_are_named() {
+    let bytes = model(vec![2], StoredPrecision::F64).to_bytes().unwrap();
+    let view = TensorView::new(Dtype::F32, vec![1], &[0; 4]).unwrap();
+    let foreign = safetensors::serialize([("w", view.clone())], None).unwrap();
+    assert!(matches!(refusal(&foreign), ModelFileError::Foreign));
+    assert!(matches!(refusal(b"not a model at all"), ModelFileError::NotSafetensors(_)));
+
+    let newer = rebuilt(&bytes, |body, _| *body = body.replace("\"format\":1", "\"format\":7,\"novelty\":{}"));
+    let text = refusal(&newer).to_string();
+    assert!(text.contains("format 7") && text.contains("format 1") && text.contains("0.1.0"), "{text}");
+
+    let twice = rebuilt(&bytes, |body, _| *body = body.replace("\"seed\"", "\"seed\":1,\"seed\""));
+    assert!(matches!(refusal(&twice), ModelFileError::Header(_)));
+
+    let text =
+        r#"{"w":{"dtype":"U8","shape":[1],"data_offsets":[0,1]},"w":{"dtype":"U8","shape":[1],"data_offsets":[0,1]}}"#;
+    let mut two = (text.len() as u64).to_le_bytes().to_vec();
+    two.extend(text.as_bytes());
+    two.push(0);
+    assert!(refusal(&two).to_string().contains("duplicate key \"w\""));
+    for length in [u64::MAX, 1 << 63, 1 << 32, MAX_HEADER + 1] {
+        assert!(matches!(refusal(&length.to_le_bytes()), ModelFileError::NotSafetensors(_)));
+    }
+}
+
+#[test]
+fn tensors_that_do_not_fit_are_named() {
+    let bytes = model(vec![2], StoredPrecision::F64).to_bytes().unwrap();
+    assert!(ModelFile::<f64>::from_bytes(&rebuilt(&bytes, |_, _| ())).is_ok());
+
+    let missing = rebuilt(&bytes, |_, tensors| drop(tensors.remove(0)));
+    assert!(matches!(refusal(&missing), ModelFileError::MissingTensor(name) if name == "layers.0.bias"));
+    let extra = rebuilt(&bytes, |_, tensors| {
+        let mut copy = tensors[0].clone();
+        copy.0 = "layers.9.bias".to_string();
+        tensors.push(copy);
+    });
+    assert!(matches!(refusal(&extra), ModelFileError::ExtraTensor(name) if name == "layers.9.bias"));
+    let turned = rebuilt(&bytes, |_, tensors| tensors[1].2.reverse());
+    assert_eq!(refusal(&turned).to_string(), "tensor layers.0.weight: expected shape [2, 5], found [5, 2]");
+    let integers = rebuilt(&bytes, |_, tensors| tensors[0].1 = Dtype::I64);
+    assert_eq!(refusal(&integers).to_string(), "tensor layers.0.bias: expected f64, found i64");
+    for bad in [f64::NAN, f64::INFINITY] {
+        let poisoned = rebuilt(&bytes, |_, tensors| tensors[1].3[24..32].copy_from_slice(&bad.to_le_bytes()));
+        assert_eq!(refusal(&poisoned).to_string(), "tensor layers.0.weight: number 3 is not finite");
+    }
+}
+
+#[test]
+fn claims_of_the_description_are_checked() {
+    let bytes = model(vec![2], StoredPrecision::F64).to_bytes().unwrap();
+    for (old, new) in [
+        ("\"hidden\":[2]", "\"hidden\":[]"),
+        ("\"hidden\":[2]", "\"hidden\":[0]"),
+        ("\"hidden\":[2]", "\"hidden\":[18446744073709551615]"),
+        ("\"hidden\":[2]", "\"hidden\":[1048576,1048576,1048576]"),
+        ("\"coordinates\":2", "\"coordinates\":1099511627776"),
+        ("\"coordinates\":2", "\"coordinates\":0"),
+        ("\"periodic\":[true,false]", "\"periodic\":[true]"),
+        ("\"alpha\":0.1", "\"alpha\":null"),
+        ("\"r_dot\"]", "\"r\"]"),
+        ("[0.5,1.5]", "[1.5,0.5]"),
+    ] {
+        let changed = rebuilt(&bytes, |body, _| {
+            assert!(body.contains(old), "{old}");
+            *body = body.replace(old, new);
+        });
+        assert!(matches!(refusal(&changed), ModelFileError::Header(_)), "{new}");
+    }
+}
+
+#[test]
+fn what_cannot_be_read_back_is_not_written() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("model.safetensors");
+    let good = model(vec![2], StoredPrecision::F32);
+    good.save(&path).unwrap();
+
+    let mut bad = good.clone();
+    bad.weights[3] = 1e300;
+    assert!(matches!(bad.save(&path), Err(ModelFileError::NotFinite { index: 3, .. })) || bad.weights.len() < 4);
+    bad = good.clone();
+    bad.weights.pop();
+    assert!(matches!(bad.save(&path), Err(ModelFileError::WrongLength { .. })));
+    bad = good.clone();
+    bad.header.validation_loss = f64::NAN;
+    assert!(matches!(bad.save(&path), Err(ModelFileError::Header(_))));
+    assert!(matches!(good.save(directory.path()), Err(ModelFileError::Write(_))));
+    assert_eq!(ModelFile::<f64>::load(&path).unwrap(), good);
+    assert!(matches!(ModelFile::<f64>::load(directory.path()), Err(ModelFileError::Read(_))));
+}
+
+proptest! {
+    #[test]
+    fn random_models_survive(
+        hidden in prop::collection::vec(1usize..6, 1..4),
+        embed in any::<bool>(),
+        seed in any::<u64>(),
+        scale in prop::array::uniform2(f64::MIN_POSITIVE..1e300),
+        numbers in prop::collection::vec(prop::num::f64::NORMAL | prop::num::f64::SUBNORMAL | prop::num::f64::ZERO, 200),
+    ) {
+        let mut header = header(hidden, embed, StoredPrecision::F64);
+        header.seed = seed;
+        header.architecture.scale = scale.to_vec();
+        let count = Layout::new(&header.architecture).parameters;
+        let weights: Vec<f64> = numbers.iter().cycle().take(count).copied().collect();
+        let model = ModelFile { header, weights };
+        let bytes = model.to_bytes().unwrap();
+        let loaded = ModelFile::<f64>::from_bytes(&bytes).unwrap();
+        prop_assert_eq!(&loaded, &model);
+        prop_assert_eq!(loaded.to_bytes().unwrap(), bytes);
+    }
+
+    #[test]
+    fn arbitrary_bytes_are_refused(bytes in prop::collection::vec(any::<u8>(), 0..300)) {
+        prop_assert!(ModelFile::<f64>::from_bytes(&bytes).is_err());
+    }
+}

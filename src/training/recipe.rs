@@ -1,0 +1,77 @@
+//! From a configuration to a trained network: data, shape, training.
+
+use crate::lagrangian::{Configured, configure};
+use crate::network::{Architecture, NetworkError, NetworkLagrangian};
+use crate::scalar::Scalar;
+use crate::training::config::{Config, Scaling};
+use crate::training::sampling::{SamplingError, sample_all};
+use crate::training::solver::Hooks;
+use crate::training::trainer::{Trained, TrainingError, train};
+use thiserror::Error;
+
+/// A trained network with what led to it.
+#[derive(Debug)]
+pub struct Outcome<S> {
+    /// The system it learned from.
+    pub system: Configured<f64>,
+    /// The network with its best weights.
+    pub model: NetworkLagrangian<S>,
+    /// History and losses.
+    pub trained: Trained<S>,
+}
+
+/// Why a configuration gave no network.
+#[derive(Debug, Error)]
+pub enum RecipeError {
+    /// The data could not be made.
+    #[error(transparent)]
+    Sampling(#[from] SamplingError),
+    /// The network could not be made.
+    #[error(transparent)]
+    Network(#[from] NetworkError),
+    /// Training failed.
+    #[error(transparent)]
+    Training(#[from] TrainingError),
+}
+
+impl Config {
+    /// The configured system in double precision.
+    ///
+    /// # Errors
+    /// Unknown system or parameter, or a value out of range.
+    pub fn system(&self) -> Result<Configured<f64>, SamplingError> {
+        let given: Vec<(String, String)> =
+            self.parameters.iter().map(|(symbol, value)| (symbol.clone(), value.to_string())).collect();
+        Ok(configure(&self.system, &given)?)
+    }
+
+    /// Shape of the network for a system, with physical scales `scale` (used if the configuration scales).
+    pub fn architecture(&self, system: &Configured<f64>, scale: Vec<f64>) -> Architecture {
+        let n = system.coordinates;
+        Architecture {
+            coordinates: n,
+            hidden: self.network.hidden.clone(),
+            activation: self.network.activation,
+            alpha: self.network.alpha,
+            scale: match self.network.scaling {
+                Scaling::Physical => scale,
+                Scaling::None => vec![1.0; n],
+            },
+            periodic: (system.system.coordinates)(n).iter().map(|c| c.periodic).collect(),
+            embed_periodic: self.network.embed_periodic,
+        }
+    }
+}
+
+/// Samples the data, trains, and returns the best network; see [`train`].
+///
+/// # Errors
+/// [`RecipeError`].
+pub fn run<S: Scalar>(config: &Config, threads: usize, hooks: &Hooks) -> Result<Outcome<S>, RecipeError> {
+    let system = config.system()?;
+    let (data, scale) = sample_all::<S>(config, &system)?;
+    let architecture = config.architecture(&system, scale);
+    let trained = train(config, &architecture, data, threads, hooks)?;
+    let model = NetworkLagrangian::new(architecture, trained.weights.clone())?;
+    Ok(Outcome { system, model, trained })
+}
