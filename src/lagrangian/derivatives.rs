@@ -149,8 +149,8 @@ fn jets<L: Lagrangian, R: Real, const H: usize, const N: usize>(
         }
         if need.coriolis {
             let mut sum = found.second(H + i, 0) * v[0];
-            for j in 1..H {
-                sum += found.second(H + i, j) * v[j];
+            for (j, &speed) in v.iter().enumerate().skip(1) {
+                sum += found.second(H + i, j) * speed;
             }
             out.coriolis[i] = sum;
         }

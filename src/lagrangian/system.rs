@@ -116,6 +116,9 @@ pub struct TrajectoryTest {
     pub dt: f64,
 }
 
+/// Refuses coordinates outside a chart with what is demanded of them.
+pub type Domain = fn(&[f64]) -> Result<(), &'static str>;
+
 /// Catalogue entry of a system; functions take the number of coordinates.
 #[derive(Clone, Copy, Debug)]
 pub struct System {
@@ -138,7 +141,7 @@ pub struct System {
     /// Trajectory test.
     pub trajectory: fn(usize) -> TrajectoryTest,
     /// Where the coordinates make sense; the error says what is demanded.
-    pub domain: Option<fn(&[f64]) -> Result<(), &'static str>>,
+    pub domain: Option<Domain>,
 }
 
 impl System {

@@ -60,7 +60,9 @@ pub(super) fn is_singular<S: Scalar>(n: usize, matrix: &[S], scratch: &mut Dense
         }
     }
     let (least, most) = scratch.extreme_eigenvalues(n);
-    !(least > S::EPSILON * most)
+    // Not finite counts as singular.
+    let regular = least > S::EPSILON * most;
+    !regular
 }
 
 impl<S: Scalar> Dense<S> {

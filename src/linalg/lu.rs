@@ -63,7 +63,7 @@ pub(super) fn factor<S: Scalar, const W: usize>(
         }
     }
     for l in 0..W {
-        smallest[l] = smallest[l] / largest[l];
+        smallest[l] /= largest[l];
     }
     smallest
 }
@@ -90,10 +90,10 @@ pub(super) fn substitute<S: Scalar, const W: usize>(
     let (lu, order, b, x) = (&lu[..n * n], &order[..n], &b[..n], &mut x[..n]);
     for i in 0..n {
         let mut sum = [<S as Real>::zero(); W];
-        for j in 0..n {
+        for (j, b) in b.iter().enumerate() {
             let index = S::of_f64(j as f64);
             for l in 0..W {
-                sum[l] = if order[i][l] == index { b[j][l] } else { sum[l] };
+                sum[l] = if order[i][l] == index { b[l] } else { sum[l] };
             }
         }
         for j in 0..i {

@@ -94,7 +94,8 @@ fn positive_pivots<S: Scalar>(n: usize, a: &mut [S], minors: &mut Vec<Scaled<S>>
             pivot -= scaled * unit;
             a[k * n + j] = unit;
         }
-        if !(pivot > floor * diagonal) {
+        let comfortable = pivot > floor * diagonal;
+        if !comfortable {
             return;
         }
         a[k * n + k] = pivot;

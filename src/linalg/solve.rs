@@ -96,7 +96,7 @@ fn probe<S: Scalar, const W: usize>(x: &[Lane<S, W>]) -> Lane<S, W> {
     let mut probe = [<S as Real>::zero(); W];
     for lane in x {
         for l in 0..W {
-            probe[l] += lane[l] - lane[l];
+            probe[l] += lane[l] * <S as Real>::zero();
         }
     }
     probe

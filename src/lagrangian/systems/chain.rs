@@ -42,7 +42,7 @@ pub fn acceleration<R: Real>(loads: &[R], lengths: &[R], g: R, q: &[R], v: &[R])
         }
         force.push(sum);
     }
-    // M = L D L^T, L below the diagonal.
+    // M = L D L^T; column k below the diagonal keeps L times its pivot.
     for k in 0..n {
         for i in k + 1..n {
             let factor = m[i * n + k] / m[k * n + k];
@@ -53,14 +53,13 @@ pub fn acceleration<R: Real>(loads: &[R], lengths: &[R], g: R, q: &[R], v: &[R])
             let update = factor * force[k];
             force[i] -= update;
         }
-        // Column k is kept unscaled: column k of L times the pivot.
     }
     for k in (0..n).rev() {
         for i in k + 1..n {
             let update = m[i * n + k] * force[i];
             force[k] -= update;
         }
-        force[k] = force[k] / m[k * n + k];
+        force[k] /= m[k * n + k];
     }
     force.iter().zip(lengths).map(|(&x, &l)| x / l).collect()
 }
