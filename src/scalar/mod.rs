@@ -10,8 +10,10 @@ mod simd;
 mod slices;
 mod sum;
 
-pub use dd::Dd;
-pub use lanes::{Exponential, Lanes};
+pub use dd::{Dd, UnreadableNumber};
+pub use lanes::{
+    Exponential, Lanes, cos_lanes, exp_lanes, ln_lanes, sin_cos_lanes, sin_lanes, sqrt_lanes, tanh_lanes,
+};
 pub use simd::vectorized;
 pub use slices::{Slice, SliceMut};
 pub use sum::Sum;

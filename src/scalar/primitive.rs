@@ -3,7 +3,7 @@
 use super::{Real, Scalar, Slice, SliceMut};
 
 macro_rules! impl_primitive {
-    ($float:ident, $bits:ty, $erfc:path) => {
+    ($float:ident, $bits:ty, $erfc:path, $ldexp:path) => {
         impl Real for $float {
             type Scalar = $float;
 
@@ -132,10 +132,7 @@ macro_rules! impl_primitive {
                 <$float>::floor(self)
             }
             fn ldexp(self, exponent: i32) -> Self {
-                // Two halves, so that neither power overflows alone.
-                let half = exponent / 2;
-                let power = |e: i32| <$float>::powi(2.0, e);
-                self * power(half) * power(exponent - half)
+                $ldexp(self, exponent)
             }
             fn ilogb(self) -> i32 {
                 if self == 0.0 {
@@ -165,5 +162,5 @@ macro_rules! impl_primitive {
     };
 }
 
-impl_primitive!(f32, u32, libm::erfcf);
-impl_primitive!(f64, u64, libm::erfc);
+impl_primitive!(f32, u32, libm::erfcf, libm::scalbnf);
+impl_primitive!(f64, u64, libm::erfc, libm::scalbn);

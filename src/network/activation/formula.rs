@@ -37,7 +37,7 @@ pub(super) fn gelu<S: Scalar>(x: S) -> Jet<S> {
     // Beyond 40 every tail is 0 in any precision.
     let a = bounded(x, 40.0);
     let square = a * a;
-    let decay = (square * constant(-0.5)).lane_decay();
+    let decay = (square * constant(-0.5)).lane_exp();
     // What rounding the square left: e^(-(s + d)/2) = e^(-s/2) (1 - d/2).
     let rest = a.lane_fused(a, -square) * constant(-0.5);
     let m = rest.lane_fused(decay.mantissa, decay.mantissa);
@@ -57,7 +57,7 @@ pub(super) fn gelu<S: Scalar>(x: S) -> Jet<S> {
 #[inline(always)]
 pub(super) fn softplus<S: Scalar>(x: S) -> Jet<S> {
     let one = constant::<S>(1.0);
-    let decay = (-Real::abs(x)).lane_decay();
+    let decay = (-Real::abs(x)).lane_exp();
     let e = decay.value();
     let r = one / (one + e);
     let value = positive_part(x) + decay.scale(decay.mantissa * e.lane_log1p_ratio());
@@ -73,7 +73,7 @@ pub(super) fn softplus<S: Scalar>(x: S) -> Jet<S> {
 #[inline(always)]
 fn hyperbolic<S: Scalar>(a: S) -> (S, S, Exponential<S>) {
     let one = constant::<S>(1.0);
-    let decay = (-a).lane_decay();
+    let decay = (-a).lane_exp();
     let r = one / (one + decay.value());
     (-decay.minus_one * r, constant::<S>(4.0) * decay.mantissa * r * r, decay)
 }

@@ -30,7 +30,7 @@ impl Dd {
     }
 
     /// `erfc(self)`, relatively accurate until it underflows.
-    pub(super) fn erfc_accurate(self) -> Self {
+    pub(super) fn complementary_error(self) -> Self {
         if self.is_nan() {
             return Self::NAN;
         }
@@ -38,7 +38,7 @@ impl Dd {
             return if self.high() < -13.0 {
                 <Self as Real>::two()
             } else {
-                <Self as Real>::two() - (-self).erfc_accurate()
+                <Self as Real>::two() - (-self).complementary_error()
             };
         }
         if self.high() > 28.0 {

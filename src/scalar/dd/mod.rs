@@ -1,12 +1,24 @@
 //! Double-double numbers: the judge of `f32` and `f64`.
 
+mod angle;
+mod arithmetic;
+mod conversion;
+mod elementary;
 mod error_function;
+mod natural;
+mod reduction;
+mod text;
+
+#[cfg(test)]
+mod table;
+#[cfg(test)]
+mod tests;
+
+pub use conversion::UnreadableNumber;
 
 use super::{Real, Scalar};
 use std::cmp::Ordering;
 use std::fmt;
-use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
-use xprec::{CompensatedArithmetic, Df64};
 
 /// An unevaluated sum of two `f64`, about 31 decimal digits (unit round-off near `2^-104`), range of `f64`.
 #[derive(Clone, Copy, Debug, Default)]
@@ -22,7 +34,7 @@ impl Dd {
     /// The sum `high + low`, renormalised so that `high` is its nearest `f64`.
     #[inline]
     pub fn new(high: f64, low: f64) -> Self {
-        Self::wrap(Df64::compensated_sum(high, low))
+        Self::sum(high, low)
     }
     /// Leading part: the nearest `f64`.
     #[inline]
@@ -33,16 +45,6 @@ impl Dd {
     #[inline]
     pub fn low(self) -> f64 {
         self.low
-    }
-    /// Into the crate that does the arithmetic.
-    #[inline(always)]
-    fn df(self) -> Df64 {
-        Df64::compensated_fast_sum(self.high, self.low)
-    }
-    /// Out of the crate that does the arithmetic.
-    #[inline(always)]
-    fn wrap(value: Df64) -> Self {
-        Self { high: value.hi(), low: value.lo() }
     }
     const fn leading(high: f64) -> Self {
         Self { high, low: 0.0 }
@@ -69,57 +71,12 @@ impl fmt::Display for Dd {
         f.write_str(&self.to_text())
     }
 }
-impl Neg for Dd {
-    type Output = Self;
-    #[inline]
-    fn neg(self) -> Self {
-        Self::wrap(-self.df())
-    }
-}
-
-macro_rules! impl_operator {
-    ($($op:ident $method:ident $assign:ident $assign_method:ident;)*) => {$(
-        impl $op for Dd {
-            type Output = Self;
-            #[inline]
-            fn $method(self, other: Self) -> Self {
-                Self::wrap(self.df().$method(other.df()))
-            }
-        }
-        impl $assign for Dd {
-            #[inline]
-            fn $assign_method(&mut self, other: Self) {
-                *self = self.$method(other);
-            }
-        }
-    )*};
-}
-impl_operator! {
-    Add add AddAssign add_assign;
-    Sub sub SubAssign sub_assign;
-    Mul mul MulAssign mul_assign;
-    Div div DivAssign div_assign;
-}
-
-impl num_traits::Zero for Dd {
-    fn zero() -> Self {
-        Self::new(0.0, 0.0)
-    }
-    fn is_zero(&self) -> bool {
-        self.high() == 0.0
-    }
-}
-impl num_traits::One for Dd {
-    fn one() -> Self {
-        Self::new(1.0, 0.0)
-    }
-}
-
-macro_rules! through_float {
-    ($($name:ident)*) => {$(
+/// Methods of [`Real`] that are written next door under another name.
+macro_rules! forward {
+    ($($name:ident = $inner:ident;)*) => {$(
         #[inline]
         fn $name(self) -> Self {
-            Self::wrap(num_traits::Float::$name(self.df()))
+            self.$inner()
         }
     )*};
 }
@@ -135,9 +92,31 @@ impl Real for Dd {
     fn primal(self) -> Self {
         self
     }
-    through_float! { recip sqrt exp exp_m1 ln ln_1p sin cos tan asin acos atan sinh cosh tanh abs }
-    fn erfc(self) -> Self {
-        self.erfc_accurate()
+    forward! {
+        sqrt = square_root;
+        exp = exponential;
+        exp_m1 = exponential_minus_one;
+        ln = logarithm;
+        ln_1p = logarithm_one_plus;
+        sinh = hyperbolic_sine;
+        cosh = hyperbolic_cosine;
+        tanh = hyperbolic_tangent;
+        sin = sine;
+        cos = cosine;
+        tan = tangent;
+        asin = arc_sine;
+        acos = arc_cosine;
+        atan = arc_tangent;
+        erfc = complementary_error;
+    }
+    fn recip(self) -> Self {
+        Self::leading(1.0) / self
+    }
+    fn sin_cos(self) -> (Self, Self) {
+        self.sine_cosine()
+    }
+    fn abs(self) -> Self {
+        if self.high.is_sign_negative() { -self } else { self }
     }
     fn logistic(self) -> Self {
         let one = <Self as Real>::one();
@@ -148,13 +127,13 @@ impl Real for Dd {
         Real::max(self, <Self as Real>::zero()) + (-Real::abs(self)).exp().ln_1p()
     }
     fn powi(self, exponent: i32) -> Self {
-        Self::wrap(num_traits::Float::powi(self.df(), exponent))
+        self.integer_power(exponent)
     }
     fn powf(self, exponent: Self) -> Self {
-        Self::wrap(num_traits::Float::powf(self.df(), exponent.df()))
+        self.real_power(exponent)
     }
     fn atan2(self, x: Self) -> Self {
-        Self::wrap(num_traits::Float::atan2(self.df(), x.df()))
+        self.arc_tangent_of(x)
     }
     fn max(self, other: Self) -> Self {
         if self >= other || self.is_nan() { self } else { other }
@@ -195,10 +174,10 @@ impl Scalar for Dd {
         (self.high(), self.low())
     }
     fn parse(text: &str) -> Option<Self> {
-        text.parse().ok().map(Self::of_f64)
+        text::parse(text)
     }
     fn to_text(self) -> String {
-        format!("{:?}", self.high())
+        text::print(self)
     }
     fn is_finite(self) -> bool {
         self.high().is_finite() && self.low().is_finite()
@@ -207,14 +186,14 @@ impl Scalar for Dd {
         self.high().is_nan() || self.low().is_nan()
     }
     fn wrap_angle(self) -> Self {
-        let turn = Self::PI + Self::PI;
-        self - turn * (self / turn).floor()
+        self.wrapped_angle()
     }
     fn floor(self) -> Self {
-        Self::wrap(num_traits::Float::floor(self.df()))
+        let high = self.high.floor();
+        if high == self.high { Self::new(high, self.low.floor()) } else { Self::leading(high) }
     }
     fn ldexp(self, exponent: i32) -> Self {
-        Self::new(Scalar::ldexp(self.high(), exponent), Scalar::ldexp(self.low(), exponent))
+        Self::new(Scalar::ldexp(self.high, exponent), Scalar::ldexp(self.low, exponent))
     }
     fn ilogb(self) -> i32 {
         self.high().ilogb()

@@ -8,10 +8,11 @@ impl Lanes for Dd {
     fn lane_fused(self, factor: Self, summand: Self) -> Self {
         self * factor + summand
     }
-    fn lane_decay(self) -> Exponential<Self> {
+    fn lane_exp(self) -> Exponential<Self> {
         // Three equal thirds reach below the smallest number together and are normal alone.
-        let lowest = Dd::of_f64(-1600.0);
-        let y = if self < lowest { lowest } else { self };
+        let limit = Dd::of_f64(1600.0);
+        let y = if self < -limit { -limit } else { self };
+        let y = if y > limit { limit } else { y };
         let third = (y / Dd::of_f64(3.0)).exp();
         Exponential { mantissa: third, first: third, second: third, minus_one: y.exp_m1() }
     }
@@ -20,5 +21,14 @@ impl Lanes for Dd {
     }
     fn lane_normal_tail(self) -> Self {
         (self * Dd::SQRT_HALF).erfcx() * <Dd as Real>::half()
+    }
+    #[inline]
+    fn lane_ln(self) -> Self {
+        self.ln()
+    }
+    const FAST_ANGLE: Self = Dd::MAX;
+    #[inline]
+    fn lane_sin_cos(self) -> (Self, Self) {
+        self.sin_cos()
     }
 }

@@ -2,6 +2,10 @@
 
 mod double_double;
 mod pieces;
+#[cfg(test)]
+mod tests;
+
+use super::{Real, Scalar, vectorized};
 
 /// `e^y` in pieces, so that a product with it is rounded once even where it underflows.
 ///
@@ -37,11 +41,11 @@ impl<S: Copy + std::ops::Mul<Output = S>> Exponential<S> {
 /// The `lane_*` functions have no branch and no call: a loop over them inside [`crate::scalar::vectorized`] becomes
 /// vector instructions for `f32` and `f64`. Outside of it they are right but slow (a fused multiply-add without
 /// hardware support is a library call). `Dd` answers with its ordinary functions.
-pub trait Lanes: Sized + Copy {
+pub trait Lanes: Sized + Copy + PartialOrd {
     /// `self * factor + summand`, rounded once for `f32` and `f64`.
     fn lane_fused(self, factor: Self, summand: Self) -> Self;
-    /// `e^self` in pieces for `self <= 0`; 0 far below the range, `NaN` for `NaN`.
-    fn lane_decay(self) -> Exponential<Self>;
+    /// `e^self` in pieces; 0 far below the range, infinite far above, `NaN` for `NaN`. `minus_one` needs `self <= 700`.
+    fn lane_exp(self) -> Exponential<Self>;
     /// `ln(1 + self) / self` for `0 <= self <= 1`; 1 at 0.
     fn lane_log1p_ratio(self) -> Self;
     /// `e^(a^2/2) * Phi(-a)` for `a = self >= 0`, with `Phi` the normal distribution function: half the scaled
@@ -50,4 +54,113 @@ pub trait Lanes: Sized + Copy {
     /// A polynomial in `(a - K) / (a + K)` over `a + K`, fitted at Chebyshev points with 50 digits (the substitution is
     /// that of M. M. Shepherd and J. G. Laframboise, Math. Comp. 36, 1981).
     fn lane_normal_tail(self) -> Self;
+    /// Natural logarithm.
+    fn lane_ln(self) -> Self;
+    /// Largest size of an angle that [`Lanes::lane_sin_cos`] reduces.
+    const FAST_ANGLE: Self;
+    /// Sine and cosine for `|self| <= FAST_ANGLE`; meaningless numbers beyond.
+    fn lane_sin_cos(self) -> (Self, Self);
+}
+
+/// `out = f(x)`, elementwise.
+#[inline(always)]
+fn map<S: Scalar>(x: &[S], out: &mut [S], f: impl Fn(S) -> S) {
+    debug_assert_eq!(x.len(), out.len());
+    for (&x, out) in x.iter().zip(out.iter_mut()) {
+        *out = f(x);
+    }
+}
+
+/// `out = e^x`, elementwise; all slices of these functions have the same length.
+pub fn exp_lanes<S: Scalar>(x: &[S], out: &mut [S]) {
+    vectorized(
+        #[inline(always)]
+        || map(x, out, |x| x.lane_exp().value()),
+    );
+}
+
+/// `out = tanh(x)`, elementwise.
+pub fn tanh_lanes<S: Scalar>(x: &[S], out: &mut [S]) {
+    let (one, twice) = (S::of_f64(1.0), S::of_f64(-2.0));
+    vectorized(
+        #[inline(always)]
+        || {
+            map(x, out, |x| {
+                let decay = (twice * Real::abs(x)).lane_exp();
+                let size = decay.minus_one / (one + decay.value());
+                if x > S::of_f64(0.0) { -size } else { size + (x - x) }
+            });
+        },
+    );
+}
+
+/// `out = ln(x)`, elementwise.
+pub fn ln_lanes<S: Scalar>(x: &[S], out: &mut [S]) {
+    vectorized(
+        #[inline(always)]
+        || map(x, out, |x| x.lane_ln()),
+    );
+}
+
+/// `out = sqrt(x)`, elementwise.
+pub fn sqrt_lanes<S: Scalar>(x: &[S], out: &mut [S]) {
+    vectorized(
+        #[inline(always)]
+        || map(x, out, |x| Real::sqrt(x)),
+    );
+}
+
+/// Whether some angle needs the scalar function: too large, infinite or `NaN`.
+#[inline(always)]
+fn any_large<S: Scalar>(x: &[S]) -> bool {
+    x.iter().fold(false, |any, &x| any | !(Real::abs(x) <= S::FAST_ANGLE))
+}
+
+/// `sin = sin(x)`, `cos = cos(x)`, elementwise, angles in radians of any size.
+pub fn sin_cos_lanes<S: Scalar>(x: &[S], sin: &mut [S], cos: &mut [S]) {
+    debug_assert!(x.len() == sin.len() && x.len() == cos.len());
+    let large = vectorized(
+        #[inline(always)]
+        || {
+            for ((&x, sin), cos) in x.iter().zip(sin.iter_mut()).zip(cos.iter_mut()) {
+                (*sin, *cos) = x.lane_sin_cos();
+            }
+            any_large(x)
+        },
+    );
+    if large {
+        for ((&x, sin), cos) in x.iter().zip(sin).zip(cos) {
+            if !(Real::abs(x) <= S::FAST_ANGLE) {
+                (*sin, *cos) = Real::sin_cos(x);
+            }
+        }
+    }
+}
+
+/// `out = sin(x)`, elementwise, angles in radians of any size.
+pub fn sin_lanes<S: Scalar>(x: &[S], out: &mut [S]) {
+    angles(x, out, #[inline(always)] |x| x.lane_sin_cos().0, Real::sin);
+}
+
+/// `out = cos(x)`, elementwise, angles in radians of any size.
+pub fn cos_lanes<S: Scalar>(x: &[S], out: &mut [S]) {
+    angles(x, out, #[inline(always)] |x| x.lane_sin_cos().1, Real::cos);
+}
+
+#[inline(always)]
+fn angles<S: Scalar>(x: &[S], out: &mut [S], fast: impl Fn(S) -> S, any_size: impl Fn(S) -> S) {
+    let large = vectorized(
+        #[inline(always)]
+        || {
+            map(x, out, fast);
+            any_large(x)
+        },
+    );
+    if large {
+        for (&x, out) in x.iter().zip(out) {
+            if !(Real::abs(x) <= S::FAST_ANGLE) {
+                *out = any_size(x);
+            }
+        }
+    }
 }

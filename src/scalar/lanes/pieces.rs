@@ -9,9 +9,11 @@ trait Polynomial: Sized {
 
 macro_rules! impl_pieces {
     (
-        $float:ident, $bits:ident, lowest: $lowest:expr, ln2: ($ln2_high:expr, $ln2_low:expr),
+        $float:ident, $bits:ident, limit: $limit:expr, ln2: ($ln2_high:expr, $ln2_low:expr),
         exp: ($exp_even:expr, $exp_odd:expr), log: ($log_even:expr, $log_odd:expr),
-        tail: ($center:expr, $tail_even:expr, $tail_odd:expr)
+        tail: ($center:expr, $tail_even:expr, $tail_odd:expr),
+        artanh: $artanh:expr, sin: $sin:expr, cos: $cos:expr,
+        quarter: ($quarter_high:expr, $quarter_middle:expr, $quarter_low:expr), fast_angle: $fast_angle:expr
     ) => {
         impl Polynomial for $float {
             #[inline(always)]
@@ -29,13 +31,14 @@ macro_rules! impl_pieces {
                 self.mul_add(factor, summand)
             }
             #[inline(always)]
-            fn lane_decay(self) -> Exponential<Self> {
+            fn lane_exp(self) -> Exponential<Self> {
                 const FRACTION: u32 = <$float>::MANTISSA_DIGITS - 1;
                 const BIAS: $bits = (<$float>::MAX_EXP - 1) as $bits;
                 // Adding it rounds to an integer, which then stands in the lowest bits.
                 const MAGIC: $float = 1.5 * ((1 as $bits) << FRACTION) as $float;
                 const OFFSET: $bits = 1 << 11;
-                let y = if self < $lowest { $lowest } else { self };
+                let y = if self < -$limit { -$limit } else { self };
+                let y = if y > $limit { $limit } else { y };
                 let shifted = y.mul_add(std::$float::consts::LOG2_E, MAGIC);
                 let n = shifted - MAGIC;
                 let r = n.mul_add(-$ln2_low, n.mul_add(-$ln2_high, y));
@@ -65,12 +68,63 @@ macro_rules! impl_pieces {
                 let s = (self - $center) * t;
                 t * s.polynomial(s * s, $tail_even, $tail_odd)
             }
+            #[inline(always)]
+            fn lane_ln(self) -> Self {
+                const FRACTION: u32 = <$float>::MANTISSA_DIGITS - 1;
+                const SQRT_HALF: $bits = std::$float::consts::FRAC_1_SQRT_2.to_bits();
+                const ONE: $bits = (1.0 as $float).to_bits();
+                // An integer added to the bits of this number is that integer added to its value.
+                const INTEGER: $float = ((1 as $bits) << FRACTION) as $float;
+                const LIFT: $float = 2.0 * INTEGER;
+                let tiny = self < <$float>::MIN_POSITIVE;
+                let x = if tiny { self * LIFT } else { self };
+                let lifted = if tiny { (FRACTION + 1) as $float } else { 0.0 };
+                // x = 2^k m with sqrt(1/2) <= m < sqrt(2)
+                let offset = x.to_bits().wrapping_add(ONE - SQRT_HALF);
+                let m = $float::from_bits((offset & (((1 as $bits) << FRACTION) - 1)).wrapping_add(SQRT_HALF));
+                let biased = $float::from_bits((offset >> FRACTION) | INTEGER.to_bits()) - INTEGER;
+                let k = biased - (<$float>::MAX_EXP - 1) as $float - lifted;
+                // ln m = f - (f^2/2 - s (f^2/2 + R)) with s = f / (2 + f): as in FreeBSD's e_log.c.
+                let f = m - 1.0;
+                let s = f / (2.0 + f);
+                let square = s * s;
+                let half = 0.5 * f * f;
+                let rest = square * $artanh.iter().rev().fold(0.0, |sum: Self, &c| sum.mul_add(square, c));
+                let inner = half - k.mul_add($ln2_low, s * (half + rest));
+                let value = k.mul_add($ln2_high, f - inner);
+                let value = if self == <$float>::INFINITY { self } else { value };
+                let value = if self == 0.0 { -<$float>::INFINITY } else { value };
+                if self >= 0.0 { value } else { <$float>::NAN }
+            }
+            const FAST_ANGLE: Self = $fast_angle;
+            #[inline(always)]
+            fn lane_sin_cos(self) -> (Self, Self) {
+                const FRACTION: u32 = <$float>::MANTISSA_DIGITS - 1;
+                const MAGIC: $float = 1.5 * ((1 as $bits) << FRACTION) as $float;
+                let shifted = self.mul_add(std::$float::consts::FRAC_2_PI, MAGIC);
+                let n = shifted - MAGIC;
+                let r = n.mul_add(-$quarter_high, self);
+                let z = n.mul_add(-$quarter_middle, r);
+                let lost = n.mul_add(-$quarter_middle, r - z);
+                let rest = n.mul_add(-$quarter_low, lost);
+                let square = z * z;
+                let series = |c: &[Self]| c.iter().rev().fold(0.0, |sum: Self, &c| sum.mul_add(square, c));
+                // sin(z + rest) and cos(z + rest)
+                let sin = z + (square * z).mul_add(series(&$sin), rest);
+                let half = 0.5 * square;
+                let near = 1.0 - half;
+                let cos = near + ((1.0 - near) - half + (square * square).mul_add(series(&$cos), -z * rest));
+                let bits = shifted.to_bits();
+                let (a, b) = if bits & 1 == 0 { (sin, cos) } else { (cos, sin) };
+                let sign = |x: Self, bit: $bits| $float::from_bits(x.to_bits() ^ (bit & 2) << (<$bits>::BITS - 2));
+                (sign(a, bits), sign(b, bits.wrapping_add(1)))
+            }
         }
     };
 }
 
 impl_pieces! {
-    f32, u32, lowest: -150.0, ln2: (std::f32::consts::LN_2, -1.904_654_2e-9),
+    f32, u32, limit: 150.0, ln2: (std::f32::consts::LN_2, -1.904_654_2e-9),
     exp: (
         [0.5, 1.0 / 24.0, 1.0 / 720.0],
         [1.0 / 6.0, 1.0 / 120.0, 1.0 / 5040.0]
@@ -80,11 +134,15 @@ impl_pieces! {
         3.0,
         [0.729_083_66, 0.230_019_9, -0.010_484_374, 0.001_089_887_7, -0.000_281_760_76],
         [-0.509_332_06, -0.047_259_573, 0.006_937_723_6, -0.000_918_778_36]
-    )
+    ),
+    artanh: [0.666_666_6, 0.400_009_72, 0.284_987_87, 0.242_790_79],
+    sin: [-1.0 / 6.0, 1.0 / 120.0, -1.0 / 5040.0, 1.0 / 362_880.0],
+    cos: [1.0 / 24.0, -1.0 / 720.0, 1.0 / 40320.0, -1.0 / 3_628_800.0],
+    quarter: (std::f32::consts::FRAC_PI_2, -4.371_139e-8, -1.715_124_5e-15), fast_angle: 8192.0
 }
 
 impl_pieces! {
-    f64, u64, lowest: -800.0, ln2: (std::f64::consts::LN_2, 2.3190468138462996e-17),
+    f64, u64, limit: 800.0, ln2: (std::f64::consts::LN_2, 2.3190468138462996e-17),
     exp: (
         [0.5, 1.0 / 24.0, 1.0 / 720.0, 1.0 / 40320.0, 1.0 / 3628800.0, 1.0 / 479001600.0],
         [1.0 / 6.0, 1.0 / 120.0, 1.0 / 5040.0, 1.0 / 362880.0, 1.0 / 39916800.0, 1.0 / 6227020800.0]
@@ -105,5 +163,18 @@ impl_pieces! {
             -4.976246819752703e-05, 3.979842167870731e-06, -3.346442375826221e-07, 4.025216079941169e-08,
             -8.5852629726266e-09, 2.207298117618302e-09, -3.6917135362496476e-10
         ]
-    )
+    ),
+    artanh: [
+        6.666666666666735130e-01, 3.999999999940941908e-01, 2.857142874366239149e-01, 2.222219843214978396e-01,
+        1.818357216161805012e-01, 1.531383769920937332e-01, 1.479819860511658591e-01
+    ],
+    sin: [
+        -1.66666666666666324348e-01, 8.33333333332248946124e-03, -1.98412698298579493134e-04,
+        2.75573137070700676789e-06, -2.50507602534068634195e-08, 1.58969099521155010221e-10
+    ],
+    cos: [
+        4.16666666666666019037e-02, -1.38888888888741095749e-03, 2.48015872894767294178e-05,
+        -2.75573143513906633035e-07, 2.08757232129817482790e-09, -1.13596475577881948265e-11
+    ],
+    quarter: (std::f64::consts::FRAC_PI_2, 6.123233995736766e-17, -1.4973849048591698e-33), fast_angle: 1048576.0
 }
