@@ -1,1 +1,19 @@
 //! Energy and trajectory errors, comparisons of learned and exact Lagrangians.
+
+mod accelerations;
+mod affine;
+mod coordinates;
+mod energy;
+mod grid;
+mod lyapunov;
+mod summary;
+mod trajectories;
+
+pub use accelerations::{AccelerationError, acceleration_errors};
+pub use affine::{AffineFit, affine_fit};
+pub use coordinates::{CoordinateError, angle_difference, coordinate_error};
+pub use energy::{EnergyError, energy_drift, energy_error};
+pub use grid::{Axis, Grid, GridError, determinant_grid, lagrangian_grid};
+pub use lyapunov::{Lyapunov, lyapunov};
+pub use summary::{Statistics, statistics};
+pub use trajectories::{StartBox, TrajectoryRun, TrajectoryTest, TrajectorySummary};

@@ -1,1 +1,24 @@
 //! Plots, tables and the HTML report.
+
+mod evaluation;
+mod html;
+mod plot;
+mod table;
+mod training;
+
+pub use evaluation::{GridComparison, evaluation_figures, grid_figures};
+pub use html::Report;
+pub use plot::{HeatMap, LinePlot, PlotError, Series, Trace, heat_maps_png, line_png, trace_png};
+pub use table::text_table;
+pub use training::{HistoryRow, training_figures};
+
+/// One picture of a report.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Figure {
+    /// File name without directory, with `.png`.
+    pub file: String,
+    /// PNG bytes.
+    pub png: Vec<u8>,
+    /// What the picture shows.
+    pub caption: String,
+}

@@ -1,1 +1,28 @@
-//! Integrators and trajectories.
+//! Integrators and trajectories: from `(q, v)` at `t0` to samples at `t0 + k dt`.
+//!
+//! A roll-out integrates `dq/dt = v`, `dv/dt = a(q, v)` with an explicit Runge-Kutta method of Dormand and Prince
+//! (order 5 or 8) under error control. It never loses what it has: when a model fails, the valid part of the
+//! trajectory stays and a [`RolloutError`] says where and why. Angles stay continuous (never wrapped) in the output;
+//! a model that needs them wrapped wraps them itself.
+//!
+//! Adaptive integration is offered in the precisions the solver knows, [`Integrable`]: `f32` and `f64`.
+
+mod dense;
+mod error;
+mod ode;
+mod options;
+mod run;
+mod trajectory;
+mod write;
+
+pub use error::{RolloutError, UnderflowCause};
+pub use ode::Integrable;
+pub use options::{Domain, Method, Options};
+pub use run::{Rollout, rollout, rollout_many};
+pub use trajectory::{Statistics, Trajectory};
+pub use write::write_atomically;
+
+#[cfg(test)]
+pub(crate) mod models;
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,92 @@
+//! Distance of two trajectories over time.
+
+use crate::rollout::Trajectory;
+use crate::scalar::Scalar;
+
+/// Absolute errors of coordinates over the times that both trajectories reach.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CoordinateError {
+    /// Number of coordinates `n`.
+    pub coordinates: usize,
+    /// Times.
+    pub t: Vec<f64>,
+    /// `|q_learned - q_exact|` per coordinate, `(len, n)`; angles modulo `2 pi`, at most `pi`.
+    pub per_coordinate: Vec<f64>,
+    /// Largest over the coordinates, `(len)`.
+    pub max: Vec<f64>,
+}
+
+impl CoordinateError {
+    /// First time at which the largest error exceeds `threshold`.
+    pub fn time_above(&self, threshold: f64) -> Option<f64> {
+        self.t.iter().zip(&self.max).find(|&(_, &error)| !(error <= threshold)).map(|(&t, _)| t)
+    }
+}
+
+/// Distance of two angles on the circle, in `[0, pi]`.
+pub fn angle_difference<S: Scalar>(a: S, b: S) -> S {
+    let turn = S::PI + S::PI;
+    let difference = (a - b).abs().wrap_angle();
+    S::min(difference, turn - difference)
+}
+
+/// Errors of `learned` against `exact`, sample by sample, as far as both go; `periodic[i]` marks angles.
+///
+/// Samples are matched by their place: both trajectories must come from the same sample times. A `periodic` shorter than
+/// `n` leaves the remaining coordinates plain.
+pub fn coordinate_error<S: Scalar>(exact: &Trajectory<S>, learned: &Trajectory<S>, periodic: &[bool]) -> CoordinateError {
+    let n = exact.coordinates.min(learned.coordinates);
+    let len = exact.len().min(learned.len());
+    let mut result = CoordinateError {
+        coordinates: n,
+        t: exact.t[..len].iter().map(|t| t.to_f64()).collect(),
+        per_coordinate: Vec::with_capacity(len * n),
+        max: Vec::with_capacity(len),
+    };
+    for k in 0..len {
+        let (a, b) = (exact.state(k).0, learned.state(k).0);
+        let mut largest = 0.0;
+        for i in 0..n {
+            let angle = periodic.get(i).copied().unwrap_or(false);
+            let error = if angle { angle_difference(a[i], b[i]) } else { (a[i] - b[i]).abs() }.to_f64();
+            result.per_coordinate.push(error);
+            // NaN wins.
+            largest = if error <= largest { largest } else { error };
+        }
+        result.max.push(largest);
+    }
+    result
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::PI;
+
+    fn trajectory(q: &[f64]) -> Trajectory<f64> {
+        Trajectory { coordinates: 2, t: vec![0.0, 1.0], q: q.to_vec(), v: vec![0.0; 4], energy: None }
+    }
+
+    #[test]
+    fn angles_go_round() {
+        let (a, b) = (trajectory(&[0.1, 0.0, 1.0, 0.0]), trajectory(&[2.0 * PI - 0.1, 0.5, 1.0 + 6.0 * PI, 7.0]));
+        let error = coordinate_error(&a, &b, &[true]);
+        assert!((error.per_coordinate[0] - 0.2).abs() < 1e-14);
+        assert_eq!(error.per_coordinate[1], 0.5);
+        assert!(error.per_coordinate[2] < 1e-14);
+        assert_eq!(error.max, [0.5, 7.0]);
+        assert_eq!(error.time_above(1.0), Some(1.0));
+        assert_eq!(error.time_above(10.0), None);
+        assert!((angle_difference(0.0_f64, PI) - PI).abs() < 1e-15);
+        assert_eq!(angle_difference(3.0_f64, 3.0), 0.0);
+    }
+
+    #[test]
+    fn the_shorter_one_decides() {
+        let mut short = trajectory(&[0.0; 4]);
+        short.t.pop();
+        short.q.truncate(2);
+        short.v.truncate(2);
+        assert_eq!(coordinate_error(&trajectory(&[1.0; 4]), &short, &[]).max, [1.0]);
+    }
+}

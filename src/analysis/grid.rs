@@ -1,0 +1,218 @@
+//! A model over two components of its state, the others fixed.
+
+use super::AffineFit;
+use crate::lagrangian::{EulerLagrange, Request, Terms};
+use crate::scalar::Scalar;
+
+/// One axis of a grid.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Axis {
+    /// Component of `(q, v)`: coordinates `0..n`, velocities `n..2n`.
+    pub component: usize,
+    /// First value.
+    pub from: f64,
+    /// Last value.
+    pub to: f64,
+    /// Number of values, at least 2.
+    pub points: usize,
+}
+
+impl Axis {
+    /// The values, evenly spaced, both ends included.
+    pub fn values(&self) -> Vec<f64> {
+        let last = self.points.saturating_sub(1).max(1) as f64;
+        (0..self.points).map(|k| self.from + (self.to - self.from) * (k as f64 / last)).collect()
+    }
+}
+
+/// Values over a rectangle.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Grid {
+    /// Values of the first axis.
+    pub x: Vec<f64>,
+    /// Values of the second axis.
+    pub y: Vec<f64>,
+    /// `(y.len(), x.len())`; `NaN` where the model gives none.
+    pub values: Vec<f64>,
+}
+
+impl Grid {
+    /// The same grid with `map` applied to each value.
+    pub fn map(&self, map: impl Fn(f64) -> f64) -> Self {
+        Self { values: self.values.iter().map(|&z| map(z)).collect(), ..self.clone() }
+    }
+
+    /// The same grid after an affine fit.
+    pub fn fitted(&self, fit: &AffineFit) -> Self {
+        self.map(|z| fit.apply(z))
+    }
+
+    /// Value by value difference `self - other`; `None` if the sizes differ.
+    pub fn minus(&self, other: &Self) -> Option<Self> {
+        if self.x.len() != other.x.len() || self.y.len() != other.y.len() {
+            return None;
+        }
+        let values = self.values.iter().zip(&other.values).map(|(a, b)| a - b).collect();
+        Some(Self { values, ..self.clone() })
+    }
+}
+
+/// Why a grid cannot be laid.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum GridError {
+    /// The fixed state has the wrong length.
+    #[error("fixed state: expected {expected} numbers, found {found}")]
+    State {
+        /// Numbers expected, `2n`.
+        expected: usize,
+        /// Numbers found.
+        found: usize,
+    },
+    /// An axis names no component, has too few or too many points, or bounds that are not finite and different.
+    #[error("axis {axis}: {problem}")]
+    Axis {
+        /// 0 or 1.
+        axis: usize,
+        /// What is wrong.
+        problem: &'static str,
+    },
+}
+
+/// `L` of `model` over two components; `state` fixes the others as `(q, v)`.
+///
+/// # Errors
+/// [`GridError`] if the state or an axis does not fit the model.
+pub fn lagrangian_grid<S: Scalar>(model: &dyn EulerLagrange<S>, state: &[f64], axes: [Axis; 2]) -> Result<Grid, GridError> {
+    evaluate(model, state, axes, Request::LAGRANGIAN, |terms, row| terms.lagrangian.get(row).map(|x| x.to_f64()))
+}
+
+/// `det M` of `model` over two components; `state` fixes the others as `(q, v)`.
+///
+/// # Errors
+/// [`GridError`] if the state or an axis does not fit the model.
+pub fn determinant_grid<S: Scalar>(model: &dyn EulerLagrange<S>, state: &[f64], axes: [Axis; 2]) -> Result<Grid, GridError> {
+    let n = model.coordinates();
+    evaluate(model, state, axes, Request::MASS_MATRIX, |terms, row| {
+        let m = terms.mass_matrix.get(row * n * n..(row + 1) * n * n)?;
+        Some(determinant(m.to_vec(), n).to_f64())
+    })
+}
+
+fn evaluate<S: Scalar>(
+    model: &dyn EulerLagrange<S>,
+    state: &[f64],
+    axes: [Axis; 2],
+    request: Request,
+    value: impl Fn(&Terms<S>, usize) -> Option<f64>,
+) -> Result<Grid, GridError> {
+    let n = model.coordinates();
+    if state.len() != 2 * n {
+        return Err(GridError::State { expected: 2 * n, found: state.len() });
+    }
+    for (axis, a) in axes.iter().enumerate() {
+        let problem = match a {
+            a if a.component >= 2 * n => "names no component",
+            a if !(2..=10_000).contains(&a.points) => "needs 2 to 10,000 points",
+            a if !(a.from.is_finite() && a.to.is_finite() && a.from != a.to) => "needs two different finite bounds",
+            _ if axes[0].component == axes[1].component => "both axes are the same component",
+            _ => continue,
+        };
+        return Err(GridError::Axis { axis, problem });
+    }
+    let (x, y) = (axes[0].values(), axes[1].values());
+    let mut values = Vec::with_capacity(x.len() * y.len());
+    let (mut q, mut v, mut terms) = (Vec::new(), Vec::new(), Terms::default());
+    let mut full = state.to_vec();
+    for &second in &y {
+        q.clear();
+        v.clear();
+        for &first in &x {
+            full[axes[0].component] = first;
+            full[axes[1].component] = second;
+            q.extend(full[..n].iter().map(|&z| S::of_f64(z)));
+            v.extend(full[n..].iter().map(|&z| S::of_f64(z)));
+        }
+        // Rows that fail are `NaN` or missing; the others are right whatever the result says.
+        let _ = model.terms(&q, &v, request, &mut terms);
+        values.extend((0..x.len()).map(|row| value(&terms, row).filter(|z| z.is_finite()).unwrap_or(f64::NAN)));
+    }
+    Ok(Grid { x, y, values })
+}
+
+/// Determinant by elimination with row pivots.
+fn determinant<S: Scalar>(mut m: Vec<S>, n: usize) -> S {
+    let mut det = S::of_f64(1.0);
+    for k in 0..n {
+        let mut pivot = k;
+        for i in k + 1..n {
+            if m[i * n + k].abs() > m[pivot * n + k].abs() {
+                pivot = i;
+            }
+        }
+        if pivot != k {
+            for j in 0..n {
+                m.swap(k * n + j, pivot * n + j);
+            }
+            det = -det;
+        }
+        let head = m[k * n + k];
+        det = det * head;
+        if head == S::of_f64(0.0) {
+            return head;
+        }
+        for i in k + 1..n {
+            let factor = m[i * n + k] / head;
+            for j in k + 1..n {
+                let above = m[k * n + j];
+                m[i * n + j] = m[i * n + j] - factor * above;
+            }
+        }
+    }
+    det
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rollout::models::{PENDULUM, SINGULAR};
+
+    const AXES: [Axis; 2] = [
+        Axis { component: 0, from: -2.0, to: 2.0, points: 5 },
+        Axis { component: 1, from: 0.0, to: 3.0, points: 4 },
+    ];
+
+    #[test]
+    fn lagrangian_over_the_plane() {
+        let grid = lagrangian_grid::<f64>(&PENDULUM, &[0.0, 0.0], AXES).unwrap();
+        assert_eq!((grid.x.len(), grid.y.len(), grid.values.len()), (5, 4, 20));
+        for (j, v) in grid.y.iter().enumerate() {
+            for (i, q) in grid.x.iter().enumerate() {
+                assert!((grid.values[j * 5 + i] - (0.5 * v * v + q.cos())).abs() < 1e-15);
+            }
+        }
+        assert!(grid.minus(&grid).unwrap().values.iter().all(|&z| z == 0.0));
+        let ones = determinant_grid::<f64>(&PENDULUM, &[0.0, 0.0], AXES).unwrap();
+        assert!(ones.values.iter().all(|&z| z == 1.0));
+    }
+
+    #[test]
+    fn failing_rows_are_gaps_and_bad_axes_errors() {
+        let grid = determinant_grid::<f64>(&SINGULAR, &[0.0, 0.0], AXES).unwrap();
+        assert_eq!(grid.values[0], 0.0);
+        assert_eq!(grid.values[1], 1.0);
+        assert!(matches!(lagrangian_grid::<f64>(&PENDULUM, &[0.0], AXES), Err(GridError::State { .. })));
+        let mut bad = AXES;
+        bad[1].component = 2;
+        assert!(matches!(lagrangian_grid::<f64>(&PENDULUM, &[0.0; 2], bad), Err(GridError::Axis { axis: 1, .. })));
+        bad[1] = AXES[0];
+        assert!(lagrangian_grid::<f64>(&PENDULUM, &[0.0; 2], bad).is_err());
+    }
+
+    #[test]
+    fn determinants() {
+        assert_eq!(determinant(vec![0.0, 1.0, 1.0, 0.0], 2), -1.0);
+        assert_eq!(determinant(vec![1.0, 2.0, 2.0, 4.0], 2), 0.0);
+        let d: f64 = determinant(vec![2.0, 1.0, 0.0, 1.0, 3.0, 1.0, 0.0, 1.0, -4.0], 3);
+        assert!((d + 22.0).abs() < 1e-14);
+    }
+}

@@ -1,0 +1,239 @@
+//! The trajectory test: learned motion against exact motion from random starts.
+
+use super::{
+    CoordinateError, EnergyError, Lyapunov, Statistics, coordinate_error, energy_drift, energy_error, lyapunov, statistics,
+};
+use crate::lagrangian::EulerLagrange;
+use crate::rollout::{Domain, Integrable, Method, Options, Rollout, rollout_many};
+use crate::scalar::Scalar;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
+
+/// Bounds of random starts, in physical units.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct StartBox {
+    /// `(lower, upper)` of each coordinate.
+    pub q: Vec<(f64, f64)>,
+    /// `(lower, upper)` of each velocity.
+    pub v: Vec<(f64, f64)>,
+}
+
+impl StartBox {
+    /// `count` starts, uniform within the bounds; the same seed gives the same starts.
+    ///
+    /// A start depends only on the seed and on the starts before it: more starts extend the list.
+    pub fn starts<S: Scalar>(&self, count: usize, seed: u64) -> Vec<(Vec<S>, Vec<S>)> {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let mut draw = |bounds: &[(f64, f64)]| -> Vec<S> {
+            bounds.iter().map(|(lower, upper)| S::of_f64(lower + (upper - lower) * random.random::<f64>())).collect()
+        };
+        (0..count).map(|_| (draw(&self.q), draw(&self.v))).collect()
+    }
+}
+
+/// The test as the paper makes it: random starts, exact motion by [`Options::reference`], learned motion at rtol 1e-6 and
+/// atol 1e-8.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TrajectoryTest<S> {
+    /// Where motions start.
+    pub bounds: StartBox,
+    /// Number of starts; the paper takes 4.
+    pub starts: usize,
+    /// Seed of the starts.
+    pub seed: u64,
+    /// Duration.
+    pub t_end: f64,
+    /// Distance of samples.
+    pub dt: f64,
+    /// Which coordinates are angles.
+    pub periodic: Vec<bool>,
+    /// Energy below which the energy error is not taken relative to `|E(0)|`.
+    pub energy_scale: f64,
+    /// Integrator of the learned motion.
+    pub method: Method,
+    /// Relative tolerance of the learned motion.
+    pub rtol: f64,
+    /// Absolute tolerance of the learned motion.
+    pub atol: f64,
+    /// Where the learned motion must stay; `None` lets it go anywhere.
+    pub domain: Option<Domain<S>>,
+    /// Whether to estimate Lyapunov exponents of the exact motion.
+    pub lyapunov: bool,
+    /// Threads.
+    pub threads: usize,
+}
+
+/// One start.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TrajectoryRun<S> {
+    /// Exact motion.
+    pub exact: Rollout<S>,
+    /// Learned motion.
+    pub learned: Rollout<S>,
+    /// Distance of the two.
+    pub coordinates: CoordinateError,
+    /// Exact energy along the learned motion.
+    pub energy: EnergyError,
+    /// Exact energy along the exact motion: the error of the reference itself.
+    pub reference_energy: EnergyError,
+    /// Learned energy along the learned motion.
+    pub drift: EnergyError,
+    /// Chaos of the exact motion, if asked for and found.
+    pub lyapunov: Option<Lyapunov>,
+}
+
+/// What a report and a script need of one start.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TrajectorySummary {
+    /// Coordinates at the start.
+    pub q: Vec<f64>,
+    /// Velocities at the start.
+    pub v: Vec<f64>,
+    /// Time up to which learned and exact motion could be compared.
+    pub compared_until: f64,
+    /// Largest coordinate error over time.
+    pub coordinate_error: Statistics,
+    /// Normalised error of the exact energy along the learned motion.
+    pub energy_error: Statistics,
+    /// Normalised drift of the learned energy.
+    pub energy_drift: Statistics,
+    /// Largest finite-time Lyapunov exponent of the exact motion.
+    pub lyapunov_exponent: Option<f64>,
+    /// Evaluations of the learned acceleration.
+    pub evaluations: usize,
+    /// Why the learned motion ended early.
+    pub stopped: Option<String>,
+    /// Why the exact motion ended early.
+    pub reference_stopped: Option<String>,
+}
+
+impl<S: Integrable> TrajectoryTest<S> {
+    /// The paper's pendulum test: 4 starts, `t` in `[0, 100]`, `dt` 0.1, rtol 1e-6, atol 1e-8, on one thread.
+    pub fn new(bounds: StartBox, periodic: Vec<bool>) -> Self {
+        Self {
+            bounds,
+            starts: 4,
+            seed: 0,
+            t_end: 100.0,
+            dt: 0.1,
+            periodic,
+            energy_scale: 0.0,
+            method: Method::Dopri5,
+            rtol: 1e-6,
+            atol: 1e-8,
+            domain: None,
+            lyapunov: false,
+            threads: 1,
+        }
+    }
+
+    /// Runs every start with both models; the results are in the order of the starts and do not depend on `threads`.
+    pub fn run(&self, exact: &dyn EulerLagrange<S>, learned: &dyn EulerLagrange<S>) -> Vec<TrajectoryRun<S>> {
+        let starts = self.bounds.starts::<S>(self.starts, self.seed);
+        let reference = Options::reference(S::of_f64(self.t_end), S::of_f64(self.dt));
+        let options = Options {
+            method: self.method,
+            rtol: S::of_f64(self.rtol),
+            atol: S::of_f64(self.atol),
+            domain: self.domain.clone(),
+            ..reference.clone()
+        };
+        let scale = S::of_f64(self.energy_scale);
+        let truths = rollout_many(exact, &starts, &reference, self.threads);
+        let learned = rollout_many(learned, &starts, &options, self.threads);
+        let pairs = starts.iter().zip(truths.into_iter().zip(learned));
+        pairs
+            .map(|((q, v), (truth, learned))| TrajectoryRun {
+                coordinates: coordinate_error(&truth.trajectory, &learned.trajectory, &self.periodic),
+                energy: energy_error(exact, &learned.trajectory, scale),
+                reference_energy: energy_drift(&truth.trajectory, scale),
+                drift: energy_drift(&learned.trajectory, scale),
+                lyapunov: if self.lyapunov { lyapunov(exact, q, v, &self.leaps(&reference)).ok() } else { None },
+                exact: truth,
+                learned,
+            })
+            .collect()
+    }
+
+    /// Options of the Lyapunov estimate: a hundred renormalisations are plenty.
+    fn leaps(&self, reference: &Options<S>) -> Options<S> {
+        let tolerance = S::max(S::of_f64(1e-10), reference.rtol);
+        Options { dt: S::of_f64(self.t_end.abs() / 100.0), rtol: tolerance, atol: tolerance, ..reference.clone() }
+    }
+}
+
+impl<S: Scalar> TrajectoryRun<S> {
+    /// Numbers of the run.
+    pub fn summary(&self) -> TrajectorySummary {
+        let start = |values: &[S]| values.iter().map(|x| x.to_f64()).collect::<Vec<_>>();
+        let (q, v) = match (self.exact.trajectory.is_empty(), self.learned.trajectory.is_empty()) {
+            (false, _) => self.exact.trajectory.state(0),
+            (true, false) => self.learned.trajectory.state(0),
+            (true, true) => (&[][..], &[][..]),
+        };
+        TrajectorySummary {
+            q: start(q),
+            v: start(v),
+            compared_until: self.coordinates.t.last().copied().unwrap_or(0.0),
+            coordinate_error: statistics(self.coordinates.max.iter().copied()),
+            energy_error: self.energy.statistics(),
+            energy_drift: self.drift.statistics(),
+            lyapunov_exponent: self.lyapunov.map(|l| l.exponent),
+            evaluations: self.learned.statistics.evaluations,
+            stopped: self.learned.stop.as_ref().map(ToString::to_string),
+            reference_stopped: self.exact.stop.as_ref().map(ToString::to_string),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rollout::models::{OSCILLATOR, PENDULUM, SINGULAR};
+
+    fn test() -> TrajectoryTest<f64> {
+        let bounds = StartBox { q: vec![(-0.1, 0.1)], v: vec![(-0.01, 0.01)] };
+        TrajectoryTest { t_end: 10.0, ..TrajectoryTest::new(bounds, vec![true]) }
+    }
+
+    #[test]
+    fn a_model_against_itself_and_a_near_one() {
+        let same = test().run(&PENDULUM, &PENDULUM);
+        assert_eq!(same.len(), 4);
+        for run in &same {
+            let summary = run.summary();
+            assert!(summary.coordinate_error.max < 1e-5 && summary.energy_error.max < 1e-4, "{summary:?}");
+            assert_eq!((summary.compared_until, summary.stopped.clone()), (10.0, None));
+            assert!(run.reference_energy.statistics().max < 1e-8);
+        }
+        let other = test().run(&PENDULUM, &OSCILLATOR);
+        assert!(other.iter().any(|run| run.summary().coordinate_error.max > 1e-5));
+        let threaded = TrajectoryTest { threads: 3, lyapunov: true, ..test() }.run(&PENDULUM, &OSCILLATOR);
+        for (a, b) in other.iter().zip(&threaded) {
+            assert_eq!(a.learned, b.learned);
+            assert!(b.lyapunov.unwrap().exponent < 0.3);
+        }
+    }
+
+    #[test]
+    fn failures_shorten_the_comparison_and_summaries_serialise() {
+        let run = &TrajectoryTest { starts: 1, ..test() }.run(&PENDULUM, &SINGULAR)[0];
+        let summary = run.summary();
+        assert!(summary.stopped.as_ref().unwrap().contains("singular"));
+        assert!(summary.compared_until < 2.0 && summary.compared_until > 1.0);
+        let text = serde_json::to_string(&summary).unwrap();
+        let back: TrajectorySummary = serde_json::from_str(&text).unwrap();
+        assert_eq!((back.stopped, back.evaluations), (summary.stopped, summary.evaluations));
+        assert!((back.energy_error.max - summary.energy_error.max).abs() < 1e-14);
+    }
+
+    #[test]
+    fn starts_extend_and_repeat() {
+        let bounds = StartBox { q: vec![(0.0, 6.0), (1.0, 2.0)], v: vec![(-1.0, 1.0); 2] };
+        let four = bounds.starts::<f64>(4, 7);
+        assert_eq!(bounds.starts::<f64>(6, 7)[..4], four[..]);
+        assert_ne!(bounds.starts::<f64>(4, 8), four);
+        assert!(four.iter().all(|(q, v)| (1.0..2.0).contains(&q[1]) && v.iter().all(|v| v.abs() <= 1.0)));
+    }
+}

@@ -1,0 +1,80 @@
+//! Pictures of a training.
+
+use super::{Figure, LinePlot, PlotError, Series, line_png};
+
+/// One epoch. Quantities that a training does not have are `NaN`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HistoryRow {
+    /// Number of the epoch.
+    pub epoch: f64,
+    /// Mean loss of the training states.
+    pub training_loss: f64,
+    /// Loss of the validation states.
+    pub validation_loss: f64,
+    /// Learning rate.
+    pub learning_rate: f64,
+    /// Mean norm of the gradient.
+    pub gradient_norm: f64,
+    /// Mean penalty.
+    pub penalty: f64,
+}
+
+/// Pictures of a history: loss, learning rate, gradient norm and penalty, as far as there is something to show.
+///
+/// # Errors
+/// [`PlotError::Renderer`] if the renderer fails; quantities without a finite positive value are left out.
+pub fn training_figures(rows: &[HistoryRow]) -> Result<Vec<Figure>, PlotError> {
+    let epochs: Vec<f64> = rows.iter().map(|row| row.epoch).collect();
+    let series = |name: &str, part: fn(&HistoryRow) -> f64| Series::new(name, &epochs, &rows.iter().map(part).collect::<Vec<_>>());
+    let best = rows.iter().filter(|row| row.validation_loss.is_finite()).min_by(|a, b| a.validation_loss.total_cmp(&b.validation_loss));
+    let loss = match best {
+        Some(best) => format!("Loss per epoch; lowest validation loss {:.6} in epoch {}.", best.validation_loss, best.epoch),
+        None => "Loss per epoch.".into(),
+    };
+    let pictures = [
+        (
+            "training_loss.png",
+            "Training",
+            "loss",
+            vec![series("training", |r| r.training_loss), series("validation", |r| r.validation_loss)],
+            loss,
+        ),
+        ("learning_rate.png", "Learning rate", "learning rate", vec![series("", |r| r.learning_rate)], "Learning rate per epoch.".into()),
+        ("gradient_norm.png", "Gradient norm", "gradient norm", vec![series("", |r| r.gradient_norm)], "Norm of the gradient before clipping, mean per epoch.".into()),
+        ("penalty.png", "Stability penalty", "penalty", vec![series("", |r| r.penalty)], "Penalty on the mass matrix, mean per epoch; epochs without a violation leave gaps.".into()),
+    ];
+    let mut figures = Vec::new();
+    for (file, title, y_label, series, caption) in pictures {
+        let plot = LinePlot { title: title.into(), x_label: "epoch".into(), y_label: y_label.into(), log_y: true, series };
+        match line_png(&plot) {
+            Ok(png) => figures.push(Figure { file: file.into(), png, caption }),
+            Err(PlotError::Empty(_)) => {}
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(figures)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_missing_is_left_out() {
+        let rows: Vec<_> = (0..20)
+            .map(|k| HistoryRow {
+                epoch: f64::from(k),
+                training_loss: (-0.3 * f64::from(k)).exp(),
+                validation_loss: 1.1 * (-0.3 * f64::from(k)).exp(),
+                learning_rate: 1e-3,
+                gradient_norm: f64::NAN,
+                penalty: 0.0,
+            })
+            .collect();
+        let figures = training_figures(&rows).unwrap();
+        let names: Vec<_> = figures.iter().map(|f| f.file.as_str()).collect();
+        assert_eq!(names, ["training_loss.png", "learning_rate.png"]);
+        assert!(figures[0].caption.contains("epoch 19"));
+        assert!(training_figures(&[]).unwrap().is_empty());
+    }
+}

@@ -1,0 +1,101 @@
+//! Why a roll-out ended early.
+
+use crate::lagrangian::MechanicsError;
+
+/// Why steps became too small to go on although every evaluation of the model succeeded or failed for no other reason.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum UnderflowCause {
+    /// The error estimate asks for ever smaller steps: the motion blows up, is not smooth, or the tolerance is finer
+    /// than the rounding errors of the model.
+    #[error("error test failed, largest |acceleration| {largest_acceleration:.3e}")]
+    ErrorTest {
+        /// Largest absolute acceleration at the last accepted state.
+        largest_acceleration: f64,
+    },
+    /// The model failed at every trial state ahead.
+    #[error("{0}")]
+    Model(MechanicsError),
+}
+
+/// Why a roll-out ended before `t_end`; times in the unit of the options, states as `(q, v)` in physical units.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum RolloutError {
+    /// An argument makes no sense.
+    #[error("{what}: {problem}")]
+    Invalid {
+        /// Which argument.
+        what: &'static str,
+        /// What is wrong with it.
+        problem: String,
+    },
+    /// The trajectory leaves its domain.
+    #[error("left the domain at t = {t}: component {component} reached {value:.6e}, allowed is [{lower:.6e}, {upper:.6e}]")]
+    LeftDomain {
+        /// Last time inside.
+        t: f64,
+        /// State `(q, v)` at `t`.
+        state: Vec<f64>,
+        /// Index into `(q, v)`: coordinates `0..n`, velocities `n..2n`.
+        component: usize,
+        /// Offending value just ahead.
+        value: f64,
+        /// Lower bound.
+        lower: f64,
+        /// Upper bound.
+        upper: f64,
+    },
+    /// The mass matrix cannot be solved with.
+    #[error("singular mass matrix at t = {t} (condition number {condition:.3e})")]
+    SingularMass {
+        /// Last time at which it could.
+        t: f64,
+        /// State `(q, v)` at `t`.
+        state: Vec<f64>,
+        /// Condition number just ahead.
+        condition: f64,
+    },
+    /// A state or an acceleration is not finite.
+    #[error("{what} is not finite just after t = {t}")]
+    NotFinite {
+        /// Last time at which all was finite.
+        t: f64,
+        /// State `(q, v)` at `t`.
+        state: Vec<f64>,
+        /// Which quantity.
+        what: &'static str,
+    },
+    /// Steps became smaller than the time can resolve.
+    #[error("step size underflow at t = {t} (last step {step:.3e}): {cause}")]
+    StepUnderflow {
+        /// Time of the last accepted step.
+        t: f64,
+        /// State `(q, v)` at `t`.
+        state: Vec<f64>,
+        /// Size of the last accepted step, 0 if there was none.
+        step: f64,
+        /// Why.
+        cause: UnderflowCause,
+    },
+    /// The allowed number of steps is used up.
+    #[error("{steps} steps were not enough, stopped at t = {t}")]
+    TooManySteps {
+        /// Time reached.
+        t: f64,
+        /// Attempts made.
+        steps: usize,
+    },
+}
+
+impl RolloutError {
+    /// Time at which the motion stopped, if it had begun.
+    pub fn time(&self) -> Option<f64> {
+        match self {
+            Self::Invalid { .. } => None,
+            Self::LeftDomain { t, .. }
+            | Self::SingularMass { t, .. }
+            | Self::NotFinite { t, .. }
+            | Self::StepUnderflow { t, .. }
+            | Self::TooManySteps { t, .. } => Some(*t),
+        }
+    }
+}

@@ -1,0 +1,458 @@
+//! Adapter to `ode_solvers`: the only file that names it.
+//!
+//! Its traps, and what is done about them:
+//! - A right-hand side cannot fail: the first error of an attempt is latched and `NaN` returned. An attempted step with
+//!   a failed stage is then rejected and tried shorter; the error ends the integration only once steps underflow.
+//! - Its dense output extrapolates the last sample, panics or hangs for some intervals, and is lost for failures: only
+//!   the sparse one is used, and samples are interpolated here from the stages of each accepted step.
+//! - Backward integration is fragile: the elapsed time always runs upwards from 0 (the caller flips the sign).
+//! - Statistics are lost on errors: calls are counted here.
+//! - Underflow is not noticed in `f32`: a step that does not advance the time ends the integration.
+//! - Two nodes of its order 8 table are wrong (0 for 1): harmless, the equations here do not depend on time.
+
+use super::dense::{Interpolant, Step};
+use super::{Method, Statistics};
+use crate::scalar::{Real, Scalar};
+use nalgebra::allocator::Allocator;
+use nalgebra::{DefaultAllocator, Dim, OVector};
+use ode_solvers::dop_shared::{FloatNumber, IntegrationError};
+use ode_solvers::{DVector, Dop853, Dopri5, OutputType, SVector, System};
+use std::cell::RefCell;
+
+/// A right-hand side `dy = f(y)` of an autonomous system.
+pub(super) type Rhs<'a, S, E> = dyn FnMut(&[S], &mut [S]) -> Result<(), E> + 'a;
+
+/// Receives sample `k` with its state.
+pub(super) type Output<'a, S> = dyn FnMut(usize, &[S]) + 'a;
+
+/// What to integrate.
+#[doc(hidden)]
+pub struct Task<'a, S> {
+    pub(super) method: Method,
+    pub(super) rtol: S,
+    pub(super) atol: S,
+    pub(super) max_steps: usize,
+    /// Size of the first attempt; 0 leaves it to the solver.
+    pub(super) first_step: S,
+    /// State at elapsed time 0.
+    pub(super) start: &'a [S],
+    /// Elapsed times of the samples, ascending from 0; the last is the end.
+    pub(super) samples: &'a [S],
+}
+
+/// Why an integration ended early.
+#[doc(hidden)]
+#[derive(Debug)]
+pub enum Ended<E> {
+    /// The right-hand side fails ahead, however short the step.
+    Failed(E),
+    /// The error estimate asks for steps that do not advance the time.
+    Underflow,
+    /// No attempts left.
+    TooManySteps,
+}
+
+/// What an integration did.
+#[doc(hidden)]
+pub struct Ran<S, E> {
+    pub(super) statistics: Statistics,
+    /// Elapsed time, state and size of the last accepted step.
+    pub(super) elapsed: S,
+    pub(super) state: Vec<S>,
+    pub(super) step: S,
+    pub(super) ended: Option<Ended<E>>,
+}
+
+/// The scalars that roll-outs work in: `f32` and `f64`.
+pub trait Integrable: Scalar {
+    #[doc(hidden)]
+    fn integrate<E>(task: &Task<'_, Self>, f: &mut Rhs<'_, Self, E>, output: &mut Output<'_, Self>) -> Ran<Self, E>;
+}
+
+macro_rules! integrable {
+    ($($float:ty)*) => {
+        $(
+            impl Integrable for $float {
+                fn integrate<E>(
+                    task: &Task<'_, Self>,
+                    f: &mut Rhs<'_, Self, E>,
+                    output: &mut Output<'_, Self>,
+                ) -> Ran<Self, E> {
+                    // Small states live on the stack.
+                    match task.start.len() {
+                        2 => integrate(task, |y| SVector::<Self, 2>::from_column_slice(y), f, output),
+                        4 => integrate(task, |y| SVector::<Self, 4>::from_column_slice(y), f, output),
+                        6 => integrate(task, |y| SVector::<Self, 6>::from_column_slice(y), f, output),
+                        _ => integrate(task, DVector::<Self>::from_column_slice, f, output),
+                    }
+                }
+            }
+        )*
+    };
+}
+integrable!(f32 f64);
+
+/// Stages after the first of both methods.
+const fn stages(method: Method) -> usize {
+    match method {
+        Method::Dopri5 => 6,
+        Method::Dop853 => 11,
+    }
+}
+
+/// Calls per accepted step that are not stages of its attempt.
+const fn closing_calls(method: Method) -> usize {
+    match method {
+        Method::Dopri5 => 0,
+        Method::Dop853 => 1,
+    }
+}
+
+/// Everything that is observed while a solver runs.
+struct Watch<'a, 'f, S, E> {
+    task: &'a Task<'a, S>,
+    f: &'a mut Rhs<'f, S, E>,
+    output: &'a mut Output<'f, S>,
+    /// Stages of the last calls, the newest at `calls - 1`, in a ring of `ring` rows.
+    recent: Vec<S>,
+    calls: usize,
+    statistics: Statistics,
+    /// Last accepted step.
+    elapsed: S,
+    state: Vec<S>,
+    slope: Vec<S>,
+    step: S,
+    /// First sample not yet delivered.
+    next: usize,
+    /// First failure since the last accepted step, and the one before that step.
+    failure: Option<E>,
+    earlier: Option<E>,
+    /// An accepted step failed at its end: try again with this size.
+    retry: Option<S>,
+    /// The time does not advance any more.
+    stuck: bool,
+    interpolant: Interpolant<S>,
+    slopes: Vec<S>,
+    sample: Vec<S>,
+}
+
+impl<S: Scalar, E> Watch<'_, '_, S, E> {
+    fn evaluate(&mut self, y: &[S], dy: &mut [S]) {
+        if self.failure.is_some() && y.iter().any(|x| !x.is_finite()) {
+            // A state that an earlier failure of this attempt has spoilt.
+            dy.fill(S::NAN);
+        } else if y == self.state.as_slice() {
+            dy.copy_from_slice(&self.slope);
+        } else {
+            self.statistics.evaluations += 1;
+            if let Err(error) = (self.f)(y, dy) {
+                self.failure.get_or_insert(error);
+                dy.fill(S::NAN);
+            }
+        }
+        let row = (self.calls % self.ring()) * dy.len();
+        self.recent[row..row + dy.len()].copy_from_slice(dy);
+        self.calls += 1;
+    }
+
+    /// Rows of `recent`: what one accepted step calls.
+    fn ring(&self) -> usize {
+        stages(self.task.method) + closing_calls(self.task.method)
+    }
+
+    /// Takes an accepted step; `true` stops the solver.
+    fn accepted(&mut self, x: S, y: &[S], slope: &[S]) -> bool {
+        self.statistics.accepted += 1;
+        let h = x - self.elapsed;
+        if h <= <S as Real>::zero() {
+            self.stuck = true;
+            return true;
+        }
+        // Failures of rejected attempts are harmless; one of the closing evaluation is not.
+        if slope.iter().any(|x| !x.is_finite()) {
+            self.retry = Some(h);
+            return true;
+        }
+        let rejected = self.failure.take();
+        if self.task.samples.get(self.next).is_some_and(|&t| t < x) && !self.interpolate(h, y) {
+            self.retry = Some(h);
+            return true;
+        }
+        self.earlier = rejected;
+        while let Some(&t) = self.task.samples.get(self.next) {
+            if t > x {
+                break;
+            }
+            if t == x {
+                (self.output)(self.next, y);
+            } else {
+                self.interpolant.evaluate((t - self.elapsed) / h, &mut self.sample);
+                (self.output)(self.next, &self.sample);
+            }
+            self.next += 1;
+        }
+        self.elapsed = x;
+        self.step = h;
+        self.state.copy_from_slice(y);
+        self.slope.copy_from_slice(slope);
+        false
+    }
+
+    /// Prepares the interpolant of the step to `y`; `false` if an evaluation it needs fails.
+    fn interpolate(&mut self, h: S, y: &[S]) -> bool {
+        let dim = y.len();
+        let ring = self.ring();
+        self.slopes.clear();
+        self.slopes.extend_from_slice(&self.slope);
+        for call in self.calls - ring..self.calls {
+            let row = (call % ring) * dim;
+            self.slopes.extend_from_slice(&self.recent[row..row + dim]);
+        }
+        let step = Step { h, y0: &self.state, y1: y, slopes: &self.slopes };
+        match self.task.method {
+            Method::Dopri5 => {
+                self.interpolant.dopri5(&step);
+                true
+            }
+            Method::Dop853 => {
+                self.statistics.evaluations += 3;
+                self.interpolant.dop853(&step, self.f).map_err(|error| self.failure = Some(error)).is_ok()
+            }
+        }
+    }
+
+    /// The failure that made steps shrink.
+    fn cause(&mut self) -> Option<E> {
+        self.failure.take().or_else(|| self.earlier.take())
+    }
+}
+
+/// The watch as the solver sees it.
+struct Watched<'w, 'a, 'f, S, E>(&'w RefCell<Watch<'a, 'f, S, E>>);
+
+impl<S, D, E> System<S, OVector<S, D>> for Watched<'_, '_, '_, S, E>
+where
+    S: Scalar + FloatNumber,
+    D: Dim,
+    DefaultAllocator: Allocator<D>,
+{
+    fn system(&self, _: S, y: &OVector<S, D>, dy: &mut OVector<S, D>) {
+        self.0.borrow_mut().evaluate(y.as_slice(), dy.as_mut_slice());
+    }
+
+    fn solout(&mut self, x: S, y: &OVector<S, D>, dy: &OVector<S, D>) -> bool {
+        self.0.borrow_mut().accepted(x, y.as_slice(), dy.as_slice())
+    }
+}
+
+fn integrate<S, D, E>(
+    task: &Task<'_, S>,
+    vector: impl Fn(&[S]) -> OVector<S, D>,
+    f: &mut Rhs<'_, S, E>,
+    output: &mut Output<'_, S>,
+) -> Ran<S, E>
+where
+    S: Scalar + FloatNumber,
+    f64: From<S>,
+    D: Dim,
+    DefaultAllocator: Allocator<D>,
+    OVector<S, D>: std::ops::Mul<S, Output = OVector<S, D>>,
+{
+    let dim = task.start.len();
+    let ring = stages(task.method) + closing_calls(task.method);
+    let (zero, end) = (<S as Real>::zero(), task.samples.last().copied());
+    let mut slope = vec![zero; dim];
+    let mut ran = Ran {
+        statistics: Statistics { evaluations: 1, ..Statistics::default() },
+        elapsed: zero,
+        state: task.start.to_vec(),
+        step: zero,
+        ended: None,
+    };
+    if let Err(error) = f(task.start, &mut slope) {
+        ran.ended = Some(Ended::Failed(error));
+        return ran;
+    }
+    let Some(end) = end else { return ran };
+    let mut next = 0;
+    while task.samples.get(next).is_some_and(|&t| t <= zero) {
+        output(next, task.start);
+        next += 1;
+    }
+    let watch = RefCell::new(Watch {
+        task,
+        f,
+        output,
+        recent: vec![zero; ring * dim],
+        calls: 0,
+        statistics: ran.statistics,
+        elapsed: zero,
+        state: task.start.to_vec(),
+        slope,
+        step: zero,
+        next,
+        failure: None,
+        earlier: None,
+        retry: None,
+        stuck: false,
+        interpolant: Interpolant::default(),
+        slopes: Vec::with_capacity((ring + 1) * dim),
+        sample: vec![zero; dim],
+    });
+
+    let mut first_step = task.first_step;
+    while next < task.samples.len() {
+        let (elapsed, y, attempts_left) = {
+            let mut watch = watch.borrow_mut();
+            watch.calls = 0;
+            let attempts = watch.statistics.accepted + watch.statistics.rejected;
+            (watch.elapsed, vector(&watch.state), task.max_steps.saturating_sub(attempts))
+        };
+        let accepted_before = watch.borrow().statistics.accepted;
+        let result = if attempts_left == 0 {
+            Err(IntegrationError::MaxNumStepReached { x: 0.0, n_step: 0 })
+        } else {
+            run(task, Watched(&watch), elapsed, end, y, first_step, attempts_left)
+        };
+
+        let mut watch = watch.borrow_mut();
+        let accepted = watch.statistics.accepted - accepted_before;
+        let opening = if attempts_left == 0 { 0 } else if first_step == zero { 3 } else { 1 };
+        let attempts = (watch.calls - opening - accepted * closing_calls(task.method)) / stages(task.method);
+        watch.statistics.rejected += attempts - accepted;
+        next = watch.next;
+        if let Some(failed) = watch.retry.take() {
+            // The step counted as accepted was not taken.
+            watch.statistics.accepted -= 1;
+            watch.statistics.rejected += 1;
+            first_step = failed * S::of_f64(0.25);
+            if elapsed + first_step > elapsed && watch.elapsed + first_step > watch.elapsed {
+                continue;
+            }
+            watch.stuck = true;
+        }
+        ran.ended = match result {
+            _ if watch.stuck => Some(watch.cause().map_or(Ended::Underflow, Ended::Failed)),
+            Ok(()) => {
+                // The last step may end one rounding short of the end.
+                while watch.next < task.samples.len() {
+                    let (k, state) = (watch.next, watch.state.clone());
+                    (watch.output)(k, &state);
+                    watch.next += 1;
+                }
+                next = watch.next;
+                None
+            }
+            Err(IntegrationError::MaxNumStepReached { .. }) => Some(Ended::TooManySteps),
+            Err(_) => Some(watch.cause().map_or(Ended::Underflow, Ended::Failed)),
+        };
+        if ran.ended.is_some() {
+            break;
+        }
+    }
+
+    let watch = watch.into_inner();
+    Ran { statistics: watch.statistics, elapsed: watch.elapsed, state: watch.state, step: watch.step, ..ran }
+}
+
+/// One run of the solver from `elapsed` to `end`, its own defaults except for stiffness detection (off: the number of
+/// steps is limited instead) and the number of steps.
+fn run<S, D, E>(
+    task: &Task<'_, S>,
+    watched: Watched<'_, '_, '_, S, E>,
+    elapsed: S,
+    end: S,
+    y: OVector<S, D>,
+    first_step: S,
+    max_steps: usize,
+) -> Result<(), IntegrationError>
+where
+    S: Scalar + FloatNumber,
+    f64: From<S>,
+    D: Dim,
+    DefaultAllocator: Allocator<D>,
+    OVector<S, D>: std::ops::Mul<S, Output = OVector<S, D>>,
+{
+    let number = <S as Scalar>::of_f64;
+    let max_steps = u32::try_from(max_steps).unwrap_or(u32::MAX - 1);
+    macro_rules! solve {
+        ($solver:ident, $beta:expr, $shrink:expr, $grow:expr) => {
+            $solver::from_param(
+                watched,
+                elapsed,
+                end,
+                end,
+                y,
+                task.rtol,
+                task.atol,
+                number(0.9),
+                number($beta),
+                number($shrink),
+                number($grow),
+                end - elapsed,
+                first_step,
+                max_steps,
+                u32::MAX,
+                OutputType::Sparse,
+            )
+            .integrate()
+            .map(|_| ())
+        };
+    }
+    match task.method {
+        Method::Dopri5 => solve!(Dopri5, 0.04, 0.2, 10.0),
+        Method::Dop853 => solve!(Dop853, 0.0, 0.333, 6.0),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Samples of `y' = -y` from 1.
+    fn decay(method: Method, tolerance: f64, first_step: f64, samples: &[f64]) -> (Vec<f64>, Statistics) {
+        let task =
+            Task { method, rtol: tolerance, atol: tolerance, max_steps: 1000, first_step, start: &[1.0], samples };
+        let mut got = Vec::new();
+        let ran = f64::integrate::<()>(
+            &task,
+            &mut |y, dy| {
+                dy[0] = -y[0];
+                Ok(())
+            },
+            &mut |k, y| {
+                assert_eq!(k, got.len());
+                got.push(y[0]);
+            },
+        );
+        assert!(ran.ended.is_none());
+        (got, ran.statistics)
+    }
+
+    /// Largest error of the samples of one single step of size `h`.
+    fn single_step(method: Method, h: f64) -> f64 {
+        let samples: Vec<f64> = (0..=20).map(|k| h * f64::from(k) / 20.0).collect();
+        let (got, statistics) = decay(method, 1e6, h, &samples);
+        assert_eq!((statistics.accepted, statistics.rejected), (1, 0));
+        assert_eq!(got.len(), samples.len());
+        samples.iter().zip(got).map(|(t, y)| (y - (-t).exp()).abs()).fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn interpolation_is_right_inside_a_single_step_with_its_order() {
+        for (method, order, bound) in [(Method::Dopri5, 4.0, 2e-4), (Method::Dop853, 7.0, 2e-7)] {
+            assert!(single_step(method, 0.5) < bound, "{method:?}: {:e}", single_step(method, 0.5));
+            // Local error h^(order + 1).
+            let slope = (single_step(method, 0.5) / single_step(method, 0.25)).log2();
+            assert!((slope - order - 1.0).abs() < 0.35, "{method:?}: {slope}");
+        }
+    }
+
+    #[test]
+    fn a_sample_at_zero_and_two_at_one_time() {
+        let (got, _) = decay(Method::Dop853, 1e-10, 0.0, &[0.0, 0.0, 1.0, 1.0]);
+        assert_eq!(got[..2], [1.0, 1.0]);
+        assert_eq!(got[2], got[3]);
+        assert!((got[2] - (-1.0_f64).exp()).abs() < 1e-9);
+    }
+}

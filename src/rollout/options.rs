@@ -1,0 +1,232 @@
+//! What a roll-out is asked to do.
+
+use super::RolloutError;
+use crate::scalar::{Real, Scalar};
+use serde::{Deserialize, Serialize};
+
+/// Explicit Runge-Kutta methods with step size control.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Method {
+    /// Dormand and Prince (1980), order 5(4), interpolation of order 4.
+    Dopri5,
+    /// Hairer, Norsett and Wanner (1993), order 8(5,3), interpolation of order 7.
+    Dop853,
+}
+
+/// Box in which a trajectory must stay; the bounds of a training range or of a chart.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Domain<S> {
+    bounds: Vec<Option<(S, S)>>,
+}
+
+impl<S: Scalar> Domain<S> {
+    /// Bounds `(lower, upper)` of every component of `(q, v)`; `None` is unbounded, as periodic coordinates are.
+    pub fn new(bounds: Vec<Option<(S, S)>>) -> Self {
+        Self { bounds }
+    }
+
+    /// Number of components `2n`.
+    pub fn len(&self) -> usize {
+        self.bounds.len()
+    }
+
+    /// Whether no component is described.
+    pub fn is_empty(&self) -> bool {
+        self.bounds.is_empty()
+    }
+
+    /// First component of `(q, v)` outside its bounds, with the bounds.
+    pub fn violation(&self, state: &[S]) -> Option<(usize, S, S)> {
+        self.bounds.iter().zip(state).enumerate().find_map(|(index, (bounds, &x))| match *bounds {
+            Some((lower, upper)) if !(x >= lower && x <= upper) => Some((index, lower, upper)),
+            _ => None,
+        })
+    }
+
+    /// Bounded component of `(q, v)` nearest to a bound, relative to its width, with the bounds.
+    pub(super) fn tightest(&self, state: &[S]) -> Option<(usize, S, S)> {
+        let mut best: Option<(S, (usize, S, S))> = None;
+        for (index, (bounds, &x)) in self.bounds.iter().zip(state).enumerate() {
+            if let Some((lower, upper)) = *bounds {
+                let room = S::min(x - lower, upper - x) / (upper - lower);
+                if best.is_none_or(|(smallest, _)| room < smallest) {
+                    best = Some((room, (index, lower, upper)));
+                }
+            }
+        }
+        best.map(|(_, found)| found)
+    }
+}
+
+/// Options of a roll-out.
+///
+/// | Name | Default | Purpose | Range |
+/// |---|---|---|---|
+/// | `t0` | 0 | time of the start | finite |
+/// | `t_end` | given | time of the last sample; before `t0` integrates backwards | finite |
+/// | `dt` | given | distance of samples; its sign is ignored | finite, not 0, at most 10^8 samples |
+/// | `method` | `Dopri5` | integrator | |
+/// | `rtol`, `atol` | 1e-6, 1e-8 | local error per step: `atol + rtol abs(y)` per component, root mean square | >= 0, not both 0 |
+/// | `max_steps` | 1,000,000 | attempts of all steps | >= 1 |
+/// | `domain` | none | where the trajectory must stay | `2n` components |
+/// | `energy` | true | store `E` at every sample | |
+///
+/// `rtol` below about ten roundings of the scalar cannot be reached and costs many steps (`f32`: 1e-6).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Options<S> {
+    /// Time of the start.
+    pub t0: S,
+    /// Time of the last sample.
+    pub t_end: S,
+    /// Distance of samples.
+    pub dt: S,
+    /// Integrator.
+    pub method: Method,
+    /// Relative tolerance.
+    pub rtol: S,
+    /// Absolute tolerance in the unit of each component.
+    pub atol: S,
+    /// Attempts allowed.
+    pub max_steps: usize,
+    /// Where the trajectory must stay.
+    pub domain: Option<Domain<S>>,
+    /// Whether to store the energy of every sample.
+    pub energy: bool,
+}
+
+/// More samples than this are refused: their memory would be in the tens of gigabytes.
+const MAX_SAMPLES: f64 = 1e8;
+
+impl<S: Scalar> Options<S> {
+    /// Learned motion as in the paper's tests: `Dopri5`, rtol 1e-6, atol 1e-8, from time 0.
+    pub fn new(t_end: S, dt: S) -> Self {
+        Self {
+            t0: <S as Real>::zero(),
+            t_end,
+            dt,
+            method: Method::Dopri5,
+            rtol: S::of_f64(1e-6),
+            atol: S::of_f64(1e-8),
+            max_steps: 1_000_000,
+            domain: None,
+            energy: true,
+        }
+    }
+
+    /// Ground truth: `Dop853` with rtol = atol = 1e-12, or sixteen roundings where the scalar is coarser.
+    pub fn reference(t_end: S, dt: S) -> Self {
+        let tolerance = S::max(S::of_f64(1e-12), S::EPSILON.ldexp(4));
+        Self { method: Method::Dop853, rtol: tolerance, atol: tolerance, ..Self::new(t_end, dt) }
+    }
+
+    /// Refuses options that make no sense for `n` coordinates.
+    ///
+    /// # Errors
+    /// [`RolloutError::Invalid`] naming the option.
+    pub fn check(&self, n: usize) -> Result<(), RolloutError> {
+        let invalid = |what, problem: String| Err(RolloutError::Invalid { what, problem });
+        for (what, value) in [("t0", self.t0), ("t_end", self.t_end), ("dt", self.dt)] {
+            if !value.is_finite() {
+                return invalid(what, format!("{value} is not finite"));
+            }
+        }
+        if self.dt == <S as Real>::zero() {
+            return invalid("dt", "must not be 0".into());
+        }
+        let samples = ((self.t_end - self.t0) / self.dt).abs();
+        if !(samples.to_f64() <= MAX_SAMPLES) {
+            return invalid("dt", format!("asks for {:.3e} samples, at most {MAX_SAMPLES:.0e} are allowed", samples.to_f64()));
+        }
+        for (what, value) in [("rtol", self.rtol), ("atol", self.atol)] {
+            if !(value.is_finite() && value >= <S as Real>::zero()) {
+                return invalid(what, format!("{value} is not a finite number >= 0"));
+            }
+        }
+        if self.rtol + self.atol <= <S as Real>::zero() {
+            return invalid("rtol", "rtol and atol must not both be 0".into());
+        }
+        if self.max_steps == 0 {
+            return invalid("max_steps", "must be at least 1".into());
+        }
+        match &self.domain {
+            Some(domain) if domain.len() != 2 * n => {
+                invalid("domain", format!("expected {} components, found {}", 2 * n, domain.len()))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Requested samples: elapsed times `|t - t0|` in ascending order and the times themselves; the last is `t_end`.
+    pub(super) fn samples(&self) -> (Vec<S>, Vec<S>) {
+        let span = self.t_end - self.t0;
+        let step = self.dt.abs();
+        let signed = if span < <S as Real>::zero() { -step } else { step };
+        let ratio = span.abs() / step;
+        // A quotient this close to a whole number is whole: the times carry no more digits.
+        let blur = S::EPSILON.ldexp(2) * (self.t0.abs() + self.t_end.abs() + span.abs()) / step;
+        let whole = (ratio + blur).floor();
+        let mut elapsed = Vec::new();
+        let mut times = Vec::new();
+        let count = whole.to_f64() as usize;
+        for k in 0..=count {
+            let k = S::of_f64(k as f64);
+            elapsed.push(k * step);
+            times.push(self.t0 + k * signed);
+        }
+        if (ratio - whole).abs() <= blur {
+            elapsed.pop();
+            times.pop();
+        }
+        elapsed.push(span.abs());
+        times.push(self.t_end);
+        (elapsed, times)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sample_times_are_the_requested_ones() {
+        let times = |t0: f64, t_end: f64, dt: f64| Options { t0, ..Options::new(t_end, dt) }.samples().1;
+        assert_eq!(times(0.0, 0.3, 0.1), [0.0, 0.1, 0.2, 0.3]);
+        assert_eq!(times(0.0, 0.35, 0.1), [0.0, 0.1, 0.2, 0.1 * 3.0, 0.35]);
+        assert_eq!(times(1.0, 0.0, 0.5), [1.0, 0.5, 0.0]);
+        assert_eq!(times(-1.0, 1.0, -1.0), [-1.0, 0.0, 1.0]);
+        assert_eq!(times(2.0, 2.0, 0.1), [2.0]);
+        assert_eq!(times(0.0, 0.05, 0.1), [0.0, 0.05]);
+        assert_eq!(times(0.0, 100.0, 0.1).len(), 1001);
+        assert_eq!(times(1e6, 1e6 + 1.0, 0.1).len(), 11);
+        let single = Options::<f32>::new(100.0, 0.1).samples().1;
+        assert_eq!(single.len(), 1001);
+        assert_eq!(*single.last().unwrap(), 100.0);
+    }
+
+    #[test]
+    fn nonsense_is_named() {
+        let good = Options::<f64>::new(1.0, 0.1);
+        assert!(good.check(1).is_ok());
+        let name = |options: Options<f64>| match options.check(1) {
+            Err(RolloutError::Invalid { what, .. }) => what,
+            other => panic!("{other:?}"),
+        };
+        assert_eq!(name(Options { dt: 0.0, ..good.clone() }), "dt");
+        assert_eq!(name(Options { dt: 1e-12, ..good.clone() }), "dt");
+        assert_eq!(name(Options { t_end: f64::INFINITY, ..good.clone() }), "t_end");
+        assert_eq!(name(Options { rtol: f64::NAN, ..good.clone() }), "rtol");
+        assert_eq!(name(Options { atol: -1.0, ..good.clone() }), "atol");
+        assert_eq!(name(Options { rtol: 0.0, atol: 0.0, ..good.clone() }), "rtol");
+        assert_eq!(name(Options { max_steps: 0, ..good.clone() }), "max_steps");
+        assert_eq!(name(Options { domain: Some(Domain::new(vec![None])), ..good.clone() }), "domain");
+    }
+
+    #[test]
+    fn domain_reports_the_first_violation() {
+        let domain = Domain::new(vec![None, Some((-1.0, 1.0))]);
+        assert_eq!(domain.violation(&[1e9, 0.5]), None);
+        assert_eq!(domain.violation(&[0.0, 1.5]), Some((1, -1.0, 1.0)));
+        assert_eq!(domain.violation(&[0.0, f64::NAN]), Some((1, -1.0, 1.0)));
+    }
+}

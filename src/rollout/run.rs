@@ -1,0 +1,204 @@
+//! Roll-outs of one start and of many.
+
+use super::ode::{Ended, Task};
+use super::{Integrable, Options, RolloutError, Statistics, Trajectory, UnderflowCause};
+use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Terms};
+use crate::scalar::Scalar;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// What a roll-out brought.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rollout<S> {
+    /// The samples reached; all valid, whatever `stop` says.
+    pub trajectory: Trajectory<S>,
+    /// Work done.
+    pub statistics: Statistics,
+    /// Why it ended before `t_end`.
+    pub stop: Option<RolloutError>,
+}
+
+impl<S: Scalar> Rollout<S> {
+    /// Whether `t_end` was reached.
+    pub fn is_complete(&self) -> bool {
+        self.stop.is_none()
+    }
+
+    /// The trajectory if `t_end` was reached.
+    ///
+    /// # Errors
+    /// The reason if not.
+    pub fn complete(self) -> Result<Trajectory<S>, RolloutError> {
+        match self.stop {
+            None => Ok(self.trajectory),
+            Some(error) => Err(error),
+        }
+    }
+}
+
+/// Why the derivative of a state cannot be had.
+enum Failure {
+    Domain { component: usize, value: f64, lower: f64, upper: f64 },
+    State,
+    Model(MechanicsError),
+}
+
+/// Integrates `dq/dt = v`, `dv/dt = a(q, v)` from `(q, v)` at `options.t0` and samples it at `t0 + k dt` and `t_end`.
+///
+/// `q` and `v` have length `n` and are in physical units. The domain is checked at every state that is evaluated, the
+/// trial states of a step included; a step that would leave it is shortened, so that the time reported is the time of
+/// the exit.
+pub fn rollout<S: Integrable>(model: &dyn EulerLagrange<S>, q: &[S], v: &[S], options: &Options<S>) -> Rollout<S> {
+    let n = model.coordinates();
+    let mut result =
+        Rollout { trajectory: Trajectory::empty(n), statistics: Statistics::default(), stop: check(n, q, v, options).err() };
+    if result.stop.is_some() {
+        return result;
+    }
+
+    let (elapsed, times) = options.samples();
+    let backwards = options.t_end < options.t0;
+    let start: Vec<S> = q.iter().chain(v).copied().collect();
+    let task = Task {
+        method: options.method,
+        rtol: options.rtol,
+        atol: options.atol,
+        max_steps: options.max_steps,
+        first_step: S::of_f64(0.0),
+        start: &start,
+        samples: &elapsed,
+    };
+
+    let mut terms = Terms::default();
+    let mut derivative = |y: &[S], dy: &mut [S]| -> Result<(), Failure> {
+        if y.iter().any(|x| !x.is_finite()) {
+            return Err(Failure::State);
+        }
+        if let Some((component, lower, upper)) = options.domain.as_ref().and_then(|domain| domain.violation(y)) {
+            let (value, lower, upper) = (y[component].to_f64(), lower.to_f64(), upper.to_f64());
+            return Err(Failure::Domain { component, value, lower, upper });
+        }
+        let (q, v) = y.split_at(n);
+        model.terms(q, v, Request::ACCELERATION, &mut terms).map_err(Failure::Model)?;
+        if terms.acceleration.len() != n {
+            let (expected, found) = (n, terms.acceleration.len());
+            return Err(Failure::Model(MechanicsError::Shape { what: "acceleration", expected, found }));
+        }
+        if terms.acceleration.iter().any(|a| !a.is_finite()) {
+            return Err(Failure::Model(MechanicsError::NotFinite { row: 0, what: "acceleration" }));
+        }
+        for (slope, &x) in dy.iter_mut().zip(v.iter().chain(&terms.acceleration)) {
+            *slope = if backwards { -x } else { x };
+        }
+        Ok(())
+    };
+    let trajectory = &mut result.trajectory;
+    let domain = options.domain.as_ref();
+    let mut valid = true;
+    let mut sample = |k: usize, y: &[S]| {
+        // An interpolated state may still cross a bound by less than the tolerance.
+        valid &= y.iter().all(|x| x.is_finite()) && domain.is_none_or(|domain| domain.violation(y).is_none());
+        if valid {
+            trajectory.t.push(times[k]);
+            trajectory.q.extend_from_slice(&y[..n]);
+            trajectory.v.extend_from_slice(&y[n..]);
+        }
+    };
+
+    let ran = S::integrate(&task, &mut derivative, &mut sample);
+    result.statistics = ran.statistics;
+    let t = if backwards { options.t0 - ran.elapsed } else { options.t0 + ran.elapsed }.to_f64();
+    let state: Vec<f64> = ran.state.iter().map(|x| x.to_f64()).collect();
+    let step = ran.step.to_f64();
+    result.stop = match ran.ended {
+        None if valid => None,
+        None => left(domain, &ran.state, t, state),
+        Some(Ended::TooManySteps) => Some(RolloutError::TooManySteps { t, steps: options.max_steps }),
+        Some(Ended::Failed(failure)) => Some(typed(failure, t, state, step)),
+        Some(Ended::Underflow) => {
+            let largest_acceleration = match model.terms(&ran.state[..n], &ran.state[n..], Request::ACCELERATION, &mut terms)
+            {
+                Ok(()) => terms.acceleration.iter().map(|a| a.abs().to_f64()).fold(0.0, f64::max),
+                Err(_) => f64::NAN,
+            };
+            let cause = UnderflowCause::ErrorTest { largest_acceleration };
+            Some(RolloutError::StepUnderflow { t, state, step, cause })
+        }
+    };
+    if options.energy {
+        result.trajectory.energy = Some(result.trajectory.energy_by(model));
+    }
+    result
+}
+
+/// Rolls out every start `(q, v)`; the results keep the order of the starts and do not depend on `threads`.
+pub fn rollout_many<S: Integrable>(
+    model: &dyn EulerLagrange<S>,
+    starts: &[(Vec<S>, Vec<S>)],
+    options: &Options<S>,
+    threads: usize,
+) -> Vec<Rollout<S>> {
+    let run = |(q, v): &(Vec<S>, Vec<S>)| rollout(model, q, v, options);
+    let threads = threads.clamp(1, starts.len().max(1));
+    if threads == 1 {
+        return starts.iter().map(run).collect();
+    }
+    let next = AtomicUsize::new(0);
+    let done = Mutex::new(Vec::with_capacity(starts.len()));
+    std::thread::scope(|scope| {
+        for _ in 0..threads {
+            scope.spawn(|| {
+                while let Some((k, start)) = {
+                    let k = next.fetch_add(1, Ordering::Relaxed);
+                    starts.get(k).map(|start| (k, start))
+                } {
+                    let rolled = run(start);
+                    done.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push((k, rolled));
+                }
+            });
+        }
+    });
+    let mut done = done.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
+    done.sort_by_key(|(k, _)| *k);
+    done.into_iter().map(|(_, rolled)| rolled).collect()
+}
+
+fn check<S: Scalar>(n: usize, q: &[S], v: &[S], options: &Options<S>) -> Result<(), RolloutError> {
+    let invalid = |what, problem| Err(RolloutError::Invalid { what, problem });
+    if n == 0 {
+        return invalid("model", "has no coordinates".to_string());
+    }
+    for (what, values) in [("q", q), ("v", v)] {
+        if values.len() != n {
+            return invalid(what, format!("expected {n} numbers, found {}", values.len()));
+        }
+        if let Some(index) = values.iter().position(|x| !x.is_finite()) {
+            return invalid(what, format!("number {index} is not finite"));
+        }
+    }
+    options.check(n)
+}
+
+/// The error of a trajectory whose samples cross a bound that its steps respect: it is grazed within the tolerance.
+fn left<S: Scalar>(
+    domain: Option<&super::Domain<S>>,
+    reached: &[S],
+    t: f64,
+    state: Vec<f64>,
+) -> Option<RolloutError> {
+    let (component, lower, upper) = domain?.violation(reached).or_else(|| domain?.tightest(reached))?;
+    let (value, lower, upper) = (state[component], lower.to_f64(), upper.to_f64());
+    Some(RolloutError::LeftDomain { t, state, component, value, lower, upper })
+}
+
+fn typed(failure: Failure, t: f64, state: Vec<f64>, step: f64) -> RolloutError {
+    match failure {
+        Failure::Domain { component, value, lower, upper } => {
+            RolloutError::LeftDomain { t, state, component, value, lower, upper }
+        }
+        Failure::State => RolloutError::NotFinite { t, state, what: "state" },
+        Failure::Model(MechanicsError::Singular { condition, .. }) => RolloutError::SingularMass { t, state, condition },
+        Failure::Model(MechanicsError::NotFinite { what, .. }) => RolloutError::NotFinite { t, state, what },
+        Failure::Model(error) => RolloutError::StepUnderflow { t, state, step, cause: UnderflowCause::Model(error) },
+    }
+}

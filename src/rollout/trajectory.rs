@@ -1,0 +1,178 @@
+//! Sampled motion.
+
+use super::RolloutError;
+use crate::lagrangian::{EulerLagrange, Request, Terms};
+use crate::scalar::Scalar;
+use serde::{Deserialize, Serialize};
+use std::fmt::Write as _;
+
+/// Counts of an integration.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Statistics {
+    /// Steps taken.
+    pub accepted: usize,
+    /// Steps attempted and not taken.
+    pub rejected: usize,
+    /// Evaluations of the acceleration.
+    pub evaluations: usize,
+}
+
+impl std::ops::AddAssign for Statistics {
+    fn add_assign(&mut self, other: Self) {
+        self.accepted += other.accepted;
+        self.rejected += other.rejected;
+        self.evaluations += other.evaluations;
+    }
+}
+
+/// States at successive times, in physical units.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Trajectory<S> {
+    /// Number of coordinates `n`.
+    pub coordinates: usize,
+    /// Times.
+    pub t: Vec<S>,
+    /// Coordinates, `(len, n)`; angles continuous.
+    pub q: Vec<S>,
+    /// Velocities, `(len, n)`.
+    pub v: Vec<S>,
+    /// Energy at each time by the model that moved, if asked for; `NaN` where it could not be computed.
+    pub energy: Option<Vec<S>>,
+}
+
+/// States evaluated at once.
+const CHUNK: usize = 256;
+
+impl<S: Scalar> Trajectory<S> {
+    /// No states of `n` coordinates.
+    pub fn empty(coordinates: usize) -> Self {
+        Self { coordinates, t: Vec::new(), q: Vec::new(), v: Vec::new(), energy: None }
+    }
+
+    /// Number of states.
+    pub fn len(&self) -> usize {
+        self.t.len()
+    }
+
+    /// Whether there are no states.
+    pub fn is_empty(&self) -> bool {
+        self.t.is_empty()
+    }
+
+    /// State `k` as `(q, v)`.
+    ///
+    /// # Panics
+    /// If `k` is not below [`Trajectory::len`].
+    pub fn state(&self, k: usize) -> (&[S], &[S]) {
+        let rows = k * self.coordinates..(k + 1) * self.coordinates;
+        (&self.q[rows.clone()], &self.v[rows])
+    }
+
+    /// Energy `E = p.v - L` of `model` at every state; `NaN` where the model cannot say.
+    pub fn energy_by(&self, model: &dyn EulerLagrange<S>) -> Vec<S> {
+        let size = CHUNK * self.coordinates.max(1);
+        let mut energy = Vec::with_capacity(self.len());
+        let mut terms = Terms::default();
+        for (q, v) in self.q.chunks(size).zip(self.v.chunks(size)) {
+            let batch = q.len() / self.coordinates;
+            terms.energy.clear();
+            // A row that is not finite is reported and stays `NaN` or infinite in the result.
+            let computed = model.terms(q, v, Request::ENERGY, &mut terms);
+            if terms.energy.len() == batch {
+                energy.extend(terms.energy.iter().map(|&e| if e.is_finite() { e } else { S::NAN }));
+            } else {
+                debug_assert!(computed.is_err());
+                energy.resize(energy.len() + batch, S::NAN);
+            }
+        }
+        energy
+    }
+
+    /// The same states in another precision.
+    pub fn cast<T: Scalar>(&self) -> Trajectory<T> {
+        let cast = |values: &[S]| values.iter().map(|&x| x.cast()).collect::<Vec<T>>();
+        Trajectory {
+            coordinates: self.coordinates,
+            t: cast(&self.t),
+            q: cast(&self.q),
+            v: cast(&self.v),
+            energy: self.energy.as_deref().map(cast),
+        }
+    }
+
+    /// CSV text with the header `t, columns..` and, if stored, `energy`; full digits, one state per line.
+    ///
+    /// `columns` are the `2n` names of a state, coordinates then velocities.
+    ///
+    /// # Errors
+    /// [`RolloutError::Invalid`] if the number of columns is not `2n`.
+    pub fn to_csv<T: AsRef<str>>(&self, columns: &[T]) -> Result<String, RolloutError> {
+        let n = self.coordinates;
+        if columns.len() != 2 * n {
+            return Err(RolloutError::Invalid {
+                what: "columns",
+                problem: format!("expected {} names, found {}", 2 * n, columns.len()),
+            });
+        }
+        let mut text = String::from("t");
+        for column in columns {
+            text.push(',');
+            text.push_str(&quoted(column.as_ref()));
+        }
+        text.push_str(if self.energy.is_some() { ",energy\n" } else { "\n" });
+        for (k, t) in self.t.iter().enumerate() {
+            let (q, v) = self.state(k);
+            text.push_str(&t.to_text());
+            for x in q.iter().chain(v) {
+                let _ = write!(text, ",{}", x.to_text());
+            }
+            if let Some(energy) = self.energy.as_ref().and_then(|energy| energy.get(k)) {
+                let _ = write!(text, ",{}", energy.to_text());
+            }
+            text.push('\n');
+        }
+        Ok(text)
+    }
+}
+
+/// A CSV field, in quotes where the format demands them.
+fn quoted(field: &str) -> String {
+    if field.contains([',', '"', '\n', '\r']) { format!("\"{}\"", field.replace('"', "\"\"")) } else { field.into() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn two() -> Trajectory<f64> {
+        Trajectory {
+            coordinates: 1,
+            t: vec![0.0, 0.1],
+            q: vec![1.0, 1.0 / 3.0],
+            v: vec![0.0, -1e-300],
+            energy: Some(vec![0.5, f64::NAN]),
+        }
+    }
+
+    #[test]
+    fn csv_keeps_every_digit() {
+        let text = two().to_csv(&["x", "a,\"b\""]).unwrap();
+        let mut lines = text.lines();
+        assert_eq!(lines.next().unwrap(), "t,x,\"a,\"\"b\"\"\",energy");
+        assert_eq!(lines.next().unwrap(), "0.0,1.0,0.0,0.5");
+        let fields: Vec<f64> = lines.next().unwrap().split(',').map(|f| f.parse().unwrap()).collect();
+        assert_eq!(fields[..3], [0.1, 1.0 / 3.0, -1e-300]);
+        assert!(fields[3].is_nan());
+        assert_eq!(lines.next(), None);
+        assert!(two().to_csv(&["x"]).is_err());
+    }
+
+    #[test]
+    fn states_and_casts() {
+        let trajectory = two();
+        assert_eq!(trajectory.state(1), (&[1.0 / 3.0][..], &[-1e-300][..]));
+        let single: Trajectory<f32> = trajectory.cast();
+        assert_eq!(single.q, [1.0, 1.0 / 3.0]);
+        assert_eq!(single.v[1], 0.0);
+    }
+}
