@@ -1,0 +1,58 @@
+//! A training step allocates nothing after the first.
+
+use lnn::network::{Activation, Architecture, Initialization, initial_weights};
+use lnn::training::{Dataset, Method, Moments, Objective, Penalty, Update};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+struct Counting;
+static CALLS: AtomicUsize = AtomicUsize::new(0);
+
+// SAFETY: every call is passed on to the system allocator unchanged.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        CALLS.fetch_add(1, Ordering::Relaxed);
+        unsafe { System.alloc(layout) }
+    }
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+// One test, so that no other thread allocates meanwhile.
+#[test]
+fn a_training_step_allocates_nothing_after_the_first() {
+    let architecture = Architecture {
+        coordinates: 2,
+        hidden: vec![96; 3],
+        activation: Activation::Gelu,
+        alpha: -1.0,
+        scale: vec![2.0; 2],
+        periodic: vec![true; 2],
+        embed_periodic: true,
+    };
+    let mut rng = ChaCha8Rng::seed_from_u64(1);
+    let mut weights: Vec<f32> = initial_weights(&architecture, Initialization::Default, &mut rng);
+    let mut draw = || (0..2 * 256).map(|_| rng.random_range(-2.0..2.0)).collect();
+    let data = Dataset::new(2, draw(), draw(), draw()).unwrap();
+    let rows: Vec<u32> = (0..256).collect();
+    // The negative quadratic term keeps the penalty and its jets active.
+    let mut objective = Objective::new(&architecture, Penalty::Eigenvalue { lambda: 1.0 }, 2).unwrap();
+    let (mut gradient, mut moments) = (weights.clone(), Moments::new(weights.len()));
+    let update = Update { method: Method::Radam, rate: 1e-6, weight_decay: 1e-6, clip: 1.0 };
+    let mut step = || {
+        let report = objective.step(&weights, &data, &rows, &mut gradient);
+        assert_eq!(report.penalised, 256);
+        moments.update(&mut weights, &gradient, &update);
+    };
+    (0..3).for_each(|_| step());
+    let before = CALLS.load(Ordering::Relaxed);
+    (0..10).for_each(|_| step());
+    let counted = CALLS.load(Ordering::Relaxed) - before;
+    assert_eq!(counted, 0, "allocations in 10 steps");
+}
