@@ -9,9 +9,7 @@ mod primitive;
 mod simd;
 
 pub use dd::{Dd, UnreadableNumber};
-pub use lanes::{
-    Exponential, Lanes, cos_lanes, exp_lanes, ln_lanes, sin_cos_lanes, sin_lanes, sqrt_lanes, tanh_lanes,
-};
+pub use lanes::{Exponential, Lanes, cos_lanes, exp_lanes, ln_lanes, sin_cos_lanes, sin_lanes, sqrt_lanes, tanh_lanes};
 pub use simd::vectorized;
 
 use std::fmt::{Debug, Display};
@@ -205,6 +203,7 @@ pub trait Scalar:
     #[inline]
     fn cast<T: Scalar>(self) -> T {
         let (high, low) = self.parts();
-        T::of_f64(high) + T::of_f64(low)
+        let leading = T::of_f64(high);
+        if leading.is_finite() { leading + T::of_f64(low) } else { leading }
     }
 }
