@@ -2,8 +2,11 @@
 
 use super::{Real, Scalar, Slice, SliceMut};
 
+/// Beyond it angles are reduced by the portable library: system libraries lose digits next to multiples of `pi/2`.
+const LARGE_ANGLE: f64 = 1048576.0;
+
 macro_rules! impl_primitive {
-    ($float:ident, $bits:ty, $erfc:path, $ldexp:path) => {
+    ($float:ident, $bits:ty, $erfc:path, $ldexp:path, $sin:path, $cos:path, $tan:path, $sin_cos:path) => {
         impl Real for $float {
             type Scalar = $float;
 
@@ -19,7 +22,7 @@ macro_rules! impl_primitive {
             fn recip(self) -> Self {
                 1.0 / self
             }
-            impl_primitive!(@std $float: sqrt exp exp_m1 ln ln_1p sin cos tan asin acos atan sinh cosh tanh);
+            impl_primitive!(@std $float: sqrt exp exp_m1 ln ln_1p asin acos atan sinh cosh tanh);
             #[inline]
             fn erfc(self) -> Self {
                 $erfc(self)
@@ -68,8 +71,20 @@ macro_rules! impl_primitive {
                 }
             }
             #[inline]
+            fn sin(self) -> Self {
+                if self.abs() <= LARGE_ANGLE as $float { <$float>::sin(self) } else { $sin(self) }
+            }
+            #[inline]
+            fn cos(self) -> Self {
+                if self.abs() <= LARGE_ANGLE as $float { <$float>::cos(self) } else { $cos(self) }
+            }
+            #[inline]
+            fn tan(self) -> Self {
+                if self.abs() <= LARGE_ANGLE as $float { <$float>::tan(self) } else { $tan(self) }
+            }
+            #[inline]
             fn sin_cos(self) -> (Self, Self) {
-                <$float>::sin_cos(self)
+                if self.abs() <= LARGE_ANGLE as $float { <$float>::sin_cos(self) } else { $sin_cos(self) }
             }
         }
 
@@ -121,8 +136,8 @@ macro_rules! impl_primitive {
                 if (0.0..turn).contains(&self) {
                     return self;
                 }
-                // The hardware-independent sine and cosine reduce by an exact quotient; their angle is the remainder.
-                let (sin, cos) = <$float>::sin_cos(self);
+                // Sine and cosine reduce by an exact quotient; their angle is the remainder.
+                let (sin, cos) = Real::sin_cos(self);
                 let angle = sin.atan2(cos);
                 let wrapped = if angle < 0.0 { angle + turn } else { angle };
                 if wrapped >= turn { 0.0 } else { wrapped }
@@ -162,5 +177,72 @@ macro_rules! impl_primitive {
     };
 }
 
-impl_primitive!(f32, u32, libm::erfcf, libm::scalbnf);
-impl_primitive!(f64, u64, libm::erfc, libm::scalbn);
+impl_primitive!(f32, u32, libm::erfcf, libm::scalbnf, libm::sinf, libm::cosf, libm::tanf, libm::sincosf);
+impl_primitive!(f64, u64, libm::erfc, libm::scalbn, libm::sin, libm::cos, libm::tan, libm::sincos);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scalar::Dd;
+
+    fn checks<S: Scalar>(smallest: S, lowest_exponent: i32) {
+        let (one, zero) = (<S as Real>::one(), <S as Real>::zero());
+        // Powers of two, subnormal ones included, and no detour through infinity or zero.
+        assert_eq!(smallest.ilogb(), lowest_exponent);
+        assert_eq!(one.ldexp(lowest_exponent), smallest);
+        assert_eq!(smallest.ldexp(-lowest_exponent), one);
+        assert_eq!(smallest.ldexp(i32::MAX), S::INFINITY);
+        assert_eq!(zero.ldexp(i32::MAX), zero);
+        assert_eq!(S::MAX.ldexp(i32::MIN), zero);
+        assert_eq!(S::MIN_POSITIVE.ldexp(-1).ilogb() + 1, S::MIN_POSITIVE.ilogb());
+        assert_eq!((-S::of_f64(6.5)).ilogb(), 2);
+        assert_eq!(zero.ilogb(), i32::MIN);
+        // NaN wins in every position.
+        for (x, y) in [(S::NAN, one), (one, S::NAN)] {
+            assert!(Real::max(x, y).is_nan() && Real::min(x, y).is_nan());
+        }
+        assert!(S::NAN.select(one, zero).is_nan() && S::NAN.relu().is_nan());
+        assert_eq!([one.select(one, zero), zero.select(one, zero), (-zero).select(one, zero)], [one, zero, zero]);
+        assert_eq!([S::INFINITY.logistic(), (-S::INFINITY).logistic()], [one, zero]);
+        assert_eq!([S::INFINITY.softplus(), (-S::INFINITY).softplus()], [S::INFINITY, zero]);
+        assert!(S::NAN.logistic().is_nan() && S::NAN.softplus().is_nan());
+        // Both tails against double-double numbers.
+        let floor = Dd::of_f64(2.0) * smallest.cast::<Dd>();
+        for k in -760..=760 {
+            let x = S::of_f64(f64::from(k) * 0.97);
+            let wide = x.cast::<Dd>();
+            let close = |found: S, exact: Dd, units: f64| {
+                Real::abs(found.cast::<Dd>() - exact)
+                    <= Dd::of_f64(units) * S::EPSILON.cast() * Real::abs(exact) + floor
+            };
+            assert!(close(x.logistic(), wide.logistic(), 3.0), "{x:?}");
+            assert!(close(x.softplus(), wide.softplus(), 3.0), "{x:?}");
+            let base = one + S::of_f64(f64::from(k) * 1e-3);
+            for exponent in [-5, -1, 0, 1, 2, 3, 7] {
+                let exact = base.cast::<Dd>().powi(exponent);
+                assert!(close(Real::powi(base, exponent), exact, 4.0), "{base:?}^{exponent}");
+            }
+        }
+    }
+
+    #[test]
+    fn rules_and_tails() {
+        checks::<f32>(f32::from_bits(1), -149);
+        checks::<f64>(f64::from_bits(1), -1074);
+        checks::<Dd>(Dd::of_f64(f64::from_bits(1)), -1074);
+    }
+
+    #[test]
+    fn angles_of_any_size() {
+        let hard = 6381956970095103.0 * 2.0_f64.powi(797);
+        for x in (0..=1000).map(|k| 2.0_f64.powi(k)).chain([hard]) {
+            let exact = Dd::of_f64(x).sin_cos();
+            let (s, c) = Real::sin_cos(x);
+            for (found, exact) in [(s, exact.0), (c, exact.1), (Real::sin(x), exact.0), (Real::cos(x), exact.1)] {
+                let error = Real::abs(Dd::of_f64(found) - exact).to_f64();
+                assert!(error <= f64::EPSILON * exact.to_f64().abs(), "{x}: {found} {exact}");
+            }
+        }
+        assert!(Real::cos(hard).abs() < 1e-17 && Real::cos(hard) != 0.0);
+    }
+}

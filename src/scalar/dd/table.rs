@@ -1,5 +1,7 @@
 //! Values of the elementary functions at the nearest double-double number to a decimal, from `mpmath` with 4000 bits.
 
+#![allow(clippy::approx_constant, clippy::excessive_precision, clippy::inconsistent_digit_grouping)]
+
 /// `(function, argument, value)`; the argument is an `f64`.
 #[rustfmt::skip]
 pub(super) const VALUES: &[(&str, f64, &str)] = &[

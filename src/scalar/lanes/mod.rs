@@ -81,14 +81,21 @@ pub fn exp_lanes<S: Scalar>(x: &[S], out: &mut [S]) {
 
 /// `out = tanh(x)`, elementwise.
 pub fn tanh_lanes<S: Scalar>(x: &[S], out: &mut [S]) {
-    let (one, twice) = (S::of_f64(1.0), S::of_f64(-2.0));
+    let (one, two) = (S::of_f64(1.0), S::of_f64(2.0));
     vectorized(
         #[inline(always)]
         || {
             map(x, out, |x| {
-                let decay = (twice * Real::abs(x)).lane_exp();
-                let size = decay.minus_one / (one + decay.value());
-                if x > S::of_f64(0.0) { -size } else { size + (x - x) }
+                let decay = (-two * Real::abs(x)).lane_exp();
+                // tanh a = -m / (2 + m) with m = e^(-2a) - 1, the rounding of sum and quotient made good.
+                let m = decay.minus_one;
+                let sum = two + m;
+                let lost = (two - sum) + m;
+                let inverse = one / sum;
+                let quotient = m * inverse;
+                let rest = lost.lane_fused(-quotient, sum.lane_fused(-quotient, m));
+                let size = rest.lane_fused(inverse, quotient);
+                if x > S::of_f64(0.0) { -size } else { size }
             });
         },
     );
@@ -110,10 +117,16 @@ pub fn sqrt_lanes<S: Scalar>(x: &[S], out: &mut [S]) {
     );
 }
 
+/// Whether the fast reduction serves an angle.
+#[inline(always)]
+fn is_fast<S: Scalar>(x: S) -> bool {
+    Real::abs(x) <= S::FAST_ANGLE
+}
+
 /// Whether some angle needs the scalar function: too large, infinite or `NaN`.
 #[inline(always)]
 fn any_large<S: Scalar>(x: &[S]) -> bool {
-    x.iter().fold(false, |any, &x| any | !(Real::abs(x) <= S::FAST_ANGLE))
+    x.iter().fold(false, |any, &x| any | !is_fast(x))
 }
 
 /// `sin = sin(x)`, `cos = cos(x)`, elementwise, angles in radians of any size.
@@ -130,7 +143,7 @@ pub fn sin_cos_lanes<S: Scalar>(x: &[S], sin: &mut [S], cos: &mut [S]) {
     );
     if large {
         for ((&x, sin), cos) in x.iter().zip(sin).zip(cos) {
-            if !(Real::abs(x) <= S::FAST_ANGLE) {
+            if !is_fast(x) {
                 (*sin, *cos) = Real::sin_cos(x);
             }
         }
@@ -139,12 +152,24 @@ pub fn sin_cos_lanes<S: Scalar>(x: &[S], sin: &mut [S], cos: &mut [S]) {
 
 /// `out = sin(x)`, elementwise, angles in radians of any size.
 pub fn sin_lanes<S: Scalar>(x: &[S], out: &mut [S]) {
-    angles(x, out, #[inline(always)] |x| x.lane_sin_cos().0, Real::sin);
+    angles(
+        x,
+        out,
+        #[inline(always)]
+        |x| x.lane_sin_cos().0,
+        Real::sin,
+    );
 }
 
 /// `out = cos(x)`, elementwise, angles in radians of any size.
 pub fn cos_lanes<S: Scalar>(x: &[S], out: &mut [S]) {
-    angles(x, out, #[inline(always)] |x| x.lane_sin_cos().1, Real::cos);
+    angles(
+        x,
+        out,
+        #[inline(always)]
+        |x| x.lane_sin_cos().1,
+        Real::cos,
+    );
 }
 
 #[inline(always)]
@@ -158,7 +183,7 @@ fn angles<S: Scalar>(x: &[S], out: &mut [S], fast: impl Fn(S) -> S, any_size: im
     );
     if large {
         for (&x, out) in x.iter().zip(out) {
-            if !(Real::abs(x) <= S::FAST_ANGLE) {
+            if !is_fast(x) {
                 *out = any_size(x);
             }
         }
