@@ -57,7 +57,7 @@ pub fn lyapunov<S: Integrable>(
         let shifted: Vec<S> = flat(k).iter().zip(&offset).map(|(x, d)| S::of_f64(x + d)).collect();
         let (t, t_end) = (main.t[k], main.t[k + 1]);
         let leap = Options { t0: t, t_end, dt: t_end - t, energy: false, domain: None, ..options.clone() };
-        // The same start is integrated by the same steps from here, so that only the flow's own growth remains.
+        // Both start afresh for each leap: errors of earlier leaps do not count as growth.
         let ends: Vec<Vec<f64>> = [flat(k).iter().map(|&x| S::of_f64(x)).collect::<Vec<S>>(), shifted]
             .into_iter()
             .map(|start| {

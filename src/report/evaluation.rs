@@ -4,6 +4,9 @@ use super::{Figure, HeatMap, LinePlot, PlotError, Series, Trace, heat_maps_png, 
 use crate::analysis::{AffineFit, Grid, TrajectoryRun, affine_fit};
 use crate::scalar::Scalar;
 
+/// Times and values of one quantity of a run.
+type Part<S> = fn(&TrajectoryRun<S>) -> (&[f64], &[f64]);
+
 /// Pictures of trajectory tests: coordinate error, energy error, energy drift over time, one line per start, and for the
 /// first start the coordinates over time and its trace in the plane of coordinate and velocity.
 ///
@@ -20,18 +23,18 @@ pub fn evaluation_figures<S: Scalar, T: AsRef<str>>(
     let over_time = |title: &str, y_label: &str, log_y: bool, series: Vec<Series>| {
         line_png(&LinePlot { title: title.into(), x_label: "t [s]".into(), y_label: y_label.into(), log_y, series })
     };
-    let per_start = |part: &dyn Fn(&TrajectoryRun<S>) -> (Vec<f64>, Vec<f64>)| -> Vec<Series> {
+    let per_start = |part: Part<S>| -> Vec<Series> {
         runs.iter()
             .enumerate()
             .map(|(k, run)| {
                 let (t, y) = part(run);
-                Series::new(&format!("start {}", k + 1), &t, &y)
+                Series::new(&format!("start {}", k + 1), t, y)
             })
             .collect()
     };
-    let coordinate = per_start(&|run| (run.coordinates.t.clone(), run.coordinates.max.clone()));
-    let energy = per_start(&|run| (run.energy.t.clone(), run.energy.error.clone()));
-    let drift = per_start(&|run| (run.drift.t.clone(), run.drift.error.clone()));
+    let coordinate = per_start(|run| (&run.coordinates.t, &run.coordinates.max));
+    let energy = per_start(|run| (&run.energy.t, &run.energy.error));
+    let drift = per_start(|run| (&run.drift.t, &run.drift.error));
     keep(
         &mut figures,
         "coordinate_error.png",
@@ -54,8 +57,8 @@ pub fn evaluation_figures<S: Scalar, T: AsRef<str>>(
     let Some(run) = runs.first() else { return Ok(figures) };
     let (exact, learned) = (&run.exact.trajectory, &run.learned.trajectory);
     let n = exact.coordinates;
-    for i in 0..n.min(columns.len()) {
-        let name = columns[i].as_ref();
+    for (i, name) in columns.iter().take(n).enumerate() {
+        let name = name.as_ref();
         let angle = periodic.get(i).copied().unwrap_or(false);
         let line = |label: &str, trajectory: &crate::rollout::Trajectory<S>| {
             let t: Vec<f64> = trajectory.t.iter().map(|t| t.to_f64()).collect();
@@ -65,7 +68,12 @@ pub fn evaluation_figures<S: Scalar, T: AsRef<str>>(
         keep(
             &mut figures,
             &format!("trajectory_{}.png", file_part(name)),
-            over_time(&format!("{name} of start 1"), name, false, vec![line("exact", exact), line("learned", learned).dashed()]),
+            over_time(
+                &format!("{name} of start 1"),
+                name,
+                false,
+                vec![line("exact", exact), line("learned", learned).over()],
+            ),
             format!("{name} of start 1 over time, exact and learned."),
         )?;
     }
@@ -74,7 +82,10 @@ pub fn evaluation_figures<S: Scalar, T: AsRef<str>>(
         let angle = periodic.get(i).copied().unwrap_or(false);
         let path = |label: &str, trajectory: &crate::rollout::Trajectory<S>| {
             let part = |values: &[S]| values.iter().skip(i).step_by(n).map(|x| x.to_f64()).collect::<Vec<_>>();
-            Series { points: folded(&part(&trajectory.q), &part(&trajectory.v), angle, true), ..Series::new(label, &[], &[]) }
+            Series {
+                points: folded(&part(&trajectory.q), &part(&trajectory.v), angle, true),
+                ..Series::new(label, &[], &[])
+            }
         };
         let trace = Trace {
             title: "Phase space".into(),
@@ -86,7 +97,9 @@ pub fn evaluation_figures<S: Scalar, T: AsRef<str>>(
             &mut figures,
             &format!("phase_{}.png", file_part(q_name)),
             trace_png(&trace),
-            format!("Start 1 in the plane of {q_name} and {v_name}, exact and learned, from dark (early) to bright (late)."),
+            format!(
+                "Start 1 in the plane of {q_name} and {v_name}, exact and learned, from dark (early) to bright (late)."
+            ),
         )?;
     }
     Ok(figures)
@@ -147,7 +160,12 @@ pub fn grid_figures(comparison: &GridComparison) -> Result<(Figure, Option<Affin
 }
 
 /// Keeps a picture, drops one without data.
-fn keep(figures: &mut Vec<Figure>, file: &str, drawn: Result<Vec<u8>, PlotError>, caption: String) -> Result<(), PlotError> {
+fn keep(
+    figures: &mut Vec<Figure>,
+    file: &str,
+    drawn: Result<Vec<u8>, PlotError>,
+    caption: String,
+) -> Result<(), PlotError> {
     match drawn {
         Ok(png) => figures.push(Figure { file: file.into(), png, caption }),
         Err(PlotError::Empty(_)) => {}
@@ -213,8 +231,10 @@ mod tests {
 
     #[test]
     fn grids_are_compared_up_to_the_fit() {
-        let axes =
-            [Axis { component: 0, from: -3.0, to: 3.0, points: 61 }, Axis { component: 1, from: -2.0, to: 2.0, points: 41 }];
+        let axes = [
+            Axis { component: 0, from: -3.0, to: 3.0, points: 61 },
+            Axis { component: 1, from: -2.0, to: 2.0, points: 41 },
+        ];
         let grid = |model| lagrangian_grid::<f64>(model, &[0.0, 0.0], axes).unwrap();
         let exact = grid(&PENDULUM);
         let mut comparison = GridComparison {
@@ -233,8 +253,14 @@ mod tests {
         let (figure, _) = grid_figures(&comparison).unwrap();
         save(&[figure]);
         let det = determinant_grid::<f64>(&PENDULUM, &[0.0, 0.0], axes).unwrap();
-        comparison =
-            GridComparison { quantity: "det M".into(), file: "det_m".into(), exact: det.clone(), learned: det, fit: false, ..comparison };
+        comparison = GridComparison {
+            quantity: "det M".into(),
+            file: "det_m".into(),
+            exact: det.clone(),
+            learned: det,
+            fit: false,
+            ..comparison
+        };
         let (figure, fit) = grid_figures(&comparison).unwrap();
         assert!(fit.is_none());
         save(&[figure]);

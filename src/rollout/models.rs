@@ -3,11 +3,13 @@
 use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Terms};
 use crate::scalar::{Real, Scalar};
 
+type Force = fn(&[f64], &[f64], &mut [f64]) -> Result<f64, MechanicsError>;
+
 /// A system with a diagonal, constant mass matrix 1 given by its potential, acceleration and what may fail.
 pub(crate) struct Toy {
     n: usize,
     /// `(q, v) -> (acceleration, potential)`.
-    force: fn(&[f64], &[f64], &mut [f64]) -> Result<f64, MechanicsError>,
+    force: Force,
 }
 
 impl<S: Scalar> EulerLagrange<S> for Toy {
@@ -34,8 +36,8 @@ impl<S: Scalar> EulerLagrange<S> for Toy {
                     let kinetic: f64 = v.iter().map(|v| 0.5 * v * v).sum();
                     terms.energy[row] = S::of_f64(kinetic + potential);
                     terms.lagrangian[row] = S::of_f64(kinetic - potential);
-                    for i in 0..n {
-                        terms.acceleration[row * n + i] = S::of_f64(a[i]);
+                    for (i, &a) in a.iter().enumerate() {
+                        terms.acceleration[row * n + i] = S::of_f64(a);
                         terms.mass_matrix[row * n * n + i * n + i] = S::of_f64(1.0);
                     }
                 }

@@ -106,8 +106,8 @@ fn many_coordinates_and_single_precision() {
     let start = [1.0, 0.5, -0.5, 0.25];
     let done = rollout(&FOUR, &start, &[0.0; 4], &Options::<f64>::reference(10.0, 0.5)).complete().unwrap();
     for k in 0..done.len() {
-        for i in 0..4 {
-            let exact = start[i] * (done.t[k] * (1.0 + i as f64).sqrt()).cos();
+        for (i, start) in start.iter().enumerate() {
+            let exact = start * (done.t[k] * (1.0 + i as f64).sqrt()).cos();
             assert!((done.state(k).0[i] - exact).abs() < 1e-10);
         }
     }
@@ -179,7 +179,12 @@ fn a_bound_that_only_trial_states_cross_is_no_failure() {
     // The oscillator stays within [-1, 1]; trial states of long steps do not.
     let domain = Some(Domain::new(vec![Some((-1.0 - 1e-6, 1.0 + 1e-6)), None]));
     for method in METHODS {
-        let done = rollout(&OSCILLATOR, &[1.0], &[0.0], &Options { domain: domain.clone(), ..options(method, 20.0, 0.1, 1e-9) });
+        let done = rollout(
+            &OSCILLATOR,
+            &[1.0],
+            &[0.0],
+            &Options { domain: domain.clone(), ..options(method, 20.0, 0.1, 1e-9) },
+        );
         assert_eq!(done.stop, None, "{method:?}");
         assert!(oscillator_error(&done.trajectory, 0.0) < 1e-6);
     }
