@@ -34,7 +34,11 @@ pub fn angle_difference<S: Scalar>(a: S, b: S) -> S {
 ///
 /// Samples are matched by their place: both trajectories must come from the same sample times. A `periodic` shorter than
 /// `n` leaves the remaining coordinates plain.
-pub fn coordinate_error<S: Scalar>(exact: &Trajectory<S>, learned: &Trajectory<S>, periodic: &[bool]) -> CoordinateError {
+pub fn coordinate_error<S: Scalar>(
+    exact: &Trajectory<S>,
+    learned: &Trajectory<S>,
+    periodic: &[bool],
+) -> CoordinateError {
     let n = exact.coordinates.min(learned.coordinates);
     let len = exact.len().min(learned.len());
     let mut result = CoordinateError {

@@ -82,7 +82,11 @@ pub enum GridError {
 ///
 /// # Errors
 /// [`GridError`] if the state or an axis does not fit the model.
-pub fn lagrangian_grid<S: Scalar>(model: &dyn EulerLagrange<S>, state: &[f64], axes: [Axis; 2]) -> Result<Grid, GridError> {
+pub fn lagrangian_grid<S: Scalar>(
+    model: &dyn EulerLagrange<S>,
+    state: &[f64],
+    axes: [Axis; 2],
+) -> Result<Grid, GridError> {
     evaluate(model, state, axes, Request::LAGRANGIAN, |terms, row| terms.lagrangian.get(row).map(|x| x.to_f64()))
 }
 
@@ -90,7 +94,11 @@ pub fn lagrangian_grid<S: Scalar>(model: &dyn EulerLagrange<S>, state: &[f64], a
 ///
 /// # Errors
 /// [`GridError`] if the state or an axis does not fit the model.
-pub fn determinant_grid<S: Scalar>(model: &dyn EulerLagrange<S>, state: &[f64], axes: [Axis; 2]) -> Result<Grid, GridError> {
+pub fn determinant_grid<S: Scalar>(
+    model: &dyn EulerLagrange<S>,
+    state: &[f64],
+    axes: [Axis; 2],
+) -> Result<Grid, GridError> {
     let n = model.coordinates();
     evaluate(model, state, axes, Request::MASS_MATRIX, |terms, row| {
         let m = terms.mass_matrix.get(row * n * n..(row + 1) * n * n)?;
@@ -176,10 +184,8 @@ mod tests {
     use super::*;
     use crate::rollout::models::{PENDULUM, SINGULAR};
 
-    const AXES: [Axis; 2] = [
-        Axis { component: 0, from: -2.0, to: 2.0, points: 5 },
-        Axis { component: 1, from: 0.0, to: 3.0, points: 4 },
-    ];
+    const AXES: [Axis; 2] =
+        [Axis { component: 0, from: -2.0, to: 2.0, points: 5 }, Axis { component: 1, from: 0.0, to: 3.0, points: 4 }];
 
     #[test]
     fn lagrangian_over_the_plane() {

@@ -16,4 +16,4 @@ pub use energy::{EnergyError, energy_drift, energy_error};
 pub use grid::{Axis, Grid, GridError, determinant_grid, lagrangian_grid};
 pub use lyapunov::{Lyapunov, lyapunov};
 pub use summary::{Statistics, statistics};
-pub use trajectories::{StartBox, TrajectoryRun, TrajectoryTest, TrajectorySummary};
+pub use trajectories::{StartBox, TrajectoryRun, TrajectorySummary, TrajectoryTest};

@@ -1,7 +1,8 @@
 //! The trajectory test: learned motion against exact motion from random starts.
 
 use super::{
-    CoordinateError, EnergyError, Lyapunov, Statistics, coordinate_error, energy_drift, energy_error, lyapunov, statistics,
+    CoordinateError, EnergyError, Lyapunov, Statistics, coordinate_error, energy_drift, energy_error, lyapunov,
+    statistics,
 };
 use crate::lagrangian::EulerLagrange;
 use crate::rollout::{Domain, Integrable, Method, Options, Rollout, rollout_many};

@@ -65,7 +65,12 @@ pub fn evaluation_figures<S: Scalar, T: AsRef<str>>(
         keep(
             &mut figures,
             &format!("trajectory_{}.png", file_part(name)),
-            over_time(&format!("{name} of start 1"), name, false, vec![line("exact", exact), line("learned", learned).dashed()]),
+            over_time(
+                &format!("{name} of start 1"),
+                name,
+                false,
+                vec![line("exact", exact), line("learned", learned).dashed()],
+            ),
             format!("{name} of start 1 over time, exact and learned."),
         )?;
     }
@@ -74,7 +79,10 @@ pub fn evaluation_figures<S: Scalar, T: AsRef<str>>(
         let angle = periodic.get(i).copied().unwrap_or(false);
         let path = |label: &str, trajectory: &crate::rollout::Trajectory<S>| {
             let part = |values: &[S]| values.iter().skip(i).step_by(n).map(|x| x.to_f64()).collect::<Vec<_>>();
-            Series { points: folded(&part(&trajectory.q), &part(&trajectory.v), angle, true), ..Series::new(label, &[], &[]) }
+            Series {
+                points: folded(&part(&trajectory.q), &part(&trajectory.v), angle, true),
+                ..Series::new(label, &[], &[])
+            }
         };
         let trace = Trace {
             title: "Phase space".into(),
@@ -86,7 +94,9 @@ pub fn evaluation_figures<S: Scalar, T: AsRef<str>>(
             &mut figures,
             &format!("phase_{}.png", file_part(q_name)),
             trace_png(&trace),
-            format!("Start 1 in the plane of {q_name} and {v_name}, exact and learned, from dark (early) to bright (late)."),
+            format!(
+                "Start 1 in the plane of {q_name} and {v_name}, exact and learned, from dark (early) to bright (late)."
+            ),
         )?;
     }
     Ok(figures)
@@ -147,7 +157,12 @@ pub fn grid_figures(comparison: &GridComparison) -> Result<(Figure, Option<Affin
 }
 
 /// Keeps a picture, drops one without data.
-fn keep(figures: &mut Vec<Figure>, file: &str, drawn: Result<Vec<u8>, PlotError>, caption: String) -> Result<(), PlotError> {
+fn keep(
+    figures: &mut Vec<Figure>,
+    file: &str,
+    drawn: Result<Vec<u8>, PlotError>,
+    caption: String,
+) -> Result<(), PlotError> {
     match drawn {
         Ok(png) => figures.push(Figure { file: file.into(), png, caption }),
         Err(PlotError::Empty(_)) => {}
@@ -213,8 +228,10 @@ mod tests {
 
     #[test]
     fn grids_are_compared_up_to_the_fit() {
-        let axes =
-            [Axis { component: 0, from: -3.0, to: 3.0, points: 61 }, Axis { component: 1, from: -2.0, to: 2.0, points: 41 }];
+        let axes = [
+            Axis { component: 0, from: -3.0, to: 3.0, points: 61 },
+            Axis { component: 1, from: -2.0, to: 2.0, points: 41 },
+        ];
         let grid = |model| lagrangian_grid::<f64>(model, &[0.0, 0.0], axes).unwrap();
         let exact = grid(&PENDULUM);
         let mut comparison = GridComparison {
@@ -233,8 +250,14 @@ mod tests {
         let (figure, _) = grid_figures(&comparison).unwrap();
         save(&[figure]);
         let det = determinant_grid::<f64>(&PENDULUM, &[0.0, 0.0], axes).unwrap();
-        comparison =
-            GridComparison { quantity: "det M".into(), file: "det_m".into(), exact: det.clone(), learned: det, fit: false, ..comparison };
+        comparison = GridComparison {
+            quantity: "det M".into(),
+            file: "det_m".into(),
+            exact: det.clone(),
+            learned: det,
+            fit: false,
+            ..comparison
+        };
         let (figure, fit) = grid_figures(&comparison).unwrap();
         assert!(fit.is_none());
         save(&[figure]);

@@ -123,7 +123,8 @@ pub fn line_png(plot: &LinePlot) -> Result<Vec<u8>, PlotError> {
         }
     }
     let empty = || PlotError::Empty(plot.title.clone());
-    let (x, y) = (range(values(&series, |p| p.0)).ok_or_else(empty)?, range(values(&series, |p| p.1)).ok_or_else(empty)?);
+    let (x, y) =
+        (range(values(&series, |p| p.0)).ok_or_else(empty)?, range(values(&series, |p| p.1)).ok_or_else(empty)?);
 
     let mut plots = Vec::new();
     let several = series.len() > 1;
@@ -156,7 +157,11 @@ pub fn line_png(plot: &LinePlot) -> Result<Vec<u8>, PlotError> {
         let (low, high) = (values(&series, |p| p.1).fold(f64::INFINITY, f64::min), top);
         let (low, high) = (whole(low, false), whole(high, true));
         let high = if high > low { high } else { low * 10.0 };
-        layout.with_log_y().with_y_axis_min(low).with_y_axis_max(high).with_y_tick_format(TickFormat::Custom(Arc::new(decade)))
+        layout
+            .with_log_y()
+            .with_y_axis_min(low)
+            .with_y_axis_max(high)
+            .with_y_tick_format(TickFormat::Custom(Arc::new(decade)))
     } else {
         let room = 0.05 * (y.1 - y.0);
         layout.with_y_axis_min(y.0 - room).with_y_axis_max(y.1 + room).with_y_tick_format(numbers())
@@ -447,7 +452,9 @@ mod tests {
 
     #[test]
     fn ticks() {
-        for (x, text) in [(0.0, "0"), (0.1 + 0.2, "0.3"), (-2.5, "\u{2212}2.5"), (1000.0, "1000"), (1e6, "1e6"), (2e-5, "2e-5")] {
+        for (x, text) in
+            [(0.0, "0"), (0.1 + 0.2, "0.3"), (-2.5, "\u{2212}2.5"), (1000.0, "1000"), (1e6, "1e6"), (2e-5, "2e-5")]
+        {
             assert_eq!(number(x), text);
         }
         for (x, text) in [(1e-6, "1e-6"), (0.1, "0.1"), (1.0, "1"), (1e4, "1e4")] {

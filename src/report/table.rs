@@ -15,7 +15,8 @@ pub fn text_table<H: AsRef<str>, C: AsRef<str>>(headers: &[H], rows: &[Vec<C>]) 
         for (i, cell) in row.iter().enumerate() {
             let cell = cell.as_ref();
             widths[i] = widths[i].max(width(cell));
-            let number = cell.starts_with(|c: char| c.is_ascii_digit() || "+-.".contains(c)) || ["", "NaN", "inf"].contains(&cell);
+            let number = cell.starts_with(|c: char| c.is_ascii_digit() || "+-.".contains(c))
+                || ["", "NaN", "inf"].contains(&cell);
             numeric[i] &= number;
         }
     }

@@ -25,10 +25,17 @@ pub struct HistoryRow {
 /// [`PlotError::Renderer`] if the renderer fails; quantities without a finite positive value are left out.
 pub fn training_figures(rows: &[HistoryRow]) -> Result<Vec<Figure>, PlotError> {
     let epochs: Vec<f64> = rows.iter().map(|row| row.epoch).collect();
-    let series = |name: &str, part: fn(&HistoryRow) -> f64| Series::new(name, &epochs, &rows.iter().map(part).collect::<Vec<_>>());
-    let best = rows.iter().filter(|row| row.validation_loss.is_finite()).min_by(|a, b| a.validation_loss.total_cmp(&b.validation_loss));
+    let series = |name: &str, part: fn(&HistoryRow) -> f64| {
+        Series::new(name, &epochs, &rows.iter().map(part).collect::<Vec<_>>())
+    };
+    let best = rows
+        .iter()
+        .filter(|row| row.validation_loss.is_finite())
+        .min_by(|a, b| a.validation_loss.total_cmp(&b.validation_loss));
     let loss = match best {
-        Some(best) => format!("Loss per epoch; lowest validation loss {:.6} in epoch {}.", best.validation_loss, best.epoch),
+        Some(best) => {
+            format!("Loss per epoch; lowest validation loss {:.6} in epoch {}.", best.validation_loss, best.epoch)
+        }
         None => "Loss per epoch.".into(),
     };
     let pictures = [
@@ -39,13 +46,32 @@ pub fn training_figures(rows: &[HistoryRow]) -> Result<Vec<Figure>, PlotError> {
             vec![series("training", |r| r.training_loss), series("validation", |r| r.validation_loss)],
             loss,
         ),
-        ("learning_rate.png", "Learning rate", "learning rate", vec![series("", |r| r.learning_rate)], "Learning rate per epoch.".into()),
-        ("gradient_norm.png", "Gradient norm", "gradient norm", vec![series("", |r| r.gradient_norm)], "Norm of the gradient before clipping, mean per epoch.".into()),
-        ("penalty.png", "Stability penalty", "penalty", vec![series("", |r| r.penalty)], "Penalty on the mass matrix, mean per epoch; epochs without a violation leave gaps.".into()),
+        (
+            "learning_rate.png",
+            "Learning rate",
+            "learning rate",
+            vec![series("", |r| r.learning_rate)],
+            "Learning rate per epoch.".into(),
+        ),
+        (
+            "gradient_norm.png",
+            "Gradient norm",
+            "gradient norm",
+            vec![series("", |r| r.gradient_norm)],
+            "Norm of the gradient before clipping, mean per epoch.".into(),
+        ),
+        (
+            "penalty.png",
+            "Stability penalty",
+            "penalty",
+            vec![series("", |r| r.penalty)],
+            "Penalty on the mass matrix, mean per epoch; epochs without a violation leave gaps.".into(),
+        ),
     ];
     let mut figures = Vec::new();
     for (file, title, y_label, series, caption) in pictures {
-        let plot = LinePlot { title: title.into(), x_label: "epoch".into(), y_label: y_label.into(), log_y: true, series };
+        let plot =
+            LinePlot { title: title.into(), x_label: "epoch".into(), y_label: y_label.into(), log_y: true, series };
         match line_png(&plot) {
             Ok(png) => figures.push(Figure { file: file.into(), png, caption }),
             Err(PlotError::Empty(_)) => {}

@@ -29,7 +29,9 @@ pub enum RolloutError {
         problem: String,
     },
     /// The trajectory leaves its domain.
-    #[error("left the domain at t = {t}: component {component} reached {value:.6e}, allowed is [{lower:.6e}, {upper:.6e}]")]
+    #[error(
+        "left the domain at t = {t}: component {component} reached {value:.6e}, allowed is [{lower:.6e}, {upper:.6e}]"
+    )]
     LeftDomain {
         /// Last time inside.
         t: f64,

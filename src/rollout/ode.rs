@@ -317,7 +317,13 @@ where
 
         let mut watch = watch.borrow_mut();
         let accepted = watch.statistics.accepted - accepted_before;
-        let opening = if attempts_left == 0 { 0 } else if first_step == zero { 3 } else { 1 };
+        let opening = if attempts_left == 0 {
+            0
+        } else if first_step == zero {
+            3
+        } else {
+            1
+        };
         let attempts = (watch.calls - opening - accepted * closing_calls(task.method)) / stages(task.method);
         watch.statistics.rejected += attempts - accepted;
         next = watch.next;

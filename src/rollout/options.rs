@@ -136,7 +136,10 @@ impl<S: Scalar> Options<S> {
         }
         let samples = ((self.t_end - self.t0) / self.dt).abs();
         if !(samples.to_f64() <= MAX_SAMPLES) {
-            return invalid("dt", format!("asks for {:.3e} samples, at most {MAX_SAMPLES:.0e} are allowed", samples.to_f64()));
+            return invalid(
+                "dt",
+                format!("asks for {:.3e} samples, at most {MAX_SAMPLES:.0e} are allowed", samples.to_f64()),
+            );
         }
         for (what, value) in [("rtol", self.rtol), ("atol", self.atol)] {
             if !(value.is_finite() && value >= <S as Real>::zero()) {

@@ -50,8 +50,11 @@ enum Failure {
 /// the exit.
 pub fn rollout<S: Integrable>(model: &dyn EulerLagrange<S>, q: &[S], v: &[S], options: &Options<S>) -> Rollout<S> {
     let n = model.coordinates();
-    let mut result =
-        Rollout { trajectory: Trajectory::empty(n), statistics: Statistics::default(), stop: check(n, q, v, options).err() };
+    let mut result = Rollout {
+        trajectory: Trajectory::empty(n),
+        statistics: Statistics::default(),
+        stop: check(n, q, v, options).err(),
+    };
     if result.stop.is_some() {
         return result;
     }
@@ -116,11 +119,11 @@ pub fn rollout<S: Integrable>(model: &dyn EulerLagrange<S>, q: &[S], v: &[S], op
         Some(Ended::TooManySteps) => Some(RolloutError::TooManySteps { t, steps: options.max_steps }),
         Some(Ended::Failed(failure)) => Some(typed(failure, t, state, step)),
         Some(Ended::Underflow) => {
-            let largest_acceleration = match model.terms(&ran.state[..n], &ran.state[n..], Request::ACCELERATION, &mut terms)
-            {
-                Ok(()) => terms.acceleration.iter().map(|a| a.abs().to_f64()).fold(0.0, f64::max),
-                Err(_) => f64::NAN,
-            };
+            let largest_acceleration =
+                match model.terms(&ran.state[..n], &ran.state[n..], Request::ACCELERATION, &mut terms) {
+                    Ok(()) => terms.acceleration.iter().map(|a| a.abs().to_f64()).fold(0.0, f64::max),
+                    Err(_) => f64::NAN,
+                };
             let cause = UnderflowCause::ErrorTest { largest_acceleration };
             Some(RolloutError::StepUnderflow { t, state, step, cause })
         }
@@ -180,12 +183,7 @@ fn check<S: Scalar>(n: usize, q: &[S], v: &[S], options: &Options<S>) -> Result<
 }
 
 /// The error of a trajectory whose samples cross a bound that its steps respect: it is grazed within the tolerance.
-fn left<S: Scalar>(
-    domain: Option<&super::Domain<S>>,
-    reached: &[S],
-    t: f64,
-    state: Vec<f64>,
-) -> Option<RolloutError> {
+fn left<S: Scalar>(domain: Option<&super::Domain<S>>, reached: &[S], t: f64, state: Vec<f64>) -> Option<RolloutError> {
     let (component, lower, upper) = domain?.violation(reached).or_else(|| domain?.tightest(reached))?;
     let (value, lower, upper) = (state[component], lower.to_f64(), upper.to_f64());
     Some(RolloutError::LeftDomain { t, state, component, value, lower, upper })
@@ -197,7 +195,9 @@ fn typed(failure: Failure, t: f64, state: Vec<f64>, step: f64) -> RolloutError {
             RolloutError::LeftDomain { t, state, component, value, lower, upper }
         }
         Failure::State => RolloutError::NotFinite { t, state, what: "state" },
-        Failure::Model(MechanicsError::Singular { condition, .. }) => RolloutError::SingularMass { t, state, condition },
+        Failure::Model(MechanicsError::Singular { condition, .. }) => {
+            RolloutError::SingularMass { t, state, condition }
+        }
         Failure::Model(MechanicsError::NotFinite { what, .. }) => RolloutError::NotFinite { t, state, what },
         Failure::Model(error) => RolloutError::StepUnderflow { t, state, step, cause: UnderflowCause::Model(error) },
     }

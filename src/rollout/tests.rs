@@ -179,7 +179,12 @@ fn a_bound_that_only_trial_states_cross_is_no_failure() {
     // The oscillator stays within [-1, 1]; trial states of long steps do not.
     let domain = Some(Domain::new(vec![Some((-1.0 - 1e-6, 1.0 + 1e-6)), None]));
     for method in METHODS {
-        let done = rollout(&OSCILLATOR, &[1.0], &[0.0], &Options { domain: domain.clone(), ..options(method, 20.0, 0.1, 1e-9) });
+        let done = rollout(
+            &OSCILLATOR,
+            &[1.0],
+            &[0.0],
+            &Options { domain: domain.clone(), ..options(method, 20.0, 0.1, 1e-9) },
+        );
         assert_eq!(done.stop, None, "{method:?}");
         assert!(oscillator_error(&done.trajectory, 0.0) < 1e-6);
     }

@@ -11,9 +11,7 @@ mod slices;
 mod sum;
 
 pub use dd::{Dd, UnreadableNumber};
-pub use lanes::{
-    Exponential, Lanes, cos_lanes, exp_lanes, ln_lanes, sin_cos_lanes, sin_lanes, sqrt_lanes, tanh_lanes,
-};
+pub use lanes::{Exponential, Lanes, cos_lanes, exp_lanes, ln_lanes, sin_cos_lanes, sin_lanes, sqrt_lanes, tanh_lanes};
 pub use simd::vectorized;
 pub use slices::{Slice, SliceMut};
 pub use sum::Sum;

@@ -17,7 +17,13 @@ impl Dd {
             return Self::leading(root);
         }
         // Away from the range where squares lose their trailing part.
-        let shift = if self.high < 1e-200 { 240 } else if self.high > 1e200 { -240 } else { 0 };
+        let shift = if self.high < 1e-200 {
+            240
+        } else if self.high > 1e200 {
+            -240
+        } else {
+            0
+        };
         if shift != 0 {
             return self.ldexp(2 * shift).square_root().ldexp(-shift);
         }

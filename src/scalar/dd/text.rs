@@ -72,8 +72,7 @@ fn exact_digits(x: Dd) -> (Vec<u8>, i32) {
     let power = if low == 0 { high_power } else { high_power.min(low_power) };
     let lift = |mantissa: u64, from: i32| Natural::new(mantissa).shifted_left((from - power).max(0).unsigned_abs());
     let (high, low) = (lift(high, high_power), lift(low, if low == 0 { power } else { low_power }));
-    let mantissa =
-        if (x.high < 0.0) == (x.low < 0.0) || low.is_zero() { high.add(&low) } else { high.distance(&low) };
+    let mantissa = if (x.high < 0.0) == (x.low < 0.0) || low.is_zero() { high.add(&low) } else { high.distance(&low) };
     // 2^-k = 5^k 10^-k
     let (scaled, decimal) = if power >= 0 {
         (mantissa.shifted_left(power.unsigned_abs()), 0)

@@ -139,12 +139,24 @@ pub fn sin_cos_lanes<S: Scalar>(x: &[S], sin: &mut [S], cos: &mut [S]) {
 
 /// `out = sin(x)`, elementwise, angles in radians of any size.
 pub fn sin_lanes<S: Scalar>(x: &[S], out: &mut [S]) {
-    angles(x, out, #[inline(always)] |x| x.lane_sin_cos().0, Real::sin);
+    angles(
+        x,
+        out,
+        #[inline(always)]
+        |x| x.lane_sin_cos().0,
+        Real::sin,
+    );
 }
 
 /// `out = cos(x)`, elementwise, angles in radians of any size.
 pub fn cos_lanes<S: Scalar>(x: &[S], out: &mut [S]) {
-    angles(x, out, #[inline(always)] |x| x.lane_sin_cos().1, Real::cos);
+    angles(
+        x,
+        out,
+        #[inline(always)]
+        |x| x.lane_sin_cos().1,
+        Real::cos,
+    );
 }
 
 #[inline(always)]

@@ -11,7 +11,10 @@ fn arguments<S: Scalar>() -> Vec<S> {
         })
         .collect();
     list.extend((1..400).map(|k| S::of_f64(f64::from(k) * std::f64::consts::FRAC_PI_4)));
-    list.extend([0.0, -0.0, 1.0, 5e-324, 1e-310, 1e-45, 1e-40, 1e30, -1e30, 1e300, 88.7, -103.5, 709.7, -745.0, -720.0].map(S::of_f64));
+    list.extend(
+        [0.0, -0.0, 1.0, 5e-324, 1e-310, 1e-45, 1e-40, 1e30, -1e30, 1e300, 88.7, -103.5, 709.7, -745.0, -720.0]
+            .map(S::of_f64),
+    );
     list.extend([S::INFINITY, -S::INFINITY, S::NAN, S::MAX, S::MIN_POSITIVE, S::of_f64(1048576.5), S::of_f64(8192.5)]);
     list
 }
@@ -24,7 +27,10 @@ fn worst<S: Scalar>(name: &str, x: &[S], found: &[S], exact: impl Fn(Dd) -> Dd) 
         let exact = exact(x.cast());
         let nearest: S = exact.cast();
         if nearest.is_nan() || !nearest.is_finite() {
-            assert!(found.is_nan() == nearest.is_nan() && (found == nearest || found.is_nan()), "{name}({x:?}) = {found:?}");
+            assert!(
+                found.is_nan() == nearest.is_nan() && (found == nearest || found.is_nan()),
+                "{name}({x:?}) = {found:?}"
+            );
             continue;
         }
         // One unit in the last place of the nearest number.
