@@ -1,4 +1,4 @@
-//! Ctrl-C: the first asks the running command to finish its step, the second ends the program.
+//! Ctrl-C: training finishes its step first, everything else ends at once.
 
 use crate::cli::CliError;
 use std::sync::Arc;
@@ -18,4 +18,13 @@ pub fn flag() -> Result<Arc<AtomicBool>, CliError> {
     })
     .map_err(|e| CliError::data(format_args!("cannot watch for Ctrl-C: {e}")))?;
     Ok(flag)
+}
+
+/// Ctrl-C ends the program at once with exit code 130; files being written are whole or not there.
+///
+/// # Errors
+/// If the handler cannot be installed.
+pub fn end_at_once() -> Result<(), CliError> {
+    ctrlc::set_handler(|| std::process::exit(130))
+        .map_err(|e| CliError::data(format_args!("cannot watch for Ctrl-C: {e}")))
 }

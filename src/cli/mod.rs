@@ -5,16 +5,23 @@
 
 mod config;
 mod error;
+mod evaluate;
+mod evaluation;
+mod folder;
 mod inspect;
 mod interrupt;
 mod json;
+mod learned;
 mod nearest;
 mod number;
 mod output;
 mod progress;
+mod rollout;
 mod source;
 mod states;
 mod systems;
+mod train;
+mod train_config;
 
 pub use error::{CliError, Kind};
 pub use states::{States, StatesError, parse_states};
@@ -36,6 +43,12 @@ struct Cli {
 enum Command {
     /// List the systems that can be learned.
     Systems(systems::Args),
+    /// Learn the Lagrangian of a system and write model, history, pictures and a report.
+    Train(train_config::Args),
+    /// Integrate the motion of a model.
+    Rollout(rollout::Args),
+    /// Compare a model with the system it learned.
+    Evaluate(evaluate::Args),
     /// Print the Euler-Lagrange terms of states, every digit of them.
     Inspect(inspect::Args),
 }
@@ -58,8 +71,15 @@ pub fn main(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
 }
 
 fn run(command: Command) -> Result<(), CliError> {
+    // Training keeps its best model when it is interrupted; the others have nothing to keep.
+    if !matches!(command, Command::Train(_)) {
+        interrupt::end_at_once()?;
+    }
     match command {
         Command::Systems(args) => systems::run(&args),
+        Command::Train(args) => train::run(&args),
+        Command::Rollout(args) => rollout::run(&args),
+        Command::Evaluate(args) => evaluate::run(&args),
         Command::Inspect(args) => inspect::run(&args),
     }
 }

@@ -24,15 +24,14 @@ impl Progress {
         Self { bar }
     }
 
-    /// `done` steps are done, with this loss and learning rate.
-    pub fn show(&self, done: u64, loss: f64, rate: f64) {
-        self.bar.set_message(format!("loss {loss:.4e}  rate {rate:.2e}"));
-        self.bar.set_position(done);
-    }
-
     /// `done` steps are done.
     pub fn advance(&self, done: u64) {
         self.bar.set_position(done);
+    }
+
+    /// The last validation loss and the learning rate.
+    pub fn show(&self, loss: f64, rate: f64) {
+        self.bar.set_message(format!("loss {loss:.4e}  rate {rate:.2e}"));
     }
 }
 

@@ -1,9 +1,8 @@
 //! Where Euler-Lagrange terms come from: a hand-written system or a trained model.
 
 use crate::cli::CliError;
+use crate::cli::learned::Learned;
 use crate::lagrangian::{EulerLagrange, configure};
-use crate::network::NetworkLagrangian;
-use crate::network::file::ModelFile;
 use crate::scalar::Scalar;
 use std::path::Path;
 
@@ -31,10 +30,8 @@ impl<S: Scalar> Source<S> {
     /// # Errors
     /// A data error for a file that is not a whole model file.
     pub fn model(path: &Path) -> Result<Self, CliError> {
-        let file = ModelFile::<S>::load(path).map_err(|e| CliError::file(path, e))?;
-        let network =
-            NetworkLagrangian::new(file.header.architecture, file.weights).map_err(|e| CliError::file(path, e))?;
-        Ok(Self { model: Box::new(network), columns: file.header.columns })
+        let Learned { header, network } = Learned::load(path)?;
+        Ok(Self { model: Box::new(network), columns: header.columns })
     }
 }
 

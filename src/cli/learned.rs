@@ -1,0 +1,57 @@
+//! A model file with the network it describes and the system it learned.
+
+use crate::cli::CliError;
+use crate::lagrangian::{Configured, configure};
+use crate::network::NetworkLagrangian;
+use crate::network::file::{Header, ModelFile};
+use crate::rollout::Domain;
+use crate::scalar::Scalar;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// A trained model.
+pub struct Learned<S> {
+    /// What the file says about it.
+    pub header: Header,
+    /// The network in the precision of `S`.
+    pub network: NetworkLagrangian<S>,
+}
+
+impl<S: Scalar> Learned<S> {
+    /// Reads a model file; weights are converted to the precision of `S`.
+    ///
+    /// # Errors
+    /// A data error for anything but a whole model file.
+    pub fn load(path: &Path) -> Result<Self, CliError> {
+        let ModelFile { header, weights } = ModelFile::load(path).map_err(|e| CliError::file(path, e))?;
+        let network =
+            NetworkLagrangian::new(header.architecture.clone(), weights).map_err(|e| CliError::file(path, e))?;
+        Ok(Self { header, network })
+    }
+
+    /// The hand-written system that the model learned.
+    ///
+    /// # Errors
+    /// A data error if this version does not know it.
+    pub fn system(&self, path: &Path) -> Result<Configured<f64>, CliError> {
+        let configured =
+            configure(&self.header.system, &given(&self.header.parameters)).map_err(|e| CliError::file(path, e))?;
+        if configured.system.columns(configured.coordinates) != self.header.columns {
+            return Err(CliError::file(path, format_args!("columns are not those of {}", self.header.system)));
+        }
+        Ok(configured)
+    }
+
+    /// The states it was trained on; periodic coordinates are unbounded.
+    pub fn domain(&self) -> Domain<S> {
+        let bound = |&[low, high]: &[f64; 2]| (S::of_f64(low), S::of_f64(high));
+        let periodic = &self.header.architecture.periodic;
+        let positions = self.header.position.iter().zip(periodic).map(|(b, &p)| (!p).then(|| bound(b)));
+        Domain::new(positions.chain(self.header.velocity.iter().map(|b| Some(bound(b)))).collect())
+    }
+}
+
+/// Parameters in the form the catalogue takes them.
+pub fn given(parameters: &BTreeMap<String, f64>) -> Vec<(String, String)> {
+    parameters.iter().map(|(symbol, value)| (symbol.clone(), value.to_string())).collect()
+}

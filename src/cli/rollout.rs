@@ -1,0 +1,100 @@
+//! `lnn rollout`: the motion of a model from one state.
+
+use crate::cli::learned::Learned;
+use crate::cli::number::{finite, positive};
+use crate::cli::{CliError, output};
+use crate::network::storage::write_atomically;
+use crate::rollout::{Method, Options, RolloutError, rollout};
+use std::path::PathBuf;
+
+/// Arguments.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Model file.
+    model: PathBuf,
+    /// Start: coordinates, then velocities, separated by commas.
+    #[arg(long, value_name = "q1,..,v1,..", required = true, value_delimiter = ',', allow_hyphen_values = true, value_parser = finite)]
+    state: Vec<f64>,
+    /// Time of the last sample in seconds; the motion starts at 0, negative times run backwards.
+    #[arg(long, value_name = "T", allow_hyphen_values = true, value_parser = finite)]
+    t_end: f64,
+    /// Time between samples in seconds.
+    #[arg(long, value_name = "DT", allow_hyphen_values = true, value_parser = positive)]
+    dt: f64,
+    /// Integrator.
+    #[arg(long, value_enum, default_value = "dopri5")]
+    method: MethodName,
+    /// Relative tolerance of a step.
+    #[arg(long, value_name = "R", default_value = "1e-6", allow_hyphen_values = true, value_parser = positive)]
+    rtol: f64,
+    /// Absolute tolerance of a step.
+    #[arg(long, value_name = "A", default_value = "1e-8", allow_hyphen_values = true, value_parser = positive)]
+    atol: f64,
+    /// CSV of the trajectory: t, the columns of a state, energy.
+    #[arg(long, value_name = "FILE.csv")]
+    out: PathBuf,
+}
+
+#[derive(Clone, Copy, Debug, clap::ValueEnum)]
+enum MethodName {
+    Dopri5,
+    Dop853,
+}
+
+impl From<MethodName> for Method {
+    fn from(name: MethodName) -> Self {
+        match name {
+            MethodName::Dopri5 => Self::Dopri5,
+            MethodName::Dop853 => Self::Dop853,
+        }
+    }
+}
+
+/// Integrates in double precision and writes the valid part of the trajectory.
+///
+/// # Errors
+/// A usage error for a state of the wrong length; a data error for a bad model, a file that cannot be written, or a
+/// motion that ends before its time, the samples up to there being written.
+pub fn run(args: &Args) -> Result<(), CliError> {
+    let learned = Learned::<f64>::load(&args.model)?;
+    let columns = &learned.header.columns;
+    if args.state.len() != columns.len() {
+        let (expected, found) = (columns.len(), args.state.len());
+        let names = columns.join(",");
+        return Err(CliError::usage(format_args!("--state: expected {expected} numbers ({names}), found {found}")));
+    }
+    let (q, v) = args.state.split_at(columns.len() / 2);
+    let options = Options {
+        method: args.method.into(),
+        rtol: args.rtol,
+        atol: args.atol,
+        domain: Some(learned.domain()),
+        ..Options::new(args.t_end, args.dt)
+    };
+    let result = rollout(&learned.network, q, v, &options);
+    if let Some(error @ RolloutError::Invalid { .. }) = &result.stop {
+        return Err(CliError::usage(error));
+    }
+    let csv = result.trajectory.to_csv(columns).map_err(CliError::data)?;
+    write_atomically(&args.out, csv.as_bytes())
+        .map_err(|e| CliError::file(&args.out, format_args!("cannot write: {e}")))?;
+    if let Some(stop) = result.stop {
+        let problem = match &stop {
+            RolloutError::LeftDomain { t, component, value, lower, upper, .. } => format!(
+                "left the training range at t = {t}: {} reached {value:.6e}, trained on [{lower}, {upper}]",
+                columns.get(*component).map_or("a component", String::as_str)
+            ),
+            other => other.to_string(),
+        };
+        let kept = result.trajectory.len();
+        return Err(CliError::data(format_args!("{problem} ({kept} samples are in {})", args.out.display())));
+    }
+    let statistics = result.statistics;
+    output::print(&format!(
+        "{} samples to t = {} s, {} evaluations, in {}\n",
+        result.trajectory.len(),
+        args.t_end,
+        statistics.evaluations,
+        args.out.display()
+    ))
+}

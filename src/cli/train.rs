@@ -1,0 +1,276 @@
+//! `lnn train`: learns, judges, writes.
+
+use crate::cli::evaluation::{Evaluation, Plan, evaluate};
+use crate::cli::folder::Folder;
+use crate::cli::learned::given;
+use crate::cli::number::threads;
+use crate::cli::progress::Progress as Bar;
+use crate::cli::train_config::Args;
+use crate::cli::{CliError, interrupt, output};
+use crate::lagrangian::{Configured, configure};
+use crate::network::file::{FORMAT, Header, ModelFile, StoredPrecision};
+use crate::network::{Architecture, NetworkLagrangian};
+use crate::report::{HistoryRow, Report, training_figures};
+use crate::scalar::Scalar;
+use crate::training::{
+    Config, Epoch, Hooks, Phase, Precision, Progress, SamplingError, Scaling, Stop, Trained, sample_all, train,
+};
+use serde::Serialize;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+/// What `summary.json` holds; losses in the paper's convention, errors in physical units.
+#[derive(Serialize)]
+struct Summary<'a> {
+    system: &'a str,
+    crate_version: &'static str,
+    seed: u64,
+    precision: &'static str,
+    threads: usize,
+    epochs: usize,
+    weights: usize,
+    validation_loss: f64,
+    test_loss: f64,
+    test_states_left_out: usize,
+    wall_seconds: f64,
+    training_seconds: f64,
+    states_per_second: f64,
+    ended: String,
+    #[serde(flatten)]
+    evaluation: &'a Evaluation,
+}
+
+/// Trains and writes everything into the output directory.
+///
+/// # Errors
+/// A usage error for arguments and configuration, a data error for files and a training that fails, an interruption;
+/// after the last two the best model so far is written, if there is one.
+pub fn run(args: &Args) -> Result<(), CliError> {
+    let (config, system) = args.resolve()?;
+    match config.precision {
+        Precision::F32 => learn::<f32>(args, &config, &system),
+        Precision::F64 => learn::<f64>(args, &config, &system),
+    }
+}
+
+fn learn<S: Scalar>(args: &Args, config: &Config, system: &Configured<f64>) -> Result<(), CliError> {
+    let started = Instant::now();
+    let (data, scale) = sample_all::<S>(config, system).map_err(|e| match e {
+        SamplingError::Dataset(_) => CliError::data(e),
+        _ => CliError::usage(e),
+    })?;
+    let path = args.out.clone().unwrap_or_else(|| PathBuf::from("runs").join(&config.system));
+    let folder = Folder::open(&path)?;
+    let architecture = architecture(config, system, scale);
+    let stop = interrupt::flag()?;
+    let threads = threads(args.threads);
+    let fresh = (data.test.cast::<f64>().q().to_vec(), data.test.cast::<f64>().v().to_vec());
+
+    let trained = train(config, &architecture, data, threads, &hooks(&stop)).map_err(|e| {
+        if stop.load(Ordering::SeqCst) {
+            CliError::interrupted("interrupted before the first epoch ended")
+        } else {
+            CliError::data(e)
+        }
+    })?;
+
+    // The model and its history first: nothing that comes after can lose them.
+    let header = header(config, system, architecture.clone(), trained.validation_loss)?;
+    let model = ModelFile { header, weights: trained.weights.clone() };
+    let toml = toml::to_string(config).map_err(CliError::data)?;
+    let file = folder.file("model.safetensors");
+    folder.write("config.toml", toml.as_bytes())?;
+    folder.write("history.csv", history(&trained.history).as_bytes())?;
+    model.save(&file).map_err(|e| CliError::file(&file, e))?;
+
+    let network = NetworkLagrangian::new(architecture, model.weights).map_err(CliError::data)?.cast::<f64>();
+    let plan = Plan { states: (&fresh.0, &fresh.1), starts: 4, seed: config.seed, threads };
+    let evaluation = evaluate(system, &network, plan)?;
+    let summary = Summary {
+        system: &config.system,
+        crate_version: env!("CARGO_PKG_VERSION"),
+        seed: config.seed,
+        precision: S::NAME,
+        threads,
+        epochs: trained.history.len(),
+        weights: trained.weights.len(),
+        validation_loss: trained.validation_loss,
+        test_loss: trained.test.loss.to_f64(),
+        test_states_left_out: trained.test.left_out,
+        wall_seconds: started.elapsed().as_secs_f64(),
+        training_seconds: trained.seconds,
+        states_per_second: trained.states as f64 / trained.seconds,
+        ended: ended(&trained.stop),
+        evaluation: &evaluation,
+    };
+    let json = serde_json::to_string_pretty(&summary).map_err(CliError::data)? + "\n";
+    write_report(&folder, system, &summary, &trained.history, &toml)?;
+    folder.write("summary.json", json.as_bytes())?;
+    let text =
+        format!("{}\n{}\nreport: {}\n", headline(&summary), evaluation.text(), folder.file("report.html").display());
+    output::print(if args.json { &json } else { &text })?;
+    conclude(&trained, &path)
+}
+
+/// The exit of a training that did not run to its end.
+fn conclude<S>(trained: &Trained<S>, path: &Path) -> Result<(), CliError> {
+    let kept = format!("the best of {} epochs is in {}", trained.history.len(), path.display());
+    match &trained.stop {
+        Stop::Finished => Ok(()),
+        Stop::Interrupted => Err(CliError::interrupted(format_args!("interrupted, {kept}"))),
+        Stop::Failed(error) => Err(CliError::data(format_args!("training stopped: {error}; {kept}"))),
+    }
+}
+
+fn ended(stop: &Stop) -> String {
+    match stop {
+        Stop::Finished => "finished".to_string(),
+        Stop::Interrupted => "interrupted".to_string(),
+        Stop::Failed(error) => error.to_string(),
+    }
+}
+
+/// Shape of the network for this run.
+fn architecture(config: &Config, system: &Configured<f64>, scale: Vec<f64>) -> Architecture {
+    let network = &config.network;
+    Architecture {
+        coordinates: system.coordinates,
+        hidden: network.hidden.clone(),
+        activation: network.activation,
+        alpha: network.alpha,
+        scale: match network.scaling {
+            Scaling::Physical => scale,
+            Scaling::None => vec![1.0; system.coordinates],
+        },
+        periodic: (system.system.coordinates)(system.coordinates).iter().map(|c| c.periodic).collect(),
+        embed_periodic: network.embed_periodic,
+    }
+}
+
+/// What the model file says about this run.
+fn header(
+    config: &Config,
+    system: &Configured<f64>,
+    architecture: Architecture,
+    validation_loss: f64,
+) -> Result<Header, CliError> {
+    // Defaults that change in a later version must not change this model.
+    let named = system.system.parameters.iter().map(|p| p.symbol.to_string());
+    let mut parameters: std::collections::BTreeMap<_, _> = named.zip(system.parameters.iter().copied()).collect();
+    parameters.extend(config.parameters.clone());
+    configure::<f64>(&config.system, &given(&parameters)).map_err(CliError::data)?;
+    let hull = |bounds: fn(&Phase) -> &Vec<[f64; 2]>| {
+        (0..system.coordinates)
+            .map(|i| {
+                let all = config.phases.iter().filter_map(|phase| bounds(phase).get(i));
+                all.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], b| [low.min(b[0]), high.max(b[1])])
+            })
+            .collect()
+    };
+    Ok(Header {
+        format: FORMAT,
+        crate_version: env!("CARGO_PKG_VERSION").to_string(),
+        architecture,
+        system: config.system.clone(),
+        parameters,
+        columns: system.system.columns(system.coordinates),
+        precision: match config.precision {
+            Precision::F32 => StoredPrecision::F32,
+            Precision::F64 => StoredPrecision::F64,
+        },
+        position: hull(|phase| &phase.position),
+        velocity: hull(|phase| &phase.velocity),
+        seed: config.seed,
+        validation_loss,
+    })
+}
+
+/// Progress on standard error, Ctrl-C.
+fn hooks(stop: &Arc<AtomicBool>) -> Hooks {
+    let bar: std::sync::OnceLock<Bar> = std::sync::OnceLock::new();
+    Hooks {
+        watcher: Some(Arc::new(move |progress| match progress {
+            Progress::Step { step, steps, .. } => {
+                bar.get_or_init(|| Bar::new(steps as u64, "steps")).advance(step as u64);
+            }
+            Progress::Epoch(epoch) => {
+                if let Some(bar) = bar.get() {
+                    bar.show(epoch.validation_loss, epoch.rate);
+                }
+            }
+        })),
+        interrupt: Arc::clone(stop),
+    }
+}
+
+/// `history.csv`: one row per epoch.
+fn history(epochs: &[Epoch]) -> String {
+    let mut csv =
+        "epoch,phase,rate,training_loss,penalty,penalised,validation_loss,gradient_norm,left_out,skipped,seconds\n"
+            .to_string();
+    for e in epochs {
+        // Writing to a string cannot fail.
+        let _ = writeln!(
+            csv,
+            "{},{},{},{},{},{},{},{},{},{},{:.3}",
+            e.epoch,
+            e.phase,
+            e.rate,
+            e.training_loss,
+            e.penalty,
+            e.penalised,
+            e.validation_loss,
+            e.gradient_norm,
+            e.left_out,
+            e.skipped,
+            e.seconds
+        );
+    }
+    csv
+}
+
+/// The figures of a run in one line.
+fn headline(summary: &Summary<'_>) -> String {
+    format!(
+        "loss (paper): validation {:.6}, fresh states {:.6}; {} epochs in {:.1} s, {:.0} states/s, {} weights, seed {}\n",
+        summary.validation_loss,
+        summary.test_loss,
+        summary.epochs,
+        summary.training_seconds,
+        summary.states_per_second,
+        summary.weights,
+        summary.seed
+    )
+}
+
+fn write_report(
+    folder: &Folder,
+    system: &Configured<f64>,
+    summary: &Summary<'_>,
+    epochs: &[Epoch],
+    toml: &str,
+) -> Result<(), CliError> {
+    let rows: Vec<HistoryRow> = epochs
+        .iter()
+        .map(|e| HistoryRow {
+            epoch: e.epoch as f64,
+            training_loss: e.training_loss,
+            validation_loss: e.validation_loss,
+            learning_rate: e.rate,
+            gradient_norm: e.gradient_norm,
+            penalty: e.penalty,
+        })
+        .collect();
+    let training = training_figures(&rows).map_err(CliError::data)?;
+    let report = Report::new(&format!("{}: learned", system.system.title)).paragraph(&headline(summary));
+    let report = summary.evaluation.report(report).heading("Training");
+    let report = training.iter().fold(report, |report, figure| report.figure(&figure.png, &figure.caption));
+    let report = report.heading("Configuration").preformatted(toml);
+    for figure in training.iter().chain(&summary.evaluation.figures) {
+        folder.write(&figure.file, &figure.png)?;
+    }
+    folder.write("report.html", report.to_html().as_bytes())
+}
