@@ -111,12 +111,15 @@ impl<S: Scalar> Adjoint<S> {
         out.h.resize(4 * size, zero);
         layer.apply(weights, count, plane(input, 3, count * layer.inputs), &mut out.z[2 * size..]);
         let n = chunk.architecture.coordinates;
-        vectorized(#[inline(always)] || {
-            for (j, &state) in jets.state.iter().enumerate() {
-                let (s, t) = (&jets.s[j * n..][..n], &jets.t[j * n..][..n]);
-                forward_row(hidden, chunk.batch, (j, state, count), (s, t, jets.moving), &mut out.z, &mut out.h);
-            }
-        });
+        vectorized(
+            #[inline(always)]
+            || {
+                for (j, &state) in jets.state.iter().enumerate() {
+                    let (s, t) = (&jets.s[j * n..][..n], &jets.t[j * n..][..n]);
+                    forward_row(hidden, chunk.batch, (j, state, count), (s, t, jets.moving), &mut out.z, &mut out.h);
+                }
+            },
+        );
     }
 
     /// The output layer is linear: its gradient is the sum of `h[st]`.
@@ -124,7 +127,10 @@ impl<S: Scalar> Adjoint<S> {
         let output = chunk.layout.output_range();
         let last = self.layers.last().map_or(&self.phi, |layer| &layer.h);
         let mixed = plane(last, 3, jets.state.len() * output.len());
-        vectorized(#[inline(always)] || add_rows(mixed, &mut gradient[output]));
+        vectorized(
+            #[inline(always)]
+            || add_rows(mixed, &mut gradient[output]),
+        );
     }
 
     /// Adjoints of a layer's pre-activations from those of its activations.
@@ -135,11 +141,14 @@ impl<S: Scalar> Adjoint<S> {
         let hidden = &chunk.hidden[l];
         layer.z_adjoint.resize(4 * count * hidden.width, <S as Real>::zero());
         let above = if is_last { &[] } else { layer.h_adjoint.as_slice() };
-        vectorized(#[inline(always)] || {
-            for (j, &state) in jets.state.iter().enumerate() {
-                reverse_row(hidden, (j, state, count), &layer.z, above, &mut layer.z_adjoint);
-            }
-        });
+        vectorized(
+            #[inline(always)]
+            || {
+                for (j, &state) in jets.state.iter().enumerate() {
+                    reverse_row(hidden, (j, state, count), &layer.z, above, &mut layer.z_adjoint);
+                }
+            },
+        );
     }
 
     /// Weight and bias gradients of a layer, and the adjoints of the activations below it.
@@ -152,7 +161,10 @@ impl<S: Scalar> Adjoint<S> {
         shape.add_weight_gradient(4 * count, &layer.z_adjoint, input, gradient);
         // A bias enters the value channel alone.
         let value = plane(&layer.z_adjoint, 0, count * shape.outputs);
-        vectorized(#[inline(always)] || add_rows(value, &mut gradient[shape.bias_range()]));
+        vectorized(
+            #[inline(always)]
+            || add_rows(value, &mut gradient[shape.bias_range()]),
+        );
         if let Some(previous) = before.last_mut() {
             previous.h_adjoint.resize(3 * count * shape.inputs, <S as Real>::zero());
             shape.pull_back(weights, 3 * count, &layer.z_adjoint, &mut previous.h_adjoint);

@@ -172,7 +172,10 @@ impl<S: Scalar> Chunk<S> {
         layer.apply(weights, rows, input, &mut hidden.z);
         let bias = &weights[layer.bias_range()];
         let (z, tangents) = hidden.z.split_at_mut(size);
-        vectorized(#[inline(always)] || add_to_rows(z, bias));
+        vectorized(
+            #[inline(always)]
+            || add_to_rows(z, bias),
+        );
         let (h, h_tangents) = hidden.h.split_at_mut(size);
         let kept = match depth {
             Depth::Value => 0,
@@ -193,13 +196,16 @@ impl<S: Scalar> Chunk<S> {
         }
         // Nothing reads the activations' tangents of the last hidden layer: the output is linear.
         if channels > 1 && l + 1 < self.layout.hidden().len() {
-            vectorized(#[inline(always)] || {
-                for (h, z) in h_tangents.chunks_exact_mut(size).zip(tangents.chunks_exact(size)) {
-                    for ((h, &z), &d1) in h.iter_mut().zip(z).zip(&*d1) {
-                        *h = d1 * z;
+            vectorized(
+                #[inline(always)]
+                || {
+                    for (h, z) in h_tangents.chunks_exact_mut(size).zip(tangents.chunks_exact(size)) {
+                        for ((h, &z), &d1) in h.iter_mut().zip(z).zip(&*d1) {
+                            *h = d1 * z;
+                        }
                     }
-                }
-            });
+                },
+            );
         }
     }
 
@@ -210,11 +216,14 @@ impl<S: Scalar> Chunk<S> {
         let output = &weights[self.layout.output_range()];
         let last = self.hidden.last().map_or(&self.phi, |hidden| &hidden.h);
         self.lagrangian.clear();
-        vectorized(#[inline(always)] || {
-            for (h, v) in last.chunks_exact(output.len()).zip(self.features.velocity.chunks_exact(n)) {
-                self.lagrangian.push(dot(h, output) + alpha * dot(v, v));
-            }
-        });
+        vectorized(
+            #[inline(always)]
+            || {
+                for (h, v) in last.chunks_exact(output.len()).zip(self.features.velocity.chunks_exact(n)) {
+                    self.lagrangian.push(dot(h, output) + alpha * dot(v, v));
+                }
+            },
+        );
     }
 
     fn reverse(&mut self, weights: &[S], channels: usize) {
@@ -245,14 +254,20 @@ impl<S: Scalar> Chunk<S> {
             let hidden = &mut after[0];
             if has_mass {
                 let (mass, coriolis) = (&mut self.mass_matrix, &mut self.coriolis);
-                vectorized(#[inline(always)] || add_second_derivatives(hidden, batch, n, &mut self.row, mass, coriolis));
+                vectorized(
+                    #[inline(always)]
+                    || add_second_derivatives(hidden, batch, n, &mut self.row, mass, coriolis),
+                );
             }
             resize(&mut hidden.z_adjoint, batch * hidden.width);
-            vectorized(#[inline(always)] || {
-                for ((out, &a), &d1) in hidden.z_adjoint.iter_mut().zip(&hidden.adjoint).zip(&hidden.slope[0]) {
-                    *out = a * d1;
-                }
-            });
+            vectorized(
+                #[inline(always)]
+                || {
+                    for ((out, &a), &d1) in hidden.z_adjoint.iter_mut().zip(&hidden.adjoint).zip(&hidden.slope[0]) {
+                        *out = a * d1;
+                    }
+                },
+            );
             let target = match before.last_mut() {
                 Some(previous) => {
                     resize(&mut previous.adjoint, batch * layer.inputs);

@@ -13,7 +13,7 @@ mod model;
 mod reference;
 pub mod storage;
 
-pub use activation::Activation;
+pub use activation::{Activation, UnknownActivation};
 pub use adjoint::{Adjoint, Jets};
 pub use chunk::{Chunk, Depth};
 pub use config::{Architecture, Initialization};

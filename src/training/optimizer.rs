@@ -61,18 +61,21 @@ impl<S: Scalar> Moments<S> {
         let step = S::of_f64(step);
         let epsilon = S::of_f64(EPSILON);
         let moments = self.first.iter_mut().zip(self.second.iter_mut());
-        vectorized(#[inline(always)] move || {
-            for ((w, &g), (m, v)) in weights.iter_mut().zip(gradient).zip(moments) {
-                let g = g * clip + decay * *w;
-                *m = b1 * *m + c1 * g;
-                *v = b2 * *v + c2 * g * g;
-                let direction = match scale {
-                    Some(scale) => *m / (v.sqrt() * S::of_f64(scale) + epsilon),
-                    None => *m,
-                };
-                *w -= step * direction;
-            }
-        });
+        vectorized(
+            #[inline(always)]
+            move || {
+                for ((w, &g), (m, v)) in weights.iter_mut().zip(gradient).zip(moments) {
+                    let g = g * clip + decay * *w;
+                    *m = b1 * *m + c1 * g;
+                    *v = b2 * *v + c2 * g * g;
+                    let direction = match scale {
+                        Some(scale) => *m / (v.sqrt() * S::of_f64(scale) + epsilon),
+                        None => *m,
+                    };
+                    *w -= step * direction;
+                }
+            },
+        );
         norm
     }
 
@@ -103,14 +106,17 @@ impl<S: Scalar> Moments<S> {
 fn norm<S: Scalar>(gradient: &[S]) -> f64 {
     const LANES: usize = 16;
     let mut sums = [0.0; LANES];
-    vectorized(#[inline(always)] || {
-        for part in gradient.chunks(LANES) {
-            for (sum, &g) in sums.iter_mut().zip(part) {
-                let g = g.to_f64();
-                *sum += g * g;
+    vectorized(
+        #[inline(always)]
+        || {
+            for part in gradient.chunks(LANES) {
+                for (sum, &g) in sums.iter_mut().zip(part) {
+                    let g = g.to_f64();
+                    *sum += g * g;
+                }
             }
-        }
-    });
+        },
+    );
     sums.iter().sum::<f64>().sqrt()
 }
 

@@ -245,11 +245,14 @@ impl<S: Scalar> EpochSolver<S> {
         self.averaged_steps += 1;
         let keep = self.optimizer.averaging.min(1.0 - 1.0 / self.averaged_steps as f64);
         let take = S::of_f64(1.0 - keep);
-        crate::scalar::vectorized(#[inline(always)] || {
-            for (average, &w) in self.average.iter_mut().zip(&self.weights) {
-                *average += take * (w - *average);
-            }
-        });
+        crate::scalar::vectorized(
+            #[inline(always)]
+            || {
+                for (average, &w) in self.average.iter_mut().zip(&self.weights) {
+                    *average += take * (w - *average);
+                }
+            },
+        );
     }
 
     /// The weights that are validated and kept.
