@@ -22,7 +22,7 @@ pub struct Args {
     #[arg(long, value_name = "N", default_value = "4", allow_hyphen_values = true, value_parser = count)]
     starts: usize,
     /// Seed of the states and starts [default: the model's].
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_hyphen_values = true)]
     seed: Option<u64>,
     /// Threads [default: all].
     #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = count)]

@@ -7,6 +7,7 @@ use crate::cli::number::threads;
 use crate::cli::progress::Progress as Bar;
 use crate::cli::train_config::Args;
 use crate::cli::{CliError, interrupt, output};
+use crate::lagrangian::system::Size;
 use crate::lagrangian::{Configured, configure};
 use crate::network::file::{FORMAT, Header, ModelFile, StoredPrecision};
 use crate::network::{Architecture, NetworkLagrangian};
@@ -161,6 +162,9 @@ fn header(
     let named = system.system.parameters.iter().map(|p| p.symbol.to_string());
     let mut parameters: std::collections::BTreeMap<_, _> = named.zip(system.parameters.iter().copied()).collect();
     parameters.extend(config.parameters.clone());
+    if let Size::Chosen { symbol, .. } = system.system.size {
+        parameters.insert(symbol.to_string(), system.coordinates as f64);
+    }
     configure::<f64>(&config.system, &given(&parameters)).map_err(CliError::data)?;
     let hull = |bounds: fn(&Phase) -> &Vec<[f64; 2]>| {
         (0..system.coordinates)

@@ -23,7 +23,7 @@ pub struct Args {
     #[arg(long, value_name = "SYMBOL=VALUE", value_parser = source::parameter)]
     param: Vec<(String, String)>,
     /// Seed of states, weights and the order of the data.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_hyphen_values = true)]
     seed: Option<u64>,
     /// Epochs of every phase.
     #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = count)]
