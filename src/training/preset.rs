@@ -79,11 +79,11 @@ fn quick(system: &Configured<f64>) -> Config {
         }
     }
     let phase = Phase {
-        epochs: 50,
+        epochs: 80,
         rate: 3e-3,
         eta_min: 0.0,
         schedule: Schedule::Cosine,
-        t_max: 50.0,
+        t_max: 80.0,
         position: boxes(&bounds.positions),
         velocity: boxes(&bounds.velocities),
     };
