@@ -120,9 +120,15 @@ fn grids(
     Ok(figures)
 }
 
+/// A table of a report.
+struct Table {
+    title: &'static str,
+    header: Vec<&'static str>,
+    rows: Vec<Vec<String>>,
+}
+
 impl Evaluation {
-    /// Tables: title, header, rows.
-    fn tables(&self) -> [(&'static str, Vec<&'static str>, Vec<Vec<String>>); 2] {
+    fn tables(&self) -> [Table; 2] {
         let accelerations = self.coordinates.iter().zip(&self.accelerations).map(|(name, e)| {
             let numbers = [e.mean, e.rms, e.median, e.p99, e.max].map(|x| format!("{x:.4e}"));
             [vec![name.clone()], numbers.to_vec(), vec![e.failed.to_string()]].concat()
@@ -135,31 +141,28 @@ impl Evaluation {
             row
         });
         [
-            (
-                "Error of accelerations on fresh states, physical units",
-                vec!["coordinate", "mean", "rms", "median", "99 %", "max", "failed"],
-                accelerations.collect(),
-            ),
-            (
-                "Trajectories from random starts against exact motion",
-                vec!["start", "until [s]", "coordinates mean", "max", "energy mean", "max", "ended by"],
-                trajectories.collect(),
-            ),
+            Table {
+                title: "Error of accelerations on fresh states, physical units",
+                header: vec!["coordinate", "mean", "rms", "median", "99 %", "max", "failed"],
+                rows: accelerations.collect(),
+            },
+            Table {
+                title: "Trajectories from random starts against exact motion",
+                header: vec!["start", "until [s]", "coordinates mean", "max", "energy mean", "max", "ended by"],
+                rows: trajectories.collect(),
+            },
         ]
     }
 
     /// Tables for a terminal.
     pub fn text(&self) -> String {
-        self.tables()
-            .iter()
-            .map(|(title, header, rows)| format!("{title}\n{}", text_table(header, rows)))
-            .collect::<Vec<_>>()
-            .join("\n")
+        let tables = self.tables();
+        tables.iter().map(|t| format!("{}\n{}", t.title, text_table(&t.header, &t.rows))).collect::<Vec<_>>().join("\n")
     }
 
     /// Tables and pictures for a report.
     pub fn report(&self, mut report: Report) -> Report {
-        for (title, header, rows) in self.tables() {
+        for Table { title, header, rows } in self.tables() {
             report = report.heading(title).table(&header, &rows);
         }
         report = report.heading("Learned against exact");

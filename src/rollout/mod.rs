@@ -13,14 +13,12 @@ mod ode;
 mod options;
 mod run;
 mod trajectory;
-mod write;
 
 pub use error::{RolloutError, UnderflowCause};
 pub use ode::Integrable;
 pub use options::{Domain, Method, Options};
 pub use run::{Rollout, rollout, rollout_many};
 pub use trajectory::{Statistics, Trajectory};
-pub use write::write_atomically;
 
 #[cfg(test)]
 pub(crate) mod models;
