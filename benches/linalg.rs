@@ -3,7 +3,7 @@
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use faer::linalg::solvers::Solve;
 use lnn::linalg::{self, Workspace};
-use nalgebra::{DMatrix, DVector, SMatrix, SVector};
+use nalgebra::{Const, DMatrix, DVector, DimMin, SMatrix, SVector, ToTypenum};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::hint::black_box;
@@ -28,7 +28,10 @@ fn data(n: usize) -> (Vec<f64>, Vec<f64>) {
 }
 
 /// nalgebra with its size known to the compiler.
-fn nalgebra_static<const N: usize>(matrices: &[f64], rhs: &[f64], x: &mut [f64]) {
+fn nalgebra_static<const N: usize>(matrices: &[f64], rhs: &[f64], x: &mut [f64])
+where
+    Const<N>: ToTypenum + DimMin<Const<N>, Output = Const<N>>,
+{
     for ((m, r), x) in matrices.chunks_exact(N * N).zip(rhs.chunks_exact(N)).zip(x.chunks_exact_mut(N)) {
         let m = SMatrix::<f64, N, N>::from_column_slice(m);
         if let Some(found) = m.lu().solve(&SVector::<f64, N>::from_column_slice(r)) {

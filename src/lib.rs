@@ -1,10 +1,14 @@
 //! Stabilized Lagrangian neural networks: learn `L(q, dq/dt)` from motion, predict motion that keeps its energy, read
 //! physics off the learned function.
 //!
-//! Rooms, each importing only from those above it: [`scalar`], [`ops`], [`forward`], [`linalg`], [`tape`],
+//! Rooms, each importing only from those above it: [`names`], [`storage`], [`scalar`], [`ops`], [`forward`], [`linalg`], [`tape`],
 //! [`lagrangian`], [`network`], [`training`], [`rollout`], [`analysis`], `report`, `cli`.
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
+
+pub mod names;
+
+pub mod storage;
 
 pub mod scalar;
 

@@ -1,8 +1,8 @@
 //! TOML configurations with errors that name file, line, key and the nearest known key.
 
 use crate::cli::CliError;
-use crate::cli::nearest::nearest;
-use crate::network::storage::read_regular;
+use crate::names::nearest;
+use crate::storage::read_regular;
 use serde::de::DeserializeOwned;
 use std::ops::Range;
 use std::path::Path;

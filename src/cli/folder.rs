@@ -1,7 +1,7 @@
 //! A directory that a command fills, held by one run at a time.
 
 use crate::cli::CliError;
-use crate::network::storage::write_atomically;
+use crate::storage::write_atomically;
 use std::fs::{self, File, TryLockError};
 use std::path::{Path, PathBuf};
 

@@ -4,8 +4,8 @@ use crate::cli::source::{Source, parameter};
 use crate::cli::{CliError, States, json, output, parse_states, states};
 use crate::lagrangian::{MechanicsError, Request, Terms};
 use crate::linalg::{Workspace, eigenvalues};
-use crate::network::storage::read_regular;
 use crate::scalar::{Dd, Scalar};
+use crate::storage::read_regular;
 use std::path::PathBuf;
 
 /// States evaluated together; bounds the memory whatever the length of the file.

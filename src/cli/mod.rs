@@ -12,7 +12,6 @@ mod inspect;
 mod interrupt;
 mod json;
 mod learned;
-mod nearest;
 mod number;
 mod output;
 mod progress;

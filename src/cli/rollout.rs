@@ -3,8 +3,8 @@
 use crate::cli::learned::Learned;
 use crate::cli::number::{finite, positive};
 use crate::cli::{CliError, output};
-use crate::network::storage::write_atomically;
 use crate::rollout::{Method, Options, RolloutError, rollout};
+use crate::storage::write_atomically;
 use std::path::PathBuf;
 
 /// Arguments.

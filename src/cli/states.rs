@@ -1,6 +1,6 @@
 //! States from CSV files.
 
-use crate::cli::nearest::unknown;
+use crate::names::unknown;
 use crate::scalar::Scalar;
 use thiserror::Error;
 

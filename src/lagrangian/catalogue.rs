@@ -2,28 +2,29 @@
 
 use super::system::{Closed, Size, System};
 use super::{EulerLagrange, HandWritten};
+use crate::names::unknown;
 use crate::scalar::Scalar;
 
 /// Why a system could not be built.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SystemError {
     /// No system of this name.
-    #[error("unknown system `{name}`; did you mean `{nearest}`?")]
+    #[error("{}", unknown("system", name, known.iter().copied()))]
     UnknownSystem {
         /// The name asked for.
         name: String,
-        /// The most similar name there is.
-        nearest: &'static str,
+        /// Names there are.
+        known: Vec<&'static str>,
     },
     /// No parameter of this symbol.
-    #[error("{system} has no parameter `{symbol}`; did you mean `{nearest}`?")]
+    #[error("{system}: {}", unknown("parameter", symbol, known.iter().copied()))]
     UnknownParameter {
         /// The system.
         system: &'static str,
         /// The symbol given.
         symbol: String,
-        /// The most similar symbol there is.
-        nearest: &'static str,
+        /// Symbols there are.
+        known: Vec<&'static str>,
     },
     /// A parameter given twice.
     #[error("parameter `{symbol}` is given twice")]
@@ -114,10 +115,7 @@ pub fn systems() -> &'static [System] {
 /// # Errors
 /// [`SystemError::UnknownSystem`] with the nearest name.
 pub fn find(name: &str) -> Result<&'static System, SystemError> {
-    SYSTEMS.iter().find(|system| system.name == name).ok_or_else(|| SystemError::UnknownSystem {
-        name: name.into(),
-        nearest: nearest(name, SYSTEMS.iter().map(|system| system.name)),
-    })
+    SYSTEMS.iter().find(|system| system.name == name).ok_or_else(|| unknown_system(name))
 }
 
 /// Reads the parameters of a system in the working precision; those not given take their defaults.
@@ -131,10 +129,10 @@ pub fn configure<S: Scalar>(name: &str, given: &Given) -> Result<Configured<S>, 
         Size::Chosen { symbol, .. } => Some(symbol),
     };
     for (i, (symbol, _)) in given.iter().enumerate() {
-        let mut known = system.parameters.iter().map(|p| p.symbol).chain(count);
+        let known = system.parameters.iter().map(|p| p.symbol).chain(count);
         if !known.clone().any(|k| k == symbol) {
-            let nearest = if known.next().is_some() { nearest(symbol, symbols(system, count)) } else { "" };
-            return Err(SystemError::UnknownParameter { system: system.name, symbol: symbol.clone(), nearest });
+            let (system, known) = (system.name, known.collect());
+            return Err(SystemError::UnknownParameter { system, symbol: symbol.clone(), known });
         }
         if given[..i].iter().any(|(earlier, _)| earlier == symbol) {
             return Err(SystemError::Repeated { symbol: symbol.clone() });
@@ -200,7 +198,7 @@ impl<S: Scalar> Configured<S> {
     /// # Errors
     /// [`SystemError::UnknownSystem`] if the description is not of the catalogue.
     pub fn build(&self) -> Result<Box<dyn EulerLagrange<S>>, SystemError> {
-        construct(self).ok_or_else(|| SystemError::UnknownSystem { name: self.system.name.into(), nearest: "" })
+        construct(self).ok_or_else(|| unknown_system(self.system.name))
     }
     /// As [`exact_acceleration`].
     ///
@@ -223,29 +221,8 @@ impl<S: Scalar> Configured<S> {
     }
 }
 
-/// Symbols of a system.
-fn symbols(system: &'static System, count: Option<&'static str>) -> impl Iterator<Item = &'static str> {
-    system.parameters.iter().map(|p| p.symbol).chain(count)
-}
-
-/// The candidate at the smallest edit distance (Levenshtein).
-fn nearest(name: &str, candidates: impl Iterator<Item = &'static str>) -> &'static str {
-    candidates.min_by_key(|candidate| distance(name, candidate)).unwrap_or("")
-}
-
-fn distance(a: &str, b: &str) -> usize {
-    let b: Vec<char> = b.chars().collect();
-    let mut row: Vec<usize> = (0..=b.len()).collect();
-    for (i, x) in a.chars().enumerate() {
-        let mut corner = row[0];
-        row[0] = i + 1;
-        for (j, &y) in b.iter().enumerate() {
-            let replaced = corner + usize::from(x != y);
-            corner = row[j + 1];
-            row[j + 1] = replaced.min(row[j] + 1).min(corner + 1);
-        }
-    }
-    row[b.len()]
+fn unknown_system(name: &str) -> SystemError {
+    SystemError::UnknownSystem { name: name.into(), known: SYSTEMS.iter().map(|system| system.name).collect() }
 }
 
 #[cfg(test)]
@@ -286,14 +263,10 @@ mod tests {
         assert_eq!(configured.parameters, expected);
         assert_eq!(configure::<f32>("n-pendulum", &given(&[("n", "7")])).unwrap().coordinates, 7);
         let error = |name: &str, list: &[(&str, &str)]| configure::<f64>(name, &given(list)).unwrap_err();
-        assert_eq!(
-            error("duble-pendulum", &[]),
-            SystemError::UnknownSystem { name: "duble-pendulum".into(), nearest: "double-pendulum" }
-        );
-        assert!(matches!(
-            error("spring-pendulum", &[("L0", "1")]),
-            SystemError::UnknownParameter { nearest: "l0", .. }
-        ));
+        let text = error("duble-pendulum", &[]).to_string();
+        assert_eq!(text, "unknown system \"duble-pendulum\", did you mean \"double-pendulum\"?");
+        let text = error("spring-pendulum", &[("L0", "1")]).to_string();
+        assert_eq!(text, "spring-pendulum: unknown parameter \"L0\", did you mean \"l0\"?");
         assert!(matches!(error("n-pendulum", &[("N", "3")]), SystemError::UnknownParameter { .. }));
         assert!(matches!(error("double-pendulum", &[("g", "1"), ("g", "2")]), SystemError::Repeated { .. }));
         for bad in ["0", "-1", "nan", "inf", "1e999", "one", ""] {

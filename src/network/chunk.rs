@@ -371,7 +371,7 @@ pub(super) fn dot<S: Scalar>(a: &[S], b: &[S]) -> S {
     let mut width = LANES / 2;
     while width > 0 {
         for k in 0..width {
-            sums[k] = sums[k] + sums[k + width];
+            sums[k] += sums[k + width];
         }
         width /= 2;
     }

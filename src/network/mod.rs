@@ -11,7 +11,6 @@ mod init;
 mod layout;
 mod model;
 mod reference;
-pub mod storage;
 
 pub use activation::{Activation, UnknownActivation};
 pub use adjoint::{Adjoint, Jets};

@@ -167,7 +167,7 @@ impl<S: Scalar> EulerLagrange<S> for NetworkLagrangian<S> {
     fn terms(&self, q: &[S], v: &[S], request: Request, terms: &mut Terms<S>) -> Result<(), MechanicsError> {
         let n = self.architecture.coordinates;
         let shape = |what, expected, found| Err(MechanicsError::Shape { what, expected, found });
-        if q.len() % n != 0 {
+        if !q.len().is_multiple_of(n) {
             return shape("coordinates", q.len().next_multiple_of(n), q.len());
         }
         if v.len() != q.len() {

@@ -4,6 +4,9 @@ use super::{Figure, HeatMap, LinePlot, PlotError, Series, Trace, heat_maps_png, 
 use crate::analysis::{AffineFit, Grid, TrajectoryRun, affine_fit};
 use crate::scalar::Scalar;
 
+/// Times and values of one quantity of a run.
+type Part<S> = fn(&TrajectoryRun<S>) -> (&[f64], &[f64]);
+
 /// Pictures of trajectory tests: coordinate error, energy error, energy drift over time, one line per start, and for the
 /// first start the coordinates over time and its trace in the plane of coordinate and velocity.
 ///
@@ -20,18 +23,18 @@ pub fn evaluation_figures<S: Scalar, T: AsRef<str>>(
     let over_time = |title: &str, y_label: &str, log_y: bool, series: Vec<Series>| {
         line_png(&LinePlot { title: title.into(), x_label: "t [s]".into(), y_label: y_label.into(), log_y, series })
     };
-    let per_start = |part: &dyn Fn(&TrajectoryRun<S>) -> (Vec<f64>, Vec<f64>)| -> Vec<Series> {
+    let per_start = |part: Part<S>| -> Vec<Series> {
         runs.iter()
             .enumerate()
             .map(|(k, run)| {
                 let (t, y) = part(run);
-                Series::new(&format!("start {}", k + 1), &t, &y)
+                Series::new(&format!("start {}", k + 1), t, y)
             })
             .collect()
     };
-    let coordinate = per_start(&|run| (run.coordinates.t.clone(), run.coordinates.max.clone()));
-    let energy = per_start(&|run| (run.energy.t.clone(), run.energy.error.clone()));
-    let drift = per_start(&|run| (run.drift.t.clone(), run.drift.error.clone()));
+    let coordinate = per_start(|run| (&run.coordinates.t, &run.coordinates.max));
+    let energy = per_start(|run| (&run.energy.t, &run.energy.error));
+    let drift = per_start(|run| (&run.drift.t, &run.drift.error));
     keep(
         &mut figures,
         "coordinate_error.png",
@@ -54,8 +57,8 @@ pub fn evaluation_figures<S: Scalar, T: AsRef<str>>(
     let Some(run) = runs.first() else { return Ok(figures) };
     let (exact, learned) = (&run.exact.trajectory, &run.learned.trajectory);
     let n = exact.coordinates;
-    for i in 0..n.min(columns.len()) {
-        let name = columns[i].as_ref();
+    for (i, name) in columns.iter().take(n).enumerate() {
+        let name = name.as_ref();
         let angle = periodic.get(i).copied().unwrap_or(false);
         let line = |label: &str, trajectory: &crate::rollout::Trajectory<S>| {
             let t: Vec<f64> = trajectory.t.iter().map(|t| t.to_f64()).collect();
@@ -69,7 +72,7 @@ pub fn evaluation_figures<S: Scalar, T: AsRef<str>>(
                 &format!("{name} of start 1"),
                 name,
                 false,
-                vec![line("exact", exact), line("learned", learned).dashed()],
+                vec![line("exact", exact), line("learned", learned).over()],
             ),
             format!("{name} of start 1 over time, exact and learned."),
         )?;

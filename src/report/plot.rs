@@ -39,20 +39,20 @@ pub struct Series {
     pub name: String,
     /// Points; those that are not finite leave gaps.
     pub points: Vec<(f64, f64)>,
-    /// Whether to draw it dashed.
-    pub dashed: bool,
+    /// Whether to draw it thin over the others, which are then drawn wide: lines that ought to coincide.
+    pub over: bool,
 }
 
 impl Series {
-    /// A solid line through `(x[k], y[k])`.
+    /// A line through `(x[k], y[k])`.
     pub fn new(name: &str, x: &[f64], y: &[f64]) -> Self {
-        Self { name: name.into(), points: x.iter().copied().zip(y.iter().copied()).collect(), dashed: false }
+        Self { name: name.into(), points: x.iter().copied().zip(y.iter().copied()).collect(), over: false }
     }
 
-    /// The same line dashed.
+    /// The same line drawn thin over the others.
     #[must_use]
-    pub fn dashed(self) -> Self {
-        Self { dashed: true, ..self }
+    pub fn over(self) -> Self {
+        Self { over: true, ..self }
     }
 }
 
@@ -107,9 +107,10 @@ pub struct HeatMap {
 /// [`PlotError`] if nothing can be shown.
 pub fn line_png(plot: &LinePlot) -> Result<Vec<u8>, PlotError> {
     let mut series = plot.series.clone();
+    let all_x = range(series.iter().flat_map(|s| &s.points).map(|p| p.0));
     for series in &mut series {
         for point in &mut series.points {
-            if plot.log_y && !(point.1 > 0.0) {
+            if plot.log_y && point.1 <= 0.0 {
                 point.1 = f64::NAN;
             }
         }
@@ -123,11 +124,11 @@ pub fn line_png(plot: &LinePlot) -> Result<Vec<u8>, PlotError> {
         }
     }
     let empty = || PlotError::Empty(plot.title.clone());
-    let (x, y) =
-        (range(values(&series, |p| p.0)).ok_or_else(empty)?, range(values(&series, |p| p.1)).ok_or_else(empty)?);
+    let (y, x) = (range(values(&series, |p| p.1)).ok_or_else(empty)?, all_x.ok_or_else(empty)?);
 
     let mut plots = Vec::new();
     let several = series.len() > 1;
+    let overlaid = several && series.iter().any(|s| s.over);
     for (index, series) in series.iter().enumerate() {
         let colour = COLOURS[index % COLOURS.len()];
         let mut named = series.name.is_empty() || !several;
@@ -136,10 +137,8 @@ pub fn line_png(plot: &LinePlot) -> Result<Vec<u8>, PlotError> {
                 plots.push(Plot::Scatter(ScatterPlot::new().with_data(run).with_color(colour).with_size(2.5)));
                 continue;
             }
-            let mut line = Line::new().with_data(run).with_color(colour).with_stroke_width(1.8);
-            if series.dashed {
-                line = line.with_dashed();
-            }
+            let width = if overlaid && !series.over { 5.0 } else { 1.8 };
+            let mut line = Line::new().with_data(run).with_color(colour).with_stroke_width(width);
             if !named {
                 line = line.with_legend(&*series.name);
                 named = true;
@@ -268,8 +267,10 @@ pub fn heat_maps_png(maps: &[HeatMap]) -> Result<Vec<u8>, PlotError> {
             .with_y_range(y.0, y.1)
             .with_cell_size(1.08);
         let plots = vec![Plot::Heatmap(heat)];
+        // The colour bar of a constant has no ticks.
+        let title = if high > low { map.title.clone() } else { format!("{} = {}", map.title, number(low)) };
         layouts.push(
-            style(Layout::auto_from_plots(&plots), &map.title, &map.x_label, &map.y_label)
+            style(Layout::auto_from_plots(&plots), &title, &map.x_label, &map.y_label)
                 .with_show_grid(false)
                 .with_x_axis_min(x.0)
                 .with_x_axis_max(x.1)
@@ -349,10 +350,8 @@ fn runs(points: &[(f64, f64)]) -> Vec<Vec<(f64, f64)>> {
     for (k, &point) in points.iter().enumerate() {
         if !(fine(point.0) && fine(point.1)) {
             runs.push(Vec::new());
-        } else if k % stride == 0 || k == last {
-            if let Some(run) = runs.last_mut() {
-                run.push(point);
-            }
+        } else if let Some(run) = runs.last_mut().filter(|_| k % stride == 0 || k == last) {
+            run.push(point);
         }
     }
     runs.retain(|run| !run.is_empty());
@@ -392,7 +391,7 @@ mod tests {
     use super::*;
 
     fn plot(points: &[(f64, f64)], log_y: bool) -> Result<Vec<u8>, PlotError> {
-        let series = vec![Series { name: "a".into(), points: points.to_vec(), dashed: false }];
+        let series = vec![Series { name: "a".into(), points: points.to_vec(), over: false }];
         line_png(&LinePlot { title: "T".into(), x_label: "t [s]".into(), y_label: "y".into(), log_y, series })
     }
 
@@ -443,7 +442,7 @@ mod tests {
     #[test]
     fn traces() {
         let circle: Vec<_> = (0..500).map(|k| ((0.05 * f64::from(k)).cos(), (0.05 * f64::from(k)).sin())).collect();
-        let path = |points| Series { name: "p".into(), points, dashed: false };
+        let path = |points| Series { name: "p".into(), points, over: false };
         let trace = |paths| Trace { title: "T".into(), x_label: "x".into(), y_label: "y".into(), paths };
         assert!(is_png(&trace_png(&trace(vec![path(circle), path(vec![])])).unwrap()));
         assert!(is_png(&trace_png(&trace(vec![path(vec![(0.0, 0.0)])])).unwrap()));

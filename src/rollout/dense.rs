@@ -5,10 +5,11 @@
 //! `y0 + s (r1 + (1-s) (r2 + s (r3 + (1-s) (r4 + ...))))`, `s` in `[0, 1]` along the step; it meets `y` and `dy/dt` at
 //! both ends.
 
+use super::ode::Rhs;
 use crate::scalar::{Real, Scalar};
 
 /// Weights of the fifth coefficient of DOPRI5 over its stages (Shampine's, order 4).
-const DOPRI5: &[(usize, f64)] = &[
+const DOPRI5: Weights = &[
     (1, -12715105075.0 / 11282082432.0),
     (3, 87487479700.0 / 32700410799.0),
     (4, -10690763975.0 / 1880347072.0),
@@ -17,8 +18,11 @@ const DOPRI5: &[(usize, f64)] = &[
     (7, 69997945.0 / 29380423.0),
 ];
 
+/// `(index of the stage, weight)`, stages counted from 1.
+type Weights = &'static [(usize, f64)];
+
 /// Stages 14 to 16: `(index of k, weight)`; row sums are the nodes 1/10, 1/5, 7/9.
-const EXTRA: [&[(usize, f64)]; 3] = [
+const EXTRA: [Weights; 3] = [
     &[
         (1, 0.056167502283047954),
         (7, 0.25350021021662483),
@@ -52,7 +56,7 @@ const EXTRA: [&[(usize, f64)]; 3] = [
 ];
 
 /// Weights of the four highest coefficients over the stages.
-const DENSE: [&[(usize, f64)]; 4] = [
+const DENSE: [Weights; 4] = [
     &[
         (1, -8.428938276109013),
         (6, 0.5667149535193777),
@@ -143,11 +147,7 @@ impl<S: Scalar> Interpolant<S> {
     ///
     /// # Errors
     /// The first error of `f`.
-    pub fn dop853<E>(
-        &mut self,
-        step: &Step<'_, S>,
-        f: &mut dyn FnMut(&[S], &mut [S]) -> Result<(), E>,
-    ) -> Result<(), E> {
+    pub fn dop853<E>(&mut self, step: &Step<'_, S>, f: &mut Rhs<'_, S, E>) -> Result<(), E> {
         self.hermite(step, 13, 8);
         let dim = self.dim;
         for weights in EXTRA {

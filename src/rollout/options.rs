@@ -135,7 +135,7 @@ impl<S: Scalar> Options<S> {
             return invalid("dt", "must not be 0".into());
         }
         let samples = ((self.t_end - self.t0) / self.dt).abs();
-        if !(samples.to_f64() <= MAX_SAMPLES) {
+        if samples.is_nan() || samples.to_f64() > MAX_SAMPLES {
             return invalid(
                 "dt",
                 format!("asks for {:.3e} samples, at most {MAX_SAMPLES:.0e} are allowed", samples.to_f64()),

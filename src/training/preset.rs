@@ -93,7 +93,9 @@ fn quick(system: &Configured<f64>) -> Config {
 /// Appendix "Training details" of Hamzaogullari and Ozakin.
 fn paper(system: &Configured<f64>) -> Option<Config> {
     let n = system.coordinates;
-    let (states, hidden, phases): (usize, Vec<usize>, &[(usize, f64, f64)]) = match system.system.name {
+    /// Epochs, rate, lowest rate.
+    type Stretch = (usize, f64, f64);
+    let (states, hidden, phases): (_, _, &[Stretch]) = match system.system.name {
         "double-pendulum" => (60_000, vec![500; 3], &[(300, 1e-3, 1e-6), (200, 4e-5, 1e-7), (200, 1e-5, 1e-8)]),
         "triple-pendulum" => (60_000, vec![500; 3], &[(500, 1e-3, 1e-7)]),
         "spring-pendulum" => (60_000, vec![600; 2], &[(500, 5e-4, 1e-7)]),
@@ -109,7 +111,7 @@ fn paper(system: &Configured<f64>) -> Option<Config> {
         initialization: Initialization::Default,
     };
     let bounds: Bounds = (system.system.training)(n);
-    let phase = |(k, &(epochs, rate, eta_min)): (usize, &(usize, f64, f64))| {
+    let phase = |(k, &(epochs, rate, eta_min)): (usize, &Stretch)| {
         let mut position = boxes(&bounds.positions);
         if system.system.name == "double-pendulum" {
             // The first phase sees three turns, the others one turn and a little more.

@@ -22,7 +22,7 @@ pub fn solve<T: Real>(n: usize, matrix: &[T], right: &[T]) -> Vec<T> {
             let known = m[k * n + j] * x[j];
             x[k] -= known;
         }
-        x[k] = x[k] / m[k * n + k];
+        x[k] /= m[k * n + k];
     }
     x
 }

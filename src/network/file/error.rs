@@ -1,6 +1,6 @@
 //! Why a model file could not be written or read.
 
-use crate::network::storage::ReadError;
+use crate::storage::ReadError;
 use thiserror::Error;
 
 /// Why a model file could not be written or read.

@@ -18,9 +18,9 @@ mod tests;
 pub use error::ModelFileError;
 pub use header::{FORMAT, Header, StoredPrecision};
 
-use crate::network::storage::{read_regular, write_atomically};
 use crate::network::{Architecture, Layout};
 use crate::scalar::Scalar;
+use crate::storage::{read_regular, write_atomically};
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use serde::Deserialize;
 use std::collections::HashMap;
