@@ -2,14 +2,15 @@
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use lnn::lagrangian::{self, Request, Terms};
-use num_dual::{Dual2SVec64, hessian};
+use nalgebra_of_num_dual::SVector;
+use num_dual::{Dual2SVec64, DualNum, hessian};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::hint::black_box;
 use std::time::Duration;
 
 /// The double pendulum's Lagrangian over num-dual's numbers, unit masses and lengths.
-fn double_pendulum(x: &nalgebra::SVector<Dual2SVec64<4>, 4>) -> Dual2SVec64<4> {
+fn double_pendulum(x: &SVector<Dual2SVec64<4>, 4>) -> Dual2SVec64<4> {
     let (u, w) = (x[2], x[3]);
     let kinetic = u * u + w * w * 0.5 + u * w * (x[0] - x[1]).cos();
     kinetic + (x[0].cos() * 2.0 + x[1].cos()) * 9.8
@@ -41,7 +42,7 @@ fn benches(c: &mut Criterion) {
                 group.bench_function(BenchmarkId::new("num-dual hessian", batch), |b| {
                     b.iter(|| {
                         for (q, v) in q.chunks_exact(2).zip(v.chunks_exact(2)) {
-                            let x = nalgebra::SVector::from([q[0], q[1], v[0], v[1]]);
+                            let x = SVector::from([q[0], q[1], v[0], v[1]]);
                             black_box(hessian(|x| double_pendulum(&x), &black_box(x)));
                         }
                     });

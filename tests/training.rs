@@ -60,7 +60,7 @@ fn whole_loss<T: Real>(
     for i in 0..n {
         loss += ((predicted[i] - a[i]) / scale(i)).abs();
     }
-    loss = loss / T::from_f64(2.0 * n as f64);
+    loss /= T::from_f64(2.0 * n as f64);
     for u in negative {
         for i in 0..n {
             for j in 0..n {
