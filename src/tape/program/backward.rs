@@ -1,6 +1,6 @@
 //! Reverse replay of one chunk: each operation's adjoint over all lanes, last operation first.
 
-use super::{Instruction, LANES, Node, Row};
+use super::{Instruction, LANES, Node, Row, elementary};
 use crate::ops::{Binary, Unary};
 use crate::scalar::{Real, Scalar, vectorized};
 
@@ -95,10 +95,14 @@ impl<S: Scalar> Sweep<'_, S> {
             Unary::Sqrt => self.add(a, |l| masked(w[l], Unary::Sqrt.first(x[l], y[l]))),
             Unary::Abs => self.add(a, |l| masked(w[l], Unary::Abs.first(x[l], y[l]))),
             Unary::Exp => self.add(a, |l| masked(w[l], y[l])),
+            Unary::Ln => self.add(a, |l| masked(w[l], Unary::Ln.first(x[l], y[l]))),
+            Unary::Ln1p => self.add(a, |l| masked(w[l], Unary::Ln1p.first(x[l], y[l]))),
+            Unary::Tan => self.add(a, |l| masked(w[l], Unary::Tan.first(x[l], y[l]))),
+            Unary::Atan => self.add(a, |l| masked(w[l], Unary::Atan.first(x[l], y[l]))),
             Unary::Powi(2) => self.add(a, |l| masked(w[l], x[l] + x[l])),
             _ => {
                 let mut partials = y;
-                elementary(f, &x, &mut partials);
+                elementary::first(f, &x, &y, &mut partials);
                 self.add(a, |l| masked(w[l], partials[l]));
             }
         }
@@ -133,26 +137,10 @@ impl<S: Scalar> Sweep<'_, S> {
             }
             _ => {
                 let (mut first, mut second) = (*self.value(a), *self.value(b));
-                call(f, &mut first, &mut second, &self.rows[out]);
+                elementary::first_of_two(f, &mut first, &mut second, &self.rows[out]);
                 self.add(a, |l| masked(w[l], first[l]));
                 self.add(b, |l| masked(w[l], second[l]));
             }
         }
-    }
-}
-
-/// Replaces the values `y` by the derivatives `f'(x)`.
-#[inline(never)]
-fn elementary<S: Scalar>(f: Unary, x: &Row<S>, y: &mut Row<S>) {
-    for l in 0..LANES {
-        y[l] = f.first(x[l], y[l]);
-    }
-}
-
-/// Replaces the arguments by the partial derivatives.
-#[inline(never)]
-fn call<S: Scalar>(f: Binary, a: &mut Row<S>, b: &mut Row<S>, y: &Row<S>) {
-    for l in 0..LANES {
-        (a[l], b[l]) = f.first(a[l], b[l], y[l]);
     }
 }

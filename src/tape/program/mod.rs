@@ -6,6 +6,7 @@
 //! threads: the same batch gives the same bytes.
 
 mod backward;
+mod elementary;
 mod forward;
 mod recorder;
 mod replay;
