@@ -5,13 +5,14 @@
 
 mod activation;
 mod affine;
-mod dense;
 mod eigen;
 mod record;
+mod scratch;
 mod solve;
 
 pub use activation::{JetFunction, JetKind};
 pub use record::Block;
+pub(super) use scratch::Scratch;
 
 use super::program::{Row, Sweep};
 use crate::scalar::Scalar;
@@ -71,8 +72,8 @@ impl<S> BlockOp<S> {
     /// Numbers of working space.
     pub(super) fn scratch(&self) -> usize {
         match self {
-            Self::Solve(op) => op.n * (op.n + 2),
-            Self::Eigen(op) => 5 * op.n * op.n + 2 * op.n,
+            Self::Solve(op) => op.scratch(),
+            Self::Eigen(op) => op.scratch(),
             _ => 0,
         }
     }
@@ -87,7 +88,7 @@ impl<S: Scalar> BlockOp<S> {
         rows: &mut [Row<S>],
         out: usize,
         parameters: &[S],
-        scratch: &mut [S],
+        scratch: &mut Scratch<S>,
     ) {
         let base = uniform.len();
         let (before, after) = rows.split_at_mut(out);

@@ -3,6 +3,7 @@
 use super::{Instruction, LANES, Node, Row, elementary};
 use crate::ops::{Binary, Unary};
 use crate::scalar::{Real, Scalar, vectorized};
+use crate::tape::block::Scratch;
 
 /// Values of the forward replay and the adjoints being gathered.
 pub(in crate::tape) struct Sweep<'a, S> {
@@ -21,7 +22,7 @@ pub(in crate::tape) struct Sweep<'a, S> {
     /// Adjoints of the parameters that block operations read.
     pub(in crate::tape) parameter_adjoints: &'a mut [S],
     /// Working space of block operations.
-    pub(in crate::tape) scratch: &'a mut [S],
+    pub(in crate::tape) scratch: &'a mut Scratch<S>,
 }
 
 /// `weight * partial`, but 0 where the weight is exactly 0, whatever the partial derivative: a select, not a branch.

@@ -3,6 +3,7 @@
 use super::{Instruction, LANES, Node, Row, elementary};
 use crate::ops::{Binary, Unary};
 use crate::scalar::{Scalar, vectorized};
+use crate::tape::block::Scratch;
 
 /// What an instruction may read besides the rows of its own section.
 pub(super) struct Environment<'a, S> {
@@ -21,7 +22,7 @@ pub(super) fn forward<S: Scalar>(
     program: &[Instruction<S>],
     environment: &Environment<'_, S>,
     rows: &mut [Row<S>],
-    scratch: &mut [S],
+    scratch: &mut Scratch<S>,
 ) {
     let uniform = environment.uniform;
     let base = uniform.len();

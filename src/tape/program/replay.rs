@@ -4,6 +4,7 @@ use super::backward::Sweep;
 use super::forward::{Environment, forward};
 use super::{LANES, Node, Program, Row};
 use crate::scalar::{Real, Scalar};
+use crate::tape::block::Scratch;
 use crate::tape::error::{TapeError, check_length};
 use std::sync::Arc;
 
@@ -19,7 +20,7 @@ pub struct Replay<S> {
     adjoints: Vec<Row<S>>,
     uniform_adjoints: Vec<Row<S>>,
     parameters: Vec<S>,
-    scratch: Vec<S>,
+    scratch: Scratch<S>,
 }
 
 impl<S: Scalar> Replay<S> {
@@ -33,7 +34,7 @@ impl<S: Scalar> Replay<S> {
             adjoints: vec![[zero; LANES]; program.lane_rows],
             uniform_adjoints: vec![[zero; LANES]; program.uniform_rows],
             parameters: vec![zero; program.parameters],
-            scratch: vec![zero; program.scratch],
+            scratch: Scratch::new(program.scratch),
             program,
         }
     }
