@@ -88,6 +88,13 @@ fn pendulum<S: Scalar>(c: &mut Criterion) {
                 dp
             });
         });
+        group.bench_function(BenchmarkId::new("gradient by parameters only, lanes", count), |b| {
+            b.iter(|| {
+                replay.forward(count, &data, black_box(&parameters), &mut y).unwrap();
+                replay.reverse_parameters(&w, &mut dp).unwrap();
+                dp
+            });
+        });
     }
     group.finish();
 }

@@ -47,7 +47,7 @@ impl Solve {
         scatter(self.solve(scratch), out);
     }
 
-    /// `lam = M^-T a'`, `r' += lam`, `M' -= lam a^T`; nothing in lanes whose `a'` is 0.
+    /// `lam = M^-T a'`, `r' += lam`, `M' -= lam a^T`; nothing in lanes whose `a'` is 0, and only what is asked for.
     #[allow(clippy::too_many_arguments)]
     pub(super) fn reverse<S: Scalar>(
         &self,
@@ -55,8 +55,8 @@ impl Solve {
         solution: &[Row<S>],
         adjoint: &[Row<S>],
         targets: &mut [Row<S>],
-        matrix_rows: Range<usize>,
-        right_rows: Range<usize>,
+        [matrix_rows, right_rows]: [Range<usize>; 2],
+        [by_matrix, by_right]: [bool; 2],
         scratch: &mut Scratch<S>,
     ) {
         let (n, zero) = (self.n, <S as Real>::zero());
@@ -74,8 +74,10 @@ impl Solve {
         let lam = self.solve(scratch);
         for lane in (0..LANES).filter(|&lane| !silent(lane)) {
             for (i, &lam) in lam[lane * n..(lane + 1) * n].iter().enumerate() {
-                targets[right_rows.start + i][lane] += lam;
-                for (j, a) in solution.iter().enumerate() {
+                if by_right {
+                    targets[right_rows.start + i][lane] += lam;
+                }
+                for (j, a) in solution.iter().enumerate().filter(|_| by_matrix) {
                     targets[matrix_rows.start + i * n + j][lane] -= lam * a[lane];
                 }
             }

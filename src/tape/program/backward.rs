@@ -5,10 +5,17 @@ use crate::ops::{Binary, Unary};
 use crate::scalar::{Real, Scalar, vectorized};
 use crate::tape::block::Scratch;
 
+/// Depends on lane inputs.
+pub(in crate::tape) const INPUTS: u8 = 1;
+/// Depends on parameters.
+pub(in crate::tape) const PARAMETERS: u8 = 2;
+
 /// Values of the forward replay and the adjoints being gathered.
 pub(in crate::tape) struct Sweep<'a, S> {
-    /// Rows below are constants.
-    pub(in crate::tape) constants: usize,
+    /// What each row depends on: bits of [`INPUTS`] and [`PARAMETERS`].
+    pub(in crate::tape) reach: &'a [u8],
+    /// The adjoints asked for, the same bits: rows that reach none of them are left out.
+    pub(in crate::tape) wanted: u8,
     /// Uniform rows (empty while they themselves are swept).
     pub(in crate::tape) uniform: &'a [Row<S>],
     /// Rows of the section being swept.
@@ -39,11 +46,11 @@ impl<S: Scalar> Sweep<'_, S> {
         let (row, base) = (row as usize, self.uniform.len());
         if row < base { &self.uniform[row] } else { &self.rows[row - base] }
     }
-    /// Adds the contribution of each lane to the adjoint of a row, unless that row is constant.
+    /// Adds the contribution of each lane to the adjoint of a row, unless nothing asked for depends on it.
     #[inline(always)]
     fn add(&mut self, row: u32, contribution: impl Fn(usize) -> S) {
         let (row, base) = (row as usize, self.uniform.len());
-        if row < self.constants {
+        if self.reach[row] & self.wanted == 0 {
             return;
         }
         let mut sum = if row < base { self.uniform_adjoints[row] } else { self.adjoints[row - base] };
@@ -67,6 +74,9 @@ impl<S: Scalar> Sweep<'_, S> {
 
     #[inline(always)]
     fn step(&mut self, instruction: &Instruction<S>) {
+        if self.reach[instruction.out as usize] & self.wanted == 0 {
+            return;
+        }
         let out = instruction.out as usize - self.uniform.len();
         match &instruction.node {
             Node::Input(_) | Node::Parameter(_) | Node::Constant(_) => {}
