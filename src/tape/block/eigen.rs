@@ -43,7 +43,8 @@ impl Eigen {
         scatter(values, levels);
         for (lane, vectors) in vectors.chunks_exact(n * n).enumerate() {
             for (k, u) in vectors.chunks_exact(n).enumerate() {
-                let largest = u.iter().fold(<S as Real>::zero(), |most, &x| if x.abs() > most.abs() { x } else { most });
+                let largest =
+                    u.iter().fold(<S as Real>::zero(), |most, &x| if x.abs() > most.abs() { x } else { most });
                 let turned = largest < <S as Real>::zero();
                 for (i, &x) in u.iter().enumerate() {
                     columns[i * n + k][lane] = if turned { -x } else { x };

@@ -16,8 +16,8 @@ pub use recorder::Recorder;
 pub use replay::Replay;
 pub use tracer::Tracer;
 
-pub(super) use backward::{PARAMETERS, Sweep};
 use backward::INPUTS;
+pub(super) use backward::{PARAMETERS, Sweep};
 pub(super) use recorder::Node;
 pub(super) use replay::pairwise;
 

@@ -112,11 +112,7 @@ impl<S: Scalar> Replay<S> {
     ///
     /// # Errors
     /// As [`Replay::reverse`].
-    pub fn reverse_parameters(
-        &mut self,
-        output_adjoints: &[S],
-        parameter_adjoints: &mut [S],
-    ) -> Result<(), TapeError> {
+    pub fn reverse_parameters(&mut self, output_adjoints: &[S], parameter_adjoints: &mut [S]) -> Result<(), TapeError> {
         self.sweep(output_adjoints, None, Some(parameter_adjoints))
     }
 
