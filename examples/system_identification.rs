@@ -12,7 +12,6 @@ use lnn::scalar::Real;
 use lnn::tape::{Program, Replay, Tracer};
 use std::cell::RefCell;
 use std::sync::Arc;
-
 type Number<'t> = Tracer<'t, f64>;
 
 /// Sum over the states of |a - target|^2, of the lanes `(q, v, target)` and the parameters.
