@@ -45,6 +45,22 @@ fn nodes(c: &mut Criterion) {
             adjoints.of(x)
         });
     });
+    group.bench_function("eight independent chains, per node", |b| {
+        b.iter(|| {
+            tape.reset();
+            let x: [Var<'_, f64>; 8] = std::array::from_fn(|k| tape.variable(black_box(1.0 + k as f64 * 1e-4)));
+            let mut y = x;
+            for _ in 0..count / 16 {
+                for k in 0..8 {
+                    y[k] *= x[7 - k];
+                    y[k] += x[k];
+                }
+            }
+            let sum = y.into_iter().fold(Var::zero(), |sum, y| sum + y);
+            tape.reverse(sum, &mut adjoints).unwrap();
+            adjoints.of(x[0])
+        });
+    });
     group.finish();
 }
 
@@ -85,6 +101,13 @@ fn pendulum<S: Scalar>(c: &mut Criterion) {
             b.iter(|| {
                 replay.forward(count, &data, black_box(&parameters), &mut y).unwrap();
                 replay.reverse(&w, &mut dx, &mut dp).unwrap();
+                dp
+            });
+        });
+        group.bench_function(BenchmarkId::new("gradient by parameters only, lanes", count), |b| {
+            b.iter(|| {
+                replay.forward(count, &data, black_box(&parameters), &mut y).unwrap();
+                replay.reverse_parameters(&w, &mut dp).unwrap();
                 dp
             });
         });

@@ -66,6 +66,8 @@ fn replay_and_reused_tape_allocate_nothing() {
         tape.reverse(y, &mut adjoints).unwrap();
         assert!(adjoints.of(x).is_finite());
     };
+    // The reset after the first recording makes room for it.
+    round();
     round();
     assert_eq!(allocations(|| (0..10).for_each(|_| round())), 0);
 }

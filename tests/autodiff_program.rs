@@ -23,6 +23,11 @@ fn run<S: Scalar>(program: Program<S>, lanes: usize, x: &[S], p: &[S], w: &[S]) 
     let [y, dx, dp] = &mut out;
     replay.forward(lanes, x, p, y).unwrap();
     replay.reverse(w, dx, dp).unwrap();
+    // Asked for alone, they are the same to the bit.
+    let (mut alone_x, mut alone_p) = (vec![S::NAN; x.len()], vec![S::NAN; p.len()]);
+    replay.reverse_inputs(w, &mut alone_x).unwrap();
+    replay.reverse_parameters(w, &mut alone_p).unwrap();
+    assert_eq!(format!("{alone_x:?} {alone_p:?}"), format!("{dx:?} {dp:?}"));
     out
 }
 
@@ -67,7 +72,9 @@ fn replay_agrees_with_the_eager_tape_lane_by_lane() {
             let state = &x[2 * lane..2 * lane + 2];
             let weight = &w[3 * lane..3 * lane + 3];
             let (value, d) = gradient(&Mixture, &[state, &parameters].concat()).unwrap();
-            assert_eq!(&y[3 * lane..3 * lane + 3], [value, state[0] * parameters[0], parameters[1] * parameters[2]]);
+            // Rows and single numbers take the elementary functions from different places: alike up to their rounding.
+            close(&y[3 * lane..3 * lane + 1], &[value], 16.0 * f64::EPSILON);
+            assert_eq!(&y[3 * lane + 1..3 * lane + 3], [state[0] * parameters[0], parameters[1] * parameters[2]]);
             let want = [weight[0] * d[0] + weight[1] * parameters[0], weight[0] * d[1]];
             close(&dx[2 * lane..2 * lane + 2], &want, 1e-13);
             sum[0] += weight[0] * d[2] + weight[1] * state[0];

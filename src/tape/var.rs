@@ -54,7 +54,7 @@ impl<'t, T: Real> Var<'t, T> {
     fn unary(self, value: T, partial: T) -> Self {
         match self.tape {
             None => Self::lift(value),
-            Some(tape) => tape.push(value, [self.id, 0], [partial, T::zero()]),
+            Some(tape) => tape.push(value, (self.id, partial), (0, T::zero())),
         }
     }
     /// Result of a function of two arguments.
@@ -62,12 +62,17 @@ impl<'t, T: Real> Var<'t, T> {
     fn binary(self, other: Self, value: T, partials: (T, T)) -> Self {
         let (da, db) = partials;
         match (self.tape, other.tape) {
-            (None, None) => Self::lift(value),
-            (Some(tape), None) => tape.push(value, [self.id, 0], [da, T::zero()]),
-            (None, Some(tape)) => tape.push(value, [other.id, 0], [db, T::zero()]),
-            (Some(tape), Some(second)) if std::ptr::eq(tape, second) => tape.push(value, [self.id, other.id], [da, db]),
+            (Some(tape), Some(second)) if std::ptr::eq(tape, second) => tape.push(value, (self.id, da), (other.id, db)),
             (Some(tape), Some(second)) => mixed(tape, second),
+            (Some(tape), None) => tape.push(value, (self.id, da), (0, T::zero())),
+            (None, Some(tape)) => tape.push(value, (other.id, db), (0, T::zero())),
+            (None, None) => Self::lift(value),
         }
+    }
+    /// Product of a variable and a constant factor.
+    #[inline(always)]
+    fn scaled(self, factor: T, value: T) -> Self {
+        if factor.is_exact_zero() && value.is_exact_zero() { Self::lift(value) } else { self.unary(value, factor) }
     }
     /// The same variable with a value that a rounding-free operation gave it.
     #[inline(always)]
@@ -76,7 +81,7 @@ impl<'t, T: Real> Var<'t, T> {
     }
     #[inline(always)]
     fn table1(self, f: Unary) -> Self {
-        if self.id == 0 {
+        if self.tape.is_none() {
             return Self::lift(f.value(self.value));
         }
         let (value, partial) = f.value_first(self.value);
@@ -85,7 +90,7 @@ impl<'t, T: Real> Var<'t, T> {
     #[inline(always)]
     fn table2(self, other: Self, f: Binary) -> Self {
         let value = f.value(self.value, other.value);
-        if self.id == 0 && other.id == 0 {
+        if self.tape.is_none() && other.tape.is_none() {
             return Self::lift(value);
         }
         self.binary(other, value, f.first(self.value, other.value, value))
@@ -112,9 +117,9 @@ impl<T: Real> Add for Var<'_, T> {
     #[inline(always)]
     fn add(self, other: Self) -> Self {
         let value = self.value + other.value;
-        match (self.id, other.id) {
-            (_, 0) => self.renamed(value),
-            (0, _) => other.renamed(value),
+        match (self.tape, other.tape) {
+            (_, None) => self.renamed(value),
+            (None, _) => other.renamed(value),
             _ => self.binary(other, value, (T::one(), T::one())),
         }
     }
@@ -124,8 +129,8 @@ impl<T: Real> Sub for Var<'_, T> {
     #[inline(always)]
     fn sub(self, other: Self) -> Self {
         let value = self.value - other.value;
-        match other.id {
-            0 => self.renamed(value),
+        match other.tape {
+            None => self.renamed(value),
             _ => self.binary(other, value, (T::one(), -T::one())),
         }
     }
@@ -136,12 +141,11 @@ impl<T: Real> Mul for Var<'_, T> {
     #[inline(always)]
     fn mul(self, other: Self) -> Self {
         let value = self.value * other.value;
-        let constant_zero =
-            (self.id == 0 && self.value.is_exact_zero()) || (other.id == 0 && other.value.is_exact_zero());
-        if constant_zero && value.is_exact_zero() {
-            return Self::lift(value);
+        match (self.tape, other.tape) {
+            (Some(_), None) => self.scaled(other.value, value),
+            (None, Some(_)) => other.scaled(self.value, value),
+            _ => self.binary(other, value, (other.value, self.value)),
         }
-        self.binary(other, value, (other.value, self.value))
     }
 }
 impl<T: Real> Div for Var<'_, T> {
@@ -188,6 +192,11 @@ impl<T: Real> Real for Var<'_, T> {
     #[inline]
     fn powi(self, exponent: i32) -> Self {
         self.table1(Unary::Powi(exponent))
+    }
+    /// One argument, where `self * self` has two.
+    #[inline(always)]
+    fn sqr(self) -> Self {
+        self.unary(self.value * self.value, self.value + self.value)
     }
     #[inline]
     fn powf(self, exponent: Self) -> Self {

@@ -28,22 +28,27 @@ impl Affine {
         }
     }
 
-    /// `X' += W^T Y'`, `W' += Y' X^T`, `b' +=` sums of the rows of `Y'` in channel 0.
-    pub(super) fn reverse<S: Scalar>(
-        &self,
-        x: &[Row<S>],
-        parameters: &[S],
-        y_adjoint: &[Row<S>],
-        x_adjoint: &mut [Row<S>],
-        parameter_adjoints: &mut [S],
-    ) {
-        let (columns, one) = (self.channels * LANES, <S as Real>::one());
+    /// `X' += W^T Y'`.
+    pub(super) fn reverse_input<S: Scalar>(&self, parameters: &[S], y_adjoint: &[Row<S>], x_adjoint: &mut [Row<S>]) {
+        let columns = self.channels * LANES;
         let weights = MatRef::new(&parameters[self.weights..], self.outputs, self.inputs);
         let y = MatRef::new(y_adjoint.as_flattened(), self.outputs, columns);
+        let target = MatMut::new(x_adjoint.as_flattened_mut(), self.inputs, columns);
+        gemm(target, true, <S as Real>::one(), weights.t(), y);
+    }
+
+    /// `W' += Y' X^T`, `b' +=` sums of the rows of `Y'` in channel 0.
+    pub(super) fn reverse_parameters<S: Scalar>(
+        &self,
+        x: &[Row<S>],
+        y_adjoint: &[Row<S>],
+        parameter_adjoints: &mut [S],
+    ) {
+        let columns = self.channels * LANES;
+        let y = MatRef::new(y_adjoint.as_flattened(), self.outputs, columns);
         let x = MatRef::new(x.as_flattened(), self.inputs, columns);
-        gemm(MatMut::new(x_adjoint.as_flattened_mut(), self.inputs, columns), true, one, weights.t(), y);
         let target = &mut parameter_adjoints[self.weights..];
-        gemm(MatMut::new(target, self.outputs, self.inputs), true, one, y, x.t());
+        gemm(MatMut::new(target, self.outputs, self.inputs), true, <S as Real>::one(), y, x.t());
         if let Some(bias) = self.bias {
             let rows = y_adjoint.iter().step_by(self.channels);
             for (target, row) in parameter_adjoints[bias..].iter_mut().zip(rows) {

@@ -1,6 +1,7 @@
 //! Batched symmetric eigendecomposition.
 
-use super::dense;
+use super::scratch::{Scratch, scatter};
+use crate::linalg;
 use crate::scalar::{Real, Scalar};
 use crate::tape::program::{LANES, Row};
 
@@ -13,22 +14,40 @@ pub(in crate::tape) struct Eigen {
 }
 
 impl Eigen {
-    pub(super) fn forward<S: Scalar>(&self, matrix: &[Row<S>], out: &mut [Row<S>], scratch: &mut [S]) {
+    /// Numbers of working space.
+    pub(super) fn scratch(&self) -> usize {
+        let square = self.n * self.n;
+        (LANES * (2 * square + self.n)).max(3 * square)
+    }
+
+    /// Lanes whose matrix is not finite become `NaN`.
+    pub(super) fn forward<S: Scalar>(&self, matrix: &[Row<S>], out: &mut [Row<S>], scratch: &mut Scratch<S>) {
         let n = self.n;
-        let (a, u) = scratch.split_at_mut(n * n);
-        let u = &mut u[..n * n];
-        for lane in 0..LANES {
-            for i in 0..n {
-                for j in 0..n {
+        let Scratch { numbers, workspace } = scratch;
+        let (matrices, rest) = numbers.split_at_mut(LANES * n * n);
+        let (vectors, rest) = rest.split_at_mut(LANES * n * n);
+        let values = &mut rest[..LANES * n];
+        for i in 0..n {
+            for j in 0..n {
+                for lane in 0..LANES {
                     let sum = matrix[i * n + j][lane] + matrix[j * n + i][lane];
-                    a[i * n + j] = sum * S::of_f64(0.5);
+                    matrices[lane * n * n + i * n + j] = sum * <S as Real>::half();
                 }
             }
-            dense::jacobi(n, a, u);
-            for k in 0..n {
-                out[k][lane] = a[k * n + k];
-                for i in 0..n {
-                    out[n + i * n + k][lane] = u[i * n + k];
+        }
+        if linalg::eigh(n, matrices, values, vectors, workspace).is_err() && workspace.failures().is_empty() {
+            values.fill(S::NAN);
+            vectors.fill(S::NAN);
+        }
+        let (levels, columns) = out.split_at_mut(n);
+        scatter(values, levels);
+        for (lane, vectors) in vectors.chunks_exact(n * n).enumerate() {
+            for (k, u) in vectors.chunks_exact(n).enumerate() {
+                let largest =
+                    u.iter().fold(<S as Real>::zero(), |most, &x| if x.abs() > most.abs() { x } else { most });
+                let turned = largest < <S as Real>::zero();
+                for (i, &x) in u.iter().enumerate() {
+                    columns[i * n + k][lane] = if turned { -x } else { x };
                 }
             }
         }
@@ -45,10 +64,10 @@ impl Eigen {
         value: &[Row<S>],
         adjoint: &[Row<S>],
         target: &mut [Row<S>],
-        scratch: &mut [S],
+        scratch: &mut Scratch<S>,
     ) {
         let (n, zero) = (self.n, <S as Real>::zero());
-        let (u, rest) = scratch.split_at_mut(n * n);
+        let (u, rest) = scratch.numbers.split_at_mut(n * n);
         let (inner, rest) = rest.split_at_mut(n * n);
         let half_product = &mut rest[..n * n];
         for lane in 0..LANES {

@@ -5,15 +5,16 @@
 
 mod activation;
 mod affine;
-mod dense;
 mod eigen;
 mod record;
+mod scratch;
 mod solve;
 
 pub use activation::{JetFunction, JetKind};
 pub use record::Block;
+pub(super) use scratch::Scratch;
 
-use super::program::{Row, Sweep};
+use super::program::{PARAMETERS, Row, Sweep};
 use crate::scalar::Scalar;
 use std::sync::Arc;
 
@@ -68,11 +69,15 @@ impl<S> BlockOp<S> {
             Self::Eigen(op) => Self::Eigen(eigen::Eigen { matrix: to(op.matrix), ..*op }),
         }
     }
+    /// Whether it reads parameters itself.
+    pub(super) fn has_parameters(&self) -> bool {
+        matches!(self, Self::Affine(_))
+    }
     /// Numbers of working space.
     pub(super) fn scratch(&self) -> usize {
         match self {
-            Self::Solve(op) => op.n * (op.n + 2),
-            Self::Eigen(op) => 5 * op.n * op.n + 2 * op.n,
+            Self::Solve(op) => op.scratch(),
+            Self::Eigen(op) => op.scratch(),
             _ => 0,
         }
     }
@@ -87,7 +92,7 @@ impl<S: Scalar> BlockOp<S> {
         rows: &mut [Row<S>],
         out: usize,
         parameters: &[S],
-        scratch: &mut [S],
+        scratch: &mut Scratch<S>,
     ) {
         let base = uniform.len();
         let (before, after) = rows.split_at_mut(out);
@@ -113,7 +118,7 @@ impl<S: Scalar> BlockOp<S> {
         }
     }
 
-    /// Adds to the adjoints of the rows it read.
+    /// Adds to the adjoints of the rows it read, where they are asked for.
     #[inline(never)]
     pub(super) fn reverse(&self, sweep: &mut Sweep<'_, S>, out: usize) {
         let base = sweep.uniform.len();
@@ -121,12 +126,15 @@ impl<S: Scalar> BlockOp<S> {
         let adjoint = &after[..self.rows()];
         let value = &sweep.rows[out..out + self.rows()];
         let range = |first: u32, count: usize| first as usize - base..first as usize - base + count;
+        let wanted = |row: u32| sweep.reach[row as usize] & sweep.wanted != 0;
         match self {
             Self::Pack(sources) => {
                 for (weight, &source) in adjoint.iter().zip(sources) {
+                    if !wanted(source) {
+                        continue;
+                    }
                     let source = source as usize;
                     let target = match source {
-                        _ if source < sweep.constants => continue,
                         _ if source < base => &mut sweep.uniform_adjoints[source],
                         _ => &mut before[source - base],
                     };
@@ -137,8 +145,13 @@ impl<S: Scalar> BlockOp<S> {
             }
             Self::Affine(op) => {
                 let input = range(op.input, op.inputs * op.channels);
-                let (x, x_adjoint) = (&sweep.rows[input.clone()], &mut before[input]);
-                op.reverse(x, sweep.parameters, adjoint, x_adjoint, sweep.parameter_adjoints);
+                let x = &sweep.rows[input.clone()];
+                if wanted(op.input) {
+                    op.reverse_input(sweep.parameters, adjoint, &mut before[input]);
+                }
+                if sweep.wanted & PARAMETERS != 0 {
+                    op.reverse_parameters(x, adjoint, sweep.parameter_adjoints);
+                }
             }
             Self::Jet(op) => {
                 let input = range(op.input, self.rows());
@@ -146,7 +159,8 @@ impl<S: Scalar> BlockOp<S> {
             }
             Self::Solve(op) => {
                 let (matrix, right) = (range(op.matrix, op.n * op.n), range(op.right, op.n));
-                op.reverse(&sweep.rows[matrix.clone()], value, adjoint, before, matrix, right, sweep.scratch);
+                let wanted = [wanted(op.matrix), wanted(op.right)];
+                op.reverse(&sweep.rows[matrix.clone()], value, adjoint, before, [matrix, right], wanted, sweep.scratch);
             }
             Self::Eigen(op) => {
                 op.reverse(value, adjoint, &mut before[range(op.matrix, op.n * op.n)], sweep.scratch);

@@ -91,9 +91,11 @@ impl<S: Scalar> Recorder<S> {
         self.block(BlockOp::Jet(op), x.rows, x.channels)
     }
 
-    /// `a = M^-1 r`, `M` `(n, n)` row-major, by LU with partial pivoting.
+    /// `a = M^-1 r`, `M` `(n, n)` row-major, by LU with partial pivoting and one refinement
+    /// ([`linalg::solve`](crate::linalg::solve)).
     ///
-    /// A singular lane gives numbers that are not finite: detect them.
+    /// A lane whose matrix is singular to working precision, or not finite, is `NaN`. The verdict on a matrix with a
+    /// tiny pivot takes it for symmetric (a mass matrix); other matrices are solved as well.
     pub fn solve<'t>(&'t self, matrix: &[Tracer<'_, S>], right: &[Tracer<'_, S>]) -> Vec<Tracer<'t, S>> {
         let n = right.len();
         let solution = if matrix.len() == n * n {

@@ -1,6 +1,7 @@
 //! Batched solve `M a = r`.
 
-use super::dense;
+use super::scratch::{Scratch, gather, scatter};
+use crate::linalg;
 use crate::scalar::{Real, Scalar};
 use crate::tape::program::{LANES, Row};
 use std::ops::Range;
@@ -14,11 +15,23 @@ pub(in crate::tape) struct Solve {
 }
 
 impl Solve {
-    /// One lane of the matrix.
-    fn gather<S: Scalar>(matrix: &[Row<S>], lane: usize, a: &mut [S]) {
-        for (target, row) in a.iter_mut().zip(matrix) {
-            *target = row[lane];
+    /// Numbers of working space: a matrix and two vectors for each lane.
+    pub(super) fn scratch(&self) -> usize {
+        LANES * self.n * (self.n + 2)
+    }
+
+    /// Solves for the matrices and right-hand sides that stand in the scratch; the solutions are left there.
+    ///
+    /// A lane that fails is `NaN`, which is its report: the others are right.
+    fn solve<'s, S: Scalar>(&self, scratch: &'s mut Scratch<S>) -> &'s [S] {
+        let Scratch { numbers, workspace } = scratch;
+        let (matrices, rest) = numbers.split_at_mut(LANES * self.n * self.n);
+        let (right, rest) = rest.split_at_mut(LANES * self.n);
+        let solution = &mut rest[..LANES * self.n];
+        if linalg::solve(self.n, matrices, right, solution, workspace).is_err() && workspace.failures().is_empty() {
+            solution.fill(S::NAN);
         }
+        solution
     }
 
     pub(super) fn forward<S: Scalar>(
@@ -26,21 +39,15 @@ impl Solve {
         matrix: &[Row<S>],
         right: &[Row<S>],
         out: &mut [Row<S>],
-        scratch: &mut [S],
+        scratch: &mut Scratch<S>,
     ) {
-        let (a, x) = scratch.split_at_mut(self.n * self.n);
-        let x = &mut x[..self.n];
-        for lane in 0..LANES {
-            Self::gather(matrix, lane, a);
-            Self::gather(right, lane, x);
-            dense::solve(a, x, false);
-            for (row, &value) in out.iter_mut().zip(x.iter()) {
-                row[lane] = value;
-            }
-        }
+        let size = LANES * self.n * self.n;
+        gather(matrix, &mut scratch.numbers[..size]);
+        gather(right, &mut scratch.numbers[size..]);
+        scatter(self.solve(scratch), out);
     }
 
-    /// `lam = M^-T a'`, `r' += lam`, `M' -= lam a^T`; nothing in lanes whose `a'` is 0.
+    /// `lam = M^-T a'`, `r' += lam`, `M' -= lam a^T`; nothing in lanes whose `a'` is 0, and only what is asked for.
     #[allow(clippy::too_many_arguments)]
     pub(super) fn reverse<S: Scalar>(
         &self,
@@ -48,23 +55,29 @@ impl Solve {
         solution: &[Row<S>],
         adjoint: &[Row<S>],
         targets: &mut [Row<S>],
-        matrix_rows: Range<usize>,
-        right_rows: Range<usize>,
-        scratch: &mut [S],
+        [matrix_rows, right_rows]: [Range<usize>; 2],
+        [by_matrix, by_right]: [bool; 2],
+        scratch: &mut Scratch<S>,
     ) {
-        let n = self.n;
-        let (a, rest) = scratch.split_at_mut(n * n);
-        let x = &mut rest[..n];
-        for lane in 0..LANES {
-            Self::gather(adjoint, lane, x);
-            if x.iter().all(|&w| w == <S as Real>::zero()) {
-                continue;
+        let (n, zero) = (self.n, <S as Real>::zero());
+        let silent = |lane: usize| adjoint.iter().all(|row| row[lane] == zero);
+        if (0..LANES).all(silent) {
+            return;
+        }
+        for (k, row) in matrix.iter().enumerate() {
+            let transposed = (k % n) * n + k / n;
+            for (l, &value) in row.iter().enumerate() {
+                scratch.numbers[l * n * n + transposed] = value;
             }
-            Self::gather(matrix, lane, a);
-            dense::solve(a, x, true);
-            for (i, &lam) in x.iter().enumerate() {
-                targets[right_rows.start + i][lane] += lam;
-                for (j, a) in solution.iter().enumerate() {
+        }
+        gather(adjoint, &mut scratch.numbers[LANES * n * n..]);
+        let lam = self.solve(scratch);
+        for lane in (0..LANES).filter(|&lane| !silent(lane)) {
+            for (i, &lam) in lam[lane * n..(lane + 1) * n].iter().enumerate() {
+                if by_right {
+                    targets[right_rows.start + i][lane] += lam;
+                }
+                for (j, a) in solution.iter().enumerate().filter(|_| by_matrix) {
                     targets[matrix_rows.start + i * n + j][lane] -= lam * a[lane];
                 }
             }

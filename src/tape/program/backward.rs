@@ -1,13 +1,21 @@
 //! Reverse replay of one chunk: each operation's adjoint over all lanes, last operation first.
 
-use super::{Instruction, LANES, Node, Row};
+use super::{Instruction, LANES, Node, Row, elementary};
 use crate::ops::{Binary, Unary};
 use crate::scalar::{Real, Scalar, vectorized};
+use crate::tape::block::Scratch;
+
+/// Depends on lane inputs.
+pub(in crate::tape) const INPUTS: u8 = 1;
+/// Depends on parameters.
+pub(in crate::tape) const PARAMETERS: u8 = 2;
 
 /// Values of the forward replay and the adjoints being gathered.
 pub(in crate::tape) struct Sweep<'a, S> {
-    /// Rows below are constants.
-    pub(in crate::tape) constants: usize,
+    /// What each row depends on: bits of [`INPUTS`] and [`PARAMETERS`].
+    pub(in crate::tape) reach: &'a [u8],
+    /// The adjoints asked for, the same bits: rows that reach none of them are left out.
+    pub(in crate::tape) wanted: u8,
     /// Uniform rows (empty while they themselves are swept).
     pub(in crate::tape) uniform: &'a [Row<S>],
     /// Rows of the section being swept.
@@ -21,7 +29,7 @@ pub(in crate::tape) struct Sweep<'a, S> {
     /// Adjoints of the parameters that block operations read.
     pub(in crate::tape) parameter_adjoints: &'a mut [S],
     /// Working space of block operations.
-    pub(in crate::tape) scratch: &'a mut [S],
+    pub(in crate::tape) scratch: &'a mut Scratch<S>,
 }
 
 /// `weight * partial`, but 0 where the weight is exactly 0, whatever the partial derivative: a select, not a branch.
@@ -38,11 +46,11 @@ impl<S: Scalar> Sweep<'_, S> {
         let (row, base) = (row as usize, self.uniform.len());
         if row < base { &self.uniform[row] } else { &self.rows[row - base] }
     }
-    /// Adds the contribution of each lane to the adjoint of a row, unless that row is constant.
+    /// Adds the contribution of each lane to the adjoint of a row, unless nothing asked for depends on it.
     #[inline(always)]
     fn add(&mut self, row: u32, contribution: impl Fn(usize) -> S) {
         let (row, base) = (row as usize, self.uniform.len());
-        if row < self.constants {
+        if self.reach[row] & self.wanted == 0 {
             return;
         }
         let mut sum = if row < base { self.uniform_adjoints[row] } else { self.adjoints[row - base] };
@@ -66,6 +74,9 @@ impl<S: Scalar> Sweep<'_, S> {
 
     #[inline(always)]
     fn step(&mut self, instruction: &Instruction<S>) {
+        if self.reach[instruction.out as usize] & self.wanted == 0 {
+            return;
+        }
         let out = instruction.out as usize - self.uniform.len();
         match &instruction.node {
             Node::Input(_) | Node::Parameter(_) | Node::Constant(_) => {}
@@ -95,10 +106,14 @@ impl<S: Scalar> Sweep<'_, S> {
             Unary::Sqrt => self.add(a, |l| masked(w[l], Unary::Sqrt.first(x[l], y[l]))),
             Unary::Abs => self.add(a, |l| masked(w[l], Unary::Abs.first(x[l], y[l]))),
             Unary::Exp => self.add(a, |l| masked(w[l], y[l])),
+            Unary::Ln => self.add(a, |l| masked(w[l], Unary::Ln.first(x[l], y[l]))),
+            Unary::Ln1p => self.add(a, |l| masked(w[l], Unary::Ln1p.first(x[l], y[l]))),
+            Unary::Tan => self.add(a, |l| masked(w[l], Unary::Tan.first(x[l], y[l]))),
+            Unary::Atan => self.add(a, |l| masked(w[l], Unary::Atan.first(x[l], y[l]))),
             Unary::Powi(2) => self.add(a, |l| masked(w[l], x[l] + x[l])),
             _ => {
                 let mut partials = y;
-                elementary(f, &x, &mut partials);
+                elementary::first(f, &x, &y, &mut partials);
                 self.add(a, |l| masked(w[l], partials[l]));
             }
         }
@@ -133,26 +148,10 @@ impl<S: Scalar> Sweep<'_, S> {
             }
             _ => {
                 let (mut first, mut second) = (*self.value(a), *self.value(b));
-                call(f, &mut first, &mut second, &self.rows[out]);
+                elementary::first_of_two(f, &mut first, &mut second, &self.rows[out]);
                 self.add(a, |l| masked(w[l], first[l]));
                 self.add(b, |l| masked(w[l], second[l]));
             }
         }
-    }
-}
-
-/// Replaces the values `y` by the derivatives `f'(x)`.
-#[inline(never)]
-fn elementary<S: Scalar>(f: Unary, x: &Row<S>, y: &mut Row<S>) {
-    for l in 0..LANES {
-        y[l] = f.first(x[l], y[l]);
-    }
-}
-
-/// Replaces the arguments by the partial derivatives.
-#[inline(never)]
-fn call<S: Scalar>(f: Binary, a: &mut Row<S>, b: &mut Row<S>, y: &Row<S>) {
-    for l in 0..LANES {
-        (a[l], b[l]) = f.first(a[l], b[l], y[l]);
     }
 }

@@ -1,8 +1,9 @@
 //! Forward replay of one chunk: each operation over all lanes.
 
-use super::{Instruction, LANES, Node, Row};
+use super::{Instruction, LANES, Node, Row, elementary};
 use crate::ops::{Binary, Unary};
 use crate::scalar::{Scalar, vectorized};
+use crate::tape::block::Scratch;
 
 /// What an instruction may read besides the rows of its own section.
 pub(super) struct Environment<'a, S> {
@@ -21,7 +22,7 @@ pub(super) fn forward<S: Scalar>(
     program: &[Instruction<S>],
     environment: &Environment<'_, S>,
     rows: &mut [Row<S>],
-    scratch: &mut [S],
+    scratch: &mut Scratch<S>,
 ) {
     let uniform = environment.uniform;
     let base = uniform.len();
@@ -42,7 +43,7 @@ pub(super) fn forward<S: Scalar>(
                     Node::Unary(f, a) => unary(*f, get(*a), out),
                     Node::SinCos(a) => {
                         if let Some(cos) = rest.first_mut() {
-                            sin_cos(get(*a), out, cos);
+                            elementary::sin_cos(get(*a), out, cos);
                         }
                     }
                     Node::Binary(f, a, b) => binary(*f, get(*a), get(*b), out),
@@ -83,7 +84,7 @@ fn map<S: Scalar>(x: &Row<S>, out: &mut Row<S>, f: impl Fn(S) -> S) {
     }
 }
 
-/// The cheap functions are compiled for the widest vectors; the others are calls.
+/// The cheap functions are compiled in place; the others are calls for a whole row.
 #[inline(always)]
 fn unary<S: Scalar>(f: Unary, x: &Row<S>, out: &mut Row<S>) {
     match f {
@@ -92,21 +93,7 @@ fn unary<S: Scalar>(f: Unary, x: &Row<S>, out: &mut Row<S>) {
         Unary::Sqrt => map(x, out, S::sqrt),
         Unary::Abs => map(x, out, S::abs),
         Unary::Powi(2) => map(x, out, |x| x * x),
-        _ => elementary(f, x, out),
-    }
-}
-
-/// The one place where elementary functions meet lanes.
-#[inline(never)]
-fn elementary<S: Scalar>(f: Unary, x: &Row<S>, out: &mut Row<S>) {
-    map(x, out, |x| f.value(x));
-}
-
-/// Sine and cosine of all lanes.
-#[inline(never)]
-fn sin_cos<S: Scalar>(x: &Row<S>, sin: &mut Row<S>, cos: &mut Row<S>) {
-    for l in 0..LANES {
-        (sin[l], cos[l]) = x[l].sin_cos();
+        _ => elementary::value(f, x, out),
     }
 }
 
@@ -125,14 +112,6 @@ fn binary<S: Scalar>(f: Binary, a: &Row<S>, b: &Row<S>, out: &mut Row<S>) {
         Binary::Div => zip(a, b, out, |a, b| a / b),
         Binary::Max => zip(a, b, out, |a, b| Binary::Max.value(a, b)),
         Binary::Min => zip(a, b, out, |a, b| Binary::Min.value(a, b)),
-        Binary::Powf | Binary::Atan2 => call(f, a, b, out),
-    }
-}
-
-/// Functions of two numbers that are calls.
-#[inline(never)]
-fn call<S: Scalar>(f: Binary, a: &Row<S>, b: &Row<S>, out: &mut Row<S>) {
-    for l in 0..LANES {
-        out[l] = f.value(a[l], b[l]);
+        Binary::Powf | Binary::Atan2 => elementary::value_of_two(f, a, b, out),
     }
 }

@@ -6,6 +6,7 @@
 //! threads: the same batch gives the same bytes.
 
 mod backward;
+mod elementary;
 mod forward;
 mod recorder;
 mod replay;
@@ -15,7 +16,8 @@ pub use recorder::Recorder;
 pub use replay::Replay;
 pub use tracer::Tracer;
 
-pub(super) use backward::Sweep;
+use backward::INPUTS;
+pub(super) use backward::{PARAMETERS, Sweep};
 pub(super) use recorder::Node;
 pub(super) use replay::pairwise;
 
@@ -40,8 +42,8 @@ pub(super) struct Instruction<S> {
 /// Only what the outputs need is kept, equal expressions are computed once, constants are folded.
 #[derive(Clone, Debug)]
 pub struct Program<S> {
-    /// Rows below are constants; adjoints do not reach them.
-    pub(super) constants: usize,
+    /// What each row depends on, see [`Sweep::reach`].
+    pub(super) reach: Vec<u8>,
     /// Rows below are uniform over the lanes.
     pub(super) uniform_rows: usize,
     pub(super) lane_rows: usize,
@@ -91,19 +93,25 @@ impl<S: Scalar> Program<S> {
                 graph.nodes[index].operands(|row| needed[node_of(row)] = true);
             }
         }
+        let mut reach = vec![0u8; count];
         for (index, node) in graph.nodes.iter().enumerate() {
-            uniform[index] = match node {
-                Node::Input(_) | Node::Block(_) => false,
-                node => {
-                    let mut all = true;
-                    node.operands(|row| all &= uniform[node_of(row)]);
-                    all
-                }
+            let (mut bits, mut all) = (0, true);
+            node.operands(|row| {
+                bits |= reach[node_of(row)];
+                all &= uniform[node_of(row)];
+            });
+            (uniform[index], reach[index]) = match node {
+                Node::Input(_) => (false, INPUTS),
+                Node::Parameter(_) => (true, PARAMETERS),
+                Node::Block(op) if op.has_parameters() => (false, bits | PARAMETERS),
+                Node::Block(_) => (false, bits),
+                _ => (all, bits),
             };
         }
         let mut place = vec![0u32; count];
         let mut rows = 0u32;
         let mut boundaries = [0usize; 3];
+        let mut reach_of_row = Vec::new();
         for (section, boundary) in boundaries.iter_mut().enumerate() {
             for (index, node) in graph.nodes.iter().enumerate() {
                 let home = match node {
@@ -114,14 +122,15 @@ impl<S: Scalar> Program<S> {
                 if needed[index] && home == section {
                     place[index] = rows;
                     rows += node.rows() as u32;
+                    reach_of_row.resize(rows as usize, reach[index]);
                 }
             }
             *boundary = rows as usize;
         }
-        let [constants, uniform_rows, all_rows] = boundaries;
+        let [_, uniform_rows, all_rows] = boundaries;
         let moved = |row: u32| place[node_of(row)] + (row - graph.first[node_of(row)]);
         let mut program = Self {
-            constants,
+            reach: reach_of_row,
             uniform_rows,
             lane_rows: all_rows - uniform_rows,
             uniform: Vec::new(),

@@ -1,9 +1,10 @@
 //! Replay of a program over a batch: forward, then reverse.
 
-use super::backward::Sweep;
+use super::backward::{INPUTS, PARAMETERS, Sweep};
 use super::forward::{Environment, forward};
 use super::{LANES, Node, Program, Row};
 use crate::scalar::{Real, Scalar};
+use crate::tape::block::Scratch;
 use crate::tape::error::{TapeError, check_length};
 use std::sync::Arc;
 
@@ -19,7 +20,7 @@ pub struct Replay<S> {
     adjoints: Vec<Row<S>>,
     uniform_adjoints: Vec<Row<S>>,
     parameters: Vec<S>,
-    scratch: Vec<S>,
+    scratch: Scratch<S>,
 }
 
 impl<S: Scalar> Replay<S> {
@@ -33,7 +34,7 @@ impl<S: Scalar> Replay<S> {
             adjoints: vec![[zero; LANES]; program.lane_rows],
             uniform_adjoints: vec![[zero; LANES]; program.uniform_rows],
             parameters: vec![zero; program.parameters],
-            scratch: vec![zero; program.scratch],
+            scratch: Scratch::new(program.scratch),
             program,
         }
     }
@@ -98,16 +99,52 @@ impl<S: Scalar> Replay<S> {
         input_adjoints: &mut [S],
         parameter_adjoints: &mut [S],
     ) -> Result<(), TapeError> {
+        self.sweep(output_adjoints, Some(input_adjoints), Some(parameter_adjoints))
+    }
+    /// [`Replay::reverse`] for the inputs alone: what does not depend on them is not swept.
+    ///
+    /// # Errors
+    /// As [`Replay::reverse`].
+    pub fn reverse_inputs(&mut self, output_adjoints: &[S], input_adjoints: &mut [S]) -> Result<(), TapeError> {
+        self.sweep(output_adjoints, Some(input_adjoints), None)
+    }
+    /// [`Replay::reverse`] for the parameters alone: what does not depend on them is not swept.
+    ///
+    /// # Errors
+    /// As [`Replay::reverse`].
+    pub fn reverse_parameters(&mut self, output_adjoints: &[S], parameter_adjoints: &mut [S]) -> Result<(), TapeError> {
+        self.sweep(output_adjoints, None, Some(parameter_adjoints))
+    }
+
+    fn sweep(
+        &mut self,
+        output_adjoints: &[S],
+        mut by_input: Option<&mut [S]>,
+        by_parameter: Option<&mut [S]>,
+    ) -> Result<(), TapeError> {
         let program = Arc::clone(&self.program);
         let lanes = self.lanes.ok_or(TapeError::NoForward)?;
         check_length("output adjoints", lanes * program.outputs.len(), output_adjoints.len())?;
-        check_length("input adjoints", lanes * program.inputs, input_adjoints.len())?;
-        check_length("parameter adjoints", program.parameters, parameter_adjoints.len())?;
+        let mut wanted = 0;
+        if let Some(target) = &mut by_input {
+            check_length("input adjoints", lanes * program.inputs, target.len())?;
+            wanted |= INPUTS;
+        }
+        let parameter_adjoints = match by_parameter {
+            Some(target) => {
+                check_length("parameter adjoints", program.parameters, target.len())?;
+                wanted |= PARAMETERS;
+                target
+            }
+            None => &mut [],
+        };
         let zero = <S as Real>::zero();
         let (rows, base, width) = (program.lane_rows, program.uniform_rows, program.outputs.len());
         self.uniform_adjoints.fill([zero; LANES]);
-        input_adjoints.fill(zero);
         parameter_adjoints.fill(zero);
+        if let Some(target) = &mut by_input {
+            target.fill(zero);
+        }
         for (chunk, start) in (0..lanes).step_by(LANES).enumerate() {
             let count = LANES.min(lanes - start);
             self.adjoints.fill([zero; LANES]);
@@ -119,7 +156,8 @@ impl<S: Scalar> Replay<S> {
                 }
             }
             let mut sweep = Sweep {
-                constants: program.constants,
+                reach: &program.reach,
+                wanted,
                 uniform: &self.uniform,
                 rows: &self.values[chunk * rows..(chunk + 1) * rows],
                 uniform_adjoints: &mut self.uniform_adjoints,
@@ -129,14 +167,18 @@ impl<S: Scalar> Replay<S> {
                 scratch: &mut self.scratch,
             };
             sweep.run(&program.lanes);
+            let Some(target) = &mut by_input else { continue };
             for instruction in &program.lanes {
                 if let Node::Input(index) = instruction.node {
                     let source = &self.adjoints[instruction.out as usize - base];
                     for (lane, &value) in source[..count].iter().enumerate() {
-                        input_adjoints[(start + lane) * program.inputs + index as usize] = value;
+                        target[(start + lane) * program.inputs + index as usize] = value;
                     }
                 }
             }
+        }
+        if wanted & PARAMETERS == 0 {
+            return Ok(());
         }
         // Uniform rows: sum over the lanes once, then sweep once.
         for row in &mut self.uniform_adjoints {
@@ -145,7 +187,8 @@ impl<S: Scalar> Replay<S> {
             row[0] = sum;
         }
         let mut sweep = Sweep {
-            constants: program.constants,
+            reach: &program.reach,
+            wanted,
             uniform: &[],
             rows: &self.uniform,
             uniform_adjoints: &mut [],
