@@ -28,25 +28,24 @@ fn data(n: usize) -> (Vec<f64>, Vec<f64>) {
 }
 
 /// nalgebra with its size known to the compiler.
-fn nalgebra_static<const N: usize>(matrices: &[f64], rhs: &[f64], x: &mut [f64])
-where
-    Const<N>: ToTypenum + DimMin<Const<N>, Output = Const<N>>,
-{
-    for ((m, r), x) in matrices.chunks_exact(N * N).zip(rhs.chunks_exact(N)).zip(x.chunks_exact_mut(N)) {
-        let m = SMatrix::<f64, N, N>::from_column_slice(m);
-        if let Some(found) = m.lu().solve(&SVector::<f64, N>::from_column_slice(r)) {
-            x.copy_from_slice(found.as_slice());
+macro_rules! nalgebra_static {
+    ($n:literal, $matrices:ident, $rhs:ident, $x:ident) => {
+        for ((m, r), x) in $matrices.chunks_exact($n * $n).zip($rhs.chunks_exact($n)).zip($x.chunks_exact_mut($n)) {
+            let found = SMatrix::<f64, $n, $n>::from_column_slice(m).lu().solve(&SVector::from_column_slice(r));
+            if let Some(found) = found {
+                x.copy_from_slice(found.as_slice());
+            }
         }
-    }
+    };
 }
 
 fn nalgebra_solve(n: usize, matrices: &[f64], rhs: &[f64], x: &mut [f64]) {
     match n {
-        2 => nalgebra_static::<2>(matrices, rhs, x),
-        3 => nalgebra_static::<3>(matrices, rhs, x),
-        4 => nalgebra_static::<4>(matrices, rhs, x),
-        6 => nalgebra_static::<6>(matrices, rhs, x),
-        8 => nalgebra_static::<8>(matrices, rhs, x),
+        2 => nalgebra_static!(2, matrices, rhs, x),
+        3 => nalgebra_static!(3, matrices, rhs, x),
+        4 => nalgebra_static!(4, matrices, rhs, x),
+        6 => nalgebra_static!(6, matrices, rhs, x),
+        8 => nalgebra_static!(8, matrices, rhs, x),
         _ => {
             for ((m, r), x) in matrices.chunks_exact(n * n).zip(rhs.chunks_exact(n)).zip(x.chunks_exact_mut(n)) {
                 let m = DMatrix::from_column_slice(n, n, m);
