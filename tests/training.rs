@@ -12,6 +12,7 @@ use lnn::training::{
     Config, Data, Dataset, Datasets, Failure, Hooks, Method, Network, Objective, OnFailure, Optimizer, Penalty, Phase,
     Precision, Scaling, Schedule, Stop, Trained, TrainingError, train,
 };
+use proptest::prelude::*;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::sync::Arc;
@@ -159,6 +160,39 @@ fn an_inactive_penalty_is_exactly_zero() {
     let (with, gradient) = run(Penalty::Eigenvalue { lambda: 1000.0 });
     assert_eq!((with.penalty, with.penalised), (0.0, 0));
     assert_eq!((with, gradient), run(Penalty::None));
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    /// `lambda` times the mean of `sum relu(-eigenvalue)`: never negative, zero exactly where no eigenvalue is negative.
+    #[test]
+    fn the_penalty_counts_negative_eigenvalues_and_nothing_else(
+        n in 1_usize..=6,
+        alpha in -1.0_f64..1.0,
+        seed in any::<u64>(),
+    ) {
+        let architecture = Architecture { alpha, ..architecture(n, &[7, 6]) };
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let weights: Vec<f64> = initial_weights(&architecture, Initialization::VariancePreserving, &mut rng);
+        let data = random_data(n, 9, seed ^ 1);
+        let penalty = Penalty::Eigenvalue { lambda: 2.5 };
+        let mut gradient = vec![0.0; weights.len()];
+        let rows: Vec<u32> = (0..9).collect();
+        let report = Objective::new(&architecture, penalty, 1).unwrap().step(&weights, &data, &rows, &mut gradient);
+        let mut chunk = lnn::network::Chunk::new(&architecture);
+        chunk.evaluate(&weights, data.q(), data.v(), lnn::network::Depth::MassMatrix);
+        let sums: Vec<f64> = chunk
+            .mass_matrix
+            .chunks_exact(n * n)
+            .map(|m| nalgebra::DMatrix::from_row_slice(n, n, m).symmetric_eigenvalues())
+            .map(|w| w.iter().map(|w| (-w).max(0.0)).sum())
+            .collect();
+        let expected = 2.5 * sums.iter().sum::<f64>() / 9.0;
+        prop_assert!(report.penalty >= 0.0);
+        prop_assert!((report.penalty - expected).abs() <= 1e-12 * (1.0 + expected), "{} {expected}", report.penalty);
+        prop_assert_eq!(report.penalised == 0, report.penalty == 0.0);
+    }
 }
 
 fn config(epochs: usize) -> Config {

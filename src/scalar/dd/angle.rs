@@ -1,10 +1,10 @@
 //! Circular functions and their inverses.
 
-use super::{Dd, reduction::quarter_turns};
+use super::Dd;
+use super::reduction::{HALF_PI, quarter_turns};
 use crate::scalar::{Real, Scalar};
 
 const ONE: Dd = Dd::leading(1.0);
-pub(super) const HALF_PI: Dd = Dd { high: std::f64::consts::FRAC_PI_2, low: 6.123233995736766e-17 };
 
 /// `sum of (-z^2)^k / (first + 2k)!` relative to its first term 1, `|z| <= pi/4`.
 fn alternating_series(z: Dd, first: i32) -> Dd {

@@ -1,6 +1,6 @@
 //! The traits of `num-traits` that make sense for a number type of the library.
 
-use super::{Dd, angle::HALF_PI, elementary::LN_2};
+use super::{Dd, elementary::LN_2, reduction::HALF_PI};
 use crate::scalar::Scalar;
 use num_traits::{FloatConst, FromPrimitive, Num, NumCast, One, ToPrimitive, Zero};
 

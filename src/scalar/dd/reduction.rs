@@ -3,7 +3,10 @@
 //! `x 2/pi mod 4` is computed as an integer with 382 binary places: the bits of `2/pi` that make whole turns with the last
 //! bit of `x` are skipped. Cancellation near multiples of `pi/2` eats at most some 130 places of a double-double number.
 
-use super::{Dd, angle::HALF_PI};
+use super::Dd;
+
+/// A quarter turn.
+pub(super) const HALF_PI: Dd = Dd { high: std::f64::consts::FRAC_PI_2, low: 6.123233995736766e-17 };
 
 /// Words of a window; the two leading bits are the quarter turn, the rest a fraction.
 const WORDS: usize = 6;
