@@ -3,7 +3,7 @@
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use faer::linalg::solvers::Solve;
 use lnn::linalg::{self, Workspace};
-use nalgebra::{Const, DMatrix, DVector, DimMin, SMatrix, SVector, ToTypenum};
+use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::hint::black_box;
