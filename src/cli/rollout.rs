@@ -106,8 +106,11 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         return Err(CliError::data(format_args!("{problem} ({kept} samples are in {})", args.out.display())));
     }
     let statistics = result.statistics;
-    let iterations =
-        if method.is_structure_preserving() { format!(" in {} iterations", statistics.iterations) } else { String::new() };
+    let iterations = if method.is_structure_preserving() {
+        format!(" in {} iterations", statistics.iterations)
+    } else {
+        String::new()
+    };
     output::print(&format!(
         "{} samples to t = {} s, {} steps, {} evaluations{iterations}, in {}\n",
         result.trajectory.len(),

@@ -65,7 +65,7 @@ impl<S: Scalar> Chord<S> {
         x: &mut [S],
     ) -> Result<(), Failure> {
         let size = x.len();
-        let (mut matrices, mut last) = (0, Defect::unknown());
+        let (mut matrices, mut best) = (0, Defect::unknown());
         if self.stale {
             self.refresh(phase, equations, x)?;
             matrices = 1;
@@ -73,7 +73,7 @@ impl<S: Scalar> Chord<S> {
         for iteration in 1..=MAX_ITERATIONS {
             let defect = equations.residual(phase, x, &mut self.residual)?;
             phase.iterations += 1;
-            let improves = defect.improves(last);
+            let improves = defect.improves(best);
             if defect.is_rounding() || (!improves && defect.is_small()) {
                 self.least = self.least.min(iteration);
                 self.stale = matrices > 1 || iteration > self.least + PATIENCE;
@@ -90,7 +90,7 @@ impl<S: Scalar> Chord<S> {
                 self.refresh(phase, equations, x)?;
                 matrices += 1;
             }
-            last = defect;
+            best = best.best(defect);
             for (x, row) in x.iter_mut().zip(self.inverse.chunks_exact(size)) {
                 *x -= row.iter().zip(&self.residual).fold(<S as Real>::zero(), |sum, (&a, &r)| a.mul_add(r, sum));
             }
@@ -99,12 +99,7 @@ impl<S: Scalar> Chord<S> {
     }
 
     /// A new matrix at `x`, inverted.
-    fn refresh(
-        &mut self,
-        phase: &mut Phase<'_, S>,
-        equations: &mut impl Equations<S>,
-        x: &[S],
-    ) -> Result<(), Failure> {
+    fn refresh(&mut self, phase: &mut Phase<'_, S>, equations: &mut impl Equations<S>, x: &[S]) -> Result<(), Failure> {
         let size = x.len();
         (self.stale, self.least) = (true, MAX_ITERATIONS);
         equations.jacobian(phase, x, &mut self.matrix)?;

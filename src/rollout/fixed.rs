@@ -69,9 +69,7 @@ pub(super) fn run<S: Scalar>(
     let start: Vec<S> = q.iter().chain(v).copied().collect();
     let moving = Failure::check(domain, &start).and_then(|()| phase.momentum(q, v));
     result.stop = match moving {
-        Err(failure) => {
-            Some(typed(failure, options.t0.to_f64(), start.iter().map(|x| x.to_f64()).collect(), 0.0))
-        }
+        Err(failure) => Some(typed(failure, options.t0.to_f64(), start.iter().map(|x| x.to_f64()).collect(), 0.0)),
         Ok(p) => {
             let state = State { q: Compensated::new(q.to_vec()), p: Compensated::new(p) };
             let mut position = Position { state, near: v.to_vec(), since: zero, steps: 0, h: zero };

@@ -118,9 +118,8 @@ impl<S: Scalar> Equations<S> for Stages<'_, S> {
                 residual[i * n + k] = (self.p[i * n + k] - p.high[k]) - wanted;
             }
         }
-        let most = |y: &[S], k: usize| {
-            y.iter().skip(k).step_by(n).fold(<S as Real>::zero(), |most, y| S::max(most, y.abs()))
-        };
+        let most =
+            |y: &[S], k: usize| y.iter().skip(k).step_by(n).fold(<S as Real>::zero(), |most, y| S::max(most, y.abs()));
         Ok(Defect::of(n, residual, |k| p.high[k].abs() + most(self.p, k) + self.h.abs() * most(self.g, k)))
     }
 
@@ -233,8 +232,7 @@ impl<S: Scalar> Gauss<S> {
                 let row = &weights[i * depth * s..(i + 1) * depth * s];
                 for k in 0..n {
                     let past = self.history.iter().skip(k).step_by(n);
-                    self.v[i * n + k] =
-                        row.iter().zip(past).fold(<S as Real>::zero(), |sum, (&w, &v)| sum + w * v);
+                    self.v[i * n + k] = row.iter().zip(past).fold(<S as Real>::zero(), |sum, (&w, &v)| sum + w * v);
                 }
             }
             if self.solve(phase, state).is_err() {

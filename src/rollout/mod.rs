@@ -25,9 +25,9 @@ mod variational;
 pub use error::{RolloutError, UnderflowCause};
 pub use ode::Integrable;
 pub use options::{Domain, Method, Options};
+use run::Failure;
 pub use run::{Rollout, rollout, rollout_fixed, rollout_many};
 pub use trajectory::{Statistics, Trajectory};
-use run::Failure;
 
 #[cfg(test)]
 pub(crate) mod models;

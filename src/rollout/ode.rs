@@ -10,8 +10,8 @@
 //! - Underflow is not noticed in `f32`: a step that does not advance the time ends the integration.
 //! - Two nodes of its order 8 table are wrong (0 for 1): harmless, the equations here do not depend on time.
 
-use super::dense::{Interpolant, Step};
 use super::Statistics;
+use super::dense::{Interpolant, Step};
 use crate::scalar::{Real, Scalar};
 use nalgebra::allocator::Allocator;
 use nalgebra::{DefaultAllocator, Dim, OVector};

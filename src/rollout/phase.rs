@@ -74,9 +74,15 @@ impl<S: Scalar> Defect<S> {
         self.overall <= S::EPSILON.ldexp(12)
     }
 
-    /// Whether this is less than half of an earlier one, in either measure.
-    pub(super) fn improves(self, earlier: Self) -> bool {
-        self.relative < earlier.relative * S::half() || self.overall < earlier.overall * S::half()
+    /// Whether this is less than half of the best so far, in either measure. Comparing with the last one instead would
+    /// let an iteration hop between two roundings for ever.
+    pub(super) fn improves(self, best: Self) -> bool {
+        self.relative < best.relative * S::half() || self.overall < best.overall * S::half()
+    }
+
+    /// The better of both in each measure.
+    pub(super) fn best(self, other: Self) -> Self {
+        Self { relative: S::min(self.relative, other.relative), overall: S::min(self.overall, other.overall) }
     }
 }
 
@@ -152,9 +158,7 @@ impl<'a, S: Scalar> Phase<'a, S> {
         (0..=n).for_each(|_| points.extend_from_slice(v));
         let (shifted, velocities) = points.split_at((n + 1) * n);
         let outcome = self.evaluate(shifted, velocities, Request::MOMENTUM | Request::DL_DQ);
-        for (field, matrix) in
-            [(&self.terms.momentum, &mut into.mixed), (&self.terms.dl_dq, &mut into.stiffness)]
-        {
+        for (field, matrix) in [(&self.terms.momentum, &mut into.mixed), (&self.terms.dl_dq, &mut into.stiffness)] {
             matrix.clear();
             matrix.resize(n * n, zero);
             for j in 0..n {
@@ -176,7 +180,7 @@ impl<'a, S: Scalar> Phase<'a, S> {
         let n = self.n;
         let mut residual = vec![<S as Real>::zero(); n];
         let mut change = residual.clone();
-        let mut last = Defect::unknown();
+        let mut best = Defect::unknown();
         for sweep in 1..=MAX_SWEEPS {
             self.evaluate(q, v, Request::MOMENTUM | Request::MASS_MATRIX)?;
             self.iterations += 1;
@@ -185,15 +189,15 @@ impl<'a, S: Scalar> Phase<'a, S> {
             }
             let found = &self.terms.momentum;
             let defect = Defect::of(n, &residual, |i| p[i].abs() + found[i].abs());
-            if defect.is_rounding() || (!defect.improves(last) && defect.is_small()) {
+            // Before the verdict: a momentum that does not depend on the velocity agrees with any.
+            linalg::solve(n, &self.terms.mass_matrix, &residual, &mut change, &mut self.workspace).map_err(singular)?;
+            if defect.is_rounding() || (!defect.improves(best) && defect.is_small()) {
                 return Ok(());
             }
             if sweep == MAX_SWEEPS {
                 return Err(Failure::NotConverged { iterations: sweep, residual: defect.overall.to_f64() });
             }
-            last = defect;
-            linalg::solve(n, &self.terms.mass_matrix, &residual, &mut change, &mut self.workspace)
-                .map_err(singular)?;
+            best = best.best(defect);
             v.iter_mut().zip(&change).for_each(|(v, &c)| *v -= c);
         }
         Ok(())

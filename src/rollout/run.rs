@@ -244,9 +244,7 @@ pub(super) fn typed(failure: Failure, t: f64, state: Vec<f64>, step: f64) -> Rol
             RolloutError::SingularMass { t, state, condition }
         }
         Failure::Model(MechanicsError::NotFinite { what, .. }) => RolloutError::NotFinite { t, state, what },
-        Failure::NotConverged { iterations, residual } => {
-            RolloutError::NotConverged { t, state, iterations, residual }
-        }
+        Failure::NotConverged { iterations, residual } => RolloutError::NotConverged { t, state, iterations, residual },
         Failure::Model(error) => RolloutError::StepUnderflow { t, state, step, cause: UnderflowCause::Model(error) },
     }
 }
