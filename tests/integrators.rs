@@ -468,3 +468,25 @@ fn table_of_energy_errors() {
         }
     }
 }
+
+#[test]
+#[ignore = "a table: collocation on (q, p) against (q, v)"]
+fn table_of_variables() {
+    println!("|E - E0| in the first and last tenth, T = 10000, Gauss order 4 on (q, v) and on (q, p)");
+    let magnetic = [0.5, -0.3, 0.2, 0.7];
+    let models: [(&str, Boxed<f64>, [f64; 4]); 2] = [
+        ("double pendulum", system("double pendulum"), [0.5, 0.3, 1.0, -0.4]),
+        ("magnetic", system("magnetic"), magnetic),
+    ];
+    for (name, model, start) in models {
+        for h in [0.1, 0.05] {
+            let (first, last) = gauss4_on_velocities(&*model, &start, h, (10_000.0 / h) as usize);
+            let rolled = done(rollout(&*model, &start[..2], &start[2..], &fixed(Method::Gauss4, 10_000.0, h, h)));
+            let energy = rolled.trajectory.energy.as_ref().unwrap();
+            let most = |part: &[f64]| part.iter().map(|e| (e - energy[0]).abs()).fold(0.0, f64::max);
+            let tenth = energy.len() / 10;
+            let (early, late) = (most(&energy[..tenth]), most(&energy[energy.len() - tenth..]));
+            println!("{name} | {h} | {first:.2e} {last:.2e} | {early:.2e} {late:.2e}");
+        }
+    }
+}
