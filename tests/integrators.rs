@@ -104,6 +104,11 @@ fn distance<S: Scalar>(a: &[S], b: &[S]) -> f64 {
     a.iter().zip(b).map(|(&a, &b)| (a - b).abs().to_f64()).fold(0.0, f64::max)
 }
 
+/// What should be zero at `(q, v, t)`.
+type Invariant = dyn Fn(&[f64], &[f64], f64) -> f64;
+/// `(model, start, h, steps)` to the largest energy errors in the first and last tenth.
+type Explicit = fn(&dyn EulerLagrange<f64>, &[f64], f64, usize) -> (f64, f64);
+
 /// Slope of the straight line closest to the points.
 fn slope(points: &[(f64, f64)]) -> f64 {
     let n = points.len() as f64;
@@ -205,7 +210,7 @@ fn linear_and_quadratic_invariants_are_kept() {
     for (method, _) in METHODS {
         let pair = plain::<f64, _>(Pair);
         let rolled = done(rollout(&pair, &[0.7, -0.2], &[0.4, 0.1], &fixed(method, 1000.0, 1.0, 0.05)));
-        let worst = |f: &dyn Fn(&[f64], &[f64], f64) -> f64, rolled: &Rollout<f64>| {
+        let worst = |f: &Invariant, rolled: &Rollout<f64>| {
             let states = (0..rolled.trajectory.len()).map(|k| {
                 let (q, v) = rolled.trajectory.state(k);
                 f(q, v, rolled.trajectory.t[k])
@@ -440,8 +445,7 @@ fn table_of_energy_errors() {
     for (name, start, steps) in [("regular", REGULAR, [0.02, 0.005]), ("chaotic", CHAOTIC, [0.005, 0.0025])] {
         for h in steps {
             let count = (1000.0 / h) as usize;
-            let explicit: [(&str, fn(&dyn EulerLagrange<f64>, &[f64], f64, usize) -> (f64, f64)); 2] =
-                [("RK4", runge_kutta), ("Gauss4 on (q, v)", gauss4_on_velocities)];
+            let explicit: [(&str, Explicit); 2] = [("RK4", runge_kutta), ("Gauss4 on (q, v)", gauss4_on_velocities)];
             for (method, run) in explicit {
                 let clock = Instant::now();
                 let (first, last) = run(&model, &start, h, count);
