@@ -21,7 +21,7 @@ pub struct Args {
     /// Time between samples in seconds.
     #[arg(long, value_name = "DT", allow_hyphen_values = true, value_parser = positive)]
     dt: f64,
-    /// Integrator.
+    /// Integrator: two with error control, four symplectic ones of fixed step for long times.
     #[arg(long, value_enum, default_value = "dopri5")]
     method: MethodName,
     /// Relative tolerance of a step.
@@ -30,6 +30,9 @@ pub struct Args {
     /// Absolute tolerance of a step.
     #[arg(long, value_name = "A", default_value = "1e-8", allow_hyphen_values = true, value_parser = positive)]
     atol: f64,
+    /// Longest step of midpoint, gauss4, gauss6 and variational in seconds, one per sample if not given.
+    #[arg(long, value_name = "H", allow_hyphen_values = true, value_parser = positive)]
+    step: Option<f64>,
     /// CSV of the trajectory: t, the columns of a state, energy.
     #[arg(long, value_name = "FILE.csv")]
     out: PathBuf,
@@ -39,6 +42,10 @@ pub struct Args {
 enum MethodName {
     Dopri5,
     Dop853,
+    Midpoint,
+    Gauss4,
+    Gauss6,
+    Variational,
 }
 
 impl From<MethodName> for Method {
@@ -46,6 +53,10 @@ impl From<MethodName> for Method {
         match name {
             MethodName::Dopri5 => Self::Dopri5,
             MethodName::Dop853 => Self::Dop853,
+            MethodName::Midpoint => Self::Midpoint,
+            MethodName::Gauss4 => Self::Gauss4,
+            MethodName::Gauss6 => Self::Gauss6,
+            MethodName::Variational => Self::Variational,
         }
     }
 }
@@ -64,10 +75,15 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         return Err(CliError::usage(format_args!("--state: expected {expected} numbers ({names}), found {found}")));
     }
     let (q, v) = args.state.split_at(columns.len() / 2);
+    let method = Method::from(args.method);
+    if args.step.is_some() && !method.is_structure_preserving() {
+        return Err(CliError::usage("--step: dopri5 and dop853 choose their own steps; see --rtol"));
+    }
     let options = Options {
-        method: args.method.into(),
+        method,
         rtol: args.rtol,
         atol: args.atol,
+        step: args.step,
         domain: Some(learned.domain()),
         ..Options::new(args.t_end, args.dt)
     };
@@ -90,10 +106,16 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         return Err(CliError::data(format_args!("{problem} ({kept} samples are in {})", args.out.display())));
     }
     let statistics = result.statistics;
+    let iterations = if method.is_structure_preserving() {
+        format!(" in {} iterations", statistics.iterations)
+    } else {
+        String::new()
+    };
     output::print(&format!(
-        "{} samples to t = {} s, {} evaluations, in {}\n",
+        "{} samples to t = {} s, {} steps, {} evaluations{iterations}, in {}\n",
         result.trajectory.len(),
         args.t_end,
+        statistics.accepted,
         statistics.evaluations,
         args.out.display()
     ))

@@ -78,6 +78,18 @@ pub enum RolloutError {
         /// Why.
         cause: UnderflowCause,
     },
+    /// The implicit equations of a fixed step could not be solved: the step is too long for the motion.
+    #[error("step from t = {t} did not converge in {iterations} iterations (residual {residual:.3e})")]
+    NotConverged {
+        /// Time of the last step taken.
+        t: f64,
+        /// State `(q, v)` at `t`.
+        state: Vec<f64>,
+        /// Iterations made.
+        iterations: usize,
+        /// Residual left, relative to the largest momentum.
+        residual: f64,
+    },
     /// The allowed number of steps is used up.
     #[error("{steps} steps were not enough, stopped at t = {t}")]
     TooManySteps {
@@ -97,6 +109,7 @@ impl RolloutError {
             | Self::SingularMass { t, .. }
             | Self::NotFinite { t, .. }
             | Self::StepUnderflow { t, .. }
+            | Self::NotConverged { t, .. }
             | Self::TooManySteps { t, .. } => Some(*t),
         }
     }

@@ -1,23 +1,32 @@
 //! Integrators and trajectories: from `(q, v)` at `t0` to samples at `t0 + k dt`.
 //!
 //! A roll-out integrates `dq/dt = v`, `dv/dt = a(q, v)` with an explicit Runge-Kutta method of Dormand and Prince
-//! (order 5 or 8) under error control. It never loses what it has: when a model fails, the valid part of the
+//! (order 5 or 8) under error control, or Hamilton's equations behind the same Lagrangian with a symplectic method of
+//! fixed step (implicit midpoint, Gauss collocation, variational). It never loses what it has: when a model fails, the valid part of the
 //! trajectory stays and a [`RolloutError`] says where and why. Angles stay continuous (never wrapped) in the output;
 //! a model that needs them wrapped wraps them itself.
 //!
-//! Adaptive integration is offered in the precisions the solver knows, [`Integrable`]: `f32` and `f64`.
+//! Adaptive integration is offered in the precisions the solver knows, [`Integrable`]: `f32` and `f64`; fixed steps in
+//! every precision by [`rollout_fixed`].
 
+mod chord;
+mod compensated;
 mod dense;
 mod error;
+mod fixed;
+mod gauss;
 mod ode;
 mod options;
+mod phase;
 mod run;
 mod trajectory;
+mod variational;
 
 pub use error::{RolloutError, UnderflowCause};
 pub use ode::Integrable;
 pub use options::{Domain, Method, Options};
-pub use run::{Rollout, rollout, rollout_many};
+use run::Failure;
+pub use run::{Rollout, rollout, rollout_fixed, rollout_many};
 pub use trajectory::{Statistics, Trajectory};
 
 #[cfg(test)]

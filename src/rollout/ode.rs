@@ -10,8 +10,8 @@
 //! - Underflow is not noticed in `f32`: a step that does not advance the time ends the integration.
 //! - Two nodes of its order 8 table are wrong (0 for 1): harmless, the equations here do not depend on time.
 
+use super::Statistics;
 use super::dense::{Interpolant, Step};
-use super::{Method, Statistics};
 use crate::scalar::{Real, Scalar};
 use nalgebra::allocator::Allocator;
 use nalgebra::{DefaultAllocator, Dim, OVector};
@@ -25,10 +25,17 @@ pub(super) type Rhs<'a, S, E> = dyn FnMut(&[S], &mut [S]) -> Result<(), E> + 'a;
 /// Receives sample `k` with its state.
 pub(super) type Output<'a, S> = dyn FnMut(usize, &[S]) + 'a;
 
+/// The methods offered here.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Adaptive {
+    Dopri5,
+    Dop853,
+}
+
 /// What to integrate.
 #[doc(hidden)]
 pub struct Task<'a, S> {
-    pub(super) method: Method,
+    pub(super) method: Adaptive,
     pub(super) rtol: S,
     pub(super) atol: S,
     pub(super) max_steps: usize,
@@ -93,18 +100,18 @@ macro_rules! integrable {
 integrable!(f32 f64);
 
 /// Stages after the first of both methods.
-const fn stages(method: Method) -> usize {
+const fn stages(method: Adaptive) -> usize {
     match method {
-        Method::Dopri5 => 6,
-        Method::Dop853 => 11,
+        Adaptive::Dopri5 => 6,
+        Adaptive::Dop853 => 11,
     }
 }
 
 /// Calls per accepted step that are not stages of its attempt.
-const fn closing_calls(method: Method) -> usize {
+const fn closing_calls(method: Adaptive) -> usize {
     match method {
-        Method::Dopri5 => 0,
-        Method::Dop853 => 1,
+        Adaptive::Dopri5 => 0,
+        Adaptive::Dop853 => 1,
     }
 }
 
@@ -210,11 +217,11 @@ impl<S: Scalar, E> Watch<'_, '_, S, E> {
         }
         let step = Step { h, y0: &self.state, y1: y, slopes: &self.slopes };
         match self.task.method {
-            Method::Dopri5 => {
+            Adaptive::Dopri5 => {
                 self.interpolant.dopri5(&step);
                 true
             }
-            Method::Dop853 => {
+            Adaptive::Dop853 => {
                 self.statistics.evaluations += 3;
                 self.interpolant.dop853(&step, self.f).map_err(|error| self.failure = Some(error)).is_ok()
             }
@@ -406,8 +413,8 @@ where
         };
     }
     match task.method {
-        Method::Dopri5 => solve!(Dopri5, 0.04, 0.2, 10.0),
-        Method::Dop853 => solve!(Dop853, 0.0, 0.333, 6.0),
+        Adaptive::Dopri5 => solve!(Dopri5, 0.04, 0.2, 10.0),
+        Adaptive::Dop853 => solve!(Dop853, 0.0, 0.333, 6.0),
     }
 }
 
@@ -416,7 +423,7 @@ mod tests {
     use super::*;
 
     /// Samples of `y' = -y` from 1.
-    fn decay(method: Method, tolerance: f64, first_step: f64, samples: &[f64]) -> (Vec<f64>, Statistics) {
+    fn decay(method: Adaptive, tolerance: f64, first_step: f64, samples: &[f64]) -> (Vec<f64>, Statistics) {
         let task =
             Task { method, rtol: tolerance, atol: tolerance, max_steps: 1000, first_step, start: &[1.0], samples };
         let mut got = Vec::new();
@@ -436,7 +443,7 @@ mod tests {
     }
 
     /// Largest error of the samples of one single step of size `h`.
-    fn single_step(method: Method, h: f64) -> f64 {
+    fn single_step(method: Adaptive, h: f64) -> f64 {
         let samples: Vec<f64> = (0..=20).map(|k| h * f64::from(k) / 20.0).collect();
         let (got, statistics) = decay(method, 1e6, h, &samples);
         assert_eq!((statistics.accepted, statistics.rejected), (1, 0));
@@ -446,7 +453,7 @@ mod tests {
 
     #[test]
     fn interpolation_is_right_inside_a_single_step_with_its_order() {
-        for (method, order, bound) in [(Method::Dopri5, 4.0, 2e-4), (Method::Dop853, 7.0, 2e-7)] {
+        for (method, order, bound) in [(Adaptive::Dopri5, 4.0, 2e-4), (Adaptive::Dop853, 7.0, 2e-7)] {
             assert!(single_step(method, 0.5) < bound, "{method:?}: {:e}", single_step(method, 0.5));
             // Local error h^(order + 1).
             let slope = (single_step(method, 0.5) / single_step(method, 0.25)).log2();
@@ -456,7 +463,7 @@ mod tests {
 
     #[test]
     fn a_sample_at_zero_and_two_at_one_time() {
-        let (got, _) = decay(Method::Dop853, 1e-10, 0.0, &[0.0, 0.0, 1.0, 1.0]);
+        let (got, _) = decay(Adaptive::Dop853, 1e-10, 0.0, &[0.0, 0.0, 1.0, 1.0]);
         assert_eq!(got[..2], [1.0, 1.0]);
         assert_eq!(got[2], got[3]);
         assert!((got[2] - (-1.0_f64).exp()).abs() < 1e-9);

@@ -4,7 +4,10 @@ use super::RolloutError;
 use crate::scalar::{Real, Scalar};
 use serde::{Deserialize, Serialize};
 
-/// Explicit Runge-Kutta methods with step size control.
+/// Integrators: explicit Runge-Kutta methods with step size control, and structure-preserving ones of fixed step.
+///
+/// The latter are implicit and symplectic in `(q, p)`, `p = dL/dv`, for every Lagrangian with a regular mass matrix:
+/// the energy error stays bounded over long times, where adaptive methods drift. See [`Options::step`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Method {
@@ -12,6 +15,21 @@ pub enum Method {
     Dopri5,
     /// Hairer, Norsett and Wanner (1993), order 8(5,3), interpolation of order 7.
     Dop853,
+    /// Implicit midpoint rule, order 2.
+    Midpoint,
+    /// Gauss collocation with two stages, order 4.
+    Gauss4,
+    /// Gauss collocation with three stages, order 6.
+    Gauss6,
+    /// Discrete Euler-Lagrange equations of the midpoint discrete Lagrangian, order 2.
+    Variational,
+}
+
+impl Method {
+    /// Whether steps are fixed and the motion is symplectic.
+    pub const fn is_structure_preserving(self) -> bool {
+        !matches!(self, Self::Dopri5 | Self::Dop853)
+    }
 }
 
 /// Box in which a trajectory must stay; the bounds of a training range or of a chart.
@@ -68,6 +86,7 @@ impl<S: Scalar> Domain<S> {
 /// | `dt` | given | distance of samples; its sign is ignored | finite, not 0, at most 10^8 samples |
 /// | `method` | `Dopri5` | integrator | |
 /// | `rtol`, `atol` | 1e-6, 1e-8 | local error per step: `atol + rtol abs(y)` per component, root mean square | >= 0, not both 0 |
+/// | `step` | `dt` | longest step of the structure-preserving methods; `rtol` and `atol` mean nothing to them | finite, > 0 |
 /// | `max_steps` | 1,000,000 | attempts of all steps | >= 1 |
 /// | `domain` | none | where the trajectory must stay | `2n` components |
 /// | `energy` | true | store `E` at every sample | |
@@ -87,6 +106,9 @@ pub struct Options<S> {
     pub rtol: S,
     /// Absolute tolerance in the unit of each component.
     pub atol: S,
+    /// Longest step of the structure-preserving methods: each distance of samples is cut into equal steps not above
+    /// it. `None`: one step per sample. Adaptive methods choose their own.
+    pub step: Option<S>,
     /// Attempts allowed.
     pub max_steps: usize,
     /// Where the trajectory must stay.
@@ -108,6 +130,7 @@ impl<S: Scalar> Options<S> {
             method: Method::Dopri5,
             rtol: S::of_f64(1e-6),
             atol: S::of_f64(1e-8),
+            step: None,
             max_steps: 1_000_000,
             domain: None,
             energy: true,
@@ -148,6 +171,11 @@ impl<S: Scalar> Options<S> {
         }
         if self.rtol + self.atol <= <S as Real>::zero() {
             return invalid("rtol", "rtol and atol must not both be 0".into());
+        }
+        if let Some(step) = self.step
+            && !(step.is_finite() && step > <S as Real>::zero())
+        {
+            return invalid("step", format!("{step} is not a finite number > 0"));
         }
         if self.max_steps == 0 {
             return invalid("max_steps", "must be at least 1".into());
@@ -221,6 +249,8 @@ mod tests {
         assert_eq!(name(Options { rtol: f64::NAN, ..good.clone() }), "rtol");
         assert_eq!(name(Options { atol: -1.0, ..good.clone() }), "atol");
         assert_eq!(name(Options { rtol: 0.0, atol: 0.0, ..good.clone() }), "rtol");
+        assert_eq!(name(Options { step: Some(0.0), ..good.clone() }), "step");
+        assert_eq!(name(Options { step: Some(f64::NAN), ..good.clone() }), "step");
         assert_eq!(name(Options { max_steps: 0, ..good.clone() }), "max_steps");
         assert_eq!(name(Options { domain: Some(Domain::new(vec![None])), ..good.clone() }), "domain");
     }

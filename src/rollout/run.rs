@@ -1,7 +1,8 @@
 //! Roll-outs of one start and of many.
 
-use super::ode::{Ended, Task};
-use super::{Integrable, Options, RolloutError, Statistics, Trajectory, UnderflowCause};
+use super::fixed::{self, Stepper};
+use super::ode::{Adaptive, Ended, Task};
+use super::{Integrable, Method, Options, RolloutError, Statistics, Trajectory, UnderflowCause};
 use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Terms};
 use crate::scalar::Scalar;
 use std::sync::Mutex;
@@ -36,11 +37,29 @@ impl<S: Scalar> Rollout<S> {
     }
 }
 
-/// Why the derivative of a state cannot be had.
-enum Failure {
+/// Why the derivative of a state, or a step, cannot be had.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Failure {
     Domain { component: usize, value: f64, lower: f64, upper: f64 },
     State,
     Model(MechanicsError),
+    NotConverged { iterations: usize, residual: f64 },
+}
+
+impl Failure {
+    /// A state `(q, v)` that must be finite and inside the domain.
+    pub(super) fn check<S: Scalar>(domain: Option<&super::Domain<S>>, state: &[S]) -> Result<(), Self> {
+        if state.iter().any(|x| !x.is_finite()) {
+            return Err(Self::State);
+        }
+        match domain.and_then(|domain| domain.violation(state)) {
+            None => Ok(()),
+            Some((component, lower, upper)) => {
+                let (value, lower, upper) = (state[component].to_f64(), lower.to_f64(), upper.to_f64());
+                Err(Self::Domain { component, value, lower, upper })
+            }
+        }
+    }
 }
 
 /// Integrates `dq/dt = v`, `dv/dt = a(q, v)` from `(q, v)` at `options.t0` and samples it at `t0 + k dt` and `t_end`.
@@ -48,7 +67,16 @@ enum Failure {
 /// `q` and `v` have length `n` and are in physical units. The domain is checked at every state that is evaluated, the
 /// trial states of a step included; a step that would leave it is shortened, so that the time reported is the time of
 /// the exit.
+///
+/// Fixed-step methods check the domain at the stages and the end of every step, and report the last time inside.
 pub fn rollout<S: Integrable>(model: &dyn EulerLagrange<S>, q: &[S], v: &[S], options: &Options<S>) -> Rollout<S> {
+    let method = match options.method {
+        Method::Dopri5 => Adaptive::Dopri5,
+        Method::Dop853 => Adaptive::Dop853,
+        Method::Midpoint | Method::Gauss4 | Method::Gauss6 | Method::Variational => {
+            return rollout_fixed(model, q, v, options);
+        }
+    };
     let n = model.coordinates();
     let mut result = Rollout {
         trajectory: Trajectory::empty(n),
@@ -63,7 +91,7 @@ pub fn rollout<S: Integrable>(model: &dyn EulerLagrange<S>, q: &[S], v: &[S], op
     let backwards = options.t_end < options.t0;
     let start: Vec<S> = q.iter().chain(v).copied().collect();
     let task = Task {
-        method: options.method,
+        method,
         rtol: options.rtol,
         atol: options.atol,
         max_steps: options.max_steps,
@@ -74,13 +102,7 @@ pub fn rollout<S: Integrable>(model: &dyn EulerLagrange<S>, q: &[S], v: &[S], op
 
     let mut terms = Terms::default();
     let mut derivative = |y: &[S], dy: &mut [S]| -> Result<(), Failure> {
-        if y.iter().any(|x| !x.is_finite()) {
-            return Err(Failure::State);
-        }
-        if let Some((component, lower, upper)) = options.domain.as_ref().and_then(|domain| domain.violation(y)) {
-            let (value, lower, upper) = (y[component].to_f64(), lower.to_f64(), upper.to_f64());
-            return Err(Failure::Domain { component, value, lower, upper });
-        }
+        Failure::check(options.domain.as_ref(), y)?;
         let (q, v) = y.split_at(n);
         model.terms(q, v, Request::ACCELERATION, &mut terms).map_err(Failure::Model)?;
         if terms.acceleration.len() != n {
@@ -128,6 +150,29 @@ pub fn rollout<S: Integrable>(model: &dyn EulerLagrange<S>, q: &[S], v: &[S], op
             Some(RolloutError::StepUnderflow { t, state, step, cause })
         }
     };
+    if options.energy {
+        result.trajectory.energy = Some(result.trajectory.energy_by(model));
+    }
+    result
+}
+
+/// [`rollout`] by the structure-preserving methods alone, in every precision: [`crate::scalar::Dd`] as well.
+pub fn rollout_fixed<S: Scalar>(model: &dyn EulerLagrange<S>, q: &[S], v: &[S], options: &Options<S>) -> Rollout<S> {
+    let n = model.coordinates();
+    let mut result = Rollout {
+        trajectory: Trajectory::empty(n),
+        statistics: Statistics::default(),
+        stop: check(n, q, v, options).err(),
+    };
+    if result.stop.is_some() {
+        return result;
+    }
+    let Some(mut stepper) = Stepper::new(options.method, n) else {
+        let problem = format!("{:?} adapts its steps; {} offers fixed steps only", options.method, S::NAME);
+        result.stop = Some(RolloutError::Invalid { what: "method", problem });
+        return result;
+    };
+    fixed::run(model, &mut stepper, q, v, options, &mut result);
     if options.energy {
         result.trajectory.energy = Some(result.trajectory.energy_by(model));
     }
@@ -189,7 +234,7 @@ fn left<S: Scalar>(domain: Option<&super::Domain<S>>, reached: &[S], t: f64, sta
     Some(RolloutError::LeftDomain { t, state, component, value, lower, upper })
 }
 
-fn typed(failure: Failure, t: f64, state: Vec<f64>, step: f64) -> RolloutError {
+pub(super) fn typed(failure: Failure, t: f64, state: Vec<f64>, step: f64) -> RolloutError {
     match failure {
         Failure::Domain { component, value, lower, upper } => {
             RolloutError::LeftDomain { t, state, component, value, lower, upper }
@@ -199,6 +244,7 @@ fn typed(failure: Failure, t: f64, state: Vec<f64>, step: f64) -> RolloutError {
             RolloutError::SingularMass { t, state, condition }
         }
         Failure::Model(MechanicsError::NotFinite { what, .. }) => RolloutError::NotFinite { t, state, what },
+        Failure::NotConverged { iterations, residual } => RolloutError::NotConverged { t, state, iterations, residual },
         Failure::Model(error) => RolloutError::StepUnderflow { t, state, step, cause: UnderflowCause::Model(error) },
     }
 }

@@ -13,8 +13,11 @@ pub struct Statistics {
     pub accepted: usize,
     /// Steps attempted and not taken.
     pub rejected: usize,
-    /// Evaluations of the acceleration.
+    /// States evaluated: accelerations for the adaptive methods, momenta and forces for the structure-preserving ones.
     pub evaluations: usize,
+    /// Iterations of implicit equations; 0 for explicit methods.
+    #[serde(default)]
+    pub iterations: usize,
 }
 
 impl std::ops::AddAssign for Statistics {
@@ -22,6 +25,7 @@ impl std::ops::AddAssign for Statistics {
         self.accepted += other.accepted;
         self.rejected += other.rejected;
         self.evaluations += other.evaluations;
+        self.iterations += other.iterations;
     }
 }
 

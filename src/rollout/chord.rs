@@ -1,0 +1,139 @@
+//! Newton's method with a matrix that is kept as long as it serves, iterated to the rounding floor.
+
+use super::Failure;
+use super::phase::{Defect, Phase, singular};
+use crate::linalg::{LANES, solve};
+use crate::scalar::{Real, Scalar};
+
+/// Equations `F(x) = 0` of one step.
+pub(super) trait Equations<S: Scalar> {
+    /// `F(x)` into `residual`, and how large it is.
+    fn residual(&mut self, phase: &mut Phase<'_, S>, x: &[S], residual: &mut [S]) -> Result<Defect<S>, Failure>;
+    /// An approximation of `dF/dx` at `x`, row-major.
+    fn jacobian(&mut self, phase: &mut Phase<'_, S>, x: &[S], matrix: &mut [S]) -> Result<(), Failure>;
+}
+
+/// Evaluations of one step.
+const MAX_ITERATIONS: usize = 60;
+/// New matrices in one step.
+const MAX_MATRICES: usize = 4;
+/// A matrix is replaced before the next step once a step takes this many evaluations more than its best.
+const PATIENCE: usize = 1;
+
+/// The inverse of an iteration matrix and how well it did.
+#[derive(Clone, Debug)]
+pub(super) struct Chord<S> {
+    inverse: Vec<S>,
+    /// Fewest evaluations a step took with this matrix.
+    least: usize,
+    stale: bool,
+    residual: Vec<S>,
+    matrix: Vec<S>,
+    unit: Vec<S>,
+}
+
+impl<S: Scalar> Chord<S> {
+    /// Without a matrix, for `size` unknowns.
+    pub(super) fn new(size: usize) -> Self {
+        let zero = <S as Real>::zero();
+        Self {
+            inverse: vec![zero; size * size],
+            least: MAX_ITERATIONS,
+            stale: true,
+            residual: vec![zero; size],
+            matrix: vec![zero; size * size],
+            unit: Vec::new(),
+        }
+    }
+
+    /// Forgets the matrix, for another step size or place.
+    pub(super) fn forget(&mut self) {
+        self.stale = true;
+    }
+
+    /// Solves from the guess in `x`; on success the last call of [`Equations::residual`] was at the solution.
+    ///
+    /// The iteration ends where it no longer halves the residual, not at a tolerance: a tolerance leaves errors of one
+    /// sign, which drift (Hairer, McLachlan and Razakarivony 2008).
+    ///
+    /// # Errors
+    /// Those of the equations; [`Failure::NotConverged`]; a singular matrix.
+    pub(super) fn solve(
+        &mut self,
+        phase: &mut Phase<'_, S>,
+        equations: &mut impl Equations<S>,
+        x: &mut [S],
+    ) -> Result<(), Failure> {
+        let size = x.len();
+        let (mut matrices, mut best) = (0, Defect::unknown());
+        if self.stale {
+            self.refresh(phase, equations, x)?;
+            matrices = 1;
+        }
+        for iteration in 1..=MAX_ITERATIONS {
+            let defect = equations.residual(phase, x, &mut self.residual)?;
+            phase.iterations += 1;
+            let improves = defect.improves(best);
+            if defect.is_rounding() || (!improves && defect.is_small()) {
+                self.least = self.least.min(iteration);
+                self.stale = matrices > 1 || iteration > self.least + PATIENCE;
+                return Ok(());
+            }
+            let failed = Failure::NotConverged { iterations: iteration, residual: defect.overall.to_f64() };
+            if iteration == MAX_ITERATIONS {
+                return Err(failed);
+            }
+            if !improves {
+                if matrices == MAX_MATRICES {
+                    return Err(failed);
+                }
+                self.refresh(phase, equations, x)?;
+                matrices += 1;
+            }
+            best = best.best(defect);
+            for (x, row) in x.iter_mut().zip(self.inverse.chunks_exact(size)) {
+                *x -= row.iter().zip(&self.residual).fold(<S as Real>::zero(), |sum, (&a, &r)| a.mul_add(r, sum));
+            }
+        }
+        Ok(())
+    }
+
+    /// A new matrix at `x`, inverted.
+    fn refresh(&mut self, phase: &mut Phase<'_, S>, equations: &mut impl Equations<S>, x: &[S]) -> Result<(), Failure> {
+        let size = x.len();
+        (self.stale, self.least) = (true, MAX_ITERATIONS);
+        equations.jacobian(phase, x, &mut self.matrix)?;
+        if size == 1 {
+            if self.matrix[0] == <S as Real>::zero() {
+                return Err(Failure::Model(crate::lagrangian::MechanicsError::Singular {
+                    row: 0,
+                    condition: f64::INFINITY,
+                }));
+            }
+            self.inverse[0] = self.matrix[0].recip();
+        } else {
+            // Columns of the inverse, a block of lanes at a time.
+            let width = size.min(LANES);
+            let matrices = self.matrix.repeat(width);
+            let mut columns = vec![<S as Real>::zero(); width * size];
+            for start in (0..size).step_by(width) {
+                let count = width.min(size - start);
+                self.unit.clear();
+                self.unit.resize(count * size, <S as Real>::zero());
+                for k in 0..count {
+                    self.unit[k * size + start + k] = <S as Real>::one();
+                }
+                let columns = &mut columns[..count * size];
+                let matrices = &matrices[..count * size * size];
+                solve(size, matrices, &self.unit, columns, &mut phase.workspace).map_err(singular)?;
+                for k in 0..count {
+                    for i in 0..size {
+                        self.inverse[i * size + start + k] = columns[k * size + i];
+                    }
+                }
+            }
+        }
+        self.stale = false;
+        Ok(())
+    }
+}

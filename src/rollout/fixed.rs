@@ -1,0 +1,180 @@
+//! Fixed steps from sample to sample in phase space.
+
+use super::compensated::{Compensated, State};
+use super::gauss::Gauss;
+use super::phase::Phase;
+use super::run::typed;
+use super::variational::Variational;
+use super::{Failure, Method, Options, Rollout, RolloutError};
+use crate::lagrangian::EulerLagrange;
+use crate::scalar::{Real, Scalar};
+
+/// A structure-preserving method with its memory.
+pub(super) enum Stepper<S> {
+    Gauss(Gauss<S>),
+    Variational(Variational<S>),
+}
+
+impl<S: Scalar> Stepper<S> {
+    /// The stepper of a method for `n` coordinates, if it has a fixed step.
+    pub(super) fn new(method: Method, n: usize) -> Option<Self> {
+        match method {
+            Method::Dopri5 | Method::Dop853 => None,
+            Method::Midpoint => Some(Self::Gauss(Gauss::new(1, n))),
+            Method::Gauss4 => Some(Self::Gauss(Gauss::new(2, n))),
+            Method::Gauss6 => Some(Self::Gauss(Gauss::new(3, n))),
+            Method::Variational => Some(Self::Variational(Variational::new(n))),
+        }
+    }
+
+    fn step(&mut self, phase: &mut Phase<'_, S>, state: &mut State<S>, v: &mut [S], h: S) -> Result<(), Failure> {
+        match self {
+            Self::Gauss(gauss) => gauss.step(phase, state, v, h),
+            Self::Variational(variational) => variational.step(phase, state, v, h),
+        }
+    }
+
+    /// Coordinates and velocities at the stages of the last step.
+    fn stages(&self) -> (&[S], &[S]) {
+        match self {
+            Self::Gauss(gauss) => gauss.stages(),
+            Self::Variational(variational) => variational.stages(),
+        }
+    }
+}
+
+/// Where a roll-out stands.
+struct Position<S> {
+    state: State<S>,
+    /// A velocity near that of the state.
+    near: Vec<S>,
+    /// Elapsed time of the sample before, and steps of size `h` since.
+    since: S,
+    steps: usize,
+    h: S,
+}
+
+/// Integrates from `(q, v)` to the end of the options or of what is possible; arguments are checked.
+pub(super) fn run<S: Scalar>(
+    model: &dyn EulerLagrange<S>,
+    stepper: &mut Stepper<S>,
+    q: &[S],
+    v: &[S],
+    options: &Options<S>,
+    result: &mut Rollout<S>,
+) {
+    let mut phase = Phase::new(model);
+    let zero = <S as Real>::zero();
+    let domain = options.domain.as_ref();
+    let start: Vec<S> = q.iter().chain(v).copied().collect();
+    let moving = Failure::check(domain, &start).and_then(|()| phase.momentum(q, v));
+    result.stop = match moving {
+        Err(failure) => Some(typed(failure, options.t0.to_f64(), start.iter().map(|x| x.to_f64()).collect(), 0.0)),
+        Ok(p) => {
+            let state = State { q: Compensated::new(q.to_vec()), p: Compensated::new(p) };
+            let mut position = Position { state, near: v.to_vec(), since: zero, steps: 0, h: zero };
+            result.trajectory.t.push(options.t0);
+            result.trajectory.q.extend_from_slice(q);
+            result.trajectory.v.extend_from_slice(v);
+            advance(&mut phase, stepper, &mut position, options, result)
+        }
+    };
+    result.statistics.evaluations = phase.evaluations;
+    result.statistics.iterations = phase.iterations;
+}
+
+fn advance<S: Scalar>(
+    phase: &mut Phase<'_, S>,
+    stepper: &mut Stepper<S>,
+    position: &mut Position<S>,
+    options: &Options<S>,
+    result: &mut Rollout<S>,
+) -> Option<RolloutError> {
+    let (elapsed, times) = options.samples();
+    let backwards = options.t_end < options.t0;
+    let domain = options.domain.as_ref();
+    // All distances but the last are dt, whatever the rounding of their difference.
+    let regular = options.dt.abs();
+    let last = elapsed.len() - 1;
+    for k in 1..elapsed.len() {
+        let difference = elapsed[k] - elapsed[k - 1];
+        let blur = S::EPSILON.ldexp(3) * elapsed[k];
+        let distance = if k < last || (difference - regular).abs() <= blur { regular } else { difference };
+        let longest = options.step.unwrap_or(distance);
+        let count = (distance / longest - S::EPSILON.ldexp(4)).floor().to_f64() + 1.0;
+        let h = distance / S::of_f64(count);
+        (position.since, position.steps, position.h) = (elapsed[k - 1], 0, h);
+        let signed = if backwards { -h } else { h };
+        // A count beyond all numbers of steps ends by `max_steps`.
+        while (position.steps as f64) < count {
+            if result.statistics.accepted == options.max_steps {
+                let t = position.time(options, backwards);
+                return Some(RolloutError::TooManySteps { t, steps: options.max_steps });
+            }
+            let before = (position.state.clone(), position.near.clone());
+            let stepped = stepper
+                .step(phase, &mut position.state, &mut position.near, signed)
+                .and_then(|()| inside(stepper, phase.n, options));
+            if let Err(failure) = stepped {
+                (position.state, position.near) = before;
+                return Some(position.failed(phase, failure, options, backwards));
+            }
+            result.statistics.accepted += 1;
+            position.steps += 1;
+        }
+        let arrived = position.velocity(phase).and_then(|v| {
+            let sample: Vec<S> = position.state.q.high.iter().copied().chain(v).collect();
+            Failure::check(domain, &sample).map(|()| sample)
+        });
+        match arrived {
+            Ok(sample) => {
+                let (q, v) = sample.split_at(phase.n);
+                result.trajectory.t.push(times[k]);
+                result.trajectory.q.extend_from_slice(q);
+                result.trajectory.v.extend_from_slice(v);
+            }
+            Err(failure) => return Some(position.failed(phase, failure, options, backwards)),
+        }
+    }
+    None
+}
+
+/// Checks the stages of the last step.
+fn inside<S: Scalar>(stepper: &Stepper<S>, n: usize, options: &Options<S>) -> Result<(), Failure> {
+    let Some(domain) = options.domain.as_ref() else { return Ok(()) };
+    let (q, v) = stepper.stages();
+    let mut stage = vec![<S as Real>::zero(); 2 * n];
+    for (q, v) in q.chunks_exact(n).zip(v.chunks_exact(n)) {
+        stage[..n].copy_from_slice(q);
+        stage[n..].copy_from_slice(v);
+        Failure::check(Some(domain), &stage)?;
+    }
+    Ok(())
+}
+
+impl<S: Scalar> Position<S> {
+    fn velocity(&self, phase: &mut Phase<'_, S>) -> Result<Vec<S>, Failure> {
+        let mut v = self.near.clone();
+        phase.velocity(&self.state.q.high, &self.state.p.high, &mut v)?;
+        Ok(v)
+    }
+
+    fn time(&self, options: &Options<S>, backwards: bool) -> f64 {
+        let elapsed = self.since + S::of_f64(self.steps as f64) * self.h;
+        if backwards { options.t0 - elapsed } else { options.t0 + elapsed }.to_f64()
+    }
+
+    /// The error of a failure just ahead; the velocity of the state is the nearest known if it cannot be had.
+    fn failed(
+        &self,
+        phase: &mut Phase<'_, S>,
+        failure: Failure,
+        options: &Options<S>,
+        backwards: bool,
+    ) -> RolloutError {
+        let v = self.velocity(phase).unwrap_or_else(|_| self.near.clone());
+        let state = self.state.q.high.iter().chain(&v).map(|x| x.to_f64()).collect();
+        let step = if self.steps == 0 && self.since == <S as Real>::zero() { 0.0 } else { self.h.to_f64() };
+        typed(failure, self.time(options, backwards), state, step)
+    }
+}

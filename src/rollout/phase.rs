@@ -1,0 +1,213 @@
+//! A model in phase space: `p = dL/dv` and `dp/dt = dL/dq` as functions of `(q, v)`, and the way back from `p` to `v`.
+
+use super::Failure;
+use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Terms};
+use crate::linalg::{self, LinalgError, Workspace};
+use crate::scalar::{Real, Scalar};
+
+/// Newton steps from `p` to `v`.
+const MAX_SWEEPS: usize = 50;
+
+/// A model, the buffers of its evaluation, and what was evaluated.
+pub(super) struct Phase<'a, S> {
+    model: &'a dyn EulerLagrange<S>,
+    /// Number of coordinates.
+    pub(super) n: usize,
+    terms: Terms<S>,
+    pub(super) workspace: Workspace<S>,
+    /// States evaluated.
+    pub(super) evaluations: usize,
+    /// Iterations of implicit equations.
+    pub(super) iterations: usize,
+    points: Vec<S>,
+}
+
+/// First derivatives of `p` and `g` at one state, `(n, n)` each; `dg/dv` is the transpose of `dp/dq`.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Derivatives<S> {
+    /// `M = dp/dv`.
+    pub(super) mass: Vec<S>,
+    /// `dp_i/dq_j` at `(i, j)`.
+    pub(super) mixed: Vec<S>,
+    /// `dg_i/dq_j` at `(i, j)`.
+    pub(super) stiffness: Vec<S>,
+}
+
+/// How far an equation is from being solved.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Defect<S> {
+    /// Largest residual relative to the terms of its own component.
+    pub(super) relative: S,
+    /// Largest residual relative to the largest term of all.
+    pub(super) overall: S,
+}
+
+impl<S: Scalar> Defect<S> {
+    /// Before the first evaluation.
+    pub(super) fn unknown() -> Self {
+        Self { relative: S::INFINITY, overall: S::INFINITY }
+    }
+
+    /// Of residuals `(rows, n)`, the terms of component `i` being as large as `size(i)`.
+    pub(super) fn of(n: usize, residual: &[S], size: impl Fn(usize) -> S) -> Self {
+        let zero = <S as Real>::zero();
+        let most = (0..n).map(&size).fold(zero, |most, size| S::max(most, size));
+        let mut defect = Self { relative: zero, overall: zero };
+        for i in 0..n {
+            let worst = residual.iter().skip(i).step_by(n).fold(zero, |worst, r| S::max(worst, r.abs()));
+            if worst == zero {
+                continue;
+            }
+            defect.relative = S::max(defect.relative, worst / (size(i) + S::EPSILON * most));
+            defect.overall = S::max(defect.overall, worst / most);
+        }
+        defect
+    }
+
+    /// Solved to the last rounding.
+    pub(super) fn is_rounding(self) -> bool {
+        self.relative <= S::EPSILON
+    }
+
+    /// As far as rounding errors of the model may explain.
+    pub(super) fn is_small(self) -> bool {
+        self.overall <= S::EPSILON.ldexp(12)
+    }
+
+    /// Whether this is less than half of the best so far, in either measure. Comparing with the last one instead would
+    /// let an iteration hop between two roundings for ever.
+    pub(super) fn improves(self, best: Self) -> bool {
+        self.relative < best.relative * S::half() || self.overall < best.overall * S::half()
+    }
+
+    /// The better of both in each measure.
+    pub(super) fn best(self, other: Self) -> Self {
+        Self { relative: S::min(self.relative, other.relative), overall: S::min(self.overall, other.overall) }
+    }
+}
+
+impl<'a, S: Scalar> Phase<'a, S> {
+    pub(super) fn new(model: &'a dyn EulerLagrange<S>) -> Self {
+        Self {
+            model,
+            n: model.coordinates(),
+            terms: Terms::default(),
+            workspace: Workspace::new(),
+            evaluations: 0,
+            iterations: 0,
+            points: Vec::new(),
+        }
+    }
+
+    fn evaluate(&mut self, q: &[S], v: &[S], request: Request) -> Result<(), Failure> {
+        if q.iter().chain(v).any(|x| !x.is_finite()) {
+            return Err(Failure::State);
+        }
+        self.evaluations += q.len() / self.n;
+        self.model.terms(q, v, request, &mut self.terms).map_err(Failure::Model)?;
+        let fields = [
+            (Request::MOMENTUM, "momentum", &self.terms.momentum, 1),
+            (Request::DL_DQ, "dL/dq", &self.terms.dl_dq, 1),
+            (Request::MASS_MATRIX, "mass matrix", &self.terms.mass_matrix, self.n),
+        ];
+        for (asked, what, field, width) in fields {
+            let expected = q.len() * width;
+            if request.includes(asked) && field.len() != expected {
+                return Err(Failure::Model(MechanicsError::Shape { what, expected, found: field.len() }));
+            }
+            if request.includes(asked) && field.iter().any(|x| !x.is_finite()) {
+                return Err(Failure::Model(MechanicsError::NotFinite { row: 0, what }));
+            }
+        }
+        Ok(())
+    }
+
+    /// `p` and `g` of a batch, `(batch, n)`.
+    pub(super) fn momenta_and_forces(&mut self, q: &[S], v: &[S], p: &mut [S], g: &mut [S]) -> Result<(), Failure> {
+        self.evaluate(q, v, Request::MOMENTUM | Request::DL_DQ)?;
+        p.copy_from_slice(&self.terms.momentum);
+        g.copy_from_slice(&self.terms.dl_dq);
+        Ok(())
+    }
+
+    /// `p` of one state.
+    pub(super) fn momentum(&mut self, q: &[S], v: &[S]) -> Result<Vec<S>, Failure> {
+        self.evaluate(q, v, Request::MOMENTUM)?;
+        Ok(self.terms.momentum.clone())
+    }
+
+    /// `M` as the model gives it, derivatives along `q` by forward differences over `sqrt(eps)`: enough for an
+    /// iteration matrix. The differences are one batch of `n + 1` states.
+    pub(super) fn derivatives(&mut self, q: &[S], v: &[S], into: &mut Derivatives<S>) -> Result<(), Failure> {
+        let n = self.n;
+        let zero = <S as Real>::zero();
+        self.evaluate(q, v, Request::MASS_MATRIX)?;
+        into.mass.clone_from(&self.terms.mass_matrix);
+        let shift = |i: usize| {
+            let size = S::max(q[i].abs(), v[i].abs());
+            S::EPSILON.sqrt() * if size > zero { size } else { <S as Real>::one() }
+        };
+        let mut points = std::mem::take(&mut self.points);
+        points.clear();
+        for row in 0..=n {
+            points.extend_from_slice(q);
+            if row > 0 {
+                points[row * n + row - 1] += shift(row - 1);
+            }
+        }
+        (0..=n).for_each(|_| points.extend_from_slice(v));
+        let (shifted, velocities) = points.split_at((n + 1) * n);
+        let outcome = self.evaluate(shifted, velocities, Request::MOMENTUM | Request::DL_DQ);
+        for (field, matrix) in [(&self.terms.momentum, &mut into.mixed), (&self.terms.dl_dq, &mut into.stiffness)] {
+            matrix.clear();
+            matrix.resize(n * n, zero);
+            for j in 0..n {
+                // The shift as it was rounded.
+                let width = points[(j + 1) * n + j] - q[j];
+                for i in 0..n {
+                    if outcome.is_ok() {
+                        matrix[i * n + j] = (field[(j + 1) * n + i] - field[i]) / width;
+                    }
+                }
+            }
+        }
+        self.points = points;
+        outcome
+    }
+
+    /// Solves `dL/dv(q, v) = p` for `v` by Newton's method from the guess in `v`, to the last rounding.
+    pub(super) fn velocity(&mut self, q: &[S], p: &[S], v: &mut [S]) -> Result<(), Failure> {
+        let n = self.n;
+        let mut residual = vec![<S as Real>::zero(); n];
+        let mut change = residual.clone();
+        let mut best = Defect::unknown();
+        for sweep in 1..=MAX_SWEEPS {
+            self.evaluate(q, v, Request::MOMENTUM | Request::MASS_MATRIX)?;
+            self.iterations += 1;
+            for ((r, &found), &wanted) in residual.iter_mut().zip(&self.terms.momentum).zip(p) {
+                *r = found - wanted;
+            }
+            let found = &self.terms.momentum;
+            let defect = Defect::of(n, &residual, |i| p[i].abs() + found[i].abs());
+            // Before the verdict: a momentum that does not depend on the velocity agrees with any.
+            linalg::solve(n, &self.terms.mass_matrix, &residual, &mut change, &mut self.workspace).map_err(singular)?;
+            if defect.is_rounding() || (!defect.improves(best) && defect.is_small()) {
+                return Ok(());
+            }
+            if sweep == MAX_SWEEPS {
+                return Err(Failure::NotConverged { iterations: sweep, residual: defect.overall.to_f64() });
+            }
+            best = best.best(defect);
+            v.iter_mut().zip(&change).for_each(|(v, &c)| *v -= c);
+        }
+        Ok(())
+    }
+}
+
+/// A failed solve as a failure of the model.
+pub(super) fn singular(error: LinalgError) -> Failure {
+    Failure::Model(match error {
+        LinalgError::Singular { condition, .. } => MechanicsError::Singular { row: 0, condition },
+        _ => MechanicsError::NotFinite { row: 0, what: "mass matrix" },
+    })
+}
