@@ -33,6 +33,10 @@ impl StartBox {
     }
 }
 
+/// Steps after which a learned motion is given up: ten times what a healthy one takes over the longest test, and seconds
+/// where a model learned next to nothing and its motion runs into a singular mass matrix.
+const LEARNED_STEPS: usize = 30_000;
+
 /// The test as the paper makes it: random starts, exact motion by [`Options::reference`], learned motion at rtol 1e-6 and
 /// atol 1e-8.
 #[derive(Clone, Debug, PartialEq)]
@@ -138,6 +142,7 @@ impl<S: Integrable> TrajectoryTest<S> {
             rtol: S::of_f64(self.rtol),
             atol: S::of_f64(self.atol),
             domain: self.domain.clone(),
+            max_steps: LEARNED_STEPS,
             ..reference.clone()
         };
         let scale = S::of_f64(self.energy_scale);
