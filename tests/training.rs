@@ -10,7 +10,7 @@ use lnn::scalar::{Dd, Real, Scalar};
 use lnn::tape::{ScalarFunction, gradient};
 use lnn::training::{
     Config, Data, Dataset, Datasets, Failure, Hooks, Method, Network, Objective, OnFailure, Optimizer, Penalty, Phase,
-    Precision, Scaling, Schedule, Stop, Trained, TrainingError, train,
+    Polish, Precision, Regularizer, Scaling, Schedule, Stop, Trained, TrainingError, train,
 };
 use proptest::prelude::*;
 use rand::{Rng, SeedableRng};
@@ -36,13 +36,65 @@ fn random_data<S: Scalar>(n: usize, states: usize, seed: u64) -> Dataset<S> {
     Dataset::new(n, draw(3.0), draw(4.0), draw(5.0)).unwrap()
 }
 
-/// Loss of one state in the paper's convention plus the penalty, over any number type; eigenvectors are those of `M`.
+/// Penalties written down a second time, with what is constant for the gradient.
+enum Judge<S> {
+    /// Eigenvectors of negative eigenvalues of every state's scaled mass matrix.
+    Eigenvectors(Vec<Vec<Vec<f64>>>),
+    /// Characteristic scales and the time-like coordinate.
+    Sylvester(Vec<S>, Option<usize>),
+}
+
+/// Determinant by expansion along the first row.
+fn determinant<T: Real>(n: usize, m: &[T]) -> T {
+    if n == 0 {
+        return T::one();
+    }
+    (0..n).fold(T::zero(), |sum, j| {
+        let minor: Vec<T> = (n..n * n).filter(|k| k % n != j).map(|k| m[k]).collect();
+        let term = m[j] * determinant(n - 1, &minor);
+        if j % 2 == 0 { sum + term } else { sum - term }
+    })
+}
+
+impl<S: Scalar> Judge<S> {
+    /// The penalty of state `row` with the scaled mass matrix `m`, without its weight.
+    fn penalty<T: Real>(&self, row: usize, n: usize, m: &[T]) -> T {
+        let mut sum = T::zero();
+        match self {
+            Self::Eigenvectors(negative) => {
+                for u in &negative[row] {
+                    for k in 0..n * n {
+                        // First-order change of an eigenvalue: u^T dM u.
+                        sum -= T::from_f64(u[k / n] * u[k % n]) * m[k];
+                    }
+                }
+            }
+            Self::Sylvester(scales, time) => {
+                let scale = |i: usize| of_scalar::<T>(scales[i]);
+                let eps = T::from_f64(1e-8);
+                if let Some(t) = *time {
+                    sum += m[t * n + t].relu() / (scale(t) + eps);
+                }
+                let axes: Vec<usize> = (0..n).filter(|&i| Some(i) != *time).collect();
+                let mut product = T::one();
+                for (k, &axis) in axes.iter().enumerate() {
+                    product *= scale(axis);
+                    let block: Vec<T> =
+                        axes[..=k].iter().flat_map(|i| axes[..=k].iter().map(move |j| m[i * n + j])).collect();
+                    sum += (-determinant(k + 1, &block)).relu() / (product + eps);
+                }
+            }
+        }
+        sum
+    }
+}
+
+/// Loss of one state in the paper's convention plus the penalty, over any number type.
 fn whole_loss<T: Real>(
     architecture: &Architecture,
     weights: &[T],
     [q, v, a]: [&[T]; 3],
-    negative: &[Vec<f64>],
-    lambda: f64,
+    (judge, row, lambda): (&Judge<impl Scalar>, usize, f64),
 ) -> T {
     let n = architecture.coordinates;
     let lifted: Vec<HyperDual<T>> = weights.iter().map(|&w| HyperDual::lift(w)).collect();
@@ -62,15 +114,8 @@ fn whole_loss<T: Real>(
         loss += ((predicted[i] - a[i]) / scale(i)).abs();
     }
     loss /= T::from_f64(2.0 * n as f64);
-    for u in negative {
-        for i in 0..n {
-            for j in 0..n {
-                // First-order change of an eigenvalue of the scaled mass matrix: u^T dM u.
-                let element = mass[i * n + j] * scale(i) * scale(j);
-                loss -= T::from_f64(lambda * u[i] * u[j]) * element;
-            }
-        }
-    }
+    let scaled: Vec<T> = (0..n * n).map(|k| mass[k] * scale(k / n) * scale(k % n)).collect();
+    loss += T::from_f64(lambda) * judge.penalty(row, n, &scaled);
     loss
 }
 
@@ -78,7 +123,7 @@ fn whole_loss<T: Real>(
 struct MeanLoss<'a, S> {
     architecture: &'a Architecture,
     data: &'a Dataset<S>,
-    negative: &'a [Vec<Vec<f64>>],
+    judge: &'a Judge<S>,
     lambda: f64,
 }
 
@@ -86,10 +131,10 @@ impl<S: Scalar> ScalarFunction for MeanLoss<'_, S> {
     fn eval<R: Real>(&self, weights: &[R]) -> R {
         let n = self.architecture.coordinates;
         let mut total = R::zero();
-        for (row, negative) in self.negative.iter().enumerate() {
+        for row in 0..self.data.len() {
             let part = |x: &[S]| -> Vec<R> { x[row * n..(row + 1) * n].iter().map(|&x| of_scalar(x)).collect() };
             let [q, v, a] = [self.data.q(), self.data.v(), self.data.a()].map(part);
-            total += whole_loss(self.architecture, weights, [&q, &v, &a], negative, self.lambda);
+            total += whole_loss(self.architecture, weights, [&q, &v, &a], (self.judge, row, self.lambda));
         }
         total / R::from_f64(self.data.len() as f64)
     }
@@ -105,21 +150,37 @@ fn gradient_agrees<S: Scalar>(n: usize, alpha: f64, penalty: Penalty, tolerance:
     let report = objective.step(&weights, &data, &[0, 1, 2, 3, 4, 5, 6], &mut found);
     assert_eq!(report.failure, None);
 
-    // Negative eigenpairs of the scaled mass matrices, from a separate evaluation in double precision.
-    let lambda = if let Penalty::Eigenvalue { lambda } = penalty { lambda } else { 0.0 };
+    // Mass matrices from a separate evaluation.
     let mut chunk = lnn::network::Chunk::new(&architecture);
     chunk.evaluate(&weights, data.q(), data.v(), lnn::network::Depth::MassMatrix);
-    let negative: Vec<Vec<Vec<f64>>> = chunk
-        .mass_matrix
-        .chunks_exact(n * n)
-        .map(|m| {
-            let eigen = nalgebra::DMatrix::from_fn(n, n, |i, j| m[i * n + j].to_f64()).symmetric_eigen();
-            let active = (0..n).filter(|&k| lambda > 0.0 && eigen.eigenvalues[k] < 0.0);
-            active.map(|k| eigen.eigenvectors.column(k).iter().copied().collect()).collect()
-        })
-        .collect();
-    assert_eq!(report.penalised, negative.iter().filter(|u| !u.is_empty()).count());
-    let loss = MeanLoss { architecture: &architecture, data: &data, negative: &negative, lambda };
+    let matrices = || chunk.mass_matrix.chunks_exact(n * n);
+    let (judge, active) = match penalty {
+        Penalty::Sylvester { time, .. } => {
+            let scale = |i: usize| {
+                let mut column: Vec<S> = matrices().map(|m| Real::abs(m[i * n + i])).collect();
+                column.sort_by(|a, b| a.partial_cmp(b).unwrap());
+                column[(column.len() - 1) / 2]
+            };
+            let judge = Judge::Sylvester((0..n).map(scale).collect(), time);
+            let active = (0..data.len()).filter(|&k| judge.penalty(k, n, matrices().nth(k).unwrap()).to_f64() > 0.0);
+            let active = active.count();
+            (judge, active)
+        }
+        _ => {
+            let negative: Vec<Vec<Vec<f64>>> = matrices()
+                .map(|m| {
+                    let eigen = nalgebra::DMatrix::from_fn(n, n, |i, j| m[i * n + j].to_f64()).symmetric_eigen();
+                    let active = (0..n).filter(|&k| penalty.lambda() > 0.0 && eigen.eigenvalues[k] < 0.0);
+                    active.map(|k| eigen.eigenvectors.column(k).iter().copied().collect()).collect()
+                })
+                .collect();
+            let active = negative.iter().filter(|u| !u.is_empty()).count();
+            (Judge::Eigenvectors(negative), active)
+        }
+    };
+    assert_eq!(report.penalised, active);
+    assert!(active > 0 || penalty == Penalty::None, "the penalty was not active");
+    let loss = MeanLoss { architecture: &architecture, data: &data, judge: &judge, lambda: penalty.lambda() };
     let (value, expected) = gradient(&loss, &weights).unwrap();
     let size = expected.iter().fold(0.0, |m: f64, x| m.max(x.to_f64().abs()));
     for (&found, &expected) in found.iter().zip(&expected) {
@@ -147,6 +208,52 @@ fn the_gradient_of_an_active_penalty_is_right() {
 }
 
 #[test]
+fn the_gradient_of_sylvesters_penalty_is_right() {
+    for n in 1..=3 {
+        for time in std::iter::once(None).chain((0..n).map(Some)) {
+            let penalty = Penalty::Sylvester { lambda: 3.0, time };
+            // Near -alpha of half the scale some signs are right and some are wrong.
+            for alpha in [-0.4, 0.02, 0.4] {
+                if alpha < 0.0 && time.is_some() && n == 1 || alpha > 0.0 && time.is_none() {
+                    continue;
+                }
+                gradient_agrees::<f64>(n, alpha, penalty, 1e-11);
+                gradient_agrees::<Dd>(n, alpha, penalty, 1e-26);
+            }
+        }
+    }
+}
+
+/// More states than are evaluated together, so that those in doubt are evaluated again.
+#[test]
+fn sylvesters_penalty_takes_its_scales_from_the_whole_batch() {
+    let architecture = Architecture { alpha: -0.1, ..architecture(2, &[6, 5]) };
+    let weights: Vec<f64> = initial_weights(&architecture, Initialization::Default, &mut ChaCha8Rng::seed_from_u64(4));
+    let data = random_data(2, 700, 5);
+    let penalty = Penalty::Sylvester { lambda: 2.0, time: None };
+    let rows: Vec<u32> = (0..700).collect();
+    let step = |penalty, rows: &[u32], threads| {
+        let mut gradient = vec![0.0; weights.len()];
+        let report =
+            Objective::new(&architecture, penalty, threads).unwrap().step(&weights, &data, rows, &mut gradient);
+        (report, gradient)
+    };
+    let (whole, gradient) = step(penalty, &rows, 1);
+    assert_eq!((whole, gradient.clone()), step(penalty, &rows, 3));
+    // The same states thrice: the same median, the same mean.
+    let thrice: Vec<u32> = (0..2100).map(|k| k % 700).collect();
+    let (repeated, again) = step(penalty, &thrice, 2);
+    assert!(whole.penalised > 0 && repeated.penalised == 3 * whole.penalised);
+    let size = gradient.iter().fold(0.0f64, |m, g| m.max(g.abs()));
+    // A sum of 2,100 states against one of 700.
+    assert!((repeated.penalty - whole.penalty).abs() <= 1e-14 * whole.penalty);
+    assert!(gradient.iter().zip(&again).all(|(a, b)| (a - b).abs() <= 1e-12 * size));
+    // Not the mean of the halves' penalties: each half has scales of its own.
+    let (first, second) = (step(penalty, &rows[..350], 1).0, step(penalty, &rows[350..], 1).0);
+    assert!((0.5 * (first.penalty + second.penalty) - whole.penalty).abs() > 1e-6 * whole.penalty);
+}
+
+#[test]
 fn an_inactive_penalty_is_exactly_zero() {
     let architecture = Architecture { alpha: 5.0, ..architecture(2, &[6, 6]) };
     let weights: Vec<f64> = initial_weights(&architecture, Initialization::Default, &mut ChaCha8Rng::seed_from_u64(1));
@@ -159,7 +266,37 @@ fn an_inactive_penalty_is_exactly_zero() {
     };
     let (with, gradient) = run(Penalty::Eigenvalue { lambda: 1000.0 });
     assert_eq!((with.penalty, with.penalised), (0.0, 0));
-    assert_eq!((with, gradient), run(Penalty::None));
+    assert_eq!((with, gradient.clone()), run(Penalty::None));
+    assert_eq!((with, gradient), run(Penalty::Sylvester { lambda: 1000.0, time: None }));
+}
+
+#[test]
+fn polishing_lowers_the_loss_and_keeps_the_best() {
+    let mut config = config(3);
+    config.optimizer.averaging = 0.0;
+    let before = run(&config, datasets(), 1, &Hooks::default()).unwrap();
+    config.polish = Some(Polish { iterations: 30, memory: 8 });
+    let after = run(&config, datasets(), 2, &Hooks::default()).unwrap();
+    let rows = before.history.len();
+    // The phases are what they were; polishing has rows of its own, without a learning rate.
+    for (a, b) in before.history.iter().zip(&after.history) {
+        assert_eq!((a.validation_loss, a.training_loss), (b.validation_loss, b.training_loss));
+    }
+    assert!(after.history.len() > rows);
+    assert!(after.history[rows..].iter().all(|e| e.phase == 3 && e.rate == 0.0));
+    let lowest = after.history.iter().map(|e| e.validation_loss).fold(f64::INFINITY, f64::min);
+    assert_eq!(after.validation_loss, lowest);
+    assert!(
+        after.validation_loss < 0.8 * before.validation_loss,
+        "{} {}",
+        after.validation_loss,
+        before.validation_loss
+    );
+    // Any number of threads, the same bytes.
+    assert_eq!(after.weights, run(&config, datasets(), 1, &Hooks::default()).unwrap().weights);
+    // Interrupted before it began: the phases' model stands.
+    let hooks = Hooks { watcher: None, interrupt: Arc::new(AtomicBool::new(true)) };
+    assert!(run(&config, datasets(), 1, &hooks).is_err());
 }
 
 proptest! {
@@ -216,7 +353,7 @@ fn config(epochs: usize) -> Config {
             embed_periodic: true,
             initialization: Initialization::Default,
         },
-        penalty: Penalty::Eigenvalue { lambda: 10.0 },
+        penalty: Regularizer::Eigenvalue { lambda: 10.0 },
         optimizer: Optimizer {
             method: Method::Radam,
             batch: 150,
@@ -237,6 +374,7 @@ fn config(epochs: usize) -> Config {
             };
             2
         ],
+        polish: None,
     }
 }
 
@@ -258,7 +396,8 @@ fn datasets() -> Datasets<f32> {
 fn run(config: &Config, data: Datasets<f32>, threads: usize, hooks: &Hooks) -> Result<Trained<f32>, TrainingError> {
     let activation = config.network.activation;
     let architecture = Architecture { embed_periodic: false, activation, ..architecture(2, &config.network.hidden) };
-    train(config, &architecture, data, threads, hooks)
+    let penalty = config.penalty().unwrap();
+    train(config, &architecture, penalty, data, threads, hooks)
 }
 
 #[test]

@@ -63,6 +63,7 @@ fn learn<S: Scalar>(args: &Args, config: &Config, system: &Configured<f64>) -> R
         SamplingError::Dataset(_) => CliError::data(e),
         _ => CliError::usage(e),
     })?;
+    let penalty = config.penalty().map_err(CliError::usage)?;
     let path = args.out.clone().unwrap_or_else(|| PathBuf::from("runs").join(&config.system));
     let folder = Folder::open(&path)?;
     let architecture = architecture(config, system, scale);
@@ -70,7 +71,7 @@ fn learn<S: Scalar>(args: &Args, config: &Config, system: &Configured<f64>) -> R
     let threads = threads(args.threads);
     let fresh = (data.test.cast::<f64>().q().to_vec(), data.test.cast::<f64>().v().to_vec());
 
-    let trained = train(config, &architecture, data, threads, &hooks(&stop)).map_err(|e| {
+    let trained = train(config, &architecture, penalty, data, threads, &hooks(&stop)).map_err(|e| {
         if stop.load(Ordering::SeqCst) {
             CliError::interrupted("interrupted before the first epoch ended")
         } else {

@@ -2,7 +2,7 @@
 
 use crate::network::{Activation, Initialization};
 use crate::training::optimizer::Method;
-use crate::training::penalty::Penalty;
+use crate::training::penalty::Regularizer;
 use crate::training::schedule::Schedule;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -57,12 +57,25 @@ pub struct Config {
     pub network: Network,
     /// Penalty on the mass matrix.
     #[serde(default)]
-    pub penalty: Penalty,
+    pub penalty: Regularizer,
     /// Update rule.
     pub optimizer: Optimizer,
     /// Phases in order, each from the best weights of the one before.
     #[serde(rename = "phase")]
     pub phases: Vec<Phase>,
+    /// Full-batch polishing after the last phase.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub polish: Option<Polish>,
+}
+
+/// Full-batch L-BFGS in double precision on the states of the last phase, from the best weights so far.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Polish {
+    /// Iterations at most.
+    pub iterations: usize,
+    /// Pairs of steps and gradient differences that are kept.
+    pub memory: usize,
 }
 
 /// States that are sampled uniformly within bounds.
@@ -180,10 +193,8 @@ impl Config {
         }
         let finite = "a finite number";
         fraction(self.network.alpha, "network.alpha", self.network.alpha.is_finite(), finite)?;
-        if let Penalty::Eigenvalue { lambda } = self.penalty {
-            let ok = lambda.is_finite() && lambda >= 0.0;
-            fraction(lambda, "penalty.lambda", ok, "a finite number of at least 0")?;
-        }
+        let lambda = self.penalty.lambda();
+        fraction(lambda, "penalty.lambda", lambda.is_finite() && lambda >= 0.0, "a finite number of at least 0")?;
         let optimizer = &self.optimizer;
         count(optimizer.batch, "optimizer.batch", STATES)?;
         let decay = optimizer.weight_decay;
@@ -203,6 +214,10 @@ impl Config {
             fraction(phase.t_max, &field("t_max"), positive(phase.t_max), "a positive number of epochs")?;
             check_bounds(&field("position"), &phase.position, n)?;
             check_bounds(&field("velocity"), &phase.velocity, n)?;
+        }
+        if let Some(polish) = &self.polish {
+            count(polish.iterations, "polish.iterations", 1 << 24)?;
+            count(polish.memory, "polish.memory", 1000)?;
         }
         Ok(())
     }

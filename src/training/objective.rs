@@ -6,11 +6,14 @@
 //! A batch is cut into stripes and chunks whose sizes do not depend on the number of threads, and every sum is taken in
 //! their order: the same numbers on any number of threads.
 
-use crate::linalg::{self, Workspace, eigh, is_positive_definite, solve};
+use crate::linalg::{self, Workspace, solve};
 use crate::network::{Adjoint, Architecture, Chunk, Depth, Jets};
 use crate::scalar::{Real, Scalar, Sum};
 use crate::training::dataset::Dataset;
 use crate::training::penalty::Penalty;
+use crate::training::signature::{
+    Buffers, Violation, characteristic_scales, eigenvalue_violation, has_signature, sylvester_violation,
+};
 use rayon::prelude::*;
 
 /// States evaluated together.
@@ -72,9 +75,13 @@ struct Stripe<S> {
     acceleration: Vec<S>,
     right: Vec<S>,
     multiplier: Vec<S>,
-    values: Vec<S>,
-    vectors: Vec<S>,
     workspace: Workspace<S>,
+    signature: Buffers<S>,
+    violation: Violation<S>,
+    /// `|M_ii|` of every state, `(states, n)`, and the states whose signature is in doubt with their matrices.
+    diagonal: Vec<S>,
+    suspects: Vec<usize>,
+    suspect_matrices: Vec<S>,
     inverse_scale: Vec<S>,
     residual: Sum<S>,
     penalty: Sum<S>,
@@ -97,9 +104,12 @@ impl<S: Scalar> Stripe<S> {
             acceleration: Vec::new(),
             right: Vec::new(),
             multiplier: Vec::new(),
-            values: Vec::new(),
-            vectors: Vec::new(),
             workspace: Workspace::new(),
+            signature: Buffers::default(),
+            violation: Violation::default(),
+            diagonal: Vec::new(),
+            suspects: Vec::new(),
+            suspect_matrices: Vec::new(),
             inverse_scale: architecture.scale.iter().map(|&s| S::of_f64(s).recip()).collect(),
             residual: Sum::default(),
             penalty: Sum::default(),
@@ -114,6 +124,9 @@ impl<S: Scalar> Stripe<S> {
         self.gradient.resize(parameters, <S as Real>::zero());
         (self.residual, self.penalty) = (Sum::default(), Sum::default());
         (self.penalised, self.left_out, self.failure) = (0, 0, None);
+        self.diagonal.clear();
+        self.suspects.clear();
+        self.suspect_matrices.clear();
     }
 
     /// Copies the states of these rows side by side.
@@ -128,18 +141,87 @@ impl<S: Scalar> Stripe<S> {
         }
     }
 
-    /// Loss, penalty and their gradients of one chunk; `weight` is `1/(2 n batch)`, `lambda` the penalty's over the batch.
-    fn add_chunk(&mut self, weights: &[S], data: &Dataset<S>, rows: &[u32], weight: S, lambda: Option<S>) {
+    /// Loss and gradient of one chunk, with an eigenvalue penalty; leaves what Sylvester's needs of all states.
+    ///
+    /// `weight` is `1/(2 n batch)`; the penalty comes with its weight over the batch.
+    fn add_chunk(&mut self, weights: &[S], data: &Dataset<S>, rows: &[u32], weight: S, penalty: (Penalty, S)) {
         self.gather(data, rows);
         self.chunk.evaluate(weights, &self.q, &self.v, Depth::Training);
         self.solve(rows);
         self.add_residuals(data, rows, weight);
         self.add_motion_jets();
         self.adjoint.add_gradient(&self.chunk, weights, &self.jets, &mut self.gradient);
-        if let Some(lambda) = lambda {
-            self.add_penalty_jets(lambda);
+        let (penalty, lambda) = penalty;
+        match penalty {
+            Penalty::None => {}
+            Penalty::Eigenvalue { .. } => {
+                self.add_eigenvalue_jets(lambda);
+                self.adjoint.add_gradient(&self.chunk, weights, &self.penalty_jets, &mut self.gradient);
+            }
+            Penalty::Sylvester { time, .. } => self.note_suspects(time),
+        }
+    }
+
+    /// Keeps the diagonals of the chunk's mass matrices and whatever has not plainly the right signature.
+    fn note_suspects(&mut self, time: Option<usize>) {
+        let n = self.chunk.coordinates();
+        for matrix in self.chunk.mass_matrix.chunks_exact(n * n) {
+            if !has_signature(n, matrix, time, &mut self.signature) {
+                self.suspects.push(self.diagonal.len() / n);
+                self.suspect_matrices.extend_from_slice(matrix);
+            }
+            self.diagonal.extend(matrix.iter().step_by(n + 1).map(|&m| Real::abs(m)));
+        }
+    }
+
+    /// Sylvester's penalty and its gradient of the states in doubt, by the scales of the whole batch.
+    fn add_sylvester(
+        &mut self,
+        weights: &[S],
+        data: &Dataset<S>,
+        rows: &[u32],
+        scales: &[S],
+        (lambda, time): (S, Option<usize>),
+    ) {
+        let n = self.chunk.coordinates();
+        let suspects = std::mem::take(&mut self.suspects);
+        let matrices = std::mem::take(&mut self.suspect_matrices);
+        for (group, matrices) in suspects.chunks(CHUNK).zip(matrices.chunks(CHUNK * n * n)) {
+            self.penalty_jets.clear(false);
+            // The buffers still hold the only chunk of a small batch.
+            let kept = rows.len() <= CHUNK;
+            for (k, (&state, matrix)) in group.iter().zip(matrices.chunks_exact(n * n)).enumerate() {
+                let outcome = sylvester_violation(n, matrix, scales, time, &mut self.signature, &mut self.violation);
+                if outcome.is_ok() {
+                    self.push_violation(if kept { state } else { k }, lambda);
+                }
+            }
+            if self.penalty_jets.state.is_empty() {
+                continue;
+            }
+            if !kept {
+                let chosen: Vec<u32> = group.iter().map(|&state| rows[state]).collect();
+                self.gather(data, &chosen);
+                self.chunk.evaluate(weights, &self.q, &self.v, Depth::Training);
+            }
             self.adjoint.add_gradient(&self.chunk, weights, &self.penalty_jets, &mut self.gradient);
         }
+        (self.suspects, self.suspect_matrices) = (suspects, matrices);
+    }
+
+    /// Counts the violation at hand and adds its jets: `G = sum gamma u u^T` has `s = lambda gamma u`, `t = u`.
+    fn push_violation(&mut self, state: usize, lambda: S) {
+        if self.violation.gamma.is_empty() {
+            return;
+        }
+        let n = self.chunk.coordinates();
+        self.penalty.add(lambda * self.violation.value);
+        for (&gamma, u) in self.violation.gamma.iter().zip(self.violation.vectors.chunks_exact(n)) {
+            self.penalty_jets.state.push(state);
+            self.penalty_jets.s.extend(u.iter().map(|&u| lambda * gamma * u));
+            self.penalty_jets.t.extend_from_slice(u);
+        }
+        self.penalised += 1;
     }
 
     /// Losses of one chunk, no gradient.
@@ -215,30 +297,15 @@ impl<S: Scalar> Stripe<S> {
         }
     }
 
-    /// `lambda sum relu(-eigenvalue)`: one jet per negative eigenvalue `w = u^T M u`, with `s = -lambda u`, `t = u`.
-    ///
-    /// Exact at repeated eigenvalues, where any basis of their space gives the same sum. Definite matrices are told by
-    /// their pivots and cost no spectrum.
-    fn add_penalty_jets(&mut self, lambda: S) {
+    /// Jets of the eigenvalue penalty of the chunk.
+    fn add_eigenvalue_jets(&mut self, lambda: S) {
         let n = self.chunk.coordinates();
-        let zero = <S as Real>::zero();
         self.penalty_jets.clear(false);
-        self.values.resize(n, zero);
-        self.vectors.resize(n * n, zero);
-        for (state, matrix) in self.chunk.mass_matrix.chunks_exact(n * n).enumerate() {
-            if is_positive_definite(n, matrix, &mut self.vectors)
-                || eigh(n, matrix, &mut self.values, &mut self.vectors, &mut self.workspace).is_err()
-            {
-                continue;
+        for state in 0..self.chunk.mass_matrix.len() / (n * n) {
+            let matrix = &self.chunk.mass_matrix[state * n * n..(state + 1) * n * n];
+            if eigenvalue_violation(n, matrix, &mut self.signature, &mut self.violation).is_ok() {
+                self.push_violation(state, lambda);
             }
-            let negative = self.values.iter().take_while(|&&w| w < zero).count();
-            for (&w, u) in self.values[..negative].iter().zip(self.vectors.chunks_exact(n)) {
-                self.penalty.add(-lambda * w);
-                self.penalty_jets.state.push(state);
-                self.penalty_jets.s.extend(u.iter().map(|&u| -lambda * u));
-                self.penalty_jets.t.extend_from_slice(u);
-            }
-            self.penalised += usize::from(negative > 0);
         }
     }
 }
@@ -276,21 +343,31 @@ impl<S: Scalar> Objective<S> {
     pub fn step(&mut self, weights: &[S], data: &Dataset<S>, rows: &[u32], gradient: &mut [S]) -> BatchReport<S> {
         let count = S::of_f64(rows.len() as f64);
         let weight = (S::of_f64(2.0 * data.coordinates() as f64) * count).recip();
-        let lambda = match self.penalty {
-            Penalty::None => None,
-            Penalty::Eigenvalue { lambda } => Some(S::of_f64(lambda) / count),
-        };
+        let penalty = self.penalty;
+        let lambda = S::of_f64(penalty.lambda()) / count;
         let stripes = self.run(rows, |stripe, rows| {
             stripe.reset(weights.len());
             for rows in rows.chunks(CHUNK) {
-                stripe.add_chunk(weights, data, rows, weight, lambda);
+                stripe.add_chunk(weights, data, rows, weight, (penalty, lambda));
             }
         });
+        if let Penalty::Sylvester { time, .. } = penalty
+            && self.stripes[..stripes].iter().any(|stripe| !stripe.suspects.is_empty())
+        {
+            let scales = self.scales(stripes, data.coordinates());
+            self.run(rows, |stripe, rows| stripe.add_sylvester(weights, data, rows, &scales, (lambda, time)));
+        }
         let stripes = &self.stripes[..stripes];
         self.pool.install(|| {
             gradient.par_chunks_mut(SUM_BLOCK).enumerate().for_each(|(k, block)| sum_gradients(stripes, k, block));
         });
         self.report(stripes.len(), rows.len(), data.coordinates())
+    }
+
+    /// Characteristic scales of the batch that the stripes hold.
+    fn scales(&self, stripes: usize, n: usize) -> Vec<S> {
+        let diagonals: Vec<S> = self.stripes[..stripes].iter().flat_map(|s| s.diagonal.iter().copied()).collect();
+        characteristic_scales(n, &diagonals)
     }
 
     /// Loss of a whole dataset, no gradient.

@@ -5,7 +5,7 @@ use crate::lagrangian::system::Bounds;
 use crate::network::{Activation, Initialization};
 use crate::training::config::{Config, Data, Network, OnFailure, Optimizer, Phase, Precision, Scaling};
 use crate::training::optimizer::Method;
-use crate::training::penalty::Penalty;
+use crate::training::penalty::Regularizer;
 use crate::training::schedule::Schedule;
 use std::f64::consts::PI;
 
@@ -48,7 +48,7 @@ fn base(system: &Configured<f64>, states: usize, network: Network) -> Config {
             validation_velocity: boxes(&validation.velocities),
         },
         network,
-        penalty: Penalty::Eigenvalue { lambda: 5.0 },
+        penalty: Regularizer::Eigenvalue { lambda: 5.0 },
         optimizer: Optimizer {
             method: Method::Radam,
             batch: 128,
@@ -58,6 +58,7 @@ fn base(system: &Configured<f64>, states: usize, network: Network) -> Config {
             on_failure: OnFailure::Skip,
         },
         phases: Vec::new(),
+        polish: None,
     }
 }
 
@@ -87,7 +88,7 @@ fn quick(system: &Configured<f64>) -> Config {
         position: boxes(&bounds.positions),
         velocity: boxes(&bounds.velocities),
     };
-    Config { penalty: Penalty::Eigenvalue { lambda: 100.0 }, phases: vec![phase], ..base(system, 60_000, network) }
+    Config { penalty: Regularizer::Eigenvalue { lambda: 100.0 }, phases: vec![phase], ..base(system, 60_000, network) }
 }
 
 /// Appendix "Training details" of Hamzaogullari and Ozakin.

@@ -4,6 +4,7 @@ use crate::lagrangian::{Configured, configure};
 use crate::network::{Architecture, NetworkError, NetworkLagrangian};
 use crate::scalar::Scalar;
 use crate::training::config::{Config, Scaling};
+use crate::training::penalty::{Penalty, Regularizer};
 use crate::training::sampling::{SamplingError, sample_all};
 use crate::training::solver::Hooks;
 use crate::training::trainer::{Trained, TrainingError, train};
@@ -45,6 +46,21 @@ impl Config {
         Ok(configure(&self.system, &given)?)
     }
 
+    /// The penalty, its time-like coordinate looked up in the system if it names one.
+    ///
+    /// # Errors
+    /// Unknown system or parameter, or a name that is no coordinate of it.
+    pub fn penalty(&self) -> Result<Penalty, SamplingError> {
+        let coordinates = match self.penalty {
+            Regularizer::LorentzianSylvester { .. } => {
+                let system = self.system()?;
+                (system.system.coordinates)(system.coordinates)
+            }
+            _ => Vec::new(),
+        };
+        Ok(self.penalty.penalty(coordinates.iter().map(|c| c.name.as_ref()))?)
+    }
+
     /// Shape of the network for a system, with physical scales `scale` (used if the configuration scales).
     pub fn architecture(&self, system: &Configured<f64>, scale: Vec<f64>) -> Architecture {
         let n = system.coordinates;
@@ -71,7 +87,7 @@ pub fn run<S: Scalar>(config: &Config, threads: usize, hooks: &Hooks) -> Result<
     let system = config.system()?;
     let (data, scale) = sample_all::<S>(config, &system)?;
     let architecture = config.architecture(&system, scale);
-    let trained = train(config, &architecture, data, threads, hooks)?;
+    let trained = train(config, &architecture, config.penalty()?, data, threads, hooks)?;
     let model = NetworkLagrangian::new(architecture, trained.weights.clone())?;
     Ok(Outcome { system, model, trained })
 }

@@ -5,6 +5,8 @@ use crate::scalar::Scalar;
 use crate::training::config::{Config, Phase};
 use crate::training::dataset::Dataset;
 use crate::training::objective::{BatchReport, Objective};
+use crate::training::penalty::Penalty;
+use crate::training::polish::{Start, polish};
 use crate::training::solver::{Epoch, EpochSolver, Hooks, StepError, TrainingProblem, TrainingState};
 use argmin::core::observers::{Observe, ObserverMode};
 use argmin::core::{Error, Executor, KV, State, TerminationReason, TerminationStatus};
@@ -106,7 +108,8 @@ pub struct Datasets<S> {
     pub test: Dataset<S>,
 }
 
-/// Trains a network of this shape; the configuration must have been validated.
+/// Trains a network of this shape with the configuration's penalty, resolved by [`Config::penalty`]; the configuration
+/// must have been validated.
 ///
 /// The same configuration, data and seed give the same bytes on any number of `threads`.
 ///
@@ -115,23 +118,23 @@ pub struct Datasets<S> {
 pub fn train<S: Scalar>(
     config: &Config,
     architecture: &Architecture,
+    penalty: Penalty,
     data: Datasets<S>,
     threads: usize,
     hooks: &Hooks,
 ) -> Result<Trained<S>, TrainingError> {
     let started = Instant::now();
-    let objective = || {
-        Objective::new(architecture, config.penalty, threads)
-            .map_err(|source| TrainingError::Threads { threads, source })
-    };
+    let objective =
+        || Objective::new(architecture, penalty, threads).map_err(|source| TrainingError::Threads { threads, source });
     let mut weights =
         initial_weights(architecture, config.network.initialization, &mut Stream::Weights.generator(config.seed));
     let batches = |states: usize| states.div_ceil(config.optimizer.batch.min(states));
     let pairs = || config.phases.iter().zip(&data.training);
     let steps = pairs().map(|(phase, data)| phase.epochs * batches(data.len())).sum();
     let mut progress = Run { history: Vec::new(), step: 0, states: 0, stop: Stop::Finished, best: f64::INFINITY };
-    for (number, (phase, training)) in config.phases.iter().zip(data.training).enumerate() {
-        let problem = TrainingProblem { objective: objective()?, training, validation: data.validation.clone() };
+    for (number, (phase, training)) in config.phases.iter().zip(&data.training).enumerate() {
+        let (training, validation) = (training.clone(), data.validation.clone());
+        let problem = TrainingProblem { objective: objective()?, training, validation };
         let mut solver = EpochSolver::new(
             config.optimizer.clone(),
             phase.clone(),
@@ -149,6 +152,33 @@ pub fn train<S: Scalar>(
         }
         if progress.stop != Stop::Finished {
             break;
+        }
+    }
+    if let (Some(settings), Some(training), Stop::Finished) = (&config.polish, data.training.last(), &progress.stop)
+        && progress.best.is_finite()
+    {
+        let objective = Objective::new(architecture, penalty, threads)
+            .map_err(|source| TrainingError::Threads { threads, source })?;
+        let start = Start {
+            objective,
+            training: training.cast(),
+            validation: data.validation.cast(),
+            weight_decay: config.optimizer.weight_decay,
+            weights: weights.iter().map(|w| w.to_f64()).collect(),
+            validation_loss: progress.best,
+            last: (progress.history.len(), config.phases.len()),
+            started,
+            hooks: hooks.clone(),
+        };
+        let polished = polish(settings, start).map_err(TrainingError::Optimizer)?;
+        if let Some(best) = polished.weights {
+            weights = best.iter().map(|&w| S::of_f64(w)).collect();
+        }
+        progress.best = polished.validation_loss;
+        progress.states += polished.evaluations.saturating_mul(training.len());
+        progress.history.extend(polished.history);
+        if hooks.interrupt.load(std::sync::atomic::Ordering::Relaxed) {
+            progress.stop = Stop::Interrupted;
         }
     }
     if progress.best.is_infinite() {
