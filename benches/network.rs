@@ -3,7 +3,7 @@
 //! `cargo bench --bench network`; the suffix of a name is `n`, hidden width, batch, precision. Elements are states.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use lnn::network::{Activation, Architecture, Chunk, Depth, Initialization, initial_weights};
+use lnn::network::{Architecture, Chunk, Depth, Initialization, InputLayer, Nonlinearity, initial_weights};
 use lnn::scalar::Scalar;
 use lnn::training::{Dataset, Method, Moments, Objective, Penalty, Update};
 use rand::{Rng, SeedableRng};
@@ -16,11 +16,12 @@ fn architecture(n: usize, width: usize) -> Architecture {
     Architecture {
         coordinates: n,
         hidden: vec![width; 3],
-        activation: Activation::Gelu,
+        activation: Nonlinearity::Gelu,
         alpha: 1.0,
         scale: vec![10.0; n],
         periodic: vec![false; n],
         embed_periodic: false,
+        input_layer: InputLayer::None,
     }
 }
 

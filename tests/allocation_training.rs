@@ -1,6 +1,6 @@
 //! A training step allocates nothing after the first.
 
-use lnn::network::{Activation, Architecture, Initialization, initial_weights};
+use lnn::network::{Architecture, Initialization, InputLayer, Nonlinearity, initial_weights};
 use lnn::training::{Dataset, Method, Moments, Objective, Penalty, Update};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -27,14 +27,20 @@ static ALLOCATOR: Counting = Counting;
 // One test, so that no other thread allocates meanwhile.
 #[test]
 fn a_training_step_allocates_nothing_after_the_first() {
+    allocates_nothing(Nonlinearity::Gelu, InputLayer::None);
+    allocates_nothing(Nonlinearity::QuadraticSoftplus, InputLayer::Dyt);
+}
+
+fn allocates_nothing(activation: Nonlinearity, input_layer: InputLayer) {
     let architecture = Architecture {
         coordinates: 2,
         hidden: vec![96; 3],
-        activation: Activation::Gelu,
+        activation,
         alpha: -1.0,
         scale: vec![2.0; 2],
         periodic: vec![true; 2],
         embed_periodic: true,
+        input_layer,
     };
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     let mut weights: Vec<f32> = initial_weights(&architecture, Initialization::Default, &mut rng);
@@ -54,5 +60,5 @@ fn a_training_step_allocates_nothing_after_the_first() {
     let before = CALLS.load(Ordering::Relaxed);
     (0..10).for_each(|_| step());
     let counted = CALLS.load(Ordering::Relaxed) - before;
-    assert_eq!(counted, 0, "allocations in 10 steps");
+    assert_eq!(counted, 0, "allocations in 10 steps with {activation}");
 }

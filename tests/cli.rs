@@ -2,7 +2,7 @@
 #![cfg(feature = "cli")]
 
 use lnn::network::file::{FORMAT, Header, ModelFile, StoredPrecision};
-use lnn::network::{Activation, Architecture, Layout};
+use lnn::network::{Architecture, InputLayer, Layout, Nonlinearity};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fs;
@@ -189,11 +189,12 @@ fn model() -> ModelFile<f32> {
     let architecture = Architecture {
         coordinates: 2,
         hidden: vec![8, 8],
-        activation: Activation::Softplus,
+        activation: Nonlinearity::Softplus,
         alpha: 0.5,
         scale: vec![3.0, 4.0],
         periodic: vec![true, true],
         embed_periodic: true,
+        input_layer: InputLayer::None,
     };
     let count = Layout::new(&architecture).parameters;
     let header = Header {

@@ -202,6 +202,10 @@ fn wrong_trainings_are_refused_before_anything_is_written() {
     with("batch = 128", "batch = 0", &["optimizer.batch"]);
     with("hidden = [16, 16]", "hidden = []", &["network.hidden"]);
     with("activation = \"gelu\"", "activation = \"gelo\"", &["gelo", "gelu"]);
+    with("activation = \"gelu\"", "activation = \"identity\"", &["network.activation", "identity"]);
+    with("input_layer = \"none\"", "input_layer = \"dty\"", &["dty", "did you mean \"dyt\"?"]);
+    let odd = "hidden = [16, 15]\nactivation = \"quadratic-softplus\"";
+    with("hidden = [16, 16]\nactivation = \"gelu\"", odd, &["network.hidden[1]", "even", "15"]);
     with("system = \"double-pendulum\"", "system = \"triple-pendulum\"", &["data."]);
     let config = folder.config(&small("double-pendulum"));
     refused(&train(&["spring-pendulum", "--config", &config]), 2, &["double-pendulum", "spring-pendulum"]);

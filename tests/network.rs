@@ -5,7 +5,10 @@ mod common;
 use common::of_scalar;
 use lnn::forward::HyperDual;
 use lnn::lagrangian::Lagrangian;
-use lnn::network::{Activation, Adjoint, Architecture, Chunk, Depth, Initialization, Jets, Layout, initial_weights};
+use lnn::network::{
+    Adjoint, Architecture, Chunk, Depth, Initialization, InputLayer, Jets, Layout, LinearMap, Nonlinearity,
+    initial_weights,
+};
 use lnn::scalar::{Dd, Real, Scalar};
 use lnn::tape::{ScalarFunction, gradient};
 use proptest::prelude::*;
@@ -57,19 +60,19 @@ struct Case {
 }
 
 fn cases() -> impl Strategy<Value = Case> {
-    let activations =
-        [Activation::Gelu, Activation::Softplus, Activation::XTanh, Activation::Tanh, Activation::Quadratic];
-    let shape = (1_usize..=6, prop::collection::vec(1_usize..24, 1..4), 0..activations.len());
-    (shape, prop::collection::vec(any::<bool>(), 6), any::<bool>(), any::<u64>()).prop_map(
-        move |((n, hidden, activation), periodic, embed_periodic, seed)| Case {
+    let shape = (1_usize..=6, prop::collection::vec(1_usize..24, 1..4), prop::sample::select(&Nonlinearity::ALL[..]));
+    let input_layer = prop::sample::select(vec![InputLayer::None, InputLayer::Dyt]);
+    (shape, input_layer, prop::collection::vec(any::<bool>(), 6), any::<bool>(), any::<u64>()).prop_map(
+        |((n, hidden, activation), input_layer, periodic, embed_periodic, seed)| Case {
             architecture: Architecture {
                 coordinates: n,
-                hidden,
-                activation: activations[activation],
+                hidden: hidden.into_iter().map(|w| w * activation.branches().len()).collect(),
+                activation,
                 alpha: 0.75,
                 scale: (0..n).map(|i| 1.5 + i as f64 / 2.0).collect(),
                 periodic: periodic[..n].to_vec(),
                 embed_periodic,
+                input_layer,
             },
             seed,
         },
@@ -82,10 +85,17 @@ impl std::fmt::Debug for Case {
     }
 }
 
-/// Random weights and states of a case.
+/// Random weights and states of a case; the parameters of an input layer leave their initial values too.
 fn draw<S: Scalar>(case: &Case, batch: usize) -> (Vec<S>, Vec<S>, Vec<S>) {
     let mut rng = ChaCha8Rng::seed_from_u64(case.seed);
-    let weights = initial_weights(&case.architecture, Initialization::Default, &mut rng);
+    let mut weights: Vec<S> = initial_weights(&case.architecture, Initialization::Default, &mut rng);
+    for layer in Layout::new(&case.architecture).branches.iter().flat_map(|branch| &branch.layers) {
+        if layer.map != LinearMap::Dense {
+            for k in layer.weight_range().chain(layer.bias_range()) {
+                weights[k] += S::of_f64(rng.random_range(-0.3..0.3));
+            }
+        }
+    }
     let mut states = |size: f64| -> Vec<S> {
         (0..batch * case.architecture.coordinates).map(|_| S::of_f64(rng.random_range(-size..size))).collect()
     };
@@ -198,9 +208,109 @@ proptest! {
     #[test]
     fn the_adjoint_identity_agrees_with_nested_forward_numbers_on_the_tape(case in cases()) {
         let mut case = case;
-        case.architecture.hidden.iter_mut().for_each(|w| *w = 1 + *w % 7);
+        let branches = case.architecture.activation.branches().len();
+        case.architecture.hidden.iter_mut().for_each(|w| *w = branches * (1 + *w % 7));
         adjoint_identity::<f64>(&case, 1e-12);
         adjoint_identity::<Dd>(&case, 1e-26);
+    }
+}
+
+/// Every kind of model at every small number of coordinates: one or two branches, with and without an input layer.
+fn models() -> impl Iterator<Item = Case> {
+    let kinds = [Nonlinearity::XTanh, Nonlinearity::QuadraticSoftplus]
+        .into_iter()
+        .flat_map(|activation| [InputLayer::None, InputLayer::Dyt].map(|input_layer| (activation, input_layer)));
+    kinds.flat_map(|(activation, input_layer)| {
+        (1..=4).map(move |n| Case {
+            architecture: Architecture {
+                coordinates: n,
+                hidden: vec![6, 4],
+                activation,
+                alpha: 0.75,
+                scale: (0..n).map(|i| 1.5 + i as f64 / 2.0).collect(),
+                periodic: (0..n).map(|i| i % 2 == 0).collect(),
+                embed_periodic: true,
+                input_layer,
+            },
+            seed: n as u64,
+        })
+    })
+}
+
+#[test]
+fn both_identities_hold_for_every_kind_of_model() {
+    for case in models() {
+        forward_identity::<f64>(&case, 1e-12);
+        forward_identity::<Dd>(&case, 1e-26);
+        adjoint_identity::<f64>(&case, 1e-12);
+        adjoint_identity::<Dd>(&case, 1e-26);
+    }
+}
+
+/// A hybrid is the sum of two networks of half the widths with the same features, `alpha |v/s|^2` counted once.
+#[test]
+fn a_hybrid_is_the_sum_of_its_branches() {
+    for case in models().filter(|case| case.architecture.activation == Nonlinearity::QuadraticSoftplus) {
+        let (weights, q, v) = draw::<f64>(&case, 3);
+        let evaluate = |architecture: &Architecture, weights: &[f64]| {
+            let mut chunk = Chunk::new(architecture);
+            chunk.evaluate(weights, &q, &v, Depth::Motion);
+            [chunk.lagrangian, chunk.momentum, chunk.dl_dq, chunk.mass_matrix, chunk.coriolis].concat()
+        };
+        let half = |activation, alpha| {
+            let hidden = case.architecture.hidden.iter().map(|w| w / 2).collect();
+            Architecture { activation, alpha, hidden, ..case.architecture.clone() }
+        };
+        let (softplus, quadratic) = weights.split_at(weights.len() / 2);
+        let one = evaluate(&half(Nonlinearity::Softplus, case.architecture.alpha), softplus);
+        let two = evaluate(&half(Nonlinearity::Quadratic, 0.0), quadratic);
+        let sum: Vec<f64> = one.iter().zip(&two).map(|(a, b)| a + b).collect();
+        assert!(difference(&evaluate(&case.architecture, &weights), &sum) < 1e-14);
+    }
+}
+
+/// `gamma tanh(a x) + beta` written out: such a network is a plain one on other features.
+#[test]
+fn dynamic_tanh_stands_before_the_first_dense_layer() {
+    let plain = Architecture {
+        coordinates: 1,
+        hidden: vec![1],
+        activation: Nonlinearity::Quadratic,
+        alpha: 0.5,
+        scale: vec![2.0],
+        periodic: vec![false],
+        embed_periodic: false,
+        input_layer: InputLayer::Dyt,
+    };
+    let (a, gamma, beta, row, bias, output) = (0.7, [1.5, -0.5], [0.25, 0.1], [0.3, -1.1], 0.6, 2.0);
+    let weights = [&[a][..], &gamma, &beta, &row, &[bias, output]].concat();
+    let (q, v) = (1.2, -3.0);
+    let mut chunk = Chunk::new(&plain);
+    chunk.evaluate(&weights, &[q], &[v], Depth::Value);
+    let feature = |i: usize, x: f64| gamma[i] * (a * x / 2.0).tanh() + beta[i];
+    let z = row[0] * feature(0, q) + row[1] * feature(1, v) + bias;
+    let expected = output * z * z + 0.5 * (v / 2.0) * (v / 2.0);
+    assert!((chunk.lagrangian[0] / expected - 1.0).abs() < 1e-14, "{} for {expected}", chunk.lagrangian[0]);
+}
+
+#[test]
+fn widths_that_a_hybrid_cannot_halve_are_refused() {
+    for case in models() {
+        assert_eq!(case.architecture.validate(), Ok(()));
+        for width in [1, 5] {
+            let odd = Architecture { hidden: vec![4, width], ..case.architecture.clone() };
+            let hybrid = odd.activation == Nonlinearity::QuadraticSoftplus;
+            match odd.validate() {
+                Ok(()) => assert!(!hybrid),
+                Err(error) => {
+                    let text = error.to_string();
+                    assert!(
+                        hybrid && text.contains("quadratic-softplus") && text.ends_with(&width.to_string()),
+                        "{text}"
+                    );
+                }
+            }
+        }
     }
 }
 
@@ -210,11 +320,12 @@ fn shallower_evaluations_give_the_same_numbers() {
         architecture: Architecture {
             coordinates: 3,
             hidden: vec![17, 9],
-            activation: Activation::Softplus,
+            activation: Nonlinearity::Softplus,
             alpha: 1.0,
             scale: vec![2.0; 3],
             periodic: vec![true, false, true],
             embed_periodic: true,
+            input_layer: InputLayer::None,
         },
         seed: 5,
     };

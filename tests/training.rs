@@ -5,7 +5,7 @@ mod common;
 use common::{of_scalar, solve};
 use lnn::forward::HyperDual;
 use lnn::lagrangian::Lagrangian;
-use lnn::network::{Activation, Architecture, Initialization, initial_weights};
+use lnn::network::{Architecture, Initialization, InputLayer, Nonlinearity, initial_weights};
 use lnn::scalar::{Dd, Real, Scalar};
 use lnn::tape::{ScalarFunction, gradient};
 use lnn::training::{
@@ -22,11 +22,12 @@ fn architecture(n: usize, hidden: &[usize]) -> Architecture {
     Architecture {
         coordinates: n,
         hidden: hidden.to_vec(),
-        activation: Activation::Gelu,
+        activation: Nonlinearity::Gelu,
         alpha: 0.3,
         scale: (0..n).map(|i| 2.0 + i as f64).collect(),
         periodic: vec![true; n],
         embed_periodic: true,
+        input_layer: InputLayer::None,
     }
 }
 
@@ -140,8 +141,22 @@ impl<S: Scalar> ScalarFunction for MeanLoss<'_, S> {
     }
 }
 
-fn gradient_agrees<S: Scalar>(n: usize, alpha: f64, penalty: Penalty, tolerance: f64) {
-    let architecture = Architecture { alpha, ..architecture(n, &[5, 4]) };
+/// One or two branches, with and without an input layer.
+const MODELS: [(Nonlinearity, InputLayer); 4] = [
+    (Nonlinearity::Gelu, InputLayer::None),
+    (Nonlinearity::Gelu, InputLayer::Dyt),
+    (Nonlinearity::QuadraticSoftplus, InputLayer::None),
+    (Nonlinearity::QuadraticSoftplus, InputLayer::Dyt),
+];
+
+fn gradient_agrees<S: Scalar>(
+    (activation, input_layer): (Nonlinearity, InputLayer),
+    n: usize,
+    alpha: f64,
+    penalty: Penalty,
+    tolerance: f64,
+) {
+    let architecture = Architecture { alpha, activation, input_layer, ..architecture(n, &[6, 4]) };
     let mut rng = ChaCha8Rng::seed_from_u64(11);
     let weights: Vec<S> = initial_weights(&architecture, Initialization::Default, &mut rng);
     let data = random_data::<S>(n, 7, 12);
@@ -193,17 +208,21 @@ fn gradient_agrees<S: Scalar>(n: usize, alpha: f64, penalty: Penalty, tolerance:
 
 #[test]
 fn the_gradient_is_that_of_the_whole_loss() {
-    for n in 1..=4 {
-        gradient_agrees::<f64>(n, 0.6, Penalty::None, 1e-12);
-        gradient_agrees::<Dd>(n, 0.6, Penalty::None, 1e-26);
+    for model in MODELS {
+        for n in 1..=4 {
+            gradient_agrees::<f64>(model, n, 0.6, Penalty::None, 1e-12);
+            gradient_agrees::<Dd>(model, n, 0.6, Penalty::None, 1e-26);
+        }
     }
 }
 
 #[test]
 fn the_gradient_of_an_active_penalty_is_right() {
-    for n in 1..=3 {
-        // A negative quadratic term makes every mass matrix negative; eigenvectors of the reference are f64.
-        gradient_agrees::<f64>(n, -0.4, Penalty::Eigenvalue { lambda: 3.0 }, 1e-11);
+    for model in MODELS {
+        for n in 1..=4 {
+            // A negative quadratic term makes every mass matrix negative; eigenvectors of the reference are f64.
+            gradient_agrees::<f64>(model, n, -0.4, Penalty::Eigenvalue { lambda: 3.0 }, 1e-11);
+        }
     }
 }
 
@@ -347,10 +366,11 @@ fn config(epochs: usize) -> Config {
         },
         network: Network {
             hidden: vec![16, 16],
-            activation: Activation::Gelu,
+            activation: Nonlinearity::Gelu,
             alpha: 1.0,
             scaling: Scaling::Physical,
             embed_periodic: true,
+            input_layer: InputLayer::None,
             initialization: Initialization::Default,
         },
         penalty: Regularizer::Eigenvalue { lambda: 10.0 },
@@ -394,8 +414,9 @@ fn datasets() -> Datasets<f32> {
 }
 
 fn run(config: &Config, data: Datasets<f32>, threads: usize, hooks: &Hooks) -> Result<Trained<f32>, TrainingError> {
-    let activation = config.network.activation;
-    let architecture = Architecture { embed_periodic: false, activation, ..architecture(2, &config.network.hidden) };
+    let Network { activation, input_layer, .. } = config.network;
+    let architecture =
+        Architecture { embed_periodic: false, activation, input_layer, ..architecture(2, &config.network.hidden) };
     let penalty = config.penalty().unwrap();
     train(config, &architecture, penalty, data, threads, hooks)
 }
@@ -412,6 +433,46 @@ fn training_learns_and_keeps_the_best_epoch() {
     assert!(best < 0.25 * losses[0], "{losses:?}");
     assert!(f64::from(trained.test.loss) < 2.0 * best);
     assert_eq!(trained.states, 24 * 700);
+}
+
+#[test]
+fn every_kind_of_model_learns() {
+    for (activation, input_layer) in MODELS {
+        let mut config = config(12);
+        config.optimizer.batch = 20;
+        config.network.activation = activation;
+        config.network.input_layer = input_layer;
+        let trained = run(&config, datasets(), 2, &Hooks::default()).unwrap();
+        let first = trained.history[0].validation_loss;
+        let best = trained.validation_loss;
+        assert!(best < 0.25 * first, "{activation} {input_layer:?}: {best} after {first}");
+    }
+}
+
+#[test]
+fn a_configuration_needs_no_input_layer_and_even_widths_for_a_hybrid() {
+    let mut config = config(1);
+    let text = serde_json::to_string(&config).unwrap();
+    let field = ",\"input_layer\":\"none\"";
+    assert!(text.contains(field));
+    assert_eq!(serde_json::from_str::<Config>(&text.replace(field, "")).unwrap(), config);
+    config.network.input_layer = InputLayer::Dyt;
+    config.network.activation = Nonlinearity::QuadraticSoftplus;
+    config.network.initialization = Initialization::NearZero;
+    let text = serde_json::to_string(&config).unwrap();
+    for name in ["\"dyt\"", "\"quadratic-softplus\"", "\"near-zero\""] {
+        assert!(text.contains(name), "{text}");
+    }
+    assert_eq!(serde_json::from_str::<Config>(&text).unwrap(), config);
+    assert_eq!(config.validate(2), Ok(()));
+    for width in [1, 17] {
+        config.network.hidden = vec![16, width];
+        let error = config.validate(2).unwrap_err();
+        assert_eq!((error.field.as_str(), error.found), ("network.hidden[1]", width.to_string()));
+        assert!(error.expected.contains("even") && error.expected.contains("quadratic-softplus"));
+    }
+    config.network.activation = Nonlinearity::Softplus;
+    assert_eq!(config.validate(2), Ok(()));
 }
 
 #[test]
@@ -466,7 +527,7 @@ fn one_number_that_is_not_finite_is_named_and_never_reaches_the_weights() {
     let mut data = datasets();
     data.training[0] = bad;
     let mut skipping = config(2);
-    skipping.network.activation = Activation::Quadratic;
+    skipping.network.activation = Nonlinearity::Quadratic;
     let mut stopping = skipping.clone();
     stopping.optimizer.on_failure = OnFailure::Stop;
     let error = run(&stopping, data.clone(), 2, &Hooks::default()).unwrap_err().to_string();

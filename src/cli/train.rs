@@ -14,7 +14,7 @@ use crate::network::{Architecture, NetworkLagrangian};
 use crate::report::{HistoryRow, Report, training_figures};
 use crate::scalar::Scalar;
 use crate::training::{
-    Config, Epoch, Hooks, Phase, Precision, Progress, SamplingError, Scaling, Stop, Trained, sample_all, train,
+    Config, Epoch, Hooks, Phase, Precision, Progress, SamplingError, Stop, Trained, sample_all, train,
 };
 use serde::Serialize;
 use std::fmt::Write as _;
@@ -66,7 +66,7 @@ fn learn<S: Scalar>(args: &Args, config: &Config, system: &Configured<f64>) -> R
     let penalty = config.penalty().map_err(CliError::usage)?;
     let path = args.out.clone().unwrap_or_else(|| PathBuf::from("runs").join(&config.system));
     let folder = Folder::open(&path)?;
-    let architecture = architecture(config, system, scale);
+    let architecture = config.architecture(system, scale);
     let stop = interrupt::flag()?;
     let threads = threads(args.threads);
     let fresh = (data.test.cast::<f64>().q().to_vec(), data.test.cast::<f64>().v().to_vec());
@@ -132,23 +132,6 @@ fn ended(stop: &Stop) -> String {
         Stop::Finished => "finished".to_string(),
         Stop::Interrupted => "interrupted".to_string(),
         Stop::Failed(error) => error.to_string(),
-    }
-}
-
-/// Shape of the network for this run.
-fn architecture(config: &Config, system: &Configured<f64>, scale: Vec<f64>) -> Architecture {
-    let network = &config.network;
-    Architecture {
-        coordinates: system.coordinates,
-        hidden: network.hidden.clone(),
-        activation: network.activation,
-        alpha: network.alpha,
-        scale: match network.scaling {
-            Scaling::Physical => scale,
-            Scaling::None => vec![1.0; system.coordinates],
-        },
-        periodic: (system.system.coordinates)(system.coordinates).iter().map(|c| c.periodic).collect(),
-        embed_periodic: network.embed_periodic,
     }
 }
 

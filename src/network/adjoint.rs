@@ -9,7 +9,9 @@
 //! the adjoint of the mixed channel is the `dL/dz` it left: one forward pass, three reverse passes and four for the
 //! weights, beside the `n + 3` of the evaluation.
 
-use crate::network::chunk::{Chunk, Hidden, plane};
+use crate::network::branch::Hidden;
+use crate::network::planes::{add_rows, plane};
+use crate::network::{Branch, Chunk};
 use crate::scalar::{Real, Scalar, vectorized};
 
 /// A list of mixed Taylor coefficients `L_st` whose sum is differentiated; vectors are in scaled coordinates.
@@ -37,7 +39,7 @@ impl<S> Jets<S> {
 
 /// Buffers of one hidden layer, planes `(channel, jet, unit)`.
 #[derive(Clone, Debug, Default)]
-struct Layer<S> {
+struct JetPlanes<S> {
     /// Pre-activation tangents `z[s]`, `z[t]`, `z[st]`.
     z: Vec<S>,
     /// Activations `h`, `h[s]`, `h[t]`, `h[st]`.
@@ -52,13 +54,15 @@ struct Layer<S> {
 #[derive(Clone, Debug)]
 pub struct Adjoint<S> {
     phi: Vec<S>,
-    layers: Vec<Layer<S>>,
+    /// Hidden layers of each branch.
+    branches: Vec<Vec<JetPlanes<S>>>,
 }
 
 impl<S: Scalar> Adjoint<S> {
     /// A workspace for the networks that `chunk` evaluates.
     pub fn new(chunk: &Chunk<S>) -> Self {
-        Self { phi: Vec::new(), layers: vec![Layer::default(); chunk.hidden.len()] }
+        let branches = chunk.branches.iter().map(|planes| vec![JetPlanes::default(); planes.hidden.len()]).collect();
+        Self { phi: Vec::new(), branches }
     }
 
     /// Adds to `gradient` the derivative of `sum of L_st over jets` by every parameter.
@@ -69,19 +73,24 @@ impl<S: Scalar> Adjoint<S> {
             return;
         }
         self.fill_feature_planes(chunk, jets);
-        for l in 0..self.layers.len() {
-            self.forward_layer(chunk, weights, jets, l);
-        }
-        self.add_output_gradient(chunk, jets, gradient);
-        for l in (0..self.layers.len()).rev() {
-            self.reverse_layer(chunk, jets, l);
-            self.add_layer_gradient(chunk, weights, jets, l, gradient);
+        let branches = chunk.layout.branches.iter().zip(&chunk.branches);
+        for ((branch, planes), layers) in branches.zip(&mut self.branches) {
+            let (n, batch) = (chunk.architecture.coordinates, chunk.batch);
+            let sweep = Sweep { branch, hidden: &planes.hidden, phi: &self.phi, weights, jets, n, batch };
+            for l in 0..layers.len() {
+                sweep.forward_layer(layers, l);
+            }
+            sweep.add_output_gradient(layers, gradient);
+            for l in (0..layers.len()).rev() {
+                sweep.reverse_layer(layers, l);
+                sweep.add_layer_gradient(layers, l, gradient);
+            }
         }
     }
 
     /// Feature channels value, `s`, `t`, `st`.
     fn fill_feature_planes(&mut self, chunk: &Chunk<S>, jets: &Jets<S>) {
-        let (n, width) = (chunk.architecture.coordinates, chunk.layout.features());
+        let (n, width) = (chunk.architecture.coordinates, chunk.layout.features);
         let size = jets.state.len() * width;
         let zero = <S as Real>::zero();
         self.phi.resize(4 * size, zero);
@@ -97,36 +106,50 @@ impl<S: Scalar> Adjoint<S> {
             features.tangent(arch, state, |i| -drift(s, i), |_| zero, &mut self.phi[row(3)]);
         }
     }
+}
 
-    fn forward_layer(&mut self, chunk: &Chunk<S>, weights: &[S], jets: &Jets<S>, l: usize) {
+/// One branch of an evaluated chunk with the jets that start from its states.
+struct Sweep<'a, S> {
+    branch: &'a Branch,
+    hidden: &'a [Hidden<S>],
+    /// Feature channels `(4, jets, features)`.
+    phi: &'a [S],
+    weights: &'a [S],
+    jets: &'a Jets<S>,
+    n: usize,
+    batch: usize,
+}
+
+impl<S: Scalar> Sweep<'_, S> {
+    fn forward_layer(&self, layers: &mut [JetPlanes<S>], l: usize) {
+        let (jets, n, batch) = (self.jets, self.n, self.batch);
         let count = jets.state.len();
-        let layer = chunk.layout.layers[l];
-        let hidden = &chunk.hidden[l];
+        let layer = self.branch.layers[l];
+        let hidden = &self.hidden[l];
         let size = count * hidden.width;
-        let (before, after) = self.layers.split_at_mut(l);
-        let input = before.last().map_or(&self.phi, |previous| &previous.h);
+        let (before, after) = layers.split_at_mut(l);
+        let input = before.last().map_or(self.phi, |previous| &previous.h);
         let out = &mut after[0];
         let zero = <S as Real>::zero();
         out.z.resize(3 * size, zero);
         out.h.resize(4 * size, zero);
-        layer.apply(weights, count, plane(input, 3, count * layer.inputs), &mut out.z[2 * size..]);
-        let n = chunk.architecture.coordinates;
+        layer.apply(self.weights, count, plane(input, 3, count * layer.inputs), &mut out.z[2 * size..]);
         vectorized(
             #[inline(always)]
             || {
                 for (j, &state) in jets.state.iter().enumerate() {
                     let (s, t) = (&jets.s[j * n..][..n], &jets.t[j * n..][..n]);
-                    forward_row(hidden, chunk.batch, (j, state, count), (s, t, jets.moving), &mut out.z, &mut out.h);
+                    forward_row(hidden, batch, (j, state, count), (s, t, jets.moving), &mut out.z, &mut out.h);
                 }
             },
         );
     }
 
     /// The output layer is linear: its gradient is the sum of `h[st]`.
-    fn add_output_gradient(&self, chunk: &Chunk<S>, jets: &Jets<S>, gradient: &mut [S]) {
-        let output = chunk.layout.output_range();
-        let last = self.layers.last().map_or(&self.phi, |layer| &layer.h);
-        let mixed = plane(last, 3, jets.state.len() * output.len());
+    fn add_output_gradient(&self, layers: &[JetPlanes<S>], gradient: &mut [S]) {
+        let output = self.branch.output_range();
+        let last = layers.last().map_or(self.phi, |layer| &layer.h);
+        let mixed = plane(last, 3, self.jets.state.len() * output.len());
         vectorized(
             #[inline(always)]
             || add_rows(mixed, &mut gradient[output]),
@@ -134,17 +157,17 @@ impl<S: Scalar> Adjoint<S> {
     }
 
     /// Adjoints of a layer's pre-activations from those of its activations.
-    fn reverse_layer(&mut self, chunk: &Chunk<S>, jets: &Jets<S>, l: usize) {
-        let count = jets.state.len();
-        let is_last = l + 1 == self.layers.len();
-        let layer = &mut self.layers[l];
-        let hidden = &chunk.hidden[l];
+    fn reverse_layer(&self, layers: &mut [JetPlanes<S>], l: usize) {
+        let count = self.jets.state.len();
+        let is_last = l + 1 == layers.len();
+        let layer = &mut layers[l];
+        let hidden = &self.hidden[l];
         layer.z_adjoint.resize(4 * count * hidden.width, <S as Real>::zero());
         let above = if is_last { &[] } else { layer.h_adjoint.as_slice() };
         vectorized(
             #[inline(always)]
             || {
-                for (j, &state) in jets.state.iter().enumerate() {
+                for (j, &state) in self.jets.state.iter().enumerate() {
                     reverse_row(hidden, (j, state, count), &layer.z, above, &mut layer.z_adjoint);
                 }
             },
@@ -152,32 +175,24 @@ impl<S: Scalar> Adjoint<S> {
     }
 
     /// Weight and bias gradients of a layer, and the adjoints of the activations below it.
-    fn add_layer_gradient(&mut self, chunk: &Chunk<S>, weights: &[S], jets: &Jets<S>, l: usize, gradient: &mut [S]) {
-        let count = jets.state.len();
-        let shape = chunk.layout.layers[l];
-        let (before, after) = self.layers.split_at_mut(l);
+    fn add_layer_gradient(&self, layers: &mut [JetPlanes<S>], l: usize, gradient: &mut [S]) {
+        let count = self.jets.state.len();
+        let shape = self.branch.layers[l];
+        let (before, after) = layers.split_at_mut(l);
         let layer = &after[0];
-        let input = before.last().map_or(&self.phi, |previous| &previous.h);
+        let input = before.last().map_or(self.phi, |previous| &previous.h);
         shape.add_weight_gradient(4 * count, &layer.z_adjoint, input, gradient);
-        // A bias enters the value channel alone.
-        let value = plane(&layer.z_adjoint, 0, count * shape.outputs);
-        vectorized(
-            #[inline(always)]
-            || add_rows(value, &mut gradient[shape.bias_range()]),
-        );
+        if shape.bias.is_some() {
+            // A bias enters the value channel alone.
+            let value = plane(&layer.z_adjoint, 0, count * shape.outputs);
+            vectorized(
+                #[inline(always)]
+                || add_rows(value, &mut gradient[shape.bias_range()]),
+            );
+        }
         if let Some(previous) = before.last_mut() {
             previous.h_adjoint.resize(3 * count * shape.inputs, <S as Real>::zero());
-            shape.pull_back(weights, 3 * count, &layer.z_adjoint, &mut previous.h_adjoint);
-        }
-    }
-}
-
-/// Sum of the rows of a plane, added to `total`.
-#[inline(always)]
-fn add_rows<S: Scalar>(plane: &[S], total: &mut [S]) {
-    for row in plane.chunks_exact(total.len()) {
-        for (sum, &x) in total.iter_mut().zip(row) {
-            *sum += x;
+            shape.pull_back(self.weights, 3 * count, false, &layer.z_adjoint, &mut previous.h_adjoint);
         }
     }
 }

@@ -4,43 +4,14 @@
 //! `D2L[u, w] = sum over layers and units of A act''(z) z[u] z[w]`. `M` takes the directions `(0, e_i)`, `c` adds
 //! `(v, 0)`; `p` and `g` fall out of the reverse sweep. All numbers here are in scaled coordinates.
 //!
-//! Buffers are planes `(channel, state, unit)`, so that the channels of a layer lie side by side and one matrix product
-//! serves them all.
+//! The branches of a network add up: so do their values, adjoints of the features and second derivatives.
 
+use crate::network::branch::{BranchPlanes, Hidden};
+use crate::network::depth::Depth;
 use crate::network::features::FeatureBatch;
-use crate::network::{Architecture, Layout};
+use crate::network::planes::{dot, plane, resize};
+use crate::network::{Activation, Architecture, Layout};
 use crate::scalar::{Real, Scalar, vectorized};
-
-/// How far a chunk is evaluated; each step includes those before it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Depth {
-    /// `L`: one pass.
-    Value,
-    /// `p`, `g`: two passes.
-    Gradient,
-    /// `M`: `n + 2` passes.
-    MassMatrix,
-    /// `c`: `n + 3` passes.
-    Motion,
-    /// As `Motion`, keeping what the adjoint identity needs.
-    Training,
-}
-
-/// What a hidden layer leaves behind.
-#[derive(Clone, Debug)]
-pub(super) struct Hidden<S> {
-    pub(super) width: usize,
-    /// Pre-activations and their tangents `(channels, batch, width)`.
-    pub(super) z: Vec<S>,
-    /// Activations and their tangents `(channels, batch, width)`.
-    pub(super) h: Vec<S>,
-    /// First, second and third derivative of the activation `(batch, width)`.
-    pub(super) slope: [Vec<S>; 3],
-    /// `dL/dh`, `(batch, width)`.
-    pub(super) adjoint: Vec<S>,
-    /// `dL/dz`, `(batch, width)`.
-    pub(super) z_adjoint: Vec<S>,
-}
 
 /// A chunk of states and everything computed of it; buffers are reused from call to call.
 #[derive(Clone, Debug)]
@@ -52,7 +23,7 @@ pub struct Chunk<S> {
     /// Features and their tangents `(channels, batch, features)`.
     phi: Vec<S>,
     phi_adjoint: Vec<S>,
-    pub(super) hidden: Vec<Hidden<S>>,
+    pub(super) branches: Vec<BranchPlanes<S>>,
     row: [Vec<S>; 2],
     /// `L`, `(batch)`.
     pub lagrangian: Vec<S>,
@@ -66,32 +37,11 @@ pub struct Chunk<S> {
     pub coriolis: Vec<S>,
 }
 
-/// Plane `k` of a buffer of planes of `size` numbers.
-#[inline(always)]
-pub(super) fn plane<S>(planes: &[S], k: usize, size: usize) -> &[S] {
-    &planes[k * size..(k + 1) * size]
-}
-
-fn resize<S: Scalar>(buffer: &mut Vec<S>, length: usize) {
-    buffer.resize(length, <S as Real>::zero());
-}
-
 impl<S: Scalar> Chunk<S> {
     /// An empty chunk for networks of this shape.
     pub fn new(architecture: &Architecture) -> Self {
         let layout = Layout::new(architecture);
-        let hidden = layout
-            .hidden()
-            .iter()
-            .map(|layer| Hidden {
-                width: layer.outputs,
-                z: Vec::new(),
-                h: Vec::new(),
-                slope: Default::default(),
-                adjoint: Vec::new(),
-                z_adjoint: Vec::new(),
-            })
-            .collect();
+        let branches = layout.branches.iter().map(BranchPlanes::new).collect();
         Self {
             architecture: architecture.clone(),
             layout,
@@ -99,7 +49,7 @@ impl<S: Scalar> Chunk<S> {
             features: FeatureBatch::default(),
             phi: Vec::new(),
             phi_adjoint: Vec::new(),
-            hidden,
+            branches,
             row: Default::default(),
             lagrangian: Vec::new(),
             momentum: Vec::new(),
@@ -120,15 +70,11 @@ impl<S: Scalar> Chunk<S> {
     pub fn evaluate(&mut self, weights: &[S], q: &[S], v: &[S], depth: Depth) {
         self.batch = q.len() / self.architecture.coordinates;
         let n = self.architecture.coordinates;
-        let channels = match depth {
-            Depth::Value | Depth::Gradient => 1,
-            Depth::MassMatrix => 1 + n,
-            Depth::Motion | Depth::Training => 2 + n,
-        };
+        let channels = depth.channels(n);
         self.features.fill(&self.architecture, q, v);
         self.fill_feature_planes(channels);
-        for l in 0..self.hidden.len() {
-            self.forward_layer(weights, l, channels, depth);
+        for (branch, planes) in self.layout.branches.iter().zip(&mut self.branches) {
+            planes.forward(branch, weights, &self.phi, self.batch, channels, depth);
         }
         self.finish_value(weights);
         if depth >= Depth::Gradient {
@@ -137,7 +83,7 @@ impl<S: Scalar> Chunk<S> {
     }
 
     fn fill_feature_planes(&mut self, channels: usize) {
-        let (n, width) = (self.architecture.coordinates, self.layout.features());
+        let (n, width) = (self.architecture.coordinates, self.layout.features);
         let size = self.batch * width;
         let (zero, one) = (<S as Real>::zero(), <S as Real>::one());
         resize(&mut self.phi, channels * size);
@@ -161,69 +107,15 @@ impl<S: Scalar> Chunk<S> {
         }
     }
 
-    fn forward_layer(&mut self, weights: &[S], l: usize, channels: usize, depth: Depth) {
-        let layer = self.layout.layers[l];
-        let (before, after) = self.hidden.split_at_mut(l);
-        let input = before.last().map_or(&self.phi, |previous| &previous.h);
-        let hidden = &mut after[0];
-        let (rows, size) = (channels * self.batch, self.batch * hidden.width);
-        resize(&mut hidden.z, channels * size);
-        resize(&mut hidden.h, channels * size);
-        layer.apply(weights, rows, input, &mut hidden.z);
-        let bias = &weights[layer.bias_range()];
-        let (z, tangents) = hidden.z.split_at_mut(size);
-        vectorized(
-            #[inline(always)]
-            || add_to_rows(z, bias),
-        );
-        let (h, h_tangents) = hidden.h.split_at_mut(size);
-        let kept = match depth {
-            Depth::Value => 0,
-            Depth::Gradient => 1,
-            Depth::MassMatrix | Depth::Motion => 2,
-            Depth::Training => 3,
-        };
-        for slope in &mut hidden.slope[..kept] {
-            resize(slope, size);
-        }
-        let [d1, d2, d3] = &mut hidden.slope;
-        let activation = self.architecture.activation;
-        match kept {
-            0 => activation.value(z, h),
-            1 => activation.jet1(z, h, d1),
-            2 => activation.jet2(z, h, d1, d2),
-            _ => activation.jet3(z, h, d1, d2, d3),
-        }
-        // Nothing reads the activations' tangents of the last hidden layer: the output is linear.
-        if channels > 1 && l + 1 < self.layout.hidden().len() {
-            vectorized(
-                #[inline(always)]
-                || {
-                    for (h, z) in h_tangents.chunks_exact_mut(size).zip(tangents.chunks_exact(size)) {
-                        for ((h, &z), &d1) in h.iter_mut().zip(z).zip(&*d1) {
-                            *h = d1 * z;
-                        }
-                    }
-                },
-            );
-        }
-    }
-
-    /// `L = w.h + alpha |v/s|^2`.
+    /// `L = alpha |v/s|^2 + sum over branches of w.h`.
     fn finish_value(&mut self, weights: &[S]) {
         let n = self.architecture.coordinates;
         let alpha = S::of_f64(self.architecture.alpha);
-        let output = &weights[self.layout.output_range()];
-        let last = self.hidden.last().map_or(&self.phi, |hidden| &hidden.h);
         self.lagrangian.clear();
-        vectorized(
-            #[inline(always)]
-            || {
-                for (h, v) in last.chunks_exact(output.len()).zip(self.features.velocity.chunks_exact(n)) {
-                    self.lagrangian.push(dot(h, output) + alpha * dot(v, v));
-                }
-            },
-        );
+        self.lagrangian.extend(self.features.velocity.chunks_exact(n).map(|v| alpha * dot(v, v)));
+        for (branch, planes) in self.layout.branches.iter().zip(&self.branches) {
+            planes.add_value(branch, weights, &self.phi, &mut self.lagrangian);
+        }
     }
 
     fn reverse(&mut self, weights: &[S], channels: usize) {
@@ -238,51 +130,30 @@ impl<S: Scalar> Chunk<S> {
         if channels > n + 1 {
             self.coriolis.resize(batch * n, zero);
         }
-        resize(&mut self.phi_adjoint, batch * self.layout.features());
-        let output = &weights[self.layout.output_range()];
-        let seed = match self.hidden.last_mut() {
-            Some(last) => {
-                resize(&mut last.adjoint, batch * output.len());
-                &mut last.adjoint
+        self.phi_adjoint.clear();
+        self.phi_adjoint.resize(batch * self.layout.features, zero);
+        for (branch, planes) in self.layout.branches.iter().zip(&mut self.branches) {
+            planes.reverse(branch, weights, batch, &mut self.phi_adjoint);
+            if !has_mass {
+                continue;
             }
-            None => &mut self.phi_adjoint,
-        };
-        seed.chunks_exact_mut(output.len()).for_each(|row| row.copy_from_slice(output));
-        for l in (0..self.hidden.len()).rev() {
-            let layer = self.layout.layers[l];
-            let (before, after) = self.hidden.split_at_mut(l);
-            let hidden = &mut after[0];
-            if has_mass {
-                let (mass, coriolis) = (&mut self.mass_matrix, &mut self.coriolis);
-                vectorized(
-                    #[inline(always)]
-                    || add_second_derivatives(hidden, batch, n, &mut self.row, mass, coriolis),
-                );
-            }
-            resize(&mut hidden.z_adjoint, batch * hidden.width);
-            vectorized(
-                #[inline(always)]
-                || {
-                    for ((out, &a), &d1) in hidden.z_adjoint.iter_mut().zip(&hidden.adjoint).zip(&hidden.slope[0]) {
-                        *out = a * d1;
-                    }
-                },
-            );
-            let target = match before.last_mut() {
-                Some(previous) => {
-                    resize(&mut previous.adjoint, batch * layer.inputs);
-                    &mut previous.adjoint
+            for (layer, hidden) in branch.hidden().iter().zip(&planes.hidden).rev() {
+                // A linear layer has no curvature.
+                if layer.activation != Activation::Identity {
+                    let (mass, coriolis) = (&mut self.mass_matrix, &mut self.coriolis);
+                    vectorized(
+                        #[inline(always)]
+                        || add_second_derivatives(hidden, batch, n, &mut self.row, mass, coriolis),
+                    );
                 }
-                None => &mut self.phi_adjoint,
-            };
-            layer.pull_back(weights, batch, &hidden.z_adjoint, target);
+            }
         }
         self.finish_gradient(has_mass);
     }
 
     /// Pulls the adjoint of the features back to `p` and `g`; adds the terms of `alpha |v/s|^2`.
     fn finish_gradient(&mut self, has_mass: bool) {
-        let (n, width) = (self.architecture.coordinates, self.layout.features());
+        let (n, width) = (self.architecture.coordinates, self.layout.features);
         let twice_alpha = S::of_f64(2.0 * self.architecture.alpha);
         resize(&mut self.momentum, self.batch * n);
         resize(&mut self.dl_dq, self.batch * n);
@@ -299,16 +170,6 @@ impl<S: Scalar> Chunk<S> {
                     self.mass_matrix[(state * n + i) * n + i] += twice_alpha;
                 }
             }
-        }
-    }
-}
-
-/// Adds `bias` to every row of a plane.
-#[inline(always)]
-fn add_to_rows<S: Scalar>(plane: &mut [S], bias: &[S]) {
-    for row in plane.chunks_exact_mut(bias.len()) {
-        for (z, &b) in row.iter_mut().zip(bias) {
-            *z += b;
         }
     }
 }
@@ -350,30 +211,4 @@ fn add_second_derivatives<S: Scalar>(
             }
         }
     }
-}
-
-/// Dot product in independent partial sums of fixed order: vectorises, and errs less than a running sum.
-#[inline(always)]
-pub(super) fn dot<S: Scalar>(a: &[S], b: &[S]) -> S {
-    const LANES: usize = 16;
-    let zero = <S as Real>::zero();
-    let mut sums = [zero; LANES];
-    let (a_chunks, b_chunks) = (a.chunks_exact(LANES), b.chunks_exact(LANES));
-    let mut rest = zero;
-    for (&x, &y) in a_chunks.remainder().iter().zip(b_chunks.remainder()) {
-        rest += x * y;
-    }
-    for (a, b) in a_chunks.zip(b_chunks) {
-        for k in 0..LANES {
-            sums[k] += a[k] * b[k];
-        }
-    }
-    let mut width = LANES / 2;
-    while width > 0 {
-        for k in 0..width {
-            sums[k] += sums[k + width];
-        }
-        width /= 2;
-    }
-    sums[0] + rest
 }

@@ -1,6 +1,6 @@
 //! Shape of a network Lagrangian.
 
-use super::Activation;
+use super::Nonlinearity;
 use serde::{Deserialize, Serialize};
 
 /// Distribution of the initial weights.
@@ -13,6 +13,27 @@ pub enum Initialization {
     VariancePreserving,
     /// Normal, `v_i/sqrt(fan_in)` with `v_1 = 2.2`, `v_i = 0.58 i`, last `fan_in` (Cranmer et al. 2020); zero biases.
     Cranmer,
+    /// As `Default`, the output layer scaled by 0.01, so that `L` starts as `alpha |v|^2` (Liu et al. 2021).
+    NearZero,
+}
+
+/// What stands between the input features and the first dense layer.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum InputLayer {
+    /// Nothing.
+    #[default]
+    None,
+    /// Dynamic tanh, `gamma_i tanh(a x_i) + beta_i`, with learned `a`, initially 0.5, `gamma`, ones, and `beta`, zeros
+    /// (Zhu et al. 2025). Every branch has its own.
+    Dyt,
+}
+
+impl InputLayer {
+    /// Whether there is none.
+    pub fn is_none(&self) -> bool {
+        *self == Self::None
+    }
 }
 
 /// Everything that determines a network Lagrangian but its weights.
@@ -22,9 +43,10 @@ pub struct Architecture {
     /// Number of coordinates `n`.
     pub coordinates: usize,
     /// Widths of the hidden layers; the paper's "4 layers of 500" is `[500, 500, 500]` and a linear output without bias.
+    /// The branches of a hybrid share them equally.
     pub hidden: Vec<usize>,
     /// Activation of the hidden layers.
-    pub activation: Activation,
+    pub activation: Nonlinearity,
     /// Factor of the added `|v|^2` of scaled velocities; 0 leaves it out.
     pub alpha: f64,
     /// Scale `s_i` of each coordinate: the network sees `q_i/s_i`, `v_i/s_i`. Ones: no scaling.
@@ -33,4 +55,7 @@ pub struct Architecture {
     pub periodic: Vec<bool>,
     /// Feed `sin q_i`, `cos q_i` of the periodic coordinates instead of `q_i/s_i`.
     pub embed_periodic: bool,
+    /// What stands before the first dense layer; not written if there is nothing, which is what its absence means.
+    #[serde(default, skip_serializing_if = "InputLayer::is_none")]
+    pub input_layer: InputLayer,
 }

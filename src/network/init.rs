@@ -1,65 +1,100 @@
 //! Initial weights.
 
-use crate::network::{Architecture, Initialization, Layout};
+use crate::network::{Architecture, Initialization, Layer, Layout, LinearMap};
 use crate::scalar::{Real, Scalar};
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 
+/// Initial scale of the argument of a dynamic tanh (Zhu et al. 2025).
+const DYT_ALPHA: f64 = 0.5;
+
+/// Factor of the output weights under [`Initialization::NearZero`].
+const NEAR_ZERO: f64 = 0.01;
+
 /// Draws the flat parameters of a network; the same generator state gives the same weights in every precision.
 ///
-/// Linear gain 1 for the output layer under [`Initialization::VariancePreserving`].
+/// Every branch is drawn by itself, with its own widths and gains; the gain of a linear layer is 1. The parameters of
+/// an input layer are not random: `a = 0.5`, `gamma = 1`, `beta = 0`.
 pub fn initial_weights<S: Scalar>(architecture: &Architecture, kind: Initialization, rng: &mut impl Rng) -> Vec<S> {
     let layout = Layout::new(architecture);
     let mut weights = vec![<S as Real>::zero(); layout.parameters];
-    let last = layout.layers.len() - 1;
-    for (k, layer) in layout.layers.iter().enumerate() {
-        let fan_in = layer.inputs as f64;
-        let deviation = match kind {
-            Initialization::Default => {
-                let bound = fan_in.sqrt().recip();
-                for w in layer.weight_range().chain(layer.bias_range()) {
-                    weights[w] = S::of_f64(rng.random_range(-bound..=bound));
-                }
-                continue;
+    for branch in &layout.branches {
+        let dense = || branch.layers.iter().filter(|layer| layer.map == LinearMap::Dense);
+        let count = dense().count();
+        for (k, layer) in dense().enumerate() {
+            let place = if k + 1 == count { Place::Output } else { Place::Hidden(k) };
+            draw(layer, place, kind, rng, &mut weights);
+        }
+        for layer in &branch.layers {
+            match layer.map {
+                LinearMap::Dense => {}
+                LinearMap::Diagonal => weights[layer.weight_range()].fill(<S as Real>::one()),
+                LinearMap::Scalar => weights[layer.weight_range()].fill(S::of_f64(DYT_ALPHA)),
             }
-            Initialization::VariancePreserving if k == last => fan_in.sqrt().recip(),
-            Initialization::VariancePreserving => architecture.activation.variance_gain() / fan_in.sqrt(),
-            Initialization::Cranmer if k == last => fan_in.sqrt(),
-            Initialization::Cranmer if k == 0 => 2.2 / fan_in.sqrt(),
-            Initialization::Cranmer => 0.58 * k as f64 / fan_in.sqrt(),
-        };
-        for w in layer.weight_range() {
-            let normal: f64 = StandardNormal.sample(rng);
-            weights[w] = S::of_f64(deviation * normal);
         }
     }
     weights
 }
 
+/// Where a dense layer stands in its branch.
+#[derive(Clone, Copy, PartialEq)]
+enum Place {
+    /// Hidden layer, counted from 0.
+    Hidden(usize),
+    /// Linear output.
+    Output,
+}
+
+/// Draws the parameters of a dense layer; `weights` are flat over all parameters, and zero.
+fn draw<S: Scalar>(layer: &Layer, place: Place, kind: Initialization, rng: &mut impl Rng, weights: &mut [S]) {
+    let root = (layer.inputs as f64).sqrt();
+    let deviation = match (kind, place) {
+        (Initialization::Default | Initialization::NearZero, _) => {
+            let bound = root.recip();
+            let near_zero = kind == Initialization::NearZero && place == Place::Output;
+            let factor = if near_zero { NEAR_ZERO } else { 1.0 };
+            for w in layer.weight_range().chain(layer.bias_range()) {
+                weights[w] = S::of_f64(factor * rng.random_range(-bound..=bound));
+            }
+            return;
+        }
+        (Initialization::VariancePreserving, _) => layer.activation.variance_gain() / root,
+        (Initialization::Cranmer, Place::Hidden(0)) => 2.2 / root,
+        (Initialization::Cranmer, Place::Hidden(k)) => 0.58 * k as f64 / root,
+        (Initialization::Cranmer, Place::Output) => root,
+    };
+    for w in layer.weight_range() {
+        let normal: f64 = StandardNormal.sample(rng);
+        weights[w] = S::of_f64(deviation * normal);
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::network::Activation;
+    use crate::network::{Activation, InputLayer, Nonlinearity};
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
 
-    fn deviations(kind: Initialization) -> Vec<(f64, f64)> {
-        let architecture = Architecture {
+    fn architecture(activation: Nonlinearity) -> Architecture {
+        Architecture {
             coordinates: 2,
             hidden: vec![300, 200],
-            activation: Activation::Softplus,
+            activation,
             alpha: 0.0,
             scale: vec![1.0; 2],
             periodic: vec![false; 2],
             embed_periodic: false,
-        };
-        let weights: Vec<f64> = initial_weights(&architecture, kind, &mut ChaCha8Rng::seed_from_u64(1));
-        let deviation = |range: std::ops::Range<usize>| {
-            let count = range.len().max(1) as f64;
-            (weights[range].iter().map(|w| w * w).sum::<f64>() / count).sqrt()
-        };
-        let layout = Layout::new(&architecture);
-        layout.layers.iter().map(|l| (deviation(l.weight_range()), deviation(l.bias_range()))).collect()
+            input_layer: InputLayer::None,
+        }
+    }
+
+    fn drawn(architecture: &Architecture, kind: Initialization) -> Vec<f64> {
+        initial_weights(architecture, kind, &mut ChaCha8Rng::seed_from_u64(1))
+    }
+
+    fn root_mean_square(numbers: &[f64]) -> f64 {
+        (numbers.iter().map(|w| w * w).sum::<f64>() / numbers.len().max(1) as f64).sqrt()
     }
 
     /// Within four standard errors of a sample deviation over `count` weights.
@@ -67,27 +102,95 @@ mod tests {
         assert!((found / expected - 1.0).abs() < 4.0 / (2.0 * count as f64).sqrt(), "{found} for {expected}");
     }
 
+    /// Deviations of weights and biases of a single network and of both branches of a hybrid, against `expected(widths,
+    /// activation)`: weights and biases of every layer.
+    fn every_branch_follows(kind: Initialization, expected: impl Fn([f64; 3], Activation) -> [[f64; 2]; 3]) {
+        for choice in [Nonlinearity::Softplus, Nonlinearity::XTanh, Nonlinearity::QuadraticSoftplus] {
+            let architecture = architecture(choice);
+            let weights = drawn(&architecture, kind);
+            let branches = Layout::new(&architecture).branches;
+            assert_eq!(branches.len(), choice.branches().len());
+            for (branch, &activation) in branches.iter().zip(choice.branches()) {
+                let share = branches.len() as f64;
+                let expected = expected([4.0, 300.0 / share, 200.0 / share], activation);
+                assert_eq!(branch.layers.len(), 3);
+                for (layer, [weight, bias]) in branch.layers.iter().zip(expected) {
+                    let (range, biases) = (layer.weight_range(), layer.bias_range());
+                    near(root_mean_square(&weights[range.clone()]), weight, range.len());
+                    if bias == 0.0 {
+                        assert!(weights[biases].iter().all(|&b| b == 0.0));
+                    } else {
+                        near(root_mean_square(&weights[biases.clone()]), bias, biases.len());
+                    }
+                }
+            }
+        }
+    }
+
+    /// Deviation of numbers uniform within the inverse root of the fan-in.
+    fn uniform(fan_in: f64) -> f64 {
+        (3.0 * fan_in).sqrt().recip()
+    }
+
     #[test]
     fn default_weights_are_uniform_within_the_inverse_root_of_the_fan_in() {
-        let found = deviations(Initialization::Default);
-        for ((weights, biases), (fan_in, fan_out)) in found.into_iter().zip([(4, 300), (300, 200)]) {
-            near(weights, (3.0 * fan_in as f64).sqrt().recip(), fan_in * fan_out);
-            near(biases, (3.0 * fan_in as f64).sqrt().recip(), fan_out);
+        every_branch_follows(Initialization::Default, |n, _| {
+            [[uniform(n[0]); 2], [uniform(n[1]); 2], [uniform(n[2]), 0.0]]
+        });
+    }
+
+    #[test]
+    fn variance_preserving_weights_have_the_gain_of_their_own_activation() {
+        every_branch_follows(Initialization::VariancePreserving, |n, activation| {
+            let gain = activation.variance_gain();
+            [[gain / n[0].sqrt(), 0.0], [gain / n[1].sqrt(), 0.0], [n[2].sqrt().recip(), 0.0]]
+        });
+    }
+
+    #[test]
+    fn cranmer_weights_follow_their_formula() {
+        every_branch_follows(Initialization::Cranmer, |n, _| {
+            [[2.2 / n[0].sqrt(), 0.0], [0.58 / n[1].sqrt(), 0.0], [n[2].sqrt(), 0.0]]
+        });
+        let deeper = Architecture { hidden: vec![100; 4], ..architecture(Nonlinearity::Gelu) };
+        let weights = drawn(&deeper, Initialization::Cranmer);
+        let layer = Layout::new(&deeper).branches[0].layers[3];
+        near(root_mean_square(&weights[layer.weight_range()]), 0.58 * 3.0 / 10.0, 10_000);
+    }
+
+    #[test]
+    fn near_zero_weights_are_the_default_ones_with_a_small_output() {
+        for choice in [Nonlinearity::Gelu, Nonlinearity::QuadraticSoftplus] {
+            let architecture = Architecture { input_layer: InputLayer::Dyt, ..architecture(choice) };
+            let mut expected = drawn(&architecture, Initialization::Default);
+            for branch in Layout::new(&architecture).branches {
+                expected[branch.output_range()].iter_mut().for_each(|w| *w *= 0.01);
+            }
+            assert_eq!(drawn(&architecture, Initialization::NearZero), expected);
         }
     }
 
     #[test]
-    fn normal_schemes_follow_their_formulas_and_leave_biases_zero() {
-        let gain = Activation::Softplus.variance_gain();
-        let cases = [
-            (Initialization::VariancePreserving, [gain / 2.0, gain / 300.0_f64.sqrt(), 200.0_f64.sqrt().recip()]),
-            (Initialization::Cranmer, [1.1, 0.58 / 300.0_f64.sqrt(), 200.0_f64.sqrt()]),
-        ];
-        for (kind, expected) in cases {
-            let found = deviations(kind);
-            for ((&(weights, biases), expected), count) in found.iter().zip(expected).zip([1200, 60_000, 200]) {
-                near(weights, expected, count);
-                assert_eq!(biases, 0.0);
+    fn an_input_layer_starts_as_stated_and_draws_nothing() {
+        for choice in [Nonlinearity::Gelu, Nonlinearity::QuadraticSoftplus] {
+            let plain = architecture(choice);
+            let dyt = Architecture { input_layer: InputLayer::Dyt, ..plain.clone() };
+            for kind in [
+                Initialization::Default,
+                Initialization::VariancePreserving,
+                Initialization::Cranmer,
+                Initialization::NearZero,
+            ] {
+                let (with, without) = (drawn(&dyt, kind), drawn(&plain, kind));
+                let mut rest = without.as_slice();
+                for branch in Layout::new(&dyt).branches {
+                    let start = branch.layers[0].weight;
+                    assert_eq!(with[start..start + 9], [0.5, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0]);
+                    let own;
+                    (own, rest) = rest.split_at(branch.output_range().end - start - 9);
+                    assert_eq!(with[start + 9..branch.output_range().end], *own);
+                }
+                assert!(rest.is_empty());
             }
         }
     }

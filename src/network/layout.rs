@@ -1,69 +1,132 @@
-//! Where the weights of a network sit in its flat parameter vector.
+//! Where the parameters of a network sit in its flat vector: a sum of branches, each a chain of layers.
 
-use crate::network::Architecture;
+use crate::network::{Activation, Architecture, InputLayer};
+use std::ops::Range;
 
-/// One affine map `z = W h + b`.
+/// How the weights `W` of a layer act on its inputs `x`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LinearMap {
+    /// `W x`, `W` of shape `(outputs, inputs)` row-major.
+    Dense,
+    /// `gamma_i x_i`, one weight per unit.
+    Diagonal,
+    /// `a x_i`, one weight for all units.
+    Scalar,
+}
+
+/// One layer `h = act(W x + b)`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Layer {
+    /// Kind of the linear map.
+    pub map: LinearMap,
+    /// What follows the affine map, elementwise.
+    pub activation: Activation,
     /// Numbers in.
     pub inputs: usize,
-    /// Numbers out.
+    /// Numbers out; as many as go in unless the map is dense.
     pub outputs: usize,
-    /// Offset of `W`, `(outputs, inputs)` row-major.
+    /// Offset of `W`.
     pub weight: usize,
     /// Offset of `b`, `(outputs)`; the output layer has none (a constant in `L` moves nothing).
     pub bias: Option<usize>,
 }
 
 impl Layer {
-    /// Range of the weight matrix.
-    pub fn weight_range(&self) -> std::ops::Range<usize> {
-        self.weight..self.weight + self.inputs * self.outputs
+    /// Range of the weights.
+    pub fn weight_range(&self) -> Range<usize> {
+        let count = match self.map {
+            LinearMap::Dense => self.inputs * self.outputs,
+            LinearMap::Diagonal => self.outputs,
+            LinearMap::Scalar => 1,
+        };
+        self.weight..self.weight + count
     }
     /// Range of the bias, empty if there is none.
-    pub fn bias_range(&self) -> std::ops::Range<usize> {
+    pub fn bias_range(&self) -> Range<usize> {
         self.bias.map_or(0..0, |start| start..start + self.outputs)
     }
 }
 
-/// The affine maps of a network in order, the last one linear with one output.
+/// A chain of layers, the last one dense and linear with one output.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Layout {
-    /// Affine maps, input to output.
+pub struct Branch {
+    /// Layers, input to output.
     pub layers: Vec<Layer>,
-    /// Length of the flat parameter vector.
-    pub parameters: usize,
-    /// Input features made of coordinates.
-    pub position_features: usize,
 }
 
-impl Layout {
-    /// Layout of an architecture.
-    pub fn new(architecture: &Architecture) -> Self {
-        let position_features = architecture.position_features();
-        let mut layers = Vec::with_capacity(architecture.hidden.len() + 1);
-        let mut inputs = position_features + architecture.coordinates;
-        let mut offset = 0;
-        for &outputs in &architecture.hidden {
-            let bias = offset + inputs * outputs;
-            layers.push(Layer { inputs, outputs, weight: offset, bias: Some(bias) });
-            offset = bias + outputs;
-            inputs = outputs;
-        }
-        layers.push(Layer { inputs, outputs: 1, weight: offset, bias: None });
-        Self { layers, parameters: offset + inputs, position_features }
-    }
-
-    /// Input features: those of the coordinates, then one per velocity.
-    pub fn features(&self) -> usize {
-        self.layers[0].inputs
-    }
-    /// Hidden layers, all but the last affine map.
+impl Branch {
+    /// All layers but the output.
     pub fn hidden(&self) -> &[Layer] {
         &self.layers[..self.layers.len() - 1]
     }
     /// Weights of the linear output.
-    pub fn output_range(&self) -> std::ops::Range<usize> {
+    pub fn output_range(&self) -> Range<usize> {
         self.layers[self.layers.len() - 1].weight_range()
+    }
+}
+
+/// The branches of a network, whose outputs add up, one after the other in the flat parameter vector.
+///
+/// Every layer holds its weights, then its biases.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Layout {
+    /// Branches; all start from the input features.
+    pub branches: Vec<Branch>,
+    /// Length of the flat parameter vector.
+    pub parameters: usize,
+    /// Input features made of coordinates.
+    pub position_features: usize,
+    /// Input features: those of the coordinates, then one per velocity.
+    pub features: usize,
+}
+
+impl Layout {
+    /// Layout of an architecture: one branch per activation of its nonlinearity, each with an equal share of the widths
+    /// and an input layer of its own.
+    pub fn new(architecture: &Architecture) -> Self {
+        let position_features = architecture.position_features();
+        let features = position_features + architecture.coordinates;
+        let activations = architecture.activation.branches();
+        let mut parameters = 0;
+        let mut branches = Vec::with_capacity(activations.len());
+        for &activation in activations {
+            let mut chain = Chain { layers: Vec::new(), width: features, offset: parameters };
+            match architecture.input_layer {
+                InputLayer::None => {}
+                InputLayer::Dyt => {
+                    chain.push(LinearMap::Scalar, Activation::Tanh, features, false);
+                    chain.push(LinearMap::Diagonal, Activation::Identity, features, true);
+                }
+            }
+            for &width in &architecture.hidden {
+                chain.push(LinearMap::Dense, activation, width / activations.len(), true);
+            }
+            chain.push(LinearMap::Dense, Activation::Identity, 1, false);
+            parameters = chain.offset;
+            branches.push(Branch { layers: chain.layers });
+        }
+        Self { branches, parameters, position_features, features }
+    }
+}
+
+/// A branch in the making.
+struct Chain {
+    layers: Vec<Layer>,
+    /// Outputs of the last layer.
+    width: usize,
+    /// End of its parameters.
+    offset: usize,
+}
+
+impl Chain {
+    fn push(&mut self, map: LinearMap, activation: Activation, outputs: usize, has_bias: bool) {
+        let mut layer = Layer { map, activation, inputs: self.width, outputs, weight: self.offset, bias: None };
+        self.offset = layer.weight_range().end;
+        if has_bias {
+            layer.bias = Some(self.offset);
+            self.offset += outputs;
+        }
+        self.width = outputs;
+        self.layers.push(layer);
     }
 }

@@ -1,21 +1,27 @@
-//! The network Lagrangian: a multilayer perceptron as `L(q, v)`, evaluated in batches.
+//! The network Lagrangian: a sum of multilayer perceptrons as `L(q, v)`, evaluated in batches.
 
 mod activation;
 mod adjoint;
 mod affine;
+mod branch;
 mod chunk;
 mod config;
+mod depth;
 mod features;
 pub mod file;
 mod init;
 mod layout;
 mod model;
+mod nonlinearity;
+mod planes;
 mod reference;
 
-pub use activation::{Activation, UnknownActivation};
+pub use activation::Activation;
 pub use adjoint::{Adjoint, Jets};
-pub use chunk::{Chunk, Depth};
-pub use config::{Architecture, Initialization};
+pub use chunk::Chunk;
+pub use config::{Architecture, Initialization, InputLayer};
+pub use depth::Depth;
 pub use init::initial_weights;
-pub use layout::{Layer, Layout};
+pub use layout::{Branch, Layer, Layout, LinearMap};
 pub use model::{NetworkError, NetworkLagrangian};
+pub use nonlinearity::{Nonlinearity, UnknownNonlinearity};

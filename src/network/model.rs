@@ -60,6 +60,11 @@ impl Architecture {
         if self.hidden.is_empty() || self.hidden.contains(&0) {
             return fault(format!("expected hidden layers of positive width, found {:?}", self.hidden));
         }
+        let branches = self.activation.branches().len();
+        if let Some(width) = self.hidden.iter().find(|w| !w.is_multiple_of(branches)) {
+            let name = self.activation;
+            return fault(format!("expected widths that {name} can cut into {branches} equal parts, found {width}"));
+        }
         if self.periodic.len() != n || self.scale.len() != n {
             let (scales, flags) = (self.scale.len(), self.periodic.len());
             return fault(format!("expected {n} scales and periodic flags, found {scales} and {flags}"));

@@ -1,6 +1,6 @@
 //! Everything that determines a training run; written beside every model as `config.toml`.
 
-use crate::network::{Activation, Initialization};
+use crate::network::{Initialization, InputLayer, Nonlinearity};
 use crate::training::optimizer::Method;
 use crate::training::penalty::Regularizer;
 use crate::training::schedule::Schedule;
@@ -98,16 +98,19 @@ pub struct Data {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Network {
-    /// Widths of the hidden layers.
+    /// Widths of the hidden layers; the branches of a hybrid share them equally.
     pub hidden: Vec<usize>,
     /// Activation of the hidden layers.
-    pub activation: Activation,
+    pub activation: Nonlinearity,
     /// Factor of the added `|v|^2` of scaled velocities.
     pub alpha: f64,
     /// Scaling of the coordinates.
     pub scaling: Scaling,
     /// Feed sine and cosine of periodic coordinates.
     pub embed_periodic: bool,
+    /// What stands before the first dense layer.
+    #[serde(default)]
+    pub input_layer: InputLayer,
     /// Distribution of the initial weights.
     pub initialization: Initialization,
 }
@@ -189,7 +192,15 @@ impl Config {
             format!("{}", hidden.len()),
         )?;
         for (k, &width) in hidden.iter().enumerate() {
-            count(width, &format!("network.hidden[{k}]"), 1 << 16)?;
+            let field = format!("network.hidden[{k}]");
+            count(width, &field, 1 << 16)?;
+            let ok = width.is_multiple_of(self.network.activation.branches().len());
+            check(
+                ok,
+                &field,
+                "an even width, for quadratic-softplus is two networks of half the width",
+                width.to_string(),
+            )?;
         }
         let finite = "a finite number";
         fraction(self.network.alpha, "network.alpha", self.network.alpha.is_finite(), finite)?;

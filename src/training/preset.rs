@@ -2,7 +2,7 @@
 
 use crate::lagrangian::Configured;
 use crate::lagrangian::system::Bounds;
-use crate::network::{Activation, Initialization};
+use crate::network::{Initialization, InputLayer, Nonlinearity};
 use crate::training::config::{Config, Data, Network, OnFailure, Optimizer, Phase, Precision, Scaling};
 use crate::training::optimizer::Method;
 use crate::training::penalty::Regularizer;
@@ -65,10 +65,11 @@ fn base(system: &Configured<f64>, states: usize, network: Network) -> Config {
 fn quick(system: &Configured<f64>) -> Config {
     let network = Network {
         hidden: vec![128; 3],
-        activation: Activation::Gelu,
+        activation: Nonlinearity::Gelu,
         alpha: 1.0,
         scaling: Scaling::Physical,
         embed_periodic: true,
+        input_layer: InputLayer::None,
         initialization: Initialization::Default,
     };
     let n = system.coordinates;
@@ -105,10 +106,11 @@ fn paper(system: &Configured<f64>) -> Option<Config> {
     };
     let network = Network {
         hidden,
-        activation: Activation::Gelu,
+        activation: Nonlinearity::Gelu,
         alpha: 1.0,
         scaling: Scaling::Physical,
         embed_periodic: false,
+        input_layer: InputLayer::None,
         initialization: Initialization::Default,
     };
     let bounds: Bounds = (system.system.training)(n);

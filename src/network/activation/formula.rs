@@ -121,3 +121,10 @@ pub(super) fn quadratic<S: Scalar>(x: S) -> Jet<S> {
     let zero = constant(0.0);
     [x * x, constant::<S>(2.0) * x, constant(2.0), zero, zero]
 }
+
+/// `x`.
+#[inline(always)]
+pub(super) fn identity<S: Scalar>(x: S) -> Jet<S> {
+    let zero = constant(0.0);
+    [x, constant(1.0), zero, zero, zero]
+}

@@ -13,6 +13,7 @@ macro_rules! each_activation {
             Activation::XTanh => each_activation!(@one x_tanh, $formula => $body),
             Activation::Tanh => each_activation!(@one tanh, $formula => $body),
             Activation::Quadratic => each_activation!(@one quadratic, $formula => $body),
+            Activation::Identity => each_activation!(@one identity, $formula => $body),
         }
     };
     (@one $name:ident, $formula:ident => $body:expr) => {{

@@ -5,11 +5,9 @@ mod gain;
 mod jets;
 
 use crate::scalar::Real;
-use serde::{Deserialize, Serialize};
 
-/// Activation function of the hidden layers.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+/// Elementwise function that ends a layer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Activation {
     /// `x Phi(x)`, exact (error function).
     Gelu,
@@ -21,11 +19,13 @@ pub enum Activation {
     Tanh,
     /// `x^2`.
     Quadratic,
+    /// `x`, of linear layers.
+    Identity,
 }
 
 impl Activation {
     /// Every activation.
-    pub const ALL: [Self; 5] = [Self::Gelu, Self::Softplus, Self::XTanh, Self::Tanh, Self::Quadratic];
+    pub const ALL: [Self; 6] = [Self::Gelu, Self::Softplus, Self::XTanh, Self::Tanh, Self::Quadratic, Self::Identity];
 
     /// The activation of any kind of real number: the reference that nested derivatives go through.
     pub fn apply<R: Real>(self, x: R) -> R {
@@ -38,10 +38,11 @@ impl Activation {
             Self::XTanh => x * (x * R::half()).tanh(),
             Self::Tanh => x.tanh(),
             Self::Quadratic => x.sqr(),
+            Self::Identity => x,
         }
     }
 
-    /// The name in configuration files.
+    /// The name, as in configuration files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Gelu => "gelu",
@@ -49,6 +50,7 @@ impl Activation {
             Self::XTanh => "x-tanh",
             Self::Tanh => "tanh",
             Self::Quadratic => "quadratic",
+            Self::Identity => "identity",
         }
     }
 }
@@ -56,19 +58,6 @@ impl Activation {
 impl std::fmt::Display for Activation {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.pad(self.name())
-    }
-}
-
-/// A text that names no activation.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("unknown activation `{0}`; known are gelu, softplus, x-tanh, tanh, quadratic")]
-pub struct UnknownActivation(pub String);
-
-impl std::str::FromStr for Activation {
-    type Err = UnknownActivation;
-
-    fn from_str(text: &str) -> Result<Self, UnknownActivation> {
-        Self::ALL.into_iter().find(|a| a.name() == text).ok_or_else(|| UnknownActivation(text.to_owned()))
     }
 }
 

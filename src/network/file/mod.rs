@@ -1,9 +1,14 @@
 //! Model files: a network with everything needed to rebuild it, in one safetensors file.
 //!
 //! Tensors are `layers.K.weight`, shape `(out, in)` row-major, and `layers.K.bias`, shape `(out)`, `K` from 0; the last
-//! layer is linear, has one output and no bias. Numbers are `f32` or `f64`, all of one type. The inputs of layer 0 are,
+//! layer is linear, has one output and no bias. Numbers are `f32` or `f64`, all of one type. The input features are,
 //! for every coordinate in order, `sin q_i` and `cos q_i` if the coordinate is periodic and embedded and `q_i/s_i` if it
-//! is not, then `v_i/s_i` for every velocity. The network's output plus `alpha |v/s|^2` is the Lagrangian.
+//! is not, then `v_i/s_i` for every velocity. They are the inputs of layer 0; with the input layer `dyt` those are
+//! `gamma_i tanh(alpha x_i) + beta_i` of the features `x_i`, with the tensors `dyt.alpha`, shape `(1)`, `dyt.gamma` and
+//! `dyt.beta`, shape `(features)`. The network's output plus `alpha |v/s|^2` is the Lagrangian (`alpha` of the header).
+//!
+//! The activation `quadratic-softplus` has two such networks, whose outputs add up, with half the widths each: names
+//! start with `branches.0.` (softplus) and `branches.1.` (quadratic).
 //!
 //! The metadata has the one key `lnn`, a JSON object with the fields of [`Header`] and `checksum`: eight hexadecimal
 //! digits, the CRC-32 (IEEE) of that JSON text up to the comma before `"checksum"`, followed by the bytes of the tensors.
@@ -18,7 +23,7 @@ mod tests;
 pub use error::ModelFileError;
 pub use header::{FORMAT, Header, StoredPrecision};
 
-use crate::network::{Architecture, Layout};
+use crate::network::{Architecture, Layout, LinearMap};
 use crate::scalar::Scalar;
 use crate::storage::{read_regular, write_atomically};
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
@@ -37,7 +42,7 @@ const KEY: &str = "lnn";
 
 /// A network: its description and its flat parameter vector.
 ///
-/// The vector is laid out by [`Layout`]: for every layer the weights `(out, in)` row-major, then the biases.
+/// The vector is laid out by [`Layout`]: branch by branch, for every layer the weights, then the biases.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModelFile<S> {
     /// Everything but the weights.
@@ -214,9 +219,11 @@ fn read_header(text: &str, payload: &[u8]) -> Result<Header, ModelFileError> {
 
 /// The tensors of an architecture in the order of the flat vector.
 fn slots(architecture: &Architecture) -> Result<Vec<Slot>, ModelFileError> {
-    // Shapes are only claims until they are compared with the file: multiply them out without overflow first.
-    let mut inputs = Some(2 * architecture.coordinates + architecture.coordinates);
-    let mut total = Some(0usize);
+    // Shapes are only claims until they are compared with the file: multiply them out without overflow first. The
+    // branches of a hybrid share the widths and have no more weights than one network.
+    let features = 3 * architecture.coordinates;
+    let mut inputs = Some(features);
+    let mut total = Some(architecture.activation.branches().len() * (1 + 2 * features));
     for &outputs in architecture.hidden.iter().chain(&[1]) {
         let layer = inputs.and_then(|i| i.checked_add(1)).and_then(|i| i.checked_mul(outputs));
         total = total.zip(layer).and_then(|(a, b)| a.checked_add(b));
@@ -225,13 +232,26 @@ fn slots(architecture: &Architecture) -> Result<Vec<Slot>, ModelFileError> {
     if total.is_none_or(|total| total as u64 > MAX_BYTES) {
         return Err(ModelFileError::Header("hidden: more weights than a file may hold".to_string()));
     }
+    let layout = Layout::new(architecture);
     let mut slots = Vec::new();
-    for (k, layer) in Layout::new(architecture).layers.iter().enumerate() {
-        let shape = vec![layer.outputs, layer.inputs];
-        slots.push(Slot { name: format!("layers.{k}.weight"), shape, range: layer.weight_range() });
-        if layer.bias.is_some() {
-            let shape = vec![layer.outputs];
-            slots.push(Slot { name: format!("layers.{k}.bias"), shape, range: layer.bias_range() });
+    for (b, branch) in layout.branches.iter().enumerate() {
+        let prefix = if layout.branches.len() > 1 { format!("branches.{b}.") } else { String::new() };
+        let mut dense = 0;
+        for layer in &branch.layers {
+            let (weight, shape, bias) = match layer.map {
+                LinearMap::Scalar => ("dyt.alpha".to_string(), vec![1], String::new()),
+                LinearMap::Diagonal => ("dyt.gamma".to_string(), vec![layer.outputs], "dyt.beta".to_string()),
+                LinearMap::Dense => {
+                    dense += 1;
+                    let name = |part: &str| format!("layers.{}.{part}", dense - 1);
+                    (name("weight"), vec![layer.outputs, layer.inputs], name("bias"))
+                }
+            };
+            slots.push(Slot { name: format!("{prefix}{weight}"), shape, range: layer.weight_range() });
+            if layer.bias.is_some() {
+                let (name, shape) = (format!("{prefix}{bias}"), vec![layer.outputs]);
+                slots.push(Slot { name, shape, range: layer.bias_range() });
+            }
         }
     }
     Ok(slots)

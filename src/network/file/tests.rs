@@ -1,7 +1,7 @@
 //! Round trips, damage and foreign files.
 
 use super::*;
-use crate::network::Activation;
+use crate::network::{InputLayer, Nonlinearity};
 use proptest::prelude::*;
 use std::collections::BTreeMap;
 
@@ -12,11 +12,12 @@ fn header(hidden: Vec<usize>, embed_periodic: bool, precision: StoredPrecision) 
         architecture: Architecture {
             coordinates: 2,
             hidden,
-            activation: Activation::Gelu,
+            activation: Nonlinearity::Gelu,
             alpha: 0.1,
             scale: vec![0.1 + 0.2, 10.0 / 3.0],
             periodic: vec![true, false],
             embed_periodic,
+            input_layer: InputLayer::None,
         },
         system: "spring-pendulum".to_string(),
         parameters: BTreeMap::from([("m".to_string(), 1.0), ("g".to_string(), 9.81)]),
@@ -30,7 +31,26 @@ fn header(hidden: Vec<usize>, embed_periodic: bool, precision: StoredPrecision) 
 }
 
 fn model(hidden: Vec<usize>, precision: StoredPrecision) -> ModelFile<f64> {
-    let header = header(hidden, true, precision);
+    with_numbers(header(hidden, true, precision))
+}
+
+/// One or two branches, with and without an input layer, in both precisions.
+fn every_kind(hidden: &[usize]) -> Vec<ModelFile<f64>> {
+    let mut models = Vec::new();
+    for precision in [StoredPrecision::F32, StoredPrecision::F64] {
+        for activation in [Nonlinearity::Gelu, Nonlinearity::QuadraticSoftplus] {
+            for input_layer in [InputLayer::None, InputLayer::Dyt] {
+                let mut header = header(hidden.to_vec(), true, precision);
+                header.architecture.activation = activation;
+                header.architecture.input_layer = input_layer;
+                models.push(with_numbers(header));
+            }
+        }
+    }
+    models
+}
+
+fn with_numbers(header: Header) -> ModelFile<f64> {
     let count = Layout::new(&header.architecture).parameters;
     let weights = (0..count).map(|k| f64::from((k as f32 * 0.37).sin())).collect();
     ModelFile { header, weights }
@@ -68,8 +88,7 @@ fn refusal(bytes: &[u8]) -> ModelFileError {
 fn saves_and_loads_the_same_bytes() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("model.safetensors");
-    for precision in [StoredPrecision::F32, StoredPrecision::F64] {
-        let model = model(vec![3, 4], precision);
+    for model in every_kind(&[6, 4]) {
         model.save(&path).unwrap();
         let loaded = ModelFile::<f64>::load(&path).unwrap();
         assert_eq!(loaded, model);
@@ -82,26 +101,56 @@ fn saves_and_loads_the_same_bytes() {
     assert_eq!(std::fs::read_dir(&directory).unwrap().count(), 1);
 }
 
+/// The same tensors once per branch of a hybrid.
+fn in_both_branches(tensors: Vec<(String, Vec<usize>)>) -> Vec<(String, Vec<usize>)> {
+    let branch = |b: usize| tensors.iter().map(move |(name, shape)| (format!("branches.{b}.{name}"), shape.clone()));
+    branch(0).chain(branch(1)).collect()
+}
+
+/// Format 1 was first written without the field `input_layer`: a model without one is still written so.
+#[test]
+fn files_from_before_the_input_layer_load_and_keep_their_bytes() {
+    let plain = model(vec![2], StoredPrecision::F64);
+    let text = serde_json::to_string(&plain.header.architecture).unwrap();
+    let expected = concat!(
+        r#"{"coordinates":2,"hidden":[2],"activation":"gelu","alpha":0.1,"#,
+        r#""scale":[0.30000000000000004,3.3333333333333335],"periodic":[true,false],"embed_periodic":true}"#
+    );
+    assert_eq!(text, expected);
+    let bytes = plain.to_bytes().unwrap();
+    let loaded = ModelFile::<f64>::from_bytes(&bytes).unwrap();
+    assert_eq!(loaded.header.architecture.input_layer, InputLayer::None);
+    assert_eq!(loaded.to_bytes().unwrap(), bytes);
+}
+
 #[test]
 fn tensors_have_the_documented_names_and_shapes() {
-    let bytes = model(vec![3, 4], StoredPrecision::F32).to_bytes().unwrap();
-    let file = SafeTensors::deserialize(&bytes).unwrap();
-    let mut shapes: Vec<_> = file.iter().map(|(name, t)| (name, t.shape().to_vec())).collect();
-    shapes.sort();
+    let dense = |widths: [usize; 2]| {
+        let [a, b] = widths;
+        let shapes = [vec![a], vec![a, 5], vec![b], vec![b, a], vec![1, b]];
+        let names = ["layers.0.bias", "layers.0.weight", "layers.1.bias", "layers.1.weight", "layers.2.weight"];
+        names.map(String::from).into_iter().zip(shapes).collect::<Vec<_>>()
+    };
+    let dyt = || ["dyt.alpha", "dyt.beta", "dyt.gamma"].map(String::from).into_iter().zip([vec![1], vec![5], vec![5]]);
     let expected = [
-        ("layers.0.bias", vec![3]),
-        ("layers.0.weight", vec![3, 5]),
-        ("layers.1.bias", vec![4]),
-        ("layers.1.weight", vec![4, 3]),
-        ("layers.2.weight", vec![1, 4]),
+        dense([6, 4]),
+        dyt().chain(dense([6, 4])).collect(),
+        in_both_branches(dense([3, 2])),
+        in_both_branches(dyt().chain(dense([3, 2])).collect()),
     ];
-    assert_eq!(shapes, expected);
+    for (model, expected) in every_kind(&[6, 4]).into_iter().zip(expected.iter().cycle()) {
+        let bytes = model.to_bytes().unwrap();
+        let file = SafeTensors::deserialize(&bytes).unwrap();
+        let mut shapes: Vec<_> = file.iter().map(|(name, t)| (name.to_string(), t.shape().to_vec())).collect();
+        shapes.sort();
+        assert_eq!(shapes, *expected);
+    }
 }
 
 #[test]
 fn every_prefix_and_every_flipped_bit_is_refused() {
-    for precision in [StoredPrecision::F32, StoredPrecision::F64] {
-        let bytes = model(vec![2], precision).to_bytes().unwrap();
+    for model in every_kind(&[2]) {
+        let bytes = model.to_bytes().unwrap();
         for length in 0..bytes.len() {
             assert!(ModelFile::<f64>::from_bytes(&bytes[..length]).is_err(), "prefix of {length} bytes");
         }
@@ -157,6 +206,12 @@ fn tensors_that_do_not_fit_are_named() {
     assert!(matches!(refusal(&extra), ModelFileError::ExtraTensor(name) if name == "layers.9.bias"));
     let turned = rebuilt(&bytes, |_, tensors| tensors[1].2.reverse());
     assert_eq!(refusal(&turned).to_string(), "tensor layers.0.weight: expected shape [2, 5], found [5, 2]");
+    let untold = rebuilt(&bytes, |body, _| {
+        *body = body.replace("\"embed_periodic\":true", "\"embed_periodic\":true,\"input_layer\":\"dyt\"");
+    });
+    assert!(matches!(refusal(&untold), ModelFileError::MissingTensor(name) if name == "dyt.alpha"));
+    let hybrid = rebuilt(&bytes, |body, _| *body = body.replace("\"gelu\"", "\"quadratic-softplus\""));
+    assert!(matches!(refusal(&hybrid), ModelFileError::ExtraTensor(name) if name == "layers.0.bias"));
     let integers = rebuilt(&bytes, |_, tensors| tensors[0].1 = Dtype::I64);
     assert_eq!(refusal(&integers).to_string(), "tensor layers.0.bias: expected f64, found i64");
     for bad in [f64::NAN, f64::INFINITY] {
@@ -173,6 +228,10 @@ fn claims_of_the_description_are_checked() {
         ("\"hidden\":[2]", "\"hidden\":[0]"),
         ("\"hidden\":[2]", "\"hidden\":[18446744073709551615]"),
         ("\"hidden\":[2]", "\"hidden\":[1048576,1048576,1048576]"),
+        ("\"hidden\":[2],\"activation\":\"gelu\"", "\"hidden\":[3],\"activation\":\"quadratic-softplus\""),
+        ("\"hidden\":[2],\"activation\":\"gelu\"", "\"hidden\":[1],\"activation\":\"quadratic-softplus\""),
+        ("\"activation\":\"gelu\"", "\"activation\":\"identity\""),
+        ("\"embed_periodic\":true", "\"embed_periodic\":true,\"input_layer\":\"layer-norm\""),
         ("\"coordinates\":2", "\"coordinates\":1099511627776"),
         ("\"coordinates\":2", "\"coordinates\":0"),
         ("\"periodic\":[true,false]", "\"periodic\":[true]"),
@@ -214,11 +273,16 @@ proptest! {
     fn random_models_survive(
         hidden in prop::collection::vec(1usize..6, 1..4),
         embed in any::<bool>(),
+        activation in prop::sample::select(&Nonlinearity::ALL[..]),
+        input_layer in prop::sample::select(vec![InputLayer::None, InputLayer::Dyt]),
         seed in any::<u64>(),
         scale in prop::array::uniform2(f64::MIN_POSITIVE..1e300),
         numbers in prop::collection::vec(prop::num::f64::NORMAL | prop::num::f64::SUBNORMAL | prop::num::f64::ZERO, 200),
     ) {
+        let hidden = hidden.into_iter().map(|w| w * activation.branches().len()).collect();
         let mut header = header(hidden, embed, StoredPrecision::F64);
+        header.architecture.activation = activation;
+        header.architecture.input_layer = input_layer;
         header.seed = seed;
         header.architecture.scale = scale.to_vec();
         let count = Layout::new(&header.architecture).parameters;
