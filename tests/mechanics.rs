@@ -107,9 +107,15 @@ fn double_double_agrees_with_an_independent_table() {
         let index: usize = field[3].parse().unwrap();
         let expected = Dd::new(field[4].parse().unwrap(), field[5].parse().unwrap());
         let scale = largest(values) * if field[2] == "acceleration" { kappa } else { 1.0 };
-        let mut error = (values[index] - expected).to_f64().abs() / scale;
+        let mut error = (values[index] - expected).to_f64().abs();
         if field[2] == "acceleration" {
-            error = error.max((exact[index] - expected).to_f64().abs() / scale);
+            error = error.max((exact[index] - expected).to_f64().abs());
+        }
+        if scale > 0.0 {
+            error /= scale;
+        } else {
+            // What vanishes exactly is a remainder of numerical differentiation in the table.
+            assert!(error < 1e-50, "{line}: {error:e}");
         }
         assert!(error < 1e-28, "{line}: {error:e}");
         worst = worst.max(error);
