@@ -20,15 +20,19 @@ fn benches(c: &mut Criterion) {
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     for system in lagrangian::systems() {
         let n = system.size.default();
-        let built = lagrangian::build::<f64>(system.name, &[]).expect("the defaults are valid");
+        let configured = lagrangian::configure::<f64>(system.name, &[]).expect("the defaults are valid");
+        let built = configured.build().expect("the system is of the catalogue");
         let bounds = (system.validation)(n);
         let mut group = c.benchmark_group(system.name);
         group.sample_size(20).warm_up_time(Duration::from_millis(300)).measurement_time(Duration::from_millis(1500));
         for batch in [1, 16, 128, 1024] {
             let mut draw = |b: &[(f64, f64)]| -> Vec<f64> {
-                (0..batch * n).map(|k| rng.random_range(b[k % n].0..b[k % n].1)).collect()
+                (0..batch * n).map(|k| rng.random_range(b[k % n].0..=b[k % n].1)).collect()
             };
-            let (q, v) = (draw(&bounds.positions), draw(&bounds.velocities));
+            let (q, mut v) = (draw(&bounds.positions), draw(&bounds.velocities));
+            for (q, v) in q.chunks_exact(n).zip(v.chunks_exact_mut(n)) {
+                configured.impose_constraint(q, v).expect("the state has n coordinates");
+            }
             let mut terms = Terms::default();
             group.throughput(Throughput::Elements(batch as u64));
             for (name, request) in

@@ -77,9 +77,32 @@ fn systems_are_listed() {
     assert_eq!((run.code, run.stderr.as_str()), (Some(0), ""));
     let all: Value = serde_json::from_str(&run.stdout).unwrap();
     let names: Vec<_> = all.as_array().unwrap().iter().map(|s| s["name"].as_str().unwrap()).collect();
-    for name in ["double-pendulum", "triple-pendulum", "n-pendulum", "spring-pendulum", "sphere-geodesic"] {
+    for name in [
+        "double-pendulum",
+        "triple-pendulum",
+        "n-pendulum",
+        "spring-pendulum",
+        "sphere-geodesic",
+        "constant-force",
+        "harmonic-oscillator",
+        "kepler",
+        "henon-heiles",
+        "charged-particle",
+        "ads2-geodesic",
+        "ads3-geodesic",
+        "ads4-geodesic",
+        "schwarzschild-geodesic",
+    ] {
         assert!(names.contains(&name), "{name}");
     }
+    let named = |name: &str| all.as_array().unwrap().iter().find(|s| s["name"] == name).unwrap();
+    let ads = named("ads4-geodesic");
+    assert_eq!((ads["time_like"].as_str(), ads["time_unit"].as_str()), (Some("t"), Some("m")));
+    assert_eq!(ads["units"][4], "m/m");
+    let shell = "t_dot = sqrt(x_dot^2 + y_dot^2 + z_dot^2 + (z/L)^2)";
+    assert_eq!(ads["constraint"], shell);
+    let pendulum = named("double-pendulum");
+    assert!(pendulum["time_like"].is_null() && pendulum["constraint"].is_null() && pendulum["time_unit"] == "s");
     for system in all.as_array().unwrap() {
         let n = system["coordinates"].as_array().unwrap().len();
         for (key, length) in [("columns", 2 * n), ("units", 2 * n), ("periodic", n)] {
@@ -94,6 +117,7 @@ fn systems_are_listed() {
     }
     let table = lnn(&["systems"]).stdout;
     assert!(names.iter().all(|name| table.contains(name)));
+    assert!(table.contains(shell) && table.contains("time-like"));
 }
 
 #[test]

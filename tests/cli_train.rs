@@ -165,6 +165,36 @@ fn a_model_moves_and_is_judged() {
 }
 
 #[test]
+fn a_relativistic_model_knows_the_range_of_the_imposed_velocity() {
+    let folder = Folder::new();
+    let printed = folder.train("ads4-geodesic", "run", &["--epochs", "1"]);
+    assert!(printed.contains("until [m]"));
+    let model = text(&folder.path("run/model.safetensors"));
+    let header = ModelFile::<f64>::load(Path::new(&model)).unwrap().header;
+    // z/L is at least 0.5; x_dot, y_dot, z_dot and z at their bounds give 6.20.
+    let [low, high] = header.velocity[0];
+    assert!(low >= 0.5 && high < 6.21 && low < high, "{low} {high}");
+    assert_eq!(header.velocity[1], [-1.0, 1.0]);
+    assert!((header.architecture.scale[0] - high.max(5.0)).abs() < 1e-6 * high);
+
+    let out = text(&folder.path("path.csv"));
+    let rollout = |state: &str| {
+        let options = ["--t-end", "0.0002", "--dt", "0.0001", "--out", &out];
+        lnn(&[&["rollout", &model, "--state", state], &options[..]].concat())
+    };
+    let middle = 0.5 * (low + high);
+    assert!(succeeded(&rollout(&format!("0,0,0,3,{middle},0,0,0"))).contains(" m, "));
+    refused(&rollout("0,0,0,3,0,0,0,0"), 1, &["training range", "t_dot"]);
+    let json = succeeded(&lnn(&["evaluate", &model, "--starts", "2", "--json"]));
+    let json: Value = serde_json::from_str(&json).unwrap();
+    for start in json["trajectories"].as_array().unwrap() {
+        let number = |key: &str, k: usize| start[key][k].as_f64().unwrap();
+        let square: f64 = (1..4).map(|k| number("v", k).powi(2)).sum::<f64>() + number("q", 3).powi(2);
+        assert!((number("v", 0) - square.sqrt()).abs() < 1e-14 && number("q", 0) == 0.0);
+    }
+}
+
+#[test]
 fn wrong_trainings_are_refused_before_anything_is_written() {
     let folder = Folder::new();
     let out = text(&folder.path("out"));

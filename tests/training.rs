@@ -236,8 +236,8 @@ fn the_gradient_of_sylvesters_penalty_is_right() {
                 if alpha < 0.0 && time.is_some() && n == 1 || alpha > 0.0 && time.is_none() {
                     continue;
                 }
-                gradient_agrees::<f64>(n, alpha, penalty, 1e-11);
-                gradient_agrees::<Dd>(n, alpha, penalty, 1e-26);
+                gradient_agrees::<f64>(MODELS[0], n, alpha, penalty, 1e-11);
+                gradient_agrees::<Dd>(MODELS[0], n, alpha, penalty, 1e-26);
             }
         }
     }

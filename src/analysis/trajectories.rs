@@ -4,7 +4,7 @@ use super::{
     CoordinateError, EnergyError, Lyapunov, Statistics, coordinate_error, energy_drift, energy_error, lyapunov,
     statistics,
 };
-use crate::lagrangian::EulerLagrange;
+use crate::lagrangian::{Configured, EulerLagrange, SystemError};
 use crate::rollout::{Domain, Integrable, Method, Options, Rollout, rollout_many};
 use crate::scalar::Scalar;
 use rand::{Rng, SeedableRng};
@@ -133,9 +133,34 @@ impl<S: Integrable> TrajectoryTest<S> {
         }
     }
 
-    /// Runs every start with both models; the results are in the order of the starts and do not depend on `threads`.
+    /// Runs the starts of the box with both models; the results are in their order and do not depend on `threads`.
     pub fn run(&self, exact: &dyn EulerLagrange<S>, learned: &dyn EulerLagrange<S>) -> Vec<TrajectoryRun<S>> {
-        let starts = self.bounds.starts::<S>(self.starts, self.seed);
+        self.run_from(&self.bounds.starts::<S>(self.starts, self.seed), exact, learned)
+    }
+
+    /// The same from the random starts of the box put on the mass shell of `system`, if it has one.
+    ///
+    /// # Errors
+    /// [`SystemError::State`] if box and system differ in the number of coordinates.
+    pub fn run_constrained(
+        &self,
+        system: &Configured<S>,
+        exact: &dyn EulerLagrange<S>,
+        learned: &dyn EulerLagrange<S>,
+    ) -> Result<Vec<TrajectoryRun<S>>, SystemError> {
+        let mut starts = self.bounds.starts::<S>(self.starts, self.seed);
+        for (q, v) in &mut starts {
+            system.impose_constraint(q, v)?;
+        }
+        Ok(self.run_from(&starts, exact, learned))
+    }
+
+    fn run_from(
+        &self,
+        starts: &[(Vec<S>, Vec<S>)],
+        exact: &dyn EulerLagrange<S>,
+        learned: &dyn EulerLagrange<S>,
+    ) -> Vec<TrajectoryRun<S>> {
         let reference = Options::reference(S::of_f64(self.t_end), S::of_f64(self.dt));
         let options = Options {
             method: self.method,
@@ -146,8 +171,8 @@ impl<S: Integrable> TrajectoryTest<S> {
             ..reference.clone()
         };
         let scale = S::of_f64(self.energy_scale);
-        let truths = rollout_many(exact, &starts, &reference, self.threads);
-        let learned = rollout_many(learned, &starts, &options, self.threads);
+        let truths = rollout_many(exact, starts, &reference, self.threads);
+        let learned = rollout_many(learned, starts, &options, self.threads);
         let pairs = starts.iter().zip(truths.into_iter().zip(learned));
         pairs
             .map(|((q, v), (truth, learned))| TrajectoryRun {
@@ -196,6 +221,7 @@ impl<S: Scalar> TrajectoryRun<S> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::lagrangian::configure;
     use crate::rollout::models::{OSCILLATOR, PENDULUM, SINGULAR};
 
     fn test() -> TrajectoryTest<f64> {
@@ -232,6 +258,31 @@ mod tests {
         let back: TrajectorySummary = serde_json::from_str(&text).unwrap();
         assert_eq!((back.stopped, back.evaluations), (summary.stopped, summary.evaluations));
         assert!((back.energy_error.max - summary.energy_error.max).abs() < 1e-14);
+    }
+
+    #[test]
+    fn relativistic_starts_are_on_the_mass_shell() {
+        let system = configure::<f64>("ads3-geodesic", &[]).unwrap();
+        let exact = system.build().unwrap();
+        let start = (system.system.trajectory)(3).start;
+        // Nothing drawn for the velocity of t is used.
+        for t_dot in [(0.0, 0.0), (-9.0, 9.0)] {
+            let mut v = start.velocities.clone();
+            v[0] = t_dot;
+            let bounds = StartBox { q: start.positions.clone(), v };
+            let test = TrajectoryTest { t_end: 0.5, dt: 0.01, ..TrajectoryTest::new(bounds, vec![false; 3]) };
+            let runs = test.run_constrained(&system, exact.as_ref(), exact.as_ref()).unwrap();
+            assert_eq!(runs.len(), 4);
+            for run in runs {
+                let summary = run.summary();
+                let mut v = summary.v.clone();
+                system.impose_constraint(&summary.q, &mut v).unwrap();
+                assert_eq!((v, summary.q[0]), (summary.v, 0.0));
+                assert_eq!((summary.compared_until, summary.reference_stopped), (0.5, None));
+            }
+        }
+        let short = TrajectoryTest::new(StartBox { q: vec![(0.0, 1.0)], v: vec![(0.0, 1.0)] }, vec![false]);
+        assert!(short.run_constrained(&system, exact.as_ref(), exact.as_ref()).is_err());
     }
 
     #[test]

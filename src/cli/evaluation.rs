@@ -22,6 +22,9 @@ pub struct Evaluation {
     /// Names of the accelerations' coordinates.
     #[serde(skip)]
     pub coordinates: Vec<String>,
+    /// Unit of times.
+    #[serde(skip)]
+    pub time_unit: &'static str,
     /// Pictures.
     #[serde(skip)]
     pub figures: Vec<Figure>,
@@ -65,15 +68,17 @@ pub fn evaluate(
         threads: plan.threads,
         ..TrajectoryTest::new(bounds, periodic.clone())
     };
-    let runs = test.run(exact.as_ref(), learned);
+    let runs = test.run_constrained(system, exact.as_ref(), learned).map_err(CliError::data)?;
 
     let columns = system.system.columns(n);
-    let mut figures = evaluation_figures(&runs, &columns, &periodic).map_err(CliError::data)?;
+    let mut figures =
+        evaluation_figures(&runs, &columns, &periodic, system.system.time_unit).map_err(CliError::data)?;
     figures.extend(grids(system, exact.as_ref(), learned)?);
     Ok(Evaluation {
         accelerations,
         trajectories: runs.iter().map(TrajectoryRun::summary).collect(),
         coordinates: coordinates.iter().map(|c| c.name.to_string()).collect(),
+        time_unit: system.system.time_unit,
         figures,
     })
 }
@@ -89,7 +94,10 @@ fn grids(
     let middle = bounds.positions.iter().map(|(low, high)| 0.5 * (low + high));
     // At rest a total time derivative in the learned L vanishes: what is left is a factor and a constant.
     let rest = bounds.velocities.iter().map(|(low, high)| 0.0f64.clamp(*low, *high));
-    let state: Vec<f64> = middle.chain(rest).collect();
+    let (middle, mut rest): (Vec<f64>, Vec<f64>) = (middle.collect(), rest.collect());
+    // A mass shell lets nothing rest in time.
+    system.impose_constraint(&middle, &mut rest).map_err(CliError::data)?;
+    let state = [middle, rest].concat();
     let ranges: Vec<(f64, f64)> = bounds.positions.into_iter().chain(bounds.velocities).collect();
     let columns = system.system.columns(n);
     let axes =
@@ -123,7 +131,7 @@ fn grids(
 /// A table of a report.
 struct Table {
     title: &'static str,
-    header: Vec<&'static str>,
+    header: Vec<String>,
     rows: Vec<Vec<String>>,
 }
 
@@ -140,15 +148,17 @@ impl Evaluation {
             row.push(t.stopped.clone().or(t.reference_stopped.clone()).unwrap_or_default());
             row
         });
+        let header = |names: &[&str]| names.iter().map(ToString::to_string).collect();
+        let until = format!("until [{}]", self.time_unit);
         [
             Table {
                 title: "Error of accelerations on fresh states, physical units",
-                header: vec!["coordinate", "mean", "rms", "median", "99 %", "max", "failed"],
+                header: header(&["coordinate", "mean", "rms", "median", "99 %", "max", "failed"]),
                 rows: accelerations.collect(),
             },
             Table {
                 title: "Trajectories from random starts against exact motion",
-                header: vec!["start", "until [s]", "coordinates mean", "max", "energy mean", "max", "ended by"],
+                header: header(&["start", &until, "coordinates mean", "max", "energy mean", "max", "ended by"]),
                 rows: trajectories.collect(),
             },
         ]

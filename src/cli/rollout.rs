@@ -3,6 +3,7 @@
 use crate::cli::learned::Learned;
 use crate::cli::number::{finite, positive};
 use crate::cli::{CliError, output};
+use crate::lagrangian::find;
 use crate::rollout::{Method, Options, RolloutError, rollout};
 use crate::storage::write_atomically;
 use std::path::PathBuf;
@@ -12,13 +13,14 @@ use std::path::PathBuf;
 pub struct Args {
     /// Model file.
     model: PathBuf,
-    /// Start: coordinates, then velocities, separated by commas.
+    /// Start: coordinates, then velocities, separated by commas; taken as it is, on a mass shell or off it.
     #[arg(long, value_name = "q1,..,v1,..", required = true, value_delimiter = ',', allow_hyphen_values = true, value_parser = finite)]
     state: Vec<f64>,
-    /// Time of the last sample in seconds; the motion starts at 0, negative times run backwards.
+    /// Time of the last sample, in seconds (relativistic systems: proper time in metres); the motion starts at 0, negative
+    /// times run backwards.
     #[arg(long, value_name = "T", allow_hyphen_values = true, value_parser = finite)]
     t_end: f64,
-    /// Time between samples in seconds.
+    /// Time between samples, in the same unit.
     #[arg(long, value_name = "DT", allow_hyphen_values = true, value_parser = positive)]
     dt: f64,
     /// Integrator: two with error control, four symplectic ones of fixed step for long times.
@@ -30,7 +32,7 @@ pub struct Args {
     /// Absolute tolerance of a step.
     #[arg(long, value_name = "A", default_value = "1e-8", allow_hyphen_values = true, value_parser = positive)]
     atol: f64,
-    /// Longest step of midpoint, gauss4, gauss6 and variational in seconds, one per sample if not given.
+    /// Longest step of midpoint, gauss4, gauss6 and variational, one per sample if not given.
     #[arg(long, value_name = "H", allow_hyphen_values = true, value_parser = positive)]
     step: Option<f64>,
     /// CSV of the trajectory: t, the columns of a state, energy.
@@ -106,13 +108,15 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         return Err(CliError::data(format_args!("{problem} ({kept} samples are in {})", args.out.display())));
     }
     let statistics = result.statistics;
+    // A system of another version has no unit here.
+    let unit = find(&learned.header.system).map_or("", |system| system.time_unit);
     let iterations = if method.is_structure_preserving() {
         format!(" in {} iterations", statistics.iterations)
     } else {
         String::new()
     };
     output::print(&format!(
-        "{} samples to t = {} s, {} steps, {} evaluations{iterations}, in {}\n",
+        "{} samples to t = {} {unit}, {} steps, {} evaluations{iterations}, in {}\n",
         result.trajectory.len(),
         args.t_end,
         statistics.accepted,

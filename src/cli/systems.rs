@@ -1,7 +1,7 @@
 //! `lnn systems`: what can be learned.
 
 use crate::cli::{CliError, output};
-use crate::lagrangian::system::{Bounds, Size, System};
+use crate::lagrangian::system::{Bounds, Coordinate, Size, System};
 use crate::lagrangian::systems;
 use serde_json::{Value, json};
 
@@ -51,6 +51,9 @@ fn describe(system: &System) -> Value {
         "columns": system.columns(n),
         "units": column_units(system, n),
         "periodic": coordinates.iter().map(|c| c.periodic).collect::<Vec<_>>(),
+        "time_unit": system.time_unit,
+        "time_like": system.time_like.map(|i| coordinates[i].name.as_ref()),
+        "constraint": system.constraint,
         "parameters": parameters,
         "bounds": { "training": box_of((system.training)(n)), "validation": box_of((system.validation)(n)) },
     })
@@ -60,19 +63,27 @@ fn describe(system: &System) -> Value {
 fn column_units(system: &System, n: usize) -> Vec<String> {
     let coordinates = (system.coordinates)(n);
     let positions = coordinates.iter().map(|c| c.unit.to_string());
-    positions.chain(coordinates.iter().map(|c| format!("{}/s", c.unit))).collect()
+    positions.chain(coordinates.iter().map(|c| format!("{}/{}", c.unit, system.time_unit))).collect()
 }
 
 fn table(system: &System) -> String {
     let n = system.size.default();
     let bounds = (system.validation)(n);
     let ranges = bounds.positions.iter().chain(&bounds.velocities);
-    let periodic = (system.coordinates)(n).into_iter().map(|c| if c.periodic { "  periodic" } else { "" });
+    let remark = |(i, c): (usize, Coordinate)| match (c.periodic, system.time_like == Some(i)) {
+        (_, true) => "  time-like",
+        (true, _) => "  periodic",
+        _ => "",
+    };
+    let remarks = (system.coordinates)(n).into_iter().enumerate().map(remark);
+    let fixed = system.time_like.filter(|_| system.constraint.is_some()).map(|i| n + i);
     let mut text = format!("{}  ({})\n", system.name, system.title);
-    for (((column, unit), (low, high)), periodic) in
-        system.columns(n).iter().zip(column_units(system, n)).zip(ranges).zip(periodic.chain(std::iter::repeat("")))
-    {
-        text += &format!("  {column:<12} {unit:<6} {low:>7.3} .. {high:<7.3}{periodic}\n");
+    let rows = system.columns(n).into_iter().zip(column_units(system, n)).zip(ranges);
+    for (k, (((column, unit), (low, high)), remark)) in rows.zip(remarks.chain(std::iter::repeat(""))).enumerate() {
+        match system.constraint.filter(|_| fixed == Some(k)) {
+            Some(constraint) => text += &format!("  {column:<12} {unit:<6} {constraint}\n"),
+            None => text += &format!("  {column:<12} {unit:<6} {low:>7.3} .. {high:<7.3}{remark}\n"),
+        }
     }
     for [symbol, default, unit, range] in parameters(system) {
         text += &format!("  --param {:<12} {unit:<6} {range}\n", format!("{symbol}={default}"));

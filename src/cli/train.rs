@@ -14,7 +14,7 @@ use crate::network::{Architecture, NetworkLagrangian};
 use crate::report::{HistoryRow, Report, training_figures};
 use crate::scalar::Scalar;
 use crate::training::{
-    Config, Epoch, Hooks, Phase, Precision, Progress, SamplingError, Stop, Trained, sample_all, train,
+    Config, Datasets, Epoch, Hooks, Phase, Precision, Progress, SamplingError, Stop, Trained, sample_all, train,
 };
 use serde::Serialize;
 use std::fmt::Write as _;
@@ -67,6 +67,7 @@ fn learn<S: Scalar>(args: &Args, config: &Config, system: &Configured<f64>) -> R
     let path = args.out.clone().unwrap_or_else(|| PathBuf::from("runs").join(&config.system));
     let folder = Folder::open(&path)?;
     let architecture = config.architecture(system, scale);
+    let imposed = imposed_velocities(system, &data);
     let stop = interrupt::flag()?;
     let threads = threads(args.threads);
     let fresh = (data.test.cast::<f64>().q().to_vec(), data.test.cast::<f64>().v().to_vec());
@@ -80,7 +81,7 @@ fn learn<S: Scalar>(args: &Args, config: &Config, system: &Configured<f64>) -> R
     })?;
 
     // The model and its history first: nothing that comes after can lose them.
-    let header = header(config, system, architecture.clone(), trained.validation_loss)?;
+    let header = header(config, system, architecture.clone(), imposed, trained.validation_loss)?;
     let model = ModelFile { header, weights: trained.weights.clone() };
     let toml = toml::to_string(config).map_err(CliError::data)?;
     let file = folder.file("model.safetensors");
@@ -135,11 +136,20 @@ fn ended(stop: &Stop) -> String {
     }
 }
 
+/// The velocity that the mass shell fixes and its range over the training states, which no bounds of the configuration
+/// tell.
+fn imposed_velocities<S: Scalar>(system: &Configured<f64>, data: &Datasets<S>) -> Option<(usize, [f64; 2])> {
+    let i = system.constrained_coordinate()?;
+    let ranges = data.training.iter().map(|set| set.velocity_range(i));
+    ranges.reduce(|[low, high], [l, h]| [low.min(l), high.max(h)]).map(|range| (i, range))
+}
+
 /// What the model file says about this run.
 fn header(
     config: &Config,
     system: &Configured<f64>,
     architecture: Architecture,
+    imposed: Option<(usize, [f64; 2])>,
     validation_loss: f64,
 ) -> Result<Header, CliError> {
     // Defaults that change in a later version must not change this model.
@@ -158,6 +168,10 @@ fn header(
             })
             .collect()
     };
+    let mut velocity: Vec<[f64; 2]> = hull(|phase| &phase.velocity);
+    if let Some((i, range)) = imposed {
+        velocity[i] = range;
+    }
     Ok(Header {
         format: FORMAT,
         crate_version: env!("CARGO_PKG_VERSION").to_string(),
@@ -170,7 +184,7 @@ fn header(
             Precision::F64 => StoredPrecision::F64,
         },
         position: hull(|phase| &phase.position),
-        velocity: hull(|phase| &phase.velocity),
+        velocity,
         seed: config.seed,
         validation_loss,
     })

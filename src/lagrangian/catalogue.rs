@@ -94,6 +94,16 @@ macro_rules! catalogue {
             })*
             vec![S::NAN; n]
         }
+
+        /// The velocity of the time-like coordinate on the mass shell, if the system has one.
+        fn constrained<S: Scalar>(configured: &Configured<S>, q: &[S], v: &[S]) -> Option<S> {
+            let n = configured.coordinates;
+            $(if configured.system.name == super::systems::$module::SYSTEM.name {
+                let make: fn(usize) -> _ = $make;
+                return make(n).constrained_velocity(&configured.parameters, q, v);
+            })*
+            None
+        }
     };
 }
 
@@ -103,6 +113,15 @@ catalogue! {
     n_pendulum: |n| super::systems::n_pendulum::NPendulum { n };
     spring_pendulum: |_| super::systems::spring_pendulum::SpringPendulum;
     sphere_geodesic: |_| super::systems::sphere_geodesic::SphereGeodesic;
+    constant_force: |_| super::systems::constant_force::ConstantForce;
+    harmonic_oscillator: |_| super::systems::harmonic_oscillator::HarmonicOscillator;
+    kepler: |_| super::systems::kepler::Kepler;
+    henon_heiles: |_| super::systems::henon_heiles::HenonHeiles;
+    charged_particle: |_| super::systems::charged_particle::ChargedParticle;
+    ads2_geodesic: |n| super::systems::ads2_geodesic::AdsGeodesic { n };
+    ads3_geodesic: |n| super::systems::ads3_geodesic::AdsGeodesic { n };
+    ads4_geodesic: |n| super::systems::ads4_geodesic::AdsGeodesic { n };
+    schwarzschild_geodesic: |_| super::systems::schwarzschild_geodesic::SchwarzschildGeodesic;
 }
 
 /// All systems.
@@ -205,19 +224,41 @@ impl<S: Scalar> Configured<S> {
     /// # Errors
     /// [`SystemError::State`] for a state of the wrong length.
     pub fn exact_acceleration(&self, q: &[S], v: &[S]) -> Result<Vec<S>, SystemError> {
+        self.check_lengths(q, v)?;
+        Ok(closed(self, q, v))
+    }
+    /// Index of the coordinate whose velocity the mass shell fixes.
+    pub fn constrained_coordinate(&self) -> Option<usize> {
+        self.system.time_like.filter(|_| self.system.constraint.is_some())
+    }
+    /// Puts one state on the mass shell `g(v, v) = -1` by the velocity of its time-like coordinate; systems without a
+    /// constraint leave the state alone.
+    ///
+    /// Outside the domain the velocity becomes `NaN` or infinite.
+    ///
+    /// # Errors
+    /// [`SystemError::State`] for a state of the wrong length.
+    pub fn impose_constraint(&self, q: &[S], v: &mut [S]) -> Result<(), SystemError> {
+        self.check_lengths(q, v)?;
+        if let (Some(i), Some(velocity)) = (self.constrained_coordinate(), constrained(self, q, v)) {
+            v[i] = velocity;
+        }
+        Ok(())
+    }
+    fn check_lengths(&self, q: &[S], v: &[S]) -> Result<(), SystemError> {
         let expected = self.coordinates;
         match [q, v].into_iter().find(|x| x.len() != expected) {
             Some(x) => Err(SystemError::State { system: self.system.name, expected, found: x.len() }),
-            None => Ok(closed(self, q, v)),
+            None => Ok(()),
         }
     }
-    /// Refuses coordinates where the system's chart ends (`r <= 0`, a pole); the text says what is demanded.
+    /// Refuses coordinates where the system's chart ends (`r <= 0`, a pole, a horizon); the text says what is demanded.
     ///
     /// # Errors
     /// What the coordinates must satisfy.
     pub fn check_domain(&self, q: &[S]) -> Result<(), &'static str> {
-        let leading: Vec<f64> = q.iter().map(|q| q.to_f64()).collect();
-        self.system.domain.map_or(Ok(()), |domain| domain(&leading))
+        let leading = |x: &[S]| -> Vec<f64> { x.iter().map(|x| x.to_f64()).collect() };
+        self.system.domain.map_or(Ok(()), |domain| domain(&leading(&self.parameters), &leading(q)))
     }
 }
 
@@ -242,9 +283,25 @@ mod tests {
             assert_eq!(configured.build().unwrap().coordinates(), n);
             assert_eq!((system.coordinates)(n).len(), n);
             assert_eq!(system.columns(n).len(), 2 * n);
-            for bounds in [(system.training)(n), (system.validation)(n), (system.trajectory)(n).start] {
+            let start = (system.trajectory)(n).start;
+            assert_eq!((start.positions.len(), start.velocities.len()), (n, n));
+            assert!(start.positions.iter().chain(&start.velocities).all(|b| b.0 <= b.1));
+            let fixed = configured.constrained_coordinate();
+            for bounds in [(system.training)(n), (system.validation)(n)] {
                 assert_eq!((bounds.positions.len(), bounds.velocities.len()), (n, n));
-                assert!(bounds.positions.iter().chain(&bounds.velocities).all(|b| b.0 < b.1));
+                assert!(bounds.positions.iter().all(|b| b.0 < b.1), "{}", system.name);
+                assert!(bounds.velocities.iter().enumerate().all(|(i, b)| b.0 < b.1 || fixed == Some(i)));
+            }
+            let mut v: Vec<f64> = (0..n).map(|i| 0.1 * i as f64).collect();
+            let q: Vec<f64> = start.positions.iter().map(|b| 0.4 * b.0 + 0.6 * b.1).collect();
+            let before = v.clone();
+            configured.impose_constraint(&q, &mut v).unwrap();
+            match fixed {
+                None => assert_eq!((v, system.constraint), (before, None)),
+                Some(i) => {
+                    assert!(v[i] > 0.0 && (0..n).all(|k| k == i || v[k] == before[k]));
+                    assert!(system.constraint.unwrap().starts_with(&format!("{} = ", system.columns(n)[n + i])));
+                }
             }
             let middle: Vec<f64> = (system.training)(n).positions.iter().map(|b| 0.4 * b.0 + 0.6 * b.1).collect();
             assert_eq!(configured.check_domain(&middle), Ok(()));
@@ -254,6 +311,14 @@ mod tests {
         assert_eq!(find("sphere-geodesic").unwrap().columns(2), ["theta", "phi", "theta_dot", "phi_dot"]);
         assert!(configure::<f64>("spring-pendulum", &[]).unwrap().check_domain(&[0.0, 1.0]).is_err());
         assert!(configure::<f64>("sphere-geodesic", &[]).unwrap().check_domain(&[0.0, 1.0]).is_err());
+        assert!(configure::<f64>("kepler", &[]).unwrap().check_domain(&[0.0, 0.0]).is_err());
+        assert!(configure::<f64>("ads2-geodesic", &[]).unwrap().check_domain(&[1.0, -1.0]).is_err());
+        // The horizon moves with the mass.
+        let hole = |mass: &str| configure::<f64>("schwarzschild-geodesic", &given(&[("M", mass)])).unwrap();
+        assert_eq!(hole("1").check_domain(&[0.0, 3.0, 1.0, 0.0]), Ok(()));
+        assert!(hole("1.5").check_domain(&[0.0, 3.0, 1.0, 0.0]).is_err());
+        assert!(hole("1").check_domain(&[0.0, 3.0, 0.0, 0.0]).is_err());
+        assert!(hole("1").impose_constraint(&[0.0, 3.0, 1.0], &mut [0.0; 4]).is_err());
     }
 
     #[test]

@@ -9,7 +9,7 @@ use std::borrow::Cow;
 pub struct Coordinate {
     /// Name, also of its CSV column; the velocity's column is the name and `_dot`.
     pub name: Cow<'static, str>,
-    /// Unit of the coordinate; velocities are in this unit per second.
+    /// Unit of the coordinate; velocities are in this unit per [`System::time_unit`].
     pub unit: &'static str,
     /// An angle: adding `2 pi` changes nothing.
     pub periodic: bool,
@@ -110,14 +110,14 @@ impl Bounds {
 pub struct TrajectoryTest {
     /// Box of the random starts.
     pub start: Bounds,
-    /// End of the time span that starts at 0, in seconds.
+    /// End of the time span that starts at 0, in [`System::time_unit`].
     pub t_end: f64,
-    /// Step of the output, in seconds.
+    /// Step of the output, in [`System::time_unit`].
     pub dt: f64,
 }
 
-/// Refuses coordinates outside a chart with what is demanded of them.
-pub type Domain = fn(&[f64]) -> Result<(), &'static str>;
+/// Refuses coordinates outside a chart, given the parameters, with what is demanded of them.
+pub type Domain = fn(parameters: &[f64], q: &[f64]) -> Result<(), &'static str>;
 
 /// Catalogue entry of a system; functions take the number of coordinates.
 #[derive(Clone, Copy, Debug)]
@@ -132,8 +132,14 @@ pub struct System {
     pub coordinates: fn(usize) -> Vec<Coordinate>,
     /// Constants, in the order the Lagrangian takes them; [`Size::Chosen`] adds one more.
     pub parameters: &'static [Parameter],
+    /// Unit of the evolution parameter: `s`, or `m` for proper time in geometric units (`G = c = 1`, where times and
+    /// masses are lengths).
+    pub time_unit: &'static str,
     /// The coordinate that is a time (Lorentzian systems).
     pub time_like: Option<usize>,
+    /// The mass shell `g(v, v) = -1` solved for the velocity of the time-like coordinate, in words of the columns;
+    /// [`Closed::constrained_velocity`] is the formula.
+    pub constraint: Option<&'static str>,
     /// Box of the training states.
     pub training: fn(usize) -> Bounds,
     /// Box of the states on which errors are stated.
@@ -157,4 +163,10 @@ impl System {
 pub trait Closed: Lagrangian {
     /// `a(q, v)`, written down without differentiating the Lagrangian.
     fn acceleration<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> Vec<R>;
+
+    /// The velocity of the time-like coordinate that puts a state on the mass shell `g(v, v) = -1`, pointing to the
+    /// future; whatever `v` holds in its place is not read. `None` for a system without constraint.
+    fn constrained_velocity<R: Real>(&self, _parameters: &[R], _q: &[R], _v: &[R]) -> Option<R> {
+        None
+    }
 }

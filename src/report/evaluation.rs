@@ -10,7 +10,8 @@ type Part<S> = fn(&TrajectoryRun<S>) -> (&[f64], &[f64]);
 /// Pictures of trajectory tests: coordinate error, energy error, energy drift over time, one line per start, and for the
 /// first start the coordinates over time and its trace in the plane of coordinate and velocity.
 ///
-/// `columns` names the `2n` components of a state; `periodic` marks angles, drawn modulo `2 pi`.
+/// `columns` names the `2n` components of a state; `periodic` marks angles, drawn modulo `2 pi`; `time_unit` is the unit
+/// of the time axis.
 ///
 /// # Errors
 /// [`PlotError::Renderer`] if the renderer fails; pictures without data are left out.
@@ -18,10 +19,12 @@ pub fn evaluation_figures<S: Scalar, T: AsRef<str>>(
     runs: &[TrajectoryRun<S>],
     columns: &[T],
     periodic: &[bool],
+    time_unit: &str,
 ) -> Result<Vec<Figure>, PlotError> {
     let mut figures = Vec::new();
     let over_time = |title: &str, y_label: &str, log_y: bool, series: Vec<Series>| {
-        line_png(&LinePlot { title: title.into(), x_label: "t [s]".into(), y_label: y_label.into(), log_y, series })
+        let x_label = format!("t [{time_unit}]");
+        line_png(&LinePlot { title: title.into(), x_label, y_label: y_label.into(), log_y, series })
     };
     let per_start = |part: Part<S>| -> Vec<Series> {
         runs.iter()
@@ -220,13 +223,13 @@ mod tests {
         let test = TrajectoryTest { t_end: 30.0, ..TrajectoryTest::<f64>::new(bounds, vec![true]) };
         let mut runs = test.run(&PENDULUM, &PENDULUM);
         runs.extend(TrajectoryTest { starts: 1, seed: 5, ..test }.run(&PENDULUM, &SINGULAR));
-        let figures = evaluation_figures(&runs, &["theta", "theta_dot"], &[true]).unwrap();
+        let figures = evaluation_figures(&runs, &["theta", "theta_dot"], &[true], "s").unwrap();
         let names: Vec<_> = figures.iter().map(|f| f.file.as_str()).collect();
         let expected =
             ["coordinate_error.png", "energy_error.png", "energy_drift.png", "trajectory_theta.png", "phase_theta.png"];
         assert_eq!(names, expected);
         save(&figures);
-        assert!(evaluation_figures::<f64, &str>(&[], &[], &[]).unwrap().is_empty());
+        assert!(evaluation_figures::<f64, &str>(&[], &[], &[], "s").unwrap().is_empty());
     }
 
     #[test]

@@ -90,7 +90,7 @@ pub struct Data {
     pub test: usize,
     /// Validation and test bounds of each coordinate.
     pub validation_position: Vec<[f64; 2]>,
-    /// Validation and test bounds of each velocity.
+    /// Validation and test bounds of each velocity; those of a velocity that a mass shell fixes mean nothing.
     pub validation_velocity: Vec<[f64; 2]>,
 }
 
@@ -149,7 +149,7 @@ pub struct Phase {
     pub t_max: f64,
     /// Training bounds of each coordinate.
     pub position: Vec<[f64; 2]>,
-    /// Training bounds of each velocity.
+    /// Training bounds of each velocity; those of a velocity that a mass shell fixes mean nothing.
     pub velocity: Vec<[f64; 2]>,
 }
 

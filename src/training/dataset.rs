@@ -98,6 +98,12 @@ impl<S: Scalar> Dataset<S> {
             .collect()
     }
 
+    /// Smallest and largest velocity of coordinate `i`.
+    pub fn velocity_range(&self, i: usize) -> [f64; 2] {
+        let all = self.v.iter().skip(i).step_by(self.coordinates).map(|v| v.to_f64());
+        all.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(v), high.max(v)])
+    }
+
     /// The same states in another precision.
     pub fn cast<T: Scalar>(&self) -> Dataset<T> {
         let cast = |x: &[S]| x.iter().map(|&x| x.cast()).collect();
@@ -122,5 +128,6 @@ mod tests {
     fn the_scale_is_the_largest_of_coordinate_and_velocity() {
         let data = Dataset::new(2, vec![1.0, -3.0, 0.5, 0.0], vec![-2.0, 1.0, 0.0, 0.0], vec![9.0; 4]).unwrap();
         assert_eq!(data.physical_scale(), vec![2.0, 3.0]);
+        assert_eq!((data.velocity_range(0), data.velocity_range(1)), ([-2.0, 0.0], [0.0, 1.0]));
     }
 }

@@ -102,6 +102,7 @@ fn paper(system: &Configured<f64>) -> Option<Config> {
         "triple-pendulum" => (60_000, vec![500; 3], &[(500, 1e-3, 1e-7)]),
         "spring-pendulum" => (60_000, vec![600; 2], &[(500, 5e-4, 1e-7)]),
         "sphere-geodesic" => (50_000, vec![500; 3], &[(50, 1e-3, 1e-6)]),
+        "ads4-geodesic" => (120_000, vec![500; 3], &[(300, 1e-3, 1e-7)]),
         _ => return None,
     };
     let network = Network {

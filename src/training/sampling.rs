@@ -32,7 +32,8 @@ pub enum SamplingError {
 
 /// Draws `states` states uniformly from a box, with their exact accelerations, all in double precision.
 ///
-/// States outside the system's domain, or with an acceleration that is not finite, are drawn again.
+/// A system with a mass shell is put on it: the velocity of its time-like coordinate follows from the other numbers, its
+/// bounds mean nothing. States outside the system's domain, or with an acceleration that is not finite, are drawn again.
 ///
 /// # Errors
 /// [`SamplingError::Domain`] if more than nine in ten draws are refused.
@@ -50,7 +51,8 @@ pub fn sample(
         let mut draw = |bounds: &[[f64; 2]]| -> Vec<f64> {
             bounds.iter().map(|&[low, high]| if low < high { rng.random_range(low..high) } else { low }).collect()
         };
-        let (new_q, new_v) = (draw(position), draw(velocity));
+        let (new_q, mut new_v) = (draw(position), draw(velocity));
+        system.impose_constraint(&new_q, &mut new_v)?;
         let demand = system.check_domain(&new_q).err();
         let new_a = system.exact_acceleration(&new_q, &new_v)?;
         if demand.is_some() || new_a.iter().any(|a| !a.is_finite()) {
@@ -93,4 +95,69 @@ pub fn sample_all<S: Scalar>(
     let test = sample(system, field, bounds, data.test, &mut Stream::Test.generator(seed))?;
     let training = training.iter().map(Dataset::cast).collect();
     Ok((Datasets { training, validation: validation.cast(), test: test.cast() }, scale))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lagrangian::{Request, Terms, configure};
+    use crate::training::preset::Preset;
+
+    #[test]
+    fn every_state_of_a_relativistic_system_is_on_the_mass_shell() {
+        let mut seen = 0;
+        for system in crate::lagrangian::systems().iter().filter(|s| s.constraint.is_some()) {
+            let configured = configure::<f64>(system.name, &[]).unwrap();
+            let mut config = Preset::Quick.config(&configured).unwrap();
+            (config.data.training, config.data.validation, config.data.test) = (500, 200, 100);
+            let (data, scale) = sample_all::<f64>(&config, &configured).unwrap();
+            let i = configured.constrained_coordinate().unwrap();
+            for set in data.training.iter().chain([&data.validation, &data.test]) {
+                let mut terms = Terms::default();
+                let exact = configured.build().unwrap();
+                exact.terms(set.q(), set.v(), Request::ENERGY, &mut terms).unwrap();
+                // 2 L = g(v, v) = -1; the terms of the sum are p_i v_i.
+                for ((l, p), v) in terms
+                    .lagrangian
+                    .iter()
+                    .zip(terms.momentum.chunks(set.coordinates()))
+                    .zip(set.v().chunks(set.coordinates()))
+                {
+                    let terms: f64 = p.iter().zip(v).map(|(p, v)| (p * v).abs()).sum();
+                    assert!((2.0 * l + 1.0).abs() <= 16.0 * f64::EPSILON * terms, "{}: {l} {terms}", system.name);
+                }
+                assert!(set.velocity_range(i)[0] > 0.0);
+            }
+            assert!(scale[i] >= data.training[0].velocity_range(i)[1] && scale.iter().all(|s| s.is_finite()));
+            // Whatever the bounds of the constrained velocity, nothing changes.
+            config.phases[0].velocity[i] = [-7.0, -7.0];
+            assert_eq!(sample_all::<f64>(&config, &configured).unwrap().0.training, data.training);
+            seen += 1;
+        }
+        assert_eq!(seen, 4);
+    }
+
+    #[test]
+    fn scales_of_the_papers_geodesics() {
+        let system = configure::<f64>("ads4-geodesic", &[]).unwrap();
+        let mut config = Preset::Paper.config(&system).unwrap();
+        assert_eq!((config.data.training, config.data.validation), (120_000, 24_000));
+        (config.data.training, config.data.validation, config.data.test) = (120_000, 10, 10);
+        let (_, scale) = sample_all::<f32>(&config, &system).unwrap();
+        // s_t = 6.18, s_x = s_y = 5.00, s_z = 6.00; t_dot is at most sqrt(1 + 1 + 0.6^2 + 6^2) = 6.20.
+        assert!((6.15..6.2).contains(&scale[0]), "{scale:?}");
+        assert!(scale[1..].iter().zip([5.0, 5.0, 6.0]).all(|(s, paper)| (s - paper).abs() < 0.005), "{scale:?}");
+    }
+
+    #[test]
+    fn velocities_beyond_light_are_drawn_again_or_refused() {
+        let system = configure::<f64>("charged-particle", &[]).unwrap();
+        let at = |low: f64, high: f64| {
+            let mut rng = Stream::Test.generator(0);
+            sample(&system, "box", (&[[0.0, 1.0]; 3], &[[low, high]; 3]), 100, &mut rng)
+        };
+        let set = at(-1.0, 1.0).unwrap();
+        assert!(set.v().chunks(3).all(|v| v.iter().map(|v| v * v).sum::<f64>() < 1.0));
+        assert!(matches!(at(0.9, 1.0), Err(SamplingError::Domain { demand: "a finite acceleration", .. })));
+    }
 }

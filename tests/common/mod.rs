@@ -1,6 +1,8 @@
 //! What several test programs share.
 #![allow(dead_code, reason = "each test program uses its part")]
 
+pub mod accuracy;
+
 use lnn::scalar::{Real, Scalar};
 
 /// Gaussian elimination without exchanges over any number type, for small well-conditioned systems.

@@ -1,8 +1,18 @@
 //! Hand-written systems, one file each: Lagrangian, closed-form acceleration, catalogue entry.
 
+pub mod ads2_geodesic;
+pub mod ads3_geodesic;
+pub mod ads4_geodesic;
+mod anti_de_sitter;
 mod chain;
+pub mod charged_particle;
+pub mod constant_force;
 pub mod double_pendulum;
+pub mod harmonic_oscillator;
+pub mod henon_heiles;
+pub mod kepler;
 pub mod n_pendulum;
+pub mod schwarzschild_geodesic;
 pub mod sphere_geodesic;
 pub mod spring_pendulum;
 pub mod triple_pendulum;
@@ -15,6 +25,11 @@ const MASS: Parameter = Parameter { symbol: "m", default: "1", unit: "kg", range
 const LENGTH: Parameter = Parameter { symbol: "l", default: "1", unit: "m", range: Range::Positive };
 /// The paper's acceleration of gravity; zero and negative values are allowed.
 const ACCELERATION_OF_GRAVITY: Parameter = Parameter { symbol: "g", default: "9.8", unit: "m/s^2", range: Range::Any };
+
+/// Coordinates that are lengths.
+fn lengths(names: &[&'static str]) -> Vec<Coordinate> {
+    names.iter().map(|&name| Coordinate::length(name)).collect()
+}
 
 /// `theta1`, `theta2`, ..; `theta` if there is one.
 fn angles(n: usize) -> Vec<Coordinate> {

@@ -19,7 +19,9 @@ pub const SYSTEM: System = System {
     coordinates: |_| vec![Coordinate { periodic: false, ..Coordinate::angle("theta") }, Coordinate::angle("phi")],
     parameters: &PARAMETERS,
     size: Size::Fixed(2),
+    time_unit: "s",
     time_like: None,
+    constraint: None,
     training: |_| Bounds {
         positions: vec![(0.1 * PI, 0.9 * PI), (-0.5 * PI, 2.5 * PI)],
         velocities: vec![(-5.0, 5.0), (-5.0, 5.0)],
@@ -36,7 +38,7 @@ pub const SYSTEM: System = System {
         t_end: 20.0,
         dt: 0.05,
     },
-    domain: Some(|q| if q[0].sin() != 0.0 { Ok(()) } else { Err("theta must keep away from the poles") }),
+    domain: Some(|_, q| if q[0].sin() != 0.0 { Ok(()) } else { Err("theta must keep away from the poles") }),
 };
 
 impl Lagrangian for SphereGeodesic {

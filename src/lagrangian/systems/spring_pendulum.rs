@@ -24,7 +24,9 @@ pub const SYSTEM: System = System {
     coordinates: |_| vec![Coordinate::length("r"), Coordinate::angle("theta")],
     parameters: &PARAMETERS,
     size: Size::Fixed(2),
+    time_unit: "s",
     time_like: None,
+    constraint: None,
     training: |_| Bounds {
         positions: vec![(0.05, 5.0), (-0.5 * PI, 2.5 * PI)],
         velocities: vec![(-5.0, 5.0), (-5.0, 5.0)],
@@ -38,7 +40,7 @@ pub const SYSTEM: System = System {
         t_end: 50.0,
         dt: 0.1,
     },
-    domain: Some(|q| if q[0] > 0.0 { Ok(()) } else { Err("r must be positive") }),
+    domain: Some(|_, q| if q[0] > 0.0 { Ok(()) } else { Err("r must be positive") }),
 };
 
 impl Lagrangian for SpringPendulum {

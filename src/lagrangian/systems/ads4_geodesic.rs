@@ -1,0 +1,14 @@
+//! Geodesic of 4-dimensional anti-de Sitter space.
+
+use super::anti_de_sitter;
+use crate::lagrangian::system::System;
+
+pub use super::anti_de_sitter::AdsGeodesic;
+
+/// Catalogue entry.
+pub const SYSTEM: System = anti_de_sitter::system(
+    "ads4-geodesic",
+    "Geodesic of AdS4 in half-space coordinates",
+    4,
+    "t_dot = sqrt(x_dot^2 + y_dot^2 + z_dot^2 + (z/L)^2)",
+);

@@ -1,0 +1,92 @@
+//! Geodesics of anti-de Sitter space of any dimension in half-space coordinates, shared by `ads2`, `ads3` and `ads4`.
+
+use super::{LENGTH, lengths};
+use crate::lagrangian::Lagrangian;
+use crate::lagrangian::system::{Bounds, Closed, Parameter, Size, System, TrajectoryTest};
+use crate::scalar::Real;
+
+/// `Lagrangian = (L/z)^2 (-t'^2 + x'^2 + y'^2 + z'^2) / 2` over `(t, z)`, `(t, x, z)` or `(t, x, y, z)`, `L` the radius.
+///
+/// `' = d/dtau`, `tau` the proper time; geometric units, `c = 1`: all coordinates, `tau` and `L` in metres. The
+/// geodesic equations are those of Hamzaogullari and Ozakin's appendix; the Euler-Lagrange equation of `z` confirms all
+/// signs printed there.
+#[derive(Clone, Copy, Debug)]
+pub struct AdsGeodesic {
+    /// Number of coordinates, 2 to 4.
+    pub n: usize,
+}
+
+const PARAMETERS: [Parameter; 1] = [Parameter { symbol: "L", ..LENGTH }];
+
+/// The same bounds as the paper's for every dimension: `t`, the coordinates between, `z`.
+fn bounds(n: usize, t: (f64, f64), x: (f64, f64), z: (f64, f64), x_dot: (f64, f64), z_dot: (f64, f64)) -> Bounds {
+    let list = |first, middle, last| {
+        let mut list = vec![middle; n];
+        (list[0], list[n - 1]) = (first, last);
+        list
+    };
+    // The velocity of t follows from the mass shell.
+    Bounds { positions: list(t, x, z), velocities: list((0.0, 0.0), x_dot, z_dot) }
+}
+
+fn states(n: usize) -> Bounds {
+    bounds(n, (-5.0, 5.0), (-5.0, 5.0), (0.5, 6.0), (-1.0, 1.0), (-0.6, 0.6))
+}
+
+/// Catalogue entry of `n` coordinates.
+pub const fn system(name: &'static str, title: &'static str, n: usize, constraint: &'static str) -> System {
+    System {
+        name,
+        title,
+        coordinates: |n| match n {
+            2 => lengths(&["t", "z"]),
+            3 => lengths(&["t", "x", "z"]),
+            _ => lengths(&["t", "x", "y", "z"]),
+        },
+        parameters: &PARAMETERS,
+        size: Size::Fixed(n),
+        time_unit: "m",
+        time_like: Some(0),
+        constraint: Some(constraint),
+        training: states,
+        validation: states,
+        trajectory: |n| TrajectoryTest {
+            start: bounds(n, (0.0, 0.0), (-1.0, 1.0), (0.5, 3.0), (-0.25, 0.25), (-0.25, 0.25)),
+            t_end: 0.5,
+            dt: 0.01,
+        },
+        domain: Some(|_, q| if q.last().is_some_and(|&z| z > 0.0) { Ok(()) } else { Err("z must be positive") }),
+    }
+}
+
+/// Sum of squares.
+fn squares<R: Real>(v: &[R]) -> R {
+    v.iter().fold(R::zero(), |sum, &v| sum + v.sqr())
+}
+
+impl Lagrangian for AdsGeodesic {
+    fn coordinates(&self) -> usize {
+        self.n
+    }
+    fn lagrangian<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> R {
+        let [radius] = *parameters else { return R::constant(crate::scalar::Scalar::NAN) };
+        R::half() * (radius / q[self.n - 1]).sqr() * (squares(&v[1..]) - v[0].sqr())
+    }
+}
+
+impl Closed for AdsGeodesic {
+    /// `t'' = 2 t' z'/z`, likewise `x` and `y`; `z'' = (t'^2 - x'^2 - y'^2 + z'^2)/z`.
+    fn acceleration<R: Real>(&self, _parameters: &[R], q: &[R], v: &[R]) -> Vec<R> {
+        let last = self.n - 1;
+        let (z, z_dot) = (q[last], v[last]);
+        let mut a: Vec<R> = v[..last].iter().map(|&v| R::two() * v * (z_dot / z)).collect();
+        a.push((v[0].sqr() - squares(&v[1..last]) + z_dot.sqr()) / z);
+        a
+    }
+
+    /// `t' = sqrt(x'^2 + y'^2 + z'^2 + (z/L)^2)`.
+    fn constrained_velocity<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> Option<R> {
+        let [radius] = *parameters else { return None };
+        Some((squares(&v[1..]) + (q[self.n - 1] / radius).sqr()).sqrt())
+    }
+}

@@ -1,0 +1,76 @@
+//! A relativistic charge in uniform magnetic and electric fields at right angles.
+
+use super::{MASS, lengths};
+use crate::lagrangian::Lagrangian;
+use crate::lagrangian::system::{Bounds, Closed, Parameter, Range, Size, System, TrajectoryTest};
+use crate::scalar::Real;
+
+/// `L = -m c^2 sqrt(1 - v^2/c^2) + q (A.v - phi)`, `A = B (-y, x, 0) / 2`, `phi = -E x`: magnetic field `B` along `z`,
+/// electric field `E` along `x`. Not quadratic in `v`; `M = gamma m (1 + gamma^2 v v^T / c^2)`.
+///
+/// Everything is `NaN` unless `|v| < c`. The default `c = 1` means natural units; with `c` in m/s all is in SI units.
+#[derive(Clone, Copy, Debug)]
+pub struct ChargedParticle;
+
+const PARAMETERS: [Parameter; 5] = [
+    MASS,
+    Parameter { symbol: "q", default: "1", unit: "C", range: Range::Any },
+    Parameter { symbol: "c", default: "1", unit: "m/s", range: Range::Positive },
+    Parameter { symbol: "B", default: "1", unit: "T", range: Range::Any },
+    Parameter { symbol: "E", default: "0.1", unit: "V/m", range: Range::Any },
+];
+
+/// Catalogue entry. The corners of the boxes of velocities are slower than light.
+pub const SYSTEM: System = System {
+    name: "charged-particle",
+    title: "Relativistic charged particle",
+    coordinates: |_| lengths(&["x", "y", "z"]),
+    parameters: &PARAMETERS,
+    size: Size::Fixed(3),
+    time_unit: "s",
+    time_like: None,
+    constraint: None,
+    training: |n| Bounds::uniform(n, (-5.0, 5.0), (-0.55, 0.55)),
+    validation: |n| Bounds::uniform(n, (-5.0, 5.0), (-0.55, 0.55)),
+    trajectory: |n| TrajectoryTest { start: Bounds::uniform(n, (-1.0, 1.0), (-0.25, 0.25)), t_end: 10.0, dt: 0.05 },
+    domain: None,
+};
+
+/// `1 - v^2/c^2`, `NaN` unless it is positive.
+///
+/// The largest component `w` enters as `(c - w) (c + w)` close to `c`, where that is exact, and as `c^2 - w^2` far from
+/// it, where the derivative of the product would cancel.
+fn gamma_to_minus_two<R: Real>(c: R, v: &[R]) -> R {
+    let (mut w, mut others) = (v[0], R::zero());
+    for &x in &v[1..] {
+        let larger = x.sqr() - w.sqr();
+        others += larger.select(w, x).sqr();
+        w = larger.select(x, w);
+    }
+    let (limit, square) = (c.sqr(), w.sqr());
+    let along = (square + square - limit).select((c - w) * (c + w), limit - square);
+    let result = (along - others) / limit;
+    result.select(result, R::constant(crate::scalar::Scalar::NAN))
+}
+
+impl Lagrangian for ChargedParticle {
+    fn coordinates(&self) -> usize {
+        3
+    }
+    fn lagrangian<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> R {
+        let [m, charge, c, b, e] = *parameters else { return R::constant(crate::scalar::Scalar::NAN) };
+        let potential = R::half() * b * (q[0] * v[1] - q[1] * v[0]) + e * q[0];
+        charge * potential - m * c.sqr() * gamma_to_minus_two(c, v).sqrt()
+    }
+}
+
+impl Closed for ChargedParticle {
+    /// `gamma m a = q (E + v x B - v (v.E) / c^2)`.
+    fn acceleration<R: Real>(&self, parameters: &[R], _q: &[R], v: &[R]) -> Vec<R> {
+        let [m, charge, c, b, e] = *parameters else { return Vec::new() };
+        let factor = charge * gamma_to_minus_two(c, v).sqrt() / m;
+        let drag = e * v[0] / c.sqr();
+        let along = e * ((c - v[0]) / c) * ((c + v[0]) / c);
+        vec![factor * (along + b * v[1]), -(factor * (b * v[0] + drag * v[1])), -(factor * drag * v[2])]
+    }
+}

@@ -1,0 +1,45 @@
+//! A point mass under a constant force.
+
+use super::{MASS, lengths};
+use crate::lagrangian::Lagrangian;
+use crate::lagrangian::system::{Bounds, Closed, Parameter, Range, Size, System, TrajectoryTest};
+use crate::scalar::Real;
+
+/// `L = m v^2 / 2 + F q`.
+#[derive(Clone, Copy, Debug)]
+pub struct ConstantForce;
+
+const PARAMETERS: [Parameter; 2] = [MASS, Parameter { symbol: "F", default: "1", unit: "N", range: Range::Any }];
+
+/// Catalogue entry.
+pub const SYSTEM: System = System {
+    name: "constant-force",
+    title: "Constant force",
+    coordinates: |_| lengths(&["q"]),
+    parameters: &PARAMETERS,
+    size: Size::Fixed(1),
+    time_unit: "s",
+    time_like: None,
+    constraint: None,
+    training: |n| Bounds::uniform(n, (-5.0, 5.0), (-5.0, 5.0)),
+    validation: |n| Bounds::uniform(n, (-5.0, 5.0), (-5.0, 5.0)),
+    trajectory: |n| TrajectoryTest { start: Bounds::uniform(n, (-1.0, 1.0), (-1.0, 1.0)), t_end: 2.0, dt: 0.02 },
+    domain: None,
+};
+
+impl Lagrangian for ConstantForce {
+    fn coordinates(&self) -> usize {
+        1
+    }
+    fn lagrangian<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> R {
+        let [m, force] = *parameters else { return R::constant(crate::scalar::Scalar::NAN) };
+        R::half() * m * v[0].sqr() + force * q[0]
+    }
+}
+
+impl Closed for ConstantForce {
+    fn acceleration<R: Real>(&self, parameters: &[R], _q: &[R], _v: &[R]) -> Vec<R> {
+        let [m, force] = *parameters else { return Vec::new() };
+        vec![force / m]
+    }
+}

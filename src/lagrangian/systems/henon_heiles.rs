@@ -1,0 +1,48 @@
+//! A star near the centre of an axisymmetric galaxy (Henon and Heiles 1964), the standard example of chaos.
+
+use super::lengths;
+use crate::lagrangian::Lagrangian;
+use crate::lagrangian::system::{Bounds, Closed, Parameter, Range, Size, System, TrajectoryTest};
+use crate::scalar::Real;
+
+/// `L = (v_x^2 + v_y^2) / 2 - (x^2 + y^2) / 2 - lambda (x^2 y - y^3 / 3)`, unit mass and frequency; bound below
+/// `E = 1 / (6 lambda^2)`.
+#[derive(Clone, Copy, Debug)]
+pub struct HenonHeiles;
+
+const PARAMETERS: [Parameter; 1] = [Parameter { symbol: "lambda", default: "1", unit: "1/(m s^2)", range: Range::Any }];
+
+/// Catalogue entry. The starts of the trajectory test lie below the energy of escape.
+pub const SYSTEM: System = System {
+    name: "henon-heiles",
+    title: "Henon-Heiles system",
+    coordinates: |_| lengths(&["x", "y"]),
+    parameters: &PARAMETERS,
+    size: Size::Fixed(2),
+    time_unit: "s",
+    time_like: None,
+    constraint: None,
+    training: |n| Bounds::uniform(n, (-1.0, 1.0), (-0.6, 0.6)),
+    validation: |n| Bounds::uniform(n, (-1.0, 1.0), (-0.6, 0.6)),
+    trajectory: |n| TrajectoryTest { start: Bounds::uniform(n, (-0.25, 0.25), (-0.25, 0.25)), t_end: 100.0, dt: 0.1 },
+    domain: None,
+};
+
+impl Lagrangian for HenonHeiles {
+    fn coordinates(&self) -> usize {
+        2
+    }
+    fn lagrangian<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> R {
+        let [lambda] = *parameters else { return R::constant(crate::scalar::Scalar::NAN) };
+        let (xx, yy) = (q[0].sqr(), q[1].sqr());
+        R::half() * (v[0].sqr() + v[1].sqr() - xx - yy) - lambda * q[1] * (xx - R::ratio(1, 3) * yy)
+    }
+}
+
+impl Closed for HenonHeiles {
+    fn acceleration<R: Real>(&self, parameters: &[R], q: &[R], _v: &[R]) -> Vec<R> {
+        let [lambda] = *parameters else { return Vec::new() };
+        let (x, y) = (q[0], q[1]);
+        vec![-(x + R::two() * lambda * x * y), -(y + lambda * (x - y) * (x + y))]
+    }
+}

@@ -1,0 +1,52 @@
+//! Motion of a unit mass around a fixed centre of gravity, in the plane.
+
+use super::lengths;
+use crate::lagrangian::Lagrangian;
+use crate::lagrangian::system::{Bounds, Closed, Parameter, Range, Size, System, TrajectoryTest};
+use crate::scalar::Real;
+
+/// `L = (v_x^2 + v_y^2) / 2 + mu / r`, `r^2 = x^2 + y^2`, per unit of mass; singular at `r = 0`.
+#[derive(Clone, Copy, Debug)]
+pub struct Kepler;
+
+const PARAMETERS: [Parameter; 1] = [Parameter { symbol: "mu", default: "1", unit: "m^3/s^2", range: Range::Positive }];
+
+/// Catalogue entry. The starts of the trajectory test lie on ellipses of eccentricity below 1/2 inside the training box.
+pub const SYSTEM: System = System {
+    name: "kepler",
+    title: "Kepler problem",
+    coordinates: |_| lengths(&["x", "y"]),
+    parameters: &PARAMETERS,
+    size: Size::Fixed(2),
+    time_unit: "s",
+    time_like: None,
+    constraint: None,
+    training: |n| Bounds::uniform(n, (-2.0, 2.0), (-2.0, 2.0)),
+    validation: |n| Bounds::uniform(n, (-2.0, 2.0), (-2.0, 2.0)),
+    trajectory: |_| TrajectoryTest {
+        start: Bounds { positions: vec![(0.9, 1.1), (-0.1, 0.1)], velocities: vec![(-0.1, 0.1), (0.8, 1.05)] },
+        t_end: 20.0,
+        dt: 0.05,
+    },
+    domain: Some(|_, q| if q[0] != 0.0 || q[1] != 0.0 { Ok(()) } else { Err("x and y must not both vanish") }),
+};
+
+impl Lagrangian for Kepler {
+    fn coordinates(&self) -> usize {
+        2
+    }
+    fn lagrangian<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> R {
+        let [mu] = *parameters else { return R::constant(crate::scalar::Scalar::NAN) };
+        R::half() * (v[0].sqr() + v[1].sqr()) + mu / (q[0].sqr() + q[1].sqr()).sqrt()
+    }
+}
+
+impl Closed for Kepler {
+    /// `a = -mu (x, y) / r^3`.
+    fn acceleration<R: Real>(&self, parameters: &[R], q: &[R], _v: &[R]) -> Vec<R> {
+        let [mu] = *parameters else { return Vec::new() };
+        let square = q[0].sqr() + q[1].sqr();
+        let factor = -mu / (square * square.sqrt());
+        vec![factor * q[0], factor * q[1]]
+    }
+}

@@ -1,0 +1,99 @@
+//! Free fall outside a black hole without charge and spin.
+
+use crate::lagrangian::Lagrangian;
+use crate::lagrangian::system::{Bounds, Closed, Coordinate, Parameter, Range, Size, System, TrajectoryTest};
+use crate::scalar::Real;
+use std::f64::consts::PI;
+
+/// `L = (-f t'^2 + r'^2 / f + r^2 (theta'^2 + sin^2 theta phi'^2)) / 2`, `f = 1 - 2M/r`, per unit of mass.
+///
+/// `' = d/dtau`, `tau` the proper time; geometric units, `G = c = 1`: `t`, `r`, `tau` and `M` in metres.
+#[derive(Clone, Copy, Debug)]
+pub struct SchwarzschildGeodesic;
+
+const PARAMETERS: [Parameter; 1] = [Parameter { symbol: "M", default: "1", unit: "m", range: Range::Positive }];
+
+fn bounds(phi: (f64, f64)) -> Bounds {
+    Bounds {
+        positions: vec![(-10.0, 10.0), (3.0, 15.0), (0.1 * PI, 0.9 * PI), phi],
+        // The velocity of t follows from the mass shell.
+        velocities: vec![(0.0, 0.0), (-0.3, 0.3), (-0.1, 0.1), (-0.1, 0.1)],
+    }
+}
+
+/// Catalogue entry.
+pub const SYSTEM: System = System {
+    name: "schwarzschild-geodesic",
+    title: "Geodesic of the Schwarzschild metric",
+    coordinates: |_| {
+        let theta = Coordinate { periodic: false, ..Coordinate::angle("theta") };
+        vec![Coordinate::length("t"), Coordinate::length("r"), theta, Coordinate::angle("phi")]
+    },
+    parameters: &PARAMETERS,
+    size: Size::Fixed(4),
+    time_unit: "m",
+    time_like: Some(0),
+    constraint: Some("t_dot = sqrt((1 + r_dot^2/f + r^2 (theta_dot^2 + sin(theta)^2 phi_dot^2))/f), f = 1 - 2 M/r"),
+    training: |_| bounds((-0.5 * PI, 2.5 * PI)),
+    validation: |_| bounds((0.0, 2.0 * PI)),
+    trajectory: |_| TrajectoryTest {
+        start: Bounds {
+            positions: vec![(0.0, 0.0), (6.0, 12.0), (0.4 * PI, 0.6 * PI), (0.0, 2.0 * PI)],
+            velocities: vec![(0.0, 0.0), (-0.1, 0.1), (-0.02, 0.02), (-0.05, 0.05)],
+        },
+        t_end: 5.0,
+        dt: 0.05,
+    },
+    domain: Some(|parameters, q| match (parameters, q) {
+        (&[mass], &[_, r, theta, _]) if r > 2.0 * mass && theta.sin() != 0.0 => Ok(()),
+        _ => Err("r must be above 2 M and theta keep away from the poles"),
+    }),
+};
+
+/// `theta'^2 + sin^2 theta phi'^2`.
+fn turning<R: Real>(q: &[R], v: &[R]) -> R {
+    v[2].sqr() + (q[2].sin() * v[3]).sqr()
+}
+
+/// `f = 1 - 2M/r`: below `r = 4M` as `(r - 2M)/r`, where the difference is exact, above as written, where the derivative
+/// of the quotient would cancel.
+fn redshift<R: Real>(mass: R, r: R) -> R {
+    let horizon = R::two() * mass;
+    (horizon + horizon - r).select((r - horizon) / r, R::one() - horizon / r)
+}
+
+impl Lagrangian for SchwarzschildGeodesic {
+    fn coordinates(&self) -> usize {
+        4
+    }
+    fn lagrangian<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> R {
+        let [mass] = *parameters else { return R::constant(crate::scalar::Scalar::NAN) };
+        let (r, f) = (q[1], redshift(mass, q[1]));
+        R::half() * (v[1].sqr() / f - f * v[0].sqr() + r.sqr() * turning(q, v))
+    }
+}
+
+impl Closed for SchwarzschildGeodesic {
+    /// `t'' = -2M t' r' / (r (r - 2M))`, `r'' = M (r'^2/f - f t'^2)/r^2 + (r - 2M) (theta'^2 + sin^2 theta phi'^2)`,
+    /// `theta'' = -2 r' theta'/r + sin theta cos theta phi'^2`, `phi'' = -2 phi' (r'/r + cot theta theta')`.
+    fn acceleration<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> Vec<R> {
+        let [mass] = *parameters else { return Vec::new() };
+        let (r, (sin, cos)) = (q[1], q[2].sin_cos());
+        let height = r - R::two() * mass;
+        let f = height / r;
+        let rate = v[1] / r;
+        vec![
+            -R::two() * mass * v[0] * rate / height,
+            mass * (v[1].sqr() / f - f * v[0].sqr()) / r.sqr() + height * turning(q, v),
+            sin * cos * v[3].sqr() - R::two() * rate * v[2],
+            -R::two() * v[3] * (rate + (cos / sin) * v[2]),
+        ]
+    }
+
+    /// `t' = sqrt((1 + r'^2/f + r^2 (theta'^2 + sin^2 theta phi'^2)) / f)`.
+    fn constrained_velocity<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> Option<R> {
+        let [mass] = *parameters else { return None };
+        let f = redshift(mass, q[1]);
+        Some(((R::one() + v[1].sqr() / f + q[1].sqr() * turning(q, v)) / f).sqrt())
+    }
+}
