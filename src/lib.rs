@@ -2,7 +2,7 @@
 //! physics off the learned function.
 //!
 //! Rooms, each importing only from those above it: [`names`], [`storage`], [`scalar`], [`ops`], [`forward`], [`linalg`], [`tape`],
-//! [`lagrangian`], [`network`], [`training`], [`rollout`], [`analysis`], `report`, `cli`.
+//! [`lagrangian`], [`network`], [`training`], [`rollout`], [`analysis`], [`experiments`], `report`, `cli`.
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 
@@ -29,6 +29,8 @@ pub mod training;
 pub mod rollout;
 
 pub mod analysis;
+
+pub mod experiments;
 
 #[cfg(feature = "plot")]
 pub mod report;

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Rooms from top to bottom; a file may name its own room and those before it.
-const ROOMS: [&str; 14] = [
+const ROOMS: [&str; 15] = [
     "names",
     "storage",
     "scalar",
@@ -18,6 +18,7 @@ const ROOMS: [&str; 14] = [
     "training",
     "rollout",
     "analysis",
+    "experiments",
     "report",
     "cli",
 ];

@@ -7,6 +7,7 @@ mod energy;
 mod grid;
 mod instability;
 mod lyapunov;
+mod signature;
 mod summary;
 mod trajectories;
 
@@ -17,5 +18,6 @@ pub use energy::{EnergyError, energy_drift, energy_error};
 pub use grid::{Axis, Grid, GridError, determinant_grid, lagrangian_grid};
 pub use instability::{savitzky_golay, stretches, training_instability};
 pub use lyapunov::{Lyapunov, lyapunov};
+pub use signature::wrong_signatures;
 pub use summary::{Statistics, statistics};
 pub use trajectories::{StartBox, TrajectoryRun, TrajectorySummary, TrajectoryTest};

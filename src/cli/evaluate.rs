@@ -63,7 +63,13 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let states =
         sample(&system, "validation bounds", (&bounds.0, &bounds.1), STATES, &mut random).map_err(CliError::data)?;
 
-    let plan = Plan { states: (states.q(), states.v()), starts: args.starts, seed, threads: threads(args.threads) };
+    let plan = Plan {
+        states: (states.q(), states.v()),
+        starts: args.starts,
+        horizon: 1.0,
+        seed,
+        threads: threads(args.threads),
+    };
     let evaluation = evaluate(&system, &learned.network, plan)?;
     let validation_loss = learned.header.validation_loss;
     let summary = Summary { system: system.system.name, seed, validation_loss, evaluation: &evaluation };

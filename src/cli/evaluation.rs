@@ -2,7 +2,7 @@
 
 use crate::analysis::{
     AccelerationError, Axis, StartBox, TrajectoryRun, TrajectorySummary, TrajectoryTest, acceleration_errors,
-    determinant_grid, lagrangian_grid,
+    determinant_grid, lagrangian_grid, wrong_signatures,
 };
 use crate::cli::CliError;
 use crate::lagrangian::{Configured, EulerLagrange};
@@ -17,6 +17,8 @@ const GRID: usize = 81;
 pub struct Evaluation {
     /// Error of the accelerations of fresh states, one entry per coordinate.
     pub accelerations: Vec<AccelerationError>,
+    /// Fraction of the fresh states whose mass matrix has not the signature of the exact one.
+    pub wrong_signature: f64,
     /// One entry per random start.
     pub trajectories: Vec<TrajectorySummary>,
     /// Names of the accelerations' coordinates.
@@ -37,6 +39,8 @@ pub struct Plan<'a> {
     pub states: (&'a [f64], &'a [f64]),
     /// Random starts.
     pub starts: usize,
+    /// Fraction of the trajectory test's time span.
+    pub horizon: f64,
     /// Seed of the starts.
     pub seed: u64,
     /// Threads.
@@ -63,7 +67,7 @@ pub fn evaluate(
     let test = TrajectoryTest {
         starts: plan.starts,
         seed: plan.seed,
-        t_end: test.t_end,
+        t_end: test.t_end * plan.horizon,
         dt: test.dt,
         threads: plan.threads,
         ..TrajectoryTest::new(bounds, periodic.clone())
@@ -76,6 +80,7 @@ pub fn evaluate(
     figures.extend(grids(system, exact.as_ref(), learned)?);
     Ok(Evaluation {
         accelerations,
+        wrong_signature: wrong_signatures(exact.as_ref(), learned, plan.states.0, plan.states.1),
         trajectories: runs.iter().map(TrajectoryRun::summary).collect(),
         coordinates: coordinates.iter().map(|c| c.name.to_string()).collect(),
         time_unit: system.system.time_unit,

@@ -7,11 +7,13 @@ mod config;
 mod error;
 mod evaluate;
 mod evaluation;
+mod experiment;
 mod folder;
 mod inspect;
 mod interrupt;
 mod json;
 mod learned;
+mod learning;
 mod number;
 mod output;
 mod progress;
@@ -48,6 +50,8 @@ enum Command {
     Rollout(rollout::Args),
     /// Compare a model with the system it learned.
     Evaluate(evaluate::Args),
+    /// Regenerate a table or figure of the paper, or list them.
+    Experiment(experiment::Args),
     /// Print the Euler-Lagrange terms of states, every digit of them.
     Inspect(inspect::Args),
 }
@@ -70,8 +74,8 @@ pub fn main(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
 }
 
 fn run(command: Command) -> Result<(), CliError> {
-    // Training keeps its best model when it is interrupted; the others have nothing to keep.
-    if !matches!(command, Command::Train(_)) {
+    // Training and experiments keep what they have when they are interrupted; the others have nothing to keep.
+    if !matches!(command, Command::Train(_) | Command::Experiment(_)) {
         interrupt::end_at_once()?;
     }
     match command {
@@ -79,6 +83,7 @@ fn run(command: Command) -> Result<(), CliError> {
         Command::Train(args) => train::run(&args),
         Command::Rollout(args) => rollout::run(&args),
         Command::Evaluate(args) => evaluate::run(&args),
+        Command::Experiment(args) => experiment::run(&args),
         Command::Inspect(args) => inspect::run(&args),
     }
 }

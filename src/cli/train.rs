@@ -1,48 +1,18 @@
 //! `lnn train`: learns, judges, writes.
 
-use crate::cli::evaluation::{Evaluation, Plan, evaluate};
 use crate::cli::folder::Folder;
-use crate::cli::learned::given;
+use crate::cli::learning::{Effort, Finished, Learning, learn};
 use crate::cli::number::threads;
 use crate::cli::progress::Progress as Bar;
 use crate::cli::train_config::Args;
 use crate::cli::{CliError, interrupt, output};
-use crate::lagrangian::system::Size;
-use crate::lagrangian::{Configured, configure};
-use crate::network::file::{FORMAT, Header, ModelFile, StoredPrecision};
-use crate::network::{Architecture, NetworkLagrangian};
-use crate::report::{HistoryRow, Report, training_figures};
-use crate::scalar::Scalar;
-use crate::training::{
-    Config, Datasets, Epoch, Hooks, Phase, Precision, Progress, SamplingError, Stop, Trained, sample_all, train,
-};
-use serde::Serialize;
-use std::fmt::Write as _;
+use crate::training::{Hooks, Progress, Stop};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Instant;
 
-/// What `summary.json` holds; losses in the paper's convention, errors in physical units.
-#[derive(Serialize)]
-struct Summary<'a> {
-    system: &'a str,
-    crate_version: &'static str,
-    seed: u64,
-    precision: &'static str,
-    threads: usize,
-    epochs: usize,
-    weights: usize,
-    validation_loss: f64,
-    test_loss: f64,
-    test_states_left_out: usize,
-    wall_seconds: f64,
-    training_seconds: f64,
-    states_per_second: f64,
-    ended: String,
-    #[serde(flatten)]
-    evaluation: &'a Evaluation,
-}
+/// Starts of the trajectory test, as in the paper.
+const STARTS: usize = 4;
 
 /// Trains and writes everything into the output directory.
 ///
@@ -51,143 +21,29 @@ struct Summary<'a> {
 /// after the last two the best model so far is written, if there is one.
 pub fn run(args: &Args) -> Result<(), CliError> {
     let (config, system) = args.resolve()?;
-    match config.precision {
-        Precision::F32 => learn::<f32>(args, &config, &system),
-        Precision::F64 => learn::<f64>(args, &config, &system),
-    }
-}
-
-fn learn<S: Scalar>(args: &Args, config: &Config, system: &Configured<f64>) -> Result<(), CliError> {
-    let started = Instant::now();
-    let (data, scale) = sample_all::<S>(config, system).map_err(|e| match e {
-        SamplingError::Dataset(_) => CliError::data(e),
-        _ => CliError::usage(e),
-    })?;
-    let penalty = config.penalty().map_err(CliError::usage)?;
     let path = args.out.clone().unwrap_or_else(|| PathBuf::from("runs").join(&config.system));
     let folder = Folder::open(&path)?;
-    let architecture = config.architecture(system, scale);
-    let imposed = imposed_velocities(system, &data);
     let stop = interrupt::flag()?;
-    let threads = threads(args.threads);
-    let fresh = (data.test.cast::<f64>().q().to_vec(), data.test.cast::<f64>().v().to_vec());
-
-    let trained = train(config, &architecture, penalty, data, threads, &hooks(&stop)).map_err(|e| {
-        if stop.load(Ordering::SeqCst) {
-            CliError::interrupted("interrupted before the first epoch ended")
-        } else {
-            CliError::data(e)
+    let effort = Effort { threads: threads(args.threads), starts: STARTS, horizon: 1.0 };
+    let finished = match learn(&folder, &config, &system, effort, &hooks(&stop))? {
+        Learning::Finished(finished) => finished,
+        Learning::Nothing(_) if stop.load(Ordering::SeqCst) => {
+            return Err(CliError::interrupted("interrupted before the first epoch ended"));
         }
-    })?;
-
-    // The model and its history first: nothing that comes after can lose them.
-    let header = header(config, system, architecture.clone(), imposed, trained.validation_loss)?;
-    let model = ModelFile { header, weights: trained.weights.clone() };
-    let toml = toml::to_string(config).map_err(CliError::data)?;
-    let file = folder.file("model.safetensors");
-    folder.write("config.toml", toml.as_bytes())?;
-    folder.write("history.csv", history(&trained.history).as_bytes())?;
-    model.save(&file).map_err(|e| CliError::file(&file, e))?;
-
-    let network = NetworkLagrangian::new(architecture, model.weights).map_err(CliError::data)?.cast::<f64>();
-    let plan = Plan { states: (&fresh.0, &fresh.1), starts: 4, seed: config.seed, threads };
-    let evaluation = evaluate(system, &network, plan)?;
-    let summary = Summary {
-        system: &config.system,
-        crate_version: env!("CARGO_PKG_VERSION"),
-        seed: config.seed,
-        precision: S::NAME,
-        threads,
-        epochs: trained.history.len(),
-        weights: trained.weights.len(),
-        validation_loss: trained.validation_loss,
-        test_loss: trained.test.loss.to_f64(),
-        test_states_left_out: trained.test.left_out,
-        wall_seconds: started.elapsed().as_secs_f64(),
-        training_seconds: trained.seconds,
-        states_per_second: trained.states as f64 / trained.seconds,
-        ended: ended(&trained.stop),
-        evaluation: &evaluation,
+        Learning::Nothing(reason) => return Err(CliError::data(reason)),
     };
-    let json = serde_json::to_string_pretty(&summary).map_err(CliError::data)? + "\n";
-    write_report(&folder, system, &summary, &trained.history, &toml)?;
-    folder.write("summary.json", json.as_bytes())?;
-    let text =
-        format!("{}\n{}\nreport: {}\n", headline(&summary), evaluation.text(), folder.file("report.html").display());
-    output::print(if args.json { &json } else { &text })?;
-    conclude(&trained, &path)
+    output::print(if args.json { &finished.json } else { &finished.text })?;
+    conclude(&finished, &path)
 }
 
 /// The exit of a training that did not run to its end.
-fn conclude<S>(trained: &Trained<S>, path: &Path) -> Result<(), CliError> {
-    let kept = format!("the best of {} epochs is in {}", trained.history.len(), path.display());
-    match &trained.stop {
+fn conclude(finished: &Finished, path: &Path) -> Result<(), CliError> {
+    let kept = format!("the best of {} epochs is in {}", finished.epochs, path.display());
+    match &finished.stop {
         Stop::Finished => Ok(()),
         Stop::Interrupted => Err(CliError::interrupted(format_args!("interrupted, {kept}"))),
         Stop::Failed(error) => Err(CliError::data(format_args!("training stopped: {error}; {kept}"))),
     }
-}
-
-fn ended(stop: &Stop) -> String {
-    match stop {
-        Stop::Finished => "finished".to_string(),
-        Stop::Interrupted => "interrupted".to_string(),
-        Stop::Failed(error) => error.to_string(),
-    }
-}
-
-/// The velocity that the mass shell fixes and its range over the training states, which no bounds of the configuration
-/// tell.
-fn imposed_velocities<S: Scalar>(system: &Configured<f64>, data: &Datasets<S>) -> Option<(usize, [f64; 2])> {
-    let i = system.constrained_coordinate()?;
-    let ranges = data.training.iter().map(|set| set.velocity_range(i));
-    ranges.reduce(|[low, high], [l, h]| [low.min(l), high.max(h)]).map(|range| (i, range))
-}
-
-/// What the model file says about this run.
-fn header(
-    config: &Config,
-    system: &Configured<f64>,
-    architecture: Architecture,
-    imposed: Option<(usize, [f64; 2])>,
-    validation_loss: f64,
-) -> Result<Header, CliError> {
-    // Defaults that change in a later version must not change this model.
-    let named = system.system.parameters.iter().map(|p| p.symbol.to_string());
-    let mut parameters: std::collections::BTreeMap<_, _> = named.zip(system.parameters.iter().copied()).collect();
-    parameters.extend(config.parameters.clone());
-    if let Size::Chosen { symbol, .. } = system.system.size {
-        parameters.insert(symbol.to_string(), system.coordinates as f64);
-    }
-    configure::<f64>(&config.system, &given(&parameters)).map_err(CliError::data)?;
-    let hull = |bounds: fn(&Phase) -> &Vec<[f64; 2]>| {
-        (0..system.coordinates)
-            .map(|i| {
-                let all = config.phases.iter().filter_map(|phase| bounds(phase).get(i));
-                all.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], b| [low.min(b[0]), high.max(b[1])])
-            })
-            .collect()
-    };
-    let mut velocity: Vec<[f64; 2]> = hull(|phase| &phase.velocity);
-    if let Some((i, range)) = imposed {
-        velocity[i] = range;
-    }
-    Ok(Header {
-        format: FORMAT,
-        crate_version: env!("CARGO_PKG_VERSION").to_string(),
-        architecture,
-        system: config.system.clone(),
-        parameters,
-        columns: system.system.columns(system.coordinates),
-        precision: match config.precision {
-            Precision::F32 => StoredPrecision::F32,
-            Precision::F64 => StoredPrecision::F64,
-        },
-        position: hull(|phase| &phase.position),
-        velocity,
-        seed: config.seed,
-        validation_loss,
-    })
 }
 
 /// Progress on standard error, Ctrl-C.
@@ -206,73 +62,4 @@ fn hooks(stop: &Arc<AtomicBool>) -> Hooks {
         })),
         interrupt: Arc::clone(stop),
     }
-}
-
-/// `history.csv`: one row per epoch.
-fn history(epochs: &[Epoch]) -> String {
-    let mut csv =
-        "epoch,phase,rate,training_loss,penalty,penalised,validation_loss,gradient_norm,left_out,skipped,seconds\n"
-            .to_string();
-    for e in epochs {
-        // Writing to a string cannot fail.
-        let _ = writeln!(
-            csv,
-            "{},{},{},{},{},{},{},{},{},{},{:.3}",
-            e.epoch,
-            e.phase,
-            e.rate,
-            e.training_loss,
-            e.penalty,
-            e.penalised,
-            e.validation_loss,
-            e.gradient_norm,
-            e.left_out,
-            e.skipped,
-            e.seconds
-        );
-    }
-    csv
-}
-
-/// The figures of a run in one line.
-fn headline(summary: &Summary<'_>) -> String {
-    format!(
-        "loss (paper): validation {:.6}, fresh states {:.6}; {} epochs in {:.1} s, {:.0} states/s, {} weights, seed {}\n",
-        summary.validation_loss,
-        summary.test_loss,
-        summary.epochs,
-        summary.training_seconds,
-        summary.states_per_second,
-        summary.weights,
-        summary.seed
-    )
-}
-
-fn write_report(
-    folder: &Folder,
-    system: &Configured<f64>,
-    summary: &Summary<'_>,
-    epochs: &[Epoch],
-    toml: &str,
-) -> Result<(), CliError> {
-    let rows: Vec<HistoryRow> = epochs
-        .iter()
-        .map(|e| HistoryRow {
-            epoch: e.epoch as f64,
-            training_loss: e.training_loss,
-            validation_loss: e.validation_loss,
-            learning_rate: e.rate,
-            gradient_norm: e.gradient_norm,
-            penalty: e.penalty,
-        })
-        .collect();
-    let training = training_figures(&rows).map_err(CliError::data)?;
-    let report = Report::new(&format!("{}: learned", system.system.title)).paragraph(&headline(summary));
-    let report = summary.evaluation.report(report).heading("Training");
-    let report = training.iter().fold(report, |report, figure| report.figure(&figure.png, &figure.caption));
-    let report = report.heading("Configuration").preformatted(toml);
-    for figure in training.iter().chain(&summary.evaluation.figures) {
-        folder.write(&figure.file, &figure.png)?;
-    }
-    folder.write("report.html", report.to_html().as_bytes())
 }

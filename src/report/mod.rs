@@ -1,12 +1,14 @@
 //! Plots, tables and the HTML report.
 
 mod evaluation;
+mod experiment;
 mod html;
 mod plot;
 mod table;
 mod training;
 
 pub use evaluation::{GridComparison, evaluation_figures, grid_figures};
+pub use experiment::{EXPERIMENT_HEADER, experiment_figures, experiment_table};
 pub use html::Report;
 pub use plot::{HeatMap, LinePlot, PlotError, Series, Trace, heat_maps_png, line_png, trace_png};
 pub use table::text_table;

@@ -1,0 +1,249 @@
+//! `lnn experiment`: the paper's tables and figures, one command each; finished runs are not run again.
+
+use crate::cli::folder::Folder;
+use crate::cli::learning::{Effort, Learning, learn};
+use crate::cli::number::{count, threads};
+use crate::cli::progress::Progress as Bar;
+use crate::cli::{CliError, interrupt, output};
+use crate::experiments::{Experiment, Outcome, Picture, Record, Run, Scale, experiments, find};
+use crate::report::{EXPERIMENT_HEADER, Figure, Report, experiment_figures, experiment_table, text_table};
+use crate::training::{Hooks, Stop};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::sync::PoisonError;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Instant;
+
+/// Arguments.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// An experiment by name, or `all`; without a name they are listed with the tables and figures they regenerate.
+    name: Option<String>,
+    /// How much of the paper's budget.
+    #[arg(long, value_enum, default_value = "short")]
+    scale: ScaleName,
+    /// Seeds of every run.
+    #[arg(long, value_name = "N", default_value = "1", allow_hyphen_values = true, value_parser = count)]
+    seeds: usize,
+    /// Threads; as many runs go side by side, and the results do not depend on them [default: all].
+    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = count)]
+    threads: Option<usize>,
+    /// Directory; an experiment goes into NAME-SCALE in it.
+    #[arg(long, value_name = "DIR", default_value = "runs/experiments")]
+    out: PathBuf,
+}
+
+#[derive(Clone, Copy, Debug, clap::ValueEnum)]
+enum ScaleName {
+    /// All experiments in minutes; shows that they run.
+    Smoke,
+    /// Minutes each; gives a ranking.
+    Short,
+    /// The paper's own.
+    Paper,
+}
+
+/// Runs experiments, or lists them.
+///
+/// # Errors
+/// A usage error for an unknown name, a data error for a directory that cannot be written or that another run holds, an
+/// interruption; runs that are finished stay finished.
+pub fn run(args: &Args) -> Result<(), CliError> {
+    let Some(name) = &args.name else {
+        interrupt::end_at_once()?;
+        return output::print(&listing());
+    };
+    let scale = match args.scale {
+        ScaleName::Smoke => Scale::Smoke,
+        ScaleName::Short => Scale::Short,
+        ScaleName::Paper => Scale::Paper,
+    };
+    let chosen: Vec<&Experiment> =
+        if name == "all" { experiments().iter().collect() } else { vec![find(name).map_err(CliError::usage)?] };
+    let hooks = Hooks { watcher: None, interrupt: interrupt::flag()? };
+    for experiment in chosen {
+        let path = args.out.join(format!("{}-{}", experiment.name, scale.name()));
+        perform(experiment, scale, args.seeds, threads(args.threads), &path, &hooks)?;
+    }
+    Ok(())
+}
+
+fn listing() -> String {
+    let rows: Vec<Vec<String>> = experiments()
+        .iter()
+        .map(|e| vec![e.name.to_string(), e.paper.to_string(), e.runs(Scale::Paper, 1).len().to_string()])
+        .collect();
+    text_table(&["experiment", "of the paper", "runs"], &rows)
+}
+
+fn perform(
+    experiment: &Experiment,
+    scale: Scale,
+    seeds: usize,
+    threads: usize,
+    path: &Path,
+    hooks: &Hooks,
+) -> Result<(), CliError> {
+    let started = Instant::now();
+    let folder = Folder::open(path)?;
+    let runs = experiment.runs(scale, seeds);
+    let bar = Bar::new(runs.len() as u64, "runs");
+    let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
+    let results: Mutex<BTreeMap<usize, Result<Option<Record>, CliError>>> = Mutex::new(BTreeMap::new());
+    let abreast = threads.min(runs.len()).max(1);
+    let work = || {
+        while let Some(run) = runs.get(next.fetch_add(1, Ordering::Relaxed)) {
+            let result = one(run, scale, (threads / abreast).max(1), &path.join(&run.name), hooks);
+            bar.advance(done.fetch_add(1, Ordering::Relaxed) as u64 + 1);
+            let failed = result.is_err();
+            let index = runs.iter().position(|other| other.name == run.name).unwrap_or(0);
+            results.lock().unwrap_or_else(PoisonError::into_inner).insert(index, result);
+            if failed || hooks.interrupt.load(Ordering::SeqCst) {
+                // No new runs; those of the other threads come to their own end.
+                next.store(runs.len(), Ordering::Relaxed);
+            }
+        }
+    };
+    std::thread::scope(|scope| {
+        for _ in 0..abreast {
+            scope.spawn(work);
+        }
+    });
+    drop(bar);
+    let mut found = results.into_inner().unwrap_or_else(PoisonError::into_inner);
+    let results = runs
+        .into_iter()
+        .enumerate()
+        .map(|(index, run)| Ok((run, found.remove(&index).transpose()?.flatten())))
+        .collect::<Result<Vec<(Run, Option<Record>)>, CliError>>()?;
+    if hooks.interrupt.load(Ordering::SeqCst) {
+        let finished = results.iter().filter(|(_, record)| record.is_some()).count();
+        return Err(CliError::interrupted(format_args!(
+            "interrupted with {finished} of {} runs finished; the same command goes on from there",
+            results.len()
+        )));
+    }
+    conclude(experiment, scale, &results, &folder, path, started)
+}
+
+/// The record of a run: the one that is there if it was made from the same configuration, or a new one. `None` if it was
+/// interrupted.
+fn one(run: &Run, scale: Scale, threads: usize, path: &Path, hooks: &Hooks) -> Result<Option<Record>, CliError> {
+    let toml = toml::to_string(&run.config).map_err(CliError::data)?;
+    if let Some(record) = finished(path, &toml) {
+        return Ok(Some(record));
+    }
+    let folder = Folder::open(path)?;
+    let system = run.config.system().map_err(CliError::data)?;
+    run.config.validate(system.coordinates).map_err(CliError::data)?;
+    let (starts, horizon) = scale.trajectories();
+    let began = Instant::now();
+    let record = match learn(&folder, &run.config, &system, Effort { threads, starts, horizon }, hooks)? {
+        _ if hooks.interrupt.load(Ordering::SeqCst) => return Ok(None),
+        Learning::Finished(finished) => {
+            if let Stop::Failed(error) = &finished.stop {
+                tracing::warn!(run = run.name, %error, "training stopped early");
+            }
+            finished.record
+        }
+        Learning::Nothing(reason) => {
+            Record { outcome: Outcome::Nothing { reason }, losses: Vec::new(), seconds: began.elapsed().as_secs_f64() }
+        }
+    };
+    folder.write("config.toml", toml.as_bytes())?;
+    // Last: what has a record is finished.
+    let json = serde_json::to_string(&record).map_err(CliError::data)?;
+    folder.write(RECORD, json.as_bytes())?;
+    Ok(Some(record))
+}
+
+/// File that a finished run has.
+const RECORD: &str = "record.json";
+
+/// The record in a directory if it was made from this configuration.
+fn finished(path: &Path, toml: &str) -> Option<Record> {
+    let read = |name: &str| crate::storage::read_regular(&path.join(name), 1 << 26).ok();
+    let record = serde_json::from_slice(&read(RECORD)?).ok()?;
+    (read("config.toml")? == toml.as_bytes()).then_some(record)
+}
+
+/// Writes table, pictures and report; prints the table.
+fn conclude(
+    experiment: &Experiment,
+    scale: Scale,
+    results: &[(Run, Option<Record>)],
+    folder: &Folder,
+    path: &Path,
+    started: Instant,
+) -> Result<(), CliError> {
+    let table = experiment_table(&experiment.rows(results));
+    let mut figures = experiment_figures(experiment, results).map_err(CliError::data)?;
+    for figure in &figures {
+        folder.write(&figure.file, &figure.png)?;
+    }
+    figures.extend(pictures_of_runs(experiment, results, path));
+    let training: f64 = results.iter().filter_map(|(_, record)| record.as_ref()).map(|record| record.seconds).sum();
+    let note = format!(
+        "Scale {}, {} runs, {training:.0} s of training, {:.0} s on the clock this time.",
+        scale.name(),
+        results.len(),
+        started.elapsed().as_secs_f64()
+    );
+    let conventions = "Losses are the paper's: half the mean absolute error of scaled accelerations; times the mean scale \
+                       they are physical. Several runs: mean [lowest, highest]. Wrong signature: fraction of fresh \
+                       states. Integrated: starts of the trajectory test whose learned motion reached its end.";
+    let report = Report::new(experiment.title)
+        .paragraph(&format!("Regenerates: {}.", experiment.paper))
+        .paragraph(&format!("The paper: {}", experiment.finding))
+        .paragraph(&note)
+        .table(&EXPERIMENT_HEADER, &table)
+        .paragraph(conventions);
+    let report = figures.iter().fold(report, |report, figure| report.figure(&figure.png, &figure.caption));
+    folder.write("table.csv", csv(&table).as_bytes())?;
+    folder.write("report.html", report.to_html().as_bytes())?;
+    let text = text_table(&EXPERIMENT_HEADER, &table);
+    let report = folder.file("report.html");
+    output::print(&format!(
+        "{} ({})\n{text}\n{note}\nreport: {}\n\n",
+        experiment.title,
+        experiment.paper,
+        report.display()
+    ))
+}
+
+/// Comma-separated values; cells hold brackets and words, so all are quoted.
+fn csv(table: &[Vec<String>]) -> String {
+    let line = |cells: &mut dyn Iterator<Item = &str>| {
+        cells.map(|cell| format!("\"{}\"", cell.replace('"', "\"\""))).collect::<Vec<_>>().join(",") + "\n"
+    };
+    let rows = table.iter().map(|row| line(&mut row.iter().map(String::as_str)));
+    line(&mut EXPERIMENT_HEADER.into_iter()) + &rows.collect::<String>()
+}
+
+/// Pictures that the experiment takes over from the evaluations of its runs, as far as they are there.
+fn pictures_of_runs(experiment: &Experiment, results: &[(Run, Option<Record>)], path: &Path) -> Vec<Figure> {
+    let mut figures = Vec::new();
+    for prefix in experiment.pictures.iter().flat_map(|picture| match picture {
+        Picture::Evaluation(prefixes) => *prefixes,
+        _ => &[],
+    }) {
+        for (run, _) in results.iter().filter(|(_, record)| record.is_some()) {
+            let directory = path.join(&run.name);
+            let mut files: Vec<String> = std::fs::read_dir(&directory)
+                .into_iter()
+                .flatten()
+                .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
+                .filter(|name| name.starts_with(prefix) && name.ends_with(".png"))
+                .collect();
+            files.sort();
+            for file in files {
+                if let Ok(png) = crate::storage::read_regular(&directory.join(&file), 1 << 26) {
+                    let subject = file.trim_end_matches(".png").replace('_', " ");
+                    figures.push(Figure { file, png, caption: format!("{}: {subject}.", run.label) });
+                }
+            }
+        }
+    }
+    figures
+}

@@ -1,0 +1,307 @@
+//! One training from configuration to files: model, history, summary, pictures, report.
+
+use crate::analysis::{stretches, training_instability};
+use crate::cli::CliError;
+use crate::cli::evaluation::{Evaluation, Plan, evaluate};
+use crate::cli::folder::Folder;
+use crate::cli::learned::given;
+use crate::experiments::{Outcome, Record};
+use crate::lagrangian::system::Size;
+use crate::lagrangian::{Configured, configure};
+use crate::network::file::{FORMAT, Header, ModelFile, StoredPrecision};
+use crate::network::{Architecture, NetworkLagrangian};
+use crate::report::{HistoryRow, Report, training_figures};
+use crate::scalar::Scalar;
+use crate::training::{
+    Config, Datasets, Epoch, Hooks, Phase, Precision, SamplingError, Stop, TrainingError, sample_all, train,
+};
+use serde::Serialize;
+use std::fmt::Write as _;
+use std::time::Instant;
+
+/// What `summary.json` holds; losses in the paper's convention, errors in physical units.
+#[derive(Serialize)]
+struct Summary<'a> {
+    system: &'a str,
+    crate_version: &'static str,
+    seed: u64,
+    precision: &'static str,
+    threads: usize,
+    epochs: usize,
+    weights: usize,
+    validation_loss: f64,
+    test_loss: f64,
+    test_states_left_out: usize,
+    instability: Option<f64>,
+    wall_seconds: f64,
+    training_seconds: f64,
+    states_per_second: f64,
+    ended: String,
+    #[serde(flatten)]
+    evaluation: &'a Evaluation,
+}
+
+/// How much work a run may take.
+#[derive(Clone, Copy, Debug)]
+pub struct Effort {
+    /// Threads of the training.
+    pub threads: usize,
+    /// Starts of the trajectory test.
+    pub starts: usize,
+    /// Fraction of the test's time span.
+    pub horizon: f64,
+}
+
+/// What a run came to, after its files were written.
+#[derive(Debug)]
+pub struct Finished {
+    /// Why training ended.
+    pub stop: Stop,
+    /// Epochs that were run.
+    pub epochs: usize,
+    /// `summary.json`.
+    pub json: String,
+    /// Tables for a terminal.
+    pub text: String,
+    /// What an experiment keeps of it.
+    pub record: Record,
+}
+
+/// How a training went.
+#[derive(Debug)]
+pub enum Learning {
+    /// There is a model.
+    Finished(Box<Finished>),
+    /// No epoch gave a finite loss, and why; nothing was written.
+    Nothing(String),
+}
+
+/// Trains in the configuration's precision and writes everything into the directory; files as [`learn`] says.
+///
+/// # Errors
+/// A usage error for bounds that cannot be sampled and for penalties that do not fit, a data error for files that cannot be
+/// written.
+pub fn learn(
+    folder: &Folder,
+    config: &Config,
+    system: &Configured<f64>,
+    effort: Effort,
+    hooks: &Hooks,
+) -> Result<Learning, CliError> {
+    match config.precision {
+        Precision::F32 => learn_in::<f32>(folder, config, system, effort, hooks),
+        Precision::F64 => learn_in::<f64>(folder, config, system, effort, hooks),
+    }
+}
+
+fn learn_in<S: Scalar>(
+    folder: &Folder,
+    config: &Config,
+    system: &Configured<f64>,
+    effort: Effort,
+    hooks: &Hooks,
+) -> Result<Learning, CliError> {
+    let started = Instant::now();
+    let (data, scale) = sample_all::<S>(config, system).map_err(|e| match e {
+        SamplingError::Dataset(_) => CliError::data(e),
+        _ => CliError::usage(e),
+    })?;
+    let penalty = config.penalty().map_err(CliError::usage)?;
+    let architecture = config.architecture(system, scale);
+    let imposed = imposed_velocities(system, &data);
+    let fresh = (data.test.cast::<f64>().q().to_vec(), data.test.cast::<f64>().v().to_vec());
+    let trained = match train(config, &architecture, penalty, data, effort.threads, hooks) {
+        Ok(trained) => trained,
+        Err(error @ TrainingError::NothingLearned(_)) => return Ok(Learning::Nothing(error.to_string())),
+        Err(error) => return Err(CliError::data(error)),
+    };
+
+    // The model and its history first: nothing that comes after can lose them.
+    let header = header(config, system, architecture.clone(), imposed, trained.validation_loss)?;
+    let model = ModelFile { header, weights: trained.weights.clone() };
+    let toml = toml::to_string(config).map_err(CliError::data)?;
+    let file = folder.file("model.safetensors");
+    folder.write("config.toml", toml.as_bytes())?;
+    folder.write("history.csv", history(&trained.history).as_bytes())?;
+    model.save(&file).map_err(|e| CliError::file(&file, e))?;
+
+    let scale = architecture.scale.iter().sum::<f64>() / architecture.scale.len() as f64;
+    let network = NetworkLagrangian::new(architecture, model.weights).map_err(CliError::data)?.cast::<f64>();
+    let Effort { threads, starts, horizon } = effort;
+    let plan = Plan { states: (&fresh.0, &fresh.1), starts, horizon, seed: config.seed, threads };
+    let evaluation = evaluate(system, &network, plan)?;
+    let finite = |x: f64| x.is_finite().then_some(x);
+    let losses: Vec<[Option<f64>; 2]> =
+        trained.history.iter().map(|e| [finite(e.training_loss), finite(e.validation_loss)]).collect();
+    let training_losses: Vec<f64> = trained.history.iter().map(|e| e.training_loss).collect();
+    let instability = training_instability(&training_losses, &stretches(config));
+    let summary = Summary {
+        system: &config.system,
+        crate_version: env!("CARGO_PKG_VERSION"),
+        seed: config.seed,
+        precision: S::NAME,
+        threads,
+        epochs: trained.history.len(),
+        weights: trained.weights.len(),
+        validation_loss: trained.validation_loss,
+        test_loss: trained.test.loss.to_f64(),
+        test_states_left_out: trained.test.left_out,
+        instability,
+        wall_seconds: started.elapsed().as_secs_f64(),
+        training_seconds: trained.seconds,
+        states_per_second: trained.states as f64 / trained.seconds,
+        ended: ended(&trained.stop),
+        evaluation: &evaluation,
+    };
+    let json = serde_json::to_string_pretty(&summary).map_err(CliError::data)? + "\n";
+    write_report(folder, system, &summary, &trained.history, &toml)?;
+    folder.write("summary.json", json.as_bytes())?;
+    let text =
+        format!("{}\n{}\nreport: {}\n", headline(&summary), evaluation.text(), folder.file("report.html").display());
+    let outcome = Outcome::Learned(crate::experiments::Learned {
+        validation_loss: trained.validation_loss,
+        instability,
+        scale,
+        wrong_signature: evaluation.wrong_signature,
+        energy_errors: evaluation.trajectories.iter().map(|t| finite(t.energy_error.mean)).collect(),
+        integrated: evaluation.trajectories.iter().filter(|t| t.stopped.is_none()).count(),
+    });
+    Ok(Learning::Finished(Box::new(Finished {
+        epochs: trained.history.len(),
+        json,
+        text,
+        record: Record { outcome, losses, seconds: trained.seconds },
+        stop: trained.stop,
+    })))
+}
+
+fn ended(stop: &Stop) -> String {
+    match stop {
+        Stop::Finished => "finished".to_string(),
+        Stop::Interrupted => "interrupted".to_string(),
+        Stop::Failed(error) => error.to_string(),
+    }
+}
+
+/// The velocity that the mass shell fixes and its range over the training states, which no bounds of the configuration
+/// tell.
+fn imposed_velocities<S: Scalar>(system: &Configured<f64>, data: &Datasets<S>) -> Option<(usize, [f64; 2])> {
+    let i = system.constrained_coordinate()?;
+    let ranges = data.training.iter().map(|set| set.velocity_range(i));
+    ranges.reduce(|[low, high], [l, h]| [low.min(l), high.max(h)]).map(|range| (i, range))
+}
+
+/// What the model file says about this run.
+fn header(
+    config: &Config,
+    system: &Configured<f64>,
+    architecture: Architecture,
+    imposed: Option<(usize, [f64; 2])>,
+    validation_loss: f64,
+) -> Result<Header, CliError> {
+    // Defaults that change in a later version must not change this model.
+    let named = system.system.parameters.iter().map(|p| p.symbol.to_string());
+    let mut parameters: std::collections::BTreeMap<_, _> = named.zip(system.parameters.iter().copied()).collect();
+    parameters.extend(config.parameters.clone());
+    if let Size::Chosen { symbol, .. } = system.system.size {
+        parameters.insert(symbol.to_string(), system.coordinates as f64);
+    }
+    configure::<f64>(&config.system, &given(&parameters)).map_err(CliError::data)?;
+    let hull = |bounds: fn(&Phase) -> &Vec<[f64; 2]>| {
+        (0..system.coordinates)
+            .map(|i| {
+                let all = config.phases.iter().filter_map(|phase| bounds(phase).get(i));
+                all.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], b| [low.min(b[0]), high.max(b[1])])
+            })
+            .collect()
+    };
+    let mut velocity: Vec<[f64; 2]> = hull(|phase| &phase.velocity);
+    if let Some((i, range)) = imposed {
+        velocity[i] = range;
+    }
+    Ok(Header {
+        format: FORMAT,
+        crate_version: env!("CARGO_PKG_VERSION").to_string(),
+        architecture,
+        system: config.system.clone(),
+        parameters,
+        columns: system.system.columns(system.coordinates),
+        precision: match config.precision {
+            Precision::F32 => StoredPrecision::F32,
+            Precision::F64 => StoredPrecision::F64,
+        },
+        position: hull(|phase| &phase.position),
+        velocity,
+        seed: config.seed,
+        validation_loss,
+    })
+}
+
+/// `history.csv`: one row per epoch.
+fn history(epochs: &[Epoch]) -> String {
+    let mut csv =
+        "epoch,phase,rate,training_loss,penalty,penalised,validation_loss,gradient_norm,left_out,skipped,seconds\n"
+            .to_string();
+    for e in epochs {
+        // Writing to a string cannot fail.
+        let _ = writeln!(
+            csv,
+            "{},{},{},{},{},{},{},{},{},{},{:.3}",
+            e.epoch,
+            e.phase,
+            e.rate,
+            e.training_loss,
+            e.penalty,
+            e.penalised,
+            e.validation_loss,
+            e.gradient_norm,
+            e.left_out,
+            e.skipped,
+            e.seconds
+        );
+    }
+    csv
+}
+
+/// The figures of a run in one line.
+fn headline(summary: &Summary<'_>) -> String {
+    format!(
+        "loss (paper): validation {:.6}, fresh states {:.6}; {} epochs in {:.1} s, {:.0} states/s, {} weights, seed {}\n",
+        summary.validation_loss,
+        summary.test_loss,
+        summary.epochs,
+        summary.training_seconds,
+        summary.states_per_second,
+        summary.weights,
+        summary.seed
+    )
+}
+
+fn write_report(
+    folder: &Folder,
+    system: &Configured<f64>,
+    summary: &Summary<'_>,
+    epochs: &[Epoch],
+    toml: &str,
+) -> Result<(), CliError> {
+    let rows: Vec<HistoryRow> = epochs
+        .iter()
+        .map(|e| HistoryRow {
+            epoch: e.epoch as f64,
+            training_loss: e.training_loss,
+            validation_loss: e.validation_loss,
+            learning_rate: e.rate,
+            gradient_norm: e.gradient_norm,
+            penalty: e.penalty,
+        })
+        .collect();
+    let training = training_figures(&rows).map_err(CliError::data)?;
+    let report = Report::new(&format!("{}: learned", system.system.title)).paragraph(&headline(summary));
+    let report = summary.evaluation.report(report).heading("Training");
+    let report = training.iter().fold(report, |report, figure| report.figure(&figure.png, &figure.caption));
+    let report = report.heading("Configuration").preformatted(toml);
+    for figure in training.iter().chain(&summary.evaluation.figures) {
+        folder.write(&figure.file, &figure.png)?;
+    }
+    folder.write("report.html", report.to_html().as_bytes())
+}

@@ -1,0 +1,174 @@
+//! The experiments of Hamzaogullari and Ozakin as data: every table and figure is a list of training configurations.
+//!
+//! An [`Experiment`] turns a [`Scale`] and a number of seeds into [`Run`]s; whoever trains them hands back one
+//! [`Record`] per run, and [`Experiment::rows`] gathers them into the paper's table beside ours.
+
+mod budget;
+mod network;
+mod physical;
+mod record;
+
+pub use budget::Scale;
+pub use record::{Learned, Outcome, Record, Row, Spread};
+
+use crate::names::unknown;
+use crate::training::Config;
+
+/// What the paper reports for a group of runs, in its own convention.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Reported {
+    /// Validation loss.
+    pub loss: Option<f64>,
+    /// Training instability.
+    pub instability: Option<f64>,
+    /// Mean energy error of the trajectory test.
+    pub energy: Option<f64>,
+}
+
+/// One training of an experiment.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Run {
+    /// Name of its directory.
+    pub name: String,
+    /// Row of the table it belongs to.
+    pub label: String,
+    /// Position on the horizontal axis of a scan.
+    pub abscissa: Option<f64>,
+    /// Line it belongs to in comparisons of several groups (method of regularization, activation).
+    pub group: String,
+    /// Everything that determines it.
+    pub config: Config,
+    /// What the paper reports for its row.
+    pub reported: Reported,
+}
+
+/// Pictures of an experiment beside its table and loss curves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Picture {
+    /// Lowest loss of each run against its abscissa, a line per group.
+    Scan {
+        /// Label of the horizontal axis.
+        abscissa: &'static str,
+    },
+    /// Loss against instability, a point per row.
+    TradeOff,
+    /// Pictures of every run's evaluation whose file name begins so.
+    Evaluation(&'static [&'static str]),
+}
+
+/// A table or figure of the paper.
+#[derive(Clone, Copy, Debug)]
+pub struct Experiment {
+    /// Name on the command line.
+    pub name: &'static str,
+    /// Heading.
+    pub title: &'static str,
+    /// Figures and tables of the paper that it regenerates.
+    pub paper: &'static str,
+    /// What the paper found, in a sentence or two.
+    pub finding: &'static str,
+    /// Pictures.
+    pub pictures: &'static [Picture],
+    /// Runs of one seed at the paper's scale.
+    runs: fn() -> Vec<Run>,
+}
+
+static EXPERIMENTS: &[Experiment] = &[
+    network::REGULARIZATION,
+    network::SCALING,
+    network::QUADRATIC_TERM,
+    network::ACTIVATIONS,
+    network::INITIALIZATION,
+    network::TRAINING_RANGE,
+    network::OLD_TRICKS,
+    physical::DOUBLE_PENDULUM,
+    physical::SPRING_PENDULUM,
+    physical::TRIPLE_PENDULUM,
+    physical::SPHERE_GEODESIC,
+    physical::ADS4_GEODESIC,
+];
+
+/// All experiments, in the order of the paper.
+pub fn experiments() -> &'static [Experiment] {
+    EXPERIMENTS
+}
+
+/// The experiment of a name.
+///
+/// # Errors
+/// A message with the nearest name.
+pub fn find(name: &str) -> Result<&'static Experiment, String> {
+    let known = || EXPERIMENTS.iter().map(|e| e.name);
+    EXPERIMENTS.iter().find(|e| e.name == name).ok_or_else(|| unknown("experiment", name, known()))
+}
+
+impl Experiment {
+    /// The runs at a scale, each for `seeds` seeds from 0; runs that the paper itself repeats keep their own seeds apart.
+    pub fn runs(&self, scale: Scale, seeds: usize) -> Vec<Run> {
+        let runs = (self.runs)();
+        let stride = 1 + runs.iter().map(|run| run.config.seed).max().unwrap_or(0);
+        (0..seeds as u64)
+            .flat_map(|k| runs.iter().map(move |run| (k, run.clone())))
+            .map(|(k, mut run)| {
+                run.config.seed += k * stride;
+                run.name = format!("{}-seed{}", run.name, run.config.seed);
+                scale.apply(&mut run.config);
+                run
+            })
+            .collect()
+    }
+}
+
+/// A directory name from words: lower case letters, digits and single dashes.
+fn slug(text: &str) -> String {
+    let kept = text.chars().map(|c| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' });
+    let words: String = kept.collect();
+    words.split('-').filter(|word| !word.is_empty()).collect::<Vec<_>>().join("-")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn every_run_is_valid_and_has_a_name_of_its_own() {
+        for experiment in experiments() {
+            for scale in [Scale::Smoke, Scale::Short, Scale::Paper] {
+                let runs = experiment.runs(scale, 2);
+                let names: BTreeSet<&str> = runs.iter().map(|run| run.name.as_str()).collect();
+                assert_eq!(names.len(), runs.len(), "{}", experiment.name);
+                for run in &runs {
+                    let system = run.config.system().unwrap();
+                    run.config.validate(system.coordinates).unwrap();
+                    run.config.penalty().unwrap();
+                    assert_eq!(slug(&run.name), run.name);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn names_are_found_and_the_nearest_is_offered() {
+        for experiment in experiments() {
+            assert_eq!(find(experiment.name).unwrap().title, experiment.title);
+        }
+        assert!(find("activation").unwrap_err().contains("activations"));
+    }
+
+    #[test]
+    fn the_paper_scale_is_the_papers_own() {
+        let runs = find("regularization").unwrap().runs(Scale::Paper, 1);
+        assert_eq!(runs.len(), 12);
+        let seeds: BTreeSet<u64> =
+            runs.iter().filter(|r| r.config.penalty.lambda() == 0.0).map(|r| r.config.seed).collect();
+        assert_eq!(seeds.len(), 4);
+        for run in &runs {
+            let c = &run.config;
+            assert_eq!(
+                (c.data.training, c.phases[0].epochs, c.network.hidden.as_slice()),
+                (60_000, 300, [500; 3].as_slice())
+            );
+        }
+    }
+}

@@ -1,0 +1,212 @@
+//! Tables and pictures of an experiment: the paper's figures beside ours.
+
+use super::{Figure, LinePlot, PlotError, Series, line_png};
+use crate::experiments::{Experiment, Outcome, Picture, Record, Row, Run, Spread};
+
+/// Header of [`experiment_table`].
+pub const EXPERIMENT_HEADER: [&str; 10] = [
+    "run",
+    "runs",
+    "loss",
+    "paper",
+    "instability",
+    "paper",
+    "physical loss",
+    "wrong signature",
+    "integrated",
+    "energy error",
+];
+
+/// A spread as `mean [low, high]`, or the value alone where there is no spread.
+fn spread(value: Option<Spread>) -> String {
+    value.map_or_else(
+        || "-".to_string(),
+        |s| {
+            if s.low == s.high {
+                number(s.mean)
+            } else {
+                format!("{} [{}, {}]", number(s.mean), number(s.low), number(s.high))
+            }
+        },
+    )
+}
+
+/// Four significant digits.
+fn number(x: f64) -> String {
+    if x == 0.0 || (1e-3..1e4).contains(&x.abs()) {
+        let digits = if x == 0.0 { 0 } else { (3 - x.abs().log10().floor() as i32).max(0) as usize };
+        format!("{x:.digits$}")
+    } else {
+        format!("{x:.3e}")
+    }
+}
+
+/// Rows of the paper's table beside ours, below [`EXPERIMENT_HEADER`]; losses and instabilities in the paper's convention,
+/// the mean over the runs with the lowest and the highest.
+pub fn experiment_table(rows: &[Row]) -> Vec<Vec<String>> {
+    rows.iter()
+        .map(|row| {
+            let reported = |value: Option<f64>| value.map_or_else(|| "-".to_string(), number);
+            let runs =
+                if row.failed == 0 { row.runs.to_string() } else { format!("{} ({} failed)", row.runs, row.failed) };
+            let energy = match row.reported.energy {
+                Some(paper) => format!("{} (paper {})", spread(row.energy), number(paper)),
+                None => spread(row.energy),
+            };
+            vec![
+                row.label.clone(),
+                runs,
+                spread(row.loss),
+                reported(row.reported.loss),
+                spread(row.instability),
+                reported(row.reported.instability),
+                spread(row.normalised_loss),
+                spread(row.wrong_signature),
+                format!("{}/{}", row.integrated.0, row.integrated.1),
+                energy,
+            ]
+        })
+        .collect()
+}
+
+/// Pictures of an experiment from its finished runs; what has nothing to show is left out.
+///
+/// # Errors
+/// [`PlotError::Renderer`] if the renderer fails.
+pub fn experiment_figures(
+    experiment: &Experiment,
+    results: &[(Run, Option<Record>)],
+) -> Result<Vec<Figure>, PlotError> {
+    let mut figures = Vec::new();
+    let mut add = |file: &str, caption: String, plot: LinePlot| match line_png(&plot) {
+        Ok(png) => {
+            figures.push(Figure { file: format!("{file}.png"), png, caption });
+            Ok(())
+        }
+        Err(PlotError::Empty(_)) => Ok(()),
+        Err(error) => Err(error),
+    };
+    for (part, word) in [(0, "training"), (1, "validation")] {
+        add(
+            &format!("{word}_loss"),
+            format!("Geometric mean of the {word} losses of each group of runs, paper convention."),
+            LinePlot {
+                title: format!("{}: {word} loss", experiment.title),
+                x_label: "epoch".into(),
+                y_label: "loss".into(),
+                log_y: true,
+                series: loss_curves(results, part),
+            },
+        )?;
+    }
+    for picture in experiment.pictures {
+        match picture {
+            Picture::Scan { abscissa } => add(
+                "scan",
+                format!(
+                    "Lowest validation loss of each run against {abscissa}; runs without {abscissa} as a level line."
+                ),
+                LinePlot {
+                    title: format!("{}: lowest loss", experiment.title),
+                    x_label: format!("log10 {abscissa}"),
+                    y_label: "lowest validation loss".into(),
+                    log_y: true,
+                    series: scan(results),
+                },
+            )?,
+            Picture::TradeOff => add(
+                "trade_off",
+                "Lowest validation loss against training instability, one point per run; lower left is better.".into(),
+                LinePlot {
+                    title: format!("{}: loss against instability", experiment.title),
+                    x_label: "log10 instability".into(),
+                    y_label: "lowest validation loss".into(),
+                    log_y: true,
+                    series: trade_off(results),
+                },
+            )?,
+            Picture::Evaluation(_) => {}
+        }
+    }
+    Ok(figures)
+}
+
+/// Groups in the order of first appearance with their records.
+fn groups(results: &[(Run, Option<Record>)], of: fn(&Run) -> &str) -> Vec<(&str, Vec<(&Run, &Record)>)> {
+    let mut groups: Vec<(&str, Vec<(&Run, &Record)>)> = Vec::new();
+    for (run, record) in results {
+        let Some(record) = record else { continue };
+        match groups.iter_mut().find(|(name, _)| *name == of(run)) {
+            Some((_, members)) => members.push((run, record)),
+            None => groups.push((of(run), vec![(run, record)])),
+        }
+    }
+    groups
+}
+
+/// One line per group: geometric mean over the runs that still went on, epoch by epoch.
+fn loss_curves(results: &[(Run, Option<Record>)], part: usize) -> Vec<Series> {
+    let curve = |members: &[(&Run, &Record)]| -> Vec<(f64, f64)> {
+        let epochs = members.iter().map(|(_, record)| record.losses.len()).max().unwrap_or(0);
+        (0..epochs)
+            .map(|epoch| {
+                let losses = members.iter().filter_map(|(_, record)| record.losses.get(epoch));
+                let logarithms: Vec<f64> =
+                    losses.filter_map(|loss| loss[part]).map(f64::ln).filter(|x| x.is_finite()).collect();
+                let mean = logarithms.iter().sum::<f64>() / logarithms.len() as f64;
+                (epoch as f64 + 1.0, mean.exp())
+            })
+            .collect()
+    };
+    let lines = groups(results, |run| if run.group.is_empty() { &run.label } else { &run.group });
+    lines
+        .iter()
+        .map(|(name, members)| Series { name: (*name).to_string(), points: curve(members), over: false })
+        .collect()
+}
+
+fn lowest(record: &Record) -> f64 {
+    match &record.outcome {
+        Outcome::Learned(learned) => learned.validation_loss,
+        Outcome::Nothing { .. } => f64::NAN,
+    }
+}
+
+fn scan(results: &[(Run, Option<Record>)]) -> Vec<Series> {
+    let abscissae = || results.iter().filter_map(|(run, _)| run.abscissa).map(f64::log10);
+    let ends = [abscissae().fold(f64::INFINITY, f64::min), abscissae().fold(f64::NEG_INFINITY, f64::max)];
+    groups(results, |run| &run.group)
+        .into_iter()
+        .map(|(name, members)| {
+            let at = |(run, record): &(&Run, &Record)| run.abscissa.map(|x| (x.log10(), lowest(record)));
+            let mut points: Vec<(f64, f64)> = members.iter().filter_map(at).collect();
+            points.sort_by(|a, b| a.0.total_cmp(&b.0));
+            if points.is_empty() {
+                let losses: Vec<f64> = members.iter().map(|(_, r)| lowest(r)).filter(|x| x.is_finite()).collect();
+                let mean = losses.iter().sum::<f64>() / losses.len() as f64;
+                points = ends.map(|x| (x, mean)).to_vec();
+            }
+            Series { name: name.to_string(), points, over: false }
+        })
+        .collect()
+}
+
+/// A label or group per colour; gaps between the points keep them apart.
+fn trade_off(results: &[(Run, Option<Record>)]) -> Vec<Series> {
+    let labels = groups(results, |run| &run.label);
+    // More labels than colours: groups.
+    let chosen = if labels.len() <= 7 { labels } else { groups(results, |run| &run.group) };
+    chosen
+        .into_iter()
+        .map(|(name, members)| {
+            let points = members.iter().flat_map(|(_, record)| {
+                let instability = match &record.outcome {
+                    Outcome::Learned(learned) => learned.instability.map_or(f64::NAN, f64::log10),
+                    Outcome::Nothing { .. } => f64::NAN,
+                };
+                [(instability, lowest(record)), (f64::NAN, f64::NAN)]
+            });
+            Series { name: name.to_string(), points: points.collect(), over: false }
+        })
+        .collect()
+}
