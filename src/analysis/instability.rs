@@ -56,10 +56,10 @@ pub fn stretches(config: &Config) -> Vec<Range<usize>> {
 /// Mean over the stretches of the standard deviation of `loss - trend` within each, the trend being the Savitzky-Golay
 /// filter of order 2 and window 15 over the whole series of losses, one per epoch; in the loss's unit.
 ///
-/// Stretches beyond the end of the series are cut or passed over. `None` without a stretch of two epochs, or if a loss
-/// is not finite.
+/// Stretches beyond the end of the series are cut or passed over. `None` for a series of fewer than five losses, through
+/// which a parabola says nothing, without a stretch of two epochs, or if a loss is not finite.
 pub fn training_instability(losses: &[f64], stretches: &[Range<usize>]) -> Option<f64> {
-    if losses.iter().any(|loss| !loss.is_finite()) {
+    if losses.len() < 5 || losses.iter().any(|loss| !loss.is_finite()) {
         return None;
     }
     let trend = savitzky_golay(losses, WINDOW);
@@ -116,6 +116,7 @@ mod tests {
         // A run that ended early, no stretch at all, and losses that are not finite.
         assert!(training_instability(&smooth[..35], &[0..30, 30..60, 60..90]).is_some());
         assert_eq!(training_instability(&smooth, &[]), None);
-        assert_eq!(training_instability(&[1.0, f64::NAN, 1.0], &[0..2, 2..3]), None);
+        assert_eq!(training_instability(&smooth[..4], &[0..2, 2..4]), None);
+        assert_eq!(training_instability(&[1.0, f64::NAN, 1.0, 2.0, 1.0], &[0..3, 3..5]), None);
     }
 }

@@ -4,7 +4,7 @@ use super::{Figure, LinePlot, PlotError, Series, line_png};
 use crate::experiments::{Experiment, Outcome, Picture, Record, Row, Run, Spread};
 
 /// Header of [`experiment_table`].
-pub const EXPERIMENT_HEADER: [&str; 10] = [
+pub const EXPERIMENT_HEADER: [&str; 11] = [
     "run",
     "runs",
     "loss",
@@ -12,6 +12,7 @@ pub const EXPERIMENT_HEADER: [&str; 10] = [
     "instability",
     "paper",
     "physical loss",
+    "physical instability",
     "wrong signature",
     "integrated",
     "energy error",
@@ -61,6 +62,7 @@ pub fn experiment_table(rows: &[Row]) -> Vec<Vec<String>> {
                 spread(row.instability),
                 reported(row.reported.instability),
                 spread(row.normalised_loss),
+                spread(row.normalised_instability),
                 spread(row.wrong_signature),
                 format!("{}/{}", row.integrated.0, row.integrated.1),
                 energy,

@@ -1,0 +1,108 @@
+//! `lnn experiment` from outside: everything runs, nothing finished runs twice.
+#![cfg(feature = "cli")]
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+
+fn lnn(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_lnn")).arg("experiment").args(arguments).output().unwrap()
+}
+
+fn succeeded(output: &Output) -> String {
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    assert!(output.stderr.is_empty(), "{}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout.clone()).unwrap()
+}
+
+fn smoke(name: &str, out: &Path, threads: &str) -> String {
+    succeeded(&lnn(&[name, "--scale", "smoke", "--threads", threads, "--out", out.to_str().unwrap()]))
+}
+
+#[test]
+fn every_experiment_of_the_paper_runs() {
+    let listed = succeeded(&lnn(&[]));
+    let out = tempfile::tempdir().unwrap();
+    let printed = smoke("all", out.path(), "2");
+    for experiment in lnn::experiments::experiments() {
+        assert!(listed.contains(experiment.name) && listed.contains(experiment.paper));
+        assert!(printed.contains(experiment.title));
+        let folder = out.path().join(format!("{}-smoke", experiment.name));
+        let table = fs::read_to_string(folder.join("table.csv")).unwrap();
+        let runs = experiment.runs(lnn::experiments::Scale::Smoke, 1);
+        for run in &runs {
+            assert!(table.contains(&format!("\"{}\"", run.label)), "{table}");
+            for file in ["record.json", "model.safetensors", "config.toml", "report.html"] {
+                assert!(folder.join(&run.name).join(file).is_file(), "{}: no {file}", run.name);
+            }
+        }
+        let report = fs::read_to_string(folder.join("report.html")).unwrap();
+        assert!(report.contains(experiment.title) && report.matches("data:image/png").count() >= 2);
+        // Relativistic runs are held to their signature, not to positive eigenvalues.
+        if experiment.name == "ads4-geodesic" {
+            let config = fs::read_to_string(folder.join(&runs[0].name).join("config.toml")).unwrap();
+            assert!(config.contains("kind = \"lorentzian-sylvester\"") && config.contains("time = \"t\""), "{config}");
+        }
+    }
+    // The README lists what the program lists.
+    let readme = fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/README.md")).unwrap();
+    for experiment in lnn::experiments::experiments() {
+        assert!(readme.contains(&format!("| `{}` | {} |", experiment.name, experiment.paper)), "{}", experiment.name);
+    }
+}
+
+#[test]
+fn finished_runs_are_kept_and_missing_ones_made_again() {
+    let out = tempfile::tempdir().unwrap();
+    smoke("old-tricks", out.path(), "1");
+    let folder = out.path().join("old-tricks-smoke");
+    let read = |file: &str| fs::read(folder.join(file)).unwrap();
+    let table = read("table.csv");
+    let model = read("liu-tricks-seed0/model.safetensors");
+    let kept = "cranmer-initialisation-seed0/record.json";
+    let record = String::from_utf8(read(kept)).unwrap();
+    // A mark that a new run would not leave; one run lost, one made with another configuration.
+    let marked = record.replace("\"seconds\":", "\"seconds\":1000000");
+    assert_ne!(marked, record);
+    fs::write(folder.join(kept), &marked).unwrap();
+    fs::remove_file(folder.join("liu-tricks-seed0/record.json")).unwrap();
+    let changed = "paper-s-model-seed0/config.toml";
+    let config = String::from_utf8(read(changed)).unwrap();
+    fs::write(folder.join(changed), config.replace("rate = 0.001", "rate = 0.002")).unwrap();
+
+    smoke("old-tricks", out.path(), "2");
+    assert_eq!(String::from_utf8(read(kept)).unwrap(), marked);
+    assert_eq!(read(changed), config.into_bytes());
+    // The same numbers on another number of threads.
+    assert_eq!(read("table.csv"), table);
+    assert_eq!(read("liu-tricks-seed0/model.safetensors"), model);
+}
+
+#[test]
+fn more_seeds_are_more_runs_of_the_same_rows() {
+    let out = tempfile::tempdir().unwrap();
+    let path = out.path().to_str().unwrap();
+    succeeded(&lnn(&["scaling", "--scale", "smoke", "--seeds", "2", "--out", path]));
+    let folder = out.path().join("scaling-smoke");
+    let table = fs::read_to_string(folder.join("table.csv")).unwrap();
+    assert_eq!(table.lines().count(), 4);
+    assert!(table.lines().skip(1).all(|line| line.split("\",\"").nth(1) == Some("2")), "{table}");
+    let models = ["physical-scaling-seed0", "physical-scaling-seed1"]
+        .map(|run| fs::read(folder.join(run).join("model.safetensors")).unwrap());
+    assert_ne!(models[0], models[1]);
+}
+
+#[test]
+fn wrong_names_and_directories_are_refused() {
+    for (arguments, code, part) in [
+        (["activation", "--scale", "smoke"], 2, "activations"),
+        (["scaling", "--scale", "tiny"], 2, "tiny"),
+        (["scaling", "--seeds", "0"], 2, "--seeds"),
+        (["scaling", "--out", "/dev/null/x"], 1, "/dev/null"),
+    ] {
+        let output = lnn(&arguments);
+        let stderr = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(code), "{stderr}");
+        assert!(stderr.starts_with("error: ") && stderr.lines().count() == 1 && stderr.contains(part), "{stderr}");
+    }
+}
