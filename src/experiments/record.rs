@@ -135,3 +135,47 @@ fn row(label: &str, results: &[(Run, Option<Record>)]) -> Row {
         reported,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::experiments::{Scale, find};
+
+    fn learned(loss: f64, energy_errors: Vec<Option<f64>>) -> Option<Record> {
+        let integrated = energy_errors.iter().flatten().count();
+        let outcome = Outcome::Learned(Learned {
+            validation_loss: loss,
+            instability: Some(loss / 10.0),
+            scale: 10.0,
+            wrong_signature: 0.25,
+            energy_errors,
+            integrated,
+        });
+        Some(Record { outcome, losses: vec![[Some(1.0), None]], seconds: 2.0 })
+    }
+
+    #[test]
+    fn rows_gather_runs_of_one_label_and_count_failures() {
+        let experiment = find("activations").unwrap();
+        let runs = experiment.runs(Scale::Smoke, 1);
+        let nothing = Some(Record { outcome: Outcome::Nothing { reason: "NaN".into() }, losses: vec![], seconds: 1.0 });
+        let mut records = vec![learned(0.1, vec![Some(0.5), None]), learned(0.3, vec![Some(0.1)]), nothing, None];
+        records.resize(runs.len(), None);
+        let results: Vec<(Run, Option<Record>)> = runs.into_iter().zip(records).collect();
+        let rows = experiment.rows(&results);
+        assert_eq!(rows.iter().map(|r| r.label.as_str()).collect::<Vec<_>>()[..2], ["GELU", "x tanh(kx)"]);
+        let gelu = &rows[0];
+        assert_eq!((gelu.runs, gelu.failed, gelu.integrated), (2, 0, (2, 3)));
+        assert_eq!(gelu.loss, Some(Spread { mean: 0.2, low: 0.1, high: 0.3 }));
+        assert_eq!(gelu.energy, Some(Spread { mean: 0.3, low: 0.1, high: 0.5 }));
+        assert!((gelu.normalised_instability.unwrap().mean - 0.2).abs() < 1e-15);
+        assert_eq!(gelu.reported.loss, Some(0.00738));
+        assert_eq!((rows[1].runs, rows[1].failed, rows[1].loss), (1, 1, None));
+        assert_eq!((rows[2].runs, rows[2].integrated), (0, (0, 0)));
+        // A record reads back from its file.
+        for (_, record) in results {
+            let text = serde_json::to_string(&record).unwrap();
+            assert_eq!(serde_json::from_str::<Option<Record>>(&text).unwrap(), record);
+        }
+    }
+}
