@@ -1,33 +1,12 @@
 //! Replays and reused tapes allocate nothing after the first call.
 
+#[path = "common/counting.rs"]
+mod counting;
+
+use counting::allocations;
 use lnn::scalar::Real;
 use lnn::tape::{Adjoints, Program, Replay, Tape};
-use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
-
-struct Counting;
-static CALLS: AtomicUsize = AtomicUsize::new(0);
-
-// SAFETY: every call is passed on to the system allocator unchanged.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        CALLS.fetch_add(1, Ordering::Relaxed);
-        unsafe { System.alloc(layout) }
-    }
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
-
-fn allocations(f: impl FnOnce()) -> usize {
-    let before = CALLS.load(Ordering::Relaxed);
-    f();
-    CALLS.load(Ordering::Relaxed) - before
-}
 
 // One test, so that no other thread allocates meanwhile.
 #[test]

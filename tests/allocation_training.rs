@@ -1,28 +1,13 @@
 //! A training step allocates nothing after the first.
 
+#[path = "common/counting.rs"]
+mod counting;
+
+use counting::allocations;
 use lnn::network::{Architecture, Initialization, InputLayer, Nonlinearity, initial_weights};
 use lnn::training::{Dataset, Method, Moments, Objective, Penalty, Update};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::sync::atomic::{AtomicUsize, Ordering};
-
-struct Counting;
-static CALLS: AtomicUsize = AtomicUsize::new(0);
-
-// SAFETY: every call is passed on to the system allocator unchanged.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        CALLS.fetch_add(1, Ordering::Relaxed);
-        unsafe { System.alloc(layout) }
-    }
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
 
 // One test, so that no other thread allocates meanwhile.
 #[test]
@@ -57,8 +42,6 @@ fn allocates_nothing(activation: Nonlinearity, input_layer: InputLayer) {
         moments.update(&mut weights, &gradient, &update);
     };
     (0..3).for_each(|_| step());
-    let before = CALLS.load(Ordering::Relaxed);
-    (0..10).for_each(|_| step());
-    let counted = CALLS.load(Ordering::Relaxed) - before;
+    let counted = allocations(|| (0..10).for_each(|_| step()));
     assert_eq!(counted, 0, "allocations in 10 steps with {activation}");
 }

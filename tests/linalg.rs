@@ -245,9 +245,9 @@ fn scale_does_not_matter() {
             linalg::solve(n, &m, &r, &mut y, &mut ws).unwrap();
             assert_eq!(x.iter().map(|x| Scalar::ldexp(*x, e)).collect::<Vec<_>>(), y);
             let mut minors = Vec::new();
-            linalg::leading_minors(n, &scaled, &mut minors).unwrap();
+            linalg::leading_minors(n, &scaled, &mut minors, &mut ws).unwrap();
             let mut plain = Vec::new();
-            linalg::leading_minors(n, &m, &mut plain).unwrap();
+            linalg::leading_minors(n, &m, &mut plain, &mut ws).unwrap();
             for (k, (a, b)) in minors.iter().zip(&plain).enumerate() {
                 assert!((a.mantissa / b.mantissa - 1.0).abs() < 1e-13);
                 assert_eq!(a.exponent - b.exponent, i64::from(e) * (k as i64 + 1));
@@ -326,6 +326,7 @@ fn singular_and_foreign_rows_are_reported_and_the_others_solved() {
 #[test]
 fn inertia_by_pivots_agrees_with_the_spectrum() {
     let mut rng = ChaCha8Rng::seed_from_u64(5);
+    let mut ws = Workspace::new();
     let mut scratch = vec![0.0; 400];
     for n in 1..=20 {
         for negative in 0..=n {
@@ -336,7 +337,7 @@ fn inertia_by_pivots_agrees_with_the_spectrum() {
             assert_eq!(found, Inertia { positive: n - negative, zero: 0, negative });
             assert_eq!(linalg::is_positive_definite(n, &m, &mut scratch), negative == 0);
             let mut minors = Vec::new();
-            linalg::leading_minors(n, &m, &mut minors).unwrap();
+            linalg::leading_minors(n, &m, &mut minors, &mut ws).unwrap();
             let product: f64 = w.iter().product();
             assert!((minors[n - 1].value() / product - 1.0).abs() < 1e-11, "n = {n}, {negative}");
         }

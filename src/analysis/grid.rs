@@ -2,7 +2,7 @@
 
 use super::AffineFit;
 use crate::lagrangian::{EulerLagrange, Request, Terms};
-use crate::linalg::leading_minors;
+use crate::linalg::{Workspace, leading_minors};
 use crate::scalar::Scalar;
 
 /// One axis of a grid.
@@ -101,10 +101,10 @@ pub fn determinant_grid<S: Scalar>(
     axes: [Axis; 2],
 ) -> Result<Grid, GridError> {
     let n = model.coordinates();
-    let mut minors = Vec::new();
+    let (mut minors, mut workspace) = (Vec::new(), Workspace::new());
     evaluate(model, state, axes, Request::MASS_MATRIX, |terms, row| {
         let m = terms.mass_matrix.get(row * n * n..(row + 1) * n * n)?;
-        leading_minors(n, m, &mut minors).ok()?;
+        leading_minors(n, m, &mut minors, &mut workspace).ok()?;
         minors.last().map(|det| det.value().to_f64())
     })
 }

@@ -20,6 +20,8 @@ pub struct Workspace<S> {
     pub(super) dense: Dense<S>,
     /// Right-hand sides and solutions of an inverse.
     pub(super) columns: Vec<S>,
+    /// Scratch of determinants.
+    pub(super) minors: Minors<S>,
     /// Lent to callers.
     vector: Vec<S>,
     failures: Vec<(usize, Failure)>,
@@ -60,6 +62,14 @@ impl<S: Scalar, const W: usize> Buffers<S, W> {
             vector.resize(n, zero);
         }
     }
+}
+
+/// Scratch of determinants and their gradients.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Minors<S> {
+    pub block: Vec<S>,
+    pub values: Vec<S>,
+    pub vectors: Vec<S>,
 }
 
 /// Scratch of the paths that treat one matrix at a time.

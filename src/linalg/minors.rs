@@ -57,18 +57,25 @@ impl<S: Scalar> Scaled<S> {
 ///
 /// # Errors
 /// [`LinalgError::Shape`]; [`LinalgError::NotFinite`] (row 0) for an infinity or a `NaN`.
-pub fn leading_minors<S: Scalar>(n: usize, matrix: &[S], minors: &mut Vec<Scaled<S>>) -> Result<(), LinalgError> {
+pub fn leading_minors<S: Scalar>(
+    n: usize,
+    matrix: &[S],
+    minors: &mut Vec<Scaled<S>>,
+    workspace: &mut Workspace<S>,
+) -> Result<(), LinalgError> {
     expect_length("matrix", n * n, matrix.len())?;
     if matrix.iter().any(|m| !m.is_finite()) {
         return Err(LinalgError::NotFinite { row: 0 });
     }
     minors.clear();
-    let mut scratch = matrix.to_vec();
-    positive_pivots(n, &mut scratch, minors);
+    let scratch = &mut workspace.minors.block;
+    scratch.clear();
+    scratch.extend_from_slice(matrix);
+    positive_pivots(n, scratch, minors);
     for k in minors.len() + 1..=n {
         scratch.clear();
         scratch.extend((0..k).flat_map(|i| matrix[i * n..i * n + k].iter().copied()));
-        minors.push(determinant(k, &mut scratch));
+        minors.push(determinant(k, scratch));
     }
     Ok(())
 }
@@ -152,16 +159,25 @@ pub fn adjugate<S: Scalar>(
 ) -> Result<i64, LinalgError> {
     expect_length("matrix", n * n, matrix.len())?;
     expect_length("gradient", n * n, gradient.len())?;
-    let mut values = vec![<S as Real>::zero(); n];
-    let mut vectors = vec![<S as Real>::zero(); n * n];
-    eigh(n, matrix, &mut values, &mut vectors, workspace)?;
-    let products: Vec<Scaled<S>> =
-        (0..n).map(|k| (0..n).filter(|&l| l != k).fold(Scaled::one(), |product, l| product.times(values[l]))).collect();
     let zero = <S as Real>::zero();
-    let exponent = products.iter().filter(|p| p.mantissa != zero).map(|p| p.exponent).max().unwrap_or(0);
+    let mut scratch = std::mem::take(&mut workspace.minors);
+    scratch.values.resize(n, zero);
+    scratch.vectors.resize(n * n, zero);
+    let (values, vectors) = (&mut scratch.values[..n], &mut scratch.vectors[..n * n]);
+    let outcome = eigh(n, matrix, values, vectors, workspace).map(|()| sum_adjugate(n, values, vectors, gradient));
+    workspace.minors = scratch;
+    outcome
+}
+
+/// [`adjugate`] from eigenvalues and eigenvectors.
+fn sum_adjugate<S: Scalar>(n: usize, values: &[S], vectors: &[S], gradient: &mut [S]) -> i64 {
+    let zero = <S as Real>::zero();
+    let product = |k: usize| (0..n).filter(|&l| l != k).fold(Scaled::one(), |product, l| product.times(values[l]));
+    let exponent = (0..n).map(product).filter(|p| p.mantissa != zero).map(|p| p.exponent).max().unwrap_or(0);
     gradient.fill(zero);
-    for (k, product) in products.iter().enumerate() {
-        let weight = Scaled { exponent: product.exponent - exponent, ..*product }.value();
+    for k in 0..n {
+        let product = product(k);
+        let weight = Scaled { exponent: product.exponent - exponent, ..product }.value();
         let u = &vectors[k * n..(k + 1) * n];
         for i in 0..n {
             for j in 0..n {
@@ -169,5 +185,5 @@ pub fn adjugate<S: Scalar>(
             }
         }
     }
-    Ok(exponent)
+    exponent
 }

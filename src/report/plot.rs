@@ -128,13 +128,22 @@ pub fn line_png(plot: &LinePlot) -> Result<Vec<u8>, PlotError> {
 
     let mut plots = Vec::new();
     let several = series.len() > 1;
+    // Points without lines want room around them.
+    let scattered = series.iter().all(|s| runs(&s.points).iter().all(|run| run.len() == 1));
+    let margin = if scattered { 0.04 * (x.1 - x.0) } else { 0.0 };
     let overlaid = several && series.iter().any(|s| s.over);
     for (index, series) in series.iter().enumerate() {
         let colour = COLOURS[index % COLOURS.len()];
         let mut named = series.name.is_empty() || !several;
         for run in runs(&series.points) {
             if run.len() == 1 {
-                plots.push(Plot::Scatter(ScatterPlot::new().with_data(run).with_color(colour).with_size(2.5)));
+                let size = if scattered { 5.0 } else { 2.5 };
+                let mut points = ScatterPlot::new().with_data(run).with_color(colour).with_size(size);
+                if scattered && !named {
+                    points = points.with_legend(&*series.name);
+                    named = true;
+                }
+                plots.push(Plot::Scatter(points));
                 continue;
             }
             let width = if overlaid && !series.over { 5.0 } else { 1.8 };
@@ -149,8 +158,8 @@ pub fn line_png(plot: &LinePlot) -> Result<Vec<u8>, PlotError> {
     let layout = style(Layout::auto_from_plots(&plots), &plot.title, &plot.x_label, &plot.y_label)
         .with_width(760.0)
         .with_height(430.0)
-        .with_x_axis_min(x.0)
-        .with_x_axis_max(x.1);
+        .with_x_axis_min(x.0 - margin)
+        .with_x_axis_max(x.1 + margin);
     let layout = if plot.log_y {
         let whole = |v: f64, up: bool| 10f64.powf(if up { v.log10().ceil() } else { v.log10().floor() });
         let (low, high) = (values(&series, |p| p.1).fold(f64::INFINITY, f64::min), top);

@@ -192,7 +192,7 @@ fn minor_violations<S: Scalar, I: Iterator<Item = S>>(
     let Buffers { block, gradient, leading, adjugate: adjoint, minors, workspace, .. } = buffers;
     gradient.clear();
     gradient.resize(m * m, zero);
-    leading_minors(m, block, minors)?;
+    leading_minors(m, block, minors, workspace)?;
     // eps / s_k; its part eps / (product of the scales that are not zero) replaces 1/(s_k + eps) where a scale is zero.
     let mut ratio = Scaled::new(S::of_f64(EPSILON));
     let mut vanishes = false;
