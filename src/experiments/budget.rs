@@ -7,7 +7,8 @@ use crate::training::Config;
 pub enum Scale {
     /// Minutes for all experiments together: shows that everything runs, not what is better.
     Smoke,
-    /// Minutes each: widths of 128, 30,000 states, 90 epochs, enough to read a ranking.
+    /// Minutes each: widths of 128, 30,000 states and 90 epochs, enough to read a ranking; 60,000 states and 300 epochs for
+    /// an experiment of one run.
     Short,
     /// The paper's own.
     Paper,
@@ -22,9 +23,10 @@ struct Limits {
 }
 
 impl Scale {
-    fn limits(self) -> Option<Limits> {
+    fn limits(self, alone: bool) -> Option<Limits> {
         match self {
             Self::Smoke => Some(Limits { states: 512, width: 16, epochs: 4, batch: 64 }),
+            Self::Short if alone => Some(Limits { states: 60_000, width: 128, epochs: 300, batch: 128 }),
             Self::Short => Some(Limits { states: 30_000, width: 128, epochs: 90, batch: 128 }),
             Self::Paper => None,
         }
@@ -50,8 +52,9 @@ impl Scale {
     /// Cuts states, widths, epochs and batch to the scale; the phases share the epochs in the paper's proportion.
     ///
     /// The period of the annealing shrinks only where less than one fall would fit into a phase.
-    pub(super) fn apply(self, config: &mut Config) {
-        let Some(limits) = self.limits() else { return };
+    /// `alone`: the only run of its experiment.
+    pub(super) fn apply(self, config: &mut Config, alone: bool) {
+        let Some(limits) = self.limits(alone) else { return };
         let data = &mut config.data;
         data.training = data.training.min(limits.states);
         data.validation = data.validation.min(limits.states / 5);

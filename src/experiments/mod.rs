@@ -106,13 +106,14 @@ impl Experiment {
     /// The runs at a scale, each for `seeds` seeds from 0; runs that the paper itself repeats keep their own seeds apart.
     pub fn runs(&self, scale: Scale, seeds: usize) -> Vec<Run> {
         let runs = (self.runs)();
+        let alone = runs.len() == 1;
         let stride = 1 + runs.iter().map(|run| run.config.seed).max().unwrap_or(0);
         (0..seeds as u64)
             .flat_map(|k| runs.iter().map(move |run| (k, run.clone())))
             .map(|(k, mut run)| {
                 run.config.seed += k * stride;
                 run.name = format!("{}-seed{}", run.name, run.config.seed);
-                scale.apply(&mut run.config);
+                scale.apply(&mut run.config, alone);
                 run
             })
             .collect()

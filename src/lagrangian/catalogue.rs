@@ -3,7 +3,8 @@
 use super::system::{Closed, Size, System};
 use super::{EulerLagrange, HandWritten};
 use crate::names::unknown;
-use crate::scalar::Scalar;
+use crate::scalar::{Dd, Scalar};
+use std::any::Any;
 
 /// Why a system could not be built.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -124,6 +125,29 @@ catalogue! {
     schwarzschild_geodesic: |_| super::systems::schwarzschild_geodesic::SchwarzschildGeodesic;
 }
 
+/// [`construct`], compiled in this crate once for each of its scalars instead of again in every crate that calls it: all
+/// systems under all forward numbers are much code.
+fn construct_once<S: Scalar>(configured: &Configured<S>) -> Option<Box<dyn EulerLagrange<S>>> {
+    fn single(configured: &Configured<f32>) -> Option<Box<dyn EulerLagrange<f32>>> {
+        construct(configured)
+    }
+    fn double(configured: &Configured<f64>) -> Option<Box<dyn EulerLagrange<f64>>> {
+        construct(configured)
+    }
+    fn double_double(configured: &Configured<Dd>) -> Option<Box<dyn EulerLagrange<Dd>>> {
+        construct(configured)
+    }
+    let configured: &dyn Any = configured;
+    let built: Box<dyn Any> = if let Some(configured) = configured.downcast_ref() {
+        Box::new(single(configured))
+    } else if let Some(configured) = configured.downcast_ref() {
+        Box::new(double(configured))
+    } else {
+        Box::new(double_double(configured.downcast_ref()?))
+    };
+    *built.downcast().ok()?
+}
+
 /// All systems.
 pub fn systems() -> &'static [System] {
     SYSTEMS
@@ -215,9 +239,10 @@ impl<S: Scalar> Configured<S> {
     /// As [`build`].
     ///
     /// # Errors
-    /// [`SystemError::UnknownSystem`] if the description is not of the catalogue.
+    /// [`SystemError::UnknownSystem`] if the description is not of the catalogue or the scalar is none of `f32`, `f64` and
+    /// [`Dd`].
     pub fn build(&self) -> Result<Box<dyn EulerLagrange<S>>, SystemError> {
-        construct(self).ok_or_else(|| unknown_system(self.system.name))
+        construct_once(self).ok_or_else(|| unknown_system(self.system.name))
     }
     /// As [`exact_acceleration`].
     ///
@@ -269,7 +294,6 @@ fn unknown_system(name: &str) -> SystemError {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scalar::Dd;
 
     fn given(list: &[(&str, &str)]) -> Vec<(String, String)> {
         list.iter().map(|&(s, t)| (s.into(), t.into())).collect()
