@@ -56,6 +56,22 @@ impl Grid {
         let values = self.values.iter().zip(&other.values).map(|(a, b)| a - b).collect();
         Some(Self { values, ..self.clone() })
     }
+
+    /// Where the values have not the sign of `exact`, value by value; one that is not finite has no sign. `None` at a
+    /// point where `exact` is 0 or not finite; `None` altogether if the sizes differ.
+    pub fn wrong_signs(&self, exact: &Self) -> Option<Vec<Option<bool>>> {
+        if self.x.len() != exact.x.len() || self.y.len() != exact.y.len() {
+            return None;
+        }
+        let sign = |z: f64| if z.is_finite() { z.partial_cmp(&0.0).filter(|order| order.is_ne()) } else { None };
+        let pairs = self.values.iter().zip(&exact.values);
+        Some(pairs.map(|(&z, &exact)| sign(exact).map(|right| sign(z) != Some(right))).collect())
+    }
+
+    /// The point of a value's index.
+    pub fn point(&self, index: usize) -> (f64, f64) {
+        (self.x[index % self.x.len()], self.y[index / self.x.len()])
+    }
 }
 
 /// Why a grid cannot be laid.
@@ -88,10 +104,12 @@ pub fn lagrangian_grid<S: Scalar>(
     state: &[f64],
     axes: [Axis; 2],
 ) -> Result<Grid, GridError> {
-    evaluate(model, state, axes, Request::LAGRANGIAN, |terms, row| terms.lagrangian.get(row).map(|x| x.to_f64()))
+    let value = |terms: &Terms<S>, row: usize| terms.lagrangian.get(row).map(|x| x.to_f64());
+    evaluate(model, state, axes, Request::LAGRANGIAN, |_, _| {}, value)
 }
 
-/// `det M` of `model` over two components; `state` fixes the others as `(q, v)`.
+/// `det M` of `model` over two components; `state` fixes the others as `(q, v)`, and `impose` may then change the
+/// velocities of each point, given its coordinates (to put it on a mass shell).
 ///
 /// # Errors
 /// [`GridError`] if the state or an axis does not fit the model.
@@ -99,10 +117,11 @@ pub fn determinant_grid<S: Scalar>(
     model: &dyn EulerLagrange<S>,
     state: &[f64],
     axes: [Axis; 2],
+    impose: impl Fn(&[f64], &mut [f64]),
 ) -> Result<Grid, GridError> {
     let n = model.coordinates();
     let (mut minors, mut workspace) = (Vec::new(), Workspace::new());
-    evaluate(model, state, axes, Request::MASS_MATRIX, |terms, row| {
+    evaluate(model, state, axes, Request::MASS_MATRIX, impose, |terms, row| {
         let m = terms.mass_matrix.get(row * n * n..(row + 1) * n * n)?;
         leading_minors(n, m, &mut minors, &mut workspace).ok()?;
         minors.last().map(|det| det.value().to_f64())
@@ -114,6 +133,7 @@ fn evaluate<S: Scalar>(
     state: &[f64],
     axes: [Axis; 2],
     request: Request,
+    impose: impl Fn(&[f64], &mut [f64]),
     mut value: impl FnMut(&Terms<S>, usize) -> Option<f64>,
 ) -> Result<Grid, GridError> {
     let n = model.coordinates();
@@ -140,6 +160,8 @@ fn evaluate<S: Scalar>(
         for &first in &x {
             full[axes[0].component] = first;
             full[axes[1].component] = second;
+            let (position, velocity) = full.split_at_mut(n);
+            impose(position, velocity);
             q.extend(full[..n].iter().map(|&z| S::of_f64(z)));
             v.extend(full[n..].iter().map(|&z| S::of_f64(z)));
         }
@@ -168,13 +190,48 @@ mod tests {
             }
         }
         assert!(grid.minus(&grid).unwrap().values.iter().all(|&z| z == 0.0));
-        let ones = determinant_grid::<f64>(&PENDULUM, &[0.0, 0.0], AXES).unwrap();
+        let ones = determinant_grid::<f64>(&PENDULUM, &[0.0, 0.0], AXES, |_, _| {}).unwrap();
         assert!(ones.values.iter().all(|&z| z == 1.0));
     }
 
     #[test]
+    fn velocities_are_imposed_point_by_point() {
+        use crate::lagrangian::{HandWritten, Lagrangian};
+        use crate::scalar::Real;
+        /// `L = v_0^4 / 12 + v_1^2 / 2`: `det M = v_0^2`.
+        struct Quartic;
+        impl Lagrangian for Quartic {
+            fn coordinates(&self) -> usize {
+                2
+            }
+            fn lagrangian<R: Real>(&self, _: &[R], _: &[R], v: &[R]) -> R {
+                R::ratio(1, 12) * v[0].sqr().sqr() + R::half() * v[1].sqr()
+            }
+        }
+        let model = HandWritten::<_, f64>::new(Quartic, vec![]);
+        let grid = determinant_grid(&model, &[9.0; 4], AXES, |q, v| v[0] = q[0] + 2.0 * q[1]).unwrap();
+        for (index, &det) in grid.values.iter().enumerate() {
+            let (x, y) = grid.point(index);
+            assert!((det - (x + 2.0 * y).powi(2)).abs() <= 4.0 * f64::EPSILON * det, "{det} at {x}, {y}");
+        }
+    }
+
+    #[test]
+    fn wrong_signs_are_found_where_there_is_a_sign() {
+        let grid = |values: &[f64]| Grid { x: vec![0.0, 1.0, 2.0], y: vec![5.0, 6.0], values: values.to_vec() };
+        let (nan, inf) = (f64::NAN, f64::INFINITY);
+        let exact = grid(&[1.0, 2.0, -1.0, 0.0, nan, 3.0]);
+        let found = grid(&[0.5, -2.0, -9.0, 1.0, 1.0, inf]).wrong_signs(&exact).unwrap();
+        assert_eq!(found, [Some(false), Some(true), Some(false), None, None, Some(true)]);
+        // A model without mass has no sign either.
+        assert_eq!(grid(&[0.0; 6]).wrong_signs(&exact).unwrap()[..3], [Some(true); 3]);
+        assert_eq!(exact.point(4), (1.0, 6.0));
+        assert!(grid(&[0.0; 6]).wrong_signs(&Grid { x: vec![0.0], ..exact }).is_none());
+    }
+
+    #[test]
     fn failing_rows_are_gaps_and_bad_axes_errors() {
-        let grid = determinant_grid::<f64>(&SINGULAR, &[0.0, 0.0], AXES).unwrap();
+        let grid = determinant_grid::<f64>(&SINGULAR, &[0.0, 0.0], AXES, |_, _| {}).unwrap();
         assert_eq!(grid.values[0], 0.0);
         assert_eq!(grid.values[1], 1.0);
         assert!(matches!(lagrangian_grid::<f64>(&PENDULUM, &[0.0], AXES), Err(GridError::State { .. })));

@@ -11,6 +11,8 @@ use serde::Serialize;
 
 /// Points of a grid along each axis.
 const GRID: usize = 81;
+/// Velocities of the fast map of `det M`, in upper bounds of the validation states.
+const FAST: f64 = 0.99;
 
 /// Numbers of an evaluation, all in physical units.
 #[derive(Clone, Debug, Serialize)]
@@ -74,9 +76,7 @@ pub fn evaluate(
     };
     let runs = test.run_constrained(system, exact.as_ref(), learned).map_err(CliError::data)?;
 
-    let columns = system.system.columns(n);
-    let mut figures =
-        evaluation_figures(&runs, &columns, &periodic, system.system.time_unit).map_err(CliError::data)?;
+    let mut figures = evaluation_figures(&runs, system).map_err(CliError::data)?;
     figures.extend(grids(system, exact.as_ref(), learned)?);
     Ok(Evaluation {
         accelerations,
@@ -88,7 +88,8 @@ pub fn evaluate(
     })
 }
 
-/// `L` and `det M` at rest over the first two coordinates, or over coordinate and velocity if there is only one.
+/// `L` and `det M` at rest over the first two coordinates, or over coordinate and velocity if there is only one; with more
+/// than one, `det M` also at velocities close to the upper end of the validation bounds, where wrong signs appear first.
 fn grids(
     system: &Configured<f64>,
     exact: &dyn EulerLagrange<f64>,
@@ -96,32 +97,53 @@ fn grids(
 ) -> Result<Vec<Figure>, CliError> {
     let n = system.coordinates;
     let bounds = (system.system.validation)(n);
-    let middle = bounds.positions.iter().map(|(low, high)| 0.5 * (low + high));
+    let middle: Vec<f64> = bounds.positions.iter().map(|(low, high)| 0.5 * (low + high)).collect();
     // At rest a total time derivative in the learned L vanishes: what is left is a factor and a constant.
-    let rest = bounds.velocities.iter().map(|(low, high)| 0.0f64.clamp(*low, *high));
-    let (middle, mut rest): (Vec<f64>, Vec<f64>) = (middle.collect(), rest.collect());
+    let mut rest: Vec<f64> = bounds.velocities.iter().map(|(low, high)| 0.0f64.clamp(*low, *high)).collect();
     // A mass shell lets nothing rest in time.
     system.impose_constraint(&middle, &mut rest).map_err(CliError::data)?;
-    let state = [middle, rest].concat();
+    let fast = bounds.velocities.iter().map(|(_, high)| FAST * high).collect();
+    let (rest, fast) = ([middle.clone(), rest].concat(), [middle, fast].concat());
     let ranges: Vec<(f64, f64)> = bounds.positions.into_iter().chain(bounds.velocities).collect();
-    let columns = system.system.columns(n);
+    let labels = system.system.labels(n);
     let axes =
         [0, 1].map(|component| Axis { component, from: ranges[component].0, to: ranges[component].1, points: GRID });
 
-    let mut figures = Vec::new();
-    let pairs = [
-        ("L", "lagrangian", lagrangian_grid(exact, &state, axes), lagrangian_grid(learned, &state, axes)),
-        ("det M", "det_mass_matrix", determinant_grid(exact, &state, axes), determinant_grid(learned, &state, axes)),
+    // L is -1/2 everywhere on a mass shell and would show nothing there; its learned M is learned nowhere else.
+    let impose = |q: &[f64], v: &mut [f64]| system.impose_constraint(q, v).unwrap_or_else(|_| v.fill(f64::NAN));
+    let lagrangian = |model: &dyn EulerLagrange<f64>| lagrangian_grid(model, &rest, axes);
+    let determinant = |model: &dyn EulerLagrange<f64>, state: &[f64]| determinant_grid(model, state, axes, impose);
+    let mut pairs = vec![
+        ("L", "lagrangian", fixed(system, &rest, axes, false), lagrangian(exact), lagrangian(learned)),
+        (
+            "det M",
+            "det_mass_matrix",
+            fixed(system, &rest, axes, true),
+            determinant(exact, &rest),
+            determinant(learned, &rest),
+        ),
     ];
-    for (quantity, file, exact, learned) in pairs {
+    if n > 1 {
+        pairs.push((
+            "Fast det M",
+            "det_mass_matrix_fast",
+            fixed(system, &fast, axes, true),
+            determinant(exact, &fast),
+            determinant(learned, &fast),
+        ));
+    }
+    let mut figures = Vec::new();
+    for (quantity, file, fixed, exact, learned) in pairs {
         let comparison = GridComparison {
             quantity: quantity.to_string(),
             file: file.to_string(),
-            x_label: columns[0].clone(),
-            y_label: columns[1].clone(),
+            x_label: labels[0].clone(),
+            y_label: labels[1].clone(),
             exact: exact.map_err(CliError::data)?,
             learned: learned.map_err(CliError::data)?,
+            fixed,
             fit: true,
+            signs: quantity != "L",
         };
         match grid_figures(&comparison) {
             Ok((figure, _)) => figures.push(figure),
@@ -131,6 +153,30 @@ fn grids(
         }
     }
     Ok(figures)
+}
+
+/// The components of `(q, v)` that a grid leaves fixed, in words, neighbours of equal value together; `imposed` if the
+/// velocity of a time-like coordinate follows from the mass shell at every point.
+fn fixed(system: &Configured<f64>, state: &[f64], axes: [Axis; 2], imposed: bool) -> String {
+    let n = system.coordinates;
+    let (columns, units) = (system.system.columns(n), system.system.units(n));
+    let shell = system.constrained_coordinate().filter(|_| imposed).map(|i| n + i);
+    let mut groups: Vec<(Vec<&str>, String)> = Vec::new();
+    for (k, &x) in state.iter().enumerate() {
+        if axes.iter().any(|axis| axis.component == k) {
+            continue;
+        }
+        let value = match shell {
+            Some(shell) if shell == k => "by the mass shell".to_string(),
+            // Four decimals; adding 0 turns -0 into 0.
+            _ => format!("= {} {}", (1e4 * x).round() / 1e4 + 0.0, units[k]),
+        };
+        match groups.last_mut() {
+            Some((names, of)) if *of == value => names.push(columns[k].as_str()),
+            _ => groups.push((vec![columns[k].as_str()], value)),
+        }
+    }
+    groups.iter().map(|(names, value)| format!("{} {value}", names.join(", "))).collect::<Vec<_>>().join("; ")
 }
 
 /// A table of a report.
@@ -182,5 +228,51 @@ impl Evaluation {
         }
         report = report.heading("Learned against exact");
         self.figures.iter().fold(report, |report, figure| report.figure(&figure.png, &figure.caption))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lagrangian::configure;
+
+    #[test]
+    fn grids_say_where_they_are() {
+        let captions = |name: &str| -> Vec<(String, String)> {
+            let system = configure::<f64>(name, &[]).unwrap();
+            let exact = system.build().unwrap();
+            let figures = grids(&system, exact.as_ref(), exact.as_ref()).unwrap();
+            figures.into_iter().map(|figure| (figure.file, figure.caption)).collect()
+        };
+        let begins = |captions: &[(String, String)], expected: &[(&str, &str)]| {
+            assert_eq!(captions.len(), expected.len());
+            for ((file, caption), (name, text)) in captions.iter().zip(expected) {
+                assert!(file == name && caption.starts_with(text), "{file}: {caption}");
+            }
+        };
+        let rest = "theta3 = 3.1416 rad; theta1_dot, theta2_dot, theta3_dot = 0 rad/s: exact";
+        begins(
+            &captions("triple-pendulum"),
+            &[
+                ("lagrangian.png", &format!("L at {rest}")),
+                ("det_mass_matrix.png", &format!("det M at {rest}")),
+                (
+                    "det_mass_matrix_fast.png",
+                    "Fast det M at theta3 = 3.1416 rad; theta1_dot, theta2_dot, theta3_dot = 9.9 rad/s: exact",
+                ),
+            ],
+        );
+        begins(
+            &captions("ads2-geodesic"),
+            &[
+                ("lagrangian.png", "L at t_dot = 3.25 m/m; z_dot = 0 m/m: exact"),
+                ("det_mass_matrix.png", "det M at t_dot by the mass shell; z_dot = 0 m/m: exact"),
+                ("det_mass_matrix_fast.png", "Fast det M at t_dot by the mass shell; z_dot = 0.594 m/m: exact"),
+            ],
+        );
+        // The velocity is an axis: there is no fast map.
+        let one = captions("harmonic-oscillator");
+        begins(&one, &[("lagrangian.png", "L: exact"), ("det_mass_matrix.png", "det M: exact")]);
+        assert!(one[1].1.contains("right sign at every point") && !one[0].1.contains("sign"));
     }
 }

@@ -221,6 +221,15 @@ fn csv(table: &[Vec<String>]) -> String {
     line(&mut EXPERIMENT_HEADER.into_iter()) + &rows.collect::<String>()
 }
 
+/// Beginnings of the names of pictures in the order of a report; training and whatever else come last.
+const ORDER: [&str; 8] =
+    ["coordinate_error", "energy_", "trajectory_", "velocity_", "trace_", "phase_", "lagrangian", "det_mass_matrix"];
+
+/// Index of a picture in [`ORDER`].
+fn place_in_report(file: &str) -> usize {
+    ORDER.iter().position(|beginning| file.starts_with(beginning)).unwrap_or(ORDER.len())
+}
+
 /// Pictures that the experiment takes over from the evaluations of its runs, as far as they are there.
 fn pictures_of_runs(experiment: &Experiment, results: &[(Run, Option<Record>)], path: &Path) -> Vec<Figure> {
     let mut figures = Vec::new();
@@ -236,7 +245,7 @@ fn pictures_of_runs(experiment: &Experiment, results: &[(Run, Option<Record>)], 
                 .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
                 .filter(|name| name.starts_with(prefix) && name.ends_with(".png"))
                 .collect();
-            files.sort();
+            files.sort_by_cached_key(|file| (place_in_report(file), file.clone()));
             for file in files {
                 if let Ok(png) = crate::storage::read_regular(&directory.join(&file), 1 << 26) {
                     let subject = file.trim_end_matches(".png").replace('_', " ");
@@ -246,4 +255,45 @@ fn pictures_of_runs(experiment: &Experiment, results: &[(Run, Option<Record>)], 
         }
     }
     figures
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::experiments::Scale;
+
+    #[test]
+    fn pictures_come_in_the_order_of_a_report() {
+        let directory = tempfile::tempdir().unwrap();
+        let experiment = find("double-pendulum").unwrap();
+        let run = experiment.runs(Scale::Smoke, 1).remove(0);
+        let ordered = [
+            "coordinate_error.png",
+            "energy_drift.png",
+            "energy_error.png",
+            "trajectory_theta1.png",
+            "trajectory_theta2.png",
+            "velocity_t.png",
+            "trace_start1.png",
+            "phase_theta1.png",
+            "lagrangian.png",
+            "det_mass_matrix.png",
+            "det_mass_matrix_fast.png",
+            "learning_rate.png",
+            "training_loss.png",
+        ];
+        let folder = directory.path().join(&run.name);
+        std::fs::create_dir(&folder).unwrap();
+        for file in ordered {
+            std::fs::write(folder.join(file), b"x").unwrap();
+        }
+        let record = Record { outcome: Outcome::Nothing { reason: String::new() }, losses: Vec::new(), seconds: 0.0 };
+        let results = [(run, Some(record))];
+        let found = |name: &str| -> Vec<String> {
+            let figures = pictures_of_runs(find(name).unwrap(), &results, directory.path());
+            figures.into_iter().map(|figure| figure.file).collect()
+        };
+        assert_eq!(found("double-pendulum"), ordered);
+        assert_eq!(found("training-range"), ["det_mass_matrix.png", "det_mass_matrix_fast.png"]);
+    }
 }

@@ -49,7 +49,7 @@ fn describe(system: &System) -> Value {
         "title": system.title,
         "coordinates": coordinates.iter().map(|c| c.name.as_ref()).collect::<Vec<_>>(),
         "columns": system.columns(n),
-        "units": column_units(system, n),
+        "units": system.units(n),
         "periodic": coordinates.iter().map(|c| c.periodic).collect::<Vec<_>>(),
         "time_unit": system.time_unit,
         "time_like": system.time_like.map(|i| coordinates[i].name.as_ref()),
@@ -57,13 +57,6 @@ fn describe(system: &System) -> Value {
         "parameters": parameters,
         "bounds": { "training": box_of((system.training)(n)), "validation": box_of((system.validation)(n)) },
     })
-}
-
-/// Units of the columns of a state.
-fn column_units(system: &System, n: usize) -> Vec<String> {
-    let coordinates = (system.coordinates)(n);
-    let positions = coordinates.iter().map(|c| c.unit.to_string());
-    positions.chain(coordinates.iter().map(|c| format!("{}/{}", c.unit, system.time_unit))).collect()
 }
 
 fn table(system: &System) -> String {
@@ -78,7 +71,7 @@ fn table(system: &System) -> String {
     let remarks = (system.coordinates)(n).into_iter().enumerate().map(remark);
     let fixed = system.time_like.filter(|_| system.constraint.is_some()).map(|i| n + i);
     let mut text = format!("{}  ({})\n", system.name, system.title);
-    let rows = system.columns(n).into_iter().zip(column_units(system, n)).zip(ranges);
+    let rows = system.columns(n).into_iter().zip(system.units(n)).zip(ranges);
     for (k, (((column, unit), (low, high)), remark)) in rows.zip(remarks.chain(std::iter::repeat(""))).enumerate() {
         match system.constraint.filter(|_| fixed == Some(k)) {
             Some(constraint) => text += &format!("  {column:<12} {unit:<6} {constraint}\n"),

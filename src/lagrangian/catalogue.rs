@@ -282,9 +282,18 @@ impl<S: Scalar> Configured<S> {
     /// # Errors
     /// What the coordinates must satisfy.
     pub fn check_domain(&self, q: &[S]) -> Result<(), &'static str> {
-        let leading = |x: &[S]| -> Vec<f64> { x.iter().map(|x| x.to_f64()).collect() };
         self.system.domain.map_or(Ok(()), |domain| domain(&leading(&self.parameters), &leading(q)))
     }
+    /// `(x, y)` of coordinates in the system's [`Plane`](super::system::Plane); `None` without a plane or for a wrong
+    /// number of coordinates.
+    pub fn place(&self, q: &[S]) -> Option<(f64, f64)> {
+        let plane = self.system.plane.filter(|_| q.len() == self.coordinates)?;
+        Some((plane.point)(&leading(&self.parameters), &leading(q)))
+    }
+}
+
+fn leading<S: Scalar>(x: &[S]) -> Vec<f64> {
+    x.iter().map(|x| x.to_f64()).collect()
 }
 
 fn unknown_system(name: &str) -> SystemError {
@@ -306,7 +315,7 @@ mod tests {
             let configured = configure::<f64>(system.name, &[]).unwrap();
             assert_eq!(configured.build().unwrap().coordinates(), n);
             assert_eq!((system.coordinates)(n).len(), n);
-            assert_eq!(system.columns(n).len(), 2 * n);
+            assert_eq!((system.columns(n).len(), system.units(n).len()), (2 * n, 2 * n));
             let start = (system.trajectory)(n).start;
             assert_eq!((start.positions.len(), start.velocities.len()), (n, n));
             assert!(start.positions.iter().chain(&start.velocities).all(|b| b.0 <= b.1));
@@ -332,6 +341,7 @@ mod tests {
         }
         let pendulum = find("double-pendulum").unwrap();
         assert_eq!(pendulum.columns(2), ["theta1", "theta2", "theta1_dot", "theta2_dot"]);
+        assert_eq!(pendulum.labels(2)[1..3], ["theta2 [rad]", "theta1_dot [rad/s]"]);
         assert_eq!(find("sphere-geodesic").unwrap().columns(2), ["theta", "phi", "theta_dot", "phi_dot"]);
         assert!(configure::<f64>("spring-pendulum", &[]).unwrap().check_domain(&[0.0, 1.0]).is_err());
         assert!(configure::<f64>("sphere-geodesic", &[]).unwrap().check_domain(&[0.0, 1.0]).is_err());
@@ -343,6 +353,62 @@ mod tests {
         assert!(hole("1.5").check_domain(&[0.0, 3.0, 1.0, 0.0]).is_err());
         assert!(hole("1").check_domain(&[0.0, 3.0, 0.0, 0.0]).is_err());
         assert!(hole("1").impose_constraint(&[0.0, 3.0, 1.0], &mut [0.0; 4]).is_err());
+    }
+
+    #[test]
+    fn systems_are_where_they_should_be() {
+        let place = |name: &str, list: &[(&str, &str)], q: &[f64]| {
+            configure::<f64>(name, &given(list)).unwrap().place(q).unwrap()
+        };
+        let near = |(x, y): (f64, f64), (a, b): (f64, f64), size: f64| {
+            // Sine and cosine to half a unit in the last place, angles as near as pi is.
+            assert!((x - a).abs().max((y - b).abs()) <= 4.0 * f64::EPSILON * size, "({x}, {y}) for ({a}, {b})");
+        };
+        use std::f64::consts::{FRAC_PI_2, FRAC_PI_3, FRAC_PI_6, PI};
+        let root = 0.75f64.sqrt();
+        // One rod to the right, one up; then hanging; then three, the last up at an angle.
+        near(place("double-pendulum", &[("l1", "2"), ("l2", "0.5")], &[FRAC_PI_2, PI]), (2.0, 0.5), 2.5);
+        near(place("double-pendulum", &[], &[0.0, 0.0]), (0.0, -2.0), 2.0);
+        let rods = [("l1", "1"), ("l2", "2"), ("l3", "4")];
+        near(place("triple-pendulum", &rods, &[0.0, FRAC_PI_2, PI - FRAC_PI_6]), (4.0, 4.0 * root - 1.0), 7.0);
+        near(place("n-pendulum", &[("n", "5"), ("l", "2")], &[FRAC_PI_6; 5]), (5.0, -10.0 * root), 10.0);
+        near(place("n-pendulum", &[("n", "1")], &[-FRAC_PI_2]), (-1.0, 0.0), 1.0);
+        near(place("spring-pendulum", &[], &[3.0, FRAC_PI_3]), (3.0 * root, -1.5), 3.0);
+        near(place("sphere-geodesic", &[("R", "2")], &[FRAC_PI_3, PI]), (-2.0 * root, 1.0), 2.0);
+        near(place("schwarzschild-geodesic", &[], &[7.0, 4.0, 1.0, FRAC_PI_6]), (4.0 * root, 2.0), 4.0);
+        assert_eq!(place("kepler", &[], &[1.5, -2.0]), (1.5, -2.0));
+        assert_eq!(place("henon-heiles", &[], &[0.25, 0.5]), (0.25, 0.5));
+        assert_eq!(place("charged-particle", &[], &[1.0, 2.0, 3.0]), (1.0, 2.0));
+        assert_eq!(place("ads2-geodesic", &[], &[1.0, 2.0]), (1.0, 2.0));
+        assert_eq!(place("ads3-geodesic", &[], &[1.0, 2.0, 3.0]), (2.0, 3.0));
+        assert_eq!(place("ads4-geodesic", &[], &[1.0, 2.0, 3.0, 4.0]), (2.0, 4.0));
+        assert_eq!(configure::<f64>("kepler", &[]).unwrap().place(&[1.0]), None);
+    }
+
+    #[test]
+    fn places_are_finite_and_no_larger_than_the_system() {
+        for system in systems() {
+            let n = system.size.default();
+            let configured = configure::<f64>(system.name, &[]).unwrap();
+            let bounds = (system.training)(n).positions;
+            let Some(plane) = system.plane else {
+                assert_eq!((n, configured.place(&[0.5])), (1, None), "{}", system.name);
+                continue;
+            };
+            assert!(plane.labels.iter().all(|label| label.ends_with(" [m]")), "{}", system.name);
+            let size = match system.name {
+                "sphere-geodesic" => 1.0,
+                "double-pendulum" | "triple-pendulum" | "n-pendulum" => n as f64,
+                _ => f64::INFINITY,
+            };
+            for k in 0..1000 {
+                // A different fraction of each coordinate's range in every state.
+                let part = |i: usize| (0.618_034 * f64::from(k) * (1.0 + i as f64).sqrt()).fract();
+                let q: Vec<f64> = bounds.iter().enumerate().map(|(i, b)| b.0 + (b.1 - b.0) * part(i)).collect();
+                let (x, y) = configured.place(&q).unwrap();
+                assert!(x.is_finite() && y.is_finite() && x.hypot(y) <= size * (1.0 + 1e-15 * n as f64), "{q:?}");
+            }
+        }
     }
 
     #[test]

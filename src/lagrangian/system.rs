@@ -119,6 +119,17 @@ pub struct TrajectoryTest {
 /// Refuses coordinates outside a chart, given the parameters, with what is demanded of them.
 pub type Domain = fn(parameters: &[f64], q: &[f64]) -> Result<(), &'static str>;
 
+/// A plane in which a picture shows where a system is, in space rather than over its coordinates.
+#[derive(Clone, Copy, Debug)]
+pub struct Plane {
+    /// Labels of the horizontal and the vertical axis, with units.
+    pub labels: [&'static str; 2],
+    /// `(x, y)` from the values of [`System::parameters`] and `n` coordinates. Finite wherever both are finite and the
+    /// result fits the number type; `NaN` for a wrong number of parameters. A point of a body of fixed size stays within
+    /// that size: `x^2 + y^2 <= (sum of the rods)^2` for a chain of pendula, `R^2` on a sphere.
+    pub point: fn(parameters: &[f64], q: &[f64]) -> (f64, f64),
+}
+
 /// Catalogue entry of a system; functions take the number of coordinates.
 #[derive(Clone, Copy, Debug)]
 pub struct System {
@@ -148,6 +159,8 @@ pub struct System {
     pub trajectory: fn(usize) -> TrajectoryTest,
     /// Where the coordinates make sense; the error says what is demanded.
     pub domain: Option<Domain>,
+    /// Where it is in a plane; `None` for systems of one coordinate, whose coordinate over time says all.
+    pub plane: Option<Plane>,
 }
 
 impl System {
@@ -156,6 +169,16 @@ impl System {
         let coordinates = (self.coordinates)(n);
         let positions = coordinates.iter().map(|c| c.name.to_string());
         positions.chain(coordinates.iter().map(|c| format!("{}_dot", c.name))).collect()
+    }
+    /// The same columns with their units (`theta1_dot [rad/s]`): labels of axes.
+    pub fn labels(&self, n: usize) -> Vec<String> {
+        self.columns(n).iter().zip(self.units(n)).map(|(column, unit)| format!("{column} [{unit}]")).collect()
+    }
+    /// Units of the same columns (`rad`, `rad/s`).
+    pub fn units(&self, n: usize) -> Vec<String> {
+        let coordinates = (self.coordinates)(n);
+        let positions = coordinates.iter().map(|c| c.unit.to_string());
+        positions.chain(coordinates.iter().map(|c| format!("{}/{}", c.unit, self.time_unit))).collect()
     }
 }
 

@@ -1,165 +1,180 @@
-//! Pictures of an evaluation.
+//! Pictures of the motions of an evaluation.
 
-use super::{Figure, HeatMap, LinePlot, PlotError, Series, Trace, heat_maps_png, line_png, trace_png};
-use crate::analysis::{AffineFit, Grid, TrajectoryRun, affine_fit};
+use super::{Figure, LinePlot, PlotError, Series, Trace, line_png, trace_png};
+use crate::analysis::TrajectoryRun;
+use crate::lagrangian::Configured;
+use crate::rollout::Trajectory;
 use crate::scalar::Scalar;
 
 /// Times and values of one quantity of a run.
 type Part<S> = fn(&TrajectoryRun<S>) -> (&[f64], &[f64]);
 
-/// Pictures of trajectory tests: coordinate error, energy error, energy drift over time, one line per start, and for the
-/// first start the coordinates over time and its trace in the plane of coordinate and velocity.
+/// Pictures of trajectory tests, in the order of a report: coordinate error, energy error, drift of the learned energy,
+/// one line per start; coordinates of the first start over time, and velocities if the system has a time-like coordinate;
+/// every start in the plane of the system; the first start in the planes of coordinate and velocity.
 ///
-/// `columns` names the `2n` components of a state; `periodic` marks angles, drawn modulo `2 pi`; `time_unit` is the unit
-/// of the time axis.
+/// `system` describes what moved: names, units, angles (drawn modulo `2 pi`), the plane.
 ///
 /// # Errors
 /// [`PlotError::Renderer`] if the renderer fails; pictures without data are left out.
-pub fn evaluation_figures<S: Scalar, T: AsRef<str>>(
+pub fn evaluation_figures<S: Scalar>(
     runs: &[TrajectoryRun<S>],
-    columns: &[T],
-    periodic: &[bool],
-    time_unit: &str,
+    system: &Configured<S>,
 ) -> Result<Vec<Figure>, PlotError> {
-    let mut figures = Vec::new();
-    let over_time = |title: &str, y_label: &str, log_y: bool, series: Vec<Series>| {
-        let x_label = format!("t [{time_unit}]");
-        line_png(&LinePlot { title: title.into(), x_label, y_label: y_label.into(), log_y, series })
-    };
-    let per_start = |part: Part<S>| -> Vec<Series> {
-        runs.iter()
-            .enumerate()
-            .map(|(k, run)| {
-                let (t, y) = part(run);
-                Series::new(&format!("start {}", k + 1), t, y)
-            })
-            .collect()
-    };
-    let coordinate = per_start(|run| (&run.coordinates.t, &run.coordinates.max));
-    let energy = per_start(|run| (&run.energy.t, &run.energy.error));
-    let drift = per_start(|run| (&run.drift.t, &run.drift.error));
-    keep(
-        &mut figures,
-        "coordinate_error.png",
-        over_time("Coordinate error", "largest |q learned \u{2212} q exact|", true, coordinate),
-        "Largest coordinate error of the learned motion over time, angles modulo 2\u{3c0}.".into(),
-    )?;
-    keep(
-        &mut figures,
-        "energy_error.png",
-        over_time("Energy error", "|E(t) \u{2212} E(0)| / |E(0)|", true, energy),
-        "Normalised error of the exact energy along the learned motion.".into(),
-    )?;
-    keep(
-        &mut figures,
-        "energy_drift.png",
-        over_time("Drift of the learned energy", "|E(t) \u{2212} E(0)| / |E(0)|", true, drift),
-        "Normalised drift of the learned energy along the learned motion: what the integrator loses.".into(),
-    )?;
-
-    let Some(run) = runs.first() else { return Ok(figures) };
-    let (exact, learned) = (&run.exact.trajectory, &run.learned.trajectory);
-    let n = exact.coordinates;
-    for (i, name) in columns.iter().take(n).enumerate() {
-        let name = name.as_ref();
-        let angle = periodic.get(i).copied().unwrap_or(false);
-        let line = |label: &str, trajectory: &crate::rollout::Trajectory<S>| {
-            let t: Vec<f64> = trajectory.t.iter().map(|t| t.to_f64()).collect();
-            let q: Vec<f64> = (0..trajectory.len()).map(|k| trajectory.state(k).0[i].to_f64()).collect();
-            Series { points: folded(&t, &q, angle, false), ..Series::new(label, &[], &[]) }
-        };
-        keep(
-            &mut figures,
-            &format!("trajectory_{}.png", file_part(name)),
-            over_time(
-                &format!("{name} of start 1"),
-                name,
-                false,
-                vec![line("exact", exact), line("learned", learned).over()],
-            ),
-            format!("{name} of start 1 over time, exact and learned."),
-        )?;
-    }
-    for i in 0..n.min(columns.len() / 2) {
-        let (q_name, v_name) = (columns[i].as_ref(), columns[n + i].as_ref());
-        let angle = periodic.get(i).copied().unwrap_or(false);
-        let path = |label: &str, trajectory: &crate::rollout::Trajectory<S>| {
-            let part = |values: &[S]| values.iter().skip(i).step_by(n).map(|x| x.to_f64()).collect::<Vec<_>>();
-            Series {
-                points: folded(&part(&trajectory.q), &part(&trajectory.v), angle, true),
-                ..Series::new(label, &[], &[])
-            }
-        };
-        let trace = Trace {
-            title: "Phase space".into(),
-            x_label: q_name.into(),
-            y_label: v_name.into(),
-            paths: vec![path("exact", exact), path("learned", learned)],
-        };
-        keep(
-            &mut figures,
-            &format!("phase_{}.png", file_part(q_name)),
-            trace_png(&trace),
-            format!(
-                "Start 1 in the plane of {q_name} and {v_name}, exact and learned, from dark (early) to bright (late)."
-            ),
-        )?;
+    let mut figures = errors_over_time(runs, system)?;
+    if let Some(run) = runs.first() {
+        let pair = [("exact", &run.exact.trajectory), ("learned", &run.learned.trajectory)];
+        first_over_time(&mut figures, pair, system)?;
+        traces(&mut figures, runs, system)?;
+        phases(&mut figures, pair, system)?;
     }
     Ok(figures)
 }
 
-/// A quantity of the exact and of the learned model on the same grid.
-#[derive(Clone, Debug, PartialEq)]
-pub struct GridComparison {
-    /// Name of the quantity, such as `L` or `det M`.
-    pub quantity: String,
-    /// Beginning of the file name.
-    pub file: String,
-    /// Label of the horizontal axis, with unit.
-    pub x_label: String,
-    /// Label of the vertical axis, with unit.
-    pub y_label: String,
-    /// Exact values.
-    pub exact: Grid,
-    /// Learned values.
-    pub learned: Grid,
-    /// Whether to compare up to the best affine fit (`a learned + b`), as a Lagrangian must be.
-    pub fit: bool,
+/// Exact and learned motion with their names.
+type Pair<'a, S> = [(&'static str, &'a Trajectory<S>); 2];
+
+/// Lines over the evolution parameter.
+fn over_time<S>(
+    system: &Configured<S>,
+    title: &str,
+    y_label: &str,
+    log_y: bool,
+    series: Vec<Series>,
+) -> Result<Vec<u8>, PlotError> {
+    let parameter = if system.system.time_like.is_some() { "proper time" } else { "t" };
+    let x_label = format!("{parameter} [{}]", system.system.time_unit);
+    line_png(&LinePlot { title: title.into(), x_label, y_label: y_label.into(), log_y, series })
 }
 
-/// Exact, learned and difference side by side, the first two with one range of colours, and the fit if one was made.
-///
-/// # Errors
-/// [`PlotError`] if a grid has no finite value, the grids differ in size, or the renderer fails.
-pub fn grid_figures(comparison: &GridComparison) -> Result<(Figure, Option<AffineFit>), PlotError> {
-    let quantity = &comparison.quantity;
-    let empty = || PlotError::Empty(quantity.clone());
-    let fit = if comparison.fit { affine_fit(&comparison.learned.values, &comparison.exact.values) } else { None };
-    let learned = fit.map_or_else(|| comparison.learned.clone(), |fit| comparison.learned.fitted(&fit));
-    let difference = learned.minus(&comparison.exact).ok_or_else(empty)?;
-    let finite = comparison.exact.values.iter().filter(|z| z.is_finite());
-    let (low, high) = finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &z| (low.min(z), high.max(z)));
-    let map = |title: String, grid: Grid, range, diverging| HeatMap {
-        title,
-        x_label: comparison.x_label.clone(),
-        y_label: comparison.y_label.clone(),
-        grid,
-        range,
-        diverging,
-    };
-    let png = heat_maps_png(&[
-        map(format!("{quantity} exact"), comparison.exact.clone(), Some((low, high)), false),
-        map(format!("{quantity} learned"), learned, Some((low, high)), false),
-        map("learned \u{2212} exact".into(), difference, None, true),
-    ])?;
-    let caption = match fit {
-        Some(fit) => format!(
-            "{quantity}: exact, learned after the best affine fit (a = {:.6}, b = {:.6}, R\u{b2} = {:.6}), and the difference.",
-            fit.a, fit.b, fit.r2
+fn errors_over_time<S: Scalar>(runs: &[TrajectoryRun<S>], system: &Configured<S>) -> Result<Vec<Figure>, PlotError> {
+    let mut units = system.system.units(system.coordinates);
+    units.truncate(system.coordinates);
+    units.sort();
+    units.dedup();
+    let coordinate_label = format!("largest |q learned \u{2212} q exact| [{}]", units.join(", "));
+    let energy_label = "|E(t) \u{2212} E(0)| / |E(0)|";
+    let pictures: [(&str, &str, &str, Part<S>, &str); 3] = [
+        (
+            "coordinate_error.png",
+            "Coordinate error",
+            &coordinate_label,
+            |run| (&run.coordinates.t, &run.coordinates.max),
+            "Largest coordinate error of the learned motion over time, angles modulo 2\u{3c0}.",
         ),
-        None => format!("{quantity}: exact, learned with the same colours, and the difference."),
+        (
+            "energy_error.png",
+            "Energy error",
+            energy_label,
+            |run| (&run.energy.t, &run.energy.error),
+            "Normalised error of the exact energy along the learned motion.",
+        ),
+        (
+            "energy_drift.png",
+            "Drift of the learned energy",
+            energy_label,
+            |run| (&run.drift.t, &run.drift.error),
+            "Normalised drift of the learned energy along the learned motion: what the integrator loses.",
+        ),
+    ];
+    let mut figures = Vec::new();
+    for (file, title, label, part, caption) in pictures {
+        let line = |(k, run): (usize, &TrajectoryRun<S>)| {
+            let (t, y) = part(run);
+            Series::new(&format!("start {}", k + 1), t, y)
+        };
+        let lines = runs.iter().enumerate().map(line).collect();
+        keep(&mut figures, file, over_time(system, title, label, true, lines), caption.into())?;
+    }
+    Ok(figures)
+}
+
+/// Coordinates of the first start, and velocities if there is a time-like coordinate: rates of clocks.
+fn first_over_time<S: Scalar>(
+    figures: &mut Vec<Figure>,
+    pair: Pair<'_, S>,
+    system: &Configured<S>,
+) -> Result<(), PlotError> {
+    let n = system.coordinates;
+    let (coordinates, columns) = ((system.system.coordinates)(n), system.system.columns(n));
+    let labels = system.system.labels(n);
+    let shown = if system.system.time_like.is_some() { 2 * n } else { n };
+    for k in 0..shown {
+        let (coordinate, column) = (&coordinates[k % n], &columns[k]);
+        let line = |(label, trajectory): (&str, &Trajectory<S>)| {
+            let t: Vec<f64> = trajectory.t.iter().map(|t| t.to_f64()).collect();
+            let points = folded(&t, &component(trajectory, k), coordinate.periodic && k < n, false);
+            Series { points, ..Series::new(label, &[], &[]) }
+        };
+        let lines = vec![line(pair[0]), line(pair[1]).over()];
+        let kind = if k < n { "trajectory" } else { "velocity" };
+        keep(
+            figures,
+            &format!("{kind}_{}.png", file_part(&coordinate.name)),
+            over_time(system, &format!("{column} of start 1"), &labels[k], false, lines),
+            format!("{column} of start 1 over time, exact and learned."),
+        )?;
+    }
+    Ok(())
+}
+
+/// Every start in the plane of the system.
+fn traces<S: Scalar>(
+    figures: &mut Vec<Figure>,
+    runs: &[TrajectoryRun<S>],
+    system: &Configured<S>,
+) -> Result<(), PlotError> {
+    let Some(plane) = system.system.plane else { return Ok(()) };
+    let path = |label: &str, trajectory: &Trajectory<S>| {
+        let places = (0..trajectory.len()).filter_map(|k| system.place(trajectory.state(k).0));
+        Series { points: places.collect(), ..Series::new(label, &[], &[]) }
     };
-    Ok((Figure { file: format!("{}.png", comparison.file), png, caption }, fit))
+    for (k, run) in runs.iter().enumerate() {
+        let start = k + 1;
+        let [x_label, y_label] = plane.labels.map(String::from);
+        let caption =
+            format!("Trace of start {start} in the plane, exact and learned, from dark (early) to bright (late).");
+        let trace = Trace {
+            title: format!("Start {start}"),
+            x_label,
+            y_label,
+            paths: vec![path("exact", &run.exact.trajectory), path("learned", &run.learned.trajectory)],
+            equal: true,
+        };
+        keep(figures, &format!("trace_start{start}.png"), trace_png(&trace), caption)?;
+    }
+    Ok(())
+}
+
+/// The first start in the planes of coordinate and velocity.
+fn phases<S: Scalar>(figures: &mut Vec<Figure>, pair: Pair<'_, S>, system: &Configured<S>) -> Result<(), PlotError> {
+    let n = system.coordinates;
+    let (columns, labels) = (system.system.columns(n), system.system.labels(n));
+    for (i, coordinate) in (system.system.coordinates)(n).iter().enumerate() {
+        let path = |(label, trajectory): (&str, &Trajectory<S>)| {
+            let (q, v) = (component(trajectory, i), component(trajectory, n + i));
+            Series { points: folded(&q, &v, coordinate.periodic, true), ..Series::new(label, &[], &[]) }
+        };
+        let trace = Trace {
+            title: "Phase space of start 1".into(),
+            x_label: labels[i].clone(),
+            y_label: labels[n + i].clone(),
+            paths: pair.map(path).to_vec(),
+            equal: false,
+        };
+        let (q, v) = (&columns[i], &columns[n + i]);
+        let caption =
+            format!("Start 1 in the plane of {q} and {v}, exact and learned, from dark (early) to bright (late).");
+        keep(figures, &format!("phase_{}.png", file_part(q)), trace_png(&trace), caption)?;
+    }
+    Ok(())
+}
+
+/// Component `k` of the states `(q, v)` over time; nothing if the trajectory has not so many.
+fn component<S: Scalar>(trajectory: &Trajectory<S>, k: usize) -> Vec<f64> {
+    let n = trajectory.coordinates;
+    let (values, offset) = if k < n { (&trajectory.q, k) } else { (&trajectory.v, k - n) };
+    values.chunks_exact(n.max(1)).filter_map(|row| row.get(offset)).map(|x| x.to_f64()).collect()
 }
 
 /// Keeps a picture, drops one without data.
@@ -205,16 +220,13 @@ fn file_part(name: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::analysis::{Axis, StartBox, TrajectoryTest, determinant_grid, lagrangian_grid};
-    use crate::rollout::models::{OSCILLATOR, PENDULUM, SINGULAR};
+    use crate::analysis::{StartBox, TrajectoryTest};
+    use crate::lagrangian::configure;
+    use crate::report::test_pictures::save;
+    use crate::rollout::models::{PENDULUM, SINGULAR};
 
-    fn save(figures: &[Figure]) {
-        // Pictures to look at: set the directory to keep them.
-        if let Ok(directory) = std::env::var("LNN_TEST_PICTURES") {
-            for figure in figures {
-                std::fs::write(std::path::Path::new(&directory).join(&figure.file), &figure.png).unwrap();
-            }
-        }
+    fn files(figures: &[Figure]) -> Vec<&str> {
+        figures.iter().map(|f| f.file.as_str()).collect()
     }
 
     #[test]
@@ -222,50 +234,37 @@ mod tests {
         let bounds = StartBox { q: vec![(2.0, 3.0)], v: vec![(1.0, 1.5)] };
         let test = TrajectoryTest { t_end: 30.0, ..TrajectoryTest::<f64>::new(bounds, vec![true]) };
         let mut runs = test.run(&PENDULUM, &PENDULUM);
+        runs.truncate(1);
         runs.extend(TrajectoryTest { starts: 1, seed: 5, ..test }.run(&PENDULUM, &SINGULAR));
-        let figures = evaluation_figures(&runs, &["theta", "theta_dot"], &[true], "s").unwrap();
-        let names: Vec<_> = figures.iter().map(|f| f.file.as_str()).collect();
-        let expected =
-            ["coordinate_error.png", "energy_error.png", "energy_drift.png", "trajectory_theta.png", "phase_theta.png"];
-        assert_eq!(names, expected);
+        let system = configure::<f64>("n-pendulum", &[("n".to_string(), "1".to_string())]).unwrap();
+        let figures = evaluation_figures(&runs, &system).unwrap();
+        let expected = [
+            "coordinate_error.png",
+            "energy_error.png",
+            "energy_drift.png",
+            "trajectory_theta.png",
+            "trace_start1.png",
+            "trace_start2.png",
+            "phase_theta.png",
+        ];
+        assert_eq!(files(&figures), expected);
         save(&figures);
-        assert!(evaluation_figures::<f64, &str>(&[], &[], &[], "s").unwrap().is_empty());
+        assert!(evaluation_figures(&[], &system).unwrap().is_empty());
     }
 
     #[test]
-    fn grids_are_compared_up_to_the_fit() {
-        let axes = [
-            Axis { component: 0, from: -3.0, to: 3.0, points: 61 },
-            Axis { component: 1, from: -2.0, to: 2.0, points: 41 },
-        ];
-        let grid = |model| lagrangian_grid::<f64>(model, &[0.0, 0.0], axes).unwrap();
-        let exact = grid(&PENDULUM);
-        let mut comparison = GridComparison {
-            quantity: "L".into(),
-            file: "lagrangian".into(),
-            x_label: "theta [rad]".into(),
-            y_label: "theta_dot [rad/s]".into(),
-            learned: exact.map(|z| 3.0 * z - 7.0),
-            exact,
-            fit: true,
-        };
-        let (_, fit) = grid_figures(&comparison).unwrap();
-        let fit = fit.unwrap();
-        assert!((fit.a - 1.0 / 3.0).abs() < 1e-12 && (fit.b - 7.0 / 3.0).abs() < 1e-12 && fit.r2 > 1.0 - 1e-12);
-        comparison.learned = grid(&OSCILLATOR);
-        let (figure, _) = grid_figures(&comparison).unwrap();
-        save(&[figure]);
-        let det = determinant_grid::<f64>(&PENDULUM, &[0.0, 0.0], axes).unwrap();
-        comparison = GridComparison {
-            quantity: "det M".into(),
-            file: "det_m".into(),
-            exact: det.clone(),
-            learned: det,
-            fit: false,
-            ..comparison
-        };
-        let (figure, fit) = grid_figures(&comparison).unwrap();
-        assert!(fit.is_none());
-        save(&[figure]);
+    fn rates_of_clocks_are_shown_where_there_is_a_time() {
+        let system = configure::<f64>("ads2-geodesic", &[]).unwrap();
+        let exact = system.build().unwrap();
+        let start = (system.system.trajectory)(2).start;
+        let bounds = StartBox { q: start.positions, v: start.velocities };
+        let test = TrajectoryTest { starts: 1, t_end: 0.5, dt: 0.01, ..TrajectoryTest::new(bounds, vec![false; 2]) };
+        let runs = test.run_constrained(&system, exact.as_ref(), exact.as_ref()).unwrap();
+        let figures = evaluation_figures(&runs, &system).unwrap();
+        let motions = ["trajectory_t.png", "trajectory_z.png", "velocity_t.png", "velocity_z.png", "trace_start1.png"];
+        assert_eq!(files(&figures)[3..8], motions);
+        assert!(figures[5].caption.starts_with("t_dot of start 1"));
+        let states = &runs[0].exact.trajectory;
+        assert_eq!((component(states, 1)[3], component(states, 2)[3]), (states.state(3).0[1], states.state(3).1[0]));
     }
 }

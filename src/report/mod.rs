@@ -2,13 +2,17 @@
 
 mod evaluation;
 mod experiment;
+mod grids;
 mod html;
 mod plot;
 mod table;
+#[cfg(test)]
+mod test_pictures;
 mod training;
 
-pub use evaluation::{GridComparison, evaluation_figures, grid_figures};
+pub use evaluation::evaluation_figures;
 pub use experiment::{EXPERIMENT_HEADER, experiment_figures, experiment_table};
+pub use grids::{GridComparison, grid_figures};
 pub use html::Report;
 pub use plot::{HeatMap, LinePlot, PlotError, Series, Trace, heat_maps_png, line_png, trace_png};
 pub use table::text_table;

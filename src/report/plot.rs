@@ -80,8 +80,11 @@ pub struct Trace {
     pub x_label: String,
     /// Label of the vertical axis, with unit.
     pub y_label: String,
-    /// Paths with a name each, drawn side by side with the same axes.
+    /// Paths with a name each, drawn side by side with the same axes; points at equal places in the lists have equal
+    /// colours. The first is shown whole, the others as far as they keep within its extent of it.
     pub paths: Vec<Series>,
+    /// Whether both axes have one scale (a plane of space).
+    pub equal: bool,
 }
 
 /// A grid as colours.
@@ -99,6 +102,8 @@ pub struct HeatMap {
     pub range: Option<(f64, f64)>,
     /// Whether colours diverge from 0 (differences).
     pub diverging: bool,
+    /// Points to mark by a dot.
+    pub marks: Vec<(f64, f64)>,
 }
 
 /// PNG of lines.
@@ -183,40 +188,43 @@ pub fn line_png(plot: &LinePlot) -> Result<Vec<u8>, PlotError> {
 /// [`PlotError`] if nothing can be shown.
 pub fn trace_png(trace: &Trace) -> Result<Vec<u8>, PlotError> {
     let empty = || PlotError::Empty(trace.title.clone());
-    let x = range(values(&trace.paths, |p| p.0)).ok_or_else(empty)?;
-    let y = range(values(&trace.paths, |p| p.1)).ok_or_else(empty)?;
+    let x = window(&trace.paths, |p| p.0).ok_or_else(empty)?;
+    let y = window(&trace.paths, |p| p.1).ok_or_else(empty)?;
+    let total = trace.paths.iter().map(|path| path.points.len()).max().unwrap_or(0).max(1) as f64;
     let room = (0.04 * (x.1 - x.0), 0.04 * (y.1 - y.0));
     let (mut all, mut layouts) = (Vec::new(), Vec::new());
     for path in &trace.paths {
         let mut plots = Vec::new();
-        let total = path.points.len().max(1) as f64;
-        let piece = path.points.len().div_ceil(80).max(2);
+        // What leaves the window is a gap.
+        let inside = |p: &(f64, f64)| x.0 <= p.0 && p.0 <= x.1 && y.0 <= p.1 && p.1 <= y.1;
+        let points = path.points.iter().map(|p| if inside(p) { *p } else { (f64::NAN, f64::NAN) });
+        let points: Vec<(f64, f64)> = points.collect();
+        let piece = points.len().div_ceil(80).max(2);
         let mut start = 0;
-        while start + 1 < path.points.len() {
+        while start + 1 < points.len() {
             // Pieces share their end points.
-            let end = (start + piece).min(path.points.len() - 1);
+            let end = (start + piece).min(points.len() - 1);
             let colour = ColorMap::Viridis.map(0.92 * start as f64 / total);
-            for run in runs(&path.points[start..=end]) {
+            for run in runs(&points[start..=end]) {
                 plots.push(Plot::Line(Line::new().with_data(run).with_color(&*colour).with_stroke_width(1.4)));
             }
             start = end;
         }
-        if let Some(&first) = path.points.iter().find(|p| fine(p.0) && fine(p.1)) {
+        if let Some(&first) = points.iter().find(|p| fine(p.0) && fine(p.1)) {
             plots.push(Plot::Scatter(ScatterPlot::new().with_data(vec![first]).with_color("#D55E00").with_size(4.0)));
         }
         if plots.is_empty() {
             continue;
         }
         let title = if path.name.is_empty() { trace.title.clone() } else { format!("{}: {}", trace.title, path.name) };
-        layouts.push(
-            style(Layout::auto_from_plots(&plots), &title, &trace.x_label, &trace.y_label)
-                .with_x_axis_min(x.0 - room.0)
-                .with_x_axis_max(x.1 + room.0)
-                .with_y_axis_min(y.0 - room.1)
-                .with_y_axis_max(y.1 + room.1)
-                .with_x_tick_format(numbers())
-                .with_y_tick_format(numbers()),
-        );
+        let layout = style(Layout::auto_from_plots(&plots), &title, &trace.x_label, &trace.y_label)
+            .with_x_axis_min(x.0 - room.0)
+            .with_x_axis_max(x.1 + room.0)
+            .with_y_axis_min(y.0 - room.1)
+            .with_y_axis_max(y.1 + room.1)
+            .with_x_tick_format(numbers())
+            .with_y_tick_format(numbers());
+        layouts.push(if trace.equal { layout.with_equal_aspect() } else { layout });
         all.push(plots);
     }
     let panels = all.len();
@@ -275,7 +283,11 @@ pub fn heat_maps_png(maps: &[HeatMap]) -> Result<Vec<u8>, PlotError> {
             .with_x_range(x.0, x.1)
             .with_y_range(y.0, y.1)
             .with_cell_size(1.08);
-        let plots = vec![Plot::Heatmap(heat)];
+        let mut plots = vec![Plot::Heatmap(heat)];
+        if !map.marks.is_empty() {
+            let marks = ScatterPlot::new().with_data(map.marks.clone()).with_color(COLOURS[1]).with_size(1.1);
+            plots.push(Plot::Scatter(marks));
+        }
         // The colour bar of a constant has no ticks.
         let title = if high > low { map.title.clone() } else { format!("{} = {}", map.title, number(low)) };
         layouts.push(
@@ -351,6 +363,15 @@ fn range(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     Some((low - room, high + room))
 }
 
+/// Range of the first path, and of all as far as within its extent of that range.
+fn window(paths: &[Series], part: fn(&(f64, f64)) -> f64) -> Option<(f64, f64)> {
+    let all = range(values(paths, part))?;
+    let Some((low, high)) = paths.first().and_then(|first| range(values(std::slice::from_ref(first), part))) else {
+        return Some(all);
+    };
+    Some((all.0.max(low - (high - low)), all.1.min(high + (high - low))))
+}
+
 /// Uninterrupted stretches of finite points, thinned to what a picture can show.
 fn runs(points: &[(f64, f64)]) -> Vec<Vec<(f64, f64)>> {
     let stride = points.len().div_ceil(MAX_POINTS).max(1);
@@ -396,85 +417,4 @@ fn decade(x: f64) -> String {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn plot(points: &[(f64, f64)], log_y: bool) -> Result<Vec<u8>, PlotError> {
-        let series = vec![Series { name: "a".into(), points: points.to_vec(), over: false }];
-        line_png(&LinePlot { title: "T".into(), x_label: "t [s]".into(), y_label: "y".into(), log_y, series })
-    }
-
-    fn is_png(bytes: &[u8]) -> bool {
-        bytes.starts_with(b"\x89PNG\r\n\x1a\n") && bytes.len() > 1000
-    }
-
-    #[test]
-    fn strange_series_neither_hang_nor_panic() {
-        let (nan, inf) = (f64::NAN, f64::INFINITY);
-        for log in [false, true] {
-            for empty in [&[][..], &[(0.0, nan)], &[(nan, 1.0)], &[(0.0, inf), (1.0, -inf)]] {
-                assert_eq!(plot(empty, log), Err(PlotError::Empty("T".into())));
-            }
-            for good in [
-                &[(0.0, 1.0)][..],
-                &[(0.0, 5.0), (1.0, 5.0), (2.0, 5.0)],
-                &[(0.0, 1.0), (1.0, inf), (2.0, nan), (3.0, 2.0), (4.0, 3.0)],
-                &[(0.0, 1e-300), (1.0, 1e140), (2.0, 1e300)],
-                &[(0.0, 0.0), (1.0, -1.0), (2.0, 1.0)],
-                &[(7.0, 1e-12), (7.0, 2e-12)],
-            ] {
-                assert!(is_png(&plot(good, log).unwrap()), "{good:?}");
-            }
-        }
-        assert!(plot(&[(0.0, 0.0), (1.0, -1.0)], true).is_err());
-    }
-
-    #[test]
-    fn strange_grids_neither_hang_nor_panic() {
-        let map = |values: Vec<f64>| HeatMap {
-            title: "G".into(),
-            x_label: "x".into(),
-            y_label: "y".into(),
-            grid: Grid { x: vec![0.0, 1.0], y: vec![0.0, 1.0], values },
-            range: None,
-            diverging: false,
-        };
-        for values in [vec![1.0; 4], vec![f64::NAN, 1.0, 2.0, f64::INFINITY], vec![0.0; 4]] {
-            let both = [map(values.clone()), HeatMap { diverging: true, ..map(values) }];
-            assert!(is_png(&heat_maps_png(&both).unwrap()));
-        }
-        assert!(heat_maps_png(&[map(vec![f64::NAN; 4])]).is_err());
-        assert!(heat_maps_png(&[map(vec![1.0; 3])]).is_err());
-        assert!(heat_maps_png(&[]).is_err());
-    }
-
-    #[test]
-    fn traces() {
-        let circle: Vec<_> = (0..500).map(|k| ((0.05 * f64::from(k)).cos(), (0.05 * f64::from(k)).sin())).collect();
-        let path = |points| Series { name: "p".into(), points, over: false };
-        let trace = |paths| Trace { title: "T".into(), x_label: "x".into(), y_label: "y".into(), paths };
-        assert!(is_png(&trace_png(&trace(vec![path(circle), path(vec![])])).unwrap()));
-        assert!(is_png(&trace_png(&trace(vec![path(vec![(0.0, 0.0)])])).unwrap()));
-        assert!(trace_png(&trace(vec![])).is_err());
-    }
-
-    #[test]
-    fn ticks() {
-        for (x, text) in
-            [(0.0, "0"), (0.1 + 0.2, "0.3"), (-2.5, "\u{2212}2.5"), (1000.0, "1000"), (1e6, "1e6"), (2e-5, "2e-5")]
-        {
-            assert_eq!(number(x), text);
-        }
-        for (x, text) in [(1e-6, "1e-6"), (0.1, "0.1"), (1.0, "1"), (1e4, "1e4")] {
-            assert_eq!(decade(x), text);
-        }
-    }
-
-    #[test]
-    fn long_series_are_thinned_and_keep_their_ends() {
-        let points: Vec<_> = (0..100_000).map(|k| (f64::from(k), 1.0)).collect();
-        let runs = runs(&points);
-        assert!(runs.len() == 1 && runs[0].len() <= MAX_POINTS + 1);
-        assert_eq!(runs[0].last().unwrap().0, 99_999.0);
-    }
-}
+mod tests;

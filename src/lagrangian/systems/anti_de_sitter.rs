@@ -2,7 +2,7 @@
 
 use super::{LENGTH, lengths};
 use crate::lagrangian::Lagrangian;
-use crate::lagrangian::system::{Bounds, Closed, Parameter, Size, System, TrajectoryTest};
+use crate::lagrangian::system::{Bounds, Closed, Parameter, Plane, Size, System, TrajectoryTest};
 use crate::scalar::Real;
 
 /// `Lagrangian = (L/z)^2 (-t'^2 + x'^2 + y'^2 + z'^2) / 2` over `(t, z)`, `(t, x, z)` or `(t, x, y, z)`, `L` the radius.
@@ -56,6 +56,11 @@ pub const fn system(name: &'static str, title: &'static str, n: usize, constrain
             dt: 0.01,
         },
         domain: Some(|_, q| if q.last().is_some_and(|&z| z > 0.0) { Ok(()) } else { Err("z must be positive") }),
+        // With x there is a plane of space, without it one of space and time.
+        plane: Some(Plane {
+            labels: [if n == 2 { "t [m]" } else { "x [m]" }, "z [m]"],
+            point: |_, q| (q[usize::from(q.len() > 2)], q[q.len() - 1]),
+        }),
     }
 }
 

@@ -5,6 +5,11 @@
 
 use crate::scalar::Real;
 
+/// Place of the last point mass, `x = sum_i l_i sin q_i`, `y = -sum_i l_i cos q_i`, the pivot at the origin.
+pub fn end(lengths: &[f64], q: &[f64]) -> (f64, f64) {
+    lengths.iter().zip(q).fold((0.0, 0.0), |(x, y), (l, q)| (x + l * q.sin(), y - l * q.cos()))
+}
+
 /// `L = sum_i mu_i (l_i v_i)^2 / 2 + sum_(i<j) mu_j l_i l_j v_i v_j cos(q_i - q_j) + g sum_i mu_i l_i cos q_i`.
 pub fn lagrangian<R: Real>(loads: &[R], lengths: &[R], g: R, q: &[R], v: &[R]) -> R {
     let mut kinetic = R::zero();

@@ -1,6 +1,6 @@
 //! A relativistic charge in uniform magnetic and electric fields at right angles.
 
-use super::{MASS, lengths};
+use super::{MASS, X_AND_Y, lengths};
 use crate::lagrangian::Lagrangian;
 use crate::lagrangian::system::{Bounds, Closed, Parameter, Range, Size, System, TrajectoryTest};
 use crate::scalar::Real;
@@ -34,6 +34,7 @@ pub const SYSTEM: System = System {
     validation: |n| Bounds::uniform(n, (-5.0, 5.0), (-0.55, 0.55)),
     trajectory: |n| TrajectoryTest { start: Bounds::uniform(n, (-1.0, 1.0), (-0.25, 0.25)), t_end: 10.0, dt: 0.05 },
     domain: None,
+    plane: Some(X_AND_Y),
 };
 
 /// `1 - v^2/c^2`, `NaN` unless it is positive.

@@ -25,6 +25,7 @@ pub const SYSTEM: System = System {
     validation: |n| Bounds::uniform(n, (-5.0, 5.0), (-5.0, 5.0)),
     trajectory: |n| TrajectoryTest { start: Bounds::uniform(n, (-1.0, 1.0), (-1.0, 1.0)), t_end: 2.0, dt: 0.02 },
     domain: None,
+    plane: None,
 };
 
 impl Lagrangian for ConstantForce {

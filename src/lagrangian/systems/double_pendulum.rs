@@ -1,8 +1,8 @@
 //! Double pendulum: two point masses on massless rods, angles from the downward vertical.
 
-use super::{ACCELERATION_OF_GRAVITY, LENGTH, MASS, angles};
+use super::{ACCELERATION_OF_GRAVITY, LAST_BOB, LENGTH, MASS, NOWHERE, angles, chain};
 use crate::lagrangian::Lagrangian;
-use crate::lagrangian::system::{Bounds, Closed, Parameter, Size, System, TrajectoryTest};
+use crate::lagrangian::system::{Bounds, Closed, Parameter, Plane, Size, System, TrajectoryTest};
 use crate::scalar::Real;
 use std::f64::consts::PI;
 
@@ -32,6 +32,13 @@ pub const SYSTEM: System = System {
     validation: |n| Bounds::uniform(n, (0.0, 2.0 * PI), (-10.0, 10.0)),
     trajectory: |n| TrajectoryTest { start: Bounds::uniform(n, (0.0, 2.0 * PI), (-0.1, 0.1)), t_end: 100.0, dt: 0.1 },
     domain: None,
+    plane: Some(Plane {
+        labels: LAST_BOB,
+        point: |parameters, q| match *parameters {
+            [_, _, l1, l2, _] => chain::end(&[l1, l2], q),
+            _ => NOWHERE,
+        },
+    }),
 };
 
 impl Lagrangian for DoublePendulum {

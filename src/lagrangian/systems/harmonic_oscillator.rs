@@ -26,6 +26,7 @@ pub const SYSTEM: System = System {
     validation: |n| Bounds::uniform(n, (-2.0, 2.0), (-2.0, 2.0)),
     trajectory: |n| TrajectoryTest { start: Bounds::uniform(n, (-1.0, 1.0), (-1.0, 1.0)), t_end: 50.0, dt: 0.1 },
     domain: None,
+    plane: None,
 };
 
 impl Lagrangian for HarmonicOscillator {

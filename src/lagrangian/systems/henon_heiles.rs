@@ -1,6 +1,6 @@
 //! A star near the centre of an axisymmetric galaxy (Henon and Heiles 1964), the standard example of chaos.
 
-use super::lengths;
+use super::{X_AND_Y, lengths};
 use crate::lagrangian::Lagrangian;
 use crate::lagrangian::system::{Bounds, Closed, Parameter, Range, Size, System, TrajectoryTest};
 use crate::scalar::Real;
@@ -26,6 +26,7 @@ pub const SYSTEM: System = System {
     validation: |n| Bounds::uniform(n, (-1.0, 1.0), (-0.6, 0.6)),
     trajectory: |n| TrajectoryTest { start: Bounds::uniform(n, (-0.25, 0.25), (-0.25, 0.25)), t_end: 100.0, dt: 0.1 },
     domain: None,
+    plane: Some(X_AND_Y),
 };
 
 impl Lagrangian for HenonHeiles {

@@ -1,6 +1,6 @@
 //! Motion of a unit mass around a fixed centre of gravity, in the plane.
 
-use super::lengths;
+use super::{X_AND_Y, lengths};
 use crate::lagrangian::Lagrangian;
 use crate::lagrangian::system::{Bounds, Closed, Parameter, Range, Size, System, TrajectoryTest};
 use crate::scalar::Real;
@@ -29,6 +29,7 @@ pub const SYSTEM: System = System {
         dt: 0.05,
     },
     domain: Some(|_, q| if q[0] != 0.0 || q[1] != 0.0 { Ok(()) } else { Err("x and y must not both vanish") }),
+    plane: Some(X_AND_Y),
 };
 
 impl Lagrangian for Kepler {

@@ -17,7 +17,7 @@ pub mod sphere_geodesic;
 pub mod spring_pendulum;
 pub mod triple_pendulum;
 
-use super::system::{Coordinate, Parameter, Range};
+use super::system::{Coordinate, Parameter, Plane, Range};
 
 /// A mass of 1 kg.
 const MASS: Parameter = Parameter { symbol: "m", default: "1", unit: "kg", range: Range::Positive };
@@ -25,6 +25,13 @@ const MASS: Parameter = Parameter { symbol: "m", default: "1", unit: "kg", range
 const LENGTH: Parameter = Parameter { symbol: "l", default: "1", unit: "m", range: Range::Positive };
 /// The paper's acceleration of gravity; zero and negative values are allowed.
 const ACCELERATION_OF_GRAVITY: Parameter = Parameter { symbol: "g", default: "9.8", unit: "m/s^2", range: Range::Any };
+
+/// The plane of the first two coordinates, `x` and `y`.
+const X_AND_Y: Plane = Plane { labels: ["x [m]", "y [m]"], point: |_, q| (q[0], q[1]) };
+/// Labels of the place of a chain's last point mass.
+const LAST_BOB: [&str; 2] = ["x of the last bob [m]", "y of the last bob [m]"];
+/// No place, for a wrong number of parameters.
+const NOWHERE: (f64, f64) = (f64::NAN, f64::NAN);
 
 /// Coordinates that are lengths.
 fn lengths(names: &[&'static str]) -> Vec<Coordinate> {

@@ -1,8 +1,8 @@
 //! Chain of n equal pendula.
 
-use super::{ACCELERATION_OF_GRAVITY, LENGTH, MASS, angles, chain};
+use super::{ACCELERATION_OF_GRAVITY, LAST_BOB, LENGTH, MASS, NOWHERE, angles, chain};
 use crate::lagrangian::Lagrangian;
-use crate::lagrangian::system::{Bounds, Closed, Parameter, Size, System, TrajectoryTest};
+use crate::lagrangian::system::{Bounds, Closed, Parameter, Plane, Size, System, TrajectoryTest};
 use crate::scalar::Real;
 use std::f64::consts::PI;
 
@@ -30,6 +30,13 @@ pub const SYSTEM: System = System {
     validation: |n| Bounds::uniform(n, (0.0, 2.0 * PI), (-10.0, 10.0)),
     trajectory: |n| TrajectoryTest { start: Bounds::uniform(n, (0.2, 3.0), (-0.1, 0.1)), t_end: 50.0, dt: 0.1 },
     domain: None,
+    plane: Some(Plane {
+        labels: LAST_BOB,
+        point: |parameters, q| match *parameters {
+            [_, l, _] => chain::end(&vec![l; q.len()], q),
+            _ => NOWHERE,
+        },
+    }),
 };
 
 impl NPendulum {

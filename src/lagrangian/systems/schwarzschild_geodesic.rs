@@ -1,7 +1,7 @@
 //! Free fall outside a black hole without charge and spin.
 
 use crate::lagrangian::Lagrangian;
-use crate::lagrangian::system::{Bounds, Closed, Coordinate, Parameter, Range, Size, System, TrajectoryTest};
+use crate::lagrangian::system::{Bounds, Closed, Coordinate, Parameter, Plane, Range, Size, System, TrajectoryTest};
 use crate::scalar::Real;
 use std::f64::consts::PI;
 
@@ -47,6 +47,11 @@ pub const SYSTEM: System = System {
     domain: Some(|parameters, q| match (parameters, q) {
         (&[mass], &[_, r, theta, _]) if r > 2.0 * mass && theta.sin() != 0.0 => Ok(()),
         _ => Err("r must be above 2 M and theta keep away from the poles"),
+    }),
+    // Seen along the axis, r as if space were flat.
+    plane: Some(Plane {
+        labels: ["r cos phi [m]", "r sin phi [m]"],
+        point: |_, q| (q[1] * q[3].cos(), q[1] * q[3].sin()),
     }),
 };
 

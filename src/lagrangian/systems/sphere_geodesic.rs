@@ -1,8 +1,8 @@
 //! Free motion on a sphere in polar angle and azimuth.
 
-use super::{LENGTH, MASS};
+use super::{LENGTH, MASS, NOWHERE};
 use crate::lagrangian::Lagrangian;
-use crate::lagrangian::system::{Bounds, Closed, Coordinate, Parameter, Size, System, TrajectoryTest};
+use crate::lagrangian::system::{Bounds, Closed, Coordinate, Parameter, Plane, Size, System, TrajectoryTest};
 use crate::scalar::Real;
 use std::f64::consts::PI;
 
@@ -39,6 +39,14 @@ pub const SYSTEM: System = System {
         dt: 0.05,
     },
     domain: Some(|_, q| if q[0].sin() != 0.0 { Ok(()) } else { Err("theta must keep away from the poles") }),
+    // Seen from the side, from far along the negative y axis.
+    plane: Some(Plane {
+        labels: ["x [m]", "z [m]"],
+        point: |parameters, q| match *parameters {
+            [_, radius] => (radius * q[0].sin() * q[1].cos(), radius * q[0].cos()),
+            _ => NOWHERE,
+        },
+    }),
 };
 
 impl Lagrangian for SphereGeodesic {

@@ -2,7 +2,7 @@
 
 use super::{ACCELERATION_OF_GRAVITY, LENGTH, MASS};
 use crate::lagrangian::Lagrangian;
-use crate::lagrangian::system::{Bounds, Closed, Coordinate, Parameter, Range, Size, System, TrajectoryTest};
+use crate::lagrangian::system::{Bounds, Closed, Coordinate, Parameter, Plane, Range, Size, System, TrajectoryTest};
 use crate::scalar::Real;
 use std::f64::consts::PI;
 
@@ -41,6 +41,7 @@ pub const SYSTEM: System = System {
         dt: 0.1,
     },
     domain: Some(|_, q| if q[0] > 0.0 { Ok(()) } else { Err("r must be positive") }),
+    plane: Some(Plane { labels: ["x [m]", "y [m]"], point: |_, q| (q[0] * q[1].sin(), -(q[0] * q[1].cos())) }),
 };
 
 impl Lagrangian for SpringPendulum {
