@@ -31,13 +31,24 @@ impl AffineFit {
 /// common offset costs no digits. The remaining freedom of a Lagrangian, a total derivative `dF(q)/dt`, is odd in the
 /// velocity for the usual systems: compare on grids at rest or over coordinates to be free of it.
 pub fn affine_fit(source: &[f64], target: &[f64]) -> Option<AffineFit> {
+    fit(source, target, true)
+}
+
+/// As [`affine_fit`] with `b = 0`: `det M` of a learned Lagrangian is known up to a factor alone. `r2` is then the share
+/// of the mean square of the target.
+pub fn factor_fit(source: &[f64], target: &[f64]) -> Option<AffineFit> {
+    fit(source, target, false)
+}
+
+fn fit(source: &[f64], target: &[f64], summand: bool) -> Option<AffineFit> {
     let pairs = || source.iter().zip(target).map(|(&x, &y)| (x, y)).filter(|(x, y)| x.is_finite() && y.is_finite());
     let count = pairs().count();
     if count < 2 {
         return None;
     }
     let per = 1.0 / count as f64;
-    let (mean_x, mean_y) = pairs().fold((0.0, 0.0), |(a, b), (x, y)| (a + x * per, b + y * per));
+    let means = pairs().fold((0.0, 0.0), |(a, b), (x, y)| (a + x * per, b + y * per));
+    let (mean_x, mean_y) = if summand { means } else { (0.0, 0.0) };
     let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
     for (x, y) in pairs() {
         let (x, y) = (x - mean_x, y - mean_y);
@@ -85,5 +96,14 @@ mod tests {
         assert_eq!((fit.a, fit.b), (0.0, 2.0));
         assert_eq!(affine_fit(&[0.0, 1.0], &[5.0, 5.0]).unwrap().r2, 1.0);
         assert!(affine_fit(&[1.0], &[1.0]).is_none());
+    }
+
+    #[test]
+    fn a_factor_alone_has_no_summand() {
+        // A constant target says nothing of a slope, but a factor it has.
+        let fit = factor_fit(&[2.0, 2.0, 4.0], &[-1.0, -1.0, -2.0]).unwrap();
+        assert_eq!((fit.a, fit.b, fit.r2, fit.rms), (-0.5, 0.0, 1.0, 0.0));
+        let fit = factor_fit(&[1.0, 3.0], &[2.0, 2.0]).unwrap();
+        assert!((fit.a - 0.8).abs() < 1e-15 && fit.b == 0.0 && (fit.r2 - 0.8).abs() < 1e-14);
     }
 }

@@ -12,7 +12,7 @@ mod summary;
 mod trajectories;
 
 pub use accelerations::{AccelerationError, acceleration_errors};
-pub use affine::{AffineFit, affine_fit};
+pub use affine::{AffineFit, affine_fit, factor_fit};
 pub use coordinates::{CoordinateError, angle_difference, coordinate_error};
 pub use energy::{EnergyError, energy_drift, energy_error};
 pub use grid::{Axis, Grid, GridError, determinant_grid, lagrangian_grid};

@@ -6,7 +6,7 @@ use crate::analysis::{
 };
 use crate::cli::CliError;
 use crate::lagrangian::{Configured, EulerLagrange};
-use crate::report::{Figure, GridComparison, PlotError, Report, evaluation_figures, grid_figures, text_table};
+use crate::report::{Figure, Fit, GridComparison, PlotError, Report, evaluation_figures, grid_figures, text_table};
 use serde::Serialize;
 
 /// Points of a grid along each axis.
@@ -106,8 +106,10 @@ fn grids(
     let (rest, fast) = ([middle.clone(), rest].concat(), [middle, fast].concat());
     let ranges: Vec<(f64, f64)> = bounds.positions.into_iter().chain(bounds.velocities).collect();
     let labels = system.system.labels(n);
+    // A spacetime is shown over space, where there are two dimensions of it.
+    let shown = if system.system.time_like == Some(0) && n > 2 { [1, n - 1] } else { [0, 1] };
     let axes =
-        [0, 1].map(|component| Axis { component, from: ranges[component].0, to: ranges[component].1, points: GRID });
+        shown.map(|component| Axis { component, from: ranges[component].0, to: ranges[component].1, points: GRID });
 
     // L is -1/2 everywhere on a mass shell and would show nothing there; its learned M is learned nowhere else.
     let impose = |q: &[f64], v: &mut [f64]| system.impose_constraint(q, v).unwrap_or_else(|_| v.fill(f64::NAN));
@@ -137,12 +139,12 @@ fn grids(
         let comparison = GridComparison {
             quantity: quantity.to_string(),
             file: file.to_string(),
-            x_label: labels[0].clone(),
-            y_label: labels[1].clone(),
+            x_label: labels[shown[0]].clone(),
+            y_label: labels[shown[1]].clone(),
             exact: exact.map_err(CliError::data)?,
             learned: learned.map_err(CliError::data)?,
             fixed,
-            fit: true,
+            fit: if quantity == "L" { Fit::Affine } else { Fit::Factor },
             signs: quantity != "L",
         };
         match grid_figures(&comparison) {

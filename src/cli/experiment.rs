@@ -1,7 +1,7 @@
 //! `lnn experiment`: the paper's tables and figures, one command each; finished runs are not run again.
 
 use crate::cli::folder::Folder;
-use crate::cli::learning::{Effort, Learning, learn};
+use crate::cli::learning::{CAPTIONS, Effort, Learning, learn};
 use crate::cli::number::{count, threads};
 use crate::cli::progress::Progress as Bar;
 use crate::cli::{CliError, interrupt, output};
@@ -239,6 +239,9 @@ fn pictures_of_runs(experiment: &Experiment, results: &[(Run, Option<Record>)], 
     }) {
         for (run, _) in results.iter().filter(|(_, record)| record.is_some()) {
             let directory = path.join(&run.name);
+            let read = |file: &str| crate::storage::read_regular(&directory.join(file), 1 << 26).ok();
+            let captions: BTreeMap<String, String> =
+                read(CAPTIONS).and_then(|json| serde_json::from_slice(&json).ok()).unwrap_or_default();
             let mut files: Vec<String> = std::fs::read_dir(&directory)
                 .into_iter()
                 .flatten()
@@ -247,10 +250,12 @@ fn pictures_of_runs(experiment: &Experiment, results: &[(Run, Option<Record>)], 
                 .collect();
             files.sort_by_cached_key(|file| (place_in_report(file), file.clone()));
             for file in files {
-                if let Ok(png) = crate::storage::read_regular(&directory.join(&file), 1 << 26) {
-                    let subject = file.trim_end_matches(".png").replace('_', " ");
-                    figures.push(Figure { file, png, caption: format!("{}: {subject}.", run.label) });
-                }
+                let Some(png) = read(&file) else { continue };
+                let caption = match captions.get(&file) {
+                    Some(caption) => format!("{}: {caption}", run.label),
+                    None => run.label.clone(),
+                };
+                figures.push(Figure { file, png, caption });
             }
         }
     }
@@ -287,6 +292,7 @@ mod tests {
         for file in ordered {
             std::fs::write(folder.join(file), b"x").unwrap();
         }
+        std::fs::write(folder.join(CAPTIONS), r#"{"det_mass_matrix.png": "at rest"}"#).unwrap();
         let record = Record { outcome: Outcome::Nothing { reason: String::new() }, losses: Vec::new(), seconds: 0.0 };
         let results = [(run, Some(record))];
         let found = |name: &str| -> Vec<String> {
@@ -294,6 +300,9 @@ mod tests {
             figures.into_iter().map(|figure| figure.file).collect()
         };
         assert_eq!(found("double-pendulum"), ordered);
+        let figures = pictures_of_runs(find("training-range").unwrap(), &results, directory.path());
+        assert_eq!(figures[0].caption, "Double pendulum: at rest");
+        assert_eq!(figures[1].caption, "Double pendulum");
         assert_eq!(found("training-range"), ["det_mass_matrix.png", "det_mass_matrix_fast.png"]);
     }
 }

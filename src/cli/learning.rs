@@ -16,6 +16,7 @@ use crate::training::{
     Config, Datasets, Epoch, Hooks, Phase, Precision, SamplingError, Stop, TrainingError, sample_all, train,
 };
 use serde::Serialize;
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::time::Instant;
 
@@ -40,6 +41,9 @@ struct Summary<'a> {
     #[serde(flatten)]
     evaluation: &'a Evaluation,
 }
+
+/// File with the captions of a run's pictures, by file name.
+pub const CAPTIONS: &str = "captions.json";
 
 /// How much work a run may take.
 #[derive(Clone, Copy, Debug)]
@@ -201,7 +205,7 @@ fn header(
 ) -> Result<Header, CliError> {
     // Defaults that change in a later version must not change this model.
     let named = system.system.parameters.iter().map(|p| p.symbol.to_string());
-    let mut parameters: std::collections::BTreeMap<_, _> = named.zip(system.parameters.iter().copied()).collect();
+    let mut parameters: BTreeMap<_, _> = named.zip(system.parameters.iter().copied()).collect();
     parameters.extend(config.parameters.clone());
     if let Size::Chosen { symbol, .. } = system.system.size {
         parameters.insert(symbol.to_string(), system.coordinates as f64);
@@ -300,8 +304,11 @@ fn write_report(
     let report = summary.evaluation.report(report).heading("Training");
     let report = training.iter().fold(report, |report, figure| report.figure(&figure.png, &figure.caption));
     let report = report.heading("Configuration").preformatted(toml);
-    for figure in training.iter().chain(&summary.evaluation.figures) {
+    let figures = || training.iter().chain(&summary.evaluation.figures);
+    for figure in figures() {
         folder.write(&figure.file, &figure.png)?;
     }
+    let captions: BTreeMap<&str, &str> = figures().map(|f| (f.file.as_str(), f.caption.as_str())).collect();
+    folder.write(CAPTIONS, serde_json::to_string_pretty(&captions).map_err(CliError::data)?.as_bytes())?;
     folder.write("report.html", report.to_html().as_bytes())
 }

@@ -4,7 +4,7 @@ use super::{Figure, LinePlot, PlotError, Series, Trace, line_png, trace_png};
 use crate::analysis::TrajectoryRun;
 use crate::lagrangian::Configured;
 use crate::rollout::Trajectory;
-use crate::scalar::Scalar;
+use crate::scalar::{Real, Scalar};
 
 /// Times and values of one quantity of a run.
 type Part<S> = fn(&TrajectoryRun<S>) -> (&[f64], &[f64]);
@@ -126,7 +126,7 @@ fn traces<S: Scalar>(
 ) -> Result<(), PlotError> {
     let Some(plane) = system.system.plane else { return Ok(()) };
     let path = |label: &str, trajectory: &Trajectory<S>| {
-        let places = (0..trajectory.len()).filter_map(|k| system.place(trajectory.state(k).0));
+        let places = smooth(trajectory).into_iter().filter_map(|q| system.place(&q));
         Series { points: places.collect(), ..Series::new(label, &[], &[]) }
     };
     for (k, run) in runs.iter().enumerate() {
@@ -144,6 +144,31 @@ fn traces<S: Scalar>(
         keep(figures, &format!("trace_start{start}.png"), trace_png(&trace), caption)?;
     }
     Ok(())
+}
+
+/// Coordinates along a motion, by cubic Hermite interpolation five times as dense as its samples: what is drawn between
+/// them curves as the motion did.
+fn smooth<S: Scalar>(trajectory: &Trajectory<S>) -> Vec<Vec<S>> {
+    const PIECES: usize = 5;
+    let n = trajectory.coordinates;
+    let mut places = Vec::with_capacity(PIECES * trajectory.len());
+    for k in 0..trajectory.len() {
+        let (q, v) = trajectory.state(k);
+        places.push(q.to_vec());
+        if k + 1 == trajectory.len() {
+            break;
+        }
+        let (next, w) = trajectory.state(k + 1);
+        let h = trajectory.t[k + 1] - trajectory.t[k];
+        for piece in 1..PIECES {
+            let x = S::of_f64(piece as f64 / PIECES as f64);
+            let (one, two, three) = (<S as Real>::one(), S::of_f64(2.0), S::of_f64(3.0));
+            let toward = x * x * (three - two * x);
+            let (leaving, arriving) = (h * x * (one - x) * (one - x), -h * x * x * (one - x));
+            places.push((0..n).map(|i| q[i] + toward * (next[i] - q[i]) + leaving * v[i] + arriving * w[i]).collect());
+        }
+    }
+    places
 }
 
 /// The first start in the planes of coordinate and velocity.
@@ -223,10 +248,23 @@ mod tests {
     use crate::analysis::{StartBox, TrajectoryTest};
     use crate::lagrangian::configure;
     use crate::report::test_pictures::save;
-    use crate::rollout::models::{PENDULUM, SINGULAR};
+    use crate::rollout::models::{OSCILLATOR, PENDULUM, SINGULAR};
 
     fn files(figures: &[Figure]) -> Vec<&str> {
         figures.iter().map(|f| f.file.as_str()).collect()
+    }
+
+    #[test]
+    fn drawn_paths_curve_with_the_motion() {
+        // Samples of a unit circle 0.2 apart: a cubic through places and velocities stays on it to 0.2^4/384.
+        let bounds = StartBox { q: vec![(1.0, 1.0)], v: vec![(0.0, 0.0)] };
+        let test = TrajectoryTest { starts: 1, t_end: 2.0, dt: 0.2, ..TrajectoryTest::<f64>::new(bounds, vec![false]) };
+        let run = test.run(&OSCILLATOR, &OSCILLATOR).remove(0);
+        let path = smooth(&run.exact.trajectory);
+        assert_eq!(path.len(), 51);
+        for (k, q) in path.iter().enumerate() {
+            assert!((q[0] - (0.04 * k as f64).cos()).abs() < 1.1 * 0.2f64.powi(4) / 384.0, "{k}: {}", q[0]);
+        }
     }
 
     #[test]

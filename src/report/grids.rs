@@ -1,7 +1,18 @@
 //! Pictures of learned and exact functions on a grid.
 
 use super::{Figure, HeatMap, PlotError, heat_maps_png};
-use crate::analysis::{AffineFit, Grid, affine_fit};
+use crate::analysis::{AffineFit, Grid, affine_fit, factor_fit};
+
+/// What a learned quantity is free of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fit {
+    /// Nothing: as it is.
+    None,
+    /// A factor (`det M`).
+    Factor,
+    /// A factor and a summand (`L`).
+    Affine,
+}
 
 /// A quantity of the exact and of the learned model on the same grid.
 #[derive(Clone, Debug, PartialEq)]
@@ -20,8 +31,8 @@ pub struct GridComparison {
     pub learned: Grid,
     /// What is fixed on the grid, in words (`v = 0 m/s`); may be empty.
     pub fixed: String,
-    /// Whether to compare up to the best affine fit (`a learned + b`), as a Lagrangian must be.
-    pub fit: bool,
+    /// Up to what the two are compared.
+    pub fit: Fit,
     /// Whether to count and mark points where the learned value has the wrong sign, before any fit.
     pub signs: bool,
 }
@@ -36,7 +47,12 @@ pub struct GridComparison {
 pub fn grid_figures(comparison: &GridComparison) -> Result<(Figure, Option<AffineFit>), PlotError> {
     let quantity = &comparison.quantity;
     let empty = || PlotError::Empty(quantity.clone());
-    let fit = if comparison.fit { affine_fit(&comparison.learned.values, &comparison.exact.values) } else { None };
+    let values = (&comparison.learned.values, &comparison.exact.values);
+    let fit = match comparison.fit {
+        Fit::None => None,
+        Fit::Factor => factor_fit(values.0, values.1),
+        Fit::Affine => affine_fit(values.0, values.1),
+    };
     let learned = fit.map_or_else(|| comparison.learned.clone(), |fit| comparison.learned.fitted(&fit));
     let difference = learned.minus(&comparison.exact).ok_or_else(empty)?;
     let signs = if comparison.signs { comparison.learned.wrong_signs(&comparison.exact) } else { None };
@@ -75,7 +91,7 @@ pub fn grid_figures(comparison: &GridComparison) -> Result<(Figure, Option<Affin
     let fixed = if comparison.fixed.is_empty() { String::new() } else { format!(" at {}", comparison.fixed) };
     let learned = match fit {
         Some(fit) => {
-            format!("learned after the best affine fit (a = {:.6}, b = {:.6}, R\u{b2} = {:.6})", fit.a, fit.b, fit.r2)
+            format!("learned after the best fit (a = {:.6e}, b = {:.6e}, R\u{b2} = {:.6})", fit.a, fit.b, fit.r2)
         }
         None => "learned with the same colours".to_string(),
     };
@@ -113,7 +129,7 @@ mod tests {
             learned: exact.map(|z| 3.0 * z - 7.0),
             exact,
             fixed: String::new(),
-            fit: true,
+            fit: Fit::Affine,
             signs: false,
         };
         let (_, fit) = grid_figures(&comparison).unwrap();
@@ -129,7 +145,7 @@ mod tests {
             fixed: "g = 1".into(),
             learned: det.clone(),
             exact: det,
-            fit: false,
+            fit: Fit::None,
             signs: true,
             ..comparison
         };
@@ -143,7 +159,7 @@ mod tests {
                 *z = -*z;
             }
         }
-        for fit in [true, false] {
+        for fit in [Fit::Affine, Fit::Factor, Fit::None] {
             comparison.fit = fit;
             let (figure, _) = grid_figures(&comparison).unwrap();
             assert!(figure.caption.contains("wrong sign at 24.59 %"), "{}", figure.caption);

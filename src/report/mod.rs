@@ -12,7 +12,7 @@ mod training;
 
 pub use evaluation::evaluation_figures;
 pub use experiment::{EXPERIMENT_HEADER, experiment_figures, experiment_table};
-pub use grids::{GridComparison, grid_figures};
+pub use grids::{Fit, GridComparison, grid_figures};
 pub use html::Report;
 pub use plot::{HeatMap, LinePlot, PlotError, Series, Trace, heat_maps_png, line_png, trace_png};
 pub use table::text_table;
