@@ -22,7 +22,7 @@ pub struct MinimumNorm<S> {
 /// `x = sum of u_k (u_k . b) / w_k` over the eigenvalues with `|w_k| > n eps max |w|`; the others count as zero. Their
 /// directions are those in which nothing is determined, such as gauge directions or redundant coordinates; `x` has no
 /// component along them, and what `b` has is returned as [`MinimumNorm::outside`]. For a regular matrix this is what
-/// [`solve`](super::solve) gives, at a higher price.
+/// [`solve`](fn@super::solve) gives, at a higher price.
 ///
 /// `matrix` is `(n, n)`, `rhs` is `(n)`. Which eigenvalues vanish depends on the units of the coordinates: give them
 /// alike sizes. A common factor of all elements, as long as they are normal numbers, changes nothing but exponents.
