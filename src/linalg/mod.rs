@@ -1,4 +1,4 @@
-//! Batched small dense linear algebra: solve, symmetric eigen, inertia, minors; products.
+//! Batched small dense linear algebra: solve, minimum-norm solution, symmetric eigen, inertia, minors; products.
 //!
 //! Matrices are row-major `(batch, n, n)` slices, vectors `(batch, n)`. Kernels run on lanes: element `(i, j)` of
 //! [`LANES`] matrices side by side, every lane through the same branch-free steps, so that a matrix gives the same
@@ -15,6 +15,7 @@ mod jacobi;
 mod large;
 mod lu;
 mod matmul;
+mod minimum_norm;
 mod minors;
 mod solve;
 
@@ -25,5 +26,6 @@ pub use error::{Failure, LinalgError};
 pub use inertia::{Inertia, inertia, is_positive_definite};
 pub use inverse::inverse;
 pub use matmul::{MatMut, MatRef, gemm};
+pub use minimum_norm::{MinimumNorm, minimum_norm};
 pub use minors::{Scaled, adjugate, leading_minors};
 pub use solve::solve;

@@ -1,0 +1,56 @@
+//! Networks and batches that the cases of training share.
+
+use crate::common::accuracy::cast;
+use lnn::network::{Architecture, Chunk, Depth, Initialization, InputLayer, Nonlinearity, initial_weights};
+use lnn::scalar::{Dd, Scalar};
+use lnn::training::{BatchReport, Dataset, Objective, Penalty};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+/// No coordinate is an angle: reducing it would be one more rounding of the input.
+pub fn architecture(n: usize, hidden: &[usize], activation: Nonlinearity, alpha: f64) -> Architecture {
+    Architecture {
+        coordinates: n,
+        hidden: hidden.to_vec(),
+        activation,
+        alpha,
+        scale: (0..n).map(|i| 1.0 + 0.5 * i as f64).collect(),
+        periodic: vec![false; n],
+        embed_periodic: false,
+        input_layer: InputLayer::None,
+    }
+}
+
+pub fn weights<S: Scalar>(architecture: &Architecture, seed: u64) -> Vec<S> {
+    initial_weights(architecture, Initialization::Default, &mut ChaCha8Rng::seed_from_u64(seed))
+}
+
+pub fn states<S: Scalar>(n: usize, count: usize, seed: u64) -> Dataset<S> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut draw = |size: f64| (0..count * n).map(|_| S::of_f64(rng.random_range(-size..size))).collect();
+    Dataset::new(n, draw(3.0), draw(2.0), draw(4.0)).unwrap()
+}
+
+/// Report and gradient of one step over all states.
+pub fn step<S: Scalar>(
+    architecture: &Architecture,
+    (penalty, threads): (Penalty, usize),
+    weights: &[S],
+    data: &Dataset<S>,
+    rows: &[u32],
+) -> (BatchReport<S>, Vec<S>) {
+    let mut gradient = vec![S::NAN; weights.len()];
+    let report = Objective::new(architecture, penalty, threads).unwrap().step(weights, data, rows, &mut gradient);
+    (report, gradient)
+}
+
+pub fn all_rows(count: usize) -> Vec<u32> {
+    (0..count as u32).collect()
+}
+
+/// Scaled mass matrices of all states, in double-double.
+pub fn mass_matrices<S: Scalar>(architecture: &Architecture, weights: &[S], data: &Dataset<S>) -> Vec<Dd> {
+    let mut chunk = Chunk::<Dd>::new(architecture);
+    chunk.evaluate(&cast::<S, Dd>(weights), &cast::<S, Dd>(data.q()), &cast::<S, Dd>(data.v()), Depth::MassMatrix);
+    chunk.mass_matrix
+}
