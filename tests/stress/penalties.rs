@@ -152,8 +152,9 @@ fn out_of_range<S: Scalar>(cases: &[(usize, i32)]) {
             let unit = positive_definite::<S>(n, &mut rng);
             let mut m: Vec<S> = unit.iter().map(|x| x.ldexp(exponent)).collect();
             let (mut plain, mut scaled) = (Vec::new(), Vec::new());
-            linalg::leading_minors(n, &unit, &mut plain).unwrap();
-            linalg::leading_minors(n, &m, &mut scaled).unwrap();
+            let mut workspace = Workspace::new();
+            linalg::leading_minors(n, &unit, &mut plain, &mut workspace).unwrap();
+            linalg::leading_minors(n, &m, &mut scaled, &mut workspace).unwrap();
             for (k, (a, b)) in plain.iter().zip(&scaled).enumerate() {
                 assert!(b.mantissa > S::of_f64(0.0) && a.mantissa == b.mantissa, "n = {n}, 2^{exponent}, minor {k}");
                 assert_eq!(b.exponent - a.exponent, i64::from(exponent) * (k as i64 + 1));
@@ -163,7 +164,7 @@ fn out_of_range<S: Scalar>(cases: &[(usize, i32)]) {
             }
             let flipped = rng.random_range(0..n);
             m[flipped * n + flipped] = -m[flipped * n + flipped];
-            linalg::leading_minors(n, &m, &mut scaled).unwrap();
+            linalg::leading_minors(n, &m, &mut scaled, &mut workspace).unwrap();
             assert!(scaled[flipped].mantissa < S::of_f64(0.0), "n = {n}, 2^{exponent}: {flipped}");
             for (name, found) in [("eigenvalue", eigenvalue(n, &m)), ("Sylvester", sylvester(n, &m, None))] {
                 assert!(found.value.is_finite(), "{name}, n = {n}, 2^{exponent}: {}", found.value);
