@@ -516,6 +516,22 @@ fn a_singular_mass_matrix_stops_or_is_left_out_by_choice() {
     assert_eq!(report.left_out, 2);
     assert!(matches!(report.failure, Some(Failure::Singular { row: 3, .. })), "{:?}", report.failure);
     assert!(gradient.iter().all(|&g| g == 0.0));
+    // The mean over no state is no loss, least of all 0.
+    assert!(report.loss.is_nan() && objective.loss(&weights, &data).loss.is_nan());
+}
+
+/// A model that has no acceleration on the validation states is not a good one.
+#[test]
+fn validation_states_that_are_left_out_never_make_the_best_epoch() {
+    let mut config = config(2);
+    // Softplus is linear to the last bit far below 0, so that det M vanishes on states moved there and on them alone.
+    config.network.activation = Nonlinearity::Softplus;
+    config.network.alpha = 0.0;
+    let mut data = datasets();
+    let far: Vec<f32> = data.validation.q().iter().map(|_| -1e9).collect();
+    data.validation = Dataset::new(2, far, data.validation.v().to_vec(), data.validation.a().to_vec()).unwrap();
+    let outcome = run(&config, data, 1, &Hooks::default());
+    assert!(matches!(outcome, Err(TrainingError::NothingLearned(_))), "{outcome:?}");
 }
 
 #[test]

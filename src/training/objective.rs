@@ -24,7 +24,7 @@ const STRIPES: usize = 8;
 /// What a batch came to.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BatchReport<S> {
-    /// Loss in the paper's convention, without penalty, over the states that count.
+    /// Loss in the paper's convention, without penalty, over the states that count; `NaN` if none does.
     pub loss: S,
     /// Penalty with its weight.
     pub penalty: S,
@@ -392,7 +392,8 @@ impl<S: Scalar> Objective<S> {
             left_out += stripe.left_out;
             failure = failure.or(stripe.failure);
         }
-        let loss = residual.value() / S::of_f64((2 * n * (states - left_out).max(1)) as f64);
+        // No state, no loss: the mean of nothing is not 0.
+        let loss = residual.value() / S::of_f64((2 * n * (states - left_out)) as f64);
         BatchReport { loss, penalty: penalty.value(), penalised, left_out, failure }
     }
 }

@@ -17,6 +17,9 @@ use serde::Serialize;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+/// At most one in this many validation states may be left out of a loss that counts.
+const LEFT_OUT: usize = 100;
+
 /// State of an argmin run: parameters and validation loss.
 pub type TrainingState<S> = IterState<Vec<S>, (), (), (), (), f64>;
 
@@ -205,7 +208,7 @@ impl<S: Scalar> EpochSolver<S> {
                 return Err(StepError::State { step, failure });
             }
             tracing::debug!(step, %failure, "state left out");
-            if matches!(failure, Failure::NotFinite { .. }) {
+            if matches!(failure, Failure::NotFinite { .. }) || report.left_out == rows.len() {
                 means.skipped += 1;
                 return Ok(());
             }
@@ -336,8 +339,9 @@ impl<S: Scalar> Solver<TrainingProblem<S>, TrainingState<S>> for EpochSolver<S> 
             watcher(Progress::Epoch(&epoch));
         }
         self.history.push(epoch);
-        // A loss that is not finite must never be the best.
-        let cost = if cost.is_finite() { cost } else { f64::INFINITY };
+        // A loss that is not finite, or that passes over more than a few of the states, must never be the best.
+        let judged = LEFT_OUT * validation.left_out <= problem.validation.len();
+        let cost = if cost.is_finite() && judged { cost } else { f64::INFINITY };
         let param = self.validated().to_vec();
         Ok((state.param(param).cost(cost), Some(record)))
     }
