@@ -134,7 +134,12 @@ pub fn line_png(plot: &LinePlot) -> Result<Vec<u8>, PlotError> {
         let mut named = series.name.is_empty() || !several;
         for run in runs(&series.points) {
             if run.len() == 1 {
-                plots.push(Plot::Scatter(ScatterPlot::new().with_data(run).with_color(colour).with_size(2.5)));
+                let mut point = ScatterPlot::new().with_data(run).with_color(colour).with_size(2.5);
+                if !named {
+                    point = point.with_legend(&*series.name);
+                    named = true;
+                }
+                plots.push(Plot::Scatter(point));
                 continue;
             }
             let width = if overlaid && !series.over { 5.0 } else { 1.8 };

@@ -2,6 +2,8 @@
 #![allow(dead_code, reason = "each test program uses its part")]
 
 pub mod accuracy;
+pub mod matrices;
+pub mod nested;
 
 use lnn::scalar::{Real, Scalar};
 
