@@ -15,8 +15,8 @@ impl Order {
 
     pub fn name(self) -> &'static str {
         match self {
-            Self::Second => "differences of order 2",
-            Self::Fourth => "differences of order 4",
+            Self::Second => "differences, h^2",
+            Self::Fourth => "differences, h^4",
         }
     }
 

@@ -3,9 +3,10 @@
 use super::options::Options;
 use super::output::{Section, Table, curve, level};
 use super::timing::Timing;
-use crate::common::matrices::matrices;
+use crate::common::matrices::{matrices, with_spectrum};
 use faer::linalg::solvers::Solve;
 use lnn::linalg::{self, Workspace};
+use lnn::report::Series;
 use lnn::scalar::{Dd, Real, Scalar};
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 use rand::{Rng, SeedableRng};
@@ -13,8 +14,9 @@ use rand_chacha::ChaCha8Rng;
 use std::hint::black_box;
 
 const TEXT: &str = "\
-LAPACK's matrix types (definite and not, condition numbers to 0.01/eps, zero and tiny diagonals, units 2^3 apart), f64, a \
-batch one after the other; the library works on eight side by side.
+Two sets of matrices in f64. hard: LAPACK's types (definite and not, condition numbers to 0.01/eps, zero and tiny \
+diagonals, units 2^3 apart), where the library takes the time to look whether a matrix is singular; regular: definite \
+ones with eigenvalues from 1 to n. A batch is done one after the other; the library works on eight side by side.
 Solve: R = |M x - r| / ((|M| |x| + |r|) n eps). Eigen: R = max |M u - w u| / (n eps |M|), max |U U' - I| / (n eps). Residuals \
 in double-double, Frobenius norms, the worst matrix.
 Inertia: matrices whose signs are not all right, judged by eigenvalues in double-double or by construction; a zero counts \
@@ -52,6 +54,7 @@ const SIGNS: [(&str, Signs); 4] =
 /// Matrices of one size with what is known of them.
 struct Batch {
     n: usize,
+    set: &'static str,
     kinds: Vec<String>,
     matrices: Vec<f64>,
     rhs: Vec<f64>,
@@ -60,12 +63,25 @@ struct Batch {
 }
 
 impl Batch {
-    fn new(n: usize, rounds: usize) -> Self {
+    /// LAPACK's types, each `rounds` times.
+    fn hard(n: usize, rounds: usize) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(n as u64);
-        let (kinds, list): (Vec<_>, Vec<_>) = (0..rounds).flat_map(|_| matrices::<f64>(n, &mut rng)).unzip();
+        Self::new(n, "hard", (0..rounds).flat_map(|_| matrices::<f64>(n, &mut rng)).collect(), &mut rng)
+    }
+
+    /// Well-conditioned definite ones.
+    fn regular(n: usize, count: usize) -> Self {
+        let mut rng = ChaCha8Rng::seed_from_u64(n as u64);
+        let spectrum: Vec<f64> = (1..=n).map(|k| k as f64).collect();
+        let list = (0..count).map(|_| ("regular".into(), with_spectrum(&spectrum, &mut rng))).collect();
+        Self::new(n, "regular", list, &mut rng)
+    }
+
+    fn new(n: usize, set: &'static str, list: Vec<(String, Vec<f64>)>, rng: &mut ChaCha8Rng) -> Self {
+        let (kinds, list): (Vec<String>, Vec<Vec<f64>>) = list.into_iter().unzip();
         let signs = kinds.iter().zip(&list).map(|(kind, m)| exact_signs(n, kind, m)).collect();
         let rhs = (0..kinds.len() * n).map(|_| rng.random_range(-1.0..1.0)).collect();
-        Self { n, kinds, matrices: list.concat(), rhs, signs }
+        Self { n, set, kinds, matrices: list.concat(), rhs, signs }
     }
 
     fn len(&self) -> usize {
@@ -93,68 +109,88 @@ fn exact_signs(n: usize, kind: &str, matrix: &[f64]) -> (usize, usize) {
 
 /// Measures every engine on every size.
 pub fn section(options: &Options) -> Section {
-    let mut raw = Table::new(["operation", "engine", "n", "matrices", "worst_r", "worst_matrix", "wrong_signs"]);
+    let mut raw = Table::new(["operation", "engine", "set", "n", "matrices", "worst_r", "worst_matrix", "wrong_signs"]);
     raw.header.extend(Timing::HEADER.map(|name| if name == "repeats" { name.into() } else { format!("ns_{name}") }));
-    let summary = Table::new(["operation", "engine", "n", "worst R", "wrong signs", "ns per matrix", "worst matrix"]);
+    let summary =
+        Table::new(["operation", "engine", "set", "n", "worst R", "wrong signs", "ns per matrix", "worst matrix"]);
     let mut section = Section::new("matrices", "Small symmetric matrices", TEXT, raw, summary);
-    let batches: Vec<Batch> = SIZES.iter().map(|&n| Batch::new(n, options.choose(1, 4, 8))).collect();
-    let stopwatch = options.stopwatch();
-    let mut workspace = Workspace::new();
+    for set in ["regular", "hard"] {
+        let batch = |&n: &usize| match set {
+            "hard" => Batch::hard(n, options.choose(1, 4, 8)),
+            _ => Batch::regular(n, options.choose(40, 160, 320)),
+        };
+        let batches: Vec<Batch> = SIZES.iter().map(batch).collect();
+        solves(options, &batches, &mut section);
+        eigen(options, &batches, &mut section);
+        inertia(options, &batches, &mut section);
+    }
+    for (engine, solve) in SOLVERS {
+        for n in SIZES {
+            section.failed(format!("{engine}, matrix of ones, n = {n}"), singular(n, solve));
+        }
+    }
+    section
+}
 
+fn solves(options: &Options, batches: &[Batch], section: &mut Section) {
+    let (stopwatch, mut workspace) = (options.stopwatch(), Workspace::new());
     let mut curves = Vec::new();
     for (engine, solve) in SOLVERS {
         let mut points = Vec::new();
-        for batch in &batches {
+        for batch in batches {
             let mut x = vec![f64::NAN; batch.rhs.len()];
             let failed = solve(batch.n, &batch.matrices, &batch.rhs, &mut x, &mut workspace);
             let worst = worst(batch, &failed, |row| solve_error(batch, row, &x));
-            note(&mut section, batch, engine, &failed);
+            note(section, batch, engine, &failed);
             let time = stopwatch.measure(|| {
                 black_box(solve(batch.n, black_box(&batch.matrices), &batch.rhs, &mut x, &mut workspace));
             });
-            points.push((worst.0, row(&mut section, ("solve", engine), batch, Ok(worst), time)));
-            section.failed(format!("{engine}, matrix of ones, n = {}", batch.n), singular(batch.n, solve));
+            points.push((worst.0, row(section, ("solve", engine), batch, Ok(worst), time)));
         }
         curves.push(curve(engine, &points));
     }
-    curves.push(level("R = 30", 30.0, &curves));
-    section.diagram("solve".into(), "Solve, n = 2, 3, 4, 8, 20", "worst R", "time per matrix [ns]", curves);
+    diagram(section, ("solve", "Solve"), batches, curves);
+}
 
+fn eigen(options: &Options, batches: &[Batch], section: &mut Section) {
+    let (stopwatch, mut workspace) = (options.stopwatch(), Workspace::new());
     let mut curves = Vec::new();
     for (engine, eigh) in EIGENSOLVERS {
         let mut points = Vec::new();
-        for batch in &batches {
+        for batch in batches {
             let (mut w, mut u) = (batch.rhs.clone(), batch.matrices.clone());
             let failed = eigh(batch.n, &batch.matrices, &mut w, &mut u, &mut workspace);
             let worst = worst(batch, &failed, |row| eigen_error(batch, row, &w, &u));
-            note(&mut section, batch, engine, &failed);
+            note(section, batch, engine, &failed);
             let time = stopwatch.measure(|| {
                 black_box(eigh(batch.n, black_box(&batch.matrices), &mut w, &mut u, &mut workspace));
             });
-            points.push((worst.0, row(&mut section, ("eigen", engine), batch, Ok(worst), time)));
+            points.push((worst.0, row(section, ("eigen", engine), batch, Ok(worst), time)));
         }
         curves.push(curve(engine, &points));
     }
-    curves.push(level("R = 30", 30.0, &curves));
-    section.diagram(
-        "eigen".into(),
-        "Eigenvalues and vectors, n = 2, 3, 4, 8, 20",
-        "worst R",
-        "time per matrix [ns]",
-        curves,
-    );
+    diagram(section, ("eigen", "Eigenvalues and vectors"), batches, curves);
+}
 
+fn inertia(options: &Options, batches: &[Batch], section: &mut Section) {
+    let (stopwatch, mut workspace) = (options.stopwatch(), Workspace::new());
     for (engine, signs) in SIGNS {
-        for batch in &batches {
+        for batch in batches {
             let mut scratch = vec![0.0; batch.rhs.len().max(batch.n * batch.n)];
             let wrong = signs(batch.n, &batch.matrices, &batch.signs, &mut scratch, &mut workspace);
             let time = stopwatch.measure(|| {
                 black_box(signs(batch.n, black_box(&batch.matrices), &batch.signs, &mut scratch, &mut workspace));
             });
-            row(&mut section, ("inertia", engine), batch, Err(wrong), time);
+            row(section, ("inertia", engine), batch, Err(wrong), time);
         }
     }
-    section
+}
+
+fn diagram(section: &mut Section, (file, title): (&str, &str), batches: &[Batch], mut curves: Vec<Series>) {
+    let set = batches.first().map_or("", |batch| batch.set);
+    curves.push(level("R = 30", 30.0, &curves));
+    let title = format!("{title} of {set} matrices, n = 2, 3, 4, 8, 20");
+    section.diagram(format!("{file}_{set}"), &title, "worst R", "time per matrix [ns]", curves);
 }
 
 /// Adds a row of both tables; returns the nanoseconds per matrix.
@@ -170,7 +206,7 @@ fn row(
         Err(wrong) => (String::new(), String::new(), wrong.to_string()),
     };
     let scale = 1e9 / batch.len() as f64;
-    let head = [operation.to_string(), engine.to_string(), batch.n.to_string()];
+    let head = [operation.to_string(), engine.to_string(), batch.set.to_string(), batch.n.to_string()];
     let mut raw = head.to_vec();
     raw.extend([batch.len().to_string(), r.clone(), kind.clone(), wrong.clone()]);
     raw.extend(time.cells(scale));

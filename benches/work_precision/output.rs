@@ -61,7 +61,14 @@ impl Section {
     }
 
     /// Adds a diagram of `y` over the decimal logarithm of the error; one that shows nothing is noted as left out.
-    pub fn diagram(&mut self, file: String, title: &str, x: &str, y: &str, curves: Vec<Series>) {
+    pub fn diagram(&mut self, file: String, title: &str, x: &str, y: &str, mut curves: Vec<Series>) {
+        let places = || curves.iter().flat_map(|c| &c.points).map(|p| p.0).filter(|x| x.is_finite());
+        let (low, high) = (places().fold(f64::INFINITY, f64::min), places().fold(f64::NEG_INFINITY, f64::max));
+        let room = 0.03 * (high - low);
+        if let Some(last) = curves.last_mut() {
+            // Points without height widen the axis, so that none lies on its end.
+            last.points.extend([low - room, high + room].map(|x| (x, f64::NAN)));
+        }
         let plot = LinePlot {
             title: title.into(),
             x_label: format!("log10 of {x}"),

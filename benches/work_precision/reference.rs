@@ -1,4 +1,7 @@
-//! Motions in double-double by Gauss collocation of order 6 at `h` and `h/2`, whose difference bounds their error.
+//! Motions in double-double by Gauss collocation of order 6 at `h`, `h/2`, .., extrapolated to `h = 0`.
+//!
+//! The method is symmetric: its error is a series in even powers of `h`, from the sixth on. The last two columns of the
+//! extrapolation differ by about the error of the lesser one, which bounds that of the better.
 
 use super::problems::Problem;
 use lnn::lagrangian::{Request, Terms};
@@ -10,9 +13,9 @@ pub struct Reference {
     pub states: Trajectory<Dd>,
     /// Largest component of any state.
     pub size: f64,
-    /// Difference to the run with twice the step, relative to `size`: bounds the error.
+    /// Difference of the last two columns of the extrapolation, relative to `size`: bounds the error.
     pub bound: f64,
-    /// Step of the run.
+    /// Smallest step.
     pub step: f64,
     /// Largest `|p.v|`, twice the kinetic energy where that is a square of velocities; no constant in `L` changes it.
     pub energy_scale: f64,
@@ -20,26 +23,45 @@ pub struct Reference {
     pub amplification: f64,
 }
 
-/// Halves the step until two runs agree to `target`.
+/// A bound above this is no reference.
+const USELESS: f64 = 1e-13;
+
+/// Halves the step until the last two columns agree to `target`, or `levels` steps have been tried.
 ///
 /// # Errors
-/// Why a run in double-double stopped, or that they never agree.
-pub fn reference(problem: &Problem, target: f64) -> Result<Reference, String> {
+/// Why a run in double-double stopped, or that the columns still differ visibly.
+pub fn reference(problem: &Problem, target: f64, levels: usize) -> Result<Reference, String> {
     let mut step = problem.dt / 8.0;
-    let mut coarse = run(problem, step)?;
-    let size = largest(&coarse);
-    for _ in 0..8 {
+    let mut row = vec![run(problem, step)?];
+    let size = largest(&row[0]);
+    let mut bound = f64::INFINITY;
+    for level in 1..levels {
         step /= 2.0;
-        let fine = run(problem, step)?;
-        let bound = distance(&fine, &coarse).0 / size;
-        if bound <= target {
-            let energy_scale = energy_scale(problem, &fine);
-            let amplification = amplification(problem, size);
-            return Ok(Reference { states: fine, size, bound, step, energy_scale, amplification });
+        let mut next = vec![run(problem, step)?];
+        for (k, coarse) in row.iter().enumerate() {
+            next.push(extrapolate(coarse, &next[k], 6 + 2 * k as i32));
         }
-        coarse = fine;
+        row = next;
+        bound = distance(&row[level], &row[level - 1]).0 / size;
+        if bound <= target {
+            break;
+        }
     }
-    Err(format!("reference: runs in double-double still differ by more than {target:e} at the step {step:e}"))
+    match row.pop() {
+        Some(states) if bound <= USELESS => {
+            let energy_scale = energy_scale(problem, &states);
+            let amplification = amplification(problem, size);
+            Ok(Reference { states, size, bound, step, energy_scale, amplification })
+        }
+        _ => Err(format!("reference: double-double still leaves {bound:.1e} at the step {step:.1e}")),
+    }
+}
+
+/// Removes the error in `h^order` from runs at `2 h` and `h`.
+fn extrapolate(coarse: &Trajectory<Dd>, fine: &Trajectory<Dd>, order: i32) -> Trajectory<Dd> {
+    let weight = Dd::of_f64(2f64.powi(order) - 1.0);
+    let combine = |coarse: &[Dd], fine: &[Dd]| fine.iter().zip(coarse).map(|(&f, &c)| f + (f - c) / weight).collect();
+    Trajectory { q: combine(&coarse.q, &fine.q), v: combine(&coarse.v, &fine.v), ..fine.clone() }
 }
 
 fn run(problem: &Problem, step: f64) -> Result<Trajectory<Dd>, String> {

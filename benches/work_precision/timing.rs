@@ -38,7 +38,7 @@ impl Timing {
 }
 
 impl Stopwatch {
-    /// Times `work` after one run that does not count.
+    /// Times `work` after one run that does not count, unless that alone takes a third of the time there is.
     pub fn measure(&self, mut work: impl FnMut()) -> Timing {
         let mut once = |times: usize| {
             let begun = Instant::now();
@@ -46,6 +46,9 @@ impl Stopwatch {
             begun.elapsed().as_secs_f64() / times as f64
         };
         let first = once(1);
+        if first > self.longest / 3.0 {
+            return Timing { min: first, lower: first, median: first, upper: first, repeats: 1 };
+        }
         // A first run is slow: look again before deciding how often.
         let single = if first < self.shortest { first.min(once(3)) } else { first };
         let times = (self.shortest / single.max(1e-9)).ceil().max(1.0) as usize;
