@@ -1,8 +1,11 @@
 //! The parts of the work-precision program, one after the other on one thread.
 
 mod activations;
+mod batch;
+mod case;
 mod derivatives;
 mod differences;
+mod engines;
 mod learned;
 mod machine;
 mod matrices;
@@ -10,6 +13,7 @@ mod options;
 mod output;
 mod problems;
 mod reference;
+mod rivals;
 mod rollouts;
 mod summary;
 mod timing;
