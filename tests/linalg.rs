@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::matrices::{dd, norm, times, with_spectrum};
+use common::matrices::{dd, matrices, norm, times, with_spectrum};
 use lnn::linalg::{self, Failure, Inertia, LinalgError, Workspace};
 use lnn::scalar::{Dd, Real, Scalar};
 use rand::{Rng, SeedableRng};
@@ -10,49 +10,6 @@ use rand_chacha::ChaCha8Rng;
 
 /// Rounding stays below this, algorithms that lose accuracy do not (units of eps times condition).
 const R: f64 = 30.0;
-
-/// Matrix types by their spectra and structure; signs alternate in the indefinite ones.
-fn matrices<S: Scalar>(n: usize, rng: &mut ChaCha8Rng) -> Vec<(String, Vec<S>)> {
-    let eps = S::EPSILON.to_f64();
-    let mut list = Vec::new();
-    for indefinite in [false, true] {
-        let sign = |k: usize| if indefinite && k % 2 == 1 { -1.0 } else { 1.0 };
-        for condition in [2.0, 1e3, 0.1 / eps.sqrt(), 0.01 / eps] {
-            let graded = |k: usize| condition.powf(-(k as f64) / (n.max(2) - 1) as f64) * sign(k);
-            let ramp = |k: usize| (1.0 - (k as f64 / (n.max(2) - 1) as f64) * (1.0 - 1.0 / condition)) * sign(k);
-            let one_small = |k: usize| if k + 1 == n { 1.0 / condition } else { sign(k) };
-            let one_large = |k: usize| if k == 0 { 1.0 } else { sign(k) / condition };
-            let shapes: [(&str, &dyn Fn(usize) -> f64); 4] =
-                [("graded", &graded), ("ramp", &ramp), ("one small", &one_small), ("one large", &one_large)];
-            for (name, shape) in shapes {
-                let w: Vec<f64> = (0..n).map(shape).collect();
-                list.push((format!("{name} {condition:.0e} {indefinite}"), with_spectrum(&w, rng)));
-            }
-        }
-    }
-    let random: Vec<f64> = (0..n).map(|_| rng.random_range(-1.0..1.0)).collect();
-    list.push(("random".into(), with_spectrum(&random, rng)));
-    // Zero diagonal, tiny diagonal: no pivot without an exchange.
-    for diagonal in [0.0, 2f64.powi(-60)] {
-        let mut m: Vec<S> = vec![S::of_f64(diagonal); n * n];
-        for i in 0..n {
-            for j in 0..i {
-                m[i * n + j] = S::of_f64(rng.random_range(0.5..1.5));
-                m[j * n + i] = m[i * n + j];
-            }
-        }
-        if n > 1 {
-            list.push((format!("diagonal {diagonal:e}"), m));
-        }
-    }
-    // Units of very different size: D A D.
-    let base: Vec<S> = with_spectrum(&(0..n).map(|k| 1.0 + k as f64).collect::<Vec<_>>(), rng);
-    for step in if n > 20 { [-1, 1] } else { [-3, 3] } {
-        let m = (0..n * n).map(|k| base[k].ldexp(step * (k / n + k % n) as i32)).collect();
-        list.push((format!("scaled {step}"), m));
-    }
-    list
-}
 
 /// Worst backward and forward error of `solve` over all types, in units of `n eps` and `kappa eps`.
 fn solve_errors<S: Scalar>() -> (f64, f64) {

@@ -2,9 +2,8 @@
 
 mod common;
 
+use common::nested::reference;
 use common::of_scalar;
-use lnn::forward::HyperDual;
-use lnn::lagrangian::Lagrangian;
 use lnn::network::{
     Adjoint, Architecture, Chunk, Depth, Initialization, InputLayer, Jets, Layout, LinearMap, Nonlinearity,
     initial_weights,
@@ -14,45 +13,6 @@ use lnn::tape::{ScalarFunction, gradient};
 use proptest::prelude::*;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-
-/// `L`, `p`, `g`, `M`, `c` by nested forward numbers, in scaled coordinates.
-struct Reference<T> {
-    lagrangian: T,
-    p: Vec<T>,
-    g: Vec<T>,
-    m: Vec<T>,
-    c: Vec<T>,
-}
-
-fn reference<T: Real>(architecture: &Architecture, weights: &[T], q: &[T], v: &[T]) -> Reference<T> {
-    let n = architecture.coordinates;
-    let weights: Vec<HyperDual<T>> = weights.iter().map(|&w| HyperDual::lift(w)).collect();
-    let scale = |i: usize| T::from_f64(architecture.scale[i]);
-    // Second derivative along two scaled directions, each a list of (index in (q, v), component).
-    let jet = |s: &[(usize, T)], t: &[(usize, T)]| -> HyperDual<T> {
-        let part = |direction: &[(usize, T)], k: usize| {
-            direction.iter().filter(|d| d.0 == k).fold(T::zero(), |sum, d| sum + d.1) * scale(k % n)
-        };
-        let x: Vec<HyperDual<T>> = (0..2 * n)
-            .map(|k| HyperDual::new(if k < n { q[k] } else { v[k - n] }, part(s, k), part(t, k), T::zero()))
-            .collect();
-        architecture.lagrangian(&weights, &x[..n], &x[n..])
-    };
-    let along: Vec<(usize, T)> = (0..n).map(|i| (i, v[i] / scale(i))).collect();
-    let one = T::one();
-    let mut out = Reference { lagrangian: T::zero(), p: vec![], g: vec![], m: vec![], c: vec![] };
-    for i in 0..n {
-        let moving = jet(&[(n + i, one)], &along);
-        out.lagrangian = moving.value;
-        out.p.push(moving.s);
-        out.c.push(moving.st);
-        out.g.push(jet(&[(i, one)], &[]).s);
-        for j in 0..n {
-            out.m.push(jet(&[(n + i, one)], &[(n + j, one)]).st);
-        }
-    }
-    out
-}
 
 struct Case {
     architecture: Architecture,

@@ -523,15 +523,18 @@ fn a_singular_mass_matrix_stops_or_is_left_out_by_choice() {
 /// A model that has no acceleration on the validation states is not a good one.
 #[test]
 fn validation_states_that_are_left_out_never_make_the_best_epoch() {
-    let mut config = config(2);
-    // Softplus is linear to the last bit far below 0, so that det M vanishes on states moved there and on them alone.
-    config.network.activation = Nonlinearity::Softplus;
-    config.network.alpha = 0.0;
-    let mut data = datasets();
-    let far: Vec<f32> = data.validation.q().iter().map(|_| -1e9).collect();
-    data.validation = Dataset::new(2, far, data.validation.v().to_vec(), data.validation.a().to_vec()).unwrap();
-    let outcome = run(&config, data, 1, &Hooks::default());
-    assert!(matches!(outcome, Err(TrainingError::NothingLearned(_))), "{outcome:?}");
+    let config = config(2);
+    // Far from 0 a softplus is linear to the last bit: M vanishes on states moved there, and on them alone.
+    let activation = Nonlinearity::Softplus;
+    let shape = architecture(2, &config.network.hidden);
+    let architecture = Architecture { activation, alpha: 0.0, embed_periodic: false, ..shape };
+    let near = datasets();
+    let learn = |data| train(&config, &architecture, config.penalty().unwrap(), data, 1, &Hooks::default());
+    assert!(learn(near.clone()).is_ok());
+    let q = vec![-1e9; near.validation.q().len()];
+    let validation = Dataset::new(2, q, near.validation.v().to_vec(), near.validation.a().to_vec()).unwrap();
+    let outcome = learn(Datasets { validation, ..near });
+    assert!(matches!(outcome, Err(TrainingError::NothingLearned(_))), "{:?}", outcome.map(|t| t.validation_loss));
 }
 
 #[test]

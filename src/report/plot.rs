@@ -144,7 +144,7 @@ pub fn line_png(plot: &LinePlot) -> Result<Vec<u8>, PlotError> {
             if run.len() == 1 {
                 let size = if scattered { 5.0 } else { 2.5 };
                 let mut points = ScatterPlot::new().with_data(run).with_color(colour).with_size(size);
-                if scattered && !named {
+                if !named {
                     points = points.with_legend(&*series.name);
                     named = true;
                 }

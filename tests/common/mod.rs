@@ -3,6 +3,7 @@
 
 pub mod accuracy;
 pub mod matrices;
+pub mod nested;
 
 use lnn::scalar::{Real, Scalar};
 

@@ -1,0 +1,30 @@
+//! Run time against error: roll-outs, derivative engines, activation kernels, small symmetric matrices.
+//!
+//! `cargo bench --bench work_precision -- [--quick | --smoke] [--part NAME].. [--model FILE] [--out DIR]`
+//!
+//! Every part writes its raw numbers as CSV, log-log diagrams and what failed or was left out, with the reason;
+//! `report.html` gathers everything. Errors are judged in double-double.
+
+#[path = "../tests/common/mod.rs"]
+mod common;
+#[path = "work_precision/mod.rs"]
+mod work_precision;
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    let options = match work_precision::Options::parse(std::env::args().skip(1)) {
+        Ok(options) => options,
+        Err(message) => {
+            eprintln!("error: {message}\n{}", work_precision::USAGE);
+            return ExitCode::from(2);
+        }
+    };
+    match work_precision::run(&options) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(message) => {
+            eprintln!("error: {message}");
+            ExitCode::FAILURE
+        }
+    }
+}
