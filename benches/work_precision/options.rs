@@ -100,7 +100,7 @@ impl Options {
         Stopwatch {
             repeats: self.choose(2, 10, 20),
             shortest: self.choose(1e-5, 1e-3, 5e-3),
-            longest: self.choose(0.02, 2.0, 10.0),
+            longest: self.choose(0.02, 2.0, 5.0),
         }
     }
 }

@@ -55,7 +55,7 @@ pub fn problems(options: &Options) -> Result<Vec<Problem>, String> {
             let (q, v) = (q.clone(), v.clone());
             let wide = Box::new(network.cast::<Dd>());
             // Shorter: its reference is costly.
-            let t_end = options.choose(dt, 4.0 * dt, 8.0 * dt);
+            let t_end = options.choose(dt, 2.0 * dt, 4.0 * dt);
             list.push(Problem { name: LEARNED, model: Box::new(network), wide, q, v, t_end, dt });
         }
         list.push(Problem { name, model, wide, q, v, t_end, dt });

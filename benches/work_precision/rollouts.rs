@@ -151,7 +151,9 @@ fn points(
     (method, name): (Method, &str),
     section: &mut Section,
 ) -> Vec<Point> {
-    let longest = arguments.choose(0.002, 0.01, 0.06);
+    // A network is slower, and its longer runs are what there is to see.
+    let patience = if problem.name == LEARNED { arguments.choose(1.0, 8.0, 4.0) } else { 1.0 };
+    let longest = patience * arguments.choose(0.002, 0.01, 0.06);
     let stopwatch = arguments.stopwatch();
     let fixed = method.is_structure_preserving();
     let settings: Vec<f64> = if fixed {
