@@ -1,5 +1,8 @@
 //! The eager tape, forward numbers and drivers against each other, on random expressions and at the edges.
 
+mod common;
+
+use common::properties;
 use lnn::forward::{Dual, HyperDual, Jet2};
 use lnn::scalar::{Dd, Real, Scalar};
 use lnn::tape::{
@@ -115,7 +118,7 @@ fn routes_agree<S: Scalar>(f: &Expression, x: &[S; 3], tolerance: f64) -> bool {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(400))]
+    #![proptest_config(properties(400))]
     #[test]
     fn every_route_gives_the_same_derivatives(f in expressions(), x in prop::array::uniform3(-2.0f64..2.0)) {
         // Deep towers amplify: the tolerance is eps times the size of the numbers and the depth of the tree.

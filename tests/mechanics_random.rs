@@ -1,5 +1,8 @@
 //! Random smooth Lagrangians, Riemannian and Lorentzian: closed forms, the energy identity, gauge invariance.
 
+mod common;
+
+use common::properties;
 use lnn::forward::{Dual, HyperDual};
 use lnn::lagrangian::{EulerLagrange, HandWritten, Lagrangian, Request, Terms};
 use lnn::linalg::{self, Inertia, Workspace};
@@ -133,7 +136,7 @@ fn kappa(n: usize, m: &[f64]) -> f64 {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 96, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(properties(96))]
 
     #[test]
     fn accelerations_agree_with_closed_forms(n in 1usize..=6, lorentzian: bool, quartic: bool, seed: u64) {

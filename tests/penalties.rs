@@ -1,5 +1,8 @@
 //! Regularizers of single mass matrices: zeros, signs, scales, gradients.
 
+mod common;
+
+use common::properties;
 use lnn::scalar::{Dd, Scalar};
 use lnn::training::{
     SignatureBuffers, Violation, characteristic_scales, eigenvalue_violation, has_signature, sylvester_violation,
@@ -76,7 +79,7 @@ fn relabelled(n: usize, m: &[f64], order: &[usize]) -> Matrix {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(128))]
+    #![proptest_config(properties(128))]
 
     #[test]
     fn positive_definite_matrices_cost_nothing(n in 1_usize..=8, seed in any::<u64>()) {

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{of_scalar, solve};
+use common::{of_scalar, properties, solve};
 use lnn::forward::HyperDual;
 use lnn::lagrangian::Lagrangian;
 use lnn::network::{Architecture, Initialization, InputLayer, Nonlinearity, initial_weights};
@@ -319,7 +319,7 @@ fn polishing_lowers_the_loss_and_keeps_the_best() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(64))]
+    #![proptest_config(properties(64))]
 
     /// `lambda` times the mean of `sum relu(-eigenvalue)`: never negative, zero exactly where no eigenvalue is negative.
     #[test]
