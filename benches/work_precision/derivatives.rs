@@ -75,6 +75,7 @@ fn measure(options: &Options, case: &Case, section: &mut Section) -> Result<(), 
     bench.forward_identity::<Dd>()?;
     bench.forward_identity::<f64>()?;
     bench.forward_identity::<f32>()?;
+    bench.mixed()?;
     bench.adjoint_identity::<f64>()?;
     bench.adjoint_identity::<f32>()?;
     if case.batch == 1 {

@@ -70,7 +70,7 @@ impl Bench<'_> {
     fn add(&mut self, what: (&'static str, &'static str, &'static str), step: f64, errors: Vec<f64>, time: Timing) {
         let (quantity, engine, precision) = what;
         let eps = match precision {
-            "f32" => f64::from(f32::EPSILON),
+            "f32" | "f32, solved in f64" => f64::from(f32::EPSILON),
             "dd" => Dd::EPSILON.to_f64(),
             _ => f64::EPSILON,
         };
@@ -104,6 +104,31 @@ impl Bench<'_> {
             Ok(()) => self.add(("motion", engine, S::NAME), f64::NAN, errors(self.case.n, &terms, &self.judge), time),
             Err(error) => self.failed(engine, S::NAME, error.to_string()),
         }
+    }
+
+    /// Mixed precision: `M`, `c`, `g` of the forward identity in `f32`, the small systems solved in `f64`.
+    pub fn mixed(&mut self) -> Result<(), String> {
+        let case = self.case;
+        let model = case.network::<f32>()?;
+        let (v, mut terms, mut workspace) = (cast(&case.v), Terms::default(), Workspace::new());
+        let mut run = || -> Result<Terms<f64>, String> {
+            let products = Request::MASS_MATRIX | Request::CORIOLIS | Request::DL_DQ;
+            model.terms(black_box(&case.q), &case.v, products, &mut terms).map_err(|e| e.to_string())?;
+            let mut wide = Terms {
+                dl_dq: cast(&terms.dl_dq),
+                mass_matrix: cast(&terms.mass_matrix),
+                coriolis: cast(&terms.coriolis),
+                ..Terms::default()
+            };
+            wide.complete(case.n, &v, Request::ACCELERATION, &mut workspace).map_err(|e| e.to_string())?;
+            Ok(wide)
+        };
+        let terms = run()?;
+        let time = self.stopwatch.measure(|| {
+            let _ = black_box(run());
+        });
+        self.add(("motion", "identity", "f32, solved in f64"), f64::NAN, errors(case.n, &terms, &self.judge), time);
+        Ok(())
     }
 
     /// The Hessian of the Lagrangian by the scalar tape, reverse over forward.
