@@ -1,13 +1,13 @@
 //! Euler-Lagrange terms of a batch of states: what may be asked for, where it is stored, how the rest follows.
 
 use crate::scalar::Scalar;
-use std::ops::BitOr;
+use std::ops::{BitOr, Range};
 
 /// Which terms a caller needs; nothing else is computed.
 ///
 /// Requests combine with `|`. Asking for [`Request::ACCELERATION`] computes `M`, `c` and `g` on the way and stores
-/// them, [`Request::ENERGY`] stores `L` and `p`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// them, [`Request::ENERGY`] stores `L` and `p`. The default asks for nothing.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Request(u8);
 
 impl Request {
@@ -61,6 +61,25 @@ pub struct Terms<S> {
     pub energy: Vec<S>,
 }
 
+impl<S: Scalar> Terms<S> {
+    /// Takes over what `request` asks for of the rows `rows` of a batch of `n` coordinates; the rest is emptied.
+    pub(crate) fn copy_rows(&mut self, batch: &Self, n: usize, rows: Range<usize>, request: Request) {
+        let mut copy = |to: &mut Vec<S>, from: &[S], width: usize, what: Request| {
+            to.clear();
+            if request.includes(what) {
+                to.extend_from_slice(&from[rows.start * width..rows.end * width]);
+            }
+        };
+        copy(&mut self.lagrangian, &batch.lagrangian, 1, Request::LAGRANGIAN);
+        copy(&mut self.momentum, &batch.momentum, n, Request::MOMENTUM);
+        copy(&mut self.dl_dq, &batch.dl_dq, n, Request::DL_DQ);
+        copy(&mut self.mass_matrix, &batch.mass_matrix, n * n, Request::MASS_MATRIX);
+        copy(&mut self.coriolis, &batch.coriolis, n, Request::CORIOLIS);
+        copy(&mut self.acceleration, &batch.acceleration, n, Request::ACCELERATION);
+        copy(&mut self.energy, &batch.energy, 1, Request::ENERGY);
+    }
+}
+
 /// Why terms could not be computed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MechanicsError {
@@ -107,4 +126,9 @@ pub trait EulerLagrange<S: Scalar>: Send + Sync {
     /// [`MechanicsError`] naming the first row that fails. Terms other than the acceleration are filled even when a
     /// mass matrix is singular, and the accelerations of the other rows are right; those of failed rows are `NaN`.
     fn terms(&self, q: &[S], v: &[S], request: Request, terms: &mut Terms<S>) -> Result<(), MechanicsError>;
+
+    /// Whether several states at once take much less time per state than one, by more than threads need to meet.
+    fn prefers_batches(&self) -> bool {
+        false
+    }
 }

@@ -190,4 +190,9 @@ impl<S: Scalar> EulerLagrange<S> for NetworkLagrangian<S> {
         self.idle.lock().unwrap_or_else(PoisonError::into_inner).push(workspace);
         outcome
     }
+
+    /// From about 100,000 weights on: a single state then waits for them longer than threads take to meet.
+    fn prefers_batches(&self) -> bool {
+        self.weights.len() >= 100_000
+    }
 }

@@ -19,6 +19,7 @@ mod ode;
 mod options;
 mod phase;
 mod run;
+mod together;
 mod trajectory;
 mod variational;
 
@@ -27,6 +28,7 @@ pub use ode::Integrable;
 pub use options::{Domain, Method, Options};
 use run::Failure;
 pub use run::{Rollout, rollout, rollout_fixed, rollout_many};
+pub use together::rollout_together;
 pub use trajectory::{Statistics, Trajectory};
 
 #[cfg(test)]

@@ -96,21 +96,31 @@ pub(super) fn tanh<S: Scalar>(x: S) -> Jet<S> {
 
 /// `x tanh(x/2)`: with `t = tanh(x/2)`, `s = sech^2(x/2)`, `y = x/2`: `f' = t + y s`, `f'' = s (1 - y t)`,
 /// `f''' = s (-3 t + y (2 t^2 - s)) / 2`, `f'''' = s (2 t^2 - s + y t (2 s - t^2))`.
+///
+/// Where large terms nearly cancel, with `e = exp(-x)`, `r = 1/(1 + e)`: `1 - y t = r (1 - y + e (1 + y))`, and from
+/// `x = 2` on `f''' = s r^2 (x - 3 + e (e (x + 3) - 4 x)) / 2`, whose differences are nearly exact.
 #[inline(always)]
 pub(super) fn x_tanh<S: Scalar>(x: S) -> Jet<S> {
     let magnitude = Real::abs(x);
     // Beyond 1600 every tail is 0 in any precision.
     let a = bounded(x, 1600.0);
+    let (one, three) = (constant::<S>(1.0), constant::<S>(3.0));
     let y = a * constant(0.5);
     let (t, m, decay) = hyperbolic(a);
     let s = decay.scale(m);
+    let e = decay.value();
+    let r = one / (one + e);
     let square = t * t;
     let twice = constant::<S>(2.0) * square;
+    let second = r * (one + y).lane_fused(e, one - y);
+    let near = y.lane_fused(twice - s, -three * t);
+    let far = r * r * e.lane_fused((a + three).lane_fused(e, constant::<S>(-4.0) * a), a - three);
+    let third = if a < constant(2.0) { near } else { far };
     [
         magnitude * t,
         signed(t + decay.scale(y * m), x),
-        decay.scale(m * (-y).lane_fused(t, constant(1.0))),
-        decay.scale(m * signed(constant(0.5), x) * y.lane_fused(twice - s, t * constant(-3.0))),
+        decay.scale(m * second),
+        decay.scale(m * signed(constant(0.5), x) * third),
         decay.scale(m * (y * t).lane_fused(constant::<S>(2.0) * s - square, twice - s)),
     ]
 }

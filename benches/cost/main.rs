@@ -1,0 +1,236 @@
+//! What a request costs, and what is skipped when it is not made: evaluations and training steps of network Lagrangians
+//! in turns, beside their bare matrix products and the time to read the weights.
+//!
+//! `cargo bench --bench cost` takes some minutes and prints Markdown tables; `-- --smoke` seconds.
+
+#[path = "../peers/products.rs"]
+mod products;
+mod turns;
+
+use lnn::lagrangian::{EulerLagrange, Request, Terms};
+use lnn::network::{
+    Architecture, Chunk, Depth, Initialization, InputLayer, NetworkLagrangian, Nonlinearity, initial_weights,
+};
+use lnn::rollout::{rollout_many, rollout_together};
+use lnn::scalar::Scalar;
+use lnn::training::{Dataset, Objective, Penalty};
+use products::Products;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use std::hint::black_box;
+use turns::{ROUNDS, Work, in_turns};
+
+const BATCH: usize = 128;
+const LAYERS: usize = 3;
+
+struct Options {
+    smoke: bool,
+}
+
+impl Options {
+    fn width(&self) -> usize {
+        if self.smoke { 32 } else { 500 }
+    }
+    fn rounds(&self) -> usize {
+        if self.smoke { 1 } else { ROUNDS }
+    }
+}
+
+/// A network whose mass matrices are all positive definite, or with `alpha = -1` none of them.
+fn architecture(n: usize, width: usize, alpha: f64) -> Architecture {
+    Architecture {
+        coordinates: n,
+        hidden: vec![width; LAYERS],
+        activation: Nonlinearity::Gelu,
+        alpha,
+        scale: vec![10.0; n],
+        periodic: vec![false; n],
+        embed_periodic: false,
+        input_layer: InputLayer::None,
+    }
+}
+
+struct Setup<S> {
+    architecture: Architecture,
+    weights: Vec<S>,
+    data: Dataset<S>,
+    rows: Vec<u32>,
+}
+
+impl<S: Scalar> Setup<S> {
+    fn new(n: usize, width: usize, alpha: f64) -> Self {
+        let architecture = architecture(n, width, alpha);
+        let mut rng = ChaCha8Rng::seed_from_u64(7);
+        let weights = initial_weights(&architecture, Initialization::Default, &mut rng);
+        let mut draw = || (0..BATCH * n).map(|_| S::of_f64(rng.random_range(-10.0..10.0))).collect();
+        let data = Dataset::new(n, draw(), draw(), draw()).expect("finite numbers");
+        Self { architecture, weights, data, rows: (0..BATCH as u32).collect() }
+    }
+
+    fn step(&self, name: &str, penalty: Penalty, threads: usize) -> Work<'_> {
+        let mut objective = Objective::new(&self.architecture, penalty, threads).expect("threads");
+        let mut gradient = self.weights.clone();
+        Work::new(name, move || {
+            black_box(objective.step(&self.weights, &self.data, &self.rows, &mut gradient));
+        })
+    }
+
+    fn loss(&self, name: &str, threads: usize) -> Work<'_> {
+        let mut objective = Objective::new(&self.architecture, Penalty::None, threads).expect("threads");
+        Work::new(name, move || {
+            black_box(objective.loss(&self.weights, &self.data));
+        })
+    }
+
+    fn evaluation(&self, name: &str, depth: Depth) -> Work<'_> {
+        let mut chunk = Chunk::new(&self.architecture);
+        Work::new(name, move || chunk.evaluate(&self.weights, black_box(self.data.q()), self.data.v(), depth))
+    }
+
+    fn products(&self, name: &str, threads: usize) -> Work<'_> {
+        let mut products = Products::<S>::new(self.data.coordinates(), &self.architecture.hidden, BATCH, threads);
+        Work::new(name, move || products.take())
+    }
+
+    /// Accelerations of the first `count` states as an integrator asks for them.
+    fn accelerations(&self, name: &str, count: usize) -> Work<'_> {
+        let network = NetworkLagrangian::new(self.architecture.clone(), self.weights.clone()).expect("weights fit");
+        let (end, mut terms) = (count * self.data.coordinates(), Terms::default());
+        Work::new(name, move || {
+            let (q, v) = (black_box(&self.data.q()[..end]), &self.data.v()[..end]);
+            network.terms(q, v, Request::ACCELERATION, &mut terms).expect("regular mass matrices");
+        })
+    }
+
+    /// Reads all weights once.
+    fn stream(&self, name: &str) -> Work<'_> {
+        Work::new(name, || {
+            let sum = lnn::scalar::vectorized(
+                #[inline(always)]
+                || {
+                    let mut lanes = [<S as lnn::scalar::Real>::zero(); 64];
+                    for block in black_box(self.weights.as_slice()).chunks_exact(64) {
+                        for (sum, &w) in lanes.iter_mut().zip(block) {
+                            *sum += w;
+                        }
+                    }
+                    lanes
+                },
+            );
+            black_box(sum);
+        })
+    }
+}
+
+fn requests(options: &Options) {
+    let (n, width) = (2, options.width());
+    let plain = Setup::<f32>::new(n, width, 1.0);
+    let wide = Setup::<f64>::new(n, width, 1.0);
+    let penalised = Setup::<f32>::new(n, width, -1.0);
+    let lambda = 10.0;
+    let eigenvalue = Penalty::Eigenvalue { lambda };
+    let sylvester = Penalty::Sylvester { lambda, time: None };
+    let mut work = vec![
+        plain.step("step, no penalty", Penalty::None, 1),
+        plain.evaluation("L", Depth::Value),
+        plain.evaluation("L, p, g", Depth::Gradient),
+        plain.evaluation("L, p, g, M", Depth::MassMatrix),
+        plain.evaluation("L, p, g, M, c", Depth::Motion),
+        plain.loss("losses of a validation set", 1),
+        plain.step("step, eigenvalue penalty, inactive", eigenvalue, 1),
+        plain.step("step, Sylvester penalty, inactive", sylvester, 1),
+        penalised.step("step, Sylvester penalty, active in every state", sylvester, 1),
+        penalised.step("step, eigenvalue penalty, active in every state", eigenvalue, 1),
+        plain.products("bare products", 1),
+        plain.step("step, no penalty, two threads", Penalty::None, 2),
+        plain.products("bare products, two threads", 2),
+        wide.step("step, no penalty, f64", Penalty::None, 1),
+    ];
+    in_turns(&mut work, options.rounds());
+    println!("\n### Requests: n = {n}, {LAYERS} x {width}, batch {BATCH}, f32, one thread unless said\n");
+    println!("| request | us per state | of a step |\n|---|---|---|");
+    for w in &work {
+        println!("| {} | {:.2} | {:.3} |", w.name, w.median() * 1e6 / BATCH as f64, w.times_of(&work[0]));
+    }
+    println!("\nTwo threads: {:.2} times one.", work[0].times_of(&work[11]));
+    println!(
+        "Step over its bare products: {:.2}, two threads {:.2}.",
+        work[0].times_of(&work[10]),
+        work[11].times_of(&work[12])
+    );
+}
+
+fn coordinates(options: &Options) {
+    let width = options.width();
+    let counts = [1, 2, 4, 8, 12, 20];
+    let setups = counts.map(|n| Setup::<f32>::new(n, width, 1.0));
+    let mut work: Vec<Work<'_>> = setups.iter().map(|s| s.step("step", Penalty::None, 1)).collect();
+    work.extend(setups.iter().map(|s| s.products("products", 1)));
+    in_turns(&mut work, options.rounds());
+    println!("\n### Coordinates: step without penalty, {LAYERS} x {width}, batch {BATCH}, f32, one thread\n");
+    println!("| n | ms | over its n + 11 bare products | over n = 2 | (n + 11)/13 |\n|---|---|---|---|---|");
+    for (k, n) in counts.into_iter().enumerate() {
+        let (step, products) = (&work[k], &work[counts.len() + k]);
+        let (ratio, growth) = (step.times_of(products), step.times_of(&work[1]));
+        println!("| {n} | {:.2} | {ratio:.2} | {growth:.2} | {:.2} |", step.median() * 1e3, (n + 11) as f64 / 13.0);
+    }
+}
+
+fn latency<S: Scalar>(options: &Options) {
+    let (n, width) = (2, options.width());
+    let setup = Setup::<S>::new(n, width, 1.0);
+    let mut work = vec![setup.stream("weights read once")];
+    let counts = [1, 2, 4, 8, 16, 64];
+    work.extend(counts.map(|count| setup.accelerations(&format!("{count}"), count)));
+    in_turns(&mut work, options.rounds());
+    println!(
+        "\n### Latency: accelerations inside an integrator, n = {n}, {LAYERS} x {width}, {}, one thread\n",
+        S::NAME
+    );
+    println!("Weights read once: {:.1} us; n + 3 = {} passes.\n", work[0].median() * 1e6, n + 3);
+    println!("| states | us | us per state | over n + 3 readings of the weights |\n|---|---|---|---|");
+    for (w, count) in work[1..].iter().zip(counts) {
+        let (us, ratio) = (w.median() * 1e6, w.times_of(&work[0]) / (n + 3) as f64);
+        println!("| {count} | {us:.1} | {:.1} | {ratio:.2} |", us / count as f64);
+    }
+}
+
+/// An ensemble of motions one by one and together, per motion.
+fn ensembles(options: &Options) {
+    let motion = |threads, width| {
+        let setup = Setup::<f64>::new(2, width, 1.0);
+        let network = NetworkLagrangian::new(setup.architecture, setup.weights).expect("weights fit");
+        let start = |k: usize| setup.data.q()[2 * k..][..2].iter().map(|x| x / 10.0).collect::<Vec<f64>>();
+        let starts: Vec<_> = (0..16).map(|k| (start(k), start(k + 16))).collect();
+        let rollout = lnn::rollout::Options::new(0.5, 0.1);
+        let mut work = [
+            Work::new("alone", || {
+                for start in starts.chunks(8) {
+                    black_box(rollout_many(&network, start, &rollout, threads));
+                }
+            }),
+            Work::new("together", || {
+                black_box(rollout_together(&network, &starts, &rollout, threads));
+            }),
+        ];
+        in_turns(&mut work, options.rounds());
+        let [alone, together] = [&work[0], &work[1]].map(|w| w.median() * 1e3 / starts.len() as f64);
+        println!("| {width} | {threads} | {alone:.2} | {together:.2} | {:.2} |", work[0].times_of(&work[1]));
+    };
+    println!("\n### Ensembles: 16 motions by Dopri5, n = 2, f64\n");
+    println!("| width | threads | ms per motion alone | together | gain |\n|---|---|---|---|---|");
+    for width in if options.smoke { vec![32] } else { vec![64, 128, 256, 500] } {
+        for threads in [1, 2] {
+            motion(threads, width);
+        }
+    }
+}
+
+fn main() {
+    let options = Options { smoke: std::env::args().any(|a| a == "--smoke") };
+    requests(&options);
+    coordinates(&options);
+    latency::<f32>(&options);
+    latency::<f64>(&options);
+    ensembles(&options);
+}
