@@ -13,7 +13,8 @@ mod work_precision;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    let options = match work_precision::Options::parse(std::env::args().skip(1)) {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let options = match work_precision::Options::parse(&arguments) {
         Ok(options) => options,
         Err(message) => {
             eprintln!("error: {message}\n{}", work_precision::USAGE);

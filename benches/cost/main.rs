@@ -227,7 +227,9 @@ fn ensembles(options: &Options) {
 }
 
 fn main() {
-    let options = Options { smoke: std::env::args().any(|a| a == "--smoke") };
+    let given = |what: &str| std::env::args().any(|argument| argument == what);
+    // `cargo test` runs benchmarks without `--bench`.
+    let options = Options { smoke: given("--smoke") || !given("--bench") };
     requests(&options);
     coordinates(&options);
     latency::<f32>(&options);

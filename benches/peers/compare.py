@@ -98,7 +98,7 @@ def main():
     rounds, seconds, cases = (1, 0.3, CASES[:1]) if options.quick else (7, 1.0, CASES)
     worker = os.path.join(HERE, "worker.py")
     engines = [Engine(name, [sys.executable, worker, name]) for name in ENGINES]
-    ours = Engine("lnn", [options.program])
+    ours = Engine("lnn", [options.program, "serve"])
     header = ["n", "precision", "engine", "median ms", "least ms", "times lnn", "least", "most", "compile s"]
     print(f"training step without optimiser, 3 hidden layers of {WIDTH}, batch {BATCH}, 2 threads; {platform.platform()}")
     print("| " + " | ".join(header) + " |\n|" + "---|" * len(header))

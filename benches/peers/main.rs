@@ -3,7 +3,7 @@
 //! `compare.py` starts this program and one for each peer and lets them work in turns. `setup DIR N WIDTH BATCH PRECISION
 //! ALPHA` writes weights, states, targets, loss and gradient as raw little-endian `f64`; `step S`, `products S` and
 //! `accelerations S` answer with nanoseconds, one number per run, of at least three runs and about `S` seconds.
-//! `--list` and other arguments of a benchmark run are not understood: without a line to read the program ends.
+//! That is with the argument `serve`; without it everything is tried once.
 
 mod products;
 
@@ -147,7 +147,22 @@ fn answer(line: &str, case: &mut Option<Box<dyn Timed>>) -> Outcome<String> {
     }
 }
 
-fn main() -> Outcome<()> {
+/// Every request once, on a small network.
+fn smoke() -> Outcome<()> {
+    let directory = tempfile::tempdir()?;
+    for precision in ["f32", "f64"] {
+        let mut case = None;
+        answer(&format!("setup {} 2 16 70 {precision} 1.0", directory.path().display()), &mut case)?;
+        for what in ["step", "products", "accelerations"] {
+            let times = answer(&format!("{what} 0"), &mut case)?;
+            assert_eq!(times.split(' ').count(), 3, "{precision}, {what}: {times}");
+        }
+    }
+    assert_eq!(std::fs::read(directory.path().join("gradient"))?.len(), 8 * (4 * 16 + 16 + 2 * (16 * 16 + 16) + 16));
+    Ok(())
+}
+
+fn serve() -> Outcome<()> {
     let (mut case, mut out) = (None, std::io::stdout().lock());
     for line in std::io::stdin().lock().lines() {
         match answer(&line?, &mut case) {
@@ -157,4 +172,8 @@ fn main() -> Outcome<()> {
         out.flush()?;
     }
     Ok(())
+}
+
+fn main() -> Outcome<()> {
+    if std::env::args().any(|argument| argument == "serve") { serve() } else { smoke() }
 }

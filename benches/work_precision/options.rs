@@ -52,17 +52,24 @@ pub struct Options {
 }
 
 impl Options {
-    /// Reads the arguments after the program's name; `--bench`, which cargo adds, is ignored.
+    /// Reads the arguments after the program's name. Without the `--bench` that `cargo bench` adds, as in `cargo test`,
+    /// whatever they are, everything is tried at the smallest scale.
     ///
     /// # Errors
     /// What is wrong with them, in words.
-    pub fn parse(mut arguments: impl Iterator<Item = String>) -> Result<Self, String> {
+    pub fn parse(arguments: &[String]) -> Result<Self, String> {
+        let target = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("target");
         let mut options = Self {
             scale: Scale::Full,
             parts: Vec::new(),
             model: None,
-            out: PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("target/work-precision"),
+            out: target.join("work-precision"),
         };
+        if !arguments.iter().any(|argument| argument == "--bench") {
+            let (scale, parts, out) = (Scale::Smoke, Part::ALL.to_vec(), target.join("work-precision-smoke"));
+            return Ok(Self { scale, parts, out, ..options });
+        }
+        let mut arguments = arguments.iter().cloned();
         while let Some(argument) = arguments.next() {
             let mut value = || arguments.next().ok_or_else(|| format!("{argument} needs a value"));
             match argument.as_str() {

@@ -64,7 +64,7 @@ pub struct Terms<S> {
 impl<S: Scalar> Terms<S> {
     /// Takes over what `request` asks for of the rows `rows` of a batch of `n` coordinates; the rest is emptied.
     pub(crate) fn copy_rows(&mut self, batch: &Self, n: usize, rows: Range<usize>, request: Request) {
-        let mut copy = |to: &mut Vec<S>, from: &[S], width: usize, what: Request| {
+        let copy = |to: &mut Vec<S>, from: &[S], width: usize, what: Request| {
             to.clear();
             if request.includes(what) {
                 to.extend_from_slice(&from[rows.start * width..rows.end * width]);
