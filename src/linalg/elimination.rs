@@ -79,10 +79,7 @@ fn where_pivot<S: Scalar, const W: usize>(
 ///
 /// The pivot of a step is the first of the largest elements of its column. Every lane goes through the same steps.
 #[inline(always)]
-pub(super) fn solve<S: Scalar, const W: usize>(
-    (n, m): (usize, usize),
-    system: &mut [Lane<S, W>],
-) -> Pivots<S, W> {
+pub(super) fn solve<S: Scalar, const W: usize>((n, m): (usize, usize), system: &mut [Lane<S, W>]) -> Pivots<S, W> {
     let width = n + m;
     let a = &mut system[..n * width];
     let mut pivots = Pivots { smallest: [S::INFINITY; W], growth: [<S as Real>::zero(); W] };
@@ -158,11 +155,7 @@ pub(super) fn solve<S: Scalar, const W: usize>(
 
 /// Subtracts `A X` from the right-hand sides of `[A | B]`, `X` in `n` lines of `m`.
 #[inline(always)]
-pub(super) fn residual<S: Scalar, const W: usize>(
-    (n, m): (usize, usize),
-    system: &mut [Lane<S, W>],
-    x: &[Lane<S, W>],
-) {
+pub(super) fn residual<S: Scalar, const W: usize>((n, m): (usize, usize), system: &mut [Lane<S, W>], x: &[Lane<S, W>]) {
     let width = n + m;
     for i in 0..n {
         for c in 0..m {

@@ -136,10 +136,7 @@ impl<S: Scalar> Systems<'_, S> {
 
 /// Which lanes have pivots or a growth of elements that cost digits, or no solution.
 #[inline(always)]
-fn refinement_due<S: Scalar, const W: usize>(
-    pivots: &elimination::Pivots<S, W>,
-    largest: &Lane<S, W>,
-) -> [bool; W] {
+fn refinement_due<S: Scalar, const W: usize>(pivots: &elimination::Pivots<S, W>, largest: &Lane<S, W>) -> [bool; W] {
     let (small, growth) = (S::of_f64(SMALL_PIVOT), S::of_f64(GROWTH));
     let mut due = [false; W];
     for l in 0..W {
@@ -222,4 +219,3 @@ fn examine<S: Scalar>(n: usize, matrix: &[S], x: &[S], scratch: &mut super::batc
     }
     x.iter().any(|x| !x.is_finite()).then_some(Failure::NotFinite)
 }
-
