@@ -281,7 +281,7 @@ fn inertia_by_pivots_agrees_with_the_spectrum() {
 fn inertia_of_hard_matrices_is_that_of_their_exact_spectra() {
     let mut rng = ChaCha8Rng::seed_from_u64(8);
     let mut scratch = vec![0.0; 400];
-    for n in 1..=20 {
+    for n in [1, 2, 3, 4, 5, 8, 13, 20] {
         for (name, m) in matrices::<f64>(n, &mut rng) {
             // Units of another size on every other coordinate as well.
             let mixed: Vec<f64> = (0..n * n)
