@@ -52,11 +52,11 @@ pub(super) fn is_singular<S: Scalar>(n: usize, matrix: &[S], scratch: &mut Dense
     !regular
 }
 
-/// Powers of two `s_i` for which `s_i a_ij s_j` has rows of size 1 (Bunch 1971), one after the other; `None` where a
+/// Powers of two `s_i` for which `s_i a_ij s_j` has rows of size 1 (Bunch 1971), one after the other; `false` where a
 /// row is zero.
 ///
 /// `1/s_i = max(sqrt |a_ii|, s_j |a_ij| for j < i)`; the lower triangle is read.
-pub(super) fn equilibration<S: Scalar>(n: usize, a: &[S], scale: &mut Vec<S>) -> bool {
+fn equilibration<S: Scalar>(n: usize, a: &[S], scale: &mut Vec<S>) -> bool {
     let zero = <S as Real>::zero();
     scale.clear();
     for i in 0..n {

@@ -39,7 +39,7 @@ pub(super) fn decompose<S: Scalar, const W: usize>(
                     let (largest, probe) = load(n, matrices, start, a);
                     let exponents = rescale(a, &largest, &range);
                     diagonalize(n, a, u, turns);
-                    finite &= store(n, a, u, turns, &exponents, &probe, (&mut *values, &mut *vectors), start);
+                    finite &= store(n, (a, u), turns, &exponents, &probe, (&mut *values, &mut *vectors), start);
                 }
             });
         },
@@ -271,8 +271,7 @@ fn rotate<S: Scalar, const W: usize>(
 #[inline(always)]
 fn store<S: Scalar, const W: usize>(
     n: usize,
-    a: &[Lane<S, W>],
-    u: &[Lane<S, W>],
+    (a, u): (&[Lane<S, W>], &[Lane<S, W>]),
     ranks: &mut [Lane<S, W>],
     exponents: &[i32; W],
     probe: &Lane<S, W>,
