@@ -278,6 +278,30 @@ fn inertia_by_pivots_agrees_with_the_spectrum() {
 }
 
 #[test]
+fn inertia_of_hard_matrices_is_that_of_their_exact_spectra() {
+    let mut rng = ChaCha8Rng::seed_from_u64(8);
+    let mut scratch = vec![0.0; 400];
+    for n in [1, 2, 3, 4, 5, 8, 13, 20] {
+        for (name, m) in matrices::<f64>(n, &mut rng) {
+            // Units of another size on every other coordinate as well.
+            let mixed: Vec<f64> = (0..n * n)
+                .map(|k| {
+                    Scalar::ldexp(m[k], if k / n % 2 == 0 { 40 } else { -9 } + if k % n % 2 == 0 { 40 } else { -9 })
+                })
+                .collect();
+            let wide: Vec<Dd> = m.iter().map(|&m| dd(m)).collect();
+            let mut w = vec![Dd::of_f64(0.0); n];
+            linalg::eigenvalues(n, &wide, &mut w, &mut Workspace::new()).unwrap();
+            let negative = w.iter().filter(|w| w.to_f64() < 0.0).count();
+            let expected = Inertia { positive: n - negative, zero: 0, negative };
+            for m in [&m, &mixed] {
+                assert_eq!(linalg::inertia(n, m, &mut scratch).unwrap(), expected, "n = {n}, {name}");
+            }
+        }
+    }
+}
+
+#[test]
 fn gradient_of_the_determinant_is_right_where_it_vanishes() {
     let mut ws = Workspace::new();
     let mut gradient = [0.0; 4];

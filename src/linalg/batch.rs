@@ -12,14 +12,10 @@ pub(super) type Lane<S, const W: usize> = [S; W];
 /// Buffers of the batched operations, grown on first use, and the rows that failed in the last one.
 #[derive(Clone, Debug, Default)]
 pub struct Workspace<S> {
-    /// Blocks of [`LANES`] matrices.
-    pub(super) wide: Buffers<S, LANES>,
-    /// Single matrices.
-    pub(super) single: Buffers<S, 1>,
-    /// Dense scratch of one matrix.
-    pub(super) dense: Dense<S>,
-    /// Right-hand sides and solutions of an inverse.
-    pub(super) columns: Vec<S>,
+    /// A block of matrices too large for the stack.
+    pub(super) block: Buffer<S>,
+    /// What the second look at a block needs.
+    pub(super) second: Second<S>,
     /// Scratch of determinants.
     pub(super) minors: Minors<S>,
     /// Lent to callers.
@@ -27,41 +23,36 @@ pub struct Workspace<S> {
     failures: Vec<(usize, Failure)>,
 }
 
-/// Lane buffers: two matrices and four vectors.
-#[derive(Clone, Debug)]
-pub(super) struct Buffers<S, const W: usize> {
-    pub matrix: Vec<Lane<S, W>>,
-    pub factor: Vec<Lane<S, W>>,
-    pub rhs: Vec<Lane<S, W>>,
-    pub solution: Vec<Lane<S, W>>,
-    pub residual: Vec<Lane<S, W>>,
-    pub order: Vec<Lane<S, W>>,
+/// Numbers on the boundary of a cache line, as the widest vector instructions like them.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Buffer<S> {
+    numbers: Vec<S>,
 }
 
-impl<S, const W: usize> Default for Buffers<S, W> {
-    fn default() -> Self {
-        Self {
-            matrix: Vec::new(),
-            factor: Vec::new(),
-            rhs: Vec::new(),
-            solution: Vec::new(),
-            residual: Vec::new(),
-            order: Vec::new(),
+/// Bytes of a cache line.
+const LINE: usize = 64;
+
+impl<S: Scalar> Buffer<S> {
+    /// The first `count` lanes, with the numbers of their last use.
+    pub fn lanes<const W: usize>(&mut self, count: usize) -> &mut [Lane<S, W>] {
+        let spare = LINE / size_of::<S>();
+        if self.numbers.len() < count * W + spare {
+            self.numbers.resize(count * W + spare, <S as Real>::zero());
         }
+        let start = self.numbers.as_ptr().align_offset(LINE).min(spare);
+        self.numbers[start..start + count * W].as_chunks_mut().0
     }
 }
 
-impl<S: Scalar, const W: usize> Buffers<S, W> {
-    /// Room for matrices of size `n`.
-    pub fn reserve(&mut self, n: usize) {
-        let zero = [<S as Real>::zero(); W];
-        for matrix in [&mut self.matrix, &mut self.factor] {
-            matrix.resize(n * n, zero);
-        }
-        for vector in [&mut self.rhs, &mut self.solution, &mut self.residual, &mut self.order] {
-            vector.resize(n, zero);
-        }
-    }
+/// Scratch of rows that need more than one elimination.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Second<S> {
+    /// A block of matrices.
+    pub block: Buffer<S>,
+    /// Their solutions.
+    pub solution: Buffer<S>,
+    /// One matrix.
+    pub dense: Dense<S>,
 }
 
 /// Scratch of determinants and their gradients.
@@ -75,8 +66,12 @@ pub(super) struct Minors<S> {
 /// Scratch of the paths that treat one matrix at a time.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Dense<S> {
-    pub matrix: Vec<Lane<S, 1>>,
+    /// The matrix.
+    pub matrix: Vec<S>,
+    /// Powers of two that scale its rows.
     pub scale: Vec<S>,
+    /// Lanes made of it.
+    pub lanes: Buffer<S>,
 }
 
 impl<S: Scalar> Workspace<S> {
@@ -102,48 +97,71 @@ impl<S: Scalar> Workspace<S> {
     pub(super) fn failures_mut(&mut self) -> &mut Vec<(usize, Failure)> {
         &mut self.failures
     }
+    /// The three parts a solver works with at the same time.
+    pub(super) fn parts(&mut self) -> (&mut Buffer<S>, &mut Second<S>, &mut Vec<(usize, Failure)>) {
+        (&mut self.block, &mut self.second, &mut self.failures)
+    }
     /// The error of the first failed row, if any.
     pub(super) fn outcome(&self) -> Result<(), LinalgError> {
         self.failures.first().map_or(Ok(()), |&(row, failure)| Err(LinalgError::of_row(row, failure)))
     }
 }
 
-/// Copies rows `start..` of a `(batch, width)` slice into lanes; lanes past the end repeat the last row.
+/// The rows `start..start + W` of a batch; lanes past its end repeat the last row.
 #[inline(always)]
-pub(super) fn gather<S: Scalar, const W: usize>(rows: &[S], width: usize, start: usize, lanes: &mut [Lane<S, W>]) {
-    let batch = rows.len() / width;
+pub(super) fn rows<S, const W: usize>(batch: &[S], width: usize, start: usize) -> [&[S]; W] {
+    let last = batch.len() / width - 1;
+    let mut rows = [&batch[..width]; W];
     for l in 0..W {
-        let row = (start + l).min(batch - 1);
-        for (lane, &x) in lanes.iter_mut().zip(&rows[row * width..(row + 1) * width]) {
-            lane[l] = x;
-        }
+        let row = (start + l).min(last);
+        rows[l] = &batch[row * width..][..width];
     }
+    rows
 }
 
-/// Copies lanes back into rows `start..` of a `(batch, width)` slice.
+/// Element `e` of every row.
 #[inline(always)]
-pub(super) fn scatter<S: Scalar, const W: usize>(lanes: &[Lane<S, W>], rows: &mut [S], width: usize, start: usize) {
-    for (l, row) in rows[start * width..].chunks_exact_mut(width).take(W).enumerate() {
-        for (x, lane) in row.iter_mut().zip(lanes) {
-            *x = lane[l];
-        }
+pub(super) fn across<S: Copy, const W: usize>(rows: &[&[S]; W], e: usize) -> Lane<S, W> {
+    let mut lane = [rows[0][e]; W];
+    for l in 1..W {
+        lane[l] = rows[l][e];
     }
+    lane
 }
 
-/// Runs a kernel with sizes 2 and 3 as constants, so that their loops unroll.
+/// A choice that is never compiled to a branch: lanes that branch do not become vector instructions.
+#[inline(always)]
+pub(super) fn select<S>(condition: bool, chosen: S, otherwise: S) -> S {
+    std::hint::select_unpredictable(condition, chosen, otherwise)
+}
+
+/// Lanes on the boundary of a cache line.
+#[repr(align(64))]
+pub(super) struct Aligned<T>(pub T);
+
+/// Calls `$body` with `$lanes` lanes of storage, small sizes as constants with the storage on the stack.
+///
+/// `$n` is the size inside of `$count` and `$body`.
 macro_rules! with_size {
-    ($n:expr, |$size:ident| $body:expr) => {
-        match $n {
-            2 => {
-                let $size = 2_usize;
+    (($scalar:ty, $width:ident) $size:expr, $buffer:expr, |$n:ident| $count:expr, |$lanes:ident| $body:expr) => {{
+        macro_rules! constant {
+            ($literal:literal) => {{
+                #[allow(non_upper_case_globals)]
+                const $n: usize = $literal;
+                let mut storage = Aligned([[<$scalar as Real>::zero(); $width]; $count]);
+                let $lanes = &mut storage.0[..];
                 $body
-            }
-            3 => {
-                let $size = 3_usize;
-                $body
-            }
-            $size => $body,
+            }};
         }
-    };
+        match $size {
+            2 => constant!(2),
+            3 => constant!(3),
+            4 => constant!(4),
+            $n => {
+                let $lanes = $buffer.lanes::<$width>($count);
+                $body
+            }
+        }
+    }};
 }
 pub(super) use with_size;

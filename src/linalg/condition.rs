@@ -1,9 +1,9 @@
 //! Condition numbers, and when a matrix counts as singular.
 
-use super::batch::Dense;
+use super::batch::{Dense, LANES};
 use super::error::{LinalgError, expect_length};
-use super::{Workspace, jacobi, large};
-use crate::scalar::{Real, Scalar};
+use super::{Workspace, elimination, jacobi, large};
+use crate::scalar::{Real, Scalar, vectorized};
 
 /// 2-norm condition number `max |w| / min |w|` of one symmetric `(n, n)` matrix; infinite if exactly singular.
 ///
@@ -14,7 +14,7 @@ pub fn condition_number<S: Scalar>(n: usize, matrix: &[S], workspace: &mut Works
     if matrix.iter().any(|m| !m.is_finite()) {
         return Err(LinalgError::NotFinite { row: 0 });
     }
-    Ok(condition_2(n, matrix, &mut workspace.dense))
+    Ok(condition_2(n, matrix, &mut workspace.second.dense))
 }
 
 /// [`condition_number`] of a finite matrix.
@@ -28,64 +28,121 @@ pub(super) fn condition_2<S: Scalar>(n: usize, matrix: &[S], scratch: &mut Dense
 /// (Bunch 1971).
 ///
 /// The scaling is by powers of two on both sides: a choice of units cannot make a matrix singular. It may spoil a
-/// well-conditioned indefinite matrix, therefore both are asked.
+/// well-conditioned indefinite matrix, therefore both are asked. Eigenvalues are computed only where the Frobenius
+/// norms of matrix and inverse, whose product bounds the condition number, do not settle it.
 pub(super) fn is_singular<S: Scalar>(n: usize, matrix: &[S], scratch: &mut Dense<S>) -> bool {
     scratch.load(matrix);
+    if scratch.bounded(n) {
+        return false;
+    }
+    if !scratch.equilibrate(n) {
+        return true;
+    }
+    if scratch.bounded(n) {
+        return false;
+    }
     let (least, most) = scratch.extreme_eigenvalues(n);
     if least > S::EPSILON * most {
         return false;
     }
     scratch.load(matrix);
-    let Dense { matrix: a, scale } = scratch;
-    scale.clear();
-    let zero = <S as Real>::zero();
-    for i in 0..n {
-        // 1/s_i = max(sqrt |a_ii|, s_j |a_ij| for j < i), as a power of two.
-        let mut size = a[i * n + i][0].abs().sqrt();
-        for (j, &s) in scale.iter().enumerate() {
-            let bound: S = s * a[i * n + j][0].abs();
-            size = if bound > size { bound } else { size };
-        }
-        if size == zero {
-            size = a[i * n..(i + 1) * n].iter().fold(zero, |m, x| if x[0].abs() > m { x[0].abs() } else { m });
-        }
-        if size == zero {
-            return true;
-        }
-        scale.push(<S as Real>::one().ldexp(-size.ilogb()));
-    }
-    for i in 0..n {
-        for j in 0..n {
-            a[i * n + j][0] = a[i * n + j][0] * scale[i] * scale[j];
-        }
-    }
     let (least, most) = scratch.extreme_eigenvalues(n);
     // Not finite counts as singular.
     let regular = least > S::EPSILON * most;
     !regular
 }
 
+/// Powers of two `s_i` for which `s_i a_ij s_j` has rows of size 1 (Bunch 1971), one after the other; `false` where a
+/// row is zero.
+///
+/// `1/s_i = max(sqrt |a_ii|, s_j |a_ij| for j < i)`; the lower triangle is read.
+fn equilibration<S: Scalar>(n: usize, a: &[S], scale: &mut Vec<S>) -> bool {
+    let zero = <S as Real>::zero();
+    scale.clear();
+    for i in 0..n {
+        let mut size = a[i * n + i].abs().sqrt();
+        for (j, &s) in scale.iter().enumerate() {
+            let bound: S = s * a[i * n + j].abs();
+            size = if bound > size { bound } else { size };
+        }
+        if size == zero {
+            size = a[i * n..(i + 1) * n].iter().fold(zero, |m, x| if x.abs() > m { x.abs() } else { m });
+        }
+        if size == zero {
+            return false;
+        }
+        scale.push(<S as Real>::one().ldexp(-size.ilogb()));
+    }
+    true
+}
+
 impl<S: Scalar> Dense<S> {
     /// Copies a matrix in.
-    pub(super) fn load(&mut self, matrix: &[S]) {
+    fn load(&mut self, matrix: &[S]) {
         self.matrix.clear();
-        self.matrix.extend(matrix.iter().map(|&m| [m]));
+        self.matrix.extend_from_slice(matrix);
     }
 
-    /// Smallest and largest absolute eigenvalue of the loaded matrix, which is destroyed.
+    /// Scales rows and columns of the loaded matrix to size 1; `false` where a row is zero.
+    fn equilibrate(&mut self, n: usize) -> bool {
+        let Self { matrix: a, scale, .. } = self;
+        if !equilibration(n, a, scale) {
+            return false;
+        }
+        for i in 0..n {
+            for j in 0..n {
+                a[i * n + j] = a[i * n + j] * scale[i] * scale[j];
+            }
+        }
+        true
+    }
+
+    /// Whether `|A|_F |A^-1|_F` of the loaded matrix is below `1/eps` by a factor of four, room for rounding.
+    ///
+    /// The columns of the inverse are spread over the lanes.
+    fn bounded(&mut self, n: usize) -> bool {
+        let m = n.div_ceil(LANES);
+        let width = n + m;
+        let system = self.lanes.lanes::<LANES>(n * width);
+        let (zero, one) = (<S as Real>::zero(), <S as Real>::one());
+        let matrix = &self.matrix;
+        let mut squares = [0.0; LANES];
+        vectorized(
+            #[inline(always)]
+            || {
+                for i in 0..n {
+                    for j in 0..n {
+                        system[i * width + j] = [matrix[i * n + j]; LANES];
+                    }
+                    system[i * width + n..(i + 1) * width].fill([zero; LANES]);
+                    system[i * width + n + i / LANES][i % LANES] = one;
+                }
+                elimination::solve((n, m), system);
+                for i in 0..n {
+                    for c in 0..m {
+                        for l in 0..LANES {
+                            let x = system[i * width + n + c][l].to_f64();
+                            squares[l] += x * x;
+                        }
+                    }
+                }
+            },
+        );
+        let own: f64 = matrix.iter().map(|x| x.to_f64() * x.to_f64()).sum();
+        let condition = (own * squares.iter().sum::<f64>()).sqrt();
+        condition * S::EPSILON.to_f64() < 0.25
+    }
+
+    /// Smallest and largest absolute eigenvalue of the loaded matrix.
     fn extreme_eigenvalues(&mut self, n: usize) -> (S, S) {
-        let mut values = if large::serves::<S>(n) {
-            let matrix: Vec<S> = self.matrix.iter().map(|m| m[0]).collect();
-            let mut values = vec![S::NAN; n];
-            large::eigh(n, &matrix, &mut values, &mut []);
-            values
+        let mut values = vec![S::NAN; n];
+        if large::serves::<S>(n) {
+            large::eigh(n, &self.matrix, &mut values, &mut []);
         } else {
-            let exponents = jacobi::rescale(&mut self.matrix);
-            jacobi::diagonalize(n, &mut self.matrix, &mut []);
-            (0..n).map(|i| self.matrix[i * n + i][0].ldexp(exponents[0])).collect()
-        };
-        values.iter_mut().for_each(|w| *w = w.abs());
-        values.iter().fold((S::INFINITY, <S as Real>::zero()), |(least, most), &w| {
+            jacobi::decompose::<S, 1>(n, &self.matrix, &mut values, &mut [], (0, 1), &mut self.lanes);
+        }
+        values.iter().fold((S::INFINITY, <S as Real>::zero()), |(least, most), w| {
+            let w = w.abs();
             (if w >= least { least } else { w }, if w <= most { most } else { w })
         })
     }

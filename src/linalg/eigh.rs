@@ -1,9 +1,9 @@
 //! Batched symmetric eigendecomposition.
 
-use super::batch::{Buffers, LANES, Workspace, gather, scatter, with_size};
+use super::batch::{Buffer, LANES, Workspace};
 use super::error::{Failure, LinalgError, expect_length};
 use super::{jacobi, large};
-use crate::scalar::{Scalar, vectorized};
+use crate::scalar::Scalar;
 
 /// Eigenvalues, ascending, and eigenvectors of a batch of symmetric matrices: `M = sum_k w_k u_k u_k^T`.
 ///
@@ -53,23 +53,19 @@ fn run<S: Scalar>(
     if batch == 0 {
         return Ok(());
     }
-    if large::serves::<S>(n) {
+    let finite = if large::serves::<S>(n) {
         for (row, (m, w)) in matrices.chunks_exact(size).zip(values.chunks_exact_mut(n)).enumerate() {
             let u = if vectors.is_empty() { &mut [][..] } else { &mut vectors[row * size..(row + 1) * size] };
             large::eigh(n, m, w, u);
         }
+        false
+    } else if size_of::<S>() < size_of::<f64>() {
+        split::<S, { 2 * LANES }>(n, matrices, values, vectors, &mut workspace.block)
     } else {
-        let (wide, single) = (&mut workspace.wide, &mut workspace.single);
-        let mut start = 0;
-        while start < batch {
-            let count = (batch - start).min(LANES);
-            if count == 1 {
-                block(n, matrices, values, vectors, start, single);
-            } else {
-                block(n, matrices, values, vectors, start, wide);
-            }
-            start += count;
-        }
+        split::<S, LANES>(n, matrices, values, vectors, &mut workspace.block)
+    };
+    if finite {
+        return Ok(());
     }
     for (row, m) in matrices.chunks_exact(size).enumerate() {
         let values = &mut values[row * n..(row + 1) * n];
@@ -84,32 +80,16 @@ fn run<S: Scalar>(
     workspace.outcome()
 }
 
-/// Rows `start..start + W`.
-fn block<S: Scalar, const W: usize>(
+/// In blocks of `W`, a single matrix at the end alone; whether all is finite.
+fn split<S: Scalar, const W: usize>(
     n: usize,
     matrices: &[S],
     values: &mut [S],
     vectors: &mut [S],
-    start: usize,
-    buffers: &mut Buffers<S, W>,
-) {
-    buffers.reserve(n);
-    let Buffers { matrix, factor, rhs, .. } = buffers;
-    vectorized(
-        #[inline(always)]
-        || {
-            with_size!(n, |n| {
-                let matrix = &mut matrix[..n * n];
-                gather(matrices, n * n, start, matrix);
-                let u = if vectors.is_empty() { &mut [][..] } else { &mut factor[..n * n] };
-                let exponents = jacobi::rescale(matrix);
-                jacobi::diagonalize(n, matrix, u);
-                jacobi::sorted(n, matrix, &exponents, u, rhs);
-                scatter(rhs, values, n, start);
-                if !vectors.is_empty() {
-                    scatter(u, vectors, n * n, start);
-                }
-            })
-        },
-    );
+    buffer: &mut Buffer<S>,
+) -> bool {
+    let batch = values.len() / n;
+    let alone = usize::from(batch % W == 1);
+    let finite = jacobi::decompose::<S, W>(n, matrices, values, vectors, (0, batch - alone), buffer);
+    jacobi::decompose::<S, 1>(n, matrices, values, vectors, (batch - alone, batch), buffer) & finite
 }

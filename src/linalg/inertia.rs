@@ -40,8 +40,10 @@ pub fn is_positive_definite<S: Scalar>(n: usize, matrix: &[S], scratch: &mut [S]
 /// Inertia of one symmetric `(n, n)` matrix from the pivots of `P M P^T = L D L^T` with complete pivoting, blocks of
 /// 1x1 and 2x2 (Bunch and Parlett 1971).
 ///
-/// Signs are right for every eigenvalue larger than rounding, zero diagonals and tiny pivots included; a remainder
-/// below `n eps max|M|` counts as zero. Reads the lower triangle; `scratch` holds `n^2` numbers.
+/// Signs are right for every eigenvalue larger than rounding, zero diagonals, tiny pivots and coordinates in units of
+/// very different size included: rows and columns are scaled to largest elements near 1 first, which leaves the inertia
+/// (Sylvester). A remainder below `2 n eps` of that counts as zero. Reads the lower triangle; `scratch` holds `n^2`
+/// numbers.
 ///
 /// # Errors
 /// [`LinalgError::Shape`]; [`LinalgError::NotFinite`] (row 0) for an infinity or a `NaN`.
@@ -65,6 +67,7 @@ pub fn inertia<S: Scalar>(n: usize, matrix: &[S], scratch: &mut [S]) -> Result<I
     // Near 1: products of pivots neither overflow nor vanish.
     let exponent = largest.ilogb();
     a.iter_mut().for_each(|x| *x = x.ldexp(-exponent));
+    balance(n, a);
     let floor = S::EPSILON * S::of_f64(2.0 * n as f64);
     // (1 + sqrt 17) / 8 bounds the growth.
     let alpha = (one + S::of_f64(17.0).sqrt()) / S::of_f64(8.0);
@@ -124,6 +127,36 @@ pub fn inertia<S: Scalar>(n: usize, matrix: &[S], scratch: &mut [S]) -> Result<I
         }
     }
     Ok(found)
+}
+
+/// Scales of very different size are brought together within this many rounds, which halve their exponents.
+const ROUNDS: usize = 16;
+
+/// Multiplies rows and columns of a symmetric matrix, in its lower triangle, by powers of two until the largest element
+/// of each row is near 1 (Ruiz 2001, one row after the other).
+fn balance<S: Scalar>(n: usize, a: &mut [S]) {
+    let zero = <S as Real>::zero();
+    let lowest = S::MIN_POSITIVE.ilogb();
+    for _ in 0..ROUNDS {
+        let mut balanced = true;
+        for i in 0..n {
+            let place = |j: usize| if j < i { i * n + j } else { j * n + i };
+            let size = (0..n).map(|j| a[place(j)].abs()).fold(zero, |m, x| if x > m { x } else { m });
+            let shift = if size == zero { 0 } else { size.ilogb().max(lowest).div_euclid(2) };
+            if shift == 0 {
+                continue;
+            }
+            balanced = false;
+            let factor = <S as Real>::one().ldexp(-shift);
+            for j in 0..n {
+                a[place(j)] *= factor;
+            }
+            a[i * n + i] *= factor;
+        }
+        if balanced {
+            break;
+        }
+    }
 }
 
 /// Exchanges rows and columns `i <= j` of a symmetric matrix in its lower triangle.

@@ -8,16 +8,17 @@
 mod batch;
 mod condition;
 mod eigh;
+mod elimination;
 mod error;
 mod inertia;
 mod inverse;
 mod jacobi;
 mod large;
-mod lu;
 mod matmul;
 mod minimum_norm;
 mod minors;
 mod solve;
+mod systems;
 
 pub use batch::{LANES, Workspace};
 pub use condition::condition_number;

@@ -1,0 +1,221 @@
+//! Batches of linear systems: one elimination for all rows, a second look at those that need it.
+
+use super::batch::{Aligned, LANES, Lane, Second, Workspace, with_size};
+use super::error::Failure;
+use super::{condition, elimination};
+use crate::scalar::{Real, Scalar, vectorized};
+
+/// A batch of systems `A X = B`.
+#[derive(Clone, Copy)]
+pub(super) struct Systems<'a, S> {
+    /// Size of a matrix.
+    pub n: usize,
+    /// Right-hand sides per matrix.
+    pub m: usize,
+    /// `(batch, n, n)`.
+    pub matrices: &'a [S],
+    /// `(batch, n, m)`; the identity if not given, `m = n`, and `X` is made symmetric.
+    pub right: Option<&'a [S]>,
+}
+
+/// Below this ratio of smallest pivot to largest element a solution is refined.
+const SMALL_PIVOT: f64 = 1.0 / 1024.0;
+/// Above this ratio of the largest element of the triangular factor to that of the matrix as well.
+const GROWTH: f64 = 4.0;
+
+/// Below this ratio of smallest pivot to largest element a matrix may be singular.
+fn suspicious<S: Scalar>(n: usize) -> S {
+    S::EPSILON * S::of_f64(1024.0 * (n * n) as f64)
+}
+
+impl<S: Scalar> Systems<'_, S> {
+    /// Solves all; `solutions` is `(batch, n, m)`, `NaN` in the rows that fail.
+    pub fn solve(&self, solutions: &mut [S], workspace: &mut Workspace<S>) {
+        workspace.clear_failures();
+        let batch = solutions.len() / (self.n * self.m).max(1);
+        if size_of::<S>() < size_of::<f64>() {
+            self.split::<{ 2 * LANES }>(batch, solutions, workspace);
+        } else {
+            self.split::<LANES>(batch, solutions, workspace);
+        }
+    }
+
+    /// In blocks of `W`, a single row at the end alone.
+    fn split<const W: usize>(&self, batch: usize, solutions: &mut [S], workspace: &mut Workspace<S>) {
+        let alone = usize::from(batch % W == 1);
+        self.blocks::<W>(0, batch - alone, solutions, workspace);
+        self.blocks::<1>(batch - alone, batch, solutions, workspace);
+    }
+
+    fn blocks<const W: usize>(&self, start: usize, end: usize, solutions: &mut [S], workspace: &mut Workspace<S>) {
+        if start == end {
+            return;
+        }
+        let &Self { n, m, matrices, right } = self;
+        let (buffer, second, failures) = workspace.parts();
+        let single = m == 1 && right.is_some();
+        vectorized(
+            #[inline(always)]
+            || {
+                if single {
+                    with_size!((S, W) n, buffer, |n| n * (n + 1), |system| {
+                        for start in (start..end).step_by(W) {
+                            let largest = elimination::load((n, 1), matrices, right, start, system);
+                            let pivots = elimination::solve((n, 1), system);
+                            if store((n, 1), system, &pivots, &largest, false, solutions, start) {
+                                self.look_again::<W>(solutions, start, second, failures);
+                            }
+                        }
+                    });
+                } else {
+                    with_size!((S, W) n, buffer, |n| n * (n + n), |system| {
+                        for start in (start..end).step_by(W) {
+                            let largest = elimination::load((n, n), matrices, right, start, system);
+                            let pivots = elimination::solve((n, n), system);
+                            if store((n, n), system, &pivots, &largest, right.is_none(), solutions, start) {
+                                self.look_again::<W>(solutions, start, second, failures);
+                            }
+                        }
+                    });
+                }
+            },
+        );
+    }
+
+    /// Solves rows `start..start + W` once more, with one step of iterative refinement where it is due, and finds out
+    /// which matrices are singular.
+    #[cold]
+    #[inline(never)]
+    fn look_again<const W: usize>(
+        &self,
+        solutions: &mut [S],
+        start: usize,
+        second: &mut Second<S>,
+        failures: &mut Vec<(usize, Failure)>,
+    ) {
+        let &Self { n, m, matrices, right } = self;
+        let mut doubtful = [false; W];
+        let Second { block, solution, dense } = second;
+        vectorized(
+            #[inline(always)]
+            || {
+                let (system, x) = (block.lanes::<W>(n * (n + m)), solution.lanes::<W>(n * m));
+                let largest = elimination::load((n, m), matrices, right, start, system);
+                let pivots = elimination::solve((n, m), system);
+                for (e, x) in x.iter_mut().enumerate() {
+                    *x = system[e / m * (n + m) + n + e % m];
+                }
+                elimination::load((n, m), matrices, right, start, system);
+                elimination::residual((n, m), system, x);
+                elimination::solve((n, m), system);
+                let due = refinement_due(&pivots, &largest);
+                let floor = suspicious::<S>(n);
+                for (e, x) in x.iter().enumerate() {
+                    let step = &mut system[e / m * (n + m) + n + e % m];
+                    for l in 0..W {
+                        let refined: S = x[l] + step[l];
+                        step[l] = if due[l] { refined } else { x[l] };
+                    }
+                }
+                let probe = finish((n, m), system, right.is_none(), solutions, start);
+                for l in 0..W {
+                    let regular = pivots.smallest[l] > floor * largest[l];
+                    doubtful[l] = !(regular && probe[l] == <S as Real>::zero());
+                }
+            },
+        );
+        for row in (start..matrices.len() / (n * n)).take(W).filter(|row| doubtful[row - start]) {
+            let x = &mut solutions[row * n * m..(row + 1) * n * m];
+            if let Some(failure) = examine(n, &matrices[row * n * n..(row + 1) * n * n], x, dense) {
+                x.fill(S::NAN);
+                failures.push((row, failure));
+            }
+        }
+    }
+}
+
+/// Which lanes have pivots or a growth of elements that cost digits, or no solution.
+#[inline(always)]
+fn refinement_due<S: Scalar, const W: usize>(pivots: &elimination::Pivots<S, W>, largest: &Lane<S, W>) -> [bool; W] {
+    let (small, growth) = (S::of_f64(SMALL_PIVOT), S::of_f64(GROWTH));
+    let mut due = [false; W];
+    for l in 0..W {
+        let harmless = (pivots.smallest[l] > small * largest[l]) & (pivots.growth[l] <= growth * largest[l]);
+        due[l] = !harmless;
+    }
+    due
+}
+
+/// Writes the solutions out; whether a row needs a second look.
+#[inline(always)]
+fn store<S: Scalar, const W: usize>(
+    shape: (usize, usize),
+    system: &mut [Lane<S, W>],
+    pivots: &elimination::Pivots<S, W>,
+    largest: &Lane<S, W>,
+    symmetric: bool,
+    solutions: &mut [S],
+    start: usize,
+) -> bool {
+    let probe = finish(shape, system, symmetric, solutions, start);
+    let due = refinement_due(pivots, largest);
+    let mut again = false;
+    for l in 0..W {
+        again |= due[l] | (probe[l] != <S as Real>::zero());
+    }
+    again
+}
+
+/// Writes the solutions of a block out; returns zero where all of a solution is finite, `NaN` otherwise.
+#[inline(always)]
+fn finish<S: Scalar, const W: usize>(
+    (n, m): (usize, usize),
+    system: &mut [Lane<S, W>],
+    symmetric: bool,
+    solutions: &mut [S],
+    start: usize,
+) -> Lane<S, W> {
+    let width = n + m;
+    let system = &mut system[..n * width];
+    let zero = <S as Real>::zero();
+    let mut probe = [zero; W];
+    if symmetric {
+        for i in 0..n {
+            for j in 0..i {
+                let (x, mut mean) = (system[i * width + n + j], system[j * width + n + i]);
+                for l in 0..W {
+                    mean[l] = (mean[l] + x[l]) * S::half();
+                }
+                system[i * width + n + j] = mean;
+                system[j * width + n + i] = mean;
+            }
+        }
+    }
+    for i in 0..n {
+        for c in 0..m {
+            let x = system[i * width + n + c];
+            for l in 0..W {
+                probe[l] += x[l] * zero;
+            }
+        }
+    }
+    for (l, row) in solutions[start * n * m..].chunks_exact_mut(n * m).take(W).enumerate() {
+        for i in 0..n {
+            for c in 0..m {
+                row[i * m + c] = system[i * width + n + c][l];
+            }
+        }
+    }
+    probe
+}
+
+/// The verdict on a matrix with a small pivot or a solution that is not finite.
+fn examine<S: Scalar>(n: usize, matrix: &[S], x: &[S], scratch: &mut super::batch::Dense<S>) -> Option<Failure> {
+    if matrix.iter().any(|m| !m.is_finite()) {
+        return Some(Failure::NotFinite);
+    }
+    if condition::is_singular(n, matrix, scratch) {
+        return Some(Failure::Singular { condition: condition::condition_2(n, matrix, scratch) });
+    }
+    x.iter().any(|x| !x.is_finite()).then_some(Failure::NotFinite)
+}
