@@ -169,7 +169,7 @@ mod tests {
     fn motions_together_are_the_motions_alone() {
         let system = configure::<f64>("double-pendulum", &[]).unwrap().build().unwrap();
         for method in [Method::Dopri5, Method::Dop853, Method::Gauss4, Method::Variational] {
-            let options = Options { method, step: 0.01, ..Options::new(2.0, 0.1) };
+            let options = Options { method, step: Some(0.01), ..Options::new(2.0, 0.1) };
             let alone = rollout_many(&*system, &starts(11), &options, 2);
             for threads in [1, 3] {
                 assert_eq!(rollout_together(&*system, &starts(11), &options, threads), alone);
