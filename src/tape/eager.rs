@@ -26,20 +26,15 @@ impl<T: Real> Node<T> {
     fn new(arguments: u64, da: T, db: T) -> Self {
         Self { arguments: Cell::new(arguments), da: Cell::new(da), db: Cell::new(db) }
     }
+    /// The nodes that it depends on.
+    #[inline(always)]
+    fn arguments(&self) -> (usize, usize) {
+        let both = self.arguments.get();
+        (both as u32 as usize, (both >> 32) as usize)
+    }
     /// What room is filled with.
     fn empty() -> Self {
         Self::new(0, T::zero(), T::zero())
-    }
-    /// The weight of the node goes to its arguments, which precede it: `values` are the adjoints of all nodes before.
-    /// Identifier 0 is a sink that nobody reads: cheaper than a branch.
-    #[inline(always)]
-    fn propagate(&self, weight: T, values: &mut [T]) {
-        if weight.is_exact_zero() {
-            return;
-        }
-        let arguments = self.arguments.get();
-        values[arguments as u32 as usize] += self.da.get() * weight;
-        values[(arguments >> 32) as usize] += self.db.get() * weight;
     }
 }
 
@@ -62,13 +57,34 @@ pub struct Tape<T> {
 /// Room of a new tape, in nodes.
 const FIRST_ROOM: u32 = 128;
 
-/// Sweeps nodes, the last one first. `values` are the adjoints up to the last one; answers with those before the
-/// first one.
+/// Sweeps nodes, the last one first: the weight of each goes to its arguments, which precede it. `values` are the
+/// adjoints up to the last node; answers with those before the first one.
+///
+/// Arguments were mostly recorded just before, so the next weight is handed on in a register where it was just
+/// computed: a number read back from memory right after it was written would cost more than everything else here.
+/// Identifier 0 is a sink that nobody reads: cheaper than a branch.
 #[inline]
 fn sweep<'a, T: Real>(nodes: &[Node<T>], mut values: &'a mut [T]) -> &'a mut [T] {
+    let Some(&(mut weight)) = values.last() else { return values };
     for node in nodes.iter().rev() {
-        let Some((weight, before)) = values.split_last_mut() else { return &mut [] };
-        node.propagate(*weight, before);
+        let Some((_, before)) = values.split_last_mut() else { return &mut [] };
+        let Some(next) = before.len().checked_sub(1) else { return before };
+        if weight.is_exact_zero() {
+            weight = before[next];
+        } else {
+            let (a, b) = node.arguments();
+            let first = before[a] + node.da.get() * weight;
+            before[a] = first;
+            let second = before[b] + node.db.get() * weight;
+            before[b] = second;
+            weight = if b == next {
+                second
+            } else if a == next {
+                first
+            } else {
+                before[next]
+            };
+        }
         values = before;
     }
     values

@@ -136,14 +136,24 @@ impl<T: Real> Add for Var<'_, T> {
     type Output = Self;
     #[inline(always)]
     fn add(self, other: Self) -> Self {
-        self.binary(other, self.value + other.value, || (T::one(), T::one()))
+        self.binary(
+            other,
+            self.value + other.value,
+            #[inline(always)]
+            || (T::one(), T::one()),
+        )
     }
 }
 impl<T: Real> Sub for Var<'_, T> {
     type Output = Self;
     #[inline(always)]
     fn sub(self, other: Self) -> Self {
-        self.binary(other, self.value - other.value, || (T::one(), -T::one()))
+        self.binary(
+            other,
+            self.value - other.value,
+            #[inline(always)]
+            || (T::one(), -T::one()),
+        )
     }
 }
 impl<T: Real> Mul for Var<'_, T> {
@@ -154,7 +164,12 @@ impl<T: Real> Mul for Var<'_, T> {
         match (self.tape, other.tape) {
             (Some(_), None) => self.scaled(other.value, value),
             (None, Some(_)) => other.scaled(self.value, value),
-            _ => self.binary(other, value, || (other.value, self.value)),
+            _ => self.binary(
+                other,
+                value,
+                #[inline(always)]
+                || (other.value, self.value),
+            ),
         }
     }
 }
@@ -233,9 +248,12 @@ impl<T: Real> Real for Var<'_, T> {
             return Self::not_a_number();
         }
         let c = self.value;
-        a.binary(b, c.select(a.value, b.value), || {
-            (c.select(T::one(), T::zero()), c.select(T::zero(), T::one()))
-        })
+        a.binary(
+            b,
+            c.select(a.value, b.value),
+            #[inline(always)]
+            || (c.select(T::one(), T::zero()), c.select(T::zero(), T::one())),
+        )
     }
     #[inline]
     fn sin_cos(self) -> (Self, Self) {
