@@ -1,22 +1,57 @@
 //! Euler-Lagrange terms of hand-written systems: states per second, against num-dual's Hessian of the same Lagrangian.
 
+#[path = "shared/ratio.rs"]
+mod ratio;
+
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use lnn::lagrangian::{self, Request, Terms};
+use lnn::scalar::Scalar;
 use nalgebra_of_num_dual::SVector;
-use num_dual::{Dual2SVec64, DualNum, hessian};
+use num_dual::{Dual2SVec32, Dual2SVec64, DualNum, hessian};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::hint::black_box;
 use std::time::Duration;
 
-/// The double pendulum's Lagrangian over num-dual's numbers, unit masses and lengths.
-fn double_pendulum(x: &SVector<Dual2SVec64<4>, 4>) -> Dual2SVec64<4> {
-    let (u, w) = (x[2], x[3]);
-    let kinetic = u * u + w * w * 0.5 + u * w * (x[0] - x[1]).cos();
-    kinetic + (x[0].cos() * 2.0 + x[1].cos()) * 9.8
+/// The double pendulum's Lagrangian over num-dual's numbers, unit masses and lengths, and all its second derivatives.
+macro_rules! num_dual_hessian {
+    ($name:ident, $float:ty, $number:ty) => {
+        fn $name(q: &[$float], v: &[$float]) {
+            let lagrangian = |x: &SVector<$number, 4>| {
+                let (u, w) = (x[2], x[3]);
+                let kinetic = u * u + w * w * 0.5 + u * w * (x[0] - x[1]).cos();
+                kinetic + (x[0].cos() * 2.0 + x[1].cos()) * 9.8
+            };
+            let x = SVector::from([q[0], q[1], v[0], v[1]]);
+            black_box(hessian(|x| lagrangian(&x), &black_box(x)));
+        }
+    };
+}
+num_dual_hessian!(hessian_f32, f32, Dual2SVec32<4>);
+num_dual_hessian!(hessian_f64, f64, Dual2SVec64<4>);
+
+/// The double pendulum's terms against the Hessian of its Lagrangian, one state at a time, in the same run.
+fn ratios<S: Scalar>(one: fn(&[S], &[S])) {
+    let batch = 1024;
+    let built = lagrangian::build::<S>("double-pendulum", &[]).expect("the defaults are valid");
+    let numbers =
+        |shift: f64| -> Vec<S> { (0..2 * batch).map(|i| S::of_f64((shift + 0.7391 * i as f64).sin() * 2.0)).collect() };
+    let (q, v) = (numbers(0.1), numbers(0.7));
+    let mut terms = Terms::default();
+    for (name, request) in [
+        ("mass matrix and coriolis term", Request::MASS_MATRIX | Request::CORIOLIS),
+        ("acceleration", Request::ACCELERATION),
+    ] {
+        let batched = || built.terms(black_box(&q), &v, request, &mut terms).expect("regular states");
+        let each = || q.chunks_exact(2).zip(v.chunks_exact(2)).for_each(|(q, v)| one(q, v));
+        let name = format!("double pendulum, {}, {name}, num-dual's Hessian", S::NAME);
+        ratio::compare(&name, batch, "at least 3", batched, each);
+    }
 }
 
 fn benches(c: &mut Criterion) {
+    ratios::<f32>(hessian_f32);
+    ratios::<f64>(hessian_f64);
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     for system in lagrangian::systems() {
         let n = system.size.default();
@@ -45,10 +80,7 @@ fn benches(c: &mut Criterion) {
             if system.name == "double-pendulum" {
                 group.bench_function(BenchmarkId::new("num-dual hessian", batch), |b| {
                     b.iter(|| {
-                        for (q, v) in q.chunks_exact(2).zip(v.chunks_exact(2)) {
-                            let x = SVector::from([q[0], q[1], v[0], v[1]]);
-                            black_box(hessian(|x| double_pendulum(&x), &black_box(x)));
-                        }
+                        q.chunks_exact(2).zip(v.chunks_exact(2)).for_each(|(q, v)| hessian_f64(q, v));
                     });
                 });
             }

@@ -1,5 +1,8 @@
 //! Speed of the tapes: nanoseconds per node, gradients of the double pendulum's acceleration error.
 
+#[path = "shared/ratio.rs"]
+mod ratio;
+
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use lnn::forward::Jet2;
 use lnn::scalar::{Dd, Real, Scalar};
@@ -64,6 +67,59 @@ fn nodes(c: &mut Criterion) {
     group.finish();
 }
 
+/// Sum of the errors of all states as numbers on a tape.
+fn recorded<'t, S: Scalar>(p: &[Var<'t, S>], data: &[S]) -> Var<'t, S> {
+    let mut sum = Var::zero();
+    for row in data.chunks(6) {
+        let z: [Var<'_, S>; 6] = std::array::from_fn(|i| Var::lift(row[i]));
+        sum += error(p, &z[..4], &z[4..]);
+    }
+    sum
+}
+
+/// The same in floats.
+fn plain<S: Scalar>(p: &[S], data: &[S]) -> S {
+    data.chunks(6).fold(S::of_f64(0.0), |sum, row| sum + error(p, &row[..4], &row[4..]))
+}
+
+/// Gradients and values against each other in the same run.
+fn ratios<S: Scalar>(_: &mut Criterion) {
+    let parameters = PARAMETERS.map(S::of_f64);
+    let (mut tape, mut adjoints) = (Tape::<S>::new(), Adjoints::new());
+    for count in [100, 1024] {
+        let data = states::<S>(count);
+        let name = |what: &str| format!("double pendulum error, {}, {count} states, {what}", S::NAME);
+        let mut eager = || {
+            tape.reset();
+            let p = black_box(parameters).map(|p| tape.variable(p));
+            tape.reverse(recorded(&p, &data), &mut adjoints).unwrap();
+            black_box(p.map(|p| adjoints.of(p)));
+        };
+        let value = || {
+            black_box(plain(black_box(&parameters), &data));
+        };
+        ratio::compare(&name("floats, eager gradient"), count, "at most 5", value, &mut eager);
+        let program = Program::<S>::record(6, 5, |_, x, p| vec![error(p, &x[..4], &x[4..])]).unwrap();
+        let mut replay = Replay::new(Arc::new(program));
+        let (mut y, w, mut dp) = (vec![S::of_f64(0.0); count], vec![S::of_f64(1.0); count], [S::of_f64(0.0); 5]);
+        let lanes = || {
+            replay.forward(count, &data, black_box(&parameters), &mut y).unwrap();
+            replay.reverse_parameters(&w, &mut dp).unwrap();
+            black_box(dp);
+        };
+        ratio::compare(&name("gradient by lanes, eager gradient"), count, "at least 3", lanes, &mut eager);
+        let lanes = || {
+            replay.evaluate(count, &[&data], black_box(&parameters), &mut [&mut y]).unwrap();
+            black_box(&y);
+        };
+        ratio::compare(&name("value by lanes, floats"), count, "at least 1.7", lanes, value);
+        tape.reset();
+        let p = parameters.map(|p| tape.variable(p));
+        black_box(recorded(&p, &data).value());
+        println!("{}: {}", name("nodes"), tape.statistics().nodes);
+    }
+}
+
 fn pendulum<S: Scalar>(c: &mut Criterion) {
     let mut group = c.benchmark_group(format!("double pendulum acceleration error, {}", S::NAME));
     let parameters = PARAMETERS.map(S::of_f64);
@@ -71,22 +127,14 @@ fn pendulum<S: Scalar>(c: &mut Criterion) {
         let data = states::<S>(count);
         group.throughput(Throughput::Elements(count as u64));
         group.bench_function(BenchmarkId::new("value, floats", count), |b| {
-            b.iter(|| {
-                let p = black_box(&parameters);
-                data.chunks(6).fold(S::of_f64(0.0), |sum, row| sum + error(p, &row[..4], &row[4..]))
-            });
+            b.iter(|| plain(black_box(&parameters), &data));
         });
         let (mut tape, mut adjoints) = (Tape::<S>::new(), Adjoints::new());
         group.bench_function(BenchmarkId::new("gradient, eager tape", count), |b| {
             b.iter(|| {
                 tape.reset();
                 let p = black_box(parameters).map(|p| tape.variable(p));
-                let mut sum = Var::zero();
-                for row in data.chunks(6) {
-                    let z: [Var<'_, S>; 6] = std::array::from_fn(|i| Var::lift(row[i]));
-                    sum += error(&p, &z[..4], &z[4..]);
-                }
-                tape.reverse(sum, &mut adjoints).unwrap();
+                tape.reverse(recorded(&p, &data), &mut adjoints).unwrap();
                 p.map(|p| adjoints.of(p))
             });
         });
@@ -95,7 +143,7 @@ fn pendulum<S: Scalar>(c: &mut Criterion) {
         let (mut y, w) = (vec![S::of_f64(0.0); count], vec![S::of_f64(1.0); count]);
         let (mut dx, mut dp) = (vec![S::of_f64(0.0); 6 * count], [S::of_f64(0.0); 5]);
         group.bench_function(BenchmarkId::new("value, lanes", count), |b| {
-            b.iter(|| replay.forward(count, &data, black_box(&parameters), &mut y).unwrap());
+            b.iter(|| replay.evaluate(count, &[&data], black_box(&parameters), &mut [&mut y]).unwrap());
         });
         group.bench_function(BenchmarkId::new("gradient, lanes", count), |b| {
             b.iter(|| {
@@ -154,5 +202,14 @@ fn second_order(c: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, nodes, pendulum::<f32>, pendulum::<f64>, pendulum::<Dd>, second_order);
+criterion_group!(
+    benches,
+    ratios::<f32>,
+    ratios::<f64>,
+    nodes,
+    pendulum::<f32>,
+    pendulum::<f64>,
+    pendulum::<Dd>,
+    second_order
+);
 criterion_main!(benches);

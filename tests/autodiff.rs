@@ -287,6 +287,42 @@ fn constants_are_not_recorded() {
 }
 
 #[test]
+fn functions_of_one_variable_are_not_recorded() {
+    let tape = Tape::<f64>::new();
+    let mut adjoints = Adjoints::new();
+    let x = tape.variable(0.5);
+    let scaled = Var::from_f64(3.0) - x * Var::from_f64(4.0);
+    let y = -(scaled.sqr() / Var::from_f64(2.0)).exp();
+    assert_eq!((y.id(), tape.statistics().nodes), (x.id(), 1));
+    // d/dx -exp((3 - 4x)^2 / 2) = 4 (3 - 4x) exp((3 - 4x)^2 / 2).
+    tape.reverse(y, &mut adjoints).unwrap();
+    assert_eq!(adjoints.of(x), 4.0 * 0.5f64.exp());
+    // A number that is no node has no adjoint; one that differs by a constant has that of its node.
+    assert!(adjoints.of(scaled).is_nan() && adjoints.of(y).is_nan());
+    assert_eq!(adjoints.of(x + Var::one()), adjoints.of(x));
+    // Both uses of a number find their way to its variable.
+    let z = tape.variable(2.0);
+    let product = scaled * (z * scaled);
+    assert_eq!(tape.statistics().nodes, 4);
+    tape.reverse(product, &mut adjoints).unwrap();
+    assert_eq!((adjoints.of(x), adjoints.of(z)), (2.0 * 2.0 * 1.0 * -4.0, 1.0));
+}
+
+#[test]
+fn a_zero_partial_derivative_hides_an_infinite_slope() {
+    let tape = Tape::<f64>::new();
+    let mut adjoints = Adjoints::new();
+    let (x, y) = (tape.variable(0.0), tape.variable(3.0));
+    let root = x.sqrt();
+    for hidden in [x.select(root, y), y * root.sqr() + y, root.sqr() + y, Var::max(root, y)] {
+        tape.reverse(hidden, &mut adjoints).unwrap();
+        assert_eq!((adjoints.of(x), adjoints.of(y)), (0.0, 1.0), "{hidden:?}");
+    }
+    tape.reverse(root * y, &mut adjoints).unwrap();
+    assert_eq!((adjoints.of(x), adjoints.of(y)), (f64::INFINITY, 0.0));
+}
+
+#[test]
 fn mixed_tapes_are_refused_by_both() {
     let (first, second) = (Tape::<f64>::new(), Tape::<f64>::new());
     let (a, b) = (first.variable(1.0), second.variable(2.0));
@@ -303,7 +339,7 @@ fn mixed_tapes_are_refused_by_both() {
 fn a_full_tape_says_so() {
     let tape = Tape::<f64>::with_limit(4);
     let x = tape.variable(1.0);
-    let y = (x.sin() * x).exp();
+    let y = (x.sin() * x * x * x).exp();
     assert!(y.value().is_nan());
     assert_eq!(tape.check(), Err(TapeError::Full { limit: 4 }));
 }

@@ -289,3 +289,32 @@ fn eigenvector_adjoints_agree_with_differences_in_double_double() {
         assert!((difference - dx[i]).to_f64().abs() < 1e-13, "{i}: {difference:?} {:?}", dx[i]);
     }
 }
+
+#[test]
+fn fields_give_what_rows_give() {
+    // Three inputs from two fields, three outputs to two fields and one that is left out; a chunk and a part of one.
+    let lanes = 70;
+    let program = Program::<f64>::record(3, 2, |_, x, p| vec![x[0] * p[0] + x[2], x[1].sin() * p[1], p[0]]).unwrap();
+    let (rows, p) = (numbers::<f64>(3 * lanes, 21), numbers::<f64>(2, 22));
+    let column = |from: usize, width: usize| -> Vec<f64> {
+        rows.chunks(3).flat_map(|row| row[from..from + width].to_vec()).collect()
+    };
+    let (first, second) = (column(0, 1), column(1, 2));
+    let mut replay = Replay::new(Arc::new(program));
+    let mut want = vec![0.0; 3 * lanes];
+    replay.forward(lanes, &rows, &p, &mut want).unwrap();
+    let (mut a, mut b) = (vec![0.0; 2 * lanes], vec![0.0; lanes]);
+    replay.evaluate(lanes, &[&first, &second], &p, &mut [&mut a, &mut [], &mut b]).unwrap();
+    for (lane, row) in want.chunks(3).enumerate() {
+        assert_eq!(
+            [a[2 * lane], a[2 * lane + 1], b[lane]].map(f64::to_bits),
+            [row[0], row[1], row[2]].map(f64::to_bits)
+        );
+    }
+    // Nothing is kept for a reverse replay.
+    assert_eq!(replay.reverse_parameters(&want, &mut [0.0; 2]), Err(TapeError::NoForward));
+    let short = replay.evaluate(lanes, &[&first], &p, &mut [&mut a, &mut b]);
+    assert_eq!(short, Err(TapeError::Shape { what: "inputs of a state", expected: 3, found: 1 }));
+    let ragged = replay.evaluate(lanes, &[&rows], &p, &mut [&mut a, &mut b[1..]]);
+    assert_eq!(ragged, Err(TapeError::Shape { what: "outputs of a state", expected: 3, found: 2 }));
+}

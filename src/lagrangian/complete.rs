@@ -72,9 +72,7 @@ impl<S: Scalar> Terms<S> {
         ];
         let foreign = fields
             .into_iter()
-            .filter_map(|(what, field, width)| {
-                field.iter().position(|x| !x.is_finite()).map(|at| (at / width.max(1), what))
-            })
+            .filter_map(|(what, field, width)| first_not_finite(field).map(|at| (at / width.max(1), what)))
             .min_by_key(|&(row, _)| row);
         match (foreign, first) {
             (None, None) => Ok(()),
@@ -86,6 +84,14 @@ impl<S: Scalar> Terms<S> {
             (Some((row, what)), None) => Err(MechanicsError::NotFinite { row, what }),
         }
     }
+}
+
+/// Where the first number stands that is not finite; whole blocks are looked at side by side.
+fn first_not_finite<S: Scalar>(field: &[S]) -> Option<usize> {
+    const BLOCK: usize = 64;
+    let all_finite = |block: &[S]| block.iter().fold(true, |all, x| all & x.is_finite());
+    let start = BLOCK * field.chunks(BLOCK).position(|block| !all_finite(block))?;
+    field[start..].iter().position(|x| !x.is_finite()).map(|at| start + at)
 }
 
 /// One coordinate: `a = f / M`; the first row that fails.

@@ -30,8 +30,6 @@ pub struct HandWritten<L, S> {
 #[derive(Debug, Default)]
 struct Scratch<S> {
     workspace: Workspace<S>,
-    inputs: Vec<S>,
-    outputs: Vec<S>,
     replays: Vec<(usize, Replay<S>)>,
 }
 
@@ -60,44 +58,15 @@ impl<L: Lagrangian, S: Scalar> HandWritten<L, S> {
     /// Fills the needed fields of a batch by replaying a program; whether that was possible.
     fn replay(&self, n: usize, q: &[S], v: &[S], need: Need, terms: &mut Terms<S>, scratch: &mut Scratch<S>) -> bool {
         let Some(program) = self.program(need) else { return false };
-        let batch = q.len() / n;
-        let Scratch { inputs, outputs, replays, .. } = scratch;
-        inputs.clear();
-        for (q, v) in q.chunks_exact(n).zip(v.chunks_exact(n)) {
-            inputs.extend_from_slice(q);
-            inputs.extend_from_slice(v);
-        }
-        let width = program.outputs();
-        outputs.clear();
-        outputs.resize(batch * width, S::NAN);
-        let index = need.index();
+        let (index, replays) = (need.index(), &mut scratch.replays);
         let at = replays.iter().position(|(i, _)| *i == index).unwrap_or_else(|| {
             replays.push((index, Replay::new(program)));
             replays.len() - 1
         });
-        if replays[at].1.forward(batch, inputs, &self.parameters, outputs).is_err() {
-            return false;
-        }
-        for (row, state) in outputs.chunks_exact(width.max(1)).enumerate() {
-            let mut next = state.iter().copied();
-            let mut fill = |field: &mut [S]| field.iter_mut().zip(&mut next).for_each(|(x, y)| *x = y);
-            if need.lagrangian {
-                fill(&mut terms.lagrangian[row..=row]);
-            }
-            if need.momentum {
-                fill(&mut terms.momentum[row * n..(row + 1) * n]);
-            }
-            if need.dl_dq {
-                fill(&mut terms.dl_dq[row * n..(row + 1) * n]);
-            }
-            if need.mass_matrix {
-                fill(&mut terms.mass_matrix[row * n * n..(row + 1) * n * n]);
-            }
-            if need.coriolis {
-                fill(&mut terms.coriolis[row * n..(row + 1) * n]);
-            }
-        }
-        true
+        // The order of the recording; what is not needed is empty.
+        let Terms { lagrangian, momentum, dl_dq, mass_matrix, coriolis, .. } = terms;
+        let outputs: &mut [&mut [S]] = &mut [lagrangian, momentum, dl_dq, mass_matrix, coriolis];
+        replays[at].1.evaluate(q.len() / n, &[q, v], &self.parameters, outputs).is_ok()
     }
 
     fn compute(
@@ -118,7 +87,9 @@ impl<L: Lagrangian, S: Scalar> HandWritten<L, S> {
             return Err(shape("velocities", v.len()));
         }
         let need = Need::of(request);
-        terms.clear();
+        terms.acceleration.clear();
+        terms.energy.clear();
+        // Whatever is needed is overwritten below.
         let size = |needed: bool, width: usize| if needed { batch * width } else { 0 };
         terms.lagrangian.resize(size(need.lagrangian, 1), S::NAN);
         terms.momentum.resize(size(need.momentum, n), S::NAN);

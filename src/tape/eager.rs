@@ -2,41 +2,39 @@
 
 use super::error::TapeError;
 use super::var::Var;
-use crate::scalar::Real;
+use crate::scalar::{Real, Scalar};
 use std::cell::{Cell, RefCell};
 
-/// One recorded operation: up to two arguments and the partial derivatives by them (24 bytes for `f64`).
-#[derive(Clone, Copy)]
+/// One recorded operation: two arguments and the partial derivatives by them (24 bytes for `f64`).
+///
+/// Its parts are stored one by one: a copy of the whole passes through the stack, where a wide load of numbers just
+/// stored in halves stalls.
 struct Node<T> {
-    a: u32,
-    b: u32,
-    da: T,
-    db: T,
-}
-
-/// Room for a node. Its parts are stored one by one: a copy of the whole passes through the stack, where a wide load
-/// of numbers just stored in halves stalls.
-struct Place<T> {
-    a: Cell<u32>,
-    b: Cell<u32>,
+    /// First argument in the low half, second in the high half.
+    arguments: Cell<u64>,
     da: Cell<T>,
     db: Cell<T>,
 }
 
-impl<T: Real> Place<T> {
+/// Both arguments in one number.
+#[inline(always)]
+fn packed(a: u32, b: u32) -> u64 {
+    u64::from(a) | u64::from(b) << 32
+}
+
+impl<T: Real> Node<T> {
+    fn new(arguments: u64, da: T, db: T) -> Self {
+        Self { arguments: Cell::new(arguments), da: Cell::new(da), db: Cell::new(db) }
+    }
+    /// The nodes that it depends on.
+    #[inline(always)]
+    fn arguments(&self) -> (usize, usize) {
+        let both = self.arguments.get();
+        (both as u32 as usize, (both >> 32) as usize)
+    }
+    /// What room is filled with.
     fn empty() -> Self {
-        Self { a: Cell::new(0), b: Cell::new(0), da: Cell::new(T::zero()), db: Cell::new(T::zero()) }
-    }
-    #[inline(always)]
-    fn set(&self, node: Node<T>) {
-        self.a.set(node.a);
-        self.b.set(node.b);
-        self.da.set(node.da);
-        self.db.set(node.db);
-    }
-    #[inline(always)]
-    fn get(&self) -> Node<T> {
-        Node { a: self.a.get(), b: self.b.get(), da: self.da.get(), db: self.db.get() }
+        Self::new(0, T::zero(), T::zero())
     }
 }
 
@@ -45,8 +43,8 @@ impl<T: Real> Place<T> {
 ///
 /// Identifier 0 stands for constants, which are never recorded.
 pub struct Tape<T> {
-    /// Nodes `0..room`, written through shared references: recording is a comparison and two stores.
-    room: Vec<Place<T>>,
+    /// Nodes `0..room`, written through shared references: recording is a comparison and four stores.
+    room: Vec<Node<T>>,
     /// Nodes from `room` on; the next reset makes room for as many.
     overflow: RefCell<Vec<Node<T>>>,
     /// Nodes recorded, the constant at 0 included.
@@ -59,16 +57,37 @@ pub struct Tape<T> {
 /// Room of a new tape, in nodes.
 const FIRST_ROOM: u32 = 128;
 
-/// One step of the sweep: the weight of a node goes to its arguments.
-#[inline(always)]
-fn propagate<T: Real>(values: &mut [T], index: usize, node: Node<T>) {
-    let weight = values[index];
-    if weight.is_exact_zero() {
-        return;
+/// Sweeps nodes, the last one first: the weight of each goes to its arguments, which precede it. `values` are the
+/// adjoints up to the last node; answers with those before the first one.
+///
+/// Arguments were mostly recorded just before, so the next weight is handed on in a register where it was just
+/// computed: a number read back from memory right after it was written would cost more than everything else here.
+/// Identifier 0 is a sink that nobody reads: cheaper than a branch.
+#[inline]
+fn sweep<'a, T: Real>(nodes: &[Node<T>], mut values: &'a mut [T]) -> &'a mut [T] {
+    let Some(&(mut weight)) = values.last() else { return values };
+    for node in nodes.iter().rev() {
+        let Some((_, before)) = values.split_last_mut() else { return &mut [] };
+        let Some(next) = before.len().checked_sub(1) else { return before };
+        if weight.is_exact_zero() {
+            weight = before[next];
+        } else {
+            let (a, b) = node.arguments();
+            let first = before[a] + node.da.get() * weight;
+            before[a] = first;
+            let second = before[b] + node.db.get() * weight;
+            before[b] = second;
+            weight = if b == next {
+                second
+            } else if a == next {
+                first
+            } else {
+                before[next]
+            };
+        }
+        values = before;
     }
-    // Identifier 0 is a sink that nobody reads: cheaper than a branch.
-    values[node.a as usize] += node.da * weight;
-    values[node.b as usize] += node.db * weight;
+    values
 }
 
 /// Size of a tape.
@@ -114,7 +133,7 @@ impl<T: Real> Tape<T> {
     }
     /// Makes room for `count` nodes, at least the constant at 0.
     fn grow(&mut self, count: u32) {
-        self.room.resize_with(count.max(1) as usize, Place::empty);
+        self.room.resize_with(count.max(1) as usize, Node::empty);
     }
     /// A new independent variable.
     #[inline]
@@ -124,31 +143,41 @@ impl<T: Real> Tape<T> {
     /// Records an operation: arguments with the partial derivatives by them.
     #[inline(always)]
     pub(super) fn push(&self, value: T, (a, da): (u32, T), (b, db): (u32, T)) -> Var<'_, T> {
-        let (id, node) = (self.count.get(), Node { a, b, da, db });
-        let Some(place) = self.room.get(id as usize) else { return self.push_beyond(value, node) };
-        place.set(node);
+        let (id, arguments) = (self.count.get(), packed(a, b));
+        let Some(node) = self.room.get(id as usize) else {
+            // The cold call answers with a bare number: a variable would come back through memory, and the compiler
+            // would then keep every result there.
+            return match self.push_beyond(arguments, da, db) {
+                0 => Var::not_a_number(),
+                id => Var::recorded(self, id, value),
+            };
+        };
+        node.arguments.set(arguments);
+        node.da.set(da);
+        node.db.set(db);
         self.count.set(id + 1);
         Var::recorded(self, id, value)
     }
-    /// Records an operation past the room.
+    /// Records an operation past the room: its identifier, 0 if the tape is full.
     #[cold]
     #[inline(never)]
-    fn push_beyond(&self, value: T, node: Node<T>) -> Var<'_, T> {
+    fn push_beyond(&self, arguments: u64, da: T, db: T) -> u32 {
         let id = self.count.get();
         if id >= self.limit {
-            return self.fail(TapeError::Full { limit: self.limit });
+            self.latch(TapeError::Full { limit: self.limit });
+            return 0;
         }
-        self.overflow.borrow_mut().push(node);
+        self.overflow.borrow_mut().push(Node::new(arguments, da, db));
         self.count.set(id + 1);
-        Var::recorded(self, id, value)
+        id
     }
-    /// Keeps the first error and answers with `NaN`.
+    /// Keeps the first error.
     #[cold]
-    pub(super) fn fail<'a>(&self, error: TapeError) -> Var<'a, T> {
+    #[inline(never)]
+    pub(super) fn latch(&self, error: TapeError) {
         if self.error.get().is_none() {
             self.error.set(Some(error));
         }
-        Var::not_a_number()
     }
     /// The first error since the last reset.
     ///
@@ -173,17 +202,14 @@ impl<T: Real> Tape<T> {
             return Err(TapeError::Foreign);
         }
         let last = output.id() as usize;
-        let values = values.as_mut_slice();
-        values[last] = T::one();
         let room = self.room.len();
+        let values = &mut values[..=last];
+        values[last] = output.slope();
+        let mut before = values;
         if last >= room {
-            for (index, &node) in self.overflow.borrow()[..=last - room].iter().enumerate().rev() {
-                propagate(values, room + index, node);
-            }
+            before = sweep(&self.overflow.borrow()[..=last - room], before);
         }
-        for (index, node) in self.room[..room.min(last + 1)].iter().enumerate().skip(1).rev() {
-            propagate(values, index, node.get());
-        }
+        sweep(&self.room[1..room.min(last + 1)], before);
         Ok(())
     }
     /// Forgets everything recorded and any error, and keeps the memory: what was recorded once is recorded again
@@ -214,10 +240,14 @@ impl<T: Real> Adjoints<T> {
         Self { values: Vec::new() }
     }
     /// Derivative of the last sweep's output by `variable`; 0 for constants and for what was recorded later.
+    ///
+    /// Independent variables and results of operations on two variables have one. A result `f(x)` of one variable is
+    /// not recorded (its derivative is carried along with the number), so only `x` has: `NaN`, unless `f' = 1`.
     #[inline]
     pub fn of(&self, variable: Var<'_, T>) -> T {
         match variable.id() {
             0 => T::zero(),
+            _ if !(variable.slope() - T::one()).is_exact_zero() => T::constant(T::Scalar::NAN),
             id => self.values.get(id as usize).copied().unwrap_or_else(T::zero),
         }
     }

@@ -10,6 +10,13 @@
 //!   [`Real::select`](crate::scalar::Real::select) can. Block operations (affine maps, jets of activations, solves,
 //!   eigenvalues) carry their own adjoint rules.
 //!
+//! Memory of a [`Tape`] over numbers of `s` bytes: `8 + 2 s` bytes per node (24 for `f64`), of which there is one per
+//! variable and one per operation on two variables; functions of one variable, constant factors and constant summands
+//! need none. The sweep holds `s` bytes per node besides, in [`Adjoints`]. A reset keeps the memory and costs nothing per
+//! node (the one after a recording that outgrew the room allocates room for it); the next sweep clears one adjoint per
+//! node recorded, not per node held. A [`Replay`] holds `s` bytes per row, lane and chunk of [`LANES`] states for the
+//! values, those of one chunk for the adjoints; [`Replay::evaluate`] those of one chunk alone.
+//!
 //! In both, constants are never recorded, variables of two recordings never mix silently, and a zero adjoint times an
 //! infinite partial derivative contributes 0, so that a branch not taken leaves no `NaN`.
 

@@ -9,10 +9,16 @@ use std::fmt;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// A number on a [`Tape`], or a constant.
+///
+/// A function of one variable is not recorded: the number carries its derivative by the last recorded node along, so
+/// chains of such functions (negation, constant factors and summands, sines, powers) cost a product and no memory.
 #[derive(Clone, Copy)]
 pub struct Var<'t, T> {
     value: T,
-    id: u32,
+    /// Derivative of the value by the node `id`.
+    slope: T,
+    /// Node; 0 for constants. As wide as its neighbours, so that copies never load what was stored in parts.
+    id: usize,
     tape: Option<&'t Tape<T>>,
 }
 
@@ -26,12 +32,13 @@ impl<'t, T: Real> Var<'t, T> {
     /// A number without a tape.
     #[inline(always)]
     pub fn lift(value: T) -> Self {
-        Self { value, id: 0, tape: None }
+        Self { value, slope: T::zero(), id: 0, tape: None }
     }
     #[inline(always)]
     pub(super) fn recorded(tape: &'t Tape<T>, id: u32, value: T) -> Self {
-        Self { value, id, tape: Some(tape) }
+        Self { value, slope: T::one(), id: id as usize, tape: Some(tape) }
     }
+    #[inline(always)]
     pub(super) fn not_a_number() -> Self {
         Self::lift(T::constant(T::Scalar::NAN))
     }
@@ -40,44 +47,47 @@ impl<'t, T: Real> Var<'t, T> {
     pub fn value(self) -> T {
         self.value
     }
-    /// 0 for a constant.
+    /// The node that it is a function of; 0 for a constant.
     #[inline(always)]
     pub fn id(self) -> u32 {
-        self.id
+        self.id as u32
+    }
+    /// Derivative of the number by its node.
+    #[inline(always)]
+    pub(super) fn slope(self) -> T {
+        self.slope
     }
     #[inline(always)]
     pub(super) fn tape(self) -> Option<&'t Tape<T>> {
         self.tape
     }
-    /// Result of a function of one argument.
+    /// Result of a function of this number alone, with the partial derivative by it.
     #[inline(always)]
     fn unary(self, value: T, partial: T) -> Self {
-        match self.tape {
-            None => Self::lift(value),
-            Some(tape) => tape.push(value, (self.id, partial), (0, T::zero())),
-        }
+        Self { value, slope: chained(partial, self.slope), ..self }
     }
-    /// Result of a function of two arguments.
+    /// Result of a function of two arguments; only the partial derivatives that are needed are computed.
     #[inline(always)]
-    fn binary(self, other: Self, value: T, partials: (T, T)) -> Self {
-        let (da, db) = partials;
+    fn binary(self, other: Self, value: T, partials: impl FnOnce() -> (T, T)) -> Self {
         match (self.tape, other.tape) {
-            (Some(tape), Some(second)) if std::ptr::eq(tape, second) => tape.push(value, (self.id, da), (other.id, db)),
-            (Some(tape), Some(second)) => mixed(tape, second),
-            (Some(tape), None) => tape.push(value, (self.id, da), (0, T::zero())),
-            (None, Some(tape)) => tape.push(value, (other.id, db), (0, T::zero())),
             (None, None) => Self::lift(value),
+            (Some(_), None) => self.unary(value, partials().0),
+            (None, Some(_)) => other.unary(value, partials().1),
+            (Some(tape), Some(second)) => {
+                if !std::ptr::eq(tape, second) {
+                    mixed(tape, second);
+                    return Self::not_a_number();
+                }
+                let (da, db) = partials();
+                tape.push(value, (self.id(), chained(da, self.slope)), (other.id(), chained(db, other.slope)))
+            }
         }
     }
-    /// Product of a variable and a constant factor.
+    /// Product of a variable and a constant factor: a constant if the factor is exactly 0, unless the product is not 0
+    /// (`0 * inf`).
     #[inline(always)]
     fn scaled(self, factor: T, value: T) -> Self {
         if factor.is_exact_zero() && value.is_exact_zero() { Self::lift(value) } else { self.unary(value, factor) }
-    }
-    /// The same variable with a value that a rounding-free operation gave it.
-    #[inline(always)]
-    fn renamed(self, value: T) -> Self {
-        Self { value, ..self }
     }
     #[inline(always)]
     fn table1(self, f: Unary) -> Self {
@@ -90,61 +100,76 @@ impl<'t, T: Real> Var<'t, T> {
     #[inline(always)]
     fn table2(self, other: Self, f: Binary) -> Self {
         let value = f.value(self.value, other.value);
-        if self.tape.is_none() && other.tape.is_none() {
-            return Self::lift(value);
-        }
-        self.binary(other, value, f.first(self.value, other.value, value))
+        self.binary(
+            other,
+            value,
+            #[inline(always)]
+            || f.first(self.value, other.value, value),
+        )
     }
+}
+
+/// Chain rule `partial * slope`; an exactly zero partial derivative stays so, whatever the slope: a branch not taken
+/// contributes nothing.
+#[inline(always)]
+fn chained<T: Real>(partial: T, slope: T) -> T {
+    let product = partial * slope;
+    if partial.is_exact_zero() { T::zero() } else { product }
 }
 
 /// Two tapes met: both report it.
 #[cold]
-fn mixed<'t, T: Real>(first: &Tape<T>, second: &Tape<T>) -> Var<'t, T> {
-    second.fail(TapeError::MixedTapes);
-    first.fail(TapeError::MixedTapes)
+#[inline(never)]
+fn mixed<T: Real>(first: &Tape<T>, second: &Tape<T>) {
+    second.latch(TapeError::MixedTapes);
+    first.latch(TapeError::MixedTapes);
 }
 
 impl<T: Real> Neg for Var<'_, T> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
-        self.unary(-self.value, -T::one())
+        Self { value: -self.value, slope: -self.slope, ..self }
     }
 }
 impl<T: Real> Add for Var<'_, T> {
     type Output = Self;
-    /// A constant summand records nothing: the derivatives of the sum are those of the variable.
     #[inline(always)]
     fn add(self, other: Self) -> Self {
-        let value = self.value + other.value;
-        match (self.tape, other.tape) {
-            (_, None) => self.renamed(value),
-            (None, _) => other.renamed(value),
-            _ => self.binary(other, value, (T::one(), T::one())),
-        }
+        self.binary(
+            other,
+            self.value + other.value,
+            #[inline(always)]
+            || (T::one(), T::one()),
+        )
     }
 }
 impl<T: Real> Sub for Var<'_, T> {
     type Output = Self;
     #[inline(always)]
     fn sub(self, other: Self) -> Self {
-        let value = self.value - other.value;
-        match other.tape {
-            None => self.renamed(value),
-            _ => self.binary(other, value, (T::one(), -T::one())),
-        }
+        self.binary(
+            other,
+            self.value - other.value,
+            #[inline(always)]
+            || (T::one(), -T::one()),
+        )
     }
 }
 impl<T: Real> Mul for Var<'_, T> {
     type Output = Self;
-    /// A constant factor that is exactly 0 makes a constant, unless the product is not 0 (`0 * inf`).
     #[inline(always)]
     fn mul(self, other: Self) -> Self {
         let value = self.value * other.value;
         match (self.tape, other.tape) {
             (Some(_), None) => self.scaled(other.value, value),
             (None, Some(_)) => other.scaled(self.value, value),
-            _ => self.binary(other, value, (other.value, self.value)),
+            _ => self.binary(
+                other,
+                value,
+                #[inline(always)]
+                || (other.value, self.value),
+            ),
         }
     }
 }
@@ -219,12 +244,16 @@ impl<T: Real> Real for Var<'_, T> {
         if let (Some(tape), Some(other)) = (self.tape, a.tape.or(b.tape))
             && !std::ptr::eq(tape, other)
         {
-            return mixed(tape, other);
+            mixed(tape, other);
+            return Self::not_a_number();
         }
         let c = self.value;
-        let share = |yes: T, no: T| c.select(yes, no);
-        let partials = (share(T::one(), T::zero()), share(T::zero(), T::one()));
-        a.binary(b, c.select(a.value, b.value), partials)
+        a.binary(
+            b,
+            c.select(a.value, b.value),
+            #[inline(always)]
+            || (c.select(T::one(), T::zero()), c.select(T::zero(), T::one())),
+        )
     }
     #[inline]
     fn sin_cos(self) -> (Self, Self) {

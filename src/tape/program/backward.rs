@@ -40,26 +40,70 @@ fn masked<S: Scalar>(weight: S, partial: S) -> S {
     if weight == zero { zero } else { product }
 }
 
-impl<S: Scalar> Sweep<'_, S> {
+/// Where contributions go.
+struct Targets<'a, S> {
+    reach: &'a [u8],
+    wanted: u8,
+    /// Adjoints of the uniform rows.
+    uniform: &'a mut [Row<S>],
+    /// Adjoints of the rows before the one that is swept.
+    before: &'a mut [Row<S>],
+}
+
+impl<S: Scalar> Targets<'_, S> {
+    /// The adjoint of a row, unless nothing asked for depends on it.
     #[inline(always)]
-    fn value(&self, row: u32) -> &Row<S> {
-        let (row, base) = (row as usize, self.uniform.len());
-        if row < base { &self.uniform[row] } else { &self.rows[row - base] }
-    }
-    /// Adds the contribution of each lane to the adjoint of a row, unless nothing asked for depends on it.
-    #[inline(always)]
-    fn add(&mut self, row: u32, contribution: impl Fn(usize) -> S) {
+    fn of(&mut self, row: u32) -> Option<&mut Row<S>> {
         let (row, base) = (row as usize, self.uniform.len());
         if self.reach[row] & self.wanted == 0 {
-            return;
+            None
+        } else if row < base {
+            Some(&mut self.uniform[row])
+        } else {
+            Some(&mut self.before[row - base])
         }
-        let mut sum = if row < base { self.uniform_adjoints[row] } else { self.adjoints[row - base] };
-        for (l, target) in sum.iter_mut().enumerate() {
-            *target += contribution(l);
-        }
-        *if row < base { &mut self.uniform_adjoints[row] } else { &mut self.adjoints[row - base] } = sum;
     }
+    /// Adds `f(w)` of each lane to the adjoint of a row.
+    #[inline(always)]
+    fn add(&mut self, row: u32, w: &Row<S>, f: impl Fn(S) -> S) {
+        if let Some(target) = self.of(row) {
+            for l in 0..LANES {
+                target[l] += f(w[l]);
+            }
+        }
+    }
+    /// Adds `f(w, x)` of each lane to the adjoint of a row.
+    #[inline(always)]
+    fn add_with(&mut self, row: u32, w: &Row<S>, x: &Row<S>, f: impl Fn(S, S) -> S) {
+        if let Some(target) = self.of(row) {
+            for l in 0..LANES {
+                target[l] += f(w[l], x[l]);
+            }
+        }
+    }
+    /// Adds `f(w, x, y)` of each lane to the adjoint of a row.
+    #[inline(always)]
+    fn add_with_two(&mut self, row: u32, w: &Row<S>, (x, y): (&Row<S>, &Row<S>), f: impl Fn(S, S, S) -> S) {
+        if let Some(target) = self.of(row) {
+            for l in 0..LANES {
+                target[l] += f(w[l], x[l], y[l]);
+            }
+        }
+    }
+}
 
+/// Everything one operation reads and writes.
+struct Step<'a, S> {
+    uniform: &'a [Row<S>],
+    rows: &'a [Row<S>],
+    /// First row of the operation in its section.
+    out: usize,
+    /// Adjoints of the operation's rows.
+    weights: &'a [Row<S>],
+    targets: Targets<'a, S>,
+}
+
+impl<S: Scalar> Sweep<'_, S> {
     /// Sweeps the instructions backwards.
     pub(in crate::tape) fn run(&mut self, program: &[Instruction<S>]) {
         vectorized(
@@ -77,80 +121,101 @@ impl<S: Scalar> Sweep<'_, S> {
         if self.reach[instruction.out as usize] & self.wanted == 0 {
             return;
         }
-        let out = instruction.out as usize - self.uniform.len();
-        match &instruction.node {
-            Node::Input(_) | Node::Parameter(_) | Node::Constant(_) => {}
-            Node::Unary(f, a) => self.unary(*f, *a, out),
+        let base = self.uniform.len();
+        let out = instruction.out as usize - base;
+        if let Node::Block(op) = &instruction.node {
+            return op.reverse(self, out);
+        }
+        // Operands precede the operation.
+        let (before, weights) = self.adjoints.split_at_mut(out);
+        let uniform = if base == 0 { &mut [] } else { &mut *self.uniform_adjoints };
+        let targets = Targets { reach: self.reach, wanted: self.wanted, uniform, before };
+        Step { uniform: self.uniform, rows: self.rows, out, weights, targets }.run(&instruction.node);
+    }
+}
+
+impl<'a, S: Scalar> Step<'a, S> {
+    #[inline(always)]
+    fn value(&self, row: u32) -> &'a Row<S> {
+        let (row, base) = (row as usize, self.uniform.len());
+        if row < base { &self.uniform[row] } else { &self.rows[row - base] }
+    }
+
+    #[inline(always)]
+    fn run(mut self, node: &Node<S>) {
+        match node {
+            Node::Input(_) | Node::Parameter(_) | Node::Constant(_) | Node::Block(_) => {}
+            Node::Unary(f, a) => self.unary(*f, *a),
             Node::SinCos(a) => {
-                let (ws, wc, s, c) = (self.adjoints[out], self.adjoints[out + 1], self.rows[out], self.rows[out + 1]);
-                self.add(*a, |l| masked(ws[l], c[l]) - masked(wc[l], s[l]));
+                let (s, c) = (&self.rows[self.out], &self.rows[self.out + 1]);
+                let (ws, wc) = (&self.weights[0], &self.weights[1]);
+                if let Some(target) = self.targets.of(*a) {
+                    for l in 0..LANES {
+                        target[l] += masked(ws[l], c[l]) - masked(wc[l], s[l]);
+                    }
+                }
             }
-            Node::Binary(f, a, b) => self.binary(*f, *a, *b, out),
+            Node::Binary(f, a, b) => self.binary(*f, *a, *b),
             Node::Select(c, a, b) => {
-                let (w, c) = (self.adjoints[out], *self.value(*c));
+                let (w, c) = (&self.weights[0], self.value(*c));
                 let zero = <S as Real>::zero();
                 let share = |w: S, yes: S| if w == zero { zero } else { yes };
-                self.add(*a, |l| share(w[l], c[l].select(w[l], zero)));
-                self.add(*b, |l| share(w[l], c[l].select(zero, w[l])));
+                self.targets.add_with(*a, w, c, |w, c| share(w, c.select(w, zero)));
+                self.targets.add_with(*b, w, c, |w, c| share(w, c.select(zero, w)));
             }
-            Node::Block(op) => op.reverse(self, out),
         }
     }
 
     #[inline(always)]
-    fn unary(&mut self, f: Unary, a: u32, out: usize) {
-        let (w, x, y) = (self.adjoints[out], *self.value(a), self.rows[out]);
+    fn unary(&mut self, f: Unary, a: u32) {
+        let (w, x, y) = (&self.weights[0], self.value(a), &self.rows[self.out]);
+        let targets = &mut self.targets;
         match f {
-            Unary::Neg => self.add(a, |l| -w[l]),
-            Unary::Recip => self.add(a, |l| masked(w[l], Unary::Recip.first(x[l], y[l]))),
-            Unary::Sqrt => self.add(a, |l| masked(w[l], Unary::Sqrt.first(x[l], y[l]))),
-            Unary::Abs => self.add(a, |l| masked(w[l], Unary::Abs.first(x[l], y[l]))),
-            Unary::Exp => self.add(a, |l| masked(w[l], y[l])),
-            Unary::Ln => self.add(a, |l| masked(w[l], Unary::Ln.first(x[l], y[l]))),
-            Unary::Ln1p => self.add(a, |l| masked(w[l], Unary::Ln1p.first(x[l], y[l]))),
-            Unary::Tan => self.add(a, |l| masked(w[l], Unary::Tan.first(x[l], y[l]))),
-            Unary::Atan => self.add(a, |l| masked(w[l], Unary::Atan.first(x[l], y[l]))),
-            Unary::Powi(2) => self.add(a, |l| masked(w[l], x[l] + x[l])),
+            Unary::Neg => targets.add(a, w, |w| -w),
+            Unary::Recip => targets.add_with_two(a, w, (x, y), |w, x, y| masked(w, Unary::Recip.first(x, y))),
+            Unary::Sqrt => targets.add_with_two(a, w, (x, y), |w, x, y| masked(w, Unary::Sqrt.first(x, y))),
+            Unary::Abs => targets.add_with_two(a, w, (x, y), |w, x, y| masked(w, Unary::Abs.first(x, y))),
+            Unary::Exp => targets.add_with(a, w, y, masked),
+            Unary::Ln => targets.add_with_two(a, w, (x, y), |w, x, y| masked(w, Unary::Ln.first(x, y))),
+            Unary::Ln1p => targets.add_with_two(a, w, (x, y), |w, x, y| masked(w, Unary::Ln1p.first(x, y))),
+            Unary::Tan => targets.add_with_two(a, w, (x, y), |w, x, y| masked(w, Unary::Tan.first(x, y))),
+            Unary::Atan => targets.add_with_two(a, w, (x, y), |w, x, y| masked(w, Unary::Atan.first(x, y))),
+            Unary::Powi(2) => targets.add_with(a, w, x, |w, x| masked(w, x + x)),
             _ => {
-                let mut partials = y;
-                elementary::first(f, &x, &y, &mut partials);
-                self.add(a, |l| masked(w[l], partials[l]));
+                let mut partials = *y;
+                elementary::first(f, x, y, &mut partials);
+                targets.add_with(a, w, &partials, masked);
             }
         }
     }
 
     #[inline(always)]
-    fn binary(&mut self, f: Binary, a: u32, b: u32, out: usize) {
-        let w = self.adjoints[out];
+    fn binary(&mut self, f: Binary, a: u32, b: u32) {
+        let (w, x, y, out) = (&self.weights[0], self.value(a), self.value(b), &self.rows[self.out]);
+        let targets = &mut self.targets;
         match f {
             Binary::Add => {
-                self.add(a, |l| w[l]);
-                self.add(b, |l| w[l]);
+                targets.add(a, w, |w| w);
+                targets.add(b, w, |w| w);
             }
             Binary::Sub => {
-                self.add(a, |l| w[l]);
-                self.add(b, |l| -w[l]);
+                targets.add(a, w, |w| w);
+                targets.add(b, w, |w| -w);
             }
             Binary::Mul => {
-                let (x, y) = (*self.value(a), *self.value(b));
-                self.add(a, |l| masked(w[l], y[l]));
-                self.add(b, |l| masked(w[l], x[l]));
+                targets.add_with(a, w, y, masked);
+                targets.add_with(b, w, x, masked);
             }
             Binary::Div => {
-                let (y, b_row) = (self.rows[out], *self.value(b));
-                let mut first = b_row;
-                let mut second = y;
-                for l in 0..LANES {
-                    (first[l], second[l]) = Binary::Div.first(y[l], b_row[l], y[l]);
-                }
-                self.add(a, |l| masked(w[l], first[l]));
-                self.add(b, |l| masked(w[l], second[l]));
+                let first = |y: S, out: S| Binary::Div.first(out, y, out);
+                targets.add_with_two(a, w, (y, out), |w, y, out| masked(w, first(y, out).0));
+                targets.add_with_two(b, w, (y, out), |w, y, out| masked(w, first(y, out).1));
             }
             _ => {
-                let (mut first, mut second) = (*self.value(a), *self.value(b));
-                elementary::first_of_two(f, &mut first, &mut second, &self.rows[out]);
-                self.add(a, |l| masked(w[l], first[l]));
-                self.add(b, |l| masked(w[l], second[l]));
+                let (mut first, mut second) = (*x, *y);
+                elementary::first_of_two(f, &mut first, &mut second, out);
+                targets.add_with(a, w, &first, masked);
+                targets.add_with(b, w, &second, masked);
             }
         }
     }

@@ -9,10 +9,12 @@ use crate::tape::block::Scratch;
 pub(super) struct Environment<'a, S> {
     /// Uniform rows (empty while they themselves are computed).
     pub(super) uniform: &'a [Row<S>],
-    /// Lane inputs of the chunk, `(lanes, inputs)`; lanes past the end repeat the last state.
-    pub(super) inputs: &'a [S],
-    /// Number of lane inputs.
-    pub(super) width: usize,
+    /// Lane inputs: fields `(lanes, width)` side by side; lanes past the end repeat the last state.
+    pub(super) inputs: &'a [&'a [S]],
+    /// Number of lanes of the batch.
+    pub(super) lanes: usize,
+    /// First lane of the chunk.
+    pub(super) start: usize,
     /// Parameters.
     pub(super) parameters: &'a [S],
 }
@@ -65,14 +67,22 @@ pub(super) fn forward<S: Scalar>(
 
 /// One input of all lanes.
 #[inline(always)]
-fn load<S: Scalar>(environment: &Environment<'_, S>, index: usize, out: &mut Row<S>) {
-    let states = environment.inputs.chunks_exact(environment.width);
+fn load<S: Scalar>(environment: &Environment<'_, S>, mut index: usize, out: &mut Row<S>) {
     let mut value = S::NAN;
     let mut filled = 0;
-    for (target, state) in out.iter_mut().zip(states) {
-        value = state[index];
-        *target = value;
-        filled += 1;
+    for field in environment.inputs {
+        let width = field.len() / environment.lanes;
+        if index >= width {
+            index -= width;
+            continue;
+        }
+        let states = field[environment.start * width..].chunks_exact(width);
+        for (target, state) in out.iter_mut().zip(states) {
+            value = state[index];
+            *target = value;
+            filled += 1;
+        }
+        break;
     }
     out[filled..].fill(value);
 }

@@ -54,37 +54,72 @@ impl<S: Scalar> Replay<S> {
         parameters: &[S],
         outputs: &mut [S],
     ) -> Result<(), TapeError> {
+        check_length("inputs", lanes * self.program.inputs, inputs.len())?;
+        check_length("outputs", lanes * self.program.outputs.len(), outputs.len())?;
+        self.run(lanes, &[inputs], parameters, &mut [outputs], true)?;
+        self.lanes = Some(lanes);
+        Ok(())
+    }
+    /// Computes outputs without keeping what a reverse replay needs, so that the rows of one chunk serve all.
+    ///
+    /// Inputs and outputs are fields, row-major matrices `(lanes, width)` side by side: the columns of the first field
+    /// are the first inputs (outputs) of the program, and so on. Empty fields are left out.
+    ///
+    /// # Errors
+    /// [`TapeError::Shape`] if the parameters or the fields together have the wrong length.
+    pub fn evaluate(
+        &mut self,
+        lanes: usize,
+        inputs: &[&[S]],
+        parameters: &[S],
+        outputs: &mut [&mut [S]],
+    ) -> Result<(), TapeError> {
+        let columns = |length: usize| length / lanes.max(1);
+        let width = inputs.iter().map(|field| columns(field.len())).sum();
+        check_length("inputs of a state", self.program.inputs, width)?;
+        check_length("inputs", lanes * width, inputs.iter().map(|field| field.len()).sum())?;
+        let width = outputs.iter().map(|field| columns(field.len())).sum();
+        check_length("outputs of a state", self.program.outputs.len(), width)?;
+        check_length("outputs", lanes * width, outputs.iter().map(|field| field.len()).sum())?;
+        self.run(lanes, inputs, parameters, outputs, false)
+    }
+
+    /// Replays all chunks; each in rows of its own if they are to be kept.
+    fn run(
+        &mut self,
+        lanes: usize,
+        inputs: &[&[S]],
+        parameters: &[S],
+        outputs: &mut [&mut [S]],
+        keep: bool,
+    ) -> Result<(), TapeError> {
         let program = Arc::clone(&self.program);
         self.lanes = None;
-        check_length("inputs", lanes * program.inputs, inputs.len())?;
         check_length("parameters", program.parameters, parameters.len())?;
-        check_length("outputs", lanes * program.outputs.len(), outputs.len())?;
         let rows = program.lane_rows;
-        self.values.resize(self.values.len().max(lanes.div_ceil(LANES) * rows), [<S as Real>::zero(); LANES]);
+        let chunks = if keep { lanes.div_ceil(LANES) } else { 1 };
+        self.values.resize(self.values.len().max(chunks * rows), [<S as Real>::zero(); LANES]);
         self.parameters.copy_from_slice(parameters);
-        let environment = Environment { uniform: &[], inputs: &[], width: 0, parameters };
+        let environment = Environment { uniform: &[], inputs: &[], lanes, start: 0, parameters };
         forward(&program.uniform, &environment, &mut self.uniform, &mut self.scratch);
         for (chunk, start) in (0..lanes).step_by(LANES).enumerate() {
-            let count = LANES.min(lanes - start);
-            let environment = Environment {
-                uniform: &self.uniform,
-                inputs: &inputs[start * program.inputs..(start + count) * program.inputs],
-                width: program.inputs,
-                parameters,
-            };
-            let values = &mut self.values[chunk * rows..(chunk + 1) * rows];
+            let environment = Environment { uniform: &self.uniform, inputs, lanes, start, parameters };
+            let first = if keep { chunk * rows } else { 0 };
+            let values = &mut self.values[first..first + rows];
             forward(&program.lanes, &environment, values, &mut self.scratch);
-            let width = program.outputs.len();
-            for (column, &row) in program.outputs.iter().enumerate() {
+            let mut next = program.outputs.iter().map(|&row| {
                 let row = row as usize;
-                let source =
-                    if row < program.uniform_rows { &self.uniform[row] } else { &values[row - program.uniform_rows] };
-                for (lane, &value) in source[..count].iter().enumerate() {
-                    outputs[(start + lane) * width + column] = value;
+                if row < program.uniform_rows { &self.uniform[row] } else { &values[row - program.uniform_rows] }
+            });
+            for field in outputs.iter_mut() {
+                let width = field.len() / lanes;
+                for (column, source) in next.by_ref().take(width).enumerate() {
+                    for (state, &value) in field[start * width..].chunks_exact_mut(width).zip(source) {
+                        state[column] = value;
+                    }
                 }
             }
         }
-        self.lanes = Some(lanes);
         Ok(())
     }
 
