@@ -4,11 +4,13 @@
 //! arguments or configuration, 130 Ctrl-C. A failure is one line, `error: FILE: row 3, column theta1: ...`.
 
 mod config;
+mod differences;
 mod error;
 mod evaluate;
 mod evaluation;
 mod experiment;
 mod folder;
+mod holder;
 mod inspect;
 mod interrupt;
 mod json;
@@ -17,6 +19,7 @@ mod learning;
 mod number;
 mod output;
 mod progress;
+mod resume;
 mod rollout;
 mod source;
 mod states;

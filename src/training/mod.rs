@@ -1,5 +1,6 @@
 //! Datasets, losses, regularizers, optimisers hosted by argmin, the trainer.
 
+mod checkpoint;
 mod config;
 mod dataset;
 mod objective;
@@ -14,6 +15,7 @@ mod signature;
 mod solver;
 mod trainer;
 
+pub use checkpoint::{CheckpointError, Every, Identity, Keeper, NEWEST, PREVIOUS, Restored, Snapshot, remove_checkpoints, saved_config};
 pub use config::{Config, ConfigError, Data, Network, OnFailure, Optimizer, Phase, Polish, Precision, Scaling};
 pub use dataset::{Dataset, DatasetError};
 pub use objective::{BatchReport, Failure, Objective};
@@ -28,4 +30,4 @@ pub use signature::{
     sylvester_violation,
 };
 pub use solver::{Epoch, EpochSolver, Hooks, Progress, StepError, TrainingProblem, TrainingState, Watcher};
-pub use trainer::{Datasets, Stop, Stream, Trained, TrainingError, train};
+pub use trainer::{Datasets, Sitting, Stop, Stream, Trained, TrainingError, resume, train};
