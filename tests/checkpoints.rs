@@ -6,7 +6,7 @@ use lnn::scalar::Scalar;
 use lnn::storage::Disk;
 use lnn::training::{
     CheckpointError, Config, Datasets, Epoch, Every, Hooks, Identity, Keeper, NEWEST, PREVIOUS, Phase, Polish, Preset,
-    Progress, Sitting, Stop, Trained, TrainingError, remove_checkpoints, resume, sample_all, saved_config, train,
+    Progress, Sitting, Stop, Trained, TrainingError, remove_checkpoints, resume, sample_all, saved, train,
 };
 use std::fs;
 use std::path::Path;
@@ -179,7 +179,7 @@ fn the_previous_checkpoint_serves_when_the_newest_is_damaged() {
         let found = restore().unwrap();
         assert_eq!(found.content.steps(), 8);
         assert!(found.fallback.is_some());
-        assert!(saved_config(&Disk, directory.path()).unwrap().fallback.is_some());
+        assert!(saved(&Disk, directory.path()).unwrap().fallback.is_some());
     }
     // The damaged one does not take the place of the good one.
     let _ = case.sit(directory.path(), Every::Seconds(1e9), 1, &stop_after(1));

@@ -3,7 +3,7 @@
 
 use lnn::lagrangian::configure;
 use lnn::storage::Disk;
-use lnn::training::{Config, NEWEST, PREVIOUS, Preset, saved_config};
+use lnn::training::{Config, NEWEST, PREVIOUS, Preset, saved};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde_json::Value;
@@ -23,7 +23,7 @@ fn config() -> Config {
 
 fn lnn(arguments: &[&str]) -> Child {
     let mut command = Command::new(env!("CARGO_BIN_EXE_lnn"));
-    command.args(arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
+    command.env("LNN_LOG", "info").args(arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
 }
 
 fn succeed(arguments: &[&str]) {
@@ -44,6 +44,12 @@ fn summary(directory: &Path) -> Value {
         assert!(summary.as_object_mut().unwrap().remove(key).is_some());
     }
     summary
+}
+
+/// The last epoch that the log on standard error names.
+fn last_epoch(log: &str) -> Option<usize> {
+    let numbers = log.lines().filter_map(|line| line.split("epoch=").nth(1)?.split_whitespace().next()?.parse().ok());
+    numbers.last()
 }
 
 /// Kills a training `kills` times, always goes on with it, and compares the end with a training that was left alone.
@@ -73,7 +79,8 @@ fn survive(kills: usize, seed: u64) {
         let ended = child.try_wait().unwrap();
         // SIGKILL.
         child.kill().unwrap();
-        let status = child.wait().unwrap();
+        let output = child.wait_with_output().unwrap();
+        let status = output.status;
         match ended {
             Some(status) => {
                 assert!(status.success());
@@ -84,8 +91,11 @@ fn survive(kills: usize, seed: u64) {
             None => done += 1,
         }
         if killed.join(NEWEST).exists() || killed.join(PREVIOUS).exists() {
-            let found = saved_config(&Disk, &killed).unwrap();
-            assert_eq!(found.content, toml::to_string(&config()).unwrap());
+            let found = saved(&Disk, &killed).unwrap().content;
+            assert_eq!(found.config, toml::to_string(&config()).unwrap());
+            // The log names an epoch, counted from 0, before the checkpoint behind it is written.
+            let log = last_epoch(&String::from_utf8_lossy(&output.stderr));
+            assert!(found.epochs >= log.unwrap_or(0), "{found:?}, but epoch {log:?} had ended");
         }
     }
     if killed.join(NEWEST).exists() || killed.join(PREVIOUS).exists() {

@@ -4,7 +4,7 @@ use crate::analysis::{stretches, training_instability};
 use crate::cli::evaluation::{Evaluation, Plan, evaluate};
 use crate::cli::folder::Folder;
 use crate::cli::learned::given;
-use crate::cli::{CliError, output};
+use crate::cli::{CliError, memory, output};
 use crate::experiments::{Outcome, Record};
 use crate::lagrangian::system::Size;
 use crate::lagrangian::{Configured, configure};
@@ -16,6 +16,7 @@ use crate::storage::Disk;
 use crate::training::{
     Config, Datasets, Epoch, Every, Hooks, Identity, Keeper, NEWEST, PREVIOUS, Phase, Precision, Restored,
     SamplingError, Sitting, Snapshot, Stop, TrainingError, remove_checkpoints, resume, sample_all,
+    training_memory,
 };
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -167,6 +168,8 @@ fn learn_in<S: Scalar>(
     keeping: Keeping,
 ) -> Result<Learning, CliError> {
     let started = Instant::now();
+    let unscaled = config.architecture(system, vec![1.0; system.coordinates]);
+    memory::require("training", training_memory(config, &unscaled))?;
     let (data, scale) = sample_all::<S>(config, system).map_err(|e| match e {
         SamplingError::Dataset(_) => CliError::data(e),
         _ => CliError::usage(e),

@@ -16,6 +16,7 @@ mod interrupt;
 mod json;
 mod learned;
 mod learning;
+mod memory;
 mod number;
 mod output;
 mod progress;

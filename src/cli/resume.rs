@@ -3,7 +3,7 @@
 use crate::cli::differences::differences;
 use crate::cli::{CliError, config, output};
 use crate::storage::{Disk, read_regular};
-use crate::training::{CheckpointError, Config, NEWEST, PREVIOUS, saved_config};
+use crate::training::{CheckpointError, Config, NEWEST, PREVIOUS, saved};
 use serde::Deserialize;
 use std::path::Path;
 
@@ -28,8 +28,8 @@ pub fn find(directory: &Path) -> Result<Found, CliError> {
     if !directory.is_dir() {
         return Err(CliError::file(directory, "no such directory"));
     }
-    match saved_config(&Disk, directory) {
-        Ok(saved) => parse(directory, NEWEST, &saved.content).map(Found::Unfinished),
+    match saved(&Disk, directory) {
+        Ok(found) => parse(directory, NEWEST, &found.content.config).map(Found::Unfinished),
         Err(CheckpointError::Missing) => finished(directory),
         Err(error) => Err(CliError::file(directory, error)),
     }

@@ -3,6 +3,7 @@
 mod checkpoint;
 mod config;
 mod dataset;
+mod memory;
 mod objective;
 mod optimizer;
 mod penalty;
@@ -15,9 +16,10 @@ mod signature;
 mod solver;
 mod trainer;
 
-pub use checkpoint::{CheckpointError, Every, Identity, Keeper, NEWEST, PREVIOUS, Restored, Snapshot, remove_checkpoints, saved_config};
+pub use checkpoint::{CheckpointError, Every, Identity, Keeper, NEWEST, PREVIOUS, Restored, Snapshot, Saved, remove_checkpoints, saved};
 pub use config::{Config, ConfigError, Data, Network, OnFailure, Optimizer, Phase, Polish, Precision, Scaling};
 pub use dataset::{Dataset, DatasetError};
+pub use memory::training_memory;
 pub use objective::{BatchReport, Failure, Objective};
 pub use optimizer::{Method, Moments, Update};
 pub use penalty::{Penalty, Regularizer};

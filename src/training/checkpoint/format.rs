@@ -1,6 +1,6 @@
 //! The bytes of a checkpoint.
 
-use super::{Course, Ended, Identity, Snapshot, Underway, precision};
+use super::{Course, Ended, Identity, Saved, Snapshot, Underway, precision};
 use crate::network::file::container::{Kind, Tensor, Tensors, pack, unpack};
 use crate::network::file::{ModelFileError, StoredPrecision};
 use crate::scalar::Scalar;
@@ -35,6 +35,11 @@ pub(super) struct Header {
 const MOST: u64 = 1 << 52;
 
 impl Header {
+    pub(super) fn into_saved(self) -> Saved {
+        let (epochs, steps) = self.underway.map_or((0, self.steps), |underway| (underway.epochs, underway.step));
+        Saved { config: self.identity.config, epochs: self.epochs.saturating_add(epochs), steps }
+    }
+
     fn check_counts(&self) -> Result<(), ModelFileError> {
         let mut counts = vec![self.phases as u64, self.steps as u64, self.states as u64];
         if let Some(u) = &self.underway {
@@ -348,7 +353,7 @@ mod tests {
             let bytes = encode(&identity, 0.0, &snapshot.ended, wrong.as_ref()).unwrap();
             assert!(decode::<f32>(&bytes).unwrap_err().to_string().contains("order"));
         }
-        let model = decode::<f32>(&[b"\x02\0\0\0\0\0\0\0{}".as_slice(), &[0; 4]].concat()).unwrap_err();
+        let model = decode::<f32>(b"\x02\0\0\0\0\0\0\0{}").unwrap_err();
         assert!(model.to_string().contains("checkpoint"), "{model}");
     }
 }

@@ -195,13 +195,23 @@ pub fn remove_checkpoints(files: &dyn Files, directory: &Path) -> std::io::Resul
     Ok(())
 }
 
-/// The configuration of the training whose checkpoint is in a directory.
+/// What a checkpoint says without the numbers it holds.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Saved {
+    /// Configuration of the training.
+    pub config: String,
+    /// Epochs completed, polishing included.
+    pub epochs: usize,
+    /// Steps taken.
+    pub steps: usize,
+}
+
+/// The training whose checkpoint is in a directory.
 ///
 /// # Errors
 /// [`CheckpointError`] if there is none that is whole.
-pub fn saved_config(files: &dyn Files, directory: &Path) -> Result<Restored<String>, CheckpointError> {
-    let found = newest_whole(files, directory, decode_header)?;
-    Ok(Restored { content: found.content.identity.config, fallback: found.fallback })
+pub fn saved(files: &dyn Files, directory: &Path) -> Result<Restored<Saved>, CheckpointError> {
+    newest_whole(files, directory, |bytes| decode_header(bytes).map(Header::into_saved))
 }
 
 /// Reads the newest checkpoint, or the one before if the newest is damaged or missing.

@@ -15,7 +15,7 @@
 mod format;
 mod keeper;
 
-pub use keeper::{CheckpointError, Every, Identity, Keeper, NEWEST, PREVIOUS, Restored, remove_checkpoints, saved_config};
+pub use keeper::{CheckpointError, Every, Identity, Keeper, NEWEST, PREVIOUS, Restored, Saved, remove_checkpoints, saved};
 
 use crate::network::file::StoredPrecision;
 use crate::scalar::Scalar;
