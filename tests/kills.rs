@@ -56,9 +56,11 @@ fn last_epoch(log: &str) -> Option<usize> {
 fn survive(kills: usize, seed: u64) {
     let folder = tempfile::tempdir().unwrap();
     let text = |path: &Path| path.to_str().unwrap().to_string();
-    let (file, alone, killed) = (folder.path().join("c.toml"), folder.path().join("alone"), folder.path().join("killed"));
+    let (file, alone, killed) =
+        (folder.path().join("c.toml"), folder.path().join("alone"), folder.path().join("killed"));
     fs::write(&file, toml::to_string(&config()).unwrap()).unwrap();
-    let train = ["train", "--threads", "1", "--checkpoint-every", "1", "--config", &text(&file), "--out"].map(String::from);
+    let train =
+        ["train", "--threads", "1", "--checkpoint-every", "1", "--config", &text(&file), "--out"].map(String::from);
     let train = |out: &Path| [&train[..], &[text(out)]].concat();
     let began = Instant::now();
     succeed(&train(&alone).iter().map(String::as_str).collect::<Vec<_>>());
@@ -70,7 +72,9 @@ fn survive(kills: usize, seed: u64) {
         // From its beginning again when it has come to its end, so that every stretch of it is hit.
         let go_on = killed.join(NEWEST).exists() || killed.join(PREVIOUS).exists();
         let arguments = if go_on {
-            ["train", "--threads", "1", "--checkpoint-every", "1", "--resume", &text(&killed)].map(String::from).to_vec()
+            ["train", "--threads", "1", "--checkpoint-every", "1", "--resume", &text(&killed)]
+                .map(String::from)
+                .to_vec()
         } else {
             train(&killed)
         };
@@ -104,7 +108,8 @@ fn survive(kills: usize, seed: u64) {
         succeed(&train(&killed).iter().map(String::as_str).collect::<Vec<_>>());
     }
     compare(&killed, &alone);
-    let hidden = fs::read_dir(&killed).unwrap().filter(|e| e.as_ref().unwrap().file_name().to_str().unwrap().starts_with('.'));
+    let hidden =
+        fs::read_dir(&killed).unwrap().filter(|e| e.as_ref().unwrap().file_name().to_str().unwrap().starts_with('.'));
     assert_eq!(hidden.count(), 0);
 }
 

@@ -4,7 +4,8 @@ use toml::{Table, Value};
 
 /// The first few values that differ, such as `seed: 0 in the checkpoint, 5 asked for`; empty if the texts say the same.
 pub fn differences(saved: &str, asked: &str) -> String {
-    let parse = |text: &str| text.parse::<Table>().map(Value::Table).unwrap_or_else(|_| Value::String(text.to_string()));
+    let parse =
+        |text: &str| text.parse::<Table>().map(Value::Table).unwrap_or_else(|_| Value::String(text.to_string()));
     let mut found = Vec::new();
     compare("", &parse(saved), &parse(asked), &mut found);
     const SHOWN: usize = 4;

@@ -123,7 +123,10 @@ mod tests {
         let first = Folder::open(&path).unwrap();
         let refusal = Folder::open(&path).unwrap_err().to_string();
         let holder = format!("(process {} on ", std::process::id());
-        assert!(refusal.contains("another run is writing into this directory") && refusal.contains(&holder), "{refusal}");
+        assert!(
+            refusal.contains("another run is writing into this directory") && refusal.contains(&holder),
+            "{refusal}"
+        );
         first.write("x", b"1").unwrap();
         assert!(first.write("missing/x", b"1").is_err());
         drop(first);

@@ -15,8 +15,7 @@ use crate::scalar::Scalar;
 use crate::storage::Disk;
 use crate::training::{
     Config, Datasets, Epoch, Every, Hooks, Identity, Keeper, NEWEST, PREVIOUS, Phase, Precision, Restored,
-    SamplingError, Sitting, Snapshot, Stop, TrainingError, remove_checkpoints, resume, sample_all,
-    training_memory,
+    SamplingError, Sitting, Snapshot, Stop, TrainingError, remove_checkpoints, resume, sample_all, training_memory,
 };
 use serde::Serialize;
 use std::collections::BTreeMap;

@@ -43,7 +43,8 @@ fn finished(directory: &Path) -> Result<Found, CliError> {
         ended: String,
     }
     let read = |name: &str| String::from_utf8(read_regular(&directory.join(name), 1 << 26).ok()?).ok();
-    let summary = read("summary.json").and_then(|json| Some((serde_json::from_str::<Summary>(&json).ok()?.ended, json)));
+    let summary =
+        read("summary.json").and_then(|json| Some((serde_json::from_str::<Summary>(&json).ok()?.ended, json)));
     match (summary, read("config.toml")) {
         (Some((ended, json)), Some(text)) if ended == "finished" => {
             parse(directory, "config.toml", &text).map(|config| Found::Finished(config, json))

@@ -96,7 +96,11 @@ fn conclude(finished: &Finished, path: &Path) -> Result<(), CliError> {
 
 /// The end of a message about a training that was stopped.
 fn how_to_go_on(path: &Path) -> String {
-    if has_checkpoint(path) { format!("; go on with: {}", command(path)) } else { "; there is no checkpoint".to_string() }
+    if has_checkpoint(path) {
+        format!("; go on with: {}", command(path))
+    } else {
+        "; there is no checkpoint".to_string()
+    }
 }
 
 /// Progress on standard error, Ctrl-C.

@@ -71,12 +71,7 @@ pub fn training_memory(config: &Config, architecture: &Architecture) -> Option<u
             product([8, weights, 2 * polish.memory as u64 + POLISH]),
         ]),
     };
-    sum([
-        states,
-        product([(VECTORS + CHECKPOINT) * number, weights]),
-        product([wide, stripes, of_stripe?]),
-        polish,
-    ])
+    sum([states, product([(VECTORS + CHECKPOINT) * number, weights]), product([wide, stripes, of_stripe?]), polish])
 }
 
 /// A product, if it can be counted.

@@ -16,7 +16,9 @@ mod signature;
 mod solver;
 mod trainer;
 
-pub use checkpoint::{CheckpointError, Every, Identity, Keeper, NEWEST, PREVIOUS, Restored, Snapshot, Saved, remove_checkpoints, saved};
+pub use checkpoint::{
+    CheckpointError, Every, Identity, Keeper, NEWEST, PREVIOUS, Restored, Saved, Snapshot, remove_checkpoints, saved,
+};
 pub use config::{Config, ConfigError, Data, Network, OnFailure, Optimizer, Phase, Polish, Precision, Scaling};
 pub use dataset::{Dataset, DatasetError};
 pub use memory::training_memory;

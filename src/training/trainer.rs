@@ -112,7 +112,8 @@ pub struct Datasets<S> {
 impl<S: Scalar> Datasets<S> {
     /// Name and checksum of each set: training of every phase, validation, test.
     pub fn checksums(&self) -> Vec<(String, u32)> {
-        let training = self.training.iter().enumerate().map(|(k, set)| (format!("training states of phase {}", k + 1), set));
+        let training =
+            self.training.iter().enumerate().map(|(k, set)| (format!("training states of phase {}", k + 1), set));
         let others = [("validation states".to_string(), &self.validation), ("test states".to_string(), &self.test)];
         training.chain(others).map(|(name, set)| (name, set.checksum())).collect()
     }

@@ -166,11 +166,7 @@ impl Tensors<'_> {
             return Err(ModelFileError::WrongType { name, expected, found });
         }
         if tensor.shape() != shape {
-            return Err(ModelFileError::WrongShape {
-                name,
-                expected: shape.to_vec(),
-                found: tensor.shape().to_vec(),
-            });
+            return Err(ModelFileError::WrongShape { name, expected: shape.to_vec(), found: tensor.shape().to_vec() });
         }
         Ok(tensor.data())
     }

@@ -80,4 +80,3 @@ impl Header {
         require(self.validation_loss.is_finite(), "validation_loss: expected a finite number")
     }
 }
-

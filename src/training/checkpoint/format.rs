@@ -132,7 +132,19 @@ fn rows(history: &[Epoch]) -> Vec<f64> {
 }
 
 fn history(rows: &[f64]) -> Vec<Epoch> {
-    let epoch = |&[epoch, phase, rate, training_loss, penalty, penalised, validation_loss, gradient_norm, left_out, skipped, seconds]: &[f64; COLUMNS]| Epoch {
+    let epoch = |&[
+        epoch,
+        phase,
+        rate,
+        training_loss,
+        penalty,
+        penalised,
+        validation_loss,
+        gradient_norm,
+        left_out,
+        skipped,
+        seconds,
+    ]: &[f64; COLUMNS]| Epoch {
         epoch: epoch as usize,
         phase: phase as usize,
         rate,
@@ -158,8 +170,8 @@ pub(super) fn encode<S: Scalar>(
     ended: &Ended<S>,
     underway: Option<&Underway<S>>,
 ) -> Result<Vec<u8>, ModelFileError> {
-    let precision =
-        precision::<S>().ok_or_else(|| ModelFileError::Header(format!("no checkpoint can hold {} numbers", S::NAME)))?;
+    let precision = precision::<S>()
+        .ok_or_else(|| ModelFileError::Header(format!("no checkpoint can hold {} numbers", S::NAME)))?;
     let vector = |name: &str, numbers: &[S]| Tensor::new(name.to_string(), vec![numbers.len()], numbers, precision);
     let table = |name: &str, history: &[Epoch]| {
         Tensor::new(name.to_string(), vec![history.len(), COLUMNS], &rows(history), StoredPrecision::F64)
@@ -316,8 +328,7 @@ mod tests {
             batch: 3,
             means,
         };
-        let underway =
-            Underway { course, history: vec![row(2, 0.5)], best, best_loss: f64::INFINITY, best_epoch: 0 };
+        let underway = Underway { course, history: vec![row(2, 0.5)], best, best_loss: f64::INFINITY, best_epoch: 0 };
         let identity = Identity { config: "a = \"b\"\n".to_string(), data: vec![("test".to_string(), 5)] };
         (identity, Snapshot { seconds: 0.1 + 0.2, ended, underway: Some(underway) })
     }

@@ -117,7 +117,8 @@ impl Keeper {
 
     /// Whether a checkpoint is due when so many epochs have been completed.
     pub(in crate::training) fn is_due_after(&self, epochs: usize) -> bool {
-        match (self.every, self.state().last) {
+        let last = self.state().last;
+        match (self.every, last) {
             (Every::Epochs(every), Some((_, last))) => epochs.saturating_sub(last) >= every,
             _ => self.is_due(),
         }
@@ -138,6 +139,7 @@ impl Keeper {
         }
         let epochs = underway.map_or(ended.history.len(), |underway| underway.course.epoch);
         (state.last, state.cost) = (Some((Instant::now(), epochs)), began.elapsed());
+        tracing::info!(epochs, cost = state.cost.as_secs_f64(), "checkpoint");
     }
 
     /// The newest whole checkpoint of the same configuration and data, for a network of `parameters` weights and
@@ -231,8 +233,6 @@ fn newest_whole<T>(
         Err(ModelFileError::Read(ReadError::Missing)) if matches!(newest, ModelFileError::Read(ReadError::Missing)) => {
             Err(CheckpointError::Missing)
         }
-        Err(previous) => {
-            Err(CheckpointError::Damaged { newest: Box::new(newest), previous: Box::new(previous) })
-        }
+        Err(previous) => Err(CheckpointError::Damaged { newest: Box::new(newest), previous: Box::new(previous) }),
     }
 }

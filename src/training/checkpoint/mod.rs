@@ -15,7 +15,9 @@
 mod format;
 mod keeper;
 
-pub use keeper::{CheckpointError, Every, Identity, Keeper, NEWEST, PREVIOUS, Restored, Saved, remove_checkpoints, saved};
+pub use keeper::{
+    CheckpointError, Every, Identity, Keeper, NEWEST, PREVIOUS, Restored, Saved, remove_checkpoints, saved,
+};
 
 use crate::network::file::StoredPrecision;
 use crate::scalar::Scalar;
