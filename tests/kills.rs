@@ -48,8 +48,8 @@ fn summary(directory: &Path) -> Value {
 
 /// The last epoch that the log on standard error names.
 fn last_epoch(log: &str) -> Option<usize> {
-    let numbers = log.lines().filter_map(|line| line.split("epoch=").nth(1)?.split_whitespace().next()?.parse().ok());
-    numbers.last()
+    let mut numbers = log.lines().filter_map(|line| line.split("epoch=").nth(1)?.split_whitespace().next()?.parse().ok());
+    numbers.next_back()
 }
 
 /// Kills a training `kills` times, always goes on with it, and compares the end with a training that was left alone.

@@ -105,7 +105,7 @@ mod tests {
         assert!(memory(|c| c.precision = Precision::F64).unwrap() > plain);
         assert!(memory(|c| c.data.training = 1 << 30).unwrap() > 100 << 30);
         // Three square matrices of 65536 rows in 36 vectors and 8 gradients.
-        assert!(memory(|c| c.network.hidden = vec![1 << 16; 4]).unwrap() > 44 * 4 * 3 << 32);
+        assert!(memory(|c| c.network.hidden = vec![1 << 16; 4]).unwrap() > 44 * 4 * (3 << 32));
     }
 
     #[test]
