@@ -48,7 +48,8 @@ fn summary(directory: &Path) -> Value {
 
 /// The last epoch that the log on standard error names.
 fn last_epoch(log: &str) -> Option<usize> {
-    let mut numbers = log.lines().filter_map(|line| line.split("epoch=").nth(1)?.split_whitespace().next()?.parse().ok());
+    let mut numbers =
+        log.lines().filter_map(|line| line.split("epoch=").nth(1)?.split_whitespace().next()?.parse().ok());
     numbers.next_back()
 }
 
