@@ -59,7 +59,7 @@ impl Folder {
     fn stopped(&self, out: &str) -> Output {
         let child = self.train(out, &[]);
         wait_for(&self.path(out).join(NEWEST));
-        std::thread::sleep(Duration::from_millis(300));
+        std::thread::sleep(Duration::from_millis(100));
         interrupt(&child);
         child.wait_with_output().unwrap()
     }
@@ -67,6 +67,9 @@ impl Folder {
         lnn(&[&["train", "--resume", &self.text(out)], more].concat())
     }
 }
+
+/// Epochs of a training that is interrupted early on.
+const EPOCHS: usize = 1000;
 
 fn config(epochs: usize) -> Config {
     let mut config = Preset::Quick.config(&configure("double-pendulum", &[]).unwrap()).unwrap();
@@ -104,7 +107,8 @@ fn result(directory: &Path) -> (Vec<u8>, Vec<String>, Value) {
 
 #[test]
 fn a_training_stopped_in_the_middle_comes_to_the_same_end() {
-    let folder = Folder::new(60);
+    // Some seconds, whatever the machine: far more than until the interruption.
+    let folder = Folder::new(EPOCHS);
     succeeded(&folder.train("whole", &[]).wait_with_output().unwrap());
     let stopped = folder.stopped("stopped");
     let out = folder.text("stopped");
@@ -113,7 +117,11 @@ fn a_training_stopped_in_the_middle_comes_to_the_same_end() {
 
     // Another configuration is refused, and so is beginning anew on top of what is there.
     refused(&folder.resume("stopped", &["--seed", "5"]), 2, &["seed: 0 in the checkpoint, 5 asked for"]);
-    refused(&folder.resume("stopped", &["--epochs", "7"]), 2, &["phase[0].epochs", "60 in the checkpoint, 7 asked"]);
+    refused(
+        &folder.resume("stopped", &["--epochs", "7"]),
+        2,
+        &["phase[0].epochs", &format!("{EPOCHS} in the checkpoint, 7 asked")],
+    );
     refused(&folder.resume("stopped", &["--param", "m1=2"]), 2, &["parameters.m1"]);
     refused(&lnn(&["train", "spring-pendulum", "--resume", &out]), 2, &["system"]);
     refused(&folder.resume("stopped", &["--out", "x"]), 2, &["--resume"]);
@@ -136,7 +144,7 @@ fn a_training_stopped_in_the_middle_comes_to_the_same_end() {
     let before = fs::metadata(folder.path("stopped").join("summary.json")).unwrap().modified().unwrap();
     assert!(succeeded(&folder.resume("stopped", &[])).contains("has finished"));
     let json: Value = serde_json::from_str(&succeeded(&folder.resume("stopped", &["--json"]))).unwrap();
-    assert_eq!(json["epochs"], 60);
+    assert_eq!(json["epochs"], EPOCHS);
     refused(&folder.resume("stopped", &["--seed", "5"]), 2, &["seed"]);
     assert_eq!(fs::metadata(folder.path("stopped").join("summary.json")).unwrap().modified().unwrap(), before);
 }

@@ -21,7 +21,10 @@ struct Round<S> {
     /// Rounds evaluated so far.
     number: u64,
     active: usize,
+    /// What each member waits for; nobody waits any more once it is evaluated.
     asked: Vec<Option<Asked<S>>>,
+    /// Rows of each member in the last batch.
+    rows: Vec<Range<usize>>,
     q: Vec<S>,
     v: Vec<S>,
     terms: Terms<S>,
@@ -33,8 +36,6 @@ struct Asked<S> {
     q: Vec<S>,
     v: Vec<S>,
     request: Request,
-    /// Rows of the batch, once evaluated.
-    rows: Range<usize>,
 }
 
 impl<'a, S: Scalar> Group<'a, S> {
@@ -43,6 +44,7 @@ impl<'a, S: Scalar> Group<'a, S> {
             number: 0,
             active: members,
             asked: (0..members).map(|_| None).collect(),
+            rows: vec![0..0; members],
             q: Vec::new(),
             v: Vec::new(),
             terms: Terms::default(),
@@ -66,11 +68,12 @@ impl<'a, S: Scalar> Group<'a, S> {
         let mut request = Request::default();
         round.q.clear();
         round.v.clear();
-        for asked in round.asked.iter_mut().flatten() {
+        for (asked, rows) in round.asked.iter_mut().zip(&mut round.rows) {
+            let Some(asked) = asked.take() else { continue };
             let first = round.q.len() / n;
             round.q.extend_from_slice(&asked.q);
             round.v.extend_from_slice(&asked.v);
-            asked.rows = first..round.q.len() / n;
+            *rows = first..round.q.len() / n;
             request = request | asked.request;
         }
         round.complete = self.model.terms(&round.q, &round.v, request, &mut round.terms).is_ok();
@@ -102,7 +105,7 @@ impl<S: Scalar> EulerLagrange<S> for Member<'_, '_, S> {
 
     fn terms(&self, q: &[S], v: &[S], request: Request, terms: &mut Terms<S>) -> Result<(), MechanicsError> {
         let mut round = self.group.lock();
-        round.asked[self.index] = Some(Asked { q: q.to_vec(), v: v.to_vec(), request, rows: 0..0 });
+        round.asked[self.index] = Some(Asked { q: q.to_vec(), v: v.to_vec(), request });
         let number = round.number;
         while round.number == number {
             if round.asked.iter().flatten().count() == round.active {
@@ -111,8 +114,8 @@ impl<S: Scalar> EulerLagrange<S> for Member<'_, '_, S> {
                 round = self.group.evaluated.wait(round).unwrap_or_else(PoisonError::into_inner);
             }
         }
-        let rows = round.asked[self.index].take().map_or(0..0, |asked| asked.rows);
         if round.complete {
+            let rows = round.rows[self.index].clone();
             terms.copy_rows(&round.terms, self.coordinates(), rows, request);
             return Ok(());
         }
