@@ -2,28 +2,18 @@
 //!
 //! `cargo bench --bench network`; the suffix of a name is `n`, hidden width, batch, precision. Elements are states.
 
+#[path = "shared/networks.rs"]
+mod networks;
+
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use lnn::network::{Architecture, Chunk, Depth, Initialization, InputLayer, Nonlinearity, initial_weights};
+use lnn::network::{Architecture, Chunk, Depth, Initialization, initial_weights};
 use lnn::scalar::Scalar;
 use lnn::training::{Dataset, Method, Moments, Objective, Penalty, Update};
+use networks::architecture;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::hint::black_box;
 use std::time::Duration;
-
-/// Three hidden layers: the paper's "4 layers".
-fn architecture(n: usize, width: usize) -> Architecture {
-    Architecture {
-        coordinates: n,
-        hidden: vec![width; 3],
-        activation: Nonlinearity::Gelu,
-        alpha: 1.0,
-        scale: vec![10.0; n],
-        periodic: vec![false; n],
-        embed_periodic: false,
-        input_layer: InputLayer::None,
-    }
-}
 
 struct Setup<S> {
     architecture: Architecture,
@@ -32,7 +22,7 @@ struct Setup<S> {
 }
 
 fn setup<S: Scalar>(n: usize, width: usize, batch: usize) -> Setup<S> {
-    let architecture = architecture(n, width);
+    let architecture = architecture(n, width, 1.0);
     let mut rng = ChaCha8Rng::seed_from_u64(7);
     let weights = initial_weights(&architecture, Initialization::Default, &mut rng);
     let mut draw = || (0..batch * n).map(|_| S::of_f64(rng.random_range(-10.0..10.0))).collect();

@@ -3,18 +3,19 @@
 //!
 //! `cargo bench --bench cost` takes some minutes and prints Markdown tables; `-- --smoke` seconds.
 
+#[path = "../shared/networks.rs"]
+mod networks;
 #[path = "../peers/products.rs"]
 mod products;
 #[path = "../shared/turns.rs"]
 mod turns;
 
 use lnn::lagrangian::{EulerLagrange, Request, Terms};
-use lnn::network::{
-    Architecture, Chunk, Depth, Initialization, InputLayer, NetworkLagrangian, Nonlinearity, initial_weights,
-};
+use lnn::network::{Architecture, Chunk, Depth, Initialization, NetworkLagrangian, initial_weights};
 use lnn::rollout::{rollout_many, rollout_together};
 use lnn::scalar::Scalar;
 use lnn::training::{Dataset, Objective, Penalty};
+use networks::architecture;
 use products::Products;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -26,7 +27,6 @@ use turns::{Work, in_turns};
 const TURN: Duration = Duration::from_millis(60);
 
 const BATCH: usize = 128;
-const LAYERS: usize = 3;
 
 struct Options {
     smoke: bool,
@@ -38,20 +38,6 @@ impl Options {
     }
     fn rounds(&self) -> usize {
         if self.smoke { 1 } else { 15 }
-    }
-}
-
-/// A network whose mass matrices are all positive definite, or with `alpha = -1` none of them.
-fn architecture(n: usize, width: usize, alpha: f64) -> Architecture {
-    Architecture {
-        coordinates: n,
-        hidden: vec![width; LAYERS],
-        activation: Nonlinearity::Gelu,
-        alpha,
-        scale: vec![10.0; n],
-        periodic: vec![false; n],
-        embed_periodic: false,
-        input_layer: InputLayer::None,
     }
 }
 
@@ -152,7 +138,7 @@ fn requests(options: &Options) {
         wide.step("step, no penalty, f64", Penalty::None, 1),
     ];
     in_turns(&mut work, options.rounds(), TURN);
-    println!("\n### Requests: n = {n}, {LAYERS} x {width}, batch {BATCH}, f32, one thread unless said\n");
+    println!("\n### Requests: n = {n}, 3 x {width}, batch {BATCH}, f32, one thread unless said\n");
     println!("| request | us per state | of a step |\n|---|---|---|");
     for w in &work {
         println!("| {} | {:.2} | {:.3} |", w.name, w.median() * 1e6 / BATCH as f64, w.times_of(&work[0]));
@@ -172,7 +158,7 @@ fn coordinates(options: &Options) {
     let mut work: Vec<Work<'_>> = setups.iter().map(|s| s.step("step", Penalty::None, 1)).collect();
     work.extend(setups.iter().map(|s| s.products("products", 1)));
     in_turns(&mut work, options.rounds(), TURN);
-    println!("\n### Coordinates: step without penalty, {LAYERS} x {width}, batch {BATCH}, f32, one thread\n");
+    println!("\n### Coordinates: step without penalty, 3 x {width}, batch {BATCH}, f32, one thread\n");
     println!("| n | ms | over its n + 11 bare products | over n = 2 | (n + 11)/13 |\n|---|---|---|---|---|");
     for (k, n) in counts.into_iter().enumerate() {
         let (step, products) = (&work[k], &work[counts.len() + k]);
@@ -188,10 +174,7 @@ fn latency<S: Scalar>(options: &Options) {
     let counts = [1, 2, 4, 8, 16, 64];
     work.extend(counts.map(|count| setup.accelerations(&format!("{count}"), count)));
     in_turns(&mut work, options.rounds(), TURN);
-    println!(
-        "\n### Latency: accelerations inside an integrator, n = {n}, {LAYERS} x {width}, {}, one thread\n",
-        S::NAME
-    );
+    println!("\n### Latency: accelerations inside an integrator, n = {n}, 3 x {width}, {}, one thread\n", S::NAME);
     println!("Weights read once: {:.1} us; n + 3 = {} passes.\n", work[0].median() * 1e6, n + 3);
     println!("| states | us | us per state | over n + 3 readings of the weights |\n|---|---|---|---|");
     for (w, count) in work[1..].iter().zip(counts) {

@@ -5,11 +5,14 @@
 //! `accelerations S` answer with nanoseconds, one number per run, of at least three runs and about `S` seconds.
 //! That is with the argument `serve`; without it everything is tried once.
 
+#[path = "../shared/networks.rs"]
+mod networks;
 mod products;
 
-use lnn::network::{Architecture, Initialization, InputLayer, Nonlinearity, initial_weights};
+use lnn::network::{Architecture, Initialization, initial_weights};
 use lnn::scalar::Scalar;
 use lnn::training::{Dataset, Objective, Penalty};
+use networks::{SCALE, architecture};
 use products::Products;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -19,8 +22,6 @@ use std::time::{Duration, Instant};
 
 type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
 
-/// Scale of every coordinate; the peers work in scaled ones.
-const SCALE: f64 = 10.0;
 const THREADS: usize = 2;
 /// Sylvester's penalty, in the paper's form; `engines.py` has the same weight.
 const PENALTY: Penalty = Penalty::Sylvester { lambda: 10.0, time: None };
@@ -80,16 +81,7 @@ fn setup(words: &[&str]) -> Outcome<Box<dyn Timed>> {
         return Err("expected: setup DIR N WIDTH BATCH PRECISION ALPHA".into());
     };
     let (n, width, batch): (usize, usize, usize) = (n.parse()?, width.parse()?, batch.parse()?);
-    let architecture = Architecture {
-        coordinates: n,
-        hidden: vec![width; 3],
-        activation: Nonlinearity::Gelu,
-        alpha: alpha.parse()?,
-        scale: vec![SCALE; n],
-        periodic: vec![false; n],
-        embed_periodic: false,
-        input_layer: InputLayer::None,
-    };
+    let architecture = architecture(n, width, alpha.parse()?);
     let mut rng = ChaCha8Rng::seed_from_u64(7);
     let weights: Vec<f64> = initial_weights(&architecture, Initialization::Default, &mut rng);
     let mut draw = || (0..batch * n).map(|_| rng.random_range(-SCALE..SCALE)).collect::<Vec<f64>>();
@@ -100,6 +92,7 @@ fn setup(words: &[&str]) -> Outcome<Box<dyn Timed>> {
         let bytes: Vec<u8> = numbers.iter().flat_map(|x| x.to_le_bytes()).collect();
         std::fs::write(Path::new(directory).join(name), bytes)
     };
+    // The peers work in scaled coordinates.
     let scaled = |x: &[f64]| x.iter().map(|x| x / SCALE).collect::<Vec<f64>>();
     write("weights", &weights)?;
     for (name, numbers) in ["x", "w", "a"].iter().zip(&states) {
