@@ -67,6 +67,9 @@ impl Args {
                     let problem = format!("{} is about {:?}, not {system:?}", path.display(), config.system);
                     return Err(CliError::usage(problem));
                 }
+                // Before the arguments change anything: what is wrong here is the file's.
+                configure::<f64>(&config.system, &given(&config.parameters))
+                    .map_err(|e| CliError::usage(format_args!("{}: {e}", path.display())))?;
                 config
             }
             None => self.preset_config()?,
