@@ -5,6 +5,7 @@
 
 #[path = "../peers/products.rs"]
 mod products;
+#[path = "../shared/turns.rs"]
 mod turns;
 
 use lnn::lagrangian::{EulerLagrange, Request, Terms};
@@ -18,7 +19,11 @@ use products::Products;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::hint::black_box;
-use turns::{ROUNDS, Work, in_turns};
+use std::time::Duration;
+use turns::{Work, in_turns};
+
+/// Time of one turn.
+const TURN: Duration = Duration::from_millis(60);
 
 const BATCH: usize = 128;
 const LAYERS: usize = 3;
@@ -32,7 +37,7 @@ impl Options {
         if self.smoke { 32 } else { 500 }
     }
     fn rounds(&self) -> usize {
-        if self.smoke { 1 } else { ROUNDS }
+        if self.smoke { 1 } else { 15 }
     }
 }
 
@@ -146,7 +151,7 @@ fn requests(options: &Options) {
         plain.products("bare products, two threads", 2),
         wide.step("step, no penalty, f64", Penalty::None, 1),
     ];
-    in_turns(&mut work, options.rounds());
+    in_turns(&mut work, options.rounds(), TURN);
     println!("\n### Requests: n = {n}, {LAYERS} x {width}, batch {BATCH}, f32, one thread unless said\n");
     println!("| request | us per state | of a step |\n|---|---|---|");
     for w in &work {
@@ -166,7 +171,7 @@ fn coordinates(options: &Options) {
     let setups = counts.map(|n| Setup::<f32>::new(n, width, 1.0));
     let mut work: Vec<Work<'_>> = setups.iter().map(|s| s.step("step", Penalty::None, 1)).collect();
     work.extend(setups.iter().map(|s| s.products("products", 1)));
-    in_turns(&mut work, options.rounds());
+    in_turns(&mut work, options.rounds(), TURN);
     println!("\n### Coordinates: step without penalty, {LAYERS} x {width}, batch {BATCH}, f32, one thread\n");
     println!("| n | ms | over its n + 11 bare products | over n = 2 | (n + 11)/13 |\n|---|---|---|---|---|");
     for (k, n) in counts.into_iter().enumerate() {
@@ -182,7 +187,7 @@ fn latency<S: Scalar>(options: &Options) {
     let mut work = vec![setup.stream("weights read once")];
     let counts = [1, 2, 4, 8, 16, 64];
     work.extend(counts.map(|count| setup.accelerations(&format!("{count}"), count)));
-    in_turns(&mut work, options.rounds());
+    in_turns(&mut work, options.rounds(), TURN);
     println!(
         "\n### Latency: accelerations inside an integrator, n = {n}, {LAYERS} x {width}, {}, one thread\n",
         S::NAME
@@ -213,7 +218,7 @@ fn ensembles(options: &Options) {
                 black_box(rollout_together(&network, &starts, &rollout, threads));
             }),
         ];
-        in_turns(&mut work, options.rounds());
+        in_turns(&mut work, options.rounds(), TURN);
         let [alone, together] = [&work[0], &work[1]].map(|w| w.median() * 1e3 / starts.len() as f64);
         println!("| {width} | {threads} | {alone:.2} | {together:.2} | {:.2} |", work[0].times_of(&work[1]));
     };

@@ -59,12 +59,8 @@ impl Options {
     /// What is wrong with them, in words.
     pub fn parse(arguments: &[String]) -> Result<Self, String> {
         let target = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("target");
-        let mut options = Self {
-            scale: Scale::Full,
-            parts: Vec::new(),
-            model: None,
-            out: target.join("work-precision"),
-        };
+        let mut options =
+            Self { scale: Scale::Full, parts: Vec::new(), model: None, out: target.join("work-precision") };
         if !arguments.iter().any(|argument| argument == "--bench") {
             let (scale, parts, out) = (Scale::Smoke, Part::ALL.to_vec(), target.join("work-precision-smoke"));
             return Ok(Self { scale, parts, out, ..options });

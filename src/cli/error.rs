@@ -73,7 +73,7 @@ impl fmt::Display for CliError {
 impl std::error::Error for CliError {}
 
 /// Lines joined by a space, control characters written out: an error is one line whatever a file name contains.
-fn one_line(text: &str) -> String {
+pub(super) fn one_line(text: &str) -> String {
     let joined = text.lines().map(str::trim).filter(|line| !line.is_empty()).collect::<Vec<_>>().join(" ");
     joined.chars().fold(String::with_capacity(joined.len()), |mut line, c| {
         if c.is_control() {

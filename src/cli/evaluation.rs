@@ -4,7 +4,7 @@ use crate::analysis::{
     AccelerationError, Axis, StartBox, TrajectoryRun, TrajectorySummary, TrajectoryTest, acceleration_errors,
     determinant_grid, lagrangian_grid, wrong_signatures,
 };
-use crate::cli::CliError;
+use crate::cli::{CliError, memory};
 use crate::lagrangian::{Configured, EulerLagrange};
 use crate::report::{Figure, Fit, GridComparison, PlotError, Report, evaluation_figures, grid_figures, text_table};
 use serde::Serialize;
@@ -65,6 +65,9 @@ pub fn evaluate(
     let accelerations = acceleration_errors(exact.as_ref(), learned, plan.states.0, plan.states.1);
 
     let test = (system.system.trajectory)(n);
+    // Exact and learned.
+    let samples = test.t_end * plan.horizon / test.dt;
+    memory::require("the evaluation", memory::motions((plan.starts as u64).saturating_mul(2), samples, n, 0))?;
     let bounds = StartBox { q: test.start.positions, v: test.start.velocities };
     let test = TrajectoryTest {
         starts: plan.starts,

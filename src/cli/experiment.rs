@@ -1,13 +1,13 @@
 //! `lnn experiment`: the paper's tables and figures, one command each; finished runs are not run again.
 
 use crate::cli::folder::Folder;
-use crate::cli::learning::{CAPTIONS, Effort, Learning, learn};
+use crate::cli::learning::{Begin, CAPTIONS, Effort, Keeping, Learning, forget, learn};
 use crate::cli::number::{count, threads};
 use crate::cli::progress::Progress as Bar;
 use crate::cli::{CliError, interrupt, output};
 use crate::experiments::{Experiment, Outcome, Picture, Record, Run, Scale, experiments, find};
 use crate::report::{EXPERIMENT_HEADER, Figure, Report, experiment_figures, experiment_table, text_table};
-use crate::training::{Hooks, Stop};
+use crate::training::{Every, Hooks, Stop};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
@@ -139,7 +139,9 @@ fn one(run: &Run, scale: Scale, threads: usize, path: &Path, hooks: &Hooks) -> R
     run.config.validate(system.coordinates).map_err(CliError::data)?;
     let (starts, horizon) = scale.trajectories();
     let began = Instant::now();
-    let record = match learn(&folder, &run.config, &system, Effort { threads, starts, horizon }, hooks)? {
+    // A run that was stopped goes on from its checkpoint.
+    let keeping = Keeping { every: Every::Seconds(60.0), start: Begin::Either };
+    let record = match learn(&folder, &run.config, &system, Effort { threads, starts, horizon }, hooks, keeping)? {
         _ if hooks.interrupt.load(Ordering::SeqCst) => return Ok(None),
         Learning::Finished(finished) => {
             if let Stop::Failed(error) = &finished.stop {
@@ -152,9 +154,10 @@ fn one(run: &Run, scale: Scale, threads: usize, path: &Path, hooks: &Hooks) -> R
         }
     };
     folder.write("config.toml", toml.as_bytes())?;
-    // Last: what has a record is finished.
+    // What has a record is finished.
     let json = serde_json::to_string(&record).map_err(CliError::data)?;
     folder.write(RECORD, json.as_bytes())?;
+    forget(&folder)?;
     Ok(Some(record))
 }
 

@@ -1,12 +1,21 @@
 //! A directory that a command fills, held by one run at a time.
 
-use crate::cli::CliError;
-use crate::storage::write_atomically;
-use std::fs::{self, File, TryLockError};
+use crate::cli::holder::Holder;
+use crate::cli::{CliError, output};
+use crate::storage::{Disk, remove_leftovers, write_atomically};
+use std::fs::{self, File, OpenOptions, TryLockError};
+use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 
-/// Name of the file whose lock says that a run is writing here; the system frees it with the process.
+/// Name of the file whose lock says that a run is writing here, and whose text says which; the system frees the lock with
+/// the process.
 const LOCK: &str = ".lnn.lock";
+
+/// Longest text of a lock file that is read, in bytes.
+const LOCK_TEXT: u64 = 1024;
+
+/// Attempts to lock a file that others remove meanwhile.
+const ATTEMPTS: usize = 100;
 
 /// An output directory, created and found writable before any work starts.
 #[derive(Debug)]
@@ -16,19 +25,24 @@ pub struct Folder {
 }
 
 impl Folder {
-    /// Creates the directory if need be and takes its lock.
+    /// Creates the directory if need be, takes its lock, and removes what writers killed in the middle left.
     ///
     /// # Errors
     /// A data error if it cannot be created or written, or if another run holds it.
     pub fn open(path: &Path) -> Result<Self, CliError> {
         fs::create_dir_all(path).map_err(|e| CliError::file(path, format_args!("cannot create the directory: {e}")))?;
-        let lock = File::create(path.join(LOCK))
-            .map_err(|e| CliError::file(path, format_args!("cannot write into the directory: {e}")))?;
-        match lock.try_lock() {
-            Ok(()) => Ok(Self { path: path.to_path_buf(), _lock: lock }),
-            Err(TryLockError::WouldBlock) => Err(CliError::file(path, "another run is writing into this directory")),
-            Err(TryLockError::Error(e)) => Err(CliError::file(path, format_args!("cannot lock the directory: {e}"))),
+        for _ in 0..ATTEMPTS {
+            if let Some(lock) = lock(path)? {
+                remove_leftovers(&Disk, path);
+                return Ok(Self { path: path.to_path_buf(), _lock: lock });
+            }
         }
+        Err(CliError::file(path, "cannot lock the directory: others take and leave it all the time"))
+    }
+
+    /// The directory.
+    pub fn path(&self) -> &Path {
+        &self.path
     }
 
     /// Path of a file in it.
@@ -44,6 +58,51 @@ impl Folder {
         let path = self.file(name);
         write_atomically(&path, bytes).map_err(|e| CliError::file(&path, format_args!("cannot write: {e}")))
     }
+}
+
+/// The lock file of a directory, locked; `None` if its holder removed it meanwhile.
+fn lock(directory: &Path) -> Result<Option<File>, CliError> {
+    let path = directory.join(LOCK);
+    let mut file = OpenOptions::new()
+        .read(true)
+        .write(true)
+        .create(true)
+        .truncate(false)
+        .open(&path)
+        .map_err(|e| CliError::file(directory, format_args!("cannot write into the directory: {e}")))?;
+    let before = text(&mut file);
+    let cannot = |e: io::Error| CliError::file(directory, format_args!("cannot lock the directory: {e}"));
+    match file.try_lock() {
+        Ok(()) => {}
+        Err(TryLockError::WouldBlock) => {
+            let holder = Holder::parse(&before).map(|holder| format!(" ({holder})")).unwrap_or_default();
+            let problem = format!("another run is writing into this directory{holder}");
+            return Err(CliError::file(directory, problem));
+        }
+        Err(TryLockError::Error(e)) => return Err(cannot(e)),
+    }
+    let own = Holder::this().text();
+    file.set_len(0).and_then(|()| io::Seek::rewind(&mut file)).map_err(cannot)?;
+    file.write_all(own.as_bytes()).and_then(|()| file.flush()).map_err(cannot)?;
+    // A holder that removed the file between opening and locking left a lock on a file without a name.
+    match File::open(&path).map(|mut named| text(&mut named)) {
+        Ok(named) if named == own => {}
+        Ok(_) => return Ok(None),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
+        Err(error) => return Err(cannot(error)),
+    }
+    if let Some(holder) = Holder::parse(&before) {
+        output::note(&format!("{}: taken over from {holder}, which is gone", directory.display()));
+    }
+    Ok(Some(file))
+}
+
+/// The beginning of a file, as far as it is text.
+fn text(file: &mut File) -> String {
+    let mut text = String::new();
+    // What cannot be read tells nothing about the holder; the lock itself is what counts.
+    let _ = file.take(LOCK_TEXT).read_to_string(&mut text);
+    text
 }
 
 impl Drop for Folder {
@@ -62,7 +121,12 @@ mod tests {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("a/b");
         let first = Folder::open(&path).unwrap();
-        assert!(Folder::open(&path).unwrap_err().to_string().ends_with("another run is writing into this directory"));
+        let refusal = Folder::open(&path).unwrap_err().to_string();
+        let holder = format!("(process {} on ", std::process::id());
+        assert!(
+            refusal.contains("another run is writing into this directory") && refusal.contains(&holder),
+            "{refusal}"
+        );
         first.write("x", b"1").unwrap();
         assert!(first.write("missing/x", b"1").is_err());
         drop(first);
@@ -71,5 +135,30 @@ mod tests {
         assert!(Folder::open(&path.join("x")).is_err());
         drop(again);
         assert_eq!(fs::read_dir(&path).unwrap().count(), 1);
+        // What a killed run left is taken over.
+        fs::write(path.join(LOCK), "process 1\nhost elsewhere\nsince 0\n").unwrap();
+        fs::write(path.join(".x.4194999.0.tmp"), "half").unwrap();
+        drop(Folder::open(&path).unwrap());
+        assert_eq!(fs::read_dir(&path).unwrap().count(), if Path::new("/proc/self").exists() { 1 } else { 2 });
+    }
+
+    #[test]
+    fn of_many_at_once_one_gets_it() {
+        let directory = tempfile::tempdir().unwrap();
+        let inside = std::sync::atomic::AtomicUsize::new(0);
+        let ordering = std::sync::atomic::Ordering::SeqCst;
+        std::thread::scope(|scope| {
+            for _ in 0..8 {
+                scope.spawn(|| {
+                    for _ in 0..200 {
+                        if let Ok(folder) = Folder::open(directory.path()) {
+                            assert_eq!(inside.fetch_add(1, ordering), 0);
+                            assert_eq!(inside.fetch_sub(1, ordering), 1);
+                            drop(folder);
+                        }
+                    }
+                });
+            }
+        });
     }
 }

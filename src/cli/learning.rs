@@ -1,23 +1,26 @@
 //! One training from configuration to files: model, history, summary, pictures, report.
 
 use crate::analysis::{stretches, training_instability};
-use crate::cli::CliError;
 use crate::cli::evaluation::{Evaluation, Plan, evaluate};
 use crate::cli::folder::Folder;
 use crate::cli::learned::given;
+use crate::cli::{CliError, memory, output};
 use crate::experiments::{Outcome, Record};
 use crate::lagrangian::system::Size;
 use crate::lagrangian::{Configured, configure};
 use crate::network::file::{FORMAT, Header, ModelFile, StoredPrecision};
-use crate::network::{Architecture, NetworkLagrangian};
+use crate::network::{Architecture, Layout, NetworkLagrangian};
 use crate::report::{HistoryRow, Report, training_figures};
 use crate::scalar::Scalar;
+use crate::storage::Disk;
 use crate::training::{
-    Config, Datasets, Epoch, Hooks, Phase, Precision, SamplingError, Stop, TrainingError, sample_all, train,
+    Config, Datasets, Epoch, Every, Hooks, Identity, Keeper, NEWEST, PREVIOUS, Phase, Precision, Restored,
+    SamplingError, Sitting, Snapshot, Stop, TrainingError, remove_checkpoints, resume, sample_all, training_memory,
 };
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
+use std::sync::Arc;
 use std::time::Instant;
 
 /// What `summary.json` holds; losses in the paper's convention, errors in physical units.
@@ -71,6 +74,61 @@ pub struct Finished {
     pub record: Record,
 }
 
+/// Where a training begins.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Begin {
+    /// At its beginning.
+    Anew,
+    /// At its checkpoint, which must be there.
+    Resume,
+    /// At its checkpoint if there is one that fits, at its beginning if not.
+    Either,
+}
+
+/// How a training keeps checkpoints.
+#[derive(Clone, Copy, Debug)]
+pub struct Keeping {
+    /// How often one is written.
+    pub every: Every,
+    /// Whether one is read.
+    pub start: Begin,
+}
+
+/// The checkpoint to go on from, or nothing, with old checkpoints out of the way.
+fn begin<S: Scalar>(
+    keeper: &Keeper,
+    folder: &Folder,
+    parameters: usize,
+    states: usize,
+    start: Begin,
+) -> Result<Option<Snapshot<S>>, CliError> {
+    if start != Begin::Anew {
+        match keeper.restore(parameters, states) {
+            Ok(Restored { content, fallback }) => {
+                if let Some(problem) = fallback {
+                    let (newest, previous) = (folder.file(NEWEST), folder.file(PREVIOUS));
+                    let place = newest.display();
+                    output::note(&format!("{place}: {problem}; going on from {}", previous.display()));
+                }
+                return Ok(Some(content));
+            }
+            Err(error) if start == Begin::Resume => return Err(CliError::file(folder.path(), error)),
+            Err(_) => {}
+        }
+    }
+    forget(folder)?;
+    Ok(None)
+}
+
+/// Removes the checkpoints of a training that is over.
+///
+/// # Errors
+/// A data error naming the directory.
+pub fn forget(folder: &Folder) -> Result<(), CliError> {
+    let cannot = |e| CliError::file(folder.path(), format_args!("cannot remove checkpoints: {e}"));
+    remove_checkpoints(&Disk, folder.path()).map_err(cannot)
+}
+
 /// How a training went.
 #[derive(Debug)]
 pub enum Learning {
@@ -80,7 +138,8 @@ pub enum Learning {
     Nothing(String),
 }
 
-/// Trains in the configuration's precision and writes everything into the directory; files as [`learn`] says.
+/// Trains in the configuration's precision and writes everything into the directory. Checkpoints stay until
+/// [`forget`].
 ///
 /// # Errors
 /// A usage error for bounds that cannot be sampled and for penalties that do not fit, a data error for files that cannot be
@@ -91,10 +150,11 @@ pub fn learn(
     system: &Configured<f64>,
     effort: Effort,
     hooks: &Hooks,
+    keeping: Keeping,
 ) -> Result<Learning, CliError> {
     match config.precision {
-        Precision::F32 => learn_in::<f32>(folder, config, system, effort, hooks),
-        Precision::F64 => learn_in::<f64>(folder, config, system, effort, hooks),
+        Precision::F32 => learn_in::<f32>(folder, config, system, effort, hooks, keeping),
+        Precision::F64 => learn_in::<f64>(folder, config, system, effort, hooks, keeping),
     }
 }
 
@@ -104,8 +164,11 @@ fn learn_in<S: Scalar>(
     system: &Configured<f64>,
     effort: Effort,
     hooks: &Hooks,
+    keeping: Keeping,
 ) -> Result<Learning, CliError> {
     let started = Instant::now();
+    let unscaled = config.architecture(system, vec![1.0; system.coordinates]);
+    memory::require("training", training_memory(config, &unscaled))?;
     let (data, scale) = sample_all::<S>(config, system).map_err(|e| match e {
         SamplingError::Dataset(_) => CliError::data(e),
         _ => CliError::usage(e),
@@ -114,7 +177,13 @@ fn learn_in<S: Scalar>(
     let architecture = config.architecture(system, scale);
     let imposed = imposed_velocities(system, &data);
     let fresh = (data.test.cast::<f64>().q().to_vec(), data.test.cast::<f64>().v().to_vec());
-    let trained = match train(config, &architecture, penalty, data, effort.threads, hooks) {
+    let toml = toml::to_string(config).map_err(CliError::data)?;
+    let identity = Identity { config: toml.clone(), data: data.checksums() };
+    let keeper = Arc::new(Keeper::new(Arc::new(Disk), folder.path(), keeping.every, identity));
+    let parameters = Layout::new(&architecture).parameters;
+    let start = begin(&keeper, folder, parameters, config.data.training, keeping.start)?;
+    let sitting = Sitting { keeper: Some(keeper), start };
+    let trained = match resume(config, &architecture, penalty, data, effort.threads, hooks, sitting) {
         Ok(trained) => trained,
         Err(error @ TrainingError::NothingLearned(_)) => return Ok(Learning::Nothing(error.to_string())),
         Err(error) => return Err(CliError::data(error)),
@@ -123,7 +192,6 @@ fn learn_in<S: Scalar>(
     // The model and its history first: nothing that comes after can lose them.
     let header = header(config, system, architecture.clone(), imposed, trained.validation_loss)?;
     let model = ModelFile { header, weights: trained.weights.clone() };
-    let toml = toml::to_string(config).map_err(CliError::data)?;
     let file = folder.file("model.safetensors");
     folder.write("config.toml", toml.as_bytes())?;
     folder.write("history.csv", history(&trained.history).as_bytes())?;

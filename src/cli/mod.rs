@@ -4,19 +4,23 @@
 //! arguments or configuration, 130 Ctrl-C. A failure is one line, `error: FILE: row 3, column theta1: ...`.
 
 mod config;
+mod differences;
 mod error;
 mod evaluate;
 mod evaluation;
 mod experiment;
 mod folder;
+mod holder;
 mod inspect;
 mod interrupt;
 mod json;
 mod learned;
 mod learning;
+mod memory;
 mod number;
 mod output;
 mod progress;
+mod resume;
 mod rollout;
 mod source;
 mod states;

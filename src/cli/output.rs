@@ -11,3 +11,8 @@ pub fn print(text: &str) -> Result<(), CliError> {
     let mut out = std::io::stdout().lock();
     out.write_all(text.as_bytes()).and_then(|()| out.flush()).map_err(|e| CliError::output(&e))
 }
+
+/// A remark on standard error, one line; if that is closed, there is nobody to tell.
+pub fn note(text: &str) {
+    let _ = writeln!(std::io::stderr(), "note: {}", crate::cli::error::one_line(text));
+}

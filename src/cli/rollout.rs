@@ -2,7 +2,7 @@
 
 use crate::cli::learned::Learned;
 use crate::cli::number::{finite, positive};
-use crate::cli::{CliError, output};
+use crate::cli::{CliError, memory, output};
 use crate::lagrangian::find;
 use crate::rollout::{Method, Options, RolloutError, rollout};
 use crate::storage::write_atomically;
@@ -89,6 +89,11 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         domain: Some(learned.domain()),
         ..Options::new(args.t_end, args.dt)
     };
+    if options.check(q.len()).is_ok() {
+        // A number and its comma in the CSV.
+        const TEXT: u64 = 2 * 25;
+        memory::require("the motion", memory::motions(1, args.t_end / args.dt, q.len(), TEXT))?;
+    }
     let result = rollout(&learned.network, q, v, &options);
     if let Some(error @ RolloutError::Invalid { .. }) = &result.stop {
         return Err(CliError::usage(error));

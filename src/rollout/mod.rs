@@ -12,23 +12,24 @@
 mod chord;
 mod compensated;
 mod dense;
+mod ensemble;
 mod error;
 mod fixed;
 mod gauss;
+mod group;
 mod ode;
 mod options;
 mod phase;
 mod run;
-mod together;
 mod trajectory;
 mod variational;
 
+pub use ensemble::{rollout_many, rollout_together};
 pub use error::{RolloutError, UnderflowCause};
 pub use ode::Integrable;
 pub use options::{Domain, Method, Options};
 use run::Failure;
-pub use run::{Rollout, rollout, rollout_fixed, rollout_many};
-pub use together::rollout_together;
+pub use run::{Rollout, rollout, rollout_fixed};
 pub use trajectory::{Statistics, Trajectory};
 
 #[cfg(test)]

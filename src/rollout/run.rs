@@ -2,12 +2,9 @@
 
 use super::fixed::{self, Stepper};
 use super::ode::{Adaptive, Ended, Task};
-use super::together::{self, rollout_together};
 use super::{Integrable, Method, Options, RolloutError, Statistics, Trajectory, UnderflowCause};
 use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Terms};
 use crate::scalar::Scalar;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// What a roll-out brought.
 #[derive(Clone, Debug, PartialEq)]
@@ -178,47 +175,6 @@ pub fn rollout_fixed<S: Scalar>(model: &dyn EulerLagrange<S>, q: &[S], v: &[S], 
         result.trajectory.energy = Some(result.trajectory.energy_by(model));
     }
     result
-}
-
-/// Rolls out every start `(q, v)`; the results keep the order of the starts and do not depend on `threads`.
-///
-/// Large ensembles of a model that [`EulerLagrange::prefers_batches`] advance as [`rollout_together`] does.
-pub fn rollout_many<S: Integrable>(
-    model: &dyn EulerLagrange<S>,
-    starts: &[(Vec<S>, Vec<S>)],
-    options: &Options<S>,
-    threads: usize,
-) -> Vec<Rollout<S>> {
-    if model.prefers_batches() && starts.len() > together::GROUP {
-        return rollout_together(model, starts, options, threads);
-    }
-    in_order(starts, threads, |(q, v)| rollout(model, q, v, options))
-}
-
-/// `work` on every item, by so many threads; the results keep the order of the items.
-pub(super) fn in_order<T: Sync, R: Send>(items: &[T], threads: usize, work: impl Fn(&T) -> R + Sync) -> Vec<R> {
-    let threads = threads.clamp(1, items.len().max(1));
-    if threads == 1 {
-        return items.iter().map(work).collect();
-    }
-    let next = AtomicUsize::new(0);
-    let done = Mutex::new(Vec::with_capacity(items.len()));
-    std::thread::scope(|scope| {
-        for _ in 0..threads {
-            scope.spawn(|| {
-                while let Some((k, item)) = {
-                    let k = next.fetch_add(1, Ordering::Relaxed);
-                    items.get(k).map(|item| (k, item))
-                } {
-                    let result = work(item);
-                    done.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push((k, result));
-                }
-            });
-        }
-    });
-    let mut done = done.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
-    done.sort_by_key(|(k, _)| *k);
-    done.into_iter().map(|(_, result)| result).collect()
 }
 
 fn check<S: Scalar>(n: usize, q: &[S], v: &[S], options: &Options<S>) -> Result<(), RolloutError> {

@@ -1,5 +1,7 @@
 //! States with their accelerations: what a network learns from.
 
+use crate::network::file::StoredPrecision;
+use crate::network::file::container::checksum;
 use crate::scalar::Scalar;
 use thiserror::Error;
 
@@ -102,6 +104,11 @@ impl<S: Scalar> Dataset<S> {
     pub fn velocity_range(&self, i: usize) -> [f64; 2] {
         let all = self.v.iter().skip(i).step_by(self.coordinates).map(|v| v.to_f64());
         all.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(v), high.max(v)])
+    }
+
+    /// CRC-32 of coordinates, velocities and accelerations in double precision.
+    pub fn checksum(&self) -> u32 {
+        checksum(self.q.iter().chain(&self.v).chain(&self.a), StoredPrecision::F64)
     }
 
     /// The same states in another precision.

@@ -1,7 +1,9 @@
 //! Datasets, losses, regularizers, optimisers hosted by argmin, the trainer.
 
+mod checkpoint;
 mod config;
 mod dataset;
+mod memory;
 mod objective;
 mod optimizer;
 mod penalty;
@@ -14,8 +16,12 @@ mod signature;
 mod solver;
 mod trainer;
 
+pub use checkpoint::{
+    CheckpointError, Every, Identity, Keeper, NEWEST, PREVIOUS, Restored, Saved, Snapshot, remove_checkpoints, saved,
+};
 pub use config::{Config, ConfigError, Data, Network, OnFailure, Optimizer, Phase, Polish, Precision, Scaling};
 pub use dataset::{Dataset, DatasetError};
+pub use memory::training_memory;
 pub use objective::{BatchReport, Failure, Objective};
 pub use optimizer::{Method, Moments, Update};
 pub use penalty::{Penalty, Regularizer};
@@ -28,4 +34,4 @@ pub use signature::{
     sylvester_violation,
 };
 pub use solver::{Epoch, EpochSolver, Hooks, Progress, StepError, TrainingProblem, TrainingState, Watcher};
-pub use trainer::{Datasets, Stop, Stream, Trained, TrainingError, train};
+pub use trainer::{Datasets, Sitting, Stop, Stream, Trained, TrainingError, resume, train};

@@ -17,9 +17,9 @@ use crate::training::signature::{
 use rayon::prelude::*;
 
 /// States evaluated together.
-const CHUNK: usize = 64;
+pub(super) const CHUNK: usize = 64;
 /// Stripes a batch is cut into at most; each has its own gradient.
-const STRIPES: usize = 8;
+pub(super) const STRIPES: usize = 8;
 
 /// What a batch came to.
 #[derive(Clone, Copy, Debug, PartialEq)]

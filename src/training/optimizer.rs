@@ -44,6 +44,16 @@ impl<S: Scalar> Moments<S> {
         Self { first: zeros.clone(), second: zeros, step: 0 }
     }
 
+    /// First moments, second moments and the steps they are made of.
+    pub(super) fn parts(&self) -> (&[S], &[S], u32) {
+        (&self.first, &self.second, self.step)
+    }
+
+    /// Moments from their [parts](Moments::parts).
+    pub(super) fn from_parts(first: Vec<S>, second: Vec<S>, step: u32) -> Self {
+        Self { first, second, step }
+    }
+
     /// Updates `weights` in place; returns the gradient's norm before clipping.
     ///
     /// A gradient that is not finite changes nothing; its norm, infinite or `NaN`, is returned.

@@ -4,6 +4,7 @@
 //! absolute value, whose kinks end the line search sooner or later; what stands then is the iterate of the lowest
 //! validation loss, which may be the start.
 
+use crate::training::checkpoint::Clock;
 use crate::training::config::Polish;
 use crate::training::dataset::Dataset;
 use crate::training::objective::{BatchReport, Objective};
@@ -14,7 +15,6 @@ use argmin::solver::linesearch::MoreThuenteLineSearch;
 use argmin::solver::quasinewton::LBFGS;
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::Instant;
 
 /// Evaluations an iteration may take on average; argmin's line searches know no limit.
 const EVALUATIONS: usize = 20;
@@ -35,8 +35,8 @@ pub(super) struct Start {
     pub validation_loss: f64,
     /// Last epoch and phase of the history so far.
     pub last: (usize, usize),
-    /// When training began.
-    pub started: Instant,
+    /// Time since training began.
+    pub clock: Clock,
     /// Who watches.
     pub hooks: Hooks,
 }
@@ -71,7 +71,7 @@ struct FullBatch {
     best_loss: f64,
     history: Vec<Epoch>,
     last: (usize, usize),
-    started: Instant,
+    clock: Clock,
 }
 
 impl FullBatch {
@@ -123,7 +123,7 @@ impl FullBatch {
             gradient_norm: self.gradient.iter().map(|g| g * g).sum::<f64>().sqrt(),
             left_out: report.left_out,
             skipped: 0,
-            seconds: self.started.elapsed().as_secs_f64(),
+            seconds: self.clock.seconds(),
         };
         if let Some(watcher) = &self.hooks.watcher {
             watcher(Progress::Epoch(&row));
@@ -201,7 +201,7 @@ pub(super) fn polish(settings: &Polish, start: Start) -> Result<Polished, String
         best_loss: start.validation_loss,
         history: Vec::new(),
         last: start.last,
-        started: start.started,
+        clock: start.clock,
     })));
     let search = MoreThuenteLineSearch::new().with_bounds(1e-10, 10.0).map_err(|e| e.to_string())?;
     let solver = LBFGS::new(search, settings.memory);

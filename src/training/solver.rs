@@ -1,9 +1,11 @@
 //! Stochastic training as an argmin solver: one iteration is one epoch, the cost is the validation loss.
 //!
 //! The parameters argmin sees are those that are validated (averaged, if averaging is on); the solver keeps the weights
-//! that move, their moments, the order of the data and the random state.
+//! that move, their moments, the order of the data and the random state: its course, which a checkpoint can hold between
+//! any two steps.
 
 use crate::scalar::{Real, Scalar};
+use crate::training::checkpoint::{Clock, Course, Ended, Keeper, Underway};
 use crate::training::config::{OnFailure, Optimizer, Phase};
 use crate::training::dataset::Dataset;
 use crate::training::objective::{Failure, Objective};
@@ -124,33 +126,35 @@ pub struct EpochSolver<S> {
     pub(super) optimizer: Optimizer,
     pub(super) phase: Phase,
     pub(super) phase_number: usize,
-    pub(super) rng: ChaCha8Rng,
-    pub(super) order: Vec<u32>,
-    pub(super) weights: Vec<S>,
-    pub(super) moments: Moments<S>,
-    pub(super) average: Vec<S>,
-    pub(super) averaged_steps: usize,
+    pub(super) course: Course<S>,
+    /// Whether the course began in an earlier sitting.
+    pub(super) restored: bool,
     pub(super) gradient: Vec<S>,
-    pub(super) epoch: usize,
-    pub(super) step: usize,
     pub(super) steps: usize,
-    pub(super) started: std::time::Instant,
+    pub(super) clock: Clock,
     pub(super) history: Vec<Epoch>,
     pub(super) stopped: Option<StepError>,
     pub(super) hooks: Hooks,
+    pub(super) saver: Option<Saver<S>>,
+}
+
+/// Who keeps the checkpoints, and what went before this phase.
+pub(super) struct Saver<S> {
+    pub(super) keeper: Arc<Keeper>,
+    pub(super) ended: Ended<S>,
 }
 
 /// Running means over the steps of an epoch.
-#[derive(Default)]
-struct Means {
-    loss: f64,
-    penalty: f64,
-    norm: f64,
-    penalised: usize,
-    left_out: usize,
-    skipped: usize,
-    taken: usize,
-    last_failure: Option<Failure>,
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Means {
+    pub(super) loss: f64,
+    pub(super) penalty: f64,
+    pub(super) norm: f64,
+    pub(super) penalised: usize,
+    pub(super) left_out: usize,
+    pub(super) skipped: usize,
+    pub(super) taken: usize,
+    pub(super) last_failure: Option<Failure>,
 }
 
 impl<S: Scalar> EpochSolver<S> {
@@ -162,20 +166,15 @@ impl<S: Scalar> EpochSolver<S> {
             optimizer,
             phase,
             phase_number: 1,
-            rng,
-            order: (0..states as u32).collect(),
-            weights: Vec::new(),
-            moments: Moments::new(0),
-            average: Vec::new(),
-            averaged_steps: 0,
+            course: Course::new(rng, states),
+            restored: false,
             gradient: Vec::new(),
-            epoch: 0,
-            step: 0,
             steps,
-            started: std::time::Instant::now(),
+            clock: Clock::after(0.0),
             history: Vec::new(),
             stopped: None,
             hooks: Hooks::default(),
+            saver: None,
         }
     }
 
@@ -195,12 +194,12 @@ impl<S: Scalar> EpochSolver<S> {
         problem: &mut TrainingProblem<S>,
         rows: std::ops::Range<usize>,
         rate: f64,
-        means: &mut Means,
     ) -> Result<(), StepError> {
-        self.step += 1;
-        let step = self.step;
-        let rows = &self.order[rows];
-        let report = problem.objective.step(&self.weights, &problem.training, rows, &mut self.gradient);
+        let Course { order, weights, moments, means, step, .. } = &mut self.course;
+        *step += 1;
+        let step = *step;
+        let rows = &order[rows];
+        let report = problem.objective.step(weights, &problem.training, rows, &mut self.gradient);
         if let Some(failure) = report.failure {
             means.last_failure = Some(failure);
             means.left_out += report.left_out;
@@ -219,7 +218,7 @@ impl<S: Scalar> EpochSolver<S> {
             weight_decay: self.optimizer.weight_decay,
             clip: self.optimizer.clip,
         };
-        let norm = self.moments.update(&mut self.weights, &self.gradient, &update);
+        let norm = moments.update(weights, &self.gradient, &update);
         if !norm.is_finite() {
             if self.optimizer.on_failure == OnFailure::Stop {
                 return Err(StepError::Gradient { step, norm });
@@ -227,13 +226,13 @@ impl<S: Scalar> EpochSolver<S> {
             means.skipped += 1;
             return Ok(());
         }
-        self.add_to_average();
         let loss = report.loss.to_f64();
         means.taken += 1;
         means.loss += loss;
         means.penalty += report.penalty.to_f64();
         means.penalised += report.penalised;
         means.norm += norm;
+        self.add_to_average();
         if let Some(watcher) = &self.hooks.watcher {
             watcher(Progress::Step { step, steps: self.steps, rate, loss });
         }
@@ -245,13 +244,14 @@ impl<S: Scalar> EpochSolver<S> {
         if self.optimizer.averaging == 0.0 {
             return;
         }
-        self.averaged_steps += 1;
-        let keep = self.optimizer.averaging.min(1.0 - 1.0 / self.averaged_steps as f64);
+        let Course { weights, average, averaged_steps, .. } = &mut self.course;
+        *averaged_steps += 1;
+        let keep = self.optimizer.averaging.min(1.0 - 1.0 / *averaged_steps as f64);
         let take = S::of_f64(1.0 - keep);
         crate::scalar::vectorized(
             #[inline(always)]
             || {
-                for (average, &w) in self.average.iter_mut().zip(&self.weights) {
+                for (average, &w) in average.iter_mut().zip(&*weights) {
                     *average += take * (w - *average);
                 }
             },
@@ -260,7 +260,21 @@ impl<S: Scalar> EpochSolver<S> {
 
     /// The weights that are validated and kept.
     fn validated(&self) -> &[S] {
-        if self.optimizer.averaging == 0.0 { &self.weights } else { &self.average }
+        if self.optimizer.averaging == 0.0 { &self.course.weights } else { &self.course.average }
+    }
+
+    /// Writes a checkpoint, if somebody keeps them and one is due.
+    fn save_if(&self, state: &TrainingState<S>, is_due: impl Fn(&Keeper) -> bool) {
+        let Some(Saver { keeper, ended }) = self.saver.as_ref().filter(|saver| is_due(&saver.keeper)) else { return };
+        let best = state.get_best_param().or(state.get_param());
+        let underway = Underway {
+            course: self.course.clone(),
+            history: self.history.clone(),
+            best: best.unwrap_or(&ended.weights).clone(),
+            best_loss: state.get_best_cost(),
+            best_epoch: state.get_last_best_iter(),
+        };
+        keeper.save(self.clock.seconds(), ended, Some(&underway));
     }
 }
 
@@ -277,13 +291,15 @@ impl<S: Scalar> Solver<TrainingProblem<S>, TrainingState<S>> for EpochSolver<S> 
         _problem: &mut Problem<TrainingProblem<S>>,
         state: TrainingState<S>,
     ) -> Result<(TrainingState<S>, Option<KV>), Error> {
-        if let Some(param) = state.get_param() {
-            self.weights.clone_from(param);
+        if !self.restored {
+            let course = &mut self.course;
+            if let Some(param) = state.get_param() {
+                course.weights.clone_from(param);
+            }
+            course.average.clone_from(&course.weights);
+            course.averaged_steps = 0;
+            course.moments = Moments::new(course.weights.len());
         }
-        self.average.clone_from(&self.weights);
-        self.averaged_steps = 0;
-        self.moments = Moments::new(self.weights.len());
-        self.gradient.resize(self.weights.len(), <S as Real>::zero());
         Ok((state, None))
     }
 
@@ -293,46 +309,57 @@ impl<S: Scalar> Solver<TrainingProblem<S>, TrainingState<S>> for EpochSolver<S> 
         state: TrainingState<S>,
     ) -> Result<(TrainingState<S>, Option<KV>), Error> {
         let problem = problem.problem.as_mut().ok_or_else(|| Error::msg("the training problem is missing"))?;
-        let begun: f64 = state.get_iter() as f64;
-        self.order.shuffle(&mut self.rng);
-        let batch = self.optimizer.batch.min(self.order.len());
-        let steps = self.order.len().div_ceil(batch);
-        let mut means = Means::default();
-        for k in 0..steps {
+        self.gradient.resize(self.course.weights.len(), <S as Real>::zero());
+        let begun: f64 = self.course.iteration as f64;
+        if self.course.batch == 0 {
+            let Course { order, rng, means, .. } = &mut self.course;
+            order.shuffle(rng);
+            *means = Means::default();
+        }
+        let states = self.course.order.len();
+        let batch = self.optimizer.batch.min(states);
+        let steps = states.div_ceil(batch);
+        while self.course.batch < steps {
+            let k = self.course.batch;
             let within = match self.phase.schedule {
                 Schedule::Cosine => k as f64 / steps as f64,
                 _ => 0.0,
             };
-            let rows = k * batch..((k + 1) * batch).min(self.order.len());
+            let rows = k * batch..((k + 1) * batch).min(states);
             let rate = self.rate(begun + within);
-            if let Err(error) = self.take_step(problem, rows, rate, &mut means) {
+            if let Err(error) = self.take_step(problem, rows, rate) {
                 self.stopped = Some(error);
                 return Ok((state, None));
             }
+            self.course.batch += 1;
             if self.hooks.interrupt.load(Ordering::Relaxed) {
                 return Ok((state, None));
             }
+            self.save_if(&state, Keeper::is_due);
         }
-        self.epoch += 1;
+        let means = std::mem::take(&mut self.course.means);
+        self.course.batch = 0;
+        self.course.iteration += 1;
+        self.course.epoch += 1;
         if let (0, Some(failure)) = (means.taken, means.last_failure) {
-            self.stopped = Some(StepError::NoProgress { epoch: self.epoch, failure });
+            self.stopped = Some(StepError::NoProgress { epoch: self.course.epoch, failure });
             return Ok((state, None));
         }
         let validation = problem.objective.loss(self.validated(), &problem.validation);
         let cost = validation.loss.to_f64();
         let taken = means.taken.max(1) as f64;
         let epoch = Epoch {
-            epoch: self.epoch,
+            epoch: self.course.epoch,
             phase: self.phase_number,
             rate: self.rate(begun),
             training_loss: means.loss / taken,
             penalty: means.penalty / taken,
-            penalised: means.penalised as f64 / self.order.len() as f64,
+            penalised: means.penalised as f64 / states as f64,
             validation_loss: cost,
             gradient_norm: means.norm / taken,
             left_out: means.left_out,
             skipped: means.skipped,
-            seconds: self.started.elapsed().as_secs_f64(),
+            seconds: self.clock.seconds(),
         };
         let record = kv!("training_loss" => epoch.training_loss; "rate" => epoch.rate; "penalty" => epoch.penalty;);
         if let Some(watcher) = &self.hooks.watcher {
@@ -346,13 +373,15 @@ impl<S: Scalar> Solver<TrainingProblem<S>, TrainingState<S>> for EpochSolver<S> 
         Ok((state.param(param).cost(cost), Some(record)))
     }
 
-    fn terminate(&mut self, _state: &TrainingState<S>) -> TerminationStatus {
-        match &self.stopped {
-            Some(error) => TerminationStatus::Terminated(TerminationReason::SolverExit(error.to_string())),
-            None if self.hooks.interrupt.load(Ordering::Relaxed) => {
-                TerminationStatus::Terminated(TerminationReason::Interrupt)
-            }
-            None => TerminationStatus::NotTerminated,
+    fn terminate(&mut self, state: &TrainingState<S>) -> TerminationStatus {
+        if let Some(error) = &self.stopped {
+            return TerminationStatus::Terminated(TerminationReason::SolverExit(error.to_string()));
         }
+        let interrupted = self.hooks.interrupt.load(Ordering::Relaxed);
+        self.save_if(state, |keeper| interrupted || keeper.is_due_after(self.course.epoch));
+        if interrupted {
+            return TerminationStatus::Terminated(TerminationReason::Interrupt);
+        }
+        TerminationStatus::NotTerminated
     }
 }

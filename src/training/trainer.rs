@@ -2,17 +2,18 @@
 
 use crate::network::{Architecture, initial_weights};
 use crate::scalar::Scalar;
+use crate::training::checkpoint::{Clock, Ended, Keeper, Snapshot, Underway};
 use crate::training::config::{Config, Phase};
 use crate::training::dataset::Dataset;
 use crate::training::objective::{BatchReport, Objective};
 use crate::training::penalty::Penalty;
 use crate::training::polish::{Start, polish};
-use crate::training::solver::{Epoch, EpochSolver, Hooks, StepError, TrainingProblem, TrainingState};
+use crate::training::solver::{Epoch, EpochSolver, Hooks, Saver, StepError, TrainingProblem, TrainingState};
 use argmin::core::observers::{Observe, ObserverMode};
 use argmin::core::{Error, Executor, KV, State, TerminationReason, TerminationStatus};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
-use std::time::Instant;
+use std::sync::Arc;
 use thiserror::Error;
 
 /// Streams of the random generator: one seed, independent draws for each purpose.
@@ -108,6 +109,24 @@ pub struct Datasets<S> {
     pub test: Dataset<S>,
 }
 
+impl<S: Scalar> Datasets<S> {
+    /// Name and checksum of each set: training of every phase, validation, test.
+    pub fn checksums(&self) -> Vec<(String, u32)> {
+        let training =
+            self.training.iter().enumerate().map(|(k, set)| (format!("training states of phase {}", k + 1), set));
+        let others = [("validation states".to_string(), &self.validation), ("test states".to_string(), &self.test)];
+        training.chain(others).map(|(name, set)| (name, set.checksum())).collect()
+    }
+}
+
+/// Where a training keeps its checkpoints and what it goes on from.
+pub struct Sitting<S> {
+    /// Keeps checkpoints, if anybody does.
+    pub keeper: Option<Arc<Keeper>>,
+    /// What [`Keeper::restore`] found, or nothing for a training from its beginning.
+    pub start: Option<Snapshot<S>>,
+}
+
 /// Trains a network of this shape with the configuration's penalty, resolved by [`Config::penalty`]; the configuration
 /// must have been validated.
 ///
@@ -123,40 +142,63 @@ pub fn train<S: Scalar>(
     threads: usize,
     hooks: &Hooks,
 ) -> Result<Trained<S>, TrainingError> {
-    let started = Instant::now();
+    resume(config, architecture, penalty, data, threads, hooks, Sitting { keeper: None, start: None })
+}
+
+/// [`train`] with checkpoints, and from one: the result is that of a training that was never stopped, but for the times.
+///
+/// A checkpoint must be of the same configuration and data, which [`Keeper::restore`] sees to.
+///
+/// # Errors
+/// As [`train`].
+pub fn resume<S: Scalar>(
+    config: &Config,
+    architecture: &Architecture,
+    penalty: Penalty,
+    data: Datasets<S>,
+    threads: usize,
+    hooks: &Hooks,
+    sitting: Sitting<S>,
+) -> Result<Trained<S>, TrainingError> {
     let objective =
         || Objective::new(architecture, penalty, threads).map_err(|source| TrainingError::Threads { threads, source });
-    let mut weights =
-        initial_weights(architecture, config.network.initialization, &mut Stream::Weights.generator(config.seed));
     let batches = |states: usize| states.div_ceil(config.optimizer.batch.min(states));
     let pairs = || config.phases.iter().zip(&data.training);
     let steps = pairs().map(|(phase, data)| phase.epochs * batches(data.len())).sum();
-    let mut progress = Run { history: Vec::new(), step: 0, states: 0, stop: Stop::Finished, best: f64::INFINITY };
-    for (number, (phase, training)) in config.phases.iter().zip(&data.training).enumerate() {
+    let Sitting { keeper, start } = sitting;
+    let Snapshot { seconds, mut ended, mut underway } = start.unwrap_or_else(|| {
+        let mut rng = Stream::Weights.generator(config.seed);
+        let weights = initial_weights(architecture, config.network.initialization, &mut rng);
+        Snapshot { seconds: 0.0, ended: Ended::none(weights), underway: None }
+    });
+    let clock = Clock::after(seconds);
+    let mut stop = Stop::Finished;
+    for (number, (phase, training)) in pairs().enumerate().skip(ended.phases) {
         let (training, validation) = (training.clone(), data.validation.clone());
         let problem = TrainingProblem { objective: objective()?, training, validation };
-        let mut solver = EpochSolver::new(
-            config.optimizer.clone(),
-            phase.clone(),
-            Stream::Order(number).generator(config.seed),
-            problem.training.len(),
-        );
+        let rng = Stream::Order(number).generator(config.seed);
+        let mut solver = EpochSolver::new(config.optimizer.clone(), phase.clone(), rng, problem.training.len());
         solver.phase_number = number + 1;
-        solver.epoch = progress.history.len();
-        solver.step = progress.step;
+        (solver.course.epoch, solver.course.step) = (ended.history.len(), ended.steps);
         solver.steps = steps;
-        solver.started = started;
+        solver.clock = clock;
         solver.hooks = hooks.clone();
-        if let Some(best) = progress.run_phase(problem, solver, phase, weights.clone())? {
-            weights = best;
-        }
-        if progress.stop != Stop::Finished {
+        solver.saver = keeper.clone().map(|keeper| Saver { keeper, ended: ended.clone() });
+        stop = run_phase(problem, solver, phase, &mut ended, underway.take())?;
+        if stop != Stop::Finished {
             break;
         }
     }
-    if let (Some(settings), Some(training), Stop::Finished) = (&config.polish, data.training.last(), &progress.stop)
-        && progress.best.is_finite()
+    let keep = |ended: &Ended<S>| {
+        if let Some(keeper) = &keeper {
+            keeper.save(clock.seconds(), ended, None);
+        }
+    };
+    if let (Some(settings), Some(training), Stop::Finished) = (&config.polish, data.training.last(), &stop)
+        && ended.validation_loss.is_finite()
+        && !ended.polished
     {
+        keep(&ended);
         let objective = Objective::new(architecture, penalty, threads)
             .map_err(|source| TrainingError::Threads { threads, source })?;
         let start = Start {
@@ -164,38 +206,35 @@ pub fn train<S: Scalar>(
             training: training.cast(),
             validation: data.validation.cast(),
             weight_decay: config.optimizer.weight_decay,
-            weights: weights.iter().map(|w| w.to_f64()).collect(),
-            validation_loss: progress.best,
-            last: (progress.history.len(), config.phases.len()),
-            started,
+            weights: ended.weights.iter().map(|w| w.to_f64()).collect(),
+            validation_loss: ended.validation_loss,
+            last: (ended.history.len(), config.phases.len()),
+            clock,
             hooks: hooks.clone(),
         };
         let polished = polish(settings, start).map_err(TrainingError::Optimizer)?;
         if let Some(best) = polished.weights {
-            weights = best.iter().map(|&w| S::of_f64(w)).collect();
+            ended.weights = best.iter().map(|&w| S::of_f64(w)).collect();
         }
-        progress.best = polished.validation_loss;
-        progress.states += polished.evaluations.saturating_mul(training.len());
-        progress.history.extend(polished.history);
+        ended.validation_loss = polished.validation_loss;
+        ended.states += polished.evaluations.saturating_mul(training.len());
+        ended.history.extend(polished.history);
+        ended.polished = true;
         if hooks.interrupt.load(std::sync::atomic::Ordering::Relaxed) {
-            progress.stop = Stop::Interrupted;
+            stop = Stop::Interrupted;
         }
     }
-    if progress.best.is_infinite() {
-        let error = if let Stop::Failed(error) = progress.stop { Some(error) } else { None };
+    if ended.validation_loss.is_infinite() {
+        let error = if let Stop::Failed(error) = stop { Some(error) } else { None };
         return Err(TrainingError::NothingLearned(error));
     }
-    let seconds = started.elapsed().as_secs_f64();
-    let test = objective()?.loss(&weights, &data.test);
-    Ok(Trained {
-        weights,
-        history: progress.history,
-        validation_loss: progress.best,
-        test,
-        stop: progress.stop,
-        states: progress.states,
-        seconds,
-    })
+    if stop == Stop::Finished {
+        keep(&ended);
+    }
+    let seconds = clock.seconds();
+    let test = objective()?.loss(&ended.weights, &data.test);
+    let Ended { weights, history, validation_loss, states, .. } = ended;
+    Ok(Trained { weights, history, validation_loss, test, stop, states, seconds })
 }
 
 /// Writes every epoch to the log.
@@ -209,45 +248,46 @@ impl<I: State> Observe<I> for Log {
     }
 }
 
-/// What the phases have come to so far.
-struct Run {
-    history: Vec<Epoch>,
-    step: usize,
-    states: usize,
-    stop: Stop,
-    best: f64,
-}
-
-impl Run {
-    /// Runs one phase through argmin; returns its best parameters if they beat those of the phases before.
-    fn run_phase<S: Scalar>(
-        &mut self,
-        problem: TrainingProblem<S>,
-        solver: EpochSolver<S>,
-        phase: &Phase,
-        start: Vec<S>,
-    ) -> Result<Option<Vec<S>>, TrainingError> {
-        let states = problem.training.len();
-        let result = Executor::new(problem, solver)
-            .add_observer(Log, ObserverMode::Always)
-            .configure(|state: TrainingState<S>| state.param(start).max_iters(phase.epochs as u64))
-            .timer(false)
-            .run()
-            .map_err(|error| TrainingError::Optimizer(error.to_string()))?;
-        let solver = result.solver;
-        self.states += (solver.step - self.step).saturating_mul(solver.optimizer.batch.min(states));
-        self.step = solver.step;
-        self.history.extend(solver.history);
-        self.stop = match (solver.stopped, result.state.get_termination_status()) {
-            (Some(error), _) => Stop::Failed(error),
-            (None, TerminationStatus::Terminated(TerminationReason::Interrupt)) => Stop::Interrupted,
-            _ => Stop::Finished,
-        };
-        let cost = result.state.get_best_cost();
-        if cost >= self.best {
-            return Ok(None);
-        }
-        self.best = cost;
-        Ok(result.state.get_best_param().cloned())
+/// Runs one phase through argmin, from its beginning or from where it was; adds what it came to and says why it ended.
+///
+/// Its best parameters stand if they beat those of the phases before.
+fn run_phase<S: Scalar>(
+    problem: TrainingProblem<S>,
+    mut solver: EpochSolver<S>,
+    phase: &Phase,
+    ended: &mut Ended<S>,
+    underway: Option<Underway<S>>,
+) -> Result<Stop, TrainingError> {
+    let states = problem.training.len();
+    let mut state = TrainingState::<S>::new().param(ended.weights.clone());
+    if let Some(Underway { course, history, best, best_loss, best_epoch }) = underway {
+        (solver.course, solver.history, solver.restored) = (course, history, true);
+        state.iter = solver.course.iteration;
+        state.last_best_iter = best_epoch;
+        (state.cost, state.best_cost) = (best_loss, best_loss);
+        (state.param, state.best_param) = (Some(best.clone()), Some(best));
     }
+    let result = Executor::new(problem, solver)
+        .add_observer(Log, ObserverMode::Always)
+        .configure(|_| state.max_iters(phase.epochs as u64))
+        .timer(false)
+        .run()
+        .map_err(|error| TrainingError::Optimizer(error.to_string()))?;
+    let solver = result.solver;
+    let step = solver.course.step;
+    ended.phases += 1;
+    ended.states += step.saturating_sub(ended.steps).saturating_mul(solver.optimizer.batch.min(states));
+    ended.steps = step;
+    ended.history.extend(solver.history);
+    let cost = result.state.get_best_cost();
+    if let Some(best) = result.state.get_best_param()
+        && cost < ended.validation_loss
+    {
+        (ended.validation_loss, ended.weights) = (cost, best.clone());
+    }
+    Ok(match (solver.stopped, result.state.get_termination_status()) {
+        (Some(error), _) => Stop::Failed(error),
+        (None, TerminationStatus::Terminated(TerminationReason::Interrupt)) => Stop::Interrupted,
+        _ => Stop::Finished,
+    })
 }

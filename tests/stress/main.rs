@@ -43,7 +43,7 @@
 //! | 34 tolerance | here; `rollout::tests::error_follows_tolerance` |
 //! | 35 energy over long runs | here in f32; `integrators.rs::rounding_errors_of_the_energy_walk_at_random` and its long variant in f64 |
 //! | 36 many rows | here; `scalar::sum::tests::ten_million_tenths_in_single_precision` |
-//! | 37 splits and threads | here; `training.rs::the_same_seed_gives_the_same_bytes_on_any_number_of_threads`. A training cannot be resumed, so there is nothing to compare with a straight run |
+//! | 37 splits and threads | here; `training.rs::the_same_seed_gives_the_same_bytes_on_any_number_of_threads`, `presets.rs`; stopped and resumed: `checkpoints.rs::stopping_after_any_step_changes_nothing` |
 //! | 38 subnormal weights | here |
 
 #[path = "../common/mod.rs"]

@@ -1,9 +1,9 @@
-//! Why a model file could not be written or read.
+//! Why a model file, or another file of the same make, could not be written or read.
 
 use crate::storage::ReadError;
 use thiserror::Error;
 
-/// Why a model file could not be written or read.
+/// Why a model file, or another file of the same make, could not be written or read.
 #[derive(Debug, Error)]
 pub enum ModelFileError {
     /// Missing, not a regular file, too large, or refused by the system.
@@ -15,9 +15,14 @@ pub enum ModelFileError {
     /// Not a safetensors file, or one that is cut off or damaged in its structure.
     #[error("not a whole safetensors file: {0}")]
     NotSafetensors(String),
-    /// A safetensors file of another program.
-    #[error("a safetensors file, but not of an lnn model (no \"lnn\" metadata)")]
-    Foreign,
+    /// A safetensors file of another program or purpose.
+    #[error("a safetensors file, but not of an lnn {kind} (no {key:?} metadata)")]
+    Foreign {
+        /// What was expected, such as a model.
+        kind: &'static str,
+        /// Its metadata key.
+        key: &'static str,
+    },
     /// Written by a later version.
     #[error("written by lnn {writer} in format {found}; lnn {reader} reads format {supported}")]
     Version {
@@ -38,8 +43,8 @@ pub enum ModelFileError {
         /// Checksum of its bytes.
         found: u32,
     },
-    /// The description of the model makes no sense.
-    #[error("model description: {0}")]
+    /// The description makes no sense.
+    #[error("description: {0}")]
     Header(String),
     /// A tensor that the architecture asks for is not there.
     #[error("tensor {0} is missing")]

@@ -1,6 +1,7 @@
 //! What a model file says about its model.
 
 use super::ModelFileError;
+use super::container::check_version;
 use crate::network::Architecture;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -62,7 +63,7 @@ impl Header {
     /// # Errors
     /// [`ModelFileError::Header`] or [`ModelFileError::Version`].
     pub fn validate(&self) -> Result<(), ModelFileError> {
-        check_version(self.format, &self.crate_version)?;
+        check_version(FORMAT, self.format, &self.crate_version)?;
         let require = |ok: bool, text: &str| if ok { Ok(()) } else { Err(ModelFileError::Header(text.to_string())) };
         self.architecture.validate().map_err(|e| ModelFileError::Header(e.to_string()))?;
         let (n, hidden) = (self.architecture.coordinates, &self.architecture.hidden);
@@ -78,13 +79,4 @@ impl Header {
         }
         require(self.validation_loss.is_finite(), "validation_loss: expected a finite number")
     }
-}
-
-/// Refuses formats that this version does not read.
-pub(super) fn check_version(format: u32, writer: &str) -> Result<(), ModelFileError> {
-    if format == FORMAT {
-        return Ok(());
-    }
-    let (reader, writer) = (env!("CARGO_PKG_VERSION"), writer.escape_debug().take(40).collect());
-    Err(ModelFileError::Version { writer, found: format, reader, supported: FORMAT })
 }

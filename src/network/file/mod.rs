@@ -14,6 +14,7 @@
 //! digits, the CRC-32 (IEEE) of that JSON text up to the comma before `"checksum"`, followed by the bytes of the tensors.
 //! A changed bit anywhere is refused. The same model gives the same bytes.
 
+pub mod container;
 mod error;
 mod header;
 mod json;
@@ -23,22 +24,17 @@ mod tests;
 pub use error::ModelFileError;
 pub use header::{FORMAT, Header, StoredPrecision};
 
+use self::container::{Kind, Tensor, pack, unpack};
 use crate::network::{Architecture, Layout, LinearMap};
 use crate::scalar::Scalar;
-use crate::storage::{read_regular, write_atomically};
-use safetensors::tensor::{Dtype, SafeTensors, TensorView};
-use serde::Deserialize;
-use std::collections::HashMap;
+use crate::storage::{Disk, Files, read_regular, write_whole};
 use std::path::Path;
 
 /// Largest file that is read, in bytes.
 pub const MAX_BYTES: u64 = 1 << 30;
 
-/// Largest description that is read, in bytes.
-const MAX_HEADER: u64 = 1 << 20;
-
-/// The only metadata key: with two, the order of bytes would change from run to run.
-const KEY: &str = "lnn";
+/// What sets a model file apart.
+const MODEL: Kind = Kind { name: "model", key: "lnn", format: FORMAT };
 
 /// A network: its description and its flat parameter vector.
 ///
@@ -70,39 +66,20 @@ impl<S: Scalar> ModelFile<S> {
         if self.weights.len() != expected {
             return Err(ModelFileError::WrongLength { expected, found: self.weights.len() });
         }
+        let precision = self.header.precision;
         let mut tensors = Vec::with_capacity(slots.len());
-        for slot in slots {
-            let mut bytes = Vec::with_capacity(slot.range.len() * 8);
-            for (index, &x) in self.weights[slot.range].iter().enumerate() {
-                let finite = match self.header.precision {
-                    StoredPrecision::F32 => {
-                        put(&x.cast::<f32>().to_le_bytes(), x.cast::<f32>().is_finite(), &mut bytes)
-                    }
-                    StoredPrecision::F64 => put(&x.to_f64().to_le_bytes(), x.to_f64().is_finite(), &mut bytes),
-                };
-                if !finite {
-                    return Err(ModelFileError::NotFinite { name: slot.name, index });
-                }
+        for Slot { name, shape, range } in slots {
+            let numbers = &self.weights[range];
+            let finite = |x: &S| match precision {
+                StoredPrecision::F32 => x.cast::<f32>().is_finite(),
+                StoredPrecision::F64 => x.to_f64().is_finite(),
+            };
+            if let Some(index) = numbers.iter().position(|x| !finite(x)) {
+                return Err(ModelFileError::NotFinite { name, index });
             }
-            tensors.push((slot.name, slot.shape, bytes));
+            tensors.push(Tensor::new(name, shape, numbers, precision));
         }
-        // The payload in the file is in safetensors' own order: by name, one number type throughout.
-        tensors.sort_by(|a, b| a.0.cmp(&b.0));
-        let text = serde_json::to_string(&self.header).map_err(|e| ModelFileError::Header(e.to_string()))?;
-        let body = text.strip_suffix('}').unwrap_or(&text);
-        let mut checksum = crc32fast::Hasher::new();
-        checksum.update(body.as_bytes());
-        tensors.iter().for_each(|(_, _, bytes)| checksum.update(bytes));
-        let text = format!("{body}{}", checksum_field(checksum.finalize()));
-
-        let dtype = stored_dtype(self.header.precision);
-        let damaged = |e: safetensors::SafeTensorError| ModelFileError::NotSafetensors(e.to_string());
-        let views = tensors
-            .iter()
-            .map(|(name, shape, bytes)| Ok((name, TensorView::new(dtype, shape.clone(), bytes)?)))
-            .collect::<Result<Vec<_>, _>>()
-            .map_err(damaged)?;
-        safetensors::serialize(views, Some(HashMap::from([(KEY.to_string(), text)]))).map_err(damaged)
+        pack(&MODEL, &self.header, tensors)
     }
 
     /// Reads the bytes of a file; never panics and allocates no more than a small multiple of their number.
@@ -112,25 +89,17 @@ impl<S: Scalar> ModelFile<S> {
     /// # Errors
     /// [`ModelFileError`] for anything but a whole, undamaged model file of this format.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, ModelFileError> {
-        let damaged = |e: safetensors::SafeTensorError| ModelFileError::NotSafetensors(e.to_string());
-        check_container(bytes)?;
-        let (start, metadata) = SafeTensors::read_metadata(bytes).map_err(damaged)?;
-        let text = metadata.metadata().as_ref().and_then(|map| map.get(KEY)).ok_or(ModelFileError::Foreign)?;
-        let header = read_header(text, &bytes[8 + start..])?;
-        if metadata.metadata().as_ref().is_some_and(|map| map.len() != 1) {
-            return Err(ModelFileError::Header("expected \"lnn\" as the only metadata key".to_string()));
-        }
-        let file = SafeTensors::deserialize(bytes).map_err(damaged)?;
+        let (header, file) = unpack::<Header>(&MODEL, bytes)?;
+        header.validate()?;
         let slots = slots(&header.architecture)?;
-        let mut names = file.names();
-        names.sort_unstable();
-        if let Some(&extra) = names.iter().find(|&&name| slots.iter().all(|slot| slot.name != name)) {
-            return Err(ModelFileError::ExtraTensor(extra.escape_debug().take(60).collect()));
-        }
+        file.check_names(|name| slots.iter().any(|slot| slot.name == name))?;
         let mut weights = Vec::with_capacity(bytes.len() / 4);
         for slot in slots {
-            let tensor = file.tensor(&slot.name).map_err(|_| ModelFileError::MissingTensor(slot.name.clone()))?;
-            read_tensor(&tensor, slot, header.precision, &mut weights)?;
+            let first = weights.len();
+            weights.extend(file.numbers::<S>(&slot.name, &slot.shape, header.precision)?);
+            if let Some(index) = weights[first..].iter().position(|x| !x.is_finite()) {
+                return Err(ModelFileError::NotFinite { name: slot.name, index });
+            }
         }
         weights.shrink_to_fit();
         Ok(Self { header, weights })
@@ -141,7 +110,15 @@ impl<S: Scalar> ModelFile<S> {
     /// # Errors
     /// As [`ModelFile::to_bytes`], and [`ModelFileError::Write`].
     pub fn save(&self, path: &Path) -> Result<(), ModelFileError> {
-        write_atomically(path, &self.to_bytes()?).map_err(ModelFileError::Write)
+        self.save_to(&Disk, path)
+    }
+
+    /// [`ModelFile::save`] by the operations of `files`.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn save_to(&self, files: &dyn Files, path: &Path) -> Result<(), ModelFileError> {
+        write_whole(files, path, &self.to_bytes()?).map_err(ModelFileError::Write)
     }
 
     /// Reads a regular file of at most [`MAX_BYTES`].
@@ -151,70 +128,6 @@ impl<S: Scalar> ModelFile<S> {
     pub fn load(path: &Path) -> Result<Self, ModelFileError> {
         Self::from_bytes(&read_regular(path, MAX_BYTES)?)
     }
-}
-
-fn put(number: &[u8], finite: bool, bytes: &mut Vec<u8>) -> bool {
-    bytes.extend_from_slice(number);
-    finite
-}
-
-fn stored_dtype(precision: StoredPrecision) -> Dtype {
-    match precision {
-        StoredPrecision::F32 => Dtype::F32,
-        StoredPrecision::F64 => Dtype::F64,
-    }
-}
-
-fn checksum_field(checksum: u32) -> String {
-    format!(",\"checksum\":\"{checksum:08x}\"}}")
-}
-
-/// Limits the description before it is parsed, and refuses one that two readers could understand differently.
-fn check_container(bytes: &[u8]) -> Result<(), ModelFileError> {
-    let refuse = |text: &str| Err(ModelFileError::NotSafetensors(text.to_string()));
-    let Some(length) = bytes.first_chunk::<8>().map(|b| u64::from_le_bytes(*b)) else {
-        return refuse("shorter than 8 bytes");
-    };
-    if length > MAX_HEADER {
-        return refuse("the description is longer than 1 MiB");
-    }
-    match bytes[8..].get(..length as usize) {
-        None => refuse("cut off"),
-        Some(text) => json::check_unambiguous(text).map_err(|e| ModelFileError::NotSafetensors(e.to_string())),
-    }
-}
-
-/// The description, its version and checksum tested first.
-fn read_header(text: &str, payload: &[u8]) -> Result<Header, ModelFileError> {
-    /// What every version of the format says.
-    #[derive(Deserialize)]
-    struct Version {
-        format: u32,
-        crate_version: String,
-    }
-    let malformed = |e: serde_json::Error| ModelFileError::Header(e.to_string());
-    let version: Version = serde_json::from_str(text).map_err(malformed)?;
-    header::check_version(version.format, &version.crate_version)?;
-
-    let missing = || ModelFileError::Header("no checksum".to_string());
-    let cut = text.len().checked_sub(checksum_field(0).len()).ok_or_else(missing)?;
-    let (body, field) = text.split_at_checked(cut).ok_or_else(missing)?;
-    let digits =
-        field.strip_prefix(",\"checksum\":\"").and_then(|rest| rest.strip_suffix("\"}")).ok_or_else(missing)?;
-    let expected = u32::from_str_radix(digits, 16).map_err(|_| missing())?;
-    let mut checksum = crc32fast::Hasher::new();
-    checksum.update(body.as_bytes());
-    checksum.update(payload);
-    let found = checksum.finalize();
-    // Comparing the text as well refuses digits written in another way.
-    if found != expected || field != checksum_field(expected) {
-        return Err(ModelFileError::Checksum { expected, found });
-    }
-    let body = format!("{body}}}");
-    json::check_unambiguous(body.as_bytes()).map_err(malformed)?;
-    let header: Header = serde_json::from_str(&body).map_err(malformed)?;
-    header.validate()?;
-    Ok(header)
 }
 
 /// The tensors of an architecture in the order of the flat vector.
@@ -255,36 +168,4 @@ fn slots(architecture: &Architecture) -> Result<Vec<Slot>, ModelFileError> {
         }
     }
     Ok(slots)
-}
-
-/// Appends the numbers of one tensor.
-fn read_tensor<S: Scalar>(
-    tensor: &TensorView<'_>,
-    slot: Slot,
-    precision: StoredPrecision,
-    weights: &mut Vec<S>,
-) -> Result<(), ModelFileError> {
-    let name = slot.name;
-    if tensor.dtype() != stored_dtype(precision) {
-        let found = format!("{:?}", tensor.dtype()).to_lowercase();
-        return Err(ModelFileError::WrongType { name, expected: precision.name(), found });
-    }
-    if tensor.shape() != slot.shape {
-        return Err(ModelFileError::WrongShape { name, expected: slot.shape, found: tensor.shape().to_vec() });
-    }
-    let first = weights.len();
-    match precision {
-        StoredPrecision::F32 => {
-            let (chunks, _) = tensor.data().as_chunks::<4>();
-            weights.extend(chunks.iter().map(|b| S::of_f64(f64::from(f32::from_le_bytes(*b)))));
-        }
-        StoredPrecision::F64 => {
-            let (chunks, _) = tensor.data().as_chunks::<8>();
-            weights.extend(chunks.iter().map(|b| S::of_f64(f64::from_le_bytes(*b))));
-        }
-    }
-    match weights[first..].iter().position(|x| !x.is_finite()) {
-        Some(index) => Err(ModelFileError::NotFinite { name, index }),
-        None => Ok(()),
-    }
 }

@@ -1,9 +1,11 @@
 //! Round trips, damage and foreign files.
 
+use super::container::{MAX_HEADER, checksum_field};
 use super::*;
 use crate::network::{InputLayer, Nonlinearity};
 use proptest::prelude::*;
-use std::collections::BTreeMap;
+use safetensors::tensor::{Dtype, SafeTensors, TensorView};
+use std::collections::{BTreeMap, HashMap};
 
 fn header(hidden: Vec<usize>, embed_periodic: bool, precision: StoredPrecision) -> Header {
     Header {
@@ -60,7 +62,7 @@ fn with_numbers(header: Header) -> ModelFile<f64> {
 fn rebuilt(bytes: &[u8], change: impl FnOnce(&mut String, &mut Vec<(String, Dtype, Vec<usize>, Vec<u8>)>)) -> Vec<u8> {
     let (_, metadata) = SafeTensors::read_metadata(bytes).unwrap();
     let file = SafeTensors::deserialize(bytes).unwrap();
-    let text = &metadata.metadata().as_ref().unwrap()[KEY];
+    let text = &metadata.metadata().as_ref().unwrap()[MODEL.key];
     let mut body = text[..text.len() - checksum_field(0).len()].to_string();
     let mut tensors: Vec<_> =
         file.iter().map(|(n, t)| (n.to_string(), t.dtype(), t.shape().to_vec(), t.data().to_vec())).collect();
@@ -70,7 +72,7 @@ fn rebuilt(bytes: &[u8], change: impl FnOnce(&mut String, &mut Vec<(String, Dtyp
         tensors.iter().map(|(n, d, s, b)| (n.clone(), TensorView::new(*d, s.clone(), b).unwrap())).collect();
     let start = |text: &str| {
         let views = views.iter().map(|(n, v)| (n.clone(), v.clone()));
-        safetensors::serialize(views, Some(HashMap::from([(KEY.to_string(), text.to_string())]))).unwrap()
+        safetensors::serialize(views, Some(HashMap::from([(MODEL.key.to_string(), text.to_string())]))).unwrap()
     };
     let draft = start(&body);
     let (length, _) = SafeTensors::read_metadata(&draft).unwrap();
@@ -170,7 +172,7 @@ fn foreign_newer_and_ambiguous_files_are_named() {
     let bytes = model(vec![2], StoredPrecision::F64).to_bytes().unwrap();
     let view = TensorView::new(Dtype::F32, vec![1], &[0; 4]).unwrap();
     let foreign = safetensors::serialize([("w", view.clone())], None).unwrap();
-    assert!(matches!(refusal(&foreign), ModelFileError::Foreign));
+    assert!(matches!(refusal(&foreign), ModelFileError::Foreign { kind: "model", key: "lnn" }));
     assert!(matches!(refusal(b"not a model at all"), ModelFileError::NotSafetensors(_)));
 
     let newer = rebuilt(&bytes, |body, _| *body = body.replace("\"format\":1", "\"format\":7,\"novelty\":{}"));

@@ -1,11 +1,7 @@
 //! Times of several pieces of work taken in turns, so that a busy machine slows all of them alike.
+#![allow(dead_code, reason = "each benchmark uses its part")]
 
 use std::time::{Duration, Instant};
-
-/// Rounds in which everything has its turn.
-pub const ROUNDS: usize = 15;
-/// Time of one turn.
-const TURN: Duration = Duration::from_millis(60);
 
 /// A piece of work with its name.
 pub struct Work<'a> {
@@ -46,12 +42,12 @@ fn median(mut values: Vec<f64>) -> f64 {
     values[values.len() / 2]
 }
 
-/// Runs everything in turns.
-pub fn in_turns(work: &mut [Work<'_>], rounds: usize) {
+/// Runs everything in turns of about so long.
+pub fn in_turns(work: &mut [Work<'_>], rounds: usize, turn: Duration) {
     for w in &mut *work {
         w.turn();
         let once = w.turn().max(1e-9);
-        w.repeats = ((TURN.as_secs_f64() / once) as usize).clamp(1, 1_000_000);
+        w.repeats = ((turn.as_secs_f64() / once) as usize).clamp(1, 1_000_000);
     }
     for _ in 0..rounds {
         for w in &mut *work {

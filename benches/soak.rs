@@ -1,0 +1,72 @@
+//! Memory over a long run: training and roll-outs back to back in one process, the resident memory after each round.
+//!
+//! `cargo bench --bench soak -- --minutes 30` prints a line per minute and at the end the slope of a straight line through
+//! all rounds after the first tenth, in kB per hour and per round. Linux only (`/proc/self/status`).
+
+use lnn::lagrangian::configure;
+use lnn::rollout::{Method, Options, rollout_many, rollout_together};
+use lnn::training::{Config, Hooks, Preset, run};
+use std::hint::black_box;
+use std::time::{Duration, Instant};
+
+/// A small training of every kind of step: penalty, L-BFGS, validation.
+fn config(seed: u64) -> Config {
+    let system = configure::<f64>("double-pendulum", &[]).expect("the defaults are valid");
+    let mut config = Preset::Quick.config(&system).expect("every system has a quick preset");
+    config.seed = seed;
+    (config.data.training, config.data.validation, config.data.test) = (4000, 500, 500);
+    config.network.hidden = vec![64; 2];
+    config.phases[0].epochs = 3;
+    config.polish = Some(lnn::training::Polish { iterations: 3, memory: 5 });
+    config
+}
+
+/// Trains a network and lets it move by every method.
+fn round(seed: u64) {
+    let outcome = run::<f64>(&config(seed), 2, &Hooks::default()).expect("a training");
+    let starts: Vec<_> = (0..8).map(|k| (vec![0.1 * k as f64, 0.2], vec![0.0, 0.1])).collect();
+    for method in
+        [Method::Dopri5, Method::Dop853, Method::Midpoint, Method::Gauss4, Method::Gauss6, Method::Variational]
+    {
+        let options = Options { method, step: Some(0.02), max_steps: 2000, ..Options::new(1.0, 0.1) };
+        black_box(rollout_many(&outcome.model, &starts, &options, 2));
+        black_box(rollout_together(&outcome.model, &starts, &options, 2));
+    }
+}
+
+/// Resident memory in kB.
+fn resident() -> Option<f64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;
+    line.split_whitespace().next()?.parse().ok()
+}
+
+/// Slope of the line of least squares.
+fn slope(points: &[(f64, f64)]) -> f64 {
+    let count = points.len() as f64;
+    let mean = |f: fn(&(f64, f64)) -> f64| points.iter().map(f).sum::<f64>() / count;
+    let (x, y) = (mean(|p| p.0), mean(|p| p.1));
+    let above: f64 = points.iter().map(|p| (p.0 - x) * (p.1 - y)).sum();
+    above / points.iter().map(|p| (p.0 - x).powi(2)).sum::<f64>()
+}
+
+fn main() {
+    let arguments: Vec<String> = std::env::args().collect();
+    let minutes = arguments.iter().position(|a| a == "--minutes").and_then(|k| arguments.get(k + 1)?.parse().ok());
+    let minutes: f64 = minutes.unwrap_or(if arguments.iter().any(|a| a == "--bench") { 30.0 } else { 0.0 });
+    let (start, mut said, mut points) = (Instant::now(), Instant::now(), Vec::new());
+    while points.len() < 4 || start.elapsed() < Duration::from_secs_f64(60.0 * minutes) {
+        round(points.len() as u64);
+        let Some(memory) = resident() else { return println!("this system does not tell its resident memory") };
+        points.push((start.elapsed().as_secs_f64() / 3600.0, memory));
+        if said.elapsed() > Duration::from_secs(60) {
+            said = Instant::now();
+            println!("{:.0} min, {} rounds: {memory:.0} kB", start.elapsed().as_secs_f64() / 60.0, points.len());
+        }
+    }
+    let settled = &points[points.len() / 10..];
+    let (hourly, last) = (slope(settled), points.len() - 1);
+    let rounds: Vec<_> = settled.iter().enumerate().map(|(k, p)| (k as f64, p.1)).collect();
+    println!("{} rounds in {:.1} min, {:.0} kB at the end", points.len(), points[last].0 * 60.0, points[last].1);
+    println!("slope {hourly:.1} kB per hour, {:.3} kB per round", slope(&rounds));
+}

@@ -1,0 +1,11 @@
+//! Files read within limits and written whole or not at all; memory that is left.
+
+mod files;
+mod memory;
+mod read;
+mod write;
+
+pub use files::{Disk, Files};
+pub use memory::available_memory;
+pub use read::{ReadError, read_regular};
+pub use write::{remove_leftovers, replace, write_atomically, write_whole};

@@ -1,0 +1,238 @@
+//! Checkpoints in a directory: when to write one, the newest and the one before, going on from either.
+
+use super::format::{Header, decode, decode_header, encode};
+use super::{Ended, Snapshot, Underway};
+use crate::network::file::ModelFileError;
+use crate::scalar::Scalar;
+use crate::storage::{Files, ReadError, replace};
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+use thiserror::Error;
+
+/// Name of the newest checkpoint.
+pub const NEWEST: &str = "checkpoint.safetensors";
+/// Name of the one before it.
+pub const PREVIOUS: &str = "checkpoint.previous.safetensors";
+/// Largest checkpoint that is read, in bytes.
+const MAX_BYTES: u64 = 1 << 34;
+/// Writing takes at most one part in this many of the time between two checkpoints.
+const COST: u32 = 100;
+
+/// How often a checkpoint is written.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Every {
+    /// When so many epochs have ended since the last.
+    Epochs(usize),
+    /// At the first step after so many seconds since the last, later if writing would take more than a hundredth of the
+    /// time.
+    Seconds(f64),
+}
+
+/// What a training is of: it goes on only from a checkpoint of the same.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Identity {
+    /// The configuration, in the words of whoever trains.
+    pub config: String,
+    /// Name and checksum of each set of states.
+    pub data: Vec<(String, u32)>,
+}
+
+/// Why there is nothing to go on from.
+#[derive(Debug, Error)]
+pub enum CheckpointError {
+    /// No checkpoint in the directory.
+    #[error("there is no checkpoint")]
+    Missing,
+    /// Neither the newest checkpoint nor the one before can be read.
+    #[error("{NEWEST}: {newest}; {PREVIOUS}: {previous}")]
+    Damaged {
+        /// What is wrong with the newest.
+        newest: Box<ModelFileError>,
+        /// What is wrong with the one before.
+        previous: Box<ModelFileError>,
+    },
+    /// Written by another version.
+    #[error("{0}")]
+    Version(Box<ModelFileError>),
+    /// The checkpoint is of another configuration.
+    #[error("the checkpoint is of another configuration")]
+    Config {
+        /// The checkpoint's.
+        saved: String,
+    },
+    /// The states are not those of the checkpoint.
+    #[error("the checkpoint is of other data: {0}")]
+    Data(String),
+}
+
+/// What was found to go on from.
+#[derive(Clone, Debug)]
+pub struct Restored<T> {
+    /// Content of the checkpoint.
+    pub content: T,
+    /// What is wrong with the newest checkpoint, if the one before had to do.
+    pub fallback: Option<String>,
+}
+
+/// Writes and reads the checkpoints of one training in one directory.
+pub struct Keeper {
+    files: Arc<dyn Files>,
+    directory: PathBuf,
+    every: Every,
+    identity: Identity,
+    state: Mutex<State>,
+}
+
+struct State {
+    /// When the last checkpoint was written or read, and the epochs completed then.
+    last: Option<(Instant, usize)>,
+    /// How long it took.
+    cost: Duration,
+    /// Whether the newest checkpoint deserves to become the previous one.
+    keep: bool,
+}
+
+impl Keeper {
+    /// Checkpoints of this training in `directory`.
+    pub fn new(files: Arc<dyn Files>, directory: &Path, every: Every, identity: Identity) -> Self {
+        let state = State { last: None, cost: Duration::ZERO, keep: true };
+        Self { files, directory: directory.to_path_buf(), every, identity, state: Mutex::new(state) }
+    }
+
+    /// Whether a checkpoint is due between two steps of an epoch.
+    pub(in crate::training) fn is_due(&self) -> bool {
+        let state = self.state();
+        match (self.every, state.last) {
+            (Every::Seconds(seconds), Some((last, _))) => {
+                let elapsed = last.elapsed();
+                elapsed.as_secs_f64() >= seconds && elapsed >= state.cost.saturating_mul(COST)
+            }
+            (_, None) => true,
+            (Every::Epochs(_), Some(_)) => false,
+        }
+    }
+
+    /// Whether a checkpoint is due when so many epochs have been completed.
+    pub(in crate::training) fn is_due_after(&self, epochs: usize) -> bool {
+        let last = self.state().last;
+        match (self.every, last) {
+            (Every::Epochs(every), Some((_, last))) => epochs.saturating_sub(last) >= every,
+            _ => self.is_due(),
+        }
+    }
+
+    /// Writes a checkpoint; if that fails the one before stands, training goes on, and a
+    /// warning in the log tells.
+    pub(in crate::training) fn save<S: Scalar>(&self, seconds: f64, ended: &Ended<S>, underway: Option<&Underway<S>>) {
+        let began = Instant::now();
+        let mut state = self.state();
+        let (newest, previous) = (self.directory.join(NEWEST), self.directory.join(PREVIOUS));
+        let written = encode(&self.identity, seconds, ended, underway).and_then(|bytes| {
+            replace(self.files.as_ref(), &newest, &previous, &bytes, state.keep).map_err(ModelFileError::Write)
+        });
+        match written {
+            Ok(()) => state.keep = true,
+            Err(problem) => tracing::warn!(checkpoint = %newest.display(), %problem),
+        }
+        let epochs = underway.map_or(ended.history.len(), |underway| underway.course.epoch);
+        (state.last, state.cost) = (Some((Instant::now(), epochs)), began.elapsed());
+        tracing::info!(epochs, cost = state.cost.as_secs_f64(), "checkpoint");
+    }
+
+    /// The newest whole checkpoint of the same configuration and data, for a network of `parameters` weights and
+    /// phases over `states` states.
+    ///
+    /// # Errors
+    /// [`CheckpointError`].
+    pub fn restore<S: Scalar>(
+        &self,
+        parameters: usize,
+        states: usize,
+    ) -> Result<Restored<Snapshot<S>>, CheckpointError> {
+        let found = newest_whole(self.files.as_ref(), &self.directory, decode::<S>)?;
+        let (header, snapshot): (Header, Snapshot<S>) = found.content;
+        if header.identity.config != self.identity.config {
+            return Err(CheckpointError::Config { saved: header.identity.config });
+        }
+        let other = self.identity.data.iter().filter(|set| !header.identity.data.contains(set));
+        let names: Vec<&str> = other.map(|(name, _)| name.as_str()).collect();
+        if !names.is_empty() || header.identity.data.len() != self.identity.data.len() {
+            return Err(CheckpointError::Data(names.join(", ")));
+        }
+        if snapshot.ended.weights.len() != parameters {
+            let problem = format!("{} weights, the network has {parameters}", snapshot.ended.weights.len());
+            return Err(CheckpointError::Data(problem));
+        }
+        if let Some(order) = snapshot.underway.as_ref().map(|underway| underway.course.order.len())
+            && order != states
+        {
+            return Err(CheckpointError::Data(format!("{order} states in an epoch, the phase has {states}")));
+        }
+        let mut state = self.state();
+        state.keep = found.fallback.is_none();
+        state.last = Some((Instant::now(), snapshot.epochs()));
+        Ok(Restored { content: snapshot, fallback: found.fallback })
+    }
+
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Removes the checkpoints in a directory: the training has ended, or begins anew.
+///
+/// # Errors
+/// That of the file system.
+pub fn remove_checkpoints(files: &dyn Files, directory: &Path) -> std::io::Result<()> {
+    // The newest last: while there is a checkpoint it is the newest.
+    for name in [PREVIOUS, NEWEST] {
+        match files.remove(&directory.join(name)) {
+            Err(error) if error.kind() != std::io::ErrorKind::NotFound => return Err(error),
+            _ => {}
+        }
+    }
+    Ok(())
+}
+
+/// What a checkpoint says without the numbers it holds.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Saved {
+    /// Configuration of the training.
+    pub config: String,
+    /// Epochs completed, polishing included.
+    pub epochs: usize,
+    /// Steps taken.
+    pub steps: usize,
+}
+
+/// The training whose checkpoint is in a directory.
+///
+/// # Errors
+/// [`CheckpointError`] if there is none that is whole.
+pub fn saved(files: &dyn Files, directory: &Path) -> Result<Restored<Saved>, CheckpointError> {
+    newest_whole(files, directory, |bytes| decode_header(bytes).map(Header::into_saved))
+}
+
+/// Reads the newest checkpoint, or the one before if the newest is damaged or missing.
+fn newest_whole<T>(
+    files: &dyn Files,
+    directory: &Path,
+    decode: impl Fn(&[u8]) -> Result<T, ModelFileError>,
+) -> Result<Restored<T>, CheckpointError> {
+    let read = |name: &str| decode(&files.read(&directory.join(name), MAX_BYTES)?);
+    let newest = match read(NEWEST) {
+        Ok(content) => return Ok(Restored { content, fallback: None }),
+        Err(error @ ModelFileError::Version { .. }) => return Err(CheckpointError::Version(Box::new(error))),
+        Err(error) => error,
+    };
+    match read(PREVIOUS) {
+        Ok(content) => Ok(Restored { content, fallback: Some(newest.to_string()) }),
+        Err(ModelFileError::Read(ReadError::Missing)) if matches!(newest, ModelFileError::Read(ReadError::Missing)) => {
+            Err(CheckpointError::Missing)
+        }
+        Err(previous) => Err(CheckpointError::Damaged { newest: Box::new(newest), previous: Box::new(previous) }),
+    }
+}

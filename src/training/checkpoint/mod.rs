@@ -1,0 +1,156 @@
+//! Checkpoints: everything a training needs to go on as if it had never stopped.
+//!
+//! A checkpoint is a safetensors file of the same make as a model file
+//! ([`container`](crate::network::file::container)), metadata key `lnn-checkpoint`. Its description holds the
+//! configuration in the words of whoever trains, checksums of the data, and the numbers that are no tensors, floating
+//! point ones as the bits of `f64`. Tensors, in the precision of the training unless said otherwise:
+//!
+//! - `best`: parameters of the best epoch of the phases that ended; `history`, `f64` of shape `(epochs, 11)`: their rows;
+//! - while a phase is under way `weights`, `moments.first`, `moments.second` and `average` of its last step, `order` of
+//!   the states in its epoch (`u32`), `phase.best` and `phase.history`.
+//!
+//! A phase is held to the step: the next batch of the epoch and the sums over its batches so far are in the description,
+//! with the state of the random generator. Polishing has no state of its own: it begins again from the phases' end.
+
+mod format;
+mod keeper;
+
+pub use keeper::{
+    CheckpointError, Every, Identity, Keeper, NEWEST, PREVIOUS, Restored, Saved, remove_checkpoints, saved,
+};
+
+use crate::network::file::StoredPrecision;
+use crate::scalar::Scalar;
+use crate::training::optimizer::Moments;
+use crate::training::solver::{Epoch, Means};
+use rand_chacha::ChaCha8Rng;
+use std::time::Instant;
+
+/// A training at some step.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Snapshot<S> {
+    pub(super) seconds: f64,
+    pub(super) ended: Ended<S>,
+    pub(super) underway: Option<Underway<S>>,
+}
+
+impl<S> Snapshot<S> {
+    /// Steps taken so far.
+    pub fn steps(&self) -> usize {
+        self.underway.as_ref().map_or(self.ended.steps, |underway| underway.course.step)
+    }
+    /// Epochs completed so far, polishing included.
+    pub fn epochs(&self) -> usize {
+        self.ended.history.len() + self.underway.as_ref().map_or(0, |underway| underway.history.len())
+    }
+}
+
+/// What the phases that have ended came to.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Ended<S> {
+    /// How many have ended.
+    pub phases: usize,
+    /// Whether polishing has ended too.
+    pub polished: bool,
+    /// Parameters of the best epoch; the initial ones if there is none.
+    pub weights: Vec<S>,
+    /// Its validation loss, infinite if there is none.
+    pub validation_loss: f64,
+    /// One row per epoch.
+    pub history: Vec<Epoch>,
+    /// Steps taken.
+    pub steps: usize,
+    /// States that went through a step.
+    pub states: usize,
+}
+
+impl<S> Ended<S> {
+    /// Before the first phase.
+    pub fn none(weights: Vec<S>) -> Self {
+        let (phases, steps, states) = (0, 0, 0);
+        let (validation_loss, history) = (f64::INFINITY, Vec::new());
+        Self { phases, polished: false, weights, validation_loss, history, steps, states }
+    }
+}
+
+/// A phase between two of its steps.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Underway<S> {
+    pub course: Course<S>,
+    /// One row per epoch of the phase.
+    pub history: Vec<Epoch>,
+    /// Parameters of the phase's best epoch; those it started with if there is none.
+    pub best: Vec<S>,
+    /// Their validation loss, infinite if there is none.
+    pub best_loss: f64,
+    /// The best epoch of the phase, counted from 0.
+    pub best_epoch: u64,
+}
+
+/// What moves from step to step within a phase.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Course<S> {
+    /// Draws the order of every epoch.
+    pub rng: ChaCha8Rng,
+    /// States in the order of the epoch.
+    pub order: Vec<u32>,
+    /// The weights that move.
+    pub weights: Vec<S>,
+    /// Moments of their gradients.
+    pub moments: Moments<S>,
+    /// Running average of the weights.
+    pub average: Vec<S>,
+    /// Steps in it.
+    pub averaged_steps: usize,
+    /// Epochs completed in this phase.
+    pub iteration: u64,
+    /// Epochs completed in all phases.
+    pub epoch: usize,
+    /// Steps taken in all phases.
+    pub step: usize,
+    /// Batches of the epoch that are done; 0 before the order is drawn.
+    pub batch: usize,
+    /// Sums over them.
+    pub means: Means,
+}
+
+impl<S: Scalar> Course<S> {
+    /// Before the first step of a phase over `states` states.
+    pub fn new(rng: ChaCha8Rng, states: usize) -> Self {
+        Self {
+            rng,
+            order: (0..states as u32).collect(),
+            weights: Vec::new(),
+            moments: Moments::new(0),
+            average: Vec::new(),
+            averaged_steps: 0,
+            iteration: 0,
+            epoch: 0,
+            step: 0,
+            batch: 0,
+            means: Means::default(),
+        }
+    }
+}
+
+/// Seconds of training, all sittings together.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Clock {
+    since: Instant,
+    before: f64,
+}
+
+impl Clock {
+    /// Starts now, after so many seconds of earlier sittings.
+    pub fn after(before: f64) -> Self {
+        Self { since: Instant::now(), before }
+    }
+    pub fn seconds(&self) -> f64 {
+        self.before + self.since.elapsed().as_secs_f64()
+    }
+}
+
+/// The number type of a training, if files know it.
+fn precision<S: Scalar>() -> Option<StoredPrecision> {
+    [StoredPrecision::F32, StoredPrecision::F64].into_iter().find(|precision| precision.name() == S::NAME)
+}

@@ -1,0 +1,118 @@
+//! Memory that a training takes, known before it is taken.
+
+use crate::network::{Architecture, Layout};
+use crate::training::config::{Config, Precision};
+use crate::training::objective::{CHUNK, STRIPES};
+use crate::training::penalty::Regularizer;
+
+/// Vectors of all weights that training holds: weights, gradient, two moments, average, the best of the phase and of those
+/// before (each twice), the last two that were validated, and the start.
+const VECTORS: u64 = 12;
+/// Vectors of all weights in a checkpoint, and how often each is held while it is written: copied, in bytes, in the file's
+/// bytes, read back.
+const CHECKPOINT: u64 = 6 * 4;
+/// Vectors of all weights that polishing holds beside two for each pair it remembers.
+const POLISH: u64 = 14;
+
+/// Bytes that a training takes at most, about; `None` if they cannot be counted in 64 bits.
+///
+/// With `s` bytes per number, `n` coordinates, `f` features, `w` units in all layers, `P` weights, `K` phases of `N`
+/// training states, `V` validation and `T` test states, it is the sum of
+///
+/// - states: `3 n (16 + s) (K N + V + T)`, drawn in double precision into vectors that may have grown to twice their
+///   length, then converted; `3 n s (N + V)` for the phase under way; `8 n T` for the evaluation afterwards, five times;
+///   `4 (6 N + V)` for the order of states and its copies in a checkpoint;
+/// - weights: `(12 + 24) s P`, the second for writing a checkpoint;
+/// - stripes: `s (P + 64 (w (2 c + 5 + 14 j) + 4 f c + 10 n^2 + 20 n))` for each of the up to 8 parts of a batch, `c = n + 2`
+///   channels and `j` jets per state, 1 without penalty and `n + 1` with one, the latter with `n^2` more numbers per state;
+/// - polishing with memory `m`, which makes `s = 8` in the stripes: `24 n (N + V) + 4 N + 8 P (2 m + 14)`.
+pub fn training_memory(config: &Config, architecture: &Architecture) -> Option<u64> {
+    let layout = Layout::new(architecture);
+    let number = match config.precision {
+        Precision::F32 => 4,
+        Precision::F64 => 8,
+    };
+    let (n, f) = (architecture.coordinates as u64, layout.features as u64);
+    let units: usize = layout.branches.iter().flat_map(|branch| branch.hidden()).map(|layer| layer.outputs).sum();
+    let (units, weights, phases) = (units as u64, layout.parameters as u64, config.phases.len() as u64);
+    let data = &config.data;
+    let (training, validation, test) = (data.training as u64, data.validation as u64, data.test as u64);
+
+    let all = sum([product([phases, training]), Some(validation), Some(test)]);
+    let once = sum([Some(training), Some(validation)]);
+    let states = sum([
+        product([3 * (16 + number), n, all?]),
+        product([3 * number, n, once?]),
+        product([40, n, test]),
+        product([4, sum([product([6, training]), Some(validation)])?]),
+    ]);
+
+    let largest = (data.training.min(config.optimizer.batch)).max(data.validation).max(data.test);
+    let largest = if config.polish.is_some() { largest.max(data.training) } else { largest } as u64;
+    let stripes = largest.div_ceil(CHUNK as u64).min(STRIPES as u64);
+    let batch = largest.div_ceil(STRIPES as u64).max(CHUNK as u64);
+    let (channels, penalised) = (n + 2, !matches!(config.penalty, Regularizer::None));
+    let jets = if penalised { n + 1 } else { 1 };
+    let square = product([n, n])?;
+    let of_state = sum([
+        product([units, sum([product([2, channels]), Some(5), product([14, jets])])?]),
+        product([4, f, channels]),
+        product([10, square]),
+        product([20, n]),
+    ]);
+    let suspects = if penalised { product([square + n + 1, batch]) } else { Some(0) };
+    let of_stripe = sum([Some(weights), product([CHUNK as u64, of_state?]), suspects]);
+    let wide = if config.polish.is_some() { 8 } else { number };
+    let polish = match &config.polish {
+        None => Some(0),
+        Some(polish) => sum([
+            product([24, n, once?]),
+            product([4, training]),
+            product([8, weights, 2 * polish.memory as u64 + POLISH]),
+        ]),
+    };
+    sum([states, product([(VECTORS + CHECKPOINT) * number, weights]), product([wide, stripes, of_stripe?]), polish])
+}
+
+/// A product, if it can be counted.
+fn product<const N: usize>(factors: [u64; N]) -> Option<u64> {
+    factors.into_iter().try_fold(1_u64, u64::checked_mul)
+}
+
+/// A sum, if it can be counted.
+fn sum<const N: usize>(terms: [Option<u64>; N]) -> Option<u64> {
+    terms.into_iter().try_fold(0_u64, |sum, term| sum.checked_add(term?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::training::preset::Preset;
+
+    fn memory(change: impl FnOnce(&mut Config)) -> Option<u64> {
+        let system = crate::lagrangian::configure("double-pendulum", &[]).unwrap();
+        let mut config = Preset::Quick.config(&system).unwrap();
+        change(&mut config);
+        training_memory(&config, &config.architecture(&system, vec![1.0; 2]))
+    }
+
+    #[test]
+    fn more_of_anything_takes_more() {
+        let plain = memory(|_| {}).unwrap();
+        assert!(memory(|c| c.data.training += 1000).unwrap() > plain);
+        assert!(memory(|c| c.network.hidden[0] += 100).unwrap() > plain);
+        assert!(memory(|c| c.phases.push(c.phases[0].clone())).unwrap() > plain);
+        assert!(memory(|c| c.precision = Precision::F64).unwrap() > plain);
+        assert!(memory(|c| c.data.training = 1 << 30).unwrap() > 100 << 30);
+        // Three square matrices of 65536 rows in 36 vectors and 8 gradients.
+        assert!(memory(|c| c.network.hidden = vec![1 << 16; 4]).unwrap() > 44 * 4 * (3 << 32));
+    }
+
+    #[test]
+    fn what_cannot_be_counted_is_not() {
+        assert_eq!(product([1 << 32, 1 << 32]), None);
+        assert_eq!(sum([Some(u64::MAX), Some(1)]), None);
+        assert_eq!(sum([Some(1), None]), None);
+        assert_eq!(memory(|c| c.data.training = usize::MAX / 4), None);
+    }
+}

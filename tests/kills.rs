@@ -1,0 +1,133 @@
+//! The program killed at random moments: at most one interval is lost, and the end is the same to the last byte.
+#![cfg(all(feature = "cli", unix))]
+
+use lnn::lagrangian::configure;
+use lnn::storage::Disk;
+use lnn::training::{Config, NEWEST, PREVIOUS, Preset, saved};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use serde_json::Value;
+use std::fs;
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+fn config() -> Config {
+    let mut config = Preset::Quick.config(&configure("harmonic-oscillator", &[]).unwrap()).unwrap();
+    (config.data.training, config.data.validation, config.data.test) = (1024, 64, 64);
+    config.network.hidden = vec![16];
+    config.optimizer.batch = 64;
+    config.phases[0].epochs = 40;
+    config
+}
+
+fn lnn(arguments: &[&str]) -> Child {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_lnn"));
+    command.env("LNN_LOG", "info").args(arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
+}
+
+fn succeed(arguments: &[&str]) {
+    let output = lnn(arguments).wait_with_output().unwrap();
+    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+}
+
+/// Columns of the history but the last, the time.
+fn history(directory: &Path) -> String {
+    let csv = fs::read_to_string(directory.join("history.csv")).unwrap();
+    csv.lines().map(|line| format!("{}\n", line.rsplit_once(',').unwrap().0)).collect()
+}
+
+/// The summary without its times.
+fn summary(directory: &Path) -> Value {
+    let mut summary: Value = serde_json::from_slice(&fs::read(directory.join("summary.json")).unwrap()).unwrap();
+    for key in ["wall_seconds", "training_seconds", "states_per_second"] {
+        assert!(summary.as_object_mut().unwrap().remove(key).is_some());
+    }
+    summary
+}
+
+/// The last epoch that the log on standard error names.
+fn last_epoch(log: &str) -> Option<usize> {
+    let mut numbers =
+        log.lines().filter_map(|line| line.split("epoch=").nth(1)?.split_whitespace().next()?.parse().ok());
+    numbers.next_back()
+}
+
+/// Kills a training `kills` times, always goes on with it, and compares the end with a training that was left alone.
+fn survive(kills: usize, seed: u64) {
+    let folder = tempfile::tempdir().unwrap();
+    let text = |path: &Path| path.to_str().unwrap().to_string();
+    let (file, alone, killed) =
+        (folder.path().join("c.toml"), folder.path().join("alone"), folder.path().join("killed"));
+    fs::write(&file, toml::to_string(&config()).unwrap()).unwrap();
+    let train =
+        ["train", "--threads", "1", "--checkpoint-every", "1", "--config", &text(&file), "--out"].map(String::from);
+    let train = |out: &Path| [&train[..], &[text(out)]].concat();
+    let began = Instant::now();
+    succeed(&train(&alone).iter().map(String::as_str).collect::<Vec<_>>());
+    let span = began.elapsed();
+
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let (mut done, mut finished) = (0, 0);
+    while done < kills {
+        // From its beginning again when it has come to its end, so that every stretch of it is hit.
+        let go_on = killed.join(NEWEST).exists() || killed.join(PREVIOUS).exists();
+        let arguments = if go_on {
+            ["train", "--threads", "1", "--checkpoint-every", "1", "--resume", &text(&killed)]
+                .map(String::from)
+                .to_vec()
+        } else {
+            train(&killed)
+        };
+        let mut child = lnn(&arguments.iter().map(String::as_str).collect::<Vec<_>>());
+        std::thread::sleep(Duration::from_secs_f64(span.as_secs_f64() * random.random_range(0.0..0.6)));
+        let ended = child.try_wait().unwrap();
+        // SIGKILL.
+        child.kill().unwrap();
+        let output = child.wait_with_output().unwrap();
+        let status = output.status;
+        match ended {
+            Some(status) => {
+                assert!(status.success());
+                compare(&killed, &alone);
+                finished += 1;
+            }
+            None if status.success() => finished += 1,
+            None => done += 1,
+        }
+        if killed.join(NEWEST).exists() || killed.join(PREVIOUS).exists() {
+            let found = saved(&Disk, &killed).unwrap().content;
+            assert_eq!(found.config, toml::to_string(&config()).unwrap());
+            // The log names an epoch, counted from 0, before the checkpoint behind it is written.
+            let log = last_epoch(&String::from_utf8_lossy(&output.stderr));
+            assert!(found.epochs >= log.unwrap_or(0), "{found:?}, but epoch {log:?} had ended");
+        }
+    }
+    if killed.join(NEWEST).exists() || killed.join(PREVIOUS).exists() {
+        succeed(&["train", "--threads", "1", "--resume", &text(&killed)]);
+    } else if finished == 0 || !killed.join("model.safetensors").exists() {
+        succeed(&train(&killed).iter().map(String::as_str).collect::<Vec<_>>());
+    }
+    compare(&killed, &alone);
+    let hidden =
+        fs::read_dir(&killed).unwrap().filter(|e| e.as_ref().unwrap().file_name().to_str().unwrap().starts_with('.'));
+    assert_eq!(hidden.count(), 0);
+}
+
+fn compare(killed: &Path, alone: &Path) {
+    let model = |directory: &Path| fs::read(directory.join("model.safetensors")).unwrap();
+    assert!(model(killed) == model(alone), "the models differ");
+    assert_eq!(history(killed), history(alone));
+    assert_eq!(summary(killed), summary(alone));
+}
+
+#[test]
+fn twenty_kills() {
+    survive(20, 1);
+}
+
+#[test]
+#[ignore = "minutes"]
+fn two_hundred_kills() {
+    survive(200, 2);
+}
