@@ -1,71 +1,12 @@
 //! The program from outside: results, exit codes and the one line that says what is wrong.
 #![cfg(feature = "cli")]
 
-use lnn::network::file::{FORMAT, Header, ModelFile, StoredPrecision};
-use lnn::network::{Architecture, InputLayer, Layout, Nonlinearity};
+mod common;
+
+use common::program::{Folder, HEADER, inspect, lnn, model, text};
 use serde_json::Value;
-use std::collections::BTreeMap;
 use std::fs;
-use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use tempfile::TempDir;
-
-/// What a run left behind.
-struct Run {
-    code: Option<i32>,
-    stdout: String,
-    stderr: String,
-}
-
-fn lnn(arguments: &[&str]) -> Run {
-    let output = Command::new(env!("CARGO_BIN_EXE_lnn")).args(arguments).env_remove("LNN_LOG").output().unwrap();
-    let text = |bytes| String::from_utf8(bytes).unwrap();
-    Run { code: output.status.code(), stdout: text(output.stdout), stderr: text(output.stderr) }
-}
-
-impl Run {
-    /// The run failed with this code and one line that says all of `parts`, and printed no result.
-    fn refused(&self, code: i32, parts: &[&str]) {
-        assert_eq!(self.code, Some(code), "{}", self.stderr);
-        assert_eq!(self.stderr.lines().count(), 1, "{}", self.stderr);
-        assert!(self.stderr.starts_with("error: "), "{}", self.stderr);
-        for part in parts {
-            assert!(self.stderr.contains(part), "{part:?} is not in {}", self.stderr);
-        }
-        assert_eq!(self.stdout, "");
-    }
-    /// The run succeeded without a word on standard error; its lines as JSON.
-    fn objects(&self) -> Vec<Value> {
-        assert_eq!((self.code, self.stderr.as_str()), (Some(0), ""));
-        self.stdout.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
-    }
-}
-
-struct Folder(TempDir);
-
-impl Folder {
-    fn new() -> Self {
-        Self(tempfile::tempdir().unwrap())
-    }
-    fn path(&self, name: &str) -> PathBuf {
-        self.0.path().join(name)
-    }
-    fn file(&self, name: &str, content: impl AsRef<[u8]>) -> String {
-        let path = self.path(name);
-        fs::write(&path, content).unwrap();
-        text(&path)
-    }
-}
-
-fn text(path: &Path) -> String {
-    path.to_str().unwrap().to_string()
-}
-
-const HEADER: &str = "theta1,theta2,theta1_dot,theta2_dot\n";
-
-fn inspect(system: &str, states: &str, more: &[&str]) -> Run {
-    lnn(&[&["inspect", "--system", system, "--states", states], more].concat())
-}
 
 fn numbers(value: &Value) -> Vec<f64> {
     value.as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect()
@@ -206,35 +147,6 @@ fn a_singular_mass_matrix_leaves_the_other_rows_right() {
         assert!(objects[k]["error"].is_null());
         assert_eq!(numbers(&objects[k]["acceleration"]).len(), 2);
     }
-}
-
-/// A small network with weights of no meaning.
-fn model() -> ModelFile<f32> {
-    let architecture = Architecture {
-        coordinates: 2,
-        hidden: vec![8, 8],
-        activation: Nonlinearity::Softplus,
-        alpha: 0.5,
-        scale: vec![3.0, 4.0],
-        periodic: vec![true, true],
-        embed_periodic: true,
-        input_layer: InputLayer::None,
-    };
-    let count = Layout::new(&architecture).parameters;
-    let header = Header {
-        format: FORMAT,
-        crate_version: env!("CARGO_PKG_VERSION").to_string(),
-        architecture,
-        system: "double-pendulum".to_string(),
-        parameters: ["m1", "m2", "l1", "l2"].map(|s| (s.to_string(), 1.0)).into_iter().collect::<BTreeMap<_, _>>(),
-        columns: ["theta1", "theta2", "theta1_dot", "theta2_dot"].map(String::from).to_vec(),
-        precision: StoredPrecision::F32,
-        position: vec![[0.0, 6.0]; 2],
-        velocity: vec![[-10.0, 10.0]; 2],
-        seed: 1,
-        validation_loss: 0.25,
-    };
-    ModelFile { header, weights: (0..count).map(|k| (k as f32 * 0.7).sin() / 4.0).collect() }
 }
 
 #[test]

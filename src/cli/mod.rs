@@ -28,6 +28,7 @@ mod systems;
 mod train;
 mod train_config;
 
+pub use config::parse as parse_config;
 pub use error::{CliError, Kind};
 pub use states::{States, StatesError, parse_states};
 
@@ -77,6 +78,17 @@ pub fn main(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     }
 }
 
+/// Whether the program understands these arguments, the first being its own name; nothing is run.
+///
+/// # Errors
+/// The usage error that the program ends with. Asking for help or for the version is none.
+pub fn check_arguments(arguments: impl IntoIterator<Item = OsString>) -> Result<(), CliError> {
+    match Cli::try_parse_from(arguments) {
+        Err(error) if error.exit_code() != 0 => Err(misunderstood(&error)),
+        _ => Ok(()),
+    }
+}
+
 fn run(command: Command) -> Result<(), CliError> {
     // Training and experiments keep what they have when they are interrupted; the others have nothing to keep.
     if !matches!(command, Command::Train(_) | Command::Experiment(_)) {
@@ -109,14 +121,18 @@ fn answer(error: &clap::Error) -> ExitCode {
             ExitCode::from(2)
         }
         _ => {
-            let text = error.to_string();
-            let problem =
-                ["\n\nUsage:", "\n\nFor more"].iter().fold(text.as_str(), |t, end| t.split(end).next().unwrap_or(t));
-            let failed = CliError::usage(problem.strip_prefix("error: ").unwrap_or(problem));
+            let failed = misunderstood(error);
             report(&failed);
             failed.exit_code()
         }
     }
+}
+
+/// The first paragraph of what is wrong with the arguments, without usage and hints.
+fn misunderstood(error: &clap::Error) -> CliError {
+    let text = error.to_string();
+    let problem = ["\n\nUsage:", "\n\nFor more"].iter().fold(text.as_str(), |t, end| t.split(end).next().unwrap_or(t));
+    CliError::usage(problem.strip_prefix("error: ").unwrap_or(problem))
 }
 
 /// One line on standard error; if that is closed too, there is nobody to tell.

@@ -107,13 +107,14 @@ impl Args {
 
     fn file_config(&self, path: &Path) -> Result<Config, CliError> {
         let config: Config = config::load(path)?;
-        match self.system.as_ref().filter(|name| **name != config.system) {
-            Some(system) => {
-                let problem = format!("{} is about {:?}, not {system:?}", path.display(), config.system);
-                Err(CliError::usage(problem))
-            }
-            None => Ok(config),
+        if let Some(system) = self.system.as_ref().filter(|name| **name != config.system) {
+            let problem = format!("{} is about {:?}, not {system:?}", path.display(), config.system);
+            return Err(CliError::usage(problem));
         }
+        // Before the arguments change anything: what is wrong here is the file's.
+        configure::<f64>(&config.system, &given(&config.parameters))
+            .map_err(|e| CliError::usage(format_args!("{}: {e}", path.display())))?;
+        Ok(config)
     }
 
     /// A configuration with the values that arguments name.

@@ -4,6 +4,8 @@
 pub mod accuracy;
 pub mod matrices;
 pub mod nested;
+#[cfg(feature = "cli")]
+pub mod program;
 
 use lnn::scalar::{Real, Scalar};
 use proptest::test_runner::{Config, FileFailurePersistence, RngSeed};

@@ -1,0 +1,143 @@
+//! The program `lnn` from outside: runs with a time limit, files to give it, a small model.
+
+use lnn::network::file::{FORMAT, Header, ModelFile, StoredPrecision};
+use lnn::network::{Architecture, InputLayer, Layout, Nonlinearity};
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::fs;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::thread;
+use std::time::{Duration, Instant};
+use tempfile::TempDir;
+
+/// Header of the states of a double pendulum.
+pub const HEADER: &str = "theta1,theta2,theta1_dot,theta2_dot\n";
+
+/// The program with its arguments and without a filter of the log.
+pub fn command(arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_lnn"));
+    command.args(arguments).env_remove("LNN_LOG");
+    command
+}
+
+/// Runs the program.
+pub fn lnn(arguments: &[&str]) -> Run {
+    Run::of(&mut command(arguments))
+}
+
+/// Looks at states of a system.
+pub fn inspect(system: &str, states: &str, more: &[&str]) -> Run {
+    lnn(&[&["inspect", "--system", system, "--states", states], more].concat())
+}
+
+/// What a run left behind.
+pub struct Run {
+    pub code: Option<i32>,
+    pub stdout: String,
+    pub stderr: String,
+}
+
+impl Run {
+    /// Runs a command to its end; one that takes two minutes waits for what never comes, and fails the test.
+    pub fn of(command: &mut Command) -> Self {
+        fn read(mut pipe: impl Read + Send + 'static) -> thread::JoinHandle<String> {
+            thread::spawn(move || {
+                let mut text = String::new();
+                pipe.read_to_string(&mut text).expect("UTF-8");
+                text
+            })
+        }
+        let mut child = command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        let (out, err) = (read(child.stdout.take().unwrap()), read(child.stderr.take().unwrap()));
+        let limit = Instant::now() + Duration::from_secs(120);
+        let status = loop {
+            match child.try_wait().unwrap() {
+                Some(status) => break status,
+                None if Instant::now() > limit => {
+                    child.kill().unwrap();
+                    child.wait().unwrap();
+                    panic!("{command:?} does not end");
+                }
+                None => thread::sleep(Duration::from_millis(1)),
+            }
+        };
+        Self { code: status.code(), stdout: out.join().unwrap(), stderr: err.join().unwrap() }
+    }
+
+    /// The run failed with this code and one line that says all of `parts`, and printed no result.
+    pub fn refused(&self, code: i32, parts: &[&str]) {
+        assert_eq!(self.code, Some(code), "{}", self.stderr);
+        assert_eq!(self.stderr.lines().count(), 1, "{}", self.stderr);
+        assert!(self.stderr.starts_with("error: ") && !self.stderr.contains("panicked"), "{}", self.stderr);
+        for part in parts {
+            assert!(self.stderr.contains(part), "{part:?} is not in {}", self.stderr);
+        }
+        assert_eq!(self.stdout, "");
+    }
+
+    /// The run succeeded without a word on standard error; its lines as JSON.
+    pub fn objects(&self) -> Vec<Value> {
+        assert_eq!((self.code, self.stderr.as_str()), (Some(0), ""));
+        self.stdout.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+    }
+}
+
+/// A directory of a test's own.
+pub struct Folder(pub TempDir);
+
+impl Folder {
+    pub fn new() -> Self {
+        Self(tempfile::tempdir().unwrap())
+    }
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+    /// Writes a file and gives its path.
+    pub fn file(&self, name: &str, content: impl AsRef<[u8]>) -> String {
+        let path = self.path(name);
+        fs::write(&path, content).unwrap();
+        text(&path)
+    }
+    /// Names of everything in it.
+    pub fn names(&self) -> Vec<String> {
+        let names = fs::read_dir(self.0.path()).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap());
+        let mut names: Vec<String> = names.collect();
+        names.sort();
+        names
+    }
+}
+
+pub fn text(path: &Path) -> String {
+    path.to_str().unwrap().to_string()
+}
+
+/// A small network for a double pendulum, with weights of no meaning.
+pub fn model() -> ModelFile<f32> {
+    let architecture = Architecture {
+        coordinates: 2,
+        hidden: vec![8, 8],
+        activation: Nonlinearity::Softplus,
+        alpha: 0.5,
+        scale: vec![3.0, 4.0],
+        periodic: vec![true, true],
+        embed_periodic: true,
+        input_layer: InputLayer::None,
+    };
+    let count = Layout::new(&architecture).parameters;
+    let header = Header {
+        format: FORMAT,
+        crate_version: env!("CARGO_PKG_VERSION").to_string(),
+        architecture,
+        system: "double-pendulum".to_string(),
+        parameters: ["m1", "m2", "l1", "l2"].map(|s| (s.to_string(), 1.0)).into_iter().collect::<BTreeMap<_, _>>(),
+        columns: ["theta1", "theta2", "theta1_dot", "theta2_dot"].map(String::from).to_vec(),
+        precision: StoredPrecision::F32,
+        position: vec![[0.0, 6.0]; 2],
+        velocity: vec![[-10.0, 10.0]; 2],
+        seed: 1,
+        validation_loss: 0.25,
+    };
+    ModelFile { header, weights: (0..count).map(|k| (k as f32 * 0.7).sin() / 4.0).collect() }
+}
