@@ -21,7 +21,7 @@ mod json;
 mod tests;
 
 pub use error::ModelFileError;
-pub use header::{FORMAT, Header, StoredPrecision};
+pub use header::{FORMAT, Header, MAX_COORDINATES, MAX_WIDTH, StoredPrecision};
 
 use crate::network::{Architecture, Layout, LinearMap};
 use crate::scalar::Scalar;
