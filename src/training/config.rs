@@ -1,5 +1,6 @@
 //! Everything that determines a training run; written beside every model as `config.toml`.
 
+use crate::network::file::MAX_WIDTH;
 use crate::network::{Initialization, InputLayer, Nonlinearity};
 use crate::training::optimizer::Method;
 use crate::training::penalty::Regularizer;
@@ -193,7 +194,7 @@ impl Config {
         )?;
         for (k, &width) in hidden.iter().enumerate() {
             let field = format!("network.hidden[{k}]");
-            count(width, &field, 1 << 16)?;
+            count(width, &field, MAX_WIDTH)?;
             let ok = width.is_multiple_of(self.network.activation.branches().len());
             check(
                 ok,

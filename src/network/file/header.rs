@@ -9,6 +9,12 @@ use std::collections::BTreeMap;
 /// Format that this version writes and reads.
 pub const FORMAT: u32 = 1;
 
+/// Most coordinates of a model: the memory of an evaluation grows with their square, that of a file does not.
+pub const MAX_COORDINATES: usize = 256;
+
+/// Largest width of a hidden layer.
+pub const MAX_WIDTH: usize = 1 << 16;
+
 /// Number type of the stored weights.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -67,8 +73,9 @@ impl Header {
         let require = |ok: bool, text: &str| if ok { Ok(()) } else { Err(ModelFileError::Header(text.to_string())) };
         self.architecture.validate().map_err(|e| ModelFileError::Header(e.to_string()))?;
         let (n, hidden) = (self.architecture.coordinates, &self.architecture.hidden);
+        require(n <= MAX_COORDINATES, &format!("coordinates: expected at most {MAX_COORDINATES}"))?;
         require(hidden.len() <= 64, "hidden: expected at most 64 widths")?;
-        require(hidden.iter().all(|w| *w <= 1 << 20), "hidden: expected widths of at most 1048576")?;
+        require(hidden.iter().all(|w| *w <= MAX_WIDTH), &format!("hidden: expected widths of at most {MAX_WIDTH}"))?;
         require(self.columns.len() == 2 * n, "columns: expected two per coordinate")?;
         let distinct: std::collections::BTreeSet<_> = self.columns.iter().collect();
         require(distinct.len() == 2 * n, "columns: expected distinct names")?;

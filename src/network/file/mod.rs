@@ -22,7 +22,7 @@ mod json;
 mod tests;
 
 pub use error::ModelFileError;
-pub use header::{FORMAT, Header, StoredPrecision};
+pub use header::{FORMAT, Header, MAX_COORDINATES, MAX_WIDTH, StoredPrecision};
 
 use self::container::{Kind, Tensor, pack, unpack};
 use crate::network::{Architecture, Layout, LinearMap};

@@ -249,6 +249,24 @@ fn claims_of_the_description_are_checked() {
     }
 }
 
+/// A list of numbers costs a few bytes per coordinate, a mass matrix its square.
+#[test]
+fn coordinates_and_widths_are_bounded() {
+    let sized = |n: usize, width: usize| {
+        let mut header = header(vec![width], true, StoredPrecision::F32);
+        header.architecture.coordinates = n;
+        header.architecture.scale = vec![1.0; n];
+        header.architecture.periodic = vec![false; n];
+        header.columns = (0..2 * n).map(|k| k.to_string()).collect();
+        header.position = vec![[0.0, 1.0]; n];
+        header.velocity = vec![[0.0, 1.0]; n];
+        header.validate().map_err(|e| e.to_string())
+    };
+    assert_eq!(sized(MAX_COORDINATES, MAX_WIDTH), Ok(()));
+    assert!(sized(MAX_COORDINATES + 1, 1).unwrap_err().contains("coordinates: expected at most 256"));
+    assert!(sized(1, MAX_WIDTH + 1).unwrap_err().contains("hidden: expected widths of at most 65536"));
+}
+
 #[test]
 fn what_cannot_be_read_back_is_not_written() {
     let directory = tempfile::tempdir().unwrap();
