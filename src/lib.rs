@@ -2,7 +2,7 @@
 //! physics off the learned function.
 //!
 //! Rooms, each importing only from those above it: [`names`], [`storage`], [`scalar`], [`ops`], [`forward`], [`linalg`], [`tape`],
-//! [`lagrangian`], [`network`], [`training`], [`rollout`], [`analysis`], [`experiments`], `report`, `cli`.
+//! [`recording`], [`lagrangian`], [`network`], [`training`], [`rollout`], [`analysis`], [`experiments`], `report`, `cli`.
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 
@@ -19,6 +19,8 @@ pub mod forward;
 pub mod linalg;
 
 pub mod tape;
+
+pub mod recording;
 
 pub mod lagrangian;
 

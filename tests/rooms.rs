@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Rooms from top to bottom; a file may name its own room and those before it.
-const ROOMS: [&str; 15] = [
+const ROOMS: [&str; 16] = [
     "names",
     "storage",
     "scalar",
@@ -13,6 +13,7 @@ const ROOMS: [&str; 15] = [
     "forward",
     "linalg",
     "tape",
+    "recording",
     "lagrangian",
     "network",
     "training",

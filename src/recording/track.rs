@@ -1,0 +1,143 @@
+//! Recorded trajectories in memory.
+
+use thiserror::Error;
+
+/// One recorded trajectory of `n` coordinates: positions at increasing times, and what else was measured.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Track {
+    /// Where it comes from, such as a file's name.
+    pub name: String,
+    /// Times of the samples in s, strictly increasing, `(samples)`.
+    pub times: Vec<f64>,
+    /// Coordinates, `(samples, n)` row-major; angles are unwrapped: they go on past a full turn.
+    pub q: Vec<f64>,
+    /// Velocities, `(samples, n)`; empty if they were not measured.
+    pub v: Vec<f64>,
+    /// Accelerations, `(samples, n)`; empty if they were not measured.
+    pub a: Vec<f64>,
+    /// Known external generalized forces, `(samples, n)`; empty if there are none.
+    pub force: Vec<f64>,
+}
+
+/// Trajectories of one system.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Recording {
+    /// Names of the coordinates.
+    pub coordinates: Vec<String>,
+    /// Which coordinates are angles, in rad.
+    pub periodic: Vec<bool>,
+    /// The trajectories.
+    pub tracks: Vec<Track>,
+}
+
+/// Why numbers do not make a trajectory.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum TrackError {
+    /// Lengths disagree.
+    #[error("{track}: {what}: expected {expected} numbers, found {found}")]
+    Shape {
+        /// Name of the trajectory.
+        track: String,
+        /// Which array.
+        what: &'static str,
+        /// Numbers expected.
+        expected: usize,
+        /// Numbers found.
+        found: usize,
+    },
+    /// A number is infinite or `NaN`.
+    #[error("{track}: {what} of sample {sample} is not finite")]
+    NotFinite {
+        /// Name of the trajectory.
+        track: String,
+        /// Which array.
+        what: &'static str,
+        /// Sample, from 0.
+        sample: usize,
+    },
+    /// Time stands still or goes back.
+    #[error("{track}: time of sample {sample} is not later than that of the sample before")]
+    Order {
+        /// Name of the trajectory.
+        track: String,
+        /// Sample, from 0.
+        sample: usize,
+    },
+}
+
+impl Track {
+    /// Number of samples.
+    pub fn len(&self) -> usize {
+        self.times.len()
+    }
+
+    /// Whether there is no sample.
+    pub fn is_empty(&self) -> bool {
+        self.times.is_empty()
+    }
+
+    /// Checks shapes for `n` coordinates, finiteness and the order of times.
+    ///
+    /// # Errors
+    /// The first [`TrackError`].
+    pub fn validate(&self, n: usize) -> Result<(), TrackError> {
+        let track = || self.name.clone();
+        let expected = self.len() * n;
+        for (what, values, optional) in [
+            ("positions", &self.q, false),
+            ("velocities", &self.v, true),
+            ("accelerations", &self.a, true),
+            ("forces", &self.force, true),
+        ] {
+            if values.len() != expected && !(optional && values.is_empty()) {
+                return Err(TrackError::Shape { track: track(), what, expected, found: values.len() });
+            }
+            if let Some(at) = values.iter().position(|x| !x.is_finite()) {
+                return Err(TrackError::NotFinite { track: track(), what, sample: at / n.max(1) });
+            }
+        }
+        if let Some(sample) = self.times.iter().position(|t| !t.is_finite()) {
+            return Err(TrackError::NotFinite { track: track(), what: "time", sample });
+        }
+        match self.times.windows(2).position(|pair| pair[1] <= pair[0]) {
+            Some(at) => Err(TrackError::Order { track: track(), sample: at + 1 }),
+            None => Ok(()),
+        }
+    }
+}
+
+impl Recording {
+    /// Number of coordinates `n`.
+    pub fn n(&self) -> usize {
+        self.coordinates.len()
+    }
+
+    /// Samples of all trajectories.
+    pub fn samples(&self) -> usize {
+        self.tracks.iter().map(Track::len).sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_wrong_is_named() {
+        let good = Track {
+            name: "swing".into(),
+            times: vec![0.0, 0.1, 0.2],
+            q: vec![1.0, 2.0, 1.1, 2.1, 1.2, 2.2],
+            v: vec![],
+            a: vec![],
+            force: vec![],
+        };
+        assert_eq!(good.validate(2), Ok(()));
+        let short = Track { v: vec![0.0; 4], ..good.clone() };
+        assert_eq!(short.validate(2).unwrap_err().to_string(), "swing: velocities: expected 6 numbers, found 4");
+        let late = Track { times: vec![0.0, 0.1, 0.1], ..good.clone() };
+        assert_eq!(late.validate(2), Err(TrackError::Order { track: "swing".into(), sample: 2 }));
+        let broken = Track { q: vec![1.0, 2.0, f64::NAN, 2.1, 1.2, 2.2], ..good };
+        assert!(broken.validate(2).unwrap_err().to_string().contains("positions of sample 1"));
+    }
+}
