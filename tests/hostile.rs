@@ -18,12 +18,15 @@
 //! | sizes 0, 1, 2^40; widths beyond the memory | `sizes_are_refused_before_anything_is_allocated`, `claims_cost_nothing` |
 //! | batch 0, -1; rate NaN, negative, 0; dt 0; t infinite | `configurations_are_placed`, `numbers_of_the_command_line_have_ranges`, `cli_train::wrong_trainings_are_refused_before_anything_is_written` |
 //! | configuration: typo, duplicate, wrong type | `configurations_are_placed`, `cli::config::tests` |
-//! | disk full | `cli::devices_closed_pipes_and_full_disks_end_quietly_or_with_a_line` for standard output; `storage::tests::failures_keep_the_old_content` for files |
+//! | disk full, I/O errors, short and interrupted writes | `faults`: every operation fails once, and for good; `cli_resume::full_disks_and_lost_directories_are_named`; `cli::devices_closed_pipes_and_full_disks_end_quietly_or_with_a_line` for standard output |
+//! | kill -9 at any moment | `kills::twenty_kills` (200 by `cargo test --test kills -- --ignored`), `faults::a_checkpoint_is_the_old_one_or_the_new_one` |
 //! | read-only directory, directory as target, no parent | `targets_that_cannot_be_written_are_named`, `cli_train::directories_that_cannot_be_written_are_named_before_training` |
-//! | Ctrl-C | `cli_train::ctrl_c_keeps_the_best_model` |
+//! | Ctrl-C, once and twice | `cli_train::ctrl_c_keeps_the_best_model`, `cli_resume::a_second_ctrl_c_ends_at_once` |
 //! | reader of a pipe gone | `pipes` |
-//! | two runs, one directory | `cli::folder::tests::one_run_at_a_time`, `cli_train::ctrl_c_keeps_the_best_model` |
+//! | two runs, one directory | `cli::folder::tests::one_run_at_a_time`, `cli_resume::a_directory_has_one_run_and_outlives_a_dead_one` |
 //! | loss NaN, singular mass matrix in training | `training::one_number_that_is_not_finite_is_named_and_never_reaches_the_weights`, `a_singular_mass_matrix_stops_or_is_left_out_by_choice` |
+//! | resume under another configuration or other data | `checkpoints::other_configurations_data_and_networks_are_refused`, `cli_resume::a_training_stopped_in_the_middle_comes_to_the_same_end` |
+//! | training that does not fit into memory | `cli_resume::work_that_does_not_fit_into_memory_is_refused`, `memory` |
 //! | roll-out leaves its domain | `cli_train::a_model_moves_and_is_judged` |
 //! | symbolic link, FIFO, /dev/zero, directory as input | `only_regular_files_are_read` |
 //!
@@ -145,7 +148,7 @@ fn weights_and_versions_are_checked() {
     let newer = described("\"format\":1", "\"format\":2,\"novelty\":{}");
     refused(newer, &["/m: written by lnn", "in format 2", &format!("lnn {own} reads format 1")]);
     refused(described("\"precision\":\"f32\"", "\"precision\":\"f64\""), &["tensor", "expected f64, found f32"]);
-    refused(described("\"precision\":\"f32\"", "\"precision\":\"f16\""), &["/m: model description: ", "f16"]);
+    refused(described("\"precision\":\"f32\"", "\"precision\":\"f16\""), &["/m: description: ", "f16"]);
     refused(described("\"hidden\":[8,8]", "\"hidden\":[8,9]"), &["expected shape", "found"]);
     refused(described("\"seed\":1", "\"seed\":1,\"seed\":2"), &["duplicate key \"seed\""]);
     // A system of another version can be looked at and not compared with.
@@ -181,7 +184,7 @@ fn claims_cost_nothing() {
     refused(described("\"hidden\":[8,8]", "\"hidden\":[1099511627776]"), &["expected widths of at most 65536"]);
     refused(described("\"hidden\":[8,8]", "\"hidden\":[18446744073709551615]"), &["expected widths"]);
     refused(described("\"hidden\":[8,8]", "\"hidden\":[16384,16384]"), &["expected shape [16384, 6]", "found [8, 6]"]);
-    refused(described("\"coordinates\":2", "\"coordinates\":1099511627776"), &["/m: model description: "]);
+    refused(described("\"coordinates\":2", "\"coordinates\":1099511627776"), &["/m: description: "]);
     let huge = "{\"a\":{\"dtype\":\"F64\",\"shape\":[4294967296,4294967296,4294967296],\"data_offsets\":[0,8]}}";
     refused(container(huge, &[0; 8]), &["not a whole safetensors file"]);
     // A hole of a terabyte in the file system: the size is refused before a byte is read.
@@ -419,8 +422,9 @@ fn targets_that_cannot_be_written_are_named() {
     let directory = text(&folder.path("directory"));
     fs::create_dir(&directory).unwrap();
     let before = folder.names();
+    // Noticed before the motion, which would take long.
     let rollout =
-        |out: &str| lnn(&["rollout", &model, "--state", "1,2,3,4", "--t-end", "0.001", "--dt", "0.001", "--out", out]);
+        |out: &str| lnn(&["rollout", &model, "--state", "1,2,3,4", "--t-end", "10000", "--dt", "0.001", "--out", out]);
     for out in [&directory, &text(&folder.path("no/parent.csv")), &text(&folder.path("m/below.csv")), "/proc/lnn.csv"] {
         rollout(out).refused(1, &[&format!("{out}: cannot write: ")]);
     }

@@ -45,7 +45,6 @@ impl Random {
         z ^ (z >> 31)
     }
     /// A number below `count`.
-    #[cfg(test)]
     pub fn below(&mut self, count: usize) -> usize {
         (self.bits() % count.max(1) as u64) as usize
     }

@@ -1,11 +1,12 @@
 //! What the fuzzer asks of `lnn`, one function of bytes per target; a claim that does not hold panics.
 //!
-//! Readers (`model_file`, `states_csv`, `config`, `command_line`) take the bytes as they are and refuse them or give
+//! Readers (`model_file`, `checkpoint`, `states_csv`, `config`, `command_line`) take the bytes as they are and refuse them or give
 //! something that is written back the same. The others make a problem of the bytes and compare two independent ways to
 //! its answer: `program` reverse replay and nested forward numbers, `linalg` and `network` working precision and
 //! double-double.
 #![forbid(unsafe_code)]
 
+pub mod checkpoint;
 pub mod command_line;
 pub mod config;
 pub mod linalg;
@@ -15,8 +16,7 @@ pub mod program;
 pub mod states_csv;
 
 mod accuracy;
-mod bytes;
+pub mod bytes;
 #[path = "../../tests/common/nested.rs"]
 mod nested;
-#[cfg(test)]
-mod tests;
+mod sealed;

@@ -3,8 +3,8 @@
 //! Tame matrices have elements within `2^+-20` of each other and a common power of two of any size: errors are a few
 //! roundings of the norm. Wild ones have any bits: nothing may panic, and a row is either finite or reported.
 
-use crate::accuracy::{cast, finite};
-use crate::bytes::Bytes;
+use super::accuracy::{cast, finite};
+use super::bytes::Bytes;
 use lnn::linalg::{Failure, Workspace, condition_number, eigenvalues, eigh, inertia, is_positive_definite, solve};
 use lnn::scalar::{Dd, Real, Scalar};
 

@@ -1,9 +1,9 @@
 //! A small network of random shape, weights and state: the batched derivatives in `f64` against nested forward numbers
 //! in double-double; weights of any bits are answered with finite terms or a typed error.
 
-use crate::accuracy::{apart, cast, finite, largest};
-use crate::bytes::{Bytes, Random};
-use crate::nested::{Reference, reference};
+use super::accuracy::{apart, cast, finite, largest};
+use super::bytes::{Bytes, Random};
+use super::nested::{Reference, reference};
 use lnn::lagrangian::{EulerLagrange, Request, Terms};
 use lnn::network::{Architecture, Chunk, Depth, InputLayer, Layout, NetworkLagrangian, Nonlinearity};
 use lnn::scalar::{Dd, Scalar};

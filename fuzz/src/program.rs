@@ -5,8 +5,8 @@
 //! products of the Hessian with a direction must agree within that many roundings, in `f64` and in double-double; lanes
 //! of a batch must agree to the bit.
 
-use crate::accuracy::cast;
-use crate::bytes::{Bytes, Random};
+use super::accuracy::cast;
+use super::bytes::{Bytes, Random};
 use lnn::forward::{Dual, HyperDual};
 use lnn::scalar::{Dd, Real, Scalar};
 use lnn::tape::{Program, Replay, ScalarFunction, gradient};

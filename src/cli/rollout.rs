@@ -5,7 +5,7 @@ use crate::cli::number::{finite, positive};
 use crate::cli::{CliError, memory, output};
 use crate::lagrangian::find;
 use crate::rollout::{Method, Options, RolloutError, rollout};
-use crate::storage::write_atomically;
+use crate::storage::{check_target, write_atomically};
 use std::path::PathBuf;
 
 /// Arguments.
@@ -94,13 +94,14 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         const TEXT: u64 = 2 * 25;
         memory::require("the motion", memory::motions(1, args.t_end / args.dt, q.len(), TEXT))?;
     }
+    let cannot_write = |e| CliError::file(&args.out, format_args!("cannot write: {e}"));
+    check_target(&args.out).map_err(cannot_write)?;
     let result = rollout(&learned.network, q, v, &options);
     if let Some(error @ RolloutError::Invalid { .. }) = &result.stop {
         return Err(CliError::usage(error));
     }
     let csv = result.trajectory.to_csv(columns).map_err(CliError::data)?;
-    write_atomically(&args.out, csv.as_bytes())
-        .map_err(|e| CliError::file(&args.out, format_args!("cannot write: {e}")))?;
+    write_atomically(&args.out, csv.as_bytes()).map_err(cannot_write)?;
     if let Some(stop) = result.stop {
         let problem = match &stop {
             RolloutError::LeftDomain { t, component, value, lower, upper, .. } => format!(

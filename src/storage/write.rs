@@ -42,6 +42,21 @@ pub fn write_whole(files: &dyn Files, path: &Path, bytes: &[u8]) -> io::Result<(
     draft.take_name()
 }
 
+/// Whether [`write_atomically`] could write to `path` now: found out before the work whose result it will be.
+///
+/// A temporary file is created beside the target and removed again.
+///
+/// # Errors
+/// As there.
+pub fn check_target(path: &Path) -> io::Result<()> {
+    match fs::metadata(path) {
+        Ok(data) if data.is_dir() => Err(io::Error::new(io::ErrorKind::IsADirectory, "is a directory")),
+        Ok(data) if !data.is_file() => OpenOptions::new().write(true).open(path).map(drop),
+        Ok(_) => Draft::write(&Disk, &fs::canonicalize(path)?, b"").map(drop),
+        Err(_) => Draft::write(&Disk, path, b"").map(drop),
+    }
+}
+
 /// Writes `bytes` to `newest` and lets what stood there live on as `previous`, until the next time.
 ///
 /// The new content is read back before anything is given up. Whatever fails and whenever the program dies, `newest` or
@@ -181,9 +196,12 @@ mod tests {
     fn failures_keep_the_old_content() {
         let directory = tempfile::tempdir().unwrap();
         let write = |path: &Path| write_atomically(path, b"x");
-        assert_eq!(write(directory.path()).unwrap_err().kind(), io::ErrorKind::IsADirectory);
-        assert!(write(&directory.path().join("missing/a.csv")).is_err());
-        assert!(write(Path::new("")).is_err());
+        for attempt in [write, check_target] {
+            assert_eq!(attempt(directory.path()).unwrap_err().kind(), io::ErrorKind::IsADirectory);
+            assert!(attempt(&directory.path().join("missing/a.csv")).is_err());
+            assert!(attempt(Path::new("")).is_err());
+        }
+        check_target(&directory.path().join("a.csv")).unwrap();
         assert_eq!(entries(directory.path()), 0);
     }
 

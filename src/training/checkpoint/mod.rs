@@ -19,7 +19,7 @@ pub use keeper::{
     CheckpointError, Every, Identity, Keeper, NEWEST, PREVIOUS, Restored, Saved, remove_checkpoints, saved,
 };
 
-use crate::network::file::StoredPrecision;
+use crate::network::file::{ModelFileError, StoredPrecision};
 use crate::scalar::Scalar;
 use crate::training::optimizer::Moments;
 use crate::training::solver::{Epoch, Means};
@@ -32,6 +32,24 @@ pub struct Snapshot<S> {
     pub(super) seconds: f64,
     pub(super) ended: Ended<S>,
     pub(super) underway: Option<Underway<S>>,
+}
+
+impl<S: Scalar> Snapshot<S> {
+    /// The bytes of a checkpoint of this training.
+    ///
+    /// # Errors
+    /// A number type that files do not know.
+    pub fn to_bytes(&self, identity: &Identity) -> Result<Vec<u8>, ModelFileError> {
+        format::encode(identity, self.seconds, &self.ended, self.underway.as_ref())
+    }
+
+    /// Reads any bytes as a checkpoint; its numbers are converted to the precision of `S`.
+    ///
+    /// # Errors
+    /// [`ModelFileError`] for anything but a whole checkpoint.
+    pub fn from_bytes(bytes: &[u8]) -> Result<(Identity, Self), ModelFileError> {
+        format::decode(bytes).map(|(header, snapshot)| (header.identity, snapshot))
+    }
 }
 
 impl<S> Snapshot<S> {

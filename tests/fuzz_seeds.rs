@@ -1,11 +1,16 @@
-//! Every target on its committed seeds and on mutations of them, the same ones in every run.
+//! Every fuzz target on its committed seeds and on mutations of them, the same ones in every run.
+#![cfg(all(feature = "cli", unix))]
 
-use crate::bytes::Random;
+// The library of the targets, compiled as a part of this test: the fuzzing engine is not needed.
+#[path = "../fuzz/src/lib.rs"]
+mod targets;
+
 use std::path::Path;
+use targets::bytes::Random;
 
 /// The seeds of a target, by name of the file.
 fn seeds(target: &str) -> Vec<Vec<u8>> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("corpus").join(target);
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/corpus").join(target);
     let mut files: Vec<_> = std::fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().path()).collect();
     files.sort();
     assert!(!files.is_empty(), "{} is empty", folder.display());
@@ -45,35 +50,40 @@ fn try_target(name: &str, mutations: usize, run: fn(&[u8])) {
 
 #[test]
 fn model_file() {
-    try_target("model_file", 5000, crate::model_file::run);
+    try_target("model_file", 5000, targets::model_file::run);
+}
+
+#[test]
+fn checkpoint() {
+    try_target("checkpoint", 3000, targets::checkpoint::run);
 }
 
 #[test]
 fn states_csv() {
-    try_target("states_csv", 5000, crate::states_csv::run);
+    try_target("states_csv", 5000, targets::states_csv::run);
 }
 
 #[test]
 fn config() {
-    try_target("config", 3000, crate::config::run);
+    try_target("config", 3000, targets::config::run);
 }
 
 #[test]
 fn command_line() {
-    try_target("command_line", 2000, crate::command_line::run);
+    try_target("command_line", 2000, targets::command_line::run);
 }
 
 #[test]
 fn program() {
-    try_target("program", 1000, crate::program::run);
+    try_target("program", 1000, targets::program::run);
 }
 
 #[test]
 fn linalg() {
-    try_target("linalg", 2000, crate::linalg::run);
+    try_target("linalg", 2000, targets::linalg::run);
 }
 
 #[test]
 fn network() {
-    try_target("network", 1000, crate::network::run);
+    try_target("network", 1000, targets::network::run);
 }
