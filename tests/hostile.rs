@@ -405,7 +405,7 @@ fn only_regular_files_are_read() {
     }
     // What may not be read, unless by the superuser.
     let secret = folder.file("secret", "x");
-    fs::set_permissions(&secret, std::os::unix::fs::PermissionsExt::from_mode(0)).unwrap();
+    fs::set_permissions(&secret, std::os::unix::fs::PermissionsExt::from_mode(0o0)).unwrap();
     if fs::read(&secret).is_err() {
         inspect("double-pendulum", &secret, &[]).refused(1, &["secret: cannot read: "]);
     }
