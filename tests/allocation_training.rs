@@ -26,6 +26,7 @@ fn allocates_nothing(activation: Nonlinearity, input_layer: InputLayer) {
         periodic: vec![true; 2],
         embed_periodic: true,
         input_layer,
+        dissipation: None,
     };
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     let mut weights: Vec<f32> = initial_weights(&architecture, Initialization::Default, &mut rng);

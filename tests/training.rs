@@ -28,6 +28,7 @@ fn architecture(n: usize, hidden: &[usize]) -> Architecture {
         periodic: vec![true; n],
         embed_periodic: true,
         input_layer: InputLayer::None,
+        dissipation: None,
     }
 }
 
@@ -371,6 +372,7 @@ fn config(epochs: usize) -> Config {
             scaling: Scaling::Physical,
             embed_periodic: true,
             input_layer: InputLayer::None,
+            dissipation: None,
             initialization: Initialization::Default,
         },
         penalty: Regularizer::Eigenvalue { lambda: 10.0 },

@@ -20,6 +20,7 @@ fn header(hidden: Vec<usize>, embed_periodic: bool, precision: StoredPrecision) 
             periodic: vec![true, false],
             embed_periodic,
             input_layer: InputLayer::None,
+            dissipation: None,
         },
         system: "spring-pendulum".to_string(),
         parameters: BTreeMap::from([("m".to_string(), 1.0), ("g".to_string(), 9.81)]),
