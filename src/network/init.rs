@@ -194,6 +194,27 @@ mod tests {
     }
 
     #[test]
+    fn a_dissipation_is_drawn_after_the_lagrangian_and_starts_small() {
+        for kind in [Initialization::Default, Initialization::Cranmer] {
+            let plain = architecture(Nonlinearity::QuadraticSoftplus);
+            let damped = Architecture { dissipation: Some(40), ..plain.clone() };
+            let (without, with) = (drawn(&plain, kind), drawn(&damped, kind));
+            let (lagrangian, friction) = with.split_at(without.len());
+            assert_eq!(lagrangian, without);
+            let (gamma, rest) = friction.split_at(40);
+            let (weight, direction) = rest.split_at(40 * 2);
+            assert!(gamma.iter().all(|&g| g == -5.0) && weight.iter().all(|&w| w == 0.0));
+            assert_eq!(direction.len(), 40 * 2);
+            assert!(direction.chunks(2).all(|b| (b[0].hypot(b[1]) - 1.0).abs() < 4.0 * f64::EPSILON));
+            // A mean of 40 unit vectors: each component has the standard error sqrt(1/2/40).
+            for i in 0..2 {
+                let mean = direction.iter().skip(i).step_by(2).sum::<f64>() / 40.0;
+                assert!(mean.abs() < 4.0 * (0.5f64 / 40.0).sqrt(), "{mean}");
+            }
+        }
+    }
+
+    #[test]
     fn an_input_layer_starts_as_stated_and_draws_nothing() {
         for choice in [Nonlinearity::Gelu, Nonlinearity::QuadraticSoftplus] {
             let plain = architecture(choice);
