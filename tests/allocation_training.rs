@@ -12,11 +12,11 @@ use rand_chacha::ChaCha8Rng;
 // One test, so that no other thread allocates meanwhile.
 #[test]
 fn a_training_step_allocates_nothing_after_the_first() {
-    allocates_nothing(Nonlinearity::Gelu, InputLayer::None);
-    allocates_nothing(Nonlinearity::QuadraticSoftplus, InputLayer::Dyt);
+    allocates_nothing(Nonlinearity::Gelu, InputLayer::None, None);
+    allocates_nothing(Nonlinearity::QuadraticSoftplus, InputLayer::Dyt, Some(16));
 }
 
-fn allocates_nothing(activation: Nonlinearity, input_layer: InputLayer) {
+fn allocates_nothing(activation: Nonlinearity, input_layer: InputLayer, dissipation: Option<usize>) {
     let architecture = Architecture {
         coordinates: 2,
         hidden: vec![96; 3],
@@ -26,11 +26,12 @@ fn allocates_nothing(activation: Nonlinearity, input_layer: InputLayer) {
         periodic: vec![true; 2],
         embed_periodic: true,
         input_layer,
+        dissipation,
     };
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     let mut weights: Vec<f32> = initial_weights(&architecture, Initialization::Default, &mut rng);
     let mut draw = || (0..2 * 256).map(|_| rng.random_range(-2.0..2.0)).collect();
-    let data = Dataset::new(2, draw(), draw(), draw()).unwrap();
+    let data = Dataset::new(2, draw(), draw(), draw()).unwrap().with_forces(draw()).unwrap();
     let rows: Vec<u32> = (0..256).collect();
     // The negative quadratic term keeps the penalty and its jets active.
     let mut objective = Objective::new(&architecture, Penalty::Eigenvalue { lambda: 1.0 }, 2).unwrap();

@@ -26,6 +26,7 @@ fn model(value: f64) -> ModelFile<f64> {
         periodic: vec![false],
         embed_periodic: false,
         input_layer: InputLayer::None,
+        dissipation: None,
     };
     let weights = vec![value; Layout::new(&architecture).parameters];
     let header = Header {

@@ -34,6 +34,7 @@ fn cases() -> impl Strategy<Value = Case> {
                 periodic: periodic[..n].to_vec(),
                 embed_periodic,
                 input_layer,
+                dissipation: None,
             },
             seed,
         },
@@ -226,6 +227,7 @@ fn models() -> impl Iterator<Item = Case> {
                 periodic: (0..n).map(|i| i % 2 == 0).collect(),
                 embed_periodic: true,
                 input_layer,
+                dissipation: None,
             },
             seed: n as u64,
         })
@@ -276,6 +278,7 @@ fn dynamic_tanh_stands_before_the_first_dense_layer() {
         periodic: vec![false],
         embed_periodic: false,
         input_layer: InputLayer::Dyt,
+        dissipation: None,
     };
     let (a, gamma, beta, row, bias, output) = (0.7, [1.5, -0.5], [0.25, 0.1], [0.3, -1.1], 0.6, 2.0);
     let weights = [&[a][..], &gamma, &beta, &row, &[bias, output]].concat();
@@ -321,6 +324,7 @@ fn shallower_evaluations_give_the_same_numbers() {
             periodic: vec![true, false, true],
             embed_periodic: true,
             input_layer: InputLayer::None,
+            dissipation: None,
         },
         seed: 5,
     };

@@ -5,7 +5,7 @@ mod common;
 use common::{of_scalar, properties, solve};
 use lnn::forward::HyperDual;
 use lnn::lagrangian::Lagrangian;
-use lnn::network::{Architecture, Initialization, InputLayer, Nonlinearity, initial_weights};
+use lnn::network::{Architecture, Initialization, InputLayer, Layout, Nonlinearity, initial_weights};
 use lnn::scalar::{Dd, Real, Scalar};
 use lnn::tape::{ScalarFunction, gradient};
 use lnn::training::{
@@ -28,6 +28,7 @@ fn architecture(n: usize, hidden: &[usize]) -> Architecture {
         periodic: vec![true; n],
         embed_periodic: true,
         input_layer: InputLayer::None,
+        dissipation: None,
     }
 }
 
@@ -94,7 +95,7 @@ impl<S: Scalar> Judge<S> {
 fn whole_loss<T: Real>(
     architecture: &Architecture,
     weights: &[T],
-    [q, v, a]: [&[T]; 3],
+    [q, v, a, external]: [&[T]; 4],
     (judge, row, lambda): (&Judge<impl Scalar>, usize, f64),
 ) -> T {
     let n = architecture.coordinates;
@@ -107,7 +108,15 @@ fn whole_loss<T: Real>(
     let unit = |k: usize| -> Vec<T> { (0..2 * n).map(|i| if i == k { T::one() } else { T::zero() }).collect() };
     let moving: Vec<T> = v.iter().copied().chain((0..n).map(|_| T::zero())).collect();
     let mass: Vec<T> = (0..n * n).map(|k| jet(&unit(n + k / n), &unit(n + k % n)).st).collect();
-    let force: Vec<T> = (0..n).map(|i| jet(&unit(i), &unit(i)).s - jet(&unit(n + i), &moving).st).collect();
+    let friction = |i: usize| {
+        let at = |k: usize| {
+            if k == i { HyperDual::new(v[k], T::one(), T::zero(), T::zero()) } else { HyperDual::lift(v[k]) }
+        };
+        let q: Vec<HyperDual<T>> = q.iter().map(|&q| HyperDual::lift(q)).collect();
+        architecture.rayleigh_dissipation(&lifted, &q, &(0..n).map(at).collect::<Vec<_>>()).s
+    };
+    let own = |i: usize| jet(&unit(i), &unit(i)).s - jet(&unit(n + i), &moving).st;
+    let force: Vec<T> = (0..n).map(|i| own(i) - friction(i) + external[i]).collect();
     let scale = |i: usize| T::from_f64(architecture.scale[i]);
     let predicted = solve(n, &mass, &force);
     let mut loss = T::zero();
@@ -135,31 +144,43 @@ impl<S: Scalar> ScalarFunction for MeanLoss<'_, S> {
         for row in 0..self.data.len() {
             let part = |x: &[S]| -> Vec<R> { x[row * n..(row + 1) * n].iter().map(|&x| of_scalar(x)).collect() };
             let [q, v, a] = [self.data.q(), self.data.v(), self.data.a()].map(part);
-            total += whole_loss(self.architecture, weights, [&q, &v, &a], (self.judge, row, self.lambda));
+            let force = if self.data.force().is_empty() { vec![R::zero(); n] } else { part(self.data.force()) };
+            total += whole_loss(self.architecture, weights, [&q, &v, &a, &force], (self.judge, row, self.lambda));
         }
         total / R::from_f64(self.data.len() as f64)
     }
 }
 
-/// One or two branches, with and without an input layer.
-const MODELS: [(Nonlinearity, InputLayer); 4] = [
-    (Nonlinearity::Gelu, InputLayer::None),
-    (Nonlinearity::Gelu, InputLayer::Dyt),
-    (Nonlinearity::QuadraticSoftplus, InputLayer::None),
-    (Nonlinearity::QuadraticSoftplus, InputLayer::Dyt),
+/// Activation, input layer, units of the dissipation.
+type Model = (Nonlinearity, InputLayer, Option<usize>);
+
+/// One or two branches, with and without an input layer, with and without friction.
+const MODELS: [Model; 6] = [
+    (Nonlinearity::Gelu, InputLayer::None, None),
+    (Nonlinearity::Gelu, InputLayer::Dyt, None),
+    (Nonlinearity::QuadraticSoftplus, InputLayer::None, None),
+    (Nonlinearity::QuadraticSoftplus, InputLayer::Dyt, None),
+    (Nonlinearity::Gelu, InputLayer::None, Some(5)),
+    (Nonlinearity::QuadraticSoftplus, InputLayer::Dyt, Some(3)),
 ];
 
 fn gradient_agrees<S: Scalar>(
-    (activation, input_layer): (Nonlinearity, InputLayer),
+    (activation, input_layer, dissipation): Model,
     n: usize,
     alpha: f64,
     penalty: Penalty,
     tolerance: f64,
 ) {
-    let architecture = Architecture { alpha, activation, input_layer, ..architecture(n, &[6, 4]) };
+    let architecture = Architecture { alpha, activation, input_layer, dissipation, ..architecture(n, &[6, 4]) };
     let mut rng = ChaCha8Rng::seed_from_u64(11);
-    let weights: Vec<S> = initial_weights(&architecture, Initialization::Default, &mut rng);
-    let data = random_data::<S>(n, 7, 12);
+    let mut weights: Vec<S> = initial_weights(&architecture, Initialization::Default, &mut rng);
+    let mut data = random_data::<S>(n, 7, 12);
+    if let Some(layout) = Layout::new(&architecture).dissipation {
+        // Strong friction that depends on the place, and known forces.
+        weights[layout.gamma_range().start..].iter_mut().for_each(|w| *w += S::of_f64(rng.random_range(0.0..2.0)));
+        let force = (0..7 * n).map(|_| S::of_f64(rng.random_range(-2.0..2.0))).collect();
+        data = data.with_forces(force).unwrap();
+    }
     let mut objective = Objective::new(&architecture, penalty, 2).unwrap();
     let mut found = vec![S::NAN; weights.len()];
     let report = objective.step(&weights, &data, &[0, 1, 2, 3, 4, 5, 6], &mut found);
@@ -371,6 +392,7 @@ fn config(epochs: usize) -> Config {
             scaling: Scaling::Physical,
             embed_periodic: true,
             input_layer: InputLayer::None,
+            dissipation: None,
             initialization: Initialization::Default,
         },
         penalty: Regularizer::Eigenvalue { lambda: 10.0 },
@@ -414,9 +436,9 @@ fn datasets() -> Datasets<f32> {
 }
 
 fn run(config: &Config, data: Datasets<f32>, threads: usize, hooks: &Hooks) -> Result<Trained<f32>, TrainingError> {
-    let Network { activation, input_layer, .. } = config.network;
+    let Network { activation, input_layer, dissipation, ref hidden, .. } = config.network;
     let architecture =
-        Architecture { embed_periodic: false, activation, input_layer, ..architecture(2, &config.network.hidden) };
+        Architecture { embed_periodic: false, activation, input_layer, dissipation, ..architecture(2, hidden) };
     let penalty = config.penalty().unwrap();
     train(config, &architecture, penalty, data, threads, hooks)
 }
@@ -437,8 +459,9 @@ fn training_learns_and_keeps_the_best_epoch() {
 
 #[test]
 fn every_kind_of_model_learns() {
-    for (activation, input_layer) in MODELS {
+    for (activation, input_layer, dissipation) in MODELS {
         let mut config = config(12);
+        config.network.dissipation = dissipation;
         config.optimizer.batch = 20;
         config.network.activation = activation;
         config.network.input_layer = input_layer;

@@ -17,5 +17,6 @@ pub fn architecture(n: usize, width: usize, alpha: f64) -> Architecture {
         periodic: vec![false; n],
         embed_periodic: false,
         input_layer: InputLayer::None,
+        dissipation: None,
     }
 }

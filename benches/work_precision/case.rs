@@ -36,6 +36,7 @@ impl Case {
             periodic: vec![false; n],
             embed_periodic: false,
             input_layer: InputLayer::None,
+            dissipation: None,
         };
         let mut rng = ChaCha8Rng::seed_from_u64(7);
         let weights = initial_weights(&architecture, Initialization::Default, &mut rng);

@@ -28,6 +28,7 @@ fn architecture(bytes: &mut Bytes<'_>) -> Architecture {
         periodic: (0..coordinates).map(|_| bytes.flag()).collect(),
         embed_periodic: bytes.flag(),
         input_layer: if bytes.flag() { InputLayer::Dyt } else { InputLayer::None },
+        dissipation: None,
     }
 }
 

@@ -132,11 +132,11 @@ enum Shape {
 }
 
 /// Everything there is to say about state `k` of a batch.
-fn fields<'a, S>(n: usize, k: usize, terms: &'a Terms<S>, spectrum: &'a [S]) -> [Field<'a, S>; 8] {
+fn fields<'a, S>(n: usize, k: usize, terms: &'a Terms<S>, spectrum: &'a [S]) -> Vec<Field<'a, S>> {
     let part = |values: &'a [S], size: usize| values.get(k * size..(k + 1) * size).unwrap_or(&[]);
     let number = |name, values| Field { name, values: part(values, 1), shape: Shape::Number };
     let vector = |name, values| Field { name, values: part(values, n), shape: Shape::Vector };
-    [
+    let mut fields = vec![
         number("lagrangian", &terms.lagrangian),
         vector("momentum", &terms.momentum),
         vector("dl_dq", &terms.dl_dq),
@@ -145,7 +145,11 @@ fn fields<'a, S>(n: usize, k: usize, terms: &'a Terms<S>, spectrum: &'a [S]) -> 
         vector("coriolis", &terms.coriolis),
         vector("acceleration", &terms.acceleration),
         number("energy", &terms.energy),
-    ]
+    ];
+    if !terms.force.is_empty() {
+        fields.extend([vector("force", &terms.force), number("dissipation", &terms.dissipation)]);
+    }
+    fields
 }
 
 /// One state as a line of JSON or a block of text; a failed acceleration is `null`.

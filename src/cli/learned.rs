@@ -1,7 +1,7 @@
 //! A model file with the network it describes and the system it learned.
 
 use crate::cli::CliError;
-use crate::lagrangian::{Configured, configure};
+use crate::lagrangian::{Configured, configure, find};
 use crate::network::NetworkLagrangian;
 use crate::network::file::{Header, ModelFile};
 use crate::rollout::Domain;
@@ -32,8 +32,12 @@ impl<S: Scalar> Learned<S> {
     /// The hand-written system that the model learned.
     ///
     /// # Errors
-    /// A data error if this version does not know it.
+    /// A data error if it is none of the catalogue's: a system of which there are only recordings.
     pub fn system(&self, path: &Path) -> Result<Configured<f64>, CliError> {
+        if find(&self.header.system).is_err() {
+            let problem = "is no system of `lnn systems`: there is no exact motion to compare the model with";
+            return Err(CliError::file(path, format_args!("{:?}, which it learned, {problem}", self.header.system)));
+        }
         let configured =
             configure(&self.header.system, &given(&self.header.parameters)).map_err(|e| CliError::file(path, e))?;
         if configured.system.columns(configured.coordinates) != self.header.columns {

@@ -3,7 +3,7 @@
 use crate::cli::learned::Learned;
 use crate::cli::number::{finite, positive};
 use crate::cli::{CliError, memory, output};
-use crate::lagrangian::find;
+use crate::lagrangian::{EulerLagrange, find};
 use crate::rollout::{Method, Options, RolloutError, rollout};
 use crate::storage::{check_target, write_atomically};
 use std::path::PathBuf;
@@ -23,7 +23,8 @@ pub struct Args {
     /// Time between samples, in the same unit.
     #[arg(long, value_name = "DT", allow_hyphen_values = true, value_parser = positive)]
     dt: f64,
-    /// Integrator: two with error control, four symplectic ones of fixed step for long times.
+    /// Integrator: two with error control, four symplectic ones of fixed step for long times; variational refuses models
+    /// with friction.
     #[arg(long, value_enum, default_value = "dopri5")]
     method: MethodName,
     /// Relative tolerance of a step.
@@ -114,15 +115,22 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         return Err(CliError::data(format_args!("{problem} ({kept} samples are in {})", args.out.display())));
     }
     let statistics = result.statistics;
-    // A system of another version has no unit here.
-    let unit = find(&learned.header.system).map_or("", |system| system.time_unit);
+    // A system that was only recorded has no unit here, nor has one of another version.
+    let unit = find(&learned.header.system).map_or(String::new(), |system| format!(" {}", system.time_unit));
+    let balance = if learned.network.conserves_energy() {
+        String::new()
+    } else {
+        let balance = result.trajectory.energy_balance(&learned.network).map_err(CliError::data)?;
+        let (change, dissipated, defect) = (balance.change, balance.dissipated, balance.defect());
+        format!("energy changed by {change:.9e}, friction took {dissipated:.9e}, not accounted for {defect:.1e}\n")
+    };
     let iterations = if method.is_structure_preserving() {
         format!(" in {} iterations", statistics.iterations)
     } else {
         String::new()
     };
     output::print(&format!(
-        "{} samples to t = {} {unit}, {} steps, {} evaluations{iterations}, in {}\n",
+        "{} samples to t = {}{unit}, {} steps, {} evaluations{iterations}, in {}\n{balance}",
         result.trajectory.len(),
         args.t_end,
         statistics.accepted,

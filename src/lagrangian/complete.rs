@@ -1,4 +1,4 @@
-//! The Euler-Lagrange formula: acceleration and energy from `L`, `p`, `g`, `M`, `c`, whoever computed them.
+//! The Euler-Lagrange formula: acceleration and energy from `L`, `p`, `g`, `M`, `c`, `Q`, whoever computed them.
 
 use super::{MechanicsError, Request, Terms};
 use crate::linalg::{self, Failure, Workspace};
@@ -7,16 +7,16 @@ use crate::scalar::{Real, Scalar};
 impl<S: Scalar> Terms<S> {
     /// Empties every field, keeping the buffers.
     pub fn clear(&mut self) {
-        let Self { lagrangian, momentum, dl_dq, mass_matrix, coriolis, acceleration, energy } = self;
-        for field in [lagrangian, momentum, dl_dq, mass_matrix, coriolis, acceleration, energy] {
+        let Self { lagrangian, momentum, dl_dq, mass_matrix, coriolis, force, dissipation, acceleration, energy } = self;
+        for field in [lagrangian, momentum, dl_dq, mass_matrix, coriolis, force, dissipation, acceleration, energy] {
             field.clear();
         }
     }
 
-    /// Adds `a = M^-1 (g - c)` and `E = p.v - L` if requested, then checks every filled field.
+    /// Adds `a = M^-1 (g - c + Q)` and `E = p.v - L` if requested, then checks every filled field.
     ///
-    /// `v` is `(batch, n)`; `L`, `p`, `g`, `M`, `c` must be filled as far as the request needs them. One coordinate is
-    /// divided, not factored.
+    /// `v` is `(batch, n)`; `L`, `p`, `g`, `M`, `c` must be filled as far as the request needs them, `Q` if there are forces
+    /// beside those of `L`. One coordinate is divided, not factored.
     ///
     /// # Errors
     /// [`MechanicsError`] naming the first row with a singular mass matrix or a term that is not finite; accelerations
@@ -50,24 +50,30 @@ impl<S: Scalar> Terms<S> {
             expect("coriolis terms", batch * n, self.coriolis.len())?;
             self.acceleration.clear();
             self.acceleration.resize(batch * n, S::NAN);
-            let mut force = workspace.take_vector();
-            force.clear();
-            force.extend(self.dl_dq.iter().zip(&self.coriolis).map(|(&g, &c)| g - c));
+            let mut right = workspace.take_vector();
+            right.clear();
+            right.extend(self.dl_dq.iter().zip(&self.coriolis).map(|(&g, &c)| g - c));
+            if !self.force.is_empty() {
+                expect("generalized forces", batch * n, self.force.len())?;
+                right.iter_mut().zip(&self.force).for_each(|(right, &force)| *right += force);
+            }
             first = if n == 1 {
-                divide(&self.mass_matrix, &force, &mut self.acceleration)
+                divide(&self.mass_matrix, &right, &mut self.acceleration)
             } else {
-                let solved = linalg::solve(n, &self.mass_matrix, &force, &mut self.acceleration, workspace);
+                let solved = linalg::solve(n, &self.mass_matrix, &right, &mut self.acceleration, workspace);
                 solved.err().and_then(|_| workspace.failures().first().copied())
             };
-            workspace.give_vector(force);
+            workspace.give_vector(right);
         }
         // What was not finite before the solve is named rather than the solve.
-        let fields: [(&'static str, &[S], usize); 6] = [
+        let fields: [(&'static str, &[S], usize); 8] = [
             ("Lagrangian", &self.lagrangian, 1),
             ("momentum", &self.momentum, n),
             ("dL/dq", &self.dl_dq, n),
             ("mass matrix", &self.mass_matrix, n * n),
             ("coriolis term", &self.coriolis, n),
+            ("generalized force", &self.force, n),
+            ("dissipated power", &self.dissipation, 1),
             ("energy", &self.energy, 1),
         ];
         let foreign = fields
@@ -136,6 +142,25 @@ mod tests {
         assert_eq!(error, MechanicsError::NotFinite { row: 0, what: "momentum" });
         let error = terms.complete(3, &v, Request::ALL, &mut workspace).unwrap_err();
         assert!(matches!(error, MechanicsError::Shape { .. }));
+    }
+
+    #[test]
+    fn forces_beside_those_of_the_lagrangian_accelerate() {
+        let mut terms = Terms {
+            dl_dq: vec![3.0, 4.0],
+            coriolis: vec![1.0; 2],
+            force: vec![-1.0, 2.0],
+            mass_matrix: vec![2.0, 0.0, 0.0, 4.0],
+            ..Terms::default()
+        };
+        terms.complete(2, &[1.0, 0.0], Request::ACCELERATION, &mut Workspace::new()).unwrap();
+        assert_eq!(terms.acceleration, [0.5, 1.25]);
+        terms.force.pop();
+        let error = terms.complete(2, &[1.0, 0.0], Request::ACCELERATION, &mut Workspace::new()).unwrap_err();
+        assert_eq!(error, MechanicsError::Shape { what: "generalized forces", expected: 2, found: 1 });
+        terms.force = vec![f64::NAN, 0.0];
+        let error = terms.complete(2, &[1.0, 0.0], Request::ACCELERATION, &mut Workspace::new()).unwrap_err();
+        assert_eq!(error, MechanicsError::NotFinite { row: 0, what: "generalized force" });
     }
 
     #[test]

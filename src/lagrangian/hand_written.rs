@@ -87,8 +87,9 @@ impl<L: Lagrangian, S: Scalar> HandWritten<L, S> {
             return Err(shape("velocities", v.len()));
         }
         let need = Need::of(request);
-        terms.acceleration.clear();
-        terms.energy.clear();
+        for field in [&mut terms.force, &mut terms.dissipation, &mut terms.acceleration, &mut terms.energy] {
+            field.clear();
+        }
         // Whatever is needed is overwritten below.
         let size = |needed: bool, width: usize| if needed { batch * width } else { 0 };
         terms.lagrangian.resize(size(need.lagrangian, 1), S::NAN);

@@ -1,7 +1,7 @@
 //! Lagrangian mechanics: one trait for a Lagrangian, one place for the Euler-Lagrange terms.
 //!
 //! State `x = (q, v)`, `v = dq/dt`, both in `R^n`. `p = dL/dv`, `g = dL/dq`, `M = d2L/dv dv`, `c = (d2L/dv dq) v`,
-//! `a = M^-1 (g - c)`, `E = p.v - L`. Batches are row-major: `(batch, n)` and `(batch, n, n)`.
+//! `a = M^-1 (g - c + Q)`, `E = p.v - L`; `Q` are forces that do not follow from `L`, such as friction. Batches are row-major: `(batch, n)` and `(batch, n, n)`.
 
 mod catalogue;
 mod complete;

@@ -5,7 +5,7 @@ use std::ops::{BitOr, Range};
 
 /// Which terms a caller needs; nothing else is computed.
 ///
-/// Requests combine with `|`. Asking for [`Request::ACCELERATION`] computes `M`, `c` and `g` on the way and stores
+/// Requests combine with `|`. Asking for [`Request::ACCELERATION`] computes `M`, `c`, `g` and `Q` on the way and stores
 /// them, [`Request::ENERGY`] stores `L` and `p`. The default asks for nothing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Request(u8);
@@ -21,12 +21,14 @@ impl Request {
     pub const MASS_MATRIX: Self = Self(8);
     /// `c = (d2L/dv dq) v`.
     pub const CORIOLIS: Self = Self(16);
-    /// `a = M^-1 (g - c)`, with `M`, `c`, `g`.
-    pub const ACCELERATION: Self = Self(32 | 16 | 8 | 4);
+    /// `a = M^-1 (g - c + Q)`, with `M`, `c`, `g`, `Q`.
+    pub const ACCELERATION: Self = Self(128 | 32 | 16 | 8 | 4);
     /// `E = p.v - L`, with `L`, `p`.
     pub const ENERGY: Self = Self(64 | 2 | 1);
+    /// Forces `Q` that do not follow from `L`, such as friction, and the power they take; nothing for a model without.
+    pub const FORCE: Self = Self(128);
     /// Everything.
-    pub const ALL: Self = Self(127);
+    pub const ALL: Self = Self(255);
 
     /// Whether all of `other` is asked for.
     #[inline]
@@ -55,7 +57,12 @@ pub struct Terms<S> {
     pub mass_matrix: Vec<S>,
     /// `c = (d2L/dv dq) v`, `(batch, n)`.
     pub coriolis: Vec<S>,
-    /// `a = M^-1 (g - c)`, `(batch, n)`.
+    /// Generalized force `Q` beside those of `L`, friction `-dD/dv` for a dissipation `D`, `(batch, n)`; empty for a model that
+    /// [conserves its energy](EulerLagrange::conserves_energy).
+    pub force: Vec<S>,
+    /// Power that `Q` takes away, `-v.Q = v.dD/dv`, `(batch)`, in the unit of `L` per unit of time; empty as `force`.
+    pub dissipation: Vec<S>,
+    /// `a = M^-1 (g - c + Q)`, `(batch, n)`.
     pub acceleration: Vec<S>,
     /// `E = p.v - L`, `(batch)`.
     pub energy: Vec<S>,
@@ -66,7 +73,8 @@ impl<S: Scalar> Terms<S> {
     pub(crate) fn copy_rows(&mut self, batch: &Self, n: usize, rows: Range<usize>, request: Request) {
         let copy = |to: &mut Vec<S>, from: &[S], width: usize, what: Request| {
             to.clear();
-            if request.includes(what) {
+            // A model without friction has no forces to copy.
+            if request.includes(what) && !from.is_empty() {
                 to.extend_from_slice(&from[rows.start * width..rows.end * width]);
             }
         };
@@ -75,6 +83,8 @@ impl<S: Scalar> Terms<S> {
         copy(&mut self.dl_dq, &batch.dl_dq, n, Request::DL_DQ);
         copy(&mut self.mass_matrix, &batch.mass_matrix, n * n, Request::MASS_MATRIX);
         copy(&mut self.coriolis, &batch.coriolis, n, Request::CORIOLIS);
+        copy(&mut self.force, &batch.force, n, Request::FORCE);
+        copy(&mut self.dissipation, &batch.dissipation, 1, Request::FORCE);
         copy(&mut self.acceleration, &batch.acceleration, n, Request::ACCELERATION);
         copy(&mut self.energy, &batch.energy, 1, Request::ENERGY);
     }
@@ -126,6 +136,11 @@ pub trait EulerLagrange<S: Scalar>: Send + Sync {
     /// [`MechanicsError`] naming the first row that fails. Terms other than the acceleration are filled even when a
     /// mass matrix is singular, and the accelerations of the other rows are right; those of failed rows are `NaN`.
     fn terms(&self, q: &[S], v: &[S], request: Request, terms: &mut Terms<S>) -> Result<(), MechanicsError>;
+
+    /// Whether the motion keeps the energy `E = p.v - L`: no friction, no other force beside those of `L`.
+    fn conserves_energy(&self) -> bool {
+        true
+    }
 
     /// Whether several states at once take much less time per state than one, by more than threads need to meet.
     fn prefers_batches(&self) -> bool {

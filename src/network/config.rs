@@ -58,4 +58,8 @@ pub struct Architecture {
     /// What stands before the first dense layer; not written if there is nothing, which is what its absence means.
     #[serde(default, skip_serializing_if = "InputLayer::is_none")]
     pub input_layer: InputLayer,
+    /// Units of the Rayleigh dissipation `D(q, v)` beside `L`; without it, which is what its absence in a file means, the
+    /// motion keeps its energy.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub dissipation: Option<usize>,
 }

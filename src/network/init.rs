@@ -11,10 +11,16 @@ const DYT_ALPHA: f64 = 0.5;
 /// Factor of the output weights under [`Initialization::NearZero`].
 const NEAR_ZERO: f64 = 0.01;
 
+/// Initial `gamma` of every unit of a dissipation: the friction starts at `ln(1 + e^-5) = 0.0067`.
+const FRICTION: f64 = -5.0;
+
 /// Draws the flat parameters of a network; the same generator state gives the same weights in every precision.
 ///
 /// Every branch is drawn by itself, with its own widths and gains; the gain of a linear layer is 1. The parameters of
 /// an input layer are not random: `a = 0.5`, `gamma = 1`, `beta = 0`.
+///
+/// Those of a dissipation come after all others, which are the same without it: `gamma = -5`, `w = 0`, and `b` of length
+/// 1 in random directions.
 pub fn initial_weights<S: Scalar>(architecture: &Architecture, kind: Initialization, rng: &mut impl Rng) -> Vec<S> {
     let layout = Layout::new(architecture);
     let mut weights = vec![<S as Real>::zero(); layout.parameters];
@@ -33,7 +39,23 @@ pub fn initial_weights<S: Scalar>(architecture: &Architecture, kind: Initializat
             }
         }
     }
+    if let Some(dissipation) = layout.dissipation {
+        weights[dissipation.gamma_range()].fill(S::of_f64(FRICTION));
+        for row in weights[dissipation.direction_range()].chunks_exact_mut(dissipation.coordinates) {
+            draw_direction(rng, row);
+        }
+    }
     weights
+}
+
+/// A vector of length 1, its direction uniform.
+fn draw_direction<S: Scalar>(rng: &mut impl Rng, direction: &mut [S]) {
+    let normal: Vec<f64> = direction.iter().map(|_| StandardNormal.sample(rng)).collect();
+    // Never 0 but for a generator that gives nothing else.
+    let length = normal.iter().map(|x: &f64| x * x).sum::<f64>().sqrt().max(f64::MIN_POSITIVE);
+    for (x, normal) in direction.iter_mut().zip(normal) {
+        *x = S::of_f64(normal / length);
+    }
 }
 
 /// Where a dense layer stands in its branch.
@@ -86,6 +108,7 @@ mod tests {
             periodic: vec![false; 2],
             embed_periodic: false,
             input_layer: InputLayer::None,
+            dissipation: None,
         }
     }
 
@@ -167,6 +190,27 @@ mod tests {
                 expected[branch.output_range()].iter_mut().for_each(|w| *w *= 0.01);
             }
             assert_eq!(drawn(&architecture, Initialization::NearZero), expected);
+        }
+    }
+
+    #[test]
+    fn a_dissipation_is_drawn_after_the_lagrangian_and_starts_small() {
+        for kind in [Initialization::Default, Initialization::Cranmer] {
+            let plain = architecture(Nonlinearity::QuadraticSoftplus);
+            let damped = Architecture { dissipation: Some(40), ..plain.clone() };
+            let (without, with) = (drawn(&plain, kind), drawn(&damped, kind));
+            let (lagrangian, friction) = with.split_at(without.len());
+            assert_eq!(lagrangian, without);
+            let (gamma, rest) = friction.split_at(40);
+            let (weight, direction) = rest.split_at(40 * 2);
+            assert!(gamma.iter().all(|&g| g == -5.0) && weight.iter().all(|&w| w == 0.0));
+            assert_eq!(direction.len(), 40 * 2);
+            assert!(direction.chunks(2).all(|b| (b[0].hypot(b[1]) - 1.0).abs() < 4.0 * f64::EPSILON));
+            // A mean of 40 unit vectors: each component has the standard error sqrt(1/2/40).
+            for i in 0..2 {
+                let mean = direction.iter().skip(i).step_by(2).sum::<f64>() / 40.0;
+                assert!(mean.abs() < 4.0 * (0.5f64 / 40.0).sqrt(), "{mean}");
+            }
         }
     }
 

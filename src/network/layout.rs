@@ -65,7 +65,8 @@ impl Branch {
     }
 }
 
-/// The branches of a network, whose outputs add up, one after the other in the flat parameter vector.
+/// The branches of a network, whose outputs add up, one after the other in the flat parameter vector; the dissipation
+/// comes last.
 ///
 /// Every layer holds its weights, then its biases.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -78,6 +79,38 @@ pub struct Layout {
     pub position_features: usize,
     /// Input features: those of the coordinates, then one per velocity.
     pub features: usize,
+    /// Parameters of the dissipation, behind those of all branches.
+    pub dissipation: Option<DissipationLayout>,
+}
+
+/// Where the parameters of a Rayleigh dissipation sit: `gamma`, then `w`, then `b`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct DissipationLayout {
+    /// Units `K`.
+    pub units: usize,
+    /// Input features made of coordinates, `F`.
+    pub features: usize,
+    /// Number of coordinates `n`.
+    pub coordinates: usize,
+    /// Offset of the first parameter.
+    pub offset: usize,
+}
+
+impl DissipationLayout {
+    /// Range of `gamma`, `(K)`.
+    pub fn gamma_range(&self) -> Range<usize> {
+        self.offset..self.offset + self.units
+    }
+    /// Range of `w`, `(K, F)` row-major.
+    pub fn weight_range(&self) -> Range<usize> {
+        let start = self.gamma_range().end;
+        start..start + self.units * self.features
+    }
+    /// Range of `b`, `(K, n)` row-major.
+    pub fn direction_range(&self) -> Range<usize> {
+        let start = self.weight_range().end;
+        start..start + self.units * self.coordinates
+    }
 }
 
 impl Layout {
@@ -105,7 +138,14 @@ impl Layout {
             parameters = chain.offset;
             branches.push(Branch { layers: chain.layers });
         }
-        Self { branches, parameters, position_features, features }
+        let dissipation = architecture.dissipation.map(|units| DissipationLayout {
+            units,
+            features: position_features,
+            coordinates: architecture.coordinates,
+            offset: parameters,
+        });
+        let parameters = dissipation.map_or(parameters, |dissipation| dissipation.direction_range().end);
+        Self { branches, parameters, position_features, features, dissipation }
     }
 }
 

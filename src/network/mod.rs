@@ -1,4 +1,5 @@
-//! The network Lagrangian: a sum of multilayer perceptrons as `L(q, v)`, evaluated in batches.
+//! The network Lagrangian: a sum of multilayer perceptrons as `L(q, v)`, and a Rayleigh dissipation beside it, evaluated
+//! in batches.
 
 mod activation;
 mod adjoint;
@@ -7,6 +8,7 @@ mod branch;
 mod chunk;
 mod config;
 mod depth;
+mod dissipation;
 mod features;
 pub mod file;
 mod init;
@@ -21,7 +23,8 @@ pub use adjoint::{Adjoint, Jets};
 pub use chunk::Chunk;
 pub use config::{Architecture, Initialization, InputLayer};
 pub use depth::Depth;
+pub use dissipation::Dissipation;
 pub use init::initial_weights;
-pub use layout::{Branch, Layer, Layout, LinearMap};
+pub use layout::{Branch, DissipationLayout, Layer, Layout, LinearMap};
 pub use model::{NetworkError, NetworkLagrangian};
 pub use nonlinearity::{Nonlinearity, UnknownNonlinearity};

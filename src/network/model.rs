@@ -2,7 +2,7 @@
 
 use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Terms};
 use crate::linalg;
-use crate::network::{Architecture, Chunk, Depth, Layout};
+use crate::network::{Architecture, Chunk, Depth, Dissipation, Layout};
 use crate::scalar::Scalar;
 use std::sync::{Mutex, PoisonError};
 use thiserror::Error;
@@ -10,7 +10,7 @@ use thiserror::Error;
 /// States evaluated together.
 const CHUNK: usize = 64;
 
-/// A network with its weights: `L(q, v)` and everything that follows from it.
+/// A network with its weights: `L(q, v)`, perhaps a dissipation `D(q, v)`, and everything that follows from them.
 ///
 /// The network works in scaled coordinates `q_i/s_i`, `v_i/s_i`; terms are returned in physical units, `L` in the
 /// network's own unit (a factor and a total derivative of `L` move nothing). Periodic coordinates are reduced to
@@ -26,6 +26,7 @@ pub struct NetworkLagrangian<S> {
 #[derive(Debug)]
 struct Workspace<S> {
     chunk: Chunk<S>,
+    dissipation: Option<Dissipation<S>>,
     wrapped: Vec<S>,
     linalg: linalg::Workspace<S>,
 }
@@ -71,6 +72,9 @@ impl Architecture {
         }
         if let Some(scale) = self.scale.iter().find(|s| !(s.is_finite() && **s > 0.0)) {
             return fault(format!("expected positive scales, found {scale}"));
+        }
+        if self.dissipation == Some(0) {
+            return fault("expected a dissipation of at least one unit, found 0".to_string());
         }
         if !self.alpha.is_finite() {
             return fault(format!("expected a finite alpha, found {}", self.alpha));
@@ -121,6 +125,12 @@ impl<S: Scalar> NetworkLagrangian<S> {
 }
 
 impl<S: Scalar> Workspace<S> {
+    fn new(architecture: &Architecture) -> Self {
+        let chunk = Chunk::new(architecture);
+        let dissipation = Dissipation::new(&chunk);
+        Self { chunk, dissipation, wrapped: Vec::new(), linalg: linalg::Workspace::new() }
+    }
+
     /// Evaluates one chunk and appends its terms in physical units.
     fn append(
         &mut self,
@@ -161,6 +171,15 @@ impl<S: Scalar> Workspace<S> {
             let element = |(k, &m): (usize, &S)| m * (inverse(k / n % n) * inverse(k % n));
             terms.mass_matrix.extend(chunk.mass_matrix.iter().enumerate().map(element));
         }
+        if let Some(dissipation) = &mut self.dissipation
+            && request.includes(Request::FORCE)
+        {
+            dissipation.evaluate(chunk, &network.weights);
+            let first = terms.force.len();
+            unscale(&dissipation.gradient, &mut terms.force);
+            terms.force[first..].iter_mut().for_each(|force| *force = -*force);
+            terms.dissipation.extend_from_slice(&dissipation.power);
+        }
     }
 }
 
@@ -180,7 +199,7 @@ impl<S: Scalar> EulerLagrange<S> for NetworkLagrangian<S> {
         }
         terms.clear();
         let mut workspace = self.idle.lock().unwrap_or_else(PoisonError::into_inner).pop().unwrap_or_else(|| {
-            Workspace { chunk: Chunk::new(&self.architecture), wrapped: Vec::new(), linalg: linalg::Workspace::new() }
+            Workspace::new(&self.architecture)
         });
         let depth = Self::depth(request);
         for states in q.chunks(CHUNK * n).zip(v.chunks(CHUNK * n)) {
@@ -189,6 +208,10 @@ impl<S: Scalar> EulerLagrange<S> for NetworkLagrangian<S> {
         let outcome = terms.complete(n, v, request, &mut workspace.linalg);
         self.idle.lock().unwrap_or_else(PoisonError::into_inner).push(workspace);
         outcome
+    }
+
+    fn conserves_energy(&self) -> bool {
+        self.architecture.dissipation.is_none()
     }
 
     /// From about 100,000 weights on: a single state then waits for them longer than threads take to meet.

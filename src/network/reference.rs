@@ -1,4 +1,4 @@
-//! The network as a [`Lagrangian`] over [`Real`]: slow, obvious, good for any derivative.
+//! The network as a [`Lagrangian`] over [`Real`], and its dissipation: slow, obvious, good for any derivative.
 
 use crate::lagrangian::Lagrangian;
 use crate::network::features::features;
@@ -21,6 +21,34 @@ impl Lagrangian for Architecture {
             sum + output[0]
         })
     }
+}
+
+impl Architecture {
+    /// The Rayleigh dissipation `D = sum_k softplus(gamma_k + w_k.f(q)) ln cosh(b_k.(v/s))` of states in physical units, 0 for
+    /// a network without one; friction is the generalized force `-dD/dv`.
+    ///
+    /// `f(q)` are the input features made of coordinates, `parameters` the flat weights. The unit of `D` is that of `L` per
+    /// unit of time. Angles are taken as they are, not wrapped.
+    pub fn rayleigh_dissipation<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> R {
+        let layout = Layout::new(self);
+        let Some(dissipation) = layout.dissipation else { return R::zero() };
+        let features = features(self, q, v);
+        let (positions, velocities) = features.split_at(layout.position_features);
+        let dot = |row: &[R], x: &[R]| row.iter().zip(x).fold(R::zero(), |sum, (&a, &x)| sum + a * x);
+        let gamma = parameters[dissipation.gamma_range()].iter();
+        let weight = parameters[dissipation.weight_range()].chunks_exact(dissipation.features);
+        let direction = parameters[dissipation.direction_range()].chunks_exact(dissipation.coordinates);
+        gamma.zip(weight).zip(direction).fold(R::zero(), |sum, ((&gamma, w), b)| {
+            sum + (gamma + dot(w, positions)).softplus() * log_cosh(dot(b, velocities))
+        })
+    }
+}
+
+/// `ln cosh x = ln(1 + 2 sinh^2(x/2))`, relatively accurate everywhere: beyond `|x| = 40` it grows by `|x|`, to `e^-80`.
+fn log_cosh<R: Real>(x: R) -> R {
+    let bound = R::from_f64(40.0);
+    let near = x.max(-bound).min(bound);
+    (R::two() * (near * R::half()).sinh().sqr()).ln_1p() + (x.abs() - bound).relu()
 }
 
 /// `act(W x + b)`.

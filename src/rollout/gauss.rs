@@ -13,7 +13,8 @@
 //!
 //! Source: Hairer, Lubich and Wanner, Geometric Numerical Integration (2006), II.1.3 and VI.4. The coefficients are
 //! used as `a_ij = m_ij b_j` with `m_ij + m_ji = 1` exactly in floating point, so that rounding them does not spoil
-//! symplecticity (Antonana, Makazaga and Murua 2017).
+//! symplecticity (Antonana, Makazaga and Murua 2017). Friction `Q` adds to `dL/dq`: the order stays, and there is no
+//! symplectic form to keep.
 
 use super::Failure;
 use super::chord::{Chord, Equations};
@@ -23,14 +24,14 @@ use crate::scalar::{Real, Scalar};
 
 /// Nodes `c`, weights `b`, `m_ij = a_ij / b_j`, row-major.
 #[derive(Clone, Debug)]
-struct Tableau<S> {
-    nodes: Vec<S>,
-    weights: Vec<S>,
+pub(super) struct Tableau<S> {
+    pub(super) nodes: Vec<S>,
+    pub(super) weights: Vec<S>,
     ratios: Vec<S>,
 }
 
 impl<S: Scalar> Tableau<S> {
-    fn new(stages: usize) -> Self {
+    pub(super) fn new(stages: usize) -> Self {
         let number = S::of_f64;
         let (half, one) = (<S as Real>::half(), <S as Real>::one());
         // Below the diagonal m = 1/2 + x, above it the exact complement.
@@ -68,7 +69,7 @@ impl<S: Scalar> Tableau<S> {
 }
 
 /// Values at `at` of the polynomials that are 1 at one node and 0 at the others, `(at, nodes)`.
-fn lagrange<S: Scalar>(nodes: &[S], at: &[S]) -> Vec<S> {
+pub(super) fn lagrange<S: Scalar>(nodes: &[S], at: &[S]) -> Vec<S> {
     let one = <S as Real>::one();
     let mut weights = Vec::with_capacity(nodes.len() * at.len());
     for &t in at {
@@ -126,7 +127,8 @@ impl<S: Scalar> Equations<S> for Stages<'_, S> {
         Ok(Defect::of(n, residual, |k| p.high[k].abs() + most(self.p, k) + self.h.abs() * most(self.g, k)))
     }
 
-    /// Block `(i, j)`: `delta_ij M + h a_ij (B - B^T) - h^2 (a^2)_ij K`, `B = dp/dq`, `K = dg/dq` at the middle stage.
+    /// Block `(i, j)`: `delta_ij M + h a_ij (B - B^T - C) - h^2 (a^2)_ij K`, `B = dp/dq`, `K = dg/dq`, `C = dQ/dv` at the middle
+    /// stage.
     fn jacobian(&mut self, phase: &mut Phase<'_, S>, x: &[S], matrix: &mut [S]) -> Result<(), Failure> {
         let (n, s) = (phase.n, self.tableau.stages());
         let middle = s / 2 * n;
@@ -134,7 +136,7 @@ impl<S: Scalar> Equations<S> for Stages<'_, S> {
             self.q[k] = self.state.q.high[k] + self.increment(n, s / 2, k, x);
         }
         phase.derivatives(&self.q[..n], &x[middle..middle + n], self.derivatives)?;
-        let Derivatives { mass, mixed, stiffness } = &*self.derivatives;
+        let Derivatives { mass, mixed, stiffness, damping } = &*self.derivatives;
         let a = |i: usize, j: usize| self.tableau.ratios[i * s + j] * self.steps[j];
         for i in 0..s {
             for j in 0..s {
@@ -143,7 +145,8 @@ impl<S: Scalar> Equations<S> for Stages<'_, S> {
                 for r in 0..n {
                     for c in 0..n {
                         let antisymmetric = mixed[r * n + c] - mixed[c * n + r];
-                        let mut element = linear * antisymmetric - square * stiffness[r * n + c];
+                        let along_v = antisymmetric - damping[r * n + c];
+                        let mut element = linear * along_v - square * stiffness[r * n + c];
                         if i == j {
                             element += mass[r * n + c];
                         }

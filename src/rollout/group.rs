@@ -103,6 +103,10 @@ impl<S: Scalar> EulerLagrange<S> for Member<'_, '_, S> {
         self.group.model.coordinates()
     }
 
+    fn conserves_energy(&self) -> bool {
+        self.group.model.conserves_energy()
+    }
+
     fn terms(&self, q: &[S], v: &[S], request: Request, terms: &mut Terms<S>) -> Result<(), MechanicsError> {
         let mut round = self.group.lock();
         round.asked[self.index] = Some(Asked { q: q.to_vec(), v: v.to_vec(), request });

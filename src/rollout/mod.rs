@@ -3,12 +3,14 @@
 //! A roll-out integrates `dq/dt = v`, `dv/dt = a(q, v)` with an explicit Runge-Kutta method of Dormand and Prince
 //! (order 5 or 8) under error control, or Hamilton's equations behind the same Lagrangian with a symplectic method of
 //! fixed step (implicit midpoint, Gauss collocation, variational). It never loses what it has: when a model fails, the valid part of the
-//! trajectory stays and a [`RolloutError`] says where and why. Angles stay continuous (never wrapped) in the output;
+//! trajectory stays and a [`RolloutError`] says where and why. Of a model with friction every method but the variational one
+//! integrates the motion; [`Trajectory::energy_balance`] says where the energy went. Angles stay continuous (never wrapped) in the output;
 //! a model that needs them wrapped wraps them itself.
 //!
 //! Adaptive integration is offered in the precisions the solver knows, [`Integrable`]: `f32` and `f64`; fixed steps in
 //! every precision by [`rollout_fixed`].
 
+mod balance;
 mod chord;
 mod compensated;
 mod dense;
@@ -24,6 +26,7 @@ mod run;
 mod trajectory;
 mod variational;
 
+pub use balance::EnergyBalance;
 pub use ensemble::{rollout_many, rollout_together};
 pub use error::{RolloutError, UnderflowCause};
 pub use ode::Integrable;

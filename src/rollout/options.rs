@@ -7,7 +7,8 @@ use serde::{Deserialize, Serialize};
 /// Integrators: explicit Runge-Kutta methods with step size control, and structure-preserving ones of fixed step.
 ///
 /// The latter are implicit and symplectic in `(q, p)`, `p = dL/dv`, for every Lagrangian with a regular mass matrix:
-/// the energy error stays bounded over long times, where adaptive methods drift. See [`Options::step`].
+/// the energy error stays bounded over long times, where adaptive methods drift. See [`Options::step`]. A motion with
+/// friction has no energy to keep: [`Method::Variational`] refuses it, the Gauss methods keep their order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Method {

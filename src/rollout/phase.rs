@@ -1,4 +1,5 @@
-//! A model in phase space: `p = dL/dv` and `dp/dt = dL/dq` as functions of `(q, v)`, and the way back from `p` to `v`.
+//! A model in phase space: `p = dL/dv` and `dp/dt = dL/dq + Q` as functions of `(q, v)`, and the way back from `p` to `v`;
+//! `Q` is friction, zero for a model that conserves its energy.
 
 use super::Failure;
 use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Terms};
@@ -20,9 +21,11 @@ pub(super) struct Phase<'a, S> {
     /// Iterations of implicit equations.
     pub(super) iterations: usize,
     points: Vec<S>,
+    /// Whether forces beside those of `L` act.
+    damped: bool,
 }
 
-/// First derivatives of `p` and `g` at one state, `(n, n)` each; `dg/dv` is the transpose of `dp/dq`.
+/// First derivatives of `p` and `g = dL/dq + Q` at one state, `(n, n)` each; `d2L/dq dv` is the transpose of `dp/dq`.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Derivatives<S> {
     /// `M = dp/dv`.
@@ -31,6 +34,8 @@ pub(super) struct Derivatives<S> {
     pub(super) mixed: Vec<S>,
     /// `dg_i/dq_j` at `(i, j)`.
     pub(super) stiffness: Vec<S>,
+    /// `dQ_i/dv_j` at `(i, j)`, zero for a model that conserves its energy.
+    pub(super) damping: Vec<S>,
 }
 
 /// How far an equation is from being solved.
@@ -96,6 +101,7 @@ impl<'a, S: Scalar> Phase<'a, S> {
             evaluations: 0,
             iterations: 0,
             points: Vec::new(),
+            damped: !model.conserves_energy(),
         }
     }
 
@@ -104,7 +110,11 @@ impl<'a, S: Scalar> Phase<'a, S> {
             return Err(Failure::State);
         }
         self.evaluations += q.len() / self.n;
+        let request = if self.damped && request.includes(Request::DL_DQ) { request | Request::FORCE } else { request };
         self.model.terms(q, v, request, &mut self.terms).map_err(Failure::Model)?;
+        if request.includes(Request::FORCE) {
+            self.terms.dl_dq.iter_mut().zip(&self.terms.force).for_each(|(g, &force)| *g += force);
+        }
         let fields = [
             (Request::MOMENTUM, "momentum", &self.terms.momentum, 1),
             (Request::DL_DQ, "dL/dq", &self.terms.dl_dq, 1),
@@ -136,8 +146,8 @@ impl<'a, S: Scalar> Phase<'a, S> {
         Ok(self.terms.momentum.clone())
     }
 
-    /// `M` as the model gives it, derivatives along `q` by forward differences over `sqrt(eps)`: enough for an
-    /// iteration matrix. The differences are one batch of `n + 1` states.
+    /// `M` as the model gives it, derivatives along `q`, and of friction along `v`, by forward differences over `sqrt(eps)`:
+    /// enough for an iteration matrix. The differences are one batch of `n + 1` states, `2n + 1` with friction.
     pub(super) fn derivatives(&mut self, q: &[S], v: &[S], into: &mut Derivatives<S>) -> Result<(), Failure> {
         let n = self.n;
         let zero = <S as Real>::zero();
@@ -148,15 +158,17 @@ impl<'a, S: Scalar> Phase<'a, S> {
             S::EPSILON.sqrt() * if size > zero { size } else { <S as Real>::one() }
         };
         let mut points = std::mem::take(&mut self.points);
+        let rows = if self.damped { 2 * n + 1 } else { n + 1 };
         points.clear();
-        for row in 0..=n {
-            points.extend_from_slice(q);
-            if row > 0 {
-                points[row * n + row - 1] += shift(row - 1);
+        (0..rows).for_each(|_| points.extend_from_slice(q));
+        (0..rows).for_each(|_| points.extend_from_slice(v));
+        let (shifted, velocities) = points.split_at_mut(rows * n);
+        for i in 0..n {
+            shifted[(1 + i) * n + i] += shift(i);
+            if self.damped {
+                velocities[(1 + n + i) * n + i] += shift(i);
             }
         }
-        (0..=n).for_each(|_| points.extend_from_slice(v));
-        let (shifted, velocities) = points.split_at((n + 1) * n);
         let outcome = self.evaluate(shifted, velocities, Request::MOMENTUM | Request::DL_DQ);
         for (field, matrix) in [(&self.terms.momentum, &mut into.mixed), (&self.terms.dl_dq, &mut into.stiffness)] {
             matrix.clear();
@@ -168,6 +180,17 @@ impl<'a, S: Scalar> Phase<'a, S> {
                     if outcome.is_ok() {
                         matrix[i * n + j] = (field[(j + 1) * n + i] - field[i]) / width;
                     }
+                }
+            }
+        }
+        into.damping.clear();
+        into.damping.resize(n * n, zero);
+        if outcome.is_ok() && !self.terms.force.is_empty() {
+            let force = &self.terms.force;
+            for j in 0..n {
+                let width = points[(rows + 1 + n + j) * n + j] - v[j];
+                for i in 0..n {
+                    into.damping[i * n + j] = (force[(1 + n + j) * n + i] - force[i]) / width;
                 }
             }
         }

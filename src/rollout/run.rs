@@ -170,6 +170,12 @@ pub fn rollout_fixed<S: Scalar>(model: &dyn EulerLagrange<S>, q: &[S], v: &[S], 
         result.stop = Some(RolloutError::Invalid { what: "method", problem });
         return result;
     };
+    if options.method == Method::Variational && !model.conserves_energy() {
+        let problem = "the variational integrator keeps the energy and this model loses it by friction; \
+                       dopri5, dop853, midpoint, gauss4 and gauss6 integrate it";
+        result.stop = Some(RolloutError::Invalid { what: "method", problem: problem.to_string() });
+        return result;
+    }
     fixed::run(model, &mut stepper, q, v, options, &mut result);
     if options.energy {
         result.trajectory.energy = Some(result.trajectory.energy_by(model));

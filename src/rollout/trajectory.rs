@@ -45,7 +45,7 @@ pub struct Trajectory<S> {
 }
 
 /// States evaluated at once.
-const CHUNK: usize = 256;
+pub(super) const CHUNK: usize = 256;
 
 impl<S: Scalar> Trajectory<S> {
     /// No states of `n` coordinates.

@@ -7,7 +7,7 @@
 //! p0 = -D1 L_d(q0, q1) = dL/dv - h/2 dL/dq,    p1 = D2 L_d(q0, q1) = dL/dv + h/2 dL/dq.
 //! ```
 //!
-//! Order 2, symplectic. In exact arithmetic the motion is that of the implicit midpoint rule on Hamilton's equations;
+//! The discrete action knows no friction: models that lose energy are refused. Order 2, symplectic. In exact arithmetic the motion is that of the implicit midpoint rule on Hamilton's equations;
 //! the derivation needs no Hamiltonian, and the two check each other.
 //!
 //! Source: Marsden and West, Discrete mechanics and variational integrators (2001), 1.3.1 and 2.3.1.
@@ -55,7 +55,7 @@ impl<S: Scalar> Equations<S> for Discrete<'_, S> {
         let n = phase.n;
         self.move_to(x);
         phase.derivatives(self.q, x, self.derivatives)?;
-        let Derivatives { mass, mixed, stiffness } = &*self.derivatives;
+        let Derivatives { mass, mixed, stiffness, .. } = &*self.derivatives;
         let (linear, square) = (self.half_step, self.half_step * self.half_step);
         for r in 0..n {
             for c in 0..n {

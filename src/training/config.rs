@@ -112,6 +112,9 @@ pub struct Network {
     /// What stands before the first dense layer.
     #[serde(default)]
     pub input_layer: InputLayer,
+    /// Units of a learned Rayleigh dissipation; without it the motion keeps its energy.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub dissipation: Option<usize>,
     /// Distribution of the initial weights.
     pub initialization: Initialization,
 }
@@ -205,6 +208,9 @@ impl Config {
         }
         let finite = "a finite number";
         fraction(self.network.alpha, "network.alpha", self.network.alpha.is_finite(), finite)?;
+        if let Some(units) = self.network.dissipation {
+            count(units, "network.dissipation", MAX_WIDTH)?;
+        }
         let lambda = self.penalty.lambda();
         fraction(lambda, "penalty.lambda", lambda.is_finite() && lambda >= 0.0, "a finite number of at least 0")?;
         let optimizer = &self.optimizer;

@@ -5,13 +5,15 @@ use crate::network::file::container::checksum;
 use crate::scalar::Scalar;
 use thiserror::Error;
 
-/// States and accelerations in physical units, all `(states, n)` row-major.
+/// States and accelerations in physical units, all `(states, n)` row-major, perhaps with known external forces.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Dataset<S> {
     coordinates: usize,
     q: Vec<S>,
     v: Vec<S>,
     a: Vec<S>,
+    /// Empty if there are none.
+    force: Vec<S>,
 }
 
 /// Why numbers do not make a dataset.
@@ -42,6 +44,17 @@ pub enum DatasetError {
     Empty,
 }
 
+/// Checks the length of an array and that it is finite.
+fn check<S: Scalar>(what: &'static str, values: &[S], expected: usize, n: usize) -> Result<(), DatasetError> {
+    if values.len() != expected {
+        return Err(DatasetError::Shape { what, expected, found: values.len() });
+    }
+    match values.iter().position(|x| !x.is_finite()) {
+        Some(k) => Err(DatasetError::NotFinite { what, row: k / n, column: k % n }),
+        None => Ok(()),
+    }
+}
+
 impl<S: Scalar> Dataset<S> {
     /// Checks shapes and finiteness.
     ///
@@ -53,14 +66,23 @@ impl<S: Scalar> Dataset<S> {
         }
         let expected = q.len() / coordinates * coordinates;
         for (what, values) in [("coordinate", &q), ("velocity", &v), ("acceleration", &a)] {
-            if values.len() != expected {
-                return Err(DatasetError::Shape { what, expected, found: values.len() });
-            }
-            if let Some(k) = values.iter().position(|x| !x.is_finite()) {
-                return Err(DatasetError::NotFinite { what, row: k / coordinates, column: k % coordinates });
-            }
+            check(what, values, expected, coordinates)?;
         }
-        Ok(Self { coordinates, q, v, a })
+        Ok(Self { coordinates, q, v, a, force: Vec::new() })
+    }
+
+    /// The same states under known external generalized forces `Q`, `(states, n)` in physical units (N, N m), conjugate to
+    /// the coordinates: `Q.dq` is work in J.
+    ///
+    /// Accelerations alone leave the unit of `L` free. Forces fix it: with `M_ij` in scaled coordinates `s_i s_j` times
+    /// that in physical ones, `M a = g - c - dD/dv + Q` takes the force `s_i Q_i` in J, so that `L` comes out in J and the
+    /// dissipated power in W.
+    ///
+    /// # Errors
+    /// [`DatasetError`] naming the first offending row and column.
+    pub fn with_forces(self, force: Vec<S>) -> Result<Self, DatasetError> {
+        check("force", &force, self.q.len(), self.coordinates)?;
+        Ok(Self { force, ..self })
     }
 
     /// Number of coordinates `n`.
@@ -88,6 +110,11 @@ impl<S: Scalar> Dataset<S> {
         &self.a
     }
 
+    /// Known external generalized forces `(states, n)`; empty if there are none.
+    pub fn force(&self) -> &[S] {
+        &self.force
+    }
+
     /// One scale per coordinate: the largest of `|q_i|` and `|v_i|` over all states, 1 where both vanish.
     pub fn physical_scale(&self) -> Vec<f64> {
         let n = self.coordinates;
@@ -106,15 +133,21 @@ impl<S: Scalar> Dataset<S> {
         all.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(v), high.max(v)])
     }
 
-    /// CRC-32 of coordinates, velocities and accelerations in double precision.
+    /// CRC-32 of coordinates, velocities, accelerations and forces in double precision.
     pub fn checksum(&self) -> u32 {
-        checksum(self.q.iter().chain(&self.v).chain(&self.a), StoredPrecision::F64)
+        checksum(self.q.iter().chain(&self.v).chain(&self.a).chain(&self.force), StoredPrecision::F64)
     }
 
     /// The same states in another precision.
     pub fn cast<T: Scalar>(&self) -> Dataset<T> {
         let cast = |x: &[S]| x.iter().map(|&x| x.cast()).collect();
-        Dataset { coordinates: self.coordinates, q: cast(&self.q), v: cast(&self.v), a: cast(&self.a) }
+        Dataset {
+            coordinates: self.coordinates,
+            q: cast(&self.q),
+            v: cast(&self.v),
+            a: cast(&self.a),
+            force: cast(&self.force),
+        }
     }
 }
 
@@ -129,6 +162,12 @@ mod tests {
         let short = Dataset::new(2, vec![0.0; 4], vec![0.0; 2], vec![0.0; 4]);
         assert_eq!(short, Err(DatasetError::Shape { what: "velocity", expected: 4, found: 2 }));
         assert_eq!(Dataset::<f64>::new(2, vec![], vec![], vec![]), Err(DatasetError::Empty));
+        let good = Dataset::new(2, vec![0.0; 4], vec![0.0; 4], vec![0.0; 4]).unwrap();
+        let bad = good.clone().with_forces(vec![0.0, f64::INFINITY, 0.0, 0.0]);
+        assert_eq!(bad, Err(DatasetError::NotFinite { what: "force", row: 0, column: 1 }));
+        let forced = good.clone().with_forces(vec![1.0; 4]).unwrap();
+        assert!(forced.checksum() != good.checksum() && forced.cast::<f32>().force() == [1.0; 4]);
+        assert_eq!(good.with_forces(vec![]), Err(DatasetError::Shape { what: "force", expected: 4, found: 0 }));
     }
 
     #[test]

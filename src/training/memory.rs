@@ -23,7 +23,7 @@ const POLISH: u64 = 14;
 ///   length, then converted; `3 n s (N + V)` for the phase under way; `8 n T` for the evaluation afterwards, five times;
 ///   `4 (6 N + V)` for the order of states and its copies in a checkpoint;
 /// - weights: `(12 + 24) s P`, the second for writing a checkpoint;
-/// - stripes: `s (P + 64 (w (2 c + 5 + 14 j) + 4 f c + 10 n^2 + 20 n))` for each of the up to 8 parts of a batch, `c = n + 2`
+/// - stripes: `s (P + 64 (w (2 c + 5 + 14 j) + 4 f c + 10 n^2 + 20 n + 6 K))` for each of the up to 8 parts of a batch, `c = n + 2`
 ///   channels and `j` jets per state, 1 without penalty and `n + 1` with one, the latter with `n^2` more numbers per state;
 /// - polishing with memory `m`, which makes `s = 8` in the stripes: `24 n (N + V) + 4 N + 8 P (2 m + 14)`.
 pub fn training_memory(config: &Config, architecture: &Architecture) -> Option<u64> {
@@ -59,6 +59,7 @@ pub fn training_memory(config: &Config, architecture: &Architecture) -> Option<u
         product([4, f, channels]),
         product([10, square]),
         product([20, n]),
+        product([6, architecture.dissipation.unwrap_or(0) as u64]),
     ]);
     let suspects = if penalised { product([square + n + 1, batch]) } else { Some(0) };
     let of_stripe = sum([Some(weights), product([CHUNK as u64, of_state?]), suspects]);

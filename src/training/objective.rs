@@ -3,11 +3,15 @@
 //! Loss of the paper: the mean of `|prediction - target|` over the `2n` components `(v, a)` of the scaled state
 //! derivative, the first `n` equal by construction: half the mean absolute error of the scaled accelerations.
 //!
+//! Accelerations solve `M a = g - c - dD/dv + Q` with the network's dissipation `D` and the data's known forces `Q`, if there
+//! are any. A loss `l(a)` depends on the parameters of `D` by `dl = -lam.d(dD/dv)`, `lam = M^-1 dl/da`; those of `L` enter as
+//! without friction, at the `a` that has it.
+//!
 //! A batch is cut into stripes and chunks whose sizes do not depend on the number of threads, and every sum is taken in
 //! their order: the same numbers on any number of threads.
 
 use crate::linalg::{self, Workspace, solve};
-use crate::network::{Adjoint, Architecture, Chunk, Depth, Jets};
+use crate::network::{Adjoint, Architecture, Chunk, Depth, Dissipation, Jets};
 use crate::scalar::{Real, Scalar, Sum};
 use crate::training::dataset::Dataset;
 use crate::training::penalty::Penalty;
@@ -67,6 +71,7 @@ pub struct Objective<S> {
 struct Stripe<S> {
     chunk: Chunk<S>,
     adjoint: Adjoint<S>,
+    dissipation: Option<Dissipation<S>>,
     jets: Jets<S>,
     penalty_jets: Jets<S>,
     gradient: Vec<S>,
@@ -95,6 +100,7 @@ impl<S: Scalar> Stripe<S> {
         let chunk = Chunk::new(architecture);
         Self {
             adjoint: Adjoint::new(&chunk),
+            dissipation: Dissipation::new(&chunk),
             chunk,
             jets: Jets::default(),
             penalty_jets: Jets::default(),
@@ -147,10 +153,14 @@ impl<S: Scalar> Stripe<S> {
     fn add_chunk(&mut self, weights: &[S], data: &Dataset<S>, rows: &[u32], weight: S, penalty: (Penalty, S)) {
         self.gather(data, rows);
         self.chunk.evaluate(weights, &self.q, &self.v, Depth::Training);
-        self.solve(rows);
+        self.solve(weights, data, rows);
         self.add_residuals(data, rows, weight);
         self.add_motion_jets();
         self.adjoint.add_gradient(&self.chunk, weights, &self.jets, &mut self.gradient);
+        if let Some(dissipation) = &self.dissipation {
+            // The jets' s is -lam.
+            dissipation.add_gradient(&self.chunk, weights, &self.jets.state, &self.jets.s, &mut self.gradient);
+        }
         let (penalty, lambda) = penalty;
         match penalty {
             Penalty::None => {}
@@ -228,15 +238,22 @@ impl<S: Scalar> Stripe<S> {
     fn add_losses(&mut self, weights: &[S], data: &Dataset<S>, rows: &[u32]) {
         self.gather(data, rows);
         self.chunk.evaluate(weights, &self.q, &self.v, Depth::Motion);
-        self.solve(rows);
+        self.solve(weights, data, rows);
         self.add_residuals(data, rows, <S as Real>::one());
     }
 
     /// Accelerations of the chunk, scaled; `NaN` where a state fails, which is noted with its row.
-    fn solve(&mut self, rows: &[u32]) {
+    fn solve(&mut self, weights: &[S], data: &Dataset<S>, rows: &[u32]) {
         let n = self.chunk.coordinates();
         self.right.clear();
         self.right.extend(self.chunk.dl_dq.iter().zip(&self.chunk.coriolis).map(|(&g, &c)| g - c));
+        if let Some(dissipation) = &mut self.dissipation {
+            dissipation.evaluate(&self.chunk, weights);
+            self.right.iter_mut().zip(&dissipation.gradient).for_each(|(right, &friction)| *right -= friction);
+        }
+        if !data.force().is_empty() {
+            self.add_forces(data, rows);
+        }
         self.acceleration.resize(self.right.len(), <S as Real>::zero());
         let (matrices, solution) = (&self.chunk.mass_matrix, &mut self.acceleration);
         if solve(n, matrices, &self.right, solution, &mut self.workspace).is_ok() {
@@ -249,6 +266,17 @@ impl<S: Scalar> Stripe<S> {
                 linalg::Failure::Singular { condition } => Failure::Singular { row, condition },
                 linalg::Failure::NotFinite => Failure::NotFinite { row },
             });
+        }
+    }
+
+    /// Adds the known forces, in scaled coordinates `s_i Q_i`, to the right-hand sides.
+    fn add_forces(&mut self, data: &Dataset<S>, rows: &[u32]) {
+        let n = data.coordinates();
+        for (right, &row) in self.right.chunks_exact_mut(n).zip(rows) {
+            let force = &data.force()[row as usize * n..][..n];
+            for ((right, &force), &inverse) in right.iter_mut().zip(force).zip(&self.inverse_scale) {
+                *right += force / inverse;
+            }
         }
     }
 

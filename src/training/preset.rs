@@ -79,6 +79,7 @@ fn quick(system: &Configured<f64>) -> Config {
         scaling: Scaling::Physical,
         embed_periodic: true,
         input_layer: InputLayer::None,
+        dissipation: None,
         initialization: Initialization::Default,
     };
     let n = system.coordinates;
@@ -122,6 +123,7 @@ fn paper(system: &Configured<f64>) -> Option<Config> {
         scaling: Scaling::Physical,
         embed_periodic: false,
         input_layer: InputLayer::None,
+        dissipation: None,
         initialization: Initialization::Default,
     };
     let bounds: Bounds = (system.system.training)(n);

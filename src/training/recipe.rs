@@ -76,6 +76,7 @@ impl Config {
             periodic: (system.system.coordinates)(n).iter().map(|c| c.periodic).collect(),
             embed_periodic: self.network.embed_periodic,
             input_layer: self.network.input_layer,
+            dissipation: self.network.dissipation,
         }
     }
 }

@@ -124,6 +124,7 @@ pub fn model() -> ModelFile<f32> {
         periodic: vec![true, true],
         embed_periodic: true,
         input_layer: InputLayer::None,
+        dissipation: None,
     };
     let count = Layout::new(&architecture).parameters;
     let header = Header {

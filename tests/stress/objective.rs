@@ -18,6 +18,7 @@ pub fn architecture(n: usize, hidden: &[usize], activation: Nonlinearity, alpha:
         periodic: vec![false; n],
         embed_periodic: false,
         input_layer: InputLayer::None,
+        dissipation: None,
     }
 }
 

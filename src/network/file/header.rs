@@ -45,9 +45,9 @@ pub struct Header {
     pub crate_version: String,
     /// Shape of the network, scales and periodic coordinates.
     pub architecture: Architecture,
-    /// Name of the system it learned.
+    /// Name of the system it learned: one of the catalogue, or any text for a system that was only recorded.
     pub system: String,
-    /// Values of all parameters of that system, in their units.
+    /// Values of all parameters of that system, in their units; empty for one that was only recorded.
     pub parameters: BTreeMap<String, f64>,
     /// Names of the components of a state: coordinates, then velocities.
     pub columns: Vec<String>,
@@ -76,6 +76,8 @@ impl Header {
         require(n <= MAX_COORDINATES, &format!("coordinates: expected at most {MAX_COORDINATES}"))?;
         require(hidden.len() <= 64, "hidden: expected at most 64 widths")?;
         require(hidden.iter().all(|w| *w <= MAX_WIDTH), &format!("hidden: expected widths of at most {MAX_WIDTH}"))?;
+        let units = self.architecture.dissipation.unwrap_or(1);
+        require(units <= MAX_WIDTH, &format!("dissipation: expected at most {MAX_WIDTH} units"))?;
         require(self.columns.len() == 2 * n, "columns: expected two per coordinate")?;
         let distinct: std::collections::BTreeSet<_> = self.columns.iter().collect();
         require(distinct.len() == 2 * n, "columns: expected distinct names")?;

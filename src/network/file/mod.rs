@@ -10,6 +10,10 @@
 //! The activation `quadratic-softplus` has two such networks, whose outputs add up, with half the widths each: names
 //! start with `branches.0.` (softplus) and `branches.1.` (quadratic).
 //!
+//! A network with a dissipation of `K` units has the tensors `dissipation.gamma`, shape `(K)`, `dissipation.weight`, shape
+//! `(K, F)` over the features `f` of the coordinates, and `dissipation.direction`, shape `(K, n)`:
+//! `D = sum_k softplus(gamma_k + weight_k.f) ln cosh(direction_k.(v/s))`.
+//!
 //! The metadata has the one key `lnn`, a JSON object with the fields of [`Header`] and `checksum`: eight hexadecimal
 //! digits, the CRC-32 (IEEE) of that JSON text up to the comma before `"checksum"`, followed by the bytes of the tensors.
 //! A changed bit anywhere is refused. The same model gives the same bytes.
@@ -25,7 +29,7 @@ pub use error::ModelFileError;
 pub use header::{FORMAT, Header, MAX_COORDINATES, MAX_WIDTH, StoredPrecision};
 
 use self::container::{Kind, Tensor, pack, unpack};
-use crate::network::{Architecture, Layout, LinearMap};
+use crate::network::{Architecture, DissipationLayout, Layout, LinearMap};
 use crate::scalar::Scalar;
 use crate::storage::{Disk, Files, read_regular, write_whole};
 use std::path::Path;
@@ -38,7 +42,8 @@ const MODEL: Kind = Kind { name: "model", key: "lnn", format: FORMAT };
 
 /// A network: its description and its flat parameter vector.
 ///
-/// The vector is laid out by [`Layout`]: branch by branch, for every layer the weights, then the biases.
+/// The vector is laid out by [`Layout`]: branch by branch, for every layer the weights, then the biases; then the
+/// dissipation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModelFile<S> {
     /// Everything but the weights.
@@ -142,6 +147,8 @@ fn slots(architecture: &Architecture) -> Result<Vec<Slot>, ModelFileError> {
         total = total.zip(layer).and_then(|(a, b)| a.checked_add(b));
         inputs = Some(outputs);
     }
+    let units = architecture.dissipation.unwrap_or(0);
+    total = total.zip(units.checked_mul(1 + features)).and_then(|(a, b)| a.checked_add(b));
     if total.is_none_or(|total| total as u64 > MAX_BYTES) {
         return Err(ModelFileError::Header("hidden: more weights than a file may hold".to_string()));
     }
@@ -166,6 +173,13 @@ fn slots(architecture: &Architecture) -> Result<Vec<Slot>, ModelFileError> {
                 slots.push(Slot { name, shape, range: layer.bias_range() });
             }
         }
+    }
+    if let Some(dissipation) = layout.dissipation {
+        let DissipationLayout { units, features, coordinates, .. } = dissipation;
+        let mut push = |part: &str, shape, range| slots.push(Slot { name: format!("dissipation.{part}"), shape, range });
+        push("gamma", vec![units], dissipation.gamma_range());
+        push("weight", vec![units, features], dissipation.weight_range());
+        push("direction", vec![units, coordinates], dissipation.direction_range());
     }
     Ok(slots)
 }

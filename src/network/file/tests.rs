@@ -20,6 +20,7 @@ fn header(hidden: Vec<usize>, embed_periodic: bool, precision: StoredPrecision) 
             periodic: vec![true, false],
             embed_periodic,
             input_layer: InputLayer::None,
+            dissipation: None,
         },
         system: "spring-pendulum".to_string(),
         parameters: BTreeMap::from([("m".to_string(), 1.0), ("g".to_string(), 9.81)]),
@@ -36,7 +37,7 @@ fn model(hidden: Vec<usize>, precision: StoredPrecision) -> ModelFile<f64> {
     with_numbers(header(hidden, true, precision))
 }
 
-/// One or two branches, with and without an input layer, in both precisions.
+/// One or two branches, with and without an input layer, and one branch with a dissipation, in both precisions.
 fn every_kind(hidden: &[usize]) -> Vec<ModelFile<f64>> {
     let mut models = Vec::new();
     for precision in [StoredPrecision::F32, StoredPrecision::F64] {
@@ -48,8 +49,16 @@ fn every_kind(hidden: &[usize]) -> Vec<ModelFile<f64>> {
                 models.push(with_numbers(header));
             }
         }
+        models.push(with_numbers(damped(hidden.to_vec(), precision)));
     }
     models
+}
+
+/// A network with a dissipation of three units.
+fn damped(hidden: Vec<usize>, precision: StoredPrecision) -> Header {
+    let mut header = header(hidden, true, precision);
+    header.architecture.dissipation = Some(3);
+    header
 }
 
 fn with_numbers(header: Header) -> ModelFile<f64> {
@@ -134,11 +143,14 @@ fn tensors_have_the_documented_names_and_shapes() {
         names.map(String::from).into_iter().zip(shapes).collect::<Vec<_>>()
     };
     let dyt = || ["dyt.alpha", "dyt.beta", "dyt.gamma"].map(String::from).into_iter().zip([vec![1], vec![5], vec![5]]);
+    let friction = [("direction", vec![3, 2]), ("gamma", vec![3]), ("weight", vec![3, 3])]
+        .map(|(part, shape)| (format!("dissipation.{part}"), shape));
     let expected = [
         dense([6, 4]),
         dyt().chain(dense([6, 4])).collect(),
         in_both_branches(dense([3, 2])),
         in_both_branches(dyt().chain(dense([3, 2])).collect()),
+        friction.into_iter().chain(dense([6, 4])).collect(),
     ];
     for (model, expected) in every_kind(&[6, 4]).into_iter().zip(expected.iter().cycle()) {
         let bytes = model.to_bytes().unwrap();
@@ -212,6 +224,21 @@ fn tensors_that_do_not_fit_are_named() {
         *body = body.replace("\"embed_periodic\":true", "\"embed_periodic\":true,\"input_layer\":\"dyt\"");
     });
     assert!(matches!(refusal(&untold), ModelFileError::MissingTensor(name) if name == "dyt.alpha"));
+    let claims = |units: &'static str| {
+        rebuilt(&bytes, move |body, _| {
+            let plain = "\"embed_periodic\":true";
+            *body = body.replace(plain, &format!("{plain},\"dissipation\":{units}"));
+        })
+    };
+    assert!(matches!(refusal(&claims("2")), ModelFileError::MissingTensor(name) if name == "dissipation.gamma"));
+    for units in ["0", "65537", "18446744073709551615", "-1", "1.5"] {
+        assert!(matches!(refusal(&claims(units)), ModelFileError::Header(_)), "{units}");
+    }
+    let stored = with_numbers(damped(vec![2], StoredPrecision::F64)).to_bytes().unwrap();
+    let frictionless = rebuilt(&stored, |body, _| *body = body.replace(",\"dissipation\":3", ""));
+    assert!(matches!(refusal(&frictionless), ModelFileError::ExtraTensor(name) if name == "dissipation.direction"));
+    let other = rebuilt(&stored, |body, _| *body = body.replace("\"dissipation\":3", "\"dissipation\":4"));
+    assert_eq!(refusal(&other).to_string(), "tensor dissipation.gamma: expected shape [4], found [3]");
     let hybrid = rebuilt(&bytes, |body, _| *body = body.replace("\"gelu\"", "\"quadratic-softplus\""));
     assert!(matches!(refusal(&hybrid), ModelFileError::ExtraTensor(name) if name == "layers.0.bias"));
     let integers = rebuilt(&bytes, |_, tensors| tensors[0].1 = Dtype::I64);
@@ -295,6 +322,7 @@ proptest! {
         embed in any::<bool>(),
         activation in prop::sample::select(&Nonlinearity::ALL[..]),
         input_layer in prop::sample::select(vec![InputLayer::None, InputLayer::Dyt]),
+        dissipation in prop::option::of(1usize..5),
         seed in any::<u64>(),
         scale in prop::array::uniform2(f64::MIN_POSITIVE..1e300),
         numbers in prop::collection::vec(prop::num::f64::NORMAL | prop::num::f64::SUBNORMAL | prop::num::f64::ZERO, 200),
@@ -303,6 +331,7 @@ proptest! {
         let mut header = header(hidden, embed, StoredPrecision::F64);
         header.architecture.activation = activation;
         header.architecture.input_layer = input_layer;
+        header.architecture.dissipation = dissipation;
         header.seed = seed;
         header.architecture.scale = scale.to_vec();
         let count = Layout::new(&header.architecture).parameters;

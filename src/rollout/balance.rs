@@ -1,0 +1,106 @@
+//! Where the energy of a motion with friction went.
+
+use super::gauss::{Tableau, lagrange};
+use super::trajectory::CHUNK;
+use super::{RolloutError, Trajectory};
+use crate::lagrangian::{EulerLagrange, Request, Terms};
+use crate::scalar::{Real, Scalar};
+
+/// Samples whose interpolating polynomial is integrated.
+const SAMPLES: usize = 6;
+
+/// Energy gained and energy lost to friction between the first and the last sample, in the unit of `L`.
+///
+/// `dE/dt = -v.dD/dv` makes their sum zero, up to the errors of the integration and of the quadrature.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EnergyBalance<S> {
+    /// `E` at the end less `E` at the start.
+    pub change: S,
+    /// Integral of the dissipated power `v.dD/dv` over time; 0 for a model that conserves its energy.
+    pub dissipated: S,
+    /// Largest `|E|` of a sample: rounding errors are in its units.
+    pub size: S,
+}
+
+impl<S: Scalar> EnergyBalance<S> {
+    /// Energy that came from nowhere, `change + dissipated`.
+    pub fn defect(&self) -> S {
+        self.change + self.dissipated
+    }
+}
+
+impl<S: Scalar> Trajectory<S> {
+    /// Energy balance of the motion by `model`.
+    ///
+    /// The power is integrated through the polynomials of degree 5 through neighbouring samples, at the distances they
+    /// have: the error is of order 6 in the distance of samples, as far as the power is smooth.
+    ///
+    /// # Errors
+    /// [`RolloutError::Invalid`] if there is no sample, or a sample at which the model cannot be evaluated.
+    pub fn energy_balance(&self, model: &dyn EulerLagrange<S>) -> Result<EnergyBalance<S>, RolloutError> {
+        let invalid = |problem: String| RolloutError::Invalid { what: "trajectory", problem };
+        let zero = <S as Real>::zero();
+        let size = CHUNK * self.coordinates.max(1);
+        let (mut energy, mut power) = (Vec::with_capacity(self.len()), Vec::with_capacity(self.len()));
+        let mut terms = Terms::default();
+        for (q, v) in self.q.chunks(size).zip(self.v.chunks(size)) {
+            model
+                .terms(q, v, Request::ENERGY | Request::FORCE, &mut terms)
+                .map_err(|e| invalid(format!("samples from {}: {e}", energy.len())))?;
+            energy.extend_from_slice(&terms.energy);
+            power.extend_from_slice(&terms.dissipation);
+            power.resize(energy.len(), zero);
+        }
+        let (Some(&first), Some(&last)) = (energy.first(), energy.last()) else {
+            return Err(invalid("has no samples".to_string()));
+        };
+        let size = energy.iter().fold(zero, |size, e| S::max(size, e.abs()));
+        Ok(EnergyBalance { change: last - first, dissipated: integral(&self.t, &power), size })
+    }
+}
+
+/// Integral of samples `y` over the times `t`, in order: each interval by the polynomial through the samples around it.
+fn integral<S: Scalar>(t: &[S], y: &[S]) -> S {
+    let Tableau { nodes, weights, .. } = Tableau::<S>::new(SAMPLES / 2);
+    let window = SAMPLES.min(t.len());
+    let mut sum = <S as Real>::zero();
+    for k in 1..t.len() {
+        let first = k.saturating_sub(SAMPLES / 2).min(t.len() - window);
+        let h = t[k] - t[k - 1];
+        let points: Vec<S> = nodes.iter().map(|&node| t[k - 1] + node * h).collect();
+        let basis = lagrange(&t[first..first + window], &points);
+        for (row, &weight) in basis.chunks_exact(window).zip(&weights) {
+            let value = row.iter().zip(&y[first..]).fold(<S as Real>::zero(), |sum, (&l, &y)| sum + l * y);
+            sum += weight * h * value;
+        }
+    }
+    sum
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn polynomials_of_degree_five_are_integrated_exactly_at_any_distances() {
+        let t = [0.0f64, 0.1, 0.3, 0.35, 0.6, 0.8, 0.85, 1.0];
+        let y = t.map(|t| 1.0 + 6.0 * t.powi(5));
+        assert!((integral(&t, &y) - 2.0).abs() < 1e-14);
+        let backwards: Vec<f64> = t.iter().rev().copied().collect();
+        let values: Vec<f64> = y.iter().rev().copied().collect();
+        assert!((integral(&backwards, &values) + 2.0).abs() < 1e-14);
+        assert!((integral(&t[..2], &[1.0, 3.0]) - 0.2).abs() < 1e-15);
+        assert_eq!(integral(&t[..1], &[7.0]), 0.0);
+    }
+
+    #[test]
+    fn the_order_is_six() {
+        let error = |n: usize| {
+            let t: Vec<f64> = (0..=n).map(|k| k as f64 / n as f64).collect();
+            let y: Vec<f64> = t.iter().map(|t| (2.0 * t).exp()).collect();
+            (integral(&t, &y) - 0.5 * 2f64.exp().powi(2) + 0.5).abs()
+        };
+        let order = (error(20) / error(40)).log2();
+        assert!((5.5..7.5).contains(&order), "{order}");
+    }
+}
