@@ -25,7 +25,7 @@ const ROOMS: [&str; 16] = [
 ];
 
 /// Crates and the only places that may name them.
-const ADAPTERS: [(&str, &str); 12] = [
+const ADAPTERS: [(&str, &str); 13] = [
     ("pulp", "src/scalar/"),
     ("xprec", "src/scalar/"),
     ("libm", "src/scalar/"),
@@ -36,6 +36,7 @@ const ADAPTERS: [(&str, &str); 12] = [
     ("safetensors", "src/network/file/"),
     ("crc32fast", "src/network/file/"),
     ("kuva", "src/report/plot"),
+    ("zip", "src/recording/read/npz.rs"),
     ("clap", "src/cli/"),
     ("indicatif", "src/cli/"),
 ];

@@ -1,5 +1,17 @@
-//! Recorded motion: what somebody measured, as it was measured.
+//! Recorded motion: what somebody measured, as it was measured; its derivatives, and what it is good for.
 
+mod columns;
+mod hold_out;
+#[cfg(feature = "data")]
+pub mod read;
+mod reading;
+pub mod smooth;
+mod statistics;
 mod track;
+mod units;
 
+pub use columns::{Columns, ColumnsError};
+pub use hold_out::{HeldOut, HoldOutError, hold_out};
+pub use reading::{Cut, Dropped, Reading, Rows};
 pub use track::{Recording, Track, TrackError};
+pub use units::factor;

@@ -7,5 +7,5 @@ mod write;
 
 pub use files::{Disk, Files};
 pub use memory::available_memory;
-pub use read::{ReadError, read_regular};
+pub use read::{ReadError, open_regular, read_regular};
 pub use write::{check_target, remove_leftovers, replace, write_atomically, write_whole};

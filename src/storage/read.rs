@@ -27,14 +27,14 @@ pub enum ReadError {
     Io(#[from] io::Error),
 }
 
-/// Reads a regular file of at most `limit` bytes.
+/// Opens a regular file of at most `limit` bytes; its size comes second.
 ///
-/// Links are followed. Kind and size are checked before anything is opened or allocated, and a file that grows while it
-/// is read is refused, so that a pipe cannot block and a device cannot fill the memory.
+/// Links are followed. Kind and size are checked before anything is opened, so that a pipe cannot block and a device
+/// cannot fill the memory.
 ///
 /// # Errors
 /// [`ReadError`].
-pub fn read_regular(path: &Path, limit: u64) -> Result<Vec<u8>, ReadError> {
+pub fn open_regular(path: &Path, limit: u64) -> Result<(File, u64), ReadError> {
     let data = match fs::metadata(path) {
         Ok(data) => data,
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Err(ReadError::Missing),
@@ -49,7 +49,17 @@ pub fn read_regular(path: &Path, limit: u64) -> Result<Vec<u8>, ReadError> {
     if data.len() > limit {
         return Err(ReadError::TooLarge { bytes: data.len(), limit });
     }
+    Ok((File::open(path)?, data.len()))
+}
+
+/// Reads a regular file of at most `limit` bytes, opened like [`open_regular`]; one that grows beyond while it is read
+/// is refused.
+///
+/// # Errors
+/// [`ReadError`].
+pub fn read_regular(path: &Path, limit: u64) -> Result<Vec<u8>, ReadError> {
+    let (file, _) = open_regular(path, limit)?;
     let mut bytes = Vec::new();
-    let read = File::open(path)?.take(limit.saturating_add(1)).read_to_end(&mut bytes)? as u64;
+    let read = file.take(limit.saturating_add(1)).read_to_end(&mut bytes)? as u64;
     if read > limit { Err(ReadError::TooLarge { bytes: read, limit }) } else { Ok(bytes) }
 }

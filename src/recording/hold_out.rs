@@ -1,0 +1,207 @@
+//! Training and validation, apart by whole trajectories.
+
+use crate::recording::{Recording, Track};
+use rand::SeedableRng;
+use rand::seq::SliceRandom;
+use rand_chacha::ChaCha8Rng;
+use serde::Serialize;
+use std::ops::Range;
+use thiserror::Error;
+
+/// Stream of the generator that chooses trajectories; those of training are numbered from 0.
+const STREAM: u64 = 8;
+
+/// What is held out of a recording for validation.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum HeldOut {
+    /// Whole trajectories, by number, ascending.
+    Tracks(Vec<usize>),
+    /// The end of the only trajectory: samples `start..` after a gap of `gap` samples that nobody uses.
+    End {
+        /// First sample held out.
+        start: usize,
+        /// Samples before it that are left out.
+        gap: usize,
+    },
+}
+
+/// Why nothing can be held out.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum HoldOutError {
+    /// Not a share.
+    #[error("share of the data held out: expected a number between 0 and 1, found {0}")]
+    Fraction(f64),
+    /// One trajectory that is too short to be divided.
+    #[error("{samples} samples are too few to hold out {fraction} of them after a gap of {gap}")]
+    Short {
+        /// Samples of the trajectory.
+        samples: usize,
+        /// Share asked for.
+        fraction: f64,
+        /// The gap in samples.
+        gap: usize,
+    },
+}
+
+impl HeldOut {
+    /// Chooses what is held out: trajectories in random order until they hold at least `fraction` of all samples, one
+    /// at least and not all; of a single trajectory its last part, after a gap of `gap` samples, so that no window of
+    /// smoothing reaches from one side to the other.
+    ///
+    /// # Errors
+    /// [`HoldOutError`].
+    pub fn choose(recording: &Recording, fraction: f64, gap: usize, seed: u64) -> Result<Self, HoldOutError> {
+        if !(fraction > 0.0 && fraction < 1.0) {
+            return Err(HoldOutError::Fraction(fraction));
+        }
+        let samples = recording.samples();
+        let wanted = ((fraction * samples as f64).round() as usize).max(1);
+        if recording.tracks.len() < 2 {
+            let start = samples.saturating_sub(wanted);
+            if wanted < 2 || start < gap + 2 {
+                return Err(HoldOutError::Short { samples, fraction, gap });
+            }
+            return Ok(Self::End { start, gap });
+        }
+        let mut order: Vec<usize> = (0..recording.tracks.len()).collect();
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        rng.set_stream(STREAM);
+        order.shuffle(&mut rng);
+        order.pop();
+        let mut held = Vec::new();
+        let mut count = 0;
+        for track in order {
+            if count >= wanted {
+                break;
+            }
+            count += recording.tracks[track].len();
+            held.push(track);
+        }
+        held.sort_unstable();
+        Ok(Self::Tracks(held))
+    }
+
+    /// Training and validation.
+    pub fn divide(&self, recording: &Recording) -> (Recording, Recording) {
+        let with = |tracks: Vec<Track>| Recording { tracks, ..bare(recording) };
+        match self {
+            Self::Tracks(held) => {
+                let part = |inside: bool| {
+                    let tracks = recording.tracks.iter().enumerate();
+                    tracks.filter(|(k, _)| held.contains(k) == inside).map(|(_, track)| track.clone()).collect()
+                };
+                (with(part(false)), with(part(true)))
+            }
+            Self::End { start, gap } => {
+                let part = |range: Range<usize>, which: &str| {
+                    let tracks = recording.tracks.iter().take(1);
+                    tracks.map(|track| section(track, recording.n(), range.clone(), which)).collect()
+                };
+                let end = recording.samples();
+                let (start, end) = ((*start).min(end), end);
+                (with(part(0..start.saturating_sub(*gap), "beginning")), with(part(start..end, "end")))
+            }
+        }
+    }
+
+    /// In words, such as `run3.csv, run7.csv`.
+    pub fn describe(&self, recording: &Recording) -> String {
+        match self {
+            Self::Tracks(held) => held
+                .iter()
+                .filter_map(|k| recording.tracks.get(*k))
+                .map(|t| t.name.as_str())
+                .collect::<Vec<_>>()
+                .join(", "),
+            Self::End { start, gap } => format!(
+                "the last {} samples of the only trajectory, after a gap of {gap}",
+                recording.samples().saturating_sub(*start)
+            ),
+        }
+    }
+}
+
+/// Divides a recording into training and validation, see [`HeldOut::choose`].
+///
+/// # Errors
+/// [`HoldOutError`].
+pub fn hold_out(
+    recording: &Recording,
+    fraction: f64,
+    gap: usize,
+    seed: u64,
+) -> Result<(Recording, Recording), HoldOutError> {
+    Ok(HeldOut::choose(recording, fraction, gap, seed)?.divide(recording))
+}
+
+/// The same coordinates without trajectories.
+fn bare(recording: &Recording) -> Recording {
+    let (coordinates, periodic) = (recording.coordinates.clone(), recording.periodic.clone());
+    Recording { coordinates, periodic, tracks: Vec::new() }
+}
+
+/// Samples of a track of `n` coordinates.
+fn section(track: &Track, n: usize, range: Range<usize>, which: &str) -> Track {
+    let part = |values: &[f64]| values.get(range.start * n..range.end * n).unwrap_or(&[]).to_vec();
+    Track {
+        name: format!("{} ({which})", track.name),
+        times: track.times[range.clone()].to_vec(),
+        q: part(&track.q),
+        v: part(&track.v),
+        a: part(&track.a),
+        force: part(&track.force),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn recording(lengths: &[usize]) -> Recording {
+        let tracks = lengths.iter().enumerate().map(|(k, length)| Track {
+            name: format!("run{k}"),
+            times: (0..*length).map(|j| j as f64).collect(),
+            q: (0..2 * length).map(|j| (100 * k + j) as f64).collect(),
+            v: vec![],
+            a: vec![],
+            force: vec![1.0; 2 * length],
+        });
+        Recording { coordinates: vec!["x".into(), "y".into()], periodic: vec![false; 2], tracks: tracks.collect() }
+    }
+
+    #[test]
+    fn trajectories_stay_whole() {
+        let all = recording(&[20, 30, 40, 20, 30]);
+        let mut choices = std::collections::BTreeSet::new();
+        for seed in 0..20 {
+            let (training, validation) = hold_out(&all, 0.2, 5, seed).unwrap();
+            assert!(validation.samples() >= 28 && !training.tracks.is_empty());
+            assert_eq!(training.samples() + validation.samples(), all.samples());
+            let mut tracks = [training.tracks, validation.tracks.clone()].concat();
+            tracks.sort_by(|a, b| a.name.cmp(&b.name));
+            assert_eq!(tracks, all.tracks);
+            assert_eq!(hold_out(&all, 0.2, 5, seed).unwrap().1, validation);
+            choices.insert(validation.tracks.iter().map(|t| t.name.clone()).collect::<Vec<_>>());
+        }
+        assert!(choices.len() > 3, "{choices:?}");
+        // Even if nearly all is asked for, something is left to learn from.
+        assert_eq!(hold_out(&recording(&[9, 9]), 0.99, 1, 0).unwrap().0.tracks.len(), 1);
+    }
+
+    #[test]
+    fn the_end_of_a_single_one() {
+        let one = recording(&[100]);
+        let held = HeldOut::choose(&one, 0.2, 10, 0).unwrap();
+        assert_eq!(held, HeldOut::End { start: 80, gap: 10 });
+        let (training, validation) = held.divide(&one);
+        assert_eq!((training.samples(), validation.samples()), (70, 20));
+        assert_eq!((training.tracks[0].q[139], validation.tracks[0].q[0]), (139.0, 160.0));
+        assert!(validation.tracks[0].v.is_empty() && validation.tracks[0].validate(2).is_ok());
+        assert!(held.describe(&one).contains("last 20 samples"));
+        assert!(matches!(hold_out(&one, 0.5, 60, 0), Err(HoldOutError::Short { .. })));
+        for bad in [0.0, 1.0, f64::NAN, -0.1] {
+            assert!(matches!(hold_out(&one, bad, 0, 0), Err(HoldOutError::Fraction(_))));
+        }
+    }
+}

@@ -1,0 +1,144 @@
+//! Trajectories that grow row by row.
+
+use super::Problem;
+use super::select::Selection;
+use crate::recording::reading::Rows;
+use crate::recording::{Columns, Track};
+use std::collections::HashMap;
+use std::f64::consts::TAU;
+
+/// Most trajectories of one file.
+const MOST: usize = 100_000;
+
+/// A trajectory while its rows come in.
+pub struct Growing {
+    /// Value of the column that tells trajectories apart.
+    pub label: Option<String>,
+    /// Rows of its samples.
+    pub rows: Rows,
+    /// What was measured, the name empty.
+    pub track: Track,
+    /// The row before, as it stands in the file.
+    last: Vec<f64>,
+    last_row: u64,
+}
+
+/// Trajectories of one file.
+pub struct Builder<'a> {
+    columns: &'a Columns,
+    selection: Selection,
+    periodic: Vec<bool>,
+    current: usize,
+    labels: HashMap<String, usize>,
+    /// The trajectories so far.
+    pub growing: Vec<Growing>,
+    /// Rows left out because they repeat the row before.
+    pub duplicates: usize,
+}
+
+impl<'a> Builder<'a> {
+    /// No rows yet.
+    pub fn new(columns: &'a Columns, selection: Selection) -> Self {
+        let periodic = columns.periodic();
+        let (growing, labels) = (Vec::new(), HashMap::new());
+        Self { columns, selection, periodic, current: 0, labels, growing, duplicates: 0 }
+    }
+
+    /// Which columns are used.
+    pub fn selection(&self) -> &Selection {
+        &self.selection
+    }
+
+    /// Adds a row: the used columns in the order of the selection, as they stand in the file, and the value that tells
+    /// trajectories apart if there is such a column.
+    pub fn push(&mut self, row: u64, values: &[f64], label: Option<&str>) -> Result<(), Problem> {
+        self.turn_to(row, label)?;
+        let Some(growing) = self.growing.get_mut(self.current) else { return Ok(()) };
+        let timed = usize::from(self.selection.timed);
+        // A negative factor of time turns its order around.
+        let sign = self.selection.values[0].factor.signum();
+        if self.selection.timed && !growing.last.is_empty() && values[0] * sign <= growing.last[0] * sign {
+            if values == growing.last {
+                self.duplicates += 1;
+                return Ok(());
+            }
+            let hint = match (values[0] == growing.last[0], label.is_none()) {
+                (true, _) => " with other values",
+                (false, true) => " (another trajectory? give it a file or a column of its own)",
+                (false, false) => "",
+            };
+            let column = self.selection.values[0].name.clone();
+            let (before_row, before) = (growing.last_row, growing.last[0]);
+            return Err(Problem::Order { row, column, before_row, before, found: values[0], hint });
+        }
+        growing.last.clear();
+        growing.last.extend_from_slice(values);
+        growing.last_row = row;
+
+        let (sample, track) = (growing.track.times.len(), &mut growing.track);
+        growing.rows.note(sample, row);
+        let n = self.columns.coords.len();
+        let mut scaled = values.iter().zip(&self.selection.values).map(|(x, used)| {
+            let y = x * used.factor;
+            if y.is_finite() {
+                Ok(y)
+            } else {
+                Err(Problem::Field { row, column: used.name.clone(), found: format!("{x} times {}", used.factor) })
+            }
+        });
+        match (timed, self.columns.rate) {
+            (0, rate) => track.times.push(sample as f64 / rate.unwrap_or(1.0)),
+            _ => {
+                for time in scaled.by_ref().take(1) {
+                    track.times.push(time?);
+                }
+            }
+        }
+        for (i, q) in scaled.by_ref().take(n).enumerate() {
+            let q = q?;
+            let turns = match (self.periodic[i], sample) {
+                (true, 1..) => ((track.q[(sample - 1) * n + i] - q) / TAU).round(),
+                _ => 0.0,
+            };
+            track.q.push(if turns == 0.0 { q } else { q + TAU * turns });
+        }
+        for (names, part) in [
+            (&self.columns.velocity, &mut track.v),
+            (&self.columns.acceleration, &mut track.a),
+            (&self.columns.force, &mut track.force),
+        ] {
+            for value in scaled.by_ref().take(names.len()) {
+                part.push(value?);
+            }
+        }
+        Ok(())
+    }
+
+    /// Finds or begins the trajectory of a label.
+    fn turn_to(&mut self, row: u64, label: Option<&str>) -> Result<(), Problem> {
+        if self.growing.get(self.current).is_some_and(|growing| growing.label.as_deref() == label) {
+            return Ok(());
+        }
+        if let Some(known) = label.and_then(|label| self.labels.get(label)) {
+            self.current = *known;
+            return Ok(());
+        }
+        if self.growing.len() == MOST {
+            let column = self.columns.trajectory.clone().unwrap_or_default();
+            return Err(Problem::Trajectories { row, column, most: MOST });
+        }
+        self.current = self.growing.len();
+        if let Some(label) = label {
+            self.labels.insert(label.to_string(), self.current);
+        }
+        let label = label.map(ToString::to_string);
+        self.growing.push(Growing { label, rows: Rows::default(), track: empty(), last: Vec::new(), last_row: 0 });
+        Ok(())
+    }
+}
+
+/// No samples.
+pub fn empty() -> Track {
+    let none = Vec::new;
+    Track { name: String::new(), times: none(), q: none(), v: none(), a: none(), force: none() }
+}

@@ -1,0 +1,159 @@
+//! What is wrong with files of recorded motion.
+
+use crate::recording::ColumnsError;
+use crate::storage::ReadError;
+use thiserror::Error;
+
+/// Why files do not make a recording.
+#[derive(Debug, Error)]
+pub enum DataError {
+    /// The description of the columns contradicts itself.
+    #[error(transparent)]
+    Columns(#[from] ColumnsError),
+    /// No files.
+    #[error("expected at least one file of data")]
+    NoFiles,
+    /// A file.
+    #[error("{file}: {problem}")]
+    File {
+        /// Its path.
+        file: String,
+        /// What is wrong with it.
+        problem: Problem,
+    },
+}
+
+/// What is wrong with a file; rows are lines of a text file or rows of an array, from 1.
+#[derive(Debug, Error)]
+pub enum Problem {
+    /// The file itself.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// Given as two of the files.
+    #[error("the file is given twice")]
+    Again,
+    /// Nothing in it.
+    #[error("the file is empty")]
+    Empty,
+    /// Bytes that are not text.
+    #[error("row {0}: not UTF-8 text")]
+    NotText(u64),
+    /// A line that is too long to be a row of numbers.
+    #[error("row {row}: a line of more than {limit} bytes")]
+    LongLine {
+        /// The row.
+        row: u64,
+        /// Longest line.
+        limit: u64,
+    },
+    /// Separated by something else than commas.
+    #[error("row {row}: fields are separated by {separator:?}, expected commas")]
+    Separator {
+        /// The first row.
+        row: u64,
+        /// What stands there.
+        separator: char,
+    },
+    /// A used column stands twice in the header.
+    #[error("row {row}: column {name} stands there twice")]
+    Duplicate {
+        /// Row of the header.
+        row: u64,
+        /// Its name.
+        name: String,
+    },
+    /// A column that is not there, with the nearest name.
+    #[error("row {row}: missing {what}: {problem}")]
+    Missing {
+        /// Row of the header.
+        row: u64,
+        /// What it was to be.
+        what: &'static str,
+        /// Its name and what is there.
+        problem: String,
+    },
+    /// Neither times nor a rate.
+    #[error("no column is called t or time: name the column of time, or give the rate in samples per second")]
+    NoTime,
+    /// Names for another number of columns.
+    #[error("row {row}: expected {expected} fields, as many as columns are named, found {found}")]
+    Width {
+        /// The row.
+        row: u64,
+        /// Names given.
+        expected: usize,
+        /// Fields found.
+        found: usize,
+    },
+    /// Names given though the file has its own.
+    #[error("row {row}: expected numbers below the given names of columns, found the header {found}")]
+    Header {
+        /// The row.
+        row: u64,
+        /// What stands there.
+        found: String,
+    },
+    /// A row with too few or too many fields.
+    #[error("row {row}: expected {expected} fields, found {found}")]
+    Ragged {
+        /// The row.
+        row: u64,
+        /// Fields of the first row.
+        expected: usize,
+        /// Fields of the row.
+        found: usize,
+    },
+    /// A field that is not a finite number.
+    #[error("row {row}, column {column}: expected a finite number, found {found:?}")]
+    Field {
+        /// The row.
+        row: u64,
+        /// Name of the column.
+        column: String,
+        /// What stands there.
+        found: String,
+    },
+    /// Time stands still or goes back.
+    #[error("row {row}, column {column}: expected a time later than {before} of row {before_row}, found {found}{hint}")]
+    Order {
+        /// The row.
+        row: u64,
+        /// The column of time.
+        column: String,
+        /// The row before it in the same trajectory.
+        before_row: u64,
+        /// Its time, as in the file.
+        before: f64,
+        /// Time of the row, as in the file.
+        found: f64,
+        /// What may be the reason.
+        hint: &'static str,
+    },
+    /// A header and nothing below.
+    #[error("no rows of numbers")]
+    NoRows,
+    /// Too little to learn from.
+    #[error("expected at least {least} rows without a gap in time, found {found}")]
+    TooFew {
+        /// Fewest samples of a trajectory.
+        least: usize,
+        /// Most samples between two gaps.
+        found: usize,
+    },
+    /// Many trajectories in one file.
+    #[error("row {row}, column {column}: more than {most} different values, expected one per trajectory")]
+    Trajectories {
+        /// The row.
+        row: u64,
+        /// The column.
+        column: String,
+        /// Most trajectories of a file.
+        most: usize,
+    },
+    /// An array file that is not what it should be.
+    #[error("{0}")]
+    Array(String),
+    /// The file could not be read to its end.
+    #[error("cannot read: {0}")]
+    Io(#[from] std::io::Error),
+}

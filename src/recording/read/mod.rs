@@ -1,0 +1,82 @@
+//! Recorded motion from files: CSV, NPY, NPZ.
+
+mod builder;
+mod csv;
+mod error;
+mod npy;
+mod npz;
+mod pieces;
+mod select;
+
+pub use error::{DataError, Problem};
+pub use pieces::LEAST;
+
+use crate::recording::reading::Reading;
+use crate::recording::{Columns, Recording};
+use crate::storage::open_regular;
+use builder::Builder;
+use std::fs::File;
+use std::io::{BufReader, Read, Seek};
+use std::path::Path;
+
+/// Largest file in bytes.
+const MAX_BYTES: u64 = 1 << 36;
+
+/// Reads recorded trajectories.
+///
+/// Every file holds one trajectory, or several told apart by a column; gaps in time cut them further. The format is told
+/// by the first bytes: arrays of NumPy (`.npy`, `.npz`; floats of 4 or 8 bytes and integers, either order and byte order),
+/// anything else is text of comma-separated numbers with or without a header. Numbers are converted to SI; angles are
+/// unwrapped by the nearest turn; rows that repeat the row before digit by digit are left out and counted.
+///
+/// # Errors
+/// [`DataError`], naming the file and, where there is one, row and column.
+pub fn read_recording<P: AsRef<Path>>(paths: &[P], columns: &Columns) -> Result<Reading, DataError> {
+    columns.validate()?;
+    if paths.is_empty() {
+        return Err(DataError::NoFiles);
+    }
+    let recording = Recording { coordinates: columns.coords.clone(), periodic: columns.periodic(), tracks: Vec::new() };
+    let mut reading = Reading { files: paths.len(), ..Reading::from(recording) };
+    for (k, path) in paths.iter().enumerate() {
+        let path = path.as_ref();
+        let again = paths[..k].iter().any(|earlier| earlier.as_ref() == path);
+        let added = if again { Err(Problem::Again) } else { add_file(path, columns, &mut reading) };
+        added.map_err(|problem| DataError::File { file: path.display().to_string(), problem })?;
+    }
+    Ok(reading)
+}
+
+/// Adds the trajectories of one file.
+fn add_file(path: &Path, columns: &Columns, reading: &mut Reading) -> Result<(), Problem> {
+    let (mut file, size) = open_regular(path, MAX_BYTES)?;
+    let builder = parse(&mut file, size, columns)?;
+    reading.time = builder.selection().time().map(ToString::to_string);
+    reading.duplicates += builder.duplicates;
+    if builder.growing.is_empty() {
+        return Err(Problem::NoRows);
+    }
+    let name = path.display().to_string();
+    let mut most = 0;
+    for growing in builder.growing {
+        most = most.max(pieces::add(&name, growing, reading));
+    }
+    if most < LEAST { Err(Problem::TooFew { least: LEAST, found: most }) } else { Ok(()) }
+}
+
+/// Tells the format and reads the rows.
+fn parse<'a>(file: &mut File, size: u64, columns: &'a Columns) -> Result<Builder<'a>, Problem> {
+    let mut start = Vec::new();
+    file.take(npy::MAGIC.len() as u64).read_to_end(&mut start)?;
+    file.rewind()?;
+    if start.starts_with(npy::MAGIC) {
+        npy::read(&mut BufReader::with_capacity(1 << 20, file), size, columns)
+    } else if start.starts_with(npz::MAGIC) {
+        npz::read(file.try_clone()?, columns)
+    } else {
+        csv::read(BufReader::with_capacity(1 << 20, file.take(size)), columns)
+    }
+}
+
+#[cfg(test)]
+mod tests;

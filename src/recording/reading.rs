@@ -1,0 +1,108 @@
+//! Where recorded samples stand in the files they come from, and what was left out.
+
+use crate::recording::Recording;
+use serde::Serialize;
+
+/// Line of the file of every sample, run-length: from sample `.0` on, sample `k` stands on line `k - .0 + .1`.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Rows(Vec<(usize, u64)>);
+
+impl Rows {
+    /// Notes that sample `sample` stands on line `row`; samples come in order.
+    pub(crate) fn note(&mut self, sample: usize, row: u64) {
+        if self.0.is_empty() || self.row(sample) != row {
+            self.0.push((sample, row));
+        }
+    }
+
+    /// Line of a sample, from 1.
+    pub fn row(&self, sample: usize) -> u64 {
+        let run = self.0.partition_point(|(first, _)| *first <= sample);
+        match run.checked_sub(1).and_then(|k| self.0.get(k)) {
+            Some((first, row)) => row + (sample - first) as u64,
+            None => sample as u64 + 1,
+        }
+    }
+
+    /// The rows of samples `start..end`, counted anew from 0.
+    pub(crate) fn part(&self, start: usize, end: usize) -> Self {
+        let mut rows = Self(vec![(0, self.row(start))]);
+        for (first, row) in self.0.iter().filter(|(first, _)| *first > start && *first < end) {
+            rows.0.push((first - start, *row));
+        }
+        rows
+    }
+}
+
+/// A step in time so long that the trajectory was cut there.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Cut {
+    /// The file.
+    pub file: String,
+    /// Row of the last sample before the gap.
+    pub before: u64,
+    /// Row of the first sample after it.
+    pub after: u64,
+    /// Length of the step in s.
+    pub seconds: f64,
+    /// Its length in usual steps.
+    pub steps: f64,
+}
+
+/// A stretch between gaps, too short to be used.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Dropped {
+    /// The file.
+    pub file: String,
+    /// Row of its first sample.
+    pub first: u64,
+    /// Row of its last sample.
+    pub last: u64,
+    /// Its samples.
+    pub samples: usize,
+}
+
+/// A recording and where it comes from.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Reading {
+    /// What was recorded, in SI.
+    pub recording: Recording,
+    /// Rows of the samples of every trajectory.
+    pub rows: Vec<Rows>,
+    /// Files read.
+    pub files: usize,
+    /// Column that gave the times; none if they follow from the rate.
+    pub time: Option<String>,
+    /// Rows left out because they repeat the row before, digit by digit.
+    pub duplicates: usize,
+    /// Gaps in time.
+    pub cuts: Vec<Cut>,
+    /// Stretches left out.
+    pub dropped: Vec<Dropped>,
+}
+
+impl From<Recording> for Reading {
+    /// A recording made in memory: its rows are samples, counted from 1.
+    fn from(recording: Recording) -> Self {
+        let rows = vec![Rows::default(); recording.tracks.len()];
+        Self { recording, rows, files: 0, time: None, duplicates: 0, cuts: Vec::new(), dropped: Vec::new() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_skip_what_was_left_out() {
+        let mut rows = Rows::default();
+        for (sample, row) in [2, 3, 4, 7, 8, 10].into_iter().enumerate() {
+            rows.note(sample, row);
+        }
+        assert_eq!(rows.0.len(), 3);
+        assert_eq!((0..7).map(|k| rows.row(k)).collect::<Vec<_>>(), [2, 3, 4, 7, 8, 10, 11]);
+        let part = rows.part(2, 5);
+        assert_eq!((0..3).map(|k| part.row(k)).collect::<Vec<_>>(), [4, 7, 8]);
+        assert_eq!(Rows::default().row(4), 5);
+    }
+}

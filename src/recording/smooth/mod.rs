@@ -1,0 +1,291 @@
+//! Velocities and accelerations of recorded motion by local polynomial regression, with their errors.
+
+mod local_fit;
+mod noise;
+mod window;
+
+pub use local_fit::MOST_DEGREE;
+pub use noise::Noise;
+pub(crate) use noise::noise;
+pub use window::Quality;
+
+use crate::recording::statistics::{median, steps};
+use crate::recording::{Recording, Track};
+use local_fit::{Estimate, LocalFit};
+use thiserror::Error;
+use window::Signal;
+
+/// How derivatives are taken; what is not given is chosen from the data.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SmoothOptions {
+    /// Degree of the polynomials, 2 to 8.
+    pub degree: usize,
+    /// Length of the windows in samples, odd and at least `degree + 3`; chosen per coordinate if not given.
+    pub window: Option<usize>,
+    /// Standard deviations of the positions' noise, one per coordinate; estimated if not given.
+    pub noise: Option<Vec<f64>>,
+    /// Whether measured velocities, if there are any, take part.
+    pub velocities: bool,
+}
+
+impl Default for SmoothOptions {
+    fn default() -> Self {
+        Self { degree: 4, window: None, noise: None, velocities: true }
+    }
+}
+
+/// Why no derivatives can be taken.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum SmoothError {
+    /// An option out of its range.
+    #[error("{what}: expected {expected}, found {found}")]
+    Option {
+        /// Which option.
+        what: &'static str,
+        /// Its range.
+        expected: String,
+        /// What it was.
+        found: String,
+    },
+    /// A trajectory too short for the window.
+    #[error("{track}: {samples} samples are fewer than the {needed} that a fit of this degree needs")]
+    Short {
+        /// The trajectory; empty for all of them.
+        track: String,
+        /// Its samples.
+        samples: usize,
+        /// Least number.
+        needed: usize,
+    },
+    /// A trajectory of another number of coordinates, or without the velocities that the others have.
+    #[error("{track}: positions or velocities are not those of {n} coordinates")]
+    Shape {
+        /// The trajectory.
+        track: String,
+        /// Number of coordinates.
+        n: usize,
+    },
+}
+
+/// Noise, windows and quality of one coordinate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Chosen {
+    /// Noise of its positions.
+    pub noise: Noise,
+    /// Noise of its velocities, if they take part.
+    pub velocity_noise: Option<Noise>,
+    /// The window and what it gives.
+    pub quality: Quality,
+    /// Length of the window in s.
+    pub seconds: f64,
+}
+
+/// How the derivatives of a recording are taken: one window per coordinate, the same in seconds for all trajectories.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Smoothing {
+    /// Degree of the polynomials.
+    pub degree: usize,
+    /// Every coordinate.
+    pub coordinates: Vec<Chosen>,
+    /// Median step in s.
+    pub step: f64,
+}
+
+/// A trajectory with derivatives; all arrays are `(samples, n)`.
+///
+/// The errors are of two kinds: standard errors say what noise does, biases what the polynomial cannot follow. Their
+/// root of the sum of squares is the error to expect.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Smoothed {
+    /// Times in s, `(samples)`.
+    pub times: Vec<f64>,
+    /// Positions.
+    pub q: Vec<f64>,
+    /// Velocities.
+    pub v: Vec<f64>,
+    /// Accelerations.
+    pub a: Vec<f64>,
+    /// Standard errors of the positions.
+    pub q_error: Vec<f64>,
+    /// Standard errors of the velocities.
+    pub v_error: Vec<f64>,
+    /// Standard errors of the accelerations.
+    pub a_error: Vec<f64>,
+    /// Estimated bias of the positions, root mean square over the neighbourhood.
+    pub q_bias: Vec<f64>,
+    /// Estimated bias of the velocities.
+    pub v_bias: Vec<f64>,
+    /// Estimated bias of the accelerations.
+    pub a_bias: Vec<f64>,
+    /// Samples left and right that have no full window around them: their errors are several times larger.
+    pub margin: usize,
+}
+
+impl Smoothed {
+    /// Samples with full windows.
+    pub fn interior(&self) -> std::ops::Range<usize> {
+        let end = self.times.len().saturating_sub(self.margin);
+        self.margin.min(end)..end
+    }
+}
+
+/// Whether steps are equal to within the rounding of the times.
+fn is_regular(times: &[f64]) -> bool {
+    let [first, .., last] = times else { return true };
+    let step = (last - first) / (times.len() - 1) as f64;
+    let tolerance = 8.0 * f64::EPSILON * first.abs().max(last.abs());
+    times.iter().enumerate().all(|(k, t)| (t - (first + k as f64 * step)).abs() <= tolerance)
+}
+
+impl Smoothing {
+    /// Estimates noise and chooses windows. Long recordings are sampled: the time taken does not grow with their length.
+    ///
+    /// # Errors
+    /// [`SmoothError`] for an option out of range, a trajectory of another shape, or trajectories too short.
+    pub fn choose(recording: &Recording, options: &SmoothOptions) -> Result<Self, SmoothError> {
+        let (n, tracks) = (recording.n(), recording.tracks.as_slice());
+        check(options, n)?;
+        let velocities = options.velocities && tracks.iter().all(|t| !t.v.is_empty());
+        for track in tracks {
+            if track.q.len() != track.len() * n || (velocities && track.v.len() != track.q.len()) {
+                return Err(SmoothError::Shape { track: track.name.clone(), n });
+            }
+        }
+        let regular: Vec<bool> = tracks.iter().map(|track| is_regular(&track.times)).collect();
+        let mut usual: Vec<f64> = tracks.iter().filter(|t| t.len() > 1).map(|t| steps(&t.times).0).collect();
+        let step = median(&mut usual);
+        let longest = tracks.iter().map(Track::len).max().unwrap_or(0);
+        let short = |needed| SmoothError::Short { track: "the longest trajectory".into(), samples: longest, needed };
+        let coordinates = (0..n).map(|i| {
+            let position = match &options.noise {
+                Some(given) => Noise { sigma: given[i], order: 0, resolved: true },
+                None => noise(tracks.iter().map(|t| (t.times.as_slice(), t.q.as_slice())), n, i),
+            };
+            let velocity = velocities.then(|| noise(tracks.iter().map(|t| (t.times.as_slice(), t.v.as_slice())), n, i));
+            let ratio = velocity.map(|velocity| (position.sigma / velocity.sigma).clamp(1e-6 * step, 1e6 * step));
+            let ratio = ratio.filter(|ratio| ratio.is_finite());
+            let signal =
+                Signal { tracks, regular: &regular, n, i, sigma: position.sigma, ratio, degree: options.degree };
+            let quality = match options.window {
+                Some(window) => signal.quality(window).ok_or_else(|| short(window))?,
+                None => signal.best().ok_or_else(|| short(options.degree + 3))?,
+            };
+            let seconds = (quality.window - 1) as f64 * step;
+            Ok(Chosen { noise: position, velocity_noise: velocity, quality, seconds })
+        });
+        Ok(Self { degree: options.degree, coordinates: coordinates.collect::<Result<_, _>>()?, step })
+    }
+
+    /// Longest window in samples of a trajectory with the usual step.
+    pub fn window(&self) -> usize {
+        self.coordinates.iter().map(|chosen| chosen.quality.window).max().unwrap_or(0)
+    }
+
+    /// Window of coordinate `i` in samples of a trajectory: as many seconds as chosen, at most all of the trajectory.
+    fn samples(&self, i: usize, track: &Track) -> usize {
+        let least = (self.degree + 3) | 1;
+        let samples = (self.coordinates[i].seconds / steps(&track.times).0).round() as usize;
+        let most = track.len() - (track.len() + 1) % 2;
+        (samples | 1).clamp(least, most.max(least))
+    }
+
+    /// Takes the derivatives of a trajectory. Near its ends windows are one-sided.
+    ///
+    /// # Errors
+    /// [`SmoothError`] for a trajectory of fewer samples than coefficients, or of another shape than the recording's.
+    pub fn apply(&self, track: &Track) -> Result<Smoothed, SmoothError> {
+        let (n, length) = (self.coordinates.len(), track.len());
+        let needed = (self.degree + 3) | 1;
+        if length < needed {
+            return Err(SmoothError::Short { track: track.name.clone(), samples: length, needed });
+        }
+        let velocities = self.coordinates.iter().any(|chosen| chosen.velocity_noise.is_some());
+        if track.q.len() != length * n || (velocities && track.v.len() != length * n) {
+            return Err(SmoothError::Shape { track: track.name.clone(), n });
+        }
+        let mut smoothed = Smoothed { times: track.times.clone(), ..Smoothed::default() };
+        for values in smoothed.arrays().into_iter().flatten() {
+            values.resize(length * n, 0.0);
+        }
+        let regular = is_regular(&track.times);
+        let tracks = std::slice::from_ref(track);
+        for i in 0..n {
+            let Chosen { noise, velocity_noise, .. } = self.coordinates[i];
+            let ratio = velocity_noise.map(|v| (noise.sigma / v.sigma).clamp(1e-6 * self.step, 1e6 * self.step));
+            let ratio = ratio.filter(|ratio| ratio.is_finite());
+            let signal = Signal { tracks, regular: &[regular], n, i, sigma: noise.sigma, ratio, degree: self.degree };
+            let window = self.samples(i, track);
+            smoothed.margin = smoothed.margin.max(window / 2);
+            smooth(&signal, window, &mut smoothed);
+        }
+        Ok(smoothed)
+    }
+}
+
+/// Fills column `signal.i` of all arrays.
+fn smooth(signal: &Signal<'_>, window: usize, smoothed: &mut Smoothed) {
+    let (track, n, i) = (&signal.tracks[0], signal.n, signal.i);
+    let (length, half) = (track.len(), window / 2);
+    let mut fit = LocalFit::default();
+    let mut centred = false;
+    // Squared change by two more degrees, and the part of it that noise explains.
+    let mut excess: [Vec<f64>; 3] = std::array::from_fn(|_| vec![0.0; length]);
+    for at in 0..length {
+        let first = at.saturating_sub(half).min(length - window);
+        let middle = first + half == at;
+        if !(signal.regular[0] && centred && middle) {
+            signal.fit(&mut fit, track, first, window, at);
+        }
+        centred = middle;
+        let Estimate { values, changes } = signal.estimate(&fit, track, first, window, at);
+        for (k, [value, error, _]) in smoothed.arrays().into_iter().enumerate() {
+            value[at * n + i] = values[k];
+            error[at * n + i] = signal.sigma * fit.variance[k].sqrt();
+            excess[k][at] = changes[k] * changes[k] - signal.sigma * signal.sigma * fit.change_variance[k];
+        }
+    }
+    for (excess, [_, _, bias]) in excess.iter().zip(smoothed.arrays()) {
+        for at in 0..length {
+            let near = &excess[at.saturating_sub(window)..(at + window + 1).min(length)];
+            bias[at * n + i] = (near.iter().sum::<f64>() / near.len() as f64).max(0.0).sqrt();
+        }
+    }
+}
+
+impl Smoothed {
+    /// Value, standard error and bias of position, velocity and acceleration.
+    fn arrays(&mut self) -> [[&mut Vec<f64>; 3]; 3] {
+        [
+            [&mut self.q, &mut self.q_error, &mut self.q_bias],
+            [&mut self.v, &mut self.v_error, &mut self.v_bias],
+            [&mut self.a, &mut self.a_error, &mut self.a_bias],
+        ]
+    }
+}
+
+/// Checks options for `n` coordinates.
+fn check(options: &SmoothOptions, n: usize) -> Result<(), SmoothError> {
+    let wrong = |what, expected: String, found: String| Err(SmoothError::Option { what, expected, found });
+    let most = MOST_DEGREE - 2;
+    if !(2..=most).contains(&options.degree) {
+        return wrong("degree", format!("2 to {most}"), options.degree.to_string());
+    }
+    let least = (options.degree + 3) | 1;
+    if let Some(window) = options.window
+        && (window < least || window % 2 == 0)
+    {
+        return wrong("window", format!("an odd number of samples from {least} on"), window.to_string());
+    }
+    if let Some(noise) = &options.noise {
+        if noise.len() != n {
+            return wrong("noise", format!("{n} numbers, one per coordinate"), noise.len().to_string());
+        }
+        if let Some(sigma) = noise.iter().find(|sigma| !(sigma.is_finite() && **sigma > 0.0)) {
+            return wrong("noise", "finite numbers above 0".to_string(), sigma.to_string());
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,159 @@
+use super::*;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+/// Two coordinates, `sin 3t + 0.4 cos 7t` and its half at twice the pace, exact: position, velocity, acceleration.
+fn exact(t: f64) -> [[f64; 2]; 3] {
+    let wave = |p: f64, s: f64| {
+        let (a, b) = (3.0 * p, 7.0 * p);
+        [
+            s * ((a * t).sin() + 0.4 * (b * t).cos()),
+            s * (a * (a * t).cos() - 0.4 * b * (b * t).sin()),
+            s * (-a * a * (a * t).sin() - 0.4 * b * b * (b * t).cos()),
+        ]
+    };
+    let (x, y) = (wave(1.0, 1.0), wave(2.0, 0.5));
+    std::array::from_fn(|k| [x[k], y[k]])
+}
+
+fn track(times: Vec<f64>, sigma: f64, velocity_sigma: Option<f64>, seed: u64) -> Track {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut noisy = |x: f64, sigma: f64| x + sigma * Distribution::<f64>::sample(&StandardNormal, &mut rng);
+    let q = times.iter().flat_map(|t| exact(*t)[0]).map(|x| noisy(x, sigma)).collect();
+    let v = times.iter().flat_map(|t| exact(*t)[1]);
+    let v = velocity_sigma.map(|sigma| v.map(|x| noisy(x, sigma)).collect()).unwrap_or_default();
+    Track { name: "waves".into(), times, q, v, a: vec![], force: vec![] }
+}
+
+fn recording(tracks: Vec<Track>) -> Recording {
+    Recording { coordinates: vec!["x".into(), "y".into()], periodic: vec![false; 2], tracks }
+}
+
+fn even(count: usize, step: f64) -> Vec<f64> {
+    (0..count).map(|k| k as f64 * step).collect()
+}
+
+/// Root mean square error of the accelerations of coordinate `i` inside.
+fn acceleration_error(smoothed: &Smoothed, i: usize) -> f64 {
+    let inside = smoothed.interior();
+    let sum: f64 = inside.clone().map(|k| (smoothed.a[2 * k + i] - exact(smoothed.times[k])[2][i]).powi(2)).sum();
+    (sum / inside.len() as f64).sqrt()
+}
+
+#[test]
+fn errors_are_as_large_as_said() {
+    let uneven: Vec<f64> = even(4000, 0.01).iter().map(|t| t + 0.002 * (37.0 * t).sin()).collect();
+    for (times, sigma, velocity_sigma) in [
+        (even(4000, 0.01), 1e-3, None),
+        (even(4000, 0.01), 1e-2, None),
+        (uneven, 1e-3, None),
+        (even(4000, 0.01), 1e-2, Some(0.05)),
+    ] {
+        let recording = recording(vec![track(times, sigma, velocity_sigma, 5)]);
+        let smoothing = Smoothing::choose(&recording, &SmoothOptions::default()).unwrap();
+        let smoothed = smoothing.apply(&recording.tracks[0]).unwrap();
+        for i in 0..2 {
+            let chosen = &smoothing.coordinates[i];
+            assert!((chosen.noise.sigma / sigma - 1.0).abs() < 0.1, "{:?}", chosen.noise);
+            let actual = acceleration_error(&smoothed, i);
+            let said = chosen.quality.total(2);
+            assert!((actual / said - 1.0).abs() < 0.25, "{sigma} {i}: error {actual}, said {said}");
+            let arrays = [
+                (&smoothed.q, &smoothed.q_error, &smoothed.q_bias),
+                (&smoothed.v, &smoothed.v_error, &smoothed.v_bias),
+                (&smoothed.a, &smoothed.a_error, &smoothed.a_bias),
+            ];
+            for (k, (value, error, bias)) in arrays.into_iter().enumerate() {
+                let inside = smoothed.interior();
+                let share = |times: f64| {
+                    let within = inside.clone().filter(|s| {
+                        let at = 2 * s + i;
+                        (value[at] - exact(smoothed.times[*s])[k][i]).abs() <= times * error[at].hypot(bias[at])
+                    });
+                    within.count() as f64 / inside.len() as f64
+                };
+                // Errors of neighbours are correlated over about half a window: so many are independent.
+                let independent = 2.0 * inside.len() as f64 / chosen.quality.window as f64;
+                let scatter = |p: f64| 3.0 * (p * (1.0 - p) / independent).sqrt();
+                for (times, p) in [(1.0, 0.683), (2.0, 0.954)] {
+                    let found = share(times);
+                    println!("{sigma} {i} {k}: within {times}: {found:.3} window {}", chosen.quality.window);
+                    assert!((found - p).abs() < scatter(p) + 0.02, "{sigma} {i} {k}: {found} within {times}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn the_chosen_window_is_nearly_the_best() {
+    for (sigma, step) in [(1e-4, 0.01), (1e-2, 0.01), (1e-3, 0.002), (1e-1, 0.005)] {
+        let recording = recording(vec![track(even(3000, step), sigma, None, 9)]);
+        let chosen = Smoothing::choose(&recording, &SmoothOptions::default()).unwrap();
+        let error = |options: &SmoothOptions| {
+            let smoothed = Smoothing::choose(&recording, options).unwrap().apply(&recording.tracks[0]).unwrap();
+            [0, 1].map(|i| acceleration_error(&smoothed, i))
+        };
+        let mine = error(&SmoothOptions::default());
+        let mut best = [f64::INFINITY; 2];
+        for window in (7..600).step_by(8) {
+            let found = error(&SmoothOptions { window: Some(window), ..SmoothOptions::default() });
+            best = [best[0].min(found[0]), best[1].min(found[1])];
+        }
+        for i in 0..2 {
+            let window = chosen.coordinates[i].quality.window;
+            println!("{sigma} {step} {i}: window {window}, {:.4} of best", mine[i] / best[i]);
+            assert!(mine[i] < 1.5 * best[i], "{sigma} {step} {i}: window {window}, {} of {}", mine[i], best[i]);
+        }
+    }
+}
+
+#[test]
+fn measured_velocities_help() {
+    let times = even(2000, 0.01);
+    let with = recording(vec![track(times, 1e-2, Some(0.02), 1)]);
+    let joint = Smoothing::choose(&with, &SmoothOptions::default()).unwrap();
+    let alone = Smoothing::choose(&with, &SmoothOptions { velocities: false, ..SmoothOptions::default() }).unwrap();
+    let error = |smoothing: &Smoothing| acceleration_error(&smoothing.apply(&with.tracks[0]).unwrap(), 0);
+    assert!(error(&joint) < 0.6 * error(&alone), "{} {}", error(&joint), error(&alone));
+    assert!((joint.coordinates[0].velocity_noise.unwrap().sigma / 0.02 - 1.0).abs() < 0.1);
+}
+
+#[test]
+fn polynomials_come_back_at_the_ends_too() {
+    for times in [even(40, 0.05), even(40, 0.05).iter().map(|t| t + 0.01 * (9.0 * t).sin()).collect()] {
+        let quartic = |t: f64| 1.0 - t + 2.0 * t * t - t.powi(3) + 0.3 * t.powi(4);
+        let second = |t: f64| 4.0 - 6.0 * t + 3.6 * t * t;
+        let q = times.iter().flat_map(|t| [quartic(*t), 7.0]).collect();
+        let track = Track { name: "p".into(), times, q, v: vec![], a: vec![], force: vec![] };
+        let recording = recording(vec![track]);
+        let options = SmoothOptions { window: Some(11), noise: Some(vec![1.0, 1.0]), ..SmoothOptions::default() };
+        let smoothed = Smoothing::choose(&recording, &options).unwrap().apply(&recording.tracks[0]).unwrap();
+        assert_eq!((smoothed.margin, smoothed.interior()), (5, 5..35));
+        for (k, t) in smoothed.times.iter().enumerate() {
+            // A row of standard error `e` for noise 1 carries rounding of numbers below 2 this far.
+            let tolerance = |e: f64| 64.0 * f64::EPSILON * e.max(1.0);
+            let error = (smoothed.a[2 * k] - second(*t)).abs();
+            assert!(error < tolerance(smoothed.a_error[2 * k]), "{k}: {error:e}");
+            assert!((smoothed.q[2 * k] - quartic(*t)).abs() < tolerance(1.0));
+            assert_eq!((smoothed.q[2 * k + 1], smoothed.a[2 * k + 1]), (7.0, 0.0));
+        }
+        assert!(smoothed.a_error[0] > 3.0 * smoothed.a_error[40]);
+    }
+}
+
+#[test]
+fn options_and_shapes_are_checked() {
+    let good = recording(vec![track(even(40, 0.1), 1e-3, None, 1)]);
+    let refused = |options: SmoothOptions| Smoothing::choose(&good, &options).unwrap_err().to_string();
+    assert!(refused(SmoothOptions { degree: 9, ..Default::default() }).contains("degree: expected 2 to 8, found 9"));
+    assert!(refused(SmoothOptions { window: Some(8), ..Default::default() }).contains("odd number"));
+    assert!(refused(SmoothOptions { window: Some(41), ..Default::default() }).contains("fewer than the 41"));
+    assert!(refused(SmoothOptions { noise: Some(vec![1.0]), ..Default::default() }).contains("2 numbers"));
+    let smoothing = Smoothing::choose(&good, &SmoothOptions::default()).unwrap();
+    let short = track(even(6, 0.1), 1e-3, None, 1);
+    assert!(matches!(smoothing.apply(&short), Err(SmoothError::Short { samples: 6, needed: 7, .. })));
+    let broken = Track { q: vec![0.0; 3], ..good.tracks[0].clone() };
+    assert!(matches!(smoothing.apply(&broken), Err(SmoothError::Shape { n: 2, .. })));
+}

@@ -1,0 +1,60 @@
+//! Order statistics and robust scale.
+
+/// Median of one standard normal variable's magnitude: a median magnitude over this is a standard deviation.
+const NORMAL_MEDIAN: f64 = 0.674_489_750_196_081_7;
+
+/// The number a fraction `f` of all lies below; `NaN` of none. Reorders.
+pub fn quantile(values: &mut [f64], f: f64) -> f64 {
+    if values.is_empty() {
+        return f64::NAN;
+    }
+    let at = ((values.len() - 1) as f64 * f.clamp(0.0, 1.0)).round() as usize;
+    *values.select_nth_unstable_by(at, f64::total_cmp).1
+}
+
+/// Median; `NaN` of none. Reorders.
+pub fn median(values: &mut [f64]) -> f64 {
+    quantile(values, 0.5)
+}
+
+/// Standard deviation of normal numbers of mean 0, some of them spoilt: median magnitude over 0.6745. Reorders.
+pub fn robust_deviation(values: &mut [f64]) -> f64 {
+    for x in values.iter_mut() {
+        *x = x.abs();
+    }
+    median(values) / NORMAL_MEDIAN
+}
+
+/// Root mean square; 0 of none.
+pub fn rms(values: impl IntoIterator<Item = f64>) -> f64 {
+    let (sum, count) = values.into_iter().fold((0.0, 0usize), |(sum, count), x| (sum + x * x, count + 1));
+    if count == 0 { 0.0 } else { (sum / count as f64).sqrt() }
+}
+
+/// Median step and robust spread of the steps of increasing times, both in s; of long records, of steps spread evenly.
+pub fn steps(times: &[f64]) -> (f64, f64) {
+    const MOST: usize = 1 << 17;
+    let stride = (times.len() / MOST).max(1);
+    let mut steps: Vec<f64> = times.windows(2).step_by(stride).map(|pair| pair[1] - pair[0]).collect();
+    let usual = median(&mut steps);
+    for step in &mut steps {
+        *step -= usual;
+    }
+    (usual, robust_deviation(&mut steps))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn middles() {
+        assert_eq!(median(&mut [3.0, 1.0, 2.0]), 2.0);
+        assert_eq!(quantile(&mut [4.0, 3.0, 1.0, 2.0, 5.0], 1.0), 5.0);
+        assert!(median(&mut []).is_nan());
+        assert_eq!(rms([3.0, -4.0, 0.0, 0.0]), 2.5);
+        assert_eq!(steps(&[0.0, 1.0, 2.0, 3.0, 9.0]), (1.0, 0.0));
+        // A quarter of outliers moves the deviation little: the median of |x| is that of the others.
+        assert!((robust_deviation(&mut [1.0, -1.0, 1.0, 1e9]) - 1.0 / NORMAL_MEDIAN).abs() < 1e-15);
+    }
+}

@@ -1,0 +1,66 @@
+//! Units of recorded columns, converted to SI on reading.
+
+use std::f64::consts::PI;
+
+/// Known units and what one of them is in SI (angles in rad).
+const UNITS: [(&str, f64); 22] = [
+    ("rad", 1.0),
+    ("deg", PI / 180.0),
+    ("turn", 2.0 * PI),
+    ("mrad", 1e-3),
+    ("rpm", 2.0 * PI / 60.0),
+    ("s", 1.0),
+    ("ms", 1e-3),
+    ("us", 1e-6),
+    ("ns", 1e-9),
+    ("min", 60.0),
+    ("h", 3600.0),
+    ("m", 1.0),
+    ("km", 1e3),
+    ("cm", 1e-2),
+    ("mm", 1e-3),
+    ("um", 1e-6),
+    ("in", 0.0254),
+    ("ft", 0.3048),
+    ("g", 9.80665),
+    ("N", 1.0),
+    ("kN", 1e3),
+    ("mN", 1e-3),
+];
+
+/// Factor that turns a number in this unit into SI.
+///
+/// `text` is a unit (`deg`, `ms`, `mm`; `g` is the standard gravity), a unit per second or per second squared (`deg/s`,
+/// `mm/s2`), or the factor itself.
+///
+/// # Errors
+/// What was expected instead.
+pub fn factor(text: &str) -> Result<f64, String> {
+    let text = text.trim();
+    if let Ok(x) = text.parse::<f64>() {
+        return if x.is_finite() && x != 0.0 {
+            Ok(x)
+        } else {
+            Err(format!("expected a unit or a finite factor other than 0, found {text:?}"))
+        };
+    }
+    let base = ["/s^2", "/s2", "/s"].iter().find_map(|per| text.strip_suffix(per)).unwrap_or(text);
+    UNITS.iter().find(|(name, _)| *name == base).map(|(_, factor)| *factor).ok_or_else(|| {
+        let names: Vec<&str> = UNITS.iter().map(|(name, _)| *name).collect();
+        format!("unknown unit {text:?}, expected a number or one of {} (also with /s, /s2)", names.join(", "))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn units_and_factors() {
+        assert_eq!(factor("deg").unwrap() * 180.0, PI);
+        assert_eq!((factor("ms"), factor("mm/s2"), factor(" -0.01 ")), (Ok(1e-3), Ok(1e-3), Ok(-0.01)));
+        for bad in ["nan", "0", "inf", "degree", "", "1e999", "/s"] {
+            assert!(factor(bad).is_err(), "{bad}");
+        }
+    }
+}
