@@ -1,8 +1,131 @@
 //! Stabilized Lagrangian neural networks: learn `L(q, dq/dt)` from motion, predict motion that keeps its energy, read
 //! physics off the learned function.
 //!
+//! # The way of the data
+//!
+//! ```text
+//! measured motion  recording::Recording ─┐
+//! states with a    training::Dataset  ───┼─► training::train ─► network::NetworkLagrangian ◄─► network::file::ModelFile
+//! closed form      training::sample   ───┘                               │
+//! L written down   lagrangian::Lagrangian ─► lagrangian::HandWritten ────┤
+//!                                                                        ▼
+//!                                                       lagrangian::EulerLagrange: L, p, M, a, E of a batch
+//!                                                                        │
+//!                                rollout (motion) ◄──────────────────────┼──► analysis (errors, exponents), your solver
+//! ```
+//!
+//! Everything that moves by a Lagrangian, learned or written down, is an [`EulerLagrange`](lagrangian::EulerLagrange):
+//! one call gives the terms of a batch of states, and nothing that was not asked for is computed.
+//!
+//! | to | use |
+//! |---|---|
+//! | write a Lagrangian, or take one of the catalogue | [`lagrangian::Lagrangian`], [`lagrangian::systems()`] |
+//! | get `L`, `p`, `M`, `a`, `E` of states | [`lagrangian::EulerLagrange::terms`] |
+//! | integrate, with error control or symplectically | [`rollout::rollout`], [`rollout::rollout_many`] |
+//! | learn from accelerations | [`training::run`] (a configuration), [`training::train`] (your own [`training::Dataset`]) |
+//! | minimise your own loss of a network | [`training::Objective`], or [`network::Chunk`] and [`network::Adjoint`] below it |
+//! | store and load models | [`network::file::ModelFile`] |
+//! | differentiate a function of yours | [`tape::gradient`], [`tape::hessian`]; over many states [`tape::Program`] |
+//! | solve small symmetric systems in batches | [`linalg`] |
+//! | judge a model: energy, coordinates, Lyapunov exponents | [`analysis`] |
+//!
 //! Rooms, each importing only from those above it: [`names`], [`storage`], [`scalar`], [`ops`], [`forward`], [`linalg`], [`tape`],
-//! [`recording`], [`lagrangian`], [`network`], [`training`], [`rollout`], [`analysis`], [`experiments`], `report`, `cli`.
+//! [`recording`], [`lagrangian`], [`network`], [`training`], [`rollout`], [`analysis`], [`experiments`], `report` (feature
+//! `plot`), `cli` (feature `cli`, the default; a library user leaves it out by `default-features = false`).
+//!
+//! # Shapes, units, numbers
+//!
+//! A state is `(q, v)`, `v = dq/dt`. A batch of `b` states of `n` coordinates is two slices `(b, n)`, row-major: one
+//! state after the other. Matrices are `(b, n, n)`. Units are SI: m, rad, s, kg, J; angles may be any number of turns. What
+//! a network has learned it returns in the same physical units, `L` up to a factor and a total time derivative, neither of
+//! which moves anything. The number is a parameter of every type: [`f32`], [`f64`] or the double-double [`scalar::Dd`].
+//!
+//! Nothing here is global: a model, an objective or a roll-out may be used from any thread, several at a time. Threads
+//! are started only where a number of threads is an argument; results do not depend on that number. Errors are
+//! typed, `Send + Sync`, and say which row and which argument; library code does not print and does not end the process.
+//!
+//! # Terms of a Lagrangian
+//!
+//! ```
+//! use lnn::lagrangian::{EulerLagrange, HandWritten, Lagrangian, Request, Terms};
+//! use lnn::scalar::Real;
+//!
+//! struct SpringPendulum; // q = (length in m, angle in rad); m, k, rest length, g
+//! impl Lagrangian for SpringPendulum {
+//!     fn coordinates(&self) -> usize { 2 }
+//!     fn lagrangian<R: Real>(&self, p: &[R], q: &[R], v: &[R]) -> R {
+//!         let kinetic = p[0] * (v[0].sqr() + (q[0] * v[1]).sqr()) * R::half();
+//!         kinetic - p[1] * (q[0] - p[2]).sqr() * R::half() + p[0] * p[3] * q[0] * q[1].cos()
+//!     }
+//! }
+//!
+//! let model = HandWritten::new(SpringPendulum, vec![0.5, 20.0, 1.0, 9.81]);
+//! let mut terms = Terms::default(); // reused: later calls allocate nothing
+//! let (q, v) = ([1.2, 0.0, 1.5, 0.3], [0.0, 2.0, 1.0, 0.0]); // two states
+//! model.terms(&q, &v, Request::MASS_MATRIX | Request::ACCELERATION, &mut terms)?;
+//! assert_eq!(terms.mass_matrix[..4], [0.5, 0.0, 0.0, 0.5 * 1.2 * 1.2]);
+//! // r'' = r w^2 - k (r - r0)/m + g cos(angle)
+//! let expected: f64 = 1.2 * 4.0 - 20.0 * 0.2 / 0.5 + 9.81;
+//! assert!((terms.acceleration[0] - expected).abs() < 1e-13);
+//! # Ok::<(), lnn::lagrangian::MechanicsError>(())
+//! ```
+//!
+//! # Motion
+//!
+//! ```
+//! use lnn::lagrangian::build;
+//! use lnn::rollout::{Method, Options, rollout};
+//!
+//! let model = build::<f64>("double-pendulum", &[("m2".to_string(), "0.5".to_string())])?;
+//! let options = Options { method: Method::Gauss6, step: Some(0.01), ..Options::new(5.0, 0.1) };
+//! let motion = rollout(&*model, &[2.0, 1.0], &[0.0, 0.0], &options).complete()?;
+//! let energy = motion.energy.unwrap(); // J, at every sample
+//! assert_eq!(motion.t.len(), 51);
+//! assert!(energy.iter().all(|e| (e - energy[0]).abs() < 1e-7));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! # Learning
+//!
+//! ```
+//! use lnn::lagrangian::configure;
+//! use lnn::training::{Hooks, Preset, run};
+//!
+//! let system = configure::<f64>("harmonic-oscillator", &[])?;
+//! let mut config = Preset::Quick.config(&system).unwrap();
+//! config.network.hidden = vec![8]; // as small as can be: this runs in a moment
+//! (config.data.training, config.data.validation, config.data.test) = (256, 64, 64);
+//! (config.optimizer.batch, config.phases[0].epochs) = (32, 20);
+//! let learned = run::<f64>(&config, 1, &Hooks::default())?; // one thread
+//! let history = &learned.trained.history;
+//! assert!(history[19].validation_loss < history[0].validation_loss);
+//! // `learned.model` is an EulerLagrange like any other.
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! With states of your own, make a [`training::Dataset`] for each of training, validation and test, and call
+//! [`training::train`] with the same configuration.
+//!
+//! # Derivatives by the tape
+//!
+//! ```
+//! use lnn::scalar::Real;
+//! use lnn::tape::{ScalarFunction, gradient};
+//!
+//! struct Rosenbrock;
+//! impl ScalarFunction for Rosenbrock {
+//!     fn eval<R: Real>(&self, x: &[R]) -> R {
+//!         (R::one() - x[0]).sqr() + (x[1] - x[0].sqr()).sqr() * (R::two() * R::two() * R::two())
+//!     }
+//! }
+//!
+//! let (value, slope) = gradient(&Rosenbrock, &[2.0, 3.0])?;
+//! assert_eq!((value, slope), (9.0, vec![34.0 * 2.0 - 2.0, -16.0]));
+//! # Ok::<(), lnn::tape::TapeError>(())
+//! ```
+//!
+//! Programs that use the crate stand in `examples/`: solvers of other crates, parameter identification by argmin, nalgebra
+//! matrices, batches without allocation, a filmed pendulum, and a reader of model files in Python.
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 

@@ -76,6 +76,7 @@ impl Grid {
 
 /// Why a grid cannot be laid.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum GridError {
     /// The fixed state has the wrong length.
     #[error("fixed state: expected {expected} numbers, found {found}")]

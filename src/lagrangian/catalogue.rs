@@ -8,6 +8,7 @@ use std::any::Any;
 
 /// Why a system could not be built.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum SystemError {
     /// No system of this name.
     #[error("{}", unknown("system", name, known.iter().copied()))]

@@ -92,6 +92,7 @@ impl<S: Scalar> Terms<S> {
 
 /// Why terms could not be computed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum MechanicsError {
     /// A slice has the wrong length.
     #[error("{what}: expected {expected} numbers, found {found}")]

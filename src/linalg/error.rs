@@ -14,6 +14,7 @@ pub enum Failure {
 
 /// Error of a batched operation.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum LinalgError {
     /// A slice has the wrong length.
     #[error("{what}: expected {expected} numbers, found {found}")]

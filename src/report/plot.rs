@@ -23,6 +23,7 @@ const DECADES: f64 = 1e-18;
 
 /// Why there is no picture.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum PlotError {
     /// No finite value (no positive one, on a logarithmic axis).
     #[error("nothing finite to plot in `{0}`")]

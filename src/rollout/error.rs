@@ -4,6 +4,7 @@ use crate::lagrangian::MechanicsError;
 
 /// Why steps became too small to go on although every evaluation of the model succeeded or failed for no other reason.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum UnderflowCause {
     /// The error estimate asks for ever smaller steps: the motion blows up, is not smooth, or the tolerance is finer
     /// than the rounding errors of the model.
@@ -19,6 +20,7 @@ pub enum UnderflowCause {
 
 /// Why a roll-out ended before `t_end`; times in the unit of the options, states as `(q, v)` in physical units.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum RolloutError {
     /// An argument makes no sense.
     #[error("{what}: {problem}")]

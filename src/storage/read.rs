@@ -7,6 +7,7 @@ use thiserror::Error;
 
 /// Why a file could not be read.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum ReadError {
     /// Nothing there.
     #[error("no such file")]

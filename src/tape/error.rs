@@ -5,6 +5,7 @@
 /// Operators cannot fail, so the first error is kept by the tape, the number becomes `NaN`, and the call that asks
 /// for a result returns the error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum TapeError {
     /// An operation joined variables of two tapes.
     #[error("an operation mixes variables of two tapes")]

@@ -1,0 +1,60 @@
+//! A learned Lagrangian in somebody else's solver: the Dop853 of the crate `differential-equations`.
+//!
+//! Whatever a network has learned, its motion keeps the energy of what it has learned.
+
+use differential_equations::prelude::{ExplicitRungeKutta, IVP, ODE};
+use lnn::lagrangian::{EulerLagrange, MechanicsError, Request, Terms};
+use lnn::network::{NetworkLagrangian, file::ModelFile};
+use std::cell::RefCell;
+use std::path::Path;
+
+/// `d(q, v)/dt = (v, a)`. The solver's right-hand side cannot fail: the first error is kept, and NaN ends the motion.
+struct Motion<'a> {
+    model: &'a dyn EulerLagrange<f64>,
+    terms: RefCell<Terms<f64>>,
+    failure: RefCell<Option<MechanicsError>>,
+}
+
+impl ODE<f64, [f64; 4]> for Motion<'_> {
+    fn diff(&self, _t: f64, x: &[f64; 4], dx: &mut [f64; 4]) {
+        let (q, v) = x.split_at(2);
+        let mut terms = self.terms.borrow_mut();
+        match self.model.terms(q, v, Request::ACCELERATION, &mut terms) {
+            Ok(()) => {
+                dx[..2].copy_from_slice(v);
+                dx[2..].copy_from_slice(&terms.acceleration);
+            }
+            Err(error) => {
+                dx.fill(f64::NAN);
+                self.failure.borrow_mut().get_or_insert(error);
+            }
+        }
+    }
+}
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/data/double_pendulum.safetensors");
+    // Weights of a file in single precision, widened: the arithmetic is in double precision.
+    let ModelFile { header, weights } = ModelFile::<f64>::load(&path)?;
+    let model = NetworkLagrangian::new(header.architecture, weights)?;
+    let motion = Motion { model: &model, terms: RefCell::default(), failure: RefCell::default() };
+    let solver = ExplicitRungeKutta::dop853().rtol(1e-11).atol(1e-11);
+    let solution = IVP::ode(&motion, 0.0, 5.0, [0.6, 1.1, 0.0, 0.0]).even(0.05).method(solver).solve();
+    if let Some(error) = motion.failure.take() {
+        return Err(error.into());
+    }
+    let solution = solution.map_err(|error| format!("{error:?}"))?;
+
+    // The energies of all samples at once.
+    let (q, v): (Vec<_>, Vec<_>) = solution.y.iter().map(|x| ([x[0], x[1]], [x[2], x[3]])).unzip();
+    let mut terms = Terms::default();
+    model.terms(q.as_flattened(), v.as_flattened(), Request::ENERGY, &mut terms)?;
+    let (low, high) = terms.energy.iter().fold((f64::MAX, f64::MIN), |(low, high), &e| (low.min(e), high.max(e)));
+    let kinetic = terms.momentum.chunks(2).zip(&v).map(|(p, v)| (p[0] * v[0] + p[1] * v[1]) / 2.0);
+    let scale = kinetic.fold(0.0, f64::max);
+    let drift = (high - low) / scale;
+    println!("{} samples, energy constant to {drift:.1e} of the largest kinetic energy", q.len());
+    // Some hundred steps, each allowed an error of 1e-11 (1 + |x|).
+    assert!(q.len() == 101 && scale > 0.0 && drift < 1e-7, "not conserved");
+    Ok(())
+}
