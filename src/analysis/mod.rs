@@ -1,4 +1,4 @@
-//! Energy and trajectory errors, comparisons of learned and exact Lagrangians.
+//! Energy and trajectory errors, comparisons of learned and exact Lagrangians, predictions of recorded motion.
 
 mod accelerations;
 mod affine;
@@ -7,6 +7,7 @@ mod energy;
 mod grid;
 mod instability;
 mod lyapunov;
+mod prediction;
 mod signature;
 mod summary;
 mod trajectories;
@@ -18,6 +19,9 @@ pub use energy::{EnergyError, energy_drift, energy_error};
 pub use grid::{Axis, Grid, GridError, determinant_grid, lagrangian_grid};
 pub use instability::{savitzky_golay, stretches, training_instability};
 pub use lyapunov::{Lyapunov, lyapunov};
+pub use prediction::{
+    PredictionError, Predictions, Window, predict_by_constant_velocity, predict_by_motion, prediction_error,
+};
 pub use signature::wrong_signatures;
 pub use summary::{Statistics, statistics};
 pub use trajectories::{StartBox, TrajectoryRun, TrajectorySummary, TrajectoryTest};

@@ -37,6 +37,10 @@ pub(super) fn quantile(sorted: &[f64], p: f64) -> f64 {
     let place = p.clamp(0.0, 1.0) * last as f64;
     let below = place.floor() as usize;
     let above = (below + 1).min(last);
+    // Infinities have no differences.
+    if place == below as f64 || sorted[below] == sorted[above] {
+        return sorted[below];
+    }
     sorted[below] + (place - below as f64) * (sorted[above] - sorted[below])
 }
 
@@ -56,6 +60,8 @@ mod tests {
         assert_eq!(quantile(&[1.0, 2.0, 4.0], 0.5), 2.0);
         assert_eq!(quantile(&[1.0, 2.0, 4.0], 0.75), 3.0);
         assert_eq!(quantile(&[1.0, 2.0, 4.0], 1.0), 4.0);
+        assert_eq!(quantile(&[1.0, f64::INFINITY, f64::INFINITY], 0.75), f64::INFINITY);
+        assert_eq!(quantile(&[1.0, 2.0, f64::INFINITY], 0.5), 2.0);
         assert!(quantile(&[], 0.5).is_nan());
     }
 }

@@ -10,7 +10,7 @@ use crate::lagrangian::system::Size;
 use crate::lagrangian::{Configured, configure};
 use crate::network::file::{FORMAT, Header, ModelFile, StoredPrecision};
 use crate::network::{Architecture, Layout, NetworkLagrangian};
-use crate::report::{HistoryRow, Report, training_figures};
+use crate::report::{Figure, HistoryRow, Report, training_figures};
 use crate::scalar::Scalar;
 use crate::storage::Disk;
 use crate::training::{
@@ -247,7 +247,7 @@ fn learn_in<S: Scalar>(
     })))
 }
 
-fn ended(stop: &Stop) -> String {
+pub(super) fn ended(stop: &Stop) -> String {
     match stop {
         Stop::Finished => "finished".to_string(),
         Stop::Interrupted => "interrupted".to_string(),
@@ -310,7 +310,7 @@ fn header(
 }
 
 /// `history.csv`: one row per epoch.
-fn history(epochs: &[Epoch]) -> String {
+pub(super) fn history(epochs: &[Epoch]) -> String {
     let mut csv =
         "epoch,phase,rate,training_loss,penalty,penalised,validation_loss,gradient_norm,left_out,skipped,seconds\n"
             .to_string();
@@ -356,27 +356,36 @@ fn write_report(
     epochs: &[Epoch],
     toml: &str,
 ) -> Result<(), CliError> {
-    let rows: Vec<HistoryRow> = epochs
-        .iter()
-        .map(|e| HistoryRow {
-            epoch: e.epoch as f64,
-            training_loss: e.training_loss,
-            validation_loss: e.validation_loss,
-            learning_rate: e.rate,
-            gradient_norm: e.gradient_norm,
-            penalty: e.penalty,
-        })
-        .collect();
-    let training = training_figures(&rows).map_err(CliError::data)?;
+    let training = training_pictures(epochs)?;
     let report = Report::new(&format!("{}: learned", system.system.title)).paragraph(&headline(summary));
     let report = summary.evaluation.report(report).heading("Training");
     let report = training.iter().fold(report, |report, figure| report.figure(&figure.png, &figure.caption));
     let report = report.heading("Configuration").preformatted(toml);
-    let figures = || training.iter().chain(&summary.evaluation.figures);
-    for figure in figures() {
+    write_figures(folder, training.iter().chain(&summary.evaluation.figures))?;
+    folder.write("report.html", report.to_html().as_bytes())
+}
+
+/// Pictures of a history.
+pub(super) fn training_pictures(epochs: &[Epoch]) -> Result<Vec<Figure>, CliError> {
+    let row = |e: &Epoch| HistoryRow {
+        epoch: e.epoch as f64,
+        training_loss: e.training_loss,
+        validation_loss: e.validation_loss,
+        learning_rate: e.rate,
+        gradient_norm: e.gradient_norm,
+        penalty: e.penalty,
+    };
+    training_figures(&epochs.iter().map(row).collect::<Vec<_>>()).map_err(CliError::data)
+}
+
+/// Writes pictures, and [`CAPTIONS`] that tell what they show.
+pub(super) fn write_figures<'a>(
+    folder: &Folder,
+    figures: impl Iterator<Item = &'a Figure> + Clone,
+) -> Result<(), CliError> {
+    for figure in figures.clone() {
         folder.write(&figure.file, &figure.png)?;
     }
-    let captions: BTreeMap<&str, &str> = figures().map(|f| (f.file.as_str(), f.caption.as_str())).collect();
-    folder.write(CAPTIONS, serde_json::to_string_pretty(&captions).map_err(CliError::data)?.as_bytes())?;
-    folder.write("report.html", report.to_html().as_bytes())
+    let captions: BTreeMap<&str, &str> = figures.map(|f| (f.file.as_str(), f.caption.as_str())).collect();
+    folder.write(CAPTIONS, serde_json::to_string_pretty(&captions).map_err(CliError::data)?.as_bytes())
 }

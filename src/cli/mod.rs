@@ -9,17 +9,21 @@ mod error;
 mod evaluate;
 mod evaluation;
 mod experiment;
+mod fit;
+mod fit_args;
 mod folder;
 mod holder;
 mod inspect;
 mod interrupt;
 mod json;
+mod judgement;
 mod learned;
 mod learning;
 mod memory;
 mod number;
 mod output;
 mod progress;
+mod recording_args;
 mod resume;
 mod rollout;
 mod source;
@@ -51,6 +55,8 @@ enum Command {
     Systems(systems::Args),
     /// Learn the Lagrangian of a system and write model, history, pictures and a report.
     Train(train_config::Args),
+    /// Learn the Lagrangian of recorded motion, judge it by motion that was held out.
+    Fit(fit_args::Args),
     /// Integrate the motion of a model.
     Rollout(rollout::Args),
     /// Compare a model with the system it learned.
@@ -90,13 +96,14 @@ pub fn check_arguments(arguments: impl IntoIterator<Item = OsString>) -> Result<
 }
 
 fn run(command: Command) -> Result<(), CliError> {
-    // Training and experiments keep what they have when they are interrupted; the others have nothing to keep.
-    if !matches!(command, Command::Train(_) | Command::Experiment(_)) {
+    // Trainings, fits and experiments keep what they have when they are interrupted; the others have nothing to keep.
+    if !matches!(command, Command::Train(_) | Command::Fit(_) | Command::Experiment(_)) {
         interrupt::end_at_once()?;
     }
     match command {
         Command::Systems(args) => systems::run(&args),
         Command::Train(args) => train::run(&args),
+        Command::Fit(args) => fit::run(&args),
         Command::Rollout(args) => rollout::run(&args),
         Command::Evaluate(args) => evaluate::run(&args),
         Command::Experiment(args) => experiment::run(&args),

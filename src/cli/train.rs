@@ -104,7 +104,7 @@ fn how_to_go_on(path: &Path) -> String {
 }
 
 /// Progress on standard error, Ctrl-C.
-fn hooks(stop: &Arc<AtomicBool>) -> Hooks {
+pub(super) fn hooks(stop: &Arc<AtomicBool>) -> Hooks {
     let bar: std::sync::OnceLock<Bar> = std::sync::OnceLock::new();
     Hooks {
         watcher: Some(Arc::new(move |progress| match progress {

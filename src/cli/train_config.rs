@@ -55,9 +55,18 @@ enum PresetName {
 }
 
 #[derive(Clone, Copy, Debug, clap::ValueEnum)]
-enum PrecisionName {
+pub enum PrecisionName {
     F32,
     F64,
+}
+
+impl From<PrecisionName> for Precision {
+    fn from(name: PrecisionName) -> Self {
+        match name {
+            PrecisionName::F32 => Self::F32,
+            PrecisionName::F64 => Self::F64,
+        }
+    }
 }
 
 impl Args {
@@ -130,10 +139,7 @@ impl Args {
             config.phases.iter_mut().for_each(|phase| phase.epochs = epochs);
         }
         if let Some(precision) = self.precision {
-            config.precision = match precision {
-                PrecisionName::F32 => Precision::F32,
-                PrecisionName::F64 => Precision::F64,
-            };
+            config.precision = precision.into();
         }
         Ok(config)
     }

@@ -3,6 +3,7 @@
 mod checkpoint;
 mod config;
 mod dataset;
+mod measured;
 mod memory;
 mod objective;
 mod optimizer;
@@ -21,6 +22,7 @@ pub use checkpoint::{
 };
 pub use config::{Config, ConfigError, Data, Network, OnFailure, Optimizer, Phase, Polish, Precision, Scaling};
 pub use dataset::{Dataset, DatasetError};
+pub use measured::{Measured, MeasuredError, Part, Preparation, Targets};
 pub use memory::training_memory;
 pub use objective::{BatchReport, Failure, Objective};
 pub use optimizer::{Method, Moments, Update};

@@ -58,30 +58,45 @@ fn base(system: &Configured<f64>, states: usize, network: Network) -> Config {
         },
         network,
         penalty: regularizer(system, 5.0),
-        optimizer: Optimizer {
-            method: Method::Radam,
-            batch: 128,
-            weight_decay: 1e-6,
-            clip: 1.0,
-            averaging: 0.0,
-            on_failure: OnFailure::Skip,
-        },
+        optimizer: optimizer(),
         phases: Vec::new(),
         polish: None,
     }
 }
 
-fn quick(system: &Configured<f64>) -> Config {
-    let network = Network {
+fn optimizer() -> Optimizer {
+    Optimizer {
+        method: Method::Radam,
+        batch: 128,
+        weight_decay: 1e-6,
+        clip: 1.0,
+        averaging: 0.0,
+        on_failure: OnFailure::Skip,
+    }
+}
+
+/// Weight of the quick preset's penalty.
+const QUICK_PENALTY: f64 = 100.0;
+
+fn quick_network() -> Network {
+    Network {
         hidden: vec![128; 3],
         activation: Nonlinearity::Gelu,
         alpha: 1.0,
         scaling: Scaling::Physical,
         embed_periodic: true,
         input_layer: InputLayer::None,
-        dissipation: None,
         initialization: Initialization::Default,
-    };
+        dissipation: None,
+    }
+}
+
+fn quick_phase(epochs: usize, position: Vec<[f64; 2]>, velocity: Vec<[f64; 2]>) -> Phase {
+    let (rate, eta_min, schedule, t_max) = (3e-3, 0.0, Schedule::Cosine, epochs as f64);
+    Phase { epochs, rate, eta_min, schedule, t_max, position, velocity }
+}
+
+fn quick(system: &Configured<f64>) -> Config {
     let n = system.coordinates;
     let mut bounds: Bounds = (system.system.training)(n);
     // Embedded angles repeat: one turn is all there is.
@@ -90,16 +105,34 @@ fn quick(system: &Configured<f64>) -> Config {
             *bound = (0.0, 2.0 * PI);
         }
     }
-    let phase = Phase {
-        epochs: 80,
-        rate: 3e-3,
-        eta_min: 0.0,
-        schedule: Schedule::Cosine,
-        t_max: 80.0,
-        position: boxes(&bounds.positions),
-        velocity: boxes(&bounds.velocities),
-    };
-    Config { penalty: regularizer(system, 100.0), phases: vec![phase], ..base(system, 60_000, network) }
+    let phase = quick_phase(80, boxes(&bounds.positions), boxes(&bounds.velocities));
+    let penalty = regularizer(system, QUICK_PENALTY);
+    Config { penalty, phases: vec![phase], ..base(system, 60_000, quick_network()) }
+}
+
+/// The quick preset for recorded states: numbers of training, validation and test states, bounds of coordinates and
+/// velocities of training and validation, and how many steps to take, in whole epochs.
+pub(super) fn recorded(
+    name: &str,
+    [training, validation, test]: [usize; 3],
+    [position, velocity]: [Vec<[f64; 2]>; 2],
+    [validation_position, validation_velocity]: [Vec<[f64; 2]>; 2],
+    steps: usize,
+) -> Config {
+    let optimizer = optimizer();
+    let epochs = steps.div_ceil(training.div_ceil(optimizer.batch));
+    Config {
+        system: name.to_string(),
+        seed: 0,
+        precision: Precision::F32,
+        parameters: Default::default(),
+        data: Data { training, validation, test, validation_position, validation_velocity },
+        network: quick_network(),
+        penalty: Regularizer::Eigenvalue { lambda: QUICK_PENALTY },
+        optimizer,
+        phases: vec![quick_phase(epochs, position, velocity)],
+        polish: None,
+    }
 }
 
 /// Appendix "Training details" of Hamzaogullari and Ozakin. Its table for AdS4 lists the eigenvalue penalty, which no

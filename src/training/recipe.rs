@@ -63,7 +63,14 @@ impl Config {
 
     /// Shape of the network for a system, with physical scales `scale` (used if the configuration scales).
     pub fn architecture(&self, system: &Configured<f64>, scale: Vec<f64>) -> Architecture {
-        let n = system.coordinates;
+        let coordinates = (system.system.coordinates)(system.coordinates);
+        self.architecture_with(coordinates.iter().map(|c| c.periodic).collect(), scale)
+    }
+
+    /// Shape of the network for coordinates that are angles or not, with physical scales `scale` (used if the configuration
+    /// scales), both of length `n`.
+    pub fn architecture_with(&self, periodic: Vec<bool>, scale: Vec<f64>) -> Architecture {
+        let n = periodic.len();
         Architecture {
             coordinates: n,
             hidden: self.network.hidden.clone(),
@@ -73,7 +80,7 @@ impl Config {
                 Scaling::Physical => scale,
                 Scaling::None => vec![1.0; n],
             },
-            periodic: (system.system.coordinates)(n).iter().map(|c| c.periodic).collect(),
+            periodic,
             embed_periodic: self.network.embed_periodic,
             input_layer: self.network.input_layer,
             dissipation: self.network.dissipation,

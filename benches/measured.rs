@@ -1,0 +1,178 @@
+//! Predictions of a real, filmed double pendulum: learned Lagrangians with and without friction, from smoothed
+//! accelerations and through the motion, beside what a user would try first: going on at constant velocity, and a plain
+//! network of the same size that learns the accelerations.
+//!
+//! `cargo bench --bench measured -- FILM.csv...` takes films as `examples/pendulum_video.rs` does, 400 frames a second;
+//! without files those of Asseman, Kornuta and Ozcan ("Learning beyond simulated physics", 2018) if they stand in
+//! `../shared/data/ibm-double-pendulum`. Every film is a recording of its own: the first four fifths are learned from, the
+//! rest is predicted, 0.5 s at a time. Writes `measured.csv` into `target/measured`.
+
+#[path = "measured/plain.rs"]
+mod plain;
+#[allow(dead_code)]
+#[path = "../examples/pendulum_video.rs"]
+mod video;
+
+use lnn::analysis::{
+    PredictionError, Predictions, Window, predict_by_constant_velocity, predict_by_motion, prediction_error,
+};
+use lnn::lagrangian::EulerLagrange;
+use lnn::network::NetworkLagrangian;
+use lnn::recording::{Recording, Track};
+use lnn::training::shooting::{Shooting, Task, fit};
+use lnn::training::{Config, Datasets, Hooks, Measured, Penalty, Preparation, Targets, train};
+use plain::Plain;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// Frames per second.
+const RATE: f64 = 400.0;
+/// How far ahead the rest of a film is predicted, in s.
+const HORIZON: f64 = 0.5;
+/// Threads.
+const THREADS: usize = 2;
+
+/// How much work is done.
+#[derive(Clone, Copy)]
+struct Scale {
+    epochs: Option<usize>,
+    hidden: [usize; 3],
+    shooting_epochs: usize,
+}
+
+/// A film as angles.
+fn recording(path: &Path, text: &str) -> Result<Recording, String> {
+    let film = video::read(text).and_then(|frames| video::fit(&frames).ok_or("no frames".to_string()))?;
+    let times = (0..film.angles.len()).map(|k| k as f64 / RATE).collect();
+    let (q, name) = (film.angles.concat(), path.display().to_string());
+    let track = Track { name, times, q, v: vec![], a: vec![], force: vec![] };
+    let coordinates = ["theta1", "theta2"].map(String::from).to_vec();
+    Ok(Recording { coordinates, periodic: vec![true; 2], tracks: vec![track] })
+}
+
+/// A swing of two uncoupled, damped oscillators, for the trial run.
+fn made() -> Recording {
+    let times: Vec<f64> = (0..1200).map(|k| k as f64 / RATE).collect();
+    let q = times.iter().flat_map(|t| [(3.0 * t).cos() * (-0.1 * t).exp(), 0.5 * (5.0 * t).sin()]).collect();
+    let track = Track { name: "made".into(), times, q, v: vec![], a: vec![], force: vec![] };
+    let coordinates = ["theta1", "theta2"].map(String::from).to_vec();
+    Recording { coordinates, periodic: vec![true; 2], tracks: vec![track] }
+}
+
+/// A predictor's errors at a few times, and how long it learned.
+struct Line {
+    name: &'static str,
+    errors: Vec<PredictionError>,
+    seconds: f64,
+}
+
+/// Learns a Lagrangian and lets it predict.
+fn learned(measured: &Measured, windows: &[Window], friction: bool, through_motion: bool, scale: Scale) -> Predictions {
+    let data: Datasets<f32> = measured.datasets(Targets::Smoothed).expect("states with full windows");
+    let mut config: Config = measured.config("double pendulum", &data);
+    config.network.hidden = scale.hidden.to_vec();
+    config.network.dissipation = friction.then_some(16);
+    config.phases[0].epochs = scale.epochs.unwrap_or(config.phases[0].epochs);
+    config.phases[0].t_max = config.phases[0].epochs as f64;
+    let architecture = config.architecture_with(vec![true; 2], data.training[0].physical_scale());
+    let penalty = Penalty::Eigenvalue { lambda: config.penalty.lambda() };
+    let hooks = Hooks::default();
+    let mut weights = train(&config, &architecture, penalty, data, THREADS, &hooks).expect("a training").weights;
+    if through_motion {
+        let (training, validation) = (measured.training.estimated(), measured.validation.estimated());
+        let noise = measured.noise();
+        let settings = Shooting { epochs: scale.shooting_epochs, ..Shooting::default() };
+        let architecture = &architecture;
+        let task = Task {
+            architecture,
+            penalty,
+            weights,
+            training: &training,
+            validation: &validation,
+            noise: &noise,
+            seed: 0,
+        };
+        weights = fit(&settings, task, THREADS, &hooks).expect("a fit").weights;
+    }
+    let model = NetworkLagrangian::new(architecture, weights).expect("weights of this architecture").cast::<f64>();
+    predict_by_motion(&model, windows, THREADS)
+}
+
+fn lines(recording: &Recording, scale: Scale) -> Vec<Line> {
+    let measured = Measured::new(recording, &Preparation::default()).expect("a recording long enough");
+    for (name, c) in recording.coordinates.iter().zip(&measured.smoothing.coordinates) {
+        let (noise, relative) = (c.noise.sigma, 100.0 * c.quality.relative());
+        println!("{name}: noise {noise:.2e} rad, windows of {:.3} s, accelerations good to {relative:.1} %", c.seconds);
+    }
+    let test = measured.test.estimated();
+    let pairs = test.iter().zip(&measured.test.states);
+    let windows: Vec<Window> =
+        pairs.flat_map(|(e, s)| Window::cut(e.track, (e.q, e.v), s.interior(), 2, HORIZON)).collect();
+    let mut lines = Vec::new();
+    let mut add = |name: &'static str, predict: &mut dyn FnMut() -> Predictions| {
+        let start = Instant::now();
+        let predictions = predict();
+        let seconds = start.elapsed().as_secs_f64();
+        let at = |t: f64| prediction_error(&windows, &predictions, &recording.periodic, t);
+        let errors: Vec<_> = [0.1, 0.25, HORIZON].map(at).to_vec();
+        let [a, b, c] = [0, 1, 2].map(|k| errors[k].median);
+        let missing = errors[2].missing;
+        println!("  {name:44} {a:.4}  {b:.4}  {c:.4} rad after 0.1, 0.25, 0.5 s; {missing} given up; {seconds:.0} s");
+        lines.push(Line { name, errors, seconds });
+    };
+    println!("  {} windows of {HORIZON} s, median errors:", windows.len());
+    add("constant velocity", &mut || predict_by_constant_velocity(&windows));
+    add("plain network on smoothed accelerations", &mut || {
+        let data: Datasets<f32> = measured.datasets(Targets::Smoothed).expect("states with full windows");
+        let config = measured.config("plain", &data);
+        let epochs = scale.epochs.unwrap_or(config.phases[0].epochs);
+        let model = Plain::learn(&data.training[0], &scale.hidden, epochs, config.phases[0].rate, 0);
+        predict_by_motion(&model as &dyn EulerLagrange<f64>, &windows, THREADS)
+    });
+    for (name, friction, through_motion) in [
+        ("Lagrangian, smoothed accelerations", false, false),
+        ("Lagrangian and friction, smoothed accelerations", true, false),
+        ("Lagrangian, through the motion", false, true),
+        ("Lagrangian and friction, through the motion", true, true),
+    ] {
+        add(name, &mut || learned(&measured, &windows, friction, through_motion, scale));
+    }
+    lines
+}
+
+fn main() {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let mut films: Vec<PathBuf> = arguments.iter().filter(|a| !a.starts_with("--")).map(PathBuf::from).collect();
+    if !arguments.iter().any(|a| a == "--bench") {
+        // A trial run: everything once, on a made motion.
+        let lines = lines(&made(), Scale { epochs: Some(2), hidden: [8; 3], shooting_epochs: 1 });
+        assert_eq!(lines.len(), 6);
+        return;
+    }
+    if films.is_empty() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/ibm-double-pendulum");
+        films = (0..3).map(|k| folder.join(format!("{k}.csv"))).filter(|path| path.exists()).collect();
+    }
+    if films.is_empty() {
+        return println!("no films: expected files of `x_red,y_red,x_green,y_green,x_blue,y_blue` as arguments");
+    }
+    let mut csv = "film,predictor,seconds,median,rms,nine_of_ten,windows,given_up,learning_seconds\n".to_string();
+    for film in &films {
+        let name = film.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+        println!("{name}");
+        let text = std::fs::read_to_string(film).unwrap_or_else(|e| panic!("{}: {e}", film.display()));
+        let recording = recording(film, &text).unwrap_or_else(|e| panic!("{}: {e}", film.display()));
+        let scale = Scale { epochs: None, hidden: [128; 3], shooting_epochs: Shooting::default().epochs };
+        for Line { name: predictor, errors, seconds } in lines(&recording, scale) {
+            for e in errors {
+                let PredictionError { seconds: ahead, rms, median, most, windows, missing } = e;
+                writeln!(csv, "{name},{predictor},{ahead},{median},{rms},{most},{windows},{missing},{seconds:.1}")
+                    .expect("writing to a string");
+            }
+        }
+    }
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("target/measured");
+    std::fs::create_dir_all(&folder).expect("a folder for the results");
+    std::fs::write(folder.join("measured.csv"), csv).expect("room for the results");
+}

@@ -1,0 +1,216 @@
+//! Predictions of recorded motion that a model has not seen: how far off they are, how long they hold.
+//!
+//! A recording is cut into windows; every predictor gets the estimated state at the start of a window and says where the
+//! coordinates will be at the times of the samples that follow. What it says is compared with what was measured.
+
+use super::angle_difference;
+use super::summary::quantile;
+use crate::lagrangian::EulerLagrange;
+use crate::recording::Track;
+use crate::rollout::{Options, rollout_many};
+use serde::{Deserialize, Serialize};
+
+/// A stretch of recorded motion to be predicted from the state at its start.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Window {
+    /// Estimated coordinates at the start, `(n)`.
+    pub q: Vec<f64>,
+    /// Estimated velocities at the start, `(n)`.
+    pub v: Vec<f64>,
+    /// Times of the samples that follow, from the start of the window, ascending, in s.
+    pub times: Vec<f64>,
+    /// Measured coordinates at these times, `(samples, n)`.
+    pub measured: Vec<f64>,
+}
+
+impl Window {
+    /// Windows of `seconds` one after the other through the samples `interior` of a track of `n` coordinates, with the
+    /// estimated states `q` and `v`, `(samples, n)`, at its samples; a rest that is shorter is left out.
+    pub fn cut(
+        track: &Track,
+        (q, v): (&[f64], &[f64]),
+        interior: std::ops::Range<usize>,
+        n: usize,
+        seconds: f64,
+    ) -> Vec<Self> {
+        let state = |values: &[f64], sample: usize| values[sample * n..(sample + 1) * n].to_vec();
+        let mut windows = Vec::new();
+        let mut start = interior.start;
+        while start < interior.end {
+            let origin = track.times[start];
+            // The last sample may be late by a rounding error of the times.
+            let length = track.times[start..interior.end].partition_point(|t| t - origin <= seconds * (1.0 + 1e-9));
+            let end = start + length;
+            if end >= interior.end || length < 2 {
+                break;
+            }
+            windows.push(Self {
+                q: state(q, start),
+                v: state(v, start),
+                times: track.times[start + 1..end].iter().map(|t| t - origin).collect(),
+                measured: track.q[(start + 1) * n..end * n].to_vec(),
+            });
+            start = end - 1;
+        }
+        windows
+    }
+}
+
+/// Coordinates at the times of every window's samples, `(samples, n)`; not finite where a predictor gave up.
+pub type Predictions = Vec<Vec<f64>>;
+
+/// The motion of a model; `NaN` from where it ends before its time. The result does not depend on `threads`.
+pub fn predict_by_motion(model: &dyn EulerLagrange<f64>, windows: &[Window], threads: usize) -> Predictions {
+    let n = model.coordinates();
+    let starts: Vec<_> = windows.iter().map(|window| (window.q.clone(), window.v.clone())).collect();
+    let end = windows.iter().filter_map(|window| window.times.last()).fold(0.0_f64, |end, t| end.max(*t));
+    let shortest = windows.iter().flat_map(|w| w.times.first().copied().into_iter().chain(steps(&w.times)));
+    let step = shortest.fold(end, f64::min);
+    // One rounding more, so that the last sample of every window lies inside.
+    let options = Options { energy: false, ..Options::new(end * (1.0 + 1e-12), step) };
+    let motions = rollout_many(model, &starts, &options, threads);
+    let pairs = windows.iter().zip(motions);
+    pairs
+        .map(|(window, motion)| along(&motion.trajectory.t, &motion.trajectory.q, &motion.trajectory.v, n, window))
+        .collect()
+}
+
+fn steps(times: &[f64]) -> impl Iterator<Item = f64> {
+    times.windows(2).map(|pair| pair[1] - pair[0])
+}
+
+/// Coordinates between the samples of a motion, by cubic Hermite interpolation, at the times of a window.
+fn along(t: &[f64], q: &[f64], v: &[f64], n: usize, window: &Window) -> Vec<f64> {
+    let mut positions = Vec::with_capacity(window.measured.len());
+    for &time in &window.times {
+        let after = t.partition_point(|t| *t < time);
+        if after == 0 || after >= t.len() {
+            positions.extend(std::iter::repeat_n(f64::NAN, n));
+            continue;
+        }
+        let (before, h) = (after - 1, t[after] - t[after - 1]);
+        let s = (time - t[before]) / h;
+        let rise = s * s * (3.0 - 2.0 * s);
+        for i in 0..n {
+            let at = |values: &[f64], k: usize| values[k * n + i];
+            let bend = h * s * (1.0 - s) * ((1.0 - s) * at(v, before) - s * at(v, after));
+            positions.push(at(q, before) + rise * (at(q, after) - at(q, before)) + bend);
+        }
+    }
+    positions
+}
+
+/// Everything goes on as it went at the start: the least that a model must beat.
+pub fn predict_by_constant_velocity(windows: &[Window]) -> Predictions {
+    let prediction = |window: &Window| {
+        let along = window.times.iter().flat_map(|t| window.q.iter().zip(&window.v).map(move |(q, v)| q + t * v));
+        along.collect()
+    };
+    windows.iter().map(prediction).collect()
+}
+
+/// Distance of predicted and measured coordinates a given time after the start of the windows.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PredictionError {
+    /// Time after the start in s.
+    pub seconds: f64,
+    /// Root mean square over windows and coordinates, in the coordinates' unit; `NaN` if a prediction is missing.
+    pub rms: f64,
+    /// Median over the windows of the root mean square over the coordinates; a missing prediction counts as infinite.
+    pub median: f64,
+    /// Nine windows of ten are below this.
+    pub most: f64,
+    /// Windows.
+    pub windows: usize,
+    /// Windows without a prediction for this time.
+    pub missing: usize,
+}
+
+/// Errors `seconds` after the start, at the sample nearest to it; angles, marked by `periodic`, count modulo a turn.
+pub fn prediction_error(
+    windows: &[Window],
+    predictions: &Predictions,
+    periodic: &[bool],
+    seconds: f64,
+) -> PredictionError {
+    let n = periodic.len();
+    let mut errors: Vec<f64> = windows
+        .iter()
+        .zip(predictions)
+        .filter_map(|(window, predicted)| {
+            let near = |k: &usize| (window.times[*k] - seconds).abs();
+            let at = (0..window.times.len()).min_by(|a, b| near(a).total_cmp(&near(b)))?;
+            let row = at * n..(at + 1) * n;
+            let pairs = window.measured.get(row.clone())?.iter().zip(predicted.get(row)?).zip(periodic);
+            let squares = pairs.map(|((&m, &p), &angle)| if angle { angle_difference(m, p) } else { m - p }.powi(2));
+            Some((squares.sum::<f64>() / n as f64).sqrt())
+        })
+        .collect();
+    let missing = errors.iter().filter(|error| !error.is_finite()).count();
+    let rms = (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt();
+    errors.iter_mut().filter(|error| !error.is_finite()).for_each(|error| *error = f64::INFINITY);
+    errors.sort_by(f64::total_cmp);
+    let rms = if missing > 0 { f64::NAN } else { rms };
+    let (median, most) = (quantile(&errors, 0.5), quantile(&errors, 0.9));
+    PredictionError { seconds, rms, median, most, windows: errors.len(), missing }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rollout::models::{OSCILLATOR, SINGULAR};
+
+    /// A swing `cos t` every tenth of a second.
+    fn swing(samples: usize) -> (Track, Vec<f64>) {
+        let times: Vec<f64> = (0..samples).map(|k| 0.1 * k as f64).collect();
+        let q = times.iter().map(|t| t.cos()).collect();
+        let v = times.iter().map(|t| -t.sin()).collect();
+        (Track { name: "swing".into(), times, q, v: vec![], a: vec![], force: vec![] }, v)
+    }
+
+    #[test]
+    fn windows_follow_each_other() {
+        let (track, v) = swing(40);
+        let windows = Window::cut(&track, (&track.q, &v), 2..38, 1, 0.5);
+        assert_eq!(windows.len(), 7);
+        assert_eq!((windows[1].q[0], windows[1].v[0]), (track.q[7], v[7]));
+        assert_eq!((windows[1].times.len(), windows[1].measured[4]), (5, track.q[12]));
+        assert!((windows[1].times[4] - 0.5).abs() < 1e-12);
+        assert!(Window::cut(&track, (&track.q, &v), 2..38, 1, 9.0).is_empty());
+        assert!(Window::cut(&track, (&track.q, &v), 2..38, 1, 0.01).is_empty());
+    }
+
+    #[test]
+    fn the_right_model_predicts_and_a_straight_line_does_not() {
+        let (track, v) = swing(60);
+        let windows = Window::cut(&track, (&track.q, &v), 0..60, 1, 1.0);
+        let error = |predictions: &Predictions| prediction_error(&windows, predictions, &[false], 1.0);
+        let motion = error(&predict_by_motion(&OSCILLATOR, &windows, 2));
+        // Tolerances of the roll-out, and interpolation over a tenth of a radian.
+        assert!(motion.rms < 1e-5 && motion.windows == 5 && motion.missing == 0, "{motion:?}");
+        let line = error(&predict_by_constant_velocity(&windows));
+        // |cos(t + 1) - cos t + sin t| over the circle: its root mean square is sqrt((1 - cos 1)^2 + (1 - sin 1)^2)/sqrt 2.
+        assert!((line.rms - 0.34).abs() < 0.05, "{line:?}");
+        assert_eq!(line.seconds, 1.0);
+    }
+
+    #[test]
+    fn predictions_that_end_are_counted() {
+        let (mut track, mut v) = swing(30);
+        (track.q.iter_mut().for_each(|q| *q = 0.0), v.iter_mut().for_each(|v| *v = -1.0));
+        let windows = Window::cut(&track, (&track.q, &v), 0..30, 1, 1.4);
+        let error = prediction_error(&windows, &predict_by_motion(&SINGULAR, &windows, 1), &[false], 1.4);
+        assert!(error.missing == error.windows && error.rms.is_nan() && error.median == f64::INFINITY, "{error:?}");
+        let early = prediction_error(&windows, &predict_by_motion(&SINGULAR, &windows, 1), &[false], 0.1);
+        // Measured is 0, predicted -t - t^2/2.
+        assert!(early.missing == 0 && (early.rms - 0.105).abs() < 1e-6, "{early:?}");
+    }
+
+    #[test]
+    fn angles_count_modulo_a_turn() {
+        let window = Window { q: vec![0.0], v: vec![0.0], times: vec![1.0], measured: vec![7.0] };
+        let error = |periodic| prediction_error(std::slice::from_ref(&window), &vec![vec![0.5]], &[periodic], 1.0).rms;
+        assert!((error(true) - (6.5 - std::f64::consts::TAU)).abs() < 1e-12);
+        assert_eq!(error(false), 6.5);
+    }
+}

@@ -1,0 +1,265 @@
+//! What a model of recorded motion is worth: predictions of motion that was held out, and where its energy goes.
+
+use crate::analysis::{
+    PredictionError, Predictions, Window, predict_by_constant_velocity, predict_by_motion, prediction_error,
+};
+use crate::cli::CliError;
+use crate::lagrangian::{EulerLagrange, Request, Terms};
+use crate::report::{Figure, LinePlot, PlotError, Report, Series, line_png, text_table};
+use crate::rollout::Trajectory;
+use crate::training::{Part, SignatureBuffers, has_signature};
+use serde::Serialize;
+
+/// Windows that are predicted at most; of more, evenly spaced ones.
+const WINDOWS: usize = 500;
+/// Samples ahead that are predicted unless told otherwise.
+const AHEAD: f64 = 200.0;
+/// Points of a curve of prediction errors.
+const POINTS: usize = 40;
+
+/// How to judge.
+#[derive(Clone, Copy, Debug)]
+pub struct Plan<'a> {
+    /// Motion that the model has not seen.
+    pub part: &'a Part,
+    /// How far ahead it is predicted, in s, if that is given.
+    pub horizon: Option<f64>,
+    /// The time-like coordinate, if there is one.
+    pub time: Option<usize>,
+    /// Threads.
+    pub threads: usize,
+}
+
+/// Where the energy of held-out motion goes by the model; all in the unit of the learned `L`, which is J only where
+/// forces were given.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct Balance {
+    /// Mean over the samples of `p.v/2`, the kinetic energy of a mechanical system.
+    pub kinetic: f64,
+    /// Energy at the end of a trajectory less that at its start, mean over the trajectories.
+    pub change: f64,
+    /// Energy taken by friction, mean over the trajectories.
+    pub friction: f64,
+    /// Root mean square over the trajectories of what is not accounted for; external work is not counted.
+    pub defect: f64,
+}
+
+/// Numbers and pictures.
+#[derive(Clone, Debug, Serialize)]
+pub struct Judgement {
+    /// Errors of the model's motion, by time ahead.
+    pub model: Vec<PredictionError>,
+    /// Errors of going on at the velocity of the start.
+    pub constant_velocity: Vec<PredictionError>,
+    /// Fraction of the held-out states whose mass matrix has not the right signature.
+    pub wrong_signature: f64,
+    /// Energy along the held-out trajectories; none if there is none of it to be told.
+    pub energy: Option<Balance>,
+    /// Pictures.
+    #[serde(skip)]
+    pub figures: Vec<Figure>,
+}
+
+/// Predicts held-out motion.
+///
+/// # Errors
+/// A data error if a picture cannot be drawn.
+pub fn judge(model: &dyn EulerLagrange<f64>, plan: &Plan<'_>) -> Result<Judgement, CliError> {
+    let (n, recording) = (model.coordinates(), &plan.part.recording);
+    let horizon = plan.horizon.unwrap_or_else(|| horizon(plan.part));
+    let mut windows: Vec<Window> = plan
+        .part
+        .estimated()
+        .iter()
+        .zip(&plan.part.states)
+        .flat_map(|(e, states)| Window::cut(e.track, (e.q, e.v), states.interior(), n, horizon))
+        .collect();
+    let stride = windows.len().div_ceil(WINDOWS).max(1);
+    windows = windows.into_iter().step_by(stride).collect();
+    let motion = predict_by_motion(model, &windows, plan.threads);
+    let straight = predict_by_constant_velocity(&windows);
+    let errors = |predictions: &Predictions, count: usize| -> Vec<PredictionError> {
+        let times = (1..=count).map(|k| horizon * k as f64 / count as f64);
+        times.map(|t| prediction_error(&windows, predictions, &recording.periodic, t)).collect()
+    };
+    let mut figures = Vec::new();
+    if !windows.is_empty() {
+        let curves = [("model", errors(&motion, POINTS)), ("constant velocity", errors(&straight, POINTS))];
+        figures.extend(drawn(error_plot(&curves), "prediction_error.png", ERROR_CAPTION)?);
+        // The window that nine of ten are better than would flatter less; the first shows what a user would look at.
+        for (i, name) in recording.coordinates.iter().enumerate() {
+            let file = format!("prediction_{}.png", i + 1);
+            figures.extend(drawn(example(&windows[0], &motion[0], n, i, name), &file, EXAMPLE_CAPTION)?);
+        }
+    }
+    let tabled = |predictions: &Predictions| if windows.is_empty() { Vec::new() } else { errors(predictions, 4) };
+    Ok(Judgement {
+        model: tabled(&motion),
+        constant_velocity: tabled(&straight),
+        wrong_signature: wrong_signature(model, plan.part, plan.time),
+        energy: balance(model, plan.part),
+        figures,
+    })
+}
+
+const ERROR_CAPTION: &str = "Median over held-out windows of the error of predicted coordinates (root mean square over the coordinates) against the time since \
+                             the state that the prediction starts from.";
+const EXAMPLE_CAPTION: &str = "The first held-out window: measured, and predicted from the state at its start.";
+
+/// A quarter of the shortest trajectory, at most [`AHEAD`] samples.
+fn horizon(part: &Part) -> f64 {
+    let spans = part.states.iter().filter_map(|states| {
+        let times = &states.times[states.interior()];
+        let span = times.last()? - times.first()?;
+        Some((0.25 * span).min(AHEAD * span / (times.len() - 1).max(1) as f64))
+    });
+    spans.fold(f64::INFINITY, f64::min)
+}
+
+/// The picture, unless there is nothing to show.
+fn drawn(plot: LinePlot, file: &str, caption: &str) -> Result<Option<Figure>, CliError> {
+    match line_png(&plot) {
+        Ok(png) => Ok(Some(Figure { file: file.to_string(), png, caption: caption.to_string() })),
+        Err(PlotError::Empty(_)) => Ok(None),
+        Err(error) => Err(CliError::data(error)),
+    }
+}
+
+fn error_plot(curves: &[(&str, Vec<PredictionError>)]) -> LinePlot {
+    let series = |(name, errors): &(&str, Vec<PredictionError>)| {
+        let (x, y): (Vec<f64>, Vec<f64>) = errors.iter().map(|e| (e.seconds, e.median)).unzip();
+        Series::new(name, &x, &y)
+    };
+    LinePlot {
+        title: "Prediction of held-out motion".into(),
+        x_label: "time ahead [s]".into(),
+        y_label: "median error".into(),
+        log_y: true,
+        series: curves.iter().map(series).collect(),
+    }
+}
+
+/// Coordinate `i` of a window, measured and predicted.
+fn example(window: &Window, predicted: &[f64], n: usize, i: usize, name: &str) -> LinePlot {
+    let line = |label: &str, values: &[f64]| {
+        let column: Vec<f64> = values.iter().skip(i).step_by(n).copied().collect();
+        Series::new(label, &window.times, &column)
+    };
+    LinePlot {
+        title: format!("Prediction of {name}"),
+        x_label: "time ahead [s]".into(),
+        y_label: name.to_string(),
+        log_y: false,
+        series: vec![line("measured", &window.measured), line("predicted", predicted).over()],
+    }
+}
+
+/// States evaluated at once.
+const CHUNK: usize = 4096;
+
+/// Fraction of the states with full windows whose mass matrix has not the right signature, or is not finite.
+fn wrong_signature(model: &dyn EulerLagrange<f64>, part: &Part, time: Option<usize>) -> f64 {
+    let n = model.coordinates();
+    let (mut wrong, mut count) = (0, 0);
+    let (mut terms, mut buffers) = (Terms::default(), SignatureBuffers::default());
+    for states in &part.states {
+        let rows = states.interior();
+        let all = rows.start * n..rows.end * n;
+        for (q, v) in states.q[all.clone()].chunks(CHUNK * n).zip(states.v[all].chunks(CHUNK * n)) {
+            // Failures of single states leave matrices that are not finite.
+            let _ = model.terms(q, v, Request::MASS_MATRIX, &mut terms);
+            count += q.len() / n;
+            let right =
+                |matrix: &&[f64]| matrix.iter().all(|m| m.is_finite()) && has_signature(n, matrix, time, &mut buffers);
+            wrong += q.len() / n - terms.mass_matrix.chunks_exact(n * n).filter(right).count();
+        }
+    }
+    wrong as f64 / f64::max(1.0, count as f64)
+}
+
+/// Energy along the held-out trajectories, at the estimated states.
+fn balance(model: &dyn EulerLagrange<f64>, part: &Part) -> Option<Balance> {
+    let n = model.coordinates();
+    let mut sums = Balance::default();
+    let (mut tracks, mut samples) = (0.0, 0.0);
+    let mut terms = Terms::default();
+    for states in &part.states {
+        let rows = states.interior();
+        let of = |values: &[f64]| values[rows.start * n..rows.end * n].to_vec();
+        let (q, v) = (of(&states.q), of(&states.v));
+        let trajectory = Trajectory { coordinates: n, t: states.times[rows.clone()].to_vec(), q, v, energy: None };
+        let Ok(balance) = trajectory.energy_balance(model) else { continue };
+        tracks += 1.0;
+        sums.change += balance.change;
+        sums.friction += balance.dissipated;
+        sums.defect += balance.defect().powi(2);
+        for (q, v) in trajectory.q.chunks(CHUNK * n).zip(trajectory.v.chunks(CHUNK * n)) {
+            let _ = model.terms(q, v, Request::MOMENTUM, &mut terms);
+            sums.kinetic += 0.5 * terms.momentum.iter().zip(v).map(|(p, v)| p * v).sum::<f64>();
+            samples += (q.len() / n) as f64;
+        }
+    }
+    (tracks > 0.0).then(|| Balance {
+        kinetic: sums.kinetic / samples,
+        change: sums.change / tracks,
+        friction: sums.friction / tracks,
+        defect: (sums.defect / tracks).sqrt(),
+    })
+}
+
+impl Judgement {
+    const HEADERS: [&'static str; 7] = [
+        "time ahead (s)",
+        "median error",
+        "9 of 10 below",
+        "rms error",
+        "constant velocity: median",
+        "windows",
+        "given up",
+    ];
+
+    fn rows(&self) -> Vec<Vec<String>> {
+        let pairs = self.model.iter().zip(&self.constant_velocity);
+        pairs
+            .map(|(model, straight)| {
+                let numbers = [model.median, model.most, model.rms, straight.median].map(|x| format!("{x:.4e}"));
+                let counts = [model.windows, model.missing].map(|count| count.to_string());
+                [vec![format!("{:.4}", model.seconds)], numbers.to_vec(), counts.to_vec()].concat()
+            })
+            .collect()
+    }
+
+    /// What is not in the table of predictions, in words.
+    fn remarks(&self) -> String {
+        let mut text = format!(
+            "mass matrix of the wrong signature: {:.2} % of the held-out states\n",
+            100.0 * self.wrong_signature
+        );
+        if let Some(Balance { kinetic, change, friction, defect }) = self.energy {
+            let share = |x: f64| format!("{:.1} %", 100.0 * x / kinetic.abs());
+            text += &format!(
+                "energy along held-out trajectories, over the mean kinetic energy: change {}, taken by friction {}, not accounted for {}\n",
+                share(change),
+                share(friction),
+                share(defect)
+            );
+        }
+        text
+    }
+
+    /// For a terminal.
+    pub fn text(&self) -> String {
+        if self.model.is_empty() {
+            let none = "no window of held-out motion is as long as the horizon: nothing was predicted\n";
+            return format!("{none}{}", self.remarks());
+        }
+        format!("{}{}", text_table(&Self::HEADERS, &self.rows()), self.remarks())
+    }
+
+    /// Adds tables and pictures to a report.
+    pub fn report(&self, report: Report) -> Report {
+        let report = report.heading("Predictions of held-out motion").table(&Self::HEADERS, &self.rows());
+        let report = self.remarks().lines().fold(report, |report, line| report.paragraph(line));
+        self.figures.iter().fold(report, |report, figure| report.figure(&figure.png, &figure.caption))
+    }
+}
