@@ -8,6 +8,9 @@
 //! with `s = gamma u`, `t = u`, `tau = 0`. The tangents `z[s]`, `z[t]` are combinations of those the evaluation left, and
 //! the adjoint of the mixed channel is the `dL/dz` it left: one forward pass, three reverse passes and four for the
 //! weights, beside the `n + 3` of the evaluation.
+//!
+//! The same sweep, carried on to the features, gives the derivatives by the state: with `lam`, `a` held fixed, those of
+//! `s = -lam`, `t = a`, `tau = 1` are `u da/dq` and `u da/dv` of `u = dl/da`, the explicit `v` of `x_t` included.
 
 use crate::network::branch::Hidden;
 use crate::network::planes::{add_rows, plane};
@@ -54,6 +57,8 @@ struct JetPlanes<S> {
 #[derive(Clone, Debug)]
 pub struct Adjoint<S> {
     phi: Vec<S>,
+    /// Adjoints of the features' channels value, `s`, `t`; empty if nobody asks.
+    phi_adjoint: Vec<S>,
     /// Hidden layers of each branch.
     branches: Vec<Vec<JetPlanes<S>>>,
 }
@@ -62,16 +67,51 @@ impl<S: Scalar> Adjoint<S> {
     /// A workspace for the networks that `chunk` evaluates.
     pub fn new(chunk: &Chunk<S>) -> Self {
         let branches = chunk.branches.iter().map(|planes| vec![JetPlanes::default(); planes.hidden.len()]).collect();
-        Self { phi: Vec::new(), branches }
+        Self { phi: Vec::new(), phi_adjoint: Vec::new(), branches }
     }
 
     /// Adds to `gradient` the derivative of `sum of L_st over jets` by every parameter.
     ///
     /// `chunk` must have been evaluated with `weights` to [`Depth::Training`](crate::network::Depth::Training).
     pub fn add_gradient(&mut self, chunk: &Chunk<S>, weights: &[S], jets: &Jets<S>, gradient: &mut [S]) {
+        if !jets.state.is_empty() {
+            self.phi_adjoint.clear();
+            self.sweep(chunk, weights, jets, gradient);
+        }
+    }
+
+    /// [`add_gradient`](Self::add_gradient) that also adds to `dq`, `dv`, both `(batch, n)`, the derivatives by the scaled
+    /// states `q_i/s_i`, `v_i/s_i` of the chunk, the jets' directions `s` and `t` held fixed.
+    ///
+    /// With `s = -M^-1 u`, `t = a` and moving jets these are `u da/dq` and `u da/dv` of the accelerations
+    /// `a = M^-1 (g - c)`.
+    pub fn add_gradient_and_inputs(
+        &mut self,
+        chunk: &Chunk<S>,
+        weights: &[S],
+        jets: &Jets<S>,
+        gradient: &mut [S],
+        (dq, dv): (&mut [S], &mut [S]),
+    ) {
         if jets.state.is_empty() {
             return;
         }
+        let (n, width, count) = (chunk.architecture.coordinates, chunk.layout.features, jets.state.len());
+        self.phi_adjoint.clear();
+        self.phi_adjoint.resize(3 * count * width, <S as Real>::zero());
+        self.sweep(chunk, weights, jets, gradient);
+        for (j, &state) in jets.state.iter().enumerate() {
+            let row = |channel: usize| plane(plane(&self.phi_adjoint, channel, count * width), j, width);
+            let adjoint = [row(0), row(2), plane(&chunk.phi_adjoint, state, width)];
+            let s = jets.moving.then(|| &jets.s[j * n..][..n]);
+            let range = state * n..(state + 1) * n;
+            let inputs = (&mut dq[range.clone()], &mut dv[range]);
+            chunk.features.pull_back_jet(&chunk.architecture, state, adjoint, s, inputs);
+        }
+    }
+
+    /// One forward and one reverse pass over the jets; the latter reaches the features if `phi_adjoint` has room for them.
+    fn sweep(&mut self, chunk: &Chunk<S>, weights: &[S], jets: &Jets<S>, gradient: &mut [S]) {
         self.fill_feature_planes(chunk, jets);
         let branches = chunk.layout.branches.iter().zip(&chunk.branches);
         for ((branch, planes), layers) in branches.zip(&mut self.branches) {
@@ -84,6 +124,10 @@ impl<S: Scalar> Adjoint<S> {
             for l in (0..layers.len()).rev() {
                 sweep.reverse_layer(layers, l);
                 sweep.add_layer_gradient(layers, l, gradient);
+            }
+            if let (Some(first), false) = (layers.first(), self.phi_adjoint.is_empty()) {
+                let rows = 3 * jets.state.len();
+                branch.layers[0].pull_back(weights, rows, true, &first.z_adjoint, &mut self.phi_adjoint);
             }
         }
     }

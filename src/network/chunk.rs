@@ -22,7 +22,7 @@ pub struct Chunk<S> {
     pub(super) features: FeatureBatch<S>,
     /// Features and their tangents `(channels, batch, features)`.
     phi: Vec<S>,
-    phi_adjoint: Vec<S>,
+    pub(super) phi_adjoint: Vec<S>,
     pub(super) branches: Vec<BranchPlanes<S>>,
     row: [Vec<S>; 2],
     /// `L`, `(batch)`.

@@ -3,7 +3,7 @@
 //! Scaled states are `q_i/s_i`, `v_i/s_i`. Every coordinate gives one feature `q_i/s_i`, or two, `sin q_i` and `cos q_i`,
 //! when it is an embedded angle; every velocity gives `v_i/s_i`. No feature mixes coordinates, and only those of embedded
 //! angles are curved. The directions of the forward and adjoint identities never meet that curvature: in every second
-//! derivative they take, one direction has no coordinate part.
+//! derivative they take, one direction has no coordinate part. Derivatives of those identities by the state do.
 
 use crate::network::Architecture;
 use crate::scalar::{Real, Scalar};
@@ -113,5 +113,42 @@ impl<S: Scalar> FeatureBatch<S> {
             }
         }
         dv.copy_from_slice(&adjoint[width..]);
+    }
+
+    /// Adds the derivatives of a mixed coefficient `L_st` of one state by its scaled `q` and `v` to `dq`, `dv`.
+    ///
+    /// A position feature `f` enters the channels value, `s`, `t`, `st` of the jet by `f`, 0, `tau f' v_i`,
+    /// `-tau f' s_i`, a velocity feature by its value alone. `adjoint` holds the derivatives of `L_st` by the features'
+    /// channels value, `t`, `st`; `s` is the jet's first direction if it is moving (`tau = 1`), `None` if not. Embedded
+    /// angles have `f'' = -s_i^2 f`, other features none.
+    pub fn pull_back_jet(
+        &self,
+        architecture: &Architecture,
+        state: usize,
+        [value, t, mixed]: [&[S]; 3],
+        s: Option<&[S]>,
+        (dq, dv): (&mut [S], &mut [S]),
+    ) {
+        let n = architecture.coordinates;
+        let width = architecture.position_features();
+        let slope = &self.slope[state * width..(state + 1) * width];
+        let features = &self.value[state * (width + n)..][..width];
+        let velocity = &self.velocity[state * n..][..n];
+        let mut k = 0;
+        for i in 0..n {
+            let embedded = architecture.embeds(i);
+            for _ in 0..if embedded { 2 } else { 1 } {
+                dq[i] += slope[k] * value[k];
+                if let Some(s) = s {
+                    dv[i] += slope[k] * t[k];
+                    if embedded {
+                        let scale = S::of_f64(architecture.scale[i]);
+                        dq[i] -= scale * scale * features[k] * (velocity[i] * t[k] - s[i] * mixed[k]);
+                    }
+                }
+                k += 1;
+            }
+            dv[i] += value[width + i];
+        }
     }
 }

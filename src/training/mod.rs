@@ -13,6 +13,7 @@ mod preset;
 mod recipe;
 mod sampling;
 mod schedule;
+pub mod shooting;
 mod signature;
 mod solver;
 mod trainer;

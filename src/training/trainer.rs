@@ -238,7 +238,7 @@ pub fn resume<S: Scalar>(
 }
 
 /// Writes every epoch to the log.
-struct Log;
+pub(super) struct Log;
 
 impl<I: State> Observe<I> for Log {
     fn observe_iter(&mut self, state: &I, kv: &KV) -> Result<(), Error> {

@@ -1,0 +1,133 @@
+//! Settings of multiple shooting.
+
+use crate::training::config::ConfigError;
+use crate::training::optimizer::Method;
+use serde::{Deserialize, Serialize};
+
+/// How a network is fitted through its motion. Keys that are not given have their defaults; others are refused.
+///
+/// | Name | Default | Purpose | Range |
+/// |---|---|---|---|
+/// | `samples_per_segment` | 32 | samples predicted from one start | 2 to 65536 |
+/// | `steps` | chosen | integration steps per segment | 1 to 65536 |
+/// | `epochs` | 40 | passes through all segments | 1 to 2^24 |
+/// | `batch` | 32 | segments per update of the weights | 1 to 2^30 |
+/// | `method` | RAdam | update rule of the weights | |
+/// | `rate` | 0.001 | learning rate, falling to 0 by half a cosine | above 0 |
+/// | `weight_decay` | 1e-6 | L2 weight decay, added to the gradient | from 0 |
+/// | `clip` | 1 | the gradient's norm is cut to this | above 0 |
+/// | `continuity` | 1 | weight of a joint's gap beside one observation | from 0 |
+/// | `huber` | 3 | residuals beyond so many sigma count linearly | above 0, `inf` for plain squares |
+/// | `start_share` | 0.5 | part of a Gauss-Newton step the starts take per visit | above 0 to 1 |
+/// | `curvature_every` | 5 | epochs between two linearisations by the starts | 1 to 2^24 |
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Shooting {
+    /// Samples of a segment, about: every trajectory is cut into segments of equal length.
+    pub samples_per_segment: usize,
+    /// Integration steps per segment. If not given, as many as keep the integrator's error below a twentieth of the noise.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub steps: Option<usize>,
+    /// Passes through all segments.
+    pub epochs: usize,
+    /// Segments per update of the weights.
+    pub batch: usize,
+    /// Update rule of the weights.
+    pub method: Method,
+    /// Learning rate at the start.
+    pub rate: f64,
+    /// L2 weight decay.
+    pub weight_decay: f64,
+    /// The gradient's norm is cut to this.
+    pub clip: f64,
+    /// Weight of the gap of a joint, in units of noise, beside one observation.
+    pub continuity: f64,
+    /// Residuals beyond so many standard deviations count linearly.
+    pub huber: f64,
+    /// Part of the Gauss-Newton step that the start of a segment takes when it is visited.
+    pub start_share: f64,
+    /// Epochs between two linearisations of the motion by the starts.
+    pub curvature_every: usize,
+}
+
+impl Default for Shooting {
+    fn default() -> Self {
+        Self {
+            samples_per_segment: 32,
+            steps: None,
+            epochs: 40,
+            batch: 32,
+            method: Method::Radam,
+            rate: 1e-3,
+            weight_decay: 1e-6,
+            clip: 1.0,
+            continuity: 1.0,
+            huber: 3.0,
+            start_share: 0.5,
+            curvature_every: 5,
+        }
+    }
+}
+
+impl Shooting {
+    /// Checks every range.
+    ///
+    /// # Errors
+    /// The first value out of range.
+    pub fn validate(&self) -> Result<(), ConfigError> {
+        let check = |ok: bool, field: &str, expected: &'static str, found: String| {
+            let field = format!("shooting.{field}");
+            if ok { Ok(()) } else { Err(ConfigError { field, expected, found }) }
+        };
+        let count = |value: usize, field: &str, least: usize, most: usize, expected| {
+            check((least..=most).contains(&value), field, expected, value.to_string())
+        };
+        let number = |value: f64, field: &str, ok: bool, expected| check(ok, field, expected, format!("{value}"));
+        let sensible = "a positive number of sensible size";
+        count(self.samples_per_segment, "samples_per_segment", 2, 1 << 16, "2 to 65536 samples")?;
+        if let Some(steps) = self.steps {
+            count(steps, "steps", 1, 1 << 16, "1 to 65536 steps")?;
+        }
+        count(self.epochs, "epochs", 1, 1 << 24, sensible)?;
+        count(self.batch, "batch", 1, 1 << 30, sensible)?;
+        number(self.rate, "rate", self.rate.is_finite() && self.rate > 0.0, "a positive number")?;
+        let from_zero = |x: f64| x.is_finite() && x >= 0.0;
+        let least_zero = "a finite number of at least 0";
+        number(self.weight_decay, "weight_decay", from_zero(self.weight_decay), least_zero)?;
+        number(self.clip, "clip", self.clip > 0.0, "a positive number")?;
+        number(self.continuity, "continuity", from_zero(self.continuity), least_zero)?;
+        number(self.huber, "huber", self.huber > 0.0, "a positive number, inf for plain squares")?;
+        let share = self.start_share;
+        number(share, "start_share", share > 0.0 && share <= 1.0, "a number above 0, at most 1")?;
+        count(self.curvature_every, "curvature_every", 1, 1 << 24, sensible)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn defaults_are_valid_and_bad_values_are_named() {
+        assert_eq!(Shooting::default().validate(), Ok(()));
+        let fault = |change: fn(&mut Shooting)| {
+            let mut settings = Shooting::default();
+            change(&mut settings);
+            settings.validate().unwrap_err().field
+        };
+        assert_eq!(fault(|s| s.samples_per_segment = 1), "shooting.samples_per_segment");
+        assert_eq!(fault(|s| s.steps = Some(0)), "shooting.steps");
+        assert_eq!(fault(|s| s.rate = f64::NAN), "shooting.rate");
+        assert_eq!(fault(|s| s.huber = 0.0), "shooting.huber");
+        assert_eq!(fault(|s| s.continuity = f64::INFINITY), "shooting.continuity");
+        assert_eq!(fault(|s| s.start_share = 1.5), "shooting.start_share");
+        assert_eq!(fault(|s| s.batch = 0), "shooting.batch");
+    }
+
+    #[test]
+    fn keys_are_known_or_refused() {
+        let read = |text| serde_json::from_str::<Shooting>(text);
+        assert_eq!(read(r#"{"epochs": 7}"#).unwrap(), Shooting { epochs: 7, ..Shooting::default() });
+        assert!(read(r#"{"epoch": 7}"#).unwrap_err().to_string().contains("epoch"));
+    }
+}
