@@ -39,13 +39,13 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let model = NetworkLagrangian::new(header.architecture, weights)?;
     let motion = Motion { model: &model, terms: RefCell::default(), failure: RefCell::default() };
     let solver = ExplicitRungeKutta::dop853().rtol(1e-11).atol(1e-11);
-    let solution = IVP::ode(&motion, 0.0, 5.0, [0.6, 1.1, 0.0, 0.0]).even(0.05).method(solver).solve();
+    let solution = IVP::ode(&motion, 0.0, 5.0, [0.6, 1.1, 0.0, 0.0]).method(solver).solve();
     if let Some(error) = motion.failure.take() {
         return Err(error.into());
     }
     let solution = solution.map_err(|error| format!("{error:?}"))?;
 
-    // The energies of all samples at once.
+    // The energies after all steps at once; between steps the solver interpolates, to fewer digits.
     let (q, v): (Vec<_>, Vec<_>) = solution.y.iter().map(|x| ([x[0], x[1]], [x[2], x[3]])).unzip();
     let mut terms = Terms::default();
     model.terms(q.as_flattened(), v.as_flattened(), Request::ENERGY, &mut terms)?;
@@ -53,8 +53,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let kinetic = terms.momentum.chunks(2).zip(&v).map(|(p, v)| (p[0] * v[0] + p[1] * v[1]) / 2.0);
     let scale = kinetic.fold(0.0, f64::max);
     let drift = (high - low) / scale;
-    println!("{} samples, energy constant to {drift:.1e} of the largest kinetic energy", q.len());
+    println!("{} steps, energy constant to {drift:.1e} of the largest kinetic energy", q.len());
     // Some hundred steps, each allowed an error of 1e-11 (1 + |x|).
-    assert!(q.len() == 101 && scale > 0.0 && drift < 1e-7, "not conserved");
+    assert!(q.len() > 50 && scale > 0.0 && drift < 1e-7, "not conserved");
     Ok(())
 }

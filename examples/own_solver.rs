@@ -68,7 +68,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let energy = spread(&mut terms.energy.iter().copied());
     let momentum = spread(&mut terms.momentum.iter().step_by(2).copied());
     println!("{} states, energy constant to {energy:.1e} J, momentum to {momentum:.1e} kg m/s", q.len());
-    // About 500 steps, each allowed an error of 1e-11 (1 + |x|).
+    // 3,000 steps, each allowed an error of 1e-11 (1 + |x|).
     assert!(q.len() > 100 && energy < 1e-7 && momentum < 1e-7, "not conserved");
     Ok(())
 }

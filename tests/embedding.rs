@@ -45,9 +45,6 @@ const _: () = {
     error::<scalar::UnreadableNumber>();
     error::<storage::ReadError>();
     error::<tape::TapeError>();
-    error::<analysis::AccelerationError>();
-    error::<analysis::CoordinateError>();
-    error::<analysis::EnergyError>();
     error::<analysis::GridError>();
     error::<training::CheckpointError>();
     error::<training::ConfigError>();
