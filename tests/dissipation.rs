@@ -172,7 +172,15 @@ fn gradients_are_accurate<S: Scalar>(case: &Case) {
     let point = [cast(&weights), scaled(&q), scaled(&v)].concat();
     let by_part = |point: &[Dd]| -> [Vec<Dd>; 3] {
         let (_, all) = gradient(&Along { architecture, weights: count, u: &wide }, point).unwrap();
-        [all[..count].to_vec(), all[count..count + 3 * n].to_vec(), all[count + 3 * n..].to_vec()]
+        // Rows of the same state add up.
+        let by_state = |rows: &[Dd]| {
+            let mut sum = vec![<Dd as Real>::zero(); 3 * n];
+            for (row, &state) in rows.chunks_exact(n).zip(&states) {
+                sum[state * n..(state + 1) * n].iter_mut().zip(row).for_each(|(sum, &x)| *sum += x);
+            }
+            sum
+        };
+        [all[..count].to_vec(), by_state(&all[count..count + 3 * n]), by_state(&all[count + 3 * n..])]
     };
     let expected = by_part(&point);
     let perturbed: Vec<_> = (0..6).map(|_| by_part(&perturb(&point, &mut rng))).collect();

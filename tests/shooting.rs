@@ -32,12 +32,16 @@ fn small(n: usize, activation: Nonlinearity, input_layer: InputLayer, embed_peri
         periodic: (0..n).map(|i| i % 2 == 0).collect(),
         embed_periodic,
         input_layer,
+        dissipation: None,
     }
 }
 
-/// Random weights; the parameters of an input layer leave their initial values too.
+/// Random weights; the parameters of an input layer leave their initial values too, and friction is not small.
 fn draw_weights<S: Scalar>(architecture: &Architecture, rng: &mut ChaCha8Rng) -> Vec<S> {
     let mut weights: Vec<S> = initial_weights(architecture, Initialization::Default, rng);
+    if let Some(dissipation) = Layout::new(architecture).dissipation {
+        dissipation.gamma_range().for_each(|k| weights[k] += S::of_f64(rng.random_range(4.0..5.0)));
+    }
     for layer in Layout::new(architecture).branches.iter().flat_map(|branch| &branch.layers) {
         if layer.map != LinearMap::Dense {
             for k in layer.weight_range().chain(layer.bias_range()) {
@@ -257,12 +261,12 @@ fn objective<S: Scalar>(
 #[test]
 fn the_gradient_through_the_integrator_is_that_of_the_discrete_map() {
     let kinds = [
-        (1, Nonlinearity::Gelu, InputLayer::None, true),
-        (2, Nonlinearity::Softplus, InputLayer::None, true),
-        (2, Nonlinearity::QuadraticSoftplus, InputLayer::Dyt, false),
+        (1, Nonlinearity::Gelu, InputLayer::None, true, None),
+        (2, Nonlinearity::Softplus, InputLayer::None, true, Some(3)),
+        (2, Nonlinearity::QuadraticSoftplus, InputLayer::Dyt, false, None),
     ];
-    for (n, activation, input_layer, embed) in kinds {
-        let architecture = small(n, activation, input_layer, embed);
+    for (n, activation, input_layer, embed, dissipation) in kinds {
+        let architecture = Architecture { dissipation, ..small(n, activation, input_layer, embed) };
         let motion = Motion::made_up(n, 8);
         let width = 2 * n;
         let exact = segments::<Dd>(&architecture, &motion, 4, 2);

@@ -146,8 +146,8 @@ impl<S: Scalar> Dissipation<S> {
         );
     }
 
-    /// Adds to `dq` and `dv` the derivative of `u_j.dD/d(v/s)` by the scaled coordinates `q/s` and velocities `v/s` of its
-    /// state, all `(states, n)`, rows as in [`Dissipation::add_gradient`].
+    /// Adds to `dq` and `dv`, `(batch, n)` over the whole chunk, the derivative of `sum_j u_j.dD/d(v/s)` by the scaled
+    /// coordinates `q/s` and velocities `v/s`; `u` as in [`Dissipation::add_gradient`].
     pub fn add_input_gradient(
         &mut self,
         chunk: &Chunk<S>,
@@ -158,8 +158,7 @@ impl<S: Scalar> Dissipation<S> {
     ) {
         let DissipationLayout { units, features: width, coordinates: n, .. } = self.layout;
         let parameters = Parameters::of(&self.layout, weights);
-        let rows = dq.chunks_exact_mut(n).zip(dv.chunks_exact_mut(n));
-        for ((&state, u), (dq, dv)) in states.iter().zip(u.chunks_exact(n)).zip(rows) {
+        for (&state, u) in states.iter().zip(u.chunks_exact(n)) {
             self.adjoint.clear();
             self.adjoint.resize(width + n, <S as Real>::zero());
             let (of_features, of_velocity) = self.adjoint.split_at_mut(width);
@@ -175,8 +174,9 @@ impl<S: Scalar> Dissipation<S> {
             resize(&mut self.pulled, 2 * n);
             let (pulled_q, pulled_v) = self.pulled.split_at_mut(n);
             chunk.features.pull_back(&chunk.architecture, state, &self.adjoint, pulled_q, pulled_v);
-            dq.iter_mut().zip(pulled_q).for_each(|(sum, &mut x)| *sum += x);
-            dv.iter_mut().zip(pulled_v).for_each(|(sum, &mut x)| *sum += x);
+            let row = state * n..(state + 1) * n;
+            dq[row.clone()].iter_mut().zip(pulled_q).for_each(|(sum, &mut x)| *sum += x);
+            dv[row].iter_mut().zip(pulled_v).for_each(|(sum, &mut x)| *sum += x);
         }
     }
 }

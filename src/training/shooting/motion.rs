@@ -1,11 +1,11 @@
 //! Accelerations of a chunk of states and their vector-Jacobian product: the equation of motion of shooting.
 //!
-//! `M a = g - c + Q` in scaled coordinates, `Q` the generalized forces that are not of the Lagrangian. They enter in two
+//! `M a = g - c - dD/dv + Q` in scaled coordinates, `D` the dissipation and `Q` known external forces. They enter in two
 //! places of this file and nowhere else: [`Motion::accelerate`] adds them, [`Motion::pull_back`] takes `lam = M^-1 u`
-//! through whatever they depend on.
+//! through what `D` depends on.
 
 use crate::linalg::{Workspace, solve};
-use crate::network::{Adjoint, Architecture, Chunk, Depth, Jets};
+use crate::network::{Adjoint, Architecture, Chunk, Depth, Dissipation, Jets};
 use crate::scalar::{Real, Scalar};
 use crate::training::penalty::Penalty;
 use crate::training::signature::{
@@ -17,6 +17,7 @@ pub(super) struct Motion<S> {
     architecture: Architecture,
     chunk: Chunk<S>,
     adjoint: Adjoint<S>,
+    dissipation: Option<Dissipation<S>>,
     jets: Jets<S>,
     scale: Vec<S>,
     /// Physical states.
@@ -35,6 +36,7 @@ impl<S: Scalar> Motion<S> {
         Self {
             architecture: architecture.clone(),
             adjoint: Adjoint::new(&chunk),
+            dissipation: Dissipation::new(&chunk),
             chunk,
             jets: Jets::default(),
             scale: architecture.scale.iter().map(|&s| S::of_f64(s)).collect(),
@@ -60,9 +62,12 @@ impl<S: Scalar> Motion<S> {
             self.v.push(v * scale);
         }
         self.chunk.evaluate(weights, &self.q, &self.v, depth);
+        if let Some(dissipation) = &mut self.dissipation {
+            dissipation.evaluate(&self.chunk, weights);
+        }
     }
 
-    /// Accelerations `M^-1 (g - c + Q)` of the states evaluated last under scaled external forces, `(states, n)` or empty.
+    /// Accelerations `M^-1 (g - c - dD/dv + Q)` of the states evaluated last under scaled external forces, `(states, n)` or empty.
     ///
     /// A state without one is no longer alive; the acceleration of those that are not is 0.
     pub fn accelerate(&mut self, external: &[S], alive: &mut [bool], acceleration: &mut [S]) {
@@ -71,6 +76,9 @@ impl<S: Scalar> Motion<S> {
         self.right.extend(self.chunk.dl_dq.iter().zip(&self.chunk.coriolis).map(|(&g, &c)| g - c));
         for (right, &force) in self.right.iter_mut().zip(external) {
             *right += force;
+        }
+        if let Some(dissipation) = &self.dissipation {
+            self.right.iter_mut().zip(&dissipation.gradient).for_each(|(right, &force)| *right -= force);
         }
         // Failed rows are `NaN` and looked for below.
         let _ = solve(n, &self.chunk.mass_matrix, &self.right, acceleration, &mut self.workspace);
@@ -103,7 +111,12 @@ impl<S: Scalar> Motion<S> {
             self.jets.s.extend(self.solution[range.clone()].iter().map(|&lambda| -lambda));
             self.jets.t.extend_from_slice(&a[range]);
         }
-        self.adjoint.add_gradient_and_inputs(&self.chunk, weights, &self.jets, gradient, (dq, dv));
+        self.adjoint.add_gradient_and_inputs(&self.chunk, weights, &self.jets, gradient, (&mut *dq, &mut *dv));
+        if let Some(dissipation) = &mut self.dissipation {
+            let Jets { state, s, .. } = &self.jets;
+            dissipation.add_gradient(&self.chunk, weights, state, s, gradient);
+            dissipation.add_input_gradient(&self.chunk, weights, state, s, (dq, dv));
+        }
     }
 
     /// Value of `lambda` times the sum of the states' violations and how many violate; adds its gradient by the weights.
