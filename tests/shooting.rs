@@ -523,6 +523,7 @@ fn exact_positions_teach_exact_accelerations() {
         periodic: vec![false],
         embed_periodic: false,
         input_layer: InputLayer::None,
+        dissipation: None,
     };
     let motion = oscillator(64, 0.0);
     let weights: Vec<f64> = initial_weights(&architecture, Initialization::Default, &mut ChaCha8Rng::seed_from_u64(12));

@@ -197,7 +197,8 @@ mod tests {
     #[test]
     fn predictions_that_end_are_counted() {
         let (mut track, mut v) = swing(30);
-        (track.q.iter_mut().for_each(|q| *q = 0.0), v.iter_mut().for_each(|v| *v = -1.0));
+        track.q.fill(0.0);
+        v.fill(-1.0);
         let windows = Window::cut(&track, (&track.q, &v), 0..30, 1, 1.4);
         let error = prediction_error(&windows, &predict_by_motion(&SINGULAR, &windows, 1), &[false], 1.4);
         assert!(error.missing == error.windows && error.rms.is_nan() && error.median == f64::INFINITY, "{error:?}");
