@@ -3,6 +3,7 @@
 //! Results go to standard output, messages and progress to standard error. Exit codes: 0 done, 1 data or files, 2
 //! arguments or configuration, 130 Ctrl-C. A failure is one line, `error: FILE: row 3, column theta1: ...`.
 
+mod check;
 mod config;
 mod differences;
 mod error;
@@ -53,6 +54,8 @@ struct Cli {
 enum Command {
     /// List the systems that can be learned.
     Systems(systems::Args),
+    /// Say what recorded motion is good for, before anything is learned from it.
+    Check(check::Args),
     /// Learn the Lagrangian of a system and write model, history, pictures and a report.
     Train(train_config::Args),
     /// Learn the Lagrangian of recorded motion, judge it by motion that was held out.
@@ -102,6 +105,7 @@ fn run(command: Command) -> Result<(), CliError> {
     }
     match command {
         Command::Systems(args) => systems::run(&args),
+        Command::Check(args) => check::run(&args),
         Command::Train(args) => train::run(&args),
         Command::Fit(args) => fit::run(&args),
         Command::Rollout(args) => rollout::run(&args),

@@ -7,6 +7,7 @@ pub mod read;
 mod reading;
 pub mod smooth;
 mod statistics;
+pub mod survey;
 mod track;
 mod units;
 

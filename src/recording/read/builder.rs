@@ -83,7 +83,7 @@ impl<'a> Builder<'a> {
             if y.is_finite() {
                 Ok(y)
             } else {
-                Err(Problem::Field { row, column: used.name.clone(), found: format!("{x} times {}", used.factor) })
+                Err(Problem::Field { row, column: used.name.clone(), found: format!("{x} times {:e}", used.factor) })
             }
         });
         match (timed, self.columns.rate) {

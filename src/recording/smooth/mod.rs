@@ -6,7 +6,7 @@ mod window;
 
 pub use local_fit::MOST_DEGREE;
 pub use noise::Noise;
-pub(crate) use noise::noise;
+pub(crate) use noise::{contrast_weights, noise};
 pub use window::Quality;
 
 use crate::recording::statistics::{median, steps};
@@ -130,7 +130,7 @@ impl Smoothed {
 }
 
 /// Whether steps are equal to within the rounding of the times.
-fn is_regular(times: &[f64]) -> bool {
+pub(crate) fn is_regular(times: &[f64]) -> bool {
     let [first, .., last] = times else { return true };
     let step = (last - first) / (times.len() - 1) as f64;
     let tolerance = 8.0 * f64::EPSILON * first.abs().max(last.abs());
@@ -162,8 +162,7 @@ impl Smoothing {
                 None => noise(tracks.iter().map(|t| (t.times.as_slice(), t.q.as_slice())), n, i),
             };
             let velocity = velocities.then(|| noise(tracks.iter().map(|t| (t.times.as_slice(), t.v.as_slice())), n, i));
-            let ratio = velocity.map(|velocity| (position.sigma / velocity.sigma).clamp(1e-6 * step, 1e6 * step));
-            let ratio = ratio.filter(|ratio| ratio.is_finite());
+            let ratio = velocity.and_then(|velocity| ratio(position, velocity, step));
             let signal =
                 Signal { tracks, regular: &regular, n, i, sigma: position.sigma, ratio, degree: options.degree };
             let quality = match options.window {
@@ -174,6 +173,21 @@ impl Smoothing {
             Ok(Chosen { noise: position, velocity_noise: velocity, quality, seconds })
         });
         Ok(Self { degree: options.degree, coordinates: coordinates.collect::<Result<_, _>>()?, step })
+    }
+
+    /// The signal of coordinate `i` on trajectories whose steps are equal or not.
+    fn signal<'a>(&self, tracks: &'a [Track], regular: &'a [bool], i: usize) -> Signal<'a> {
+        let Chosen { noise, velocity_noise, .. } = self.coordinates[i];
+        let ratio = velocity_noise.and_then(|velocity| ratio(noise, velocity, self.step));
+        Signal { tracks, regular, n: self.coordinates.len(), i, sigma: noise.sigma, ratio, degree: self.degree }
+    }
+
+    /// Calls `visit` with position, velocity and acceleration of coordinate `i` at places spread evenly over the
+    /// trajectories, and where they are: trajectory and sample.
+    pub(crate) fn visit(&self, recording: &Recording, i: usize, mut visit: impl FnMut([f64; 3], &Track, usize)) {
+        let regular: Vec<bool> = recording.tracks.iter().map(|track| is_regular(&track.times)).collect();
+        let signal = self.signal(&recording.tracks, &regular, i);
+        signal.visit(self.coordinates[i].quality.window, |estimate, _, track, at| visit(estimate.values, track, at));
     }
 
     /// Longest window in samples of a trajectory with the usual step.
@@ -210,16 +224,19 @@ impl Smoothing {
         let regular = is_regular(&track.times);
         let tracks = std::slice::from_ref(track);
         for i in 0..n {
-            let Chosen { noise, velocity_noise, .. } = self.coordinates[i];
-            let ratio = velocity_noise.map(|v| (noise.sigma / v.sigma).clamp(1e-6 * self.step, 1e6 * self.step));
-            let ratio = ratio.filter(|ratio| ratio.is_finite());
-            let signal = Signal { tracks, regular: &[regular], n, i, sigma: noise.sigma, ratio, degree: self.degree };
+            let signal = self.signal(tracks, std::slice::from_ref(&regular), i);
             let window = self.samples(i, track);
             smoothed.margin = smoothed.margin.max(window / 2);
             smooth(&signal, window, &mut smoothed);
         }
         Ok(smoothed)
     }
+}
+
+/// Noise of positions over noise of velocities in s, within what steps of time can tell apart.
+fn ratio(position: Noise, velocity: Noise, step: f64) -> Option<f64> {
+    let ratio = (position.sigma / velocity.sigma).clamp(1e-6 * step, 1e6 * step);
+    ratio.is_finite().then_some(ratio)
 }
 
 /// Fills column `signal.i` of all arrays.

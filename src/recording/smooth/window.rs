@@ -137,11 +137,10 @@ impl Signal<'_> {
         while window <= LONGEST && (window <= longest / 2 || window == least) {
             let Some(quality) = self.quality(window) else { break };
             match best {
-                Some(known) if known.total(2) <= quality.total(2) => {
-                    if quality.bias[2] > 10.0 * known.total(2) {
-                        break;
-                    }
-                }
+                // Past the first minimum: over several periods either degree misses everything, and their change says
+                // nothing.
+                Some(known) if quality.total(2) > 2.0 * known.total(2) => break,
+                Some(known) if known.total(2) <= quality.total(2) => {}
                 _ => best = Some(quality),
             }
             window = (window + 2).max((window + window / 10) | 1);

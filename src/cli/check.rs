@@ -1,0 +1,214 @@
+//! `lnn check`: what recorded motion is good for, before anything is learned from it.
+
+use crate::cli::recording_args::RecordingArgs;
+use crate::cli::{CliError, output};
+use crate::recording::survey::{FEW_SAMPLES, Kind, LARGE_ERROR, Method, Survey, SurveyOptions, Suspicion, survey};
+use crate::report::text_table;
+use std::fmt::Write;
+
+/// Lines of a table that can be long.
+const LINES: usize = 20;
+
+/// Arguments.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    #[command(flatten)]
+    recording: RecordingArgs,
+    /// One JSON object instead of text.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Reads the data, looks at them and says what it found.
+///
+/// # Errors
+/// A usage error for contradicting arguments, a data error for files that cannot be used.
+pub fn run(args: &Args) -> Result<(), CliError> {
+    let reading = args.recording.read()?;
+    let found = survey(&reading, &SurveyOptions::default()).map_err(CliError::data)?;
+    if args.json {
+        let text = serde_json::to_string_pretty(&found).map_err(CliError::data)?;
+        return output::print(&format!("{text}\n"));
+    }
+    output::print(&describe(&found))
+}
+
+/// A number as a reader likes it: four digits.
+fn short(x: f64) -> String {
+    match x.abs() {
+        0.0 => "0".to_string(),
+        size if (1e-3..1e5).contains(&size) => {
+            let decimals = (3.0 - size.log10().floor()).clamp(0.0, 6.0) as usize;
+            format!("{x:.decimals$}")
+        }
+        _ => format!("{x:.3e}"),
+    }
+}
+
+/// A share in per cent.
+fn percent(x: f64) -> String {
+    if x.is_finite() { format!("{} %", short(100.0 * x)) } else { "-".to_string() }
+}
+
+/// The survey for people.
+fn describe(found: &Survey) -> String {
+    let mut text = header(found);
+    let rows: Vec<Vec<String>> = found
+        .coordinates
+        .iter()
+        .map(|c| {
+            let name = if c.periodic { format!("{} (angle)", c.name) } else { c.name.clone() };
+            let bound = if c.noise_resolved { "" } else { "at most " };
+            let noise = format!("{bound}{}", short(c.noise));
+            let motion = [c.velocity, c.acceleration, c.period, c.samples_per_period].map(short);
+            [vec![name, short(c.min), short(c.max), noise, percent(c.noise_relative)], motion.to_vec()].concat()
+        })
+        .collect();
+    let titles =
+        ["coordinate", "least", "most", "noise", "of range", "rms v", "rms a", "fast period s", "samples in it"];
+    text += &section(&text_table(&titles, &rows));
+
+    let rows: Vec<Vec<String>> = found
+        .coordinates
+        .iter()
+        .map(|c| {
+            let numbers = [c.window_seconds, c.velocity_error, c.acceleration_error].map(short);
+            let ends = [percent(c.acceleration_error_relative)];
+            [vec![c.name.clone(), c.window.to_string()], numbers.to_vec(), ends.to_vec()].concat()
+        })
+        .collect();
+    let titles = ["smoothing", "window", "window s", "error of v", "error of a", "of rms a"];
+    text += &section(&text_table(&titles, &rows));
+
+    let rows: Vec<Vec<String>> = found.suspicious.iter().take(LINES).map(suspicion).collect();
+    if !rows.is_empty() {
+        text += &section(&text_table(&["suspicious", "row", "coordinate", "value", "what"], &rows));
+        let _ = more(&mut text, found.suspicious_count, "places");
+    }
+    let _ = advice(&mut text, found);
+    for warning in &found.warnings {
+        let _ = writeln!(text, "warning: {warning}");
+    }
+    text
+}
+
+/// A blank line before a table.
+fn section(table: &str) -> String {
+    format!("\n{table}")
+}
+
+/// What was read.
+fn header(found: &Survey) -> String {
+    let seconds: f64 = found.tracks.iter().map(|t| t.end - t.start).sum();
+    let times = match &found.time {
+        Some(column) => format!("times from column {column}"),
+        None => "times from the rate".to_string(),
+    };
+    let mut text = format!(
+        "{} {}, {} {}, {} samples, {} s; {times}\n",
+        found.files,
+        if found.files == 1 { "file" } else { "files" },
+        found.tracks.len(),
+        if found.tracks.len() == 1 { "trajectory" } else { "trajectories" },
+        found.samples,
+        short(seconds)
+    );
+    let rows: Vec<Vec<String>> = found
+        .tracks
+        .iter()
+        .take(LINES)
+        .map(|t| {
+            let rows = format!("{}-{}", t.first_row, t.last_row);
+            let times = [t.start, t.end, t.rate].map(short);
+            [vec![t.name.clone(), rows, t.samples.to_string()], times.to_vec(), vec![percent(t.jitter)]].concat()
+        })
+        .collect();
+    let titles = ["trajectory", "rows", "samples", "from s", "to s", "samples per s", "jitter"];
+    text += &section(&text_table(&titles, &rows));
+    let _ = more(&mut text, found.tracks.len(), "trajectories");
+    let _ = left_out(&mut text, found);
+    text
+}
+
+/// Gaps and what was left out.
+fn left_out(text: &mut String, found: &Survey) -> std::fmt::Result {
+    if found.duplicates > 0 {
+        writeln!(text, "left out: {} rows that repeat the row before", found.duplicates)?;
+    }
+    for cut in found.cuts.iter().take(LINES) {
+        let (seconds, steps) = (short(cut.seconds), short(cut.steps));
+        writeln!(
+            text,
+            "gap: {} s ({steps} steps) between rows {} and {} of {}",
+            seconds, cut.before, cut.after, cut.file
+        )?;
+    }
+    more(text, found.cuts.len(), "gaps")?;
+    for part in found.dropped.iter().take(LINES) {
+        let (first, last) = (part.first, part.last);
+        writeln!(text, "left out: {} samples between gaps, rows {first}-{last} of {}", part.samples, part.file)?;
+    }
+    more(text, found.dropped.len(), "stretches between gaps")
+}
+
+/// How many more there are than were shown.
+fn more(text: &mut String, all: usize, what: &str) -> std::fmt::Result {
+    match all.checked_sub(LINES) {
+        Some(rest) if rest > 0 => writeln!(text, "and {rest} more {what}"),
+        _ => Ok(()),
+    }
+}
+
+/// One suspicious place.
+fn suspicion(s: &Suspicion) -> Vec<String> {
+    let size = short(s.size);
+    let what = match s.kind {
+        Kind::Outlier => format!("outlier, off by {size}"),
+        Kind::Jump => format!("all later positions are shifted by {size}"),
+        Kind::Kink => format!("the velocity jumps by {size}: an impact?"),
+        Kind::Frozen => format!("{} equal values: a frozen sensor?", s.size),
+    };
+    vec![s.track.clone(), s.row.to_string(), s.coordinate.clone(), short(s.value), what]
+}
+
+/// What a fit would do.
+fn advice(text: &mut String, found: &Survey) -> std::fmt::Result {
+    let worst = found.coordinates.iter().map(|c| c.acceleration_error_relative).fold(0.0, f64::max);
+    let limit = percent(LARGE_ERROR);
+    writeln!(text)?;
+    match found.method {
+        Method::Smoothing => writeln!(
+            text,
+            "advice: learn from smoothed derivatives (polynomials of degree {}): their accelerations are good to {}, \
+             better than {limit}",
+            found.degree,
+            percent(worst)
+        )?,
+        Method::Shooting => writeln!(
+            text,
+            "advice: learn through the motion (multiple shooting): accelerations by smoothing are good to {}, no better \
+             than {limit}",
+            percent(worst)
+        )?,
+    }
+    let enough = found.coordinates.iter().all(|c| c.samples_per_period >= FEW_SAMPLES);
+    if enough && found.warnings.is_empty() {
+        writeln!(text, "sampling is fine: at least {FEW_SAMPLES} samples per period of the fast motion")?;
+    }
+    match found.held_out_text.as_str() {
+        "" => Ok(()),
+        held => writeln!(text, "held out for validation: {held}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_have_four_digits() {
+        let texts = [0.0, 1.0, -0.012_345_6, 98_765.4, 1e-9, 123_456.0].map(short);
+        assert_eq!(texts, ["0", "1.000", "-0.01235", "98765", "1.000e-9", "1.235e5"]);
+        assert_eq!((percent(0.0123).as_str(), percent(f64::NAN).as_str()), ("1.230 %", "-"));
+    }
+}

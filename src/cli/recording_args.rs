@@ -1,0 +1,83 @@
+//! Files of recorded motion and the meaning of their columns, as arguments.
+
+use crate::cli::{CliError, number};
+use crate::recording::read::{DataError, read_recording};
+use crate::recording::{Columns, Reading};
+use std::path::PathBuf;
+
+/// Recorded motion.
+#[derive(Clone, Debug, clap::Args)]
+pub struct RecordingArgs {
+    /// Files of recorded motion: CSV, NPY or NPZ; each holds a trajectory, or several told apart by a column.
+    #[arg(required = true, value_name = "DATA")]
+    pub data: Vec<PathBuf>,
+    /// Columns of the coordinates, by name or by number from 1.
+    #[arg(long, value_name = "q1,q2", value_delimiter = ',', required = true)]
+    pub coords: Vec<String>,
+    /// Columns of measured velocities, one per coordinate.
+    #[arg(long, value_name = "v1,v2", value_delimiter = ',')]
+    pub velocity: Vec<String>,
+    /// Columns of measured accelerations, one per coordinate.
+    #[arg(long, value_name = "a1,a2", value_delimiter = ',')]
+    pub acceleration: Vec<String>,
+    /// Columns of known external generalized forces, one per coordinate.
+    #[arg(long, value_name = "f1,f2", value_delimiter = ',')]
+    pub force: Vec<String>,
+    /// Column of time; without it and without a rate, the one called t or time.
+    #[arg(long, value_name = "COLUMN", conflicts_with = "rate")]
+    pub time: Option<String>,
+    /// Samples per second, if no column holds the time.
+    #[arg(long, value_name = "HZ", value_parser = number::positive)]
+    pub rate: Option<f64>,
+    /// Column whose value tells the trajectories of a file apart.
+    #[arg(long, value_name = "COLUMN")]
+    pub trajectory: Option<String>,
+    /// Coordinates that are angles, in rad or with a unit; they are unwrapped.
+    #[arg(long, value_name = "q1,q2", value_delimiter = ',')]
+    pub periodic: Vec<String>,
+    /// Units of columns that are not SI, or factors to SI, such as theta=deg,t=ms,x=0.01.
+    #[arg(long, value_name = "COLUMN=UNIT", value_delimiter = ',', value_parser = unit)]
+    pub units: Vec<(String, String)>,
+    /// Names of all columns of files without a header.
+    #[arg(long, value_name = "a,b,c", value_delimiter = ',')]
+    pub columns: Vec<String>,
+}
+
+/// `column=unit`.
+fn unit(text: &str) -> Result<(String, String), String> {
+    match text.split_once('=') {
+        Some((column, unit)) if !column.trim().is_empty() && !unit.trim().is_empty() => {
+            Ok((column.trim().to_string(), unit.trim().to_string()))
+        }
+        _ => Err("expected COLUMN=UNIT".to_string()),
+    }
+}
+
+impl RecordingArgs {
+    /// What the columns mean.
+    pub fn meaning(&self) -> Columns {
+        Columns {
+            coords: self.coords.clone(),
+            velocity: self.velocity.clone(),
+            acceleration: self.acceleration.clone(),
+            force: self.force.clone(),
+            time: self.time.clone(),
+            rate: self.rate,
+            trajectory: self.trajectory.clone(),
+            periodic: self.periodic.clone(),
+            units: self.units.clone(),
+            names: (!self.columns.is_empty()).then(|| self.columns.clone()),
+        }
+    }
+
+    /// Reads the files.
+    ///
+    /// # Errors
+    /// A usage error for arguments that contradict each other, a data error for the first file that is not as said.
+    pub fn read(&self) -> Result<Reading, CliError> {
+        read_recording(&self.data, &self.meaning()).map_err(|error| match error {
+            DataError::Columns(_) | DataError::NoFiles => CliError::usage(error),
+            DataError::File { .. } => CliError::data(error),
+        })
+    }
+}

@@ -1,0 +1,90 @@
+//! What is known about one coordinate.
+
+use super::consistency::{Consistency, compare};
+use crate::recording::Recording;
+use crate::recording::smooth::{Chosen, Smoothing};
+use serde::Serialize;
+use std::f64::consts::TAU;
+
+/// Range, noise and motion of one coordinate, and what smoothing would make of it; in SI.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct CoordinateSurvey {
+    /// Its name.
+    pub name: String,
+    /// Whether it is an angle, unwrapped.
+    pub periodic: bool,
+    /// Least value.
+    pub min: f64,
+    /// Largest value.
+    pub max: f64,
+    /// Standard deviation of the noise, estimated from the data.
+    pub noise: f64,
+    /// The noise over the range.
+    pub noise_relative: f64,
+    /// Whether motion and noise can be told apart; if not, `noise` is an upper bound.
+    pub noise_resolved: bool,
+    /// Root mean square of the velocity about its mean.
+    pub velocity: f64,
+    /// Root mean square of the acceleration.
+    pub acceleration: f64,
+    /// Period in s of the fast part of the motion, `2 pi rms(v) / rms(a)`: of a sine its period, of many frequencies that
+    /// of their root mean square in the velocity's spectrum (Rice 1944).
+    pub period: f64,
+    /// Samples in such a period.
+    pub samples_per_period: f64,
+    /// Window that smoothing would use, in samples.
+    pub window: usize,
+    /// The window in s.
+    pub window_seconds: f64,
+    /// Error of velocities by smoothing, noise and bias together, root mean square.
+    pub velocity_error: f64,
+    /// Error of accelerations by smoothing.
+    pub acceleration_error: f64,
+    /// The latter over the size of the accelerations.
+    pub acceleration_error_relative: f64,
+    /// Measured velocities against derivatives of positions.
+    pub measured_velocity: Option<Consistency>,
+    /// Measured accelerations against second derivatives of positions.
+    pub measured_acceleration: Option<Consistency>,
+    /// Steps between samples of more than 2 rad, of an angle: which way it went is a guess.
+    pub ambiguous_turns: usize,
+    /// Row and trajectory of the first such step.
+    pub first_ambiguous: Option<(String, u64)>,
+}
+
+impl CoordinateSurvey {
+    /// Looks at coordinate `i`. `alone` smooths positions only, `planned` is what a fit would do.
+    pub fn new(recording: &Recording, i: usize, alone: &Smoothing, planned: &Chosen) -> Self {
+        let n = recording.n();
+        let values = || recording.tracks.iter().flat_map(|track| track.q.iter().skip(i).step_by(n).copied());
+        let (min, max) = values().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)));
+        let Chosen { noise, quality, seconds, .. } = *planned;
+        let period = TAU * quality.velocity / quality.acceleration;
+        let measured = |derivative: usize| {
+            let all = recording.tracks.iter().all(|t| !if derivative == 1 { &t.v } else { &t.a }.is_empty());
+            (all && !recording.tracks.is_empty()).then(|| compare(recording, i, derivative, alone))
+        };
+        Self {
+            name: recording.coordinates[i].clone(),
+            periodic: recording.periodic[i],
+            min,
+            max,
+            noise: noise.sigma,
+            noise_relative: noise.sigma / (max - min),
+            noise_resolved: noise.resolved,
+            velocity: quality.velocity,
+            acceleration: quality.acceleration,
+            period,
+            samples_per_period: period / alone.step,
+            window: quality.window,
+            window_seconds: seconds,
+            velocity_error: quality.total(1),
+            acceleration_error: quality.total(2),
+            acceleration_error_relative: quality.relative(),
+            measured_velocity: measured(1),
+            measured_acceleration: measured(2),
+            ambiguous_turns: 0,
+            first_ambiguous: None,
+        }
+    }
+}

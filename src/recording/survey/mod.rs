@@ -1,0 +1,190 @@
+//! What recorded motion is good for, before anything is learned from it.
+
+mod consistency;
+mod coordinate;
+mod suspicious;
+mod warnings;
+
+pub use consistency::Consistency;
+pub use coordinate::CoordinateSurvey;
+pub use suspicious::{Kind, Suspicion};
+
+use crate::recording::smooth::{SmoothError, SmoothOptions, Smoothing};
+use crate::recording::statistics::steps;
+use crate::recording::{Cut, Dropped, HeldOut, Reading};
+use serde::Serialize;
+
+/// Samples per period of the fast motion below which sampling is called coarse.
+pub const FEW_SAMPLES: f64 = 20.0;
+/// Relative error of accelerations by smoothing above which shooting is advised.
+pub const LARGE_ERROR: f64 = 0.1;
+/// A step of an angle, in rad, from which on unwrapping is a guess.
+const GUESS: f64 = 2.0;
+
+/// How to look.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SurveyOptions {
+    /// How derivatives would be taken.
+    pub smooth: SmoothOptions,
+    /// Share of the samples that would be held out for validation.
+    pub validation: f64,
+    /// Seed of the choice of what is held out.
+    pub seed: u64,
+}
+
+impl Default for SurveyOptions {
+    fn default() -> Self {
+        Self { smooth: SmoothOptions::default(), validation: 0.2, seed: 0 }
+    }
+}
+
+/// How a Lagrangian is learned from positions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Method {
+    /// From derivatives by local polynomials.
+    Smoothing,
+    /// Through the motion, by multiple shooting.
+    Shooting,
+}
+
+/// One trajectory.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct TrackSurvey {
+    /// Its name.
+    pub name: String,
+    /// Row of its first sample in the file.
+    pub first_row: u64,
+    /// Row of its last sample.
+    pub last_row: u64,
+    /// Its samples.
+    pub samples: usize,
+    /// First time in s.
+    pub start: f64,
+    /// Last time in s.
+    pub end: f64,
+    /// Samples per second, by the median step.
+    pub rate: f64,
+    /// Robust standard deviation of the steps over their median.
+    pub jitter: f64,
+}
+
+/// Everything there is to say.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Survey {
+    /// Files read.
+    pub files: usize,
+    /// Column of time; none if times follow from the rate.
+    pub time: Option<String>,
+    /// Samples of all trajectories.
+    pub samples: usize,
+    /// Median step in s.
+    pub step: f64,
+    /// The trajectories.
+    pub tracks: Vec<TrackSurvey>,
+    /// Rows left out because they repeat the row before.
+    pub duplicates: usize,
+    /// Gaps in time.
+    pub cuts: Vec<Cut>,
+    /// Stretches between gaps that are too short.
+    pub dropped: Vec<Dropped>,
+    /// The coordinates.
+    pub coordinates: Vec<CoordinateSurvey>,
+    /// Places that do not look like smooth motion with noise; of very many the first.
+    pub suspicious: Vec<Suspicion>,
+    /// How many there are.
+    pub suspicious_count: usize,
+    /// Degree of the polynomials of smoothing.
+    pub degree: usize,
+    /// The advised way to learn.
+    pub method: Method,
+    /// What would be held out for validation.
+    pub held_out: Option<HeldOut>,
+    /// The same in words.
+    pub held_out_text: String,
+    /// What to know before learning.
+    pub warnings: Vec<String>,
+}
+
+/// Looks at a recording. Every sample is looked at once; windows of smoothing are tried at places spread evenly, so that
+/// ten million samples take seconds.
+///
+/// # Errors
+/// [`SmoothError`] for options out of range, or trajectories too short for any window.
+pub fn survey(reading: &Reading, options: &SurveyOptions) -> Result<Survey, SmoothError> {
+    let recording = &reading.recording;
+    let n = recording.n();
+    let alone = Smoothing::choose(recording, &SmoothOptions { velocities: false, ..options.smooth.clone() })?;
+    let look = |planned: &Smoothing| -> Vec<CoordinateSurvey> {
+        (0..n).map(|i| CoordinateSurvey::new(recording, i, &alone, &planned.coordinates[i])).collect()
+    };
+    let mut coordinates = look(&alone);
+    // Velocities take part only where they are what they are called.
+    let measured = options.smooth.velocities && n > 0;
+    let mut planned = alone.clone();
+    if measured && coordinates.iter().all(|c| c.measured_velocity.is_some_and(|v| v.holds())) {
+        planned = Smoothing::choose(recording, &options.smooth)?;
+        coordinates = look(&planned);
+    }
+    let (mut suspicious, mut suspicious_count) = (Vec::new(), 0);
+    for (i, coordinate) in coordinates.iter_mut().enumerate() {
+        suspicious_count += suspicious::find(reading, i, coordinate.noise, &mut suspicious);
+        if coordinate.periodic {
+            guesses(reading, i, coordinate);
+        }
+    }
+    let tracks = recording.tracks.iter().zip(&reading.rows).filter(|(track, _)| !track.is_empty());
+    let tracks = tracks.map(|(track, rows)| {
+        let (step, spread) = steps(&track.times);
+        let last = track.len() - 1;
+        TrackSurvey {
+            name: track.name.clone(),
+            first_row: rows.row(0),
+            last_row: rows.row(last),
+            samples: track.len(),
+            start: track.times[0],
+            end: track.times[last],
+            rate: 1.0 / step,
+            jitter: spread / step,
+        }
+    });
+    let worst = coordinates.iter().filter(|c| c.min < c.max).map(|c| c.acceleration_error_relative);
+    let large = worst.fold(0.0, f64::max) > LARGE_ERROR;
+    let held_out = HeldOut::choose(recording, options.validation, planned.window(), options.seed).ok();
+    let mut survey = Survey {
+        files: reading.files,
+        time: reading.time.clone(),
+        samples: recording.samples(),
+        step: alone.step,
+        tracks: tracks.collect(),
+        duplicates: reading.duplicates,
+        cuts: reading.cuts.clone(),
+        dropped: reading.dropped.clone(),
+        coordinates,
+        suspicious,
+        suspicious_count,
+        degree: planned.degree,
+        method: if large { Method::Shooting } else { Method::Smoothing },
+        held_out_text: held_out.as_ref().map(|held| held.describe(recording)).unwrap_or_default(),
+        held_out,
+        warnings: Vec::new(),
+    };
+    survey.warnings = warnings::warnings(&survey);
+    Ok(survey)
+}
+
+/// Counts steps of an angle between samples that are too long to be unwrapped.
+fn guesses(reading: &Reading, i: usize, coordinate: &mut CoordinateSurvey) {
+    let n = reading.recording.n();
+    for (track, rows) in reading.recording.tracks.iter().zip(&reading.rows) {
+        for k in 1..track.len() {
+            if (track.q[k * n + i] - track.q[(k - 1) * n + i]).abs() > GUESS {
+                coordinate.ambiguous_turns += 1;
+                coordinate.first_ambiguous.get_or_insert_with(|| (track.name.clone(), rows.row(k)));
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,198 @@
+//! Samples that do not look like motion: spikes, jumps, kinks, frozen sensors.
+
+use crate::recording::Reading;
+use crate::recording::smooth::{contrast_weights, is_regular};
+use crate::recording::statistics::robust_deviation;
+use serde::Serialize;
+
+/// Points of a contrast: sixth differences.
+const POINTS: usize = 7;
+/// Contrasts that far from 0, in standard deviations, are no noise.
+const LIMIT: f64 = 6.0;
+/// Fewest equal values in a row that may be a frozen sensor.
+const FROZEN: usize = 8;
+/// Suspicions that are kept.
+const MOST: usize = 1000;
+
+/// What is suspicious.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Kind {
+    /// One sample far from its neighbours.
+    Outlier,
+    /// The position jumps: everything after is shifted.
+    Jump,
+    /// The velocity jumps, as in an impact.
+    Kink,
+    /// The same value again and again while things move before and after.
+    Frozen,
+}
+
+/// A place in the data that does not look like smooth motion with noise.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Suspicion {
+    /// Name of the trajectory.
+    pub track: String,
+    /// Row of the file (line, or row of an array, from 1).
+    pub row: u64,
+    /// Name of the coordinate.
+    pub coordinate: String,
+    /// What it looks like.
+    pub kind: Kind,
+    /// Its value there.
+    pub value: f64,
+    /// How far the sample or all later ones are off; of a kink, by how much the velocity changes; of a frozen sensor,
+    /// the number of equal values.
+    pub size: f64,
+}
+
+/// The alternating binomials that one sample, a jump and a kink leave in sixth differences.
+const PATTERNS: [(Kind, &[f64]); 3] = [
+    (Kind::Outlier, &[1.0, -6.0, 15.0, -20.0, 15.0, -6.0, 1.0]),
+    (Kind::Jump, &[1.0, -5.0, 10.0, -10.0, 5.0, -1.0]),
+    (Kind::Kink, &[1.0, -4.0, 6.0, -4.0, 1.0]),
+];
+
+/// All suspicions of coordinate `i`, the first of them in detail, and how many there are.
+///
+/// Sixth differences, scaled to the noise of one sample, are noise alone where motion is smooth. Where one is beyond six
+/// standard deviations (robust, from their median) and its neighbours have the other sign (motion that is sampled too
+/// coarsely has the same), the pattern around it tells what happened.
+pub fn find(reading: &Reading, i: usize, sigma: f64, found: &mut Vec<Suspicion>) -> usize {
+    let (recording, n) = (&reading.recording, reading.recording.n());
+    let (mut count, mut z) = (0, Vec::new());
+    for (track, rows) in recording.tracks.iter().zip(&reading.rows) {
+        let mut report = |at: usize, kind: Kind, size: f64| {
+            count += 1;
+            if found.len() < MOST {
+                let (name, coordinate) = (track.name.clone(), recording.coordinates[i].clone());
+                let (row, value) = (rows.row(at), track.q[at * n + i]);
+                found.push(Suspicion { track: name, row, coordinate, kind, value, size });
+            }
+        };
+        let q = |at: usize| track.q[at * n + i];
+        frozen(track.len(), q, sigma, |at, length| report(at, Kind::Frozen, length as f64));
+        if track.len() < 2 * POINTS {
+            continue;
+        }
+        differences(&track.times, q, &mut z);
+        let stride = (z.len() >> 16).max(1);
+        let mut some: Vec<f64> = z.iter().step_by(stride).copied().collect();
+        let limit = LIMIT * robust_deviation(&mut some).max(sigma);
+        let mut quiet_from = 0;
+        for k in 1..z.len() - 1 {
+            let far = z[k].abs() > limit && z[k] * z[k - 1] < 0.0 && z[k] * z[k + 1] < 0.0;
+            let peak = z[k].abs() >= z[k - 1].abs() && z[k].abs() >= z[k + 1].abs();
+            if far && peak && k >= quiet_from {
+                let (kind, at, size) = classify(&z, k);
+                let step = track.times[at] - track.times[at - 1];
+                report(at, kind, if kind == Kind::Kink { size / step } else { size });
+                quiet_from = k + POINTS;
+            }
+        }
+    }
+    count
+}
+
+/// Contrasts of seven neighbours each, the first of them that of samples 0 to 6.
+fn differences(times: &[f64], q: impl Fn(usize) -> f64, z: &mut Vec<f64>) {
+    z.clear();
+    let regular = is_regular(times);
+    let mut weights = [0.0; POINTS];
+    for (start, window) in times.windows(POINTS).enumerate() {
+        if start == 0 || !regular {
+            contrast_weights(window, &mut weights);
+        }
+        let origin = q(start);
+        z.push(weights.iter().enumerate().map(|(j, weight)| weight * (q(start + j) - origin)).sum());
+    }
+}
+
+/// Which pattern explains most of the contrasts around the peak `k`, the first sample concerned, and the size.
+fn classify(z: &[f64], k: usize) -> (Kind, usize, f64) {
+    // Contrast `j` concerns samples `j..j + 7`; scaled by the norm of the seven weights of equal steps.
+    let norm = PATTERNS[0].1.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let mut best = (0.0, Kind::Outlier, k + POINTS / 2, 0.0);
+    for (kind, pattern) in PATTERNS {
+        for first in (k + 2).saturating_sub(pattern.len())..=k {
+            let Some(part) = z.get(first..first + pattern.len()) else { continue };
+            let product: f64 = part.iter().zip(pattern).map(|(x, p)| x * p).sum();
+            let square: f64 = pattern.iter().map(|p| p * p).sum();
+            if product * product / square > best.0 {
+                // The first contrast of the pattern ends at the first sample that is off.
+                best = (product * product / square, kind, first + POINTS - 1, product / square * norm);
+            }
+        }
+    }
+    (best.1, best.2, best.3)
+}
+
+/// Calls `report` with the first sample and the length of runs of equal values between which things move.
+fn frozen(samples: usize, q: impl Fn(usize) -> f64, sigma: f64, mut report: impl FnMut(usize, usize)) {
+    let stride = (samples >> 16).max(1);
+    let changes = (1..samples).step_by(stride).map(|k| (q(k) - q(k - 1)).abs()).filter(|x| *x > 0.0);
+    // A curve on a grid that stands still for L samples in a turning point is nine grid lines away L samples before.
+    let moved = 6.0 * sigma + 12.0 * changes.fold(f64::INFINITY, f64::min);
+    let mut start = 0;
+    for k in 1..=samples {
+        if k < samples && q(k) == q(start) {
+            continue;
+        }
+        let length = k - start;
+        if length >= FROZEN && length < samples {
+            let before = (q(start) - q(start.saturating_sub(length))).abs();
+            let after = (q((k - 1 + length).min(samples - 1)) - q(k - 1)).abs();
+            if before > moved || after > moved {
+                report(start, length);
+            }
+        }
+        start = k;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::recording::{Recording, Track};
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    fn survey(change: impl Fn(usize, f64) -> f64) -> Vec<(u64, Kind, f64)> {
+        let mut rng = ChaCha8Rng::seed_from_u64(11);
+        let times: Vec<f64> = (0..3000).map(|k| f64::from(k) * 0.01).collect();
+        let mut noisy = |x: f64| x + 1e-3 * Distribution::<f64>::sample(&StandardNormal, &mut rng);
+        let clean: Vec<f64> = times.iter().map(|t| noisy((3.0 * t).sin() + 0.2 * (11.0 * t).cos())).collect();
+        let q = clean.iter().enumerate().map(|(k, x)| change(k, *x)).collect();
+        let track = Track { name: "t".into(), times, q, v: vec![], a: vec![], force: vec![] };
+        let recording = Recording { coordinates: vec!["x".into()], periodic: vec![false], tracks: vec![track] };
+        let mut found = Vec::new();
+        let count = find(&Reading::from(recording), 0, 1e-3, &mut found);
+        assert_eq!(count, found.len());
+        found.into_iter().map(|s| (s.row, s.kind, s.size)).collect()
+    }
+
+    #[test]
+    fn what_happened_is_told() {
+        assert_eq!(survey(|_, x| x), []);
+        let near = |found: Vec<(u64, Kind, f64)>, row: u64, kind: Kind, size: f64| {
+            let [(at, what, by)] = found[..] else { panic!("{found:?}") };
+            assert_eq!((at, what), (row, kind));
+            assert!((by / size - 1.0).abs() < 0.1, "{by} {size}");
+        };
+        near(survey(|k, x| if k == 1234 { x + 0.05 } else { x }), 1235, Kind::Outlier, 0.05);
+        near(survey(|k, x| if k >= 1234 { x - 0.1 } else { x }), 1235, Kind::Jump, -0.1);
+        let frozen = survey(|k, x| if (500..540).contains(&k) { 0.25 } else { x });
+        assert!(frozen.contains(&(501, Kind::Frozen, 40.0)), "{frozen:?}");
+        let kinked = survey(|k, x| if k >= 2000 { x + 5.0 * (k - 2000) as f64 * 0.01 } else { x });
+        let [(row, Kind::Kink, size)] = kinked[..] else { panic!("{kinked:?}") };
+        assert!((2000..=2003).contains(&row) && (size / 5.0 - 1.0).abs() < 0.2, "{row} {size}");
+    }
+
+    #[test]
+    fn grids_are_not_frozen() {
+        // Values on a grid of 0.05 stand still at every turning point.
+        let found = survey(|_, x| (x / 0.05).round() * 0.05);
+        assert!(found.iter().all(|(_, kind, _)| *kind != Kind::Frozen), "{found:?}");
+    }
+}

@@ -1,0 +1,64 @@
+//! What a reader should know before learning from the data.
+
+use super::suspicious::Kind;
+use super::{FEW_SAMPLES, Survey};
+use std::f64::consts::TAU;
+
+/// One sentence each.
+pub fn warnings(survey: &Survey) -> Vec<String> {
+    let mut all = Vec::new();
+    for c in &survey.coordinates {
+        let name = &c.name;
+        if c.min == c.max {
+            all.push(format!("{name} never moves: nothing can be learned about it"));
+            continue;
+        }
+        if let Some((track, row)) = &c.first_ambiguous {
+            all.push(format!(
+                "{name} turns by more than 2 rad between samples {} times, first at row {row} of {track}: which way is a \
+                 guess",
+                c.ambiguous_turns
+            ));
+        }
+        if !c.noise_resolved {
+            all.push(format!("{name}: motion and noise cannot be told apart, the noise is at most what is said"));
+        }
+        if c.samples_per_period < FEW_SAMPLES {
+            all.push(format!(
+                "{name}: {:.1} samples per period of its fast motion ({:.3e} s), expected at least {FEW_SAMPLES}: sample \
+                 faster",
+                c.samples_per_period, c.period
+            ));
+        }
+        let measured = [("velocity", 1, &c.measured_velocity), ("acceleration", 2, &c.measured_acceleration)];
+        for (what, derivative, consistency) in measured {
+            if let Some(consistency) = consistency.filter(|c| !c.holds()) {
+                let order = ["", "", "second "][derivative];
+                let hint = consistency.mistake(survey.step).map(|text| format!(": {text}")).unwrap_or_default();
+                all.push(format!(
+                    "the measured {what} of {name} is {:.4} times the {order}derivative of its positions (correlation \
+                     {:.3}){hint}",
+                    consistency.factor, consistency.correlation
+                ));
+            }
+        }
+        let wraps = |turn: f64| {
+            let jumps = survey.suspicious.iter().filter(|s| s.kind == Kind::Jump && s.coordinate == *name);
+            jumps.filter(|s| (s.size.abs() / turn - 1.0).abs() < 0.15).count()
+        };
+        if !c.periodic && wraps(TAU) > 0 {
+            all.push(format!("{name} jumps by a full turn {} times: is it an angle (--periodic {name})?", wraps(TAU)));
+        }
+        if wraps(360.0) > 0 {
+            let count = wraps(360.0);
+            all.push(format!("{name} jumps by 360 {count} times: is it an angle in degrees (--units {name}=deg)?"));
+        }
+    }
+    if survey.suspicious_count > 0 {
+        all.push(format!("{} places do not look like smooth motion with noise", survey.suspicious_count));
+    }
+    if survey.held_out.is_none() {
+        all.push("too few samples to hold out a validation part".to_string());
+    }
+    all
+}
