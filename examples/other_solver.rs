@@ -54,7 +54,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let scale = kinetic.fold(0.0, f64::max);
     let drift = (high - low) / scale;
     println!("{} steps, energy constant to {drift:.1e} of the largest kinetic energy", q.len());
-    // Some hundred steps, each allowed an error of 1e-11 (1 + |x|).
+    // 145 steps, each allowed an error of 1e-11 (1 + |x|).
     assert!(q.len() > 50 && scale > 0.0 && drift < 1e-7, "not conserved");
     Ok(())
 }
