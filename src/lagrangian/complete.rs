@@ -7,7 +7,8 @@ use crate::scalar::{Real, Scalar};
 impl<S: Scalar> Terms<S> {
     /// Empties every field, keeping the buffers.
     pub fn clear(&mut self) {
-        let Self { lagrangian, momentum, dl_dq, mass_matrix, coriolis, force, dissipation, acceleration, energy } = self;
+        let Self { lagrangian, momentum, dl_dq, mass_matrix, coriolis, force, dissipation, acceleration, energy } =
+            self;
         for field in [lagrangian, momentum, dl_dq, mass_matrix, coriolis, force, dissipation, acceleration, energy] {
             field.clear();
         }

@@ -198,9 +198,12 @@ impl<S: Scalar> EulerLagrange<S> for NetworkLagrangian<S> {
             return shape("velocities", q.len(), v.len());
         }
         terms.clear();
-        let mut workspace = self.idle.lock().unwrap_or_else(PoisonError::into_inner).pop().unwrap_or_else(|| {
-            Workspace::new(&self.architecture)
-        });
+        let mut workspace = self
+            .idle
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .pop()
+            .unwrap_or_else(|| Workspace::new(&self.architecture));
         let depth = Self::depth(request);
         for states in q.chunks(CHUNK * n).zip(v.chunks(CHUNK * n)) {
             workspace.append(self, states, (request, depth), terms);

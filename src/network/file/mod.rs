@@ -176,7 +176,8 @@ fn slots(architecture: &Architecture) -> Result<Vec<Slot>, ModelFileError> {
     }
     if let Some(dissipation) = layout.dissipation {
         let DissipationLayout { units, features, coordinates, .. } = dissipation;
-        let mut push = |part: &str, shape, range| slots.push(Slot { name: format!("dissipation.{part}"), shape, range });
+        let mut push =
+            |part: &str, shape, range| slots.push(Slot { name: format!("dissipation.{part}"), shape, range });
         push("gamma", vec![units], dissipation.gamma_range());
         push("weight", vec![units, features], dissipation.weight_range());
         push("direction", vec![units, coordinates], dissipation.direction_range());
