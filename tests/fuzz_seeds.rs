@@ -64,6 +64,11 @@ fn states_csv() {
 }
 
 #[test]
+fn recording() {
+    try_target("recording", 2000, targets::recording::run);
+}
+
+#[test]
 fn config() {
     try_target("config", 3000, targets::config::run);
 }

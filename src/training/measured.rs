@@ -5,6 +5,7 @@
 //! be fitted through its motion ([`shooting`](crate::training::shooting)).
 
 use crate::recording::smooth::{SmoothError, SmoothOptions, Smoothed, Smoothing};
+use crate::recording::survey::LARGE_ERROR;
 use crate::recording::{HeldOut, HoldOutError, Recording};
 use crate::scalar::Scalar;
 use crate::training::config::Config;
@@ -26,9 +27,6 @@ pub enum Targets {
     /// The motion itself, from the network that smoothed or measured accelerations give.
     Motion,
 }
-
-/// Relative error of smoothed accelerations above which the motion itself is the better teacher.
-const NOISY: f64 = 0.1;
 
 /// How recorded motion is prepared.
 #[derive(Clone, Debug, PartialEq)]
@@ -169,7 +167,7 @@ impl Measured {
     pub fn advice(&self) -> Targets {
         if self.training.has_accelerations() {
             Targets::Measured
-        } else if self.acceleration_error() <= NOISY {
+        } else if self.acceleration_error() <= LARGE_ERROR {
             Targets::Smoothed
         } else {
             Targets::Motion
