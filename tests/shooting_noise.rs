@@ -182,6 +182,7 @@ fn shooting_beats_smoothing() {
         tracks.iter().zip(&smoothed).map(|(track, [q, v, _])| Estimated { track, q, v }).collect();
     let noise = Noise { q: sigma, v: vec![] };
     let settings = std::env::var("SHOOTING").unwrap_or("{}".to_string());
+    let mut worst = 0.0_f64;
     for text in settings.split(';') {
         let settings: Shooting = serde_json::from_str(text).unwrap();
         let task = Task {
@@ -227,6 +228,7 @@ fn shooting_beats_smoothing() {
             fitted.seconds
         );
         let shooting = judge("  shooting", &exact, &architecture, &fitted.weights, &fresh);
-        assert!(shooting < smoothing);
+        worst = worst.max(shooting);
     }
+    assert!(worst < smoothing);
 }

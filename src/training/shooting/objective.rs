@@ -13,7 +13,7 @@ use crate::training::shooting::starts::{Curvature, Linearisation};
 use rayon::prelude::*;
 
 /// Segments integrated together.
-const CHUNK: usize = 16;
+const CHUNK: usize = 8;
 /// Stripes a batch is cut into at most; each has its own gradient.
 const STRIPES: usize = 8;
 
@@ -61,8 +61,9 @@ pub(super) struct Stripe<S> {
     /// Residuals, by request.
     values: Vec<S>,
     linear: Linearisation<S>,
-    /// Curvatures, `(rows, 2n, 2n)`, by request.
+    /// Curvatures, `(rows, 2n, 2n)`, and derivatives of residuals and gaps, by request.
     curvature: Vec<S>,
+    jacobian: Vec<S>,
     /// Of residuals and gaps.
     sums: [Sum<S>; 2],
     counted: usize,
@@ -82,6 +83,7 @@ impl<S: Scalar> Stripe<S> {
             values: Vec::new(),
             linear: Linearisation::default(),
             curvature: Vec::new(),
+            jacobian: Vec::new(),
             sums: Default::default(),
             counted: 0,
             gaps: 0,
@@ -94,9 +96,8 @@ impl<S: Scalar> Stripe<S> {
     fn reset(&mut self, parameters: usize) {
         self.gradient.clear();
         self.gradient.resize(parameters, <S as Real>::zero());
-        for list in [&mut self.start_gradient, &mut self.next_gradient, &mut self.values, &mut self.curvature] {
-            list.clear();
-        }
+        let lists = [&mut self.start_gradient, &mut self.next_gradient, &mut self.values];
+        lists.into_iter().chain([&mut self.curvature, &mut self.jacobian]).for_each(Vec::clear);
         (self.sums, self.penalty) = (Default::default(), Sum::default());
         (self.counted, self.gaps, self.penalised, self.left_out) = (0, 0, 0, 0);
     }
@@ -159,7 +160,7 @@ impl<S: Scalar> Stripe<S> {
         self.collect(given, rows, &mut linear.base);
         linear.alive.clone_from(&self.integrator.alive);
         linear.moved.clear();
-        let (n, width) = (given.segments.n, 2 * given.segments.n);
+        let width = 2 * given.segments.n;
         for k in 0..width {
             let by = linear.difference(given.segments, k);
             let starts = rows.iter().flat_map(|&row| &given.starts[row as usize * width..][..width]);
@@ -171,21 +172,47 @@ impl<S: Scalar> Stripe<S> {
                 *all &= alive;
             }
         }
-        linear.add(given.segments, rows, huber, continuity, (&mut self.curvature, &mut self.start_gradient));
-        debug_assert_eq!(self.start_gradient.len() % n, 0);
+        let parts = (&mut self.curvature, &mut self.jacobian, &mut self.start_gradient);
+        linear.add(given.segments, rows, huber, continuity, parts);
         self.linear = linear;
+    }
+
+    /// Gradients by the starts of a chunk, with the derivatives of an earlier linearisation.
+    fn add_start_gradients(
+        &mut self,
+        given: &Given<'_, S>,
+        rows: &[u32],
+        curvature: &Curvature<S>,
+        (huber, continuity): (Huber<S>, S),
+    ) {
+        self.shoot(given, rows);
+        self.add_losses(given, rows, huber, (<S as Real>::one(), continuity));
+        let mut values = std::mem::take(&mut self.values);
+        for (row, &segment) in rows.iter().enumerate() {
+            let from = self.start_gradient.len();
+            self.start_gradient.resize(from + 2 * given.segments.n, <S as Real>::zero());
+            if self.integrator.alive[row] {
+                values.clear();
+                self.collect_row(given, (row, segment as usize), &mut values);
+                let gradient = &mut self.start_gradient[from..];
+                curvature.add_gradient(given.segments, segment as usize, &values, huber, continuity, gradient);
+            }
+        }
+        self.values = values;
     }
 
     /// All residuals and gaps of the chunk that was shot, row by row.
     fn collect(&self, given: &Given<'_, S>, rows: &[u32], out: &mut Vec<S>) {
+        rows.iter().enumerate().for_each(|(row, &segment)| self.collect_row(given, (row, segment as usize), out));
+    }
+
+    /// Residuals, then the gap, of one row.
+    fn collect_row(&self, given: &Given<'_, S>, place: (usize, usize), out: &mut Vec<S>) {
         let width = 2 * given.segments.n;
-        for (row, &segment) in rows.iter().enumerate() {
-            let place = (row, segment as usize);
-            each_residual(&self.integrator, given.segments, place, |residual| out.push(residual.value));
-            if given.segments.list[place.1].has_next {
-                let next = &given.starts[(place.1 + 1) * width..][..width];
-                out.extend((0..width).map(|k| gap(&self.integrator, given.segments, place, next, k)));
-            }
+        each_residual(&self.integrator, given.segments, place, |residual| out.push(residual.value));
+        if given.segments.list[place.1].has_next {
+            let next = &given.starts[(place.1 + 1) * width..][..width];
+            out.extend((0..width).map(|k| gap(&self.integrator, given.segments, place, next, k)));
         }
     }
 }
@@ -329,9 +356,30 @@ impl<S: Scalar> Shots<S> {
         let stripes = self.run(&rows, 0, |stripe, rows| stripe.add_curvature(&given, rows, huber, continuity));
         let mut gradient = vec![<S as Real>::zero(); starts.len()];
         self.gather_starts(stripes, &rows, segments, &mut gradient);
-        curvature.set(self.stripes[..stripes].iter().flat_map(|stripe| stripe.curvature.iter().copied()));
+        let parts = self.stripes[..stripes].iter().map(|s| (s.curvature.as_slice(), s.jacobian.as_slice()));
+        curvature.set(segments, parts);
         curvature.correct(segments, starts, &gradient, share);
         self.report(stripes, &rows, segments)
+    }
+
+    /// Moves the starts of the segments `rows`, and a little those of their followers, by `share` of a Gauss-Newton step
+    /// with the derivatives that `curvature` holds of an earlier [`refine`](Self::refine): one forward integration.
+    pub fn settle(
+        &mut self,
+        weights: &[S],
+        segments: &Segments<S>,
+        (starts, rows): (&mut [S], &[u32]),
+        (curvature, start_gradient): (&mut Curvature<S>, &mut [S]),
+        share: f64,
+    ) {
+        let given = Given { weights, segments, starts: &*starts };
+        let (huber, continuity) = (self.huber, self.continuity);
+        let held = &*curvature;
+        let stripes = self.run(rows, 0, |stripe, rows| {
+            stripe.add_start_gradients(&given, rows, held, (huber, continuity));
+        });
+        self.gather_starts(stripes, rows, segments, start_gradient);
+        curvature.correct(segments, starts, start_gradient, share);
     }
 
     fn report(&self, stripes: usize, rows: &[u32], segments: &Segments<S>) -> ShotReport<S> {

@@ -134,6 +134,9 @@ impl<S: Scalar> ShootingSolver<S> {
         self.step += 1;
         let ShootingProblem { shots, training, .. } = problem;
         let rows = &self.order[rows];
+        let Starts { at, curvature } = &mut self.starts;
+        let share = self.settings.start_share;
+        shots.settle(&self.weights, training, (at, rows), (curvature, &mut self.start_gradient), share);
         let gradients = (self.gradient.as_mut_slice(), self.start_gradient.as_mut_slice());
         let report: ShotReport<S> = shots.step(&self.weights, training, &self.starts.at, rows, gradients);
         means.left_out += report.left_out;

@@ -1,8 +1,11 @@
 //! Corrections of the segments' starts by Gauss and Newton's method.
 //!
 //! A start has `2n` unknowns and many observations, so that its curvature `H = sum of rho'(r)/r J^T J` over residuals and
-//! gaps is small and well conditioned. `J` is a difference of two integrations; it may be some epochs old, for a step
-//! `-H^-1 g` with the exact gradient `g` still goes to the right place.
+//! gaps is small and well conditioned. `J` is a difference of two integrations and may be some epochs old. Before the
+//! weights are moved by a segment its start settles, by a step `-H^-1 J^T rho'(r)` that takes no more than a forward
+//! integration: at the best start the gradient by the weights is that of the loss with starts eliminated, and the steep
+//! directions that starts can undo are gone from it (Golub and Pereyra 1973, variable projection). After that the exact
+//! gradient `g`, which is there anyway, corrects what is left by `-H^-1 g`.
 
 use crate::linalg::{Workspace, solve};
 use crate::scalar::{Real, Scalar};
@@ -44,7 +47,7 @@ impl<S: Scalar> Linearisation<S> {
         rows: &[u32],
         huber: Huber<S>,
         continuity: S,
-        (curvature, gradient): (&mut Vec<S>, &mut Vec<S>),
+        (curvature, jacobian, gradient): (&mut Vec<S>, &mut Vec<S>, &mut Vec<S>),
     ) {
         let width = 2 * segments.n;
         let (zero, two) = (<S as Real>::zero(), <S as Real>::two());
@@ -64,16 +67,20 @@ impl<S: Scalar> Linearisation<S> {
                 let before = if segment.has_previous { two * continuity } else { zero };
                 h[k * width + k] = square * (S::of_f64(DAMPING) + before);
             }
+            let j = jacobian.len();
+            jacobian.resize(j + count * width, zero);
             for e in (at..at + count).filter(|_| self.alive[row]) {
                 let weight = if e < at + residuals { <S as Real>::one() } else { continuity };
                 let r = self.base[e];
                 let (slope, bend) = (weight * huber.of(r).1, weight * huber.curvature(r));
-                let derivative = |k: usize| (self.moved[k * total + e] - r) / self.difference(segments, k);
+                let derivative = &mut jacobian[j + (e - at) * width..][..width];
+                for (k, d) in derivative.iter_mut().enumerate() {
+                    *d = (self.moved[k * total + e] - r) / self.difference(segments, k);
+                }
                 for i in 0..width {
-                    let first = derivative(i);
-                    g[i] += slope * first;
+                    g[i] += slope * derivative[i];
                     for j in 0..=i {
-                        h[i * width + j] += bend * first * derivative(j);
+                        h[i * width + j] += bend * derivative[i] * derivative[j];
                     }
                 }
             }
@@ -87,24 +94,66 @@ impl<S: Scalar> Linearisation<S> {
     }
 }
 
-/// Curvature of the loss by every start, `(segments, 2n, 2n)`.
+/// Derivatives of all residuals and gaps by their starts, and the curvature of the loss that they make.
 #[derive(Debug)]
 pub struct Curvature<S> {
+    /// `(segments, 2n, 2n)`.
     matrices: Vec<S>,
+    /// `(residuals and gap of each segment, 2n)`, and where each segment's begin.
+    jacobian: Vec<S>,
+    offsets: Vec<usize>,
     correction: Vec<S>,
     workspace: Workspace<S>,
 }
 
 impl<S: Scalar> Default for Curvature<S> {
     fn default() -> Self {
-        Self { matrices: Vec::new(), correction: Vec::new(), workspace: Workspace::new() }
+        Self {
+            matrices: Vec::new(),
+            jacobian: Vec::new(),
+            offsets: Vec::new(),
+            correction: Vec::new(),
+            workspace: Workspace::new(),
+        }
     }
 }
 
 impl<S: Scalar> Curvature<S> {
-    pub(super) fn set(&mut self, matrices: impl Iterator<Item = S>) {
+    /// Takes over the parts of all segments in order.
+    pub(super) fn set<'a>(&mut self, segments: &Segments<S>, parts: impl Iterator<Item = (&'a [S], &'a [S])>) {
         self.matrices.clear();
-        self.matrices.extend(matrices);
+        self.jacobian.clear();
+        for (matrices, jacobian) in parts {
+            self.matrices.extend_from_slice(matrices);
+            self.jacobian.extend_from_slice(jacobian);
+        }
+        let width = 2 * segments.n;
+        let mut at = 0;
+        self.offsets.clear();
+        for (k, segment) in segments.list.iter().enumerate() {
+            self.offsets.push(at);
+            at += width * (segments.residuals(k) + if segment.has_next { width } else { 0 });
+        }
+    }
+
+    /// Adds `J^T rho'(r)` of one segment to `gradient`, `(2n)`; `values` are its residuals, then its gap.
+    pub(super) fn add_gradient(
+        &self,
+        segments: &Segments<S>,
+        segment: usize,
+        values: &[S],
+        huber: Huber<S>,
+        continuity: S,
+        gradient: &mut [S],
+    ) {
+        let residuals = segments.residuals(segment);
+        let rows = self.jacobian[self.offsets[segment]..].chunks_exact(gradient.len());
+        for (e, (&r, row)) in values.iter().zip(rows).enumerate() {
+            let slope = if e < residuals { huber.of(r).1 } else { continuity * huber.of(r).1 };
+            for (g, &d) in gradient.iter_mut().zip(row) {
+                *g += slope * d;
+            }
+        }
     }
 
     /// Moves `starts` by `-share H^-1 gradient`, both `(segments, 2, n)`; the gradient is of sums, not of means.
