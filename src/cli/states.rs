@@ -1,6 +1,7 @@
 //! States from CSV files.
 
 use crate::names::unknown;
+use crate::recording::read::unquoted;
 use crate::scalar::Scalar;
 use thiserror::Error;
 
@@ -148,12 +149,6 @@ fn read_header(row: usize, header: &str, columns: &[String]) -> Result<Vec<usize
     }
     let missing: Vec<&str> = (0..columns.len()).filter(|k| !order.contains(k)).map(|k| columns[k].as_str()).collect();
     if missing.is_empty() { Ok(order) } else { Err(StatesError::Missing { row, names: missing.join(", ") }) }
-}
-
-/// A field without the spaces and quotes around it.
-fn unquoted(field: &str) -> &str {
-    let field = field.trim();
-    field.strip_prefix('"').and_then(|rest| rest.strip_suffix('"')).map_or(field, str::trim)
 }
 
 #[cfg(test)]

@@ -149,7 +149,7 @@ fn number(field: &[u8]) -> Option<f64> {
 }
 
 /// A field without the spaces and quotes around it.
-fn unquoted(field: &str) -> &str {
+pub(crate) fn unquoted(field: &str) -> &str {
     let field = field.trim();
     field.strip_prefix('"').and_then(|rest| rest.strip_suffix('"')).map_or(field, str::trim)
 }

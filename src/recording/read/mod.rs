@@ -8,6 +8,8 @@ mod npz;
 mod pieces;
 mod select;
 
+#[cfg(feature = "cli")]
+pub(crate) use csv::unquoted;
 pub use error::{DataError, Problem};
 pub use pieces::LEAST;
 

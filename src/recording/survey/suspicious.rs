@@ -127,24 +127,21 @@ fn classify(z: &[f64], k: usize) -> (Kind, usize, f64) {
     (best.1, best.2, best.3)
 }
 
-/// Calls `report` with the first sample and the length of runs of equal values between which things move.
+/// Calls `report` with the first sample and the length of runs of equal values that the motion jumps into or out of.
 fn frozen(samples: usize, q: impl Fn(usize) -> f64, sigma: f64, mut report: impl FnMut(usize, usize)) {
+    let step = |k: usize| (q(k) - q(k - 1)).abs();
     let stride = (samples >> 16).max(1);
-    let changes = (1..samples).step_by(stride).map(|k| (q(k) - q(k - 1)).abs()).filter(|x| *x > 0.0);
-    // A curve on a grid that stands still for L samples in a turning point is nine grid lines away L samples before.
-    let moved = 6.0 * sigma + 12.0 * changes.fold(f64::INFINITY, f64::min);
+    let grid = (1..samples).step_by(stride).map(step).filter(|x| *x > 0.0).fold(f64::INFINITY, f64::min);
+    // A curve on a grid stands still in its turning points, but leaves them line by line.
+    let jump = 6.0 * sigma + 3.0 * grid;
     let mut start = 0;
     for k in 1..=samples {
         if k < samples && q(k) == q(start) {
             continue;
         }
-        let length = k - start;
-        if length >= FROZEN && length < samples {
-            let before = (q(start) - q(start.saturating_sub(length))).abs();
-            let after = (q((k - 1 + length).min(samples - 1)) - q(k - 1)).abs();
-            if before > moved || after > moved {
-                report(start, length);
-            }
+        let jumps = (start > 0 && step(start) > jump) || (k < samples && step(k) > jump);
+        if k - start >= FROZEN && jumps {
+            report(start, k - start);
         }
         start = k;
     }
