@@ -110,6 +110,11 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     if targets == Targets::Measured && !measured.training.has_accelerations() {
         return Err(CliError::usage("--targets measured: no accelerations were given, see --acceleration"));
     }
+    let forced = reading.recording.tracks.iter().any(|track| !track.force.is_empty());
+    if args.friction.is_some() && reading.recording.n() == 1 && !forced {
+        let motion = "every motion of one coordinate has a Lagrangian";
+        output::note(&format!("{motion}: without known forces (--force) L and the friction are not told apart"));
+    }
     let folder = Folder::open(&path)?;
     let job = Job { args, reading: &reading, measured: &measured, targets, folder: &folder, started };
     match args.precision {
