@@ -6,6 +6,8 @@ use crate::recording::survey::{FEW_SAMPLES, Kind, LARGE_ERROR, Method, Survey, S
 use crate::report::text_table;
 use std::fmt::Write;
 
+/// Jitter that is rounding of the times.
+const ROUNDING: f64 = 1e-9;
 /// Lines of a table that can be long.
 const LINES: usize = 20;
 
@@ -120,7 +122,12 @@ fn header(found: &Survey) -> String {
         .map(|t| {
             let rows = format!("{}-{}", t.first_row, t.last_row);
             let times = [t.start, t.end, t.rate].map(short);
-            [vec![t.name.clone(), rows, t.samples.to_string()], times.to_vec(), vec![percent(t.jitter)]].concat()
+            [
+                vec![t.name.clone(), rows, t.samples.to_string()],
+                times.to_vec(),
+                vec![percent(if t.jitter < ROUNDING { 0.0 } else { t.jitter })],
+            ]
+            .concat()
         })
         .collect();
     let titles = ["trajectory", "rows", "samples", "from s", "to s", "samples per s", "jitter"];

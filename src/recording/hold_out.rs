@@ -45,8 +45,8 @@ pub enum HoldOutError {
 }
 
 impl HeldOut {
-    /// Chooses what is held out: trajectories in random order until they hold at least `fraction` of all samples, one
-    /// at least and not all; of a single trajectory its last part, after a gap of `gap` samples, so that no window of
+    /// Chooses what is held out: trajectories in random order until they hold `fraction` of all samples, none that would
+    /// make it more than twice as many, one at least and not all; of a single trajectory its last part, after a gap of `gap` samples, so that no window of
     /// smoothing reaches from one side to the other.
     ///
     /// # Errors
@@ -68,15 +68,17 @@ impl HeldOut {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream(STREAM);
         order.shuffle(&mut rng);
-        order.pop();
         let mut held = Vec::new();
         let mut count = 0;
-        for track in order {
-            if count >= wanted {
-                break;
+        for &track in &order {
+            let length = recording.tracks[track].len();
+            if count < wanted && count + length <= 2 * wanted && held.len() + 1 < order.len() {
+                count += length;
+                held.push(track);
             }
-            count += recording.tracks[track].len();
-            held.push(track);
+        }
+        if held.is_empty() {
+            held.extend(order.into_iter().min_by_key(|track| (recording.tracks[*track].len(), *track)));
         }
         held.sort_unstable();
         Ok(Self::Tracks(held))
@@ -185,6 +187,10 @@ mod tests {
             choices.insert(validation.tracks.iter().map(|t| t.name.clone()).collect::<Vec<_>>());
         }
         assert!(choices.len() > 3, "{choices:?}");
+        // A long trajectory is not taken for a small share.
+        for seed in 0..10 {
+            assert_eq!(hold_out(&recording(&[100, 20, 100]), 0.1, 1, seed).unwrap().1.samples() % 100, 20);
+        }
         // Even if nearly all is asked for, something is left to learn from.
         assert_eq!(hold_out(&recording(&[9, 9]), 0.99, 1, 0).unwrap().0.tracks.len(), 1);
     }
