@@ -541,8 +541,15 @@ fn exact_positions_teach_exact_accelerations() {
         noise: &noise,
         seed: 2,
     };
-    let settings =
-        Shooting { samples_per_segment: 16, steps: Some(8), epochs: 200, batch: 2, rate: 1e-2, ..Shooting::default() };
+    let settings = Shooting {
+        samples_per_segment: 16,
+        steps: Some(8),
+        epochs: 200,
+        batch: 2,
+        rate: 1e-2,
+        continuity: 1.0,
+        ..Shooting::default()
+    };
     let fitted = fit(&settings, task, 1, &Hooks::default()).unwrap();
     assert_eq!((fitted.segments, fitted.stop.clone(), fitted.history.len()), ((20, 320), Stop::Finished, 200));
     let (q, v): (Vec<f64>, Vec<f64>) =
