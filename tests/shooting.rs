@@ -375,7 +375,7 @@ fn the_method_has_order_four() {
         // Velocities between steps are derivatives of a cubic: one order less.
         assert!((2.7..4.5).contains(&slope), "{errors:?}");
     }
-    // Positions alone.
+    // Positions alone; where samples lie between steps varies with the steps, the trend is the order.
     let positions = |steps: usize| -> Vec<f64> {
         let bare = Noise { v: Vec::new(), ..noise(2) };
         let segments = Segments::<f64>::new(&architecture, &motion.estimated(), &bare, 12, steps);
@@ -383,13 +383,11 @@ fn the_method_has_order_four() {
         let mut shots = self::shots::<f64>(&architecture, Penalty::None, 1);
         shots.residuals(&weights, &segments, segments.starts(), &rows)
     };
-    let exact = positions(512);
+    let exact = positions(1024);
     let errors =
-        [16, 32, 64].map(|steps| positions(steps).iter().zip(&exact).fold(0.0_f64, |m, (a, b)| m.max((a - b).abs())));
-    for pair in errors.windows(2) {
-        let slope = (pair[0] / pair[1]).log2();
-        assert!((3.6..4.4).contains(&slope), "{errors:?}");
-    }
+        [16, 128].map(|steps| positions(steps).iter().zip(&exact).fold(0.0_f64, |m, (a, b)| m.max((a - b).abs())));
+    let slope = (errors[0] / errors[1]).log2() / 3.0;
+    assert!((3.6..4.4).contains(&slope), "{errors:?}: order {slope}");
 }
 
 /// Whole turns, and which ones a recording counts, change nothing but rounding.
@@ -435,6 +433,16 @@ fn refinement_ends_where_the_gradient_by_the_starts_vanishes() {
     }
     let after = slope(&mut shots, &starts);
     assert!(after.0 < before.0 && after.1 < 1e-6 * before.1, "{before:?} {after:?}");
+
+    // With the derivatives of that linearisation the way back from somewhere near is as good as a step of refinement.
+    let best = starts.clone();
+    starts.iter_mut().step_by(2).for_each(|q| *q += 0.01);
+    let away = |starts: &[f64]| starts.iter().zip(&best).fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
+    let mut buffer = starts.clone();
+    for _ in 0..20 {
+        shots.settle(&weights, &segments, (&mut starts, &rows), (&mut curvature, &mut buffer), 1.0);
+    }
+    assert!(away(&starts) < 1e-6, "{}", away(&starts));
 }
 
 /// Segments without motion are left out and counted, and give no gradient.
@@ -511,13 +519,13 @@ fn oscillator(samples: usize, error: f64) -> Motion {
     Motion { tracks, states }
 }
 
-/// Without noise the fit goes on far below what the estimated velocities, wrong by 5 %, would allow, and finds `a = -4 q`.
+/// Without noise a network that holds the answer finds `a = -4 q`, from estimated velocities that are wrong by 5 %.
 #[test]
 fn exact_positions_teach_exact_accelerations() {
     let architecture = Architecture {
         coordinates: 1,
-        hidden: vec![16, 16],
-        activation: Nonlinearity::Gelu,
+        hidden: vec![8],
+        activation: Nonlinearity::Quadratic,
         alpha: 1.0,
         scale: vec![2.0],
         periodic: vec![false],
@@ -538,9 +546,17 @@ fn exact_positions_teach_exact_accelerations() {
         noise: &noise,
         seed: 2,
     };
-    let settings = Shooting { samples_per_segment: 16, epochs: 120, batch: 4, rate: 1e-2, ..Shooting::default() };
+    let settings = Shooting {
+        samples_per_segment: 16,
+        steps: Some(8),
+        epochs: 200,
+        batch: 2,
+        rate: 1e-2,
+        continuity: 1.0,
+        ..Shooting::default()
+    };
     let fitted = fit(&settings, task, 1, &Hooks::default()).unwrap();
-    assert_eq!((fitted.segments, fitted.stop.clone(), fitted.history.len()), ((20, 320), Stop::Finished, 120));
+    assert_eq!((fitted.segments, fitted.stop.clone(), fitted.history.len()), ((20, 320), Stop::Finished, 200));
     let (q, v): (Vec<f64>, Vec<f64>) =
         (0..50).map(|k| 0.9 * f64::from(k)).map(|s| (0.9 * s.cos(), 1.8 * s.sin())).unzip();
     let mut chunk = Chunk::new(&architecture);
@@ -551,7 +567,7 @@ fn exact_positions_teach_exact_accelerations() {
         / q.iter().map(|q| 4.0 * q.abs()).sum::<f64>();
     println!("loss {} -> {}, acceleration error {error:.4}", fitted.start_loss, fitted.validation_loss);
     assert!(fitted.validation_loss < 1e-3 * fitted.start_loss && error < 0.02, "{error}");
-    assert!(fitted.integration_error < 0.1);
+    assert!(fitted.integration_error < 0.05, "{}", fitted.integration_error);
 }
 
 #[test]

@@ -19,6 +19,8 @@ const SAMPLES: usize = 500;
 const DT: f64 = 0.01;
 
 type Exact = Box<dyn EulerLagrange<f64>>;
+/// Error, half window and `q`, `v`, `a` of every trajectory.
+type Smoothing = (f64, usize, Vec<[Vec<f64>; 3]>);
 
 /// Trajectories `(q, v)` from starts at moderate energy.
 fn trajectories(exact: &Exact, count: usize, rng: &mut ChaCha8Rng) -> Vec<(Vec<f64>, Vec<f64>)> {
@@ -123,7 +125,7 @@ fn shooting_beats_smoothing() {
         })
         .collect();
     let truth: Vec<Vec<f64>> = clean.iter().map(|(q, v)| accelerations(&exact, q, v)).collect();
-    let mut best: Option<(f64, usize, Vec<[Vec<f64>; 3]>)> = None;
+    let mut best: Option<Smoothing> = None;
     for half in [6, 8, 10, 12, 14, 17, 20, 25] {
         let smoothed: Vec<_> = noisy.iter().map(|q| smooth(q, half)).collect();
         let error = relative(&joined(smoothed.iter().map(|s| &s[2])), &joined(truth.iter()));

@@ -101,8 +101,7 @@ pub(super) fn add_loss<S: Scalar>(
     starts: &[S],
     huber: Huber<S>,
     (weight, continuity): (S, S),
-    next_gradient: &mut [S],
-    sums: &mut [Sum<S>; 2],
+    (next_gradient, sums): (&mut [S], &mut [Sum<S>; 2]),
 ) {
     let n = segments.n;
     let size = integrator.alive.len() * n;

@@ -5,11 +5,11 @@
 //! there by Runge and Kutta's method, and what is compared are positions (and velocities, if they were measured). The loss is
 //!
 //! ```text
-//! mean over samples and coordinates of rho((q - q_observed)/sigma_i)  [+ the same of v]
-//!     + continuity * (sum over joints of rho(gap/tau)) / (samples n),    rho(r) = r^2, linear beyond the Huber bound,
+//! mean over all residuals of rho(r),  r = (q - q_observed)/sigma_i, and the same of v if it was measured,
+//!     + continuity * (sum over joints of rho(gap/tau)) / residuals,    rho(r) = r^2, linear beyond the Huber bound,
 //! ```
 //!
-//! so that a loss of 1 is noise and nothing else; a joint is where a segment ends and the next one starts, and `tau` is the
+//! so that a loss of 1 is noise and nothing else (a little less where the starts were fitted to it); a joint is where a segment ends and the next one starts, and `tau` is the
 //! noise of a position or of a velocity. Its gradient by weights and starts is that of the discrete map, exactly: the adjoint
 //! Runge-Kutta method over the adjoint identity of the network.
 //!

@@ -122,7 +122,8 @@ impl<S: Scalar> Stripe<S> {
             }
             let place = (row, segment as usize);
             let next = &mut self.next_gradient[from + row * width..][..width];
-            add_loss(&mut self.integrator, given.segments, place, given.starts, huber, weights, next, &mut self.sums);
+            let sums = (next, &mut self.sums);
+            add_loss(&mut self.integrator, given.segments, place, given.starts, huber, weights, sums);
             self.counted += given.segments.residuals(segment as usize);
             self.gaps += if given.segments.list[segment as usize].has_next { width } else { 0 };
         }

@@ -8,18 +8,22 @@ use serde::{Deserialize, Serialize};
 ///
 /// | Name | Default | Purpose | Range |
 /// |---|---|---|---|
-/// | `samples_per_segment` | 32 | samples predicted from one start | 2 to 65536 |
+/// | `samples_per_segment` | 20 | samples predicted from one start | 2 to 65536 |
 /// | `steps` | chosen | integration steps per segment | 1 to 65536 |
-/// | `epochs` | 40 | passes through all segments | 1 to 2^24 |
-/// | `batch` | 32 | segments per update of the weights | 1 to 2^30 |
+/// | `epochs` | 100 | passes through all segments | 1 to 2^24 |
+/// | `batch` | 16 | segments per update of the weights | 1 to 2^30 |
 /// | `method` | RAdam | update rule of the weights | |
-/// | `rate` | 0.001 | learning rate, falling to 0 by half a cosine | above 0 |
+/// | `rate` | 0.002 | learning rate, falling to 0 by half a cosine | above 0 |
 /// | `weight_decay` | 1e-6 | L2 weight decay, added to the gradient | from 0 |
 /// | `clip` | 1 | the gradient's norm is cut to this | above 0 |
-/// | `continuity` | 1 | weight of a joint's gap beside one observation | from 0 |
+/// | `continuity` | 0.1 | weight of a joint's gap beside one observation | from 0 |
 /// | `huber` | 3 | residuals beyond so many sigma count linearly | above 0, `inf` for plain squares |
-/// | `start_share` | 0.5 | part of a Gauss-Newton step the starts take per visit | above 0 to 1 |
+/// | `start_share` | 1 | part of a Gauss-Newton step the starts take per visit | above 0 to 1 |
 /// | `curvature_every` | 5 | epochs between two linearisations by the starts | 1 to 2^24 |
+///
+/// The defaults are what served best on a double pendulum sampled at 100 Hz with noise of 1 %: segments that last about a
+/// tenth of its slow period. Much longer ones follow its chaos rather than its law, a much larger weight of the gaps joins
+/// them into longer ones.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Shooting {
@@ -53,17 +57,17 @@ pub struct Shooting {
 impl Default for Shooting {
     fn default() -> Self {
         Self {
-            samples_per_segment: 32,
+            samples_per_segment: 20,
             steps: None,
-            epochs: 40,
-            batch: 32,
+            epochs: 100,
+            batch: 16,
             method: Method::Radam,
-            rate: 1e-3,
+            rate: 2e-3,
             weight_decay: 1e-6,
             clip: 1.0,
-            continuity: 1.0,
+            continuity: 0.1,
             huber: 3.0,
-            start_share: 0.5,
+            start_share: 1.0,
             curvature_every: 5,
         }
     }
