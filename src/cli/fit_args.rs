@@ -16,7 +16,7 @@ pub struct Args {
     #[arg(long, value_enum)]
     pub targets: Option<TargetsName>,
     /// Learn a friction beside L: a Rayleigh dissipation of so many units.
-    #[arg(long, value_name = "UNITS", num_args = 0..=1, default_missing_value = "16", allow_hyphen_values = true, value_parser = count)]
+    #[arg(long, value_name = "UNITS", num_args = 0..=1, default_missing_value = "16", value_parser = count)]
     pub friction: Option<usize>,
     /// The coordinate that is a time: its diagonal element of the mass matrix is negative.
     #[arg(long, value_name = "COORDINATE")]
