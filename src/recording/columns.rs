@@ -50,7 +50,7 @@ impl Columns {
     }
 
     /// Factor of a column to SI.
-    pub(crate) fn factor(&self, name: &str) -> f64 {
+    pub fn factor(&self, name: &str) -> f64 {
         self.units.iter().find(|(column, _)| column == name).and_then(|(_, unit)| factor(unit).ok()).unwrap_or(1.0)
     }
 

@@ -5,7 +5,7 @@ use crate::recording::smooth::local_fit::{Estimate, LocalFit};
 use serde::Serialize;
 
 /// Places at which windows are tried.
-const CENTRES: usize = 512;
+const CENTRES: usize = 2048;
 /// Longest window that is tried, in samples.
 const LONGEST: usize = 2001;
 
@@ -16,7 +16,8 @@ pub struct Quality {
     pub window: usize,
     /// Standard errors of position, velocity and acceleration: what noise does to them.
     pub error: [f64; 3],
-    /// Their bias, root mean square: what the polynomial cannot follow.
+    /// Their bias, root mean square: what the polynomial cannot follow. Estimated by two more degrees, which miss part of
+    /// short bursts themselves: there it is too small, for a chaotic double pendulum by a third.
     pub bias: [f64; 3],
     /// Root mean square of velocity about its mean, and of acceleration, errors taken out.
     pub velocity: f64,
