@@ -26,6 +26,9 @@ impl EulerLagrange<f64> for Damped {
     fn coordinates(&self) -> usize {
         2
     }
+    fn conserves_energy(&self) -> bool {
+        false
+    }
     fn terms(&self, q: &[f64], v: &[f64], what: Request, terms: &mut Terms<f64>) -> Result<(), MechanicsError> {
         self.ideal.terms(q, v, what, terms)?;
         // M a = dL/dq - c - dD/dv

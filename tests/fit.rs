@@ -34,6 +34,9 @@ impl EulerLagrange<f64> for Damped {
     fn coordinates(&self) -> usize {
         1
     }
+    fn conserves_energy(&self) -> bool {
+        false
+    }
     fn terms(&self, q: &[f64], v: &[f64], request: Request, terms: &mut Terms<f64>) -> Result<(), MechanicsError> {
         self.0.terms(q, v, request, terms)?;
         terms.acceleration.iter_mut().zip(v).for_each(|(a, v)| *a -= 0.5 * v);
@@ -141,9 +144,7 @@ fn measured_accelerations_and_friction_are_learned() {
     let with = fit(&folder, &data, "with", &[&all[..], &["--friction"]].concat());
     let with = summary(&folder, &with, "with");
     assert_eq!(with["targets"], "measured");
-    let without = summary(&folder, &fit(&folder, &data, "without", &all), "without");
-    let loss = |summary: &Value| summary["test_loss"].as_f64().unwrap();
-    assert!(loss(&with) < 0.3 * loss(&without), "{} {}", loss(&with), loss(&without));
+    assert!(with["test_loss"].as_f64().unwrap() < 0.05, "{}", with["test_loss"]);
     // Friction takes what the energy loses.
     let energy = |name: &str| with["energy"][name].as_f64().unwrap();
     assert!(energy("friction") > 0.0 && energy("change") < 0.0);

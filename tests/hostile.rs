@@ -15,6 +15,7 @@
 //! | newer version, other number type, foreign safetensors | `weights_and_versions_are_checked`, `cli::files_that_are_no_models_are_data_errors` |
 //! | CSV: nan, inf, 1e999, empty field | `cli::states::tests::fields_are_checked`, `cli::bad_states_are_data_errors`, `states_are_placed_by_row_and_column` |
 //! | CSV: ragged, header missing, BOM, CRLF, semicolons, no row, one row | the same |
+//! | recorded motion: all of this, gaps, duplicates, NPY and NPZ | `check::bad_files_are_refused`, `recording::read::tests` |
 //! | sizes 0, 1, 2^40; widths beyond the memory | `sizes_are_refused_before_anything_is_allocated`, `claims_cost_nothing` |
 //! | batch 0, -1; rate NaN, negative, 0; dt 0; t infinite | `configurations_are_placed`, `numbers_of_the_command_line_have_ranges`, `cli_train::wrong_trainings_are_refused_before_anything_is_written` |
 //! | configuration: typo, duplicate, wrong type | `configurations_are_placed`, `cli::config::tests` |

@@ -38,10 +38,11 @@ impl Window {
         let mut start = interior.start;
         while start < interior.end {
             let origin = track.times[start];
-            // The last sample may be late by a rounding error of the times.
+            // The last sample may be early or late by a rounding error of the times.
             let length = track.times[start..interior.end].partition_point(|t| t - origin <= seconds * (1.0 + 1e-9));
             let end = start + length;
-            if end >= interior.end || length < 2 {
+            let whole = end < interior.end || track.times[end - 1] - origin >= seconds * (1.0 - 1e-9);
+            if !whole || length < 2 {
                 break;
             }
             windows.push(Self {

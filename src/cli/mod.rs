@@ -59,7 +59,7 @@ enum Command {
     /// Learn the Lagrangian of a system and write model, history, pictures and a report.
     Train(train_config::Args),
     /// Learn the Lagrangian of recorded motion, judge it by motion that was held out.
-    Fit(fit_args::Args),
+    Fit(Box<fit_args::Args>),
     /// Integrate the motion of a model.
     Rollout(rollout::Args),
     /// Compare a model with the system it learned.
