@@ -1,4 +1,4 @@
-//! "Did you mean": the known name nearest to a mistyped one.
+//! Names in messages: the known name nearest to a mistyped one, texts on one line.
 
 /// The candidate that fewest edits (insert, delete, replace, swap neighbours) turn `name` into; none if all are far.
 pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
@@ -44,6 +44,19 @@ fn edits(a: &[char], b: &[char]) -> usize {
         before = std::mem::replace(&mut above, row);
     }
     above[b.len()]
+}
+
+/// Lines joined by a space, control characters written out: an error is one line whatever a file name contains.
+pub fn one_line(text: &str) -> String {
+    let joined = text.lines().map(str::trim).filter(|line| !line.is_empty()).collect::<Vec<_>>().join(" ");
+    joined.chars().fold(String::with_capacity(joined.len()), |mut line, c| {
+        if c.is_control() {
+            line.extend(c.escape_default())
+        } else {
+            line.push(c)
+        }
+        line
+    })
 }
 
 #[cfg(test)]

@@ -1,5 +1,6 @@
 //! How a command fails: one line and an exit code.
 
+use crate::names::one_line;
 use std::fmt;
 use std::io;
 use std::path::Path;
@@ -71,19 +72,6 @@ impl fmt::Display for CliError {
 }
 
 impl std::error::Error for CliError {}
-
-/// Lines joined by a space, control characters written out: an error is one line whatever a file name contains.
-pub(super) fn one_line(text: &str) -> String {
-    let joined = text.lines().map(str::trim).filter(|line| !line.is_empty()).collect::<Vec<_>>().join(" ");
-    joined.chars().fold(String::with_capacity(joined.len()), |mut line, c| {
-        if c.is_control() {
-            line.extend(c.escape_default())
-        } else {
-            line.push(c)
-        }
-        line
-    })
-}
 
 #[cfg(test)]
 mod tests {

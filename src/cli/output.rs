@@ -14,5 +14,5 @@ pub fn print(text: &str) -> Result<(), CliError> {
 
 /// A remark on standard error, one line; if that is closed, there is nobody to tell.
 pub fn note(text: &str) {
-    let _ = writeln!(std::io::stderr(), "note: {}", crate::cli::error::one_line(text));
+    let _ = writeln!(std::io::stderr(), "note: {}", crate::names::one_line(text));
 }

@@ -1,5 +1,6 @@
 //! What is wrong with files of recorded motion.
 
+use crate::names::one_line;
 use crate::recording::ColumnsError;
 use crate::storage::ReadError;
 use thiserror::Error;
@@ -14,7 +15,7 @@ pub enum DataError {
     #[error("expected at least one file of data")]
     NoFiles,
     /// A file.
-    #[error("{file}: {problem}")]
+    #[error("{}", one_line(&format!("{file}: {problem}")))]
     File {
         /// Its path.
         file: String,
