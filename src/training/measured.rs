@@ -210,7 +210,7 @@ impl Measured {
         Noise { q, v }
     }
 
-    /// A configuration for these states: the network and the rates of the quick preset, about [`STEPS`] steps.
+    /// A configuration for these states: the network and the rates of the quick preset, 30,000 steps in whole epochs.
     pub fn config<S: Scalar>(&self, name: &str, data: &Datasets<S>) -> Config {
         let [training, validation, test] = [&data.training[0], &data.validation, &data.test];
         let [position, velocity] = ranges(training);
