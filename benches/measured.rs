@@ -23,9 +23,9 @@ use lnn::analysis::{
 };
 use lnn::lagrangian::EulerLagrange;
 use lnn::network::NetworkLagrangian;
-use lnn::recording::{Recording, Track};
+use lnn::recording::{Recording, Targets, Track};
 use lnn::training::shooting::{Shooting, Task, fit};
-use lnn::training::{Config, Datasets, Hooks, Measured, Penalty, Preparation, Targets, train};
+use lnn::training::{Config, Datasets, Hooks, Measured, Penalty, Preparation, train};
 use plain::Plain;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};

@@ -59,7 +59,7 @@ fn good_data_are_described() {
     near(&found["tracks"][0]["rate"], 100.0, 1e-9);
     near(&found["coordinates"][0]["acceleration"], 9.0 / 2f64.sqrt(), 0.03);
     near(&found["coordinates"][0]["samples_per_period"], 100.0 * std::f64::consts::TAU / 3.0, 0.05);
-    assert_eq!((&found["method"], &found["suspicious_count"]), (&"smoothing".into(), &0.into()));
+    assert_eq!((&found["targets"], &found["suspicious_count"]), (&"smoothed".into(), &0.into()));
     assert_eq!((found["warnings"].as_array().unwrap().len(), &found["tracks"][2]["last_row"]), (0, &1501.into()));
     assert!(found["held_out_text"].as_str().unwrap().contains("run"));
 

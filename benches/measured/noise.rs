@@ -4,9 +4,9 @@
 use crate::{Scale, learned};
 use lnn::analysis::acceleration_errors;
 use lnn::lagrangian::{Configured, EulerLagrange, Request, Terms, configure};
-use lnn::recording::{Recording, Track};
+use lnn::recording::{Recording, Targets, Track};
 use lnn::rollout::{Options, Trajectory, rollout};
-use lnn::training::{Measured, Preparation, Stream, Targets};
+use lnn::training::{Measured, Preparation, Stream};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};

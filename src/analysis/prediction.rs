@@ -6,7 +6,7 @@
 use super::angle_difference;
 use super::summary::quantile;
 use crate::lagrangian::EulerLagrange;
-use crate::recording::Track;
+use crate::recording::{Track, hermite};
 use crate::rollout::{Options, rollout_many};
 use serde::{Deserialize, Serialize};
 
@@ -90,13 +90,11 @@ fn along(t: &[f64], q: &[f64], v: &[f64], n: usize, window: &Window) -> Vec<f64>
             continue;
         }
         let (before, h) = (after - 1, t[after] - t[after - 1]);
-        let s = (time - t[before]) / h;
-        let rise = s * s * (3.0 - 2.0 * s);
-        for i in 0..n {
-            let at = |values: &[f64], k: usize| values[k * n + i];
-            let bend = h * s * (1.0 - s) * ((1.0 - s) * at(v, before) - s * at(v, after));
-            positions.push(at(q, before) + rise * (at(q, after) - at(q, before)) + bend);
-        }
+        let [[a, b, c, d], _] = hermite((time - t[before]) / h, h);
+        let at = |values: &[f64], k: usize, i: usize| values[k * n + i];
+        positions.extend(
+            (0..n).map(|i| a * at(q, before, i) + b * at(v, before, i) + c * at(q, after, i) + d * at(v, after, i)),
+        );
     }
     positions
 }

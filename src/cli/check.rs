@@ -2,7 +2,8 @@
 
 use crate::cli::recording_args::RecordingArgs;
 use crate::cli::{CliError, output};
-use crate::recording::survey::{FEW_SAMPLES, Kind, LARGE_ERROR, Method, Survey, SurveyOptions, Suspicion, survey};
+use crate::recording::survey::{FEW_SAMPLES, Kind, Survey, SurveyOptions, Suspicion, survey};
+use crate::recording::{LARGE_ERROR, Targets};
 use crate::report::text_table;
 use std::fmt::Write;
 
@@ -183,15 +184,20 @@ fn advice(text: &mut String, found: &Survey) -> std::fmt::Result {
     let worst = found.coordinates.iter().map(|c| c.acceleration_error_relative).fold(0.0, f64::max);
     let limit = percent(LARGE_ERROR);
     writeln!(text)?;
-    match found.method {
-        Method::Smoothing => writeln!(
+    match found.targets {
+        Targets::Measured => writeln!(
+            text,
+            "advice: learn from the measured accelerations; those by smoothing are good to {}",
+            percent(worst)
+        )?,
+        Targets::Smoothed => writeln!(
             text,
             "advice: learn from smoothed derivatives (polynomials of degree {}): their accelerations are good to {}, \
              better than {limit}",
             found.degree,
             percent(worst)
         )?,
-        Method::Shooting => writeln!(
+        Targets::Motion => writeln!(
             text,
             "advice: learn through the motion (multiple shooting): accelerations by smoothing are good to {}, no better \
              than {limit}",

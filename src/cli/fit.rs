@@ -11,11 +11,11 @@ use crate::cli::{CliError, interrupt, memory, output};
 use crate::network::file::{FORMAT, Header, ModelFile, StoredPrecision};
 use crate::network::{Architecture, NetworkLagrangian};
 use crate::recording::smooth::SmoothOptions;
-use crate::recording::{HeldOut, Reading};
+use crate::recording::{HeldOut, Reading, Targets};
 use crate::report::Report;
 use crate::scalar::Scalar;
 use crate::training::shooting::{self, Shooting, Task};
-use crate::training::{Config, Measured, Preparation, Regularizer, Stop, Targets, Trained, train, training_memory};
+use crate::training::{Config, Measured, Preparation, Regularizer, Stop, Trained, train, training_memory};
 use serde::Serialize;
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -107,7 +107,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     };
     let measured = Measured::new(&reading.recording, &preparation).map_err(CliError::data)?;
     let targets = args.targets.map_or_else(|| measured.advice(), Targets::from);
-    if targets == Targets::Measured && !measured.training.has_accelerations() {
+    if targets == Targets::Measured && !measured.training.recording.has_accelerations() {
         return Err(CliError::usage("--targets measured: no accelerations were given, see --acceleration"));
     }
     let forced = reading.recording.tracks.iter().any(|track| !track.force.is_empty());

@@ -3,7 +3,7 @@
 use crate::cli::number::{count, positive};
 use crate::cli::recording_args::RecordingArgs;
 use crate::cli::train_config::PrecisionName;
-use crate::training::Targets;
+use crate::recording::Targets;
 use std::path::PathBuf;
 
 /// Arguments.

@@ -86,7 +86,6 @@ pub fn judge(model: &dyn EulerLagrange<f64>, plan: &Plan<'_>) -> Result<Judgemen
     if !windows.is_empty() {
         let curves = [("model", errors(&motion, POINTS)), ("constant velocity", errors(&straight, POINTS))];
         figures.extend(drawn(error_plot(&curves), "prediction_error.png", ERROR_CAPTION)?);
-        // The window that nine of ten are better than would flatter less; the first shows what a user would look at.
         for (i, name) in recording.coordinates.iter().enumerate() {
             let file = format!("prediction_{}.png", i + 1);
             figures.extend(drawn(example(&windows[0], &motion[0], n, i, name), &file, EXAMPLE_CAPTION)?);

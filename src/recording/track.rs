@@ -112,6 +112,16 @@ impl Recording {
         self.coordinates.len()
     }
 
+    /// Whether every trajectory has measured velocities.
+    pub fn has_velocities(&self) -> bool {
+        !self.tracks.is_empty() && self.tracks.iter().all(|track| !track.v.is_empty())
+    }
+
+    /// Whether every trajectory has measured accelerations.
+    pub fn has_accelerations(&self) -> bool {
+        !self.tracks.is_empty() && self.tracks.iter().all(|track| !track.a.is_empty())
+    }
+
     /// Samples of all trajectories.
     pub fn samples(&self) -> usize {
         self.tracks.iter().map(Track::len).sum()

@@ -3,8 +3,9 @@
 use super::{Figure, LinePlot, PlotError, Series, Trace, line_png, trace_png};
 use crate::analysis::TrajectoryRun;
 use crate::lagrangian::Configured;
+use crate::recording::hermite;
 use crate::rollout::Trajectory;
-use crate::scalar::{Real, Scalar};
+use crate::scalar::Scalar;
 
 /// Times and values of one quantity of a run.
 type Part<S> = fn(&TrajectoryRun<S>) -> (&[f64], &[f64]);
@@ -161,11 +162,9 @@ fn smooth<S: Scalar>(trajectory: &Trajectory<S>) -> Vec<Vec<S>> {
         let (next, w) = trajectory.state(k + 1);
         let h = trajectory.t[k + 1] - trajectory.t[k];
         for piece in 1..PIECES {
-            let x = S::of_f64(piece as f64 / PIECES as f64);
-            let (one, two, three) = (<S as Real>::one(), S::of_f64(2.0), S::of_f64(3.0));
-            let toward = x * x * (three - two * x);
-            let (leaving, arriving) = (h * x * (one - x) * (one - x), -h * x * x * (one - x));
-            places.push((0..n).map(|i| q[i] + toward * (next[i] - q[i]) + leaving * v[i] + arriving * w[i]).collect());
+            let [factors, _] = hermite(piece as f64 / PIECES as f64, h.to_f64()).map(|f| f.map(S::of_f64));
+            let [a, b, c, d] = factors;
+            places.push((0..n).map(|i| a * q[i] + b * v[i] + c * next[i] + d * w[i]).collect());
         }
     }
     places

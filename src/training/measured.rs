@@ -5,28 +5,15 @@
 //! be fitted through its motion ([`shooting`](crate::training::shooting)).
 
 use crate::recording::smooth::{SmoothError, SmoothOptions, Smoothed, Smoothing};
-use crate::recording::survey::LARGE_ERROR;
-use crate::recording::{HeldOut, HoldOutError, Recording};
+use crate::recording::survey::plan;
+use crate::recording::{HeldOut, HoldOutError, Recording, Targets};
 use crate::scalar::Scalar;
 use crate::training::config::Config;
 use crate::training::dataset::{Dataset, DatasetError};
 use crate::training::preset::recorded;
 use crate::training::shooting::{Estimated, Noise};
 use crate::training::trainer::Datasets;
-use serde::{Deserialize, Serialize};
 use thiserror::Error;
-
-/// What a network learns from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Targets {
-    /// Accelerations that were measured.
-    Measured,
-    /// Accelerations by local polynomials.
-    Smoothed,
-    /// The motion itself, from the network that smoothed or measured accelerations give.
-    Motion,
-}
 
 /// How recorded motion is prepared.
 #[derive(Clone, Debug, PartialEq)]
@@ -87,11 +74,6 @@ impl Part {
         pairs.map(|(track, states)| Estimated { track, q: &states.q, v: &states.v }).collect()
     }
 
-    /// Whether accelerations were measured.
-    pub fn has_accelerations(&self) -> bool {
-        self.recording.tracks.iter().all(|track| !track.a.is_empty())
-    }
-
     /// States away from the ends of trajectories, or all of them if nothing had to be derived; at most about `most`.
     fn dataset<S: Scalar>(&self, targets: Targets, most: usize) -> Result<Dataset<S>, DatasetError> {
         let n = self.recording.n();
@@ -146,7 +128,7 @@ impl Measured {
     /// [`MeasuredError`].
     pub fn new(recording: &Recording, preparation: &Preparation) -> Result<Self, MeasuredError> {
         let Preparation { smoothing: options, held_out: share, most_states, seed } = preparation;
-        let smoothing = Smoothing::choose(recording, options)?;
+        let (_, smoothing) = plan(recording, options)?;
         let divide = |recording: &Recording, share: f64| {
             let held_out = HeldOut::choose(recording, share, smoothing.window(), *seed)?;
             let (rest, held) = held_out.divide(recording);
@@ -162,21 +144,9 @@ impl Measured {
         Ok(Self { training, validation, test, held_out, most_states: *most_states, smoothing })
     }
 
-    /// The way that suits the data: measured accelerations if there are any, smoothed ones if they are good to a tenth,
-    /// the motion itself if not.
+    /// The way that suits the data.
     pub fn advice(&self) -> Targets {
-        if self.training.has_accelerations() {
-            Targets::Measured
-        } else if self.acceleration_error() <= LARGE_ERROR {
-            Targets::Smoothed
-        } else {
-            Targets::Motion
-        }
-    }
-
-    /// Expected error of smoothed accelerations, relative to their size, of the worst coordinate.
-    pub fn acceleration_error(&self) -> f64 {
-        self.smoothing.coordinates.iter().map(|chosen| chosen.quality.relative()).fold(0.0, f64::max)
+        Targets::advised(self.training.recording.has_accelerations(), self.smoothing.acceleration_error())
     }
 
     /// States and accelerations for a supervised training, validation and test.

@@ -16,6 +16,7 @@ mod schedule;
 pub mod shooting;
 mod signature;
 mod solver;
+mod stripes;
 mod trainer;
 
 pub use checkpoint::{
@@ -23,7 +24,7 @@ pub use checkpoint::{
 };
 pub use config::{Config, ConfigError, Data, Network, OnFailure, Optimizer, Phase, Polish, Precision, Scaling};
 pub use dataset::{Dataset, DatasetError};
-pub use measured::{Measured, MeasuredError, Part, Preparation, Targets};
+pub use measured::{Measured, MeasuredError, Part, Preparation};
 pub use memory::training_memory;
 pub use objective::{BatchReport, Failure, Objective};
 pub use optimizer::{Method, Moments, Update};

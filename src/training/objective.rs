@@ -18,6 +18,7 @@ use crate::training::penalty::Penalty;
 use crate::training::signature::{
     Buffers, Violation, characteristic_scales, eigenvalue_violation, has_signature, sylvester_violation,
 };
+use crate::training::stripes::sum_gradients;
 use rayon::prelude::*;
 
 /// States evaluated together.
@@ -386,9 +387,7 @@ impl<S: Scalar> Objective<S> {
             self.run(rows, |stripe, rows| stripe.add_sylvester(weights, data, rows, &scales, (lambda, time)));
         }
         let stripes = &self.stripes[..stripes];
-        self.pool.install(|| {
-            gradient.par_chunks_mut(SUM_BLOCK).enumerate().for_each(|(k, block)| sum_gradients(stripes, k, block));
-        });
+        sum_gradients(&self.pool, stripes, |stripe| &stripe.gradient, gradient);
         self.report(stripes.len(), rows.len(), data.coordinates())
     }
 
@@ -423,18 +422,5 @@ impl<S: Scalar> Objective<S> {
         // No state, no loss: the mean of nothing is not 0.
         let loss = residual.value() / S::of_f64((2 * n * (states - left_out)) as f64);
         BatchReport { loss, penalty: penalty.value(), penalised, left_out, failure }
-    }
-}
-
-/// Parameters summed over the stripes at a time.
-const SUM_BLOCK: usize = 1 << 14;
-
-fn sum_gradients<S: Scalar>(stripes: &[Stripe<S>], block: usize, out: &mut [S]) {
-    let range = block * SUM_BLOCK..block * SUM_BLOCK + out.len();
-    out.copy_from_slice(&stripes[0].gradient[range.clone()]);
-    for stripe in &stripes[1..] {
-        for (sum, &g) in out.iter_mut().zip(&stripe.gradient[range.clone()]) {
-            *sum += g;
-        }
     }
 }

@@ -190,6 +190,11 @@ impl Smoothing {
         signal.visit(self.coordinates[i].quality.window, |estimate, _, track, at| visit(estimate.values, track, at));
     }
 
+    /// Expected error of the accelerations over their size, of the worst coordinate.
+    pub fn acceleration_error(&self) -> f64 {
+        self.coordinates.iter().map(|chosen| chosen.quality.relative()).fold(0.0, f64::max)
+    }
+
     /// Longest window in samples of a trajectory with the usual step.
     pub fn window(&self) -> usize {
         self.coordinates.iter().map(|chosen| chosen.quality.window).max().unwrap_or(0)

@@ -61,8 +61,8 @@ impl CoordinateSurvey {
         let Chosen { noise, quality, seconds, .. } = *planned;
         let period = TAU * quality.velocity / quality.acceleration;
         let measured = |derivative: usize| {
-            let all = recording.tracks.iter().all(|t| !if derivative == 1 { &t.v } else { &t.a }.is_empty());
-            (all && !recording.tracks.is_empty()).then(|| compare(recording, i, derivative, alone))
+            let there = if derivative == 1 { recording.has_velocities() } else { recording.has_accelerations() };
+            there.then(|| compare(recording, i, derivative, alone))
         };
         Self {
             name: recording.coordinates[i].clone(),

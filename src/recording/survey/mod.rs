@@ -11,13 +11,12 @@ pub use suspicious::{Kind, Suspicion};
 
 use crate::recording::smooth::{SmoothError, SmoothOptions, Smoothing};
 use crate::recording::statistics::steps;
-use crate::recording::{Cut, Dropped, HeldOut, Reading};
+use crate::recording::{Cut, Dropped, HeldOut, Reading, Recording, Targets};
+use consistency::compare;
 use serde::Serialize;
 
 /// Samples per period of the fast motion below which sampling is called coarse.
 pub const FEW_SAMPLES: f64 = 20.0;
-/// Relative error of accelerations by smoothing above which shooting is advised.
-pub const LARGE_ERROR: f64 = 0.1;
 /// A step of an angle, in rad, from which on unwrapping is a guess.
 const GUESS: f64 = 2.0;
 
@@ -36,16 +35,6 @@ impl Default for SurveyOptions {
     fn default() -> Self {
         Self { smooth: SmoothOptions::default(), validation: 0.2, seed: 0 }
     }
-}
-
-/// How a Lagrangian is learned from positions.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Method {
-    /// From derivatives by local polynomials.
-    Smoothing,
-    /// Through the motion, by multiple shooting.
-    Shooting,
 }
 
 /// One trajectory.
@@ -97,13 +86,26 @@ pub struct Survey {
     /// Degree of the polynomials of smoothing.
     pub degree: usize,
     /// The advised way to learn.
-    pub method: Method,
+    pub targets: Targets,
     /// What would be held out for validation.
     pub held_out: Option<HeldOut>,
     /// The same in words.
     pub held_out_text: String,
     /// What to know before learning.
     pub warnings: Vec<String>,
+}
+
+/// How derivatives are taken: of positions alone, and as a fit takes them. Measured velocities take part only where they
+/// are what they are called.
+///
+/// # Errors
+/// [`SmoothError`] for options out of range, or trajectories too short for any window.
+pub fn plan(recording: &Recording, options: &SmoothOptions) -> Result<(Smoothing, Smoothing), SmoothError> {
+    let alone = Smoothing::choose(recording, &SmoothOptions { velocities: false, ..options.clone() })?;
+    let holds = |i: usize| compare(recording, i, 1, &alone).holds();
+    let trusted = options.velocities && recording.has_velocities() && (0..recording.n()).all(holds);
+    let planned = if trusted { Smoothing::choose(recording, options)? } else { alone.clone() };
+    Ok((alone, planned))
 }
 
 /// Looks at a recording. Every sample is looked at once; windows of smoothing are tried at places spread evenly, so that
@@ -114,18 +116,9 @@ pub struct Survey {
 pub fn survey(reading: &Reading, options: &SurveyOptions) -> Result<Survey, SmoothError> {
     let recording = &reading.recording;
     let n = recording.n();
-    let alone = Smoothing::choose(recording, &SmoothOptions { velocities: false, ..options.smooth.clone() })?;
-    let look = |planned: &Smoothing| -> Vec<CoordinateSurvey> {
-        (0..n).map(|i| CoordinateSurvey::new(recording, i, &alone, &planned.coordinates[i])).collect()
-    };
-    let mut coordinates = look(&alone);
-    // Velocities take part only where they are what they are called.
-    let measured = options.smooth.velocities && n > 0;
-    let mut planned = alone.clone();
-    if measured && coordinates.iter().all(|c| c.measured_velocity.is_some_and(|v| v.holds())) {
-        planned = Smoothing::choose(recording, &options.smooth)?;
-        coordinates = look(&planned);
-    }
+    let (alone, planned) = plan(recording, &options.smooth)?;
+    let mut coordinates: Vec<CoordinateSurvey> =
+        (0..n).map(|i| CoordinateSurvey::new(recording, i, &alone, &planned.coordinates[i])).collect();
     let (mut suspicious, mut suspicious_count) = (Vec::new(), 0);
     for (i, coordinate) in coordinates.iter_mut().enumerate() {
         suspicious_count += suspicious::find(reading, i, coordinate.noise, &mut suspicious);
@@ -148,8 +141,6 @@ pub fn survey(reading: &Reading, options: &SurveyOptions) -> Result<Survey, Smoo
             jitter: spread / step,
         }
     });
-    let worst = coordinates.iter().filter(|c| c.min < c.max).map(|c| c.acceleration_error_relative);
-    let large = worst.fold(0.0, f64::max) > LARGE_ERROR;
     let held_out = HeldOut::choose(recording, options.validation, planned.window(), options.seed).ok();
     let mut survey = Survey {
         files: reading.files,
@@ -164,7 +155,7 @@ pub fn survey(reading: &Reading, options: &SurveyOptions) -> Result<Survey, Smoo
         suspicious,
         suspicious_count,
         degree: planned.degree,
-        method: if large { Method::Shooting } else { Method::Smoothing },
+        targets: Targets::advised(recording.has_accelerations(), planned.acceleration_error()),
         held_out_text: held_out.as_ref().map(|held| held.describe(recording)).unwrap_or_default(),
         held_out,
         warnings: Vec::new(),

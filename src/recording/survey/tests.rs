@@ -29,17 +29,17 @@ fn a_swing_is_described() {
     assert!((c.acceleration / 8.0 * 2f64.sqrt() - 1.0).abs() < 0.02, "{}", c.acceleration);
     // The period of the sine, pi/2 s, sampled 157 times.
     assert!((c.samples_per_period - 157.0).abs() < 4.0, "{}", c.samples_per_period);
-    assert_eq!((found.method, found.warnings.len(), found.suspicious_count), (Method::Smoothing, 0, 0));
+    assert_eq!((found.targets, found.warnings.len(), found.suspicious_count), (Targets::Smoothed, 0, 0));
     assert!(found.held_out_text.contains("last 400 samples"));
     let json: serde_json::Value = serde_json::to_value(&found).unwrap();
-    assert_eq!((&json["method"], &json["tracks"][0]["samples"]), (&"smoothing".into(), &2000.into()));
+    assert_eq!((&json["targets"], &json["tracks"][0]["samples"]), (&"smoothed".into(), &2000.into()));
 }
 
 #[test]
 fn loud_noise_calls_for_shooting() {
     let found = look(swing(0.3, 100.0, None));
     assert!(found.coordinates[0].acceleration_error_relative > 0.1, "{:?}", found.coordinates[0]);
-    assert_eq!(found.method, Method::Shooting);
+    assert_eq!(found.targets, Targets::Motion);
 }
 
 #[test]

@@ -10,6 +10,7 @@ use crate::training::shooting::integrator::Integrator;
 use crate::training::shooting::loss::{Huber, add_loss, each_residual, gap};
 use crate::training::shooting::segments::Segments;
 use crate::training::shooting::starts::{Curvature, Linearisation};
+use crate::training::stripes::sum_gradients;
 use rayon::prelude::*;
 
 /// Segments integrated together.
@@ -283,17 +284,7 @@ impl<S: Scalar> Shots<S> {
             stripe.add_losses(&given, rows, huber, (weight, continuity));
             stripe.add_gradient(weights, (penalty, lambda), segments.n);
         });
-        let parts = &self.stripes[..stripes];
-        self.pool.install(|| {
-            gradient.par_chunks_mut(SUM_BLOCK).enumerate().for_each(|(k, block)| {
-                block.fill(<S as Real>::zero());
-                for part in parts {
-                    for (sum, &g) in block.iter_mut().zip(&part.gradient[k * SUM_BLOCK..]) {
-                        *sum += g;
-                    }
-                }
-            });
-        });
+        sum_gradients(&self.pool, &self.stripes[..stripes], |stripe| &stripe.gradient, gradient);
         self.gather_starts(stripes, rows, segments, start_gradient);
         self.report(stripes, rows, segments)
     }
@@ -402,9 +393,6 @@ impl<S: Scalar> Shots<S> {
         ShotReport { loss, gap, penalty: penalty.value(), penalised, left_out, residuals }
     }
 }
-
-/// Parameters summed over the stripes at a time.
-const SUM_BLOCK: usize = 1 << 14;
 
 fn count<S: Scalar>(number: usize) -> S {
     S::of_f64(number as f64)

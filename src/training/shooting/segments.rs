@@ -6,7 +6,7 @@
 //! from a multiple of `2 pi` near the segment's start, so that a motion of many turns loses no digits.
 
 use crate::network::Architecture;
-use crate::recording::Track;
+use crate::recording::{Track, hermite};
 use crate::scalar::{Real, Scalar};
 use std::f64::consts::TAU;
 use std::ops::Range;
@@ -66,12 +66,7 @@ pub(super) struct Place<S> {
 impl<S: Scalar> Place<S> {
     /// `fraction` of step `step` of length `h`.
     fn new(step: usize, fraction: f64, h: f64) -> Self {
-        let s = fraction;
-        let (square, cube) = (s * s, s * s * s);
-        let rise = 3.0 * square - 2.0 * cube;
-        let slope = 6.0 * (s - square) / h;
-        let position = [1.0 - rise, h * (s - 2.0 * square + cube), rise, h * (cube - square)];
-        let velocity = [-slope, 1.0 - 4.0 * s + 3.0 * square, slope, 3.0 * square - 2.0 * s];
+        let [position, velocity] = hermite(fraction, h);
         Self { step, position: position.map(S::of_f64), velocity: velocity.map(S::of_f64) }
     }
 }
