@@ -359,3 +359,27 @@ fn inverses_are_symmetric_and_invert() {
         }
     }
 }
+
+/// Regular only after scaling: the correction by refinement is as large as the solution.
+#[test]
+fn a_correction_that_does_not_shrink_is_not_taken() {
+    let e = 0.5f64.powi(22);
+    let (a, c) = (0.0042724609375, 4.5 * e);
+    let matrix = [
+        [a, a, -e, -e, c],
+        [a, a, -e, -e, 4.0 * c],
+        [-e, -e, -e, 0.0, -8.0 * e],
+        [-e, -e, 0.0, -8.6e-10, -0.5],
+        [c, 4.0 * c, -8.0 * e, -0.5, -0.0546875],
+    ]
+    .concat();
+    let right = [-0.13671875, 0.0, -0.23828125, -9.918212890625e-5, 0.796875];
+    let mut x = [0.0; 5];
+    linalg::solve(5, &matrix, &right, &mut x, &mut Workspace::new()).unwrap();
+    let x = x.map(dd);
+    let product = times(5, &matrix, &x);
+    let residual = norm((0..5).map(|i| product[i] - dd(right[i])));
+    let scale = norm(matrix.iter().map(|&m| dd(m))) * norm(x.into_iter()) + norm(right.map(dd).into_iter());
+    let error = residual / (scale * 5.0 * f64::EPSILON);
+    assert!(error < R, "backward error {error}");
+}

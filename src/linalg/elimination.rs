@@ -53,7 +53,7 @@ pub(super) fn load<S: Scalar, const W: usize>(
 
 /// `bound = max(bound, |x|)`.
 #[inline(always)]
-fn larger<S: Scalar, const W: usize>(bound: &mut Lane<S, W>, x: &Lane<S, W>) {
+pub(super) fn larger<S: Scalar, const W: usize>(bound: &mut Lane<S, W>, x: &Lane<S, W>) {
     for l in 0..W {
         let size = x[l].abs();
         bound[l] = select(size > bound[l], size, bound[l]);

@@ -84,6 +84,9 @@ impl<S: Scalar> Systems<'_, S> {
 
     /// Solves rows `start..start + W` once more, with one step of iterative refinement where it is due, and finds out
     /// which matrices are singular.
+    ///
+    /// A correction of more than half the solution is not taken (as in LAPACK's `xSYRFS`): the matrix is singular to
+    /// working precision, and what is left after the two cancel has a larger backward error than either.
     #[cold]
     #[inline(never)]
     fn look_again<const W: usize>(
@@ -110,11 +113,19 @@ impl<S: Scalar> Systems<'_, S> {
                 elimination::solve((n, m), system);
                 let due = refinement_due(&pivots, &largest);
                 let floor = suspicious::<S>(n);
-                for (e, x) in x.iter().enumerate() {
-                    let step = &mut system[e / m * (n + m) + n + e % m];
-                    for l in 0..W {
-                        let refined: S = x[l] + step[l];
-                        step[l] = if due[l] { refined } else { x[l] };
+                for c in 0..m {
+                    let (mut size, mut step) = ([<S as Real>::zero(); W], [<S as Real>::zero(); W]);
+                    for i in 0..n {
+                        elimination::larger(&mut size, &x[i * m + c]);
+                        elimination::larger(&mut step, &system[i * (n + m) + n + c]);
+                    }
+                    for i in 0..n {
+                        let (x, out) = (x[i * m + c], &mut system[i * (n + m) + n + c]);
+                        for l in 0..W {
+                            let refined: S = x[l] + out[l];
+                            let shrinks = step[l] <= S::half() * size[l];
+                            out[l] = if due[l] & shrinks { refined } else { x[l] };
+                        }
                     }
                 }
                 let probe = finish((n, m), system, right.is_none(), solutions, start);
