@@ -81,7 +81,7 @@ fn distance<S: Scalar>(a: &[S], b: &[S]) -> f64 {
 }
 
 /// Gradient and Hessian of an expression by every route; `true` if they agree to `tolerance`.
-fn routes_agree<S: Scalar>(f: &Expression, x: &[S; 3], tolerance: f64) -> bool {
+fn routes_agree<S: Scalar>(f: &impl ScalarFunction, x: &[S; 3], tolerance: f64) -> bool {
     let (value, first, second) = hessian(f, x).unwrap();
     let variables = [0, 1, 2].map(|i| Jet2::<S, 3>::variable(x[i], i));
     let jet = f.eval(&variables);
@@ -250,6 +250,26 @@ fn long_chains_wide_fans_and_reuse() {
     }
     assert_eq!(tape.statistics().bytes, bytes);
     assert_eq!(tape.statistics().nodes, 52);
+}
+
+/// `(-2)^2` with both numbers moving, by every route.
+#[test]
+fn powers_of_negative_numbers_have_one_set_of_derivatives() {
+    struct Power;
+    impl ScalarFunction for Power {
+        fn eval<R: Real>(&self, x: &[R]) -> R {
+            x[0].powf(x[1]) * x[2]
+        }
+    }
+    let x = [-2.0, 2.0, 3.0];
+    assert!(routes_agree(&Power, &x, 2.0 * f64::EPSILON));
+    let (value, first, second) = hessian(&Power, &x).unwrap();
+    let log = 2f64.ln();
+    let mixed = -2.0 * (1.0 + 2.0 * log) * 3.0;
+    let expected = [6.0, mixed, -4.0, mixed, 12.0 * log * log, 4.0 * log, -4.0, 4.0 * log, 0.0];
+    assert_eq!(value, 12.0);
+    assert!(distance(&first, &[-12.0, 12.0 * log, 4.0]) <= f64::EPSILON);
+    assert!(distance(&second, &expected) <= 2.0 * f64::EPSILON, "{second:?}");
 }
 
 #[test]

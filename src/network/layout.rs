@@ -114,6 +114,11 @@ impl DissipationLayout {
 }
 
 impl Layout {
+    /// Offset, rows and columns of every dense weight matrix, in order.
+    pub fn matrices(&self) -> impl Iterator<Item = (usize, usize, usize)> {
+        let layers = self.branches.iter().flat_map(|branch| &branch.layers);
+        layers.filter(|layer| layer.map == LinearMap::Dense).map(|layer| (layer.weight, layer.outputs, layer.inputs))
+    }
     /// Layout of an architecture: one branch per activation of its nonlinearity, each with an equal share of the widths
     /// and an input layer of its own.
     pub fn new(architecture: &Architecture) -> Self {

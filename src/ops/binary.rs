@@ -57,10 +57,11 @@ fn flat<R: Real>(first: R) -> (R, R, R) {
     (zero, zero, zero)
 }
 
-/// `ln a`, 0 at `a = 0`, where `a^b ln a` tends to 0.
+/// `ln |a|`, 0 at `a = 0`, where `a^b ln a` tends to 0.
 #[inline(always)]
 fn log<R: Real>(a: R) -> R {
-    a.select(a.ln(), R::zero())
+    let size = a.abs();
+    size.select(size.ln(), R::zero())
 }
 
 table! {
@@ -72,7 +73,8 @@ table! {
     Mul mul(a, b, y, da, db) = (b, a), (R::zero(), R::one(), R::zero());
     /// `a / b`.
     Div div(a, b, y, da, db) = { let r = b.recip(); (r, -(y * r)) }, (R::zero(), -(da * da), -(db * da + db * da));
-    /// `a^b`, `a > 0`.
+    /// `a^b`, `a > 0`. At `a < 0` only integer `b` have a value, and derivatives along `b` keep its sign:
+    /// `ln |a|` stands for `ln a`.
     Powf powf(a, b, y, da, db) = (b * a.powf(b - R::one()), y * log(a)), {
         let (one, log) = (R::one(), log(a));
         (

@@ -124,7 +124,8 @@ pub trait Real:
     fn abs(self) -> Self;
     /// `self^exponent` for an integer exponent.
     fn powi(self, exponent: i32) -> Self;
-    /// `self^exponent`, `self > 0`.
+    /// `self^exponent`, `self > 0`; at `self < 0` only integer exponents have a value, and derivatives along the exponent
+    /// keep its sign: `ln |self|` stands for `ln self`.
     fn powf(self, exponent: Self) -> Self;
     /// Angle of the point `(x, self)` in radians.
     fn atan2(self, x: Self) -> Self;

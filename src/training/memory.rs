@@ -3,14 +3,16 @@
 use crate::network::{Architecture, Layout};
 use crate::training::config::{Config, Precision};
 use crate::training::objective::{CHUNK, STRIPES};
+use crate::training::optimizer::eigenbasis_numbers;
 use crate::training::penalty::Regularizer;
 
 /// Vectors of all weights that training holds: weights, gradient, two moments, average, the best of the phase and of those
 /// before (each twice), the last two that were validated, and the start.
 const VECTORS: u64 = 12;
-/// Vectors of all weights in a checkpoint, and how often each is held while it is written: copied, in bytes, in the file's
-/// bytes, read back.
-const CHECKPOINT: u64 = 6 * 4;
+/// How often what a checkpoint keeps is held while it is written: copied, in bytes, in the file's bytes, read back.
+const COPIES: u64 = 4;
+/// Vectors of all weights in a checkpoint, as often as each is held while it is written.
+const CHECKPOINT: u64 = 6 * COPIES;
 /// Vectors of all weights that polishing holds beside two for each pair it remembers.
 const POLISH: u64 = 14;
 
@@ -23,6 +25,8 @@ const POLISH: u64 = 14;
 ///   length, then converted; `3 n s (N + V)` for the phase under way; `8 n T` for the evaluation afterwards, five times;
 ///   `4 (6 N + V)` for the order of states and its copies in a checkpoint;
 /// - weights: `(12 + 24) s P`, the second for writing a checkpoint;
+/// - eigenbases of SOAP: `s (4 r + 2 m)` with `r` numbers in the squares over the sides of all weight matrices and `m` in the
+///   matrices, and `8 s r` for writing a checkpoint;
 /// - stripes: `s (P + 64 (w (2 c + 5 + 14 j) + 4 f c + 10 n^2 + 20 n + 6 K))` for each of the up to 8 parts of a batch, `c = n + 2`
 ///   channels and `j` jets per state, 1 without penalty and `n + 1` with one, the latter with `n^2` more numbers per state;
 /// - polishing with memory `m`, which makes `s = 8` in the stripes: `24 n (N + V) + 4 N + 8 P (2 m + 14)`.
@@ -46,6 +50,9 @@ pub fn training_memory(config: &Config, architecture: &Architecture) -> Option<u
         product([40, n, test]),
         product([4, sum([product([6, training]), Some(validation)])?]),
     ]);
+
+    let (kept, held) = eigenbasis_numbers(config.optimizer.method, layout.matrices())?;
+    let bases = product([number, sum([Some(held as u64), product([COPIES, kept as u64])])?]);
 
     let largest = (data.training.min(config.optimizer.batch)).max(data.validation).max(data.test);
     let largest = if config.polish.is_some() { largest.max(data.training) } else { largest } as u64;
@@ -72,7 +79,13 @@ pub fn training_memory(config: &Config, architecture: &Architecture) -> Option<u
             product([8, weights, 2 * polish.memory as u64 + POLISH]),
         ]),
     };
-    sum([states, product([(VECTORS + CHECKPOINT) * number, weights]), product([wide, stripes, of_stripe?]), polish])
+    sum([
+        states,
+        bases,
+        product([(VECTORS + CHECKPOINT) * number, weights]),
+        product([wide, stripes, of_stripe?]),
+        polish,
+    ])
 }
 
 /// A product, if it can be counted.

@@ -353,6 +353,16 @@ impl<S: Scalar> Objective<S> {
         Ok(Self { architecture: architecture.clone(), penalty, pool, stripes: Vec::new() })
     }
 
+    /// Shape of the networks.
+    pub(super) fn architecture(&self) -> &Architecture {
+        &self.architecture
+    }
+
+    /// The threads.
+    pub(super) fn pool(&self) -> &rayon::ThreadPool {
+        &self.pool
+    }
+
     /// Runs `work` on every stripe of `rows`, at most [`STRIPES`] of whole chunks each.
     fn run(&mut self, rows: &[u32], work: impl Fn(&mut Stripe<S>, &[u32]) + Sync) -> usize {
         let chunks = rows.len().div_ceil(CHUNK);

@@ -4,12 +4,13 @@
 //! that move, their moments, the order of the data and the random state: its course, which a checkpoint can hold between
 //! any two steps.
 
+use crate::network::Layout;
 use crate::scalar::{Real, Scalar};
 use crate::training::checkpoint::{Clock, Course, Ended, Keeper, Underway};
 use crate::training::config::{OnFailure, Optimizer, Phase};
 use crate::training::dataset::Dataset;
 use crate::training::objective::{Failure, Objective};
-use crate::training::optimizer::{Moments, Update};
+use crate::training::optimizer::{Method, Moments, Update};
 use crate::training::schedule::Schedule;
 use argmin::core::{Error, IterState, KV, Problem, Solver, State, TerminationReason, TerminationStatus};
 use argmin::kv;
@@ -218,7 +219,11 @@ impl<S: Scalar> EpochSolver<S> {
             weight_decay: self.optimizer.weight_decay,
             clip: self.optimizer.clip,
         };
-        let norm = moments.update(weights, &self.gradient, &update);
+        let gradient = &mut self.gradient;
+        let norm = match update.method {
+            Method::Soap => problem.objective.pool().install(|| moments.update(weights, gradient, &update)),
+            Method::Adam | Method::Radam => moments.update(weights, gradient, &update),
+        };
         if !norm.is_finite() {
             if self.optimizer.on_failure == OnFailure::Stop {
                 return Err(StepError::Gradient { step, norm });
@@ -280,15 +285,12 @@ impl<S: Scalar> EpochSolver<S> {
 
 impl<S: Scalar> Solver<TrainingProblem<S>, TrainingState<S>> for EpochSolver<S> {
     fn name(&self) -> &str {
-        match self.optimizer.method {
-            crate::training::optimizer::Method::Adam => "Adam",
-            crate::training::optimizer::Method::Radam => "RAdam",
-        }
+        self.optimizer.method.name()
     }
 
     fn init(
         &mut self,
-        _problem: &mut Problem<TrainingProblem<S>>,
+        problem: &mut Problem<TrainingProblem<S>>,
         state: TrainingState<S>,
     ) -> Result<(TrainingState<S>, Option<KV>), Error> {
         if !self.restored {
@@ -298,7 +300,9 @@ impl<S: Scalar> Solver<TrainingProblem<S>, TrainingState<S>> for EpochSolver<S> 
             }
             course.average.clone_from(&course.weights);
             course.averaged_steps = 0;
-            course.moments = Moments::new(course.weights.len());
+            let problem = problem.problem.as_ref().ok_or_else(|| Error::msg("the training problem is missing"))?;
+            let layout = Layout::new(problem.objective.architecture());
+            course.moments = Moments::for_method(self.optimizer.method, course.weights.len(), layout.matrices());
         }
         Ok((state, None))
     }

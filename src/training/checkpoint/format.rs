@@ -5,7 +5,7 @@ use crate::network::file::container::{Kind, Tensor, Tensors, pack, unpack};
 use crate::network::file::{ModelFileError, StoredPrecision};
 use crate::scalar::Scalar;
 use crate::training::objective::Failure;
-use crate::training::optimizer::Moments;
+use crate::training::optimizer::{Block, Moments, Stored};
 use crate::training::solver::{Epoch, Means};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
@@ -61,6 +61,9 @@ struct UnderwayHeader {
     rng: ChaCha8Rng,
     order: usize,
     moments: u32,
+    /// Weight matrices whose moments are taken in eigenbases.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    matrices: Vec<Block>,
     averaged_steps: usize,
     iteration: u64,
     epoch: usize,
@@ -178,10 +181,13 @@ pub(super) fn encode<S: Scalar>(
     };
     let mut tensors = vec![vector("best", &ended.weights), table("history", &ended.history)];
     if let Some(Underway { course, history, best, .. }) = underway {
-        let (first, second, _) = course.moments.parts();
+        let Stored { first, second, bases, .. } = course.moments.stored();
         tensors.push(vector("weights", &course.weights));
         tensors.push(vector("moments.first", first));
         tensors.push(vector("moments.second", second));
+        if !bases.is_empty() {
+            tensors.push(vector("moments.bases", &bases));
+        }
         tensors.push(vector("average", &course.average));
         tensors.push(Tensor::indices("order".to_string(), &course.order));
         tensors.push(vector("phase.best", best));
@@ -203,7 +209,8 @@ pub(super) fn encode<S: Scalar>(
         underway: underway.map(|Underway { course, history, best_loss, best_epoch, .. }| UnderwayHeader {
             rng: course.rng.clone(),
             order: course.order.len(),
-            moments: course.moments.parts().2,
+            moments: course.moments.stored().step,
+            matrices: course.moments.stored().blocks,
             averaged_steps: course.averaged_steps,
             iteration: course.iteration,
             epoch: course.epoch,
@@ -244,7 +251,7 @@ pub(super) fn decode<S: Scalar>(bytes: &[u8]) -> Result<(Header, Snapshot<S>), M
                 rng: stored.rng.clone(),
                 order: permutation(file.indices("order", stored.order)?)?,
                 weights: vector("weights")?,
-                moments: Moments::from_parts(vector("moments.first")?, vector("moments.second")?, stored.moments),
+                moments: moments(&file, &header, stored)?,
                 average: vector("average")?,
                 averaged_steps: stored.averaged_steps,
                 iteration: stored.iteration,
@@ -261,6 +268,23 @@ pub(super) fn decode<S: Scalar>(bytes: &[u8]) -> Result<(Header, Snapshot<S>), M
     };
     let seconds = header.seconds.max(0.0);
     Ok((header, Snapshot { seconds, ended, underway }))
+}
+
+/// The moments and their eigenbases.
+fn moments<S: Scalar>(
+    file: &Tensors<'_>,
+    header: &Header,
+    stored: &UnderwayHeader,
+) -> Result<Moments<S>, ModelFileError> {
+    let unfit = || ModelFileError::Header("matrices: not side by side within the parameters".to_string());
+    let numbers = |name: &str, count: usize| file.numbers::<S>(name, &[count], header.precision);
+    let first = numbers("moments.first", header.parameters)?;
+    let second = numbers("moments.second", header.parameters)?;
+    let bases = match Block::numbers(&stored.matrices).ok_or_else(unfit)? {
+        0 => Vec::new(),
+        count => numbers("moments.bases", count)?,
+    };
+    Moments::restore(first, second, stored.moments, &stored.matrices, &bases).ok_or_else(unfit)
 }
 
 fn table(file: &Tensors<'_>, name: &str, epochs: usize) -> Result<Vec<Epoch>, ModelFileError> {
@@ -302,7 +326,8 @@ mod tests {
         let mut rng = Stream::Order(3).generator(9);
         let mut draw = |count: usize| -> Vec<f32> { (0..count).map(|_| rng.random_range(-1.0..1.0)).collect() };
         let (weights, average, best) = (draw(5), draw(5), draw(5));
-        let moments = Moments::from_parts(draw(5), draw(5), 77);
+        let matrices = [Block { start: 1, rows: 2, cols: 2 }];
+        let moments = Moments::restore(draw(5), draw(5), 77, &matrices, &draw(16)).unwrap();
         let mut ended = Ended::none(draw(5));
         ended.history = vec![row(1, 0.25)];
         let means = Means {

@@ -244,6 +244,11 @@ impl<S: Scalar> Shots<S> {
         Ok(Self { architecture: architecture.clone(), penalty, huber, continuity, pool, stripes: Vec::new() })
     }
 
+    /// Shape of the networks.
+    pub(super) fn architecture(&self) -> &Architecture {
+        &self.architecture
+    }
+
     /// Runs `work` on the chunks of every stripe of `rows`; returns the number of stripes.
     fn run(&mut self, rows: &[u32], parameters: usize, work: impl Fn(&mut Stripe<S>, &[u32]) + Sync) -> usize {
         let size = rows.len().div_ceil(CHUNK).div_ceil(STRIPES).max(1) * CHUNK;

@@ -1,5 +1,6 @@
 //! Multiple shooting as an argmin solver: one iteration is one epoch, the cost is the validation loss.
 
+use crate::network::Layout;
 use crate::scalar::{Real, Scalar};
 use crate::training::checkpoint::Clock;
 use crate::training::optimizer::{Method, Moments, Update};
@@ -143,7 +144,7 @@ impl<S: Scalar> ShootingSolver<S> {
         let settings = &self.settings;
         let update = Update { method: settings.method, rate, weight_decay: settings.weight_decay, clip: settings.clip };
         let norm = if report.left_out < rows.len() {
-            self.moments.update(&mut self.weights, &self.gradient, &update)
+            self.moments.update(&mut self.weights, &mut self.gradient, &update)
         } else {
             f64::NAN
         };
@@ -173,6 +174,7 @@ impl<S: Scalar> Solver<ShootingProblem<S>, TrainingState<S>> for ShootingSolver<
         match self.settings.method {
             Method::Adam => "multiple shooting (Adam)",
             Method::Radam => "multiple shooting (RAdam)",
+            Method::Soap => "multiple shooting (SOAP)",
         }
     }
 
@@ -185,7 +187,8 @@ impl<S: Scalar> Solver<ShootingProblem<S>, TrainingState<S>> for ShootingSolver<
         if let Some(weights) = state.get_param() {
             self.weights.clone_from(weights);
         }
-        self.moments = Moments::new(self.weights.len());
+        let layout = Layout::new(problem.shots.architecture());
+        self.moments = Moments::for_method(self.settings.method, self.weights.len(), layout.matrices());
         self.gradient.resize(self.weights.len(), <S as Real>::zero());
         for _ in 1..PREPARATION {
             self.starts.refine(&mut problem.shots, &self.weights, &problem.training);
