@@ -20,7 +20,7 @@ fn every_preset_trains_to_the_same_bits_on_any_number_of_threads() {
     let mut presets = 0;
     for system in systems() {
         let configured = configure::<f64>(system.name, &[]).unwrap();
-        for preset in [Preset::Quick, Preset::Paper] {
+        for preset in [Preset::Quick, Preset::Best, Preset::Paper] {
             let Some(config) = preset.config(&configured) else { continue };
             let config = shrunk(config);
             let bits = |threads| {

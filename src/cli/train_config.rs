@@ -50,7 +50,11 @@ pub struct Args {
 
 #[derive(Clone, Copy, Debug, clap::ValueEnum)]
 enum PresetName {
+    /// A minute on two cores.
     Quick,
+    /// Up to half an hour on two cores.
+    Best,
+    /// The paper's budget and choices: hours.
     Paper,
 }
 
@@ -149,6 +153,7 @@ impl Args {
         let system = configure::<f64>(name, &self.param).map_err(CliError::usage)?;
         let (preset, known) = match self.preset.unwrap_or(PresetName::Quick) {
             PresetName::Quick => (Preset::Quick, "quick"),
+            PresetName::Best => (Preset::Best, "best"),
             PresetName::Paper => (Preset::Paper, "paper"),
         };
         preset.config(&system).ok_or_else(|| {
