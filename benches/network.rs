@@ -64,7 +64,7 @@ fn step<S: Scalar>(c: &mut Criterion, n: usize, width: usize, batch: usize) {
         group.bench_function(id, |b| {
             b.iter(|| {
                 objective.step(&weights, &data, &rows, &mut gradient);
-                moments.update(&mut weights, &gradient, &update)
+                moments.update(&mut weights, &mut gradient, &update)
             });
         });
     }

@@ -4,7 +4,7 @@
 mod counting;
 
 use counting::allocations;
-use lnn::network::{Architecture, Initialization, InputLayer, Nonlinearity, initial_weights};
+use lnn::network::{Architecture, Initialization, InputLayer, Layout, Nonlinearity, initial_weights};
 use lnn::training::{Dataset, Method, Moments, Objective, Penalty, Update};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -35,14 +35,18 @@ fn allocates_nothing(activation: Nonlinearity, input_layer: InputLayer, dissipat
     let rows: Vec<u32> = (0..256).collect();
     // The negative quadratic term keeps the penalty and its jets active.
     let mut objective = Objective::new(&architecture, Penalty::Eigenvalue { lambda: 1.0 }, 2).unwrap();
-    let (mut gradient, mut moments) = (weights.clone(), Moments::new(weights.len()));
-    let update = Update { method: Method::Radam, rate: 1e-6, weight_decay: 1e-6, clip: 1.0 };
-    let mut step = || {
-        let report = objective.step(&weights, &data, &rows, &mut gradient);
-        assert_eq!(report.penalised, 256);
-        moments.update(&mut weights, &gradient, &update);
-    };
-    (0..3).for_each(|_| step());
-    let counted = allocations(|| (0..10).for_each(|_| step()));
-    assert_eq!(counted, 0, "allocations in 10 steps with {activation}");
+    let layout = Layout::new(&architecture);
+    for method in [Method::Radam, Method::Soap] {
+        let mut gradient = weights.clone();
+        let mut moments = Moments::for_method(method, weights.len(), layout.matrices());
+        let update = Update { method, rate: 1e-6, weight_decay: 1e-6, clip: 1.0 };
+        let mut step = || {
+            let report = objective.step(&weights, &data, &rows, &mut gradient);
+            assert_eq!(report.penalised, 256);
+            moments.update(&mut weights, &mut gradient, &update);
+        };
+        (0..3).for_each(|_| step());
+        let counted = allocations(|| (0..10).for_each(|_| step()));
+        assert_eq!(counted, 0, "allocations in 10 steps of {} with {activation}", method.name());
+    }
 }

@@ -383,6 +383,7 @@ fn config(units: Option<usize>, epochs: usize) -> Config {
         data: Data {
             training: 1,
             validation: 1,
+            off_shell: 0.0,
             test: 1,
             validation_position: bounds(),
             validation_velocity: bounds(),

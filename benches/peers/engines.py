@@ -23,15 +23,10 @@ def lower_median(values, axis, library):
 # PyTorch: nested reverse mode, pseudo-inverse, the Hessian once for the loss and once more for the penalty.
 
 
-def torch_paper(inputs, precision):
+def torch_model(weights, alpha):
+    """Acceleration and mass matrix of one state (x, w) by nested reverse mode."""
     import torch
-    from torch.func import jacrev, vmap
-
-    dtype = {"f32": torch.float32, "f64": torch.float64}[precision]
-    tensor = lambda array: torch.tensor(np.asarray(array), dtype=dtype)
-    weights = [tensor(w).requires_grad_() for w in inputs["weights"]]
-    x, w, target = (tensor(inputs[k]) for k in ("x", "w", "a"))
-    n, alpha = x.shape[1], inputs["alpha"]
+    from torch.func import jacrev
 
     def lagrangian(x, w):
         h = torch.cat([x, w])
@@ -39,18 +34,33 @@ def torch_paper(inputs, precision):
             h = torch.nn.functional.gelu(torch.nn.functional.linear(h, matrix, bias))
         return torch.nn.functional.linear(h, weights[-1])[0] + alpha * (w * w).sum()
 
+    mass = jacrev(jacrev(lagrangian, 1), 1)
+
     def acceleration(x, w):
-        mass = jacrev(jacrev(lagrangian, 1), 1)(x, w)
         mixed = jacrev(jacrev(lagrangian, 1), 0)(x, w)
         force = jacrev(lagrangian, 0)(x, w)
-        return torch.linalg.pinv(mass) @ (force - mixed @ w)
+        return torch.linalg.pinv(mass(x, w)) @ (force - mixed @ w)
+
+    return acceleration, mass
+
+
+def torch_paper(inputs, precision):
+    import torch
+    from torch.func import vmap
+
+    dtype = {"f32": torch.float32, "f64": torch.float64}[precision]
+    tensor = lambda array: torch.tensor(np.asarray(array), dtype=dtype)
+    weights = [tensor(w).requires_grad_() for w in inputs["weights"]]
+    x, w, target = (tensor(inputs[k]) for k in ("x", "w", "a"))
+    n = x.shape[1]
+    acceleration, mass_matrix = torch_model(weights, inputs["alpha"])
 
     def evaluate():
         for parameter in weights:
             parameter.grad = None
         predicted = vmap(acceleration)(x, w)
         loss = (predicted - target).abs().sum() / (2 * n * x.shape[0])
-        mass = vmap(jacrev(jacrev(lagrangian, 1), 1))(x, w)
+        mass = vmap(mass_matrix)(x, w)
         diagonal = torch.diagonal(mass, dim1=1, dim2=2).abs().detach()
         scales = torch.cumprod(lower_median(diagonal, 0, torch), 0)
         penalty = 0.0

@@ -3,11 +3,12 @@
 //! `compare.py` starts this program and one for each peer and lets them work in turns. `setup DIR N WIDTH BATCH PRECISION
 //! ALPHA` writes weights, states, targets, loss and gradient as raw little-endian `f64`; `step S`, `products S` and
 //! `accelerations S` answer with nanoseconds, one number per run, of at least three runs and about `S` seconds.
-//! That is with the argument `serve`; without it everything is tried once.
+//! That is with the argument `serve`; `recipe DIR` writes what `recipe.py` trains on; without arguments everything is tried once.
 
 #[path = "../shared/networks.rs"]
 mod networks;
 mod products;
+mod recipe;
 
 use lnn::network::{Architecture, Initialization, initial_weights};
 use lnn::scalar::Scalar;
@@ -88,10 +89,7 @@ fn setup(words: &[&str]) -> Outcome<Box<dyn Timed>> {
     let states = [draw(), draw(), draw()];
     let mut judge = Case::<f64>::new(&architecture, &weights, &states)?;
     let loss = judge.evaluate();
-    let write = |name: &str, numbers: &[f64]| {
-        let bytes: Vec<u8> = numbers.iter().flat_map(|x| x.to_le_bytes()).collect();
-        std::fs::write(Path::new(directory).join(name), bytes)
-    };
+    let write = |name: &str, numbers: &[f64]| write(Path::new(directory), name, numbers);
     // The peers work in scaled coordinates.
     let scaled = |x: &[f64]| x.iter().map(|x| x / SCALE).collect::<Vec<f64>>();
     write("weights", &weights)?;
@@ -105,6 +103,12 @@ fn setup(words: &[&str]) -> Outcome<Box<dyn Timed>> {
         "f64" => Box::new(judge),
         _ => return Err("precision is f32 or f64".into()),
     })
+}
+
+/// Writes numbers as raw little-endian `f64`.
+fn write(directory: &Path, name: &str, numbers: &[f64]) -> std::io::Result<()> {
+    let bytes: Vec<u8> = numbers.iter().flat_map(|x| x.to_le_bytes()).collect();
+    std::fs::write(directory.join(name), bytes)
 }
 
 /// Nanoseconds of every run, for about so long.
@@ -152,6 +156,8 @@ fn smoke() -> Outcome<()> {
         }
     }
     assert_eq!(std::fs::read(directory.path().join("gradient"))?.len(), 8 * (4 * 16 + 16 + 2 * (16 * 16 + 16) + 16));
+    recipe::write_all(directory.path(), 100)?;
+    assert_eq!(std::fs::read(directory.path().join("training2.a"))?.len(), 8 * 2 * 100);
     Ok(())
 }
 
@@ -168,5 +174,10 @@ fn serve() -> Outcome<()> {
 }
 
 fn main() -> Outcome<()> {
-    if std::env::args().any(|argument| argument == "serve") { serve() } else { smoke() }
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    match arguments.iter().map(String::as_str).collect::<Vec<_>>().as_slice() {
+        ["recipe", directory] => recipe::write_all(Path::new(directory), usize::MAX),
+        words if words.contains(&"serve") => serve(),
+        _ => smoke(),
+    }
 }

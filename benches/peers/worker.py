@@ -21,14 +21,18 @@ def read(directory, name):
     return np.fromfile(os.path.join(directory, name), dtype="<f8")
 
 
-def inputs(directory, n, width, alpha):
-    flat, shapes = read(directory, "weights"), [(width, 2 * n), (width, width), (width, width)]
-    weights, start = [], 0
+def layers(flat, n, width):
+    """Weights and biases of three hidden layers, then the output's weights."""
+    shapes, weights, start = [(width, 2 * n), (width, width), (width, width)], [], 0
     for out, into in shapes:
         weights.append(flat[start : start + out * into].reshape(out, into))
         weights.append(flat[start + out * into : start + out * into + out])
         start += out * into + out
-    weights.append(flat[start : start + width].reshape(1, width))
+    return weights + [flat[start : start + width].reshape(1, width)]
+
+
+def inputs(directory, n, width, alpha):
+    weights = layers(read(directory, "weights"), n, width)
     states = {name: read(directory, name).reshape(-1, n) for name in "xwa"}
     return {"weights": weights, "alpha": alpha, **states}
 

@@ -7,6 +7,7 @@ mod energy;
 mod grid;
 mod instability;
 mod lyapunov;
+mod mass_matrix;
 mod prediction;
 mod signature;
 mod summary;
@@ -19,6 +20,7 @@ pub use energy::{EnergyError, energy_drift, energy_error};
 pub use grid::{Axis, Grid, GridError, determinant_grid, lagrangian_grid};
 pub use instability::{savitzky_golay, stretches, training_instability};
 pub use lyapunov::{Lyapunov, lyapunov};
+pub use mass_matrix::{MassMatrixError, mass_matrix_error};
 pub use prediction::{
     PredictionError, Predictions, Window, predict_by_constant_velocity, predict_by_motion, prediction_error,
 };

@@ -1,8 +1,8 @@
 //! What a model is worth: accelerations, trajectories and pictures against the hand-written system.
 
 use crate::analysis::{
-    AccelerationError, Axis, StartBox, TrajectoryRun, TrajectorySummary, TrajectoryTest, acceleration_errors,
-    determinant_grid, lagrangian_grid, wrong_signatures,
+    AccelerationError, Axis, MassMatrixError, StartBox, TrajectoryRun, TrajectorySummary, TrajectoryTest,
+    acceleration_errors, determinant_grid, lagrangian_grid, mass_matrix_error, wrong_signatures,
 };
 use crate::cli::{CliError, memory};
 use crate::lagrangian::{Configured, EulerLagrange};
@@ -21,6 +21,8 @@ pub struct Evaluation {
     pub accelerations: Vec<AccelerationError>,
     /// Fraction of the fresh states whose mass matrix has not the signature of the exact one.
     pub wrong_signature: f64,
+    /// Error of the mass matrix, of a geodesic the metric, at rest at the positions of the fresh states.
+    pub mass_matrix: MassMatrixError,
     /// One entry per random start.
     pub trajectories: Vec<TrajectorySummary>,
     /// Names of the accelerations' coordinates.
@@ -84,6 +86,7 @@ pub fn evaluate(
     Ok(Evaluation {
         accelerations,
         wrong_signature: wrong_signatures(exact.as_ref(), learned, plan.states.0, plan.states.1),
+        mass_matrix: mass_matrix_error(exact.as_ref(), learned, plan.states.0),
         trajectories: runs.iter().map(TrajectoryRun::summary).collect(),
         coordinates: coordinates.iter().map(|c| c.name.to_string()).collect(),
         time_unit: system.system.time_unit,
@@ -192,7 +195,7 @@ struct Table {
 }
 
 impl Evaluation {
-    fn tables(&self) -> [Table; 2] {
+    fn tables(&self) -> [Table; 3] {
         let accelerations = self.coordinates.iter().zip(&self.accelerations).map(|(name, e)| {
             let numbers = [e.mean, e.rms, e.median, e.p99, e.max].map(|x| format!("{x:.4e}"));
             [vec![name.clone()], numbers.to_vec(), vec![e.failed.to_string()]].concat()
@@ -204,6 +207,9 @@ impl Evaluation {
             row.push(t.stopped.clone().or(t.reference_stopped.clone()).unwrap_or_default());
             row
         });
+        let m = &self.mass_matrix;
+        let matrix = [m.factor, m.mean, m.median, m.p99, m.max].map(|x| format!("{x:.4e}"));
+        let matrix = [matrix.to_vec(), vec![m.failed.to_string()]].concat();
         let header = |names: &[&str]| names.iter().map(ToString::to_string).collect();
         let until = format!("until [{}]", self.time_unit);
         [
@@ -211,6 +217,11 @@ impl Evaluation {
                 title: "Error of accelerations on fresh states, physical units",
                 header: header(&["coordinate", "mean", "rms", "median", "99 %", "max", "failed"]),
                 rows: accelerations.collect(),
+            },
+            Table {
+                title: "Relative error of the mass matrix at rest, up to one factor",
+                header: header(&["factor", "mean", "median", "99 %", "max", "failed"]),
+                rows: vec![matrix],
             },
             Table {
                 title: "Trajectories from random starts against exact motion",

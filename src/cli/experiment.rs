@@ -6,9 +6,14 @@ use crate::cli::number::{count, threads};
 use crate::cli::progress::Progress as Bar;
 use crate::cli::{CliError, interrupt, output};
 use crate::experiments::{Experiment, Outcome, Picture, Record, Run, Scale, experiments, find};
-use crate::report::{EXPERIMENT_HEADER, Figure, Report, experiment_figures, experiment_table, text_table};
+use crate::recording::Columns;
+use crate::recording::read::read_recording;
+use crate::report::{
+    Curve, EXPERIMENT_HEADER, Figure, Report, experiment_curves, experiment_figures, experiment_table, text_table,
+};
 use crate::training::{Every, Hooks, Stop};
 use std::collections::BTreeMap;
+use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::PoisonError;
@@ -29,6 +34,10 @@ pub struct Args {
     /// Threads; as many runs go side by side, and the results do not depend on them [default: all].
     #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = count)]
     threads: Option<usize>,
+    /// A curve from elsewhere for the picture of time-to-accuracy: a CSV with the columns seconds and validation_loss; may be
+    /// repeated.
+    #[arg(long, value_name = "LABEL=FILE.csv", value_parser = beside)]
+    beside: Vec<(String, PathBuf)>,
     /// Directory; an experiment goes into NAME-SCALE in it.
     #[arg(long, value_name = "DIR", default_value = "runs/experiments")]
     out: PathBuf,
@@ -61,12 +70,32 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     };
     let chosen: Vec<&Experiment> =
         if name == "all" { experiments().iter().collect() } else { vec![find(name).map_err(CliError::usage)?] };
+    let curves = args.beside.iter().map(curve).collect::<Result<Vec<Curve>, CliError>>()?;
     let hooks = Hooks { watcher: None, interrupt: interrupt::flag()? };
     for experiment in chosen {
         let path = args.out.join(format!("{}-{}", experiment.name, scale.name()));
-        perform(experiment, scale, args.seeds, threads(args.threads), &path, &hooks)?;
+        perform(experiment, scale, args.seeds, threads(args.threads), &path, (&curves, &hooks))?;
     }
     Ok(())
+}
+
+/// `label=file`.
+fn beside(text: &str) -> Result<(String, PathBuf), String> {
+    match text.split_once('=') {
+        Some((label, file)) if !label.trim().is_empty() && !file.is_empty() => {
+            Ok((label.trim().to_string(), PathBuf::from(file)))
+        }
+        _ => Err("expected LABEL=FILE.csv".to_string()),
+    }
+}
+
+/// A curve of loss against time from a file.
+fn curve((label, file): &(String, PathBuf)) -> Result<Curve, CliError> {
+    let [time, loss] = ["seconds", "validation_loss"].map(str::to_string);
+    let columns = Columns { coords: vec![loss], time: Some(time), ..Columns::default() };
+    let reading = read_recording(&[file], &columns).map_err(CliError::data)?;
+    let points = |track: crate::recording::Track| track.times.into_iter().zip(track.q).collect::<Vec<_>>();
+    Ok(Curve { label: label.clone(), points: reading.recording.tracks.into_iter().flat_map(points).collect() })
 }
 
 fn listing() -> String {
@@ -83,7 +112,7 @@ fn perform(
     seeds: usize,
     threads: usize,
     path: &Path,
-    hooks: &Hooks,
+    (beside, hooks): (&[Curve], &Hooks),
 ) -> Result<(), CliError> {
     let started = Instant::now();
     let folder = Folder::open(path)?;
@@ -91,7 +120,7 @@ fn perform(
     let bar = Bar::new(runs.len() as u64, "runs");
     let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
     let results: Mutex<BTreeMap<usize, Result<Option<Record>, CliError>>> = Mutex::new(BTreeMap::new());
-    let abreast = threads.min(runs.len()).max(1);
+    let abreast = if experiment.is_timed() { 1 } else { threads.min(runs.len()).max(1) };
     let work = || {
         while let Some(run) = runs.get(next.fetch_add(1, Ordering::Relaxed)) {
             let result = one(run, scale, (threads / abreast).max(1), &path.join(&run.name), hooks);
@@ -124,7 +153,7 @@ fn perform(
             results.len()
         )));
     }
-    conclude(experiment, scale, &results, &folder, path, started)
+    conclude(experiment, scale, (&results, beside), &folder, path, started)
 }
 
 /// The record of a run: the one that is there if it was made from the same configuration, or a new one. `None` if it was
@@ -149,9 +178,12 @@ fn one(run: &Run, scale: Scale, threads: usize, path: &Path, hooks: &Hooks) -> R
             }
             finished.record
         }
-        Learning::Nothing(reason) => {
-            Record { outcome: Outcome::Nothing { reason }, losses: Vec::new(), seconds: began.elapsed().as_secs_f64() }
-        }
+        Learning::Nothing(reason) => Record {
+            outcome: Outcome::Nothing { reason },
+            losses: Vec::new(),
+            times: Vec::new(),
+            seconds: began.elapsed().as_secs_f64(),
+        },
     };
     folder.write("config.toml", toml.as_bytes())?;
     // What has a record is finished.
@@ -175,13 +207,18 @@ fn finished(path: &Path, toml: &str) -> Option<Record> {
 fn conclude(
     experiment: &Experiment,
     scale: Scale,
-    results: &[(Run, Option<Record>)],
+    (results, beside): (&[(Run, Option<Record>)], &[Curve]),
     folder: &Folder,
     path: &Path,
     started: Instant,
 ) -> Result<(), CliError> {
     let table = experiment_table(&experiment.rows(results));
-    let mut figures = experiment_figures(experiment, results).map_err(CliError::data)?;
+    let mut curves = experiment_curves(results);
+    curves.extend_from_slice(beside);
+    if experiment.is_timed() {
+        folder.write("curves.csv", curves_csv(&curves).as_bytes())?;
+    }
+    let mut figures = experiment_figures(experiment, results, &curves).map_err(CliError::data)?;
     for figure in &figures {
         folder.write(&figure.file, &figure.png)?;
     }
@@ -213,6 +250,18 @@ fn conclude(
         experiment.paper,
         report.display()
     ))
+}
+
+/// Loss against time of every curve, as far as they are known.
+fn curves_csv(curves: &[Curve]) -> String {
+    let mut csv = String::from("run,seconds,validation_loss\n");
+    for Curve { label, points } in curves {
+        let label = label.replace('"', "\"\"");
+        for (seconds, loss) in points {
+            let _ = writeln!(csv, "\"{label}\",{seconds},{loss}");
+        }
+    }
+    csv
 }
 
 /// Comma-separated values; cells hold brackets and words, so all are quoted.
@@ -296,7 +345,12 @@ mod tests {
             std::fs::write(folder.join(file), b"x").unwrap();
         }
         std::fs::write(folder.join(CAPTIONS), r#"{"det_mass_matrix.png": "at rest"}"#).unwrap();
-        let record = Record { outcome: Outcome::Nothing { reason: String::new() }, losses: Vec::new(), seconds: 0.0 };
+        let record = Record {
+            outcome: Outcome::Nothing { reason: String::new() },
+            losses: Vec::new(),
+            times: Vec::new(),
+            seconds: 0.0,
+        };
         let results = [(run, Some(record))];
         let found = |name: &str| -> Vec<String> {
             let figures = pictures_of_runs(find(name).unwrap(), &results, directory.path());

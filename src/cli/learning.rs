@@ -205,6 +205,7 @@ fn learn_in<S: Scalar>(
     let finite = |x: f64| x.is_finite().then_some(x);
     let losses: Vec<[Option<f64>; 2]> =
         trained.history.iter().map(|e| [finite(e.training_loss), finite(e.validation_loss)]).collect();
+    let times = trained.history.iter().map(|e| e.seconds).collect();
     let training_losses: Vec<f64> = trained.history.iter().map(|e| e.training_loss).collect();
     let instability = training_instability(&training_losses, &stretches(config));
     let summary = Summary {
@@ -242,7 +243,7 @@ fn learn_in<S: Scalar>(
         epochs: trained.history.len(),
         json,
         text,
-        record: Record { outcome, losses, seconds: trained.seconds },
+        record: Record { outcome, losses, times, seconds: trained.seconds },
         stop: trained.stop,
     })))
 }

@@ -1,4 +1,5 @@
-//! The experiments of Hamzaogullari and Ozakin as data: every table and figure is a list of training configurations.
+//! Experiments as data, those of Hamzaogullari and Ozakin and some on our own presets: every table and figure is a list of
+//! training configurations.
 //!
 //! An [`Experiment`] turns a [`Scale`] and a number of seeds into [`Run`]s; whoever trains them hands back one
 //! [`Record`] per run, and [`Experiment::rows`] gathers them into the paper's table beside ours.
@@ -6,6 +7,7 @@
 mod budget;
 mod network;
 mod physical;
+mod presets;
 mod record;
 
 pub use budget::Scale;
@@ -52,18 +54,20 @@ pub enum Picture {
     },
     /// Loss against instability, a point per row.
     TradeOff,
+    /// Lowest validation loss so far against seconds of training, a line per run.
+    Clock,
     /// Pictures of every run's evaluation whose file name begins so.
     Evaluation(&'static [&'static str]),
 }
 
-/// A table or figure of the paper.
+/// A table or figure, of the paper or beside it.
 #[derive(Clone, Copy, Debug)]
 pub struct Experiment {
     /// Name on the command line.
     pub name: &'static str,
     /// Heading.
     pub title: &'static str,
-    /// Figures and tables of the paper that it regenerates.
+    /// Figures and tables of the paper that it regenerates, `-` if there are none.
     pub paper: &'static str,
     /// What the paper found, in a sentence or two.
     pub finding: &'static str,
@@ -86,6 +90,9 @@ static EXPERIMENTS: &[Experiment] = &[
     physical::TRIPLE_PENDULUM,
     physical::SPHERE_GEODESIC,
     physical::ADS4_GEODESIC,
+    presets::QUICK,
+    presets::BEST,
+    presets::TIME_TO_ACCURACY,
 ];
 
 /// All experiments, in the order of the paper.
@@ -103,6 +110,11 @@ pub fn find(name: &str) -> Result<&'static Experiment, String> {
 }
 
 impl Experiment {
+    /// Whether the time of its runs matters: they then run one after the other, each on all threads.
+    pub fn is_timed(&self) -> bool {
+        self.pictures.contains(&Picture::Clock)
+    }
+
     /// The runs at a scale, each for `seeds` seeds from 0; runs that the paper itself repeats keep their own seeds apart.
     pub fn runs(&self, scale: Scale, seeds: usize) -> Vec<Run> {
         let runs = (self.runs)();

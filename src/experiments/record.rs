@@ -41,6 +41,9 @@ pub struct Record {
     pub outcome: Outcome,
     /// Training and validation loss of every epoch, absent where not finite.
     pub losses: Vec<[Option<f64>; 2]>,
+    /// Seconds of training at the end of every epoch.
+    #[serde(default)]
+    pub times: Vec<f64>,
     /// Seconds of training.
     pub seconds: f64,
 }
@@ -151,14 +154,19 @@ mod tests {
             energy_errors,
             integrated,
         });
-        Some(Record { outcome, losses: vec![[Some(1.0), None]], seconds: 2.0 })
+        Some(Record { outcome, losses: vec![[Some(1.0), None]], times: vec![2.0], seconds: 2.0 })
     }
 
     #[test]
     fn rows_gather_runs_of_one_label_and_count_failures() {
         let experiment = find("activations").unwrap();
         let runs = experiment.runs(Scale::Smoke, 1);
-        let nothing = Some(Record { outcome: Outcome::Nothing { reason: "NaN".into() }, losses: vec![], seconds: 1.0 });
+        let nothing = Some(Record {
+            outcome: Outcome::Nothing { reason: "NaN".into() },
+            losses: vec![],
+            times: vec![],
+            seconds: 1.0,
+        });
         let mut records = vec![learned(0.1, vec![Some(0.5), None]), learned(0.3, vec![Some(0.1)]), nothing, None];
         records.resize(runs.len(), None);
         let results: Vec<(Run, Option<Record>)> = runs.into_iter().zip(records).collect();

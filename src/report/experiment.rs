@@ -71,13 +71,47 @@ pub fn experiment_table(rows: &[Row]) -> Vec<Vec<String>> {
         .collect()
 }
 
-/// Pictures of an experiment from its finished runs; what has nothing to show is left out.
+/// Validation loss against seconds of training.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Curve {
+    /// What it is of.
+    pub label: String,
+    /// Seconds and loss, paper convention.
+    pub points: Vec<(f64, f64)>,
+}
+
+/// The curve of every finished run.
+pub fn experiment_curves(results: &[(Run, Option<Record>)]) -> Vec<Curve> {
+    let of = |(run, record): &(Run, Option<Record>)| {
+        let record = record.as_ref()?;
+        let losses = record.losses.iter().map(|[_, validation]| *validation);
+        let points = record.times.iter().zip(losses).filter_map(|(&time, loss)| Some((time, loss?))).collect();
+        Some(Curve { label: run.label.clone(), points })
+    };
+    results.iter().filter_map(of).collect()
+}
+
+/// The lowest loss so far against the logarithm of the time.
+fn reached(curves: &[Curve]) -> Vec<Series> {
+    let series = |curve: &Curve| {
+        let mut lowest = f64::INFINITY;
+        let point = |&(time, loss): &(f64, f64)| {
+            lowest = lowest.min(loss);
+            (time.log10(), lowest)
+        };
+        Series { name: curve.label.clone(), points: curve.points.iter().map(point).collect(), over: false }
+    };
+    curves.iter().map(series).collect()
+}
+
+/// Pictures of an experiment from its finished runs, and `curves` where time matters; what has nothing to show is left out.
 ///
 /// # Errors
 /// [`PlotError::Renderer`] if the renderer fails.
 pub fn experiment_figures(
     experiment: &Experiment,
     results: &[(Run, Option<Record>)],
+    curves: &[Curve],
 ) -> Result<Vec<Figure>, PlotError> {
     let mut figures = Vec::new();
     let mut add = |file: &str, caption: String, plot: LinePlot| match line_png(&plot) {
@@ -125,6 +159,17 @@ pub fn experiment_figures(
                     y_label: "lowest validation loss".into(),
                     log_y: true,
                     series: trade_off(results),
+                },
+            )?,
+            Picture::Clock => add(
+                "time_to_accuracy",
+                "Lowest validation loss so far against seconds of training, paper convention.".into(),
+                LinePlot {
+                    title: experiment.title.into(),
+                    x_label: "log10 of the time of training [s]".into(),
+                    y_label: "lowest validation loss".into(),
+                    log_y: true,
+                    series: reached(curves),
                 },
             )?,
             Picture::Evaluation(_) => {}

@@ -79,6 +79,10 @@ pub struct Polish {
     pub memory: usize,
 }
 
+fn is_zero(x: &f64) -> bool {
+    *x == 0.0
+}
+
 /// States that are sampled uniformly within bounds.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -87,6 +91,11 @@ pub struct Data {
     pub training: usize,
     /// Number of validation states; the best epoch is chosen on them.
     pub validation: usize,
+    /// Fraction of the training states of a system with a mass shell that are drawn off it: their velocity is `u` times one on
+    /// the shell, `u` uniform in `[0, 1)`, their acceleration `u^2` times as large, as for every geodesic. On the shell alone
+    /// the metric cannot be told.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub off_shell: f64,
     /// Number of fresh states on which the final model is judged.
     pub test: usize,
     /// Validation and test bounds of each coordinate.
@@ -186,6 +195,8 @@ impl Config {
         count(self.data.training, "data.training", STATES)?;
         count(self.data.validation, "data.validation", STATES)?;
         count(self.data.test, "data.test", STATES)?;
+        let off_shell = self.data.off_shell;
+        fraction(off_shell, "data.off_shell", (0.0..=1.0).contains(&off_shell), "a number from 0 to 1")?;
         check_bounds("data.validation_position", &self.data.validation_position, n)?;
         check_bounds("data.validation_velocity", &self.data.validation_velocity, n)?;
         let hidden = &self.network.hidden;

@@ -55,6 +55,7 @@ fn base(system: &Configured<f64>, states: usize, network: Network) -> Config {
         data: Data {
             training: states,
             validation: states / 5,
+            off_shell: 0.0,
             test: states / 5,
             validation_position: boxes(&validation.positions),
             validation_velocity: boxes(&validation.velocities),
@@ -88,6 +89,9 @@ fn best(system: &str) -> Size {
     }
 }
 
+/// Part of the states off a mass shell in the presets of our own.
+const OFF_SHELL: f64 = 0.25;
+
 /// Weight of the penalty of the presets of our own.
 const PENALTY: f64 = 100.0;
 
@@ -119,11 +123,14 @@ fn ours(system: &Configured<f64>, size: Size) -> Config {
         }
     }
     let phase = phase(size.epochs, 5e-3, boxes(&bounds.positions), boxes(&bounds.velocities));
+    let base = base(system, 60_000, network(size.width));
+    let off_shell = if system.constrained_coordinate().is_some() { OFF_SHELL } else { 0.0 };
     Config {
+        data: Data { off_shell, ..base.data },
         penalty: regularizer(system, PENALTY),
         optimizer: optimizer(Method::Soap),
         phases: vec![phase],
-        ..base(system, 60_000, network(size.width))
+        ..base
     }
 }
 
@@ -143,7 +150,7 @@ pub(super) fn recorded(
         seed: 0,
         precision: Precision::F32,
         parameters: Default::default(),
-        data: Data { training, validation, test, validation_position, validation_velocity },
+        data: Data { training, validation, test, off_shell: 0.0, validation_position, validation_velocity },
         network: network(QUICK.width),
         penalty: Regularizer::Eigenvalue { lambda: PENALTY },
         optimizer,

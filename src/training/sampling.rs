@@ -70,6 +70,20 @@ pub fn sample(
     Ok(Dataset::new(n, q, v, a)?)
 }
 
+/// Slows a `fraction` of geodesic states down: `v -> u v`, `a -> u^2 a`, `u` uniform in `[0, 1)`.
+fn leave_shell(set: &Dataset<f64>, fraction: f64, rng: &mut impl Rng) -> Result<Dataset<f64>, DatasetError> {
+    let n = set.coordinates();
+    let (mut v, mut a) = (set.v().to_vec(), set.a().to_vec());
+    for (v, a) in v.chunks_exact_mut(n).zip(a.chunks_exact_mut(n)) {
+        let (chance, u) = (rng.random::<f64>(), rng.random::<f64>());
+        if chance < fraction {
+            v.iter_mut().for_each(|v| *v *= u);
+            a.iter_mut().for_each(|a| *a *= u * u);
+        }
+    }
+    Dataset::new(n, set.q().to_vec(), v, a)
+}
+
 /// All datasets of a run in its precision, with the physical scale of the first phase's training states.
 ///
 /// # Errors
@@ -85,7 +99,10 @@ pub fn sample_all<S: Scalar>(
         let field = format!("phase[{k}].position");
         let bounds = (phase.position.as_slice(), phase.velocity.as_slice());
         let mut rng = Stream::Training(k).generator(seed);
-        training.push(sample(system, &field, bounds, config.data.training, &mut rng)?);
+        let set = sample(system, &field, bounds, config.data.training, &mut rng)?;
+        let off = config.data.off_shell;
+        let slowed = off > 0.0 && system.constrained_coordinate().is_some();
+        training.push(if slowed { leave_shell(&set, off, &mut rng)? } else { set });
     }
     let scale = training[0].physical_scale();
     let data = &config.data;
@@ -135,6 +152,28 @@ mod tests {
             seen += 1;
         }
         assert_eq!(seen, 4);
+    }
+
+    #[test]
+    fn slow_states_off_the_shell_are_states_of_the_same_motion() {
+        let system = configure::<f64>("ads4-geodesic", &[]).unwrap();
+        let mut config = Preset::Quick.config(&system).unwrap();
+        (config.data.training, config.data.validation, config.data.test) = (2000, 10, 10);
+        config.data.off_shell = 0.25;
+        let (data, _) = sample_all::<f64>(&config, &system).unwrap();
+        let (set, mut terms, mut off) = (&data.training[0], Terms::default(), 0);
+        let exact = system.build().unwrap();
+        exact.terms(set.q(), set.v(), Request::ENERGY | Request::ACCELERATION, &mut terms).unwrap();
+        for (&l, (a, found)) in terms.lagrangian.iter().zip(terms.acceleration.chunks(4).zip(set.a().chunks(4))) {
+            assert!((-0.5 - 1e-12..=0.0).contains(&l), "time-like or at rest: {l}");
+            off += usize::from(l > -0.5 + 1e-9);
+            let size = a.iter().fold(1.0f64, |m, a| m.max(a.abs()));
+            assert!(a.iter().zip(found).all(|(a, b)| (a - b).abs() <= 1e-12 * size));
+        }
+        // Binomial: mean 500, deviation 19.
+        assert!((400..600).contains(&off), "{off}");
+        config.data.off_shell = 1.5;
+        assert!(matches!(sample_all::<f64>(&config, &system), Err(SamplingError::Config(_))));
     }
 
     #[test]
