@@ -7,13 +7,15 @@
 //! `cargo bench --bench measured -- --part films FILM.csv...` takes films as `examples/pendulum_video.rs` does, 400 frames a second;
 //! without files those of Asseman, Kornuta and Ozcan ("Learning beyond simulated physics", 2018) if they stand in
 //! `../shared/data/ibm-double-pendulum`. Every film is a recording of its own: the first four fifths are learned from, the
-//! rest is predicted, 0.5 s at a time. `-- --part noise` is the made motion; without `--part` both. Writes `films.csv` and `noise.csv` into
-//! `target/measured`.
+//! rest is predicted, 0.5 s at a time. `-- --part noise` is the made motion, `-- --part rows` reads and surveys ten million
+//! rows and says what that took; without `--part` all three. Writes `films.csv` and `noise.csv` into `target/measured`.
 
 #[path = "measured/noise.rs"]
 mod noise;
 #[path = "measured/plain.rs"]
 mod plain;
+#[path = "measured/rows.rs"]
+mod rows;
 #[allow(dead_code)]
 #[path = "../examples/pendulum_video.rs"]
 mod video;
@@ -37,6 +39,9 @@ const RATE: f64 = 400.0;
 const HORIZON: f64 = 0.5;
 /// Threads.
 const THREADS: usize = 2;
+
+/// What can be measured.
+const PARTS: [&str; 3] = ["rows", "noise", "films"];
 
 /// How much work is done.
 #[derive(Clone, Copy)]
@@ -150,11 +155,14 @@ fn lines(recording: &Recording, scale: Scale) -> Vec<Line> {
 
 fn main() {
     let mut arguments = std::env::args().skip(1);
-    let (mut parts, mut films, mut full) = (vec!["films".to_string(), "noise".to_string()], Vec::new(), false);
+    let (mut parts, mut films, mut full) = (PARTS.map(String::from).to_vec(), Vec::new(), false);
     while let Some(argument) = arguments.next() {
         match argument.as_str() {
             "--bench" => full = true,
-            "--part" => parts = vec![arguments.next().expect("--part films or --part noise")],
+            "--part" => {
+                let part = arguments.next().filter(|part| PARTS.contains(&part.as_str()));
+                parts = vec![part.unwrap_or_else(|| panic!("--part: expected one of {}", PARTS.join(", ")))];
+            }
             other => films.push(PathBuf::from(other)),
         }
     }
@@ -164,10 +172,17 @@ fn main() {
         let scale = Scale { epochs: Some(2), hidden: [8; 3], shooting_epochs: 1 };
         assert_eq!(lines(&made(), scale).len(), 6);
         assert_eq!(noise::compare(5, 0..1, scale).len(), 3);
+        let place = tempfile::tempdir().expect("a folder");
+        let found = rows::time(&place.path().join("rows.csv"), 2000);
+        assert_eq!((found.samples, found.cuts.len(), found.warnings.len()), (2000, 0, 0));
         return;
     }
     std::fs::create_dir_all(&folder).expect("a folder for the results");
     let scale = Scale { epochs: None, hidden: [128; 3], shooting_epochs: Shooting::default().epochs };
+    // First, while the process is small.
+    if parts.iter().any(|part| part == "rows") {
+        rows::time(&folder.join("rows.csv"), 10_000_000);
+    }
     if parts.iter().any(|part| part == "noise") {
         let rows = noise::compare(50, 0..3, scale);
         let csv = format!("seed,learned_from,error,seconds\n{}\n", rows.join("\n"));

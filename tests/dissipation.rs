@@ -4,9 +4,10 @@
 mod common;
 
 use common::accuracy::{cast, largest};
+use common::damped::Damped;
 use common::{of_scalar, properties};
 use lnn::forward::HyperDual;
-use lnn::lagrangian::{EulerLagrange, MechanicsError, Request, Terms, configure};
+use lnn::lagrangian::{EulerLagrange, Request, Terms};
 use lnn::linalg::Workspace;
 use lnn::network::{
     Architecture, Chunk, Depth, Dissipation, Initialization, InputLayer, Layout, NetworkLagrangian, Nonlinearity,
@@ -23,6 +24,7 @@ use proptest::prelude::*;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::TAU;
+use std::time::Instant;
 
 #[derive(Clone, Debug)]
 struct Case {
@@ -259,51 +261,6 @@ fn friction_adds_to_the_forces_of_the_same_lagrangian() {
     }
 }
 
-/// A chain of pendula with friction in its joints, viscous and nearly dry.
-struct Damped {
-    exact: Box<dyn EulerLagrange<f64>>,
-}
-
-impl Damped {
-    /// N m s.
-    const VISCOUS: f64 = 0.3;
-    /// N m, and the velocity in rad/s at which dry friction is nearly fully there.
-    const DRY: (f64, f64) = (1.0, 0.5);
-
-    fn chain(n: usize) -> Self {
-        let configured = configure("n-pendulum", &[("n".to_string(), n.to_string())]).unwrap();
-        Self { exact: configured.build().unwrap() }
-    }
-
-    /// Torque that resists joint `i`, and the velocity of its bending.
-    fn joint(v: &[f64], i: usize) -> (f64, f64) {
-        let bend = if i == 0 { v[0] } else { v[i] - v[i - 1] };
-        (Self::VISCOUS * bend + Self::DRY.0 * (bend / Self::DRY.1).tanh(), bend)
-    }
-}
-
-impl EulerLagrange<f64> for Damped {
-    fn coordinates(&self) -> usize {
-        self.exact.coordinates()
-    }
-    fn conserves_energy(&self) -> bool {
-        false
-    }
-    fn terms(&self, q: &[f64], v: &[f64], request: Request, terms: &mut Terms<f64>) -> Result<(), MechanicsError> {
-        let n = self.coordinates();
-        self.exact.terms(q, v, request, terms)?;
-        if request.includes(Request::FORCE) {
-            for v in v.chunks_exact(n) {
-                let joints: Vec<(f64, f64)> = (0..n).map(|i| Self::joint(v, i)).collect();
-                terms.dissipation.push(joints.iter().map(|(torque, bend)| torque * bend).sum());
-                let above = joints.iter().skip(1).map(|joint| joint.0).chain([0.0]);
-                terms.force.extend(joints.iter().zip(above).map(|(below, above)| above - below.0));
-            }
-        }
-        terms.complete(n, v, request, &mut Workspace::new())
-    }
-}
-
 #[test]
 fn the_energy_of_a_motion_goes_where_friction_takes_it() {
     let model = Damped::chain(2);
@@ -489,4 +446,29 @@ fn friction_is_learned_beside_the_lagrangian() {
     // Measured: 0.90.
     let forced = learn(&model, Some(16), 60, true);
     assert!((forced.factor - 1.0).abs() < 0.2 && forced.mass < 0.15, "{forced:?}");
+}
+
+/// What a longer training separates, chains of one to three pendula: the error of accelerations with and without friction,
+/// of the mass matrix and of the dissipated power.
+///
+/// `cargo test --test dissipation -- --ignored --nocapture separation` prints the table, in minutes.
+#[test]
+#[ignore = "prints a table, in minutes"]
+fn separation() {
+    println!("relative errors    acceleration                     mass     power of      mean");
+    println!(" n  epochs  without friction      with    matrix  single states     power    seconds");
+    for n in 1..=3 {
+        let model = Damped::chain(n);
+        for epochs in [60, 400] {
+            let start = Instant::now();
+            let (without, with) = (learn(&model, None, epochs, false), learn(&model, Some(16), epochs, false));
+            let seconds = start.elapsed().as_secs_f64();
+            let [plain, own, mass, power] = [without.acceleration, with.acceleration, with.mass, with.power];
+            let mean = (with.mean_power - 1.0).abs();
+            println!("{n:2} {epochs:7} {plain:17.4} {own:9.4} {mass:9.4} {power:14.4} {mean:9.4} {seconds:10.1}");
+            // A second coordinate tells friction from the forces of L.
+            assert!(n == 1 || own < plain, "{n} {epochs}: {with:?} {without:?}");
+            assert!([plain, own, mass, power, mean].iter().all(|x| x.is_finite()), "{with:?} {without:?}");
+        }
+    }
 }

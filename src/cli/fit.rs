@@ -1,9 +1,10 @@
 //! `lnn fit`: learns from recorded motion, judges by motion that was held out, writes.
 
 use crate::cli::fit_args::Args;
+use crate::cli::fit_summary::Found;
 use crate::cli::folder::Folder;
-use crate::cli::judgement::{Judgement, Plan, judge};
-use crate::cli::learning::{ended, history, training_pictures, write_figures};
+use crate::cli::judgement::{Plan, judge};
+use crate::cli::learning::history;
 use crate::cli::number::threads;
 use crate::cli::train::hooks;
 use crate::cli::train_config::PrecisionName;
@@ -11,13 +12,12 @@ use crate::cli::{CliError, interrupt, memory, output};
 use crate::network::file::{FORMAT, Header, ModelFile, StoredPrecision};
 use crate::network::{Architecture, NetworkLagrangian};
 use crate::recording::smooth::SmoothOptions;
-use crate::recording::{HeldOut, Reading, Targets};
-use crate::report::Report;
+use crate::recording::survey::{SurveyOptions, survey};
+use crate::recording::{Reading, Targets};
 use crate::scalar::Scalar;
 use crate::training::shooting::{self, Shooting, Task};
 use crate::training::{Config, Measured, Preparation, Regularizer, Stop, Trained, train, training_memory};
 use serde::Serialize;
-use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -32,55 +32,6 @@ struct Record<'a> {
     noise: Option<&'a [f64]>,
     shooting: Option<&'a Shooting>,
     training: &'a Config,
-}
-
-/// One coordinate of `summary.json`: what the data are like and what smoothing makes of them, in SI units.
-#[derive(Serialize)]
-struct Coordinate {
-    name: String,
-    noise: f64,
-    window_samples: usize,
-    window_seconds: f64,
-    acceleration_error: f64,
-    acceleration_error_relative: f64,
-}
-
-/// What `summary.json` holds.
-#[derive(Serialize)]
-struct Summary<'a> {
-    system: &'a str,
-    crate_version: &'static str,
-    seed: u64,
-    precision: &'static str,
-    threads: usize,
-    targets: Targets,
-    trajectories: [usize; 3],
-    samples: [usize; 3],
-    held_out: &'a HeldOut,
-    coordinates: Vec<Coordinate>,
-    epochs: usize,
-    weights: usize,
-    /// Loss (paper) against the accelerations the network was trained on, of the validation and the held-out part.
-    validation_loss: f64,
-    test_loss: f64,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    shooting: Option<ShootingSummary>,
-    ended: String,
-    training_seconds: f64,
-    wall_seconds: f64,
-    #[serde(flatten)]
-    judgement: &'a Judgement,
-}
-
-/// Multiple shooting in `summary.json`; losses are mean squared residuals in units of noise.
-#[derive(Serialize)]
-struct ShootingSummary {
-    epochs: usize,
-    segments: usize,
-    steps_per_segment: usize,
-    start_loss: f64,
-    validation_loss: f64,
-    integration_error: f64,
 }
 
 /// Learns and writes everything into the output directory.
@@ -110,6 +61,9 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     if targets == Targets::Measured && !measured.training.recording.has_accelerations() {
         return Err(CliError::usage("--targets measured: no accelerations were given, see --acceleration"));
     }
+    let looking = SurveyOptions { smooth: preparation.smoothing, validation: args.hold_out, seed: args.seed };
+    let found = survey(&reading, &looking).map_err(CliError::data)?;
+    found.warnings.iter().for_each(|warning| output::note(warning));
     let forced = reading.recording.tracks.iter().any(|track| !track.force.is_empty());
     if args.friction.is_some() && reading.recording.n() == 1 && !forced {
         let motion = "every motion of one coordinate has a Lagrangian";
@@ -194,52 +148,19 @@ impl Job<'_> {
         let time = args.timelike.as_ref().and_then(|name| names.iter().position(|n| n == name));
         let plan = Plan { part: &measured.test, horizon: args.horizon, time, threads };
         let judgement = judge(&network, &plan)?;
-        let parts = [&measured.training, &measured.validation, &measured.test];
-        let summary = Summary {
-            system: &args.name,
-            crate_version: env!("CARGO_PKG_VERSION"),
-            seed: args.seed,
-            precision: S::NAME,
-            threads,
+        let found = Found {
+            name: &args.name,
+            recording: &self.reading.recording,
+            measured,
             targets: *targets,
-            trajectories: parts.map(|part| part.recording.tracks.len()),
-            samples: parts.map(|part| part.recording.samples()),
-            held_out: &measured.held_out,
-            coordinates: self.coordinates(),
-            epochs: trained.history.len(),
-            weights: trained.weights.len(),
-            validation_loss: trained.validation_loss,
-            test_loss: trained.test.loss.to_f64(),
-            shooting: shot.as_ref().map(|fitted| ShootingSummary {
-                epochs: fitted.history.len(),
-                segments: fitted.segments.0,
-                steps_per_segment: fitted.steps,
-                start_loss: fitted.start_loss,
-                validation_loss: fitted.validation_loss,
-                integration_error: fitted.integration_error,
-            }),
-            ended: ended(&trained.stop),
-            training_seconds: trained.seconds + shot.as_ref().map_or(0.0, |fitted| fitted.seconds),
-            wall_seconds: self.started.elapsed().as_secs_f64(),
+            seed: args.seed,
+            threads,
+            trained: &trained,
+            shot: shot.as_ref(),
             judgement: &judgement,
+            started: self.started,
         };
-        let json = serde_json::to_string_pretty(&summary).map_err(CliError::data)? + "\n";
-        let text = self.text(&summary);
-        let mut figures = training_pictures(&trained.history)?;
-        if let Some(shot) = &shot {
-            let mut later = training_pictures(&shot.history)?;
-            later.iter_mut().for_each(|figure| figure.file.insert_str(0, "shooting_"));
-            figures.extend(later);
-        }
-        let report = Report::new(&format!("{}: learned from recorded motion", args.name)).preformatted(&text);
-        let report = judgement.report(report).heading("Training");
-        let report = figures.iter().fold(report, |report, figure| report.figure(&figure.png, &figure.caption));
-        let report = report.heading("Configuration").preformatted(&toml);
-        write_figures(folder, figures.iter().chain(&judgement.figures))?;
-        folder.write("report.html", report.to_html().as_bytes())?;
-        folder.write("summary.json", json.as_bytes())?;
-        let text = format!("{text}\nreport: {}\n", folder.file("report.html").display());
-        output::print(if args.json { &json } else { &text })?;
+        found.write(folder, &toml, args.json)?;
         match &trained.stop {
             Stop::Finished => Ok(()),
             Stop::Interrupted => {
@@ -298,62 +219,5 @@ impl Job<'_> {
             seed: config.seed,
             validation_loss: trained.validation_loss,
         }
-    }
-
-    fn coordinates(&self) -> Vec<Coordinate> {
-        let pairs = self.reading.recording.coordinates.iter().zip(&self.measured.smoothing.coordinates);
-        pairs
-            .map(|(name, chosen)| Coordinate {
-                name: name.clone(),
-                noise: chosen.noise.sigma,
-                window_samples: chosen.quality.window,
-                window_seconds: chosen.seconds,
-                acceleration_error: chosen.quality.total(2),
-                acceleration_error_relative: chosen.quality.relative(),
-            })
-            .collect()
-    }
-
-    /// The run in words and tables.
-    fn text(&self, summary: &Summary<'_>) -> String {
-        let [training, validation, test] = summary.samples;
-        let way = match summary.targets {
-            Targets::Measured => "measured accelerations",
-            Targets::Smoothed => "smoothed accelerations",
-            Targets::Motion => "the motion itself (multiple shooting)",
-        };
-        let held = summary.held_out.describe(&self.reading.recording);
-        let mut text = format!(
-            "learned from {way}: {training} samples of {} trajectories, best epoch chosen on {validation}, judged on {test} \
-             (held out: {held})\n",
-            summary.trajectories[0]
-        );
-        // Writing to a string cannot fail.
-        for c in &summary.coordinates {
-            let _ = writeln!(
-                text,
-                "{}: noise {:.3e}, smoothed over {:.3} s ({} samples), accelerations good to {:.1} %",
-                c.name,
-                c.noise,
-                c.window_seconds,
-                c.window_samples,
-                100.0 * c.acceleration_error_relative
-            );
-        }
-        let _ = writeln!(
-            text,
-            "loss (paper) against those accelerations: validation {:.6}, held out {:.6}; {} epochs, {} weights, seed {}",
-            summary.validation_loss, summary.test_loss, summary.epochs, summary.weights, summary.seed
-        );
-        if let Some(shooting) = &summary.shooting {
-            let _ = writeln!(
-                text,
-                "mean squared residual of predictions, in units of noise (1: only noise is left): {:.3} before, {:.3} after {} epochs \
-                 over {} segments",
-                shooting.start_loss, shooting.validation_loss, shooting.epochs, shooting.segments
-            );
-        }
-        let _ = writeln!(text, "{:.1} s of training, {:.1} s in all\n", summary.training_seconds, summary.wall_seconds);
-        text + &summary.judgement.text()
     }
 }

@@ -12,6 +12,7 @@ mod evaluation;
 mod experiment;
 mod fit;
 mod fit_args;
+mod fit_summary;
 mod folder;
 mod holder;
 mod inspect;

@@ -2,6 +2,7 @@
 #![allow(dead_code, reason = "each test program uses its part")]
 
 pub mod accuracy;
+pub mod damped;
 pub mod matrices;
 pub mod nested;
 #[cfg(feature = "cli")]

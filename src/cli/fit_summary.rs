@@ -1,0 +1,206 @@
+//! What `lnn fit` found, in `summary.json`, in words and in the report.
+
+use crate::cli::folder::Folder;
+use crate::cli::judgement::Judgement;
+use crate::cli::learning::{ended, training_pictures, write_figures};
+use crate::cli::{CliError, output};
+use crate::recording::{HeldOut, Recording, Targets};
+use crate::report::Report;
+use crate::scalar::Scalar;
+use crate::training::shooting::Fitted;
+use crate::training::{Measured, Trained};
+use serde::Serialize;
+use std::fmt::Write as _;
+use std::time::Instant;
+
+/// One coordinate of `summary.json`: what the data are like and what smoothing makes of them, in SI units.
+#[derive(Serialize)]
+struct Coordinate {
+    name: String,
+    noise: f64,
+    window_samples: usize,
+    window_seconds: f64,
+    acceleration_error: f64,
+    acceleration_error_relative: f64,
+}
+
+/// What `summary.json` holds.
+#[derive(Serialize)]
+struct Summary<'a> {
+    system: &'a str,
+    crate_version: &'static str,
+    seed: u64,
+    precision: &'static str,
+    threads: usize,
+    targets: Targets,
+    trajectories: [usize; 3],
+    samples: [usize; 3],
+    held_out: &'a HeldOut,
+    coordinates: Vec<Coordinate>,
+    epochs: usize,
+    weights: usize,
+    /// Loss (paper) against the accelerations the network was trained on, of the validation and the held-out part.
+    validation_loss: f64,
+    test_loss: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    shooting: Option<ShootingSummary>,
+    ended: String,
+    training_seconds: f64,
+    wall_seconds: f64,
+    #[serde(flatten)]
+    judgement: &'a Judgement,
+}
+
+/// Multiple shooting in `summary.json`; losses are mean squared residuals in units of noise.
+#[derive(Serialize)]
+struct ShootingSummary {
+    epochs: usize,
+    segments: usize,
+    steps_per_segment: usize,
+    start_loss: f64,
+    validation_loss: f64,
+    integration_error: f64,
+}
+
+/// What was learned, and from what.
+pub struct Found<'a, S> {
+    /// Name of the system.
+    pub name: &'a str,
+    /// What was recorded.
+    pub recording: &'a Recording,
+    /// The same, smoothed and divided.
+    pub measured: &'a Measured,
+    /// What was learned from.
+    pub targets: Targets,
+    /// Seed.
+    pub seed: u64,
+    /// Threads.
+    pub threads: usize,
+    /// The supervised training.
+    pub trained: &'a Trained<S>,
+    /// Multiple shooting, if there was any.
+    pub shot: Option<&'a Fitted<S>>,
+    /// What the model is worth.
+    pub judgement: &'a Judgement,
+    /// When the command began.
+    pub started: Instant,
+}
+
+impl<'a, S: Scalar> Found<'a, S> {
+    /// Writes pictures, `report.html` and `summary.json`, and prints the last as it is or in words.
+    ///
+    /// # Errors
+    /// Pictures that cannot be drawn, files that cannot be written, a closed standard output.
+    pub fn write(&self, folder: &Folder, toml: &str, print_json: bool) -> Result<(), CliError> {
+        let summary = self.summary();
+        let json = serde_json::to_string_pretty(&summary).map_err(CliError::data)? + "\n";
+        let text = summary.text(self.recording);
+        let mut figures = training_pictures(&self.trained.history)?;
+        if let Some(shot) = self.shot {
+            let mut later = training_pictures(&shot.history)?;
+            later.iter_mut().for_each(|figure| figure.file.insert_str(0, "shooting_"));
+            figures.extend(later);
+        }
+        let report = Report::new(&format!("{}: learned from recorded motion", self.name)).preformatted(&text);
+        let report = self.judgement.report(report).heading("Training");
+        let report = figures.iter().fold(report, |report, figure| report.figure(&figure.png, &figure.caption));
+        let report = report.heading("Configuration").preformatted(toml);
+        write_figures(folder, figures.iter().chain(&self.judgement.figures))?;
+        folder.write("report.html", report.to_html().as_bytes())?;
+        folder.write("summary.json", json.as_bytes())?;
+        let text = format!("{text}\nreport: {}\n", folder.file("report.html").display());
+        output::print(if print_json { &json } else { &text })
+    }
+
+    fn summary(&self) -> Summary<'a> {
+        let Self { measured, trained, shot, .. } = self;
+        let parts = [&measured.training, &measured.validation, &measured.test];
+        Summary {
+            system: self.name,
+            crate_version: env!("CARGO_PKG_VERSION"),
+            seed: self.seed,
+            precision: S::NAME,
+            threads: self.threads,
+            targets: self.targets,
+            trajectories: parts.map(|part| part.recording.tracks.len()),
+            samples: parts.map(|part| part.recording.samples()),
+            held_out: &measured.held_out,
+            coordinates: self.coordinates(),
+            epochs: trained.history.len(),
+            weights: trained.weights.len(),
+            validation_loss: trained.validation_loss,
+            test_loss: trained.test.loss.to_f64(),
+            shooting: shot.map(|fitted| ShootingSummary {
+                epochs: fitted.history.len(),
+                segments: fitted.segments.0,
+                steps_per_segment: fitted.steps,
+                start_loss: fitted.start_loss,
+                validation_loss: fitted.validation_loss,
+                integration_error: fitted.integration_error,
+            }),
+            ended: ended(&trained.stop),
+            training_seconds: trained.seconds + shot.map_or(0.0, |fitted| fitted.seconds),
+            wall_seconds: self.started.elapsed().as_secs_f64(),
+            judgement: self.judgement,
+        }
+    }
+
+    fn coordinates(&self) -> Vec<Coordinate> {
+        let pairs = self.recording.coordinates.iter().zip(&self.measured.smoothing.coordinates);
+        pairs
+            .map(|(name, chosen)| Coordinate {
+                name: name.clone(),
+                noise: chosen.noise.sigma,
+                window_samples: chosen.quality.window,
+                window_seconds: chosen.seconds,
+                acceleration_error: chosen.quality.total(2),
+                acceleration_error_relative: chosen.quality.relative(),
+            })
+            .collect()
+    }
+}
+
+impl Summary<'_> {
+    /// The run in words and tables.
+    fn text(&self, recording: &Recording) -> String {
+        let [training, validation, test] = self.samples;
+        let way = match self.targets {
+            Targets::Measured => "measured accelerations",
+            Targets::Smoothed => "smoothed accelerations",
+            Targets::Motion => "the motion itself (multiple shooting)",
+        };
+        let held = self.held_out.describe(recording);
+        let mut text = format!(
+            "learned from {way}: {training} samples of {} trajectories, best epoch chosen on {validation}, judged on {test} \
+             (held out: {held})\n",
+            self.trajectories[0]
+        );
+        // Writing to a string cannot fail.
+        for c in &self.coordinates {
+            let _ = writeln!(
+                text,
+                "{}: noise {:.3e}, smoothed over {:.3} s ({} samples), accelerations good to {:.1} %",
+                c.name,
+                c.noise,
+                c.window_seconds,
+                c.window_samples,
+                100.0 * c.acceleration_error_relative
+            );
+        }
+        let _ = writeln!(
+            text,
+            "loss (paper) against those accelerations: validation {:.6}, held out {:.6}; {} epochs, {} weights, seed {}",
+            self.validation_loss, self.test_loss, self.epochs, self.weights, self.seed
+        );
+        if let Some(shooting) = &self.shooting {
+            let _ = writeln!(
+                text,
+                "mean squared residual of predictions, in units of noise (1: only noise is left): {:.3} before, {:.3} after {} epochs \
+                 over {} segments",
+                shooting.start_loss, shooting.validation_loss, shooting.epochs, shooting.segments
+            );
+        }
+        let _ = writeln!(text, "{:.1} s of training, {:.1} s in all\n", self.training_seconds, self.wall_seconds);
+        text + &self.judgement.text()
+    }
+}
