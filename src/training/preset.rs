@@ -30,7 +30,7 @@ impl Preset {
     pub fn config(self, system: &Configured<f64>) -> Option<Config> {
         match self {
             Self::Quick => Some(ours(system, QUICK)),
-            Self::Best => Some(ours(system, best(system.system.name))),
+            Self::Best => Some(ours(system, BEST)),
             Self::Paper => paper(system),
         }
     }
@@ -81,13 +81,7 @@ struct Size {
 
 const QUICK: Size = Size { width: 128, epochs: 40 };
 
-/// The size that was the best of those tried within its time.
-fn best(system: &str) -> Size {
-    match system {
-        "double-pendulum" => Size { width: 128, epochs: 400 },
-        _ => Size { width: 192, epochs: 300 },
-    }
-}
+const BEST: Size = Size { width: 192, epochs: 400 };
 
 /// Part of the states off a mass shell in the presets of our own.
 const OFF_SHELL: f64 = 0.25;
