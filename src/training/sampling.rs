@@ -127,6 +127,7 @@ mod tests {
             let configured = configure::<f64>(system.name, &[]).unwrap();
             let mut config = Preset::Quick.config(&configured).unwrap();
             (config.data.training, config.data.validation, config.data.test) = (500, 200, 100);
+            config.data.off_shell = 0.0;
             let (data, scale) = sample_all::<f64>(&config, &configured).unwrap();
             let i = configured.constrained_coordinate().unwrap();
             for set in data.training.iter().chain([&data.validation, &data.test]) {
