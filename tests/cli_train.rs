@@ -171,9 +171,9 @@ fn a_relativistic_model_knows_the_range_of_the_imposed_velocity() {
     assert!(printed.contains("until [m]"));
     let model = text(&folder.path("run/model.safetensors"));
     let header = ModelFile::<f64>::load(Path::new(&model)).unwrap().header;
-    // z/L is at least 0.5; x_dot, y_dot, z_dot and z at their bounds give 6.20.
+    // x_dot, y_dot, z_dot and z at their bounds give 6.20; a quarter of the states is slowed down, almost to rest.
     let [low, high] = header.velocity[0];
-    assert!(low >= 0.5 && high < 6.21 && low < high, "{low} {high}");
+    assert!((0.0..0.5).contains(&low) && (1.0..6.21).contains(&high), "{low} {high}");
     assert_eq!(header.velocity[1], [-1.0, 1.0]);
     assert!((header.architecture.scale[0] - high.max(5.0)).abs() < 1e-6 * high);
 
@@ -227,8 +227,8 @@ fn wrong_trainings_are_refused_before_anything_is_written() {
     with("epochs = 3", "epochs = 0", &["phase[0].epochs"]);
     with("epochs = 3", "epochs = \"many\"", &["phase[0].epochs", "expected usize"]);
     with("seed = 0", "seed = 0\nseed = 1", &["duplicate"]);
-    with("rate = 0.003", "rate = nan", &["phase[0].rate", "NaN"]);
-    with("rate = 0.003", "rate = 0.0", &["phase[0].rate"]);
+    with("rate = 0.005", "rate = nan", &["phase[0].rate", "NaN"]);
+    with("rate = 0.005", "rate = 0.0", &["phase[0].rate"]);
     with("batch = 128", "batch = 0", &["optimizer.batch"]);
     with("hidden = [16, 16]", "hidden = []", &["network.hidden"]);
     with("activation = \"gelu\"", "activation = \"gelo\"", &["gelo", "gelu"]);

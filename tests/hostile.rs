@@ -271,10 +271,10 @@ fn configurations_are_placed() {
     with("batch = 128", "batch = 128\nbatch = 128", &["duplicate key"]);
     with("[network]", "[network]\nalpha = 1.0", &["duplicate key"]);
     with("[optimizer]", "[optimizer]\n[optimizer]", &["duplicate key"]);
-    with("rate = 0.003", "rate = 1e999999999999", &["c.toml"]);
+    with("rate = 0.005", "rate = 1e999999999999", &["c.toml"]);
     // Out of range: with the key.
-    with("rate = 0.003", "rate = -0.003", &["phase[0].rate: expected a positive number, found -0.003"]);
-    with("rate = 0.003", "rate = inf", &["phase[0].rate: expected a positive number, found inf"]);
+    with("rate = 0.005", "rate = -0.003", &["phase[0].rate: expected a positive number, found -0.003"]);
+    with("rate = 0.005", "rate = inf", &["phase[0].rate: expected a positive number, found inf"]);
     with("epochs = 1", "epochs = 1099511627776", &["phase[0].epochs", "1099511627776"]);
     with("hidden = [2]", "hidden = [1099511627776]", &["network.hidden[0]", "1099511627776"]);
     with("training = 8", "training = 0", &["data.training", "found 0"]);
