@@ -265,7 +265,7 @@ fn configurations_are_placed() {
     placed("optimizer.batch", "batch = 128", "batch = \"128\"", "expected usize");
     placed("seed", "seed = 0", "seed = -1", "-1");
     placed("seed", "seed = 0", "seed = true", "boolean `true`");
-    placed("optimizer.method", "method = \"radam\"", "method = \"radom\"", "did you mean \"radam\"?");
+    placed("optimizer.method", "method = \"soap\"", "method = \"radom\"", "did you mean \"radam\"?");
     placed("optimizer.bacth", "batch = 128", "bacth = 128", "did you mean \"batch\"?");
     placed("network.hiden", "hidden = ", "hiden = ", "did you mean \"hidden\"?");
     with("batch = 128", "batch = 128\nbatch = 128", &["duplicate key"]);
