@@ -183,14 +183,13 @@ fn judged(f: &Expression, x: &[f64], u: &[f64]) -> Option<(Answer<Dd>, [f64; 1 +
     let mut condition = exact.map(|y| y.to_f64().abs());
     for pattern in 0..8 {
         let mut random = Random(pattern);
-        let mut moved = |y: Dd, least: f64| {
-            let size = if y == <Dd as Real>::zero() { Dd::of_f64(least) } else { y };
-            y + size * Dd::of_f64(STEP * random.sign())
-        };
+        let mut moved = |y: Dd| y + y * Dd::of_f64(STEP * random.sign());
         // A zero among the values may be all that is left of larger numbers, and other ways come to their roundings; on a
-        // kink or a cut they may come to the other side.
+        // kink or a cut they may come to either side.
+        let nothing = Dd::of_f64(if pattern % 2 == 0 { STEP } else { -STEP });
         let other = nested(f, &x, &u, |y| {
-            HyperDual::new(moved(y.value, 1.0), moved(y.s, 0.0), moved(y.t, 0.0), moved(y.st, 0.0))
+            let value = if y.value == <Dd as Real>::zero() { nothing } else { moved(y.value) };
+            HyperDual::new(value, moved(y.s), moved(y.t), moved(y.st))
         });
         for ((condition, &a), &b) in condition.iter_mut().zip(&exact).zip(&other) {
             let change = ((a - b).to_f64() / STEP).abs();
