@@ -169,10 +169,11 @@ fn replayed<S: Scalar>(f: &Expression, x: &[S], u: &[S], lanes: usize) -> Answer
 /// move an answer by more than can be told.
 fn judged(f: &Expression, x: &[f64], u: &[f64]) -> Option<(Answer<Dd>, [f64; 1 + 2 * VARIABLES])> {
     let (x, u): (Vec<Dd>, Vec<Dd>) = (cast(x), cast(u));
-    let mut tame = true;
+    let (mut tame, mut largest) = (true, 0f64);
     let exact = nested(f, &x, &u, |y| {
         for part in [y.value, y.s, y.t, y.st] {
             let size = part.to_f64().abs();
+            largest = largest.max(size);
             tame &= size == 0.0 || (1e-60..1e60).contains(&size);
         }
         y
@@ -180,7 +181,8 @@ fn judged(f: &Expression, x: &[f64], u: &[f64]) -> Option<(Answer<Dd>, [f64; 1 +
     if !tame {
         return None;
     }
-    let mut condition = exact.map(|y| y.to_f64().abs());
+    // Any way may lose roundings of the largest number on it, even where no perturbation of operands tells.
+    let mut condition = exact.map(|y| y.to_f64().abs().max(largest));
     for pattern in 0..8 {
         let mut random = Random(pattern);
         let mut moved = |y: Dd| y + y * Dd::of_f64(STEP * random.sign());
