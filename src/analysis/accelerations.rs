@@ -1,32 +1,10 @@
 //! Errors of accelerations in physical units.
 
-use super::summary::quantile;
+use super::summary::ErrorDistribution;
 use crate::lagrangian::{EulerLagrange, Request, Terms};
 use crate::scalar::Scalar;
-use serde::{Deserialize, Serialize};
 
-/// Distribution of `|a_learned - a_exact|` of one coordinate, in the unit of its acceleration.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct AccelerationError {
-    /// Mean absolute error.
-    pub mean: f64,
-    /// Root of the mean squared error.
-    pub rms: f64,
-    /// Median absolute error.
-    pub median: f64,
-    /// 95 % of the states are better.
-    pub p95: f64,
-    /// 99 % of the states are better.
-    pub p99: f64,
-    /// Largest absolute error.
-    pub max: f64,
-    /// States compared.
-    pub count: usize,
-    /// States left out because a model has no finite acceleration there.
-    pub failed: usize,
-}
-
-/// Errors of `learned` against `exact` at a batch of states, one entry per coordinate.
+/// `|a_learned - a_exact|` at a batch of states, one entry per coordinate, in the unit of its acceleration.
 ///
 /// `q` and `v` are `(batch, n)` in physical units. States where either model fails are counted, not compared.
 pub fn acceleration_errors<S: Scalar>(
@@ -34,7 +12,7 @@ pub fn acceleration_errors<S: Scalar>(
     learned: &dyn EulerLagrange<S>,
     q: &[S],
     v: &[S],
-) -> Vec<AccelerationError> {
+) -> Vec<ErrorDistribution> {
     const CHUNK: usize = 256;
     let n = exact.coordinates();
     let mut errors = vec![Vec::new(); n];
@@ -58,23 +36,7 @@ pub fn acceleration_errors<S: Scalar>(
             }
         }
     }
-    errors.into_iter().map(|errors| distribution(errors, failed)).collect()
-}
-
-fn distribution(mut errors: Vec<f64>, failed: usize) -> AccelerationError {
-    errors.sort_by(f64::total_cmp);
-    let count = errors.len();
-    let mean = |map: fn(f64) -> f64| errors.iter().map(|&e| map(e)).sum::<f64>() / count as f64;
-    AccelerationError {
-        mean: mean(|e| e),
-        rms: mean(|e| e * e).sqrt(),
-        median: quantile(&errors, 0.5),
-        p95: quantile(&errors, 0.95),
-        p99: quantile(&errors, 0.99),
-        max: quantile(&errors, 1.0),
-        count,
-        failed,
-    }
+    errors.into_iter().map(|errors| ErrorDistribution::of(errors, failed)).collect()
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! The learned mass matrix, or metric, against the exact one.
 
-use super::summary::quantile;
+use super::summary::ErrorDistribution;
 use crate::lagrangian::{EulerLagrange, Request, Terms};
 use crate::scalar::{Real, Scalar};
 use serde::{Deserialize, Serialize};
@@ -13,18 +13,9 @@ use serde::{Deserialize, Serialize};
 pub struct MassMatrixError {
     /// The factor `s` of the smallest mean square.
     pub factor: f64,
-    /// Mean.
-    pub mean: f64,
-    /// Median.
-    pub median: f64,
-    /// 99 % of the states are better.
-    pub p99: f64,
-    /// Largest.
-    pub max: f64,
-    /// States compared.
-    pub count: usize,
-    /// States left out because a matrix is not finite there.
-    pub failed: usize,
+    /// The relative errors.
+    #[serde(flatten)]
+    pub error: ErrorDistribution,
 }
 
 /// Compares the matrices at rest at the positions `q`, `(states, n)`.
@@ -60,17 +51,9 @@ pub fn mass_matrix_error<S: Scalar>(
         let difference: Vec<f64> = a.iter().zip(*b).map(|(a, b)| factor * b - a).collect();
         (dot(&difference, &difference) / dot(a, a)).sqrt()
     };
-    let mut errors: Vec<f64> = pairs.iter().map(error).collect();
-    errors.sort_by(f64::total_cmp);
-    MassMatrixError {
-        factor,
-        mean: errors.iter().sum::<f64>() / errors.len() as f64,
-        median: quantile(&errors, 0.5),
-        p99: quantile(&errors, 0.99),
-        max: quantile(&errors, 1.0),
-        count: errors.len(),
-        failed: states - errors.len(),
-    }
+    let errors: Vec<f64> = pairs.iter().map(error).collect();
+    let failed = states - errors.len();
+    MassMatrixError { factor, error: ErrorDistribution::of(errors, failed) }
 }
 
 #[cfg(test)]
@@ -99,7 +82,7 @@ mod tests {
         let exact = model(1.0, 0.5, 0.0);
         // What vanishes at rest does not count.
         let same = mass_matrix_error(&exact, &model(-4.0, -2.0, 7.0), &q);
-        assert_eq!((same.factor, same.max, same.count, same.failed), (-0.25, 0.0, 3, 0));
+        assert_eq!((same.factor, same.error.max, same.error.count, same.error.failed), (-0.25, 0.0, 3, 0));
         let other = mass_matrix_error(&exact, &model(1.0, 0.0, 0.0), &q);
         // M_exact = diag(1 + q/2, 1) against s times the unit matrix.
         let squares = [2.0, 1.5f64.powi(2) + 1.0, 2.5f64.powi(2) + 1.0];
@@ -108,9 +91,9 @@ mod tests {
         assert!((other.factor - s).abs() < 1e-14);
         let errors = [1.0, 1.5, 2.5].map(|m| ((s - m).powi(2) + (s - 1.0).powi(2)).sqrt());
         let relative: Vec<f64> = errors.iter().zip(squares).map(|(e, x)| e / x.sqrt()).collect();
-        assert!((other.mean - relative.iter().sum::<f64>() / 3.0).abs() < 1e-14);
-        assert!((other.max - relative.iter().fold(0.0f64, |m, &x| m.max(x))).abs() < 1e-14);
+        assert!((other.error.mean - relative.iter().sum::<f64>() / 3.0).abs() < 1e-14);
+        assert!((other.error.max - relative.iter().fold(0.0f64, |m, &x| m.max(x))).abs() < 1e-14);
         let broken = mass_matrix_error(&exact, &model(f64::NAN, 0.0, 0.0), &q);
-        assert_eq!((broken.count, broken.failed), (0, 3));
+        assert_eq!((broken.error.count, broken.error.failed), (0, 3));
     }
 }

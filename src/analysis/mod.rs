@@ -13,7 +13,7 @@ mod signature;
 mod summary;
 mod trajectories;
 
-pub use accelerations::{AccelerationError, acceleration_errors};
+pub use accelerations::acceleration_errors;
 pub use affine::{AffineFit, affine_fit, factor_fit};
 pub use coordinates::{CoordinateError, angle_difference, coordinate_error};
 pub use energy::{EnergyError, energy_drift, energy_error};
@@ -25,5 +25,5 @@ pub use prediction::{
     PredictionError, Predictions, Window, predict_by_constant_velocity, predict_by_motion, prediction_error,
 };
 pub use signature::wrong_signatures;
-pub use summary::{Statistics, statistics};
+pub use summary::{ErrorDistribution, Statistics, statistics};
 pub use trajectories::{StartBox, TrajectoryRun, TrajectorySummary, TrajectoryTest};

@@ -31,6 +31,46 @@ pub fn statistics(series: impl IntoIterator<Item = f64>) -> Statistics {
     result
 }
 
+/// Distribution of errors over states.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ErrorDistribution {
+    /// Mean absolute error.
+    pub mean: f64,
+    /// Root of the mean squared error.
+    pub rms: f64,
+    /// Median absolute error.
+    pub median: f64,
+    /// 95 % of the states are better.
+    pub p95: f64,
+    /// 99 % of the states are better.
+    pub p99: f64,
+    /// Largest absolute error.
+    pub max: f64,
+    /// States compared.
+    pub count: usize,
+    /// States left out because a model gives nothing finite there.
+    pub failed: usize,
+}
+
+impl ErrorDistribution {
+    /// Of the absolute errors of the states that were compared, and the number of those that were not.
+    pub(super) fn of(mut errors: Vec<f64>, failed: usize) -> Self {
+        errors.sort_by(f64::total_cmp);
+        let count = errors.len();
+        let mean = |map: fn(f64) -> f64| errors.iter().map(|&e| map(e)).sum::<f64>() / count as f64;
+        Self {
+            mean: mean(|e| e),
+            rms: mean(|e| e * e).sqrt(),
+            median: quantile(&errors, 0.5),
+            p95: quantile(&errors, 0.95),
+            p99: quantile(&errors, 0.99),
+            max: quantile(&errors, 1.0),
+            count,
+            failed,
+        }
+    }
+}
+
 /// Value below which the fraction `p` of a sorted series lies, interpolated linearly; `NaN` for an empty one.
 pub(super) fn quantile(sorted: &[f64], p: f64) -> f64 {
     let Some(last) = sorted.len().checked_sub(1) else { return f64::NAN };

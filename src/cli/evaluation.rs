@@ -1,7 +1,7 @@
 //! What a model is worth: accelerations, trajectories and pictures against the hand-written system.
 
 use crate::analysis::{
-    AccelerationError, Axis, MassMatrixError, StartBox, TrajectoryRun, TrajectorySummary, TrajectoryTest,
+    Axis, ErrorDistribution, MassMatrixError, StartBox, TrajectoryRun, TrajectorySummary, TrajectoryTest,
     acceleration_errors, determinant_grid, lagrangian_grid, mass_matrix_error, wrong_signatures,
 };
 use crate::cli::{CliError, memory};
@@ -18,7 +18,7 @@ const FAST: f64 = 0.99;
 #[derive(Clone, Debug, Serialize)]
 pub struct Evaluation {
     /// Error of the accelerations of fresh states, one entry per coordinate.
-    pub accelerations: Vec<AccelerationError>,
+    pub accelerations: Vec<ErrorDistribution>,
     /// Fraction of the fresh states whose mass matrix has not the signature of the exact one.
     pub wrong_signature: f64,
     /// Error of the mass matrix, of a geodesic the metric, at rest at the positions of the fresh states.
@@ -207,8 +207,8 @@ impl Evaluation {
             row.push(t.stopped.clone().or(t.reference_stopped.clone()).unwrap_or_default());
             row
         });
-        let m = &self.mass_matrix;
-        let matrix = [m.factor, m.mean, m.median, m.p99, m.max].map(|x| format!("{x:.4e}"));
+        let MassMatrixError { factor, error: m } = &self.mass_matrix;
+        let matrix = [*factor, m.mean, m.median, m.p99, m.max].map(|x| format!("{x:.4e}"));
         let matrix = [matrix.to_vec(), vec![m.failed.to_string()]].concat();
         let header = |names: &[&str]| names.iter().map(ToString::to_string).collect();
         let until = format!("until [{}]", self.time_unit);

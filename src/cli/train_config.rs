@@ -52,7 +52,7 @@ pub struct Args {
 enum PresetName {
     /// A minute on two cores.
     Quick,
-    /// Up to half an hour on two cores.
+    /// Wider and ten times as many epochs as quick.
     Best,
     /// The paper's budget and choices: hours.
     Paper,

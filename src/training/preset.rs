@@ -14,7 +14,7 @@ use std::f64::consts::PI;
 pub enum Preset {
     /// A useful model within a minute on two cores.
     Quick,
-    /// As exact as half an hour on two cores allows.
+    /// Wider layers and ten times as many epochs as [`Preset::Quick`].
     Best,
     /// The paper's own budget and choices.
     Paper,

@@ -120,29 +120,21 @@ impl<S: Scalar> Side<S> {
         let trace = self.covariance.iter().step_by(size + 1).fold(<S as Real>::zero(), |sum, &c| sum + c);
         // Vectors of eigenvalues that are lost in rounding stay where they are.
         let shift = S::EPSILON * trace + S::MIN_POSITIVE;
-        self.next.copy_from_slice(&self.vectors);
-        gemm(
-            MatMut::new(&mut self.next, size, size),
-            false,
-            <S as Real>::one(),
-            MatRef::new(&self.vectors, size, size),
-            MatRef::new(&self.covariance, size, size),
-        );
+        product(size, &mut self.next, &self.vectors, MatRef::new(&self.covariance, size, size));
         for (next, &vector) in self.next.iter_mut().zip(&self.vectors) {
             *next += shift * vector;
         }
         if !orthonormalize(size, &mut self.next) {
             self.next.copy_from_slice(&self.vectors);
         }
-        gemm(
-            MatMut::new(&mut self.turn, size, size),
-            false,
-            <S as Real>::one(),
-            MatRef::new(&self.next, size, size),
-            MatRef::new(&self.vectors, size, size).t(),
-        );
+        product(size, &mut self.turn, &self.next, MatRef::new(&self.vectors, size, size).t());
         std::mem::swap(&mut self.vectors, &mut self.next);
     }
+}
+
+/// `out = a b` of square matrices.
+fn product<S: Scalar>(size: usize, out: &mut [S], a: &[S], b: MatRef<'_, S>) {
+    gemm(MatMut::new(out, size, size), false, <S as Real>::one(), MatRef::new(a, size, size), b);
 }
 
 /// Makes the rows orthonormal, one after the other, twice (Giraud, Langou, Rozložník 2005: twice is enough); `false` if
