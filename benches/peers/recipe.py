@@ -1,6 +1,6 @@
 """The paper's training of the double pendulum in PyTorch, validation loss against time.
 
-    python recipe.py PROGRAM [--minutes 30] [--out FILE.csv]
+    python recipe.py PROGRAM [--minutes 30] [--threads 2] [--out FILE.csv]
 
 PROGRAM is the built benchmark `peers`, which writes the states and initial weights of `lnn train double-pendulum --preset
 paper`. Three hidden layers of 500, GELU, nested reverse mode, pseudo-inverse, eigenvalue penalty, RAdam with gradient clipping, one phase
@@ -14,10 +14,6 @@ import os
 import subprocess
 import tempfile
 import time
-
-THREADS = 2
-for variable in ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
-    os.environ[variable] = str(THREADS)
 
 import numpy as np
 import torch
@@ -33,9 +29,10 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("program")
     parser.add_argument("--minutes", type=float, default=30.0)
+    parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--out", default="recipe.csv")
     options = parser.parse_args()
-    torch.set_num_threads(THREADS)
+    torch.set_num_threads(options.threads)
     with tempfile.TemporaryDirectory() as directory:
         subprocess.run([options.program, "recipe", directory], check=True)
         recipe = json.load(open(os.path.join(directory, "recipe.json")))

@@ -62,6 +62,11 @@ pub fn coordinate_error<S: Scalar>(
     result
 }
 
+/// `|v_learned - v_exact|` per coordinate, `(len, n)`, as far as both go; samples are matched as by [`coordinate_error`].
+pub fn velocity_error<S: Scalar>(exact: &Trajectory<S>, learned: &Trajectory<S>) -> Vec<f64> {
+    exact.v.iter().zip(&learned.v).map(|(&a, &b)| (a - b).abs().to_f64()).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

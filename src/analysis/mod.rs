@@ -2,6 +2,7 @@
 
 mod accelerations;
 mod affine;
+mod conserved;
 mod coordinates;
 mod energy;
 mod grid;
@@ -15,7 +16,8 @@ mod trajectories;
 
 pub use accelerations::acceleration_errors;
 pub use affine::{AffineFit, affine_fit, factor_fit};
-pub use coordinates::{CoordinateError, angle_difference, coordinate_error};
+pub use conserved::conserved_error;
+pub use coordinates::{CoordinateError, angle_difference, coordinate_error, velocity_error};
 pub use energy::{EnergyError, energy_drift, energy_error};
 pub use grid::{Axis, Grid, GridError, determinant_grid, lagrangian_grid};
 pub use instability::{savitzky_golay, stretches, training_instability};

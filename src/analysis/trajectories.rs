@@ -2,7 +2,7 @@
 
 use super::{
     CoordinateError, EnergyError, Lyapunov, Statistics, coordinate_error, energy_drift, energy_error, lyapunov,
-    statistics,
+    statistics, velocity_error,
 };
 use crate::lagrangian::{Configured, EulerLagrange, SystemError};
 use crate::rollout::{Domain, Integrable, Method, Options, Rollout, rollout_many};
@@ -61,6 +61,8 @@ pub struct TrajectoryTest<S> {
     pub rtol: f64,
     /// Absolute tolerance of the learned motion.
     pub atol: f64,
+    /// Steps after which a learned motion is given up.
+    pub max_steps: usize,
     /// Where the learned motion must stay; `None` lets it go anywhere.
     pub domain: Option<Domain<S>>,
     /// Whether to estimate Lyapunov exponents of the exact motion.
@@ -78,6 +80,8 @@ pub struct TrajectoryRun<S> {
     pub learned: Rollout<S>,
     /// Distance of the two.
     pub coordinates: CoordinateError,
+    /// `|v_learned - v_exact|` per coordinate, `(len, n)`.
+    pub velocities: Vec<f64>,
     /// Exact energy along the learned motion.
     pub energy: EnergyError,
     /// Exact energy along the exact motion: the error of the reference itself.
@@ -99,11 +103,13 @@ pub struct TrajectorySummary {
     pub compared_until: f64,
     /// Largest coordinate error over time.
     pub coordinate_error: Statistics,
+    /// Errors of each velocity.
+    pub velocity_error: Vec<Statistics>,
     /// Normalised error of the exact energy along the learned motion.
     pub energy_error: Statistics,
     /// Normalised drift of the learned energy.
     pub energy_drift: Statistics,
-    /// Largest finite-time Lyapunov exponent of the exact motion.
+    /// Largest finite-time Lyapunov exponent of the exact motion, if it was asked for.
     pub lyapunov_exponent: Option<f64>,
     /// Evaluations of the learned acceleration.
     pub evaluations: usize,
@@ -127,6 +133,7 @@ impl<S: Integrable> TrajectoryTest<S> {
             method: Method::Dopri5,
             rtol: 1e-6,
             atol: 1e-8,
+            max_steps: LEARNED_STEPS,
             domain: None,
             lyapunov: false,
             threads: 1,
@@ -167,7 +174,7 @@ impl<S: Integrable> TrajectoryTest<S> {
             rtol: S::of_f64(self.rtol),
             atol: S::of_f64(self.atol),
             domain: self.domain.clone(),
-            max_steps: LEARNED_STEPS,
+            max_steps: self.max_steps,
             ..reference.clone()
         };
         let scale = S::of_f64(self.energy_scale);
@@ -177,6 +184,7 @@ impl<S: Integrable> TrajectoryTest<S> {
         pairs
             .map(|((q, v), (truth, learned))| TrajectoryRun {
                 coordinates: coordinate_error(&truth.trajectory, &learned.trajectory, &self.periodic),
+                velocities: velocity_error(&truth.trajectory, &learned.trajectory),
                 energy: energy_error(exact, &learned.trajectory, scale),
                 reference_energy: energy_drift(&truth.trajectory, scale),
                 drift: energy_drift(&learned.trajectory, scale),
@@ -197,6 +205,7 @@ impl<S: Integrable> TrajectoryTest<S> {
 impl<S: Scalar> TrajectoryRun<S> {
     /// Numbers of the run.
     pub fn summary(&self) -> TrajectorySummary {
+        let n = self.exact.trajectory.coordinates;
         let start = |values: &[S]| values.iter().map(|x| x.to_f64()).collect::<Vec<_>>();
         let (q, v) = match (self.exact.trajectory.is_empty(), self.learned.trajectory.is_empty()) {
             (false, _) => self.exact.trajectory.state(0),
@@ -208,6 +217,7 @@ impl<S: Scalar> TrajectoryRun<S> {
             v: start(v),
             compared_until: self.coordinates.t.last().copied().unwrap_or(0.0),
             coordinate_error: statistics(self.coordinates.max.iter().copied()),
+            velocity_error: (0..n).map(|i| statistics(self.velocities.iter().skip(i).step_by(n).copied())).collect(),
             energy_error: self.energy.statistics(),
             energy_drift: self.drift.statistics(),
             lyapunov_exponent: self.lyapunov.map(|l| l.exponent),

@@ -1,10 +1,12 @@
 //! `lnn evaluate`: a model against the system it learned.
 
-use crate::cli::evaluation::{Evaluation, Plan, evaluate};
+use crate::cli::evaluation::{Evaluation, Plan, RTOL, evaluate};
 use crate::cli::folder::Folder;
 use crate::cli::learned::Learned;
-use crate::cli::number::{count, threads};
+use crate::cli::number::{bounds, count, positive, threads};
 use crate::cli::{CliError, output};
+use crate::lagrangian::Configured;
+use crate::lagrangian::system::{Bounds, TrajectoryTest};
 use crate::report::Report;
 use crate::training::{Stream, sample};
 use serde::Serialize;
@@ -24,6 +26,19 @@ pub struct Args {
     /// Seed of the states and starts [default: the model's].
     #[arg(long, value_name = "N", allow_hyphen_values = true)]
     seed: Option<u64>,
+    /// Where the starts lie instead: bounds of the coordinates, one pair for all of them or one for each, in the system's
+    /// units.
+    #[arg(long, value_name = "LOW:HIGH,..", value_delimiter = ',', allow_hyphen_values = true, value_parser = bounds)]
+    positions: Vec<(f64, f64)>,
+    /// The same for the velocities; the one that a mass shell gives is not read.
+    #[arg(long, value_name = "LOW:HIGH,..", value_delimiter = ',', allow_hyphen_values = true, value_parser = bounds)]
+    velocities: Vec<(f64, f64)>,
+    /// Time span of the motions instead of the paper's, in seconds (relativistic systems: proper time in metres).
+    #[arg(long, value_name = "T", allow_hyphen_values = true, value_parser = positive)]
+    until: Option<f64>,
+    /// Relative tolerance of a step of the learned motion; the absolute one is a hundredth of it.
+    #[arg(long, value_name = "R", default_value_t = RTOL, allow_hyphen_values = true, value_parser = positive)]
+    rtol: f64,
     /// Threads [default: all].
     #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = count)]
     threads: Option<usize>,
@@ -43,6 +58,24 @@ struct Summary<'a> {
     validation_loss: f64,
     #[serde(flatten)]
     evaluation: &'a Evaluation,
+}
+
+/// The paper's starts and time span, as far as the arguments do not replace them.
+fn span(args: &Args, system: &Configured<f64>) -> Result<TrajectoryTest, CliError> {
+    let n = system.coordinates;
+    let replaced = |option: &str, given: &[(f64, f64)], paper: Vec<(f64, f64)>| match given {
+        [] => Ok(paper),
+        [all] => Ok(vec![*all; n]),
+        each if each.len() == n => Ok(each.to_vec()),
+        _ => {
+            let found = given.len();
+            Err(CliError::usage(format_args!("{option}: expected 1 or {n} pairs LOW:HIGH, found {found}")))
+        }
+    };
+    let TrajectoryTest { start: Bounds { positions, velocities }, t_end, dt } = (system.system.trajectory)(n);
+    let positions = replaced("--positions", &args.positions, positions)?;
+    let velocities = replaced("--velocities", &args.velocities, velocities)?;
+    Ok(TrajectoryTest { start: Bounds { positions, velocities }, t_end: args.until.unwrap_or(t_end), dt })
 }
 
 /// Runs the paper's trajectory test and writes tables and pictures.
@@ -66,7 +99,9 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let plan = Plan {
         states: (states.q(), states.v()),
         starts: args.starts,
-        horizon: 1.0,
+        span: span(args, &system)?,
+        rtol: args.rtol,
+        trained: learned.domain(),
         seed,
         threads: threads(args.threads),
     };

@@ -1,16 +1,22 @@
 //! What a model is worth: accelerations, trajectories and pictures against the hand-written system.
 
 use crate::analysis::{
-    Axis, ErrorDistribution, MassMatrixError, StartBox, TrajectoryRun, TrajectorySummary, TrajectoryTest,
-    acceleration_errors, determinant_grid, lagrangian_grid, mass_matrix_error, wrong_signatures,
+    Axis, ErrorDistribution, MassMatrixError, StartBox, Statistics, TrajectoryRun, TrajectorySummary, TrajectoryTest,
+    acceleration_errors, conserved_error, determinant_grid, lagrangian_grid, mass_matrix_error, statistics,
+    wrong_signatures,
 };
 use crate::cli::{CliError, memory};
+use crate::lagrangian::system::TrajectoryTest as Span;
 use crate::lagrangian::{Configured, EulerLagrange};
 use crate::report::{Figure, Fit, GridComparison, PlotError, Report, evaluation_figures, grid_figures, text_table};
+use crate::rollout::{Domain, Trajectory};
 use serde::Serialize;
+use std::fmt::Write as _;
 
 /// Points of a grid along each axis.
 const GRID: usize = 81;
+/// Relative tolerance of the learned motion in the paper's test.
+pub const RTOL: f64 = 1e-6;
 /// Velocities of the fast map of `det M`, in upper bounds of the validation states.
 const FAST: f64 = 0.99;
 
@@ -24,27 +30,46 @@ pub struct Evaluation {
     /// Error of the mass matrix, of a geodesic the metric, at rest at the positions of the fresh states.
     pub mass_matrix: MassMatrixError,
     /// One entry per random start.
-    pub trajectories: Vec<TrajectorySummary>,
+    pub trajectories: Vec<Motion>,
     /// Names of the accelerations' coordinates.
     #[serde(skip)]
     pub coordinates: Vec<String>,
     /// Unit of times.
     #[serde(skip)]
     pub time_unit: &'static str,
+    /// What the exact motion conserves beside its energy.
+    #[serde(skip)]
+    pub conserved: Option<&'static str>,
     /// Pictures.
     #[serde(skip)]
     pub figures: Vec<Figure>,
 }
 
+/// One start of the trajectory test.
+#[derive(Clone, Debug, Serialize)]
+pub struct Motion {
+    /// Errors against exact motion.
+    #[serde(flatten)]
+    pub summary: TrajectorySummary,
+    /// Relative error of what the exact motion conserves beside its energy, if it does.
+    pub conserved_error: Option<Statistics>,
+    /// The first sample at which the learned motion had left the states the model was trained on, in words.
+    pub left_training_range: Option<String>,
+}
+
 /// How to evaluate.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Plan<'a> {
     /// Fresh states `(states, n)` on which accelerations are compared.
     pub states: (&'a [f64], &'a [f64]),
     /// Random starts.
     pub starts: usize,
-    /// Fraction of the trajectory test's time span.
-    pub horizon: f64,
+    /// Where they lie and how long they move.
+    pub span: Span,
+    /// Relative tolerance of the learned motion; the absolute one is a hundredth of it.
+    pub rtol: f64,
+    /// The states the model was trained on.
+    pub trained: Domain<f64>,
     /// Seed of the starts.
     pub seed: u64,
     /// Threads.
@@ -66,20 +91,31 @@ pub fn evaluate(
     let periodic: Vec<bool> = coordinates.iter().map(|c| c.periodic).collect();
     let accelerations = acceleration_errors(exact.as_ref(), learned, plan.states.0, plan.states.1);
 
-    let test = (system.system.trajectory)(n);
+    let Span { start, t_end, dt } = plan.span;
     // Exact and learned.
-    let samples = test.t_end * plan.horizon / test.dt;
-    memory::require("the evaluation", memory::motions((plan.starts as u64).saturating_mul(2), samples, n, 0))?;
-    let bounds = StartBox { q: test.start.positions, v: test.start.velocities };
+    memory::require("the evaluation", memory::motions((plan.starts as u64).saturating_mul(2), t_end / dt, n, 0))?;
+    let defaults = TrajectoryTest::new(StartBox { q: start.positions, v: start.velocities }, periodic);
+    // Steps grow with the time, and with the fifth root of the accuracy.
+    let longer =
+        (t_end / (system.system.trajectory)(n).t_end).max(1.0) * (defaults.rtol / plan.rtol).max(1.0).powf(0.2);
     let test = TrajectoryTest {
         starts: plan.starts,
         seed: plan.seed,
-        t_end: test.t_end * plan.horizon,
-        dt: test.dt,
+        t_end,
+        dt,
+        rtol: plan.rtol,
+        atol: 1e-2 * plan.rtol,
+        max_steps: (longer * defaults.max_steps as f64) as usize,
+        lyapunov: true,
         threads: plan.threads,
-        ..TrajectoryTest::new(bounds, periodic.clone())
+        ..defaults
     };
     let runs = test.run_constrained(system, exact.as_ref(), learned).map_err(CliError::data)?;
+    let motion = |run: &TrajectoryRun<f64>| Motion {
+        summary: run.summary(),
+        conserved_error: conserved_error(system, &run.learned.trajectory).map(statistics),
+        left_training_range: leaving(&run.learned.trajectory, &plan.trained, &system.system.columns(n)),
+    };
 
     let mut figures = evaluation_figures(&runs, system).map_err(CliError::data)?;
     figures.extend(grids(system, exact.as_ref(), learned)?);
@@ -87,10 +123,21 @@ pub fn evaluate(
         accelerations,
         wrong_signature: wrong_signatures(exact.as_ref(), learned, plan.states.0, plan.states.1),
         mass_matrix: mass_matrix_error(exact.as_ref(), learned, plan.states.0),
-        trajectories: runs.iter().map(TrajectoryRun::summary).collect(),
+        trajectories: runs.iter().map(motion).collect(),
         coordinates: coordinates.iter().map(|c| c.name.to_string()).collect(),
         time_unit: system.system.time_unit,
+        conserved: system.system.conserved.map(|conserved| conserved.name),
         figures,
+    })
+}
+
+/// The first sample outside the states a model was trained on.
+fn leaving(trajectory: &Trajectory<f64>, trained: &Domain<f64>, columns: &[String]) -> Option<String> {
+    (0..trajectory.len()).find_map(|k| {
+        let (q, v) = trajectory.state(k);
+        let (component, ..) = trained.violation(&[q, v].concat())?;
+        let name = columns.get(component).map_or("a component", String::as_str);
+        Some(format!("{name} outside the training range at {:.1}", trajectory.t[k]))
     })
 }
 
@@ -189,7 +236,7 @@ fn fixed(system: &Configured<f64>, state: &[f64], axes: [Axis; 2], imposed: bool
 
 /// A table of a report.
 struct Table {
-    title: &'static str,
+    title: String,
     header: Vec<String>,
     rows: Vec<Vec<String>>,
 }
@@ -200,34 +247,50 @@ impl Evaluation {
             let numbers = [e.mean, e.rms, e.median, e.p99, e.max].map(|x| format!("{x:.4e}"));
             [vec![name.clone()], numbers.to_vec(), vec![e.failed.to_string()]].concat()
         });
-        let trajectories = self.trajectories.iter().enumerate().map(|(k, t)| {
-            let numbers = [t.coordinate_error.mean, t.coordinate_error.max, t.energy_error.mean, t.energy_error.max];
+        let trajectories = self.trajectories.iter().enumerate().map(|(k, motion)| {
+            let t = &motion.summary;
+            let fastest = t.velocity_error.iter().fold(f64::NAN, |m, v| m.max(v.max));
+            let mut numbers = vec![t.coordinate_error.mean, t.coordinate_error.max, fastest];
+            numbers.extend([t.energy_error.mean, t.energy_error.max]);
+            numbers.extend(motion.conserved_error.map(|conserved| conserved.max));
             let mut row = vec![(k + 1).to_string(), format!("{:.1}", t.compared_until)];
-            row.extend(numbers.map(|x| format!("{x:.3e}")));
-            row.push(t.stopped.clone().or(t.reference_stopped.clone()).unwrap_or_default());
+            row.extend(numbers.iter().map(|x| format!("{x:.3e}")));
+            let time = t.lyapunov_exponent.filter(|exponent| *exponent > 0.0).map(f64::recip);
+            row.push(time.map_or("-".to_string(), |time| format!("{time:.1}")));
+            let ends = [&t.stopped, &t.reference_stopped, &motion.left_training_range];
+            row.push(ends.into_iter().flatten().map(String::as_str).collect::<Vec<_>>().join("; "));
             row
         });
+        let t_end = self.trajectories.iter().fold(0.0, |m: f64, motion| m.max(motion.summary.compared_until));
         let MassMatrixError { factor, error: m } = &self.mass_matrix;
         let matrix = [*factor, m.mean, m.median, m.p99, m.max].map(|x| format!("{x:.4e}"));
         let matrix = [matrix.to_vec(), vec![m.failed.to_string()]].concat();
         let header = |names: &[&str]| names.iter().map(ToString::to_string).collect();
         let until = format!("until [{}]", self.time_unit);
+        let lyapunov = format!("Lyapunov time [{}]", self.time_unit);
+        let conserved = self.conserved.map(|_| "conserved max");
+        let mut motions =
+            vec!["start", until.as_str(), "coordinates mean", "max", "velocities max", "energy mean", "max"];
+        motions.extend(conserved.into_iter().chain([lyapunov.as_str(), "remarks"]));
+        let mut about = String::from("Trajectories from random starts against exact motion");
+        if let Some(name) = self.conserved {
+            let _ = write!(about, "; conserved: {name}, relative");
+        }
+        if t_end > 1.0 {
+            let _ = write!(about, "; motion without chaos has a Lyapunov time of about {:.0}", t_end / t_end.ln());
+        }
         [
             Table {
-                title: "Error of accelerations on fresh states, physical units",
+                title: "Error of accelerations on fresh states, physical units".into(),
                 header: header(&["coordinate", "mean", "rms", "median", "99 %", "max", "failed"]),
                 rows: accelerations.collect(),
             },
             Table {
-                title: "Relative error of the mass matrix at rest, up to one factor",
+                title: "Relative error of the mass matrix at rest, up to one factor".into(),
                 header: header(&["factor", "mean", "median", "99 %", "max", "failed"]),
                 rows: vec![matrix],
             },
-            Table {
-                title: "Trajectories from random starts against exact motion",
-                header: header(&["start", &until, "coordinates mean", "max", "energy mean", "max", "ended by"]),
-                rows: trajectories.collect(),
-            },
+            Table { title: about, header: header(&motions), rows: trajectories.collect() },
         ]
     }
 
@@ -240,7 +303,7 @@ impl Evaluation {
     /// Tables and pictures for a report.
     pub fn report(&self, mut report: Report) -> Report {
         for Table { title, header, rows } in self.tables() {
-            report = report.heading(title).table(&header, &rows);
+            report = report.heading(&title).table(&header, &rows);
         }
         report = report.heading("Learned against exact");
         self.figures.iter().fold(report, |report, figure| report.figure(&figure.png, &figure.caption))

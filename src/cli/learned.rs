@@ -46,13 +46,18 @@ impl<S: Scalar> Learned<S> {
         Ok(configured)
     }
 
-    /// The states it was trained on; periodic coordinates are unbounded.
+    /// The states it was trained on.
     pub fn domain(&self) -> Domain<S> {
-        let bound = |&[low, high]: &[f64; 2]| (S::of_f64(low), S::of_f64(high));
-        let periodic = &self.header.architecture.periodic;
-        let positions = self.header.position.iter().zip(periodic).map(|(b, &p)| (!p).then(|| bound(b)));
-        Domain::new(positions.chain(self.header.velocity.iter().map(|b| Some(bound(b)))).collect())
+        trained_on(&self.header)
     }
+}
+
+/// The states a model was trained on; periodic coordinates are unbounded.
+pub fn trained_on<S: Scalar>(header: &Header) -> Domain<S> {
+    let bound = |&[low, high]: &[f64; 2]| (S::of_f64(low), S::of_f64(high));
+    let periodic = &header.architecture.periodic;
+    let positions = header.position.iter().zip(periodic).map(|(b, &p)| (!p).then(|| bound(b)));
+    Domain::new(positions.chain(header.velocity.iter().map(|b| Some(bound(b)))).collect())
 }
 
 /// Parameters in the form the catalogue takes them.

@@ -1,12 +1,12 @@
 //! One training from configuration to files: model, history, summary, pictures, report.
 
 use crate::analysis::{stretches, training_instability};
-use crate::cli::evaluation::{Evaluation, Plan, evaluate};
+use crate::cli::evaluation::{Evaluation, Plan, RTOL, evaluate};
 use crate::cli::folder::Folder;
-use crate::cli::learned::given;
+use crate::cli::learned::{given, trained_on};
 use crate::cli::{CliError, memory, output};
 use crate::experiments::{Outcome, Record};
-use crate::lagrangian::system::Size;
+use crate::lagrangian::system::{Size, TrajectoryTest};
 use crate::lagrangian::{Configured, configure};
 use crate::network::file::{FORMAT, Header, ModelFile, StoredPrecision};
 use crate::network::{Architecture, Layout, NetworkLagrangian};
@@ -191,6 +191,7 @@ fn learn_in<S: Scalar>(
 
     // The model and its history first: nothing that comes after can lose them.
     let header = header(config, system, architecture.clone(), imposed, trained.validation_loss)?;
+    let domain = trained_on(&header);
     let model = ModelFile { header, weights: trained.weights.clone() };
     let file = folder.file("model.safetensors");
     folder.write("config.toml", toml.as_bytes())?;
@@ -200,7 +201,16 @@ fn learn_in<S: Scalar>(
     let scale = architecture.scale.iter().sum::<f64>() / architecture.scale.len() as f64;
     let network = NetworkLagrangian::new(architecture, model.weights).map_err(CliError::data)?.cast::<f64>();
     let Effort { threads, starts, horizon } = effort;
-    let plan = Plan { states: (&fresh.0, &fresh.1), starts, horizon, seed: config.seed, threads };
+    let test = (system.system.trajectory)(system.coordinates);
+    let plan = Plan {
+        states: (&fresh.0, &fresh.1),
+        starts,
+        span: TrajectoryTest { t_end: test.t_end * horizon, ..test },
+        rtol: RTOL,
+        trained: domain,
+        seed: config.seed,
+        threads,
+    };
     let evaluation = evaluate(system, &network, plan)?;
     let finite = |x: f64| x.is_finite().then_some(x);
     let losses: Vec<[Option<f64>; 2]> =
@@ -236,8 +246,8 @@ fn learn_in<S: Scalar>(
         instability,
         scale,
         wrong_signature: evaluation.wrong_signature,
-        energy_errors: evaluation.trajectories.iter().map(|t| finite(t.energy_error.mean)).collect(),
-        integrated: evaluation.trajectories.iter().filter(|t| t.stopped.is_none()).count(),
+        energy_errors: evaluation.trajectories.iter().map(|t| finite(t.summary.energy_error.mean)).collect(),
+        integrated: evaluation.trajectories.iter().filter(|t| t.summary.stopped.is_none()).count(),
     });
     Ok(Learning::Finished(Box::new(Finished {
         epochs: trained.history.len(),

@@ -13,6 +13,12 @@ pub fn positive(text: &str) -> Result<f64, String> {
     finite(text).ok().filter(|x| *x > 0.0).ok_or_else(|| "expected a finite number above 0".to_string())
 }
 
+/// Two finite decimal numbers, the lower first: `LOW:HIGH`.
+pub fn bounds(text: &str) -> Result<(f64, f64), String> {
+    let pair = text.split_once(':').and_then(|(low, high)| Some((finite(low).ok()?, finite(high).ok()?)));
+    pair.filter(|(low, high)| low <= high).ok_or_else(|| "expected LOW:HIGH, two finite numbers in order".to_string())
+}
+
 /// A whole number above 0.
 pub fn count(text: &str) -> Result<usize, String> {
     text.trim().parse().ok().filter(|n| *n > 0).ok_or_else(|| "expected a whole number above 0".to_string())
@@ -38,5 +44,9 @@ mod tests {
         }
         assert!(count("1.0").is_err() && count("99999999999999999999").is_err());
         assert_eq!((positive("1e-3"), count("7")), (Ok(1e-3), Ok(7)));
+        assert_eq!((bounds("-0.5:1e3"), bounds(" 2 : 2 ")), (Ok((-0.5, 1000.0)), Ok((2.0, 2.0))));
+        for bad in ["", "1", "1:", ":1", "2:1", "0:inf", "nan:nan", "0:1:2"] {
+            assert!(bounds(bad).is_err(), "{bad}");
+        }
     }
 }

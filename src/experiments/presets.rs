@@ -57,7 +57,6 @@ pub(super) const TIME_TO_ACCURACY: Experiment = Experiment {
             run("quick", "preset quick", of(Preset::Quick), reported(0.006859)),
             run("quick-radam", "preset quick by RAdam, twice the epochs", radam, reported(0.006859)),
             run("best", "preset best", of(Preset::Best), reported(0.001523)),
-            run("paper", "preset paper", of(Preset::Paper), reported(0.001523)),
         ]
     },
 };

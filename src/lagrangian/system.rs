@@ -130,6 +130,19 @@ pub struct Plane {
     pub point: fn(parameters: &[f64], q: &[f64]) -> (f64, f64),
 }
 
+/// Components of a vector at a state, given the parameters.
+pub type Vector = fn(parameters: &[f64], q: &[f64], v: &[f64]) -> Vec<f64>;
+
+/// What exact motion keeps beside its energy.
+#[derive(Clone, Copy, Debug)]
+pub struct Conserved {
+    /// Name, with unit.
+    pub name: &'static str,
+    /// Components of the conserved vector at a state, from the values of [`System::parameters`]; never all zero on a
+    /// motion of interest. `NaN` for a wrong number of parameters.
+    pub vector: Vector,
+}
+
 /// Catalogue entry of a system; functions take the number of coordinates.
 #[derive(Clone, Copy, Debug)]
 pub struct System {
@@ -161,6 +174,8 @@ pub struct System {
     pub domain: Option<Domain>,
     /// Where it is in a plane; `None` for systems of one coordinate, whose coordinate over time says all.
     pub plane: Option<Plane>,
+    /// What is conserved beside the energy, if anything is.
+    pub conserved: Option<Conserved>,
 }
 
 impl System {

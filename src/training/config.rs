@@ -92,8 +92,9 @@ pub struct Data {
     /// Number of validation states; the best epoch is chosen on them.
     pub validation: usize,
     /// Fraction of the training states of a system with a mass shell that are drawn off it: their velocity is `u` times one on
-    /// the shell, `u` uniform in `[0, 1)`, their acceleration `u^2` times as large, as for every geodesic. On the shell alone
-    /// the metric cannot be told.
+    /// the shell, `|u|` from 0.03 to 1 and uniform in its logarithm, of either sign, their acceleration `u^2` times as
+    /// large, as for every geodesic, and their residuals weigh `1/u^2` in the training loss. On the shell alone the metric
+    /// cannot be told.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub off_shell: f64,
     /// Number of fresh states on which the final model is judged.

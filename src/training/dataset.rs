@@ -14,6 +14,8 @@ pub struct Dataset<S> {
     a: Vec<S>,
     /// Empty if there are none.
     force: Vec<S>,
+    /// Empty if all are 1.
+    weight: Vec<S>,
 }
 
 /// Why numbers do not make a dataset.
@@ -68,7 +70,7 @@ impl<S: Scalar> Dataset<S> {
         for (what, values) in [("coordinate", &q), ("velocity", &v), ("acceleration", &a)] {
             check(what, values, expected, coordinates)?;
         }
-        Ok(Self { coordinates, q, v, a, force: Vec::new() })
+        Ok(Self { coordinates, q, v, a, force: Vec::new(), weight: Vec::new() })
     }
 
     /// The same states under known external generalized forces `Q`, `(states, n)` in physical units (N, N m), conjugate to
@@ -83,6 +85,15 @@ impl<S: Scalar> Dataset<S> {
     pub fn with_forces(self, force: Vec<S>) -> Result<Self, DatasetError> {
         check("force", &force, self.q.len(), self.coordinates)?;
         Ok(Self { force, ..self })
+    }
+
+    /// The same states, their residuals multiplied by these weights in the loss, `(states)`.
+    ///
+    /// # Errors
+    /// [`DatasetError`] for a wrong number of weights or one that is not finite.
+    pub fn with_weights(self, weight: Vec<S>) -> Result<Self, DatasetError> {
+        check("weight", &weight, self.len(), 1)?;
+        Ok(Self { weight, ..self })
     }
 
     /// Number of coordinates `n`.
@@ -115,6 +126,11 @@ impl<S: Scalar> Dataset<S> {
         &self.force
     }
 
+    /// Weight of a state's residuals in the loss.
+    pub fn weight(&self, state: usize) -> S {
+        self.weight.get(state).copied().unwrap_or(<S as crate::scalar::Real>::one())
+    }
+
     /// One scale per coordinate: the largest of `|q_i|` and `|v_i|` over all states, 1 where both vanish.
     pub fn physical_scale(&self) -> Vec<f64> {
         let n = self.coordinates;
@@ -133,9 +149,10 @@ impl<S: Scalar> Dataset<S> {
         all.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(v), high.max(v)])
     }
 
-    /// CRC-32 of coordinates, velocities, accelerations and forces in double precision.
+    /// CRC-32 of coordinates, velocities, accelerations, forces and weights in double precision.
     pub fn checksum(&self) -> u32 {
-        checksum(self.q.iter().chain(&self.v).chain(&self.a).chain(&self.force), StoredPrecision::F64)
+        let all = self.q.iter().chain(&self.v).chain(&self.a).chain(&self.force).chain(&self.weight);
+        checksum(all, StoredPrecision::F64)
     }
 
     /// The same states in another precision.
@@ -147,6 +164,7 @@ impl<S: Scalar> Dataset<S> {
             v: cast(&self.v),
             a: cast(&self.a),
             force: cast(&self.force),
+            weight: cast(&self.weight),
         }
     }
 }

@@ -21,7 +21,7 @@ const POLISH: u64 = 14;
 /// With `s` bytes per number, `n` coordinates, `f` features, `w` units in all layers, `P` weights, `K` phases of `N`
 /// training states, `V` validation and `T` test states, it is the sum of
 ///
-/// - states: `3 n (16 + s) (K N + V + T)`, drawn in double precision into vectors that may have grown to twice their
+/// - states: `(3 n + 1) (16 + s) (K N + V + T)`, drawn in double precision into vectors that may have grown to twice their
 ///   length, then converted; `3 n s (N + V)` for the phase under way; `8 n T` for the evaluation afterwards, five times;
 ///   `4 (6 N + V)` for the order of states and its copies in a checkpoint;
 /// - weights: `(12 + 24) s P`, the second for writing a checkpoint;
@@ -45,7 +45,7 @@ pub fn training_memory(config: &Config, architecture: &Architecture) -> Option<u
     let all = sum([product([phases, training]), Some(validation), Some(test)]);
     let once = sum([Some(training), Some(validation)]);
     let states = sum([
-        product([3 * (16 + number), n, all?]),
+        product([16 + number, sum([product([3, n]), Some(1)])?, all?]),
         product([3 * number, n, once?]),
         product([40, n, test]),
         product([4, sum([product([6, training]), Some(validation)])?]),

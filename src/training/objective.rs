@@ -1,7 +1,8 @@
 //! Loss and parameter gradient of a batch, and the losses of a whole dataset.
 //!
 //! Loss of the paper: the mean of `|prediction - target|` over the `2n` components `(v, a)` of the scaled state
-//! derivative, the first `n` equal by construction: half the mean absolute error of the scaled accelerations.
+//! derivative, the first `n` equal by construction: half the mean absolute error of the scaled accelerations. States of a
+//! dataset may have [weights](Dataset::with_weights).
 //!
 //! Accelerations solve `M a = g - c - dD/dv + Q` with the network's dissipation `D` and the data's known forces `Q`, if there
 //! are any. A loss `l(a)` depends on the parameters of `D` by `dl = -lam.d(dD/dv)`, `lam = M^-1 dl/da`; those of `L` enter as
@@ -294,9 +295,11 @@ impl<S: Scalar> Stripe<S> {
                 continue;
             }
             let target = &data.a()[row as usize * n..][..n];
+            let own = data.weight(row as usize);
+            let weight = own * weight;
             for i in 0..n {
                 let residual = a[i] - target[i] * self.inverse_scale[i];
-                self.residual.add(residual.abs());
+                self.residual.add(own * residual.abs());
                 // The sign of zero is zero.
                 right[i] = if residual > zero {
                     -weight

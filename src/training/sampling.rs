@@ -70,18 +70,29 @@ pub fn sample(
     Ok(Dataset::new(n, q, v, a)?)
 }
 
-/// Slows a `fraction` of geodesic states down: `v -> u v`, `a -> u^2 a`, `u` uniform in `[0, 1)`.
+/// Slowest velocity off a mass shell, as a part of one on it.
+const SLOWEST: f64 = 0.03;
+
+/// Slows a `fraction` of geodesic states down and reverses half of them: `v -> u v`, `a -> u^2 a`, `|u|` between
+/// [`SLOWEST`] and 1, uniform in its logarithm.
+///
+/// Their residuals weigh `1 / u^2`: an error of the connection counts at every speed alike.
 fn leave_shell(set: &Dataset<f64>, fraction: f64, rng: &mut impl Rng) -> Result<Dataset<f64>, DatasetError> {
     let n = set.coordinates();
     let (mut v, mut a) = (set.v().to_vec(), set.a().to_vec());
+    let mut weights = Vec::with_capacity(set.len());
     for (v, a) in v.chunks_exact_mut(n).zip(a.chunks_exact_mut(n)) {
-        let (chance, u) = (rng.random::<f64>(), rng.random::<f64>());
-        if chance < fraction {
-            v.iter_mut().for_each(|v| *v *= u);
-            a.iter_mut().for_each(|a| *a *= u * u);
+        let (chance, depth, reversed) = (rng.random::<f64>(), rng.random::<f64>(), rng.random::<bool>());
+        if chance >= fraction {
+            weights.push(1.0);
+            continue;
         }
+        let u = SLOWEST.powf(depth);
+        v.iter_mut().for_each(|v| *v *= if reversed { -u } else { u });
+        a.iter_mut().for_each(|a| *a *= u * u);
+        weights.push((u * u).recip());
     }
-    Dataset::new(n, set.q().to_vec(), v, a)
+    Dataset::new(n, set.q().to_vec(), v, a)?.with_weights(weights)
 }
 
 /// All datasets of a run in its precision, with the physical scale of the first phase's training states.
@@ -156,23 +167,32 @@ mod tests {
     }
 
     #[test]
-    fn slow_states_off_the_shell_are_states_of_the_same_motion() {
+    fn states_off_the_shell_are_states_of_the_same_motion() {
         let system = configure::<f64>("ads4-geodesic", &[]).unwrap();
         let mut config = Preset::Quick.config(&system).unwrap();
         (config.data.training, config.data.validation, config.data.test) = (2000, 10, 10);
         config.data.off_shell = 0.25;
         let (data, _) = sample_all::<f64>(&config, &system).unwrap();
-        let (set, mut terms, mut off) = (&data.training[0], Terms::default(), 0);
+        let (set, mut terms) = (&data.training[0], Terms::default());
         let exact = system.build().unwrap();
         exact.terms(set.q(), set.v(), Request::ENERGY | Request::ACCELERATION, &mut terms).unwrap();
-        for (&l, (a, found)) in terms.lagrangian.iter().zip(terms.acceleration.chunks(4).zip(set.a().chunks(4))) {
-            assert!((-0.5 - 1e-12..=0.0).contains(&l), "time-like or at rest: {l}");
-            off += usize::from(l > -0.5 + 1e-9);
-            let size = a.iter().fold(1.0f64, |m, a| m.max(a.abs()));
-            assert!(a.iter().zip(found).all(|(a, b)| (a - b).abs() <= 1e-12 * size));
+        let (mut off, mut reversed, mut slow) = (0, 0, 0);
+        for k in 0..set.len() {
+            let (v, a) = (&set.v()[4 * k..][..4], &set.a()[4 * k..][..4]);
+            // 2 L = g(v, v) = -u^2.
+            let u = (-2.0 * terms.lagrangian[k]).sqrt();
+            assert!((0.03 * (1.0 - 1e-12)..=1.0 + 1e-9).contains(&u), "{u}");
+            assert!((set.weight(k) * u * u - 1.0).abs() < 1e-9);
+            let exact = &terms.acceleration[4 * k..][..4];
+            let size = exact.iter().fold(0.0f64, |m, a| m.max(a.abs()));
+            assert!(a.iter().zip(exact).all(|(a, b)| (a - b).abs() <= 1e-12 * size));
+            off += usize::from(u < 1.0 - 1e-9);
+            reversed += usize::from(v[0] < 0.0);
+            slow += usize::from(u < 0.03f64.sqrt());
         }
-        // Binomial: mean 500, deviation 19.
-        assert!((400..600).contains(&off), "{off}");
+        // Binomial: means 500, 250, 250, deviations 19, 15, 15.
+        assert!((400..600).contains(&off) && (175..325).contains(&reversed) && (175..325).contains(&slow));
+        assert!((0..10).all(|k| data.validation.weight(k) == 1.0));
         config.data.off_shell = 1.5;
         assert!(matches!(sample_all::<f64>(&config, &system), Err(SamplingError::Config(_))));
     }

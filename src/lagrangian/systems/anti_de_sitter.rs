@@ -2,7 +2,7 @@
 
 use super::{LENGTH, lengths};
 use crate::lagrangian::Lagrangian;
-use crate::lagrangian::system::{Bounds, Closed, Parameter, Plane, Size, System, TrajectoryTest};
+use crate::lagrangian::system::{Bounds, Closed, Conserved, Parameter, Plane, Size, System, TrajectoryTest};
 use crate::scalar::Real;
 
 /// `Lagrangian = (L/z)^2 (-t'^2 + x'^2 + y'^2 + z'^2) / 2` over `(t, z)`, `(t, x, z)` or `(t, x, y, z)`, `L` the radius.
@@ -60,6 +60,15 @@ pub const fn system(name: &'static str, title: &'static str, n: usize, constrain
         plane: Some(Plane {
             labels: [if n == 2 { "t [m]" } else { "x [m]" }, "z [m]"],
             point: |_, q| (q[usize::from(q.len() > 2)], q[q.len() - 1]),
+        }),
+        // The metric is the same at every time and place but for z.
+        conserved: Some(Conserved {
+            name: "momenta but that of z [1]",
+            vector: |parameters, q, v| {
+                let (&[radius], Some((z, _))) = (parameters, q.split_last()) else { return vec![f64::NAN] };
+                let sign = |i: usize| if i == 0 { -1.0 } else { 1.0 };
+                (0..q.len() - 1).map(|i| sign(i) * (radius / z).powi(2) * v[i]).collect()
+            },
         }),
     }
 }

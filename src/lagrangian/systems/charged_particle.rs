@@ -35,6 +35,7 @@ pub const SYSTEM: System = System {
     trajectory: |n| TrajectoryTest { start: Bounds::uniform(n, (-1.0, 1.0), (-0.25, 0.25)), t_end: 10.0, dt: 0.05 },
     domain: None,
     plane: Some(X_AND_Y),
+    conserved: None,
 };
 
 /// `1 - v^2/c^2`, `NaN` unless it is positive.

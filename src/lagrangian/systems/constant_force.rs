@@ -26,6 +26,7 @@ pub const SYSTEM: System = System {
     trajectory: |n| TrajectoryTest { start: Bounds::uniform(n, (-1.0, 1.0), (-1.0, 1.0)), t_end: 2.0, dt: 0.02 },
     domain: None,
     plane: None,
+    conserved: None,
 };
 
 impl Lagrangian for ConstantForce {

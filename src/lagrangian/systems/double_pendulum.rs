@@ -39,6 +39,7 @@ pub const SYSTEM: System = System {
             _ => NOWHERE,
         },
     }),
+    conserved: None,
 };
 
 impl Lagrangian for DoublePendulum {

@@ -27,6 +27,7 @@ pub const SYSTEM: System = System {
     trajectory: |n| TrajectoryTest { start: Bounds::uniform(n, (-0.25, 0.25), (-0.25, 0.25)), t_end: 100.0, dt: 0.1 },
     domain: None,
     plane: Some(X_AND_Y),
+    conserved: None,
 };
 
 impl Lagrangian for HenonHeiles {

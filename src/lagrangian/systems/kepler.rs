@@ -2,7 +2,7 @@
 
 use super::{X_AND_Y, lengths};
 use crate::lagrangian::Lagrangian;
-use crate::lagrangian::system::{Bounds, Closed, Parameter, Range, Size, System, TrajectoryTest};
+use crate::lagrangian::system::{Bounds, Closed, Conserved, Parameter, Range, Size, System, TrajectoryTest};
 use crate::scalar::Real;
 
 /// `L = (v_x^2 + v_y^2) / 2 + mu / r`, `r^2 = x^2 + y^2`, per unit of mass; singular at `r = 0`.
@@ -30,6 +30,7 @@ pub const SYSTEM: System = System {
     },
     domain: Some(|_, q| if q[0] != 0.0 || q[1] != 0.0 { Ok(()) } else { Err("x and y must not both vanish") }),
     plane: Some(X_AND_Y),
+    conserved: Some(Conserved { name: "angular momentum [m^2/s]", vector: |_, q, v| vec![q[0] * v[1] - q[1] * v[0]] }),
 };
 
 impl Lagrangian for Kepler {

@@ -33,6 +33,14 @@ const LAST_BOB: [&str; 2] = ["x of the last bob [m]", "y of the last bob [m]"];
 /// No place, for a wrong number of parameters.
 const NOWHERE: (f64, f64) = (f64::NAN, f64::NAN);
 
+/// `e x e'`, `e` the direction of polar angle and azimuth.
+fn angular_velocity([theta, phi]: [f64; 2], [theta_dot, phi_dot]: [f64; 2]) -> [f64; 3] {
+    let ((sin, cos), (sin_phi, cos_phi)) = (theta.sin_cos(), phi.sin_cos());
+    // theta' points along growing phi, sin theta phi' against growing theta.
+    let along = sin * phi_dot;
+    [-sin_phi * theta_dot - along * cos * cos_phi, cos_phi * theta_dot - along * cos * sin_phi, along * sin]
+}
+
 /// Coordinates that are lengths.
 fn lengths(names: &[&'static str]) -> Vec<Coordinate> {
     names.iter().map(|&name| Coordinate::length(name)).collect()

@@ -37,6 +37,7 @@ pub const SYSTEM: System = System {
             _ => NOWHERE,
         },
     }),
+    conserved: None,
 };
 
 impl NPendulum {

@@ -1,7 +1,10 @@
 //! Free fall outside a black hole without charge and spin.
 
+use super::angular_velocity;
 use crate::lagrangian::Lagrangian;
-use crate::lagrangian::system::{Bounds, Closed, Coordinate, Parameter, Plane, Range, Size, System, TrajectoryTest};
+use crate::lagrangian::system::{
+    Bounds, Closed, Conserved, Coordinate, Parameter, Plane, Range, Size, System, TrajectoryTest,
+};
 use crate::scalar::Real;
 use std::f64::consts::PI;
 
@@ -52,6 +55,14 @@ pub const SYSTEM: System = System {
     plane: Some(Plane {
         labels: ["r cos phi [m]", "r sin phi [m]"],
         point: |_, q| (q[1] * q[3].cos(), q[1] * q[3].sin()),
+    }),
+    conserved: Some(Conserved {
+        name: "energy and angular momentum per mass [1, m]",
+        vector: |parameters, q, v| {
+            let &[mass] = parameters else { return vec![f64::NAN] };
+            let momentum = angular_velocity([q[2], q[3]], [v[2], v[3]]).map(|x| q[1] * q[1] * x);
+            [[redshift(mass, q[1]) * v[0]].as_slice(), &momentum].concat()
+        },
     }),
 };
 

@@ -1,8 +1,10 @@
 //! Free motion on a sphere in polar angle and azimuth.
 
-use super::{LENGTH, MASS, NOWHERE};
+use super::{LENGTH, MASS, NOWHERE, angular_velocity};
 use crate::lagrangian::Lagrangian;
-use crate::lagrangian::system::{Bounds, Closed, Coordinate, Parameter, Plane, Size, System, TrajectoryTest};
+use crate::lagrangian::system::{
+    Bounds, Closed, Conserved, Coordinate, Parameter, Plane, Size, System, TrajectoryTest,
+};
 use crate::scalar::Real;
 use std::f64::consts::PI;
 
@@ -45,6 +47,14 @@ pub const SYSTEM: System = System {
         point: |parameters, q| match *parameters {
             [_, radius] => (radius * q[0].sin() * q[1].cos(), radius * q[0].cos()),
             _ => NOWHERE,
+        },
+    }),
+    // A relative error d of it bounds the angle off the plane of the great circle and the relative error of the speed.
+    conserved: Some(Conserved {
+        name: "angular momentum [kg m^2/s]",
+        vector: |parameters, q, v| {
+            let &[m, radius] = parameters else { return vec![f64::NAN] };
+            angular_velocity([q[0], q[1]], [v[0], v[1]]).map(|x| m * radius * radius * x).to_vec()
         },
     }),
 };

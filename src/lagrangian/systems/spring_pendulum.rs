@@ -42,6 +42,7 @@ pub const SYSTEM: System = System {
     },
     domain: Some(|_, q| if q[0] > 0.0 { Ok(()) } else { Err("r must be positive") }),
     plane: Some(Plane { labels: ["x [m]", "y [m]"], point: |_, q| (q[0] * q[1].sin(), -(q[0] * q[1].cos())) }),
+    conserved: None,
 };
 
 impl Lagrangian for SpringPendulum {

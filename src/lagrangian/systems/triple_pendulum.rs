@@ -41,6 +41,7 @@ pub const SYSTEM: System = System {
             _ => NOWHERE,
         },
     }),
+    conserved: None,
 };
 
 /// Masses carried by each rod, lengths, acceleration of gravity.
