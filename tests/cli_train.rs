@@ -160,6 +160,28 @@ fn a_model_moves_and_is_judged() {
     let json: Value = serde_json::from_str(&json).unwrap();
     assert_eq!(json["trajectories"].as_array().unwrap().len(), 2);
     assert!(folder.path("run/evaluation/lagrangian.png").is_file());
+    assert!(json["trajectories"][0]["conserved_error"].is_null());
+    let evaluate = |more: &[&str]| lnn(&[&["evaluate", &model, "--starts", "2", "--json"], more].concat());
+    let (near, still) = (["--positions", "1:1.5,0.03:0.03"], ["--velocities", "0:0"]);
+    let json = succeeded(&evaluate(&[&near[..], &still, &["--until", "0.05", "--rtol", "1e-9"]].concat()));
+    let json: Value = serde_json::from_str(&json).unwrap();
+    for start in json["trajectories"].as_array().unwrap() {
+        let numbers =
+            |key: &str| start[key].as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect::<Vec<_>>();
+        let (q, v) = (numbers("q"), numbers("v"));
+        assert!((1.0..=1.5).contains(&q[0]) && q[1] == 0.03 && v == [0.0, 0.0], "{start}");
+        assert!((start["compared_until"].as_f64().unwrap() - 0.05).abs() < 1e-9, "{start}");
+        assert!(start["lyapunov_exponent"].is_number() && start["velocity_error"].as_array().unwrap().len() == 2);
+    }
+    // Faster than the model was trained for.
+    let fast = format!("{}:{0}", 3.0 * header.velocity[0][1]);
+    let table = succeeded(&lnn(&["evaluate", &model, "--velocities", &fast, "--until", "0.1"]));
+    assert!(table.contains(&format!("{} outside the training range at 0.0", header.columns[2])), "{table}");
+    refused(&evaluate(&["--positions", "0:1,0:1,0:1"]), 2, &["--positions: expected 1 or 2 pairs LOW:HIGH, found 3"]);
+    refused(&evaluate(&["--velocities", "1:0"]), 2, &["--velocities", "LOW:HIGH"]);
+    refused(&evaluate(&["--until", "0"]), 2, &["--until"]);
+    refused(&evaluate(&["--until", "1e12"]), 1, &["the evaluation takes about"]);
+    refused(&evaluate(&["--rtol", "nan"]), 2, &["--rtol"]);
     refused(&lnn(&["evaluate", &model, "--starts", "0"]), 2, &["--starts"]);
     refused(&lnn(&["evaluate", &text(&folder.path("none"))]), 1, &["no such file"]);
 }
@@ -171,9 +193,9 @@ fn a_relativistic_model_knows_the_range_of_the_imposed_velocity() {
     assert!(printed.contains("until [m]"));
     let model = text(&folder.path("run/model.safetensors"));
     let header = ModelFile::<f64>::load(Path::new(&model)).unwrap().header;
-    // x_dot, y_dot, z_dot and z at their bounds give 6.20; a quarter of the states is slowed down, almost to rest.
+    // x_dot, y_dot, z_dot and z at their bounds give 6.62; three quarters of the states are slowed down, half of them reversed.
     let [low, high] = header.velocity[0];
-    assert!((0.0..0.5).contains(&low) && (1.0..6.21).contains(&high), "{low} {high}");
+    assert!((-6.63..-1.0).contains(&low) && (1.0..6.63).contains(&high), "{low} {high}");
     assert_eq!(header.velocity[1], [-1.0, 1.0]);
     assert!((header.architecture.scale[0] - high.max(5.0)).abs() < 1e-6 * high);
 
@@ -182,15 +204,16 @@ fn a_relativistic_model_knows_the_range_of_the_imposed_velocity() {
         let options = ["--t-end", "0.0002", "--dt", "0.0001", "--out", &out];
         lnn(&[&["rollout", &model, "--state", state], &options[..]].concat())
     };
-    let middle = 0.5 * (low + high);
-    assert!(succeeded(&rollout(&format!("0,0,0,3,{middle},0,0,0"))).contains(" m, "));
-    refused(&rollout("0,0,0,3,0,0,0,0"), 1, &["training range", "t_dot"]);
+    let inside = 0.5 * high;
+    assert!(succeeded(&rollout(&format!("0,0,0,3,{inside},0,0,0"))).contains(" m, "));
+    refused(&rollout("0,0,0,3,6.7,0,0,0"), 1, &["training range", "t_dot"]);
     let json = succeeded(&lnn(&["evaluate", &model, "--starts", "2", "--json"]));
     let json: Value = serde_json::from_str(&json).unwrap();
     for start in json["trajectories"].as_array().unwrap() {
         let number = |key: &str, k: usize| start[key][k].as_f64().unwrap();
         let square: f64 = (1..4).map(|k| number("v", k).powi(2)).sum::<f64>() + number("q", 3).powi(2);
         assert!((number("v", 0) - square.sqrt()).abs() < 1e-14 && number("q", 0) == 0.0);
+        assert!(start["conserved_error"]["max"].as_f64().unwrap() > 0.0);
     }
 }
 

@@ -1,6 +1,8 @@
 //! Every preset of every system: it trains, and to the same bits on any number of threads.
 
+use lnn::analysis::StartBox;
 use lnn::lagrangian::{configure, systems};
+use lnn::rollout::{Options, rollout};
 use lnn::training::{Config, Hooks, Preset, run};
 
 /// The preset with few states, few epochs and narrow layers, everything else as it ships.
@@ -36,4 +38,28 @@ fn every_preset_trains_to_the_same_bits_on_any_number_of_threads() {
         }
     }
     assert!(presets >= 19, "{presets} presets");
+}
+
+#[test]
+fn exact_motions_of_the_ads_test_stay_among_the_training_states() {
+    for name in ["ads2-geodesic", "ads3-geodesic", "ads4-geodesic"] {
+        let system = configure::<f64>(name, &[]).unwrap();
+        let (n, test) = (system.coordinates, (system.system.trajectory)(system.coordinates));
+        let config = Preset::Quick.config(&system).unwrap();
+        let exact = system.build().unwrap();
+        let bounds = StartBox { q: test.start.positions, v: test.start.velocities };
+        for (q, mut v) in bounds.starts::<f64>(50, 3) {
+            system.impose_constraint(&q, &mut v).unwrap();
+            let run = rollout(exact.as_ref(), &q, &v, &Options::reference(test.t_end, test.dt));
+            assert!(run.stop.is_none());
+            for k in 0..run.trajectory.len() {
+                let (q, v) = run.trajectory.state(k);
+                let inside = |x: f64, [low, high]: [f64; 2]| (low..=high).contains(&x);
+                let phase = &config.phases[0];
+                assert!((0..n).all(|i| inside(q[i], phase.position[i])), "{name}: {q:?}");
+                // The velocity of t follows from the others.
+                assert!((1..n).all(|i| inside(v[i], phase.velocity[i])), "{name}: {v:?}");
+            }
+        }
+    }
 }

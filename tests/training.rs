@@ -311,6 +311,32 @@ fn an_inactive_penalty_is_exactly_zero() {
 }
 
 #[test]
+fn a_state_of_weight_three_counts_three_times() {
+    let architecture = architecture(2, &[6, 5]);
+    let weights = initial_weights::<f64>(&architecture, Initialization::Default, &mut ChaCha8Rng::seed_from_u64(11));
+    let times = |k: usize| k % 4;
+    let data = random_data::<f64>(2, 40, 12);
+    let heavy = data.clone().with_weights((0..40).map(|k| times(k) as f64).collect()).unwrap();
+    let repeated: Vec<u32> = (0..40).flat_map(|k| vec![k as u32; times(k)]).collect();
+    let all: Vec<u32> = (0..40).collect();
+    let mut objective = Objective::new(&architecture, Penalty::None, 1).unwrap();
+    let (mut one, mut other) = (vec![0.0; weights.len()], vec![0.0; weights.len()]);
+    let weighted = objective.step(&weights, &heavy, &all, &mut one).loss;
+    let plain = objective.step(&weights, &data, &repeated, &mut other).loss;
+    let factor = repeated.len() as f64 / 40.0;
+    assert!((weighted - factor * plain).abs() < 1e-12 * weighted && weighted > 0.0);
+    let size = one.iter().fold(0.0f64, |m, g| m.max(g.abs()));
+    assert!(one.iter().zip(&other).all(|(a, b)| (a - factor * b).abs() < 1e-12 * size));
+    assert!((objective.loss(&weights, &heavy).loss - weighted).abs() < 1e-12 * weighted);
+
+    assert!(data.clone().with_weights(vec![1.0; 39]).unwrap_err().to_string().contains("expected 40 numbers"));
+    let text = data.clone().with_weights(vec![f64::NAN; 40]).unwrap_err().to_string();
+    assert_eq!(text, "weight 0 of state 0 is not finite");
+    assert_ne!(heavy.checksum(), data.checksum());
+    assert_eq!(heavy.cast::<f32>().weight(3), 3.0);
+}
+
+#[test]
 fn polishing_lowers_the_loss_and_keeps_the_best() {
     let mut config = config(3);
     config.optimizer.averaging = 0.0;

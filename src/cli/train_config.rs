@@ -52,7 +52,7 @@ pub struct Args {
 enum PresetName {
     /// A minute on two cores.
     Quick,
-    /// Wider and ten times as many epochs as quick.
+    /// Wider and longer: five minutes on two cores.
     Best,
     /// The paper's budget and choices: hours.
     Paper,
