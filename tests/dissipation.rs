@@ -372,6 +372,7 @@ fn config(units: Option<usize>, epochs: usize) -> Config {
             t_max: epochs as f64,
             position: bounds(),
             velocity: bounds(),
+            logarithmic: vec![],
         }],
         polish: None,
     }

@@ -440,6 +440,7 @@ fn config(epochs: usize) -> Config {
                 t_max: 1.0,
                 position: vec![[-1.0, 1.0]; 2],
                 velocity: vec![[-1.0, 1.0]; 2],
+                logarithmic: vec![],
             };
             2
         ],

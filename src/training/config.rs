@@ -165,6 +165,10 @@ pub struct Phase {
     pub position: Vec<[f64; 2]>,
     /// Training bounds of each velocity; those of a velocity that a mass shell fixes mean nothing.
     pub velocity: Vec<[f64; 2]>,
+    /// For which coordinates half of the training states are uniform in the logarithm, where the low end of the bounds needs more
+    /// of them than its length; none if empty.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub logarithmic: Vec<bool>,
 }
 
 /// A value of a configuration that is out of range.
@@ -244,6 +248,15 @@ impl Config {
             fraction(phase.t_max, &field("t_max"), positive(phase.t_max), "a positive number of epochs")?;
             check_bounds(&field("position"), &phase.position, n)?;
             check_bounds(&field("velocity"), &phase.velocity, n)?;
+            let logarithmic = &phase.logarithmic;
+            let found = format!("{} for {n}", logarithmic.len());
+            let expected = "nothing or true or false for each coordinate";
+            check(logarithmic.is_empty() || logarithmic.len() == n, &field("logarithmic"), expected, found)?;
+            for (i, &[low, _]) in phase.position.iter().enumerate() {
+                let ok = low > 0.0 || !logarithmic.get(i).copied().unwrap_or(false);
+                let expected = "a lowest coordinate above 0 to take its logarithm";
+                check(ok, &field(&format!("position[{i}]")), expected, format!("{low}"))?;
+            }
         }
         if let Some(polish) = &self.polish {
             count(polish.iterations, "polish.iterations", 1 << 24)?;

@@ -108,12 +108,21 @@ fn network(width: usize) -> Network {
 
 /// One fall of the rate to zero.
 fn phase(epochs: usize, rate: f64, position: Vec<[f64; 2]>, velocity: Vec<[f64; 2]>) -> Phase {
-    Phase { epochs, rate, eta_min: 0.0, schedule: Schedule::Cosine, t_max: epochs as f64, position, velocity }
+    Phase {
+        epochs,
+        rate,
+        eta_min: 0.0,
+        schedule: Schedule::Cosine,
+        t_max: epochs as f64,
+        position,
+        velocity,
+        logarithmic: vec![],
+    }
 }
 
 /// The paper's box of training states with a single turn of every angle, wider where the motions of the trajectory test soon
-/// leave it.
-fn training_bounds(system: &Configured<f64>) -> Bounds {
+/// leave it, and the coordinates whose small values need more states.
+fn training_states(system: &Configured<f64>) -> (Bounds, Vec<bool>) {
     let n = system.coordinates;
     let mut bounds: Bounds = (system.system.training)(n);
     // Embedded angles repeat: one turn is all there is.
@@ -122,21 +131,26 @@ fn training_bounds(system: &Configured<f64>) -> Bounds {
             *bound = (0.0, 2.0 * PI);
         }
     }
+    let mut logarithmic = Vec::new();
     match system.system.name {
         // A short spring turns fast.
-        "spring-pendulum" => bounds.velocities = vec![(-7.0, 7.0), (-10.0, 10.0)],
+        "spring-pendulum" => {
+            bounds.velocities = vec![(-7.0, 7.0), (-10.0, 10.0)];
+            logarithmic = vec![true, false];
+        }
         // z = z_0 / cos(tau) from rest: towards the horizon everything falls ever faster.
         "ads2-geodesic" | "ads3-geodesic" | "ads4-geodesic" => {
             bounds.positions[n - 1].0 = 0.4;
             bounds.velocities[n - 1] = (-2.4, 2.4);
+            logarithmic = (1..=n).map(|i| i == n).collect();
         }
         _ => {}
     }
-    bounds
+    (bounds, logarithmic)
 }
 
 fn ours(system: &Configured<f64>, size: Size) -> Config {
-    let bounds = training_bounds(system);
+    let (bounds, logarithmic) = training_states(system);
     let phase = phase(size.epochs, 5e-3, boxes(&bounds.positions), boxes(&bounds.velocities));
     let base = base(system, 60_000, network(size.width));
     let off_shell = if system.constrained_coordinate().is_some() { OFF_SHELL } else { 0.0 };
@@ -144,7 +158,7 @@ fn ours(system: &Configured<f64>, size: Size) -> Config {
         data: Data { off_shell, ..base.data },
         penalty: regularizer(system, PENALTY),
         optimizer: Optimizer { weight_decay: size.weight_decay, ..optimizer(Method::Soap) },
-        phases: vec![phase],
+        phases: vec![Phase { logarithmic, ..phase }],
         ..base
     }
 }
@@ -206,7 +220,16 @@ fn paper(system: &Configured<f64>) -> Option<Config> {
             position = vec![if k == 0 { [-3.0 * PI, 3.0 * PI] } else { [-PI / 10.0, 21.0 * PI / 10.0] }; n];
         }
         let velocity = boxes(&bounds.velocities);
-        Phase { epochs, rate, eta_min, schedule: Schedule::CosineAnnealing, t_max: 30.0, position, velocity }
+        Phase {
+            epochs,
+            rate,
+            eta_min,
+            schedule: Schedule::CosineAnnealing,
+            t_max: 30.0,
+            position,
+            velocity,
+            logarithmic: vec![],
+        }
     };
     let phases = phases.iter().enumerate().map(phase).collect();
     Some(Config { phases, ..base(system, states, network) })

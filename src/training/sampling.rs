@@ -40,7 +40,19 @@ pub enum SamplingError {
 pub fn sample(
     system: &Configured<f64>,
     field: &str,
+    bounds: (&[[f64; 2]], &[[f64; 2]]),
+    states: usize,
+    rng: &mut impl Rng,
+) -> Result<Dataset<f64>, SamplingError> {
+    sample_by(system, field, bounds, &[], states, rng)
+}
+
+/// The same with the [`logarithmic`](crate::training::Phase::logarithmic) coordinates of a phase.
+fn sample_by(
+    system: &Configured<f64>,
+    field: &str,
     (position, velocity): (&[[f64; 2]], &[[f64; 2]]),
+    logarithmic: &[bool],
     states: usize,
     rng: &mut impl Rng,
 ) -> Result<Dataset<f64>, SamplingError> {
@@ -51,7 +63,14 @@ pub fn sample(
         let mut draw = |bounds: &[[f64; 2]]| -> Vec<f64> {
             bounds.iter().map(|&[low, high]| if low < high { rng.random_range(low..high) } else { low }).collect()
         };
-        let (new_q, mut new_v) = (draw(position), draw(velocity));
+        let (mut new_q, mut new_v) = (draw(position), draw(velocity));
+        for (q, &[low, high]) in
+            new_q.iter_mut().zip(position).zip(logarithmic).filter(|(_, log)| **log).map(|(x, _)| x)
+        {
+            if rng.random::<bool>() {
+                *q = low * (high / low).powf(rng.random::<f64>());
+            }
+        }
         system.impose_constraint(&new_q, &mut new_v)?;
         let demand = system.check_domain(&new_q).err();
         let new_a = system.exact_acceleration(&new_q, &new_v)?;
@@ -110,7 +129,7 @@ pub fn sample_all<S: Scalar>(
         let field = format!("phase[{k}].position");
         let bounds = (phase.position.as_slice(), phase.velocity.as_slice());
         let mut rng = Stream::Training(k).generator(seed);
-        let set = sample(system, &field, bounds, config.data.training, &mut rng)?;
+        let set = sample_by(system, &field, bounds, &phase.logarithmic, config.data.training, &mut rng)?;
         let off = config.data.off_shell;
         let slowed = off > 0.0 && system.constrained_coordinate().is_some();
         training.push(if slowed { leave_shell(&set, off, &mut rng)? } else { set });
@@ -195,6 +214,31 @@ mod tests {
         assert!((0..10).all(|k| data.validation.weight(k) == 1.0));
         config.data.off_shell = 1.5;
         assert!(matches!(sample_all::<f64>(&config, &system), Err(SamplingError::Config(_))));
+    }
+
+    #[test]
+    fn half_of_a_logarithmic_coordinate_is_uniform_in_its_logarithm() {
+        let system = configure::<f64>("ads2-geodesic", &[]).unwrap();
+        let mut config = Preset::Quick.config(&system).unwrap();
+        (config.data.training, config.data.validation, config.data.test) = (8000, 10, 10);
+        config.phases[0].position = vec![[-5.0, 5.0], [0.25, 64.0]];
+        let below_four = |logarithmic: &[bool]| {
+            let mut config = config.clone();
+            config.phases[0].logarithmic = logarithmic.to_vec();
+            let (data, _) = sample_all::<f64>(&config, &system).unwrap();
+            let z = data.training[0].q().chunks(2).map(|q| q[1]);
+            assert!(z.clone().all(|z| (0.25..=64.0).contains(&z)));
+            z.filter(|z| *z < 4.0).count()
+        };
+        // 3.75 of 63.75 uniformly, 4 of 8 doublings logarithmically; the means' deviations are 21 and 41.
+        let (plain, mixed) = (below_four(&[]), below_four(&[false, true]));
+        assert!(plain.abs_diff(471) < 110 && mixed.abs_diff(2235) < 210, "{plain} {mixed}");
+        config.phases[0].logarithmic = vec![true, false];
+        let refused = sample_all::<f64>(&config, &system).unwrap_err().to_string();
+        assert!(refused.starts_with("phase[0].position[0]: expected a lowest coordinate above 0"), "{refused}");
+        config.phases[0].logarithmic = vec![true];
+        let refused = sample_all::<f64>(&config, &system).unwrap_err().to_string();
+        assert!(refused.starts_with("phase[0].logarithmic: expected nothing or true or false"), "{refused}");
     }
 
     #[test]
