@@ -97,6 +97,11 @@ pub struct Data {
     /// cannot be told.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub off_shell: f64,
+    /// With a number `f` above 0 a training state weighs `f m / (f m + |a|)`, `|a|` the mean size of its scaled accelerations
+    /// and `m` the mean over all states: errors count relative to accelerations above `f m`, and a few large ones do not
+    /// outweigh the others.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub relative: f64,
     /// Number of fresh states on which the final model is judged.
     pub test: usize,
     /// Validation and test bounds of each coordinate.
@@ -202,6 +207,9 @@ impl Config {
         count(self.data.test, "data.test", STATES)?;
         let off_shell = self.data.off_shell;
         fraction(off_shell, "data.off_shell", (0.0..=1.0).contains(&off_shell), "a number from 0 to 1")?;
+        let relative = self.data.relative;
+        let ok = relative.is_finite() && relative >= 0.0;
+        fraction(relative, "data.relative", ok, "a finite number of at least 0")?;
         check_bounds("data.validation_position", &self.data.validation_position, n)?;
         check_bounds("data.validation_velocity", &self.data.validation_velocity, n)?;
         let hidden = &self.network.hidden;

@@ -89,6 +89,17 @@ fn sample_by(
     Ok(Dataset::new(n, q, v, a)?)
 }
 
+/// The states with the weights of [`Data::relative`](crate::training::Data::relative).
+fn weigh(set: Dataset<f64>, floor: f64) -> Result<Dataset<f64>, DatasetError> {
+    let scale = set.physical_scale();
+    let size = |a: &[f64]| a.iter().zip(&scale).map(|(a, s)| (a / s).abs()).sum::<f64>() / scale.len() as f64;
+    let sizes: Vec<f64> = set.a().chunks_exact(scale.len()).map(size).collect();
+    let floor = floor * sizes.iter().sum::<f64>() / sizes.len() as f64;
+    // Without any acceleration every state counts the same.
+    let weight = |size: f64| if floor > 0.0 { floor / (floor + size) } else { 1.0 };
+    set.with_weights(sizes.into_iter().map(weight).collect())
+}
+
 /// Slowest velocity off a mass shell, as a part of one on it.
 const SLOWEST: f64 = 0.03;
 
@@ -100,16 +111,16 @@ fn leave_shell(set: &Dataset<f64>, fraction: f64, rng: &mut impl Rng) -> Result<
     let n = set.coordinates();
     let (mut v, mut a) = (set.v().to_vec(), set.a().to_vec());
     let mut weights = Vec::with_capacity(set.len());
-    for (v, a) in v.chunks_exact_mut(n).zip(a.chunks_exact_mut(n)) {
+    for (k, (v, a)) in v.chunks_exact_mut(n).zip(a.chunks_exact_mut(n)).enumerate() {
         let (chance, depth, reversed) = (rng.random::<f64>(), rng.random::<f64>(), rng.random::<bool>());
         if chance >= fraction {
-            weights.push(1.0);
+            weights.push(set.weight(k));
             continue;
         }
         let u = SLOWEST.powf(depth);
         v.iter_mut().for_each(|v| *v *= if reversed { -u } else { u });
         a.iter_mut().for_each(|a| *a *= u * u);
-        weights.push((u * u).recip());
+        weights.push(set.weight(k) / (u * u));
     }
     Dataset::new(n, set.q().to_vec(), v, a)?.with_weights(weights)
 }
@@ -130,6 +141,7 @@ pub fn sample_all<S: Scalar>(
         let bounds = (phase.position.as_slice(), phase.velocity.as_slice());
         let mut rng = Stream::Training(k).generator(seed);
         let set = sample_by(system, &field, bounds, &phase.logarithmic, config.data.training, &mut rng)?;
+        let set = if config.data.relative > 0.0 { weigh(set, config.data.relative)? } else { set };
         let off = config.data.off_shell;
         let slowed = off > 0.0 && system.constrained_coordinate().is_some();
         training.push(if slowed { leave_shell(&set, off, &mut rng)? } else { set });
@@ -214,6 +226,31 @@ mod tests {
         assert!((0..10).all(|k| data.validation.weight(k) == 1.0));
         config.data.off_shell = 1.5;
         assert!(matches!(sample_all::<f64>(&config, &system), Err(SamplingError::Config(_))));
+    }
+
+    #[test]
+    fn relative_weights_fall_with_the_acceleration() {
+        let set = Dataset::new(2, vec![1.0, 4.0, -2.0, 0.0], vec![0.0; 4], vec![2.0, 0.0, 2.0, 20.0]).unwrap();
+        // Scales 2 and 4: sizes 1/2 and 3, mean 7/4.
+        let weighed = weigh(set.clone(), 2.0).unwrap();
+        assert_eq!([weighed.weight(0), weighed.weight(1)], [3.5 / 4.0, 3.5 / 6.5]);
+        let still = Dataset::new(2, vec![1.0, 4.0], vec![0.0; 2], vec![0.0; 2]).unwrap();
+        assert_eq!(weigh(still, 2.0).unwrap().weight(0), 1.0);
+        // Slowed and reversed states keep them.
+        let mut rng = Stream::Test.generator(0);
+        let slowed = leave_shell(&weighed, 1.0, &mut rng).unwrap();
+        for k in 0..2 {
+            let squared = slowed.a()[2 * k] / weighed.a()[2 * k];
+            assert!((slowed.weight(k) * squared / weighed.weight(k) - 1.0).abs() < 1e-12 && squared < 1.0);
+        }
+        let system = configure::<f64>("spring-pendulum", &[]).unwrap();
+        let mut config = Preset::Quick.config(&system).unwrap();
+        (config.data.training, config.data.validation, config.data.test) = (50, 10, 10);
+        let (data, _) = sample_all::<f64>(&config, &system).unwrap();
+        assert!((0..50).all(|k| (1e-6..1.0).contains(&data.training[0].weight(k))));
+        config.data.relative = -1.0;
+        let refused = sample_all::<f64>(&config, &system).unwrap_err().to_string();
+        assert_eq!(refused, "data.relative: expected a finite number of at least 0, found -1");
     }
 
     #[test]
