@@ -142,7 +142,7 @@ fn training_states(system: &Configured<f64>) -> (Bounds, Vec<bool>) {
         // z = z_0 / cos(tau) from rest: towards the horizon everything falls ever faster.
         "ads2-geodesic" | "ads3-geodesic" | "ads4-geodesic" => {
             bounds.positions[n - 1].0 = 0.4;
-            bounds.velocities[n - 1] = (-2.4, 2.4);
+            bounds.velocities[n - 1] = (-1.2, 1.2);
             logarithmic = (1..=n).map(|i| i == n).collect();
         }
         _ => {}
@@ -155,8 +155,12 @@ fn ours(system: &Configured<f64>, size: Size) -> Config {
     let phase = phase(size.epochs, 5e-3, boxes(&bounds.positions), boxes(&bounds.velocities));
     let base = base(system, 60_000, network(size.width));
     let off_shell = if system.constrained_coordinate().is_some() { OFF_SHELL } else { 0.0 };
-    // A short spring's angle is accelerated a thousand times more than others.
-    let relative = if system.system.name == "spring-pendulum" { 0.1 } else { 0.0 };
+    let relative = match system.system.name {
+        // A short spring's angle is accelerated a thousand times more than others.
+        "spring-pendulum" => 0.1,
+        "ads2-geodesic" | "ads3-geodesic" | "ads4-geodesic" => 1.0,
+        _ => 0.0,
+    };
     Config {
         data: Data { off_shell, relative, ..base.data },
         penalty: regularizer(system, PENALTY),
