@@ -257,8 +257,9 @@ impl Evaluation {
             row.extend(numbers.iter().map(|x| format!("{x:.3e}")));
             let time = t.lyapunov_exponent.filter(|exponent| *exponent > 0.0).map(f64::recip);
             row.push(time.map_or("-".to_string(), |time| format!("{time:.1}")));
-            let ends = [&t.stopped, &t.reference_stopped, &motion.left_training_range];
-            row.push(ends.into_iter().flatten().map(String::as_str).collect::<Vec<_>>().join("; "));
+            let exact = t.reference_stopped.as_ref().map(|stop| format!("exact motion: {stop}"));
+            let remarks = [motion.left_training_range.clone(), t.stopped.clone(), exact];
+            row.push(remarks.into_iter().flatten().collect::<Vec<_>>().join("; "));
             row
         });
         let t_end = self.trajectories.iter().fold(0.0, |m: f64, motion| m.max(motion.summary.compared_until));

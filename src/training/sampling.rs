@@ -202,7 +202,7 @@ mod tests {
         let system = configure::<f64>("ads4-geodesic", &[]).unwrap();
         let mut config = Preset::Quick.config(&system).unwrap();
         (config.data.training, config.data.validation, config.data.test) = (2000, 10, 10);
-        config.data.off_shell = 0.25;
+        (config.data.off_shell, config.data.relative) = (0.25, 0.0);
         let (data, _) = sample_all::<f64>(&config, &system).unwrap();
         let (set, mut terms) = (&data.training[0], Terms::default());
         let exact = system.build().unwrap();
