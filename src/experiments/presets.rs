@@ -55,7 +55,7 @@ pub(super) const TIME_TO_ACCURACY: Experiment = Experiment {
         }
         vec![
             run("quick", "preset quick", of(Preset::Quick), reported(0.006859)),
-            run("quick-radam", "preset quick by RAdam, twice the epochs", radam, reported(0.006859)),
+            run("quick-radam", "quick by RAdam, 80 epochs", radam, reported(0.006859)),
             run("best", "preset best", of(Preset::Best), reported(0.001523)),
         ]
     },
