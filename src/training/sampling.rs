@@ -64,10 +64,9 @@ fn sample_by(
             bounds.iter().map(|&[low, high]| if low < high { rng.random_range(low..high) } else { low }).collect()
         };
         let (mut new_q, mut new_v) = (draw(position), draw(velocity));
-        for (q, &[low, high]) in
-            new_q.iter_mut().zip(position).zip(logarithmic).filter(|(_, log)| **log).map(|(x, _)| x)
-        {
-            if rng.random::<bool>() {
+        for (i, q) in new_q.iter_mut().enumerate() {
+            if logarithmic.get(i) == Some(&true) && rng.random::<bool>() {
+                let [low, high] = position[i];
                 *q = low * (high / low).powf(rng.random::<f64>());
             }
         }
