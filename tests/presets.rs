@@ -1,4 +1,4 @@
-//! Every preset of every system: it trains, and to the same bits on any number of threads.
+//! Every preset of every system: it trains, to the same bits on any number of threads, on states that its motions go through.
 
 use lnn::analysis::StartBox;
 use lnn::lagrangian::{configure, systems};

@@ -5,22 +5,23 @@ use crate::rollout::Trajectory;
 use crate::scalar::Scalar;
 
 /// `|C(t) - C(0)| / |C(0)|` (Euclidean norms) of the system's [conserved vector](crate::lagrangian::system::Conserved) along
-/// any trajectory, one value per sample; `None` for a system without one.
+/// any trajectory, one value per sample; `None` for a system without one
+/// or a trajectory of another number of coordinates.
 ///
 /// `NaN` where `C(0)` vanishes and so does the difference.
 pub fn conserved_error<S: Scalar>(system: &Configured<S>, trajectory: &Trajectory<S>) -> Option<Vec<f64>> {
-    let conserved = system.system.conserved?;
-    let leading = |x: &[S]| -> Vec<f64> { x.iter().map(|x| x.to_f64()).collect() };
-    let parameters = leading(&system.parameters);
-    let at = |k: usize| {
-        let (q, v) = trajectory.state(k);
-        (conserved.vector)(&parameters, &leading(q), &leading(v))
-    };
-    let norm = |x: &mut dyn Iterator<Item = f64>| x.map(|x| x * x).sum::<f64>().sqrt();
-    let Some(first) = (!trajectory.is_empty()).then(|| at(0)) else { return Some(Vec::new()) };
-    let size = norm(&mut first.iter().copied());
-    let error = |k: usize| norm(&mut at(k).iter().zip(&first).map(|(a, b)| a - b)) / size;
-    Some((0..trajectory.len()).map(error).collect())
+    system.system.conserved?;
+    let vectors: Option<Vec<Vec<f64>>> = (0..trajectory.len())
+        .map(|k| {
+            let (q, v) = trajectory.state(k);
+            system.conserved(q, v)
+        })
+        .collect();
+    let vectors = vectors?;
+    let Some(first) = vectors.first() else { return Some(Vec::new()) };
+    let distance = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
+    let size = distance(first, &vec![0.0; first.len()]);
+    Some(vectors.iter().map(|vector| distance(vector, first) / size).collect())
 }
 
 #[cfg(test)]

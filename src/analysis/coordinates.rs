@@ -77,6 +77,13 @@ mod tests {
     }
 
     #[test]
+    fn velocities_are_compared_as_far_as_both_go() {
+        let exact = Trajectory { v: vec![1.0, -2.0, 3.0, 4.0], ..trajectory(&[0.0; 4]) };
+        let learned = Trajectory { t: vec![0.0], q: vec![0.0; 2], v: vec![1.5, 2.0], ..trajectory(&[]) };
+        assert_eq!(velocity_error(&exact, &learned), [0.5, 4.0]);
+    }
+
+    #[test]
     fn angles_go_round() {
         let (a, b) = (trajectory(&[0.1, 0.0, 1.0, 0.0]), trajectory(&[2.0 * PI - 0.1, 0.5, 1.0 + 6.0 * PI, 7.0]));
         let error = coordinate_error(&a, &b, &[true]);

@@ -291,6 +291,12 @@ impl<S: Scalar> Configured<S> {
         let plane = self.system.plane.filter(|_| q.len() == self.coordinates)?;
         Some((plane.point)(&leading(&self.parameters), &leading(q)))
     }
+    /// The system's [`Conserved`](super::system::Conserved) vector at a state; `None` without one or for a state of the wrong
+    /// length.
+    pub fn conserved(&self, q: &[S], v: &[S]) -> Option<Vec<f64>> {
+        let conserved = self.system.conserved.filter(|_| self.check_lengths(q, v).is_ok())?;
+        Some((conserved.vector)(&leading(&self.parameters), &leading(q), &leading(v)))
+    }
 }
 
 fn leading<S: Scalar>(x: &[S]) -> Vec<f64> {

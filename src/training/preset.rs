@@ -121,9 +121,15 @@ fn phase(epochs: usize, rate: f64, position: Vec<[f64; 2]>, velocity: Vec<[f64; 
     }
 }
 
-/// The paper's box of training states with a single turn of every angle, wider where the motions of the trajectory test soon
-/// leave it, and the coordinates whose small values need more states.
-fn training_states(system: &Configured<f64>) -> (Bounds, Vec<bool>) {
+/// Where the presets of our own draw their training states, and how these count.
+struct States {
+    bounds: Bounds,
+    logarithmic: Vec<bool>,
+    relative: f64,
+}
+
+/// The paper's box with a single turn of every angle, wider where the motions of the trajectory test soon leave it.
+fn training_states(system: &Configured<f64>) -> States {
     let n = system.coordinates;
     let mut bounds: Bounds = (system.system.training)(n);
     // Embedded angles repeat: one turn is all there is.
@@ -132,35 +138,29 @@ fn training_states(system: &Configured<f64>) -> (Bounds, Vec<bool>) {
             *bound = (0.0, 2.0 * PI);
         }
     }
-    let mut logarithmic = Vec::new();
+    let (mut logarithmic, mut relative) = (Vec::new(), 0.0);
     match system.system.name {
-        // A short spring turns fast.
+        // A short spring turns fast, and its angle is accelerated a thousand times more than others.
         "spring-pendulum" => {
             bounds.velocities = vec![(-7.0, 7.0), (-10.0, 10.0)];
-            logarithmic = vec![true, false];
+            (logarithmic, relative) = (vec![true, false], 0.1);
         }
         // z = z_0 / cos(tau) from rest: towards the horizon everything falls ever faster.
         "ads2-geodesic" | "ads3-geodesic" | "ads4-geodesic" => {
             bounds.positions[n - 1].0 = 0.4;
             bounds.velocities[n - 1] = (-1.2, 1.2);
-            logarithmic = (1..=n).map(|i| i == n).collect();
+            (logarithmic, relative) = ((1..=n).map(|i| i == n).collect(), 1.0);
         }
         _ => {}
     }
-    (bounds, logarithmic)
+    States { bounds, logarithmic, relative }
 }
 
 fn ours(system: &Configured<f64>, size: Size) -> Config {
-    let (bounds, logarithmic) = training_states(system);
+    let States { bounds, logarithmic, relative } = training_states(system);
     let phase = phase(size.epochs, 5e-3, boxes(&bounds.positions), boxes(&bounds.velocities));
     let base = base(system, 60_000, network(size.width));
     let off_shell = if system.constrained_coordinate().is_some() { OFF_SHELL } else { 0.0 };
-    let relative = match system.system.name {
-        // A short spring's angle is accelerated a thousand times more than others.
-        "spring-pendulum" => 0.1,
-        "ads2-geodesic" | "ads3-geodesic" | "ads4-geodesic" => 1.0,
-        _ => 0.0,
-    };
     Config {
         data: Data { off_shell, relative, ..base.data },
         penalty: regularizer(system, PENALTY),

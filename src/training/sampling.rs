@@ -106,22 +106,19 @@ const SLOWEST: f64 = 0.03;
 /// [`SLOWEST`] and 1, uniform in its logarithm.
 ///
 /// Their residuals weigh `1 / u^2`: an error of the connection counts at every speed alike.
-fn leave_shell(set: &Dataset<f64>, fraction: f64, rng: &mut impl Rng) -> Result<Dataset<f64>, DatasetError> {
-    let n = set.coordinates();
-    let (mut v, mut a) = (set.v().to_vec(), set.a().to_vec());
+fn leave_shell(mut set: Dataset<f64>, fraction: f64, rng: &mut impl Rng) -> Result<Dataset<f64>, DatasetError> {
     let mut weights = Vec::with_capacity(set.len());
-    for (k, (v, a)) in v.chunks_exact_mut(n).zip(a.chunks_exact_mut(n)).enumerate() {
+    for k in 0..set.len() {
         let (chance, depth, reversed) = (rng.random::<f64>(), rng.random::<f64>(), rng.random::<bool>());
-        if chance >= fraction {
-            weights.push(set.weight(k));
-            continue;
+        let mut weight = set.weight(k);
+        if chance < fraction {
+            let u = SLOWEST.powf(depth);
+            set.change_pace(k, if reversed { -u } else { u });
+            weight /= u * u;
         }
-        let u = SLOWEST.powf(depth);
-        v.iter_mut().for_each(|v| *v *= if reversed { -u } else { u });
-        a.iter_mut().for_each(|a| *a *= u * u);
-        weights.push(set.weight(k) / (u * u));
+        weights.push(weight);
     }
-    Dataset::new(n, set.q().to_vec(), v, a)?.with_weights(weights)
+    set.with_weights(weights)
 }
 
 /// All datasets of a run in its precision, with the physical scale of the first phase's training states.
@@ -143,7 +140,7 @@ pub fn sample_all<S: Scalar>(
         let set = if config.data.relative > 0.0 { weigh(set, config.data.relative)? } else { set };
         let off = config.data.off_shell;
         let slowed = off > 0.0 && system.constrained_coordinate().is_some();
-        training.push(if slowed { leave_shell(&set, off, &mut rng)? } else { set });
+        training.push(if slowed { leave_shell(set, off, &mut rng)? } else { set });
     }
     let scale = training[0].physical_scale();
     let data = &config.data;
@@ -237,7 +234,7 @@ mod tests {
         assert_eq!(weigh(still, 2.0).unwrap().weight(0), 1.0);
         // Slowed and reversed states keep them.
         let mut rng = Stream::Test.generator(0);
-        let slowed = leave_shell(&weighed, 1.0, &mut rng).unwrap();
+        let slowed = leave_shell(weighed.clone(), 1.0, &mut rng).unwrap();
         for k in 0..2 {
             let squared = slowed.a()[2 * k] / weighed.a()[2 * k];
             assert!((slowed.weight(k) * squared / weighed.weight(k) - 1.0).abs() < 1e-12 && squared < 1.0);
