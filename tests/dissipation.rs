@@ -341,6 +341,7 @@ fn config(units: Option<usize>, epochs: usize) -> Config {
             training: 1,
             validation: 1,
             off_shell: 0.0,
+            motions: 0.0,
             relative: 0.0,
             test: 1,
             validation_position: bounds(),

@@ -41,7 +41,7 @@ fn every_preset_trains_to_the_same_bits_on_any_number_of_threads() {
 }
 
 #[test]
-fn exact_motions_of_the_ads_test_begin_among_the_training_states() {
+fn exact_motions_of_the_ads_test_stay_among_the_training_states() {
     for name in ["ads2-geodesic", "ads3-geodesic", "ads4-geodesic"] {
         let system = configure::<f64>(name, &[]).unwrap();
         let (n, test) = (system.coordinates, (system.system.trajectory)(system.coordinates));
@@ -50,8 +50,8 @@ fn exact_motions_of_the_ads_test_begin_among_the_training_states() {
         let bounds = StartBox { q: test.start.positions, v: test.start.velocities };
         for (q, mut v) in bounds.starts::<f64>(50, 3) {
             system.impose_constraint(&q, &mut v).unwrap();
-            // The last to leave the box of velocities, from z = 3 on, do so after a proper time of 0.29.
-            let run = rollout(exact.as_ref(), &q, &v, &Options::reference(0.5 * test.t_end, test.dt));
+            // z'' = z + 2 z'^2 / z whatever the other velocities: at most z' = 2.36, from z = 3 and z' = 0.25.
+            let run = rollout(exact.as_ref(), &q, &v, &Options::reference(test.t_end, test.dt));
             assert!(run.stop.is_none());
             for k in 0..run.trajectory.len() {
                 let (q, v) = run.trajectory.state(k);

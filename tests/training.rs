@@ -408,6 +408,7 @@ fn config(epochs: usize) -> Config {
             training: 700,
             validation: 100,
             off_shell: 0.0,
+            motions: 0.0,
             relative: 0.0,
             test: 100,
             validation_position: vec![[-1.0, 1.0]; 2],

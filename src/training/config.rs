@@ -97,6 +97,10 @@ pub struct Data {
     /// cannot be told.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub off_shell: f64,
+    /// Fraction of the training states that lie on exact motions from the starts of the system's trajectory test, at any
+    /// time with equal chance, as long as these stay within the bounds of the phase.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub motions: f64,
     /// With a number `f` above 0 a training state weighs `f m / (f m + |a|)`, `|a|` the mean size of its scaled accelerations
     /// and `m` the mean over all states: errors count relative to accelerations above `f m`, and a few large ones do not
     /// outweigh the others.
@@ -207,6 +211,8 @@ impl Config {
         count(self.data.test, "data.test", STATES)?;
         let off_shell = self.data.off_shell;
         fraction(off_shell, "data.off_shell", (0.0..=1.0).contains(&off_shell), "a number from 0 to 1")?;
+        let motions = self.data.motions;
+        fraction(motions, "data.motions", (0.0..=1.0).contains(&motions), "a number from 0 to 1")?;
         let relative = self.data.relative;
         let ok = relative.is_finite() && relative >= 0.0;
         fraction(relative, "data.relative", ok, "a finite number of at least 0")?;

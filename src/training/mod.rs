@@ -5,6 +5,7 @@ mod config;
 mod dataset;
 mod measured;
 mod memory;
+mod motions;
 mod objective;
 mod optimizer;
 mod penalty;

@@ -21,7 +21,7 @@ pub enum Preset {
 }
 
 /// Bounds in the form of a configuration.
-fn boxes(bounds: &[(f64, f64)]) -> Vec<[f64; 2]> {
+pub(super) fn boxes(bounds: &[(f64, f64)]) -> Vec<[f64; 2]> {
     bounds.iter().map(|&(low, high)| [low, high]).collect()
 }
 
@@ -56,6 +56,7 @@ fn base(system: &Configured<f64>, states: usize, network: Network) -> Config {
             training: states,
             validation: states / 5,
             off_shell: 0.0,
+            motions: 0.0,
             relative: 0.0,
             test: states / 5,
             validation_position: boxes(&validation.positions),
@@ -126,6 +127,7 @@ struct States {
     bounds: Bounds,
     logarithmic: Vec<bool>,
     relative: f64,
+    motions: f64,
 }
 
 /// The paper's box with a single turn of every angle, wider where the motions of the trajectory test soon leave it.
@@ -138,31 +140,36 @@ fn training_states(system: &Configured<f64>) -> States {
             *bound = (0.0, 2.0 * PI);
         }
     }
-    let (mut logarithmic, mut relative) = (Vec::new(), 0.0);
+    let (mut logarithmic, mut relative, mut motions) = (Vec::new(), 0.0, 0.0);
     match system.system.name {
         // A short spring turns fast, and its angle is accelerated a thousand times more than others.
         "spring-pendulum" => {
             bounds.velocities = vec![(-7.0, 7.0), (-10.0, 10.0)];
             (logarithmic, relative) = (vec![true, false], 0.1);
         }
+        // Near the poles the azimuth turns fast, and most great circles of the test are slower than the box.
+        "sphere-geodesic" => {
+            bounds.velocities[1] = (-6.5, 6.5);
+            (relative, motions) = (0.3, 0.5);
+        }
         // z = z_0 / cos(tau) from rest: towards the horizon everything falls ever faster.
         "ads2-geodesic" | "ads3-geodesic" | "ads4-geodesic" => {
             bounds.positions[n - 1].0 = 0.4;
-            bounds.velocities[n - 1] = (-1.2, 1.2);
-            (logarithmic, relative) = ((1..=n).map(|i| i == n).collect(), 1.0);
+            bounds.velocities[n - 1] = (-2.4, 2.4);
+            (logarithmic, relative, motions) = ((1..=n).map(|i| i == n).collect(), 1.0, 0.3);
         }
         _ => {}
     }
-    States { bounds, logarithmic, relative }
+    States { bounds, logarithmic, relative, motions }
 }
 
 fn ours(system: &Configured<f64>, size: Size) -> Config {
-    let States { bounds, logarithmic, relative } = training_states(system);
+    let States { bounds, logarithmic, relative, motions } = training_states(system);
     let phase = phase(size.epochs, 5e-3, boxes(&bounds.positions), boxes(&bounds.velocities));
     let base = base(system, 60_000, network(size.width));
     let off_shell = if system.constrained_coordinate().is_some() { OFF_SHELL } else { 0.0 };
     Config {
-        data: Data { off_shell, relative, ..base.data },
+        data: Data { off_shell, relative, motions, ..base.data },
         penalty: regularizer(system, PENALTY),
         optimizer: Optimizer { weight_decay: size.weight_decay, ..optimizer(Method::Soap) },
         phases: vec![Phase { logarithmic, ..phase }],
@@ -191,6 +198,7 @@ pub(super) fn recorded(
             validation,
             test,
             off_shell: 0.0,
+            motions: 0.0,
             relative: 0.0,
             validation_position,
             validation_velocity,

@@ -4,6 +4,7 @@ use crate::lagrangian::{Configured, SystemError};
 use crate::scalar::Scalar;
 use crate::training::config::{Config, ConfigError};
 use crate::training::dataset::{Dataset, DatasetError};
+use crate::training::motions::along_motions;
 use crate::training::trainer::{Datasets, Stream};
 use rand::Rng;
 use thiserror::Error;
@@ -25,6 +26,14 @@ pub enum SamplingError {
         /// What the system demands.
         demand: &'static str,
     },
+    /// Motions of the trajectory test hardly pass through the box.
+    #[error(
+        "{field}: hardly any motion of the trajectory test stays within these bounds; data.motions asks for such states"
+    )]
+    Motions {
+        /// Which bounds.
+        field: String,
+    },
     /// The accelerations do not fit the precision.
     #[error(transparent)]
     Dataset(#[from] DatasetError),
@@ -44,48 +53,80 @@ pub fn sample(
     states: usize,
     rng: &mut impl Rng,
 ) -> Result<Dataset<f64>, SamplingError> {
-    sample_by(system, field, bounds, &[], states, rng)
+    fill(Drawn::default(), system, field, bounds, &[], states, rng)
 }
 
-/// The same with the [`logarithmic`](crate::training::Phase::logarithmic) coordinates of a phase.
-fn sample_by(
+/// States as they are drawn, with their exact accelerations.
+#[derive(Default)]
+pub(super) struct Drawn {
+    pub q: Vec<f64>,
+    pub v: Vec<f64>,
+    pub a: Vec<f64>,
+}
+
+impl Drawn {
+    /// Takes a state, unless it lies outside the system's domain or has no finite acceleration: then what is demanded.
+    pub fn take(
+        &mut self,
+        system: &Configured<f64>,
+        q: &[f64],
+        v: &[f64],
+    ) -> Result<Option<&'static str>, SamplingError> {
+        let a = system.exact_acceleration(q, v)?;
+        let finite = a.iter().all(|a| a.is_finite());
+        let demand = system.check_domain(q).err().or((!finite).then_some("a finite acceleration"));
+        if demand.is_none() {
+            self.q.extend(q);
+            self.v.extend(v);
+            self.a.extend(a);
+        }
+        Ok(demand)
+    }
+}
+
+/// Coordinates and velocities of a state, uniform within bounds; half of the [`logarithmic`](crate::training::Phase::logarithmic)
+/// coordinates uniform in their logarithm.
+pub(super) fn draw(
+    (position, velocity): (&[[f64; 2]], &[[f64; 2]]),
+    logarithmic: &[bool],
+    rng: &mut impl Rng,
+) -> (Vec<f64>, Vec<f64>) {
+    let mut uniform = |bounds: &[[f64; 2]]| -> Vec<f64> {
+        bounds.iter().map(|&[low, high]| if low < high { rng.random_range(low..high) } else { low }).collect()
+    };
+    let (mut q, v) = (uniform(position), uniform(velocity));
+    for (i, q) in q.iter_mut().enumerate() {
+        if logarithmic.get(i) == Some(&true) && rng.random::<bool>() {
+            let [low, high] = position[i];
+            *q = low * (high / low).powf(rng.random::<f64>());
+        }
+    }
+    (q, v)
+}
+
+/// Draws further states, up to `states`, as [`sample`] does.
+fn fill(
+    mut drawn: Drawn,
     system: &Configured<f64>,
     field: &str,
-    (position, velocity): (&[[f64; 2]], &[[f64; 2]]),
+    bounds: (&[[f64; 2]], &[[f64; 2]]),
     logarithmic: &[bool],
     states: usize,
     rng: &mut impl Rng,
 ) -> Result<Dataset<f64>, SamplingError> {
     let n = system.coordinates;
-    let (mut q, mut v, mut a) = (Vec::new(), Vec::new(), Vec::new());
     let mut refused = 0_usize;
-    while q.len() < states * n {
-        let mut draw = |bounds: &[[f64; 2]]| -> Vec<f64> {
-            bounds.iter().map(|&[low, high]| if low < high { rng.random_range(low..high) } else { low }).collect()
-        };
-        let (mut new_q, mut new_v) = (draw(position), draw(velocity));
-        for (i, q) in new_q.iter_mut().enumerate() {
-            if logarithmic.get(i) == Some(&true) && rng.random::<bool>() {
-                let [low, high] = position[i];
-                *q = low * (high / low).powf(rng.random::<f64>());
-            }
-        }
-        system.impose_constraint(&new_q, &mut new_v)?;
-        let demand = system.check_domain(&new_q).err();
-        let new_a = system.exact_acceleration(&new_q, &new_v)?;
-        if demand.is_some() || new_a.iter().any(|a| !a.is_finite()) {
+    while drawn.q.len() < states * n {
+        let (q, mut v) = draw(bounds, logarithmic, rng);
+        system.impose_constraint(&q, &mut v)?;
+        if let Some(demand) = drawn.take(system, &q, &v)? {
             refused += 1;
-            if refused > 1000 && refused > 9 * (q.len() / n) {
-                let demand = demand.unwrap_or("a finite acceleration");
+            if refused > 1000 && refused > 9 * (drawn.q.len() / n) {
                 return Err(SamplingError::Domain { field: field.to_string(), demand });
             }
-            continue;
         }
-        q.extend(new_q);
-        v.extend(new_v);
-        a.extend(new_a);
     }
-    Ok(Dataset::new(n, q, v, a)?)
+    Ok(Dataset::new(n, drawn.q, drawn.v, drawn.a)?)
 }
 
 /// The states with the weights of [`Data::relative`](crate::training::Data::relative).
@@ -136,7 +177,10 @@ pub fn sample_all<S: Scalar>(
         let field = format!("phase[{k}].position");
         let bounds = (phase.position.as_slice(), phase.velocity.as_slice());
         let mut rng = Stream::Training(k).generator(seed);
-        let set = sample_by(system, &field, bounds, &phase.logarithmic, config.data.training, &mut rng)?;
+        let states = config.data.training;
+        let moving = (config.data.motions * states as f64).round() as usize;
+        let drawn = along_motions(system, &field, bounds, &phase.logarithmic, moving, &mut rng)?;
+        let set = fill(drawn, system, &field, bounds, &phase.logarithmic, states, &mut rng)?;
         let set = if config.data.relative > 0.0 { weigh(set, config.data.relative)? } else { set };
         let off = config.data.off_shell;
         let slowed = off > 0.0 && system.constrained_coordinate().is_some();
@@ -254,6 +298,7 @@ mod tests {
         let system = configure::<f64>("ads2-geodesic", &[]).unwrap();
         let mut config = Preset::Quick.config(&system).unwrap();
         (config.data.training, config.data.validation, config.data.test) = (8000, 10, 10);
+        config.data.motions = 0.0;
         config.phases[0].position = vec![[-5.0, 5.0], [0.25, 64.0]];
         let below_four = |logarithmic: &[bool]| {
             let mut config = config.clone();
