@@ -104,7 +104,8 @@ impl<S: Scalar> Trajectory<S> {
         }
     }
 
-    /// CSV text with the header `t, columns..` and, if stored, `energy`; full digits, one state per line.
+    /// CSV text with the header `t, columns..` and, if stored, `energy`; full digits, one state per line. Where a column is
+    /// itself called `t`, the time of a spacetime, the first is `tau`.
     ///
     /// `columns` are the `2n` names of a state, coordinates then velocities.
     ///
@@ -118,7 +119,8 @@ impl<S: Scalar> Trajectory<S> {
                 problem: format!("expected {} names, found {}", 2 * n, columns.len()),
             });
         }
-        let mut text = String::from("t");
+        let taken = columns.iter().any(|column| column.as_ref() == "t");
+        let mut text = String::from(if taken { "tau" } else { "t" });
         for column in columns {
             text.push(',');
             text.push_str(&quoted(column.as_ref()));
@@ -169,6 +171,7 @@ mod tests {
         assert!(fields[3].is_nan());
         assert_eq!(lines.next(), None);
         assert!(two().to_csv(&["x"]).is_err());
+        assert!(two().to_csv(&["t", "t_dot"]).unwrap().starts_with("tau,t,t_dot,energy\n"));
     }
 
     #[test]
