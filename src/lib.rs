@@ -30,7 +30,7 @@
 //! | judge a model: energy, coordinates, Lyapunov exponents | [`analysis`] |
 //!
 //! Rooms, each importing only from those above it: [`names`], [`storage`], [`scalar`], [`ops`], [`forward`], [`linalg`], [`tape`],
-//! [`recording`], [`lagrangian`], [`network`], [`training`], [`rollout`], [`analysis`], [`experiments`], `report` (feature
+//! [`recording`], [`lagrangian`], [`rollout`], [`network`], [`training`], [`analysis`], [`experiments`], `report` (feature
 //! `plot`), `cli` (feature `cli`, the default; a library user leaves it out by `default-features = false`).
 //!
 //! # Shapes, units, numbers

@@ -98,7 +98,8 @@ pub struct Data {
     #[serde(default, skip_serializing_if = "is_zero")]
     pub off_shell: f64,
     /// Fraction of the training states that lie on exact motions from the starts of the system's trajectory test, at any
-    /// time with equal chance, as long as these stay within the bounds of the phase.
+    /// time with equal chance, as long as these stay within the bounds of the phase. A [`Phase::logarithmic`] coordinate is so
+    /// in half of the starts as well; `off_shell` and `relative` treat these states like all others.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub motions: f64,
     /// With a number `f` above 0 a training state weighs `f m / (f m + |a|)`, `|a|` the mean size of its scaled accelerations

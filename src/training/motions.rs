@@ -13,7 +13,7 @@ const PER_MOTION: f64 = 10.0;
 
 /// Draws `states` states of exact motions from the starts of the system's trajectory test, every sample up to its end with
 /// the same chance; a motion ends where it leaves the bounds. An angle is turned back into its bounds, to any turn that lies
-/// within them.
+/// within them. Starts are drawn as states are, half of the logarithmic coordinates uniform in their logarithm.
 ///
 /// # Errors
 /// [`SamplingError::Motions`] if hardly any motion stays within the bounds for a while.
