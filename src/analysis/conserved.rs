@@ -5,8 +5,7 @@ use crate::rollout::Trajectory;
 use crate::scalar::Scalar;
 
 /// `|C(t) - C(0)| / |C(0)|` (Euclidean norms) of the system's [conserved vector](crate::lagrangian::system::Conserved) along
-/// any trajectory, one value per sample; `None` for a system without one
-/// or a trajectory of another number of coordinates.
+/// any trajectory, one value per sample; `None` for a system without one or a trajectory of another number of coordinates.
 ///
 /// `NaN` where `C(0)` vanishes and so does the difference.
 pub fn conserved_error<S: Scalar>(system: &Configured<S>, trajectory: &Trajectory<S>) -> Option<Vec<f64>> {
