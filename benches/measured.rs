@@ -153,12 +153,22 @@ fn lines(recording: &Recording, scale: Scale) -> Vec<Line> {
     lines
 }
 
+/// Everything once, on little motion.
+pub fn trial() {
+    let scale = Scale { epochs: Some(2), hidden: [8; 3], shooting_epochs: 1 };
+    assert_eq!(lines(&made(), scale).len(), 6);
+    assert_eq!(noise::compare(5, 0..1, scale).len(), 3);
+    let place = tempfile::tempdir().expect("a folder");
+    let found = rows::time(&place.path().join("rows.csv"), 2000);
+    assert_eq!((found.samples, found.cuts.len(), found.warnings.len()), (2000, 0, 0));
+}
+
 fn main() {
     let mut arguments = std::env::args().skip(1);
-    let (mut parts, mut films, mut full) = (PARTS.map(String::from).to_vec(), Vec::new(), false);
+    let (mut parts, mut films) = (PARTS.map(String::from).to_vec(), Vec::new());
     while let Some(argument) = arguments.next() {
         match argument.as_str() {
-            "--bench" => full = true,
+            "--bench" => {}
             "--part" => {
                 let part = arguments.next().filter(|part| PARTS.contains(&part.as_str()));
                 parts = vec![part.unwrap_or_else(|| panic!("--part: expected one of {}", PARTS.join(", ")))];
@@ -167,16 +177,6 @@ fn main() {
         }
     }
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("target/measured");
-    if !full {
-        // A trial run: everything once, on little motion.
-        let scale = Scale { epochs: Some(2), hidden: [8; 3], shooting_epochs: 1 };
-        assert_eq!(lines(&made(), scale).len(), 6);
-        assert_eq!(noise::compare(5, 0..1, scale).len(), 3);
-        let place = tempfile::tempdir().expect("a folder");
-        let found = rows::time(&place.path().join("rows.csv"), 2000);
-        assert_eq!((found.samples, found.cuts.len(), found.warnings.len()), (2000, 0, 0));
-        return;
-    }
     std::fs::create_dir_all(&folder).expect("a folder for the results");
     let scale = Scale { epochs: None, hidden: [128; 3], shooting_epochs: Shooting::default().epochs };
     // First, while the process is small.

@@ -53,7 +53,11 @@ fn slope(points: &[(f64, f64)]) -> f64 {
 fn main() {
     let arguments: Vec<String> = std::env::args().collect();
     let minutes = arguments.iter().position(|a| a == "--minutes").and_then(|k| arguments.get(k + 1)?.parse().ok());
-    let minutes: f64 = minutes.unwrap_or(if arguments.iter().any(|a| a == "--bench") { 30.0 } else { 0.0 });
+    soak(minutes.unwrap_or(30.0));
+}
+
+/// Rounds for so many minutes, and what became of the memory.
+pub fn soak(minutes: f64) {
     let (start, mut said, mut points) = (Instant::now(), Instant::now(), Vec::new());
     while points.len() < 4 || start.elapsed() < Duration::from_secs_f64(60.0 * minutes) {
         round(points.len() as u64);

@@ -5,12 +5,17 @@
 //! Every part writes its raw numbers as CSV, log-log diagrams and what failed or was left out, with the reason;
 //! `report.html` gathers everything. Errors are judged in double-double.
 
-#[path = "../tests/common/mod.rs"]
+#[path = "../tests/suite/common/mod.rs"]
 mod common;
 #[path = "work_precision/mod.rs"]
 mod work_precision;
 
 use std::process::ExitCode;
+
+/// Every part at its smallest.
+pub fn trial() {
+    work_precision::run(&work_precision::Options::smoke()).expect("every part runs");
+}
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();

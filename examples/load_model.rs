@@ -6,12 +6,14 @@ use lnn::lagrangian::{EulerLagrange, Request, Terms};
 use lnn::network::{NetworkLagrangian, file::ModelFile};
 use std::path::Path;
 
-const SHIPPED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/data/double_pendulum.safetensors");
+pub const SHIPPED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/data/double_pendulum.safetensors");
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let path = std::env::args().nth(1).filter(|a| !a.starts_with('-')).unwrap_or(SHIPPED.to_string());
+    show(&std::env::args().nth(1).unwrap_or(SHIPPED.to_string()))
+}
 
-    let ModelFile { header, weights } = ModelFile::<f64>::load(Path::new(&path))?;
+pub fn show(path: &str) -> Result<(), Box<dyn std::error::Error>> {
+    let ModelFile { header, weights } = ModelFile::<f64>::load(Path::new(path))?;
     let (n, columns) = (header.architecture.coordinates, header.columns);
     let (model, mut terms) = (NetworkLagrangian::new(header.architecture, weights)?, Terms::default());
     model.terms(&vec![0.5; n], &vec![0.1; n], Request::MASS_MATRIX | Request::ACCELERATION, &mut terms)?;

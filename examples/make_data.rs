@@ -47,6 +47,15 @@ impl EulerLagrange<f64> for Damped {
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let csv = made()?;
+    if std::env::args().any(|argument| argument == "--write") {
+        return Ok(std::fs::write(FILE, csv)?);
+    }
+    compare(&csv)
+}
+
+/// The recording as CSV.
+pub fn made() -> Result<String, Box<dyn std::error::Error>> {
     let ideal = HandWritten::new(DoublePendulum, vec![1.0, 1.0, 1.0, 1.0, 9.81]);
     let model = Damped { ideal, joints: [0.08, 0.05] };
     let (mut csv, mut rng) = ("run,t,theta1,theta2\n".to_string(), Stream::Training(0).generator(0));
@@ -63,14 +72,16 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             writeln!(csv, "{run},{t:.2},{:.5},{:.5}", noisy(0), noisy(1))?;
         }
     }
-    if std::env::args().any(|argument| argument == "--write") {
-        return Ok(std::fs::write(FILE, csv)?);
-    }
+    Ok(csv)
+}
+
+/// Fails unless the file holds this recording.
+pub fn compare(csv: &str) -> Result<(), Box<dyn std::error::Error>> {
     // Another machine may round another way; a motion of five seconds does not make 1e-4 of it.
     let numbers = |text: &str| -> Result<Vec<f64>, _> {
         text.lines().skip(1).flat_map(|l| l.split(',')).map(str::parse).collect()
     };
-    let (made, found) = (numbers(&csv)?, numbers(&std::fs::read_to_string(FILE)?)?);
+    let (made, found) = (numbers(csv)?, numbers(&std::fs::read_to_string(FILE)?)?);
     assert_eq!((made.len(), csv.len() < 60_000), (found.len(), true));
     assert!(made.iter().zip(&found).all(|(a, b): (&f64, &f64)| (a - b).abs() < 1e-4), "{FILE} is another");
     Ok(())

@@ -6,7 +6,7 @@
 use lnn::lagrangian::{EulerLagrange, HandWritten, Request, Terms, systems::double_pendulum::DoublePendulum};
 use nalgebra::{DMatrix, DMatrixView, SMatrix, SVector};
 
-fn main() -> Result<(), Box<dyn std::error::Error>> {
+pub fn main() -> Result<(), Box<dyn std::error::Error>> {
     let (m1, m2, l1, l2) = (1.2, 0.7, 0.9, 1.1);
     let model = HandWritten::new(DoublePendulum, vec![m1, m2, l1, l2, 9.81]);
     let mut terms = Terms::default();

@@ -32,7 +32,7 @@ impl ODE<f64, [f64; 4]> for Motion<'_> {
     }
 }
 
-fn main() -> Result<(), Box<dyn std::error::Error>> {
+pub fn main() -> Result<(), Box<dyn std::error::Error>> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/data/double_pendulum.safetensors");
     // Weights of a file in single precision, widened: the arithmetic is in double precision.
     let ModelFile { header, weights } = ModelFile::<f64>::load(&path)?;

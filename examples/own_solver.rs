@@ -44,7 +44,7 @@ impl System<f64, SVector<f64, 4>> for Motion<'_> {
     }
 }
 
-fn main() -> Result<(), Box<dyn std::error::Error>> {
+pub fn main() -> Result<(), Box<dyn std::error::Error>> {
     let model = HandWritten::new(CartAndPendulum, vec![1.5, 0.6, 0.9, 9.81]);
     let failure = RefCell::new(None);
     let motion = Motion { model: &model, terms: RefCell::default(), failure: &failure };

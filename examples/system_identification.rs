@@ -73,7 +73,7 @@ fn identify(count: usize, noise: f64) -> Result<f64, Error> {
     Ok(worst)
 }
 
-fn main() -> Result<(), Error> {
+pub fn main() -> Result<(), Error> {
     assert!(identify(2000, 0.0)? < 1e-8 && identify(2000, 0.01)? < 0.01, "not recovered");
     Ok(())
 }

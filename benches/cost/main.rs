@@ -215,9 +215,12 @@ fn ensembles(options: &Options) {
 }
 
 fn main() {
-    let given = |what: &str| std::env::args().any(|argument| argument == what);
-    // `cargo test` runs benchmarks without `--bench`.
-    let options = Options { smoke: given("--smoke") || !given("--bench") };
+    run(std::env::args().any(|argument| argument == "--smoke"));
+}
+
+/// Prints all tables; in seconds and without meaning for `smoke`.
+pub fn run(smoke: bool) {
+    let options = Options { smoke };
     requests(&options);
     coordinates(&options);
     latency::<f32>(&options);

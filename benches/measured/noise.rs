@@ -1,7 +1,7 @@
 //! Fifty made trajectories of a double pendulum, 5 s at 100 Hz, positions with 1 % of noise: what is learned from exact
 //! accelerations, from smoothed ones and through the motion.
 
-use crate::{Scale, learned};
+use super::{Scale, learned};
 use lnn::analysis::acceleration_errors;
 use lnn::lagrangian::{Configured, EulerLagrange, Request, Terms, configure};
 use lnn::recording::{Recording, Targets, Track};

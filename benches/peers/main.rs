@@ -145,7 +145,7 @@ fn answer(line: &str, case: &mut Option<Box<dyn Timed>>) -> Outcome<String> {
 }
 
 /// Every request once, on a small network.
-fn smoke() -> Outcome<()> {
+pub fn smoke() -> Outcome<()> {
     let directory = tempfile::tempdir()?;
     for precision in ["f32", "f64"] {
         let mut case = None;

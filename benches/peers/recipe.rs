@@ -1,6 +1,6 @@
 //! What the paper's training of the double pendulum starts from, for a peer: scaled states, weights, settings.
 
-use crate::{Outcome, write};
+use super::{Outcome, write};
 use lnn::lagrangian::configure;
 use lnn::network::initial_weights;
 use lnn::training::{Dataset, Preset, Stream, sample_all};

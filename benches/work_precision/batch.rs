@@ -1,6 +1,6 @@
 //! Batches of small symmetric matrices, and the errors of what was made of them, judged in double-double.
 
-use crate::common::matrices::{matrices, with_spectrum};
+use super::super::common::matrices::{matrices, with_spectrum};
 use lnn::linalg::{self, Workspace};
 use lnn::scalar::{Dd, Real, Scalar};
 use rand::{Rng, SeedableRng};

@@ -1,7 +1,7 @@
 //! Networks with states and targets, and their Lagrangian and loss as plain functions.
 
-use crate::common::nested::reference;
-use crate::common::{accuracy::cast, of_scalar, solve};
+use super::super::common::nested::reference;
+use super::super::common::{accuracy::cast, of_scalar, solve};
 use lnn::lagrangian::Lagrangian;
 use lnn::network::{Architecture, Initialization, InputLayer, NetworkLagrangian, Nonlinearity, initial_weights};
 use lnn::scalar::{Real, Scalar};

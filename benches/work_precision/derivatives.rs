@@ -1,12 +1,12 @@
 //! Derivative engines on network Lagrangians: `M`, `c`, `a` and the parameter gradient.
 
+use super::super::common::accuracy::cast;
 use super::case::Case;
 use super::differences::Order;
 use super::engines::Bench;
 use super::options::Options;
 use super::output::{Section, Table, curve, level, short};
 use super::timing::Timing;
-use crate::common::accuracy::cast;
 use lnn::lagrangian::{EulerLagrange, Request, Terms};
 use lnn::linalg::{Workspace, condition_number};
 use lnn::scalar::{Dd, Scalar};

@@ -1,10 +1,10 @@
 //! The derivative engines, each measured on one case.
 
+use super::super::common::accuracy::cast;
 use super::case::{Case, OfState, OfWeights};
 use super::differences::{Differences, Displaced, Order};
 use super::options::Options;
 use super::timing::{Stopwatch, Timing};
-use crate::common::accuracy::cast;
 use lnn::lagrangian::{EulerLagrange, HandWritten, Request, Terms};
 use lnn::linalg::Workspace;
 use lnn::scalar::{Dd, Real, Scalar};

@@ -52,19 +52,19 @@ pub struct Options {
 }
 
 impl Options {
-    /// Reads the arguments after the program's name. Without the `--bench` that `cargo bench` adds, as in `cargo test`,
-    /// whatever they are, everything is tried at the smallest scale.
+    /// Everything at the smallest scale.
+    pub fn smoke() -> Self {
+        let out = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("target/work-precision-smoke");
+        Self { scale: Scale::Smoke, parts: Part::ALL.to_vec(), model: None, out }
+    }
+
+    /// Reads the arguments after the program's name.
     ///
     /// # Errors
     /// What is wrong with them, in words.
     pub fn parse(arguments: &[String]) -> Result<Self, String> {
-        let target = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("target");
-        let mut options =
-            Self { scale: Scale::Full, parts: Vec::new(), model: None, out: target.join("work-precision") };
-        if !arguments.iter().any(|argument| argument == "--bench") {
-            let (scale, parts, out) = (Scale::Smoke, Part::ALL.to_vec(), target.join("work-precision-smoke"));
-            return Ok(Self { scale, parts, out, ..options });
-        }
+        let out = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("target/work-precision");
+        let mut options = Self { scale: Scale::Full, parts: Vec::new(), model: None, out };
         let mut arguments = arguments.iter().cloned();
         while let Some(argument) = arguments.next() {
             let mut value = || arguments.next().ok_or_else(|| format!("{argument} needs a value"));

@@ -1,8 +1,8 @@
 //! Motions to integrate: a model in `f64`, the same model in double-double, a start and output times.
 
+use super::super::common::accuracy::{configure, recast};
 use super::learned;
 use super::options::Options;
-use crate::common::accuracy::{configure, recast};
 use lnn::lagrangian::{Configured, EulerLagrange};
 use lnn::scalar::Dd;
 

@@ -18,6 +18,6 @@ pub mod states_csv;
 
 mod accuracy;
 pub mod bytes;
-#[path = "../../tests/common/nested.rs"]
+#[path = "../../tests/suite/common/nested.rs"]
 mod nested;
 mod sealed;

@@ -1,0 +1,29 @@
+//! Every benchmark once, at its smallest, in one program: what `cargo test` runs of them.
+#![allow(dead_code, unused_imports, reason = "the mains of the benchmarks are not called")]
+
+mod linalg;
+mod measured;
+mod network;
+mod soak;
+mod systems;
+mod tape;
+
+#[path = "cost/main.rs"]
+mod cost;
+#[path = "peers/main.rs"]
+mod peers;
+#[path = "work_precision.rs"]
+mod work_precision;
+
+fn main() {
+    // Without `--bench` criterion runs every function once.
+    linalg::linalg_benches();
+    systems::systems_benches();
+    tape::benches();
+    network::benches();
+    cost::run(true);
+    peers::smoke().expect("every request is answered");
+    soak::soak(0.0);
+    measured::trial();
+    work_precision::trial();
+}

@@ -1,0 +1,62 @@
+//! Threads are started only where a number of threads is an argument.
+#![cfg(target_os = "linux")]
+
+use crate::alone;
+use lnn::lagrangian::{EulerLagrange, Request, Terms, build};
+use lnn::network::{NetworkLagrangian, file::ModelFile};
+use lnn::rollout::{Options, rollout, rollout_many};
+use lnn::training::{Dataset, Objective, Penalty};
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+/// Threads of this process.
+fn threads() -> usize {
+    std::fs::read_dir("/proc/self/task").unwrap().count()
+}
+
+#[test]
+fn threads_are_the_callers_choice() {
+    if !alone("threads::threads_are_the_callers_choice") {
+        return;
+    }
+    let before = threads();
+    let file = ModelFile::<f64>::load(
+        &Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/data/double_pendulum.safetensors"),
+    )
+    .unwrap();
+    let architecture = file.header.architecture.clone();
+    let learned = NetworkLagrangian::new(file.header.architecture, file.weights.clone()).unwrap();
+    let written = build::<f64>("double-pendulum", &[]).unwrap();
+    let q: Vec<f64> = (0..400).map(|k| (0.7 * f64::from(k)).sin()).collect();
+    let v: Vec<f64> = (0..400).map(|k| (0.3 * f64::from(k)).cos()).collect();
+    let mut terms = Terms::default();
+    for model in [&learned as &dyn EulerLagrange<f64>, &*written] {
+        model.terms(&q, &v, Request::ALL, &mut terms).unwrap();
+        assert!(rollout(model, &q[..2], &v[..2], &Options::new(0.1, 0.05)).is_complete());
+        let starts = vec![(q[..2].to_vec(), v[..2].to_vec()); 4];
+        assert_eq!(rollout_many(model, &starts, &Options::new(0.1, 0.05), 1).len(), 4);
+    }
+    assert_eq!(threads(), before, "evaluation and roll-outs start no thread");
+
+    let data = Dataset::new(2, q, v, terms.acceleration).unwrap();
+    let rows: Vec<u32> = (0..200).collect();
+    let mut gradients = Vec::new();
+    for count in [1, 3] {
+        let mut objective = Objective::new(&architecture, Penalty::Eigenvalue { lambda: 1.0 }, count).unwrap();
+        let mut gradient = vec![0.0; file.weights.len()];
+        assert!(objective.step(&file.weights, &data, &rows, &mut gradient).loss.is_finite());
+        gradients.push(gradient);
+        let now = threads();
+        assert!(now <= before + count, "{count} threads were asked for, {} started", now - before);
+        assert!(count == 1 || now > before, "the count sees threads");
+        drop(objective);
+        let limit = Instant::now() + Duration::from_secs(20);
+        while threads() > before {
+            assert!(Instant::now() < limit, "threads outlive the objective");
+            std::thread::sleep(Duration::from_millis(2));
+        }
+    }
+    assert!(gradients[0] == gradients[1], "the number of threads changes nothing");
+    // Rayon's global pool can be built once in the life of a process: nobody has done so.
+    rayon::ThreadPoolBuilder::new().num_threads(1).build_global().expect("the global pool belongs to the application");
+}

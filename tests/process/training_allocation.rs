@@ -1,0 +1,52 @@
+//! A training step allocates nothing after the first.
+
+use crate::alone;
+use crate::counting::allocations;
+use lnn::network::{Architecture, Initialization, InputLayer, Layout, Nonlinearity, initial_weights};
+use lnn::training::{Dataset, Method, Moments, Objective, Penalty, Update};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+#[test]
+fn a_training_step_allocates_nothing_after_the_first() {
+    if !alone("training_allocation::a_training_step_allocates_nothing_after_the_first") {
+        return;
+    }
+    allocates_nothing(Nonlinearity::Gelu, InputLayer::None, None);
+    allocates_nothing(Nonlinearity::QuadraticSoftplus, InputLayer::Dyt, Some(16));
+}
+
+fn allocates_nothing(activation: Nonlinearity, input_layer: InputLayer, dissipation: Option<usize>) {
+    let architecture = Architecture {
+        coordinates: 2,
+        hidden: vec![96; 3],
+        activation,
+        alpha: -1.0,
+        scale: vec![2.0; 2],
+        periodic: vec![true; 2],
+        embed_periodic: true,
+        input_layer,
+        dissipation,
+    };
+    let mut rng = ChaCha8Rng::seed_from_u64(1);
+    let mut weights: Vec<f32> = initial_weights(&architecture, Initialization::Default, &mut rng);
+    let mut draw = || (0..2 * 256).map(|_| rng.random_range(-2.0..2.0)).collect();
+    let data = Dataset::new(2, draw(), draw(), draw()).unwrap().with_forces(draw()).unwrap();
+    let rows: Vec<u32> = (0..256).collect();
+    // The negative quadratic term keeps the penalty and its jets active.
+    let mut objective = Objective::new(&architecture, Penalty::Eigenvalue { lambda: 1.0 }, 2).unwrap();
+    let layout = Layout::new(&architecture);
+    for method in [Method::Radam, Method::Soap] {
+        let mut gradient = weights.clone();
+        let mut moments = Moments::for_method(method, weights.len(), layout.matrices());
+        let update = Update { method, rate: 1e-6, weight_decay: 1e-6, clip: 1.0 };
+        let mut step = || {
+            let report = objective.step(&weights, &data, &rows, &mut gradient);
+            assert_eq!(report.penalised, 256);
+            moments.update(&mut weights, &mut gradient, &update);
+        };
+        (0..3).for_each(|_| step());
+        let counted = allocations(|| (0..10).for_each(|_| step()));
+        assert_eq!(counted, 0, "allocations in 10 steps of {} with {activation}", method.name());
+    }
+}

@@ -1,0 +1,4 @@
+//! Derivatives by the tape: eager, and by recorded programs.
+
+mod program;
+mod tape;

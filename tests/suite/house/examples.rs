@@ -1,0 +1,296 @@
+//! Examples: each asserts its own result; those that need arguments or Python are given them.
+
+#[allow(dead_code, reason = "its functions are called")]
+#[path = "../../../examples/load_model.rs"]
+mod load_model;
+#[allow(dead_code, reason = "its functions are called")]
+#[path = "../../../examples/make_data.rs"]
+mod make_data;
+#[path = "../../../examples/nalgebra_matrices.rs"]
+mod nalgebra_matrices;
+#[path = "../../../examples/other_solver.rs"]
+mod other_solver;
+#[path = "../../../examples/own_solver.rs"]
+mod own_solver;
+#[path = "../../../examples/system_identification.rs"]
+mod system_identification;
+
+#[allow(dead_code, reason = "its functions are tested")]
+#[path = "../../../examples/pendulum_video.rs"]
+mod pendulum_video;
+
+use pendulum_video::{convert, fit, read};
+use std::f64::consts::TAU;
+
+#[test]
+fn an_integrator_of_ode_solvers_moves_a_cart_and_a_pendulum() {
+    own_solver::main().unwrap();
+}
+
+#[test]
+fn an_integrator_of_another_crate_moves_a_learned_pendulum() {
+    other_solver::main().unwrap();
+}
+
+#[test]
+fn argmin_identifies_a_system() {
+    system_identification::main().unwrap();
+}
+
+#[test]
+fn a_stored_model_is_loaded() {
+    load_model::show(load_model::SHIPPED).unwrap();
+}
+
+#[test]
+fn nalgebra_takes_the_matrices() {
+    nalgebra_matrices::main().unwrap();
+}
+
+#[test]
+fn the_shipped_recording_is_the_made_one() {
+    make_data::compare(&make_data::made().unwrap()).unwrap();
+}
+
+/// Frames of a film at 400 Hz: arms, place of the pivot, angles over time; markers are found to the pixel.
+fn film(
+    count: usize,
+    arms: [f64; 2],
+    pivot: impl Fn(f64) -> [f64; 2],
+    angles: impl Fn(f64) -> [f64; 2],
+) -> Vec<[f64; 6]> {
+    let frame = |k: usize| {
+        let t = k as f64 / 400.0;
+        let (p, [first, second]) = (pivot(t), angles(t));
+        let elbow = [p[0] + arms[0] * first.sin(), p[1] + arms[0] * first.cos()];
+        let end = [elbow[0] + arms[1] * second.sin(), elbow[1] + arms[1] * second.cos()];
+        [p, elbow, end].as_flattened().iter().map(|x| x.round()).collect::<Vec<_>>().try_into().unwrap()
+    };
+    (0..count).map(frame).collect()
+}
+
+/// Swings, and turns over several times.
+fn motion(t: f64) -> [f64; 2] {
+    [2.0 * (3.1 * t).sin() + 0.4, 2.2 * t + (5.3 * t).sin()]
+}
+
+#[test]
+fn a_film_gives_arms_and_angles() {
+    let arms = [602.0, 461.0];
+    // A pivot that sways by eight pixels once a second.
+    let frames = film(4000, arms, |t| [1200.0 + 8.0 * (TAU * t).sin(), 1220.0], motion);
+    let film = fit(&frames).unwrap();
+    assert!(film.window > 1 && film.window < 40, "averaged over {} frames", film.window);
+    // Rounding to a pixel has a variance of 1/12 in each direction: 1/12 to 1/6 along an arm, by the noise of its ends.
+    for ((length, scatter), arm) in film.arms.iter().zip(arms) {
+        assert!((length - arm).abs() < 0.05 && (0.26..0.45).contains(scatter), "{length} +- {scatter} for {arm}");
+    }
+    // At most half a pixel off in each direction at either end, and what the sway makes of the averaged pivot.
+    for (k, found) in film.angles.iter().enumerate() {
+        for ((found, true_angle), arm) in found.iter().zip(motion(k as f64 / 400.0)).zip(arms) {
+            assert!((found - true_angle).abs() < (2.0_f64.sqrt() + 0.5) / arm, "frame {k}: {found} for {true_angle}");
+        }
+    }
+    assert!(film.angles[3999][1] > 3.0 * TAU, "turns must add up");
+}
+
+#[test]
+fn the_noise_of_a_pivot_at_rest_is_averaged_away() {
+    // Noise of two pixels rms without memory, from the fractional parts of multiples of the golden ratio.
+    let noise = |t: f64, shift: f64| (((400.0 * t).round() * 0.618_033_988_75 + shift).fract() - 0.5) * 48.0_f64.sqrt();
+    let mut frames = film(2000, [300.0, 200.0], |_| [500.0, 500.0], motion);
+    for (k, frame) in frames.iter_mut().enumerate() {
+        let t = k as f64 / 400.0;
+        (frame[0], frame[1]) = (frame[0] + noise(t, 0.1), frame[1] + noise(t, 0.7));
+    }
+    let film = fit(&frames).unwrap();
+    let (length, scatter) = film.arms[0];
+    assert!(film.window > 8 && (length - 300.0).abs() < 0.1 && scatter < 0.4, "{length} +- {scatter}, {}", film.window);
+}
+
+#[test]
+fn films_that_are_none_are_refused_by_row_and_column() {
+    let refusal = |text: &str| read(text).unwrap_err();
+    assert_eq!(refusal("1,2,3,4,5,6\n1,2,x,4,5,6"), "row 2, column 3: expected a finite number, found \"x\"");
+    assert_eq!(refusal("1,2,3,4,5,nan"), "row 1, column 6: expected a finite number, found \"nan\"");
+    assert_eq!(refusal("1,2,3,4,5,6\n\n1,2,3,4,5"), "row 3: expected 6 numbers, found 5");
+    assert_eq!(refusal("1,2,3,4,5,6,7"), "row 1: expected 6 numbers, found 7");
+    assert!(fit(&[]).is_none());
+    let arguments = |list: &[&str]| list.iter().map(|a| a.to_string()).collect::<Vec<_>>();
+    for bad in [&["a"][..], &["a", "b", "--rate", "0"], &["a", "b", "--rate", "x"], &["a", "b", "--rat", "400"]] {
+        assert!(convert(&arguments(bad)).is_err(), "{bad:?}");
+    }
+}
+
+#[test]
+fn a_film_becomes_a_csv_of_angles() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_string();
+    let lines: Vec<String> = film(40, [600.0, 400.0], |_| [0.0, 0.0], motion)
+        .iter()
+        .map(|frame| frame.map(|x| x.to_string()).join(","))
+        .collect();
+    std::fs::write(path("film.csv"), lines.join("\n")).unwrap();
+    let report = convert(&[path("film.csv"), path("angles.csv"), "--rate".into(), "400".into()]).unwrap();
+    assert!(report.starts_with("40 frames, ") && report.contains("arms 600.0"), "{report}");
+    let csv = std::fs::read_to_string(path("angles.csv")).unwrap();
+    let mut rows = csv.lines();
+    assert_eq!(rows.next(), Some("t,theta1,theta2"));
+    let last: Vec<f64> = rows.last().unwrap().split(',').map(|x| x.parse().unwrap()).collect();
+    let [first, second] = motion(39.0 / 400.0);
+    assert!(last[0] == 0.0975 && (last[1] - first).abs() < 0.005 && (last[2] - second).abs() < 0.005, "{last:?}");
+}
+
+/// Films of a real double pendulum, where they lie beside the project.
+#[test]
+fn the_arms_of_a_real_pendulum_are_rigid() {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/ibm-double-pendulum");
+    for name in ["0.csv", "1.csv", "2.csv"] {
+        let Ok(text) = std::fs::read_to_string(folder.join(name)) else {
+            eprintln!("skipped: {} is not there", folder.join(name).display());
+            continue;
+        };
+        let frames = read(&text).unwrap();
+        let film = fit(&frames).unwrap();
+        let [(l1, s1), (l2, s2)] = film.arms;
+        println!("{name}: {} frames, window {}, {l1:.2} +- {s1:.2}, {l2:.2} +- {s2:.2}", frames.len(), film.window);
+        assert!(s1 / l1 < 0.004 && s2 / l2 < 0.004 && (l1 / l2 - 1.307).abs() < 0.003);
+        let steps = film.angles.windows(2).flat_map(|w| [(w[1][0] - w[0][0]).abs(), (w[1][1] - w[0][1]).abs()]);
+        assert!(steps.fold(0.0, f64::max) < 0.5, "an angle jumps");
+    }
+}
+
+#[cfg(feature = "cli")]
+mod python {
+    use crate::common::program::{Folder, lnn};
+    use lnn::network::Layout;
+    use lnn::network::file::{Header, ModelFile};
+    use serde_json::{Value, json};
+    use std::path::{Path, PathBuf};
+    use std::process::{Command, Output};
+
+    const STATES: &str = "theta1_dot,theta1,theta2,theta2_dot\n0.1,0.5,-3,2\n-4,7,1.5,3\n0,0,0,0\n2.5,-20,4,-0.5\n";
+
+    fn at(name: &str) -> PathBuf {
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("examples").join(name)
+    }
+
+    /// A Python with numpy and safetensors: the one that `LNN_PYTHON` names, which must have them, or the system's.
+    fn python() -> Option<PathBuf> {
+        let named = std::env::var_os("LNN_PYTHON").map(PathBuf::from);
+        let program = named.clone().unwrap_or_else(|| "python3".into());
+        match Command::new(&program).args(["-c", "import numpy, safetensors.numpy"]).output() {
+            Ok(output) if output.status.success() => Some(program),
+            outcome => {
+                let why = outcome.map_or_else(|e| e.to_string(), |o| String::from_utf8_lossy(&o.stderr).into_owned());
+                assert!(named.is_none(), "LNN_PYTHON cannot evaluate models: {why}");
+                eprintln!("skipped: {} {why}", program.display());
+                None
+            }
+        }
+    }
+
+    fn run(python: &Path, arguments: &[&str]) -> Output {
+        let folder = at("python");
+        Command::new(python)
+            .args(arguments)
+            .env("PYTHONPATH", folder)
+            .env("PYTHONDONTWRITEBYTECODE", "1")
+            .output()
+            .unwrap()
+    }
+
+    fn lines(output: &Output) -> Vec<Value> {
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        String::from_utf8_lossy(&output.stdout).lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+    }
+
+    fn number(value: &Value) -> f64 {
+        value.as_f64().unwrap()
+    }
+
+    /// Both programs say the same of every state.
+    fn agree(python: &Path, model: &str, states: &str) {
+        let script = at("python/evaluate.py");
+        let theirs = lines(&run(python, &[script.to_str().unwrap(), model, states]));
+        let ours = lnn(&["inspect", "--model", model, "--states", states, "--precision", "f64"]).stdout;
+        let ours: Vec<Value> = ours.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+        assert_eq!((theirs.len(), ours.len()), (4, 4));
+        let all = |name: &str| ours.iter().map(|o| number(&o[name]).abs()).fold(0.0, f64::max);
+        let size = all("lagrangian");
+        for (theirs, ours) in theirs.iter().zip(&ours) {
+            let difference = (number(&theirs["lagrangian"]) - number(&ours["lagrangian"])).abs();
+            // Sums of at most 16 terms, three layers: some hundred roundings.
+            assert!(difference <= 1e-13 * size, "{model}: L differs by {difference:e}");
+            for i in 0..2 {
+                let difference = (number(&theirs["momentum"][i]) - number(&ours["momentum"][i])).abs();
+                // Central differences over 1e-3 of the scale, of order 4.
+                assert!(difference <= 1e-9 * size, "{model}: p differs by {difference:e}");
+            }
+        }
+    }
+
+    #[test]
+    fn python_evaluates_every_kind_of_model() {
+        let Some(python) = python() else { return };
+        let folder = Folder::new();
+        let states = folder.file("states.csv", STATES);
+        agree(&python, at("data/double_pendulum.safetensors").to_str().unwrap(), &states);
+        let shipped = ModelFile::<f64>::load(&at("data/double_pendulum.safetensors")).unwrap();
+        for (k, (activation, input_layer, embed, precision)) in [
+            ("gelu", "dyt", false, "f64"),
+            ("softplus", "none", true, "f32"),
+            ("x-tanh", "none", true, "f64"),
+            ("tanh", "dyt", true, "f32"),
+            ("quadratic", "none", false, "f32"),
+            ("quadratic-softplus", "dyt", true, "f64"),
+        ]
+        .into_iter()
+        .enumerate()
+        {
+            let mut header = serde_json::to_value(&shipped.header).unwrap();
+            header["precision"] = precision.into();
+            let architecture = &mut header["architecture"];
+            architecture["hidden"] = json!([6, 8]);
+            architecture["activation"] = activation.into();
+            architecture["input_layer"] = input_layer.into();
+            architecture["embed_periodic"] = embed.into();
+            architecture["alpha"] = 0.3.into();
+            let header: Header = serde_json::from_value(header).unwrap();
+            let count = Layout::new(&header.architecture).parameters;
+            let weights = (0..count).map(|k| (1.3 * k as f64).sin() / 2.0).collect();
+            let path = folder.path(&format!("{k}.safetensors"));
+            ModelFile::<f64> { header, weights }.save(&path).unwrap();
+            agree(&python, path.to_str().unwrap(), &states);
+        }
+    }
+
+    #[test]
+    fn what_python_saves_is_loaded_unless_a_bit_is_wrong() {
+        let Some(python) = python() else { return };
+        let folder = Folder::new();
+        let states = folder.file("states.csv", STATES);
+        let (given, made) = (at("data/double_pendulum.safetensors"), folder.path("doubled.safetensors"));
+        let [given, made] = [&given, &made].map(|path| path.to_str().unwrap());
+        let double = "import sys, evaluate as e
+header, tensors = e.load(sys.argv[1])
+tensors['layers.2.weight'] *= 2
+header['architecture']['alpha'] *= 2
+e.save(sys.argv[2], header, tensors)";
+        let output = run(&python, &["-c", double, given, made]);
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let look = |model: &str| lnn(&["inspect", "--model", model, "--states", &states, "--precision", "f64"]);
+        let once: Vec<Value> = look(given).objects();
+        for (once, twice) in once.iter().zip(look(made).objects()) {
+            // A power of two commutes with every rounding.
+            assert_eq!(2.0 * number(&once["lagrangian"]), number(&twice["lagrangian"]));
+        }
+        // A changed weight.
+        let mut bytes = std::fs::read(made).unwrap();
+        *bytes.last_mut().unwrap() ^= 1;
+        let broken = folder.file("broken.safetensors", &bytes);
+        look(&broken).refused(1, &["broken.safetensors", "checksum"]);
+        let output = run(&python, &["-c", "import sys, evaluate as e; e.load(sys.argv[1])", &broken]);
+        assert!(!output.status.success() && String::from_utf8_lossy(&output.stderr).contains("the checksum is wrong"));
+    }
+}

@@ -1,0 +1,6 @@
+//! The repository itself: order of rooms, examples, use by other programs, seeds of the fuzz targets.
+
+mod embedding;
+mod examples;
+mod fuzz_seeds;
+mod rooms;

@@ -1,0 +1,14 @@
+//! One program of all tests that may run side by side, a folder per subject; `tests/process` holds those that must own their
+//! process. `cargo test --test suite training::` runs a subject, `cargo test --test suite stress -- --nocapture` prints tables.
+
+mod autodiff;
+mod common;
+mod house;
+mod linalg;
+mod mechanics;
+mod network;
+mod program;
+mod recording;
+mod rollout;
+mod stress;
+mod training;

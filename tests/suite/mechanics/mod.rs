@@ -1,0 +1,5 @@
+//! Euler-Lagrange terms of hand-written systems.
+
+mod random;
+mod relativity;
+mod systems;

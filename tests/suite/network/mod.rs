@@ -1,0 +1,4 @@
+//! Terms of network Lagrangians.
+
+mod derivatives;
+mod dissipation;

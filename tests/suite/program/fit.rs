@@ -1,0 +1,209 @@
+//! `lnn fit` from outside: recorded swings of a pendulum, learned by networks small enough for a test.
+#![cfg(feature = "cli")]
+
+use crate::common::damped::Damped;
+use crate::common::program::{Folder, Run, lnn, text};
+use lnn::lagrangian::{EulerLagrange, Request, Terms};
+use lnn::network::file::ModelFile;
+use lnn::rollout::{Method, Options, rollout};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
+use serde_json::Value;
+use std::fmt::Write as _;
+use std::fs;
+
+/// Names of the coordinates of one pendulum and of two: angles from the downward vertical.
+const ANGLES: [&[&str]; 2] = [&["angle"], &["upper", "lower"]];
+
+/// Swings at 50 Hz as a CSV, columns `run,t`, then positions, velocities and accelerations of every coordinate, the last two
+/// with `_dot` and `_ddot` behind its name; positions with a noise of `sigma`.
+fn swings(model: &dyn EulerLagrange<f64>, runs: usize, seconds: f64, sigma: f64) -> String {
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    let n = model.coordinates();
+    let columns: [String; 3] =
+        ["", "_dot", "_ddot"].map(|end| ANGLES[n - 1].iter().map(|name| format!(",{name}{end}")).collect());
+    let mut csv = format!("run,t{}\n", columns.concat());
+    for run in 0..runs {
+        let mut draw = |size: f64| -> Vec<f64> { (0..n).map(|_| rng.random_range(-size..size)).collect() };
+        let start = [draw(1.5 * n as f64), draw(2.0 * n as f64)];
+        let options = Options { method: Method::Dop853, ..Options::new(seconds, 0.02) };
+        let motion = rollout(model, &start[0], &start[1], &options).complete().unwrap();
+        let mut terms = Terms::default();
+        model.terms(&motion.q, &motion.v, Request::ACCELERATION, &mut terms).unwrap();
+        for (k, t) in motion.t.iter().enumerate() {
+            let row = k * n..(k + 1) * n;
+            let mut line = format!("{run},{t}");
+            for q in &motion.q[row.clone()] {
+                write!(line, ",{}", q + sigma * rng.sample::<f64, _>(StandardNormal)).unwrap();
+            }
+            for x in motion.v[row.clone()].iter().chain(&terms.acceleration[row]) {
+                write!(line, ",{x}").unwrap();
+            }
+            csv += &(line + "\n");
+        }
+    }
+    csv
+}
+
+/// Swings of one pendulum over 3 s.
+fn pendulum(runs: usize, damped: bool, sigma: f64) -> String {
+    let model = Damped::chain(1);
+    swings(if damped { &model } else { model.exact.as_ref() }, runs, 3.0, sigma)
+}
+
+/// What the columns of one pendulum mean.
+const COLUMNS: [&str; 6] = ["--coords", "angle", "--trajectory", "run", "--periodic", "angle"];
+
+/// Learns by a small network.
+fn fit(folder: &Folder, data: &str, out: &str, more: &[&str]) -> Run {
+    let out = text(&folder.path(out));
+    lnn(&[&["fit", data, "--out", &out, "--hidden", "24,24"], &COLUMNS[..], more].concat())
+}
+
+/// What `lnn check` warns of, as notes.
+fn warnings(data: &str, columns: &[&str]) -> Vec<String> {
+    let survey = &lnn(&[&["check", data, "--json"], columns].concat()).stdout;
+    let survey: Value = serde_json::from_str(survey).unwrap();
+    let all = survey["warnings"].as_array().unwrap();
+    all.iter().map(|warning| format!("note: {}", warning.as_str().unwrap())).collect()
+}
+
+/// `summary.json` of a run that succeeded, with nothing but notes on standard error.
+fn summary(folder: &Folder, run: &Run, out: &str) -> Value {
+    assert_eq!(run.code, Some(0), "{}", run.stderr);
+    assert!(run.stderr.lines().all(|line| line.starts_with("note: ")), "{}", run.stderr);
+    serde_json::from_slice(&fs::read(folder.path(out).join("summary.json")).unwrap()).unwrap()
+}
+
+/// Median error at the largest distance in time, of the model and of a straight line.
+fn errors(summary: &Value) -> (f64, f64) {
+    let last = |name: &str| summary[name].as_array().unwrap().last().unwrap()["median"].as_f64().unwrap();
+    (last("model"), last("constant_velocity"))
+}
+
+#[test]
+fn recorded_positions_become_a_model_that_predicts() {
+    let folder = Folder::new();
+    let data = folder.file("swings.csv", pendulum(12, false, 0.0));
+    let run = fit(&folder, &data, "out", &["--epochs", "60"]);
+    let found = summary(&folder, &run, "out");
+    assert_eq!(found["targets"], "smoothed");
+    let (model, straight) = errors(&found);
+    assert!(model < 0.1 * straight, "{model} {straight}");
+    assert_eq!(found["wrong_signature"], 0.0);
+    assert!(run.stdout.contains("learned from smoothed accelerations") && run.stdout.contains("report: "));
+    let mut names: Vec<_> =
+        fs::read_dir(folder.path("out")).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    for name in
+        ["config.toml", "history.csv", "model.safetensors", "prediction_error.png", "report.html", "summary.json"]
+    {
+        assert!(names.iter().any(|n| n == name), "{name} is not in {names:?}");
+    }
+    // The model is one like any other, with the user's own names.
+    let model = text(&folder.path("out/model.safetensors"));
+    let header = ModelFile::<f64>::load(folder.path("out/model.safetensors").as_path()).unwrap().header;
+    assert_eq!(
+        (header.system.as_str(), header.columns),
+        ("measured", vec!["angle".to_string(), "angle_dot".to_string()])
+    );
+    let states = folder.file("states.csv", "angle,angle_dot\n0.5,0.25\n");
+    let terms = &lnn(&["inspect", "--model", &model, "--states", &states]).objects()[0];
+    let a = terms["acceleration"][0].as_f64().unwrap();
+    assert!((a + 9.81 * 0.5_f64.sin()).abs() < 0.5, "{a}");
+    let csv = text(&folder.path("motion.csv"));
+    let motion = lnn(&["rollout", &model, "--state", "0.5,0.25", "--t-end", "1", "--dt", "0.1", "--out", &csv]);
+    assert_eq!((motion.code, motion.stderr.as_str()), (Some(0), ""));
+    lnn(&["evaluate", &model]).refused(1, &["measured"]);
+}
+
+#[test]
+fn the_same_bytes_on_any_number_of_threads() {
+    let folder = Folder::new();
+    // One sample of the noisy angles is off by 10 degrees.
+    let rows = pendulum(6, true, 0.003);
+    let mut rows: Vec<String> = rows.lines().map(String::from).collect();
+    let mut fields: Vec<String> = rows[200].split(',').map(String::from).collect();
+    fields[2] = (fields[2].parse::<f64>().unwrap() + 10f64.to_radians()).to_string();
+    rows[200] = fields.join(",");
+    let data = folder.file("swings.csv", rows.join("\n") + "\n");
+    let mut notes = warnings(&data, &COLUMNS);
+    assert!(notes.iter().any(|note| note.contains("do not look like smooth motion")), "{notes:?}");
+    // Of one coordinate friction and Lagrangian are not told apart.
+    let friction = "note: every motion of one coordinate has a Lagrangian: without known forces (--force) L and the friction \
+                    are not told apart";
+    notes.push(friction.to_string());
+    let more = ["--targets", "motion", "--friction", "4", "--epochs", "3", "--shooting-epochs", "2", "--threads"];
+    let model = |threads: &str| {
+        let run = fit(&folder, &data, threads, &[&more[..], &[threads]].concat());
+        summary(&folder, &run, threads);
+        assert_eq!(run.stderr.lines().collect::<Vec<_>>(), notes);
+        fs::read(folder.path(threads).join("model.safetensors")).unwrap()
+    };
+    let one = model("1");
+    assert!(one == model("2") && one == model("3"));
+    assert!(folder.path("1/shooting.csv").exists());
+}
+
+/// Two coordinates tell friction from the forces of `L`: what it takes is what the motion loses, and accelerations are
+/// learned that no `L` alone gives.
+#[test]
+fn measured_accelerations_and_friction_are_learned() {
+    let folder = Folder::new();
+    let data = folder.file("swings.csv", swings(&Damped::chain(2), 80, 2.0, 0.0));
+    let names = ["--coords", "upper,lower", "--periodic", "upper,lower", "--velocity", "upper_dot,lower_dot"];
+    let more =
+        ["--acceleration", "upper_ddot,lower_ddot", "--trajectory", "run", "--hidden", "32,32", "--epochs", "150"];
+    let learned = |out: &str, friction: &[&str]| {
+        let place = text(&folder.path(out));
+        let run = lnn(&[&["fit", &data, "--out", &place], &names[..], &more, friction].concat());
+        let found = summary(&folder, &run, out);
+        assert_eq!(found["targets"], "measured");
+        let energy = ["change", "friction", "defect"].map(|name| found["energy"][name].as_f64().unwrap());
+        (energy, found["test_loss"].as_f64().unwrap())
+    };
+    let ([change, taken, defect], loss) = learned("without", &[]);
+    // The mean change, and the root mean square of what is not accounted for: all of it.
+    assert!(change < 0.0 && taken == 0.0 && defect >= -change, "{change} {taken} {defect}");
+    let ([change, taken, defect], with) = learned("with", &["--friction"]);
+    assert!(change < 0.0 && defect < -0.5 * change, "{change} {taken} {defect}");
+    assert!(with < 0.6 * loss, "{with} {loss}");
+}
+
+#[test]
+fn what_cannot_be_learned_from_is_named() {
+    let folder = Folder::new();
+    let data = folder.file("swings.csv", pendulum(2, false, 0.0));
+    let refused = |more: &[&str], code, parts: &[&str]| fit(&folder, &data, "out", more).refused(code, parts);
+    refused(&["--targets", "measured"], 2, &["no accelerations were given", "--acceleration"]);
+    refused(&["--timelike", "time"], 2, &["--timelike time", "angle"]);
+    refused(&["--hold-out", "1"], 2, &["--hold-out", "between 0 and 1"]);
+    refused(&["--window", "8"], 1, &["window: expected an odd number"]);
+    refused(&["--noise", "0.1,0.2"], 1, &["noise: expected 1 numbers"]);
+    refused(&["--hidden", "0"], 2, &["--hidden"]);
+    refused(&["--velocity", "angle_dt"], 1, &["angle_dt", "angle_dot"]);
+    let short = folder.file("short.csv", "t,angle\n0,1\n0.1,1.1\n0.2,1.2\n");
+    lnn(&["fit", &short, "--coords", "angle"]).refused(1, &["short.csv"]);
+    assert_eq!(folder.names(), ["short.csv", "swings.csv"]);
+}
+
+#[test]
+fn the_commands_of_the_readme_run() {
+    let folder = Folder::new();
+    let readme = fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/README.md")).unwrap();
+    let commands = readme.lines().filter_map(|line| line.strip_prefix("cargo run --release -- "));
+    let commands: Vec<&str> = commands.filter(|c| c.starts_with("check ") || c.starts_with("fit ")).collect();
+    assert_eq!(commands.len(), 2, "{commands:?}");
+    let out = text(&folder.path("out"));
+    for command in commands {
+        let mut arguments: Vec<&str> = command.split_whitespace().collect();
+        if arguments[0] == "fit" {
+            arguments.extend(["--epochs", "2", "--shooting-epochs", "1", "--out", &out]);
+        }
+        let run = lnn(&arguments);
+        assert_eq!((run.code, run.stderr.as_str()), (Some(0), ""), "{command}");
+        assert!(run.stdout.contains("theta2"), "{}", run.stdout);
+    }
+    assert!(folder.path("out/report.html").exists());
+}

@@ -1,0 +1,281 @@
+//! The program from outside: results, exit codes and the one line that says what is wrong.
+#![cfg(feature = "cli")]
+
+use crate::common::program::{Folder, HEADER, inspect, lnn, model, text};
+use serde_json::Value;
+use std::fs;
+use std::process::{Command, Stdio};
+
+fn numbers(value: &Value) -> Vec<f64> {
+    value.as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect()
+}
+
+#[test]
+fn systems_are_listed() {
+    let run = lnn(&["systems", "--json"]);
+    assert_eq!((run.code, run.stderr.as_str()), (Some(0), ""));
+    let all: Value = serde_json::from_str(&run.stdout).unwrap();
+    let names: Vec<_> = all.as_array().unwrap().iter().map(|s| s["name"].as_str().unwrap()).collect();
+    for name in [
+        "double-pendulum",
+        "triple-pendulum",
+        "n-pendulum",
+        "spring-pendulum",
+        "sphere-geodesic",
+        "constant-force",
+        "harmonic-oscillator",
+        "kepler",
+        "henon-heiles",
+        "charged-particle",
+        "ads2-geodesic",
+        "ads3-geodesic",
+        "ads4-geodesic",
+        "schwarzschild-geodesic",
+    ] {
+        assert!(names.contains(&name), "{name}");
+    }
+    let named = |name: &str| all.as_array().unwrap().iter().find(|s| s["name"] == name).unwrap();
+    let ads = named("ads4-geodesic");
+    assert_eq!((ads["time_like"].as_str(), ads["time_unit"].as_str()), (Some("t"), Some("m")));
+    assert_eq!(ads["units"][4], "m/m");
+    let shell = "t_dot = sqrt(x_dot^2 + y_dot^2 + z_dot^2 + (z/L)^2)";
+    assert_eq!(ads["constraint"], shell);
+    let pendulum = named("double-pendulum");
+    assert!(pendulum["time_like"].is_null() && pendulum["constraint"].is_null() && pendulum["time_unit"] == "s");
+    for system in all.as_array().unwrap() {
+        let n = system["coordinates"].as_array().unwrap().len();
+        for (key, length) in [("columns", 2 * n), ("units", 2 * n), ("periodic", n)] {
+            assert_eq!(system[key].as_array().unwrap().len(), length, "{key} of {}", system["name"]);
+        }
+        for parameter in system["parameters"].as_array().unwrap() {
+            assert!(
+                parameter["symbol"].is_string() && parameter["default"].is_number() && parameter["unit"].is_string()
+            );
+        }
+        assert_eq!(system["bounds"]["validation"]["position"].as_array().unwrap().len(), n);
+    }
+    let table = lnn(&["systems"]).stdout;
+    assert!(names.iter().all(|name| table.contains(name)));
+    assert!(table.contains(shell) && table.contains("time-like"));
+}
+
+#[test]
+fn inspect_prints_every_term() {
+    let folder = Folder::new();
+    // Equal masses and lengths, g = 9.8, both rods level and at rest: M = [[2, 1], [1, 1]], g = -9.8 (2, 1), a = (-9.8, 0).
+    let quarter = std::f64::consts::FRAC_PI_2;
+    let states = folder.file("s.csv", format!("{HEADER}{quarter:?},{quarter:?},0,0\n0,0,1,2\n"));
+    let objects = inspect("double-pendulum", &states, &[]).objects();
+    assert_eq!(objects.len(), 2);
+    let close = |value: &Value, expected: &[f64]| {
+        let found = numbers(value);
+        assert_eq!(found.len(), expected.len());
+        assert!(
+            found.iter().zip(expected).all(|(a, b)| (a - b).abs() <= 1e-14 * b.abs().max(1.0)),
+            "{found:?} {expected:?}"
+        );
+    };
+    let level = &objects[0];
+    close(&level["mass_matrix"][0], &[2.0, 1.0]);
+    close(&level["mass_matrix"][1], &[1.0, 1.0]);
+    close(&level["eigenvalues"], &[(3.0 - 5f64.sqrt()) / 2.0, (3.0 + 5f64.sqrt()) / 2.0]);
+    close(&level["dl_dq"], &[-19.6, -9.8]);
+    close(&level["coriolis"], &[0.0, 0.0]);
+    close(&level["momentum"], &[0.0, 0.0]);
+    close(&level["acceleration"], &[-9.8, 0.0]);
+    let swinging = &objects[1];
+    close(&swinging["momentum"], &[4.0, 3.0]);
+    let (energy, value) = (swinging["energy"].as_f64().unwrap(), swinging["lagrangian"].as_f64().unwrap());
+    // T = p.v/2 = 5, so E + L = 2 T whatever the zero of the potential.
+    assert!((energy + value - 10.0).abs() < 1e-13);
+    let keys: Vec<_> = swinging.as_object().unwrap().keys().collect();
+    assert_eq!(keys.len(), 8);
+
+    let table = inspect("double-pendulum", &states, &["--format", "table"]);
+    assert_eq!(table.code, Some(0));
+    assert!(table.stdout.starts_with("row 2\n") && table.stdout.contains("row 3\n"));
+}
+
+#[test]
+fn inspect_takes_columns_in_any_order_and_parameters_in_any_form() {
+    let folder = Folder::new();
+    let straight = folder.file("a.csv", format!("{HEADER}0.1,0.2,0.3,0.4\n"));
+    let turned = folder.file("b.csv", "\u{feff}theta2_dot, theta1 ,theta1_dot,theta2\r\n0.4,0.1,0.3,0.2\r\n");
+    let together = inspect("double-pendulum", &straight, &["--param", "m1=2", "l2=0.5"]).objects();
+    let apart = inspect("double-pendulum", &turned, &["--param", "m1=2", "--param", "l2=0.5"]).objects();
+    assert_eq!(together, apart);
+    assert_ne!(together, inspect("double-pendulum", &straight, &[]).objects());
+
+    let chain = folder.file("c.csv", "theta1,theta1_dot,theta2,theta2_dot,theta3,theta3_dot\n1,2,3,4,5,6\n");
+    let three = inspect("n-pendulum", &chain, &["--param", "n=3"]).objects();
+    assert_eq!(numbers(&three[0]["acceleration"]).len(), 3);
+}
+
+#[test]
+fn precision_is_that_of_the_run() {
+    let folder = Folder::new();
+    let states = folder.file("s.csv", format!("{HEADER}0.1,0.2,0.3,0.4\n"));
+    let energy = |precision: &str| {
+        let run = inspect("double-pendulum", &states, &["--precision", precision]);
+        assert_eq!(run.code, Some(0), "{}", run.stderr);
+        let digits = run.stdout.rsplit("\"energy\":").next().unwrap().trim_end().trim_end_matches('}').to_string();
+        (serde_json::from_str::<f64>(&digits).unwrap(), digits)
+    };
+    let (single, _) = energy("f32");
+    let (double, _) = energy("f64");
+    let (judge, digits) = energy("dd");
+    assert!((single - judge).abs() < 1e-5 * judge.abs() && single != judge);
+    assert!((double - judge).abs() < 1e-14 * judge.abs());
+    assert!(digits.chars().filter(char::is_ascii_digit).count() > 28, "{digits}");
+}
+
+#[test]
+fn a_singular_mass_matrix_leaves_the_other_rows_right() {
+    let folder = Folder::new();
+    let states = folder.file("s.csv", "theta,phi,theta_dot,phi_dot\n1,2,3,4\n0,0,1,1\n1.5,2,3,4\n");
+    let run = inspect("sphere-geodesic", &states, &[]);
+    assert_eq!(run.code, Some(1));
+    assert_eq!(run.stderr.lines().count(), 1);
+    assert!(run.stderr.contains("row 3: the mass matrix is singular (condition number inf)"), "{}", run.stderr);
+    let objects: Vec<Value> = run.stdout.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    assert_eq!(objects.len(), 3);
+    assert!(objects[1]["acceleration"].is_null() && objects[1]["error"].is_string());
+    assert!(objects[1]["mass_matrix"].is_array());
+    for k in [0, 2] {
+        assert!(objects[k]["error"].is_null());
+        assert_eq!(numbers(&objects[k]["acceleration"]).len(), 2);
+    }
+}
+
+#[test]
+fn a_model_is_inspected_like_a_system() {
+    let folder = Folder::new();
+    let path = folder.path("model.safetensors");
+    model().save(&path).unwrap();
+    let states = folder.file("s.csv", format!("{HEADER}0.1,0.2,3,4\n{:?},0.2,3,4\n", 0.1 + std::f64::consts::TAU));
+    let run = |precision| lnn(&["inspect", "--model", &text(&path), "--states", &states, "--precision", precision]);
+    let (single, double, judge) = (run("f32").objects(), run("f64").objects(), run("dd").objects());
+    for key in ["momentum", "dl_dq", "eigenvalues", "coriolis", "acceleration"] {
+        for (k, exact) in numbers(&judge[0][key]).into_iter().enumerate() {
+            let size = exact.abs().max(1.0);
+            assert!((numbers(&double[0][key])[k] - exact).abs() < 1e-12 * size, "{key}");
+            assert!((numbers(&single[0][key])[k] - exact).abs() < 1e-3 * size, "{key}");
+            // A turn further the network sees the same angle.
+            assert!((numbers(&double[1][key])[k] - exact).abs() < 1e-11 * size, "{key}");
+        }
+    }
+}
+
+#[test]
+fn files_that_are_no_models_are_data_errors() {
+    let folder = Folder::new();
+    let states = folder.file("s.csv", format!("{HEADER}1,2,3,4\n"));
+    let refused = |path: &str, parts: &[&str]| {
+        lnn(&["inspect", "--model", path, "--states", &states]).refused(1, &[&[path], parts].concat());
+    };
+    refused(&text(&folder.path("missing.safetensors")), &["no such file"]);
+    refused(&text(folder.0.path()), &["expected a regular file, found a directory"]);
+    refused(&states, &["not a whole safetensors file"]);
+    let bytes = model().to_bytes().unwrap();
+    refused(&folder.file("cut", &bytes[..bytes.len() - 5]), &["not a whole safetensors file"]);
+    let mut flipped = bytes.clone();
+    *flipped.last_mut().unwrap() ^= 4;
+    refused(&folder.file("flipped", flipped), &["damaged: checksum"]);
+    let empty = br#"{"w":{"dtype":"F32","shape":[0],"data_offsets":[0,0]}}"#;
+    let foreign = [&(empty.len() as u64).to_le_bytes()[..], empty].concat();
+    refused(&folder.file("foreign", foreign), &["not of an lnn model"]);
+
+    let path = folder.file("model", bytes);
+    let both = ["inspect", "--model", &path, "--states", &states, "--system", "double-pendulum"];
+    lnn(&both).refused(2, &["--system", "--model"]);
+    lnn(&["inspect", "--model", &path, "--states", &states, "--param", "m1=1"]).refused(2, &["--param", "--model"]);
+    lnn(&["inspect", "--states", &states]).refused(2, &["--system"]);
+}
+
+#[test]
+fn wrong_arguments_are_usage_errors() {
+    let folder = Folder::new();
+    let states = folder.file("s.csv", format!("{HEADER}1,2,3,4\n"));
+    inspect("duoble-pendulum", &states, &[]).refused(2, &["duoble-pendulum", "double-pendulum"]);
+    inspect("double-pendulum", &states, &["--param", "m3=1"]).refused(2, &["m3", "m1"]);
+    inspect("double-pendulum", &states, &["--param", "m1=nan"]).refused(2, &["m1", "nan"]);
+    inspect("double-pendulum", &states, &["--param", "m1=-1"]).refused(2, &["m1", "-1"]);
+    inspect("double-pendulum", &states, &["--param", "m1=1", "m1=2"]).refused(2, &["m1"]);
+    inspect("double-pendulum", &states, &["--param", "m1"]).refused(2, &["--param", "SYMBOL=VALUE"]);
+    inspect("n-pendulum", &states, &["--param", "n=0"]).refused(2, &["n-pendulum", "0"]);
+    inspect("double-pendulum", &states, &["--precision", "f16"]).refused(2, &["f16", "f64"]);
+    inspect("double-pendulum", &states, &["--frmat", "json"]).refused(2, &["--frmat", "--format"]);
+    lnn(&["inspect", "--system", "double-pendulum"]).refused(2, &["--states"]);
+    lnn(&["sistems"]).refused(2, &["sistems", "systems"]);
+    let nothing = lnn(&[]);
+    assert_eq!(nothing.code, Some(2));
+    assert!(nothing.stderr.contains("Usage"));
+    let version = lnn(&["--version"]);
+    assert_eq!((version.code, version.stdout), (Some(0), format!("lnn {}\n", env!("CARGO_PKG_VERSION"))));
+    let help = lnn(&["inspect", "--help"]);
+    assert_eq!((help.code, help.stderr.as_str()), (Some(0), ""));
+}
+
+#[test]
+fn bad_states_are_data_errors() {
+    let folder = Folder::new();
+    let refused = |content: &[u8], parts: &[&str]| {
+        let states = folder.file("s.csv", content);
+        inspect("double-pendulum", &states, &[]).refused(1, &[&["s.csv: "], parts].concat());
+    };
+    let with = |row: &str| format!("{HEADER}1,2,3,4\n{row}\n").into_bytes();
+    refused(&with("nan,2,3,4"), &["row 3, column theta1: expected a finite number, found \"nan\""]);
+    refused(&with("1,2,1e999,4"), &["row 3, column theta1_dot", "1e999"]);
+    refused(&with("1,,3,4"), &["row 3, column theta2", "found \"\""]);
+    refused(&with("1,2,3"), &["row 3: expected 4 fields, found 3"]);
+    refused(b"theta1,theta2,theta1_dot\n1,2,3\n", &["missing column theta2_dot"]);
+    refused(b"theta1,theta2,theta1_dot,theta2_dot,t\n1,2,3,4,5\n", &["unknown column \"t\""]);
+    refused(b"theta1,theta2,theta1_dot,theta1\n1,2,3,4\n", &["theta1 stands there twice"]);
+    refused(b"theta1;theta2;theta1_dot;theta2_dot\n1;2;3;4\n", &["expected commas"]);
+    refused(b"1,2,3,4\n", &["unknown column \"1\""]);
+    refused(HEADER.as_bytes(), &["no states"]);
+    refused(b"", &["empty"]);
+    refused(b"\xff\xfe\x00", &["row 1: not UTF-8"]);
+
+    inspect("double-pendulum", &text(&folder.path("missing.csv")), &[]).refused(1, &["missing.csv: no such file"]);
+    inspect("double-pendulum", &text(folder.0.path()), &[]).refused(1, &["found a directory"]);
+}
+
+#[cfg(unix)]
+#[test]
+fn devices_closed_pipes_and_full_disks_end_quietly_or_with_a_line() {
+    let folder = Folder::new();
+    inspect("double-pendulum", "/dev/zero", &[]).refused(1, &["/dev/zero: expected a regular file"]);
+
+    let rows = "0.1,0.2,0.3,0.4\n".repeat(20_000);
+    let states = folder.file("many.csv", format!("{HEADER}{rows}"));
+    let arguments = ["inspect", "--system", "double-pendulum", "--states", &states];
+    let mut child = Command::new(env!("CARGO_BIN_EXE_lnn"))
+        .args(arguments)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop(child.stdout.take());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!((output.status.code(), output.stderr.len()), (Some(0), 0));
+
+    if let Ok(full) = fs::OpenOptions::new().write(true).open("/dev/full") {
+        let output = Command::new(env!("CARGO_BIN_EXE_lnn")).arg("systems").stdout(full).output().unwrap();
+        assert_eq!(output.status.code(), Some(1));
+        assert!(String::from_utf8_lossy(&output.stderr).starts_with("error: standard output: "));
+    }
+}
+
+#[test]
+fn the_log_goes_to_standard_error_and_its_filter_is_checked() {
+    let run = |filter: &str| {
+        Command::new(env!("CARGO_BIN_EXE_lnn")).args(["systems", "--json"]).env("LNN_LOG", filter).output().unwrap()
+    };
+    let loud = run("trace");
+    assert_eq!(loud.status.code(), Some(0));
+    assert!(serde_json::from_slice::<Value>(&loud.stdout).is_ok());
+    let wrong = run("lnn=nonsense");
+    assert_eq!(wrong.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&wrong.stderr).starts_with("error: LNN_LOG: "));
+}

@@ -1,0 +1,11 @@
+//! The program `lnn` from outside.
+
+mod check;
+mod dissipation;
+mod experiment;
+mod fit;
+mod hostile;
+mod inspect;
+mod pipes;
+mod resume;
+mod train;

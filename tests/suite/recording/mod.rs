@@ -1,0 +1,3 @@
+//! Recorded motion.
+
+mod smoothing;

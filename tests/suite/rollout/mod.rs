@@ -1,0 +1,3 @@
+//! Integrators.
+
+mod integrators;

@@ -1,0 +1,9 @@
+//! Losses, penalties, optimisers, checkpoints.
+
+mod checkpoints;
+mod faults;
+mod faulty;
+mod objective;
+mod penalties;
+mod presets;
+mod shooting;
