@@ -59,12 +59,33 @@ pub(super) fn evaluate<L: Lagrangian, R: Real>(
     if !need.second_order() {
         return first_order(system, parameters, q, v, need, out);
     }
+    // Conditions that the compiler decides: code for other numbers of coordinates is not generated.
     match q.len() {
-        1 => jets::<L, R, 1, 2>(system, parameters, q, v, need, out),
-        2 => jets::<L, R, 2, 4>(system, parameters, q, v, need, out),
-        3 => jets::<L, R, 3, 6>(system, parameters, q, v, need, out),
-        4 => jets::<L, R, 4, 8>(system, parameters, q, v, need, out),
-        _ => directions(system, parameters, q, v, need, out),
+        1 if const { may_be::<L>(1) } => jets::<L, R, 1, 2>(system, parameters, q, v, need, out),
+        2 if const { may_be::<L>(2) } => jets::<L, R, 2, 4>(system, parameters, q, v, need, out),
+        3 if const { may_be::<L>(3) } => jets::<L, R, 3, 6>(system, parameters, q, v, need, out),
+        4 if const { may_be::<L>(4) } => jets::<L, R, 4, 8>(system, parameters, q, v, need, out),
+        _ => {
+            if const { may_be_large::<L>() } {
+                directions(system, parameters, q, v, need, out);
+            }
+        }
+    }
+}
+
+/// Whether a Lagrangian can have `n` coordinates.
+const fn may_be<L: Lagrangian>(n: usize) -> bool {
+    match L::COORDINATES {
+        Some(declared) => declared == n,
+        None => true,
+    }
+}
+
+/// Whether a Lagrangian can have more coordinates than jets serve.
+const fn may_be_large<L: Lagrangian>() -> bool {
+    match L::COORDINATES {
+        Some(declared) => declared > 4,
+        None => true,
     }
 }
 

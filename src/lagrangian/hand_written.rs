@@ -4,7 +4,7 @@ use super::derivatives::{Need, State, evaluate};
 use super::{EulerLagrange, Lagrangian, MechanicsError, Request, Terms};
 use crate::linalg::Workspace;
 use crate::scalar::{Real, Scalar};
-use crate::tape::{Program, Replay, Tracer};
+use crate::tape::{Program, Replay, TapeError, Tracer};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 /// Batches from this size on are replayed from a recorded program; a chunk of lanes is not worth it below.
@@ -20,7 +20,64 @@ const REPLAY_COORDINATES: usize = 8;
 #[derive(Debug)]
 pub struct HandWritten<L, S> {
     system: L,
+    evaluator: Evaluator<S>,
+}
+
+/// What is compiled for every Lagrangian apart: its terms state by state, and the recording of its value.
+trait Form<S>: Send + Sync {
+    fn coordinates(&self) -> usize;
+    /// Fills the needed fields of a batch, which have their sizes.
+    fn states(&self, parameters: &[S], q: &[S], v: &[S], need: Need, terms: &mut Terms<S>);
+    /// The program whose one output is the value.
+    fn value(&self, parameters: usize) -> Result<Program<S>, TapeError>;
+}
+
+impl<L: Lagrangian, S: Scalar> Form<S> for L {
+    fn coordinates(&self) -> usize {
+        Lagrangian::coordinates(self)
+    }
+    fn states(&self, parameters: &[S], q: &[S], v: &[S], need: Need, terms: &mut Terms<S>) {
+        let n = Lagrangian::coordinates(self).max(1);
+        for (row, (q, v)) in q.chunks_exact(n).zip(v.chunks_exact(n)).enumerate() {
+            let part = |needed: bool, width: usize| if needed { row * width..(row + 1) * width } else { 0..0 };
+            let mut state = State {
+                lagrangian: &mut terms.lagrangian[part(need.lagrangian, 1)],
+                momentum: &mut terms.momentum[part(need.momentum, n)],
+                dl_dq: &mut terms.dl_dq[part(need.dl_dq, n)],
+                mass_matrix: &mut terms.mass_matrix[part(need.mass_matrix, n * n)],
+                coriolis: &mut terms.coriolis[part(need.coriolis, n)],
+            };
+            evaluate(self, parameters, q, v, need, &mut state);
+        }
+    }
+    fn value(&self, parameters: usize) -> Result<Program<S>, TapeError> {
+        let n = Lagrangian::coordinates(self);
+        Program::record(2 * n, parameters, |_, x, p| vec![self.lagrangian(p, &x[..n], &x[n..])])
+    }
+}
+
+/// A recorded Lagrangian: its one output is the value.
+#[derive(Debug)]
+struct Recorded<S> {
+    value: Program<S>,
+}
+
+impl<S: Scalar> Lagrangian for Recorded<S> {
+    fn coordinates(&self) -> usize {
+        self.value.inputs() / 2
+    }
+    fn lagrangian<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> R {
+        let outputs = self.value.interpret(&[q, v].concat(), parameters);
+        outputs.map_or_else(|_| R::constant(Scalar::NAN), |outputs| outputs[0])
+    }
+}
+
+/// Parameters, recorded programs and buffers: everything that does not depend on the type of the Lagrangian.
+#[derive(Debug)]
+struct Evaluator<S> {
     parameters: Vec<S>,
+    /// The program of the value, recorded on first use.
+    value: OnceLock<Option<Recorded<S>>>,
     /// One program per combination of needed terms.
     programs: [OnceLock<Option<Arc<Program<S>>>>; 32],
     /// Buffers not in use; as many as there were callers at a time.
@@ -36,19 +93,29 @@ struct Scratch<S> {
 impl<L: Lagrangian, S: Scalar> HandWritten<L, S> {
     /// A Lagrangian with parameter values in the order it takes them.
     pub fn new(system: L, parameters: Vec<S>) -> Self {
-        Self { system, parameters, programs: [const { OnceLock::new() }; 32], pool: Mutex::new(Vec::new()) }
+        let evaluator = Evaluator {
+            parameters,
+            value: OnceLock::new(),
+            programs: [const { OnceLock::new() }; 32],
+            pool: Mutex::new(Vec::new()),
+        };
+        Self { system, evaluator }
     }
     /// The values of the parameters.
     pub fn parameters(&self) -> &[S] {
-        &self.parameters
+        &self.evaluator.parameters
     }
+}
 
+impl<S: Scalar> Evaluator<S> {
     /// The program that computes what is needed, recorded on first use.
-    fn program(&self, need: Need) -> Option<Arc<Program<S>>> {
+    fn program(&self, form: &dyn Form<S>, need: Need) -> Option<Arc<Program<S>>> {
+        let count = self.parameters.len();
+        let value = self.value.get_or_init(|| form.value(count).ok().map(|value| Recorded { value })).as_ref()?;
         let recorded = self.programs[need.index()].get_or_init(|| {
-            let n = self.system.coordinates();
-            let record = Program::record(2 * n, self.parameters.len(), |_, inputs, parameters| {
-                record(&self.system, parameters, &inputs[..n], &inputs[n..], need)
+            let n = Lagrangian::coordinates(value);
+            let record = Program::record(2 * n, count, |_, inputs, parameters| {
+                record(value, parameters, &inputs[..n], &inputs[n..], need)
             });
             record.ok().map(Arc::new)
         });
@@ -56,8 +123,15 @@ impl<L: Lagrangian, S: Scalar> HandWritten<L, S> {
     }
 
     /// Fills the needed fields of a batch by replaying a program; whether that was possible.
-    fn replay(&self, n: usize, q: &[S], v: &[S], need: Need, terms: &mut Terms<S>, scratch: &mut Scratch<S>) -> bool {
-        let Some(program) = self.program(need) else { return false };
+    fn replay(
+        &self,
+        form: &dyn Form<S>,
+        (q, v): (&[S], &[S]),
+        need: Need,
+        terms: &mut Terms<S>,
+        scratch: &mut Scratch<S>,
+    ) -> bool {
+        let Some(program) = self.program(form, need) else { return false };
         let (index, replays) = (need.index(), &mut scratch.replays);
         let at = replays.iter().position(|(i, _)| *i == index).unwrap_or_else(|| {
             replays.push((index, Replay::new(program)));
@@ -66,18 +140,19 @@ impl<L: Lagrangian, S: Scalar> HandWritten<L, S> {
         // The order of the recording; what is not needed is empty.
         let Terms { lagrangian, momentum, dl_dq, mass_matrix, coriolis, .. } = terms;
         let outputs: &mut [&mut [S]] = &mut [lagrangian, momentum, dl_dq, mass_matrix, coriolis];
-        replays[at].1.evaluate(q.len() / n, &[q, v], &self.parameters, outputs).is_ok()
+        replays[at].1.evaluate(q.len() / form.coordinates(), &[q, v], &self.parameters, outputs).is_ok()
     }
 
     fn compute(
         &self,
+        form: &dyn Form<S>,
         q: &[S],
         v: &[S],
         request: Request,
         terms: &mut Terms<S>,
         scratch: &mut Scratch<S>,
     ) -> Result<(), MechanicsError> {
-        let n = self.system.coordinates();
+        let n = form.coordinates();
         let batch = q.len() / n.max(1);
         let shape = |what, found| MechanicsError::Shape { what, expected: batch * n, found };
         if q.len() != batch * n {
@@ -98,26 +173,31 @@ impl<L: Lagrangian, S: Scalar> HandWritten<L, S> {
         terms.mass_matrix.resize(size(need.mass_matrix, n * n), S::NAN);
         terms.coriolis.resize(size(need.coriolis, n), S::NAN);
         let by_program = batch >= REPLAY_FROM && n <= REPLAY_COORDINATES;
-        if !(by_program && self.replay(n, q, v, need, terms, scratch)) {
-            for (row, (q, v)) in q.chunks_exact(n.max(1)).zip(v.chunks_exact(n.max(1))).enumerate() {
-                let part = |needed: bool, width: usize| if needed { row * width..(row + 1) * width } else { 0..0 };
-                let mut state = State {
-                    lagrangian: &mut terms.lagrangian[part(need.lagrangian, 1)],
-                    momentum: &mut terms.momentum[part(need.momentum, n)],
-                    dl_dq: &mut terms.dl_dq[part(need.dl_dq, n)],
-                    mass_matrix: &mut terms.mass_matrix[part(need.mass_matrix, n * n)],
-                    coriolis: &mut terms.coriolis[part(need.coriolis, n)],
-                };
-                evaluate(&self.system, &self.parameters, q, v, need, &mut state);
-            }
+        if !(by_program && self.replay(form, (q, v), need, terms, scratch)) {
+            form.states(&self.parameters, q, v, need, terms);
         }
         terms.complete(n, v, request, &mut scratch.workspace)
+    }
+
+    fn terms(
+        &self,
+        form: &dyn Form<S>,
+        q: &[S],
+        v: &[S],
+        request: Request,
+        terms: &mut Terms<S>,
+    ) -> Result<(), MechanicsError> {
+        let pooled = || self.pool.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut scratch = pooled().pop().unwrap_or_default();
+        let outcome = self.compute(form, q, v, request, terms, &mut scratch);
+        pooled().push(scratch);
+        outcome
     }
 }
 
 /// The needed terms of one state, one after the other.
-fn record<'t, L: Lagrangian, S: Scalar>(
-    system: &L,
+fn record<'t, S: Scalar>(
+    system: &Recorded<S>,
     parameters: &[Tracer<'t, S>],
     q: &[Tracer<'t, S>],
     v: &[Tracer<'t, S>],
@@ -139,14 +219,10 @@ fn record<'t, L: Lagrangian, S: Scalar>(
 
 impl<L: Lagrangian, S: Scalar> EulerLagrange<S> for HandWritten<L, S> {
     fn coordinates(&self) -> usize {
-        self.system.coordinates()
+        Lagrangian::coordinates(&self.system)
     }
 
     fn terms(&self, q: &[S], v: &[S], request: Request, terms: &mut Terms<S>) -> Result<(), MechanicsError> {
-        let pooled = || self.pool.lock().unwrap_or_else(PoisonError::into_inner);
-        let mut scratch = pooled().pop().unwrap_or_default();
-        let outcome = self.compute(q, v, request, terms, &mut scratch);
-        pooled().push(scratch);
-        outcome
+        self.evaluator.terms(&self.system, q, v, request, terms)
     }
 }

@@ -22,6 +22,10 @@ use crate::scalar::Real;
 /// The same code then gives values, first and second derivatives with respect to `q`, `v` and the parameters
 /// (masses, lengths, ...), in every precision, for one state or a recorded batch.
 pub trait Lagrangian: Send + Sync {
+    /// The number that [`Lagrangian::coordinates`] returns, where it is known when the code is compiled: derivatives of single
+    /// states are then compiled for this number alone.
+    const COORDINATES: Option<usize> = None;
+
     /// Number of coordinates `n`.
     fn coordinates(&self) -> usize;
 

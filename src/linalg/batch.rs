@@ -25,7 +25,7 @@ pub struct Workspace<S> {
 
 /// Numbers on the boundary of a cache line, as the widest vector instructions like them.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Buffer<S> {
+pub(crate) struct Buffer<S> {
     numbers: Vec<S>,
 }
 

@@ -20,6 +20,7 @@ mod minors;
 mod solve;
 mod systems;
 
+pub(crate) use batch::Buffer;
 pub use batch::{LANES, Workspace};
 pub use condition::condition_number;
 pub use eigh::{eigenvalues, eigh};

@@ -56,6 +56,8 @@ fn gamma_to_minus_two<R: Real>(c: R, v: &[R]) -> R {
 }
 
 impl Lagrangian for ChargedParticle {
+    const COORDINATES: Option<usize> = Some(3);
+
     fn coordinates(&self) -> usize {
         3
     }

@@ -30,6 +30,8 @@ pub const SYSTEM: System = System {
 };
 
 impl Lagrangian for ConstantForce {
+    const COORDINATES: Option<usize> = Some(1);
+
     fn coordinates(&self) -> usize {
         1
     }

@@ -43,6 +43,8 @@ pub const SYSTEM: System = System {
 };
 
 impl Lagrangian for DoublePendulum {
+    const COORDINATES: Option<usize> = Some(2);
+
     fn coordinates(&self) -> usize {
         2
     }

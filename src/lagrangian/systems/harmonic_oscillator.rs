@@ -31,6 +31,8 @@ pub const SYSTEM: System = System {
 };
 
 impl Lagrangian for HarmonicOscillator {
+    const COORDINATES: Option<usize> = Some(1);
+
     fn coordinates(&self) -> usize {
         1
     }

@@ -31,6 +31,8 @@ pub const SYSTEM: System = System {
 };
 
 impl Lagrangian for HenonHeiles {
+    const COORDINATES: Option<usize> = Some(2);
+
     fn coordinates(&self) -> usize {
         2
     }

@@ -34,6 +34,8 @@ pub const SYSTEM: System = System {
 };
 
 impl Lagrangian for Kepler {
+    const COORDINATES: Option<usize> = Some(2);
+
     fn coordinates(&self) -> usize {
         2
     }

@@ -79,6 +79,8 @@ fn redshift<R: Real>(mass: R, r: R) -> R {
 }
 
 impl Lagrangian for SchwarzschildGeodesic {
+    const COORDINATES: Option<usize> = Some(4);
+
     fn coordinates(&self) -> usize {
         4
     }

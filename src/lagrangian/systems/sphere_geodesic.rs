@@ -60,6 +60,8 @@ pub const SYSTEM: System = System {
 };
 
 impl Lagrangian for SphereGeodesic {
+    const COORDINATES: Option<usize> = Some(2);
+
     fn coordinates(&self) -> usize {
         2
     }

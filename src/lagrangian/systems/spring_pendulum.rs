@@ -46,6 +46,8 @@ pub const SYSTEM: System = System {
 };
 
 impl Lagrangian for SpringPendulum {
+    const COORDINATES: Option<usize> = Some(2);
+
     fn coordinates(&self) -> usize {
         2
     }

@@ -51,6 +51,8 @@ fn loads<R: Real>(parameters: &[R]) -> Option<([R; 3], [R; 3], R)> {
 }
 
 impl Lagrangian for TriplePendulum {
+    const COORDINATES: Option<usize> = Some(3);
+
     fn coordinates(&self) -> usize {
         3
     }

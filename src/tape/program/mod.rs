@@ -8,6 +8,7 @@
 mod backward;
 mod elementary;
 mod forward;
+mod interpret;
 mod recorder;
 mod replay;
 mod tracer;

@@ -3,24 +3,31 @@
 use super::backward::{INPUTS, PARAMETERS, Sweep};
 use super::forward::{Environment, forward};
 use super::{LANES, Node, Program, Row};
+use crate::linalg::Buffer;
 use crate::scalar::{Real, Scalar};
 use crate::tape::block::Scratch;
 use crate::tape::error::{TapeError, check_length};
 use std::sync::Arc;
 
 /// Buffers for replaying a [`Program`]; they grow to the largest batch seen and are reused after that, so repeated
-/// replays of a size allocate nothing.
-#[derive(Clone, Debug)]
+/// replays of a size allocate nothing. A clone starts afresh.
+#[derive(Debug)]
 pub struct Replay<S> {
     program: Arc<Program<S>>,
     lanes: Option<usize>,
-    uniform: Vec<Row<S>>,
+    uniform: Buffer<S>,
     /// Values of the lane rows, chunk after chunk.
-    values: Vec<Row<S>>,
-    adjoints: Vec<Row<S>>,
-    uniform_adjoints: Vec<Row<S>>,
+    values: Buffer<S>,
+    adjoints: Buffer<S>,
+    uniform_adjoints: Buffer<S>,
     parameters: Vec<S>,
     scratch: Scratch<S>,
+}
+
+impl<S: Scalar> Clone for Replay<S> {
+    fn clone(&self) -> Self {
+        Self::new(Arc::clone(&self.program))
+    }
 }
 
 impl<S: Scalar> Replay<S> {
@@ -29,10 +36,10 @@ impl<S: Scalar> Replay<S> {
         let zero = <S as Real>::zero();
         Self {
             lanes: None,
-            uniform: vec![[zero; LANES]; program.uniform_rows],
-            values: Vec::new(),
-            adjoints: vec![[zero; LANES]; program.lane_rows],
-            uniform_adjoints: vec![[zero; LANES]; program.uniform_rows],
+            uniform: Buffer::default(),
+            values: Buffer::default(),
+            adjoints: Buffer::default(),
+            uniform_adjoints: Buffer::default(),
             parameters: vec![zero; program.parameters],
             scratch: Scratch::new(program.scratch),
             program,
@@ -98,18 +105,19 @@ impl<S: Scalar> Replay<S> {
         check_length("parameters", program.parameters, parameters.len())?;
         let rows = program.lane_rows;
         let chunks = if keep { lanes.div_ceil(LANES) } else { 1 };
-        self.values.resize(self.values.len().max(chunks * rows), [<S as Real>::zero(); LANES]);
+        let all: &mut [Row<S>] = self.values.lanes(chunks * rows);
+        let uniform: &mut [Row<S>] = self.uniform.lanes(program.uniform_rows);
         self.parameters.copy_from_slice(parameters);
         let environment = Environment { uniform: &[], inputs: &[], lanes, start: 0, parameters };
-        forward(&program.uniform, &environment, &mut self.uniform, &mut self.scratch);
+        forward(&program.uniform, &environment, uniform, &mut self.scratch);
         for (chunk, start) in (0..lanes).step_by(LANES).enumerate() {
-            let environment = Environment { uniform: &self.uniform, inputs, lanes, start, parameters };
+            let environment = Environment { uniform, inputs, lanes, start, parameters };
             let first = if keep { chunk * rows } else { 0 };
-            let values = &mut self.values[first..first + rows];
+            let values = &mut all[first..first + rows];
             forward(&program.lanes, &environment, values, &mut self.scratch);
             let mut next = program.outputs.iter().map(|&row| {
                 let row = row as usize;
-                if row < program.uniform_rows { &self.uniform[row] } else { &values[row - program.uniform_rows] }
+                if row < program.uniform_rows { &uniform[row] } else { &values[row - program.uniform_rows] }
             });
             for field in outputs.iter_mut() {
                 let width = field.len() / lanes;
@@ -175,17 +183,21 @@ impl<S: Scalar> Replay<S> {
         };
         let zero = <S as Real>::zero();
         let (rows, base, width) = (program.lane_rows, program.uniform_rows, program.outputs.len());
-        self.uniform_adjoints.fill([zero; LANES]);
+        let uniform: &[Row<S>] = self.uniform.lanes(base);
+        let values: &[Row<S>] = self.values.lanes(lanes.div_ceil(LANES) * rows);
+        let adjoints: &mut [Row<S>] = self.adjoints.lanes(rows);
+        let uniform_adjoints: &mut [Row<S>] = self.uniform_adjoints.lanes(base);
+        uniform_adjoints.fill([zero; LANES]);
         parameter_adjoints.fill(zero);
         if let Some(target) = &mut by_input {
             target.fill(zero);
         }
         for (chunk, start) in (0..lanes).step_by(LANES).enumerate() {
             let count = LANES.min(lanes - start);
-            self.adjoints.fill([zero; LANES]);
+            adjoints.fill([zero; LANES]);
             for (column, &row) in program.outputs.iter().enumerate() {
                 let row = row as usize;
-                let target = if row < base { &mut self.uniform_adjoints[row] } else { &mut self.adjoints[row - base] };
+                let target = if row < base { &mut uniform_adjoints[row] } else { &mut adjoints[row - base] };
                 for (lane, value) in target[..count].iter_mut().enumerate() {
                     *value += output_adjoints[(start + lane) * width + column];
                 }
@@ -193,10 +205,10 @@ impl<S: Scalar> Replay<S> {
             let mut sweep = Sweep {
                 reach: &program.reach,
                 wanted,
-                uniform: &self.uniform,
-                rows: &self.values[chunk * rows..(chunk + 1) * rows],
-                uniform_adjoints: &mut self.uniform_adjoints,
-                adjoints: &mut self.adjoints,
+                uniform,
+                rows: &values[chunk * rows..(chunk + 1) * rows],
+                uniform_adjoints,
+                adjoints,
                 parameters: &self.parameters,
                 parameter_adjoints,
                 scratch: &mut self.scratch,
@@ -205,7 +217,7 @@ impl<S: Scalar> Replay<S> {
             let Some(target) = &mut by_input else { continue };
             for instruction in &program.lanes {
                 if let Node::Input(index) = instruction.node {
-                    let source = &self.adjoints[instruction.out as usize - base];
+                    let source = &adjoints[instruction.out as usize - base];
                     for (lane, &value) in source[..count].iter().enumerate() {
                         target[(start + lane) * program.inputs + index as usize] = value;
                     }
@@ -216,7 +228,7 @@ impl<S: Scalar> Replay<S> {
             return Ok(());
         }
         // Uniform rows: sum over the lanes once, then sweep once.
-        for row in &mut self.uniform_adjoints {
+        for row in uniform_adjoints.iter_mut() {
             let sum = pairwise(row);
             row.fill(zero);
             row[0] = sum;
@@ -225,9 +237,9 @@ impl<S: Scalar> Replay<S> {
             reach: &program.reach,
             wanted,
             uniform: &[],
-            rows: &self.uniform,
+            rows: uniform,
             uniform_adjoints: &mut [],
-            adjoints: &mut self.uniform_adjoints,
+            adjoints: uniform_adjoints,
             parameters: &self.parameters,
             parameter_adjoints: &mut [],
             scratch: &mut self.scratch,
@@ -235,7 +247,7 @@ impl<S: Scalar> Replay<S> {
         sweep.run(&program.uniform);
         for instruction in &program.uniform {
             if let Node::Parameter(index) = instruction.node {
-                parameter_adjoints[index as usize] += self.uniform_adjoints[instruction.out as usize][0];
+                parameter_adjoints[index as usize] += uniform_adjoints[instruction.out as usize][0];
             }
         }
         Ok(())

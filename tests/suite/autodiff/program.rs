@@ -318,3 +318,34 @@ fn fields_give_what_rows_give() {
     let ragged = replay.evaluate(lanes, &[&rows], &p, &mut [&mut a, &mut b[1..]]);
     assert_eq!(ragged, Err(TapeError::Shape { what: "outputs of a state", expected: 3, found: 2 }));
 }
+
+/// Everything the table has, of two inputs and a parameter.
+fn assorted<R: Real>(x: &[R], p: &[R]) -> [R; 2] {
+    let (sin, cos) = (x[0] * p[0]).sin_cos();
+    let root = (x[1].sqr() + R::one()).sqrt();
+    [sin * root.ln() + x[1].atan2(cos), (x[0] - x[1]).select(cos.powi(3), root.exp()) / p[0]]
+}
+
+#[test]
+fn an_interpreted_program_is_the_recorded_function_of_any_number() {
+    let program = Program::<f64>::record(2, 1, |_, x, p| assorted(x, p).to_vec()).unwrap();
+    let (x, p) = ([0.3, -0.8], [1.7]);
+    assert_eq!(program.interpret(&x, &p).unwrap(), assorted(&x, &p));
+    let seeded = [HyperDual::new(0.3, 1.0, 0.5, 0.0), HyperDual::new(-0.8, 0.0, 2.0, 1.0)];
+    let (found, expected) =
+        (program.interpret(&seeded, &[HyperDual::lift(1.7)]), assorted(&seeded, &[HyperDual::lift(1.7)]));
+    for (a, b) in found.unwrap().into_iter().zip(expected) {
+        close(&[a.value, a.s, a.t, a.st], &[b.value, b.s, b.t, b.st], 4e-16);
+    }
+    // Recorded again it is the same program.
+    let again = Program::<f64>::record(2, 1, |_, x, p| program.interpret(x, p).unwrap()).unwrap();
+    assert_eq!(again.lane_operations(), program.lane_operations());
+    assert_eq!(again.interpret(&x, &p).unwrap(), assorted(&x, &p));
+    let wrong = program.interpret(&x[..1], &p).unwrap_err();
+    assert_eq!(wrong, TapeError::Shape { what: "inputs", expected: 2, found: 1 });
+    let blocks = Program::<f64>::record(2, 6, |recorder, x, _| {
+        let block = recorder.pack(x, 1);
+        vec![recorder.affine(block, 1, 2, None).get(0, 0)]
+    });
+    assert!(matches!(blocks.unwrap().interpret(&x, &[0.0; 6]), Err(TapeError::Block { .. })));
+}
