@@ -143,18 +143,23 @@ pub mod linalg;
 
 pub mod tape;
 
+#[cfg(feature = "data")]
 pub mod recording;
 
 pub mod lagrangian;
 
 pub mod network;
 
+#[cfg(feature = "training")]
 pub mod training;
 
+#[cfg(feature = "rollout")]
 pub mod rollout;
 
+#[cfg(feature = "training")]
 pub mod analysis;
 
+#[cfg(feature = "training")]
 pub mod experiments;
 
 #[cfg(feature = "plot")]

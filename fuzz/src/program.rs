@@ -17,7 +17,7 @@ const VARIABLES: usize = 4;
 const INPUTS: usize = 2;
 /// Operations at most.
 const LENGTH: usize = 24;
-/// Most roundings per operation that an answer may be off; see `tests/linalg.rs` for the number.
+/// Most roundings per operation that an answer may be off; see `tests/suite/linalg.rs` for the number.
 const R: f64 = 30.0;
 /// Relative perturbation of the judge: larger than the roundings of `f64` add up to, so that a kink or a pole within
 /// their reach is within its own.

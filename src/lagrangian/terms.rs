@@ -1,7 +1,7 @@
 //! Euler-Lagrange terms of a batch of states: what may be asked for, where it is stored, how the rest follows.
 
 use crate::scalar::Scalar;
-use std::ops::{BitOr, Range};
+use std::ops::BitOr;
 
 /// Which terms a caller needs; nothing else is computed.
 ///
@@ -70,7 +70,8 @@ pub struct Terms<S> {
 
 impl<S: Scalar> Terms<S> {
     /// Takes over what `request` asks for of the rows `rows` of a batch of `n` coordinates; the rest is emptied.
-    pub(crate) fn copy_rows(&mut self, batch: &Self, n: usize, rows: Range<usize>, request: Request) {
+    #[cfg(feature = "rollout")]
+    pub(crate) fn copy_rows(&mut self, batch: &Self, n: usize, rows: std::ops::Range<usize>, request: Request) {
         let copy = |to: &mut Vec<S>, from: &[S], width: usize, what: Request| {
             to.clear();
             // A model without friction has no forces to copy.

@@ -10,6 +10,7 @@ mod config;
 mod depth;
 mod dissipation;
 mod features;
+#[cfg(feature = "model-files")]
 pub mod file;
 mod init;
 mod layout;

@@ -452,7 +452,7 @@ fn friction_is_learned_beside_the_lagrangian() {
 /// What a longer training separates, chains of one to three pendula: the error of accelerations with and without friction,
 /// of the mass matrix and of the dissipated power.
 ///
-/// `cargo test --test dissipation -- --ignored --nocapture separation` prints the table, in minutes.
+/// `cargo test --test suite dissipation -- --ignored --nocapture separation` prints the table, in minutes.
 #[test]
 #[ignore = "prints a table, in minutes"]
 fn separation() {

@@ -20,7 +20,7 @@
 //! | batch 0, -1; rate NaN, negative, 0; dt 0; t infinite | `configurations_are_placed`, `numbers_of_the_command_line_have_ranges`, `cli_train::wrong_trainings_are_refused_before_anything_is_written` |
 //! | configuration: typo, duplicate, wrong type | `configurations_are_placed`, `cli::config::tests` |
 //! | disk full, I/O errors, short and interrupted writes | `faults`: every operation fails once, and for good; `cli_resume::full_disks_and_lost_directories_are_named`; `cli::devices_closed_pipes_and_full_disks_end_quietly_or_with_a_line` for standard output |
-//! | kill -9 at any moment | `kills::twenty_kills` (200 by `cargo test --test kills -- --ignored`), `faults::a_checkpoint_is_the_old_one_or_the_new_one` |
+//! | kill -9 at any moment | `kills::twenty_kills` (200 by `cargo test --test process kills -- --ignored`), `faults::a_checkpoint_is_the_old_one_or_the_new_one` |
 //! | read-only directory, directory as target, no parent | `targets_that_cannot_be_written_are_named`, `cli_train::directories_that_cannot_be_written_are_named_before_training` |
 //! | Ctrl-C, once and twice | `cli_train::ctrl_c_keeps_the_best_model`, `cli_resume::a_second_ctrl_c_ends_at_once` |
 //! | reader of a pipe gone | `pipes` |

@@ -1,7 +1,7 @@
 //! Structure-preserving integrators: order, reversibility, invariants, energy over long times, and how they fail.
 //!
 //! The ignored tests print tables and take minutes:
-//! `cargo test --test integrators -- --ignored --nocapture --test-threads 1`
+//! `cargo test --test suite integrators -- --ignored --nocapture --test-threads 1`
 
 use lnn::lagrangian::systems::double_pendulum::DoublePendulum;
 use lnn::lagrangian::systems::spring_pendulum::SpringPendulum;

@@ -1,4 +1,4 @@
-//! Cases 33 to 35: order, tolerance and long runs of the integrators, as far as `tests/integrators.rs` leaves them.
+//! Cases 33 to 35: order, tolerance and long runs of the integrators, as far as `tests/suite/rollout/integrators.rs` leaves them.
 
 use super::record::{LIMIT, Row};
 use lnn::lagrangian::{EulerLagrange, configure};
