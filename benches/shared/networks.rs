@@ -13,6 +13,7 @@ pub fn architecture(n: usize, width: usize, alpha: f64) -> Architecture {
         hidden: vec![width; 3],
         activation: Nonlinearity::Gelu,
         alpha,
+        time_like: None,
         scale: vec![SCALE; n],
         periodic: vec![false; n],
         embed_periodic: false,

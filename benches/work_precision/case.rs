@@ -32,6 +32,7 @@ impl Case {
             hidden: vec![width; 3],
             activation: Nonlinearity::Gelu,
             alpha: 1.0,
+            time_like: None,
             scale: vec![REACH; n],
             periodic: vec![false; n],
             embed_periodic: false,

@@ -24,6 +24,7 @@ fn architecture(bytes: &mut Bytes<'_>) -> Architecture {
         hidden: (0..layers).map(|_| (1 + bytes.below(5)) * activation.branches().len()).collect(),
         activation,
         alpha: bytes.small(),
+        time_like: None,
         scale: (0..coordinates).map(|_| (1 + bytes.below(32)) as f64 / 8.0).collect(),
         periodic: (0..coordinates).map(|_| bytes.flag()).collect(),
         embed_periodic: bytes.flag(),

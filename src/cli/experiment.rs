@@ -31,6 +31,9 @@ pub struct Args {
     /// Seeds of every run.
     #[arg(long, value_name = "N", default_value = "1", allow_hyphen_values = true, value_parser = count)]
     seeds: usize,
+    /// Only the runs whose row of the table begins with this text; a later command without it goes on from there.
+    #[arg(long, value_name = "TEXT")]
+    only: Option<String>,
     /// Threads; as many runs go side by side, and the results do not depend on them [default: all].
     #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = count)]
     threads: Option<usize>,
@@ -72,11 +75,32 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         if name == "all" { experiments().iter().collect() } else { vec![find(name).map_err(CliError::usage)?] };
     let curves = args.beside.iter().map(curve).collect::<Result<Vec<Curve>, CliError>>()?;
     let hooks = Hooks { watcher: None, interrupt: interrupt::flag()? };
-    for experiment in chosen {
+    for (experiment, runs) in chosen_runs(args, &chosen, scale)? {
         let path = args.out.join(format!("{}-{}", experiment.name, scale.name()));
-        perform(experiment, scale, args.seeds, threads(args.threads), &path, (&curves, &hooks))?;
+        perform((experiment, scale), runs, threads(args.threads), &path, (&curves, &hooks))?;
     }
     Ok(())
+}
+
+/// The experiments with those of their runs that were asked for, if there are any.
+fn chosen_runs<'a>(
+    args: &Args,
+    chosen: &[&'a Experiment],
+    scale: Scale,
+) -> Result<Vec<(&'a Experiment, Vec<Run>)>, CliError> {
+    let all = || chosen.iter().map(|experiment| (*experiment, experiment.runs(scale, args.seeds)));
+    let Some(text) = &args.only else { return Ok(all().collect()) };
+    let of = |(experiment, runs): (&'a Experiment, Vec<Run>)| {
+        (experiment, runs.into_iter().filter(|run| run.label.starts_with(text)).collect::<Vec<Run>>())
+    };
+    let kept: Vec<_> = all().map(of).filter(|(_, runs)| !runs.is_empty()).collect();
+    if kept.is_empty() {
+        let mut rows: Vec<String> = all().flat_map(|(_, runs)| runs).map(|run| format!("`{}`", run.label)).collect();
+        rows.dedup();
+        let rows = rows.join(", ");
+        return Err(CliError::usage(format_args!("--only {text:?}: no row begins so; there are {rows}")));
+    }
+    Ok(kept)
 }
 
 /// `label=file`.
@@ -107,16 +131,14 @@ fn listing() -> String {
 }
 
 fn perform(
-    experiment: &Experiment,
-    scale: Scale,
-    seeds: usize,
+    (experiment, scale): (&Experiment, Scale),
+    runs: Vec<Run>,
     threads: usize,
     path: &Path,
     (beside, hooks): (&[Curve], &Hooks),
 ) -> Result<(), CliError> {
     let started = Instant::now();
     let folder = Folder::open(path)?;
-    let runs = experiment.runs(scale, seeds);
     let bar = Bar::new(runs.len() as u64, "runs");
     let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
     let results: Mutex<BTreeMap<usize, Result<Option<Record>, CliError>>> = Mutex::new(BTreeMap::new());

@@ -95,7 +95,9 @@ impl Job<'_> {
         let config = self.config(&measured.config(&args.name, &data));
         config.validate(names.len()).map_err(CliError::usage)?;
         let periodic = self.reading.recording.periodic.clone();
+        let time_like = config.network.time_like_index(names.iter().map(String::as_str)).map_err(CliError::usage)?;
         let architecture = config.architecture_with(periodic, data.training[0].physical_scale());
+        let architecture = Architecture { time_like, ..architecture };
         architecture.validate().map_err(CliError::usage)?;
         memory::require("training", training_memory(&config, &architecture))?;
         let penalty = config.penalty.penalty(names.iter().map(String::as_str)).map_err(CliError::usage)?;
@@ -179,6 +181,7 @@ impl Job<'_> {
         config.precision = (*precision).into();
         config.network.hidden.clone_from(hidden);
         config.network.dissipation = *friction;
+        config.network.time_like.clone_from(timelike);
         if let Some(time) = timelike {
             config.penalty = Regularizer::LorentzianSylvester { lambda: config.penalty.lambda(), time: time.clone() };
         }

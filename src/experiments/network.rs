@@ -116,12 +116,24 @@ pub(super) const QUADRATIC_TERM: Experiment = Experiment {
             let with = if alpha == 0.0 { "without |v|^2" } else { "with |v|^2" };
             run(with, &format!("{activation} {with}"), config)
         };
-        [Nonlinearity::Gelu, Nonlinearity::XTanh, Nonlinearity::Softplus]
+        let pendulum = [Nonlinearity::Gelu, Nonlinearity::XTanh, Nonlinearity::Softplus]
             .into_iter()
-            .flat_map(|activation| [1.0, 0.0].map(|alpha| model(activation, alpha)))
-            .collect()
+            .flat_map(|activation| [1.0, 0.0].map(|alpha| model(activation, alpha)));
+        pendulum.chain(spacetime()).collect()
     },
 };
+
+/// Preset quick of anti-de Sitter space with the term in the signature of spacetime, with all squares added, and without.
+fn spacetime() -> [Run; 3] {
+    [("AdS4 with -t'^2 + x'^2 + y'^2 + z'^2", true, 1.0), ("AdS4 with |v|^2", false, 1.0), ("AdS4 without", true, 0.0)]
+        .map(|(label, signed, alpha)| {
+            let system = configure("ads4-geodesic", &[]).unwrap_or_else(|e| unreachable!("{e}"));
+            let mut config = Preset::Quick.config(&system).unwrap_or_else(|| unreachable!("a system of the catalogue"));
+            config.network.alpha = alpha;
+            config.network.time_like = config.network.time_like.filter(|_| signed);
+            run(label, label, config)
+        })
+}
 
 /// Activations of the paper with both initialisations.
 fn activation_run(label: &str, activation: Nonlinearity, initialization: Initialization) -> Run {
@@ -231,7 +243,8 @@ pub(super) const OLD_TRICKS: Experiment = Experiment {
         };
         let ours = Config { penalty: Regularizer::Eigenvalue { lambda: 100.0 }, ..trained_on(baseline(), EXTENDED) };
         vec![
-            old("Cranmer initialisation", Nonlinearity::Softplus, Initialization::Cranmer, 0.0),
+            old("Cranmer initialisation, as in the paper", Nonlinearity::Softplus, Initialization::CranmerPaper, 0.0),
+            old("Cranmer initialisation, as in his code", Nonlinearity::Softplus, Initialization::Cranmer, 0.0),
             old("Liu tricks", Nonlinearity::QuadraticSoftplus, Initialization::Default, 1.0),
             run("paper's model", "paper's model", ours),
         ]

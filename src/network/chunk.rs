@@ -107,12 +107,19 @@ impl<S: Scalar> Chunk<S> {
         }
     }
 
-    /// `L = alpha |v/s|^2 + sum over branches of w.h`.
+    /// `L = alpha |v/s|^2 + sum over branches of w.h`, the square of a time-like coordinate taken away.
     fn finish_value(&mut self, weights: &[S]) {
         let n = self.architecture.coordinates;
         let alpha = S::of_f64(self.architecture.alpha);
         self.lagrangian.clear();
-        self.lagrangian.extend(self.features.velocity.chunks_exact(n).map(|v| alpha * dot(v, v)));
+        let time_like = self.architecture.time_like;
+        self.lagrangian.extend(self.features.velocity.chunks_exact(n).map(|v| {
+            let square = match time_like {
+                Some(t) => dot(&v[..t], &v[..t]) + dot(&v[t + 1..], &v[t + 1..]) - v[t] * v[t],
+                None => dot(v, v),
+            };
+            alpha * square
+        }));
         for (branch, planes) in self.layout.branches.iter().zip(&self.branches) {
             planes.add_value(branch, weights, &self.phi, &mut self.lagrangian);
         }
@@ -154,7 +161,7 @@ impl<S: Scalar> Chunk<S> {
     /// Pulls the adjoint of the features back to `p` and `g`; adds the terms of `alpha |v/s|^2`.
     fn finish_gradient(&mut self, has_mass: bool) {
         let (n, width) = (self.architecture.coordinates, self.layout.features);
-        let twice_alpha = S::of_f64(2.0 * self.architecture.alpha);
+        let twice = |i: usize| S::of_f64(2.0 * self.architecture.quadratic_factor(i));
         resize(&mut self.momentum, self.batch * n);
         resize(&mut self.dl_dq, self.batch * n);
         for state in 0..self.batch {
@@ -162,12 +169,10 @@ impl<S: Scalar> Chunk<S> {
             let (dq, dv) = (&mut self.dl_dq[range.clone()], &mut self.momentum[range.clone()]);
             let adjoint = &self.phi_adjoint[state * width..(state + 1) * width];
             self.features.pull_back(&self.architecture, state, adjoint, dq, dv);
-            for (p, &v) in dv.iter_mut().zip(&self.features.velocity[range]) {
-                *p += twice_alpha * v;
-            }
-            if has_mass {
-                for i in 0..n {
-                    self.mass_matrix[(state * n + i) * n + i] += twice_alpha;
+            for (i, (p, &v)) in dv.iter_mut().zip(&self.features.velocity[range]).enumerate() {
+                *p += twice(i) * v;
+                if has_mass {
+                    self.mass_matrix[(state * n + i) * n + i] += twice(i);
                 }
             }
         }

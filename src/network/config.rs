@@ -11,8 +11,12 @@ pub enum Initialization {
     Default,
     /// Normal, `gain/sqrt(fan_in)` with `gain = 1/sqrt(E[act'(Z)^2])`, `Z` standard normal; zero biases.
     VariancePreserving,
-    /// Normal, `v_i/sqrt(fan_in)` with `v_1 = 2.2`, `v_i = 0.58 i`, last `fan_in` (Cranmer et al. 2020); zero biases.
+    /// Normal, zero biases; as the code of Cranmer et al. (2020) has it: `2.2/sqrt(n)` for the first map, `0.58 i/sqrt(n)` for
+    /// the `i`-th after it (`i` = 1, 2, ..), `sqrt(n)` for the output, `n` the larger side of the map.
     Cranmer,
+    /// The same as Hamzaogullari and Ozakin have it: `0.58 i/sqrt(n)` for the `i`-th map of all (`i` = 2, 3, ..), `n` the
+    /// `fan_in`.
+    CranmerPaper,
     /// As `Default`, the output layer scaled by 0.01, so that `L` starts as `alpha |v|^2` (Liu et al. 2021).
     NearZero,
 }
@@ -49,6 +53,10 @@ pub struct Architecture {
     pub activation: Nonlinearity,
     /// Factor of the added `|v|^2` of scaled velocities; 0 leaves it out.
     pub alpha: f64,
+    /// The coordinate whose square counts negative in the added term: `alpha (-t'^2 + x'^2 + ..)`, the signature of a
+    /// spacetime. Without it, which is what its absence in a file means, all squares are added.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub time_like: Option<usize>,
     /// Scale `s_i` of each coordinate: the network sees `q_i/s_i`, `v_i/s_i`. Ones: no scaling.
     pub scale: Vec<f64>,
     /// Which coordinates are angles with period `2 pi` (wrapped before the network sees them).
@@ -62,4 +70,11 @@ pub struct Architecture {
     /// motion keeps its energy.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub dissipation: Option<usize>,
+}
+
+impl Architecture {
+    /// Factor of `(v_i/s_i)^2` in the added term: `alpha`, or `-alpha` for the time-like coordinate.
+    pub fn quadratic_factor(&self, i: usize) -> f64 {
+        if self.time_like == Some(i) { -self.alpha } else { self.alpha }
+    }
 }

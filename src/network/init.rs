@@ -69,7 +69,8 @@ enum Place {
 
 /// Draws the parameters of a dense layer; `weights` are flat over all parameters, and zero.
 fn draw<S: Scalar>(layer: &Layer, place: Place, kind: Initialization, rng: &mut impl Rng, weights: &mut [S]) {
-    let root = (layer.inputs as f64).sqrt();
+    let side = if kind == Initialization::Cranmer { layer.inputs.max(layer.outputs) } else { layer.inputs };
+    let root = (side as f64).sqrt();
     let deviation = match (kind, place) {
         (Initialization::Default | Initialization::NearZero, _) => {
             let bound = root.recip();
@@ -81,9 +82,10 @@ fn draw<S: Scalar>(layer: &Layer, place: Place, kind: Initialization, rng: &mut 
             return;
         }
         (Initialization::VariancePreserving, _) => layer.activation.variance_gain() / root,
-        (Initialization::Cranmer, Place::Hidden(0)) => 2.2 / root,
+        (Initialization::Cranmer | Initialization::CranmerPaper, Place::Hidden(0)) => 2.2 / root,
         (Initialization::Cranmer, Place::Hidden(k)) => 0.58 * k as f64 / root,
-        (Initialization::Cranmer, Place::Output) => root,
+        (Initialization::CranmerPaper, Place::Hidden(k)) => 0.58 * (k + 1) as f64 / root,
+        (Initialization::Cranmer | Initialization::CranmerPaper, Place::Output) => root,
     };
     for w in layer.weight_range() {
         let normal: f64 = StandardNormal.sample(rng);
@@ -104,6 +106,7 @@ mod tests {
             hidden: vec![300, 200],
             activation,
             alpha: 0.0,
+            time_like: None,
             scale: vec![1.0; 2],
             periodic: vec![false; 2],
             embed_periodic: false,
@@ -171,14 +174,32 @@ mod tests {
     }
 
     #[test]
-    fn cranmer_weights_follow_their_formula() {
+    fn cranmer_weights_follow_the_code_of_their_author() {
         every_branch_follows(Initialization::Cranmer, |n, _| {
-            [[2.2 / n[0].sqrt(), 0.0], [0.58 / n[1].sqrt(), 0.0], [n[2].sqrt(), 0.0]]
+            // The larger sides: the first width twice, then the second.
+            [[2.2 / n[1].sqrt(), 0.0], [0.58 / n[1].sqrt(), 0.0], [n[2].sqrt(), 0.0]]
         });
+        deep_maps_deviate_by(Initialization::Cranmer, [2.2 / 10.0, 0.58 / 10.0, 1.16 / 10.0, 1.74 / 10.0, 10.0]);
+    }
+
+    #[test]
+    fn cranmer_weights_of_the_paper_count_all_maps_and_take_the_fan_in() {
+        every_branch_follows(Initialization::CranmerPaper, |n, _| {
+            [[2.2 / n[0].sqrt(), 0.0], [1.16 / n[1].sqrt(), 0.0], [n[2].sqrt(), 0.0]]
+        });
+        deep_maps_deviate_by(Initialization::CranmerPaper, [1.1, 1.16 / 10.0, 1.74 / 10.0, 2.32 / 10.0, 10.0]);
+    }
+
+    /// Deviations of the maps of four layers of 100.
+    fn deep_maps_deviate_by(kind: Initialization, expected: [f64; 5]) {
         let deeper = Architecture { hidden: vec![100; 4], ..architecture(Nonlinearity::Gelu) };
-        let weights = drawn(&deeper, Initialization::Cranmer);
-        let layer = Layout::new(&deeper).branches[0].layers[3];
-        near(root_mean_square(&weights[layer.weight_range()]), 0.58 * 3.0 / 10.0, 10_000);
+        let weights = drawn(&deeper, kind);
+        let layers = &Layout::new(&deeper).branches[0].layers;
+        assert_eq!(layers.len(), expected.len());
+        for (layer, expected) in layers.iter().zip(expected) {
+            let range = layer.weight_range();
+            near(root_mean_square(&weights[range.clone()]), expected, range.len());
+        }
     }
 
     #[test]
@@ -223,6 +244,7 @@ mod tests {
                 Initialization::Default,
                 Initialization::VariancePreserving,
                 Initialization::Cranmer,
+                Initialization::CranmerPaper,
                 Initialization::NearZero,
             ] {
                 let (with, without) = (drawn(&dyt, kind), drawn(&plain, kind));

@@ -79,6 +79,9 @@ impl Architecture {
         if !self.alpha.is_finite() {
             return fault(format!("expected a finite alpha, found {}", self.alpha));
         }
+        if let Some(time) = self.time_like.filter(|&time| time >= n) {
+            return fault(format!("expected a time-like coordinate below {n}, found {time}"));
+        }
         Ok(())
     }
 }

@@ -15,7 +15,8 @@ impl Lagrangian for Architecture {
         let layout = Layout::new(self);
         let features = features(self, q, v);
         let velocities = &features[layout.position_features..];
-        let quadratic = velocities.iter().fold(R::zero(), |sum, &v| sum + v * v) * R::from_f64(self.alpha);
+        let square = |(i, &v): (usize, &R)| v * v * R::from_f64(self.quadratic_factor(i));
+        let quadratic = velocities.iter().enumerate().map(square).fold(R::zero(), |sum, square| sum + square);
         layout.branches.iter().fold(quadratic, |sum, branch| {
             let output = branch.layers.iter().fold(features.clone(), |h, layer| evaluate(layer, parameters, &h));
             sum + output[0]

@@ -125,6 +125,10 @@ pub struct Network {
     pub activation: Nonlinearity,
     /// Factor of the added `|v|^2` of scaled velocities.
     pub alpha: f64,
+    /// Name of the coordinate whose square counts negative in the added term, `alpha (-t'^2 + x'^2 + ..)`; without it all
+    /// squares are added.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub time_like: Option<String>,
     /// Scaling of the coordinates.
     pub scaling: Scaling,
     /// Feed sine and cosine of periodic coordinates.
@@ -191,6 +195,36 @@ pub struct ConfigError {
     pub expected: &'static str,
     /// What stands there.
     pub found: String,
+}
+
+impl Network {
+    /// Index of the coordinate [`time_like`](Self::time_like) among these names, if there is one.
+    ///
+    /// # Errors
+    /// A name that is none of them.
+    pub fn time_like_index<'a>(
+        &self,
+        coordinates: impl Iterator<Item = &'a str>,
+    ) -> Result<Option<usize>, ConfigError> {
+        self.time_like.as_ref().map(|name| place("network.time_like", name, coordinates)).transpose()
+    }
+}
+
+/// Index of a coordinate by its name.
+///
+/// # Errors
+/// A name that is none of them.
+pub(super) fn place<'a>(
+    field: &str,
+    name: &str,
+    coordinates: impl Iterator<Item = &'a str>,
+) -> Result<usize, ConfigError> {
+    let names: Vec<&str> = coordinates.collect();
+    names.iter().position(|known| *known == name).ok_or_else(|| ConfigError {
+        field: field.to_string(),
+        expected: "the name of a coordinate",
+        found: format!("`{name}`; there are {}", names.join(", ")),
+    })
 }
 
 impl Config {

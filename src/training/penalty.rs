@@ -1,6 +1,6 @@
 //! Which violations of the mass matrix's signature are penalised.
 
-use crate::training::config::ConfigError;
+use crate::training::config::{ConfigError, place};
 use serde::{Deserialize, Serialize};
 
 /// Regularizer of a configuration; `lambda` is its weight beside the loss (the paper tries 1 to 10,000).
@@ -88,14 +88,7 @@ impl Regularizer {
             Self::Eigenvalue { lambda } => Penalty::Eigenvalue { lambda },
             Self::Sylvester { lambda } => Penalty::Sylvester { lambda, time: None },
             Self::LorentzianSylvester { lambda, ref time } => {
-                let names: Vec<&str> = coordinates.collect();
-                let Some(index) = names.iter().position(|name| name == time) else {
-                    return Err(ConfigError {
-                        field: "penalty.time".to_string(),
-                        expected: "the name of a coordinate",
-                        found: format!("`{time}`; there are {}", names.join(", ")),
-                    });
-                };
+                let index = place("penalty.time", time, coordinates)?;
                 Penalty::Sylvester { lambda, time: Some(index) }
             }
         })

@@ -36,11 +36,16 @@ impl Preset {
     }
 }
 
+/// Name of the time-like coordinate of a system.
+fn time_like(system: &Configured<f64>) -> Option<String> {
+    let coordinates = (system.system.coordinates)(system.coordinates);
+    system.system.time_like.and_then(|index| coordinates.into_iter().nth(index)).map(|time| time.name.into_owned())
+}
+
 /// The penalty on a wrong signature: eigenvalues, or Lorentzian Sylvester where a coordinate is a time.
 fn regularizer(system: &Configured<f64>, lambda: f64) -> Regularizer {
-    let coordinates = (system.system.coordinates)(system.coordinates);
-    match system.system.time_like.and_then(|index| coordinates.into_iter().nth(index)) {
-        Some(time) => Regularizer::LorentzianSylvester { lambda, time: time.name.into_owned() },
+    match time_like(system) {
+        Some(time) => Regularizer::LorentzianSylvester { lambda, time },
         None => Regularizer::Eigenvalue { lambda },
     }
 }
@@ -62,7 +67,7 @@ fn base(system: &Configured<f64>, states: usize, network: Network) -> Config {
             validation_position: boxes(&validation.positions),
             validation_velocity: boxes(&validation.velocities),
         },
-        network,
+        network: Network { time_like: time_like(system), ..network },
         penalty: regularizer(system, 5.0),
         optimizer: optimizer(Method::Radam),
         phases: Vec::new(),
@@ -100,6 +105,7 @@ fn network(width: usize) -> Network {
         hidden: vec![width; 3],
         activation: Nonlinearity::Gelu,
         alpha: 1.0,
+        time_like: None,
         scaling: Scaling::Physical,
         embed_periodic: true,
         input_layer: InputLayer::None,
@@ -229,6 +235,7 @@ fn paper(system: &Configured<f64>) -> Option<Config> {
         hidden,
         activation: Nonlinearity::Gelu,
         alpha: 1.0,
+        time_like: None,
         scaling: Scaling::Physical,
         embed_periodic: false,
         input_layer: InputLayer::None,

@@ -64,11 +64,16 @@ impl Config {
     /// Shape of the network for a system, with physical scales `scale` (used if the configuration scales).
     pub fn architecture(&self, system: &Configured<f64>, scale: Vec<f64>) -> Architecture {
         let coordinates = (system.system.coordinates)(system.coordinates);
-        self.architecture_with(coordinates.iter().map(|c| c.periodic).collect(), scale)
+        let names = coordinates.iter().map(|c| c.name.as_ref());
+        // A name that is no coordinate is refused where the states are sampled.
+        let time_like = self.network.time_like_index(names).unwrap_or_default();
+        let architecture = self.architecture_with(coordinates.iter().map(|c| c.periodic).collect(), scale);
+        Architecture { time_like, ..architecture }
     }
 
     /// Shape of the network for coordinates that are angles or not, with physical scales `scale` (used if the configuration
-    /// scales), both of length `n`.
+    /// scales), both of length `n`; without a time-like coordinate, which has to be looked up by its name
+    /// ([`Network::time_like_index`](crate::training::Network::time_like_index)).
     pub fn architecture_with(&self, periodic: Vec<bool>, scale: Vec<f64>) -> Architecture {
         let n = periodic.len();
         Architecture {
@@ -76,6 +81,7 @@ impl Config {
             hidden: self.network.hidden.clone(),
             activation: self.network.activation,
             alpha: self.network.alpha,
+            time_like: None,
             scale: match self.network.scaling {
                 Scaling::Physical => scale,
                 Scaling::None => vec![1.0; n],

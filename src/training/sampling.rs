@@ -171,6 +171,8 @@ pub fn sample_all<S: Scalar>(
     system: &Configured<f64>,
 ) -> Result<(Datasets<S>, Vec<f64>), SamplingError> {
     config.validate(system.coordinates)?;
+    let coordinates = (system.system.coordinates)(system.coordinates);
+    config.network.time_like_index(coordinates.iter().map(|c| c.name.as_ref()))?;
     let seed = config.seed;
     let mut training = Vec::with_capacity(config.phases.len());
     for (k, phase) in config.phases.iter().enumerate() {

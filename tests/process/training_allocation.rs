@@ -22,6 +22,7 @@ fn allocates_nothing(activation: Nonlinearity, input_layer: InputLayer, dissipat
         hidden: vec![96; 3],
         activation,
         alpha: -1.0,
+        time_like: None,
         scale: vec![2.0; 2],
         periodic: vec![true; 2],
         embed_periodic: true,

@@ -3,8 +3,8 @@
 use super::Activation;
 
 impl Activation {
-    /// `1 / sqrt(E[act'(Z)^2])` for a standard normal `Z`: weights drawn with standard deviation `gain / sqrt(fan_out)`
-    /// keep the variance of the gradients.
+    /// `1 / sqrt(E[act'(Z)^2])` for a standard normal `Z`: the gain of weights drawn with standard deviation
+    /// `gain / sqrt(fan_in)`, which keep the variance of the gradients between layers of one width.
     ///
     /// Trapezoidal rule with step 1/16 on `[-14, 14]`; accurate to `1e-12`, for the integrand is analytic in a strip of
     /// half-width `pi/2` or wider, where the rule converges like `e^(-2 pi (pi/2) 16)`.

@@ -5,7 +5,8 @@
 //! for every coordinate in order, `sin q_i` and `cos q_i` if the coordinate is periodic and embedded and `q_i/s_i` if it
 //! is not, then `v_i/s_i` for every velocity. They are the inputs of layer 0; with the input layer `dyt` those are
 //! `gamma_i tanh(alpha x_i) + beta_i` of the features `x_i`, with the tensors `dyt.alpha`, shape `(1)`, `dyt.gamma` and
-//! `dyt.beta`, shape `(features)`. The network's output plus `alpha |v/s|^2` is the Lagrangian (`alpha` of the header).
+//! `dyt.beta`, shape `(features)`. The network's output plus `alpha |v/s|^2` is the Lagrangian (`alpha` of the header);
+//! with `time_like`, the index of a coordinate from 0, the square of its velocity is taken away, not added.
 //!
 //! The activation `quadratic-softplus` has two such networks, whose outputs add up, with half the widths each: names
 //! start with `branches.0.` (softplus) and `branches.1.` (quadratic).

@@ -16,6 +16,7 @@ fn header(hidden: Vec<usize>, embed_periodic: bool, precision: StoredPrecision) 
             hidden,
             activation: Nonlinearity::Gelu,
             alpha: 0.1,
+            time_like: None,
             scale: vec![0.1 + 0.2, 10.0 / 3.0],
             periodic: vec![true, false],
             embed_periodic,

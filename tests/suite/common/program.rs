@@ -120,6 +120,7 @@ pub fn model() -> ModelFile<f32> {
         hidden: vec![8, 8],
         activation: Nonlinearity::Softplus,
         alpha: 0.5,
+        time_like: None,
         scale: vec![3.0, 4.0],
         periodic: vec![true, true],
         embed_periodic: true,

@@ -14,6 +14,7 @@ pub fn architecture(n: usize, hidden: &[usize], activation: Nonlinearity, alpha:
         hidden: hidden.to_vec(),
         activation,
         alpha,
+        time_like: None,
         scale: (0..n).map(|i| 1.0 + 0.5 * i as f64).collect(),
         periodic: vec![false; n],
         embed_periodic: false,

@@ -19,6 +19,7 @@ fn model(value: f64) -> ModelFile<f64> {
         hidden: vec![3],
         activation: Nonlinearity::Gelu,
         alpha: 0.0,
+        time_like: None,
         scale: vec![1.0],
         periodic: vec![false],
         embed_periodic: false,
