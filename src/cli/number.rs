@@ -16,7 +16,8 @@ pub fn positive(text: &str) -> Result<f64, String> {
 /// Two finite decimal numbers, the lower first: `LOW:HIGH`.
 pub fn bounds(text: &str) -> Result<(f64, f64), String> {
     let pair = text.split_once(':').and_then(|(low, high)| Some((finite(low).ok()?, finite(high).ok()?)));
-    pair.filter(|(low, high)| low <= high).ok_or_else(|| "expected LOW:HIGH, two finite numbers in order".to_string())
+    pair.filter(|(low, high)| low <= high && (high - low).is_finite())
+        .ok_or_else(|| "expected LOW:HIGH, two finite numbers in order".to_string())
 }
 
 /// A whole number above 0.
@@ -45,7 +46,7 @@ mod tests {
         assert!(count("1.0").is_err() && count("99999999999999999999").is_err());
         assert_eq!((positive("1e-3"), count("7")), (Ok(1e-3), Ok(7)));
         assert_eq!((bounds("-0.5:1e3"), bounds(" 2 : 2 ")), (Ok((-0.5, 1000.0)), Ok((2.0, 2.0))));
-        for bad in ["", "1", "1:", ":1", "2:1", "0:inf", "nan:nan", "0:1:2"] {
+        for bad in ["", "1", "1:", ":1", "2:1", "0:inf", "nan:nan", "0:1:2", "-1e308:1e308"] {
             assert!(bounds(bad).is_err(), "{bad}");
         }
     }

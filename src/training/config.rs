@@ -324,6 +324,10 @@ fn check_bounds(field: &str, bounds: &[[f64; 2]], n: usize) -> Result<(), Config
         if !(low.is_finite() && high.is_finite() && low <= high) {
             return fault(format!("{field}[{k}]"), "finite [low, high] in order", format!("[{low}, {high}]"));
         }
+        if !(high - low).is_finite() {
+            let expected = "[low, high] no further apart than the largest number";
+            return fault(format!("{field}[{k}]"), expected, format!("[{low:e}, {high:e}]"));
+        }
     }
     Ok(())
 }

@@ -151,7 +151,7 @@ impl<S: Scalar> Stripe<S> {
 
     /// Loss and gradient of one chunk, with an eigenvalue penalty; leaves what Sylvester's needs of all states.
     ///
-    /// `weight` is `1/(2 n batch)`; the penalty comes with its weight over the batch.
+    /// `weight` is `1/(2 n counted)`, with the states of the batch that count; the penalty comes with its weight over the batch.
     fn add_chunk(&mut self, weights: &[S], data: &Dataset<S>, rows: &[u32], weight: S, penalty: (Penalty, S)) {
         self.gather(data, rows);
         self.chunk.evaluate(weights, &self.q, &self.v, Depth::Training);
@@ -382,17 +382,19 @@ impl<S: Scalar> Objective<S> {
     }
 
     /// Loss, penalty and gradient of the states `rows` of `data`; `gradient` is overwritten.
+    ///
+    /// Differentiated is `loss + penalty` of the report: the loss is the mean over the states that are not left out, the
+    /// penalty over all of them.
     pub fn step(&mut self, weights: &[S], data: &Dataset<S>, rows: &[u32], gradient: &mut [S]) -> BatchReport<S> {
-        let count = S::of_f64(rows.len() as f64);
-        let weight = (S::of_f64(2.0 * data.coordinates() as f64) * count).recip();
         let penalty = self.penalty;
-        let lambda = S::of_f64(penalty.lambda()) / count;
-        let stripes = self.run(rows, |stripe, rows| {
-            stripe.reset(weights.len());
-            for rows in rows.chunks(CHUNK) {
-                stripe.add_chunk(weights, data, rows, weight, (penalty, lambda));
-            }
-        });
+        let lambda = S::of_f64(penalty.lambda()) / S::of_f64(rows.len() as f64);
+        let mut stripes = self.evaluate(weights, data, rows, rows.len(), lambda);
+        let counted = rows.len() - self.left_out(stripes);
+        if 0 < counted && counted < rows.len() {
+            // How many count is known only now; to repeat the few batches that leave states out is cheaper than to keep
+            // the gradients of loss and penalty apart in all.
+            stripes = self.evaluate(weights, data, rows, counted, lambda);
+        }
         if let Penalty::Sylvester { time, .. } = penalty
             && self.stripes[..stripes].iter().any(|stripe| !stripe.suspects.is_empty())
         {
@@ -402,6 +404,24 @@ impl<S: Scalar> Objective<S> {
         let stripes = &self.stripes[..stripes];
         sum_gradients(&self.pool, stripes, |stripe| &stripe.gradient, gradient);
         self.report(stripes.len(), rows.len(), data.coordinates())
+    }
+
+    /// Sums of loss, penalty and gradient over the batch, of which `counted` states are not left out; Sylvester's penalty
+    /// apart. Returns the number of stripes.
+    fn evaluate(&mut self, weights: &[S], data: &Dataset<S>, rows: &[u32], counted: usize, lambda: S) -> usize {
+        let weight = (S::of_f64(2.0 * data.coordinates() as f64) * S::of_f64(counted as f64)).recip();
+        let penalty = self.penalty;
+        self.run(rows, |stripe, rows| {
+            stripe.reset(weights.len());
+            for rows in rows.chunks(CHUNK) {
+                stripe.add_chunk(weights, data, rows, weight, (penalty, lambda));
+            }
+        })
+    }
+
+    /// States that the stripes left out.
+    fn left_out(&self, stripes: usize) -> usize {
+        self.stripes[..stripes].iter().map(|stripe| stripe.left_out).sum()
     }
 
     /// Characteristic scales of the batch that the stripes hold.

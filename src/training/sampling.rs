@@ -92,7 +92,15 @@ pub(super) fn draw(
     rng: &mut impl Rng,
 ) -> (Vec<f64>, Vec<f64>) {
     let mut uniform = |bounds: &[[f64; 2]]| -> Vec<f64> {
-        bounds.iter().map(|&[low, high]| if low < high { rng.random_range(low..high) } else { low }).collect()
+        let one = |&[low, high]: &[f64; 2]| match high - low {
+            length if length.is_infinite() => {
+                let share = rng.random::<f64>();
+                (1.0 - share) * low + share * high
+            }
+            _ if low < high => rng.random_range(low..high),
+            _ => low,
+        };
+        bounds.iter().map(one).collect()
     };
     let (mut q, v) = (uniform(position), uniform(velocity));
     for (i, q) in q.iter_mut().enumerate() {

@@ -10,7 +10,7 @@ use crate::training::checkpoint::{Clock, Course, Ended, Keeper, Underway};
 use crate::training::config::{OnFailure, Optimizer, Phase};
 use crate::training::dataset::Dataset;
 use crate::training::objective::{Failure, Objective};
-use crate::training::optimizer::{Method, Moments, Update};
+use crate::training::optimizer::{Moments, Update};
 use crate::training::schedule::Schedule;
 use argmin::core::{Error, IterState, KV, Problem, Solver, State, TerminationReason, TerminationStatus};
 use argmin::kv;
@@ -158,11 +158,16 @@ pub(super) struct Means {
     pub(super) last_failure: Option<Failure>,
 }
 
+/// States of a step: no more than there are, at least one.
+fn batch(optimizer: &Optimizer, states: usize) -> usize {
+    optimizer.batch.min(states).max(1)
+}
+
 impl<S: Scalar> EpochSolver<S> {
     /// A solver for one phase over `states` training states, shuffled by `rng`; host it in an argmin `Executor` whose
     /// state starts with the initial weights and runs for `phase.epochs` iterations.
     pub fn new(optimizer: Optimizer, phase: Phase, rng: ChaCha8Rng, states: usize) -> Self {
-        let steps = phase.epochs * states.div_ceil(optimizer.batch.min(states).max(1));
+        let steps = phase.epochs * states.div_ceil(batch(&optimizer, states));
         Self {
             optimizer,
             phase,
@@ -220,10 +225,7 @@ impl<S: Scalar> EpochSolver<S> {
             clip: self.optimizer.clip,
         };
         let gradient = &mut self.gradient;
-        let norm = match update.method {
-            Method::Soap => problem.objective.pool().install(|| moments.update(weights, gradient, &update)),
-            Method::Adam | Method::Radam => moments.update(weights, gradient, &update),
-        };
+        let norm = moments.update_on(Some(problem.objective.pool()), weights, gradient, &update);
         if !norm.is_finite() {
             if self.optimizer.on_failure == OnFailure::Stop {
                 return Err(StepError::Gradient { step, norm });
@@ -321,7 +323,7 @@ impl<S: Scalar> Solver<TrainingProblem<S>, TrainingState<S>> for EpochSolver<S> 
             *means = Means::default();
         }
         let states = self.course.order.len();
-        let batch = self.optimizer.batch.min(states);
+        let batch = batch(&self.optimizer, states);
         let steps = states.div_ceil(batch);
         while self.course.batch < steps {
             let k = self.course.batch;

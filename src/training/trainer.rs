@@ -3,7 +3,7 @@
 use crate::network::{Architecture, initial_weights};
 use crate::scalar::Scalar;
 use crate::training::checkpoint::{Clock, Ended, Keeper, Snapshot, Underway};
-use crate::training::config::{Config, Phase};
+use crate::training::config::{Config, ConfigError, Phase};
 use crate::training::dataset::Dataset;
 use crate::training::objective::{BatchReport, Objective};
 use crate::training::penalty::Penalty;
@@ -82,6 +82,17 @@ pub struct Trained<S> {
 /// Why training could not run.
 #[derive(Debug, Error)]
 pub enum TrainingError {
+    /// The configuration is out of range.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// Phases and sets of training states differ in number.
+    #[error("expected a set of training states for each of {phases} phases, found {found}")]
+    Datasets {
+        /// Phases of the configuration.
+        phases: usize,
+        /// Sets given.
+        found: usize,
+    },
     /// Threads could not be started.
     #[error("cannot start {threads} threads: {source}")]
     Threads {
@@ -127,13 +138,12 @@ pub struct Sitting<S> {
     pub start: Option<Snapshot<S>>,
 }
 
-/// Trains a network of this shape with the configuration's penalty, resolved by [`Config::penalty`]; the configuration
-/// must have been validated.
+/// Trains a network of this shape with the configuration's penalty, resolved by [`Config::penalty`].
 ///
 /// The same configuration, data and seed give the same bytes on any number of `threads`.
 ///
 /// # Errors
-/// [`TrainingError`] if nothing was learned; a run that was interrupted or failed after its first epoch returns its best.
+/// [`TrainingError`] if the configuration is out of range, a phase has no training states or nothing was learned; a run that was interrupted or failed after its first epoch returns its best.
 pub fn train<S: Scalar>(
     config: &Config,
     architecture: &Architecture,
@@ -160,6 +170,11 @@ pub fn resume<S: Scalar>(
     hooks: &Hooks,
     sitting: Sitting<S>,
 ) -> Result<Trained<S>, TrainingError> {
+    config.validate(architecture.coordinates)?;
+    let (phases, found) = (config.phases.len(), data.training.len());
+    if phases != found {
+        return Err(TrainingError::Datasets { phases, found });
+    }
     let objective =
         || Objective::new(architecture, penalty, threads).map_err(|source| TrainingError::Threads { threads, source });
     let batches = |states: usize| states.div_ceil(config.optimizer.batch.min(states));

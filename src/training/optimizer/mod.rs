@@ -139,9 +139,20 @@ impl<S: Scalar> Moments<S> {
 
     /// Updates `weights` in place and uses `gradient` up; returns its norm before clipping.
     ///
-    /// A gradient that is not finite changes nothing; its norm, infinite or `NaN`, is returned. The result does not depend
-    /// on the number of threads.
+    /// A gradient that is not finite changes nothing; its norm, infinite or `NaN`, is returned. All work is done on the
+    /// caller's thread.
     pub fn update(&mut self, weights: &mut [S], gradient: &mut [S], update: &Update) -> f64 {
+        self.update_on(None, weights, gradient, update)
+    }
+
+    /// [`Moments::update`] with the eigenbases shared out over the threads of a pool; the result does not depend on them.
+    pub(super) fn update_on(
+        &mut self,
+        pool: soap::Threads<'_>,
+        weights: &mut [S],
+        gradient: &mut [S],
+        update: &Update,
+    ) -> f64 {
         let norm = norm(gradient);
         if !norm.is_finite() {
             return norm;
@@ -165,7 +176,7 @@ impl<S: Scalar> Moments<S> {
         for (g, &w) in gradient.iter_mut().zip(&*weights) {
             *g = *g * clip + decay * w;
         }
-        soap::enter(&mut self.bases, gradient, self.step == 1);
+        soap::enter(&mut self.bases, gradient, self.step == 1, pool);
         vectorized(
             #[inline(always)]
             || {
@@ -174,11 +185,11 @@ impl<S: Scalar> Moments<S> {
                 }
             },
         );
-        soap::leave(&mut self.bases, gradient);
+        soap::leave(&mut self.bases, gradient, pool);
         for (w, &step) in weights.iter_mut().zip(&*gradient) {
             *w -= step;
         }
-        soap::follow(&mut self.bases, &mut self.first, self.step);
+        soap::follow(&mut self.bases, &mut self.first, self.step, pool);
         norm
     }
 

@@ -297,25 +297,36 @@ impl Choice {
 }
 
 /// Turns the matrices of a gradient into their eigenbases, in place.
-pub(super) fn enter<S: Scalar>(bases: &mut [Eigenbasis<S>], gradient: &mut [S], first: bool) {
-    turn(bases, gradient, |basis, gradient| basis.enter(gradient, first));
+pub(super) fn enter<S: Scalar>(bases: &mut [Eigenbasis<S>], gradient: &mut [S], first: bool, pool: Threads<'_>) {
+    turn(bases, gradient, pool, |basis, gradient| basis.enter(gradient, first));
 }
 
 /// Turns the matrices of a direction back, in place.
-pub(super) fn leave<S: Scalar>(bases: &mut [Eigenbasis<S>], direction: &mut [S]) {
-    turn(bases, direction, Eigenbasis::leave);
+pub(super) fn leave<S: Scalar>(bases: &mut [Eigenbasis<S>], direction: &mut [S], pool: Threads<'_>) {
+    turn(bases, direction, pool, Eigenbasis::leave);
 }
 
 /// Follows the eigenbases where it is time, the first moments with them.
-pub(super) fn follow<S: Scalar>(bases: &mut [Eigenbasis<S>], first_moments: &mut [S], step: u32) {
+pub(super) fn follow<S: Scalar>(bases: &mut [Eigenbasis<S>], first_moments: &mut [S], step: u32, pool: Threads<'_>) {
     if step.is_multiple_of(EVERY) {
-        turn(bases, first_moments, Eigenbasis::follow);
+        turn(bases, first_moments, pool, Eigenbasis::follow);
     }
 }
 
-fn turn<S: Scalar>(bases: &mut [Eigenbasis<S>], numbers: &mut [S], work: impl Fn(&mut Eigenbasis<S>, &[S]) + Sync) {
+/// The threads to work on: a pool, or the caller's own. Never rayon's global pool, which belongs to the application.
+pub(super) type Threads<'a> = Option<&'a rayon::ThreadPool>;
+
+fn turn<S: Scalar>(
+    bases: &mut [Eigenbasis<S>],
+    numbers: &mut [S],
+    pool: Threads<'_>,
+    work: impl Fn(&mut Eigenbasis<S>, &[S]) + Sync,
+) {
     let shared = &*numbers;
-    bases.par_iter_mut().for_each(|basis| work(basis, shared));
+    match pool {
+        Some(pool) => pool.install(|| bases.par_iter_mut().for_each(|basis| work(basis, shared))),
+        None => bases.iter_mut().for_each(|basis| work(basis, shared)),
+    }
     for basis in bases {
         numbers[basis.block.range()].copy_from_slice(&basis.turned);
     }
@@ -365,13 +376,13 @@ mod tests {
         for step in 0..40 {
             let original = random(30, step);
             let mut gradient = original.clone();
-            enter(&mut bases, &mut gradient, step == 0);
+            enter(&mut bases, &mut gradient, step == 0, None);
             assert_ne!(gradient[3..27], original[3..27]);
-            leave(&mut bases, &mut gradient);
+            leave(&mut bases, &mut gradient, None);
             for (x, y) in gradient.iter().zip(&original) {
                 assert!((x - y).abs() < 1e-14, "step {step}");
             }
-            follow(&mut bases, &mut gradient, 10);
+            follow(&mut bases, &mut gradient, 10, None);
             assert!(defect(6, &bases[0].left.vectors) < 1e-14 && defect(4, &bases[0].right.vectors) < 1e-14);
         }
     }

@@ -31,7 +31,7 @@ pub struct ShotReport<S> {
     pub penalised: usize,
     /// Segments left out because their motion is not finite or leaves every sensible range.
     pub left_out: usize,
-    /// Residuals of the batch, those left out included.
+    /// Residuals that count.
     pub residuals: usize,
 }
 
@@ -249,6 +249,11 @@ impl<S: Scalar> Shots<S> {
         &self.architecture
     }
 
+    /// The threads.
+    pub(super) fn pool(&self) -> &rayon::ThreadPool {
+        &self.pool
+    }
+
     /// Runs `work` on the chunks of every stripe of `rows`; returns the number of stripes.
     fn run(&mut self, rows: &[u32], parameters: usize, work: impl Fn(&mut Stripe<S>, &[u32]) + Sync) -> usize {
         let size = rows.len().div_ceil(CHUNK).div_ceil(STRIPES).max(1) * CHUNK;
@@ -270,7 +275,8 @@ impl<S: Scalar> Shots<S> {
     /// `(segments, 2, n)` scaled, are overwritten.
     ///
     /// Differentiated is `loss + penalty`, gaps included, with the weight `1/residuals` of every residual and
-    /// `continuity/residuals` of every gap, over the segments that are not left out. The penalty takes the states as given.
+    /// `continuity/residuals` of every gap, `residuals` those of the report: all over the segments that are not left out. The
+    /// penalty takes the states as given.
     pub fn step(
         &mut self,
         weights: &[S],
@@ -281,17 +287,26 @@ impl<S: Scalar> Shots<S> {
     ) -> ShotReport<S> {
         let given = Given { weights, segments, starts };
         let (penalty, huber) = (self.penalty, self.huber);
-        let weight = count::<S>(rows.iter().map(|&row| segments.residuals(row as usize)).sum()).recip();
-        let continuity = self.continuity * weight;
+        let all: usize = rows.iter().map(|&row| segments.residuals(row as usize)).sum();
         let lambda = S::of_f64(penalty.lambda()) / count::<S>(rows.len() * segments.steps);
-        let stripes = self.run(rows, weights.len(), |stripe, rows| {
-            stripe.shoot(&given, rows);
-            stripe.add_losses(&given, rows, huber, (weight, continuity));
-            stripe.add_gradient(weights, (penalty, lambda), segments.n);
-        });
+        let mut shoot = |counted: usize| {
+            let weight = count::<S>(counted).recip();
+            let continuity = self.continuity * weight;
+            let stripes = self.run(rows, weights.len(), |stripe, rows| {
+                stripe.shoot(&given, rows);
+                stripe.add_losses(&given, rows, huber, (weight, continuity));
+                stripe.add_gradient(weights, (penalty, lambda), segments.n);
+            });
+            (stripes, self.stripes[..stripes].iter().map(|stripe| stripe.counted).sum())
+        };
+        let (mut stripes, counted) = shoot(all);
+        if 0 < counted && counted < all {
+            // How many residuals count is known only now.
+            (stripes, _) = shoot(counted);
+        }
         sum_gradients(&self.pool, &self.stripes[..stripes], |stripe| &stripe.gradient, gradient);
         self.gather_starts(stripes, rows, segments, start_gradient);
-        self.report(stripes, rows, segments)
+        self.report(stripes)
     }
 
     /// Gradients by the starts of the segments `rows` and of those that follow them.
@@ -323,7 +338,7 @@ impl<S: Scalar> Shots<S> {
             stripe.shoot(&given, rows);
             stripe.add_losses(&given, rows, huber, (zero, zero));
         });
-        self.report(stripes, rows, segments)
+        self.report(stripes)
     }
 
     /// Residuals of the segments `rows` in units of noise, sample by sample: positions each with its velocity, if that was
@@ -356,7 +371,7 @@ impl<S: Scalar> Shots<S> {
         let parts = self.stripes[..stripes].iter().map(|s| (s.curvature.as_slice(), s.jacobian.as_slice()));
         curvature.set(segments, parts);
         curvature.correct(segments, starts, &gradient, share);
-        self.report(stripes, &rows, segments)
+        self.report(stripes)
     }
 
     /// Moves the starts of the segments `rows`, and a little those of their followers, by `share` of a Gauss-Newton step
@@ -379,7 +394,7 @@ impl<S: Scalar> Shots<S> {
         curvature.correct(segments, starts, start_gradient, share);
     }
 
-    fn report(&self, stripes: usize, rows: &[u32], segments: &Segments<S>) -> ShotReport<S> {
+    fn report(&self, stripes: usize) -> ShotReport<S> {
         let (mut residual, mut gap, mut penalty) = (Sum::default(), Sum::default(), Sum::default());
         let (mut counted, mut gaps, mut penalised, mut left_out) = (0, 0, 0, 0);
         for stripe in &self.stripes[..stripes] {
@@ -394,8 +409,7 @@ impl<S: Scalar> Shots<S> {
         // No residual, no loss: the mean of nothing is not 0.
         let loss = residual.value() / count::<S>(counted);
         let gap = gap.value() / count::<S>(gaps.max(1));
-        let residuals = rows.iter().map(|&row| segments.residuals(row as usize)).sum();
-        ShotReport { loss, gap, penalty: penalty.value(), penalised, left_out, residuals }
+        ShotReport { loss, gap, penalty: penalty.value(), penalised, left_out, residuals: counted }
     }
 }
 

@@ -144,7 +144,7 @@ impl<S: Scalar> ShootingSolver<S> {
         let settings = &self.settings;
         let update = Update { method: settings.method, rate, weight_decay: settings.weight_decay, clip: settings.clip };
         let norm = if report.left_out < rows.len() {
-            self.moments.update(&mut self.weights, &mut self.gradient, &update)
+            self.moments.update_on(Some(shots.pool()), &mut self.weights, &mut self.gradient, &update)
         } else {
             f64::NAN
         };
