@@ -342,6 +342,46 @@ mod tests {
     }
 
     #[test]
+    fn bounds_longer_than_the_largest_number_are_refused_and_can_be_drawn_from() {
+        let system = configure::<f64>("double-pendulum", &[]).unwrap();
+        let quick = Preset::Quick.config(&system).unwrap();
+        let wide = [-1e308, 1e308];
+        type Bounds<'a> = fn(&mut Config) -> &mut Vec<[f64; 2]>;
+        let all: [(&str, Bounds<'_>); 4] = [
+            ("phase[0].position", |c| &mut c.phases[0].position),
+            ("phase[0].velocity", |c| &mut c.phases[0].velocity),
+            ("data.validation_position", |c| &mut c.data.validation_position),
+            ("data.validation_velocity", |c| &mut c.data.validation_velocity),
+        ];
+        for (field, bounds) in all {
+            let mut config = quick.clone();
+            bounds(&mut config)[1] = wide;
+            let refused = sample_all::<f64>(&config, &system).unwrap_err().to_string();
+            let expected = "[low, high] no further apart than the largest number, found [-1e308, 1e308]";
+            assert_eq!(refused, format!("{field}[1]: expected {expected}"));
+        }
+        let mut rng = Stream::Test.generator(0);
+        let (q, v) = draw((&[wide; 50], &[[2.0, 2.0]]), &[], &mut rng);
+        assert!(q.iter().all(|q| q.is_finite()) && q.iter().any(|q| *q < 0.0) && q.iter().any(|q| *q > 0.0));
+        assert_eq!(v, [2.0]);
+    }
+
+    #[test]
+    fn a_time_like_coordinate_is_one_of_the_system() {
+        let system = configure::<f64>("ads4-geodesic", &[]).unwrap();
+        for preset in [Preset::Quick, Preset::Best, Preset::Paper] {
+            let config = preset.config(&system).unwrap();
+            assert_eq!(config.architecture(&system, vec![1.0; 4]).time_like, Some(0));
+        }
+        let mut config = Preset::Quick.config(&system).unwrap();
+        config.network.time_like = Some("w".to_string());
+        let refused = sample_all::<f64>(&config, &system).unwrap_err().to_string();
+        assert_eq!(refused, "network.time_like: expected the name of a coordinate, found `w`; there are t, x, y, z");
+        let pendulum = configure::<f64>("double-pendulum", &[]).unwrap();
+        assert_eq!(Preset::Quick.config(&pendulum).unwrap().network.time_like, None);
+    }
+
+    #[test]
     fn velocities_beyond_light_are_drawn_again_or_refused() {
         let system = configure::<f64>("charged-particle", &[]).unwrap();
         let at = |low: f64, high: f64| {

@@ -3,15 +3,38 @@
 
 use crate::alone;
 use lnn::lagrangian::{EulerLagrange, Request, Terms, build};
-use lnn::network::{NetworkLagrangian, file::ModelFile};
+use lnn::network::{Architecture, Layout, NetworkLagrangian, file::ModelFile};
+use lnn::recording::Track;
 use lnn::rollout::{Options, rollout, rollout_many};
-use lnn::training::{Dataset, Objective, Penalty};
+use lnn::training::shooting::{Estimated, Noise, Shooting, Task, fit};
+use lnn::training::{Dataset, Hooks, Method, Moments, Objective, Penalty, Update};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
 /// Threads of this process.
 fn threads() -> usize {
     std::fs::read_dir("/proc/self/task").unwrap().count()
+}
+
+/// Weights after an epoch of multiple shooting by SOAP.
+fn shot(architecture: &Architecture, weights: &[f64], threads: usize) -> Vec<f64> {
+    let times: Vec<f64> = (0..40).map(|k| 0.02 * f64::from(k)).collect();
+    let q: Vec<f64> = times.iter().flat_map(|t| [0.5 * (3.0 * t).sin(), 0.4 * (4.0 * t).cos()]).collect();
+    let v: Vec<f64> = times.iter().flat_map(|t| [1.5 * (3.0 * t).cos(), -1.6 * (4.0 * t).sin()]).collect();
+    let track = Track { name: String::new(), times, q: q.clone(), v: vec![], a: vec![], force: vec![] };
+    let tracks = [Estimated { track: &track, q: &q, v: &v }];
+    let noise = Noise { q: vec![0.1; 2], v: vec![] };
+    let task = Task {
+        architecture,
+        penalty: Penalty::None,
+        weights: weights.to_vec(),
+        training: &tracks,
+        validation: &tracks,
+        noise: &noise,
+        seed: 0,
+    };
+    let settings = Shooting { method: Method::Soap, samples_per_segment: 20, epochs: 1, ..Shooting::default() };
+    fit(&settings, task, threads, &Hooks::default()).unwrap().weights
 }
 
 #[test]
@@ -57,6 +80,10 @@ fn threads_are_the_callers_choice() {
         }
     }
     assert!(gradients[0] == gradients[1], "the number of threads changes nothing");
+    assert!(shot(&architecture, &file.weights, 1) == shot(&architecture, &file.weights, 3));
+    let mut moments = Moments::for_method(Method::Soap, file.weights.len(), Layout::new(&architecture).matrices());
+    let update = Update { method: Method::Soap, rate: 1e-3, weight_decay: 0.0, clip: 1.0 };
+    assert!(moments.update(&mut file.weights.clone(), &mut gradients[0], &update) > 0.0);
     // Rayon's global pool can be built once in the life of a process: nobody has done so.
     rayon::ThreadPoolBuilder::new().num_threads(1).build_global().expect("the global pool belongs to the application");
 }

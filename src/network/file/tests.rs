@@ -135,6 +135,20 @@ fn files_from_before_the_input_layer_load_and_keep_their_bytes() {
     assert_eq!(loaded.to_bytes().unwrap(), bytes);
 }
 
+/// So was it without the field `time_like`; a model with one keeps it.
+#[test]
+fn files_name_a_time_like_coordinate_if_there_is_one() {
+    let mut model = model(vec![2], StoredPrecision::F64);
+    let before = model.to_bytes().unwrap();
+    assert_eq!(ModelFile::<f64>::from_bytes(&before).unwrap().header.architecture.time_like, None);
+    model.header.architecture.time_like = Some(1);
+    assert!(serde_json::to_string(&model.header).unwrap().contains(r#""alpha":0.1,"time_like":1,"#));
+    assert_eq!(ModelFile::<f64>::from_bytes(&model.to_bytes().unwrap()).unwrap(), model);
+    model.header.architecture.time_like = Some(2);
+    let error = model.to_bytes().unwrap_err().to_string();
+    assert!(error.contains("expected a time-like coordinate below 2, found 2"), "{error}");
+}
+
 #[test]
 fn tensors_have_the_documented_names_and_shapes() {
     let dense = |widths: [usize; 2]| {

@@ -28,7 +28,8 @@ fn cases() -> impl Strategy<Value = Case> {
                 hidden: hidden.into_iter().map(|w| w * activation.branches().len()).collect(),
                 activation,
                 alpha: 0.75,
-                time_like: None,
+                // One of the coordinates, or none.
+                time_like: Some((seed % (n as u64 + 1)) as usize).filter(|&i| i < n),
                 scale: (0..n).map(|i| 1.5 + i as f64 / 2.0).collect(),
                 periodic: periodic[..n].to_vec(),
                 embed_periodic,
@@ -346,4 +347,37 @@ fn shallower_evaluations_give_the_same_numbers() {
     assert!(run(Depth::MassMatrix).coriolis.is_empty());
     assert_eq!(run(Depth::Motion).coriolis, whole.coriolis);
     assert_eq!(Layout::new(&case.architecture).parameters, weights.len());
+}
+
+/// `alpha (-t'^2 + x'^2 + ..)` with a time-like coordinate, all squares added without.
+#[test]
+fn the_added_term_follows_the_time_like_coordinate() {
+    let plain = Architecture {
+        coordinates: 3,
+        hidden: vec![2],
+        activation: Nonlinearity::Gelu,
+        alpha: 1.5,
+        time_like: None,
+        scale: vec![2.0, 4.0, 1.0],
+        periodic: vec![false; 3],
+        embed_periodic: false,
+        input_layer: InputLayer::None,
+        dissipation: None,
+    };
+    // A network that gives 0: what is left is the added term.
+    let weights = vec![0.0; Layout::new(&plain).parameters];
+    let (q, v) = ([0.3, -0.4, 0.5], [6.0, 8.0, -1.0]);
+    for (time_like, signs) in [(None, [1.0; 3]), (Some(0), [-1.0, 1.0, 1.0]), (Some(2), [1.0, 1.0, -1.0])] {
+        let architecture = Architecture { time_like, ..plain.clone() };
+        let mut chunk = Chunk::new(&architecture);
+        chunk.evaluate(&weights, &q, &v, Depth::Motion);
+        // Scaled velocities 3, 2, -1.
+        let [a, b, c] = signs;
+        assert_eq!(chunk.lagrangian, [1.5 * (9.0 * a + 4.0 * b + c)]);
+        assert_eq!(chunk.momentum, [9.0 * a, 6.0 * b, -3.0 * c]);
+        assert_eq!(chunk.mass_matrix, [3.0 * a, 0.0, 0.0, 0.0, 3.0 * b, 0.0, 0.0, 0.0, 3.0 * c]);
+    }
+    let beyond = Architecture { time_like: Some(3), ..plain };
+    let error = beyond.validate().unwrap_err().to_string();
+    assert_eq!(error, "architecture: expected a time-like coordinate below 3, found 3");
 }

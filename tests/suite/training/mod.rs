@@ -3,6 +3,7 @@
 mod checkpoints;
 mod faults;
 mod faulty;
+mod left_out;
 mod objective;
 mod penalties;
 mod presets;

@@ -557,6 +557,20 @@ fn an_interrupt_ends_training_with_the_best_so_far() {
     assert!(trained.validation_loss.is_finite());
 }
 
+/// What would divide by zero, or leave out phases without a word.
+#[test]
+fn a_batch_of_nothing_and_missing_training_states_are_named() {
+    let refused = |config: &Config, data| run(config, data, 1, &Hooks::default()).unwrap_err().to_string();
+    let mut empty = config(2);
+    empty.optimizer.batch = 0;
+    let expected = "optimizer.batch: expected a positive number of sensible size, found 0";
+    assert_eq!(refused(&empty, datasets()), expected);
+    let mut data = datasets();
+    data.training.truncate(1);
+    let expected = "expected a set of training states for each of 2 phases, found 1";
+    assert_eq!(refused(&config(2), data), expected);
+}
+
 /// A network whose mass matrix vanishes: no hidden curvature in the velocities, no quadratic term.
 #[test]
 fn a_singular_mass_matrix_stops_or_is_left_out_by_choice() {
