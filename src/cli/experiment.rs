@@ -9,7 +9,8 @@ use crate::experiments::{Experiment, Outcome, Picture, Record, Run, Scale, exper
 use crate::recording::Columns;
 use crate::recording::read::read_recording;
 use crate::report::{
-    Curve, EXPERIMENT_HEADER, Figure, Report, experiment_curves, experiment_figures, experiment_table, text_table,
+    Curve, EXPERIMENT_HEADER, Figure, REDUCTION_HEADER, Report, experiment_curves, experiment_figures,
+    experiment_table, reduction_table, text_table,
 };
 use crate::training::{Every, Hooks, Stop};
 use std::collections::BTreeMap;
@@ -261,10 +262,18 @@ fn conclude(
         .paragraph(&note)
         .table(&EXPERIMENT_HEADER, &table)
         .paragraph(conventions);
+    let remarks = experiment.remarks(&results.iter().map(|(run, _)| run).collect::<Vec<_>>());
+    let reductions = reduction_table(&experiment.reductions(results));
+    let report = remarks.iter().fold(report, |report, remark| report.paragraph(remark));
+    let report = if reductions.is_empty() { report } else { report.table(&REDUCTION_HEADER, &reductions) };
     let report = figures.iter().fold(report, |report, figure| report.figure(&figure.png, &figure.caption));
     folder.write("table.csv", csv(&table).as_bytes())?;
     folder.write("report.html", report.to_html().as_bytes())?;
-    let text = text_table(&EXPERIMENT_HEADER, &table);
+    let mut text = text_table(&EXPERIMENT_HEADER, &table) + "\n";
+    remarks.iter().for_each(|remark| text += &format!("{remark}\n"));
+    if !reductions.is_empty() {
+        text += &format!("\n{}", text_table(&REDUCTION_HEADER, &reductions));
+    }
     let report = folder.file("report.html");
     output::print(&format!(
         "{} ({})\n{text}\n{note}\nreport: {}\n\n",

@@ -247,6 +247,11 @@ fn learn_in<S: Scalar>(
         scale,
         wrong_signature: evaluation.wrong_signature,
         energy_errors: evaluation.trajectories.iter().map(|t| finite(t.summary.energy_error.mean)).collect(),
+        stretching: evaluation
+            .trajectories
+            .iter()
+            .map(|t| finite(t.summary.lyapunov_exponent? * test.t_end * horizon))
+            .collect(),
         integrated: evaluation.trajectories.iter().filter(|t| t.summary.stopped.is_none()).count(),
     });
     Ok(Learning::Finished(Box::new(Finished {

@@ -9,9 +9,11 @@ mod network;
 mod physical;
 mod presets;
 mod record;
+mod remarks;
 
 pub use budget::Scale;
 pub use record::{Learned, Outcome, Record, Row, Spread};
+pub use remarks::{Quantity, Reduction};
 
 use crate::names::unknown;
 use crate::training::Config;
@@ -23,8 +25,18 @@ pub struct Reported {
     pub loss: Option<f64>,
     /// Training instability.
     pub instability: Option<f64>,
-    /// Mean energy error of the trajectory test.
+    /// Mean energy error of the trajectory test, over all of its starts.
     pub energy: Option<f64>,
+    /// Mean energy error of a regular motion.
+    pub regular_energy: Option<f64>,
+    /// Mean energy error of a chaotic motion.
+    pub chaotic_energy: Option<f64>,
+}
+
+impl Reported {
+    /// Nothing.
+    const NOTHING: Self =
+        Self { loss: None, instability: None, energy: None, regular_energy: None, chaotic_energy: None };
 }
 
 /// One training of an experiment.
@@ -73,6 +85,8 @@ pub struct Experiment {
     pub finding: &'static str,
     /// Pictures.
     pub pictures: &'static [Picture],
+    /// Reductions that the paper states.
+    reductions: &'static [Reduction],
     /// Runs of one seed at the paper's scale.
     runs: fn() -> Vec<Run>,
 }

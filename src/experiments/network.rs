@@ -1,6 +1,6 @@
 //! The paper's network experiments, all on the double pendulum (its appendix "Training details of network experiments").
 
-use super::{Experiment, Picture, Reported, Run, slug};
+use super::{Experiment, Picture, Quantity, Reduction, Reported, Run, slug};
 use crate::lagrangian::configure;
 use crate::network::{Initialization, InputLayer, Nonlinearity};
 use crate::training::{Config, Preset, Regularizer, Scaling};
@@ -42,13 +42,17 @@ fn run(group: &str, label: &str, config: Config) -> Run {
     }
 }
 
+const fn reduction(quantity: Quantity, group: &'static str, against: &'static str, paper: f64) -> Reduction {
+    Reduction { quantity, group, against, paper }
+}
+
 impl Run {
     fn seed(mut self, seed: u64) -> Self {
         self.config.seed = seed;
         self
     }
     fn reported(mut self, loss: f64, instability: f64) -> Self {
-        self.reported = Reported { loss: Some(loss), instability: Some(instability), energy: None };
+        self.reported = Reported { loss: Some(loss), instability: Some(instability), ..Reported::NOTHING };
         self
     }
 }
@@ -61,6 +65,12 @@ pub(super) const REGULARIZATION: Experiment = Experiment {
               instability 90.7 % and 71.6 % below; 2 of 4 unregularized models useless for integration; the best \
               weight is 100 for both, and larger ones cost little.",
     pictures: &[Picture::Scan { abscissa: "lambda" }, Picture::TradeOff],
+    reductions: &[
+        reduction(Quantity::Loss, "eigenvalue", "none", 0.966),
+        reduction(Quantity::Loss, "Sylvester", "none", 0.964),
+        reduction(Quantity::Instability, "eigenvalue", "none", 0.9068),
+        reduction(Quantity::Instability, "Sylvester", "none", 0.7162),
+    ],
     runs: || {
         let base = || trained_on(baseline(), EXTENDED);
         let without = (0..4).map(|seed| {
@@ -86,6 +96,10 @@ pub(super) const SCALING: Experiment = Experiment {
     finding: "Normalised loss 40.9 % lower with physical scaling than without, instability 97.6 % lower; DyT falls short \
               of it. All with x tanh(kx).",
     pictures: &[Picture::TradeOff],
+    reductions: &[
+        reduction(Quantity::PhysicalLoss, "physical scaling", "no scaling", 0.4087),
+        reduction(Quantity::PhysicalInstability, "physical scaling", "no scaling", 0.9755),
+    ],
     runs: || {
         let model = |label: &str, scaling: Scaling, input_layer: InputLayer| {
             let mut config = baseline();
@@ -108,6 +122,7 @@ pub(super) const QUADRATIC_TERM: Experiment = Experiment {
     paper: "Fig. extraterm_performance",
     finding: "The term |v|^2 lowers instability substantially, and the mean validation loss too.",
     pictures: &[Picture::TradeOff],
+    reductions: &[],
     runs: || {
         let model = |activation: Nonlinearity, alpha: f64| {
             let mut config = baseline();
@@ -150,6 +165,7 @@ pub(super) const ACTIVATIONS: Experiment = Experiment {
     finding: "GELU is best in loss and instability, x tanh(kx) follows, softplus and the hybrid are far behind. Each row \
               is the mean over default and variance-preserving initialisation.",
     pictures: &[Picture::TradeOff],
+    reductions: &[],
     runs: || {
         [
             ("GELU", Nonlinearity::Gelu, 0.00738, 0.01452),
@@ -176,6 +192,7 @@ pub(super) const INITIALIZATION: Experiment = Experiment {
     paper: "Table initialization_comparison",
     finding: "Variance-preserving initialisation improves softplus, the hybrid and x tanh(kx), and slightly harms GELU.",
     pictures: &[Picture::TradeOff],
+    reductions: &[],
     runs: || {
         use Initialization::{Default as Plain, VariancePreserving as Custom};
         use Nonlinearity::{Gelu, QuadraticSoftplus as Hybrid, Softplus, XTanh};
@@ -206,6 +223,7 @@ pub(super) const TRAINING_RANGE: Experiment = Experiment {
     finding: "Trained on [0, 2 pi] alone, det M has wrong signs near 0 and 2 pi at high velocity; a range extended by \
               pi/10 to pi/2 on both sides cures it.",
     pictures: &[Picture::Evaluation(&["det_mass_matrix"])],
+    reductions: &[],
     runs: || {
         let extended = |by: f64| [-by, 2.0 * PI + by];
         [
@@ -233,6 +251,7 @@ pub(super) const OLD_TRICKS: Experiment = Experiment {
     finding: "The paper's model is better in loss and stability than softplus with the initialisation of Cranmer et al. \
               (2020) and than the hybrid network with |v|^2 of Liu et al. (2021), both on [0, 2 pi] without penalty.",
     pictures: &[Picture::TradeOff],
+    reductions: &[],
     runs: || {
         let old = |label: &str, activation, initialization, alpha| {
             let mut config = Config { penalty: Regularizer::None, ..trained_on(baseline(), TURN) };

@@ -16,8 +16,26 @@ pub struct Learned {
     pub wrong_signature: f64,
     /// Mean energy error of each start of the trajectory test, absent where there is none.
     pub energy_errors: Vec<Option<f64>>,
+    /// Lyapunov exponent of the exact motion of each start times the time span of the test, absent where unknown: the
+    /// logarithm of the factor by which neighbours part.
+    #[serde(default)]
+    pub stretching: Vec<Option<f64>>,
     /// Starts whose learned motion reached the end of the time span.
     pub integrated: usize,
+}
+
+/// A motion is regular below this logarithm of the factor by which its neighbours part: its Lyapunov time is then above a
+/// fifth of the time span. Those of regular motions of 50 s part by some 50, the span in units of a second.
+const REGULAR: f64 = 5.0;
+
+impl Learned {
+    /// Energy errors of the starts whose exact motion is regular, or of the others; without those of which it is not known.
+    fn energy_of(&self, regular: bool) -> impl Iterator<Item = f64> {
+        let pairs = self.energy_errors.iter().zip(&self.stretching);
+        pairs.filter_map(move |(error, stretching)| {
+            error.filter(|_| stretching.is_some_and(|s| (s < REGULAR) == regular))
+        })
+    }
 }
 
 /// What a training came to; kept beside the model as `record.json`.
@@ -93,6 +111,10 @@ pub struct Row {
     pub wrong_signature: Option<Spread>,
     /// Mean energy error over all starts.
     pub energy: Option<Spread>,
+    /// That over the starts whose exact motion is regular.
+    pub regular_energy: Option<Spread>,
+    /// That over the starts whose exact motion is chaotic.
+    pub chaotic_energy: Option<Spread>,
     /// Starts integrated to the end, of all.
     pub integrated: (usize, usize),
     /// What the paper reports.
@@ -134,6 +156,8 @@ fn row(label: &str, results: &[(Run, Option<Record>)]) -> Row {
         normalised_instability: of(|l| l.instability.map(|i| i * l.scale)),
         wrong_signature: of(|l| Some(l.wrong_signature)),
         energy: Spread::of(learned.iter().flat_map(|l| l.energy_errors.iter().copied().flatten())),
+        regular_energy: Spread::of(learned.iter().flat_map(|l| l.energy_of(true))),
+        chaotic_energy: Spread::of(learned.iter().flat_map(|l| l.energy_of(false))),
         integrated: (learned.iter().map(|l| l.integrated).sum(), learned.iter().map(|l| l.energy_errors.len()).sum()),
         reported,
     }
@@ -151,6 +175,8 @@ mod tests {
             instability: Some(loss / 10.0),
             scale: 10.0,
             wrong_signature: 0.25,
+            // Regular, chaotic, regular, ..
+            stretching: (0..energy_errors.len()).map(|k| Some(if k % 2 == 0 { 4.0 } else { 40.0 })).collect(),
             energy_errors,
             integrated,
         });
@@ -167,20 +193,31 @@ mod tests {
             times: vec![],
             seconds: 1.0,
         });
-        let mut records = vec![learned(0.1, vec![Some(0.5), None]), learned(0.3, vec![Some(0.1)]), nothing, None];
+        let mut records =
+            vec![learned(0.1, vec![Some(0.5), None]), learned(0.3, vec![Some(0.1), Some(0.6)]), nothing, None];
         records.resize(runs.len(), None);
         let results: Vec<(Run, Option<Record>)> = runs.into_iter().zip(records).collect();
         let rows = experiment.rows(&results);
         assert_eq!(rows.iter().map(|r| r.label.as_str()).collect::<Vec<_>>()[..2], ["GELU", "x tanh(kx)"]);
         let gelu = &rows[0];
-        assert_eq!((gelu.runs, gelu.failed, gelu.integrated), (2, 0, (2, 3)));
+        assert_eq!((gelu.runs, gelu.failed, gelu.integrated), (2, 0, (3, 4)));
         assert_eq!(gelu.loss, Some(Spread { mean: 0.2, low: 0.1, high: 0.3 }));
-        assert_eq!(gelu.energy, Some(Spread { mean: 0.3, low: 0.1, high: 0.5 }));
+        let energy = gelu.energy.unwrap();
+        assert!((energy.mean - 0.4).abs() < 1e-15 && (energy.low, energy.high) == (0.1, 0.6));
+        assert_eq!(gelu.regular_energy, Some(Spread { mean: 0.3, low: 0.1, high: 0.5 }));
+        assert_eq!(gelu.chaotic_energy, Some(Spread { mean: 0.6, low: 0.6, high: 0.6 }));
         assert!((gelu.normalised_instability.unwrap().mean - 0.2).abs() < 1e-15);
         assert_eq!(gelu.reported.loss, Some(0.00738));
         assert_eq!((rows[1].runs, rows[1].failed, rows[1].loss), (1, 1, None));
         assert_eq!((rows[2].runs, rows[2].integrated), (0, (0, 0)));
-        // A record reads back from its file.
+        // A record reads back from its file, also one that knows nothing of chaos.
+        let text = serde_json::to_string(&results[0].1).unwrap();
+        let field = ",\"stretching\":[4.0,40.0]";
+        assert!(text.contains(field), "{text}");
+        let Outcome::Learned(old) = serde_json::from_str::<Record>(&text.replace(field, "")).unwrap().outcome else {
+            panic!("{text}")
+        };
+        assert_eq!((old.energy_of(true).count(), old.energy_of(false).count()), (0, 0));
         for (_, record) in results {
             let text = serde_json::to_string(&record).unwrap();
             assert_eq!(serde_json::from_str::<Option<Record>>(&text).unwrap(), record);

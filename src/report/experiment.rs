@@ -1,10 +1,10 @@
 //! Tables and pictures of an experiment: the paper's figures beside ours.
 
 use super::{Figure, LinePlot, PlotError, Series, line_png};
-use crate::experiments::{Experiment, Outcome, Picture, Record, Row, Run, Spread};
+use crate::experiments::{Experiment, Outcome, Picture, Record, Reduction, Row, Run, Spread};
 
 /// Header of [`experiment_table`].
-pub const EXPERIMENT_HEADER: [&str; 11] = [
+pub const EXPERIMENT_HEADER: [&str; 13] = [
     "run",
     "runs",
     "loss",
@@ -16,7 +16,23 @@ pub const EXPERIMENT_HEADER: [&str; 11] = [
     "wrong signature",
     "integrated",
     "energy error",
+    "of regular motions",
+    "of chaotic motions",
 ];
+
+/// Header of [`reduction_table`].
+pub const REDUCTION_HEADER: [&str; 5] = ["reduction of", "by", "against", "here", "paper"];
+
+/// The reductions that the paper states beside those of these runs, below [`REDUCTION_HEADER`].
+pub fn reduction_table(reductions: &[(Reduction, Option<f64>)]) -> Vec<Vec<String>> {
+    let percent = |x: f64| format!("{:.1} %", 100.0 * x);
+    let row = |(reduction, found): &(Reduction, Option<f64>)| {
+        let Reduction { quantity, group, against, paper } = reduction;
+        let found = found.map_or_else(|| "-".to_string(), percent);
+        vec![quantity.name().to_string(), group.to_string(), against.to_string(), found, percent(*paper)]
+    };
+    reductions.iter().map(row).collect()
+}
 
 /// A spread as `mean [low, high]`, or the value alone where there is no spread.
 fn spread(value: Option<Spread>) -> String {
@@ -50,9 +66,9 @@ pub fn experiment_table(rows: &[Row]) -> Vec<Vec<String>> {
             let reported = |value: Option<f64>| value.map_or_else(|| "-".to_string(), number);
             let runs =
                 if row.failed == 0 { row.runs.to_string() } else { format!("{} ({} failed)", row.runs, row.failed) };
-            let energy = match row.reported.energy {
-                Some(paper) => format!("{} (paper {})", spread(row.energy), number(paper)),
-                None => spread(row.energy),
+            let energy = |own: Option<Spread>, paper: Option<f64>| match paper {
+                Some(paper) => format!("{} (paper {})", spread(own), number(paper)),
+                None => spread(own),
             };
             vec![
                 row.label.clone(),
@@ -65,7 +81,9 @@ pub fn experiment_table(rows: &[Row]) -> Vec<Vec<String>> {
                 spread(row.normalised_instability),
                 spread(row.wrong_signature),
                 format!("{}/{}", row.integrated.0, row.integrated.1),
-                energy,
+                energy(row.energy, row.reported.energy),
+                energy(row.regular_energy, row.reported.regular_energy),
+                energy(row.chaotic_energy, row.reported.chaotic_energy),
             ]
         })
         .collect()

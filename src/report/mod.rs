@@ -11,7 +11,10 @@ mod test_pictures;
 mod training;
 
 pub use evaluation::evaluation_figures;
-pub use experiment::{Curve, EXPERIMENT_HEADER, experiment_curves, experiment_figures, experiment_table};
+pub use experiment::{
+    Curve, EXPERIMENT_HEADER, REDUCTION_HEADER, experiment_curves, experiment_figures, experiment_table,
+    reduction_table,
+};
 pub use grids::{Fit, GridComparison, grid_figures};
 pub use html::Report;
 pub use plot::{HeatMap, LinePlot, PlotError, Series, Trace, heat_maps_png, line_png, trace_png};
