@@ -93,6 +93,33 @@ fn more_seeds_are_more_runs_of_the_same_rows() {
 }
 
 #[test]
+fn single_rows_can_be_run_and_tables_say_what_they_compare() {
+    let out = tempfile::tempdir().unwrap();
+    let path = out.path().to_str().unwrap();
+    let only = |text| lnn(&["scaling", "--scale", "smoke", "--only", text, "--out", path]);
+    let printed = succeeded(&only("DyT"));
+    let table = || fs::read_to_string(out.path().join("scaling-smoke/table.csv")).unwrap();
+    assert!(table().lines().count() == 2 && table().lines().nth(1).unwrap().starts_with("\"DyT\""), "{}", table());
+    for part in ["RAdam", "lambda = 5", "without the penalty"] {
+        assert!(printed.contains(part), "{printed} lacks {part}");
+    }
+    // Without the rows to compare there is no reduction of ours beside the paper's.
+    let is_missing = |printed: &str| {
+        let line =
+            printed.lines().find(|line| line.contains("physical scaling  no scaling") && line.contains("40.9 %"));
+        line.is_some_and(|line| line.split_whitespace().any(|word| word == "-"))
+    };
+    assert!(is_missing(&printed), "{printed}");
+    let printed = smoke("scaling", out.path(), "1");
+    assert_eq!(table().lines().count(), 4);
+    assert!(printed.contains("40.9 %") && !is_missing(&printed), "{printed}");
+    let refused = only("dyt");
+    let stderr = String::from_utf8_lossy(&refused.stderr);
+    assert_eq!((refused.status.code(), stderr.lines().count()), (Some(2), 1), "{stderr}");
+    assert!(stderr.contains("no row begins so; there are `physical scaling`, `no scaling`, `DyT`"), "{stderr}");
+}
+
+#[test]
 fn wrong_names_and_directories_are_refused() {
     for (arguments, code, part) in [
         (["activation", "--scale", "smoke"], 2, "activations"),
