@@ -30,7 +30,7 @@ pub struct Args {
     #[arg(long, value_enum, default_value = "short")]
     scale: ScaleName,
     /// Seeds of every run.
-    #[arg(long, value_name = "N", default_value = "1", allow_hyphen_values = true, value_parser = count)]
+    #[arg(long, value_name = "N", default_value = "1", allow_hyphen_values = true, value_parser = seeds)]
     seeds: usize,
     /// Only the runs whose row of the table begins with this text; a later command without it goes on from there.
     #[arg(long, value_name = "TEXT")]
@@ -102,6 +102,12 @@ fn chosen_runs<'a>(
         return Err(CliError::usage(format_args!("--only {text:?}: no row begins so; there are {rows}")));
     }
     Ok(kept)
+}
+
+/// Seeds of every run, no more than can be listed.
+fn seeds(text: &str) -> Result<usize, String> {
+    const MOST: usize = 10_000;
+    count(text).ok().filter(|n| *n <= MOST).ok_or_else(|| format!("expected a whole number from 1 to {MOST}"))
 }
 
 /// `label=file`.
