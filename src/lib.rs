@@ -23,6 +23,7 @@
 //! | get `L`, `p`, `M`, `a`, `E` of states | [`lagrangian::EulerLagrange::terms`] |
 //! | integrate, with error control or symplectically | [`rollout::rollout`], [`rollout::rollout_many`] |
 //! | learn from accelerations | [`training::run`] (a configuration), [`training::train`] (your own [`training::Dataset`]) |
+//! | know every key of a configuration | [`training::configuration_reference`], [`training::TRAINING_SECTIONS`] |
 //! | minimise your own loss of a network | [`training::Objective`], or [`network::Chunk`] and [`network::Adjoint`] below it |
 //! | store and load models | [`network::file::ModelFile`] |
 //! | differentiate a function of yours | [`tape::gradient`], [`tape::hessian`]; over many states [`tape::Program`] |

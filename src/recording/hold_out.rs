@@ -15,6 +15,8 @@ const STREAM: u64 = 8;
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum HeldOut {
+    /// Nothing: all data are learned from.
+    Nothing,
     /// Whole trajectories, by number, ascending.
     Tracks(Vec<usize>),
     /// The end of the only trajectory: samples `start..` after a gap of `gap` samples that nobody uses.
@@ -30,7 +32,7 @@ pub enum HeldOut {
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum HoldOutError {
     /// Not a share.
-    #[error("share of the data held out: expected a number between 0 and 1, found {0}")]
+    #[error("share of the data held out: expected 0, or a number between 0 and 1, found {0}")]
     Fraction(f64),
     /// One trajectory that is too short to be divided.
     #[error("{samples} samples are too few to hold out {fraction} of them after a gap of {gap}")]
@@ -47,11 +49,14 @@ pub enum HoldOutError {
 impl HeldOut {
     /// Chooses what is held out: trajectories in random order until they hold `fraction` of all samples, none that would
     /// make it more than twice as many, one at least and not all; of a single trajectory its last part, after a gap of `gap` samples, so that no window of
-    /// smoothing reaches from one side to the other.
+    /// smoothing reaches from one side to the other. Of a share of 0 nothing.
     ///
     /// # Errors
     /// [`HoldOutError`].
     pub fn choose(recording: &Recording, fraction: f64, gap: usize, seed: u64) -> Result<Self, HoldOutError> {
+        if fraction == 0.0 {
+            return Ok(Self::Nothing);
+        }
         if !(fraction > 0.0 && fraction < 1.0) {
             return Err(HoldOutError::Fraction(fraction));
         }
@@ -88,6 +93,7 @@ impl HeldOut {
     pub fn divide(&self, recording: &Recording) -> (Recording, Recording) {
         let with = |tracks: Vec<Track>| Recording { tracks, ..bare(recording) };
         match self {
+            Self::Nothing => (recording.clone(), bare(recording)),
             Self::Tracks(held) => {
                 let part = |inside: bool| {
                     let tracks = recording.tracks.iter().enumerate();
@@ -110,6 +116,7 @@ impl HeldOut {
     /// In words, such as `run3.csv, run7.csv`.
     pub fn describe(&self, recording: &Recording) -> String {
         match self {
+            Self::Nothing => "nothing".to_string(),
             Self::Tracks(held) => held
                 .iter()
                 .filter_map(|k| recording.tracks.get(*k))
@@ -206,7 +213,9 @@ mod tests {
         assert!(validation.tracks[0].v.is_empty() && validation.tracks[0].validate(2).is_ok());
         assert!(held.describe(&one).contains("last 20 samples"));
         assert!(matches!(hold_out(&one, 0.5, 60, 0), Err(HoldOutError::Short { .. })));
-        for bad in [0.0, 1.0, f64::NAN, -0.1] {
+        let (all, nothing) = hold_out(&one, 0.0, 0, 0).unwrap();
+        assert_eq!((all, nothing.tracks.len()), (one.clone(), 0));
+        for bad in [1.0, f64::NAN, -0.1] {
             assert!(matches!(hold_out(&one, bad, 0, 0), Err(HoldOutError::Fraction(_))));
         }
     }

@@ -49,7 +49,10 @@ pub struct Config {
     pub seed: u64,
     /// Precision of weights and arithmetic.
     pub precision: Precision,
-    /// Parameters of the system that differ from its defaults.
+    /// Model whose weights the training starts from, instead of random ones: a file, or the directory of a run.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub from: Option<String>,
+    /// Parameters of the system; those that are not given have its defaults.
     #[serde(default)]
     pub parameters: BTreeMap<String, f64>,
     /// Sampled states.
@@ -70,13 +73,21 @@ pub struct Config {
 }
 
 /// Full-batch L-BFGS in double precision on the states of the last phase, from the best weights so far.
+///
+/// Keys that are not given have their defaults: 100 iterations, 20 pairs.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, default)]
 pub struct Polish {
     /// Iterations at most.
     pub iterations: usize,
     /// Pairs of steps and gradient differences that are kept.
     pub memory: usize,
+}
+
+impl Default for Polish {
+    fn default() -> Self {
+        Self { iterations: 100, memory: 20 }
+    }
 }
 
 fn is_zero(x: &f64) -> bool {
@@ -233,101 +244,123 @@ impl Config {
     /// # Errors
     /// The first value out of range.
     pub fn validate(&self, n: usize) -> Result<(), ConfigError> {
-        let check = |ok: bool, field: &str, expected: &'static str, found: String| {
-            if ok { Ok(()) } else { Err(ConfigError { field: field.to_string(), expected, found }) }
-        };
-        let count = |value: usize, field: &str, most: usize| {
-            check((1..=most).contains(&value), field, "a positive number of sensible size", value.to_string())
-        };
-        let fraction = |value: f64, field: &str, ok: bool, expected| check(ok, field, expected, format!("{value}"));
+        self.faults(n).into_iter().next().map_or(Ok(()), Err)
+    }
+
+    /// Every value out of range, for a system of `n` coordinates, in the order of the keys.
+    pub fn faults(&self, n: usize) -> Vec<ConfigError> {
+        let mut faults = Faults::default();
         const STATES: usize = 1 << 30;
-        count(self.data.training, "data.training", STATES)?;
-        count(self.data.validation, "data.validation", STATES)?;
-        count(self.data.test, "data.test", STATES)?;
-        let off_shell = self.data.off_shell;
-        fraction(off_shell, "data.off_shell", (0.0..=1.0).contains(&off_shell), "a number from 0 to 1")?;
-        let motions = self.data.motions;
-        fraction(motions, "data.motions", (0.0..=1.0).contains(&motions), "a number from 0 to 1")?;
-        let relative = self.data.relative;
-        let ok = relative.is_finite() && relative >= 0.0;
-        fraction(relative, "data.relative", ok, "a finite number of at least 0")?;
-        check_bounds("data.validation_position", &self.data.validation_position, n)?;
-        check_bounds("data.validation_velocity", &self.data.validation_velocity, n)?;
-        let hidden = &self.network.hidden;
-        check(
-            !hidden.is_empty() && hidden.len() <= 64,
-            "network.hidden",
-            "1 to 64 widths",
-            format!("{}", hidden.len()),
-        )?;
-        for (k, &width) in hidden.iter().enumerate() {
-            let field = format!("network.hidden[{k}]");
-            count(width, &field, MAX_WIDTH)?;
-            let ok = width.is_multiple_of(self.network.activation.branches().len());
-            check(
-                ok,
-                &field,
-                "an even width, for quadratic-softplus is two networks of half the width",
-                width.to_string(),
-            )?;
+        let data = &self.data;
+        faults.count(data.training, "data.training", STATES);
+        faults.count(data.validation, "data.validation", STATES);
+        faults.count(data.test, "data.test", STATES);
+        for (value, field) in [(data.off_shell, "data.off_shell"), (data.motions, "data.motions")] {
+            faults.number(value, field, (0.0..=1.0).contains(&value), "a number from 0 to 1");
         }
-        let finite = "a finite number";
-        fraction(self.network.alpha, "network.alpha", self.network.alpha.is_finite(), finite)?;
-        if let Some(units) = self.network.dissipation {
-            count(units, "network.dissipation", MAX_WIDTH)?;
-        }
-        let lambda = self.penalty.lambda();
-        fraction(lambda, "penalty.lambda", lambda.is_finite() && lambda >= 0.0, "a finite number of at least 0")?;
+        faults.from_zero(data.relative, "data.relative");
+        faults.bounds("data.validation_position", &data.validation_position, n);
+        faults.bounds("data.validation_velocity", &data.validation_velocity, n);
+        self.network_faults(&mut faults);
+        faults.from_zero(self.penalty.lambda(), "penalty.lambda");
         let optimizer = &self.optimizer;
-        count(optimizer.batch, "optimizer.batch", STATES)?;
-        let decay = optimizer.weight_decay;
-        let ok = decay.is_finite() && decay >= 0.0;
-        fraction(decay, "optimizer.weight_decay", ok, "a finite number of at least 0")?;
-        fraction(optimizer.clip, "optimizer.clip", optimizer.clip > 0.0, "a positive number")?;
+        faults.count(optimizer.batch, "optimizer.batch", STATES);
+        faults.from_zero(optimizer.weight_decay, "optimizer.weight_decay");
+        faults.number(optimizer.clip, "optimizer.clip", optimizer.clip > 0.0, "a positive number");
         let averaging = optimizer.averaging;
-        fraction(averaging, "optimizer.averaging", (0.0..1.0).contains(&averaging), "a number from 0 to below 1")?;
-        check(!self.phases.is_empty(), "phase", "at least one phase", "none".to_string())?;
+        let ok = (0.0..1.0).contains(&averaging);
+        faults.number(averaging, "optimizer.averaging", ok, "a number from 0 to below 1");
+        faults.check(!self.phases.is_empty(), "phase", "at least one phase", "none".to_string());
         for (k, phase) in self.phases.iter().enumerate() {
-            let field = |name: &str| format!("phase[{k}].{name}");
-            count(phase.epochs, &field("epochs"), 1 << 24)?;
-            let positive = |x: f64| x.is_finite() && x > 0.0;
-            fraction(phase.rate, &field("rate"), positive(phase.rate), "a positive number")?;
-            let ok = (0.0..=phase.rate).contains(&phase.eta_min);
-            fraction(phase.eta_min, &field("eta_min"), ok, "a number from 0 to the rate")?;
-            fraction(phase.t_max, &field("t_max"), positive(phase.t_max), "a positive number of epochs")?;
-            check_bounds(&field("position"), &phase.position, n)?;
-            check_bounds(&field("velocity"), &phase.velocity, n)?;
-            let logarithmic = &phase.logarithmic;
-            let found = format!("{} for {n}", logarithmic.len());
-            let expected = "nothing or true or false for each coordinate";
-            check(logarithmic.is_empty() || logarithmic.len() == n, &field("logarithmic"), expected, found)?;
-            for (i, &[low, _]) in phase.position.iter().enumerate() {
-                let ok = low > 0.0 || !logarithmic.get(i).copied().unwrap_or(false);
-                let expected = "a lowest coordinate above 0 to take its logarithm";
-                check(ok, &field(&format!("position[{i}]")), expected, format!("{low}"))?;
-            }
+            phase.faults(k, n, &mut faults);
         }
         if let Some(polish) = &self.polish {
-            count(polish.iterations, "polish.iterations", 1 << 24)?;
-            count(polish.memory, "polish.memory", 1000)?;
+            faults.count(polish.iterations, "polish.iterations", 1 << 24);
+            faults.count(polish.memory, "polish.memory", 1000);
         }
-        Ok(())
+        faults.0
+    }
+
+    fn network_faults(&self, faults: &mut Faults) {
+        let network = &self.network;
+        let hidden = &network.hidden;
+        let ok = !hidden.is_empty() && hidden.len() <= 64;
+        faults.check(ok, "network.hidden", "1 to 64 widths", hidden.len().to_string());
+        for (k, &width) in hidden.iter().enumerate() {
+            let field = format!("network.hidden[{k}]");
+            let even = "an even width, for quadratic-softplus is two networks of half the width";
+            let ok = width.is_multiple_of(network.activation.branches().len());
+            if faults.count(width, &field, MAX_WIDTH) {
+                faults.check(ok, &field, even, width.to_string());
+            }
+        }
+        faults.number(network.alpha, "network.alpha", network.alpha.is_finite(), "a finite number");
+        if let Some(units) = network.dissipation {
+            faults.count(units, "network.dissipation", MAX_WIDTH);
+        }
     }
 }
 
-fn check_bounds(field: &str, bounds: &[[f64; 2]], n: usize) -> Result<(), ConfigError> {
-    let fault = |field: String, expected, found| Err(ConfigError { field, expected, found });
-    if bounds.len() != n {
-        return fault(field.to_string(), "one [low, high] per coordinate", format!("{} for {n}", bounds.len()));
+impl Phase {
+    /// Every value of phase `k` that is out of range, for `n` coordinates.
+    fn faults(&self, k: usize, n: usize, faults: &mut Faults) {
+        let field = |name: &str| format!("phase[{k}].{name}");
+        faults.count(self.epochs, &field("epochs"), 1 << 24);
+        let positive = |x: f64| x.is_finite() && x > 0.0;
+        if faults.number(self.rate, &field("rate"), positive(self.rate), "a positive number") {
+            let ok = (0.0..=self.rate).contains(&self.eta_min);
+            faults.number(self.eta_min, &field("eta_min"), ok, "a number from 0 to the rate");
+        }
+        faults.number(self.t_max, &field("t_max"), positive(self.t_max), "a positive number of epochs");
+        faults.bounds(&field("position"), &self.position, n);
+        faults.bounds(&field("velocity"), &self.velocity, n);
+        let logarithmic = &self.logarithmic;
+        let found = format!("{} for {n}", logarithmic.len());
+        let expected = "nothing or true or false for each coordinate";
+        faults.check(logarithmic.is_empty() || logarithmic.len() == n, &field("logarithmic"), expected, found);
+        for (i, &[low, _]) in self.position.iter().enumerate() {
+            let ok = low > 0.0 || !logarithmic.get(i).copied().unwrap_or(false);
+            let expected = "a lowest coordinate above 0 to take its logarithm";
+            faults.check(ok, &field(&format!("position[{i}]")), expected, format!("{low}"));
+        }
     }
-    for (k, &[low, high]) in bounds.iter().enumerate() {
-        if !(low.is_finite() && high.is_finite() && low <= high) {
-            return fault(format!("{field}[{k}]"), "finite [low, high] in order", format!("[{low}, {high}]"));
+}
+
+/// Values out of range, as they are found.
+#[derive(Debug, Default)]
+pub(super) struct Faults(pub Vec<ConfigError>);
+
+impl Faults {
+    /// Notes a value unless it is as expected; whether it is comes back.
+    pub fn check(&mut self, ok: bool, field: &str, expected: &'static str, found: String) -> bool {
+        if !ok {
+            self.0.push(ConfigError { field: field.to_string(), expected, found });
+        }
+        ok
+    }
+    /// A number that is as expected or not.
+    pub fn number(&mut self, value: f64, field: &str, ok: bool, expected: &'static str) -> bool {
+        self.check(ok, field, expected, format!("{value}"))
+    }
+    /// A finite number of at least 0.
+    pub fn from_zero(&mut self, value: f64, field: &str) -> bool {
+        self.number(value, field, value.is_finite() && value >= 0.0, "a finite number of at least 0")
+    }
+    /// A whole number from 1 to `most`.
+    pub fn count(&mut self, value: usize, field: &str, most: usize) -> bool {
+        self.check((1..=most).contains(&value), field, "a positive number of sensible size", value.to_string())
+    }
+    /// A finite `[low, high]` for each of `n` coordinates.
+    fn bounds(&mut self, field: &str, bounds: &[[f64; 2]], n: usize) {
+        let found = format!("{} for {n}", bounds.len());
+        self.check(bounds.len() == n, field, "one [low, high] per coordinate", found);
+        for (k, &[low, high]) in bounds.iter().enumerate() {
+            let ok = low.is_finite() && high.is_finite() && low <= high;
+            self.check(ok, &format!("{field}[{k}]"), "finite [low, high] in order", format!("[{low}, {high}]"));
         }
         if !(high - low).is_finite() {
             let expected = "[low, high] no further apart than the largest number";
             return fault(format!("{field}[{k}]"), expected, format!("[{low:e}, {high:e}]"));
         }
     }
-    Ok(())
 }

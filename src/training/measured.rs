@@ -20,7 +20,8 @@ use thiserror::Error;
 pub struct Preparation {
     /// Local polynomials.
     pub smoothing: SmoothOptions,
-    /// Share of the samples held out to judge; half as much of the rest chooses the best epoch.
+    /// Share of the samples held out to judge; half as much of the rest chooses the best epoch. With 0 everything is learned
+    /// from and chooses the best epoch too, and nothing judges.
     pub held_out: f64,
     /// Most states of a supervised training; of more, evenly spaced ones are taken.
     pub most_states: usize,
@@ -136,6 +137,7 @@ impl Measured {
         };
         let (held_out, rest, test) = divide(recording, *share)?;
         let (training, validation) = match divide(&rest, share / 2.0) {
+            Ok((HeldOut::Nothing, ..)) => (rest.clone(), rest),
             Ok((_, training, validation)) => (training, validation),
             Err(_) => (rest, test.clone()),
         };
@@ -149,7 +151,8 @@ impl Measured {
         Targets::advised(self.training.recording.has_accelerations(), self.smoothing.acceleration_error())
     }
 
-    /// States and accelerations for a supervised training, validation and test.
+    /// States and accelerations for a supervised training, validation and test; where nothing is held out, the test is the
+    /// validation.
     ///
     /// # Errors
     /// [`MeasuredError::Dataset`], if no sample has a full window around it for instance.
@@ -158,11 +161,12 @@ impl Measured {
         let dataset = |which, part: &Part, most| {
             part.dataset::<S>(targets, most).map_err(|source| MeasuredError::Dataset { which, source })
         };
-        Ok(Datasets {
-            training: vec![dataset("training states", &self.training, most)?],
-            validation: dataset("validation states", &self.validation, most / 5)?,
-            test: dataset("test states", &self.test, most / 5)?,
-        })
+        let validation = dataset("validation states", &self.validation, most / 5)?;
+        let test = match self.held_out {
+            HeldOut::Nothing => validation.clone(),
+            _ => dataset("test states", &self.test, most / 5)?,
+        };
+        Ok(Datasets { training: vec![dataset("training states", &self.training, most)?], validation, test })
     }
 
     /// Standard deviations of the noise; where data have none, a millionth of their spread.

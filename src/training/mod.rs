@@ -12,6 +12,7 @@ mod penalty;
 mod polish;
 mod preset;
 mod recipe;
+mod reference;
 mod sampling;
 mod schedule;
 pub mod shooting;
@@ -32,6 +33,7 @@ pub use optimizer::{Method, Moments, Update};
 pub use penalty::{Penalty, Regularizer};
 pub use preset::Preset;
 pub use recipe::{Outcome, RecipeError, run};
+pub use reference::{Key, SHOOTING_SECTION, Section, TRAINING_SECTIONS, configuration_reference, section_reference};
 pub use sampling::{SamplingError, sample, sample_all};
 pub use schedule::Schedule;
 pub use signature::{

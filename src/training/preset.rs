@@ -56,6 +56,7 @@ fn base(system: &Configured<f64>, states: usize, network: Network) -> Config {
         system: system.system.name.to_string(),
         seed: 0,
         precision: Precision::F32,
+        from: None,
         parameters: Default::default(),
         data: Data {
             training: states,
@@ -198,6 +199,7 @@ pub(super) fn recorded(
         system: name.to_string(),
         seed: 0,
         precision: Precision::F32,
+        from: None,
         parameters: Default::default(),
         data: Data {
             training,

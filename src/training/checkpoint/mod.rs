@@ -53,6 +53,10 @@ impl<S: Scalar> Snapshot<S> {
 }
 
 impl<S> Snapshot<S> {
+    /// The beginning of a training from these weights, such as those of a model that learns on.
+    pub fn beginning_with(weights: Vec<S>) -> Self {
+        Self { seconds: 0.0, ended: Ended::none(weights), underway: None }
+    }
     /// Steps taken so far.
     pub fn steps(&self) -> usize {
         self.underway.as_ref().map_or(self.ended.steps, |underway| underway.course.step)

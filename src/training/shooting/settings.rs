@@ -1,6 +1,6 @@
 //! Settings of multiple shooting.
 
-use crate::training::config::ConfigError;
+use crate::training::config::{ConfigError, Faults};
 use crate::training::optimizer::Method;
 use serde::{Deserialize, Serialize};
 
@@ -79,31 +79,32 @@ impl Shooting {
     /// # Errors
     /// The first value out of range.
     pub fn validate(&self) -> Result<(), ConfigError> {
-        let check = |ok: bool, field: &str, expected: &'static str, found: String| {
-            let field = format!("shooting.{field}");
-            if ok { Ok(()) } else { Err(ConfigError { field, expected, found }) }
-        };
-        let count = |value: usize, field: &str, least: usize, most: usize, expected| {
-            check((least..=most).contains(&value), field, expected, value.to_string())
-        };
-        let number = |value: f64, field: &str, ok: bool, expected| check(ok, field, expected, format!("{value}"));
-        let sensible = "a positive number of sensible size";
-        count(self.samples_per_segment, "samples_per_segment", 2, 1 << 16, "2 to 65536 samples")?;
+        self.faults().into_iter().next().map_or(Ok(()), Err)
+    }
+
+    /// Every value out of range, in the order of the keys.
+    pub fn faults(&self) -> Vec<ConfigError> {
+        let mut faults = Faults::default();
+        let within = 2..=1 << 16;
+        let found = self.samples_per_segment.to_string();
+        let ok = within.contains(&self.samples_per_segment);
+        faults.check(ok, "shooting.samples_per_segment", "2 to 65536 samples", found);
         if let Some(steps) = self.steps {
-            count(steps, "steps", 1, 1 << 16, "1 to 65536 steps")?;
+            faults.check((1..=1 << 16).contains(&steps), "shooting.steps", "1 to 65536 steps", steps.to_string());
         }
-        count(self.epochs, "epochs", 1, 1 << 24, sensible)?;
-        count(self.batch, "batch", 1, 1 << 30, sensible)?;
-        number(self.rate, "rate", self.rate.is_finite() && self.rate > 0.0, "a positive number")?;
-        let from_zero = |x: f64| x.is_finite() && x >= 0.0;
-        let least_zero = "a finite number of at least 0";
-        number(self.weight_decay, "weight_decay", from_zero(self.weight_decay), least_zero)?;
-        number(self.clip, "clip", self.clip > 0.0, "a positive number")?;
-        number(self.continuity, "continuity", from_zero(self.continuity), least_zero)?;
-        number(self.huber, "huber", self.huber > 0.0, "a positive number, inf for plain squares")?;
-        let share = self.start_share;
-        number(share, "start_share", share > 0.0 && share <= 1.0, "a number above 0, at most 1")?;
-        count(self.curvature_every, "curvature_every", 1, 1 << 24, sensible)
+        faults.count(self.epochs, "shooting.epochs", 1 << 24);
+        faults.count(self.batch, "shooting.batch", 1 << 30);
+        let ok = self.rate.is_finite() && self.rate > 0.0;
+        faults.number(self.rate, "shooting.rate", ok, "a positive number");
+        faults.from_zero(self.weight_decay, "shooting.weight_decay");
+        faults.number(self.clip, "shooting.clip", self.clip > 0.0, "a positive number");
+        faults.from_zero(self.continuity, "shooting.continuity");
+        let expected = "a positive number, inf for plain squares";
+        faults.number(self.huber, "shooting.huber", self.huber > 0.0, expected);
+        let ok = self.start_share > 0.0 && self.start_share <= 1.0;
+        faults.number(self.start_share, "shooting.start_share", ok, "a number above 0, at most 1");
+        faults.count(self.curvature_every, "shooting.curvature_every", 1 << 24);
+        faults.0
     }
 }
 

@@ -332,6 +332,7 @@ fn config(units: Option<usize>, epochs: usize) -> Config {
     // States are given, not sampled.
     let bounds = || vec![[-1.0, 1.0]; 2];
     Config {
+        from: None,
         system: "recorded".to_string(),
         seed: 1,
         precision: Precision::F32,

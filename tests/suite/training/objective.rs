@@ -399,6 +399,7 @@ proptest! {
 
 fn config(epochs: usize) -> Config {
     Config {
+        from: None,
         system: "none".to_string(),
         seed: 3,
         precision: Precision::F32,
