@@ -1,26 +1,10 @@
 //! TOML configurations with errors that name file, line, key and the nearest known key.
 
-use crate::cli::CliError;
 use crate::names::nearest;
-use crate::storage::read_regular;
 use serde::de::DeserializeOwned;
+use std::collections::BTreeMap;
 use std::ops::Range;
-use std::path::Path;
 use toml::de::{DeTable, DeValue};
-
-/// Largest configuration that is read, in bytes.
-const MAX_BYTES: u64 = 1 << 20;
-
-/// Reads a configuration; its text is returned beside it.
-///
-/// # Errors
-/// A file that cannot be read is a data error, everything in it a usage error: `FILE:LINE: KEY: problem`.
-pub fn load<T: DeserializeOwned>(path: &Path) -> Result<T, CliError> {
-    let bytes = read_regular(path, MAX_BYTES).map_err(|e| CliError::file(path, e))?;
-    let text =
-        String::from_utf8(bytes).map_err(|_| CliError::usage(format_args!("{}: not UTF-8 text", path.display())))?;
-    parse(&text).map_err(|(line, problem)| CliError::usage(format_args!("{}:{line}: {problem}", path.display())))
-}
 
 /// Parses a configuration.
 ///
@@ -39,8 +23,44 @@ pub fn parse<T: DeserializeOwned>(text: &str) -> Result<T, (usize, String)> {
     })
 }
 
+/// Line, from 1, of every key of a text, by its path, such as `phase[0].rate`.
+///
+/// # Errors
+/// As [`parse`], for text that is not TOML.
+pub(super) fn lines(text: &str) -> Result<BTreeMap<String, usize>, (usize, String)> {
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let line = |at: usize| 1 + text.as_bytes()[..at.min(text.len())].iter().filter(|b| **b == b'\n').count();
+    let table = DeTable::parse(text)
+        .map_err(|error| (line(error.span().map_or(0, |span| span.start)), error.message().to_string()))?;
+    let mut found = BTreeMap::new();
+    note_lines(table.get_ref(), "", &line, &mut found);
+    Ok(found)
+}
+
+/// Notes the lines of the keys of a table.
+fn note_lines(table: &DeTable<'_>, before: &str, line: &dyn Fn(usize) -> usize, found: &mut BTreeMap<String, usize>) {
+    for (key, value) in table {
+        let name: &str = key.get_ref();
+        let path = if before.is_empty() { name.to_string() } else { format!("{before}.{name}") };
+        found.insert(path.clone(), line(key.span().start));
+        match value.get_ref() {
+            DeValue::Table(inner) => note_lines(inner, &path, line, found),
+            DeValue::Array(items) => {
+                for (k, item) in items.iter().enumerate() {
+                    let path = format!("{path}[{k}]");
+                    found.insert(path.clone(), line(item.span().start));
+                    if let DeValue::Table(inner) = item.get_ref() {
+                        note_lines(inner, &path, line, found);
+                    }
+                }
+            }
+            _ => {}
+        }
+    }
+}
+
 /// serde's message with the nearest known name instead of a long list.
-fn explain(message: &str) -> String {
+pub(super) fn explain(message: &str) -> String {
     let quoted: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
     let unknown = ["unknown field", "unknown variant"].iter().any(|start| message.starts_with(start));
     match quoted.split_first() {
@@ -150,16 +170,5 @@ mod tests {
         assert!(refusal("seed = 1", "seed = 1\nseed = 2").contains("duplicate key"));
         assert!(refusal("seed = 1", "seed = ").starts_with("1: "));
         assert!(refusal("seed = 1\n", "").contains("missing field `seed`"));
-    }
-
-    #[test]
-    fn files_are_named() {
-        let directory = tempfile::tempdir().unwrap();
-        let path = directory.path().join("c.toml");
-        assert_eq!(load::<Config>(&path).unwrap_err().kind(), crate::cli::Kind::Data);
-        std::fs::write(&path, "seed = 1\nseeed = 2\n").unwrap();
-        let error = load::<Config>(&path).unwrap_err();
-        assert_eq!(error.kind(), crate::cli::Kind::Usage);
-        assert!(error.to_string().contains("c.toml:2: "), "{error}");
     }
 }

@@ -1,4 +1,4 @@
-//! How a command fails: one line and an exit code.
+//! How a command fails: one line, or one for each mistake of a configuration, and an exit code.
 
 use crate::names::one_line;
 use std::fmt;
@@ -30,6 +30,14 @@ impl CliError {
     /// Wrong arguments or configuration.
     pub fn usage(message: impl fmt::Display) -> Self {
         Self { kind: Kind::Usage, message: one_line(&message.to_string()) }
+    }
+    /// Several mistakes in arguments or configuration, one line each.
+    ///
+    /// # Errors
+    /// Always, if there are any.
+    pub fn all_usage(messages: impl IntoIterator<Item = String>) -> Result<(), Self> {
+        let lines: Vec<String> = messages.into_iter().map(|message| one_line(&message)).collect();
+        if lines.is_empty() { Ok(()) } else { Err(Self { kind: Kind::Usage, message: lines.join("\nerror: ") }) }
     }
     /// Wrong data, or a file that cannot be read or written.
     pub fn data(message: impl fmt::Display) -> Self {
@@ -80,6 +88,9 @@ mod tests {
     #[test]
     fn messages_are_one_line() {
         assert_eq!(CliError::usage("a\n\n  b\u{7}").to_string(), "a b\\u{7}");
+        let two = CliError::all_usage(["a\nb", "c"].map(String::from)).unwrap_err();
+        assert_eq!(format!("error: {two}"), "error: a b\nerror: c");
+        assert_eq!(CliError::all_usage([]), Ok(()));
     }
 
     #[test]

@@ -2,7 +2,8 @@
 
 use crate::cli::evaluation::{Evaluation, Plan, RTOL, evaluate};
 use crate::cli::folder::Folder;
-use crate::cli::learned::Learned;
+use crate::cli::learned::{Learned, model_file};
+use crate::cli::learning::parameter_table;
 use crate::cli::number::{bounds, count, positive, threads};
 use crate::cli::{CliError, output};
 use crate::lagrangian::Configured;
@@ -18,7 +19,7 @@ const STATES: usize = 12_000;
 /// Arguments.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Model file.
+    /// Model, a file or the directory of a run.
     model: PathBuf,
     /// Random starts of the trajectory test.
     #[arg(long, value_name = "N", default_value = "4", allow_hyphen_values = true, value_parser = count)]
@@ -85,7 +86,8 @@ fn span(args: &Args, system: &Configured<f64>) -> Result<TrajectoryTest, CliErro
 pub fn run(args: &Args) -> Result<(), CliError> {
     let learned = Learned::<f64>::load(&args.model)?;
     let system = learned.system(&args.model)?;
-    let beside = || args.model.parent().unwrap_or(Path::new("")).join("evaluation");
+    let file = model_file(&args.model)?;
+    let beside = || file.parent().unwrap_or(Path::new("")).join("evaluation");
     let folder = Folder::open(&args.out.clone().unwrap_or_else(beside))?;
 
     let seed = args.seed.unwrap_or(learned.header.seed);
@@ -115,7 +117,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         folder.write(&figure.file, &figure.png)?;
     }
     folder.write("evaluation.json", json.as_bytes())?;
-    folder.write("report.html", evaluation.report(report).to_html().as_bytes())?;
+    folder.write("report.html", evaluation.report(parameter_table(report, &system)).to_html().as_bytes())?;
     if args.json {
         return output::print(&json);
     }

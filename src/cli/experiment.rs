@@ -27,7 +27,7 @@ pub struct Args {
     /// An experiment by name, or `all`; without a name they are listed with the tables and figures they regenerate.
     name: Option<String>,
     /// How much of the paper's budget.
-    #[arg(long, value_enum, default_value = "short")]
+    #[arg(long, value_enum, value_name = "SCALE", default_value = "short")]
     scale: ScaleName,
     /// Seeds of every run.
     #[arg(long, value_name = "N", default_value = "1", allow_hyphen_values = true, value_parser = seeds)]
@@ -45,6 +45,9 @@ pub struct Args {
     /// Directory; an experiment goes into NAME-SCALE in it.
     #[arg(long, value_name = "DIR", default_value = "runs/experiments")]
     out: PathBuf,
+    /// One JSON object per line instead of tables.
+    #[arg(long)]
+    json: bool,
 }
 
 #[derive(Clone, Copy, Debug, clap::ValueEnum)]
@@ -65,7 +68,7 @@ enum ScaleName {
 pub fn run(args: &Args) -> Result<(), CliError> {
     let Some(name) = &args.name else {
         interrupt::end_at_once()?;
-        return output::print(&listing());
+        return output::print(&listing(args.json));
     };
     let scale = match args.scale {
         ScaleName::Smoke => Scale::Smoke,
@@ -78,7 +81,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let hooks = Hooks { watcher: None, interrupt: interrupt::flag()? };
     for (experiment, runs) in chosen_runs(args, &chosen, scale)? {
         let path = args.out.join(format!("{}-{}", experiment.name, scale.name()));
-        perform((experiment, scale), runs, threads(args.threads), &path, (&curves, &hooks))?;
+        perform((experiment, scale), runs, threads(args.threads), &path, (&curves, &hooks, args.json))?;
     }
     Ok(())
 }
@@ -129,7 +132,14 @@ fn curve((label, file): &(String, PathBuf)) -> Result<Curve, CliError> {
     Ok(Curve { label: label.clone(), points: reading.recording.tracks.into_iter().flat_map(points).collect() })
 }
 
-fn listing() -> String {
+fn listing(json: bool) -> String {
+    if json {
+        let described = |e: &Experiment| {
+            let runs = e.runs(Scale::Paper, 1).len();
+            serde_json::json!({ "name": e.name, "title": e.title, "paper": e.paper, "runs": runs })
+        };
+        return experiments().iter().map(|experiment| format!("{}\n", described(experiment))).collect();
+    }
     let rows: Vec<Vec<String>> = experiments()
         .iter()
         .map(|e| vec![e.name.to_string(), e.paper.to_string(), e.runs(Scale::Paper, 1).len().to_string()])
@@ -142,7 +152,7 @@ fn perform(
     runs: Vec<Run>,
     threads: usize,
     path: &Path,
-    (beside, hooks): (&[Curve], &Hooks),
+    (beside, hooks, json): (&[Curve], &Hooks, bool),
 ) -> Result<(), CliError> {
     let started = Instant::now();
     let folder = Folder::open(path)?;
@@ -182,7 +192,7 @@ fn perform(
             results.len()
         )));
     }
-    conclude(experiment, scale, (&results, beside), &folder, path, started)
+    conclude(experiment, scale, (&results, beside, json), &folder, path, started)
 }
 
 /// The record of a run: the one that is there if it was made from the same configuration, or a new one. `None` if it was
@@ -236,7 +246,7 @@ fn finished(path: &Path, toml: &str) -> Option<Record> {
 fn conclude(
     experiment: &Experiment,
     scale: Scale,
-    (results, beside): (&[(Run, Option<Record>)], &[Curve]),
+    (results, beside, json): (&[(Run, Option<Record>)], &[Curve], bool),
     folder: &Folder,
     path: &Path,
     started: Instant,
@@ -275,6 +285,21 @@ fn conclude(
     let report = figures.iter().fold(report, |report, figure| report.figure(&figure.png, &figure.caption));
     folder.write("table.csv", csv(&table).as_bytes())?;
     folder.write("report.html", report.to_html().as_bytes())?;
+    if json {
+        let row = |cells: &Vec<String>| {
+            let named = EXPERIMENT_HEADER.iter().zip(cells);
+            named.map(|(name, cell)| (name.to_string(), cell.as_str().into())).collect::<serde_json::Map<_, _>>()
+        };
+        let object = serde_json::json!({
+            "experiment": experiment.name,
+            "scale": scale.name(),
+            "runs": results.len(),
+            "training_seconds": training,
+            "rows": table.iter().map(row).collect::<Vec<_>>(),
+            "report": folder.file("report.html").display().to_string(),
+        });
+        return output::print(&format!("{object}\n"));
+    }
     let mut text = text_table(&EXPERIMENT_HEADER, &table) + "\n";
     remarks.iter().for_each(|remark| text += &format!("{remark}\n"));
     if !reductions.is_empty() {

@@ -1,11 +1,15 @@
 //! `lnn fit`: learns from recorded motion, judges by motion that was held out, writes.
 
+use crate::cli::changes::PenaltyName;
 use crate::cli::fit_args::Args;
+use crate::cli::fit_config::{FitConfig, Recording, Settled};
 use crate::cli::fit_summary::Found;
 use crate::cli::folder::Folder;
 use crate::cli::judgement::{Plan, judge};
 use crate::cli::learning::history;
 use crate::cli::number::threads;
+use crate::cli::print_config::PrintFormat;
+use crate::cli::start::{Start, weights};
 use crate::cli::train::hooks;
 use crate::cli::train_config::PrecisionName;
 use crate::cli::{CliError, interrupt, memory, output};
@@ -16,23 +20,12 @@ use crate::recording::survey::{SurveyOptions, survey};
 use crate::recording::{Reading, Targets};
 use crate::scalar::Scalar;
 use crate::training::shooting::{self, Shooting, Task};
-use crate::training::{Config, Measured, Preparation, Regularizer, Stop, Trained, train, training_memory};
-use serde::Serialize;
+use crate::training::{
+    Config, Measured, Preparation, Regularizer, Sitting, Snapshot, Stop, Trained, configuration_reference, resume,
+    training_memory,
+};
 use std::path::PathBuf;
 use std::time::Instant;
-
-/// What `config.toml` holds: everything but the data.
-#[derive(Serialize)]
-struct Record<'a> {
-    targets: Targets,
-    held_out: f64,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    window: Option<usize>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    noise: Option<&'a [f64]>,
-    shooting: Option<&'a Shooting>,
-    training: &'a Config,
-}
 
 /// Learns and writes everything into the output directory.
 ///
@@ -41,8 +34,13 @@ struct Record<'a> {
 /// last the best model so far is written, if there is one.
 pub fn run(args: &Args) -> Result<(), CliError> {
     let started = Instant::now();
+    if args.print_config == Some(PrintFormat::Markdown) {
+        return output::print(&(FitConfig::reference() + &configuration_reference()));
+    }
+    let settled = Settled::of(args)?;
+    let args = &settled.args;
     let reading = args.recording.read()?;
-    let path = args.out.clone().unwrap_or_else(|| PathBuf::from("runs").join(&args.name));
+    let path = args.out.clone().unwrap_or_else(|| PathBuf::from("runs").join(args.name()));
     if let Some(time) = &args.timelike {
         let names = &reading.recording.coordinates;
         if !names.contains(time) {
@@ -52,8 +50,8 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     }
     let preparation = Preparation {
         smoothing: SmoothOptions { window: args.window, noise: args.noise.clone(), ..SmoothOptions::default() },
-        held_out: args.hold_out,
-        seed: args.seed,
+        held_out: args.share(),
+        seed: args.seed(),
         ..Preparation::default()
     };
     let measured = Measured::new(&reading.recording, &preparation).map_err(CliError::data)?;
@@ -61,7 +59,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     if targets == Targets::Measured && !measured.training.recording.has_accelerations() {
         return Err(CliError::usage("--targets measured: no accelerations were given, see --acceleration"));
     }
-    let looking = SurveyOptions { smooth: preparation.smoothing, validation: args.hold_out, seed: args.seed };
+    let looking = SurveyOptions { smooth: preparation.smoothing, validation: args.share(), seed: args.seed() };
     let found = survey(&reading, &looking).map_err(CliError::data)?;
     found.warnings.iter().for_each(|warning| output::note(warning));
     let forced = reading.recording.tracks.iter().any(|track| !track.force.is_empty());
@@ -69,9 +67,16 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         let motion = "every motion of one coordinate has a Lagrangian";
         output::note(&format!("{motion}: without known forces (--force) L and the friction are not told apart"));
     }
+    if args.print_config.is_some() {
+        let data = measured.datasets::<f64>(targets).map_err(CliError::data)?;
+        let start = args.from.as_deref().map(Start::read).transpose()?;
+        let training = configured(&settled, targets, start.as_ref(), &measured.config(args.name(), &data))?;
+        return output::print(&record(&settled, targets, Some(shooting_of(&settled)), &training).commented()?);
+    }
     let folder = Folder::open(&path)?;
-    let job = Job { args, reading: &reading, measured: &measured, targets, folder: &folder, started };
-    match args.precision {
+    let job =
+        Job { args, settled: &settled, reading: &reading, measured: &measured, targets, folder: &folder, started };
+    match args.precision() {
         PrecisionName::F32 => job.run::<f32>(),
         PrecisionName::F64 => job.run::<f64>(),
     }
@@ -80,6 +85,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
 /// What is to be done.
 struct Job<'a> {
     args: &'a Args,
+    settled: &'a Settled,
     reading: &'a Reading,
     measured: &'a Measured,
     targets: Targets,
@@ -91,22 +97,33 @@ impl Job<'_> {
     fn run<S: Scalar>(&self) -> Result<(), CliError> {
         let Self { args, measured, targets, folder, .. } = self;
         let names = &self.reading.recording.coordinates;
-        let data = measured.datasets::<S>(*targets).map_err(CliError::data)?;
-        let config = self.config(&measured.config(&args.name, &data));
-        config.validate(names.len()).map_err(CliError::usage)?;
+        let mut data = measured.datasets::<S>(*targets).map_err(CliError::data)?;
+        let start = args.from.as_deref().map(Start::read).transpose()?;
+        let config = configured(self.settled, *targets, start.as_ref(), &measured.config(args.name(), &data))?;
+        CliError::all_usage(config.faults(names.len()).into_iter().map(|fault| fault.to_string()))?;
         let periodic = self.reading.recording.periodic.clone();
         let time_like = config.network.time_like_index(names.iter().map(String::as_str)).map_err(CliError::usage)?;
-        let architecture = config.architecture_with(periodic, data.training[0].physical_scale());
-        let architecture = Architecture { time_like, ..architecture };
+        let shaped = |scale| Architecture { time_like, ..config.architecture_with(periodic.clone(), scale) };
+        let (architecture, weights) = match &start {
+            Some(start) => {
+                start.require(&config, periodic.clone())?;
+                let (weights, shape) = weights(&start.from, shaped)?;
+                (shape, Some(weights))
+            }
+            None => (shaped(data.training[0].physical_scale()), None),
+        };
+        // Every phase learns from the same states.
+        data.training = vec![data.training.swap_remove(0); config.phases.len()];
         architecture.validate().map_err(CliError::usage)?;
         memory::require("training", training_memory(&config, &architecture))?;
         let penalty = config.penalty.penalty(names.iter().map(String::as_str)).map_err(CliError::usage)?;
         let stop = interrupt::flag()?;
         let threads = threads(args.threads);
 
+        let sitting = Sitting { keeper: None, start: weights.map(Snapshot::beginning_with) };
         let mut trained =
-            train(&config, &architecture, penalty, data, threads, &hooks(&stop)).map_err(CliError::data)?;
-        let shooting = (*targets == Targets::Motion).then(|| self.shooting());
+            resume(&config, &architecture, penalty, data, threads, &hooks(&stop), sitting).map_err(CliError::data)?;
+        let shooting = (*targets == Targets::Motion).then(|| shooting_of(self.settled));
         let mut shot = None;
         if let (Some(settings), Stop::Finished) = (&shooting, &trained.stop) {
             let (training, validation) = (measured.training.estimated(), measured.validation.estimated());
@@ -118,7 +135,7 @@ impl Job<'_> {
                 training: &training,
                 validation: &validation,
                 noise: &noise,
-                seed: args.seed,
+                seed: args.seed(),
             };
             let fitted = shooting::fit(settings, task, threads, &hooks(&stop)).map_err(CliError::data)?;
             trained.weights.clone_from(&fitted.weights);
@@ -127,14 +144,7 @@ impl Job<'_> {
         }
 
         // The model and its history first: nothing that comes after can lose them.
-        let record = Record {
-            targets: *targets,
-            held_out: args.hold_out,
-            window: args.window,
-            noise: args.noise.as_deref(),
-            shooting: shooting.as_ref(),
-            training: &config,
-        };
+        let record = record(self.settled, *targets, shooting.clone(), &config);
         let toml = toml::to_string(&record).map_err(CliError::data)?;
         let model =
             ModelFile { header: self.header::<S>(&config, &architecture, &trained), weights: trained.weights.clone() };
@@ -151,11 +161,11 @@ impl Job<'_> {
         let plan = Plan { part: &measured.test, horizon: args.horizon, time, threads };
         let judgement = judge(&network, &plan)?;
         let found = Found {
-            name: &args.name,
+            name: args.name(),
             recording: &self.reading.recording,
             measured,
             targets: *targets,
-            seed: args.seed,
+            seed: args.seed(),
             threads,
             trained: &trained,
             shot: shot.as_ref(),
@@ -173,35 +183,6 @@ impl Job<'_> {
         }
     }
 
-    /// The configuration that suits the data, changed by the arguments.
-    fn config(&self, suggested: &Config) -> Config {
-        let Args { hidden, epochs, seed, friction, timelike, precision, .. } = self.args;
-        let mut config = suggested.clone();
-        config.seed = *seed;
-        config.precision = (*precision).into();
-        config.network.hidden.clone_from(hidden);
-        config.network.dissipation = *friction;
-        config.network.time_like.clone_from(timelike);
-        if let Some(time) = timelike {
-            config.penalty = Regularizer::LorentzianSylvester { lambda: config.penalty.lambda(), time: time.clone() };
-        }
-        let phase = &mut config.phases[0];
-        if let Some(epochs) = epochs {
-            phase.epochs = *epochs;
-        } else if self.targets == Targets::Motion {
-            phase.epochs = phase.epochs.div_ceil(3);
-        }
-        phase.t_max = phase.epochs as f64;
-        config
-    }
-
-    fn shooting(&self) -> Shooting {
-        let mut settings = Shooting::default();
-        settings.epochs = self.args.shooting_epochs.unwrap_or(settings.epochs);
-        settings.samples_per_segment = self.args.segment.unwrap_or(settings.samples_per_segment);
-        settings
-    }
-
     /// What the model file says about this run.
     fn header<S: Scalar>(&self, config: &Config, architecture: &Architecture, trained: &Trained<S>) -> Header {
         let names = &self.reading.recording.coordinates;
@@ -213,7 +194,7 @@ impl Job<'_> {
             system: config.system.clone(),
             parameters: Default::default(),
             columns: names.iter().cloned().chain(velocities).collect(),
-            precision: match self.args.precision {
+            precision: match self.args.precision() {
                 PrecisionName::F32 => StoredPrecision::F32,
                 PrecisionName::F64 => StoredPrecision::F64,
             },
@@ -222,5 +203,64 @@ impl Job<'_> {
             seed: config.seed,
             validation_loss: trained.validation_loss,
         }
+    }
+}
+
+/// The configuration that suits the data, changed by the file, by the model to start from and by the arguments.
+fn configured(
+    settled: &Settled,
+    targets: Targets,
+    start: Option<&Start>,
+    suggested: &Config,
+) -> Result<Config, CliError> {
+    let args = &settled.args;
+    let mut suggested = suggested.clone();
+    if targets == Targets::Motion && args.changes.epochs.is_none() && !settled.has_epochs() {
+        let phase = &mut suggested.phases[0];
+        phase.epochs = phase.epochs.div_ceil(3);
+        phase.t_max = phase.epochs as f64;
+    }
+    if let Some(start) = start {
+        start.shape(&mut suggested);
+    }
+    let mut config = settled.training(&suggested)?;
+    config.system = args.name().to_string();
+    config.from.clone_from(&args.from);
+    config.seed = args.seed();
+    config.precision = args.precision().into();
+    config.network.dissipation = args.friction.or(config.network.dissipation);
+    config.network.time_like = args.timelike.clone().or(config.network.time_like);
+    if let Some(time) = &args.timelike {
+        let classical = [PenaltyName::Eigenvalue, PenaltyName::Sylvester];
+        if args.changes.penalty.is_some_and(|penalty| classical.contains(&penalty)) {
+            let problem = "a time-like coordinate needs lorentzian-sylvester, or none";
+            return Err(CliError::usage(format_args!("--penalty: {problem} (--timelike {time})")));
+        }
+        config.penalty = Regularizer::LorentzianSylvester { lambda: config.penalty.lambda(), time: time.clone() };
+    }
+    args.changes.apply(&mut config, args.timelike.as_deref(), ", name it by --timelike")?;
+    Ok(config)
+}
+
+/// Multiple shooting by the file and the arguments.
+fn shooting_of(settled: &Settled) -> Shooting {
+    let mut shooting = settled.shooting();
+    shooting.epochs = settled.args.shooting_epochs.unwrap_or(shooting.epochs);
+    shooting.samples_per_segment = settled.args.segment.unwrap_or(shooting.samples_per_segment);
+    shooting
+}
+
+/// What `config.toml` holds.
+fn record(settled: &Settled, targets: Targets, shooting: Option<Shooting>, training: &Config) -> FitConfig {
+    let args = &settled.args;
+    FitConfig {
+        targets: Some(targets),
+        held_out: args.share(),
+        window: args.window,
+        noise: args.noise.clone(),
+        horizon: args.horizon,
+        recording: Recording::of(&args.recording),
+        shooting,
+        training: training.clone(),
     }
 }

@@ -1,19 +1,35 @@
 //! Arguments of `lnn fit`.
 
-use crate::cli::number::{count, positive};
+use crate::cli::changes::Changes;
+use crate::cli::fit_config::HELD_OUT;
+use crate::cli::number::{count, positive, weight};
+use crate::cli::print_config::PrintFormat;
 use crate::cli::recording_args::RecordingArgs;
 use crate::cli::train_config::PrecisionName;
 use crate::recording::Targets;
 use std::path::PathBuf;
 
 /// Arguments.
-#[derive(Debug, clap::Args)]
+#[derive(Clone, Debug, clap::Args)]
+#[command(mut_arg("data", unless_configured), mut_arg("coords", unless_configured))]
 pub struct Args {
     #[command(flatten)]
     pub recording: RecordingArgs,
+    /// A configuration, such as the config.toml beside a model, or - for standard input: what arguments do not say is taken
+    /// from it, DATA and columns included. Keys that are not in it have their usual values.
+    #[arg(long, value_name = "FILE")]
+    pub config: Option<PathBuf>,
+    /// Print the configuration with comments, as it would be used for the data, and learn nothing; markdown prints a table of
+    /// all keys.
+    #[arg(long, value_enum, value_name = "FORMAT", num_args = 0..=1, require_equals = true, default_missing_value = "toml")]
+    pub print_config: Option<PrintFormat>,
+    /// Start from the weights of a model, a file or the directory of a run: network and friction are the model's, other ones
+    /// are refused.
+    #[arg(long, value_name = "MODEL")]
+    pub from: Option<String>,
     /// What to learn from: measured accelerations, smoothed ones, or the motion itself by multiple shooting
     /// [default: measured if there are any, smoothed if they are good to a tenth, the motion if not].
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, value_name = "WAY")]
     pub targets: Option<TargetsName>,
     /// Learn a friction beside L: a Rayleigh dissipation of so many units.
     #[arg(long, value_name = "UNITS", num_args = 0..=1, default_missing_value = "16", value_parser = count)]
@@ -27,37 +43,34 @@ pub struct Args {
     /// Standard deviation of the noise of every coordinate, in SI units [default: estimated].
     #[arg(long, value_name = "S1,S2,..", value_delimiter = ',', allow_hyphen_values = true, value_parser = positive)]
     pub noise: Option<Vec<f64>>,
-    /// Share of the samples, by whole trajectories, that is held out to judge the model.
-    #[arg(long, value_name = "SHARE", default_value = "0.2", allow_hyphen_values = true, value_parser = share)]
-    pub hold_out: f64,
+    /// Share of the samples, by whole trajectories, that is held out to judge the model; with 0 all data are learned from and
+    /// nothing judges the model [default: 0.2].
+    #[arg(long, value_name = "SHARE", allow_hyphen_values = true, value_parser = share)]
+    pub hold_out: Option<f64>,
     /// How far ahead held-out motion is predicted, in seconds [default: 200 samples, at most a quarter of the shortest
     /// held-out trajectory].
     #[arg(long, value_name = "SECONDS", allow_hyphen_values = true, value_parser = positive)]
     pub horizon: Option<f64>,
-    /// Widths of the hidden layers.
-    #[arg(long, value_name = "W1,W2,..", value_delimiter = ',', default_value = "128,128,128", allow_hyphen_values = true, value_parser = count)]
-    pub hidden: Vec<usize>,
-    /// Epochs of the supervised training [default: about 30,000 steps, a third of them before multiple shooting].
-    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = count)]
-    pub epochs: Option<usize>,
-    /// Epochs of multiple shooting.
+    #[command(flatten)]
+    pub changes: Changes,
+    /// Epochs of multiple shooting [default: 100].
     #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = count)]
     pub shooting_epochs: Option<usize>,
-    /// Samples predicted from one start by multiple shooting.
+    /// Samples predicted from one start by multiple shooting [default: 20].
     #[arg(long, value_name = "SAMPLES", allow_hyphen_values = true, value_parser = count)]
     pub segment: Option<usize>,
-    /// Seed of held-out trajectories, weights and the order of the data.
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    pub seed: u64,
+    /// Seed of held-out trajectories, weights and the order of the data [default: 0].
+    #[arg(long, value_name = "N", allow_hyphen_values = true)]
+    pub seed: Option<u64>,
     /// Threads; the result does not depend on them [default: all].
     #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = count)]
     pub threads: Option<usize>,
-    /// Precision of weights and arithmetic.
-    #[arg(long, value_enum, default_value = "f32")]
-    pub precision: PrecisionName,
-    /// Name of the system, for the model file.
-    #[arg(long, value_name = "NAME", default_value = "measured")]
-    pub name: String,
+    /// Precision of weights and arithmetic [default: f32].
+    #[arg(long, value_enum, value_name = "TYPE")]
+    pub precision: Option<PrecisionName>,
+    /// Name of the system, for the model file [default: measured].
+    #[arg(long, value_name = "NAME")]
+    pub name: Option<String>,
     /// Directory for everything the run writes [default: runs/NAME].
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
@@ -69,9 +82,46 @@ pub struct Args {
 /// [`Targets`] by name.
 #[derive(Clone, Copy, Debug, clap::ValueEnum)]
 pub enum TargetsName {
+    /// Measured accelerations.
     Measured,
+    /// Accelerations by local polynomials.
     Smoothed,
+    /// The motion itself, by multiple shooting.
     Motion,
+}
+
+impl From<Targets> for TargetsName {
+    fn from(targets: Targets) -> Self {
+        match targets {
+            Targets::Measured => Self::Measured,
+            Targets::Smoothed => Self::Smoothed,
+            Targets::Motion => Self::Motion,
+        }
+    }
+}
+
+impl Args {
+    /// Share of the samples that is held out.
+    pub fn share(&self) -> f64 {
+        self.hold_out.unwrap_or(HELD_OUT)
+    }
+    /// The seed.
+    pub fn seed(&self) -> u64 {
+        self.seed.unwrap_or(0)
+    }
+    /// Name of the system.
+    pub fn name(&self) -> &str {
+        self.name.as_deref().unwrap_or("measured")
+    }
+    /// Precision of weights and arithmetic.
+    pub fn precision(&self) -> PrecisionName {
+        self.precision.unwrap_or(PrecisionName::F32)
+    }
+}
+
+/// What a configuration may say instead.
+fn unless_configured(argument: clap::Arg) -> clap::Arg {
+    argument.required(false).required_unless_present("config")
 }
 
 impl From<TargetsName> for Targets {
@@ -84,7 +134,7 @@ impl From<TargetsName> for Targets {
     }
 }
 
-/// A number between 0 and 1.
+/// 0, or a number between 0 and 1.
 fn share(text: &str) -> Result<f64, String> {
-    positive(text).ok().filter(|x| *x < 1.0).ok_or_else(|| "expected a number between 0 and 1".to_string())
+    weight(text).ok().filter(|x| *x < 1.0).ok_or_else(|| "expected 0, or a number between 0 and 1".to_string())
 }

@@ -41,7 +41,8 @@ struct Summary<'a> {
     weights: usize,
     /// Loss (paper) against the accelerations the network was trained on, of the validation and the held-out part.
     validation_loss: f64,
-    test_loss: f64,
+    /// None where nothing was held out.
+    test_loss: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     shooting: Option<ShootingSummary>,
     ended: String,
@@ -129,7 +130,7 @@ impl<'a, S: Scalar> Found<'a, S> {
             epochs: trained.history.len(),
             weights: trained.weights.len(),
             validation_loss: trained.validation_loss,
-            test_loss: trained.test.loss.to_f64(),
+            test_loss: (measured.held_out != HeldOut::Nothing).then(|| trained.test.loss.to_f64()),
             shooting: shot.map(|fitted| ShootingSummary {
                 epochs: fitted.history.len(),
                 segments: fitted.segments.0,
@@ -169,12 +170,15 @@ impl Summary<'_> {
             Targets::Smoothed => "smoothed accelerations",
             Targets::Motion => "the motion itself (multiple shooting)",
         };
-        let held = self.held_out.describe(recording);
-        let mut text = format!(
-            "learned from {way}: {training} samples of {} trajectories, best epoch chosen on {validation}, judged on {test} \
-             (held out: {held})\n",
-            self.trajectories[0]
-        );
+        let judged = match self.held_out {
+            HeldOut::Nothing => "best epoch chosen on the same, judged by nothing".to_string(),
+            held => {
+                let held = held.describe(recording);
+                format!("best epoch chosen on {validation}, judged on {test} (held out: {held})")
+            }
+        };
+        let mut text =
+            format!("learned from {way}: {training} samples of {} trajectories, {judged}\n", self.trajectories[0]);
         // Writing to a string cannot fail.
         for c in &self.coordinates {
             let _ = writeln!(
@@ -189,8 +193,12 @@ impl Summary<'_> {
         }
         let _ = writeln!(
             text,
-            "loss (paper) against those accelerations: validation {:.6}, held out {:.6}; {} epochs, {} weights, seed {}",
-            self.validation_loss, self.test_loss, self.epochs, self.weights, self.seed
+            "loss (paper) against those accelerations: validation {:.6}{}; {} epochs, {} weights, seed {}",
+            self.validation_loss,
+            self.test_loss.map_or(String::new(), |loss| format!(", held out {loss:.6}")),
+            self.epochs,
+            self.weights,
+            self.seed
         );
         if let Some(shooting) = &self.shooting {
             let _ = writeln!(

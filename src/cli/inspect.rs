@@ -1,11 +1,10 @@
 //! `lnn inspect`: the Euler-Lagrange terms of states, full digits.
 
 use crate::cli::source::{Source, parameter};
-use crate::cli::{CliError, States, json, output, parse_states, states};
+use crate::cli::{CliError, States, input, json, output, parse_states, states};
 use crate::lagrangian::{MechanicsError, Request, Terms};
 use crate::linalg::{Workspace, eigenvalues};
 use crate::scalar::{Dd, Scalar};
-use crate::storage::read_regular;
 use std::path::PathBuf;
 
 /// States evaluated together; bounds the memory whatever the length of the file.
@@ -17,33 +16,42 @@ pub struct Args {
     /// A system by name (`lnn systems` lists them).
     #[arg(long, value_name = "NAME", required_unless_present = "model", conflicts_with = "model")]
     system: Option<String>,
-    /// A trained model.
-    #[arg(long, value_name = "FILE")]
+    /// A trained model, a file or the directory of a run.
+    #[arg(long, value_name = "MODEL")]
     model: Option<PathBuf>,
     /// A parameter of the system, decimal text read in the working precision; may be repeated.
     #[arg(long, value_name = "SYMBOL=VALUE", num_args = 1.., value_parser = parameter, conflicts_with = "model")]
     param: Vec<(String, String)>,
-    /// CSV of states: the system's columns as header, in any order.
+    /// CSV of states, or - for standard input: the system's columns as header, in any order; other columns, such as t and
+    /// energy of a roll-out, are left out.
     #[arg(long, value_name = "FILE.csv")]
     states: PathBuf,
     /// Precision of everything, the reading of the states included.
-    #[arg(long, value_enum, default_value = "f64")]
+    #[arg(long, value_enum, value_name = "TYPE", default_value = "f64")]
     precision: Precision,
-    /// One JSON object per line, or text.
-    #[arg(long, value_enum, default_value = "json")]
+    /// What is printed.
+    #[arg(long, value_enum, value_name = "FORMAT", default_value = "json")]
     format: Format,
+    /// The same as --format json.
+    #[arg(long, conflicts_with = "format")]
+    json: bool,
 }
 
 #[derive(Clone, Copy, Debug, clap::ValueEnum)]
 enum Precision {
+    /// Single, 9 digits.
     F32,
+    /// Double, 17 digits.
     F64,
+    /// Double-double, about 32 digits.
     Dd,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 enum Format {
+    /// One object per line.
     Json,
+    /// Text.
     Table,
 }
 
@@ -65,8 +73,11 @@ fn inspect<S: Scalar>(args: &Args) -> Result<(), CliError> {
         Some(path) => Source::<S>::model(path)?,
         None => Source::<S>::system(args.system.as_deref().unwrap_or_default(), &args.param)?,
     };
-    let bytes = read_regular(&args.states, states::MAX_BYTES).map_err(|e| CliError::file(&args.states, e))?;
-    let states: States<S> = parse_states(&bytes, &source.columns).map_err(|e| CliError::file(&args.states, e))?;
+    let place = input::name(&args.states);
+    let bytes =
+        input::read(&args.states, states::MAX_BYTES).map_err(|e| CliError::data(format_args!("{place}: {e}")))?;
+    let states: States<S> =
+        parse_states(&bytes, &source.columns).map_err(|e| CliError::data(format_args!("{place}: {e}")))?;
     drop(bytes);
 
     let n = source.columns.len() / 2;
@@ -92,9 +103,9 @@ fn inspect<S: Scalar>(args: &Args) -> Result<(), CliError> {
     }
     match failures.as_slice() {
         [] => Ok(()),
-        [(row, problem)] => Err(CliError::file(&args.states, format_args!("row {row}: {problem}"))),
+        [(row, problem)] => Err(CliError::data(format_args!("{place}: row {row}: {problem}"))),
         [(row, problem), rest @ ..] => {
-            Err(CliError::file(&args.states, format_args!("row {row}: {problem} (and {} more rows)", rest.len())))
+            Err(CliError::data(format_args!("{place}: row {row}: {problem} (and {} more rows)", rest.len())))
         }
     }
 }

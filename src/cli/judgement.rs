@@ -66,6 +66,9 @@ pub struct Judgement {
 /// A data error if a picture cannot be drawn.
 pub fn judge(model: &dyn EulerLagrange<f64>, plan: &Plan<'_>) -> Result<Judgement, CliError> {
     let (n, recording) = (model.coordinates(), &plan.part.recording);
+    if recording.tracks.is_empty() {
+        return Ok(Judgement::nothing());
+    }
     let horizon = plan.horizon.unwrap_or_else(|| horizon(plan.part));
     let mut windows: Vec<Window> = plan
         .part
@@ -228,8 +231,27 @@ impl Judgement {
             .collect()
     }
 
+    /// That of a model that no motion was held out to judge: its numbers are not there.
+    fn nothing() -> Self {
+        Self {
+            model: Vec::new(),
+            constant_velocity: Vec::new(),
+            wrong_signature: f64::NAN,
+            energy: None,
+            figures: Vec::new(),
+        }
+    }
+
+    /// Whether there was nothing to judge by.
+    fn is_of_nothing(&self) -> bool {
+        self.wrong_signature.is_nan()
+    }
+
     /// What is not in the table of predictions, in words.
     fn remarks(&self) -> String {
+        if self.is_of_nothing() {
+            return "nothing was held out (--hold-out 0): nothing judges this model\n".to_string();
+        }
         let mut text = format!(
             "mass matrix of the wrong signature: {:.2} % of the held-out states\n",
             100.0 * self.wrong_signature
@@ -248,6 +270,9 @@ impl Judgement {
 
     /// For a terminal.
     pub fn text(&self) -> String {
+        if self.is_of_nothing() {
+            return self.remarks();
+        }
         if self.model.is_empty() {
             let none = "no window of held-out motion is as long as the horizon: nothing was predicted\n";
             return format!("{none}{}", self.remarks());
@@ -257,6 +282,9 @@ impl Judgement {
 
     /// Adds tables and pictures to a report.
     pub fn report(&self, report: Report) -> Report {
+        if self.is_of_nothing() {
+            return report.heading("Predictions of held-out motion").paragraph(self.remarks().trim_end());
+        }
         let report = report.heading("Predictions of held-out motion").table(&Self::HEADERS, &self.rows());
         let report = self.remarks().lines().fold(report, |report, line| report.paragraph(line));
         self.figures.iter().fold(report, |report, figure| report.figure(&figure.png, &figure.caption))

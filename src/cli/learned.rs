@@ -1,13 +1,14 @@
 //! A model file with the network it describes and the system it learned.
 
 use crate::cli::CliError;
+use crate::lagrangian::system::Size;
 use crate::lagrangian::{Configured, configure, find};
 use crate::network::NetworkLagrangian;
 use crate::network::file::{Header, ModelFile};
 use crate::rollout::Domain;
 use crate::scalar::Scalar;
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// A trained model.
 pub struct Learned<S> {
@@ -17,12 +18,32 @@ pub struct Learned<S> {
     pub network: NetworkLagrangian<S>,
 }
 
+/// Name of the model file in the directory of a run.
+pub const MODEL: &str = "model.safetensors";
+
+/// The file of a model that is given by its file or by the directory of its run.
+///
+/// # Errors
+/// A data error for a directory without a model.
+pub fn model_file(path: &Path) -> Result<PathBuf, CliError> {
+    if !path.is_dir() {
+        return Ok(path.to_path_buf());
+    }
+    let file = path.join(MODEL);
+    if file.exists() {
+        Ok(file)
+    } else {
+        Err(CliError::file(path, format_args!("there is no {MODEL} in this directory")))
+    }
+}
+
 impl<S: Scalar> Learned<S> {
-    /// Reads a model file; weights are converted to the precision of `S`.
+    /// Reads a model, by its file or by the directory of its run; weights are converted to the precision of `S`.
     ///
     /// # Errors
     /// A data error for anything but a whole model file.
     pub fn load(path: &Path) -> Result<Self, CliError> {
+        let path = &model_file(path)?;
         let ModelFile { header, weights } = ModelFile::load(path).map_err(|e| CliError::file(path, e))?;
         let network =
             NetworkLagrangian::new(header.architecture.clone(), weights).map_err(|e| CliError::file(path, e))?;
@@ -58,6 +79,16 @@ pub fn trained_on<S: Scalar>(header: &Header) -> Domain<S> {
     let periodic = &header.architecture.periodic;
     let positions = header.position.iter().zip(periodic).map(|(b, &p)| (!p).then(|| bound(b)));
     Domain::new(positions.chain(header.velocity.iter().map(|b| Some(bound(b)))).collect())
+}
+
+/// Values of all parameters of a system, its size among them.
+pub fn all_parameters(system: &Configured<f64>) -> BTreeMap<String, f64> {
+    let named = system.system.parameters.iter().map(|p| p.symbol.to_string());
+    let mut parameters: BTreeMap<_, _> = named.zip(system.parameters.iter().copied()).collect();
+    if let Size::Chosen { symbol, .. } = system.system.size {
+        parameters.insert(symbol.to_string(), system.coordinates as f64);
+    }
+    parameters
 }
 
 /// Parameters in the form the catalogue takes them.

@@ -3,10 +3,11 @@
 use crate::analysis::{stretches, training_instability};
 use crate::cli::evaluation::{Evaluation, Plan, RTOL, evaluate};
 use crate::cli::folder::Folder;
-use crate::cli::learned::{given, trained_on};
-use crate::cli::{CliError, memory, output};
+use crate::cli::learned::{all_parameters, given, trained_on};
+use crate::cli::systems::parameters;
+use crate::cli::{CliError, memory, output, start};
 use crate::experiments::{Outcome, Record};
-use crate::lagrangian::system::{Size, TrajectoryTest};
+use crate::lagrangian::system::TrajectoryTest;
 use crate::lagrangian::{Configured, configure};
 use crate::network::file::{FORMAT, Header, ModelFile, StoredPrecision};
 use crate::network::{Architecture, Layout, NetworkLagrangian};
@@ -120,6 +121,18 @@ fn begin<S: Scalar>(
     Ok(None)
 }
 
+/// The network's shape, and the weights of the model that the training starts from, if it does: then the scales are the
+/// model's.
+fn begin_shape<S: Scalar>(
+    config: &Config,
+    system: &Configured<f64>,
+    scale: Vec<f64>,
+) -> Result<(Architecture, Option<Vec<S>>), CliError> {
+    let Some(from) = &config.from else { return Ok((config.architecture(system, scale), None)) };
+    let (weights, architecture) = start::weights(from, |scale| config.architecture(system, scale))?;
+    Ok((architecture, Some(weights)))
+}
+
 /// Removes the checkpoints of a training that is over.
 ///
 /// # Errors
@@ -174,7 +187,7 @@ fn learn_in<S: Scalar>(
         _ => CliError::usage(e),
     })?;
     let penalty = config.penalty().map_err(CliError::usage)?;
-    let architecture = config.architecture(system, scale);
+    let (architecture, before) = begin_shape::<S>(config, system, scale)?;
     let imposed = imposed_velocities(system, &data);
     let fresh = (data.test.cast::<f64>().q().to_vec(), data.test.cast::<f64>().v().to_vec());
     let toml = toml::to_string(config).map_err(CliError::data)?;
@@ -182,6 +195,7 @@ fn learn_in<S: Scalar>(
     let keeper = Arc::new(Keeper::new(Arc::new(Disk), folder.path(), keeping.every, identity));
     let parameters = Layout::new(&architecture).parameters;
     let start = begin(&keeper, folder, parameters, config.data.training, keeping.start)?;
+    let start = start.or_else(|| before.map(Snapshot::beginning_with));
     let sitting = Sitting { keeper: Some(keeper), start };
     let trained = match resume(config, &architecture, penalty, data, effort.threads, hooks, sitting) {
         Ok(trained) => trained,
@@ -288,12 +302,8 @@ fn header(
     validation_loss: f64,
 ) -> Result<Header, CliError> {
     // Defaults that change in a later version must not change this model.
-    let named = system.system.parameters.iter().map(|p| p.symbol.to_string());
-    let mut parameters: BTreeMap<_, _> = named.zip(system.parameters.iter().copied()).collect();
+    let mut parameters = all_parameters(system);
     parameters.extend(config.parameters.clone());
-    if let Size::Chosen { symbol, .. } = system.system.size {
-        parameters.insert(symbol.to_string(), system.coordinates as f64);
-    }
     configure::<f64>(&config.system, &given(&parameters)).map_err(CliError::data)?;
     let hull = |bounds: fn(&Phase) -> &Vec<[f64; 2]>| {
         (0..system.coordinates)
@@ -365,6 +375,20 @@ fn headline(summary: &Summary<'_>) -> String {
     )
 }
 
+/// Adds the system's parameters to a report.
+pub(super) fn parameter_table(report: Report, system: &Configured<f64>) -> Report {
+    let values = all_parameters(system);
+    let row = |[symbol, _, unit, _]: &[String; 4]| {
+        let value = values.get(symbol).map(f64::to_string).unwrap_or_default();
+        vec![symbol.clone(), value, if unit == "1" { "-".to_string() } else { unit.clone() }]
+    };
+    let rows: Vec<Vec<String>> = parameters(system.system).iter().map(row).collect();
+    if rows.is_empty() {
+        return report;
+    }
+    report.heading("Parameters of the system").table(&["parameter", "value", "unit"], &rows)
+}
+
 fn write_report(
     folder: &Folder,
     system: &Configured<f64>,
@@ -374,7 +398,7 @@ fn write_report(
 ) -> Result<(), CliError> {
     let training = training_pictures(epochs)?;
     let report = Report::new(&format!("{}: learned", system.system.title)).paragraph(&headline(summary));
-    let report = summary.evaluation.report(report).heading("Training");
+    let report = summary.evaluation.report(parameter_table(report, system)).heading("Training");
     let report = training.iter().fold(report, |report, figure| report.figure(&figure.png, &figure.caption));
     let report = report.heading("Configuration").preformatted(toml);
     write_figures(folder, training.iter().chain(&summary.evaluation.figures))?;

@@ -1,10 +1,13 @@
 //! The command-line program: arguments to library calls.
 //!
 //! Results go to standard output, messages and progress to standard error. Exit codes: 0 done, 1 data or files, 2
-//! arguments or configuration, 130 Ctrl-C. A failure is one line, `error: FILE: row 3, column theta1: ...`.
+//! arguments or configuration, 130 Ctrl-C. A failure is one line, `error: FILE: row 3, column theta1: ...`;
+//! of a configuration all mistakes are found, a line for each.
 
+mod changes;
 mod check;
 mod config;
+mod config_file;
 mod differences;
 mod error;
 mod evaluate;
@@ -12,23 +15,30 @@ mod evaluation;
 mod experiment;
 mod fit;
 mod fit_args;
+mod fit_config;
 mod fit_summary;
 mod folder;
 mod holder;
+mod input;
 mod inspect;
 mod interrupt;
 mod json;
 mod judgement;
 mod learned;
 mod learning;
+mod manual;
 mod memory;
+mod motion;
 mod number;
 mod output;
+mod print_config;
 mod progress;
 mod recording_args;
 mod resume;
 mod rollout;
 mod source;
+mod spool;
+mod start;
 mod states;
 mod systems;
 mod train;
@@ -38,7 +48,7 @@ pub use config::parse as parse_config;
 pub use error::{CliError, Kind};
 pub use states::{States, StatesError, parse_states};
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 use std::ffi::OsString;
 use std::io::Write;
 use std::process::ExitCode;
@@ -69,6 +79,10 @@ enum Command {
     Experiment(experiment::Args),
     /// Print the Euler-Lagrange terms of states, every digit of them.
     Inspect(inspect::Args),
+    /// Print a script that completes commands and options in a shell.
+    Completions(manual::CompletionsArgs),
+    /// Print the manual page of the program or of a command.
+    Man(manual::ManArgs),
 }
 
 /// Runs the program with its arguments, the first being its own name.
@@ -113,6 +127,8 @@ fn run(command: Command) -> Result<(), CliError> {
         Command::Evaluate(args) => evaluate::run(&args),
         Command::Experiment(args) => experiment::run(&args),
         Command::Inspect(args) => inspect::run(&args),
+        Command::Completions(args) => manual::completions(&args, Cli::command()),
+        Command::Man(args) => manual::man(&args, Cli::command()),
     }
 }
 
@@ -163,4 +179,30 @@ fn watch_log() -> Result<(), CliError> {
     // Already installed when several commands run in one process (tests): keep the first.
     let _ = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).try_init();
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn everything_is_documented() {
+        let mut program = Cli::command();
+        program.build();
+        assert!(program.get_about().is_some());
+        for command in program.get_subcommands().filter(|command| command.get_name() != "help") {
+            let name = command.get_name();
+            assert!(command.get_about().is_some_and(|about| about.to_string().ends_with('.')), "{name}");
+            for argument in command.get_arguments() {
+                let place = format!("{name} {}", argument.get_id());
+                assert!(argument.get_help().is_some_and(|help| !help.to_string().is_empty()), "{place}");
+                for value in argument.get_possible_values() {
+                    let told = value.get_help().is_some() || name == "completions" || value.is_hide_set();
+                    let flag = !argument.get_action().takes_values();
+                    assert!(told || flag, "{place}: {}", value.get_name());
+                }
+            }
+        }
+        program.debug_assert();
+    }
 }

@@ -13,6 +13,11 @@ pub fn positive(text: &str) -> Result<f64, String> {
     finite(text).ok().filter(|x| *x > 0.0).ok_or_else(|| "expected a finite number above 0".to_string())
 }
 
+/// A finite decimal number of at least 0.
+pub fn weight(text: &str) -> Result<f64, String> {
+    finite(text).ok().filter(|x| *x >= 0.0).ok_or_else(|| "expected a finite number of at least 0".to_string())
+}
+
 /// Two finite decimal numbers, the lower first: `LOW:HIGH`.
 pub fn bounds(text: &str) -> Result<(f64, f64), String> {
     let pair = text.split_once(':').and_then(|(low, high)| Some((finite(low).ok()?, finite(high).ok()?)));
@@ -43,6 +48,8 @@ mod tests {
         for bad in ["0", "-1", "-0.0"] {
             assert!(positive(bad).is_err() && count(bad).is_err(), "{bad}");
         }
+        assert_eq!((weight("0"), weight("2.5")), (Ok(0.0), Ok(2.5)));
+        assert!(weight("-1").is_err() && weight("nan").is_err());
         assert!(count("1.0").is_err() && count("99999999999999999999").is_err());
         assert_eq!((positive("1e-3"), count("7")), (Ok(1e-3), Ok(7)));
         assert_eq!((bounds("-0.5:1e3"), bounds(" 2 : 2 ")), (Ok((-0.5, 1000.0)), Ok((2.0, 2.0))));

@@ -1,5 +1,6 @@
 //! Files of recorded motion and the meaning of their columns, as arguments.
 
+use crate::cli::spool::read_spooled;
 use crate::cli::{CliError, number};
 use crate::recording::read::{DataError, read_recording};
 use crate::recording::{Columns, Reading};
@@ -8,7 +9,7 @@ use std::path::PathBuf;
 /// Recorded motion.
 #[derive(Clone, Debug, clap::Args)]
 pub struct RecordingArgs {
-    /// Files of recorded motion: CSV, NPY or NPZ; each holds a trajectory, or several told apart by a column.
+    /// Files of recorded motion: CSV, NPY or NPZ, one of them - for standard input; each holds a trajectory, or several told apart by a column.
     #[arg(required = true, value_name = "DATA")]
     pub data: Vec<PathBuf>,
     /// Columns of the coordinates, by name or by number from 1.
@@ -44,7 +45,7 @@ pub struct RecordingArgs {
 }
 
 /// `column=unit`.
-fn unit(text: &str) -> Result<(String, String), String> {
+pub(super) fn unit(text: &str) -> Result<(String, String), String> {
     match text.split_once('=') {
         Some((column, unit)) if !column.trim().is_empty() && !unit.trim().is_empty() => {
             Ok((column.trim().to_string(), unit.trim().to_string()))
@@ -75,7 +76,7 @@ impl RecordingArgs {
     /// # Errors
     /// A usage error for arguments that contradict each other, a data error for the first file that is not as said.
     pub fn read(&self) -> Result<Reading, CliError> {
-        read_recording(&self.data, &self.meaning()).map_err(|error| match error {
+        read_spooled(&self.data, |files| read_recording(files, &self.meaning())).map_err(|error| match error {
             DataError::Columns(_) | DataError::NoFiles => CliError::usage(error),
             DataError::File { .. } => CliError::data(error),
         })

@@ -1,8 +1,9 @@
 //! `lnn rollout`: the motion of a model from one state.
 
 use crate::cli::learned::Learned;
+use crate::cli::motion::{Facts, Watch, picture_file, place};
 use crate::cli::number::{finite, positive};
-use crate::cli::{CliError, memory, output};
+use crate::cli::{CliError, input, memory, output};
 use crate::lagrangian::{EulerLagrange, find};
 use crate::rollout::{Method, Options, RolloutError, rollout};
 use crate::storage::{check_target, write_atomically};
@@ -11,7 +12,7 @@ use std::path::PathBuf;
 /// Arguments.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Model file.
+    /// Model, a file or the directory of a run.
     model: PathBuf,
     /// Start: coordinates, then velocities, separated by commas; taken as it is, on a mass shell or off it.
     #[arg(long, value_name = "q1,..,v1,..", required = true, value_delimiter = ',', allow_hyphen_values = true, value_parser = finite)]
@@ -25,7 +26,7 @@ pub struct Args {
     dt: f64,
     /// Integrator: two with error control, four symplectic ones of fixed step for long times; variational refuses models
     /// with friction.
-    #[arg(long, value_enum, default_value = "dopri5")]
+    #[arg(long, value_enum, value_name = "NAME", default_value = "dopri5")]
     method: MethodName,
     /// Relative tolerance of a step.
     #[arg(long, value_name = "R", default_value = "1e-6", allow_hyphen_values = true, value_parser = positive)]
@@ -36,18 +37,34 @@ pub struct Args {
     /// Longest step of midpoint, gauss4, gauss6 and variational, one per sample if not given.
     #[arg(long, value_name = "H", allow_hyphen_values = true, value_parser = positive)]
     step: Option<f64>,
-    /// CSV of the trajectory: t, the columns of a state, energy.
+    /// Go on where the motion leaves the states that the model was trained on, and say where that was; angles are free to
+    /// turn anyway.
+    #[arg(long)]
+    beyond_range: bool,
+    /// CSV of the trajectory: t, the columns of a state, energy; - for standard output.
     #[arg(long, value_name = "FILE.csv")]
     out: PathBuf,
+    /// Picture of the coordinates against time, or a page with velocities and energy as well.
+    #[arg(long, value_name = "FILE.png|FILE.html", value_parser = picture_file)]
+    plot: Option<PathBuf>,
+    /// Print what there is to say as a JSON object instead of text.
+    #[arg(long)]
+    json: bool,
 }
 
 #[derive(Clone, Copy, Debug, clap::ValueEnum)]
 enum MethodName {
+    /// Dormand and Prince, order 5, error control.
     Dopri5,
+    /// Dormand and Prince, order 8, error control.
     Dop853,
+    /// Implicit midpoint rule, order 2, symplectic.
     Midpoint,
+    /// Gauss collocation, order 4, symplectic.
     Gauss4,
+    /// Gauss collocation, order 6, symplectic.
     Gauss6,
+    /// Discrete Euler-Lagrange equations, order 2, symplectic.
     Variational,
 }
 
@@ -77,6 +94,10 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         let names = columns.join(",");
         return Err(CliError::usage(format_args!("--state: expected {expected} numbers ({names}), found {found}")));
     }
+    let standard = input::is_standard(&args.out);
+    if args.json && standard {
+        return Err(CliError::usage("--json: the trajectory takes standard output (--out -)"));
+    }
     let (q, v) = args.state.split_at(columns.len() / 2);
     let method = Method::from(args.method);
     if args.step.is_some() && !method.is_structure_preserving() {
@@ -87,7 +108,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         rtol: args.rtol,
         atol: args.atol,
         step: args.step,
-        domain: Some(learned.domain()),
+        domain: (!args.beyond_range).then(|| learned.domain()),
         ..Options::new(args.t_end, args.dt)
     };
     if options.check(q.len()).is_ok() {
@@ -96,45 +117,80 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         memory::require("the motion", memory::motions(1, args.t_end / args.dt, q.len(), TEXT))?;
     }
     let cannot_write = |e| CliError::file(&args.out, format_args!("cannot write: {e}"));
-    check_target(&args.out).map_err(cannot_write)?;
+    if !standard {
+        check_target(&args.out).map_err(cannot_write)?;
+    }
+    if let Some(plot) = &args.plot {
+        check_target(plot).map_err(|e| CliError::file(plot, format_args!("cannot write: {e}")))?;
+    }
     let result = rollout(&learned.network, q, v, &options);
     if let Some(error @ RolloutError::Invalid { .. }) = &result.stop {
         return Err(CliError::usage(error));
     }
     let csv = result.trajectory.to_csv(columns).map_err(CliError::data)?;
-    write_atomically(&args.out, csv.as_bytes()).map_err(cannot_write)?;
+    if standard {
+        output::print(&csv)?;
+    } else {
+        write_atomically(&args.out, csv.as_bytes()).map_err(cannot_write)?;
+    }
+    let mut watch = Watch::new(learned.domain(), columns);
+    watch.add(&result.trajectory);
+    // A system that was only recorded has no unit here, nor has one of another version.
+    let time_unit = find(&learned.header.system).ok().map(|system| system.time_unit);
+    if let Some(plot) = &args.plot {
+        watch.plot(plot, &format!("{}: roll-out", learned.header.system), time_unit.unwrap_or_default())?;
+    }
+    if let Some(leaving) = watch.leaving.as_ref().filter(|_| args.beyond_range) {
+        output::note(&format!("{}; what comes after is a guess", leaving.text()));
+    }
     if let Some(stop) = result.stop {
         let problem = match &stop {
             RolloutError::LeftDomain { t, component, value, lower, upper, .. } => format!(
-                "left the training range at t = {t}: {} reached {value:.6e}, trained on [{lower}, {upper}]",
+                "left the training range at t = {t}: {} reached {value:.6e}, trained on [{lower}, {upper}]; --beyond-range goes on",
                 columns.get(*component).map_or("a component", String::as_str)
             ),
             other => other.to_string(),
         };
         let kept = result.trajectory.len();
-        return Err(CliError::data(format_args!("{problem} ({kept} samples are in {})", args.out.display())));
+        return Err(CliError::data(format_args!("{problem} ({kept} samples are in {})", place(&args.out))));
     }
     let statistics = result.statistics;
-    // A system that was only recorded has no unit here, nor has one of another version.
-    let unit = find(&learned.header.system).map_or(String::new(), |system| format!(" {}", system.time_unit));
     let balance = if learned.network.conserves_energy() {
-        String::new()
+        None
     } else {
-        let balance = result.trajectory.energy_balance(&learned.network).map_err(CliError::data)?;
+        Some(result.trajectory.energy_balance(&learned.network).map_err(CliError::data)?)
+    };
+    let facts = Facts {
+        system: &learned.header.system,
+        samples: result.trajectory.len(),
+        t_end: args.t_end,
+        time_unit,
+        steps: statistics.accepted,
+        evaluations: statistics.evaluations,
+        iterations: method.is_structure_preserving().then_some(statistics.iterations),
+        energy_change: balance.map(|balance| balance.change),
+        dissipated: balance.map(|balance| balance.dissipated),
+        energy_defect: balance.map(|balance| balance.defect()),
+        left_training_range: watch.leaving.as_ref(),
+        out: place(&args.out),
+    };
+    if args.json {
+        return output::print(&facts.json()?);
+    }
+    let unit = time_unit.map_or(String::new(), |unit| format!(" {unit}"));
+    let balance = balance.map_or(String::new(), |balance| {
         let (change, dissipated, defect) = (balance.change, balance.dissipated, balance.defect());
         format!("energy changed by {change:.9e}, friction took {dissipated:.9e}, not accounted for {defect:.1e}\n")
-    };
-    let iterations = if method.is_structure_preserving() {
-        format!(" in {} iterations", statistics.iterations)
-    } else {
-        String::new()
-    };
-    output::print(&format!(
+    });
+    let iterations = facts.iterations.map_or(String::new(), |iterations| format!(" in {iterations} iterations"));
+    let text = format!(
         "{} samples to t = {}{unit}, {} steps, {} evaluations{iterations}, in {}\n{balance}",
-        result.trajectory.len(),
-        args.t_end,
-        statistics.accepted,
-        statistics.evaluations,
-        args.out.display()
-    ))
+        facts.samples, facts.t_end, facts.steps, facts.evaluations, facts.out
+    );
+    if standard {
+        text.lines().for_each(output::note)
+    } else {
+        output::print(&text)?
+    }
+    Ok(())
 }

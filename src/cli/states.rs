@@ -1,6 +1,6 @@
 //! States from CSV files.
 
-use crate::names::unknown;
+use crate::names::{nearest, unknown};
 use crate::recording::read::unquoted;
 use crate::scalar::Scalar;
 use thiserror::Error;
@@ -87,8 +87,8 @@ pub enum StatesError {
 
 /// Reads states from CSV text.
 ///
-/// The first line that is not blank names the columns, all of `columns` (coordinates, then velocities) in any order and
-/// no others. Fields are separated by commas; spaces around them, double quotes, a byte order mark, blank lines and
+/// The first line that is not blank names the columns, all of `columns` (coordinates, then velocities) in any order; what
+/// stands in others, such as the time and the energy of a roll-out, is left out. Fields are separated by commas; spaces around them, double quotes, a byte order mark, blank lines and
 /// Windows line ends are accepted. Numbers are read in the precision of `S`: a double-double sees the decimal text, not
 /// its nearest `f64`.
 ///
@@ -113,6 +113,7 @@ pub fn parse_states<S: Scalar>(bytes: &[u8], columns: &[String]) -> Result<State
             return Err(StatesError::Ragged { row, expected: order.len(), found });
         }
         for (field, &column) in line.split(',').zip(&order) {
+            let Some(column) = column else { continue };
             let field = unquoted(field);
             state[column] = S::parse(field).filter(|x| x.is_finite()).ok_or_else(|| StatesError::Field {
                 row,
@@ -127,28 +128,38 @@ pub fn parse_states<S: Scalar>(bytes: &[u8], columns: &[String]) -> Result<State
     if states.rows.is_empty() { Err(StatesError::NoStates) } else { Ok(states) }
 }
 
-/// For every field of a row, the index of its column.
-fn read_header(row: usize, header: &str, columns: &[String]) -> Result<Vec<usize>, StatesError> {
+/// For every field of a row, the index of its column, if it has one.
+fn read_header(row: usize, header: &str, columns: &[String]) -> Result<Vec<Option<usize>>, StatesError> {
     if !header.contains(',')
         && let Some(separator) = [';', '\t', '|'].into_iter().find(|c| header.contains(*c))
     {
         return Err(StatesError::Separator { row, separator });
     }
-    let mut order = Vec::with_capacity(columns.len());
-    for name in header.split(',').map(unquoted) {
-        let Some(column) = columns.iter().position(|known| known == name) else {
-            return Err(StatesError::Unknown {
-                row,
-                problem: unknown("column", name, columns.iter().map(String::as_str)),
-            });
-        };
-        if order.contains(&column) {
+    let names: Vec<&str> = header.split(',').map(unquoted).collect();
+    let mut order = Vec::with_capacity(names.len());
+    for name in &names {
+        let column = columns.iter().position(|known| known == name);
+        if column.is_some() && order.contains(&column) {
             return Err(StatesError::Duplicate { row, name: name.to_string() });
         }
         order.push(column);
     }
-    let missing: Vec<&str> = (0..columns.len()).filter(|k| !order.contains(k)).map(|k| columns[k].as_str()).collect();
-    if missing.is_empty() { Ok(order) } else { Err(StatesError::Missing { row, names: missing.join(", ") }) }
+    let missing: Vec<&str> =
+        (0..columns.len()).filter(|k| !order.contains(&Some(*k))).map(|k| columns[k].as_str()).collect();
+    if missing.is_empty() {
+        return Ok(order);
+    }
+    // Where one is missing, one that is not known may be a misprint of it.
+    let near = |name: &&&str| nearest(name, missing.iter().copied()).is_some();
+    let foreign = || names.iter().zip(&order).filter(|(_, column)| column.is_none()).map(|(name, _)| name);
+    let nothing_known = order.iter().all(Option::is_none);
+    match foreign().find(near).or_else(|| foreign().next().filter(|_| nothing_known)) {
+        Some(name) => {
+            let problem = unknown("column", name, columns.iter().map(String::as_str));
+            Err(StatesError::Unknown { row, problem })
+        }
+        None => Err(StatesError::Missing { row, names: missing.join(", ") }),
+    }
 }
 
 #[cfg(test)]
@@ -188,6 +199,16 @@ mod tests {
         );
         assert_eq!(refusal("\ntheta1,theta2_dot\n"), "row 2: missing column theta2, theta1_dot");
         assert_eq!(refusal("theta1,theta2,theta1_dot,theta2_dot\n\n"), "no states below the header");
+    }
+
+    #[test]
+    fn columns_of_a_roll_out_that_are_no_state_are_left_out() {
+        let text = "t,theta1,theta2,theta1_dot,theta2_dot,energy\n0,1,2,3,4,nan\n0.1,5,6,7,8,x\n";
+        let states = parse_states::<f64>(text.as_bytes(), &columns()).unwrap();
+        assert_eq!((states.q, states.v), (vec![1.0, 2.0, 5.0, 6.0], vec![3.0, 4.0, 7.0, 8.0]));
+        assert_eq!(refusal("t,theta1,theta2,theta1_dot\n"), "row 1: missing column theta2_dot");
+        let near = refusal("t,theta1,theta2,theta1_dot,theta2_do\n");
+        assert_eq!(near, "row 1: unknown column \"theta2_do\", did you mean \"theta2_dot\"?");
     }
 
     #[test]

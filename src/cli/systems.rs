@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 /// Arguments.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// One JSON array instead of a table.
+    /// One JSON object per line instead of a table.
     #[arg(long)]
     json: bool,
 }
@@ -16,14 +16,13 @@ pub struct Args {
 /// Prints the catalogue.
 pub fn run(args: &Args) -> Result<(), CliError> {
     if args.json {
-        let all: Vec<Value> = systems().iter().map(describe).collect();
-        return output::print(&format!("{:#}\n", Value::from(all)));
+        return output::print(&systems().iter().map(|system| format!("{}\n", describe(system))).collect::<String>());
     }
     output::print(&systems().iter().map(table).collect::<Vec<_>>().join("\n"))
 }
 
 /// Symbol, default, unit and allowed values of every parameter.
-fn parameters(system: &System) -> Vec<[String; 4]> {
+pub fn parameters(system: &System) -> Vec<[String; 4]> {
     let mut rows: Vec<_> =
         system.parameters.iter().map(|p| [p.symbol, p.default, p.unit, p.range.text()].map(String::from)).collect();
     if let Size::Chosen { symbol, default, least, most } = system.size {

@@ -22,6 +22,9 @@ const STARTS: usize = 4;
 /// A usage error for arguments and configuration, a data error for files and a training that fails, an interruption;
 /// after the last two the best model so far is written, if there is one.
 pub fn run(args: &Args) -> Result<(), CliError> {
+    if let Some(format) = args.print_config {
+        return args.print(format);
+    }
     let Some(Task { config, system, folder, start }) = Task::of(args)? else { return Ok(()) };
     let stop = interrupt::flag()?;
     let effort = Effort { threads: threads(args.threads), starts: STARTS, horizon: 1.0 };

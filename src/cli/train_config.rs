@@ -1,38 +1,53 @@
 //! Arguments of `lnn train` and the configuration they come to.
 
-use crate::cli::learned::given;
+use crate::cli::changes::Changes;
+use crate::cli::config_file::{ConfigFile, Mistake};
+use crate::cli::learned::{all_parameters, given};
 use crate::cli::number::{count, finite, positive};
-use crate::cli::{CliError, config, source};
-use crate::lagrangian::{Configured, configure};
-use crate::training::{Config, Every, Precision, Preset};
-use std::path::{Path, PathBuf};
+use crate::cli::print_config::{PrintFormat, commented, with_seed};
+use crate::cli::start::Start;
+use crate::cli::{CliError, output, source};
+use crate::lagrangian::{Configured, SystemError, configure};
+use crate::training::{
+    Config, Every, Precision, Preset, SamplingError, Schedule, TRAINING_SECTIONS, configuration_reference,
+};
+use std::path::PathBuf;
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
+#[command(mut_arg("learning_rate", |rate| rate.visible_alias("rate")))]
 pub struct Args {
-    /// A system by name (`lnn systems` lists them) [default: the configuration's].
-    #[arg(required_unless_present_any = ["config", "resume"])]
+    /// A system by name (`lnn systems` lists them) [default: that of the configuration or of the model].
+    #[arg(required_unless_present_any = ["config", "resume", "from"])]
     system: Option<String>,
     /// A configuration that ships with the program [default: quick].
-    #[arg(long, value_enum, conflicts_with = "config")]
+    #[arg(long, value_enum, value_name = "NAME")]
     preset: Option<PresetName>,
-    /// A complete configuration, such as the config.toml beside a model.
+    /// A configuration, such as the config.toml beside a model, or - for standard input; keys that are not in it have the
+    /// preset's values.
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
+    /// Print the configuration with comments, as it would be used, and train nothing; markdown prints a table of all keys.
+    #[arg(long, value_enum, value_name = "FORMAT", num_args = 0..=1, require_equals = true, default_missing_value = "toml",
+        conflicts_with = "resume")]
+    pub print_config: Option<PrintFormat>,
+    /// Start from the weights of a model, a file or the directory of a run: system, parameters, network and precision are the
+    /// model's unless said otherwise, states are new; another network is refused.
+    #[arg(long, value_name = "MODEL")]
+    from: Option<String>,
     /// A parameter of the system; may be repeated.
     #[arg(long, value_name = "SYMBOL=VALUE", value_parser = source::parameter)]
     param: Vec<(String, String)>,
-    /// Seed of states, weights and the order of the data.
+    /// Seed of states, weights and the order of the data [default: the configuration's, 0 in all presets].
     #[arg(long, value_name = "N", allow_hyphen_values = true)]
     seed: Option<u64>,
-    /// Epochs of every phase.
-    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = count)]
-    epochs: Option<usize>,
+    #[command(flatten)]
+    changes: Changes,
     /// Threads; the result does not depend on them [default: all].
     #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = count)]
     pub threads: Option<usize>,
-    /// Precision of weights and arithmetic.
-    #[arg(long, value_enum)]
+    /// Precision of weights and arithmetic [default: the configuration's, f32 in all presets].
+    #[arg(long, value_enum, value_name = "TYPE")]
     precision: Option<PrecisionName>,
     /// Directory for everything the run writes [default: runs/SYSTEM].
     #[arg(long, value_name = "DIR")]
@@ -60,7 +75,9 @@ enum PresetName {
 
 #[derive(Clone, Copy, Debug, clap::ValueEnum)]
 pub enum PrecisionName {
+    /// Single.
     F32,
+    /// Double.
     F64,
 }
 
@@ -73,19 +90,23 @@ impl From<PrecisionName> for Precision {
     }
 }
 
+impl From<Precision> for PrecisionName {
+    fn from(precision: Precision) -> Self {
+        match precision {
+            Precision::F32 => Self::F32,
+            Precision::F64 => Self::F64,
+        }
+    }
+}
+
 impl Args {
-    /// The configuration: the file's or the preset's, changed by the arguments, every value in range.
+    /// The configuration: the file's, the model's or the preset's, in this order, changed by the arguments, every value in
+    /// range.
     ///
     /// # Errors
-    /// A usage error naming what is wrong, or a data error for a file that cannot be read.
+    /// Usage errors naming everything that is wrong, or a data error for a file that cannot be read.
     pub fn resolve(&self) -> Result<(Config, Configured<f64>), CliError> {
-        let config = match &self.config {
-            Some(path) => self.file_config(path)?,
-            None => self.preset_config(self.system.as_deref().unwrap_or_default())?,
-        };
-        let config = self.changed(config)?;
-        let system = self.check(&config)?;
-        Ok((config, system))
+        self.settle(None)
     }
 
     /// The configuration that the arguments ask for beside `--resume`: that of the checkpoint where they say nothing.
@@ -93,41 +114,120 @@ impl Args {
     /// # Errors
     /// As [`Args::resolve`].
     pub fn resolve_beside(&self, saved: &Config) -> Result<Config, CliError> {
-        let config = match (&self.config, self.preset) {
-            (Some(path), _) => self.file_config(path)?,
-            (None, Some(_)) => self.preset_config(self.system.as_ref().unwrap_or(&saved.system))?,
-            (None, None) => {
-                let system = self.system.clone().unwrap_or_else(|| saved.system.clone());
-                Config { system, ..saved.clone() }
-            }
-        };
+        if self.config.is_some() || self.preset.is_some() || self.from.is_some() {
+            return Ok(self.settle(Some(&saved.system))?.0);
+        }
+        let system = self.system.clone().unwrap_or_else(|| saved.system.clone());
+        let config = Config { system, ..saved.clone() };
         self.changed(config)
     }
 
     /// The configuration's system; every value is in range.
     ///
     /// # Errors
-    /// A usage error naming what is wrong.
+    /// Usage errors naming everything that is wrong.
     pub fn check(&self, config: &Config) -> Result<Configured<f64>, CliError> {
         let system = configure(&config.system, &given(&config.parameters)).map_err(CliError::usage)?;
-        let place = |e: &dyn std::fmt::Display| match &self.config {
-            Some(path) => CliError::usage(format_args!("{}: {e}", path.display())),
-            None => CliError::usage(e),
-        };
-        config.validate(system.coordinates).map_err(|e| place(&e))?;
+        CliError::all_usage(config.faults(system.coordinates).into_iter().map(|fault| fault.to_string()))?;
         Ok(system)
     }
 
-    fn file_config(&self, path: &Path) -> Result<Config, CliError> {
-        let config: Config = config::load(path)?;
-        if let Some(system) = self.system.as_ref().filter(|name| **name != config.system) {
-            let problem = format!("{} is about {:?}, not {system:?}", path.display(), config.system);
-            return Err(CliError::usage(problem));
+    /// Prints the configuration or its reference.
+    ///
+    /// # Errors
+    /// As [`Args::resolve`]; standard output that cannot be written.
+    pub fn print(&self, format: PrintFormat) -> Result<(), CliError> {
+        let (config, system) = self.resolve()?;
+        if format == PrintFormat::Markdown {
+            return output::print(&configuration_reference());
         }
-        // Before the arguments change anything: what is wrong here is the file's.
-        configure::<f64>(&config.system, &given(&config.parameters))
-            .map_err(|e| CliError::usage(format_args!("{}: {e}", path.display())))?;
-        Ok(config)
+        let described = crate::cli::systems::parameters(system.system);
+        let remark = |name: &str| {
+            let [_, default, unit, range] = described.iter().find(|[symbol, ..]| symbol == name)?;
+            let unit = if unit == "1" { String::new() } else { format!(", in {unit}") };
+            Some(format!("{range}{unit}; {default} unless set"))
+        };
+        let table = toml::Table::try_from(&Config { seed: 0, ..config.clone() }).map_err(CliError::data)?;
+        output::print(&with_seed(&commented(&TRAINING_SECTIONS, &table, &remark), config.seed))
+    }
+
+    /// The configuration that files and arguments come to; `saved` names a system where they do not.
+    fn settle(&self, saved: Option<&str>) -> Result<(Config, Configured<f64>), CliError> {
+        let file = self.config.as_deref().map(ConfigFile::read).transpose()?;
+        let from = self.from.clone().or_else(|| file.as_ref()?.text(&["from"]));
+        let start = from.as_deref().map(Start::read).transpose()?;
+        let name = self.name(file.as_ref(), start.as_ref(), saved)?;
+        let mut parameters = match &start {
+            Some(start) if start.header.system == name => given(&start.header.parameters),
+            _ => Vec::new(),
+        };
+        let mut mistakes = Vec::new();
+        replace(&mut parameters, &file.as_ref().map(file_parameters).unwrap_or_default());
+        // What is wrong in the arguments is not the file's.
+        match configure::<f64>(&name, &self.param) {
+            Err(SystemError::UnknownSystem { .. }) if file.is_some() && self.system.is_none() => {}
+            other => drop(other.map_err(CliError::usage)?),
+        }
+        replace(&mut parameters, &self.param);
+        let (system, known) = match configure::<f64>(&name, &parameters) {
+            Ok(system) => (system, true),
+            Err(error) => {
+                mistakes.extend(wrong_parameters(&name, &parameters, &error));
+                // Something to tell the types of the other keys by.
+                let usual = configure(&name, &self.param).or_else(|_| configure("double-pendulum", &[]));
+                (usual.map_err(CliError::usage)?, false)
+            }
+        };
+        let mut config = self.preset_config(&system)?;
+        config.parameters = all_parameters(&system);
+        if let Some(start) = &start {
+            start.shape(&mut config);
+        }
+        if let Some(file) = &file {
+            let (filled, wrong) = file.over(&config)?;
+            config = with_periods(file, filled);
+            config.seed = file.large(&["seed"]).unwrap_or(config.seed);
+            mistakes.extend(wrong);
+            if known {
+                mistakes.extend(config.faults(system.coordinates).into_iter().map(Mistake::from));
+                mistakes.extend(config.penalty().err().map(|error| match error {
+                    SamplingError::Config(fault) => Mistake::from(fault),
+                    other => Mistake::new("", other),
+                }));
+            }
+            file.check(mistakes)?;
+        }
+        config.system = name;
+        config.from = from;
+        let config = self.changed(config)?;
+        let system = self.check(&config)?;
+        if let Some(start) = &start {
+            let coordinates = (system.system.coordinates)(system.coordinates);
+            start.require(&config, coordinates.iter().map(|c| c.periodic).collect())?;
+        }
+        Ok((config, system))
+    }
+
+    /// Name of the system: the argument's, the file's, the model's or the checkpoint's.
+    fn name(&self, file: Option<&ConfigFile>, start: Option<&Start>, saved: Option<&str>) -> Result<String, CliError> {
+        let in_file = file.and_then(|file| file.text(&["system"]));
+        match (&self.system, in_file) {
+            (Some(asked), Some(found)) if *asked != found => {
+                let place = self.config.as_deref().map(crate::cli::input::name).unwrap_or_default();
+                Err(CliError::usage(format_args!("{place} is about {found:?}, not {asked:?}")))
+            }
+            (Some(name), _) => Ok(name.clone()),
+            (None, Some(name)) => Ok(name),
+            (None, None) => {
+                let known = start.map(|start| start.header.system.as_str()).or(saved);
+                known.map(str::to_string).ok_or_else(|| {
+                    let place = self.config.as_deref().map(crate::cli::input::name).unwrap_or_default();
+                    CliError::usage(format_args!(
+                        "{place}: system: no system is named, neither here nor as an argument"
+                    ))
+                })
+            }
+        }
     }
 
     /// A configuration with the values that arguments name.
@@ -139,27 +239,68 @@ impl Args {
         if let Some(seed) = self.seed {
             config.seed = seed;
         }
-        if let Some(epochs) = self.epochs {
-            config.phases.iter_mut().for_each(|phase| phase.epochs = epochs);
-        }
         if let Some(precision) = self.precision {
             config.precision = precision.into();
         }
+        // Whoever takes the configuration finds out what is wrong with its system.
+        let time = configure::<f64>(&config.system, &given(&config.parameters)).ok().and_then(|system| {
+            let coordinates = (system.system.coordinates)(system.coordinates);
+            coordinates.into_iter().nth(system.system.time_like?).map(|coordinate| coordinate.name)
+        });
+        self.changes.apply(&mut config, time.as_deref(), "")?;
         Ok(config)
     }
 
-    /// The preset's configuration of the system, whose size the parameters decide.
-    fn preset_config(&self, name: &str) -> Result<Config, CliError> {
-        let system = configure::<f64>(name, &self.param).map_err(CliError::usage)?;
+    /// The preset's configuration of the system.
+    fn preset_config(&self, system: &Configured<f64>) -> Result<Config, CliError> {
         let (preset, known) = match self.preset.unwrap_or(PresetName::Quick) {
             PresetName::Quick => (Preset::Quick, "quick"),
             PresetName::Best => (Preset::Best, "best"),
             PresetName::Paper => (Preset::Paper, "paper"),
         };
-        preset.config(&system).ok_or_else(|| {
+        preset.config(system).ok_or_else(|| {
+            let name = system.system.name;
             CliError::usage(format_args!("--preset {known}: there is none for {name}, use quick or --config"))
         })
     }
+}
+
+/// The numbers of a file's `[parameters]` as the catalogue takes them.
+fn file_parameters(file: &ConfigFile) -> Vec<(String, String)> {
+    let table = file.get(&["parameters"]).and_then(toml::Value::as_table);
+    let number = |value: &toml::Value| value.as_float().or_else(|| value.as_integer().map(|x| x as f64));
+    let entries = table.into_iter().flatten();
+    entries.filter_map(|(symbol, value)| Some((symbol.clone(), number(value)?.to_string()))).collect()
+}
+
+/// Takes later values in the place of earlier ones.
+fn replace(parameters: &mut Vec<(String, String)>, later: &[(String, String)]) {
+    parameters.retain(|(symbol, _)| later.iter().all(|(new, _)| new != symbol));
+    parameters.extend_from_slice(later);
+}
+
+/// What is wrong with a system's name or with its parameters, each of them by itself.
+fn wrong_parameters(name: &str, parameters: &[(String, String)], error: &SystemError) -> Vec<Mistake> {
+    if matches!(error, SystemError::UnknownSystem { .. }) {
+        return vec![Mistake::new("system", error)];
+    }
+    let alone = parameters.iter().filter_map(|one| {
+        let problem = configure::<f64>(name, std::slice::from_ref(one)).err()?;
+        Some(Mistake::new(format!("parameters.{}", one.0), problem))
+    });
+    let found: Vec<Mistake> = alone.collect();
+    if found.is_empty() { vec![Mistake::new("parameters", error)] } else { found }
+}
+
+/// The configuration with a `t_max` of all epochs where the file changes these alone and the schedule has no periods.
+fn with_periods(file: &ConfigFile, mut config: Config) -> Config {
+    for (k, phase) in config.phases.iter_mut().enumerate() {
+        let has = |key: &str| file.has(&format!("phase[{k}].{key}"));
+        if has("epochs") && !has("t_max") && phase.schedule != Schedule::CosineAnnealing {
+            phase.t_max = phase.epochs as f64;
+        }
+    }
+    config
 }
 
 /// How often checkpoints are written: `10` epochs, `90s`.

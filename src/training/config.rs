@@ -356,11 +356,11 @@ impl Faults {
         self.check(bounds.len() == n, field, "one [low, high] per coordinate", found);
         for (k, &[low, high]) in bounds.iter().enumerate() {
             let ok = low.is_finite() && high.is_finite() && low <= high;
-            self.check(ok, &format!("{field}[{k}]"), "finite [low, high] in order", format!("[{low}, {high}]"));
-        }
-        if !(high - low).is_finite() {
-            let expected = "[low, high] no further apart than the largest number";
-            return fault(format!("{field}[{k}]"), expected, format!("[{low:e}, {high:e}]"));
+            let field = format!("{field}[{k}]");
+            if self.check(ok, &field, "finite [low, high] in order", format!("[{low}, {high}]")) {
+                let expected = "[low, high] no further apart than the largest number";
+                self.check((high - low).is_finite(), &field, expected, format!("[{low:e}, {high:e}]"));
+            }
         }
     }
 }

@@ -114,6 +114,12 @@ pub const TRAINING_SECTIONS: [Section<'static>; 8] = [
                 "Activation of the hidden layers; quadratic-softplus is two networks of half the widths.",
             ),
             key("alpha", "a finite number", "Factor of the added |v|^2 of scaled velocities."),
+            optional(
+                "time_like",
+                "\"t\"",
+                "a coordinate",
+                "Its square counts negative in the added term, alpha (-t'^2 + x'^2 + ..); without it all squares are added.",
+            ),
             key(
                 "scaling",
                 "physical, none",
@@ -129,7 +135,7 @@ pub const TRAINING_SECTIONS: [Section<'static>; 8] = [
             ),
             key(
                 "initialization",
-                "default, variance-preserving, cranmer, near-zero",
+                "default, variance-preserving, cranmer, cranmer-paper, near-zero",
                 "Distribution of the initial weights.",
             ),
         ],

@@ -5,7 +5,7 @@ use lnn::network::{Architecture, InputLayer, Layout, Nonlinearity};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fs;
-use std::io::Read;
+use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::thread;
@@ -25,6 +25,17 @@ pub fn command(arguments: &[&str]) -> Command {
 /// Runs the program.
 pub fn lnn(arguments: &[&str]) -> Run {
     Run::of(&mut command(arguments))
+}
+
+/// Runs the program with this on its standard input.
+pub fn piped(arguments: &[&str], content: &[u8]) -> Run {
+    let mut child =
+        command(arguments).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    // A program that ends before it has read everything closes the pipe.
+    let _ = child.stdin.take().unwrap().write_all(content);
+    let output = child.wait_with_output().unwrap();
+    let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("UTF-8");
+    Run { code: output.status.code(), stdout: text(output.stdout), stderr: text(output.stderr) }
 }
 
 /// Looks at states of a system.

@@ -25,7 +25,7 @@ const ROOMS: [&str; 16] = [
 ];
 
 /// Crates and the only places that may name them.
-const ADAPTERS: [(&str, &str); 13] = [
+const ADAPTERS: [(&str, &str); 15] = [
     ("pulp", "src/scalar/"),
     ("xprec", "src/scalar/"),
     ("libm", "src/scalar/"),
@@ -38,6 +38,8 @@ const ADAPTERS: [(&str, &str); 13] = [
     ("kuva", "src/report/plot"),
     ("zip", "src/recording/read/npz.rs"),
     ("clap", "src/cli/"),
+    ("clap_complete", "src/cli/"),
+    ("clap_mangen", "src/cli/"),
     ("indicatif", "src/cli/"),
 ];
 

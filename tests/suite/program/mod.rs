@@ -1,6 +1,8 @@
 //! The program `lnn` from outside.
 
 mod check;
+mod configuration;
+mod conveniences;
 mod dissipation;
 mod experiment;
 mod fit;

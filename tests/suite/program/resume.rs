@@ -236,7 +236,7 @@ fn work_that_does_not_fit_into_memory_is_refused() {
         fs::write(folder.path("c.toml"), good.replacen(old, new, 1)).unwrap();
         refused(&folder.train("out", &[]).wait_with_output().unwrap(), code, parts);
     };
-    with("hidden = [16, 16]", "hidden = [1000000, 1000000]", 2, &["network.hidden[0]"]);
+    with("hidden = [16, 16]", "hidden = [1000000, 16]", 2, &["network.hidden[0]"]);
     with("training = 4096", "training = 1000000000000", 2, &["data.training"]);
     with("batch = 128", "batch = 1000000000000", 2, &["optimizer.batch"]);
     if Path::new("/proc/meminfo").exists() {

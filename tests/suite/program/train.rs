@@ -259,7 +259,18 @@ fn wrong_trainings_are_refused_before_anything_is_written() {
     with("input_layer = \"none\"", "input_layer = \"dty\"", &["dty", "did you mean \"dyt\"?"]);
     let odd = "hidden = [16, 15]\nactivation = \"quadratic-softplus\"";
     with("hidden = [16, 16]\nactivation = \"gelu\"", odd, &["network.hidden[1]", "even", "15"]);
-    with("system = \"double-pendulum\"", "system = \"triple-pendulum\"", &["data."]);
+    // A mistake that concerns many keys is a line for each of them.
+    let path = folder.path("bad.toml");
+    fs::write(&path, good.replacen("double-pendulum", "triple-pendulum", 1)).unwrap();
+    let other = train(&["--config", &text(&path)]);
+    let stderr = String::from_utf8_lossy(&other.stderr);
+    assert_eq!(other.status.code(), Some(2), "{stderr}");
+    let fields = ["data.validation_position", "data.validation_velocity", "phase[0].position", "phase[0].velocity"];
+    assert_eq!(stderr.lines().count(), fields.len(), "{stderr}");
+    for (line, field) in stderr.lines().zip(fields) {
+        assert!(line.starts_with("error: ") && line.contains("bad.toml:") && line.contains(field), "{line}");
+        assert!(line.ends_with("one [low, high] per coordinate, found 2 for 3"), "{line}");
+    }
     let config = folder.config(&small("double-pendulum"));
     refused(&train(&["spring-pendulum", "--config", &config]), 2, &["double-pendulum", "spring-pendulum"]);
     assert!(!folder.path("out").exists());

@@ -1,0 +1,182 @@
+//! Options for what is changed most, of `train` and `fit` alike.
+
+use crate::cli::CliError;
+use crate::cli::number::{count, positive, weight};
+use crate::network::Nonlinearity;
+use crate::training::{Config, Regularizer};
+
+/// Changes of a configuration.
+#[derive(Clone, Debug, Default, clap::Args)]
+pub struct Changes {
+    /// Widths of the hidden layers [default: the configuration's; 128,128,128 in the preset quick and in fits].
+    #[arg(long, value_name = "W1,W2,..", value_delimiter = ',', allow_hyphen_values = true, value_parser = count)]
+    pub hidden: Vec<usize>,
+    /// Activation of the hidden layers: gelu, softplus, x-tanh, tanh, quadratic, or quadratic-softplus, which is two networks of
+    /// half the widths [default: the configuration's, gelu in all presets].
+    #[arg(long, value_name = "NAME", value_parser = activation)]
+    pub activation: Option<Nonlinearity>,
+    /// What keeps the signature of the mass matrix.
+    #[arg(long, value_enum, value_name = "KIND")]
+    pub penalty: Option<PenaltyName>,
+    /// Weight of the penalty beside the loss.
+    #[arg(long, value_name = "L", allow_hyphen_values = true, value_parser = weight)]
+    pub lambda: Option<f64>,
+    /// Learning rate of the first phase; the rates of later phases and all lowest rates are scaled with it.
+    #[arg(long, value_name = "R", allow_hyphen_values = true, value_parser = positive)]
+    pub learning_rate: Option<f64>,
+    /// Epochs of all phases together; the whole schedule is scaled, with the periods of its rates.
+    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = count)]
+    pub epochs: Option<usize>,
+}
+
+/// Kinds of [`Regularizer`] by name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum PenaltyName {
+    /// Nothing does.
+    None,
+    /// Negative eigenvalues are penalised.
+    Eigenvalue,
+    /// Negative leading minors are penalised.
+    Sylvester,
+    /// The same beside a time-like coordinate, whose own element must be negative.
+    LorentzianSylvester,
+}
+
+/// An activation by name.
+fn activation(text: &str) -> Result<Nonlinearity, String> {
+    let known = Nonlinearity::ALL.map(Nonlinearity::name);
+    let found = Nonlinearity::ALL.into_iter().find(|choice| choice.name() == text);
+    found.ok_or_else(|| crate::names::unknown("activation", text, known))
+}
+
+impl Changes {
+    /// Changes a configuration; `time` is the time-like coordinate of the system, if it has one, and `how` says how to name
+    /// one otherwise.
+    ///
+    /// # Errors
+    /// A usage error for options that contradict each other or the configuration.
+    pub fn apply(&self, config: &mut Config, time: Option<&str>, how: &str) -> Result<(), CliError> {
+        if !self.hidden.is_empty() {
+            config.network.hidden.clone_from(&self.hidden);
+        }
+        if let Some(activation) = self.activation {
+            config.network.activation = activation;
+        }
+        self.penalise(config, time, how)?;
+        if let Some(rate) = self.learning_rate
+            && let Some(first) = config.phases.first().map(|phase| phase.rate)
+        {
+            let factor = rate / first;
+            for phase in &mut config.phases {
+                (phase.rate, phase.eta_min) = (phase.rate * factor, phase.eta_min * factor);
+            }
+            config.phases[0].rate = rate;
+        }
+        self.epochs.map_or(Ok(()), |epochs| scale_epochs(config, epochs))
+    }
+
+    fn penalise(&self, config: &mut Config, time: Option<&str>, how: &str) -> Result<(), CliError> {
+        let lambda = self.lambda.unwrap_or(match config.penalty {
+            // The weight of the presets quick and best.
+            Regularizer::None => 100.0,
+            _ => config.penalty.lambda(),
+        });
+        let kind = match (self.penalty, &config.penalty) {
+            (Some(kind), _) => kind,
+            (None, _) if self.lambda.is_none() => return Ok(()),
+            (None, Regularizer::None) => {
+                return Err(CliError::usage("--lambda: there is no penalty to weigh, choose one by --penalty"));
+            }
+            (None, Regularizer::Eigenvalue { .. }) => PenaltyName::Eigenvalue,
+            (None, Regularizer::Sylvester { .. }) => PenaltyName::Sylvester,
+            (None, Regularizer::LorentzianSylvester { .. }) => PenaltyName::LorentzianSylvester,
+        };
+        config.penalty = match kind {
+            PenaltyName::None if self.lambda.is_some() => {
+                return Err(CliError::usage("--lambda: --penalty none has no weight"));
+            }
+            PenaltyName::None => Regularizer::None,
+            PenaltyName::Eigenvalue => Regularizer::Eigenvalue { lambda },
+            PenaltyName::Sylvester => Regularizer::Sylvester { lambda },
+            PenaltyName::LorentzianSylvester => {
+                let named = match &config.penalty {
+                    Regularizer::LorentzianSylvester { time, .. } => Some(time.as_str()),
+                    _ => None,
+                };
+                let Some(time) = named.or(time) else {
+                    let problem = format!("{} has no time-like coordinate{how}", config.system);
+                    return Err(CliError::usage(format_args!("--penalty lorentzian-sylvester: {problem}")));
+                };
+                Regularizer::LorentzianSylvester { lambda, time: time.to_string() }
+            }
+        };
+        Ok(())
+    }
+}
+
+/// Makes the phases last `total` epochs together, in the proportions they have.
+fn scale_epochs(config: &mut Config, total: usize) -> Result<(), CliError> {
+    let phases = config.phases.len();
+    if total < phases {
+        return Err(CliError::usage(format_args!(
+            "--epochs {total}: the schedule has {phases} phases, expected at least {phases}"
+        )));
+    }
+    let all: usize = config.phases.iter().map(|phase| phase.epochs).sum();
+    let (mut before, mut given) = (0, 0);
+    for (k, phase) in config.phases.iter_mut().enumerate() {
+        before += phase.epochs;
+        // An epoch at least for this phase and for each of the later ones.
+        let end = (total as f64 * before as f64 / all as f64).round() as usize;
+        let end = end.clamp(given + 1, total - (phases - 1 - k));
+        phase.t_max *= (end - given) as f64 / phase.epochs as f64;
+        phase.epochs = end - given;
+        given = end;
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lagrangian::configure;
+    use crate::training::Preset;
+
+    fn changed(preset: Preset, system: &str, changes: Changes) -> Result<Config, String> {
+        let mut config = preset.config(&configure(system, &[]).unwrap()).unwrap();
+        changes.apply(&mut config, None, "").map(|()| config).map_err(|e| e.to_string())
+    }
+
+    #[test]
+    fn the_whole_schedule_is_scaled() {
+        let of = |epochs, rate| {
+            let changes = Changes { epochs: Some(epochs), learning_rate: rate, ..Changes::default() };
+            changed(Preset::Paper, "double-pendulum", changes)
+        };
+        let phases = |config: Config| config.phases.iter().map(|p| (p.epochs, p.t_max)).collect::<Vec<_>>();
+        assert_eq!(phases(of(70, None).unwrap()), [(30, 3.0), (20, 3.0), (20, 3.0)]);
+        assert_eq!(phases(of(700, None).unwrap()), [(300, 30.0), (200, 30.0), (200, 30.0)]);
+        assert_eq!(phases(of(3, None).unwrap()).iter().map(|p| p.0).collect::<Vec<_>>(), [1, 1, 1]);
+        assert_eq!(phases(of(1001, None).unwrap()).iter().map(|p| p.0).sum::<usize>(), 1001);
+        assert!(of(2, None).unwrap_err().contains("3 phases"));
+        let config = of(700, Some(2e-3)).unwrap();
+        assert_eq!((config.phases[0].rate, config.phases[0].eta_min), (2e-3, 2e-6));
+        assert_eq!((config.phases[1].rate, config.phases[1].eta_min), (8e-5, 2e-7));
+    }
+
+    #[test]
+    fn penalties_are_named_and_weighed() {
+        let of = |system: &str, penalty, lambda| {
+            changed(Preset::Quick, system, Changes { penalty, lambda, ..Changes::default() }).map(|c| c.penalty)
+        };
+        use PenaltyName as Name;
+        assert_eq!(of("kepler", None, Some(3.0)), Ok(Regularizer::Eigenvalue { lambda: 3.0 }));
+        assert_eq!(of("kepler", Some(Name::Sylvester), None), Ok(Regularizer::Sylvester { lambda: 100.0 }));
+        assert_eq!(of("kepler", Some(Name::None), None), Ok(Regularizer::None));
+        assert!(of("kepler", Some(Name::None), Some(1.0)).unwrap_err().contains("no weight"));
+        assert!(of("kepler", Some(Name::LorentzianSylvester), None).unwrap_err().contains("no time-like coordinate"));
+        let time = "t".to_string();
+        let lorentzian = Regularizer::LorentzianSylvester { lambda: 2.0, time };
+        assert_eq!(of("ads4-geodesic", None, Some(2.0)), Ok(lorentzian));
+    }
+}

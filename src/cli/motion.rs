@@ -1,0 +1,218 @@
+//! What a roll-out tells beside its samples: where it left the training range, pictures, facts in JSON.
+
+use crate::cli::{CliError, input};
+use crate::report::{Figure, LinePlot, Report, Series, line_png};
+use crate::rollout::{Domain, Trajectory};
+use crate::storage::write_atomically;
+use serde::Serialize;
+use std::path::Path;
+
+/// Points of a curve beyond which every second one is left out.
+const MOST_POINTS: usize = 4000;
+
+/// The first sample outside the states that a model was trained on.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Leaving {
+    /// Its time.
+    pub t: f64,
+    /// The component that left.
+    pub column: String,
+    /// Its value.
+    pub value: f64,
+    /// What it was trained on.
+    pub trained_on: [f64; 2],
+}
+
+impl Leaving {
+    /// In words.
+    pub fn text(&self) -> String {
+        let Self { t, column, value, trained_on: [low, high] } = self;
+        format!("left the training range at t = {t}: {column} reached {value:.6e}, trained on [{low}, {high}]")
+    }
+}
+
+/// Watches a motion whose samples come in pieces; keeps few of them.
+pub struct Watch {
+    domain: Domain<f64>,
+    columns: Vec<String>,
+    /// Where it left the training range.
+    pub leaving: Option<Leaving>,
+    /// Times, and values of every column and of the energy, of every `stride`-th sample.
+    times: Vec<f64>,
+    values: Vec<Vec<f64>>,
+    stride: usize,
+    seen: usize,
+}
+
+impl Watch {
+    /// Watches the motion of a model with these columns that was trained on `domain`.
+    pub fn new(domain: Domain<f64>, columns: &[String]) -> Self {
+        let values = vec![Vec::new(); columns.len() + 1];
+        let columns = columns.to_vec();
+        Self { domain, columns, leaving: None, times: Vec::new(), values, stride: 1, seen: 0 }
+    }
+
+    /// Takes the next samples.
+    pub fn add(&mut self, piece: &Trajectory<f64>) {
+        for k in 0..piece.len() {
+            let (q, v) = piece.state(k);
+            let state = [q, v].concat();
+            if self.leaving.is_none()
+                && let Some((component, low, high)) = self.domain.violation(&state)
+            {
+                let column = self.columns.get(component).cloned().unwrap_or_default();
+                self.leaving =
+                    Some(Leaving { t: piece.t[k], column, value: state[component], trained_on: [low, high] });
+            }
+            if self.seen.is_multiple_of(self.stride) {
+                self.times.push(piece.t[k]);
+                let energy = piece.energy.as_ref().and_then(|energy| energy.get(k)).copied().unwrap_or(f64::NAN);
+                for (values, x) in self.values.iter_mut().zip(state.into_iter().chain([energy])) {
+                    values.push(x);
+                }
+            }
+            self.seen += 1;
+            if self.times.len() > MOST_POINTS {
+                self.stride *= 2;
+                thin(&mut self.times);
+                self.values.iter_mut().for_each(thin);
+            }
+        }
+    }
+
+    /// Draws the coordinates against time as a PNG, or a page of coordinates, velocities and energy as HTML, by the end of the
+    /// file's name.
+    ///
+    /// # Errors
+    /// A data error for a motion that has no finite sample, or a file that cannot be written.
+    pub fn plot(&self, path: &Path, title: &str, time_unit: &str) -> Result<(), CliError> {
+        let n = self.columns.len() / 2;
+        let bytes = if is_page(path) {
+            let mut report = Report::new(title);
+            if let Some(leaving) = &self.leaving {
+                report = report.paragraph(&format!("The motion {}.", leaving.text()));
+            }
+            let energy = ["energy".to_string()];
+            let parts = [
+                ("Coordinates", &self.columns[..n], &self.values[..n]),
+                ("Velocities", &self.columns[n..], &self.values[n..2 * n]),
+                ("Energy of the model", &energy[..], &self.values[2 * n..]),
+            ];
+            for (what, names, values) in parts {
+                let png = self.picture(what, names, values, time_unit)?;
+                let figure = Figure { file: String::new(), png, caption: format!("{what} against time.") };
+                report = report.figure(&figure.png, &figure.caption);
+            }
+            report.to_html().into_bytes()
+        } else {
+            self.picture(title, &self.columns[..n], &self.values[..n], time_unit)?
+        };
+        write_atomically(path, &bytes).map_err(|e| CliError::file(path, format_args!("cannot write: {e}")))
+    }
+
+    fn picture(&self, title: &str, names: &[String], values: &[Vec<f64>], unit: &str) -> Result<Vec<u8>, CliError> {
+        let plot = LinePlot {
+            title: title.to_string(),
+            x_label: if unit.is_empty() { "time".to_string() } else { format!("time [{unit}]") },
+            y_label: names.join(", "),
+            log_y: false,
+            series: names.iter().zip(values).map(|(name, y)| Series::new(name, &self.times, y)).collect(),
+        };
+        line_png(&plot).map_err(CliError::data)
+    }
+}
+
+fn thin(values: &mut Vec<f64>) {
+    let mut k = 0;
+    values.retain(|_| {
+        k += 1;
+        k % 2 == 1
+    });
+}
+
+/// Whether a picture's file is to be a page.
+fn is_page(path: &Path) -> bool {
+    path.extension().is_some_and(|end| end.eq_ignore_ascii_case("html") || end.eq_ignore_ascii_case("htm"))
+}
+
+/// A file for a picture: PNG or HTML.
+pub fn picture_file(text: &str) -> Result<std::path::PathBuf, String> {
+    let path = std::path::PathBuf::from(text);
+    let known = is_page(&path) || path.extension().is_some_and(|end| end.eq_ignore_ascii_case("png"));
+    if known { Ok(path) } else { Err("expected a file that ends in .png or .html".to_string()) }
+}
+
+/// What a roll-out came to, as one JSON object.
+#[derive(Debug, Serialize)]
+pub struct Facts<'a> {
+    /// Name of the system.
+    pub system: &'a str,
+    /// Samples written.
+    pub samples: usize,
+    /// Time of the last sample.
+    pub t_end: f64,
+    /// Unit of times, if the system is one of the catalogue's.
+    pub time_unit: Option<&'a str>,
+    /// Steps taken.
+    pub steps: usize,
+    /// States whose terms were evaluated.
+    pub evaluations: usize,
+    /// Iterations of an implicit method.
+    pub iterations: Option<usize>,
+    /// Energy at the end less that at the start, for a model with friction.
+    pub energy_change: Option<f64>,
+    /// Energy taken by friction.
+    pub dissipated: Option<f64>,
+    /// What is not accounted for.
+    pub energy_defect: Option<f64>,
+    /// Where the motion left the training range.
+    pub left_training_range: Option<&'a Leaving>,
+    /// The file of the samples.
+    pub out: String,
+}
+
+impl Facts<'_> {
+    /// One line.
+    ///
+    /// # Errors
+    /// Numbers that JSON cannot hold.
+    pub fn json(&self) -> Result<String, CliError> {
+        serde_json::to_string_pretty(self).map(|text| text + "\n").map_err(CliError::data)
+    }
+}
+
+/// Where the samples are, in words.
+pub fn place(out: &Path) -> String {
+    if input::is_standard(out) { "standard output".to_string() } else { out.display().to_string() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn long_motions_are_thinned_and_watched() {
+        let domain = Domain::new(vec![Some((-1.0, 5000.0)), None]);
+        let mut watch = Watch::new(domain, &["x".to_string(), "x_dot".to_string()]);
+        let piece = |k: usize| Trajectory {
+            coordinates: 1,
+            t: vec![k as f64],
+            q: vec![k as f64],
+            v: vec![1.0],
+            energy: Some(vec![0.5]),
+        };
+        (0..10_001).for_each(|k| watch.add(&piece(k)));
+        assert!(watch.times.len() <= MOST_POINTS + 1 && watch.times.len() > MOST_POINTS / 2);
+        assert!(watch.times.windows(2).all(|t| t[1] - t[0] == watch.stride as f64) && watch.times[0] == 0.0);
+        let leaving = watch.leaving.as_ref().unwrap();
+        assert_eq!((leaving.t, leaving.column.as_str(), leaving.trained_on), (5001.0, "x", [-1.0, 5000.0]));
+        let directory = tempfile::tempdir().unwrap();
+        let [png, page] = ["a.png", "a.html"].map(|name| directory.path().join(name));
+        watch.plot(&png, "Motion", "s").unwrap();
+        watch.plot(&page, "Motion", "").unwrap();
+        assert!(std::fs::read(&png).unwrap().starts_with(b"\x89PNG"));
+        let page = std::fs::read_to_string(&page).unwrap();
+        assert!(page.matches("data:image/png").count() == 3 && page.contains("left the training range at t = 5001"));
+        assert!(picture_file("a.PNG").is_ok() && picture_file("a.svg").is_err() && picture_file("a").is_err());
+    }
+}

@@ -1,0 +1,92 @@
+//! Training that starts from a model: the configuration takes the model's shape, and another shape is refused.
+
+use crate::cli::CliError;
+use crate::cli::learned::model_file;
+use crate::network::Architecture;
+use crate::network::file::{Header, ModelFile, StoredPrecision};
+use crate::scalar::Scalar;
+use crate::training::{Config, Precision, Scaling};
+use serde_json::Value;
+use std::path::Path;
+
+/// The model to start from, as far as the shape of a training is concerned.
+pub struct Start {
+    /// Where it is, as the user said it.
+    pub from: String,
+    /// What its file says about it.
+    pub header: Header,
+}
+
+impl Start {
+    /// Reads a model, by file or by the directory of its run.
+    ///
+    /// # Errors
+    /// A data error for anything but a whole model file.
+    pub fn read(from: &str) -> Result<Self, CliError> {
+        let path = model_file(Path::new(from))?;
+        let ModelFile { header, .. } = ModelFile::<f64>::load(&path).map_err(|e| CliError::file(&path, e))?;
+        Ok(Self { from: from.to_string(), header })
+    }
+
+    /// Gives a configuration the model's shape and precision.
+    pub fn shape(&self, config: &mut Config) {
+        let model = &self.header.architecture;
+        let network = &mut config.network;
+        network.hidden.clone_from(&model.hidden);
+        (network.activation, network.alpha) = (model.activation, model.alpha);
+        (network.embed_periodic, network.input_layer) = (model.embed_periodic, model.input_layer);
+        network.dissipation = model.dissipation;
+        let scaled = model.scale.iter().any(|scale| *scale != 1.0);
+        network.scaling = if scaled { Scaling::Physical } else { Scaling::None };
+        config.precision = match self.header.precision {
+            StoredPrecision::F32 => Precision::F32,
+            StoredPrecision::F64 => Precision::F64,
+        };
+        config.from = Some(self.from.clone());
+    }
+
+    /// Refuses a configuration whose network, for coordinates that are angles or not, is not the model's.
+    ///
+    /// # Errors
+    /// A usage error naming everything that differs.
+    pub fn require(&self, config: &Config, periodic: Vec<bool>) -> Result<(), CliError> {
+        let asked = config.architecture_with(periodic, self.header.architecture.scale.clone());
+        let found = differences(&asked, &self.header.architecture);
+        if found.is_empty() {
+            return Ok(());
+        }
+        Err(CliError::usage(format_args!("--from {}: the model has another shape: {}", self.from, found.join("; "))))
+    }
+}
+
+/// Weights and scales of a model that a training starts from; the architecture must have been found to fit.
+///
+/// # Errors
+/// A data error for a model that cannot be read, or that is of another shape by now.
+pub fn weights<S: Scalar>(
+    from: &str,
+    asked: impl FnOnce(Vec<f64>) -> Architecture,
+) -> Result<(Vec<S>, Architecture), CliError> {
+    let path = model_file(Path::new(from))?;
+    let ModelFile { header, weights } = ModelFile::load(&path).map_err(|e| CliError::file(&path, e))?;
+    let asked = asked(header.architecture.scale.clone());
+    match differences(&asked, &header.architecture).as_slice() {
+        [] => Ok((weights, asked)),
+        found => Err(CliError::file(&path, format_args!("the model has another shape: {}", found.join("; ")))),
+    }
+}
+
+/// What differs between the shape asked for and that of a model.
+fn differences(asked: &Architecture, model: &Architecture) -> Vec<String> {
+    let fields = |shape: &Architecture| serde_json::to_value(shape).unwrap_or_default();
+    let (asked, model) = (fields(asked), fields(model));
+    let names = |value: &Value| value.as_object().map(|o| o.keys().cloned().collect::<Vec<_>>()).unwrap_or_default();
+    let mut all = [names(&asked), names(&model)].concat();
+    all.sort_unstable();
+    all.dedup();
+    let shown = |value: &Value| if value.is_null() { "none".to_string() } else { value.to_string() };
+    let differing = all.iter().filter(|name| asked[name.as_str()] != model[name.as_str()]);
+    differing
+        .map(|name| format!("{name} {} asked for, {} in the model", shown(&asked[name]), shown(&model[name])))
+        .collect()
+}
