@@ -1,15 +1,24 @@
-//! Names in messages: the known name nearest to a mistyped one, texts on one line.
+//! Names in messages: the known name nearest to a mistyped one, texts on one line, counts, foreign words translated.
 
-/// The candidate that fewest edits (insert, delete, replace, swap neighbours) turn `name` into; none if all are far.
+mod foreign;
+
+pub use foreign::plain;
+
+/// The candidate that fewest edits (insert, delete, replace, swap neighbours) turn `name` into; none if every one takes more
+/// than a third of the letters: `y` is not near `x`, nor `m3` near `m1`.
 pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let name: Vec<char> = name.to_lowercase().chars().take(64).collect();
-    let limit = (name.len() / 3).max(1);
-    candidates
-        .into_iter()
-        .map(|candidate| (edits(&name, &candidate.to_lowercase().chars().collect::<Vec<_>>()), candidate))
-        .filter(|(distance, _)| *distance <= limit)
-        .min_by_key(|(distance, _)| *distance)
-        .map(|(_, candidate)| candidate)
+    let near = |candidate: &'a str| {
+        let letters: Vec<char> = candidate.to_lowercase().chars().collect();
+        let distance = edits(&name, &letters);
+        (distance <= name.len().max(letters.len()) / 3).then_some((distance, candidate))
+    };
+    candidates.into_iter().filter_map(near).min_by_key(|(distance, _)| *distance).map(|(_, candidate)| candidate)
+}
+
+/// `1 row`, `2 rows`: a count with its noun in the singular or the plural.
+pub fn counted(count: usize, singular: &str, plural: &str) -> String {
+    format!("{count} {}", if count == 1 { singular } else { plural })
 }
 
 /// `unknown WHAT "NAME"` with the nearest candidate, or all of them when none is near.
@@ -73,12 +82,19 @@ mod tests {
     }
 
     #[test]
+    fn one_is_singular() {
+        assert_eq!([0, 1, 2].map(|n| counted(n, "row", "rows")), ["0 rows", "1 row", "2 rows"]);
+    }
+
+    #[test]
     fn only_near_names_are_offered() {
         let names = ["double-pendulum", "triple-pendulum", "sphere-geodesic"];
         assert_eq!(nearest("duoble-pendulm", names), Some("double-pendulum"));
         assert_eq!(nearest("Sphere-Geodesic", names), Some("sphere-geodesic"));
         assert_eq!(nearest("kepler", names), None);
         assert_eq!(nearest("", names), None);
+        assert_eq!([nearest("y", ["x", "t", "yy"]), nearest("m3", ["m1", "m2"]), nearest("v", ["rv"])], [None; 3]);
+        assert_eq!((nearest("X", ["x"]), nearest("alhpa", ["beta", "alpha"])), (Some("x"), Some("alpha")));
         assert!(unknown("system", "kepler", names).ends_with("double-pendulum, triple-pendulum, sphere-geodesic"));
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::cli::recording_args::RecordingArgs;
 use crate::cli::{CliError, output};
+use crate::names::counted;
 use crate::recording::survey::{FEW_SAMPLES, Kind, Survey, SurveyOptions, Suspicion, survey};
 use crate::recording::{LARGE_ERROR, Targets};
 use crate::report::text_table;
@@ -53,6 +54,11 @@ fn percent(x: f64) -> String {
     if x.is_finite() { format!("{} %", short(100.0 * x)) } else { "-".to_string() }
 }
 
+/// Unit of a coordinate; velocities and accelerations are in it per s and s^2.
+fn unit(periodic: bool) -> &'static str {
+    if periodic { "rad" } else { "SI" }
+}
+
 /// The survey for people.
 fn describe(found: &Survey) -> String {
     let mut text = header(found);
@@ -60,15 +66,24 @@ fn describe(found: &Survey) -> String {
         .coordinates
         .iter()
         .map(|c| {
-            let name = if c.periodic { format!("{} (angle)", c.name) } else { c.name.clone() };
+            let name = format!("{} ({})", c.name, unit(c.periodic));
             let bound = if c.noise_resolved { "" } else { "at most " };
             let noise = format!("{bound}{}", short(c.noise));
             let motion = [c.velocity, c.acceleration, c.period, c.samples_per_period].map(short);
             [vec![name, short(c.min), short(c.max), noise, percent(c.noise_relative)], motion.to_vec()].concat()
         })
         .collect();
-    let titles =
-        ["coordinate", "least", "most", "noise", "of range", "rms v", "rms a", "fast period s", "samples in it"];
+    let titles = [
+        "coordinate",
+        "least",
+        "most",
+        "noise",
+        "of range",
+        "rms v /s",
+        "rms a /s^2",
+        "fast period s",
+        "samples in it",
+    ];
     text += &section(&text_table(&titles, &rows));
 
     let rows: Vec<Vec<String>> = found
@@ -77,16 +92,17 @@ fn describe(found: &Survey) -> String {
         .map(|c| {
             let numbers = [c.window_seconds, c.velocity_error, c.acceleration_error].map(short);
             let ends = [percent(c.acceleration_error_relative)];
-            [vec![c.name.clone(), c.window.to_string()], numbers.to_vec(), ends.to_vec()].concat()
+            [vec![format!("{} ({})", c.name, unit(c.periodic)), c.window.to_string()], numbers.to_vec(), ends.to_vec()]
+                .concat()
         })
         .collect();
-    let titles = ["smoothing", "window", "window s", "error of v", "error of a", "of rms a"];
+    let titles = ["smoothing", "window samples", "window s", "error of v /s", "error of a /s^2", "of rms a"];
     text += &section(&text_table(&titles, &rows));
 
     let rows: Vec<Vec<String>> = found.suspicious.iter().take(LINES).map(suspicion).collect();
     if !rows.is_empty() {
-        text += &section(&text_table(&["suspicious", "row", "coordinate", "value", "what"], &rows));
-        let _ = more(&mut text, found.suspicious_count, "places");
+        text += &section(&text_table(&["suspicious", "row", "coordinate", "value (as its unit)", "what"], &rows));
+        let _ = more(&mut text, found.suspicious_count, ("place", "places"));
     }
     let _ = advice(&mut text, found);
     for warning in &found.warnings {
@@ -108,12 +124,10 @@ fn header(found: &Survey) -> String {
         None => "times from the rate".to_string(),
     };
     let mut text = format!(
-        "{} {}, {} {}, {} samples, {} s; {times}\n",
-        found.files,
-        if found.files == 1 { "file" } else { "files" },
-        found.tracks.len(),
-        if found.tracks.len() == 1 { "trajectory" } else { "trajectories" },
-        found.samples,
+        "{}, {}, {}, {} s; {times}\n",
+        counted(found.files, "file", "files"),
+        counted(found.tracks.len(), "trajectory", "trajectories"),
+        counted(found.samples, "sample", "samples"),
         short(seconds)
     );
     let rows: Vec<Vec<String>> = found
@@ -131,9 +145,9 @@ fn header(found: &Survey) -> String {
             .concat()
         })
         .collect();
-    let titles = ["trajectory", "rows", "samples", "from s", "to s", "samples per s", "jitter"];
+    let titles = ["trajectory", "rows", "samples", "from s", "to s", "samples per s", "jitter of a step"];
     text += &section(&text_table(&titles, &rows));
-    let _ = more(&mut text, found.tracks.len(), "trajectories");
+    let _ = more(&mut text, found.tracks.len(), ("trajectory", "trajectories"));
     let _ = left_out(&mut text, found);
     text
 }
@@ -141,7 +155,8 @@ fn header(found: &Survey) -> String {
 /// Gaps and what was left out.
 fn left_out(text: &mut String, found: &Survey) -> std::fmt::Result {
     if found.duplicates > 0 {
-        writeln!(text, "left out: {} rows that repeat the row before", found.duplicates)?;
+        let rows = counted(found.duplicates, "row that repeats", "rows that repeat");
+        writeln!(text, "left out: {rows} the row before")?;
     }
     for cut in found.cuts.iter().take(LINES) {
         let (seconds, steps) = (short(cut.seconds), short(cut.steps));
@@ -151,18 +166,21 @@ fn left_out(text: &mut String, found: &Survey) -> std::fmt::Result {
             seconds, cut.before, cut.after, cut.file
         )?;
     }
-    more(text, found.cuts.len(), "gaps")?;
+    more(text, found.cuts.len(), ("gap", "gaps"))?;
     for part in found.dropped.iter().take(LINES) {
         let (first, last) = (part.first, part.last);
-        writeln!(text, "left out: {} samples between gaps, rows {first}-{last} of {}", part.samples, part.file)?;
+        let samples = counted(part.samples, "sample", "samples");
+        writeln!(text, "left out: {samples} between gaps, rows {first}-{last} of {}", part.file)?;
     }
-    more(text, found.dropped.len(), "stretches between gaps")
+    more(text, found.dropped.len(), ("stretch between gaps", "stretches between gaps"))
 }
 
 /// How many more there are than were shown.
-fn more(text: &mut String, all: usize, what: &str) -> std::fmt::Result {
+fn more(text: &mut String, all: usize, (one, many): (&str, &str)) -> std::fmt::Result {
     match all.checked_sub(LINES) {
-        Some(rest) if rest > 0 => writeln!(text, "and {rest} more {what}"),
+        Some(rest) if rest > 0 => {
+            writeln!(text, "and {}", counted(rest, &format!("more {one}"), &format!("more {many}")))
+        }
         _ => Ok(()),
     }
 }

@@ -1,7 +1,8 @@
 //! Configuration files that need not be complete: keys that are not there have the values of a base, and all mistakes
 //! are found at once.
 
-use crate::cli::config::{explain, lines};
+use crate::cli::config::lines;
+use crate::names::plain;
 use crate::cli::{CliError, input};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -305,7 +306,7 @@ impl Filled {
         let unknown = problem.strip_prefix("unknown field `").and_then(|rest| rest.split('`').next());
         let at = path.iter().position(|step| matches!(step, Step::Key(name) if Some(name.as_str()) == unknown));
         let path = at.map_or(path, |at| &path[..=at]);
-        let mistake = Mistake::new(text_of(path), explain(problem));
+        let mistake = Mistake::new(text_of(path), plain(&problem.to_string()));
         if !self.mistakes.contains(&mistake) {
             self.mistakes.push(mistake);
         }

@@ -4,7 +4,7 @@ use crate::cli::evaluation::{Evaluation, Plan, RTOL, evaluate};
 use crate::cli::folder::Folder;
 use crate::cli::learned::{Learned, model_file};
 use crate::cli::learning::parameter_table;
-use crate::cli::number::{bounds, count, positive, threads};
+use crate::cli::number::{bounds, count, positive, seed, threads, tolerance};
 use crate::cli::{CliError, output};
 use crate::lagrangian::Configured;
 use crate::lagrangian::system::{Bounds, TrajectoryTest};
@@ -25,7 +25,7 @@ pub struct Args {
     #[arg(long, value_name = "N", default_value = "4", allow_hyphen_values = true, value_parser = count)]
     starts: usize,
     /// Seed of the states and starts [default: the model's].
-    #[arg(long, value_name = "N", allow_hyphen_values = true)]
+    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = seed)]
     seed: Option<u64>,
     /// Where the starts lie instead: bounds of the coordinates, one pair for all of them or one for each, in the system's
     /// units.
@@ -37,8 +37,8 @@ pub struct Args {
     /// Time span of the motions instead of the paper's, in seconds (relativistic systems: proper time in metres).
     #[arg(long, value_name = "T", allow_hyphen_values = true, value_parser = positive)]
     until: Option<f64>,
-    /// Relative tolerance of a step of the learned motion; the absolute one is a hundredth of it.
-    #[arg(long, value_name = "R", default_value_t = RTOL, allow_hyphen_values = true, value_parser = positive)]
+    /// Relative tolerance of a step of the learned motion, at least 2e-15; the absolute one is a hundredth of it.
+    #[arg(long, value_name = "R", default_value_t = RTOL, allow_hyphen_values = true, value_parser = tolerance)]
     rtol: f64,
     /// Threads [default: all].
     #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = count)]

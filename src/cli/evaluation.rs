@@ -31,9 +31,12 @@ pub struct Evaluation {
     pub mass_matrix: MassMatrixError,
     /// One entry per random start.
     pub trajectories: Vec<Motion>,
-    /// Names of the accelerations' coordinates.
+    /// Names of the accelerations' coordinates, with the accelerations' units.
     #[serde(skip)]
     pub coordinates: Vec<String>,
+    /// Unit of all coordinates together.
+    #[serde(skip)]
+    pub unit: &'static str,
     /// Unit of times.
     #[serde(skip)]
     pub time_unit: &'static str,
@@ -124,7 +127,14 @@ pub fn evaluate(
         wrong_signature: wrong_signatures(exact.as_ref(), learned, plan.states.0, plan.states.1),
         mass_matrix: mass_matrix_error(exact.as_ref(), learned, plan.states.0),
         trajectories: runs.iter().map(motion).collect(),
-        coordinates: coordinates.iter().map(|c| c.name.to_string()).collect(),
+        coordinates: coordinates
+            .iter()
+            .map(|c| format!("{} [{}/{}^2]", c.name, c.unit, system.system.time_unit))
+            .collect(),
+        unit: match coordinates.iter().find(|c| c.unit != coordinates[0].unit) {
+            None => coordinates[0].unit,
+            Some(_) => "each in its unit",
+        },
         time_unit: system.system.time_unit,
         conserved: system.system.conserved.map(|conserved| conserved.name),
         figures,
@@ -270,8 +280,9 @@ impl Evaluation {
         let until = format!("until [{}]", self.time_unit);
         let lyapunov = format!("Lyapunov time [{}]", self.time_unit);
         let conserved = self.conserved.map(|_| "conserved max");
-        let mut motions =
-            vec!["start", until.as_str(), "coordinates mean", "max", "velocities max", "energy mean", "max"];
+        let mean = format!("coordinates mean [{}]", self.unit);
+        let fastest = format!("velocities max [{}/{}]", self.unit, self.time_unit);
+        let mut motions = vec!["start", until.as_str(), &mean, "max", &fastest, "energy mean, relative", "max"];
         motions.extend(conserved.into_iter().chain([lyapunov.as_str(), "remarks"]));
         let mut about = String::from("Trajectories from random starts against exact motion");
         if let Some(name) = self.conserved {
@@ -282,8 +293,8 @@ impl Evaluation {
         }
         [
             Table {
-                title: "Error of accelerations on fresh states, physical units".into(),
-                header: header(&["coordinate", "mean", "rms", "median", "99 %", "max", "failed"]),
+                title: "Error of accelerations on fresh states".into(),
+                header: header(&["acceleration", "mean", "rms", "median", "99 %", "max", "failed"]),
                 rows: accelerations.collect(),
             },
             Table {

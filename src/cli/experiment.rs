@@ -6,6 +6,7 @@ use crate::cli::number::{count, threads};
 use crate::cli::progress::Progress as Bar;
 use crate::cli::{CliError, interrupt, output};
 use crate::experiments::{Experiment, Outcome, Picture, Record, Run, Scale, experiments, find};
+use crate::names::counted;
 use crate::recording::Columns;
 use crate::recording::read::read_recording;
 use crate::report::{
@@ -188,8 +189,8 @@ fn perform(
     if hooks.interrupt.load(Ordering::SeqCst) {
         let finished = results.iter().filter(|(_, record)| record.is_some()).count();
         return Err(CliError::interrupted(format_args!(
-            "interrupted with {finished} of {} runs finished; the same command goes on from there",
-            results.len()
+            "interrupted with {finished} of {} finished; the same command goes on from there",
+            counted(results.len(), "run", "runs")
         )));
     }
     conclude(experiment, scale, (&results, beside, json), &folder, path, started)
@@ -264,9 +265,9 @@ fn conclude(
     figures.extend(pictures_of_runs(experiment, results, path));
     let training: f64 = results.iter().filter_map(|(_, record)| record.as_ref()).map(|record| record.seconds).sum();
     let note = format!(
-        "Scale {}, {} runs, {training:.0} s of training, {:.0} s on the clock this time.",
+        "Scale {}, {}, {training:.0} s of training, {:.0} s on the clock this time.",
         scale.name(),
-        results.len(),
+        counted(results.len(), "run", "runs"),
         started.elapsed().as_secs_f64()
     );
     let conventions = "Losses are the paper's: half the mean absolute error of scaled accelerations; times the mean scale \

@@ -4,6 +4,7 @@ use crate::cli::folder::Folder;
 use crate::cli::judgement::Judgement;
 use crate::cli::learning::{ended, training_pictures, write_figures};
 use crate::cli::{CliError, output};
+use crate::names::counted;
 use crate::recording::{HeldOut, Recording, Targets};
 use crate::report::Report;
 use crate::scalar::Scalar;
@@ -177,35 +178,41 @@ impl Summary<'_> {
                 format!("best epoch chosen on {validation}, judged on {test} (held out: {held})")
             }
         };
-        let mut text =
-            format!("learned from {way}: {training} samples of {} trajectories, {judged}\n", self.trajectories[0]);
+        let mut text = format!(
+            "learned from {way}: {} of {}, {judged}\n",
+            counted(training, "sample", "samples"),
+            counted(self.trajectories[0], "trajectory", "trajectories")
+        );
         // Writing to a string cannot fail.
         for c in &self.coordinates {
             let _ = writeln!(
                 text,
-                "{}: noise {:.3e}, smoothed over {:.3} s ({} samples), accelerations good to {:.1} %",
+                "{}: noise {:.3e}, smoothed over {:.3} s ({}), accelerations good to {:.1} %",
                 c.name,
                 c.noise,
                 c.window_seconds,
-                c.window_samples,
+                counted(c.window_samples, "sample", "samples"),
                 100.0 * c.acceleration_error_relative
             );
         }
         let _ = writeln!(
             text,
-            "loss (paper) against those accelerations: validation {:.6}{}; {} epochs, {} weights, seed {}",
+            "loss (paper) against those accelerations: validation {:.6}{}; {}, {}, seed {}",
             self.validation_loss,
             self.test_loss.map_or(String::new(), |loss| format!(", held out {loss:.6}")),
-            self.epochs,
-            self.weights,
+            counted(self.epochs, "epoch", "epochs"),
+            counted(self.weights, "weight", "weights"),
             self.seed
         );
         if let Some(shooting) = &self.shooting {
             let _ = writeln!(
                 text,
-                "mean squared residual of predictions, in units of noise (1: only noise is left): {:.3} before, {:.3} after {} epochs \
-                 over {} segments",
-                shooting.start_loss, shooting.validation_loss, shooting.epochs, shooting.segments
+                "mean squared residual of predictions, in units of noise (1: only noise is left): {:.3} before, {:.3} after {} \
+                 over {}",
+                shooting.start_loss,
+                shooting.validation_loss,
+                counted(shooting.epochs, "epoch", "epochs"),
+                counted(shooting.segments, "segment", "segments")
             );
         }
         let _ = writeln!(text, "{:.1} s of training, {:.1} s in all\n", self.training_seconds, self.wall_seconds);

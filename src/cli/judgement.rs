@@ -135,7 +135,7 @@ fn error_plot(curves: &[(&str, Vec<PredictionError>)]) -> LinePlot {
     LinePlot {
         title: "Prediction of held-out motion".into(),
         x_label: "time ahead [s]".into(),
-        y_label: "median error".into(),
+        y_label: "median error (SI)".into(),
         log_y: true,
         series: curves.iter().map(series).collect(),
     }
@@ -212,10 +212,10 @@ fn balance(model: &dyn EulerLagrange<f64>, part: &Part) -> Option<Balance> {
 impl Judgement {
     const HEADERS: [&'static str; 7] = [
         "time ahead (s)",
-        "median error",
-        "9 of 10 below",
-        "rms error",
-        "constant velocity: median",
+        "median error (SI)",
+        "9 of 10 below (SI)",
+        "rms error (SI)",
+        "constant velocity: median (SI)",
         "windows",
         "given up",
     ];

@@ -9,6 +9,7 @@ use crate::cli::{CliError, memory, output, start};
 use crate::experiments::{Outcome, Record};
 use crate::lagrangian::system::TrajectoryTest;
 use crate::lagrangian::{Configured, configure};
+use crate::names::counted;
 use crate::network::file::{FORMAT, Header, ModelFile, StoredPrecision};
 use crate::network::{Architecture, Layout, NetworkLagrangian};
 use crate::report::{Figure, HistoryRow, Report, training_figures};
@@ -364,13 +365,13 @@ pub(super) fn history(epochs: &[Epoch]) -> String {
 /// The figures of a run in one line.
 fn headline(summary: &Summary<'_>) -> String {
     format!(
-        "loss (paper): validation {:.6}, fresh states {:.6}; {} epochs in {:.1} s, {:.0} states/s, {} weights, seed {}\n",
+        "loss (paper): validation {:.6}, fresh states {:.6}; {} in {:.1} s, {:.0} states/s, {}, seed {}\n",
         summary.validation_loss,
         summary.test_loss,
-        summary.epochs,
+        counted(summary.epochs, "epoch", "epochs"),
         summary.training_seconds,
         summary.states_per_second,
-        summary.weights,
+        counted(summary.weights, "weight", "weights"),
         summary.seed
     )
 }

@@ -28,6 +28,7 @@ mod learned;
 mod learning;
 mod manual;
 mod memory;
+mod misunderstood;
 mod motion;
 mod number;
 mod output;
@@ -49,6 +50,7 @@ pub use error::{CliError, Kind};
 pub use states::{States, StatesError, parse_states};
 
 use clap::{CommandFactory, Parser, Subcommand};
+use misunderstood::misunderstood;
 use std::ffi::OsString;
 use std::io::Write;
 use std::process::ExitCode;
@@ -87,9 +89,10 @@ enum Command {
 
 /// Runs the program with its arguments, the first being its own name.
 pub fn main(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
-    let cli = match Cli::try_parse_from(arguments) {
+    let arguments: Vec<OsString> = arguments.into_iter().collect();
+    let cli = match Cli::try_parse_from(&arguments) {
         Ok(cli) => cli,
-        Err(error) => return answer(&error),
+        Err(error) => return answer(&error, &arguments),
     };
     match watch_log().and_then(|()| run(cli.command)) {
         Ok(()) => ExitCode::SUCCESS,
@@ -107,15 +110,16 @@ pub fn main(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
 /// # Errors
 /// The usage error that the program ends with. Asking for help or for the version is none.
 pub fn check_arguments(arguments: impl IntoIterator<Item = OsString>) -> Result<(), CliError> {
-    match Cli::try_parse_from(arguments) {
-        Err(error) if error.exit_code() != 0 => Err(misunderstood(&error)),
+    let arguments: Vec<OsString> = arguments.into_iter().collect();
+    match Cli::try_parse_from(&arguments) {
+        Err(error) if error.exit_code() != 0 => Err(misunderstood(&error, &arguments)),
         _ => Ok(()),
     }
 }
 
 fn run(command: Command) -> Result<(), CliError> {
-    // Trainings, fits and experiments keep what they have when they are interrupted; the others have nothing to keep.
-    if !matches!(command, Command::Train(_) | Command::Fit(_) | Command::Experiment(_)) {
+    // Trainings, fits, roll-outs and experiments keep what they have when they are interrupted; the others have nothing to keep.
+    if !matches!(command, Command::Train(_) | Command::Fit(_) | Command::Rollout(_) | Command::Experiment(_)) {
         interrupt::end_at_once()?;
     }
     match command {
@@ -133,7 +137,7 @@ fn run(command: Command) -> Result<(), CliError> {
 }
 
 /// Help and version go where they are asked for; a wrong argument is one line like any other error.
-fn answer(error: &clap::Error) -> ExitCode {
+fn answer(error: &clap::Error, arguments: &[OsString]) -> ExitCode {
     use clap::error::ErrorKind::{DisplayHelp, DisplayHelpOnMissingArgumentOrSubcommand, DisplayVersion};
     match error.kind() {
         DisplayHelp | DisplayVersion => match output::print(&error.to_string()) {
@@ -149,18 +153,11 @@ fn answer(error: &clap::Error) -> ExitCode {
             ExitCode::from(2)
         }
         _ => {
-            let failed = misunderstood(error);
+            let failed = misunderstood(error, arguments);
             report(&failed);
             failed.exit_code()
         }
     }
-}
-
-/// The first paragraph of what is wrong with the arguments, without usage and hints.
-fn misunderstood(error: &clap::Error) -> CliError {
-    let text = error.to_string();
-    let problem = ["\n\nUsage:", "\n\nFor more"].iter().fold(text.as_str(), |t, end| t.split(end).next().unwrap_or(t));
-    CliError::usage(problem.strip_prefix("error: ").unwrap_or(problem))
 }
 
 /// One line on standard error; if that is closed too, there is nobody to tell.

@@ -1,5 +1,7 @@
 //! Numbers of the command line, with their ranges.
 
+use crate::rollout::Options;
+
 /// A finite decimal number.
 pub fn finite(text: &str) -> Result<f64, String> {
     match text.trim().parse::<f64>() {
@@ -16,6 +18,20 @@ pub fn positive(text: &str) -> Result<f64, String> {
 /// A finite decimal number of at least 0.
 pub fn weight(text: &str) -> Result<f64, String> {
     finite(text).ok().filter(|x| *x >= 0.0).ok_or_else(|| "expected a finite number of at least 0".to_string())
+}
+
+/// A relative tolerance that double precision can keep.
+pub fn tolerance(text: &str) -> Result<f64, String> {
+    let least = Options::<f64>::least_tolerance();
+    match positive(text)? {
+        fine if fine < least => Err(format!("double precision cannot keep it, the least is {least:e}")),
+        x => Ok(x),
+    }
+}
+
+/// A seed.
+pub fn seed(text: &str) -> Result<u64, String> {
+    text.trim().parse().map_err(|_| format!("expected a whole number from 0 to {}", u64::MAX))
 }
 
 /// Two finite decimal numbers, the lower first: `LOW:HIGH`.
@@ -52,6 +68,10 @@ mod tests {
         assert!(weight("-1").is_err() && weight("nan").is_err());
         assert!(count("1.0").is_err() && count("99999999999999999999").is_err());
         assert_eq!((positive("1e-3"), count("7")), (Ok(1e-3), Ok(7)));
+        assert_eq!((tolerance("2e-15"), seed("18446744073709551615")), (Ok(2e-15), Ok(u64::MAX)));
+        assert_eq!(tolerance("1e-30").unwrap_err(), "double precision cannot keep it, the least is 2e-15");
+        assert!(["nan", "0", "-1e-6"].iter().all(|bad| tolerance(bad).is_err()));
+        assert!(["-1", "1.5", "", "18446744073709551616"].iter().all(|bad| seed(bad).is_err()));
         assert_eq!((bounds("-0.5:1e3"), bounds(" 2 : 2 ")), (Ok((-0.5, 1000.0)), Ok((2.0, 2.0))));
         for bad in ["", "1", "1:", ":1", "2:1", "0:inf", "nan:nan", "0:1:2", "-1e308:1e308"] {
             assert!(bounds(bad).is_err(), "{bad}");

@@ -8,6 +8,7 @@ use crate::cli::resume::{Found, command, find, has_checkpoint, require_same, say
 use crate::cli::train_config::Args;
 use crate::cli::{CliError, interrupt, output};
 use crate::lagrangian::Configured;
+use crate::names::counted;
 use crate::training::{Config, Hooks, NEWEST, PREVIOUS, Progress, Stop};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -89,7 +90,7 @@ impl Task {
 
 /// The exit of a training that did not run to its end.
 fn conclude(finished: &Finished, path: &Path) -> Result<(), CliError> {
-    let kept = format!("the best of {} epochs is in {}", finished.epochs, path.display());
+    let kept = format!("the best of {} is in {}", counted(finished.epochs, "epoch", "epochs"), path.display());
     match &finished.stop {
         Stop::Finished => Ok(()),
         Stop::Interrupted => Err(CliError::interrupted(format_args!("interrupted, {kept}{}", how_to_go_on(path)))),

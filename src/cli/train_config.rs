@@ -3,7 +3,7 @@
 use crate::cli::changes::Changes;
 use crate::cli::config_file::{ConfigFile, Mistake};
 use crate::cli::learned::{all_parameters, given};
-use crate::cli::number::{count, finite, positive};
+use crate::cli::number::{count, finite, positive, seed};
 use crate::cli::print_config::{PrintFormat, commented, with_seed};
 use crate::cli::start::Start;
 use crate::cli::{CliError, output, source};
@@ -39,7 +39,7 @@ pub struct Args {
     #[arg(long, value_name = "SYMBOL=VALUE", value_parser = source::parameter)]
     param: Vec<(String, String)>,
     /// Seed of states, weights and the order of the data [default: the configuration's, 0 in all presets].
-    #[arg(long, value_name = "N", allow_hyphen_values = true)]
+    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = seed)]
     seed: Option<u64>,
     #[command(flatten)]
     changes: Changes,

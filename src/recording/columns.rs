@@ -1,5 +1,6 @@
 //! What the columns of recorded files mean.
 
+use crate::names::counted;
 use crate::names::unknown;
 use crate::recording::units::factor;
 use thiserror::Error;
@@ -75,7 +76,10 @@ impl Columns {
         {
             if !names.is_empty() && names.len() != self.coords.len() {
                 let (n, found) = (self.coords.len(), names.len());
-                return wrong(format!("{what}: expected {n} columns, one per coordinate, found {found}"));
+                return wrong(format!(
+                    "{what}: expected {}, one per coordinate, found {found}",
+                    counted(n, "column", "columns")
+                ));
             }
         }
         let used: Vec<(&str, &String)> = self.used().collect();

@@ -1,5 +1,6 @@
 //! Training and validation, apart by whole trajectories.
 
+use crate::names::counted;
 use crate::recording::{Recording, Track};
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
@@ -35,7 +36,7 @@ pub enum HoldOutError {
     #[error("share of the data held out: expected 0, or a number between 0 and 1, found {0}")]
     Fraction(f64),
     /// One trajectory that is too short to be divided.
-    #[error("{samples} samples are too few to hold out {fraction} of them after a gap of {gap}")]
+    #[error("{} too few to hold out {fraction} of them after a gap of {gap}", counted(*samples, "sample is", "samples are"))]
     Short {
         /// Samples of the trajectory.
         samples: usize,
@@ -124,8 +125,8 @@ impl HeldOut {
                 .collect::<Vec<_>>()
                 .join(", "),
             Self::End { start, gap } => format!(
-                "the last {} samples of the only trajectory, after a gap of {gap}",
-                recording.samples().saturating_sub(*start)
+                "the last {} of the only trajectory, after a gap of {gap}",
+                counted(recording.samples().saturating_sub(*start), "sample", "samples")
             ),
         }
     }

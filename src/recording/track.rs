@@ -34,7 +34,7 @@ pub struct Recording {
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum TrackError {
     /// Lengths disagree.
-    #[error("{track}: {what}: expected {expected} numbers, found {found}")]
+    #[error("{track}: {what}: expected {}, found {found}", crate::names::counted(*expected, "number", "numbers"))]
     Shape {
         /// Name of the trajectory.
         track: String,

@@ -6,7 +6,7 @@
 
 use super::json::check_unambiguous;
 use super::{ModelFileError, StoredPrecision};
-use crate::names::one_line;
+use crate::names::{one_line, plain};
 use crate::scalar::Scalar;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use serde::de::DeserializeOwned;
@@ -197,7 +197,9 @@ fn check_container(bytes: &[u8]) -> Result<(), ModelFileError> {
     }
     match bytes[8..].get(..length as usize) {
         None => refuse("cut off"),
-        Some(text) => check_unambiguous(text).map_err(|e| ModelFileError::NotSafetensors(one_line(&e.to_string()))),
+        Some(text) => {
+            check_unambiguous(text).map_err(|e| ModelFileError::NotSafetensors(one_line(&plain(&e.to_string()))))
+        }
     }
 }
 
@@ -209,7 +211,7 @@ fn read_header<H: DeserializeOwned>(kind: &Kind, text: &str, payload: &[u8]) -> 
         format: u32,
         crate_version: String,
     }
-    let malformed = |e: serde_json::Error| ModelFileError::Header(one_line(&e.to_string()));
+    let malformed = |e: serde_json::Error| ModelFileError::Header(one_line(&plain(&e.to_string())));
     let version: Version = serde_json::from_str(text).map_err(malformed)?;
     check_version(kind.format, version.format, &version.crate_version)?;
 

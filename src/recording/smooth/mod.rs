@@ -9,6 +9,7 @@ pub use noise::Noise;
 pub(crate) use noise::{contrast_weights, noise};
 pub use window::Quality;
 
+use crate::names::counted;
 use crate::recording::statistics::{median, steps};
 use crate::recording::{Recording, Track};
 use local_fit::{Estimate, LocalFit};
@@ -48,7 +49,7 @@ pub enum SmoothError {
         found: String,
     },
     /// A trajectory too short for the window.
-    #[error("{track}: {samples} samples are fewer than the {needed} that a fit of this degree needs")]
+    #[error("{track}: {} fewer than the {needed} that a fit of this degree needs", counted(*samples, "sample is", "samples are"))]
     Short {
         /// The trajectory; empty for all of them.
         track: String,
@@ -300,7 +301,11 @@ fn check(options: &SmoothOptions, n: usize) -> Result<(), SmoothError> {
     }
     if let Some(noise) = &options.noise {
         if noise.len() != n {
-            return wrong("noise", format!("{n} numbers, one per coordinate"), noise.len().to_string());
+            return wrong(
+                "noise",
+                format!("{}, one per coordinate", counted(n, "number", "numbers")),
+                noise.len().to_string(),
+            );
         }
         if let Some(sigma) = noise.iter().find(|sigma| !(sigma.is_finite() && **sigma > 0.0)) {
             return wrong("noise", "finite numbers above 0".to_string(), sigma.to_string());

@@ -2,6 +2,7 @@
 
 use super::suspicious::Kind;
 use super::{FEW_SAMPLES, Survey};
+use crate::names::counted;
 use std::f64::consts::TAU;
 
 /// One sentence each.
@@ -15,9 +16,9 @@ pub fn warnings(survey: &Survey) -> Vec<String> {
         }
         if let Some((track, row)) = &c.first_ambiguous {
             all.push(format!(
-                "{name} turns by more than 2 rad between samples {} times, first at row {row} of {track}: which way is a \
+                "{name} turns by more than 2 rad between samples {}, first at row {row} of {track}: which way is a \
                  guess",
-                c.ambiguous_turns
+                counted(c.ambiguous_turns, "time", "times")
             ));
         }
         if !c.noise_resolved {
@@ -55,7 +56,8 @@ pub fn warnings(survey: &Survey) -> Vec<String> {
         }
     }
     if survey.suspicious_count > 0 {
-        all.push(format!("{} places do not look like smooth motion with noise", survey.suspicious_count));
+        let places = counted(survey.suspicious_count, "place does", "places do");
+        all.push(format!("{places} not look like smooth motion with noise"));
     }
     if survey.held_out.is_none() {
         all.push("too few samples to hold out a validation part".to_string());

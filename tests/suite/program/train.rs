@@ -248,7 +248,11 @@ fn wrong_trainings_are_refused_before_anything_is_written() {
     };
     with("epochs = 3", "epcohs = 3", &["epcohs", "did you mean \"epochs\"?"]);
     with("epochs = 3", "epochs = 0", &["phase[0].epochs"]);
-    with("epochs = 3", "epochs = \"many\"", &["phase[0].epochs", "expected usize"]);
+    with(
+        "epochs = 3",
+        "epochs = \"many\"",
+        &["phase[0].epochs", "expected a whole number of at least 0, found \"many\""],
+    );
     with("seed = 0", "seed = 0\nseed = 1", &["duplicate"]);
     with("rate = 0.005", "rate = nan", &["phase[0].rate", "NaN"]);
     with("rate = 0.005", "rate = 0.0", &["phase[0].rate"]);

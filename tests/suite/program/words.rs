@@ -1,0 +1,178 @@
+//! Messages are in the words of those who write files and arguments, and name the option that helps.
+#![cfg(all(feature = "cli", unix))]
+
+use crate::common::program::{Folder, HEADER, inspect, lnn, model, text};
+use lnn::cli::{check_arguments, parse_config};
+use lnn::lagrangian::configure;
+use lnn::training::{Config, Preset};
+use std::ffi::OsString;
+
+/// Words of machines and of this program's insides.
+const FOREIGN: [&str; 27] = [
+    "usize",
+    "u64",
+    "u32",
+    "i64",
+    "i128",
+    "u128",
+    "variant",
+    "unknown field",
+    "missing field",
+    "invalid type",
+    "invalid value",
+    "struct ",
+    "NonFinite",
+    "NotFinite",
+    "ParseInt",
+    "ParseFloat",
+    "Some(",
+    "Err(",
+    "Io(",
+    "Utf8Error",
+    "digit found",
+    "floating point `",
+    "integer `",
+    "boolean `",
+    "sequence,",
+    "map,",
+    "ident ",
+];
+
+fn plain(said: &str, input: &str) {
+    for word in FOREIGN {
+        assert!(!said.contains(word), "{word:?} in {said:?}, said about {input:?}");
+    }
+}
+
+#[test]
+fn every_wrong_value_of_a_configuration_is_refused_in_plain_words() {
+    let config = Preset::Quick.config(&configure("double-pendulum", &[]).unwrap()).unwrap();
+    let good = toml::to_string(&config).unwrap();
+    parse_config::<Config>(&good).unwrap();
+    let values = [
+        "\"x\"",
+        "\"\"",
+        "-3",
+        "1.5",
+        "true",
+        "[]",
+        "[[]]",
+        "{}",
+        "{a = 1}",
+        "99999999999999999999",
+        "1e999",
+        "nan",
+        "",
+        "1 2",
+        "'",
+        "1979-05-27",
+        "[\"x\", 1]",
+        "0x",
+        "[1",
+        "_",
+    ];
+    let mut refused = 0;
+    for (k, line) in good.lines().enumerate() {
+        let Some((key, _)) = line.split_once(" = ") else { continue };
+        for value in values {
+            let wrong =
+                |(j, other): (usize, &str)| if j == k { format!("{key} = {value}\n") } else { format!("{other}\n") };
+            let bad: String = good.lines().enumerate().map(wrong).collect();
+            if let Err((place, problem)) = parse_config::<Config>(&bad) {
+                assert!(place > 0);
+                plain(&problem, &format!("{key} = {value}"));
+                refused += 1;
+            }
+        }
+        let mistyped = good.replacen(&format!("{key} ="), &format!("{key}zzzzzzzzz ="), 1);
+        plain(&parse_config::<Config>(&mistyped).unwrap_err().1, key);
+    }
+    assert!(refused > 200, "{refused}");
+}
+
+#[test]
+fn every_wrong_argument_is_refused_in_plain_words() {
+    let commands: [&[&str]; 6] = [
+        &["train", "double-pendulum"],
+        &["rollout", "m", "--state", "1,2,3,4", "--t-end", "1", "--dt", "0.1", "--out", "o"],
+        &["evaluate", "m"],
+        &["inspect", "--system", "double-pendulum", "--states", "s"],
+        &["check", "d", "--coords", "x"],
+        &["fit", "d", "--coords", "x"],
+    ];
+    let mut refused = 0;
+    for command in commands {
+        for option in [
+            "--seed",
+            "--epochs",
+            "--threads",
+            "--precision",
+            "--preset",
+            "--checkpoint-every",
+            "--rtol",
+            "--atol",
+            "--step",
+            "--method",
+            "--starts",
+            "--until",
+            "--positions",
+            "--rate",
+            "--units",
+            "--param",
+            "--format",
+            "--targets",
+            "--friction",
+            "--zebra",
+            "--t-ned",
+        ] {
+            for value in ["x", "", "-1", "1.5", "99999999999999999999999", "nan", "0", "1e999", "1e-30"] {
+                let given = format!("{option}={value}");
+                let line = [&["lnn"], command, &[&given]].concat();
+                if let Err(error) = check_arguments(line.iter().map(OsString::from)) {
+                    plain(&error.to_string(), &given);
+                    assert!(error.to_string().contains(option), "{command:?} {given}: {error}");
+                    refused += 1;
+                }
+            }
+        }
+    }
+    assert!(refused > 500, "{refused}");
+}
+
+#[test]
+fn the_option_that_helps_is_named() {
+    let folder = Folder::new();
+    let rows = |header: &str| {
+        let line = |k: usize| format!("{},{},{}\n", k as f64 / 100.0, (k as f64 / 10.0).sin(), k);
+        format!("{header}{}", (0..40).map(line).collect::<String>())
+    };
+    let data = folder.file("d.csv", rows("s,x,y\n"));
+    let bare = folder.file("b.csv", rows(""));
+    let twice = folder.file("two.csv", format!("{}0.0,1,2\n", rows("t,x,y\n")));
+    lnn(&["check", &data, "--coords", "x"])
+        .refused(1, &["no column is called t or time", "--time COLUMN", "--rate HZ"]);
+    lnn(&["check", &data, "--coords", "z", "--time", "s"]).refused(1, &["unknown column \"z\"", "--coords"]);
+    lnn(&["check", &bare, "--coords", "x", "--rate", "5"]).refused(1, &["file without names", "--coords"]);
+    lnn(&["check", &data, "--coords", "x", "--columns", "a,x,b"]).refused(1, &["found the header s,x,y", "--columns"]);
+    lnn(&["check", &twice, "--coords", "x"]).refused(1, &["another trajectory?", "--trajectory"]);
+    lnn(&["check", &data, "--coords", "x", "--velocity", "y,s"]).refused(2, &["--velocity: expected 1 column"]);
+    lnn(&["check", &data, "--coords", "x", "--units", "x=parsec"]).refused(2, &["--units: x: unknown unit"]);
+    let model = folder.file("m", model().to_bytes().unwrap());
+    let out = text(&folder.path("out.csv"));
+    let rollout = |more: &[&str]| lnn(&[&["rollout", &model, "--state", "1,2,0,0", "--out", &out], more].concat());
+    rollout(&["--t-end", "1", "--dt", "1e-12"]).refused(2, &["--dt: asks for", "at most 1e8"]);
+    rollout(&["--t-end", "1", "--dt", "0.1", "--rtol", "1e-30"]).refused(2, &["--rtol: ", "the least is 2e-15"]);
+    lnn(&["evaluate", &model, "--rtol", "1e-30"]).refused(2, &["--rtol: ", "the least is 2e-15"]);
+    assert!(!folder.path("out.csv").exists());
+}
+
+#[test]
+fn counts_are_singular_and_plural() {
+    let folder = Folder::new();
+    let model = folder.file("m", model().to_bytes().unwrap());
+    let out = text(&folder.path("out.csv"));
+    let run = lnn(&["rollout", &model, "--state", "1,2,0,0", "--t-end", "0", "--dt", "0.1", "--out", &out]);
+    assert!(run.stdout.starts_with("1 sample to t = 0 s, 0 steps, "), "{}", run.stdout);
+    let states = folder.file("s.csv", format!("{HEADER}1,2,3\n"));
+    inspect("double-pendulum", &states, &[]).refused(1, &["row 2: expected 4 fields, found 3"]);
+}
