@@ -2,8 +2,8 @@
 //! are found at once.
 
 use crate::cli::config::lines;
-use crate::names::plain;
 use crate::cli::{CliError, input};
+use crate::names::plain;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::collections::BTreeMap;
@@ -306,7 +306,7 @@ impl Filled {
         let unknown = problem.strip_prefix("unknown field `").and_then(|rest| rest.split('`').next());
         let at = path.iter().position(|step| matches!(step, Step::Key(name) if Some(name.as_str()) == unknown));
         let path = at.map_or(path, |at| &path[..=at]);
-        let mistake = Mistake::new(text_of(path), plain(&problem.to_string()));
+        let mistake = Mistake::new(text_of(path), plain(problem));
         if !self.mistakes.contains(&mistake) {
             self.mistakes.push(mistake);
         }

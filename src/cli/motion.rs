@@ -1,9 +1,10 @@
 //! What a roll-out tells beside its samples: where it left the training range, pictures, facts in JSON.
 
-use crate::cli::{CliError, input};
+use crate::cli::{CliError, input, output};
+use crate::names::counted;
 use crate::report::{Figure, LinePlot, Report, Series, line_png};
 use crate::rollout::{Domain, Trajectory};
-use crate::storage::write_atomically;
+use crate::storage::{Disk, Growing, remove_leftovers, write_atomically};
 use serde::Serialize;
 use std::path::Path;
 
@@ -171,7 +172,77 @@ pub struct Facts<'a> {
     pub out: String,
 }
 
+/// What the samples are written to.
+pub enum Target<'a> {
+    /// Standard output, as they come.
+    Standard,
+    /// A file that takes its name when it is whole.
+    File { path: &'a Path, growing: Growing<'a> },
+}
+
+impl<'a> Target<'a> {
+    /// Begins to write.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn create(path: &'a Path, standard: bool) -> Result<Self, CliError> {
+        if standard {
+            return Ok(Self::Standard);
+        }
+        if let Some(folder) = path.parent() {
+            remove_leftovers(&Disk, if folder.as_os_str().is_empty() { Path::new(".") } else { folder });
+        }
+        let growing = Growing::create(&Disk, path).map_err(|e| cannot_write(path, e))?;
+        Ok(Self::File { path, growing })
+    }
+    /// Adds text at the end.
+    ///
+    /// # Errors
+    /// A closed pipe, a full disk.
+    pub fn append(&mut self, text: &str) -> Result<(), CliError> {
+        match self {
+            Self::Standard => output::print(text),
+            Self::File { path, growing } => growing.append(text.as_bytes()).map_err(|e| cannot_write(path, e)),
+        }
+    }
+    /// Gives the file its name.
+    ///
+    /// # Errors
+    /// As [`Target::append`].
+    pub fn finish(self) -> Result<(), CliError> {
+        match self {
+            Self::Standard => Ok(()),
+            Self::File { path, growing } => growing.finish().map_err(|e| cannot_write(path, e)),
+        }
+    }
+}
+
+fn cannot_write(path: &Path, error: std::io::Error) -> CliError {
+    CliError::file(path, format_args!("cannot write: {error}"))
+}
+
 impl Facts<'_> {
+    /// In words, a line each for the motion and its energy.
+    pub fn text(&self) -> String {
+        let unit = self.time_unit.map_or(String::new(), |unit| format!(" {unit}"));
+        let iterations =
+            self.iterations.map_or(String::new(), |count| format!(" in {}", counted(count, "iteration", "iterations")));
+        let balance = match (self.energy_change, self.dissipated, self.energy_defect) {
+            (Some(change), Some(dissipated), Some(defect)) => format!(
+                "energy changed by {change:.9e}, friction took {dissipated:.9e}, not accounted for {defect:.1e}\n"
+            ),
+            _ => String::new(),
+        };
+        format!(
+            "{} to t = {}{unit}, {}, {}{iterations}, in {}\n{balance}",
+            counted(self.samples, "sample", "samples"),
+            self.t_end,
+            counted(self.steps, "step", "steps"),
+            counted(self.evaluations, "evaluation", "evaluations"),
+            self.out
+        )
+    }
+
     /// One line.
     ///
     /// # Errors

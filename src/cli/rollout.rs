@@ -1,13 +1,16 @@
 //! `lnn rollout`: the motion of a model from one state.
 
 use crate::cli::learned::Learned;
-use crate::cli::motion::{Facts, Watch, picture_file, place};
-use crate::cli::number::{finite, positive};
-use crate::cli::{CliError, input, memory, output};
+use crate::cli::motion::{Facts, Target, Watch, picture_file, place};
+use crate::cli::number::{finite, positive, tolerance};
+use crate::cli::{CliError, input, interrupt, output};
 use crate::lagrangian::{EulerLagrange, find};
-use crate::rollout::{Method, Options, RolloutError, rollout};
-use crate::storage::{check_target, write_atomically};
+use crate::names::counted;
+use crate::rollout::{Balances, Method, Options, RolloutError, Trajectory, rollout_in_pieces};
+use crate::storage::check_target;
+use std::ops::ControlFlow;
 use std::path::PathBuf;
+use std::sync::atomic::Ordering;
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
@@ -28,13 +31,14 @@ pub struct Args {
     /// with friction.
     #[arg(long, value_enum, value_name = "NAME", default_value = "dopri5")]
     method: MethodName,
-    /// Relative tolerance of a step.
-    #[arg(long, value_name = "R", default_value = "1e-6", allow_hyphen_values = true, value_parser = positive)]
+    /// Relative tolerance of a step, at least 2e-15.
+    #[arg(long, value_name = "R", default_value = "1e-6", allow_hyphen_values = true, value_parser = tolerance)]
     rtol: f64,
     /// Absolute tolerance of a step.
     #[arg(long, value_name = "A", default_value = "1e-8", allow_hyphen_values = true, value_parser = positive)]
     atol: f64,
-    /// Longest step of midpoint, gauss4, gauss6 and variational, one per sample if not given.
+    /// Longest step of midpoint, gauss4, gauss6 and variational, cut to the time between samples; one per sample if not
+    /// given.
     #[arg(long, value_name = "H", allow_hyphen_values = true, value_parser = positive)]
     step: Option<f64>,
     /// Go on where the motion leaves the states that the model was trained on, and say where that was; angles are free to
@@ -111,30 +115,40 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         domain: (!args.beyond_range).then(|| learned.domain()),
         ..Options::new(args.t_end, args.dt)
     };
-    if options.check(q.len()).is_ok() {
-        // A number and its comma in the CSV.
-        const TEXT: u64 = 2 * 25;
-        memory::require("the motion", memory::motions(1, args.t_end / args.dt, q.len(), TEXT))?;
-    }
-    let cannot_write = |e| CliError::file(&args.out, format_args!("cannot write: {e}"));
-    if !standard {
-        check_target(&args.out).map_err(cannot_write)?;
+    options.check(q.len()).map_err(|e| refused(&e))?;
+    if let Some(step) = args.step.filter(|step| *step > args.dt) {
+        output::note(&format!("--step {step} is longer than --dt {}: one step per sample", args.dt));
     }
     if let Some(plot) = &args.plot {
         check_target(plot).map_err(|e| CliError::file(plot, format_args!("cannot write: {e}")))?;
     }
-    let result = rollout(&learned.network, q, v, &options);
-    if let Some(error @ RolloutError::Invalid { .. }) = &result.stop {
-        return Err(CliError::usage(error));
-    }
-    let csv = result.trajectory.to_csv(columns).map_err(CliError::data)?;
-    if standard {
-        output::print(&csv)?;
-    } else {
-        write_atomically(&args.out, csv.as_bytes()).map_err(cannot_write)?;
-    }
+    let mut target = Target::create(&args.out, standard)?;
+    let header = Trajectory { energy: Some(vec![]), ..Trajectory::<f64>::empty(q.len()) };
+    target.append(&header.csv_header(columns).map_err(CliError::data)?)?;
+    let network = &learned.network;
+    let mut balances =
+        (!network.conserves_energy()).then(|| Balances::new(q.len(), |t: &Trajectory<f64>| t.energy_balance(network)));
     let mut watch = Watch::new(learned.domain(), columns);
-    watch.add(&result.trajectory);
+    let (stop, mut failed) = (interrupt::flag()?, None);
+    let mut take = |piece: &Trajectory<f64>| {
+        watch.add(piece);
+        let written = target.append(&piece.csv_rows());
+        let balanced = balances.as_mut().map_or(Ok(()), |sum| sum.add(piece)).map_err(CliError::data);
+        failed = written.and(balanced).err();
+        if failed.is_some() || stop.load(Ordering::Relaxed) {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
+    };
+    let result = rollout_in_pieces(network, q, v, &options, &mut take);
+    if let Some(error) = failed {
+        return Err(error);
+    }
+    if let Some(error @ RolloutError::Invalid { .. }) = &result.stop {
+        return Err(refused(error));
+    }
+    target.finish()?;
     // A system that was only recorded has no unit here, nor has one of another version.
     let time_unit = find(&learned.header.system).ok().map(|system| system.time_unit);
     if let Some(plot) = &args.plot {
@@ -144,25 +158,18 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         output::note(&format!("{}; what comes after is a guess", leaving.text()));
     }
     if let Some(stop) = result.stop {
-        let problem = match &stop {
-            RolloutError::LeftDomain { t, component, value, lower, upper, .. } => format!(
-                "left the training range at t = {t}: {} reached {value:.6e}, trained on [{lower}, {upper}]; --beyond-range goes on",
-                columns.get(*component).map_or("a component", String::as_str)
-            ),
-            other => other.to_string(),
-        };
-        let kept = result.trajectory.len();
-        return Err(CliError::data(format_args!("{problem} ({kept} samples are in {})", place(&args.out))));
+        let kept = counted(result.samples, "sample is", "samples are");
+        let problem = format!("{} ({kept} in {})", ended(&stop, columns, method), place(&args.out));
+        return Err(match stop {
+            RolloutError::Stopped { .. } => CliError::interrupted(problem),
+            _ => CliError::data(problem),
+        });
     }
     let statistics = result.statistics;
-    let balance = if learned.network.conserves_energy() {
-        None
-    } else {
-        Some(result.trajectory.energy_balance(&learned.network).map_err(CliError::data)?)
-    };
+    let balance = balances.map(Balances::finish).transpose().map_err(CliError::data)?;
     let facts = Facts {
         system: &learned.header.system,
-        samples: result.trajectory.len(),
+        samples: result.samples,
         t_end: args.t_end,
         time_unit,
         steps: statistics.accepted,
@@ -177,20 +184,43 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     if args.json {
         return output::print(&facts.json()?);
     }
-    let unit = time_unit.map_or(String::new(), |unit| format!(" {unit}"));
-    let balance = balance.map_or(String::new(), |balance| {
-        let (change, dissipated, defect) = (balance.change, balance.dissipated, balance.defect());
-        format!("energy changed by {change:.9e}, friction took {dissipated:.9e}, not accounted for {defect:.1e}\n")
-    });
-    let iterations = facts.iterations.map_or(String::new(), |iterations| format!(" in {iterations} iterations"));
-    let text = format!(
-        "{} samples to t = {}{unit}, {} steps, {} evaluations{iterations}, in {}\n{balance}",
-        facts.samples, facts.t_end, facts.steps, facts.evaluations, facts.out
-    );
+    let text = facts.text();
     if standard {
-        text.lines().for_each(output::note)
-    } else {
-        output::print(&text)?
+        text.lines().for_each(output::note);
+        return Ok(());
     }
-    Ok(())
+    output::print(&text)
+}
+
+/// A motion that is refused before it begins, with the option that was wrong.
+fn refused(error: &RolloutError) -> CliError {
+    let RolloutError::Invalid { what, problem } = error else { return CliError::usage(error) };
+    let option = match *what {
+        "t_end" => "--t-end",
+        "dt" => "--dt",
+        "rtol" => "--rtol",
+        "atol" => "--atol",
+        "step" => "--step",
+        "method" => "--method",
+        "q" | "v" => "--state",
+        other => other,
+    };
+    CliError::usage(format_args!("{option}: {problem}"))
+}
+
+/// Why a motion ended early, and the option that helps.
+fn ended(stop: &RolloutError, columns: &[String], method: Method) -> String {
+    let fixed = method.is_structure_preserving();
+    match stop {
+        RolloutError::LeftDomain { t, component, value, lower, upper, .. } => format!(
+            "left the training range at t = {t}: {} reached {value:.6e}, trained on [{lower}, {upper}]; --beyond-range goes on",
+            columns.get(*component).map_or("a component", String::as_str)
+        ),
+        RolloutError::Stopped { t } => format!("interrupted at t = {t}"),
+        RolloutError::NotConverged { .. } => format!("{stop}: a shorter --step may help"),
+        RolloutError::TooManySteps { .. } if fixed => format!("{stop}: a longer --step needs fewer"),
+        RolloutError::TooManySteps { .. } => format!("{stop}: a larger --rtol and --atol need fewer"),
+        RolloutError::StepUnderflow { .. } => format!("{stop}: a larger --rtol and --atol may help"),
+        other => other.to_string(),
+    }
 }

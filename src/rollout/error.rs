@@ -100,6 +100,12 @@ pub enum RolloutError {
         /// Attempts made.
         steps: usize,
     },
+    /// Whoever receives the samples takes no more.
+    #[error("stopped at t = {t} by the receiver of the samples")]
+    Stopped {
+        /// Time of the last step taken.
+        t: f64,
+    },
 }
 
 impl RolloutError {
@@ -112,7 +118,8 @@ impl RolloutError {
             | Self::NotFinite { t, .. }
             | Self::StepUnderflow { t, .. }
             | Self::NotConverged { t, .. }
-            | Self::TooManySteps { t, .. } => Some(*t),
+            | Self::TooManySteps { t, .. }
+            | Self::Stopped { t } => Some(*t),
         }
     }
 }

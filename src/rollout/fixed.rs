@@ -3,9 +3,10 @@
 use super::compensated::{Compensated, State};
 use super::gauss::Gauss;
 use super::phase::Phase;
-use super::run::typed;
+use super::run::{Keep, typed};
+use super::samples::{Samples, Times};
 use super::variational::Variational;
-use super::{Failure, Method, Options, Rollout, RolloutError};
+use super::{Failure, Method, Options, RolloutError, Statistics};
 use crate::lagrangian::EulerLagrange;
 use crate::scalar::{Real, Scalar};
 
@@ -61,26 +62,29 @@ pub(super) fn run<S: Scalar>(
     q: &[S],
     v: &[S],
     options: &Options<S>,
-    result: &mut Rollout<S>,
-) {
+    keep: &mut Keep<'_, S>,
+) -> (Statistics, Option<RolloutError>) {
+    let mut statistics = Statistics::default();
     let mut phase = Phase::new(model);
     let zero = <S as Real>::zero();
     let domain = options.domain.as_ref();
     let start: Vec<S> = q.iter().chain(v).copied().collect();
     let moving = Failure::check(domain, &start).and_then(|()| phase.momentum(q, v));
-    result.stop = match moving {
+    let stop = match moving {
         Err(failure) => Some(typed(failure, options.t0.to_f64(), start.iter().map(|x| x.to_f64()).collect(), 0.0)),
         Ok(p) => {
             let state = State { q: Compensated::new(q.to_vec()), p: Compensated::new(p) };
             let mut position = Position { state, near: v.to_vec(), since: zero, steps: 0, h: zero };
-            result.trajectory.t.push(options.t0);
-            result.trajectory.q.extend_from_slice(q);
-            result.trajectory.v.extend_from_slice(v);
-            advance(&mut phase, stepper, &mut position, options, result)
+            if keep(options.t0, q, v) {
+                advance(&mut phase, stepper, &mut position, options, &mut statistics, keep)
+            } else {
+                Some(RolloutError::Stopped { t: options.t0.to_f64() })
+            }
         }
     };
-    result.statistics.evaluations = phase.evaluations;
-    result.statistics.iterations = phase.iterations;
+    statistics.evaluations = phase.evaluations;
+    statistics.iterations = phase.iterations;
+    (statistics, stop)
 }
 
 fn advance<S: Scalar>(
@@ -88,26 +92,29 @@ fn advance<S: Scalar>(
     stepper: &mut Stepper<S>,
     position: &mut Position<S>,
     options: &Options<S>,
-    result: &mut Rollout<S>,
+    statistics: &mut Statistics,
+    keep: &mut Keep<'_, S>,
 ) -> Option<RolloutError> {
-    let (elapsed, times) = options.samples();
+    let samples = Samples::new(options);
     let backwards = options.t_end < options.t0;
     let domain = options.domain.as_ref();
     // All distances but the last are dt, whatever the rounding of their difference.
     let regular = options.dt.abs();
-    let last = elapsed.len() - 1;
-    for k in 1..elapsed.len() {
-        let difference = elapsed[k] - elapsed[k - 1];
-        let blur = S::EPSILON.ldexp(3) * elapsed[k];
+    let last = samples.len() - 1;
+    for k in 1..=last {
+        let (before, elapsed) = (samples.elapsed(k - 1), samples.elapsed(k));
+        let difference = elapsed - before;
+        let blur = S::EPSILON.ldexp(3) * elapsed;
         let distance = if k < last || (difference - regular).abs() <= blur { regular } else { difference };
         let longest = options.step.unwrap_or(distance);
-        let count = (distance / longest - S::EPSILON.ldexp(4)).floor().to_f64() + 1.0;
+        // A longest step beyond the distance is cut to it.
+        let count = ((distance / longest - S::EPSILON.ldexp(4)).floor().to_f64() + 1.0).max(1.0);
         let h = distance / S::of_f64(count);
-        (position.since, position.steps, position.h) = (elapsed[k - 1], 0, h);
+        (position.since, position.steps, position.h) = (before, 0, h);
         let signed = if backwards { -h } else { h };
         // A count beyond all numbers of steps ends by `max_steps`.
         while (position.steps as f64) < count {
-            if result.statistics.accepted == options.max_steps {
+            if statistics.accepted == options.max_steps {
                 let t = position.time(options, backwards);
                 return Some(RolloutError::TooManySteps { t, steps: options.max_steps });
             }
@@ -119,7 +126,7 @@ fn advance<S: Scalar>(
                 (position.state, position.near) = before;
                 return Some(position.failed(phase, failure, options, backwards));
             }
-            result.statistics.accepted += 1;
+            statistics.accepted += 1;
             position.steps += 1;
         }
         let arrived = position.velocity(phase).and_then(|v| {
@@ -129,9 +136,9 @@ fn advance<S: Scalar>(
         match arrived {
             Ok(sample) => {
                 let (q, v) = sample.split_at(phase.n);
-                result.trajectory.t.push(times[k]);
-                result.trajectory.q.extend_from_slice(q);
-                result.trajectory.v.extend_from_slice(v);
+                if !keep(samples.time(k), q, v) {
+                    return Some(RolloutError::Stopped { t: samples.time(k).to_f64() });
+                }
             }
             Err(failure) => return Some(position.failed(phase, failure, options, backwards)),
         }

@@ -7,6 +7,8 @@
 //! integrates the motion; [`Trajectory::energy_balance`] says where the energy went. Angles stay continuous (never wrapped) in the output;
 //! a model that needs them wrapped wraps them itself.
 //!
+//! [`rollout_in_pieces`] hands the samples over instead of keeping them, for motions longer than the memory.
+//!
 //! Adaptive integration is offered in the precisions the solver knows, [`Integrable`]: `f32` and `f64`; fixed steps in
 //! every precision by [`rollout_fixed`].
 
@@ -22,7 +24,9 @@ mod group;
 mod ode;
 mod options;
 mod phase;
+mod pieces;
 mod run;
+mod samples;
 mod trajectory;
 mod variational;
 
@@ -31,6 +35,7 @@ pub use ensemble::{rollout_many, rollout_together};
 pub use error::{RolloutError, UnderflowCause};
 pub use ode::Integrable;
 pub use options::{Domain, Method, Options};
+pub use pieces::{Balances, Ending, rollout_in_pieces};
 use run::Failure;
 pub use run::{Rollout, rollout, rollout_fixed};
 pub use trajectory::{Statistics, Trajectory};

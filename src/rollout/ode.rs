@@ -12,6 +12,7 @@
 
 use super::Statistics;
 use super::dense::{Interpolant, Step};
+use super::samples::Times;
 use crate::scalar::{Real, Scalar};
 use nalgebra::allocator::Allocator;
 use nalgebra::{DefaultAllocator, Dim, OVector};
@@ -22,8 +23,8 @@ use std::cell::RefCell;
 /// A right-hand side `dy = f(y)` of an autonomous system.
 pub(super) type Rhs<'a, S, E> = dyn FnMut(&[S], &mut [S]) -> Result<(), E> + 'a;
 
-/// Receives sample `k` with its state.
-pub(super) type Output<'a, S> = dyn FnMut(usize, &[S]) + 'a;
+/// Receives sample `k` with its state, and says whether to go on.
+pub(super) type Output<'a, S> = dyn FnMut(usize, &[S]) -> bool + 'a;
 
 /// The methods offered here.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -44,7 +45,7 @@ pub struct Task<'a, S> {
     /// State at elapsed time 0.
     pub(super) start: &'a [S],
     /// Elapsed times of the samples, ascending from 0; the last is the end.
-    pub(super) samples: &'a [S],
+    pub(super) samples: &'a dyn Times<S>,
 }
 
 /// Why an integration ended early.
@@ -57,6 +58,8 @@ pub enum Ended<E> {
     Underflow,
     /// No attempts left.
     TooManySteps,
+    /// The receiver of the samples takes no more.
+    Stopped,
 }
 
 /// What an integration did.
@@ -138,6 +141,8 @@ struct Watch<'a, 'f, S, E> {
     retry: Option<S>,
     /// The time does not advance any more.
     stuck: bool,
+    /// The receiver of the samples takes no more.
+    stopped: bool,
     interpolant: Interpolant<S>,
     slopes: Vec<S>,
     sample: Vec<S>,
@@ -181,28 +186,32 @@ impl<S: Scalar, E> Watch<'_, '_, S, E> {
             return true;
         }
         let rejected = self.failure.take();
-        if self.task.samples.get(self.next).is_some_and(|&t| t < x) && !self.interpolate(h, y) {
+        if self.task.samples.get(self.next).is_some_and(|t| t < x) && !self.interpolate(h, y) {
             self.retry = Some(h);
             return true;
         }
         self.earlier = rejected;
-        while let Some(&t) = self.task.samples.get(self.next) {
+        while let Some(t) = self.task.samples.get(self.next) {
             if t > x {
                 break;
             }
-            if t == x {
-                (self.output)(self.next, y);
+            let more = if t == x {
+                (self.output)(self.next, y)
             } else {
                 self.interpolant.evaluate((t - self.elapsed) / h, &mut self.sample);
-                (self.output)(self.next, &self.sample);
-            }
+                (self.output)(self.next, &self.sample)
+            };
             self.next += 1;
+            if !more {
+                self.stopped = true;
+                break;
+            }
         }
         self.elapsed = x;
         self.step = h;
         self.state.copy_from_slice(y);
         self.slope.copy_from_slice(slope);
-        false
+        self.stopped
     }
 
     /// Prepares the interpolant of the step to `y`; `false` if an evaluation it needs fails.
@@ -267,7 +276,7 @@ where
 {
     let dim = task.start.len();
     let ring = stages(task.method) + closing_calls(task.method);
-    let (zero, end) = (<S as Real>::zero(), task.samples.last().copied());
+    let (zero, end) = (<S as Real>::zero(), task.samples.len().checked_sub(1).and_then(|last| task.samples.get(last)));
     let mut slope = vec![zero; dim];
     let mut ran = Ran {
         statistics: Statistics { evaluations: 1, ..Statistics::default() },
@@ -282,8 +291,11 @@ where
     }
     let Some(end) = end else { return ran };
     let mut next = 0;
-    while task.samples.get(next).is_some_and(|&t| t <= zero) {
-        output(next, task.start);
+    while task.samples.get(next).is_some_and(|t| t <= zero) {
+        if !output(next, task.start) {
+            ran.ended = Some(Ended::Stopped);
+            return ran;
+        }
         next += 1;
     }
     let watch = RefCell::new(Watch {
@@ -302,6 +314,7 @@ where
         earlier: None,
         retry: None,
         stuck: false,
+        stopped: false,
         interpolant: Interpolant::default(),
         slopes: Vec::with_capacity((ring + 1) * dim),
         sample: vec![zero; dim],
@@ -345,12 +358,13 @@ where
             watch.stuck = true;
         }
         ran.ended = match result {
+            _ if watch.stopped => Some(Ended::Stopped),
             _ if watch.stuck => Some(watch.cause().map_or(Ended::Underflow, Ended::Failed)),
             Ok(()) => {
                 // The last step may end one rounding short of the end.
                 while watch.next < task.samples.len() {
                     let (k, state) = (watch.next, watch.state.clone());
-                    (watch.output)(k, &state);
+                    let _ = (watch.output)(k, &state);
                     watch.next += 1;
                 }
                 next = watch.next;
@@ -387,6 +401,9 @@ where
     OVector<S, D>: std::ops::Mul<S, Output = OVector<S, D>>,
 {
     let number = <S as Scalar>::of_f64;
+    // A component that stays 0 would have the error 0/0.
+    let smallest = <S as Scalar>::MIN_POSITIVE;
+    let atol = if task.atol > smallest { task.atol } else { smallest };
     let max_steps = u32::try_from(max_steps).unwrap_or(u32::MAX - 1);
     macro_rules! solve {
         ($solver:ident, $beta:expr, $shrink:expr, $grow:expr) => {
@@ -397,7 +414,7 @@ where
                 end,
                 y,
                 task.rtol,
-                task.atol,
+                atol,
                 number(0.9),
                 number($beta),
                 number($shrink),
@@ -423,7 +440,7 @@ mod tests {
     use super::*;
 
     /// Samples of `y' = -y` from 1.
-    fn decay(method: Adaptive, tolerance: f64, first_step: f64, samples: &[f64]) -> (Vec<f64>, Statistics) {
+    fn decay(method: Adaptive, tolerance: f64, first_step: f64, samples: &Vec<f64>) -> (Vec<f64>, Statistics) {
         let task =
             Task { method, rtol: tolerance, atol: tolerance, max_steps: 1000, first_step, start: &[1.0], samples };
         let mut got = Vec::new();
@@ -436,6 +453,7 @@ mod tests {
             &mut |k, y| {
                 assert_eq!(k, got.len());
                 got.push(y[0]);
+                true
             },
         );
         assert!(ran.ended.is_none());
@@ -463,7 +481,7 @@ mod tests {
 
     #[test]
     fn a_sample_at_zero_and_two_at_one_time() {
-        let (got, _) = decay(Adaptive::Dop853, 1e-10, 0.0, &[0.0, 0.0, 1.0, 1.0]);
+        let (got, _) = decay(Adaptive::Dop853, 1e-10, 0.0, &vec![0.0, 0.0, 1.0, 1.0]);
         assert_eq!(got[..2], [1.0, 1.0]);
         assert_eq!(got[2], got[3]);
         assert!((got[2] - (-1.0_f64).exp()).abs() < 1e-9);

@@ -1,6 +1,7 @@
 //! What a roll-out is asked to do.
 
 use super::RolloutError;
+use super::samples::blur;
 use crate::scalar::{Real, Scalar};
 use serde::{Deserialize, Serialize};
 
@@ -27,6 +28,18 @@ pub enum Method {
 }
 
 impl Method {
+    /// Its name, as in a configuration.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Dopri5 => "dopri5",
+            Self::Dop853 => "dop853",
+            Self::Midpoint => "midpoint",
+            Self::Gauss4 => "gauss4",
+            Self::Gauss6 => "gauss6",
+            Self::Variational => "variational",
+        }
+    }
+
     /// Whether steps are fixed and the motion is symplectic.
     pub const fn is_structure_preserving(self) -> bool {
         !matches!(self, Self::Dopri5 | Self::Dop853)
@@ -86,13 +99,12 @@ impl<S: Scalar> Domain<S> {
 /// | `t_end` | given | time of the last sample; before `t0` integrates backwards | finite |
 /// | `dt` | given | distance of samples; its sign is ignored | finite, not 0, at most 10^8 samples |
 /// | `method` | `Dopri5` | integrator | |
-/// | `rtol`, `atol` | 1e-6, 1e-8 | local error per step: `atol + rtol abs(y)` per component, root mean square | >= 0, not both 0 |
-/// | `step` | `dt` | longest step of the structure-preserving methods; `rtol` and `atol` mean nothing to them | finite, > 0 |
+/// | `rtol`, `atol` | 1e-6, 1e-8 | local error per step: `atol + rtol abs(y)` per component, root mean square | >= 0, not both 0, not finer than [`Options::least_tolerance`] of the state |
+/// | `step` | `dt` | longest step of the structure-preserving methods, cut to the distance of samples; `rtol` and `atol` mean nothing to them | finite, > 0 |
 /// | `max_steps` | 1,000,000 | attempts of all steps | >= 1 |
 /// | `domain` | none | where the trajectory must stay | `2n` components |
 /// | `energy` | true | store `E` at every sample | |
 ///
-/// `rtol` below about ten roundings of the scalar cannot be reached and costs many steps (`f32`: 1e-6).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Options<S> {
     /// Time of the start.
@@ -144,6 +156,12 @@ impl<S: Scalar> Options<S> {
         Self { method: Method::Dop853, rtol: tolerance, atol: tolerance, ..Self::new(t_end, dt) }
     }
 
+    /// Finest relative tolerance that the scalar can keep, about nine of its roundings: 1e-6 in `f32`, 2e-15 in `f64`. Below
+    /// it steps shrink until they no longer advance the time, and never arrive.
+    pub fn least_tolerance() -> S {
+        S::of_f64(if S::EPSILON.to_f64() > 1e-12 { 1e-6 } else { 2e-15 })
+    }
+
     /// Refuses options that make no sense for `n` coordinates.
     ///
     /// # Errors
@@ -165,6 +183,10 @@ impl<S: Scalar> Options<S> {
                 format!("asks for {:.3e} samples, at most {MAX_SAMPLES:.0e} are allowed", samples.to_f64()),
             );
         }
+        if blur(self).to_f64() >= 0.5 {
+            let (dt, t) = (self.dt, S::max(self.t0.abs(), self.t_end.abs()));
+            return invalid("dt", format!("{dt} is too short to tell times near {t} apart in {}", S::NAME));
+        }
         for (what, value) in [("rtol", self.rtol), ("atol", self.atol)] {
             if !(value.is_finite() && value >= <S as Real>::zero()) {
                 return invalid(what, format!("{value} is not a finite number >= 0"));
@@ -172,6 +194,13 @@ impl<S: Scalar> Options<S> {
         }
         if self.rtol + self.atol <= <S as Real>::zero() {
             return invalid("rtol", "rtol and atol must not both be 0".into());
+        }
+        let least = Self::least_tolerance();
+        if !self.method.is_structure_preserving() && self.rtol > <S as Real>::zero() && self.rtol < least {
+            let rtol = self.rtol.to_f64();
+            let problem =
+                format!("{rtol:e} is finer than {} can keep, the least is {:e}", S::NAME, least.to_f64() as f32);
+            return invalid("rtol", problem);
         }
         if let Some(step) = self.step
             && !(step.is_finite() && step > <S as Real>::zero())
@@ -188,53 +217,11 @@ impl<S: Scalar> Options<S> {
             _ => Ok(()),
         }
     }
-
-    /// Requested samples: elapsed times `|t - t0|` in ascending order and the times themselves; the last is `t_end`.
-    pub(super) fn samples(&self) -> (Vec<S>, Vec<S>) {
-        let span = self.t_end - self.t0;
-        let step = self.dt.abs();
-        let signed = if span < <S as Real>::zero() { -step } else { step };
-        let ratio = span.abs() / step;
-        // A quotient this close to a whole number is whole: the times carry no more digits.
-        let blur = S::EPSILON.ldexp(2) * (self.t0.abs() + self.t_end.abs() + span.abs()) / step;
-        let whole = (ratio + blur).floor();
-        let mut elapsed = Vec::new();
-        let mut times = Vec::new();
-        let count = whole.to_f64() as usize;
-        for k in 0..=count {
-            let k = S::of_f64(k as f64);
-            elapsed.push(k * step);
-            times.push(self.t0 + k * signed);
-        }
-        if (ratio - whole).abs() <= blur {
-            elapsed.pop();
-            times.pop();
-        }
-        elapsed.push(span.abs());
-        times.push(self.t_end);
-        (elapsed, times)
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn sample_times_are_the_requested_ones() {
-        let times = |t0: f64, t_end: f64, dt: f64| Options { t0, ..Options::new(t_end, dt) }.samples().1;
-        assert_eq!(times(0.0, 0.3, 0.1), [0.0, 0.1, 0.2, 0.3]);
-        assert_eq!(times(0.0, 0.35, 0.1), [0.0, 0.1, 0.2, 0.1 * 3.0, 0.35]);
-        assert_eq!(times(1.0, 0.0, 0.5), [1.0, 0.5, 0.0]);
-        assert_eq!(times(-1.0, 1.0, -1.0), [-1.0, 0.0, 1.0]);
-        assert_eq!(times(2.0, 2.0, 0.1), [2.0]);
-        assert_eq!(times(0.0, 0.05, 0.1), [0.0, 0.05]);
-        assert_eq!(times(0.0, 100.0, 0.1).len(), 1001);
-        assert_eq!(times(1e6, 1e6 + 1.0, 0.1).len(), 11);
-        let single = Options::<f32>::new(100.0, 0.1).samples().1;
-        assert_eq!(single.len(), 1001);
-        assert_eq!(*single.last().unwrap(), 100.0);
-    }
 
     #[test]
     fn nonsense_is_named() {
@@ -250,6 +237,12 @@ mod tests {
         assert_eq!(name(Options { rtol: f64::NAN, ..good.clone() }), "rtol");
         assert_eq!(name(Options { atol: -1.0, ..good.clone() }), "atol");
         assert_eq!(name(Options { rtol: 0.0, atol: 0.0, ..good.clone() }), "rtol");
+        assert_eq!(name(Options { rtol: 1e-30, ..good.clone() }), "rtol");
+        assert_eq!(name(Options { t0: 1e16, t_end: 1e16 + 10.0, ..good.clone() }), "dt");
+        let least = Options::<f64>::least_tolerance();
+        assert!(Options { rtol: least, ..good.clone() }.check(1).is_ok());
+        assert!(Options { rtol: 1e-30, method: Method::Gauss4, ..good.clone() }.check(1).is_ok());
+        assert!(Options::<f32>::new(1.0, 0.1).check(1).is_ok());
         assert_eq!(name(Options { step: Some(0.0), ..good.clone() }), "step");
         assert_eq!(name(Options { step: Some(f64::NAN), ..good.clone() }), "step");
         assert_eq!(name(Options { max_steps: 0, ..good.clone() }), "max_steps");

@@ -2,6 +2,7 @@
 
 use super::fixed::{self, Stepper};
 use super::ode::{Adaptive, Ended, Task};
+use super::samples::Samples;
 use super::{Integrable, Method, Options, RolloutError, Statistics, Trajectory, UnderflowCause};
 use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Terms};
 use crate::scalar::Scalar;
@@ -68,24 +69,50 @@ impl Failure {
 ///
 /// Fixed-step methods check the domain at the stages and the end of every step, and report the last time inside.
 pub fn rollout<S: Integrable>(model: &dyn EulerLagrange<S>, q: &[S], v: &[S], options: &Options<S>) -> Rollout<S> {
+    collected(model, options, |keep| integrate(model, q, v, options, keep))
+}
+
+/// Receives the time, coordinates and velocities of every sample in order, and says whether to go on.
+pub(super) type Keep<'a, S> = dyn FnMut(S, &[S], &[S]) -> bool + 'a;
+
+/// The samples of a motion as a trajectory, with the energies if options ask for them.
+fn collected<S: Scalar>(
+    model: &dyn EulerLagrange<S>,
+    options: &Options<S>,
+    motion: impl FnOnce(&mut Keep<'_, S>) -> (Statistics, Option<RolloutError>),
+) -> Rollout<S> {
+    let mut trajectory = Trajectory::empty(model.coordinates());
+    let (statistics, stop) = motion(&mut |t, q, v| {
+        trajectory.push(t, q, v);
+        true
+    });
+    if options.energy && !matches!(stop, Some(RolloutError::Invalid { .. })) {
+        trajectory.energy = Some(trajectory.energy_by(model));
+    }
+    Rollout { trajectory, statistics, stop }
+}
+
+/// [`rollout`] that hands every sample over and keeps none.
+pub(super) fn integrate<S: Integrable>(
+    model: &dyn EulerLagrange<S>,
+    q: &[S],
+    v: &[S],
+    options: &Options<S>,
+    keep: &mut Keep<'_, S>,
+) -> (Statistics, Option<RolloutError>) {
     let method = match options.method {
         Method::Dopri5 => Adaptive::Dopri5,
         Method::Dop853 => Adaptive::Dop853,
         Method::Midpoint | Method::Gauss4 | Method::Gauss6 | Method::Variational => {
-            return rollout_fixed(model, q, v, options);
+            return integrate_fixed(model, q, v, options, keep);
         }
     };
     let n = model.coordinates();
-    let mut result = Rollout {
-        trajectory: Trajectory::empty(n),
-        statistics: Statistics::default(),
-        stop: check(n, q, v, options).err(),
-    };
-    if result.stop.is_some() {
-        return result;
+    if let Err(error) = check(n, q, v, options).and_then(|()| reachable(q, v, options)) {
+        return (Statistics::default(), Some(error));
     }
 
-    let (elapsed, times) = options.samples();
+    let samples = Samples::new(options);
     let backwards = options.t_end < options.t0;
     let start: Vec<S> = q.iter().chain(v).copied().collect();
     let task = Task {
@@ -95,7 +122,7 @@ pub fn rollout<S: Integrable>(model: &dyn EulerLagrange<S>, q: &[S], v: &[S], op
         max_steps: options.max_steps,
         first_step: S::of_f64(0.0),
         start: &start,
-        samples: &elapsed,
+        samples: &samples,
     };
 
     let mut terms = Terms::default();
@@ -115,27 +142,23 @@ pub fn rollout<S: Integrable>(model: &dyn EulerLagrange<S>, q: &[S], v: &[S], op
         }
         Ok(())
     };
-    let trajectory = &mut result.trajectory;
     let domain = options.domain.as_ref();
     let mut valid = true;
     let mut sample = |k: usize, y: &[S]| {
         // An interpolated state may still cross a bound by less than the tolerance.
         valid &= y.iter().all(|x| x.is_finite()) && domain.is_none_or(|domain| domain.violation(y).is_none());
-        if valid {
-            trajectory.t.push(times[k]);
-            trajectory.q.extend_from_slice(&y[..n]);
-            trajectory.v.extend_from_slice(&y[n..]);
-        }
+        // The samples behind an invalid one are not taken, the motion goes on to its end.
+        !valid || keep(samples.time(k), &y[..n], &y[n..])
     };
 
     let ran = S::integrate(&task, &mut derivative, &mut sample);
-    result.statistics = ran.statistics;
     let t = if backwards { options.t0 - ran.elapsed } else { options.t0 + ran.elapsed }.to_f64();
     let state: Vec<f64> = ran.state.iter().map(|x| x.to_f64()).collect();
     let step = ran.step.to_f64();
-    result.stop = match ran.ended {
+    let stop = match ran.ended {
         None if valid => None,
         None => left(domain, &ran.state, t, state),
+        Some(Ended::Stopped) => Some(RolloutError::Stopped { t }),
         Some(Ended::TooManySteps) => Some(RolloutError::TooManySteps { t, steps: options.max_steps }),
         Some(Ended::Failed(failure)) => Some(typed(failure, t, state, step)),
         Some(Ended::Underflow) => {
@@ -148,39 +171,37 @@ pub fn rollout<S: Integrable>(model: &dyn EulerLagrange<S>, q: &[S], v: &[S], op
             Some(RolloutError::StepUnderflow { t, state, step, cause })
         }
     };
-    if options.energy {
-        result.trajectory.energy = Some(result.trajectory.energy_by(model));
-    }
-    result
+    (ran.statistics, stop)
 }
 
 /// [`rollout`] by the structure-preserving methods alone, in every precision: [`crate::scalar::Dd`] as well.
 pub fn rollout_fixed<S: Scalar>(model: &dyn EulerLagrange<S>, q: &[S], v: &[S], options: &Options<S>) -> Rollout<S> {
+    collected(model, options, |keep| integrate_fixed(model, q, v, options, keep))
+}
+
+/// [`rollout_fixed`] that hands every sample over and keeps none.
+fn integrate_fixed<S: Scalar>(
+    model: &dyn EulerLagrange<S>,
+    q: &[S],
+    v: &[S],
+    options: &Options<S>,
+    keep: &mut Keep<'_, S>,
+) -> (Statistics, Option<RolloutError>) {
     let n = model.coordinates();
-    let mut result = Rollout {
-        trajectory: Trajectory::empty(n),
-        statistics: Statistics::default(),
-        stop: check(n, q, v, options).err(),
-    };
-    if result.stop.is_some() {
-        return result;
+    let refused = |error| (Statistics::default(), Some(error));
+    if let Err(error) = check(n, q, v, options) {
+        return refused(error);
     }
     let Some(mut stepper) = Stepper::new(options.method, n) else {
-        let problem = format!("{:?} adapts its steps; {} offers fixed steps only", options.method, S::NAME);
-        result.stop = Some(RolloutError::Invalid { what: "method", problem });
-        return result;
+        let problem = format!("{} adapts its steps; {} offers fixed steps only", options.method.name(), S::NAME);
+        return refused(RolloutError::Invalid { what: "method", problem });
     };
     if options.method == Method::Variational && !model.conserves_energy() {
         let problem = "the variational integrator keeps the energy and this model loses it by friction; \
                        dopri5, dop853, midpoint, gauss4 and gauss6 integrate it";
-        result.stop = Some(RolloutError::Invalid { what: "method", problem: problem.to_string() });
-        return result;
+        return refused(RolloutError::Invalid { what: "method", problem: problem.to_string() });
     }
-    fixed::run(model, &mut stepper, q, v, options, &mut result);
-    if options.energy {
-        result.trajectory.energy = Some(result.trajectory.energy_by(model));
-    }
-    result
+    fixed::run(model, &mut stepper, q, v, options, keep)
 }
 
 fn check<S: Scalar>(n: usize, q: &[S], v: &[S], options: &Options<S>) -> Result<(), RolloutError> {
@@ -197,6 +218,22 @@ fn check<S: Scalar>(n: usize, q: &[S], v: &[S], options: &Options<S>) -> Result<
         }
     }
     options.check(n)
+}
+
+/// Refuses an absolute tolerance that stands alone and is finer than the scalar can keep of the start.
+fn reachable<S: Scalar>(q: &[S], v: &[S], options: &Options<S>) -> Result<(), RolloutError> {
+    let zero = S::of_f64(0.0);
+    let size = q.iter().chain(v).fold(zero, |size, x| S::max(size, x.abs()));
+    let least = Options::<S>::least_tolerance() * size;
+    if options.rtol > zero || options.atol >= least {
+        return Ok(());
+    }
+    let (atol, size, least) = (options.atol.to_f64(), size.to_f64(), least.to_f64());
+    let problem = format!(
+        "{atol:e} without rtol is finer than {} can keep of a state of size {size}, the least is {least:e}",
+        S::NAME
+    );
+    Err(RolloutError::Invalid { what: "atol", problem })
 }
 
 /// The error of a trajectory whose samples cross a bound that its steps respect: it is grazed within the tolerance.

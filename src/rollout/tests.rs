@@ -2,7 +2,7 @@
 
 use super::models::{BROKEN, EXPLODING, FOUR, KEPLER, OSCILLATOR, PENDULUM, SINGULAR};
 use super::*;
-use crate::lagrangian::EulerLagrange;
+use crate::lagrangian::{EulerLagrange, build};
 
 const METHODS: [Method; 2] = [Method::Dopri5, Method::Dop853];
 
@@ -238,4 +238,65 @@ fn ensembles_do_not_depend_on_threads() {
     assert_eq!(one.len(), 7);
     assert_eq!(one, four);
     assert!(rollout_many(model, &[], &Options::<f64>::new(5.0, 0.1), 3).is_empty());
+}
+
+const FIXED: [Method; 4] = [Method::Midpoint, Method::Gauss4, Method::Gauss6, Method::Variational];
+
+/// A longest step beyond the distance of samples is that distance.
+fn long_steps_are_cut<S: crate::scalar::Scalar>(model: &dyn EulerLagrange<S>) {
+    let number = S::of_f64;
+    for method in FIXED {
+        for t_end in [0.3, -0.3] {
+            let options = |step| Options { method, step, ..Options::new(number(t_end), number(0.1)) };
+            let run = |step| rollout_fixed(model, &[number(1.0)], &[number(0.5)], &options(step)).complete().unwrap();
+            let expected = run(None);
+            assert!(expected.q.windows(2).all(|pair| pair[0] != pair[1]), "{method:?} does not move");
+            for step in [0.11, 1e6, 1e14, 1e30] {
+                assert_eq!(run(Some(number(step))), expected, "{method:?} {t_end} {step}");
+            }
+        }
+    }
+}
+
+#[test]
+fn steps_beyond_the_samples_are_cut_in_every_precision() {
+    long_steps_are_cut(&*build::<f32>("harmonic-oscillator", &[]).unwrap());
+    long_steps_are_cut(&*build::<f64>("harmonic-oscillator", &[]).unwrap());
+    long_steps_are_cut(&*build::<crate::scalar::Dd>("harmonic-oscillator", &[]).unwrap());
+}
+
+#[test]
+fn tolerances_that_cannot_be_kept_are_refused_with_the_least() {
+    let system = build::<f64>("harmonic-oscillator", &[]).unwrap();
+    let run = |method, rtol, atol| {
+        let options = Options { method, rtol, atol, ..Options::new(1.0, 0.1) };
+        rollout(&*system, &[1.0], &[2.0], &options)
+    };
+    for method in METHODS {
+        let refusal = |rtol, atol| run(method, rtol, atol).stop.unwrap().to_string();
+        assert_eq!(refusal(1e-30, 1e-30), "rtol: 1e-30 is finer than f64 can keep, the least is 2e-15");
+        assert_eq!(refusal(1e-16, 1.0), "rtol: 1e-16 is finer than f64 can keep, the least is 2e-15");
+        let alone = "atol: 1e-30 without rtol is finer than f64 can keep of a state of size 2, the least is 4e-15";
+        assert_eq!(refusal(0.0, 1e-30), alone);
+        // The least works, alone or together.
+        let least = Options::<f64>::least_tolerance();
+        for (rtol, atol) in [(least, least), (least, 0.0), (0.0, 2.0 * least)] {
+            let done = run(method, rtol, atol);
+            assert!(
+                done.is_complete() && done.statistics.accepted < 100_000,
+                "{method:?} {rtol} {atol}: {:?}",
+                done.stop
+            );
+        }
+        let single = Options::<f32> { method, rtol: 1e-7, ..Options::new(1.0, 0.1) };
+        let refusal = rollout(&PENDULUM, &[1.0_f32], &[2.0], &single).stop.unwrap().to_string();
+        assert!(refusal.ends_with("than f32 can keep, the least is 1e-6"), "{refusal}");
+        // What stays at 0 has no error, whatever the absolute tolerance.
+        let still = Options { method, atol: 0.0, ..Options::new(1.0, 0.1) };
+        let done = rollout(&PENDULUM, &[0.0], &[0.0], &still);
+        assert!(done.is_complete() && done.trajectory.q.iter().all(|q| *q == 0.0), "{:?}", done.stop);
+    }
+    for method in FIXED {
+        assert!(run(method, 1e-30, 1e-30).is_complete(), "they mean nothing to {method:?}");
+    }
 }

@@ -53,6 +53,13 @@ impl<S: Scalar> Trajectory<S> {
         Self { coordinates, t: Vec::new(), q: Vec::new(), v: Vec::new(), energy: None }
     }
 
+    /// Adds a state behind the last.
+    pub(super) fn push(&mut self, t: S, q: &[S], v: &[S]) {
+        self.t.push(t);
+        self.q.extend_from_slice(q);
+        self.v.extend_from_slice(v);
+    }
+
     /// Number of states.
     pub fn len(&self) -> usize {
         self.t.len()
@@ -112,6 +119,14 @@ impl<S: Scalar> Trajectory<S> {
     /// # Errors
     /// [`RolloutError::Invalid`] if the number of columns is not `2n`.
     pub fn to_csv<T: AsRef<str>>(&self, columns: &[T]) -> Result<String, RolloutError> {
+        Ok(self.csv_header(columns)? + &self.csv_rows())
+    }
+
+    /// The header of [`Trajectory::to_csv`], one line.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn csv_header<T: AsRef<str>>(&self, columns: &[T]) -> Result<String, RolloutError> {
         let n = self.coordinates;
         if columns.len() != 2 * n {
             return Err(RolloutError::Invalid {
@@ -126,6 +141,12 @@ impl<S: Scalar> Trajectory<S> {
             text.push_str(&quoted(column.as_ref()));
         }
         text.push_str(if self.energy.is_some() { ",energy\n" } else { "\n" });
+        Ok(text)
+    }
+
+    /// The lines of [`Trajectory::to_csv`] below its header.
+    pub fn csv_rows(&self) -> String {
+        let mut text = String::new();
         for (k, t) in self.t.iter().enumerate() {
             let (q, v) = self.state(k);
             text.push_str(&t.to_text());
@@ -137,7 +158,7 @@ impl<S: Scalar> Trajectory<S> {
             }
             text.push('\n');
         }
-        Ok(text)
+        text
     }
 }
 

@@ -8,4 +8,4 @@ mod write;
 pub use files::{Disk, Files};
 pub use memory::available_memory;
 pub use read::{ReadError, open_regular, read_regular};
-pub use write::{check_target, remove_leftovers, replace, write_atomically, write_whole};
+pub use write::{Growing, check_target, remove_leftovers, replace, write_atomically, write_whole};

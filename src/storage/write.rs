@@ -2,7 +2,7 @@
 
 use super::files::{Disk, Files, uninterrupted, write_all};
 use std::ffi::{OsStr, OsString};
-use std::fs::{self, OpenOptions};
+use std::fs::{self, File, OpenOptions};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -25,21 +25,83 @@ pub fn write_atomically(path: &Path, bytes: &[u8]) -> io::Result<()> {
 /// # Errors
 /// As there.
 pub fn write_whole(files: &dyn Files, path: &Path, bytes: &[u8]) -> io::Result<()> {
-    let target = match fs::canonicalize(path) {
-        Ok(existing) => existing,
-        Err(error) if error.kind() == io::ErrorKind::NotFound => path.to_path_buf(),
-        Err(error) => return Err(error),
-    };
-    match fs::metadata(&target) {
-        Ok(data) if data.is_dir() => return Err(io::Error::new(io::ErrorKind::IsADirectory, "is a directory")),
-        Ok(data) if !data.is_file() => {
-            let mut file = OpenOptions::new().write(true).open(&target)?;
-            return write_all(files, &mut file, bytes);
-        }
-        _ => {}
+    let mut file = Growing::create(files, path)?;
+    file.append(bytes)?;
+    file.finish()
+}
+
+/// A file written piece by piece; readers see the old content until [`Growing::finish`], as of [`write_atomically`].
+///
+/// Dropped before that, it leaves nothing behind, but for what was already written in place to a pipe or device.
+pub struct Growing<'a> {
+    files: &'a dyn Files,
+    file: File,
+    /// The temporary file; none if the target is written in place.
+    draft: Option<Draft<'a>>,
+    /// Bytes gathered for the next write.
+    buffer: Vec<u8>,
+}
+
+/// Bytes of one write.
+const BUFFER: usize = 1 << 16;
+
+impl<'a> Growing<'a> {
+    /// Begins a file that will be `path`.
+    ///
+    /// # Errors
+    /// The error of the file system; a directory as target is refused.
+    pub fn create(files: &'a dyn Files, path: &Path) -> io::Result<Self> {
+        let target = match fs::canonicalize(path) {
+            Ok(existing) => existing,
+            Err(error) if error.kind() == io::ErrorKind::NotFound => path.to_path_buf(),
+            Err(error) => return Err(error),
+        };
+        let (draft, file) = match fs::metadata(&target) {
+            Ok(data) if data.is_dir() => return Err(io::Error::new(io::ErrorKind::IsADirectory, "is a directory")),
+            Ok(data) if !data.is_file() => (None, OpenOptions::new().write(true).open(&target)?),
+            _ => {
+                let (draft, file) = Draft::create(files, &target)?;
+                (Some(draft), file)
+            }
+        };
+        Ok(Self { files, file, draft, buffer: Vec::new() })
     }
-    let draft = Draft::write(files, &target, bytes)?;
-    draft.take_name()
+
+    /// Adds bytes at the end.
+    ///
+    /// # Errors
+    /// The error of the file system, the disk being full for one; nothing can be added after it.
+    pub fn append(&mut self, bytes: &[u8]) -> io::Result<()> {
+        if self.buffer.is_empty() && bytes.len() >= BUFFER {
+            return write_all(self.files, &mut self.file, bytes);
+        }
+        self.buffer.extend_from_slice(bytes);
+        if self.buffer.len() < BUFFER {
+            return Ok(());
+        }
+        self.flush()
+    }
+
+    /// Gives the file its name.
+    ///
+    /// # Errors
+    /// As of [`write_atomically`].
+    pub fn finish(mut self) -> io::Result<()> {
+        self.flush()?;
+        match self.draft {
+            None => Ok(()),
+            Some(draft) => {
+                draft.complete(&self.file)?;
+                draft.take_name()
+            }
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        let written = write_all(self.files, &mut self.file, &self.buffer);
+        self.buffer.clear();
+        written
+    }
 }
 
 /// Whether [`write_atomically`] could write to `path` now: found out before the work whose result it will be.
@@ -52,8 +114,8 @@ pub fn check_target(path: &Path) -> io::Result<()> {
     match fs::metadata(path) {
         Ok(data) if data.is_dir() => Err(io::Error::new(io::ErrorKind::IsADirectory, "is a directory")),
         Ok(data) if !data.is_file() => OpenOptions::new().write(true).open(path).map(drop),
-        Ok(_) => Draft::write(&Disk, &fs::canonicalize(path)?, b"").map(drop),
-        Err(_) => Draft::write(&Disk, path, b"").map(drop),
+        Ok(_) => Draft::create(&Disk, &fs::canonicalize(path)?).map(drop),
+        Err(_) => Draft::create(&Disk, path).map(drop),
     }
 }
 
@@ -77,29 +139,39 @@ pub fn replace(files: &dyn Files, newest: &Path, previous: &Path, bytes: &[u8], 
 /// A temporary file beside its target; removed unless it takes the target's name.
 struct Draft<'a> {
     files: &'a dyn Files,
-    target: &'a Path,
+    target: PathBuf,
     directory: PathBuf,
     path: PathBuf,
     named: bool,
 }
 
 impl<'a> Draft<'a> {
-    /// Creates the temporary file with these bytes, on the disk, and the permissions of the target, if that exists.
-    fn write(files: &'a dyn Files, target: &'a Path, bytes: &[u8]) -> io::Result<Self> {
+    /// Creates the temporary file, empty.
+    fn create(files: &'a dyn Files, target: &Path) -> io::Result<(Self, File)> {
         let name = target.file_name().ok_or_else(|| io::Error::new(io::ErrorKind::InvalidInput, "names no file"))?;
         let directory = match target.parent() {
             Some(parent) if !parent.as_os_str().is_empty() => parent.to_path_buf(),
             _ => PathBuf::from("."),
         };
         let path = directory.join(temporary_name(name));
-        let mut file = uninterrupted(|| files.create(&path))?;
-        let draft = Self { files, target, directory, path, named: false };
+        let file = uninterrupted(|| files.create(&path))?;
+        Ok((Self { files, target: target.to_path_buf(), directory, path, named: false }, file))
+    }
+
+    /// Creates the temporary file with these bytes, on the disk.
+    fn write(files: &'a dyn Files, target: &Path, bytes: &[u8]) -> io::Result<Self> {
+        let (draft, mut file) = Self::create(files, target)?;
         write_all(files, &mut file, bytes)?;
-        if let Ok(old) = fs::metadata(target) {
+        draft.complete(&file)?;
+        Ok(draft)
+    }
+
+    /// Gives the file the permissions of the target, if that exists, and brings it to the disk.
+    fn complete(&self, file: &File) -> io::Result<()> {
+        if let Ok(old) = fs::metadata(&self.target) {
             file.set_permissions(old.permissions())?;
         }
-        uninterrupted(|| files.sync(&file))?;
-        Ok(draft)
+        uninterrupted(|| self.files.sync(file))
     }
 
     /// Reads the file back.
@@ -118,7 +190,7 @@ impl<'a> Draft<'a> {
     }
 
     fn take_name(mut self) -> io::Result<()> {
-        uninterrupted(|| self.files.rename(&self.path, self.target))?;
+        uninterrupted(|| self.files.rename(&self.path, &self.target))?;
         self.named = true;
         uninterrupted(|| self.files.sync_directory(&self.directory))
     }
@@ -189,6 +261,26 @@ mod tests {
         assert_eq!(read_regular(&path, 3).unwrap(), b"one");
         write_atomically(&path, b"two").unwrap();
         assert_eq!(read_regular(&path, 3).unwrap(), b"two");
+        assert_eq!(entries(directory.path()), 1);
+    }
+
+    #[test]
+    fn a_growing_file_is_seen_when_it_is_finished() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("a.csv");
+        write_atomically(&path, b"old").unwrap();
+        for finished in [false, true] {
+            let mut file = Growing::create(&Disk, &path).unwrap();
+            (0..30_000).for_each(|k| file.append(format!("{k:06}").as_bytes()).unwrap());
+            file.append(&[b'x'; BUFFER]).unwrap();
+            assert_eq!(read_regular(&path, 3).unwrap(), b"old");
+            if finished {
+                file.finish().unwrap();
+            }
+        }
+        let content = fs::read(&path).unwrap();
+        assert_eq!(content.len(), 180_000 + BUFFER);
+        assert!((0..30_000).all(|k| content[6 * k..6 * k + 6] == *format!("{k:06}").as_bytes()));
         assert_eq!(entries(directory.path()), 1);
     }
 

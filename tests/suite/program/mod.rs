@@ -8,6 +8,8 @@ mod experiment;
 mod fit;
 mod hostile;
 mod inspect;
+mod motion;
 mod pipes;
 mod resume;
 mod train;
+mod words;

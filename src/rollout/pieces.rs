@@ -1,0 +1,210 @@
+//! Roll-outs of any length in little memory: samples are handed over in pieces.
+
+use super::run::integrate;
+use super::trajectory::CHUNK;
+use super::{EnergyBalance, Integrable, Options, RolloutError, Statistics, Trajectory};
+use crate::lagrangian::EulerLagrange;
+use crate::scalar::Scalar;
+use std::ops::ControlFlow;
+
+/// How a roll-out in pieces ended.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Ending {
+    /// Samples handed over, all valid, whatever `stop` says.
+    pub samples: usize,
+    /// Work done.
+    pub statistics: Statistics,
+    /// Why it ended before `t_end`.
+    pub stop: Option<RolloutError>,
+}
+
+/// [`rollout`](super::rollout) with the samples handed to `take` in pieces of at most 256, in order, with the energies if
+/// options ask for them.
+///
+/// The pieces one behind the other are the trajectory of [`rollout`](super::rollout), bit for bit; memory does not grow with
+/// their number. When `take` breaks off, the motion ends with [`RolloutError::Stopped`]. A motion that is refused hands
+/// over nothing.
+pub fn rollout_in_pieces<S: Integrable>(
+    model: &dyn EulerLagrange<S>,
+    q: &[S],
+    v: &[S],
+    options: &Options<S>,
+    take: &mut dyn FnMut(&Trajectory<S>) -> ControlFlow<()>,
+) -> Ending {
+    let mut piece = Trajectory::empty(model.coordinates());
+    let (mut samples, mut willing) = (0, true);
+    let mut hand_over = |piece: &mut Trajectory<S>| {
+        piece.energy = options.energy.then(|| piece.energy_by(model));
+        samples += piece.len();
+        let more = take(piece).is_continue();
+        *piece = Trajectory { energy: None, ..std::mem::replace(piece, Trajectory::empty(0)) };
+        piece.t.clear();
+        piece.q.clear();
+        piece.v.clear();
+        more
+    };
+    let (statistics, stop) = integrate(model, q, v, options, &mut |t, q, v| {
+        piece.push(t, q, v);
+        if piece.len() == CHUNK {
+            willing = hand_over(&mut piece);
+        }
+        willing
+    });
+    if willing && !piece.is_empty() {
+        hand_over(&mut piece);
+    }
+    Ending { samples, statistics, stop }
+}
+
+/// Intervals between samples whose energy balance is taken at once.
+const BLOCK: usize = 4096;
+
+/// Energy balance of a motion that comes in pieces: the sum of those of its blocks, neighbours sharing a sample.
+///
+/// Each block is long enough for the quadrature's polynomials to have the samples that they need inside of it.
+pub struct Balances<F, S> {
+    balance: F,
+    kept: Trajectory<S>,
+    sum: Option<EnergyBalance<S>>,
+}
+
+impl<S: Scalar, F: FnMut(&Trajectory<S>) -> Result<EnergyBalance<S>, RolloutError>> Balances<F, S> {
+    /// No samples of `coordinates` coordinates yet; `balance` gives the balance of a stretch, as
+    /// [`Trajectory::energy_balance`] does.
+    pub fn new(coordinates: usize, balance: F) -> Self {
+        Self { balance, kept: Trajectory::empty(coordinates), sum: None }
+    }
+
+    /// Adds the samples behind those so far.
+    ///
+    /// # Errors
+    /// Those of the balance of a stretch.
+    pub fn add(&mut self, piece: &Trajectory<S>) -> Result<(), RolloutError> {
+        for k in 0..piece.len() {
+            let (q, v) = piece.state(k);
+            self.kept.push(piece.t[k], q, v);
+        }
+        while self.kept.len() > 2 * BLOCK {
+            let n = self.kept.coordinates;
+            let rest = Trajectory {
+                coordinates: n,
+                t: self.kept.t.split_off(BLOCK),
+                q: self.kept.q.split_off(BLOCK * n),
+                v: self.kept.v.split_off(BLOCK * n),
+                energy: None,
+            };
+            // The blocks share the sample between them.
+            let (q, v) = rest.state(0);
+            self.kept.push(rest.t[0], q, v);
+            let block = std::mem::replace(&mut self.kept, rest);
+            self.take(&block)?;
+        }
+        Ok(())
+    }
+
+    /// The balance from the first sample to the last.
+    ///
+    /// # Errors
+    /// Those of the balance of a stretch.
+    pub fn finish(mut self) -> Result<EnergyBalance<S>, RolloutError> {
+        let rest = std::mem::replace(&mut self.kept, Trajectory::empty(0));
+        self.take(&rest)
+    }
+
+    fn take(&mut self, block: &Trajectory<S>) -> Result<EnergyBalance<S>, RolloutError> {
+        let EnergyBalance { change, dissipated, size } = (self.balance)(block)?;
+        let sum = match self.sum {
+            None => EnergyBalance { change, dissipated, size },
+            Some(sum) => EnergyBalance {
+                change: sum.change + change,
+                dissipated: sum.dissipated + dissipated,
+                size: S::max(sum.size, size),
+            },
+        };
+        self.sum = Some(sum);
+        Ok(sum)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::models::BROKEN;
+    use super::super::{Method, rollout};
+    use super::*;
+    use crate::lagrangian::build;
+
+    fn oscillator() -> Box<dyn EulerLagrange<f64>> {
+        build("harmonic-oscillator", &[]).unwrap()
+    }
+
+    /// All pieces as one trajectory, at most `most` of them, their number, and how it ended.
+    fn joined(model: &dyn EulerLagrange<f64>, options: &Options<f64>, most: usize) -> (Trajectory<f64>, usize, Ending) {
+        let mut whole = Trajectory { energy: options.energy.then(Vec::new), ..Trajectory::empty(1) };
+        let mut pieces = 0;
+        let ending = rollout_in_pieces(model, &[1.0], &[0.2], options, &mut |piece| {
+            pieces += 1;
+            (0..piece.len()).for_each(|k| whole.push(piece.t[k], piece.state(k).0, piece.state(k).1));
+            if let (Some(all), Some(energy)) = (&mut whole.energy, &piece.energy) {
+                all.extend_from_slice(energy);
+            }
+            if pieces == most { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        });
+        (whole, pieces, ending)
+    }
+
+    #[test]
+    fn the_pieces_are_the_whole() {
+        for method in [Method::Dopri5, Method::Dop853, Method::Gauss4, Method::Variational] {
+            for (t_end, energy) in [(10.0, true), (-7.681, false), (0.0, true), (2.559, true)] {
+                let options = Options { method, energy, ..Options::new(t_end, 0.01) };
+                let whole = rollout(&*oscillator(), &[1.0], &[0.2], &options);
+                let (trajectory, pieces, ending) = joined(&*oscillator(), &options, 99);
+                assert_eq!((&trajectory, ending.statistics), (&whole.trajectory, whole.statistics));
+                assert_eq!((ending.samples, ending.stop), (trajectory.len(), None));
+                assert_eq!(pieces, trajectory.len().div_ceil(CHUNK));
+            }
+        }
+    }
+
+    #[test]
+    fn balances_of_blocks_add_up() {
+        let options = Options::new(20.0, 0.001);
+        let whole = rollout(&*oscillator(), &[1.0], &[0.2], &options).trajectory;
+        // A dissipated power of v^2, for the sake of its integral.
+        let balance = |stretch: &Trajectory<f64>| {
+            let (t, v) = (&stretch.t, &stretch.v);
+            let dissipated = t.windows(2).zip(v.windows(2)).map(|(t, v)| (t[1] - t[0]) * v[0] * v[1]).sum();
+            let size = v.iter().fold(0.0, |size: f64, v| size.max(v.abs()));
+            Ok(EnergyBalance { change: v.last().unwrap() - v[0], dissipated, size })
+        };
+        let mut blocks = Balances::new(1, balance);
+        let ending = rollout_in_pieces(&*oscillator(), &[1.0], &[0.2], &options, &mut |piece| {
+            blocks.add(piece).unwrap();
+            ControlFlow::Continue(())
+        });
+        let (sum, once) = (blocks.finish().unwrap(), balance(&whole).unwrap());
+        assert!(ending.samples > 4 * BLOCK && sum.size == once.size);
+        assert!((sum.change - once.change).abs() < 1e-12 && (sum.dissipated - once.dissipated).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_motion_that_fails_hands_over_what_it_has() {
+        let options = Options::new(5.0, 0.001);
+        let (trajectory, _, ending) = joined(&BROKEN, &options, 99);
+        let whole = rollout(&BROKEN, &[1.0], &[0.2], &options);
+        assert!(ending.stop.is_some() && trajectory.len() > CHUNK);
+        assert_eq!((trajectory, ending.stop), (whole.trajectory, whole.stop));
+        let (nothing, pieces, refused) = joined(&*oscillator(), &Options::new(1.0, 0.0), 99);
+        assert!(nothing.is_empty() && pieces == 0 && matches!(refused.stop, Some(RolloutError::Invalid { .. })));
+    }
+
+    #[test]
+    fn a_receiver_that_takes_no_more_ends_the_motion() {
+        for method in [Method::Dopri5, Method::Gauss4] {
+            let options = Options { method, ..Options::new(1e4, 0.001) };
+            let (trajectory, pieces, ending) = joined(&*oscillator(), &options, 2);
+            assert_eq!((trajectory.len(), pieces, ending.samples), (2 * CHUNK, 2, 2 * CHUNK));
+            assert!(matches!(ending.stop, Some(RolloutError::Stopped { t }) if t < 5.0), "{:?}", ending.stop);
+        }
+    }
+}

@@ -1,0 +1,65 @@
+//! `lnn rollout`: steps, long motions written as they go.
+#![cfg(all(feature = "cli", unix))]
+
+use crate::common::program::{Folder, command, lnn, model, text};
+use std::fs;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+/// A step longer than the time between samples is cut to it: the same motion by every method, in both directions.
+#[test]
+fn longer_steps_are_cut_to_the_samples() {
+    let folder = Folder::new();
+    let model = folder.file("m", model().to_bytes().unwrap());
+    let out = text(&folder.path("out.csv"));
+    for method in ["midpoint", "gauss4", "gauss6", "variational"] {
+        for t_end in ["0.3", "-0.3"] {
+            let motion = |step: &[&str]| {
+                let base =
+                    ["rollout", &model, "--state", "1,2,0.5,-0.5", "--t-end", t_end, "--dt", "0.1", "--method", method];
+                let run = lnn(&[&base[..], &["--out", &out], step].concat());
+                assert_eq!(run.code, Some(0), "{}", run.stderr);
+                let csv = fs::read_to_string(&out).unwrap();
+                fs::remove_file(&out).unwrap();
+                (csv, run.stderr)
+            };
+            let (expected, silent) = motion(&[]);
+            assert_eq!(silent, "");
+            for step in ["1e14", "1e300", "0.2"] {
+                let (csv, said) = motion(&["--step", step]);
+                assert_eq!(csv, expected, "{method} {step}");
+                assert!(said.starts_with("note: --step ") && said.contains("longer than --dt 0.1"), "{said}");
+            }
+        }
+    }
+}
+
+/// Ctrl-C in the middle of a long motion keeps the samples so far and leaves nothing else.
+#[test]
+fn an_interrupted_motion_keeps_its_samples() {
+    let folder = Folder::new();
+    let model = folder.file("m", model().to_bytes().unwrap());
+    let out = text(&folder.path("out.csv"));
+    let arguments = ["rollout", &model, "--state", "1,2,0,0", "--t-end", "900", "--dt", "0.00001", "--out", &out];
+    let child = command(&arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    // Until the temporary file has grown.
+    let limit = Instant::now() + Duration::from_secs(60);
+    let written = || {
+        let entries = fs::read_dir(folder.0.path()).unwrap().map(|entry| entry.unwrap());
+        let draft = entries.filter(|entry| entry.file_name().to_str().unwrap().ends_with(".tmp"));
+        draft.map(|entry| entry.metadata().unwrap().len()).sum::<u64>()
+    };
+    while written() < 1 << 17 {
+        assert!(Instant::now() < limit, "nothing is written");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    let output = child.wait_with_output().unwrap();
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(130), "{said}");
+    assert!(said.starts_with("error: interrupted at t = ") && said.contains("samples are in"), "{said}");
+    let csv = fs::read_to_string(&out).unwrap();
+    let (fields, last) = (csv.lines().next().unwrap().split(',').count(), csv.lines().last().unwrap());
+    assert!(csv.ends_with('\n') && last.split(',').count() == fields && csv.lines().count() > 1000);
+    assert_eq!(folder.names(), ["m", "out.csv"]);
+}
