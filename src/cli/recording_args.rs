@@ -2,7 +2,7 @@
 
 use crate::cli::spool::read_spooled;
 use crate::cli::{CliError, number};
-use crate::recording::read::{DataError, read_recording};
+use crate::recording::read::{DataError, Problem, read_recording};
 use crate::recording::{Columns, Reading};
 use std::path::PathBuf;
 
@@ -44,6 +44,12 @@ pub struct RecordingArgs {
     pub columns: Vec<String>,
 }
 
+/// What a contradiction that begins with an option's name lacks to name the option.
+fn option(problem: &str) -> &'static str {
+    let options = ["velocity:", "acceleration:", "force:", "periodic:", "units:", "rate:", "columns:"];
+    if options.iter().any(|name| problem.starts_with(name)) { "--" } else { "" }
+}
+
 /// `column=unit`.
 pub(super) fn unit(text: &str) -> Result<(String, String), String> {
     match text.split_once('=') {
@@ -76,9 +82,25 @@ impl RecordingArgs {
     /// # Errors
     /// A usage error for arguments that contradict each other, a data error for the first file that is not as said.
     pub fn read(&self) -> Result<Reading, CliError> {
-        read_spooled(&self.data, |files| read_recording(files, &self.meaning())).map_err(|error| match error {
-            DataError::Columns(_) | DataError::NoFiles => CliError::usage(error),
-            DataError::File { .. } => CliError::data(error),
+        read_spooled(&self.data, |files| read_recording(files, &self.meaning())).map_err(|error| match &error {
+            DataError::File { problem, .. } => CliError::data(format_args!("{error}{}", self.help(problem))),
+            _ => CliError::usage(format_args!("{}{error}", option(&error.to_string()))),
         })
+    }
+
+    /// The option that helps, with a colon before it.
+    fn help(&self, problem: &Problem) -> &'static str {
+        match problem {
+            Problem::NoTime => ": --time COLUMN or --rate HZ",
+            Problem::Missing { what: "time", .. } => ": --time COLUMN names it",
+            Problem::Missing { what: "trajectory", .. } => ": --trajectory COLUMN names it",
+            Problem::Missing { what: "coordinate", .. } => ": --coords names it",
+            Problem::Missing { what: "velocity", .. } => ": --velocity names it",
+            Problem::Missing { what: "acceleration", .. } => ": --acceleration names it",
+            Problem::Missing { what: "force", .. } => ": --force names it",
+            Problem::Width { .. } | Problem::Header { .. } => ": see --columns",
+            Problem::Order { .. } if self.trajectory.is_none() => ": --trajectory COLUMN",
+            _ => "",
+        }
     }
 }

@@ -1,7 +1,7 @@
 //! States from CSV files.
 
-use crate::names::{nearest, unknown};
-use crate::recording::read::unquoted;
+use crate::names::{counted, nearest, unknown};
+use crate::recording::read::{Separator, comment, names_in, split};
 use crate::scalar::Scalar;
 use thiserror::Error;
 
@@ -28,13 +28,13 @@ pub enum StatesError {
     /// Bytes that are not text.
     #[error("row {0}: not UTF-8 text")]
     NotText(usize),
-    /// Separated by something else than commas.
-    #[error("row {row}: fields are separated by {separator:?}, expected commas")]
-    Separator {
-        /// Row of the header.
+    /// Numbers where the names of columns should be.
+    #[error("row {row}: expected a header with the columns {names}, found numbers")]
+    NoHeader {
+        /// The first row.
         row: usize,
-        /// What stands there.
-        separator: char,
+        /// Names of the columns.
+        names: String,
     },
     /// A column stands twice in the header.
     #[error("row {row}: column {name} stands there twice")]
@@ -61,12 +61,14 @@ pub enum StatesError {
         names: String,
     },
     /// A row with too few or too many fields.
-    #[error("row {row}: expected {expected} fields, found {found}")]
+    #[error("row {row}: expected {}{separated}, found {found}", counted(*expected, "field", "fields"))]
     Ragged {
         /// The row.
         row: usize,
         /// Fields of the header.
         expected: usize,
+        /// What separates them, such as ` separated by blanks`; empty for commas.
+        separated: &'static str,
         /// Fields of the row.
         found: usize,
     },
@@ -87,8 +89,10 @@ pub enum StatesError {
 
 /// Reads states from CSV text.
 ///
-/// The first line that is not blank names the columns, all of `columns` (coordinates, then velocities) in any order; what
-/// stands in others, such as the time and the energy of a roll-out, is left out. Fields are separated by commas; spaces around them, double quotes, a byte order mark, blank lines and
+/// The first line that is neither blank nor a comment, which begins with `#`, names the columns, all of `columns` (coordinates,
+/// then velocities) in any order; the last comment above numbers may do so too. What stands in other columns, such as the time
+/// and the energy of a roll-out, is left out. Fields are separated by commas, semicolons, tabs, bars or blanks, as in that line;
+/// spaces around them, double quotes, a byte order mark, blank lines and
 /// Windows line ends are accepted. Numbers are read in the precision of `S`: a double-double sees the decimal text, not
 /// its nearest `f64`.
 ///
@@ -100,21 +104,36 @@ pub fn parse_states<S: Scalar>(bytes: &[u8], columns: &[String]) -> Result<State
         let row = 1 + bytes[..e.valid_up_to()].iter().filter(|b| **b == b'\n').count();
         StatesError::NotText(row)
     })?;
-    let mut lines = text.lines().enumerate().map(|(k, line)| (k + 1, line)).filter(|(_, line)| !line.trim().is_empty());
-    let (row, header) = lines.next().ok_or_else(|| StatesError::Empty(columns.join(",")))?;
-    let order = read_header(row, header, columns)?;
+    let rows = || text.lines().enumerate().map(|(k, line)| (k + 1, line)).filter(|(_, line)| !line.trim().is_empty());
+    let remark = |line: &str| comment(line.trim().as_bytes()).is_some();
+    let mut lines = rows().filter(|(_, line)| !remark(line)).peekable();
+    let above = rows().take_while(|(_, line)| remark(line)).last();
+    let &(first, header) = lines.peek().ok_or_else(|| StatesError::Empty(columns.join(",")))?;
+    let separator = Separator::of(header);
+    let names = split(header, separator);
+    let order = if names.iter().any(|name| name.parse::<f64>().is_err()) {
+        lines.next();
+        read_header(first, &names, columns)?
+    } else {
+        let said = above.and_then(|(row, line)| {
+            let said = line.trim().trim_start_matches('#').trim();
+            Some((row, names_in(said, names.len())?))
+        });
+        let (row, names) = said.ok_or_else(|| StatesError::NoHeader { row: first, names: columns.join(",") })?;
+        read_header(row, &names, columns)?
+    };
 
     let n = columns.len() / 2;
     let mut states = States { q: Vec::new(), v: Vec::new(), rows: Vec::new() };
     let mut state = vec![S::default(); columns.len()];
     for (row, line) in lines {
-        let found = line.split(',').count();
-        if found != order.len() {
-            return Err(StatesError::Ragged { row, expected: order.len(), found });
+        let fields = split(line, separator);
+        if fields.len() != order.len() {
+            let (expected, separated, found) = (order.len(), separator.named(), fields.len());
+            return Err(StatesError::Ragged { row, expected, separated, found });
         }
-        for (field, &column) in line.split(',').zip(&order) {
+        for (field, &column) in fields.into_iter().zip(&order) {
             let Some(column) = column else { continue };
-            let field = unquoted(field);
             state[column] = S::parse(field).filter(|x| x.is_finite()).ok_or_else(|| StatesError::Field {
                 row,
                 column: columns[column].clone(),
@@ -129,13 +148,8 @@ pub fn parse_states<S: Scalar>(bytes: &[u8], columns: &[String]) -> Result<State
 }
 
 /// For every field of a row, the index of its column, if it has one.
-fn read_header(row: usize, header: &str, columns: &[String]) -> Result<Vec<Option<usize>>, StatesError> {
-    if !header.contains(',')
-        && let Some(separator) = [';', '\t', '|'].into_iter().find(|c| header.contains(*c))
-    {
-        return Err(StatesError::Separator { row, separator });
-    }
-    let names: Vec<&str> = header.split(',').map(unquoted).collect();
+fn read_header<T: AsRef<str>>(row: usize, names: &[T], columns: &[String]) -> Result<Vec<Option<usize>>, StatesError> {
+    let names: Vec<&str> = names.iter().map(AsRef::as_ref).collect();
     let mut order = Vec::with_capacity(names.len());
     for name in &names {
         let column = columns.iter().position(|known| known == name);
@@ -185,13 +199,30 @@ mod tests {
     }
 
     #[test]
+    fn separators_and_comments_are_read() {
+        let expected = parse_states::<f64>(b"theta1,theta2,theta1_dot,theta2_dot\n1,-2,3,4.5\n", &columns()).unwrap();
+        for text in [
+            "theta1;theta2;theta1_dot;theta2_dot\n1;-2;3;4.5\n",
+            "theta1\ttheta2\ttheta1_dot\ttheta2_dot\n1\t-2\t3\t4.5\n",
+            "theta1 | theta2 | theta1_dot | theta2_dot\n1|-2|3|4.5\n",
+            "  theta1  theta2 theta1_dot theta2_dot\n   1 -2   3 4.5\n",
+            "# theta1 theta2 theta1_dot theta2_dot\n1 -2 3 4.5\n",
+        ] {
+            let states = parse_states::<f64>(text.as_bytes(), &columns()).unwrap();
+            assert_eq!((states.q, states.v, states.rows), (expected.q.clone(), expected.v.clone(), vec![2]), "{text}");
+        }
+        let text = "# by hand\n\ntheta1,theta2,theta1_dot,theta2_dot\n# first\n1,-2,3,4.5\n # last\n";
+        let states = parse_states::<f64>(text.as_bytes(), &columns()).unwrap();
+        assert_eq!((states.q, states.rows), (expected.q, vec![5]));
+    }
+
+    #[test]
     fn headers_are_checked() {
         assert!(refusal("").starts_with("the file is empty"));
-        assert_eq!(
-            refusal("theta1;theta2;theta1_dot;theta2_dot\n"),
-            "row 1: fields are separated by ';', expected commas"
-        );
-        assert_eq!(refusal("theta1\ttheta2\n"), "row 1: fields are separated by '\\t', expected commas");
+        assert_eq!(refusal("theta1;theta2;theta1_dot;theta2_dot\n"), "no states below the header");
+        assert_eq!(refusal("theta1\ttheta2\n"), "row 1: missing column theta1_dot, theta2_dot");
+        let expected = "row 2: expected a header with the columns theta1,theta2,theta1_dot,theta2_dot, found numbers";
+        assert_eq!(refusal("# by hand\n1,2,3,4\n"), expected);
         assert_eq!(refusal("theta1,theta2,theta1\n"), "row 1: column theta1 stands there twice");
         assert_eq!(
             refusal("theta1,theta2,theta1_dto\n"),

@@ -30,6 +30,8 @@ pub struct Builder<'a> {
     periodic: Vec<bool>,
     current: usize,
     labels: HashMap<String, usize>,
+    /// Rows to come, if they are known and make one trajectory.
+    expected: usize,
     /// The trajectories so far.
     pub growing: Vec<Growing>,
     /// Rows left out because they repeat the row before.
@@ -41,12 +43,17 @@ impl<'a> Builder<'a> {
     pub fn new(columns: &'a Columns, selection: Selection) -> Self {
         let periodic = columns.periodic();
         let (growing, labels) = (Vec::new(), HashMap::new());
-        Self { columns, selection, periodic, current: 0, labels, growing, duplicates: 0 }
+        Self { columns, selection, periodic, current: 0, labels, expected: 0, growing, duplicates: 0 }
     }
 
     /// Which columns are used.
     pub fn selection(&self) -> &Selection {
         &self.selection
+    }
+
+    /// Says how many rows will come, so that room is made once.
+    pub fn expect(&mut self, rows: usize) {
+        self.expected = if self.selection.trajectory.is_none() { rows } else { 0 };
     }
 
     /// Adds a row: the used columns in the order of the selection, as they stand in the file, and the value that tells
@@ -132,7 +139,17 @@ impl<'a> Builder<'a> {
             self.labels.insert(label.to_string(), self.current);
         }
         let label = label.map(ToString::to_string);
-        self.growing.push(Growing { label, rows: Rows::default(), track: empty(), last: Vec::new(), last_row: 0 });
+        let room = |columns: usize| Vec::with_capacity(self.expected * columns);
+        let Columns { coords, velocity, acceleration, force, .. } = self.columns;
+        let track = Track {
+            times: room(1),
+            q: room(coords.len()),
+            v: room(velocity.len()),
+            a: room(acceleration.len()),
+            force: room(force.len()),
+            ..empty()
+        };
+        self.growing.push(Growing { label, rows: Rows::default(), track, last: Vec::new(), last_row: 0 });
         Ok(())
     }
 }

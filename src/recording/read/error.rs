@@ -1,6 +1,6 @@
 //! What is wrong with files of recorded motion.
 
-use crate::names::one_line;
+use crate::names::{counted, one_line};
 use crate::recording::ColumnsError;
 use crate::storage::ReadError;
 use thiserror::Error;
@@ -47,14 +47,6 @@ pub enum Problem {
         /// Longest line.
         limit: u64,
     },
-    /// Separated by something else than commas.
-    #[error("row {row}: fields are separated by {separator:?}, expected commas")]
-    Separator {
-        /// The first row.
-        row: u64,
-        /// What stands there.
-        separator: char,
-    },
     /// A used column stands twice in the header.
     #[error("row {row}: column {name} stands there twice")]
     Duplicate {
@@ -77,7 +69,7 @@ pub enum Problem {
     #[error("no column is called t or time: name the column of time, or give the rate in samples per second")]
     NoTime,
     /// Names for another number of columns.
-    #[error("row {row}: expected {expected} fields, as many as columns are named, found {found}")]
+    #[error("row {row}: expected {}, as many as columns are named, found {found}", counted(*expected, "field", "fields"))]
     Width {
         /// The row.
         row: u64,
@@ -95,18 +87,30 @@ pub enum Problem {
         found: String,
     },
     /// A row with too few or too many fields.
-    #[error("row {row}: expected {expected} fields, found {found}")]
+    #[error("row {row}: expected {}{separated}, found {found}", counted(*expected, "field", "fields"))]
     Ragged {
         /// The row.
         row: u64,
         /// Fields of the first row.
         expected: usize,
+        /// What separates them, such as ` separated by blanks`; empty for commas.
+        separated: &'static str,
         /// Fields of the row.
         found: usize,
     },
     /// A field that is not a finite number.
     #[error("row {row}, column {column}: expected a finite number, found {found:?}")]
     Field {
+        /// The row.
+        row: u64,
+        /// Name of the column.
+        column: String,
+        /// What stands there.
+        found: String,
+    },
+    /// A decimal comma.
+    #[error("row {row}, column {column}: expected a decimal point, found the comma of {found:?}")]
+    DecimalComma {
         /// The row.
         row: u64,
         /// Name of the column.

@@ -3,20 +3,25 @@
 mod builder;
 mod csv;
 mod error;
+mod fill;
 mod npy;
 mod npz;
 mod pieces;
 mod select;
+mod shared;
+mod text;
 
-#[cfg(feature = "cli")]
-pub(crate) use csv::unquoted;
 pub use error::{DataError, Problem};
 pub use pieces::LEAST;
+#[cfg(feature = "cli")]
+#[cfg(feature = "cli")]
+pub(crate) use text::{Separator, comment, names_in, split};
 
 use crate::recording::reading::Reading;
 use crate::recording::{Columns, Recording};
 use crate::storage::open_regular;
 use builder::Builder;
+use shared::Shared;
 use std::fs::File;
 use std::io::{BufReader, Read, Seek};
 use std::path::Path;
@@ -28,7 +33,8 @@ const MAX_BYTES: u64 = 1 << 36;
 ///
 /// Every file holds one trajectory, or several told apart by a column; gaps in time cut them further. The format is told
 /// by the first bytes: arrays of NumPy (`.npy`, `.npz`; floats of 4 or 8 bytes and integers, either order and byte order),
-/// anything else is text of comma-separated numbers with or without a header. Numbers are converted to SI; angles are
+/// anything else is text of numbers, separated by commas, semicolons, tabs, bars or blanks, with or without a header and with
+/// comments behind a `#`. Numbers are converted to SI; angles are
 /// unwrapped by the nearest turn; rows that repeat the row before digit by digit are left out and counted.
 ///
 /// # Errors
@@ -51,8 +57,8 @@ pub fn read_recording<P: AsRef<Path>>(paths: &[P], columns: &Columns) -> Result<
 
 /// Adds the trajectories of one file.
 fn add_file(path: &Path, columns: &Columns, reading: &mut Reading) -> Result<(), Problem> {
-    let (mut file, size) = open_regular(path, MAX_BYTES)?;
-    let builder = parse(&mut file, size, columns)?;
+    let (file, size) = open_regular(path, MAX_BYTES)?;
+    let builder = parse(file, size, columns)?;
     reading.time = builder.selection().time().map(ToString::to_string);
     reading.duplicates += builder.duplicates;
     if builder.growing.is_empty() {
@@ -67,14 +73,14 @@ fn add_file(path: &Path, columns: &Columns, reading: &mut Reading) -> Result<(),
 }
 
 /// Tells the format and reads the rows.
-fn parse<'a>(file: &mut File, size: u64, columns: &'a Columns) -> Result<Builder<'a>, Problem> {
+fn parse(mut file: File, size: u64, columns: &Columns) -> Result<Builder<'_>, Problem> {
     let mut start = Vec::new();
-    file.take(npy::MAGIC.len() as u64).read_to_end(&mut start)?;
+    (&mut file).take(npy::MAGIC.len() as u64).read_to_end(&mut start)?;
     file.rewind()?;
     if start.starts_with(npy::MAGIC) {
-        npy::read(&mut BufReader::with_capacity(1 << 20, file), size, columns)
+        npy::read(Shared::new(file, size), size, columns)
     } else if start.starts_with(npz::MAGIC) {
-        npz::read(file.try_clone()?, columns)
+        npz::read(Shared::new(file, size), columns)
     } else {
         csv::read(BufReader::with_capacity(1 << 20, file.take(size)), columns)
     }

@@ -2,9 +2,12 @@
 
 use super::Problem;
 use super::builder::Builder;
+use super::fill::{Source, fill};
 use super::select::Selection;
+use super::shared::Shared;
+use crate::names::counted;
 use crate::recording::Columns;
-use std::io::Read;
+use std::io::{BufReader, Read};
 
 /// First bytes of such a file.
 pub const MAGIC: &[u8] = b"\x93NUMPY";
@@ -13,7 +16,7 @@ const LONGEST: usize = 10_000;
 
 /// Type of the elements.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Element {
+pub struct Element {
     /// `f`, `i` or `u`.
     kind: u8,
     /// Bytes.
@@ -30,12 +33,17 @@ pub struct Header {
     pub columns: usize,
     /// Number of dimensions, 1 or 2.
     pub dimensions: usize,
-    element: Element,
-    fortran: bool,
+    /// Type of the numbers.
+    pub element: Element,
+    /// Whether columns follow each other, not rows.
+    pub fortran: bool,
+    /// Bytes before the first number.
+    pub start: u64,
 }
 
 impl Header {
-    /// Reads the header of an array in a file of `available` bytes.
+    /// Reads the header of an array that, with its header, has `available` bytes: as many as its shape says, no more and no
+    /// fewer, which is found out before a number is read.
     pub fn read(input: &mut impl Read, available: u64) -> Result<Self, Problem> {
         let short = |_| Problem::Array("the header of the array is cut off".to_string());
         let mut start = [0; 8];
@@ -43,16 +51,16 @@ impl Header {
         if start[..6] != *MAGIC {
             return Err(Problem::Array("expected an array of NumPy, found something else".to_string()));
         }
-        let length = match start[6] {
+        let (length, prefix) = match start[6] {
             1 => {
                 let mut length = [0; 2];
                 input.read_exact(&mut length).map_err(short)?;
-                usize::from(u16::from_le_bytes(length))
+                (usize::from(u16::from_le_bytes(length)), 10)
             }
             2 | 3 => {
                 let mut length = [0; 4];
                 input.read_exact(&mut length).map_err(short)?;
-                u32::from_le_bytes(length) as usize
+                (u32::from_le_bytes(length) as usize, 12)
             }
             other => return Err(Problem::Array(format!("version {other} of NPY, expected 1, 2 or 3"))),
         };
@@ -64,12 +72,13 @@ impl Header {
         let mut text = vec![0; length];
         input.read_exact(&mut text).map_err(short)?;
         let text = String::from_utf8(text).map_err(|_| Problem::Array("the array's header is no text".to_string()))?;
-        let header = Self::parse(&text)?;
+        let header = Self { start: prefix + length as u64, ..Self::parse(&text)? };
         let bytes = (header.rows as u128) * (header.columns as u128) * (header.element.size as u128);
-        if bytes > u128::from(available) {
+        let behind = available.saturating_sub(header.start);
+        if bytes != u128::from(behind) {
             let (rows, columns) = (header.rows, header.columns);
             return Err(Problem::Array(format!(
-                "the header promises {rows} x {columns} numbers ({bytes} bytes), the file has {available} bytes"
+                "the header promises {rows} x {columns} numbers ({bytes} bytes), {behind} bytes stand behind it"
             )));
         }
         Ok(header)
@@ -100,37 +109,14 @@ impl Header {
             inside.split(',').map(str::trim).filter(|text| !text.is_empty()).map(|text| text.parse().ok()).collect()
         });
         match lengths.as_deref() {
-            Some(&[rows]) => Ok(Self { rows, columns: 1, dimensions: 1, element, fortran }),
-            Some(&[rows, columns]) => Ok(Self { rows, columns, dimensions: 2, element, fortran }),
-            Some(other) => {
-                Err(Problem::Array(format!("an array of {} dimensions, expected 2 (rows and columns)", other.len())))
-            }
+            Some(&[rows]) => Ok(Self { rows, columns: 1, dimensions: 1, element, fortran, start: 0 }),
+            Some(&[rows, columns]) => Ok(Self { rows, columns, dimensions: 2, element, fortran, start: 0 }),
+            Some(other) => Err(Problem::Array(format!(
+                "an array of {}, expected 2 (rows and columns)",
+                counted(other.len(), "dimension", "dimensions")
+            ))),
             None => Err(Problem::Array("the array's header has no readable shape".to_string())),
         }
-    }
-
-    /// Reads the numbers of some columns; `wanted[c]` is the place of column `c` in the result, if it is wanted.
-    pub fn numbers(&self, input: &mut impl Read, wanted: &[Option<usize>]) -> Result<Vec<Vec<f64>>, Problem> {
-        let mut columns = vec![Vec::new(); wanted.iter().flatten().count()];
-        let (total, size) = (self.rows * self.columns, self.element.size);
-        let mut buffer = vec![0; (8192 * size).min(total * size)];
-        let mut index = 0;
-        while index < total {
-            let bytes = &mut buffer[..((total - index) * size).min(8192 * size)];
-            input.read_exact(bytes).map_err(|error| match error.kind() {
-                std::io::ErrorKind::UnexpectedEof => Problem::Array("the numbers of the array are cut off".to_string()),
-                _ => Problem::Io(error),
-            })?;
-            for element in bytes.chunks_exact(size) {
-                // In either order the numbers of one column come by ascending row.
-                let column = if self.fortran { index / self.rows } else { index % self.columns };
-                if let Some(place) = wanted[column] {
-                    columns[place].push(self.element.decode(element));
-                }
-                index += 1;
-            }
-        }
-        Ok(columns)
     }
 }
 
@@ -155,8 +141,13 @@ impl Element {
         }
     }
 
+    /// Bytes of an element.
+    pub fn size(self) -> usize {
+        self.size
+    }
+
     /// The nearest `f64` of an element's bytes.
-    fn decode(self, bytes: &[u8]) -> f64 {
+    pub fn decode(self, bytes: &[u8]) -> f64 {
         let mut word = [0; 8];
         for (k, byte) in bytes.iter().enumerate() {
             word[if self.big_endian { self.size - 1 - k } else { k }] = *byte;
@@ -172,43 +163,38 @@ impl Element {
     }
 }
 
-/// Reads a table of numbers, columns by number or by the given names.
-pub fn read<'a>(input: &mut impl Read, available: u64, columns: &'a Columns) -> Result<Builder<'a>, Problem> {
-    let header = Header::read(input, available)?;
-    let names = columns.names.as_deref();
-    if let Some(names) = names
-        && names.len() != header.columns
-    {
-        return Err(Problem::Width { row: 1, expected: names.len(), found: header.columns });
-    }
-    let selection = Selection::new(columns, names, header.columns, 1)?;
-    let mut wanted = vec![None; header.columns];
-    for (place, used) in selection.values.iter().chain(&selection.trajectory).enumerate() {
-        wanted[used.position] = Some(place);
-    }
-    let numbers = header.numbers(input, &wanted)?;
-    fill(Builder::new(columns, selection), &numbers)
+/// Reads a table of numbers in a file of its own.
+pub fn read(file: Shared, available: u64, columns: &Columns) -> Result<Builder<'_>, Problem> {
+    let header = Header::read(&mut BufReader::new(file.clone()), available)?;
+    table(&header, columns, |offset| Ok(Box::new(BufReader::with_capacity(1 << 16, file.at(offset)))))
 }
 
-/// Adds all rows of columns in the order of the selection, the trajectory's column last.
-pub fn fill<'a>(mut builder: Builder<'a>, numbers: &[Vec<f64>]) -> Result<Builder<'a>, Problem> {
-    let count = builder.selection().values.len();
-    let mut values = vec![0.0; count];
-    for index in 0..numbers.first().map_or(0, Vec::len) {
-        let row = index as u64 + 1;
-        for (k, column) in numbers.iter().enumerate() {
-            let selection = builder.selection();
-            if !column[index].is_finite() {
-                let used = selection.values.get(k).or(selection.trajectory.as_ref());
-                let name = used.map(|used| used.name.clone()).unwrap_or_default();
-                return Err(Problem::Field { row, column: name, found: column[index].to_string() });
-            }
-            if k < count {
-                values[k] = column[index];
-            }
-        }
-        let label = numbers.get(count).map(|column| column[index].to_string());
-        builder.push(row, &values, label.as_deref())?;
+/// Reads a table of numbers, columns by number or by the given names; `open` gives a reader that stands so many bytes behind
+/// the beginning of the array.
+pub fn table<'a, 'f>(
+    header: &Header,
+    columns: &'a Columns,
+    mut open: impl FnMut(u64) -> Result<Box<dyn Read + 'f>, Problem>,
+) -> Result<Builder<'a>, Problem> {
+    let &Header { rows, columns: width, element, fortran, start, .. } = header;
+    let names = columns.names.as_deref();
+    if let Some(names) = names
+        && names.len() != width
+    {
+        return Err(Problem::Width { row: 1, expected: names.len(), found: width });
     }
-    Ok(builder)
+    let selection = Selection::new(columns, names, width, 1)?;
+    let wanted: Vec<(usize, usize)> =
+        selection.used().enumerate().map(|(place, used)| (used.position, place)).collect();
+    let source = |input, width, wanted| Source { input, element, width, wanted, whole: !fortran, name: String::new() };
+    let mut sources = Vec::new();
+    if fortran {
+        for (column, place) in wanted {
+            let before = (rows * column * element.size) as u64;
+            sources.push(source(open(start + before)?, 1, vec![(0, place)]));
+        }
+    } else {
+        sources.push(source(open(start)?, width, wanted));
+    }
+    fill(Builder::new(columns, selection), rows, &mut sources)
 }

@@ -2,10 +2,11 @@
 
 use super::Problem;
 use super::builder::Builder;
+use super::fill::{Source, fill};
 use super::npy::{self, Header};
-use super::select::Selection;
+use super::select::{Selection, Used};
+use super::shared::Shared;
 use crate::recording::Columns;
-use std::fs::File;
 use std::io::{BufReader, Read};
 use zip::ZipArchive;
 use zip::result::ZipError;
@@ -14,8 +15,10 @@ use zip::result::ZipError;
 pub const MAGIC: &[u8] = b"PK\x03\x04";
 /// Most arrays of an archive.
 const MOST: usize = 10_000;
-/// More than any byte of deflated data can become.
-const EXPANSION: u64 = 1100;
+/// Most bytes that the used arrays may have for every byte that they take in the file, and bytes that they may have however
+/// few they take. Measured numbers shrink to a tenth at most; what shrinks to a hundredth holds hardly a number.
+const EXPANSION: u64 = 100;
+const ANYWAY: u64 = 1 << 26;
 
 fn broken(error: ZipError) -> Problem {
     match error {
@@ -25,8 +28,11 @@ fn broken(error: ZipError) -> Problem {
 }
 
 /// Reads vectors of equal length, each a column by its name, or a single table.
-pub fn read(file: File, columns: &Columns) -> Result<Builder<'_>, Problem> {
-    let mut archive = ZipArchive::new(BufReader::new(file)).map_err(broken)?;
+///
+/// Shapes and sizes are compared with each other and with the file before a number is unpacked, and the columns are
+/// unpacked together, row by row: nothing is held but the trajectories.
+pub fn read(file: Shared, columns: &Columns) -> Result<Builder<'_>, Problem> {
+    let mut archive = ZipArchive::new(file).map_err(broken)?;
     if archive.is_empty() {
         return Err(Problem::Empty);
     }
@@ -34,12 +40,10 @@ pub fn read(file: File, columns: &Columns) -> Result<Builder<'_>, Problem> {
         return Err(Problem::Array(format!("{} arrays, expected at most {MOST}", archive.len())));
     }
     if archive.len() == 1 {
-        let mut entry = archive.by_index(0).map_err(broken)?;
-        let available = promised(entry.size(), entry.compressed_size())?;
-        let mut start = Vec::new();
-        (&mut entry).take(LOOK).read_to_end(&mut start)?;
-        if Header::read(&mut start.as_slice(), available)?.dimensions == 2 {
-            return npy::read(&mut start.as_slice().chain(entry), available, columns);
+        bounded(&mut archive, [0])?;
+        let (header, _) = open(&mut archive, 0)?;
+        if header.dimensions == 2 {
+            return table(&archive, &header, columns);
         }
     }
     let names: Vec<String> = archive
@@ -47,39 +51,66 @@ pub fn read(file: File, columns: &Columns) -> Result<Builder<'_>, Problem> {
         .map(|name| name.map(|name| name.strip_suffix(".npy").unwrap_or(&name).to_string()).map_err(broken))
         .collect::<Result<_, _>>()?;
     let selection = Selection::new(columns, Some(&names), names.len(), 1)?;
-    let mut numbers: Vec<Vec<f64>> = Vec::new();
-    for used in selection.values.iter().chain(&selection.trajectory) {
-        let mut entry = archive.by_index(used.position).map_err(broken)?;
-        let available = promised(entry.size(), entry.compressed_size())?;
+    let used: Vec<Used> = selection.used().cloned().collect();
+    bounded(&mut archive, used.iter().map(|used| used.position))?;
+    let mut archives = vec![archive; used.len()];
+    let (mut sources, mut rows) = (Vec::with_capacity(used.len()), 0);
+    for (place, (archive, Used { name, position, .. })) in archives.iter_mut().zip(&used).enumerate() {
         let in_array = |problem: Problem| match problem {
-            Problem::Array(text) => Problem::Array(format!("array {}: {text}", used.name)),
+            Problem::Array(text) => Problem::Array(format!("array {name}: {text}")),
             other => other,
         };
-        let header = Header::read(&mut entry, available).map_err(in_array)?;
+        let (header, input) = open(archive, *position).map_err(in_array)?;
         if header.columns != 1 {
             let text = format!("{} x {} numbers, expected one column", header.rows, header.columns);
             return Err(in_array(Problem::Array(text)));
         }
-        let column = header.numbers(&mut entry, &[Some(0)]).map_err(in_array)?.swap_remove(0);
-        if let Some(first) = numbers.first()
-            && first.len() != column.len()
-        {
-            let (name, expected) = (&selection.values[0].name, first.len());
-            let text = format!("{} numbers, expected {expected} as in array {name}", column.len());
+        if place > 0 && header.rows != rows {
+            let text = format!("{} numbers, expected {rows} as in array {}", header.rows, used[0].name);
             return Err(in_array(Problem::Array(text)));
         }
-        numbers.push(column);
+        rows = header.rows;
+        let (element, name) = (header.element, format!("array {name}: "));
+        sources.push(Source { input, element, width: 1, wanted: vec![(0, place)], whole: true, name });
     }
-    npy::fill(Builder::new(columns, selection), &numbers)
+    fill(Builder::new(columns, selection), rows, &mut sources)
 }
 
-/// Bytes that hold any header.
-const LOOK: u64 = 1 << 14;
+/// A single table: one reader for its rows, or one for each of its used columns if those follow each other.
+fn table<'a>(archive: &ZipArchive<Shared>, header: &Header, columns: &'a Columns) -> Result<Builder<'a>, Problem> {
+    let readers = if header.fortran { header.columns } else { 1 };
+    let mut archives = vec![archive.clone(); readers];
+    let mut free = archives.iter_mut();
+    npy::table(header, columns, |offset| {
+        let archive = free.next().ok_or_else(|| Problem::Array("more columns than the array has".to_string()))?;
+        let mut entry = archive.by_index(0).map_err(broken)?;
+        std::io::copy(&mut (&mut entry).take(offset), &mut std::io::sink())?;
+        Ok(Box::new(BufReader::with_capacity(1 << 16, entry)))
+    })
+}
 
-/// Size of an entry, if so many bytes can come out of the compressed ones.
-fn promised(size: u64, compressed: u64) -> Result<u64, Problem> {
-    if size > compressed.saturating_mul(EXPANSION) {
-        return Err(Problem::Array(format!("the archive promises {size} bytes from {compressed}")));
+/// The header of an array and a reader of what follows.
+fn open(archive: &mut ZipArchive<Shared>, index: usize) -> Result<(Header, Box<dyn Read + '_>), Problem> {
+    let entry = archive.by_index(index).map_err(broken)?;
+    let size = entry.size();
+    let mut input = BufReader::with_capacity(1 << 16, entry);
+    let header = Header::read(&mut input, size)?;
+    Ok((header, Box::new(input)))
+}
+
+/// Refuses arrays that are far larger than their part of the file.
+fn bounded(archive: &mut ZipArchive<Shared>, used: impl IntoIterator<Item = usize>) -> Result<(), Problem> {
+    let (mut size, mut compressed) = (0u64, 0u64);
+    for index in used {
+        let entry = archive.by_index_raw(index).map_err(broken)?;
+        size = size.saturating_add(entry.size());
+        compressed = compressed.saturating_add(entry.compressed_size());
     }
-    Ok(size)
+    if size > ANYWAY.max(compressed.saturating_mul(EXPANSION)) {
+        return Err(Problem::Array(format!(
+            "the archive promises {size} bytes of numbers from {compressed}, more than {EXPANSION} times as many: saved \
+             without compression they are read"
+        )));
+    }
+    Ok(())
 }

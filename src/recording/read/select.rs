@@ -91,6 +91,11 @@ impl Selection {
         Ok(Self { width, values, timed, trajectory })
     }
 
+    /// The used columns, that of the trajectory last.
+    pub fn used(&self) -> impl Iterator<Item = &Used> {
+        self.values.iter().chain(&self.trajectory)
+    }
+
     /// Name of the column of time.
     pub fn time(&self) -> Option<&str> {
         self.values.first().filter(|_| self.timed).map(|used| used.name.as_str())

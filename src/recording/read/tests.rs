@@ -63,6 +63,23 @@ fn columns_are_found_by_name_and_number() {
 }
 
 #[test]
+fn separators_and_comments_are_read() {
+    let text = table("t,q1,q2", 20, &[]);
+    let expected = read(&text, &coordinates("q2,q1")).unwrap().recording.tracks.remove(0);
+    for separator in [";", "\t", "|", " ", "   "] {
+        let track = read(text.replace(',', separator), &coordinates("q2,q1")).unwrap().recording.tracks.remove(0);
+        assert_eq!((track.times, track.q), (expected.times.clone(), expected.q.clone()), "{separator:?}");
+    }
+    let remarks = format!("# measured by hand\n# {}", text.replacen("0.3,", "  # a pause\n0.3,", 1));
+    let reading = read(&remarks, &coordinates("q2,q1")).unwrap();
+    assert_eq!((reading.recording.tracks[0].q.clone(), reading.rows[0].row(3)), (expected.q.clone(), 7));
+    // A comment that names nothing leaves numbers of columns.
+    let numbered = Columns { time: Some("1".into()), ..coordinates("3,2") };
+    let remarked = format!("# by hand\n{}", &text[8..]);
+    assert_eq!(read(remarked, &numbered).unwrap().recording.tracks[0].q, expected.q);
+}
+
+#[test]
 fn wrong_columns_are_named() {
     let text = table("t,theta1,theta2", 20, &[]);
     let says = |columns: Columns, expected: &str| assert_eq!(refusal(&text, &columns), expected);
@@ -95,13 +112,14 @@ fn wrong_rows_are_named() {
         with("0.2,1,2").starts_with("row 6, column t: expected a time later than 0.3 of row 5, found 0.2 (another")
     );
     assert!(with("0.3,1,2").contains("later than 0.3 of row 5, found 0.3 with other values"));
-    for (separator, shown) in [(";", "';'"), ("\t", "'\\t'"), ("|", "'|'")] {
-        let text = table("t,q1,q2", 20, &[]).replace(',', separator);
-        let expected = format!("row 1: fields are separated by {shown}, expected commas");
-        assert_eq!(refusal(text, &coordinates("q1")), expected);
-    }
-    assert!(refusal("1 2 3\n4 5 6\n", &coordinates("1")).contains("separated by ' '"));
-    assert!(refusal("0,1;0,2\n0,2;0,3\n", &coordinates("1")).contains("separated by ';'"));
+    let blanks = table("t,q1,q2", 20, &[(4, "0.4,1")]).replace(',', " ");
+    assert_eq!(refusal(blanks, &coordinates("q1")), "row 6: expected 3 fields separated by blanks, found 2");
+    let comma = table("t,q1,q2", 20, &[(4, "0.4,\"1,5\",2")]);
+    let expected = "row 6, column q1: expected a decimal point, found the comma of \"1,5\"";
+    assert_eq!(refusal(comma, &coordinates("q1")), expected);
+    assert!(
+        refusal("0,1;0,2\n0,2;0,3\n", &Columns { rate: Some(1.0), ..coordinates("1") }).contains("a decimal point")
+    );
     assert_eq!(refusal("", &coordinates("q1")), "the file is empty");
     assert_eq!(refusal("\u{feff}\n \n", &coordinates("q1")), "the file is empty");
     assert_eq!(refusal("t,q1\n", &coordinates("q1")), "no rows of numbers");
@@ -239,7 +257,8 @@ fn arrays_that_are_refused() {
         assert!(text.contains(part), "{text}");
     };
     says("'<f8'", "(99999999999, 99999999999)", "the header promises 99999999999 x 99999999999 numbers");
-    says("'<f8'", "(61,)", "the numbers of the array are cut off");
+    says("'<f8'", "(61,)", "the header promises 61 x 1 numbers (488 bytes), 480 bytes stand behind it");
+    says("'<f8'", "(59,)", "the header promises 59 x 1 numbers (472 bytes), 480 bytes stand behind it");
     says("'|O'", "(60,)", "Python objects");
     says("'<c16'", "(30,)", "complex numbers");
     says("'<U4'", "(30,)", "text");
@@ -250,7 +269,7 @@ fn arrays_that_are_refused() {
     says("'<f8'", "(3, x)", "no readable shape");
     says("'<f8'", "(-3, 4)", "no readable shape");
     says("'é'", "(3, 4)", "other elements");
-    says("'<f8'", "(0,)", "no rows");
+    assert!(refusal(npy("'<f8'", false, "(0,)", &[]), &numbered).contains("no rows"));
     assert!(refusal(b"\x93NUMPY\x01\x00\xff\xff{", &numbered).contains("header of the array"));
     assert!(refusal(b"\x93NUMPY\x09\x00\xff\xff{", &numbered).contains("version 9"));
     assert!(refusal(b"\x93NUMPY", &numbered).contains("cut off"));
@@ -287,6 +306,36 @@ fn archives_of_arrays() {
     for length in [4, 30, 100, whole.len() / 2, whole.len() - 1] {
         assert!(read(&whole[..length], &coordinates("x")).is_err(), "{length}");
     }
+}
+
+#[test]
+fn archives_that_promise_too_much_are_refused_unread() {
+    let zeros = |rows: usize| npy("'<f8'", false, &format!("({rows},)"), &vec![0; 8 * rows]);
+    let deflated = |arrays: &[(&str, Vec<u8>)]| {
+        let mut writer = zip::ZipWriter::new(std::io::Cursor::new(Vec::new()));
+        for (name, content) in arrays {
+            writer.start_file(*name, zip::write::SimpleFileOptions::default()).unwrap();
+            writer.write_all(content).unwrap();
+        }
+        writer.finish().unwrap().into_inner()
+    };
+    let rate = Columns { rate: Some(1.0), ..coordinates("q") };
+    // 70 MB of zeros in 70 kB.
+    let bomb = refusal(deflated(&[("q.npy", zeros(9_000_000)), ("r.npy", zeros(1))]), &rate);
+    assert!(bomb.contains("more than 100 times as many"), "{bomb}");
+    // Fewer are taken, and so is what is not used.
+    assert!(read(deflated(&[("q.npy", zeros(4_000)), ("r.npy", zeros(9_000_000))]), &rate).is_ok());
+    // A table whose columns follow each other, packed.
+    let columns: Vec<f64> = (0..60).map(|k| f64::from(k % 20) + f64::from(k / 20) * 100.0).collect();
+    let table = npy("'<f8'", true, "(20, 3)", &bytes(&columns, f64::to_le_bytes));
+    let numbered = Columns { time: Some("1".into()), ..coordinates("3,2") };
+    let reading = read(deflated(&[("a.npy", table)]), &numbered).unwrap();
+    assert_eq!(reading.recording.tracks[0].q[6..8], [203.0, 103.0]);
+    // One bit of the packed numbers.
+    let mut broken = deflated(&[("q.npy", npy("'<f8'", false, "(100,)", &bytes(&[1.5; 100], f64::to_le_bytes)))]);
+    let at = broken.len() / 3;
+    broken[at] ^= 4;
+    assert!(read(&broken, &Columns { rate: Some(1.0), ..coordinates("1") }).is_err());
 }
 
 #[test]

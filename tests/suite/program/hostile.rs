@@ -213,7 +213,11 @@ fn states_are_placed_by_row_and_column() {
     refused(&with("1;2;3;4"), &["row 4: expected 4 fields, found 1"]);
     refused(&with("1,2,3,\x1b[31m4"), &["row 4, column theta2_dot", "\\u{1b}[31m4"]);
     refused(&with("1,2,3,\0"), &["row 4, column theta2_dot", "\\0"]);
-    refused(b"theta1\ttheta2\ttheta1_dot\ttheta2_dot\n", &["row 1: fields are separated by '\\t', expected commas"]);
+    refused(
+        b"theta1\ttheta2\ttheta1_dot\ttheta2_dot\n1\t2\t3\n",
+        &["row 2: expected 4 fields separated by tabs, found 3"],
+    );
+    refused(b"1,2,3,4\n", &["row 1: expected a header with the columns theta1,theta2"]);
     refused(b"\xef\xbb\xbf\r\n\r\n", &["the file is empty, expected a header with the columns theta1,theta2"]);
     refused(&[HEADER.as_bytes(), b"\r\n \r\n"].concat(), &["no states below the header"]);
     // Any number of digits is one number, and quickly.
@@ -260,9 +264,9 @@ fn configurations_are_placed() {
     };
     placed("optimizer.batch", "batch = 128", "batch = -1", "-1");
     placed("optimizer.batch", "batch = 128", "batch = 1.5", "1.5");
-    placed("optimizer.batch", "batch = 128", "batch = \"128\"", "expected usize");
+    placed("optimizer.batch", "batch = 128", "batch = \"128\"", "expected a whole number of at least 0, found \"128\"");
     placed("seed", "seed = 0", "seed = -1", "-1");
-    placed("seed", "seed = 0", "seed = true", "boolean `true`");
+    placed("seed", "seed = 0", "seed = true", "expected a whole number of at least 0, found true");
     placed("optimizer.method", "method = \"soap\"", "method = \"radom\"", "did you mean \"radam\"?");
     placed("optimizer.bacth", "batch = 128", "bacth = 128", "did you mean \"batch\"?");
     placed("network.hiden", "hidden = ", "hiden = ", "did you mean \"hidden\"?");
@@ -441,7 +445,7 @@ fn names_that_are_not_text_are_one_line_too() {
     run.refused(1, &["no such file"]);
     assert!(!run.stderr.contains('\x1b'));
     let run = Run::of(command(&[]).arg(nowhere));
-    run.refused(2, &["unrecognized subcommand"]);
+    run.refused(2, &["unknown command"]);
     assert!(!run.stderr.contains('\x1b'));
     Run::of(command(&["train"]).arg(bytes(b"\xff"))).refused(2, &["UTF-8"]);
 }

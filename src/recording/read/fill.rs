@@ -1,0 +1,90 @@
+//! Arrays read row by row, however many files or entries their columns come from.
+
+use super::Problem;
+use super::builder::Builder;
+use super::npy::Element;
+use std::io::Read;
+
+/// Rows read at a time.
+const ROWS: usize = 1024;
+
+/// Elements that come row by row.
+pub struct Source<'a> {
+    /// Where they come from.
+    pub input: Box<dyn Read + 'a>,
+    /// Their type.
+    pub element: Element,
+    /// Elements of a row.
+    pub width: usize,
+    /// Used elements of a row: place in the row, place among the used columns.
+    pub wanted: Vec<(usize, usize)>,
+    /// Whether nothing may stand behind them.
+    pub whole: bool,
+    /// What a message calls it, with a space behind it, if it is one of several.
+    pub name: String,
+}
+
+/// Adds `rows` rows to the trajectories: the used columns in the order of the selection, the trajectory's column last.
+///
+/// Memory is that of the trajectories and of a thousand rows.
+pub fn fill<'b>(mut builder: Builder<'b>, rows: usize, sources: &mut [Source<'_>]) -> Result<Builder<'b>, Problem> {
+    let count = builder.selection().values.len();
+    let all = count + usize::from(builder.selection().trajectory.is_some());
+    builder.expect(rows);
+    let mut buffers = vec![Vec::new(); sources.len()];
+    let mut values = vec![0.0; all];
+    let mut done = 0;
+    while done < rows {
+        let now = ROWS.min(rows - done);
+        for (source, buffer) in sources.iter_mut().zip(&mut buffers) {
+            buffer.resize(now * source.width * source.element.size(), 0);
+            source.input.read_exact(buffer).map_err(|error| source.broken(error))?;
+        }
+        for k in 0..now {
+            let row = (done + k) as u64 + 1;
+            for (source, buffer) in sources.iter().zip(&buffers) {
+                let size = source.element.size();
+                for &(column, place) in &source.wanted {
+                    values[place] = source.element.decode(&buffer[(k * source.width + column) * size..][..size]);
+                }
+            }
+            if let Some(place) = values.iter().position(|x| !x.is_finite()) {
+                let selection = builder.selection();
+                let used = selection.values.get(place).or(selection.trajectory.as_ref());
+                let column = used.map(|used| used.name.clone()).unwrap_or_default();
+                return Err(Problem::Field { row, column, found: values[place].to_string() });
+            }
+            let label = values.get(count).map(ToString::to_string);
+            builder.push(row, &values[..count], label.as_deref())?;
+        }
+        done += now;
+    }
+    for source in sources {
+        source.end()?;
+    }
+    Ok(builder)
+}
+
+impl Source<'_> {
+    fn broken(&self, error: std::io::Error) -> Problem {
+        match error.kind() {
+            std::io::ErrorKind::UnexpectedEof => {
+                Problem::Array(format!("{}the numbers of the array are cut off", self.name))
+            }
+            std::io::ErrorKind::InvalidData | std::io::ErrorKind::InvalidInput => {
+                Problem::Array(format!("{}the archive is damaged: {error}", self.name))
+            }
+            _ => Problem::Io(error),
+        }
+    }
+
+    /// Reads beyond the last number, where an archive compares its checksum.
+    fn end(&mut self) -> Result<(), Problem> {
+        let more = self.input.read(&mut [0]).map_err(|error| self.broken(error))?;
+        if more > 0 && self.whole {
+            let problem = format!("{}more bytes stand behind the numbers than its header says", self.name);
+            return Err(Problem::Array(problem));
+        }
+        Ok(())
+    }
+}
