@@ -1,14 +1,15 @@
 //! Predictions of a real, filmed double pendulum: learned Lagrangians with and without friction, from smoothed
-//! accelerations and through the motion, beside what a user would try first: going on at constant velocity, and a plain
-//! network of the same size that learns the accelerations.
+//! accelerations and through the motion, beside what a user would try first: going on at constant velocity, a plain network of
+//! the same size that learns the accelerations, and the textbook's double pendulum with six constants fitted to the same film
+//! or to another one.
 //!
 //! And made motion of a double pendulum with 1 % of noise, where the truth is known.
 //!
 //! `cargo bench --bench measured -- --part films FILM.csv...` takes films as `examples/pendulum_video.rs` does, 400 frames a second;
 //! without files those of Asseman, Kornuta and Ozcan ("Learning beyond simulated physics", 2018) if they stand in
-//! `../shared/data/ibm-double-pendulum`. Every film is a recording of its own: the first four fifths are learned from, the
+//! `../shared/data/ibm-double-pendulum`; gravity pulls along the x axis of these pictures. Every film is a recording of its own: the first four fifths are learned from, the
 //! rest is predicted, 0.5 s at a time. `-- --part noise` is the made motion, `-- --part rows` reads and surveys ten million
-//! rows and says what that took; without `--part` all three. Writes `films.csv` and `noise.csv` into `target/measured`.
+//! rows and says what that took, `-- --part textbook` the films without what has to be trained; without `--part` all. Writes `films.csv` and `noise.csv` into `target/measured`.
 
 #[path = "measured/noise.rs"]
 mod noise;
@@ -16,6 +17,8 @@ mod noise;
 mod plain;
 #[path = "measured/rows.rs"]
 mod rows;
+#[path = "measured/textbook.rs"]
+mod textbook;
 #[allow(dead_code)]
 #[path = "../examples/pendulum_video.rs"]
 mod video;
@@ -32,16 +35,19 @@ use plain::Plain;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
+use textbook::Textbook;
 
 /// Frames per second.
 const RATE: f64 = 400.0;
 /// How far ahead the rest of a film is predicted, in s.
 const HORIZON: f64 = 0.5;
+/// Times ahead at which predictions are judged, in s.
+const AHEAD: [f64; 4] = [0.125, 0.25, 0.375, HORIZON];
 /// Threads.
 const THREADS: usize = 2;
 
 /// What can be measured.
-const PARTS: [&str; 3] = ["rows", "noise", "films"];
+const PARTS: &[&str] = &["rows", "noise", "films", "textbook"];
 
 /// How much work is done.
 #[derive(Clone, Copy)]
@@ -53,7 +59,12 @@ pub struct Scale {
 
 /// A film as angles.
 fn recording(path: &Path, text: &str) -> Result<Recording, String> {
-    let film = video::read(text).and_then(|frames| video::fit(&frames).ok_or("no frames".to_string()))?;
+    let frames = video::read(text)?;
+    let film = video::fit(&frames, video::Down::Right).ok_or("no frames".to_string())?;
+    match video::pull(&film.angles, video::Down::Right, RATE) {
+        Some([x, y]) if x > y.abs() => println!("gravity: {x:.1} per s^2 along x, {y:.1} along y"),
+        found => return Err(format!("gravity does not pull along x: {found:?}")),
+    }
     let times = (0..film.angles.len()).map(|k| k as f64 / RATE).collect();
     let (q, name) = (film.angles.concat(), path.display().to_string());
     let track = Track { name, times, q, v: vec![], a: vec![], force: vec![] };
@@ -68,6 +79,11 @@ fn made() -> Recording {
     let track = Track { name: "made".into(), times, q, v: vec![], a: vec![], force: vec![] };
     let coordinates = ["theta1", "theta2"].map(String::from).to_vec();
     Recording { coordinates, periodic: vec![true; 2], tracks: vec![track] }
+}
+
+/// A recording smoothed and divided as `lnn fit` does.
+fn measured(recording: &Recording) -> Measured {
+    Measured::new(recording, &Preparation::default()).expect("a recording long enough")
 }
 
 /// A predictor's errors at a few times, and how long it learned.
@@ -110,8 +126,9 @@ fn learned(measured: &Measured, friction: bool, targets: Targets, scale: Scale) 
     NetworkLagrangian::new(architecture, weights).expect("weights of this architecture").cast::<f64>()
 }
 
-fn lines(recording: &Recording, scale: Scale) -> Vec<Line> {
-    let measured = Measured::new(recording, &Preparation::default()).expect("a recording long enough");
+/// Predictions of the rest of a film by all that can be learned from its first part, and by the textbook's pendulum learned
+/// from another; without `scale` nothing is trained.
+fn lines(recording: &Recording, measured: &Measured, other: Option<&Measured>, scale: Option<Scale>) -> Vec<Line> {
     for (name, c) in recording.coordinates.iter().zip(&measured.smoothing.coordinates) {
         let (noise, relative) = (c.noise.sigma, 100.0 * c.quality.relative());
         println!("{name}: noise {noise:.2e} rad, windows of {:.3} s, accelerations good to {relative:.1} %", c.seconds);
@@ -126,14 +143,26 @@ fn lines(recording: &Recording, scale: Scale) -> Vec<Line> {
         let predictions = predict();
         let seconds = start.elapsed().as_secs_f64();
         let at = |t: f64| prediction_error(&windows, &predictions, &recording.periodic, t);
-        let errors: Vec<_> = [0.1, 0.25, HORIZON].map(at).to_vec();
-        let [a, b, c] = [0, 1, 2].map(|k| errors[k].median);
-        let missing = errors[2].missing;
-        println!("  {name:44} {a:.4}  {b:.4}  {c:.4} rad after 0.1, 0.25, 0.5 s; {missing} given up; {seconds:.0} s");
+        let errors: Vec<_> = AHEAD.map(at).to_vec();
+        let medians: Vec<String> = errors.iter().map(|e| format!("{:.4}", e.median)).collect();
+        let (medians, missing) = (medians.join("  "), errors[AHEAD.len() - 1].missing);
+        println!("  {name:48} {medians} rad after 0.125, 0.25, 0.375, 0.5 s; {missing} given up; {seconds:.0} s");
         lines.push(Line { name, errors, seconds });
     };
     println!("  {} windows of {HORIZON} s, median errors:", windows.len());
     add("constant velocity", &mut || predict_by_constant_velocity(&windows));
+    for (name, taught) in
+        [("textbook, six constants", Some(measured)), ("textbook, six constants of another film", other)]
+    {
+        let Some(taught) = taught else { continue };
+        add(name, &mut || {
+            let model = Textbook::fit(taught);
+            let [a, b, g1, g2, f1, f2] = model.0.into();
+            println!("  a {a:.4}, b {b:.4}, g1 {g1:.2}, g2 {g2:.2} per s^2, f1 {f1:.4}, f2 {f2:.4} per s");
+            predict_by_motion(&model as &dyn EulerLagrange<f64>, &windows, THREADS)
+        });
+    }
+    let Some(scale) = scale else { return lines };
     add("plain network on smoothed accelerations", &mut || {
         let data: Datasets<f32> = measured.datasets(Targets::Smoothed).expect("states with full windows");
         let config = measured.config("plain", &data);
@@ -147,7 +176,7 @@ fn lines(recording: &Recording, scale: Scale) -> Vec<Line> {
         ("Lagrangian, through the motion", false, Targets::Motion),
         ("Lagrangian and friction, through the motion", true, Targets::Motion),
     ] {
-        let mut predict = || predict_by_motion(&learned(&measured, friction, targets, scale), &windows, THREADS);
+        let mut predict = || predict_by_motion(&learned(measured, friction, targets, scale), &windows, THREADS);
         add(name, &mut predict);
     }
     lines
@@ -156,7 +185,8 @@ fn lines(recording: &Recording, scale: Scale) -> Vec<Line> {
 /// Everything once, on little motion.
 pub fn trial() {
     let scale = Scale { epochs: Some(2), hidden: [8; 3], shooting_epochs: 1 };
-    assert_eq!(lines(&made(), scale).len(), 6);
+    let measured = measured(&made());
+    assert_eq!(lines(&made(), &measured, Some(&measured), Some(scale)).len(), 8);
     assert_eq!(noise::compare(5, 0..1, scale).len(), 3);
     let place = tempfile::tempdir().expect("a folder");
     let found = rows::time(&place.path().join("rows.csv"), 2000);
@@ -165,7 +195,7 @@ pub fn trial() {
 
 fn main() {
     let mut arguments = std::env::args().skip(1);
-    let (mut parts, mut films) = (PARTS.map(String::from).to_vec(), Vec::new());
+    let (mut parts, mut films) = (PARTS.iter().map(ToString::to_string).collect::<Vec<_>>(), Vec::new());
     while let Some(argument) = arguments.next() {
         match argument.as_str() {
             "--bench" => {}
@@ -189,12 +219,14 @@ fn main() {
         std::fs::write(folder.join("noise.csv"), csv).expect("room for the results");
     }
     if parts.iter().any(|part| part == "films") {
-        std::fs::write(folder.join("films.csv"), filmed(films, scale)).expect("room for the results");
+        std::fs::write(folder.join("films.csv"), filmed(films, Some(scale))).expect("room for the results");
+    } else if parts.iter().any(|part| part == "textbook") {
+        std::fs::write(folder.join("textbook.csv"), filmed(films, None)).expect("room for the results");
     }
 }
 
 /// Compares the predictors on every film; the table as CSV.
-fn filmed(mut films: Vec<PathBuf>, scale: Scale) -> String {
+fn filmed(mut films: Vec<PathBuf>, scale: Option<Scale>) -> String {
     if films.is_empty() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/ibm-double-pendulum");
         films = (0..3).map(|k| folder.join(format!("{k}.csv"))).filter(|path| path.exists()).collect();
@@ -203,12 +235,19 @@ fn filmed(mut films: Vec<PathBuf>, scale: Scale) -> String {
         println!("no films: expected files of `x_red,y_red,x_green,y_green,x_blue,y_blue` as arguments");
     }
     let mut csv = "film,predictor,seconds,median,rms,nine_of_ten,windows,given_up,learning_seconds\n".to_string();
-    for film in &films {
-        let name = film.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
-        println!("{name}");
+    let read = |film: &PathBuf| {
         let text = std::fs::read_to_string(film).unwrap_or_else(|e| panic!("{}: {e}", film.display()));
         let recording = recording(film, &text).unwrap_or_else(|e| panic!("{}: {e}", film.display()));
-        for Line { name: predictor, errors, seconds } in lines(&recording, scale) {
+        let measured = measured(&recording);
+        (recording, measured)
+    };
+    let recordings: Vec<(Recording, Measured)> = films.iter().map(read).collect();
+    for (k, film) in films.iter().enumerate() {
+        let name = film.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+        println!("{name}");
+        let (recording, measured) = &recordings[k];
+        let other = Some(&recordings[(k + 1) % recordings.len()].1).filter(|_| recordings.len() > 1);
+        for Line { name: predictor, errors, seconds } in lines(recording, measured, other, scale) {
             for e in errors {
                 let PredictionError { seconds: ahead, rms, median, most, windows, missing } = e;
                 writeln!(csv, "{name},{predictor},{ahead},{median},{rms},{most},{windows},{missing},{seconds:.1}")

@@ -19,7 +19,7 @@ mod system_identification;
 #[path = "../../../examples/pendulum_video.rs"]
 mod pendulum_video;
 
-use pendulum_video::{convert, fit, read};
+use pendulum_video::{Down, convert, fit, pull, read};
 use std::f64::consts::TAU;
 
 #[test]
@@ -79,7 +79,7 @@ fn a_film_gives_arms_and_angles() {
     let arms = [602.0, 461.0];
     // A pivot that sways by eight pixels once a second.
     let frames = film(4000, arms, |t| [1200.0 + 8.0 * (TAU * t).sin(), 1220.0], motion);
-    let film = fit(&frames).unwrap();
+    let film = fit(&frames, Down::Bottom).unwrap();
     assert!(film.window > 1 && film.window < 40, "averaged over {} frames", film.window);
     // Rounding to a pixel has a variance of 1/12 in each direction: 1/12 to 1/6 along an arm, by the noise of its ends.
     for ((length, scatter), arm) in film.arms.iter().zip(arms) {
@@ -103,7 +103,7 @@ fn the_noise_of_a_pivot_at_rest_is_averaged_away() {
         let t = k as f64 / 400.0;
         (frame[0], frame[1]) = (frame[0] + noise(t, 0.1), frame[1] + noise(t, 0.7));
     }
-    let film = fit(&frames).unwrap();
+    let film = fit(&frames, Down::Bottom).unwrap();
     let (length, scatter) = film.arms[0];
     assert!(film.window > 8 && (length - 300.0).abs() < 0.1 && scatter < 0.4, "{length} +- {scatter}, {}", film.window);
 }
@@ -115,11 +115,71 @@ fn films_that_are_none_are_refused_by_row_and_column() {
     assert_eq!(refusal("1,2,3,4,5,nan"), "row 1, column 6: expected a finite number, found \"nan\"");
     assert_eq!(refusal("1,2,3,4,5,6\n\n1,2,3,4,5"), "row 3: expected 6 numbers, found 5");
     assert_eq!(refusal("1,2,3,4,5,6,7"), "row 1: expected 6 numbers, found 7");
-    assert!(fit(&[]).is_none());
+    assert!(fit(&[], Down::Bottom).is_none());
     let arguments = |list: &[&str]| list.iter().map(|a| a.to_string()).collect::<Vec<_>>();
-    for bad in [&["a"][..], &["a", "b", "--rate", "0"], &["a", "b", "--rate", "x"], &["a", "b", "--rat", "400"]] {
+    for bad in [
+        &["a"][..],
+        &["a", "b", "--rate", "400", "--down", "z"],
+        &["a", "b", "--rate", "0"],
+        &["a", "b", "--rate", "x"],
+        &["a", "b", "--rat", "400"],
+    ] {
         assert!(convert(&arguments(bad)).is_err(), "{bad:?}");
     }
+}
+
+/// Angles of a double pendulum of two equal arms and `g/l = 50` per s^2 at 400 Hz, from rest at 2 and 2.5 rad.
+fn pendulum() -> Vec<[f64; 2]> {
+    let slope = |[q1, q2, v1, v2]: [f64; 4]| {
+        let (sine, cosine) = (q1 - q2).sin_cos();
+        let (r1, r2) = (-0.5 * sine * v2 * v2 - 50.0 * q1.sin(), 0.5 * sine * v1 * v1 - 25.0 * q2.sin());
+        let determinant = 0.5 - (0.5 * cosine).powi(2);
+        [v1, v2, (0.5 * r1 - 0.5 * cosine * r2) / determinant, (r2 - 0.5 * cosine * r1) / determinant]
+    };
+    let add = |x: [f64; 4], h: f64, k: [f64; 4]| [0, 1, 2, 3].map(|i| x[i] + h * k[i]);
+    let (mut x, mut angles, h) = ([2.0, 2.5, 0.0, 0.0], Vec::new(), 1.0 / 1600.0);
+    for step in 0..8000 {
+        if step % 4 == 0 {
+            angles.push([x[0], x[1]]);
+        }
+        let k1 = slope(x);
+        let (k2, k3) = (slope(add(x, h / 2.0, k1)), slope(add(x, h / 2.0, slope(add(x, h / 2.0, k1)))));
+        let k4 = slope(add(x, h, k3));
+        x = [0, 1, 2, 3].map(|i| x[i] + h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]));
+    }
+    angles
+}
+
+#[test]
+fn the_motion_says_where_down_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_string();
+    let angles = pendulum();
+    for (name, axis) in [("x", [1.0, 0.0]), ("-x", [-1.0, 0.0]), ("y", [0.0, 1.0]), ("-y", [0.0, -1.0])] {
+        // A quarter turn counterclockwise for the eye, y pointing down the picture.
+        let turned =
+            |angle: f64, l: f64| [0, 1].map(|i| l * (angle.cos() * axis[i] + angle.sin() * [axis[1], -axis[0]][i]));
+        let line = |[first, second]: &[f64; 2]| {
+            let (elbow, end) = (turned(*first, 600.0), turned(*second, 400.0));
+            format!("0,0,{},{},{},{}\n", elbow[0], elbow[1], elbow[0] + end[0], elbow[1] + end[1])
+        };
+        std::fs::write(path("film.csv"), angles.iter().map(line).collect::<String>()).unwrap();
+        for down in ["x", "-x", "y", "-y"] {
+            let given =
+                [path("film.csv"), path("angles.csv"), "--rate".into(), "400".into(), "--down".into(), down.into()];
+            let said = convert(&given).map_err(|e| e.to_string());
+            if down == name {
+                assert!(said.as_ref().is_ok_and(|said| said.ends_with(&format!("down is {name}"))), "{said:?}");
+                let csv = std::fs::read_to_string(path("angles.csv")).unwrap();
+                let first: Vec<f64> = csv.lines().nth(1).unwrap().split(',').map(|x| x.parse().unwrap()).collect();
+                assert_eq!(first, [0.0, 2.0, 2.5]);
+            } else {
+                assert!(said.as_ref().is_err_and(|said| said.ends_with(&format!("give --down {name}"))), "{said:?}");
+            }
+        }
+    }
+    let [x, y] = pull(&angles, Down::Right, 400.0).unwrap();
+    assert!((x - 50.0).abs() < 1.0 && y.abs() < 0.5, "{x} {y}");
 }
 
 #[test]
@@ -151,12 +211,15 @@ fn the_arms_of_a_real_pendulum_are_rigid() {
             continue;
         };
         let frames = read(&text).unwrap();
-        let film = fit(&frames).unwrap();
+        let film = fit(&frames, Down::Bottom).unwrap();
         let [(l1, s1), (l2, s2)] = film.arms;
         println!("{name}: {} frames, window {}, {l1:.2} +- {s1:.2}, {l2:.2} +- {s2:.2}", frames.len(), film.window);
         assert!(s1 / l1 < 0.004 && s2 / l2 < 0.004 && (l1 / l2 - 1.307).abs() < 0.003);
         let steps = film.angles.windows(2).flat_map(|w| [(w[1][0] - w[0][0]).abs(), (w[1][1] - w[0][1]).abs()]);
         assert!(steps.fold(0.0, f64::max) < 0.5, "an angle jumps");
+        // Gravity pulls along the x axis of these pictures, and the angles say so from wherever they are counted.
+        let [x, y] = pull(&film.angles, Down::Bottom, 400.0).unwrap();
+        assert!((x - 69.3).abs() < 0.5 && (y - 0.1).abs() < 0.5, "{name}: {x} {y}");
     }
 }
 
