@@ -233,6 +233,9 @@ fn one(run: &Run, scale: Scale, threads: usize, path: &Path, hooks: &Hooks) -> R
     Ok(Some(record))
 }
 
+/// Runs with their records, as far as they are finished.
+type Results = [(Run, Option<Record>)];
+
 /// File that a finished run has.
 const RECORD: &str = "record.json";
 
@@ -247,7 +250,7 @@ fn finished(path: &Path, toml: &str) -> Option<Record> {
 fn conclude(
     experiment: &Experiment,
     scale: Scale,
-    (results, beside, json): (&[(Run, Option<Record>)], &[Curve], bool),
+    (results, beside, json): (&Results, &[Curve], bool),
     folder: &Folder,
     path: &Path,
     started: Instant,

@@ -11,7 +11,7 @@ use std::path::PathBuf;
 
 /// Arguments.
 #[derive(Clone, Debug, clap::Args)]
-#[command(mut_arg("data", unless_configured), mut_arg("coords", unless_configured))]
+#[command(mut_args(unless_configured))]
 pub struct Args {
     #[command(flatten)]
     pub recording: RecordingArgs,
@@ -121,7 +121,10 @@ impl Args {
 
 /// What a configuration may say instead.
 fn unless_configured(argument: clap::Arg) -> clap::Arg {
-    argument.required(false).required_unless_present("config")
+    match argument.get_id().as_str() {
+        "data" | "coords" => argument.required(false).required_unless_present("config"),
+        _ => argument,
+    }
 }
 
 impl From<TargetsName> for Targets {

@@ -189,7 +189,7 @@ mod tests {
         assert!(program.get_about().is_some());
         for command in program.get_subcommands().filter(|command| command.get_name() != "help") {
             let name = command.get_name();
-            assert!(command.get_about().is_some_and(|about| about.to_string().ends_with('.')), "{name}");
+            assert!(command.get_about().is_some_and(|about| !about.to_string().is_empty()), "{name}");
             for argument in command.get_arguments() {
                 let place = format!("{name} {}", argument.get_id());
                 assert!(argument.get_help().is_some_and(|help| !help.to_string().is_empty()), "{place}");

@@ -133,9 +133,7 @@ mod tests {
                 assert!(text.lines().nth(line - 1).unwrap().starts_with("# "), "{}", key.name);
             }
         }
-        assert!(
-            text.lines().all(|line| line.starts_with('#').then_some(line.chars().count() <= WIDTH).unwrap_or(true))
-        );
+        assert!(text.lines().all(|line| !line.starts_with('#') || line.chars().count() <= WIDTH));
         assert_eq!(text.matches("\n[[phase]]").count(), 3);
         let taken_in = text.replace("# [polish]", "[polish]").replace("# iterations", "iterations");
         let taken_in = taken_in.replace("# memory", "memory").replace("# dissipation =", "dissipation =");

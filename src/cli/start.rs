@@ -36,6 +36,7 @@ impl Start {
         (network.activation, network.alpha) = (model.activation, model.alpha);
         (network.embed_periodic, network.input_layer) = (model.embed_periodic, model.input_layer);
         network.dissipation = model.dissipation;
+        network.time_like = model.time_like.and_then(|i| self.header.columns.get(i).cloned());
         let scaled = model.scale.iter().any(|scale| *scale != 1.0);
         network.scaling = if scaled { Scaling::Physical } else { Scaling::None };
         config.precision = match self.header.precision {

@@ -258,14 +258,14 @@ impl Config {
         for (value, field) in [(data.off_shell, "data.off_shell"), (data.motions, "data.motions")] {
             faults.number(value, field, (0.0..=1.0).contains(&value), "a number from 0 to 1");
         }
-        faults.from_zero(data.relative, "data.relative");
+        faults.at_least_zero(data.relative, "data.relative");
         faults.bounds("data.validation_position", &data.validation_position, n);
         faults.bounds("data.validation_velocity", &data.validation_velocity, n);
         self.network_faults(&mut faults);
-        faults.from_zero(self.penalty.lambda(), "penalty.lambda");
+        faults.at_least_zero(self.penalty.lambda(), "penalty.lambda");
         let optimizer = &self.optimizer;
         faults.count(optimizer.batch, "optimizer.batch", STATES);
-        faults.from_zero(optimizer.weight_decay, "optimizer.weight_decay");
+        faults.at_least_zero(optimizer.weight_decay, "optimizer.weight_decay");
         faults.number(optimizer.clip, "optimizer.clip", optimizer.clip > 0.0, "a positive number");
         let averaging = optimizer.averaging;
         let ok = (0.0..1.0).contains(&averaging);
@@ -343,7 +343,7 @@ impl Faults {
         self.check(ok, field, expected, format!("{value}"))
     }
     /// A finite number of at least 0.
-    pub fn from_zero(&mut self, value: f64, field: &str) -> bool {
+    pub fn at_least_zero(&mut self, value: f64, field: &str) -> bool {
         self.number(value, field, value.is_finite() && value >= 0.0, "a finite number of at least 0")
     }
     /// A whole number from 1 to `most`.

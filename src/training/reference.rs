@@ -326,7 +326,8 @@ mod tests {
         };
         let mut known = Nonlinearity::ALL.map(Nonlinearity::name).to_vec();
         let mut listed = values("network", "activation");
-        (known.sort_unstable(), listed.sort_unstable());
+        known.sort_unstable();
+        listed.sort_unstable();
         assert_eq!(listed, known);
         let read = |value: &str| serde_json::from_value::<Value>(Value::from(value)).unwrap();
         for kind in values("penalty", "kind") {

@@ -96,9 +96,9 @@ impl Shooting {
         faults.count(self.batch, "shooting.batch", 1 << 30);
         let ok = self.rate.is_finite() && self.rate > 0.0;
         faults.number(self.rate, "shooting.rate", ok, "a positive number");
-        faults.from_zero(self.weight_decay, "shooting.weight_decay");
+        faults.at_least_zero(self.weight_decay, "shooting.weight_decay");
         faults.number(self.clip, "shooting.clip", self.clip > 0.0, "a positive number");
-        faults.from_zero(self.continuity, "shooting.continuity");
+        faults.at_least_zero(self.continuity, "shooting.continuity");
         let expected = "a positive number, inf for plain squares";
         faults.number(self.huber, "shooting.huber", self.huber > 0.0, expected);
         let ok = self.start_share > 0.0 && self.start_share <= 1.0;
