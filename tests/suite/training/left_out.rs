@@ -103,8 +103,8 @@ fn the_gradient_of_shooting_is_that_of_the_mean_over_the_segments_that_count() {
     let mut rng = ChaCha8Rng::seed_from_u64(5);
     let weights: Vec<f64> = initial_weights(&architecture, Initialization::Default, &mut rng);
     let mut starts = double.starts().to_vec();
-    // The first of three segments leaves every sensible range at once.
-    starts[0] = 1e9;
+    // The first of three segments is too fast for any sensible range.
+    starts[2] = 1e9;
     let (rows, parameters) = ([0, 1, 2, 4], Layout::new(&architecture).parameters);
     let (mut by_weights, mut by_starts) = (vec![0.0; parameters], vec![0.0; starts.len()]);
     let continuity = 0.5;
