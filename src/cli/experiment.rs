@@ -111,7 +111,8 @@ fn chosen_runs<'a>(
 /// Seeds of every run, no more than can be listed.
 fn seeds(text: &str) -> Result<usize, String> {
     const MOST: usize = 10_000;
-    count(text).ok().filter(|n| *n <= MOST).ok_or_else(|| format!("expected a whole number from 1 to {MOST}"))
+    let seeds = count(text)?;
+    if seeds <= MOST { Ok(seeds) } else { Err(format!("expected a whole number above 0, at most {MOST}")) }
 }
 
 /// `label=file`.
