@@ -5,12 +5,17 @@
 //!
 //! And made motion of a double pendulum with 1 % of noise, where the truth is known.
 //!
+//! And made motion of a cart-pendulum, where the masses are known that a fit can or cannot tell.
+//!
 //! `cargo bench --bench measured -- --part films FILM.csv...` takes films as `examples/pendulum_video.rs` does, 400 frames a second;
 //! without files those of Asseman, Kornuta and Ozcan ("Learning beyond simulated physics", 2018) if they stand in
 //! `../shared/data/ibm-double-pendulum`; gravity pulls along the x axis of these pictures. Every film is a recording of its own: the first four fifths are learned from, the
 //! rest is predicted, 0.5 s at a time. `-- --part noise` is the made motion, `-- --part rows` reads and surveys ten million
-//! rows and says what that took, `-- --part textbook` the films without what has to be trained; without `--part` all. Writes `films.csv` and `noise.csv` into `target/measured`.
+//! rows and says what that took, `-- --part textbook` the films without what has to be trained, `-- --part determination` the
+//! cart-pendulum, two minutes; without `--part` all. Writes `films.csv`, `noise.csv` and `determination.csv` into `target/measured`.
 
+#[path = "measured/determination.rs"]
+mod determination;
 #[path = "measured/noise.rs"]
 mod noise;
 #[path = "measured/plain.rs"]
@@ -47,7 +52,10 @@ const AHEAD: [f64; 4] = [0.125, 0.25, 0.375, HORIZON];
 const THREADS: usize = 2;
 
 /// What can be measured.
-const PARTS: &[&str] = &["rows", "noise", "films", "textbook"];
+const PARTS: &[&str] = &["rows", "noise", "films", "textbook", "determination"];
+
+/// Seeds of the cart-pendulums: those before them chose how many samples count as one.
+const SEEDS: std::ops::Range<u64> = 20..40;
 
 /// How much work is done.
 #[derive(Clone, Copy)]
@@ -188,6 +196,7 @@ pub fn trial() {
     let measured = measured(&made());
     assert_eq!(lines(&made(), &measured, Some(&measured), Some(scale)).len(), 8);
     assert_eq!(noise::compare(5, 0..1, scale).len(), 3);
+    assert_eq!(determination::compare(0..1, (4, 3.0), scale).len(), 12);
     let place = tempfile::tempdir().expect("a folder");
     let found = rows::time(&place.path().join("rows.csv"), 2000);
     assert_eq!((found.samples, found.cuts.len(), found.warnings.len()), (2000, 0, 0));
@@ -217,6 +226,12 @@ fn main() {
         let rows = noise::compare(50, 0..3, scale);
         let csv = format!("seed,learned_from,error,seconds\n{}\n", rows.join("\n"));
         std::fs::write(folder.join("noise.csv"), csv).expect("room for the results");
+    }
+    if parts.iter().any(|part| part == "determination") {
+        let small = Scale { epochs: Some(60), hidden: [48; 3], shooting_epochs: 0 };
+        let rows = determination::compare(SEEDS, (12, 8.0), small);
+        let csv = format!("forces,seed,quantity,learned,low,high,truth\n{}\n", rows.join("\n"));
+        std::fs::write(folder.join("determination.csv"), csv).expect("room for the results");
     }
     if parts.iter().any(|part| part == "films") {
         std::fs::write(folder.join("films.csv"), filmed(films, Some(scale))).expect("room for the results");

@@ -4,6 +4,8 @@ mod accelerations;
 mod affine;
 mod conserved;
 mod coordinates;
+mod determination;
+mod dissipation;
 mod energy;
 mod grid;
 mod instability;
@@ -18,13 +20,15 @@ pub use accelerations::acceleration_errors;
 pub use affine::{AffineFit, affine_fit, factor_fit};
 pub use conserved::conserved_error;
 pub use coordinates::{CoordinateError, angle_difference, coordinate_error, velocity_error};
+pub use determination::{Determination, Estimate, Observed, RANGE, determination, places};
+pub use dissipation::{EnergyLoss, energy_loss};
 pub use energy::{EnergyError, energy_drift, energy_error};
 pub use grid::{Axis, Grid, GridError, determinant_grid, lagrangian_grid};
 pub use instability::{savitzky_golay, stretches, training_instability};
 pub use lyapunov::{Lyapunov, lyapunov};
 pub use mass_matrix::{MassMatrixError, mass_matrix_error};
 pub use prediction::{
-    PredictionError, Predictions, Window, predict_by_constant_velocity, predict_by_motion, prediction_error,
+    PredictionError, Predictions, Window, follow, predict_by_constant_velocity, predict_by_motion, prediction_error,
 };
 pub use signature::wrong_signatures;
 pub use summary::{ErrorDistribution, Statistics, statistics};

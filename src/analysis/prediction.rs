@@ -7,7 +7,7 @@ use super::angle_difference;
 use super::summary::quantile;
 use crate::lagrangian::EulerLagrange;
 use crate::recording::{Track, hermite};
-use crate::rollout::{Options, rollout_many};
+use crate::rollout::{Options, RolloutError, rollout_many};
 use serde::{Deserialize, Serialize};
 
 /// A stretch of recorded motion to be predicted from the state at its start.
@@ -60,20 +60,37 @@ impl Window {
 /// Coordinates at the times of every window's samples, `(samples, n)`; not finite where a predictor gave up.
 pub type Predictions = Vec<Vec<f64>>;
 
+/// Steps that a motion may take before it is given up, beside [`STEPS_PER_SAMPLE`]: wild ones would take a million.
+const STEPS: usize = 1000;
+/// Steps per sample of the windows; one of a healthy motion covers several samples.
+const STEPS_PER_SAMPLE: f64 = 4.0;
+
 /// The motion of a model; `NaN` from where it ends before its time. The result does not depend on `threads`.
 pub fn predict_by_motion(model: &dyn EulerLagrange<f64>, windows: &[Window], threads: usize) -> Predictions {
+    follow(model, windows, threads).0
+}
+
+/// The motion of a model as by [`predict_by_motion`], and why it ended before its time, for every window.
+pub fn follow(
+    model: &dyn EulerLagrange<f64>,
+    windows: &[Window],
+    threads: usize,
+) -> (Predictions, Vec<Option<RolloutError>>) {
     let n = model.coordinates();
     let starts: Vec<_> = windows.iter().map(|window| (window.q.clone(), window.v.clone())).collect();
     let end = windows.iter().filter_map(|window| window.times.last()).fold(0.0_f64, |end, t| end.max(*t));
     let shortest = windows.iter().flat_map(|w| w.times.first().copied().into_iter().chain(steps(&w.times)));
     let step = shortest.fold(end, f64::min);
     // One rounding more, so that the last sample of every window lies inside.
-    let options = Options { energy: false, ..Options::new(end * (1.0 + 1e-12), step) };
+    let max_steps = STEPS + (STEPS_PER_SAMPLE * end / step) as usize;
+    let options = Options { energy: false, max_steps, ..Options::new(end * (1.0 + 1e-12), step) };
     let motions = rollout_many(model, &starts, &options, threads);
     let pairs = windows.iter().zip(motions);
     pairs
-        .map(|(window, motion)| along(&motion.trajectory.t, &motion.trajectory.q, &motion.trajectory.v, n, window))
-        .collect()
+        .map(|(window, motion)| {
+            (along(&motion.trajectory.t, &motion.trajectory.q, &motion.trajectory.v, n, window), motion.stop)
+        })
+        .unzip()
 }
 
 fn steps(times: &[f64]) -> impl Iterator<Item = f64> {

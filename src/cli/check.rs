@@ -40,6 +40,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
 /// A number as a reader likes it: four digits.
 fn short(x: f64) -> String {
     match x.abs() {
+        size if !size.is_finite() => "-".to_string(),
         0.0 => "0".to_string(),
         size if (1e-3..1e5).contains(&size) => {
             let decimals = (3.0 - size.log10().floor()).clamp(0.0, 6.0) as usize;
@@ -202,6 +203,10 @@ fn advice(text: &mut String, found: &Survey) -> std::fmt::Result {
     let worst = found.coordinates.iter().map(|c| c.acceleration_error_relative).fold(0.0, f64::max);
     let limit = percent(LARGE_ERROR);
     writeln!(text)?;
+    if !found.motionless.is_empty() {
+        let names = found.motionless.join(", ");
+        return writeln!(text, "advice: nothing can be learned while {names} stands still: leave it out of --coords");
+    }
     match found.targets {
         Targets::Measured => writeln!(
             text,

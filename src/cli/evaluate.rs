@@ -1,6 +1,7 @@
 //! `lnn evaluate`: a model against the system it learned.
 
-use crate::cli::evaluation::{Evaluation, Plan, RTOL, evaluate};
+use crate::cli::attention::Attention;
+use crate::cli::evaluation::{Evaluation, PIECES, Plan, RTOL, evaluate};
 use crate::cli::folder::Folder;
 use crate::cli::learned::{Learned, model_file};
 use crate::cli::learning::parameter_table;
@@ -106,6 +107,8 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         trained: learned.domain(),
         seed,
         threads: threads(args.threads),
+        // Ctrl-C ends the program at once: nothing is lost.
+        attention: &Attention::new(None, PIECES),
     };
     let evaluation = evaluate(&system, &learned.network, plan)?;
     let validation_loss = learned.header.validation_loss;

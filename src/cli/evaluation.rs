@@ -5,6 +5,7 @@ use crate::analysis::{
     acceleration_errors, conserved_error, determinant_grid, lagrangian_grid, mass_matrix_error, statistics,
     wrong_signatures,
 };
+use crate::cli::attention::Attention;
 use crate::cli::{CliError, memory};
 use crate::lagrangian::system::TrajectoryTest as Span;
 use crate::lagrangian::{Configured, EulerLagrange};
@@ -77,12 +78,17 @@ pub struct Plan<'a> {
     pub seed: u64,
     /// Threads.
     pub threads: usize,
+    /// Watches over it: [`PIECES`] pieces of work.
+    pub attention: &'a Attention,
 }
+
+/// Pieces of work of an evaluation: accelerations, motions, pictures, mass matrices.
+pub const PIECES: usize = 4;
 
 /// Compares a model with the system it learned.
 ///
 /// # Errors
-/// A data error if a picture cannot be drawn or the system cannot be built.
+/// A data error if a picture cannot be drawn or the system cannot be built, an interruption.
 pub fn evaluate(
     system: &Configured<f64>,
     learned: &dyn EulerLagrange<f64>,
@@ -90,9 +96,17 @@ pub fn evaluate(
 ) -> Result<Evaluation, CliError> {
     let n = system.coordinates;
     let exact = system.build().map_err(CliError::data)?;
+    let attention = plan.attention;
+    let (exact, learned) = (attention.watched(exact.as_ref()), attention.watched(learned));
+    let (exact, learned): (&dyn EulerLagrange<f64>, &dyn EulerLagrange<f64>) = (&exact, &learned);
+    let done = || {
+        attention.advance(1);
+        attention.check()
+    };
     let coordinates = (system.system.coordinates)(n);
     let periodic: Vec<bool> = coordinates.iter().map(|c| c.periodic).collect();
-    let accelerations = acceleration_errors(exact.as_ref(), learned, plan.states.0, plan.states.1);
+    let accelerations = acceleration_errors(exact, learned, plan.states.0, plan.states.1);
+    done()?;
 
     let Span { start, t_end, dt } = plan.span;
     // Exact and learned.
@@ -113,7 +127,8 @@ pub fn evaluate(
         threads: plan.threads,
         ..defaults
     };
-    let runs = test.run_constrained(system, exact.as_ref(), learned).map_err(CliError::data)?;
+    let runs = test.run_constrained(system, exact, learned).map_err(CliError::data)?;
+    done()?;
     let motion = |run: &TrajectoryRun<f64>| Motion {
         summary: run.summary(),
         conserved_error: conserved_error(system, &run.learned.trajectory).map(statistics),
@@ -121,11 +136,17 @@ pub fn evaluate(
     };
 
     let mut figures = evaluation_figures(&runs, system).map_err(CliError::data)?;
-    figures.extend(grids(system, exact.as_ref(), learned)?);
+    let grids = grids(system, exact, learned);
+    attention.check()?;
+    figures.extend(grids?);
+    done()?;
+    let wrong_signature = wrong_signatures(exact, learned, plan.states.0, plan.states.1);
+    let mass_matrix = mass_matrix_error(exact, learned, plan.states.0);
+    done()?;
     Ok(Evaluation {
         accelerations,
-        wrong_signature: wrong_signatures(exact.as_ref(), learned, plan.states.0, plan.states.1),
-        mass_matrix: mass_matrix_error(exact.as_ref(), learned, plan.states.0),
+        wrong_signature,
+        mass_matrix,
         trajectories: runs.iter().map(motion).collect(),
         coordinates: coordinates
             .iter()

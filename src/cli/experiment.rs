@@ -4,7 +4,7 @@ use crate::cli::folder::Folder;
 use crate::cli::learning::{Begin, CAPTIONS, Effort, Keeping, Learning, forget, learn};
 use crate::cli::number::{count, threads};
 use crate::cli::progress::Progress as Bar;
-use crate::cli::{CliError, interrupt, output};
+use crate::cli::{CliError, Kind, interrupt, output};
 use crate::experiments::{Experiment, Outcome, Picture, Record, Run, Scale, experiments, find};
 use crate::names::counted;
 use crate::recording::Columns;
@@ -211,7 +211,12 @@ fn one(run: &Run, scale: Scale, threads: usize, path: &Path, hooks: &Hooks) -> R
     let began = Instant::now();
     // A run that was stopped goes on from its checkpoint.
     let keeping = Keeping { every: Every::Seconds(60.0), start: Begin::Either };
-    let record = match learn(&folder, &run.config, &system, Effort { threads, starts, horizon }, hooks, keeping)? {
+    let effort = Effort { threads, starts, horizon };
+    let learned = match learn(&folder, &run.config, &system, effort, hooks, keeping) {
+        Err(error) if error.kind() == Kind::Interrupted => return Ok(None),
+        learned => learned?,
+    };
+    let record = match learned {
         _ if hooks.interrupt.load(Ordering::SeqCst) => return Ok(None),
         Learning::Finished(finished) => {
             if let Stop::Failed(error) = &finished.stop {

@@ -1,11 +1,13 @@
 //! `lnn fit`: learns from recorded motion, judges by motion that was held out, writes.
 
+use crate::cli::attention::Attention;
 use crate::cli::changes::PenaltyName;
+use crate::cli::determined::Determined;
 use crate::cli::fit_args::Args;
 use crate::cli::fit_config::{FitConfig, Recording, Settled};
 use crate::cli::fit_summary::Found;
 use crate::cli::folder::Folder;
-use crate::cli::judgement::{Plan, judge};
+use crate::cli::judgement::{Plan, WINDOWS, judge};
 use crate::cli::learning::history;
 use crate::cli::number::threads;
 use crate::cli::print_config::PrintFormat;
@@ -158,8 +160,11 @@ impl Job<'_> {
 
         let network = NetworkLagrangian::new(architecture, model.weights).map_err(CliError::data)?.cast::<f64>();
         let time = args.timelike.as_ref().and_then(|name| names.iter().position(|n| n == name));
-        let plan = Plan { part: &measured.test, horizon: args.horizon, time, threads };
+        let attention = Attention::new(Some(&stop), WINDOWS);
+        let plan = Plan { part: &measured.test, horizon: args.horizon, time, threads, attention: &attention };
         let judgement = judge(&network, &plan)?;
+        let determined = Determined::new(&network, measured, *targets)?;
+        determined.suggestion().iter().for_each(|text| output::note(text));
         let found = Found {
             name: args.name(),
             recording: &self.reading.recording,
@@ -170,6 +175,7 @@ impl Job<'_> {
             trained: &trained,
             shot: shot.as_ref(),
             judgement: &judgement,
+            determined: &determined,
             started: self.started,
         };
         found.write(folder, &toml, args.json)?;

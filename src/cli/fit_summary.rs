@@ -1,5 +1,6 @@
 //! What `lnn fit` found, in `summary.json`, in words and in the report.
 
+use crate::cli::determined::Determined;
 use crate::cli::folder::Folder;
 use crate::cli::judgement::Judgement;
 use crate::cli::learning::{ended, training_pictures, write_figures};
@@ -51,6 +52,8 @@ struct Summary<'a> {
     wall_seconds: f64,
     #[serde(flatten)]
     judgement: &'a Judgement,
+    #[serde(flatten)]
+    determined: &'a Determined,
 }
 
 /// Multiple shooting in `summary.json`; losses are mean squared residuals in units of noise.
@@ -84,6 +87,8 @@ pub struct Found<'a, S> {
     pub shot: Option<&'a Fitted<S>>,
     /// What the model is worth.
     pub judgement: &'a Judgement,
+    /// How well the data determine it.
+    pub determined: &'a Determined,
     /// When the command began.
     pub started: Instant,
 }
@@ -104,7 +109,7 @@ impl<'a, S: Scalar> Found<'a, S> {
             figures.extend(later);
         }
         let report = Report::new(&format!("{}: learned from recorded motion", self.name)).preformatted(&text);
-        let report = self.judgement.report(report).heading("Training");
+        let report = self.determined.report(self.judgement.report(report)).heading("Training");
         let report = figures.iter().fold(report, |report, figure| report.figure(&figure.png, &figure.caption));
         let report = report.heading("Configuration").preformatted(toml);
         write_figures(folder, figures.iter().chain(&self.judgement.figures))?;
@@ -144,6 +149,7 @@ impl<'a, S: Scalar> Found<'a, S> {
             training_seconds: trained.seconds + shot.map_or(0.0, |fitted| fitted.seconds),
             wall_seconds: self.started.elapsed().as_secs_f64(),
             judgement: self.judgement,
+            determined: self.determined,
         }
     }
 
@@ -216,6 +222,6 @@ impl Summary<'_> {
             );
         }
         let _ = writeln!(text, "{:.1} s of training, {:.1} s in all\n", self.training_seconds, self.wall_seconds);
-        text + &self.judgement.text()
+        text + &self.judgement.text() + &self.determined.text()
     }
 }

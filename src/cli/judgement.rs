@@ -1,9 +1,9 @@
 //! What a model of recorded motion is worth: predictions of motion that was held out, and where its energy goes.
 
-use crate::analysis::{
-    PredictionError, Predictions, Window, predict_by_constant_velocity, predict_by_motion, prediction_error,
-};
+use crate::analysis::{PredictionError, Predictions, Window, predict_by_constant_velocity, prediction_error};
 use crate::cli::CliError;
+use crate::cli::attention::Attention;
+use crate::cli::foretell::Foretold;
 use crate::lagrangian::{EulerLagrange, Request, Terms};
 use crate::report::{Figure, LinePlot, PlotError, Report, Series, line_png, text_table};
 use crate::rollout::Trajectory;
@@ -11,7 +11,7 @@ use crate::training::{Part, SignatureBuffers, has_signature};
 use serde::Serialize;
 
 /// Windows that are predicted at most; of more, evenly spaced ones.
-const WINDOWS: usize = 500;
+pub const WINDOWS: usize = 500;
 /// Samples ahead that are predicted unless told otherwise.
 const AHEAD: f64 = 200.0;
 /// Points of a curve of prediction errors.
@@ -28,6 +28,8 @@ pub struct Plan<'a> {
     pub time: Option<usize>,
     /// Threads.
     pub threads: usize,
+    /// Watches over it.
+    pub attention: &'a Attention,
 }
 
 /// Where the energy of held-out motion goes by the model; all in the unit of the learned `L`, which is J only where
@@ -49,6 +51,8 @@ pub struct Balance {
 pub struct Judgement {
     /// Errors of the model's motion, by time ahead.
     pub model: Vec<PredictionError>,
+    /// Which predictions were given up and why, in words; empty if none was.
+    pub given_up: String,
     /// Errors of going on at the velocity of the start.
     pub constant_velocity: Vec<PredictionError>,
     /// Fraction of the held-out states whose mass matrix has not the right signature.
@@ -63,7 +67,7 @@ pub struct Judgement {
 /// Predicts held-out motion.
 ///
 /// # Errors
-/// A data error if a picture cannot be drawn.
+/// A data error if a picture cannot be drawn, an interruption.
 pub fn judge(model: &dyn EulerLagrange<f64>, plan: &Plan<'_>) -> Result<Judgement, CliError> {
     let (n, recording) = (model.coordinates(), &plan.part.recording);
     if recording.tracks.is_empty() {
@@ -79,15 +83,18 @@ pub fn judge(model: &dyn EulerLagrange<f64>, plan: &Plan<'_>) -> Result<Judgemen
         .collect();
     let stride = windows.len().div_ceil(WINDOWS).max(1);
     windows = windows.into_iter().step_by(stride).collect();
-    let motion = predict_by_motion(model, &windows, plan.threads);
-    let straight = predict_by_constant_velocity(&windows);
+    let watched = plan.attention.watched(model);
+    let model: &dyn EulerLagrange<f64> = &watched;
+    let foretold = Foretold::new(model, windows, plan.threads, plan.attention)?;
+    let (windows, motion) = (&foretold.windows, &foretold.predictions);
+    let straight = predict_by_constant_velocity(windows);
     let errors = |predictions: &Predictions, count: usize| -> Vec<PredictionError> {
         let times = (1..=count).map(|k| horizon * k as f64 / count as f64);
-        times.map(|t| prediction_error(&windows, predictions, &recording.periodic, t)).collect()
+        times.map(|t| prediction_error(windows, predictions, &recording.periodic, t)).collect()
     };
     let mut figures = Vec::new();
     if !windows.is_empty() {
-        let curves = [("model", errors(&motion, POINTS)), ("constant velocity", errors(&straight, POINTS))];
+        let curves = [("model", errors(motion, POINTS)), ("constant velocity", errors(&straight, POINTS))];
         figures.extend(drawn(error_plot(&curves), "prediction_error.png", ERROR_CAPTION)?);
         for (i, name) in recording.coordinates.iter().enumerate() {
             let file = format!("prediction_{}.png", i + 1);
@@ -95,11 +102,14 @@ pub fn judge(model: &dyn EulerLagrange<f64>, plan: &Plan<'_>) -> Result<Judgemen
         }
     }
     let tabled = |predictions: &Predictions| if windows.is_empty() { Vec::new() } else { errors(predictions, 4) };
+    let (wrong_signature, energy) = (wrong_signature(model, plan.part, plan.time), balance(model, plan.part));
+    plan.attention.check()?;
     Ok(Judgement {
-        model: tabled(&motion),
+        model: tabled(motion),
         constant_velocity: tabled(&straight),
-        wrong_signature: wrong_signature(model, plan.part, plan.time),
-        energy: balance(model, plan.part),
+        given_up: foretold.remarks(),
+        wrong_signature,
+        energy,
         figures,
     })
 }
@@ -159,15 +169,22 @@ fn example(window: &Window, predicted: &[f64], n: usize, i: usize, name: &str) -
 /// States evaluated at once.
 const CHUNK: usize = 4096;
 
+/// States whose mass matrix is looked at, about; of more, evenly spaced ones.
+const STATES: usize = 20_000;
+
 /// Fraction of the states with full windows whose mass matrix has not the right signature, or is not finite.
 fn wrong_signature(model: &dyn EulerLagrange<f64>, part: &Part, time: Option<usize>) -> f64 {
     let n = model.coordinates();
     let (mut wrong, mut count) = (0, 0);
     let (mut terms, mut buffers) = (Terms::default(), SignatureBuffers::default());
+    let stride = part.recording.samples().div_ceil(STATES).max(1);
     for states in &part.states {
         let rows = states.interior();
-        let all = rows.start * n..rows.end * n;
-        for (q, v) in states.q[all.clone()].chunks(CHUNK * n).zip(states.v[all].chunks(CHUNK * n)) {
+        let some = |values: &[f64]| -> Vec<f64> {
+            values[rows.start * n..rows.end * n].chunks_exact(n).step_by(stride).flatten().copied().collect()
+        };
+        let (q, v) = (some(&states.q), some(&states.v));
+        for (q, v) in q.chunks(CHUNK * n).zip(v.chunks(CHUNK * n)) {
             // Failures of single states leave matrices that are not finite.
             let _ = model.terms(q, v, Request::MASS_MATRIX, &mut terms);
             count += q.len() / n;
@@ -224,7 +241,8 @@ impl Judgement {
         let pairs = self.model.iter().zip(&self.constant_velocity);
         pairs
             .map(|(model, straight)| {
-                let numbers = [model.median, model.most, model.rms, straight.median].map(|x| format!("{x:.4e}"));
+                let numbers = [model.median, model.most, model.rms, straight.median]
+                    .map(|x| if x.is_finite() { format!("{x:.4e}") } else { "-".to_string() });
                 let counts = [model.windows, model.missing].map(|count| count.to_string());
                 [vec![format!("{:.4}", model.seconds)], numbers.to_vec(), counts.to_vec()].concat()
             })
@@ -236,6 +254,7 @@ impl Judgement {
         Self {
             model: Vec::new(),
             constant_velocity: Vec::new(),
+            given_up: String::new(),
             wrong_signature: f64::NAN,
             energy: None,
             figures: Vec::new(),
@@ -252,12 +271,16 @@ impl Judgement {
         if self.is_of_nothing() {
             return "nothing was held out (--hold-out 0): nothing judges this model\n".to_string();
         }
-        let mut text = format!(
+        let mut text = self.given_up.clone();
+        text += &format!(
             "mass matrix of the wrong signature: {:.2} % of the held-out states\n",
             100.0 * self.wrong_signature
         );
         if let Some(Balance { kinetic, change, friction, defect }) = self.energy {
-            let share = |x: f64| format!("{:.1} %", 100.0 * x / kinetic.abs());
+            let share = |x: f64| match 100.0 * x / kinetic.abs() {
+                x if x.is_finite() => format!("{x:.1} %"),
+                _ => "not finite".to_string(),
+            };
             text += &format!(
                 "energy along held-out trajectories, over the mean kinetic energy: change {}, taken by friction {}, not accounted for {}\n",
                 share(change),

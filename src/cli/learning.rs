@@ -1,7 +1,8 @@
 //! One training from configuration to files: model, history, summary, pictures, report.
 
 use crate::analysis::{stretches, training_instability};
-use crate::cli::evaluation::{Evaluation, Plan, RTOL, evaluate};
+use crate::cli::attention::Attention;
+use crate::cli::evaluation::{Evaluation, PIECES, Plan, RTOL, evaluate};
 use crate::cli::folder::Folder;
 use crate::cli::learned::{all_parameters, given, trained_on};
 use crate::cli::systems::parameters;
@@ -225,6 +226,7 @@ fn learn_in<S: Scalar>(
         trained: domain,
         seed: config.seed,
         threads,
+        attention: &Attention::new(Some(&hooks.interrupt), PIECES),
     };
     let evaluation = evaluate(system, &network, plan)?;
     let finite = |x: f64| x.is_finite().then_some(x);

@@ -4,10 +4,12 @@
 //! arguments or configuration, 130 Ctrl-C. A failure is one line, `error: FILE: row 3, column theta1: ...`;
 //! of a configuration all mistakes are found, a line for each.
 
+mod attention;
 mod changes;
 mod check;
 mod config;
 mod config_file;
+mod determined;
 mod differences;
 mod error;
 mod evaluate;
@@ -18,6 +20,7 @@ mod fit_args;
 mod fit_config;
 mod fit_summary;
 mod folder;
+mod foretell;
 mod holder;
 mod input;
 mod inspect;

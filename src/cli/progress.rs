@@ -29,6 +29,11 @@ impl Progress {
         self.bar.set_position(done);
     }
 
+    /// A word about the work at hand.
+    pub fn say(&self, text: &str) {
+        self.bar.set_message(text.to_string());
+    }
+
     /// The last validation loss and the learning rate.
     pub fn show(&self, loss: f64, rate: f64) {
         self.bar.set_message(format!("loss {loss:.4e}  rate {rate:.2e}"));

@@ -5,7 +5,7 @@
 //! be fitted through its motion ([`shooting`](crate::training::shooting)).
 
 use crate::recording::smooth::{SmoothError, SmoothOptions, Smoothed, Smoothing};
-use crate::recording::survey::plan;
+use crate::recording::survey::{Stillness, plan, stillness};
 use crate::recording::{HeldOut, HoldOutError, Recording, Targets};
 use crate::scalar::Scalar;
 use crate::training::config::Config;
@@ -44,6 +44,14 @@ pub enum MeasuredError {
     /// No derivatives.
     #[error(transparent)]
     Smooth(#[from] SmoothError),
+    /// A coordinate that stands still.
+    #[error("{coordinate} {how}; leave it out of the coordinates, or record it moving")]
+    Motionless {
+        /// Its name.
+        coordinate: String,
+        /// How it does.
+        how: Stillness,
+    },
     /// Numbers that make no dataset.
     #[error("{which}: {source}")]
     Dataset {
@@ -129,7 +137,10 @@ impl Measured {
     /// [`MeasuredError`].
     pub fn new(recording: &Recording, preparation: &Preparation) -> Result<Self, MeasuredError> {
         let Preparation { smoothing: options, held_out: share, most_states, seed } = preparation;
-        let (_, smoothing) = plan(recording, options)?;
+        let (alone, smoothing) = plan(recording, options)?;
+        if let Some((i, how)) = (0..recording.n()).find_map(|i| Some((i, stillness(recording, i, &alone)?))) {
+            return Err(MeasuredError::Motionless { coordinate: recording.coordinates[i].clone(), how });
+        }
         let divide = |recording: &Recording, share: f64| {
             let held_out = HeldOut::choose(recording, share, smoothing.window(), *seed)?;
             let (rest, held) = held_out.divide(recording);

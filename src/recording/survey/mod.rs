@@ -2,11 +2,13 @@
 
 mod consistency;
 mod coordinate;
+mod motionless;
 mod suspicious;
 mod warnings;
 
 pub use consistency::Consistency;
 pub use coordinate::CoordinateSurvey;
+pub use motionless::{Stillness, stillness};
 pub use suspicious::{Kind, Suspicion};
 
 use crate::recording::smooth::{SmoothError, SmoothOptions, Smoothing};
@@ -91,6 +93,8 @@ pub struct Survey {
     pub held_out: Option<HeldOut>,
     /// The same in words.
     pub held_out_text: String,
+    /// Names of coordinates that stand still: nothing can be learned from them.
+    pub motionless: Vec<String>,
     /// What to know before learning.
     pub warnings: Vec<String>,
 }
@@ -158,9 +162,12 @@ pub fn survey(reading: &Reading, options: &SurveyOptions) -> Result<Survey, Smoo
         targets: Targets::advised(recording.has_accelerations(), planned.acceleration_error()),
         held_out_text: held_out.as_ref().map(|held| held.describe(recording)).unwrap_or_default(),
         held_out,
+        motionless: Vec::new(),
         warnings: Vec::new(),
     };
-    survey.warnings = warnings::warnings(&survey);
+    let still: Vec<_> = (0..n).filter_map(|i| Some((i, stillness(recording, i, &alone)?))).collect();
+    survey.motionless = still.iter().map(|(i, _)| recording.coordinates[*i].clone()).collect();
+    survey.warnings = warnings::warnings(&survey, &still);
     Ok(survey)
 }
 

@@ -113,14 +113,16 @@ fn classify(z: &[f64], k: usize) -> (Kind, usize, f64) {
     // Contrast `j` concerns samples `j..j + 7`; scaled by the norm of the seven weights of equal steps.
     let norm = PATTERNS[0].1.iter().map(|x| x * x).sum::<f64>().sqrt();
     let mut best = (0.0, Kind::Outlier, k + POINTS / 2, 0.0);
+    // Over the peak, so that no square overflows.
+    let peak = z[k].abs();
     for (kind, pattern) in PATTERNS {
         for first in (k + 2).saturating_sub(pattern.len())..=k {
             let Some(part) = z.get(first..first + pattern.len()) else { continue };
-            let product: f64 = part.iter().zip(pattern).map(|(x, p)| x * p).sum();
+            let product: f64 = part.iter().zip(pattern).map(|(x, p)| x / peak * p).sum();
             let square: f64 = pattern.iter().map(|p| p * p).sum();
             if product * product / square > best.0 {
                 // The first contrast of the pattern ends at the first sample that is off.
-                best = (product * product / square, kind, first + POINTS - 1, product / square * norm);
+                best = (product * product / square, kind, first + POINTS - 1, product / square * norm * peak);
             }
         }
     }
@@ -178,6 +180,8 @@ mod tests {
             assert!((by / size - 1.0).abs() < 0.1, "{by} {size}");
         };
         near(survey(|k, x| if k == 1234 { x + 0.05 } else { x }), 1235, Kind::Outlier, 0.05);
+        near(survey(|k, x| if k == 1234 { 1e155 } else { x }), 1235, Kind::Outlier, 1e155);
+        near(survey(|k, x| if k == 1234 { -1e300 } else { x }), 1235, Kind::Outlier, -1e300);
         near(survey(|k, x| if k >= 1234 { x - 0.1 } else { x }), 1235, Kind::Jump, -0.1);
         let frozen = survey(|k, x| if (500..540).contains(&k) { 0.25 } else { x });
         assert!(frozen.contains(&(501, Kind::Frozen, 40.0)), "{frozen:?}");

@@ -1,17 +1,17 @@
 //! What a reader should know before learning from the data.
 
 use super::suspicious::Kind;
-use super::{FEW_SAMPLES, Survey};
+use super::{FEW_SAMPLES, Stillness, Survey};
 use crate::names::counted;
 use std::f64::consts::TAU;
 
 /// One sentence each.
-pub fn warnings(survey: &Survey) -> Vec<String> {
+pub fn warnings(survey: &Survey, still: &[(usize, Stillness)]) -> Vec<String> {
     let mut all = Vec::new();
-    for c in &survey.coordinates {
+    for (i, c) in survey.coordinates.iter().enumerate() {
         let name = &c.name;
-        if c.min == c.max {
-            all.push(format!("{name} never moves: nothing can be learned about it"));
+        if let Some((_, how)) = still.iter().find(|(still, _)| *still == i) {
+            all.push(format!("{name} {how}; nothing can be learned about it"));
             continue;
         }
         if let Some((track, row)) = &c.first_ambiguous {

@@ -160,6 +160,21 @@ fn measured_accelerations_and_friction_are_learned() {
         let run = lnn(&[&["fit", &data, "--out", &place], &names[..], &more, friction].concat());
         let found = summary(&folder, &run, out);
         assert_eq!(found["targets"], "measured");
+        // A steady loss of energy asks for friction where there is none.
+        assert_eq!(run.stderr.contains("--friction learns it"), friction.is_empty(), "{}", run.stderr);
+        assert_eq!(found["energy_loss"].is_object(), friction.is_empty());
+        let ranges = found["determination"].as_array().unwrap();
+        assert_eq!(ranges.len(), if friction.is_empty() { 4 } else { 6 }, "{ranges:?}");
+        assert_eq!((&ranges[0]["name"], &found["unit"]), (&"mean M[upper,upper]".into(), &"mean mass of upper".into()));
+        for range in ranges {
+            let [low, learned, high] = ["low", "learned", "high"].map(|end| range[end].as_f64().unwrap());
+            assert!(low <= learned && learned <= high, "{range}");
+        }
+        assert!(
+            run.stdout.contains("mean M[upper,lower]") && run.stdout.contains("in 19 cases of 20"),
+            "{}",
+            run.stdout
+        );
         let energy = ["change", "friction", "defect"].map(|name| found["energy"][name].as_f64().unwrap());
         (energy, found["test_loss"].as_f64().unwrap())
     };

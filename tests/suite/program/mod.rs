@@ -11,5 +11,6 @@ mod inspect;
 mod motion;
 mod pipes;
 mod resume;
+mod still;
 mod train;
 mod words;
