@@ -265,6 +265,14 @@ fn fixed(system: &Configured<f64>, state: &[f64], axes: [Axis; 2], imposed: bool
     groups.iter().map(|(names, value)| format!("{} {value}", names.join(", "))).collect::<Vec<_>>().join("; ")
 }
 
+/// Stands where there is no finite number.
+const NONE: &str = "-";
+
+/// Five digits.
+fn digits(x: f64) -> String {
+    if x.is_finite() { format!("{x:.4e}") } else { NONE.to_string() }
+}
+
 /// A table of a report.
 struct Table {
     title: String,
@@ -275,7 +283,7 @@ struct Table {
 impl Evaluation {
     fn tables(&self) -> [Table; 3] {
         let accelerations = self.coordinates.iter().zip(&self.accelerations).map(|(name, e)| {
-            let numbers = [e.mean, e.rms, e.median, e.p99, e.max].map(|x| format!("{x:.4e}"));
+            let numbers = [e.mean, e.rms, e.median, e.p99, e.max].map(digits);
             [vec![name.clone()], numbers.to_vec(), vec![e.failed.to_string()]].concat()
         });
         let trajectories = self.trajectories.iter().enumerate().map(|(k, motion)| {
@@ -285,9 +293,9 @@ impl Evaluation {
             numbers.extend([t.energy_error.mean, t.energy_error.max]);
             numbers.extend(motion.conserved_error.map(|conserved| conserved.max));
             let mut row = vec![(k + 1).to_string(), format!("{:.1}", t.compared_until)];
-            row.extend(numbers.iter().map(|x| format!("{x:.3e}")));
+            row.extend(numbers.iter().map(|x| if x.is_finite() { format!("{x:.3e}") } else { NONE.to_string() }));
             let time = t.lyapunov_exponent.filter(|exponent| *exponent > 0.0).map(f64::recip);
-            row.push(time.map_or("-".to_string(), |time| format!("{time:.1}")));
+            row.push(time.map_or(NONE.to_string(), |time| format!("{time:.1}")));
             let exact = t.reference_stopped.as_ref().map(|stop| format!("exact motion: {stop}"));
             let remarks = [motion.left_training_range.clone(), t.stopped.clone(), exact];
             row.push(remarks.into_iter().flatten().collect::<Vec<_>>().join("; "));
@@ -295,7 +303,7 @@ impl Evaluation {
         });
         let t_end = self.trajectories.iter().fold(0.0, |m: f64, motion| m.max(motion.summary.compared_until));
         let MassMatrixError { factor, error: m } = &self.mass_matrix;
-        let matrix = [*factor, m.mean, m.median, m.p99, m.max].map(|x| format!("{x:.4e}"));
+        let matrix = [*factor, m.mean, m.median, m.p99, m.max].map(digits);
         let matrix = [matrix.to_vec(), vec![m.failed.to_string()]].concat();
         let header = |names: &[&str]| names.iter().map(ToString::to_string).collect();
         let until = format!("until [{}]", self.time_unit);
@@ -330,13 +338,31 @@ impl Evaluation {
     /// Tables for a terminal.
     pub fn text(&self) -> String {
         let tables = self.tables();
-        tables.iter().map(|t| format!("{}\n{}", t.title, text_table(&t.header, &t.rows))).collect::<Vec<_>>().join("\n")
+        let text = tables.iter().map(|t| format!("{}\n{}", t.title, text_table(&t.header, &t.rows)));
+        text.collect::<Vec<_>>().join("\n") + &self.note()
+    }
+
+    /// What a [`NONE`] means, if there is one.
+    fn note(&self) -> String {
+        let tables = self.tables();
+        let mut cells = tables.iter().flat_map(|table| table.rows.iter().flatten());
+        let none = cells.any(|cell| cell == NONE);
+        if none {
+            "\n-: no finite number; failed states and remarks say why, no Lyapunov time means no chaos\n"
+        } else {
+            ""
+        }
+        .to_string()
     }
 
     /// Tables and pictures for a report.
     pub fn report(&self, mut report: Report) -> Report {
         for Table { title, header, rows } in self.tables() {
             report = report.heading(&title).table(&header, &rows);
+        }
+        let note = self.note();
+        if !note.is_empty() {
+            report = report.paragraph(note.trim());
         }
         report = report.heading("Learned against exact");
         self.figures.iter().fold(report, |report, figure| report.figure(&figure.png, &figure.caption))

@@ -193,19 +193,25 @@ impl Summary<'_> {
         for c in &self.coordinates {
             let _ = writeln!(
                 text,
-                "{}: noise {:.3e}, smoothed over {:.3} s ({}), accelerations good to {:.1} %",
+                "{}: noise {:.3e}, smoothed over {:.3} s ({}), accelerations good to {}",
                 c.name,
                 c.noise,
                 c.window_seconds,
                 counted(c.window_samples, "sample", "samples"),
-                100.0 * c.acceleration_error_relative
+                match 100.0 * c.acceleration_error_relative {
+                    x if x.is_finite() => format!("{x:.1} %"),
+                    _ => "nothing: they are no larger than their errors".to_string(),
+                }
             );
         }
         let _ = writeln!(
             text,
             "loss (paper) against those accelerations: validation {:.6}{}; {}, {}, seed {}",
             self.validation_loss,
-            self.test_loss.map_or(String::new(), |loss| format!(", held out {loss:.6}")),
+            self.test_loss.map_or(String::new(), |loss| match loss {
+                x if x.is_finite() => format!(", held out {x:.6}"),
+                _ => ", held out not finite".to_string(),
+            }),
             counted(self.epochs, "epoch", "epochs"),
             counted(self.weights, "weight", "weights"),
             self.seed

@@ -366,10 +366,13 @@ pub(super) fn history(epochs: &[Epoch]) -> String {
 
 /// The figures of a run in one line.
 fn headline(summary: &Summary<'_>) -> String {
+    let fresh = match summary.test_loss {
+        loss if loss.is_finite() => format!("{loss:.6}"),
+        _ => format!("not finite ({} states left out)", summary.test_states_left_out),
+    };
     format!(
-        "loss (paper): validation {:.6}, fresh states {:.6}; {} in {:.1} s, {:.0} states/s, {}, seed {}\n",
+        "loss (paper): validation {:.6}, fresh states {fresh}; {} in {:.1} s, {:.0} states/s, {}, seed {}\n",
         summary.validation_loss,
-        summary.test_loss,
         counted(summary.epochs, "epoch", "epochs"),
         summary.training_seconds,
         summary.states_per_second,
