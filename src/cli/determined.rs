@@ -103,9 +103,16 @@ impl Determined {
 
     /// Adds the table to a report.
     pub fn report(&self, report: Report) -> Report {
-        let report = report.heading("What the data determine").paragraph(&self.about());
-        let report = report.table(&Self::HEADERS, &self.rows());
-        self.suggestion().map_or_else(|| report.clone(), |text| report.clone().paragraph(&text))
+        let report = report.heading("What the data determine");
+        let report = if self.determination.is_empty() {
+            report.paragraph(&self.text())
+        } else {
+            report.paragraph(&self.about()).table(&Self::HEADERS, &self.rows())
+        };
+        match self.suggestion() {
+            Some(text) => report.paragraph(&text),
+            None => report,
+        }
     }
 }
 
