@@ -6,7 +6,7 @@
 use lnn::lagrangian::{
     EulerLagrange, HandWritten, MechanicsError, Request, Terms, systems::double_pendulum::DoublePendulum,
 };
-use lnn::linalg::{Workspace, solve};
+use lnn::linalg::Workspace;
 use lnn::rollout::{Options, rollout};
 use lnn::training::Stream;
 use rand_distr::{Distribution, StandardNormal};
@@ -31,18 +31,15 @@ impl EulerLagrange<f64> for Damped {
     }
     fn terms(&self, q: &[f64], v: &[f64], what: Request, terms: &mut Terms<f64>) -> Result<(), MechanicsError> {
         self.ideal.terms(q, v, what, terms)?;
+        if what.includes(Request::FORCE) {
+            for v in v.chunks_exact(2) {
+                let (base, between) = (self.joints[0] * v[0], self.joints[1] * (v[1] - v[0]));
+                terms.force.extend([between - base, -between]);
+                terms.dissipation.push(base * v[0] + between * (v[1] - v[0]));
+            }
+        }
         // M a = dL/dq - c - dD/dv
-        let mut right: Vec<f64> = terms.dl_dq.iter().zip(&terms.coriolis).map(|(g, c)| g - c).collect();
-        for (right, v) in right.chunks_exact_mut(2).zip(v.chunks_exact(2)) {
-            let between = self.joints[1] * (v[1] - v[0]);
-            right[0] -= self.joints[0] * v[0] - between;
-            right[1] -= between;
-        }
-        if what.includes(Request::ACCELERATION) {
-            solve(2, &terms.mass_matrix, &right, &mut terms.acceleration, &mut Workspace::new())
-                .map_err(|_| MechanicsError::NotFinite { row: 0, what: "acceleration" })?;
-        }
-        Ok(())
+        terms.complete(2, v, what, &mut Workspace::new())
     }
 }
 

@@ -44,6 +44,7 @@ fn train(epochs: usize, states: usize, path: &Path) -> Result<(), String> {
         system: config.system.clone(),
         parameters: symbols.zip(system.parameters.iter().copied()).collect(),
         columns: system.system.columns(system.coordinates),
+        forces: Vec::new(),
         precision: match config.precision {
             Precision::F32 => StoredPrecision::F32,
             Precision::F64 => StoredPrecision::F64,

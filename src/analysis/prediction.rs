@@ -7,7 +7,7 @@ use super::angle_difference;
 use super::summary::quantile;
 use crate::lagrangian::EulerLagrange;
 use crate::recording::{Track, hermite};
-use crate::rollout::{Options, RolloutError, rollout_many};
+use crate::rollout::{Force, Options, RolloutError, SampledForce, Start, rollout_each};
 use serde::{Deserialize, Serialize};
 
 /// A stretch of recorded motion to be predicted from the state at its start.
@@ -21,6 +21,8 @@ pub struct Window {
     pub times: Vec<f64>,
     /// Measured coordinates at these times, `(samples, n)`.
     pub measured: Vec<f64>,
+    /// Known forces from outside from the start of the window to its end, if there were any.
+    pub force: Option<SampledForce<f64>>,
 }
 
 impl Window {
@@ -45,11 +47,16 @@ impl Window {
             if !whole || length < 2 {
                 break;
             }
+            let force = track.force.get(start * n..end * n).and_then(|values| {
+                let times = track.times[start..end].iter().map(|t| t - origin).collect();
+                SampledForce::new(n, times, values.to_vec()).ok()
+            });
             windows.push(Self {
                 q: state(q, start),
                 v: state(v, start),
                 times: track.times[start + 1..end].iter().map(|t| t - origin).collect(),
                 measured: track.q[(start + 1) * n..end * n].to_vec(),
+                force,
             });
             start = end - 1;
         }
@@ -65,7 +72,7 @@ const STEPS: usize = 1000;
 /// Steps per sample of the windows; one of a healthy motion covers several samples.
 const STEPS_PER_SAMPLE: f64 = 4.0;
 
-/// The motion of a model; `NaN` from where it ends before its time. The result does not depend on `threads`.
+/// The motion of a model under the known forces; `NaN` from where it ends before its time. The result does not depend on `threads`.
 pub fn predict_by_motion(model: &dyn EulerLagrange<f64>, windows: &[Window], threads: usize) -> Predictions {
     follow(model, windows, threads).0
 }
@@ -77,14 +84,16 @@ pub fn follow(
     threads: usize,
 ) -> (Predictions, Vec<Option<RolloutError>>) {
     let n = model.coordinates();
-    let starts: Vec<_> = windows.iter().map(|window| (window.q.clone(), window.v.clone())).collect();
+    let forces = windows.iter().map(|window| window.force.as_ref().map(|force| force as &dyn Force<f64>));
+    let starts: Vec<Start<'_, f64>> =
+        windows.iter().zip(forces).map(|(window, force)| Start { q: &window.q, v: &window.v, force }).collect();
     let end = windows.iter().filter_map(|window| window.times.last()).fold(0.0_f64, |end, t| end.max(*t));
     let shortest = windows.iter().flat_map(|w| w.times.first().copied().into_iter().chain(steps(&w.times)));
     let step = shortest.fold(end, f64::min);
     // One rounding more, so that the last sample of every window lies inside.
     let max_steps = STEPS + (STEPS_PER_SAMPLE * end / step) as usize;
     let options = Options { energy: false, max_steps, ..Options::new(end * (1.0 + 1e-12), step) };
-    let motions = rollout_many(model, &starts, &options, threads);
+    let motions = rollout_each(model, &starts, &options, threads);
     let pairs = windows.iter().zip(motions);
     pairs
         .map(|(window, motion)| {
@@ -225,7 +234,7 @@ mod tests {
 
     #[test]
     fn angles_count_modulo_a_turn() {
-        let window = Window { q: vec![0.0], v: vec![0.0], times: vec![1.0], measured: vec![7.0] };
+        let window = Window { q: vec![0.0], v: vec![0.0], times: vec![1.0], measured: vec![7.0], force: None };
         let error = |periodic| prediction_error(std::slice::from_ref(&window), &vec![vec![0.5]], &[periodic], 1.0).rms;
         assert!((error(true) - (6.5 - std::f64::consts::TAU)).abs() < 1e-12);
         assert_eq!(error(false), 6.5);

@@ -9,12 +9,13 @@ use crate::cli::fit_summary::Found;
 use crate::cli::folder::Folder;
 use crate::cli::judgement::{Plan, WINDOWS, judge};
 use crate::cli::learning::history;
+use crate::cli::losses::Judges;
 use crate::cli::number::threads;
 use crate::cli::print_config::PrintFormat;
 use crate::cli::start::{Start, weights};
 use crate::cli::train::hooks;
 use crate::cli::train_config::PrecisionName;
-use crate::cli::{CliError, interrupt, memory, output};
+use crate::cli::{CliError, forces, interrupt, memory, output};
 use crate::network::file::{FORMAT, Header, ModelFile, StoredPrecision};
 use crate::network::{Architecture, NetworkLagrangian};
 use crate::recording::smooth::SmoothOptions;
@@ -123,6 +124,7 @@ impl Job<'_> {
         let threads = threads(args.threads);
 
         let sitting = Sitting { keeper: None, start: weights.map(Snapshot::beginning_with) };
+        let judges = Judges { validation: data.validation.clone(), test: data.test.clone() };
         let mut trained =
             resume(&config, &architecture, penalty, data, threads, &hooks(&stop), sitting).map_err(CliError::data)?;
         let shooting = (*targets == Targets::Motion).then(|| shooting_of(self.settled));
@@ -142,6 +144,7 @@ impl Job<'_> {
             let fitted = shooting::fit(settings, task, threads, &hooks(&stop)).map_err(CliError::data)?;
             trained.weights.clone_from(&fitted.weights);
             trained.stop.clone_from(&fitted.stop);
+            judges.judge(&architecture, penalty, threads, &mut trained)?;
             shot = Some(fitted);
         }
 
@@ -161,7 +164,14 @@ impl Job<'_> {
         let network = NetworkLagrangian::new(architecture, model.weights).map_err(CliError::data)?.cast::<f64>();
         let time = args.timelike.as_ref().and_then(|name| names.iter().position(|n| n == name));
         let attention = Attention::new(Some(&stop), WINDOWS);
-        let plan = Plan { part: &measured.test, horizon: args.horizon, time, threads, attention: &attention };
+        let plan = Plan {
+            part: &measured.test,
+            horizon: args.horizon,
+            time,
+            forces: &args.recording.force,
+            threads,
+            attention: &attention,
+        };
         let judgement = judge(&network, &plan)?;
         let determined = Determined::new(&network, measured, *targets)?;
         determined.suggestion().iter().for_each(|text| output::note(text));
@@ -200,6 +210,7 @@ impl Job<'_> {
             system: config.system.clone(),
             parameters: Default::default(),
             columns: names.iter().cloned().chain(velocities).collect(),
+            forces: forces::recorded(&self.args.recording.force),
             precision: match self.args.precision() {
                 PrecisionName::F32 => StoredPrecision::F32,
                 PrecisionName::F64 => StoredPrecision::F64,

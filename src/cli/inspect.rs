@@ -1,14 +1,13 @@
 //! `lnn inspect`: the Euler-Lagrange terms of states, full digits.
 
+use crate::cli::inverse::inverse;
+use crate::cli::shown::{CHUNK, Field, Format, Shape, explain, report_failures, show};
 use crate::cli::source::{Source, parameter};
-use crate::cli::{CliError, States, input, json, output, parse_states, states};
-use crate::lagrangian::{MechanicsError, Request, Terms};
+use crate::cli::{CliError, States, input, output, parse_states, states};
+use crate::lagrangian::{Request, Terms};
 use crate::linalg::{Workspace, eigenvalues};
 use crate::scalar::{Dd, Scalar};
 use std::path::PathBuf;
-
-/// States evaluated together; bounds the memory whatever the length of the file.
-const CHUNK: usize = 256;
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
@@ -26,10 +25,16 @@ pub struct Args {
     /// energy of a roll-out, are left out.
     #[arg(long, value_name = "FILE.csv")]
     states: PathBuf,
+    /// The inverse question: the CSV also has the accelerations (COORDINATE_ddot), and the forces that make them are printed.
+    /// generalized_force is M a + c - g, all force beside that of L, friction included; friction is the model's own,
+    /// -dD/dv; external_force is the difference of the two, what has to be applied from outside. Other columns are left
+    /// aside.
+    #[arg(long)]
+    inverse: bool,
     /// Precision of everything, the reading of the states included.
     #[arg(long, value_enum, value_name = "TYPE", default_value = "f64")]
     precision: Precision,
-    /// What is printed.
+    /// One JSON object per line, or text; csv is for --inverse: the external forces, after the time if there is a column t.
     #[arg(long, value_enum, value_name = "FORMAT", default_value = "json")]
     format: Format,
     /// The same as --format json.
@@ -45,14 +50,6 @@ enum Precision {
     F64,
     /// Double-double, about 32 digits.
     Dd,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-enum Format {
-    /// One object per line.
-    Json,
-    /// Text.
-    Table,
 }
 
 /// Prints one object per state.
@@ -73,6 +70,12 @@ fn inspect<S: Scalar>(args: &Args) -> Result<(), CliError> {
         Some(path) => Source::<S>::model(path)?,
         None => Source::<S>::system(args.system.as_deref().unwrap_or_default(), &args.param)?,
     };
+    if args.inverse {
+        return inverse(&args.states, args.format, &source);
+    }
+    if args.format == Format::Csv {
+        return Err(CliError::usage("--format csv: expected --inverse beside it; use json or table"));
+    }
     let place = input::name(&args.states);
     let bytes =
         input::read(&args.states, states::MAX_BYTES).map_err(|e| CliError::data(format_args!("{place}: {e}")))?;
@@ -101,13 +104,7 @@ fn inspect<S: Scalar>(args: &Args) -> Result<(), CliError> {
         }
         output::print(&text)?;
     }
-    match failures.as_slice() {
-        [] => Ok(()),
-        [(row, problem)] => Err(CliError::data(format_args!("{place}: row {row}: {problem}"))),
-        [(row, problem), rest @ ..] => {
-            Err(CliError::data(format_args!("{place}: row {row}: {problem} (and {} more rows)", rest.len())))
-        }
-    }
+    report_failures(&place, &failures)
 }
 
 /// Eigenvalues of a batch of mass matrices, ascending; of one that is not finite, `NaN`.
@@ -116,30 +113,6 @@ fn spectrum<S: Scalar>(n: usize, matrices: &[S]) -> Vec<S> {
     // The matrix that fails has NaN eigenvalues already; the state itself is reported by its terms.
     let _ = eigenvalues(n, matrices, &mut values, &mut Workspace::new());
     values
-}
-
-/// The reason without the batch row, which means nothing to a reader of the file.
-fn explain(error: MechanicsError) -> String {
-    match error {
-        MechanicsError::Singular { condition, .. } => {
-            format!("the mass matrix is singular (condition number {condition:.3e})")
-        }
-        MechanicsError::NotFinite { what, .. } => format!("{what} is not finite"),
-        other => other.to_string(),
-    }
-}
-
-/// A named result: its numbers and the length of a row if it is a matrix.
-struct Field<'a, S> {
-    name: &'static str,
-    values: &'a [S],
-    shape: Shape,
-}
-
-enum Shape {
-    Number,
-    Vector,
-    Matrix,
 }
 
 /// Everything there is to say about state `k` of a batch.
@@ -161,33 +134,4 @@ fn fields<'a, S>(n: usize, k: usize, terms: &'a Terms<S>, spectrum: &'a [S]) -> 
         fields.extend([vector("force", &terms.force), number("dissipation", &terms.dissipation)]);
     }
     fields
-}
-
-/// One state as a line of JSON or a block of text; a failed acceleration is `null`.
-fn show<S: Scalar>(format: Format, row: usize, fields: &[Field<'_, S>], problem: Option<&str>) -> String {
-    let n = fields.iter().find(|f| matches!(f.shape, Shape::Vector)).map_or(1, |f| f.values.len());
-    let mut parts: Vec<(&str, String)> = fields
-        .iter()
-        .map(|field| {
-            let lost = field.values.is_empty() || (problem.is_some() && field.values.iter().any(|x| !x.is_finite()));
-            let text = match field.shape {
-                _ if lost => "null".to_string(),
-                Shape::Number => field.values.iter().map(|x| json::number(*x)).collect(),
-                Shape::Vector => json::vector(field.values),
-                Shape::Matrix => json::matrix(field.values, n),
-            };
-            (field.name, text)
-        })
-        .collect();
-    parts.extend(problem.map(|text| ("error", json::string(text))));
-    match format {
-        Format::Json => {
-            let parts: Vec<String> = parts.iter().map(|(name, text)| format!("\"{name}\":{text}")).collect();
-            format!("{{{}}}\n", parts.join(","))
-        }
-        Format::Table => {
-            let lines: String = parts.iter().map(|(name, text)| format!("  {name:<13}{text}\n")).collect();
-            format!("row {row}\n{lines}")
-        }
-    }
 }

@@ -1,12 +1,12 @@
 //! What a model of recorded motion is worth: predictions of motion that was held out, and where its energy goes.
 
 use crate::analysis::{PredictionError, Predictions, Window, predict_by_constant_velocity, prediction_error};
-use crate::cli::CliError;
 use crate::cli::attention::Attention;
+use crate::cli::energy::{Balance, balance};
 use crate::cli::foretell::Foretold;
+use crate::cli::{CliError, forces};
 use crate::lagrangian::{EulerLagrange, Request, Terms};
 use crate::report::{Figure, LinePlot, PlotError, Report, Series, line_png, text_table};
-use crate::rollout::Trajectory;
 use crate::training::{Part, SignatureBuffers, has_signature};
 use serde::Serialize;
 
@@ -26,24 +26,12 @@ pub struct Plan<'a> {
     pub horizon: Option<f64>,
     /// The time-like coordinate, if there is one.
     pub time: Option<usize>,
+    /// Names of the known forces, if there are any.
+    pub forces: &'a [String],
     /// Threads.
     pub threads: usize,
     /// Watches over it.
     pub attention: &'a Attention,
-}
-
-/// Where the energy of held-out motion goes by the model; all in the unit of the learned `L`, which is J only where
-/// forces were given.
-#[derive(Clone, Copy, Debug, Default, Serialize)]
-pub struct Balance {
-    /// Mean over the samples of `p.v/2`, the kinetic energy of a mechanical system.
-    pub kinetic: f64,
-    /// Energy at the end of a trajectory less that at its start, mean over the trajectories.
-    pub change: f64,
-    /// Energy taken by friction, mean over the trajectories.
-    pub friction: f64,
-    /// Root mean square over the trajectories of what is not accounted for; external work is not counted.
-    pub defect: f64,
 }
 
 /// Numbers and pictures.
@@ -100,6 +88,10 @@ pub fn judge(model: &dyn EulerLagrange<f64>, plan: &Plan<'_>) -> Result<Judgemen
             let file = format!("prediction_{}.png", i + 1);
             figures.extend(drawn(example(&windows[0], &motion[0], n, i, name), &file, EXAMPLE_CAPTION)?);
         }
+        if let Some(force) = &windows[0].force {
+            let times: Vec<f64> = [0.0].iter().chain(&windows[0].times).copied().collect();
+            figures.extend(drawn(forces::plot(force, &times, plan.forces), "prediction_forces.png", FORCE_CAPTION)?);
+        }
     }
     let tabled = |predictions: &Predictions| if windows.is_empty() { Vec::new() } else { errors(predictions, 4) };
     let (wrong_signature, energy) = (wrong_signature(model, plan.part, plan.time), balance(model, plan.part));
@@ -116,7 +108,9 @@ pub fn judge(model: &dyn EulerLagrange<f64>, plan: &Plan<'_>) -> Result<Judgemen
 
 const ERROR_CAPTION: &str = "Median over held-out windows of the error of predicted coordinates (root mean square over the coordinates) against the time since \
                              the state that the prediction starts from.";
-const EXAMPLE_CAPTION: &str = "The first held-out window: measured, and predicted from the state at its start.";
+const EXAMPLE_CAPTION: &str = "The first held-out window: measured, and predicted from the state at its start under the known forces, if there are any.";
+const FORCE_CAPTION: &str =
+    "Known forces in the first held-out window; the prediction takes them as linear between the samples.";
 
 /// A quarter of the shortest trajectory, at most [`AHEAD`] samples.
 fn horizon(part: &Part) -> f64 {
@@ -196,36 +190,6 @@ fn wrong_signature(model: &dyn EulerLagrange<f64>, part: &Part, time: Option<usi
     wrong as f64 / f64::max(1.0, count as f64)
 }
 
-/// Energy along the held-out trajectories, at the estimated states.
-fn balance(model: &dyn EulerLagrange<f64>, part: &Part) -> Option<Balance> {
-    let n = model.coordinates();
-    let mut sums = Balance::default();
-    let (mut tracks, mut samples) = (0.0, 0.0);
-    let mut terms = Terms::default();
-    for states in &part.states {
-        let rows = states.interior();
-        let of = |values: &[f64]| values[rows.start * n..rows.end * n].to_vec();
-        let (q, v) = (of(&states.q), of(&states.v));
-        let trajectory = Trajectory { coordinates: n, t: states.times[rows.clone()].to_vec(), q, v, energy: None };
-        let Ok(balance) = trajectory.energy_balance(model) else { continue };
-        tracks += 1.0;
-        sums.change += balance.change;
-        sums.friction += balance.dissipated;
-        sums.defect += balance.defect().powi(2);
-        for (q, v) in trajectory.q.chunks(CHUNK * n).zip(trajectory.v.chunks(CHUNK * n)) {
-            let _ = model.terms(q, v, Request::MOMENTUM, &mut terms);
-            sums.kinetic += 0.5 * terms.momentum.iter().zip(v).map(|(p, v)| p * v).sum::<f64>();
-            samples += (q.len() / n) as f64;
-        }
-    }
-    (tracks > 0.0).then(|| Balance {
-        kinetic: sums.kinetic / samples,
-        change: sums.change / tracks,
-        friction: sums.friction / tracks,
-        defect: (sums.defect / tracks).sqrt(),
-    })
-}
-
 impl Judgement {
     const HEADERS: [&'static str; 7] = [
         "time ahead (s)",
@@ -276,17 +240,8 @@ impl Judgement {
             "mass matrix of the wrong signature: {:.2} % of the held-out states\n",
             100.0 * self.wrong_signature
         );
-        if let Some(Balance { kinetic, change, friction, defect }) = self.energy {
-            let share = |x: f64| match 100.0 * x / kinetic.abs() {
-                x if x.is_finite() => format!("{x:.1} %"),
-                _ => "not finite".to_string(),
-            };
-            text += &format!(
-                "energy along held-out trajectories, over the mean kinetic energy: change {}, taken by friction {}, not accounted for {}\n",
-                share(change),
-                share(friction),
-                share(defect)
-            );
+        if let Some(balance) = &self.energy {
+            text += &balance.text();
         }
         text
     }

@@ -327,6 +327,7 @@ fn header(
         system: config.system.clone(),
         parameters,
         columns: system.system.columns(system.coordinates),
+        forces: Vec::new(),
         precision: match config.precision {
             Precision::F32 => StoredPrecision::F32,
             Precision::F64 => StoredPrecision::F64,

@@ -160,8 +160,10 @@ pub struct Facts<'a> {
     pub evaluations: usize,
     /// Iterations of an implicit method.
     pub iterations: Option<usize>,
-    /// Energy at the end less that at the start, for a model with friction.
+    /// Energy at the end less that at the start, for a model with friction or under forces.
     pub energy_change: Option<f64>,
+    /// Work of the known forces.
+    pub work: Option<f64>,
     /// Energy taken by friction.
     pub dissipated: Option<f64>,
     /// What is not accounted for.
@@ -227,9 +229,10 @@ impl Facts<'_> {
         let unit = self.time_unit.map_or(String::new(), |unit| format!(" {unit}"));
         let iterations =
             self.iterations.map_or(String::new(), |count| format!(" in {}", counted(count, "iteration", "iterations")));
+        let work = self.work.map_or(String::new(), |work| format!("forces gave {work:.9e}, "));
         let balance = match (self.energy_change, self.dissipated, self.energy_defect) {
             (Some(change), Some(dissipated), Some(defect)) => format!(
-                "energy changed by {change:.9e}, friction took {dissipated:.9e}, not accounted for {defect:.1e}\n"
+                "energy changed by {change:.9e}, {work}friction took {dissipated:.9e}, not accounted for {defect:.1e}\n"
             ),
             _ => String::new(),
         };

@@ -51,7 +51,7 @@ fn option(problem: &str) -> &'static str {
 }
 
 /// `column=unit`.
-pub(super) fn unit(text: &str) -> Result<(String, String), String> {
+pub fn unit(text: &str) -> Result<(String, String), String> {
     match text.split_once('=') {
         Some((column, unit)) if !column.trim().is_empty() && !unit.trim().is_empty() => {
             Ok((column.trim().to_string(), unit.trim().to_string()))

@@ -1,12 +1,13 @@
 //! `lnn rollout`: the motion of a model from one state.
 
+use crate::cli::forces::ForceArgs;
 use crate::cli::learned::Learned;
 use crate::cli::motion::{Facts, Target, Watch, picture_file, place};
 use crate::cli::number::{finite, positive, tolerance};
 use crate::cli::{CliError, input, interrupt, output};
 use crate::lagrangian::{EulerLagrange, find};
 use crate::names::counted;
-use crate::rollout::{Balances, Method, Options, RolloutError, Trajectory, rollout_in_pieces};
+use crate::rollout::{Balances, Driven, Method, Options, RolloutError, Trajectory, rollout_in_pieces};
 use crate::storage::check_target;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
@@ -20,13 +21,18 @@ pub struct Args {
     /// Start: coordinates, then velocities, separated by commas; taken as it is, on a mass shell or off it.
     #[arg(long, value_name = "q1,..,v1,..", required = true, value_delimiter = ',', allow_hyphen_values = true, value_parser = finite)]
     state: Vec<f64>,
-    /// Time of the last sample, in seconds (relativistic systems: proper time in metres); the motion starts at 0, negative
-    /// times run backwards.
+    /// Time of the last sample, in seconds (relativistic systems: proper time in metres); a time before the start runs
+    /// backwards.
     #[arg(long, value_name = "T", allow_hyphen_values = true, value_parser = finite)]
     t_end: f64,
+    /// Time of the start, in the same unit; it matters to recorded forces alone.
+    #[arg(long, value_name = "T", default_value = "0", allow_hyphen_values = true, value_parser = finite)]
+    t_start: f64,
     /// Time between samples, in the same unit.
     #[arg(long, value_name = "DT", allow_hyphen_values = true, value_parser = positive)]
     dt: f64,
+    #[command(flatten)]
+    forces: ForceArgs,
     /// Integrator: two with error control, four symplectic ones of fixed step for long times; variational refuses models
     /// with friction.
     #[arg(long, value_enum, value_name = "NAME", default_value = "dopri5")]
@@ -108,6 +114,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         return Err(CliError::usage("--step: dopri5 and dop853 choose their own steps; see --rtol"));
     }
     let options = Options {
+        t0: args.t_start,
         method,
         rtol: args.rtol,
         atol: args.atol,
@@ -122,12 +129,18 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     if let Some(plot) = &args.plot {
         check_target(plot).map_err(|e| CliError::file(plot, format_args!("cannot write: {e}")))?;
     }
+    let force = args.forces.force(&learned.header, args.t_start, args.t_end)?;
     let mut target = Target::create(&args.out, standard)?;
     let header = Trajectory { energy: Some(vec![]), ..Trajectory::<f64>::empty(q.len()) };
     target.append(&header.csv_header(columns).map_err(CliError::data)?)?;
     let network = &learned.network;
-    let mut balances =
-        (!network.conserves_energy()).then(|| Balances::new(q.len(), |t: &Trajectory<f64>| t.energy_balance(network)));
+    let driven = force.as_ref().map(|force| Driven::new(network, force));
+    let mut balances = (driven.is_some() || !network.conserves_energy()).then(|| {
+        Balances::new(q.len(), |t: &Trajectory<f64>| match &driven {
+            Some(driven) => driven.energy_balance(t),
+            None => t.energy_balance(network),
+        })
+    });
     let mut watch = Watch::new(learned.domain(), columns);
     let (stop, mut failed) = (interrupt::flag()?, None);
     let mut take = |piece: &Trajectory<f64>| {
@@ -141,7 +154,10 @@ pub fn run(args: &Args) -> Result<(), CliError> {
             ControlFlow::Continue(())
         }
     };
-    let result = rollout_in_pieces(network, q, v, &options, &mut take);
+    let result = match &driven {
+        Some(driven) => driven.rollout_in_pieces(q, v, &options, &mut take),
+        None => rollout_in_pieces(network, q, v, &options, &mut take),
+    };
     if let Some(error) = failed {
         return Err(error);
     }
@@ -176,6 +192,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         evaluations: statistics.evaluations,
         iterations: method.is_structure_preserving().then_some(statistics.iterations),
         energy_change: balance.map(|balance| balance.change),
+        work: balance.filter(|_| driven.is_some()).map(|balance| balance.work),
         dissipated: balance.map(|balance| balance.dissipated),
         energy_defect: balance.map(|balance| balance.defect()),
         left_training_range: watch.leaving.as_ref(),

@@ -1,7 +1,7 @@
 //! Where Euler-Lagrange terms come from: a hand-written system or a trained model.
 
-use crate::cli::CliError;
 use crate::cli::learned::Learned;
+use crate::cli::{CliError, forces};
 use crate::lagrangian::{EulerLagrange, configure};
 use crate::scalar::Scalar;
 use std::path::Path;
@@ -12,6 +12,8 @@ pub struct Source<S> {
     pub model: Box<dyn EulerLagrange<S>>,
     /// Coordinates, then velocities.
     pub columns: Vec<String>,
+    /// Names of the external forces, one per coordinate.
+    pub forces: Vec<String>,
 }
 
 impl<S: Scalar> Source<S> {
@@ -22,7 +24,9 @@ impl<S: Scalar> Source<S> {
     pub fn system(name: &str, given: &[(String, String)]) -> Result<Self, CliError> {
         let configured = configure::<S>(name, given).map_err(CliError::usage)?;
         let model = configured.build().map_err(CliError::usage)?;
-        Ok(Self { model, columns: configured.system.columns(configured.coordinates) })
+        let columns = configured.system.columns(configured.coordinates);
+        let forces = columns[..configured.coordinates].iter().map(|name| forces::usual(name)).collect();
+        Ok(Self { model, columns, forces })
     }
 
     /// A trained model; its weights are converted to the precision of `S`.
@@ -31,7 +35,8 @@ impl<S: Scalar> Source<S> {
     /// A data error for a file that is not a whole model file.
     pub fn model(path: &Path) -> Result<Self, CliError> {
         let Learned { header, network } = Learned::load(path)?;
-        Ok(Self { model: Box::new(network), columns: header.columns })
+        let forces = forces::names(&header);
+        Ok(Self { model: Box::new(network), columns: header.columns, forces })
     }
 }
 

@@ -99,6 +99,36 @@ pub enum StatesError {
 /// # Errors
 /// [`StatesError`] naming the first offending row and column.
 pub fn parse_states<S: Scalar>(bytes: &[u8], columns: &[String]) -> Result<States<S>, StatesError> {
+    let Table { values, rows } = parse_table::<S>(bytes, columns)?;
+    let n = columns.len() / 2;
+    let (mut q, mut v) = (Vec::with_capacity(values.len() / 2), Vec::with_capacity(values.len() / 2));
+    for state in values.chunks_exact(columns.len()) {
+        q.extend_from_slice(&state[..n]);
+        v.extend_from_slice(&state[n..]);
+    }
+    Ok(States { q, v, rows })
+}
+
+/// Columns of a file, in the order they were asked for.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Table<S> {
+    /// Numbers, `(rows, columns)`.
+    pub values: Vec<S>,
+    /// Line of the file, from 1, that each row stands on.
+    pub rows: Vec<usize>,
+}
+
+/// Text of columns: their names, how fields are separated, and the lines of numbers.
+struct Columns<'a> {
+    /// Row of the names.
+    row: usize,
+    names: Vec<String>,
+    separator: Separator,
+    lines: Box<dyn Iterator<Item = (usize, &'a str)> + 'a>,
+}
+
+/// Finds the names of the columns; `asked` are those that an error tells of.
+fn opened<'a>(bytes: &'a [u8], asked: &str) -> Result<Columns<'a>, StatesError> {
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let text = std::str::from_utf8(bytes).map_err(|e| {
         let row = 1 + bytes[..e.valid_up_to()].iter().filter(|b| **b == b'\n').count();
@@ -106,25 +136,40 @@ pub fn parse_states<S: Scalar>(bytes: &[u8], columns: &[String]) -> Result<State
     })?;
     let rows = || text.lines().enumerate().map(|(k, line)| (k + 1, line)).filter(|(_, line)| !line.trim().is_empty());
     let remark = |line: &str| comment(line.trim().as_bytes()).is_some();
-    let mut lines = rows().filter(|(_, line)| !remark(line)).peekable();
+    let mut lines = rows().filter(move |(_, line)| !remark(line)).peekable();
     let above = rows().take_while(|(_, line)| remark(line)).last();
-    let &(first, header) = lines.peek().ok_or_else(|| StatesError::Empty(columns.join(",")))?;
+    let &(first, header) = lines.peek().ok_or_else(|| StatesError::Empty(asked.to_string()))?;
     let separator = Separator::of(header);
-    let names = split(header, separator);
-    let order = if names.iter().any(|name| name.parse::<f64>().is_err()) {
+    let names: Vec<String> = split(header, separator).into_iter().map(String::from).collect();
+    if names.iter().any(|name| name.parse::<f64>().is_err()) {
         lines.next();
-        read_header(first, &names, columns)?
-    } else {
-        let said = above.and_then(|(row, line)| {
-            let said = line.trim().trim_start_matches('#').trim();
-            Some((row, names_in(said, names.len())?))
-        });
-        let (row, names) = said.ok_or_else(|| StatesError::NoHeader { row: first, names: columns.join(",") })?;
-        read_header(row, &names, columns)?
-    };
+        return Ok(Columns { row: first, names, separator, lines: Box::new(lines) });
+    }
+    let said = above.and_then(|(row, line)| {
+        let said = line.trim().trim_start_matches('#').trim();
+        Some((row, names_in(said, names.len())?))
+    });
+    let (row, names) = said.ok_or_else(|| StatesError::NoHeader { row: first, names: asked.to_string() })?;
+    let names = names.into_iter().map(|name| name.to_string()).collect();
+    Ok(Columns { row, names, separator, lines: Box::new(lines) })
+}
 
-    let n = columns.len() / 2;
-    let mut states = States { q: Vec::new(), v: Vec::new(), rows: Vec::new() };
+/// Names of all columns of CSV text.
+///
+/// # Errors
+/// [`StatesError`] for text without a header.
+pub fn column_names(bytes: &[u8]) -> Result<Vec<String>, StatesError> {
+    Ok(opened(bytes, "of the data")?.names)
+}
+
+/// Reads columns from CSV text as [`parse_states`] does.
+///
+/// # Errors
+/// [`StatesError`] naming the first offending row and column.
+pub fn parse_table<S: Scalar>(bytes: &[u8], columns: &[String]) -> Result<Table<S>, StatesError> {
+    let Columns { row, names, separator, lines } = opened(bytes, &columns.join(","))?;
+    let order = read_header(row, &names, columns)?;
+    let mut table = Table { values: Vec::new(), rows: Vec::new() };
     let mut state = vec![S::default(); columns.len()];
     for (row, line) in lines {
         let fields = split(line, separator);
@@ -140,21 +185,19 @@ pub fn parse_states<S: Scalar>(bytes: &[u8], columns: &[String]) -> Result<State
                 found: field.chars().take(40).collect(),
             })?;
         }
-        states.q.extend_from_slice(&state[..n]);
-        states.v.extend_from_slice(&state[n..]);
-        states.rows.push(row);
+        table.values.extend_from_slice(&state);
+        table.rows.push(row);
     }
-    if states.rows.is_empty() { Err(StatesError::NoStates) } else { Ok(states) }
+    if table.rows.is_empty() { Err(StatesError::NoStates) } else { Ok(table) }
 }
 
 /// For every field of a row, the index of its column, if it has one.
-fn read_header<T: AsRef<str>>(row: usize, names: &[T], columns: &[String]) -> Result<Vec<Option<usize>>, StatesError> {
-    let names: Vec<&str> = names.iter().map(AsRef::as_ref).collect();
+fn read_header(row: usize, names: &[String], columns: &[String]) -> Result<Vec<Option<usize>>, StatesError> {
     let mut order = Vec::with_capacity(names.len());
-    for name in &names {
+    for name in names {
         let column = columns.iter().position(|known| known == name);
         if column.is_some() && order.contains(&column) {
-            return Err(StatesError::Duplicate { row, name: name.to_string() });
+            return Err(StatesError::Duplicate { row, name: name.clone() });
         }
         order.push(column);
     }
@@ -164,7 +207,7 @@ fn read_header<T: AsRef<str>>(row: usize, names: &[T], columns: &[String]) -> Re
         return Ok(order);
     }
     // Where one is missing, one that is not known may be a misprint of it.
-    let near = |name: &&&str| nearest(name, missing.iter().copied()).is_some();
+    let near = |name: &&String| nearest(name, missing.iter().copied()).is_some();
     let foreign = || names.iter().zip(&order).filter(|(_, column)| column.is_none()).map(|(name, _)| name);
     let nothing_known = order.iter().all(Option::is_none);
     match foreign().find(near).or_else(|| foreign().next().filter(|_| nothing_known)) {

@@ -58,12 +58,7 @@ impl<S: Scalar> Terms<S> {
                 expect("generalized forces", batch * n, self.force.len())?;
                 right.iter_mut().zip(&self.force).for_each(|(right, &force)| *right += force);
             }
-            first = if n == 1 {
-                divide(&self.mass_matrix, &right, &mut self.acceleration)
-            } else {
-                let solved = linalg::solve(n, &self.mass_matrix, &right, &mut self.acceleration, workspace);
-                solved.err().and_then(|_| workspace.failures().first().copied())
-            };
+            first = accelerate(n, &self.mass_matrix, &right, &mut self.acceleration, workspace);
             workspace.give_vector(right);
         }
         // What was not finite before the solve is named rather than the solve.
@@ -86,10 +81,75 @@ impl<S: Scalar> Terms<S> {
             (Some((row, what)), first) if first.is_none_or(|(failed, _)| row <= failed) => {
                 Err(MechanicsError::NotFinite { row, what })
             }
-            (_, Some((row, Failure::Singular { condition }))) => Err(MechanicsError::Singular { row, condition }),
-            (_, Some((row, Failure::NotFinite))) => Err(MechanicsError::NotFinite { row, what: "acceleration" }),
+            (_, Some(failure)) => Err(typed(failure)),
             (Some((row, what)), None) => Err(MechanicsError::NotFinite { row, what }),
         }
+    }
+}
+
+impl<S: Scalar> Terms<S> {
+    /// Adds forces from outside, `(batch, n)`, to terms that were computed with [`Request::ACCELERATION`]: `M^-1 Q` to the
+    /// accelerations, `Q` to the forces and `-v.Q` to the power they take.
+    ///
+    /// # Errors
+    /// [`MechanicsError`] naming the first row whose force is not finite or whose mass matrix is singular.
+    pub fn add_force(
+        &mut self,
+        n: usize,
+        v: &[S],
+        external: &[S],
+        workspace: &mut Workspace<S>,
+    ) -> Result<(), MechanicsError> {
+        let shape = |what, expected, found| Err(MechanicsError::Shape { what, expected, found });
+        let (size, zero) = (v.len(), <S as Real>::zero());
+        if external.len() != size {
+            return shape("external forces", size, external.len());
+        }
+        if self.mass_matrix.len() != size * n {
+            return shape("mass matrices", size * n, self.mass_matrix.len());
+        }
+        if self.acceleration.len() != size {
+            return shape("accelerations", size, self.acceleration.len());
+        }
+        if let Some(at) = first_not_finite(external) {
+            return Err(MechanicsError::NotFinite { row: at / n.max(1), what: "external force" });
+        }
+        let mut change = workspace.take_vector();
+        change.clear();
+        change.resize(size, S::NAN);
+        let first = accelerate(n, &self.mass_matrix, external, &mut change, workspace);
+        self.acceleration.iter_mut().zip(&change).for_each(|(a, &change)| *a += change);
+        workspace.give_vector(change);
+        self.force.resize(size, zero);
+        self.force.iter_mut().zip(external).for_each(|(force, &external)| *force += external);
+        self.dissipation.resize(size / n.max(1), zero);
+        for ((power, v), external) in self.dissipation.iter_mut().zip(v.chunks(n)).zip(external.chunks(n)) {
+            *power -= v.iter().zip(external).fold(zero, |sum, (&v, &q)| sum + v * q);
+        }
+        first.map_or(Ok(()), |failure| Err(typed(failure)))
+    }
+}
+
+/// `M^-1 f` of a batch; the first row that fails.
+fn accelerate<S: Scalar>(
+    n: usize,
+    mass: &[S],
+    force: &[S],
+    acceleration: &mut [S],
+    workspace: &mut Workspace<S>,
+) -> Option<(usize, Failure)> {
+    if n == 1 {
+        return divide(mass, force, acceleration);
+    }
+    let solved = linalg::solve(n, mass, force, acceleration, workspace);
+    solved.err().and_then(|_| workspace.failures().first().copied())
+}
+
+/// A row whose acceleration cannot be had, as an error.
+fn typed((row, failure): (usize, Failure)) -> MechanicsError {
+    match failure {
+        Failure::Singular { condition } => MechanicsError::Singular { row, condition },
+        Failure::NotFinite => MechanicsError::NotFinite { row, what: "acceleration" },
     }
 }
 
@@ -162,6 +222,38 @@ mod tests {
         terms.force = vec![f64::NAN, 0.0];
         let error = terms.complete(2, &[1.0, 0.0], Request::ACCELERATION, &mut Workspace::new()).unwrap_err();
         assert_eq!(error, MechanicsError::NotFinite { row: 0, what: "generalized force" });
+    }
+
+    #[test]
+    fn forces_from_outside_are_added() {
+        let mut terms = Terms {
+            dl_dq: vec![3.0, 4.0, 0.0, 0.0],
+            coriolis: vec![1.0, 1.0, 0.0, 0.0],
+            mass_matrix: vec![2.0, 0.0, 0.0, 4.0, 1.0, 0.0, 0.0, 1.0],
+            ..Terms::default()
+        };
+        let (v, mut workspace) = ([1.0, 2.0, 3.0, 0.0], Workspace::new());
+        terms.complete(2, &v, Request::ACCELERATION, &mut workspace).unwrap();
+        terms.add_force(2, &v, &[-1.0, 2.0, 5.0, 7.0], &mut workspace).unwrap();
+        assert_eq!(terms.acceleration, [0.5, 1.25, 5.0, 7.0]);
+        assert_eq!((terms.force, terms.dissipation), (vec![-1.0, 2.0, 5.0, 7.0], vec![-3.0, -15.0]));
+        // On top of a friction of the model's own, and one coordinate.
+        let mut one = Terms {
+            mass_matrix: vec![2.0],
+            acceleration: vec![1.0],
+            force: vec![-0.5],
+            dissipation: vec![1.5],
+            ..Terms::default()
+        };
+        one.add_force(1, &[3.0], &[4.0], &mut workspace).unwrap();
+        assert_eq!((one.acceleration[0], one.force[0], one.dissipation[0]), (3.0, 3.5, -10.5));
+        let error = one.add_force(1, &[3.0], &[f64::NAN], &mut workspace).unwrap_err();
+        assert_eq!(error, MechanicsError::NotFinite { row: 0, what: "external force" });
+        let error = one.add_force(1, &[3.0], &[1.0, 2.0], &mut workspace).unwrap_err();
+        assert_eq!(error, MechanicsError::Shape { what: "external forces", expected: 1, found: 2 });
+        one.mass_matrix[0] = 0.0;
+        let error = one.add_force(1, &[3.0], &[1.0], &mut workspace).unwrap_err();
+        assert_eq!(error, MechanicsError::Singular { row: 0, condition: f64::INFINITY });
     }
 
     #[test]

@@ -7,12 +7,14 @@ mod catalogue;
 mod complete;
 mod derivatives;
 mod hand_written;
+mod inverse;
 pub mod system;
 pub mod systems;
 mod terms;
 
 pub use catalogue::{Configured, Given, SystemError, build, configure, exact_acceleration, find, systems};
 pub use hand_written::HandWritten;
+pub use inverse::{InverseDynamics, inverse_dynamics};
 pub use terms::{EulerLagrange, MechanicsError, Request, Terms};
 
 use crate::scalar::Real;

@@ -21,7 +21,10 @@ const DOPRI5: Weights = &[
 /// `(index of the stage, weight)`, stages counted from 1.
 type Weights = &'static [(usize, f64)];
 
-/// Stages 14 to 16: `(index of k, weight)`; row sums are the nodes 1/10, 1/5, 7/9.
+/// Nodes of the stages 14 to 16.
+const EXTRA_NODES: [f64; 3] = [0.1, 0.2, 7.0 / 9.0];
+
+/// Stages 14 to 16: `(index of k, weight)`; row sums are the nodes.
 const EXTRA: [Weights; 3] = [
     &[
         (1, 0.056167502283047954),
@@ -117,6 +120,8 @@ const DENSE: [Weights; 4] = [
 
 /// One accepted step of size `h` from `y0` to `y1`; `slopes` holds the stages `k1`, `k2`, ... one after the other.
 pub(super) struct Step<'a, S> {
+    /// Elapsed time at its start.
+    pub t0: S,
     /// Size.
     pub h: S,
     /// State at its start.
@@ -143,14 +148,14 @@ impl<S: Scalar> Interpolant<S> {
         self.weigh(step.h, 4, DOPRI5);
     }
 
-    /// Interpolant of order 7 of a DOP853 step; needs three evaluations of `f(y, dy)`.
+    /// Interpolant of order 7 of a DOP853 step; needs three evaluations of `f(t, y, dy)`.
     ///
     /// # Errors
     /// The first error of `f`.
     pub fn dop853<E>(&mut self, step: &Step<'_, S>, f: &mut Rhs<'_, S, E>) -> Result<(), E> {
         self.hermite(step, 13, 8);
         let dim = self.dim;
-        for weights in EXTRA {
+        for (weights, node) in EXTRA.iter().zip(EXTRA_NODES) {
             self.state.clear();
             self.state.extend_from_slice(step.y0);
             for (i, y) in self.state.iter_mut().enumerate() {
@@ -158,7 +163,7 @@ impl<S: Scalar> Interpolant<S> {
             }
             let start = self.slopes.len();
             self.slopes.resize(start + dim, <S as Real>::zero());
-            f(&self.state, &mut self.slopes[start..])?;
+            f(step.t0 + S::of_f64(node) * step.h, &self.state, &mut self.slopes[start..])?;
         }
         for (row, weights) in DENSE.iter().enumerate() {
             self.weigh(step.h, 4 + row, weights);
@@ -220,7 +225,7 @@ mod tests {
     #[test]
     fn tables_sum_to_their_nodes() {
         let sum = |weights: &[(usize, f64)]| weights.iter().map(|w| w.1).sum::<f64>();
-        for (weights, node) in EXTRA.iter().zip([0.1, 0.2, 7.0 / 9.0]) {
+        for (weights, node) in EXTRA.iter().zip(EXTRA_NODES) {
             assert!((sum(weights) - node).abs() < 1e-14, "{node}: {}", sum(weights));
         }
         // A constant derivative is interpolated by the first two coefficients alone.

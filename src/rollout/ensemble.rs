@@ -1,13 +1,31 @@
 //! Many motions: each by itself, or groups of them evaluated together.
 
 use super::group::Group;
-use super::{Integrable, Options, Rollout, rollout};
+use super::run::adaptive_or_fixed;
+use super::{Force, Integrable, Options, Rollout};
 use crate::lagrangian::EulerLagrange;
+use crate::scalar::Scalar;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Motions of a group; more gain nothing, since products of eight states at a time are as quick per state as any.
 const GROUP: usize = 8;
+
+/// Where a motion starts, and the force from outside that drives it, if there is one.
+#[derive(Clone, Copy)]
+pub struct Start<'a, S: Scalar> {
+    /// Coordinates, `(n)`.
+    pub q: &'a [S],
+    /// Velocities, `(n)`.
+    pub v: &'a [S],
+    /// Force from outside.
+    pub force: Option<&'a dyn Force<S>>,
+}
+
+/// The starts without forces.
+fn free<S: Scalar>(starts: &[(Vec<S>, Vec<S>)]) -> Vec<Start<'_, S>> {
+    starts.iter().map(|(q, v)| Start { q, v, force: None }).collect()
+}
 
 /// Rolls out every start `(q, v)`; the results keep the order of the starts and do not depend on `threads`.
 ///
@@ -18,10 +36,20 @@ pub fn rollout_many<S: Integrable>(
     options: &Options<S>,
     threads: usize,
 ) -> Vec<Rollout<S>> {
+    rollout_each(model, &free(starts), options, threads)
+}
+
+/// [`rollout_many`] with a force of its own for every start.
+pub fn rollout_each<S: Integrable>(
+    model: &dyn EulerLagrange<S>,
+    starts: &[Start<'_, S>],
+    options: &Options<S>,
+    threads: usize,
+) -> Vec<Rollout<S>> {
     if model.prefers_batches() && starts.len() > GROUP {
-        return rollout_together(model, starts, options, threads);
+        return together(model, starts, options, threads);
     }
-    in_order(starts, threads, |(q, v)| rollout(model, q, v, options))
+    in_order(starts, threads, |start| adaptive_or_fixed(model, start.force, start.q, start.v, options))
 }
 
 /// Rolls out every start `(q, v)` like [`rollout_many`](super::rollout_many), groups of motions evaluated as one batch.
@@ -35,13 +63,22 @@ pub fn rollout_together<S: Integrable>(
     options: &Options<S>,
     threads: usize,
 ) -> Vec<Rollout<S>> {
+    together(model, &free(starts), options, threads)
+}
+
+fn together<S: Integrable>(
+    model: &dyn EulerLagrange<S>,
+    starts: &[Start<'_, S>],
+    options: &Options<S>,
+    threads: usize,
+) -> Vec<Rollout<S>> {
     let groups: Vec<_> = starts.chunks(GROUP).collect();
     in_order(&groups, threads, |group| roll_group(model, group, options)).into_iter().flatten().collect()
 }
 
 fn roll_group<S: Integrable>(
     model: &dyn EulerLagrange<S>,
-    starts: &[(Vec<S>, Vec<S>)],
+    starts: &[Start<'_, S>],
     options: &Options<S>,
 ) -> Vec<Rollout<S>> {
     let group = Group::new(model, starts.len());
@@ -51,7 +88,9 @@ fn roll_group<S: Integrable>(
         let running: Vec<_> = members
             .into_iter()
             .zip(starts)
-            .map(|(member, (q, v))| scope.spawn(move || rollout(&member, q, v, options)))
+            .map(|(member, start)| {
+                scope.spawn(move || adaptive_or_fixed(&member, start.force, start.q, start.v, options))
+            })
             .collect();
         running.into_iter().map(|thread| thread.join().unwrap_or_else(|p| std::panic::resume_unwind(p))).collect()
     })

@@ -1,12 +1,13 @@
 //! Fixed steps from sample to sample in phase space.
 
 use super::compensated::{Compensated, State};
+use super::force::{Piece, pieces};
 use super::gauss::Gauss;
 use super::phase::Phase;
 use super::run::{Keep, typed};
 use super::samples::{Samples, Times};
 use super::variational::Variational;
-use super::{Failure, Method, Options, RolloutError, Statistics};
+use super::{Failure, Force, Method, Options, RolloutError, Statistics};
 use crate::lagrangian::EulerLagrange;
 use crate::scalar::{Real, Scalar};
 
@@ -49,7 +50,7 @@ struct Position<S> {
     state: State<S>,
     /// A velocity near that of the state.
     near: Vec<S>,
-    /// Elapsed time of the sample before, and steps of size `h` since.
+    /// Elapsed time of the sample or break before, and steps of size `h` since.
     since: S,
     steps: usize,
     h: S,
@@ -58,14 +59,15 @@ struct Position<S> {
 /// Integrates from `(q, v)` to the end of the options or of what is possible; arguments are checked.
 pub(super) fn run<S: Scalar>(
     model: &dyn EulerLagrange<S>,
+    force: Option<&dyn Force<S>>,
     stepper: &mut Stepper<S>,
-    q: &[S],
-    v: &[S],
+    (q, v): (&[S], &[S]),
     options: &Options<S>,
     keep: &mut Keep<'_, S>,
 ) -> (Statistics, Option<RolloutError>) {
     let mut statistics = Statistics::default();
-    let mut phase = Phase::new(model);
+    let mut phase = Phase::new(model, force);
+    let cuts = pieces(force.map_or(&[], |force| force.breaks()), options.t0, options.t_end);
     let zero = <S as Real>::zero();
     let domain = options.domain.as_ref();
     let start: Vec<S> = q.iter().chain(v).copied().collect();
@@ -76,7 +78,7 @@ pub(super) fn run<S: Scalar>(
             let state = State { q: Compensated::new(q.to_vec()), p: Compensated::new(p) };
             let mut position = Position { state, near: v.to_vec(), since: zero, steps: 0, h: zero };
             if keep(options.t0, q, v) {
-                advance(&mut phase, stepper, &mut position, options, &mut statistics, keep)
+                advance(&mut phase, stepper, &mut position, options, &cuts, (&mut statistics, keep))
             } else {
                 Some(RolloutError::Stopped { t: options.t0.to_f64() })
             }
@@ -92,42 +94,37 @@ fn advance<S: Scalar>(
     stepper: &mut Stepper<S>,
     position: &mut Position<S>,
     options: &Options<S>,
-    statistics: &mut Statistics,
-    keep: &mut Keep<'_, S>,
+    cuts: &[Piece<S>],
+    (statistics, keep): (&mut Statistics, &mut Keep<'_, S>),
 ) -> Option<RolloutError> {
     let samples = Samples::new(options);
-    let backwards = options.t_end < options.t0;
     let domain = options.domain.as_ref();
     // All distances but the last are dt, whatever the rounding of their difference.
     let regular = options.dt.abs();
     let last = samples.len() - 1;
+    let mut piece = 0;
     for k in 1..=last {
-        let (before, elapsed) = (samples.elapsed(k - 1), samples.elapsed(k));
-        let difference = elapsed - before;
+        let (start, elapsed) = (samples.elapsed(k - 1), samples.elapsed(k));
+        let difference = elapsed - start;
         let blur = S::EPSILON.ldexp(3) * elapsed;
-        let distance = if k < last || (difference - regular).abs() <= blur { regular } else { difference };
-        let longest = options.step.unwrap_or(distance);
-        // A longest step beyond the distance is cut to it.
-        let count = ((distance / longest - S::EPSILON.ldexp(4)).floor().to_f64() + 1.0).max(1.0);
-        let h = distance / S::of_f64(count);
-        (position.since, position.steps, position.h) = (before, 0, h);
-        let signed = if backwards { -h } else { h };
-        // A count beyond all numbers of steps ends by `max_steps`.
-        while (position.steps as f64) < count {
-            if statistics.accepted == options.max_steps {
-                let t = position.time(options, backwards);
-                return Some(RolloutError::TooManySteps { t, steps: options.max_steps });
+        let whole = if k < last || (difference - regular).abs() <= blur { regular } else { difference };
+        // To every break on the way, then to the sample.
+        let mut legs = vec![(start, whole, cuts[piece])];
+        while piece + 1 < cuts.len() && cuts[piece].end <= elapsed + blur {
+            let from = cuts[piece].end;
+            piece += 1;
+            if from < elapsed - blur
+                && let Some(leg) = legs.last_mut()
+            {
+                leg.1 = from - leg.0;
+                legs.push((from, elapsed - from, cuts[piece]));
             }
-            let before = (position.state.clone(), position.near.clone());
-            let stepped = stepper
-                .step(phase, &mut position.state, &mut position.near, signed)
-                .and_then(|()| inside(stepper, phase.n, options));
-            if let Err(failure) = stepped {
-                (position.state, position.near) = before;
-                return Some(position.failed(phase, failure, options, backwards));
+        }
+        for (from, distance, piece) in legs {
+            let stop = stretch(phase, stepper, position, options, (from, distance), &piece, statistics);
+            if stop.is_some() {
+                return stop;
             }
-            statistics.accepted += 1;
-            position.steps += 1;
         }
         let arrived = position.velocity(phase).and_then(|v| {
             let sample: Vec<S> = position.state.q.high.iter().copied().chain(v).collect();
@@ -140,8 +137,46 @@ fn advance<S: Scalar>(
                     return Some(RolloutError::Stopped { t: samples.time(k).to_f64() });
                 }
             }
-            Err(failure) => return Some(position.failed(phase, failure, options, backwards)),
+            Err(failure) => return Some(position.failed(phase, failure, options, options.t_end < options.t0)),
         }
+    }
+    None
+}
+
+/// Steps over a distance in elapsed time within one piece.
+fn stretch<S: Scalar>(
+    phase: &mut Phase<'_, S>,
+    stepper: &mut Stepper<S>,
+    position: &mut Position<S>,
+    options: &Options<S>,
+    (from, distance): (S, S),
+    piece: &Piece<S>,
+    statistics: &mut Statistics,
+) -> Option<RolloutError> {
+    let backwards = options.t_end < options.t0;
+    let longest = options.step.unwrap_or(distance);
+    // A longest step beyond the distance is cut to it.
+    let count = ((distance / longest - S::EPSILON.ldexp(4)).floor().to_f64() + 1.0).max(1.0);
+    let h = distance / S::of_f64(count);
+    (position.since, position.steps, position.h) = (from, 0, h);
+    let signed = if backwards { -h } else { h };
+    // A count beyond all numbers of steps ends by `max_steps`.
+    while (position.steps as f64) < count {
+        if statistics.accepted == options.max_steps {
+            let t = position.time(options, backwards).to_f64();
+            return Some(RolloutError::TooManySteps { t, steps: options.max_steps });
+        }
+        phase.begin(position.time(options, backwards), piece);
+        let before = (position.state.clone(), position.near.clone());
+        let stepped = stepper
+            .step(phase, &mut position.state, &mut position.near, signed)
+            .and_then(|()| inside(stepper, phase.n, options));
+        if let Err(failure) = stepped {
+            (position.state, position.near) = before;
+            return Some(position.failed(phase, failure, options, backwards));
+        }
+        statistics.accepted += 1;
+        position.steps += 1;
     }
     None
 }
@@ -166,9 +201,9 @@ impl<S: Scalar> Position<S> {
         Ok(v)
     }
 
-    fn time(&self, options: &Options<S>, backwards: bool) -> f64 {
+    fn time(&self, options: &Options<S>, backwards: bool) -> S {
         let elapsed = self.since + S::of_f64(self.steps as f64) * self.h;
-        if backwards { options.t0 - elapsed } else { options.t0 + elapsed }.to_f64()
+        if backwards { options.t0 - elapsed } else { options.t0 + elapsed }
     }
 
     /// The error of a failure just ahead; the velocity of the state is the nearest known if it cannot be had.
@@ -182,6 +217,6 @@ impl<S: Scalar> Position<S> {
         let v = self.velocity(phase).unwrap_or_else(|_| self.near.clone());
         let state = self.state.q.high.iter().chain(&v).map(|x| x.to_f64()).collect();
         let step = if self.steps == 0 && self.since == <S as Real>::zero() { 0.0 } else { self.h.to_f64() };
-        typed(failure, self.time(options, backwards), state, step)
+        typed(failure, self.time(options, backwards).to_f64(), state, step)
     }
 }

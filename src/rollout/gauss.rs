@@ -13,8 +13,8 @@
 //!
 //! Source: Hairer, Lubich and Wanner, Geometric Numerical Integration (2006), II.1.3 and VI.4. The coefficients are
 //! used as `a_ij = m_ij b_j` with `m_ij + m_ji = 1` exactly in floating point, so that rounding them does not spoil
-//! symplecticity (Antonana, Makazaga and Murua 2017). Friction `Q` adds to `dL/dq`: the order stays, and there is no
-//! symplectic form to keep.
+//! symplecticity (Antonana, Makazaga and Murua 2017). Friction and forces from outside, `Q`, add to `dL/dq`: the order
+//! stays, and there is no symplectic form to keep.
 
 use super::Failure;
 use super::chord::{Chord, Equations};
@@ -88,6 +88,8 @@ struct Stages<'a, S> {
     h: S,
     /// `h b_j`; their sum is `h`.
     steps: &'a [S],
+    /// `h c_j`.
+    after: &'a [S],
     /// Stage coordinates, momenta and forces, `(stages, n)`.
     q: &'a mut [S],
     p: &'a mut [S],
@@ -115,7 +117,7 @@ impl<S: Scalar> Equations<S> for Stages<'_, S> {
                 self.q[i * n + k] = q.high[k] + (q.low[k] + self.increment(n, i, k, x));
             }
         }
-        phase.momenta_and_forces(self.q, x, self.p, self.g)?;
+        phase.momenta_and_forces(self.q, x, self.after, (self.p, self.g))?;
         for i in 0..s {
             for k in 0..n {
                 let wanted = p.low[k] + self.increment(n, i, k, self.g);
@@ -135,7 +137,7 @@ impl<S: Scalar> Equations<S> for Stages<'_, S> {
         for k in 0..n {
             self.q[k] = self.state.q.high[k] + self.increment(n, s / 2, k, x);
         }
-        phase.derivatives(&self.q[..n], &x[middle..middle + n], self.derivatives)?;
+        phase.derivatives(&self.q[..n], &x[middle..middle + n], self.after[s / 2], self.derivatives)?;
         let Derivatives { mass, mixed, stiffness, damping } = &*self.derivatives;
         let a = |i: usize, j: usize| self.tableau.ratios[i * s + j] * self.steps[j];
         for i in 0..s {
@@ -166,6 +168,7 @@ pub(super) struct Gauss<S> {
     chord: Chord<S>,
     h: S,
     steps: Vec<S>,
+    after: Vec<S>,
     /// Stage velocities of the last steps of this size, oldest first, `(steps * stages, n)`.
     history: Vec<S>,
     /// Weights that extrapolate one, two, .. steps of history to the stages of the next.
@@ -197,6 +200,7 @@ impl<S: Scalar> Gauss<S> {
             chord: Chord::new(s * n),
             h: zero,
             steps: vec![zero; s],
+            after: vec![zero; s],
             history: Vec::new(),
             extrapolation,
             v: vector.clone(),
@@ -221,6 +225,9 @@ impl<S: Scalar> Gauss<S> {
             self.h = h;
             for (step, &b) in self.steps.iter_mut().zip(&self.tableau.weights) {
                 *step = h * b;
+            }
+            for (after, &node) in self.after.iter_mut().zip(&self.tableau.nodes) {
+                *after = h * node;
             }
             if s == 3 {
                 // The rounded steps must add up to h.
@@ -276,8 +283,8 @@ impl<S: Scalar> Gauss<S> {
     }
 
     fn solve(&mut self, phase: &mut Phase<'_, S>, state: &State<S>) -> Result<(), Failure> {
-        let Self { tableau, chord, h, steps, v, q, p, g, derivatives, .. } = self;
-        chord.solve(phase, &mut Stages { tableau, state, h: *h, steps, q, p, g, derivatives }, v)
+        let Self { tableau, chord, h, steps, after, v, q, p, g, derivatives, .. } = self;
+        chord.solve(phase, &mut Stages { tableau, state, h: *h, steps, after, q, p, g, derivatives }, v)
     }
 }
 

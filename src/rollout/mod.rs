@@ -4,7 +4,8 @@
 //! (order 5 or 8) under error control, or Hamilton's equations behind the same Lagrangian with a symplectic method of
 //! fixed step (implicit midpoint, Gauss collocation, variational). It never loses what it has: when a model fails, the valid part of the
 //! trajectory stays and a [`RolloutError`] says where and why. Of a model with friction every method but the variational one
-//! integrates the motion; [`Trajectory::energy_balance`] says where the energy went. Angles stay continuous (never wrapped) in the output;
+//! integrates the motion; [`Trajectory::energy_balance`] says where the energy went. [`Driven`] is a model under a
+//! [`Force`] `Q(t, q, v)` from outside: a motor, a controller, or what was recorded ([`SampledForce`]). Angles stay continuous (never wrapped) in the output;
 //! a model that needs them wrapped wraps them itself.
 //!
 //! [`rollout_in_pieces`] hands the samples over instead of keeping them, for motions longer than the memory.
@@ -12,13 +13,16 @@
 //! Adaptive integration is offered in the precisions the solver knows, [`Integrable`]: `f32` and `f64`; fixed steps in
 //! every precision by [`rollout_fixed`].
 
+mod adaptive;
 mod balance;
 mod chord;
 mod compensated;
 mod dense;
+mod driven;
 mod ensemble;
 mod error;
 mod fixed;
+mod force;
 mod gauss;
 mod group;
 mod ode;
@@ -31,8 +35,10 @@ mod trajectory;
 mod variational;
 
 pub use balance::EnergyBalance;
-pub use ensemble::{rollout_many, rollout_together};
+pub use driven::Driven;
+pub use ensemble::{Start, rollout_each, rollout_many, rollout_together};
 pub use error::{RolloutError, UnderflowCause};
+pub use force::{Force, SampledForce};
 pub use ode::Integrable;
 pub use options::{Domain, Method, Options};
 pub use pieces::{Balances, Ending, rollout_in_pieces};

@@ -8,7 +8,7 @@
 //! - Backward integration is fragile: the elapsed time always runs upwards from 0 (the caller flips the sign).
 //! - Statistics are lost on errors: calls are counted here.
 //! - Underflow is not noticed in `f32`: a step that does not advance the time ends the integration.
-//! - Two nodes of its order 8 table are wrong (0 for 1): harmless, the equations here do not depend on time.
+//! - The node of stage 12 in its order 8 table is wrong (0 for 1): the time of that stage is taken from the one before.
 
 use super::Statistics;
 use super::dense::{Interpolant, Step};
@@ -20,8 +20,8 @@ use ode_solvers::dop_shared::{FloatNumber, IntegrationError};
 use ode_solvers::{DVector, Dop853, Dopri5, OutputType, SVector, System};
 use std::cell::RefCell;
 
-/// A right-hand side `dy = f(y)` of an autonomous system.
-pub(super) type Rhs<'a, S, E> = dyn FnMut(&[S], &mut [S]) -> Result<(), E> + 'a;
+/// A right-hand side `dy = f(t, y)`, `t` the elapsed time.
+pub(super) type Rhs<'a, S, E> = dyn FnMut(S, &[S], &mut [S]) -> Result<(), E> + 'a;
 
 /// Receives sample `k` with its state, and says whether to go on.
 pub(super) type Output<'a, S> = dyn FnMut(usize, &[S]) -> bool + 'a;
@@ -42,6 +42,8 @@ pub struct Task<'a, S> {
     pub(super) max_steps: usize,
     /// Size of the first attempt; 0 leaves it to the solver.
     pub(super) first_step: S,
+    /// Whether the right-hand side depends on time.
+    pub(super) timed: bool,
     /// State at elapsed time 0.
     pub(super) start: &'a [S],
     /// Elapsed times of the samples, ascending from 0; the last is the end.
@@ -126,6 +128,9 @@ struct Watch<'a, 'f, S, E> {
     /// Stages of the last calls, the newest at `calls - 1`, in a ring of `ring` rows.
     recent: Vec<S>,
     calls: usize,
+    /// Calls of a run before its first attempt, and the time of the last call.
+    opening: usize,
+    asked: S,
     statistics: Statistics,
     /// Last accepted step.
     elapsed: S,
@@ -149,15 +154,17 @@ struct Watch<'a, 'f, S, E> {
 }
 
 impl<S: Scalar, E> Watch<'_, '_, S, E> {
-    fn evaluate(&mut self, y: &[S], dy: &mut [S]) {
+    fn evaluate(&mut self, x: S, y: &[S], dy: &mut [S]) {
+        let x = self.stage_time(x);
+        self.asked = x;
         if self.failure.is_some() && y.iter().any(|x| !x.is_finite()) {
             // A state that an earlier failure of this attempt has spoilt.
             dy.fill(S::NAN);
-        } else if y == self.state.as_slice() {
+        } else if y == self.state.as_slice() && (!self.task.timed || x == self.elapsed) {
             dy.copy_from_slice(&self.slope);
         } else {
             self.statistics.evaluations += 1;
-            if let Err(error) = (self.f)(y, dy) {
+            if let Err(error) = (self.f)(x, y, dy) {
                 self.failure.get_or_insert(error);
                 dy.fill(S::NAN);
             }
@@ -165,6 +172,16 @@ impl<S: Scalar, E> Watch<'_, '_, S, E> {
         let row = (self.calls % self.ring()) * dy.len();
         self.recent[row..row + dy.len()].copy_from_slice(dy);
         self.calls += 1;
+    }
+
+    /// The time of a stage. Stage 12 of the method of order 8 is said to be at the start of the step and is at its end;
+    /// stage 11, asked just before, is at 6/7 of it.
+    fn stage_time(&self, x: S) -> S {
+        if self.task.method == Adaptive::Dop853 && self.calls >= self.opening && x == self.elapsed {
+            self.elapsed + (self.asked - self.elapsed) * S::ratio(7, 6)
+        } else {
+            x
+        }
     }
 
     /// Rows of `recent`: what one accepted step calls.
@@ -224,7 +241,7 @@ impl<S: Scalar, E> Watch<'_, '_, S, E> {
             let row = (call % ring) * dim;
             self.slopes.extend_from_slice(&self.recent[row..row + dim]);
         }
-        let step = Step { h, y0: &self.state, y1: y, slopes: &self.slopes };
+        let step = Step { t0: self.elapsed, h, y0: &self.state, y1: y, slopes: &self.slopes };
         match self.task.method {
             Adaptive::Dopri5 => {
                 self.interpolant.dopri5(&step);
@@ -252,8 +269,8 @@ where
     D: Dim,
     DefaultAllocator: Allocator<D>,
 {
-    fn system(&self, _: S, y: &OVector<S, D>, dy: &mut OVector<S, D>) {
-        self.0.borrow_mut().evaluate(y.as_slice(), dy.as_mut_slice());
+    fn system(&self, x: S, y: &OVector<S, D>, dy: &mut OVector<S, D>) {
+        self.0.borrow_mut().evaluate(x, y.as_slice(), dy.as_mut_slice());
     }
 
     fn solout(&mut self, x: S, y: &OVector<S, D>, dy: &OVector<S, D>) -> bool {
@@ -285,7 +302,7 @@ where
         step: zero,
         ended: None,
     };
-    if let Err(error) = f(task.start, &mut slope) {
+    if let Err(error) = f(zero, task.start, &mut slope) {
         ran.ended = Some(Ended::Failed(error));
         return ran;
     }
@@ -304,6 +321,8 @@ where
         output,
         recent: vec![zero; ring * dim],
         calls: 0,
+        opening: 0,
+        asked: zero,
         statistics: ran.statistics,
         elapsed: zero,
         state: task.start.to_vec(),
@@ -325,6 +344,7 @@ where
         let (elapsed, y, attempts_left) = {
             let mut watch = watch.borrow_mut();
             watch.calls = 0;
+            watch.opening = if first_step == zero { 3 } else { 1 };
             let attempts = watch.statistics.accepted + watch.statistics.rejected;
             (watch.elapsed, vector(&watch.state), task.max_steps.saturating_sub(attempts))
         };
@@ -337,13 +357,7 @@ where
 
         let mut watch = watch.borrow_mut();
         let accepted = watch.statistics.accepted - accepted_before;
-        let opening = if attempts_left == 0 {
-            0
-        } else if first_step == zero {
-            3
-        } else {
-            1
-        };
+        let opening = if attempts_left == 0 { 0 } else { watch.opening };
         let attempts = (watch.calls - opening - accepted * closing_calls(task.method)) / stages(task.method);
         watch.statistics.rejected += attempts - accepted;
         next = watch.next;
@@ -441,12 +455,20 @@ mod tests {
 
     /// Samples of `y' = -y` from 1.
     fn decay(method: Adaptive, tolerance: f64, first_step: f64, samples: &Vec<f64>) -> (Vec<f64>, Statistics) {
-        let task =
-            Task { method, rtol: tolerance, atol: tolerance, max_steps: 1000, first_step, start: &[1.0], samples };
+        let task = Task {
+            method,
+            rtol: tolerance,
+            atol: tolerance,
+            max_steps: 1000,
+            first_step,
+            timed: false,
+            start: &[1.0],
+            samples,
+        };
         let mut got = Vec::new();
         let ran = f64::integrate::<()>(
             &task,
-            &mut |y, dy| {
+            &mut |_, y, dy| {
                 dy[0] = -y[0];
                 Ok(())
             },

@@ -1,7 +1,8 @@
 //! A model in phase space: `p = dL/dv` and `dp/dt = dL/dq + Q` as functions of `(q, v)`, and the way back from `p` to `v`;
-//! `Q` is friction, zero for a model that conserves its energy.
+//! `Q` is friction, zero for a model that conserves its energy, and a force from outside, if one acts.
 
-use super::Failure;
+use super::force::Piece;
+use super::{Failure, Force};
 use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Terms};
 use crate::linalg::{self, LinalgError, Workspace};
 use crate::scalar::{Real, Scalar};
@@ -21,8 +22,13 @@ pub(super) struct Phase<'a, S> {
     /// Iterations of implicit equations.
     pub(super) iterations: usize,
     points: Vec<S>,
+    external: Vec<S>,
     /// Whether forces beside those of `L` act.
     damped: bool,
+    force: Option<&'a dyn Force<S>>,
+    /// Time at the start of the step at hand, and the times at which the force may be asked.
+    start: S,
+    piece: Option<Piece<S>>,
 }
 
 /// First derivatives of `p` and `g = dL/dq + Q` at one state, `(n, n)` each; `d2L/dq dv` is the transpose of `dp/dq`.
@@ -92,7 +98,7 @@ impl<S: Scalar> Defect<S> {
 }
 
 impl<'a, S: Scalar> Phase<'a, S> {
-    pub(super) fn new(model: &'a dyn EulerLagrange<S>) -> Self {
+    pub(super) fn new(model: &'a dyn EulerLagrange<S>, force: Option<&'a dyn Force<S>>) -> Self {
         Self {
             model,
             n: model.coordinates(),
@@ -101,11 +107,40 @@ impl<'a, S: Scalar> Phase<'a, S> {
             evaluations: 0,
             iterations: 0,
             points: Vec::new(),
-            damped: !model.conserves_energy(),
+            external: Vec::new(),
+            damped: !model.conserves_energy() || force.is_some(),
+            force,
+            start: <S as Real>::zero(),
+            piece: None,
         }
     }
 
-    fn evaluate(&mut self, q: &[S], v: &[S], request: Request) -> Result<(), Failure> {
+    /// The next evaluations belong to a step that starts at time `t`.
+    pub(super) fn begin(&mut self, t: S, piece: &Piece<S>) {
+        (self.start, self.piece) = (t, Some(*piece));
+    }
+
+    /// Adds the force from outside to that of the model; row `k` lies `after[k]` behind the start of the step, or all rows
+    /// `after[0]`.
+    fn add_external(&mut self, q: &[S], v: &[S], after: &[S]) -> Result<(), Failure> {
+        let (Some(force), Some(piece)) = (self.force, self.piece) else { return Ok(()) };
+        let (n, zero) = (self.n, <S as Real>::zero());
+        self.terms.force.resize(q.len(), zero);
+        self.external.resize(n, zero);
+        for (row, (q, v)) in q.chunks_exact(n).zip(v.chunks_exact(n)).enumerate() {
+            let after = after.get(row).or(after.first()).copied().unwrap_or(zero);
+            force.force(piece.time(self.start + after), q, v, &mut self.external);
+            if self.external.iter().any(|x| !x.is_finite()) {
+                return Err(Failure::Model(MechanicsError::NotFinite { row: 0, what: "external force" }));
+            }
+            let sums = self.terms.force[row * n..(row + 1) * n].iter_mut();
+            sums.zip(&self.external).for_each(|(sum, &force)| *sum += force);
+        }
+        Ok(())
+    }
+
+    /// Evaluates states; `after` says how far behind the start of the step they lie, see [`Phase::add_external`].
+    fn evaluate(&mut self, q: &[S], v: &[S], request: Request, after: &[S]) -> Result<(), Failure> {
         if q.iter().chain(v).any(|x| !x.is_finite()) {
             return Err(Failure::State);
         }
@@ -113,6 +148,7 @@ impl<'a, S: Scalar> Phase<'a, S> {
         let request = if self.damped && request.includes(Request::DL_DQ) { request | Request::FORCE } else { request };
         self.model.terms(q, v, request, &mut self.terms).map_err(Failure::Model)?;
         if request.includes(Request::FORCE) {
+            self.add_external(q, v, after)?;
             self.terms.dl_dq.iter_mut().zip(&self.terms.force).for_each(|(g, &force)| *g += force);
         }
         let fields = [
@@ -132,9 +168,15 @@ impl<'a, S: Scalar> Phase<'a, S> {
         Ok(())
     }
 
-    /// `p` and `g` of a batch, `(batch, n)`.
-    pub(super) fn momenta_and_forces(&mut self, q: &[S], v: &[S], p: &mut [S], g: &mut [S]) -> Result<(), Failure> {
-        self.evaluate(q, v, Request::MOMENTUM | Request::DL_DQ)?;
+    /// `p` and `g` of a batch, `(batch, n)`, row `k` lying `after[k]` behind the start of the step.
+    pub(super) fn momenta_and_forces(
+        &mut self,
+        q: &[S],
+        v: &[S],
+        after: &[S],
+        (p, g): (&mut [S], &mut [S]),
+    ) -> Result<(), Failure> {
+        self.evaluate(q, v, Request::MOMENTUM | Request::DL_DQ, after)?;
         p.copy_from_slice(&self.terms.momentum);
         g.copy_from_slice(&self.terms.dl_dq);
         Ok(())
@@ -142,16 +184,17 @@ impl<'a, S: Scalar> Phase<'a, S> {
 
     /// `p` of one state.
     pub(super) fn momentum(&mut self, q: &[S], v: &[S]) -> Result<Vec<S>, Failure> {
-        self.evaluate(q, v, Request::MOMENTUM)?;
+        self.evaluate(q, v, Request::MOMENTUM, &[])?;
         Ok(self.terms.momentum.clone())
     }
 
-    /// `M` as the model gives it, derivatives along `q`, and of friction along `v`, by forward differences over `sqrt(eps)`:
-    /// enough for an iteration matrix. The differences are one batch of `n + 1` states, `2n + 1` with friction.
-    pub(super) fn derivatives(&mut self, q: &[S], v: &[S], into: &mut Derivatives<S>) -> Result<(), Failure> {
+    /// `M` as the model gives it, derivatives along `q`, and of `Q` along `v`, by forward differences over `sqrt(eps)`:
+    /// enough for an iteration matrix. The differences are one batch of `n + 1` states, `2n + 1` with friction or a force
+    /// from outside, `after` the start of the step.
+    pub(super) fn derivatives(&mut self, q: &[S], v: &[S], after: S, into: &mut Derivatives<S>) -> Result<(), Failure> {
         let n = self.n;
         let zero = <S as Real>::zero();
-        self.evaluate(q, v, Request::MASS_MATRIX)?;
+        self.evaluate(q, v, Request::MASS_MATRIX, &[])?;
         into.mass.clone_from(&self.terms.mass_matrix);
         let shift = |i: usize| {
             let size = S::max(q[i].abs(), v[i].abs());
@@ -169,7 +212,7 @@ impl<'a, S: Scalar> Phase<'a, S> {
                 velocities[(1 + n + i) * n + i] += shift(i);
             }
         }
-        let outcome = self.evaluate(shifted, velocities, Request::MOMENTUM | Request::DL_DQ);
+        let outcome = self.evaluate(shifted, velocities, Request::MOMENTUM | Request::DL_DQ, &[after]);
         for (field, matrix) in [(&self.terms.momentum, &mut into.mixed), (&self.terms.dl_dq, &mut into.stiffness)] {
             matrix.clear();
             matrix.resize(n * n, zero);
@@ -205,7 +248,7 @@ impl<'a, S: Scalar> Phase<'a, S> {
         let mut change = residual.clone();
         let mut best = Defect::unknown();
         for sweep in 1..=MAX_SWEEPS {
-            self.evaluate(q, v, Request::MOMENTUM | Request::MASS_MATRIX)?;
+            self.evaluate(q, v, Request::MOMENTUM | Request::MASS_MATRIX, &[])?;
             self.iterations += 1;
             for ((r, &found), &wanted) in residual.iter_mut().zip(&self.terms.momentum).zip(p) {
                 *r = found - wanted;

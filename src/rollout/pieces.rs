@@ -2,7 +2,7 @@
 
 use super::run::integrate;
 use super::trajectory::CHUNK;
-use super::{EnergyBalance, Integrable, Options, RolloutError, Statistics, Trajectory};
+use super::{EnergyBalance, Force, Integrable, Options, RolloutError, Statistics, Trajectory};
 use crate::lagrangian::EulerLagrange;
 use crate::scalar::Scalar;
 use std::ops::ControlFlow;
@@ -31,9 +31,20 @@ pub fn rollout_in_pieces<S: Integrable>(
     options: &Options<S>,
     take: &mut dyn FnMut(&Trajectory<S>) -> ControlFlow<()>,
 ) -> Ending {
+    hand_over(model, None, (q, v), options, take)
+}
+
+/// The same, perhaps under a force from outside.
+pub(super) fn hand_over<S: Integrable>(
+    model: &dyn EulerLagrange<S>,
+    force: Option<&dyn Force<S>>,
+    start: (&[S], &[S]),
+    options: &Options<S>,
+    take: &mut dyn FnMut(&Trajectory<S>) -> ControlFlow<()>,
+) -> Ending {
     let mut piece = Trajectory::empty(model.coordinates());
     let (mut samples, mut willing) = (0, true);
-    let mut hand_over = |piece: &mut Trajectory<S>| {
+    let mut give = |piece: &mut Trajectory<S>| {
         piece.energy = options.energy.then(|| piece.energy_by(model));
         samples += piece.len();
         let more = take(piece).is_continue();
@@ -43,15 +54,15 @@ pub fn rollout_in_pieces<S: Integrable>(
         piece.v.clear();
         more
     };
-    let (statistics, stop) = integrate(model, q, v, options, &mut |t, q, v| {
+    let (statistics, stop) = integrate(model, force, start, options, &mut |t, q, v| {
         piece.push(t, q, v);
         if piece.len() == CHUNK {
-            willing = hand_over(&mut piece);
+            willing = give(&mut piece);
         }
         willing
     });
     if willing && !piece.is_empty() {
-        hand_over(&mut piece);
+        give(&mut piece);
     }
     Ending { samples, statistics, stop }
 }
@@ -112,12 +123,13 @@ impl<S: Scalar, F: FnMut(&Trajectory<S>) -> Result<EnergyBalance<S>, RolloutErro
     }
 
     fn take(&mut self, block: &Trajectory<S>) -> Result<EnergyBalance<S>, RolloutError> {
-        let EnergyBalance { change, dissipated, size } = (self.balance)(block)?;
+        let EnergyBalance { change, dissipated, work, size } = (self.balance)(block)?;
         let sum = match self.sum {
-            None => EnergyBalance { change, dissipated, size },
+            None => EnergyBalance { change, dissipated, work, size },
             Some(sum) => EnergyBalance {
                 change: sum.change + change,
                 dissipated: sum.dissipated + dissipated,
+                work: sum.work + work,
                 size: S::max(sum.size, size),
             },
         };
@@ -175,7 +187,7 @@ mod tests {
             let (t, v) = (&stretch.t, &stretch.v);
             let dissipated = t.windows(2).zip(v.windows(2)).map(|(t, v)| (t[1] - t[0]) * v[0] * v[1]).sum();
             let size = v.iter().fold(0.0, |size: f64, v| size.max(v.abs()));
-            Ok(EnergyBalance { change: v.last().unwrap() - v[0], dissipated, size })
+            Ok(EnergyBalance { change: v.last().unwrap() - v[0], dissipated, work: 0.0, size })
         };
         let mut blocks = Balances::new(1, balance);
         let ending = rollout_in_pieces(&*oscillator(), &[1.0], &[0.2], &options, &mut |piece| {

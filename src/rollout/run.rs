@@ -1,10 +1,9 @@
 //! Roll-outs of one start and of many.
 
 use super::fixed::{self, Stepper};
-use super::ode::{Adaptive, Ended, Task};
-use super::samples::Samples;
-use super::{Integrable, Method, Options, RolloutError, Statistics, Trajectory, UnderflowCause};
-use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Terms};
+use super::ode::Adaptive;
+use super::{Force, Integrable, Method, Options, RolloutError, Statistics, Trajectory, UnderflowCause, adaptive};
+use crate::lagrangian::{EulerLagrange, MechanicsError};
 use crate::scalar::Scalar;
 
 /// What a roll-out brought.
@@ -69,7 +68,34 @@ impl Failure {
 ///
 /// Fixed-step methods check the domain at the stages and the end of every step, and report the last time inside.
 pub fn rollout<S: Integrable>(model: &dyn EulerLagrange<S>, q: &[S], v: &[S], options: &Options<S>) -> Rollout<S> {
-    collected(model, options, |keep| integrate(model, q, v, options, keep))
+    adaptive_or_fixed(model, None, q, v, options)
+}
+
+/// [`rollout`] by the structure-preserving methods alone, in every precision: [`crate::scalar::Dd`] as well.
+pub fn rollout_fixed<S: Scalar>(model: &dyn EulerLagrange<S>, q: &[S], v: &[S], options: &Options<S>) -> Rollout<S> {
+    fixed(model, None, q, v, options)
+}
+
+/// By any method, perhaps under a force from outside.
+pub(super) fn adaptive_or_fixed<S: Integrable>(
+    model: &dyn EulerLagrange<S>,
+    force: Option<&dyn Force<S>>,
+    q: &[S],
+    v: &[S],
+    options: &Options<S>,
+) -> Rollout<S> {
+    collected(model, options, |keep| integrate(model, force, (q, v), options, keep))
+}
+
+/// By the structure-preserving methods, perhaps under a force from outside.
+pub(super) fn fixed<S: Scalar>(
+    model: &dyn EulerLagrange<S>,
+    force: Option<&dyn Force<S>>,
+    q: &[S],
+    v: &[S],
+    options: &Options<S>,
+) -> Rollout<S> {
+    collected(model, options, |keep| integrate_fixed(model, force, (q, v), options, keep))
 }
 
 /// Receives the time, coordinates and velocities of every sample in order, and says whether to go on.
@@ -92,11 +118,11 @@ fn collected<S: Scalar>(
     Rollout { trajectory, statistics, stop }
 }
 
-/// [`rollout`] that hands every sample over and keeps none.
+/// The motion by any method, every sample handed over and none kept.
 pub(super) fn integrate<S: Integrable>(
     model: &dyn EulerLagrange<S>,
-    q: &[S],
-    v: &[S],
+    force: Option<&dyn Force<S>>,
+    (q, v): (&[S], &[S]),
     options: &Options<S>,
     keep: &mut Keep<'_, S>,
 ) -> (Statistics, Option<RolloutError>) {
@@ -104,86 +130,20 @@ pub(super) fn integrate<S: Integrable>(
         Method::Dopri5 => Adaptive::Dopri5,
         Method::Dop853 => Adaptive::Dop853,
         Method::Midpoint | Method::Gauss4 | Method::Gauss6 | Method::Variational => {
-            return integrate_fixed(model, q, v, options, keep);
+            return integrate_fixed(model, force, (q, v), options, keep);
         }
     };
-    let n = model.coordinates();
-    if let Err(error) = check(n, q, v, options).and_then(|()| reachable(q, v, options)) {
-        return (Statistics::default(), Some(error));
+    match check(model.coordinates(), q, v, options).and_then(|()| reachable(q, v, options)) {
+        Err(error) => (Statistics::default(), Some(error)),
+        Ok(()) => adaptive::run(model, force, method, (q, v), options, keep),
     }
-
-    let samples = Samples::new(options);
-    let backwards = options.t_end < options.t0;
-    let start: Vec<S> = q.iter().chain(v).copied().collect();
-    let task = Task {
-        method,
-        rtol: options.rtol,
-        atol: options.atol,
-        max_steps: options.max_steps,
-        first_step: S::of_f64(0.0),
-        start: &start,
-        samples: &samples,
-    };
-
-    let mut terms = Terms::default();
-    let mut derivative = |y: &[S], dy: &mut [S]| -> Result<(), Failure> {
-        Failure::check(options.domain.as_ref(), y)?;
-        let (q, v) = y.split_at(n);
-        model.terms(q, v, Request::ACCELERATION, &mut terms).map_err(Failure::Model)?;
-        if terms.acceleration.len() != n {
-            let (expected, found) = (n, terms.acceleration.len());
-            return Err(Failure::Model(MechanicsError::Shape { what: "acceleration", expected, found }));
-        }
-        if terms.acceleration.iter().any(|a| !a.is_finite()) {
-            return Err(Failure::Model(MechanicsError::NotFinite { row: 0, what: "acceleration" }));
-        }
-        for (slope, &x) in dy.iter_mut().zip(v.iter().chain(&terms.acceleration)) {
-            *slope = if backwards { -x } else { x };
-        }
-        Ok(())
-    };
-    let domain = options.domain.as_ref();
-    let mut valid = true;
-    let mut sample = |k: usize, y: &[S]| {
-        // An interpolated state may still cross a bound by less than the tolerance.
-        valid &= y.iter().all(|x| x.is_finite()) && domain.is_none_or(|domain| domain.violation(y).is_none());
-        // The samples behind an invalid one are not taken, the motion goes on to its end.
-        !valid || keep(samples.time(k), &y[..n], &y[n..])
-    };
-
-    let ran = S::integrate(&task, &mut derivative, &mut sample);
-    let t = if backwards { options.t0 - ran.elapsed } else { options.t0 + ran.elapsed }.to_f64();
-    let state: Vec<f64> = ran.state.iter().map(|x| x.to_f64()).collect();
-    let step = ran.step.to_f64();
-    let stop = match ran.ended {
-        None if valid => None,
-        None => left(domain, &ran.state, t, state),
-        Some(Ended::Stopped) => Some(RolloutError::Stopped { t }),
-        Some(Ended::TooManySteps) => Some(RolloutError::TooManySteps { t, steps: options.max_steps }),
-        Some(Ended::Failed(failure)) => Some(typed(failure, t, state, step)),
-        Some(Ended::Underflow) => {
-            let largest_acceleration =
-                match model.terms(&ran.state[..n], &ran.state[n..], Request::ACCELERATION, &mut terms) {
-                    Ok(()) => terms.acceleration.iter().map(|a| a.abs().to_f64()).fold(0.0, f64::max),
-                    Err(_) => f64::NAN,
-                };
-            let cause = UnderflowCause::ErrorTest { largest_acceleration };
-            Some(RolloutError::StepUnderflow { t, state, step, cause })
-        }
-    };
-    (ran.statistics, stop)
 }
 
-/// [`rollout`] by the structure-preserving methods alone, in every precision: [`crate::scalar::Dd`] as well.
-pub fn rollout_fixed<S: Scalar>(model: &dyn EulerLagrange<S>, q: &[S], v: &[S], options: &Options<S>) -> Rollout<S> {
-    collected(model, options, |keep| integrate_fixed(model, q, v, options, keep))
-}
-
-/// [`rollout_fixed`] that hands every sample over and keeps none.
+/// The motion by the structure-preserving methods, every sample handed over and none kept.
 fn integrate_fixed<S: Scalar>(
     model: &dyn EulerLagrange<S>,
-    q: &[S],
-    v: &[S],
+    force: Option<&dyn Force<S>>,
+    (q, v): (&[S], &[S]),
     options: &Options<S>,
     keep: &mut Keep<'_, S>,
 ) -> (Statistics, Option<RolloutError>) {
@@ -201,7 +161,7 @@ fn integrate_fixed<S: Scalar>(
                        dopri5, dop853, midpoint, gauss4 and gauss6 integrate it";
         return refused(RolloutError::Invalid { what: "method", problem: problem.to_string() });
     }
-    fixed::run(model, &mut stepper, q, v, options, keep)
+    fixed::run(model, force, &mut stepper, (q, v), options, keep)
 }
 
 fn check<S: Scalar>(n: usize, q: &[S], v: &[S], options: &Options<S>) -> Result<(), RolloutError> {
@@ -234,13 +194,6 @@ fn reachable<S: Scalar>(q: &[S], v: &[S], options: &Options<S>) -> Result<(), Ro
         S::NAME
     );
     Err(RolloutError::Invalid { what: "atol", problem })
-}
-
-/// The error of a trajectory whose samples cross a bound that its steps respect: it is grazed within the tolerance.
-fn left<S: Scalar>(domain: Option<&super::Domain<S>>, reached: &[S], t: f64, state: Vec<f64>) -> Option<RolloutError> {
-    let (component, lower, upper) = domain?.violation(reached).or_else(|| domain?.tightest(reached))?;
-    let (value, lower, upper) = (state[component], lower.to_f64(), upper.to_f64());
-    Some(RolloutError::LeftDomain { t, state, component, value, lower, upper })
 }
 
 pub(super) fn typed(failure: Failure, t: f64, state: Vec<f64>, step: f64) -> RolloutError {

@@ -59,6 +59,40 @@ impl<S: Scalar> Samples<S> {
     }
 }
 
+impl<S: Scalar> Samples<S> {
+    /// Number of samples whose elapsed time is not beyond `end`.
+    pub(super) fn count_until(&self, end: S) -> usize {
+        let (mut low, mut high) = (0, self.len());
+        while low < high {
+            let middle = low + (high - low) / 2;
+            if self.elapsed(middle) <= end { low = middle + 1 } else { high = middle }
+        }
+        low
+    }
+}
+
+/// Samples `first..after` in time elapsed since `start`, and, if it is none of them, the end of their stretch.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Part<S> {
+    pub(super) all: Samples<S>,
+    pub(super) first: usize,
+    pub(super) after: usize,
+    pub(super) start: S,
+    pub(super) end: Option<S>,
+}
+
+impl<S: Scalar> Times<S> for Part<S> {
+    fn len(&self) -> usize {
+        self.after - self.first + usize::from(self.end.is_some())
+    }
+
+    fn get(&self, k: usize) -> Option<S> {
+        let sample = self.first + k;
+        let elapsed = if sample < self.after { Some(self.all.elapsed(sample)) } else { self.end };
+        elapsed.filter(|_| k < self.len()).map(|e| S::max(e - self.start, <S as Real>::zero()))
+    }
+}
+
 impl<S: Scalar> Times<S> for Samples<S> {
     fn len(&self) -> usize {
         self.regular + 1

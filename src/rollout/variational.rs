@@ -7,7 +7,9 @@
 //! p0 = -D1 L_d(q0, q1) = dL/dv - h/2 dL/dq,    p1 = D2 L_d(q0, q1) = dL/dv + h/2 dL/dq.
 //! ```
 //!
-//! The discrete action knows no friction: models that lose energy are refused. Order 2, symplectic. In exact arithmetic the motion is that of the implicit midpoint rule on Hamilton's equations;
+//! The discrete action knows no friction: models that lose energy are refused. A force from outside acts by half a step
+//! times its value in the middle at either end, `dL/dq + Q` in place of `dL/dq` (the discrete Lagrange-d'Alembert
+//! principle, 3.2.1 there). Order 2, symplectic. In exact arithmetic the motion is that of the implicit midpoint rule on Hamilton's equations;
 //! the derivation needs no Hamiltonian, and the two check each other.
 //!
 //! Source: Marsden and West, Discrete mechanics and variational integrators (2001), 1.3.1 and 2.3.1.
@@ -41,7 +43,7 @@ impl<S: Scalar> Discrete<'_, S> {
 impl<S: Scalar> Equations<S> for Discrete<'_, S> {
     fn residual(&mut self, phase: &mut Phase<'_, S>, x: &[S], residual: &mut [S]) -> Result<Defect<S>, Failure> {
         self.move_to(x);
-        phase.momenta_and_forces(self.q, x, self.p, self.g)?;
+        phase.momenta_and_forces(self.q, x, &[self.half_step], (self.p, self.g))?;
         let p0 = &self.state.p;
         for (k, r) in residual.iter_mut().enumerate() {
             *r = (self.p[k] - p0.high[k]) - (p0.low[k] + self.half_step * self.g[k]);
@@ -50,17 +52,18 @@ impl<S: Scalar> Equations<S> for Discrete<'_, S> {
         Ok(Defect::of(phase.n, residual, size))
     }
 
-    /// `M + h/2 (B - B^T) - h^2/4 K`, `B = dp/dq`, `K = dg/dq`.
+    /// `M + h/2 (B - B^T - C) - h^2/4 K`, `B = dp/dq`, `K = dg/dq`, `C = dQ/dv`.
     fn jacobian(&mut self, phase: &mut Phase<'_, S>, x: &[S], matrix: &mut [S]) -> Result<(), Failure> {
         let n = phase.n;
         self.move_to(x);
-        phase.derivatives(self.q, x, self.derivatives)?;
-        let Derivatives { mass, mixed, stiffness, .. } = &*self.derivatives;
+        phase.derivatives(self.q, x, self.half_step, self.derivatives)?;
+        let Derivatives { mass, mixed, stiffness, damping } = &*self.derivatives;
         let (linear, square) = (self.half_step, self.half_step * self.half_step);
         for r in 0..n {
             for c in 0..n {
                 let at = r * n + c;
-                matrix[at] = mass[at] + linear * (mixed[at] - mixed[c * n + r]) - square * stiffness[at];
+                let along_v = (mixed[at] - mixed[c * n + r]) - damping[at];
+                matrix[at] = mass[at] + linear * along_v - square * stiffness[at];
             }
         }
         Ok(())

@@ -51,6 +51,9 @@ pub struct Header {
     pub parameters: BTreeMap<String, f64>,
     /// Names of the components of a state: coordinates, then velocities.
     pub columns: Vec<String>,
+    /// Names of the columns of the known external forces it was learned with, one per coordinate; empty if there were none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub forces: Vec<String>,
     /// Number type of the weights.
     pub precision: StoredPrecision,
     /// Bounds of each coordinate in training, in physical units.
@@ -81,6 +84,7 @@ impl Header {
         require(self.columns.len() == 2 * n, "columns: expected two per coordinate")?;
         let distinct: std::collections::BTreeSet<_> = self.columns.iter().collect();
         require(distinct.len() == 2 * n, "columns: expected distinct names")?;
+        require([0, n].contains(&self.forces.len()), "forces: expected one name per coordinate or none")?;
         require(self.parameters.values().all(|x| x.is_finite()), "parameters: expected finite numbers")?;
         for (bounds, text) in [(&self.position, "position"), (&self.velocity, "velocity")] {
             let ordered = bounds.iter().all(|&[low, high]| low.is_finite() && high.is_finite() && low <= high);

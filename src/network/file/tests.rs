@@ -26,6 +26,7 @@ fn header(hidden: Vec<usize>, embed_periodic: bool, precision: StoredPrecision) 
         system: "spring-pendulum".to_string(),
         parameters: BTreeMap::from([("m".to_string(), 1.0), ("g".to_string(), 9.81)]),
         columns: ["theta", "r", "theta_dot", "r_dot"].map(String::from).to_vec(),
+        forces: Vec::new(),
         precision,
         position: vec![[0.0, std::f64::consts::TAU], [0.5, 1.5]],
         velocity: vec![[-10.0, 10.0]; 2],
@@ -362,4 +363,18 @@ proptest! {
     fn arbitrary_bytes_are_refused(bytes in prop::collection::vec(any::<u8>(), 0..300)) {
         prop_assert!(ModelFile::<f64>::from_bytes(&bytes).is_err());
     }
+}
+
+#[test]
+fn names_of_forces_are_kept_and_counted() {
+    let plain = header(vec![4], true, StoredPrecision::F64);
+    let text = |header: &Header| serde_json::to_string(header).unwrap();
+    // A file without forces reads and writes as ever.
+    assert!(!text(&plain).contains("forces"));
+    assert_eq!(serde_json::from_str::<Header>(&text(&plain)).unwrap(), plain);
+    let driven = Header { forces: vec!["tau1".to_string(), "tau2".to_string()], ..plain.clone() };
+    assert_eq!(serde_json::from_str::<Header>(&text(&driven)).unwrap(), driven);
+    assert!(driven.validate().is_ok());
+    let one = Header { forces: vec!["tau1".to_string()], ..plain };
+    assert!(one.validate().unwrap_err().to_string().contains("forces: expected one name per coordinate"));
 }

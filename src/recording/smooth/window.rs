@@ -19,8 +19,10 @@ pub struct Quality {
     /// Their bias, root mean square: what the polynomial cannot follow. Estimated by two more degrees, which miss part of
     /// short bursts themselves: there it is too small, for a chaotic double pendulum by a third.
     pub bias: [f64; 3],
-    /// Root mean square of velocity about its mean, and of acceleration, errors taken out.
+    /// Root mean square of velocity, error taken out.
     pub velocity: f64,
+    /// The same about its mean: of a drift with oscillations the velocity of these.
+    pub velocity_deviation: f64,
     /// Root mean square of acceleration, error taken out.
     pub acceleration: f64,
 }
@@ -123,7 +125,8 @@ impl Signal<'_> {
             window,
             error: variance.map(root),
             bias: bias.map(root),
-            velocity: root(square_v - mean_v * mean_v / count - variance[1]),
+            velocity: root(square_v - variance[1]),
+            velocity_deviation: root(square_v - mean_v * mean_v / count - variance[1]),
             acceleration: root(square_a - variance[2]),
         })
     }

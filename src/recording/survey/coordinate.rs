@@ -23,11 +23,13 @@ pub struct CoordinateSurvey {
     pub noise_relative: f64,
     /// Whether motion and noise can be told apart; if not, `noise` is an upper bound.
     pub noise_resolved: bool,
-    /// Root mean square of the velocity about its mean.
+    /// Root mean square of the velocity.
     pub velocity: f64,
+    /// The same about its mean.
+    pub velocity_deviation: f64,
     /// Root mean square of the acceleration.
     pub acceleration: f64,
-    /// Period in s of the fast part of the motion, `2 pi rms(v) / rms(a)`: of a sine its period, of many frequencies that
+    /// Period in s of the fast part of the motion, `2 pi rms(v) / rms(a)`, the velocity about its mean: of a sine its period, of many frequencies that
     /// of their root mean square in the velocity's spectrum (Rice 1944).
     pub period: f64,
     /// Samples in such a period.
@@ -59,7 +61,7 @@ impl CoordinateSurvey {
         let values = || recording.tracks.iter().flat_map(|track| track.q.iter().skip(i).step_by(n).copied());
         let (min, max) = values().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)));
         let Chosen { noise, quality, seconds, .. } = *planned;
-        let period = TAU * quality.velocity / quality.acceleration;
+        let period = TAU * quality.velocity_deviation / quality.acceleration;
         let measured = |derivative: usize| {
             let there = if derivative == 1 { recording.has_velocities() } else { recording.has_accelerations() };
             there.then(|| compare(recording, i, derivative, alone))
@@ -73,6 +75,7 @@ impl CoordinateSurvey {
             noise_relative: noise.sigma / (max - min),
             noise_resolved: noise.resolved,
             velocity: quality.velocity,
+            velocity_deviation: quality.velocity_deviation,
             acceleration: quality.acceleration,
             period,
             samples_per_period: period / alone.step,

@@ -35,6 +35,19 @@ fn a_swing_is_described() {
     assert_eq!((&json["targets"], &json["tracks"][0]["samples"]), (&"smoothed".into(), &2000.into()));
 }
 
+/// A drift beside the oscillation belongs to the velocity, not to the period.
+#[test]
+fn a_drifting_swing_has_the_root_mean_square_of_all_its_velocity() {
+    let mut recording = swing(1e-4, 100.0, None);
+    let track = &mut recording.tracks[0];
+    track.q.iter_mut().zip(&track.times).for_each(|(q, t)| *q += 1.5 * t);
+    recording.periodic[0] = false;
+    let c = &look(recording).coordinates[0];
+    assert!((c.velocity / (1.5_f64.powi(2) + 2.0).sqrt() - 1.0).abs() < 0.02, "{}", c.velocity);
+    assert!((c.velocity_deviation / 2f64.sqrt() - 1.0).abs() < 0.02, "{}", c.velocity_deviation);
+    assert!((c.samples_per_period - 157.0).abs() < 4.0, "{}", c.samples_per_period);
+}
+
 #[test]
 fn loud_noise_calls_for_shooting() {
     let found = look(swing(0.3, 100.0, None));

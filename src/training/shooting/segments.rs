@@ -7,6 +7,7 @@
 
 use crate::network::Architecture;
 use crate::recording::{Track, hermite};
+use crate::rollout::SampledForce;
 use crate::scalar::{Real, Scalar};
 use std::f64::consts::TAU;
 use std::ops::Range;
@@ -151,8 +152,10 @@ impl<S: Scalar> Segments<S> {
         // Largest excursion within a segment and speed, physical.
         let mut largest = vec![0.0_f64; 2 * n];
         for trajectory in trajectories {
+            let force = SampledForce::recorded(trajectory.track);
+            let force = forced.then_some(force.as_ref());
             for piece in pieces(&trajectory.track.times, per_segment) {
-                all.push(architecture, trajectory, !noise.v.is_empty(), &piece, forced, &mut largest);
+                all.push(architecture, trajectory, !noise.v.is_empty(), &piece, force, &mut largest);
             }
         }
         let scale = |i: usize| architecture.scale[i];
@@ -179,7 +182,7 @@ impl<S: Scalar> Segments<S> {
         trajectory: &Estimated<'_>,
         use_velocity: bool,
         piece: &Piece,
-        forced: bool,
+        force: Option<Option<&SampledForce<f64>>>,
         largest: &mut [f64],
     ) {
         let n = self.n;
@@ -212,11 +215,14 @@ impl<S: Scalar> Segments<S> {
         self.starts.extend((0..n).map(|i| scaled(trajectory.q[start * n + i] - origin(start, i), i)));
         self.starts.extend((0..n).map(|i| scaled(trajectory.v[start * n + i], i)));
         let jump = |i: usize| if has_next { scaled(origin(end, i) - origin(start, i), i) } else { <S as Real>::zero() };
-        if forced {
+        if let Some(force) = force {
+            // Zero for a track without forces beside others that have them.
+            let mut values = vec![0.0; n];
             for k in 0..=2 * self.steps {
-                let time = begin + 0.5 * k as f64 * h;
-                let force = |i: usize| S::of_f64(interpolated(track, n, i, time) * scale[i]);
-                self.force.extend((0..n).map(force));
+                if let Some(force) = force {
+                    force.at(begin + 0.5 * k as f64 * h, &mut values);
+                }
+                self.force.extend(values.iter().zip(scale).map(|(force, scale)| S::of_f64(force * scale)));
             }
         }
         self.list.push(Segment {
@@ -269,17 +275,6 @@ fn spread<'a>(lists: impl Iterator<Item = &'a [f64]>, n: usize, i: usize) -> f64
         count += samples;
     }
     (square / count).sqrt()
-}
-
-/// External force `i` at some time, linear between samples; 0 for a track without forces.
-fn interpolated(track: &Track, n: usize, i: usize, time: f64) -> f64 {
-    if track.force.is_empty() {
-        return 0.0;
-    }
-    let after = track.times.partition_point(|&t| t <= time).clamp(1, track.len() - 1);
-    let (t0, t1) = (track.times[after - 1], track.times[after]);
-    let s = ((time - t0) / (t1 - t0)).clamp(0.0, 1.0);
-    (1.0 - s) * track.force[(after - 1) * n + i] + s * track.force[after * n + i]
 }
 
 #[cfg(test)]

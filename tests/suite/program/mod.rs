@@ -6,6 +6,7 @@ mod conveniences;
 mod dissipation;
 mod experiment;
 mod fit;
+mod forces;
 mod hostile;
 mod inspect;
 mod motion;

@@ -1,3 +1,4 @@
 //! Integrators.
 
+mod forces;
 mod integrators;

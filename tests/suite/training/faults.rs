@@ -34,6 +34,7 @@ fn model(value: f64) -> ModelFile<f64> {
         system: "harmonic-oscillator".to_string(),
         parameters: [("m".to_string(), 1.0)].into(),
         columns: vec!["x".to_string(), "x_dot".to_string()],
+        forces: Vec::new(),
         precision: StoredPrecision::F64,
         position: vec![[-1.0, 1.0]],
         velocity: vec![[-1.0, 1.0]],

@@ -1,0 +1,191 @@
+//! Forces from outside, as arguments: constants and recorded columns.
+
+use crate::cli::number::finite;
+use crate::cli::recording_args::unit;
+use crate::cli::states::{column_names, parse_table};
+use crate::cli::{CliError, states};
+use crate::names::unknown;
+use crate::network::file::Header;
+use crate::recording::factor;
+use crate::report::{LinePlot, Series};
+use crate::rollout::SampledForce;
+use crate::storage::read_regular;
+use std::path::{Path, PathBuf};
+
+/// Arguments.
+#[derive(Debug, clap::Args)]
+pub struct ForceArgs {
+    /// External generalized forces that drive the motion: a constant NAME=VALUE (N, N m), or a CSV with a column of time and
+    /// columns of forces, linear between its rows; may be repeated, one CSV at most. NAME is the column of the data that
+    /// the model was fitted to, or COORDINATE_force. Forces that are not named are 0.
+    #[arg(long, value_name = "FILE.csv|NAME=VALUE", allow_hyphen_values = true)]
+    force: Vec<String>,
+    /// Column of time of the forces' CSV; if not given, the one called t or time.
+    #[arg(long, value_name = "COLUMN", requires = "force")]
+    force_time: Option<String>,
+    /// Units of columns of the forces' CSV that are not SI, or factors to SI, such as t=ms,tau1=mN.
+    #[arg(long, value_name = "COLUMN=UNIT", value_delimiter = ',', value_parser = unit, requires = "force")]
+    force_units: Vec<(String, String)>,
+}
+
+/// Name of the force conjugate to a coordinate where the data gave it none.
+pub fn usual(coordinate: &str) -> String {
+    format!("{coordinate}_force")
+}
+
+/// Names of a model's forces, one per coordinate: those of its data, or `COORDINATE_force`.
+pub fn names(header: &Header) -> Vec<String> {
+    let coordinates = &header.columns[..header.columns.len() / 2];
+    if header.forces.is_empty() { coordinates.iter().map(|name| usual(name)).collect() } else { header.forces.clone() }
+}
+
+/// Columns of recorded forces as a model remembers them; numbers of columns are no names.
+pub fn recorded(columns: &[String]) -> Vec<String> {
+    if columns.iter().any(|name| name.parse::<f64>().is_ok()) { Vec::new() } else { columns.to_vec() }
+}
+
+impl ForceArgs {
+    /// The force on a motion of a model from one time to another; none if none was asked for.
+    ///
+    /// # Errors
+    /// A usage error for names and numbers that make no sense, a data error for a file that is not as said or does not
+    /// cover the motion.
+    pub fn force(&self, header: &Header, from: f64, to: f64) -> Result<Option<SampledForce<f64>>, CliError> {
+        if self.force.is_empty() {
+            return Ok(None);
+        }
+        let coordinates = &header.columns[..header.columns.len() / 2];
+        let known = names(header);
+        let mut constants: Vec<Option<f64>> = vec![None; known.len()];
+        let mut file: Option<PathBuf> = None;
+        for given in &self.force {
+            match given.split_once('=') {
+                Some((name, value)) if !Path::new(given).exists() => {
+                    let name = name.trim();
+                    let usual = |i: &usize| known[*i] == name || usual(&coordinates[*i]) == name;
+                    let Some(i) = (0..known.len()).find(usual) else {
+                        let problem = unknown("force", name, known.iter().map(String::as_str));
+                        return Err(CliError::usage(format_args!("--force: {problem}")));
+                    };
+                    let value = finite(value).map_err(|problem| {
+                        CliError::usage(format_args!("--force {name}: {problem}, found {value:?}"))
+                    })?;
+                    if constants[i].replace(value).is_some() {
+                        return Err(CliError::usage(format_args!("--force: {name} stands there twice")));
+                    }
+                }
+                _ => {
+                    if let Some(first) = file.replace(PathBuf::from(given)) {
+                        let both = format!("found {} and {given}", first.display());
+                        return Err(CliError::usage(format_args!("--force: expected one file at most, {both}")));
+                    }
+                }
+            }
+        }
+        match file {
+            Some(path) => self.with_columns(&path, (coordinates, &known), &constants, (from, to)).map(Some),
+            None if self.force_time.is_some() || !self.force_units.is_empty() => {
+                Err(CliError::usage("--force-time and --force-units are about a CSV of forces, there is none"))
+            }
+            None => {
+                let values = constants.iter().map(|force| force.unwrap_or(0.0)).collect();
+                SampledForce::constant(values).map(Some).map_err(CliError::data)
+            }
+        }
+    }
+
+    /// The columns of a file, constants beside them.
+    fn with_columns(
+        &self,
+        path: &Path,
+        (coordinates, known): (&[String], &[String]),
+        constants: &[Option<f64>],
+        (from, to): (f64, f64),
+    ) -> Result<SampledForce<f64>, CliError> {
+        let bytes = read_regular(path, states::MAX_BYTES).map_err(|e| CliError::file(path, e))?;
+        let header = column_names(&bytes).map_err(|e| CliError::file(path, e))?;
+        let there = |name: &String| header.contains(name);
+        let time = match &self.force_time {
+            Some(name) if there(name) => name.clone(),
+            Some(name) => {
+                let problem = unknown("column", name, header.iter().map(String::as_str));
+                return Err(CliError::file(path, format_args!("--force-time: {problem}")));
+            }
+            None => {
+                let named =
+                    header.iter().find(|name| ["t", "time"].iter().any(|usual| name.eq_ignore_ascii_case(usual)));
+                let none = "no column called t or time; --force-time names another";
+                named.cloned().ok_or_else(|| CliError::file(path, none))?
+            }
+        };
+        // The column of every coordinate's force, if the file has one.
+        let mut columns = vec![time];
+        let mut places: Vec<Option<usize>> = Vec::with_capacity(known.len());
+        for ((name, coordinate), constant) in known.iter().zip(coordinates).zip(constants) {
+            let column = [name.clone(), usual(coordinate)].into_iter().find(there);
+            if let (Some(column), Some(_)) = (&column, constant) {
+                let problem = format!("--force: {column} is a constant and a column of {}", path.display());
+                return Err(CliError::usage(problem));
+            }
+            places.push(column.as_ref().map(|_| columns.len()));
+            columns.extend(column);
+        }
+        if columns.len() == 1 {
+            let problem = format!("no column of forces, expected {}", known.join(", "));
+            return Err(CliError::file(path, problem));
+        }
+        if let Some((name, _)) = self.force_units.iter().find(|(name, _)| !columns.contains(name)) {
+            let problem = unknown("column", name, columns.iter().map(String::as_str));
+            return Err(CliError::usage(format_args!("--force-units: {problem}")));
+        }
+        let mut factors = Vec::with_capacity(columns.len());
+        for column in &columns {
+            let unit = self.force_units.iter().find(|(name, _)| name == column).map_or("1", |(_, unit)| unit.as_str());
+            let problem = |problem| CliError::usage(format_args!("--force-units: {column}: {problem}"));
+            factors.push(factor(unit).map_err(problem)?);
+        }
+        let table = parse_table::<f64>(&bytes, &columns).map_err(|e| CliError::file(path, e))?;
+        let (mut times, mut values) = (Vec::with_capacity(table.rows.len()), Vec::new());
+        for (row, &line) in table.values.chunks_exact(columns.len()).zip(&table.rows) {
+            let t = row[0] * factors[0];
+            if let Some(&before) = times.last()
+                && t <= before
+            {
+                let column = &columns[0];
+                let problem = format!("row {line}, column {column}: expected a time after {before}, found {t}");
+                return Err(CliError::file(path, problem));
+            }
+            times.push(t);
+            for (place, constant) in places.iter().zip(constants) {
+                values.push(place.map_or(constant.unwrap_or(0.0), |at| row[at] * factors[at]));
+            }
+        }
+        let force = SampledForce::new(known.len(), times, values).map_err(|e| CliError::file(path, e))?;
+        let ((first, last), slack) = (force.span(), 1e-9 * (to - from).abs());
+        if from.min(to) < first - slack || from.max(to) > last + slack {
+            let problem = format!(
+                "forces are known from t = {first} to {last} and the motion runs from {from} to {to}; see --t-start and \
+                 --t-end"
+            );
+            return Err(CliError::file(path, problem));
+        }
+        Ok(force)
+    }
+}
+
+/// Forces over time, one line each.
+pub fn plot(force: &SampledForce<f64>, times: &[f64], names: &[String]) -> LinePlot {
+    let mut values = vec![0.0; names.len()];
+    let mut columns = vec![Vec::with_capacity(times.len()); names.len()];
+    for &t in times {
+        force.at(t, &mut values);
+        columns.iter_mut().zip(&values).for_each(|(column, &value)| column.push(value));
+    }
+    LinePlot {
+        title: "Known forces".into(),
+        x_label: "time ahead [s]".into(),
+        y_label: "force [N, N m]".into(),
+        log_y: false,
+        series: names.iter().zip(&columns).map(|(name, column)| Series::new(name, times, column)).collect(),
+    }
+}

@@ -1,0 +1,95 @@
+//! `lnn inspect --inverse`: the forces that make known accelerations.
+
+use crate::cli::shown::{CHUNK, Field, Format, Shape, explain, report_failures, show};
+use crate::cli::source::Source;
+use crate::cli::states::{column_names, parse_table};
+use crate::cli::{CliError, input, json, output, states};
+use crate::lagrangian::{InverseDynamics, inverse_dynamics};
+use crate::scalar::Scalar;
+use std::path::Path;
+
+/// Prints the forces of every state.
+///
+/// # Errors
+/// A usage or data error; after the last state, a data error if the forces of any state are not finite.
+pub fn inverse<S: Scalar>(path: &Path, format: Format, source: &Source<S>) -> Result<(), CliError> {
+    let n = source.columns.len() / 2;
+    let accelerations = source.columns[..n].iter().map(|name| format!("{name}_ddot"));
+    let mut columns: Vec<String> = source.columns.iter().cloned().chain(accelerations).collect();
+    let place = input::name(path);
+    let told = |e: &dyn std::fmt::Display| CliError::data(format_args!("{place}: {e}"));
+    let bytes = input::read(path, states::MAX_BYTES).map_err(|e| told(&e))?;
+    let header = column_names(&bytes).map_err(|e| told(&e))?;
+    // The time of a row is passed on, unless t is a coordinate.
+    let timed = format == Format::Csv && !columns.iter().any(|name| name == "t") && header.iter().any(|c| c == "t");
+    if timed {
+        columns.push("t".to_string());
+    }
+    let table = parse_table::<S>(&bytes, &columns).map_err(|e| told(&e))?;
+    drop(bytes);
+    if format == Format::Csv {
+        let time = if timed { "t," } else { "" };
+        output::print(&format!("{time}{}\n", source.forces.join(",")))?;
+    }
+    let width = columns.len();
+    let mut failures: Vec<(usize, String)> = Vec::new();
+    for (values, rows) in table.values.chunks(CHUNK * width).zip(table.rows.chunks(CHUNK)) {
+        let part = |range: std::ops::Range<usize>| -> Vec<S> {
+            values.chunks_exact(width).flat_map(|row| row[range.clone()].iter().copied()).collect()
+        };
+        let (q, v, a) = (part(0..n), part(n..2 * n), part(2 * n..3 * n));
+        let times: Vec<S> = if timed { part(3 * n..3 * n + 1) } else { Vec::new() };
+        let model = source.model.as_ref();
+        let mut text = String::new();
+        match inverse_dynamics(model, &q, &v, &a) {
+            Ok(forces) => {
+                for (k, &row) in rows.iter().enumerate() {
+                    text += &line(format, row, n, k, &forces, times.get(k), None);
+                }
+            }
+            // One state of the chunk failed: take them one by one, so that each says its own reason.
+            Err(_) => {
+                for (k, &row) in rows.iter().enumerate() {
+                    let one = k * n..(k + 1) * n;
+                    let forces = inverse_dynamics(model, &q[one.clone()], &v[one.clone()], &a[one]);
+                    let problem = forces.as_ref().err().cloned().map(explain);
+                    let nothing = || vec![S::NAN; n];
+                    let forces = forces.unwrap_or_else(|_| InverseDynamics {
+                        generalized: nothing(),
+                        friction: Vec::new(),
+                        external: nothing(),
+                    });
+                    text += &line(format, row, n, 0, &forces, times.get(k), problem.as_deref());
+                    failures.extend(problem.map(|problem| (row, problem)));
+                }
+            }
+        }
+        output::print(&text)?;
+    }
+    report_failures(&place, &failures)
+}
+
+/// The forces on state `k` of a batch.
+fn line<S: Scalar>(
+    format: Format,
+    row: usize,
+    n: usize,
+    k: usize,
+    forces: &InverseDynamics<S>,
+    time: Option<&S>,
+    problem: Option<&str>,
+) -> String {
+    let part = |values: &'_ [S]| -> Vec<S> { values.get(k * n..(k + 1) * n).unwrap_or(&[]).to_vec() };
+    let (all, friction, external) = (part(&forces.generalized), part(&forces.friction), part(&forces.external));
+    if format == Format::Csv {
+        let numbers =
+            time.into_iter().chain(&external).map(|x| if x.is_finite() { json::number(*x) } else { "nan".into() });
+        return numbers.collect::<Vec<_>>().join(",") + "\n";
+    }
+    let vector = |name, values| Field { name, values, shape: Shape::Vector };
+    let mut fields = vec![vector("generalized_force", &all[..]), vector("external_force", &external)];
+    if !friction.is_empty() {
+        fields.insert(1, vector("friction", &friction));
+    }
+    show(format, row, &fields, problem)
+}

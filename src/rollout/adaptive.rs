@@ -1,0 +1,150 @@
+//! Steps under error control, piece by piece where a force from outside is not smooth.
+
+use super::force::{Piece, pieces};
+use super::ode::{Adaptive, Ended, Ran, Task};
+use super::run::{Keep, typed};
+use super::samples::{Part, Samples, Times};
+use super::{Domain, Failure, Force, Integrable, Options, RolloutError, Statistics, UnderflowCause};
+use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Terms};
+use crate::linalg::Workspace;
+use crate::scalar::{Real, Scalar};
+
+/// What steps after a break begin with, in the last step before: a step that ended at a break may have been cut short.
+const GROWTH: f64 = 2.0;
+
+/// The equations of a motion in elapsed time `|t - t0|`.
+struct Motion<'a, S> {
+    model: &'a dyn EulerLagrange<S>,
+    force: Option<&'a dyn Force<S>>,
+    options: &'a Options<S>,
+    n: usize,
+    terms: Terms<S>,
+    external: Vec<S>,
+    workspace: Workspace<S>,
+}
+
+impl<S: Scalar> Motion<'_, S> {
+    fn backwards(&self) -> bool {
+        self.options.t_end < self.options.t0
+    }
+
+    /// The time when so much has elapsed.
+    fn time(&self, elapsed: S) -> S {
+        if self.backwards() { self.options.t0 - elapsed } else { self.options.t0 + elapsed }
+    }
+
+    /// Derivative of `y = (q, v)` by the elapsed time.
+    fn derivative(&mut self, piece: &Piece<S>, elapsed: S, y: &[S], dy: &mut [S]) -> Result<(), Failure> {
+        let n = self.n;
+        Failure::check(self.options.domain.as_ref(), y)?;
+        let (q, v) = y.split_at(n);
+        self.model.terms(q, v, Request::ACCELERATION, &mut self.terms).map_err(Failure::Model)?;
+        if self.terms.acceleration.len() != n {
+            let (expected, found) = (n, self.terms.acceleration.len());
+            return Err(Failure::Model(MechanicsError::Shape { what: "acceleration", expected, found }));
+        }
+        if let Some(force) = self.force {
+            force.force(piece.time(self.time(elapsed)), q, v, &mut self.external);
+            self.terms.add_force(n, v, &self.external, &mut self.workspace).map_err(Failure::Model)?;
+        }
+        if self.terms.acceleration.iter().any(|a| !a.is_finite()) {
+            return Err(Failure::Model(MechanicsError::NotFinite { row: 0, what: "acceleration" }));
+        }
+        let backwards = self.backwards();
+        for (slope, &x) in dy.iter_mut().zip(v.iter().chain(&self.terms.acceleration)) {
+            *slope = if backwards { -x } else { x };
+        }
+        Ok(())
+    }
+}
+
+/// Integrates from `(q, v)` to the end of the options or of what is possible; arguments are checked.
+pub(super) fn run<S: Integrable>(
+    model: &dyn EulerLagrange<S>,
+    force: Option<&dyn Force<S>>,
+    method: Adaptive,
+    (q, v): (&[S], &[S]),
+    options: &Options<S>,
+    keep: &mut Keep<'_, S>,
+) -> (Statistics, Option<RolloutError>) {
+    let mut total = Statistics::default();
+    let (n, zero) = (model.coordinates(), <S as Real>::zero());
+    let (terms, external, workspace) = (Terms::default(), vec![zero; n], Workspace::new());
+    let mut motion = Motion { model, force, options, n, terms, external, workspace };
+    let all = Samples::new(options);
+    let domain = options.domain.as_ref();
+    let mut state: Vec<S> = q.iter().chain(v).copied().collect();
+    let (mut start, mut first, mut first_step) = (zero, 0, zero);
+    for piece in pieces(force.map_or(&[], |force| force.breaks()), options.t0, options.t_end) {
+        // The samples of this piece; its end is integrated to even if it is none.
+        let last = piece.end >= all.elapsed(all.len() - 1);
+        let after = if last { all.len() } else { all.count_until(piece.end) };
+        let end = (!last && (after == first || all.elapsed(after - 1) < piece.end)).then_some(piece.end);
+        let samples = Part { all, first, after, start, end };
+        let attempts = total.accepted + total.rejected;
+        let task = Task {
+            method,
+            rtol: options.rtol,
+            atol: options.atol,
+            max_steps: options.max_steps.saturating_sub(attempts),
+            first_step: S::min(first_step, piece.end - start),
+            timed: force.is_some(),
+            start: &state,
+            samples: &samples,
+        };
+        let mut valid = true;
+        let mut sample = |k: usize, y: &[S]| {
+            // An interpolated state may still cross a bound by less than the tolerance.
+            valid &= y.iter().all(|x| x.is_finite()) && domain.is_none_or(|domain| domain.violation(y).is_none());
+            // The samples behind an invalid one are not taken, the motion goes on to its end.
+            !valid || first + k >= after || keep(all.time(first + k), &y[..n], &y[n..])
+        };
+        let mut derivative = |e: S, y: &[S], dy: &mut [S]| motion.derivative(&piece, start + e, y, dy);
+        let Ran { statistics, elapsed: reached, state: reached_state, step, ended } =
+            S::integrate(&task, &mut derivative, &mut sample);
+        total += statistics;
+        let stop = stopped(&mut motion, &piece, ended, valid, (start + reached, &reached_state, step));
+        if stop.is_some() {
+            return (total, stop);
+        }
+        first_step = S::of_f64(GROWTH) * step;
+        (start, first, state) = (piece.end, after, reached_state);
+    }
+    (total, None)
+}
+
+/// Why a piece ended before its time, if it did.
+fn stopped<S: Integrable>(
+    motion: &mut Motion<'_, S>,
+    piece: &Piece<S>,
+    ended: Option<Ended<Failure>>,
+    valid: bool,
+    (elapsed, reached, step): (S, &[S], S),
+) -> Option<RolloutError> {
+    let t = motion.time(elapsed).to_f64();
+    let state: Vec<f64> = reached.iter().map(|x| x.to_f64()).collect();
+    let step = step.to_f64();
+    match ended {
+        None if valid => None,
+        None => left(motion.options.domain.as_ref(), reached, t, state),
+        Some(Ended::Stopped) => Some(RolloutError::Stopped { t }),
+        Some(Ended::TooManySteps) => Some(RolloutError::TooManySteps { t, steps: motion.options.max_steps }),
+        Some(Ended::Failed(failure)) => Some(typed(failure, t, state, step)),
+        Some(Ended::Underflow) => {
+            let mut slope = vec![S::NAN; reached.len()];
+            let largest_acceleration = match motion.derivative(piece, elapsed, reached, &mut slope) {
+                Ok(()) => slope[motion.n..].iter().map(|a| a.abs().to_f64()).fold(0.0, f64::max),
+                Err(_) => f64::NAN,
+            };
+            let cause = UnderflowCause::ErrorTest { largest_acceleration };
+            Some(RolloutError::StepUnderflow { t, state, step, cause })
+        }
+    }
+}
+
+/// The error of a trajectory whose samples cross a bound that its steps respect: it is grazed within the tolerance.
+fn left<S: Scalar>(domain: Option<&Domain<S>>, reached: &[S], t: f64, state: Vec<f64>) -> Option<RolloutError> {
+    let (component, lower, upper) = domain?.violation(reached).or_else(|| domain?.tightest(reached))?;
+    let (value, lower, upper) = (state[component], lower.to_f64(), upper.to_f64());
+    Some(RolloutError::LeftDomain { t, state, component, value, lower, upper })
+}

@@ -1,0 +1,201 @@
+//! Forces from outside: what drives a motion beside its own Lagrangian and friction.
+
+use super::RolloutError;
+#[cfg(feature = "data")]
+use crate::recording::Track;
+use crate::scalar::{Real, Scalar};
+use std::cmp::Ordering;
+
+/// Generalized force `Q(t, q, v)` from outside, added to the right-hand side of `M a = g - c + Q`.
+///
+/// Closures `Fn(t, q, v, &mut force)` are forces; [`SampledForce`] is one that was recorded.
+pub trait Force<S: Scalar>: Send + Sync {
+    /// Writes `Q` at time `t` and state `(q, v)` into `force`; all three have `n` numbers. `Q_i` is conjugate to `q_i`: N
+    /// for a length in m, N m for an angle in rad, in the unit of `L` per unit of the coordinate.
+    fn force(&self, t: S, q: &[S], v: &[S], force: &mut [S]);
+
+    /// Times, ascending, at which the force is not smooth. Integrators end a step at each of them, so that their order
+    /// holds; the force may jump there: it is asked just before such a time by the step that ends, at it by the next.
+    fn breaks(&self) -> &[S] {
+        &[]
+    }
+}
+
+impl<S: Scalar, F: Fn(S, &[S], &[S], &mut [S]) + Send + Sync> Force<S> for F {
+    fn force(&self, t: S, q: &[S], v: &[S], force: &mut [S]) {
+        self(t, q, v, force);
+    }
+}
+
+/// A force known at some times: linear between them, constant before the first and after the last.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SampledForce<S> {
+    n: usize,
+    times: Vec<S>,
+    values: Vec<S>,
+}
+
+impl<S: Scalar> SampledForce<S> {
+    /// Values `(times, n)` row-major at ascending times, one at least.
+    ///
+    /// # Errors
+    /// [`RolloutError::Invalid`] for no time, another number of values, times that do not ascend, numbers that are not
+    /// finite.
+    pub fn new(n: usize, times: Vec<S>, values: Vec<S>) -> Result<Self, RolloutError> {
+        let invalid = |problem: String| Err(RolloutError::Invalid { what: "force", problem });
+        if n == 0 || times.is_empty() {
+            return invalid("has no values".to_string());
+        }
+        if values.len() != times.len() * n {
+            return invalid(format!("expected {} numbers, found {}", times.len() * n, values.len()));
+        }
+        if let Some(at) = times.iter().chain(&values).position(|x| !x.is_finite()) {
+            return invalid(format!("number {at} of times and values is not finite"));
+        }
+        if let Some(at) = times.windows(2).position(|pair| pair[1] <= pair[0]) {
+            return invalid(format!("time {} does not come after the one before", at + 1));
+        }
+        Ok(Self { n, times, values })
+    }
+
+    /// The same force at all times.
+    ///
+    /// # Errors
+    /// [`RolloutError::Invalid`] for no numbers or numbers that are not finite.
+    pub fn constant(values: Vec<S>) -> Result<Self, RolloutError> {
+        Self::new(values.len(), vec![<S as Real>::zero()], values)
+    }
+
+    /// First and last time.
+    pub fn span(&self) -> (S, S) {
+        (self.times[0], self.times[self.times.len() - 1])
+    }
+
+    /// `Q` at a time into `force`, `(n)`.
+    pub fn at(&self, t: S, force: &mut [S]) {
+        let n = self.n;
+        if self.times.len() == 1 {
+            return force.copy_from_slice(&self.values);
+        }
+        let after = self.times.partition_point(|&known| known <= t).clamp(1, self.times.len() - 1);
+        let (t0, t1) = (self.times[after - 1], self.times[after]);
+        let (zero, one) = (<S as Real>::zero(), <S as Real>::one());
+        let s = S::min(S::max((t - t0) / (t1 - t0), zero), one);
+        for (i, force) in force.iter_mut().enumerate() {
+            *force = (one - s) * self.values[(after - 1) * n + i] + s * self.values[after * n + i];
+        }
+    }
+}
+
+#[cfg(feature = "data")]
+impl SampledForce<f64> {
+    /// The known external forces of a recorded trajectory; `None` if there are none.
+    pub fn recorded(track: &Track) -> Option<Self> {
+        let n = track.force.len().checked_div(track.len()).filter(|n| *n > 0)?;
+        Self::new(n, track.times.clone(), track.force.clone()).ok()
+    }
+}
+
+impl<S: Scalar> Force<S> for SampledForce<S> {
+    fn force(&self, t: S, _: &[S], _: &[S], force: &mut [S]) {
+        self.at(t, force);
+    }
+
+    fn breaks(&self) -> &[S] {
+        if self.times.len() > 1 { &self.times } else { &[] }
+    }
+}
+
+/// Part of a motion during which the force is smooth.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Piece<S> {
+    /// Elapsed time `|t - t0|` at its end.
+    pub(super) end: S,
+    /// Times at which the force is asked; the latter lies just before a break.
+    lower: S,
+    upper: S,
+}
+
+impl<S: Scalar> Piece<S> {
+    /// The time nearest to `t` that belongs to the piece.
+    pub(super) fn time(&self, t: S) -> S {
+        S::max(S::min(t, self.upper), self.lower)
+    }
+}
+
+/// Cuts the time from `t0` to `t_end` at the breaks; without breaks it is one piece.
+pub(super) fn pieces<S: Scalar>(breaks: &[S], t0: S, t_end: S) -> Vec<Piece<S>> {
+    let (low, high) = if t_end < t0 { (t_end, t0) } else { (t0, t_end) };
+    // Closer than this times are one.
+    let blur = S::EPSILON.ldexp(3) * S::max(low.abs(), high.abs());
+    let mut cuts: Vec<S> = breaks.iter().copied().filter(|b| *b > low + blur && *b < high - blur).collect();
+    cuts.sort_by(|a, b| a.partial_cmp(b).unwrap_or(Ordering::Equal));
+    cuts.dedup_by(|next, last| (*next - *last).abs() <= blur);
+    let at_end = breaks.iter().any(|b| (*b - high).abs() <= blur);
+    let bounds: Vec<S> = [low].into_iter().chain(cuts).chain([high]).collect();
+    let mut pieces: Vec<Piece<S>> = bounds
+        .windows(2)
+        .enumerate()
+        .map(|(k, pair)| {
+            let (lower, end) = (pair[0], pair[1]);
+            let is_break = k + 2 < bounds.len() || at_end;
+            let upper = if is_break { S::max(end - blur, lower) } else { end };
+            Piece { end: if t_end < t0 { t0 - lower } else { end - t0 }, lower, upper }
+        })
+        .collect();
+    if t_end < t0 {
+        pieces.reverse();
+    }
+    pieces
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scalar::Dd;
+
+    #[test]
+    fn samples_are_joined_by_lines_and_held_at_the_ends() {
+        let force = SampledForce::new(2, vec![1.0, 2.0, 4.0], vec![0.0, 1.0, 2.0, 1.0, -2.0, 5.0]).unwrap();
+        let at = |t: f64| {
+            let mut values = [f64::NAN; 2];
+            force.force(t, &[], &[], &mut values);
+            values
+        };
+        assert_eq!(
+            [at(-1.0), at(1.0), at(1.5), at(3.0), at(9.0)],
+            [[0.0, 1.0], [0.0, 1.0], [1.0, 1.0], [0.0, 3.0], [-2.0, 5.0]]
+        );
+        assert_eq!((force.breaks(), force.span()), (&[1.0, 2.0, 4.0][..], (1.0, 4.0)));
+        let steady = SampledForce::constant(vec![Dd::of_f64(3.0)]).unwrap();
+        let mut value = [Dd::default()];
+        steady.at(Dd::of_f64(7.0), &mut value);
+        assert!(value[0] == Dd::of_f64(3.0) && steady.breaks().is_empty());
+    }
+
+    #[test]
+    fn nonsense_is_refused() {
+        let says = |n, times: &[f64], values: &[f64], part: &str| {
+            let text = SampledForce::new(n, times.to_vec(), values.to_vec()).unwrap_err().to_string();
+            assert!(text.contains(part), "{text}");
+        };
+        says(1, &[], &[], "no values");
+        says(2, &[0.0], &[1.0], "expected 2 numbers, found 1");
+        says(1, &[0.0, 0.0], &[1.0, 1.0], "time 1");
+        says(1, &[0.0, 1.0], &[1.0, f64::NAN], "number 3");
+    }
+
+    #[test]
+    fn time_is_cut_at_breaks_in_both_directions() {
+        let breaks = [-1.0, 0.0, 1.0, 1.0 + 1e-16, 2.5, 3.0, 9.0];
+        let ends = |t0: f64, t_end: f64| pieces(&breaks, t0, t_end).iter().map(|p| p.end).collect::<Vec<_>>();
+        assert_eq!(ends(0.0, 3.0), [1.0, 2.5, 3.0]);
+        assert_eq!(ends(3.0, 0.0), [0.5, 2.0, 3.0]);
+        assert_eq!(ends(0.25, 0.5), [0.25]);
+        assert_eq!(ends(2.0, 2.0), [0.0]);
+        let cut = pieces(&breaks, 0.0, 3.0);
+        // Before a break for the piece that ends there, at it for the piece that begins.
+        assert!(cut[0].time(1.0) < 1.0 && cut[1].time(1.0 - 1e-16) == 1.0 && cut[2].time(3.0) < 3.0);
+        assert_eq!(pieces(&[], -1.0, 2.0)[0].time(2.0), 2.0);
+    }
+}
