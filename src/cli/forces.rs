@@ -3,7 +3,7 @@
 use crate::cli::number::finite;
 use crate::cli::recording_args::unit;
 use crate::cli::states::{column_names, parse_table};
-use crate::cli::{CliError, states};
+use crate::cli::{CliError, output, states};
 use crate::names::unknown;
 use crate::network::file::Header;
 use crate::recording::factor;
@@ -168,6 +168,11 @@ impl ForceArgs {
                  --t-end"
             );
             return Err(CliError::file(path, problem));
+        }
+        for ((name, place), constant) in known.iter().zip(&places).zip(constants) {
+            if place.is_none() && constant.is_none() {
+                output::note(&format!("{} has no column {name}: this force is 0", path.display()));
+            }
         }
         Ok(force)
     }
