@@ -10,6 +10,7 @@
 //! a direction that it contradicts is refused.
 
 use std::f64::consts::TAU;
+use std::io::Write;
 
 /// Mean length of each arm and its scatter, in pixels; frames over which the pivot was averaged; angles, rad, unwrapped.
 pub struct Film {
@@ -218,7 +219,9 @@ pub fn convert(arguments: &[String]) -> Result<String, Box<dyn std::error::Error
     let (film, said) = judged.map_err(|problem| format!("{input}: {problem}"))?;
     let Film { arms: [(l1, s1), (l2, s2)], window, angles } = film;
     let rows = angles.iter().zip(0..).map(|([a, b], k)| format!("{},{a:.6},{b:.6}\n", f64::from(k) / rate));
-    std::fs::write(output, "t,theta1,theta2\n".to_string() + &rows.collect::<String>())?;
+    // A file that is there, the film itself perhaps, is not overwritten.
+    let mut file = std::fs::File::create_new(output).map_err(|e| format!("{output}: {e}"))?;
+    file.write_all(("t,theta1,theta2\n".to_string() + &rows.collect::<String>()).as_bytes())?;
     let arms =
         format!("arms {l1:.2} and {l2:.2} pixels, scatter {s1:.2} and {s2:.2}, pivot averaged over {window} frames");
     Ok(format!("{} frames, {arms}; {said}", angles.len()))

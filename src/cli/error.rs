@@ -1,5 +1,6 @@
 //! How a command fails: one line, or one for each mistake of a configuration, and an exit code.
 
+use crate::cli::interrupt;
 use crate::names::one_line;
 use std::fmt;
 use std::io;
@@ -13,7 +14,7 @@ pub enum Kind {
     Usage,
     /// Data or files: exit code 1.
     Data,
-    /// Ctrl-C: exit code 130.
+    /// Ctrl-C, exit code 130, or SIGTERM, exit code 143.
     Interrupted,
     /// Whoever read our output has gone: no message, exit code 0.
     ClosedPipe,
@@ -47,7 +48,7 @@ impl CliError {
     pub fn file(path: &Path, problem: impl fmt::Display) -> Self {
         Self::data(format_args!("{}: {problem}", path.display()))
     }
-    /// Ctrl-C; says what was kept.
+    /// Ctrl-C or SIGTERM; says what was kept.
     pub fn interrupted(message: impl fmt::Display) -> Self {
         Self { kind: Kind::Interrupted, message: one_line(&message.to_string()) }
     }
@@ -58,6 +59,10 @@ impl CliError {
         }
         Self::data(format_args!("standard output: {error}"))
     }
+    /// Signals that cannot be watched for.
+    pub fn signals(error: io::Error) -> Self {
+        Self::data(format_args!("cannot watch for Ctrl-C: {error}"))
+    }
     /// What went wrong.
     pub fn kind(&self) -> Kind {
         self.kind
@@ -67,7 +72,7 @@ impl CliError {
         ExitCode::from(match self.kind {
             Kind::Usage => 2,
             Kind::Data => 1,
-            Kind::Interrupted => 130,
+            Kind::Interrupted => interrupt::exit_code(),
             Kind::ClosedPipe => 0,
         })
     }

@@ -2,10 +2,11 @@
 
 use crate::cli::attention::Attention;
 use crate::cli::evaluation::{Evaluation, PIECES, Plan, RTOL, evaluate};
-use crate::cli::folder::Folder;
 use crate::cli::learned::{Learned, model_file};
-use crate::cli::learning::parameter_table;
+use crate::cli::learning::{parameter_table, write_report_and_figures};
 use crate::cli::number::{bounds, count, positive, seed, threads, tolerance};
+use crate::cli::place::{self, Wanted};
+use crate::cli::results::{Writer, remove_stale_evaluation};
 use crate::cli::{CliError, output};
 use crate::lagrangian::Configured;
 use crate::lagrangian::system::{Bounds, TrajectoryTest};
@@ -44,9 +45,13 @@ pub struct Args {
     /// Threads [default: all].
     #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = count)]
     threads: Option<usize>,
-    /// Directory for evaluation.json, report.html and pictures [default: evaluation, beside the model].
+    /// Directory for evaluation.json, report.html and pictures; one that holds an evaluation is refused [default:
+    /// evaluation beside the model, or the first free of evaluation-2, evaluation-3, ..].
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Replace the evaluation in the directory.
+    #[arg(long)]
+    overwrite: bool,
     /// Print evaluation.json instead of tables.
     #[arg(long)]
     json: bool,
@@ -88,8 +93,10 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let learned = Learned::<f64>::load(&args.model)?;
     let system = learned.system(&args.model)?;
     let file = model_file(&args.model)?;
-    let beside = || file.parent().unwrap_or(Path::new("")).join("evaluation");
-    let folder = Folder::open(&args.out.clone().unwrap_or_else(beside))?;
+    let usual = file.parent().unwrap_or(Path::new("")).join("evaluation");
+    let (out, inputs) = (args.out.as_deref(), [file.as_path()]);
+    let wanted = Wanted { out, usual: &usual, overwrite: args.overwrite, inputs: &inputs, writer: Writer::Evaluator };
+    let folder = place::open(&wanted)?;
 
     let seed = args.seed.unwrap_or(learned.header.seed);
     let bounds = (system.system.validation)(system.coordinates);
@@ -116,11 +123,10 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let json = serde_json::to_string_pretty(&summary).map_err(CliError::data)? + "\n";
     let title = format!("{}: learned against exact", system.system.title);
     let report = Report::new(&title).paragraph(&format!("Model {}, starts of seed {seed}.", args.model.display()));
-    for figure in &evaluation.figures {
-        folder.write(&figure.file, &figure.png)?;
-    }
+    remove_stale_evaluation(&folder)?;
     folder.write("evaluation.json", json.as_bytes())?;
-    folder.write("report.html", evaluation.report(parameter_table(report, &system)).to_html().as_bytes())?;
+    let report = evaluation.report(parameter_table(report, &system));
+    write_report_and_figures(&folder, &report, evaluation.figures.iter())?;
     if args.json {
         return output::print(&json);
     }

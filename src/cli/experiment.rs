@@ -1,9 +1,11 @@
 //! `lnn experiment`: the paper's tables and figures, one command each; finished runs are not run again.
 
+use crate::cli::files::{holds_something, require_free};
 use crate::cli::folder::Folder;
-use crate::cli::learning::{Begin, CAPTIONS, Effort, Keeping, Learning, forget, learn};
+use crate::cli::learning::{Begin, Effort, Keeping, Learning, forget, learn};
 use crate::cli::number::{count, threads};
 use crate::cli::progress::Progress as Bar;
+use crate::cli::results::CAPTIONS;
 use crate::cli::{CliError, Kind, interrupt, output};
 use crate::experiments::{Experiment, Outcome, Picture, Record, Run, Scale, experiments, find};
 use crate::names::counted;
@@ -43,12 +45,15 @@ pub struct Args {
     /// repeated.
     #[arg(long, value_name = "LABEL=FILE.csv", value_parser = beside)]
     beside: Vec<(String, PathBuf)>,
-    /// Directory; an experiment goes into NAME-SCALE in it.
+    /// Directory; an experiment goes into NAME-SCALE in it, where it goes on with what is there.
     #[arg(long, value_name = "DIR", default_value = "runs/experiments")]
     out: PathBuf,
     /// One JSON object per line instead of tables.
     #[arg(long)]
     json: bool,
+    /// Replace finished runs that are of other configurations.
+    #[arg(long)]
+    overwrite: bool,
 }
 
 #[derive(Clone, Copy, Debug, clap::ValueEnum)]
@@ -68,7 +73,7 @@ enum ScaleName {
 /// interruption; runs that are finished stay finished.
 pub fn run(args: &Args) -> Result<(), CliError> {
     let Some(name) = &args.name else {
-        interrupt::end_at_once()?;
+        interrupt::end_at_once().map_err(CliError::signals)?;
         return output::print(&listing(args.json));
     };
     let scale = match args.scale {
@@ -78,9 +83,18 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     };
     let chosen: Vec<&Experiment> =
         if name == "all" { experiments().iter().collect() } else { vec![find(name).map_err(CliError::usage)?] };
+    let chosen = chosen_runs(args, &chosen, scale)?;
+    for (experiment, runs) in &chosen {
+        let path = args.out.join(format!("{}-{}", experiment.name, scale.name()));
+        let inputs: Vec<&Path> = args.beside.iter().map(|(_, file)| file.as_path()).collect();
+        WRITTEN.iter().try_for_each(|name| require_free(&path.join(name), &inputs, true))?;
+        if !args.overwrite {
+            require_same(&path, runs)?;
+        }
+    }
     let curves = args.beside.iter().map(curve).collect::<Result<Vec<Curve>, CliError>>()?;
-    let hooks = Hooks { watcher: None, interrupt: interrupt::flag()? };
-    for (experiment, runs) in chosen_runs(args, &chosen, scale)? {
+    let hooks = Hooks { watcher: None, interrupt: interrupt::flag().map_err(CliError::signals)? };
+    for (experiment, runs) in chosen {
         let path = args.out.join(format!("{}-{}", experiment.name, scale.name()));
         perform((experiment, scale), runs, threads(args.threads), &path, (&curves, &hooks, args.json))?;
     }
@@ -113,6 +127,27 @@ fn seeds(text: &str) -> Result<usize, String> {
     const MOST: usize = 10_000;
     let seeds = count(text)?;
     if seeds <= MOST { Ok(seeds) } else { Err(format!("expected a whole number above 0, at most {MOST}")) }
+}
+
+/// Tables of an experiment, made anew of the records of its runs.
+const WRITTEN: [&str; 2] = ["table.csv", "curves.csv"];
+
+/// Refuses a directory with finished runs of other configurations than those asked for.
+fn require_same(path: &Path, runs: &[Run]) -> Result<(), CliError> {
+    let mut others = Vec::new();
+    for run in runs {
+        let toml = toml::to_string(&run.config).map_err(CliError::data)?;
+        let directory = path.join(&run.name);
+        if holds_something(&directory.join(RECORD)) && finished(&directory, &toml).is_none() {
+            others.push(run.name.as_str());
+        }
+    }
+    let Some((first, more)) = others.split_first() else { return Ok(()) };
+    let more = if more.is_empty() { String::new() } else { format!(" (and {} more)", more.len()) };
+    let problem = format!(
+        "a finished run of another configuration is there{more}; --overwrite replaces it, or choose another --out"
+    );
+    Err(CliError::file(&path.join(first), problem))
 }
 
 /// `label=file`.
@@ -205,6 +240,11 @@ fn one(run: &Run, scale: Scale, threads: usize, path: &Path, hooks: &Hooks) -> R
         return Ok(Some(record));
     }
     let folder = Folder::open(path)?;
+    // That of another configuration must not be found beside the new one.
+    match std::fs::remove_file(folder.file(RECORD)) {
+        Err(e) if e.kind() != std::io::ErrorKind::NotFound => return Err(CliError::file(&folder.file(RECORD), e)),
+        _ => {}
+    }
     let system = run.config.system().map_err(CliError::data)?;
     run.config.validate(system.coordinates).map_err(CliError::data)?;
     let (starts, horizon) = scale.trajectories();
@@ -264,13 +304,12 @@ fn conclude(
     let table = experiment_table(&experiment.rows(results));
     let mut curves = experiment_curves(results);
     curves.extend_from_slice(beside);
+    folder.write("table.csv", csv(&table).as_bytes())?;
     if experiment.is_timed() {
         folder.write("curves.csv", curves_csv(&curves).as_bytes())?;
     }
-    let mut figures = experiment_figures(experiment, results, &curves).map_err(CliError::data)?;
-    for figure in &figures {
-        folder.write(&figure.file, &figure.png)?;
-    }
+    let own = experiment_figures(experiment, results, &curves).map_err(CliError::data)?;
+    let mut figures = own.clone();
     figures.extend(pictures_of_runs(experiment, results, path));
     let training: f64 = results.iter().filter_map(|(_, record)| record.as_ref()).map(|record| record.seconds).sum();
     let note = format!(
@@ -293,8 +332,8 @@ fn conclude(
     let report = remarks.iter().fold(report, |report, remark| report.paragraph(remark));
     let report = if reductions.is_empty() { report } else { report.table(&REDUCTION_HEADER, &reductions) };
     let report = figures.iter().fold(report, |report, figure| report.figure(&figure.png, &figure.caption));
-    folder.write("table.csv", csv(&table).as_bytes())?;
     folder.write("report.html", report.to_html().as_bytes())?;
+    own.iter().try_for_each(|figure| folder.write(&figure.file, &figure.png))?;
     if json {
         let row = |cells: &Vec<String>| {
             let named = EXPERIMENT_HEADER.iter().zip(cells);

@@ -5,29 +5,40 @@ use crate::cli::changes::PenaltyName;
 use crate::cli::determined::Determined;
 use crate::cli::fit_args::Args;
 use crate::cli::fit_config::{FitConfig, Recording, Settled};
+use crate::cli::fit_resume::Order;
 use crate::cli::fit_summary::Found;
 use crate::cli::folder::Folder;
 use crate::cli::judgement::{Plan, WINDOWS, judge};
-use crate::cli::learning::history;
+use crate::cli::learned::model_file;
+use crate::cli::learning::{Begin, begin, forget, history, save};
 use crate::cli::losses::Judges;
 use crate::cli::number::threads;
+use crate::cli::place::{self, Wanted};
 use crate::cli::print_config::PrintFormat;
+use crate::cli::results::Writer;
+use crate::cli::resume::{self, how_to_go_on};
+use crate::cli::said::Said;
 use crate::cli::start::{Start, weights};
 use crate::cli::train::hooks;
 use crate::cli::train_config::PrecisionName;
 use crate::cli::{CliError, forces, interrupt, memory, output};
+use crate::network::file::container::checksum;
 use crate::network::file::{FORMAT, Header, ModelFile, StoredPrecision};
-use crate::network::{Architecture, NetworkLagrangian};
+use crate::network::{Architecture, Layout, NetworkLagrangian};
 use crate::recording::smooth::SmoothOptions;
 use crate::recording::survey::{SurveyOptions, survey};
 use crate::recording::{Reading, Targets};
 use crate::scalar::Scalar;
+use crate::storage::Disk;
 use crate::training::shooting::{self, Shooting, Task};
 use crate::training::{
-    Config, Measured, Preparation, Regularizer, Sitting, Snapshot, Stop, Trained, configuration_reference, resume,
-    training_memory,
+    Config, Datasets, Identity, Keeper, Measured, Preparation, Regularizer, Sitting, Snapshot, Stop, Trained,
+    configuration_reference, resume as train, training_memory,
 };
-use std::path::PathBuf;
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 /// Learns and writes everything into the output directory.
@@ -35,15 +46,15 @@ use std::time::Instant;
 /// # Errors
 /// A usage error for arguments, a data error for files and data that cannot be learned from, an interruption; after the
 /// last the best model so far is written, if there is one.
-pub fn run(args: &Args) -> Result<(), CliError> {
+pub fn run(args: &Args, words: &[OsString]) -> Result<(), CliError> {
     let started = Instant::now();
     if args.print_config == Some(PrintFormat::Markdown) {
         return output::print(&(FitConfig::reference() + &configuration_reference()));
     }
-    let settled = Settled::of(args)?;
+    let Some(Order { args, said, resumed }) = Order::of(args, words)? else { return Ok(()) };
+    let settled = Settled::of(&args)?;
     let args = &settled.args;
     let reading = args.recording.read()?;
-    let path = args.out.clone().unwrap_or_else(|| PathBuf::from("runs").join(args.name()));
     if let Some(time) = &args.timelike {
         let names = &reading.recording.coordinates;
         if !names.contains(time) {
@@ -76,19 +87,32 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         let training = configured(&settled, targets, start.as_ref(), &measured.config(args.name(), &data))?;
         return output::print(&record(&settled, targets, Some(shooting_of(&settled)), &training).commented()?);
     }
-    let folder = Folder::open(&path)?;
-    let job =
-        Job { args, settled: &settled, reading: &reading, measured: &measured, targets, folder: &folder, started };
-    match args.precision() {
+    let begin = if resumed.is_some() { Begin::Resume } else { Begin::Anew };
+    let folder = match resumed {
+        Some(folder) => folder,
+        None => {
+            let usual = PathBuf::from("runs").join(args.name());
+            let start = args.from.as_deref().map(|from| model_file(Path::new(from))).transpose()?;
+            let inputs: Vec<&Path> = args.inputs().chain(start.as_deref()).collect();
+            let (out, writer) = (args.out.as_deref(), Writer::Learner);
+            place::open(&Wanted { out, usual: &usual, overwrite: args.overwrite, inputs: &inputs, writer })?
+        }
+    };
+    let (reading, measured, settled) = (&reading, &measured, &settled);
+    let job = Job { args, settled, said, begin, reading, measured, targets, folder: &folder, started };
+    let fitted = match args.precision() {
         PrecisionName::F32 => job.run::<f32>(),
         PrecisionName::F64 => job.run::<f64>(),
-    }
+    };
+    fitted.map_err(resume::keeping(folder.path()))
 }
 
 /// What is to be done.
 struct Job<'a> {
     args: &'a Args,
     settled: &'a Settled,
+    said: Said,
+    begin: Begin,
     reading: &'a Reading,
     measured: &'a Measured,
     targets: Targets,
@@ -120,14 +144,22 @@ impl Job<'_> {
         architecture.validate().map_err(CliError::usage)?;
         memory::require("training", training_memory(&config, &architecture))?;
         let penalty = config.penalty.penalty(names.iter().map(String::as_str)).map_err(CliError::usage)?;
-        let stop = interrupt::flag()?;
+        let stop = interrupt::flag().map_err(CliError::signals)?;
         let threads = threads(args.threads);
 
-        let sitting = Sitting { keeper: None, start: weights.map(Snapshot::beginning_with) };
         let judges = Judges { validation: data.validation.clone(), test: data.test.clone() };
-        let mut trained =
-            resume(&config, &architecture, penalty, data, threads, &hooks(&stop), sitting).map_err(CliError::data)?;
         let shooting = (*targets == Targets::Motion).then(|| shooting_of(self.settled));
+        let record = record(self.settled, *targets, shooting.clone(), &config);
+        let toml = toml::to_string(&record).map_err(CliError::data)?;
+        let identity = Identity { config: self.said.text(&record.without_files())?, data: self.checksums(&data) };
+        let keeper = Arc::new(Keeper::new(Arc::new(Disk), folder.path(), args.checkpoint_every, identity));
+        let parameters = Layout::new(&architecture).parameters;
+        let restored = begin(&keeper, folder, parameters, data.training[0].len(), self.begin)?;
+        let shots = restored.clone().filter(Snapshot::is_shooting);
+        let start = restored.or_else(|| weights.map(Snapshot::beginning_with));
+        let sitting = Sitting { keeper: Some(Arc::clone(&keeper)), start };
+        let mut trained = train(&config, &architecture, penalty, data, threads, &hooks(&stop), sitting)
+            .map_err(|error| self.nothing(&error, &stop))?;
         let mut shot = None;
         if let (Some(settings), Stop::Finished) = (&shooting, &trained.stop) {
             let (training, validation) = (measured.training.estimated(), measured.validation.estimated());
@@ -141,25 +173,25 @@ impl Job<'_> {
                 noise: &noise,
                 seed: args.seed(),
             };
-            let fitted = shooting::fit(settings, task, threads, &hooks(&stop)).map_err(CliError::data)?;
+            let start = Some(shots.unwrap_or_else(|| trained.snapshot(&config)));
+            let sitting = Sitting { keeper: Some(keeper), start };
+            let fitted = shooting::resume(settings, task, threads, &hooks(&stop), sitting)
+                .map_err(|error| self.nothing(&error, &stop))?;
             trained.weights.clone_from(&fitted.weights);
             trained.stop.clone_from(&fitted.stop);
             judges.judge(&architecture, penalty, threads, &mut trained)?;
             shot = Some(fitted);
         }
 
-        // The model and its history first: nothing that comes after can lose them.
-        let record = record(self.settled, *targets, shooting.clone(), &config);
-        let toml = toml::to_string(&record).map_err(CliError::data)?;
+        // The model first, then what is small, pictures last: on a full disk nothing that comes after can lose them.
         let model =
             ModelFile { header: self.header::<S>(&config, &architecture, &trained), weights: trained.weights.clone() };
-        let file = folder.file("model.safetensors");
+        save(folder, &model)?;
         folder.write("config.toml", toml.as_bytes())?;
         folder.write("history.csv", history(&trained.history).as_bytes())?;
         if let Some(shot) = &shot {
             folder.write("shooting.csv", history(&shot.history).as_bytes())?;
         }
-        model.save(&file).map_err(|e| CliError::file(&file, e))?;
 
         let network = NetworkLagrangian::new(architecture, model.weights).map_err(CliError::data)?.cast::<f64>();
         let time = args.timelike.as_ref().and_then(|name| names.iter().position(|n| n == name));
@@ -188,15 +220,38 @@ impl Job<'_> {
             determined: &determined,
             started: self.started,
         };
-        found.write(folder, &toml, args.json)?;
+        let said = found.write(folder, &toml, args.json)?;
+        if trained.stop != Stop::Interrupted {
+            forget(folder)?;
+        }
+        output::print(&said)?;
         match &trained.stop {
             Stop::Finished => Ok(()),
             Stop::Interrupted => {
-                let place = folder.path().display();
-                Err(CliError::interrupted(format_args!("interrupted, the best model so far is in {place}")))
+                let (place, on) = (folder.path().display(), how_to_go_on(folder.path()));
+                Err(CliError::interrupted(format_args!("interrupted, the best model so far is in {place}{on}")))
             }
             Stop::Failed(error) => Err(CliError::data(format_args!("training stopped: {error}"))),
         }
+    }
+
+    /// Name and checksum of everything that is learned from.
+    fn checksums<S: Scalar>(&self, data: &Datasets<S>) -> Vec<(String, u32)> {
+        let parts = [&self.measured.training, &self.measured.validation];
+        let tracks = parts.into_iter().flat_map(|part| &part.recording.tracks);
+        let numbers = tracks.flat_map(|track| [&track.times, &track.q, &track.v, &track.a, &track.force]).flatten();
+        let recorded = ("recorded motion".to_string(), checksum(numbers, StoredPrecision::F64));
+        data.checksums().into_iter().chain([recorded]).collect()
+    }
+
+    /// Why there is no model: an interruption before the first epoch ended, or an error, after which nothing is left to go
+    /// on from.
+    fn nothing(&self, error: &dyn std::fmt::Display, stop: &AtomicBool) -> CliError {
+        if stop.load(Ordering::SeqCst) {
+            let on = how_to_go_on(self.folder.path());
+            return CliError::interrupted(format_args!("interrupted before the first epoch ended{on}"));
+        }
+        forget(self.folder).err().unwrap_or_else(|| CliError::data(error))
     }
 
     /// What the model file says about this run.

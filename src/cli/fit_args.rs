@@ -3,15 +3,17 @@
 use crate::cli::changes::Changes;
 use crate::cli::fit_config::HELD_OUT;
 use crate::cli::number::{count, positive, weight};
+use crate::cli::plain_name::plain_name;
 use crate::cli::print_config::PrintFormat;
 use crate::cli::recording_args::RecordingArgs;
-use crate::cli::train_config::PrecisionName;
+use crate::cli::train_config::{PrecisionName, every};
 use crate::recording::Targets;
-use std::path::PathBuf;
+use crate::training::Every;
+use std::path::{Path, PathBuf};
 
 /// Arguments.
 #[derive(Clone, Debug, clap::Args)]
-#[command(mut_args(unless_configured))]
+#[command(mut_args(unless_known))]
 pub struct Args {
     #[command(flatten)]
     pub recording: RecordingArgs,
@@ -68,12 +70,23 @@ pub struct Args {
     /// Precision of weights and arithmetic [default: f32].
     #[arg(long, value_enum, value_name = "TYPE")]
     pub precision: Option<PrecisionName>,
-    /// Name of the system, for the model file [default: measured].
-    #[arg(long, value_name = "NAME")]
+    /// Name of the system, for the model file: letters, digits, - _ . and spaces within [default: measured].
+    #[arg(long, value_name = "NAME", allow_hyphen_values = true, value_parser = plain_name)]
     pub name: Option<String>,
-    /// Directory for everything the run writes [default: runs/NAME].
+    /// Directory for everything the run writes; one that holds a run is refused [default: runs/NAME, or the first free of
+    /// runs/NAME-2, runs/NAME-3, ..].
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+    /// Replace the run in the directory, pictures and evaluations of its model included, once the new model is there.
+    #[arg(long, conflicts_with = "resume")]
+    pub overwrite: bool,
+    /// Go on with the fit in a directory that was stopped; everything else comes from its checkpoint, DATA as well unless
+    /// given anew.
+    #[arg(long, value_name = "DIR", conflicts_with = "out")]
+    pub resume: Option<PathBuf>,
+    /// Write a checkpoint every N epochs, or every Ts seconds with an s behind the number.
+    #[arg(long, value_name = "N|Ts", default_value = "60s", allow_hyphen_values = true, value_parser = every)]
+    pub checkpoint_every: Every,
     /// Print summary.json instead of tables.
     #[arg(long)]
     pub json: bool,
@@ -113,16 +126,20 @@ impl Args {
     pub fn name(&self) -> &str {
         self.name.as_deref().unwrap_or("measured")
     }
+    /// Files that are read.
+    pub fn inputs(&self) -> impl Iterator<Item = &Path> {
+        self.recording.data.iter().chain(&self.config).map(PathBuf::as_path)
+    }
     /// Precision of weights and arithmetic.
     pub fn precision(&self) -> PrecisionName {
         self.precision.unwrap_or(PrecisionName::F32)
     }
 }
 
-/// What a configuration may say instead.
-fn unless_configured(argument: clap::Arg) -> clap::Arg {
+/// What a configuration or a checkpoint may say instead.
+fn unless_known(argument: clap::Arg) -> clap::Arg {
     match argument.get_id().as_str() {
-        "data" | "coords" => argument.required(false).required_unless_present("config"),
+        "data" | "coords" => argument.required(false).required_unless_present_any(["config", "resume"]),
         _ => argument,
     }
 }

@@ -40,6 +40,15 @@ pub struct FitConfig {
     pub training: Config,
 }
 
+impl FitConfig {
+    /// The same of files that may have other names.
+    pub fn without_files(&self) -> Self {
+        let mut other = self.clone();
+        other.recording.files.clear();
+        other
+    }
+}
+
 /// The files and what their columns mean, as [`RecordingArgs`] say it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]

@@ -1,10 +1,10 @@
 //! What `lnn fit` found, in `summary.json`, in words and in the report.
 
+use crate::cli::CliError;
 use crate::cli::determined::Determined;
 use crate::cli::folder::Folder;
 use crate::cli::judgement::Judgement;
-use crate::cli::learning::{ended, training_pictures, write_figures};
-use crate::cli::{CliError, output};
+use crate::cli::learning::{ended, training_pictures, write_report_and_figures};
 use crate::names::counted;
 use crate::recording::{HeldOut, Recording, Targets};
 use crate::report::Report;
@@ -94,13 +94,14 @@ pub struct Found<'a, S> {
 }
 
 impl<'a, S: Scalar> Found<'a, S> {
-    /// Writes pictures, `report.html` and `summary.json`, and prints the last as it is or in words.
+    /// Writes `summary.json`, `report.html` and pictures, and returns the first as it is or in words.
     ///
     /// # Errors
-    /// Pictures that cannot be drawn, files that cannot be written, a closed standard output.
-    pub fn write(&self, folder: &Folder, toml: &str, print_json: bool) -> Result<(), CliError> {
+    /// Pictures that cannot be drawn, files that cannot be written.
+    pub fn write(&self, folder: &Folder, toml: &str, as_json: bool) -> Result<String, CliError> {
         let summary = self.summary();
         let json = serde_json::to_string_pretty(&summary).map_err(CliError::data)? + "\n";
+        folder.write("summary.json", json.as_bytes())?;
         let text = summary.text(self.recording);
         let mut figures = training_pictures(&self.trained.history)?;
         if let Some(shot) = self.shot {
@@ -112,11 +113,9 @@ impl<'a, S: Scalar> Found<'a, S> {
         let report = self.determined.report(self.judgement.report(report)).heading("Training");
         let report = figures.iter().fold(report, |report, figure| report.figure(&figure.png, &figure.caption));
         let report = report.heading("Configuration").preformatted(toml);
-        write_figures(folder, figures.iter().chain(&self.judgement.figures))?;
-        folder.write("report.html", report.to_html().as_bytes())?;
-        folder.write("summary.json", json.as_bytes())?;
+        write_report_and_figures(folder, &report, figures.iter().chain(&self.judgement.figures))?;
         let text = format!("{text}\nreport: {}\n", folder.file("report.html").display());
-        output::print(if print_json { &json } else { &text })
+        Ok(if as_json { json } else { text })
     }
 
     fn summary(&self) -> Summary<'a> {

@@ -24,17 +24,43 @@ pub struct Folder {
     _lock: File,
 }
 
+/// What became of an attempt to open a directory.
+#[derive(Debug)]
+pub enum Attempt {
+    /// It is ours.
+    Open(Folder),
+    /// Another run holds it; ` (process ..)`, as far as that is known.
+    Held(String),
+}
+
 impl Folder {
     /// Creates the directory if need be, takes its lock, and removes what writers killed in the middle left.
     ///
     /// # Errors
     /// A data error if it cannot be created or written, or if another run holds it.
     pub fn open(path: &Path) -> Result<Self, CliError> {
+        match Self::attempt(path)? {
+            Attempt::Open(folder) => Ok(folder),
+            Attempt::Held(holder) => {
+                Err(CliError::file(path, format_args!("another run is writing into this directory{holder}")))
+            }
+        }
+    }
+
+    /// [`open`](Self::open) to whom it is no error that another run holds the directory.
+    ///
+    /// # Errors
+    /// A data error if it cannot be created or written.
+    pub fn attempt(path: &Path) -> Result<Attempt, CliError> {
         fs::create_dir_all(path).map_err(|e| CliError::file(path, format_args!("cannot create the directory: {e}")))?;
         for _ in 0..ATTEMPTS {
-            if let Some(lock) = lock(path)? {
-                remove_leftovers(&Disk, path);
-                return Ok(Self { path: path.to_path_buf(), _lock: lock });
+            match lock(path)? {
+                Lock::Ours(lock) => {
+                    remove_leftovers(&Disk, path);
+                    return Ok(Attempt::Open(Self { path: path.to_path_buf(), _lock: lock }));
+                }
+                Lock::Held(holder) => return Ok(Attempt::Held(holder)),
+                Lock::Gone => {}
             }
         }
         Err(CliError::file(path, "cannot lock the directory: others take and leave it all the time"))
@@ -60,8 +86,18 @@ impl Folder {
     }
 }
 
-/// The lock file of a directory, locked; `None` if its holder removed it meanwhile.
-fn lock(directory: &Path) -> Result<Option<File>, CliError> {
+/// The lock file of a directory.
+enum Lock {
+    /// Locked by us.
+    Ours(File),
+    /// Locked by another process, in words.
+    Held(String),
+    /// Removed by its holder meanwhile.
+    Gone,
+}
+
+/// Tries to lock a directory.
+fn lock(directory: &Path) -> Result<Lock, CliError> {
     let path = directory.join(LOCK);
     let mut file = OpenOptions::new()
         .read(true)
@@ -76,8 +112,7 @@ fn lock(directory: &Path) -> Result<Option<File>, CliError> {
         Ok(()) => {}
         Err(TryLockError::WouldBlock) => {
             let holder = Holder::parse(&before).map(|holder| format!(" ({holder})")).unwrap_or_default();
-            let problem = format!("another run is writing into this directory{holder}");
-            return Err(CliError::file(directory, problem));
+            return Ok(Lock::Held(holder));
         }
         Err(TryLockError::Error(e)) => return Err(cannot(e)),
     }
@@ -87,14 +122,14 @@ fn lock(directory: &Path) -> Result<Option<File>, CliError> {
     // A holder that removed the file between opening and locking left a lock on a file without a name.
     match File::open(&path).map(|mut named| text(&mut named)) {
         Ok(named) if named == own => {}
-        Ok(_) => return Ok(None),
-        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
+        Ok(_) => return Ok(Lock::Gone),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Lock::Gone),
         Err(error) => return Err(cannot(error)),
     }
     if let Some(holder) = Holder::parse(&before) {
         output::note(&format!("{}: taken over from {holder}, which is gone", directory.display()));
     }
-    Ok(Some(file))
+    Ok(Lock::Ours(file))
 }
 
 /// The beginning of a file, as far as it is text.

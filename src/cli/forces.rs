@@ -45,6 +45,11 @@ pub fn recorded(columns: &[String]) -> Vec<String> {
 }
 
 impl ForceArgs {
+    /// Arguments that are files.
+    pub fn files(&self) -> impl Iterator<Item = &Path> {
+        self.force.iter().map(Path::new).filter(|path| path.exists())
+    }
+
     /// The force on a motion of a model from one time to another; none if none was asked for.
     ///
     /// # Errors

@@ -4,7 +4,8 @@ use crate::analysis::{stretches, training_instability};
 use crate::cli::attention::Attention;
 use crate::cli::evaluation::{Evaluation, PIECES, Plan, RTOL, evaluate};
 use crate::cli::folder::Folder;
-use crate::cli::learned::{all_parameters, given, trained_on};
+use crate::cli::learned::{MODEL, all_parameters, given, trained_on};
+use crate::cli::results::{CAPTIONS, remove_stale};
 use crate::cli::systems::parameters;
 use crate::cli::{CliError, memory, output, start};
 use crate::experiments::{Outcome, Record};
@@ -47,9 +48,6 @@ struct Summary<'a> {
     #[serde(flatten)]
     evaluation: &'a Evaluation,
 }
-
-/// File with the captions of a run's pictures, by file name.
-pub const CAPTIONS: &str = "captions.json";
 
 /// How much work a run may take.
 #[derive(Clone, Copy, Debug)]
@@ -98,7 +96,10 @@ pub struct Keeping {
 }
 
 /// The checkpoint to go on from, or nothing, with old checkpoints out of the way.
-fn begin<S: Scalar>(
+///
+/// # Errors
+/// A data error for a checkpoint that must be there and is not, or that is of another run.
+pub fn begin<S: Scalar>(
     keeper: &Keeper,
     folder: &Folder,
     parameters: usize,
@@ -205,14 +206,13 @@ fn learn_in<S: Scalar>(
         Err(error) => return Err(CliError::data(error)),
     };
 
-    // The model and its history first: nothing that comes after can lose them.
+    // The model first, then what is small, pictures last: on a full disk nothing that comes after can lose them.
     let header = header(config, system, architecture.clone(), imposed, trained.validation_loss)?;
     let domain = trained_on(&header);
     let model = ModelFile { header, weights: trained.weights.clone() };
-    let file = folder.file("model.safetensors");
+    save(folder, &model)?;
     folder.write("config.toml", toml.as_bytes())?;
     folder.write("history.csv", history(&trained.history).as_bytes())?;
-    model.save(&file).map_err(|e| CliError::file(&file, e))?;
 
     let scale = architecture.scale.iter().sum::<f64>() / architecture.scale.len() as f64;
     let network = NetworkLagrangian::new(architecture, model.weights).map_err(CliError::data)?.cast::<f64>();
@@ -254,8 +254,8 @@ fn learn_in<S: Scalar>(
         evaluation: &evaluation,
     };
     let json = serde_json::to_string_pretty(&summary).map_err(CliError::data)? + "\n";
-    write_report(folder, system, &summary, &trained.history, &toml)?;
     folder.write("summary.json", json.as_bytes())?;
+    write_report(folder, system, &summary, &trained.history, &toml)?;
     let text =
         format!("{}\n{}\nreport: {}\n", headline(&summary), evaluation.text(), folder.file("report.html").display());
     let outcome = Outcome::Learned(crate::experiments::Learned {
@@ -408,8 +408,17 @@ fn write_report(
     let report = summary.evaluation.report(parameter_table(report, system)).heading("Training");
     let report = training.iter().fold(report, |report, figure| report.figure(&figure.png, &figure.caption));
     let report = report.heading("Configuration").preformatted(toml);
-    write_figures(folder, training.iter().chain(&summary.evaluation.figures))?;
-    folder.write("report.html", report.to_html().as_bytes())
+    write_report_and_figures(folder, &report, training.iter().chain(&summary.evaluation.figures))
+}
+
+/// Writes the model, and lets what an earlier run left beside it go.
+///
+/// # Errors
+/// A data error naming the file.
+pub(super) fn save<S: Scalar>(folder: &Folder, model: &ModelFile<S>) -> Result<(), CliError> {
+    let file = folder.file(MODEL);
+    model.save(&file).map_err(|e| CliError::file(&file, e))?;
+    remove_stale(folder)
 }
 
 /// Pictures of a history.
@@ -425,14 +434,17 @@ pub(super) fn training_pictures(epochs: &[Epoch]) -> Result<Vec<Figure>, CliErro
     training_figures(&epochs.iter().map(row).collect::<Vec<_>>()).map_err(CliError::data)
 }
 
-/// Writes pictures, and [`CAPTIONS`] that tell what they show.
-pub(super) fn write_figures<'a>(
+/// Writes [`CAPTIONS`], which name the pictures and tell what they show, the report, and the pictures.
+///
+/// # Errors
+/// A data error naming the file.
+pub(super) fn write_report_and_figures<'a>(
     folder: &Folder,
+    report: &Report,
     figures: impl Iterator<Item = &'a Figure> + Clone,
 ) -> Result<(), CliError> {
-    for figure in figures.clone() {
-        folder.write(&figure.file, &figure.png)?;
-    }
-    let captions: BTreeMap<&str, &str> = figures.map(|f| (f.file.as_str(), f.caption.as_str())).collect();
-    folder.write(CAPTIONS, serde_json::to_string_pretty(&captions).map_err(CliError::data)?.as_bytes())
+    let captions: BTreeMap<&str, &str> = figures.clone().map(|f| (f.file.as_str(), f.caption.as_str())).collect();
+    folder.write(CAPTIONS, serde_json::to_string_pretty(&captions).map_err(CliError::data)?.as_bytes())?;
+    folder.write("report.html", report.to_html().as_bytes())?;
+    figures.into_iter().try_for_each(|figure| folder.write(&figure.file, &figure.png))
 }

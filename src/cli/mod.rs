@@ -1,7 +1,7 @@
 //! The command-line program: arguments to library calls.
 //!
 //! Results go to standard output, messages and progress to standard error. Exit codes: 0 done, 1 data or files, 2
-//! arguments or configuration, 130 Ctrl-C. A failure is one line, `error: FILE: row 3, column theta1: ...`;
+//! arguments or configuration, 130 Ctrl-C, 143 SIGTERM. A failure is one line, `error: FILE: row 3, column theta1: ...`;
 //! of a configuration all mistakes are found, a line for each.
 
 mod attention;
@@ -16,9 +16,11 @@ mod error;
 mod evaluate;
 mod evaluation;
 mod experiment;
+mod files;
 mod fit;
 mod fit_args;
 mod fit_config;
+mod fit_resume;
 mod fit_summary;
 mod folder;
 mod forces;
@@ -39,11 +41,15 @@ mod misunderstood;
 mod motion;
 mod number;
 mod output;
+mod place;
+mod plain_name;
 mod print_config;
 mod progress;
 mod recording_args;
+mod results;
 mod resume;
 mod rollout;
+mod said;
 mod shown;
 mod source;
 mod spool;
@@ -102,7 +108,9 @@ pub fn main(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Ok(cli) => cli,
         Err(error) => return answer(&error, &arguments),
     };
-    match watch_log().and_then(|()| run(cli.command)) {
+    // Behind the names of the program and of the command.
+    let words = arguments.get(2..).unwrap_or_default();
+    match watch_log().and_then(|()| run(cli.command, words)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             if error.kind() != Kind::ClosedPipe {
@@ -125,16 +133,17 @@ pub fn check_arguments(arguments: impl IntoIterator<Item = OsString>) -> Result<
     }
 }
 
-fn run(command: Command) -> Result<(), CliError> {
+/// Runs a command; `words` are its arguments as they were typed.
+fn run(command: Command, words: &[OsString]) -> Result<(), CliError> {
     // Trainings, fits, roll-outs and experiments keep what they have when they are interrupted; the others have nothing to keep.
     if !matches!(command, Command::Train(_) | Command::Fit(_) | Command::Rollout(_) | Command::Experiment(_)) {
-        interrupt::end_at_once()?;
+        interrupt::end_at_once().map_err(CliError::signals)?;
     }
     match command {
         Command::Systems(args) => systems::run(&args),
         Command::Check(args) => check::run(&args),
         Command::Train(args) => train::run(&args),
-        Command::Fit(args) => fit::run(&args),
+        Command::Fit(args) => fit::run(&args, words),
         Command::Rollout(args) => rollout::run(&args),
         Command::Evaluate(args) => evaluate::run(&args),
         Command::Experiment(args) => experiment::run(&args),

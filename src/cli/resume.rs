@@ -1,18 +1,38 @@
-//! What `lnn train --resume DIR` finds in the directory.
+//! What `--resume DIR` of `lnn train` and `lnn fit` finds in the directory.
 
 use crate::cli::differences::differences;
-use crate::cli::{CliError, config, output};
+use crate::cli::said::Said;
+use crate::cli::{CliError, Kind, config, output};
 use crate::storage::{Disk, read_regular};
 use crate::training::{CheckpointError, Config, NEWEST, PREVIOUS, saved};
 use serde::Deserialize;
 use std::path::Path;
 
-/// A directory of a training.
+/// What learns.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Learner {
+    /// `lnn train`.
+    Train,
+    /// `lnn fit`.
+    Fit,
+}
+
+impl Learner {
+    /// The command.
+    pub fn verb(self) -> &'static str {
+        match self {
+            Self::Train => "train",
+            Self::Fit => "fit",
+        }
+    }
+}
+
+/// A directory of a training or a fit.
 pub enum Found {
-    /// It can go on; its configuration.
-    Unfinished(Box<Config>),
-    /// It has finished; its configuration and `summary.json`.
-    Finished(Box<Config>, String),
+    /// It can go on; what its checkpoint says.
+    Unfinished(String),
+    /// It has finished; `config.toml` and `summary.json`.
+    Finished(String, String),
 }
 
 /// Whether a directory holds a training that can go on.
@@ -20,43 +40,62 @@ pub fn has_checkpoint(directory: &Path) -> bool {
     [NEWEST, PREVIOUS].iter().any(|name| directory.join(name).exists())
 }
 
-/// Looks for a training to go on with.
+/// Looks for a run of this kind to go on with.
 ///
 /// # Errors
-/// A data error if there is none, if it ended with an error, or if what is there is damaged.
-pub fn find(directory: &Path) -> Result<Found, CliError> {
+/// A data error if there is none, if it ended with an error, if it is of the other kind, or if what is there is damaged.
+pub fn find(directory: &Path, learner: Learner) -> Result<Found, CliError> {
     if !directory.is_dir() {
         return Err(CliError::file(directory, "no such directory"));
     }
-    match saved(&Disk, directory) {
-        Ok(found) => parse(directory, NEWEST, &found.content.config).map(Found::Unfinished),
-        Err(CheckpointError::Missing) => finished(directory),
-        Err(error) => Err(CliError::file(directory, error)),
+    let (found, kind) = match saved(&Disk, directory) {
+        Ok(found) => {
+            let kind = kind_of(&found.content.config);
+            (Found::Unfinished(found.content.config), kind)
+        }
+        Err(CheckpointError::Missing) => finished(directory)?,
+        Err(error) => return Err(CliError::file(directory, error)),
+    };
+    if kind != learner {
+        let problem = format!("this is a run of lnn {}, not of lnn {}", kind.verb(), learner.verb());
+        return Err(CliError::file(directory, problem));
     }
+    Ok(found)
 }
 
-/// The training that left its summary and no checkpoint.
-fn finished(directory: &Path) -> Result<Found, CliError> {
+/// Who wrote the text of a checkpoint.
+fn kind_of(text: &str) -> Learner {
+    if Said::parse(text).is_some() { Learner::Fit } else { Learner::Train }
+}
+
+/// The run that left its summary and no checkpoint.
+fn finished(directory: &Path) -> Result<(Found, Learner), CliError> {
     /// The part of `summary.json` that tells.
     #[derive(Deserialize)]
     struct Summary {
         ended: String,
+        /// Where recorded motion was learned from.
+        #[serde(default)]
+        targets: Option<String>,
     }
     let read = |name: &str| String::from_utf8(read_regular(&directory.join(name), 1 << 26).ok()?).ok();
-    let summary =
-        read("summary.json").and_then(|json| Some((serde_json::from_str::<Summary>(&json).ok()?.ended, json)));
+    let summary = read("summary.json").and_then(|json| Some((serde_json::from_str::<Summary>(&json).ok()?, json)));
     match (summary, read("config.toml")) {
-        (Some((ended, json)), Some(text)) if ended == "finished" => {
-            parse(directory, "config.toml", &text).map(|config| Found::Finished(config, json))
+        (Some((Summary { ended, targets }, json)), Some(text)) if ended == "finished" => {
+            Ok((Found::Finished(text, json), if targets.is_some() { Learner::Fit } else { Learner::Train }))
         }
-        (Some((ended, _)), _) if ended != "interrupted" => {
+        (Some((Summary { ended, .. }, _)), _) if ended != "interrupted" => {
             Err(CliError::file(directory, format_args!("this training has ended: {ended}")))
         }
         _ => Err(CliError::file(directory, format_args!("there is no checkpoint ({NEWEST}) to go on from"))),
     }
 }
 
-fn parse(directory: &Path, name: &str, text: &str) -> Result<Box<Config>, CliError> {
+/// The configuration of a training, as its checkpoint or `config.toml` has it.
+///
+/// # Errors
+/// A data error naming the file.
+pub fn configuration(directory: &Path, name: &str, text: &str) -> Result<Box<Config>, CliError> {
     let config = config::parse(text).map_err(|(line, problem)| {
         CliError::file(&directory.join(name), format_args!("configuration, line {line}: {problem}"))
     })?;
@@ -75,14 +114,37 @@ pub fn require_same(directory: &Path, saved: &Config, asked: &Config) -> Result<
     }
 }
 
-/// The command that goes on with a training.
+/// The command that goes on with the run whose checkpoint is in a directory.
 pub fn command(directory: &Path) -> String {
-    let text = directory.display().to_string();
+    let learner = saved(&Disk, directory).map_or(Learner::Train, |found| kind_of(&found.content.config));
+    let (verb, text) = (learner.verb(), directory.display().to_string());
     let plain = |c: char| c.is_alphanumeric() || "/._-+=:@%,".contains(c);
     if !text.is_empty() && !text.starts_with('-') && text.chars().all(plain) {
-        format!("lnn train --resume {text}")
+        format!("lnn {verb} --resume {text}")
     } else {
-        format!("lnn train --resume='{}'", text.replace('\'', r"'\''"))
+        format!("lnn {verb} --resume='{}'", text.replace('\'', r"'\''"))
+    }
+}
+
+/// The end of a message about a run that was stopped.
+pub fn how_to_go_on(directory: &Path) -> String {
+    if has_checkpoint(directory) {
+        format!("; go on with: {}", command(directory))
+    } else {
+        "; there is no checkpoint".to_string()
+    }
+}
+
+/// An error that ended a run which has learned something, such as a full disk: its checkpoint is still there, and the
+/// message says so.
+pub fn keeping(directory: &Path) -> impl Fn(CliError) -> CliError {
+    |error| {
+        if error.kind() == Kind::Data && has_checkpoint(directory) {
+            let learned = "what was learned is kept; when that is mended";
+            CliError::data(format_args!("{error} ({learned}, go on with: {})", command(directory)))
+        } else {
+            error
+        }
     }
 }
 

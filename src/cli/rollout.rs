@@ -1,7 +1,8 @@
 //! `lnn rollout`: the motion of a model from one state.
 
+use crate::cli::files::require_free;
 use crate::cli::forces::ForceArgs;
-use crate::cli::learned::Learned;
+use crate::cli::learned::{Learned, model_file};
 use crate::cli::motion::{Facts, Target, Watch, picture_file, place};
 use crate::cli::number::{finite, positive, tolerance};
 use crate::cli::{CliError, input, interrupt, output};
@@ -51,12 +52,16 @@ pub struct Args {
     /// turn anyway.
     #[arg(long)]
     beyond_range: bool,
-    /// CSV of the trajectory: t, the columns of a state, energy; - for standard output.
+    /// CSV of the trajectory: t, the columns of a state, energy; - for standard output. A file that
+    /// holds something is refused, the model always.
     #[arg(long, value_name = "FILE.csv")]
     out: PathBuf,
     /// Picture of the coordinates against time, or a page with velocities and energy as well.
     #[arg(long, value_name = "FILE.png|FILE.html", value_parser = picture_file)]
     plot: Option<PathBuf>,
+    /// Replace the files.
+    #[arg(long)]
+    overwrite: bool,
     /// Print what there is to say as a JSON object instead of text.
     #[arg(long)]
     json: bool,
@@ -126,7 +131,16 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     if let Some(step) = args.step.filter(|step| *step > args.dt) {
         output::note(&format!("--step {step} is longer than --dt {}: one step per sample", args.dt));
     }
+    let model = model_file(&args.model)?;
+    let inputs: Vec<_> = args.forces.files().chain([model.as_path()]).collect();
+    if !standard {
+        require_free(&args.out, &inputs, args.overwrite)?;
+    }
     if let Some(plot) = &args.plot {
+        if *plot == args.out {
+            return Err(CliError::usage("--plot: the trajectory goes into this file (--out)"));
+        }
+        require_free(plot, &inputs, args.overwrite)?;
         check_target(plot).map_err(|e| CliError::file(plot, format_args!("cannot write: {e}")))?;
     }
     let force = args.forces.force(&learned.header, args.t_start, args.t_end)?;
@@ -142,7 +156,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         })
     });
     let mut watch = Watch::new(learned.domain(), columns);
-    let (stop, mut failed) = (interrupt::flag()?, None);
+    let (stop, mut failed) = (interrupt::flag().map_err(CliError::signals)?, None);
     let mut take = |piece: &Trajectory<f64>| {
         watch.add(piece);
         let written = target.append(&piece.csv_rows());

@@ -1,15 +1,18 @@
 //! `lnn train`: learns, judges, writes.
 
 use crate::cli::folder::Folder;
+use crate::cli::learned::model_file;
 use crate::cli::learning::{Begin, Effort, Finished, Keeping, Learning, forget, learn};
 use crate::cli::number::threads;
+use crate::cli::place::{self, Wanted};
 use crate::cli::progress::Progress as Bar;
-use crate::cli::resume::{Found, command, find, has_checkpoint, require_same, say_finished};
+use crate::cli::results::Writer;
+use crate::cli::resume::{self, Found, Learner, configuration, find, how_to_go_on, require_same, say_finished};
 use crate::cli::train_config::Args;
 use crate::cli::{CliError, interrupt, output};
 use crate::lagrangian::Configured;
 use crate::names::counted;
-use crate::training::{Config, Hooks, NEWEST, PREVIOUS, Progress, Stop};
+use crate::training::{Config, Hooks, NEWEST, Progress, Stop};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -27,10 +30,11 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         return args.print(format);
     }
     let Some(Task { config, system, folder, start }) = Task::of(args)? else { return Ok(()) };
-    let stop = interrupt::flag()?;
+    let stop = interrupt::flag().map_err(CliError::signals)?;
     let effort = Effort { threads: threads(args.threads), starts: STARTS, horizon: 1.0 };
     let keeping = Keeping { every: args.checkpoint_every, start };
-    let finished = match learn(&folder, &config, &system, effort, &hooks(&stop), keeping)? {
+    let learned = learn(&folder, &config, &system, effort, &hooks(&stop), keeping);
+    let finished = match learned.map_err(resume::keeping(folder.path()))? {
         Learning::Finished(finished) => finished,
         Learning::Nothing(_) if stop.load(Ordering::SeqCst) => {
             let problem = "interrupted before the first epoch ended";
@@ -61,25 +65,30 @@ impl Task {
     fn of(args: &Args) -> Result<Option<Self>, CliError> {
         let Some(path) = &args.resume else {
             let (config, system) = args.resolve()?;
-            let path = args.out.clone().unwrap_or_else(|| PathBuf::from("runs").join(&config.system));
-            let folder = Folder::open(&path)?;
-            if has_checkpoint(&path) {
-                let problem = "an unfinished training is in this directory; go on with it by";
-                let way_out = format!("remove {NEWEST} and {PREVIOUS}, or choose another --out");
-                return Err(CliError::file(&path, format_args!("{problem} {}, {way_out}", command(&path))));
-            }
-            return Ok(Some(Self { config, system, folder, start: Begin::Anew }));
+            let usual = PathBuf::from("runs").join(&config.system);
+            let start = config.from.as_deref().map(|from| model_file(Path::new(from))).transpose()?;
+            let inputs: Vec<&Path> = args.inputs().chain(start.as_deref()).collect();
+            let wanted = Wanted {
+                out: args.out.as_deref(),
+                usual: &usual,
+                overwrite: args.overwrite,
+                inputs: &inputs,
+                writer: Writer::Learner,
+            };
+            return Ok(Some(Self { config, system, folder: place::open(&wanted)?, start: Begin::Anew }));
         };
         // Looked for before anything is created, and again when nobody else can write.
-        find(path)?;
+        find(path, Learner::Train)?;
         let folder = Folder::open(path)?;
-        match find(path)? {
-            Found::Finished(saved, json) => {
+        match find(path, Learner::Train)? {
+            Found::Finished(text, json) => {
+                let saved = configuration(path, "config.toml", &text)?;
                 require_same(path, &saved, &args.resolve_beside(&saved)?)?;
                 say_finished(path, args.json.then_some(&json))?;
                 Ok(None)
             }
-            Found::Unfinished(saved) => {
+            Found::Unfinished(text) => {
+                let saved = configuration(path, NEWEST, &text)?;
                 require_same(path, &saved, &args.resolve_beside(&saved)?)?;
                 let system = args.check(&saved)?;
                 Ok(Some(Self { config: *saved, system, folder, start: Begin::Resume }))
@@ -95,15 +104,6 @@ fn conclude(finished: &Finished, path: &Path) -> Result<(), CliError> {
         Stop::Finished => Ok(()),
         Stop::Interrupted => Err(CliError::interrupted(format_args!("interrupted, {kept}{}", how_to_go_on(path)))),
         Stop::Failed(error) => Err(CliError::data(format_args!("training stopped: {error}; {kept}"))),
-    }
-}
-
-/// The end of a message about a training that was stopped.
-fn how_to_go_on(path: &Path) -> String {
-    if has_checkpoint(path) {
-        format!("; go on with: {}", command(path))
-    } else {
-        "; there is no checkpoint".to_string()
     }
 }
 

@@ -11,7 +11,7 @@ use crate::lagrangian::{Configured, SystemError, configure};
 use crate::training::{
     Config, Every, Precision, Preset, SamplingError, Schedule, TRAINING_SECTIONS, configuration_reference,
 };
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
@@ -49,9 +49,13 @@ pub struct Args {
     /// Precision of weights and arithmetic [default: the configuration's, f32 in all presets].
     #[arg(long, value_enum, value_name = "TYPE")]
     precision: Option<PrecisionName>,
-    /// Directory for everything the run writes [default: runs/SYSTEM].
+    /// Directory for everything the run writes; one that holds a run is refused [default: runs/SYSTEM, or the first free
+    /// of runs/SYSTEM-2, runs/SYSTEM-3, ..].
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+    /// Replace the run in the directory, pictures and evaluations of its model included, once the new model is there.
+    #[arg(long, conflicts_with = "resume")]
+    pub overwrite: bool,
     /// Go on with the training in a directory that was stopped; everything else comes from its checkpoint.
     #[arg(long, value_name = "DIR", conflicts_with = "out")]
     pub resume: Option<PathBuf>,
@@ -120,6 +124,11 @@ impl Args {
         let system = self.system.clone().unwrap_or_else(|| saved.system.clone());
         let config = Config { system, ..saved.clone() };
         self.changed(config)
+    }
+
+    /// Files that are read.
+    pub fn inputs(&self) -> impl Iterator<Item = &Path> {
+        self.config.iter().map(PathBuf::as_path)
     }
 
     /// The configuration's system; every value is in range.
@@ -304,7 +313,7 @@ fn with_periods(file: &ConfigFile, mut config: Config) -> Config {
 }
 
 /// How often checkpoints are written: `10` epochs, `90s`.
-fn every(text: &str) -> Result<Every, String> {
+pub fn every(text: &str) -> Result<Every, String> {
     match text.trim().strip_suffix('s') {
         Some(seconds) => positive(seconds).map(Every::Seconds),
         None => count(text).map(Every::Epochs),

@@ -143,6 +143,8 @@ pub struct EpochSolver<S> {
 pub(super) struct Saver<S> {
     pub(super) keeper: Arc<Keeper>,
     pub(super) ended: Ended<S>,
+    /// Seconds of what went before, where that has a clock of its own.
+    pub(super) seconds: f64,
 }
 
 /// Running means over the steps of an epoch.
@@ -272,7 +274,9 @@ impl<S: Scalar> EpochSolver<S> {
 
     /// Writes a checkpoint, if somebody keeps them and one is due.
     fn save_if(&self, state: &TrainingState<S>, is_due: impl Fn(&Keeper) -> bool) {
-        let Some(Saver { keeper, ended }) = self.saver.as_ref().filter(|saver| is_due(&saver.keeper)) else { return };
+        let Some(Saver { keeper, ended, .. }) = self.saver.as_ref().filter(|saver| is_due(&saver.keeper)) else {
+            return;
+        };
         let best = state.get_best_param().or(state.get_param());
         let underway = Underway {
             course: self.course.clone(),
@@ -280,6 +284,7 @@ impl<S: Scalar> EpochSolver<S> {
             best: best.unwrap_or(&ended.weights).clone(),
             best_loss: state.get_best_cost(),
             best_epoch: state.get_last_best_iter(),
+            shooting: None,
         };
         keeper.save(self.clock.seconds(), ended, Some(&underway));
     }

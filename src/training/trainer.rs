@@ -73,10 +73,29 @@ pub struct Trained<S> {
     pub test: BatchReport<S>,
     /// Why training ended.
     pub stop: Stop,
+    /// Steps taken.
+    pub steps: usize,
     /// States that went through a step.
     pub states: usize,
     /// Seconds spent in training alone.
     pub seconds: f64,
+}
+
+impl<S: Scalar> Trained<S> {
+    /// The end of this training as a checkpoint holds it, for what goes on from there, such as
+    /// [`shooting::resume`](crate::training::shooting::resume).
+    pub fn snapshot(&self, config: &Config) -> Snapshot<S> {
+        let ended = Ended {
+            phases: config.phases.len(),
+            polished: config.polish.is_some(),
+            weights: self.weights.clone(),
+            validation_loss: self.validation_loss,
+            history: self.history.clone(),
+            steps: self.steps,
+            states: self.states,
+        };
+        Snapshot { seconds: self.seconds, ended, underway: None }
+    }
 }
 
 /// Why training could not run.
@@ -188,6 +207,8 @@ pub fn resume<S: Scalar>(
     });
     let clock = Clock::after(seconds);
     let mut stop = Stop::Finished;
+    // Then this training is over, and its checkpoint is that of what came after it.
+    let shooting = underway.as_ref().is_some_and(|underway| underway.shooting.is_some());
     for (number, (phase, training)) in pairs().enumerate().skip(ended.phases) {
         let (training, validation) = (training.clone(), data.validation.clone());
         let problem = TrainingProblem { objective: objective()?, training, validation };
@@ -198,7 +219,7 @@ pub fn resume<S: Scalar>(
         solver.steps = steps;
         solver.clock = clock;
         solver.hooks = hooks.clone();
-        solver.saver = keeper.clone().map(|keeper| Saver { keeper, ended: ended.clone() });
+        solver.saver = keeper.clone().map(|keeper| Saver { keeper, ended: ended.clone(), seconds: 0.0 });
         stop = run_phase(problem, solver, phase, &mut ended, underway.take())?;
         if stop != Stop::Finished {
             break;
@@ -243,13 +264,13 @@ pub fn resume<S: Scalar>(
         let error = if let Stop::Failed(error) = stop { Some(error) } else { None };
         return Err(TrainingError::NothingLearned(error));
     }
-    if stop == Stop::Finished {
+    if stop == Stop::Finished && !shooting {
         keep(&ended);
     }
     let seconds = clock.seconds();
     let test = objective()?.loss(&ended.weights, &data.test);
-    let Ended { weights, history, validation_loss, states, .. } = ended;
-    Ok(Trained { weights, history, validation_loss, test, stop, states, seconds })
+    let Ended { weights, history, validation_loss, steps, states, .. } = ended;
+    Ok(Trained { weights, history, validation_loss, test, stop, steps, states, seconds })
 }
 
 /// Writes every epoch to the log.
@@ -275,7 +296,7 @@ fn run_phase<S: Scalar>(
 ) -> Result<Stop, TrainingError> {
     let states = problem.training.len();
     let mut state = TrainingState::<S>::new().param(ended.weights.clone());
-    if let Some(Underway { course, history, best, best_loss, best_epoch }) = underway {
+    if let Some(Underway { course, history, best, best_loss, best_epoch, .. }) = underway {
         (solver.course, solver.history, solver.restored) = (course, history, true);
         state.iter = solver.course.iteration;
         state.last_best_iter = best_epoch;

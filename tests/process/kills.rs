@@ -31,9 +31,10 @@ fn succeed(arguments: &[&str]) {
     assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
 }
 
-/// Columns of the history but the last, the time.
+/// Columns of the histories but the last, the time.
 fn history(directory: &Path) -> String {
-    let csv = fs::read_to_string(directory.join("history.csv")).unwrap();
+    let shooting = fs::read_to_string(directory.join("shooting.csv")).unwrap_or_default();
+    let csv = fs::read_to_string(directory.join("history.csv")).unwrap() + &shooting;
     csv.lines().map(|line| format!("{}\n", line.rsplit_once(',').unwrap().0)).collect()
 }
 
@@ -41,7 +42,8 @@ fn history(directory: &Path) -> String {
 fn summary(directory: &Path) -> Value {
     let mut summary: Value = serde_json::from_slice(&fs::read(directory.join("summary.json")).unwrap()).unwrap();
     for key in ["wall_seconds", "training_seconds", "states_per_second"] {
-        assert!(summary.as_object_mut().unwrap().remove(key).is_some());
+        // A fit does not count its states.
+        assert!(summary.as_object_mut().unwrap().remove(key).is_some() || key == "states_per_second");
     }
     summary
 }
@@ -53,18 +55,54 @@ fn last_epoch(log: &str) -> Option<usize> {
     numbers.next_back()
 }
 
-/// Kills a training `kills` times, always goes on with it, and compares the end with a training that was left alone.
-fn survive(kills: usize, seed: u64) {
+/// A run to kill: what is started in a folder, and what its checkpoint says of its configuration.
+struct Case {
+    verb: &'static str,
+    start: fn(&Path) -> Vec<String>,
+    configuration: Option<fn() -> String>,
+}
+
+/// A training by a configuration in the folder.
+const TRAIN: Case = Case {
+    verb: "train",
+    start: |folder| {
+        let file = folder.join("c.toml");
+        fs::write(&file, toml::to_string(&config()).unwrap()).unwrap();
+        ["--config", file.to_str().unwrap()].map(String::from).to_vec()
+    },
+    configuration: Some(|| toml::to_string(&config()).unwrap()),
+};
+
+/// A fit of made swings, on accelerations and then through the motion.
+const FIT: Case = Case {
+    verb: "fit",
+    start: |folder| {
+        let file = folder.join("swings.csv");
+        let rows = (0..4).flat_map(|run| (0..120).map(move |k| (run, 0.02 * f64::from(k))));
+        let line = |(run, t): (i32, f64)| {
+            let (size, rate) = (0.4 + 0.1 * f64::from(run), 3.0 + 0.2 * f64::from(run));
+            format!("{run},{t},{}\n", size * (rate * t).cos() + 1e-3 * (1e3 * t).sin())
+        };
+        fs::write(&file, "run,t,x\n".to_string() + &rows.map(line).collect::<String>()).unwrap();
+        let file = file.to_str().unwrap();
+        let fit = [file, "--coords", "x", "--trajectory", "run", "--hidden", "8,8", "--targets", "motion"];
+        fit.into_iter().chain(["--epochs", "30", "--shooting-epochs", "30"]).map(String::from).collect()
+    },
+    configuration: None,
+};
+
+/// Kills a run `kills` times, always goes on with it, and compares the end with a run that was left alone.
+fn survive(case: &Case, kills: usize, seed: u64) {
     let folder = tempfile::tempdir().unwrap();
     let text = |path: &Path| path.to_str().unwrap().to_string();
-    let (file, alone, killed) =
-        (folder.path().join("c.toml"), folder.path().join("alone"), folder.path().join("killed"));
-    fs::write(&file, toml::to_string(&config()).unwrap()).unwrap();
-    let train =
-        ["train", "--threads", "1", "--checkpoint-every", "1", "--config", &text(&file), "--out"].map(String::from);
-    let train = |out: &Path| [&train[..], &[text(out)]].concat();
+    let (alone, killed) = (folder.path().join("alone"), folder.path().join("killed"));
+    let begin = [case.verb, "--threads", "1", "--checkpoint-every", "1"].map(String::from);
+    let given = (case.start)(folder.path());
+    let start =
+        |out: &Path| [&begin[..], &given, &["--overwrite".to_string(), "--out".to_string(), text(out)]].concat();
+    let resume = |out: &Path| [&begin[..], &["--resume".to_string(), text(out)]].concat();
     let began = Instant::now();
-    succeed(&train(&alone).iter().map(String::as_str).collect::<Vec<_>>());
+    succeed(&start(&alone).iter().map(String::as_str).collect::<Vec<_>>());
     let span = began.elapsed();
 
     let mut random = ChaCha8Rng::seed_from_u64(seed);
@@ -72,13 +110,7 @@ fn survive(kills: usize, seed: u64) {
     while done < kills {
         // From its beginning again when it has come to its end, so that every stretch of it is hit.
         let go_on = killed.join(NEWEST).exists() || killed.join(PREVIOUS).exists();
-        let arguments = if go_on {
-            ["train", "--threads", "1", "--checkpoint-every", "1", "--resume", &text(&killed)]
-                .map(String::from)
-                .to_vec()
-        } else {
-            train(&killed)
-        };
+        let arguments = if go_on { resume(&killed) } else { start(&killed) };
         let mut child = lnn(&arguments.iter().map(String::as_str).collect::<Vec<_>>());
         std::thread::sleep(Duration::from_secs_f64(span.as_secs_f64() * random.random_range(0.0..0.6)));
         let ended = child.try_wait().unwrap();
@@ -97,16 +129,18 @@ fn survive(kills: usize, seed: u64) {
         }
         if killed.join(NEWEST).exists() || killed.join(PREVIOUS).exists() {
             let found = saved(&Disk, &killed).unwrap().content;
-            assert_eq!(found.config, toml::to_string(&config()).unwrap());
+            if let Some(configuration) = case.configuration {
+                assert_eq!(found.config, configuration());
+            }
             // The log names an epoch, counted from 0, before the checkpoint behind it is written.
             let log = last_epoch(&String::from_utf8_lossy(&output.stderr));
             assert!(found.epochs >= log.unwrap_or(0), "{found:?}, but epoch {log:?} had ended");
         }
     }
     if killed.join(NEWEST).exists() || killed.join(PREVIOUS).exists() {
-        succeed(&["train", "--threads", "1", "--resume", &text(&killed)]);
+        succeed(&resume(&killed).iter().map(String::as_str).collect::<Vec<_>>());
     } else if finished == 0 || !killed.join("model.safetensors").exists() {
-        succeed(&train(&killed).iter().map(String::as_str).collect::<Vec<_>>());
+        succeed(&start(&killed).iter().map(String::as_str).collect::<Vec<_>>());
     }
     compare(&killed, &alone);
     let hidden =
@@ -123,11 +157,17 @@ fn compare(killed: &Path, alone: &Path) {
 
 #[test]
 fn twenty_kills() {
-    survive(20, 1);
+    survive(&TRAIN, 20, 1);
+}
+
+#[test]
+fn ten_kills_of_a_fit() {
+    survive(&FIT, 10, 3);
 }
 
 #[test]
 #[ignore = "minutes"]
 fn two_hundred_kills() {
-    survive(200, 2);
+    survive(&TRAIN, 200, 2);
+    survive(&FIT, 200, 4);
 }

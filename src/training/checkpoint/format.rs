@@ -1,6 +1,6 @@
 //! The bytes of a checkpoint.
 
-use super::{Course, Ended, Identity, Saved, Snapshot, Underway, precision};
+use super::{Course, Ended, Identity, Saved, Shot, Snapshot, Underway, precision};
 use crate::network::file::container::{Kind, Tensor, Tensors, pack, unpack};
 use crate::network::file::{ModelFileError, StoredPrecision};
 use crate::scalar::Scalar;
@@ -73,6 +73,37 @@ struct UnderwayHeader {
     epochs: usize,
     best_loss: u64,
     best_epoch: u64,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    shooting: Option<ShotHeader>,
+}
+
+/// [`Shot`] without its tensors, but with their lengths.
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ShotHeader {
+    seconds: f64,
+    start_loss: u64,
+    gap: u64,
+    /// Starts, validation starts, matrices, Jacobian.
+    lengths: [usize; 4],
+}
+
+/// Names of the tensors of a [`Shot`].
+const SHOT: [&str; 4] = ["shooting.starts", "shooting.validation_starts", "shooting.matrices", "shooting.jacobian"];
+
+impl<S> Shot<S> {
+    /// Its tensors in the order of [`SHOT`].
+    fn tensors(&self) -> [&[S]; 4] {
+        [&self.starts, &self.validation_starts, &self.matrices, &self.jacobian]
+    }
+}
+
+impl<S> From<&Shot<S>> for ShotHeader {
+    fn from(shot: &Shot<S>) -> Self {
+        let bits = |x: f64| x.to_bits();
+        let lengths = shot.tensors().map(<[S]>::len);
+        Self { seconds: shot.seconds, start_loss: bits(shot.start_loss), gap: bits(shot.gap), lengths }
+    }
 }
 
 /// [`Means`] with bits.
@@ -180,7 +211,7 @@ pub(super) fn encode<S: Scalar>(
         Tensor::new(name.to_string(), vec![history.len(), COLUMNS], &rows(history), StoredPrecision::F64)
     };
     let mut tensors = vec![vector("best", &ended.weights), table("history", &ended.history)];
-    if let Some(Underway { course, history, best, .. }) = underway {
+    if let Some(Underway { course, history, best, shooting, .. }) = underway {
         let Stored { first, second, bases, .. } = course.moments.stored();
         tensors.push(vector("weights", &course.weights));
         tensors.push(vector("moments.first", first));
@@ -192,6 +223,8 @@ pub(super) fn encode<S: Scalar>(
         tensors.push(Tensor::indices("order".to_string(), &course.order));
         tensors.push(vector("phase.best", best));
         tensors.push(table("phase.history", history));
+        let shots = shooting.iter().flat_map(|shot| SHOT.into_iter().zip(shot.tensors()));
+        tensors.extend(shots.map(|(name, numbers)| vector(name, numbers)));
     }
     let header = Header {
         format: CHECKPOINT.format,
@@ -206,7 +239,7 @@ pub(super) fn encode<S: Scalar>(
         epochs: ended.history.len(),
         steps: ended.steps,
         states: ended.states,
-        underway: underway.map(|Underway { course, history, best_loss, best_epoch, .. }| UnderwayHeader {
+        underway: underway.map(|Underway { course, history, best_loss, best_epoch, shooting, .. }| UnderwayHeader {
             rng: course.rng.clone(),
             order: course.order.len(),
             moments: course.moments.stored().step,
@@ -220,6 +253,7 @@ pub(super) fn encode<S: Scalar>(
             epochs: history.len(),
             best_loss: best_loss.to_bits(),
             best_epoch: *best_epoch,
+            shooting: shooting.as_ref().map(ShotHeader::from),
         }),
     };
     pack(&CHECKPOINT, &header, tensors)
@@ -252,7 +286,7 @@ pub(super) fn decode<S: Scalar>(bytes: &[u8]) -> Result<(Header, Snapshot<S>), M
                 order: permutation(file.indices("order", stored.order)?)?,
                 weights: vector("weights")?,
                 moments: moments(&file, &header, stored)?,
-                average: vector("average")?,
+                average: if stored.shooting.is_some() { Vec::new() } else { vector("average")? },
                 averaged_steps: stored.averaged_steps,
                 iteration: stored.iteration,
                 epoch: stored.epoch,
@@ -264,6 +298,7 @@ pub(super) fn decode<S: Scalar>(bytes: &[u8]) -> Result<(Header, Snapshot<S>), M
             best: vector("phase.best")?,
             best_loss: f64::from_bits(stored.best_loss),
             best_epoch: stored.best_epoch,
+            shooting: stored.shooting.as_ref().map(|stored| shot(&file, header.precision, stored)).transpose()?,
         }),
     };
     let seconds = header.seconds.max(0.0);
@@ -285,6 +320,24 @@ fn moments<S: Scalar>(
         count => numbers("moments.bases", count)?,
     };
     Moments::restore(first, second, stored.moments, &stored.matrices, &bases).ok_or_else(unfit)
+}
+
+/// The starts of multiple shooting.
+fn shot<S: Scalar>(
+    file: &Tensors<'_>,
+    precision: StoredPrecision,
+    stored: &ShotHeader,
+) -> Result<Shot<S>, ModelFileError> {
+    let numbers = |k: usize| file.numbers::<S>(SHOT[k], &[stored.lengths[k]], precision);
+    Ok(Shot {
+        seconds: stored.seconds.max(0.0),
+        start_loss: f64::from_bits(stored.start_loss),
+        gap: f64::from_bits(stored.gap),
+        starts: numbers(0)?,
+        validation_starts: numbers(1)?,
+        matrices: numbers(2)?,
+        jacobian: numbers(3)?,
+    })
 }
 
 fn table(file: &Tensors<'_>, name: &str, epochs: usize) -> Result<Vec<Epoch>, ModelFileError> {
@@ -353,7 +406,14 @@ mod tests {
             batch: 3,
             means,
         };
-        let underway = Underway { course, history: vec![row(2, 0.5)], best, best_loss: f64::INFINITY, best_epoch: 0 };
+        let underway = Underway {
+            course,
+            history: vec![row(2, 0.5)],
+            best,
+            best_loss: f64::INFINITY,
+            best_epoch: 0,
+            shooting: None,
+        };
         let identity = Identity { config: "a = \"b\"\n".to_string(), data: vec![("test".to_string(), 5)] };
         (identity, Snapshot { seconds: 0.1 + 0.2, ended, underway: Some(underway) })
     }
@@ -369,6 +429,25 @@ mod tests {
         assert_eq!((snapshot.epochs(), snapshot.steps()), (2, 11));
         let between = Snapshot { underway: None, ..snapshot };
         assert_eq!(decode::<f32>(&bytes(&between)).unwrap().1, between);
+    }
+
+    #[test]
+    fn multiple_shooting_comes_back() {
+        let (identity, mut snapshot) = snapshot();
+        let underway = snapshot.underway.as_mut().unwrap();
+        underway.course.average.clear();
+        underway.shooting = Some(Shot {
+            seconds: 0.7,
+            start_loss: f64::INFINITY,
+            gap: 1.0 / 3.0,
+            starts: vec![1.5, -2.25],
+            validation_starts: vec![0.1],
+            matrices: vec![5.0; 4],
+            jacobian: vec![],
+        });
+        let bytes = encode(&identity, snapshot.seconds, &snapshot.ended, snapshot.underway.as_ref()).unwrap();
+        let back = decode::<f32>(&bytes).unwrap().1;
+        assert!(back == snapshot && back.is_shooting());
     }
 
     #[test]

@@ -154,20 +154,23 @@ impl Keeper {
     ) -> Result<Restored<Snapshot<S>>, CheckpointError> {
         let found = newest_whole(self.files.as_ref(), &self.directory, decode::<S>)?;
         let (header, snapshot): (Header, Snapshot<S>) = found.content;
-        if header.identity.config != self.identity.config {
-            return Err(CheckpointError::Config { saved: header.identity.config });
-        }
         let other = self.identity.data.iter().filter(|set| !header.identity.data.contains(set));
         let names: Vec<&str> = other.map(|(name, _)| name.as_str()).collect();
         if !names.is_empty() || header.identity.data.len() != self.identity.data.len() {
             return Err(CheckpointError::Data(names.join(", ")));
         }
+        // After the data: a configuration may have been made for them.
+        if header.identity.config != self.identity.config {
+            return Err(CheckpointError::Config { saved: header.identity.config });
+        }
         if snapshot.ended.weights.len() != parameters {
             let problem = format!("{} weights, the network has {parameters}", snapshot.ended.weights.len());
             return Err(CheckpointError::Data(problem));
         }
+        // The segments of multiple shooting are counted where they are cut.
         if let Some(order) = snapshot.underway.as_ref().map(|underway| underway.course.order.len())
             && order != states
+            && !snapshot.is_shooting()
         {
             return Err(CheckpointError::Data(format!("{order} states in an epoch, the phase has {states}")));
         }

@@ -7,7 +7,10 @@
 //!
 //! - `best`: parameters of the best epoch of the phases that ended; `history`, `f64` of shape `(epochs, 11)`: their rows;
 //! - while a phase is under way `weights`, `moments.first`, `moments.second` and `average` of its last step, `order` of
-//!   the states in its epoch (`u32`), `phase.best` and `phase.history`.
+//!   the states in its epoch (`u32`), `phase.best` and `phase.history`;
+//! - while [multiple shooting](crate::training::shooting) is under way behind the last phase the same of segments, without
+//!   an average, and `shooting.starts`, `shooting.validation_starts`, `shooting.matrices` and `shooting.jacobian`, the
+//!   starts of all segments and the curvature of the loss by them.
 //!
 //! A phase is held to the step: the next batch of the epoch and the sums over its batches so far are in the description,
 //! with the state of the random generator. Polishing has no state of its own: it begins again from the phases' end.
@@ -57,9 +60,13 @@ impl<S> Snapshot<S> {
     pub fn beginning_with(weights: Vec<S>) -> Self {
         Self { seconds: 0.0, ended: Ended::none(weights), underway: None }
     }
-    /// Steps taken so far.
+    /// Steps taken so far; those of multiple shooting, while that is under way.
     pub fn steps(&self) -> usize {
         self.underway.as_ref().map_or(self.ended.steps, |underway| underway.course.step)
+    }
+    /// Whether multiple shooting is under way, the training before it being over.
+    pub fn is_shooting(&self) -> bool {
+        self.underway.as_ref().is_some_and(|underway| underway.shooting.is_some())
     }
     /// Epochs completed so far, polishing included.
     pub fn epochs(&self) -> usize {
@@ -95,7 +102,7 @@ impl<S> Ended<S> {
     }
 }
 
-/// A phase between two of its steps.
+/// A phase, or multiple shooting, between two of its steps.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Underway<S> {
     pub course: Course<S>,
@@ -107,9 +114,29 @@ pub(super) struct Underway<S> {
     pub best_loss: f64,
     /// The best epoch of the phase, counted from 0.
     pub best_epoch: u64,
+    /// What multiple shooting needs beside that; `None` for a phase.
+    pub shooting: Option<Shot<S>>,
 }
 
-/// What moves from step to step within a phase.
+/// The starts of segments between two steps of multiple shooting.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Shot<S> {
+    /// Seconds of multiple shooting.
+    pub seconds: f64,
+    /// Validation loss of the weights it began with.
+    pub start_loss: f64,
+    /// Sum of the gaps over the batches of the epoch.
+    pub gap: f64,
+    /// Starts of the training segments and of the validation segments, `(segments, 2, n)`.
+    pub starts: Vec<S>,
+    pub validation_starts: Vec<S>,
+    /// Curvature and derivatives of the last linearisation, as
+    /// [`Curvature`](crate::training::shooting::Curvature) keeps them.
+    pub matrices: Vec<S>,
+    pub jacobian: Vec<S>,
+}
+
+/// What moves from step to step within a phase; the states of multiple shooting are segments.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Course<S> {
     /// Draws the order of every epoch.

@@ -3,15 +3,15 @@
 use crate::network::{Architecture, Layout, NetworkError};
 use crate::recording::TrackError;
 use crate::scalar::Scalar;
-use crate::training::checkpoint::Clock;
+use crate::training::checkpoint::{Snapshot, Underway};
 use crate::training::config::ConfigError;
 use crate::training::penalty::Penalty;
 use crate::training::shooting::objective::Shots;
 use crate::training::shooting::segments::{Estimated, Noise, Segments};
 use crate::training::shooting::settings::Shooting;
 use crate::training::shooting::solver::{ShootingProblem, ShootingSolver};
-use crate::training::solver::{Epoch, Hooks, TrainingState};
-use crate::training::trainer::{Log, Stop, Stream, TrainingError};
+use crate::training::solver::{Epoch, Hooks, Saver, TrainingState};
+use crate::training::trainer::{Log, Sitting, Stop, Stream, TrainingError};
 use argmin::core::observers::ObserverMode;
 use argmin::core::{Executor, State, TerminationReason, TerminationStatus};
 use thiserror::Error;
@@ -171,9 +171,28 @@ pub fn fit<S: Scalar>(
     threads: usize,
     hooks: &Hooks,
 ) -> Result<Fitted<S>, ShootingError> {
+    resume(settings, task, threads, hooks, Sitting { keeper: None, start: None })
+}
+
+/// [`fit`] with checkpoints, and from one: the result is that of a fit that was never stopped, but for the times.
+///
+/// `sitting.start` is the training that gave the task its weights ([`Trained::snapshot`]), or what
+/// [`Keeper::restore`](crate::training::Keeper::restore) found of the same training, task and settings; without it no
+/// checkpoint is written.
+///
+/// # Errors
+/// As [`fit`]; a checkpoint of other segments.
+///
+/// [`Trained::snapshot`]: crate::training::Trained::snapshot
+pub fn resume<S: Scalar>(
+    settings: &Shooting,
+    task: Task<'_, S>,
+    threads: usize,
+    hooks: &Hooks,
+    sitting: Sitting<S>,
+) -> Result<Fitted<S>, ShootingError> {
     settings.validate()?;
     task.check()?;
-    let clock = Clock::after(0.0);
     let per_segment = settings.samples_per_segment;
     let mut shots = Shots::new(task.architecture, task.penalty, (settings.continuity, settings.huber), threads)
         .map_err(|source| TrainingError::Threads { threads, source })?;
@@ -185,8 +204,25 @@ pub fn fit<S: Scalar>(
     let validation = task.cut(VALIDATION, per_segment, steps)?;
     let segments = (training.len(), training.samples());
     let problem = ShootingProblem { shots, training, validation };
-    let solver = ShootingSolver::new(settings, &problem, Stream::Order(0).generator(task.seed), hooks, clock);
-    let state = TrainingState::<S>::new().param(task.weights.clone());
+    let Sitting { keeper, start } = sitting;
+    let (saver, underway) = match start {
+        Some(Snapshot { seconds, ended, underway }) => {
+            (keeper.map(|keeper| Saver { keeper, ended, seconds }), underway)
+        }
+        None => (None, None),
+    };
+    let rng = Stream::Order(0).generator(task.seed);
+    let mut solver = ShootingSolver::new(settings, &problem, rng, hooks, saver);
+    let mut state = TrainingState::<S>::new().param(task.weights.clone());
+    if let Some(Underway { course, history, best, best_loss, best_epoch, shooting: Some(shot) }) = underway {
+        (state.iter, state.last_best_iter) = (course.iteration, best_epoch);
+        (state.cost, state.best_cost) = (best_loss, best_loss);
+        (state.param, state.best_param) = (Some(best.clone()), Some(best));
+        let segments = problem.training.len();
+        solver
+            .restore(&problem, course, history, shot)
+            .ok_or_else(|| estimate("checkpoint".to_string(), format!("{segments} segments"), "others"))?;
+    }
     let mut result = Executor::new(problem, solver)
         .add_observer(Log, ObserverMode::Always)
         .configure(|_| state.max_iters(settings.epochs as u64))
@@ -209,8 +245,8 @@ pub fn fit<S: Scalar>(
         TerminationStatus::Terminated(TerminationReason::Interrupt) => Stop::Interrupted,
         _ => Stop::Finished,
     };
+    let seconds = result.solver.seconds();
     let (history, start_loss) = (result.solver.history, result.solver.start_loss);
-    let seconds = clock.seconds();
     Ok(Fitted { weights, history, start_loss, validation_loss, stop, segments, steps, integration_error, seconds })
 }
 

@@ -28,7 +28,7 @@ mod settings;
 mod solver;
 mod starts;
 
-pub use fit::{Fitted, ShootingError, Task, fit};
+pub use fit::{Fitted, ShootingError, Task, fit, resume};
 pub use objective::{ShotReport, Shots};
 pub use segments::{Estimated, Noise, Segments};
 pub use settings::Shooting;

@@ -2,14 +2,14 @@
 
 use crate::network::Layout;
 use crate::scalar::{Real, Scalar};
-use crate::training::checkpoint::Clock;
+use crate::training::checkpoint::{Clock, Course, Keeper, Shot, Underway};
 use crate::training::optimizer::{Method, Moments, Update};
 use crate::training::schedule::Schedule;
 use crate::training::shooting::objective::{ShotReport, Shots};
 use crate::training::shooting::segments::Segments;
 use crate::training::shooting::settings::Shooting;
 use crate::training::shooting::starts::Curvature;
-use crate::training::solver::{Epoch, Hooks, Progress, TrainingState};
+use crate::training::solver::{Epoch, Hooks, Means, Progress, Saver, TrainingState};
 use argmin::core::{Error, KV, Problem, Solver, State, TerminationReason, TerminationStatus};
 use argmin::kv;
 use rand::seq::SliceRandom;
@@ -48,33 +48,20 @@ impl<S: Scalar> Starts<S> {
 pub(super) struct ShootingSolver<S> {
     settings: Shooting,
     hooks: Hooks,
-    rng: ChaCha8Rng,
-    order: Vec<u32>,
-    weights: Vec<S>,
-    moments: Moments<S>,
+    course: Course<S>,
     gradient: Vec<S>,
     starts: Starts<S>,
     start_gradient: Vec<S>,
     validation_starts: Starts<S>,
+    /// Sum of the gaps over the batches of the epoch.
+    gap: f64,
+    /// Whether the course began in an earlier sitting.
+    restored: bool,
     clock: Clock,
-    step: usize,
-    epoch: usize,
+    saver: Option<Saver<S>>,
     pub history: Vec<Epoch>,
     /// Validation loss of the weights that were given.
     pub start_loss: f64,
-}
-
-/// Sums over the steps of an epoch.
-#[derive(Default)]
-struct Means {
-    loss: f64,
-    gap: f64,
-    penalty: f64,
-    norm: f64,
-    penalised: usize,
-    left_out: usize,
-    skipped: usize,
-    taken: usize,
 }
 
 impl<S: Scalar> ShootingSolver<S> {
@@ -83,25 +70,79 @@ impl<S: Scalar> ShootingSolver<S> {
         problem: &ShootingProblem<S>,
         rng: ChaCha8Rng,
         hooks: &Hooks,
-        clock: Clock,
+        saver: Option<Saver<S>>,
     ) -> Self {
+        let mut course = Course::new(rng, problem.training.len());
+        course.epoch = saver.as_ref().map_or(0, |saver| saver.ended.history.len());
         Self {
             settings: settings.clone(),
             hooks: hooks.clone(),
-            rng,
-            order: (0..problem.training.len() as u32).collect(),
-            weights: Vec::new(),
-            moments: Moments::new(0),
+            course,
             gradient: Vec::new(),
             starts: Starts::of(&problem.training),
             start_gradient: vec![<S as Real>::zero(); problem.training.starts().len()],
             validation_starts: Starts::of(&problem.validation),
-            clock,
-            step: 0,
-            epoch: 0,
+            gap: 0.0,
+            restored: false,
+            clock: Clock::after(0.0),
+            saver,
             history: Vec::new(),
             start_loss: f64::INFINITY,
         }
+    }
+
+    /// Goes on from a checkpoint; `None` if that is of other segments.
+    pub fn restore(
+        &mut self,
+        problem: &ShootingProblem<S>,
+        course: Course<S>,
+        history: Vec<Epoch>,
+        shot: Shot<S>,
+    ) -> Option<()> {
+        let lengths =
+            |course: &Course<S>, starts: &[S], validation: &[S]| [course.order.len(), starts.len(), validation.len()];
+        let expected = lengths(&self.course, &self.starts.at, &self.validation_starts.at);
+        if lengths(&course, &shot.starts, &shot.validation_starts) != expected {
+            return None;
+        }
+        self.starts.curvature = Curvature::restore(&problem.training, &shot.matrices, &shot.jacobian)?;
+        (self.starts.at, self.validation_starts.at) = (shot.starts, shot.validation_starts);
+        (self.course, self.history, self.restored) = (course, history, true);
+        // Behind the first epoch nobody calls `init`.
+        self.gradient.resize(self.course.weights.len(), <S as Real>::zero());
+        (self.gap, self.start_loss, self.clock) = (shot.gap, shot.start_loss, Clock::after(shot.seconds));
+        Some(())
+    }
+
+    /// Seconds of multiple shooting, all sittings together.
+    pub fn seconds(&self) -> f64 {
+        self.clock.seconds()
+    }
+
+    /// Writes a checkpoint, if somebody keeps them and one is due.
+    fn save_if(&self, state: &TrainingState<S>, is_due: impl Fn(&Keeper) -> bool) {
+        let Some(Saver { keeper, ended, seconds }) = self.saver.as_ref().filter(|saver| is_due(&saver.keeper)) else {
+            return;
+        };
+        let best = state.get_best_param().or(state.get_param());
+        let (matrices, jacobian) = self.starts.curvature.stored();
+        let underway = Underway {
+            course: self.course.clone(),
+            history: self.history.clone(),
+            best: best.unwrap_or(&ended.weights).clone(),
+            best_loss: state.get_best_cost(),
+            best_epoch: state.get_last_best_iter(),
+            shooting: Some(Shot {
+                seconds: self.clock.seconds(),
+                start_loss: self.start_loss,
+                gap: self.gap,
+                starts: self.starts.at.clone(),
+                validation_starts: self.validation_starts.at.clone(),
+                matrices: matrices.to_vec(),
+                jacobian: jacobian.to_vec(),
+            }),
+        };
+        keeper.save(*seconds, ended, Some(&underway));
     }
 
     fn interrupted(&self) -> bool {
@@ -115,36 +156,32 @@ impl<S: Scalar> ShootingSolver<S> {
     /// Validation loss from starts that fit the weights, infinite if it means nothing.
     fn judge(&mut self, problem: &mut ShootingProblem<S>) -> f64 {
         let ShootingProblem { shots, validation, .. } = problem;
-        self.validation_starts.refine(shots, &self.weights, validation);
+        let weights = &self.course.weights;
+        self.validation_starts.refine(shots, weights, validation);
         let rows: Vec<u32> = (0..validation.len() as u32).collect();
-        let report = shots.loss(&self.weights, validation, &self.validation_starts.at, &rows);
+        let report = shots.loss(weights, validation, &self.validation_starts.at, &rows);
         let loss = report.loss.to_f64();
         let is_judged = loss.is_finite() && LEFT_OUT * report.left_out <= validation.len();
         if is_judged { loss } else { f64::INFINITY }
     }
 
     /// One update of the weights and of the starts of the segments `rows` of the order.
-    fn take_step(
-        &mut self,
-        problem: &mut ShootingProblem<S>,
-        rows: std::ops::Range<usize>,
-        rate: f64,
-        steps: usize,
-        means: &mut Means,
-    ) {
-        self.step += 1;
+    fn take_step(&mut self, problem: &mut ShootingProblem<S>, rows: std::ops::Range<usize>, rate: f64, steps: usize) {
+        let Course { order, weights, moments, means, step, .. } = &mut self.course;
+        *step += 1;
+        let step = *step;
         let ShootingProblem { shots, training, .. } = problem;
-        let rows = &self.order[rows];
+        let rows = &order[rows];
         let Starts { at, curvature } = &mut self.starts;
         let share = self.settings.start_share;
-        shots.settle(&self.weights, training, (at, rows), (curvature, &mut self.start_gradient), share);
+        shots.settle(weights, training, (at, rows), (curvature, &mut self.start_gradient), share);
         let gradients = (self.gradient.as_mut_slice(), self.start_gradient.as_mut_slice());
-        let report: ShotReport<S> = shots.step(&self.weights, training, &self.starts.at, rows, gradients);
+        let report: ShotReport<S> = shots.step(weights, training, &self.starts.at, rows, gradients);
         means.left_out += report.left_out;
         let settings = &self.settings;
         let update = Update { method: settings.method, rate, weight_decay: settings.weight_decay, clip: settings.clip };
         let norm = if report.left_out < rows.len() {
-            self.moments.update_on(Some(shots.pool()), &mut self.weights, &mut self.gradient, &update)
+            moments.update_on(Some(shots.pool()), weights, &mut self.gradient, &update)
         } else {
             f64::NAN
         };
@@ -159,12 +196,12 @@ impl<S: Scalar> ShootingSolver<S> {
         let loss = report.loss.to_f64();
         means.taken += 1;
         means.loss += loss;
-        means.gap += report.gap.to_f64();
+        self.gap += report.gap.to_f64();
         means.penalty += report.penalty.to_f64();
         means.penalised += report.penalised;
         means.norm += norm;
         if let Some(watcher) = &self.hooks.watcher {
-            watcher(Progress::Step { step: self.step, steps, rate, loss });
+            watcher(Progress::Step { step, steps, rate, loss });
         }
     }
 }
@@ -184,15 +221,19 @@ impl<S: Scalar> Solver<ShootingProblem<S>, TrainingState<S>> for ShootingSolver<
         state: TrainingState<S>,
     ) -> Result<(TrainingState<S>, Option<KV>), Error> {
         let problem = problem.problem.as_mut().ok_or_else(|| Error::msg("the shooting problem is missing"))?;
-        if let Some(weights) = state.get_param() {
-            self.weights.clone_from(weights);
+        if self.restored {
+            return Ok((state, None));
+        }
+        let Course { weights, moments, .. } = &mut self.course;
+        if let Some(given) = state.get_param() {
+            weights.clone_from(given);
         }
         let layout = Layout::new(problem.shots.architecture());
-        self.moments = Moments::for_method(self.settings.method, self.weights.len(), layout.matrices());
-        self.gradient.resize(self.weights.len(), <S as Real>::zero());
+        *moments = Moments::for_method(self.settings.method, weights.len(), layout.matrices());
+        self.gradient.resize(weights.len(), <S as Real>::zero());
         for _ in 1..PREPARATION {
-            self.starts.refine(&mut problem.shots, &self.weights, &problem.training);
-            self.validation_starts.refine(&mut problem.shots, &self.weights, &problem.validation);
+            self.starts.refine(&mut problem.shots, weights, &problem.training);
+            self.validation_starts.refine(&mut problem.shots, weights, &problem.validation);
         }
         self.start_loss = self.judge(problem);
         let cost = self.start_loss;
@@ -205,28 +246,39 @@ impl<S: Scalar> Solver<ShootingProblem<S>, TrainingState<S>> for ShootingSolver<
         state: TrainingState<S>,
     ) -> Result<(TrainingState<S>, Option<KV>), Error> {
         let problem = problem.problem.as_mut().ok_or_else(|| Error::msg("the shooting problem is missing"))?;
-        let segments = self.order.len();
-        if self.epoch.is_multiple_of(self.settings.curvature_every) {
-            self.starts.refine(&mut problem.shots, &self.weights, &problem.training);
+        let segments = self.course.order.len();
+        let begun = self.course.iteration as f64;
+        if self.course.batch == 0 {
+            if self.course.iteration.is_multiple_of(self.settings.curvature_every as u64) {
+                self.starts.refine(&mut problem.shots, &self.course.weights, &problem.training);
+            }
+            let Course { order, rng, means, .. } = &mut self.course;
+            order.shuffle(rng);
+            (*means, self.gap) = (Means::default(), 0.0);
         }
-        self.order.shuffle(&mut self.rng);
         let batch = self.settings.batch.min(segments);
         let steps = segments.div_ceil(batch);
-        let mut means = Means::default();
-        for k in 0..steps {
-            let rate = self.rate(self.epoch as f64 + k as f64 / steps as f64);
+        while self.course.batch < steps {
+            let k = self.course.batch;
+            let rate = self.rate(begun + k as f64 / steps as f64);
             let rows = k * batch..((k + 1) * batch).min(segments);
-            self.take_step(problem, rows, rate, steps * self.settings.epochs, &mut means);
+            self.take_step(problem, rows, rate, steps * self.settings.epochs);
+            self.course.batch += 1;
             if self.interrupted() {
                 return Ok((state, None));
             }
+            self.save_if(&state, Keeper::is_due);
         }
+        let means = std::mem::take(&mut self.course.means);
+        self.course.batch = 0;
+        self.course.iteration += 1;
+        self.course.epoch += 1;
         let cost = self.judge(problem);
         let taken = means.taken.max(1) as f64;
         let epoch = Epoch {
-            epoch: self.epoch + 1,
+            epoch: self.course.iteration as usize,
             phase: 1,
-            rate: self.rate(self.epoch as f64),
+            rate: self.rate(begun),
             training_loss: means.loss / taken,
             penalty: means.penalty / taken,
             penalised: means.penalised as f64 / (segments * problem.training.steps()) as f64,
@@ -236,10 +288,9 @@ impl<S: Scalar> Solver<ShootingProblem<S>, TrainingState<S>> for ShootingSolver<
             skipped: means.skipped,
             seconds: self.clock.seconds(),
         };
-        self.epoch += 1;
         let record = kv!(
             "training_loss" => epoch.training_loss;
-            "gap" => means.gap / taken;
+            "gap" => self.gap / taken;
             "rate" => epoch.rate;
             "penalty" => epoch.penalty;
         );
@@ -247,11 +298,13 @@ impl<S: Scalar> Solver<ShootingProblem<S>, TrainingState<S>> for ShootingSolver<
             watcher(Progress::Epoch(&epoch));
         }
         self.history.push(epoch);
-        Ok((state.param(self.weights.clone()).cost(cost), Some(record)))
+        Ok((state.param(self.course.weights.clone()).cost(cost), Some(record)))
     }
 
-    fn terminate(&mut self, _: &TrainingState<S>) -> TerminationStatus {
-        if self.interrupted() {
+    fn terminate(&mut self, state: &TrainingState<S>) -> TerminationStatus {
+        let interrupted = self.interrupted();
+        self.save_if(state, |keeper| interrupted || keeper.is_due_after(self.course.epoch));
+        if interrupted {
             return TerminationStatus::Terminated(TerminationReason::Interrupt);
         }
         TerminationStatus::NotTerminated

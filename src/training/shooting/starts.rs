@@ -136,6 +136,22 @@ impl<S: Scalar> Curvature<S> {
         }
     }
 
+    /// Curvature, `(segments, 2n, 2n)`, and derivatives, `(residuals and gap of each segment, 2n)`: what
+    /// [`restore`](Self::restore) takes.
+    pub(super) fn stored(&self) -> (&[S], &[S]) {
+        (&self.matrices, &self.jacobian)
+    }
+
+    /// What [`stored`](Self::stored) gave; `None` if it is not of these segments.
+    pub(super) fn restore(segments: &Segments<S>, matrices: &[S], jacobian: &[S]) -> Option<Self> {
+        let width = 2 * segments.n;
+        let rows = |k: usize| segments.residuals(k) + if segments.list[k].has_next { width } else { 0 };
+        let derivatives: usize = (0..segments.len()).map(|k| width * rows(k)).sum();
+        let mut curvature = Self::default();
+        curvature.set(segments, std::iter::once((matrices, jacobian)));
+        (matrices.len() == segments.len() * width * width && jacobian.len() == derivatives).then_some(curvature)
+    }
+
     /// Adds `J^T rho'(r)` of one segment to `gradient`, `(2n)`; `values` are its residuals, then its gap.
     pub(super) fn add_gradient(
         &self,

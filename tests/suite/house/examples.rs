@@ -193,6 +193,12 @@ fn a_film_becomes_a_csv_of_angles() {
     std::fs::write(path("film.csv"), lines.join("\n")).unwrap();
     let report = convert(&[path("film.csv"), path("angles.csv"), "--rate".into(), "400".into()]).unwrap();
     assert!(report.starts_with("40 frames, ") && report.contains("arms 600.0"), "{report}");
+    // Neither the film nor what is there already is overwritten.
+    for taken in ["film.csv", "angles.csv"] {
+        let error = convert(&[path("film.csv"), path(taken), "--rate".into(), "400".into()]).unwrap_err().to_string();
+        assert!(error.contains(taken), "{error}");
+    }
+    assert_eq!(std::fs::read_to_string(path("film.csv")).unwrap(), lines.join("\n"));
     let csv = std::fs::read_to_string(path("angles.csv")).unwrap();
     let mut rows = csv.lines();
     assert_eq!(rows.next(), Some("t,theta1,theta2"));

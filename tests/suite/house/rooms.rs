@@ -25,7 +25,7 @@ const ROOMS: [&str; 16] = [
 ];
 
 /// Crates and the only places that may name them.
-const ADAPTERS: [(&str, &str); 15] = [
+const ADAPTERS: [(&str, &str); 16] = [
     ("pulp", "src/scalar/"),
     ("xprec", "src/scalar/"),
     ("libm", "src/scalar/"),
@@ -41,6 +41,7 @@ const ADAPTERS: [(&str, &str); 15] = [
     ("clap_complete", "src/cli/"),
     ("clap_mangen", "src/cli/"),
     ("indicatif", "src/cli/"),
+    ("signal_hook", "src/cli/interrupt.rs"),
 ];
 
 /// Source without comments and literals, cut into identifiers and single symbols (`::` is one).

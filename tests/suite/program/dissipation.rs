@@ -62,7 +62,7 @@ fn a_motion_with_friction_comes_with_its_energy_balance() {
     let (damped, plain) = (arm(Some(4)), arm(None));
     let model = saved(&folder, "damped.safetensors", &damped);
     let out = text(&folder.path("motion.csv"));
-    let start = ["--state", "1,2,0.5,-0.5", "--t-end", "0.5", "--dt", "0.01", "--out", &out];
+    let start = ["--state", "1,2,0.5,-0.5", "--t-end", "0.5", "--dt", "0.01", "--out", &out, "--overwrite"];
     let tight = ["--rtol", "1e-10", "--atol", "1e-12"];
     let run = lnn(&[&["rollout", &model], &start[..], &tight].concat());
     assert_eq!((run.code, run.stderr.as_str()), (Some(0), ""));

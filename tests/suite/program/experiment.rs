@@ -70,7 +70,19 @@ fn finished_runs_are_kept_and_missing_ones_made_again() {
     let config = String::from_utf8(read(changed)).unwrap();
     fs::write(folder.join(changed), config.replace("rate = 0.001", "rate = 0.002")).unwrap();
 
-    smoke("old-tricks", out.path(), "2");
+    // Of the latter an hour of work could be lost.
+    let again = ["old-tricks", "--scale", "smoke", "--threads", "2", "--out", out.path().to_str().unwrap()];
+    let refused = lnn(&again);
+    let stderr = String::from_utf8_lossy(&refused.stderr);
+    assert_eq!(refused.status.code(), Some(1), "{stderr}");
+    assert!(stderr.contains("paper-s-model-seed0: a finished run of another configuration is there"), "{stderr}");
+    let curves = format!("x={}", folder.join("curves.csv").display());
+    fs::write(folder.join("curves.csv"), "seconds,validation_loss\n0,1\n1,0.5\n").unwrap();
+    let refused = lnn(&[&again[..], &["--overwrite", "--beside", &curves]].concat());
+    assert_eq!(refused.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&refused.stderr).contains("curves.csv: this command reads it"));
+    assert!(String::from_utf8(read(changed)).unwrap().contains("rate = 0.002"));
+    succeeded(&lnn(&[&again[..], &["--overwrite"]].concat()));
     assert_eq!(String::from_utf8(read(kept)).unwrap(), marked);
     assert_eq!(read(changed), config.into_bytes());
     // The same numbers on another number of threads.

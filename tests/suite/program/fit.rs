@@ -47,13 +47,13 @@ fn swings(model: &dyn EulerLagrange<f64>, runs: usize, seconds: f64, sigma: f64)
 }
 
 /// Swings of one pendulum over 3 s.
-fn pendulum(runs: usize, damped: bool, sigma: f64) -> String {
+pub(super) fn pendulum(runs: usize, damped: bool, sigma: f64) -> String {
     let model = Damped::chain(1);
     swings(if damped { &model } else { model.exact.as_ref() }, runs, 3.0, sigma)
 }
 
 /// What the columns of one pendulum mean.
-const COLUMNS: [&str; 6] = ["--coords", "angle", "--trajectory", "run", "--periodic", "angle"];
+pub(super) const COLUMNS: [&str; 6] = ["--coords", "angle", "--trajectory", "run", "--periodic", "angle"];
 
 /// Learns by a small network.
 fn fit(folder: &Folder, data: &str, out: &str, more: &[&str]) -> Run {
@@ -198,6 +198,9 @@ fn what_cannot_be_learned_from_is_named() {
     refused(&["--window", "8"], 1, &["window: expected an odd number"]);
     refused(&["--noise", "0.1,0.2"], 1, &["noise: expected 1 number, one per coordinate"]);
     refused(&["--hidden", "0"], 2, &["--hidden"]);
+    for name in ["../evil", "", "/tmp/evil", "..", "a/b", ".x"] {
+        refused(&["--name", name], 2, &["--name", "expected a plain name"]);
+    }
     refused(&["--velocity", "angle_dt"], 1, &["angle_dt", "angle_dot"]);
     let short = folder.file("short.csv", "t,angle\n0,1\n0.1,1.1\n0.2,1.2\n");
     lnn(&["fit", &short, "--coords", "angle"]).refused(1, &["short.csv"]);

@@ -23,6 +23,10 @@
 //! | kill -9 at any moment | `kills::twenty_kills` (200 by `cargo test --test process kills -- --ignored`), `faults::a_checkpoint_is_the_old_one_or_the_new_one` |
 //! | read-only directory, directory as target, no parent | `targets_that_cannot_be_written_are_named`, `cli_train::directories_that_cannot_be_written_are_named_before_training` |
 //! | Ctrl-C, once and twice | `cli_train::ctrl_c_keeps_the_best_model`, `cli_resume::a_second_ctrl_c_ends_at_once` |
+//! | SIGTERM; pictures that do not fit on the disk | `signals` |
+//! | an output that is an input, or there already | `overwrite`, `cli::files::tests`, `cli::place::tests` |
+//! | names that lead out of their directory | `cli::plain_name::tests`, `fit::what_cannot_be_learned_from_is_named` |
+//! | a fit stopped or killed | `fit_resume`, `kills::ten_kills_of_a_fit` |
 //! | reader of a pipe gone | `pipes` |
 //! | two runs, one directory | `cli::folder::tests::one_run_at_a_time`, `cli_resume::a_directory_has_one_run_and_outlives_a_dead_one` |
 //! | loss NaN, singular mass matrix in training | `training::one_number_that_is_not_finite_is_named_and_never_reaches_the_weights`, `a_singular_mass_matrix_stops_or_is_left_out_by_choice` |
@@ -307,9 +311,10 @@ fn every_seed_is_written_and_read_again() {
     let config = folder.file("c.toml", configuration());
     for seed in [i64::MAX as u64, u64::MAX] {
         let out = |name: &str| text(&folder.path(name));
-        let first = lnn(&["train", "--config", &config, "--seed", &seed.to_string(), "--out", &out("one")]);
+        let first =
+            lnn(&["train", "--config", &config, "--seed", &seed.to_string(), "--out", &out("one"), "--overwrite"]);
         assert_eq!(first.code, Some(0), "{}", first.stderr);
-        let again = lnn(&["train", "--config", &out("one/config.toml"), "--out", &out("two")]);
+        let again = lnn(&["train", "--config", &out("one/config.toml"), "--out", &out("two"), "--overwrite"]);
         assert_eq!(again.code, Some(0), "{}", again.stderr);
         let [one, two] = ["one", "two"].map(|name| fs::read(folder.path(name).join("model.safetensors")).unwrap());
         assert_eq!(one, two);

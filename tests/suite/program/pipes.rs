@@ -93,7 +93,8 @@ fn results_and_messages_go_their_own_ways() {
     let out = text(&folder.path("out"));
     let train = |filter: &str| {
         Run::of(
-            command(&["train", "--config", &config, "--out", &out, "--json", "--threads", "1"]).env("LNN_LOG", filter),
+            command(&["train", "--config", &config, "--out", &out, "--overwrite", "--json", "--threads", "1"])
+                .env("LNN_LOG", filter),
         )
     };
     // Every event is a line with its level; the result is JSON beside any number of them.
@@ -108,7 +109,7 @@ fn results_and_messages_go_their_own_ways() {
     for silent in ["off", "error", "warn", "info,lnn=off", "foreign=trace"] {
         assert_eq!(lines(silent, ""), 0, "{silent}");
     }
-    let unset = lnn(&["train", "--config", &config, "--out", &out]);
+    let unset = lnn(&["train", "--config", &config, "--out", &out, "--overwrite"]);
     assert_eq!((unset.code, unset.stderr.as_str()), (Some(0), ""));
     let wrong = Run::of(command(&["systems"]).env("LNN_LOG", "lnn=loud"));
     wrong.refused(2, &["LNN_LOG: "]);

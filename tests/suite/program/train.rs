@@ -115,7 +115,11 @@ fn a_model_moves_and_is_judged() {
     let model = text(&folder.path("run/model.safetensors"));
     let out = text(&folder.path("path.csv"));
     let rollout = |state: &str, more: &[&str]| {
-        lnn(&[&["rollout", &model, "--state", state, "--t-end", "0.02", "--dt", "0.01", "--out", &out], more].concat())
+        lnn(&[
+            &["rollout", &model, "--state", state, "--t-end", "0.02", "--dt", "0.01", "--out", &out, "--overwrite"],
+            more,
+        ]
+        .concat())
     };
     let header = ModelFile::<f64>::load(Path::new(&model)).unwrap().header;
     let middle: Vec<String> = header.position.iter().map(|b| (0.5 * (b[0] + b[1])).to_string()).collect();
@@ -156,12 +160,13 @@ fn a_model_moves_and_is_judged() {
 
     let table = succeeded(&lnn(&["evaluate", &model, "--starts", "2"]));
     assert!(table.contains("accelerations") && table.contains("report.html"));
-    let json = succeeded(&lnn(&["evaluate", &model, "--starts", "2", "--json"]));
+    let json = succeeded(&lnn(&["evaluate", &model, "--overwrite", "--starts", "2", "--json"]));
     let json: Value = serde_json::from_str(&json).unwrap();
     assert_eq!(json["trajectories"].as_array().unwrap().len(), 2);
     assert!(folder.path("run/evaluation/lagrangian.png").is_file());
     assert!(json["trajectories"][0]["conserved_error"].is_null());
-    let evaluate = |more: &[&str]| lnn(&[&["evaluate", &model, "--starts", "2", "--json"], more].concat());
+    let evaluate =
+        |more: &[&str]| lnn(&[&["evaluate", &model, "--overwrite", "--starts", "2", "--json"], more].concat());
     let (near, still) = (["--positions", "1:1.5,0.03:0.03"], ["--velocities", "0:0"]);
     let json = succeeded(&evaluate(&[&near[..], &still, &["--until", "0.05", "--rtol", "1e-9"]].concat()));
     let json: Value = serde_json::from_str(&json).unwrap();
@@ -175,7 +180,7 @@ fn a_model_moves_and_is_judged() {
     }
     // Faster than the model was trained for.
     let fast = format!("{}:{0}", 3.0 * header.velocity[0][1]);
-    let table = succeeded(&lnn(&["evaluate", &model, "--velocities", &fast, "--until", "0.1"]));
+    let table = succeeded(&lnn(&["evaluate", &model, "--overwrite", "--velocities", &fast, "--until", "0.1"]));
     assert!(table.contains(&format!("{} outside the training range at 0.0", header.columns[2])), "{table}");
     refused(&evaluate(&["--positions", "0:1,0:1,0:1"]), 2, &["--positions: expected 1 or 2 pairs LOW:HIGH, found 3"]);
     refused(&evaluate(&["--velocities", "1:0"]), 2, &["--velocities", "LOW:HIGH"]);
@@ -201,13 +206,13 @@ fn a_relativistic_model_knows_the_range_of_the_imposed_velocity() {
 
     let out = text(&folder.path("path.csv"));
     let rollout = |state: &str| {
-        let options = ["--t-end", "0.0002", "--dt", "0.0001", "--out", &out];
+        let options = ["--t-end", "0.0002", "--dt", "0.0001", "--out", &out, "--overwrite"];
         lnn(&[&["rollout", &model, "--state", state], &options[..]].concat())
     };
     let inside = 0.5 * high;
     assert!(succeeded(&rollout(&format!("0,0,0,3,{inside},0,0,0"))).contains(" m, "));
     refused(&rollout("0,0,0,3,6.7,0,0,0"), 1, &["training range", "t_dot"]);
-    let json = succeeded(&lnn(&["evaluate", &model, "--starts", "2", "--json"]));
+    let json = succeeded(&lnn(&["evaluate", &model, "--overwrite", "--starts", "2", "--json"]));
     let json: Value = serde_json::from_str(&json).unwrap();
     for start in json["trajectories"].as_array().unwrap() {
         let number = |key: &str, k: usize| start[key][k].as_f64().unwrap();

@@ -3,22 +3,29 @@
 use crate::common::accuracy::{cast, largest};
 use crate::common::nested::reference;
 use crate::common::{of_scalar, properties};
+use lnn::lagrangian::configure;
 use lnn::network::{
     Adjoint, Architecture, Chunk, Depth, Initialization, InputLayer, Jets, Layout, LinearMap, Nonlinearity,
     initial_weights,
 };
 use lnn::recording::Track;
 use lnn::scalar::{Dd, Real, Scalar};
+use lnn::storage::Disk;
 use lnn::tape::{ScalarFunction, gradient};
 use lnn::training::shooting::{
-    Curvature, Estimated, Fitted, Noise, Segments, Shooting, ShootingError, Shots, Task, fit,
+    self, Curvature, Estimated, Fitted, Noise, Segments, Shooting, ShootingError, Shots, Task, fit,
 };
-use lnn::training::{Dataset, Hooks, Objective, Penalty, Stop, TrainingError};
+use lnn::training::{
+    Dataset, Datasets, Every, Hooks, Identity, Keeper, Objective, Penalty, Preset, Progress, Sitting, Stop,
+    TrainingError, resume,
+};
 use proptest::prelude::*;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::TAU;
-use std::sync::atomic::Ordering;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 fn small(n: usize, activation: Nonlinearity, input_layer: InputLayer, embed_periodic: bool) -> Architecture {
     Architecture {
@@ -580,6 +587,76 @@ fn an_interrupt_keeps_the_best_so_far() {
     hooks.interrupt.store(true, Ordering::Relaxed);
     let fitted = fit_motion(&quick(), &architecture, weights.clone(), &motion, 1, &hooks).unwrap();
     assert_eq!((fitted.stop, fitted.weights), (Stop::Interrupted, weights));
+}
+
+/// The training that gave the weights is but an epoch of nothing; what is held is multiple shooting behind it.
+#[test]
+fn stopping_after_any_step_changes_nothing() {
+    let architecture = small(2, Nonlinearity::Gelu, InputLayer::None, true);
+    let motion = Motion::made_up(2, 24);
+    let tracks = motion.estimated();
+    let noise = noise(2);
+    let states = |seed: u64| {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut draw = || (0..16).map(|_| rng.random_range(-1.0..1.0)).collect();
+        Dataset::<f64>::new(2, draw(), draw(), draw()).unwrap()
+    };
+    let data = Datasets { training: vec![states(1)], validation: states(2), test: states(3) };
+    let mut config = Preset::Quick.config(&configure("double-pendulum", &[]).unwrap()).unwrap();
+    config.phases[0].epochs = 1;
+    let settings = Shooting { epochs: 4, curvature_every: 3, batch: 2, ..quick() };
+    // As a program does it: the training from the checkpoint or the beginning, then multiple shooting.
+    let sit = |directory: &Path, every: Every, threads: usize, hooks: &Hooks| {
+        let identity = Identity { config: "fit".to_string(), data: data.checksums() };
+        let keeper = Arc::new(Keeper::new(Arc::new(Disk), directory, every, identity));
+        let start = keeper.restore::<f64>(Layout::new(&architecture).parameters, 8).ok().map(|found| found.content);
+        let shots = start.clone().filter(|snapshot| snapshot.is_shooting());
+        let sitting = Sitting { keeper: Some(Arc::clone(&keeper)), start };
+        let trained =
+            resume(&config, &architecture, Penalty::None, data.clone(), threads, &Hooks::default(), sitting).unwrap();
+        let (training, validation) = (&tracks[..], &tracks[..]);
+        let weights = trained.weights.clone();
+        let penalty = Penalty::None;
+        let task = Task { architecture: &architecture, penalty, weights, training, validation, noise: &noise, seed: 1 };
+        let start = Some(shots.unwrap_or_else(|| trained.snapshot(&config)));
+        shooting::resume(&settings, task, threads, hooks, Sitting { keeper: Some(keeper), start }).unwrap()
+    };
+    let stop_after = |steps: usize| {
+        let interrupt = Arc::new(AtomicBool::new(false));
+        let (raised, taken) = (Arc::clone(&interrupt), AtomicUsize::new(0));
+        let watcher = move |progress: Progress<'_>| {
+            if matches!(progress, Progress::Step { .. }) && taken.fetch_add(1, Ordering::SeqCst) + 1 == steps {
+                raised.store(true, Ordering::SeqCst);
+            }
+        };
+        Hooks { watcher: Some(Arc::new(watcher)), interrupt }
+    };
+    let numbers = |fitted: &Fitted<f64>| {
+        let rows =
+            fitted.history.iter().map(|e| [e.training_loss, e.penalty, e.validation_loss, e.gradient_norm, e.rate]);
+        let rows: Vec<_> = rows.map(|row| row.map(f64::to_bits)).collect();
+        (rows, fitted.weights.clone(), [fitted.start_loss, fitted.validation_loss, fitted.integration_error])
+    };
+    let directory = || tempfile::tempdir().unwrap();
+    let whole = sit(directory().path(), Every::Seconds(1e9), 1, &Hooks::default());
+    let per_epoch = whole.segments.0.div_ceil(2);
+    assert_eq!((whole.history.len(), whole.stop.clone()), (4, Stop::Finished));
+    assert!(per_epoch >= 3, "{per_epoch}");
+    for steps in 1..=4 * per_epoch {
+        let place = directory();
+        let stopped = sit(place.path(), Every::Seconds(1e9), 1, &stop_after(steps));
+        assert_eq!(stopped.stop, Stop::Interrupted);
+        let found = sit(place.path(), Every::Epochs(1), 2, &Hooks::default());
+        assert!(numbers(&found) == numbers(&whole) && found.stop == Stop::Finished, "stopped after step {steps}");
+    }
+    // Stopped after every step.
+    let place = directory();
+    for _ in 0..4 * per_epoch {
+        sit(place.path(), Every::Epochs(1), 1, &stop_after(1));
+    }
+    assert!(numbers(&sit(place.path(), Every::Epochs(1), 1, &Hooks::default())) == numbers(&whole));
+    let saved = lnn::training::saved(&Disk, place.path()).unwrap().content;
+    assert!(saved.epochs > 1, "{saved:?}");
 }
 
 #[test]

@@ -1,0 +1,210 @@
+//! What runs leave in their directories: who finds it there, and how it goes when another run replaces it.
+
+use crate::cli::CliError;
+use crate::cli::files::{holds_something, same_file};
+use crate::cli::folder::Folder;
+use crate::cli::learned::MODEL;
+use crate::cli::resume::{command, has_checkpoint};
+use crate::storage::{Disk, Files, read_regular};
+use serde::Deserialize;
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// File with the captions of a run's pictures, by file name; written before them, so that each is known.
+pub const CAPTIONS: &str = "captions.json";
+/// What only trainings and fits write.
+const LEARNED: [&str; 5] = [MODEL, "config.toml", "history.csv", "shooting.csv", "summary.json"];
+/// What evaluations write; trainings and fits have the last two as well.
+const EVALUATED: [&str; 3] = ["evaluation.json", "report.html", CAPTIONS];
+/// Longest file that is read to say what is there, in bytes.
+const MAX_BYTES: u64 = 1 << 26;
+
+/// Who wants to write into a directory.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Writer {
+    /// A training or a fit.
+    Learner,
+    /// An evaluation: it never takes the place of a model.
+    Evaluator,
+}
+
+/// What is in a directory, in words; `None` if a run can be written there and nothing is lost.
+pub fn found(directory: &Path) -> Option<String> {
+    if has_checkpoint(directory) {
+        return Some(format!("an unfinished run (go on with it by: {})", command(directory)));
+    }
+    let names: Vec<String> = LEARNED
+        .into_iter()
+        .chain(EVALUATED)
+        .map(String::from)
+        .filter(|name| holds_something(&directory.join(name)))
+        .chain(pictures(directory))
+        .collect();
+    if names.is_empty() { None } else { Some(described(directory).unwrap_or_else(|| listed(&names))) }
+}
+
+/// Names of the pictures in a directory, in order.
+fn pictures(directory: &Path) -> Vec<String> {
+    let names = fs::read_dir(directory).into_iter().flatten().flatten();
+    let names = names.filter_map(|entry| entry.file_name().into_string().ok()).filter(|name| name.ends_with(".png"));
+    let mut names: Vec<String> = names.filter(|name| holds_something(&directory.join(name))).collect();
+    names.sort();
+    names
+}
+
+/// The first few names.
+fn listed(names: &[String]) -> String {
+    const SHOWN: usize = 4;
+    let more = if names.len() > SHOWN { format!(" and {} more", names.len() - SHOWN) } else { String::new() };
+    format!("{}{more}", names[..names.len().min(SHOWN)].join(", "))
+}
+
+/// A run as its summary tells.
+fn described(directory: &Path) -> Option<String> {
+    /// The part of the summaries that tells.
+    #[derive(Deserialize)]
+    struct Summary {
+        system: String,
+        seed: u64,
+        #[serde(default)]
+        epochs: Option<u64>,
+        #[serde(default)]
+        ended: Option<String>,
+        #[serde(default)]
+        targets: Option<String>,
+    }
+    let read =
+        |name: &str| serde_json::from_slice::<Summary>(&read_regular(&directory.join(name), MAX_BYTES).ok()?).ok();
+    if let Some(Summary { system, seed, epochs: Some(epochs), ended, targets }) = read("summary.json") {
+        let what = if targets.is_some() { "fit" } else { "training" };
+        let ended = if ended.as_deref() == Some("finished") { "a finished" } else { "an ended" };
+        return Some(format!("{ended} {what} of {system} (seed {seed}, {epochs} epochs)"));
+    }
+    read("evaluation.json").map(|Summary { system, seed, .. }| format!("an evaluation of {system} (seed {seed})"))
+}
+
+/// Refuses a directory where writing would overwrite what the command reads.
+///
+/// # Errors
+/// A data error naming the file.
+pub fn require_no_input(directory: &Path, inputs: &[&Path]) -> Result<(), CliError> {
+    for name in LEARNED.into_iter().chain(EVALUATED) {
+        let path = directory.join(name);
+        if inputs.iter().any(|input| same_file(&path, input)) {
+            let problem = format!(
+                "this command reads it and would write it: choose another directory (--out) than {}",
+                directory.display()
+            );
+            return Err(CliError::file(&path, problem));
+        }
+    }
+    Ok(())
+}
+
+/// Refuses a directory that holds a run, unless it may be replaced; an evaluation is refused where a model is in any case.
+///
+/// # Errors
+/// A data error that says what is there.
+pub fn require_room(directory: &Path, writer: Writer, overwrite: bool) -> Result<(), CliError> {
+    let Some(what) = found(directory) else { return Ok(()) };
+    let other = "choose another directory (--out)";
+    let learned = has_checkpoint(directory) || LEARNED.iter().any(|name| holds_something(&directory.join(name)));
+    match (writer, overwrite) {
+        (Writer::Evaluator, _) if learned => Err(CliError::file(
+            directory,
+            format_args!("there is {what}, and a model is no place for an evaluation: {other}"),
+        )),
+        (_, true) => Ok(()),
+        (_, false) => {
+            Err(CliError::file(directory, format_args!("there is {what}; --overwrite replaces it, or {other}")))
+        }
+    }
+}
+
+/// Removes what an earlier run left, all but the model: to be called when the new run's model has taken its place.
+///
+/// # Errors
+/// A data error naming what cannot be removed.
+pub fn remove_stale(folder: &Folder) -> Result<(), CliError> {
+    remove(folder.path(), &LEARNED[1..])?;
+    remove(folder.path(), &EVALUATED)?;
+    for entry in fs::read_dir(folder.path()).into_iter().flatten().flatten() {
+        let name = entry.file_name();
+        let number = name.to_str().and_then(|name| name.strip_prefix("evaluation"));
+        let numbered =
+            number.is_some_and(|n| n.is_empty() || n.strip_prefix('-').is_some_and(|n| n.parse::<u32>().is_ok()));
+        let path = entry.path();
+        if numbered && entry.file_type().is_ok_and(|kind| kind.is_dir()) && path.join(EVALUATED[0]).is_file() {
+            remove(&path, &EVALUATED)?;
+            // What else is in it stays, and so does it.
+            let _ = fs::remove_dir(&path);
+        }
+    }
+    Ok(())
+}
+
+/// Removes what an earlier evaluation left.
+///
+/// # Errors
+/// A data error naming what cannot be removed.
+pub fn remove_stale_evaluation(folder: &Folder) -> Result<(), CliError> {
+    remove(folder.path(), &EVALUATED)
+}
+
+/// Removes the pictures that the captions name, then the files.
+fn remove(directory: &Path, names: &[&str]) -> Result<(), CliError> {
+    let captions = if names.contains(&CAPTIONS) { captioned(directory) } else { Vec::new() };
+    for path in captions.into_iter().chain(names.iter().map(|name| directory.join(name))) {
+        // A device behind a link holds nothing of an earlier run.
+        if path.is_file() || path.is_symlink() && !path.exists() {
+            Disk.remove(&path).map_err(|e| CliError::file(&path, format_args!("cannot remove what was there: {e}")))?;
+        }
+    }
+    Ok(())
+}
+
+/// Pictures that the captions in a directory name, as far as the names are such of pictures in it.
+fn captioned(directory: &Path) -> Vec<PathBuf> {
+    let bytes = read_regular(&directory.join(CAPTIONS), MAX_BYTES).unwrap_or_default();
+    let names: BTreeMap<String, serde_json::Value> = serde_json::from_slice(&bytes).unwrap_or_default();
+    let plain = |name: &String| name.ends_with(".png") && Path::new(name).file_name() == Some(name.as_ref());
+    names.into_keys().filter(plain).map(|name| directory.join(name)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn captions_name_pictures_of_their_directory_alone() {
+        let directory = tempfile::tempdir().unwrap();
+        let inside = directory.path().join("run");
+        fs::create_dir(&inside).unwrap();
+        let names = r#"{"a.png": "x", "../b.png": "x", "/tmp/c.png": "x", "d.csv": "x", "..png/e.png": "x"}"#;
+        fs::write(inside.join(CAPTIONS), names).unwrap();
+        assert_eq!(captioned(&inside), [inside.join("a.png")]);
+    }
+
+    #[test]
+    fn stale_files_go_and_others_stay() {
+        let directory = tempfile::tempdir().unwrap();
+        let folder = Folder::open(directory.path()).unwrap();
+        let run = [MODEL, "config.toml", "history.csv", "summary.json", "report.html", "old.png", "notes.txt"];
+        run.iter().for_each(|name| fs::write(folder.file(name), "{}").unwrap());
+        fs::write(folder.file(CAPTIONS), r#"{"old.png": "x"}"#).unwrap();
+        for name in ["evaluation", "evaluation-2", "evaluation-x"] {
+            fs::create_dir(folder.file(name)).unwrap();
+            fs::write(folder.file(name).join("evaluation.json"), "{}").unwrap();
+        }
+        fs::write(folder.file("evaluation-2/mine.txt"), "x").unwrap();
+        assert!(found(folder.path()).unwrap().contains("model.safetensors, config.toml"));
+        remove_stale(&folder).unwrap();
+        let mut left: Vec<String> =
+            fs::read_dir(folder.path()).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+        left.sort();
+        assert_eq!(left, [".lnn.lock", "evaluation-2", "evaluation-x", MODEL, "notes.txt"]);
+        assert!(folder.file("evaluation-2/mine.txt").exists() && folder.file("evaluation-x/evaluation.json").exists());
+        assert_eq!(found(folder.path()), Some(MODEL.to_string()));
+    }
+}

@@ -1,0 +1,102 @@
+//! SIGTERM, as batch systems send it, and disks that fill up: what was learned is kept.
+#![cfg(all(feature = "cli", unix))]
+
+use crate::common::program::{Folder, Run, command, lnn, text};
+use lnn::lagrangian::configure;
+use lnn::storage::Disk;
+use lnn::training::{NEWEST, Preset, saved};
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
+
+/// A training of so many epochs.
+fn configuration(folder: &Folder, epochs: usize) -> String {
+    let mut config = Preset::Quick.config(&configure("double-pendulum", &[]).unwrap()).unwrap();
+    (config.data.training, config.data.validation, config.data.test) = (512, 64, 64);
+    config.network.hidden = vec![8, 8];
+    config.phases[0].epochs = epochs;
+    folder.file("c.toml", toml::to_string(&config).unwrap())
+}
+
+fn start(arguments: &[&str]) -> Child {
+    command(arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
+}
+
+fn send(signal: &str, child: &Child) {
+    // The process may have ended by now.
+    let _ = Command::new("kill").args([signal, &child.id().to_string()]).stderr(Stdio::null()).status().unwrap();
+}
+
+fn wait_for(path: &Path) {
+    for _ in 0..1500 {
+        if path.exists() {
+            return;
+        }
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    panic!("{} does not come", path.display());
+}
+
+#[test]
+fn a_batch_system_ends_a_training_with_everything_kept() {
+    let folder = Folder::new();
+    let (config, out) = (configuration(&folder, 1_000_000), folder.path("out"));
+    let arguments = ["train", "--config", &config, "--out", &text(&out), "--checkpoint-every", "1"];
+    let child = start(&arguments);
+    wait_for(&out.join("checkpoint.previous.safetensors"));
+    send("-TERM", &child);
+    let output = child.wait_with_output().unwrap();
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(143), "{stderr}");
+    assert!(
+        stderr.contains("interrupted, the best of") && stderr.contains("go on with: lnn train --resume "),
+        "{stderr}"
+    );
+    assert!(out.join("model.safetensors").is_file() && out.join("report.html").is_file());
+    assert!(saved(&Disk, &out).unwrap().content.epochs > 0);
+
+    // A second signal ends at once, with its own exit code, and the checkpoint stays.
+    let child = start(&["train", "--resume", &text(&out)]);
+    wait_for(&out.join(".lnn.lock"));
+    std::thread::sleep(Duration::from_millis(300));
+    send("-INT", &child);
+    send("-TERM", &child);
+    assert!(matches!(child.wait_with_output().unwrap().status.code(), Some(143 | 130)));
+    assert!(out.join(NEWEST).is_file());
+}
+
+#[test]
+fn commands_that_keep_nothing_end_at_once() {
+    let folder = Folder::new();
+    let model = folder.file("m", crate::common::program::model().to_bytes().unwrap());
+    let out = text(&folder.path("long.csv"));
+    for (signal, code) in [("-INT", 130), ("-TERM", 143)] {
+        let state = ["--state", "1,1,0,0", "--t-end", "1e5", "--dt", "0.1", "--rtol", "1e-12", "--method", "gauss6"];
+        let child = start(&[&["rollout", &model, "--out", &out], &state[..], &["--step", "1e-4"]].concat());
+        std::thread::sleep(Duration::from_millis(500));
+        send(signal, &child);
+        assert_eq!(child.wait_with_output().unwrap().status.code(), Some(code));
+        assert!(!folder.path("long.csv").exists());
+    }
+}
+
+/// Files may grow to a certain size, as on a disk that is almost full: model and tables fit, the report with its pictures
+/// does not.
+#[test]
+fn on_a_full_disk_pictures_are_lost_first() {
+    let folder = Folder::new();
+    let (config, out) = (configuration(&folder, 2), folder.path("out"));
+    let script = "trap '' XFSZ; ulimit -f 20; exec \"$0\" \"$@\"";
+    let mut shell = Command::new("sh");
+    shell.args(["-c", script, env!("CARGO_BIN_EXE_lnn"), "train", "--config", &config, "--out", &text(&out)]);
+    let run = Run::of(shell.env_remove("LNN_LOG"));
+    run.refused(1, &["report.html: cannot write: ", "what was learned is kept", "lnn train --resume "]);
+    for name in ["model.safetensors", "config.toml", "history.csv", "summary.json", "captions.json"] {
+        assert!(out.join(name).is_file(), "{name}");
+    }
+    assert!(!out.join("report.html").exists() && !out.join("lagrangian.png").exists());
+    // With room on the disk the rest comes.
+    let resumed = lnn(&["train", "--resume", &text(&out)]);
+    assert_eq!((resumed.code, resumed.stderr.as_str()), (Some(0), ""));
+    assert!(out.join("report.html").is_file() && out.join("lagrangian.png").is_file() && !out.join(NEWEST).exists());
+}
