@@ -125,7 +125,8 @@
 //! # Ok::<(), lnn::tape::TapeError>(())
 //! ```
 //!
-//! Programs that use the crate stand in `examples/`: solvers of other crates, parameter identification by argmin, nalgebra
+//! Guides and reference stand in [`docs`]: the command line, configurations, recorded motion, the method, figures with their
+//! commands. Programs that use the crate stand in `examples/`: solvers of other crates, parameter identification by argmin, nalgebra
 //! matrices, batches without allocation, a filmed pendulum, and a reader of model files in Python.
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
@@ -168,6 +169,9 @@ pub mod report;
 
 #[cfg(feature = "cli")]
 pub mod cli;
+
+#[cfg(all(any(doc, doctest), feature = "cli"))]
+pub mod docs;
 
 /// The README's code runs as a documentation test.
 #[cfg(doctest)]

@@ -206,23 +206,3 @@ fn what_cannot_be_learned_from_is_named() {
     lnn(&["fit", &short, "--coords", "angle"]).refused(1, &["short.csv"]);
     assert_eq!(folder.names(), ["short.csv", "swings.csv"]);
 }
-
-#[test]
-fn the_commands_of_the_readme_run() {
-    let folder = Folder::new();
-    let readme = fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/README.md")).unwrap();
-    let commands = readme.lines().filter_map(|line| line.strip_prefix("cargo run --release -- "));
-    let commands: Vec<&str> = commands.filter(|c| c.starts_with("check ") || c.starts_with("fit ")).collect();
-    assert_eq!(commands.len(), 2, "{commands:?}");
-    let out = text(&folder.path("out"));
-    for command in commands {
-        let mut arguments: Vec<&str> = command.split_whitespace().collect();
-        if arguments[0] == "fit" {
-            arguments.extend(["--epochs", "2", "--shooting-epochs", "1", "--out", &out]);
-        }
-        let run = lnn(&arguments);
-        assert_eq!((run.code, run.stderr.as_str()), (Some(0), ""), "{command}");
-        assert!(run.stdout.contains("theta2"), "{}", run.stdout);
-    }
-    assert!(folder.path("out/report.html").exists());
-}

@@ -1,0 +1,66 @@
+//! Pages of the folder `docs`: guides, reference, figures. Their code is tested with the library's.
+//!
+//! | page | for |
+//! |---|---|
+//! | [`commands`] | every command and option of the program, exit codes, files |
+//! | [`configuration`] | every key of `config.toml`, presets |
+//! | [`recorded_motion`] | data of your own: formats, noise, friction, films |
+//! | [`method`] | equations, penalties, identities, units and conventions |
+//! | [`library`] | features, a Lagrangian of your own, states of your own, examples |
+//! | [`model_format`] | `model.safetensors`, readable without this crate |
+//! | [`results`] | five systems by seeds, limits, time to accuracy, what made training exact, the paper's tables |
+//! | [`accuracy`] | errors of the numerics, run time against error |
+//! | [`performance`] | training steps, evaluations, small matrices, beside PyTorch and JAX |
+//! | [`architecture`] | rooms, flow of data, how to add a system, an operation, an integrator |
+//! | [`building`] | test programs, fuzzing, benchmarks |
+
+/// A page behind the definitions of its links: the first definition of a label counts, so that these, to modules, stand
+/// before the page's own, to files.
+macro_rules! page {
+    ($file:literal) => {
+        concat!(
+            "[commands]: crate::docs::commands\n",
+            "[configuration]: crate::docs::configuration\n",
+            "[presets]: crate::docs::configuration#presets\n",
+            "[recorded-motion]: crate::docs::recorded_motion\n",
+            "[method]: crate::docs::method\n",
+            "[conventions]: crate::docs::method#units-and-conventions\n",
+            "[friction]: crate::docs::method#friction\n",
+            "[penalties]: crate::docs::method#penalties\n",
+            "[off-shell]: crate::docs::method#metrics-from-geodesics\n",
+            "[derivatives]: crate::docs::method#derivatives-of-the-network\n",
+            "[library]: crate::docs::library\n",
+            "[model-format]: crate::docs::model_format\n",
+            "[results]: crate::docs::results\n",
+            "[experiments]: crate::docs::results#experiments\n",
+            "[time-to-accuracy]: crate::docs::results#time-to-accuracy\n",
+            "[accuracy]: crate::docs::accuracy\n",
+            "[performance]: crate::docs::performance\n",
+            "[small-matrices]: crate::docs::performance#small-symmetric-matrices\n",
+            "[architecture]: crate::docs::architecture\n",
+            "[building]: crate::docs::building\n",
+            "\n",
+            include_str!(concat!("../docs/", $file))
+        )
+    };
+}
+
+macro_rules! pages {
+    ($($name:ident $file:literal;)*) => {
+        $(#[doc = page!($file)] pub mod $name {})*
+    };
+}
+
+pages! {
+    commands "commands.md";
+    configuration "configuration.md";
+    recorded_motion "recorded-motion.md";
+    method "method.md";
+    library "library.md";
+    model_format "model-format.md";
+    results "results.md";
+    accuracy "accuracy.md";
+    performance "performance.md";
+    architecture "architecture.md";
+    building "building.md";
+}
