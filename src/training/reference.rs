@@ -267,8 +267,9 @@ pub fn section_reference(section: &Section<'_>, values: &Value, whose: &str) -> 
             Value::Null => "-".to_string(),
             value => format!("`{value}`"),
         };
-        let cell = |text: &str| text.replace('|', "\\|");
-        text += &format!("| `{}` | {} | {} | {} |\n", key.name, cell(key.values), cell(&value), cell(key.purpose));
+        // Brackets outside of code would be links.
+        let cell = |text: &str| text.replace('|', "\\|").replace('[', "\\[");
+        text += &format!("| `{}` | {} | {value} | {} |\n", key.name, cell(key.values), cell(key.purpose));
     }
     text + "\n"
 }
