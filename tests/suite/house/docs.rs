@@ -98,7 +98,10 @@ fn dead(pages: &BTreeMap<String, String>, page: &str, target: &str) -> Option<St
     if !path.is_empty() {
         place.pop();
         for part in path.split('/') {
-            if part == ".." { drop(place.pop()) } else { place.push(part) }
+            match part {
+                ".." => _ = place.pop(),
+                part => place.push(part),
+            }
         }
     }
     let place = place.to_str().unwrap().replace('\\', "/");
@@ -130,7 +133,7 @@ fn arguments(line: &str) -> Option<Vec<String>> {
 fn example(word: &str) -> String {
     let word = word.split('|').next().unwrap_or_default();
     let known = [("SYSTEM", "double-pendulum"), ("MODEL", "model.safetensors"), ("N", "1"), ("NAME", "quick")];
-    known.iter().find(|(name, _)| *name == word).map_or(word, |(_, value)| value).to_string()
+    known.iter().find(|(name, _)| *name == word).map_or(word, |(_, value)| *value).to_string()
 }
 
 /// What is wrong with arguments of the program. A name of a command alone speaks of the command; it is asked for help.
