@@ -171,6 +171,7 @@ pub mod report;
 pub mod cli;
 
 #[cfg(all(any(doc, doctest), feature = "cli"))]
+#[cfg(any(doc, doctest))]
 pub mod docs;
 
 /// The README's code runs as a documentation test.

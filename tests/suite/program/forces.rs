@@ -121,7 +121,7 @@ fn a_motion_is_rolled_out_under_recorded_torques() {
     let rows = table(&(HEADER.to_string() + &recorded.join("\n")));
     let milli: String =
         rows.iter().map(|row| format!("{},{},{}\n", 1e3 * row[9], 1e3 * row[1], 1e3 * row[8])).collect();
-    let milli = folder.file("milli.csv", format!("elbow_force,clock,shoulder\n{milli}"));
+    let milli = folder.file("milli.csv", format!("lower_force,clock,shoulder\n{milli}"));
     let state = rows[3][2..6].iter().map(f64::to_string).collect::<Vec<_>>().join(",");
     let (from, to) = (rows[3][1].to_string(), rows[28][1].to_string());
     let start =
@@ -140,7 +140,7 @@ fn a_motion_is_rolled_out_under_recorded_torques() {
     assert!(balance.contains("forces gave") && balance.contains("friction took 0.0"), "{said}");
     let (without, said) = roll(&[]);
     assert!(without > 2.0 * error && said.lines().count() == 1, "{without} {error} {said}");
-    let units = ["--force", &milli, "--force-time", "clock", "--force-units", "clock=ms,shoulder=mN,elbow_force=1e-3"];
+    let units = ["--force", &milli, "--force-time", "clock", "--force-units", "clock=ms,shoulder=mN,lower_force=1e-3"];
     let (same, _) = roll(&units);
     assert!((same - error).abs() < 1e-6, "{same} {error}");
     for method in ["dop853", "midpoint", "gauss4", "gauss6", "variational"] {
