@@ -141,7 +141,7 @@ fn samples_flow_from_one_command_into_the_next() {
 
     // Recorded motion through a pipe is the motion of the file.
     let long = ["--state", "1,2,0.5,0", "--t-end", "2", "--dt", "0.1", "--beyond-range"];
-    assert_eq!(lnn(&[&["rollout", &run, "--out", &csv], &long[..]].concat()).code, Some(0));
+    assert_eq!(lnn(&[&["rollout", &run, "--out", &csv, "--overwrite"], &long[..]].concat()).code, Some(0));
     let columns = ["--coords", "theta1,theta2", "--json"];
     let of_file = lnn(&[&["check", &csv], &columns[..]].concat());
     let of_pipe = piped(&[&["check", "-"], &columns[..]].concat(), fs::read(&csv).unwrap().as_slice());
@@ -157,7 +157,7 @@ fn a_motion_may_leave_the_training_range() {
     let run = run_directory(&folder);
     let csv = text(&folder.path("motion.csv"));
     let moved = |more: &[&str]| {
-        let start = ["--state", "1,2,9.999,-10.5", "--t-end", "0.2", "--dt", "0.1", "--out", &csv];
+        let start = ["--state", "1,2,9.999,-10.5", "--t-end", "0.2", "--dt", "0.1", "--out", &csv, "--overwrite"];
         lnn(&[&["rollout", &run], &start[..], more].concat())
     };
     moved(&[]).refused(1, &["left the training range at t = 0", "theta2_dot", "--beyond-range"]);
@@ -172,6 +172,8 @@ fn a_motion_may_leave_the_training_range() {
     assert_eq!((&facts["samples"], &facts["time_unit"]), (&3.into(), &"s".into()));
     assert_eq!(facts["left_training_range"]["column"], "theta2_dot");
     assert!(fs::read_to_string(&page).unwrap().contains("Energy of the model"));
+    // Neither the model nor what is there already is drawn over.
+    lnn(&[&["rollout", &run, "--out", "-", "--plot", &page], &START[..]].concat()).refused(1, &["--overwrite"]);
     moved(&["--plot", "motion.svg"]).refused(2, &["--plot", ".png or .html"]);
     let both = [&["rollout", &run, "--out", "-", "--json"], &START[..]].concat();
     lnn(&both).refused(2, &["--json", "standard output"]);

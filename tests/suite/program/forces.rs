@@ -127,7 +127,7 @@ fn a_motion_is_rolled_out_under_recorded_torques() {
     let start =
         ["rollout", &model, "--state", &state, "--t-start", &from, "--t-end", &to, "--dt", "0.02", "--out", &out];
     let roll = |more: &[&str]| {
-        let run = lnn(&[&start[..], more].concat());
+        let run = lnn(&[&start[..], &["--overwrite"], more].concat());
         assert_eq!((run.code, run.stderr.as_str()), (Some(0), ""), "{more:?}");
         let motion = table(&fs::read_to_string(&out).unwrap());
         let error = motion[25][1..3].iter().zip(&rows[28][2..4]).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);

@@ -66,18 +66,19 @@ fn a_batch_system_ends_a_training_with_everything_kept() {
 }
 
 #[test]
-fn commands_that_keep_nothing_end_at_once() {
+fn a_motion_ends_with_the_samples_that_it_has() {
     let folder = Folder::new();
     let model = folder.file("m", crate::common::program::model().to_bytes().unwrap());
-    let out = text(&folder.path("long.csv"));
-    for (signal, code) in [("-INT", 130), ("-TERM", 143)] {
-        let state = ["--state", "1,1,0,0", "--t-end", "1e5", "--dt", "0.1", "--rtol", "1e-12", "--method", "gauss6"];
-        let child = start(&[&["rollout", &model, "--out", &out], &state[..], &["--step", "1e-4"]].concat());
-        std::thread::sleep(Duration::from_millis(500));
-        send(signal, &child);
-        assert_eq!(child.wait_with_output().unwrap().status.code(), Some(code));
-        assert!(!folder.path("long.csv").exists());
-    }
+    let out = text(&folder.path("out.csv"));
+    let state = ["--state", "1,1,0,0", "--t-end", "900", "--dt", "0.00001", "--beyond-range"];
+    let child = start(&[&["rollout", &model, "--out", &out], &state[..]].concat());
+    std::thread::sleep(Duration::from_secs(1));
+    send("-TERM", &child);
+    let output = child.wait_with_output().unwrap();
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(143), "{stderr}");
+    assert!(stderr.contains("interrupted at t = "), "{stderr}");
+    assert!(std::fs::read_to_string(&out).unwrap().lines().count() > 1);
 }
 
 /// Files may grow to a certain size, as on a disk that is almost full: model and tables fit, the report with its pictures
