@@ -165,6 +165,7 @@ fn the_motion_says_where_down_is() {
         };
         std::fs::write(path("film.csv"), angles.iter().map(line).collect::<String>()).unwrap();
         for down in ["x", "-x", "y", "-y"] {
+            let _ = std::fs::remove_file(path("angles.csv"));
             let given =
                 [path("film.csv"), path("angles.csv"), "--rate".into(), "400".into(), "--down".into(), down.into()];
             let said = convert(&given).map_err(|e| e.to_string());
