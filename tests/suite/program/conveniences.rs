@@ -83,7 +83,7 @@ fn a_fit_starts_from_a_model_and_holds_nothing_out() {
     assert_eq!(summary["model"], serde_json::json!([]));
     assert!(fs::read_to_string(folder.path("all/report.html")).unwrap().contains("nothing judges this model"));
 
-    fit("tuned", &["--from", &out("all"), "--learning-rate", "1e-7"]);
+    fit("tuned", &["--from", &out("all"), "--learning-rate", "1e-4"]);
     let weights = |name: &str| ModelFile::<f64>::load(&folder.path(name).join("model.safetensors")).unwrap().weights;
     let moved = weights("all").iter().zip(weights("tuned")).fold(0.0f64, |most, (a, b)| most.max((a - b).abs()));
     assert!(moved > 0.0 && moved < 1e-3, "{moved}");

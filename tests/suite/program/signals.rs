@@ -87,7 +87,7 @@ fn a_motion_ends_with_the_samples_that_it_has() {
 fn on_a_full_disk_pictures_are_lost_first() {
     let folder = Folder::new();
     let (config, out) = (configuration(&folder, 2), folder.path("out"));
-    let script = "trap '' XFSZ; ulimit -f 20; exec \"$0\" \"$@\"";
+    let script = "trap '' XFSZ; ulimit -f 100; exec \"$0\" \"$@\"";
     let mut shell = Command::new("sh");
     shell.args(["-c", script, env!("CARGO_BIN_EXE_lnn"), "train", "--config", &config, "--out", &text(&out)]);
     let run = Run::of(shell.env_remove("LNN_LOG"));
