@@ -1,5 +1,6 @@
 //! Every benchmark once, at its smallest, in one program: what `cargo test` runs of them.
 #![allow(dead_code, unused_imports, reason = "the mains of the benchmarks are not called")]
+#![allow(clippy::duplicate_mod, clippy::module_inception, reason = "each benchmark is a program of its own too")]
 
 mod linalg;
 mod measured;

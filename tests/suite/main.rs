@@ -1,6 +1,8 @@
 //! One program of all tests that may run side by side, a folder per subject; `tests/process` holds those that must own their
 //! process. `cargo test --test suite training::` runs a subject, `cargo test --test suite stress -- --nocapture` prints tables.
 
+#![allow(clippy::duplicate_mod, reason = "the fuzz targets bring their copy of the reference")]
+
 mod autodiff;
 mod common;
 mod house;
