@@ -130,6 +130,10 @@ fn quantities(found: &Determination, names: &[String]) -> Vec<Quantity> {
         .iter()
         .zip(&found.friction)
         .map(|(name, estimate)| Quantity::new(format!("friction of {name}"), estimate, estimate.value.abs(), true));
+    let mut mass: Vec<Quantity> = mass.collect();
+    if let Some(unit) = mass.first_mut().filter(|_| !found.absolute) {
+        unit.determined = "the unit";
+    }
     let energy = Quantity::new("rms E about its mean".to_string(), &found.energy, found.energy.value, true);
-    mass.chain(friction).chain([energy]).collect()
+    mass.into_iter().chain(friction).chain([energy]).collect()
 }
