@@ -15,6 +15,8 @@ use std::time::{Duration, Instant};
 fn config() -> Config {
     let mut config = Preset::Quick.config(&configure("harmonic-oscillator", &[]).unwrap()).unwrap();
     (config.data.training, config.data.validation, config.data.test) = (1024, 64, 64);
+    // The program writes out every parameter.
+    config.parameters = [("k".to_string(), 1.0), ("m".to_string(), 1.0)].into();
     config.network.hidden = vec![16];
     config.optimizer.batch = 64;
     config.phases[0].epochs = 40;

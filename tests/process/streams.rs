@@ -47,7 +47,20 @@ fn a_rollout_takes_the_same_memory_however_long_it_is() {
 
     // The program, its model included.
     let csv = out.to_str().unwrap();
-    let line = ["lnn", "rollout", MODEL, "--state", "0.1,0.1,0,0", "--t-end", "10", "--dt", "0.00005", "--out", csv];
+    let line = [
+        "lnn",
+        "rollout",
+        MODEL,
+        "--state",
+        "0.1,0.1,0,0",
+        "--t-end",
+        "10",
+        "--dt",
+        "0.00005",
+        "--out",
+        csv,
+        "--overwrite",
+    ];
     let arguments: Vec<OsString> = line.iter().map(OsString::from).collect();
     let bytes = peak(|| assert_eq!(lnn::cli::main(arguments), ExitCode::SUCCESS));
     let size = std::fs::metadata(&out).unwrap().len() as usize;
