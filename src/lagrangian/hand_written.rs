@@ -52,7 +52,7 @@ impl<L: Lagrangian, S: Scalar> Form<S> for L {
     }
     fn value(&self, parameters: usize) -> Result<Program<S>, TapeError> {
         let n = Lagrangian::coordinates(self);
-        Program::record(2 * n, parameters, |_, x, p| vec![self.lagrangian(p, &x[..n], &x[n..])])
+        Program::record(2 * n, parameters, |x, p| vec![self.lagrangian(p, &x[..n], &x[n..])])
     }
 }
 
@@ -114,7 +114,7 @@ impl<S: Scalar> Evaluator<S> {
         let value = self.value.get_or_init(|| form.value(count).ok().map(|value| Recorded { value })).as_ref()?;
         let recorded = self.programs[need.index()].get_or_init(|| {
             let n = Lagrangian::coordinates(value);
-            let record = Program::record(2 * n, count, |_, inputs, parameters| {
+            let record = Program::record(2 * n, count, |inputs, parameters| {
                 record(value, parameters, &inputs[..n], &inputs[n..], need)
             });
             record.ok().map(Arc::new)

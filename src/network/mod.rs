@@ -1,7 +1,6 @@
 //! The network Lagrangian: a sum of multilayer perceptrons as `L(q, v)`, and a Rayleigh dissipation beside it, evaluated
 //! in batches.
 
-mod activation;
 mod adjoint;
 mod affine;
 mod branch;
@@ -19,7 +18,7 @@ mod nonlinearity;
 mod planes;
 mod reference;
 
-pub use activation::Activation;
+pub use crate::ops::Activation;
 pub use adjoint::{Adjoint, Jets};
 pub use chunk::Chunk;
 pub use config::{Architecture, Initialization, InputLayer};

@@ -40,31 +40,21 @@ impl Architecture {
         let weight = parameters[dissipation.weight_range()].chunks_exact(dissipation.features);
         let direction = parameters[dissipation.direction_range()].chunks_exact(dissipation.coordinates);
         gamma.zip(weight).zip(direction).fold(R::zero(), |sum, ((&gamma, w), b)| {
-            sum + (gamma + dot(w, positions)).softplus() * log_cosh(dot(b, velocities))
+            sum + (gamma + dot(w, positions)).softplus() * dot(b, velocities).ln_cosh()
         })
     }
 }
 
-/// `ln cosh x = ln(1 + 2 sinh^2(x/2))`, relatively accurate everywhere: beyond `|x| = 40` it grows by `|x|`, to `e^-80`.
-fn log_cosh<R: Real>(x: R) -> R {
-    let bound = R::from_f64(40.0);
-    let near = x.max(-bound).min(bound);
-    (R::two() * (near * R::half()).sinh().sqr()).ln_1p() + (x.abs() - bound).relu()
-}
-
 /// `act(W x + b)`.
 fn evaluate<R: Real>(layer: &Layer, parameters: &[R], x: &[R]) -> Vec<R> {
-    let weights = &parameters[layer.weight_range()];
+    let (weights, bias) = (&parameters[layer.weight_range()], &parameters[layer.bias_range()]);
     let mut z: Vec<R> = match layer.map {
-        LinearMap::Dense => weights
-            .chunks_exact(layer.inputs)
-            .map(|row| row.iter().zip(x).fold(R::zero(), |sum, (&w, &x)| sum + w * x))
-            .collect(),
+        LinearMap::Dense => R::affine(weights, bias, x),
         LinearMap::Diagonal => weights.iter().zip(x).map(|(&gamma, &x)| gamma * x).collect(),
         LinearMap::Scalar => x.iter().map(|&x| weights[0] * x).collect(),
     };
-    for (z, &b) in z.iter_mut().zip(&parameters[layer.bias_range()]) {
-        *z += b;
+    if layer.map != LinearMap::Dense {
+        z.iter_mut().zip(bias).for_each(|(z, &b)| *z += b);
     }
     z.into_iter().map(|z| layer.activation.apply(z)).collect()
 }

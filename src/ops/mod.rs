@@ -8,9 +8,11 @@
 //! each side at a tie, `relu'(0) = 0` (it is a [`select`](crate::scalar::Real::select) on `x > 0`). `NaN` never
 //! vanishes: where the argument is `NaN`, value and derivatives are.
 
+mod activation;
 mod binary;
 mod unary;
 
+pub use activation::Activation;
 pub use binary::Binary;
 pub use unary::Unary;
 pub(crate) use unary::unary_methods;

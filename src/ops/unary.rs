@@ -14,6 +14,19 @@ fn minus_two_by_root_pi<R: Real>() -> R {
     R::constant(-R::Scalar::of_f64(2.0) / Real::sqrt(R::Scalar::PI))
 }
 
+/// The normal distribution function.
+#[inline(always)]
+fn distribution<R: Real>(x: R) -> R {
+    R::half() * (-x * R::constant(Real::sqrt(<R::Scalar as Real>::half()))).erfc()
+}
+
+/// Its density, `e^(-x^2/2) / sqrt(2 pi)`.
+#[inline(always)]
+fn density<R: Real>(x: R) -> R {
+    let factor = R::Scalar::of_f64(0.5) / R::Scalar::PI;
+    R::constant(Real::sqrt(factor)) * (-(R::half() * x * x)).exp()
+}
+
 /// `x^exponent * factor`, exactly 0 for the factor 0.
 #[inline(always)]
 fn power<R: Real>(x: R, factor: i64, exponent: i64) -> R {
@@ -119,6 +132,15 @@ table! {
     Logistic logistic(x, y, d) = y * (-x).logistic(), -d * (R::half() * x).tanh();
     /// `ln(1 + e^x)`.
     Softplus softplus(x, y, d) = x.logistic(), d * (-x).logistic();
+    /// `x Phi(x)`, `Phi` the normal distribution function with the density `phi`: `Phi + x phi`, `phi (2 - x^2)`.
+    Gelu gelu(x, y, d) = distribution(x) + x * density(x), density(x) * (R::two() - x * x);
+    /// `x tanh(x/2)`: `tanh(x/2) + (x/2) / cosh^2(x/2)`, `(1 - (x/2) tanh(x/2)) / cosh^2(x/2)`.
+    XTanh x_tanh(x, y, d) = { let h = x * R::half(); h.tanh() + h * h.cosh().recip().sqr() }, {
+        let h = x * R::half();
+        h.cosh().recip().sqr() * (R::one() - h * h.tanh())
+    };
+    /// `ln cosh(x)`.
+    LnCosh ln_cosh(x, y, d) = x.tanh(), x.cosh().recip().sqr();
     /// Absolute value; 0 at 0 for the derivative, `NaN` passed on.
     Abs abs(x, y, d) = sign(x), d * R::zero();
 }

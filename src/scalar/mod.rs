@@ -120,6 +120,24 @@ pub trait Real:
     fn logistic(self) -> Self;
     /// `ln(1 + e^self)`, relatively accurate in both tails.
     fn softplus(self) -> Self;
+    /// `self Phi(self)`, `Phi` the normal distribution function.
+    #[inline]
+    fn gelu(self) -> Self {
+        let inverse_sqrt_two = Self::constant(Real::sqrt(<Self::Scalar as Real>::half()));
+        self * (-self * inverse_sqrt_two).erfc() * Self::half()
+    }
+    /// `self tanh(self / 2)`.
+    #[inline]
+    fn x_tanh(self) -> Self {
+        self * (self * Self::half()).tanh()
+    }
+    /// `ln cosh(self) = ln(1 + 2 sinh^2(self/2))`, relatively accurate everywhere: beyond 40 it grows by `|self|`, to `e^-80`.
+    #[inline]
+    fn ln_cosh(self) -> Self {
+        let bound = Self::from_f64(40.0);
+        let near = self.max(-bound).min(bound);
+        (Self::two() * (near * Self::half()).sinh().sqr()).ln_1p() + (self.abs() - bound).relu()
+    }
     /// Absolute value; derivative 0 at 0.
     fn abs(self) -> Self;
     /// `self^exponent` for an integer exponent.
@@ -155,6 +173,22 @@ pub trait Real:
     #[inline]
     fn relu(self) -> Self {
         self.select(self, Self::zero())
+    }
+
+    /// `W x + b`, `(outputs)`: `weights` is `W`, `(outputs, x.len())` row-major, `bias` is `b`, `(outputs)`, or empty.
+    ///
+    /// One operation on a tape that records blocks, where `weights` and `bias` are stretches of its parameters; sums
+    /// of products, taken in order, everywhere else.
+    ///
+    /// # Panics
+    /// If `weights` is not made of whole rows or `bias` is shorter than there are rows.
+    fn affine(weights: &[Self], bias: &[Self], x: &[Self]) -> Vec<Self> {
+        assert!(!x.is_empty() && weights.len().is_multiple_of(x.len()), "a matrix of whole rows");
+        assert!(bias.is_empty() || bias.len() == weights.len() / x.len(), "a bias for every row");
+        let product = |row: &[Self]| row.iter().zip(x).fold(Self::zero(), |sum, (&w, &x)| sum + w * x);
+        let mut rows: Vec<Self> = weights.chunks_exact(x.len()).map(product).collect();
+        rows.iter_mut().zip(bias).for_each(|(row, &b)| *row += b);
+        rows
     }
 }
 

@@ -20,18 +20,18 @@
 //! In both, constants are never recorded, variables of two recordings never mix silently, and a zero adjoint times an
 //! infinite partial derivative contributes 0, so that a branch not taken leaves no `NaN`.
 
-mod block;
 mod driver;
 mod eager;
+mod engine;
 mod error;
 mod program;
 mod var;
 
-pub use block::{Block, JetFunction, JetKind};
 pub use driver::{
     ScalarFunction, VectorFunction, derivative, gradient, gradient_on, hessian, hessian_vector, jacobian,
 };
 pub use eager::{Adjoints, Statistics, Tape};
+pub use engine::{Depth, Evaluation, LANES as STATES, MixedDirections, Recorded};
 pub use error::TapeError;
-pub use program::{LANES, Program, Recorder, Replay, Tracer};
+pub use program::{LANES, Program, Replay, Tracer};
 pub use var::Var;

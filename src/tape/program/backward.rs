@@ -3,7 +3,6 @@
 use super::{Instruction, LANES, Node, Row, elementary};
 use crate::ops::{Binary, Unary};
 use crate::scalar::{Real, Scalar, vectorized};
-use crate::tape::block::Scratch;
 
 /// Depends on lane inputs.
 pub(in crate::tape) const INPUTS: u8 = 1;
@@ -24,12 +23,6 @@ pub(in crate::tape) struct Sweep<'a, S> {
     pub(in crate::tape) uniform_adjoints: &'a mut [Row<S>],
     /// Adjoints of the section being swept.
     pub(in crate::tape) adjoints: &'a mut [Row<S>],
-    /// Parameters.
-    pub(in crate::tape) parameters: &'a [S],
-    /// Adjoints of the parameters that block operations read.
-    pub(in crate::tape) parameter_adjoints: &'a mut [S],
-    /// Working space of block operations.
-    pub(in crate::tape) scratch: &'a mut Scratch<S>,
 }
 
 /// `weight * partial`, but 0 where the weight is exactly 0, whatever the partial derivative: a select, not a branch.
@@ -123,9 +116,6 @@ impl<S: Scalar> Sweep<'_, S> {
         }
         let base = self.uniform.len();
         let out = instruction.out as usize - base;
-        if let Node::Block(op) = &instruction.node {
-            return op.reverse(self, out);
-        }
         // Operands precede the operation.
         let (before, weights) = self.adjoints.split_at_mut(out);
         let uniform = if base == 0 { &mut [] } else { &mut *self.uniform_adjoints };
@@ -144,7 +134,7 @@ impl<'a, S: Scalar> Step<'a, S> {
     #[inline(always)]
     fn run(mut self, node: &Node<S>) {
         match node {
-            Node::Input(_) | Node::Parameter(_) | Node::Constant(_) | Node::Block(_) => {}
+            Node::Input(_) | Node::Parameter(_) | Node::Constant(_) | Node::Dense(_) => {}
             Node::Unary(f, a) => self.unary(*f, *a),
             Node::SinCos(a) => {
                 let (s, c) = (&self.rows[self.out], &self.rows[self.out + 1]);

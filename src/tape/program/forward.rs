@@ -3,7 +3,6 @@
 use super::{Instruction, LANES, Node, Row, elementary};
 use crate::ops::{Binary, Unary};
 use crate::scalar::{Scalar, vectorized};
-use crate::tape::block::Scratch;
 
 /// What an instruction may read besides the rows of its own section.
 pub(super) struct Environment<'a, S> {
@@ -24,7 +23,6 @@ pub(super) fn forward<S: Scalar>(
     program: &[Instruction<S>],
     environment: &Environment<'_, S>,
     rows: &mut [Row<S>],
-    scratch: &mut Scratch<S>,
 ) {
     let uniform = environment.uniform;
     let base = uniform.len();
@@ -55,10 +53,7 @@ pub(super) fn forward<S: Scalar>(
                             out[l] = c[l].select(a[l], b[l]);
                         }
                     }
-                    Node::Block(op) => {
-                        let out = instruction.out as usize - base;
-                        op.forward(uniform, rows, out, environment.parameters, scratch);
-                    }
+                    Node::Dense(_) => unreachable!("programs of rows are recorded without blocks"),
                 }
             }
         },

@@ -9,8 +9,7 @@ impl<S: Scalar> Program<S> {
     /// give a program of derivatives. Constants are converted to the scalar of `R`.
     ///
     /// # Errors
-    /// [`TapeError::Shape`] for slices of the wrong length, [`TapeError::Block`] for a program of block operations, which have
-    /// no meaning for single numbers.
+    /// [`TapeError::Shape`] for slices of the wrong length.
     pub fn interpret<R: Real>(&self, inputs: &[R], parameters: &[R]) -> Result<Vec<R>, TapeError> {
         check_length("inputs", self.inputs, inputs.len())?;
         check_length("parameters", self.parameters, parameters.len())?;
@@ -30,9 +29,7 @@ impl<S: Scalar> Program<S> {
                     rows[out + 1] = cos;
                     sin
                 }
-                Node::Block(_) => {
-                    return Err(TapeError::Block { what: "single numbers", expected: 1, found: node.rows() });
-                }
+                Node::Dense(_) => unreachable!("programs of rows are recorded without blocks"),
             };
         }
         Ok(self.outputs.iter().map(|&row| rows[row as usize]).collect())

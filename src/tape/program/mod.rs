@@ -13,14 +13,12 @@ mod recorder;
 mod replay;
 mod tracer;
 
-pub use recorder::Recorder;
 pub use replay::Replay;
 pub use tracer::Tracer;
 
 use backward::INPUTS;
-pub(super) use backward::{PARAMETERS, Sweep};
-pub(super) use recorder::Node;
-pub(super) use replay::pairwise;
+use backward::PARAMETERS;
+pub(super) use recorder::{Graph, Node, Recorder};
 
 use super::error::TapeError;
 use crate::scalar::Scalar;
@@ -53,28 +51,25 @@ pub struct Program<S> {
     pub(super) outputs: Vec<u32>,
     pub(super) inputs: usize,
     pub(super) parameters: usize,
-    pub(super) scratch: usize,
 }
 
 impl<S: Scalar> Program<S> {
-    /// Records `f(recorder, inputs, parameters)`, which returns the outputs.
+    /// Records `f(inputs, parameters)`, which returns the outputs.
     ///
-    /// Inputs differ from lane to lane (a state), parameters are the same for all (masses, weights). The recorder is
-    /// needed for block operations only. `f` may itself use forward numbers over the [`Tracer`]s.
+    /// Inputs differ from lane to lane (a state), parameters are the same for all (masses, weights). `f` may itself use
+    /// forward numbers over the [`Tracer`]s.
     ///
     /// # Errors
     /// [`TapeError::DataDependentBranch`] if `f` reads a value, [`TapeError::MixedTapes`] if it uses numbers of
-    /// another recording, [`TapeError::Block`] if blocks do not fit.
+    /// another recording.
     pub fn record<F>(inputs: usize, parameters: usize, f: F) -> Result<Self, TapeError>
     where
-        F: for<'t> FnOnce(&'t Recorder<S>, &[Tracer<'t, S>], &[Tracer<'t, S>]) -> Vec<Tracer<'t, S>>,
+        F: for<'t> FnOnce(&[Tracer<'t, S>], &[Tracer<'t, S>]) -> Vec<Tracer<'t, S>>,
     {
-        let recorder = Recorder::new(parameters);
+        let recorder = Recorder::new(false);
         let outputs: Vec<u32> = {
-            let number = |node| recorder.tracer(recorder.row(node));
-            let x: Vec<Tracer<'_, S>> = (0..inputs as u32).map(|i| number(Node::Input(i))).collect();
-            let p: Vec<Tracer<'_, S>> = (0..parameters as u32).map(|i| number(Node::Parameter(i))).collect();
-            f(&recorder, &x, &p).into_iter().map(|y| recorder.row_of(y)).collect()
+            let (x, p) = (recorder.inputs(0, inputs), recorder.parameters(parameters));
+            f(&x, &p).into_iter().map(|y| recorder.row_of(y)).collect()
         };
         let graph = recorder.finish()?;
         Ok(Self::compile(&graph, &outputs, inputs, parameters))
@@ -104,8 +99,6 @@ impl<S: Scalar> Program<S> {
             (uniform[index], reach[index]) = match node {
                 Node::Input(_) => (false, INPUTS),
                 Node::Parameter(_) => (true, PARAMETERS),
-                Node::Block(op) if op.has_parameters() => (false, bits | PARAMETERS),
-                Node::Block(_) => (false, bits),
                 _ => (all, bits),
             };
         }
@@ -139,12 +132,8 @@ impl<S: Scalar> Program<S> {
             outputs: outputs.iter().map(|&row| moved(row)).collect(),
             inputs,
             parameters,
-            scratch: 0,
         };
         for (index, node) in graph.nodes.iter().enumerate().filter(|&(index, _)| needed[index]) {
-            if let Node::Block(op) = node {
-                program.scratch = program.scratch.max(op.scratch());
-            }
             let instruction = Instruction { node: node.renumbered(moved), out: place[index] };
             if uniform[index] { &mut program.uniform } else { &mut program.lanes }.push(instruction);
         }

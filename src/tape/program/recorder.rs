@@ -3,7 +3,6 @@
 use super::Tracer;
 use crate::ops::{Binary, Unary};
 use crate::scalar::Scalar;
-use crate::tape::block::BlockOp;
 use crate::tape::error::TapeError;
 use std::cell::{Cell, RefCell};
 use std::collections::HashMap;
@@ -25,8 +24,21 @@ pub(in crate::tape) enum Node<S> {
     Binary(Binary, u32, u32),
     /// Recordable branch.
     Select(u32, u32, u32),
-    /// Operation on blocks of rows.
-    Block(BlockOp<S>),
+    /// `W x + b` on rows: as many rows as there are outputs.
+    Dense(Dense),
+}
+
+/// A dense layer: where its inputs, its weights and its biases stand.
+#[derive(Clone, Debug)]
+pub(in crate::tape) struct Dense {
+    /// Rows of the inputs.
+    pub(in crate::tape) inputs: Vec<u32>,
+    /// Number of outputs.
+    pub(in crate::tape) outputs: usize,
+    /// First parameter of `W`, `(outputs, inputs)` row-major.
+    pub(in crate::tape) weights: usize,
+    /// First parameter of `b`, `(outputs)`.
+    pub(in crate::tape) bias: Option<usize>,
 }
 
 impl<S> Node<S> {
@@ -34,7 +46,7 @@ impl<S> Node<S> {
     pub(in crate::tape) fn rows(&self) -> usize {
         match self {
             Self::SinCos(_) => 2,
-            Self::Block(op) => op.rows(),
+            Self::Dense(dense) => dense.outputs,
             _ => 1,
         }
     }
@@ -45,11 +57,11 @@ impl<S> Node<S> {
             Self::Unary(_, a) | Self::SinCos(a) => visit(*a),
             Self::Binary(_, a, b) => [*a, *b].into_iter().for_each(visit),
             Self::Select(c, a, b) => [*c, *a, *b].into_iter().for_each(visit),
-            Self::Block(op) => op.operands(visit),
+            Self::Dense(dense) => dense.inputs.iter().copied().for_each(visit),
         }
     }
-    /// The same operation on renumbered rows (the first row of a block stands for the block).
-    pub(in crate::tape) fn renumbered(&self, to: impl Fn(u32) -> u32) -> Self
+    /// The same operation on renumbered rows.
+    pub(super) fn renumbered(&self, to: impl Fn(u32) -> u32) -> Self
     where
         S: Clone,
     {
@@ -59,7 +71,9 @@ impl<S> Node<S> {
             Self::SinCos(a) => Self::SinCos(to(*a)),
             Self::Binary(f, a, b) => Self::Binary(*f, to(*a), to(*b)),
             Self::Select(c, a, b) => Self::Select(to(*c), to(*a), to(*b)),
-            Self::Block(op) => Self::Block(op.renumbered(to)),
+            Self::Dense(dense) => {
+                Self::Dense(Dense { inputs: dense.inputs.iter().map(|&row| to(row)).collect(), ..dense.clone() })
+            }
         }
     }
 }
@@ -88,22 +102,30 @@ pub(in crate::tape) struct Graph<S> {
     known: HashMap<Key, u32>,
 }
 
-/// Records a [`Program`](super::Program); also the place where block operations are called.
+/// Bit of a row that names a parameter which is not recorded yet: most weights of a network are read by blocks alone.
+const PARAMETER: u32 = 1 << 31;
+
+/// Records a [`Program`](super::Program).
 #[derive(Debug)]
 pub struct Recorder<S> {
     graph: RefCell<Graph<S>>,
     error: Cell<Option<TapeError>>,
-    parameters: usize,
+    /// Whether dense layers are recorded as blocks.
+    blocks: bool,
 }
 
 impl<S: Scalar> Recorder<S> {
-    pub(super) fn new(parameters: usize) -> Self {
+    pub(in crate::tape) fn new(blocks: bool) -> Self {
         let graph = Graph { nodes: Vec::new(), first: Vec::new(), node_of_row: Vec::new(), known: HashMap::new() };
-        Self { graph: RefCell::new(graph), error: Cell::new(None), parameters }
+        Self { graph: RefCell::new(graph), error: Cell::new(None), blocks }
     }
-    /// Number of parameters of the program.
-    pub(in crate::tape) fn parameters(&self) -> usize {
-        self.parameters
+    /// The numbers of lane inputs `first..first + count`.
+    pub(in crate::tape) fn inputs(&self, first: usize, count: usize) -> Vec<Tracer<'_, S>> {
+        (first..first + count).map(|i| self.tracer(self.row(Node::Input(i as u32)))).collect()
+    }
+    /// The numbers of all parameters; each is recorded when it is first used by itself.
+    pub(in crate::tape) fn parameters(&self, count: usize) -> Vec<Tracer<'_, S>> {
+        (0..count as u32).map(|i| self.tracer(i | PARAMETER)).collect()
     }
     /// Keeps the first error.
     #[cold]
@@ -112,7 +134,7 @@ impl<S: Scalar> Recorder<S> {
             self.error.set(Some(error));
         }
     }
-    pub(super) fn finish(self) -> Result<Graph<S>, TapeError> {
+    pub(in crate::tape) fn finish(self) -> Result<Graph<S>, TapeError> {
         self.error.get().map_or_else(|| Ok(self.graph.into_inner()), Err)
     }
     /// First row of the operation, recorded now unless the same expression was before.
@@ -131,15 +153,15 @@ impl<S: Scalar> Recorder<S> {
             Node::Binary(f @ (Binary::Add | Binary::Mul), a, b) => Some(Key::Binary(*f, *a.min(b), *a.max(b))),
             Node::Binary(f, a, b) => Some(Key::Binary(*f, *a, *b)),
             Node::Select(c, a, b) => Some(Key::Select(*c, *a, *b)),
-            Node::Block(_) => None,
+            Node::Dense(_) => None,
         };
         if let Some(&row) = key.as_ref().and_then(|key| graph.known.get(key)) {
             return row;
         }
         let (row, index) = (graph.node_of_row.len(), graph.nodes.len() as u32);
-        if row + node.rows() > u32::MAX as usize {
+        if row + node.rows() > PARAMETER as usize {
             drop(graph);
-            self.latch(TapeError::Full { limit: u32::MAX });
+            self.latch(TapeError::Full { limit: PARAMETER });
             return 0;
         }
         graph.node_of_row.resize(row + node.rows(), index);
@@ -163,12 +185,45 @@ impl<S: Scalar> Recorder<S> {
                     self.latch(TapeError::MixedTapes);
                     recorder.latch(TapeError::MixedTapes);
                 }
-                number.row()
+                match number.row() {
+                    row if row & PARAMETER == 0 => row,
+                    row => self.row(Node::Parameter(row & !PARAMETER)),
+                }
             }
         }
     }
+    /// Where a stretch of parameters starts, if that is what the numbers are.
+    fn stretch(&self, numbers: &[Tracer<'_, S>]) -> Option<usize> {
+        let place = |number: &Tracer<'_, S>| {
+            let own = number.recorder().is_some_and(|recorder| std::ptr::eq(recorder, self));
+            (own && number.row() & PARAMETER != 0).then(|| (number.row() & !PARAMETER) as usize)
+        };
+        let start = place(numbers.first()?)?;
+        let consecutive = numbers.iter().enumerate().all(|(k, number)| place(number) == Some(start + k));
+        consecutive.then_some(start)
+    }
+    /// A dense layer as one block, if this recorder takes blocks and the weights are stretches of the parameters.
+    pub(super) fn dense<'t>(
+        &'t self,
+        weights: &[Tracer<'t, S>],
+        bias: &[Tracer<'t, S>],
+        x: &[Tracer<'t, S>],
+    ) -> Option<Vec<Tracer<'t, S>>> {
+        if !self.blocks {
+            return None;
+        }
+        let start = self.stretch(weights)?;
+        let bias = if bias.is_empty() { None } else { Some(self.stretch(bias)?) };
+        let inputs = x.iter().map(|&x| self.row_of(x)).collect();
+        let outputs = weights.len() / x.len();
+        let first = self.row(Node::Dense(Dense { inputs, outputs, weights: start, bias }));
+        Some((0..outputs as u32).map(|k| self.tracer(first + k)).collect())
+    }
     /// The operation that fills a row, if it is the negation of another row: that row.
     pub(super) fn negated(&self, row: u32) -> Option<u32> {
+        if row & PARAMETER != 0 {
+            return None;
+        }
         let graph = self.graph.borrow();
         match graph.nodes[graph.node_of_row[row as usize] as usize] {
             Node::Unary(Unary::Neg, a) => Some(a),

@@ -5,7 +5,6 @@ use super::forward::{Environment, forward};
 use super::{LANES, Node, Program, Row};
 use crate::linalg::Buffer;
 use crate::scalar::{Real, Scalar};
-use crate::tape::block::Scratch;
 use crate::tape::error::{TapeError, check_length};
 use std::sync::Arc;
 
@@ -21,7 +20,6 @@ pub struct Replay<S> {
     adjoints: Buffer<S>,
     uniform_adjoints: Buffer<S>,
     parameters: Vec<S>,
-    scratch: Scratch<S>,
 }
 
 impl<S: Scalar> Clone for Replay<S> {
@@ -41,7 +39,6 @@ impl<S: Scalar> Replay<S> {
             adjoints: Buffer::default(),
             uniform_adjoints: Buffer::default(),
             parameters: vec![zero; program.parameters],
-            scratch: Scratch::new(program.scratch),
             program,
         }
     }
@@ -109,12 +106,12 @@ impl<S: Scalar> Replay<S> {
         let uniform: &mut [Row<S>] = self.uniform.lanes(program.uniform_rows);
         self.parameters.copy_from_slice(parameters);
         let environment = Environment { uniform: &[], inputs: &[], lanes, start: 0, parameters };
-        forward(&program.uniform, &environment, uniform, &mut self.scratch);
+        forward(&program.uniform, &environment, uniform);
         for (chunk, start) in (0..lanes).step_by(LANES).enumerate() {
             let environment = Environment { uniform, inputs, lanes, start, parameters };
             let first = if keep { chunk * rows } else { 0 };
             let values = &mut all[first..first + rows];
-            forward(&program.lanes, &environment, values, &mut self.scratch);
+            forward(&program.lanes, &environment, values);
             let mut next = program.outputs.iter().map(|&row| {
                 let row = row as usize;
                 if row < program.uniform_rows { &uniform[row] } else { &values[row - program.uniform_rows] }
@@ -209,9 +206,6 @@ impl<S: Scalar> Replay<S> {
                 rows: &values[chunk * rows..(chunk + 1) * rows],
                 uniform_adjoints,
                 adjoints,
-                parameters: &self.parameters,
-                parameter_adjoints,
-                scratch: &mut self.scratch,
             };
             sweep.run(&program.lanes);
             let Some(target) = &mut by_input else { continue };
@@ -240,9 +234,6 @@ impl<S: Scalar> Replay<S> {
             rows: uniform,
             uniform_adjoints: &mut [],
             adjoints: uniform_adjoints,
-            parameters: &self.parameters,
-            parameter_adjoints: &mut [],
-            scratch: &mut self.scratch,
         };
         sweep.run(&program.uniform);
         for instruction in &program.uniform {

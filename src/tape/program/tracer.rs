@@ -51,7 +51,7 @@ impl<'t, S: Scalar> Tracer<'t, S> {
     fn table1(self, f: Unary) -> Self {
         match self.recorder {
             None => Self::constant(f.value(self.value)),
-            Some(recorder) => recorder.tracer(recorder.row(Node::Unary(f, self.row))),
+            Some(recorder) => recorder.tracer(recorder.row(Node::Unary(f, recorder.row_of(self)))),
         }
     }
     fn table2(self, other: Self, f: Binary) -> Self {
@@ -196,7 +196,7 @@ impl<S: Scalar> Real for Tracer<'_, S> {
                 Some(_) => b,
             },
             Some(recorder) => {
-                let (c, a, b) = (self.row, recorder.row_of(a), recorder.row_of(b));
+                let (c, a, b) = (recorder.row_of(self), recorder.row_of(a), recorder.row_of(b));
                 recorder.tracer(recorder.row(Node::Select(c, a, b)))
             }
         }
@@ -208,9 +208,19 @@ impl<S: Scalar> Real for Tracer<'_, S> {
                 (Self::constant(sin), Self::constant(cos))
             }
             Some(recorder) => {
-                let row = recorder.row(Node::SinCos(self.row));
+                let row = recorder.row(Node::SinCos(recorder.row_of(self)));
                 (recorder.tracer(row), recorder.tracer(row + 1))
             }
         }
+    }
+    fn affine(weights: &[Self], bias: &[Self], x: &[Self]) -> Vec<Self> {
+        assert!(!x.is_empty() && weights.len().is_multiple_of(x.len()), "a matrix of whole rows");
+        assert!(bias.is_empty() || bias.len() == weights.len() / x.len(), "a bias for every row");
+        let block = weights.first().and_then(|first| first.recorder?.dense(weights, bias, x));
+        block.unwrap_or_else(|| {
+            let product = |row: &[Self]| row.iter().zip(x).fold(Self::zero(), |sum, (&w, &x)| sum + w * x);
+            let bias = bias.iter().copied().chain(std::iter::repeat(Self::zero()));
+            weights.chunks_exact(x.len()).zip(bias).map(|(row, b)| product(row) + b).collect()
+        })
     }
 }

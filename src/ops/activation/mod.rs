@@ -27,15 +27,12 @@ impl Activation {
     /// Every activation.
     pub const ALL: [Self; 6] = [Self::Gelu, Self::Softplus, Self::XTanh, Self::Tanh, Self::Quadratic, Self::Identity];
 
-    /// The activation of any kind of real number: the reference that nested derivatives go through.
+    /// The activation of any kind of real number.
     pub fn apply<R: Real>(self, x: R) -> R {
         match self {
-            Self::Gelu => {
-                let inverse_sqrt_two = R::constant(Real::sqrt(<R::Scalar as Real>::half()));
-                x * (-x * inverse_sqrt_two).erfc() * R::half()
-            }
+            Self::Gelu => x.gelu(),
             Self::Softplus => x.softplus(),
-            Self::XTanh => x * (x * R::half()).tanh(),
+            Self::XTanh => x.x_tanh(),
             Self::Tanh => x.tanh(),
             Self::Quadratic => x.sqr(),
             Self::Identity => x,

@@ -1,0 +1,23 @@
+//! How far a Lagrangian is evaluated.
+
+/// How far a Lagrangian is evaluated; each step includes those before it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Depth {
+    /// `L`: one pass.
+    Value,
+    /// `p`, `g`: two passes.
+    Gradient,
+    /// `M`: `n + 2` passes.
+    MassMatrix,
+    /// `c`: `n + 3` passes.
+    Motion,
+    /// As `Motion`, keeping what gradients of losses need.
+    Training,
+}
+
+impl Depth {
+    /// First channel of the tangents along the velocities `e_i`: the value and, for `c`, the direction `(v, 0)` come before.
+    pub(super) fn first_velocity(self) -> usize {
+        if self >= Self::Motion { 2 } else { 1 }
+    }
+}

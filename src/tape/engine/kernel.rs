@@ -1,0 +1,105 @@
+//! Loops over planes.
+
+use crate::scalar::{Real, Scalar, vectorized};
+
+/// `out = f(x)`.
+#[inline(always)]
+pub(super) fn map<S: Scalar>(out: &mut [S], x: &[S], f: impl Fn(S) -> S) {
+    vectorized(
+        #[inline(always)]
+        || {
+            for (out, &x) in out.iter_mut().zip(x) {
+                *out = f(x);
+            }
+        },
+    );
+}
+
+/// `out += a x`.
+pub(super) fn add_scaled<S: Scalar>(out: &mut [S], a: S, x: &[S]) {
+    vectorized(
+        #[inline(always)]
+        || {
+            for (out, &x) in out.iter_mut().zip(x) {
+                *out += a * x;
+            }
+        },
+    );
+}
+
+/// `out += x y`.
+pub(super) fn add_product<S: Scalar>(out: &mut [S], x: &[S], y: &[S]) {
+    vectorized(
+        #[inline(always)]
+        || {
+            for ((out, &x), &y) in out.iter_mut().zip(x).zip(y) {
+                *out += x * y;
+            }
+        },
+    );
+}
+
+/// `out += x y z`.
+pub(super) fn add_product3<S: Scalar>(out: &mut [S], x: &[S], y: &[S], z: &[S]) {
+    vectorized(
+        #[inline(always)]
+        || {
+            for (((out, &x), &y), &z) in out.iter_mut().zip(x).zip(y).zip(z) {
+                *out += x * y * z;
+            }
+        },
+    );
+}
+
+/// Dot product in independent partial sums of fixed order: vectorises, and errs less than a running sum.
+#[inline(always)]
+pub(super) fn dot<S: Scalar>(a: &[S], b: &[S]) -> S {
+    const LANES: usize = 16;
+    let zero = <S as Real>::zero();
+    let mut sums = [zero; LANES];
+    let (a_chunks, b_chunks) = (a.chunks_exact(LANES), b.chunks_exact(LANES));
+    let mut rest = zero;
+    for (&x, &y) in a_chunks.remainder().iter().zip(b_chunks.remainder()) {
+        rest += x * y;
+    }
+    for (a, b) in a_chunks.zip(b_chunks) {
+        for k in 0..LANES {
+            sums[k] += a[k] * b[k];
+        }
+    }
+    let mut width = LANES / 2;
+    while width > 0 {
+        for k in 0..width {
+            sums[k] += sums[k + width];
+        }
+        width /= 2;
+    }
+    sums[0] + rest
+}
+
+/// Sum of a plane of one unit, in partial sums of fixed order.
+pub(super) fn sum<S: Scalar>(x: &[S]) -> S {
+    let zero = <S as Real>::zero();
+    x.chunks(16).fold(zero, |total, part| total + part.iter().fold(zero, |sum, &x| sum + x))
+}
+
+/// Adds the sum of the rows of a plane to `total`.
+pub(super) fn add_rows<S: Scalar>(plane: &[S], total: &mut [S]) {
+    vectorized(
+        #[inline(always)]
+        || {
+            for row in plane.chunks_exact(total.len()) {
+                for (sum, &x) in total.iter_mut().zip(row) {
+                    *sum += x;
+                }
+            }
+        },
+    );
+}
+
+/// Sets the length; new numbers are zero, old ones stay.
+pub(super) fn resize<S: Scalar>(buffer: &mut Vec<S>, length: usize) {
+    if buffer.len() < length {
+        buffer.resize(length, <S as Real>::zero());
+    }
+}

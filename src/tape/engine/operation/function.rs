@@ -1,0 +1,146 @@
+//! Functions of two numbers that the table knows, by their partial derivatives.
+
+use super::{Forward, MixedForward, MixedReverse, Reverse, add_if};
+use crate::ops::Binary;
+use crate::scalar::{Real, Scalar};
+use crate::tape::engine::{Depth, LANES};
+use crate::tape::engine::jets::partials;
+use crate::tape::engine::kernel::{add_product, add_product3};
+
+/// `f(a, b)`.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Function {
+    pub f: Binary,
+    pub a: usize,
+    pub b: usize,
+    /// Number of the function among those of its Lagrangian: where its partial derivatives stand.
+    pub number: usize,
+}
+
+/// Partial derivatives that are kept: two first, three second, four third.
+pub(crate) const PARTIALS: usize = 9;
+
+impl Function {
+    /// The planes of partial derivatives, `(9, lanes)`.
+    fn planes<S>(self, partials: &[S], lanes: usize) -> [&[S]; PARTIALS] {
+        std::array::from_fn(|k| &partials[(self.number * PARTIALS + k) * lanes..][..lanes])
+    }
+
+    pub fn forward<S: Scalar>(self, out: usize, sweep: &mut Forward<'_, S>) {
+        let lanes = sweep.store.lanes;
+        let (before, planes) = sweep.store.split(out);
+        let (a, b) = (before.plane(self.a, 0), before.plane(self.b, 0));
+        let kept = &mut sweep.partials[self.number * PARTIALS * lanes..][..PARTIALS * lanes];
+        for lane in 0..lanes {
+            let (value, all) = partials(self.f, a[lane], b[lane]);
+            planes[lane] = value;
+            all.into_iter().enumerate().for_each(|(k, partial)| kept[k * lanes + lane] = partial);
+        }
+        let (fa, fb) = kept[..2 * lanes].split_at(lanes);
+        let tangents = &mut planes[lanes..];
+        tangents.fill(<S as Real>::zero());
+        for (channel, plane) in tangents.chunks_exact_mut(lanes).enumerate() {
+            add_if(plane, fa, before.carried(self.a, channel + 1));
+            add_if(plane, fb, before.carried(self.b, channel + 1));
+        }
+    }
+
+    pub fn reverse<S: Scalar>(self, out: usize, sweep: &mut Reverse<'_, S>) {
+        let (forward, lanes) = (sweep.forward, sweep.adjoints.lanes);
+        let [fa, fb, aa, ab, bb, ..] = self.planes(sweep.partials, lanes);
+        let (mut before, adjoint) = sweep.adjoints.reverse(out);
+        add_product(before.plane_mut(self.a, 0), adjoint, fa);
+        add_product(before.plane_mut(self.b, 0), adjoint, fb);
+        if sweep.depth >= Depth::MassMatrix {
+            let first = sweep.depth.first_velocity();
+            sweep.second.add_square(self.a, forward, first, &weighted(adjoint, aa)[..lanes]);
+            sweep.second.add_cross((self.a, self.b), forward, first, &weighted(adjoint, ab)[..lanes]);
+            sweep.second.add_square(self.b, forward, first, &weighted(adjoint, bb)[..lanes]);
+        }
+    }
+
+    pub fn mixed<S: Scalar>(self, out: usize, sweep: &mut MixedForward<'_, S>) {
+        let lanes = sweep.mixed.lanes;
+        let [to, ca, cb] = [out, self.a, self.b].map(|value| sweep.values[value].mixed(sweep.order));
+        let [fa, fb, aa, ab, bb, ..] = self.planes(sweep.partials, lanes);
+        let (before, planes) = sweep.mixed.split(out);
+        planes.fill(<S as Real>::zero());
+        let of = |value: usize, channel: Option<usize>| channel.map(|channel| before.plane(value, channel));
+        for (to, of_a, of_b) in [(to.s, ca.s, cb.s), (to.t, ca.t, cb.t), (to.st, ca.st, cb.st)] {
+            if let Some(to) = to {
+                let plane = &mut planes[to * lanes..][..lanes];
+                add_if(plane, fa, of(self.a, of_a));
+                add_if(plane, fb, of(self.b, of_b));
+            }
+        }
+        let Some(st) = to.st else { return };
+        let plane = &mut planes[st * lanes..][..lanes];
+        let mut add = |d2: &[S], x: Option<&[S]>, y: Option<&[S]>| {
+            if let (Some(x), Some(y)) = (x, y) {
+                add_product3(plane, d2, x, y);
+            }
+        };
+        let (s, t) = ((of(self.a, ca.s), of(self.b, cb.s)), (of(self.a, ca.t), of(self.b, cb.t)));
+        add(aa, s.0, t.0);
+        add(ab, s.0, t.1);
+        add(ab, s.1, t.0);
+        add(bb, s.1, t.1);
+    }
+
+    pub fn mixed_reverse<S: Scalar>(self, out: usize, sweep: &mut MixedReverse<'_, S>) {
+        let [fa, fb, aa, ab, bb, aaa, aab, abb, bbb] = self.planes(sweep.partials, sweep.adjoints.lanes);
+        if sweep.wants(self.a) {
+            add_to_operand((self.a, self.b), [fa, aa, ab, aaa, aab, abb], out, sweep);
+        }
+        if sweep.wants(self.b) {
+            add_to_operand((self.b, self.a), [fb, bb, ab, bbb, abb, aab], out, sweep);
+        }
+    }
+}
+
+/// `w d` of every lane; 0 past their number.
+fn weighted<S: Scalar>(w: &[S], d: &[S]) -> [S; LANES] {
+    let mut product = [<S as Real>::zero(); LANES];
+    product.iter_mut().zip(w).zip(d).for_each(|((product, &w), &d)| *product = w * d);
+    product
+}
+
+/// Adjoints of the operand `x` beside `y`: partial derivatives `x`, `xx`, `xy`, `xxx`, `xxy`, `xyy`.
+fn add_to_operand<S: Scalar>(
+    (x, y): (usize, usize),
+    [fx, xx, xy, xxx, xxy, xyy]: [&[S]; 6],
+    out: usize,
+    sweep: &mut MixedReverse<'_, S>,
+) {
+    let [own, cx, cy] = [out, x, y].map(|value| sweep.channels(value));
+    let (mixed, lanes) = (sweep.mixed, sweep.adjoints.lanes);
+    let plane_of = |value: usize, channel: Option<usize>| channel.map(|channel| mixed.plane(value, channel));
+    let outer = sweep.value_adjoints.plane(out, 0);
+    let (mut before, adjoints) = sweep.adjoints.reverse(out);
+    let of_out = |channel: Option<usize>| channel.map(|channel| &adjoints[channel * lanes..][..lanes]);
+    let [xs, xt, xst] = [cx.s, cx.t, cx.st].map(|channel| plane_of(x, channel));
+    let [ys, yt, yst] = [cy.s, cy.t, cy.st].map(|channel| plane_of(y, channel));
+    if let Some(value) = cx.value {
+        let plane = before.plane_mut(x, value);
+        add_if(plane, fx, of_out(own.value));
+        for (adjoint, of_x, of_y) in [(of_out(own.s), xs, ys), (of_out(own.t), xt, yt), (Some(outer), xst, yst)] {
+            if let Some(adjoint) = adjoint {
+                add_if(plane, &weighted(adjoint, xx)[..lanes], of_x);
+                add_if(plane, &weighted(adjoint, xy)[..lanes], of_y);
+            }
+        }
+        for (d3, of_s, of_t) in [(xxx, xs, xt), (xxy, xs, yt), (xxy, ys, xt), (xyy, ys, yt)] {
+            if let (Some(of_s), Some(of_t)) = (of_s, of_t) {
+                add_product3(plane, &weighted(outer, d3)[..lanes], of_s, of_t);
+            }
+        }
+    }
+    for (own, of_x, other_x, other_y) in [(own.s, cx.s, xt, yt), (own.t, cx.t, xs, ys)] {
+        if let Some(channel) = of_x {
+            let plane = before.plane_mut(x, channel);
+            add_if(plane, fx, of_out(own));
+            add_if(plane, &weighted(outer, xx)[..lanes], other_x);
+            add_if(plane, &weighted(outer, xy)[..lanes], other_y);
+        }
+    }
+}

@@ -1,0 +1,88 @@
+//! Numbers of several values put side by side, and single numbers taken out of a value.
+
+use super::{Forward, MixedForward, MixedReverse, Reverse};
+use crate::scalar::{Real, Scalar};
+use crate::tape::engine::value::Mixed;
+
+/// Unit by unit: the value and its unit that each comes from.
+#[derive(Clone, Debug)]
+pub(crate) struct Gather {
+    pub sources: Vec<(usize, usize)>,
+}
+
+/// Every `units`-th number of a plane from `unit` on.
+fn column<S>(plane: &[S], unit: usize, lanes: usize) -> impl Iterator<Item = &S> {
+    plane[unit..].iter().step_by(plane.len() / lanes)
+}
+
+/// The same, to be written.
+fn column_mut<S>(plane: &mut [S], unit: usize, lanes: usize) -> impl Iterator<Item = &mut S> {
+    let units = plane.len() / lanes;
+    plane[unit..].iter_mut().step_by(units)
+}
+
+impl Gather {
+    pub fn forward<S: Scalar>(&self, out: usize, sweep: &mut Forward<'_, S>) {
+        let lanes = sweep.store.lanes;
+        let (before, planes) = sweep.store.split(out);
+        let size = self.sources.len() * lanes;
+        for (channel, plane) in planes.chunks_exact_mut(size).enumerate() {
+            for (to, &(value, unit)) in self.sources.iter().enumerate() {
+                let target = column_mut(plane, to, lanes);
+                match before.carried(value, channel) {
+                    Some(from) => target.zip(column(from, unit, lanes)).for_each(|(to, &x)| *to = x),
+                    None => target.for_each(|to| *to = <S as Real>::zero()),
+                }
+            }
+        }
+    }
+
+    pub fn reverse<S: Scalar>(&self, out: usize, sweep: &mut Reverse<'_, S>) {
+        let (mut before, adjoint) = sweep.adjoints.reverse(out);
+        let lanes = before.lanes;
+        for (from, &(value, unit)) in self.sources.iter().enumerate() {
+            let target = column_mut(before.plane_mut(value, 0), unit, lanes);
+            target.zip(column(adjoint, from, lanes)).for_each(|(sum, &a)| *sum += a);
+        }
+    }
+
+    pub fn mixed<S: Scalar>(&self, out: usize, sweep: &mut MixedForward<'_, S>) {
+        let (order, values, lanes) = (sweep.order, sweep.values, sweep.mixed.lanes);
+        let own = values[out].mixed(order);
+        let (before, planes) = sweep.mixed.split(out);
+        let size = self.sources.len() * lanes;
+        for channel in [|m: &Mixed| m.s, |m: &Mixed| m.t, |m: &Mixed| m.st] {
+            let Some(plane) = channel(&own).map(|channel| &mut planes[channel * size..][..size]) else { continue };
+            for (to, &(value, unit)) in self.sources.iter().enumerate() {
+                let target = column_mut(plane, to, lanes);
+                match channel(&values[value].mixed(order)) {
+                    Some(from) => {
+                        let from = column(before.plane(value, from), unit, lanes);
+                        target.zip(from).for_each(|(to, &x)| *to = x);
+                    }
+                    None => target.for_each(|to| *to = <S as Real>::zero()),
+                }
+            }
+        }
+    }
+
+    pub fn mixed_reverse<S: Scalar>(&self, out: usize, sweep: &mut MixedReverse<'_, S>) {
+        let own = sweep.channels(out);
+        let size = self.sources.len() * sweep.adjoints.lanes;
+        for (from, &(value, unit)) in self.sources.iter().enumerate() {
+            if !sweep.wants(value) {
+                continue;
+            }
+            let to = sweep.channels(value);
+            let (mut before, adjoint) = sweep.adjoints.reverse(out);
+            let lanes = before.lanes;
+            for channel in [|m: &Mixed| m.value, |m: &Mixed| m.s, |m: &Mixed| m.t] {
+                if let (Some(own), Some(to)) = (channel(&own), channel(&to)) {
+                    let target = column_mut(before.plane_mut(value, to), unit, lanes);
+                    let source = column(&adjoint[own * size..][..size], from, lanes);
+                    target.zip(source).for_each(|(sum, &b)| *sum += b);
+                }
+            }
+        }
+    }
+}

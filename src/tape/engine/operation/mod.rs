@@ -1,0 +1,315 @@
+//! Operations of a recorded Lagrangian: each in one file, with its rules.
+//!
+//! With `y = phi(x)`, adjoints `A = dL/dy`, mixed channels `y[s]`, `y[t]`, `y[st]` and their adjoints `B`:
+//!
+//! | rule | |
+//! |---|---|
+//! | value | `y = phi(x)` |
+//! | tangent | `y[u] = phi' x[u]` |
+//! | adjoint | `A_x += phi' A` |
+//! | contraction | `D2L[u, w] += A phi''[x[u], x[w]]` |
+//! | mixed channel | `y[st] = phi' x[st] + phi''[x[s], x[t]]` |
+//! | its reverse | `Bs += phi' Bs + A phi''[., x[t]]`, `Bt += phi' Bt + A phi''[x[s], .]`, `B0 += phi' B0 + phi''[x[s]] Bs + phi''[x[t]] Bt + A (phi''[x[st]] + phi'''[x[s], x[t]])` |
+
+mod combination;
+mod dense;
+mod elementwise;
+mod function;
+mod gather;
+mod input;
+mod product;
+mod select;
+
+pub(super) use combination::Combination;
+pub(super) use dense::Dense;
+pub(super) use elementwise::Elementwise;
+pub(super) use function::{Function, PARTIALS};
+pub(super) use gather::Gather;
+pub(super) use input::Input;
+pub(super) use product::Product;
+pub(super) use select::Select;
+
+use super::kernel::{add_product, add_product3};
+use super::value::{Kind, Mixed, Order, Store, Value, View};
+use super::{Depth, MixedDirections};
+use crate::scalar::{Real, Scalar, vectorized};
+
+/// An operation; operands are values before it.
+#[derive(Clone, Debug)]
+pub(super) enum Operation<S> {
+    /// Coordinate or velocity.
+    Input(Input),
+    /// A parameter, the same for all states.
+    Parameter(usize),
+    /// A constant.
+    Constant(S),
+    /// A function of one number on all units of a value.
+    Elementwise(Elementwise),
+    /// Product of two numbers.
+    Product(Product),
+    /// Linear combination of one or two numbers.
+    Combination(Combination<S>),
+    /// Any other function of two numbers.
+    Function(Function),
+    /// Recorded branch.
+    Select(Select),
+    /// `W x + b`.
+    Dense(Dense),
+    /// Numbers put side by side.
+    Gather(Gather),
+}
+
+impl<S> Operation<S> {
+    /// Visits the values that it reads.
+    pub fn operands(&self, mut visit: impl FnMut(usize)) {
+        match self {
+            Self::Input(_) | Self::Parameter(_) | Self::Constant(_) => {}
+            Self::Elementwise(op) => visit(op.x),
+            Self::Product(op) => [op.a, op.b].into_iter().for_each(visit),
+            Self::Combination(op) => [Some(op.a), op.b.as_ref().map(|b| b.0)].into_iter().flatten().for_each(visit),
+            Self::Function(op) => [op.a, op.b].into_iter().for_each(visit),
+            Self::Select(op) => [op.condition, op.a, op.b].into_iter().for_each(visit),
+            Self::Dense(op) => visit(op.x),
+            Self::Gather(op) => op.sources.iter().for_each(|&(value, _)| visit(value)),
+        }
+    }
+}
+
+/// What the forward sweep reads and writes.
+pub(super) struct Forward<'a, S> {
+    pub values: &'a [Value],
+    pub store: Store<'a, S>,
+    pub depth: Depth,
+    pub slopes: &'a mut [Vec<S>; 3],
+    pub partials: &'a mut [S],
+    pub parameters: &'a [S],
+    pub q: &'a [S],
+    pub v: &'a [S],
+    pub scale: &'a [S],
+}
+
+/// What the reverse sweep of the value reads and writes.
+pub(super) struct Reverse<'a, S> {
+    pub values: &'a [Value],
+    pub forward: View<'a, S>,
+    /// `dL/dy` of every value.
+    pub adjoints: Store<'a, S>,
+    pub depth: Depth,
+    pub slopes: &'a [Vec<S>; 3],
+    pub partials: &'a [S],
+    pub parameters: &'a [S],
+    pub second: &'a mut Second<S>,
+}
+
+/// What the mixed sweep reads and writes.
+pub(super) struct MixedForward<'a, S> {
+    pub values: &'a [Value],
+    pub forward: View<'a, S>,
+    pub mixed: Store<'a, S>,
+    pub order: Order,
+    pub slopes: &'a [Vec<S>; 3],
+    pub partials: &'a [S],
+    pub parameters: &'a [S],
+    pub directions: &'a MixedDirections<S>,
+    /// Velocities.
+    pub v: &'a [S],
+    pub scale: &'a [S],
+}
+
+/// What the reverse of the mixed sweep reads and writes.
+pub(super) struct MixedReverse<'a, S> {
+    pub values: &'a [Value],
+    pub forward: View<'a, S>,
+    /// `dL/dy` of every value.
+    pub value_adjoints: View<'a, S>,
+    pub mixed: View<'a, S>,
+    pub adjoints: Store<'a, S>,
+    pub order: Order,
+    pub slopes: &'a [Vec<S>; 3],
+    pub partials: &'a [S],
+    pub parameters: &'a [S],
+    pub gradient: &'a mut [S],
+    /// Derivatives by the scaled state, `(lanes, n)` each, if they are asked for.
+    pub inputs: Option<(&'a mut [S], &'a mut [S])>,
+    /// Whether the second direction moves along `(v, 0)`.
+    pub moving: bool,
+    pub scale: &'a [S],
+}
+
+/// Calls the rule of whichever operation it is.
+macro_rules! rule {
+    ($operation:expr, $out:expr, $sweep:expr, $rule:ident, $parameter:expr, $constant:expr) => {
+        match $operation {
+            Operation::Input(op) => op.$rule($out, $sweep),
+            Operation::Parameter(index) => $parameter(*index, $out, $sweep),
+            Operation::Constant(value) => $constant(*value, $out, $sweep),
+            Operation::Elementwise(op) => op.$rule($out, $sweep),
+            Operation::Product(op) => op.$rule($out, $sweep),
+            Operation::Combination(op) => op.$rule($out, $sweep),
+            Operation::Function(op) => op.$rule($out, $sweep),
+            Operation::Select(op) => op.$rule($out, $sweep),
+            Operation::Dense(op) => op.$rule($out, $sweep),
+            Operation::Gather(op) => op.$rule($out, $sweep),
+        }
+    };
+}
+
+impl<S: Scalar> Operation<S> {
+    /// Value and tangents.
+    pub fn forward(&self, out: usize, sweep: &mut Forward<'_, S>) {
+        let fill = |value: S, out: usize, sweep: &mut Forward<'_, S>| sweep.store.all_mut(out).fill(value);
+        let parameter = |index: usize, out: usize, sweep: &mut Forward<'_, S>| fill(sweep.parameters[index], out, sweep);
+        rule!(self, out, sweep, forward, parameter, fill);
+    }
+    /// Adjoints of the operands and the share of the second derivatives.
+    pub fn reverse(&self, out: usize, sweep: &mut Reverse<'_, S>) {
+        rule!(self, out, sweep, reverse, |_, _, _| {}, |_, _, _| {});
+    }
+    /// Mixed channels.
+    pub fn mixed(&self, out: usize, sweep: &mut MixedForward<'_, S>) {
+        rule!(self, out, sweep, mixed, |_, _, _| {}, |_, _, _| {});
+    }
+    /// Adjoints of the operands' mixed channels.
+    pub fn mixed_reverse(&self, out: usize, sweep: &mut MixedReverse<'_, S>) {
+        let parameter = |index: usize, out: usize, sweep: &mut MixedReverse<'_, S>| {
+            if let Some(value) = sweep.values[out].mixed(sweep.order).value {
+                sweep.gradient[index] += super::kernel::sum(sweep.adjoints.plane_mut(out, value));
+            }
+        };
+        rule!(self, out, sweep, mixed_reverse, parameter, |_, _, _| {});
+    }
+}
+
+impl<S: Scalar> MixedReverse<'_, S> {
+    /// Whether adjoints of a value lead to anything asked for.
+    pub fn wants(&self, value: usize) -> bool {
+        let value = &self.values[value];
+        value.learned || (self.inputs.is_some() && value.kind != Kind::Constant)
+    }
+    pub fn channels(&self, value: usize) -> Mixed {
+        self.values[value].mixed(self.order)
+    }
+}
+
+/// Second derivatives while they are gathered: planes of one number per state.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Second<S> {
+    pub n: usize,
+    pub lanes: usize,
+    /// `M_ij`, `i <= j`, row after row of the triangle.
+    pub mass: Vec<S>,
+    /// `c_i`.
+    pub drift: Vec<S>,
+    curvature: Vec<S>,
+    along: Vec<S>,
+}
+
+impl<S: Scalar> Second<S> {
+    /// Empties the sums for a chunk.
+    pub fn start(&mut self, n: usize, lanes: usize, drift: bool) {
+        (self.n, self.lanes) = (n, lanes);
+        let zero = <S as Real>::zero();
+        self.mass.clear();
+        self.mass.resize(n * (n + 1) / 2 * lanes, zero);
+        self.drift.clear();
+        self.drift.resize(if drift { n * lanes } else { 0 }, zero);
+    }
+    /// Number of the pair `i <= j`.
+    pub fn pair(n: usize, i: usize, j: usize) -> usize {
+        i * n - i * (i + 1) / 2 + j
+    }
+    fn mass_plane(&mut self, i: usize, j: usize) -> &mut [S] {
+        let at = Self::pair(self.n, i, j) * self.lanes;
+        &mut self.mass[at..at + self.lanes]
+    }
+    fn drift_plane(&mut self, i: usize) -> &mut [S] {
+        &mut self.drift[i * self.lanes..(i + 1) * self.lanes]
+    }
+
+    /// Adds `k x[u] x[w]` of a value `x` of one unit, `k` a plane.
+    pub fn add_square(&mut self, x: usize, forward: View<'_, S>, first: usize, k: &[S]) {
+        let n = self.n;
+        for i in 0..n {
+            let Some(xi) = forward.carried(x, first + i) else { return };
+            for j in i..n {
+                add_product3(self.mass_plane(i, j), k, xi, forward.plane(x, first + j));
+            }
+            if !self.drift.is_empty() {
+                add_product3(self.drift_plane(i), k, xi, forward.plane(x, 1));
+            }
+        }
+    }
+
+    /// Adds `k (x[u] y[w] + x[w] y[u])` of two values of one unit.
+    pub fn add_cross(&mut self, (x, y): (usize, usize), forward: View<'_, S>, first: usize, k: &[S]) {
+        let n = self.n;
+        for i in 0..n {
+            let (xi, yi) = (forward.carried(x, first + i), forward.carried(y, first + i));
+            for j in i..n {
+                let (xj, yj) = (forward.carried(x, first + j), forward.carried(y, first + j));
+                if let (Some(xi), Some(yj)) = (xi, yj) {
+                    add_product3(self.mass_plane(i, j), k, xi, yj);
+                }
+                if let (Some(xj), Some(yi)) = (xj, yi) {
+                    add_product3(self.mass_plane(i, j), k, xj, yi);
+                }
+            }
+            if !self.drift.is_empty() {
+                if let (Some(xi), Some(y)) = (xi, forward.carried(y, 1)) {
+                    add_product3(self.drift_plane(i), k, xi, y);
+                }
+                if let (Some(yi), Some(x)) = (yi, forward.carried(x, 1)) {
+                    add_product3(self.drift_plane(i), k, yi, x);
+                }
+            }
+        }
+    }
+
+    /// Adds `sum over units of adjoint d2 x[u] x[w]` of a value `x` of several units, state by state.
+    pub fn add_block(&mut self, x: &[S], units: usize, first: usize, adjoint: &[S], d2: &[S]) {
+        let (n, lanes) = (self.n, self.lanes);
+        super::kernel::resize(&mut self.curvature, units);
+        super::kernel::resize(&mut self.along, units);
+        let (curvature, along) = (&mut self.curvature[..units], &mut self.along[..units]);
+        let (mass, drift) = (&mut self.mass, &mut self.drift);
+        vectorized(
+            #[inline(always)]
+            || {
+                for lane in 0..lanes {
+                    let row = |channel: usize| &x[(channel * lanes + lane) * units..][..units];
+                    let own = lane * units..(lane + 1) * units;
+                    for ((c, &a), &d2) in curvature.iter_mut().zip(&adjoint[own.clone()]).zip(&d2[own]) {
+                        *c = a * d2;
+                    }
+                    let mut pair = lane;
+                    for i in 0..n {
+                        for ((s, &c), &x) in along.iter_mut().zip(&*curvature).zip(row(first + i)) {
+                            *s = c * x;
+                        }
+                        for j in i..n {
+                            mass[pair] += super::kernel::dot(along, row(first + j));
+                            pair += lanes;
+                        }
+                        if !drift.is_empty() {
+                            drift[i * lanes + lane] += super::kernel::dot(along, row(1));
+                        }
+                    }
+                }
+            },
+        );
+    }
+}
+
+/// `out += x y`, unless `y` is not carried.
+fn add_if<S: Scalar>(out: &mut [S], x: &[S], y: Option<&[S]>) {
+    if let Some(y) = y {
+        add_product(out, x, y);
+    }
+}
+
+/// `out += x y`, unless one of them is not carried.
+fn add_if_both<S: Scalar>(out: &mut [S], x: Option<&[S]>, y: Option<&[S]>) {
+    if let Some(x) = x {
+        add_if(out, x, y);
+    }
+}

@@ -1,0 +1,171 @@
+//! Values of a recorded Lagrangian: vectors of numbers per state, and the channels each of them carries.
+//!
+//! A value of `units` numbers on a chunk of `lanes` states is a stack of planes `(lanes, units)`, one plane per channel: the
+//! value itself, then its derivatives along directions of the inputs. What a value cannot have it does not carry: nothing
+//! moves a constant, no velocity moves what depends on positions alone, and nobody asks for the tangents of what reaches `L`
+//! by linear operations only.
+
+use super::Depth;
+use std::ops::Range;
+
+/// What a value depends on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Kind {
+    /// Parameters and constants alone.
+    Constant,
+    /// Positions, no velocity.
+    Position,
+    /// Velocities, perhaps positions too.
+    Velocity,
+}
+
+/// A vector of numbers per state.
+#[derive(Clone, Debug)]
+pub(super) struct Value {
+    pub units: usize,
+    pub kind: Kind,
+    /// It reaches `L` by operations that are linear in what moves.
+    pub terminal: bool,
+    /// It depends on parameters.
+    pub learned: bool,
+    /// Its only reader overwrites its adjoints; those of other values start from zero.
+    pub overwritten: bool,
+}
+
+/// Channels of mixed sweeps that a value carries, in this order; its adjoints lie the same way.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Mixed {
+    /// The value, for products that take all channels at once.
+    pub value: Option<usize>,
+    /// The derivative along the first direction.
+    pub s: Option<usize>,
+    /// The derivative along the second.
+    pub t: Option<usize>,
+    /// The mixed coefficient.
+    pub st: Option<usize>,
+    pub count: usize,
+}
+
+/// Which directions a mixed sweep has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Order {
+    /// None but the one of `x_st`: a first derivative.
+    First,
+    /// Both.
+    Second,
+}
+
+impl Value {
+    /// Channels of the forward sweep.
+    fn channels(&self, depth: Depth, n: usize) -> usize {
+        match self.kind {
+            _ if self.terminal || depth < Depth::MassMatrix => 1,
+            Kind::Constant => 1,
+            Kind::Position => depth.first_velocity(),
+            Kind::Velocity => depth.first_velocity() + n,
+        }
+    }
+
+    /// Channels of a mixed sweep.
+    pub fn mixed(&self, order: Order) -> Mixed {
+        let moving = self.kind != Kind::Constant;
+        let second = order == Order::Second && !self.terminal;
+        let carried = [!self.terminal, second && self.kind == Kind::Velocity, second && moving, moving];
+        let mut count = 0;
+        let [value, s, t, st] = carried.map(|carried| {
+            count += usize::from(carried);
+            carried.then(|| count - 1)
+        });
+        Mixed { value, s, t, st, count }
+    }
+}
+
+/// Where the planes of all values stand in a buffer, in numbers per state.
+#[derive(Clone, Debug)]
+pub(super) struct Layout {
+    starts: Vec<usize>,
+    units: Vec<usize>,
+    counts: Vec<usize>,
+    pub total: usize,
+}
+
+impl Layout {
+    pub fn new(values: &[Value], count: impl Fn(&Value) -> usize) -> Self {
+        let counts: Vec<usize> = values.iter().map(count).collect();
+        let mut total = 0;
+        let place = |(value, &count): (&Value, &usize)| {
+            total += value.units * count;
+            total - value.units * count
+        };
+        let starts = values.iter().zip(&counts).map(place).collect();
+        Self { starts, units: values.iter().map(|value| value.units).collect(), counts, total }
+    }
+    /// Of the forward sweep.
+    pub fn forward(values: &[Value], depth: Depth, n: usize) -> Self {
+        Self::new(values, |value| value.channels(depth, n))
+    }
+    /// Number of channels of a value.
+    pub fn count(&self, value: usize) -> usize {
+        self.counts[value]
+    }
+    fn range(&self, value: usize, lanes: usize) -> Range<usize> {
+        let start = self.starts[value] * lanes;
+        start..start + self.counts[value] * self.units[value] * lanes
+    }
+}
+
+/// Numbers of all values by a layout.
+pub(super) struct Store<'a, S> {
+    pub layout: &'a Layout,
+    pub lanes: usize,
+    pub numbers: &'a mut [S],
+}
+
+/// The same, to read.
+#[derive(Clone, Copy)]
+pub(super) struct View<'a, S> {
+    pub layout: &'a Layout,
+    pub lanes: usize,
+    pub numbers: &'a [S],
+}
+
+impl<'a, S> View<'a, S> {
+    /// All planes of a value.
+    pub fn all(&self, value: usize) -> &'a [S] {
+        &self.numbers[self.layout.range(value, self.lanes)]
+    }
+    /// One plane of a value.
+    pub fn plane(&self, value: usize, channel: usize) -> &'a [S] {
+        let size = self.layout.units[value] * self.lanes;
+        &self.all(value)[channel * size..(channel + 1) * size]
+    }
+    /// One plane, unless the value does not carry it.
+    pub fn carried(&self, value: usize, channel: usize) -> Option<&'a [S]> {
+        (channel < self.layout.count(value)).then(|| self.plane(value, channel))
+    }
+}
+
+impl<S> Store<'_, S> {
+    pub fn view(&self) -> View<'_, S> {
+        View { layout: self.layout, lanes: self.lanes, numbers: self.numbers }
+    }
+    /// What was computed before a value, and the planes of the value itself.
+    pub fn split(&mut self, value: usize) -> (View<'_, S>, &mut [S]) {
+        let range = self.layout.range(value, self.lanes);
+        let (before, rest) = self.numbers.split_at_mut(range.start);
+        (View { layout: self.layout, lanes: self.lanes, numbers: before }, &mut rest[..range.end - range.start])
+    }
+    /// The planes of a value, and what was computed before it, to be added to.
+    pub fn reverse(&mut self, value: usize) -> (Store<'_, S>, &[S]) {
+        let range = self.layout.range(value, self.lanes);
+        let (before, rest) = self.numbers.split_at_mut(range.start);
+        (Store { layout: self.layout, lanes: self.lanes, numbers: before }, &rest[..range.end - range.start])
+    }
+    pub fn all_mut(&mut self, value: usize) -> &mut [S] {
+        &mut self.numbers[self.layout.range(value, self.lanes)]
+    }
+    pub fn plane_mut(&mut self, value: usize, channel: usize) -> &mut [S] {
+        let size = self.layout.units[value] * self.lanes;
+        &mut self.all_mut(value)[channel * size..(channel + 1) * size]
+    }
+}
