@@ -171,9 +171,23 @@ impl<'g, S: Scalar> Compiler<'g, S> {
 
     fn push(&mut self, operation: Operation<S>, units: usize, kind: Kind) -> usize {
         let mut learned = matches!(operation, Operation::Parameter(_) | Operation::Dense(_));
-        operation.operands(|x| learned |= self.values[x].learned);
+        let mut velocities = Vec::new();
+        operation.operands(|x| {
+            learned |= self.values[x].learned;
+            velocities.extend(&self.values[x].velocities);
+        });
+        match &operation {
+            Operation::Input(input) if kind == Kind::Velocity => velocities.push(input.index - self.n),
+            // Nothing moves what a condition depends on.
+            Operation::Select(op) => {
+                velocities = [op.a, op.b].iter().flat_map(|&x| self.values[x].velocities.clone()).collect();
+            }
+            _ => {}
+        }
+        velocities.sort_unstable();
+        velocities.dedup();
         self.operations.push(operation);
-        self.values.push(Value { units, kind, terminal: false, learned, overwritten: false });
+        self.values.push(Value { units, kind, velocities, terminal: false, learned, overwritten: false });
         self.values.len() - 1
     }
 

@@ -14,10 +14,3 @@ pub enum Depth {
     /// As `Motion`, keeping what gradients of losses need.
     Training,
 }
-
-impl Depth {
-    /// First channel of the tangents along the velocities `e_i`: the value and, for `c`, the direction `(v, 0)` come before.
-    pub(super) fn first_velocity(self) -> usize {
-        if self >= Self::Motion { 2 } else { 1 }
-    }
-}

@@ -5,7 +5,8 @@ use crate::scalar::{Real, Scalar, vectorized};
 /// `out = f(x)`.
 #[inline(always)]
 pub(super) fn map<S: Scalar>(out: &mut [S], x: &[S], f: impl Fn(S) -> S) {
-    vectorized(
+    dispatched(
+        out.len(),
         #[inline(always)]
         || {
             for (out, &x) in out.iter_mut().zip(x) {
@@ -15,9 +16,16 @@ pub(super) fn map<S: Scalar>(out: &mut [S], x: &[S], f: impl Fn(S) -> S) {
     );
 }
 
+/// Runs a loop over `count` numbers for the widest vector instructions, as it is where that is not worth a call.
+#[inline(always)]
+fn dispatched(count: usize, kernel: impl FnOnce()) {
+    if count < 8 { kernel() } else { vectorized(kernel) }
+}
+
 /// `out += a x`.
 pub(super) fn add_scaled<S: Scalar>(out: &mut [S], a: S, x: &[S]) {
-    vectorized(
+    dispatched(
+        out.len(),
         #[inline(always)]
         || {
             for (out, &x) in out.iter_mut().zip(x) {
@@ -29,7 +37,8 @@ pub(super) fn add_scaled<S: Scalar>(out: &mut [S], a: S, x: &[S]) {
 
 /// `out += x y`.
 pub(super) fn add_product<S: Scalar>(out: &mut [S], x: &[S], y: &[S]) {
-    vectorized(
+    dispatched(
+        out.len(),
         #[inline(always)]
         || {
             for ((out, &x), &y) in out.iter_mut().zip(x).zip(y) {
@@ -41,7 +50,8 @@ pub(super) fn add_product<S: Scalar>(out: &mut [S], x: &[S], y: &[S]) {
 
 /// `out += x y z`.
 pub(super) fn add_product3<S: Scalar>(out: &mut [S], x: &[S], y: &[S], z: &[S]) {
-    vectorized(
+    dispatched(
+        out.len(),
         #[inline(always)]
         || {
             for (((out, &x), &y), &z) in out.iter_mut().zip(x).zip(y).zip(z) {

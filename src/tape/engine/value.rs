@@ -24,6 +24,8 @@ pub(super) enum Kind {
 pub(super) struct Value {
     pub units: usize,
     pub kind: Kind,
+    /// The velocities it depends on, ascending.
+    pub velocities: Vec<usize>,
     /// It reaches `L` by operations that are linear in what moves.
     pub terminal: bool,
     /// It depends on parameters.
@@ -56,14 +58,18 @@ pub(super) enum Order {
 }
 
 impl Value {
-    /// Channels of the forward sweep.
-    fn channels(&self, depth: Depth, n: usize) -> usize {
-        match self.kind {
-            _ if self.terminal || depth < Depth::MassMatrix => 1,
-            Kind::Constant => 1,
-            Kind::Position => depth.first_velocity(),
-            Kind::Velocity => depth.first_velocity() + n,
+    /// Directions of the tangents of the forward sweep: `(v, 0)` is 0, the velocity `e_i` is `1 + i`.
+    fn directions(&self, depth: Depth) -> Vec<usize> {
+        let mut directions = Vec::new();
+        if !self.terminal && self.kind != Kind::Constant {
+            if depth >= Depth::Motion {
+                directions.push(0);
+            }
+            if depth >= Depth::MassMatrix {
+                directions.extend(self.velocities.iter().map(|i| 1 + i));
+            }
         }
+        directions
     }
 
     /// Channels of a mixed sweep.
@@ -87,6 +93,11 @@ pub(super) struct Layout {
     units: Vec<usize>,
     counts: Vec<usize>,
     pub total: usize,
+    /// Directions of the channels from the first tangent on.
+    directions: Vec<Vec<usize>>,
+    /// Channel of every value and direction, 0 where there is none.
+    channels: Vec<usize>,
+    width: usize,
 }
 
 impl Layout {
@@ -98,15 +109,26 @@ impl Layout {
             total - value.units * count
         };
         let starts = values.iter().zip(&counts).map(place).collect();
-        Self { starts, units: values.iter().map(|value| value.units).collect(), counts, total }
+        let units = values.iter().map(|value| value.units).collect();
+        Self { starts, units, counts, total, directions: Vec::new(), channels: Vec::new(), width: 0 }
     }
     /// Of the forward sweep.
     pub fn forward(values: &[Value], depth: Depth, n: usize) -> Self {
-        Self::new(values, |value| value.channels(depth, n))
+        let directions: Vec<Vec<usize>> = values.iter().map(|value| value.directions(depth)).collect();
+        let mut channels = vec![0; values.len() * (n + 1)];
+        for (own, channels) in directions.iter().zip(channels.chunks_exact_mut(n + 1)) {
+            own.iter().enumerate().for_each(|(k, &direction)| channels[direction] = k + 1);
+        }
+        let layout = Self::new(values, |value| 1 + value.directions(depth).len());
+        Self { directions, channels, width: n + 1, ..layout }
     }
     /// Number of channels of a value.
     pub fn count(&self, value: usize) -> usize {
         self.counts[value]
+    }
+    /// Directions of the tangents of a value, in the order of its channels from 1 on.
+    pub fn directions(&self, value: usize) -> &[usize] {
+        &self.directions[value]
     }
     fn range(&self, value: usize, lanes: usize) -> Range<usize> {
         let start = self.starts[value] * lanes;
@@ -139,9 +161,10 @@ impl<'a, S> View<'a, S> {
         let size = self.layout.units[value] * self.lanes;
         &self.all(value)[channel * size..(channel + 1) * size]
     }
-    /// One plane, unless the value does not carry it.
-    pub fn carried(&self, value: usize, channel: usize) -> Option<&'a [S]> {
-        (channel < self.layout.count(value)).then(|| self.plane(value, channel))
+    /// The tangent along a direction, if the value has one.
+    pub fn tangent(&self, value: usize, direction: usize) -> Option<&'a [S]> {
+        let channel = self.layout.channels[value * self.layout.width + direction];
+        (channel > 0).then(|| self.plane(value, channel))
     }
 }
 

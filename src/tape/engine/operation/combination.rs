@@ -19,10 +19,12 @@ impl<S: Scalar> Combination<S> {
     }
 
     pub fn forward(&self, out: usize, sweep: &mut Forward<'_, S>) {
-        let lanes = sweep.store.lanes;
+        let (lanes, layout) = (sweep.store.lanes, sweep.store.layout);
         let (before, planes) = sweep.store.split(out);
-        for (channel, plane) in planes.chunks_exact_mut(lanes).enumerate() {
-            let mut terms = self.terms().filter_map(|(x, factor)| Some((before.carried(x, channel)?, factor)));
+        let channels = std::iter::once(None).chain(layout.directions(out).iter().map(Some));
+        for (direction, plane) in channels.zip(planes.chunks_exact_mut(lanes)) {
+            let of = |x| direction.map_or_else(|| Some(before.plane(x, 0)), |&direction| before.tangent(x, direction));
+            let mut terms = self.terms().filter_map(|(x, factor)| Some((of(x)?, factor)));
             match terms.next() {
                 Some((x, factor)) => map(plane, x, |x| factor * x),
                 None => plane.fill(<S as crate::scalar::Real>::zero()),

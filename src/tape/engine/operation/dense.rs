@@ -108,6 +108,7 @@ impl Dense {
         }
         let Mixed { s, t, .. } = own;
         let (forward, directions, n) = (sweep.forward, sweep.directions, sweep.scale.len());
+        let velocities = &sweep.values[out].velocities;
         let moving = directions.moving;
         vectorized(
             #[inline(always)]
@@ -126,10 +127,10 @@ impl Dense {
                     let (Some(s), Some(t)) = (s, t) else { continue };
                     let (before_t, from_t) = planes.split_at_mut(t * size);
                     let (plane_s, plane_t) = (&mut before_t[s * size..][row.clone()], &mut from_t[row.clone()]);
-                    for i in 0..n {
+                    for (k, &i) in velocities.iter().enumerate() {
                         let (by_s, by_t) = (directions.s[lane * n + i], directions.t[lane * n + i]);
-                        for ((s, t), &e) in plane_s.iter_mut().zip(plane_t.iter_mut()).zip(tangent(2 + i)) {
-                            *s = if i == 0 { by_s * e } else { *s + by_s * e };
+                        for ((s, t), &e) in plane_s.iter_mut().zip(plane_t.iter_mut()).zip(tangent(2 + k)) {
+                            *s = if k == 0 { by_s * e } else { *s + by_s * e };
                             *t += by_t * e;
                         }
                     }

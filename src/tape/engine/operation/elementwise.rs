@@ -91,14 +91,13 @@ impl Elementwise {
         if sweep.depth < Depth::MassMatrix || sweep.values[self.x].kind != Kind::Velocity {
             return;
         }
-        let first = sweep.depth.first_velocity();
         if self.units == 1 {
             let lanes = adjoint.len();
             let mut curvature = [<S as Real>::zero(); crate::tape::engine::LANES];
             curvature.iter_mut().zip(adjoint).zip(d2).for_each(|((c, &a), &d2)| *c = a * d2);
-            sweep.second.add_square(self.x, sweep.forward, first, &curvature[..lanes]);
+            sweep.second.add_square(self.x, sweep.forward, &curvature[..lanes]);
         } else {
-            sweep.second.add_block(sweep.forward.all(self.x), self.units, first, adjoint, d2);
+            sweep.second.add_block((self.x, self.units), sweep.forward, adjoint, d2);
         }
     }
 

@@ -27,7 +27,7 @@ impl Function {
     }
 
     pub fn forward<S: Scalar>(self, out: usize, sweep: &mut Forward<'_, S>) {
-        let lanes = sweep.store.lanes;
+        let (lanes, layout) = (sweep.store.lanes, sweep.store.layout);
         let (before, planes) = sweep.store.split(out);
         let (a, b) = (before.plane(self.a, 0), before.plane(self.b, 0));
         let kept = &mut sweep.partials[self.number * PARTIALS * lanes..][..PARTIALS * lanes];
@@ -39,9 +39,9 @@ impl Function {
         let (fa, fb) = kept[..2 * lanes].split_at(lanes);
         let tangents = &mut planes[lanes..];
         tangents.fill(<S as Real>::zero());
-        for (channel, plane) in tangents.chunks_exact_mut(lanes).enumerate() {
-            add_if(plane, fa, before.carried(self.a, channel + 1));
-            add_if(plane, fb, before.carried(self.b, channel + 1));
+        for (&direction, plane) in layout.directions(out).iter().zip(tangents.chunks_exact_mut(lanes)) {
+            add_if(plane, fa, before.tangent(self.a, direction));
+            add_if(plane, fb, before.tangent(self.b, direction));
         }
     }
 
@@ -52,10 +52,9 @@ impl Function {
         add_product(before.plane_mut(self.a, 0), adjoint, fa);
         add_product(before.plane_mut(self.b, 0), adjoint, fb);
         if sweep.depth >= Depth::MassMatrix {
-            let first = sweep.depth.first_velocity();
-            sweep.second.add_square(self.a, forward, first, &weighted(adjoint, aa)[..lanes]);
-            sweep.second.add_cross((self.a, self.b), forward, first, &weighted(adjoint, ab)[..lanes]);
-            sweep.second.add_square(self.b, forward, first, &weighted(adjoint, bb)[..lanes]);
+            sweep.second.add_square(self.a, forward, &weighted(adjoint, aa)[..lanes]);
+            sweep.second.add_cross((self.a, self.b), forward, &weighted(adjoint, ab)[..lanes]);
+            sweep.second.add_square(self.b, forward, &weighted(adjoint, bb)[..lanes]);
         }
     }
 

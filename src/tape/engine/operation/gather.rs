@@ -23,13 +23,15 @@ fn column_mut<S>(plane: &mut [S], unit: usize, lanes: usize) -> impl Iterator<It
 
 impl Gather {
     pub fn forward<S: Scalar>(&self, out: usize, sweep: &mut Forward<'_, S>) {
-        let lanes = sweep.store.lanes;
+        let (lanes, layout) = (sweep.store.lanes, sweep.store.layout);
         let (before, planes) = sweep.store.split(out);
         let size = self.sources.len() * lanes;
-        for (channel, plane) in planes.chunks_exact_mut(size).enumerate() {
+        let channels = std::iter::once(None).chain(layout.directions(out).iter().map(Some));
+        for (direction, plane) in channels.zip(planes.chunks_exact_mut(size)) {
+            let of = |x| direction.map_or_else(|| Some(before.plane(x, 0)), |&direction| before.tangent(x, direction));
             for (to, &(value, unit)) in self.sources.iter().enumerate() {
                 let target = column_mut(plane, to, lanes);
-                match before.carried(value, channel) {
+                match of(value) {
                     Some(from) => target.zip(column(from, unit, lanes)).for_each(|(to, &x)| *to = x),
                     None => target.for_each(|to| *to = <S as Real>::zero()),
                 }

@@ -12,22 +12,19 @@ pub(crate) struct Input {
 impl Input {
     /// Copies the column and places its tangents: `v_i` along `(v, 0)`, `s_i` along `e_i`.
     pub fn forward<S: Scalar>(self, out: usize, sweep: &mut Forward<'_, S>) {
-        let (n, zero) = (sweep.scale.len(), <S as Real>::zero());
+        let n = sweep.scale.len();
         let (field, column) = if self.index < n { (sweep.q, self.index) } else { (sweep.v, self.index - n) };
         let lanes = sweep.store.lanes;
-        let first = sweep.depth.first_velocity();
-        let count = sweep.store.layout.count(out);
+        let directions = sweep.store.layout.directions(out);
         let planes = sweep.store.all_mut(out);
         let (value, tangents) = planes.split_at_mut(lanes);
         value.iter_mut().zip(field.chunks_exact(n)).for_each(|(to, row)| *to = row[column]);
-        if count == 1 {
-            return;
-        }
-        tangents.fill(zero);
-        if self.index < n {
-            tangents.iter_mut().zip(sweep.v.chunks_exact(n)).for_each(|(to, row)| *to = row[column]);
-        } else {
-            tangents[(first - 1 + column) * lanes..][..lanes].fill(sweep.scale[column]);
+        for (plane, &direction) in tangents.chunks_exact_mut(lanes).zip(directions) {
+            match direction {
+                0 if self.index < n => plane.iter_mut().zip(sweep.v.chunks_exact(n)).for_each(|(to, v)| *to = v[column]),
+                0 => plane.fill(<S as Real>::zero()),
+                _ => plane.fill(sweep.scale[column]),
+            }
         }
     }
 

@@ -227,47 +227,49 @@ impl<S: Scalar> Second<S> {
     }
 
     /// Adds `k x[u] x[w]` of a value `x` of one unit, `k` a plane.
-    pub fn add_square(&mut self, x: usize, forward: View<'_, S>, first: usize, k: &[S]) {
-        let n = self.n;
-        for i in 0..n {
-            let Some(xi) = forward.carried(x, first + i) else { return };
-            for j in i..n {
-                add_product3(self.mass_plane(i, j), k, xi, forward.plane(x, first + j));
+    pub fn add_square(&mut self, x: usize, forward: View<'_, S>, k: &[S]) {
+        let directions = forward.layout.directions(x);
+        for (at, &i) in directions.iter().enumerate().filter(|(_, i)| **i > 0) {
+            let xi = forward.plane(x, 1 + at);
+            for (at, &j) in directions.iter().enumerate().skip(at) {
+                add_product3(self.mass_plane(i - 1, j - 1), k, xi, forward.plane(x, 1 + at));
             }
-            if !self.drift.is_empty() {
-                add_product3(self.drift_plane(i), k, xi, forward.plane(x, 1));
+            if let (Some(drift), false) = (forward.tangent(x, 0), self.drift.is_empty()) {
+                add_product3(self.drift_plane(i - 1), k, xi, drift);
             }
         }
     }
 
     /// Adds `k (x[u] y[w] + x[w] y[u])` of two values of one unit.
-    pub fn add_cross(&mut self, (x, y): (usize, usize), forward: View<'_, S>, first: usize, k: &[S]) {
-        let n = self.n;
-        for i in 0..n {
-            let (xi, yi) = (forward.carried(x, first + i), forward.carried(y, first + i));
-            for j in i..n {
-                let (xj, yj) = (forward.carried(x, first + j), forward.carried(y, first + j));
-                if let (Some(xi), Some(yj)) = (xi, yj) {
-                    add_product3(self.mass_plane(i, j), k, xi, yj);
-                }
-                if let (Some(xj), Some(yi)) = (xj, yi) {
-                    add_product3(self.mass_plane(i, j), k, xj, yi);
+    pub fn add_cross(&mut self, (x, y): (usize, usize), forward: View<'_, S>, k: &[S]) {
+        for (at, &i) in forward.layout.directions(x).iter().enumerate().filter(|(_, i)| **i > 0) {
+            let xi = forward.plane(x, 1 + at);
+            for (at, &j) in forward.layout.directions(y).iter().enumerate().filter(|(_, j)| **j > 0) {
+                let (yj, pair) = (forward.plane(y, 1 + at), (i.min(j) - 1, i.max(j) - 1));
+                add_product3(self.mass_plane(pair.0, pair.1), k, xi, yj);
+                if i == j {
+                    add_product3(self.mass_plane(pair.0, pair.1), k, xi, yj);
                 }
             }
-            if !self.drift.is_empty() {
-                if let (Some(xi), Some(y)) = (xi, forward.carried(y, 1)) {
-                    add_product3(self.drift_plane(i), k, xi, y);
-                }
-                if let (Some(yi), Some(x)) = (yi, forward.carried(x, 1)) {
-                    add_product3(self.drift_plane(i), k, yi, x);
-                }
+        }
+        if self.drift.is_empty() {
+            return;
+        }
+        for (a, b) in [(x, y), (y, x)] {
+            let Some(drift) = forward.tangent(b, 0) else { continue };
+            for (at, &i) in forward.layout.directions(a).iter().enumerate().filter(|(_, i)| **i > 0) {
+                add_product3(self.drift_plane(i - 1), k, forward.plane(a, 1 + at), drift);
             }
         }
     }
 
     /// Adds `sum over units of adjoint d2 x[u] x[w]` of a value `x` of several units, state by state.
-    pub fn add_block(&mut self, x: &[S], units: usize, first: usize, adjoint: &[S], d2: &[S]) {
+    pub fn add_block(&mut self, (x, units): (usize, usize), forward: View<'_, S>, adjoint: &[S], d2: &[S]) {
         let (n, lanes) = (self.n, self.lanes);
+        let directions = forward.layout.directions(x);
+        let drifts = usize::from(directions.first() == Some(&0));
+        let velocities = &directions[drifts..];
+        let x = &forward.all(x)[lanes * units..];
         super::kernel::resize(&mut self.curvature, units);
         super::kernel::resize(&mut self.along, units);
         let (curvature, along) = (&mut self.curvature[..units], &mut self.along[..units]);
@@ -276,22 +278,21 @@ impl<S: Scalar> Second<S> {
             #[inline(always)]
             || {
                 for lane in 0..lanes {
-                    let row = |channel: usize| &x[(channel * lanes + lane) * units..][..units];
+                    let tangent = |k: usize| &x[(k * lanes + lane) * units..][..units];
                     let own = lane * units..(lane + 1) * units;
                     for ((c, &a), &d2) in curvature.iter_mut().zip(&adjoint[own.clone()]).zip(&d2[own]) {
                         *c = a * d2;
                     }
-                    let mut pair = lane;
-                    for i in 0..n {
-                        for ((s, &c), &x) in along.iter_mut().zip(&*curvature).zip(row(first + i)) {
+                    for (k, &i) in velocities.iter().enumerate() {
+                        for ((s, &c), &x) in along.iter_mut().zip(&*curvature).zip(tangent(drifts + k)) {
                             *s = c * x;
                         }
-                        for j in i..n {
-                            mass[pair] += super::kernel::dot(along, row(first + j));
-                            pair += lanes;
+                        for (l, &j) in velocities.iter().enumerate().skip(k) {
+                            let pair = Self::pair(n, i - 1, j - 1);
+                            mass[pair * lanes + lane] += super::kernel::dot(along, tangent(drifts + l));
                         }
-                        if !drift.is_empty() {
-                            drift[i * lanes + lane] += super::kernel::dot(along, row(1));
+                        if drifts == 1 {
+                            drift[(i - 1) * lanes + lane] += super::kernel::dot(along, tangent(0));
                         }
                     }
                 }

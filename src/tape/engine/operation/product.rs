@@ -13,7 +13,7 @@ pub(crate) struct Product {
 
 impl Product {
     pub fn forward<S: Scalar>(self, out: usize, sweep: &mut Forward<'_, S>) {
-        let lanes = sweep.store.lanes;
+        let (lanes, layout) = (sweep.store.lanes, sweep.store.layout);
         let (before, planes) = sweep.store.split(out);
         let (a, b) = (before.plane(self.a, 0), before.plane(self.b, 0));
         let (value, tangents) = planes.split_at_mut(lanes);
@@ -22,9 +22,9 @@ impl Product {
             || value.iter_mut().zip(a).zip(b).for_each(|((y, &a), &b)| *y = a * b),
         );
         tangents.fill(<S as Real>::zero());
-        for (channel, plane) in tangents.chunks_exact_mut(lanes).enumerate() {
-            add_if(plane, b, before.carried(self.a, channel + 1));
-            add_if(plane, a, before.carried(self.b, channel + 1));
+        for (&direction, plane) in layout.directions(out).iter().zip(tangents.chunks_exact_mut(lanes)) {
+            add_if(plane, b, before.tangent(self.a, direction));
+            add_if(plane, a, before.tangent(self.b, direction));
         }
     }
 
@@ -34,7 +34,7 @@ impl Product {
         add_if(before.plane_mut(self.a, 0), adjoint, Some(forward.plane(self.b, 0)));
         add_if(before.plane_mut(self.b, 0), adjoint, Some(forward.plane(self.a, 0)));
         if sweep.depth >= Depth::MassMatrix {
-            sweep.second.add_cross((self.a, self.b), forward, sweep.depth.first_velocity(), adjoint);
+            sweep.second.add_cross((self.a, self.b), forward, adjoint);
         }
     }
 

@@ -26,13 +26,15 @@ impl Select {
     }
 
     pub fn forward<S: Scalar>(self, out: usize, sweep: &mut Forward<'_, S>) {
-        let lanes = sweep.store.lanes;
+        let (lanes, layout) = (sweep.store.lanes, sweep.store.layout);
         let (before, planes) = sweep.store.split(out);
+        let channels = std::iter::once(None).chain(layout.directions(out).iter().map(Some));
         let condition = before.plane(self.condition, 0);
         planes.fill(<S as Real>::zero());
-        for (channel, plane) in planes.chunks_exact_mut(lanes).enumerate() {
+        for (direction, plane) in channels.zip(planes.chunks_exact_mut(lanes)) {
+            let of = |x| direction.map_or_else(|| Some(before.plane(x, 0)), |&direction| before.tangent(x, direction));
             for (x, first) in self.branches() {
-                if let Some(x) = before.carried(x, channel) {
+                if let Some(x) = of(x) {
                     add_taken(plane, condition, x, first);
                 }
             }
