@@ -2,13 +2,11 @@
 
 use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Terms};
 use crate::linalg;
-use crate::network::{Architecture, Chunk, Depth, Dissipation, Layout};
+use crate::network::{Architecture, Dynamics, Layout, Model};
 use crate::scalar::Scalar;
+use crate::tape::{Depth, STATES};
 use std::sync::{Mutex, PoisonError};
 use thiserror::Error;
-
-/// States evaluated together.
-const CHUNK: usize = 64;
 
 /// A network with its weights: `L(q, v)`, perhaps a dissipation `D(q, v)`, and everything that follows from them.
 ///
@@ -19,15 +17,14 @@ const CHUNK: usize = 64;
 pub struct NetworkLagrangian<S> {
     architecture: Architecture,
     weights: Vec<S>,
+    model: Model<S>,
     /// Workspaces that no call holds at the moment.
     idle: Mutex<Vec<Workspace<S>>>,
 }
 
 #[derive(Debug)]
 struct Workspace<S> {
-    chunk: Chunk<S>,
-    dissipation: Option<Dissipation<S>>,
-    wrapped: Vec<S>,
+    dynamics: Dynamics<S>,
     linalg: linalg::Workspace<S>,
 }
 
@@ -97,7 +94,8 @@ impl<S: Scalar> NetworkLagrangian<S> {
         if weights.len() != expected {
             return Err(NetworkError::Weights { expected, found: weights.len() });
         }
-        Ok(Self { architecture, weights, idle: Mutex::new(Vec::new()) })
+        let model = architecture.model();
+        Ok(Self { architecture, weights, model, idle: Mutex::new(Vec::new()) })
     }
 
     /// Shape of the network.
@@ -111,7 +109,8 @@ impl<S: Scalar> NetworkLagrangian<S> {
     /// The same network in another precision.
     pub fn cast<T: Scalar>(&self) -> NetworkLagrangian<T> {
         let weights = self.weights.iter().map(|&w| w.cast()).collect();
-        NetworkLagrangian { architecture: self.architecture.clone(), weights, idle: Mutex::new(Vec::new()) }
+        let model = self.architecture.model();
+        NetworkLagrangian { architecture: self.architecture.clone(), weights, model, idle: Mutex::new(Vec::new()) }
     }
 
     fn depth(request: Request) -> Depth {
@@ -128,10 +127,8 @@ impl<S: Scalar> NetworkLagrangian<S> {
 }
 
 impl<S: Scalar> Workspace<S> {
-    fn new(architecture: &Architecture) -> Self {
-        let chunk = Chunk::new(architecture);
-        let dissipation = Dissipation::new(&chunk);
-        Self { chunk, dissipation, wrapped: Vec::new(), linalg: linalg::Workspace::new() }
+    fn new(model: &Model<S>) -> Self {
+        Self { dynamics: Dynamics::new(model), linalg: linalg::Workspace::new() }
     }
 
     /// Evaluates one chunk and appends its terms in physical units.
@@ -142,46 +139,33 @@ impl<S: Scalar> Workspace<S> {
         (request, depth): (Request, Depth),
         terms: &mut Terms<S>,
     ) {
-        let architecture = &network.architecture;
-        let n = architecture.coordinates;
-        self.wrapped.clear();
-        self.wrapped.extend_from_slice(q);
-        for row in self.wrapped.chunks_exact_mut(n) {
-            for (q, &periodic) in row.iter_mut().zip(&architecture.periodic) {
-                if periodic {
-                    *q = q.wrap_angle();
-                }
-            }
-        }
-        let chunk = &mut self.chunk;
-        chunk.evaluate(&network.weights, &self.wrapped, v, depth);
-        let inverse = |i: usize| S::of_f64(architecture.scale[i]).recip();
+        let (scale, n) = (network.model.scale(), network.model.coordinates());
+        let forces = request.includes(Request::FORCE);
+        self.dynamics.evaluate(&network.weights, q, v, depth, forces);
+        let evaluation = self.dynamics.lagrangian();
         let unscale =
-            |from: &[S], to: &mut Vec<S>| to.extend(from.iter().enumerate().map(|(k, &x)| x * inverse(k % n)));
+            |from: &[S], to: &mut Vec<S>| to.extend(from.iter().enumerate().map(|(k, &x)| x * scale[k % n].recip()));
         if request.includes(Request::LAGRANGIAN) {
-            terms.lagrangian.extend_from_slice(&chunk.lagrangian);
+            terms.lagrangian.extend_from_slice(&evaluation.lagrangian);
         }
         if request.includes(Request::MOMENTUM) {
-            unscale(&chunk.momentum, &mut terms.momentum);
+            unscale(&evaluation.momentum, &mut terms.momentum);
         }
         if request.includes(Request::DL_DQ) {
-            unscale(&chunk.dl_dq, &mut terms.dl_dq);
+            unscale(&evaluation.dl_dq, &mut terms.dl_dq);
         }
         if request.includes(Request::CORIOLIS) {
-            unscale(&chunk.coriolis, &mut terms.coriolis);
+            unscale(&evaluation.coriolis, &mut terms.coriolis);
         }
         if request.includes(Request::MASS_MATRIX) {
-            let element = |(k, &m): (usize, &S)| m * (inverse(k / n % n) * inverse(k % n));
-            terms.mass_matrix.extend(chunk.mass_matrix.iter().enumerate().map(element));
+            let element = |(k, &m): (usize, &S)| m * (scale[k / n % n].recip() * scale[k % n].recip());
+            terms.mass_matrix.extend(evaluation.mass_matrix.iter().enumerate().map(element));
         }
-        if let Some(dissipation) = &mut self.dissipation
-            && request.includes(Request::FORCE)
-        {
-            dissipation.evaluate(chunk, &network.weights);
+        if let Some(friction) = self.dynamics.friction().filter(|_| forces) {
             let first = terms.force.len();
-            unscale(&dissipation.gradient, &mut terms.force);
+            unscale(friction, &mut terms.force);
             terms.force[first..].iter_mut().for_each(|force| *force = -*force);
-            terms.dissipation.extend_from_slice(&dissipation.power);
+            terms.dissipation.extend_from_slice(self.dynamics.power());
         }
     }
 }
@@ -206,9 +190,9 @@ impl<S: Scalar> EulerLagrange<S> for NetworkLagrangian<S> {
             .lock()
             .unwrap_or_else(PoisonError::into_inner)
             .pop()
-            .unwrap_or_else(|| Workspace::new(&self.architecture));
+            .unwrap_or_else(|| Workspace::new(&self.model));
         let depth = Self::depth(request);
-        for states in q.chunks(CHUNK * n).zip(v.chunks(CHUNK * n)) {
+        for states in q.chunks(STATES * n).zip(v.chunks(STATES * n)) {
             workspace.append(self, states, (request, depth), terms);
         }
         let outcome = terms.complete(n, v, request, &mut workspace.linalg);

@@ -35,13 +35,12 @@ impl Architecture {
         let Some(dissipation) = layout.dissipation else { return R::zero() };
         let features = features(self, q, v);
         let (positions, velocities) = features.split_at(layout.position_features);
-        let dot = |row: &[R], x: &[R]| row.iter().zip(x).fold(R::zero(), |sum, (&a, &x)| sum + a * x);
-        let gamma = parameters[dissipation.gamma_range()].iter();
-        let weight = parameters[dissipation.weight_range()].chunks_exact(dissipation.features);
-        let direction = parameters[dissipation.direction_range()].chunks_exact(dissipation.coordinates);
-        gamma.zip(weight).zip(direction).fold(R::zero(), |sum, ((&gamma, w), b)| {
-            sum + (gamma + dot(w, positions)).softplus() * dot(b, velocities).ln_cosh()
-        })
+        let gamma = &parameters[dissipation.gamma_range()];
+        let strength = R::affine(&parameters[dissipation.weight_range()], gamma, positions);
+        let along = R::affine(&parameters[dissipation.direction_range()], &[], velocities);
+        let (strength, along) = (strength.into_iter().map(R::softplus), along.into_iter().map(R::ln_cosh));
+        let (strength, along): (Vec<R>, Vec<R>) = (strength.collect(), along.collect());
+        strength.into_iter().zip(along).fold(R::zero(), |sum, (strength, along)| sum + strength * along)
     }
 }
 

@@ -19,6 +19,7 @@ pub mod shooting;
 mod signature;
 mod solver;
 mod stripes;
+mod violations;
 mod trainer;
 
 pub use checkpoint::{

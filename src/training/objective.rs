@@ -12,18 +12,20 @@
 //! their order: the same numbers on any number of threads.
 
 use crate::linalg::{self, Workspace, solve};
-use crate::network::{Adjoint, Architecture, Chunk, Depth, Dissipation, Jets};
+use crate::network::{Architecture, Dynamics, Model};
 use crate::scalar::{Real, Scalar, Sum};
 use crate::training::dataset::Dataset;
 use crate::training::penalty::Penalty;
 use crate::training::signature::{
     Buffers, Violation, characteristic_scales, eigenvalue_violation, has_signature, sylvester_violation,
 };
+use crate::tape::{Depth, MixedDirections, STATES};
 use crate::training::stripes::sum_gradients;
+use crate::training::violations::Violations;
 use rayon::prelude::*;
 
 /// States evaluated together.
-pub(super) const CHUNK: usize = 64;
+pub(super) const CHUNK: usize = STATES;
 /// Stripes a batch is cut into at most; each has its own gradient.
 pub(super) const STRIPES: usize = 8;
 
@@ -63,7 +65,7 @@ pub enum Failure {
 
 /// Evaluates batches; owns the threads and every buffer, so that a step allocates nothing after the first.
 pub struct Objective<S> {
-    architecture: Architecture,
+    model: Model<S>,
     penalty: Penalty,
     pool: rayon::ThreadPool,
     stripes: Vec<Stripe<S>>,
@@ -71,11 +73,9 @@ pub struct Objective<S> {
 
 /// A contiguous part of a batch with its own buffers.
 struct Stripe<S> {
-    chunk: Chunk<S>,
-    adjoint: Adjoint<S>,
-    dissipation: Option<Dissipation<S>>,
-    jets: Jets<S>,
-    penalty_jets: Jets<S>,
+    dynamics: Dynamics<S>,
+    directions: MixedDirections<S>,
+    violations: Violations<S>,
     gradient: Vec<S>,
     q: Vec<S>,
     v: Vec<S>,
@@ -89,23 +89,18 @@ struct Stripe<S> {
     diagonal: Vec<S>,
     suspects: Vec<usize>,
     suspect_matrices: Vec<S>,
-    inverse_scale: Vec<S>,
+    scale: Vec<S>,
     residual: Sum<S>,
-    penalty: Sum<S>,
-    penalised: usize,
     left_out: usize,
     failure: Option<Failure>,
 }
 
 impl<S: Scalar> Stripe<S> {
-    fn new(architecture: &Architecture) -> Self {
-        let chunk = Chunk::new(architecture);
+    fn new(model: &Model<S>) -> Self {
         Self {
-            adjoint: Adjoint::new(&chunk),
-            dissipation: Dissipation::new(&chunk),
-            chunk,
-            jets: Jets::default(),
-            penalty_jets: Jets::default(),
+            dynamics: Dynamics::new(model),
+            directions: MixedDirections::default(),
+            violations: Violations::new(model),
             gradient: Vec::new(),
             q: Vec::new(),
             v: Vec::new(),
@@ -118,10 +113,8 @@ impl<S: Scalar> Stripe<S> {
             diagonal: Vec::new(),
             suspects: Vec::new(),
             suspect_matrices: Vec::new(),
-            inverse_scale: architecture.scale.iter().map(|&s| S::of_f64(s).recip()).collect(),
+            scale: model.scale().to_vec(),
             residual: Sum::default(),
-            penalty: Sum::default(),
-            penalised: 0,
             left_out: 0,
             failure: None,
         }
@@ -130,8 +123,9 @@ impl<S: Scalar> Stripe<S> {
     fn reset(&mut self, parameters: usize) {
         self.gradient.clear();
         self.gradient.resize(parameters, <S as Real>::zero());
-        (self.residual, self.penalty) = (Sum::default(), Sum::default());
-        (self.penalised, self.left_out, self.failure) = (0, 0, None);
+        self.residual = Sum::default();
+        (self.left_out, self.failure) = (0, None);
+        self.violations.reset();
         self.diagonal.clear();
         self.suspects.clear();
         self.suspect_matrices.clear();
@@ -154,30 +148,44 @@ impl<S: Scalar> Stripe<S> {
     /// `weight` is `1/(2 n counted)`, with the states of the batch that count; the penalty comes with its weight over the batch.
     fn add_chunk(&mut self, weights: &[S], data: &Dataset<S>, rows: &[u32], weight: S, penalty: (Penalty, S)) {
         self.gather(data, rows);
-        self.chunk.evaluate(weights, &self.q, &self.v, Depth::Training);
-        self.solve(weights, data, rows);
+        self.dynamics.evaluate(weights, &self.q, &self.v, Depth::Training, true);
+        self.solve(data, rows);
         self.add_residuals(data, rows, weight);
-        self.add_motion_jets();
-        self.adjoint.add_gradient(&self.chunk, weights, &self.jets, &mut self.gradient);
-        if let Some(dissipation) = &self.dissipation {
-            // The jets' s is -lam.
-            dissipation.add_gradient(&self.chunk, weights, &self.jets.state, &self.jets.s, &mut self.gradient);
-        }
         let (penalty, lambda) = penalty;
         match penalty {
             Penalty::None => {}
-            Penalty::Eigenvalue { .. } => {
-                self.add_eigenvalue_jets(lambda);
-                self.adjoint.add_gradient(&self.chunk, weights, &self.penalty_jets, &mut self.gradient);
-            }
+            Penalty::Eigenvalue { .. } => self.add_eigenvalue(lambda),
             Penalty::Sylvester { time, .. } => self.note_suspects(time),
         }
+        if self.add_directions() {
+            self.dynamics.add_gradient(weights, &self.directions, &mut self.gradient, None);
+        } else if self.replace_failed(weights) {
+            // Zero directions on finite numbers leave the failed states out.
+            self.dynamics.add_gradient(weights, &self.directions, &mut self.gradient, None);
+        }
+        self.violations.add_gradient(weights, false, &mut self.gradient);
+    }
+
+    /// Evaluates the chunk once more with states that have an acceleration in place of those that have none; whether there is
+    /// one.
+    fn replace_failed(&mut self, weights: &[S]) -> bool {
+        let n = self.scale.len();
+        let failed = |row: &[S]| row[0].is_nan();
+        let Some(good) = self.acceleration.chunks_exact(n).position(|row| !failed(row)) else { return false };
+        for (state, row) in self.acceleration.chunks_exact(n).enumerate() {
+            if failed(row) {
+                self.q.copy_within(good * n..(good + 1) * n, state * n);
+                self.v.copy_within(good * n..(good + 1) * n, state * n);
+            }
+        }
+        self.dynamics.evaluate(weights, &self.q, &self.v, Depth::Training, true);
+        true
     }
 
     /// Keeps the diagonals of the chunk's mass matrices and whatever has not plainly the right signature.
     fn note_suspects(&mut self, time: Option<usize>) {
-        let n = self.chunk.coordinates();
-        for matrix in self.chunk.mass_matrix.chunks_exact(n * n) {
+        let n = self.scale.len();
+        for matrix in self.dynamics.lagrangian().mass_matrix.chunks_exact(n * n) {
             if !has_signature(n, matrix, time, &mut self.signature) {
                 self.suspects.push(self.diagonal.len() / n);
                 self.suspect_matrices.extend_from_slice(matrix);
@@ -195,69 +203,34 @@ impl<S: Scalar> Stripe<S> {
         scales: &[S],
         (lambda, time): (S, Option<usize>),
     ) {
-        let n = self.chunk.coordinates();
-        let suspects = std::mem::take(&mut self.suspects);
-        let matrices = std::mem::take(&mut self.suspect_matrices);
-        for (group, matrices) in suspects.chunks(CHUNK).zip(matrices.chunks(CHUNK * n * n)) {
-            self.penalty_jets.clear(false);
-            // The buffers still hold the only chunk of a small batch.
-            let kept = rows.len() <= CHUNK;
-            for (k, (&state, matrix)) in group.iter().zip(matrices.chunks_exact(n * n)).enumerate() {
-                let outcome = sylvester_violation(n, matrix, scales, time, &mut self.signature, &mut self.violation);
-                if outcome.is_ok() {
-                    self.push_violation(if kept { state } else { k }, lambda);
-                }
+        let n = self.scale.len();
+        for (&state, matrix) in self.suspects.iter().zip(self.suspect_matrices.chunks_exact(n * n)) {
+            let outcome = sylvester_violation(n, matrix, scales, time, &mut self.signature, &mut self.violation);
+            if outcome.is_ok() {
+                let range = rows[state] as usize * n..(rows[state] as usize + 1) * n;
+                self.violations.push((&data.q()[range.clone()], &data.v()[range]), &self.violation, lambda);
             }
-            if self.penalty_jets.state.is_empty() {
-                continue;
-            }
-            if !kept {
-                let chosen: Vec<u32> = group.iter().map(|&state| rows[state]).collect();
-                self.gather(data, &chosen);
-                self.chunk.evaluate(weights, &self.q, &self.v, Depth::Training);
-            }
-            self.adjoint.add_gradient(&self.chunk, weights, &self.penalty_jets, &mut self.gradient);
         }
-        (self.suspects, self.suspect_matrices) = (suspects, matrices);
-    }
-
-    /// Counts the violation at hand and adds its jets: `G = sum gamma u u^T` has `s = lambda gamma u`, `t = u`.
-    fn push_violation(&mut self, state: usize, lambda: S) {
-        if self.violation.gamma.is_empty() {
-            return;
-        }
-        let n = self.chunk.coordinates();
-        self.penalty.add(lambda * self.violation.value);
-        for (&gamma, u) in self.violation.gamma.iter().zip(self.violation.vectors.chunks_exact(n)) {
-            self.penalty_jets.state.push(state);
-            self.penalty_jets.s.extend(u.iter().map(|&u| lambda * gamma * u));
-            self.penalty_jets.t.extend_from_slice(u);
-        }
-        self.penalised += 1;
+        self.violations.add_gradient(weights, true, &mut self.gradient);
     }
 
     /// Losses of one chunk, no gradient.
     fn add_losses(&mut self, weights: &[S], data: &Dataset<S>, rows: &[u32]) {
         self.gather(data, rows);
-        self.chunk.evaluate(weights, &self.q, &self.v, Depth::Motion);
-        self.solve(weights, data, rows);
+        self.dynamics.evaluate(weights, &self.q, &self.v, Depth::Motion, true);
+        self.solve(data, rows);
         self.add_residuals(data, rows, <S as Real>::one());
     }
 
     /// Accelerations of the chunk, scaled; `NaN` where a state fails, which is noted with its row.
-    fn solve(&mut self, weights: &[S], data: &Dataset<S>, rows: &[u32]) {
-        let n = self.chunk.coordinates();
-        self.right.clear();
-        self.right.extend(self.chunk.dl_dq.iter().zip(&self.chunk.coriolis).map(|(&g, &c)| g - c));
-        if let Some(dissipation) = &mut self.dissipation {
-            dissipation.evaluate(&self.chunk, weights);
-            self.right.iter_mut().zip(&dissipation.gradient).for_each(|(right, &friction)| *right -= friction);
-        }
+    fn solve(&mut self, data: &Dataset<S>, rows: &[u32]) {
+        let n = self.scale.len();
+        self.dynamics.right_hand_sides(&mut self.right);
         if !data.force().is_empty() {
             self.add_forces(data, rows);
         }
         self.acceleration.resize(self.right.len(), <S as Real>::zero());
-        let (matrices, solution) = (&self.chunk.mass_matrix, &mut self.acceleration);
+        let (matrices, solution) = (&self.dynamics.lagrangian().mass_matrix, &mut self.acceleration);
         if solve(n, matrices, &self.right, solution, &mut self.workspace).is_ok() {
             return;
         }
@@ -276,8 +249,8 @@ impl<S: Scalar> Stripe<S> {
         let n = data.coordinates();
         for (right, &row) in self.right.chunks_exact_mut(n).zip(rows) {
             let force = &data.force()[row as usize * n..][..n];
-            for ((right, &force), &inverse) in right.iter_mut().zip(force).zip(&self.inverse_scale) {
-                *right += force / inverse;
+            for ((right, &force), &scale) in right.iter_mut().zip(force).zip(&self.scale) {
+                *right += force * scale;
             }
         }
     }
@@ -298,7 +271,7 @@ impl<S: Scalar> Stripe<S> {
             let own = data.weight(row as usize);
             let weight = own * weight;
             for i in 0..n {
-                let residual = a[i] - target[i] * self.inverse_scale[i];
+                let residual = a[i] - target[i] / self.scale[i];
                 self.residual.add(own * residual.abs());
                 // The sign of zero is zero.
                 right[i] = if residual > zero {
@@ -312,31 +285,36 @@ impl<S: Scalar> Stripe<S> {
         }
     }
 
-    /// Jets of the loss: `s = -lam = -M^-1 dl/da`, `t = a`, for every state that has an acceleration.
-    fn add_motion_jets(&mut self) {
-        let n = self.chunk.coordinates();
-        self.jets.clear(true);
+    /// Directions of the loss: `s = -lam = -M^-1 dl/da`, `t = a`, zeros for states that have no acceleration; whether all have
+    /// one.
+    fn add_directions(&mut self) -> bool {
+        let n = self.scale.len();
+        self.directions.clear(true);
         self.multiplier.resize(self.right.len(), <S as Real>::zero());
         // The same matrices failed before, and their rows are passed over.
-        let _ = solve(n, &self.chunk.mass_matrix, &self.right, &mut self.multiplier, &mut self.workspace);
-        let rows = self.acceleration.chunks_exact(n).zip(self.multiplier.chunks_exact(n));
-        for (state, (a, s)) in rows.enumerate() {
-            if !a[0].is_nan() {
-                self.jets.state.push(state);
-                self.jets.s.extend_from_slice(s);
-                self.jets.t.extend_from_slice(a);
+        let matrices = &self.dynamics.lagrangian().mass_matrix;
+        let _ = solve(n, matrices, &self.right, &mut self.multiplier, &mut self.workspace);
+        self.directions.s.extend_from_slice(&self.multiplier);
+        self.directions.t.extend_from_slice(&self.acceleration);
+        let mut all = true;
+        let MixedDirections { s, t, .. } = &mut self.directions;
+        for (s, t) in s.chunks_exact_mut(n).zip(t.chunks_exact_mut(n)) {
+            if t[0].is_nan() {
+                all = false;
+                s.fill(<S as Real>::zero());
+                t.fill(<S as Real>::zero());
             }
         }
+        all
     }
 
-    /// Jets of the eigenvalue penalty of the chunk.
-    fn add_eigenvalue_jets(&mut self, lambda: S) {
-        let n = self.chunk.coordinates();
-        self.penalty_jets.clear(false);
-        for state in 0..self.chunk.mass_matrix.len() / (n * n) {
-            let matrix = &self.chunk.mass_matrix[state * n * n..(state + 1) * n * n];
+    /// Counts the eigenvalue penalties of the chunk.
+    fn add_eigenvalue(&mut self, lambda: S) {
+        let n = self.scale.len();
+        for (state, matrix) in self.dynamics.lagrangian().mass_matrix.chunks_exact(n * n).enumerate() {
             if eigenvalue_violation(n, matrix, &mut self.signature, &mut self.violation).is_ok() {
-                self.push_violation(state, lambda);
+                let range = state * n..(state + 1) * n;
+                self.violations.push((&self.q[range.clone()], &self.v[range]), &self.violation, lambda);
             }
         }
     }
@@ -352,13 +330,21 @@ impl<S: Scalar> Objective<S> {
         penalty: Penalty,
         threads: usize,
     ) -> Result<Self, rayon::ThreadPoolBuildError> {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.max(1)).build()?;
-        Ok(Self { architecture: architecture.clone(), penalty, pool, stripes: Vec::new() })
+        Self::of_model(architecture.model(), penalty, threads)
     }
 
-    /// Shape of the networks.
-    pub(super) fn architecture(&self) -> &Architecture {
-        &self.architecture
+    /// An objective for any model on `threads` threads.
+    ///
+    /// # Errors
+    /// When the threads cannot be started.
+    pub fn of_model(model: Model<S>, penalty: Penalty, threads: usize) -> Result<Self, rayon::ThreadPoolBuildError> {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.max(1)).build()?;
+        Ok(Self { model, penalty, pool, stripes: Vec::new() })
+    }
+
+    /// What is trained.
+    pub(super) fn model(&self) -> &Model<S> {
+        &self.model
     }
 
     /// The threads.
@@ -372,7 +358,7 @@ impl<S: Scalar> Objective<S> {
         let size = chunks.div_ceil(STRIPES) * CHUNK;
         let count = rows.len().div_ceil(size);
         while self.stripes.len() < count {
-            self.stripes.push(Stripe::new(&self.architecture));
+            self.stripes.push(Stripe::new(&self.model));
         }
         let stripes = &mut self.stripes[..count];
         self.pool.install(|| {
@@ -416,6 +402,7 @@ impl<S: Scalar> Objective<S> {
             for rows in rows.chunks(CHUNK) {
                 stripe.add_chunk(weights, data, rows, weight, (penalty, lambda));
             }
+            stripe.violations.add_gradient(weights, true, &mut stripe.gradient);
         })
     }
 
@@ -447,8 +434,8 @@ impl<S: Scalar> Objective<S> {
         let (mut penalised, mut left_out, mut failure) = (0, 0, None);
         for stripe in &self.stripes[..stripes] {
             residual.add(stripe.residual.value());
-            penalty.add(stripe.penalty.value());
-            penalised += stripe.penalised;
+            penalty.add(stripe.violations.penalty.value());
+            penalised += stripe.violations.count;
             left_out += stripe.left_out;
             failure = failure.or(stripe.failure);
         }

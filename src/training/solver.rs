@@ -4,7 +4,6 @@
 //! that move, their moments, the order of the data and the random state: its course, which a checkpoint can hold between
 //! any two steps.
 
-use crate::network::Layout;
 use crate::scalar::{Real, Scalar};
 use crate::training::checkpoint::{Clock, Course, Ended, Keeper, Underway};
 use crate::training::config::{OnFailure, Optimizer, Phase};
@@ -308,8 +307,8 @@ impl<S: Scalar> Solver<TrainingProblem<S>, TrainingState<S>> for EpochSolver<S> 
             course.average.clone_from(&course.weights);
             course.averaged_steps = 0;
             let problem = problem.problem.as_ref().ok_or_else(|| Error::msg("the training problem is missing"))?;
-            let layout = Layout::new(problem.objective.architecture());
-            course.moments = Moments::for_method(self.optimizer.method, course.weights.len(), layout.matrices());
+            let matrices = problem.objective.model().matrices().into_iter();
+            course.moments = Moments::for_method(self.optimizer.method, course.weights.len(), matrices);
         }
         Ok((state, None))
     }

@@ -67,6 +67,17 @@ impl<S: Scalar> Recorded<S> {
     pub fn scale(&self) -> &[S] {
         &self.scale
     }
+    /// Offset among the parameters, rows and columns of every weight matrix, in order.
+    pub fn matrices(&self) -> Vec<(usize, usize, usize)> {
+        let dense = |operation: &Operation<S>| match operation {
+            Operation::Dense(dense) => Some((dense.weights, dense.outputs, dense.inputs)),
+            _ => None,
+        };
+        let mut matrices: Vec<_> = self.operations.iter().filter_map(dense).collect();
+        matrices.sort_unstable();
+        matrices.dedup();
+        matrices
+    }
     pub(super) fn layout(&self, depth: Depth) -> &Layout {
         &self.forward[match depth {
             Depth::Value | Depth::Gradient => 0,

@@ -11,8 +11,9 @@
 //! The forward pass keeps states and accelerations of all stages; the reverse pass evaluates the network there once more,
 //! with what the adjoint identity needs. Every gradient is that of this map, exactly.
 
-use crate::network::{Architecture, Depth};
+use crate::network::Model;
 use crate::scalar::{Real, Scalar};
+use crate::tape::Depth;
 use crate::training::penalty::Penalty;
 use crate::training::shooting::motion::Motion;
 use crate::training::shooting::segments::Segments;
@@ -45,10 +46,10 @@ pub(super) struct Integrator<S> {
 }
 
 impl<S: Scalar> Integrator<S> {
-    pub fn new(architecture: &Architecture) -> Self {
+    pub fn new(model: &Model<S>) -> Self {
         Self {
-            motion: Motion::new(architecture),
-            n: architecture.coordinates,
+            motion: Motion::new(model),
+            n: model.coordinates(),
             rows: 0,
             steps: 0,
             h: Vec::new(),

@@ -5,20 +5,20 @@
 //! through what `D` depends on.
 
 use crate::linalg::{Workspace, solve};
-use crate::network::{Adjoint, Architecture, Chunk, Depth, Dissipation, Jets};
+use crate::network::{Dynamics, Model};
 use crate::scalar::{Real, Scalar};
+use crate::tape::{Depth, MixedDirections};
 use crate::training::penalty::Penalty;
 use crate::training::signature::{
     Buffers, Violation, characteristic_scales, eigenvalue_violation, sylvester_violation,
 };
+use crate::training::violations::Violations;
 
 /// The equation of motion on a chunk of states; buffers are reused from call to call.
 pub(super) struct Motion<S> {
-    architecture: Architecture,
-    chunk: Chunk<S>,
-    adjoint: Adjoint<S>,
-    dissipation: Option<Dissipation<S>>,
-    jets: Jets<S>,
+    dynamics: Dynamics<S>,
+    directions: MixedDirections<S>,
+    violations: Violations<S>,
     scale: Vec<S>,
     /// Physical states.
     q: Vec<S>,
@@ -31,15 +31,12 @@ pub(super) struct Motion<S> {
 }
 
 impl<S: Scalar> Motion<S> {
-    pub fn new(architecture: &Architecture) -> Self {
-        let chunk = Chunk::new(architecture);
+    pub fn new(model: &Model<S>) -> Self {
         Self {
-            architecture: architecture.clone(),
-            adjoint: Adjoint::new(&chunk),
-            dissipation: Dissipation::new(&chunk),
-            chunk,
-            jets: Jets::default(),
-            scale: architecture.scale.iter().map(|&s| S::of_f64(s)).collect(),
+            dynamics: Dynamics::new(model),
+            directions: MixedDirections::default(),
+            violations: Violations::new(model),
+            scale: model.scale().to_vec(),
             q: Vec::new(),
             v: Vec::new(),
             right: Vec::new(),
@@ -50,21 +47,14 @@ impl<S: Scalar> Motion<S> {
         }
     }
 
-    /// Evaluates the network at scaled states, `(states, n)`; angles are reduced to one turn first.
+    /// Evaluates the model at scaled states, `(states, n)`.
     pub fn evaluate(&mut self, weights: &[S], q: &[S], v: &[S], depth: Depth) {
         let n = self.scale.len();
         self.q.clear();
         self.v.clear();
-        for (k, (&q, &v)) in q.iter().zip(v).enumerate() {
-            let scale = self.scale[k % n];
-            let q = q * scale;
-            self.q.push(if self.architecture.periodic[k % n] { q.wrap_angle() } else { q });
-            self.v.push(v * scale);
-        }
-        self.chunk.evaluate(weights, &self.q, &self.v, depth);
-        if let Some(dissipation) = &mut self.dissipation {
-            dissipation.evaluate(&self.chunk, weights);
-        }
+        self.q.extend(q.iter().enumerate().map(|(k, &q)| q * self.scale[k % n]));
+        self.v.extend(v.iter().enumerate().map(|(k, &v)| v * self.scale[k % n]));
+        self.dynamics.evaluate(weights, &self.q, &self.v, depth, true);
     }
 
     /// Accelerations `M^-1 (g - c - dD/dv + Q)` of the states evaluated last under scaled external forces, `(states, n)` or empty.
@@ -72,16 +62,12 @@ impl<S: Scalar> Motion<S> {
     /// A state without one is no longer alive; the acceleration of those that are not is 0.
     pub fn accelerate(&mut self, external: &[S], alive: &mut [bool], acceleration: &mut [S]) {
         let n = self.scale.len();
-        self.right.clear();
-        self.right.extend(self.chunk.dl_dq.iter().zip(&self.chunk.coriolis).map(|(&g, &c)| g - c));
+        self.dynamics.right_hand_sides(&mut self.right);
         for (right, &force) in self.right.iter_mut().zip(external) {
             *right += force;
         }
-        if let Some(dissipation) = &self.dissipation {
-            self.right.iter_mut().zip(&dissipation.gradient).for_each(|(right, &force)| *right -= force);
-        }
         // Failed rows are `NaN` and looked for below.
-        let _ = solve(n, &self.chunk.mass_matrix, &self.right, acceleration, &mut self.workspace);
+        let _ = solve(n, &self.dynamics.lagrangian().mass_matrix, &self.right, acceleration, &mut self.workspace);
         for (alive, a) in alive.iter_mut().zip(acceleration.chunks_exact_mut(n)) {
             *alive &= a.iter().all(|a| a.is_finite());
             if !*alive {
@@ -101,22 +87,27 @@ impl<S: Scalar> Motion<S> {
         (dq, dv): (&mut [S], &mut [S]),
     ) {
         let n = self.scale.len();
+        let Some(good) = alive.iter().position(|alive| *alive) else { return };
         self.solution.resize(u.len(), <S as Real>::zero());
         // Matrices that failed belong to states that are not alive.
-        let _ = solve(n, &self.chunk.mass_matrix, u, &mut self.solution, &mut self.workspace);
-        self.jets.clear(true);
-        for (state, _) in alive.iter().enumerate().filter(|(_, alive)| **alive) {
+        let _ = solve(n, &self.dynamics.lagrangian().mass_matrix, u, &mut self.solution, &mut self.workspace);
+        self.directions.clear(true);
+        self.directions.s.extend(self.solution.iter().map(|&lambda| -lambda));
+        self.directions.t.extend_from_slice(a);
+        let mut replaced = false;
+        for (state, _) in alive.iter().enumerate().filter(|(_, alive)| !**alive) {
             let range = state * n..(state + 1) * n;
-            self.jets.state.push(state);
-            self.jets.s.extend(self.solution[range.clone()].iter().map(|&lambda| -lambda));
-            self.jets.t.extend_from_slice(&a[range]);
+            self.directions.s[range.clone()].fill(<S as Real>::zero());
+            self.directions.t[range].fill(<S as Real>::zero());
+            self.q.copy_within(good * n..(good + 1) * n, state * n);
+            self.v.copy_within(good * n..(good + 1) * n, state * n);
+            replaced = true;
         }
-        self.adjoint.add_gradient_and_inputs(&self.chunk, weights, &self.jets, gradient, (&mut *dq, &mut *dv));
-        if let Some(dissipation) = &mut self.dissipation {
-            let Jets { state, s, .. } = &self.jets;
-            dissipation.add_gradient(&self.chunk, weights, state, s, gradient);
-            dissipation.add_input_gradient(&self.chunk, weights, state, s, (dq, dv));
+        if replaced {
+            // Zero directions on finite numbers leave the others out.
+            self.dynamics.evaluate(weights, &self.q, &self.v, Depth::Training, true);
         }
+        self.dynamics.add_gradient(weights, &self.directions, gradient, Some((dq, dv)));
     }
 
     /// Value of `lambda` times the sum of the states' violations and how many violate; adds its gradient by the weights.
@@ -130,7 +121,7 @@ impl<S: Scalar> Motion<S> {
         gradient: &mut [S],
     ) -> (S, usize) {
         let n = self.scale.len();
-        let matrices = &self.chunk.mass_matrix;
+        let matrices = &self.dynamics.lagrangian().mass_matrix;
         let scales = match penalty {
             Penalty::None => return (<S as Real>::zero(), 0),
             Penalty::Eigenvalue { .. } => Vec::new(),
@@ -140,26 +131,19 @@ impl<S: Scalar> Motion<S> {
                 characteristic_scales(n, &diagonals)
             }
         };
-        let (mut total, mut count) = (<S as Real>::zero(), 0);
-        self.jets.clear(false);
+        self.violations.reset();
         for (state, matrix) in matrices.chunks_exact(n * n).enumerate().filter(|(state, _)| alive[*state]) {
             let (signature, found) = (&mut self.signature, &mut self.violation);
             let outcome = match penalty {
                 Penalty::Sylvester { time, .. } => sylvester_violation(n, matrix, &scales, time, signature, found),
                 _ => eigenvalue_violation(n, matrix, signature, found),
             };
-            if outcome.is_err() || found.gamma.is_empty() {
-                continue;
-            }
-            total += lambda * found.value;
-            count += 1;
-            for (&gamma, u) in found.gamma.iter().zip(found.vectors.chunks_exact(n)) {
-                self.jets.state.push(state);
-                self.jets.s.extend(u.iter().map(|&u| lambda * gamma * u));
-                self.jets.t.extend_from_slice(u);
+            if outcome.is_ok() {
+                let range = state * n..(state + 1) * n;
+                self.violations.push((&self.q[range.clone()], &self.v[range]), &self.violation, lambda);
             }
         }
-        self.adjoint.add_gradient(&self.chunk, weights, &self.jets, gradient);
-        (total, count)
+        self.violations.add_gradient(weights, true, gradient);
+        (self.violations.penalty.value(), self.violations.count)
     }
 }

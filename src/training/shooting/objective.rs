@@ -3,7 +3,7 @@
 //! A batch is cut into stripes and chunks whose sizes do not depend on the number of threads, and every sum is taken in
 //! their order: the same numbers on any number of threads.
 
-use crate::network::Architecture;
+use crate::network::{Architecture, Model};
 use crate::scalar::{Real, Scalar, Sum};
 use crate::training::penalty::Penalty;
 use crate::training::shooting::integrator::Integrator;
@@ -37,7 +37,7 @@ pub struct ShotReport<S> {
 
 /// Shoots batches of segments; owns the threads and every buffer.
 pub struct Shots<S> {
-    architecture: Architecture,
+    model: Model<S>,
     penalty: Penalty,
     huber: Huber<S>,
     continuity: S,
@@ -75,9 +75,9 @@ pub(super) struct Stripe<S> {
 }
 
 impl<S: Scalar> Stripe<S> {
-    fn new(architecture: &Architecture) -> Self {
+    fn new(model: &Model<S>) -> Self {
         Self {
-            integrator: Integrator::new(architecture),
+            integrator: Integrator::new(model),
             gradient: Vec::new(),
             start_gradient: Vec::new(),
             next_gradient: Vec::new(),
@@ -241,12 +241,12 @@ impl<S: Scalar> Shots<S> {
     ) -> Result<Self, rayon::ThreadPoolBuildError> {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.max(1)).build()?;
         let (huber, continuity) = (Huber::new(huber), S::of_f64(continuity));
-        Ok(Self { architecture: architecture.clone(), penalty, huber, continuity, pool, stripes: Vec::new() })
+        Ok(Self { model: architecture.model(), penalty, huber, continuity, pool, stripes: Vec::new() })
     }
 
-    /// Shape of the networks.
-    pub(super) fn architecture(&self) -> &Architecture {
-        &self.architecture
+    /// What is trained.
+    pub(super) fn model(&self) -> &Model<S> {
+        &self.model
     }
 
     /// The threads.
@@ -259,7 +259,7 @@ impl<S: Scalar> Shots<S> {
         let size = rows.len().div_ceil(CHUNK).div_ceil(STRIPES).max(1) * CHUNK;
         let count = rows.len().div_ceil(size);
         while self.stripes.len() < count {
-            self.stripes.push(Stripe::new(&self.architecture));
+            self.stripes.push(Stripe::new(&self.model));
         }
         let stripes = &mut self.stripes[..count];
         self.pool.install(|| {

@@ -1,6 +1,5 @@
 //! Multiple shooting as an argmin solver: one iteration is one epoch, the cost is the validation loss.
 
-use crate::network::Layout;
 use crate::scalar::{Real, Scalar};
 use crate::training::checkpoint::{Clock, Course, Keeper, Shot, Underway};
 use crate::training::optimizer::{Method, Moments, Update};
@@ -228,8 +227,8 @@ impl<S: Scalar> Solver<ShootingProblem<S>, TrainingState<S>> for ShootingSolver<
         if let Some(given) = state.get_param() {
             weights.clone_from(given);
         }
-        let layout = Layout::new(problem.shots.architecture());
-        *moments = Moments::for_method(self.settings.method, weights.len(), layout.matrices());
+        let matrices = problem.shots.model().matrices().into_iter();
+        *moments = Moments::for_method(self.settings.method, weights.len(), matrices);
         self.gradient.resize(weights.len(), <S as Real>::zero());
         for _ in 1..PREPARATION {
             self.starts.refine(&mut problem.shots, weights, &problem.training);

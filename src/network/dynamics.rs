@@ -1,0 +1,155 @@
+//! The recorded functions of a model, and their terms on a chunk of states.
+
+use crate::lagrangian::Lagrangian;
+use crate::network::{Architecture, Layout};
+use crate::scalar::{Real, Scalar};
+use crate::tape::{Depth, Evaluation, MixedDirections, Recorded};
+use std::sync::Arc;
+
+/// A model of motion, recorded: a Lagrangian, perhaps a Rayleigh dissipation beside it, with one list of parameters.
+#[derive(Clone, Debug)]
+pub struct Model<S> {
+    lagrangian: Arc<Recorded<S>>,
+    dissipation: Option<Arc<Recorded<S>>>,
+    periodic: Vec<bool>,
+}
+
+impl<S: Scalar> Model<S> {
+    /// A model of `lagrangian`, whose scales and parameters are also those of `dissipation`; `periodic` coordinates are reduced
+    /// to `[0, 2 pi)` before the functions see them.
+    pub fn new(
+        lagrangian: Arc<Recorded<S>>,
+        dissipation: Option<Arc<Recorded<S>>>,
+        periodic: Vec<bool>,
+    ) -> Self {
+        Self { lagrangian, dissipation, periodic }
+    }
+    /// Number of coordinates `n`.
+    pub fn coordinates(&self) -> usize {
+        self.lagrangian.coordinates()
+    }
+    /// Number of parameters.
+    pub fn parameters(&self) -> usize {
+        self.lagrangian.parameters()
+    }
+    /// Scales `s_i` of the coordinates.
+    pub fn scale(&self) -> &[S] {
+        self.lagrangian.scale()
+    }
+    /// Offset among the parameters, rows and columns of every weight matrix of the Lagrangian, in order.
+    pub fn matrices(&self) -> Vec<(usize, usize, usize)> {
+        self.lagrangian.matrices()
+    }
+    /// Whether there is a dissipation.
+    pub fn dissipates(&self) -> bool {
+        self.dissipation.is_some()
+    }
+}
+
+impl Architecture {
+    /// The functions of a network of this shape, recorded.
+    ///
+    /// # Panics
+    /// If the architecture contradicts itself (see [`Architecture::validate`]).
+    pub fn model<S: Scalar>(&self) -> Model<S> {
+        let scale = || self.scale.iter().map(|&s| S::of_f64(s)).collect();
+        let parameters = Layout::new(self).parameters;
+        let record = Recorded::new(scale(), parameters, |p, q, v| self.lagrangian(p, q, v));
+        let lagrangian = Arc::new(record.expect("networks read no values"));
+        let dissipation = self.dissipation.map(|_| {
+            let record = Recorded::new(scale(), parameters, |p, q, v| self.rayleigh_dissipation(p, q, v));
+            Arc::new(record.expect("dissipations read no values"))
+        });
+        Model::new(lagrangian, dissipation, self.periodic.clone())
+    }
+}
+
+/// The terms of a model on a chunk of at most [`LANES`](crate::tape::STATES) states, in scaled coordinates; buffers are reused
+/// from call to call.
+#[derive(Debug)]
+pub struct Dynamics<S> {
+    periodic: Vec<bool>,
+    wrapped: Vec<S>,
+    lagrangian: Evaluation<S>,
+    dissipation: Option<Evaluation<S>>,
+    /// `v.dD/dv`, `(batch)`.
+    power: Vec<S>,
+}
+
+impl<S: Scalar> Dynamics<S> {
+    /// Buffers for a model.
+    pub fn new(model: &Model<S>) -> Self {
+        Self {
+            periodic: model.periodic.clone(),
+            wrapped: Vec::new(),
+            lagrangian: Evaluation::new(Arc::clone(&model.lagrangian)),
+            dissipation: model.dissipation.as_ref().map(|recorded| Evaluation::new(Arc::clone(recorded))),
+            power: Vec::new(),
+        }
+    }
+
+    /// Evaluates states `q`, `v`, `(batch, n)` in physical units; the dissipation's force only if `forces`.
+    pub fn evaluate(&mut self, parameters: &[S], q: &[S], v: &[S], depth: Depth, forces: bool) {
+        self.wrapped.clear();
+        self.wrapped.extend_from_slice(q);
+        let n = self.periodic.len();
+        for row in self.wrapped.chunks_exact_mut(n) {
+            for (q, _) in row.iter_mut().zip(&self.periodic).filter(|(_, periodic)| **periodic) {
+                *q = q.wrap_angle();
+            }
+        }
+        self.lagrangian.evaluate(parameters, &self.wrapped, v, depth);
+        let Some(dissipation) = self.dissipation.as_mut().filter(|_| forces) else { return };
+        dissipation.evaluate(parameters, &self.wrapped, v, if depth == Depth::Training { depth } else { Depth::Gradient });
+        self.power.clear();
+        let scale = dissipation.recorded().scale();
+        let rows = dissipation.momentum.chunks_exact(n).zip(v.chunks_exact(n));
+        let zero = <S as Real>::zero();
+        self.power.extend(rows.map(|(gradient, v)| {
+            let terms = gradient.iter().zip(v).zip(scale);
+            let power = terms.fold(zero, |sum, ((&d, &v), &s)| sum + d * (v / s));
+            // D is convex and even in v: what is below zero is rounding.
+            if power < zero { zero } else { power }
+        }));
+    }
+
+    /// The Lagrangian's terms.
+    pub fn lagrangian(&self) -> &Evaluation<S> {
+        &self.lagrangian
+    }
+    /// `dD/d(v/s)`, `(batch, n)`, of a model that dissipates: minus the generalized force.
+    pub fn friction(&self) -> Option<&[S]> {
+        self.dissipation.as_ref().map(|dissipation| dissipation.momentum.as_slice())
+    }
+    /// The power `v.dD/dv` taken away, `(batch)`, never negative; empty without a dissipation.
+    pub fn power(&self) -> &[S] {
+        &self.power
+    }
+
+    /// Right-hand sides `g - c - dD/d(v/s)` of `M a = ..`, `(batch, n)`, into `right`.
+    pub fn right_hand_sides(&self, right: &mut Vec<S>) {
+        right.clear();
+        right.extend(self.lagrangian.dl_dq.iter().zip(&self.lagrangian.coriolis).map(|(&g, &c)| g - c));
+        if let Some(friction) = self.friction() {
+            right.iter_mut().zip(friction).for_each(|(right, &friction)| *right -= friction);
+        }
+    }
+
+    /// Adds the derivative of a sum of mixed coefficients to `gradient`, and of what accelerations owe to the dissipation: with
+    /// `s = -M^-1 u`, `t = a` and moving directions, `u da/dtheta`, and to `inputs` `u da/d(q/s)` and `u da/d(v/s)`.
+    ///
+    /// The states are those evaluated last, to [`Depth::Training`] and with forces; all their numbers are finite.
+    pub fn add_gradient(
+        &mut self,
+        parameters: &[S],
+        directions: &MixedDirections<S>,
+        gradient: &mut [S],
+        mut inputs: Option<(&mut [S], &mut [S])>,
+    ) {
+        let again = inputs.as_mut().map(|(dq, dv)| (&mut **dq, &mut **dv));
+        self.lagrangian.add_gradient(parameters, directions, gradient, again);
+        if let (Some(dissipation), true) = (&mut self.dissipation, directions.moving) {
+            dissipation.add_momentum_gradient(parameters, directions, gradient, inputs);
+        }
+    }
+}
