@@ -6,8 +6,9 @@
 mod networks;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use lnn::network::{Architecture, Chunk, Depth, Initialization, initial_weights};
+use lnn::network::{Architecture, Initialization, initial_weights};
 use lnn::scalar::Scalar;
+use lnn::tape::{Depth, Evaluation, STATES};
 use lnn::training::{Dataset, Method, Moments, Objective, Penalty, Update};
 use networks::architecture;
 use rand::{Rng, SeedableRng};
@@ -32,7 +33,7 @@ fn setup<S: Scalar>(n: usize, width: usize, batch: usize) -> Setup<S> {
 
 fn evaluation<S: Scalar>(c: &mut Criterion, n: usize, width: usize, batch: usize) {
     let Setup { architecture, weights, data } = setup::<S>(n, width, batch);
-    let mut chunk = Chunk::new(&architecture);
+    let mut chunk = Evaluation::new(architecture.model().lagrangian().clone());
     let mut group = c.benchmark_group("one thread");
     group.throughput(Throughput::Elements(batch as u64));
     for (name, depth) in [
@@ -43,7 +44,10 @@ fn evaluation<S: Scalar>(c: &mut Criterion, n: usize, width: usize, batch: usize
     ] {
         let id = BenchmarkId::new(name, format!("n{n} w{width} b{batch} {}", S::NAME));
         group.bench_function(id, |b| {
-            b.iter(|| chunk.evaluate(&weights, black_box(data.q()), black_box(data.v()), depth));
+            b.iter(|| {
+                let states = data.q().chunks(STATES * n).zip(data.v().chunks(STATES * n));
+                states.for_each(|(q, v)| chunk.evaluate(&weights, black_box(q), black_box(v), depth));
+            });
         });
     }
     group.finish();

@@ -99,7 +99,7 @@ fn ratios<S: Scalar>(_: &mut Criterion) {
             black_box(plain(black_box(&parameters), &data));
         };
         ratio::compare(&name("floats, eager gradient"), count, "at most 5", value, &mut eager);
-        let program = Program::<S>::record(6, 5, |_, x, p| vec![error(p, &x[..4], &x[4..])]).unwrap();
+        let program = Program::<S>::record(6, 5, |x, p| vec![error(p, &x[..4], &x[4..])]).unwrap();
         let mut replay = Replay::new(Arc::new(program));
         let (mut y, w, mut dp) = (vec![S::of_f64(0.0); count], vec![S::of_f64(1.0); count], [S::of_f64(0.0); 5]);
         let lanes = || {
@@ -138,7 +138,7 @@ fn pendulum<S: Scalar>(c: &mut Criterion) {
                 p.map(|p| adjoints.of(p))
             });
         });
-        let program = Program::<S>::record(6, 5, |_, x, p| vec![error(p, &x[..4], &x[4..])]).unwrap();
+        let program = Program::<S>::record(6, 5, |x, p| vec![error(p, &x[..4], &x[4..])]).unwrap();
         let mut replay = Replay::new(Arc::new(program));
         let (mut y, w) = (vec![S::of_f64(0.0); count], vec![S::of_f64(1.0); count]);
         let (mut dx, mut dp) = (vec![S::of_f64(0.0); 6 * count], [S::of_f64(0.0); 5]);
@@ -185,7 +185,7 @@ fn second_order(c: &mut Criterion) {
             lagrangian([z[0], z[1]], [z[2], z[3]])
         });
     });
-    let program = Program::<f64>::record(4, 0, |_, x, _| {
+    let program = Program::<f64>::record(4, 0, |x, _| {
         let z: [Jet2<Tracer<'_, f64>, 4>; 4] = std::array::from_fn(|i| Jet2::variable(x[i], i));
         let jet = lagrangian([z[0], z[1]], [z[2], z[3]]);
         jet.gradient

@@ -18,7 +18,7 @@ struct Misfit {
 }
 
 fn record() -> Result<Program<f64>, TapeError> {
-    Program::record(6, 3, |recorder, lane, p| {
+    Program::record(6, 3, |lane, p| {
         // Unit m1 and l1; derivatives by all of (q, v).
         let x: [Jet2<Tracer<f64>, 4>; 4] = std::array::from_fn(|i| Jet2::variable(lane[i], i));
         let [one, mass, length, gravity] = [Tracer::<f64>::one(), p[0], p[1], p[2]].map(Jet2::lift);
@@ -26,7 +26,9 @@ fn record() -> Result<Program<f64>, TapeError> {
         // M a = dL/dq - (d2L/dv dq) v
         let matrix: Vec<Tracer<f64>> = (0..4).map(|k| l.second(2 + k / 2, 2 + k % 2)).collect();
         let right = [0, 1].map(|i| l.gradient[i] - l.second(2 + i, 0) * lane[2] - l.second(2 + i, 1) * lane[3]);
-        let a = recorder.solve(&matrix, &right);
+        let determinant = matrix[0] * matrix[3] - matrix[1] * matrix[2];
+        let a = [matrix[3] * right[0] - matrix[1] * right[1], matrix[0] * right[1] - matrix[2] * right[0]];
+        let a = a.map(|a| a / determinant);
         vec![(a[0] - lane[4]).sqr() + (a[1] - lane[5]).sqr()]
     })
 }

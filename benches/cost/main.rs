@@ -11,9 +11,10 @@ mod products;
 mod turns;
 
 use lnn::lagrangian::{EulerLagrange, Request, Terms};
-use lnn::network::{Architecture, Chunk, Depth, Initialization, NetworkLagrangian, initial_weights};
+use lnn::network::{Architecture, Initialization, NetworkLagrangian, initial_weights};
 use lnn::rollout::{rollout_many, rollout_together};
 use lnn::scalar::Scalar;
+use lnn::tape::{Depth, Evaluation, STATES};
 use lnn::training::{Dataset, Objective, Penalty};
 use networks::architecture;
 use products::Products;
@@ -74,8 +75,12 @@ impl<S: Scalar> Setup<S> {
     }
 
     fn evaluation(&self, name: &str, depth: Depth) -> Work<'_> {
-        let mut chunk = Chunk::new(&self.architecture);
-        Work::new(name, move || chunk.evaluate(&self.weights, black_box(self.data.q()), self.data.v(), depth))
+        let mut chunk = Evaluation::new(self.architecture.model().lagrangian().clone());
+        let width = STATES * self.architecture.coordinates;
+        Work::new(name, move || {
+            let states = self.data.q().chunks(width).zip(self.data.v().chunks(width));
+            states.for_each(|(q, v)| chunk.evaluate(&self.weights, black_box(q), v, depth));
+        })
     }
 
     fn products(&self, name: &str, threads: usize) -> Work<'_> {

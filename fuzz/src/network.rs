@@ -5,8 +5,9 @@ use super::accuracy::{apart, cast, finite, largest};
 use super::bytes::{Bytes, Random};
 use super::nested::{Reference, reference};
 use lnn::lagrangian::{EulerLagrange, Request, Terms};
-use lnn::network::{Architecture, Chunk, Depth, InputLayer, Layout, NetworkLagrangian, Nonlinearity};
+use lnn::network::{Architecture, InputLayer, Layout, NetworkLagrangian, Nonlinearity};
 use lnn::scalar::{Dd, Scalar};
+use lnn::tape::{Depth, Evaluation};
 
 /// Most roundings that an error may have, in units of the condition.
 const R: f64 = 30.0;
@@ -73,7 +74,7 @@ fn fields(r: Reference<Dd>) -> [Vec<Dd>; 5] {
 
 fn derivatives(architecture: &Architecture, weights: &[f64], q: &[f64], v: &[f64]) {
     let n = architecture.coordinates;
-    let mut chunk = Chunk::new(architecture);
+    let mut chunk = Evaluation::new(architecture.model().lagrangian().clone());
     chunk.evaluate(weights, q, v, Depth::Motion);
     for state in 0..STATES {
         let row = state * n..(state + 1) * n;

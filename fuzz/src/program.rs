@@ -139,8 +139,8 @@ fn nested<S: Scalar>(
 
 /// By programs: the value's, and that of its derivative along `u`, replayed and swept on `lanes` equal states.
 fn replayed<S: Scalar>(f: &Expression, x: &[S], u: &[S], lanes: usize) -> Answer<S> {
-    let value = Program::record(INPUTS, VARIABLES - INPUTS, |_, x, p| vec![f.eval(&[x, p].concat(), |x| x)]);
-    let slope = Program::record(INPUTS, VARIABLES - INPUTS, |_, x, p| {
+    let value = Program::record(INPUTS, VARIABLES - INPUTS, |x, p| vec![f.eval(&[x, p].concat(), |x| x)]);
+    let slope = Program::record(INPUTS, VARIABLES - INPUTS, |x, p| {
         let point: Vec<Dual<_>> = x.iter().chain(p).zip(u).map(|(&x, &u)| Dual::new(x, Real::constant(u))).collect();
         vec![f.eval(&point, |x| x).tangent]
     });

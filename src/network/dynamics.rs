@@ -17,12 +17,16 @@ pub struct Model<S> {
 impl<S: Scalar> Model<S> {
     /// A model of `lagrangian`, whose scales and parameters are also those of `dissipation`; `periodic` coordinates are reduced
     /// to `[0, 2 pi)` before the functions see them.
-    pub fn new(
-        lagrangian: Arc<Recorded<S>>,
-        dissipation: Option<Arc<Recorded<S>>>,
-        periodic: Vec<bool>,
-    ) -> Self {
+    pub fn new(lagrangian: Arc<Recorded<S>>, dissipation: Option<Arc<Recorded<S>>>, periodic: Vec<bool>) -> Self {
         Self { lagrangian, dissipation, periodic }
+    }
+    /// The Lagrangian.
+    pub fn lagrangian(&self) -> &Arc<Recorded<S>> {
+        &self.lagrangian
+    }
+    /// The dissipation, if there is one.
+    pub fn dissipation(&self) -> Option<&Arc<Recorded<S>>> {
+        self.dissipation.as_ref()
     }
     /// Number of coordinates `n`.
     pub fn coordinates(&self) -> usize {
@@ -39,10 +43,6 @@ impl<S: Scalar> Model<S> {
     /// Offset among the parameters, rows and columns of every weight matrix of the Lagrangian, in order.
     pub fn matrices(&self) -> Vec<(usize, usize, usize)> {
         self.lagrangian.matrices()
-    }
-    /// Whether there is a dissipation.
-    pub fn dissipates(&self) -> bool {
-        self.dissipation.is_some()
     }
 }
 
@@ -100,7 +100,12 @@ impl<S: Scalar> Dynamics<S> {
         }
         self.lagrangian.evaluate(parameters, &self.wrapped, v, depth);
         let Some(dissipation) = self.dissipation.as_mut().filter(|_| forces) else { return };
-        dissipation.evaluate(parameters, &self.wrapped, v, if depth == Depth::Training { depth } else { Depth::Gradient });
+        dissipation.evaluate(
+            parameters,
+            &self.wrapped,
+            v,
+            if depth == Depth::Training { depth } else { Depth::Gradient },
+        );
         self.power.clear();
         let scale = dissipation.recorded().scale();
         let rows = dissipation.momentum.chunks_exact(n).zip(v.chunks_exact(n));

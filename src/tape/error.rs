@@ -35,16 +35,6 @@ pub enum TapeError {
     /// A reverse replay was asked for before a forward one.
     #[error("reverse replay without a forward replay before it")]
     NoForward,
-    /// A block operation was given blocks that do not fit.
-    #[error("{what}: expected {expected} rows, found {found}")]
-    Block {
-        /// Which operand.
-        what: &'static str,
-        /// Rows expected.
-        expected: usize,
-        /// Rows found.
-        found: usize,
-    },
 }
 
 /// `Ok` if a slice has the expected length.

@@ -19,8 +19,8 @@ pub mod shooting;
 mod signature;
 mod solver;
 mod stripes;
-mod violations;
 mod trainer;
+mod violations;
 
 pub use checkpoint::{
     CheckpointError, Every, Identity, Keeper, NEWEST, PREVIOUS, Restored, Saved, Snapshot, remove_checkpoints, saved,

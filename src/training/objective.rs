@@ -14,12 +14,12 @@
 use crate::linalg::{self, Workspace, solve};
 use crate::network::{Architecture, Dynamics, Model};
 use crate::scalar::{Real, Scalar, Sum};
+use crate::tape::{Depth, MixedDirections, STATES};
 use crate::training::dataset::Dataset;
 use crate::training::penalty::Penalty;
 use crate::training::signature::{
     Buffers, Violation, characteristic_scales, eigenvalue_violation, has_signature, sylvester_violation,
 };
-use crate::tape::{Depth, MixedDirections, STATES};
 use crate::training::stripes::sum_gradients;
 use crate::training::violations::Violations;
 use rayon::prelude::*;

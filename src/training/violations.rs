@@ -64,11 +64,8 @@ impl<S: Scalar> Violations<S> {
             let dynamics = self.dynamics.get_or_insert_with(|| Dynamics::new(&self.model));
             dynamics.evaluate(weights, &self.q[from..], &self.v[from..], Depth::Training, false);
             let tail = |list: &mut Vec<S>| list.split_off(from);
-            let chunk = MixedDirections {
-                s: tail(&mut self.directions.s),
-                t: tail(&mut self.directions.t),
-                moving: false,
-            };
+            let chunk =
+                MixedDirections { s: tail(&mut self.directions.s), t: tail(&mut self.directions.t), moving: false };
             self.q.truncate(from);
             self.v.truncate(from);
             dynamics.add_gradient(weights, &chunk, gradient, None);

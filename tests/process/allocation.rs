@@ -16,13 +16,10 @@ fn replay_and_reused_tape_allocate_nothing() {
     }
     assert!(allocations(|| drop(std::hint::black_box(vec![1u8; 100]))) > 0, "the counter counts");
 
-    let program = Program::<f64>::record(3, 12, |recorder, x, p| {
-        let block = recorder.pack(&[x[0], x[1], x[0] * p[0], x[2].sin()], 2);
-        let hidden = recorder.affine(block, 3, 2, Some(8));
-        let matrix = [x[0].exp() + p[1], x[1], x[1], x[2].cosh()];
-        let solution = recorder.solve(&matrix, &[hidden.get(0, 0), hidden.get(1, 1)]);
-        let (values, vectors) = recorder.symmetric_eigen(2, &matrix);
-        vec![solution[0] * solution[1], values[0], vectors[1] + p[11]]
+    let program = Program::<f64>::record(3, 12, |x, p| {
+        let hidden = (x[0] * p[0] + x[2].sin() * p[8]).tanh();
+        let determinant = (x[0].exp() + p[1]) * x[2].cosh() - x[1].sqr();
+        vec![hidden / determinant, x[1].atan2(hidden), x[0].select(hidden, x[2]) + p[11]]
     })
     .unwrap();
     let lanes = 100;

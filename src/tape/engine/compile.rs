@@ -49,7 +49,8 @@ impl<S: Scalar> Recorded<S> {
         let output = compiler.run(output);
         let Compiler { operations, mut values, inputs, slopes, functions, .. } = compiler;
         mark(&operations, &mut values, output);
-        let forward = [Depth::Gradient, Depth::MassMatrix, Depth::Motion].map(|depth| Layout::forward(&values, depth, n));
+        let forward =
+            [Depth::Gradient, Depth::MassMatrix, Depth::Motion].map(|depth| Layout::forward(&values, depth, n));
         let mixed = [Order::First, Order::Second].map(|order| Layout::new(&values, |value| value.mixed(order).count));
         let adjoint = Layout::new(&values, |_| 1);
         Ok(Self { operations, values, output, inputs, scale, parameters, slopes, functions, forward, adjoint, mixed })

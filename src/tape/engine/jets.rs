@@ -30,7 +30,11 @@ pub(super) fn jets<S: Scalar>(f: Unary, order: usize, x: &[S], y: &mut [S], [d1,
         _ if order == 0 => y.iter_mut().zip(x).for_each(|(y, &x)| *y = f.value(x)),
         Unary::Sin | Unary::Cos => {
             let (other, sign) = (d1, if f == Unary::Sin { S::of_f64(1.0) } else { S::of_f64(-1.0) });
-            if f == Unary::Sin { sin_cos_lanes(x, y, other) } else { sin_cos_lanes(x, other, y) }
+            if f == Unary::Sin {
+                sin_cos_lanes(x, y, other)
+            } else {
+                sin_cos_lanes(x, other, y)
+            }
             for (k, &y) in y.iter().enumerate() {
                 other[k] = sign * other[k];
                 if order > 1 {

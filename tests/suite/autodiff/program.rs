@@ -1,8 +1,8 @@
 //! Replayed programs against the eager tape, block operations against the same thing in scalars.
 
 use lnn::forward::{Dual, HyperDual};
-use lnn::scalar::{Dd, Real, Scalar};
-use lnn::tape::{JetFunction, JetKind, Program, Replay, ScalarFunction, TapeError, Tracer, gradient};
+use lnn::scalar::{Real, Scalar};
+use lnn::tape::{Program, Replay, ScalarFunction, TapeError, Tracer, gradient};
 use std::sync::Arc;
 
 /// Numbers in `(-1, 1)`, the same every time.
@@ -57,7 +57,7 @@ impl ScalarFunction for Mixture {
 #[test]
 fn replay_agrees_with_the_eager_tape_lane_by_lane() {
     let record = || {
-        Program::<f64>::record(2, 3, |_, x, p| {
+        Program::<f64>::record(2, 3, |x, p| {
             let z = [x[0], x[1], p[0], p[1], p[2]];
             vec![Mixture.eval(&z), x[0] * p[0], p[1] * p[2]]
         })
@@ -92,7 +92,7 @@ fn replay_agrees_with_the_eager_tape_lane_by_lane() {
 #[test]
 fn forward_numbers_ride_on_programs_and_records_are_lean() {
     // d/dx of x^2 sin p, written twice: the second costs nothing; nor does what no output needs.
-    let program = Program::<f64>::record(1, 1, |_, x, p| {
+    let program = Program::<f64>::record(1, 1, |x, p| {
         let f = |x| {
             let x = Dual::new(x, Tracer::one());
             (x * x * Dual::lift(p[0].sin())).tangent
@@ -111,7 +111,7 @@ fn forward_numbers_ride_on_programs_and_records_are_lean() {
 
 #[test]
 fn dead_lanes_and_nan() {
-    let program = Program::<f64>::record(1, 0, |_, x, _| vec![x[0].select(x[0].sqrt().ln(), Real::zero())]).unwrap();
+    let program = Program::<f64>::record(1, 0, |x, _| vec![x[0].select(x[0].sqrt().ln(), Real::zero())]).unwrap();
     let [y, dx, _] = run(program, 4, &[0.0, -1.0, 4.0, f64::NAN], &[], &[1.0; 4]);
     assert_eq!(y[..3], [0.0, 0.0, 2.0f64.ln()]);
     assert_eq!(dx[..3], [0.0, 0.0, 0.125]);
@@ -120,21 +120,14 @@ fn dead_lanes_and_nan() {
 
 #[test]
 fn errors_are_typed() {
-    let program = Program::<f64>::record(2, 1, |_, x, p| vec![x[0] * x[1] + p[0]]).unwrap();
+    let program = Program::<f64>::record(2, 1, |x, p| vec![x[0] * x[1] + p[0]]).unwrap();
     let mut replay = Replay::new(Arc::new(program));
     assert_eq!(replay.reverse(&[], &mut [], &mut [0.0]), Err(TapeError::NoForward));
     let short = replay.forward(2, &[1.0; 3], &[1.0], &mut [0.0; 2]);
     assert_eq!(short, Err(TapeError::Shape { what: "inputs", expected: 4, found: 3 }));
-    let unfit = Program::<f64>::record(2, 1, |recorder, x, _| recorder.solve(x, &[x[0], x[1]]));
-    assert_eq!(unfit.map(|_| ()), Err(TapeError::Block { what: "matrix of a solve", expected: 4, found: 2 }));
-    let unfit = Program::<f64>::record(2, 5, |recorder, x, _| {
-        let y = recorder.affine(recorder.pack(x, 1), 3, 0, None);
-        vec![y.get(0, 0)]
-    });
-    assert_eq!(unfit.map(|_| ()), Err(TapeError::Block { what: "parameters of an affine map", expected: 6, found: 5 }));
     let mut foreign = Ok(());
-    let outer = Program::<f64>::record(1, 0, |_, x, _| {
-        foreign = Program::<f64>::record(1, 0, |_, y, _| {
+    let outer = Program::<f64>::record(1, 0, |x, _| {
+        foreign = Program::<f64>::record(1, 0, |y, _| {
             let _ = y[0] * x[0];
             vec![y[0]]
         })
@@ -144,157 +137,11 @@ fn errors_are_typed() {
     assert_eq!((outer.map(|_| ()), foreign), (Err(TapeError::MixedTapes), Err(TapeError::MixedTapes)));
 }
 
-/// `tanh` with its derivatives.
-#[derive(Debug)]
-struct Tanh;
-impl<S: Scalar> JetFunction<S> for Tanh {
-    fn derivatives(&self, x: S) -> [S; 4] {
-        let (y, one, two) = (x.tanh(), <S as Real>::one(), <S as Real>::two());
-        let d = one - y * y;
-        let s = -two * y * d;
-        [y, d, s, -two * (d * d + y * s)]
-    }
-}
-
-/// A layer `tanh(W x + b)` on three inputs, its outputs weighted by `c`: parameters `W (2,3)`, `b (2)`.
-fn layer<R: Real>(p: &[R], x: &[R]) -> [R; 2] {
-    [0, 1].map(|i| (p[3 * i] * x[0] + p[3 * i + 1] * x[1] + p[3 * i + 2] * x[2] + p[6 + i]).tanh())
-}
-
-fn jets_agree<S: Scalar>(tolerance: f64) {
-    let lanes = 70;
-    let p = numbers::<S>(8, 4);
-    // Mixed: inputs (value, s, t, st) of three coordinates.
-    let block = Program::<S>::record(12, 8, |recorder, x, _| {
-        let z = recorder.affine(recorder.pack(x, 4), 2, 0, Some(6));
-        let h = recorder.jet(z, JetKind::Mixed, Arc::new(Tanh));
-        (0..8).map(|i| h.get(i / 4, i % 4)).collect()
-    })
-    .unwrap();
-    let scalar = Program::<S>::record(12, 8, |_, x, p| {
-        let x: Vec<_> = x.chunks(4).map(|c| HyperDual::new(c[0], c[1], c[2], c[3])).collect();
-        let p: Vec<_> = p.iter().map(|&p| HyperDual::lift(p)).collect();
-        layer(&p, &x).into_iter().flat_map(|h| [h.value, h.s, h.t, h.st]).collect()
-    })
-    .unwrap();
-    let (x, w) = (numbers::<S>(12 * lanes, 5), numbers::<S>(8 * lanes, 6));
-    for (a, b) in run(block, lanes, &x, &p, &w).iter().zip(&run(scalar, lanes, &x, &p, &w)) {
-        close(a, b, tolerance);
-    }
-    // Two tangents: inputs (value, t1, t2).
-    let block = Program::<S>::record(9, 8, |recorder, x, _| {
-        let z = recorder.affine(recorder.pack(x, 3), 2, 0, Some(6));
-        let h = recorder.jet(z, JetKind::Tangents(2), Arc::new(Tanh));
-        (0..6).map(|i| h.get(i / 3, i % 3)).collect()
-    })
-    .unwrap();
-    let scalar = Program::<S>::record(9, 8, |_, x, p| {
-        let along = |k: usize| {
-            let x: Vec<_> = x.chunks(3).map(|c| Dual::new(c[0], c[k])).collect();
-            layer(&p.iter().map(|&p| Dual::lift(p)).collect::<Vec<_>>(), &x)
-        };
-        let (first, second) = (along(1), along(2));
-        (0..2).flat_map(|i| [first[i].value, first[i].tangent, second[i].tangent]).collect()
-    })
-    .unwrap();
-    let (x, w) = (numbers::<S>(9 * lanes, 7), numbers::<S>(6 * lanes, 8));
-    for (a, b) in run(block, lanes, &x, &p, &w).iter().zip(&run(scalar, lanes, &x, &p, &w)) {
-        close(a, b, tolerance);
-    }
-}
-
-#[test]
-fn affine_maps_and_jets_agree_with_scalars() {
-    jets_agree::<f32>(3e-5);
-    jets_agree::<f64>(1e-13);
-    jets_agree::<Dd>(1e-28);
-}
-
-#[test]
-fn solve_agrees_with_cramer() {
-    fn check<S: Scalar>(tolerance: f64) {
-        let block = Program::<S>::record(6, 0, |recorder, x, _| recorder.solve(&x[..4], &x[4..])).unwrap();
-        let cramer = Program::<S>::record(6, 0, |_, x, _| {
-            let det = x[0] * x[3] - x[1] * x[2];
-            vec![(x[4] * x[3] - x[1] * x[5]) / det, (x[0] * x[5] - x[4] * x[2]) / det]
-        })
-        .unwrap();
-        let lanes = 66;
-        let mut x = numbers::<S>(6 * lanes, 9);
-        for state in x.chunks_mut(6) {
-            // Off-diagonally dominant: a pivot is needed.
-            state[0] *= S::of_f64(0.01);
-            state[1] += S::of_f64(3.0);
-            state[2] -= S::of_f64(3.0);
-        }
-        let w = numbers::<S>(2 * lanes, 10);
-        for (a, b) in run(block, lanes, &x, &[], &w).iter().zip(&run(cramer, lanes, &x, &[], &w)) {
-            close(a, b, tolerance);
-        }
-    }
-    check::<f64>(1e-14);
-    check::<Dd>(1e-29);
-}
-
-#[test]
-fn eigenvalue_penalty_is_right_at_repeated_eigenvalues() {
-    // sum relu(-l): its gradient is minus the projector on the negative subspace.
-    let penalty = |n: usize| {
-        Program::<f64>::record(n * n, 0, |recorder, x, _| {
-            let (values, _) = recorder.symmetric_eigen(n, x);
-            vec![values.into_iter().fold(Tracer::zero(), |sum, l| sum + (-l).relu())]
-        })
-        .unwrap()
-    };
-    for n in 1..5 {
-        let minus: Vec<f64> = (0..n * n).map(|i| if i % (n + 1) == 0 { -1.0 } else { 0.0 }).collect();
-        let [y, dx, _] = run(penalty(n), 1, &minus, &[], &[1.0]);
-        assert_eq!(y[0], n as f64);
-        assert_eq!(dx, minus);
-        // -2 I + 2^-k E, E the matrix of ones: all negative still.
-        let split: Vec<f64> = minus.iter().map(|m| 2.0 * m + 2f64.powi(-40)).collect();
-        let [_, dx, _] = run(penalty(n), 1, &split, &[], &[1.0]);
-        close(&dx, &minus, 30.0 * f64::EPSILON);
-    }
-    // diag(-1, 1, 1) and a reflection with eigenvalues -1, 1, 1.
-    let third = 1.0 / 3.0;
-    let reflection: Vec<f64> = (0..9).map(|i| if i % 4 == 0 { third } else { -2.0 * third }).collect();
-    let [y, dx, _] = run(penalty(3), 1, &reflection, &[], &[1.0]);
-    close(&y, &[1.0], 4.0 * f64::EPSILON);
-    close(&dx, &[-third; 9], 30.0 * f64::EPSILON);
-}
-
-#[test]
-fn eigenvector_adjoints_agree_with_differences_in_double_double() {
-    let n = 3;
-    let record = || {
-        Program::<Dd>::record(6, 0, |recorder, x, _| {
-            let matrix = [x[0], x[1], x[2], x[1], x[3], x[4], x[2], x[4], x[5]];
-            let (values, vectors) = recorder.symmetric_eigen(n, &matrix);
-            [values, vectors].concat()
-        })
-        .unwrap()
-    };
-    let (x, w) = (numbers::<Dd>(6, 11), numbers::<Dd>(12, 12));
-    let [_, dx, _] = run(record(), 1, &x, &[], &w);
-    let h = Dd::of_f64(1e-8);
-    for i in 0..6 {
-        let weighted = |step: Dd| {
-            let mut x = x.clone();
-            x[i] += step;
-            let [y, _, _] = run(record(), 1, &x, &[], &w);
-            y.iter().zip(&w).fold(Dd::of_f64(0.0), |sum, (&y, &w)| sum + y * w)
-        };
-        let difference = (weighted(h) - weighted(-h)) / (h + h);
-        assert!((difference - dx[i]).to_f64().abs() < 1e-13, "{i}: {difference:?} {:?}", dx[i]);
-    }
-}
-
 #[test]
 fn fields_give_what_rows_give() {
     // Three inputs from two fields, three outputs to two fields and one that is left out; a chunk and a part of one.
     let lanes = 70;
-    let program = Program::<f64>::record(3, 2, |_, x, p| vec![x[0] * p[0] + x[2], x[1].sin() * p[1], p[0]]).unwrap();
+    let program = Program::<f64>::record(3, 2, |x, p| vec![x[0] * p[0] + x[2], x[1].sin() * p[1], p[0]]).unwrap();
     let (rows, p) = (numbers::<f64>(3 * lanes, 21), numbers::<f64>(2, 22));
     let column = |from: usize, width: usize| -> Vec<f64> {
         rows.chunks(3).flat_map(|row| row[from..from + width].to_vec()).collect()
@@ -328,7 +175,7 @@ fn assorted<R: Real>(x: &[R], p: &[R]) -> [R; 2] {
 
 #[test]
 fn an_interpreted_program_is_the_recorded_function_of_any_number() {
-    let program = Program::<f64>::record(2, 1, |_, x, p| assorted(x, p).to_vec()).unwrap();
+    let program = Program::<f64>::record(2, 1, |x, p| assorted(x, p).to_vec()).unwrap();
     let (x, p) = ([0.3, -0.8], [1.7]);
     assert_eq!(program.interpret(&x, &p).unwrap(), assorted(&x, &p));
     let seeded = [HyperDual::new(0.3, 1.0, 0.5, 0.0), HyperDual::new(-0.8, 0.0, 2.0, 1.0)];
@@ -338,14 +185,9 @@ fn an_interpreted_program_is_the_recorded_function_of_any_number() {
         close(&[a.value, a.s, a.t, a.st], &[b.value, b.s, b.t, b.st], 4e-16);
     }
     // Recorded again it is the same program.
-    let again = Program::<f64>::record(2, 1, |_, x, p| program.interpret(x, p).unwrap()).unwrap();
+    let again = Program::<f64>::record(2, 1, |x, p| program.interpret(x, p).unwrap()).unwrap();
     assert_eq!(again.lane_operations(), program.lane_operations());
     assert_eq!(again.interpret(&x, &p).unwrap(), assorted(&x, &p));
     let wrong = program.interpret(&x[..1], &p).unwrap_err();
     assert_eq!(wrong, TapeError::Shape { what: "inputs", expected: 2, found: 1 });
-    let blocks = Program::<f64>::record(2, 6, |recorder, x, _| {
-        let block = recorder.pack(x, 1);
-        vec![recorder.affine(block, 1, 2, None).get(0, 0)]
-    });
-    assert!(matches!(blocks.unwrap().interpret(&x, &[0.0; 6]), Err(TapeError::Block { .. })));
 }

@@ -371,7 +371,7 @@ fn branches_on_values_are_refused_in_programs_only() {
         }
     }
     assert_eq!(gradient(&Branch, &[-3.0]).unwrap(), (3.0, vec![-1.0]));
-    let refused = Program::<f64>::record(1, 0, |_, x, _| vec![Branch.eval(x)]);
+    let refused = Program::<f64>::record(1, 0, |x, _| vec![Branch.eval(x)]);
     assert_eq!(refused.map(|_| ()), Err(TapeError::DataDependentBranch));
     assert!(TapeError::DataDependentBranch.to_string().contains("select"));
 }

@@ -30,7 +30,8 @@ const _: () = {
     shared::<Options<f64>>();
     shared::<recording::Recording>();
     shared::<linalg::Workspace<f64>>();
-    shared::<network::Chunk<f32>>();
+    shared::<network::Dynamics<f32>>();
+    shared::<lnn::tape::Evaluation<f32>>();
 
     error::<lnn::lagrangian::MechanicsError>();
     error::<lnn::lagrangian::SystemError>();

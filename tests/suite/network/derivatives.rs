@@ -3,12 +3,9 @@
 use crate::common::accuracy::cast;
 use crate::common::nested::reference;
 use crate::common::{of_scalar, properties};
-use lnn::network::{
-    Adjoint, Architecture, Chunk, Depth, Initialization, InputLayer, Jets, Layout, LinearMap, Nonlinearity,
-    initial_weights,
-};
+use lnn::network::{Architecture, Initialization, InputLayer, Layout, LinearMap, Nonlinearity, initial_weights};
 use lnn::scalar::{Dd, Real, Scalar};
-use lnn::tape::{ScalarFunction, gradient};
+use lnn::tape::{Depth, Evaluation, MixedDirections, ScalarFunction, gradient};
 use proptest::prelude::*;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -64,6 +61,13 @@ fn draw<S: Scalar>(case: &Case, batch: usize) -> (Vec<S>, Vec<S>, Vec<S>) {
     (weights, states(4.0), states(3.0))
 }
 
+/// A network's Lagrangian on a chunk of states.
+fn evaluated<S: Scalar>(architecture: &Architecture, weights: &[S], [q, v]: [&[S]; 2], depth: Depth) -> Evaluation<S> {
+    let mut evaluation = Evaluation::new(architecture.model().lagrangian().clone());
+    evaluation.evaluate(weights, q, v, depth);
+    evaluation
+}
+
 /// Largest difference over the largest magnitude.
 fn difference<S: Scalar>(found: &[S], expected: &[S]) -> f64 {
     let (size, error) = (largest(expected), apart(found, expected));
@@ -94,8 +98,7 @@ fn expected_outputs(architecture: &Architecture, [weights, q, v]: [&[Dd]; 3]) ->
 fn forward_identity<S: Scalar>(case: &Case) {
     let n = case.architecture.coordinates;
     let (weights, q, v) = draw::<S>(case, 3);
-    let mut chunk = Chunk::new(&case.architecture);
-    chunk.evaluate(&weights, &q, &v, Depth::Motion);
+    let chunk = evaluated(&case.architecture, &weights, [&q, &v], Depth::Motion);
     let mut rng = ChaCha8Rng::seed_from_u64(case.seed ^ 2);
     let step = 2f64.powi(-40);
     let mut moved = |x: &[Dd]| -> Vec<Dd> {
@@ -134,7 +137,7 @@ struct SumOfCoefficients<'a, S> {
     architecture: &'a Architecture,
     q: &'a [S],
     v: &'a [S],
-    jets: [&'a Jets<S>; 2],
+    jets: [&'a (Vec<usize>, MixedDirections<S>); 2],
 }
 
 impl<S: Scalar> ScalarFunction for SumOfCoefficients<'_, S> {
@@ -142,8 +145,8 @@ impl<S: Scalar> ScalarFunction for SumOfCoefficients<'_, S> {
         let n = self.architecture.coordinates;
         let constant = |x: &[S]| -> Vec<R> { x.iter().map(|&x| of_scalar(x)).collect() };
         let mut total = R::zero();
-        for jets in self.jets {
-            for (j, &state) in jets.state.iter().enumerate() {
+        for (states, jets) in self.jets {
+            for (j, &state) in states.iter().enumerate() {
                 let row = state * n..(state + 1) * n;
                 let r = reference(self.architecture, weights, &constant(&self.q[row.clone()]), &constant(&self.v[row]));
                 let (s, t) = (constant(&jets.s[j * n..][..n]), constant(&jets.t[j * n..][..n]));
@@ -168,14 +171,14 @@ fn adjoint_identity<S: Scalar>(case: &Case, tolerance: f64) {
     let (weights, q, v) = draw::<S>(case, 2);
     let mut rng = ChaCha8Rng::seed_from_u64(case.seed ^ 1);
     let mut vector = |count: usize| -> Vec<S> { (0..count).map(|_| S::of_f64(rng.random_range(-1.0..1.0))).collect() };
-    let moving = Jets { state: vec![0, 1], s: vector(2 * n), t: vector(2 * n), moving: true };
-    let still = Jets { state: vec![1, 0, 1], s: vector(3 * n), t: vector(3 * n), moving: false };
-    let mut chunk = Chunk::new(architecture);
-    chunk.evaluate(&weights, &q, &v, Depth::Training);
-    let mut adjoint = Adjoint::new(&chunk);
+    let moving = (vec![0, 1], MixedDirections { s: vector(2 * n), t: vector(2 * n), moving: true });
+    let still = (vec![1, 0, 1], MixedDirections { s: vector(3 * n), t: vector(3 * n), moving: false });
     let mut found = vec![<S as Real>::zero(); weights.len()];
-    adjoint.add_gradient(&chunk, &weights, &moving, &mut found);
-    adjoint.add_gradient(&chunk, &weights, &still, &mut found);
+    for (states, directions) in [&moving, &still] {
+        let of = |x: &[S]| -> Vec<S> { states.iter().flat_map(|&k| x[k * n..(k + 1) * n].to_vec()).collect() };
+        let mut evaluation = evaluated(architecture, &weights, [&of(&q), &of(&v)], Depth::Training);
+        evaluation.add_gradient(&weights, directions, &mut found, None);
+    }
 
     let sum = SumOfCoefficients { architecture, q: &q, v: &v, jets: [&moving, &still] };
     let (_, expected) = gradient(&sum, &weights).unwrap();
@@ -251,9 +254,8 @@ fn a_hybrid_is_the_sum_of_its_branches() {
     for case in models().filter(|case| case.architecture.activation == Nonlinearity::QuadraticSoftplus) {
         let (weights, q, v) = draw::<f64>(&case, 3);
         let evaluate = |architecture: &Architecture, weights: &[f64]| {
-            let mut chunk = Chunk::new(architecture);
-            chunk.evaluate(weights, &q, &v, Depth::Motion);
-            [chunk.lagrangian, chunk.momentum, chunk.dl_dq, chunk.mass_matrix, chunk.coriolis].concat()
+            let chunk = evaluated(architecture, weights, [&q, &v], Depth::Motion);
+            [&chunk.lagrangian[..], &chunk.momentum, &chunk.dl_dq, &chunk.mass_matrix, &chunk.coriolis].concat()
         };
         let half = |activation, alpha| {
             let hidden = case.architecture.hidden.iter().map(|w| w / 2).collect();
@@ -285,8 +287,7 @@ fn dynamic_tanh_stands_before_the_first_dense_layer() {
     let (a, gamma, beta, row, bias, output) = (0.7, [1.5, -0.5], [0.25, 0.1], [0.3, -1.1], 0.6, 2.0);
     let weights = [&[a][..], &gamma, &beta, &row, &[bias, output]].concat();
     let (q, v) = (1.2, -3.0);
-    let mut chunk = Chunk::new(&plain);
-    chunk.evaluate(&weights, &[q], &[v], Depth::Value);
+    let chunk = evaluated(&plain, &weights, [&[q], &[v]], Depth::Value);
     let feature = |i: usize, x: f64| gamma[i] * (a * x / 2.0).tanh() + beta[i];
     let z = row[0] * feature(0, q) + row[1] * feature(1, v) + bias;
     let expected = output * z * z + 0.5 * (v / 2.0) * (v / 2.0);
@@ -332,11 +333,7 @@ fn shallower_evaluations_give_the_same_numbers() {
         seed: 5,
     };
     let (weights, q, v) = draw::<f64>(&case, 4);
-    let run = |depth| {
-        let mut chunk = Chunk::new(&case.architecture);
-        chunk.evaluate(&weights, &q, &v, depth);
-        chunk
-    };
+    let run = |depth| evaluated(&case.architecture, &weights, [&q, &v], depth);
     let whole = run(Depth::Training);
     let same = |a: &[f64], b: &[f64]| assert!(difference(a, b) < 1e-14);
     same(&run(Depth::Value).lagrangian, &whole.lagrangian);
@@ -369,8 +366,7 @@ fn the_added_term_follows_the_time_like_coordinate() {
     let (q, v) = ([0.3, -0.4, 0.5], [6.0, 8.0, -1.0]);
     for (time_like, signs) in [(None, [1.0; 3]), (Some(0), [-1.0, 1.0, 1.0]), (Some(2), [1.0, 1.0, -1.0])] {
         let architecture = Architecture { time_like, ..plain.clone() };
-        let mut chunk = Chunk::new(&architecture);
-        chunk.evaluate(&weights, &q, &v, Depth::Motion);
+        let chunk = evaluated(&architecture, &weights, [&q, &v], Depth::Motion);
         // Scaled velocities 3, 2, -1.
         let [a, b, c] = signs;
         assert_eq!(chunk.lagrangian, [1.5 * (9.0 * a + 4.0 * b + c)]);

@@ -8,12 +8,11 @@ use lnn::forward::HyperDual;
 use lnn::lagrangian::{EulerLagrange, Request, Terms};
 use lnn::linalg::Workspace;
 use lnn::network::{
-    Architecture, Chunk, Depth, Dissipation, Initialization, InputLayer, Layout, NetworkLagrangian, Nonlinearity,
-    initial_weights,
+    Architecture, Initialization, InputLayer, Layout, NetworkLagrangian, Nonlinearity, initial_weights,
 };
 use lnn::rollout::{Method, Options, RolloutError, rollout, rollout_fixed, rollout_together};
 use lnn::scalar::{Dd, Real, Scalar};
-use lnn::tape::{ScalarFunction, gradient};
+use lnn::tape::{Depth, Evaluation, MixedDirections, ScalarFunction, gradient};
 use lnn::training::{
     Config, Data, Dataset, Datasets, Hooks, Method as Update, Network, OnFailure, Optimizer, Phase, Precision,
     Regularizer, Scaling, Schedule, train,
@@ -156,14 +155,13 @@ fn gradients_are_accurate<S: Scalar>(case: &Case) {
     let mut rng = ChaCha8Rng::seed_from_u64(case.seed ^ 1);
     let states = [2, 0, 2];
     let u: Vec<S> = (0..3 * n).map(|_| S::of_f64(rng.random_range(-1.0..1.0))).collect();
-    let mut chunk = Chunk::new(architecture);
-    chunk.evaluate(&weights, &q, &v, Depth::Value);
-    let mut dissipation = Dissipation::new(&chunk).unwrap();
-    dissipation.evaluate(&chunk, &weights);
+    let rows = |x: &[S]| -> Vec<S> { states.iter().flat_map(|&k| x[k * n..(k + 1) * n].to_vec()).collect() };
+    let mut dissipation = Evaluation::new(architecture.model().dissipation().unwrap().clone());
+    dissipation.evaluate(&weights, &rows(&q), &rows(&v), Depth::Training);
     let zeros = |length: usize| vec![<S as Real>::zero(); length];
     let (mut found, mut dq, mut dv) = (zeros(weights.len()), zeros(3 * n), zeros(3 * n));
-    dissipation.add_gradient(&chunk, &weights, &states, &u, &mut found);
-    dissipation.add_input_gradient(&chunk, &weights, &states, &u, (&mut dq, &mut dv));
+    let directions = MixedDirections { s: u.clone(), t: u.clone(), moving: true };
+    dissipation.add_momentum_gradient(&weights, &directions, &mut found, Some((&mut dq, &mut dv)));
 
     let scaled = |x: &[S]| -> Vec<Dd> {
         let rows = states.iter().flat_map(|&state| x[state * n..(state + 1) * n].iter().enumerate());
@@ -173,15 +171,7 @@ fn gradients_are_accurate<S: Scalar>(case: &Case) {
     let point = [cast(&weights), scaled(&q), scaled(&v)].concat();
     let by_part = |point: &[Dd]| -> [Vec<Dd>; 3] {
         let (_, all) = gradient(&Along { architecture, weights: count, u: &wide }, point).unwrap();
-        // Rows of the same state add up.
-        let by_state = |rows: &[Dd]| {
-            let mut sum = vec![<Dd as Real>::zero(); 3 * n];
-            for (row, &state) in rows.chunks_exact(n).zip(&states) {
-                sum[state * n..(state + 1) * n].iter_mut().zip(row).for_each(|(sum, &x)| *sum += x);
-            }
-            sum
-        };
-        [all[..count].to_vec(), by_state(&all[count..count + 3 * n]), by_state(&all[count + 3 * n..])]
+        [all[..count].to_vec(), all[count..count + 3 * n].to_vec(), all[count + 3 * n..].to_vec()]
     };
     let expected = by_part(&point);
     let perturbed: Vec<_> = (0..6).map(|_| by_part(&perturb(&point, &mut rng))).collect();

@@ -135,7 +135,7 @@ fn kinks<S: Scalar>() {
             assert!(all.iter().all(|&d| d == zero), "{all:?}");
             checks += all.len();
             for lanes in [1, 70] {
-                let program = Program::<S>::record(1, 0, |_, x, _| vec![kink.eval(x)]).unwrap();
+                let program = Program::<S>::record(1, 0, |x, _| vec![kink.eval(x)]).unwrap();
                 let mut replay = Replay::new(Arc::new(program));
                 let mut slopes = vec![S::NAN; lanes];
                 replay.forward(lanes, &vec![x; lanes], &[], &mut vec![S::NAN; lanes]).unwrap();

@@ -180,7 +180,7 @@ fn case_09_adjoint_identity_and_symmetry() {
 fn long_programs<S: Scalar>() {
     let one = S::of_f64(1.0);
     let length = 100_000;
-    let chain = Program::<S>::record(2, 0, |_, x, _| vec![(0..length).fold(x[0], |y, _| y * x[1])]).unwrap();
+    let chain = Program::<S>::record(2, 0, |x, _| vec![(0..length).fold(x[0], |y, _| y * x[1])]).unwrap();
     // The two inputs count too.
     assert_eq!(chain.lane_operations(), length + 2);
     let mut replay = Replay::new(Arc::new(chain));
@@ -188,15 +188,14 @@ fn long_programs<S: Scalar>() {
     replay.forward(1, &[one, one], &[], &mut y).unwrap();
     replay.reverse(&[one], &mut dx, &mut []).unwrap();
     assert_eq!((y[0], dx), (one, [one, S::of_f64(length as f64)]));
-    let fan =
-        Program::<S>::record(1, 0, |_, x, _| vec![(0..length).fold(Tracer::zero(), |sum, _| sum + x[0])]).unwrap();
+    let fan = Program::<S>::record(1, 0, |x, _| vec![(0..length).fold(Tracer::zero(), |sum, _| sum + x[0])]).unwrap();
     let mut replay = Replay::new(Arc::new(fan));
     replay.forward(1, &[one], &[], &mut y).unwrap();
     replay.reverse(&[one], &mut dx[..1], &mut []).unwrap();
     assert_eq!((y[0], dx[0]), (S::of_f64(length as f64), S::of_f64(length as f64)));
 
     let lanes = 65;
-    let program = Program::<S>::record(2, 1, |_, x, p| {
+    let program = Program::<S>::record(2, 1, |x, p| {
         vec![(0..50).fold(x[0], |y, k| if k % 5 == 0 { (y * p[0]).sin() } else { y * x[1] })]
     });
     let mut replay = Replay::new(Arc::new(program.unwrap()));

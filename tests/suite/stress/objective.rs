@@ -1,8 +1,9 @@
 //! Networks and batches that the cases of training share.
 
 use crate::common::accuracy::cast;
-use lnn::network::{Architecture, Chunk, Depth, Initialization, InputLayer, Nonlinearity, initial_weights};
+use lnn::network::{Architecture, Initialization, InputLayer, Nonlinearity, initial_weights};
 use lnn::scalar::{Dd, Scalar};
+use lnn::tape::{Depth, Evaluation, STATES};
 use lnn::training::{BatchReport, Dataset, Objective, Penalty};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -52,7 +53,12 @@ pub fn all_rows(count: usize) -> Vec<u32> {
 
 /// Scaled mass matrices of all states, in double-double.
 pub fn mass_matrices<S: Scalar>(architecture: &Architecture, weights: &[S], data: &Dataset<S>) -> Vec<Dd> {
-    let mut chunk = Chunk::<Dd>::new(architecture);
-    chunk.evaluate(&cast::<S, Dd>(weights), &cast::<S, Dd>(data.q()), &cast::<S, Dd>(data.v()), Depth::MassMatrix);
-    chunk.mass_matrix
+    let mut chunk = Evaluation::<Dd>::new(architecture.model().lagrangian().clone());
+    let (weights, width) = (cast::<S, Dd>(weights), STATES * architecture.coordinates);
+    let states = data.q().chunks(width).zip(data.v().chunks(width));
+    let matrices = states.flat_map(|(q, v)| {
+        chunk.evaluate(&weights, &cast::<S, Dd>(q), &cast::<S, Dd>(v), Depth::MassMatrix);
+        chunk.mass_matrix.clone()
+    });
+    matrices.collect()
 }

@@ -186,8 +186,8 @@ fn gradient_agrees<S: Scalar>(
     assert_eq!(report.failure, None);
 
     // Mass matrices from a separate evaluation.
-    let mut chunk = lnn::network::Chunk::new(&architecture);
-    chunk.evaluate(&weights, data.q(), data.v(), lnn::network::Depth::MassMatrix);
+    let mut chunk = lnn::tape::Evaluation::new(architecture.model().lagrangian().clone());
+    chunk.evaluate(&weights, data.q(), data.v(), lnn::tape::Depth::MassMatrix);
     let matrices = || chunk.mass_matrix.chunks_exact(n * n);
     let (judge, active) = match penalty {
         Penalty::Sylvester { time, .. } => {
@@ -382,8 +382,8 @@ proptest! {
         let mut gradient = vec![0.0; weights.len()];
         let rows: Vec<u32> = (0..9).collect();
         let report = Objective::new(&architecture, penalty, 1).unwrap().step(&weights, &data, &rows, &mut gradient);
-        let mut chunk = lnn::network::Chunk::new(&architecture);
-        chunk.evaluate(&weights, data.q(), data.v(), lnn::network::Depth::MassMatrix);
+        let mut chunk = lnn::tape::Evaluation::new(architecture.model().lagrangian().clone());
+        chunk.evaluate(&weights, data.q(), data.v(), lnn::tape::Depth::MassMatrix);
         let sums: Vec<f64> = chunk
             .mass_matrix
             .chunks_exact(n * n)

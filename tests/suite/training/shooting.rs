@@ -4,14 +4,11 @@ use crate::common::accuracy::{cast, largest};
 use crate::common::nested::reference;
 use crate::common::{of_scalar, properties};
 use lnn::lagrangian::configure;
-use lnn::network::{
-    Adjoint, Architecture, Chunk, Depth, Initialization, InputLayer, Jets, Layout, LinearMap, Nonlinearity,
-    initial_weights,
-};
+use lnn::network::{Architecture, Initialization, InputLayer, Layout, LinearMap, Nonlinearity, initial_weights};
 use lnn::recording::Track;
 use lnn::scalar::{Dd, Real, Scalar};
 use lnn::storage::Disk;
-use lnn::tape::{ScalarFunction, gradient};
+use lnn::tape::{Depth, Evaluation, MixedDirections, ScalarFunction, gradient};
 use lnn::training::shooting::{
     self, Curvature, Estimated, Fitted, Noise, Segments, Shooting, ShootingError, Shots, Task, fit,
 };
@@ -106,20 +103,19 @@ fn input_gradients<S: Scalar>(architecture: &Architecture, seed: u64, moving: bo
     let mut vector =
         |count: usize, size: f64| -> Vec<S> { (0..count).map(|_| S::of_f64(rng.random_range(-size..size))).collect() };
     let (q, v) = (vector(2 * n, 4.0), vector(2 * n, 3.0));
-    let jets = Jets { state: vec![1, 0], s: vector(2 * n, 1.0), t: vector(2 * n, 1.0), moving };
-    let mut chunk = Chunk::new(architecture);
-    chunk.evaluate(&weights, &q, &v, Depth::Training);
+    let jets = MixedDirections { s: vector(2 * n, 1.0), t: vector(2 * n, 1.0), moving };
+    let mut evaluation = Evaluation::new(architecture.model().lagrangian().clone());
+    evaluation.evaluate(&weights, &q, &v, Depth::Training);
     let zeros = |count: usize| vec![<S as Real>::zero(); count];
     let (mut plain, mut found) = (zeros(weights.len()), zeros(weights.len()));
     let (mut dq, mut dv) = (zeros(2 * n), zeros(2 * n));
-    let mut adjoint = Adjoint::new(&chunk);
-    adjoint.add_gradient_and_inputs(&chunk, &weights, &jets, &mut found, (&mut dq, &mut dv));
-    adjoint.add_gradient(&chunk, &weights, &jets, &mut plain);
+    evaluation.add_gradient(&weights, &jets, &mut found, Some((&mut dq, &mut dv)));
+    evaluation.add_gradient(&weights, &jets, &mut plain, None);
     assert_eq!(plain, found, "who asks for more gets the same gradient by the weights");
     let mut worst = 0.0_f64;
-    for (j, &state) in jets.state.iter().enumerate() {
+    for state in 0..2 {
         let row = |x: &[S], k: usize| cast::<S, Dd>(&x[k * n..(k + 1) * n]);
-        let given = [cast(&weights), row(&q, state), row(&v, state), row(&jets.s, j), row(&jets.t, j)];
+        let given = [cast(&weights), row(&q, state), row(&v, state), row(&jets.s, state), row(&jets.t, state)];
         let expected = expected_inputs(architecture, moving, &given);
         let step = 2f64.powi(-40);
         let mut condition = largest(&expected);
@@ -567,7 +563,7 @@ fn exact_positions_teach_exact_accelerations() {
     assert_eq!((fitted.segments, fitted.stop.clone(), fitted.history.len()), ((20, 320), Stop::Finished, 200));
     let (q, v): (Vec<f64>, Vec<f64>) =
         (0..50).map(|k| 0.9 * f64::from(k)).map(|s| (0.9 * s.cos(), 1.8 * s.sin())).unzip();
-    let mut chunk = Chunk::new(&architecture);
+    let mut chunk = Evaluation::new(architecture.model().lagrangian().clone());
     chunk.evaluate(&fitted.weights, &q, &v, Depth::Motion);
     let error = (0..q.len())
         .map(|k| (2.0 * (chunk.dl_dq[k] - chunk.coriolis[k]) / chunk.mass_matrix[k] + 4.0 * q[k]).abs())

@@ -1,9 +1,9 @@
 //! Sums, differences, negations and constant factors.
 
 use super::{Forward, MixedForward, MixedReverse, Reverse};
+use crate::scalar::Scalar;
 use crate::tape::engine::kernel::{add_scaled, map};
 use crate::tape::engine::value::Mixed;
-use crate::scalar::Scalar;
 
 /// `factor a`, or `factor a + factor_b b`.
 #[derive(Clone, Copy, Debug)]

@@ -3,9 +3,9 @@
 use super::{Forward, MixedForward, MixedReverse, Reverse, add_if};
 use crate::ops::Binary;
 use crate::scalar::{Real, Scalar};
-use crate::tape::engine::{Depth, LANES};
 use crate::tape::engine::jets::partials;
 use crate::tape::engine::kernel::{add_product, add_product3};
+use crate::tape::engine::{Depth, LANES};
 
 /// `f(a, b)`.
 #[derive(Clone, Copy, Debug)]

@@ -21,7 +21,9 @@ impl Input {
         value.iter_mut().zip(field.chunks_exact(n)).for_each(|(to, row)| *to = row[column]);
         for (plane, &direction) in tangents.chunks_exact_mut(lanes).zip(directions) {
             match direction {
-                0 if self.index < n => plane.iter_mut().zip(sweep.v.chunks_exact(n)).for_each(|(to, v)| *to = v[column]),
+                0 if self.index < n => {
+                    plane.iter_mut().zip(sweep.v.chunks_exact(n)).for_each(|(to, v)| *to = v[column])
+                }
                 0 => plane.fill(<S as Real>::zero()),
                 _ => plane.fill(sweep.scale[column]),
             }

@@ -158,7 +158,8 @@ impl<S: Scalar> Operation<S> {
     /// Value and tangents.
     pub fn forward(&self, out: usize, sweep: &mut Forward<'_, S>) {
         let fill = |value: S, out: usize, sweep: &mut Forward<'_, S>| sweep.store.all_mut(out).fill(value);
-        let parameter = |index: usize, out: usize, sweep: &mut Forward<'_, S>| fill(sweep.parameters[index], out, sweep);
+        let parameter =
+            |index: usize, out: usize, sweep: &mut Forward<'_, S>| fill(sweep.parameters[index], out, sweep);
         rule!(self, out, sweep, forward, parameter, fill);
     }
     /// Adjoints of the operands and the share of the second derivatives.
