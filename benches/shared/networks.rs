@@ -1,6 +1,6 @@
 //! The network that speed is measured on.
 
-use lnn::network::{Architecture, InputLayer, Nonlinearity};
+use lnn::network::{Architecture, Form, InputLayer, Nonlinearity};
 
 /// Scale of every coordinate.
 pub const SCALE: f64 = 10.0;
@@ -19,5 +19,6 @@ pub fn architecture(n: usize, width: usize, alpha: f64) -> Architecture {
         embed_periodic: false,
         input_layer: InputLayer::None,
         dissipation: None,
+        form: Form::default(),
     }
 }

@@ -3,7 +3,7 @@
 use super::super::common::nested::reference;
 use super::super::common::{accuracy::cast, of_scalar, solve};
 use lnn::lagrangian::Lagrangian;
-use lnn::network::{Architecture, Initialization, InputLayer, NetworkLagrangian, Nonlinearity, initial_weights};
+use lnn::network::{Architecture, Form, Initialization, InputLayer, NetworkLagrangian, Nonlinearity, initial_weights};
 use lnn::scalar::{Real, Scalar};
 use lnn::tape::ScalarFunction;
 use lnn::training::Dataset;
@@ -38,6 +38,7 @@ impl Case {
             embed_periodic: false,
             input_layer: InputLayer::None,
             dissipation: None,
+            form: Form::default(),
         };
         let mut rng = ChaCha8Rng::seed_from_u64(7);
         let weights = initial_weights(&architecture, Initialization::Default, &mut rng);

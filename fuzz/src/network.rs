@@ -5,7 +5,7 @@ use super::accuracy::{apart, cast, finite, largest};
 use super::bytes::{Bytes, Random};
 use super::nested::{Reference, reference};
 use lnn::lagrangian::{EulerLagrange, Request, Terms};
-use lnn::network::{Architecture, InputLayer, Layout, NetworkLagrangian, Nonlinearity};
+use lnn::network::{Architecture, Form, InputLayer, Layout, NetworkLagrangian, Nonlinearity};
 use lnn::scalar::{Dd, Scalar};
 use lnn::tape::{Depth, Evaluation};
 
@@ -31,6 +31,7 @@ fn architecture(bytes: &mut Bytes<'_>) -> Architecture {
         embed_periodic: bytes.flag(),
         input_layer: if bytes.flag() { InputLayer::Dyt } else { InputLayer::None },
         dissipation: None,
+        form: Form::default(),
     }
 }
 

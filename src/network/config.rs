@@ -1,6 +1,6 @@
 //! Shape of a network Lagrangian.
 
-use super::Nonlinearity;
+use super::{Form, Nonlinearity};
 use serde::{Deserialize, Serialize};
 
 /// Distribution of the initial weights.
@@ -70,6 +70,9 @@ pub struct Architecture {
     /// motion keeps its energy.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub dissipation: Option<usize>,
+    /// What is known of the Lagrangian beforehand; not written if that is nothing.
+    #[serde(default, skip_serializing_if = "Form::is_default")]
+    pub form: Form,
 }
 
 impl Architecture {

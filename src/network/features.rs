@@ -1,34 +1,39 @@
 //! Input features of the network.
 //!
 //! Every coordinate gives one feature `q_i/s_i`, or two, `sin q_i` and `cos q_i`, when it is an embedded angle; every velocity
-//! gives `v_i/s_i`.
+//! gives `v_i/s_i`. Cyclic coordinates give none.
 
 use crate::network::Architecture;
 use crate::scalar::Real;
 
 impl Architecture {
-    /// Input features made of coordinates: two per embedded angle, one per other coordinate.
+    /// Input features made of coordinates: two per embedded angle, one per other coordinate, none of cyclic ones.
     pub fn position_features(&self) -> usize {
-        (0..self.coordinates).map(|i| if self.embeds(i) { 2 } else { 1 }).sum()
+        let seen = (0..self.coordinates).filter(|i| !self.form.cyclic.contains(i));
+        seen.map(|i| if self.embeds(i) { 2 } else { 1 }).sum()
     }
 
     /// Whether coordinate `i` enters by its sine and cosine.
     pub fn embeds(&self, i: usize) -> bool {
         self.embed_periodic && self.periodic[i]
     }
-}
 
-/// Features of states `q`, `v` of length `n` in physical units.
-pub fn features<R: Real>(architecture: &Architecture, q: &[R], v: &[R]) -> Vec<R> {
-    let mut features = Vec::with_capacity(architecture.position_features() + architecture.coordinates);
-    for (i, &q) in q.iter().enumerate() {
-        if architecture.embeds(i) {
-            let (sin, cos) = q.sin_cos();
-            features.extend([sin, cos]);
-        } else {
-            features.push(q / R::from_f64(architecture.scale[i]));
+    /// Features made of the coordinates `q`, of length `n` in physical units.
+    pub(super) fn position_features_of<R: Real>(&self, q: &[R]) -> Vec<R> {
+        let mut features = Vec::with_capacity(self.position_features() + self.coordinates);
+        for (i, &q) in q.iter().enumerate().filter(|(i, _)| !self.form.cyclic.contains(i)) {
+            if self.embeds(i) {
+                let (sin, cos) = q.sin_cos();
+                features.extend([sin, cos]);
+            } else {
+                features.push(q / R::from_f64(self.scale[i]));
+            }
         }
+        features
     }
-    features.extend(v.iter().zip(&architecture.scale).map(|(&v, &s)| v / R::from_f64(s)));
-    features
+
+    /// `v_i/s_i`.
+    pub(super) fn scaled_velocities<R: Real>(&self, v: &[R]) -> Vec<R> {
+        v.iter().zip(&self.scale).map(|(&v, &s)| v / R::from_f64(s)).collect()
+    }
 }

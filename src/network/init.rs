@@ -39,6 +39,9 @@ pub fn initial_weights<S: Scalar>(architecture: &Architecture, kind: Initializat
             }
         }
     }
+    if let Some(alpha) = layout.alpha {
+        weights[alpha] = S::of_f64(architecture.alpha);
+    }
     if let Some(dissipation) = layout.dissipation {
         weights[dissipation.gamma_range()].fill(S::of_f64(FRICTION));
         for row in weights[dissipation.direction_range()].chunks_exact_mut(dissipation.coordinates) {
@@ -96,7 +99,7 @@ fn draw<S: Scalar>(layer: &Layer, place: Place, kind: Initialization, rng: &mut 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::network::{Activation, InputLayer, Nonlinearity};
+    use crate::network::{Activation, Form, InputLayer, Nonlinearity};
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
 
@@ -112,6 +115,7 @@ mod tests {
             embed_periodic: false,
             input_layer: InputLayer::None,
             dissipation: None,
+            form: Form::default(),
         }
     }
 

@@ -1,6 +1,6 @@
 //! Where the parameters of a network sit in its flat vector: a sum of branches, each a chain of layers.
 
-use crate::network::{Activation, Architecture, InputLayer};
+use crate::network::{Activation, Architecture, InputLayer, Structure};
 use std::ops::Range;
 
 /// How the weights `W` of a layer act on its inputs `x`.
@@ -47,7 +47,7 @@ impl Layer {
     }
 }
 
-/// A chain of layers, the last one dense and linear with one output.
+/// A chain of layers, the last one dense and linear: one output without a bias, or the outputs of a structure with theirs.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Branch {
     /// Layers, input to output.
@@ -77,10 +77,12 @@ pub struct Layout {
     pub parameters: usize,
     /// Input features made of coordinates.
     pub position_features: usize,
-    /// Input features: those of the coordinates, then one per velocity.
+    /// Input features: those of the coordinates, then one per velocity for a black box.
     pub features: usize,
     /// Parameters of the dissipation, behind those of all branches.
     pub dissipation: Option<DissipationLayout>,
+    /// The parameter `alpha` of a black box that learns it, the last one.
+    pub alpha: Option<usize>,
 }
 
 /// Where the parameters of a Rayleigh dissipation sit: `gamma`, then `w`, then `b`.
@@ -123,7 +125,9 @@ impl Layout {
     /// and an input layer of its own.
     pub fn new(architecture: &Architecture) -> Self {
         let position_features = architecture.position_features();
-        let features = position_features + architecture.coordinates;
+        let (n, form) = (architecture.coordinates, &architecture.form);
+        let black_box = form.structure == Structure::BlackBox;
+        let features = position_features + if black_box { n } else { 0 };
         let activations = architecture.activation.branches();
         let mut parameters = 0;
         let mut branches = Vec::with_capacity(activations.len());
@@ -139,7 +143,8 @@ impl Layout {
             for &width in &architecture.hidden {
                 chain.push(LinearMap::Dense, activation, width / activations.len(), true);
             }
-            chain.push(LinearMap::Dense, Activation::Identity, 1, false);
+            // A constant in the L of a black box moves nothing.
+            chain.push(LinearMap::Dense, Activation::Identity, form.outputs(n), !black_box);
             parameters = chain.offset;
             branches.push(Branch { layers: chain.layers });
         }
@@ -150,7 +155,9 @@ impl Layout {
             offset: parameters,
         });
         let parameters = dissipation.map_or(parameters, |dissipation| dissipation.direction_range().end);
-        Self { branches, parameters, position_features, features, dissipation }
+        let alpha = (form.learn_alpha && black_box).then_some(parameters);
+        let parameters = parameters + usize::from(alpha.is_some());
+        Self { branches, parameters, position_features, features, dissipation, alpha }
     }
 }
 

@@ -10,7 +10,8 @@ mod init;
 mod layout;
 mod model;
 mod nonlinearity;
-mod reference;
+mod recorded;
+mod structure;
 
 pub use crate::ops::Activation;
 pub use config::{Architecture, Initialization, InputLayer};
@@ -19,3 +20,4 @@ pub use init::initial_weights;
 pub use layout::{Branch, DissipationLayout, Layer, Layout, LinearMap};
 pub use model::{NetworkError, NetworkLagrangian};
 pub use nonlinearity::{Nonlinearity, UnknownNonlinearity};
+pub use structure::{Form, Structure};

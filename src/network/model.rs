@@ -2,7 +2,7 @@
 
 use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Terms};
 use crate::linalg;
-use crate::network::{Architecture, Dynamics, Layout, Model};
+use crate::network::{Architecture, Dynamics, Form, Layout, Model, Structure};
 use crate::scalar::Scalar;
 use crate::tape::{Depth, STATES};
 use std::sync::{Mutex, PoisonError};
@@ -78,6 +78,20 @@ impl Architecture {
         }
         if let Some(time) = self.time_like.filter(|&time| time >= n) {
             return fault(format!("expected a time-like coordinate below {n}, found {time}"));
+        }
+        let Form { structure, cyclic, learn_alpha, .. } = &self.form;
+        if let Some(i) = cyclic.iter().find(|&&i| i >= n) {
+            return fault(format!("expected cyclic coordinates below {n}, found {i}"));
+        }
+        let name = structure.name();
+        if *structure == Structure::Mechanical && self.time_like.is_some() {
+            return fault("expected no time-like coordinate for `mechanical`; `metric` has one".to_string());
+        }
+        if *structure != Structure::BlackBox && (0..n).all(|i| cyclic.contains(&i)) {
+            return fault(format!("expected a coordinate that is not cyclic for `{name}`"));
+        }
+        if *structure != Structure::BlackBox && *learn_alpha {
+            return fault(format!("expected no learned alpha for `{name}`, which has no such term"));
         }
         Ok(())
     }

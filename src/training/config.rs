@@ -1,7 +1,7 @@
 //! Everything that determines a training run; written beside every model as `config.toml`.
 
 use crate::network::file::MAX_WIDTH;
-use crate::network::{Initialization, InputLayer, Nonlinearity};
+use crate::network::{Form, Initialization, InputLayer, Nonlinearity, Structure};
 use crate::training::optimizer::Method;
 use crate::training::penalty::Regularizer;
 use crate::training::schedule::Schedule;
@@ -150,6 +150,18 @@ pub struct Network {
     /// Units of a learned Rayleigh dissipation; without it the motion keeps its energy.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub dissipation: Option<usize>,
+    /// How the Lagrangian is made of the network's outputs.
+    #[serde(default)]
+    pub structure: Structure,
+    /// Names of the coordinates that the Lagrangian does not depend on.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub cyclic: Vec<String>,
+    /// Whether the Lagrangian is even in the velocities.
+    #[serde(default)]
+    pub even_in_v: bool,
+    /// Whether `alpha` is learned.
+    #[serde(default)]
+    pub learn_alpha: bool,
     /// Distribution of the initial weights.
     pub initialization: Initialization,
 }
@@ -218,6 +230,22 @@ impl Network {
         coordinates: impl Iterator<Item = &'a str>,
     ) -> Result<Option<usize>, ConfigError> {
         self.time_like.as_ref().map(|name| place("network.time_like", name, coordinates)).transpose()
+    }
+}
+
+impl Network {
+    /// What is known of the Lagrangian of coordinates with these names.
+    ///
+    /// # Errors
+    /// A cyclic coordinate that is none of them.
+    pub fn form<'a>(&self, coordinates: impl Iterator<Item = &'a str> + Clone) -> Result<Form, ConfigError> {
+        let index = |name: &String| place("network.cyclic", name, coordinates.clone());
+        Ok(Form {
+            structure: self.structure,
+            cyclic: self.cyclic.iter().map(index).collect::<Result<_, _>>()?,
+            even_in_v: self.even_in_v,
+            learn_alpha: self.learn_alpha,
+        })
     }
 }
 

@@ -27,8 +27,8 @@ const POLISH: u64 = 14;
 /// - weights: `(12 + 24) s P`, the second for writing a checkpoint;
 /// - eigenbases of SOAP: `s (4 r + 2 m)` with `r` numbers in the squares over the sides of all weight matrices and `m` in the
 ///   matrices, and `8 s r` for writing a checkpoint;
-/// - stripes: `s (P + 64 (w (2 c + 5 + 14 j) + 4 f c + 10 n^2 + 20 n + 6 K))` for each of the up to 8 parts of a batch, `c = n + 2`
-///   channels and `j` jets per state, 1 without penalty and `n + 1` with one, the latter with `n^2` more numbers per state;
+/// - stripes: `s (P + 64 j (w (2 c + 21) + 4 f c + 10 n^2 + 20 n + 6 K))` for each of the up to 8 parts of a batch, `c = n + 2`
+///   channels and `j` evaluations side by side, 1 without penalty and 2 with one, the latter with `n^2` more numbers per state;
 /// - polishing with memory `m`, which makes `s = 8` in the stripes: `24 n (N + V) + 4 N + 8 P (2 m + 14)`.
 pub fn training_memory(config: &Config, architecture: &Architecture) -> Option<u64> {
     let layout = Layout::new(architecture);
@@ -59,17 +59,17 @@ pub fn training_memory(config: &Config, architecture: &Architecture) -> Option<u
     let stripes = largest.div_ceil(CHUNK as u64).min(STRIPES as u64);
     let batch = largest.div_ceil(STRIPES as u64).max(CHUNK as u64);
     let (channels, penalised) = (n + 2, !matches!(config.penalty, Regularizer::None));
-    let jets = if penalised { n + 1 } else { 1 };
+    let evaluations = if penalised { 2 } else { 1 };
     let square = product([n, n])?;
     let of_state = sum([
-        product([units, sum([product([2, channels]), Some(5), product([14, jets])])?]),
+        product([units, sum([product([2, channels]), Some(21)])?]),
         product([4, f, channels]),
         product([10, square]),
         product([20, n]),
         product([6, architecture.dissipation.unwrap_or(0) as u64]),
     ]);
     let suspects = if penalised { product([square + n + 1, batch]) } else { Some(0) };
-    let of_stripe = sum([Some(weights), product([CHUNK as u64, of_state?]), suspects]);
+    let of_stripe = sum([Some(weights), product([CHUNK as u64, evaluations, of_state?]), suspects]);
     let wide = if config.polish.is_some() { 8 } else { number };
     let polish = match &config.polish {
         None => Some(0),

@@ -2,7 +2,7 @@
 
 use crate::lagrangian::Configured;
 use crate::lagrangian::system::Bounds;
-use crate::network::{Initialization, InputLayer, Nonlinearity};
+use crate::network::{Initialization, InputLayer, Nonlinearity, Structure};
 use crate::training::config::{Config, Data, Network, OnFailure, Optimizer, Phase, Precision, Scaling};
 use crate::training::optimizer::Method;
 use crate::training::penalty::Regularizer;
@@ -110,6 +110,10 @@ fn network(width: usize) -> Network {
         scaling: Scaling::Physical,
         embed_periodic: true,
         input_layer: InputLayer::None,
+        structure: Structure::BlackBox,
+        cyclic: Vec::new(),
+        even_in_v: false,
+        learn_alpha: false,
         initialization: Initialization::Default,
         dissipation: None,
     }
@@ -242,6 +246,10 @@ fn paper(system: &Configured<f64>) -> Option<Config> {
         embed_periodic: false,
         input_layer: InputLayer::None,
         dissipation: None,
+        structure: Structure::BlackBox,
+        cyclic: Vec::new(),
+        even_in_v: false,
+        learn_alpha: false,
         initialization: Initialization::Default,
     };
     let bounds: Bounds = (system.system.training)(n);

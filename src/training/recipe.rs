@@ -1,7 +1,7 @@
 //! From a configuration to a trained network: data, shape, training.
 
 use crate::lagrangian::{Configured, configure};
-use crate::network::{Architecture, NetworkError, NetworkLagrangian};
+use crate::network::{Architecture, Form, NetworkError, NetworkLagrangian};
 use crate::scalar::Scalar;
 use crate::training::config::{Config, Scaling};
 use crate::training::penalty::{Penalty, Regularizer};
@@ -66,9 +66,10 @@ impl Config {
         let coordinates = (system.system.coordinates)(system.coordinates);
         let names = coordinates.iter().map(|c| c.name.as_ref());
         // A name that is no coordinate is refused where the states are sampled.
-        let time_like = self.network.time_like_index(names).unwrap_or_default();
+        let time_like = self.network.time_like_index(names.clone()).unwrap_or_default();
+        let form = self.network.form(names).unwrap_or_default();
         let architecture = self.architecture_with(coordinates.iter().map(|c| c.periodic).collect(), scale);
-        Architecture { time_like, ..architecture }
+        Architecture { time_like, form, ..architecture }
     }
 
     /// Shape of the network for coordinates that are angles or not, with physical scales `scale` (used if the configuration
@@ -90,6 +91,7 @@ impl Config {
             embed_periodic: self.network.embed_periodic,
             input_layer: self.network.input_layer,
             dissipation: self.network.dissipation,
+            form: Form::default(),
         }
     }
 }

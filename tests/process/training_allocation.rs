@@ -2,7 +2,7 @@
 
 use crate::alone;
 use crate::counting::allocations;
-use lnn::network::{Architecture, Initialization, InputLayer, Layout, Nonlinearity, initial_weights};
+use lnn::network::{Architecture, Form, Initialization, InputLayer, Layout, Nonlinearity, initial_weights};
 use lnn::training::{Dataset, Method, Moments, Objective, Penalty, Update};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -28,6 +28,7 @@ fn allocates_nothing(activation: Nonlinearity, input_layer: InputLayer, dissipat
         embed_periodic: true,
         input_layer,
         dissipation,
+        form: Form::default(),
     };
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     let mut weights: Vec<f32> = initial_weights(&architecture, Initialization::Default, &mut rng);

@@ -143,7 +143,7 @@ fn slots(architecture: &Architecture) -> Result<Vec<Slot>, ModelFileError> {
     let features = 3 * architecture.coordinates;
     let mut inputs = Some(features);
     let mut total = Some(architecture.activation.branches().len() * (1 + 2 * features));
-    for &outputs in architecture.hidden.iter().chain(&[1]) {
+    for &outputs in architecture.hidden.iter().chain(&[architecture.form.outputs(architecture.coordinates)]) {
         let layer = inputs.and_then(|i| i.checked_add(1)).and_then(|i| i.checked_mul(outputs));
         total = total.zip(layer).and_then(|(a, b)| a.checked_add(b));
         inputs = Some(outputs);
@@ -182,6 +182,9 @@ fn slots(architecture: &Architecture) -> Result<Vec<Slot>, ModelFileError> {
         push("gamma", vec![units], dissipation.gamma_range());
         push("weight", vec![units, features], dissipation.weight_range());
         push("direction", vec![units, coordinates], dissipation.direction_range());
+    }
+    if let Some(alpha) = layout.alpha {
+        slots.push(Slot { name: "alpha".to_string(), shape: vec![1], range: alpha..alpha + 1 });
     }
     Ok(slots)
 }

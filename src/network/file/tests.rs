@@ -2,7 +2,7 @@
 
 use super::container::{MAX_HEADER, checksum_field};
 use super::*;
-use crate::network::{InputLayer, Nonlinearity};
+use crate::network::{Form, InputLayer, Nonlinearity};
 use proptest::prelude::*;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use std::collections::{BTreeMap, HashMap};
@@ -22,6 +22,7 @@ fn header(hidden: Vec<usize>, embed_periodic: bool, precision: StoredPrecision) 
             embed_periodic,
             input_layer: InputLayer::None,
             dissipation: None,
+            form: Form::default(),
         },
         system: "spring-pendulum".to_string(),
         parameters: BTreeMap::from([("m".to_string(), 1.0), ("g".to_string(), 9.81)]),

@@ -1,7 +1,7 @@
 //! The program `lnn` from outside: runs with a time limit, files to give it, a small model.
 
 use lnn::network::file::{FORMAT, Header, ModelFile, StoredPrecision};
-use lnn::network::{Architecture, InputLayer, Layout, Nonlinearity};
+use lnn::network::{Architecture, Form, InputLayer, Layout, Nonlinearity};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fs;
@@ -137,6 +137,7 @@ pub fn model() -> ModelFile<f32> {
         embed_periodic: true,
         input_layer: InputLayer::None,
         dissipation: None,
+        form: Form::default(),
     };
     let count = Layout::new(&architecture).parameters;
     let header = Header {

@@ -3,7 +3,7 @@
 use crate::common::accuracy::cast;
 use crate::common::nested::reference;
 use crate::common::{of_scalar, properties};
-use lnn::network::{Architecture, Initialization, InputLayer, Layout, LinearMap, Nonlinearity, initial_weights};
+use lnn::network::{Architecture, Form, Initialization, InputLayer, Layout, LinearMap, Nonlinearity, initial_weights};
 use lnn::scalar::{Dd, Real, Scalar};
 use lnn::tape::{Depth, Evaluation, MixedDirections, ScalarFunction, gradient};
 use proptest::prelude::*;
@@ -32,6 +32,7 @@ fn cases() -> impl Strategy<Value = Case> {
                 embed_periodic,
                 input_layer,
                 dissipation: None,
+                form: Form::default(),
             },
             seed,
         },
@@ -232,6 +233,7 @@ fn models() -> impl Iterator<Item = Case> {
                 embed_periodic: true,
                 input_layer,
                 dissipation: None,
+                form: Form::default(),
             },
             seed: n as u64,
         })
@@ -283,6 +285,7 @@ fn dynamic_tanh_stands_before_the_first_dense_layer() {
         embed_periodic: false,
         input_layer: InputLayer::Dyt,
         dissipation: None,
+        form: Form::default(),
     };
     let (a, gamma, beta, row, bias, output) = (0.7, [1.5, -0.5], [0.25, 0.1], [0.3, -1.1], 0.6, 2.0);
     let weights = [&[a][..], &gamma, &beta, &row, &[bias, output]].concat();
@@ -329,6 +332,7 @@ fn shallower_evaluations_give_the_same_numbers() {
             embed_periodic: true,
             input_layer: InputLayer::None,
             dissipation: None,
+            form: Form::default(),
         },
         seed: 5,
     };
@@ -360,6 +364,7 @@ fn the_added_term_follows_the_time_like_coordinate() {
         embed_periodic: false,
         input_layer: InputLayer::None,
         dissipation: None,
+        form: Form::default(),
     };
     // A network that gives 0: what is left is the added term.
     let weights = vec![0.0; Layout::new(&plain).parameters];

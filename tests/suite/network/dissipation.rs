@@ -8,7 +8,7 @@ use lnn::forward::HyperDual;
 use lnn::lagrangian::{EulerLagrange, Request, Terms};
 use lnn::linalg::Workspace;
 use lnn::network::{
-    Architecture, Initialization, InputLayer, Layout, NetworkLagrangian, Nonlinearity, initial_weights,
+    Architecture, Form, Initialization, InputLayer, Layout, NetworkLagrangian, Nonlinearity, Structure, initial_weights,
 };
 use lnn::rollout::{Method, Options, RolloutError, rollout, rollout_fixed, rollout_together};
 use lnn::scalar::{Dd, Real, Scalar};
@@ -41,6 +41,7 @@ fn architecture(n: usize, units: usize) -> Architecture {
         embed_periodic: true,
         input_layer: InputLayer::None,
         dissipation: Some(units),
+        form: Form::default(),
     }
 }
 
@@ -346,6 +347,10 @@ fn config(units: Option<usize>, epochs: usize) -> Config {
             embed_periodic: true,
             input_layer: InputLayer::None,
             dissipation: units,
+            structure: Structure::BlackBox,
+            cyclic: Vec::new(),
+            even_in_v: false,
+            learn_alpha: false,
             initialization: Initialization::Default,
         },
         penalty: Regularizer::Sylvester { lambda: 100.0 },
@@ -399,6 +404,7 @@ fn learn(model: &dyn EulerLagrange<f64>, units: Option<usize>, epochs: usize, fo
         scale: training.physical_scale(),
         periodic: vec![true; n],
         dissipation: units,
+        form: Form::default(),
         ..architecture(n, 1)
     };
     let data =

@@ -1,7 +1,7 @@
 //! Networks and batches that the cases of training share.
 
 use crate::common::accuracy::cast;
-use lnn::network::{Architecture, Initialization, InputLayer, Nonlinearity, initial_weights};
+use lnn::network::{Architecture, Form, Initialization, InputLayer, Nonlinearity, initial_weights};
 use lnn::scalar::{Dd, Scalar};
 use lnn::tape::{Depth, Evaluation, STATES};
 use lnn::training::{BatchReport, Dataset, Objective, Penalty};
@@ -21,6 +21,7 @@ pub fn architecture(n: usize, hidden: &[usize], activation: Nonlinearity, alpha:
         embed_periodic: false,
         input_layer: InputLayer::None,
         dissipation: None,
+        form: Form::default(),
     }
 }
 

@@ -3,7 +3,7 @@
 use super::faulty::{Fault, Faulty};
 use lnn::lagrangian::configure;
 use lnn::network::file::{FORMAT, Header, ModelFile, StoredPrecision};
-use lnn::network::{Architecture, InputLayer, Layout, Nonlinearity};
+use lnn::network::{Architecture, Form, InputLayer, Layout, Nonlinearity};
 use lnn::storage::{Disk, Files, write_whole};
 use lnn::training::{
     Config, Every, Hooks, Identity, Keeper, NEWEST, PREVIOUS, Preset, Progress, Sitting, Stop, resume, sample_all,
@@ -25,6 +25,7 @@ fn model(value: f64) -> ModelFile<f64> {
         embed_periodic: false,
         input_layer: InputLayer::None,
         dissipation: None,
+        form: Form::default(),
     };
     let weights = vec![value; Layout::new(&architecture).parameters];
     let header = Header {

@@ -2,7 +2,7 @@
 
 use crate::common::accuracy::cast;
 use crate::common::properties;
-use lnn::network::{Architecture, Initialization, InputLayer, Layout, Nonlinearity, initial_weights};
+use lnn::network::{Architecture, Form, Initialization, InputLayer, Layout, Nonlinearity, initial_weights};
 use lnn::recording::Track;
 use lnn::scalar::{Dd, Scalar};
 use lnn::training::shooting::{Estimated, Noise, Segments, Shots};
@@ -23,6 +23,7 @@ fn architecture(n: usize, alpha: f64) -> Architecture {
         embed_periodic: false,
         input_layer: InputLayer::None,
         dissipation: None,
+        form: Form::default(),
     }
 }
 

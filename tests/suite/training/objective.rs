@@ -3,7 +3,7 @@
 use crate::common::{of_scalar, properties, solve};
 use lnn::forward::HyperDual;
 use lnn::lagrangian::Lagrangian;
-use lnn::network::{Architecture, Initialization, InputLayer, Layout, Nonlinearity, initial_weights};
+use lnn::network::{Architecture, Form, Initialization, InputLayer, Layout, Nonlinearity, Structure, initial_weights};
 use lnn::scalar::{Dd, Real, Scalar};
 use lnn::tape::{ScalarFunction, gradient};
 use lnn::training::{
@@ -28,6 +28,7 @@ fn architecture(n: usize, hidden: &[usize]) -> Architecture {
         embed_periodic: true,
         input_layer: InputLayer::None,
         dissipation: None,
+        form: Form::default(),
     }
 }
 
@@ -423,6 +424,10 @@ fn config(epochs: usize) -> Config {
             embed_periodic: true,
             input_layer: InputLayer::None,
             dissipation: None,
+            structure: Structure::BlackBox,
+            cyclic: Vec::new(),
+            even_in_v: false,
+            learn_alpha: false,
             initialization: Initialization::Default,
         },
         penalty: Regularizer::Eigenvalue { lambda: 10.0 },

@@ -4,7 +4,7 @@ use crate::common::accuracy::{cast, largest};
 use crate::common::nested::reference;
 use crate::common::{of_scalar, properties};
 use lnn::lagrangian::configure;
-use lnn::network::{Architecture, Initialization, InputLayer, Layout, LinearMap, Nonlinearity, initial_weights};
+use lnn::network::{Architecture, Form, Initialization, InputLayer, Layout, LinearMap, Nonlinearity, initial_weights};
 use lnn::recording::Track;
 use lnn::scalar::{Dd, Real, Scalar};
 use lnn::storage::Disk;
@@ -36,6 +36,7 @@ fn small(n: usize, activation: Nonlinearity, input_layer: InputLayer, embed_peri
         embed_periodic,
         input_layer,
         dissipation: None,
+        form: Form::default(),
     }
 }
 
@@ -536,6 +537,7 @@ fn exact_positions_teach_exact_accelerations() {
         embed_periodic: false,
         input_layer: InputLayer::None,
         dissipation: None,
+        form: Form::default(),
     };
     let motion = oscillator(64, 0.0);
     let weights: Vec<f64> = initial_weights(&architecture, Initialization::Default, &mut ChaCha8Rng::seed_from_u64(12));
