@@ -2,7 +2,7 @@
 
 use crate::cli::CliError;
 use crate::cli::number::{count, positive, weight};
-use crate::network::Nonlinearity;
+use crate::network::{Nonlinearity, Structure};
 use crate::training::{Config, Regularizer};
 
 /// Changes of a configuration.
@@ -15,6 +15,20 @@ pub struct Changes {
     /// half the widths [default: the configuration's, gelu in all presets].
     #[arg(long, value_name = "NAME", value_parser = activation)]
     pub activation: Option<Nonlinearity>,
+    /// How the Lagrangian is made of the network's outputs: black-box, mechanical (a positive mass matrix, potentials) or metric (of
+    /// geodesics, with its signature); the last two need no penalty and have none unless one is chosen [default: the
+    /// configuration's, black-box in all presets].
+    #[arg(long, value_name = "NAME", value_parser = structure)]
+    pub structure: Option<Structure>,
+    /// Coordinates that the Lagrangian does not depend on, their momenta conserved exactly.
+    #[arg(long, value_name = "C1,C2,..", value_delimiter = ',')]
+    pub cyclic: Vec<String>,
+    /// Make the Lagrangian even in the velocities: motion can be run backwards.
+    #[arg(long)]
+    pub even_in_v: bool,
+    /// Learn the factor alpha of the added |v|^2 of a black box.
+    #[arg(long)]
+    pub learn_alpha: bool,
     /// What keeps the signature of the mass matrix.
     #[arg(long, value_enum, value_name = "KIND")]
     pub penalty: Option<PenaltyName>,
@@ -49,6 +63,13 @@ fn activation(text: &str) -> Result<Nonlinearity, String> {
     found.ok_or_else(|| crate::names::unknown("activation", text, known))
 }
 
+/// A structure by name.
+fn structure(text: &str) -> Result<Structure, String> {
+    let known = Structure::ALL.map(Structure::name);
+    let found = Structure::ALL.into_iter().find(|choice| choice.name() == text);
+    found.ok_or_else(|| crate::names::unknown("structure", text, known))
+}
+
 impl Changes {
     /// Changes a configuration; `time` is the time-like coordinate of the system, if it has one, and `how` says how to name
     /// one otherwise.
@@ -62,6 +83,20 @@ impl Changes {
         if let Some(activation) = self.activation {
             config.network.activation = activation;
         }
+        if let Some(structure) = self.structure {
+            config.network.structure = structure;
+            if structure != Structure::BlackBox {
+                // The signature holds by construction, and motion on a mass shell tells the whole metric.
+                config.penalty = Regularizer::None;
+                config.data.off_shell = 0.0;
+                config.network.learn_alpha = false;
+            }
+        }
+        if !self.cyclic.is_empty() {
+            config.network.cyclic.clone_from(&self.cyclic);
+        }
+        config.network.even_in_v |= self.even_in_v;
+        config.network.learn_alpha |= self.learn_alpha;
         self.penalise(config, time, how)?;
         if let Some(rate) = self.learning_rate
             && let Some(first) = config.phases.first().map(|phase| phase.rate)

@@ -24,7 +24,7 @@ use crate::cli::train_config::PrecisionName;
 use crate::cli::{CliError, forces, interrupt, memory, output};
 use crate::network::file::container::checksum;
 use crate::network::file::{FORMAT, Header, ModelFile, StoredPrecision};
-use crate::network::{Architecture, Layout, NetworkLagrangian};
+use crate::network::{Architecture, Layout, NetworkLagrangian, Structure};
 use crate::recording::smooth::SmoothOptions;
 use crate::recording::survey::{SurveyOptions, survey};
 use crate::recording::{Reading, Targets};
@@ -130,7 +130,11 @@ impl Job<'_> {
         CliError::all_usage(config.faults(names.len()).into_iter().map(|fault| fault.to_string()))?;
         let periodic = self.reading.recording.periodic.clone();
         let time_like = config.network.time_like_index(names.iter().map(String::as_str)).map_err(CliError::usage)?;
-        let shaped = |scale| Architecture { time_like, ..config.architecture_with(periodic.clone(), scale) };
+        let form = config.network.form(names.iter().map(String::as_str)).map_err(CliError::usage)?;
+        let shaped = |scale| {
+            let plain = config.architecture_with(periodic.clone(), scale);
+            Architecture { time_like, form: form.clone(), ..plain }
+        };
         let (architecture, weights) = match &start {
             Some(start) => {
                 start.require(&config, periodic.clone())?;
@@ -308,7 +312,9 @@ fn configured(
             let problem = "a time-like coordinate needs lorentzian-sylvester, or none";
             return Err(CliError::usage(format_args!("--penalty: {problem} (--timelike {time})")));
         }
-        config.penalty = Regularizer::LorentzianSylvester { lambda: config.penalty.lambda(), time: time.clone() };
+        if config.network.structure == Structure::BlackBox {
+            config.penalty = Regularizer::LorentzianSylvester { lambda: config.penalty.lambda(), time: time.clone() };
+        }
     }
     args.changes.apply(&mut config, args.timelike.as_deref(), ", name it by --timelike")?;
     Ok(config)

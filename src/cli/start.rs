@@ -37,6 +37,10 @@ impl Start {
         (network.embed_periodic, network.input_layer) = (model.embed_periodic, model.input_layer);
         network.dissipation = model.dissipation;
         network.time_like = model.time_like.and_then(|i| self.header.columns.get(i).cloned());
+        let name = |i: &usize| self.header.columns.get(*i).cloned();
+        (network.structure, network.cyclic) =
+            (model.form.structure, model.form.cyclic.iter().filter_map(name).collect());
+        (network.even_in_v, network.learn_alpha) = (model.form.even_in_v, model.form.learn_alpha);
         let scaled = model.scale.iter().any(|scale| *scale != 1.0);
         network.scaling = if scaled { Scaling::Physical } else { Scaling::None };
         config.precision = match self.header.precision {
@@ -51,7 +55,10 @@ impl Start {
     /// # Errors
     /// A usage error naming everything that differs.
     pub fn require(&self, config: &Config, periodic: Vec<bool>) -> Result<(), CliError> {
-        let asked = config.architecture_with(periodic, self.header.architecture.scale.clone());
+        let columns = self.header.columns.iter().take(periodic.len()).map(String::as_str);
+        let form = config.network.form(columns).map_err(CliError::usage)?;
+        let plain = config.architecture_with(periodic, self.header.architecture.scale.clone());
+        let asked = Architecture { form, ..plain };
         let found = differences(&asked, &self.header.architecture);
         if found.is_empty() {
             return Ok(());

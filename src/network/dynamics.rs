@@ -15,8 +15,8 @@ pub struct Model<S> {
 }
 
 impl<S: Scalar> Model<S> {
-    /// A model of `lagrangian`, whose scales and parameters are also those of `dissipation`; `periodic` coordinates are reduced
-    /// to `[0, 2 pi)` before the functions see them.
+    /// A model of `lagrangian`, whose scales and parameters are also those of `dissipation`; `periodic` coordinates are angles
+    /// that [`Model::wrap`] reduces to `[0, 2 pi)`.
     pub fn new(lagrangian: Arc<Recorded<S>>, dissipation: Option<Arc<Recorded<S>>>, periodic: Vec<bool>) -> Self {
         Self { lagrangian, dissipation, periodic }
     }
@@ -39,6 +39,14 @@ impl<S: Scalar> Model<S> {
     /// Scales `s_i` of the coordinates.
     pub fn scale(&self) -> &[S] {
         self.lagrangian.scale()
+    }
+    /// Reduces the periodic coordinates of states `(batch, n)` to `[0, 2 pi)`, where the functions know them.
+    pub fn wrap(&self, q: &mut [S]) {
+        for row in q.chunks_exact_mut(self.periodic.len()) {
+            for (q, _) in row.iter_mut().zip(&self.periodic).filter(|(_, periodic)| **periodic) {
+                *q = q.wrap_angle();
+            }
+        }
     }
     /// Offset among the parameters, rows and columns of every weight matrix of the Lagrangian, in order.
     pub fn matrices(&self) -> Vec<(usize, usize, usize)> {
@@ -68,8 +76,6 @@ impl Architecture {
 /// from call to call.
 #[derive(Debug)]
 pub struct Dynamics<S> {
-    periodic: Vec<bool>,
-    wrapped: Vec<S>,
     lagrangian: Evaluation<S>,
     dissipation: Option<Evaluation<S>>,
     /// `v.dD/dv`, `(batch)`.
@@ -80,34 +86,20 @@ impl<S: Scalar> Dynamics<S> {
     /// Buffers for a model.
     pub fn new(model: &Model<S>) -> Self {
         Self {
-            periodic: model.periodic.clone(),
-            wrapped: Vec::new(),
             lagrangian: Evaluation::new(Arc::clone(&model.lagrangian)),
             dissipation: model.dissipation.as_ref().map(|recorded| Evaluation::new(Arc::clone(recorded))),
             power: Vec::new(),
         }
     }
 
-    /// Evaluates states `q`, `v`, `(batch, n)` in physical units; the dissipation's force only if `forces`.
+    /// Evaluates states `q`, `v`, `(batch, n)` in physical units, angles as they are; the dissipation's force only if `forces`.
     pub fn evaluate(&mut self, parameters: &[S], q: &[S], v: &[S], depth: Depth, forces: bool) {
-        self.wrapped.clear();
-        self.wrapped.extend_from_slice(q);
-        let n = self.periodic.len();
-        for row in self.wrapped.chunks_exact_mut(n) {
-            for (q, _) in row.iter_mut().zip(&self.periodic).filter(|(_, periodic)| **periodic) {
-                *q = q.wrap_angle();
-            }
-        }
-        self.lagrangian.evaluate(parameters, &self.wrapped, v, depth);
+        self.lagrangian.evaluate(parameters, q, v, depth);
         let Some(dissipation) = self.dissipation.as_mut().filter(|_| forces) else { return };
-        dissipation.evaluate(
-            parameters,
-            &self.wrapped,
-            v,
-            if depth == Depth::Training { depth } else { Depth::Gradient },
-        );
+        dissipation.evaluate(parameters, q, v, if depth == Depth::Training { depth } else { Depth::Gradient });
         self.power.clear();
         let scale = dissipation.recorded().scale();
+        let n = scale.len();
         let rows = dissipation.momentum.chunks_exact(n).zip(v.chunks_exact(n));
         let zero = <S as Real>::zero();
         self.power.extend(rows.map(|(gradient, v)| {

@@ -25,6 +25,7 @@ pub struct NetworkLagrangian<S> {
 #[derive(Debug)]
 struct Workspace<S> {
     dynamics: Dynamics<S>,
+    wrapped: Vec<S>,
     linalg: linalg::Workspace<S>,
 }
 
@@ -142,7 +143,7 @@ impl<S: Scalar> NetworkLagrangian<S> {
 
 impl<S: Scalar> Workspace<S> {
     fn new(model: &Model<S>) -> Self {
-        Self { dynamics: Dynamics::new(model), linalg: linalg::Workspace::new() }
+        Self { dynamics: Dynamics::new(model), wrapped: Vec::new(), linalg: linalg::Workspace::new() }
     }
 
     /// Evaluates one chunk and appends its terms in physical units.
@@ -155,7 +156,10 @@ impl<S: Scalar> Workspace<S> {
     ) {
         let (scale, n) = (network.model.scale(), network.model.coordinates());
         let forces = request.includes(Request::FORCE);
-        self.dynamics.evaluate(&network.weights, q, v, depth, forces);
+        self.wrapped.clear();
+        self.wrapped.extend_from_slice(q);
+        network.model.wrap(&mut self.wrapped);
+        self.dynamics.evaluate(&network.weights, &self.wrapped, v, depth, forces);
         let evaluation = self.dynamics.lagrangian();
         let unscale =
             |from: &[S], to: &mut Vec<S>| to.extend(from.iter().enumerate().map(|(k, &x)| x * scale[k % n].recip()));

@@ -113,7 +113,20 @@ pub const TRAINING_SECTIONS: [Section<'static>; 8] = [
                 "gelu, softplus, x-tanh, tanh, quadratic, quadratic-softplus",
                 "Activation of the hidden layers; quadratic-softplus is two networks of half the widths.",
             ),
-            key("alpha", "a finite number", "Factor of the added |v|^2 of scaled velocities."),
+            key(
+                "structure",
+                "black-box, mechanical, metric",
+                "How the Lagrangian is made of the network's outputs; see structures.",
+            ),
+            optional(
+                "cyclic",
+                "[\"t\"]",
+                "names of coordinates",
+                "Coordinates that the Lagrangian does not depend on.",
+            ),
+            key("even_in_v", "true, false", "Make the Lagrangian even in the velocities."),
+            key("alpha", "a finite number", "Factor of the added |v|^2 of scaled velocities, of a black box."),
+            key("learn_alpha", "true, false", "Learn alpha too; a black box only."),
             optional(
                 "time_like",
                 "\"t\"",

@@ -181,6 +181,7 @@ pub fn sample_all<S: Scalar>(
     config.validate(system.coordinates)?;
     let coordinates = (system.system.coordinates)(system.coordinates);
     config.network.time_like_index(coordinates.iter().map(|c| c.name.as_ref()))?;
+    config.network.form(coordinates.iter().map(|c| c.name.as_ref()))?;
     let seed = config.seed;
     let mut training = Vec::with_capacity(config.phases.len());
     for (k, phase) in config.phases.iter().enumerate() {

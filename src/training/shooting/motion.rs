@@ -16,6 +16,7 @@ use crate::training::violations::Violations;
 
 /// The equation of motion on a chunk of states; buffers are reused from call to call.
 pub(super) struct Motion<S> {
+    model: Model<S>,
     dynamics: Dynamics<S>,
     directions: MixedDirections<S>,
     violations: Violations<S>,
@@ -33,6 +34,7 @@ pub(super) struct Motion<S> {
 impl<S: Scalar> Motion<S> {
     pub fn new(model: &Model<S>) -> Self {
         Self {
+            model: model.clone(),
             dynamics: Dynamics::new(model),
             directions: MixedDirections::default(),
             violations: Violations::new(model),
@@ -47,13 +49,14 @@ impl<S: Scalar> Motion<S> {
         }
     }
 
-    /// Evaluates the model at scaled states, `(states, n)`.
+    /// Evaluates the model at scaled states, `(states, n)`; angles are reduced to one turn first.
     pub fn evaluate(&mut self, weights: &[S], q: &[S], v: &[S], depth: Depth) {
         let n = self.scale.len();
         self.q.clear();
         self.v.clear();
         self.q.extend(q.iter().enumerate().map(|(k, &q)| q * self.scale[k % n]));
         self.v.extend(v.iter().enumerate().map(|(k, &v)| v * self.scale[k % n]));
+        self.model.wrap(&mut self.q);
         self.dynamics.evaluate(weights, &self.q, &self.v, depth, true);
     }
 
