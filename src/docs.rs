@@ -5,6 +5,7 @@
 //! | [`commands`] | every command and option of the program, exit codes, files |
 //! | [`configuration`] | every key of `config.toml`, presets |
 //! | [`recorded_motion`] | data of your own: formats, noise, friction, films |
+//! | [`structures`] | black box, mechanical, metric; what is known beforehand; hybrids in Rust |
 //! | [`method`] | equations, penalties, identities, units and conventions |
 //! | [`library`] | features, a Lagrangian of your own, states of your own, examples |
 //! | [`model_format`] | `model.safetensors`, readable without this crate |
@@ -23,6 +24,7 @@ macro_rules! page {
             "[configuration]: crate::docs::configuration\n",
             "[presets]: crate::docs::configuration#presets\n",
             "[recorded-motion]: crate::docs::recorded_motion\n",
+            "[structures]: crate::docs::structures\n",
             "[method]: crate::docs::method\n",
             "[conventions]: crate::docs::method#units-and-conventions\n",
             "[friction]: crate::docs::method#friction\n",
@@ -55,6 +57,7 @@ pages! {
     commands "commands.md";
     configuration "configuration.md";
     recorded_motion "recorded-motion.md";
+    structures "structures.md";
     method "method.md";
     library "library.md";
     model_format "model-format.md";
