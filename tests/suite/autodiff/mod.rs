@@ -1,4 +1,5 @@
 //! Derivatives by the tape: eager, and by recorded programs.
 
 mod program;
+mod recorded;
 mod tape;

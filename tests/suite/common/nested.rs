@@ -14,11 +14,16 @@ pub struct Reference<T> {
     pub c: Vec<T>,
 }
 
-/// The terms of one state, `q` and `v` in physical units.
+/// The terms of a network at one state, `q` and `v` in physical units.
 pub fn reference<T: Real>(architecture: &Architecture, weights: &[T], q: &[T], v: &[T]) -> Reference<T> {
-    let n = architecture.coordinates;
+    reference_of(architecture, &architecture.scale, weights, q, v)
+}
+
+/// The terms of any Lagrangian at one state, `q` and `v` in physical units.
+pub fn reference_of<T: Real>(system: &impl Lagrangian, scale: &[f64], weights: &[T], q: &[T], v: &[T]) -> Reference<T> {
+    let n = scale.len();
     let weights: Vec<HyperDual<T>> = weights.iter().map(|&w| HyperDual::lift(w)).collect();
-    let scale = |i: usize| T::from_f64(architecture.scale[i]);
+    let scale = |i: usize| T::from_f64(scale[i]);
     // Second derivative along two scaled directions, each a list of (index in (q, v), component).
     let jet = |s: &[(usize, T)], t: &[(usize, T)]| -> HyperDual<T> {
         let part = |direction: &[(usize, T)], k: usize| {
@@ -27,7 +32,7 @@ pub fn reference<T: Real>(architecture: &Architecture, weights: &[T], q: &[T], v
         let x: Vec<HyperDual<T>> = (0..2 * n)
             .map(|k| HyperDual::new(if k < n { q[k] } else { v[k - n] }, part(s, k), part(t, k), T::zero()))
             .collect();
-        architecture.lagrangian(&weights, &x[..n], &x[n..])
+        system.lagrangian(&weights, &x[..n], &x[n..])
     };
     let along: Vec<(usize, T)> = (0..n).map(|i| (i, v[i] / scale(i))).collect();
     let one = T::one();
