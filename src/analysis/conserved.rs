@@ -1,4 +1,4 @@
-//! How well a trajectory keeps what the exact motion keeps beside its energy.
+//! Errors of what the exact motion conserves beside its energy, along a trajectory.
 
 use crate::lagrangian::Configured;
 use crate::rollout::Trajectory;

@@ -4,7 +4,7 @@ use crate::lagrangian::EulerLagrange;
 use crate::rollout::{Integrable, Options, RolloutError, rollout};
 use serde::{Deserialize, Serialize};
 
-/// How fast neighbouring motions part.
+/// Rate at which neighbouring motions part.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Lyapunov {
     /// Finite-time largest exponent, per unit of time; near 0 or below for regular motion.

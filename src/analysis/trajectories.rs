@@ -65,7 +65,7 @@ pub struct TrajectoryTest<S> {
     pub max_steps: usize,
     /// Where the learned motion must stay; `None` lets it go anywhere.
     pub domain: Option<Domain<S>>,
-    /// Whether to estimate Lyapunov exponents of the exact motion.
+    /// `true` to estimate Lyapunov exponents of the exact motion.
     pub lyapunov: bool,
     /// Threads.
     pub threads: usize,
@@ -92,7 +92,7 @@ pub struct TrajectoryRun<S> {
     pub lyapunov: Option<Lyapunov>,
 }
 
-/// What a report and a script need of one start.
+/// Figures of one start, for reports and scripts.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TrajectorySummary {
     /// Coordinates at the start.

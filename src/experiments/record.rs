@@ -1,4 +1,4 @@
-//! What runs came to, and the rows of an experiment's table.
+//! Records of runs, and the rows of an experiment's table.
 
 use super::{Experiment, Reported, Run};
 use serde::{Deserialize, Serialize};
@@ -38,7 +38,7 @@ impl Learned {
     }
 }
 
-/// What a training came to; kept beside the model as `record.json`.
+/// Outcome of a training; kept beside the model as `record.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", tag = "outcome")]
 pub enum Outcome {
@@ -54,7 +54,7 @@ pub enum Outcome {
 /// A finished run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Record {
-    /// What it came to.
+    /// Its outcome.
     #[serde(flatten)]
     pub outcome: Outcome,
     /// Training and validation loss of every epoch, absent where not finite.
@@ -117,7 +117,7 @@ pub struct Row {
     pub chaotic_energy: Option<Spread>,
     /// Starts integrated to the end, of all.
     pub integrated: (usize, usize),
-    /// What the paper reports.
+    /// The paper's figures.
     pub reported: Reported,
 }
 

@@ -41,7 +41,7 @@ pub enum SystemError {
         system: &'static str,
         /// The symbol.
         symbol: &'static str,
-        /// What is allowed.
+        /// The values allowed.
         demand: String,
         /// The text given.
         found: String,
@@ -281,7 +281,7 @@ impl<S: Scalar> Configured<S> {
     /// Refuses coordinates where the system's chart ends (`r <= 0`, a pole, a horizon); the text says what is demanded.
     ///
     /// # Errors
-    /// What the coordinates must satisfy.
+    /// The condition that the coordinates violate.
     pub fn check_domain(&self, q: &[S]) -> Result<(), &'static str> {
         self.system.domain.map_or(Ok(()), |domain| domain(&leading(&self.parameters), &leading(q)))
     }

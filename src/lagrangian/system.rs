@@ -1,4 +1,4 @@
-//! What is known about a hand-written system apart from its Lagrangian.
+//! Facts about a hand-written system apart from its Lagrangian.
 
 use super::Lagrangian;
 use crate::scalar::Real;
@@ -133,7 +133,7 @@ pub struct Plane {
 /// Components of a vector at a state, given the parameters.
 pub type Vector = fn(parameters: &[f64], q: &[f64], v: &[f64]) -> Vec<f64>;
 
-/// What exact motion keeps beside its energy.
+/// Quantity that exact motion conserves beside its energy.
 #[derive(Clone, Copy, Debug)]
 pub struct Conserved {
     /// Name, with unit.
@@ -174,7 +174,7 @@ pub struct System {
     pub domain: Option<Domain>,
     /// Where it is in a plane; `None` for systems of one coordinate, whose coordinate over time says all.
     pub plane: Option<Plane>,
-    /// What is conserved beside the energy, if anything is.
+    /// Quantity that is conserved beside the energy, if there is one.
     pub conserved: Option<Conserved>,
 }
 

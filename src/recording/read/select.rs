@@ -22,7 +22,7 @@ pub struct Selection {
     pub width: usize,
     /// Time if it is a column, coordinates, velocities, accelerations, forces.
     pub values: Vec<Used>,
-    /// Whether the first of them is the time.
+    /// `true` if the first of them is the time.
     pub timed: bool,
     /// The column that tells trajectories apart.
     pub trajectory: Option<Used>,

@@ -95,7 +95,7 @@ fn wrong_columns_are_named() {
     );
     assert!(refusal(&text[16..], &Columns { rate: Some(1.0), ..coordinates("q") }).contains("in a file without names"));
     assert!(refusal(table("s,q1,q2", 20, &[]), &coordinates("q1")).contains("no column is called t or time"));
-    assert_eq!(refusal(table("t,q1,q1", 20, &[]), &coordinates("q1")), "row 1: column q1 stands there twice");
+    assert_eq!(refusal(table("t,q1,q1", 20, &[]), &coordinates("q1")), "row 1: duplicate column q1");
 }
 
 #[test]
