@@ -20,6 +20,7 @@ macro_rules! page {
     ($file:literal) => {
         concat!(
             "[commands]: crate::docs::commands\n",
+            "[rollout]: crate::docs::commands#lnn-rollout\n",
             "[configuration]: crate::docs::configuration\n",
             "[presets]: crate::docs::configuration#presets\n",
             "[recorded-motion]: crate::docs::recorded_motion\n",

@@ -15,7 +15,7 @@ pub struct Changes {
     /// half the widths [default: the configuration's, gelu in all presets].
     #[arg(long, value_name = "NAME", value_parser = activation)]
     pub activation: Option<Nonlinearity>,
-    /// What keeps the signature of the mass matrix.
+    /// Penalty that keeps the signature of the mass matrix.
     #[arg(long, value_enum, value_name = "KIND")]
     pub penalty: Option<PenaltyName>,
     /// Weight of the penalty beside the loss.

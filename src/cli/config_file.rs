@@ -24,12 +24,12 @@ pub struct ConfigFile {
     large: BTreeMap<String, u64>,
 }
 
-/// What is wrong with the value of a key.
+/// A wrong value of a key.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Mistake {
     /// Path of the key, such as `phase[0].rate`; empty for what concerns the whole file.
     pub key: String,
-    /// What is wrong.
+    /// The problem in words.
     pub problem: String,
 }
 
@@ -77,7 +77,7 @@ impl ConfigFile {
         tables.iter().try_fold(&self.table, |table, name| table.get(*name)?.as_table())?.get(*last)
     }
 
-    /// Whether a key is there, by its path in messages, such as `phase[0].rate`.
+    /// `true` if a key is there, by its path in messages, such as `phase[0].rate`.
     pub fn has(&self, path: &str) -> bool {
         self.lines.contains_key(path)
     }
@@ -204,14 +204,14 @@ fn with(root: &Value, path: &[Step], value: &Value) -> Value {
     }
 }
 
-/// Whether a value is a `T`, or what serde says.
+/// Test of a value: it is a `T`, or serde says why not.
 fn accepts<T: DeserializeOwned>(value: &Value) -> Result<(), String> {
     T::deserialize(value.clone()).map(drop).map_err(|e| e.message().to_string())
 }
 
 /// A base that takes the values of a file one by one.
 struct Filled {
-    /// What there is so far; it is always accepted.
+    /// The part read so far; it is always accepted.
     root: Value,
     mistakes: Vec<Mistake>,
     accepts: fn(&Value) -> Result<(), String>,
@@ -316,7 +316,7 @@ impl Filled {
 /// The key that says of which kind a table is.
 const KIND: &str = "kind";
 
-/// What a table of several kinds may come to: of the same kind, the base's with the file's values; of another one, what the
+/// Results that a table of several kinds may have: of the same kind, the base's with the file's values; of another one, what the
 /// two kinds have in common comes from the base.
 fn choices(base: &Table, file: &Table) -> Vec<Table> {
     let over = |keep: &dyn Fn(&str) -> bool| -> Table {

@@ -57,7 +57,7 @@ pub struct Args {
     json: bool,
 }
 
-/// What `evaluation.json` holds.
+/// Contents of `evaluation.json`.
 #[derive(Serialize)]
 struct Summary<'a> {
     system: &'a str,

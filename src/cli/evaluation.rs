@@ -1,4 +1,4 @@
-//! What a model is worth: accelerations, trajectories and pictures against the hand-written system.
+//! Evaluation of a model: accelerations, trajectories and pictures against the hand-written system.
 
 use crate::analysis::{
     Axis, ErrorDistribution, MassMatrixError, StartBox, Statistics, TrajectoryRun, TrajectorySummary, TrajectoryTest,
@@ -6,9 +6,10 @@ use crate::analysis::{
     wrong_signatures,
 };
 use crate::cli::attention::Attention;
-use crate::cli::{CliError, memory};
+use crate::cli::{CliError, headline, memory};
 use crate::lagrangian::system::TrajectoryTest as Span;
 use crate::lagrangian::{Configured, EulerLagrange};
+use crate::names::{WIDTH, hundredths, number, rounded, wrapped};
 use crate::report::{Figure, Fit, GridComparison, PlotError, Report, evaluation_figures, grid_figures, text_table};
 use crate::rollout::{Domain, Trajectory};
 use serde::Serialize;
@@ -41,7 +42,7 @@ pub struct Evaluation {
     /// Unit of times.
     #[serde(skip)]
     pub time_unit: &'static str,
-    /// What the exact motion conserves beside its energy.
+    /// Name of what the exact motion conserves beside its energy.
     #[serde(skip)]
     pub conserved: Option<&'static str>,
     /// Pictures.
@@ -61,7 +62,7 @@ pub struct Motion {
     pub left_training_range: Option<String>,
 }
 
-/// How to evaluate.
+/// Settings of an evaluation.
 #[derive(Clone, Debug)]
 pub struct Plan<'a> {
     /// Fresh states `(states, n)` on which accelerations are compared.
@@ -154,7 +155,7 @@ pub fn evaluate(
             .collect(),
         unit: match coordinates.iter().find(|c| c.unit != coordinates[0].unit) {
             None => coordinates[0].unit,
-            Some(_) => "each in its unit",
+            Some(_) => "its unit",
         },
         time_unit: system.system.time_unit,
         conserved: system.system.conserved.map(|conserved| conserved.name),
@@ -195,7 +196,7 @@ fn grids(
     let axes =
         shown.map(|component| Axis { component, from: ranges[component].0, to: ranges[component].1, points: GRID });
 
-    // L is -1/2 everywhere on a mass shell and would show nothing there; its learned M is learned nowhere else.
+    // L is -1/2 everywhere on a mass shell and would show nothing there. M is compared on the shell, where it was trained.
     let impose = |q: &[f64], v: &mut [f64]| system.impose_constraint(q, v).unwrap_or_else(|_| v.fill(f64::NAN));
     let lagrangian = |model: &dyn EulerLagrange<f64>| lagrangian_grid(model, &rest, axes);
     let determinant = |model: &dyn EulerLagrange<f64>, state: &[f64]| determinant_grid(model, state, axes, impose);
@@ -268,11 +269,6 @@ fn fixed(system: &Configured<f64>, state: &[f64], axes: [Axis; 2], imposed: bool
 /// Stands where there is no finite number.
 const NONE: &str = "-";
 
-/// Five digits.
-fn digits(x: f64) -> String {
-    if x.is_finite() { format!("{x:.4e}") } else { NONE.to_string() }
-}
-
 /// A table of a report.
 struct Table {
     title: String,
@@ -282,20 +278,24 @@ struct Table {
 
 impl Evaluation {
     fn tables(&self) -> [Table; 3] {
+        let units: Vec<&str> = self.coordinates.iter().map(|name| headline::named(name).1).collect();
+        let unit = units.first().filter(|unit| units.iter().all(|other| other == *unit));
         let accelerations = self.coordinates.iter().zip(&self.accelerations).map(|(name, e)| {
-            let numbers = [e.mean, e.rms, e.median, e.p99, e.max].map(digits);
-            [vec![name.clone()], numbers.to_vec(), vec![e.failed.to_string()]].concat()
+            let numbers = [e.mean, e.rms, e.median, e.p99, e.max].map(number);
+            let name = if unit.is_some() { headline::named(name).0 } else { name };
+            [vec![name.to_string()], numbers.to_vec(), vec![e.failed.to_string()]].concat()
         });
+        let measures = ["mean", "rms", "median", "99 % below", "max"];
+        let of_unit = |measure: &str| format!("{measure} [{}]", unit.unwrap_or(&"its unit"));
         let trajectories = self.trajectories.iter().enumerate().map(|(k, motion)| {
             let t = &motion.summary;
             let fastest = t.velocity_error.iter().fold(f64::NAN, |m, v| m.max(v.max));
-            let mut numbers = vec![t.coordinate_error.mean, t.coordinate_error.max, fastest];
-            numbers.extend([t.energy_error.mean, t.energy_error.max]);
-            numbers.extend(motion.conserved_error.map(|conserved| conserved.max));
             let mut row = vec![(k + 1).to_string(), format!("{:.1}", t.compared_until)];
-            row.extend(numbers.iter().map(|x| if x.is_finite() { format!("{x:.3e}") } else { NONE.to_string() }));
+            row.extend([t.coordinate_error.mean, t.coordinate_error.max, fastest].map(number));
+            row.extend([t.energy_error.mean, t.energy_error.max].map(hundredths));
+            row.extend(motion.conserved_error.map(|conserved| hundredths(conserved.max)));
             let time = t.lyapunov_exponent.filter(|exponent| *exponent > 0.0).map(f64::recip);
-            row.push(time.map_or(NONE.to_string(), |time| format!("{time:.1}")));
+            row.push(time.map_or(NONE.to_string(), |time| rounded(time, 2)));
             let exact = t.reference_stopped.as_ref().map(|stop| format!("exact motion: {stop}"));
             let remarks = [motion.left_training_range.clone(), t.stopped.clone(), exact];
             row.push(remarks.into_iter().flatten().collect::<Vec<_>>().join("; "));
@@ -303,19 +303,19 @@ impl Evaluation {
         });
         let t_end = self.trajectories.iter().fold(0.0, |m: f64, motion| m.max(motion.summary.compared_until));
         let MassMatrixError { factor, error: m } = &self.mass_matrix;
-        let matrix = [*factor, m.mean, m.median, m.p99, m.max].map(digits);
-        let matrix = [matrix.to_vec(), vec![m.failed.to_string()]].concat();
+        let matrix = [m.mean, m.median, m.p99, m.max].map(hundredths);
+        let matrix = [vec![number(*factor)], matrix.to_vec(), vec![m.failed.to_string()]].concat();
         let header = |names: &[&str]| names.iter().map(ToString::to_string).collect();
         let until = format!("until [{}]", self.time_unit);
         let lyapunov = format!("Lyapunov time [{}]", self.time_unit);
-        let conserved = self.conserved.map(|_| "conserved max");
-        let mean = format!("coordinates mean [{}]", self.unit);
-        let fastest = format!("velocities max [{}/{}]", self.unit, self.time_unit);
-        let mut motions = vec!["start", until.as_str(), &mean, "max", &fastest, "energy mean, relative", "max"];
+        let conserved = self.conserved.map(|_| "conserved, max [%]");
+        let [mean, most] = ["mean", "max"].map(|which| format!("coordinates, {which} [{}]", self.unit));
+        let fastest = format!("velocities, max [{}/{}]", self.unit, self.time_unit);
+        let mut motions = vec!["start", until.as_str(), &mean, &most, &fastest, "energy, mean [%]", "energy, max [%]"];
         motions.extend(conserved.into_iter().chain([lyapunov.as_str(), "remarks"]));
         let mut about = String::from("Trajectories from random starts against exact motion");
         if let Some(name) = self.conserved {
-            let _ = write!(about, "; conserved: {name}, relative");
+            let _ = write!(about, "; conserved: {name}");
         }
         if t_end > 1.0 {
             let _ = write!(about, "; motion without chaos has a Lyapunov time of about {:.0}", t_end / t_end.ln());
@@ -323,12 +323,13 @@ impl Evaluation {
         [
             Table {
                 title: "Error of accelerations on fresh states".into(),
-                header: header(&["acceleration", "mean", "rms", "median", "99 %", "max", "failed"]),
+                header: [vec!["acceleration of".to_string()], measures.map(of_unit).to_vec(), vec!["failed".into()]]
+                    .concat(),
                 rows: accelerations.collect(),
             },
             Table {
                 title: "Relative error of the mass matrix at rest, up to one factor".into(),
-                header: header(&["factor", "mean", "median", "99 %", "max", "failed"]),
+                header: header(&["factor [1]", "mean [%]", "median [%]", "99 % below [%]", "max [%]", "failed"]),
                 rows: vec![matrix],
             },
             Table { title: about, header: header(&motions), rows: trajectories.collect() },
@@ -339,10 +340,10 @@ impl Evaluation {
     pub fn text(&self) -> String {
         let tables = self.tables();
         let text = tables.iter().map(|t| format!("{}\n{}", t.title, text_table(&t.header, &t.rows)));
-        text.collect::<Vec<_>>().join("\n") + &self.note()
+        wrapped(&(headline::of_evaluation(self) + "\n" + &text.collect::<Vec<_>>().join("\n") + &self.note()), WIDTH)
     }
 
-    /// What a [`NONE`] means, if there is one.
+    /// Meaning of [`NONE`], if there is one in the tables.
     fn note(&self) -> String {
         let tables = self.tables();
         let mut cells = tables.iter().flat_map(|table| table.rows.iter().flatten());

@@ -6,14 +6,14 @@ use crate::cli::learning::{Begin, Effort, Keeping, Learning, forget, learn};
 use crate::cli::number::{count, threads};
 use crate::cli::progress::Progress as Bar;
 use crate::cli::results::CAPTIONS;
-use crate::cli::{CliError, Kind, interrupt, output};
+use crate::cli::{CliError, Kind, headline, interrupt, output};
 use crate::experiments::{Experiment, Outcome, Picture, Record, Run, Scale, experiments, find};
-use crate::names::counted;
+use crate::names::{WIDTH, counted, wrapped};
 use crate::recording::Columns;
 use crate::recording::read::read_recording;
 use crate::report::{
     Curve, EXPERIMENT_HEADER, Figure, REDUCTION_HEADER, Report, experiment_curves, experiment_figures,
-    experiment_table, reduction_table, text_table,
+    experiment_table, experiment_view, reduction_table, text_table,
 };
 use crate::training::{Every, Hooks, Stop};
 use std::collections::BTreeMap;
@@ -29,7 +29,7 @@ use std::time::Instant;
 pub struct Args {
     /// An experiment by name, or `all`; without a name they are listed with the tables and figures they regenerate.
     name: Option<String>,
-    /// How much of the paper's budget.
+    /// Share of the paper's budget.
     #[arg(long, value_enum, value_name = "SCALE", default_value = "short")]
     scale: ScaleName,
     /// Seeds of every run.
@@ -301,7 +301,8 @@ fn conclude(
     path: &Path,
     started: Instant,
 ) -> Result<(), CliError> {
-    let table = experiment_table(&experiment.rows(results));
+    let rows = experiment.rows(results);
+    let (table, (header, view)) = (experiment_table(&rows), experiment_view(&rows));
     let mut curves = experiment_curves(results);
     curves.extend_from_slice(beside);
     folder.write("table.csv", csv(&table).as_bytes())?;
@@ -319,13 +320,13 @@ fn conclude(
         started.elapsed().as_secs_f64()
     );
     let conventions = "Losses are the paper's: half the mean absolute error of scaled accelerations; times the mean scale \
-                       they are physical. Several runs: mean [lowest, highest]. Wrong signature: fraction of fresh \
+                       they are physical. Several runs: mean [lowest, highest]. Wrong signature: share of the fresh \
                        states. Integrated: starts of the trajectory test whose learned motion reached its end.";
     let report = Report::new(experiment.title)
         .paragraph(&format!("Regenerates: {}.", experiment.paper))
         .paragraph(&format!("The paper: {}", experiment.finding))
         .paragraph(&note)
-        .table(&EXPERIMENT_HEADER, &table)
+        .table(&header, &view)
         .paragraph(conventions);
     let remarks = experiment.remarks(&results.iter().map(|(run, _)| run).collect::<Vec<_>>());
     let reductions = reduction_table(&experiment.reductions(results));
@@ -349,18 +350,24 @@ fn conclude(
         });
         return output::print(&format!("{object}\n"));
     }
-    let mut text = text_table(&EXPERIMENT_HEADER, &table) + "\n";
+    let (energies, others): (Vec<usize>, Vec<usize>) =
+        (1..header.len()).partition(|&k| ["energy", "motions"].iter().any(|word| header[k].contains(word)));
+    let table_of = |columns: &[usize]| {
+        let columns: Vec<usize> = [0].iter().chain(columns).copied().collect();
+        let rows: Vec<Vec<&str>> = view.iter().map(|row| columns.iter().map(|&k| row[k].as_str()).collect()).collect();
+        text_table(&columns.iter().map(|&k| header[k]).collect::<Vec<_>>(), &rows)
+    };
+    let tables =
+        [others, energies].iter().filter(|columns| !columns.is_empty()).map(|c| table_of(c)).collect::<Vec<_>>();
+    let mut text = format!("{}\n{}\n", headline::of_experiment(&rows), tables.join("\n"));
     remarks.iter().for_each(|remark| text += &format!("{remark}\n"));
     if !reductions.is_empty() {
         text += &format!("\n{}", text_table(&REDUCTION_HEADER, &reductions));
     }
     let report = folder.file("report.html");
-    output::print(&format!(
-        "{} ({})\n{text}\n{note}\nreport: {}\n\n",
-        experiment.title,
-        experiment.paper,
-        report.display()
-    ))
+    let (title, paper) = (experiment.title, experiment.paper);
+    let place = if paper == "-" { String::new() } else { format!(" (of the paper: {paper})") };
+    output::print(&wrapped(&format!("{title}{place}\n{text}\n{note}\nreport: {}\n\n", report.display()), WIDTH))
 }
 
 /// Loss against time of every curve, as far as they are known.

@@ -76,7 +76,7 @@ impl ForceArgs {
                         CliError::usage(format_args!("--force {name}: {problem}, found {value:?}"))
                     })?;
                     if constants[i].replace(value).is_some() {
-                        return Err(CliError::usage(format_args!("--force: {name} stands there twice")));
+                        return Err(CliError::usage(format_args!("--force: {name} is given twice")));
                     }
                 }
                 _ => {

@@ -1,4 +1,4 @@
-//! What a model of recorded motion is worth: predictions of motion that was held out, and where its energy goes.
+//! Judgement of a model of recorded motion: predictions of motion that was held out, and the balance of its energy.
 
 use crate::analysis::{PredictionError, Predictions, Window, predict_by_constant_velocity, prediction_error};
 use crate::cli::attention::Attention;
@@ -6,6 +6,7 @@ use crate::cli::energy::{Balance, balance};
 use crate::cli::foretell::Foretold;
 use crate::cli::{CliError, forces};
 use crate::lagrangian::{EulerLagrange, Request, Terms};
+use crate::names::{number, percent};
 use crate::report::{Figure, LinePlot, PlotError, Report, Series, line_png, text_table};
 use crate::training::{Part, SignatureBuffers, has_signature};
 use serde::Serialize;
@@ -17,12 +18,12 @@ const AHEAD: f64 = 200.0;
 /// Points of a curve of prediction errors.
 const POINTS: usize = 40;
 
-/// How to judge.
+/// Settings of a judgement.
 #[derive(Clone, Copy, Debug)]
 pub struct Plan<'a> {
     /// Motion that the model has not seen.
     pub part: &'a Part,
-    /// How far ahead it is predicted, in s, if that is given.
+    /// Time over which it is predicted, in s, if that is given.
     pub horizon: Option<f64>,
     /// The time-like coordinate, if there is one.
     pub time: Option<usize>,
@@ -192,11 +193,11 @@ fn wrong_signature(model: &dyn EulerLagrange<f64>, part: &Part, time: Option<usi
 
 impl Judgement {
     const HEADERS: [&'static str; 7] = [
-        "time ahead (s)",
-        "median error (SI)",
-        "9 of 10 below (SI)",
-        "rms error (SI)",
-        "constant velocity: median (SI)",
+        "time ahead [s]",
+        "median error [SI]",
+        "9 of 10 below [SI]",
+        "rms error [SI]",
+        "constant velocity, median [SI]",
         "windows",
         "given up",
     ];
@@ -205,10 +206,9 @@ impl Judgement {
         let pairs = self.model.iter().zip(&self.constant_velocity);
         pairs
             .map(|(model, straight)| {
-                let numbers = [model.median, model.most, model.rms, straight.median]
-                    .map(|x| if x.is_finite() { format!("{x:.4e}") } else { "-".to_string() });
+                let numbers = [model.median, model.most, model.rms, straight.median].map(number);
                 let counts = [model.windows, model.missing].map(|count| count.to_string());
-                [vec![format!("{:.4}", model.seconds)], numbers.to_vec(), counts.to_vec()].concat()
+                [vec![number(model.seconds)], numbers.to_vec(), counts.to_vec()].concat()
             })
             .collect()
     }
@@ -225,21 +225,19 @@ impl Judgement {
         }
     }
 
-    /// Whether there was nothing to judge by.
+    /// `true` if there was nothing to judge by.
     fn is_of_nothing(&self) -> bool {
         self.wrong_signature.is_nan()
     }
 
-    /// What is not in the table of predictions, in words.
+    /// Remarks below the table of predictions, in words.
     fn remarks(&self) -> String {
         if self.is_of_nothing() {
             return "nothing was held out (--hold-out 0): nothing judges this model\n".to_string();
         }
         let mut text = self.given_up.clone();
-        text += &format!(
-            "mass matrix of the wrong signature: {:.2} % of the held-out states\n",
-            100.0 * self.wrong_signature
-        );
+        text +=
+            &format!("mass matrix of the wrong signature: {} of the held-out states\n", percent(self.wrong_signature));
         if let Some(balance) = &self.energy {
             text += &balance.text();
         }

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 
 /// A trained model.
 pub struct Learned<S> {
-    /// What the file says about it.
+    /// Header of the file.
     pub header: Header,
     /// The network in the precision of `S`.
     pub network: NetworkLagrangian<S>,

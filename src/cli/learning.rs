@@ -11,7 +11,7 @@ use crate::cli::{CliError, memory, output, start};
 use crate::experiments::{Outcome, Record};
 use crate::lagrangian::system::TrajectoryTest;
 use crate::lagrangian::{Configured, configure};
-use crate::names::counted;
+use crate::names::{counted, number};
 use crate::network::file::{FORMAT, Header, ModelFile, StoredPrecision};
 use crate::network::{Architecture, Layout, NetworkLagrangian};
 use crate::report::{Figure, HistoryRow, Report, training_figures};
@@ -27,7 +27,7 @@ use std::fmt::Write as _;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// What `summary.json` holds; losses in the paper's convention, errors in physical units.
+/// Contents of `summary.json`; losses in the paper's convention, errors in physical units.
 #[derive(Serialize)]
 struct Summary<'a> {
     system: &'a str,
@@ -49,7 +49,7 @@ struct Summary<'a> {
     evaluation: &'a Evaluation,
 }
 
-/// How much work a run may take.
+/// Amount of work that a run may take.
 #[derive(Clone, Copy, Debug)]
 pub struct Effort {
     /// Threads of the training.
@@ -60,7 +60,7 @@ pub struct Effort {
     pub horizon: f64,
 }
 
-/// What a run came to, after its files were written.
+/// A run that ended, after its files were written.
 #[derive(Debug)]
 pub struct Finished {
     /// Why training ended.
@@ -71,7 +71,7 @@ pub struct Finished {
     pub json: String,
     /// Tables for a terminal.
     pub text: String,
-    /// What an experiment keeps of it.
+    /// The record that an experiment keeps of it.
     pub record: Record,
 }
 
@@ -86,12 +86,12 @@ pub enum Begin {
     Either,
 }
 
-/// How a training keeps checkpoints.
+/// Use of checkpoints in a training.
 #[derive(Clone, Copy, Debug)]
 pub struct Keeping {
-    /// How often one is written.
+    /// Interval at which one is written.
     pub every: Every,
-    /// Whether one is read.
+    /// Place where the training begins.
     pub start: Begin,
 }
 
@@ -145,7 +145,7 @@ pub fn forget(folder: &Folder) -> Result<(), CliError> {
     remove_checkpoints(&Disk, folder.path()).map_err(cannot)
 }
 
-/// How a training went.
+/// Outcome of a training.
 #[derive(Debug)]
 pub enum Learning {
     /// There is a model.
@@ -257,7 +257,7 @@ fn learn_in<S: Scalar>(
     folder.write("summary.json", json.as_bytes())?;
     write_report(folder, system, &summary, &trained.history, &toml)?;
     let text =
-        format!("{}\n{}\nreport: {}\n", headline(&summary), evaluation.text(), folder.file("report.html").display());
+        format!("{}\n{}\nreport: {}\n", evaluation.text(), headline(&summary), folder.file("report.html").display());
     let outcome = Outcome::Learned(crate::experiments::Learned {
         validation_loss: trained.validation_loss,
         instability,
@@ -296,7 +296,7 @@ fn imposed_velocities<S: Scalar>(system: &Configured<f64>, data: &Datasets<S>) -
     ranges.reduce(|[low, high], [l, h]| [low.min(l), high.max(h)]).map(|range| (i, range))
 }
 
-/// What the model file says about this run.
+/// Header of the model file of this run.
 fn header(
     config: &Config,
     system: &Configured<f64>,
@@ -368,12 +368,12 @@ pub(super) fn history(epochs: &[Epoch]) -> String {
 /// The figures of a run in one line.
 fn headline(summary: &Summary<'_>) -> String {
     let fresh = match summary.test_loss {
-        loss if loss.is_finite() => format!("{loss:.6}"),
+        loss if loss.is_finite() => number(loss),
         _ => format!("not finite ({} states left out)", summary.test_states_left_out),
     };
     format!(
-        "loss (paper): validation {:.6}, fresh states {fresh}; {} in {:.1} s, {:.0} states/s, {}, seed {}\n",
-        summary.validation_loss,
+        "loss (paper): validation {}, fresh states {fresh}; {} in {:.1} s, {:.0} states/s, {}, seed {}\n",
+        number(summary.validation_loss),
         counted(summary.epochs, "epoch", "epochs"),
         summary.training_seconds,
         summary.states_per_second,

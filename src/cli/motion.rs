@@ -1,7 +1,7 @@
-//! What a roll-out tells beside its samples: where it left the training range, pictures, facts in JSON.
+//! Results of a roll-out beside its samples: where it left the training range, pictures, facts in JSON.
 
 use crate::cli::{CliError, input, output};
-use crate::names::counted;
+use crate::names::{counted, rounded};
 use crate::report::{Figure, LinePlot, Report, Series, line_png};
 use crate::rollout::{Domain, Trajectory};
 use crate::storage::{Disk, Growing, remove_leftovers, write_atomically};
@@ -20,7 +20,7 @@ pub struct Leaving {
     pub column: String,
     /// Its value.
     pub value: f64,
-    /// What it was trained on.
+    /// The range of the training states.
     pub trained_on: [f64; 2],
 }
 
@@ -28,7 +28,10 @@ impl Leaving {
     /// In words.
     pub fn text(&self) -> String {
         let Self { t, column, value, trained_on: [low, high] } = self;
-        format!("left the training range at t = {t}: {column} reached {value:.6e}, trained on [{low}, {high}]")
+        format!(
+            "left the training range at t = {t}: {column} reached {}, trained on [{low}, {high}]",
+            rounded(*value, 6)
+        )
     }
 }
 
@@ -131,7 +134,7 @@ fn thin(values: &mut Vec<f64>) {
     });
 }
 
-/// Whether a picture's file is to be a page.
+/// `true` if a picture's file is to be a page.
 fn is_page(path: &Path) -> bool {
     path.extension().is_some_and(|end| end.eq_ignore_ascii_case("html") || end.eq_ignore_ascii_case("htm"))
 }
@@ -143,7 +146,7 @@ pub fn picture_file(text: &str) -> Result<std::path::PathBuf, String> {
     if known { Ok(path) } else { Err("expected a file that ends in .png or .html".to_string()) }
 }
 
-/// What a roll-out came to, as one JSON object.
+/// Facts about a roll-out, as one JSON object.
 #[derive(Debug, Serialize)]
 pub struct Facts<'a> {
     /// Name of the system.
@@ -166,7 +169,7 @@ pub struct Facts<'a> {
     pub work: Option<f64>,
     /// Energy taken by friction.
     pub dissipated: Option<f64>,
-    /// What is not accounted for.
+    /// Energy that is not accounted for.
     pub energy_defect: Option<f64>,
     /// Where the motion left the training range.
     pub left_training_range: Option<&'a Leaving>,
@@ -174,7 +177,7 @@ pub struct Facts<'a> {
     pub out: String,
 }
 
-/// What the samples are written to.
+/// Place that the samples are written to.
 pub enum Target<'a> {
     /// Standard output, as they come.
     Standard,
@@ -229,10 +232,13 @@ impl Facts<'_> {
         let unit = self.time_unit.map_or(String::new(), |unit| format!(" {unit}"));
         let iterations =
             self.iterations.map_or(String::new(), |count| format!(" in {}", counted(count, "iteration", "iterations")));
-        let work = self.work.map_or(String::new(), |work| format!("forces gave {work:.9e}, "));
+        let work = self.work.map_or(String::new(), |work| format!("forces gave {}, ", rounded(work, 10)));
         let balance = match (self.energy_change, self.dissipated, self.energy_defect) {
             (Some(change), Some(dissipated), Some(defect)) => format!(
-                "energy changed by {change:.9e}, {work}friction took {dissipated:.9e}, not accounted for {defect:.1e}\n"
+                "energy changed by {}, {work}friction took {}, not accounted for {}\n",
+                rounded(change, 10),
+                rounded(dissipated, 10),
+                rounded(defect, 2)
             ),
             _ => String::new(),
         };

@@ -7,7 +7,7 @@ const LONGEST: usize = 100;
 /// part of a path, or nowhere, is none.
 ///
 /// # Errors
-/// What was expected.
+/// A description of plain names.
 pub fn plain_name(text: &str) -> Result<String, String> {
     let known = |c: char| c.is_alphanumeric() || "-_. ".contains(c);
     let begins = text.starts_with(char::is_alphanumeric) && !text.ends_with([' ', '.']);

@@ -6,7 +6,7 @@ use toml::{Table, Value};
 /// Longest line of a comment.
 const WIDTH: usize = 110;
 
-/// What a configuration is printed as.
+/// Form in which a configuration is printed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum PrintFormat {
     /// A commented configuration file.

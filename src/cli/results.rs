@@ -1,4 +1,4 @@
-//! What runs leave in their directories: who finds it there, and how it goes when another run replaces it.
+//! Results that runs leave in their directories: who finds them there, and how another run replaces them.
 
 use crate::cli::CliError;
 use crate::cli::files::{holds_something, same_file};
@@ -13,9 +13,9 @@ use std::path::{Path, PathBuf};
 
 /// File with the captions of a run's pictures, by file name; written before them, so that each is known.
 pub const CAPTIONS: &str = "captions.json";
-/// What only trainings and fits write.
+/// Files that only trainings and fits write.
 const LEARNED: [&str; 5] = [MODEL, "config.toml", "history.csv", "shooting.csv", "summary.json"];
-/// What evaluations write; trainings and fits have the last two as well.
+/// Files that evaluations write; trainings and fits have the last two as well.
 const EVALUATED: [&str; 3] = ["evaluation.json", "report.html", CAPTIONS];
 /// Longest file that is read to say what is there, in bytes.
 const MAX_BYTES: u64 = 1 << 26;
@@ -29,7 +29,7 @@ pub enum Writer {
     Evaluator,
 }
 
-/// What is in a directory, in words; `None` if a run can be written there and nothing is lost.
+/// Contents of a directory, in words; `None` if a run can be written there and nothing is lost.
 pub fn found(directory: &Path) -> Option<String> {
     if has_checkpoint(directory) {
         return Some(format!("an unfinished run (go on with it by: {})", command(directory)));

@@ -7,7 +7,7 @@ use crate::cli::motion::{Facts, Target, Watch, picture_file, place};
 use crate::cli::number::{finite, positive, tolerance};
 use crate::cli::{CliError, input, interrupt, output};
 use crate::lagrangian::{EulerLagrange, find};
-use crate::names::counted;
+use crate::names::{counted, rounded};
 use crate::rollout::{Balances, Driven, Method, Options, RolloutError, Trajectory, rollout_in_pieces};
 use crate::storage::check_target;
 use std::ops::ControlFlow;
@@ -244,8 +244,9 @@ fn ended(stop: &RolloutError, columns: &[String], method: Method) -> String {
     let fixed = method.is_structure_preserving();
     match stop {
         RolloutError::LeftDomain { t, component, value, lower, upper, .. } => format!(
-            "left the training range at t = {t}: {} reached {value:.6e}, trained on [{lower}, {upper}]; --beyond-range goes on",
-            columns.get(*component).map_or("a component", String::as_str)
+            "left the training range at t = {t}: {} reached {}, trained on [{lower}, {upper}]; --beyond-range goes on",
+            columns.get(*component).map_or("a component", String::as_str),
+            rounded(*value, 6)
         ),
         RolloutError::Stopped { t } => format!("interrupted at t = {t}"),
         RolloutError::NotConverged { .. } => format!("{stop}: a shorter --step may help"),

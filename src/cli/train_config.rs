@@ -288,7 +288,7 @@ fn replace(parameters: &mut Vec<(String, String)>, later: &[(String, String)]) {
     parameters.extend_from_slice(later);
 }
 
-/// What is wrong with a system's name or with its parameters, each of them by itself.
+/// Mistakes in a system's name and in its parameters, each of them by itself.
 fn wrong_parameters(name: &str, parameters: &[(String, String)], error: &SystemError) -> Vec<Mistake> {
     if matches!(error, SystemError::UnknownSystem { .. }) {
         return vec![Mistake::new("system", error)];
@@ -312,7 +312,7 @@ fn with_periods(file: &ConfigFile, mut config: Config) -> Config {
     config
 }
 
-/// How often checkpoints are written: `10` epochs, `90s`.
+/// Interval of checkpoints: `10` epochs, `90s`.
 pub fn every(text: &str) -> Result<Every, String> {
     match text.trim().strip_suffix('s') {
         Some(seconds) => positive(seconds).map(Every::Seconds),

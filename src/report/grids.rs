@@ -3,7 +3,7 @@
 use super::{Figure, HeatMap, PlotError, heat_maps_png};
 use crate::analysis::{AffineFit, Grid, affine_fit, factor_fit};
 
-/// What a learned quantity is free of.
+/// Transformation up to which a learned quantity is determined.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fit {
     /// Nothing: as it is.
@@ -29,11 +29,11 @@ pub struct GridComparison {
     pub exact: Grid,
     /// Learned values.
     pub learned: Grid,
-    /// What is fixed on the grid, in words (`v = 0 m/s`); may be empty.
+    /// Components that are fixed on the grid, in words (`v = 0 m/s`); may be empty.
     pub fixed: String,
     /// Up to what the two are compared.
     pub fit: Fit,
-    /// Whether to count and mark points where the learned value has the wrong sign, before any fit.
+    /// `true` to count and mark points where the learned value has the wrong sign, before any fit.
     pub signs: bool,
 }
 

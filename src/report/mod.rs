@@ -13,7 +13,7 @@ mod training;
 pub use evaluation::evaluation_figures;
 pub use experiment::{
     Curve, EXPERIMENT_HEADER, REDUCTION_HEADER, experiment_curves, experiment_figures, experiment_table,
-    reduction_table,
+    experiment_view, reduction_table,
 };
 pub use grids::{Fit, GridComparison, grid_figures};
 pub use html::Report;
@@ -28,6 +28,6 @@ pub struct Figure {
     pub file: String,
     /// PNG bytes.
     pub png: Vec<u8>,
-    /// What the picture shows.
+    /// Description of what the picture shows.
     pub caption: String,
 }

@@ -18,7 +18,7 @@ const ANGLES: [&[&str]; 2] = [&["angle"], &["upper", "lower"]];
 
 /// Swings at 50 Hz as a CSV, columns `run,t`, then positions, velocities and accelerations of every coordinate, the last two
 /// with `_dot` and `_ddot` behind its name; positions with a noise of `sigma`.
-fn swings(model: &dyn EulerLagrange<f64>, runs: usize, seconds: f64, sigma: f64) -> String {
+pub(super) fn swings(model: &dyn EulerLagrange<f64>, runs: usize, seconds: f64, sigma: f64) -> String {
     let mut rng = ChaCha8Rng::seed_from_u64(5);
     let n = model.coordinates();
     let columns: [String; 3] =

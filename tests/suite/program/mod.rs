@@ -14,6 +14,7 @@ mod motion;
 mod overwrite;
 mod pipes;
 mod resume;
+mod screen;
 mod signals;
 mod still;
 mod train;

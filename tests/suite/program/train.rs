@@ -181,7 +181,7 @@ fn a_model_moves_and_is_judged() {
     // Faster than the model was trained for.
     let fast = format!("{}:{0}", 3.0 * header.velocity[0][1]);
     let table = succeeded(&lnn(&["evaluate", &model, "--overwrite", "--velocities", &fast, "--until", "0.1"]));
-    assert!(table.contains(&format!("{} outside the training range at 0.0", header.columns[2])), "{table}");
+    assert!(table.contains(&format!("{} outside the training range", header.columns[2])), "{table}");
     refused(&evaluate(&["--positions", "0:1,0:1,0:1"]), 2, &["--positions: expected 1 or 2 pairs LOW:HIGH, found 3"]);
     refused(&evaluate(&["--velocities", "1:0"]), 2, &["--velocities", "LOW:HIGH"]);
     refused(&evaluate(&["--until", "0"]), 2, &["--until"]);
