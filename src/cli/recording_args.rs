@@ -91,7 +91,7 @@ impl RecordingArgs {
     /// The option that helps, with a colon before it.
     fn help(&self, problem: &Problem) -> &'static str {
         match problem {
-            Problem::NoTime => ": --time COLUMN or --rate HZ",
+            Problem::NoTime { .. } => ": --time COLUMN or --rate HZ",
             Problem::Missing { what: "time", .. } => ": --time COLUMN names it",
             Problem::Missing { what: "trajectory", .. } => ": --trajectory COLUMN names it",
             Problem::Missing { what: "coordinate", .. } => ": --coords names it",

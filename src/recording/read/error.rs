@@ -66,8 +66,14 @@ pub enum Problem {
         problem: String,
     },
     /// Neither times nor a rate.
-    #[error("no column is called t or time: name the column of time, or give the rate in samples per second")]
-    NoTime,
+    #[error(
+        "no column is called t or time{}: name the column of time, or give the rate in samples per second",
+        listed(names)
+    )]
+    NoTime {
+        /// Names of the columns there are; none in a file without names.
+        names: Vec<String>,
+    },
     /// Names for another number of columns.
     #[error("row {row}: expected {}, as many as columns are named, found {found}", counted(*expected, "field", "fields"))]
     Width {
@@ -161,4 +167,15 @@ pub enum Problem {
     /// The file could not be read to its end.
     #[error("cannot read: {0}")]
     Io(#[from] std::io::Error),
+}
+
+/// The first few names of columns, such as ` (there are s, x, y)`; nothing if there are none.
+fn listed(names: &[String]) -> String {
+    const SHOWN: usize = 8;
+    let first = names.iter().take(SHOWN).cloned().collect::<Vec<_>>().join(", ");
+    match names.len() {
+        0 => String::new(),
+        more if more > SHOWN => format!(" (there are {first} and {} more)", more - SHOWN),
+        _ => format!(" (there are {first})"),
+    }
 }
