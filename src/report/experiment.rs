@@ -340,7 +340,7 @@ mod tests {
                 chaotic_energy: Some(0.19),
             },
         };
-        let (header, rows) = experiment_view(&[row.clone()]);
+        let (header, rows) = experiment_view(std::slice::from_ref(&row));
         let at = |name: &str| rows[0][header.iter().position(|h| *h == name).unwrap()].as_str();
         assert_eq!((at("loss here [1]"), at("loss paper [1]")), ("0.0123 [0.0113, 0.0133]", "0.0197"));
         assert_eq!((at("regular motions here [%]"), at("regular motions paper [%]")), ("0.0460", "0.580"));
