@@ -55,10 +55,10 @@ fn benches(c: &mut Criterion) {
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     for system in lagrangian::systems() {
         let n = system.size.default();
-        let configured = lagrangian::configure::<f64>(system.name, &[]).expect("the defaults are valid");
+        let configured = lagrangian::configure::<f64>(&system.name, &[]).expect("the defaults are valid");
         let built = configured.build().expect("the system is of the catalogue");
-        let bounds = (system.validation)(n);
-        let mut group = c.benchmark_group(system.name);
+        let bounds = system.validation(n);
+        let mut group = c.benchmark_group(system.name.as_ref());
         group.sample_size(20).warm_up_time(Duration::from_millis(300)).measurement_time(Duration::from_millis(1500));
         for batch in [1, 16, 128, 1024] {
             let mut draw = |b: &[(f64, f64)]| -> Vec<f64> {

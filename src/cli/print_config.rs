@@ -23,6 +23,10 @@ pub fn commented(sections: &[Section<'_>], root: &Table, remarks: &dyn Fn(&str) 
     for section in sections {
         let path: Vec<&str> = section.name.split('.').filter(|name| !name.is_empty()).collect();
         let found = path.iter().try_fold(Value::Table(root.clone()), |value, name| value.get(*name).cloned());
+        // Of what has no keys of its own there is nothing to take in.
+        if found.is_none() && section.keys.is_empty() {
+            continue;
+        }
         if !section.name.is_empty() {
             text += &format!("\n{}", comment(section.purpose));
         }
@@ -107,7 +111,7 @@ mod tests {
     fn a_commented_configuration_is_the_configuration() {
         for system in systems() {
             for preset in [Preset::Quick, Preset::Best, Preset::Paper] {
-                let configured = configure(system.name, &[]).unwrap();
+                let configured = configure(&system.name, &[]).unwrap();
                 let Some(mut config) = preset.config(&configured) else { continue };
                 config.parameters.insert("m 1".to_string(), 2.0);
                 config.optimizer.clip = f64::INFINITY;
