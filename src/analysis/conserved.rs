@@ -36,7 +36,8 @@ mod tests {
         for system in systems().iter().filter(|system| system.conserved.is_some()) {
             let (n, parameters) = (system.size.default(), &system.parameters);
             // Other values than the defaults, which are mostly 1.
-            let given: Vec<(String, String)> = parameters.iter().map(|p| (p.symbol.to_string(), "1.25".into())).collect();
+            let given: Vec<(String, String)> =
+                parameters.iter().map(|p| (p.symbol.to_string(), "1.25".into())).collect();
             let system = configure::<f64>(&system.name, &given).unwrap();
             let (exact, test) = (system.build().unwrap(), system.system.trajectory(n));
             let bounds = StartBox { q: test.start.positions, v: test.start.velocities };

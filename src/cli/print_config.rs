@@ -38,6 +38,10 @@ pub fn commented(sections: &[Section<'_>], root: &Table, remarks: &dyn Fn(&str) 
                     text += &entries(section.keys, Some(table), k == 0);
                 }
             }
+            Some(Value::Table(table)) if section.keys.is_empty() && table.values().any(has_tables) => {
+                let whole = Table::from_iter([(section.name.to_string(), Value::Table(table))]);
+                text += &toml::to_string(&whole).unwrap_or_default();
+            }
             Some(Value::Table(table)) => {
                 if !section.name.is_empty() {
                     text += &format!("[{}]\n", section.name);
@@ -57,6 +61,11 @@ pub fn commented(sections: &[Section<'_>], root: &Table, remarks: &dyn Fn(&str) 
         }
     }
     text
+}
+
+/// Whether a value is a table, or a list of tables.
+fn has_tables(value: &Value) -> bool {
+    value.is_table() || value.as_array().is_some_and(|items| items.iter().any(Value::is_table))
 }
 
 /// A configuration that was printed with the seed 0, with another one: a seed may be larger than the integers of a table.

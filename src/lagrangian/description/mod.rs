@@ -85,6 +85,7 @@ pub struct ParameterDescription {
     /// Allowed values.
     pub range: Range,
     /// Whether its value is to be found by the training.
+    #[serde(skip_serializing_if = "is_false")]
     pub learn: bool,
 }
 

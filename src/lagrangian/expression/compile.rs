@@ -2,6 +2,7 @@
 
 use super::error::ExpressionError;
 use super::formula::{Formula, Instruction, Operand, Operation};
+use super::functions::PI;
 use super::number::Number;
 use super::tree::{Expression, Node};
 use crate::names::unknown;
@@ -93,7 +94,7 @@ impl Compiler {
         match scope.get(name) {
             Some(Meaning::Value(value)) => Ok(*value),
             Some(meaning) => Ok(self.meaning(*meaning)),
-            None => Err(unknown("name", name, scope.keys().map(String::as_str))),
+            None => Err(unknown("name", name, scope.keys().map(String::as_str).chain([PI]))),
         }
     }
 

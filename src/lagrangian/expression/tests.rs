@@ -74,7 +74,7 @@ fn mistakes_are_placed_and_explained() {
     refused("(x)(y)", "column 4: expected an operator or the end, found `(`; a product needs a *");
     refused("x**2", "column 3: expected a number, a name or a parenthesis, found `*`; a power is written ^");
     refused("x_dott", "column 1: unknown name \"x_dott\", did you mean \"x_dot\"?");
-    refused("m*theta", "column 3: unknown name \"theta\", expected one of m, x, x_dot, y, y_dot");
+    refused("m*theta", "column 3: unknown name \"theta\", expected one of m, x, x_dot, y, y_dot, pi");
     refused("sinn(x)", "column 1: `sinn` is no function; did you mean \"sin\"?");
     refused("m(x + y)", "column 1: `m` is no function; a product needs a *, as in 2*(a + b)");
     refused("cos x", "column 5: expected `(` behind the function `cos`, found `x`");

@@ -16,5 +16,6 @@ mod pipes;
 mod resume;
 mod signals;
 mod still;
+mod system_files;
 mod train;
 mod words;
