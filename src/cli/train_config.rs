@@ -382,13 +382,9 @@ impl Unusable {
 }
 
 /// What is wrong with the parameters of a system, each of them by itself.
-fn wrong_parameters(
-    system: &Cow<'static, System>,
-    parameters: &[(String, String)],
-    error: &SystemError,
-) -> Vec<Mistake> {
+fn wrong_parameters(system: &System, parameters: &[(String, String)], error: &SystemError) -> Vec<Mistake> {
     let alone = parameters.iter().filter_map(|one| {
-        let problem = configure_system::<f64>(system.clone(), std::slice::from_ref(one)).err()?;
+        let problem = configure_system::<f64>(Cow::Owned(system.clone()), std::slice::from_ref(one)).err()?;
         Some(Mistake::new(format!("parameters.{}", one.0), problem))
     });
     let found: Vec<Mistake> = alone.collect();

@@ -54,7 +54,9 @@ fn agree<S: Scalar>(text: &str, name: &str, given: &[(&str, &str)], rng: &mut Ch
 #[test]
 fn written_systems_are_the_catalogues() {
     let mut rng = ChaCha8Rng::seed_from_u64(31);
-    let cases: [(&str, &str, &[(&str, &str)]); 4] = [
+    /// A file, the catalogue's name of the same system, its parameters.
+    type Case<'a> = (&'a str, &'a str, &'a [(&'a str, &'a str)]);
+    let cases: [Case<'_>; 4] = [
         (TWO_PENDULA, "double-pendulum", &[]),
         (TWO_PENDULA, "double-pendulum", &[("m1", "0.1"), ("l2", "2.3"), ("g", "9.81")]),
         (BLACK_HOLE, "schwarzschild-geodesic", &[]),
