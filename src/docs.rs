@@ -3,6 +3,7 @@
 //! | page | for |
 //! |---|---|
 //! | [`commands`] | every command and option of the program, exit codes, files |
+//! | [`system_files`] | a system of your own as a text file: Lagrangian or metric, formulas |
 //! | [`configuration`] | every key of `config.toml`, presets |
 //! | [`recorded_motion`] | data of your own: formats, noise, friction, films |
 //! | [`method`] | equations, penalties, identities, units and conventions |
@@ -22,6 +23,7 @@ macro_rules! page {
             "[commands]: crate::docs::commands\n",
             "[rollout]: crate::docs::commands#lnn-rollout\n",
             "[configuration]: crate::docs::configuration\n",
+            "[system-files]: crate::docs::system_files\n",
             "[presets]: crate::docs::configuration#presets\n",
             "[recorded-motion]: crate::docs::recorded_motion\n",
             "[method]: crate::docs::method\n",
@@ -54,6 +56,7 @@ macro_rules! pages {
 
 pages! {
     commands "commands.md";
+    system_files "system-files.md";
     configuration "configuration.md";
     recorded_motion "recorded-motion.md";
     method "method.md";

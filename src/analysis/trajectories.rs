@@ -274,7 +274,7 @@ mod tests {
     fn relativistic_starts_are_on_the_mass_shell() {
         let system = configure::<f64>("ads3-geodesic", &[]).unwrap();
         let exact = system.build().unwrap();
-        let start = (system.system.trajectory)(3).start;
+        let start = system.system.trajectory(3).start;
         // Nothing drawn for the velocity of t is used.
         for t_dot in [(0.0, 0.0), (-9.0, 9.0)] {
             let mut v = start.velocities.clone();

@@ -38,10 +38,10 @@ pub struct Evaluation {
     pub coordinates: Vec<String>,
     /// Unit of all coordinates together.
     #[serde(skip)]
-    pub unit: &'static str,
+    pub unit: String,
     /// Unit of times.
     #[serde(skip)]
-    pub time_unit: &'static str,
+    pub time_unit: String,
     /// Name of what the exact motion conserves beside its energy.
     #[serde(skip)]
     pub conserved: Option<&'static str>,
@@ -104,7 +104,7 @@ pub fn evaluate(
         attention.advance(1);
         attention.check()
     };
-    let coordinates = (system.system.coordinates)(n);
+    let coordinates = system.system.coordinates(n);
     let periodic: Vec<bool> = coordinates.iter().map(|c| c.periodic).collect();
     let accelerations = acceleration_errors(exact, learned, plan.states.0, plan.states.1);
     done()?;
@@ -114,8 +114,7 @@ pub fn evaluate(
     memory::require("the evaluation", memory::motions((plan.starts as u64).saturating_mul(2), t_end / dt, n, 0))?;
     let defaults = TrajectoryTest::new(StartBox { q: start.positions, v: start.velocities }, periodic);
     // Steps grow with the time, and with the fifth root of the accuracy.
-    let longer =
-        (t_end / (system.system.trajectory)(n).t_end).max(1.0) * (defaults.rtol / plan.rtol).max(1.0).powf(0.2);
+    let longer = (t_end / system.system.trajectory(n).t_end).max(1.0) * (defaults.rtol / plan.rtol).max(1.0).powf(0.2);
     let test = TrajectoryTest {
         starts: plan.starts,
         seed: plan.seed,
@@ -154,10 +153,10 @@ pub fn evaluate(
             .map(|c| format!("{} [{}/{}^2]", c.name, c.unit, system.system.time_unit))
             .collect(),
         unit: match coordinates.iter().find(|c| c.unit != coordinates[0].unit) {
-            None => coordinates[0].unit,
-            Some(_) => "its unit",
+            None => coordinates[0].unit.to_string(),
+            Some(_) => "its unit".to_string(),
         },
-        time_unit: system.system.time_unit,
+        time_unit: system.system.time_unit.to_string(),
         conserved: system.system.conserved.map(|conserved| conserved.name),
         figures,
     })
@@ -181,7 +180,7 @@ fn grids(
     learned: &dyn EulerLagrange<f64>,
 ) -> Result<Vec<Figure>, CliError> {
     let n = system.coordinates;
-    let bounds = (system.system.validation)(n);
+    let bounds = system.system.validation(n);
     let middle: Vec<f64> = bounds.positions.iter().map(|(low, high)| 0.5 * (low + high)).collect();
     // At rest a total time derivative in the learned L vanishes: what is left is a factor and a constant.
     let mut rest: Vec<f64> = bounds.velocities.iter().map(|(low, high)| 0.0f64.clamp(*low, *high)).collect();

@@ -266,6 +266,7 @@ impl Job<'_> {
             parameters: Default::default(),
             columns: names.iter().cloned().chain(velocities).collect(),
             forces: forces::recorded(&self.args.recording.force),
+            description: None,
             precision: match self.args.precision() {
                 PrecisionName::F32 => StoredPrecision::F32,
                 PrecisionName::F64 => StoredPrecision::F64,

@@ -10,7 +10,7 @@ use crate::cli::systems::parameters;
 use crate::cli::{CliError, memory, output, start};
 use crate::experiments::{Outcome, Record};
 use crate::lagrangian::system::TrajectoryTest;
-use crate::lagrangian::{Configured, configure};
+use crate::lagrangian::{Configured, configure_system};
 use crate::names::{counted, number};
 use crate::network::file::{FORMAT, Header, ModelFile, StoredPrecision};
 use crate::network::{Architecture, Layout, NetworkLagrangian};
@@ -217,7 +217,7 @@ fn learn_in<S: Scalar>(
     let scale = architecture.scale.iter().sum::<f64>() / architecture.scale.len() as f64;
     let network = NetworkLagrangian::new(architecture, model.weights).map_err(CliError::data)?.cast::<f64>();
     let Effort { threads, starts, horizon } = effort;
-    let test = (system.system.trajectory)(system.coordinates);
+    let test = system.system.trajectory(system.coordinates);
     let plan = Plan {
         states: (&fresh.0, &fresh.1),
         starts,
@@ -307,7 +307,7 @@ fn header(
     // Defaults that change in a later version must not change this model.
     let mut parameters = all_parameters(system);
     parameters.extend(config.parameters.clone());
-    configure::<f64>(&config.system, &given(&parameters)).map_err(CliError::data)?;
+    configure_system::<f64>(system.system.clone(), &given(&parameters)).map_err(CliError::data)?;
     let hull = |bounds: fn(&Phase) -> &Vec<[f64; 2]>| {
         (0..system.coordinates)
             .map(|i| {
@@ -328,6 +328,7 @@ fn header(
         parameters,
         columns: system.system.columns(system.coordinates),
         forces: Vec::new(),
+        description: config.description.clone(),
         precision: match config.precision {
             Precision::F32 => StoredPrecision::F32,
             Precision::F64 => StoredPrecision::F64,
@@ -389,7 +390,7 @@ pub(super) fn parameter_table(report: Report, system: &Configured<f64>) -> Repor
         let value = values.get(symbol).map(f64::to_string).unwrap_or_default();
         vec![symbol.clone(), value, if unit == "1" { "-".to_string() } else { unit.clone() }]
     };
-    let rows: Vec<Vec<String>> = parameters(system.system).iter().map(row).collect();
+    let rows: Vec<Vec<String>> = parameters(&system.system).iter().map(row).collect();
     if rows.is_empty() {
         return report;
     }

@@ -7,6 +7,7 @@
 mod attention;
 mod changes;
 mod check;
+mod chosen;
 mod config;
 mod config_file;
 mod determined;
@@ -56,10 +57,12 @@ mod source;
 mod spool;
 mod start;
 mod states;
+mod subject;
 mod systems;
 mod train;
 mod train_config;
 
+pub use chosen::parse_system;
 pub use config::parse as parse_config;
 pub use error::{CliError, Kind};
 pub use states::{States, StatesError, parse_states};

@@ -97,7 +97,7 @@ fn first_over_time<S: Scalar>(
     system: &Configured<S>,
 ) -> Result<(), PlotError> {
     let n = system.coordinates;
-    let (coordinates, columns) = ((system.system.coordinates)(n), system.system.columns(n));
+    let (coordinates, columns) = (system.system.coordinates(n), system.system.columns(n));
     let labels = system.system.labels(n);
     let shown = if system.system.time_like.is_some() { 2 * n } else { n };
     for k in 0..shown {
@@ -174,7 +174,7 @@ fn smooth<S: Scalar>(trajectory: &Trajectory<S>) -> Vec<Vec<S>> {
 fn phases<S: Scalar>(figures: &mut Vec<Figure>, pair: Pair<'_, S>, system: &Configured<S>) -> Result<(), PlotError> {
     let n = system.coordinates;
     let (columns, labels) = (system.system.columns(n), system.system.labels(n));
-    for (i, coordinate) in (system.system.coordinates)(n).iter().enumerate() {
+    for (i, coordinate) in system.system.coordinates(n).iter().enumerate() {
         let path = |(label, trajectory): (&str, &Trajectory<S>)| {
             let (q, v) = (component(trajectory, i), component(trajectory, n + i));
             Series { points: folded(&q, &v, coordinate.periodic, true), ..Series::new(label, &[], &[]) }
@@ -293,7 +293,7 @@ mod tests {
     fn rates_of_clocks_are_shown_where_there_is_a_time() {
         let system = configure::<f64>("ads2-geodesic", &[]).unwrap();
         let exact = system.build().unwrap();
-        let start = (system.system.trajectory)(2).start;
+        let start = system.system.trajectory(2).start;
         let bounds = StartBox { q: start.positions, v: start.velocities };
         let test = TrajectoryTest { starts: 1, t_end: 0.5, dt: 0.01, ..TrajectoryTest::new(bounds, vec![false; 2]) };
         let runs = test.run_constrained(&system, exact.as_ref(), exact.as_ref()).unwrap();

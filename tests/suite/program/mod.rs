@@ -17,5 +17,6 @@ mod resume;
 mod screen;
 mod signals;
 mod still;
+mod system_files;
 mod train;
 mod words;
