@@ -2,14 +2,15 @@
 
 use crate::analysis::{
     Axis, ErrorDistribution, MassMatrixError, StartBox, Statistics, TrajectoryRun, TrajectorySummary, TrajectoryTest,
-    acceleration_errors, conserved_error, determinant_grid, lagrangian_grid, mass_matrix_error, statistics,
+    ValidTimes, acceleration_errors, conserved_error, determinant_grid, lagrangian_grid, mass_matrix_error, statistics,
     wrong_signatures,
 };
 use crate::cli::attention::Attention;
-use crate::cli::{CliError, memory};
+use crate::cli::{CliError, memory, verdict};
 use crate::lagrangian::system::TrajectoryTest as Span;
 use crate::lagrangian::{Configured, EulerLagrange};
-use crate::report::{Figure, Fit, GridComparison, PlotError, Report, evaluation_figures, grid_figures, text_table};
+use crate::names::number;
+use crate::report::{Figure, Fit, GridComparison, Report, evaluation_figures, grid_figures, text_table};
 use crate::rollout::{Domain, Trajectory};
 use serde::Serialize;
 use std::fmt::Write as _;
@@ -18,6 +19,8 @@ use std::fmt::Write as _;
 const GRID: usize = 81;
 /// Relative tolerance of the learned motion in the paper's test.
 pub const RTOL: f64 = 1e-6;
+/// Starts whose motion is drawn.
+const DRAWN: usize = 4;
 /// Velocities of the fast map of `det M`, in upper bounds of the validation states.
 const FAST: f64 = 0.99;
 
@@ -30,6 +33,8 @@ pub struct Evaluation {
     pub wrong_signature: f64,
     /// Error of the mass matrix, of a geodesic the metric, at rest at the positions of the fresh states.
     pub mass_matrix: MassMatrixError,
+    /// How long the learned motion predicts the exact one, median over the starts.
+    pub valid_time: Option<ValidTimes>,
     /// One entry per random start.
     pub trajectories: Vec<Motion>,
     /// Names of the accelerations' coordinates, with the accelerations' units.
@@ -135,7 +140,9 @@ pub fn evaluate(
         left_training_range: leaving(&run.learned.trajectory, &plan.trained, &system.system.columns(n)),
     };
 
-    let mut figures = evaluation_figures(&runs, system).map_err(CliError::data)?;
+    let portraits = test.portraits(exact, learned, &runs[..runs.len().min(DRAWN)]);
+    attention.check()?;
+    let mut figures = evaluation_figures(&runs, &portraits, system);
     let grids = grids(system, exact, learned);
     attention.check()?;
     figures.extend(grids?);
@@ -147,6 +154,7 @@ pub fn evaluate(
         accelerations,
         wrong_signature,
         mass_matrix,
+        valid_time: ValidTimes::of(&runs.iter().map(|run| (run.valid, run.chaos())).collect::<Vec<_>>()),
         trajectories: runs.iter().map(motion).collect(),
         coordinates: coordinates
             .iter()
@@ -231,12 +239,11 @@ fn grids(
             fit: if quantity == "L" { Fit::Affine } else { Fit::Factor },
             signs: quantity != "L",
         };
-        match grid_figures(&comparison) {
-            Ok((figure, _)) => figures.push(figure),
-            // A model that is finite nowhere on the grid has no picture; the tables say so.
-            Err(PlotError::Empty(_)) => {}
-            Err(error) => return Err(CliError::data(error)),
-        }
+        // A model that is finite nowhere on the grid has no picture; the tables say so.
+        figures.extend(grid_figures(&comparison).ok().map(|(mut figure, _)| {
+            figure.caption += if system.system.time_unit == "s" { " SI units." } else { " Geometric units." };
+            figure
+        }));
     }
     Ok(figures)
 }
@@ -292,7 +299,8 @@ impl Evaluation {
             let mut numbers = vec![t.coordinate_error.mean, t.coordinate_error.max, fastest];
             numbers.extend([t.energy_error.mean, t.energy_error.max]);
             numbers.extend(motion.conserved_error.map(|conserved| conserved.max));
-            let mut row = vec![(k + 1).to_string(), format!("{:.1}", t.compared_until)];
+            let valid = format!("{}{}", number(t.valid.time), if t.valid.at_least { "+" } else { "" });
+            let mut row = vec![(k + 1).to_string(), format!("{:.1}", t.compared_until), valid];
             row.extend(numbers.iter().map(|x| if x.is_finite() { format!("{x:.3e}") } else { NONE.to_string() }));
             let time = t.lyapunov_exponent.filter(|exponent| *exponent > 0.0).map(f64::recip);
             row.push(time.map_or(NONE.to_string(), |time| format!("{time:.1}")));
@@ -311,7 +319,8 @@ impl Evaluation {
         let conserved = self.conserved.map(|_| "conserved max");
         let mean = format!("coordinates mean [{}]", self.unit);
         let fastest = format!("velocities max [{}/{}]", self.unit, self.time_unit);
-        let mut motions = vec!["start", until.as_str(), &mean, "max", &fastest, "energy mean, relative", "max"];
+        let valid = format!("valid [{}]", self.time_unit);
+        let mut motions = vec!["start", until.as_str(), &valid, &mean, "max", &fastest, "energy mean, relative", "max"];
         motions.extend(conserved.into_iter().chain([lyapunov.as_str(), "remarks"]));
         let mut about = String::from("Trajectories from random starts against exact motion");
         if let Some(name) = self.conserved {
@@ -339,7 +348,12 @@ impl Evaluation {
     pub fn text(&self) -> String {
         let tables = self.tables();
         let text = tables.iter().map(|t| format!("{}\n{}", t.title, text_table(&t.header, &t.rows)));
-        text.collect::<Vec<_>>().join("\n") + &self.note()
+        let valid = self.valid_time.as_ref().map(|valid| {
+            let (name, time) =
+                (verdict::valid_name(valid, ["start", "starts"]), verdict::valid_time(valid, self.time_unit));
+            format!("{name}: {time}\n")
+        });
+        text.collect::<Vec<_>>().join("\n") + &valid.unwrap_or_default() + &self.note()
     }
 
     /// What a [`NONE`] means, if there is one.
@@ -355,6 +369,12 @@ impl Evaluation {
         .to_string()
     }
 
+    /// What was learned and how good it is, at the beginning of a report about a system.
+    pub fn summarise(&self, report: Report, title: &str) -> Report {
+        let (sentence, rows) = verdict::of_evaluation(title, self);
+        report.summary(&sentence, &rows)
+    }
+
     /// Tables and pictures for a report.
     pub fn report(&self, mut report: Report) -> Report {
         for Table { title, header, rows } in self.tables() {
@@ -364,8 +384,7 @@ impl Evaluation {
         if !note.is_empty() {
             report = report.paragraph(note.trim());
         }
-        report = report.heading("Learned against exact");
-        self.figures.iter().fold(report, |report, figure| report.figure(&figure.png, &figure.caption))
+        report.heading("Learned against exact").figures(&self.figures)
     }
 }
 
@@ -392,10 +411,10 @@ mod tests {
         begins(
             &captions("triple-pendulum"),
             &[
-                ("lagrangian.png", &format!("L at {rest}")),
-                ("det_mass_matrix.png", &format!("det M at {rest}")),
+                ("lagrangian.svg", &format!("L at {rest}")),
+                ("det_mass_matrix.svg", &format!("det M at {rest}")),
                 (
-                    "det_mass_matrix_fast.png",
+                    "det_mass_matrix_fast.svg",
                     "Fast det M at theta3 = 3.1416 rad; theta1_dot, theta2_dot, theta3_dot = 9.9 rad/s: exact",
                 ),
             ],
@@ -403,14 +422,14 @@ mod tests {
         begins(
             &captions("ads2-geodesic"),
             &[
-                ("lagrangian.png", "L at t_dot = 3.25 m/m; z_dot = 0 m/m: exact"),
-                ("det_mass_matrix.png", "det M at t_dot by the mass shell; z_dot = 0 m/m: exact"),
-                ("det_mass_matrix_fast.png", "Fast det M at t_dot by the mass shell; z_dot = 0.594 m/m: exact"),
+                ("lagrangian.svg", "L at t_dot = 3.25 m/m; z_dot = 0 m/m: exact"),
+                ("det_mass_matrix.svg", "det M at t_dot by the mass shell; z_dot = 0 m/m: exact"),
+                ("det_mass_matrix_fast.svg", "Fast det M at t_dot by the mass shell; z_dot = 0.594 m/m: exact"),
             ],
         );
         // The velocity is an axis: there is no fast map.
         let one = captions("harmonic-oscillator");
-        begins(&one, &[("lagrangian.png", "L: exact"), ("det_mass_matrix.png", "det M: exact")]);
+        begins(&one, &[("lagrangian.svg", "L: exact"), ("det_mass_matrix.svg", "det M: exact")]);
         assert!(one[1].1.contains("right sign at every point") && !one[0].1.contains("sign"));
     }
 }

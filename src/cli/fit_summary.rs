@@ -1,10 +1,10 @@
 //! What `lnn fit` found, in `summary.json`, in words and in the report.
 
-use crate::cli::CliError;
 use crate::cli::determined::Determined;
 use crate::cli::folder::Folder;
 use crate::cli::judgement::Judgement;
 use crate::cli::learning::{ended, training_pictures, write_report_and_figures};
+use crate::cli::{CliError, verdict};
 use crate::names::counted;
 use crate::recording::{HeldOut, Recording, Targets};
 use crate::report::Report;
@@ -103,16 +103,17 @@ impl<'a, S: Scalar> Found<'a, S> {
         let json = serde_json::to_string_pretty(&summary).map_err(CliError::data)? + "\n";
         folder.write("summary.json", json.as_bytes())?;
         let text = summary.text(self.recording);
-        let mut figures = training_pictures(&self.trained.history)?;
+        let mut figures = training_pictures(&self.trained.history);
         if let Some(shot) = self.shot {
-            let mut later = training_pictures(&shot.history)?;
+            let mut later = training_pictures(&shot.history);
             later.iter_mut().for_each(|figure| figure.file.insert_str(0, "shooting_"));
             figures.extend(later);
         }
-        let report = Report::new(&format!("{}: learned from recorded motion", self.name)).preformatted(&text);
+        let (sentence, rows) = verdict::of_judgement(self.name, self.judgement);
+        let report = Report::new(&format!("{}: learned from recorded motion", self.name)).summary(&sentence, &rows);
+        let report = report.preformatted(&text);
         let report = self.determined.report(self.judgement.report(report)).heading("Training");
-        let report = figures.iter().fold(report, |report, figure| report.figure(&figure.png, &figure.caption));
-        let report = report.heading("Configuration").preformatted(toml);
+        let report = report.figures(&figures).heading("Configuration").preformatted(toml);
         write_report_and_figures(folder, &report, figures.iter().chain(&self.judgement.figures))?;
         let text = format!("{text}\nreport: {}\n", folder.file("report.html").display());
         Ok(if as_json { json } else { text })

@@ -403,11 +403,11 @@ fn write_report(
     epochs: &[Epoch],
     toml: &str,
 ) -> Result<(), CliError> {
-    let training = training_pictures(epochs)?;
-    let report = Report::new(&format!("{}: learned", system.system.title)).paragraph(&headline(summary));
+    let training = training_pictures(epochs);
+    let report = Report::new(&format!("{}: learned", system.system.title));
+    let report = summary.evaluation.summarise(report, system.system.title).paragraph(&headline(summary));
     let report = summary.evaluation.report(parameter_table(report, system)).heading("Training");
-    let report = training.iter().fold(report, |report, figure| report.figure(&figure.png, &figure.caption));
-    let report = report.heading("Configuration").preformatted(toml);
+    let report = report.figures(&training).heading("Configuration").preformatted(toml);
     write_report_and_figures(folder, &report, training.iter().chain(&summary.evaluation.figures))
 }
 
@@ -422,7 +422,7 @@ pub(super) fn save<S: Scalar>(folder: &Folder, model: &ModelFile<S>) -> Result<(
 }
 
 /// Pictures of a history.
-pub(super) fn training_pictures(epochs: &[Epoch]) -> Result<Vec<Figure>, CliError> {
+pub(super) fn training_pictures(epochs: &[Epoch]) -> Vec<Figure> {
     let row = |e: &Epoch| HistoryRow {
         epoch: e.epoch as f64,
         training_loss: e.training_loss,
@@ -431,7 +431,7 @@ pub(super) fn training_pictures(epochs: &[Epoch]) -> Result<Vec<Figure>, CliErro
         gradient_norm: e.gradient_norm,
         penalty: e.penalty,
     };
-    training_figures(&epochs.iter().map(row).collect::<Vec<_>>()).map_err(CliError::data)
+    training_figures(&epochs.iter().map(row).collect::<Vec<_>>())
 }
 
 /// Writes [`CAPTIONS`], which name the pictures and tell what they show, the report, and the pictures.
@@ -446,5 +446,5 @@ pub(super) fn write_report_and_figures<'a>(
     let captions: BTreeMap<&str, &str> = figures.clone().map(|f| (f.file.as_str(), f.caption.as_str())).collect();
     folder.write(CAPTIONS, serde_json::to_string_pretty(&captions).map_err(CliError::data)?.as_bytes())?;
     folder.write("report.html", report.to_html().as_bytes())?;
-    figures.into_iter().try_for_each(|figure| folder.write(&figure.file, &figure.png))
+    figures.into_iter().try_for_each(|figure| folder.write(&figure.file, figure.picture.to_svg().as_bytes()))
 }

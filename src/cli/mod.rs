@@ -56,8 +56,10 @@ mod spool;
 mod start;
 mod states;
 mod systems;
+mod taken;
 mod train;
 mod train_config;
+mod verdict;
 
 pub use config::parse as parse_config;
 pub use error::{CliError, Kind};

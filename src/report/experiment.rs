@@ -1,7 +1,8 @@
 //! Tables and pictures of an experiment: the paper's figures beside ours.
 
-use super::{Figure, LinePlot, PlotError, Series, line_png};
+use super::{Figure, LinePlot, Series, kept, line_plot};
 use crate::experiments::{Experiment, Outcome, Picture, Record, Reduction, Row, Run, Spread};
+use crate::names::{counted, percent};
 
 /// Header of [`experiment_table`].
 pub const EXPERIMENT_HEADER: [&str; 13] = [
@@ -56,6 +57,35 @@ fn number(x: f64) -> String {
     } else {
         format!("{x:.3e}")
     }
+}
+
+/// The best row of an experiment in a sentence, beside the paper's best, and in a short table.
+pub fn experiment_summary(rows: &[Row]) -> (String, Vec<[String; 2]>) {
+    let lowest = |of: fn(&Row) -> Option<f64>| {
+        let known = rows.iter().filter_map(|row| Some((row, of(row).filter(|loss| loss.is_finite())?)));
+        known.min_by(|a, b| a.1.total_cmp(&b.1))
+    };
+    let (runs, failed) = rows.iter().fold((0, 0), |(runs, failed), row| (runs + row.runs, failed + row.failed));
+    let runs_of = counted(runs, "run", "runs");
+    let (own, paper) = (lowest(|row| row.loss.map(|loss| loss.mean)), lowest(|row| row.reported.loss));
+    let of = |found: Option<(&Row, f64)>| found.map(|(row, loss)| format!("{} ({})", number(loss), row.label));
+    let beside = of(paper).map_or(String::new(), |paper| format!("; the paper's best is {paper}"));
+    let sentence = match own {
+        Some((row, loss)) => {
+            format!("The best of {runs_of}, {}, reached a loss of {}{beside}.", row.label, number(loss))
+        }
+        None => format!("None of {runs_of} learned anything{beside}."),
+    };
+    let none = || "-".to_string();
+    let share = |of: fn(&Row) -> Option<Spread>| percent(own.and_then(|(row, _)| of(row)).map_or(f64::NAN, |s| s.mean));
+    let table = [
+        ("lowest loss", of(own).unwrap_or_else(none)),
+        ("lowest loss in the paper", of(paper).unwrap_or_else(none)),
+        ("runs", if failed == 0 { runs.to_string() } else { format!("{runs}, {failed} learned nothing") }),
+        ("states of wrong signature (best run)", share(|row| row.wrong_signature)),
+        ("energy error of predicted motion (best run)", share(|row| row.energy)),
+    ];
+    (sentence, table.map(|(what, value)| [what.to_string(), value]).to_vec())
 }
 
 /// Rows of the paper's table beside ours, below [`EXPERIMENT_HEADER`]; losses and instabilities in the paper's convention,
@@ -123,22 +153,10 @@ fn reached(curves: &[Curve]) -> Vec<Series> {
 }
 
 /// Pictures of an experiment from its finished runs, and `curves` where time matters; what has nothing to show is left out.
-///
-/// # Errors
-/// [`PlotError::Renderer`] if the renderer fails.
-pub fn experiment_figures(
-    experiment: &Experiment,
-    results: &[(Run, Option<Record>)],
-    curves: &[Curve],
-) -> Result<Vec<Figure>, PlotError> {
+pub fn experiment_figures(experiment: &Experiment, results: &[(Run, Option<Record>)], curves: &[Curve]) -> Vec<Figure> {
     let mut figures = Vec::new();
-    let mut add = |file: &str, caption: String, plot: LinePlot| match line_png(&plot) {
-        Ok(png) => {
-            figures.push(Figure { file: format!("{file}.png"), png, caption });
-            Ok(())
-        }
-        Err(PlotError::Empty(_)) => Ok(()),
-        Err(error) => Err(error),
+    let mut add = |file: &str, caption: String, plot: LinePlot| {
+        figures.extend(kept(&format!("{file}.svg"), line_plot(&plot), caption));
     };
     for (part, word) in [(0, "training"), (1, "validation")] {
         add(
@@ -150,8 +168,10 @@ pub fn experiment_figures(
                 y_label: "loss".into(),
                 log_y: true,
                 series: loss_curves(results, part),
+                turn: None,
+                level: None,
             },
-        )?;
+        );
     }
     for picture in experiment.pictures {
         match picture {
@@ -166,8 +186,10 @@ pub fn experiment_figures(
                     y_label: "lowest validation loss".into(),
                     log_y: true,
                     series: scan(results),
+                    turn: None,
+                    level: None,
                 },
-            )?,
+            ),
             Picture::TradeOff => add(
                 "trade_off",
                 "Lowest validation loss against training instability, one point per run; lower left is better.".into(),
@@ -177,8 +199,10 @@ pub fn experiment_figures(
                     y_label: "lowest validation loss".into(),
                     log_y: true,
                     series: trade_off(results),
+                    turn: None,
+                    level: None,
                 },
-            )?,
+            ),
             Picture::Clock => add(
                 "time_to_accuracy",
                 "Lowest validation loss so far against seconds of training, paper convention.".into(),
@@ -188,12 +212,14 @@ pub fn experiment_figures(
                     y_label: "lowest validation loss".into(),
                     log_y: true,
                     series: reached(curves),
+                    turn: None,
+                    level: None,
                 },
-            )?,
+            ),
             Picture::Evaluation(_) => {}
         }
     }
-    Ok(figures)
+    figures
 }
 
 /// Groups in the order of first appearance with their records.
