@@ -30,6 +30,7 @@ macro_rules! page {
             "[conventions]: crate::docs::method#units-and-conventions\n",
             "[friction]: crate::docs::method#friction\n",
             "[penalties]: crate::docs::method#penalties\n",
+            "[valid]: crate::docs::method#time-of-valid-prediction\n",
             "[off-shell]: crate::docs::method#metrics-from-geodesics\n",
             "[derivatives]: crate::docs::method#derivatives-of-the-network\n",
             "[library]: crate::docs::library\n",

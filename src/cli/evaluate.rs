@@ -132,7 +132,9 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let summary = Summary { system: &system.system.name, seed, validation_loss, evaluation: &evaluation };
     let json = serde_json::to_string_pretty(&summary).map_err(CliError::data)? + "\n";
     let title = format!("{}: learned against exact", system.system.title);
-    let report = Report::new(&title).paragraph(&format!("Model {}, starts of seed {seed}.", args.model.display()));
+    let report = evaluation
+        .summarise(Report::new(&title), &system.system.title)
+        .paragraph(&format!("Model {}, starts of seed {seed}.", args.model.display()));
     remove_stale_evaluation(&folder)?;
     folder.write("evaluation.json", json.as_bytes())?;
     let report = evaluation.report(parameter_table(report, &system));
@@ -140,5 +142,9 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     if args.json {
         return output::print(&json);
     }
-    output::print(&format!("{}\nreport: {}\n", evaluation.text(), folder.file("report.html").display()))
+    output::print(&format!(
+        "{}\nreport: {}\n",
+        evaluation.text(&system.system.title),
+        folder.file("report.html").display()
+    ))
 }

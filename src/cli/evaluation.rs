@@ -2,7 +2,7 @@
 
 use crate::analysis::{
     Axis, ErrorDistribution, MassMatrixError, StartBox, Statistics, TrajectoryRun, TrajectorySummary, TrajectoryTest,
-    acceleration_errors, conserved_error, determinant_grid, lagrangian_grid, mass_matrix_error, statistics,
+    ValidTimes, acceleration_errors, conserved_error, determinant_grid, lagrangian_grid, mass_matrix_error, statistics,
     wrong_signatures,
 };
 use crate::cli::attention::Attention;
@@ -10,7 +10,7 @@ use crate::cli::{CliError, headline, memory};
 use crate::lagrangian::system::TrajectoryTest as Span;
 use crate::lagrangian::{Configured, EulerLagrange};
 use crate::names::{WIDTH, hundredths, number, rounded, wrapped};
-use crate::report::{Figure, Fit, GridComparison, PlotError, Report, evaluation_figures, grid_figures, text_table};
+use crate::report::{Figure, Fit, GridComparison, Report, evaluation_figures, grid_figures, text_table};
 use crate::rollout::{Domain, Trajectory};
 use serde::Serialize;
 use std::fmt::Write as _;
@@ -19,6 +19,8 @@ use std::fmt::Write as _;
 const GRID: usize = 81;
 /// Relative tolerance of the learned motion in the paper's test.
 pub const RTOL: f64 = 1e-6;
+/// Starts whose motion is drawn.
+const DRAWN: usize = 4;
 /// Velocities of the fast map of `det M`, in upper bounds of the validation states.
 const FAST: f64 = 0.99;
 
@@ -31,6 +33,8 @@ pub struct Evaluation {
     pub wrong_signature: f64,
     /// Error of the mass matrix, of a geodesic the metric, at rest at the positions of the fresh states.
     pub mass_matrix: MassMatrixError,
+    /// Time for which the learned motion predicts the exact one, median over the starts.
+    pub valid_time: Option<ValidTimes>,
     /// One entry per random start.
     pub trajectories: Vec<Motion>,
     /// Names of the accelerations' coordinates, with the accelerations' units.
@@ -135,7 +139,9 @@ pub fn evaluate(
         left_training_range: leaving(&run.learned.trajectory, &plan.trained, &system.system.columns(n)),
     };
 
-    let mut figures = evaluation_figures(&runs, system).map_err(CliError::data)?;
+    let portraits = test.portraits(exact, learned, &runs[..runs.len().min(DRAWN)]);
+    attention.check()?;
+    let mut figures = evaluation_figures(&runs, &portraits, system);
     let grids = grids(system, exact, learned);
     attention.check()?;
     figures.extend(grids?);
@@ -147,6 +153,7 @@ pub fn evaluate(
         accelerations,
         wrong_signature,
         mass_matrix,
+        valid_time: ValidTimes::of(&runs.iter().map(|run| (run.valid, run.chaos())).collect::<Vec<_>>()),
         trajectories: runs.iter().map(motion).collect(),
         coordinates: coordinates
             .iter()
@@ -231,12 +238,11 @@ fn grids(
             fit: if quantity == "L" { Fit::Affine } else { Fit::Factor },
             signs: quantity != "L",
         };
-        match grid_figures(&comparison) {
-            Ok((figure, _)) => figures.push(figure),
-            // A model that is finite nowhere on the grid has no picture; the tables say so.
-            Err(PlotError::Empty(_)) => {}
-            Err(error) => return Err(CliError::data(error)),
-        }
+        // A model that is finite nowhere on the grid has no picture; the tables say so.
+        figures.extend(grid_figures(&comparison).ok().map(|(mut figure, _)| {
+            figure.caption += if system.system.time_unit == "s" { " SI units." } else { " Geometric units." };
+            figure
+        }));
     }
     Ok(figures)
 }
@@ -289,7 +295,8 @@ impl Evaluation {
         let trajectories = self.trajectories.iter().enumerate().map(|(k, motion)| {
             let t = &motion.summary;
             let fastest = t.velocity_error.iter().fold(f64::NAN, |m, v| m.max(v.max));
-            let mut row = vec![(k + 1).to_string(), format!("{:.1}", t.compared_until)];
+            let valid = format!("{}{}", number(t.valid.time), if t.valid.at_least { "+" } else { "" });
+            let mut row = vec![(k + 1).to_string(), format!("{:.1}", t.compared_until), valid];
             row.extend([t.coordinate_error.mean, t.coordinate_error.max, fastest].map(number));
             row.extend([t.energy_error.mean, t.energy_error.max].map(hundredths));
             row.extend(motion.conserved_error.map(|conserved| hundredths(conserved.max)));
@@ -310,7 +317,8 @@ impl Evaluation {
         let conserved = self.conserved.map(|_| "conserved, max [%]");
         let [mean, most] = ["mean", "max"].map(|which| format!("coordinates, {which} [{}]", self.unit));
         let fastest = format!("velocities, max [{}/{}]", self.unit, self.time_unit);
-        let mut motions = vec!["start", until.as_str(), &mean, &most, &fastest, "energy, mean [%]", "energy, max [%]"];
+        let valid = format!("valid [{}]", self.time_unit);
+        let mut motions = vec!["start", &until, &valid, &mean, &most, &fastest, "energy, mean [%]", "energy, max [%]"];
         motions.extend(conserved.into_iter().chain([lyapunov.as_str(), "remarks"]));
         let mut about = String::from("Trajectories from random starts against exact motion");
         if let Some(name) = self.conserved {
@@ -335,11 +343,12 @@ impl Evaluation {
         ]
     }
 
-    /// Tables for a terminal.
-    pub fn text(&self) -> String {
+    /// Headline and tables for a terminal, of a model of the system called `title`.
+    pub fn text(&self, title: &str) -> String {
         let tables = self.tables();
         let text = tables.iter().map(|t| format!("{}\n{}", t.title, text_table(&t.header, &t.rows)));
-        wrapped(&(headline::of_evaluation(self) + "\n" + &text.collect::<Vec<_>>().join("\n") + &self.note()), WIDTH)
+        let first = headline::of_evaluation(title, self).text();
+        wrapped(&format!("{first}\n{}{}", text.collect::<Vec<_>>().join("\n"), self.note()), WIDTH)
     }
 
     /// Meaning of [`NONE`], if there is one in the tables.
@@ -355,6 +364,11 @@ impl Evaluation {
         .to_string()
     }
 
+    /// The headline, at the beginning of a report about the system called `title`.
+    pub fn summarise(&self, report: Report, title: &str) -> Report {
+        headline::of_evaluation(title, self).begin(report)
+    }
+
     /// Tables and pictures for a report.
     pub fn report(&self, mut report: Report) -> Report {
         for Table { title, header, rows } in self.tables() {
@@ -364,8 +378,7 @@ impl Evaluation {
         if !note.is_empty() {
             report = report.paragraph(note.trim());
         }
-        report = report.heading("Learned against exact");
-        self.figures.iter().fold(report, |report, figure| report.figure(&figure.png, &figure.caption))
+        report.heading("Learned against exact").figures(&self.figures)
     }
 }
 
@@ -392,10 +405,10 @@ mod tests {
         begins(
             &captions("triple-pendulum"),
             &[
-                ("lagrangian.png", &format!("L at {rest}")),
-                ("det_mass_matrix.png", &format!("det M at {rest}")),
+                ("lagrangian.svg", &format!("L at {rest}")),
+                ("det_mass_matrix.svg", &format!("det M at {rest}")),
                 (
-                    "det_mass_matrix_fast.png",
+                    "det_mass_matrix_fast.svg",
                     "Fast det M at theta3 = 3.1416 rad; theta1_dot, theta2_dot, theta3_dot = 9.9 rad/s: exact",
                 ),
             ],
@@ -403,14 +416,14 @@ mod tests {
         begins(
             &captions("ads2-geodesic"),
             &[
-                ("lagrangian.png", "L at t_dot = 3.25 m/m; z_dot = 0 m/m: exact"),
-                ("det_mass_matrix.png", "det M at t_dot by the mass shell; z_dot = 0 m/m: exact"),
-                ("det_mass_matrix_fast.png", "Fast det M at t_dot by the mass shell; z_dot = 0.594 m/m: exact"),
+                ("lagrangian.svg", "L at t_dot = 3.25 m/m; z_dot = 0 m/m: exact"),
+                ("det_mass_matrix.svg", "det M at t_dot by the mass shell; z_dot = 0 m/m: exact"),
+                ("det_mass_matrix_fast.svg", "Fast det M at t_dot by the mass shell; z_dot = 0.594 m/m: exact"),
             ],
         );
         // The velocity is an axis: there is no fast map.
         let one = captions("harmonic-oscillator");
-        begins(&one, &[("lagrangian.png", "L: exact"), ("det_mass_matrix.png", "det M: exact")]);
+        begins(&one, &[("lagrangian.svg", "L: exact"), ("det_mass_matrix.svg", "det M: exact")]);
         assert!(one[1].1.contains("right sign at every point") && !one[0].1.contains("sign"));
     }
 }

@@ -106,18 +106,23 @@ impl<'a, S: Scalar> Found<'a, S> {
         let summary = self.summary();
         let json = serde_json::to_string_pretty(&summary).map_err(CliError::data)? + "\n";
         folder.write("summary.json", json.as_bytes())?;
-        let text = summary.text(self.recording);
-        let mut figures = training_pictures(&self.trained.history)?;
+        let periodic = &self.recording.periodic;
+        let unit = if periodic.iter().all(|periodic| *periodic) { "rad" } else { "SI units" };
+        let headline = headline::of_judgement(self.name, self.judgement, unit);
+        let opening = summary.opening(self.recording);
+        let mut figures = training_pictures(&self.trained.history);
         if let Some(shot) = self.shot {
-            let mut later = training_pictures(&shot.history)?;
+            let mut later = training_pictures(&shot.history);
             later.iter_mut().for_each(|figure| figure.file.insert_str(0, "shooting_"));
             figures.extend(later);
         }
-        let report = Report::new(&format!("{}: learned from recorded motion", self.name)).preformatted(&text);
+        let report = headline.begin(Report::new(&format!("{}: learned from recorded motion", self.name)));
+        let report = report.preformatted(&wrapped(opening.trim_end(), WIDTH));
         let report = self.determined.report(self.judgement.report(report)).heading("Training");
-        let report = figures.iter().fold(report, |report, figure| report.figure(&figure.png, &figure.caption));
-        let report = report.heading("Configuration").preformatted(toml);
+        let report = report.figures(&figures).heading("Configuration").preformatted(toml);
         write_report_and_figures(folder, &report, figures.iter().chain(&self.judgement.figures))?;
+        let tables = self.judgement.text() + &self.determined.text();
+        let text = wrapped(&format!("{}\n{opening}{tables}", headline.text()), WIDTH);
         let text = format!("{text}\nreport: {}\n", folder.file("report.html").display());
         Ok(if as_json { json } else { text })
     }
@@ -172,8 +177,8 @@ impl<'a, S: Scalar> Found<'a, S> {
 }
 
 impl Summary<'_> {
-    /// The run in words and tables.
-    fn text(&self, recording: &Recording) -> String {
+    /// Data, losses and times of the run in words, with the table of what smoothing makes of the coordinates.
+    fn opening(&self, recording: &Recording) -> String {
         let [training, validation, test] = self.samples;
         let way = match self.targets {
             Targets::Measured => "measured accelerations",
@@ -229,9 +234,6 @@ impl Summary<'_> {
             );
         }
         let _ = writeln!(text, "{:.1} s of training, {:.1} s in all\n", self.training_seconds, self.wall_seconds);
-        let unit = if recording.periodic.iter().all(|periodic| *periodic) { "rad" } else { "SI units" };
-        let first = headline::of_predictions(&self.judgement.model, &self.judgement.constant_velocity, unit);
-        let gap = if first.is_empty() { "" } else { "\n" };
-        wrapped(&format!("{first}{gap}{text}{}{}", self.judgement.text(), self.determined.text()), WIDTH)
+        text
     }
 }

@@ -202,5 +202,7 @@ pub fn plot(force: &SampledForce<f64>, times: &[f64], names: &[String]) -> LineP
         y_label: "force [N, N m]".into(),
         log_y: false,
         series: names.iter().zip(&columns).map(|(name, column)| Series::new(name, times, column)).collect(),
+        turn: None,
+        level: None,
     }
 }

@@ -256,8 +256,12 @@ fn learn_in<S: Scalar>(
     let json = serde_json::to_string_pretty(&summary).map_err(CliError::data)? + "\n";
     folder.write("summary.json", json.as_bytes())?;
     write_report(folder, system, &summary, &trained.history, &toml)?;
-    let text =
-        format!("{}\n{}\nreport: {}\n", evaluation.text(), headline(&summary), folder.file("report.html").display());
+    let text = format!(
+        "{}\n{}\nreport: {}\n",
+        evaluation.text(&system.system.title),
+        headline(&summary),
+        folder.file("report.html").display()
+    );
     let outcome = Outcome::Learned(crate::experiments::Learned {
         validation_loss: trained.validation_loss,
         instability,
@@ -404,11 +408,11 @@ fn write_report(
     epochs: &[Epoch],
     toml: &str,
 ) -> Result<(), CliError> {
-    let training = training_pictures(epochs)?;
-    let report = Report::new(&format!("{}: learned", system.system.title)).paragraph(&headline(summary));
+    let training = training_pictures(epochs);
+    let report = Report::new(&format!("{}: learned", system.system.title));
+    let report = summary.evaluation.summarise(report, &system.system.title).paragraph(&headline(summary));
     let report = summary.evaluation.report(parameter_table(report, system)).heading("Training");
-    let report = training.iter().fold(report, |report, figure| report.figure(&figure.png, &figure.caption));
-    let report = report.heading("Configuration").preformatted(toml);
+    let report = report.figures(&training).heading("Configuration").preformatted(toml);
     write_report_and_figures(folder, &report, training.iter().chain(&summary.evaluation.figures))
 }
 
@@ -423,7 +427,7 @@ pub(super) fn save<S: Scalar>(folder: &Folder, model: &ModelFile<S>) -> Result<(
 }
 
 /// Pictures of a history.
-pub(super) fn training_pictures(epochs: &[Epoch]) -> Result<Vec<Figure>, CliError> {
+pub(super) fn training_pictures(epochs: &[Epoch]) -> Vec<Figure> {
     let row = |e: &Epoch| HistoryRow {
         epoch: e.epoch as f64,
         training_loss: e.training_loss,
@@ -432,7 +436,7 @@ pub(super) fn training_pictures(epochs: &[Epoch]) -> Result<Vec<Figure>, CliErro
         gradient_norm: e.gradient_norm,
         penalty: e.penalty,
     };
-    training_figures(&epochs.iter().map(row).collect::<Vec<_>>()).map_err(CliError::data)
+    training_figures(&epochs.iter().map(row).collect::<Vec<_>>())
 }
 
 /// Writes [`CAPTIONS`], which name the pictures and tell what they show, the report, and the pictures.
@@ -447,5 +451,5 @@ pub(super) fn write_report_and_figures<'a>(
     let captions: BTreeMap<&str, &str> = figures.clone().map(|f| (f.file.as_str(), f.caption.as_str())).collect();
     folder.write(CAPTIONS, serde_json::to_string_pretty(&captions).map_err(CliError::data)?.as_bytes())?;
     folder.write("report.html", report.to_html().as_bytes())?;
-    figures.into_iter().try_for_each(|figure| folder.write(&figure.file, &figure.png))
+    figures.into_iter().try_for_each(|figure| folder.write(&figure.file, figure.picture.to_svg().as_bytes()))
 }

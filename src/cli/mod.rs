@@ -59,6 +59,7 @@ mod start;
 mod states;
 mod subject;
 mod systems;
+mod taken;
 mod train;
 mod train_config;
 

@@ -64,7 +64,7 @@ pub struct Args {
     #[arg(long, value_name = "FILE.csv")]
     out: PathBuf,
     /// Picture of the coordinates against time, or a page with velocities and energy as well.
-    #[arg(long, value_name = "FILE.png|FILE.html", value_parser = picture_file)]
+    #[arg(long, value_name = "FILE.svg|FILE.html", value_parser = picture_file)]
     plot: Option<PathBuf>,
     /// Replace the files.
     #[arg(long)]

@@ -1,6 +1,7 @@
 //! Records of runs, and the rows of an experiment's table.
 
 use super::{Experiment, Reported, Run};
+use crate::analysis::REGULAR;
 use serde::{Deserialize, Serialize};
 
 /// Figures of a learned model.
@@ -23,10 +24,6 @@ pub struct Learned {
     /// Starts whose learned motion reached the end of the time span.
     pub integrated: usize,
 }
-
-/// A motion is regular below this logarithm of the factor by which its neighbours part: its Lyapunov time is then above a
-/// fifth of the time span. Those of regular motions of 50 s part by some 50, the span in units of a second.
-const REGULAR: f64 = 5.0;
 
 impl Learned {
     /// Energy errors of the starts whose exact motion is regular, or of the others; without those of which it is not known.

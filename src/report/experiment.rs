@@ -1,6 +1,6 @@
 //! Tables and pictures of an experiment: the paper's figures beside ours.
 
-use super::{Figure, LinePlot, PlotError, Series, line_png};
+use super::{Figure, LinePlot, Series, kept, line_plot};
 use crate::experiments::{Experiment, Outcome, Picture, Record, Reduction, Row, Run, Spread};
 use crate::names::rounded;
 
@@ -158,22 +158,10 @@ fn reached(curves: &[Curve]) -> Vec<Series> {
 }
 
 /// Pictures of an experiment from its finished runs, and `curves` where time matters; what has nothing to show is left out.
-///
-/// # Errors
-/// [`PlotError::Renderer`] if the renderer fails.
-pub fn experiment_figures(
-    experiment: &Experiment,
-    results: &[(Run, Option<Record>)],
-    curves: &[Curve],
-) -> Result<Vec<Figure>, PlotError> {
+pub fn experiment_figures(experiment: &Experiment, results: &[(Run, Option<Record>)], curves: &[Curve]) -> Vec<Figure> {
     let mut figures = Vec::new();
-    let mut add = |file: &str, caption: String, plot: LinePlot| match line_png(&plot) {
-        Ok(png) => {
-            figures.push(Figure { file: format!("{file}.png"), png, caption });
-            Ok(())
-        }
-        Err(PlotError::Empty(_)) => Ok(()),
-        Err(error) => Err(error),
+    let mut add = |file: &str, caption: String, plot: LinePlot| {
+        figures.extend(kept(&format!("{file}.svg"), line_plot(&plot), caption));
     };
     for (part, word) in [(0, "training"), (1, "validation")] {
         add(
@@ -185,8 +173,10 @@ pub fn experiment_figures(
                 y_label: "loss".into(),
                 log_y: true,
                 series: loss_curves(results, part),
+                turn: None,
+                level: None,
             },
-        )?;
+        );
     }
     for picture in experiment.pictures {
         match picture {
@@ -201,8 +191,10 @@ pub fn experiment_figures(
                     y_label: "lowest validation loss".into(),
                     log_y: true,
                     series: scan(results),
+                    turn: None,
+                    level: None,
                 },
-            )?,
+            ),
             Picture::TradeOff => add(
                 "trade_off",
                 "Lowest validation loss against training instability, one point per run; lower left is better.".into(),
@@ -212,8 +204,10 @@ pub fn experiment_figures(
                     y_label: "lowest validation loss".into(),
                     log_y: true,
                     series: trade_off(results),
+                    turn: None,
+                    level: None,
                 },
-            )?,
+            ),
             Picture::Clock => add(
                 "time_to_accuracy",
                 "Lowest validation loss so far against seconds of training, paper convention.".into(),
@@ -223,12 +217,14 @@ pub fn experiment_figures(
                     y_label: "lowest validation loss".into(),
                     log_y: true,
                     series: reached(curves),
+                    turn: None,
+                    level: None,
                 },
-            )?,
+            ),
             Picture::Evaluation(_) => {}
         }
     }
-    Ok(figures)
+    figures
 }
 
 /// Groups in the order of first appearance with their records.

@@ -1,6 +1,6 @@
 //! Pictures of learned and exact functions on a grid.
 
-use super::{Figure, HeatMap, PlotError, heat_maps_png};
+use super::{Figure, HeatMap, PlotError, heat_maps};
 use crate::analysis::{AffineFit, Grid, affine_fit, factor_fit};
 
 /// Transformation up to which a learned quantity is determined.
@@ -43,7 +43,7 @@ pub struct GridComparison {
 /// too.
 ///
 /// # Errors
-/// [`PlotError`] if a grid has no finite value, the grids differ in size, or the renderer fails.
+/// [`PlotError`] if a grid has no finite value or the grids differ in size.
 pub fn grid_figures(comparison: &GridComparison) -> Result<(Figure, Option<AffineFit>), PlotError> {
     let quantity = &comparison.quantity;
     let empty = || PlotError::Empty(quantity.clone());
@@ -83,7 +83,7 @@ pub fn grid_figures(comparison: &GridComparison) -> Result<(Figure, Option<Affin
         diverging,
         marks,
     };
-    let png = heat_maps_png(&[
+    let picture = heat_maps(&[
         map(format!("{quantity} exact"), comparison.exact.clone(), Some((low, high)), false, Vec::new()),
         map(learned_title, learned, Some((low, high)), false, marks),
         map("learned \u{2212} exact".into(), difference, None, true, Vec::new()),
@@ -103,7 +103,7 @@ pub fn grid_figures(comparison: &GridComparison) -> Result<(Figure, Option<Affin
         (None, _) => String::new(),
     };
     let caption = format!("{quantity}{fixed}: exact, {learned}, and the difference.{signs}");
-    Ok((Figure { file: format!("{}.png", comparison.file), png, caption }, fit))
+    Ok((Figure { file: format!("{}.svg", comparison.file), picture, caption }, fit))
 }
 
 #[cfg(test)]

@@ -291,8 +291,20 @@ fn the_commands_of_the_readme_run() {
         run.push(words[0].clone());
     }
     assert_eq!(run, ["train", "rollout", "evaluate", "check", "fit"]);
-    for file in ["trained/report.html", "motion.csv", "evaluation/trace_start1.png", "fitted/report.html"] {
+    for file in ["trained/report.html", "motion.csv", "evaluation/report.html", "fitted/report.html"] {
         assert!(folder.path(file).exists(), "no {file}: {:?}", folder.names());
+    }
+    // The pictures of the README are files that its command writes: of the same size, with the same words.
+    for (shown, drawn) in [("docs/motion.svg", "trace_start1.svg"), ("docs/metric.svg", "det_mass_matrix.svg")] {
+        assert!(readme.contains(&format!("]({shown})")) && readme.contains(drawn), "{shown}, {drawn}");
+        let (shown, drawn) = (read(shown), fs::read_to_string(folder.path("evaluation").join(drawn)).unwrap());
+        let frame = |svg: &str| {
+            let titles =
+                svg.split("font-weight=\"600\">").skip(1).map(|rest| rest.split('<').next().unwrap().to_string());
+            (svg.lines().next().unwrap().to_string(), titles.collect::<Vec<String>>())
+        };
+        assert_eq!(frame(&shown), frame(&drawn));
+        assert!(shown.len() < 100_000 && !frame(&shown).1.is_empty());
     }
 }
 

@@ -37,7 +37,9 @@ fn every_experiment_of_the_paper_runs() {
             }
         }
         let report = fs::read_to_string(folder.join("report.html")).unwrap();
-        assert!(report.contains(experiment.title) && report.matches("data:image/png").count() >= 2);
+        assert!(report.contains(experiment.title) && report.matches("<figure").count() >= 2);
+        assert!(report.contains("class=\"lead\">The best of "), "{}", experiment.name);
+        assert!(report.len() < 2_000_000, "{}: {}", experiment.name, report.len());
         // Relativistic runs are held to their signature, not to positive eigenvalues.
         if experiment.name == "ads4-geodesic" {
             let config = fs::read_to_string(folder.join(&runs[0].name).join("config.toml")).unwrap();

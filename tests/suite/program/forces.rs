@@ -105,7 +105,7 @@ fn a_driven_arm_is_judged_with_its_torques() {
     assert!((change - work).abs() < 0.1 * kinetic && work.abs() > 0.15 * kinetic, "{energy}");
     let line = run.stdout.lines().skip_while(|line| !line.starts_with("energy along")).nth(1).unwrap();
     assert!(line.contains("work of the known forces"), "{line}");
-    assert!(folder.path("out/prediction_forces.png").exists());
+    assert!(folder.path("out/prediction_forces.svg").exists());
     assert!(fs::read_to_string(folder.path("out/report.html")).unwrap().contains("Known forces"));
     let header = ModelFile::<f64>::load(folder.path("out/model.safetensors").as_path()).unwrap().header;
     assert_eq!(header.forces, ["shoulder", "elbow"]);
