@@ -4,12 +4,14 @@
 mod ratio;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use lnn::cli::parse_system;
 use lnn::lagrangian::{self, Request, Terms};
 use lnn::scalar::Scalar;
 use nalgebra_of_num_dual::SVector;
 use num_dual::{Dual2SVec32, Dual2SVec64, DualNum, hessian};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use std::borrow::Cow;
 use std::hint::black_box;
 use std::time::Duration;
 
@@ -49,16 +51,37 @@ fn ratios<S: Scalar>(one: fn(&[S], &[S])) {
     }
 }
 
+/// The accelerations of a batch by the Lagrangian of a file against those by the same Lagrangian as code, in the same run.
+fn described(text: &str, name: &str) {
+    let batch = 1024;
+    let system = parse_system(text).expect("an example is valid");
+    let written = lagrangian::configure_system::<f64>(Cow::Owned(system), &[]).expect("the defaults are valid");
+    let coded = lagrangian::configure::<f64>(name, &[]).expect("the defaults are valid");
+    let (n, bounds) = (coded.coordinates, coded.system.validation(coded.coordinates));
+    let mut rng = ChaCha8Rng::seed_from_u64(2);
+    let mut draw =
+        |b: &[(f64, f64)]| -> Vec<f64> { (0..batch * n).map(|k| rng.random_range(b[k % n].0..=b[k % n].1)).collect() };
+    let (q, v) = (draw(&bounds.positions), draw(&bounds.velocities));
+    let (own, code) = (written.build().expect("it is described"), coded.build().expect("it is of the catalogue"));
+    let (mut ours, mut theirs) = (Terms::default(), Terms::default());
+    let request = Request::ACCELERATION;
+    let file = || own.terms(black_box(&q), &v, request, &mut ours).expect("regular states");
+    let code = || code.terms(black_box(&q), &v, request, &mut theirs).expect("regular states");
+    ratio::compare(&format!("{name} of a file, acceleration, the same as code"), batch, "at least 0.67", file, code);
+}
+
 fn benches(c: &mut Criterion) {
+    described(include_str!("../examples/systems/two_pendula.toml"), "double-pendulum");
+    described(include_str!("../examples/systems/black_hole.toml"), "schwarzschild-geodesic");
     ratios::<f32>(hessian_f32);
     ratios::<f64>(hessian_f64);
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     for system in lagrangian::systems() {
         let n = system.size.default();
-        let configured = lagrangian::configure::<f64>(system.name, &[]).expect("the defaults are valid");
+        let configured = lagrangian::configure::<f64>(&system.name, &[]).expect("the defaults are valid");
         let built = configured.build().expect("the system is of the catalogue");
-        let bounds = (system.validation)(n);
-        let mut group = c.benchmark_group(system.name);
+        let bounds = system.validation(n);
+        let mut group = c.benchmark_group(system.name.as_ref());
         group.sample_size(20).warm_up_time(Duration::from_millis(300)).measurement_time(Duration::from_millis(1500));
         for batch in [1, 16, 128, 1024] {
             let mut draw = |b: &[(f64, f64)]| -> Vec<f64> {

@@ -3,6 +3,7 @@
 //! | page | for |
 //! |---|---|
 //! | [`commands`] | every command and option of the program, exit codes, files |
+//! | [`system_files`] | a system of your own as a text file: Lagrangian or metric, formulas |
 //! | [`configuration`] | every key of `config.toml`, presets |
 //! | [`recorded_motion`] | data of your own: formats, noise, friction, films |
 //! | [`structures`] | black box, mechanical, metric; what is known beforehand; hybrids in Rust |
@@ -21,7 +22,9 @@ macro_rules! page {
     ($file:literal) => {
         concat!(
             "[commands]: crate::docs::commands\n",
+            "[rollout]: crate::docs::commands#lnn-rollout\n",
             "[configuration]: crate::docs::configuration\n",
+            "[system-files]: crate::docs::system_files\n",
             "[presets]: crate::docs::configuration#presets\n",
             "[recorded-motion]: crate::docs::recorded_motion\n",
             "[structures]: crate::docs::structures\n",
@@ -29,6 +32,7 @@ macro_rules! page {
             "[conventions]: crate::docs::method#units-and-conventions\n",
             "[friction]: crate::docs::method#friction\n",
             "[penalties]: crate::docs::method#penalties\n",
+            "[valid]: crate::docs::method#time-of-valid-prediction\n",
             "[off-shell]: crate::docs::method#metrics-from-geodesics\n",
             "[derivatives]: crate::docs::method#derivatives-of-the-network\n",
             "[library]: crate::docs::library\n",
@@ -55,6 +59,7 @@ macro_rules! pages {
 
 pages! {
     commands "commands.md";
+    system_files "system-files.md";
     configuration "configuration.md";
     recorded_motion "recorded-motion.md";
     structures "structures.md";

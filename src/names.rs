@@ -1,8 +1,13 @@
-//! Names in messages: the known name nearest to a mistyped one, texts on one line, counts, foreign words translated.
+//! Names and numbers in messages: the known name nearest to a mistyped one, texts on one line or in short ones, counts, digits,
+//! foreign words translated.
 
 mod foreign;
+mod number;
+mod wrap;
 
 pub use foreign::plain;
+pub use number::{hundredths, number, percent, rounded};
+pub use wrap::{WIDTH, cut, cut_hard, width, wrapped};
 
 /// The candidate that fewest edits (insert, delete, replace, swap neighbours) turn `name` into; none if every one takes more
 /// than a third of the letters: `y` is not near `x`, nor `m3` near `m1`.

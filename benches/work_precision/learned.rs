@@ -45,6 +45,7 @@ fn train(epochs: usize, states: usize, path: &Path) -> Result<(), String> {
         parameters: symbols.zip(system.parameters.iter().copied()).collect(),
         columns: system.system.columns(system.coordinates),
         forces: Vec::new(),
+        description: None,
         precision: match config.precision {
             Precision::F32 => StoredPrecision::F32,
             Precision::F64 => StoredPrecision::F64,

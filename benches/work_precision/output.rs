@@ -1,6 +1,6 @@
 //! CSV files, printed tables, diagrams and the report.
 
-use lnn::report::{Figure, LinePlot, Report, Series, line_png, text_table};
+use lnn::report::{Figure, LinePlot, Report, Series, line_plot, text_table};
 use lnn::storage::write_atomically;
 use std::path::Path;
 
@@ -75,10 +75,12 @@ impl Section {
             y_label: y.into(),
             log_y: true,
             series: curves,
+            turn: None,
+            level: None,
         };
-        match line_png(&plot) {
-            Ok(png) => {
-                self.figures.push(Figure { file: format!("{}_{file}.png", self.name), png, caption: title.into() })
+        match line_plot(&plot) {
+            Ok(picture) => {
+                self.figures.push(Figure { file: format!("{}_{file}.svg", self.name), picture, caption: title.into() })
             }
             Err(error) => self.failed(file, error.to_string()),
         }
@@ -136,10 +138,9 @@ pub fn write(section: &Section, out: &Path, machine: &str, report: Report) -> Re
         report = report.paragraph("Failed or left out:").table(&section.failures.header, &section.failures.rows);
     }
     for figure in &section.figures {
-        save(&out.join(&figure.file), &figure.png)?;
-        report = report.figure(&figure.png, &figure.caption);
+        save(&out.join(&figure.file), figure.picture.to_svg().as_bytes())?;
     }
-    Ok(report)
+    Ok(report.figures(&section.figures))
 }
 
 /// Writes a file whole or not at all.

@@ -1,6 +1,6 @@
 //! What the fuzzer asks of `lnn`, one function of bytes per target; a claim that does not hold panics.
 //!
-//! Readers (`model_file`, `checkpoint`, `states_csv`, `recording`, `config`, `command_line`) take the bytes as they are and refuse them or give
+//! Readers (`model_file`, `checkpoint`, `states_csv`, `recording`, `config`, `system_file`, `command_line`) take the bytes as they are and refuse them or give
 //! something that is written back the same. The others make a problem of the bytes and compare two independent ways to
 //! its answer: `program` reverse replay and nested forward numbers, `linalg` and `network` working precision and
 //! double-double.
@@ -15,6 +15,7 @@ pub mod network;
 pub mod program;
 pub mod recording;
 pub mod states_csv;
+pub mod system_file;
 
 mod accuracy;
 pub mod bytes;

@@ -1,4 +1,4 @@
-//! How well a trajectory keeps what the exact motion keeps beside its energy.
+//! Errors of what the exact motion conserves beside its energy, along a trajectory.
 
 use crate::lagrangian::Configured;
 use crate::rollout::Trajectory;
@@ -34,11 +34,12 @@ mod tests {
     fn exact_motion_keeps_it() {
         let mut seen = Vec::new();
         for system in systems().iter().filter(|system| system.conserved.is_some()) {
-            let (n, parameters) = (system.size.default(), system.parameters);
+            let (n, parameters) = (system.size.default(), &system.parameters);
             // Other values than the defaults, which are mostly 1.
-            let given: Vec<(String, String)> = parameters.iter().map(|p| (p.symbol.into(), "1.25".into())).collect();
-            let system = configure::<f64>(system.name, &given).unwrap();
-            let (exact, test) = (system.build().unwrap(), (system.system.trajectory)(n));
+            let given: Vec<(String, String)> =
+                parameters.iter().map(|p| (p.symbol.to_string(), "1.25".into())).collect();
+            let system = configure::<f64>(&system.name, &given).unwrap();
+            let (exact, test) = (system.build().unwrap(), system.system.trajectory(n));
             let bounds = StartBox { q: test.start.positions, v: test.start.velocities };
             for (q, mut v) in bounds.starts::<f64>(4, 5) {
                 system.impose_constraint(&q, &mut v).unwrap();
@@ -54,7 +55,7 @@ mod tests {
                 let error = conserved_error(&system, &trajectory).unwrap();
                 assert!((error[error.len() - 1] - 0.5).abs() < 1e-6, "{}", system.system.name);
             }
-            seen.push(system.system.name);
+            seen.push(system.system.name.clone());
         }
         assert_eq!(seen.len(), 6, "{seen:?}");
     }

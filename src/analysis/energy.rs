@@ -1,4 +1,4 @@
-//! How well a trajectory keeps its energy.
+//! Energy error of a trajectory and drift of its learned energy.
 
 use super::{Statistics, statistics};
 use crate::lagrangian::EulerLagrange;

@@ -91,7 +91,7 @@ pub enum GridError {
     Axis {
         /// 0 or 1.
         axis: usize,
-        /// What is wrong.
+        /// The problem in words.
         problem: &'static str,
     },
 }

@@ -4,7 +4,14 @@ use crate::lagrangian::EulerLagrange;
 use crate::rollout::{Integrable, Options, RolloutError, rollout};
 use serde::{Deserialize, Serialize};
 
-/// How fast neighbouring motions part.
+/// Logarithm of the factor by which neighbours part, below which a motion of at most [`LONG`] units of time is regular: its
+/// Lyapunov time is then above a fifth of the time span. Those of regular motions part in proportion to time, by a factor of
+/// some 50 in 50 s.
+pub const REGULAR: f64 = 5.0;
+/// Time beyond which that factor counts relative to what it is there.
+const LONG: f64 = 50.0;
+
+/// Rate at which neighbouring motions part.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Lyapunov {
     /// Finite-time largest exponent, per unit of time; near 0 or below for regular motion.
@@ -17,6 +24,11 @@ impl Lyapunov {
     /// `1 / exponent`: infinite unless the exponent is positive.
     pub fn lyapunov_time(&self) -> f64 {
         if self.exponent > 0.0 { 1.0 / self.exponent } else { f64::INFINITY }
+    }
+
+    /// Whether neighbouring motions part faster than those of regular motion do.
+    pub fn is_chaotic(&self) -> bool {
+        self.exponent * self.time >= REGULAR + (self.time / LONG).ln().max(0.0)
     }
 
     /// Time after which an error `initial` has grown to `allowed` by chaos alone: `ln(allowed / initial) / exponent`.
@@ -108,5 +120,9 @@ mod tests {
         assert!((hill.horizon(1e-6, 1e-3) - 1000.0_f64.ln()).abs() < 0.5);
         let calm = lyapunov(&OSCILLATOR, &[1.0], &[0.0], &Options::<f64>::reference(20.0, 0.5)).unwrap();
         assert!(calm.exponent.abs() < 1e-3, "{calm:?}");
+        assert!(hill.is_chaotic() && !calm.is_chaotic());
+        // In proportion to time, over a long one.
+        let linear = |time: f64| Lyapunov { exponent: time.ln() / time, time };
+        assert!([10.0, 100.0, 1e4].iter().all(|&time| !linear(time).is_chaotic()));
     }
 }

@@ -11,10 +11,12 @@ mod grid;
 mod instability;
 mod lyapunov;
 mod mass_matrix;
+mod portrait;
 mod prediction;
 mod signature;
 mod summary;
 mod trajectories;
+mod valid_time;
 
 pub use accelerations::acceleration_errors;
 pub use affine::{AffineFit, affine_fit, factor_fit};
@@ -25,11 +27,14 @@ pub use dissipation::{EnergyLoss, energy_loss};
 pub use energy::{EnergyError, energy_drift, energy_error};
 pub use grid::{Axis, Grid, GridError, determinant_grid, lagrangian_grid};
 pub use instability::{savitzky_golay, stretches, training_instability};
-pub use lyapunov::{Lyapunov, lyapunov};
+pub use lyapunov::{Lyapunov, REGULAR, lyapunov};
 pub use mass_matrix::{MassMatrixError, mass_matrix_error};
+pub use portrait::Portrait;
 pub use prediction::{
     PredictionError, Predictions, Window, follow, predict_by_constant_velocity, predict_by_motion, prediction_error,
+    window_valid_times,
 };
 pub use signature::wrong_signatures;
 pub use summary::{ErrorDistribution, Statistics, statistics};
 pub use trajectories::{StartBox, TrajectoryRun, TrajectorySummary, TrajectoryTest};
+pub use valid_time::{VALID, ValidTime, ValidTimes, relative_error, spread, valid_time};

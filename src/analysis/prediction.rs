@@ -3,8 +3,8 @@
 //! A recording is cut into windows; every predictor gets the estimated state at the start of a window and says where the
 //! coordinates will be at the times of the samples that follow. What it says is compared with what was measured.
 
-use super::angle_difference;
 use super::summary::quantile;
+use super::{ValidTime, angle_difference, relative_error, valid_time};
 use crate::lagrangian::EulerLagrange;
 use crate::recording::{Track, hermite};
 use crate::rollout::{Force, Options, RolloutError, SampledForce, Start, rollout_each};
@@ -180,6 +180,22 @@ pub fn prediction_error(
     PredictionError { seconds, rms, median, most, windows: errors.len(), missing }
 }
 
+/// How long the prediction of each window was valid ([`valid_time`]), errors relative to the `spread` of the motion; at least to
+/// the end of the window where the error stays small.
+pub fn window_valid_times(
+    windows: &[Window],
+    predictions: &Predictions,
+    periodic: &[bool],
+    spread: &[f64],
+) -> Vec<ValidTime> {
+    let n = periodic.len().max(1);
+    let of = |(window, predicted): (&Window, &Vec<f64>)| {
+        let pairs = window.measured.chunks_exact(n).zip(predicted.chunks_exact(n));
+        valid_time(&window.times, pairs.map(|(q, p)| relative_error(q, p, periodic, spread)), true)
+    };
+    windows.iter().zip(predictions).map(of).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -217,6 +233,14 @@ mod tests {
         // |cos(t + 1) - cos t + sin t| over the circle: its root mean square is sqrt((1 - cos 1)^2 + (1 - sin 1)^2)/sqrt 2.
         assert!((line.rms - 0.34).abs() < 0.05, "{line:?}");
         assert_eq!(line.seconds, 1.0);
+        // The swing has a spread of 1/sqrt 2; a straight line leaves it by 0.4 of that within a second, the motion never.
+        let valid = |predictions: &Predictions| window_valid_times(&windows, predictions, &[false], &[0.5f64.sqrt()]);
+        assert!(
+            valid(&predict_by_motion(&OSCILLATOR, &windows, 2))
+                .iter()
+                .all(|v| v.at_least && v.time == windows[0].times[9])
+        );
+        assert!(valid(&predict_by_constant_velocity(&windows)).iter().any(|v| !v.at_least && v.time < 0.9));
     }
 
     #[test]

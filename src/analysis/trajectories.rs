@@ -1,11 +1,11 @@
 //! The trajectory test: learned motion against exact motion from random starts.
 
 use super::{
-    CoordinateError, EnergyError, Lyapunov, Statistics, coordinate_error, energy_drift, energy_error, lyapunov,
-    statistics, velocity_error,
+    CoordinateError, EnergyError, Lyapunov, Statistics, ValidTime, coordinate_error, energy_drift, energy_error,
+    lyapunov, relative_error, spread, statistics, valid_time, velocity_error,
 };
 use crate::lagrangian::{Configured, EulerLagrange, SystemError};
-use crate::rollout::{Domain, Integrable, Method, Options, Rollout, rollout_many};
+use crate::rollout::{Domain, Integrable, Method, Options, Rollout, Trajectory, rollout_many};
 use crate::scalar::Scalar;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -65,7 +65,7 @@ pub struct TrajectoryTest<S> {
     pub max_steps: usize,
     /// Where the learned motion must stay; `None` lets it go anywhere.
     pub domain: Option<Domain<S>>,
-    /// Whether to estimate Lyapunov exponents of the exact motion.
+    /// `true` to estimate Lyapunov exponents of the exact motion.
     pub lyapunov: bool,
     /// Threads.
     pub threads: usize,
@@ -90,9 +90,14 @@ pub struct TrajectoryRun<S> {
     pub drift: EnergyError,
     /// Chaos of the exact motion, if asked for and found.
     pub lyapunov: Option<Lyapunov>,
+    /// Error of the learned coordinates relative to the spread of the exact ones, one per sample of both
+    /// ([`relative_error`]).
+    pub relative: Vec<f64>,
+    /// How long the learned motion predicts the exact one.
+    pub valid: ValidTime,
 }
 
-/// What a report and a script need of one start.
+/// Figures of one start, for reports and scripts.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TrajectorySummary {
     /// Coordinates at the start.
@@ -111,6 +116,10 @@ pub struct TrajectorySummary {
     pub energy_drift: Statistics,
     /// Largest finite-time Lyapunov exponent of the exact motion, if it was asked for.
     pub lyapunov_exponent: Option<f64>,
+    /// How long the learned motion predicts the exact one ([`valid_time`]).
+    pub valid: ValidTime,
+    /// The same in Lyapunov times, if the exact motion is chaotic.
+    pub valid_lyapunov_times: Option<f64>,
     /// Evaluations of the learned acceleration.
     pub evaluations: usize,
     /// Why the learned motion ended early.
@@ -168,6 +177,33 @@ impl<S: Integrable> TrajectoryTest<S> {
         exact: &dyn EulerLagrange<S>,
         learned: &dyn EulerLagrange<S>,
     ) -> Vec<TrajectoryRun<S>> {
+        let (reference, options) = self.options();
+        let scale = S::of_f64(self.energy_scale);
+        let truths = rollout_many(exact, starts, &reference, self.threads);
+        let learned = rollout_many(learned, starts, &options, self.threads);
+        let pairs = starts.iter().zip(truths.into_iter().zip(learned));
+        pairs
+            .map(|((q, v), (truth, learned))| {
+                let coordinates = coordinate_error(&truth.trajectory, &learned.trajectory, &self.periodic);
+                let relative = self.relative(&truth.trajectory, &learned.trajectory);
+                TrajectoryRun {
+                    velocities: velocity_error(&truth.trajectory, &learned.trajectory),
+                    energy: energy_error(exact, &learned.trajectory, scale),
+                    reference_energy: energy_drift(&truth.trajectory, scale),
+                    drift: energy_drift(&learned.trajectory, scale),
+                    lyapunov: if self.lyapunov { lyapunov(exact, q, v, &self.leaps(&reference)).ok() } else { None },
+                    valid: valid_time(&coordinates.t, relative.iter().copied(), learned.stop.is_none()),
+                    coordinates,
+                    relative,
+                    exact: truth,
+                    learned,
+                }
+            })
+            .collect()
+    }
+
+    /// Options of the exact motion and of the learned one.
+    pub(super) fn options(&self) -> (Options<S>, Options<S>) {
         let reference = Options::reference(S::of_f64(self.t_end), S::of_f64(self.dt));
         let options = Options {
             method: self.method,
@@ -177,22 +213,18 @@ impl<S: Integrable> TrajectoryTest<S> {
             max_steps: self.max_steps,
             ..reference.clone()
         };
-        let scale = S::of_f64(self.energy_scale);
-        let truths = rollout_many(exact, starts, &reference, self.threads);
-        let learned = rollout_many(learned, starts, &options, self.threads);
-        let pairs = starts.iter().zip(truths.into_iter().zip(learned));
-        pairs
-            .map(|((q, v), (truth, learned))| TrajectoryRun {
-                coordinates: coordinate_error(&truth.trajectory, &learned.trajectory, &self.periodic),
-                velocities: velocity_error(&truth.trajectory, &learned.trajectory),
-                energy: energy_error(exact, &learned.trajectory, scale),
-                reference_energy: energy_drift(&truth.trajectory, scale),
-                drift: energy_drift(&learned.trajectory, scale),
-                lyapunov: if self.lyapunov { lyapunov(exact, q, v, &self.leaps(&reference)).ok() } else { None },
-                exact: truth,
-                learned,
-            })
-            .collect()
+        (reference, options)
+    }
+
+    /// Error of the learned coordinates relative to the spread of the exact ones, sample by sample as far as both go.
+    fn relative(&self, exact: &Trajectory<S>, learned: &Trajectory<S>) -> Vec<f64> {
+        let n = exact.coordinates;
+        let periodic: Vec<bool> = (0..n).map(|i| self.periodic.get(i).copied().unwrap_or(false)).collect();
+        let plain = |values: &[S]| values.iter().map(|x| x.to_f64()).collect::<Vec<_>>();
+        let (q, p) = (plain(&exact.q), plain(&learned.q));
+        let spread = spread(&q, &periodic);
+        let pairs = q.chunks_exact(n.max(1)).zip(p.chunks_exact(n.max(1)));
+        pairs.map(|(q, p)| relative_error(q, p, &periodic, &spread)).collect()
     }
 
     /// Options of the Lyapunov estimate: a hundred renormalisations are plenty.
@@ -203,6 +235,11 @@ impl<S: Integrable> TrajectoryTest<S> {
 }
 
 impl<S: Scalar> TrajectoryRun<S> {
+    /// Lyapunov time of the exact motion, if it is chaotic.
+    pub fn chaos(&self) -> Option<f64> {
+        self.lyapunov.filter(Lyapunov::is_chaotic).map(|lyapunov| lyapunov.lyapunov_time())
+    }
+
     /// Numbers of the run.
     pub fn summary(&self) -> TrajectorySummary {
         let n = self.exact.trajectory.coordinates;
@@ -221,6 +258,8 @@ impl<S: Scalar> TrajectoryRun<S> {
             energy_error: self.energy.statistics(),
             energy_drift: self.drift.statistics(),
             lyapunov_exponent: self.lyapunov.map(|l| l.exponent),
+            valid: self.valid,
+            valid_lyapunov_times: self.chaos().map(|time| self.valid.time / time),
             evaluations: self.learned.statistics.evaluations,
             stopped: self.learned.stop.as_ref().map(ToString::to_string),
             reference_stopped: self.exact.stop.as_ref().map(ToString::to_string),
@@ -249,6 +288,10 @@ mod tests {
             assert_eq!((summary.compared_until, summary.stopped.clone()), (10.0, None));
             assert!(run.reference_energy.statistics().max < 1e-8);
         }
+        for run in &same {
+            assert_eq!((run.valid.time, run.valid.at_least, run.chaos()), (10.0, true, None));
+            assert!(run.relative.iter().all(|e| *e < 1e-3));
+        }
         let other = test().run(&PENDULUM, &OSCILLATOR);
         assert!(other.iter().any(|run| run.summary().coordinate_error.max > 1e-5));
         let threaded = TrajectoryTest { threads: 3, lyapunov: true, ..test() }.run(&PENDULUM, &OSCILLATOR);
@@ -264,6 +307,7 @@ mod tests {
         let summary = run.summary();
         assert!(summary.stopped.as_ref().unwrap().contains("singular"));
         assert!(summary.compared_until < 2.0 && summary.compared_until > 1.0);
+        assert!(!summary.valid.at_least && summary.valid.time <= summary.compared_until);
         let text = serde_json::to_string(&summary).unwrap();
         let back: TrajectorySummary = serde_json::from_str(&text).unwrap();
         assert_eq!((back.stopped, back.evaluations), (summary.stopped, summary.evaluations));
@@ -274,7 +318,7 @@ mod tests {
     fn relativistic_starts_are_on_the_mass_shell() {
         let system = configure::<f64>("ads3-geodesic", &[]).unwrap();
         let exact = system.build().unwrap();
-        let start = (system.system.trajectory)(3).start;
+        let start = system.system.trajectory(3).start;
         // Nothing drawn for the velocity of t is used.
         for t_dot in [(0.0, 0.0), (-9.0, 9.0)] {
             let mut v = start.velocities.clone();

@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 /// Evaluations between two looks at the bar.
 const OFTEN: u64 = 1024;
 
-/// What watches such work.
+/// Watch over such work.
 pub struct Attention {
     /// Raised by Ctrl-C; none where Ctrl-C ends the program at once.
     stop: Option<Arc<AtomicBool>>,
@@ -42,7 +42,7 @@ impl Attention {
         self.bar.advance(self.done.fetch_add(pieces as u64, Ordering::Relaxed) + pieces as u64);
     }
 
-    /// Whether Ctrl-C was pressed.
+    /// `true` if Ctrl-C was pressed.
     pub fn is_interrupted(&self) -> bool {
         self.stop.as_ref().is_some_and(|stop| stop.load(Ordering::SeqCst))
     }

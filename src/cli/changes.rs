@@ -29,7 +29,7 @@ pub struct Changes {
     /// Learn the factor alpha of the added |v|^2 of a black box.
     #[arg(long)]
     pub learn_alpha: bool,
-    /// What keeps the signature of the mass matrix.
+    /// Penalty that keeps the signature of the mass matrix.
     #[arg(long, value_enum, value_name = "KIND")]
     pub penalty: Option<PenaltyName>,
     /// Weight of the penalty beside the loss.

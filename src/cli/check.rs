@@ -2,7 +2,7 @@
 
 use crate::cli::recording_args::RecordingArgs;
 use crate::cli::{CliError, output};
-use crate::names::counted;
+use crate::names::{WIDTH, counted, hundredths, percent, rounded, wrapped};
 use crate::recording::survey::{FEW_SAMPLES, Kind, Survey, SurveyOptions, Suspicion, survey};
 use crate::recording::{LARGE_ERROR, Targets};
 use crate::report::text_table;
@@ -37,22 +37,9 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     output::print(&describe(&found))
 }
 
-/// A number as a reader likes it: four digits.
+/// A number with four digits.
 fn short(x: f64) -> String {
-    match x.abs() {
-        size if !size.is_finite() => "-".to_string(),
-        0.0 => "0".to_string(),
-        size if (1e-3..1e5).contains(&size) => {
-            let decimals = (3.0 - size.log10().floor()).clamp(0.0, 6.0) as usize;
-            format!("{x:.decimals$}")
-        }
-        _ => format!("{x:.3e}"),
-    }
-}
-
-/// A share in per cent.
-fn percent(x: f64) -> String {
-    if x.is_finite() { format!("{} %", short(100.0 * x)) } else { "-".to_string() }
+    rounded(x, 4)
 }
 
 /// Unit of a coordinate; velocities and accelerations are in it per s and s^2.
@@ -62,27 +49,28 @@ fn unit(periodic: bool) -> &'static str {
 
 /// The survey for people.
 fn describe(found: &Survey) -> String {
-    let mut text = header(found);
+    let mut text = headline(found) + &header(found);
     let rows: Vec<Vec<String>> = found
         .coordinates
         .iter()
         .map(|c| {
-            let name = format!("{} ({})", c.name, unit(c.periodic));
             let bound = if c.noise_resolved { "" } else { "at most " };
             let noise = format!("{bound}{}", short(c.noise));
+            let range = [short(c.min), short(c.max), noise, hundredths(c.noise_relative)];
             let motion = [c.velocity, c.acceleration, c.period, c.samples_per_period].map(short);
-            [vec![name, short(c.min), short(c.max), noise, percent(c.noise_relative)], motion.to_vec()].concat()
+            [vec![c.name.clone(), unit(c.periodic).to_string()], range.to_vec(), motion.to_vec()].concat()
         })
         .collect();
     let titles = [
         "coordinate",
-        "least",
-        "most",
-        "noise",
-        "of range",
-        "rms v /s",
-        "rms a /s^2",
-        "fast period s",
+        "unit",
+        "least [unit]",
+        "most [unit]",
+        "noise [unit]",
+        "noise over range [%]",
+        "rms v [unit/s]",
+        "rms a [unit/s^2]",
+        "fast period [s]",
         "samples in it",
     ];
     text += &section(&text_table(&titles, &rows));
@@ -92,24 +80,32 @@ fn describe(found: &Survey) -> String {
         .iter()
         .map(|c| {
             let numbers = [c.window_seconds, c.velocity_error, c.acceleration_error].map(short);
-            let ends = [percent(c.acceleration_error_relative)];
-            [vec![format!("{} ({})", c.name, unit(c.periodic)), c.window.to_string()], numbers.to_vec(), ends.to_vec()]
-                .concat()
+            let ends = [hundredths(c.acceleration_error_relative)];
+            let names = [c.name.clone(), unit(c.periodic).to_string(), c.window.to_string()];
+            [names.to_vec(), numbers.to_vec(), ends.to_vec()].concat()
         })
         .collect();
-    let titles = ["smoothing", "window samples", "window s", "error of v /s", "error of a /s^2", "of rms a"];
+    let titles = [
+        "smoothing",
+        "unit",
+        "window [samples]",
+        "window [s]",
+        "error of v [unit/s]",
+        "error of a [unit/s^2]",
+        "over rms a [%]",
+    ];
     text += &section(&text_table(&titles, &rows));
 
     let rows: Vec<Vec<String>> = found.suspicious.iter().take(LINES).map(suspicion).collect();
     if !rows.is_empty() {
-        text += &section(&text_table(&["suspicious", "row", "coordinate", "value (as its unit)", "what"], &rows));
+        text += &section(&text_table(&["suspicious", "row", "coordinate", "value [its unit]", "what"], &rows));
         let _ = more(&mut text, found.suspicious_count, ("place", "places"));
     }
     let _ = advice(&mut text, found);
     for warning in &found.warnings {
         let _ = writeln!(text, "warning: {warning}");
     }
-    text
+    wrapped(&text, WIDTH)
 }
 
 /// A blank line before a table.
@@ -117,7 +113,28 @@ fn section(table: &str) -> String {
     format!("\n{table}")
 }
 
-/// What was read.
+/// A sentence that says if a fit can begin.
+fn headline(found: &Survey) -> String {
+    let worst = found.coordinates.iter().map(|c| c.acceleration_error_relative).fold(0.0, f64::max);
+    let looked = match (found.warnings.len(), found.suspicious_count) {
+        (0, 0) => "nothing looks wrong".to_string(),
+        (0, places) => format!("look at {} first", counted(places, "suspicious place", "suspicious places")),
+        (warnings, _) => format!("read {} at the end first", counted(warnings, "warning", "warnings")),
+    };
+    let good = match found.targets {
+        _ if !found.motionless.is_empty() => {
+            return "A fit cannot learn from these data: something stands still.\n\n".into();
+        }
+        Targets::Measured => "the accelerations are measured".to_string(),
+        Targets::Smoothed | Targets::Motion if worst.is_finite() => {
+            format!("smoothing gives the accelerations to {}", percent(worst))
+        }
+        Targets::Smoothed | Targets::Motion => "smoothing gives no accelerations".to_string(),
+    };
+    format!("A fit can learn from these data: {good}, {looked}.\n\n")
+}
+
+/// Files, trajectories and samples that were read.
 fn header(found: &Survey) -> String {
     let seconds: f64 = found.tracks.iter().map(|t| t.end - t.start).sum();
     let times = match &found.time {
@@ -141,12 +158,12 @@ fn header(found: &Survey) -> String {
             [
                 vec![t.name.clone(), rows, t.samples.to_string()],
                 times.to_vec(),
-                vec![percent(if t.jitter < ROUNDING { 0.0 } else { t.jitter })],
+                vec![hundredths(if t.jitter < ROUNDING { 0.0 } else { t.jitter })],
             ]
             .concat()
         })
         .collect();
-    let titles = ["trajectory", "rows", "samples", "from s", "to s", "samples per s", "jitter of a step"];
+    let titles = ["trajectory", "rows", "samples", "from [s]", "to [s]", "rate [Hz]", "jitter of a step [%]"];
     text += &section(&text_table(&titles, &rows));
     let _ = more(&mut text, found.tracks.len(), ("trajectory", "trajectories"));
     let _ = left_out(&mut text, found);
@@ -176,7 +193,7 @@ fn left_out(text: &mut String, found: &Survey) -> std::fmt::Result {
     more(text, found.dropped.len(), ("stretch between gaps", "stretches between gaps"))
 }
 
-/// How many more there are than were shown.
+/// Number of entries beyond those that were shown.
 fn more(text: &mut String, all: usize, (one, many): (&str, &str)) -> std::fmt::Result {
     match all.checked_sub(LINES) {
         Some(rest) if rest > 0 => {
@@ -198,7 +215,7 @@ fn suspicion(s: &Suspicion) -> Vec<String> {
     vec![s.track.clone(), s.row.to_string(), s.coordinate.clone(), short(s.value), what]
 }
 
-/// What a fit would do.
+/// Advice: the way a fit would take.
 fn advice(text: &mut String, found: &Survey) -> std::fmt::Result {
     let worst = found.coordinates.iter().map(|c| c.acceleration_error_relative).fold(0.0, f64::max);
     let limit = percent(LARGE_ERROR);
@@ -242,9 +259,17 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_have_four_digits() {
-        let texts = [0.0, 1.0, -0.012_345_6, 98_765.4, 1e-9, 123_456.0].map(short);
-        assert_eq!(texts, ["0", "1.000", "-0.01235", "98765", "1.000e-9", "1.235e5"]);
-        assert_eq!((percent(0.0123).as_str(), percent(f64::NAN).as_str()), ("1.230 %", "-"));
+    fn suspicions_are_told_in_words() {
+        let frozen = Suspicion {
+            track: "run 1".into(),
+            row: 7,
+            coordinate: "x".into(),
+            kind: Kind::Frozen,
+            value: 0.25,
+            size: 40.0,
+        };
+        assert_eq!(suspicion(&frozen), ["run 1", "7", "x", "0.2500", "40 equal values: a frozen sensor?"]);
+        let shifted = Suspicion { kind: Kind::Jump, size: 0.012_345, ..frozen };
+        assert_eq!(suspicion(&shifted)[4], "all later positions are shifted by 0.01235");
     }
 }

@@ -24,12 +24,12 @@ pub struct ConfigFile {
     large: BTreeMap<String, u64>,
 }
 
-/// What is wrong with the value of a key.
+/// A wrong value of a key.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Mistake {
     /// Path of the key, such as `phase[0].rate`; empty for what concerns the whole file.
     pub key: String,
-    /// What is wrong.
+    /// The problem in words.
     pub problem: String,
 }
 
@@ -37,6 +37,20 @@ impl Mistake {
     /// A mistake in a key.
     pub fn new(key: impl Into<String>, problem: impl std::fmt::Display) -> Self {
         Self { key: key.into(), problem: problem.to_string() }
+    }
+    /// Line of the key, or of the innermost table or list around it that has one.
+    pub fn line(&self, lines: &BTreeMap<String, usize>) -> Option<usize> {
+        let mut path = self.key.as_str();
+        loop {
+            if let Some(line) = lines.get(path) {
+                return Some(*line);
+            }
+            path = &path[..path.rfind(['.', '['])?];
+        }
+    }
+    /// Key and problem.
+    pub fn text(&self) -> String {
+        if self.key.is_empty() { self.problem.clone() } else { format!("{}: {}", self.key, self.problem) }
     }
 }
 
@@ -53,10 +67,17 @@ impl ConfigFile {
     /// # Errors
     /// A data error for a file that cannot be read, a usage error for text that is not TOML.
     pub fn read(path: &Path) -> Result<Self, CliError> {
-        let name = input::name(path);
-        let bytes = input::read(path, MAX_BYTES).map_err(|e| CliError::data(format_args!("{name}: {e}")))?;
-        let text = String::from_utf8(bytes).map_err(|_| CliError::usage(format_args!("{name}: not UTF-8 text")))?;
+        let (name, text) = read_text(path)?;
         Self::parse(name, &text)
+    }
+
+    /// Reads a file by a parser of its whole text that says line and problem.
+    ///
+    /// # Errors
+    /// A data error for a file that cannot be read, a usage error for text that the parser refuses.
+    pub fn read_with<T>(path: &Path, parse: impl FnOnce(&str) -> Result<T, (usize, String)>) -> Result<T, CliError> {
+        let (name, text) = read_text(path)?;
+        parse(&text).map_err(|(line, problem)| CliError::usage(format_args!("{name}:{line}: {problem}")))
     }
 
     /// Takes the text of a file apart.
@@ -77,7 +98,12 @@ impl ConfigFile {
         tables.iter().try_fold(&self.table, |table, name| table.get(*name)?.as_table())?.get(*last)
     }
 
-    /// Whether a key is there, by its path in messages, such as `phase[0].rate`.
+    /// Takes a key out of the file, so that nothing else is said about it.
+    pub fn take(&mut self, key: &str) -> Option<Value> {
+        self.table.remove(key)
+    }
+
+    /// `true` if a key is there, by its path in messages, such as `phase[0].rate`.
     pub fn has(&self, path: &str) -> bool {
         self.lines.contains_key(path)
     }
@@ -116,27 +142,24 @@ impl ConfigFile {
         let mut placed: Vec<(usize, String)> = mistakes
             .into_iter()
             .map(|Mistake { key, problem }| {
-                let line = self.line(&key);
+                let mistake = Mistake { key, problem };
+                let line = mistake.line(&self.lines);
                 let place = line.map_or(self.name.clone(), |line| format!("{}:{line}", self.name));
-                let key = if key.is_empty() { key } else { format!("{key}: ") };
-                (line.unwrap_or(0), format!("{place}: {key}{problem}"))
+                (line.unwrap_or(0), format!("{place}: {}", mistake.text()))
             })
             .collect();
         placed.sort();
         placed.dedup();
         CliError::all_usage(placed.into_iter().map(|(_, text)| text))
     }
+}
 
-    /// Line of a key, or of the innermost table or list around it that is in the file.
-    fn line(&self, key: &str) -> Option<usize> {
-        let mut path = key;
-        loop {
-            if let Some(line) = self.lines.get(path) {
-                return Some(*line);
-            }
-            path = &path[..path.rfind(['.', '['])?];
-        }
-    }
+/// The name of a file in messages, and its text; standard input if it is `-`.
+fn read_text(path: &Path) -> Result<(String, String), CliError> {
+    let name = input::name(path);
+    let bytes = input::read(path, MAX_BYTES).map_err(|e| CliError::data(format_args!("{name}: {e}")))?;
+    let text = String::from_utf8(bytes).map_err(|_| CliError::usage(format_args!("{name}: not UTF-8 text")))?;
+    Ok((name, text))
 }
 
 /// The text with 0 in the place of the seeds that are larger than the integers of a table, and these seeds by their paths.
@@ -204,14 +227,14 @@ fn with(root: &Value, path: &[Step], value: &Value) -> Value {
     }
 }
 
-/// Whether a value is a `T`, or what serde says.
+/// Test of a value: it is a `T`, or serde says why not.
 fn accepts<T: DeserializeOwned>(value: &Value) -> Result<(), String> {
     T::deserialize(value.clone()).map(drop).map_err(|e| e.message().to_string())
 }
 
 /// A base that takes the values of a file one by one.
 struct Filled {
-    /// What there is so far; it is always accepted.
+    /// The part read so far; it is always accepted.
     root: Value,
     mistakes: Vec<Mistake>,
     accepts: fn(&Value) -> Result<(), String>,
@@ -316,7 +339,7 @@ impl Filled {
 /// The key that says of which kind a table is.
 const KIND: &str = "kind";
 
-/// What a table of several kinds may come to: of the same kind, the base's with the file's values; of another one, what the
+/// Results that a table of several kinds may have: of the same kind, the base's with the file's values; of another one, what the
 /// two kinds have in common comes from the base.
 fn choices(base: &Table, file: &Table) -> Vec<Table> {
     let over = |keep: &dyn Fn(&str) -> bool| -> Table {

@@ -1,8 +1,9 @@
-//! What `lnn fit` cannot know: how well the data determine mass matrix, friction and energy of its model, in tables.
+//! Tables of the ranges in which the data determine mass matrix, friction and energy of the model of `lnn fit`.
 
 use crate::analysis::{Determination, EnergyLoss, Estimate, Observed, determination, energy_loss, places};
 use crate::cli::CliError;
 use crate::lagrangian::EulerLagrange;
+use crate::names::number;
 use crate::recording::Targets;
 use crate::report::{Report, text_table};
 use crate::training::Measured;
@@ -75,11 +76,15 @@ impl Determined {
         ))
     }
 
-    const HEADERS: [&'static str; 5] = ["quantity", "learned", "from", "to", "determined"];
+    fn headers(&self) -> [String; 5] {
+        let unit = if self.unit == "SI" { "SI" } else { "relative" };
+        let [learned, from, to] = ["learned", "from", "to"].map(|name| format!("{name} [{unit}]"));
+        ["quantity".to_string(), learned, from, to, "determined".to_string()]
+    }
 
     fn rows(&self) -> Vec<Vec<String>> {
         let row = |q: &Quantity| {
-            let numbers = [q.learned, q.low, q.high].map(|x| format!("{x:.4e}"));
+            let numbers = [q.learned, q.low, q.high].map(number);
             [vec![q.name.clone()], numbers.to_vec(), vec![q.determined.to_string()]].concat()
         };
         self.determination.iter().map(row).collect()
@@ -87,10 +92,10 @@ impl Determined {
 
     fn about(&self) -> String {
         let unit = match self.unit.as_str() {
-            "SI" => "in SI units, which the known forces fix".to_string(),
-            unit => format!("over the {unit}, for without known forces (--force) L has no unit"),
+            "SI" => "In SI units, which the known forces fix.".to_string(),
+            unit => format!("Relative to the {unit}: without known forces (--force) L has no unit."),
         };
-        format!("How well the data determine the model, ranges for the truth in 19 cases of 20; {unit}")
+        format!("How well the data determine the model: ranges hold the truth in 19 cases of 20.\n{unit}")
     }
 
     /// For a terminal.
@@ -98,7 +103,7 @@ impl Determined {
         if self.determination.is_empty() {
             return "how well the data determine mass matrix, friction and energy cannot be said here\n".to_string();
         }
-        format!("\n{}\n{}", self.about(), text_table(&Self::HEADERS, &self.rows()))
+        format!("\n{}\n{}", self.about(), text_table(&self.headers(), &self.rows()))
     }
 
     /// Adds the table to a report.
@@ -107,7 +112,7 @@ impl Determined {
         let report = if self.determination.is_empty() {
             report.paragraph(&self.text())
         } else {
-            report.paragraph(&self.about()).table(&Self::HEADERS, &self.rows())
+            report.paragraph(&self.about()).table(&self.headers(), &self.rows())
         };
         match self.suggestion() {
             Some(text) => report.paragraph(&text),

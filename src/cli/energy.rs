@@ -22,11 +22,11 @@ pub struct Balance {
     pub work: f64,
     /// Energy taken by friction.
     pub friction: f64,
-    /// What is not accounted for.
+    /// Energy that is not accounted for.
     pub defect: f64,
     /// Root mean square over the trajectories of the same: what in the mean may cancel.
     pub defect_rms: f64,
-    /// Whether any force was known.
+    /// `true` if any force was known.
     #[serde(skip)]
     pub forced: bool,
 }
@@ -74,7 +74,7 @@ pub fn balance(model: &dyn EulerLagrange<f64>, part: &Part) -> Option<Balance> {
 }
 
 impl Balance {
-    /// The balance in one line, its parts over the mean kinetic energy.
+    /// The balance in two lines, its parts over the mean kinetic energy.
     pub fn text(&self) -> String {
         let tenths = |x: f64| (1e3 * x / self.kinetic.abs()).round();
         let [change, work, friction] = [self.change, self.work, self.friction].map(tenths);
@@ -86,12 +86,13 @@ impl Balance {
             1 => ("the held-out trajectory".to_string(), String::new()),
             _ => {
                 let rms = percent(tenths(self.defect_rms));
-                (format!("{count} held-out trajectories (mean)"), format!(" (root mean square {rms})"))
+                (format!("{count} held-out trajectories (mean)"), format!(" (rms {rms})"))
             }
         };
-        let work = if self.forced { format!("work of the known forces {} - ", percent(work)) } else { "-".to_string() };
+        let work =
+            if self.forced { format!("work of the known forces {} - ", percent(work)) } else { "- ".to_string() };
         format!(
-            "energy along {along}, over the mean kinetic energy: change {} = {work}taken by friction {} + not accounted for \
+            "energy along {along}, over the mean kinetic energy:\n  change {} = {work}taken by friction {} + not accounted for \
              {}{spread}\n",
             percent(change),
             percent(friction),
@@ -124,9 +125,9 @@ mod tests {
         let [change, work, friction, rest] = ["change ", "known forces ", "by friction ", "accounted for "].map(part);
         assert!((change - (work - friction + rest)).abs() < 1e-9, "{text}");
         assert!((rest - 5.0).abs() < 0.11 && text.contains("3 held-out trajectories (mean)"), "{text}");
-        assert!(text.contains("(root mean square 10.0 %)"), "{text}");
+        assert!(text.contains("(rms 10.0 %)") && text.lines().all(|line| line.len() <= 120), "{text}");
         let free = Balance { trajectories: 1, forced: false, work: 0.0, ..balance }.text();
         assert!(free.contains("along the held-out trajectory,") && !free.contains("forces"), "{free}");
-        assert!(!free.contains("root mean square"), "{free}");
+        assert!(!free.contains("rms"), "{free}");
     }
 }

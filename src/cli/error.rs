@@ -1,4 +1,4 @@
-//! How a command fails: one line, or one for each mistake of a configuration, and an exit code.
+//! Failures of a command: one line, or one for each mistake of a configuration, and an exit code.
 
 use crate::cli::interrupt;
 use crate::names::one_line;
@@ -7,7 +7,7 @@ use std::io;
 use std::path::Path;
 use std::process::ExitCode;
 
-/// What went wrong, as far as a calling script cares.
+/// Kind of a failure, as far as a calling script cares.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// Arguments or configuration: exit code 2.
@@ -63,7 +63,7 @@ impl CliError {
     pub fn signals(error: io::Error) -> Self {
         Self::data(format_args!("cannot watch for Ctrl-C: {error}"))
     }
-    /// What went wrong.
+    /// The kind of the failure.
     pub fn kind(&self) -> Kind {
         self.kind
     }

@@ -7,7 +7,7 @@ use crate::cli::learning::{parameter_table, write_report_and_figures};
 use crate::cli::number::{bounds, count, positive, seed, threads, tolerance};
 use crate::cli::place::{self, Wanted};
 use crate::cli::results::{Writer, remove_stale_evaluation};
-use crate::cli::{CliError, output};
+use crate::cli::{CliError, output, source};
 use crate::lagrangian::Configured;
 use crate::lagrangian::system::{Bounds, TrajectoryTest};
 use crate::report::Report;
@@ -23,6 +23,13 @@ const STATES: usize = 12_000;
 pub struct Args {
     /// Model, a file or the directory of a run.
     model: PathBuf,
+    /// Compare with this system, by name or by the file that describes it, instead of the one that was learned: with a model of
+    /// recorded motion, such as one of lnn fit.
+    #[arg(long, value_name = "NAME|FILE.toml")]
+    system: Option<String>,
+    /// A parameter of that system; may be repeated.
+    #[arg(long, value_name = "SYMBOL=VALUE", requires = "system", value_parser = source::parameter)]
+    param: Vec<(String, String)>,
     /// Random starts of the trajectory test.
     #[arg(long, value_name = "N", default_value = "4", allow_hyphen_values = true, value_parser = count)]
     starts: usize,
@@ -57,7 +64,7 @@ pub struct Args {
     json: bool,
 }
 
-/// What `evaluation.json` holds.
+/// Contents of `evaluation.json`.
 #[derive(Serialize)]
 struct Summary<'a> {
     system: &'a str,
@@ -79,7 +86,7 @@ fn span(args: &Args, system: &Configured<f64>) -> Result<TrajectoryTest, CliErro
             Err(CliError::usage(format_args!("{option}: expected 1 or {n} pairs LOW:HIGH, found {found}")))
         }
     };
-    let TrajectoryTest { start: Bounds { positions, velocities }, t_end, dt } = (system.system.trajectory)(n);
+    let TrajectoryTest { start: Bounds { positions, velocities }, t_end, dt } = system.system.trajectory(n);
     let positions = replaced("--positions", &args.positions, positions)?;
     let velocities = replaced("--velocities", &args.velocities, velocities)?;
     Ok(TrajectoryTest { start: Bounds { positions, velocities }, t_end: args.until.unwrap_or(t_end), dt })
@@ -91,7 +98,10 @@ fn span(args: &Args, system: &Configured<f64>) -> Result<TrajectoryTest, CliErro
 /// A data error for a bad model, an unknown system or a directory that cannot be written.
 pub fn run(args: &Args) -> Result<(), CliError> {
     let learned = Learned::<f64>::load(&args.model)?;
-    let system = learned.system(&args.model)?;
+    let system = match &args.system {
+        Some(name) => learned.beside(name, &args.param)?,
+        None => learned.system(&args.model)?,
+    };
     let file = model_file(&args.model)?;
     let usual = file.parent().unwrap_or(Path::new("")).join("evaluation");
     let (out, inputs) = (args.out.as_deref(), [file.as_path()]);
@@ -99,7 +109,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let folder = place::open(&wanted)?;
 
     let seed = args.seed.unwrap_or(learned.header.seed);
-    let bounds = (system.system.validation)(system.coordinates);
+    let bounds = system.system.validation(system.coordinates);
     let pairs = |bounds: &[(f64, f64)]| bounds.iter().map(|&(low, high)| [low, high]).collect::<Vec<_>>();
     let bounds = (pairs(&bounds.positions), pairs(&bounds.velocities));
     let mut random = Stream::Test.generator(seed);
@@ -119,10 +129,12 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     };
     let evaluation = evaluate(&system, &learned.network, plan)?;
     let validation_loss = learned.header.validation_loss;
-    let summary = Summary { system: system.system.name, seed, validation_loss, evaluation: &evaluation };
+    let summary = Summary { system: &system.system.name, seed, validation_loss, evaluation: &evaluation };
     let json = serde_json::to_string_pretty(&summary).map_err(CliError::data)? + "\n";
     let title = format!("{}: learned against exact", system.system.title);
-    let report = Report::new(&title).paragraph(&format!("Model {}, starts of seed {seed}.", args.model.display()));
+    let report = evaluation
+        .summarise(Report::new(&title), &system.system.title)
+        .paragraph(&format!("Model {}, starts of seed {seed}.", args.model.display()));
     remove_stale_evaluation(&folder)?;
     folder.write("evaluation.json", json.as_bytes())?;
     let report = evaluation.report(parameter_table(report, &system));
@@ -130,5 +142,9 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     if args.json {
         return output::print(&json);
     }
-    output::print(&format!("{}\nreport: {}\n", evaluation.text(), folder.file("report.html").display()))
+    output::print(&format!(
+        "{}\nreport: {}\n",
+        evaluation.text(&system.system.title),
+        folder.file("report.html").display()
+    ))
 }

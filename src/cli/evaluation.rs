@@ -1,15 +1,16 @@
-//! What a model is worth: accelerations, trajectories and pictures against the hand-written system.
+//! Evaluation of a model: accelerations, trajectories and pictures against the hand-written system.
 
 use crate::analysis::{
     Axis, ErrorDistribution, MassMatrixError, StartBox, Statistics, TrajectoryRun, TrajectorySummary, TrajectoryTest,
-    acceleration_errors, conserved_error, determinant_grid, lagrangian_grid, mass_matrix_error, statistics,
+    ValidTimes, acceleration_errors, conserved_error, determinant_grid, lagrangian_grid, mass_matrix_error, statistics,
     wrong_signatures,
 };
 use crate::cli::attention::Attention;
-use crate::cli::{CliError, memory};
+use crate::cli::{CliError, headline, memory};
 use crate::lagrangian::system::TrajectoryTest as Span;
 use crate::lagrangian::{Configured, EulerLagrange};
-use crate::report::{Figure, Fit, GridComparison, PlotError, Report, evaluation_figures, grid_figures, text_table};
+use crate::names::{WIDTH, hundredths, number, rounded, wrapped};
+use crate::report::{Figure, Fit, GridComparison, Report, evaluation_figures, grid_figures, text_table};
 use crate::rollout::{Domain, Trajectory};
 use serde::Serialize;
 use std::fmt::Write as _;
@@ -18,6 +19,8 @@ use std::fmt::Write as _;
 const GRID: usize = 81;
 /// Relative tolerance of the learned motion in the paper's test.
 pub const RTOL: f64 = 1e-6;
+/// Starts whose motion is drawn.
+const DRAWN: usize = 4;
 /// Velocities of the fast map of `det M`, in upper bounds of the validation states.
 const FAST: f64 = 0.99;
 
@@ -30,6 +33,8 @@ pub struct Evaluation {
     pub wrong_signature: f64,
     /// Error of the mass matrix, of a geodesic the metric, at rest at the positions of the fresh states.
     pub mass_matrix: MassMatrixError,
+    /// Time for which the learned motion predicts the exact one, median over the starts.
+    pub valid_time: Option<ValidTimes>,
     /// One entry per random start.
     pub trajectories: Vec<Motion>,
     /// Names of the accelerations' coordinates, with the accelerations' units.
@@ -37,11 +42,11 @@ pub struct Evaluation {
     pub coordinates: Vec<String>,
     /// Unit of all coordinates together.
     #[serde(skip)]
-    pub unit: &'static str,
+    pub unit: String,
     /// Unit of times.
     #[serde(skip)]
-    pub time_unit: &'static str,
-    /// What the exact motion conserves beside its energy.
+    pub time_unit: String,
+    /// Name of what the exact motion conserves beside its energy.
     #[serde(skip)]
     pub conserved: Option<&'static str>,
     /// Pictures.
@@ -61,7 +66,7 @@ pub struct Motion {
     pub left_training_range: Option<String>,
 }
 
-/// How to evaluate.
+/// Settings of an evaluation.
 #[derive(Clone, Debug)]
 pub struct Plan<'a> {
     /// Fresh states `(states, n)` on which accelerations are compared.
@@ -103,7 +108,7 @@ pub fn evaluate(
         attention.advance(1);
         attention.check()
     };
-    let coordinates = (system.system.coordinates)(n);
+    let coordinates = system.system.coordinates(n);
     let periodic: Vec<bool> = coordinates.iter().map(|c| c.periodic).collect();
     let accelerations = acceleration_errors(exact, learned, plan.states.0, plan.states.1);
     done()?;
@@ -113,8 +118,7 @@ pub fn evaluate(
     memory::require("the evaluation", memory::motions((plan.starts as u64).saturating_mul(2), t_end / dt, n, 0))?;
     let defaults = TrajectoryTest::new(StartBox { q: start.positions, v: start.velocities }, periodic);
     // Steps grow with the time, and with the fifth root of the accuracy.
-    let longer =
-        (t_end / (system.system.trajectory)(n).t_end).max(1.0) * (defaults.rtol / plan.rtol).max(1.0).powf(0.2);
+    let longer = (t_end / system.system.trajectory(n).t_end).max(1.0) * (defaults.rtol / plan.rtol).max(1.0).powf(0.2);
     let test = TrajectoryTest {
         starts: plan.starts,
         seed: plan.seed,
@@ -135,7 +139,9 @@ pub fn evaluate(
         left_training_range: leaving(&run.learned.trajectory, &plan.trained, &system.system.columns(n)),
     };
 
-    let mut figures = evaluation_figures(&runs, system).map_err(CliError::data)?;
+    let portraits = test.portraits(exact, learned, &runs[..runs.len().min(DRAWN)]);
+    attention.check()?;
+    let mut figures = evaluation_figures(&runs, &portraits, system);
     let grids = grids(system, exact, learned);
     attention.check()?;
     figures.extend(grids?);
@@ -147,16 +153,17 @@ pub fn evaluate(
         accelerations,
         wrong_signature,
         mass_matrix,
+        valid_time: ValidTimes::of(&runs.iter().map(|run| (run.valid, run.chaos())).collect::<Vec<_>>()),
         trajectories: runs.iter().map(motion).collect(),
         coordinates: coordinates
             .iter()
             .map(|c| format!("{} [{}/{}^2]", c.name, c.unit, system.system.time_unit))
             .collect(),
         unit: match coordinates.iter().find(|c| c.unit != coordinates[0].unit) {
-            None => coordinates[0].unit,
-            Some(_) => "each in its unit",
+            None => coordinates[0].unit.to_string(),
+            Some(_) => "its unit".to_string(),
         },
-        time_unit: system.system.time_unit,
+        time_unit: system.system.time_unit.to_string(),
         conserved: system.system.conserved.map(|conserved| conserved.name),
         figures,
     })
@@ -180,7 +187,7 @@ fn grids(
     learned: &dyn EulerLagrange<f64>,
 ) -> Result<Vec<Figure>, CliError> {
     let n = system.coordinates;
-    let bounds = (system.system.validation)(n);
+    let bounds = system.system.validation(n);
     let middle: Vec<f64> = bounds.positions.iter().map(|(low, high)| 0.5 * (low + high)).collect();
     // At rest a total time derivative in the learned L vanishes: what is left is a factor and a constant.
     let mut rest: Vec<f64> = bounds.velocities.iter().map(|(low, high)| 0.0f64.clamp(*low, *high)).collect();
@@ -195,7 +202,7 @@ fn grids(
     let axes =
         shown.map(|component| Axis { component, from: ranges[component].0, to: ranges[component].1, points: GRID });
 
-    // L is -1/2 everywhere on a mass shell and would show nothing there; its learned M is learned nowhere else.
+    // L is -1/2 everywhere on a mass shell and would show nothing there. M is compared on the shell, where it was trained.
     let impose = |q: &[f64], v: &mut [f64]| system.impose_constraint(q, v).unwrap_or_else(|_| v.fill(f64::NAN));
     let lagrangian = |model: &dyn EulerLagrange<f64>| lagrangian_grid(model, &rest, axes);
     let determinant = |model: &dyn EulerLagrange<f64>, state: &[f64]| determinant_grid(model, state, axes, impose);
@@ -231,12 +238,11 @@ fn grids(
             fit: if quantity == "L" { Fit::Affine } else { Fit::Factor },
             signs: quantity != "L",
         };
-        match grid_figures(&comparison) {
-            Ok((figure, _)) => figures.push(figure),
-            // A model that is finite nowhere on the grid has no picture; the tables say so.
-            Err(PlotError::Empty(_)) => {}
-            Err(error) => return Err(CliError::data(error)),
-        }
+        // A model that is finite nowhere on the grid has no picture; the tables say so.
+        figures.extend(grid_figures(&comparison).ok().map(|(mut figure, _)| {
+            figure.caption += if system.system.time_unit == "s" { " SI units." } else { " Geometric units." };
+            figure
+        }));
     }
     Ok(figures)
 }
@@ -268,11 +274,6 @@ fn fixed(system: &Configured<f64>, state: &[f64], axes: [Axis; 2], imposed: bool
 /// Stands where there is no finite number.
 const NONE: &str = "-";
 
-/// Five digits.
-fn digits(x: f64) -> String {
-    if x.is_finite() { format!("{x:.4e}") } else { NONE.to_string() }
-}
-
 /// A table of a report.
 struct Table {
     title: String,
@@ -282,20 +283,25 @@ struct Table {
 
 impl Evaluation {
     fn tables(&self) -> [Table; 3] {
+        let units: Vec<&str> = self.coordinates.iter().map(|name| headline::named(name).1).collect();
+        let unit = units.first().filter(|unit| units.iter().all(|other| other == *unit));
         let accelerations = self.coordinates.iter().zip(&self.accelerations).map(|(name, e)| {
-            let numbers = [e.mean, e.rms, e.median, e.p99, e.max].map(digits);
-            [vec![name.clone()], numbers.to_vec(), vec![e.failed.to_string()]].concat()
+            let numbers = [e.mean, e.rms, e.median, e.p99, e.max].map(number);
+            let name = if unit.is_some() { headline::named(name).0 } else { name };
+            [vec![name.to_string()], numbers.to_vec(), vec![e.failed.to_string()]].concat()
         });
+        let measures = ["mean", "rms", "median", "99 % below", "max"];
+        let of_unit = |measure: &str| format!("{measure} [{}]", unit.unwrap_or(&"its unit"));
         let trajectories = self.trajectories.iter().enumerate().map(|(k, motion)| {
             let t = &motion.summary;
             let fastest = t.velocity_error.iter().fold(f64::NAN, |m, v| m.max(v.max));
-            let mut numbers = vec![t.coordinate_error.mean, t.coordinate_error.max, fastest];
-            numbers.extend([t.energy_error.mean, t.energy_error.max]);
-            numbers.extend(motion.conserved_error.map(|conserved| conserved.max));
-            let mut row = vec![(k + 1).to_string(), format!("{:.1}", t.compared_until)];
-            row.extend(numbers.iter().map(|x| if x.is_finite() { format!("{x:.3e}") } else { NONE.to_string() }));
+            let valid = format!("{}{}", number(t.valid.time), if t.valid.at_least { "+" } else { "" });
+            let mut row = vec![(k + 1).to_string(), format!("{:.1}", t.compared_until), valid];
+            row.extend([t.coordinate_error.mean, t.coordinate_error.max, fastest].map(number));
+            row.extend([t.energy_error.mean, t.energy_error.max].map(hundredths));
+            row.extend(motion.conserved_error.map(|conserved| hundredths(conserved.max)));
             let time = t.lyapunov_exponent.filter(|exponent| *exponent > 0.0).map(f64::recip);
-            row.push(time.map_or(NONE.to_string(), |time| format!("{time:.1}")));
+            row.push(time.map_or(NONE.to_string(), |time| rounded(time, 2)));
             let exact = t.reference_stopped.as_ref().map(|stop| format!("exact motion: {stop}"));
             let remarks = [motion.left_training_range.clone(), t.stopped.clone(), exact];
             row.push(remarks.into_iter().flatten().collect::<Vec<_>>().join("; "));
@@ -303,19 +309,20 @@ impl Evaluation {
         });
         let t_end = self.trajectories.iter().fold(0.0, |m: f64, motion| m.max(motion.summary.compared_until));
         let MassMatrixError { factor, error: m } = &self.mass_matrix;
-        let matrix = [*factor, m.mean, m.median, m.p99, m.max].map(digits);
-        let matrix = [matrix.to_vec(), vec![m.failed.to_string()]].concat();
+        let matrix = [m.mean, m.median, m.p99, m.max].map(hundredths);
+        let matrix = [vec![number(*factor)], matrix.to_vec(), vec![m.failed.to_string()]].concat();
         let header = |names: &[&str]| names.iter().map(ToString::to_string).collect();
         let until = format!("until [{}]", self.time_unit);
         let lyapunov = format!("Lyapunov time [{}]", self.time_unit);
-        let conserved = self.conserved.map(|_| "conserved max");
-        let mean = format!("coordinates mean [{}]", self.unit);
-        let fastest = format!("velocities max [{}/{}]", self.unit, self.time_unit);
-        let mut motions = vec!["start", until.as_str(), &mean, "max", &fastest, "energy mean, relative", "max"];
+        let conserved = self.conserved.map(|_| "conserved, max [%]");
+        let [mean, most] = ["mean", "max"].map(|which| format!("coordinates, {which} [{}]", self.unit));
+        let fastest = format!("velocities, max [{}/{}]", self.unit, self.time_unit);
+        let valid = format!("valid [{}]", self.time_unit);
+        let mut motions = vec!["start", &until, &valid, &mean, &most, &fastest, "energy, mean [%]", "energy, max [%]"];
         motions.extend(conserved.into_iter().chain([lyapunov.as_str(), "remarks"]));
         let mut about = String::from("Trajectories from random starts against exact motion");
         if let Some(name) = self.conserved {
-            let _ = write!(about, "; conserved: {name}, relative");
+            let _ = write!(about, "; conserved: {name}");
         }
         if t_end > 1.0 {
             let _ = write!(about, "; motion without chaos has a Lyapunov time of about {:.0}", t_end / t_end.ln());
@@ -323,26 +330,28 @@ impl Evaluation {
         [
             Table {
                 title: "Error of accelerations on fresh states".into(),
-                header: header(&["acceleration", "mean", "rms", "median", "99 %", "max", "failed"]),
+                header: [vec!["acceleration of".to_string()], measures.map(of_unit).to_vec(), vec!["failed".into()]]
+                    .concat(),
                 rows: accelerations.collect(),
             },
             Table {
                 title: "Relative error of the mass matrix at rest, up to one factor".into(),
-                header: header(&["factor", "mean", "median", "99 %", "max", "failed"]),
+                header: header(&["factor [1]", "mean [%]", "median [%]", "99 % below [%]", "max [%]", "failed"]),
                 rows: vec![matrix],
             },
             Table { title: about, header: header(&motions), rows: trajectories.collect() },
         ]
     }
 
-    /// Tables for a terminal.
-    pub fn text(&self) -> String {
+    /// Headline and tables for a terminal, of a model of the system called `title`.
+    pub fn text(&self, title: &str) -> String {
         let tables = self.tables();
         let text = tables.iter().map(|t| format!("{}\n{}", t.title, text_table(&t.header, &t.rows)));
-        text.collect::<Vec<_>>().join("\n") + &self.note()
+        let first = headline::of_evaluation(title, self).text();
+        wrapped(&format!("{first}\n{}{}", text.collect::<Vec<_>>().join("\n"), self.note()), WIDTH)
     }
 
-    /// What a [`NONE`] means, if there is one.
+    /// Meaning of [`NONE`], if there is one in the tables.
     fn note(&self) -> String {
         let tables = self.tables();
         let mut cells = tables.iter().flat_map(|table| table.rows.iter().flatten());
@@ -355,6 +364,11 @@ impl Evaluation {
         .to_string()
     }
 
+    /// The headline, at the beginning of a report about the system called `title`.
+    pub fn summarise(&self, report: Report, title: &str) -> Report {
+        headline::of_evaluation(title, self).begin(report)
+    }
+
     /// Tables and pictures for a report.
     pub fn report(&self, mut report: Report) -> Report {
         for Table { title, header, rows } in self.tables() {
@@ -364,8 +378,7 @@ impl Evaluation {
         if !note.is_empty() {
             report = report.paragraph(note.trim());
         }
-        report = report.heading("Learned against exact");
-        self.figures.iter().fold(report, |report, figure| report.figure(&figure.png, &figure.caption))
+        report.heading("Learned against exact").figures(&self.figures)
     }
 }
 
@@ -392,10 +405,10 @@ mod tests {
         begins(
             &captions("triple-pendulum"),
             &[
-                ("lagrangian.png", &format!("L at {rest}")),
-                ("det_mass_matrix.png", &format!("det M at {rest}")),
+                ("lagrangian.svg", &format!("L at {rest}")),
+                ("det_mass_matrix.svg", &format!("det M at {rest}")),
                 (
-                    "det_mass_matrix_fast.png",
+                    "det_mass_matrix_fast.svg",
                     "Fast det M at theta3 = 3.1416 rad; theta1_dot, theta2_dot, theta3_dot = 9.9 rad/s: exact",
                 ),
             ],
@@ -403,14 +416,14 @@ mod tests {
         begins(
             &captions("ads2-geodesic"),
             &[
-                ("lagrangian.png", "L at t_dot = 3.25 m/m; z_dot = 0 m/m: exact"),
-                ("det_mass_matrix.png", "det M at t_dot by the mass shell; z_dot = 0 m/m: exact"),
-                ("det_mass_matrix_fast.png", "Fast det M at t_dot by the mass shell; z_dot = 0.594 m/m: exact"),
+                ("lagrangian.svg", "L at t_dot = 3.25 m/m; z_dot = 0 m/m: exact"),
+                ("det_mass_matrix.svg", "det M at t_dot by the mass shell; z_dot = 0 m/m: exact"),
+                ("det_mass_matrix_fast.svg", "Fast det M at t_dot by the mass shell; z_dot = 0.594 m/m: exact"),
             ],
         );
         // The velocity is an axis: there is no fast map.
         let one = captions("harmonic-oscillator");
-        begins(&one, &[("lagrangian.png", "L: exact"), ("det_mass_matrix.png", "det M: exact")]);
+        begins(&one, &[("lagrangian.svg", "L: exact"), ("det_mass_matrix.svg", "det M: exact")]);
         assert!(one[1].1.contains("right sign at every point") && !one[0].1.contains("sign"));
     }
 }

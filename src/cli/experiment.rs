@@ -5,15 +5,15 @@ use crate::cli::folder::Folder;
 use crate::cli::learning::{Begin, Effort, Keeping, Learning, forget, learn};
 use crate::cli::number::{count, threads};
 use crate::cli::progress::Progress as Bar;
-use crate::cli::results::CAPTIONS;
-use crate::cli::{CliError, Kind, interrupt, output};
-use crate::experiments::{Experiment, Outcome, Picture, Record, Run, Scale, experiments, find};
-use crate::names::counted;
+use crate::cli::taken::{pictures_of_runs, within};
+use crate::cli::{CliError, Kind, headline, interrupt, output};
+use crate::experiments::{Experiment, Outcome, Record, Run, Scale, experiments, find};
+use crate::names::{WIDTH, counted, wrapped};
 use crate::recording::Columns;
 use crate::recording::read::read_recording;
 use crate::report::{
-    Curve, EXPERIMENT_HEADER, Figure, REDUCTION_HEADER, Report, experiment_curves, experiment_figures,
-    experiment_table, reduction_table, text_table,
+    Curve, EXPERIMENT_HEADER, REDUCTION_HEADER, Report, experiment_curves, experiment_figures, experiment_table,
+    experiment_view, reduction_table, text_table,
 };
 use crate::training::{Every, Hooks, Stop};
 use std::collections::BTreeMap;
@@ -29,7 +29,7 @@ use std::time::Instant;
 pub struct Args {
     /// An experiment by name, or `all`; without a name they are listed with the tables and figures they regenerate.
     name: Option<String>,
-    /// How much of the paper's budget.
+    /// Share of the paper's budget.
     #[arg(long, value_enum, value_name = "SCALE", default_value = "short")]
     scale: ScaleName,
     /// Seeds of every run.
@@ -301,16 +301,16 @@ fn conclude(
     path: &Path,
     started: Instant,
 ) -> Result<(), CliError> {
-    let table = experiment_table(&experiment.rows(results));
+    let rows = experiment.rows(results);
+    let (table, (header, view)) = (experiment_table(&rows), experiment_view(&rows));
     let mut curves = experiment_curves(results);
     curves.extend_from_slice(beside);
     folder.write("table.csv", csv(&table).as_bytes())?;
     if experiment.is_timed() {
         folder.write("curves.csv", curves_csv(&curves).as_bytes())?;
     }
-    let own = experiment_figures(experiment, results, &curves).map_err(CliError::data)?;
-    let mut figures = own.clone();
-    figures.extend(pictures_of_runs(experiment, results, path));
+    let figures = experiment_figures(experiment, results, &curves);
+    let taken = pictures_of_runs(experiment, results, path);
     let training: f64 = results.iter().filter_map(|(_, record)| record.as_ref()).map(|record| record.seconds).sum();
     let note = format!(
         "Scale {}, {}, {training:.0} s of training, {:.0} s on the clock this time.",
@@ -319,21 +319,23 @@ fn conclude(
         started.elapsed().as_secs_f64()
     );
     let conventions = "Losses are the paper's: half the mean absolute error of scaled accelerations; times the mean scale \
-                       they are physical. Several runs: mean [lowest, highest]. Wrong signature: fraction of fresh \
+                       they are physical. Several runs: mean [lowest, highest]. Wrong signature: share of the fresh \
                        states. Integrated: starts of the trajectory test whose learned motion reached its end.";
-    let report = Report::new(experiment.title)
+    let headline = headline::of_experiment(&rows);
+    let report = headline
+        .begin(Report::new(experiment.title))
         .paragraph(&format!("Regenerates: {}.", experiment.paper))
         .paragraph(&format!("The paper: {}", experiment.finding))
         .paragraph(&note)
-        .table(&EXPERIMENT_HEADER, &table)
+        .table(&header, &view)
         .paragraph(conventions);
     let remarks = experiment.remarks(&results.iter().map(|(run, _)| run).collect::<Vec<_>>());
     let reductions = reduction_table(&experiment.reductions(results));
     let report = remarks.iter().fold(report, |report, remark| report.paragraph(remark));
     let report = if reductions.is_empty() { report } else { report.table(&REDUCTION_HEADER, &reductions) };
-    let report = figures.iter().fold(report, |report, figure| report.figure(&figure.png, &figure.caption));
+    let report = within(taken, report.figures(&figures));
     folder.write("report.html", report.to_html().as_bytes())?;
-    own.iter().try_for_each(|figure| folder.write(&figure.file, &figure.png))?;
+    figures.iter().try_for_each(|figure| folder.write(&figure.file, figure.picture.to_svg().as_bytes()))?;
     if json {
         let row = |cells: &Vec<String>| {
             let named = EXPERIMENT_HEADER.iter().zip(cells);
@@ -349,18 +351,24 @@ fn conclude(
         });
         return output::print(&format!("{object}\n"));
     }
-    let mut text = text_table(&EXPERIMENT_HEADER, &table) + "\n";
+    let (energies, others): (Vec<usize>, Vec<usize>) =
+        (1..header.len()).partition(|&k| ["energy", "motions"].iter().any(|word| header[k].contains(word)));
+    let table_of = |columns: &[usize]| {
+        let columns: Vec<usize> = [0].iter().chain(columns).copied().collect();
+        let rows: Vec<Vec<&str>> = view.iter().map(|row| columns.iter().map(|&k| row[k].as_str()).collect()).collect();
+        text_table(&columns.iter().map(|&k| header[k]).collect::<Vec<_>>(), &rows)
+    };
+    let tables =
+        [others, energies].iter().filter(|columns| !columns.is_empty()).map(|c| table_of(c)).collect::<Vec<_>>();
+    let mut text = format!("{}\n{}\n", headline.text(), tables.join("\n"));
     remarks.iter().for_each(|remark| text += &format!("{remark}\n"));
     if !reductions.is_empty() {
         text += &format!("\n{}", text_table(&REDUCTION_HEADER, &reductions));
     }
     let report = folder.file("report.html");
-    output::print(&format!(
-        "{} ({})\n{text}\n{note}\nreport: {}\n\n",
-        experiment.title,
-        experiment.paper,
-        report.display()
-    ))
+    let (title, paper) = (experiment.title, experiment.paper);
+    let place = if paper == "-" { String::new() } else { format!(" (of the paper: {paper})") };
+    output::print(&wrapped(&format!("{title}{place}\n{text}\n{note}\nreport: {}\n\n", report.display()), WIDTH))
 }
 
 /// Loss against time of every curve, as far as they are known.
@@ -382,95 +390,4 @@ fn csv(table: &[Vec<String>]) -> String {
     };
     let rows = table.iter().map(|row| line(&mut row.iter().map(String::as_str)));
     line(&mut EXPERIMENT_HEADER.into_iter()) + &rows.collect::<String>()
-}
-
-/// Beginnings of the names of pictures in the order of a report; training and whatever else come last.
-const ORDER: [&str; 8] =
-    ["coordinate_error", "energy_", "trajectory_", "velocity_", "trace_", "phase_", "lagrangian", "det_mass_matrix"];
-
-/// Index of a picture in [`ORDER`].
-fn place_in_report(file: &str) -> usize {
-    ORDER.iter().position(|beginning| file.starts_with(beginning)).unwrap_or(ORDER.len())
-}
-
-/// Pictures that the experiment takes over from the evaluations of its runs, as far as they are there.
-fn pictures_of_runs(experiment: &Experiment, results: &[(Run, Option<Record>)], path: &Path) -> Vec<Figure> {
-    let mut figures = Vec::new();
-    for prefix in experiment.pictures.iter().flat_map(|picture| match picture {
-        Picture::Evaluation(prefixes) => *prefixes,
-        _ => &[],
-    }) {
-        for (run, _) in results.iter().filter(|(_, record)| record.is_some()) {
-            let directory = path.join(&run.name);
-            let read = |file: &str| crate::storage::read_regular(&directory.join(file), 1 << 26).ok();
-            let captions: BTreeMap<String, String> =
-                read(CAPTIONS).and_then(|json| serde_json::from_slice(&json).ok()).unwrap_or_default();
-            let mut files: Vec<String> = std::fs::read_dir(&directory)
-                .into_iter()
-                .flatten()
-                .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
-                .filter(|name| name.starts_with(prefix) && name.ends_with(".png"))
-                .collect();
-            files.sort_by_cached_key(|file| (place_in_report(file), file.clone()));
-            for file in files {
-                let Some(png) = read(&file) else { continue };
-                let caption = match captions.get(&file) {
-                    Some(caption) => format!("{}: {caption}", run.label),
-                    None => run.label.clone(),
-                };
-                figures.push(Figure { file, png, caption });
-            }
-        }
-    }
-    figures
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::experiments::Scale;
-
-    #[test]
-    fn pictures_come_in_the_order_of_a_report() {
-        let directory = tempfile::tempdir().unwrap();
-        let experiment = find("double-pendulum").unwrap();
-        let run = experiment.runs(Scale::Smoke, 1).remove(0);
-        let ordered = [
-            "coordinate_error.png",
-            "energy_drift.png",
-            "energy_error.png",
-            "trajectory_theta1.png",
-            "trajectory_theta2.png",
-            "velocity_t.png",
-            "trace_start1.png",
-            "phase_theta1.png",
-            "lagrangian.png",
-            "det_mass_matrix.png",
-            "det_mass_matrix_fast.png",
-            "learning_rate.png",
-            "training_loss.png",
-        ];
-        let folder = directory.path().join(&run.name);
-        std::fs::create_dir(&folder).unwrap();
-        for file in ordered {
-            std::fs::write(folder.join(file), b"x").unwrap();
-        }
-        std::fs::write(folder.join(CAPTIONS), r#"{"det_mass_matrix.png": "at rest"}"#).unwrap();
-        let record = Record {
-            outcome: Outcome::Nothing { reason: String::new() },
-            losses: Vec::new(),
-            times: Vec::new(),
-            seconds: 0.0,
-        };
-        let results = [(run, Some(record))];
-        let found = |name: &str| -> Vec<String> {
-            let figures = pictures_of_runs(find(name).unwrap(), &results, directory.path());
-            figures.into_iter().map(|figure| figure.file).collect()
-        };
-        assert_eq!(found("double-pendulum"), ordered);
-        let figures = pictures_of_runs(find("training-range").unwrap(), &results, directory.path());
-        assert_eq!(figures[0].caption, "Double pendulum: at rest");
-        assert_eq!(figures[1].caption, "Double pendulum");
-        assert_eq!(found("training-range"), ["det_mass_matrix.png", "det_mass_matrix_fast.png"]);
-    }
 }

@@ -4,7 +4,7 @@ use crate::cli::CliError;
 use std::fs;
 use std::path::Path;
 
-/// Whether two paths lead to the same file: by links, by other spellings, by hard links.
+/// `true` if two paths lead to the same file: by links, by other spellings, by hard links.
 pub fn same_file(a: &Path, b: &Path) -> bool {
     let (Ok(a), Ok(b)) = (fs::canonicalize(a), fs::canonicalize(b)) else { return false };
     a == b || same_node(&a, &b)
@@ -22,7 +22,7 @@ fn same_node(_: &Path, _: &Path) -> bool {
     false
 }
 
-/// Whether there is a regular file with something in it, be it by a link.
+/// `true` if there is a regular file with something in it, be it by a link.
 pub fn holds_something(path: &Path) -> bool {
     fs::metadata(path).is_ok_and(|data| data.is_file() && data.len() > 0)
 }

@@ -107,7 +107,7 @@ pub fn run(args: &Args, words: &[OsString]) -> Result<(), CliError> {
     fitted.map_err(resume::keeping(folder.path()))
 }
 
-/// What is to be done.
+/// One fit with everything it needs.
 struct Job<'a> {
     args: &'a Args,
     settled: &'a Settled,
@@ -258,7 +258,7 @@ impl Job<'_> {
         forget(self.folder).err().unwrap_or_else(|| CliError::data(error))
     }
 
-    /// What the model file says about this run.
+    /// Header of the model file of this run.
     fn header<S: Scalar>(&self, config: &Config, architecture: &Architecture, trained: &Trained<S>) -> Header {
         let names = &self.reading.recording.coordinates;
         let velocities = names.iter().map(|name| format!("{name}_dot"));
@@ -270,6 +270,7 @@ impl Job<'_> {
             parameters: Default::default(),
             columns: names.iter().cloned().chain(velocities).collect(),
             forces: forces::recorded(&self.args.recording.force),
+            description: None,
             precision: match self.args.precision() {
                 PrecisionName::F32 => StoredPrecision::F32,
                 PrecisionName::F64 => StoredPrecision::F64,
@@ -328,7 +329,7 @@ fn shooting_of(settled: &Settled) -> Shooting {
     shooting
 }
 
-/// What `config.toml` holds.
+/// Contents of `config.toml`.
 fn record(settled: &Settled, targets: Targets, shooting: Option<Shooting>, training: &Config) -> FitConfig {
     let args = &settled.args;
     FitConfig {

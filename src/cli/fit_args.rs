@@ -29,7 +29,7 @@ pub struct Args {
     /// are refused.
     #[arg(long, value_name = "MODEL")]
     pub from: Option<String>,
-    /// What to learn from: measured accelerations, smoothed ones, or the motion itself by multiple shooting
+    /// Targets to learn from: measured accelerations, smoothed ones, or the motion itself by multiple shooting
     /// [default: measured if there are any, smoothed if they are good to a tenth, the motion if not].
     #[arg(long, value_enum, value_name = "WAY")]
     pub targets: Option<TargetsName>,
@@ -49,7 +49,7 @@ pub struct Args {
     /// nothing judges the model [default: 0.2].
     #[arg(long, value_name = "SHARE", allow_hyphen_values = true, value_parser = share)]
     pub hold_out: Option<f64>,
-    /// How far ahead held-out motion is predicted, in seconds [default: 200 samples, at most a quarter of the shortest
+    /// Time over which held-out motion is predicted, in seconds [default: 200 samples, at most a quarter of the shortest
     /// held-out trajectory].
     #[arg(long, value_name = "SECONDS", allow_hyphen_values = true, value_parser = positive)]
     pub horizon: Option<f64>,
@@ -136,7 +136,7 @@ impl Args {
     }
 }
 
-/// What a configuration or a checkpoint may say instead.
+/// An argument that a configuration or a checkpoint may give instead.
 fn unless_known(argument: clap::Arg) -> clap::Arg {
     match argument.get_id().as_str() {
         "data" | "coords" => argument.required(false).required_unless_present_any(["config", "resume"]),

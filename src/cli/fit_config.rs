@@ -16,7 +16,7 @@ use std::path::PathBuf;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FitConfig {
-    /// What is learned from; as the data advise if it is not given.
+    /// Targets to learn from; as the data advise if they are not given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub targets: Option<Targets>,
     /// Share of the samples that is held out; 0: none.
@@ -27,7 +27,7 @@ pub struct FitConfig {
     /// Noise of the coordinates in SI units; estimated if it is not given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub noise: Option<Vec<f64>>,
-    /// How far ahead held-out motion is predicted, in s; chosen if it is not given.
+    /// Time over which held-out motion is predicted, in s; chosen if it is not given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub horizon: Option<f64>,
     /// The files and what their columns mean.
@@ -77,7 +77,7 @@ pub struct Recording {
 }
 
 impl Recording {
-    /// What arguments say.
+    /// Files and columns as the arguments give them.
     pub fn of(args: &RecordingArgs) -> Self {
         Self {
             files: args.data.iter().map(|file| file.display().to_string()).collect(),
@@ -197,7 +197,7 @@ impl Settled {
         Ok(training)
     }
 
-    /// Whether the file says how many epochs there are.
+    /// `true` if the file gives the number of epochs.
     pub fn has_epochs(&self) -> bool {
         self.file.as_ref().is_some_and(|file| file.has("training.phase[0].epochs"))
     }

@@ -1,4 +1,4 @@
-//! What `lnn fit` is to do: the command given, or that of the checkpoint that `--resume DIR` names.
+//! The order of `lnn fit`: the command given, or that of the checkpoint that `--resume DIR` names.
 
 use crate::cli::CliError;
 use crate::cli::fit_args::Args;

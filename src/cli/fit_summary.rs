@@ -1,13 +1,13 @@
-//! What `lnn fit` found, in `summary.json`, in words and in the report.
+//! Results of `lnn fit`: `summary.json`, tables for a terminal, report.
 
-use crate::cli::CliError;
 use crate::cli::determined::Determined;
 use crate::cli::folder::Folder;
 use crate::cli::judgement::Judgement;
 use crate::cli::learning::{ended, training_pictures, write_report_and_figures};
-use crate::names::counted;
+use crate::cli::{CliError, headline};
+use crate::names::{WIDTH, counted, hundredths, number, wrapped};
 use crate::recording::{HeldOut, Recording, Targets};
-use crate::report::Report;
+use crate::report::{Report, text_table};
 use crate::scalar::Scalar;
 use crate::training::shooting::Fitted;
 use crate::training::{Measured, Trained};
@@ -26,7 +26,7 @@ struct Coordinate {
     acceleration_error_relative: f64,
 }
 
-/// What `summary.json` holds.
+/// Contents of `summary.json`.
 #[derive(Serialize)]
 struct Summary<'a> {
     system: &'a str,
@@ -67,15 +67,19 @@ struct ShootingSummary {
     integration_error: f64,
 }
 
-/// What was learned, and from what.
+/// Header of the table of what smoothing makes of the coordinates.
+const SMOOTHING: [&str; 6] =
+    ["coordinate", "noise [SI]", "window [s]", "window [samples]", "error of a [SI]", "error of a over its rms [%]"];
+
+/// A learned model with its data.
 pub struct Found<'a, S> {
     /// Name of the system.
     pub name: &'a str,
-    /// What was recorded.
+    /// Recorded motion.
     pub recording: &'a Recording,
     /// The same, smoothed and divided.
     pub measured: &'a Measured,
-    /// What was learned from.
+    /// Targets that were learned from.
     pub targets: Targets,
     /// Seed.
     pub seed: u64,
@@ -85,9 +89,9 @@ pub struct Found<'a, S> {
     pub trained: &'a Trained<S>,
     /// Multiple shooting, if there was any.
     pub shot: Option<&'a Fitted<S>>,
-    /// What the model is worth.
+    /// Predictions of held-out motion.
     pub judgement: &'a Judgement,
-    /// How well the data determine it.
+    /// Ranges in which the data determine the model.
     pub determined: &'a Determined,
     /// When the command began.
     pub started: Instant,
@@ -102,18 +106,23 @@ impl<'a, S: Scalar> Found<'a, S> {
         let summary = self.summary();
         let json = serde_json::to_string_pretty(&summary).map_err(CliError::data)? + "\n";
         folder.write("summary.json", json.as_bytes())?;
-        let text = summary.text(self.recording);
-        let mut figures = training_pictures(&self.trained.history)?;
+        let periodic = &self.recording.periodic;
+        let unit = if periodic.iter().all(|periodic| *periodic) { "rad" } else { "SI units" };
+        let headline = headline::of_judgement(self.name, self.judgement, unit);
+        let opening = summary.opening(self.recording);
+        let mut figures = training_pictures(&self.trained.history);
         if let Some(shot) = self.shot {
-            let mut later = training_pictures(&shot.history)?;
+            let mut later = training_pictures(&shot.history);
             later.iter_mut().for_each(|figure| figure.file.insert_str(0, "shooting_"));
             figures.extend(later);
         }
-        let report = Report::new(&format!("{}: learned from recorded motion", self.name)).preformatted(&text);
+        let report = headline.begin(Report::new(&format!("{}: learned from recorded motion", self.name)));
+        let report = report.preformatted(&wrapped(opening.trim_end(), WIDTH));
         let report = self.determined.report(self.judgement.report(report)).heading("Training");
-        let report = figures.iter().fold(report, |report, figure| report.figure(&figure.png, &figure.caption));
-        let report = report.heading("Configuration").preformatted(toml);
+        let report = report.figures(&figures).heading("Configuration").preformatted(toml);
         write_report_and_figures(folder, &report, figures.iter().chain(&self.judgement.figures))?;
+        let tables = self.judgement.text() + &self.determined.text();
+        let text = wrapped(&format!("{}\n{opening}{tables}", headline.text()), WIDTH);
         let text = format!("{text}\nreport: {}\n", folder.file("report.html").display());
         Ok(if as_json { json } else { text })
     }
@@ -168,8 +177,8 @@ impl<'a, S: Scalar> Found<'a, S> {
 }
 
 impl Summary<'_> {
-    /// The run in words and tables.
-    fn text(&self, recording: &Recording) -> String {
+    /// Data, losses and times of the run in words, with the table of what smoothing makes of the coordinates.
+    fn opening(&self, recording: &Recording) -> String {
         let [training, validation, test] = self.samples;
         let way = match self.targets {
             Targets::Measured => "measured accelerations",
@@ -177,38 +186,37 @@ impl Summary<'_> {
             Targets::Motion => "the motion itself (multiple shooting)",
         };
         let judged = match self.held_out {
-            HeldOut::Nothing => "best epoch chosen on the same, judged by nothing".to_string(),
+            HeldOut::Nothing => "best epoch chosen on the same samples, judged by nothing".to_string(),
             held => {
                 let held = held.describe(recording);
-                format!("best epoch chosen on {validation}, judged on {test} (held out: {held})")
+                format!("best epoch chosen on {validation} samples, judged on {test} that were held out: {held}")
             }
         };
         let mut text = format!(
-            "learned from {way}: {} of {}, {judged}\n",
+            "learned from {way}: {} of {}\n{judged}\n\n",
             counted(training, "sample", "samples"),
             counted(self.trajectories[0], "trajectory", "trajectories")
         );
         // Writing to a string cannot fail.
-        for c in &self.coordinates {
-            let _ = writeln!(
-                text,
-                "{}: noise {:.3e}, smoothed over {:.3} s ({}), accelerations good to {}",
-                c.name,
-                c.noise,
-                c.window_seconds,
-                counted(c.window_samples, "sample", "samples"),
-                match 100.0 * c.acceleration_error_relative {
-                    x if x.is_finite() => format!("{x:.1} %"),
-                    _ => "nothing: they are no larger than their errors".to_string(),
-                }
-            );
-        }
+        let row = |c: &Coordinate| {
+            let lost = "no larger than its error".to_string();
+            let error = c.acceleration_error_relative;
+            vec![
+                c.name.clone(),
+                number(c.noise),
+                number(c.window_seconds),
+                c.window_samples.to_string(),
+                number(c.acceleration_error),
+                if error.is_finite() { hundredths(error) } else { lost },
+            ]
+        };
+        text += &text_table(&SMOOTHING, &self.coordinates.iter().map(row).collect::<Vec<_>>());
         let _ = writeln!(
             text,
-            "loss (paper) against those accelerations: validation {:.6}{}; {}, {}, seed {}",
-            self.validation_loss,
+            "\nloss (paper) against those accelerations: validation {}{}; {}, {}, seed {}",
+            number(self.validation_loss),
             self.test_loss.map_or(String::new(), |loss| match loss {
-                x if x.is_finite() => format!(", held out {x:.6}"),
+                x if x.is_finite() => format!(", held out {}", number(x)),
                 _ => ", held out not finite".to_string(),
             }),
             counted(self.epochs, "epoch", "epochs"),
@@ -218,15 +226,14 @@ impl Summary<'_> {
         if let Some(shooting) = &self.shooting {
             let _ = writeln!(
                 text,
-                "mean squared residual of predictions, in units of noise (1: only noise is left): {:.3} before, {:.3} after {} \
-                 over {}",
-                shooting.start_loss,
-                shooting.validation_loss,
+                "mean squared residual of predictions, in units of the noise: {} before, {} after {} over {} (1 is noise alone)",
+                number(shooting.start_loss),
+                number(shooting.validation_loss),
                 counted(shooting.epochs, "epoch", "epochs"),
                 counted(shooting.segments, "segment", "segments")
             );
         }
         let _ = writeln!(text, "{:.1} s of training, {:.1} s in all\n", self.training_seconds, self.wall_seconds);
-        text + &self.judgement.text() + &self.determined.text()
+        text
     }
 }

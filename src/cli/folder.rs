@@ -24,7 +24,7 @@ pub struct Folder {
     _lock: File,
 }
 
-/// What became of an attempt to open a directory.
+/// Result of an attempt to open a directory.
 #[derive(Debug)]
 pub enum Attempt {
     /// It is ours.
@@ -63,7 +63,12 @@ impl Folder {
                 Lock::Gone => {}
             }
         }
-        Err(CliError::file(path, "cannot lock the directory: others take and leave it all the time"))
+        Err(CliError::file(
+            path,
+            format_args!(
+                "cannot lock the directory: other processes took it in each of {ATTEMPTS} attempts; try again"
+            ),
+        ))
     }
 
     /// The directory.

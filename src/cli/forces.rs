@@ -50,17 +50,22 @@ impl ForceArgs {
         self.force.iter().map(Path::new).filter(|path| path.exists())
     }
 
-    /// The force on a motion of a model from one time to another; none if none was asked for.
+    /// The force on a motion from one time to another, its components `known` by name, one per coordinate; none if none was
+    /// asked for.
     ///
     /// # Errors
     /// A usage error for names and numbers that make no sense, a data error for a file that is not as said or does not
     /// cover the motion.
-    pub fn force(&self, header: &Header, from: f64, to: f64) -> Result<Option<SampledForce<f64>>, CliError> {
+    pub fn force(
+        &self,
+        coordinates: &[String],
+        known: &[String],
+        from: f64,
+        to: f64,
+    ) -> Result<Option<SampledForce<f64>>, CliError> {
         if self.force.is_empty() {
             return Ok(None);
         }
-        let coordinates = &header.columns[..header.columns.len() / 2];
-        let known = names(header);
         let mut constants: Vec<Option<f64>> = vec![None; known.len()];
         let mut file: Option<PathBuf> = None;
         for given in &self.force {
@@ -76,7 +81,7 @@ impl ForceArgs {
                         CliError::usage(format_args!("--force {name}: {problem}, found {value:?}"))
                     })?;
                     if constants[i].replace(value).is_some() {
-                        return Err(CliError::usage(format_args!("--force: {name} stands there twice")));
+                        return Err(CliError::usage(format_args!("--force: {name} is given twice")));
                     }
                 }
                 _ => {
@@ -88,7 +93,7 @@ impl ForceArgs {
             }
         }
         match file {
-            Some(path) => self.with_columns(&path, (coordinates, &known), &constants, (from, to)).map(Some),
+            Some(path) => self.with_columns(&path, (coordinates, known), &constants, (from, to)).map(Some),
             None if self.force_time.is_some() || !self.force_units.is_empty() => {
                 Err(CliError::usage("--force-time and --force-units are about a CSV of forces, there is none"))
             }
@@ -197,5 +202,7 @@ pub fn plot(force: &SampledForce<f64>, times: &[f64], names: &[String]) -> LineP
         y_label: "force [N, N m]".into(),
         log_y: false,
         series: names.iter().zip(&columns).map(|(name, column)| Series::new(name, times, column)).collect(),
+        turn: None,
+        level: None,
     }
 }

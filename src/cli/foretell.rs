@@ -60,7 +60,7 @@ impl Foretold {
         }
     }
 
-    /// What was given up and left out, in words; nothing if all went well.
+    /// Predictions that were given up or left out, in words; nothing if all went well.
     pub fn remarks(&self) -> String {
         let mut text = String::new();
         let predicted = self.windows.len();

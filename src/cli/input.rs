@@ -4,7 +4,7 @@ use crate::storage::{ReadError, read_regular};
 use std::io::Read;
 use std::path::Path;
 
-/// Whether a path means standard input or standard output.
+/// `true` if a path means standard input or standard output.
 pub fn is_standard(path: &Path) -> bool {
     path.as_os_str() == "-"
 }

@@ -12,8 +12,8 @@ use std::path::PathBuf;
 /// Arguments.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// A system by name (`lnn systems` lists them).
-    #[arg(long, value_name = "NAME", required_unless_present = "model", conflicts_with = "model")]
+    /// A system by name (`lnn systems` lists them), or by the file that describes it.
+    #[arg(long, value_name = "NAME|FILE.toml", required_unless_present = "model", conflicts_with = "model")]
     system: Option<String>,
     /// A trained model, a file or the directory of a run.
     #[arg(long, value_name = "MODEL")]

@@ -1,12 +1,16 @@
-//! What a model of recorded motion is worth: predictions of motion that was held out, and where its energy goes.
+//! Judgement of a model of recorded motion: predictions of motion that was held out, and the balance of its energy.
 
-use crate::analysis::{PredictionError, Predictions, Window, predict_by_constant_velocity, prediction_error};
+use crate::analysis::{
+    PredictionError, Predictions, ValidTimes, Window, predict_by_constant_velocity, prediction_error, spread,
+    window_valid_times,
+};
 use crate::cli::attention::Attention;
 use crate::cli::energy::{Balance, balance};
 use crate::cli::foretell::Foretold;
 use crate::cli::{CliError, forces};
 use crate::lagrangian::{EulerLagrange, Request, Terms};
-use crate::report::{Figure, LinePlot, PlotError, Report, Series, line_png, text_table};
+use crate::names::number;
+use crate::report::{Figure, LinePlot, Report, Series, Turn, kept, line_plot, text_table};
 use crate::training::{Part, SignatureBuffers, has_signature};
 use serde::Serialize;
 
@@ -17,12 +21,12 @@ const AHEAD: f64 = 200.0;
 /// Points of a curve of prediction errors.
 const POINTS: usize = 40;
 
-/// How to judge.
+/// Settings of a judgement.
 #[derive(Clone, Copy, Debug)]
 pub struct Plan<'a> {
     /// Motion that the model has not seen.
     pub part: &'a Part,
-    /// How far ahead it is predicted, in s, if that is given.
+    /// Time over which it is predicted, in s, if that is given.
     pub horizon: Option<f64>,
     /// The time-like coordinate, if there is one.
     pub time: Option<usize>,
@@ -39,6 +43,9 @@ pub struct Plan<'a> {
 pub struct Judgement {
     /// Errors of the model's motion, by time ahead.
     pub model: Vec<PredictionError>,
+    /// How long the model's motion predicts the measured one, median over the windows; at least to their end where the error
+    /// stays small. None without windows.
+    pub valid_time: Option<ValidTimes>,
     /// Which predictions were given up and why, in words; empty if none was.
     pub given_up: String,
     /// Errors of going on at the velocity of the start.
@@ -83,21 +90,31 @@ pub fn judge(model: &dyn EulerLagrange<f64>, plan: &Plan<'_>) -> Result<Judgemen
     let mut figures = Vec::new();
     if !windows.is_empty() {
         let curves = [("model", errors(motion, POINTS)), ("constant velocity", errors(&straight, POINTS))];
-        figures.extend(drawn(error_plot(&curves), "prediction_error.png", ERROR_CAPTION)?);
+        figures.extend(drawn(error_plot(&curves), "prediction_error.svg", ERROR_CAPTION));
         for (i, name) in recording.coordinates.iter().enumerate() {
-            let file = format!("prediction_{}.png", i + 1);
-            figures.extend(drawn(example(&windows[0], &motion[0], n, i, name), &file, EXAMPLE_CAPTION)?);
+            let file = format!("prediction_{}.svg", i + 1);
+            figures.extend(drawn(
+                example(&windows[0], &motion[0], &recording.periodic, i, name),
+                &file,
+                EXAMPLE_CAPTION,
+            ));
         }
         if let Some(force) = &windows[0].force {
             let times: Vec<f64> = [0.0].iter().chain(&windows[0].times).copied().collect();
-            figures.extend(drawn(forces::plot(force, &times, plan.forces), "prediction_forces.png", FORCE_CAPTION)?);
+            figures.extend(drawn(forces::plot(force, &times, plan.forces), "prediction_forces.svg", FORCE_CAPTION));
         }
     }
     let tabled = |predictions: &Predictions| if windows.is_empty() { Vec::new() } else { errors(predictions, 4) };
     let (wrong_signature, energy) = (wrong_signature(model, plan.part, plan.time), balance(model, plan.part));
     plan.attention.check()?;
+    let spread = spread(
+        &recording.tracks.iter().flat_map(|track| track.q.iter().copied()).collect::<Vec<_>>(),
+        &recording.periodic,
+    );
+    let valid = window_valid_times(windows, motion, &recording.periodic, &spread);
     Ok(Judgement {
         model: tabled(motion),
+        valid_time: ValidTimes::of(&valid.into_iter().map(|valid| (valid, None)).collect::<Vec<_>>()),
         constant_velocity: tabled(&straight),
         given_up: foretold.remarks(),
         wrong_signature,
@@ -123,12 +140,8 @@ fn horizon(part: &Part) -> f64 {
 }
 
 /// The picture, unless there is nothing to show.
-fn drawn(plot: LinePlot, file: &str, caption: &str) -> Result<Option<Figure>, CliError> {
-    match line_png(&plot) {
-        Ok(png) => Ok(Some(Figure { file: file.to_string(), png, caption: caption.to_string() })),
-        Err(PlotError::Empty(_)) => Ok(None),
-        Err(error) => Err(CliError::data(error)),
-    }
+fn drawn(plot: LinePlot, file: &str, caption: &str) -> Option<Figure> {
+    kept(file, line_plot(&plot), caption.to_string())
 }
 
 fn error_plot(curves: &[(&str, Vec<PredictionError>)]) -> LinePlot {
@@ -139,24 +152,34 @@ fn error_plot(curves: &[(&str, Vec<PredictionError>)]) -> LinePlot {
     LinePlot {
         title: "Prediction of held-out motion".into(),
         x_label: "time ahead [s]".into(),
-        y_label: "median error (SI)".into(),
+        y_label: "median error [SI]".into(),
         log_y: true,
         series: curves.iter().map(series).collect(),
+        turn: None,
+        level: None,
     }
 }
 
-/// Coordinate `i` of a window, measured and predicted.
-fn example(window: &Window, predicted: &[f64], n: usize, i: usize, name: &str) -> LinePlot {
-    let line = |label: &str, values: &[f64]| {
-        let column: Vec<f64> = values.iter().skip(i).step_by(n).copied().collect();
-        Series::new(label, &window.times, &column)
+/// Coordinate `i` of a window, measured and predicted; an angle in one turn if it leaves it.
+fn example(window: &Window, predicted: &[f64], periodic: &[bool], i: usize, name: &str) -> LinePlot {
+    let column = |values: &[f64]| -> Vec<(f64, f64)> {
+        values.iter().skip(i).step_by(periodic.len()).copied().zip(window.times.iter().copied()).collect()
+    };
+    let (measured, predicted) = (column(&window.measured), column(predicted));
+    let all = measured.iter().chain(&predicted).map(|p| p.0);
+    let turn = if periodic[i] { Turn::of(all) } else { None };
+    let line = |label: &str, path: Vec<(f64, f64)>| {
+        let path = turn.map_or_else(|| path.clone(), |turn| turn.fold(&path));
+        Series { points: path.into_iter().map(|(x, t)| (t, x)).collect(), ..Series::new(label, &[], &[]) }
     };
     LinePlot {
         title: format!("Prediction of {name}"),
         x_label: "time ahead [s]".into(),
-        y_label: name.to_string(),
+        y_label: format!("{name} [{}]", if periodic[i] { "rad" } else { "SI" }),
         log_y: false,
-        series: vec![line("measured", &window.measured), line("predicted", predicted).over()],
+        series: vec![line("measured", measured), line("predicted", predicted).over()],
+        turn,
+        level: None,
     }
 }
 
@@ -192,11 +215,11 @@ fn wrong_signature(model: &dyn EulerLagrange<f64>, part: &Part, time: Option<usi
 
 impl Judgement {
     const HEADERS: [&'static str; 7] = [
-        "time ahead (s)",
-        "median error (SI)",
-        "9 of 10 below (SI)",
-        "rms error (SI)",
-        "constant velocity: median (SI)",
+        "time ahead [s]",
+        "median error [SI]",
+        "9 of 10 below [SI]",
+        "rms error [SI]",
+        "constant velocity, median [SI]",
         "windows",
         "given up",
     ];
@@ -205,10 +228,9 @@ impl Judgement {
         let pairs = self.model.iter().zip(&self.constant_velocity);
         pairs
             .map(|(model, straight)| {
-                let numbers = [model.median, model.most, model.rms, straight.median]
-                    .map(|x| if x.is_finite() { format!("{x:.4e}") } else { "-".to_string() });
+                let numbers = [model.median, model.most, model.rms, straight.median].map(number);
                 let counts = [model.windows, model.missing].map(|count| count.to_string());
-                [vec![format!("{:.4}", model.seconds)], numbers.to_vec(), counts.to_vec()].concat()
+                [vec![number(model.seconds)], numbers.to_vec(), counts.to_vec()].concat()
             })
             .collect()
     }
@@ -218,6 +240,7 @@ impl Judgement {
         Self {
             model: Vec::new(),
             constant_velocity: Vec::new(),
+            valid_time: None,
             given_up: String::new(),
             wrong_signature: f64::NAN,
             energy: None,
@@ -225,21 +248,17 @@ impl Judgement {
         }
     }
 
-    /// Whether there was nothing to judge by.
+    /// `true` if there was nothing to judge by.
     fn is_of_nothing(&self) -> bool {
         self.wrong_signature.is_nan()
     }
 
-    /// What is not in the table of predictions, in words.
+    /// Remarks below the table of predictions, in words.
     fn remarks(&self) -> String {
         if self.is_of_nothing() {
             return "nothing was held out (--hold-out 0): nothing judges this model\n".to_string();
         }
         let mut text = self.given_up.clone();
-        text += &format!(
-            "mass matrix of the wrong signature: {:.2} % of the held-out states\n",
-            100.0 * self.wrong_signature
-        );
         if let Some(balance) = &self.energy {
             text += &balance.text();
         }
@@ -265,6 +284,6 @@ impl Judgement {
         }
         let report = report.heading("Predictions of held-out motion").table(&Self::HEADERS, &self.rows());
         let report = self.remarks().lines().fold(report, |report, line| report.paragraph(line));
-        self.figures.iter().fold(report, |report, figure| report.figure(&figure.png, &figure.caption))
+        report.figures(&self.figures)
     }
 }

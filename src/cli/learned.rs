@@ -1,8 +1,9 @@
 //! A model file with the network it describes and the system it learned.
 
 use crate::cli::CliError;
+use crate::cli::chosen::{self, learned_system};
 use crate::lagrangian::system::Size;
-use crate::lagrangian::{Configured, configure, find};
+use crate::lagrangian::{Configured, configure_system, find};
 use crate::network::NetworkLagrangian;
 use crate::network::file::{Header, ModelFile};
 use crate::rollout::Domain;
@@ -12,7 +13,7 @@ use std::path::{Path, PathBuf};
 
 /// A trained model.
 pub struct Learned<S> {
-    /// What the file says about it.
+    /// Header of the file.
     pub header: Header,
     /// The network in the precision of `S`.
     pub network: NetworkLagrangian<S>,
@@ -50,19 +51,37 @@ impl<S: Scalar> Learned<S> {
         Ok(Self { header, network })
     }
 
-    /// The hand-written system that the model learned.
+    /// The system that the model learned, of the catalogue or by its description.
     ///
     /// # Errors
-    /// A data error if it is none of the catalogue's: a system of which there are only recordings.
+    /// A data error for a system of which there are only recordings.
     pub fn system(&self, path: &Path) -> Result<Configured<f64>, CliError> {
-        if find(&self.header.system).is_err() {
-            let problem = "is no system of `lnn systems`: there is no exact motion to compare the model with";
+        let known = self.header.description.is_some() || find(&self.header.system).is_ok();
+        if !known {
+            let problem = "is no system of `lnn systems`: there is no exact motion to compare the model with; --system FILE.toml names one";
             return Err(CliError::file(path, format_args!("{:?}, which it learned, {problem}", self.header.system)));
         }
+        let system = learned_system(&self.header).map_err(|e| CliError::file(path, e))?;
         let configured =
-            configure(&self.header.system, &given(&self.header.parameters)).map_err(|e| CliError::file(path, e))?;
+            configure_system(system, &given(&self.header.parameters)).map_err(|e| CliError::file(path, e))?;
         if configured.system.columns(configured.coordinates) != self.header.columns {
             return Err(CliError::file(path, format_args!("columns are not those of {}", self.header.system)));
+        }
+        Ok(configured)
+    }
+
+    /// A system by name or by file that has the model's columns.
+    ///
+    /// # Errors
+    /// A usage error for an unknown system, a wrong parameter, or other columns.
+    pub fn beside(&self, name: &str, given: &[(String, String)]) -> Result<Configured<f64>, CliError> {
+        let configured = configure_system(chosen::system(name)?, given).map_err(CliError::usage)?;
+        let columns = configured.system.columns(configured.coordinates);
+        if columns != self.header.columns {
+            let (found, expected) = (columns.join(","), self.header.columns.join(","));
+            return Err(CliError::usage(format_args!(
+                "--system {name}: expected the model's columns {expected}, found {found}"
+            )));
         }
         Ok(configured)
     }

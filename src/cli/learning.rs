@@ -10,8 +10,8 @@ use crate::cli::systems::parameters;
 use crate::cli::{CliError, memory, output, start};
 use crate::experiments::{Outcome, Record};
 use crate::lagrangian::system::TrajectoryTest;
-use crate::lagrangian::{Configured, configure};
-use crate::names::counted;
+use crate::lagrangian::{Configured, configure_system};
+use crate::names::{counted, number};
 use crate::network::file::{FORMAT, Header, ModelFile, StoredPrecision};
 use crate::network::{Architecture, Layout, NetworkLagrangian};
 use crate::report::{Figure, HistoryRow, Report, training_figures};
@@ -27,7 +27,7 @@ use std::fmt::Write as _;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// What `summary.json` holds; losses in the paper's convention, errors in physical units.
+/// Contents of `summary.json`; losses in the paper's convention, errors in physical units.
 #[derive(Serialize)]
 struct Summary<'a> {
     system: &'a str,
@@ -49,7 +49,7 @@ struct Summary<'a> {
     evaluation: &'a Evaluation,
 }
 
-/// How much work a run may take.
+/// Amount of work that a run may take.
 #[derive(Clone, Copy, Debug)]
 pub struct Effort {
     /// Threads of the training.
@@ -60,7 +60,7 @@ pub struct Effort {
     pub horizon: f64,
 }
 
-/// What a run came to, after its files were written.
+/// A run that ended, after its files were written.
 #[derive(Debug)]
 pub struct Finished {
     /// Why training ended.
@@ -71,7 +71,7 @@ pub struct Finished {
     pub json: String,
     /// Tables for a terminal.
     pub text: String,
-    /// What an experiment keeps of it.
+    /// The record that an experiment keeps of it.
     pub record: Record,
 }
 
@@ -86,12 +86,12 @@ pub enum Begin {
     Either,
 }
 
-/// How a training keeps checkpoints.
+/// Use of checkpoints in a training.
 #[derive(Clone, Copy, Debug)]
 pub struct Keeping {
-    /// How often one is written.
+    /// Interval at which one is written.
     pub every: Every,
-    /// Whether one is read.
+    /// Place where the training begins.
     pub start: Begin,
 }
 
@@ -145,7 +145,7 @@ pub fn forget(folder: &Folder) -> Result<(), CliError> {
     remove_checkpoints(&Disk, folder.path()).map_err(cannot)
 }
 
-/// How a training went.
+/// Outcome of a training.
 #[derive(Debug)]
 pub enum Learning {
     /// There is a model.
@@ -217,7 +217,7 @@ fn learn_in<S: Scalar>(
     let scale = architecture.scale.iter().sum::<f64>() / architecture.scale.len() as f64;
     let network = NetworkLagrangian::new(architecture, model.weights).map_err(CliError::data)?.cast::<f64>();
     let Effort { threads, starts, horizon } = effort;
-    let test = (system.system.trajectory)(system.coordinates);
+    let test = system.system.trajectory(system.coordinates);
     let plan = Plan {
         states: (&fresh.0, &fresh.1),
         starts,
@@ -256,8 +256,12 @@ fn learn_in<S: Scalar>(
     let json = serde_json::to_string_pretty(&summary).map_err(CliError::data)? + "\n";
     folder.write("summary.json", json.as_bytes())?;
     write_report(folder, system, &summary, &trained.history, &toml)?;
-    let text =
-        format!("{}\n{}\nreport: {}\n", headline(&summary), evaluation.text(), folder.file("report.html").display());
+    let text = format!(
+        "{}\n{}\nreport: {}\n",
+        evaluation.text(&system.system.title),
+        headline(&summary),
+        folder.file("report.html").display()
+    );
     let outcome = Outcome::Learned(crate::experiments::Learned {
         validation_loss: trained.validation_loss,
         instability,
@@ -296,7 +300,7 @@ fn imposed_velocities<S: Scalar>(system: &Configured<f64>, data: &Datasets<S>) -
     ranges.reduce(|[low, high], [l, h]| [low.min(l), high.max(h)]).map(|range| (i, range))
 }
 
-/// What the model file says about this run.
+/// Header of the model file of this run.
 fn header(
     config: &Config,
     system: &Configured<f64>,
@@ -307,7 +311,7 @@ fn header(
     // Defaults that change in a later version must not change this model.
     let mut parameters = all_parameters(system);
     parameters.extend(config.parameters.clone());
-    configure::<f64>(&config.system, &given(&parameters)).map_err(CliError::data)?;
+    configure_system::<f64>(system.system.clone(), &given(&parameters)).map_err(CliError::data)?;
     let hull = |bounds: fn(&Phase) -> &Vec<[f64; 2]>| {
         (0..system.coordinates)
             .map(|i| {
@@ -328,6 +332,7 @@ fn header(
         parameters,
         columns: system.system.columns(system.coordinates),
         forces: Vec::new(),
+        description: config.description.clone(),
         precision: match config.precision {
             Precision::F32 => StoredPrecision::F32,
             Precision::F64 => StoredPrecision::F64,
@@ -368,12 +373,12 @@ pub(super) fn history(epochs: &[Epoch]) -> String {
 /// The figures of a run in one line.
 fn headline(summary: &Summary<'_>) -> String {
     let fresh = match summary.test_loss {
-        loss if loss.is_finite() => format!("{loss:.6}"),
+        loss if loss.is_finite() => number(loss),
         _ => format!("not finite ({} states left out)", summary.test_states_left_out),
     };
     format!(
-        "loss (paper): validation {:.6}, fresh states {fresh}; {} in {:.1} s, {:.0} states/s, {}, seed {}\n",
-        summary.validation_loss,
+        "loss (paper): validation {}, fresh states {fresh}; {} in {:.1} s, {:.0} states/s, {}, seed {}\n",
+        number(summary.validation_loss),
         counted(summary.epochs, "epoch", "epochs"),
         summary.training_seconds,
         summary.states_per_second,
@@ -389,7 +394,7 @@ pub(super) fn parameter_table(report: Report, system: &Configured<f64>) -> Repor
         let value = values.get(symbol).map(f64::to_string).unwrap_or_default();
         vec![symbol.clone(), value, if unit == "1" { "-".to_string() } else { unit.clone() }]
     };
-    let rows: Vec<Vec<String>> = parameters(system.system).iter().map(row).collect();
+    let rows: Vec<Vec<String>> = parameters(&system.system).iter().map(row).collect();
     if rows.is_empty() {
         return report;
     }
@@ -403,11 +408,11 @@ fn write_report(
     epochs: &[Epoch],
     toml: &str,
 ) -> Result<(), CliError> {
-    let training = training_pictures(epochs)?;
-    let report = Report::new(&format!("{}: learned", system.system.title)).paragraph(&headline(summary));
+    let training = training_pictures(epochs);
+    let report = Report::new(&format!("{}: learned", system.system.title));
+    let report = summary.evaluation.summarise(report, &system.system.title).paragraph(&headline(summary));
     let report = summary.evaluation.report(parameter_table(report, system)).heading("Training");
-    let report = training.iter().fold(report, |report, figure| report.figure(&figure.png, &figure.caption));
-    let report = report.heading("Configuration").preformatted(toml);
+    let report = report.figures(&training).heading("Configuration").preformatted(toml);
     write_report_and_figures(folder, &report, training.iter().chain(&summary.evaluation.figures))
 }
 
@@ -422,7 +427,7 @@ pub(super) fn save<S: Scalar>(folder: &Folder, model: &ModelFile<S>) -> Result<(
 }
 
 /// Pictures of a history.
-pub(super) fn training_pictures(epochs: &[Epoch]) -> Result<Vec<Figure>, CliError> {
+pub(super) fn training_pictures(epochs: &[Epoch]) -> Vec<Figure> {
     let row = |e: &Epoch| HistoryRow {
         epoch: e.epoch as f64,
         training_loss: e.training_loss,
@@ -431,7 +436,7 @@ pub(super) fn training_pictures(epochs: &[Epoch]) -> Result<Vec<Figure>, CliErro
         gradient_norm: e.gradient_norm,
         penalty: e.penalty,
     };
-    training_figures(&epochs.iter().map(row).collect::<Vec<_>>()).map_err(CliError::data)
+    training_figures(&epochs.iter().map(row).collect::<Vec<_>>())
 }
 
 /// Writes [`CAPTIONS`], which name the pictures and tell what they show, the report, and the pictures.
@@ -446,5 +451,5 @@ pub(super) fn write_report_and_figures<'a>(
     let captions: BTreeMap<&str, &str> = figures.clone().map(|f| (f.file.as_str(), f.caption.as_str())).collect();
     folder.write(CAPTIONS, serde_json::to_string_pretty(&captions).map_err(CliError::data)?.as_bytes())?;
     folder.write("report.html", report.to_html().as_bytes())?;
-    figures.into_iter().try_for_each(|figure| folder.write(&figure.file, &figure.png))
+    figures.into_iter().try_for_each(|figure| folder.write(&figure.file, figure.picture.to_svg().as_bytes()))
 }

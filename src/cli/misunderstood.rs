@@ -1,4 +1,4 @@
-//! What is wrong with the arguments, in one line that names the option.
+//! Mistakes in the arguments, in one line that names the option.
 
 use crate::cli::{Cli, CliError};
 use crate::names::{plain, unknown};

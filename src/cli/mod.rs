@@ -7,6 +7,7 @@
 mod attention;
 mod changes;
 mod check;
+mod chosen;
 mod config;
 mod config_file;
 mod determined;
@@ -25,6 +26,7 @@ mod fit_summary;
 mod folder;
 mod forces;
 mod foretell;
+mod headline;
 mod holder;
 mod input;
 mod inspect;
@@ -55,23 +57,39 @@ mod source;
 mod spool;
 mod start;
 mod states;
+mod subject;
 mod systems;
+mod taken;
 mod train;
 mod train_config;
 
+pub use chosen::parse_system;
 pub use config::parse as parse_config;
 pub use error::{CliError, Kind};
 pub use states::{States, StatesError, parse_states};
 
+use crate::names::{WIDTH, wrapped};
 use clap::{CommandFactory, Parser, Subcommand};
 use misunderstood::misunderstood;
 use std::ffi::OsString;
 use std::io::Write;
 use std::process::ExitCode;
 
+/// Beginnings: the three things most people want to do, with a line each to copy.
+const BEGINNINGS: &str = "\
+To learn a listed system, and see in report.html how good the result is:
+  lnn train double-pendulum
+To look at a recording of your own, then to learn from it:
+  lnn check motion.csv --coords q1,q2 && lnn fit motion.csv --coords q1,q2 --name mine
+To predict motion by what was learned:
+  lnn rollout runs/double-pendulum --state 0.6,0.9,0,0 --t-end 10 --dt 0.05 --out motion.csv";
+
+/// Order of the parts of the help.
+const TEMPLATE: &str = "{about}\n\n{before-help}{usage-heading} {usage}\n\n{all-args}{after-help}";
+
 /// Learn a Lagrangian from motion, predict motion that keeps its energy, read physics off the learned function.
 #[derive(Debug, Parser)]
-#[command(name = "lnn", version, arg_required_else_help = true, max_term_width = 100)]
+#[command(name = "lnn", version, arg_required_else_help = true, before_help = BEGINNINGS, help_template = TEMPLATE)]
 struct Cli {
     #[command(subcommand)]
     command: Command,
@@ -121,7 +139,7 @@ pub fn main(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     }
 }
 
-/// Whether the program understands these arguments, the first being its own name; nothing is run.
+/// Test of arguments, the first being the program's own name; nothing is run.
 ///
 /// # Errors
 /// The usage error that the program ends with. Asking for help or for the version is none.
@@ -157,7 +175,7 @@ fn run(command: Command, words: &[OsString]) -> Result<(), CliError> {
 fn answer(error: &clap::Error, arguments: &[OsString]) -> ExitCode {
     use clap::error::ErrorKind::{DisplayHelp, DisplayHelpOnMissingArgumentOrSubcommand, DisplayVersion};
     match error.kind() {
-        DisplayHelp | DisplayVersion => match output::print(&error.to_string()) {
+        DisplayHelp | DisplayVersion => match output::print(&wrapped(&error.to_string(), WIDTH)) {
             Err(failed) if failed.kind() != Kind::ClosedPipe => {
                 report(&failed);
                 failed.exit_code()
@@ -166,7 +184,7 @@ fn answer(error: &clap::Error, arguments: &[OsString]) -> ExitCode {
         },
         DisplayHelpOnMissingArgumentOrSubcommand => {
             // Nothing more can be done if even this cannot be shown.
-            let _ = error.print();
+            let _ = write!(std::io::stderr(), "{}", wrapped(&error.to_string(), WIDTH));
             ExitCode::from(2)
         }
         _ => {

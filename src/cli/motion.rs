@@ -1,8 +1,8 @@
-//! What a roll-out tells beside its samples: where it left the training range, pictures, facts in JSON.
+//! Results of a roll-out beside its samples: where it left the training range, pictures, facts in JSON.
 
 use crate::cli::{CliError, input, output};
-use crate::names::counted;
-use crate::report::{Figure, LinePlot, Report, Series, line_png};
+use crate::names::{counted, rounded};
+use crate::report::{Figure, LinePlot, Picture, Report, Series, line_plot};
 use crate::rollout::{Domain, Trajectory};
 use crate::storage::{Disk, Growing, remove_leftovers, write_atomically};
 use serde::Serialize;
@@ -20,7 +20,7 @@ pub struct Leaving {
     pub column: String,
     /// Its value.
     pub value: f64,
-    /// What it was trained on.
+    /// The range of the training states.
     pub trained_on: [f64; 2],
 }
 
@@ -28,7 +28,10 @@ impl Leaving {
     /// In words.
     pub fn text(&self) -> String {
         let Self { t, column, value, trained_on: [low, high] } = self;
-        format!("left the training range at t = {t}: {column} reached {value:.6e}, trained on [{low}, {high}]")
+        format!(
+            "left the training range at t = {t}: {column} reached {}, trained on [{low}, {high}]",
+            rounded(*value, 6)
+        )
     }
 }
 
@@ -81,7 +84,7 @@ impl Watch {
         }
     }
 
-    /// Draws the coordinates against time as a PNG, or a page of coordinates, velocities and energy as HTML, by the end of the
+    /// Draws the coordinates against time in SVG, or a page of coordinates, velocities and energy as HTML, by the end of the
     /// file's name.
     ///
     /// # Errors
@@ -100,26 +103,28 @@ impl Watch {
                 ("Energy of the model", &energy[..], &self.values[2 * n..]),
             ];
             for (what, names, values) in parts {
-                let png = self.picture(what, names, values, time_unit)?;
-                let figure = Figure { file: String::new(), png, caption: format!("{what} against time.") };
-                report = report.figure(&figure.png, &figure.caption);
+                let picture = self.picture(what, names, values, time_unit)?;
+                let caption = format!("{what} against time.");
+                report = report.figures(&[Figure { file: String::new(), picture, caption }]);
             }
             report.to_html().into_bytes()
         } else {
-            self.picture(title, &self.columns[..n], &self.values[..n], time_unit)?
+            self.picture(title, &self.columns[..n], &self.values[..n], time_unit)?.to_svg().into_bytes()
         };
         write_atomically(path, &bytes).map_err(|e| CliError::file(path, format_args!("cannot write: {e}")))
     }
 
-    fn picture(&self, title: &str, names: &[String], values: &[Vec<f64>], unit: &str) -> Result<Vec<u8>, CliError> {
+    fn picture(&self, title: &str, names: &[String], values: &[Vec<f64>], unit: &str) -> Result<Picture, CliError> {
         let plot = LinePlot {
             title: title.to_string(),
             x_label: if unit.is_empty() { "time".to_string() } else { format!("time [{unit}]") },
             y_label: names.join(", "),
             log_y: false,
             series: names.iter().zip(values).map(|(name, y)| Series::new(name, &self.times, y)).collect(),
+            turn: None,
+            level: None,
         };
-        line_png(&plot).map_err(CliError::data)
+        line_plot(&plot).map_err(CliError::data)
     }
 }
 
@@ -131,19 +136,19 @@ fn thin(values: &mut Vec<f64>) {
     });
 }
 
-/// Whether a picture's file is to be a page.
+/// `true` if a picture's file is to be a page.
 fn is_page(path: &Path) -> bool {
     path.extension().is_some_and(|end| end.eq_ignore_ascii_case("html") || end.eq_ignore_ascii_case("htm"))
 }
 
-/// A file for a picture: PNG or HTML.
+/// A file for a picture: SVG or HTML.
 pub fn picture_file(text: &str) -> Result<std::path::PathBuf, String> {
     let path = std::path::PathBuf::from(text);
-    let known = is_page(&path) || path.extension().is_some_and(|end| end.eq_ignore_ascii_case("png"));
-    if known { Ok(path) } else { Err("expected a file that ends in .png or .html".to_string()) }
+    let known = is_page(&path) || path.extension().is_some_and(|end| end.eq_ignore_ascii_case("svg"));
+    if known { Ok(path) } else { Err("expected a file that ends in .svg or .html".to_string()) }
 }
 
-/// What a roll-out came to, as one JSON object.
+/// Facts about a roll-out, as one JSON object.
 #[derive(Debug, Serialize)]
 pub struct Facts<'a> {
     /// Name of the system.
@@ -166,7 +171,7 @@ pub struct Facts<'a> {
     pub work: Option<f64>,
     /// Energy taken by friction.
     pub dissipated: Option<f64>,
-    /// What is not accounted for.
+    /// Energy that is not accounted for.
     pub energy_defect: Option<f64>,
     /// Where the motion left the training range.
     pub left_training_range: Option<&'a Leaving>,
@@ -174,7 +179,7 @@ pub struct Facts<'a> {
     pub out: String,
 }
 
-/// What the samples are written to.
+/// Place that the samples are written to.
 pub enum Target<'a> {
     /// Standard output, as they come.
     Standard,
@@ -229,10 +234,13 @@ impl Facts<'_> {
         let unit = self.time_unit.map_or(String::new(), |unit| format!(" {unit}"));
         let iterations =
             self.iterations.map_or(String::new(), |count| format!(" in {}", counted(count, "iteration", "iterations")));
-        let work = self.work.map_or(String::new(), |work| format!("forces gave {work:.9e}, "));
+        let work = self.work.map_or(String::new(), |work| format!("forces gave {}, ", rounded(work, 10)));
         let balance = match (self.energy_change, self.dissipated, self.energy_defect) {
             (Some(change), Some(dissipated), Some(defect)) => format!(
-                "energy changed by {change:.9e}, {work}friction took {dissipated:.9e}, not accounted for {defect:.1e}\n"
+                "energy changed by {}, {work}friction took {}, not accounted for {}\n",
+                rounded(change, 10),
+                rounded(dissipated, 10),
+                rounded(defect, 2)
             ),
             _ => String::new(),
         };
@@ -281,12 +289,12 @@ mod tests {
         let leaving = watch.leaving.as_ref().unwrap();
         assert_eq!((leaving.t, leaving.column.as_str(), leaving.trained_on), (5001.0, "x", [-1.0, 5000.0]));
         let directory = tempfile::tempdir().unwrap();
-        let [png, page] = ["a.png", "a.html"].map(|name| directory.path().join(name));
-        watch.plot(&png, "Motion", "s").unwrap();
+        let [svg, page] = ["a.svg", "a.html"].map(|name| directory.path().join(name));
+        watch.plot(&svg, "Motion", "s").unwrap();
         watch.plot(&page, "Motion", "").unwrap();
-        assert!(std::fs::read(&png).unwrap().starts_with(b"\x89PNG"));
+        assert!(std::fs::read(&svg).unwrap().starts_with(b"<svg"));
         let page = std::fs::read_to_string(&page).unwrap();
-        assert!(page.matches("data:image/png").count() == 3 && page.contains("left the training range at t = 5001"));
-        assert!(picture_file("a.PNG").is_ok() && picture_file("a.svg").is_err() && picture_file("a").is_err());
+        assert!(page.matches("<figure").count() == 3 && page.contains("left the training range at t = 5001"));
+        assert!(picture_file("a.SVG").is_ok() && picture_file("a.png").is_err() && picture_file("a").is_err());
     }
 }

@@ -8,11 +8,11 @@ use std::path::{Path, PathBuf};
 /// A directory that is wanted.
 #[derive(Clone, Copy, Debug)]
 pub struct Wanted<'a> {
-    /// What was asked for.
+    /// Directory asked for, if one was.
     pub out: Option<&'a Path>,
-    /// What serves if nothing was.
+    /// Directory that serves if none was.
     pub usual: &'a Path,
-    /// Whether what is there may be replaced.
+    /// `true` if results that are there may be replaced.
     pub overwrite: bool,
     /// Files that the command reads.
     pub inputs: &'a [&'a Path],

@@ -7,7 +7,7 @@ const LONGEST: usize = 100;
 /// part of a path, or nowhere, is none.
 ///
 /// # Errors
-/// What was expected.
+/// A description of plain names.
 pub fn plain_name(text: &str) -> Result<String, String> {
     let known = |c: char| c.is_alphanumeric() || "-_. ".contains(c);
     let begins = text.starts_with(char::is_alphanumeric) && !text.ends_with([' ', '.']);
@@ -38,7 +38,7 @@ mod tests {
 
     #[test]
     fn systems_and_experiments_have_plain_names() {
-        let names = systems().iter().map(|s| s.name).chain(experiments().iter().map(|e| e.name));
+        let names = systems().iter().map(|s| s.name.as_ref()).chain(experiments().iter().map(|e| e.name));
         assert!(names.clone().count() > 10);
         assert!(names.into_iter().all(|name| plain_name(name).is_ok()));
     }

@@ -6,7 +6,7 @@ use toml::{Table, Value};
 /// Longest line of a comment.
 const WIDTH: usize = 110;
 
-/// What a configuration is printed as.
+/// Form in which a configuration is printed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum PrintFormat {
     /// A commented configuration file.
@@ -23,6 +23,10 @@ pub fn commented(sections: &[Section<'_>], root: &Table, remarks: &dyn Fn(&str) 
     for section in sections {
         let path: Vec<&str> = section.name.split('.').filter(|name| !name.is_empty()).collect();
         let found = path.iter().try_fold(Value::Table(root.clone()), |value, name| value.get(*name).cloned());
+        // Of what has no keys of its own there is nothing to take in.
+        if found.is_none() && section.keys.is_empty() {
+            continue;
+        }
         if !section.name.is_empty() {
             text += &format!("\n{}", comment(section.purpose));
         }
@@ -33,6 +37,10 @@ pub fn commented(sections: &[Section<'_>], root: &Table, remarks: &dyn Fn(&str) 
                     text += &format!("{}[[{}]]\n", if k > 0 { "\n" } else { "" }, section.name);
                     text += &entries(section.keys, Some(table), k == 0);
                 }
+            }
+            Some(Value::Table(table)) if section.keys.is_empty() && table.values().any(has_tables) => {
+                let whole = Table::from_iter([(section.name.to_string(), Value::Table(table))]);
+                text += &toml::to_string(&whole).unwrap_or_default();
             }
             Some(Value::Table(table)) => {
                 if !section.name.is_empty() {
@@ -53,6 +61,11 @@ pub fn commented(sections: &[Section<'_>], root: &Table, remarks: &dyn Fn(&str) 
         }
     }
     text
+}
+
+/// Whether a value is a table, or a list of tables.
+fn has_tables(value: &Value) -> bool {
+    value.is_table() || value.as_array().is_some_and(|items| items.iter().any(Value::is_table))
 }
 
 /// A configuration that was printed with the seed 0, with another one: a seed may be larger than the integers of a table.
@@ -107,7 +120,7 @@ mod tests {
     fn a_commented_configuration_is_the_configuration() {
         for system in systems() {
             for preset in [Preset::Quick, Preset::Best, Preset::Paper] {
-                let configured = configure(system.name, &[]).unwrap();
+                let configured = configure(&system.name, &[]).unwrap();
                 let Some(mut config) = preset.config(&configured) else { continue };
                 config.parameters.insert("m 1".to_string(), 2.0);
                 config.optimizer.clip = f64::INFINITY;

@@ -1,5 +1,6 @@
 //! A progress bar on standard error: loss, learning rate, remaining time.
 
+use crate::names::number;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
 
@@ -36,7 +37,7 @@ impl Progress {
 
     /// The last validation loss and the learning rate.
     pub fn show(&self, loss: f64, rate: f64) {
-        self.bar.set_message(format!("loss {loss:.4e}  rate {rate:.2e}"));
+        self.bar.set_message(format!("loss {}  rate {}", number(loss), number(rate)));
     }
 }
 

@@ -44,7 +44,7 @@ pub struct RecordingArgs {
     pub columns: Vec<String>,
 }
 
-/// What a contradiction that begins with an option's name lacks to name the option.
+/// Dashes for a contradiction that begins with an option's name without them.
 fn option(problem: &str) -> &'static str {
     let options = ["velocity:", "acceleration:", "force:", "periodic:", "units:", "rate:", "columns:"];
     if options.iter().any(|name| problem.starts_with(name)) { "--" } else { "" }
@@ -61,7 +61,7 @@ pub fn unit(text: &str) -> Result<(String, String), String> {
 }
 
 impl RecordingArgs {
-    /// What the columns mean.
+    /// Meaning of the columns.
     pub fn meaning(&self) -> Columns {
         Columns {
             coords: self.coords.clone(),
@@ -91,7 +91,7 @@ impl RecordingArgs {
     /// The option that helps, with a colon before it.
     fn help(&self, problem: &Problem) -> &'static str {
         match problem {
-            Problem::NoTime => ": --time COLUMN or --rate HZ",
+            Problem::NoTime { .. } => ": --time COLUMN or --rate HZ",
             Problem::Missing { what: "time", .. } => ": --time COLUMN names it",
             Problem::Missing { what: "trajectory", .. } => ": --trajectory COLUMN names it",
             Problem::Missing { what: "coordinate", .. } => ": --coords names it",

@@ -1,4 +1,4 @@
-//! What runs leave in their directories: who finds it there, and how it goes when another run replaces it.
+//! Results that runs leave in their directories: who finds them there, and how another run replaces them.
 
 use crate::cli::CliError;
 use crate::cli::files::{holds_something, same_file};
@@ -13,9 +13,9 @@ use std::path::{Path, PathBuf};
 
 /// File with the captions of a run's pictures, by file name; written before them, so that each is known.
 pub const CAPTIONS: &str = "captions.json";
-/// What only trainings and fits write.
+/// Files that only trainings and fits write.
 const LEARNED: [&str; 5] = [MODEL, "config.toml", "history.csv", "shooting.csv", "summary.json"];
-/// What evaluations write; trainings and fits have the last two as well.
+/// Files that evaluations write; trainings and fits have the last two as well.
 const EVALUATED: [&str; 3] = ["evaluation.json", "report.html", CAPTIONS];
 /// Longest file that is read to say what is there, in bytes.
 const MAX_BYTES: u64 = 1 << 26;
@@ -29,7 +29,7 @@ pub enum Writer {
     Evaluator,
 }
 
-/// What is in a directory, in words; `None` if a run can be written there and nothing is lost.
+/// Contents of a directory, in words; `None` if a run can be written there and nothing is lost.
 pub fn found(directory: &Path) -> Option<String> {
     if has_checkpoint(directory) {
         return Some(format!("an unfinished run (go on with it by: {})", command(directory)));
@@ -44,10 +44,15 @@ pub fn found(directory: &Path) -> Option<String> {
     if names.is_empty() { None } else { Some(described(directory).unwrap_or_else(|| listed(&names))) }
 }
 
+/// Whether a file's name is a picture's; earlier versions wrote PNG.
+fn is_picture(name: &str) -> bool {
+    name.ends_with(".svg") || name.ends_with(".png")
+}
+
 /// Names of the pictures in a directory, in order.
 fn pictures(directory: &Path) -> Vec<String> {
     let names = fs::read_dir(directory).into_iter().flatten().flatten();
-    let names = names.filter_map(|entry| entry.file_name().into_string().ok()).filter(|name| name.ends_with(".png"));
+    let names = names.filter_map(|entry| entry.file_name().into_string().ok()).filter(|name| is_picture(name));
     let mut names: Vec<String> = names.filter(|name| holds_something(&directory.join(name))).collect();
     names.sort();
     names
@@ -168,7 +173,7 @@ fn remove(directory: &Path, names: &[&str]) -> Result<(), CliError> {
 fn captioned(directory: &Path) -> Vec<PathBuf> {
     let bytes = read_regular(&directory.join(CAPTIONS), MAX_BYTES).unwrap_or_default();
     let names: BTreeMap<String, serde_json::Value> = serde_json::from_slice(&bytes).unwrap_or_default();
-    let plain = |name: &String| name.ends_with(".png") && Path::new(name).file_name() == Some(name.as_ref());
+    let plain = |name: &String| is_picture(name) && Path::new(name).file_name() == Some(name.as_ref());
     names.into_keys().filter(plain).map(|name| directory.join(name)).collect()
 }
 
@@ -181,18 +186,19 @@ mod tests {
         let directory = tempfile::tempdir().unwrap();
         let inside = directory.path().join("run");
         fs::create_dir(&inside).unwrap();
-        let names = r#"{"a.png": "x", "../b.png": "x", "/tmp/c.png": "x", "d.csv": "x", "..png/e.png": "x"}"#;
+        let names =
+            r#"{"a.png": "x", "b.svg": "x", "../b.svg": "x", "/tmp/c.png": "x", "d.csv": "x", "..png/e.png": "x"}"#;
         fs::write(inside.join(CAPTIONS), names).unwrap();
-        assert_eq!(captioned(&inside), [inside.join("a.png")]);
+        assert_eq!(captioned(&inside), [inside.join("a.png"), inside.join("b.svg")]);
     }
 
     #[test]
     fn stale_files_go_and_others_stay() {
         let directory = tempfile::tempdir().unwrap();
         let folder = Folder::open(directory.path()).unwrap();
-        let run = [MODEL, "config.toml", "history.csv", "summary.json", "report.html", "old.png", "notes.txt"];
+        let run = [MODEL, "config.toml", "history.csv", "summary.json", "report.html", "old.svg", "notes.txt"];
         run.iter().for_each(|name| fs::write(folder.file(name), "{}").unwrap());
-        fs::write(folder.file(CAPTIONS), r#"{"old.png": "x"}"#).unwrap();
+        fs::write(folder.file(CAPTIONS), r#"{"old.svg": "x"}"#).unwrap();
         for name in ["evaluation", "evaluation-2", "evaluation-x"] {
             fs::create_dir(folder.file(name)).unwrap();
             fs::write(folder.file(name).join("evaluation.json"), "{}").unwrap();

@@ -1,4 +1,4 @@
-//! What `--resume DIR` of `lnn train` and `lnn fit` finds in the directory.
+//! Runs that `--resume DIR` of `lnn train` and `lnn fit` finds in the directory.
 
 use crate::cli::differences::differences;
 use crate::cli::said::Said;
@@ -8,7 +8,7 @@ use crate::training::{CheckpointError, Config, NEWEST, PREVIOUS, saved};
 use serde::Deserialize;
 use std::path::Path;
 
-/// What learns.
+/// Command that learns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Learner {
     /// `lnn train`.
@@ -35,7 +35,7 @@ pub enum Found {
     Finished(String, String),
 }
 
-/// Whether a directory holds a training that can go on.
+/// `true` if a directory holds a training that can go on.
 pub fn has_checkpoint(directory: &Path) -> bool {
     [NEWEST, PREVIOUS].iter().any(|name| directory.join(name).exists())
 }

@@ -2,12 +2,12 @@
 
 use crate::cli::files::require_free;
 use crate::cli::forces::ForceArgs;
-use crate::cli::learned::{Learned, model_file};
 use crate::cli::motion::{Facts, Target, Watch, picture_file, place};
 use crate::cli::number::{finite, positive, tolerance};
+use crate::cli::source::parameter;
+use crate::cli::subject::Subject;
 use crate::cli::{CliError, input, interrupt, output};
-use crate::lagrangian::{EulerLagrange, find};
-use crate::names::counted;
+use crate::names::{counted, rounded};
 use crate::rollout::{Balances, Driven, Method, Options, RolloutError, Trajectory, rollout_in_pieces};
 use crate::storage::check_target;
 use std::ops::ControlFlow;
@@ -18,7 +18,14 @@ use std::sync::atomic::Ordering;
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Model, a file or the directory of a run.
-    model: PathBuf,
+    #[arg(required_unless_present = "system")]
+    model: Option<PathBuf>,
+    /// A system instead of a model, by name (`lnn systems` lists them) or by the file that describes it: its exact motion.
+    #[arg(long, value_name = "NAME|FILE.toml", conflicts_with = "model")]
+    system: Option<String>,
+    /// A parameter of the system; may be repeated.
+    #[arg(long, value_name = "SYMBOL=VALUE", conflicts_with = "model", value_parser = parameter)]
+    param: Vec<(String, String)>,
     /// Start: coordinates, then velocities, separated by commas; taken as it is, on a mass shell or off it.
     #[arg(long, value_name = "q1,..,v1,..", required = true, value_delimiter = ',', allow_hyphen_values = true, value_parser = finite)]
     state: Vec<f64>,
@@ -57,7 +64,7 @@ pub struct Args {
     #[arg(long, value_name = "FILE.csv")]
     out: PathBuf,
     /// Picture of the coordinates against time, or a page with velocities and energy as well.
-    #[arg(long, value_name = "FILE.png|FILE.html", value_parser = picture_file)]
+    #[arg(long, value_name = "FILE.svg|FILE.html", value_parser = picture_file)]
     plot: Option<PathBuf>,
     /// Replace the files.
     #[arg(long)]
@@ -102,8 +109,11 @@ impl From<MethodName> for Method {
 /// A usage error for a state of the wrong length; a data error for a bad model, a file that cannot be written, or a
 /// motion that ends before its time, the samples up to there being written.
 pub fn run(args: &Args) -> Result<(), CliError> {
-    let learned = Learned::<f64>::load(&args.model)?;
-    let columns = &learned.header.columns;
+    let subject = match &args.model {
+        Some(path) => Subject::model(path)?,
+        None => Subject::system(args.system.as_deref().unwrap_or_default(), &args.param)?,
+    };
+    let columns = &subject.columns;
     if args.state.len() != columns.len() {
         let (expected, found) = (columns.len(), args.state.len());
         let names = columns.join(",");
@@ -124,15 +134,14 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         rtol: args.rtol,
         atol: args.atol,
         step: args.step,
-        domain: (!args.beyond_range).then(|| learned.domain()),
+        domain: subject.domain.clone().filter(|_| !args.beyond_range),
         ..Options::new(args.t_end, args.dt)
     };
     options.check(q.len()).map_err(|e| refused(&e))?;
     if let Some(step) = args.step.filter(|step| *step > args.dt) {
         output::note(&format!("--step {step} is longer than --dt {}: one step per sample", args.dt));
     }
-    let model = model_file(&args.model)?;
-    let inputs: Vec<_> = args.forces.files().chain([model.as_path()]).collect();
+    let inputs: Vec<_> = args.forces.files().chain(subject.file.as_deref()).collect();
     if !standard {
         require_free(&args.out, &inputs, args.overwrite)?;
     }
@@ -143,11 +152,11 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         require_free(plot, &inputs, args.overwrite)?;
         check_target(plot).map_err(|e| CliError::file(plot, format_args!("cannot write: {e}")))?;
     }
-    let force = args.forces.force(&learned.header, args.t_start, args.t_end)?;
+    let force = args.forces.force(&columns[..q.len()], &subject.forces, args.t_start, args.t_end)?;
     let mut target = Target::create(&args.out, standard)?;
     let header = Trajectory { energy: Some(vec![]), ..Trajectory::<f64>::empty(q.len()) };
     target.append(&header.csv_header(columns).map_err(CliError::data)?)?;
-    let network = &learned.network;
+    let network = subject.model.as_ref();
     let driven = force.as_ref().map(|force| Driven::new(network, force));
     let mut balances = (driven.is_some() || !network.conserves_energy()).then(|| {
         Balances::new(q.len(), |t: &Trajectory<f64>| match &driven {
@@ -155,7 +164,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
             None => t.energy_balance(network),
         })
     });
-    let mut watch = Watch::new(learned.domain(), columns);
+    let mut watch = Watch::new(subject.range(), columns);
     let (stop, mut failed) = (interrupt::flag().map_err(CliError::signals)?, None);
     let mut take = |piece: &Trajectory<f64>| {
         watch.add(piece);
@@ -179,10 +188,9 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         return Err(refused(error));
     }
     target.finish()?;
-    // A system that was only recorded has no unit here, nor has one of another version.
-    let time_unit = find(&learned.header.system).ok().map(|system| system.time_unit);
+    let time_unit = subject.time_unit.as_deref();
     if let Some(plot) = &args.plot {
-        watch.plot(plot, &format!("{}: roll-out", learned.header.system), time_unit.unwrap_or_default())?;
+        watch.plot(plot, &format!("{}: roll-out", subject.name), time_unit.unwrap_or_default())?;
     }
     if let Some(leaving) = watch.leaving.as_ref().filter(|_| args.beyond_range) {
         output::note(&format!("{}; what comes after is a guess", leaving.text()));
@@ -198,7 +206,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let statistics = result.statistics;
     let balance = balances.map(Balances::finish).transpose().map_err(CliError::data)?;
     let facts = Facts {
-        system: &learned.header.system,
+        system: &subject.name,
         samples: result.samples,
         t_end: args.t_end,
         time_unit,
@@ -244,8 +252,9 @@ fn ended(stop: &RolloutError, columns: &[String], method: Method) -> String {
     let fixed = method.is_structure_preserving();
     match stop {
         RolloutError::LeftDomain { t, component, value, lower, upper, .. } => format!(
-            "left the training range at t = {t}: {} reached {value:.6e}, trained on [{lower}, {upper}]; --beyond-range goes on",
-            columns.get(*component).map_or("a component", String::as_str)
+            "left the training range at t = {t}: {} reached {}, trained on [{lower}, {upper}]; --beyond-range goes on",
+            columns.get(*component).map_or("a component", String::as_str),
+            rounded(*value, 6)
         ),
         RolloutError::Stopped { t } => format!("interrupted at t = {t}"),
         RolloutError::NotConverged { .. } => format!("{stop}: a shorter --step may help"),

@@ -1,4 +1,4 @@
-//! What the checkpoint of a fit says: the command it was started by, where, and the configuration that came of it.
+//! Text of a fit's checkpoint: the command it was started by, where, and the configuration that came of it.
 
 use crate::cli::CliError;
 use serde::{Deserialize, Serialize};

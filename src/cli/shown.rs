@@ -8,7 +8,7 @@ use crate::scalar::Scalar;
 /// States evaluated together; bounds the memory whatever the length of the file.
 pub const CHUNK: usize = 256;
 
-/// How results are written.
+/// Form in which results are written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Format {
     /// One object per line.
@@ -52,7 +52,7 @@ pub struct Field<'a, S> {
     pub shape: Shape,
 }
 
-/// How the numbers of a result are arranged.
+/// Arrangement of the numbers of a result.
 pub enum Shape {
     Number,
     Vector,

@@ -1,9 +1,11 @@
 //! Where Euler-Lagrange terms come from: a hand-written system or a trained model.
 
 use crate::cli::learned::Learned;
-use crate::cli::{CliError, forces};
-use crate::lagrangian::{EulerLagrange, configure};
+use crate::cli::{CliError, chosen, forces};
+use crate::lagrangian::system::System;
+use crate::lagrangian::{EulerLagrange, configure_system};
 use crate::scalar::Scalar;
+use std::borrow::Cow;
 use std::path::Path;
 
 /// Something that moves by a Lagrangian, with the names of its state's components.
@@ -17,12 +19,20 @@ pub struct Source<S> {
 }
 
 impl<S: Scalar> Source<S> {
-    /// A hand-written system; its parameters, defaults included, are read in the precision of `S`.
+    /// A system by name or by file; its parameters, defaults included, are read in the precision of `S`.
     ///
     /// # Errors
-    /// A usage error for an unknown name or a wrong parameter.
+    /// A usage error for an unknown name, a mistake in a file or a wrong parameter.
     pub fn system(name: &str, given: &[(String, String)]) -> Result<Self, CliError> {
-        let configured = configure::<S>(name, given).map_err(CliError::usage)?;
+        Self::configured(chosen::system(name)?, given)
+    }
+
+    /// A system; its parameters, defaults included, are read in the precision of `S`.
+    ///
+    /// # Errors
+    /// A usage error for a wrong parameter.
+    pub fn configured(system: Cow<'static, System>, given: &[(String, String)]) -> Result<Self, CliError> {
+        let configured = configure_system::<S>(system, given).map_err(CliError::usage)?;
         let model = configured.build().map_err(CliError::usage)?;
         let columns = configured.system.columns(configured.coordinates);
         let forces = columns[..configured.coordinates].iter().map(|name| forces::usual(name)).collect();

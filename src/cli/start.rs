@@ -13,7 +13,7 @@ use std::path::Path;
 pub struct Start {
     /// Where it is, as the user said it.
     pub from: String,
-    /// What its file says about it.
+    /// Header of its file.
     pub header: Header,
 }
 
@@ -84,7 +84,7 @@ pub fn weights<S: Scalar>(
     }
 }
 
-/// What differs between the shape asked for and that of a model.
+/// Differences between the shape asked for and that of a model.
 fn differences(asked: &Architecture, model: &Architecture) -> Vec<String> {
     let fields = |shape: &Architecture| serde_json::to_value(shape).unwrap_or_default();
     let (asked, model) = (fields(asked), fields(model));

@@ -19,7 +19,7 @@ pub struct States<S> {
     pub rows: Vec<usize>,
 }
 
-/// What is wrong with a file of states; rows are lines of the file, from 1.
+/// Mistakes in a file of states; rows are lines of the file, from 1.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum StatesError {
     /// Nothing in it.
@@ -37,7 +37,7 @@ pub enum StatesError {
         names: String,
     },
     /// A column stands twice in the header.
-    #[error("row {row}: column {name} stands there twice")]
+    #[error("row {row}: duplicate column {name}")]
     Duplicate {
         /// Row of the header.
         row: usize,
@@ -67,7 +67,7 @@ pub enum StatesError {
         row: usize,
         /// Fields of the header.
         expected: usize,
-        /// What separates them, such as ` separated by blanks`; empty for commas.
+        /// Separator of the fields, such as ` separated by blanks`; empty for commas.
         separated: &'static str,
         /// Fields of the row.
         found: usize,
@@ -79,7 +79,7 @@ pub enum StatesError {
         row: usize,
         /// Name of the column.
         column: String,
-        /// What stands there.
+        /// Text that stands there.
         found: String,
     },
     /// A header and nothing below.
@@ -266,7 +266,7 @@ mod tests {
         assert_eq!(refusal("theta1\ttheta2\n"), "row 1: missing column theta1_dot, theta2_dot");
         let expected = "row 2: expected a header with the columns theta1,theta2,theta1_dot,theta2_dot, found numbers";
         assert_eq!(refusal("# by hand\n1,2,3,4\n"), expected);
-        assert_eq!(refusal("theta1,theta2,theta1\n"), "row 1: column theta1 stands there twice");
+        assert_eq!(refusal("theta1,theta2,theta1\n"), "row 1: duplicate column theta1");
         assert_eq!(
             refusal("theta1,theta2,theta1_dto\n"),
             "row 1: unknown column \"theta1_dto\", did you mean \"theta1_dot\"?"

@@ -1,13 +1,16 @@
 //! `lnn systems`: what can be learned.
 
-use crate::cli::{CliError, output};
-use crate::lagrangian::system::{Bounds, Coordinate, Size, System};
+use crate::cli::{CliError, chosen, output};
+use crate::lagrangian::system::{Bounds, Coordinate, Parameter, Size, System};
 use crate::lagrangian::systems;
 use serde_json::{Value, json};
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
 pub struct Args {
+    /// This one alone, by name or by the file that describes it.
+    #[arg(long, value_name = "NAME|FILE.toml")]
+    system: Option<String>,
     /// One JSON object per line instead of a table.
     #[arg(long)]
     json: bool,
@@ -15,16 +18,18 @@ pub struct Args {
 
 /// Prints the catalogue.
 pub fn run(args: &Args) -> Result<(), CliError> {
+    let one = args.system.as_deref().map(chosen::system).transpose()?;
+    let all = one.as_deref().map_or(systems(), std::slice::from_ref);
     if args.json {
-        return output::print(&systems().iter().map(|system| format!("{}\n", describe(system))).collect::<String>());
+        return output::print(&all.iter().map(|system| format!("{}\n", describe(system))).collect::<String>());
     }
-    output::print(&systems().iter().map(table).collect::<Vec<_>>().join("\n"))
+    output::print(&all.iter().map(table).collect::<Vec<_>>().join("\n"))
 }
 
 /// Symbol, default, unit and allowed values of every parameter.
 pub fn parameters(system: &System) -> Vec<[String; 4]> {
-    let mut rows: Vec<_> =
-        system.parameters.iter().map(|p| [p.symbol, p.default, p.unit, p.range.text()].map(String::from)).collect();
+    let row = |p: &Parameter| [p.symbol.as_ref(), &p.default, &p.unit, p.range.text()].map(String::from);
+    let mut rows: Vec<_> = system.parameters.iter().map(row).collect();
     if let Size::Chosen { symbol, default, least, most } = system.size {
         let range = format!("an integer from {least} to {most}");
         rows.push([symbol.to_string(), default.to_string(), "1".to_string(), range]);
@@ -34,7 +39,7 @@ pub fn parameters(system: &System) -> Vec<[String; 4]> {
 
 fn describe(system: &System) -> Value {
     let n = system.size.default();
-    let coordinates = (system.coordinates)(n);
+    let coordinates = system.coordinates(n);
     let box_of = |b: Bounds| json!({ "position": b.positions, "velocity": b.velocities });
     let number = |text: &str| serde_json::from_str::<Value>(text).unwrap_or_else(|_| Value::from(text));
     let parameters: Vec<Value> = parameters(system)
@@ -54,20 +59,20 @@ fn describe(system: &System) -> Value {
         "time_like": system.time_like.map(|i| coordinates[i].name.as_ref()),
         "constraint": system.constraint,
         "parameters": parameters,
-        "bounds": { "training": box_of((system.training)(n)), "validation": box_of((system.validation)(n)) },
+        "bounds": { "training": box_of(system.training(n)), "validation": box_of(system.validation(n)) },
     })
 }
 
 fn table(system: &System) -> String {
     let n = system.size.default();
-    let bounds = (system.validation)(n);
+    let bounds = system.validation(n);
     let ranges = bounds.positions.iter().chain(&bounds.velocities);
     let remark = |(i, c): (usize, Coordinate)| match (c.periodic, system.time_like == Some(i)) {
         (_, true) => "  time-like",
         (true, _) => "  periodic",
         _ => "",
     };
-    let remarks = (system.coordinates)(n).into_iter().enumerate().map(remark);
+    let remarks = system.coordinates(n).into_iter().enumerate().map(remark);
     let fixed = system.time_like.filter(|_| system.constraint.is_some()).map(|i| n + i);
     let mut text = format!("{}  ({})\n", system.name, system.title);
     let rows = system.columns(n).into_iter().zip(system.units(n)).zip(ranges);

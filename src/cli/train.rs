@@ -52,7 +52,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     conclude(&finished, folder.path())
 }
 
-/// What is to be trained, where, and from where on.
+/// A training: configuration, system, directory and beginning.
 struct Task {
     config: Config,
     system: Configured<f64>,

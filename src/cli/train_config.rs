@@ -6,20 +6,28 @@ use crate::cli::learned::{all_parameters, given};
 use crate::cli::number::{count, finite, positive, seed};
 use crate::cli::print_config::{PrintFormat, commented, with_seed};
 use crate::cli::start::Start;
-use crate::cli::{CliError, output, source};
-use crate::lagrangian::{Configured, SystemError, configure};
+use crate::cli::{CliError, chosen, output, source};
+use crate::lagrangian::system::System;
+use crate::lagrangian::{Configured, Description, DescriptionError, SystemError, configure_system, find};
+use crate::names::plain;
 use crate::training::{
     Config, Every, Precision, Preset, SamplingError, Schedule, TRAINING_SECTIONS, configuration_reference,
 };
+use serde::Deserialize;
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
 #[command(mut_arg("learning_rate", |rate| rate.visible_alias("rate")))]
 pub struct Args {
-    /// A system by name (`lnn systems` lists them) [default: that of the configuration or of the model].
-    #[arg(required_unless_present_any = ["config", "resume", "from"])]
+    /// A system by name (`lnn systems` lists them), or by the file that describes it, FILE.toml [default: that of the
+    /// configuration or of the model].
+    #[arg(required_unless_present_any = ["config", "resume", "from", "named"])]
     system: Option<String>,
+    /// The same as SYSTEM.
+    #[arg(id = "named", long = "system", value_name = "NAME|FILE.toml", conflicts_with = "system")]
+    named: Option<String>,
     /// A configuration that ships with the program [default: quick].
     #[arg(long, value_enum, value_name = "NAME")]
     preset: Option<PresetName>,
@@ -119,16 +127,38 @@ impl Args {
     /// As [`Args::resolve`].
     pub fn resolve_beside(&self, saved: &Config) -> Result<Config, CliError> {
         if self.config.is_some() || self.preset.is_some() || self.from.is_some() {
-            return Ok(self.settle(Some(&saved.system))?.0);
+            return Ok(self.settle(Some(saved))?.0);
         }
-        let system = self.system.clone().unwrap_or_else(|| saved.system.clone());
-        let config = Config { system, ..saved.clone() };
+        let asked = self.asked()?;
+        let mut config = saved.clone();
+        if let Some(asked) = asked {
+            config.system = asked.name;
+            if asked.description.is_some() {
+                config.description = asked.description;
+            }
+        }
         self.changed(config)
     }
 
     /// Files that are read.
     pub fn inputs(&self) -> impl Iterator<Item = &Path> {
-        self.config.iter().map(PathBuf::as_path)
+        let system = self.system_argument().filter(|system| chosen::is_file(system)).map(Path::new);
+        self.config.iter().map(PathBuf::as_path).chain(system)
+    }
+
+    fn system_argument(&self) -> Option<&str> {
+        self.system.as_deref().or(self.named.as_deref())
+    }
+
+    /// The system that the arguments name; whether there is one of this name is found out later.
+    fn asked(&self) -> Result<Option<Named>, CliError> {
+        let Some(argument) = self.system_argument() else { return Ok(None) };
+        if !chosen::is_file(argument) {
+            return Ok(Some(Named { name: argument.to_string(), description: None }));
+        }
+        let system = chosen::system(argument)?;
+        let description = system.described.as_ref().map(|described| described.description.clone());
+        Ok(Some(Named { name: system.name.to_string(), description }))
     }
 
     /// The configuration's system; every value is in range.
@@ -136,7 +166,7 @@ impl Args {
     /// # Errors
     /// Usage errors naming everything that is wrong.
     pub fn check(&self, config: &Config) -> Result<Configured<f64>, CliError> {
-        let system = configure(&config.system, &given(&config.parameters)).map_err(CliError::usage)?;
+        let system = config.system().map_err(CliError::usage)?;
         CliError::all_usage(config.faults(system.coordinates).into_iter().map(|fault| fault.to_string()))?;
         Ok(system)
     }
@@ -150,7 +180,7 @@ impl Args {
         if format == PrintFormat::Markdown {
             return output::print(&configuration_reference());
         }
-        let described = crate::cli::systems::parameters(system.system);
+        let described = crate::cli::systems::parameters(&system.system);
         let remark = |name: &str| {
             let [_, default, unit, range] = described.iter().find(|[symbol, ..]| symbol == name)?;
             let unit = if unit == "1" { String::new() } else { format!(", in {unit}") };
@@ -160,32 +190,42 @@ impl Args {
         output::print(&with_seed(&commented(&TRAINING_SECTIONS, &table, &remark), config.seed))
     }
 
-    /// The configuration that files and arguments come to; `saved` names a system where they do not.
-    fn settle(&self, saved: Option<&str>) -> Result<(Config, Configured<f64>), CliError> {
-        let file = self.config.as_deref().map(ConfigFile::read).transpose()?;
+    /// The configuration that files and arguments come to; `saved` has a system where they name none.
+    fn settle(&self, saved: Option<&Config>) -> Result<(Config, Configured<f64>), CliError> {
+        let mut file = self.config.as_deref().map(ConfigFile::read).transpose()?;
         let from = self.from.clone().or_else(|| file.as_ref()?.text(&["from"]));
         let start = from.as_deref().map(Start::read).transpose()?;
-        let name = self.name(file.as_ref(), start.as_ref(), saved)?;
+        let (Named { name, description }, wrong) = self.named(file.as_mut(), start.as_ref(), saved)?;
+        let system = match &description {
+            Some(description) => description.system().map(Cow::Owned).map_err(Unusable::Description),
+            None => find(&name).map(Cow::Borrowed).map_err(Unusable::System),
+        };
+        let system = wrong.map_or(system, |problem| Err(Unusable::Text(problem)));
+        // Something to tell the types of the other keys by.
+        let usable = match &system {
+            Ok(system) => system.clone(),
+            Err(_) => Cow::Borrowed(find("double-pendulum").map_err(CliError::usage)?),
+        };
         let mut parameters = match &start {
             Some(start) if start.header.system == name => given(&start.header.parameters),
             _ => Vec::new(),
         };
-        let mut mistakes = Vec::new();
+        let mut mistakes: Vec<Mistake> = system.as_ref().err().map(Unusable::mistake).into_iter().collect();
         replace(&mut parameters, &file.as_ref().map(file_parameters).unwrap_or_default());
         // What is wrong in the arguments is not the file's.
-        match configure::<f64>(&name, &self.param) {
-            Err(SystemError::UnknownSystem { .. }) if file.is_some() && self.system.is_none() => {}
-            other => drop(other.map_err(CliError::usage)?),
+        match &system {
+            Ok(system) => drop(configure_system::<f64>(system.clone(), &self.param).map_err(CliError::usage)?),
+            Err(_) if file.is_some() && self.system_argument().is_none() => {}
+            Err(error) => return Err(CliError::usage(error)),
         }
         replace(&mut parameters, &self.param);
-        let (system, known) = match configure::<f64>(&name, &parameters) {
-            Ok(system) => (system, true),
-            Err(error) => {
-                mistakes.extend(wrong_parameters(&name, &parameters, &error));
-                // Something to tell the types of the other keys by.
-                let usual = configure(&name, &self.param).or_else(|_| configure("double-pendulum", &[]));
-                (usual.map_err(CliError::usage)?, false)
+        let (system, known) = match (system, configure_system::<f64>(usable.clone(), &parameters)) {
+            (Ok(_), Ok(system)) => (system, true),
+            (Ok(_), Err(error)) => {
+                mistakes.extend(wrong_parameters(&usable, &parameters, &error));
+                (configure_system(usable, &self.param).map_err(CliError::usage)?, false)
             }
+            (Err(_), _) => (configure_system(usable, &[]).map_err(CliError::usage)?, false),
         };
         let mut config = self.preset_config(&system)?;
         config.parameters = all_parameters(&system);
@@ -207,36 +247,60 @@ impl Args {
             file.check(mistakes)?;
         }
         config.system = name;
+        config.description = description;
         config.from = from;
         let config = self.changed(config)?;
         let system = self.check(&config)?;
         if let Some(start) = &start {
-            let coordinates = (system.system.coordinates)(system.coordinates);
+            let coordinates = system.system.coordinates(system.coordinates);
             start.require(&config, coordinates.iter().map(|c| c.periodic).collect())?;
         }
         Ok((config, system))
     }
 
-    /// Name of the system: the argument's, the file's, the model's or the checkpoint's.
-    fn name(&self, file: Option<&ConfigFile>, start: Option<&Start>, saved: Option<&str>) -> Result<String, CliError> {
-        let in_file = file.and_then(|file| file.text(&["system"]));
-        match (&self.system, in_file) {
-            (Some(asked), Some(found)) if *asked != found => {
-                let place = self.config.as_deref().map(crate::cli::input::name).unwrap_or_default();
-                Err(CliError::usage(format_args!("{place} is about {found:?}, not {asked:?}")))
+    /// The system: the argument's, the file's, the model's or the checkpoint's; and what is wrong with the file's description.
+    fn named(
+        &self,
+        file: Option<&mut ConfigFile>,
+        start: Option<&Start>,
+        saved: Option<&Config>,
+    ) -> Result<(Named, Option<String>), CliError> {
+        let place = || self.config.as_deref().map(crate::cli::input::name).unwrap_or_default();
+        let asked = self.asked()?;
+        let in_file = file.as_ref().and_then(|file| file.text(&["system"]));
+        // A system is taken as a whole, not key by key.
+        let written = file.and_then(|file| file.take("description")).map(Description::deserialize).transpose();
+        let (written, wrong) = match written {
+            Ok(written) => (written, None),
+            Err(error) => (None, Some(plain(error.message()))),
+        };
+        let name = match (&asked, in_file) {
+            (Some(asked), Some(found)) if asked.name != found => {
+                return Err(CliError::usage(format_args!("{} is about {found:?}, not {:?}", place(), asked.name)));
             }
-            (Some(name), _) => Ok(name.clone()),
-            (None, Some(name)) => Ok(name),
+            (Some(asked), _) => asked.name.clone(),
+            (None, Some(name)) => name,
             (None, None) => {
-                let known = start.map(|start| start.header.system.as_str()).or(saved);
-                known.map(str::to_string).ok_or_else(|| {
-                    let place = self.config.as_deref().map(crate::cli::input::name).unwrap_or_default();
-                    CliError::usage(format_args!(
-                        "{place}: system: no system is named, neither here nor as an argument"
-                    ))
-                })
+                let known = start.map(|start| &start.header.system).or(saved.map(|saved| &saved.system));
+                known.cloned().ok_or_else(|| {
+                    let problem = "system: no system is named, neither here nor as an argument";
+                    CliError::usage(format_args!("{}: {problem}", place()))
+                })?
             }
+        };
+        let asked = asked.and_then(|asked| asked.description);
+        if let (Some(asked), Some(written)) = (&asked, &written)
+            && asked != written
+        {
+            let file = self.system_argument().unwrap_or_default();
+            let problem =
+                format!("{} has another description of {name} than {file}: leave one of the two out", place());
+            return Err(CliError::usage(problem));
         }
+        let known = start.and_then(|start| start.header.description.clone());
+        let candidates = [written, known, saved.and_then(|saved| saved.description.clone())];
+        let description = asked.or(candidates.into_iter().flatten().find(|description| description.name == name));
+        Ok((Named { name, description }, wrong))
     }
 
     /// A configuration with the values that arguments name.
@@ -252,8 +316,8 @@ impl Args {
             config.precision = precision.into();
         }
         // Whoever takes the configuration finds out what is wrong with its system.
-        let time = configure::<f64>(&config.system, &given(&config.parameters)).ok().and_then(|system| {
-            let coordinates = (system.system.coordinates)(system.coordinates);
+        let time = config.system().ok().and_then(|system| {
+            let coordinates = system.system.coordinates(system.coordinates);
             coordinates.into_iter().nth(system.system.time_like?).map(|coordinate| coordinate.name)
         });
         self.changes.apply(&mut config, time.as_deref(), "")?;
@@ -268,7 +332,7 @@ impl Args {
             PresetName::Paper => (Preset::Paper, "paper"),
         };
         preset.config(system).ok_or_else(|| {
-            let name = system.system.name;
+            let name = &system.system.name;
             CliError::usage(format_args!("--preset {known}: there is none for {name}, use quick or --config"))
         })
     }
@@ -288,13 +352,39 @@ fn replace(parameters: &mut Vec<(String, String)>, later: &[(String, String)]) {
     parameters.extend_from_slice(later);
 }
 
-/// What is wrong with a system's name or with its parameters, each of them by itself.
-fn wrong_parameters(name: &str, parameters: &[(String, String)], error: &SystemError) -> Vec<Mistake> {
-    if matches!(error, SystemError::UnknownSystem { .. }) {
-        return vec![Mistake::new("system", error)];
+/// The system that is asked for, by name or with its description.
+#[derive(Debug)]
+struct Named {
+    name: String,
+    description: Option<Description>,
+}
+
+/// Why there is no system to train on.
+#[derive(Debug, thiserror::Error)]
+enum Unusable {
+    #[error(transparent)]
+    System(SystemError),
+    #[error("description.{0}")]
+    Description(DescriptionError),
+    #[error("{0}")]
+    Text(String),
+}
+
+impl Unusable {
+    /// As a mistake of a configuration.
+    fn mistake(&self) -> Mistake {
+        match self {
+            Self::System(error) => Mistake::new("system", error),
+            Self::Description(error) => Mistake::new(format!("description.{}", error.key), &error.problem),
+            Self::Text(problem) => Mistake::new("description", problem),
+        }
     }
+}
+
+/// Mistakes in the parameters of a system, each of them by itself.
+fn wrong_parameters(system: &System, parameters: &[(String, String)], error: &SystemError) -> Vec<Mistake> {
     let alone = parameters.iter().filter_map(|one| {
-        let problem = configure::<f64>(name, std::slice::from_ref(one)).err()?;
+        let problem = configure_system::<f64>(Cow::Owned(system.clone()), std::slice::from_ref(one)).err()?;
         Some(Mistake::new(format!("parameters.{}", one.0), problem))
     });
     let found: Vec<Mistake> = alone.collect();
@@ -312,7 +402,7 @@ fn with_periods(file: &ConfigFile, mut config: Config) -> Config {
     config
 }
 
-/// How often checkpoints are written: `10` epochs, `90s`.
+/// Interval of checkpoints: `10` epochs, `90s`.
 pub fn every(text: &str) -> Result<Every, String> {
     match text.trim().strip_suffix('s') {
         Some(seconds) => positive(seconds).map(Every::Seconds),

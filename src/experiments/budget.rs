@@ -1,4 +1,4 @@
-//! How much of the paper's budget an experiment takes.
+//! Shares of the paper's budget that an experiment may take.
 
 use crate::training::Config;
 

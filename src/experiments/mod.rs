@@ -18,7 +18,7 @@ pub use remarks::{Quantity, Reduction};
 use crate::names::unknown;
 use crate::training::Config;
 
-/// What the paper reports for a group of runs, in its own convention.
+/// Figures that the paper reports for a group of runs, in its own convention.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Reported {
     /// Validation loss.
@@ -52,7 +52,7 @@ pub struct Run {
     pub group: String,
     /// Everything that determines it.
     pub config: Config,
-    /// What the paper reports for its row.
+    /// Figures that the paper reports for its row.
     pub reported: Reported,
 }
 
@@ -81,7 +81,7 @@ pub struct Experiment {
     pub title: &'static str,
     /// Figures and tables of the paper that it regenerates, `-` if there are none.
     pub paper: &'static str,
-    /// What the paper found, in a sentence or two.
+    /// The paper's finding, in a sentence or two.
     pub finding: &'static str,
     /// Pictures.
     pub pictures: &'static [Picture],
@@ -124,7 +124,7 @@ pub fn find(name: &str) -> Result<&'static Experiment, String> {
 }
 
 impl Experiment {
-    /// Whether the time of its runs matters: they then run one after the other, each on all threads.
+    /// `true` if the time of its runs matters: they then run one after the other, each on all threads.
     pub fn is_timed(&self) -> bool {
         self.pictures.contains(&Picture::Clock)
     }

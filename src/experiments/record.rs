@@ -1,6 +1,7 @@
-//! What runs came to, and the rows of an experiment's table.
+//! Records of runs, and the rows of an experiment's table.
 
 use super::{Experiment, Reported, Run};
+use crate::analysis::REGULAR;
 use serde::{Deserialize, Serialize};
 
 /// Figures of a learned model.
@@ -24,10 +25,6 @@ pub struct Learned {
     pub integrated: usize,
 }
 
-/// A motion is regular below this logarithm of the factor by which its neighbours part: its Lyapunov time is then above a
-/// fifth of the time span. Those of regular motions of 50 s part by some 50, the span in units of a second.
-const REGULAR: f64 = 5.0;
-
 impl Learned {
     /// Energy errors of the starts whose exact motion is regular, or of the others; without those of which it is not known.
     fn energy_of(&self, regular: bool) -> impl Iterator<Item = f64> {
@@ -38,7 +35,7 @@ impl Learned {
     }
 }
 
-/// What a training came to; kept beside the model as `record.json`.
+/// Outcome of a training; kept beside the model as `record.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", tag = "outcome")]
 pub enum Outcome {
@@ -54,7 +51,7 @@ pub enum Outcome {
 /// A finished run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Record {
-    /// What it came to.
+    /// Its outcome.
     #[serde(flatten)]
     pub outcome: Outcome,
     /// Training and validation loss of every epoch, absent where not finite.
@@ -117,7 +114,7 @@ pub struct Row {
     pub chaotic_energy: Option<Spread>,
     /// Starts integrated to the end, of all.
     pub integrated: (usize, usize),
-    /// What the paper reports.
+    /// The paper's figures.
     pub reported: Reported,
 }
 

@@ -1,4 +1,4 @@
-//! What has to be known to compare a table with the paper's: conventions, and the reductions that the paper states.
+//! Remarks for the comparison of a table with the paper's: conventions, and the reductions that the paper states.
 
 use super::{Experiment, Outcome, Record, Run};
 use crate::training::{Method, Regularizer};
@@ -47,7 +47,7 @@ impl Experiment {
         self.reductions.iter().map(|reduction| (*reduction, reduction.found(results))).collect()
     }
 
-    /// What these runs do differently from the paper, or as its authors' code and not its text, in sentences.
+    /// Differences between these runs and the paper, or its authors' code where that is not its text, in sentences.
     pub fn remarks(&self, runs: &[&Run]) -> Vec<String> {
         let any = |test: fn(&Run) -> bool| runs.iter().any(|run| test(run));
         let mut remarks = Vec::new();

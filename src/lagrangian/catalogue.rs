@@ -1,32 +1,35 @@
 //! The hand-written systems by name: description, Euler-Lagrange terms, closed-form acceleration.
 
-use super::system::{Closed, Size, System};
-use super::{EulerLagrange, HandWritten};
+use super::derivatives::{Need, State, evaluate};
+use super::system::{Closed, Range, Size, System};
+use super::{EulerLagrange, ExpressionLagrangian, HandWritten, Request, Terms};
+use crate::linalg::Workspace;
 use crate::names::unknown;
 use crate::scalar::{Dd, Scalar};
 use std::any::Any;
+use std::borrow::Cow;
 
 /// Why a system could not be built.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SystemError {
     /// No system of this name.
-    #[error("{}", unknown("system", name, known.iter().copied()))]
+    #[error("{}", unknown("system", name, known.iter().map(String::as_str)))]
     UnknownSystem {
         /// The name asked for.
         name: String,
         /// Names there are.
-        known: Vec<&'static str>,
+        known: Vec<String>,
     },
     /// No parameter of this symbol.
-    #[error("{system}: {}", unknown("parameter", symbol, known.iter().copied()))]
+    #[error("{system}: {}", unknown("parameter", symbol, known.iter().map(String::as_str)))]
     UnknownParameter {
         /// The system.
-        system: &'static str,
+        system: String,
         /// The symbol given.
         symbol: String,
         /// Symbols there are.
-        known: Vec<&'static str>,
+        known: Vec<String>,
     },
     /// A parameter given twice.
     #[error("parameter `{symbol}` is given twice")]
@@ -38,10 +41,10 @@ pub enum SystemError {
     #[error("parameter `{symbol}` of {system} must be {demand}, found `{found}`")]
     Value {
         /// The system.
-        system: &'static str,
+        system: String,
         /// The symbol.
-        symbol: &'static str,
-        /// What is allowed.
+        symbol: String,
+        /// The values allowed.
         demand: String,
         /// The text given.
         found: String,
@@ -50,7 +53,7 @@ pub enum SystemError {
     #[error("{system}: expected {expected} coordinates and velocities, found {found}")]
     State {
         /// The system.
-        system: &'static str,
+        system: String,
         /// Number of coordinates.
         expected: usize,
         /// Numbers found.
@@ -65,7 +68,7 @@ pub type Given = [(String, String)];
 #[derive(Clone, Debug)]
 pub struct Configured<S> {
     /// Description.
-    pub system: &'static System,
+    pub system: Cow<'static, System>,
     /// Number of coordinates.
     pub coordinates: usize,
     /// Values in the order of [`System::parameters`].
@@ -77,10 +80,18 @@ macro_rules! catalogue {
     ($($module:ident: $make:expr;)*) => {
         static SYSTEMS: &[System] = &[$(super::systems::$module::SYSTEM),*];
 
+        /// Where each of them stands in [`SYSTEMS`].
+        #[allow(non_camel_case_types)]
+        enum Place { $($module),* }
+
         /// The Euler-Lagrange terms of a configured system.
         fn construct<S: Scalar>(configured: &Configured<S>) -> Option<Box<dyn EulerLagrange<S>>> {
             let n = configured.coordinates;
-            $(if configured.system.name == super::systems::$module::SYSTEM.name {
+            if let Some(described) = &configured.system.described {
+                let parameters = configured.parameters.clone();
+                return Some(Box::new(HandWritten::new(described.lagrangian.clone(), parameters)));
+            }
+            $(if configured.system.name == SYSTEMS[Place::$module as usize].name {
                 let make: fn(usize) -> _ = $make;
                 return Some(Box::new(HandWritten::new(make(n), configured.parameters.clone())));
             })*
@@ -90,7 +101,7 @@ macro_rules! catalogue {
         /// The closed-form acceleration of a configured system.
         fn closed<S: Scalar>(configured: &Configured<S>, q: &[S], v: &[S]) -> Vec<S> {
             let n = configured.coordinates;
-            $(if configured.system.name == super::systems::$module::SYSTEM.name {
+            $(if configured.system.name == SYSTEMS[Place::$module as usize].name {
                 let make: fn(usize) -> _ = $make;
                 return make(n).acceleration(&configured.parameters, q, v);
             })*
@@ -100,7 +111,7 @@ macro_rules! catalogue {
         /// The velocity of the time-like coordinate on the mass shell, if the system has one.
         fn constrained<S: Scalar>(configured: &Configured<S>, q: &[S], v: &[S]) -> Option<S> {
             let n = configured.coordinates;
-            $(if configured.system.name == super::systems::$module::SYSTEM.name {
+            $(if configured.system.name == SYSTEMS[Place::$module as usize].name {
                 let make: fn(usize) -> _ = $make;
                 return make(n).constrained_velocity(&configured.parameters, q, v);
             })*
@@ -167,15 +178,23 @@ pub fn find(name: &str) -> Result<&'static System, SystemError> {
 /// # Errors
 /// [`SystemError`] for an unknown name or symbol, a repeated symbol, a value that is no number or out of range.
 pub fn configure<S: Scalar>(name: &str, given: &Given) -> Result<Configured<S>, SystemError> {
-    let system = find(name)?;
+    configure_system(Cow::Borrowed(find(name)?), given)
+}
+
+/// As [`configure`], for a system at hand: one of the catalogue, or one by its [description](super::Description).
+///
+/// # Errors
+/// [`SystemError`] for an unknown or repeated symbol, a value that is no number or out of range.
+pub fn configure_system<S: Scalar>(system: Cow<'static, System>, given: &Given) -> Result<Configured<S>, SystemError> {
+    let name = || system.name.to_string();
     let count = match system.size {
         Size::Fixed(_) => None,
         Size::Chosen { symbol, .. } => Some(symbol),
     };
     for (i, (symbol, _)) in given.iter().enumerate() {
-        let known = system.parameters.iter().map(|p| p.symbol).chain(count);
+        let known = system.parameters.iter().map(|p| p.symbol.as_ref()).chain(count);
         if !known.clone().any(|k| k == symbol) {
-            let (system, known) = (system.name, known.collect());
+            let (system, known) = (name(), known.map(String::from).collect());
             return Err(SystemError::UnknownParameter { system, symbol: symbol.clone(), known });
         }
         if given[..i].iter().any(|(earlier, _)| earlier == symbol) {
@@ -189,8 +208,8 @@ pub fn configure<S: Scalar>(name: &str, given: &Given) -> Result<Configured<S>, 
             None => default,
             Some(found) => {
                 found.parse().ok().filter(|n| (least..=most).contains(n)).ok_or_else(|| SystemError::Value {
-                    system: system.name,
-                    symbol,
+                    system: name(),
+                    symbol: symbol.into(),
                     demand: format!("an integer from {least} to {most}"),
                     found: found.into(),
                 })?
@@ -198,11 +217,10 @@ pub fn configure<S: Scalar>(name: &str, given: &Given) -> Result<Configured<S>, 
         },
     };
     let mut parameters = Vec::with_capacity(system.parameters.len());
-    for parameter in system.parameters {
-        let found = text(parameter.symbol).unwrap_or(parameter.default);
+    for parameter in system.parameters.iter() {
+        let found = text(&parameter.symbol).unwrap_or(&parameter.default);
         let zero = S::of_f64(0.0);
         let allowed = |value: &S| {
-            use super::system::Range;
             value.is_finite()
                 && match parameter.range {
                     Range::Any => true,
@@ -211,8 +229,8 @@ pub fn configure<S: Scalar>(name: &str, given: &Given) -> Result<Configured<S>, 
                 }
         };
         parameters.push(S::parse(found).filter(allowed).ok_or_else(|| SystemError::Value {
-            system: system.name,
-            symbol: parameter.symbol,
+            system: name(),
+            symbol: parameter.symbol.to_string(),
             demand: parameter.range.text().into(),
             found: found.into(),
         })?);
@@ -243,15 +261,19 @@ impl<S: Scalar> Configured<S> {
     /// [`SystemError::UnknownSystem`] if the description is not of the catalogue or the scalar is none of `f32`, `f64` and
     /// [`Dd`].
     pub fn build(&self) -> Result<Box<dyn EulerLagrange<S>>, SystemError> {
-        construct_once(self).ok_or_else(|| unknown_system(self.system.name))
+        construct_once(self).ok_or_else(|| unknown_system(&self.system.name))
     }
-    /// As [`exact_acceleration`].
+    /// As [`exact_acceleration`]; of a system by its description, for which no closed form is known, by differentiating its
+    /// Lagrangian. `NaN` where the mass matrix is singular.
     ///
     /// # Errors
     /// [`SystemError::State`] for a state of the wrong length.
     pub fn exact_acceleration(&self, q: &[S], v: &[S]) -> Result<Vec<S>, SystemError> {
         self.check_lengths(q, v)?;
-        Ok(closed(self, q, v))
+        Ok(match &self.system.described {
+            Some(described) => differentiated(&described.lagrangian, &self.parameters, q, v),
+            None => closed(self, q, v),
+        })
     }
     /// Index of the coordinate whose velocity the mass shell fixes.
     pub fn constrained_coordinate(&self) -> Option<usize> {
@@ -266,7 +288,11 @@ impl<S: Scalar> Configured<S> {
     /// [`SystemError::State`] for a state of the wrong length.
     pub fn impose_constraint(&self, q: &[S], v: &mut [S]) -> Result<(), SystemError> {
         self.check_lengths(q, v)?;
-        if let (Some(i), Some(velocity)) = (self.constrained_coordinate(), constrained(self, q, v)) {
+        let velocity = match &self.system.described {
+            Some(described) => described.constrained_velocity(&self.parameters, q, v),
+            None => constrained(self, q, v),
+        };
+        if let (Some(i), Some(velocity)) = (self.constrained_coordinate(), velocity) {
             v[i] = velocity;
         }
         Ok(())
@@ -274,14 +300,14 @@ impl<S: Scalar> Configured<S> {
     fn check_lengths(&self, q: &[S], v: &[S]) -> Result<(), SystemError> {
         let expected = self.coordinates;
         match [q, v].into_iter().find(|x| x.len() != expected) {
-            Some(x) => Err(SystemError::State { system: self.system.name, expected, found: x.len() }),
+            Some(x) => Err(SystemError::State { system: self.system.name.to_string(), expected, found: x.len() }),
             None => Ok(()),
         }
     }
     /// Refuses coordinates where the system's chart ends (`r <= 0`, a pole, a horizon); the text says what is demanded.
     ///
     /// # Errors
-    /// What the coordinates must satisfy.
+    /// The condition that the coordinates violate.
     pub fn check_domain(&self, q: &[S]) -> Result<(), &'static str> {
         self.system.domain.map_or(Ok(()), |domain| domain(&leading(&self.parameters), &leading(q)))
     }
@@ -299,12 +325,36 @@ impl<S: Scalar> Configured<S> {
     }
 }
 
+/// The acceleration of one state by the Euler-Lagrange equations of a Lagrangian.
+fn differentiated<S: Scalar>(lagrangian: &ExpressionLagrangian, parameters: &[S], q: &[S], v: &[S]) -> Vec<S> {
+    let mut terms = Terms::default();
+    let (n, need) = (q.len(), Need::of(Request::ACCELERATION));
+    let Terms { lagrangian: value, momentum, dl_dq, mass_matrix, coriolis, .. } = &mut terms;
+    for (field, size) in [(&mut *dl_dq, n), (&mut *mass_matrix, n * n), (&mut *coriolis, n)] {
+        field.resize(size, S::NAN);
+    }
+    evaluate(
+        lagrangian,
+        parameters,
+        q,
+        v,
+        need,
+        &mut State { lagrangian: value, momentum, dl_dq, mass_matrix, coriolis },
+    );
+    // A row that fails has the acceleration NaN, which is what there is to say of one state.
+    let _ = terms.complete(q.len(), v, Request::ACCELERATION, &mut Workspace::new());
+    terms.acceleration
+}
+
 fn leading<S: Scalar>(x: &[S]) -> Vec<f64> {
     x.iter().map(|x| x.to_f64()).collect()
 }
 
 fn unknown_system(name: &str) -> SystemError {
-    SystemError::UnknownSystem { name: name.into(), known: SYSTEMS.iter().map(|system| system.name).collect() }
+    SystemError::UnknownSystem {
+        name: name.into(),
+        known: SYSTEMS.iter().map(|system| system.name.to_string()).collect(),
+    }
 }
 
 #[cfg(test)]
@@ -319,15 +369,15 @@ mod tests {
     fn every_entry_is_complete() {
         for system in systems() {
             let n = system.size.default();
-            let configured = configure::<f64>(system.name, &[]).unwrap();
+            let configured = configure::<f64>(&system.name, &[]).unwrap();
             assert_eq!(configured.build().unwrap().coordinates(), n);
-            assert_eq!((system.coordinates)(n).len(), n);
+            assert_eq!(system.coordinates(n).len(), n);
             assert_eq!((system.columns(n).len(), system.units(n).len()), (2 * n, 2 * n));
-            let start = (system.trajectory)(n).start;
+            let start = system.trajectory(n).start;
             assert_eq!((start.positions.len(), start.velocities.len()), (n, n));
             assert!(start.positions.iter().chain(&start.velocities).all(|b| b.0 <= b.1));
             let fixed = configured.constrained_coordinate();
-            for bounds in [(system.training)(n), (system.validation)(n)] {
+            for bounds in [system.training(n), system.validation(n)] {
                 assert_eq!((bounds.positions.len(), bounds.velocities.len()), (n, n));
                 assert!(bounds.positions.iter().all(|b| b.0 < b.1), "{}", system.name);
                 assert!(bounds.velocities.iter().enumerate().all(|(i, b)| b.0 < b.1 || fixed == Some(i)));
@@ -343,7 +393,7 @@ mod tests {
                     assert!(system.constraint.unwrap().starts_with(&format!("{} = ", system.columns(n)[n + i])));
                 }
             }
-            let middle: Vec<f64> = (system.training)(n).positions.iter().map(|b| 0.4 * b.0 + 0.6 * b.1).collect();
+            let middle: Vec<f64> = system.training(n).positions.iter().map(|b| 0.4 * b.0 + 0.6 * b.1).collect();
             assert_eq!(configured.check_domain(&middle), Ok(()));
         }
         let pendulum = find("double-pendulum").unwrap();
@@ -396,14 +446,14 @@ mod tests {
     fn places_are_finite_and_no_larger_than_the_system() {
         for system in systems() {
             let n = system.size.default();
-            let configured = configure::<f64>(system.name, &[]).unwrap();
-            let bounds = (system.training)(n).positions;
+            let configured = configure::<f64>(&system.name, &[]).unwrap();
+            let bounds = system.training(n).positions;
             let Some(plane) = system.plane else {
                 assert_eq!((n, configured.place(&[0.5])), (1, None), "{}", system.name);
                 continue;
             };
             assert!(plane.labels.iter().all(|label| label.ends_with(" [m]")), "{}", system.name);
-            let size = match system.name {
+            let size = match system.name.as_ref() {
                 "sphere-geodesic" => 1.0,
                 "double-pendulum" | "triple-pendulum" | "n-pendulum" => n as f64,
                 _ => f64::INFINITY,
@@ -432,10 +482,12 @@ mod tests {
         assert!(matches!(error("n-pendulum", &[("N", "3")]), SystemError::UnknownParameter { .. }));
         assert!(matches!(error("double-pendulum", &[("g", "1"), ("g", "2")]), SystemError::Repeated { .. }));
         for bad in ["0", "-1", "nan", "inf", "1e999", "one", ""] {
-            assert!(matches!(error("double-pendulum", &[("m1", bad)]), SystemError::Value { symbol: "m1", .. }));
+            assert!(
+                matches!(error("double-pendulum", &[("m1", bad)]), SystemError::Value { symbol, .. } if symbol == "m1")
+            );
         }
         for bad in ["0", "21", "-1", "2.5", "18446744073709551616"] {
-            assert!(matches!(error("n-pendulum", &[("n", bad)]), SystemError::Value { symbol: "n", .. }));
+            assert!(matches!(error("n-pendulum", &[("n", bad)]), SystemError::Value { symbol, .. } if symbol == "n"));
         }
         assert!(matches!(
             exact_acceleration::<f64>("double-pendulum", &[], &[1.0], &[1.0, 2.0]),

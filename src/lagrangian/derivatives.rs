@@ -73,7 +73,7 @@ pub(super) fn evaluate<L: Lagrangian, R: Real>(
     }
 }
 
-/// Whether a Lagrangian can have `n` coordinates.
+/// `true` if a Lagrangian can have `n` coordinates.
 const fn may_be<L: Lagrangian>(n: usize) -> bool {
     match L::COORDINATES {
         Some(declared) => declared == n,
@@ -81,7 +81,7 @@ const fn may_be<L: Lagrangian>(n: usize) -> bool {
     }
 }
 
-/// Whether a Lagrangian can have more coordinates than jets serve.
+/// `true` if a Lagrangian can have more coordinates than jets serve.
 const fn may_be_large<L: Lagrangian>() -> bool {
     match L::COORDINATES {
         Some(declared) => declared > 4,

@@ -23,7 +23,7 @@ pub struct HandWritten<L, S> {
     evaluator: Evaluator<S>,
 }
 
-/// What is compiled for every Lagrangian apart: its terms state by state, and the recording of its value.
+/// Code that is compiled for every Lagrangian apart: its terms state by state, and the recording of its value.
 trait Form<S>: Send + Sync {
     fn coordinates(&self) -> usize;
     /// Fills the needed fields of a batch, which have their sizes.

@@ -6,13 +6,23 @@
 mod catalogue;
 mod complete;
 mod derivatives;
+mod description;
+mod expression;
+mod expression_lagrangian;
 mod hand_written;
 mod inverse;
 pub mod system;
 pub mod systems;
 mod terms;
 
-pub use catalogue::{Configured, Given, SystemError, build, configure, exact_acceleration, find, systems};
+pub use catalogue::{
+    Configured, Given, SystemError, build, configure, configure_system, exact_acceleration, find, systems,
+};
+pub use description::{
+    CoordinateDescription, Described, Description, DescriptionError, ParameterDescription, TrajectoryDescription,
+};
+pub use expression::{Expression, ExpressionError};
+pub use expression_lagrangian::ExpressionLagrangian;
 pub use hand_written::HandWritten;
 pub use inverse::{InverseDynamics, inverse_dynamics};
 pub use terms::{EulerLagrange, MechanicsError, Request, Terms};

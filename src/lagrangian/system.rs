@@ -1,8 +1,11 @@
-//! What is known about a hand-written system apart from its Lagrangian.
+//! Facts about a hand-written system apart from its Lagrangian.
 
 use super::Lagrangian;
+use super::description::Described;
 use crate::scalar::Real;
+use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
+use std::sync::Arc;
 
 /// A coordinate of a system.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -10,7 +13,7 @@ pub struct Coordinate {
     /// Name, also of its CSV column; the velocity's column is the name and `_dot`.
     pub name: Cow<'static, str>,
     /// Unit of the coordinate; velocities are in this unit per [`System::time_unit`].
-    pub unit: &'static str,
+    pub unit: Cow<'static, str>,
     /// An angle: adding `2 pi` changes nothing.
     pub periodic: bool,
 }
@@ -18,22 +21,26 @@ pub struct Coordinate {
 impl Coordinate {
     /// A periodic angle in radians.
     pub fn angle(name: impl Into<Cow<'static, str>>) -> Self {
-        Self { name: name.into(), unit: "rad", periodic: true }
+        Self { name: name.into(), unit: Cow::Borrowed("rad"), periodic: true }
     }
     /// A length in metres.
     pub fn length(name: impl Into<Cow<'static, str>>) -> Self {
-        Self { name: name.into(), unit: "m", periodic: false }
+        Self { name: name.into(), unit: Cow::Borrowed("m"), periodic: false }
     }
 }
 
 /// Values a parameter may take, besides being finite.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Range {
     /// Any finite number.
+    #[default]
+    #[serde(rename = "any")]
     Any,
     /// Zero or more.
+    #[serde(rename = "at least 0")]
     AtLeastZero,
     /// More than zero.
+    #[serde(rename = "positive")]
     Positive,
 }
 
@@ -49,16 +56,26 @@ impl Range {
 }
 
 /// A physical constant of a system.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Parameter {
     /// The paper's symbol.
-    pub symbol: &'static str,
+    pub symbol: Cow<'static, str>,
     /// Default as decimal text, read in the working precision.
-    pub default: &'static str,
+    pub default: Cow<'static, str>,
     /// Unit.
-    pub unit: &'static str,
+    pub unit: Cow<'static, str>,
     /// Allowed values.
     pub range: Range,
+    /// Whether its value is to be found by the training.
+    pub learn: bool,
+}
+
+impl Parameter {
+    /// A constant whose value is known.
+    pub const fn new(symbol: &'static str, default: &'static str, unit: &'static str, range: Range) -> Self {
+        let (symbol, default, unit) = (Cow::Borrowed(symbol), Cow::Borrowed(default), Cow::Borrowed(unit));
+        Self { symbol, default, unit, range, learn: false }
+    }
 }
 
 /// Number of coordinates of a system.
@@ -133,7 +150,7 @@ pub struct Plane {
 /// Components of a vector at a state, given the parameters.
 pub type Vector = fn(parameters: &[f64], q: &[f64], v: &[f64]) -> Vec<f64>;
 
-/// What exact motion keeps beside its energy.
+/// Quantity that exact motion conserves beside its energy.
 #[derive(Clone, Copy, Debug)]
 pub struct Conserved {
     /// Name, with unit.
@@ -143,45 +160,87 @@ pub struct Conserved {
     pub vector: Vector,
 }
 
-/// Catalogue entry of a system; functions take the number of coordinates.
-#[derive(Clone, Copy, Debug)]
+/// What depends on the number of coordinates of a system.
+#[derive(Clone, Debug)]
+pub enum PerSize<T> {
+    /// For any number of coordinates.
+    Rule(fn(usize) -> T),
+    /// For the one number that the system has.
+    Given(T),
+}
+
+impl<T: Clone> PerSize<T> {
+    /// For `n` coordinates.
+    fn of(&self, n: usize) -> T {
+        match self {
+            Self::Rule(rule) => rule(n),
+            Self::Given(value) => value.clone(),
+        }
+    }
+}
+
+/// What is known about a system: an entry of the catalogue, or a
+/// [description](super::Description) of one's own.
+#[derive(Clone, Debug)]
 pub struct System {
     /// Name on the command line.
-    pub name: &'static str,
+    pub name: Cow<'static, str>,
     /// Name in a title.
-    pub title: &'static str,
+    pub title: Cow<'static, str>,
     /// Number of coordinates.
     pub size: Size,
     /// Coordinates, in order.
-    pub coordinates: fn(usize) -> Vec<Coordinate>,
+    pub coordinates: PerSize<Vec<Coordinate>>,
     /// Constants, in the order the Lagrangian takes them; [`Size::Chosen`] adds one more.
-    pub parameters: &'static [Parameter],
+    pub parameters: Cow<'static, [Parameter]>,
     /// Unit of the evolution parameter: `s`, or `m` for proper time in geometric units (`G = c = 1`, where times and
     /// masses are lengths).
-    pub time_unit: &'static str,
+    pub time_unit: Cow<'static, str>,
     /// The coordinate that is a time (Lorentzian systems).
     pub time_like: Option<usize>,
     /// The mass shell `g(v, v) = -1` solved for the velocity of the time-like coordinate, in words of the columns;
     /// [`Closed::constrained_velocity`] is the formula.
     pub constraint: Option<&'static str>,
     /// Box of the training states.
-    pub training: fn(usize) -> Bounds,
+    pub training: PerSize<Bounds>,
     /// Box of the states on which errors are stated.
-    pub validation: fn(usize) -> Bounds,
+    pub validation: PerSize<Bounds>,
     /// Trajectory test.
-    pub trajectory: fn(usize) -> TrajectoryTest,
+    pub trajectory: PerSize<TrajectoryTest>,
     /// Where the coordinates make sense; the error says what is demanded.
     pub domain: Option<Domain>,
     /// Where it is in a plane; `None` for systems of one coordinate, whose coordinate over time says all.
     pub plane: Option<Plane>,
-    /// What is conserved beside the energy, if anything is.
+    /// Quantity that is conserved beside the energy, if there is one.
     pub conserved: Option<Conserved>,
+    /// The description with its Lagrangian, for a system that is none of the catalogue's.
+    pub described: Option<Arc<Described>>,
 }
 
 impl System {
+    /// Coordinates, in order, of the system of `n` coordinates.
+    pub fn coordinates(&self, n: usize) -> Vec<Coordinate> {
+        self.coordinates.of(n)
+    }
+    /// Box of the training states of `n` coordinates.
+    pub fn training(&self, n: usize) -> Bounds {
+        self.training.of(n)
+    }
+    /// Box of the states of `n` coordinates on which errors are stated.
+    pub fn validation(&self, n: usize) -> Bounds {
+        self.validation.of(n)
+    }
+    /// Trajectory test of `n` coordinates.
+    pub fn trajectory(&self, n: usize) -> TrajectoryTest {
+        self.trajectory.of(n)
+    }
+    /// For every parameter whether its value is to be found by the training.
+    pub fn learned_parameters(&self) -> Vec<bool> {
+        self.parameters.iter().map(|parameter| parameter.learn).collect()
+    }
     /// Names of the columns of a state of `n` coordinates: coordinates, then velocities (`theta1_dot`).
     pub fn columns(&self, n: usize) -> Vec<String> {
-        let coordinates = (self.coordinates)(n);
+        let coordinates = self.coordinates(n);
         let positions = coordinates.iter().map(|c| c.name.to_string());
         positions.chain(coordinates.iter().map(|c| format!("{}_dot", c.name))).collect()
     }
@@ -191,7 +250,7 @@ impl System {
     }
     /// Units of the same columns (`rad`, `rad/s`).
     pub fn units(&self, n: usize) -> Vec<String> {
-        let coordinates = (self.coordinates)(n);
+        let coordinates = self.coordinates(n);
         let positions = coordinates.iter().map(|c| c.unit.to_string());
         positions.chain(coordinates.iter().map(|c| format!("{}/{}", c.unit, self.time_unit))).collect()
     }

@@ -30,7 +30,7 @@ impl Request {
     /// Everything.
     pub const ALL: Self = Self(255);
 
-    /// Whether all of `other` is asked for.
+    /// `true` if all of `other` is asked for.
     #[inline]
     pub const fn includes(self, other: Self) -> bool {
         self.0 & other.0 == other.0
@@ -139,12 +139,12 @@ pub trait EulerLagrange<S: Scalar>: Send + Sync {
     /// mass matrix is singular, and the accelerations of the other rows are right; those of failed rows are `NaN`.
     fn terms(&self, q: &[S], v: &[S], request: Request, terms: &mut Terms<S>) -> Result<(), MechanicsError>;
 
-    /// Whether the motion keeps the energy `E = p.v - L`: no friction, no other force beside those of `L`.
+    /// `true` if the motion keeps the energy `E = p.v - L`: no friction, no other force beside those of `L`.
     fn conserves_energy(&self) -> bool {
         true
     }
 
-    /// Whether several states at once take much less time per state than one, by more than threads need to meet.
+    /// `true` if several states at once take much less time per state than one, by more than threads need to meet.
     fn prefers_batches(&self) -> bool {
         false
     }

@@ -14,7 +14,7 @@ pub(super) type Lane<S, const W: usize> = [S; W];
 pub struct Workspace<S> {
     /// A block of matrices too large for the stack.
     pub(super) block: Buffer<S>,
-    /// What the second look at a block needs.
+    /// Scratch of the second look at a block.
     pub(super) second: Second<S>,
     /// Scratch of determinants.
     pub(super) minors: Minors<S>,

@@ -24,7 +24,7 @@ pub(super) fn condition_2<S: Scalar>(n: usize, matrix: &[S], scratch: &mut Dense
     if least > <S as Real>::zero() { (most / least).to_f64() } else { f64::INFINITY }
 }
 
-/// Whether a finite symmetric matrix has a condition number above `1/eps`, as given and scaled to rows of size 1
+/// `true` if a finite symmetric matrix has a condition number above `1/eps`, as given and scaled to rows of size 1
 /// (Bunch 1971).
 ///
 /// The scaling is by powers of two on both sides: a choice of units cannot make a matrix singular. It may spoil a
@@ -97,7 +97,7 @@ impl<S: Scalar> Dense<S> {
         true
     }
 
-    /// Whether `|A|_F |A^-1|_F` of the loaded matrix is below `1/eps` by a factor of four, room for rounding.
+    /// `true` if `|A|_F |A^-1|_F` of the loaded matrix is below `1/eps` by a factor of four, room for rounding.
     ///
     /// The columns of the inverse are spread over the lanes.
     fn bounded(&mut self, n: usize) -> bool {

@@ -3,7 +3,7 @@
 use super::batch::{Lane, across, rows, select};
 use crate::scalar::{Real, Scalar};
 
-/// What the elimination saw of each matrix.
+/// Pivots of the elimination of each matrix.
 pub(super) struct Pivots<S, const W: usize> {
     /// Smallest pivot, absolutely.
     pub smallest: Lane<S, W>,

@@ -1,4 +1,4 @@
-//! What can go wrong with a batch of matrices, and how a row fails.
+//! Errors of a batch of matrices, and the failure of a row.
 
 /// Why one matrix of a batch gave no answer.
 #[derive(Clone, Copy, Debug, PartialEq)]

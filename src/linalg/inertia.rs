@@ -3,7 +3,7 @@
 use super::error::{LinalgError, expect_length};
 use crate::scalar::{Real, Scalar};
 
-/// How many eigenvalues are positive, zero and negative (Sylvester's law: invariant under congruence).
+/// Numbers of positive, zero and negative eigenvalues (Sylvester's law: invariant under congruence).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Inertia {
     /// Positive eigenvalues.
@@ -14,7 +14,7 @@ pub struct Inertia {
     pub negative: usize,
 }
 
-/// Whether every pivot of `M = L D L^T` without exchanges is positive.
+/// `true` if every pivot of `M = L D L^T` without exchanges is positive.
 ///
 /// `scratch` holds `n^2` numbers. Wrong only where an eigenvalue is within rounding of zero; `false` for `NaN`.
 pub fn is_positive_definite<S: Scalar>(n: usize, matrix: &[S], scratch: &mut [S]) -> bool {

@@ -14,7 +14,7 @@ const SWEEPS: usize = 40;
 /// Eigenvalues, ascending, and eigenvectors as rows (if `vectors` is not empty) of the matrices `start..end` of a
 /// batch in blocks of `W`; the upper triangle is read.
 ///
-/// Whether all is finite; the eigenvalues of a matrix that is not are `NaN`.
+/// The result is `true` if all is finite; the eigenvalues of a matrix that is not are `NaN`.
 pub(super) fn decompose<S: Scalar, const W: usize>(
     n: usize,
     matrices: &[S],

@@ -7,7 +7,7 @@ use faer::{MatRef, Side};
 /// Size above which faer's tridiagonal method beats Jacobi on lanes.
 const EIGEN: usize = 32;
 
-/// Whether faer has an eigensolver for this scalar and this size.
+/// `true` if faer has an eigensolver for this scalar and this size.
 pub(super) fn serves<S: Scalar>(n: usize) -> bool {
     n > EIGEN && !matches!(S::slice(&[]), Slice::Other(_))
 }

@@ -1,4 +1,4 @@
-//! What the columns of recorded files mean.
+//! Meaning of the columns of recorded files.
 
 use crate::names::counted;
 use crate::names::unknown;
@@ -110,14 +110,14 @@ impl Columns {
                 return wrong(format!("units: {}", unknown("column", name, known().collect::<Vec<_>>())));
             }
             if self.units[..k].iter().any(|(earlier, _)| earlier == name) {
-                return wrong(format!("units: column {name} is there twice"));
+                return wrong(format!("units: duplicate column {name}"));
             }
             factor(unit).map_err(|problem| ColumnsError(format!("units: {name}: {problem}")))?;
         }
         if let Some(names) = &self.names
             && let Some((k, name)) = names.iter().enumerate().find(|(k, name)| names[..*k].contains(name))
         {
-            return wrong(format!("columns: {name} is there twice, at position {} again", k + 1));
+            return wrong(format!("columns: duplicate name {name}, at position {} again", k + 1));
         }
         Ok(())
     }

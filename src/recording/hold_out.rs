@@ -12,7 +12,7 @@ use thiserror::Error;
 /// Stream of the generator that chooses trajectories; those of training are numbered from 0.
 const STREAM: u64 = 8;
 
-/// What is held out of a recording for validation.
+/// Part of a recording that is held out for validation.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum HeldOut {

@@ -65,7 +65,7 @@ pub struct Dropped {
 /// A recording and where it comes from.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reading {
-    /// What was recorded, in SI.
+    /// Recorded motion, in SI.
     pub recording: Recording,
     /// Rows of the samples of every trajectory.
     pub rows: Vec<Rows>,

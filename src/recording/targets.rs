@@ -1,11 +1,11 @@
-//! What there is to learn from in recorded motion.
+//! Targets of learning in recorded motion.
 
 use serde::{Deserialize, Serialize};
 
 /// Relative error of accelerations by smoothing above which the motion itself is the better teacher.
 pub const LARGE_ERROR: f64 = 0.1;
 
-/// What a network learns from.
+/// Quantity that a network learns from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Targets {

@@ -71,7 +71,7 @@ impl Track {
         self.times.len()
     }
 
-    /// Whether there is no sample.
+    /// `true` if there is no sample.
     pub fn is_empty(&self) -> bool {
         self.times.is_empty()
     }
@@ -112,12 +112,12 @@ impl Recording {
         self.coordinates.len()
     }
 
-    /// Whether every trajectory has measured velocities.
+    /// `true` if every trajectory has measured velocities.
     pub fn has_velocities(&self) -> bool {
         !self.tracks.is_empty() && self.tracks.iter().all(|track| !track.v.is_empty())
     }
 
-    /// Whether every trajectory has measured accelerations.
+    /// `true` if every trajectory has measured accelerations.
     pub fn has_accelerations(&self) -> bool {
         !self.tracks.is_empty() && self.tracks.iter().all(|track| !track.a.is_empty())
     }

@@ -34,7 +34,7 @@ const UNITS: [(&str, f64); 22] = [
 /// `mm/s2`), or the factor itself.
 ///
 /// # Errors
-/// What was expected instead.
+/// A description of what was expected.
 pub fn factor(text: &str) -> Result<f64, String> {
     let text = text.trim();
     if let Ok(x) = text.parse::<f64>() {

@@ -1,31 +1,56 @@
 //! Tables and pictures of an experiment: the paper's figures beside ours.
 
-use super::{Figure, LinePlot, PlotError, Series, line_png};
+use super::{Figure, LinePlot, Series, kept, line_plot};
 use crate::experiments::{Experiment, Outcome, Picture, Record, Reduction, Row, Run, Spread};
+use crate::names::rounded;
 
-/// Header of [`experiment_table`].
-pub const EXPERIMENT_HEADER: [&str; 13] = [
+/// Header of [`experiment_table`]: names of columns in files, of our figures and of the paper's beside them.
+pub const EXPERIMENT_HEADER: [&str; 16] = [
     "run",
     "runs",
     "loss",
-    "paper",
+    "loss paper",
     "instability",
-    "paper",
+    "instability paper",
+    "energy error",
+    "energy error paper",
+    "of regular motions",
+    "of regular motions paper",
+    "of chaotic motions",
+    "of chaotic motions paper",
+    "integrated",
+    "wrong signature",
     "physical loss",
     "physical instability",
-    "wrong signature",
+];
+
+/// The same for people, with units.
+const VIEW_HEADER: [&str; 16] = [
+    "run",
+    "runs",
+    "loss here [1]",
+    "loss paper [1]",
+    "instability here [1]",
+    "instability paper [1]",
+    "energy error here [%]",
+    "energy error paper [%]",
+    "regular motions here [%]",
+    "regular motions paper [%]",
+    "chaotic motions here [%]",
+    "chaotic motions paper [%]",
     "integrated",
-    "energy error",
-    "of regular motions",
-    "of chaotic motions",
+    "wrong signature [%]",
+    "physical loss [SI]",
+    "physical instability [SI]",
 ];
 
 /// Header of [`reduction_table`].
-pub const REDUCTION_HEADER: [&str; 5] = ["reduction of", "by", "against", "here", "paper"];
+pub const REDUCTION_HEADER: [&str; 5] = ["reduction of", "by", "against", "here [%]", "paper [%]"];
 
 /// The reductions that the paper states beside those of these runs, below [`REDUCTION_HEADER`].
 pub fn reduction_table(reductions: &[(Reduction, Option<f64>)]) -> Vec<Vec<String>> {
-    let percent = |x: f64| format!("{:.1} %", 100.0 * x);
+    // Adding 0 turns -0 into 0.
+    let percent = |x: f64| format!("{:.1}", (1e3 * x).round() / 10.0 + 0.0);
     let row = |(reduction, found): &(Reduction, Option<f64>)| {
         let Reduction { quantity, group, against, paper } = reduction;
         let found = found.map_or_else(|| "-".to_string(), percent);
@@ -34,65 +59,75 @@ pub fn reduction_table(reductions: &[(Reduction, Option<f64>)]) -> Vec<Vec<Strin
     reductions.iter().map(row).collect()
 }
 
-/// A spread as `mean [low, high]`, or the value alone where there is no spread.
-fn spread(value: Option<Spread>) -> String {
-    value.map_or_else(
-        || "-".to_string(),
-        |s| {
-            if s.low == s.high {
-                number(s.mean)
-            } else {
-                format!("{} [{}, {}]", number(s.mean), number(s.low), number(s.high))
-            }
-        },
-    )
+/// Stands where there is no figure.
+const NONE: &str = "-";
+
+/// A figure of a table: so many times as large, with so many digits.
+#[derive(Clone, Copy)]
+struct Figures {
+    /// Of a fraction.
+    fraction: f64,
+    /// Significant digits.
+    digits: usize,
 }
 
-/// Four significant digits.
-fn number(x: f64) -> String {
-    if x == 0.0 || (1e-3..1e4).contains(&x.abs()) {
-        let digits = if x == 0.0 { 0 } else { (3 - x.abs().log10().floor() as i32).max(0) as usize };
-        format!("{x:.digits$}")
-    } else {
-        format!("{x:.3e}")
+impl Figures {
+    fn one(self, x: Option<f64>, factor: f64) -> String {
+        x.map_or_else(|| NONE.to_string(), |x| rounded(factor * x, self.digits))
+    }
+
+    /// A spread as `mean [low, high]`, or the value alone where there is no spread.
+    fn spread(self, value: Option<Spread>, factor: f64) -> String {
+        let Some(Spread { mean, low, high }) = value else { return NONE.to_string() };
+        let [mean, low, high] = [mean, low, high].map(|x| (x, self.one(Some(x), factor)));
+        if low.0 == high.0 { mean.1 } else { format!("{} [{}, {}]", mean.1, low.1, high.1) }
+    }
+
+    fn row(self, row: &Row) -> Vec<String> {
+        let runs = if row.failed == 0 { row.runs.to_string() } else { format!("{} ({} failed)", row.runs, row.failed) };
+        let reported = row.reported;
+        vec![
+            row.label.clone(),
+            runs,
+            self.spread(row.loss, 1.0),
+            self.one(reported.loss, 1.0),
+            self.spread(row.instability, 1.0),
+            self.one(reported.instability, 1.0),
+            self.spread(row.energy, self.fraction),
+            self.one(reported.energy, self.fraction),
+            self.spread(row.regular_energy, self.fraction),
+            self.one(reported.regular_energy, self.fraction),
+            self.spread(row.chaotic_energy, self.fraction),
+            self.one(reported.chaotic_energy, self.fraction),
+            format!("{}/{}", row.integrated.0, row.integrated.1),
+            self.spread(row.wrong_signature, self.fraction),
+            self.spread(row.normalised_loss, 1.0),
+            self.spread(row.normalised_instability, 1.0),
+        ]
     }
 }
 
 /// Rows of the paper's table beside ours, below [`EXPERIMENT_HEADER`]; losses and instabilities in the paper's convention,
-/// the mean over the runs with the lowest and the highest.
+/// errors and wrong signatures as fractions, the mean over the runs with the lowest and the highest.
 pub fn experiment_table(rows: &[Row]) -> Vec<Vec<String>> {
-    rows.iter()
-        .map(|row| {
-            let reported = |value: Option<f64>| value.map_or_else(|| "-".to_string(), number);
-            let runs =
-                if row.failed == 0 { row.runs.to_string() } else { format!("{} ({} failed)", row.runs, row.failed) };
-            let energy = |own: Option<Spread>, paper: Option<f64>| match paper {
-                Some(paper) => format!("{} (paper {})", spread(own), number(paper)),
-                None => spread(own),
-            };
-            vec![
-                row.label.clone(),
-                runs,
-                spread(row.loss),
-                reported(row.reported.loss),
-                spread(row.instability),
-                reported(row.reported.instability),
-                spread(row.normalised_loss),
-                spread(row.normalised_instability),
-                spread(row.wrong_signature),
-                format!("{}/{}", row.integrated.0, row.integrated.1),
-                energy(row.energy, row.reported.energy),
-                energy(row.regular_energy, row.reported.regular_energy),
-                energy(row.chaotic_energy, row.reported.chaotic_energy),
-            ]
-        })
-        .collect()
+    rows.iter().map(|row| Figures { fraction: 1.0, digits: 4 }.row(row)).collect()
+}
+
+/// The same for people, with its header: fractions in per cent, three digits; no column without a figure, neither of ours nor
+/// of the paper's beside it.
+pub fn experiment_view(rows: &[Row]) -> (Vec<&'static str>, Vec<Vec<String>>) {
+    let all: Vec<Vec<String>> = rows.iter().map(|row| Figures { fraction: 100.0, digits: 3 }.row(row)).collect();
+    let told = |k: usize| all.iter().any(|row| row[k] != NONE);
+    let beside = |k: usize| VIEW_HEADER[k].contains(" here ") && told(k + 1);
+    let shown: Vec<usize> = (0..VIEW_HEADER.len()).filter(|&k| told(k) || beside(k)).collect();
+    let pick = |row: &Vec<String>| shown.iter().map(|&k| row[k].clone()).collect();
+    (shown.iter().map(|&k| VIEW_HEADER[k]).collect(), all.iter().map(pick).collect())
 }
 
 /// Validation loss against seconds of training.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Curve {
-    /// What it is of.
+    /// Name of the curve.
     pub label: String,
     /// Seconds and loss, paper convention.
     pub points: Vec<(f64, f64)>,
@@ -123,22 +158,10 @@ fn reached(curves: &[Curve]) -> Vec<Series> {
 }
 
 /// Pictures of an experiment from its finished runs, and `curves` where time matters; what has nothing to show is left out.
-///
-/// # Errors
-/// [`PlotError::Renderer`] if the renderer fails.
-pub fn experiment_figures(
-    experiment: &Experiment,
-    results: &[(Run, Option<Record>)],
-    curves: &[Curve],
-) -> Result<Vec<Figure>, PlotError> {
+pub fn experiment_figures(experiment: &Experiment, results: &[(Run, Option<Record>)], curves: &[Curve]) -> Vec<Figure> {
     let mut figures = Vec::new();
-    let mut add = |file: &str, caption: String, plot: LinePlot| match line_png(&plot) {
-        Ok(png) => {
-            figures.push(Figure { file: format!("{file}.png"), png, caption });
-            Ok(())
-        }
-        Err(PlotError::Empty(_)) => Ok(()),
-        Err(error) => Err(error),
+    let mut add = |file: &str, caption: String, plot: LinePlot| {
+        figures.extend(kept(&format!("{file}.svg"), line_plot(&plot), caption));
     };
     for (part, word) in [(0, "training"), (1, "validation")] {
         add(
@@ -150,8 +173,10 @@ pub fn experiment_figures(
                 y_label: "loss".into(),
                 log_y: true,
                 series: loss_curves(results, part),
+                turn: None,
+                level: None,
             },
-        )?;
+        );
     }
     for picture in experiment.pictures {
         match picture {
@@ -166,8 +191,10 @@ pub fn experiment_figures(
                     y_label: "lowest validation loss".into(),
                     log_y: true,
                     series: scan(results),
+                    turn: None,
+                    level: None,
                 },
-            )?,
+            ),
             Picture::TradeOff => add(
                 "trade_off",
                 "Lowest validation loss against training instability, one point per run; lower left is better.".into(),
@@ -177,8 +204,10 @@ pub fn experiment_figures(
                     y_label: "lowest validation loss".into(),
                     log_y: true,
                     series: trade_off(results),
+                    turn: None,
+                    level: None,
                 },
-            )?,
+            ),
             Picture::Clock => add(
                 "time_to_accuracy",
                 "Lowest validation loss so far against seconds of training, paper convention.".into(),
@@ -188,12 +217,14 @@ pub fn experiment_figures(
                     y_label: "lowest validation loss".into(),
                     log_y: true,
                     series: reached(curves),
+                    turn: None,
+                    level: None,
                 },
-            )?,
+            ),
             Picture::Evaluation(_) => {}
         }
     }
-    Ok(figures)
+    figures
 }
 
 /// Groups in the order of first appearance with their records.
@@ -274,4 +305,45 @@ fn trade_off(results: &[(Run, Option<Record>)]) -> Vec<Series> {
             Series { name: name.to_string(), points: points.collect(), over: false }
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::experiments::Reported;
+
+    #[test]
+    fn our_figures_and_the_papers_stand_side_by_side() {
+        let spread = |mean: f64, by: f64| Some(Spread { mean, low: mean - by, high: mean + by });
+        let row = Row {
+            label: "triple-pendulum".into(),
+            runs: 3,
+            failed: 0,
+            loss: spread(0.0123456, 0.001),
+            instability: None,
+            normalised_loss: None,
+            normalised_instability: None,
+            wrong_signature: spread(0.0, 0.0),
+            energy: spread(0.05, 0.0),
+            regular_energy: spread(4.6e-4, 0.0),
+            chaotic_energy: spread(0.0029, 0.0),
+            integrated: (12, 12),
+            reported: Reported {
+                loss: Some(0.01972),
+                instability: None,
+                energy: None,
+                regular_energy: Some(0.0058),
+                chaotic_energy: Some(0.19),
+            },
+        };
+        let (header, rows) = experiment_view(std::slice::from_ref(&row));
+        let at = |name: &str| rows[0][header.iter().position(|h| *h == name).unwrap()].as_str();
+        assert_eq!((at("loss here [1]"), at("loss paper [1]")), ("0.0123 [0.0113, 0.0133]", "0.0197"));
+        assert_eq!((at("regular motions here [%]"), at("regular motions paper [%]")), ("0.0460", "0.580"));
+        assert_eq!((at("chaotic motions here [%]"), at("chaotic motions paper [%]")), ("0.290", "19.0"));
+        // Columns of nothing are left out, for people only.
+        assert!(!header.iter().any(|name| name.contains("instability") || *name == "energy error paper [%]"));
+        let file = experiment_table(&[row]);
+        assert_eq!((file[0].len(), file[0][8].as_str(), file[0][9].as_str()), (16, "0.0004600", "0.005800"));
+    }
 }

@@ -1,9 +1,9 @@
 //! Pictures of learned and exact functions on a grid.
 
-use super::{Figure, HeatMap, PlotError, heat_maps_png};
+use super::{Figure, HeatMap, PlotError, heat_maps};
 use crate::analysis::{AffineFit, Grid, affine_fit, factor_fit};
 
-/// What a learned quantity is free of.
+/// Transformation up to which a learned quantity is determined.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fit {
     /// Nothing: as it is.
@@ -29,11 +29,11 @@ pub struct GridComparison {
     pub exact: Grid,
     /// Learned values.
     pub learned: Grid,
-    /// What is fixed on the grid, in words (`v = 0 m/s`); may be empty.
+    /// Components that are fixed on the grid, in words (`v = 0 m/s`); may be empty.
     pub fixed: String,
     /// Up to what the two are compared.
     pub fit: Fit,
-    /// Whether to count and mark points where the learned value has the wrong sign, before any fit.
+    /// `true` to count and mark points where the learned value has the wrong sign, before any fit.
     pub signs: bool,
 }
 
@@ -43,7 +43,7 @@ pub struct GridComparison {
 /// too.
 ///
 /// # Errors
-/// [`PlotError`] if a grid has no finite value, the grids differ in size, or the renderer fails.
+/// [`PlotError`] if a grid has no finite value or the grids differ in size.
 pub fn grid_figures(comparison: &GridComparison) -> Result<(Figure, Option<AffineFit>), PlotError> {
     let quantity = &comparison.quantity;
     let empty = || PlotError::Empty(quantity.clone());
@@ -83,7 +83,7 @@ pub fn grid_figures(comparison: &GridComparison) -> Result<(Figure, Option<Affin
         diverging,
         marks,
     };
-    let png = heat_maps_png(&[
+    let picture = heat_maps(&[
         map(format!("{quantity} exact"), comparison.exact.clone(), Some((low, high)), false, Vec::new()),
         map(learned_title, learned, Some((low, high)), false, marks),
         map("learned \u{2212} exact".into(), difference, None, true, Vec::new()),
@@ -103,7 +103,7 @@ pub fn grid_figures(comparison: &GridComparison) -> Result<(Figure, Option<Affin
         (None, _) => String::new(),
     };
     let caption = format!("{quantity}{fixed}: exact, {learned}, and the difference.{signs}");
-    Ok((Figure { file: format!("{}.png", comparison.file), png, caption }, fit))
+    Ok((Figure { file: format!("{}.svg", comparison.file), picture, caption }, fit))
 }
 
 #[cfg(test)]

@@ -1,12 +1,15 @@
 //! One self-contained HTML page.
 
+use super::Figure;
+use super::base64::base64;
+use super::escape::escape;
 use std::fmt::Write as _;
 
 const STYLE: &str = "\
 :root{color-scheme:light dark;--text:#1c2330;--muted:#5b6472;--page:#ffffff;--line:#d9dee6;--head:#f2f5f9}
 @media (prefers-color-scheme:dark){:root{--text:#e4e8ee;--muted:#9aa5b4;--page:#14181f;--line:#333b47;--head:#1d232c}}
 *{box-sizing:border-box}
-body{margin:0 auto;padding:2.5rem 1.25rem 4rem;max-width:62rem;background:var(--page);color:var(--text);\
+body{margin:0 auto;padding:2.5rem 1.25rem 4rem;max-width:67rem;background:var(--page);color:var(--text);\
 font:16px/1.55 system-ui,-apple-system,\"Segoe UI\",Roboto,sans-serif}
 h1{font-size:1.9rem;line-height:1.2;margin:0 0 1rem}
 h2{font-size:1.3rem;margin:2.5rem 0 .75rem;padding-bottom:.3rem;border-bottom:1px solid var(--line)}
@@ -16,9 +19,19 @@ table{border-collapse:collapse;font-variant-numeric:tabular-nums;font-size:.93re
 th,td{padding:.4rem .8rem;border-bottom:1px solid var(--line);text-align:left;white-space:nowrap}
 th{background:var(--head);font-weight:600}
 td.number{text-align:right}
-figure{margin:1.75rem 0}
-figure img{display:block;max-width:100%;height:auto;background:#fff;border:1px solid var(--line);border-radius:6px}
-figcaption{margin-top:.5rem;color:var(--muted);font-size:.92rem}
+p.lead{font-size:1.12rem}
+table.short{margin:1rem 0}
+table.short th{background:none;font-weight:400;color:var(--muted);padding-left:0}
+table.short th,table.short td{white-space:normal;vertical-align:top}
+.figures{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,24rem),1fr));gap:1.5rem 1.2rem;margin:1.2rem 0}
+figure{margin:0;min-width:0}
+figure.wide{grid-column:1/-1}
+.panels{display:flex;flex-wrap:wrap;gap:.5rem}
+.panels svg{display:block;max-width:100%;height:auto;border:1px solid var(--line);border-radius:4px}
+figure img{display:block;max-width:100%;height:auto;border:1px solid var(--line);border-radius:4px}
+img.panels{min-width:40rem}
+figcaption{margin-top:.4rem;color:var(--muted);font-size:.88rem;line-height:1.4}
+@media (max-width:40rem){body{padding:1.2rem 1rem 2rem}h1{font-size:1.5rem}th,td{padding:.35rem .5rem}}
 pre{overflow-x:auto;padding:.8rem 1rem;background:var(--head);border:1px solid var(--line);border-radius:6px;font-size:.85rem}
 ";
 
@@ -74,7 +87,7 @@ impl Report {
             self.body.push_str("<tr>");
             for cell in row {
                 let cell = cell.as_ref();
-                let class = if cell.parse::<f64>().is_ok() { " class=\"number\"" } else { "" };
+                let class = if cell.trim_end_matches('+').parse::<f64>().is_ok() { " class=\"number\"" } else { "" };
                 let _ = write!(self.body, "<td{class}>{}</td>", escape(cell));
             }
             self.body.push_str("</tr>\n");
@@ -83,15 +96,46 @@ impl Report {
         self
     }
 
-    /// Adds a picture from PNG bytes.
+    /// Adds pictures, beside each other where there is room; those of several panels have a row of their own.
     #[must_use]
-    pub fn figure(mut self, png: &[u8], caption: &str) -> Self {
-        let caption = escape(caption);
-        let data = base64(png);
+    pub fn figures<'a>(mut self, figures: impl IntoIterator<Item = &'a Figure>) -> Self {
+        self.body.push_str("<div class=\"figures\">\n");
+        for Figure { picture, caption, .. } in figures {
+            let class = if picture.panels() > 1 { " class=\"wide\"" } else { "" };
+            let (panels, caption) = (picture.to_html(caption), escape(caption));
+            let _ = writeln!(
+                self.body,
+                "<figure{class}><div class=\"panels\">{panels}</div><figcaption>{caption}</figcaption></figure>"
+            );
+        }
+        self.body.push_str("</div>\n");
+        self
+    }
+
+    /// Adds a picture from the bytes of an SVG file, which can do nothing but be seen.
+    #[must_use]
+    pub fn image(mut self, svg: &[u8], caption: &str) -> Self {
+        let (data, caption) = (base64(svg), escape(caption));
+        // Panels that cannot wrap are scrolled where there is no room for them.
+        let panels = svg.windows(8).filter(|bytes| bytes == b"\n<svg x=").count();
+        let class = if panels > 1 { " class=\"panels\"" } else { "" };
         let _ = writeln!(
             self.body,
-            "<figure><img alt=\"{caption}\" src=\"data:image/png;base64,{data}\"><figcaption>{caption}</figcaption></figure>"
+            "<figure><div class=\"scroll\"><img{class} alt=\"{caption}\" src=\"data:image/svg+xml;base64,{data}\"></div>\
+             <figcaption>{caption}</figcaption></figure>"
         );
+        self
+    }
+
+    /// Adds what matters most: a sentence and a short table of what and how much.
+    #[must_use]
+    pub fn summary(mut self, sentence: &str, rows: &[[String; 2]]) -> Self {
+        let _ = writeln!(self.body, "<p class=\"lead\">{}</p>", escape(sentence));
+        self.body.push_str("<table class=\"short\"><tbody>\n");
+        for [what, value] in rows {
+            let _ = writeln!(self.body, "<tr><th scope=\"row\">{}</th><td>{}</td></tr>", escape(what), escape(value));
+        }
+        self.body.push_str("</tbody></table>\n");
         self
     }
 
@@ -107,66 +151,38 @@ impl Report {
     }
 }
 
-/// Text with the characters that mean something in HTML replaced; control characters that HTML forbids are dropped.
-fn escape(text: &str) -> String {
-    let mut escaped = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '&' => escaped.push_str("&amp;"),
-            '<' => escaped.push_str("&lt;"),
-            '>' => escaped.push_str("&gt;"),
-            '"' => escaped.push_str("&quot;"),
-            '\'' => escaped.push_str("&#39;"),
-            c if c.is_control() && !"\n\r\t".contains(c) => {}
-            c => escaped.push(c),
-        }
-    }
-    escaped
-}
-
-/// Base64 with padding (RFC 4648, section 4).
-fn base64(bytes: &[u8]) -> String {
-    const ALPHABET: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
-    for chunk in bytes.chunks(3) {
-        let byte = |i: usize| u32::from(chunk.get(i).copied().unwrap_or(0));
-        let bits = byte(0) << 16 | byte(1) << 8 | byte(2);
-        for place in 0..4 {
-            if place <= chunk.len() {
-                text.push(char::from(ALPHABET[(bits >> (18 - 6 * place) & 63) as usize]));
-            } else {
-                text.push('=');
-            }
-        }
-    }
-    text
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn base64_of_the_standard() {
-        for (plain, coded) in [("", ""), ("f", "Zg=="), ("fo", "Zm8="), ("foo", "Zm9v"), ("foobar", "Zm9vYmFy")] {
-            assert_eq!(base64(plain.as_bytes()), coded);
-        }
-        assert_eq!(base64(&[0xff, 0xfe, 0xfd]), "//79");
-    }
+    use crate::report::{LinePlot, Series, line_plot};
 
     #[test]
     fn everything_is_escaped_and_nothing_external() {
         let evil = "<script>alert('1' & \"2\")</script>\u{0}";
+        let plot = LinePlot {
+            title: evil.into(),
+            x_label: evil.into(),
+            y_label: evil.into(),
+            log_y: false,
+            series: vec![Series::new(evil, &[0.0, 1.0], &[0.0, 1.0])],
+            turn: None,
+            level: None,
+        };
+        let figure = Figure { file: String::new(), picture: line_plot(&plot).unwrap(), caption: evil.into() };
         let html = Report::new(evil)
             .heading(evil)
             .paragraph(evil)
             .preformatted(evil)
             .table(&[evil], &[vec![evil, "1.5e-3"]])
-            .figure(&[1, 2, 3], evil)
+            .summary(evil, &[[evil.to_string(), evil.to_string()]])
+            .image(&[1, 2, 3], evil)
+            .figures(&[figure])
             .to_html();
         assert!(!html.contains("<script") && !html.contains("http") && !html.contains('\u{0}'));
-        assert_eq!(html.matches("&lt;script&gt;alert(&#39;1&#39; &amp; &quot;2&quot;)&lt;/script&gt;").count(), 9);
-        assert!(html.contains("data:image/png;base64,AQID\""));
+        // Title, header of the page, heading, paragraph, preformatted, two cells; sentence and two cells; two of the image; the
+        // figure: description, caption, title, two labels.
+        assert_eq!(html.matches("&lt;script&gt;alert(&#39;1&#39; &amp; &quot;2&quot;)&lt;/script&gt;").count(), 17);
+        assert!(html.contains("data:image/svg+xml;base64,AQID\""));
         assert!(html.contains("<td class=\"number\">1.5e-3</td>"));
         assert!(html.contains("prefers-color-scheme:dark"));
     }

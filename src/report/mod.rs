@@ -1,5 +1,7 @@
 //! Plots, tables and the HTML report.
 
+mod base64;
+mod escape;
 mod evaluation;
 mod experiment;
 mod grids;
@@ -9,25 +11,33 @@ mod table;
 #[cfg(test)]
 mod test_pictures;
 mod training;
+mod turn;
 
 pub use evaluation::evaluation_figures;
 pub use experiment::{
     Curve, EXPERIMENT_HEADER, REDUCTION_HEADER, experiment_curves, experiment_figures, experiment_table,
-    reduction_table,
+    experiment_view, reduction_table,
 };
 pub use grids::{Fit, GridComparison, grid_figures};
 pub use html::Report;
-pub use plot::{HeatMap, LinePlot, PlotError, Series, Trace, heat_maps_png, line_png, trace_png};
+pub use plot::{HeatMap, Level, LinePlot, Picture, PlotError, Series, Trace, heat_maps, line_plot, trace_plot};
 pub use table::text_table;
 pub use training::{HistoryRow, training_figures};
+pub use turn::Turn;
 
 /// One picture of a report.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Figure {
-    /// File name without directory, with `.png`.
+    /// File name without directory, with `.svg`.
     pub file: String,
-    /// PNG bytes.
-    pub png: Vec<u8>,
-    /// What the picture shows.
+    /// The drawing.
+    pub picture: Picture,
+    /// Description of what the picture shows.
     pub caption: String,
+}
+
+/// A figure of what was drawn; none where there was nothing to show.
+pub fn kept(file: &str, drawn: Result<Picture, PlotError>, caption: String) -> Option<Figure> {
+    let picture = drawn.ok()?;
+    Some(Figure { file: file.to_string(), picture, caption })
 }

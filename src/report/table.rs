@@ -1,52 +1,153 @@
 //! Tables for a terminal.
 
-/// Text of a table with aligned columns: numbers to the right, words to the left, one line per row, no trailing blanks.
+use crate::names::{WIDTH, cut, cut_hard, width};
+
+/// Blanks between two columns.
+const GAP: usize = 2;
+/// Least width of a column of words that is narrowed.
+const LEAST: usize = 24;
+
+/// Text of a table with aligned columns: numbers to the right, words to the left, no trailing blanks, lines of at most
+/// [`WIDTH`] characters.
 ///
-/// Rows may be shorter than the header. A cell counts as a number if it begins with a digit, a sign or a point.
+/// A table that is wider has its headers cut at blanks, then its longest words, and at last it is cut into several tables below
+/// each other, which begin with the same column. Rows may be shorter than the header. A cell counts as a number if it begins
+/// with a digit, a sign or a point.
 pub fn text_table<H: AsRef<str>, C: AsRef<str>>(headers: &[H], rows: &[Vec<C>]) -> String {
     let columns = rows.iter().map(Vec::len).max().unwrap_or(0).max(headers.len());
-    let width = |text: &str| text.chars().count();
-    let mut widths = vec![0; columns];
-    for (w, header) in widths.iter_mut().zip(headers) {
-        *w = width(header.as_ref());
-    }
-    let mut numeric = vec![!rows.is_empty(); columns];
-    for row in rows {
-        for (i, cell) in row.iter().enumerate() {
-            let cell = cell.as_ref();
-            widths[i] = widths[i].max(width(cell));
-            let number = cell.starts_with(|c: char| c.is_ascii_digit() || "+-.".contains(c))
-                || ["", "NaN", "inf"].contains(&cell);
-            numeric[i] &= number;
+    let columns: Vec<Column> = (0..columns).map(|k| Column::new(headers, rows, k)).collect();
+    let Some((first, others)) = columns.split_first() else { return "\n\n".to_string() };
+    let mut blocks: Vec<Vec<&Column>> = vec![vec![first]];
+    for column in others {
+        let block = blocks.last_mut().filter(|block| {
+            let least = block.iter().chain([&column]).map(|column| column.least());
+            block.len() == 1 || least.sum::<usize>() + GAP * block.len() <= WIDTH
+        });
+        match block {
+            Some(block) => block.push(column),
+            None => blocks.push(vec![first, column]),
         }
     }
-    let line = |cells: &mut dyn Iterator<Item = &str>| {
-        let mut text = String::new();
-        for (i, cell) in cells.enumerate() {
-            let pad = " ".repeat(widths[i] - width(cell));
-            if i > 0 {
-                text.push_str("  ");
-            }
-            if numeric[i] {
-                text.push_str(&pad);
-                text.push_str(cell);
-            } else {
-                text.push_str(cell);
-                text.push_str(&pad);
-            }
+    blocks.iter().map(|block| block_text(block)).collect::<Vec<_>>().join("\n")
+}
+
+/// One column.
+struct Column {
+    header: String,
+    cells: Vec<String>,
+    numeric: bool,
+}
+
+impl Column {
+    fn new<H: AsRef<str>, C: AsRef<str>>(headers: &[H], rows: &[Vec<C>], k: usize) -> Self {
+        let cells: Vec<String> = rows.iter().map(|row| row.get(k).map_or("", AsRef::as_ref).to_string()).collect();
+        let is_number = |cell: &String| {
+            cell.starts_with(|c: char| c.is_ascii_digit() || "+-.".contains(c))
+                || ["", "NaN", "inf"].contains(&cell.as_str())
+        };
+        let numeric = !cells.is_empty() && cells.iter().all(is_number);
+        Self { header: headers.get(k).map_or("", AsRef::as_ref).to_string(), cells, numeric }
+    }
+
+    /// Width of the cells as they are.
+    fn cells(&self) -> usize {
+        self.cells.iter().map(|cell| width(cell)).max().unwrap_or(0)
+    }
+
+    /// Width of the cells and of the header in one line.
+    fn natural(&self) -> usize {
+        self.cells().max(width(&self.header))
+    }
+
+    /// Width of the longest word of the header.
+    fn word(&self) -> usize {
+        self.header.split(' ').map(width).max().unwrap_or(0)
+    }
+
+    /// Least width: numbers are never cut.
+    fn least(&self) -> usize {
+        let cells = if self.numeric { self.cells() } else { self.cells().min(LEAST) };
+        cells.max(self.word())
+    }
+
+    /// Lines of the header at a width.
+    fn header(&self, at: usize) -> Vec<String> {
+        cut(&self.header, at)
+    }
+}
+
+/// Widths of columns that stand beside each other.
+fn widths(columns: &[&Column]) -> Vec<usize> {
+    let most = WIDTH.saturating_sub(GAP * (columns.len() - 1));
+    let natural: Vec<usize> = columns.iter().map(|column| column.natural()).collect();
+    if natural.iter().sum::<usize>() <= most {
+        return natural;
+    }
+    let mut widths: Vec<usize> = columns.iter().map(|column| column.cells().max(column.word())).collect();
+    // Words are cut in the widest column, as long as it is the widest.
+    for _ in most..widths.iter().sum::<usize>() {
+        let narrowed = (0..columns.len()).filter(|&k| widths[k] > columns[k].least()).max_by_key(|&k| widths[k]);
+        let Some(k) = narrowed else { break };
+        widths[k] -= 1;
+    }
+    // Headers get what is left, those of most lines first.
+    loop {
+        let used: usize = widths.iter().sum();
+        let wider = |k: usize| {
+            let lines = columns[k].header(widths[k]).len();
+            let at =
+                (widths[k] + 1..=widths[k] + most.saturating_sub(used)).find(|&at| columns[k].header(at).len() < lines);
+            at.map(|at| (lines, k, at))
+        };
+        match (0..columns.len()).filter_map(wider).max_by_key(|&(lines, k, _)| (lines, columns.len() - k)) {
+            Some((_, k, at)) => widths[k] = at,
+            None => return widths,
         }
-        text.truncate(text.trim_end().len());
-        text.push('\n');
-        text
-    };
-    let mut text = line(&mut headers.iter().map(AsRef::as_ref));
-    let total = widths.iter().sum::<usize>() + 2 * columns.saturating_sub(1);
-    text.push_str(&"-".repeat(total));
+    }
+}
+
+/// Columns that stand beside each other.
+fn block_text(columns: &[&Column]) -> String {
+    let widths = widths(columns);
+    let mut text = String::new();
+    let headers: Vec<Vec<String>> = columns.iter().zip(&widths).map(|(column, &at)| column.header(at)).collect();
+    let lines = headers.iter().map(Vec::len).max().unwrap_or(1);
+    // Headers of fewer lines stand at the bottom.
+    let header =
+        |k: usize, line: usize| (line + headers[k].len()).checked_sub(lines).map(|line| headers[k][line].as_str());
+    for line in 0..lines {
+        push_line(&mut text, columns, &widths, |k| header(k, line).unwrap_or(""));
+    }
+    text.push_str(&"-".repeat(widths.iter().sum::<usize>() + GAP * (columns.len() - 1)));
     text.push('\n');
-    for row in rows {
-        text.push_str(&line(&mut row.iter().map(AsRef::as_ref)));
+    for row in 0..columns[0].cells.len() {
+        let cells: Vec<Vec<String>> =
+            columns.iter().zip(&widths).map(|(column, &at)| cell_lines(&column.cells[row], at)).collect();
+        for line in 0..cells.iter().map(Vec::len).max().unwrap_or(1) {
+            push_line(&mut text, columns, &widths, |k| cells[k].get(line).map_or("", String::as_str));
+        }
     }
     text
+}
+
+fn cell_lines(cell: &str, at: usize) -> Vec<String> {
+    if width(cell) <= at { vec![cell.to_string()] } else { cut_hard(cell, at) }
+}
+
+fn push_line<'a>(text: &mut String, columns: &[&Column], widths: &[usize], cell: impl Fn(usize) -> &'a str) {
+    let mut line = String::new();
+    for (k, (column, &at)) in columns.iter().zip(widths).enumerate() {
+        let cell = cell(k);
+        let pad = " ".repeat(at.saturating_sub(width(cell)));
+        if k > 0 {
+            line.push_str(&" ".repeat(GAP));
+        }
+        let (left, right) = if column.numeric { (pad.as_str(), cell) } else { (cell, pad.as_str()) };
+        line.push_str(left);
+        line.push_str(right);
+    }
+    text.push_str(line.trim_end());
+    text.push('\n');
 }
 
 #[cfg(test)]
@@ -58,5 +159,45 @@ mod tests {
         let text = text_table(&["name", "error"], &[vec!["θ₁", "1.5e-3"], vec!["longer", "-2"], vec!["short"]]);
         assert_eq!(text, "name     error\n--------------\nθ₁      1.5e-3\nlonger      -2\nshort\n");
         assert_eq!(text_table::<&str, &str>(&[], &[]), "\n\n");
+    }
+
+    fn widest(text: &str) -> usize {
+        text.lines().map(width).max().unwrap_or(0)
+    }
+
+    #[test]
+    fn wide_headers_are_cut_first() {
+        let headers: Vec<String> = (0..8).map(|k| format!("a long header of {k} [rad/s]")).collect();
+        let text = text_table(&headers, &[vec!["0.0123"; 8]]);
+        assert!(widest(&text) <= WIDTH, "{text}");
+        let lines: Vec<&str> = text.lines().collect();
+        assert_eq!(lines.len(), 4, "{text}");
+        assert!(lines[2].starts_with("---") && lines[3].split_whitespace().count() == 8, "{text}");
+        // A header of fewer lines stands at the bottom.
+        let text = text_table(&[&headers[..], &["n".to_string()]].concat(), &[vec!["0.0123"; 9]]);
+        assert!(text.lines().nth(2).unwrap().ends_with(" n") && widest(&text) <= WIDTH, "{text}");
+    }
+
+    #[test]
+    fn long_words_are_cut_next() {
+        let remark =
+            "theta1_dot outside the training range at 0.5; exact motion: a singular mass matrix at 0.7; and so on";
+        let path = "/a/very/long/path/of/a/file/that/nobody/would/want/to/read/in/a/table/of/a/terminal/motion.csv";
+        let text = text_table(&["file", "error [rad]", "remarks"], &[vec![path, "1.5", remark], vec!["x", "2", ""]]);
+        assert!(widest(&text) <= WIDTH, "{text}");
+        let words: Vec<&str> = text.split_whitespace().collect();
+        assert!(remark.split(' ').all(|word| words.contains(&word)), "{text}");
+        assert!(text.contains(&path[..24]) && !text.contains(path), "{text}");
+    }
+
+    #[test]
+    fn too_many_columns_make_several_tables() {
+        let headers: Vec<String> = (0..30).map(|k| format!("column{k}")).collect();
+        let rows = vec![(0..30).map(|k| format!("{k}.5")).collect::<Vec<_>>(); 2];
+        let text = text_table(&headers, &rows);
+        assert!(widest(&text) <= WIDTH, "{text}");
+        assert_eq!(text.matches("column0").count(), text.split("\n\n").count());
+        assert!(headers.iter().all(|header| text.contains(header)) && text.split("\n\n").count() > 1, "{text}");
+        assert_eq!(text.matches("29.5").count(), 2);
     }
 }

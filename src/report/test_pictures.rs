@@ -6,7 +6,7 @@ use super::Figure;
 pub fn save(figures: &[Figure]) {
     if let Ok(directory) = std::env::var("LNN_TEST_PICTURES") {
         for figure in figures {
-            std::fs::write(std::path::Path::new(&directory).join(&figure.file), &figure.png).unwrap();
+            std::fs::write(std::path::Path::new(&directory).join(&figure.file), figure.picture.to_svg()).unwrap();
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Pictures of a training.
 
-use super::{Figure, LinePlot, PlotError, Series, line_png};
+use super::{Figure, LinePlot, Series, kept, line_plot};
 
 /// One epoch. Quantities that a training does not have are `NaN`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,11 +19,9 @@ pub struct HistoryRow {
     pub penalty: f64,
 }
 
-/// Pictures of a history: loss, learning rate, gradient norm and penalty, as far as there is something to show.
-///
-/// # Errors
-/// [`PlotError::Renderer`] if the renderer fails; quantities without a finite positive value are left out.
-pub fn training_figures(rows: &[HistoryRow]) -> Result<Vec<Figure>, PlotError> {
+/// Pictures of a history: loss, learning rate, gradient norm and penalty; quantities without a finite positive value are left
+/// out.
+pub fn training_figures(rows: &[HistoryRow]) -> Vec<Figure> {
     let epochs: Vec<f64> = rows.iter().map(|row| row.epoch).collect();
     let series = |name: &str, part: fn(&HistoryRow) -> f64| {
         Series::new(name, &epochs, &rows.iter().map(part).collect::<Vec<_>>())
@@ -40,45 +38,40 @@ pub fn training_figures(rows: &[HistoryRow]) -> Result<Vec<Figure>, PlotError> {
     };
     let pictures = [
         (
-            "training_loss.png",
+            "training_loss.svg",
             "Training",
             "loss",
             vec![series("training", |r| r.training_loss), series("validation", |r| r.validation_loss)],
             loss,
         ),
         (
-            "learning_rate.png",
+            "learning_rate.svg",
             "Learning rate",
             "learning rate",
             vec![series("", |r| r.learning_rate)],
             "Learning rate per epoch.".into(),
         ),
         (
-            "gradient_norm.png",
+            "gradient_norm.svg",
             "Gradient norm",
             "gradient norm",
             vec![series("", |r| r.gradient_norm)],
             "Norm of the gradient before clipping, mean per epoch.".into(),
         ),
         (
-            "penalty.png",
+            "penalty.svg",
             "Stability penalty",
             "penalty",
             vec![series("", |r| r.penalty)],
             "Penalty on the mass matrix, mean per epoch; epochs without a violation leave gaps.".into(),
         ),
     ];
-    let mut figures = Vec::new();
-    for (file, title, y_label, series, caption) in pictures {
-        let plot =
-            LinePlot { title: title.into(), x_label: "epoch".into(), y_label: y_label.into(), log_y: true, series };
-        match line_png(&plot) {
-            Ok(png) => figures.push(Figure { file: file.into(), png, caption }),
-            Err(PlotError::Empty(_)) => {}
-            Err(error) => return Err(error),
-        }
-    }
-    Ok(figures)
+    let figure = |(file, title, y_label, series, caption): (&str, &str, &str, Vec<Series>, String)| {
+        let (title, y_label) = (title.to_string(), y_label.to_string());
+        let plot = LinePlot { title, x_label: "epoch".into(), y_label, log_y: true, series, turn: None, level: None };
+        kept(file, line_plot(&plot), caption)
+    };
+    pictures.into_iter().filter_map(figure).collect()
 }
 
 #[cfg(test)]
@@ -97,10 +90,10 @@ mod tests {
                 penalty: 0.0,
             })
             .collect();
-        let figures = training_figures(&rows).unwrap();
+        let figures = training_figures(&rows);
         let names: Vec<_> = figures.iter().map(|f| f.file.as_str()).collect();
-        assert_eq!(names, ["training_loss.png", "learning_rate.png"]);
+        assert_eq!(names, ["training_loss.svg", "learning_rate.svg"]);
         assert!(figures[0].caption.contains("epoch 19"));
-        assert!(training_figures(&[]).unwrap().is_empty());
+        assert!(training_figures(&[]).is_empty());
     }
 }

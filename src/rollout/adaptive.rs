@@ -9,7 +9,7 @@ use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Terms};
 use crate::linalg::Workspace;
 use crate::scalar::{Real, Scalar};
 
-/// What steps after a break begin with, in the last step before: a step that ended at a break may have been cut short.
+/// Growth of the first step after a break over the last step before it, which may have been cut short.
 const GROWTH: f64 = 2.0;
 
 /// The equations of a motion in elapsed time `|t - t0|`.

@@ -10,7 +10,7 @@ use crate::scalar::{Real, Scalar};
 pub(super) struct Compensated<S> {
     /// Rounded value.
     pub(super) high: Vec<S>,
-    /// What the rounding lost.
+    /// Rests that the rounding lost.
     pub(super) low: Vec<S>,
 }
 

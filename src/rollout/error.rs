@@ -27,7 +27,7 @@ pub enum RolloutError {
     Invalid {
         /// Which argument.
         what: &'static str,
-        /// What is wrong with it.
+        /// The problem in words.
         problem: String,
     },
     /// The trajectory leaves its domain.

@@ -16,19 +16,19 @@ pub(super) struct Group<'a, S> {
     evaluated: Condvar,
 }
 
-/// What the members ask for, until the last one has asked, and the answer.
+/// Requests of the members, until the last one has asked, and the answer.
 struct Round<S> {
     /// Rounds evaluated so far.
     number: u64,
     active: usize,
-    /// What each member waits for; nobody waits any more once it is evaluated.
+    /// State that each member waits for; nobody waits any more once it is evaluated.
     asked: Vec<Option<Asked<S>>>,
     /// Rows of each member in the last batch.
     rows: Vec<Range<usize>>,
     q: Vec<S>,
     v: Vec<S>,
     terms: Terms<S>,
-    /// Whether every state of the round could be evaluated.
+    /// `true` if every state of the round could be evaluated.
     complete: bool,
 }
 

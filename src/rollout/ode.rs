@@ -33,7 +33,7 @@ pub(super) enum Adaptive {
     Dop853,
 }
 
-/// What to integrate.
+/// Problem to integrate.
 #[doc(hidden)]
 pub struct Task<'a, S> {
     pub(super) method: Adaptive,
@@ -42,7 +42,7 @@ pub struct Task<'a, S> {
     pub(super) max_steps: usize,
     /// Size of the first attempt; 0 leaves it to the solver.
     pub(super) first_step: S,
-    /// Whether the right-hand side depends on time.
+    /// `true` if the right-hand side depends on time.
     pub(super) timed: bool,
     /// State at elapsed time 0.
     pub(super) start: &'a [S],
@@ -64,7 +64,7 @@ pub enum Ended<E> {
     Stopped,
 }
 
-/// What an integration did.
+/// Result of an integration.
 #[doc(hidden)]
 pub struct Ran<S, E> {
     pub(super) statistics: Statistics,

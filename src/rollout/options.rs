@@ -1,4 +1,4 @@
-//! What a roll-out is asked to do.
+//! Options of a roll-out.
 
 use super::RolloutError;
 use super::samples::blur;
@@ -40,7 +40,7 @@ impl Method {
         }
     }
 
-    /// Whether steps are fixed and the motion is symplectic.
+    /// `true` if steps are fixed and the motion is symplectic.
     pub const fn is_structure_preserving(self) -> bool {
         !matches!(self, Self::Dopri5 | Self::Dop853)
     }
@@ -63,7 +63,7 @@ impl<S: Scalar> Domain<S> {
         self.bounds.len()
     }
 
-    /// Whether no component is described.
+    /// `true` if no component is described.
     pub fn is_empty(&self) -> bool {
         self.bounds.is_empty()
     }
@@ -126,7 +126,7 @@ pub struct Options<S> {
     pub max_steps: usize,
     /// Where the trajectory must stay.
     pub domain: Option<Domain<S>>,
-    /// Whether to store the energy of every sample.
+    /// `true` to store the energy of every sample.
     pub energy: bool,
 }
 

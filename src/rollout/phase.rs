@@ -23,7 +23,7 @@ pub(super) struct Phase<'a, S> {
     pub(super) iterations: usize,
     points: Vec<S>,
     external: Vec<S>,
-    /// Whether forces beside those of `L` act.
+    /// `true` if forces beside those of `L` act.
     damped: bool,
     force: Option<&'a dyn Force<S>>,
     /// Time at the start of the step at hand, and the times at which the force may be asked.
@@ -44,7 +44,7 @@ pub(super) struct Derivatives<S> {
     pub(super) damping: Vec<S>,
 }
 
-/// How far an equation is from being solved.
+/// Residual of an equation that is being solved.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Defect<S> {
     /// Largest residual relative to the terms of its own component.
@@ -85,7 +85,7 @@ impl<S: Scalar> Defect<S> {
         self.overall <= S::EPSILON.ldexp(12)
     }
 
-    /// Whether this is less than half of the best so far, in either measure. Comparing with the last one instead would
+    /// `true` if this is less than half of the best so far, in either measure. Comparing with the last one instead would
     /// let an iteration hop between two roundings for ever.
     pub(super) fn improves(self, best: Self) -> bool {
         self.relative < best.relative * S::half() || self.overall < best.overall * S::half()

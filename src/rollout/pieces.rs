@@ -7,7 +7,7 @@ use crate::lagrangian::EulerLagrange;
 use crate::scalar::Scalar;
 use std::ops::ControlFlow;
 
-/// How a roll-out in pieces ended.
+/// End of a roll-out in pieces.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ending {
     /// Samples handed over, all valid, whatever `stop` says.

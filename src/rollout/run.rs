@@ -6,7 +6,7 @@ use super::{Force, Integrable, Method, Options, RolloutError, Statistics, Trajec
 use crate::lagrangian::{EulerLagrange, MechanicsError};
 use crate::scalar::Scalar;
 
-/// What a roll-out brought.
+/// Result of a roll-out.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rollout<S> {
     /// The samples reached; all valid, whatever `stop` says.
@@ -18,7 +18,7 @@ pub struct Rollout<S> {
 }
 
 impl<S: Scalar> Rollout<S> {
-    /// Whether `t_end` was reached.
+    /// `true` if `t_end` was reached.
     pub fn is_complete(&self) -> bool {
         self.stop.is_none()
     }

@@ -65,7 +65,7 @@ impl<S: Scalar> Trajectory<S> {
         self.t.len()
     }
 
-    /// Whether there are no states.
+    /// `true` if there are no states.
     pub fn is_empty(&self) -> bool {
         self.t.is_empty()
     }

@@ -8,7 +8,7 @@ use super::{Real, Scalar};
 pub struct Sum<S> {
     /// Rounded sum.
     total: S,
-    /// What rounding left, at most half a unit in the last place of `total`.
+    /// Rest that rounding left, at most half a unit in the last place of `total`.
     rest: S,
 }
 

@@ -104,7 +104,7 @@ impl<'a> Growing<'a> {
     }
 }
 
-/// Whether [`write_atomically`] could write to `path` now: found out before the work whose result it will be.
+/// Test of writing: [`write_atomically`] could write to `path` now, found out before the work whose result it will be.
 ///
 /// A temporary file is created beside the target and removed again.
 ///

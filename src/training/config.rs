@@ -1,5 +1,6 @@
 //! Everything that determines a training run; written beside every model as `config.toml`.
 
+use crate::lagrangian::Description;
 use crate::network::file::MAX_WIDTH;
 use crate::network::{Form, Initialization, InputLayer, Nonlinearity, Structure};
 use crate::training::optimizer::Method;
@@ -55,6 +56,9 @@ pub struct Config {
     /// Parameters of the system; those that are not given have its defaults.
     #[serde(default)]
     pub parameters: BTreeMap<String, f64>,
+    /// The system itself, if it is none of the catalogue's; its name is `system`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub description: Option<Description>,
     /// Sampled states.
     pub data: Data,
     /// Shape of the network.

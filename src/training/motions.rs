@@ -26,9 +26,9 @@ pub(super) fn along_motions(
     rng: &mut impl Rng,
 ) -> Result<Drawn, SamplingError> {
     let n = system.coordinates;
-    let test = (system.system.trajectory)(n);
+    let test = system.system.trajectory(n);
     let [places, speeds] = [&test.start.positions, &test.start.velocities].map(|bounds| boxes(bounds));
-    let coordinates = (system.system.coordinates)(n);
+    let coordinates = system.system.coordinates(n);
     let exact = system.build()?;
     let fixed = system.constrained_coordinate();
     let chart = position.iter().zip(&coordinates).map(|(b, c)| (!c.periodic).then_some((b[0], b[1])));

@@ -38,7 +38,7 @@ impl Preset {
 
 /// Name of the time-like coordinate of a system.
 fn time_like(system: &Configured<f64>) -> Option<String> {
-    let coordinates = (system.system.coordinates)(system.coordinates);
+    let coordinates = system.system.coordinates(system.coordinates);
     system.system.time_like.and_then(|index| coordinates.into_iter().nth(index)).map(|time| time.name.into_owned())
 }
 
@@ -51,12 +51,13 @@ fn regularizer(system: &Configured<f64>, lambda: f64) -> Regularizer {
 }
 
 fn base(system: &Configured<f64>, states: usize, network: Network) -> Config {
-    let validation: Bounds = (system.system.validation)(system.coordinates);
+    let validation: Bounds = system.system.validation(system.coordinates);
     Config {
         system: system.system.name.to_string(),
         seed: 0,
         precision: Precision::F32,
         from: None,
+        description: system.system.described.as_ref().map(|described| described.description.clone()),
         parameters: Default::default(),
         data: Data {
             training: states,
@@ -144,15 +145,16 @@ struct States {
 /// The paper's box with a single turn of every angle, wider where the motions of the trajectory test soon leave it.
 fn training_states(system: &Configured<f64>) -> States {
     let n = system.coordinates;
-    let mut bounds: Bounds = (system.system.training)(n);
-    // Embedded angles repeat: one turn is all there is.
-    for (bound, coordinate) in bounds.positions.iter_mut().zip((system.system.coordinates)(n)) {
-        if coordinate.periodic {
+    let mut bounds: Bounds = system.system.training(n);
+    // Embedded angles repeat: one turn is all there is, unless somebody wants less.
+    let whole = system.system.described.is_none();
+    for (bound, coordinate) in bounds.positions.iter_mut().zip(system.system.coordinates(n)) {
+        if coordinate.periodic && whole {
             *bound = (0.0, 2.0 * PI);
         }
     }
     let (mut logarithmic, mut relative, mut motions) = (Vec::new(), 0.0, 0.0);
-    match system.system.name {
+    match system.system.name.as_ref() {
         // A short spring turns fast, and its angle is accelerated a thousand times more than others.
         "spring-pendulum" => {
             bounds.velocities = vec![(-7.0, 7.0), (-10.0, 10.0)];
@@ -204,6 +206,7 @@ pub(super) fn recorded(
         seed: 0,
         precision: Precision::F32,
         from: None,
+        description: None,
         parameters: Default::default(),
         data: Data {
             training,
@@ -229,7 +232,7 @@ fn paper(system: &Configured<f64>) -> Option<Config> {
     let n = system.coordinates;
     /// Epochs, rate, lowest rate.
     type Stretch = (usize, f64, f64);
-    let (states, hidden, phases): (_, _, &[Stretch]) = match system.system.name {
+    let (states, hidden, phases): (_, _, &[Stretch]) = match system.system.name.as_ref() {
         "double-pendulum" => (60_000, vec![500; 3], &[(300, 1e-3, 1e-6), (200, 4e-5, 1e-7), (200, 1e-5, 1e-8)]),
         "triple-pendulum" => (60_000, vec![500; 3], &[(500, 1e-3, 1e-7)]),
         "spring-pendulum" => (60_000, vec![600; 2], &[(500, 5e-4, 1e-7)]),
@@ -252,7 +255,7 @@ fn paper(system: &Configured<f64>) -> Option<Config> {
         learn_alpha: false,
         initialization: Initialization::Default,
     };
-    let bounds: Bounds = (system.system.training)(n);
+    let bounds: Bounds = system.system.training(n);
     let phase = |(k, &(epochs, rate, eta_min)): (usize, &Stretch)| {
         let mut position = boxes(&bounds.positions);
         if system.system.name == "double-pendulum" {

@@ -1,13 +1,15 @@
 //! From a configuration to a trained network: data, shape, training.
 
-use crate::lagrangian::{Configured, configure};
+use crate::lagrangian::system::System;
+use crate::lagrangian::{Configured, configure_system, find};
 use crate::network::{Architecture, Form, NetworkError, NetworkLagrangian};
 use crate::scalar::Scalar;
-use crate::training::config::{Config, Scaling};
+use crate::training::config::{Config, ConfigError, Scaling};
 use crate::training::penalty::{Penalty, Regularizer};
 use crate::training::sampling::{SamplingError, sample_all};
 use crate::training::solver::Hooks;
 use crate::training::trainer::{Trained, TrainingError, train};
+use std::borrow::Cow;
 use thiserror::Error;
 
 /// A trained network with what led to it.
@@ -43,7 +45,23 @@ impl Config {
     pub fn system(&self) -> Result<Configured<f64>, SamplingError> {
         let given: Vec<(String, String)> =
             self.parameters.iter().map(|(symbol, value)| (symbol.clone(), value.to_string())).collect();
-        Ok(configure(&self.system, &given)?)
+        Ok(configure_system(self.system_entry()?, &given)?)
+    }
+
+    /// What is known about the system: the catalogue's entry, or what its description comes to.
+    ///
+    /// # Errors
+    /// Unknown system, or a description that is wrong or of another name.
+    pub fn system_entry(&self) -> Result<Cow<'static, System>, SamplingError> {
+        match &self.description {
+            None => Ok(Cow::Borrowed(find(&self.system)?)),
+            Some(description) if description.name != self.system => Err(SamplingError::Config(ConfigError {
+                field: "description.name".to_string(),
+                expected: "the name of the system",
+                found: format!("`{}` for `{}`", description.name, self.system),
+            })),
+            Some(description) => Ok(Cow::Owned(description.system()?)),
+        }
     }
 
     /// The penalty, its time-like coordinate looked up in the system if it names one.
@@ -54,7 +72,7 @@ impl Config {
         let coordinates = match self.penalty {
             Regularizer::LorentzianSylvester { .. } => {
                 let system = self.system()?;
-                (system.system.coordinates)(system.coordinates)
+                system.system.coordinates(system.coordinates)
             }
             _ => Vec::new(),
         };
@@ -63,7 +81,7 @@ impl Config {
 
     /// Shape of the network for a system, with physical scales `scale` (used if the configuration scales).
     pub fn architecture(&self, system: &Configured<f64>, scale: Vec<f64>) -> Architecture {
-        let coordinates = (system.system.coordinates)(system.coordinates);
+        let coordinates = system.system.coordinates(system.coordinates);
         let names = coordinates.iter().map(|c| c.name.as_ref());
         // A name that is no coordinate is refused where the states are sampled.
         let time_like = self.network.time_like_index(names.clone()).unwrap_or_default();

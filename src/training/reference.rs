@@ -39,7 +39,7 @@ const fn optional(name: &'static str, example: &'static str, values: &'static st
 }
 
 /// Everything that determines a training run: the tables of [`Config`], in the order of a file.
-pub const TRAINING_SECTIONS: [Section<'static>; 8] = [
+pub const TRAINING_SECTIONS: [Section<'static>; 9] = [
     Section {
         name: "",
         purpose: "",
@@ -58,6 +58,11 @@ pub const TRAINING_SECTIONS: [Section<'static>; 8] = [
     Section {
         name: "parameters",
         purpose: "Parameters of the system, in its units (`lnn systems` lists them).",
+        keys: &[],
+    },
+    Section {
+        name: "description",
+        purpose: "A system that is none of the program's own: what its file says, see the page on system files.",
         keys: &[],
     },
     Section {

@@ -1,6 +1,6 @@
 //! Training data of hand-written systems: uniform states with exact accelerations.
 
-use crate::lagrangian::{Configured, SystemError};
+use crate::lagrangian::{Configured, DescriptionError, SystemError};
 use crate::scalar::Scalar;
 use crate::training::config::{Config, ConfigError};
 use crate::training::dataset::{Dataset, DatasetError};
@@ -15,6 +15,9 @@ pub enum SamplingError {
     /// The system does not exist or has no such parameter.
     #[error(transparent)]
     System(#[from] SystemError),
+    /// A wrong description of a system.
+    #[error("description.{0}")]
+    Description(#[from] DescriptionError),
     /// The configuration is out of range.
     #[error(transparent)]
     Config(#[from] ConfigError),
@@ -179,7 +182,7 @@ pub fn sample_all<S: Scalar>(
     system: &Configured<f64>,
 ) -> Result<(Datasets<S>, Vec<f64>), SamplingError> {
     config.validate(system.coordinates)?;
-    let coordinates = (system.system.coordinates)(system.coordinates);
+    let coordinates = system.system.coordinates(system.coordinates);
     config.network.time_like_index(coordinates.iter().map(|c| c.name.as_ref()))?;
     config.network.form(coordinates.iter().map(|c| c.name.as_ref()))?;
     let seed = config.seed;
@@ -217,7 +220,7 @@ mod tests {
     fn every_state_of_a_relativistic_system_is_on_the_mass_shell() {
         let mut seen = 0;
         for system in crate::lagrangian::systems().iter().filter(|s| s.constraint.is_some()) {
-            let configured = configure::<f64>(system.name, &[]).unwrap();
+            let configured = configure::<f64>(&system.name, &[]).unwrap();
             let mut config = Preset::Quick.config(&configured).unwrap();
             (config.data.training, config.data.validation, config.data.test) = (500, 200, 100);
             config.data.off_shell = 0.0;

@@ -6,7 +6,7 @@
 
 use super::functions::{Functions, Values};
 
-/// What a function of the coordinates is multiplied by.
+/// The factor of a function of the coordinates.
 #[derive(Clone, Debug, PartialEq)]
 enum Kind {
     /// The velocities of these coordinates, repeated ones to their power: part of `L`.
@@ -26,7 +26,7 @@ struct Change {
     size: f64,
 }
 
-/// What sizes are usual: those of the learned model itself, so that a change of size 1 makes another model of it.
+/// Usual sizes: those of the learned model itself, so that a change of size 1 makes another model of it.
 #[derive(Clone, Debug)]
 pub struct Usual {
     /// `|M_ii|`, mean over the states.
@@ -45,7 +45,7 @@ pub struct Changes {
     all: Vec<Change>,
 }
 
-/// What the changes come to at one state.
+/// Values of all changes at one state.
 #[derive(Clone, Debug, Default)]
 pub struct Row {
     values: Values,
@@ -133,12 +133,12 @@ impl Changes {
         Self { n, functions, all }
     }
 
-    /// How many there are.
+    /// Number of changes.
     pub fn len(&self) -> usize {
         self.all.len()
     }
 
-    /// What all of them, each of its usual size, come to at a state with this acceleration.
+    /// Values of all changes, each of its usual size, at a state with this acceleration.
     pub fn evaluate(&self, q: &[f64], v: &[f64], a: &[f64], row: &mut Row) {
         let (n, count) = (self.n, self.all.len());
         for (values, size) in [

@@ -1,4 +1,4 @@
-//! How well motion determines what was learned from it: mass matrix, friction and energy.
+//! Ranges in which motion determines what was learned from it: mass matrix, friction and energy.
 //!
 //! Two Lagrangians may move alike on all that was recorded and differ in `M`: where a momentum is conserved, `L` may be
 //! changed by any function of it. What the data leave open is therefore read off the curvature of the likelihood around the
@@ -34,7 +34,7 @@ use serde::{Deserialize, Serialize};
 /// A learned number and where the data allow it to be.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Estimate {
-    /// What the model has.
+    /// The model's value.
     pub value: f64,
     /// Standard deviation of what the data allow.
     pub deviation: f64,
@@ -48,16 +48,16 @@ impl Estimate {
     pub fn range(&self) -> [f64; 2] {
         [self.value - RANGE * self.deviation, self.value + RANGE * self.deviation]
     }
-    /// Whether a number lies in the range.
+    /// `true` if a number lies in the range.
     pub fn allows(&self, x: f64) -> bool {
         (x - self.value).abs() <= RANGE * self.deviation
     }
 }
 
-/// What the data say about a model's inner quantities.
+/// Ranges in which the data leave a model's inner quantities.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Determination {
-    /// Whether known forces fix the unit of `L`; if not, everything is over the mean of `M` of the first coordinate.
+    /// `true` if known forces fix the unit of `L`; if not, everything is over the mean of `M` of the first coordinate.
     pub absolute: bool,
     /// Mean over the states of the upper triangle of `M`, row after row.
     pub mass_matrix: Vec<Estimate>,
@@ -70,7 +70,7 @@ pub struct Determination {
 /// States whose changes are multiplied at once.
 const CHUNK: usize = 128;
 
-/// What `observed` says about `model`, for the states `at`, `(q, v)`, over which means are taken.
+/// Ranges in which `observed` leaves `model`, for the states `at`, `(q, v)`, over which means are taken.
 ///
 /// `None` where there is nothing to say: too many coordinates, too few states, or a model that is not finite on them.
 pub fn determination(

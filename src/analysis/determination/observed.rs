@@ -1,4 +1,4 @@
-//! What a model is compared with.
+//! Observations that a model is compared with.
 
 use crate::recording::Targets;
 use crate::training::{Measured, MeasuredError};

@@ -1,9 +1,10 @@
 //! Geodesics of anti-de Sitter space of any dimension in half-space coordinates, shared by `ads2`, `ads3` and `ads4`.
 
-use super::{LENGTH, lengths};
+use super::{length, lengths};
 use crate::lagrangian::Lagrangian;
-use crate::lagrangian::system::{Bounds, Closed, Conserved, Parameter, Plane, Size, System, TrajectoryTest};
+use crate::lagrangian::system::{Bounds, Closed, Conserved, Parameter, PerSize, Plane, Size, System, TrajectoryTest};
 use crate::scalar::Real;
+use std::borrow::Cow;
 
 /// `Lagrangian = (L/z)^2 (-t'^2 + x'^2 + y'^2 + z'^2) / 2` over `(t, z)`, `(t, x, z)` or `(t, x, y, z)`, `L` the radius.
 ///
@@ -16,7 +17,7 @@ pub struct AdsGeodesic {
     pub n: usize,
 }
 
-const PARAMETERS: [Parameter; 1] = [Parameter { symbol: "L", ..LENGTH }];
+static PARAMETERS: [Parameter; 1] = [length("L")];
 
 /// The same bounds as the paper's for every dimension: `t`, the coordinates between, `z`.
 fn bounds(n: usize, t: (f64, f64), x: (f64, f64), z: (f64, f64), x_dot: (f64, f64), z_dot: (f64, f64)) -> Bounds {
@@ -36,25 +37,25 @@ fn states(n: usize) -> Bounds {
 /// Catalogue entry of `n` coordinates.
 pub const fn system(name: &'static str, title: &'static str, n: usize, constraint: &'static str) -> System {
     System {
-        name,
-        title,
-        coordinates: |n| match n {
+        name: Cow::Borrowed(name),
+        title: Cow::Borrowed(title),
+        coordinates: PerSize::Rule(|n| match n {
             2 => lengths(&["t", "z"]),
             3 => lengths(&["t", "x", "z"]),
             _ => lengths(&["t", "x", "y", "z"]),
-        },
-        parameters: &PARAMETERS,
+        }),
+        parameters: Cow::Borrowed(&PARAMETERS),
         size: Size::Fixed(n),
-        time_unit: "m",
+        time_unit: Cow::Borrowed("m"),
         time_like: Some(0),
         constraint: Some(constraint),
-        training: states,
-        validation: states,
-        trajectory: |n| TrajectoryTest {
+        training: PerSize::Rule(states),
+        validation: PerSize::Rule(states),
+        trajectory: PerSize::Rule(|n| TrajectoryTest {
             start: bounds(n, (0.0, 0.0), (-1.0, 1.0), (0.5, 3.0), (-0.25, 0.25), (-0.25, 0.25)),
             t_end: 0.5,
             dt: 0.01,
-        },
+        }),
         domain: Some(|_, q| if q.last().is_some_and(|&z| z > 0.0) { Ok(()) } else { Err("z must be positive") }),
         // With x there is a plane of space, without it one of space and time.
         plane: Some(Plane {
@@ -70,6 +71,7 @@ pub const fn system(name: &'static str, title: &'static str, n: usize, constrain
                 (0..q.len() - 1).map(|i| sign(i) * (radius / z).powi(2) * v[i]).collect()
             },
         }),
+        described: None,
     }
 }
 

@@ -1,9 +1,10 @@
 //! A relativistic charge in uniform magnetic and electric fields at right angles.
 
-use super::{MASS, X_AND_Y, lengths};
+use super::{X_AND_Y, lengths, mass};
 use crate::lagrangian::Lagrangian;
-use crate::lagrangian::system::{Bounds, Closed, Parameter, Range, Size, System, TrajectoryTest};
+use crate::lagrangian::system::{Bounds, Closed, Parameter, PerSize, Range, Size, System, TrajectoryTest};
 use crate::scalar::Real;
+use std::borrow::Cow;
 
 /// `L = -m c^2 sqrt(1 - v^2/c^2) + q (A.v - phi)`, `A = B (-y, x, 0) / 2`, `phi = -E x`: magnetic field `B` along `z`,
 /// electric field `E` along `x`. Not quadratic in `v`; `M = gamma m (1 + gamma^2 v v^T / c^2)`.
@@ -12,30 +13,35 @@ use crate::scalar::Real;
 #[derive(Clone, Copy, Debug)]
 pub struct ChargedParticle;
 
-const PARAMETERS: [Parameter; 5] = [
-    MASS,
-    Parameter { symbol: "q", default: "1", unit: "C", range: Range::Any },
-    Parameter { symbol: "c", default: "1", unit: "m/s", range: Range::Positive },
-    Parameter { symbol: "B", default: "1", unit: "T", range: Range::Any },
-    Parameter { symbol: "E", default: "0.1", unit: "V/m", range: Range::Any },
+static PARAMETERS: [Parameter; 5] = [
+    mass("m"),
+    Parameter::new("q", "1", "C", Range::Any),
+    Parameter::new("c", "1", "m/s", Range::Positive),
+    Parameter::new("B", "1", "T", Range::Any),
+    Parameter::new("E", "0.1", "V/m", Range::Any),
 ];
 
 /// Catalogue entry. The corners of the boxes of velocities are slower than light.
 pub const SYSTEM: System = System {
-    name: "charged-particle",
-    title: "Relativistic charged particle",
-    coordinates: |_| lengths(&["x", "y", "z"]),
-    parameters: &PARAMETERS,
+    name: Cow::Borrowed("charged-particle"),
+    title: Cow::Borrowed("Relativistic charged particle"),
+    coordinates: PerSize::Rule(|_| lengths(&["x", "y", "z"])),
+    parameters: Cow::Borrowed(&PARAMETERS),
     size: Size::Fixed(3),
-    time_unit: "s",
+    time_unit: Cow::Borrowed("s"),
     time_like: None,
     constraint: None,
-    training: |n| Bounds::uniform(n, (-5.0, 5.0), (-0.55, 0.55)),
-    validation: |n| Bounds::uniform(n, (-5.0, 5.0), (-0.55, 0.55)),
-    trajectory: |n| TrajectoryTest { start: Bounds::uniform(n, (-1.0, 1.0), (-0.25, 0.25)), t_end: 10.0, dt: 0.05 },
+    training: PerSize::Rule(|n| Bounds::uniform(n, (-5.0, 5.0), (-0.55, 0.55))),
+    validation: PerSize::Rule(|n| Bounds::uniform(n, (-5.0, 5.0), (-0.55, 0.55))),
+    trajectory: PerSize::Rule(|n| TrajectoryTest {
+        start: Bounds::uniform(n, (-1.0, 1.0), (-0.25, 0.25)),
+        t_end: 10.0,
+        dt: 0.05,
+    }),
     domain: None,
     plane: Some(X_AND_Y),
     conserved: None,
+    described: None,
 };
 
 /// `1 - v^2/c^2`, `NaN` unless it is positive.

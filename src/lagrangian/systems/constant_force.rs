@@ -1,32 +1,38 @@
 //! A point mass under a constant force.
 
-use super::{MASS, lengths};
+use super::{lengths, mass};
 use crate::lagrangian::Lagrangian;
-use crate::lagrangian::system::{Bounds, Closed, Parameter, Range, Size, System, TrajectoryTest};
+use crate::lagrangian::system::{Bounds, Closed, Parameter, PerSize, Range, Size, System, TrajectoryTest};
 use crate::scalar::Real;
+use std::borrow::Cow;
 
 /// `L = m v^2 / 2 + F q`.
 #[derive(Clone, Copy, Debug)]
 pub struct ConstantForce;
 
-const PARAMETERS: [Parameter; 2] = [MASS, Parameter { symbol: "F", default: "1", unit: "N", range: Range::Any }];
+static PARAMETERS: [Parameter; 2] = [mass("m"), Parameter::new("F", "1", "N", Range::Any)];
 
 /// Catalogue entry.
 pub const SYSTEM: System = System {
-    name: "constant-force",
-    title: "Constant force",
-    coordinates: |_| lengths(&["q"]),
-    parameters: &PARAMETERS,
+    name: Cow::Borrowed("constant-force"),
+    title: Cow::Borrowed("Constant force"),
+    coordinates: PerSize::Rule(|_| lengths(&["q"])),
+    parameters: Cow::Borrowed(&PARAMETERS),
     size: Size::Fixed(1),
-    time_unit: "s",
+    time_unit: Cow::Borrowed("s"),
     time_like: None,
     constraint: None,
-    training: |n| Bounds::uniform(n, (-5.0, 5.0), (-5.0, 5.0)),
-    validation: |n| Bounds::uniform(n, (-5.0, 5.0), (-5.0, 5.0)),
-    trajectory: |n| TrajectoryTest { start: Bounds::uniform(n, (-1.0, 1.0), (-1.0, 1.0)), t_end: 2.0, dt: 0.02 },
+    training: PerSize::Rule(|n| Bounds::uniform(n, (-5.0, 5.0), (-5.0, 5.0))),
+    validation: PerSize::Rule(|n| Bounds::uniform(n, (-5.0, 5.0), (-5.0, 5.0))),
+    trajectory: PerSize::Rule(|n| TrajectoryTest {
+        start: Bounds::uniform(n, (-1.0, 1.0), (-1.0, 1.0)),
+        t_end: 2.0,
+        dt: 0.02,
+    }),
     domain: None,
     plane: None,
     conserved: None,
+    described: None,
 };
 
 impl Lagrangian for ConstantForce {

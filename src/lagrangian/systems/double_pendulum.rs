@@ -1,36 +1,35 @@
 //! Double pendulum: two point masses on massless rods, angles from the downward vertical.
 
-use super::{ACCELERATION_OF_GRAVITY, LAST_BOB, LENGTH, MASS, NOWHERE, angles, chain};
+use super::{ACCELERATION_OF_GRAVITY, LAST_BOB, NOWHERE, angles, chain, length, mass};
 use crate::lagrangian::Lagrangian;
-use crate::lagrangian::system::{Bounds, Closed, Parameter, Plane, Size, System, TrajectoryTest};
+use crate::lagrangian::system::{Bounds, Closed, Parameter, PerSize, Plane, Size, System, TrajectoryTest};
 use crate::scalar::Real;
+use std::borrow::Cow;
 use std::f64::consts::PI;
 
 /// `L = (m1 + m2) l1^2 v1^2 / 2 + m2 l2^2 v2^2 / 2 + m2 l1 l2 v1 v2 cos(q1 - q2) + (m1 + m2) g l1 cos q1 + m2 g l2 cos q2`.
 #[derive(Clone, Copy, Debug)]
 pub struct DoublePendulum;
 
-const PARAMETERS: [Parameter; 5] = [
-    Parameter { symbol: "m1", ..MASS },
-    Parameter { symbol: "m2", ..MASS },
-    Parameter { symbol: "l1", ..LENGTH },
-    Parameter { symbol: "l2", ..LENGTH },
-    ACCELERATION_OF_GRAVITY,
-];
+static PARAMETERS: [Parameter; 5] = [mass("m1"), mass("m2"), length("l1"), length("l2"), ACCELERATION_OF_GRAVITY];
 
 /// Catalogue entry.
 pub const SYSTEM: System = System {
-    name: "double-pendulum",
-    title: "Double pendulum",
-    coordinates: angles,
-    parameters: &PARAMETERS,
+    name: Cow::Borrowed("double-pendulum"),
+    title: Cow::Borrowed("Double pendulum"),
+    coordinates: PerSize::Rule(angles),
+    parameters: Cow::Borrowed(&PARAMETERS),
     size: Size::Fixed(2),
-    time_unit: "s",
+    time_unit: Cow::Borrowed("s"),
     time_like: None,
     constraint: None,
-    training: |n| Bounds::uniform(n, (-0.1 * PI, 2.1 * PI), (-10.0, 10.0)),
-    validation: |n| Bounds::uniform(n, (0.0, 2.0 * PI), (-10.0, 10.0)),
-    trajectory: |n| TrajectoryTest { start: Bounds::uniform(n, (0.0, 2.0 * PI), (-0.1, 0.1)), t_end: 100.0, dt: 0.1 },
+    training: PerSize::Rule(|n| Bounds::uniform(n, (-0.1 * PI, 2.1 * PI), (-10.0, 10.0))),
+    validation: PerSize::Rule(|n| Bounds::uniform(n, (0.0, 2.0 * PI), (-10.0, 10.0))),
+    trajectory: PerSize::Rule(|n| TrajectoryTest {
+        start: Bounds::uniform(n, (0.0, 2.0 * PI), (-0.1, 0.1)),
+        t_end: 100.0,
+        dt: 0.1,
+    }),
     domain: None,
     plane: Some(Plane {
         labels: LAST_BOB,
@@ -40,6 +39,7 @@ pub const SYSTEM: System = System {
         },
     }),
     conserved: None,
+    described: None,
 };
 
 impl Lagrangian for DoublePendulum {

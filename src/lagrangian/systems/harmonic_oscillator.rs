@@ -1,33 +1,38 @@
 //! A point mass on a linear spring.
 
-use super::{MASS, lengths};
+use super::{lengths, mass};
 use crate::lagrangian::Lagrangian;
-use crate::lagrangian::system::{Bounds, Closed, Parameter, Range, Size, System, TrajectoryTest};
+use crate::lagrangian::system::{Bounds, Closed, Parameter, PerSize, Range, Size, System, TrajectoryTest};
 use crate::scalar::Real;
+use std::borrow::Cow;
 
 /// `L = m v^2 / 2 - k q^2 / 2`.
 #[derive(Clone, Copy, Debug)]
 pub struct HarmonicOscillator;
 
-const PARAMETERS: [Parameter; 2] =
-    [MASS, Parameter { symbol: "k", default: "1", unit: "N/m", range: Range::AtLeastZero }];
+static PARAMETERS: [Parameter; 2] = [mass("m"), Parameter::new("k", "1", "N/m", Range::AtLeastZero)];
 
 /// Catalogue entry.
 pub const SYSTEM: System = System {
-    name: "harmonic-oscillator",
-    title: "Harmonic oscillator",
-    coordinates: |_| lengths(&["q"]),
-    parameters: &PARAMETERS,
+    name: Cow::Borrowed("harmonic-oscillator"),
+    title: Cow::Borrowed("Harmonic oscillator"),
+    coordinates: PerSize::Rule(|_| lengths(&["q"])),
+    parameters: Cow::Borrowed(&PARAMETERS),
     size: Size::Fixed(1),
-    time_unit: "s",
+    time_unit: Cow::Borrowed("s"),
     time_like: None,
     constraint: None,
-    training: |n| Bounds::uniform(n, (-2.0, 2.0), (-2.0, 2.0)),
-    validation: |n| Bounds::uniform(n, (-2.0, 2.0), (-2.0, 2.0)),
-    trajectory: |n| TrajectoryTest { start: Bounds::uniform(n, (-1.0, 1.0), (-1.0, 1.0)), t_end: 50.0, dt: 0.1 },
+    training: PerSize::Rule(|n| Bounds::uniform(n, (-2.0, 2.0), (-2.0, 2.0))),
+    validation: PerSize::Rule(|n| Bounds::uniform(n, (-2.0, 2.0), (-2.0, 2.0))),
+    trajectory: PerSize::Rule(|n| TrajectoryTest {
+        start: Bounds::uniform(n, (-1.0, 1.0), (-1.0, 1.0)),
+        t_end: 50.0,
+        dt: 0.1,
+    }),
     domain: None,
     plane: None,
     conserved: None,
+    described: None,
 };
 
 impl Lagrangian for HarmonicOscillator {

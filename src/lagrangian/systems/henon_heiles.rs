@@ -2,32 +2,38 @@
 
 use super::{X_AND_Y, lengths};
 use crate::lagrangian::Lagrangian;
-use crate::lagrangian::system::{Bounds, Closed, Parameter, Range, Size, System, TrajectoryTest};
+use crate::lagrangian::system::{Bounds, Closed, Parameter, PerSize, Range, Size, System, TrajectoryTest};
 use crate::scalar::Real;
+use std::borrow::Cow;
 
 /// `L = (v_x^2 + v_y^2) / 2 - (x^2 + y^2) / 2 - lambda (x^2 y - y^3 / 3)`, unit mass and frequency; bound below
 /// `E = 1 / (6 lambda^2)`.
 #[derive(Clone, Copy, Debug)]
 pub struct HenonHeiles;
 
-const PARAMETERS: [Parameter; 1] = [Parameter { symbol: "lambda", default: "1", unit: "1/(m s^2)", range: Range::Any }];
+static PARAMETERS: [Parameter; 1] = [Parameter::new("lambda", "1", "1/(m s^2)", Range::Any)];
 
 /// Catalogue entry. The starts of the trajectory test lie below the energy of escape.
 pub const SYSTEM: System = System {
-    name: "henon-heiles",
-    title: "Henon-Heiles system",
-    coordinates: |_| lengths(&["x", "y"]),
-    parameters: &PARAMETERS,
+    name: Cow::Borrowed("henon-heiles"),
+    title: Cow::Borrowed("Henon-Heiles system"),
+    coordinates: PerSize::Rule(|_| lengths(&["x", "y"])),
+    parameters: Cow::Borrowed(&PARAMETERS),
     size: Size::Fixed(2),
-    time_unit: "s",
+    time_unit: Cow::Borrowed("s"),
     time_like: None,
     constraint: None,
-    training: |n| Bounds::uniform(n, (-1.0, 1.0), (-0.6, 0.6)),
-    validation: |n| Bounds::uniform(n, (-1.0, 1.0), (-0.6, 0.6)),
-    trajectory: |n| TrajectoryTest { start: Bounds::uniform(n, (-0.25, 0.25), (-0.25, 0.25)), t_end: 100.0, dt: 0.1 },
+    training: PerSize::Rule(|n| Bounds::uniform(n, (-1.0, 1.0), (-0.6, 0.6))),
+    validation: PerSize::Rule(|n| Bounds::uniform(n, (-1.0, 1.0), (-0.6, 0.6))),
+    trajectory: PerSize::Rule(|n| TrajectoryTest {
+        start: Bounds::uniform(n, (-0.25, 0.25), (-0.25, 0.25)),
+        t_end: 100.0,
+        dt: 0.1,
+    }),
     domain: None,
     plane: Some(X_AND_Y),
     conserved: None,
+    described: None,
 };
 
 impl Lagrangian for HenonHeiles {

@@ -2,35 +2,37 @@
 
 use super::{X_AND_Y, lengths};
 use crate::lagrangian::Lagrangian;
-use crate::lagrangian::system::{Bounds, Closed, Conserved, Parameter, Range, Size, System, TrajectoryTest};
+use crate::lagrangian::system::{Bounds, Closed, Conserved, Parameter, PerSize, Range, Size, System, TrajectoryTest};
 use crate::scalar::Real;
+use std::borrow::Cow;
 
 /// `L = (v_x^2 + v_y^2) / 2 + mu / r`, `r^2 = x^2 + y^2`, per unit of mass; singular at `r = 0`.
 #[derive(Clone, Copy, Debug)]
 pub struct Kepler;
 
-const PARAMETERS: [Parameter; 1] = [Parameter { symbol: "mu", default: "1", unit: "m^3/s^2", range: Range::Positive }];
+static PARAMETERS: [Parameter; 1] = [Parameter::new("mu", "1", "m^3/s^2", Range::Positive)];
 
 /// Catalogue entry. The starts of the trajectory test lie on ellipses of eccentricity below 1/2 inside the training box.
 pub const SYSTEM: System = System {
-    name: "kepler",
-    title: "Kepler problem",
-    coordinates: |_| lengths(&["x", "y"]),
-    parameters: &PARAMETERS,
+    name: Cow::Borrowed("kepler"),
+    title: Cow::Borrowed("Kepler problem"),
+    coordinates: PerSize::Rule(|_| lengths(&["x", "y"])),
+    parameters: Cow::Borrowed(&PARAMETERS),
     size: Size::Fixed(2),
-    time_unit: "s",
+    time_unit: Cow::Borrowed("s"),
     time_like: None,
     constraint: None,
-    training: |n| Bounds::uniform(n, (-2.0, 2.0), (-2.0, 2.0)),
-    validation: |n| Bounds::uniform(n, (-2.0, 2.0), (-2.0, 2.0)),
-    trajectory: |_| TrajectoryTest {
+    training: PerSize::Rule(|n| Bounds::uniform(n, (-2.0, 2.0), (-2.0, 2.0))),
+    validation: PerSize::Rule(|n| Bounds::uniform(n, (-2.0, 2.0), (-2.0, 2.0))),
+    trajectory: PerSize::Rule(|_| TrajectoryTest {
         start: Bounds { positions: vec![(0.9, 1.1), (-0.1, 0.1)], velocities: vec![(-0.1, 0.1), (0.8, 1.05)] },
         t_end: 20.0,
         dt: 0.05,
-    },
+    }),
     domain: Some(|_, q| if q[0] != 0.0 || q[1] != 0.0 { Ok(()) } else { Err("x and y must not both vanish") }),
     plane: Some(X_AND_Y),
     conserved: Some(Conserved { name: "angular momentum [m^2/s]", vector: |_, q, v| vec![q[0] * v[1] - q[1] * v[0]] }),
+    described: None,
 };
 
 impl Lagrangian for Kepler {

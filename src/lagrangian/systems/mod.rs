@@ -20,11 +20,15 @@ pub mod triple_pendulum;
 use super::system::{Coordinate, Parameter, Plane, Range};
 
 /// A mass of 1 kg.
-const MASS: Parameter = Parameter { symbol: "m", default: "1", unit: "kg", range: Range::Positive };
+const fn mass(symbol: &'static str) -> Parameter {
+    Parameter::new(symbol, "1", "kg", Range::Positive)
+}
 /// A length of 1 m.
-const LENGTH: Parameter = Parameter { symbol: "l", default: "1", unit: "m", range: Range::Positive };
+const fn length(symbol: &'static str) -> Parameter {
+    Parameter::new(symbol, "1", "m", Range::Positive)
+}
 /// The paper's acceleration of gravity; zero and negative values are allowed.
-const ACCELERATION_OF_GRAVITY: Parameter = Parameter { symbol: "g", default: "9.8", unit: "m/s^2", range: Range::Any };
+const ACCELERATION_OF_GRAVITY: Parameter = Parameter::new("g", "9.8", "m/s^2", Range::Any);
 
 /// The plane of the first two coordinates, `x` and `y`.
 const X_AND_Y: Plane = Plane { labels: ["x [m]", "y [m]"], point: |_, q| (q[0], q[1]) };

@@ -1,9 +1,10 @@
 //! Chain of n equal pendula.
 
-use super::{ACCELERATION_OF_GRAVITY, LAST_BOB, LENGTH, MASS, NOWHERE, angles, chain};
+use super::{ACCELERATION_OF_GRAVITY, LAST_BOB, NOWHERE, angles, chain, length, mass};
 use crate::lagrangian::Lagrangian;
-use crate::lagrangian::system::{Bounds, Closed, Parameter, Plane, Size, System, TrajectoryTest};
+use crate::lagrangian::system::{Bounds, Closed, Parameter, PerSize, Plane, Size, System, TrajectoryTest};
 use crate::scalar::Real;
+use std::borrow::Cow;
 use std::f64::consts::PI;
 
 /// `n` equal masses `m` on rods of equal length `l`: rod `i` carries `(n - i) m`, `i` from 0.
@@ -13,22 +14,25 @@ pub struct NPendulum {
     pub n: usize,
 }
 
-const PARAMETERS: [Parameter; 3] =
-    [Parameter { symbol: "m", ..MASS }, Parameter { symbol: "l", ..LENGTH }, ACCELERATION_OF_GRAVITY];
+static PARAMETERS: [Parameter; 3] = [mass("m"), length("l"), ACCELERATION_OF_GRAVITY];
 
 /// Catalogue entry.
 pub const SYSTEM: System = System {
-    name: "n-pendulum",
-    title: "Chain of n equal pendula",
-    coordinates: angles,
-    parameters: &PARAMETERS,
+    name: Cow::Borrowed("n-pendulum"),
+    title: Cow::Borrowed("Chain of n equal pendula"),
+    coordinates: PerSize::Rule(angles),
+    parameters: Cow::Borrowed(&PARAMETERS),
     size: Size::Chosen { symbol: "n", default: 4, least: 1, most: 20 },
-    time_unit: "s",
+    time_unit: Cow::Borrowed("s"),
     time_like: None,
     constraint: None,
-    training: |n| Bounds::uniform(n, (-0.5 * PI, 2.5 * PI), (-10.0, 10.0)),
-    validation: |n| Bounds::uniform(n, (0.0, 2.0 * PI), (-10.0, 10.0)),
-    trajectory: |n| TrajectoryTest { start: Bounds::uniform(n, (0.2, 3.0), (-0.1, 0.1)), t_end: 50.0, dt: 0.1 },
+    training: PerSize::Rule(|n| Bounds::uniform(n, (-0.5 * PI, 2.5 * PI), (-10.0, 10.0))),
+    validation: PerSize::Rule(|n| Bounds::uniform(n, (0.0, 2.0 * PI), (-10.0, 10.0))),
+    trajectory: PerSize::Rule(|n| TrajectoryTest {
+        start: Bounds::uniform(n, (0.2, 3.0), (-0.1, 0.1)),
+        t_end: 50.0,
+        dt: 0.1,
+    }),
     domain: None,
     plane: Some(Plane {
         labels: LAST_BOB,
@@ -38,6 +42,7 @@ pub const SYSTEM: System = System {
         },
     }),
     conserved: None,
+    described: None,
 };
 
 impl NPendulum {

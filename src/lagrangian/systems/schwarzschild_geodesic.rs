@@ -3,9 +3,10 @@
 use super::angular_velocity;
 use crate::lagrangian::Lagrangian;
 use crate::lagrangian::system::{
-    Bounds, Closed, Conserved, Coordinate, Parameter, Plane, Range, Size, System, TrajectoryTest,
+    Bounds, Closed, Conserved, Coordinate, Parameter, PerSize, Plane, Range, Size, System, TrajectoryTest,
 };
 use crate::scalar::Real;
+use std::borrow::Cow;
 use std::f64::consts::PI;
 
 /// `L = (-f t'^2 + r'^2 / f + r^2 (theta'^2 + sin^2 theta phi'^2)) / 2`, `f = 1 - 2M/r`, per unit of mass.
@@ -14,7 +15,7 @@ use std::f64::consts::PI;
 #[derive(Clone, Copy, Debug)]
 pub struct SchwarzschildGeodesic;
 
-const PARAMETERS: [Parameter; 1] = [Parameter { symbol: "M", default: "1", unit: "m", range: Range::Positive }];
+static PARAMETERS: [Parameter; 1] = [Parameter::new("M", "1", "m", Range::Positive)];
 
 fn bounds(phi: (f64, f64)) -> Bounds {
     Bounds {
@@ -26,27 +27,27 @@ fn bounds(phi: (f64, f64)) -> Bounds {
 
 /// Catalogue entry.
 pub const SYSTEM: System = System {
-    name: "schwarzschild-geodesic",
-    title: "Geodesic of the Schwarzschild metric",
-    coordinates: |_| {
+    name: Cow::Borrowed("schwarzschild-geodesic"),
+    title: Cow::Borrowed("Geodesic of the Schwarzschild metric"),
+    coordinates: PerSize::Rule(|_| {
         let theta = Coordinate { periodic: false, ..Coordinate::angle("theta") };
         vec![Coordinate::length("t"), Coordinate::length("r"), theta, Coordinate::angle("phi")]
-    },
-    parameters: &PARAMETERS,
+    }),
+    parameters: Cow::Borrowed(&PARAMETERS),
     size: Size::Fixed(4),
-    time_unit: "m",
+    time_unit: Cow::Borrowed("m"),
     time_like: Some(0),
     constraint: Some("t_dot = sqrt((1 + r_dot^2/f + r^2 (theta_dot^2 + sin(theta)^2 phi_dot^2))/f), f = 1 - 2 M/r"),
-    training: |_| bounds((-0.5 * PI, 2.5 * PI)),
-    validation: |_| bounds((0.0, 2.0 * PI)),
-    trajectory: |_| TrajectoryTest {
+    training: PerSize::Rule(|_| bounds((-0.5 * PI, 2.5 * PI))),
+    validation: PerSize::Rule(|_| bounds((0.0, 2.0 * PI))),
+    trajectory: PerSize::Rule(|_| TrajectoryTest {
         start: Bounds {
             positions: vec![(0.0, 0.0), (6.0, 12.0), (0.4 * PI, 0.6 * PI), (0.0, 2.0 * PI)],
             velocities: vec![(0.0, 0.0), (-0.1, 0.1), (-0.02, 0.02), (-0.05, 0.05)],
         },
         t_end: 5.0,
         dt: 0.05,
-    },
+    }),
     domain: Some(|parameters, q| match (parameters, q) {
         (&[mass], &[_, r, theta, _]) if r > 2.0 * mass && theta.sin() != 0.0 => Ok(()),
         _ => Err("r must be above 2 M and theta keep away from the poles"),
@@ -64,6 +65,7 @@ pub const SYSTEM: System = System {
             [[redshift(mass, q[1]) * v[0]].as_slice(), &momentum].concat()
         },
     }),
+    described: None,
 };
 
 /// `theta'^2 + sin^2 theta phi'^2`.

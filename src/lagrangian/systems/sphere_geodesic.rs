@@ -1,45 +1,48 @@
 //! Free motion on a sphere in polar angle and azimuth.
 
-use super::{LENGTH, MASS, NOWHERE, angular_velocity};
+use super::{NOWHERE, angular_velocity, length, mass};
 use crate::lagrangian::Lagrangian;
 use crate::lagrangian::system::{
-    Bounds, Closed, Conserved, Coordinate, Parameter, Plane, Size, System, TrajectoryTest,
+    Bounds, Closed, Conserved, Coordinate, Parameter, PerSize, Plane, Size, System, TrajectoryTest,
 };
 use crate::scalar::Real;
+use std::borrow::Cow;
 use std::f64::consts::PI;
 
 /// `L = m R^2 (v_theta^2 + sin^2 theta v_phi^2) / 2`.
 #[derive(Clone, Copy, Debug)]
 pub struct SphereGeodesic;
 
-const PARAMETERS: [Parameter; 2] = [Parameter { symbol: "m", ..MASS }, Parameter { symbol: "R", ..LENGTH }];
+static PARAMETERS: [Parameter; 2] = [mass("m"), length("R")];
 
 /// Catalogue entry.
 pub const SYSTEM: System = System {
-    name: "sphere-geodesic",
-    title: "Geodesic on a sphere",
-    coordinates: |_| vec![Coordinate { periodic: false, ..Coordinate::angle("theta") }, Coordinate::angle("phi")],
-    parameters: &PARAMETERS,
+    name: Cow::Borrowed("sphere-geodesic"),
+    title: Cow::Borrowed("Geodesic on a sphere"),
+    coordinates: PerSize::Rule(|_| {
+        vec![Coordinate { periodic: false, ..Coordinate::angle("theta") }, Coordinate::angle("phi")]
+    }),
+    parameters: Cow::Borrowed(&PARAMETERS),
     size: Size::Fixed(2),
-    time_unit: "s",
+    time_unit: Cow::Borrowed("s"),
     time_like: None,
     constraint: None,
-    training: |_| Bounds {
+    training: PerSize::Rule(|_| Bounds {
         positions: vec![(0.1 * PI, 0.9 * PI), (-0.5 * PI, 2.5 * PI)],
         velocities: vec![(-5.0, 5.0), (-5.0, 5.0)],
-    },
-    validation: |_| Bounds {
+    }),
+    validation: PerSize::Rule(|_| Bounds {
         positions: vec![(0.1 * PI, 0.9 * PI), (0.0, 2.0 * PI)],
         velocities: vec![(-5.0, 5.0), (-5.0, 5.0)],
-    },
-    trajectory: |_| TrajectoryTest {
+    }),
+    trajectory: PerSize::Rule(|_| TrajectoryTest {
         start: Bounds {
             positions: vec![(0.25 * PI, 0.75 * PI), (0.0, 2.0 * PI)],
             velocities: vec![(-2.0, 2.0), (-2.0, 2.0)],
         },
         t_end: 20.0,
         dt: 0.05,
-    },
+    }),
     domain: Some(|_, q| if q[0].sin() != 0.0 { Ok(()) } else { Err("theta must keep away from the poles") }),
     // Seen from the side, from far along the negative y axis.
     plane: Some(Plane {
@@ -57,6 +60,7 @@ pub const SYSTEM: System = System {
             angular_velocity([q[0], q[1]], [v[0], v[1]]).map(|x| m * radius * radius * x).to_vec()
         },
     }),
+    described: None,
 };
 
 impl Lagrangian for SphereGeodesic {

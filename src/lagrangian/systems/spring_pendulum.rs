@@ -1,48 +1,48 @@
 //! Spring pendulum: a point mass on a spring that swings in a plane.
 
-use super::{ACCELERATION_OF_GRAVITY, LENGTH, MASS};
+use super::{ACCELERATION_OF_GRAVITY, length, mass};
 use crate::lagrangian::Lagrangian;
-use crate::lagrangian::system::{Bounds, Closed, Coordinate, Parameter, Plane, Range, Size, System, TrajectoryTest};
+use crate::lagrangian::system::{
+    Bounds, Closed, Coordinate, Parameter, PerSize, Plane, Range, Size, System, TrajectoryTest,
+};
 use crate::scalar::Real;
+use std::borrow::Cow;
 use std::f64::consts::PI;
 
 /// `L = m (v_r^2 + r^2 v_theta^2) / 2 + m g r cos theta - k (r - l0)^2 / 2`.
 #[derive(Clone, Copy, Debug)]
 pub struct SpringPendulum;
 
-const PARAMETERS: [Parameter; 4] = [
-    Parameter { symbol: "m", ..MASS },
-    Parameter { symbol: "k", default: "40", unit: "N/m", range: Range::AtLeastZero },
-    Parameter { symbol: "l0", ..LENGTH },
-    ACCELERATION_OF_GRAVITY,
-];
+static PARAMETERS: [Parameter; 4] =
+    [mass("m"), Parameter::new("k", "40", "N/m", Range::AtLeastZero), length("l0"), ACCELERATION_OF_GRAVITY];
 
 /// Catalogue entry.
 pub const SYSTEM: System = System {
-    name: "spring-pendulum",
-    title: "Spring pendulum",
-    coordinates: |_| vec![Coordinate::length("r"), Coordinate::angle("theta")],
-    parameters: &PARAMETERS,
+    name: Cow::Borrowed("spring-pendulum"),
+    title: Cow::Borrowed("Spring pendulum"),
+    coordinates: PerSize::Rule(|_| vec![Coordinate::length("r"), Coordinate::angle("theta")]),
+    parameters: Cow::Borrowed(&PARAMETERS),
     size: Size::Fixed(2),
-    time_unit: "s",
+    time_unit: Cow::Borrowed("s"),
     time_like: None,
     constraint: None,
-    training: |_| Bounds {
+    training: PerSize::Rule(|_| Bounds {
         positions: vec![(0.05, 5.0), (-0.5 * PI, 2.5 * PI)],
         velocities: vec![(-5.0, 5.0), (-5.0, 5.0)],
-    },
-    validation: |_| Bounds {
+    }),
+    validation: PerSize::Rule(|_| Bounds {
         positions: vec![(0.05, 5.0), (0.0, 2.0 * PI)],
         velocities: vec![(-5.0, 5.0), (-5.0, 5.0)],
-    },
-    trajectory: |_| TrajectoryTest {
+    }),
+    trajectory: PerSize::Rule(|_| TrajectoryTest {
         start: Bounds { positions: vec![(0.5, 1.5), (0.0, 2.0 * PI)], velocities: vec![(-1.0, 1.0), (-1.0, 1.0)] },
         t_end: 50.0,
         dt: 0.1,
-    },
+    }),
     domain: Some(|_, q| if q[0] > 0.0 { Ok(()) } else { Err("r must be positive") }),
     plane: Some(Plane { labels: ["x [m]", "y [m]"], point: |_, q| (q[0] * q[1].sin(), -(q[0] * q[1].cos())) }),
     conserved: None,
+    described: None,
 };
 
 impl Lagrangian for SpringPendulum {

@@ -1,38 +1,36 @@
 //! Triple pendulum: three point masses on massless rods, angles from the downward vertical.
 
-use super::{ACCELERATION_OF_GRAVITY, LAST_BOB, LENGTH, MASS, NOWHERE, angles, chain};
+use super::{ACCELERATION_OF_GRAVITY, LAST_BOB, NOWHERE, angles, chain, length, mass};
 use crate::lagrangian::Lagrangian;
-use crate::lagrangian::system::{Bounds, Closed, Parameter, Plane, Size, System, TrajectoryTest};
+use crate::lagrangian::system::{Bounds, Closed, Parameter, PerSize, Plane, Size, System, TrajectoryTest};
 use crate::scalar::Real;
+use std::borrow::Cow;
 use std::f64::consts::PI;
 
 /// `L = sum_ij mu_max(i,j) l_i l_j v_i v_j cos(q_i - q_j) / 2 + g sum_i mu_i l_i cos q_i`, `mu_i = m_i + .. + m_3`.
 #[derive(Clone, Copy, Debug)]
 pub struct TriplePendulum;
 
-const PARAMETERS: [Parameter; 7] = [
-    Parameter { symbol: "m1", ..MASS },
-    Parameter { symbol: "m2", ..MASS },
-    Parameter { symbol: "m3", ..MASS },
-    Parameter { symbol: "l1", ..LENGTH },
-    Parameter { symbol: "l2", ..LENGTH },
-    Parameter { symbol: "l3", ..LENGTH },
-    ACCELERATION_OF_GRAVITY,
-];
+static PARAMETERS: [Parameter; 7] =
+    [mass("m1"), mass("m2"), mass("m3"), length("l1"), length("l2"), length("l3"), ACCELERATION_OF_GRAVITY];
 
 /// Catalogue entry.
 pub const SYSTEM: System = System {
-    name: "triple-pendulum",
-    title: "Triple pendulum",
-    coordinates: angles,
-    parameters: &PARAMETERS,
+    name: Cow::Borrowed("triple-pendulum"),
+    title: Cow::Borrowed("Triple pendulum"),
+    coordinates: PerSize::Rule(angles),
+    parameters: Cow::Borrowed(&PARAMETERS),
     size: Size::Fixed(3),
-    time_unit: "s",
+    time_unit: Cow::Borrowed("s"),
     time_like: None,
     constraint: None,
-    training: |n| Bounds::uniform(n, (-0.5 * PI, 2.5 * PI), (-10.0, 10.0)),
-    validation: |n| Bounds::uniform(n, (0.0, 2.0 * PI), (-10.0, 10.0)),
-    trajectory: |n| TrajectoryTest { start: Bounds::uniform(n, (0.2, 3.0), (-0.1, 0.1)), t_end: 50.0, dt: 0.1 },
+    training: PerSize::Rule(|n| Bounds::uniform(n, (-0.5 * PI, 2.5 * PI), (-10.0, 10.0))),
+    validation: PerSize::Rule(|n| Bounds::uniform(n, (0.0, 2.0 * PI), (-10.0, 10.0))),
+    trajectory: PerSize::Rule(|n| TrajectoryTest {
+        start: Bounds::uniform(n, (0.2, 3.0), (-0.1, 0.1)),
+        t_end: 50.0,
+        dt: 0.1,
+    }),
     domain: None,
     plane: Some(Plane {
         labels: LAST_BOB,
@@ -42,6 +40,7 @@ pub const SYSTEM: System = System {
         },
     }),
     conserved: None,
+    described: None,
 };
 
 /// Masses carried by each rod, lengths, acceleration of gravity.

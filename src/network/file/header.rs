@@ -2,6 +2,7 @@
 
 use super::ModelFileError;
 use super::container::check_version;
+use crate::lagrangian::Description;
 use crate::network::Architecture;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -47,6 +48,9 @@ pub struct Header {
     pub architecture: Architecture,
     /// Name of the system it learned: one of the catalogue, or any text for a system that was only recorded.
     pub system: String,
+    /// The system itself, if it is described by a file; it has this name.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub description: Option<Description>,
     /// Values of all parameters of that system, in their units; empty for one that was only recorded.
     pub parameters: BTreeMap<String, f64>,
     /// Names of the components of a state: coordinates, then velocities.
@@ -81,6 +85,8 @@ impl Header {
         require(hidden.iter().all(|w| *w <= MAX_WIDTH), &format!("hidden: expected widths of at most {MAX_WIDTH}"))?;
         let units = self.architecture.dissipation.unwrap_or(1);
         require(units <= MAX_WIDTH, &format!("dissipation: expected at most {MAX_WIDTH} units"))?;
+        let named = self.description.as_ref().is_none_or(|description| description.name == self.system);
+        require(named, "description: expected the name of the system")?;
         require(self.columns.len() == 2 * n, "columns: expected two per coordinate")?;
         let distinct: std::collections::BTreeSet<_> = self.columns.iter().collect();
         require(distinct.len() == 2 * n, "columns: expected distinct names")?;

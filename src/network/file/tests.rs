@@ -28,6 +28,7 @@ fn header(hidden: Vec<usize>, embed_periodic: bool, precision: StoredPrecision) 
         parameters: BTreeMap::from([("m".to_string(), 1.0), ("g".to_string(), 9.81)]),
         columns: ["theta", "r", "theta_dot", "r_dot"].map(String::from).to_vec(),
         forces: Vec::new(),
+        description: None,
         precision,
         position: vec![[0.0, std::f64::consts::TAU], [0.5, 1.5]],
         velocity: vec![[-10.0, 10.0]; 2],

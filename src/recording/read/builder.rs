@@ -16,7 +16,7 @@ pub struct Growing {
     pub label: Option<String>,
     /// Rows of its samples.
     pub rows: Rows,
-    /// What was measured, the name empty.
+    /// The measured track, its name empty.
     pub track: Track,
     /// The row before, as it stands in the file.
     last: Vec<f64>,

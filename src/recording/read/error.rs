@@ -1,4 +1,4 @@
-//! What is wrong with files of recorded motion.
+//! Mistakes in files of recorded motion.
 
 use crate::names::{counted, one_line};
 use crate::recording::ColumnsError;
@@ -19,12 +19,12 @@ pub enum DataError {
     File {
         /// Its path.
         file: String,
-        /// What is wrong with it.
+        /// The problem.
         problem: Problem,
     },
 }
 
-/// What is wrong with a file; rows are lines of a text file or rows of an array, from 1.
+/// A problem of a file; rows are lines of a text file or rows of an array, from 1.
 #[derive(Debug, Error)]
 pub enum Problem {
     /// The file itself.
@@ -48,7 +48,7 @@ pub enum Problem {
         limit: u64,
     },
     /// A used column stands twice in the header.
-    #[error("row {row}: column {name} stands there twice")]
+    #[error("row {row}: duplicate column {name}")]
     Duplicate {
         /// Row of the header.
         row: u64,
@@ -60,14 +60,20 @@ pub enum Problem {
     Missing {
         /// Row of the header.
         row: u64,
-        /// What it was to be.
+        /// Description of what was expected.
         what: &'static str,
         /// Its name and what is there.
         problem: String,
     },
     /// Neither times nor a rate.
-    #[error("no column is called t or time: name the column of time, or give the rate in samples per second")]
-    NoTime,
+    #[error(
+        "no column is called t or time{}: name the column of time, or give the rate in samples per second",
+        listed(names)
+    )]
+    NoTime {
+        /// Names of the columns there are; none in a file without names.
+        names: Vec<String>,
+    },
     /// Names for another number of columns.
     #[error("row {row}: expected {}, as many as columns are named, found {found}", counted(*expected, "field", "fields"))]
     Width {
@@ -83,7 +89,7 @@ pub enum Problem {
     Header {
         /// The row.
         row: u64,
-        /// What stands there.
+        /// Text that stands there.
         found: String,
     },
     /// A row with too few or too many fields.
@@ -93,7 +99,7 @@ pub enum Problem {
         row: u64,
         /// Fields of the first row.
         expected: usize,
-        /// What separates them, such as ` separated by blanks`; empty for commas.
+        /// Separator of the fields, such as ` separated by blanks`; empty for commas.
         separated: &'static str,
         /// Fields of the row.
         found: usize,
@@ -105,7 +111,7 @@ pub enum Problem {
         row: u64,
         /// Name of the column.
         column: String,
-        /// What stands there.
+        /// Text that stands there.
         found: String,
     },
     /// A decimal comma.
@@ -115,7 +121,7 @@ pub enum Problem {
         row: u64,
         /// Name of the column.
         column: String,
-        /// What stands there.
+        /// Text that stands there.
         found: String,
     },
     /// Time stands still or goes back.
@@ -131,7 +137,7 @@ pub enum Problem {
         before: f64,
         /// Time of the row, as in the file.
         found: f64,
-        /// What may be the reason.
+        /// A possible reason.
         hint: &'static str,
     },
     /// A header and nothing below.
@@ -161,4 +167,15 @@ pub enum Problem {
     /// The file could not be read to its end.
     #[error("cannot read: {0}")]
     Io(#[from] std::io::Error),
+}
+
+/// The first few names of columns, such as ` (there are s, x, y)`; nothing if there are none.
+fn listed(names: &[String]) -> String {
+    const SHOWN: usize = 8;
+    let first = names.iter().take(SHOWN).cloned().collect::<Vec<_>>().join(", ");
+    match names.len() {
+        0 => String::new(),
+        more if more > SHOWN => format!(" (there are {first} and {} more)", more - SHOWN),
+        _ => format!(" (there are {first})"),
+    }
 }

@@ -18,9 +18,9 @@ pub struct Source<'a> {
     pub width: usize,
     /// Used elements of a row: place in the row, place among the used columns.
     pub wanted: Vec<(usize, usize)>,
-    /// Whether nothing may stand behind them.
+    /// `true` if nothing may stand behind them.
     pub whole: bool,
-    /// What a message calls it, with a space behind it, if it is one of several.
+    /// Name in a message, with a space behind it, if it is one of several.
     pub name: String,
 }
 

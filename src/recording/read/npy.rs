@@ -35,7 +35,7 @@ pub struct Header {
     pub dimensions: usize,
     /// Type of the numbers.
     pub element: Element,
-    /// Whether columns follow each other, not rows.
+    /// `true` if columns follow each other, not rows.
     pub fortran: bool,
     /// Bytes before the first number.
     pub start: u64,

@@ -22,7 +22,7 @@ pub struct Selection {
     pub width: usize,
     /// Time if it is a column, coordinates, velocities, accelerations, forces.
     pub values: Vec<Used>,
-    /// Whether the first of them is the time.
+    /// `true` if the first of them is the time.
     pub timed: bool,
     /// The column that tells trajectories apart.
     pub trajectory: Option<Used>,
@@ -65,7 +65,8 @@ impl Selection {
                 let usual = |name: &&String| ["t", "time"].iter().any(|usual| name.eq_ignore_ascii_case(usual));
                 let taken = |name: &&String| columns.used().any(|(_, other)| other == *name);
                 let name = names.unwrap_or(&[]).iter().find(|name| usual(name) && !taken(name));
-                Some(find("time", name.ok_or(Problem::NoTime)?)?)
+                let nothing = || Problem::NoTime { names: names.unwrap_or(&[]).to_vec() };
+                Some(find("time", name.ok_or_else(nothing)?)?)
             }
         };
         let timed = time.is_some();

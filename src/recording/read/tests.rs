@@ -94,8 +94,11 @@ fn wrong_columns_are_named() {
         refusal(&text[16..], &Columns { names: Some(list("a,b")), ..coordinates("b") }).contains("expected 2 fields")
     );
     assert!(refusal(&text[16..], &Columns { rate: Some(1.0), ..coordinates("q") }).contains("in a file without names"));
-    assert!(refusal(table("s,q1,q2", 20, &[]), &coordinates("q1")).contains("no column is called t or time"));
-    assert_eq!(refusal(table("t,q1,q1", 20, &[]), &coordinates("q1")), "row 1: column q1 stands there twice");
+    assert!(
+        refusal(table("s,q1,q2", 20, &[]), &coordinates("q1"))
+            .contains("no column is called t or time (there are s, q1, q2)")
+    );
+    assert_eq!(refusal(table("t,q1,q1", 20, &[]), &coordinates("q1")), "row 1: duplicate column q1");
 }
 
 #[test]

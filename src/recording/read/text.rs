@@ -1,6 +1,6 @@
 //! Lines of text cut into fields.
 
-/// What stands between the fields of a line.
+/// Separator of the fields of a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Separator {
     Comma,
@@ -25,7 +25,7 @@ impl Separator {
         }
     }
 
-    /// What a message adds to "fields"; nothing for commas.
+    /// Words that a message adds to "fields"; nothing for commas.
     pub(crate) fn named(self) -> &'static str {
         match self {
             Self::Comma => "",
@@ -80,7 +80,7 @@ impl<'a> Iterator for Fields<'a> {
     }
 }
 
-/// What a comment says, if a line is one: text behind a `#`.
+/// Text of a comment behind its `#`, if the line is one.
 pub(crate) fn comment(line: &[u8]) -> Option<&[u8]> {
     line.starts_with(b"#").then(|| {
         let marks = line.iter().take_while(|byte| **byte == b'#').count();

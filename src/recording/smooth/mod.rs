@@ -16,7 +16,7 @@ use local_fit::{Estimate, LocalFit};
 use thiserror::Error;
 use window::Signal;
 
-/// How derivatives are taken; what is not given is chosen from the data.
+/// Settings of derivatives; those that are not given are chosen from the data.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SmoothOptions {
     /// Degree of the polynomials, 2 to 8.
@@ -25,7 +25,7 @@ pub struct SmoothOptions {
     pub window: Option<usize>,
     /// Standard deviations of the positions' noise, one per coordinate; estimated if not given.
     pub noise: Option<Vec<f64>>,
-    /// Whether measured velocities, if there are any, take part.
+    /// `true` if measured velocities take part where there are any.
     pub velocities: bool,
 }
 
@@ -45,7 +45,7 @@ pub enum SmoothError {
         what: &'static str,
         /// Its range.
         expected: String,
-        /// What it was.
+        /// Value that was given.
         found: String,
     },
     /// A trajectory too short for the window.
@@ -81,7 +81,7 @@ pub struct Chosen {
     pub seconds: f64,
 }
 
-/// How the derivatives of a recording are taken: one window per coordinate, the same in seconds for all trajectories.
+/// Smoothing of a recording: one window per coordinate, the same in seconds for all trajectories.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Smoothing {
     /// Degree of the polynomials.
@@ -130,7 +130,7 @@ impl Smoothed {
     }
 }
 
-/// Whether steps are equal to within the rounding of the times.
+/// `true` if steps are equal to within the rounding of the times.
 pub(crate) fn is_regular(times: &[f64]) -> bool {
     let [first, .., last] = times else { return true };
     let step = (last - first) / (times.len() - 1) as f64;

@@ -16,7 +16,7 @@ pub struct Noise {
     pub sigma: f64,
     /// Order of the differences that gave it.
     pub order: usize,
-    /// Whether higher differences agree. If not, the motion is sampled too coarsely to be told from noise, and `sigma`
+    /// `true` if higher differences agree. If not, the motion is sampled too coarsely to be told from noise, and `sigma`
     /// is an upper bound.
     pub resolved: bool,
 }

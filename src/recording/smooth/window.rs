@@ -9,7 +9,7 @@ const CENTRES: usize = 2048;
 /// Longest window that is tried, in samples.
 const LONGEST: usize = 2001;
 
-/// How well one coordinate's derivatives are known, on average over the recording.
+/// Errors of one coordinate's derivatives, on average over the recording.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Quality {
     /// Length of the window in samples, odd.
@@ -45,7 +45,7 @@ impl Quality {
 pub struct Signal<'a> {
     /// The trajectories.
     pub tracks: &'a [Track],
-    /// Whether the steps of each are equal.
+    /// `true` for each whose steps are equal.
     pub regular: &'a [bool],
     /// Number of coordinates.
     pub n: usize,
@@ -103,7 +103,7 @@ impl Signal<'_> {
         visited as f64 / centres.max(1) as f64
     }
 
-    /// What a window gives: variance from the noise; squared bias from the change by two more degrees, whose own
+    /// Errors by a window: variance from the noise; squared bias from the change by two more degrees, whose own
     /// variance is taken out. None if fewer than half the samples are on trajectories long enough.
     pub fn quality(&self, window: usize) -> Option<Quality> {
         let noise = self.sigma * self.sigma;

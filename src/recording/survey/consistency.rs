@@ -1,4 +1,4 @@
-//! Whether measured velocities and accelerations are the derivatives of the positions.
+//! Comparison of measured velocities and accelerations with the derivatives of the positions.
 
 use crate::recording::Recording;
 use crate::recording::smooth::Smoothing;
@@ -12,18 +12,18 @@ pub struct Consistency {
     pub factor: f64,
     /// Correlation of the two.
     pub correlation: f64,
-    /// How well the computed one is known: its error over its size.
+    /// Relative error of the computed one.
     pub uncertainty: f64,
 }
 
 impl Consistency {
-    /// Whether the two agree as far as they are known.
+    /// `true` if the two agree as far as they are known.
     pub fn holds(&self) -> bool {
         let doubt = 0.05 + 2.0 * self.uncertainty * self.uncertainty;
         (self.factor - 1.0).abs() <= doubt && self.correlation >= 0.9 - self.uncertainty
     }
 
-    /// What may be wrong, if the factor is that of a usual mistake.
+    /// A possible mistake, if the factor is that of a usual one.
     pub fn mistake(&self, step: f64) -> Option<&'static str> {
         let known = [
             (180.0 / PI, "degrees where radians are expected?"),

@@ -1,4 +1,4 @@
-//! What is known about one coordinate.
+//! Survey of one coordinate.
 
 use super::consistency::{Consistency, compare};
 use crate::recording::Recording;
@@ -11,7 +11,7 @@ use std::f64::consts::TAU;
 pub struct CoordinateSurvey {
     /// Its name.
     pub name: String,
-    /// Whether it is an angle, unwrapped.
+    /// `true` for an angle; it is unwrapped.
     pub periodic: bool,
     /// Least value.
     pub min: f64,
@@ -21,7 +21,7 @@ pub struct CoordinateSurvey {
     pub noise: f64,
     /// The noise over the range.
     pub noise_relative: f64,
-    /// Whether motion and noise can be told apart; if not, `noise` is an upper bound.
+    /// `true` if motion and noise can be told apart; if not, `noise` is an upper bound.
     pub noise_resolved: bool,
     /// Root mean square of the velocity.
     pub velocity: f64,

@@ -1,4 +1,4 @@
-//! What recorded motion is good for, before anything is learned from it.
+//! Survey of recorded motion, before anything is learned from it.
 
 mod consistency;
 mod coordinate;
@@ -22,10 +22,10 @@ pub const FEW_SAMPLES: f64 = 20.0;
 /// A step of an angle, in rad, from which on unwrapping is a guess.
 const GUESS: f64 = 2.0;
 
-/// How to look.
+/// Settings of a survey.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SurveyOptions {
-    /// How derivatives would be taken.
+    /// Settings of derivatives.
     pub smooth: SmoothOptions,
     /// Share of the samples that would be held out for validation.
     pub validation: f64,
@@ -83,23 +83,23 @@ pub struct Survey {
     pub coordinates: Vec<CoordinateSurvey>,
     /// Places that do not look like smooth motion with noise; of very many the first.
     pub suspicious: Vec<Suspicion>,
-    /// How many there are.
+    /// Number of suspicious places.
     pub suspicious_count: usize,
     /// Degree of the polynomials of smoothing.
     pub degree: usize,
     /// The advised way to learn.
     pub targets: Targets,
-    /// What would be held out for validation.
+    /// Part that would be held out for validation.
     pub held_out: Option<HeldOut>,
     /// The same in words.
     pub held_out_text: String,
     /// Names of coordinates that stand still: nothing can be learned from them.
     pub motionless: Vec<String>,
-    /// What to know before learning.
+    /// Facts to know before learning.
     pub warnings: Vec<String>,
 }
 
-/// How derivatives are taken: of positions alone, and as a fit takes them. Measured velocities take part only where they
+/// Smoothings: of positions alone, and as a fit takes it. Measured velocities take part only where they
 /// are what they are called.
 ///
 /// # Errors

@@ -1,12 +1,13 @@
 //! Coordinates that stand still.
 
+use crate::names::number;
 use crate::recording::Recording;
 use crate::recording::smooth::Smoothing;
 
 /// Samples scatter by so many standard deviations of the noise at least where something moves.
 const MOVES: f64 = 1.2;
 
-/// How a coordinate stands still.
+/// Way in which a coordinate stands still.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Stillness {
     /// It keeps one value in every trajectory.
@@ -19,12 +20,12 @@ impl std::fmt::Display for Stillness {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::Constant(value) => write!(f, "does not move: it is {value} in every sample"),
-            Self::Noise(sigma) => write!(f, "does not move beyond its noise of {sigma:.3e}"),
+            Self::Noise(sigma) => write!(f, "does not move beyond its noise of {}", number(*sigma)),
         }
     }
 }
 
-/// Whether coordinate `i` stands still in all trajectories, and how. What is sampled too coarsely to be told from noise may
+/// Stillness of coordinate `i` in all trajectories; none if it moves. Motion sampled too coarsely to be told from noise may
 /// move.
 pub fn stillness(recording: &Recording, i: usize, smoothing: &Smoothing) -> Option<Stillness> {
     let n = recording.n();

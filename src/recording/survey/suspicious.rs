@@ -14,7 +14,7 @@ const FROZEN: usize = 8;
 /// Suspicions that are kept.
 const MOST: usize = 1000;
 
-/// What is suspicious.
+/// Kind of a suspicious place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Kind {
@@ -37,11 +37,11 @@ pub struct Suspicion {
     pub row: u64,
     /// Name of the coordinate.
     pub coordinate: String,
-    /// What it looks like.
+    /// Its kind.
     pub kind: Kind,
     /// Its value there.
     pub value: f64,
-    /// How far the sample or all later ones are off; of a kink, by how much the velocity changes; of a frozen sensor,
+    /// Offset of the sample or of all later ones; of a kink, the change of the velocity; of a frozen sensor,
     /// the number of equal values.
     pub size: f64,
 }

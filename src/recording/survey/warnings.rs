@@ -1,8 +1,8 @@
-//! What a reader should know before learning from the data.
+//! Warnings that a reader should know before learning from the data.
 
 use super::suspicious::Kind;
 use super::{FEW_SAMPLES, Stillness, Survey};
-use crate::names::counted;
+use crate::names::{counted, number};
 use std::f64::consts::TAU;
 
 /// One sentence each.
@@ -26,9 +26,9 @@ pub fn warnings(survey: &Survey, still: &[(usize, Stillness)]) -> Vec<String> {
         }
         if c.samples_per_period < FEW_SAMPLES {
             all.push(format!(
-                "{name}: {:.1} samples per period of its fast motion ({:.3e} s), expected at least {FEW_SAMPLES}: sample \
-                 faster",
-                c.samples_per_period, c.period
+                "{name}: {:.1} samples per period of its fast motion ({} s), expected at least {FEW_SAMPLES}: sample faster",
+                c.samples_per_period,
+                number(c.period)
             ));
         }
         let measured = [("velocity", 1, &c.measured_velocity), ("acceleration", 2, &c.measured_acceleration)];
@@ -37,9 +37,10 @@ pub fn warnings(survey: &Survey, still: &[(usize, Stillness)]) -> Vec<String> {
                 let order = ["", "", "second "][derivative];
                 let hint = consistency.mistake(survey.step).map(|text| format!(": {text}")).unwrap_or_default();
                 all.push(format!(
-                    "the measured {what} of {name} is {:.4} times the {order}derivative of its positions (correlation \
+                    "the measured {what} of {name} is {} times the {order}derivative of its positions (correlation \
                      {:.3}){hint}",
-                    consistency.factor, consistency.correlation
+                    number(consistency.factor),
+                    consistency.correlation
                 ));
             }
         }

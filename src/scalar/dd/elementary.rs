@@ -6,7 +6,7 @@ use crate::scalar::{Real, Scalar};
 const ONE: Dd = Dd::leading(1.0);
 const HALF: Dd = Dd::leading(0.5);
 pub(super) const LN_2: Dd = Dd { high: std::f64::consts::LN_2, low: 2.3190468138462996e-17 };
-/// What `LN_2` leaves of the logarithm of 2.
+/// Rest of the logarithm of 2 behind `LN_2`.
 const LN_2_REST: f64 = 5.707708438416212e-34;
 
 impl Dd {

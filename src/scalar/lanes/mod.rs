@@ -36,7 +36,7 @@ impl<S: Copy + std::ops::Mul<Output = S>> Exponential<S> {
     }
 }
 
-/// What a scalar offers to loops over many numbers.
+/// Functions of a scalar over many numbers.
 ///
 /// The `lane_*` functions have no branch and no call: a loop over them inside [`crate::scalar::vectorized`] becomes
 /// vector instructions for `f32` and `f64`. Outside of it they are right but slow (a fused multiply-add without
@@ -117,13 +117,13 @@ pub fn sqrt_lanes<S: Scalar>(x: &[S], out: &mut [S]) {
     );
 }
 
-/// Whether the fast reduction serves an angle.
+/// `true` if the fast reduction serves an angle.
 #[inline(always)]
 fn is_fast<S: Scalar>(x: S) -> bool {
     Real::abs(x) <= S::FAST_ANGLE
 }
 
-/// Whether some angle needs the scalar function: too large, infinite or `NaN`.
+/// `true` if some angle needs the scalar function: too large, infinite or `NaN`.
 #[inline(always)]
 fn any_large<S: Scalar>(x: &[S]) -> bool {
     x.iter().fold(false, |any, &x| any | !is_fast(x))

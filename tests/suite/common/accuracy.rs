@@ -17,7 +17,7 @@ pub fn configure<S: Scalar>(name: &str, given: &[(&str, &str)]) -> Configured<S>
 
 /// The same system, with the same numbers, in another precision.
 pub fn recast<S: Scalar, T: Scalar>(system: &Configured<S>) -> Configured<T> {
-    Configured { system: system.system, coordinates: system.coordinates, parameters: cast(&system.parameters) }
+    Configured { system: system.system.clone(), coordinates: system.coordinates, parameters: cast(&system.parameters) }
 }
 
 /// A random state of a box, on the mass shell if the system has one.
@@ -67,7 +67,7 @@ pub fn input_conditions(system: &Configured<Dd>, q: &[Dd], v: &[Dd], base: &[(&s
         } else {
             &mut moved.parameters[k - 2 * n]
         };
-        let angle = k < n && (system.system.coordinates)(n)[k].periodic;
+        let angle = k < n && system.system.coordinates(n)[k].periodic;
         let size = x.to_f64().abs().min(if angle { 2.0 * std::f64::consts::PI } else { f64::INFINITY });
         *x += Dd::of_f64(size) * step;
         let changed = outputs(&*moved.build().unwrap(), &q, &v);

@@ -11,6 +11,10 @@ use std::path::{Path, PathBuf};
 const GENERATED: [&str; 2] =
     ["<!-- generated from src/training/reference.rs -->\n\n", "<!-- end of the generated part -->\n"];
 
+/// The same around the keys of a fit.
+const OF_A_FIT: [&str; 2] =
+    ["<!-- generated from src/cli/fit_config.rs -->\n\n", "<!-- end of the generated part of fits -->\n"];
+
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
@@ -287,8 +291,20 @@ fn the_commands_of_the_readme_run() {
         run.push(words[0].clone());
     }
     assert_eq!(run, ["train", "rollout", "evaluate", "check", "fit"]);
-    for file in ["trained/report.html", "motion.csv", "evaluation/trace_start1.png", "fitted/report.html"] {
+    for file in ["trained/report.html", "motion.csv", "evaluation/report.html", "fitted/report.html"] {
         assert!(folder.path(file).exists(), "no {file}: {:?}", folder.names());
+    }
+    // The pictures of the README are files that its command writes: of the same size, with the same words.
+    for (shown, drawn) in [("docs/motion.svg", "trace_start1.svg"), ("docs/metric.svg", "det_mass_matrix.svg")] {
+        assert!(readme.contains(&format!("]({shown})")) && readme.contains(drawn), "{shown}, {drawn}");
+        let (shown, drawn) = (read(shown), fs::read_to_string(folder.path("evaluation").join(drawn)).unwrap());
+        let frame = |svg: &str| {
+            let titles =
+                svg.split("font-weight=\"600\">").skip(1).map(|rest| rest.split('<').next().unwrap().to_string());
+            (svg.lines().next().unwrap().to_string(), titles.collect::<Vec<String>>())
+        };
+        assert_eq!(frame(&shown), frame(&drawn));
+        assert!(shown.len() < 100_000 && !frame(&shown).1.is_empty());
     }
 }
 
@@ -327,14 +343,21 @@ fn every_option_is_in_the_guide() {
 fn the_configuration_reference_is_that_of_the_types() {
     let path = "docs/configuration.md";
     let page = read(path);
-    let [begin, end] = GENERATED;
-    let (before, rest) = page.split_once(begin).expect("the generated part begins");
-    let (stands, after) = rest.split_once(end).expect("the generated part ends");
-    let made = lnn::training::configuration_reference();
+    let of_training = lnn::training::configuration_reference();
+    // A fit's reference goes on with that of a training.
+    let whole = lnn(&["fit", "data.csv", "--coords", "q", "--print-config=markdown"]).stdout;
+    let of_fit = whole.strip_suffix(&of_training).expect("the keys of a training follow those of a fit");
+    assert!(of_fit.contains("| `horizon` |") && of_fit.contains("| `periodic` |"), "{of_fit}");
+    let mut written = page.clone();
+    for ([begin, end], made) in [(GENERATED, of_training.as_str()), (OF_A_FIT, of_fit)] {
+        let (before, rest) = written.split_once(begin).expect("the generated part begins");
+        let (_, after) = rest.split_once(end).expect("the generated part ends");
+        written = [before, begin, made, end, after].concat();
+    }
     if std::env::var_os("LNN_WRITE_DOCS").is_some() {
-        fs::write(root().join(path), [before, begin, &made, end, after].concat()).unwrap();
+        fs::write(root().join(path), &written).unwrap();
     } else {
-        assert!(stands == made, "{path} is old: LNN_WRITE_DOCS=1 cargo test --test suite house::docs writes it anew");
+        assert!(page == written, "{path} is old: LNN_WRITE_DOCS=1 cargo test --test suite house::docs writes it anew");
     }
     let toml: Vec<&str> =
         lines(&page).1.into_iter().filter(|(language, _)| *language == "toml").map(|(_, line)| line).collect();

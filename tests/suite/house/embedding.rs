@@ -109,8 +109,7 @@ fn dependencies(features: &[&str]) -> Vec<String> {
 
 #[test]
 fn the_library_leaves_the_program_out() {
-    let program =
-        ["clap", "clap_complete", "clap_mangen", "indicatif", "kuva", "signal-hook", "toml", "tracing-subscriber"];
+    let program = ["clap", "clap_complete", "clap_mangen", "indicatif", "signal-hook", "toml", "tracing-subscriber"];
     let learning = ["argmin", "nalgebra", "ode_solvers", "rayon", "safetensors", "serde_json", "tracing", "zip"];
     let (all, library) = (dependencies(&[]), dependencies(&["--no-default-features"]));
     for name in program.into_iter().chain(learning) {

@@ -92,3 +92,8 @@ fn linalg() {
 fn network() {
     try_target("network", 1000, targets::network::run);
 }
+
+#[test]
+fn system_file() {
+    try_target("system_file", 2000, targets::system_file::run);
+}

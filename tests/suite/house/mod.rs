@@ -5,3 +5,4 @@ mod embedding;
 mod examples;
 mod fuzz_seeds;
 mod rooms;
+mod wording;

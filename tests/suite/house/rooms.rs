@@ -25,7 +25,7 @@ const ROOMS: [&str; 16] = [
 ];
 
 /// Crates and the only places that may name them.
-const ADAPTERS: [(&str, &str); 16] = [
+const ADAPTERS: [(&str, &str); 15] = [
     ("pulp", "src/scalar/"),
     ("xprec", "src/scalar/"),
     ("libm", "src/scalar/"),
@@ -35,7 +35,6 @@ const ADAPTERS: [(&str, &str); 16] = [
     ("argmin", "src/training/"),
     ("safetensors", "src/network/file/"),
     ("crc32fast", "src/network/file/"),
-    ("kuva", "src/report/plot"),
     ("zip", "src/recording/read/npz.rs"),
     ("clap", "src/cli/"),
     ("clap_complete", "src/cli/"),

@@ -180,11 +180,11 @@ fn relativistic() -> impl Iterator<Item = &'static System> {
 
 fn signatures<S: Scalar>(rng: &mut ChaCha8Rng) {
     for system in lagrangian::systems() {
-        let configured = configure::<S>(system.name, &[]);
+        let configured = configure::<S>(&system.name, &[]);
         let n = configured.coordinates;
         let built = configured.build().unwrap();
         for _ in 0..50 {
-            let (q, v) = random_state(&configured, &(system.validation)(n), rng);
+            let (q, v) = random_state(&configured, &system.validation(n), rng);
             let mut terms = Terms::default();
             built.terms(&q, &v, Request::MASS_MATRIX | Request::LAGRANGIAN | Request::MOMENTUM, &mut terms).unwrap();
             let mut scratch = vec![S::of_f64(0.0); n * n];
@@ -215,9 +215,9 @@ fn signatures_are_exact_and_sampled_states_on_the_mass_shell() {
 fn energy_and_mass_shell_are_kept_along_the_motion() {
     let mut rng = ChaCha8Rng::seed_from_u64(22);
     for system in lagrangian::systems() {
-        let configured = configure::<f64>(system.name, &[]);
+        let configured = configure::<f64>(&system.name, &[]);
         let n = configured.coordinates;
-        let test = (system.trajectory)(n);
+        let test = system.trajectory(n);
         let options = Options::reference(test.t_end.min(5.0), test.dt);
         let built = configured.build().unwrap();
         for _ in 0..3 {
@@ -333,9 +333,9 @@ fn circular_orbits_around_a_black_hole() {
 fn boxes_of_random_states_lie_in_the_domain() {
     let mut rng = ChaCha8Rng::seed_from_u64(24);
     for system in lagrangian::systems() {
-        let configured = configure::<f64>(system.name, &[]);
+        let configured = configure::<f64>(&system.name, &[]);
         let n = configured.coordinates;
-        for bounds in [(system.training)(n), (system.validation)(n), (system.trajectory)(n).start] {
+        for bounds in [system.training(n), system.validation(n), system.trajectory(n).start] {
             let inside = |bounds: &Bounds, rng: &mut ChaCha8Rng| {
                 let (q, v) = random_state(&configured, bounds, rng);
                 configured.check_domain(&q).is_ok()

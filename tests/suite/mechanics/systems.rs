@@ -13,8 +13,8 @@ fn accuracy<S: Scalar>(name: &str, given: &[(&str, &str)], rng: &mut ChaCha8Rng)
     let wide: Configured<Dd> = recast(&system);
     let n = system.coordinates;
     let (narrow, judge) = (system.build().unwrap(), wide.build().unwrap());
-    let bounds = (system.system.validation)(n);
-    let periodic: Vec<bool> = (system.system.coordinates)(n).iter().map(|c| c.periodic).collect();
+    let bounds = system.system.validation(n);
+    let periodic: Vec<bool> = system.system.coordinates(n).iter().map(|c| c.periodic).collect();
     let mut worst: Vec<(&'static str, f64)> = Vec::new();
     let eps = S::EPSILON.to_f64();
     for case in 0..60 {
@@ -134,10 +134,10 @@ fn closed_forms_agree<S: Scalar>(rng: &mut ChaCha8Rng) {
             let text = n.to_string();
             let given = [("n", text.as_str())];
             let given = if matches!(system.size, lagrangian::system::Size::Fixed(_)) { &given[..0] } else { &given };
-            let configured = configure::<S>(system.name, given);
+            let configured = configure::<S>(&system.name, given);
             let wide: Configured<Dd> = recast(&configured);
             let (built, judge) = (configured.build().unwrap(), wide.build().unwrap());
-            let bounds = (system.validation)(n);
+            let bounds = system.validation(n);
             for _ in 0..5 {
                 let (q, v) = random_state(&configured, &bounds, rng);
                 let mut terms = Terms::default();
@@ -173,9 +173,9 @@ fn batches_replayed_agree_with_single_states_and_requests_with_each_other() {
     let mut rng = ChaCha8Rng::seed_from_u64(13);
     for system in lagrangian::systems() {
         let n = system.size.default();
-        let configured = configure::<f64>(system.name, &[]);
+        let configured = configure::<f64>(&system.name, &[]);
         let built = configured.build().unwrap();
-        let bounds = (system.validation)(n);
+        let bounds = system.validation(n);
         let batch = 150;
         let states = (0..batch).map(|_| random_state(&configured, &bounds, &mut rng));
         let (q, v): (Vec<_>, Vec<_>) = states.unzip();

@@ -324,6 +324,7 @@ fn config(units: Option<usize>, epochs: usize) -> Config {
     let bounds = || vec![[-1.0, 1.0]; 2];
     Config {
         from: None,
+        description: None,
         system: "recorded".to_string(),
         seed: 1,
         precision: Precision::F32,

@@ -165,7 +165,7 @@ fn bad_files_are_refused() {
         csv("t,x,yy", &swing(40, 1)).as_bytes(),
         &["row 1: missing coordinate: unknown column \"y\""],
     );
-    refused("twice.csv", csv("t,x,x", &swing(40, 1)).as_bytes(), &["row 1: column x stands there twice"]);
+    refused("twice.csv", csv("t,x,x", &swing(40, 1)).as_bytes(), &["row 1: duplicate column x"]);
     refused("empty.csv", b"", &["the file is empty"]);
     refused("header.csv", b"t,x,y\n", &["no rows of numbers"]);
     refused("few.csv", csv("t,x,y", &swing(5, 1)).as_bytes(), &["at least 16 rows", "found 5"]);

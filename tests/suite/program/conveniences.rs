@@ -161,12 +161,12 @@ fn a_motion_may_leave_the_training_range() {
         lnn(&[&["rollout", &run], &start[..], more].concat())
     };
     moved(&[]).refused(1, &["left the training range at t = 0", "theta2_dot", "--beyond-range"]);
-    let (png, page) = (text(&folder.path("motion.png")), text(&folder.path("motion.html")));
-    let beyond = moved(&["--beyond-range", "--plot", &png]);
+    let (svg, page) = (text(&folder.path("motion.svg")), text(&folder.path("motion.html")));
+    let beyond = moved(&["--beyond-range", "--plot", &svg]);
     assert_eq!(beyond.code, Some(0), "{}", beyond.stderr);
     assert!(beyond.stderr.starts_with("note: left the training range at t = 0: theta2_dot"), "{}", beyond.stderr);
     assert_eq!(fs::read_to_string(&csv).unwrap().lines().count(), 4);
-    assert!(fs::read(&png).unwrap().starts_with(b"\x89PNG"));
+    assert!(fs::read(&svg).unwrap().starts_with(b"<svg"));
     let beyond = moved(&["--beyond-range", "--json", "--plot", &page]);
     let facts: Value = serde_json::from_str(&beyond.stdout).unwrap();
     assert_eq!((&facts["samples"], &facts["time_unit"]), (&3.into(), &"s".into()));
@@ -174,7 +174,7 @@ fn a_motion_may_leave_the_training_range() {
     assert!(fs::read_to_string(&page).unwrap().contains("Energy of the model"));
     // Neither the model nor what is there already is drawn over.
     lnn(&[&["rollout", &run, "--out", "-", "--plot", &page], &START[..]].concat()).refused(1, &["--overwrite"]);
-    moved(&["--plot", "motion.svg"]).refused(2, &["--plot", ".png or .html"]);
+    moved(&["--plot", "motion.png"]).refused(2, &["--plot", ".svg or .html"]);
     let both = [&["rollout", &run, "--out", "-", "--json"], &START[..]].concat();
     lnn(&both).refused(2, &["--json", "standard output"]);
 }

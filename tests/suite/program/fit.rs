@@ -18,7 +18,7 @@ const ANGLES: [&[&str]; 2] = [&["angle"], &["upper", "lower"]];
 
 /// Swings at 50 Hz as a CSV, columns `run,t`, then positions, velocities and accelerations of every coordinate, the last two
 /// with `_dot` and `_ddot` behind its name; positions with a noise of `sigma`.
-fn swings(model: &dyn EulerLagrange<f64>, runs: usize, seconds: f64, sigma: f64) -> String {
+pub(super) fn swings(model: &dyn EulerLagrange<f64>, runs: usize, seconds: f64, sigma: f64) -> String {
     let mut rng = ChaCha8Rng::seed_from_u64(5);
     let n = model.coordinates();
     let columns: [String; 3] =
@@ -92,12 +92,17 @@ fn recorded_positions_become_a_model_that_predicts() {
     let (model, straight) = errors(&found);
     assert!(model < 0.1 * straight, "{model} {straight}");
     assert_eq!(found["wrong_signature"], 0.0);
+    assert!(found["valid_time"]["median"].as_f64().unwrap() > 0.0 && found["valid_time"]["lyapunov_times"].is_null());
+    assert!(run.stdout.contains("Prediction valid (error below 0.4 of the spread of the motion), median of"));
+    let report = fs::read_to_string(folder.path("out/report.html")).unwrap();
+    assert!(report.contains("class=\"lead\">measured: the learned Lagrangian predicts"));
+    assert!(report.len() < 2_000_000, "{}", report.len());
     assert!(run.stdout.contains("learned from smoothed accelerations") && run.stdout.contains("report: "));
     let mut names: Vec<_> =
         fs::read_dir(folder.path("out")).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
     names.sort();
     for name in
-        ["config.toml", "history.csv", "model.safetensors", "prediction_error.png", "report.html", "summary.json"]
+        ["config.toml", "history.csv", "model.safetensors", "prediction_error.svg", "report.html", "summary.json"]
     {
         assert!(names.iter().any(|n| n == name), "{name} is not in {names:?}");
     }

@@ -231,7 +231,7 @@ fn bad_states_are_data_errors() {
     refused(&with("1,2,3"), &["row 3: expected 4 fields, found 3"]);
     refused(b"theta1,theta2,theta1_dot\n1,2,3\n", &["missing column theta2_dot"]);
     refused(b"t,theta1,theta2,theta1_dot,theta2_do\n1,2,3,4,5\n", &["unknown column \"theta2_do\""]);
-    refused(b"theta1,theta2,theta1_dot,theta1\n1,2,3,4\n", &["theta1 stands there twice"]);
+    refused(b"theta1,theta2,theta1_dot,theta1\n1,2,3,4\n", &["duplicate column theta1"]);
     refused(b"theta1;theta2;theta1_dot;theta2_dot\n1;2;3\n", &["expected 4 fields separated by semicolons, found 3"]);
     refused(b"1,2,3,4\n", &["expected a header with the columns theta1,theta2"]);
     refused(HEADER.as_bytes(), &["no states"]);

@@ -57,12 +57,12 @@ fn a_model_is_replaced_on_demand_alone_and_leaves_nothing_behind() {
         .refused(1, &["config.toml", "this command reads it"]);
 
     // A fit takes its place: pictures of another name, the evaluation of the old model and captions of both go.
-    assert!(before.contains(&"lagrangian.png".to_string()) && before.contains(&"evaluation".to_string()));
+    assert!(before.contains(&"lagrangian.svg".to_string()) && before.contains(&"evaluation".to_string()));
     fs::write(folder.path("out/notes.txt"), "mine").unwrap();
     let replaced = fit(&data, &["--overwrite"]);
     assert_eq!(replaced.code, Some(0), "{}", replaced.stderr);
     let after = names(&folder.path("out"));
-    assert!(!after.contains(&"lagrangian.png".to_string()) && !after.contains(&"evaluation".to_string()), "{after:?}");
+    assert!(!after.contains(&"lagrangian.svg".to_string()) && !after.contains(&"evaluation".to_string()), "{after:?}");
     assert!(after.contains(&"notes.txt".to_string()) && read("model.safetensors") != first, "{after:?}");
     let refused = fit(&data, &[]);
     assert!(refused.stderr.contains("a finished fit of measured (seed 0, 1 epochs)"), "{}", refused.stderr);

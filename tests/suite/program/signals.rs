@@ -95,9 +95,9 @@ fn on_a_full_disk_pictures_are_lost_first() {
     for name in ["model.safetensors", "config.toml", "history.csv", "summary.json", "captions.json"] {
         assert!(out.join(name).is_file(), "{name}");
     }
-    assert!(!out.join("report.html").exists() && !out.join("lagrangian.png").exists());
+    assert!(!out.join("report.html").exists() && !out.join("lagrangian.svg").exists());
     // With room on the disk the rest comes.
     let resumed = lnn(&["train", "--resume", &text(&out)]);
     assert_eq!((resumed.code, resumed.stderr.as_str()), (Some(0), ""));
-    assert!(out.join("report.html").is_file() && out.join("lagrangian.png").is_file() && !out.join(NEWEST).exists());
+    assert!(out.join("report.html").is_file() && out.join("lagrangian.svg").is_file() && !out.join(NEWEST).exists());
 }

@@ -81,10 +81,10 @@ fn energy_is_kept<S: Scalar>() {
     let mut known = Row::new::<S>(29, "grad E . (v, a) = 0: every system");
     let mut geodesic = Row::new::<S>(31, "grad L . (v, a) = 0: geodesics");
     for system in lagrangian::systems() {
-        let configured = configure::<S>(system.name, &[]);
+        let configured = configure::<S>(&system.name, &[]);
         let (model, judge) = (configured.build().unwrap(), recast::<S, Dd>(&configured).build().unwrap());
         for _ in 0..20 {
-            let (q, v) = random_state(&configured, &(system.validation)(configured.coordinates), &mut rng);
+            let (q, v) = random_state(&configured, &system.validation(configured.coordinates), &mut rng);
             let r = energy_error((&*model, &*judge), &q, &v, |terms| terms.energy[0]);
             known.see(r, || system.name.to_string());
             if system.name.contains("geodesic") {
@@ -132,7 +132,7 @@ fn gauge_changes_nothing<S: Scalar, L: Lagrangian + Copy>(name: &'static str, sy
         let factor = 10f64.powf(single()) as f32;
         let gauged = Gauged { system, factor: f64::from(factor), wave };
         let gauged = HandWritten::new(gauged, configured.parameters.clone());
-        let (q, v) = random_state(&configured, &(configured.system.validation)(n), &mut rng);
+        let (q, v) = random_state(&configured, &configured.system.validation(n), &mut rng);
         let (a, b) = (terms(&plain, &q, &v), terms(&gauged, &q, &v));
         // Terms that nearly cancel in g - c cost their size times |M^-1|.
         let unit = |t: &Terms<S>| {

@@ -401,6 +401,7 @@ proptest! {
 fn config(epochs: usize) -> Config {
     Config {
         from: None,
+        description: None,
         system: "none".to_string(),
         seed: 3,
         precision: Precision::F32,

@@ -21,7 +21,7 @@ fn shrunk(mut config: Config) -> Config {
 fn every_preset_trains_to_the_same_bits_on_any_number_of_threads() {
     let mut presets = 0;
     for system in systems() {
-        let configured = configure::<f64>(system.name, &[]).unwrap();
+        let configured = configure::<f64>(&system.name, &[]).unwrap();
         for preset in [Preset::Quick, Preset::Best, Preset::Paper] {
             let Some(config) = preset.config(&configured) else { continue };
             let config = shrunk(config);
@@ -44,7 +44,7 @@ fn every_preset_trains_to_the_same_bits_on_any_number_of_threads() {
 fn exact_motions_of_the_ads_test_stay_among_the_training_states() {
     for name in ["ads2-geodesic", "ads3-geodesic", "ads4-geodesic"] {
         let system = configure::<f64>(name, &[]).unwrap();
-        let (n, test) = (system.coordinates, (system.system.trajectory)(system.coordinates));
+        let (n, test) = (system.coordinates, system.system.trajectory(system.coordinates));
         let config = Preset::Quick.config(&system).unwrap();
         let exact = system.build().unwrap();
         let bounds = StartBox { q: test.start.positions, v: test.start.velocities };

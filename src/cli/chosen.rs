@@ -1,0 +1,52 @@
+//! The system that a command is about: one of the catalogue by its name, or one of one's own by its file.
+
+use crate::cli::config_file::{ConfigFile, Mistake};
+use crate::cli::{CliError, config};
+use crate::lagrangian::system::System;
+use crate::lagrangian::{Description, find};
+use crate::network::file::Header;
+use std::borrow::Cow;
+use std::path::Path;
+
+/// Whether an argument is the file of a system, not a name of the catalogue.
+pub fn is_file(system: &str) -> bool {
+    Path::new(system).extension().is_some_and(|end| end.eq_ignore_ascii_case("toml"))
+}
+
+/// The system of a name, or of a file whose name ends in `.toml`.
+///
+/// # Errors
+/// A usage error for an unknown name and for a mistake in a file, a data error for a file that cannot be read.
+pub fn system(system: &str) -> Result<Cow<'static, System>, CliError> {
+    if is_file(system) {
+        return ConfigFile::read_with(Path::new(system), parse_system).map(Cow::Owned);
+    }
+    find(system).map(Cow::Borrowed).map_err(|error| {
+        let file = if Path::new(system).is_file() { "; a file of a system ends in .toml" } else { "" };
+        CliError::usage(format_args!("{error}{file}"))
+    })
+}
+
+/// The system of a description as text, TOML.
+///
+/// # Errors
+/// Line, from 1, and what is wrong there.
+pub fn parse_system(text: &str) -> Result<System, (usize, String)> {
+    let description: Description = config::parse(text)?;
+    description.system().map_err(|error| {
+        let lines = config::lines(text).unwrap_or_default();
+        let mistake = Mistake::new(error.key, error.problem);
+        (mistake.line(&lines).unwrap_or(1), mistake.text())
+    })
+}
+
+/// The system that a model learned, if it is known: of one that was only recorded there is nothing to know.
+///
+/// # Errors
+/// A description that has no system, or a name that the catalogue does not have.
+pub fn learned_system(header: &Header) -> Result<Cow<'static, System>, String> {
+    match &header.description {
+        Some(description) => description.system().map(Cow::Owned).map_err(|error| error.to_string()),
+        None => find(&header.system).map(Cow::Borrowed).map_err(|error| error.to_string()),
+    }
+}

@@ -1,0 +1,59 @@
+//! What a roll-out moves: a trained model, or a system.
+
+use crate::cli::chosen::{self, learned_system};
+use crate::cli::learned::{Learned, model_file};
+use crate::cli::source::Source;
+use crate::cli::{CliError, forces};
+use crate::lagrangian::EulerLagrange;
+use crate::rollout::Domain;
+use std::path::{Path, PathBuf};
+
+/// A source of motion with what is known about it.
+pub struct Subject {
+    /// Name of the system.
+    pub name: String,
+    /// Its terms.
+    pub model: Box<dyn EulerLagrange<f64>>,
+    /// Coordinates, then velocities.
+    pub columns: Vec<String>,
+    /// Names of the external forces, one per coordinate.
+    pub forces: Vec<String>,
+    /// The states a model was trained on.
+    pub domain: Option<Domain<f64>>,
+    /// Unit of times; a system that was only recorded has none, nor has one of another version.
+    pub time_unit: Option<String>,
+    /// The file it was read from.
+    pub file: Option<PathBuf>,
+}
+
+impl Subject {
+    /// A trained model, by its file or by the directory of its run.
+    ///
+    /// # Errors
+    /// A data error for anything but a whole model file.
+    pub fn model(path: &Path) -> Result<Self, CliError> {
+        let learned = Learned::<f64>::load(path)?;
+        let (domain, forces) = (Some(learned.domain()), forces::names(&learned.header));
+        let time_unit = learned_system(&learned.header).ok().map(|system| system.time_unit.to_string());
+        let Learned { header, network } = learned;
+        let (name, columns, file) = (header.system, header.columns, Some(model_file(path)?));
+        Ok(Self { name, model: Box::new(network), columns, forces, domain, time_unit, file })
+    }
+
+    /// A system by name or by file.
+    ///
+    /// # Errors
+    /// A usage error for an unknown name, a mistake in a file or a wrong parameter.
+    pub fn system(name: &str, given: &[(String, String)]) -> Result<Self, CliError> {
+        let system = chosen::system(name)?;
+        let Source { model, columns, forces } = Source::configured(system.clone(), given)?;
+        let file = chosen::is_file(name).then(|| PathBuf::from(name));
+        let (name, time_unit) = (system.name.to_string(), Some(system.time_unit.to_string()));
+        Ok(Self { name, model, columns, forces, domain: None, time_unit, file })
+    }
+
+    /// The states that it is watched to stay within: those a model was trained on, all states for a system.
+    pub fn range(&self) -> Domain<f64> {
+        self.domain.clone().unwrap_or_else(|| Domain::new(vec![None; self.columns.len()]))
+    }
+}

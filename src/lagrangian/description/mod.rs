@@ -1,0 +1,161 @@
+//! Systems of one's own: what a text file says about one, and the [`System`](super::system::System) it comes to.
+//!
+//! The structures are those of a TOML file (`docs/system-files.md`), of the table `[description]` of a configuration and of
+//! the header of a model file.
+
+mod quantity;
+mod system;
+
+use super::ExpressionLagrangian;
+use super::expression::{ExpressionError, Formula};
+use super::system::Range;
+use crate::scalar::Real;
+use quantity::{Decimal, Quantity};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// A system: coordinates, parameters, and a Lagrangian or a metric as formulas.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Description {
+    /// Name: letters, digits, `-` and `_`; none of the catalogue's.
+    pub name: String,
+    /// Name in titles; the name if left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub title: Option<String>,
+    /// Unit of the evolution parameter.
+    #[serde(default = "second")]
+    pub time_unit: String,
+    /// `L` of coordinates, velocities `NAME_dot`, parameters and definitions; either this or a metric.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lagrangian: Option<String>,
+    /// Coordinates, in order.
+    pub coordinates: Vec<CoordinateDescription>,
+    /// Constants by name.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub parameters: BTreeMap<String, ParameterDescription>,
+    /// Names for formulas; they may use each other in any order.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub definitions: BTreeMap<String, String>,
+    /// Components of `g` in `L = g_ij q_i_dot q_j_dot / 2` by pairs of coordinates, `"t,r"`; symmetric, those left out are 0.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub metric: Option<BTreeMap<String, String>>,
+    /// Bounds of training states by the names of their columns; the coordinates' own where left out.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub training: BTreeMap<String, [Quantity; 2]>,
+    /// The same of the states on which errors are stated.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub validation: BTreeMap<String, [Quantity; 2]>,
+    /// Motions on which a model is tried.
+    #[serde(default, skip_serializing_if = "TrajectoryDescription::is_empty")]
+    pub trajectory: TrajectoryDescription,
+}
+
+/// A coordinate.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CoordinateDescription {
+    /// Name, also of its column; the velocity's is the name and `_dot`.
+    pub name: String,
+    /// Unit.
+    #[serde(default = "one")]
+    pub unit: String,
+    /// An angle in radians: adding `2 pi` changes nothing.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub periodic: bool,
+    /// The coordinate that is a time, in a spacetime.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub time_like: bool,
+    /// Lowest and highest value of interest; one turn for a periodic coordinate if left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bounds: Option<[Quantity; 2]>,
+    /// The same of the velocity; without them the velocity of the time-like coordinate of a metric follows from
+    /// `g(v, v) = -1`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub velocity_bounds: Option<[Quantity; 2]>,
+}
+
+/// A constant: a number, or a table with more about it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ParameterDescription {
+    /// Value unless another one is given.
+    pub default: Decimal,
+    /// Unit.
+    pub unit: String,
+    /// Allowed values.
+    pub range: Range,
+    /// Whether its value is to be found by the training.
+    #[serde(skip_serializing_if = "is_false")]
+    pub learn: bool,
+}
+
+/// Motions on which a model is tried.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TrajectoryDescription {
+    /// End of the time span that starts at 0; 10 if left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub t_end: Option<Quantity>,
+    /// Step of the output; a hundredth of the span if left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub dt: Option<Quantity>,
+    /// Bounds of the starts by columns; the middle half of the validation bounds where left out.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub start: BTreeMap<String, [Quantity; 2]>,
+}
+
+impl TrajectoryDescription {
+    fn is_empty(&self) -> bool {
+        *self == Self::default()
+    }
+}
+
+/// What is wrong in a description.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{key}: {problem}")]
+pub struct DescriptionError {
+    /// Path of the key, such as `metric.t,t`.
+    pub key: String,
+    /// What is wrong, with the column for a formula.
+    pub problem: String,
+}
+
+impl DescriptionError {
+    fn new(key: impl Into<String>, problem: impl std::fmt::Display) -> Self {
+        Self { key: key.into(), problem: problem.to_string() }
+    }
+    fn formula(key: impl Into<String>) -> impl FnOnce(ExpressionError) -> Self {
+        |error| Self::new(key, error)
+    }
+}
+
+/// A description with the Lagrangian that it comes to.
+#[derive(Clone, Debug)]
+pub struct Described {
+    /// The description.
+    pub description: Description,
+    /// Its Lagrangian; parameters in the order of their names.
+    pub lagrangian: ExpressionLagrangian,
+    /// The velocity of the time-like coordinate on the mass shell.
+    shell: Option<Formula>,
+}
+
+impl Described {
+    /// The velocity of the time-like coordinate that puts a state on the mass shell `g(v, v) = -1`, pointing to the future;
+    /// what `v` holds in its place is not read. `None` for a system without mass shell.
+    pub fn constrained_velocity<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> Option<R> {
+        self.shell.as_ref().map(|shell| shell.evaluate(parameters, q, v))
+    }
+}
+
+fn second() -> String {
+    "s".to_string()
+}
+
+fn one() -> String {
+    "1".to_string()
+}
+
+fn is_false(x: &bool) -> bool {
+    !x
+}

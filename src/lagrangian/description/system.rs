@@ -1,0 +1,447 @@
+//! From a description to a system: every name and formula checked, the Lagrangian compiled.
+
+use super::{Described, Description, DescriptionError, Quantity};
+use crate::lagrangian::expression::{Compiler, Expression, Meaning, Value, is_name, is_reserved};
+use crate::lagrangian::system::{Bounds, Coordinate, Parameter, PerSize, Range, Size, System, TrajectoryTest};
+use crate::lagrangian::{ExpressionLagrangian, systems};
+use crate::names::unknown;
+use crate::ops::{Binary, Unary};
+use crate::scalar::{Dd, Scalar};
+use std::borrow::Cow;
+use std::collections::{BTreeMap, BTreeSet};
+use std::f64::consts::PI;
+use std::sync::Arc;
+
+/// Most coordinates of a system.
+const MAX_COORDINATES: usize = 64;
+/// Most parameters, and most definitions.
+const MAX_NAMES: usize = 256;
+
+type Outcome<T> = Result<T, DescriptionError>;
+
+/// What the mass shell demands, in words.
+const SHELL: &str = "from the mass shell g(v, v) = -1, to the future";
+
+impl Description {
+    /// The system, its Lagrangian ready to be evaluated.
+    ///
+    /// # Errors
+    /// The first key that is wrong, and how.
+    pub fn system(&self) -> Outcome<System> {
+        self.check_texts()?;
+        let n = self.coordinates.len();
+        let mut compiler = Compiler::default();
+        let mut scope = self.scope()?;
+        self.define(&mut compiler, &mut scope)?;
+        let time_like = self.time_like()?;
+        let (value, shell) = match (&self.lagrangian, &self.metric) {
+            (Some(text), None) => (self.written(text, &mut compiler, &scope)?, None),
+            (None, Some(entries)) => {
+                let metric = self.metric_entries(entries, &mut compiler, &scope)?;
+                let shell = time_like.filter(|i| self.coordinates[*i].velocity_bounds.is_none());
+                let shell = shell.map(|i| on_shell(&mut compiler, &metric, i, n));
+                (kinetic(&mut compiler, &metric, n), shell)
+            }
+            (Some(_), Some(_)) => {
+                return Err(DescriptionError::new("metric", "expected `lagrangian` or `[metric]`, found both"));
+            }
+            (None, None) => {
+                let problem =
+                    "expected `lagrangian = \"..\"`, or a table `[metric]` of its coefficients, found neither";
+                return Err(DescriptionError::new("", problem));
+            }
+        };
+        let base = self.base_bounds(shell.and(time_like))?;
+        let training = self.bounds("training", &self.training, base.clone())?;
+        let validation = self.bounds("validation", &self.validation, base)?;
+        let trajectory = self.trajectory_test(&validation)?;
+        Ok(System {
+            name: Cow::Owned(self.name.clone()),
+            title: Cow::Owned(self.title.clone().unwrap_or_else(|| self.name.clone())),
+            size: Size::Fixed(n),
+            coordinates: PerSize::Given(self.coordinates.iter().map(coordinate).collect()),
+            parameters: Cow::Owned(self.checked_parameters()?),
+            time_unit: Cow::Owned(self.time_unit.clone()),
+            time_like,
+            constraint: shell.map(|_| SHELL),
+            training: PerSize::Given(training),
+            validation: PerSize::Given(validation),
+            trajectory: PerSize::Given(trajectory),
+            domain: None,
+            plane: None,
+            conserved: None,
+            described: Some(Arc::new(Described {
+                description: self.clone(),
+                lagrangian: ExpressionLagrangian::compiled(n, compiler.formula(value)),
+                shell: shell.map(|shell| compiler.formula(shell)),
+            })),
+        })
+    }
+
+    /// Names and units that are shown: short, on one line.
+    fn check_texts(&self) -> Outcome<()> {
+        let plain = |c: char| c.is_ascii_alphanumeric() || "-_".contains(c);
+        let name = &self.name;
+        if name.is_empty() || name.len() > 64 || !name.chars().all(plain) || name.starts_with('-') {
+            let problem = "expected a name of 1 to 64 letters, digits, `-` and `_`";
+            return Err(DescriptionError::new("name", problem));
+        }
+        if systems().iter().any(|system| system.name == *name) {
+            return Err(DescriptionError::new(
+                "name",
+                format!("{name} is a system of the catalogue, expected another name"),
+            ));
+        }
+        let units = self.coordinates.iter().enumerate().map(|(i, c)| (format!("coordinates[{i}].unit"), &c.unit));
+        let parameters = self.parameters.iter().map(|(name, p)| (format!("parameters.{name}.unit"), &p.unit));
+        let texts = self.title.iter().map(|title| ("title".to_string(), title));
+        let texts = texts.chain([("time_unit".to_string(), &self.time_unit)]).chain(units).chain(parameters);
+        for (key, text) in texts {
+            if text.is_empty() || text.chars().count() > 100 || text.chars().any(char::is_control) {
+                return Err(DescriptionError::new(key, "expected 1 to 100 characters on one line"));
+            }
+        }
+        let n = self.coordinates.len();
+        if n == 0 || n > MAX_COORDINATES {
+            let problem = format!("expected 1 to {MAX_COORDINATES} tables [[coordinates]], found {n}");
+            return Err(DescriptionError::new("coordinates", problem));
+        }
+        for (key, count) in [("parameters", self.parameters.len()), ("definitions", self.definitions.len())] {
+            if count > MAX_NAMES {
+                return Err(DescriptionError::new(key, format!("expected at most {MAX_NAMES} names, found {count}")));
+            }
+        }
+        Ok(())
+    }
+
+    /// What the names of coordinates, velocities and parameters mean.
+    fn scope(&self) -> Outcome<BTreeMap<String, Meaning>> {
+        let mut scope = BTreeMap::new();
+        let mut add = |key: String, name: &str, meaning: Meaning| {
+            if !is_name(name) {
+                let problem =
+                    format!("{name:?} is no name: expected a letter or _, then letters, digits and _, 64 at most");
+                return Err(DescriptionError::new(key, problem));
+            }
+            if is_reserved(name) {
+                return Err(DescriptionError::new(key, format!("`{name}` is a function or constant of formulas")));
+            }
+            match scope.insert(name.to_string(), meaning) {
+                Some(_) => Err(DescriptionError::new(key, format!("the name `{name}` is taken"))),
+                None => Ok(()),
+            }
+        };
+        for (i, coordinate) in self.coordinates.iter().enumerate() {
+            let key = || format!("coordinates[{i}].name");
+            add(key(), &coordinate.name, Meaning::Position(i))?;
+            add(key(), &format!("{}_dot", coordinate.name), Meaning::Velocity(i))?;
+        }
+        for (i, name) in self.parameters.keys().enumerate() {
+            add(format!("parameters.{name}"), name, Meaning::Parameter(i))?;
+        }
+        // Taken, though without a meaning yet.
+        for name in self.definitions.keys() {
+            add(format!("definitions.{name}"), name, Meaning::Parameter(usize::MAX))?;
+        }
+        scope.retain(|name, _| !self.definitions.contains_key(name));
+        Ok(scope)
+    }
+
+    /// Compiles the definitions, each after those that it needs.
+    fn define(&self, compiler: &mut Compiler, scope: &mut BTreeMap<String, Meaning>) -> Outcome<()> {
+        let key = |name: &str| format!("definitions.{name}");
+        let mut waiting: Vec<Waiting<'_>> = Vec::with_capacity(self.definitions.len());
+        for (name, text) in &self.definitions {
+            let expression: Expression = text.parse().map_err(DescriptionError::formula(key(name)))?;
+            let needs = expression.names().filter_map(|used| Some(self.definitions.get_key_value(used)?.0.as_str()));
+            waiting.push(Waiting { name, needs: needs.collect(), expression });
+        }
+        while !waiting.is_empty() {
+            let before = waiting.len();
+            let mut still = Vec::new();
+            for definition in waiting {
+                if definition.needs.iter().any(|used| !scope.contains_key(*used)) {
+                    still.push(definition);
+                    continue;
+                }
+                let Waiting { name, expression, .. } = definition;
+                let value = compiler.add(&expression, scope, false).map_err(DescriptionError::formula(key(name)))?;
+                scope.insert(name.to_string(), Meaning::Value(value));
+            }
+            if still.len() == before {
+                let (name, circle) = circle(&still);
+                return Err(DescriptionError::new(key(&name), format!("it needs itself: {circle}")));
+            }
+            waiting = still;
+        }
+        Ok(())
+    }
+
+    /// The Lagrangian as it is written.
+    fn written(&self, text: &str, compiler: &mut Compiler, scope: &BTreeMap<String, Meaning>) -> Outcome<Value> {
+        let expression: Expression = text.parse().map_err(DescriptionError::formula("lagrangian"))?;
+        let value = compiler.add(&expression, scope, false).map_err(DescriptionError::formula("lagrangian"))?;
+        let velocities = compiler.velocities(value);
+        for (i, coordinate) in self.coordinates.iter().enumerate() {
+            if !velocities.contains(&i) {
+                let name = &coordinate.name;
+                let problem = format!("expected {name}_dot in it: without it {name} has no equation of motion");
+                return Err(DescriptionError::new("lagrangian", problem));
+            }
+        }
+        Ok(value)
+    }
+
+    /// The entries `(i, j)`, `i <= j`, of the metric.
+    fn metric_entries(
+        &self,
+        entries: &BTreeMap<String, String>,
+        compiler: &mut Compiler,
+        scope: &BTreeMap<String, Meaning>,
+    ) -> Outcome<BTreeMap<(usize, usize), Value>> {
+        let mut metric = BTreeMap::new();
+        for (pair, text) in entries {
+            let key = format!("metric.{pair}");
+            let index = |name: &str| {
+                let names = self.coordinates.iter().map(|c| c.name.as_str());
+                let problem = || unknown("coordinate", name, names.clone().collect::<Vec<_>>());
+                names.clone().position(|known| known == name).ok_or_else(|| DescriptionError::new(&key, problem()))
+            };
+            let Some((a, b)) = pair.split_once(',') else {
+                let problem = "expected two coordinates with a comma between them, such as \"t,t\"";
+                return Err(DescriptionError::new(key, problem));
+            };
+            let (i, j) = (index(a.trim())?, index(b.trim())?);
+            let expression: Expression = text.parse().map_err(DescriptionError::formula(&key))?;
+            let value = compiler.add(&expression, scope, true).map_err(DescriptionError::formula(&key))?;
+            if metric.insert((i.min(j), i.max(j)), value).is_some() {
+                return Err(DescriptionError::new(key, "this entry is given twice: the metric is symmetric"));
+            }
+        }
+        for (i, coordinate) in self.coordinates.iter().enumerate() {
+            if !metric.keys().any(|(a, b)| *a == i || *b == i) {
+                let name = &coordinate.name;
+                return Err(DescriptionError::new(
+                    "metric",
+                    format!("expected an entry of {name}, such as \"{name},{name}\""),
+                ));
+            }
+        }
+        Ok(metric)
+    }
+
+    /// The one coordinate that is a time.
+    fn time_like(&self) -> Outcome<Option<usize>> {
+        let mut times = self.coordinates.iter().enumerate().filter(|(_, c)| c.time_like).map(|(i, _)| i);
+        let (first, second) = (times.next(), times.next());
+        match second {
+            Some(i) => {
+                Err(DescriptionError::new(format!("coordinates[{i}].time_like"), "there is a time-like one before"))
+            }
+            None => Ok(first),
+        }
+    }
+
+    /// The coordinates' own bounds; the velocity that a mass shell fixes has none.
+    fn base_bounds(&self, fixed: Option<usize>) -> Outcome<Bounds> {
+        let mut bounds = Bounds { positions: Vec::new(), velocities: Vec::new() };
+        for (i, coordinate) in self.coordinates.iter().enumerate() {
+            let missing =
+                |what: &str| DescriptionError::new(format!("coordinates[{i}]"), format!("missing key \"{what}\""));
+            bounds.positions.push(match &coordinate.bounds {
+                Some(pair) => ordered(&format!("coordinates[{i}].bounds"), pair)?,
+                None if coordinate.periodic => (0.0, 2.0 * PI),
+                None => return Err(missing("bounds")),
+            });
+            bounds.velocities.push(match &coordinate.velocity_bounds {
+                Some(pair) => ordered(&format!("coordinates[{i}].velocity_bounds"), pair)?,
+                None if fixed == Some(i) => (0.0, 0.0),
+                None => return Err(missing("velocity_bounds")),
+            });
+        }
+        Ok(bounds)
+    }
+
+    /// A box with the columns that a table names replaced.
+    fn bounds(&self, table: &str, given: &BTreeMap<String, [Quantity; 2]>, base: Bounds) -> Outcome<Bounds> {
+        let mut bounds = base;
+        for (column, pair) in given {
+            let key = format!("{table}.{column}");
+            let pair = ordered(&key, pair)?;
+            let names = self.coordinates.iter().map(|c| c.name.clone());
+            let columns: Vec<String> = names.clone().chain(names.map(|name| format!("{name}_dot"))).collect();
+            let n = self.coordinates.len();
+            match columns.iter().position(|known| known == column) {
+                Some(i) if i < n => bounds.positions[i] = pair,
+                Some(i) => bounds.velocities[i - n] = pair,
+                None => {
+                    return Err(DescriptionError::new(key, unknown("key", column, columns.iter().map(String::as_str))));
+                }
+            }
+        }
+        Ok(bounds)
+    }
+
+    fn trajectory_test(&self, validation: &Bounds) -> Outcome<TrajectoryTest> {
+        let positive = |key: &str, value: Option<Quantity>, usual: f64| match value {
+            Some(Quantity(x)) if !(x.is_finite() && x > 0.0) => {
+                Err(DescriptionError::new(key, format!("expected a finite number above 0, found {x}")))
+            }
+            other => Ok(other.map_or(usual, |x| x.0)),
+        };
+        let t_end = positive("trajectory.t_end", self.trajectory.t_end, 10.0)?;
+        let dt = positive("trajectory.dt", self.trajectory.dt, t_end / 100.0)?;
+        if t_end / dt > 1e6 {
+            return Err(DescriptionError::new(
+                "trajectory.dt",
+                format!("expected at least a millionth of t_end = {t_end}"),
+            ));
+        }
+        // An angle may start anywhere.
+        let half = |&(low, high): &(f64, f64)| (0.75 * low + 0.25 * high, 0.25 * low + 0.75 * high);
+        let middle = Bounds {
+            positions: validation
+                .positions
+                .iter()
+                .zip(&self.coordinates)
+                .map(|(b, c)| if c.periodic { *b } else { half(b) })
+                .collect(),
+            velocities: validation.velocities.iter().map(half).collect(),
+        };
+        let start = self.bounds("trajectory.start", &self.trajectory.start, middle)?;
+        Ok(TrajectoryTest { start, t_end, dt })
+    }
+
+    fn checked_parameters(&self) -> Outcome<Vec<Parameter>> {
+        let parameter = |(name, p): (&String, &super::ParameterDescription)| {
+            let text = p.default.0.trim();
+            let zero = Dd::of_f64(0.0);
+            let allowed = |x: &Dd| {
+                x.is_finite()
+                    && match p.range {
+                        Range::Any => true,
+                        Range::AtLeastZero => *x >= zero,
+                        Range::Positive => *x > zero,
+                    }
+            };
+            if Dd::parse(text).filter(allowed).is_none() {
+                let shown: String = text.chars().take(40).collect();
+                let problem = format!("expected a decimal number, {}, found {shown:?}", p.range.text());
+                return Err(DescriptionError::new(format!("parameters.{name}.default"), problem));
+            }
+            Ok(Parameter {
+                symbol: Cow::Owned(name.clone()),
+                default: Cow::Owned(text.to_string()),
+                unit: Cow::Owned(p.unit.clone()),
+                range: p.range,
+                learn: p.learn,
+            })
+        };
+        self.parameters.iter().map(parameter).collect()
+    }
+}
+
+fn coordinate(described: &super::CoordinateDescription) -> Coordinate {
+    Coordinate {
+        name: Cow::Owned(described.name.clone()),
+        unit: Cow::Owned(described.unit.clone()),
+        periodic: described.periodic,
+    }
+}
+
+/// Finite bounds with room between them.
+fn ordered(key: &str, &[Quantity(low), Quantity(high)]: &[Quantity; 2]) -> Outcome<(f64, f64)> {
+    if low.is_finite() && high.is_finite() && low < high && (high - low).is_finite() {
+        return Ok((low, high));
+    }
+    Err(DescriptionError::new(key, format!("expected [low, high], finite and in this order, found [{low}, {high}]")))
+}
+
+/// A definition that has not been compiled yet.
+struct Waiting<'a> {
+    name: &'a str,
+    /// The definitions in its formula.
+    needs: BTreeSet<&'a str>,
+    expression: Expression,
+}
+
+/// Definitions that need each other, by the first of them, with the way around.
+fn circle(waiting: &[Waiting<'_>]) -> (String, String) {
+    let next = |name: &str| {
+        let found = waiting.iter().find(|known| known.name == name)?;
+        found.needs.iter().copied().find(|used| waiting.iter().any(|known| known.name == *used))
+    };
+    let mut way: Vec<&str> = waiting.first().map(|first| first.name).into_iter().collect();
+    while let Some(name) = way.last().and_then(|name| next(name)) {
+        if let Some(first) = way.iter().position(|known| *known == name) {
+            way.drain(..first);
+            way.push(name);
+            break;
+        }
+        way.push(name);
+    }
+    let name = way.first().map(|name| name.to_string()).unwrap_or_default();
+    const SHOWN: usize = 8;
+    let text = match way.len() {
+        length if length > SHOWN => format!("{} -> ..", way[..SHOWN].join(" -> ")),
+        _ => way.join(" -> "),
+    };
+    (name, text)
+}
+
+type Metric = BTreeMap<(usize, usize), Value>;
+
+/// `g_ij v_i v_j / 2`.
+fn kinetic(compiler: &mut Compiler, metric: &Metric, n: usize) -> Value {
+    let speeds: Vec<Value> = (0..n).map(|i| compiler.meaning(Meaning::Velocity(i))).collect();
+    let half = compiler.constant(0.5);
+    sum(compiler, metric.iter().map(|(&(i, j), &g)| (g, i, j)), |compiler, (g, i, j)| {
+        let square = compiler.binary(Binary::Mul, speeds[i], speeds[j]);
+        let term = compiler.binary(Binary::Mul, g, square);
+        if i == j { compiler.binary(Binary::Mul, half, term) } else { term }
+    })
+}
+
+/// `v_t` with `g(v, v) = -1`: of `g_tt v_t^2 + 2 b v_t + c + 1 = 0` the root to the future, where `g_tt < 0`:
+/// `-(b + sqrt(b^2 - g_tt (c + 1))) / g_tt`.
+fn on_shell(compiler: &mut Compiler, metric: &Metric, t: usize, n: usize) -> Value {
+    let speeds: Vec<Value> = (0..n).map(|i| compiler.meaning(Meaning::Velocity(i))).collect();
+    let entries = || metric.iter().map(|(&(i, j), &g)| (g, i, j));
+    let own = metric.get(&(t, t)).copied().unwrap_or_else(|| compiler.constant(0.0));
+    let mixed = entries().filter(|(_, i, j)| (*i == t) != (*j == t));
+    let b =
+        sum(compiler, mixed, |compiler, (g, i, j)| compiler.binary(Binary::Mul, g, speeds[if i == t { j } else { i }]));
+    let two = compiler.constant(2.0);
+    let space = entries().filter(|(_, i, j)| *i != t && *j != t);
+    let c = sum(compiler, space, |compiler, (g, i, j)| {
+        let square = compiler.binary(Binary::Mul, speeds[i], speeds[j]);
+        let term = compiler.binary(Binary::Mul, g, square);
+        if i == j { term } else { compiler.binary(Binary::Mul, two, term) }
+    });
+    let one = compiler.constant(1.0);
+    let shell = compiler.binary(Binary::Add, c, one);
+    let product = compiler.binary(Binary::Mul, own, shell);
+    let square = compiler.binary(Binary::Mul, b, b);
+    let inside = compiler.binary(Binary::Sub, square, product);
+    let root = compiler.unary(Unary::Sqrt, inside);
+    let top = compiler.binary(Binary::Add, b, root);
+    let quotient = compiler.binary(Binary::Div, top, own);
+    compiler.unary(Unary::Neg, quotient)
+}
+
+/// The sum of terms, 0 if there are none.
+fn sum<T>(
+    compiler: &mut Compiler,
+    parts: impl Iterator<Item = T>,
+    mut term: impl FnMut(&mut Compiler, T) -> Value,
+) -> Value {
+    let mut total = None;
+    for part in parts {
+        let value = term(compiler, part);
+        total = Some(match total {
+            Some(total) => compiler.binary(Binary::Add, total, value),
+            None => value,
+        });
+    }
+    total.unwrap_or_else(|| compiler.constant(0.0))
+}

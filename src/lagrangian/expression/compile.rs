@@ -1,0 +1,283 @@
+//! From trees of names to one program of operations, equal parts shared.
+
+use super::error::ExpressionError;
+use super::formula::{Formula, Instruction, Operand, Operation};
+use super::functions::PI;
+use super::number::Number;
+use super::tree::{Expression, Node};
+use crate::names::unknown;
+use crate::ops::{Binary, Unary};
+use std::collections::{BTreeMap, HashMap};
+
+/// Most operations of a program.
+const MAX_OPERATIONS: usize = 1 << 16;
+
+/// What a name stands for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Meaning {
+    /// A parameter by its place.
+    Parameter(usize),
+    /// A coordinate by its place.
+    Position(usize),
+    /// The velocity of a coordinate.
+    Velocity(usize),
+    /// What was compiled before.
+    Value(Value),
+}
+
+/// A value of the program that is being compiled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Value(u32);
+
+#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+enum Entry {
+    Parameter(u32),
+    Position(u32),
+    Velocity(u32),
+    Number(u32),
+    Pi,
+    Unary(Unary, Value),
+    Binary(Binary, Value, Value),
+}
+
+/// Operations so far.
+#[derive(Default)]
+pub struct Compiler {
+    entries: Vec<Entry>,
+    known: HashMap<Entry, Value>,
+    numbers: Vec<Number>,
+    places: HashMap<(u64, u64, u32), u32>,
+    /// Whether a value depends on velocities.
+    moving: Vec<bool>,
+}
+
+impl Compiler {
+    /// Adds a formula whose names mean what `scope` says; `still` refuses velocities.
+    ///
+    /// # Errors
+    /// A name that is not in scope or not allowed, or a program that becomes too long.
+    pub fn add(
+        &mut self,
+        expression: &Expression,
+        scope: &BTreeMap<String, Meaning>,
+        still: bool,
+    ) -> Result<Value, ExpressionError> {
+        let mut values: Vec<Value> = Vec::with_capacity(expression.nodes.len());
+        for node in &expression.nodes {
+            let at = |operand: &u32| values[*operand as usize];
+            let value = match node {
+                Node::Number(text) => Number::parse(text).map_or(Value(0), |number| self.number(number)),
+                Node::Pi => self.entry(Entry::Pi),
+                Node::Name(name, column) => {
+                    let value = self.named(name, scope).map_err(|problem| ExpressionError::new(*column, problem))?;
+                    if still && self.moves(value) {
+                        let problem =
+                            format!("expected coordinates and parameters alone, `{name}` is or holds a velocity");
+                        return Err(ExpressionError::new(*column, problem));
+                    }
+                    value
+                }
+                Node::Unary(function, a) => self.unary(*function, at(a)),
+                Node::Binary(Binary::Powf, a, b) => self.power(at(a), at(b)),
+                Node::Binary(function, a, b) => self.binary(*function, at(a), at(b)),
+            };
+            if self.entries.len() > MAX_OPERATIONS {
+                let problem = format!("expected a system of at most {MAX_OPERATIONS} operations");
+                return Err(ExpressionError::new(1, problem));
+            }
+            values.push(value);
+        }
+        values.last().copied().ok_or_else(|| ExpressionError::new(1, "expected a formula, found nothing"))
+    }
+
+    fn named(&mut self, name: &str, scope: &BTreeMap<String, Meaning>) -> Result<Value, String> {
+        match scope.get(name) {
+            Some(Meaning::Value(value)) => Ok(*value),
+            Some(meaning) => Ok(self.meaning(*meaning)),
+            None => Err(unknown("name", name, scope.keys().map(String::as_str).chain([PI]))),
+        }
+    }
+
+    /// The value of what is given from outside.
+    pub fn meaning(&mut self, meaning: Meaning) -> Value {
+        match meaning {
+            Meaning::Parameter(i) => self.entry(Entry::Parameter(i as u32)),
+            Meaning::Position(i) => self.entry(Entry::Position(i as u32)),
+            Meaning::Velocity(i) => self.entry(Entry::Velocity(i as u32)),
+            Meaning::Value(value) => value,
+        }
+    }
+
+    /// Whether a value depends on velocities.
+    pub fn moves(&self, value: Value) -> bool {
+        self.moving[value.0 as usize]
+    }
+
+    /// A number that every precision has.
+    pub fn constant(&mut self, value: f64) -> Value {
+        self.number(Number::exact(value))
+    }
+
+    fn number(&mut self, number: Number) -> Value {
+        let numbers = &mut self.numbers;
+        let place = *self.places.entry(number.bits()).or_insert_with(|| {
+            numbers.push(number);
+            numbers.len() as u32 - 1
+        });
+        self.entry(Entry::Number(place))
+    }
+
+    fn number_of(&self, value: Value) -> Option<Number> {
+        match self.entries[value.0 as usize] {
+            Entry::Number(place) => Some(self.numbers[place as usize]),
+            _ => None,
+        }
+    }
+
+    /// A function of one number.
+    pub fn unary(&mut self, function: Unary, a: Value) -> Value {
+        self.entry(Entry::Unary(function, a))
+    }
+
+    /// A function of two numbers; a quotient by a power of two is the product with its reciprocal, which is as exact.
+    pub fn binary(&mut self, function: Binary, a: Value, b: Value) -> Value {
+        match (function, self.number_of(b).and_then(Number::exact_reciprocal)) {
+            (Binary::Div, Some(reciprocal)) => {
+                let factor = self.number(reciprocal);
+                self.binary(Binary::Mul, a, factor)
+            }
+            (Binary::Add | Binary::Mul, _) => self.entry(Entry::Binary(function, a.min(b), a.max(b))),
+            _ => self.entry(Entry::Binary(function, a, b)),
+        }
+    }
+
+    /// `a^b`: by multiplication for whole numbers, a square root for one half.
+    fn power(&mut self, a: Value, b: Value) -> Value {
+        let exponent = match self.entries[b.0 as usize] {
+            Entry::Unary(Unary::Neg, b) => self.number_of(b).and_then(Number::integer).and_then(i32::checked_neg),
+            _ => self.number_of(b).and_then(Number::integer),
+        };
+        match exponent {
+            Some(1) => a,
+            Some(2) => self.binary(Binary::Mul, a, a),
+            Some(exponent) => self.unary(Unary::Powi(exponent), a),
+            None if self.number_of(b).is_some_and(|b| b.is(0.5)) => self.unary(Unary::Sqrt, a),
+            None => self.entry(Entry::Binary(Binary::Powf, a, b)),
+        }
+    }
+
+    fn entry(&mut self, entry: Entry) -> Value {
+        if let Some(known) = self.known.get(&entry) {
+            return *known;
+        }
+        let moving = match entry {
+            Entry::Velocity(_) => true,
+            Entry::Unary(_, a) => self.moves(a),
+            Entry::Binary(_, a, b) => self.moves(a) || self.moves(b),
+            _ => false,
+        };
+        let value = Value(self.entries.len() as u32);
+        self.entries.push(entry);
+        self.moving.push(moving);
+        self.known.insert(entry, value);
+        value
+    }
+
+    /// The velocities that a value depends on, by their coordinate.
+    pub fn velocities(&self, value: Value) -> Vec<usize> {
+        let needed = self.needed(value);
+        let entries = self.entries.iter().zip(needed).filter(|(_, needed)| *needed);
+        entries.filter_map(|(entry, _)| if let Entry::Velocity(i) = entry { Some(*i as usize) } else { None }).collect()
+    }
+
+    /// Which entries a value is made of.
+    fn needed(&self, value: Value) -> Vec<bool> {
+        let mut needed = vec![false; self.entries.len()];
+        needed[value.0 as usize] = true;
+        for at in (0..self.entries.len()).rev().filter(|at| *at <= value.0 as usize) {
+            if needed[at] {
+                for operand in operands(self.entries[at]).into_iter().flatten() {
+                    needed[operand.0 as usize] = true;
+                }
+            }
+        }
+        needed
+    }
+
+    /// The program of one value: registers are used again as soon as nothing needs them.
+    pub fn formula(&self, value: Value) -> Formula {
+        let needed = self.needed(value);
+        let mut last_use = vec![0; self.entries.len()];
+        for (at, entry) in self.entries.iter().enumerate().filter(|(at, _)| needed[*at]) {
+            for operand in operands(*entry).into_iter().flatten() {
+                last_use[operand.0 as usize] = at;
+            }
+        }
+        last_use[value.0 as usize] = usize::MAX;
+        let mut places: Vec<Operand> = Vec::with_capacity(self.entries.len());
+        let (mut free, mut registers, mut instructions) = (Vec::new(), 0, Vec::new());
+        for (at, entry) in self.entries.iter().enumerate() {
+            let place = |value: Value| places[value.0 as usize];
+            let operation = match *entry {
+                _ if !needed[at] => {
+                    places.push(Operand::Pi);
+                    continue;
+                }
+                Entry::Unary(function, a) => Operation::Unary(function, place(a)),
+                Entry::Binary(function, a, b) => Operation::Binary(function, place(a), place(b)),
+                Entry::Parameter(i) => {
+                    places.push(Operand::Parameter(i));
+                    continue;
+                }
+                Entry::Position(i) => {
+                    places.push(Operand::Position(i));
+                    continue;
+                }
+                Entry::Velocity(i) => {
+                    places.push(Operand::Velocity(i));
+                    continue;
+                }
+                Entry::Number(i) => {
+                    places.push(Operand::Number(i));
+                    continue;
+                }
+                Entry::Pi => {
+                    places.push(Operand::Pi);
+                    continue;
+                }
+            };
+            let mut ended: Vec<Value> = operands(*entry).into_iter().flatten().collect();
+            ended.dedup();
+            for operand in ended.into_iter().filter(|operand| last_use[operand.0 as usize] == at) {
+                if let Operand::Register(register) = places[operand.0 as usize] {
+                    free.push(register);
+                }
+            }
+            let out = free.pop().unwrap_or_else(|| {
+                registers += 1;
+                registers - 1
+            });
+            instructions.push(Instruction { operation, out });
+            places.push(Operand::Register(out));
+        }
+        Formula::new(instructions, self.numbers.clone(), registers, places[value.0 as usize])
+    }
+}
+
+/// What an operation is made of.
+fn operands(entry: Entry) -> [Option<Value>; 2] {
+    match entry {
+        Entry::Unary(_, a) => [Some(a), None],
+        Entry::Binary(_, a, b) => [Some(a), Some(b)],
+        _ => [None, None],
+    }
+}
+
+impl Value {
+    fn min(self, other: Self) -> Self {
+        Self(self.0.min(other.0))
+    }
+    fn max(self, other: Self) -> Self {
+        Self(self.0.max(other.0))
+    }
+}

@@ -1,0 +1,89 @@
+//! What a formula says, before its names mean anything.
+
+use super::error::ExpressionError;
+use super::functions::{Function, PI, name_of};
+use super::parse::parse;
+use crate::ops::{Binary, Unary};
+use std::fmt;
+use std::str::FromStr;
+
+/// A part of a formula; operands are parts before it.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Node {
+    /// A decimal number without sign.
+    Number(String),
+    /// The circle constant.
+    Pi,
+    /// A name and its column.
+    Name(String, usize),
+    /// A function of one number, or a minus sign.
+    Unary(Unary, u32),
+    /// A function of two numbers, or an operator; `^` is [`Binary::Powf`].
+    Binary(Binary, u32, u32),
+}
+
+/// A formula as a tree, written `m*l^2*theta_dot^2/2`; [`fmt::Display`] writes what reads back to the same formula.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Expression {
+    /// Operands before what is made of them, the whole last.
+    pub(super) nodes: Vec<Node>,
+}
+
+impl FromStr for Expression {
+    type Err = ExpressionError;
+
+    fn from_str(text: &str) -> Result<Self, ExpressionError> {
+        parse(text)
+    }
+}
+
+impl Expression {
+    /// The names of quantities in it, in order, each as often as it occurs.
+    pub fn names(&self) -> impl Iterator<Item = &str> {
+        self.nodes.iter().filter_map(|node| match node {
+            Node::Name(name, _) => Some(name.as_str()),
+            _ => None,
+        })
+    }
+}
+
+/// How tightly a part holds together: sums, products, signs, powers, atoms.
+const SUM: u8 = 0;
+const PRODUCT: u8 = 1;
+const SIGN: u8 = 2;
+const POWER: u8 = 3;
+const ATOM: u8 = 4;
+
+impl fmt::Display for Expression {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        // Every part is an operand once: its text moves into the text of the whole.
+        let mut texts: Vec<(String, u8)> = Vec::with_capacity(self.nodes.len());
+        for node in &self.nodes {
+            let mut operand = |index: u32, least: u8| {
+                let (text, level) = std::mem::take(&mut texts[index as usize]);
+                if level < least { format!("({text})") } else { text }
+            };
+            let joined = |a: String, sign: &str, b: String| format!("{a}{sign}{b}");
+            let text = match node {
+                Node::Number(text) => (text.clone(), ATOM),
+                Node::Pi => (PI.to_string(), ATOM),
+                Node::Name(name, _) => (name.clone(), ATOM),
+                Node::Unary(Unary::Neg, a) => (format!("-{}", operand(*a, SIGN)), SIGN),
+                Node::Unary(function, a) => {
+                    (format!("{}({})", name_of(Function::One(*function)).unwrap_or("?"), operand(*a, SUM)), ATOM)
+                }
+                Node::Binary(Binary::Add, a, b) => (joined(operand(*a, SUM), " + ", operand(*b, PRODUCT)), SUM),
+                Node::Binary(Binary::Sub, a, b) => (joined(operand(*a, SUM), " - ", operand(*b, PRODUCT)), SUM),
+                Node::Binary(Binary::Mul, a, b) => (joined(operand(*a, PRODUCT), "*", operand(*b, SIGN)), PRODUCT),
+                Node::Binary(Binary::Div, a, b) => (joined(operand(*a, PRODUCT), "/", operand(*b, SIGN)), PRODUCT),
+                Node::Binary(Binary::Powf, a, b) => (joined(operand(*a, ATOM), "^", operand(*b, SIGN)), POWER),
+                Node::Binary(function, a, b) => {
+                    let name = name_of(Function::Two(*function)).unwrap_or("?");
+                    (format!("{name}({}, {})", operand(*a, SUM), operand(*b, SUM)), ATOM)
+                }
+            };
+            texts.push(text);
+        }
+        f.write_str(texts.last().map_or("", |(text, _)| text))
+    }
+}

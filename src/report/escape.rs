@@ -1,0 +1,18 @@
+//! Text inside HTML and SVG.
+
+/// Text with the characters that mean something in HTML replaced; control characters that HTML forbids are dropped.
+pub(super) fn escape(text: &str) -> String {
+    let mut escaped = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '&' => escaped.push_str("&amp;"),
+            '<' => escaped.push_str("&lt;"),
+            '>' => escaped.push_str("&gt;"),
+            '"' => escaped.push_str("&quot;"),
+            '\'' => escaped.push_str("&#39;"),
+            c if c.is_control() && !"\n\r\t".contains(c) => {}
+            c => escaped.push(c),
+        }
+    }
+    escaped
+}

@@ -1,0 +1,97 @@
+//! Grids as colours, side by side.
+
+use super::axes::{Area, Axis, BELOW, Kind, TITLE_HEIGHT, number, room_left, ruled};
+use super::colours::{DIVERGING, GAP, MARK, VIRIDIS, at};
+use super::png::indexed;
+use super::svg::{Anchor, INK, Panel, text_width};
+use super::{HeatMap, Picture, PlotError, extremes, fine};
+
+/// Size of a panel.
+const SIZE: (f64, f64) = (332.0, 286.0);
+/// Width of a colour bar, room left of it.
+const BAR: (f64, f64) = (11.0, 10.0);
+/// Size of its texts.
+const TEXT: f64 = 12.0;
+/// Colours of a map; one more stands for gaps.
+const SHADES: usize = 255;
+
+/// Draws grids side by side, each with its colour bar; gaps are grey.
+///
+/// # Errors
+/// [`PlotError::Empty`] if a grid has no finite value or fewer than two values per axis.
+pub fn heat_maps(maps: &[HeatMap]) -> Result<Picture, PlotError> {
+    let panels = maps.iter().map(panel).collect::<Result<Vec<Panel>, PlotError>>()?;
+    if panels.is_empty() { Err(PlotError::Empty(String::new())) } else { Ok(Picture { panels }) }
+}
+
+fn panel(map: &HeatMap) -> Result<Panel, PlotError> {
+    let empty = || PlotError::Empty(map.title.clone());
+    let grid = &map.grid;
+    let (columns, rows) = (grid.x.len(), grid.y.len());
+    let (low, high) = extremes(grid.values.iter().copied()).ok_or_else(empty)?;
+    if columns < 2 || rows < 2 || grid.values.len() != columns * rows {
+        return Err(empty());
+    }
+    // A point is the middle of its square.
+    let edges = |axis: &[f64]| {
+        let half = 0.5 * (axis[axis.len() - 1] - axis[0]) / (axis.len() - 1) as f64;
+        (axis[0] - half, axis[axis.len() - 1] + half)
+    };
+    let kind = |label: &str, (low, high): (f64, f64)| {
+        if label.ends_with("[rad]") && high - low > 3.0 { Kind::Angle } else { Kind::Linear }
+    };
+    let axis = |values: &[f64], label: &str| {
+        let ends = edges(values);
+        Axis::new(ends.0, ends.1, kind(label, ends), label)
+    };
+    let axes = (&axis(&grid.x, &map.x_label), &axis(&grid.y, &map.y_label));
+
+    let (mut from, mut to) = map.range.unwrap_or((low, high));
+    if map.diverging {
+        let largest = from.abs().max(to.abs());
+        (from, to) = (-largest, largest);
+    }
+    let constant = from >= to;
+    let scale = if map.diverging { DIVERGING } else { VIRIDIS };
+    let mut palette: Vec<[u8; 3]> = (0..SHADES).map(|k| at(scale, k as f64 / (SHADES - 1) as f64)).collect();
+    palette.push(GAP);
+    let shade = |z: f64| match (z - from) / (to - from) {
+        _ if !fine(z) => SHADES as u8,
+        _ if constant => SHADES as u8 / 2,
+        part => (part.clamp(0.0, 1.0) * (SHADES - 1) as f64).round() as u8,
+    };
+    let image: Vec<Vec<u8>> =
+        grid.values.chunks_exact(columns).rev().map(|row| row.iter().map(|&z| shade(z)).collect()).collect();
+
+    let texts = if constant { vec![] } else { bar_ticks(from, to) };
+    let bar_room = texts.iter().map(|(_, text)| text_width(text, TEXT)).fold(0.0, f64::max) + BAR.0 + BAR.1 + 16.0;
+    let height = SIZE.1 - TITLE_HEIGHT - BELOW;
+    let left = room_left(axes.1, height);
+    let area = Area { left, top: TITLE_HEIGHT, width: SIZE.0 - left - bar_room, height };
+    let mut panel = Panel::new(SIZE.0, SIZE.1);
+    panel.image(&indexed(&image, &palette), (area.left, area.top), (area.width, area.height));
+    let mut inner = Panel::new(area.width, area.height);
+    let marks: Vec<(f64, f64)> = map.marks.iter().map(|&p| area.point(axes, p)).collect();
+    inner.dots(&marks, MARK, 1.6);
+    panel.inset((area.left, area.top), &inner);
+    let title = if constant { format!("{} = {}", map.title, number(low)) } else { map.title.clone() };
+    // Lines across would be taken for data.
+    let _ = ruled(&mut panel, area, axes, &title);
+    if !constant {
+        let bar: Vec<Vec<u8>> = (0..SHADES as u8).rev().map(|k| vec![k]).collect();
+        let place = area.left + area.width + BAR.1;
+        panel.image(&indexed(&bar, &palette), (place, area.top), (BAR.0, area.height));
+        for (z, text) in texts {
+            let y = area.top + (1.0 - (z - from) / (to - from)) * area.height;
+            panel.segments(&[[(place + BAR.0, y), (place + BAR.0 + 4.0, y)]], INK, 0.8);
+            panel.text((place + BAR.0 + 7.0, y + 4.0), TEXT, Anchor::Start, &text);
+        }
+    }
+    Ok(panel)
+}
+
+/// Ticks of a colour bar; their texts tell the power of ten.
+fn bar_ticks(from: f64, to: f64) -> Vec<(f64, String)> {
+    let (ticks, _) = Axis::new(from, to, Kind::Linear, "").ticks(5);
+    ticks.into_iter().map(|tick| (tick.at, number(tick.at))).collect()
+}

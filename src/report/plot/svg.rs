@@ -1,0 +1,201 @@
+//! Drawing in SVG: lengths in pixels from the upper left corner.
+
+use super::simplify::simplify;
+use crate::report::base64::base64;
+use crate::report::escape::escape;
+use std::fmt::Write as _;
+
+/// Colour of texts and axes.
+pub(super) const INK: &str = "#1c2330";
+/// Colour of lines behind the data.
+pub(super) const GRID: &str = "#e3e7ee";
+/// Distance from a path, in pixels, within which points are left out.
+const TOLERANCE: f64 = 0.08;
+/// Width of a letter over the size of its font, about.
+const LETTER: f64 = 0.56;
+
+/// Where a text stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Anchor {
+    Start,
+    Middle,
+    End,
+}
+
+/// Width of a text in pixels, about.
+pub(super) fn text_width(text: &str, size: f64) -> f64 {
+    LETTER * size * text.chars().filter(|c| !('\u{300}'..'\u{370}').contains(c)).count() as f64
+}
+
+/// The size, at most `size`, at which a text is no longer than `width`.
+pub(super) fn fitting(text: &str, size: f64, width: f64) -> f64 {
+    (size * width / text_width(text, size).max(1.0)).min(size)
+}
+
+/// A drawing and its size.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Panel {
+    pub width: f64,
+    pub height: f64,
+    body: String,
+}
+
+impl Panel {
+    pub fn new(width: f64, height: f64) -> Self {
+        Self { width, height, body: String::new() }
+    }
+
+    /// What is drawn, on white.
+    pub fn body(&self) -> String {
+        format!("<rect width=\"{}\" height=\"{}\" fill=\"#fff\"/>{}", short(self.width), short(self.height), self.body)
+    }
+
+    pub fn text(&mut self, (x, y): (f64, f64), size: f64, anchor: Anchor, text: &str) {
+        let anchor = match anchor {
+            Anchor::Start => "",
+            Anchor::Middle => " text-anchor=\"middle\"",
+            Anchor::End => " text-anchor=\"end\"",
+        };
+        let (x, y, size, text) = (short(x), short(y), short(size), escape(text));
+        let _ =
+            write!(self.body, "<text x=\"{x}\" y=\"{y}\" font-size=\"{size}\" fill=\"{INK}\"{anchor}>{text}</text>");
+    }
+
+    /// A title.
+    pub fn title(&mut self, (x, y): (f64, f64), size: f64, text: &str) {
+        let (x, y, size, text) = (short(x), short(y), short(size), escape(text));
+        let style = "font-weight=\"600\"";
+        let _ =
+            write!(self.body, "<text x=\"{x}\" y=\"{y}\" font-size=\"{size}\" fill=\"{INK}\" {style}>{text}</text>");
+    }
+
+    /// A text that ends at a point, readable over lines.
+    pub fn haloed_text(&mut self, (x, y): (f64, f64), size: f64, text: &str) {
+        let (x, y, size, text) = (short(x), short(y), short(size), escape(text));
+        let halo = "paint-order=\"stroke\" stroke=\"#fff\" stroke-width=\"3\" stroke-linejoin=\"round\"";
+        let _ = write!(
+            self.body,
+            "<text x=\"{x}\" y=\"{y}\" font-size=\"{size}\" fill=\"{INK}\" text-anchor=\"end\" {halo}>{text}</text>"
+        );
+    }
+
+    /// A text that reads from below, its middle at the point.
+    pub fn vertical_text(&mut self, (x, y): (f64, f64), size: f64, text: &str) {
+        let (x, y, size, text) = (short(x), short(y), short(size), escape(text));
+        let _ = write!(
+            self.body,
+            "<text transform=\"translate({x} {y}) rotate(-90)\" font-size=\"{size}\" fill=\"{INK}\" \
+             text-anchor=\"middle\">{text}</text>"
+        );
+    }
+
+    /// Segments of one colour and width.
+    pub fn segments(&mut self, segments: &[[(f64, f64); 2]], colour: &str, width: f64) {
+        if segments.is_empty() {
+            return;
+        }
+        let mut d = String::new();
+        for [(x, y), (u, w)] in segments {
+            let _ = write!(d, "M{} {}L{} {}", short(*x), short(*y), short(*u), short(*w));
+        }
+        let width = short(width);
+        let _ = write!(self.body, "<path d=\"{d}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"{width}\"/>");
+    }
+
+    /// Lines through finite points, to a twelfth of a pixel.
+    pub fn lines(&mut self, lines: &[Vec<(f64, f64)>], colour: &str, width: f64) {
+        let mut d = String::new();
+        for line in lines {
+            // Tenths of a pixel, each point relative to the one before.
+            let mut points = simplify(line, TOLERANCE).into_iter();
+            let tenths = |(x, y): (f64, f64)| ((10.0 * x).round() as i64, (10.0 * y).round() as i64);
+            let Some(mut before) = points.next().map(tenths) else { continue };
+            let _ = write!(d, "M{} {}", before.0, before.1);
+            let mut sign = "l";
+            for point in points.map(tenths) {
+                let (dx, dy) = (point.0 - before.0, point.1 - before.1);
+                if (dx, dy) != (0, 0) {
+                    let _ = write!(
+                        d,
+                        "{}{dx}{}{dy}",
+                        if sign == " " && dx < 0 { "" } else { sign },
+                        if dy < 0 { "" } else { " " }
+                    );
+                    (before, sign) = (point, " ");
+                }
+            }
+        }
+        if d.is_empty() {
+            return;
+        }
+        let width = short(10.0 * width);
+        let _ = write!(
+            self.body,
+            "<path transform=\"scale(.1)\" d=\"{d}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"{width}\" \
+             stroke-linejoin=\"round\" stroke-linecap=\"round\"/>"
+        );
+    }
+
+    /// Dots.
+    pub fn dots(&mut self, points: &[(f64, f64)], colour: &str, diameter: f64) {
+        if points.is_empty() {
+            return;
+        }
+        let mut d = String::new();
+        for (x, y) in points {
+            let _ = write!(d, "M{} {}h0", short(*x), short(*y));
+        }
+        let width = short(diameter);
+        let _ = write!(
+            self.body,
+            "<path d=\"{d}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"{width}\" stroke-linecap=\"round\"/>"
+        );
+    }
+
+    /// A PNG, stretched; its pixels stay squares of one colour.
+    pub fn image(&mut self, png: &[u8], (x, y): (f64, f64), (width, height): (f64, f64)) {
+        let _ = write!(
+            self.body,
+            "<image x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" preserveAspectRatio=\"none\" \
+             style=\"image-rendering:pixelated\" href=\"data:image/png;base64,{}\"/>",
+            short(x),
+            short(y),
+            short(width),
+            short(height),
+            base64(png)
+        );
+    }
+
+    /// Another drawing at a place; what lies outside of its size is cut off.
+    pub fn inset(&mut self, (x, y): (f64, f64), inner: &Self) {
+        let (x, y, width, height) = (short(x), short(y), short(inner.width), short(inner.height));
+        let _ = write!(
+            self.body,
+            "<svg x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\" overflow=\"hidden\">{}</svg>",
+            inner.body
+        );
+    }
+}
+
+/// A length in at most two decimals.
+pub(super) fn short(x: f64) -> String {
+    let text = format!("{x:.2}");
+    let text = text.trim_end_matches('0').trim_end_matches('.');
+    if text == "-0" { "0".to_string() } else { text.to_string() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_are_written_in_tenths_and_steps() {
+        let mut panel = Panel::new(10.0, 10.0);
+        panel.lines(&[vec![(1.0, 2.0), (1.5, 1.0), (0.5, 3.0), (0.5, 3.01)]], "#000", 1.2);
+        assert!(panel.body().contains("d=\"M10 20l5-10-10 20\"") && panel.body().contains("stroke-width=\"12\""));
+        panel.vertical_text((3.0, 4.0), 12.0, "a < b");
+        assert_eq!(panel.body().matches("a &lt; b").count(), 1);
+        assert_eq!([short(-0.001), short(2.50), short(1e3)], ["0", "2.5", "1000"]);
+        assert!(fitting("a long label", 13.0, 40.0) < 7.0 && fitting("a", 13.0, 40.0) == 13.0);
+    }
+}
