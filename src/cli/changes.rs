@@ -1,9 +1,9 @@
 //! Options for what is changed most, of `train` and `fit` alike.
 
-use crate::cli::CliError;
 use crate::cli::number::{count, positive, weight};
+use crate::cli::{CliError, chosen};
 use crate::network::{Nonlinearity, Structure};
-use crate::training::{Config, Regularizer};
+use crate::training::{Config, Known, Regularizer};
 
 /// Changes of a configuration.
 #[derive(Clone, Debug, Default, clap::Args)]
@@ -29,6 +29,10 @@ pub struct Changes {
     /// Learn the factor alpha of the added |v|^2 of a black box.
     #[arg(long)]
     pub learn_alpha: bool,
+    /// System file of a Lagrangian that is known: it is added to what the network learns, and its parameters marked learn are
+    /// learned too.
+    #[arg(long, value_name = "FILE.toml")]
+    pub known: Option<String>,
     /// Penalty that keeps the signature of the mass matrix.
     #[arg(long, value_enum, value_name = "KIND")]
     pub penalty: Option<PenaltyName>,
@@ -96,6 +100,20 @@ impl Changes {
             config.network.cyclic.clone_from(&self.cyclic);
         }
         config.network.even_in_v |= self.even_in_v;
+        if let Some(path) = &self.known {
+            config.network.known = Some(Known::File(path.clone()));
+            // What is known has its own kinetic energy.
+            config.network.alpha = 0.0;
+        }
+        if let Some(Known::File(path)) = &config.network.known {
+            let system = chosen::system(path)?;
+            let Some(described) = &system.described else {
+                return Err(CliError::usage(format_args!(
+                    "--known {path}: expected the file of a system, ending in .toml"
+                )));
+            };
+            config.network.known = Some(Known::Description(Box::new(described.description.clone())));
+        }
         config.network.learn_alpha |= self.learn_alpha;
         self.penalise(config, time, how)?;
         if let Some(rate) = self.learning_rate

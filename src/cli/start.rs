@@ -5,7 +5,7 @@ use crate::cli::learned::model_file;
 use crate::network::Architecture;
 use crate::network::file::{Header, ModelFile, StoredPrecision};
 use crate::scalar::Scalar;
-use crate::training::{Config, Precision, Scaling};
+use crate::training::{Config, Known, Precision, Scaling};
 use serde_json::Value;
 use std::path::Path;
 
@@ -41,6 +41,7 @@ impl Start {
         (network.structure, network.cyclic) =
             (model.form.structure, model.form.cyclic.iter().filter_map(name).collect());
         (network.even_in_v, network.learn_alpha) = (model.form.even_in_v, model.form.learn_alpha);
+        network.known = model.form.known.clone().map(Known::Description);
         let scaled = model.scale.iter().any(|scale| *scale != 1.0);
         network.scaling = if scaled { Scaling::Physical } else { Scaling::None };
         config.precision = match self.header.precision {

@@ -81,8 +81,10 @@ pub struct Layout {
     pub features: usize,
     /// Parameters of the dissipation, behind those of all branches.
     pub dissipation: Option<DissipationLayout>,
-    /// The parameter `alpha` of a black box that learns it, the last one.
+    /// The parameter `alpha` of a black box that learns it.
     pub alpha: Option<usize>,
+    /// Parameters of the learned constants of a known part, the last ones.
+    pub known: Range<usize>,
 }
 
 /// Where the parameters of a Rayleigh dissipation sit: `gamma`, then `w`, then `b`.
@@ -157,7 +159,9 @@ impl Layout {
         let parameters = dissipation.map_or(parameters, |dissipation| dissipation.direction_range().end);
         let alpha = (form.learn_alpha && black_box).then_some(parameters);
         let parameters = parameters + usize::from(alpha.is_some());
-        Self { branches, parameters, position_features, features, dissipation, alpha }
+        let learned = form.known.as_ref().map_or(0, |known| crate::network::known::learned(known));
+        let known = parameters..parameters + learned;
+        Self { branches, parameters: known.end, position_features, features, dissipation, alpha, known }
     }
 }
 

@@ -7,6 +7,7 @@ mod features;
 #[cfg(feature = "model-files")]
 pub mod file;
 mod init;
+mod known;
 mod layout;
 mod model;
 mod nonlinearity;

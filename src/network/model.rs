@@ -91,6 +91,10 @@ impl Architecture {
         if *structure != Structure::BlackBox && (0..n).all(|i| cyclic.contains(&i)) {
             return fault(format!("expected a coordinate that is not cyclic for `{name}`"));
         }
+        if let Some(known) = &self.form.known {
+            let described = crate::network::known::system(known, n);
+            described.map_err(|problem| NetworkError::Architecture(format!("known: {problem}")))?;
+        }
         if *structure != Structure::BlackBox && *learn_alpha {
             return fault(format!("expected no learned alpha for `{name}`, which has no such term"));
         }

@@ -25,7 +25,7 @@ impl Lagrangian for Architecture {
         };
         let n = self.coordinates;
         let triangle = n * (n + 1) / 2;
-        match self.form.structure {
+        let learned = match self.form.structure {
             Structure::BlackBox => {
                 let at = |sign: R| {
                     let moved = velocities.iter().map(|&v| sign * v);
@@ -57,7 +57,8 @@ impl Lagrangian for Architecture {
                 let outputs = outputs(&positions);
                 quadratic_form(&outputs, &velocities, &time_last(n, self.time_like), self.time_like.is_some())
             }
-        }
+        };
+        if self.form.known.is_some() { learned + self.known_lagrangian(parameters, q, v) } else { learned }
     }
 }
 

@@ -10,6 +10,7 @@
 //! spatial metric positive definite, lapse positive, shift free. All velocities are scaled, `v_i/s_i`; the network of a mechanical
 //! Lagrangian or a metric sees positions alone.
 
+use crate::lagrangian::Description;
 use crate::scalar::Real;
 use serde::{Deserialize, Serialize};
 
@@ -41,7 +42,7 @@ impl Structure {
 }
 
 /// What is known of a Lagrangian beforehand.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Form {
     /// How the Lagrangian is made of the network's outputs.
@@ -52,6 +53,9 @@ pub struct Form {
     pub even_in_v: bool,
     /// Whether `alpha` of a black box is learned.
     pub learn_alpha: bool,
+    /// A Lagrangian that is known, in physical units, and added; its constants marked `learn` are learned.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub known: Option<Box<Description>>,
 }
 
 impl Form {

@@ -166,8 +166,21 @@ pub struct Network {
     /// Whether `alpha` is learned.
     #[serde(default)]
     pub learn_alpha: bool,
+    /// A Lagrangian that is known and added: a grey box.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub known: Option<Known>,
     /// Distribution of the initial weights.
     pub initialization: Initialization,
+}
+
+/// The known part of a grey box: a file, as a user writes it, or what it says, as a run keeps it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum Known {
+    /// Path of a system file.
+    File(String),
+    /// Its content.
+    Description(Box<Description>),
 }
 
 /// Update rule.
@@ -249,6 +262,11 @@ impl Network {
             cyclic: self.cyclic.iter().map(index).collect::<Result<_, _>>()?,
             even_in_v: self.even_in_v,
             learn_alpha: self.learn_alpha,
+            known: match &self.known {
+                Some(Known::Description(description)) => Some(description.clone()),
+                // Whoever reads a configuration reads the file too.
+                Some(Known::File(_)) | None => None,
+            },
         })
     }
 }

@@ -25,7 +25,7 @@ mod violations;
 pub use checkpoint::{
     CheckpointError, Every, Identity, Keeper, NEWEST, PREVIOUS, Restored, Saved, Snapshot, remove_checkpoints, saved,
 };
-pub use config::{Config, ConfigError, Data, Network, OnFailure, Optimizer, Phase, Polish, Precision, Scaling};
+pub use config::{Config, ConfigError, Data, Known, Network, OnFailure, Optimizer, Phase, Polish, Precision, Scaling};
 pub use dataset::{Dataset, DatasetError};
 pub use measured::{Measured, MeasuredError, Part, Preparation};
 pub use memory::training_memory;

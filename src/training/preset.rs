@@ -115,6 +115,7 @@ fn network(width: usize) -> Network {
         cyclic: Vec::new(),
         even_in_v: false,
         learn_alpha: false,
+        known: None,
         initialization: Initialization::Default,
         dissipation: None,
     }
@@ -253,6 +254,7 @@ fn paper(system: &Configured<f64>) -> Option<Config> {
         cyclic: Vec::new(),
         even_in_v: false,
         learn_alpha: false,
+        known: None,
         initialization: Initialization::Default,
     };
     let bounds: Bounds = system.system.training(n);

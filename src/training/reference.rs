@@ -133,6 +133,12 @@ pub const TRAINING_SECTIONS: [Section<'static>; 9] = [
             key("alpha", "a finite number", "Factor of the added |v|^2 of scaled velocities, of a black box."),
             key("learn_alpha", "true, false", "Learn alpha too; a black box only."),
             optional(
+                "known",
+                "\"pendulum.toml\"",
+                "a system file, or its tables",
+                "A Lagrangian that is known and added; its parameters marked learn are learned beside the weights.",
+            ),
+            optional(
                 "time_like",
                 "\"t\"",
                 "a coordinate",

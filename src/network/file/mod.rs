@@ -186,5 +186,8 @@ fn slots(architecture: &Architecture) -> Result<Vec<Slot>, ModelFileError> {
     if let Some(alpha) = layout.alpha {
         slots.push(Slot { name: "alpha".to_string(), shape: vec![1], range: alpha..alpha + 1 });
     }
+    if !layout.known.is_empty() {
+        slots.push(Slot { name: "known".to_string(), shape: vec![layout.known.len()], range: layout.known });
+    }
     Ok(slots)
 }

@@ -352,6 +352,7 @@ fn config(units: Option<usize>, epochs: usize) -> Config {
             cyclic: Vec::new(),
             even_in_v: false,
             learn_alpha: false,
+            known: None,
             initialization: Initialization::Default,
         },
         penalty: Regularizer::Sylvester { lambda: 100.0 },

@@ -429,6 +429,7 @@ fn config(epochs: usize) -> Config {
             cyclic: Vec::new(),
             even_in_v: false,
             learn_alpha: false,
+            known: None,
             initialization: Initialization::Default,
         },
         penalty: Regularizer::Eigenvalue { lambda: 10.0 },
