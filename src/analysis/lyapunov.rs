@@ -4,7 +4,7 @@ use crate::lagrangian::EulerLagrange;
 use crate::rollout::{Integrable, Options, RolloutError, rollout};
 use serde::{Deserialize, Serialize};
 
-/// Logarithm of the factor by which neighbours part, below which a motion of at most [`LONG`] units of time is regular: its
+/// Logarithm of the factor by which neighbours part, below which a motion of at most 50 units of time is regular: its
 /// Lyapunov time is then above a fifth of the time span. Those of regular motions part in proportion to time, by a factor of
 /// some 50 in 50 s.
 pub const REGULAR: f64 = 5.0;

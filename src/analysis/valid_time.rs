@@ -17,12 +17,12 @@ use serde::{Deserialize, Serialize};
 /// The relative error up to which a prediction is valid.
 pub const VALID: f64 = 0.4;
 
-/// How long a prediction was valid.
+/// Time for which a prediction was valid.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ValidTime {
     /// Time of the first sample whose error exceeds [`VALID`], or of the last sample.
     pub time: f64,
-    /// Whether the error had not exceeded it by the last sample: the true time is longer.
+    /// `true` if the error had not exceeded it by the last sample: the true time is longer.
     pub at_least: bool,
 }
 
@@ -33,13 +33,13 @@ pub struct ValidTimes {
     pub threshold: f64,
     /// Median of the times.
     pub median: f64,
-    /// Whether the true median is longer, for too many predictions were valid to their end.
+    /// `true` if the true median is longer, for too many predictions were valid to their end.
     pub at_least: bool,
     /// Starts.
     pub starts: usize,
     /// Median of the times in Lyapunov times of each start; none unless the exact motion is known to be chaotic.
     pub lyapunov_times: Option<f64>,
-    /// Whether the true one is longer.
+    /// `true` if the true one is longer.
     pub lyapunov_at_least: bool,
     /// Starts whose exact motion is chaotic.
     pub chaotic: usize,

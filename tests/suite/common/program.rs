@@ -157,3 +157,14 @@ pub fn model() -> ModelFile<f32> {
     };
     ModelFile { header, weights: (0..count).map(|k| (k as f32 * 0.7).sin() / 4.0).collect() }
 }
+
+/// A text with one blank between two words, wherever its lines were cut.
+pub fn joined(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+/// Sentence that a report begins with.
+pub fn lead(report: &str) -> String {
+    let (_, rest) = report.split_once("class=\"lead\">").unwrap();
+    rest.split_once("</p>").unwrap().0.replace("&#39;", "'")
+}

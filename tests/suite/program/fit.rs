@@ -2,7 +2,7 @@
 #![cfg(feature = "cli")]
 
 use crate::common::damped::Damped;
-use crate::common::program::{Folder, Run, lnn, text};
+use crate::common::program::{Folder, Run, joined, lead, lnn, text};
 use lnn::lagrangian::{EulerLagrange, Request, Terms};
 use lnn::network::file::ModelFile;
 use lnn::rollout::{Method, Options, rollout};
@@ -95,7 +95,12 @@ fn recorded_positions_become_a_model_that_predicts() {
     assert!(found["valid_time"]["median"].as_f64().unwrap() > 0.0 && found["valid_time"]["lyapunov_times"].is_null());
     assert!(run.stdout.contains("Prediction valid (error below 0.4 of the spread of the motion), median of"));
     let report = fs::read_to_string(folder.path("out/report.html")).unwrap();
-    assert!(report.contains("class=\"lead\">measured: the learned Lagrangian predicts"));
+    let sentence = lead(&report);
+    assert!(sentence.starts_with("measured: the learned Lagrangian predicts"), "{sentence}");
+    assert!(joined(&run.stdout).starts_with(&sentence), "{}", run.stdout);
+    // Each table stands once, and the report says what was learned from.
+    assert_eq!(report.matches("time ahead [s]</th>").count(), 1);
+    assert!(report.contains("learned from smoothed accelerations"));
     assert!(report.len() < 2_000_000, "{}", report.len());
     assert!(run.stdout.contains("learned from smoothed accelerations") && run.stdout.contains("report: "));
     let mut names: Vec<_> =
