@@ -1,45 +1,51 @@
-//! Learns the parameters of a double pendulum from accelerations: argmin's L-BFGS on the gradient of a replayed program.
+//! Learns the parameters of a double pendulum from accelerations: argmin's L-BFGS on the gradient of a recorded Lagrangian.
 //!
 //! Motion does not change with the unit of mass or length: only the ratios m2/m1, l2/l1 and g/l1 can be learned.
 
 use argmin::core::{CostFunction, Error, Executor, Gradient, State};
 use argmin::solver::{linesearch::MoreThuenteLineSearch, quasinewton::LBFGS};
-use lnn::forward::Jet2;
 use lnn::lagrangian::{Lagrangian, system::Closed, systems::double_pendulum::DoublePendulum};
-use lnn::tape::{Program, Replay, TapeError, Tracer};
-use lnn::{scalar::Real, training::Stream};
+use lnn::linalg::{Workspace, solve};
+use lnn::tape::{Depth, Evaluation, MixedDirections, Recorded, STATES};
+use lnn::training::Stream;
 use rand_distr::{Distribution, StandardNormal, Uniform};
-use std::{cell::RefCell, sync::Arc};
+use std::sync::Arc;
 
 /// Mean over the states of |a - target|^2, of the lanes `(q, v, target)` and the parameters.
 struct Misfit {
-    replay: RefCell<Replay<f64>>,
+    recorded: Arc<Recorded<f64>>,
     lanes: Vec<[f64; 6]>,
 }
 
-fn record() -> Result<Program<f64>, TapeError> {
-    Program::record(6, 3, |lane, p| {
-        // Unit m1 and l1; derivatives by all of (q, v).
-        let x: [Jet2<Tracer<f64>, 4>; 4] = std::array::from_fn(|i| Jet2::variable(lane[i], i));
-        let [one, mass, length, gravity] = [Tracer::<f64>::one(), p[0], p[1], p[2]].map(Jet2::lift);
-        let l = DoublePendulum.lagrangian(&[one, mass, one, length, gravity], &x[..2], &x[2..]);
-        // M a = dL/dq - (d2L/dv dq) v
-        let matrix: Vec<Tracer<f64>> = (0..4).map(|k| l.second(2 + k / 2, 2 + k % 2)).collect();
-        let right = [0, 1].map(|i| l.gradient[i] - l.second(2 + i, 0) * lane[2] - l.second(2 + i, 1) * lane[3]);
-        let determinant = matrix[0] * matrix[3] - matrix[1] * matrix[2];
-        let a = [matrix[3] * right[0] - matrix[1] * right[1], matrix[0] * right[1] - matrix[2] * right[0]];
-        let a = a.map(|a| a / determinant);
-        vec![(a[0] - lane[4]).sqr() + (a[1] - lane[5]).sqr()]
-    })
+impl Misfit {
+    /// The mean and its gradient: with `lam = M^-1 dl/da` the mixed coefficients of `s = -lam`, `t = a`.
+    fn evaluate(&self, p: &[f64]) -> Result<(f64, Vec<f64>), Error> {
+        let parameters = [1.0, p[0], 1.0, p[1], p[2]];
+        let (mut evaluation, mut workspace) = (Evaluation::new(self.recorded.clone()), Workspace::new());
+        let (mut sum, mut gradient) = (0.0, vec![0.0; 5]);
+        for lanes in self.lanes.chunks(STATES) {
+            let part = |k: usize| -> Vec<f64> { lanes.iter().flat_map(|lane| lane[k..k + 2].to_vec()).collect() };
+            evaluation.evaluate(&parameters, &part(0), &part(2), Depth::Training);
+            let forces = evaluation.dl_dq.iter().zip(&evaluation.coriolis).map(|(g, c)| g - c);
+            let mut a = vec![0.0; 2 * lanes.len()];
+            solve(2, &evaluation.mass_matrix, &forces.collect::<Vec<_>>(), &mut a, &mut workspace)?;
+            let errors: Vec<f64> = a.iter().zip(part(4)).map(|(a, target)| a - target).collect();
+            sum += errors.iter().map(|e| e * e).sum::<f64>();
+            let by_a: Vec<f64> = errors.iter().map(|e| -2.0 * e / self.lanes.len() as f64).collect();
+            let mut s = vec![0.0; by_a.len()];
+            solve(2, &evaluation.mass_matrix, &by_a, &mut s, &mut workspace)?;
+            let directions = MixedDirections { s, t: a, moving: true };
+            evaluation.add_gradient(&parameters, &directions, &mut gradient, None);
+        }
+        Ok((sum / self.lanes.len() as f64, vec![gradient[1], gradient[3], gradient[4]]))
+    }
 }
 
 impl CostFunction for Misfit {
     type Param = Vec<f64>;
     type Output = f64;
     fn cost(&self, p: &Vec<f64>) -> Result<f64, Error> {
-        let mut errors = vec![0.0; self.lanes.len()];
-        self.replay.borrow_mut().forward(errors.len(), self.lanes.as_flattened(), p, &mut errors)?;
-        Ok(errors.iter().sum::<f64>() / errors.len() as f64)
+        Ok(self.evaluate(p)?.0)
     }
 }
 
@@ -47,16 +53,14 @@ impl Gradient for Misfit {
     type Param = Vec<f64>;
     type Gradient = Vec<f64>;
     fn gradient(&self, p: &Vec<f64>) -> Result<Vec<f64>, Error> {
-        let (_, count, mut gradient) = (self.cost(p)?, self.lanes.len(), vec![0.0; 3]);
-        self.replay.borrow_mut().reverse_parameters(&vec![1.0 / count as f64; count], &mut gradient)?;
-        Ok(gradient)
+        Ok(self.evaluate(p)?.1)
     }
 }
 
 /// Largest relative error of the parameters learned from states with this noise, in parts of the rms acceleration.
 fn identify(count: usize, noise: f64) -> Result<f64, Error> {
     let (mut rng, uniform) = (Stream::Training(0).generator(1), Uniform::new(-3.0, 3.0)?);
-    let mut lanes = vec![[0.0; 6]; count];
+    let mut lanes = vec![[0.0_f64; 6]; count];
     for lane in &mut lanes {
         let (x, target) = lane.split_at_mut(4);
         x.fill_with(|| uniform.sample(&mut rng));
@@ -66,7 +70,8 @@ fn identify(count: usize, noise: f64) -> Result<f64, Error> {
     for a in lanes.iter_mut().flat_map(|lane| &mut lane[4..]) {
         *a += noise * square.sqrt() * Distribution::<f64>::sample(&StandardNormal, &mut rng);
     }
-    let problem = Misfit { replay: RefCell::new(Replay::new(Arc::new(record()?))), lanes };
+    let recorded = Recorded::new(vec![1.0; 2], 5, |p, q, v| DoublePendulum.lagrangian(p, q, v))?;
+    let problem = Misfit { recorded: Arc::new(recorded), lanes };
     let solver = LBFGS::new(MoreThuenteLineSearch::new(), 6).with_tolerance_cost(0.0)?.with_tolerance_grad(1e-9)?;
     let result = Executor::new(problem, solver).configure(|s| s.param(vec![1.0, 1.0, 10.0]).max_iters(100)).run()?;
     let (state, learned) = (result.state(), result.state().get_best_param().cloned().unwrap_or_default());

@@ -302,7 +302,7 @@ pub fn section_reference(section: &Section<'_>, values: &Value, whose: &str) -> 
 mod tests {
     use super::*;
     use crate::network::{InputLayer, Nonlinearity};
-    use crate::training::{Polish, Regularizer};
+    use crate::training::{Known, Polish, Regularizer};
     use std::collections::BTreeSet;
 
     /// Paths of all keys of a value, tables of lists included; what stands in `open` is not descended into.
@@ -332,6 +332,8 @@ mod tests {
         let mut config = Preset::Quick.config(&system).unwrap();
         config.from = Some("a".to_string());
         config.network.dissipation = Some(16);
+        config.network.cyclic = vec!["t".to_string()];
+        config.network.known = Some(Known::File("a.toml".to_string()));
         config.polish = Some(Polish::default());
         config.data.motions = 0.5;
         let mut found = BTreeSet::new();
