@@ -84,7 +84,7 @@ fn measure<S: Scalar>(options: &Options, section: &mut Section) {
     let timed: Vec<S> =
         (0..ELEMENTS).map(|_| S::of_f64(2.0 * rng.sample::<f64, _>(rand_distr::StandardNormal))).collect();
     let stopwatch = options.stopwatch();
-    let blank = |count: usize| -> [Vec<S>; 4] { std::array::from_fn(|_| vec![S::NAN; count]) };
+    let blank = |count: usize| -> [Vec<S>; 4] { std::array::from_fn(|_| vec![S::nan(); count]) };
     let (mut curves, mut nested) = (Vec::new(), Vec::new());
     for activation in Activation::ALL.into_iter().filter(|&a| a != Activation::Identity) {
         let exact: Vec<[Dd; 5]> = points.iter().map(|x| activation.derivatives(x.cast::<Dd>())).collect();
@@ -123,7 +123,7 @@ fn measure<S: Scalar>(options: &Options, section: &mut Section) {
 
 /// Worst R over points and derivatives, which derivative and where; infinite for a number that is not finite.
 fn worst<S: Scalar>(points: &[S], exact: &[[Dd; 5]], found: &[Vec<S>]) -> (f64, usize, f64) {
-    let eps = S::EPSILON.to_f64();
+    let eps = S::epsilon().to_f64();
     let smallest = if S::NAME == "f32" { f64::from(f32::from_bits(1)) } else { f64::from_bits(1) };
     let mut worst = (0.0, 0, 0.0);
     for (k, (x, exact)) in points.iter().zip(exact).enumerate() {

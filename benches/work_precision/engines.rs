@@ -71,7 +71,7 @@ impl Bench<'_> {
         let (quantity, engine, precision) = what;
         let eps = match precision {
             "f32" | "f32, solved in f64" => f64::from(f32::EPSILON),
-            "dd" => Dd::EPSILON.to_f64(),
+            "dd" => Dd::epsilon().to_f64(),
             _ => f64::EPSILON,
         };
         let floor = eps * self.condition;

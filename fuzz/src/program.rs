@@ -213,7 +213,7 @@ fn agrees<S: Scalar>(
     found: &[S],
     (exact, condition): &(Answer<Dd>, [f64; 1 + 2 * VARIABLES]),
 ) {
-    let roundings = R * S::EPSILON.to_f64() * (1 + f.operations.len()) as f64;
+    let roundings = R * S::epsilon().to_f64() * (1 + f.operations.len()) as f64;
     for (k, &y) in found.iter().enumerate() {
         let error = (y.cast::<Dd>() - exact[k]).to_f64().abs();
         let bound = roundings * condition[k];

@@ -24,7 +24,7 @@ pub fn acceleration_errors<S: Scalar>(
             terms.acceleration.clear();
             // Failed rows are `NaN` in the result; the others are right.
             let _ = model.terms(q, v, Request::ACCELERATION, terms);
-            terms.acceleration.resize(q.len(), S::NAN);
+            terms.acceleration.resize(q.len(), S::nan());
         }
         for (a, b) in a.acceleration.chunks(n).zip(b.acceleration.chunks(n)) {
             if a.iter().chain(b).all(|x| x.is_finite()) {

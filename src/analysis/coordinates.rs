@@ -25,7 +25,7 @@ impl CoordinateError {
 
 /// Distance of two angles on the circle, in `[0, pi]`.
 pub fn angle_difference<S: Scalar>(a: S, b: S) -> S {
-    let turn = S::PI + S::PI;
+    let turn = S::pi() + S::pi();
     let difference = (a - b).abs().wrap_angle();
     S::min(difference, turn - difference)
 }

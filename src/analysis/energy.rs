@@ -38,7 +38,7 @@ pub fn energy_drift<S: Scalar>(trajectory: &Trajectory<S>, scale: S) -> EnergyEr
 }
 
 fn normalised<S: Scalar>(trajectory: &Trajectory<S>, energy: &[S], scale: S) -> EnergyError {
-    let initial = energy.first().copied().unwrap_or(S::NAN);
+    let initial = energy.first().copied().unwrap_or(S::nan());
     let by = S::max(initial.abs(), scale.abs());
     EnergyError {
         t: trajectory.t.iter().zip(energy).map(|(t, _)| t.to_f64()).collect(),

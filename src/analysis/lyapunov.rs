@@ -58,7 +58,7 @@ pub fn lyapunov<S: Integrable>(
         let (q, v) = main.state(k);
         q.iter().chain(v).map(|x| x.to_f64()).collect()
     };
-    let distance = S::EPSILON.to_f64().sqrt() * size(&flat(0)).max(1.0);
+    let distance = S::epsilon().to_f64().sqrt() * size(&flat(0)).max(1.0);
     // A fixed direction without symmetry.
     let mut offset: Vec<f64> = (0..2 * n).map(|i| 1.0 / (1.0 + i as f64).sqrt()).collect();
     let norm = size(&offset);

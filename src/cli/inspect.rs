@@ -109,7 +109,7 @@ fn inspect<S: Scalar>(args: &Args) -> Result<(), CliError> {
 
 /// Eigenvalues of a batch of mass matrices, ascending; of one that is not finite, `NaN`.
 fn spectrum<S: Scalar>(n: usize, matrices: &[S]) -> Vec<S> {
-    let mut values = vec![S::NAN; matrices.len() / n];
+    let mut values = vec![S::nan(); matrices.len() / n];
     // The matrix that fails has NaN eigenvalues already; the state itself is reported by its terms.
     let _ = eigenvalues(n, matrices, &mut values, &mut Workspace::new());
     values

@@ -53,7 +53,7 @@ pub fn inverse<S: Scalar>(path: &Path, format: Format, source: &Source<S>) -> Re
                     let one = k * n..(k + 1) * n;
                     let forces = inverse_dynamics(model, &q[one.clone()], &v[one.clone()], &a[one]);
                     let problem = forces.as_ref().err().cloned().map(explain);
-                    let nothing = || vec![S::NAN; n];
+                    let nothing = || vec![S::nan(); n];
                     let forces = forces.unwrap_or_else(|_| InverseDynamics {
                         generalized: nothing(),
                         friction: Vec::new(),

@@ -105,7 +105,7 @@ macro_rules! catalogue {
                 let make: fn(usize) -> _ = $make;
                 return make(n).acceleration(&configured.parameters, q, v);
             })*
-            vec![S::NAN; n]
+            vec![S::nan(); n]
         }
 
         /// The velocity of the time-like coordinate on the mass shell, if the system has one.
@@ -331,7 +331,7 @@ fn differentiated<S: Scalar>(lagrangian: &ExpressionLagrangian, parameters: &[S]
     let (n, need) = (q.len(), Need::of(Request::ACCELERATION));
     let Terms { lagrangian: value, momentum, dl_dq, mass_matrix, coriolis, .. } = &mut terms;
     for (field, size) in [(&mut *dl_dq, n), (&mut *mass_matrix, n * n), (&mut *coriolis, n)] {
-        field.resize(size, S::NAN);
+        field.resize(size, S::nan());
     }
     evaluate(
         lagrangian,

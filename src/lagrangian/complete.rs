@@ -50,7 +50,7 @@ impl<S: Scalar> Terms<S> {
             expect("dL/dq", batch * n, self.dl_dq.len())?;
             expect("coriolis terms", batch * n, self.coriolis.len())?;
             self.acceleration.clear();
-            self.acceleration.resize(batch * n, S::NAN);
+            self.acceleration.resize(batch * n, S::nan());
             let mut right = workspace.take_vector();
             right.clear();
             right.extend(self.dl_dq.iter().zip(&self.coriolis).map(|(&g, &c)| g - c));
@@ -116,7 +116,7 @@ impl<S: Scalar> Terms<S> {
         }
         let mut change = workspace.take_vector();
         change.clear();
-        change.resize(size, S::NAN);
+        change.resize(size, S::nan());
         let first = accelerate(n, &self.mass_matrix, external, &mut change, workspace);
         self.acceleration.iter_mut().zip(&change).for_each(|(a, &change)| *a += change);
         workspace.give_vector(change);
@@ -167,7 +167,7 @@ fn divide<S: Scalar>(mass: &[S], force: &[S], acceleration: &mut [S]) -> Option<
     for (row, ((a, &f), &m)) in acceleration.iter_mut().zip(force).zip(mass).enumerate() {
         *a = f / m;
         if !a.is_finite() {
-            *a = S::NAN;
+            *a = S::nan();
             let singular = m == <S as Real>::zero();
             let failure = if singular { Failure::Singular { condition: f64::INFINITY } } else { Failure::NotFinite };
             first = first.or(Some((row, failure)));

@@ -68,7 +68,7 @@ impl<S: Scalar> Lagrangian for Recorded<S> {
     }
     fn lagrangian<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> R {
         let outputs = self.value.interpret(&[q, v].concat(), parameters);
-        outputs.map_or_else(|_| R::constant(Scalar::NAN), |outputs| outputs[0])
+        outputs.map_or_else(|_| R::constant(Scalar::nan()), |outputs| outputs[0])
     }
 }
 
@@ -167,11 +167,11 @@ impl<S: Scalar> Evaluator<S> {
         }
         // Whatever is needed is overwritten below.
         let size = |needed: bool, width: usize| if needed { batch * width } else { 0 };
-        terms.lagrangian.resize(size(need.lagrangian, 1), S::NAN);
-        terms.momentum.resize(size(need.momentum, n), S::NAN);
-        terms.dl_dq.resize(size(need.dl_dq, n), S::NAN);
-        terms.mass_matrix.resize(size(need.mass_matrix, n * n), S::NAN);
-        terms.coriolis.resize(size(need.coriolis, n), S::NAN);
+        terms.lagrangian.resize(size(need.lagrangian, 1), S::nan());
+        terms.momentum.resize(size(need.momentum, n), S::nan());
+        terms.dl_dq.resize(size(need.dl_dq, n), S::nan());
+        terms.mass_matrix.resize(size(need.mass_matrix, n * n), S::nan());
+        terms.coriolis.resize(size(need.coriolis, n), S::nan());
         let by_program = batch >= REPLAY_FROM && n <= REPLAY_COORDINATES;
         if !(by_program && self.replay(form, (q, v), need, terms, scratch)) {
             form.states(&self.parameters, q, v, need, terms);

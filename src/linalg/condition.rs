@@ -42,13 +42,13 @@ pub(super) fn is_singular<S: Scalar>(n: usize, matrix: &[S], scratch: &mut Dense
         return false;
     }
     let (least, most) = scratch.extreme_eigenvalues(n);
-    if least > S::EPSILON * most {
+    if least > S::epsilon() * most {
         return false;
     }
     scratch.load(matrix);
     let (least, most) = scratch.extreme_eigenvalues(n);
     // Not finite counts as singular.
-    let regular = least > S::EPSILON * most;
+    let regular = least > S::epsilon() * most;
     !regular
 }
 
@@ -130,18 +130,18 @@ impl<S: Scalar> Dense<S> {
         );
         let own: f64 = matrix.iter().map(|x| x.to_f64() * x.to_f64()).sum();
         let condition = (own * squares.iter().sum::<f64>()).sqrt();
-        condition * S::EPSILON.to_f64() < 0.25
+        condition * S::epsilon().to_f64() < 0.25
     }
 
     /// Smallest and largest absolute eigenvalue of the loaded matrix.
     fn extreme_eigenvalues(&mut self, n: usize) -> (S, S) {
-        let mut values = vec![S::NAN; n];
+        let mut values = vec![S::nan(); n];
         if large::serves::<S>(n) {
             large::eigh(n, &self.matrix, &mut values, &mut []);
         } else {
             jacobi::decompose::<S, 1>(n, &self.matrix, &mut values, &mut [], (0, 1), &mut self.lanes);
         }
-        values.iter().fold((S::INFINITY, <S as Real>::zero()), |(least, most), w| {
+        values.iter().fold((S::infinity(), <S as Real>::zero()), |(least, most), w| {
             let w = w.abs();
             (if w >= least { least } else { w }, if w <= most { most } else { w })
         })

@@ -70,9 +70,9 @@ fn run<S: Scalar>(
     for (row, m) in matrices.chunks_exact(size).enumerate() {
         let values = &mut values[row * n..(row + 1) * n];
         if m.iter().any(|m| !m.is_finite()) || values.iter().any(|w| !w.is_finite()) {
-            values.fill(S::NAN);
+            values.fill(S::nan());
             if !vectors.is_empty() {
-                vectors[row * size..(row + 1) * size].fill(S::NAN);
+                vectors[row * size..(row + 1) * size].fill(S::nan());
             }
             workspace.failures_mut().push((row, Failure::NotFinite));
         }

@@ -82,7 +82,7 @@ fn where_pivot<S: Scalar, const W: usize>(
 pub(super) fn solve<S: Scalar, const W: usize>((n, m): (usize, usize), system: &mut [Lane<S, W>]) -> Pivots<S, W> {
     let width = n + m;
     let a = &mut system[..n * width];
-    let mut pivots = Pivots { smallest: [S::INFINITY; W], growth: [<S as Real>::zero(); W] };
+    let mut pivots = Pivots { smallest: [S::infinity(); W], growth: [<S as Real>::zero(); W] };
     for k in 0..n {
         let first = a[k * width + k];
         let (mut pivot, mut best, mut row) = (first, first, [S::of_f64(k as f64); W]);

@@ -68,7 +68,7 @@ pub fn inertia<S: Scalar>(n: usize, matrix: &[S], scratch: &mut [S]) -> Result<I
     let exponent = largest.ilogb();
     a.iter_mut().for_each(|x| *x = x.ldexp(-exponent));
     balance(n, a);
-    let floor = S::EPSILON * S::of_f64(2.0 * n as f64);
+    let floor = S::epsilon() * S::of_f64(2.0 * n as f64);
     // (1 + sqrt 17) / 8 bounds the growth.
     let alpha = (one + S::of_f64(17.0).sqrt()) / S::of_f64(8.0);
     let mut k = 0;
@@ -136,7 +136,7 @@ const ROUNDS: usize = 16;
 /// of each row is near 1 (Ruiz 2001, one row after the other).
 fn balance<S: Scalar>(n: usize, a: &mut [S]) {
     let zero = <S as Real>::zero();
-    let lowest = S::MIN_POSITIVE.ilogb();
+    let lowest = S::min_positive().ilogb();
     for _ in 0..ROUNDS {
         let mut balanced = true;
         for i in 0..n {

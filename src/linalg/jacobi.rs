@@ -24,7 +24,7 @@ pub(super) fn decompose<S: Scalar, const W: usize>(
     buffer: &mut Buffer<S>,
 ) -> bool {
     // Elements within these bounds need no scaling.
-    let reach = S::MIN_POSITIVE.ilogb() / -12;
+    let reach = S::min_positive().ilogb() / -12;
     let one = <S as Real>::one();
     let range = (one.ldexp(-reach), one.ldexp(reach));
     let mut finite = true;
@@ -133,7 +133,7 @@ fn diagonalize<S: Scalar, const W: usize>(
         }
     }
     for l in 0..W {
-        let least = S::EPSILON * S::EPSILON * floor[l];
+        let least = S::epsilon() * S::epsilon() * floor[l];
         floor[l] = least * least;
     }
     let pairs = n.div_ceil(2);
@@ -171,7 +171,7 @@ fn angle<S: Scalar, const W: usize>(
 ) -> bool {
     let (zero, one) = (<S as Real>::zero(), <S as Real>::one());
     let (mut app, mut aqq, apq) = (a[p * n + p], a[q * n + q], a[p * n + q]);
-    let quarter = S::EPSILON * S::of_f64(0.25);
+    let quarter = S::epsilon() * S::of_f64(0.25);
     let mut any = false;
     // Twice the element where it counts.
     let mut twice = [zero; W];

@@ -50,7 +50,7 @@ pub fn minimum_norm<S: Scalar>(
     let (mut values, mut vectors) = (vec![zero; n], vec![zero; n * n]);
     eigh(n, &matrix, &mut values, &mut vectors, workspace)?;
     let largest = values.iter().fold(zero, |m, w| if w.abs() > m { w.abs() } else { m });
-    let floor = S::of_f64(n as f64) * S::EPSILON * largest;
+    let floor = S::of_f64(n as f64) * S::epsilon() * largest;
     let (mut solution, mut rank, mut outside) = (vec![zero; n], 0, zero);
     for (&w, u) in values.iter().zip(vectors.chunks_exact(n.max(1))) {
         let component = u.iter().zip(&rhs).fold(zero, |sum, (&u, &b)| sum + u * b);

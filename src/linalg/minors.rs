@@ -82,7 +82,7 @@ pub fn leading_minors<S: Scalar>(
 
 /// Pushes the minors up to the last that follows from comfortably positive pivots without exchanges.
 fn positive_pivots<S: Scalar>(n: usize, a: &mut [S], minors: &mut Vec<Scaled<S>>) {
-    let floor = S::EPSILON.sqrt();
+    let floor = S::epsilon().sqrt();
     let mut product = Scaled::one();
     for k in 0..n {
         let mut pivot = a[k * n + k];

@@ -14,6 +14,7 @@ mod inertia;
 mod inverse;
 mod jacobi;
 mod large;
+mod large_systems;
 mod matmul;
 mod minimum_norm;
 mod minors;

@@ -7,8 +7,9 @@ use crate::scalar::Scalar;
 
 /// Solves `M_b x_b = r_b` for a batch of symmetric matrices, definite or not.
 ///
-/// Gaussian elimination with partial pivoting; one step of iterative refinement where a pivot is small or elements
-/// grow. `matrices` is `(batch, n, n)`, `rhs` and `solution` are `(batch, n)`.
+/// Gaussian elimination with partial pivoting, on lanes or, for large matrices of `f32` and `f64`, faer's; one step of
+/// iterative refinement where a pivot is small or elements grow. `matrices` is `(batch, n, n)`, `rhs` and `solution` are
+/// `(batch, n)`.
 ///
 /// # Errors
 /// [`LinalgError::Shape`] for slices of the wrong length. Otherwise the error of the first row that is singular

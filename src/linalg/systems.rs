@@ -24,14 +24,17 @@ const SMALL_PIVOT: f64 = 1.0 / 1024.0;
 const GROWTH: f64 = 4.0;
 
 /// Below this ratio of smallest pivot to largest element a matrix may be singular.
-fn suspicious<S: Scalar>(n: usize) -> S {
-    S::EPSILON * S::of_f64(1024.0 * (n * n) as f64)
+pub(super) fn suspicious<S: Scalar>(n: usize) -> S {
+    S::epsilon() * S::of_f64(1024.0 * (n * n) as f64)
 }
 
 impl<S: Scalar> Systems<'_, S> {
     /// Solves all; `solutions` is `(batch, n, m)`, `NaN` in the rows that fail.
     pub fn solve(&self, solutions: &mut [S], workspace: &mut Workspace<S>) {
         workspace.clear_failures();
+        if self.solve_large(solutions, workspace) {
+            return;
+        }
         let batch = solutions.len() / (self.n * self.m).max(1);
         if size_of::<S>() < size_of::<f64>() {
             self.split::<{ 2 * LANES }>(batch, solutions, workspace);
@@ -138,7 +141,7 @@ impl<S: Scalar> Systems<'_, S> {
         for row in (start..matrices.len() / (n * n)).take(W).filter(|row| doubtful[row - start]) {
             let x = &mut solutions[row * n * m..(row + 1) * n * m];
             if let Some(failure) = examine(n, &matrices[row * n * n..(row + 1) * n * n], x, dense) {
-                x.fill(S::NAN);
+                x.fill(S::nan());
                 failures.push((row, failure));
             }
         }
@@ -148,13 +151,17 @@ impl<S: Scalar> Systems<'_, S> {
 /// Which lanes have pivots or a growth of elements that cost digits, or no solution.
 #[inline(always)]
 fn refinement_due<S: Scalar, const W: usize>(pivots: &elimination::Pivots<S, W>, largest: &Lane<S, W>) -> [bool; W] {
-    let (small, growth) = (S::of_f64(SMALL_PIVOT), S::of_f64(GROWTH));
     let mut due = [false; W];
     for l in 0..W {
-        let harmless = (pivots.smallest[l] > small * largest[l]) & (pivots.growth[l] <= growth * largest[l]);
-        due[l] = !harmless;
+        due[l] = !is_harmless(pivots.smallest[l], pivots.growth[l], largest[l]);
     }
     due
+}
+
+/// Whether a solution stands as it is, by the smallest pivot and the largest elements of triangular factor and matrix.
+#[inline(always)]
+pub(super) fn is_harmless<S: Scalar>(smallest: S, growth: S, largest: S) -> bool {
+    (smallest > S::of_f64(SMALL_PIVOT) * largest) & (growth <= S::of_f64(GROWTH) * largest)
 }
 
 /// Writes the solutions out; whether a row needs a second look.
@@ -221,7 +228,12 @@ fn finish<S: Scalar, const W: usize>(
 }
 
 /// The verdict on a matrix with a small pivot or a solution that is not finite.
-fn examine<S: Scalar>(n: usize, matrix: &[S], x: &[S], scratch: &mut super::batch::Dense<S>) -> Option<Failure> {
+pub(super) fn examine<S: Scalar>(
+    n: usize,
+    matrix: &[S],
+    x: &[S],
+    scratch: &mut super::batch::Dense<S>,
+) -> Option<Failure> {
     if matrix.iter().any(|m| !m.is_finite()) {
         return Some(Failure::NotFinite);
     }

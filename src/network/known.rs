@@ -24,7 +24,7 @@ pub(super) fn system(description: &Description, n: usize) -> Result<System, Stri
 
 /// A constant at its parameter.
 fn value<R: Real>(parameter: &Parameter, theta: Option<R>) -> R {
-    let default = R::Scalar::parse(&parameter.default).unwrap_or(R::Scalar::NAN);
+    let default = R::Scalar::parse(&parameter.default).unwrap_or(R::Scalar::nan());
     let positive = parameter.range != Range::Any && default > R::Scalar::of_f64(0.0);
     match theta {
         None => R::constant(default),
@@ -54,7 +54,7 @@ impl Architecture {
         let Some(known) = &self.form.known else { return R::zero() };
         let described = system(known, self.coordinates).ok();
         let Some((system, described)) = described.and_then(|s| s.described.clone().map(|d| (s, d))) else {
-            return R::constant(R::Scalar::NAN);
+            return R::constant(R::Scalar::nan());
         };
         described.lagrangian.lagrangian(&self.constants(&system, parameters), q, v)
     }

@@ -11,7 +11,7 @@ pub(super) fn sign<R: Real>(x: R) -> R {
 /// `-2 / sqrt(pi)`, the factor of the derivative of `erfc`.
 #[inline(always)]
 fn minus_two_by_root_pi<R: Real>() -> R {
-    R::constant(-R::Scalar::of_f64(2.0) / Real::sqrt(R::Scalar::PI))
+    R::constant(-R::Scalar::of_f64(2.0) / Real::sqrt(R::Scalar::pi()))
 }
 
 /// The normal distribution function.
@@ -23,7 +23,7 @@ fn distribution<R: Real>(x: R) -> R {
 /// Its density, `e^(-x^2/2) / sqrt(2 pi)`.
 #[inline(always)]
 fn density<R: Real>(x: R) -> R {
-    let factor = R::Scalar::of_f64(0.5) / R::Scalar::PI;
+    let factor = R::Scalar::of_f64(0.5) / R::Scalar::pi();
     R::constant(Real::sqrt(factor)) * (-(R::half() * x * x)).exp()
 }
 

@@ -131,7 +131,7 @@ fn stopped<S: Integrable>(
         Some(Ended::TooManySteps) => Some(RolloutError::TooManySteps { t, steps: motion.options.max_steps }),
         Some(Ended::Failed(failure)) => Some(typed(failure, t, state, step)),
         Some(Ended::Underflow) => {
-            let mut slope = vec![S::NAN; reached.len()];
+            let mut slope = vec![S::nan(); reached.len()];
             let largest_acceleration = match motion.derivative(piece, elapsed, reached, &mut slope) {
                 Ok(()) => slope[motion.n..].iter().map(|a| a.abs().to_f64()).fold(0.0, f64::max),
                 Err(_) => f64::NAN,

@@ -106,7 +106,7 @@ fn advance<S: Scalar>(
     for k in 1..=last {
         let (start, elapsed) = (samples.elapsed(k - 1), samples.elapsed(k));
         let difference = elapsed - start;
-        let blur = S::EPSILON.ldexp(3) * elapsed;
+        let blur = S::epsilon().ldexp(3) * elapsed;
         let whole = if k < last || (difference - regular).abs() <= blur { regular } else { difference };
         // To every break on the way, then to the sample.
         let mut legs = vec![(start, whole, cuts[piece])];
@@ -156,7 +156,7 @@ fn stretch<S: Scalar>(
     let backwards = options.t_end < options.t0;
     let longest = options.step.unwrap_or(distance);
     // A longest step beyond the distance is cut to it.
-    let count = ((distance / longest - S::EPSILON.ldexp(4)).floor().to_f64() + 1.0).max(1.0);
+    let count = ((distance / longest - S::epsilon().ldexp(4)).floor().to_f64() + 1.0).max(1.0);
     let h = distance / S::of_f64(count);
     (position.since, position.steps, position.h) = (from, 0, h);
     let signed = if backwards { -h } else { h };

@@ -127,7 +127,7 @@ impl<S: Scalar> Piece<S> {
 pub(super) fn pieces<S: Scalar>(breaks: &[S], t0: S, t_end: S) -> Vec<Piece<S>> {
     let (low, high) = if t_end < t0 { (t_end, t0) } else { (t0, t_end) };
     // Closer than this times are one.
-    let blur = S::EPSILON.ldexp(3) * S::max(low.abs(), high.abs());
+    let blur = S::epsilon().ldexp(3) * S::max(low.abs(), high.abs());
     let mut cuts: Vec<S> = breaks.iter().copied().filter(|b| *b > low + blur && *b < high - blur).collect();
     cuts.sort_by(|a, b| a.partial_cmp(b).unwrap_or(Ordering::Equal));
     cuts.dedup_by(|next, last| (*next - *last).abs() <= blur);

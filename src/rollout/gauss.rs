@@ -298,7 +298,7 @@ mod tests {
         for stages in 1..=3 {
             let Tableau { nodes, weights, ratios } = Tableau::<S>::new(stages);
             let sum = |terms: &mut dyn Iterator<Item = S>| terms.fold(<S as Real>::zero(), |a, b| a + b);
-            let close = |a: S, b: S| assert!((a - b).abs() <= S::EPSILON * S::of_f64(4.0), "{a} {b} {stages}");
+            let close = |a: S, b: S| assert!((a - b).abs() <= S::epsilon() * S::of_f64(4.0), "{a} {b} {stages}");
             for k in 0..2 * stages as i32 {
                 close(sum(&mut weights.iter().zip(&nodes).map(|(&b, c)| b * c.powi(k))), Real::ratio(1, k + 1));
             }

@@ -21,7 +21,7 @@ impl<S: Scalar> EulerLagrange<S> for Toy {
         let n = self.n;
         let batch = q.len() / n;
         let zero = <S as Real>::zero();
-        terms.acceleration = vec![S::NAN; batch * n];
+        terms.acceleration = vec![S::nan(); batch * n];
         terms.energy = vec![zero; batch];
         terms.lagrangian = vec![zero; batch];
         terms.mass_matrix = vec![zero; batch * n * n];
@@ -42,7 +42,7 @@ impl<S: Scalar> EulerLagrange<S> for Toy {
                     }
                 }
                 Err(error) => {
-                    terms.energy[row] = S::NAN;
+                    terms.energy[row] = S::nan();
                     first = first.and(Err(error));
                 }
             }

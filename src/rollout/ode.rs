@@ -159,14 +159,14 @@ impl<S: Scalar, E> Watch<'_, '_, S, E> {
         self.asked = x;
         if self.failure.is_some() && y.iter().any(|x| !x.is_finite()) {
             // A state that an earlier failure of this attempt has spoilt.
-            dy.fill(S::NAN);
+            dy.fill(S::nan());
         } else if y == self.state.as_slice() && (!self.task.timed || x == self.elapsed) {
             dy.copy_from_slice(&self.slope);
         } else {
             self.statistics.evaluations += 1;
             if let Err(error) = (self.f)(x, y, dy) {
                 self.failure.get_or_insert(error);
-                dy.fill(S::NAN);
+                dy.fill(S::nan());
             }
         }
         let row = (self.calls % self.ring()) * dy.len();
@@ -416,7 +416,7 @@ where
 {
     let number = <S as Scalar>::of_f64;
     // A component that stays 0 would have the error 0/0.
-    let smallest = <S as Scalar>::MIN_POSITIVE;
+    let smallest = <S as Scalar>::min_positive();
     let atol = if task.atol > smallest { task.atol } else { smallest };
     let max_steps = u32::try_from(max_steps).unwrap_or(u32::MAX - 1);
     macro_rules! solve {

@@ -152,14 +152,14 @@ impl<S: Scalar> Options<S> {
 
     /// Ground truth: `Dop853` with rtol = atol = 1e-12, or sixteen roundings where the scalar is coarser.
     pub fn reference(t_end: S, dt: S) -> Self {
-        let tolerance = S::max(S::of_f64(1e-12), S::EPSILON.ldexp(4));
+        let tolerance = S::max(S::of_f64(1e-12), S::epsilon().ldexp(4));
         Self { method: Method::Dop853, rtol: tolerance, atol: tolerance, ..Self::new(t_end, dt) }
     }
 
     /// Finest relative tolerance that the scalar can keep, about nine of its roundings: 1e-6 in `f32`, 2e-15 in `f64`. Below
     /// it steps shrink until they no longer advance the time, and never arrive.
     pub fn least_tolerance() -> S {
-        S::of_f64(if S::EPSILON.to_f64() > 1e-12 { 1e-6 } else { 2e-15 })
+        S::of_f64(if S::epsilon().to_f64() > 1e-12 { 1e-6 } else { 2e-15 })
     }
 
     /// Refuses options that make no sense for `n` coordinates.

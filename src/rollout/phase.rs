@@ -56,7 +56,7 @@ pub(super) struct Defect<S> {
 impl<S: Scalar> Defect<S> {
     /// Before the first evaluation.
     pub(super) fn unknown() -> Self {
-        Self { relative: S::INFINITY, overall: S::INFINITY }
+        Self { relative: S::infinity(), overall: S::infinity() }
     }
 
     /// Of residuals `(rows, n)`, the terms of component `i` being as large as `size(i)`.
@@ -69,7 +69,7 @@ impl<S: Scalar> Defect<S> {
             if worst == zero {
                 continue;
             }
-            defect.relative = S::max(defect.relative, worst / (size(i) + S::EPSILON * most));
+            defect.relative = S::max(defect.relative, worst / (size(i) + S::epsilon() * most));
             defect.overall = S::max(defect.overall, worst / most);
         }
         defect
@@ -77,12 +77,12 @@ impl<S: Scalar> Defect<S> {
 
     /// Solved to the last rounding.
     pub(super) fn is_rounding(self) -> bool {
-        self.relative <= S::EPSILON
+        self.relative <= S::epsilon()
     }
 
     /// As far as rounding errors of the model may explain.
     pub(super) fn is_small(self) -> bool {
-        self.overall <= S::EPSILON.ldexp(12)
+        self.overall <= S::epsilon().ldexp(12)
     }
 
     /// `true` if this is less than half of the best so far, in either measure. Comparing with the last one instead would
@@ -198,7 +198,7 @@ impl<'a, S: Scalar> Phase<'a, S> {
         into.mass.clone_from(&self.terms.mass_matrix);
         let shift = |i: usize| {
             let size = S::max(q[i].abs(), v[i].abs());
-            S::EPSILON.sqrt() * if size > zero { size } else { <S as Real>::one() }
+            S::epsilon().sqrt() * if size > zero { size } else { <S as Real>::one() }
         };
         let mut points = std::mem::take(&mut self.points);
         let rows = if self.damped { 2 * n + 1 } else { n + 1 };

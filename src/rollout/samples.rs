@@ -107,7 +107,7 @@ impl<S: Scalar> Times<S> for Samples<S> {
 /// digits. From one half on the samples themselves cannot be told apart.
 pub(super) fn blur<S: Scalar>(options: &Options<S>) -> S {
     let span = options.t_end - options.t0;
-    S::EPSILON.ldexp(2) * (options.t0.abs() + options.t_end.abs() + span.abs()) / options.dt.abs()
+    S::epsilon().ldexp(2) * (options.t0.abs() + options.t_end.abs() + span.abs()) / options.dt.abs()
 }
 
 #[cfg(test)]

@@ -90,10 +90,10 @@ impl<S: Scalar> Trajectory<S> {
             // A row that is not finite is reported and stays `NaN` or infinite in the result.
             let computed = model.terms(q, v, Request::ENERGY, &mut terms);
             if terms.energy.len() == batch {
-                energy.extend(terms.energy.iter().map(|&e| if e.is_finite() { e } else { S::NAN }));
+                energy.extend(terms.energy.iter().map(|&e| if e.is_finite() { e } else { S::nan() }));
             } else {
                 debug_assert!(computed.is_err());
-                energy.resize(energy.len() + batch, S::NAN);
+                energy.resize(energy.len() + batch, S::nan());
             }
         }
         energy

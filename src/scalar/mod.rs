@@ -1,9 +1,11 @@
 //! Numbers: [`Real`] is what model code may call, [`Scalar`] is an innermost floating-point number.
 //!
-//! Everything above this room is generic over [`Scalar`] (`f32`, `f64`, [`Dd`]). A Lagrangian is written over
-//! [`Real`], which forward numbers and tape variables implement too; nothing in a model may name a float type.
+//! Everything above this room is generic over [`Scalar`] (`f32`, `f64`, [`Dd`], and any [`num_traits::Float`] as
+//! [`AnyFloat`]). A Lagrangian is written over [`Real`], which forward numbers and tape variables implement too; nothing in
+//! a model may name a float type.
 
 mod dd;
+mod float;
 mod lanes;
 mod primitive;
 mod simd;
@@ -11,6 +13,7 @@ mod slices;
 mod sum;
 
 pub use dd::{Dd, UnreadableNumber};
+pub use float::AnyFloat;
 pub use lanes::{Exponential, Lanes, cos_lanes, exp_lanes, ln_lanes, sin_cos_lanes, sin_lanes, sqrt_lanes, tanh_lanes};
 pub use simd::vectorized;
 pub use slices::{Slice, SliceMut};
@@ -192,7 +195,7 @@ pub trait Real:
     }
 }
 
-/// An innermost floating-point number: `f32`, `f64` or [`Dd`].
+/// An innermost floating-point number: `f32`, `f64`, [`Dd`] or an [`AnyFloat`].
 pub trait Scalar:
     Real<Scalar = Self>
     + Lanes
@@ -206,20 +209,20 @@ pub trait Scalar:
     + Sync
     + 'static
 {
-    /// `"f32"`, `"f64"` or `"dd"`.
+    /// `"f32"`, `"f64"` or `"dd"`; [`AnyFloat`]s are all called `"another float"`.
     const NAME: &'static str;
     /// Distance from 1 to the next number (for [`Dd`]: `2^-104`, the precision its operations keep).
-    const EPSILON: Self;
+    fn epsilon() -> Self;
     /// Smallest positive normal number.
-    const MIN_POSITIVE: Self;
+    fn min_positive() -> Self;
     /// Largest finite number.
-    const MAX: Self;
+    fn max_value() -> Self;
     /// Positive infinity.
-    const INFINITY: Self;
+    fn infinity() -> Self;
     /// Not a number.
-    const NAN: Self;
+    fn nan() -> Self;
     /// The circle constant.
-    const PI: Self;
+    fn pi() -> Self;
 
     /// Nearest number to an `f64`.
     fn of_f64(value: f64) -> Self;

@@ -90,12 +90,30 @@ macro_rules! impl_primitive {
 
         impl Scalar for $float {
             const NAME: &'static str = stringify!($float);
-            const EPSILON: Self = <$float>::EPSILON;
-            const MIN_POSITIVE: Self = <$float>::MIN_POSITIVE;
-            const MAX: Self = <$float>::MAX;
-            const INFINITY: Self = <$float>::INFINITY;
-            const NAN: Self = <$float>::NAN;
-            const PI: Self = std::$float::consts::PI;
+            #[inline(always)]
+            fn epsilon() -> Self {
+                <$float>::EPSILON
+            }
+            #[inline(always)]
+            fn min_positive() -> Self {
+                <$float>::MIN_POSITIVE
+            }
+            #[inline(always)]
+            fn max_value() -> Self {
+                <$float>::MAX
+            }
+            #[inline(always)]
+            fn infinity() -> Self {
+                <$float>::INFINITY
+            }
+            #[inline(always)]
+            fn nan() -> Self {
+                <$float>::NAN
+            }
+            #[inline(always)]
+            fn pi() -> Self {
+                std::$float::consts::PI
+            }
 
             #[inline(always)]
             fn of_f64(value: f64) -> Self {
@@ -132,7 +150,7 @@ macro_rules! impl_primitive {
                 <$float>::is_nan(self)
             }
             fn wrap_angle(self) -> Self {
-                let turn = 2.0 * <Self as Scalar>::PI;
+                let turn = 2.0 * <Self as Scalar>::pi();
                 if (0.0..turn).contains(&self) {
                     return self;
                 }
@@ -183,7 +201,7 @@ impl_primitive!(f64, u64, libm::erfc, libm::scalbn, libm::sin, libm::cos, libm::
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scalar::Dd;
+    use crate::scalar::{AnyFloat, Dd};
 
     fn checks<S: Scalar>(smallest: S, lowest_exponent: i32) {
         let (one, zero) = (<S as Real>::one(), <S as Real>::zero());
@@ -191,21 +209,21 @@ mod tests {
         assert_eq!(smallest.ilogb(), lowest_exponent);
         assert_eq!(one.ldexp(lowest_exponent), smallest);
         assert_eq!(smallest.ldexp(-lowest_exponent), one);
-        assert_eq!(smallest.ldexp(i32::MAX), S::INFINITY);
+        assert_eq!(smallest.ldexp(i32::MAX), S::infinity());
         assert_eq!(zero.ldexp(i32::MAX), zero);
-        assert_eq!(S::MAX.ldexp(i32::MIN), zero);
-        assert_eq!(S::MIN_POSITIVE.ldexp(-1).ilogb() + 1, S::MIN_POSITIVE.ilogb());
+        assert_eq!(S::max_value().ldexp(i32::MIN), zero);
+        assert_eq!(S::min_positive().ldexp(-1).ilogb() + 1, S::min_positive().ilogb());
         assert_eq!((-S::of_f64(6.5)).ilogb(), 2);
         assert_eq!(zero.ilogb(), i32::MIN);
         // NaN wins in every position.
-        for (x, y) in [(S::NAN, one), (one, S::NAN)] {
+        for (x, y) in [(S::nan(), one), (one, S::nan())] {
             assert!(Real::max(x, y).is_nan() && Real::min(x, y).is_nan());
         }
-        assert!(S::NAN.select(one, zero).is_nan() && S::NAN.relu().is_nan());
+        assert!(S::nan().select(one, zero).is_nan() && S::nan().relu().is_nan());
         assert_eq!([one.select(one, zero), zero.select(one, zero), (-zero).select(one, zero)], [one, zero, zero]);
-        assert_eq!([S::INFINITY.logistic(), (-S::INFINITY).logistic()], [one, zero]);
-        assert_eq!([S::INFINITY.softplus(), (-S::INFINITY).softplus()], [S::INFINITY, zero]);
-        assert!(S::NAN.logistic().is_nan() && S::NAN.softplus().is_nan());
+        assert_eq!([S::infinity().logistic(), (-S::infinity()).logistic()], [one, zero]);
+        assert_eq!([S::infinity().softplus(), (-S::infinity()).softplus()], [S::infinity(), zero]);
+        assert!(S::nan().logistic().is_nan() && S::nan().softplus().is_nan());
         // Both tails against double-double numbers.
         let floor = Dd::of_f64(2.0) * smallest.cast::<Dd>();
         for k in -760..=760 {
@@ -213,7 +231,7 @@ mod tests {
             let wide = x.cast::<Dd>();
             let close = |found: S, exact: Dd, units: f64| {
                 Real::abs(found.cast::<Dd>() - exact)
-                    <= Dd::of_f64(units) * S::EPSILON.cast() * Real::abs(exact) + floor
+                    <= Dd::of_f64(units) * S::epsilon().cast() * Real::abs(exact) + floor
             };
             assert!(close(x.logistic(), wide.logistic(), 3.0), "{x:?}");
             assert!(close(x.softplus(), wide.softplus(), 3.0), "{x:?}");
@@ -229,6 +247,8 @@ mod tests {
     fn rules_and_tails() {
         checks::<f32>(f32::from_bits(1), -149);
         checks::<f64>(f64::from_bits(1), -1074);
+        checks::<AnyFloat<f32>>(AnyFloat(f32::from_bits(1)), -149);
+        checks::<AnyFloat<f64>>(AnyFloat(f64::from_bits(1)), -1074);
         checks::<Dd>(Dd::of_f64(f64::from_bits(1)), -1074);
     }
 

@@ -247,7 +247,7 @@ impl<T: Real> Adjoints<T> {
     pub fn of(&self, variable: Var<'_, T>) -> T {
         match variable.id() {
             0 => T::zero(),
-            _ if !(variable.slope() - T::one()).is_exact_zero() => T::constant(T::Scalar::NAN),
+            _ if !(variable.slope() - T::one()).is_exact_zero() => T::constant(T::Scalar::nan()),
             id => self.values.get(id as usize).copied().unwrap_or_else(T::zero),
         }
     }

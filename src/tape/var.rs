@@ -40,7 +40,7 @@ impl<'t, T: Real> Var<'t, T> {
     }
     #[inline(always)]
     pub(super) fn not_a_number() -> Self {
-        Self::lift(T::constant(T::Scalar::NAN))
+        Self::lift(T::constant(T::Scalar::nan()))
     }
     /// The number; reading it is allowed on this tape.
     #[inline(always)]

@@ -11,6 +11,7 @@ mod optimizer;
 mod penalty;
 mod polish;
 mod preset;
+mod problem;
 mod recipe;
 mod reference;
 mod sampling;
@@ -33,6 +34,7 @@ pub use objective::{BatchReport, Failure, Objective};
 pub use optimizer::{Method, Moments, Update};
 pub use penalty::{Penalty, Regularizer};
 pub use preset::Preset;
+pub use problem::TrainingProblem;
 pub use recipe::{Outcome, RecipeError, run};
 pub use reference::{Key, SHOOTING_SECTION, Section, TRAINING_SECTIONS, configuration_reference, section_reference};
 pub use sampling::{SamplingError, sample, sample_all};
@@ -41,5 +43,5 @@ pub use signature::{
     Buffers as SignatureBuffers, Violation, characteristic_scales, eigenvalue_violation, has_signature,
     sylvester_violation,
 };
-pub use solver::{Epoch, EpochSolver, Hooks, Progress, StepError, TrainingProblem, TrainingState, Watcher};
+pub use solver::{Epoch, EpochSolver, Hooks, Progress, StepError, TrainingState, Watcher};
 pub use trainer::{Datasets, Sitting, Stop, Stream, Trained, TrainingError, resume, train};

@@ -23,6 +23,7 @@ use crate::training::signature::{
 use crate::training::stripes::sum_gradients;
 use crate::training::violations::Violations;
 use rayon::prelude::*;
+use std::sync::Arc;
 
 /// States evaluated together.
 pub(super) const CHUNK: usize = STATES;
@@ -67,8 +68,16 @@ pub enum Failure {
 pub struct Objective<S> {
     model: Model<S>,
     penalty: Penalty,
-    pool: rayon::ThreadPool,
+    pool: Arc<rayon::ThreadPool>,
     stripes: Vec<Stripe<S>>,
+}
+
+/// Threads for all that a run computes.
+///
+/// # Errors
+/// When they cannot be started.
+pub(super) fn threads(count: usize) -> Result<Arc<rayon::ThreadPool>, rayon::ThreadPoolBuildError> {
+    rayon::ThreadPoolBuilder::new().num_threads(count.max(1)).build().map(Arc::new)
 }
 
 /// A contiguous part of a batch with its own buffers.
@@ -338,8 +347,12 @@ impl<S: Scalar> Objective<S> {
     /// # Errors
     /// When the threads cannot be started.
     pub fn of_model(model: Model<S>, penalty: Penalty, threads: usize) -> Result<Self, rayon::ThreadPoolBuildError> {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.max(1)).build()?;
-        Ok(Self { model, penalty, pool, stripes: Vec::new() })
+        Ok(Self::on(self::threads(threads)?, model, penalty))
+    }
+
+    /// An objective for any model on threads that others use too.
+    pub(super) fn on(pool: Arc<rayon::ThreadPool>, model: Model<S>, penalty: Penalty) -> Self {
+        Self { model, penalty, pool, stripes: Vec::new() }
     }
 
     /// What is trained.

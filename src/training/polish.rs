@@ -6,29 +6,18 @@
 
 use crate::training::checkpoint::Clock;
 use crate::training::config::Polish;
-use crate::training::dataset::Dataset;
-use crate::training::objective::{BatchReport, Objective};
+use crate::training::problem::TrainingProblem;
 use crate::training::solver::{Epoch, Hooks, Progress};
-use argmin::core::observers::{Observe, ObserverMode};
-use argmin::core::{CostFunction, Error, Executor, Gradient, IterState, KV, State};
+use argmin::core::{CostFunction, Error, Executor, Gradient, IterState, KV, Problem, Solver, State, TerminationStatus};
 use argmin::solver::linesearch::MoreThuenteLineSearch;
 use argmin::solver::quasinewton::LBFGS;
 use std::sync::atomic::Ordering;
-use std::sync::{Arc, Mutex, PoisonError};
 
 /// Evaluations an iteration may take on average; argmin's line searches know no limit.
 const EVALUATIONS: usize = 20;
 
 /// What polishing starts from, the same for every iteration.
 pub(super) struct Start {
-    /// Loss and penalty.
-    pub objective: Objective<f64>,
-    /// States to learn from.
-    pub training: Dataset<f64>,
-    /// States to choose by.
-    pub validation: Dataset<f64>,
-    /// L2 weight decay.
-    pub weight_decay: f64,
     /// Parameters to begin with.
     pub weights: Vec<f64>,
     /// Their validation loss.
@@ -49,78 +38,82 @@ pub(super) struct Polished {
     pub validation_loss: f64,
     /// One row per iteration.
     pub history: Vec<Epoch>,
-    /// Evaluations of the whole training set.
-    pub evaluations: usize,
 }
 
-/// Loss and gradient at the last point asked for: argmin asks for them one after the other.
-struct FullBatch {
-    objective: Objective<f64>,
-    training: Dataset<f64>,
-    validation: Dataset<f64>,
-    rows: Vec<u32>,
-    weight_decay: f64,
-    at: Vec<f64>,
-    cost: f64,
-    gradient: Vec<f64>,
-    report: Option<BatchReport<f64>>,
-    evaluations: usize,
+/// The problem with an end to its evaluations.
+#[derive(Clone, Copy)]
+struct Bounded<'p, 'a> {
+    problem: &'p TrainingProblem<'a, f64>,
+    hooks: &'p Hooks,
     budget: usize,
-    hooks: Hooks,
-    best: Option<Vec<f64>>,
-    best_loss: f64,
-    history: Vec<Epoch>,
-    last: (usize, usize),
-    clock: Clock,
 }
 
-impl FullBatch {
-    /// Evaluates unless the point is the last one.
-    fn evaluate(&mut self, weights: &[f64]) -> Result<(), Error> {
-        if self.report.is_some() && self.at == weights {
-            return Ok(());
-        }
-        if self.hooks.interrupt.load(Ordering::Relaxed) {
-            return Err(Error::msg("interrupted"));
-        }
-        if self.evaluations >= self.budget {
-            return Err(Error::msg("the line search found no further descent"));
-        }
-        self.evaluations += 1;
-        self.at.clear();
-        self.at.extend_from_slice(weights);
-        let report = self.objective.step(weights, &self.training, &self.rows, &mut self.gradient);
-        let square: f64 = weights.iter().map(|w| w * w).sum();
-        self.cost = report.loss + report.penalty + 0.5 * self.weight_decay * square;
-        for (g, w) in self.gradient.iter_mut().zip(weights) {
-            *g += self.weight_decay * w;
-        }
-        self.report = Some(report);
-        if self.cost.is_finite() && self.gradient.iter().all(|g| g.is_finite()) {
+impl Bounded<'_, '_> {
+    /// Whether a point may be evaluated.
+    fn admit(&self, weights: &[f64]) -> Result<(), Error> {
+        if self.problem.is_known(weights) {
             Ok(())
+        } else if self.hooks.interrupt.load(Ordering::Relaxed) {
+            Err(Error::msg("interrupted"))
+        } else if self.problem.evaluations() >= self.budget {
+            Err(Error::msg("the line search found no further descent"))
         } else {
-            self.report = None;
-            Err(Error::msg("the loss is not finite"))
+            Ok(())
         }
     }
+}
 
+impl CostFunction for Bounded<'_, '_> {
+    type Param = Vec<f64>;
+    type Output = f64;
+
+    fn cost(&self, weights: &Vec<f64>) -> Result<f64, Error> {
+        self.admit(weights)?;
+        self.problem.cost(weights)
+    }
+}
+
+impl Gradient for Bounded<'_, '_> {
+    type Param = Vec<f64>;
+    type Gradient = Vec<f64>;
+
+    fn gradient(&self, weights: &Vec<f64>) -> Result<Vec<f64>, Error> {
+        self.admit(weights)?;
+        self.problem.gradient(weights)
+    }
+}
+
+/// The iterates so far, kept apart from argmin: an error of a line search ends its run and takes problem and solver along.
+struct Record<'p, 'a> {
+    problem: &'p TrainingProblem<'a, f64>,
+    hooks: &'p Hooks,
+    last: (usize, usize),
+    clock: Clock,
+    polished: Polished,
+}
+
+impl Record<'_, '_> {
     /// Judges an iterate on the validation states and writes its row.
     fn note(&mut self, weights: &[f64]) {
-        let validation_loss = self.objective.loss(weights, &self.validation).loss;
-        if validation_loss < self.best_loss {
-            self.best_loss = validation_loss;
-            self.best = Some(weights.to_vec());
+        let validation_loss = self.problem.validation_loss(weights).loss;
+        let polished = &mut self.polished;
+        if validation_loss < polished.validation_loss {
+            polished.validation_loss = validation_loss;
+            polished.weights = Some(weights.to_vec());
         }
-        let Some(report) = self.report else { return };
+        let found = |last: &crate::training::problem::Evaluated<f64>| {
+            Some((last.report?, last.gradient.iter().map(|g| g * g).sum::<f64>().sqrt()))
+        };
+        let Some((report, gradient_norm)) = self.problem.last(found) else { return };
         let row = Epoch {
-            epoch: self.last.0 + self.history.len() + 1,
+            epoch: self.last.0 + polished.history.len() + 1,
             phase: self.last.1 + 1,
             rate: 0.0,
             training_loss: report.loss,
             penalty: report.penalty,
-            penalised: report.penalised as f64 / self.rows.len() as f64,
+            penalised: report.penalised as f64 / self.problem.training().len() as f64,
             validation_loss,
-            gradient_norm: self.gradient.iter().map(|g| g * g).sum::<f64>().sqrt(),
+            gradient_norm,
             left_out: report.left_out,
             skipped: 0,
             seconds: self.clock.seconds(),
@@ -128,52 +121,47 @@ impl FullBatch {
         if let Some(watcher) = &self.hooks.watcher {
             watcher(Progress::Epoch(&row));
         }
-        self.history.push(row);
-    }
-}
-
-/// The problem as argmin and its observer share it.
-#[derive(Clone)]
-struct Shared(Arc<Mutex<FullBatch>>);
-
-impl Shared {
-    fn lock(&self) -> std::sync::MutexGuard<'_, FullBatch> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
-impl CostFunction for Shared {
-    type Param = Vec<f64>;
-    type Output = f64;
-
-    fn cost(&self, weights: &Vec<f64>) -> Result<f64, Error> {
-        let mut batch = self.lock();
-        batch.evaluate(weights)?;
-        Ok(batch.cost)
-    }
-}
-
-impl Gradient for Shared {
-    type Param = Vec<f64>;
-    type Gradient = Vec<f64>;
-
-    fn gradient(&self, weights: &Vec<f64>) -> Result<Vec<f64>, Error> {
-        let mut batch = self.lock();
-        batch.evaluate(weights)?;
-        Ok(batch.gradient.clone())
+        polished.history.push(row);
     }
 }
 
 type Iteration = IterState<Vec<f64>, Vec<f64>, (), (), (), f64>;
 
-impl Observe<Iteration> for Shared {
-    fn observe_iter(&mut self, state: &Iteration, _: &KV) -> Result<(), Error> {
+/// A solver of argmin's whose iterates are recorded.
+struct Recorded<'r, 'p, 'a, L> {
+    solver: L,
+    record: &'r mut Record<'p, 'a>,
+}
+
+impl<'p, 'a, L: Solver<Bounded<'p, 'a>, Iteration>> Solver<Bounded<'p, 'a>, Iteration> for Recorded<'_, 'p, 'a, L> {
+    fn name(&self) -> &str {
+        self.solver.name()
+    }
+
+    fn init(
+        &mut self,
+        problem: &mut Problem<Bounded<'p, 'a>>,
+        state: Iteration,
+    ) -> Result<(Iteration, Option<KV>), Error> {
+        self.solver.init(problem, state)
+    }
+
+    fn next_iter(
+        &mut self,
+        problem: &mut Problem<Bounded<'p, 'a>>,
+        state: Iteration,
+    ) -> Result<(Iteration, Option<KV>), Error> {
+        let (state, record) = self.solver.next_iter(problem, state)?;
         let (iteration, cost) = (state.get_iter(), state.get_cost());
         tracing::info!(iteration, %cost, "polish");
         if let Some(weights) = state.get_param() {
-            self.lock().note(weights);
+            self.record.note(weights);
         }
-        Ok(())
+        Ok((state, record))
+    }
+
+    fn terminate(&mut self, state: &Iteration) -> TerminationStatus {
+        self.solver.terminate(state)
     }
 }
 
@@ -181,45 +169,22 @@ impl Observe<Iteration> for Shared {
 ///
 /// # Errors
 /// The words of argmin if not even the start could be evaluated.
-pub(super) fn polish(settings: &Polish, start: Start) -> Result<Polished, String> {
-    let parameters = start.weights.len();
-    let rows = (0..start.training.len() as u32).collect();
-    let shared = Shared(Arc::new(Mutex::new(FullBatch {
-        objective: start.objective,
-        training: start.training,
-        validation: start.validation,
-        rows,
-        weight_decay: start.weight_decay,
-        at: Vec::new(),
-        cost: f64::INFINITY,
-        gradient: vec![0.0; parameters],
-        report: None,
-        evaluations: 0,
-        budget: settings.iterations.saturating_mul(EVALUATIONS),
-        hooks: start.hooks,
-        best: None,
-        best_loss: start.validation_loss,
-        history: Vec::new(),
-        last: start.last,
-        clock: start.clock,
-    })));
+pub(super) fn polish(settings: &Polish, problem: &TrainingProblem<'_, f64>, start: Start) -> Result<Polished, String> {
+    let Start { weights, validation_loss, last, clock, hooks } = start;
+    let bounded = Bounded { problem, hooks: &hooks, budget: settings.iterations.saturating_mul(EVALUATIONS) };
+    let polished = Polished { weights: None, validation_loss, history: Vec::new() };
+    let mut record = Record { problem, hooks: &hooks, last, clock, polished };
     let search = MoreThuenteLineSearch::new().with_bounds(1e-10, 10.0).map_err(|e| e.to_string())?;
-    let solver = LBFGS::new(search, settings.memory);
-    let outcome = Executor::new(shared.clone(), solver)
-        .add_observer(shared.clone(), ObserverMode::Always)
-        .configure(|state: Iteration| state.param(start.weights).max_iters(settings.iterations as u64))
+    let solver = Recorded { solver: LBFGS::new(search, settings.memory), record: &mut record };
+    let outcome = Executor::new(bounded, solver)
+        .configure(|state: Iteration| state.param(weights).max_iters(settings.iterations as u64))
         .timer(false)
-        .run();
-    let mut batch = shared.lock();
+        .run()
+        .map(|result| result.state.get_termination_status().to_string());
     match outcome {
-        Err(error) if batch.history.is_empty() => return Err(error.to_string()),
+        Err(error) if record.polished.history.is_empty() => return Err(error.to_string()),
         Err(error) => tracing::info!(%error, "polishing ended"),
-        Ok(result) => tracing::info!(status = %result.state.get_termination_status(), "polishing ended"),
+        Ok(status) => tracing::info!(%status, "polishing ended"),
     }
-    Ok(Polished {
-        weights: batch.best.take(),
-        validation_loss: batch.best_loss,
-        history: std::mem::take(&mut batch.history),
-        evaluations: batch.evaluations,
-    })
+    Ok(record.polished)
 }

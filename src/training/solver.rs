@@ -7,9 +7,9 @@
 use crate::scalar::{Real, Scalar};
 use crate::training::checkpoint::{Clock, Course, Ended, Keeper, Underway};
 use crate::training::config::{OnFailure, Optimizer, Phase};
-use crate::training::dataset::Dataset;
-use crate::training::objective::{Failure, Objective};
+use crate::training::objective::Failure;
 use crate::training::optimizer::{Moments, Update};
+use crate::training::problem::TrainingProblem;
 use crate::training::schedule::Schedule;
 use argmin::core::{Error, IterState, KV, Problem, Solver, State, TerminationReason, TerminationStatus};
 use argmin::kv;
@@ -111,31 +111,21 @@ pub enum StepError {
     },
 }
 
-/// What argmin solves: the training and validation states and the objective that evaluates them.
-pub struct TrainingProblem<S> {
-    /// Loss and gradient of batches.
-    pub objective: Objective<S>,
-    /// States to learn from.
-    pub training: Dataset<S>,
-    /// States that choose the best epoch.
-    pub validation: Dataset<S>,
-}
-
-/// Adam or RAdam over mini-batches of a [`TrainingProblem`].
+/// Adam, RAdam or SOAP over mini-batches of a [`TrainingProblem`].
 pub struct EpochSolver<S> {
-    pub(super) optimizer: Optimizer,
-    pub(super) phase: Phase,
-    pub(super) phase_number: usize,
-    pub(super) course: Course<S>,
+    optimizer: Optimizer,
+    phase: Phase,
+    phase_number: usize,
+    course: Course<S>,
     /// Whether the course began in an earlier sitting.
-    pub(super) restored: bool,
-    pub(super) gradient: Vec<S>,
-    pub(super) steps: usize,
-    pub(super) clock: Clock,
-    pub(super) history: Vec<Epoch>,
-    pub(super) stopped: Option<StepError>,
-    pub(super) hooks: Hooks,
-    pub(super) saver: Option<Saver<S>>,
+    restored: bool,
+    gradient: Vec<S>,
+    steps: usize,
+    clock: Clock,
+    history: Vec<Epoch>,
+    stopped: Option<StepError>,
+    hooks: Hooks,
+    saver: Option<Saver<S>>,
 }
 
 /// Who keeps the checkpoints, and what went before this phase.
@@ -144,6 +134,24 @@ pub(super) struct Saver<S> {
     pub(super) ended: Ended<S>,
     /// Seconds of what went before, where that has a clock of its own.
     pub(super) seconds: f64,
+}
+
+/// The run that a phase is part of.
+pub(super) struct Run<S> {
+    /// Counted from 1.
+    pub phase_number: usize,
+    /// Epochs before this phase.
+    pub epoch: usize,
+    /// Steps before this phase.
+    pub step: usize,
+    /// Steps of all phases.
+    pub steps: usize,
+    /// Time since training began.
+    pub clock: Clock,
+    /// Who watches.
+    pub hooks: Hooks,
+    /// Who keeps the checkpoints, if anybody does.
+    pub saver: Option<Saver<S>>,
 }
 
 /// Running means over the steps of an epoch.
@@ -185,6 +193,33 @@ impl<S: Scalar> EpochSolver<S> {
         }
     }
 
+    /// Makes this phase a part of a longer run.
+    pub(super) fn within(self, run: Run<S>) -> Self {
+        let Run { phase_number, epoch, step, steps, clock, hooks, saver } = run;
+        let course = Course { epoch, step, ..self.course };
+        Self { phase_number, steps, clock, hooks, saver, course, ..self }
+    }
+
+    /// Goes on from where an earlier sitting was.
+    pub(super) fn restored(self, course: Course<S>, history: Vec<Epoch>) -> Self {
+        Self { course, history, restored: true, ..self }
+    }
+
+    /// Epochs of this phase that are over.
+    pub(super) fn iteration(&self) -> u64 {
+        self.course.iteration
+    }
+
+    /// Steps of the whole run so far.
+    pub(super) fn step(&self) -> usize {
+        self.course.step
+    }
+
+    /// Its rows, and why it stopped, if a step failed.
+    pub(super) fn finish(self) -> (Vec<Epoch>, Option<StepError>) {
+        (self.history, self.stopped)
+    }
+
     /// One row per epoch so far.
     pub fn history(&self) -> &[Epoch] {
         &self.history
@@ -198,7 +233,7 @@ impl<S: Scalar> EpochSolver<S> {
     /// Takes one step; an error means that the weights were not changed and training stops.
     fn take_step(
         &mut self,
-        problem: &mut TrainingProblem<S>,
+        problem: &mut TrainingProblem<'_, S>,
         rows: std::ops::Range<usize>,
         rate: f64,
     ) -> Result<(), StepError> {
@@ -206,7 +241,7 @@ impl<S: Scalar> EpochSolver<S> {
         *step += 1;
         let step = *step;
         let rows = &order[rows];
-        let report = problem.objective.step(weights, &problem.training, rows, &mut self.gradient);
+        let report = problem.step(weights, rows, &mut self.gradient);
         if let Some(failure) = report.failure {
             means.last_failure = Some(failure);
             means.left_out += report.left_out;
@@ -226,7 +261,7 @@ impl<S: Scalar> EpochSolver<S> {
             clip: self.optimizer.clip,
         };
         let gradient = &mut self.gradient;
-        let norm = moments.update_on(Some(problem.objective.pool()), weights, gradient, &update);
+        let norm = moments.update_on(Some(problem.objective().pool()), weights, gradient, &update);
         if !norm.is_finite() {
             if self.optimizer.on_failure == OnFailure::Stop {
                 return Err(StepError::Gradient { step, norm });
@@ -289,14 +324,14 @@ impl<S: Scalar> EpochSolver<S> {
     }
 }
 
-impl<S: Scalar> Solver<TrainingProblem<S>, TrainingState<S>> for EpochSolver<S> {
+impl<'a, S: Scalar> Solver<TrainingProblem<'a, S>, TrainingState<S>> for EpochSolver<S> {
     fn name(&self) -> &str {
         self.optimizer.method.name()
     }
 
     fn init(
         &mut self,
-        problem: &mut Problem<TrainingProblem<S>>,
+        problem: &mut Problem<TrainingProblem<'a, S>>,
         state: TrainingState<S>,
     ) -> Result<(TrainingState<S>, Option<KV>), Error> {
         if !self.restored {
@@ -306,8 +341,8 @@ impl<S: Scalar> Solver<TrainingProblem<S>, TrainingState<S>> for EpochSolver<S> 
             }
             course.average.clone_from(&course.weights);
             course.averaged_steps = 0;
-            let problem = problem.problem.as_ref().ok_or_else(|| Error::msg("the training problem is missing"))?;
-            let matrices = problem.objective.model().matrices().into_iter();
+            let problem = problem.problem.as_mut().ok_or_else(|| Error::msg("the training problem is missing"))?;
+            let matrices = problem.objective().model().matrices().into_iter();
             course.moments = Moments::for_method(self.optimizer.method, course.weights.len(), matrices);
         }
         Ok((state, None))
@@ -315,7 +350,7 @@ impl<S: Scalar> Solver<TrainingProblem<S>, TrainingState<S>> for EpochSolver<S> 
 
     fn next_iter(
         &mut self,
-        problem: &mut Problem<TrainingProblem<S>>,
+        problem: &mut Problem<TrainingProblem<'a, S>>,
         state: TrainingState<S>,
     ) -> Result<(TrainingState<S>, Option<KV>), Error> {
         let problem = problem.problem.as_mut().ok_or_else(|| Error::msg("the training problem is missing"))?;
@@ -355,7 +390,7 @@ impl<S: Scalar> Solver<TrainingProblem<S>, TrainingState<S>> for EpochSolver<S> 
             self.stopped = Some(StepError::NoProgress { epoch: self.course.epoch, failure });
             return Ok((state, None));
         }
-        let validation = problem.objective.loss(self.validated(), &problem.validation);
+        let validation = problem.validation_loss(self.validated());
         let cost = validation.loss.to_f64();
         let taken = means.taken.max(1) as f64;
         let epoch = Epoch {
@@ -377,7 +412,7 @@ impl<S: Scalar> Solver<TrainingProblem<S>, TrainingState<S>> for EpochSolver<S> 
         }
         self.history.push(epoch);
         // A loss that is not finite, or that passes over more than a few of the states, must never be the best.
-        let judged = LEFT_OUT * validation.left_out <= problem.validation.len();
+        let judged = LEFT_OUT * validation.left_out <= problem.validation().len();
         let cost = if cost.is_finite() && judged { cost } else { f64::INFINITY };
         let param = self.validated().to_vec();
         Ok((state.param(param).cost(cost), Some(record)))

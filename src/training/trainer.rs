@@ -5,14 +5,17 @@ use crate::scalar::Scalar;
 use crate::training::checkpoint::{Clock, Ended, Keeper, Snapshot, Underway};
 use crate::training::config::{Config, ConfigError, Phase};
 use crate::training::dataset::Dataset;
-use crate::training::objective::{BatchReport, Objective};
+use crate::training::objective::{self, BatchReport, Objective};
 use crate::training::penalty::Penalty;
 use crate::training::polish::{Start, polish};
-use crate::training::solver::{Epoch, EpochSolver, Hooks, Saver, StepError, TrainingProblem, TrainingState};
+use crate::training::problem::TrainingProblem;
+use crate::training::solver::{Epoch, EpochSolver, Hooks, Run, Saver, StepError, TrainingState};
 use argmin::core::observers::{Observe, ObserverMode};
 use argmin::core::{Error, Executor, KV, State, TerminationReason, TerminationStatus};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
+use std::any::Any;
+use std::borrow::Cow;
 use std::sync::Arc;
 use thiserror::Error;
 
@@ -194,8 +197,9 @@ pub fn resume<S: Scalar>(
     if phases != found {
         return Err(TrainingError::Datasets { phases, found });
     }
-    let objective =
-        || Objective::new(architecture, penalty, threads).map_err(|source| TrainingError::Threads { threads, source });
+    let pool = objective::threads(threads).map_err(|source| TrainingError::Threads { threads, source })?;
+    let model = architecture.model();
+    let objective = || Objective::on(Arc::clone(&pool), model.clone(), penalty);
     let batches = |states: usize| states.div_ceil(config.optimizer.batch.min(states));
     let pairs = || config.phases.iter().zip(&data.training);
     let steps = pairs().map(|(phase, data)| phase.epochs * batches(data.len())).sum();
@@ -210,17 +214,19 @@ pub fn resume<S: Scalar>(
     // Then this training is over, and its checkpoint is that of what came after it.
     let shooting = underway.as_ref().is_some_and(|underway| underway.shooting.is_some());
     for (number, (phase, training)) in pairs().enumerate().skip(ended.phases) {
-        let (training, validation) = (training.clone(), data.validation.clone());
-        let problem = TrainingProblem { objective: objective()?, training, validation };
+        let problem = TrainingProblem::new(objective(), training, &data.validation, config.optimizer.weight_decay);
         let rng = Stream::Order(number).generator(config.seed);
-        let mut solver = EpochSolver::new(config.optimizer.clone(), phase.clone(), rng, problem.training.len());
-        solver.phase_number = number + 1;
-        (solver.course.epoch, solver.course.step) = (ended.history.len(), ended.steps);
-        solver.steps = steps;
-        solver.clock = clock;
-        solver.hooks = hooks.clone();
-        solver.saver = keeper.clone().map(|keeper| Saver { keeper, ended: ended.clone(), seconds: 0.0 });
-        stop = run_phase(problem, solver, phase, &mut ended, underway.take())?;
+        let run = Run {
+            phase_number: number + 1,
+            epoch: ended.history.len(),
+            step: ended.steps,
+            steps,
+            clock,
+            hooks: hooks.clone(),
+            saver: keeper.clone().map(|keeper| Saver { keeper, ended: ended.clone(), seconds: 0.0 }),
+        };
+        let solver = EpochSolver::new(config.optimizer.clone(), phase.clone(), rng, training.len()).within(run);
+        stop = run_phase(problem, solver, (phase, config.optimizer.batch), &mut ended, underway.take())?;
         if stop != Stop::Finished {
             break;
         }
@@ -235,25 +241,22 @@ pub fn resume<S: Scalar>(
         && !ended.polished
     {
         keep(&ended);
-        let objective = Objective::new(architecture, penalty, threads)
-            .map_err(|source| TrainingError::Threads { threads, source })?;
         let start = Start {
-            objective,
-            training: training.cast(),
-            validation: data.validation.cast(),
-            weight_decay: config.optimizer.weight_decay,
             weights: ended.weights.iter().map(|w| w.to_f64()).collect(),
             validation_loss: ended.validation_loss,
             last: (ended.history.len(), config.phases.len()),
             clock,
             hooks: hooks.clone(),
         };
-        let polished = polish(settings, start).map_err(TrainingError::Optimizer)?;
+        let (learned, judged) = (in_double(training), in_double(&data.validation));
+        let objective = Objective::on(Arc::clone(&pool), architecture.model(), penalty);
+        let problem = TrainingProblem::new(objective, &learned, &judged, config.optimizer.weight_decay);
+        let polished = polish(settings, &problem, start).map_err(TrainingError::Optimizer)?;
         if let Some(best) = polished.weights {
             ended.weights = best.iter().map(|&w| S::of_f64(w)).collect();
         }
         ended.validation_loss = polished.validation_loss;
-        ended.states += polished.evaluations.saturating_mul(training.len());
+        ended.states += problem.evaluations().saturating_mul(training.len());
         ended.history.extend(polished.history);
         ended.polished = true;
         if hooks.interrupt.load(std::sync::atomic::Ordering::Relaxed) {
@@ -268,9 +271,14 @@ pub fn resume<S: Scalar>(
         keep(&ended);
     }
     let seconds = clock.seconds();
-    let test = objective()?.loss(&ended.weights, &data.test);
+    let test = objective().loss(&ended.weights, &data.test);
     let Ended { weights, history, validation_loss, steps, states, .. } = ended;
     Ok(Trained { weights, history, validation_loss, test, stop, steps, states, seconds })
+}
+
+/// States in double precision, copied only where they are in another.
+fn in_double<S: Scalar>(data: &Dataset<S>) -> Cow<'_, Dataset<f64>> {
+    (data as &dyn Any).downcast_ref().map_or_else(|| Cow::Owned(data.cast()), Cow::Borrowed)
 }
 
 /// Writes every epoch to the log.
@@ -288,17 +296,17 @@ impl<I: State> Observe<I> for Log {
 ///
 /// Its best parameters stand if they beat those of the phases before.
 fn run_phase<S: Scalar>(
-    problem: TrainingProblem<S>,
+    problem: TrainingProblem<'_, S>,
     mut solver: EpochSolver<S>,
-    phase: &Phase,
+    (phase, batch): (&Phase, usize),
     ended: &mut Ended<S>,
     underway: Option<Underway<S>>,
 ) -> Result<Stop, TrainingError> {
-    let states = problem.training.len();
+    let states = problem.training().len();
     let mut state = TrainingState::<S>::new().param(ended.weights.clone());
     if let Some(Underway { course, history, best, best_loss, best_epoch, .. }) = underway {
-        (solver.course, solver.history, solver.restored) = (course, history, true);
-        state.iter = solver.course.iteration;
+        solver = solver.restored(course, history);
+        state.iter = solver.iteration();
         state.last_best_iter = best_epoch;
         (state.cost, state.best_cost) = (best_loss, best_loss);
         (state.param, state.best_param) = (Some(best.clone()), Some(best));
@@ -310,18 +318,19 @@ fn run_phase<S: Scalar>(
         .run()
         .map_err(|error| TrainingError::Optimizer(error.to_string()))?;
     let solver = result.solver;
-    let step = solver.course.step;
+    let step = solver.step();
     ended.phases += 1;
-    ended.states += step.saturating_sub(ended.steps).saturating_mul(solver.optimizer.batch.min(states));
+    ended.states += step.saturating_sub(ended.steps).saturating_mul(batch.min(states));
     ended.steps = step;
-    ended.history.extend(solver.history);
+    let (history, stopped) = solver.finish();
+    ended.history.extend(history);
     let cost = result.state.get_best_cost();
     if let Some(best) = result.state.get_best_param()
         && cost < ended.validation_loss
     {
         (ended.validation_loss, ended.weights) = (cost, best.clone());
     }
-    Ok(match (solver.stopped, result.state.get_termination_status()) {
+    Ok(match (stopped, result.state.get_termination_status()) {
         (Some(error), _) => Stop::Failed(error),
         (None, TerminationStatus::Terminated(TerminationReason::Interrupt)) => Stop::Interrupted,
         _ => Stop::Finished,

@@ -12,10 +12,11 @@ const R: f64 = 30.0;
 /// Worst backward and forward error of `solve` over all types, in units of `n eps` and `kappa eps`.
 fn solve_errors<S: Scalar>() -> (f64, f64) {
     let mut rng = ChaCha8Rng::seed_from_u64(1);
-    let eps = S::EPSILON.to_f64();
+    let eps = S::epsilon().to_f64();
     let (mut backward, mut forward) = (0f64, 0f64);
     let mut workspace = Workspace::new();
-    for n in 1..=20 {
+    // By lanes, and by faer from 47 on.
+    for n in (1..=20).chain([46, 47, 53]) {
         let list = matrices::<S>(n, &mut rng);
         let flat: Vec<S> = list.iter().flat_map(|(_, m)| m.iter().copied()).collect();
         let rhs: Vec<S> = (0..list.len() * n).map(|_| S::of_f64(rng.random_range(-1.0..1.0))).collect();
@@ -55,7 +56,7 @@ fn solve_is_backward_stable_on_lapack_types() {
 /// Worst error of eigenvalues and orthogonality and residual of eigenvectors, in units of `n eps |M|`.
 fn eigen_errors<S: Scalar>() -> f64 {
     let mut rng = ChaCha8Rng::seed_from_u64(2);
-    let eps = S::EPSILON.to_f64();
+    let eps = S::epsilon().to_f64();
     let mut worst = 0f64;
     for n in (1..=12).chain([16, 20, 40]) {
         let mut list = matrices::<S>(n, &mut rng);
@@ -174,7 +175,7 @@ fn scale_does_not_matter() {
 #[test]
 fn a_matrix_gives_the_same_bits_anywhere_in_a_batch() {
     let mut rng = ChaCha8Rng::seed_from_u64(4);
-    for n in 1..=6 {
+    for n in (1..=6).chain([49]) {
         let batch = 21;
         let m: Vec<f64> = (0..batch)
             .flat_map(|_| {
@@ -236,6 +237,67 @@ fn singular_and_foreign_rows_are_reported_and_the_others_solved() {
     let error = linalg::eigh(2, &m, &mut w, &mut u, &mut ws).unwrap_err();
     assert_eq!(error, LinalgError::NotFinite { row: 2 });
     assert!(w[4].is_nan() && u[8].is_nan() && w[2].abs() < 1e-16 && (w[3] - 2.0).abs() < 1e-15);
+}
+
+/// Blocks of two by two at the ends of unit matrices, solved by lanes and by faer.
+fn failures_of_size<S: Scalar>(n: usize) {
+    let (inf, nan, eps) = (f64::INFINITY, f64::NAN, S::epsilon().to_f64());
+    let blocks = [
+        [2.0, 0.0, 2.0],
+        [1.0, 1.0, 1.0],
+        [nan, 0.0, 1.0],
+        [1.0, 1.0, 1.0 + eps],
+        [0.0, 1.0, 0.0],
+        [0.0, 0.0, 0.0],
+        [1.0, inf, 1.0],
+        // Units apart, not singular.
+        [1.0, 0.0, 0.5f64.powi(100)],
+        [1e-3, 1.0, 1.0],
+    ];
+    let mut m = vec![S::of_f64(0.0); blocks.len() * n * n];
+    for (m, [a, b, c]) in m.chunks_exact_mut(n * n).zip(blocks) {
+        m.iter_mut().step_by(n + 1).for_each(|one| *one = S::of_f64(1.0));
+        (m[0], m[n - 1], m[n * n - n], m[n * n - 1]) = (S::of_f64(a), S::of_f64(b), S::of_f64(b), S::of_f64(c));
+    }
+    let (mut r, mut ws) = (vec![S::of_f64(1.0); blocks.len() * n], Workspace::new());
+    let (mut x, mut inverse) = (r.clone(), m.clone());
+    for pass in 0..2 {
+        let error = if pass == 0 {
+            linalg::solve(n, &m, &r, &mut x, &mut ws)
+        } else {
+            linalg::inverse(n, &m, &mut inverse, &mut ws)
+        };
+        assert!(matches!(error, Err(LinalgError::Singular { row: 1, condition }) if condition > 0.1 / eps));
+        let rows: Vec<usize> = ws.failures().iter().map(|f| f.0).collect();
+        assert_eq!(rows, [1, 2, 3, 5, 6], "n = {n}");
+        assert!(matches!(ws.failures()[1].1, Failure::NotFinite) && matches!(ws.failures()[4].1, Failure::NotFinite));
+        assert!(matches!(ws.failures()[2].1, Failure::Singular { condition } if condition > 0.5 / eps));
+        assert!(matches!(ws.failures()[3].1, Failure::Singular { condition } if condition == inf));
+        for row in 0..blocks.len() {
+            let (x, inverse) = (&x[row * n..][..n], &inverse[row * n * n..][..n * n]);
+            let all = if pass == 0 { x } else { inverse };
+            assert!(all.iter().all(|x| x.is_nan() == rows.contains(&row)), "row {row} of size {n}");
+        }
+    }
+    for (row, ends) in [(0, [0.5, 0.5]), (4, [1.0, 1.0]), (7, [1.0, 2f64.powi(100)]), (8, [0.0, 1.0])] {
+        let x = &x[row * n..][..n];
+        let found = [x[0].to_f64(), x[n - 1].to_f64()];
+        let error = found.iter().zip(ends).fold(0.0, |m: f64, (x, y)| m.max((x - y).abs() / y.abs().max(1.0)));
+        assert!(error <= 4.0 * eps && x[1..n - 1].iter().all(|&x| x == S::of_f64(1.0)), "row {row}: {found:?}");
+    }
+    // Not a number in the right-hand side.
+    r[4 * n + 2] = S::nan();
+    let error = linalg::solve(n, &m[4 * n * n..5 * n * n], &r[4 * n..5 * n], &mut x[..n], &mut ws);
+    assert_eq!(error, Err(LinalgError::NotFinite { row: 0 }));
+}
+
+#[test]
+fn failures_are_the_same_by_lanes_and_by_faer() {
+    for n in [5, 39, 40, 46, 47, 64] {
+        failures_of_size::<f32>(n);
+        failures_of_size::<f64>(n);
+    }
+    failures_of_size::<Dd>(47);
 }
 
 #[test]
@@ -334,7 +396,7 @@ fn gradient_of_the_determinant_is_right_where_it_vanishes() {
 #[test]
 fn inverses_are_symmetric_and_invert() {
     let mut rng = ChaCha8Rng::seed_from_u64(7);
-    for n in 1..=8 {
+    for n in (1..=8).chain([41]) {
         let batch = 11;
         let m: Vec<f64> = (0..batch)
             .flat_map(|b| {

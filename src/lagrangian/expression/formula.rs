@@ -68,14 +68,14 @@ impl Formula {
 
     #[inline]
     fn read<R: Real>(&self, operand: Operand, registers: &[R], parameters: &[R], q: &[R], v: &[R]) -> R {
-        let of = |list: &[R], i: u32| list.get(i as usize).copied().unwrap_or_else(|| R::constant(R::Scalar::NAN));
+        let of = |list: &[R], i: u32| list.get(i as usize).copied().unwrap_or_else(|| R::constant(R::Scalar::nan()));
         match operand {
             Operand::Register(i) => registers[i as usize],
             Operand::Parameter(i) => of(parameters, i),
             Operand::Position(i) => of(q, i),
             Operand::Velocity(i) => of(v, i),
             Operand::Number(i) => R::constant(self.numbers[i as usize].value()),
-            Operand::Pi => R::constant(R::Scalar::PI),
+            Operand::Pi => R::constant(R::Scalar::pi()),
         }
     }
 }

@@ -58,7 +58,7 @@ fn gamma_to_minus_two<R: Real>(c: R, v: &[R]) -> R {
     let (limit, square) = (c.sqr(), w.sqr());
     let along = (square + square - limit).select((c - w) * (c + w), limit - square);
     let result = (along - others) / limit;
-    result.select(result, R::constant(crate::scalar::Scalar::NAN))
+    result.select(result, R::constant(crate::scalar::Scalar::nan()))
 }
 
 impl Lagrangian for ChargedParticle {
@@ -68,7 +68,7 @@ impl Lagrangian for ChargedParticle {
         3
     }
     fn lagrangian<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> R {
-        let [m, charge, c, b, e] = *parameters else { return R::constant(crate::scalar::Scalar::NAN) };
+        let [m, charge, c, b, e] = *parameters else { return R::constant(crate::scalar::Scalar::nan()) };
         let potential = R::half() * b * (q[0] * v[1] - q[1] * v[0]) + e * q[0];
         charge * potential - m * c.sqr() * gamma_to_minus_two(c, v).sqrt()
     }

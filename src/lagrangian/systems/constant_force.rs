@@ -42,7 +42,7 @@ impl Lagrangian for ConstantForce {
         1
     }
     fn lagrangian<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> R {
-        let [m, force] = *parameters else { return R::constant(crate::scalar::Scalar::NAN) };
+        let [m, force] = *parameters else { return R::constant(crate::scalar::Scalar::nan()) };
         R::half() * m * v[0].sqr() + force * q[0]
     }
 }

@@ -49,7 +49,7 @@ impl Lagrangian for DoublePendulum {
         2
     }
     fn lagrangian<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> R {
-        let [m1, m2, l1, l2, g] = *parameters else { return R::constant(crate::scalar::Scalar::NAN) };
+        let [m1, m2, l1, l2, g] = *parameters else { return R::constant(crate::scalar::Scalar::nan()) };
         let (u1, u2) = (l1 * v[0], l2 * v[1]);
         let total = m1 + m2;
         let kinetic = R::half() * (total * u1.sqr() + m2 * u2.sqr()) + m2 * u1 * u2 * (q[0] - q[1]).cos();

@@ -43,7 +43,7 @@ impl Lagrangian for HenonHeiles {
         2
     }
     fn lagrangian<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> R {
-        let [lambda] = *parameters else { return R::constant(crate::scalar::Scalar::NAN) };
+        let [lambda] = *parameters else { return R::constant(crate::scalar::Scalar::nan()) };
         let (xx, yy) = (q[0].sqr(), q[1].sqr());
         R::half() * (v[0].sqr() + v[1].sqr() - xx - yy) - lambda * q[1] * (xx - R::ratio(1, 3) * yy)
     }

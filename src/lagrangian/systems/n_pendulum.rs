@@ -59,7 +59,9 @@ impl Lagrangian for NPendulum {
         self.n
     }
     fn lagrangian<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> R {
-        let Some((loads, lengths, g)) = self.loads(parameters) else { return R::constant(crate::scalar::Scalar::NAN) };
+        let Some((loads, lengths, g)) = self.loads(parameters) else {
+            return R::constant(crate::scalar::Scalar::nan());
+        };
         chain::lagrangian(&loads, &lengths, g, q, v)
     }
 }

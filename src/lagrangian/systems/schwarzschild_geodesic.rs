@@ -87,7 +87,7 @@ impl Lagrangian for SchwarzschildGeodesic {
         4
     }
     fn lagrangian<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> R {
-        let [mass] = *parameters else { return R::constant(crate::scalar::Scalar::NAN) };
+        let [mass] = *parameters else { return R::constant(crate::scalar::Scalar::nan()) };
         let (r, f) = (q[1], redshift(mass, q[1]));
         R::half() * (v[1].sqr() / f - f * v[0].sqr() + r.sqr() * turning(q, v))
     }

@@ -52,7 +52,7 @@ impl Lagrangian for SpringPendulum {
         2
     }
     fn lagrangian<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> R {
-        let [m, k, l0, g] = *parameters else { return R::constant(crate::scalar::Scalar::NAN) };
+        let [m, k, l0, g] = *parameters else { return R::constant(crate::scalar::Scalar::nan()) };
         let (r, theta) = (q[0], q[1]);
         m * (R::half() * (v[0].sqr() + (r * v[1]).sqr()) + g * r * theta.cos()) - R::half() * k * (r - l0).sqr()
     }

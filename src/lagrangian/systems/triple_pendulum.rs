@@ -56,7 +56,7 @@ impl Lagrangian for TriplePendulum {
         3
     }
     fn lagrangian<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> R {
-        let Some((loads, lengths, g)) = loads(parameters) else { return R::constant(crate::scalar::Scalar::NAN) };
+        let Some((loads, lengths, g)) = loads(parameters) else { return R::constant(crate::scalar::Scalar::nan()) };
         chain::lagrangian(&loads, &lengths, g, q, v)
     }
 }

@@ -33,7 +33,7 @@ fn bounded<S: Scalar>(x: S, bound: f64) -> S {
 /// With `Phi(-a) = e^(-a^2/2) R(a)` the density and the distribution function share one exponential.
 #[inline(always)]
 pub(super) fn gelu<S: Scalar>(x: S) -> Jet<S> {
-    let inverse_sqrt_two_pi = (constant::<S>(0.5) / S::PI).sqrt();
+    let inverse_sqrt_two_pi = (constant::<S>(0.5) / S::pi()).sqrt();
     // Beyond 40 every tail is 0 in any precision.
     let a = bounded(x, 40.0);
     let square = a * a;

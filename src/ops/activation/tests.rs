@@ -27,7 +27,7 @@ fn tails<S: Scalar>(smallest: f64) {
                 let next = if order < 4 { exact[order + 1] } else { fifth };
                 let slope = (x.to_f64() * next.to_f64()).abs();
                 let scale = exact[order].to_f64().abs();
-                let tolerance = 8.0 * S::EPSILON.to_f64() * (scale + slope) + 2.0 * smallest;
+                let tolerance = 8.0 * S::epsilon().to_f64() * (scale + slope) + 2.0 * smallest;
                 let error = (found[order].cast::<Dd>() - exact[order]).to_f64().abs();
                 assert!(found[order].is_finite(), "{activation} {} order {order} at {x:?}", S::NAME);
                 assert!(
@@ -67,7 +67,7 @@ fn cloud<S: Scalar>() -> Vec<S> {
 fn slices_match_points<S: Scalar>() {
     let mut z = cloud::<S>();
     z.extend([0.0, -0.0, f64::INFINITY, f64::NEG_INFINITY, f64::NAN, 1e30, -1e30, 1e-40].map(S::of_f64));
-    let blank = || vec![S::NAN; z.len()];
+    let blank = || vec![S::nan(); z.len()];
     let same = |a: S, b: S| a == b || (a.is_nan() && b.is_nan());
     for activation in Activation::ALL {
         let (mut f, mut d1, mut d2, mut d3) = (blank(), blank(), blank(), blank());
@@ -126,7 +126,7 @@ fn identities<S: Scalar>() {
         for activation in [Activation::Gelu, Activation::Softplus] {
             // The two values are rounded themselves: softplus is ln 2 where x is 0.
             let size = Real::abs(x) + activation.derivatives(-Real::abs(x))[0];
-            let tolerance = two * S::EPSILON * Real::abs(size);
+            let tolerance = two * S::epsilon() * Real::abs(size);
             let difference = activation.derivatives(x)[0] - activation.derivatives(-x)[0];
             assert!(Real::abs(difference - x) <= tolerance, "{activation} {} at {x:?}", S::NAME);
         }
@@ -145,7 +145,7 @@ fn reflections() {
 #[test]
 fn limits_at_infinity() {
     fn check<S: Scalar>() {
-        let (up, down) = (S::INFINITY, -S::INFINITY);
+        let (up, down) = (S::infinity(), -S::infinity());
         let zero = <S as Real>::zero();
         let one = <S as Real>::one();
         assert_eq!(Activation::Gelu.derivatives(up), [up, one, zero, zero, zero]);
@@ -157,7 +157,7 @@ fn limits_at_infinity() {
         assert_eq!(Activation::XTanh.derivatives(down), [up, -one, zero, zero, zero]);
         assert_eq!(Activation::Tanh.derivatives(down), [-one, zero, zero, zero, zero]);
         for activation in Activation::ALL {
-            let jet = activation.derivatives(S::NAN);
+            let jet = activation.derivatives(S::nan());
             assert!(jet[0].is_nan());
             // The slope of a straight line is known without its argument.
             assert_eq!(jet[1].is_nan(), activation != Activation::Identity);
@@ -173,12 +173,12 @@ fn limits_at_infinity() {
 fn reference_agrees() {
     fn check<S: Scalar>() {
         let fraction = if S::NAME == "f32" { f64::from(f32::EPSILON) } else { f64::EPSILON };
-        let smallest = S::MIN_POSITIVE * S::of_f64(fraction);
+        let smallest = S::min_positive() * S::of_f64(fraction);
         for x in cloud::<S>() {
             for activation in Activation::ALL {
                 let (value, reference) = (activation.derivatives(x), activation.apply(x));
                 let slope = Real::abs(x * value[1]) + Real::abs(value[0]);
-                let tolerance = S::of_f64(8.0) * S::EPSILON * slope + S::of_f64(64.0) * smallest;
+                let tolerance = S::of_f64(8.0) * S::epsilon() * slope + S::of_f64(64.0) * smallest;
                 let error = Real::abs(value[0] - reference);
                 assert!(error <= tolerance, "{activation} {} at {x:?}: {:?} {reference:?}", S::NAME, value[0]);
             }

@@ -25,7 +25,7 @@ impl Dd {
 
     pub(super) fn sine_cosine(self) -> (Self, Self) {
         if !self.is_finite() {
-            return (Self::NAN, Self::NAN);
+            return (Self::nan(), Self::nan());
         }
         match self.reduced() {
             (0, s, c) => (s, c),
@@ -47,9 +47,9 @@ impl Dd {
 
     pub(super) fn wrapped_angle(self) -> Self {
         if !self.is_finite() {
-            return Self::NAN;
+            return Self::nan();
         }
-        let turn = Self::PI + Self::PI;
+        let turn = Self::pi() + Self::pi();
         if self.high >= 0.0 && self < turn {
             return self;
         }
@@ -66,7 +66,7 @@ impl Dd {
         let special = y.high == 0.0 || x.high == 0.0 || !y.is_finite() || !x.is_finite();
         if special {
             return match () {
-                () if start.abs() == std::f64::consts::PI => Self::PI.with_sign_of(start),
+                () if start.abs() == std::f64::consts::PI => Self::pi().with_sign_of(start),
                 () if start.abs() == std::f64::consts::FRAC_PI_2 => HALF_PI.with_sign_of(start),
                 () if start.abs() == std::f64::consts::FRAC_PI_4 => (HALF_PI * Self::leading(0.5)).with_sign_of(start),
                 () if start.abs() > 2.0 => (HALF_PI * Self::leading(1.5)).with_sign_of(start),

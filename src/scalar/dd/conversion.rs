@@ -106,8 +106,8 @@ const fn pair(high: f64, low: f64) -> Dd {
 impl FloatConst for Dd {
     constants! {
         E = pair(std::f64::consts::E, 1.4456468917292502e-16);
-        PI = <Self as Scalar>::PI;
-        TAU = <Self as Scalar>::PI.ldexp(1);
+        PI = <Self as Scalar>::pi();
+        TAU = <Self as Scalar>::pi().ldexp(1);
         FRAC_PI_2 = HALF_PI;
         FRAC_PI_3 = pair(std::f64::consts::FRAC_PI_3, -1.072081766451091e-16);
         FRAC_PI_4 = HALF_PI.ldexp(-1);

@@ -52,9 +52,9 @@ impl Dd {
 
     pub(super) fn exponential(self) -> Self {
         if self.is_nan() {
-            Self::NAN
+            Self::nan()
         } else if self.high > 710.0 {
-            Self::INFINITY
+            Self::infinity()
         } else if self.high < -746.0 {
             Self::leading(0.0)
         } else {

@@ -32,7 +32,7 @@ impl Dd {
     /// `erfc(self)`, relatively accurate until it underflows.
     pub(super) fn complementary_error(self) -> Self {
         if self.is_nan() {
-            return Self::NAN;
+            return Self::nan();
         }
         if self.high() < 0.0 {
             return if self.high() < -13.0 {

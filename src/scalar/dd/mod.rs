@@ -154,12 +154,30 @@ impl Real for Dd {
 
 impl Scalar for Dd {
     const NAME: &'static str = "dd";
-    const EPSILON: Self = Self::leading(4.930380657631324e-32);
-    const MIN_POSITIVE: Self = Self::leading(f64::MIN_POSITIVE);
-    const MAX: Self = Self::leading(f64::MAX);
-    const INFINITY: Self = Self::leading(f64::INFINITY);
-    const NAN: Self = Self::leading(f64::NAN);
-    const PI: Self = Self { high: std::f64::consts::PI, low: 1.2246467991473532e-16 };
+    #[inline]
+    fn epsilon() -> Self {
+        Self::leading(4.930380657631324e-32)
+    }
+    #[inline]
+    fn min_positive() -> Self {
+        Self::leading(f64::MIN_POSITIVE)
+    }
+    #[inline]
+    fn max_value() -> Self {
+        Self::leading(f64::MAX)
+    }
+    #[inline]
+    fn infinity() -> Self {
+        Self::leading(f64::INFINITY)
+    }
+    #[inline]
+    fn nan() -> Self {
+        Self::leading(f64::NAN)
+    }
+    #[inline]
+    fn pi() -> Self {
+        Self { high: std::f64::consts::PI, low: 1.2246467991473532e-16 }
+    }
 
     #[inline]
     fn of_f64(value: f64) -> Self {

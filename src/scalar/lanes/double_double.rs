@@ -26,7 +26,10 @@ impl Lanes for Dd {
     fn lane_ln(self) -> Self {
         self.ln()
     }
-    const FAST_ANGLE: Self = Dd::MAX;
+    #[inline]
+    fn fast_angle() -> Self {
+        Dd::max_value()
+    }
     #[inline]
     fn lane_sin_cos(self) -> (Self, Self) {
         self.sin_cos()

@@ -57,8 +57,8 @@ pub trait Lanes: Sized + Copy + PartialOrd {
     /// Natural logarithm.
     fn lane_ln(self) -> Self;
     /// Largest size of an angle that [`Lanes::lane_sin_cos`] reduces.
-    const FAST_ANGLE: Self;
-    /// Sine and cosine for `|self| <= FAST_ANGLE`; meaningless numbers beyond.
+    fn fast_angle() -> Self;
+    /// Sine and cosine for `|self| <= fast_angle()`; meaningless numbers beyond.
     fn lane_sin_cos(self) -> (Self, Self);
 }
 
@@ -120,7 +120,7 @@ pub fn sqrt_lanes<S: Scalar>(x: &[S], out: &mut [S]) {
 /// `true` if the fast reduction serves an angle.
 #[inline(always)]
 fn is_fast<S: Scalar>(x: S) -> bool {
-    Real::abs(x) <= S::FAST_ANGLE
+    Real::abs(x) <= S::fast_angle()
 }
 
 /// `true` if some angle needs the scalar function: too large, infinite or `NaN`.

@@ -96,7 +96,10 @@ macro_rules! impl_pieces {
                 let value = if self == 0.0 { -<$float>::INFINITY } else { value };
                 if self >= 0.0 { value } else { <$float>::NAN }
             }
-            const FAST_ANGLE: Self = $fast_angle;
+            #[inline(always)]
+            fn fast_angle() -> Self {
+                $fast_angle
+            }
             #[inline(always)]
             fn lane_sin_cos(self) -> (Self, Self) {
                 const FRACTION: u32 = <$float>::MANTISSA_DIGITS - 1;

@@ -15,13 +15,21 @@ fn arguments<S: Scalar>() -> Vec<S> {
         [0.0, -0.0, 1.0, 5e-324, 1e-310, 1e-45, 1e-40, 1e30, -1e30, 1e300, 88.7, -103.5, 709.7, -745.0, -720.0]
             .map(S::of_f64),
     );
-    list.extend([S::INFINITY, -S::INFINITY, S::NAN, S::MAX, S::MIN_POSITIVE, S::of_f64(1048576.5), S::of_f64(8192.5)]);
+    list.extend([
+        S::infinity(),
+        -S::infinity(),
+        S::nan(),
+        S::max_value(),
+        S::min_positive(),
+        S::of_f64(1048576.5),
+        S::of_f64(8192.5),
+    ]);
     list
 }
 
 /// Largest error in units in the last place against double-double numbers.
 fn worst<S: Scalar>(name: &str, x: &[S], found: &[S], exact: impl Fn(Dd) -> Dd) -> f64 {
-    let smallest = S::MIN_POSITIVE.to_f64() * if S::NAME == "f32" { f64::from(f32::EPSILON) } else { f64::EPSILON };
+    let smallest = S::min_positive().to_f64() * if S::NAME == "f32" { f64::from(f32::EPSILON) } else { f64::EPSILON };
     let mut worst = 0.0_f64;
     for (&x, &found) in x.iter().zip(found) {
         let exact = exact(x.cast());
@@ -35,7 +43,7 @@ fn worst<S: Scalar>(name: &str, x: &[S], found: &[S], exact: impl Fn(Dd) -> Dd) 
         }
         // One unit in the last place of the nearest number.
         let unit = Real::abs(nearest).ilogb().max(-2000);
-        let unit = (S::EPSILON.to_f64() * 2.0_f64.powi(unit)).max(smallest);
+        let unit = (S::epsilon().to_f64() * 2.0_f64.powi(unit)).max(smallest);
         let error = (found.cast::<Dd>() - exact).to_f64().abs() / unit;
         assert!(error <= 2.0, "{name}({x:?}) = {found:?}, not {nearest:?}: {error} units");
         worst = worst.max(error);
@@ -45,7 +53,7 @@ fn worst<S: Scalar>(name: &str, x: &[S], found: &[S], exact: impl Fn(Dd) -> Dd) 
 
 fn accurate<S: Scalar>() {
     let x = arguments::<S>();
-    let blank = || vec![S::NAN; x.len()];
+    let blank = || vec![S::nan(); x.len()];
     let (mut out, mut other) = (blank(), blank());
     let mut report = Vec::new();
     exp_lanes(&x, &mut out);
@@ -76,7 +84,7 @@ fn slices_are_accurate() {
 
 #[test]
 fn double_double_slices_are_the_functions() {
-    let x = [Dd::PI, Dd::of_f64(-0.3), Dd::of_f64(1e22)];
+    let x = [Dd::pi(), Dd::of_f64(-0.3), Dd::of_f64(1e22)];
     let (mut sin, mut cos) = (x, x);
     sin_cos_lanes(&x, &mut sin, &mut cos);
     for ((x, sin), cos) in x.into_iter().zip(sin).zip(cos) {

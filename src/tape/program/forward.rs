@@ -59,7 +59,7 @@ pub(super) fn forward<S: Scalar>(program: &[Instruction<S>], environment: &Envir
 /// One input of all lanes.
 #[inline(always)]
 fn load<S: Scalar>(environment: &Environment<'_, S>, mut index: usize, out: &mut Row<S>) {
-    let mut value = S::NAN;
+    let mut value = S::nan();
     let mut filled = 0;
     for field in environment.inputs {
         let width = field.len() / environment.lanes;

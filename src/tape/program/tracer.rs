@@ -33,7 +33,7 @@ impl<S: fmt::Debug> fmt::Debug for Tracer<'_, S> {
 impl<'t, S: Scalar> Tracer<'t, S> {
     #[inline(always)]
     pub(super) fn recorded(recorder: &'t Recorder<S>, row: u32) -> Self {
-        Self { value: S::NAN, row, recorder: Some(recorder) }
+        Self { value: S::nan(), row, recorder: Some(recorder) }
     }
     pub(super) fn recorder(self) -> Option<&'t Recorder<S>> {
         self.recorder

@@ -119,7 +119,7 @@ impl<S: Scalar> Side<S> {
         }
         let trace = self.covariance.iter().step_by(size + 1).fold(<S as Real>::zero(), |sum, &c| sum + c);
         // Vectors of eigenvalues that are lost in rounding stay where they are.
-        let shift = S::EPSILON * trace + S::MIN_POSITIVE;
+        let shift = S::epsilon() * trace + S::min_positive();
         product(size, &mut self.next, &self.vectors, MatRef::new(&self.covariance, size, size));
         for (next, &vector) in self.next.iter_mut().zip(&self.vectors) {
             *next += shift * vector;

@@ -148,7 +148,7 @@ impl<S: Scalar> Stripe<S> {
         for (row, &segment) in rows.iter().enumerate() {
             let alive = integrator.alive[row];
             each_residual(integrator, segments, (row, segment as usize), |residual| {
-                values.push(if alive { residual.value } else { S::NAN });
+                values.push(if alive { residual.value } else { S::nan() });
             });
         }
     }

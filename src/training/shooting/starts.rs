@@ -37,7 +37,7 @@ impl<S> Default for Linearisation<S> {
 impl<S: Scalar> Linearisation<S> {
     /// How far component `k` is moved.
     pub fn difference(&self, segments: &Segments<S>, k: usize) -> S {
-        S::EPSILON.sqrt() * S::of_f64(DIFFERENCE) * segments.range[k]
+        S::epsilon().sqrt() * S::of_f64(DIFFERENCE) * segments.range[k]
     }
 
     /// Appends curvature, `(rows, 2n, 2n)`, and gradient, `(rows, 2n)`, of the rows; those given up stay where they are.

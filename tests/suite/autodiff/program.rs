@@ -24,7 +24,7 @@ fn run<S: Scalar>(program: Program<S>, lanes: usize, x: &[S], p: &[S], w: &[S]) 
     replay.forward(lanes, x, p, y).unwrap();
     replay.reverse(w, dx, dp).unwrap();
     // Asked for alone, they are the same to the bit.
-    let (mut alone_x, mut alone_p) = (vec![S::NAN; x.len()], vec![S::NAN; p.len()]);
+    let (mut alone_x, mut alone_p) = (vec![S::nan(); x.len()], vec![S::nan(); p.len()]);
     replay.reverse_inputs(w, &mut alone_x).unwrap();
     replay.reverse_parameters(w, &mut alone_p).unwrap();
     assert_eq!(format!("{alone_x:?} {alone_p:?}"), format!("{dx:?} {dp:?}"));

@@ -167,7 +167,7 @@ fn check<L: Lagrangian, S: Scalar>(system: &L, scale: &[f64], parameters: &[f64]
     let judge = |what: &str, found: &[Dd], expected: &[Dd], others: &[Vec<Dd>]| {
         let condition = others.iter().fold(largest(expected), |most, other| most.max(apart(other, expected) / STEP));
         let error = apart(found, expected);
-        let r = if error == 0.0 { 0.0 } else { error / (S::EPSILON.to_f64() * condition) };
+        let r = if error == 0.0 { 0.0 } else { error / (S::epsilon().to_f64() * condition) };
         assert!(r <= 30.0, "{what} in {}: R = {r:.3}", S::NAME);
     };
     let (expected, others) = (terms(&given), perturbed.iter().map(terms).collect::<Vec<_>>());

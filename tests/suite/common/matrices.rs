@@ -52,7 +52,7 @@ pub fn times<S: Scalar>(n: usize, m: &[S], x: &[Dd]) -> Vec<Dd> {
 
 /// Matrix types by their spectra and structure; signs alternate in the indefinite ones.
 pub fn matrices<S: Scalar>(n: usize, rng: &mut ChaCha8Rng) -> Vec<(String, Vec<S>)> {
-    let eps = S::EPSILON.to_f64();
+    let eps = S::epsilon().to_f64();
     let mut list = Vec::new();
     for indefinite in [false, true] {
         let sign = |k: usize| if indefinite && k % 2 == 1 { -1.0 } else { 1.0 };

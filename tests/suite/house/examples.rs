@@ -10,6 +10,8 @@ mod make_data;
 mod nalgebra_matrices;
 #[path = "../../../examples/other_solver.rs"]
 mod other_solver;
+#[path = "../../../examples/own_optimizer.rs"]
+mod own_optimizer;
 #[path = "../../../examples/own_solver.rs"]
 mod own_solver;
 #[path = "../../../examples/system_identification.rs"]
@@ -30,6 +32,11 @@ fn an_integrator_of_ode_solvers_moves_a_cart_and_a_pendulum() {
 #[test]
 fn an_integrator_of_another_crate_moves_a_learned_pendulum() {
     other_solver::main().unwrap();
+}
+
+#[test]
+fn a_solver_of_ones_own_trains_a_network() {
+    own_optimizer::main().unwrap();
 }
 
 #[test]

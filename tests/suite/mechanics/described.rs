@@ -39,7 +39,7 @@ fn agree<S: Scalar>(text: &str, name: &str, given: &[(&str, &str)], rng: &mut Ch
         for (((name, a), (_, b)), condition) in found.iter().zip(&exact).zip(conditions) {
             let solved = if *name == "acceleration" { kappa } else { 1.0 };
             let condition = condition.iter().fold(0f64, |m, &c| m.max(c));
-            let unit = S::EPSILON.to_f64() * (condition + solved * largest(b)).max(f64::MIN_POSITIVE);
+            let unit = S::epsilon().to_f64() * (condition + solved * largest(b)).max(f64::MIN_POSITIVE);
             let difference =
                 |a: &[S], b: &[Dd]| largest(&a.iter().zip(b).map(|(&a, &b)| a.cast::<Dd>() - b).collect::<Vec<_>>());
             worst = worst.max(difference(a, b) / unit);

@@ -27,7 +27,7 @@ fn hard_point<S: Scalar>(system: &Configured<S>, q: &[S], v: &[S]) -> (f64, f64)
             let size = b.to_f64().abs();
             for a in both {
                 let error = (a[i].cast::<Dd>() - b).to_f64().abs();
-                let r = error / (S::EPSILON.to_f64() * (change + size)).max(f64::MIN_POSITIVE);
+                let r = error / (S::epsilon().to_f64() * (change + size)).max(f64::MIN_POSITIVE);
                 assert!(
                     r < 30.0,
                     "{} {} {name} {i} at {q:?} {v:?}: R = {r}, condition {}",
@@ -139,7 +139,7 @@ fn speeds_of_light_are_refused_by<S: Scalar>() {
         let error = system.terms(&vec![q.clone(); 40].concat(), &batch.concat(), Request::ALL, &mut terms);
         assert!(matches!(error, Err(MechanicsError::NotFinite { row: 7, .. })), "{error:?}");
         for (row, a) in terms.acceleration.chunks(3).enumerate() {
-            let close = |(a, b): (&S, &S)| (*a - *b).to_f64().abs() <= 16.0 * S::EPSILON.to_f64();
+            let close = |(a, b): (&S, &S)| (*a - *b).to_f64().abs() <= 16.0 * S::epsilon().to_f64();
             assert!(if row == 7 { a.iter().all(|a| a.is_nan()) } else { a.iter().zip(&alone.acceleration).all(close) });
         }
     }
@@ -196,7 +196,7 @@ fn signatures<S: Scalar>(rng: &mut ChaCha8Rng) {
                 // On the mass shell 2 L = g(v, v) = -1, a sum of the terms p_i v_i.
                 let size: f64 = terms.momentum.iter().zip(&v).map(|(&p, &v)| (p * v).to_f64().abs()).sum();
                 let shell = (terms.lagrangian[0] + S::of_f64(0.5)).to_f64().abs();
-                assert!(shell <= 8.0 * S::EPSILON.to_f64() * size, "{} {}: {shell:e}", system.name, S::NAME);
+                assert!(shell <= 8.0 * S::epsilon().to_f64() * size, "{} {}: {shell:e}", system.name, S::NAME);
             }
         }
     }

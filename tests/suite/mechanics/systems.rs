@@ -16,7 +16,7 @@ fn accuracy<S: Scalar>(name: &str, given: &[(&str, &str)], rng: &mut ChaCha8Rng)
     let bounds = system.system.validation(n);
     let periodic: Vec<bool> = system.system.coordinates(n).iter().map(|c| c.periodic).collect();
     let mut worst: Vec<(&'static str, f64)> = Vec::new();
-    let eps = S::EPSILON.to_f64();
+    let eps = S::epsilon().to_f64();
     for case in 0..60 {
         let shift = [0.0, 1024.0, 1048576.0, 1099511627776.0][case % 4];
         let (mut q, v) = random_state(&system, &bounds, rng);
@@ -150,7 +150,7 @@ fn closed_forms_agree<S: Scalar>(rng: &mut ChaCha8Rng) {
                 let conditions = input_conditions(&wide, &q, &v, &base);
                 let at = base.iter().position(|(name, _)| *name == "acceleration").unwrap();
                 let condition = conditions[at].iter().fold(0f64, |m, &c| m.max(c));
-                let unit = S::EPSILON.to_f64() * (condition + kappa * largest(&base[at].1));
+                let unit = S::epsilon().to_f64() * (condition + kappa * largest(&base[at].1));
                 for (&a, &b) in terms.acceleration.iter().zip(&exact) {
                     let error = (a - b).to_f64().abs();
                     assert!(error <= 3.0 * unit, "{} {n} {}: {error:e} {unit:e}", system.name, S::NAME);

@@ -105,7 +105,7 @@ fn forward_identity<S: Scalar>(case: &Case) {
     let mut moved = |x: &[Dd]| -> Vec<Dd> {
         x.iter().map(|&x| x + x * Dd::of_f64(if rng.random() { step } else { -step })).collect()
     };
-    let eps = S::EPSILON.to_f64();
+    let eps = S::epsilon().to_f64();
     for state in 0..3 {
         let row = state * n..(state + 1) * n;
         let inputs: [Vec<Dd>; 3] = [cast(&weights), cast(&q[row.clone()]), cast(&v[row.clone()])];

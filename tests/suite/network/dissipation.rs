@@ -95,7 +95,7 @@ fn perturb(x: &[Dd], rng: &mut impl Rng) -> Vec<Dd> {
 fn roundings<'a, S: Scalar>(found: &[Dd], expected: &[Dd], perturbed: impl Iterator<Item = &'a [Dd]>) -> f64 {
     let apart = |a: &[Dd]| largest(&a.iter().zip(expected).map(|(&a, &b)| a - b).collect::<Vec<_>>());
     let condition = perturbed.fold(largest(expected), |most, p| most.max(apart(p) / STEP));
-    if condition == 0.0 { apart(found) } else { apart(found) / (S::EPSILON.to_f64() * condition) }
+    if condition == 0.0 { apart(found) } else { apart(found) / (S::epsilon().to_f64() * condition) }
 }
 
 /// Force and power of three states against nested forward numbers.

@@ -1,4 +1,5 @@
 //! Terms of network Lagrangians.
 
+mod any_float;
 mod derivatives;
 mod dissipation;

@@ -44,7 +44,7 @@ fn weight<S: Scalar>(_: S, q: &[S], _: &[S], force: &mut [S]) {
 }
 
 fn options<S: Scalar>(method: Method, t_end: f64, step: f64) -> Options<S> {
-    let tolerance = S::max(S::of_f64(1e-11), S::EPSILON.ldexp(4));
+    let tolerance = S::max(S::of_f64(1e-11), S::epsilon().ldexp(4));
     let base = Options::new(S::of_f64(t_end), S::of_f64(0.1));
     Options { method, rtol: tolerance, atol: tolerance, step: Some(S::of_f64(step)), ..base }
 }

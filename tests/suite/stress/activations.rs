@@ -10,7 +10,7 @@ use std::sync::Arc;
 
 /// Derivatives of GELU where they change sign, against the largest of the terms they are sums of.
 fn sign_changes<S: Scalar>() {
-    let eps = S::EPSILON.to_f64();
+    let eps = S::epsilon().to_f64();
     let mut closed = Row::new::<S>(2, "GELU'', ''', '''' at their zeros: closed forms");
     let mut nested = Row::new::<S>(2, "GELU'' at sqrt 2: nested forward numbers");
     let root = |x: f64| ((7.0 + x * 33.0_f64.sqrt()) / 2.0).sqrt();
@@ -55,16 +55,16 @@ fn case_02_derivatives_change_sign_where_they_should() {
 fn reflected<S: Scalar>(x: S, rows: &mut [Row; 2]) {
     let jets = |f: Activation| (f.derivatives(x)[0], f.derivatives(-x)[0]);
     // Among the subnormal numbers each value is a whole multiple of the smallest.
-    let smallest = S::MIN_POSITIVE.to_f64() * S::EPSILON.to_f64();
+    let smallest = S::min_positive().to_f64() * S::epsilon().to_f64();
     let (up, down) = jets(Activation::Gelu);
     let error = |up: S, down: S| (dd(up) - dd(down) - dd(x)).to_f64().abs();
     let size = x.to_f64().abs();
-    let gelu = (error(up, down) - smallest).max(0.0) / (S::EPSILON.to_f64() * size).max(smallest);
+    let gelu = (error(up, down) - smallest).max(0.0) / (S::epsilon().to_f64() * size).max(smallest);
     rows[0].see(gelu, || format!("x = {x:?}"));
     let (up, down) = jets(Activation::Softplus);
     // Both values are ln 2 at 0 and rounded themselves: their size counts, not that of x alone.
     let size = size + down.to_f64().min(up.to_f64());
-    rows[1].see(error(up, down) / (S::EPSILON.to_f64() * size), || format!("x = {x:?}"));
+    rows[1].see(error(up, down) / (S::epsilon().to_f64() * size), || format!("x = {x:?}"));
     for even in [Activation::XTanh, Activation::Quadratic] {
         let (up, down) = jets(even);
         assert_eq!(up, down, "{even} at {x:?}");
@@ -80,8 +80,8 @@ fn reflection_rows<S: Scalar>() -> [Row; 2] {
 /// Every binade from the subnormal numbers to the largest.
 fn reflections<S: Scalar>() {
     let mut rows = reflection_rows::<S>();
-    let lowest = S::MIN_POSITIVE.ilogb() + S::EPSILON.ilogb();
-    for exponent in lowest..=S::MAX.ilogb() {
+    let lowest = S::min_positive().ilogb() + S::epsilon().ilogb();
+    for exponent in lowest..=S::max_value().ilogb() {
         for k in 0..48 {
             reflected(S::of_f64(1.0 + (f64::from(k) + 0.37) / 48.0).ldexp(exponent), &mut rows);
         }
@@ -137,15 +137,15 @@ fn kinks<S: Scalar>() {
             for lanes in [1, 70] {
                 let program = Program::<S>::record(1, 0, |x, _| vec![kink.eval(x)]).unwrap();
                 let mut replay = Replay::new(Arc::new(program));
-                let mut slopes = vec![S::NAN; lanes];
-                replay.forward(lanes, &vec![x; lanes], &[], &mut vec![S::NAN; lanes]).unwrap();
+                let mut slopes = vec![S::nan(); lanes];
+                replay.forward(lanes, &vec![x; lanes], &[], &mut vec![S::nan(); lanes]).unwrap();
                 replay.reverse(&vec![one; lanes], &mut slopes, &mut []).unwrap();
                 assert!(slopes.iter().all(|&d| d == zero), "{slopes:?}");
                 checks += lanes;
             }
         }
         // On either side the slopes are those of the straight lines.
-        let smallest = S::MIN_POSITIVE;
+        let smallest = S::min_positive();
         assert_eq!(gradient(&kink, &[smallest]).unwrap().1, [one]);
         assert_eq!(gradient(&kink, &[-smallest]).unwrap().1, [if kink.0 { zero } else { -one }]);
     }

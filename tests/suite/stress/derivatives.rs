@@ -126,7 +126,7 @@ impl<S: Scalar> ScalarFunction for Weighted<'_, S> {
 
 fn adjoint_identity<S: Scalar>() {
     let mut rng = ChaCha8Rng::seed_from_u64(9);
-    let eps = S::EPSILON.to_f64();
+    let eps = S::epsilon().to_f64();
     let mut adjoint = Row::new::<S>(9, "<J v, w> = <v, J' w>, unit n eps |v| |w| |J|");
     let mut symmetric = Row::new::<S>(9, "H = H', unit eps |H|");
     for n in 1..=20 {
@@ -184,7 +184,7 @@ fn long_programs<S: Scalar>() {
     // The two inputs count too.
     assert_eq!(chain.lane_operations(), length + 2);
     let mut replay = Replay::new(Arc::new(chain));
-    let (mut y, mut dx) = ([S::NAN], [S::NAN; 2]);
+    let (mut y, mut dx) = ([S::nan()], [S::nan(); 2]);
     replay.forward(1, &[one, one], &[], &mut y).unwrap();
     replay.reverse(&[one], &mut dx, &mut []).unwrap();
     assert_eq!((y[0], dx), (one, [one, S::of_f64(length as f64)]));
@@ -203,7 +203,7 @@ fn long_programs<S: Scalar>() {
     let x: Vec<S> = (0..2 * lanes).map(|_| S::of_f64(rng.random_range(0.5..1.5))).collect();
     let mut first = None;
     for _ in 0..10_000 {
-        let (mut y, mut dx, mut dp) = (vec![S::NAN; lanes], vec![S::NAN; 2 * lanes], [S::NAN]);
+        let (mut y, mut dx, mut dp) = (vec![S::nan(); lanes], vec![S::nan(); 2 * lanes], [S::nan()]);
         replay.forward(lanes, &x, &[one], &mut y).unwrap();
         replay.reverse(&vec![one; lanes], &mut dx, &mut dp).unwrap();
         let all = [y, dx, dp.to_vec()].concat();

@@ -7,11 +7,11 @@ use lnn::scalar::{Dd, Real, Scalar};
 
 /// Errors in units of `eps |M|`.
 fn closed_forms<S: Scalar>() {
-    let eps = S::EPSILON.to_f64();
+    let eps = S::epsilon().to_f64();
     let mut row = Row::new::<S>(18, "closed forms of 2x2 and 3x3, unit eps |M|");
-    let digits = -S::EPSILON.ilogb();
+    let digits = -S::epsilon().ilogb();
     let mut check = |n: usize, m: &[S], exact: &[Dd], place: &dyn Fn() -> String| -> Vec<S> {
-        let mut w = vec![S::NAN; n];
+        let mut w = vec![S::nan(); n];
         linalg::eigenvalues(n, m, &mut w, &mut Workspace::new()).unwrap();
         let size = exact.iter().fold(0.0_f64, |m, w| m.max(w.to_f64().abs()));
         for (&w, &exact) in w.iter().zip(exact) {

@@ -32,7 +32,7 @@ fn bad_states<S: Scalar>() {
             model.terms(data.q(), data.v(), Request::ALL, &mut good).unwrap();
             for (k, bad) in positions(batch)
                 .flat_map(|p| [2 * p, 2 * p + 1])
-                .zip([S::NAN, S::INFINITY, -S::INFINITY].into_iter().cycle())
+                .zip([S::nan(), S::infinity(), -S::infinity()].into_iter().cycle())
             {
                 for velocity in [false, true] {
                     let (mut q, mut v) = (data.q().to_vec(), data.v().to_vec());
@@ -74,7 +74,7 @@ fn overflowing_states<S: Scalar>() {
         let data = states::<S>(2, batch, 3);
         for p in positions(batch) {
             let mut q = data.q().to_vec();
-            q[2 * p] = S::MAX.sqrt();
+            q[2 * p] = S::max_value().sqrt();
             let data = Dataset::new(2, q, data.v().to_vec(), data.a().to_vec()).unwrap();
             let (report, gradient) = step(&shape, (Penalty::None, 2), &theta, &data, &all_rows(batch));
             assert_eq!((report.failure, report.left_out), (Some(Failure::NotFinite { row: p }), 1), "batch {batch}");
@@ -103,8 +103,8 @@ fn bad_weights<S: Scalar>() {
         for batch in [1, 65] {
             let data = states::<S>(2, batch, 4);
             let mut objective = Objective::new(&shape, Penalty::Eigenvalue { lambda: 1.0 }, 2).unwrap();
-            let mut gradient = vec![S::NAN; theta.len()];
-            for (k, bad) in (0..theta.len()).flat_map(|k| [(k, S::NAN), (k, S::INFINITY), (k, -S::INFINITY)]) {
+            let mut gradient = vec![S::nan(); theta.len()];
+            for (k, bad) in (0..theta.len()).flat_map(|k| [(k, S::nan()), (k, S::infinity()), (k, -S::infinity())]) {
                 let mut wrong = theta.clone();
                 wrong[k] = bad;
                 let report = objective.step(&wrong, &data, &all_rows(batch), &mut gradient);
@@ -145,7 +145,7 @@ fn case_05_bad_weights() {
 
 /// Hilbert matrices: an error from where their condition says so, a backward stable solution before.
 fn hilbert<S: Scalar>() {
-    let eps = S::EPSILON.to_f64();
+    let eps = S::epsilon().to_f64();
     let mut row = Row::new::<S>(22, "Hilbert matrices: solved or refused");
     let (mut solved, mut refused) = (0, 0);
     for n in 1..=20 {
@@ -153,7 +153,7 @@ fn hilbert<S: Scalar>() {
         let wide: Vec<Dd> = cast(&m);
         let kappa = linalg::condition_number(n, &wide, &mut Workspace::new()).unwrap();
         let rhs = vec![S::of_f64(1.0); n];
-        let (mut x, mut workspace) = (vec![S::NAN; n], Workspace::new());
+        let (mut x, mut workspace) = (vec![S::nan(); n], Workspace::new());
         match linalg::solve(n, &m, &rhs, &mut x, &mut workspace) {
             Ok(()) => {
                 solved += 1;
@@ -227,7 +227,7 @@ fn subnormal<S: Scalar>() {
         let data = states::<S>(2, 256, 7);
         let seconds = |theta: &[S]| {
             let mut objective = Objective::new(&shape, Penalty::Eigenvalue { lambda: 1.0 }, 1).unwrap();
-            let mut gradient = vec![S::NAN; theta.len()];
+            let mut gradient = vec![S::nan(); theta.len()];
             let mut best = f64::INFINITY;
             for _ in 0..5 {
                 let clock = Instant::now();
@@ -240,16 +240,18 @@ fn subnormal<S: Scalar>() {
             best
         };
         let plain = seconds(&usual);
-        for shift in
-            [S::MIN_POSITIVE.ilogb() / 2, S::MIN_POSITIVE.ilogb(), S::MIN_POSITIVE.ilogb() + S::EPSILON.ilogb() + 2]
-        {
+        for shift in [
+            S::min_positive().ilogb() / 2,
+            S::min_positive().ilogb(),
+            S::min_positive().ilogb() + S::epsilon().ilogb() + 2,
+        ] {
             let small: Vec<S> = usual.iter().map(|w| w.ldexp(shift)).collect();
             slowest = slowest.max(seconds(&small) / plain);
             checks += 1;
         }
     }
     exact::<S>(38, &format!("subnormal weights, {slowest:.1} times the usual time at most"), checks);
-    assert!(dd(S::MIN_POSITIVE.ldexp(-1)).to_f64() > 0.0, "subnormal numbers exist");
+    assert!(dd(S::min_positive().ldexp(-1)).to_f64() > 0.0, "subnormal numbers exist");
 }
 
 #[test]

@@ -57,7 +57,7 @@ fn tolerances<S: Integrable>(finest: i32) {
             let error = run::<S>(method, t_end, tolerance);
             row.see(error / (tolerance * amplification(t_end)), || format!("{method:?}, rtol 1e-{k}"));
             // Below 30 roundings of the start, amplified, what is left is rounding and need not fall.
-            let floor = LIMIT * S::EPSILON.to_f64() * amplification(t_end);
+            let floor = LIMIT * S::epsilon().to_f64() * amplification(t_end);
             assert!(error < last.max(floor), "{method:?} {} 1e-{k}: {error:e} after {last:e}", S::NAME);
             last = error;
         }

@@ -55,7 +55,7 @@ fn energy_error<S: Scalar>(
     let dot = |x: &[Dd], y: &[Dd]| x.iter().zip(y).map(|(&x, &y)| (x * y).to_f64().abs()).sum::<f64>();
     let scale = dot(&exact.momentum, &a) + dot(&exact.dl_dq, &v) + exact.energy[0].to_f64().abs();
     let kappa = condition(q.len(), &exact.mass_matrix);
-    rate(judge, &q, &v, &a, of).abs() / (S::EPSILON.to_f64() * kappa * scale)
+    rate(judge, &q, &v, &a, of).abs() / (S::epsilon().to_f64() * kappa * scale)
 }
 
 fn energy_is_kept<S: Scalar>() {
@@ -139,7 +139,7 @@ fn gauge_changes_nothing<S: Scalar, L: Lagrangian + Copy>(name: &'static str, sy
             let kappa = condition(n, &t.mass_matrix);
             kappa * (big(&t.acceleration) + (big(&t.dl_dq) + big(&t.coriolis)) / big(&t.mass_matrix))
         };
-        let unit = S::EPSILON.to_f64() * (unit(&a) + unit(&b));
+        let unit = S::epsilon().to_f64() * (unit(&a) + unit(&b));
         for (&x, &y) in a.acceleration.iter().zip(&b.acceleration) {
             row.see((dd(x) - dd(y)).to_f64().abs() / unit, || format!("{name}, factor {factor}"));
         }
@@ -187,7 +187,7 @@ fn great_circle<S: Scalar>() {
         let found = terms(&*model, &cast::<Dd, S>(&q), &cast::<Dd, S>(&v));
         let kappa = condition(2, &found.mass_matrix);
         for i in 0..2 {
-            let unit = S::EPSILON.to_f64() * (conditions[i] + kappa * a[i].to_f64().abs());
+            let unit = S::epsilon().to_f64() * (conditions[i] + kappa * a[i].to_f64().abs());
             let error = (dd(found.acceleration[i]) - a[i]).to_f64().abs();
             row.see(error / unit.max(f64::MIN_POSITIVE), || format!("inclination {inclination}, s = {start}"));
             assert!((base[at].1[i] - a[i]).to_f64().abs() <= 1e-28 * (conditions[i] + kappa * largest(&a)));

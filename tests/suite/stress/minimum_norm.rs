@@ -24,7 +24,7 @@ fn distance<S: Scalar>(x: &[S], y: &[Dd]) -> f64 {
 /// A chain of bodies joined by springs of integer strength, free to move as a whole: the energy does not change along
 /// `(1, .., 1)`, the gauge direction. Forces that add up to zero have a solution, a common force has none.
 fn gauge_directions<S: Scalar>() {
-    let eps = S::EPSILON.to_f64();
+    let eps = S::epsilon().to_f64();
     let mut rng = ChaCha8Rng::seed_from_u64(221);
     let mut row = Row::new::<S>(22, "minimum norm: gauge directions, unit n eps kappa |x|");
     for n in 1..=20 {
@@ -67,7 +67,7 @@ fn gauge_directions<S: Scalar>() {
 /// `r` coordinates written as combinations `z = J q` of `n > r` redundant ones: `M = J^T K J`. The shortest solution
 /// of `M x = J^T f` is `J^T (J J^T)^-1 K^-1 f`, here in double-double.
 fn redundant_coordinates<S: Scalar>() {
-    let eps = S::EPSILON.to_f64();
+    let eps = S::epsilon().to_f64();
     let mut rng = ChaCha8Rng::seed_from_u64(222);
     let mut row = Row::new::<S>(22, "minimum norm: redundant coordinates, unit n eps kappa |x|");
     for n in 1..=20 {
@@ -105,7 +105,7 @@ fn redundant_coordinates<S: Scalar>() {
 
 /// Any symmetric matrix of rank `r` with its range and null space known, right-hand sides with parts in both.
 fn inconsistent<S: Scalar>() {
-    let eps = S::EPSILON.to_f64();
+    let eps = S::epsilon().to_f64();
     let mut rng = ChaCha8Rng::seed_from_u64(223);
     let mut stationary = Row::new::<S>(22, "minimum norm: M (b - M x) = 0, unit n eps |M| |b|");
     let mut split = Row::new::<S>(22, "minimum norm: |b|^2 = |M x|^2 + outside^2");

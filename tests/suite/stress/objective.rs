@@ -43,7 +43,7 @@ pub fn step<S: Scalar>(
     data: &Dataset<S>,
     rows: &[u32],
 ) -> (BatchReport<S>, Vec<S>) {
-    let mut gradient = vec![S::NAN; weights.len()];
+    let mut gradient = vec![S::nan(); weights.len()];
     let report = Objective::new(architecture, penalty, threads).unwrap().step(weights, data, rows, &mut gradient);
     (report, gradient)
 }

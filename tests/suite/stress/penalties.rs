@@ -41,7 +41,7 @@ fn spectrum<S: Scalar>(n: usize, m: &[S]) -> (Vec<Dd>, Vec<Dd>) {
 
 /// The gradient of the eigenvalue penalty is minus the projector on the negative space, whatever clusters in it.
 fn repeated<S: Scalar>() {
-    let eps = S::EPSILON.to_f64();
+    let eps = S::epsilon().to_f64();
     let mut rng = ChaCha8Rng::seed_from_u64(19);
     let mut row = Row::new::<S>(19, "gradient at repeated eigenvalues, unit n eps |M| / gap");
     for n in 1..=8 {
@@ -97,7 +97,7 @@ fn determinant(n: usize, m: &[i64]) -> i64 {
 
 /// The gradient of the determinant where the matrix has lost one rank, or two (it vanishes).
 fn adjugates<S: Scalar>() {
-    let eps = S::EPSILON.to_f64();
+    let eps = S::epsilon().to_f64();
     let mut rng = ChaCha8Rng::seed_from_u64(20);
     let mut row = Row::new::<S>(20, "gradient of det at singular M, unit n eps |M|^(n-1)");
     let mut list: Vec<(usize, Vec<i64>)> = vec![(2, vec![1; 4]), (3, vec![1; 9]), (1, vec![0])];
@@ -111,7 +111,7 @@ fn adjugates<S: Scalar>() {
     for (n, m) in list {
         assert_eq!(determinant(n, &m), 0);
         let numbers: Vec<S> = m.iter().map(|&m| S::of_f64(m as f64)).collect();
-        let mut found = vec![S::NAN; n * n];
+        let mut found = vec![S::nan(); n * n];
         let exponent = linalg::adjugate(n, &numbers, &mut found, &mut Workspace::new()).unwrap();
         let (w, _) = spectrum(n, &numbers);
         let size = w[0].to_f64().abs().max(w[n - 1].to_f64().abs());
@@ -135,7 +135,7 @@ fn case_20_adjugates_of_singular_matrices() {
 /// `B B^T + d I` with `d = 30 n eps |B|^2`, in double-double and rounded.
 fn positive_definite<S: Scalar>(n: usize, rng: &mut ChaCha8Rng) -> Vec<S> {
     let b: Vec<Dd> = (0..n * n).map(|_| Dd::of_f64(rng.random_range(-1.0..1.0))).collect();
-    let shift = Dd::of_f64(30.0 * n as f64 * S::EPSILON.to_f64() * norm(b.iter().copied()).powi(2));
+    let shift = Dd::of_f64(30.0 * n as f64 * S::epsilon().to_f64() * norm(b.iter().copied()).powi(2));
     let product = |k: usize| {
         let diagonal = if k / n == k % n { shift } else { <Dd as Real>::zero() };
         (0..n).fold(diagonal, |s, l| s + b[k / n * n + l] * b[k % n * n + l])
@@ -235,7 +235,7 @@ fn case_23_24_right_signatures_cost_nothing() {
 /// One eigenvalue `+-2^-k` among others of order 1: active exactly where the exact one is negative, but for rounding;
 /// a penalty without a gradient, or a gradient without a penalty, never.
 fn barely_negative<S: Scalar>() {
-    let eps = S::EPSILON.to_f64();
+    let eps = S::epsilon().to_f64();
     let mut rng = ChaCha8Rng::seed_from_u64(27);
     let mut row = Row::new::<S>(27, "largest wrongly judged eigenvalue, unit n eps |M|");
     let mut value = Row::new::<S>(27, "value of a barely active penalty, unit n eps |M|");

@@ -23,7 +23,7 @@ fn large_angles<S: Scalar>(most: i32) {
         let both = x.sin_cos();
         for (exact, alone, slices) in [(exact_sin, [x.sin(), both.0], sin[k]), (exact_cos, [x.cos(), both.1], cos[k])] {
             let nearest: S = exact.cast();
-            let unit = S::EPSILON.to_f64() * 2.0_f64.powi(nearest.ilogb());
+            let unit = S::epsilon().to_f64() * 2.0_f64.powi(nearest.ilogb());
             let error = |found: S| (dd(found) - exact).to_f64().abs() / unit;
             alone.into_iter().for_each(|found| single.see(error(found), || format!("x = {x:?}")));
             lanes.see(error(slices), || format!("x = {x:?}"));

@@ -11,17 +11,17 @@ fn tiny_pivots<S: Scalar>() {
     let (one, two) = (S::of_f64(1.0), S::of_f64(2.0));
     for k in (2..=60).chain([200, 500, 1000]) {
         let d = S::of_f64(2f64.powi(-k));
-        let mut x = [S::NAN; 2];
+        let mut x = [S::nan(); 2];
         linalg::solve(2, &[d, one, one, d], &[one, two], &mut x, &mut Workspace::new()).unwrap();
         let (d, one, two) = (dd(d), dd(one), dd(two));
         let exact = [(d - two) / (d * d - one), (two * d - one) / (d * d - one)];
         for (x, exact) in x.into_iter().zip(exact) {
-            row.see(((dd(x) - exact) / exact).to_f64().abs() / S::EPSILON.to_f64(), || format!("d = 2^-{k}"));
+            row.see(((dd(x) - exact) / exact).to_f64().abs() / S::epsilon().to_f64(), || format!("d = 2^-{k}"));
         }
         let inertia = linalg::inertia(
             2,
             &[S::of_f64(2f64.powi(-k)), S::of_f64(1.0), S::of_f64(1.0), S::of_f64(0.0)],
-            &mut [S::NAN; 4],
+            &mut [S::nan(); 4],
         );
         assert_eq!(inertia, Ok(Inertia { positive: 1, zero: 0, negative: 1 }), "d = 2^-{k}");
     }
@@ -44,11 +44,11 @@ fn zero_diagonals<S: Scalar>() {
             let inertia = linalg::inertia(n, &m, &mut vec![zero; n * n]).unwrap();
             assert_eq!(inertia, Inertia { positive, zero: 0, negative: n - positive }, "{name} {n}");
             let rhs: Vec<S> = (0..n).map(|i| (0..n).fold(zero, |s, j| s + m[i * n + j] * expected[j])).collect();
-            let mut x = vec![S::NAN; n];
+            let mut x = vec![S::nan(); n];
             linalg::solve(n, &m, &rhs, &mut x, &mut Workspace::new()).unwrap();
             let size = expected.iter().fold(0.0_f64, |m, x| m.max(x.to_f64().abs()));
             for (x, y) in x.iter().zip(&expected) {
-                row.see((*x - *y).to_f64().abs() / (n as f64 * S::EPSILON.to_f64() * size), || format!("{name} {n}"));
+                row.see((*x - *y).to_f64().abs() / (n as f64 * S::epsilon().to_f64() * size), || format!("{name} {n}"));
             }
             checks += 1;
         }

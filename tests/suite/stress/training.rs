@@ -56,7 +56,7 @@ fn see(
 /// `M`, `a` and the gradient of the loss with penalties of weight 100, against the same code in double-double (which
 /// is itself checked against reverse mode through the whole loss).
 fn loss_gradients<S: Scalar>() {
-    let eps = S::EPSILON.to_f64();
+    let eps = S::epsilon().to_f64();
     let mut rows =
         ["M, unit n eps |M|", "a, unit n eps kappa |a|", "gradient of loss + 100 penalty, unit n eps kappa |.|"]
             .map(|name| Row::new::<S>(13, name));
@@ -140,7 +140,7 @@ fn medians<S: Scalar>() {
         let (lower, upper) = (by_index((batch - 1) / 2), by_index(batch / 2));
         let (report, _) =
             step(&shape, (Penalty::Sylvester { lambda: 1.0, time: None }, 2), &theta, &data, &all_rows(batch));
-        let error = |expected: Dd| ((dd(report.penalty) - expected) / lower).to_f64().abs() / S::EPSILON.to_f64();
+        let error = |expected: Dd| ((dd(report.penalty) - expected) / lower).to_f64().abs() / S::epsilon().to_f64();
         row.see(error(lower), || format!("batch {batch}"));
         assert!(batch % 2 == 1 || error(upper) > 1000.0, "the upper median cannot be told apart");
     }
@@ -173,7 +173,7 @@ fn many_rows<S: Scalar>(count: usize) {
     let exact = (0..5).fold(<Dd as Real>::zero(), |s, k| s + weighted(k)) / Dd::of_f64(count as f64);
     let report = objective.loss(&theta, &many);
     let error = ((dd(report.loss) - exact) / exact).to_f64().abs();
-    row.see(error / (S::EPSILON.to_f64() * (count as f64).log2()), || format!("{count} rows"));
+    row.see(error / (S::epsilon().to_f64() * (count as f64).log2()), || format!("{count} rows"));
     row.end_below(4.0);
 }
 
@@ -221,7 +221,7 @@ fn splits<S: Scalar>() {
             }
             let largest = size.iter().copied().fold(0.0, f64::max);
             let error = difference(&whole, &sum) / largest;
-            row.see(error / (S::EPSILON.to_f64() * (batch as f64).log2()), || format!("{batch} in parts of {part}"));
+            row.see(error / (S::epsilon().to_f64() * (batch as f64).log2()), || format!("{batch} in parts of {part}"));
         }
     }
     row.end_below(10.0);

@@ -182,7 +182,7 @@ fn gradient_agrees<S: Scalar>(
         data = data.with_forces(force).unwrap();
     }
     let mut objective = Objective::new(&architecture, penalty, 2).unwrap();
-    let mut found = vec![S::NAN; weights.len()];
+    let mut found = vec![S::nan(); weights.len()];
     let report = objective.step(&weights, &data, &[0, 1, 2, 3, 4, 5, 6], &mut found);
     assert_eq!(report.failure, None);
 

@@ -129,7 +129,7 @@ fn input_gradients<S: Scalar>(architecture: &Architecture, seed: u64, moving: bo
         }
         let found = [row(&dq, state), row(&dv, state)].concat();
         let error = apart(&found, &expected);
-        worst = worst.max(if error == 0.0 { 0.0 } else { error / (S::EPSILON.to_f64() * condition) });
+        worst = worst.max(if error == 0.0 { 0.0 } else { error / (S::epsilon().to_f64() * condition) });
     }
     worst
 }
