@@ -24,7 +24,7 @@
 //! | integrate, with error control or symplectically | [`rollout::rollout`], [`rollout::rollout_many`] |
 //! | learn from accelerations | [`training::run`] (a configuration), [`training::train`] (your own [`training::Dataset`]) |
 //! | know every key of a configuration | [`training::configuration_reference`], [`training::TRAINING_SECTIONS`] |
-//! | minimise your own loss of a network | [`training::Objective`], or [`network::Chunk`] and [`network::Adjoint`] below it |
+//! | minimise your own loss of a network | [`training::Objective`], or [`tape::Recorded`] and [`tape::Evaluation`] below it |
 //! | store and load models | [`network::file::ModelFile`] |
 //! | differentiate a function of yours | [`tape::gradient`], [`tape::hessian`]; over many states [`tape::Program`] |
 //! | solve small symmetric systems in batches | [`linalg`] |

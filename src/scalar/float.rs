@@ -92,7 +92,7 @@ impl<F: Float> num_traits::One for AnyFloat<F> {
     }
 }
 
-/// What the engine asks of a number that is not its own.
+/// Demands of the engine on a number that is not its own.
 trait Foreign: Float + FloatConst + Debug + Display + Send + Sync + 'static {}
 impl<F: Float + FloatConst + Debug + Display + Send + Sync + 'static> Foreign for F {}
 

@@ -1,14 +1,16 @@
 //! The tape: record, replay, reverse sweep.
 //!
-//! Two ways to a derivative in reverse mode, both generic over the number:
+//! Three ways to a derivative in reverse mode, all generic over the number:
 //!
 //! - [`Tape`] records while it computes; one reverse sweep gives the gradient at those very numbers. The code under
 //!   it may branch on values. Elements are any [`Real`](crate::scalar::Real): a tape over forward numbers gives
 //!   Hessians.
 //! - [`Program`] records once, without numbers, and is replayed on many states side by side (lanes) by a [`Replay`],
 //!   forward and backward, without allocating. A branch on a value cannot be recorded and is refused;
-//!   [`Real::select`](crate::scalar::Real::select) can. Block operations (affine maps, jets of activations, solves,
-//!   eigenvalues) carry their own adjoint rules.
+//!   [`Real::select`](crate::scalar::Real::select) can.
+//! - [`Recorded`] holds a function `L(q, v)` of numbers and dense layers ([`Real::affine`](crate::scalar::Real::affine)), and
+//!   an [`Evaluation`] gives everything a Lagrangian is asked for: `p`, `g`, `M`, `c`, and gradients of losses of the
+//!   accelerations by parameters and state.
 //!
 //! Memory of a [`Tape`] over numbers of `s` bytes: `8 + 2 s` bytes per node (24 for `f64`), of which there is one per
 //! variable and one per operation on two variables; functions of one variable, constant factors and constant summands

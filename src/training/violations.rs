@@ -13,6 +13,8 @@ pub(super) struct Violations<S> {
     q: Vec<S>,
     v: Vec<S>,
     directions: MixedDirections<S>,
+    /// Those of the states under way.
+    chunk: MixedDirections<S>,
     /// Penalties with their weights.
     pub penalty: Sum<S>,
     /// States with a penalty.
@@ -27,6 +29,7 @@ impl<S: Scalar> Violations<S> {
             q: Vec::new(),
             v: Vec::new(),
             directions: MixedDirections::default(),
+            chunk: MixedDirections::default(),
             penalty: Sum::default(),
             count: 0,
         }
@@ -63,12 +66,12 @@ impl<S: Scalar> Violations<S> {
             let from = self.q.len() - width.min(self.q.len());
             let dynamics = self.dynamics.get_or_insert_with(|| Dynamics::new(&self.model));
             dynamics.evaluate(weights, &self.q[from..], &self.v[from..], Depth::Training, false);
-            let tail = |list: &mut Vec<S>| list.split_off(from);
-            let chunk =
-                MixedDirections { s: tail(&mut self.directions.s), t: tail(&mut self.directions.t), moving: false };
+            self.chunk.clear(false);
+            self.chunk.s.extend(self.directions.s.drain(from..));
+            self.chunk.t.extend(self.directions.t.drain(from..));
             self.q.truncate(from);
             self.v.truncate(from);
-            dynamics.add_gradient(weights, &chunk, gradient, None);
+            dynamics.add_gradient(weights, &self.chunk, gradient, None);
         }
     }
 }

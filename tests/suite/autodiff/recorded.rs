@@ -43,6 +43,8 @@ impl Lagrangian for Expression {
         for (number, node) in self.nodes.iter().enumerate() {
             let (a, b) = (all[node.a % all.len()], all[node.b % all.len()]);
             let above = |x: R| x.sqr() + R::one();
+            // Away from 1, where the logarithm would tell the rounding of the sum.
+            let around = |x: R| x.tanh() + R::from_f64(2.5);
             let next = match node.kind % KINDS {
                 0 => a + b,
                 1 => a - b * R::from_f64(0.7),
@@ -52,9 +54,9 @@ impl Lagrangian for Expression {
                 6 => a.tanh(),
                 7 => (a.tanh() * b.tanh()).exp(),
                 8 => above(a).sqrt(),
-                9 => above(b).ln(),
+                9 => around(b).ln() + b.sqr().ln_1p(),
                 10 => a.atan2(above(b)),
-                11 => above(a).powf(b.tanh()),
+                11 => around(a).powf(b.tanh()),
                 12 => a.max(b),
                 13 => (a - b).select(a.sqr(), b * a),
                 14 => a.gelu() - b.softplus(),
