@@ -2,7 +2,7 @@
 
 use crate::cli::number::{count, positive, weight};
 use crate::cli::{CliError, chosen};
-use crate::network::{Nonlinearity, Structure};
+use crate::network::{Initialization, Nonlinearity, Structure};
 use crate::training::{Config, Known, Regularizer};
 
 /// Changes of a configuration.
@@ -102,8 +102,9 @@ impl Changes {
         config.network.even_in_v |= self.even_in_v;
         if let Some(path) = &self.known {
             config.network.known = Some(Known::File(path.clone()));
-            // What is known has its own kinetic energy.
+            // What is known has its own kinetic energy, and the network begins with next to nothing beside it.
             config.network.alpha = 0.0;
+            config.network.initialization = Initialization::NearZero;
         }
         if let Some(Known::File(path)) = &config.network.known {
             let system = chosen::system(path)?;

@@ -219,6 +219,7 @@ impl Job<'_> {
             seed: args.seed(),
             threads,
             trained: &trained,
+            constants: network.architecture().known_constants(network.weights()),
             shot: shot.as_ref(),
             judgement: &judgement,
             determined: &determined,

@@ -12,6 +12,7 @@ use crate::scalar::Scalar;
 use crate::training::shooting::Fitted;
 use crate::training::{Measured, Trained};
 use serde::Serialize;
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::time::Instant;
 
@@ -47,6 +48,9 @@ struct Summary<'a> {
     test_loss: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     shooting: Option<ShootingSummary>,
+    /// Constants of the known part of a grey box.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    constants: BTreeMap<String, f64>,
     ended: String,
     training_seconds: f64,
     wall_seconds: f64,
@@ -87,6 +91,8 @@ pub struct Found<'a, S> {
     pub threads: usize,
     /// The supervised training.
     pub trained: &'a Trained<S>,
+    /// Constants of the known part of a grey box, by name.
+    pub constants: BTreeMap<String, f64>,
     /// Multiple shooting, if there was any.
     pub shot: Option<&'a Fitted<S>>,
     /// Predictions of held-out motion.
@@ -153,6 +159,7 @@ impl<'a, S: Scalar> Found<'a, S> {
                 validation_loss: fitted.validation_loss,
                 integration_error: fitted.integration_error,
             }),
+            constants: self.constants.clone(),
             ended: ended(&trained.stop),
             training_seconds: trained.seconds + shot.map_or(0.0, |fitted| fitted.seconds),
             wall_seconds: self.started.elapsed().as_secs_f64(),
@@ -232,6 +239,10 @@ impl Summary<'_> {
                 counted(shooting.epochs, "epoch", "epochs"),
                 counted(shooting.segments, "segment", "segments")
             );
+        }
+        if !self.constants.is_empty() {
+            let constants: Vec<String> = self.constants.iter().map(|(k, &x)| format!("{k} {}", number(x))).collect();
+            let _ = writeln!(text, "constants of the known part: {}", constants.join(", "));
         }
         let _ = writeln!(text, "{:.1} s of training, {:.1} s in all\n", self.training_seconds, self.wall_seconds);
         text

@@ -7,6 +7,7 @@ use crate::lagrangian::system::{Parameter, Range, System};
 use crate::lagrangian::{Description, Lagrangian};
 use crate::network::{Architecture, Layout};
 use crate::scalar::{Real, Scalar};
+use std::collections::BTreeMap;
 
 /// Constants of a known part that are learned.
 pub(super) fn learned(description: &Description) -> usize {
@@ -39,6 +40,12 @@ impl Architecture {
     pub fn known_parameters<R: Real>(&self, parameters: &[R]) -> Vec<R> {
         let described = self.form.known.as_ref().and_then(|known| system(known, self.coordinates).ok());
         described.map_or_else(Vec::new, |system| self.constants(&system, parameters))
+    }
+
+    /// The same by name, in double precision.
+    pub fn known_constants<S: Scalar>(&self, parameters: &[S]) -> BTreeMap<String, f64> {
+        let names = self.form.known.iter().flat_map(|known| known.parameters.keys().cloned());
+        names.zip(self.known_parameters(parameters).into_iter().map(Scalar::to_f64)).collect()
     }
 
     fn constants<R: Real>(&self, system: &System, parameters: &[R]) -> Vec<R> {
