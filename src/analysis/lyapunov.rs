@@ -26,7 +26,7 @@ impl Lyapunov {
         if self.exponent > 0.0 { 1.0 / self.exponent } else { f64::INFINITY }
     }
 
-    /// Whether neighbouring motions part faster than those of regular motion do.
+    /// `true` if neighbouring motions part faster than those of regular motion do.
     pub fn is_chaotic(&self) -> bool {
         self.exponent * self.time >= REGULAR + (self.time / LONG).ln().max(0.0)
     }

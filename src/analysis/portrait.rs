@@ -9,7 +9,7 @@ use crate::scalar::Scalar;
 const SAMPLES: f64 = 4000.0;
 /// Lyapunov times that are drawn of a chaotic motion, at least and at most.
 const LYAPUNOV_TIMES: (f64, f64) = (4.0, 12.0);
-/// How much more than the time of valid prediction is drawn, so that it is seen how the two part.
+/// Time span of a portrait over the time of valid prediction, so that it is seen how the two part.
 const BEYOND: f64 = 1.3;
 /// Turns of its liveliest coordinate that are drawn of a regular motion: ten swings.
 const TURNS: usize = 20;

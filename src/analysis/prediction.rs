@@ -180,7 +180,7 @@ pub fn prediction_error(
     PredictionError { seconds, rms, median, most, windows: errors.len(), missing }
 }
 
-/// How long the prediction of each window was valid ([`valid_time`]), errors relative to the `spread` of the motion; at least to
+/// Time for which the prediction of each window was valid ([`valid_time`]), errors relative to the `spread` of the motion; at least to
 /// the end of the window where the error stays small.
 pub fn window_valid_times(
     windows: &[Window],

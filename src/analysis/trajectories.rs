@@ -93,7 +93,7 @@ pub struct TrajectoryRun<S> {
     /// Error of the learned coordinates relative to the spread of the exact ones, one per sample of both
     /// ([`relative_error`]).
     pub relative: Vec<f64>,
-    /// How long the learned motion predicts the exact one.
+    /// Time of valid prediction of the learned motion.
     pub valid: ValidTime,
 }
 
@@ -116,7 +116,7 @@ pub struct TrajectorySummary {
     pub energy_drift: Statistics,
     /// Largest finite-time Lyapunov exponent of the exact motion, if it was asked for.
     pub lyapunov_exponent: Option<f64>,
-    /// How long the learned motion predicts the exact one ([`valid_time`]).
+    /// Time of valid prediction ([`valid_time`]) of the learned motion.
     pub valid: ValidTime,
     /// The same in Lyapunov times, if the exact motion is chaotic.
     pub valid_lyapunov_times: Option<f64>,

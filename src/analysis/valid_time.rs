@@ -83,7 +83,7 @@ pub fn relative_error(exact: &[f64], predicted: &[f64], periodic: &[bool], sprea
     if count == 0 { f64::NAN } else { (sum / f64::from(count)).sqrt() }
 }
 
-/// How long a prediction with these errors was valid. `complete` if the prediction did not give up: then the true motion ends
+/// Time for which a prediction with these errors was valid. `complete` if the prediction did not give up: then the true motion ends
 /// with the last sample, and what comes after is not known.
 pub fn valid_time(times: &[f64], errors: impl IntoIterator<Item = f64>, complete: bool) -> ValidTime {
     let mut wrong = times.iter().zip(errors).filter(|(_, error)| error.is_nan() || *error > VALID);

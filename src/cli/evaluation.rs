@@ -325,7 +325,8 @@ impl Evaluation {
             let _ = write!(about, "; conserved: {name}");
         }
         if t_end > 1.0 {
-            let _ = write!(about, "; motion without chaos has a Lyapunov time of about {:.0}", t_end / t_end.ln());
+            let (time, unit) = (t_end / t_end.ln(), &self.time_unit);
+            let _ = write!(about, "; motion without chaos has a Lyapunov time of about {time:.0} {unit}");
         }
         [
             Table {

@@ -66,7 +66,7 @@ pub struct Parameter {
     pub unit: Cow<'static, str>,
     /// Allowed values.
     pub range: Range,
-    /// Whether its value is to be found by the training.
+    /// `true` if its value is to be found by the training.
     pub learn: bool,
 }
 
@@ -160,7 +160,7 @@ pub struct Conserved {
     pub vector: Vector,
 }
 
-/// What depends on the number of coordinates of a system.
+/// Property that depends on the number of coordinates of a system.
 #[derive(Clone, Debug)]
 pub enum PerSize<T> {
     /// For any number of coordinates.
@@ -179,7 +179,7 @@ impl<T: Clone> PerSize<T> {
     }
 }
 
-/// What is known about a system: an entry of the catalogue, or a
+/// Knowledge about a system: an entry of the catalogue, or a
 /// [description](super::Description) of one's own.
 #[derive(Clone, Debug)]
 pub struct System {

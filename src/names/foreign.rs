@@ -51,7 +51,7 @@ fn translated(said: &str) -> String {
     }
 }
 
-/// What was expected.
+/// Expected value.
 fn kind(expected: &str) -> String {
     let first = expected.split(' ').next().unwrap_or_default();
     let number = |text: &str| text.chars().find(char::is_ascii_digit).map(|_| text.to_string());
@@ -80,7 +80,7 @@ fn kind(expected: &str) -> String {
     }
 }
 
-/// What was found.
+/// Value found.
 fn thing(found: &str) -> String {
     let found = found.trim_end_matches(" as i128").trim_end_matches(" as u128");
     let inside = found.split('`').nth(1);

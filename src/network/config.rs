@@ -21,7 +21,7 @@ pub enum Initialization {
     NearZero,
 }
 
-/// What stands between the input features and the first dense layer.
+/// Layer between the input features and the first dense layer.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum InputLayer {
@@ -34,7 +34,7 @@ pub enum InputLayer {
 }
 
 impl InputLayer {
-    /// Whether there is none.
+    /// `true` if there is none.
     pub fn is_none(&self) -> bool {
         *self == Self::None
     }
@@ -54,7 +54,7 @@ pub struct Architecture {
     /// Factor of the added `|v|^2` of scaled velocities; 0 leaves it out.
     pub alpha: f64,
     /// The coordinate whose square counts negative in the added term: `alpha (-t'^2 + x'^2 + ..)`, the signature of a
-    /// spacetime. Without it, which is what its absence in a file means, all squares are added.
+    /// spacetime. Without it all squares are added.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub time_like: Option<usize>,
     /// Scale `s_i` of each coordinate: the network sees `q_i/s_i`, `v_i/s_i`. Ones: no scaling.
@@ -63,21 +63,14 @@ pub struct Architecture {
     pub periodic: Vec<bool>,
     /// Feed `sin q_i`, `cos q_i` of the periodic coordinates instead of `q_i/s_i`.
     pub embed_periodic: bool,
-    /// What stands before the first dense layer; not written if there is nothing, which is what its absence means.
+    /// Layer before the first dense one; files without this key have none.
     #[serde(default, skip_serializing_if = "InputLayer::is_none")]
     pub input_layer: InputLayer,
-    /// Units of the Rayleigh dissipation `D(q, v)` beside `L`; without it, which is what its absence in a file means, the
-    /// motion keeps its energy.
+    /// Units of the Rayleigh dissipation `D(q, v)` beside `L`; without it the motion
+    /// keeps its energy.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub dissipation: Option<usize>,
-    /// What is known of the Lagrangian beforehand; not written if that is nothing.
+    /// Knowledge of the Lagrangian beforehand; files without this key have none.
     #[serde(default, skip_serializing_if = "Form::is_default")]
     pub form: Form,
-}
-
-impl Architecture {
-    /// Factor of `(v_i/s_i)^2` in the added term: `alpha`, or `-alpha` for the time-like coordinate.
-    pub fn quadratic_factor(&self, i: usize) -> f64 {
-        if self.time_like == Some(i) { -self.alpha } else { self.alpha }
-    }
 }

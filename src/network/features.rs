@@ -13,7 +13,7 @@ impl Architecture {
         seen.map(|i| if self.embeds(i) { 2 } else { 1 }).sum()
     }
 
-    /// Whether coordinate `i` enters by its sine and cosine.
+    /// `true` if coordinate `i` enters by its sine and cosine.
     pub fn embeds(&self, i: usize) -> bool {
         self.embed_periodic && self.periodic[i]
     }

@@ -3,7 +3,7 @@
 use crate::network::{Activation, Architecture, InputLayer, Structure};
 use std::ops::Range;
 
-/// How the weights `W` of a layer act on its inputs `x`.
+/// Action of a layer's weights `W` on its inputs `x`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LinearMap {
     /// `W x`, `W` of shape `(outputs, inputs)` row-major.
@@ -19,7 +19,7 @@ pub enum LinearMap {
 pub struct Layer {
     /// Kind of the linear map.
     pub map: LinearMap,
-    /// What follows the affine map, elementwise.
+    /// Function after the affine map, elementwise.
     pub activation: Activation,
     /// Numbers in.
     pub inputs: usize,

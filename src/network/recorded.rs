@@ -33,18 +33,9 @@ impl Lagrangian for Architecture {
                 };
                 let network =
                     if self.form.even_in_v { (at(R::one()) + at(-R::one())) * R::half() } else { at(R::one()) };
-                let sign = |i: usize| if self.time_like == Some(i) { -R::one() } else { R::one() };
-                let squares = velocities.iter().enumerate().map(|(i, &v)| (i, v * v));
-                match layout.alpha {
-                    Some(alpha) => {
-                        let sum = squares.fold(R::zero(), |sum, (i, square)| sum + sign(i) * square);
-                        network + parameters[alpha] * sum
-                    }
-                    None => {
-                        let term = |(i, square)| square * R::from_f64(self.quadratic_factor(i));
-                        squares.map(term).fold(R::zero(), |sum, square| sum + square) + network
-                    }
-                }
+                let signed = |(i, &v): (usize, &R)| if self.time_like == Some(i) { -(v * v) } else { v * v };
+                let squares = velocities.iter().enumerate().map(signed).fold(R::zero(), |sum, square| sum + square);
+                network + layout.alpha.map_or(R::from_f64(self.alpha), |alpha| parameters[alpha]) * squares
             }
             Structure::Mechanical => {
                 let outputs = outputs(&positions);

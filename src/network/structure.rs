@@ -14,7 +14,7 @@ use crate::lagrangian::Description;
 use crate::scalar::Real;
 use serde::{Deserialize, Serialize};
 
-/// How the Lagrangian is made of the network's outputs.
+/// Structure of a Lagrangian: how it is made of the network's outputs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Structure {
@@ -41,17 +41,17 @@ impl Structure {
     }
 }
 
-/// What is known of a Lagrangian beforehand.
+/// Knowledge of a Lagrangian beforehand.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Form {
-    /// How the Lagrangian is made of the network's outputs.
+    /// Structure of a Lagrangian: how it is made of the network's outputs.
     pub structure: Structure,
     /// Coordinates that `L` does not depend on: their momenta are conserved exactly.
     pub cyclic: Vec<usize>,
-    /// Whether `L(q, -v) = L(q, v)`: the motion can be run backwards.
+    /// `true` if `L(q, -v) = L(q, v)`: the motion can be run backwards.
     pub even_in_v: bool,
-    /// Whether `alpha` of a black box is learned.
+    /// `true` if `alpha` of a black box is learned.
     pub learn_alpha: bool,
     /// A Lagrangian that is known, in physical units, and added; its constants marked `learn` are learned.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -59,7 +59,7 @@ pub struct Form {
 }
 
 impl Form {
-    /// Whether nothing is known.
+    /// `true` if nothing is known.
     pub fn is_default(&self) -> bool {
         *self == Self::default()
     }

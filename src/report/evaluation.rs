@@ -10,7 +10,7 @@ use crate::scalar::Scalar;
 const LINES: usize = 7;
 /// Coordinates that have pictures of their own.
 const COORDINATES: usize = 8;
-/// How much more than the median time of valid prediction the picture of it shows.
+/// Time span of the picture over the median time of valid prediction.
 const BEYOND_VALID: f64 = 4.0;
 
 /// Times and values of one quantity of a run.
@@ -139,7 +139,7 @@ fn first_over_time<S: Scalar>(figures: &mut Vec<Figure>, pair: Pair<'_, S>, syst
     }
 }
 
-/// What the colours of a path say.
+/// Meaning of a path's colours.
 fn from_dark_to_bright<S: Scalar>(trajectory: &Trajectory<S>, unit: &str) -> String {
     let end = trajectory.t.last().map_or(0.0, |t| t.to_f64());
     format!("from dark (0 {unit}, dot) to bright ({end:.3} {unit})").replace(".000", "")

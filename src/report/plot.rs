@@ -38,7 +38,7 @@ pub struct Series {
     pub name: String,
     /// Points; those that are not finite leave gaps.
     pub points: Vec<(f64, f64)>,
-    /// Whether to draw it thin over the others, which are then drawn wide: lines that ought to coincide.
+    /// `true` if to draw it thin over the others, which are then drawn wide: lines that ought to coincide.
     pub over: bool,
 }
 
@@ -60,7 +60,7 @@ impl Series {
 pub struct Level {
     /// The value.
     pub value: f64,
-    /// What it is.
+    /// Its name.
     pub name: String,
 }
 
@@ -73,7 +73,7 @@ pub struct LinePlot {
     pub x_label: String,
     /// Label of the vertical axis, with unit.
     pub y_label: String,
-    /// Whether the vertical axis is logarithmic; values that are not positive leave gaps.
+    /// `true` if the vertical axis is logarithmic; values that are not positive leave gaps.
     pub log_y: bool,
     /// The turn that the vertical axis shows, for an angle that leaves it somewhere.
     pub turn: Option<Turn>,
@@ -95,7 +95,7 @@ pub struct Trace {
     /// Paths with a name each, drawn side by side with the same axes; points at equal places in the lists have equal
     /// colours. The first is shown whole, the others as far as they keep within its extent of it.
     pub paths: Vec<Series>,
-    /// Whether both axes have one scale (a plane of space).
+    /// `true` if both axes have one scale (a plane of space).
     pub equal: bool,
     /// The turn that the horizontal axis shows, for an angle that leaves it somewhere.
     pub turn: Option<Turn>,
@@ -114,7 +114,7 @@ pub struct HeatMap {
     pub grid: Grid,
     /// Colours between these values; `None`: between the extremes of the grid.
     pub range: Option<(f64, f64)>,
-    /// Whether colours diverge from 0 (differences).
+    /// `true` if colours diverge from 0 (differences).
     pub diverging: bool,
     /// Points to mark by a dot.
     pub marks: Vec<(f64, f64)>,

@@ -32,7 +32,7 @@ impl<T: Real> Node<T> {
         let both = self.arguments.get();
         (both as u32 as usize, (both >> 32) as usize)
     }
-    /// What room is filled with.
+    /// Filling of unused room.
     fn empty() -> Self {
         Self::new(0, T::zero(), T::zero())
     }

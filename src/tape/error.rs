@@ -1,4 +1,4 @@
-//! What can go wrong on a tape.
+//! Errors of tapes.
 
 /// Why a recording or a sweep gave no result.
 ///

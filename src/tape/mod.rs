@@ -19,8 +19,9 @@
 //! node recorded, not per node held. A [`Replay`] holds `s` bytes per row, lane and chunk of [`LANES`] states for the
 //! values, those of one chunk for the adjoints; [`Replay::evaluate`] those of one chunk alone.
 //!
-//! In both, constants are never recorded, variables of two recordings never mix silently, and a zero adjoint times an
-//! infinite partial derivative contributes 0, so that a branch not taken leaves no `NaN`.
+//! In all of them constants are never recorded and variables of two recordings never mix silently. In the first two a zero
+//! adjoint times an infinite partial derivative contributes 0, so that a branch not taken leaves no `NaN`; a [`Recorded`]
+//! Lagrangian needs finite slopes in both branches.
 
 mod driver;
 mod eager;
@@ -33,7 +34,7 @@ pub use driver::{
     ScalarFunction, VectorFunction, derivative, gradient, gradient_on, hessian, hessian_vector, jacobian,
 };
 pub use eager::{Adjoints, Statistics, Tape};
-pub use engine::{Depth, Evaluation, LANES as STATES, MixedDirections, Recorded};
+pub use engine::{Depth, Evaluation, MixedDirections, Recorded, STATES};
 pub use error::TapeError;
 pub use program::{LANES, Program, Replay, Tracer};
 pub use var::Var;

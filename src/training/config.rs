@@ -20,7 +20,7 @@ pub enum Precision {
     F64,
 }
 
-/// What happens when a step meets a state without a finite acceleration or a gradient that is not finite.
+/// Reaction to a state without a finite acceleration or a gradient that is not finite.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum OnFailure {
@@ -30,7 +30,7 @@ pub enum OnFailure {
     Stop,
 }
 
-/// How coordinates are scaled.
+/// Scaling of the coordinates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Scaling {
@@ -109,7 +109,7 @@ pub struct Data {
     /// Fraction of the training states of a system with a mass shell that are drawn off it: their velocity is `u` times one on
     /// the shell, `|u|` from 0.03 to 1 and uniform in its logarithm, of either sign, their acceleration `u^2` times as
     /// large, as for every geodesic, and their residuals weigh `1/u^2` in the training loss. On the shell alone the metric
-    /// cannot be told.
+    /// is not identifiable.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub off_shell: f64,
     /// Fraction of the training states that lie on exact motions from the starts of the system's trajectory test, at any
@@ -148,22 +148,22 @@ pub struct Network {
     pub scaling: Scaling,
     /// Feed sine and cosine of periodic coordinates.
     pub embed_periodic: bool,
-    /// What stands before the first dense layer.
+    /// Layer before the first dense one.
     #[serde(default)]
     pub input_layer: InputLayer,
     /// Units of a learned Rayleigh dissipation; without it the motion keeps its energy.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub dissipation: Option<usize>,
-    /// How the Lagrangian is made of the network's outputs.
+    /// Structure of the Lagrangian: how it is made of the network's outputs.
     #[serde(default)]
     pub structure: Structure,
     /// Names of the coordinates that the Lagrangian does not depend on.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub cyclic: Vec<String>,
-    /// Whether the Lagrangian is even in the velocities.
+    /// `true` if the Lagrangian is even in the velocities.
     #[serde(default)]
     pub even_in_v: bool,
-    /// Whether `alpha` is learned.
+    /// `true` if `alpha` is learned.
     #[serde(default)]
     pub learn_alpha: bool,
     /// A Lagrangian that is known and added: a grey box.
@@ -197,7 +197,7 @@ pub struct Optimizer {
     pub clip: f64,
     /// Weights are averaged over about `1/(1 - averaging)` steps for validation and the final model; 0: not averaged.
     pub averaging: f64,
-    /// What happens when a step fails.
+    /// Reaction to a step that fails.
     pub on_failure: OnFailure,
 }
 
@@ -211,7 +211,7 @@ pub struct Phase {
     pub rate: f64,
     /// Lowest learning rate.
     pub eta_min: f64,
-    /// How the rate moves.
+    /// Course of the rate.
     pub schedule: Schedule,
     /// Epochs from highest to lowest rate of `cosine-annealing`.
     pub t_max: f64,
@@ -231,9 +231,9 @@ pub struct Phase {
 pub struct ConfigError {
     /// Path of the value, such as `phase[0].rate`.
     pub field: String,
-    /// What would have been right.
+    /// Values that are allowed.
     pub expected: &'static str,
-    /// What stands there.
+    /// The value found.
     pub found: String,
 }
 
@@ -251,7 +251,7 @@ impl Network {
 }
 
 impl Network {
-    /// What is known of the Lagrangian of coordinates with these names.
+    /// Knowledge of the Lagrangian beforehand, for coordinates with these names.
     ///
     /// # Errors
     /// A cyclic coordinate that is none of them.

@@ -104,7 +104,7 @@ impl<S: Scalar> Dataset<S> {
     pub fn len(&self) -> usize {
         self.q.len() / self.coordinates
     }
-    /// Whether there is no state; never, once built.
+    /// `true` if there is no state; never, once built.
     pub fn is_empty(&self) -> bool {
         self.q.is_empty()
     }

@@ -15,7 +15,7 @@ use crate::training::shooting::{Estimated, Noise};
 use crate::training::trainer::Datasets;
 use thiserror::Error;
 
-/// How recorded motion is prepared.
+/// Preparation of recorded motion.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Preparation {
     /// Local polynomials.
@@ -49,7 +49,7 @@ pub enum MeasuredError {
     Motionless {
         /// Its name.
         coordinate: String,
-        /// How it does.
+        /// The way it does.
         how: Stillness,
     },
     /// Numbers that make no dataset.
@@ -57,7 +57,7 @@ pub enum MeasuredError {
     Dataset {
         /// Training, validation or test.
         which: &'static str,
-        /// What is wrong.
+        /// The problem.
         source: DatasetError,
     },
 }
@@ -65,7 +65,7 @@ pub enum MeasuredError {
 /// Trajectories with the states estimated from them.
 #[derive(Clone, Debug)]
 pub struct Part {
-    /// What was recorded.
+    /// The recorded motion.
     pub recording: Recording,
     /// States of every trajectory.
     pub states: Vec<Smoothed>,
@@ -117,11 +117,11 @@ impl Part {
 pub struct Measured {
     /// Noise and windows.
     pub smoothing: Smoothing,
-    /// What is trained on.
+    /// The part to train on.
     pub training: Part,
-    /// What chooses the best epoch.
+    /// The part that chooses the best epoch.
     pub validation: Part,
-    /// What judges.
+    /// The part that judges.
     pub test: Part,
     /// Which part of the recording judges.
     pub held_out: HeldOut,

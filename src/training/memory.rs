@@ -9,7 +9,7 @@ use crate::training::penalty::Regularizer;
 /// Vectors of all weights that training holds: weights, gradient, two moments, average, the best of the phase and of those
 /// before (each twice), the last two that were validated, and the start.
 const VECTORS: u64 = 12;
-/// How often what a checkpoint keeps is held while it is written: copied, in bytes, in the file's bytes, read back.
+/// Copies of a checkpoint's numbers while it is written: the copy, its bytes, the file's bytes, those read back.
 const COPIES: u64 = 4;
 /// Vectors of all weights in a checkpoint, as often as each is held while it is written.
 const CHECKPOINT: u64 = 6 * COPIES;

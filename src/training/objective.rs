@@ -30,7 +30,7 @@ pub(super) const CHUNK: usize = STATES;
 /// Stripes a batch is cut into at most; each has its own gradient.
 pub(super) const STRIPES: usize = 8;
 
-/// What a batch came to.
+/// Outcome of a batch.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BatchReport<S> {
     /// Loss in the paper's convention, without penalty, over the states that count; `NaN` if none does.
@@ -166,10 +166,8 @@ impl<S: Scalar> Stripe<S> {
             Penalty::Eigenvalue { .. } => self.add_eigenvalue(lambda),
             Penalty::Sylvester { time, .. } => self.note_suspects(time),
         }
-        if self.add_directions() {
-            self.dynamics.add_gradient(weights, &self.directions, &mut self.gradient, None);
-        } else if self.replace_failed(weights) {
-            // Zero directions on finite numbers leave the failed states out.
+        // Zero directions on finite numbers leave the failed states out.
+        if self.add_directions() || self.replace_failed(weights) {
             self.dynamics.add_gradient(weights, &self.directions, &mut self.gradient, None);
         }
         self.violations.add_gradient(weights, false, &mut self.gradient);
@@ -355,7 +353,7 @@ impl<S: Scalar> Objective<S> {
         Self { model, penalty, pool, stripes: Vec::new() }
     }
 
-    /// What is trained.
+    /// The model that is trained.
     pub(super) fn model(&self) -> &Model<S> {
         &self.model
     }

@@ -16,7 +16,7 @@ use std::sync::atomic::Ordering;
 /// Evaluations an iteration may take on average; argmin's line searches know no limit.
 const EVALUATIONS: usize = 20;
 
-/// What polishing starts from, the same for every iteration.
+/// Start of a polishing, the same for every iteration.
 pub(super) struct Start {
     /// Parameters to begin with.
     pub weights: Vec<f64>,
@@ -30,7 +30,7 @@ pub(super) struct Start {
     pub hooks: Hooks,
 }
 
-/// What polishing came to.
+/// Result of a polishing.
 pub(super) struct Polished {
     /// Parameters of the lowest validation loss, if lower than at the start.
     pub weights: Option<Vec<f64>>,
@@ -49,7 +49,7 @@ struct Bounded<'p, 'a> {
 }
 
 impl Bounded<'_, '_> {
-    /// Whether a point may be evaluated.
+    /// `true` if a point may be evaluated.
     fn admit(&self, weights: &[f64]) -> Result<(), Error> {
         if self.problem.is_known(weights) {
             Ok(())

@@ -81,7 +81,7 @@ fn optimizer(method: Method) -> Optimizer {
     Optimizer { method, batch: 128, weight_decay: WEIGHT_DECAY, clip: 1.0, averaging: 0.0, on_failure: OnFailure::Skip }
 }
 
-/// What the presets of our own differ in.
+/// Choices in which the presets of our own differ.
 #[derive(Clone, Copy)]
 struct Size {
     width: usize,

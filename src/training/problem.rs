@@ -6,7 +6,7 @@ use crate::training::objective::{BatchReport, Objective};
 use argmin::core::{CostFunction, Error, Gradient};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// What argmin solves: a network's parameters, the states it learns from and those it is judged by.
+/// Problem of an argmin run: a network's parameters, the states it learns from and those it is judged by.
 ///
 /// The cost of parameters `w` is loss plus penalty plus `weight_decay |w|^2 / 2` over all training states, and the gradient is
 /// its derivative; a line search that asks for both at one point has one evaluation. Every solver of argmin's, of this crate's
@@ -76,17 +76,17 @@ impl<'a, S: Scalar> TrainingProblem<'a, S> {
         self.lock().evaluations
     }
 
-    /// What batches are evaluated by.
+    /// The objective that evaluates batches.
     pub(super) fn objective(&mut self) -> &mut Objective<S> {
         &mut self.evaluator.get_mut().unwrap_or_else(PoisonError::into_inner).objective
     }
 
-    /// Whether these parameters are evaluated already.
+    /// `true` if these parameters are evaluated already.
     pub(super) fn is_known(&self, weights: &[S]) -> bool {
         self.lock().last.is_of(weights)
     }
 
-    /// What the last evaluation found.
+    /// The result of the last evaluation.
     pub(super) fn last<T>(&self, read: impl FnOnce(&Evaluated<S>) -> T) -> T {
         read(&self.lock().last)
     }

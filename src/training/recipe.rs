@@ -48,7 +48,7 @@ impl Config {
         Ok(configure_system(self.system_entry()?, &given)?)
     }
 
-    /// What is known about the system: the catalogue's entry, or what its description comes to.
+    /// The system: the catalogue's entry, or the one of its description.
     ///
     /// # Errors
     /// Unknown system, or a description that is wrong or of another name.

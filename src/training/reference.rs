@@ -13,7 +13,7 @@ pub struct Key {
     pub name: &'static str,
     /// Allowed values, with their unit.
     pub values: &'static str,
-    /// What it is for.
+    /// Purpose.
     pub purpose: &'static str,
     /// A value in TOML, for keys that may be left out and mean something by that; empty for all others.
     pub example: &'static str,
@@ -24,7 +24,7 @@ pub struct Key {
 pub struct Section<'a> {
     /// Its name, empty for the keys that stand before any table.
     pub name: &'a str,
-    /// What it is for.
+    /// Purpose.
     pub purpose: &'static str,
     /// Its keys; empty for a table whose keys the system decides.
     pub keys: &'static [Key],
@@ -76,7 +76,7 @@ pub const TRAINING_SECTIONS: [Section<'static>; 9] = [
                 "0.75",
                 "0 to 1; 0 unless set",
                 "Fraction of the training states of a geodesic that are slowed down or reversed, off the mass shell: on the \
-                 shell alone the metric cannot be told.",
+                 shell alone the metric is not identifiable.",
             ),
             optional(
                 "motions",

@@ -26,7 +26,7 @@ pub enum SamplingError {
     Domain {
         /// Which bounds.
         field: String,
-        /// What the system demands.
+        /// Demand of the system.
         demand: &'static str,
     },
     /// Motions of the trajectory test hardly pass through the box.

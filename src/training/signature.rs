@@ -76,7 +76,7 @@ pub fn characteristic_scales<S: Scalar>(n: usize, diagonals: &[S]) -> Vec<S> {
         .collect()
 }
 
-/// Whether `M`, `(n, n)`, is positive definite, or with a time-like coordinate `M_tt < 0` and the rest positive definite.
+/// `true` if `M`, `(n, n)`, is positive definite, or with a time-like coordinate `M_tt < 0` and the rest positive definite.
 ///
 /// `false` also where rounding leaves it open.
 pub fn has_signature<S: Scalar>(n: usize, matrix: &[S], time: Option<usize>, buffers: &mut Buffers<S>) -> bool {

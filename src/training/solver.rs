@@ -52,7 +52,7 @@ pub struct Epoch {
     pub seconds: f64,
 }
 
-/// What a watcher is told while training runs.
+/// News of a training that runs.
 #[derive(Clone, Copy, Debug)]
 pub enum Progress<'a> {
     /// A step was taken: `(step, steps)` of all phases and the mean loss of the epoch so far.
@@ -106,7 +106,7 @@ pub enum StepError {
     NoProgress {
         /// Counted from 1 over all phases.
         epoch: usize,
-        /// What the last step failed for.
+        /// Failure of the last step.
         failure: Failure,
     },
 }
@@ -117,7 +117,7 @@ pub struct EpochSolver<S> {
     phase: Phase,
     phase_number: usize,
     course: Course<S>,
-    /// Whether the course began in an earlier sitting.
+    /// `true` if the course began in an earlier sitting.
     restored: bool,
     gradient: Vec<S>,
     steps: usize,

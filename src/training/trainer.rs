@@ -63,7 +63,7 @@ pub enum Stop {
     Failed(StepError),
 }
 
-/// What training made.
+/// Result of a training.
 #[derive(Clone, Debug)]
 pub struct Trained<S> {
     /// Parameters of the best validation epoch.
@@ -120,7 +120,7 @@ pub enum TrainingError {
     Threads {
         /// Number asked for.
         threads: usize,
-        /// What the system said.
+        /// Message of the operating system.
         source: rayon::ThreadPoolBuildError,
     },
     /// The host of the optimiser failed.
@@ -156,7 +156,7 @@ impl<S: Scalar> Datasets<S> {
 pub struct Sitting<S> {
     /// Keeps checkpoints, if anybody does.
     pub keeper: Option<Arc<Keeper>>,
-    /// What [`Keeper::restore`] found, or nothing for a training from its beginning.
+    /// The checkpoint that [`Keeper::restore`] found, or nothing for a training from its beginning.
     pub start: Option<Snapshot<S>>,
 }
 

@@ -84,7 +84,7 @@ pub struct ParameterDescription {
     pub unit: String,
     /// Allowed values.
     pub range: Range,
-    /// Whether its value is to be found by the training.
+    /// `true` if its value is to be found by the training.
     #[serde(skip_serializing_if = "is_false")]
     pub learn: bool,
 }
@@ -110,13 +110,13 @@ impl TrajectoryDescription {
     }
 }
 
-/// What is wrong in a description.
+/// Mistake in a description.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{key}: {problem}")]
 pub struct DescriptionError {
     /// Path of the key, such as `metric.t,t`.
     pub key: String,
-    /// What is wrong, with the column for a formula.
+    /// The mistake, with the column for a formula.
     pub problem: String,
 }
 

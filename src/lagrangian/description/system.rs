@@ -19,7 +19,7 @@ const MAX_NAMES: usize = 256;
 
 type Outcome<T> = Result<T, DescriptionError>;
 
-/// What the mass shell demands, in words.
+/// Demand of the mass shell, in words.
 const SHELL: &str = "from the mass shell g(v, v) = -1, to the future";
 
 impl Description {
@@ -114,7 +114,7 @@ impl Description {
         Ok(())
     }
 
-    /// What the names of coordinates, velocities and parameters mean.
+    /// Meaning of the names of coordinates, velocities and parameters.
     fn scope(&self) -> Outcome<BTreeMap<String, Meaning>> {
         let mut scope = BTreeMap::new();
         let mut add = |key: String, name: &str, meaning: Meaning| {

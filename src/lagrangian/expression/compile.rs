@@ -12,7 +12,7 @@ use std::collections::{BTreeMap, HashMap};
 /// Most operations of a program.
 const MAX_OPERATIONS: usize = 1 << 16;
 
-/// What a name stands for.
+/// Meaning of a name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Meaning {
     /// A parameter by its place.
@@ -21,7 +21,7 @@ pub enum Meaning {
     Position(usize),
     /// The velocity of a coordinate.
     Velocity(usize),
-    /// What was compiled before.
+    /// Formulas compiled before.
     Value(Value),
 }
 
@@ -47,7 +47,7 @@ pub struct Compiler {
     known: HashMap<Entry, Value>,
     numbers: Vec<Number>,
     places: HashMap<(u64, u64, u32), u32>,
-    /// Whether a value depends on velocities.
+    /// `true` if a value depends on velocities.
     moving: Vec<bool>,
 }
 
@@ -108,7 +108,7 @@ impl Compiler {
         }
     }
 
-    /// Whether a value depends on velocities.
+    /// `true` if a value depends on velocities.
     pub fn moves(&self, value: Value) -> bool {
         self.moving[value.0 as usize]
     }
@@ -264,7 +264,7 @@ impl Compiler {
     }
 }
 
-/// What an operation is made of.
+/// Kind and operands of an operation.
 fn operands(entry: Entry) -> [Option<Value>; 2] {
     match entry {
         Entry::Unary(_, a) => [Some(a), None],

@@ -1,4 +1,4 @@
-//! What is wrong in a formula.
+//! Mistakes in a formula.
 
 /// A mistake in the text of a formula.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -6,7 +6,7 @@
 pub struct ExpressionError {
     /// Character of the text where it is, from 1.
     pub column: usize,
-    /// What is wrong, and what was expected.
+    /// The mistake, and what was expected.
     pub problem: String,
 }
 

@@ -52,7 +52,7 @@ pub(super) fn name_of(function: Function) -> Option<&'static str> {
     FUNCTIONS.iter().find(|(_, known)| *known == function).map(|(name, _)| *name)
 }
 
-/// Whether a name means something in every formula.
+/// `true` if a name means something in every formula.
 pub fn is_reserved(name: &str) -> bool {
     name == PI || function(name).is_some()
 }

@@ -35,11 +35,11 @@ impl Number {
         let power = low == 0.0 && high > 0.0 && high.log2().fract() == 0.0 && (-100.0..=100.0).contains(&high.log2());
         (power && high == 2f64.powi(high.log2() as i32)).then(|| Self::exact(1.0 / high))
     }
-    /// Whether it is this `f64`.
+    /// `true` if it is this `f64`.
     pub fn is(self, value: f64) -> bool {
         self.exact.parts() == (value, 0.0)
     }
-    /// What two numbers have in common if they are the same.
+    /// Key that equal numbers share.
     pub fn bits(self) -> (u64, u64, u32) {
         let (high, low) = self.exact.parts();
         (high.to_bits(), low.to_bits(), self.single.to_bits())

@@ -42,7 +42,7 @@ impl<'a> Parser<'a> {
     fn advance(&mut self) {
         self.at += 1;
     }
-    /// Whether a sign comes next, which is taken then.
+    /// `true` if a sign comes next, which is taken then.
     fn takes(&mut self, sign: char) -> bool {
         let found = self.next().kind == Kind::Sign(sign);
         self.at += usize::from(found);

@@ -41,7 +41,7 @@ fn continues_name(c: char) -> bool {
     c.is_alphanumeric() || c == '_'
 }
 
-/// Whether a text is one name: a letter or `_`, then letters, digits and `_`.
+/// `true` if a text is one name: a letter or `_`, then letters, digits and `_`.
 pub fn is_name(text: &str) -> bool {
     text.starts_with(begins_name) && text.chars().all(continues_name) && text.chars().count() <= 64
 }

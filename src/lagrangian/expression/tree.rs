@@ -1,4 +1,4 @@
-//! What a formula says, before its names mean anything.
+//! Tree of a formula, before its names mean anything.
 
 use super::error::ExpressionError;
 use super::functions::{Function, PI, name_of};
@@ -47,7 +47,7 @@ impl Expression {
     }
 }
 
-/// How tightly a part holds together: sums, products, signs, powers, atoms.
+/// Precedence of a part: sums, products, signs, powers, atoms.
 const SUM: u8 = 0;
 const PRODUCT: u8 = 1;
 const SIGN: u8 = 2;

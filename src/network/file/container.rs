@@ -16,7 +16,7 @@ use std::collections::HashMap;
 /// Largest description that is read, in bytes.
 pub(super) const MAX_HEADER: u64 = 1 << 20;
 
-/// What sets files of one kind apart.
+/// Marks of the files of one kind.
 #[derive(Clone, Copy, Debug)]
 pub struct Kind {
     /// In messages: a model, a checkpoint.
@@ -205,7 +205,7 @@ fn check_container(bytes: &[u8]) -> Result<(), ModelFileError> {
 
 /// The description, its version and checksum tested first.
 fn read_header<H: DeserializeOwned>(kind: &Kind, text: &str, payload: &[u8]) -> Result<H, ModelFileError> {
-    /// What every version of the format says.
+    /// Part that every version of the format has.
     #[derive(Deserialize)]
     struct Version {
         format: u32,

@@ -18,7 +18,7 @@ pub enum ModelFileError {
     /// A safetensors file of another program or purpose.
     #[error("a safetensors file, but not of an lnn {kind} (no {key:?} metadata)")]
     Foreign {
-        /// What was expected, such as a model.
+        /// Expected kind, such as a model.
         kind: &'static str,
         /// Its metadata key.
         key: &'static str,

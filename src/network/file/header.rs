@@ -1,4 +1,4 @@
-//! What a model file says about its model.
+//! Header of a model file.
 
 use super::ModelFileError;
 use super::container::check_version;

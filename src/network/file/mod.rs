@@ -38,7 +38,7 @@ use std::path::Path;
 /// Largest file that is read, in bytes.
 pub const MAX_BYTES: u64 = 1 << 30;
 
-/// What sets a model file apart.
+/// Marks of a model file.
 const MODEL: Kind = Kind { name: "model", key: "lnn", format: FORMAT };
 
 /// A network: its description and its flat parameter vector.

@@ -18,7 +18,7 @@ pub(super) const BELOW: f64 = 44.0;
 /// Decades that have ticks of their own at every value.
 const FEW_DECADES: f64 = 6.0;
 
-/// How an axis counts.
+/// Scale of an axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     Linear,

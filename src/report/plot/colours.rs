@@ -2,9 +2,9 @@
 
 /// Colours that people with any colour vision tell apart (Wong 2011), yellow left out.
 pub(super) const LINES: [&str; 7] = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#333333"];
-/// What deserves attention: the start of a path, a wrong sign.
+/// Colour of what deserves attention: the start of a path, a wrong sign.
 pub(super) const MARK: &str = "#D55E00";
-/// What has no value.
+/// Colour of places without a value.
 pub(super) const GAP: [u8; 3] = [0xbb, 0xbb, 0xbb];
 
 /// Colours at equal distances, linear between them.

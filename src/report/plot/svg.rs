@@ -45,7 +45,7 @@ impl Panel {
         Self { width, height, body: String::new() }
     }
 
-    /// What is drawn, on white.
+    /// Drawing, on white.
     pub fn body(&self) -> String {
         format!("<rect width=\"{}\" height=\"{}\" fill=\"#fff\"/>{}", short(self.width), short(self.height), self.body)
     }

@@ -6,7 +6,7 @@ fn plot(points: &[(f64, f64)], log_y: bool) -> Result<Picture, PlotError> {
     line_plot(&LinePlot { title, x_label, y_label, log_y, series, turn: None, level: None })
 }
 
-/// Whether it is drawn and no number in it is none.
+/// `true` if it is drawn and no number in it is none.
 fn is_sound(picture: &Picture) -> bool {
     let svg = picture.to_svg();
     svg.starts_with("<svg xmlns") && svg.ends_with("</svg>\n") && !svg.contains("NaN") && !svg.contains("inf")

@@ -108,7 +108,7 @@ fn mark<S: Scalar>(operations: &[Operation<S>], values: &mut [Value], output: us
                 (_, Kind::Constant) => (terminal[op.a], terminal[op.b]) = (terminal[op.a] && terminal[out], false),
                 _ => (terminal[op.a], terminal[op.b]) = (false, false),
             },
-            Operation::Select(op) => [op.a, op.b].into_iter().for_each(|x| terminal[x] &= terminal[out]),
+            Operation::Select(op) => op.branches.into_iter().for_each(|x| terminal[x] &= terminal[out]),
             _ => operation.operands(|x| terminal[x] &= terminal[out]),
         }
     }
@@ -192,7 +192,7 @@ impl<'g, S: Scalar> Compiler<'g, S> {
             Operation::Input(input) if kind == Kind::Velocity => velocities.push(input.index - self.n),
             // Nothing moves what a condition depends on.
             Operation::Select(op) => {
-                velocities = [op.a, op.b].iter().flat_map(|&x| self.values[x].velocities.clone()).collect();
+                velocities = op.branches.iter().flat_map(|&x| self.values[x].velocities.clone()).collect();
             }
             _ => {}
         }
@@ -317,7 +317,7 @@ impl<'g, S: Scalar> Compiler<'g, S> {
             }
             Node::Select(c, a, b) => {
                 let [condition, a, b] = [*c, *a, *b].map(|row| self.number(row));
-                self.push(Operation::Select(Select { condition, a, b }), 1, self.kind_of(&[a, b]))
+                self.push(Operation::Select(Select { condition, branches: [a, b] }), 1, self.kind_of(&[a, b]))
             }
             Node::Dense(dense) => {
                 let x = self.vector(&dense.inputs);
@@ -342,7 +342,7 @@ impl<'g, S: Scalar> Compiler<'g, S> {
         let a = self.number(a);
         let b = b.map(|(b, factor)| (self.number(b), factor));
         let kind = b.map_or(self.values[a].kind, |(b, _)| self.kind_of(&[a, b]));
-        self.push(Operation::Combination(Combination { a, factor, b }), 1, kind)
+        self.push(Operation::Combination(Combination::new((a, factor), b)), 1, kind)
     }
 
     /// The value that holds these rows in this order, made of them if there is none.

@@ -1,6 +1,6 @@
-//! How far a Lagrangian is evaluated.
+//! Depth of an evaluation.
 
-/// How far a Lagrangian is evaluated; each step includes those before it.
+/// Depth of an evaluation of a Lagrangian; each step includes those before it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Depth {
     /// `L`: one pass.

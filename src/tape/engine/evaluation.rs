@@ -1,9 +1,9 @@
 //! Sweeps over a recorded Lagrangian on a chunk of states.
 
 use super::kernel::resize;
-use super::operation::{Forward, MixedForward, MixedReverse, PARTIALS, Reverse, Second};
+use super::operation::{Forward, Kept, MixedForward, MixedReverse, PARTIALS, Reverse, Second};
 use super::value::{Kind, Order, Store, View};
-use super::{Depth, LANES, Recorded};
+use super::{Depth, Recorded, STATES};
 use crate::scalar::{Real, Scalar};
 use std::sync::Arc;
 
@@ -14,7 +14,7 @@ pub struct MixedDirections<S> {
     pub s: Vec<S>,
     /// Velocity direction `t`, `(states, n)`.
     pub t: Vec<S>,
-    /// Whether the second direction moves along `(v, 0)` too (`tau = 1`).
+    /// `true` if the second direction moves along `(v, 0)` too (`tau = 1`).
     pub moving: bool,
 }
 
@@ -27,7 +27,7 @@ impl<S> MixedDirections<S> {
     }
 }
 
-/// A recorded Lagrangian on a chunk of at most [`LANES`] states, and everything computed of it; buffers are reused from call to
+/// A recorded Lagrangian on a chunk of at most [`STATES`] states, and everything computed of it; buffers are reused from call to
 /// call. All results are in scaled coordinates.
 #[derive(Debug)]
 pub struct Evaluation<S> {
@@ -92,17 +92,17 @@ impl<S: Scalar> Evaluation<S> {
         &self.recorded
     }
 
-    /// Evaluates states `q`, `v`, both `(batch, n)` in physical units with `batch <= LANES`, with these parameters.
+    /// Evaluates states `q`, `v`, both `(batch, n)` in physical units with `batch <= STATES`, with these parameters.
     ///
     /// Fills the public fields up to `depth`; fields beyond are empty.
     ///
     /// # Panics
-    /// If there are more states than [`LANES`] or too few parameters.
+    /// If there are more states than [`STATES`] or too few parameters.
     pub fn evaluate(&mut self, parameters: &[S], q: &[S], v: &[S], depth: Depth) {
         let recorded = Arc::clone(&self.recorded);
         let n = recorded.coordinates();
         let lanes = q.len() / n;
-        assert!(lanes <= LANES && v.len() == q.len() && parameters.len() >= recorded.parameters, "a chunk of states");
+        assert!(lanes <= STATES && v.len() == q.len() && parameters.len() >= recorded.parameters, "a chunk of states");
         self.lanes = lanes;
         for (own, given) in [(&mut self.q, q), (&mut self.v, v)] {
             own.clear();
@@ -145,13 +145,16 @@ impl<S: Scalar> Evaluation<S> {
         resize(&mut self.adjoints, recorded.adjoint.total * lanes);
         self.second.start(n, lanes, depth >= Depth::Motion);
         let mut sweep = Reverse {
-            values: &recorded.values,
-            forward: View { layout: recorded.layout(depth), lanes, numbers: &self.numbers },
+            kept: Kept {
+                values: &recorded.values,
+                forward: View { layout: recorded.layout(depth), lanes, numbers: &self.numbers },
+                slopes: &self.slopes,
+                partials: &self.partials,
+                parameters,
+                scale: &recorded.scale,
+            },
             adjoints: Store { layout: &recorded.adjoint, lanes, numbers: &mut self.adjoints },
             depth,
-            slopes: &self.slopes,
-            partials: &self.partials,
-            parameters,
             second: &mut self.second,
         };
         for (value, _) in recorded.values.iter().enumerate().filter(|(_, value)| !value.overwritten) {
@@ -230,38 +233,35 @@ impl<S: Scalar> Evaluation<S> {
     ) {
         let recorded = Arc::clone(&self.recorded);
         let (lanes, layout) = (self.lanes, recorded.mixed_layout(order));
-        let forward = View { layout: recorded.layout(Depth::Training), lanes, numbers: &self.numbers };
-        resize(&mut self.mixed, layout.total * lanes);
-        resize(&mut self.mixed_adjoints, layout.total * lanes);
-        let mut sweep = MixedForward {
+        let kept = || Kept {
             values: &recorded.values,
-            forward,
-            mixed: Store { layout, lanes, numbers: &mut self.mixed },
-            order,
+            forward: View { layout: recorded.layout(Depth::Training), lanes, numbers: &self.numbers },
             slopes: &self.slopes,
             partials: &self.partials,
             parameters,
+            scale: &recorded.scale,
+        };
+        resize(&mut self.mixed, layout.total * lanes);
+        resize(&mut self.mixed_adjoints, layout.total * lanes);
+        let mut sweep = MixedForward {
+            kept: kept(),
+            mixed: Store { layout, lanes, numbers: &mut self.mixed },
+            order,
             directions,
             v: &self.v,
-            scale: &recorded.scale,
         };
         for (out, operation) in recorded.operations.iter().enumerate() {
             operation.mixed(out, &mut sweep);
         }
         let mut sweep = MixedReverse {
-            values: &recorded.values,
-            forward,
+            kept: kept(),
             value_adjoints: View { layout: &recorded.adjoint, lanes, numbers: &self.adjoints },
             mixed: View { layout, lanes, numbers: &self.mixed },
             adjoints: Store { layout, lanes, numbers: &mut self.mixed_adjoints },
             order,
-            slopes: &self.slopes,
-            partials: &self.partials,
-            parameters,
             gradient,
             inputs,
             moving: directions.moving,
-            scale: &recorded.scale,
         };
         for (value, _) in recorded.values.iter().enumerate().filter(|(_, value)| !value.overwritten) {
             sweep.adjoints.all_mut(value).fill(<S as Real>::zero());

@@ -2,20 +2,6 @@
 
 use crate::scalar::{Real, Scalar, vectorized};
 
-/// `out = f(x)`.
-#[inline(always)]
-pub(super) fn map<S: Scalar>(out: &mut [S], x: &[S], f: impl Fn(S) -> S) {
-    dispatched(
-        out.len(),
-        #[inline(always)]
-        || {
-            for (out, &x) in out.iter_mut().zip(x) {
-                *out = f(x);
-            }
-        },
-    );
-}
-
 /// Runs a loop over `count` numbers for the widest vector instructions, as it is where that is not worth a call.
 #[inline(always)]
 fn dispatched(count: usize, kernel: impl FnOnce()) {

@@ -37,4 +37,4 @@ pub use depth::Depth;
 pub use evaluation::{Evaluation, MixedDirections};
 
 /// States evaluated together at most.
-pub const LANES: usize = 64;
+pub const STATES: usize = 64;

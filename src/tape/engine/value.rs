@@ -8,7 +8,7 @@
 use super::Depth;
 use std::ops::Range;
 
-/// What a value depends on.
+/// Dependence of a value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Kind {
     /// Parameters and constants alone.
@@ -172,7 +172,7 @@ impl<S> Store<'_, S> {
     pub fn view(&self) -> View<'_, S> {
         View { layout: self.layout, lanes: self.lanes, numbers: self.numbers }
     }
-    /// What was computed before a value, and the planes of the value itself.
+    /// The values before a value, and the planes of the value itself.
     pub fn split(&mut self, value: usize) -> (View<'_, S>, &mut [S]) {
         let range = self.layout.range(value, self.lanes);
         let (before, rest) = self.numbers.split_at_mut(range.start);

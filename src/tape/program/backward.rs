@@ -11,7 +11,7 @@ pub(in crate::tape) const PARAMETERS: u8 = 2;
 
 /// Values of the forward replay and the adjoints being gathered.
 pub(in crate::tape) struct Sweep<'a, S> {
-    /// What each row depends on: bits of [`INPUTS`] and [`PARAMETERS`].
+    /// Dependence of each row: bits of [`INPUTS`] and [`PARAMETERS`].
     pub(in crate::tape) reach: &'a [u8],
     /// The adjoints asked for, the same bits: rows that reach none of them are left out.
     pub(in crate::tape) wanted: u8,

@@ -4,7 +4,7 @@ use super::{Instruction, LANES, Node, Row, elementary};
 use crate::ops::{Binary, Unary};
 use crate::scalar::{Scalar, vectorized};
 
-/// What an instruction may read besides the rows of its own section.
+/// Data that an instruction may read besides the rows of its own section.
 pub(super) struct Environment<'a, S> {
     /// Uniform rows (empty while they themselves are computed).
     pub(super) uniform: &'a [Row<S>],

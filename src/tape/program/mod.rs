@@ -41,7 +41,7 @@ pub(super) struct Instruction<S> {
 /// Only what the outputs need is kept, equal expressions are computed once, constants are folded.
 #[derive(Clone, Debug)]
 pub struct Program<S> {
-    /// What each row depends on, see [`Sweep::reach`].
+    /// Dependence of each row, see [`Sweep::reach`].
     pub(super) reach: Vec<u8>,
     /// Rows below are uniform over the lanes.
     pub(super) uniform_rows: usize,

@@ -78,7 +78,7 @@ impl<S> Node<S> {
     }
 }
 
-/// What identifies an expression.
+/// Identity of an expression.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 enum Key {
     Input(u32),
@@ -110,7 +110,7 @@ const PARAMETER: u32 = 1 << 31;
 pub struct Recorder<S> {
     graph: RefCell<Graph<S>>,
     error: Cell<Option<TapeError>>,
-    /// Whether dense layers are recorded as blocks.
+    /// `true` if dense layers are recorded as blocks.
     blocks: bool,
 }
 

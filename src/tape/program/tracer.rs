@@ -44,7 +44,7 @@ impl<'t, S: Scalar> Tracer<'t, S> {
     pub(super) fn constant_value(self) -> S {
         self.value
     }
-    /// Whether it is the constant `value`.
+    /// `true` if it is the constant `value`.
     fn is(self, value: f64) -> bool {
         self.recorder.is_none() && self.value == S::of_f64(value)
     }

@@ -20,7 +20,7 @@ const MAX_BYTES: u64 = 1 << 34;
 /// Writing takes at most one part in this many of the time between two checkpoints.
 const COST: u32 = 100;
 
-/// How often a checkpoint is written.
+/// Time between two checkpoints.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Every {
     /// When so many epochs have ended since the last.
@@ -30,7 +30,7 @@ pub enum Every {
     Seconds(f64),
 }
 
-/// What a training is of: it goes on only from a checkpoint of the same.
+/// Identity of a training, written into its checkpoints: a run resumes only from a checkpoint with the same identity.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Identity {
@@ -49,9 +49,9 @@ pub enum CheckpointError {
     /// Neither the newest checkpoint nor the one before can be read.
     #[error("{NEWEST}: {newest}; {PREVIOUS}: {previous}")]
     Damaged {
-        /// What is wrong with the newest.
+        /// Problem of the newest.
         newest: Box<ModelFileError>,
-        /// What is wrong with the one before.
+        /// Problem of the one before.
         previous: Box<ModelFileError>,
     },
     /// Written by another version.
@@ -68,12 +68,12 @@ pub enum CheckpointError {
     Data(String),
 }
 
-/// What was found to go on from.
+/// The checkpoint to go on from.
 #[derive(Clone, Debug)]
 pub struct Restored<T> {
     /// Content of the checkpoint.
     pub content: T,
-    /// What is wrong with the newest checkpoint, if the one before had to do.
+    /// Problem of the newest checkpoint, if the one before it had to serve.
     pub fallback: Option<String>,
 }
 
@@ -89,9 +89,9 @@ pub struct Keeper {
 struct State {
     /// When the last checkpoint was written or read, and the epochs completed then.
     last: Option<(Instant, usize)>,
-    /// How long it took.
+    /// Duration.
     cost: Duration,
-    /// Whether the newest checkpoint deserves to become the previous one.
+    /// `true` if the newest checkpoint deserves to become the previous one.
     keep: bool,
 }
 
@@ -102,7 +102,7 @@ impl Keeper {
         Self { files, directory: directory.to_path_buf(), every, identity, state: Mutex::new(state) }
     }
 
-    /// Whether a checkpoint is due between two steps of an epoch.
+    /// `true` if a checkpoint is due between two steps of an epoch.
     pub(in crate::training) fn is_due(&self) -> bool {
         let state = self.state();
         match (self.every, state.last) {
@@ -115,7 +115,7 @@ impl Keeper {
         }
     }
 
-    /// Whether a checkpoint is due when so many epochs have been completed.
+    /// `true` if a checkpoint is due when so many epochs have been completed.
     pub(in crate::training) fn is_due_after(&self, epochs: usize) -> bool {
         let last = self.state().last;
         match (self.every, last) {
@@ -200,7 +200,7 @@ pub fn remove_checkpoints(files: &dyn Files, directory: &Path) -> std::io::Resul
     Ok(())
 }
 
-/// What a checkpoint says without the numbers it holds.
+/// Header of a checkpoint, without its numbers.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Saved {
     /// Configuration of the training.

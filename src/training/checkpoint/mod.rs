@@ -64,7 +64,7 @@ impl<S> Snapshot<S> {
     pub fn steps(&self) -> usize {
         self.underway.as_ref().map_or(self.ended.steps, |underway| underway.course.step)
     }
-    /// Whether multiple shooting is under way, the training before it being over.
+    /// `true` if multiple shooting is under way, the training before it being over.
     pub fn is_shooting(&self) -> bool {
         self.underway.as_ref().is_some_and(|underway| underway.shooting.is_some())
     }
@@ -74,12 +74,12 @@ impl<S> Snapshot<S> {
     }
 }
 
-/// What the phases that have ended came to.
+/// Result of the phases that have ended.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Ended<S> {
-    /// How many have ended.
+    /// Number of phases that have ended.
     pub phases: usize,
-    /// Whether polishing has ended too.
+    /// `true` if polishing has ended too.
     pub polished: bool,
     /// Parameters of the best epoch; the initial ones if there is none.
     pub weights: Vec<S>,
@@ -114,7 +114,7 @@ pub(super) struct Underway<S> {
     pub best_loss: f64,
     /// The best epoch of the phase, counted from 0.
     pub best_epoch: u64,
-    /// What multiple shooting needs beside that; `None` for a phase.
+    /// State of multiple shooting beside that; `None` for a phase.
     pub shooting: Option<Shot<S>>,
 }
 
@@ -136,7 +136,7 @@ pub(super) struct Shot<S> {
     pub jacobian: Vec<S>,
 }
 
-/// What moves from step to step within a phase; the states of multiple shooting are segments.
+/// State that moves from step to step within a phase; the states of multiple shooting are segments.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Course<S> {
     /// Draws the order of every epoch.

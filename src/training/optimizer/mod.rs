@@ -119,7 +119,7 @@ impl<S: Scalar> Moments<S> {
         Self { bases: blocks.into_iter().map(Eigenbasis::new).collect(), ..Self::new(parameters) }
     }
 
-    /// What a checkpoint keeps.
+    /// State of the optimiser as a checkpoint keeps it.
     pub(super) fn stored(&self) -> Stored<'_, S> {
         let mut bases = Vec::new();
         self.bases.iter().for_each(|basis| basis.store(&mut bases));

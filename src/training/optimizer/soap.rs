@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 
 /// Steps between two looks at the eigenvectors.
 const EVERY: u32 = 10;
-/// What a step leaves of the running means.
+/// Running means after a step.
 const KEEP: f64 = 0.95;
 /// Sides longer than this are not turned.
 const LONGEST: usize = 1024;
@@ -44,7 +44,7 @@ impl Block {
         blocks.iter().map(of).try_fold(0_usize, |sum, numbers: usize| sum.checked_add(numbers))
     }
 
-    /// Whether the matrices, in order, lie side by side within this many parameters.
+    /// `true` if the matrices, in order, lie side by side within this many parameters.
     pub(super) fn fit(blocks: &[Self], parameters: usize) -> bool {
         let end = blocks.iter().try_fold(0, |end, block| {
             let next = block.rows.checked_mul(block.cols).and_then(|size| block.start.checked_add(size));

@@ -16,7 +16,7 @@ use argmin::core::observers::ObserverMode;
 use argmin::core::{Executor, State, TerminationReason, TerminationStatus};
 use thiserror::Error;
 
-/// What is fitted to what.
+/// A network and the recorded motion it is fitted to.
 #[derive(Clone, Debug)]
 pub struct Task<'a, S> {
     /// Shape of the network.
@@ -76,9 +76,9 @@ pub enum ShootingError {
     Estimate {
         /// Which numbers.
         what: String,
-        /// What would have been right.
+        /// Values that are allowed.
         expected: String,
-        /// What is there.
+        /// The value found.
         found: String,
     },
     /// No two samples follow each other closely enough for a segment.

@@ -18,7 +18,7 @@ const CHUNK: usize = 8;
 /// Stripes a batch is cut into at most; each has its own gradient.
 const STRIPES: usize = 8;
 
-/// What a batch of segments came to.
+/// Outcome of a batch of segments.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ShotReport<S> {
     /// Mean of `rho` over the residuals that count, 1 where only noise is left; `NaN` if none does.
@@ -244,7 +244,7 @@ impl<S: Scalar> Shots<S> {
         Ok(Self { model: architecture.model(), penalty, huber, continuity, pool, stripes: Vec::new() })
     }
 
-    /// What is trained.
+    /// The model that is trained.
     pub(super) fn model(&self) -> &Model<S> {
         &self.model
     }

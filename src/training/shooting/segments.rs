@@ -15,7 +15,7 @@ use std::ops::Range;
 /// A recorded trajectory with the states that were estimated from it, by smoothing for instance.
 #[derive(Clone, Copy, Debug)]
 pub struct Estimated<'a> {
-    /// What was measured.
+    /// Measured values.
     pub track: &'a Track,
     /// Estimated positions, `(samples, n)` in physical units, unwrapped as in the track.
     pub q: &'a [f64],
@@ -44,11 +44,11 @@ pub(super) struct Segment<S> {
     pub step: S,
     /// Seconds from its start to its end.
     pub duration: f64,
-    /// Whether the next segment of the list goes on where this one ends.
+    /// `true` if the next segment of the list goes on where this one ends.
     pub has_next: bool,
-    /// Whether the one before ends where this one starts.
+    /// `true` if the one before ends where this one starts.
     pub has_previous: bool,
-    /// Whether its velocities were measured.
+    /// `true` if its velocities were measured.
     pub has_velocity: bool,
     /// Scaled origin of the next segment's positions, seen from this one's, `(n)`.
     pub jump: Vec<S>,
@@ -89,7 +89,7 @@ pub struct Segments<S> {
     /// Tolerances `tau` of positions and velocities, `(2, n)`: their noise, that of velocities if not measured by the ratio
     /// of the spreads of velocities and positions.
     pub(super) tau: Vec<S>,
-    /// How far positions may go from the start, and velocities from zero, `(2, n)`.
+    /// Bounds of the distance of positions from the start and of velocities from zero, `(2, n)`.
     pub(super) range: Vec<S>,
     /// Estimated starts, `(segments, 2, n)`.
     starts: Vec<S>,
@@ -240,7 +240,7 @@ impl<S: Scalar> Segments<S> {
     pub fn len(&self) -> usize {
         self.list.len()
     }
-    /// Whether there is no segment.
+    /// `true` if there is no segment.
     pub fn is_empty(&self) -> bool {
         self.list.is_empty()
     }

@@ -4,7 +4,7 @@ use crate::training::config::{ConfigError, Faults};
 use crate::training::optimizer::Method;
 use serde::{Deserialize, Serialize};
 
-/// How a network is fitted through its motion. Keys that are not given have their defaults; others are refused.
+/// Choices of a fit through motion. Keys that are not given have their defaults; others are refused.
 ///
 /// | Name | Default | Purpose | Range |
 /// |---|---|---|---|

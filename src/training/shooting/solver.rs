@@ -20,7 +20,7 @@ const LEFT_OUT: usize = 20;
 /// Gauss-Newton steps of all starts before the first epoch.
 const PREPARATION: usize = 3;
 
-/// What argmin solves.
+/// Problem of an argmin run.
 pub(super) struct ShootingProblem<S> {
     pub shots: Shots<S>,
     pub training: Segments<S>,
@@ -54,7 +54,7 @@ pub(super) struct ShootingSolver<S> {
     validation_starts: Starts<S>,
     /// Sum of the gaps over the batches of the epoch.
     gap: f64,
-    /// Whether the course began in an earlier sitting.
+    /// `true` if the course began in an earlier sitting.
     restored: bool,
     clock: Clock,
     saver: Option<Saver<S>>,

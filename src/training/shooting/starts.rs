@@ -35,7 +35,7 @@ impl<S> Default for Linearisation<S> {
 }
 
 impl<S: Scalar> Linearisation<S> {
-    /// How far component `k` is moved.
+    /// Step of component `k`.
     pub fn difference(&self, segments: &Segments<S>, k: usize) -> S {
         S::epsilon().sqrt() * S::of_f64(DIFFERENCE) * segments.range[k]
     }
@@ -142,7 +142,7 @@ impl<S: Scalar> Curvature<S> {
         (&self.matrices, &self.jacobian)
     }
 
-    /// What [`stored`](Self::stored) gave; `None` if it is not of these segments.
+    /// The starts that [`stored`](Self::stored) gave; `None` if they are not of these segments.
     pub(super) fn restore(segments: &Segments<S>, matrices: &[S], jacobian: &[S]) -> Option<Self> {
         let width = 2 * segments.n;
         let rows = |k: usize| segments.residuals(k) + if segments.list[k].has_next { width } else { 0 };

@@ -246,7 +246,9 @@ fn every_structure_agrees_with_nested_forward_numbers() {
         assert_eq!(architecture.validate(), Ok(()));
         let mut rng = ChaCha8Rng::seed_from_u64(k as u64);
         let weights: Vec<f64> = initial_weights(&architecture, Initialization::Default, &mut rng);
-        assert_eq!(weights.len(), Layout::new(&architecture).parameters);
+        let layout = Layout::new(&architecture);
+        assert_eq!(weights.len(), layout.parameters);
+        assert_eq!(architecture.model::<f64>().matrices(), layout.matrices().collect::<Vec<_>>());
         let scale = architecture.scale.clone();
         check::<_, f64>(&architecture, &scale, &weights, k as u64);
         check::<_, Dd>(&architecture, &scale, &weights, k as u64);

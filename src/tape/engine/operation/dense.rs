@@ -86,29 +86,29 @@ impl Dense {
     }
 
     pub fn reverse<S: Scalar>(self, out: usize, sweep: &mut Reverse<'_, S>) {
-        let accumulate = !sweep.values[self.x].overwritten;
+        let accumulate = !sweep.kept.values[self.x].overwritten;
         let (mut before, adjoint) = sweep.adjoints.reverse(out);
-        self.pull_back(sweep.parameters, before.lanes, accumulate, adjoint, before.plane_mut(self.x, 0));
+        self.pull_back(sweep.kept.parameters, before.lanes, accumulate, adjoint, before.plane_mut(self.x, 0));
     }
 
     /// The mixed channel is a product; the directions' channels are combinations of tangents already there.
     pub fn mixed<S: Scalar>(self, out: usize, sweep: &mut MixedForward<'_, S>) {
         let lanes = sweep.mixed.lanes;
-        let [own, from] = [out, self.x].map(|value| sweep.values[value].mixed(sweep.order));
+        let [own, from] = [out, self.x].map(|value| sweep.kept.values[value].mixed(sweep.order));
         if let (Some(to), true) = (from.value, own.value.is_some()) {
-            sweep.mixed.plane_mut(self.x, to).copy_from_slice(sweep.forward.plane(self.x, 0));
+            sweep.mixed.plane_mut(self.x, to).copy_from_slice(sweep.kept.forward.plane(self.x, 0));
         }
         let (before, planes) = sweep.mixed.split(out);
         let size = lanes * self.outputs;
         if let (Some(to), Some(from)) = (own.st, from.st) {
-            self.apply(sweep.parameters, lanes, before.plane(self.x, from), &mut planes[to * size..][..size]);
+            self.apply(sweep.kept.parameters, lanes, before.plane(self.x, from), &mut planes[to * size..][..size]);
         }
         if sweep.order == Order::First {
             return;
         }
         let Mixed { s, t, .. } = own;
-        let (forward, directions, n) = (sweep.forward, sweep.directions, sweep.scale.len());
-        let velocities = &sweep.values[out].velocities;
+        let (forward, directions, n) = (sweep.kept.forward, sweep.directions, sweep.kept.scale.len());
+        let velocities = &sweep.kept.values[out].velocities;
         let moving = directions.moving;
         vectorized(
             #[inline(always)]
@@ -146,7 +146,7 @@ impl Dense {
         if let Some(st) = own.st {
             sweep.adjoints.plane_mut(out, st).copy_from_slice(sweep.value_adjoints.plane(out, 0));
         }
-        let accumulate = !sweep.values[self.x].overwritten;
+        let accumulate = !sweep.kept.values[self.x].overwritten;
         let wanted = sweep.wants(self.x);
         let (mut before, adjoints) = sweep.adjoints.reverse(out);
         let x = sweep.mixed.all(self.x);
@@ -167,7 +167,7 @@ impl Dense {
             // The adjoint of the mixed channel, which comes last, is that of the value and known already.
             let rows = (own.count - usize::from(own.st.is_some())) * lanes;
             let below = &mut before.all_mut(self.x)[..rows * self.inputs];
-            self.pull_back(sweep.parameters, rows, accumulate, &adjoints[..rows * self.outputs], below);
+            self.pull_back(sweep.kept.parameters, rows, accumulate, &adjoints[..rows * self.outputs], below);
         }
     }
 }

@@ -76,8 +76,8 @@ impl Elementwise {
     }
 
     pub fn reverse<S: Scalar>(self, out: usize, sweep: &mut Reverse<'_, S>) {
-        let [d1, d2, _] = self.slopes(sweep.slopes, sweep.adjoints.lanes);
-        let overwritten = sweep.values[self.x].overwritten;
+        let [d1, d2, _] = self.slopes(sweep.kept.slopes, sweep.adjoints.lanes);
+        let overwritten = sweep.kept.values[self.x].overwritten;
         let (mut before, adjoint) = sweep.adjoints.reverse(out);
         let target = before.plane_mut(self.x, 0);
         vectorized(
@@ -88,24 +88,24 @@ impl Elementwise {
                 }
             },
         );
-        if sweep.depth < Depth::MassMatrix || sweep.values[self.x].kind != Kind::Velocity {
+        if sweep.depth < Depth::MassMatrix || sweep.kept.values[self.x].kind != Kind::Velocity {
             return;
         }
         if self.units == 1 {
             let lanes = adjoint.len();
-            let mut curvature = [<S as Real>::zero(); crate::tape::engine::LANES];
+            let mut curvature = [<S as Real>::zero(); crate::tape::engine::STATES];
             curvature.iter_mut().zip(adjoint).zip(d2).for_each(|((c, &a), &d2)| *c = a * d2);
-            sweep.second.add_square(self.x, sweep.forward, &curvature[..lanes]);
+            sweep.second.add_square(self.x, sweep.kept.forward, &curvature[..lanes]);
         } else {
-            sweep.second.add_block((self.x, self.units), sweep.forward, adjoint, d2);
+            sweep.second.add_block((self.x, self.units), sweep.kept.forward, adjoint, d2);
         }
     }
 
     pub fn mixed<S: Scalar>(self, out: usize, sweep: &mut MixedForward<'_, S>) {
         let lanes = sweep.mixed.lanes;
         let size = self.units * lanes;
-        let [d1, d2, _] = self.slopes(sweep.slopes, lanes);
-        let [own, from] = [out, self.x].map(|value| sweep.values[value].mixed(sweep.order));
+        let [d1, d2, _] = self.slopes(sweep.kept.slopes, lanes);
+        let [own, from] = [out, self.x].map(|value| sweep.kept.values[value].mixed(sweep.order));
         let (before, all) = sweep.mixed.split(out);
         let [_, ys, yt, yst] = planes_mut(all, own, size);
         let [_, xs, xt, xst] = planes(before.all(self.x), from, size);
@@ -133,9 +133,9 @@ impl Elementwise {
         }
         let lanes = sweep.adjoints.lanes;
         let size = self.units * lanes;
-        let [d1, d2, d3] = self.slopes(sweep.slopes, lanes);
+        let [d1, d2, d3] = self.slopes(sweep.kept.slopes, lanes);
         let [own, from] = [out, self.x].map(|value| sweep.channels(value));
-        let overwritten = sweep.values[self.x].overwritten;
+        let overwritten = sweep.kept.values[self.x].overwritten;
         let outer = sweep.value_adjoints.plane(out, 0);
         let [_, xs, xt, xst] = planes(sweep.mixed.all(self.x), from, size);
         let (mut before, adjoints) = sweep.adjoints.reverse(out);

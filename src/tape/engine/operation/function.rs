@@ -5,7 +5,7 @@ use crate::ops::Binary;
 use crate::scalar::{Real, Scalar};
 use crate::tape::engine::jets::partials;
 use crate::tape::engine::kernel::{add_product, add_product3};
-use crate::tape::engine::{Depth, LANES};
+use crate::tape::engine::{Depth, STATES};
 
 /// `f(a, b)`.
 #[derive(Clone, Copy, Debug)]
@@ -46,8 +46,8 @@ impl Function {
     }
 
     pub fn reverse<S: Scalar>(self, out: usize, sweep: &mut Reverse<'_, S>) {
-        let (forward, lanes) = (sweep.forward, sweep.adjoints.lanes);
-        let [fa, fb, aa, ab, bb, ..] = self.planes(sweep.partials, lanes);
+        let (forward, lanes) = (sweep.kept.forward, sweep.adjoints.lanes);
+        let [fa, fb, aa, ab, bb, ..] = self.planes(sweep.kept.partials, lanes);
         let (mut before, adjoint) = sweep.adjoints.reverse(out);
         add_product(before.plane_mut(self.a, 0), adjoint, fa);
         add_product(before.plane_mut(self.b, 0), adjoint, fb);
@@ -60,8 +60,8 @@ impl Function {
 
     pub fn mixed<S: Scalar>(self, out: usize, sweep: &mut MixedForward<'_, S>) {
         let lanes = sweep.mixed.lanes;
-        let [to, ca, cb] = [out, self.a, self.b].map(|value| sweep.values[value].mixed(sweep.order));
-        let [fa, fb, aa, ab, bb, ..] = self.planes(sweep.partials, lanes);
+        let [to, ca, cb] = [out, self.a, self.b].map(|value| sweep.kept.values[value].mixed(sweep.order));
+        let [fa, fb, aa, ab, bb, ..] = self.planes(sweep.kept.partials, lanes);
         let (before, planes) = sweep.mixed.split(out);
         planes.fill(<S as Real>::zero());
         let of = |value: usize, channel: Option<usize>| channel.map(|channel| before.plane(value, channel));
@@ -87,7 +87,7 @@ impl Function {
     }
 
     pub fn mixed_reverse<S: Scalar>(self, out: usize, sweep: &mut MixedReverse<'_, S>) {
-        let [fa, fb, aa, ab, bb, aaa, aab, abb, bbb] = self.planes(sweep.partials, sweep.adjoints.lanes);
+        let [fa, fb, aa, ab, bb, aaa, aab, abb, bbb] = self.planes(sweep.kept.partials, sweep.adjoints.lanes);
         if sweep.wants(self.a) {
             add_to_operand((self.a, self.b), [fa, aa, ab, aaa, aab, abb], out, sweep);
         }
@@ -98,8 +98,8 @@ impl Function {
 }
 
 /// `w d` of every lane; 0 past their number.
-fn weighted<S: Scalar>(w: &[S], d: &[S]) -> [S; LANES] {
-    let mut product = [<S as Real>::zero(); LANES];
+fn weighted<S: Scalar>(w: &[S], d: &[S]) -> [S; STATES] {
+    let mut product = [<S as Real>::zero(); STATES];
     product.iter_mut().zip(w).zip(d).for_each(|((product, &w), &d)| *product = w * d);
     product
 }

@@ -49,7 +49,7 @@ impl Gather {
     }
 
     pub fn mixed<S: Scalar>(&self, out: usize, sweep: &mut MixedForward<'_, S>) {
-        let (order, values, lanes) = (sweep.order, sweep.values, sweep.mixed.lanes);
+        let (order, values, lanes) = (sweep.order, sweep.kept.values, sweep.mixed.lanes);
         let own = values[out].mixed(order);
         let (before, planes) = sweep.mixed.split(out);
         let size = self.sources.len() * lanes;

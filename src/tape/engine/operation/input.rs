@@ -34,11 +34,11 @@ impl Input {
 
     /// `x_s = (0, s)`, `x_t = tau (v, 0) + (0, t)`, `x_st = -tau (s, 0)`; a first derivative has `x_st = (0, s)`.
     pub fn mixed<S: Scalar>(self, out: usize, sweep: &mut MixedForward<'_, S>) {
-        let n = sweep.scale.len();
-        let channels = sweep.values[out].mixed(sweep.order);
+        let n = sweep.kept.scale.len();
+        let channels = sweep.kept.values[out].mixed(sweep.order);
         let (directions, zero) = (sweep.directions, <S as Real>::zero());
         let (position, column) = (self.index < n, self.index % n);
-        let scale = sweep.scale[column];
+        let scale = sweep.kept.scale[column];
         let mut place = |channel: Option<usize>, field: &[S], factor: S| {
             if let Some(channel) = channel {
                 let plane = sweep.mixed.plane_mut(out, channel);
@@ -62,10 +62,10 @@ impl Input {
 
     /// Adjoints of the scaled state; the second direction holds `v` itself if it is moving.
     pub fn mixed_reverse<S: Scalar>(self, out: usize, sweep: &mut MixedReverse<'_, S>) {
-        let n = sweep.scale.len();
+        let n = sweep.kept.scale.len();
         let channels = sweep.channels(out);
         let (position, column) = (self.index < n, self.index % n);
-        let scale = sweep.scale[column];
+        let scale = sweep.kept.scale[column];
         let Some((dq, dv)) = &mut sweep.inputs else { return };
         let mut add = |field: &mut [S], channel: Option<usize>| {
             if let Some(channel) = channel {

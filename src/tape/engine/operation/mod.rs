@@ -17,6 +17,7 @@ mod elementwise;
 mod function;
 mod gather;
 mod input;
+mod linear;
 mod product;
 mod select;
 
@@ -66,16 +67,16 @@ impl<S> Operation<S> {
             Self::Input(_) | Self::Parameter(_) | Self::Constant(_) => {}
             Self::Elementwise(op) => visit(op.x),
             Self::Product(op) => [op.a, op.b].into_iter().for_each(visit),
-            Self::Combination(op) => [Some(op.a), op.b.as_ref().map(|b| b.0)].into_iter().flatten().for_each(visit),
+            Self::Combination(op) => op.operands().iter().copied().for_each(visit),
             Self::Function(op) => [op.a, op.b].into_iter().for_each(visit),
-            Self::Select(op) => [op.condition, op.a, op.b].into_iter().for_each(visit),
+            Self::Select(op) => std::iter::once(op.condition).chain(op.branches).for_each(visit),
             Self::Dense(op) => visit(op.x),
             Self::Gather(op) => op.sources.iter().for_each(|&(value, _)| visit(value)),
         }
     }
 }
 
-/// What the forward sweep reads and writes.
+/// Data of the forward sweep.
 pub(super) struct Forward<'a, S> {
     pub values: &'a [Value],
     pub store: Store<'a, S>,
@@ -88,52 +89,48 @@ pub(super) struct Forward<'a, S> {
     pub scale: &'a [S],
 }
 
-/// What the reverse sweep of the value reads and writes.
-pub(super) struct Reverse<'a, S> {
+/// The forward sweep as it was left for the sweeps after it.
+pub(super) struct Kept<'a, S> {
     pub values: &'a [Value],
     pub forward: View<'a, S>,
-    /// `dL/dy` of every value.
-    pub adjoints: Store<'a, S>,
-    pub depth: Depth,
     pub slopes: &'a [Vec<S>; 3],
     pub partials: &'a [S],
     pub parameters: &'a [S],
-    pub second: &'a mut Second<S>,
-}
-
-/// What the mixed sweep reads and writes.
-pub(super) struct MixedForward<'a, S> {
-    pub values: &'a [Value],
-    pub forward: View<'a, S>,
-    pub mixed: Store<'a, S>,
-    pub order: Order,
-    pub slopes: &'a [Vec<S>; 3],
-    pub partials: &'a [S],
-    pub parameters: &'a [S],
-    pub directions: &'a MixedDirections<S>,
-    /// Velocities.
-    pub v: &'a [S],
     pub scale: &'a [S],
 }
 
-/// What the reverse of the mixed sweep reads and writes.
+/// Data of the reverse sweep of the value.
+pub(super) struct Reverse<'a, S> {
+    pub kept: Kept<'a, S>,
+    /// `dL/dy` of every value.
+    pub adjoints: Store<'a, S>,
+    pub depth: Depth,
+    pub second: &'a mut Second<S>,
+}
+
+/// Data of the mixed sweep.
+pub(super) struct MixedForward<'a, S> {
+    pub kept: Kept<'a, S>,
+    pub mixed: Store<'a, S>,
+    pub order: Order,
+    pub directions: &'a MixedDirections<S>,
+    /// Velocities.
+    pub v: &'a [S],
+}
+
+/// Data of the reverse of the mixed sweep.
 pub(super) struct MixedReverse<'a, S> {
-    pub values: &'a [Value],
-    pub forward: View<'a, S>,
+    pub kept: Kept<'a, S>,
     /// `dL/dy` of every value.
     pub value_adjoints: View<'a, S>,
     pub mixed: View<'a, S>,
     pub adjoints: Store<'a, S>,
     pub order: Order,
-    pub slopes: &'a [Vec<S>; 3],
-    pub partials: &'a [S],
-    pub parameters: &'a [S],
     pub gradient: &'a mut [S],
     /// Derivatives by the scaled state, `(lanes, n)` each, if they are asked for.
     pub inputs: Option<(&'a mut [S], &'a mut [S])>,
-    /// Whether the second direction moves along `(v, 0)`.
+    /// `true` if the second direction moves along `(v, 0)`.
     pub moving: bool,
-    pub scale: &'a [S],
 }
 
 /// Calls the rule of whichever operation it is.
@@ -173,7 +170,7 @@ impl<S: Scalar> Operation<S> {
     /// Adjoints of the operands' mixed channels.
     pub fn mixed_reverse(&self, out: usize, sweep: &mut MixedReverse<'_, S>) {
         let parameter = |index: usize, out: usize, sweep: &mut MixedReverse<'_, S>| {
-            if let Some(value) = sweep.values[out].mixed(sweep.order).value {
+            if let Some(value) = sweep.channels(out).value {
                 sweep.gradient[index] += super::kernel::sum(sweep.adjoints.plane_mut(out, value));
             }
         };
@@ -182,13 +179,13 @@ impl<S: Scalar> Operation<S> {
 }
 
 impl<S: Scalar> MixedReverse<'_, S> {
-    /// Whether adjoints of a value lead to anything asked for.
+    /// `true` if adjoints of a value lead to anything asked for.
     pub fn wants(&self, value: usize) -> bool {
-        let value = &self.values[value];
+        let value = &self.kept.values[value];
         value.learned || (self.inputs.is_some() && value.kind != Kind::Constant)
     }
     pub fn channels(&self, value: usize) -> Mixed {
-        self.values[value].mixed(self.order)
+        self.kept.values[value].mixed(self.order)
     }
 }
 

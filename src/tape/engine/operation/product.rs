@@ -29,7 +29,7 @@ impl Product {
     }
 
     pub fn reverse<S: Scalar>(self, out: usize, sweep: &mut Reverse<'_, S>) {
-        let forward = sweep.forward;
+        let forward = sweep.kept.forward;
         let (mut before, adjoint) = sweep.adjoints.reverse(out);
         add_if(before.plane_mut(self.a, 0), adjoint, Some(forward.plane(self.b, 0)));
         add_if(before.plane_mut(self.b, 0), adjoint, Some(forward.plane(self.a, 0)));
@@ -39,8 +39,8 @@ impl Product {
     }
 
     pub fn mixed<S: Scalar>(self, out: usize, sweep: &mut MixedForward<'_, S>) {
-        let (forward, lanes) = (sweep.forward, sweep.mixed.lanes);
-        let [to, ca, cb] = [out, self.a, self.b].map(|value| sweep.values[value].mixed(sweep.order));
+        let (forward, lanes) = (sweep.kept.forward, sweep.mixed.lanes);
+        let [to, ca, cb] = [out, self.a, self.b].map(|value| sweep.kept.values[value].mixed(sweep.order));
         let (before, planes) = sweep.mixed.split(out);
         planes.fill(<S as Real>::zero());
         let of = |value: usize, channel: Option<usize>| channel.map(|channel| before.plane(value, channel));
@@ -71,7 +71,7 @@ impl Product {
 /// Adjoints of the factor `x`, which stands beside `y`.
 fn add_to_factor<S: Scalar>((x, y): (usize, usize), out: usize, sweep: &mut MixedReverse<'_, S>) {
     let [own, cx, cy] = [out, x, y].map(|value| sweep.channels(value));
-    let (factor, mixed, lanes) = (sweep.forward.plane(y, 0), sweep.mixed, sweep.adjoints.lanes);
+    let (factor, mixed, lanes) = (sweep.kept.forward.plane(y, 0), sweep.mixed, sweep.adjoints.lanes);
     let of_y = |channel: Option<usize>| channel.map(|channel| mixed.plane(y, channel));
     let outer = sweep.value_adjoints.plane(out, 0);
     let (mut before, adjoints) = sweep.adjoints.reverse(out);
