@@ -226,8 +226,8 @@ impl<S: Scalar> EulerLagrange<S> for NetworkLagrangian<S> {
         let weights: Vec<Taylor<'static, S>> = self.weights.iter().map(|&w| Taylor::constant(w)).collect();
         let mut wrapped = q.to_vec();
         self.model.wrap(&mut wrapped);
-        let lagrangian = |q: &[Taylor<'_, S>], v: &[Taylor<'_, S>]| self.architecture.lagrangian(&weights, q, v);
-        metric_jets(self.architecture.coordinates, (&wrapped, v), lagrangian)
+        let n = self.architecture.coordinates;
+        metric_jets(n, (&wrapped, v), |q, v| self.architecture.lagrangian(&weights, q, v))
     }
 
     fn conserves_energy(&self) -> bool {
