@@ -8,6 +8,8 @@
 mod layer;
 mod number;
 mod polynomials;
+#[cfg(test)]
+mod tests;
 
 use crate::scalar::{Real, Scalar};
 use polynomials::{DEGREE, Degrees, Variables, pair};
