@@ -21,6 +21,7 @@
 //! |---|---|
 //! | write a Lagrangian, or take one of the catalogue | [`lagrangian::Lagrangian`], [`lagrangian::systems()`] |
 //! | get `L`, `p`, `M`, `a`, `E` of states | [`lagrangian::EulerLagrange::terms`] |
+//! | know metric, connection and curvature at a point | [`geometry::geometries`] |
 //! | integrate, with error control or symplectically | [`rollout::rollout`], [`rollout::rollout_many`] |
 //! | learn from accelerations | [`training::run`] (a configuration), [`training::train`] (your own [`training::Dataset`]) |
 //! | know every key of a configuration | [`training::configuration_reference`], [`training::TRAINING_SECTIONS`] |
@@ -31,7 +32,7 @@
 //! | judge a model: energy, coordinates, Lyapunov exponents | [`analysis`] |
 //!
 //! Rooms, each importing only from those above it: [`names`], [`storage`], [`scalar`], [`ops`], [`forward`], [`linalg`], [`tape`],
-//! [`recording`], [`lagrangian`], [`rollout`], [`network`], [`training`], [`analysis`], [`experiments`], `report` (feature
+//! [`recording`], [`lagrangian`], [`geometry`], [`rollout`], [`network`], [`training`], [`analysis`], [`experiments`], `report` (feature
 //! `plot`), `cli` (feature `cli`, the default; a library user leaves it out by `default-features = false`).
 //!
 //! # Shapes, units, numbers
@@ -149,6 +150,8 @@ pub mod tape;
 pub mod recording;
 
 pub mod lagrangian;
+
+pub mod geometry;
 
 pub mod network;
 

@@ -26,6 +26,7 @@ mod fit_summary;
 mod folder;
 mod forces;
 mod foretell;
+mod geometry;
 mod headline;
 mod holder;
 mod input;
@@ -113,6 +114,8 @@ enum Command {
     Experiment(experiment::Args),
     /// Print the Euler-Lagrange terms of states, every digit of them.
     Inspect(inspect::Args),
+    /// Print metric, Christoffel symbols and curvature of points, every digit of them.
+    Geometry(geometry::Args),
     /// Print a script that completes commands and options in a shell.
     Completions(manual::CompletionsArgs),
     /// Print the manual page of the program or of a command.
@@ -166,6 +169,7 @@ fn run(command: Command, words: &[OsString]) -> Result<(), CliError> {
         Command::Evaluate(args) => evaluate::run(&args),
         Command::Experiment(args) => experiment::run(&args),
         Command::Inspect(args) => inspect::run(&args),
+        Command::Geometry(args) => geometry::run(&args),
         Command::Completions(args) => manual::completions(&args, Cli::command()),
         Command::Man(args) => manual::man(&args, Cli::command()),
     }

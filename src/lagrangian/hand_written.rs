@@ -1,7 +1,8 @@
 //! A Lagrangian written by hand, with values for its parameters, as a source of Euler-Lagrange terms.
 
 use super::derivatives::{Need, State, evaluate};
-use super::{EulerLagrange, Lagrangian, MechanicsError, Request, Terms};
+use super::taylor::Taylor;
+use super::{EulerLagrange, Lagrangian, MechanicsError, MetricJet, Request, Terms, metric_jets};
 use crate::linalg::Workspace;
 use crate::scalar::{Real, Scalar};
 use crate::tape::{self, Evaluation, Program, Replay, STATES, TapeError, Tracer};
@@ -116,13 +117,20 @@ impl<L: Lagrangian, S: Scalar> HandWritten<L, S> {
 impl<S: Scalar> Evaluator<S> {
     /// The program of the value, recorded on first use.
     fn value(&self, form: &dyn Form<S>) -> Option<&Recorded<S>> {
-        self.value.get_or_init(|| form.value(self.parameters.len()).ok().map(|value| Recorded { value })).as_ref()
+        let count = self.parameters.len();
+        self.value.get_or_init(|| form.value(count).ok().map(|value| Recorded { value })).as_ref()
+    }
+
+    /// The metric jets of a batch, by the program of the value.
+    fn metric_jets(&self, form: &dyn Form<S>, q: &[S], v: &[S]) -> Result<Vec<MetricJet<S>>, MechanicsError> {
+        let value = self.value(form).ok_or(MechanicsError::Derivatives { what: "mass matrix" })?;
+        let parameters: Vec<Taylor<'static, S>> = self.parameters.iter().map(|&p| Taylor::constant(p)).collect();
+        metric_jets(form.coordinates(), (q, v), |q, v| value.lagrangian(&parameters, q, v))
     }
 
     /// The program that computes what is needed, recorded on first use.
     fn program(&self, form: &dyn Form<S>, need: Need) -> Option<Arc<Program<S>>> {
-        let count = self.parameters.len();
-        let value = self.value(form)?;
+        let (value, count) = (self.value(form)?, self.parameters.len());
         let recorded = self.programs[need.index()].get_or_init(|| {
             let n = Lagrangian::coordinates(value);
             let record = Program::record(2 * n, count, |inputs, parameters| {
@@ -272,5 +280,9 @@ impl<L: Lagrangian, S: Scalar> EulerLagrange<S> for HandWritten<L, S> {
 
     fn terms(&self, q: &[S], v: &[S], request: Request, terms: &mut Terms<S>) -> Result<(), MechanicsError> {
         self.evaluator.terms(&self.system, q, v, request, terms)
+    }
+
+    fn metric_jets(&self, q: &[S], v: &[S]) -> Result<Vec<MetricJet<S>>, MechanicsError> {
+        self.evaluator.metric_jets(&self.system, q, v)
     }
 }

@@ -11,8 +11,10 @@ mod expression;
 mod expression_lagrangian;
 mod hand_written;
 mod inverse;
+mod metric;
 pub mod system;
 pub mod systems;
+mod taylor;
 mod terms;
 
 pub use catalogue::{
@@ -25,6 +27,9 @@ pub use expression::{Expression, ExpressionError};
 pub use expression_lagrangian::ExpressionLagrangian;
 pub use hand_written::HandWritten;
 pub use inverse::{InverseDynamics, inverse_dynamics};
+pub use metric::MetricJet;
+pub(crate) use metric::metric_jets;
+pub(crate) use taylor::Taylor;
 pub use terms::{EulerLagrange, MechanicsError, Request, Terms};
 
 use crate::scalar::Real;

@@ -5,6 +5,7 @@
 
 mod autodiff;
 mod common;
+mod geometry;
 mod house;
 mod linalg;
 mod mechanics;

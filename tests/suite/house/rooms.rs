@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Rooms from top to bottom; a file may name its own room and those before it.
-const ROOMS: [&str; 16] = [
+const ROOMS: [&str; 17] = [
     "names",
     "storage",
     "scalar",
@@ -15,6 +15,7 @@ const ROOMS: [&str; 16] = [
     "tape",
     "recording",
     "lagrangian",
+    "geometry",
     "rollout",
     "network",
     "training",

@@ -8,6 +8,7 @@ mod experiment;
 mod fit;
 mod fit_resume;
 mod forces;
+mod geometry;
 mod hostile;
 mod inspect;
 mod motion;
