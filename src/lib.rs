@@ -28,10 +28,11 @@
 //! | store and load models | [`network::file::ModelFile`] |
 //! | differentiate a function of yours | [`tape::gradient`], [`tape::hessian`]; over many states [`tape::Program`] |
 //! | solve small symmetric systems in batches | [`linalg`] |
+//! | find what a Lagrangian conserves, compare two Lagrangians | [`symmetry::symmetries`], [`symmetry::quadratic`], [`symmetry::compare`] |
 //! | judge a model: energy, coordinates, Lyapunov exponents | [`analysis`] |
 //!
 //! Rooms, each importing only from those above it: [`names`], [`storage`], [`scalar`], [`ops`], [`forward`], [`linalg`], [`tape`],
-//! [`recording`], [`lagrangian`], [`rollout`], [`network`], [`training`], [`analysis`], [`experiments`], `report` (feature
+//! [`recording`], [`lagrangian`], [`rollout`], [`network`], [`symmetry`], [`training`], [`analysis`], [`experiments`], `report` (feature
 //! `plot`), `cli` (feature `cli`, the default; a library user leaves it out by `default-features = false`).
 //!
 //! # Shapes, units, numbers
@@ -151,6 +152,9 @@ pub mod recording;
 pub mod lagrangian;
 
 pub mod network;
+
+#[cfg(feature = "rollout")]
+pub mod symmetry;
 
 #[cfg(feature = "training")]
 pub mod training;

@@ -6,8 +6,10 @@
 
 mod attention;
 mod changes;
+mod charges;
 mod check;
 mod chosen;
+mod compare;
 mod config;
 mod config_file;
 mod determined;
@@ -46,6 +48,7 @@ mod output;
 mod place;
 mod plain_name;
 mod print_config;
+mod probe;
 mod progress;
 mod recording_args;
 mod results;
@@ -58,6 +61,7 @@ mod spool;
 mod start;
 mod states;
 mod subject;
+mod symmetries;
 mod systems;
 mod taken;
 mod train;
@@ -113,6 +117,10 @@ enum Command {
     Experiment(experiment::Args),
     /// Print the Euler-Lagrange terms of states, every digit of them.
     Inspect(inspect::Args),
+    /// Find the symmetries of a Lagrangian and what its motion conserves.
+    Symmetries(symmetries::Args),
+    /// Say what two Lagrangians have in common beyond factor and gauge.
+    Compare(compare::Args),
     /// Print a script that completes commands and options in a shell.
     Completions(manual::CompletionsArgs),
     /// Print the manual page of the program or of a command.
@@ -166,6 +174,8 @@ fn run(command: Command, words: &[OsString]) -> Result<(), CliError> {
         Command::Evaluate(args) => evaluate::run(&args),
         Command::Experiment(args) => experiment::run(&args),
         Command::Inspect(args) => inspect::run(&args),
+        Command::Symmetries(args) => symmetries::run(&args),
+        Command::Compare(args) => compare::run(&args),
         Command::Completions(args) => manual::completions(&args, Cli::command()),
         Command::Man(args) => manual::man(&args, Cli::command()),
     }
