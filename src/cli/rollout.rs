@@ -129,9 +129,6 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     if args.json && standard {
         return Err(CliError::usage("--json: the trajectory takes standard output (--out -)"));
     }
-    if args.charges && args.forces.files().next().is_some() {
-        return Err(CliError::usage("--charges: forces from outside change them; leave the forces out"));
-    }
     let (q, v) = args.state.split_at(columns.len() / 2);
     let method = Method::from(args.method);
     if args.step.is_some() && !method.is_structure_preserving() {
@@ -162,6 +159,9 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         check_target(plot).map_err(|e| CliError::file(plot, format_args!("cannot write: {e}")))?;
     }
     let force = args.forces.force(&columns[..q.len()], &subject.forces, args.t_start, args.t_end)?;
+    if args.charges && force.is_some() {
+        return Err(CliError::usage("--charges: forces from outside change them; leave the forces out"));
+    }
     let mut target = Target::create(&args.out, standard)?;
     let header = Trajectory { energy: Some(vec![]), ..Trajectory::<f64>::empty(q.len()) };
     target.append(&header.csv_header(columns).map_err(CliError::data)?)?;

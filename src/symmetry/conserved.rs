@@ -242,8 +242,9 @@ fn search(
         told.vectors.iter().map(|vector| plain.given(&mix(vector, zero), values.len())).collect();
     let sizes: Vec<f64> = values.iter().map(|value| norm(value)).collect();
     reduce(&mut rows, &sizes, noise, old);
+    let last = zero.len().checked_sub(1).map_or(0.0, |last| found.values[last]).max(f64::EPSILON);
     let conserved = rows.split_off(old).into_iter().map(|mut row| {
-        sparse::polish(&mut row, &rates, &sizes, found.values[zero.len() - 1].max(1e-12));
+        sparse::polish(&mut row, &rates, &sizes, last);
         let terms = row.iter().zip(&places).filter(|(c, _)| **c != 0.0).map(|(c, (f, m))| (*c, *f, *m));
         Conserved { terms: terms.collect(), basis: basis.clone() }
     });

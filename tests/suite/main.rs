@@ -13,4 +13,5 @@ mod program;
 mod recording;
 mod rollout;
 mod stress;
+mod symmetry;
 mod training;
