@@ -1,4 +1,4 @@
-//! What two Lagrangians of the same coordinates have in common: the motion, and more than that.
+//! Common ground of two Lagrangians of the same coordinates: the motion, and more than that.
 
 use super::basis::{Basis, Values};
 use super::orthonormal::{add, dot, norm, orthonormal};
@@ -20,13 +20,13 @@ pub struct Comparison {
     pub gauge_formula: String,
     /// The constant, in the unit of `A`.
     pub constant: f64,
-    /// What is left of the momenta and of the values of `A` beside `f(B) + dF/dt + constant`, root mean square over that of `A`.
+    /// Rest of the momenta and of the values of `A` beside `f(B) + dF/dt + constant`, root mean square over that of `A`.
     pub lagrangian: f64,
     /// Difference of the accelerations, root mean square in the frame of `|M|` of `B` over that of the larger ones.
     pub motion: f64,
-    /// What is left of the mass matrix of `A` beside that of `f(B)`, root mean square over that of `A`, in the same frame.
+    /// Rest of the mass matrix of `A` beside that of `f(B)`, root mean square over that of `A`, in the same frame.
     pub mass_matrix: f64,
-    /// What is left of the energy of `A` beside the best polynomial of that of `B`, of first degree unless `f` has a higher one, root
+    /// Rest of the energy of `A` beside the best polynomial of that of `B`, of first degree unless `f` has a higher one, root
     /// mean square over that of the energy of `A` about its mean.
     pub energy: f64,
 }

@@ -16,7 +16,7 @@ const DEPENDENT: f64 = 1e-7;
 /// Part of a quantity that is no combination of known ones, for it to be new.
 const NEW: f64 = 1e-4;
 
-/// What a function of the coordinates multiplies.
+/// Factor of a function of the coordinates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Monomial {
     /// Nothing: the function itself.

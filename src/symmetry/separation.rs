@@ -17,6 +17,8 @@ pub struct Separation {
 const SMALL: f64 = 0.1;
 /// Least gap by which values are told apart when nothing is known of the noise.
 const APART: f64 = 10.0;
+/// Noise that a model has at the least: smaller values are not told apart.
+const NOISE: f64 = 1e-4;
 /// Least gap above a known noise.
 const ABOVE: f64 = 30.0;
 
@@ -25,7 +27,7 @@ impl Separation {
     ///
     /// With a tolerance the first value above it must exceed the last below it 30 times, and the tolerance itself three
     /// times. Without one, values above 0.1 are not zero, and the cut is where the ratio of neighbours is largest, 10 at
-    /// least. Otherwise there is no gap and no count.
+    /// least, values below 1e-4 taken as that. Otherwise there is no gap and no count.
     pub fn new(values: &[f64], tolerance: Option<f64>) -> Self {
         // Nothing is smaller than the rounding of a number near 1.
         let floor = f64::EPSILON;
@@ -40,10 +42,10 @@ impl Separation {
             }
             None => {
                 let small = values.iter().take_while(|value| **value < SMALL).count();
-                let cuts = (1..=small).filter_map(|k| Some((k, ratio(k, values[k - 1])?)));
+                let cuts = (1..=small).filter_map(|k| Some((k, ratio(k, values[k - 1].max(NOISE))?)));
                 match cuts.max_by(|a, b| a.1.total_cmp(&b.1)) {
                     None => Self { count: Some(small), gap: ratio(0, SMALL) },
-                    Some((k, gap)) => Self { count: (gap >= APART).then_some(k), gap: Some(gap) },
+                    Some((k, apart)) => Self { count: (apart >= APART).then_some(k), gap: ratio(k, values[k - 1]) },
                 }
             }
         }
@@ -63,6 +65,8 @@ mod tests {
         assert_eq!(at(&[1e-14, 5e-9, 6e-9, 2e-8], exact).count, None);
         assert_eq!(at(&[1e-16, 1e-17], exact), Separation { count: Some(2), gap: None });
         assert_eq!(at(&[1e-4, 2e-3, 3e-3, 0.2], None).count, Some(3));
+        // Imposed symmetries beside learned ones.
+        assert_eq!(at(&[0.0, 1e-9, 2e-3, 0.05], None).count, Some(3));
         assert_eq!(at(&[1e-3, 5e-3, 2e-2, 0.09], None).count, None);
         assert_eq!(at(&[0.2, 0.3], None), Separation { count: Some(0), gap: Some(2.0) });
         assert_eq!(at(&[], None).count, Some(0));
