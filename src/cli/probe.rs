@@ -34,7 +34,7 @@ pub type Bound = (String, [f64; 2]);
 /// Reads [`Bound`].
 ///
 /// # Errors
-/// What was expected.
+/// The form that was expected.
 pub fn bound(text: &str) -> Result<Bound, String> {
     let wrong = || "expected NAME=LOW:HIGH, such as r=4:12 or r_dot=-0.3:0.3".to_string();
     let (name, range) = text.split_once('=').ok_or_else(wrong)?;

@@ -61,12 +61,12 @@ pub enum Format {
 /// Degrees of families of functions.
 ///
 /// # Errors
-/// What was expected.
+/// The form that was expected.
 pub fn degrees(text: &str) -> Result<Degrees, String> {
     text.parse()
 }
 
-/// What was found, as JSON.
+/// Findings, as JSON.
 #[derive(Debug, Serialize)]
 struct Found {
     system: String,
@@ -81,7 +81,7 @@ struct Found {
     gauge_functions: Vec<String>,
     structure_constants: Vec<Vec<Vec<f64>>>,
     killing_form_signature: [usize; 3],
-    /// What of the commutators is no combination of the fields.
+    /// Rest of the commutators beside combinations of the fields, relative.
     closure: f64,
     /// The symmetry of time, which is not counted: the energy is conserved.
     time_translation: bool,

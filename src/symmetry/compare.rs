@@ -144,14 +144,15 @@ impl Fit {
         let mut size = target;
         let constant = orthonormal(&columns[functions + 1..functions + 2], DEPENDENT);
         constant.remove(&mut size);
-        let higher = solution.split_off(functions + 2);
         let whole = norm(&size);
-        let mut gauge = solution[1..=functions].to_vec();
-        for (c, column) in gauge.iter_mut().zip(&columns[1..=functions]) {
-            if (*c * norm(column)).abs() <= 1e-9 * whole {
+        // Roundings are no terms.
+        for (k, (c, column)) in solution.iter_mut().zip(&columns).enumerate() {
+            if k > 0 && k != functions + 1 && (*c * norm(column)).abs() <= 1e-9 * whole {
                 *c = 0.0;
             }
         }
+        let higher = solution.split_off(functions + 2);
+        let gauge = solution[1..=functions].to_vec();
         let factors = std::iter::once(solution[0]).chain(higher).enumerate();
         let factors: Vec<f64> = factors.map(|(k, c)| c * unit.powi(k as i32)).collect();
         let kept = 1 + factors.iter().skip(1).rposition(|c| *c != 0.0).map_or(0, |last| last + 1);
