@@ -29,10 +29,11 @@
 //! | store and load models | [`network::file::ModelFile`] |
 //! | differentiate a function of yours | [`tape::gradient`], [`tape::hessian`]; over many states [`tape::Program`] |
 //! | solve small symmetric systems in batches | [`linalg`] |
+//! | find what a Lagrangian conserves, compare two Lagrangians | [`symmetry::symmetries`], [`symmetry::quadratic`], [`symmetry::compare`] |
 //! | judge a model: energy, coordinates, Lyapunov exponents | [`analysis`] |
 //!
 //! Rooms, each importing only from those above it: [`names`], [`storage`], [`scalar`], [`ops`], [`forward`], [`linalg`], [`tape`],
-//! [`recording`], [`lagrangian`], [`geometry`], [`rollout`], [`network`], [`training`], [`analysis`], [`experiments`], `report` (feature
+//! [`recording`], [`lagrangian`], [`geometry`], [`rollout`], [`network`], [`symmetry`], [`training`], [`analysis`], [`experiments`], `report` (feature
 //! `plot`), `cli` (feature `cli`, the default; a library user leaves it out by `default-features = false`).
 //!
 //! # Shapes, units, numbers
@@ -154,6 +155,9 @@ pub mod lagrangian;
 pub mod geometry;
 
 pub mod network;
+
+#[cfg(feature = "rollout")]
+pub mod symmetry;
 
 #[cfg(feature = "training")]
 pub mod training;

@@ -6,8 +6,10 @@
 
 mod attention;
 mod changes;
+mod charges;
 mod check;
 mod chosen;
+mod compare;
 mod config;
 mod config_file;
 mod determined;
@@ -47,6 +49,7 @@ mod output;
 mod place;
 mod plain_name;
 mod print_config;
+mod probe;
 mod progress;
 mod recording_args;
 mod results;
@@ -59,6 +62,7 @@ mod spool;
 mod start;
 mod states;
 mod subject;
+mod symmetries;
 mod systems;
 mod taken;
 mod train;
@@ -116,6 +120,10 @@ enum Command {
     Inspect(inspect::Args),
     /// Print metric, Christoffel symbols and curvature of points, every digit of them.
     Geometry(geometry::Args),
+    /// Find the symmetries of a Lagrangian and what its motion conserves.
+    Symmetries(symmetries::Args),
+    /// Say what two Lagrangians have in common beyond factor and gauge.
+    Compare(compare::Args),
     /// Print a script that completes commands and options in a shell.
     Completions(manual::CompletionsArgs),
     /// Print the manual page of the program or of a command.
@@ -170,6 +178,8 @@ fn run(command: Command, words: &[OsString]) -> Result<(), CliError> {
         Command::Experiment(args) => experiment::run(&args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Geometry(args) => geometry::run(&args),
+        Command::Symmetries(args) => symmetries::run(&args),
+        Command::Compare(args) => compare::run(&args),
         Command::Completions(args) => manual::completions(&args, Cli::command()),
         Command::Man(args) => manual::man(&args, Cli::command()),
     }

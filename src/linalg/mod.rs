@@ -18,6 +18,8 @@ mod large_systems;
 mod matmul;
 mod minimum_norm;
 mod minors;
+#[cfg(feature = "rollout")]
+mod singular;
 mod solve;
 mod systems;
 
@@ -31,4 +33,6 @@ pub use inverse::inverse;
 pub use matmul::{MatMut, MatRef, gemm};
 pub use minimum_norm::{MinimumNorm, minimum_norm};
 pub use minors::{Scaled, adjugate, leading_minors};
+#[cfg(feature = "rollout")]
+pub(crate) use singular::singular;
 pub use solve::solve;

@@ -14,4 +14,5 @@ mod program;
 mod recording;
 mod rollout;
 mod stress;
+mod symmetry;
 mod training;

@@ -18,6 +18,7 @@ const ROOMS: [&str; 17] = [
     "geometry",
     "rollout",
     "network",
+    "symmetry",
     "training",
     "analysis",
     "experiments",

@@ -16,6 +16,7 @@ const ROOMS: [&str; 15] = [
     "geometry",
     "rollout",
     "network",
+    "symmetry",
     "training",
     "analysis",
     "experiments",

@@ -18,6 +18,7 @@ mod resume;
 mod screen;
 mod signals;
 mod still;
+mod symmetries;
 mod system_files;
 mod train;
 mod words;
