@@ -31,7 +31,7 @@
 //! | judge a model: energy, coordinates, Lyapunov exponents | [`analysis`] |
 //!
 //! Rooms, each importing only from those above it: [`names`], [`storage`], [`scalar`], [`ops`], [`forward`], [`linalg`], [`tape`],
-//! [`recording`], [`lagrangian`], [`rollout`], [`network`], [`training`], [`analysis`], [`experiments`], `report` (feature
+//! [`recording`], [`lagrangian`], [`rollout`], [`network`], [`certificate`], [`training`], [`analysis`], [`experiments`], `report` (feature
 //! `plot`), `cli` (feature `cli`, the default; a library user leaves it out by `default-features = false`).
 //!
 //! # Shapes, units, numbers
@@ -151,6 +151,8 @@ pub mod recording;
 pub mod lagrangian;
 
 pub mod network;
+
+pub mod certificate;
 
 #[cfg(feature = "training")]
 pub mod training;

@@ -5,6 +5,7 @@
 //! of a configuration all mistakes are found, a line for each.
 
 mod attention;
+mod certify;
 mod changes;
 mod check;
 mod chosen;
@@ -113,6 +114,8 @@ enum Command {
     Experiment(experiment::Args),
     /// Print the Euler-Lagrange terms of states, every digit of them.
     Inspect(inspect::Args),
+    /// Prove where the mass matrix has its signature, and a condition number below a bound.
+    Certify(certify::Args),
     /// Print a script that completes commands and options in a shell.
     Completions(manual::CompletionsArgs),
     /// Print the manual page of the program or of a command.
@@ -166,6 +169,7 @@ fn run(command: Command, words: &[OsString]) -> Result<(), CliError> {
         Command::Evaluate(args) => evaluate::run(&args),
         Command::Experiment(args) => experiment::run(&args),
         Command::Inspect(args) => inspect::run(&args),
+        Command::Certify(args) => certify::run(&args),
         Command::Completions(args) => manual::completions(&args, Cli::command()),
         Command::Man(args) => manual::man(&args, Cli::command()),
     }
