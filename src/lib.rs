@@ -28,6 +28,7 @@
 //! | store and load models | [`network::file::ModelFile`] |
 //! | differentiate a function of yours | [`tape::gradient`], [`tape::hessian`]; over many states [`tape::Program`] |
 //! | solve small symmetric systems in batches | [`linalg`] |
+//! | prove where a mass matrix has its signature | [`certificate`] |
 //! | judge a model: energy, coordinates, Lyapunov exponents | [`analysis`] |
 //!
 //! Rooms, each importing only from those above it: [`names`], [`storage`], [`scalar`], [`ops`], [`forward`], [`linalg`], [`tape`],

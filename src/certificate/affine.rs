@@ -40,7 +40,9 @@ fn product<'a>(arena: &'a Arena, weights: &[f64], bias: &[Number<'a>], x: &[Numb
     let loss = (inputs + 8) as f64 * f64::EPSILON;
     // Planes (inputs, parts x plane) and distances (inputs, parts).
     let (mut planes, mut distances) = (vec![0.0; inputs * columns], vec![0.0; inputs * parts]);
-    for ((x, planes), distances) in x.iter().zip(planes.chunks_exact_mut(columns)).zip(distances.chunks_exact_mut(parts)) {
+    for ((x, planes), distances) in
+        x.iter().zip(planes.chunks_exact_mut(columns)).zip(distances.chunks_exact_mut(parts))
+    {
         let mut take = |forms: &[f64]| {
             let rows = forms.chunks_exact(stride).zip(planes.chunks_exact_mut(plane)).zip(distances.iter_mut());
             for ((form, to), distance) in rows {

@@ -18,7 +18,8 @@ const LARGE_ANGLE: f64 = 1e6;
 fn widened(low: f64, high: f64) -> Interval {
     // Products with the margin are themselves rounded, which the last step covers; the tiny summand covers subnormal results.
     let wide = |x: f64| x.abs() * MARGIN + f64::MIN_POSITIVE;
-    let (low, high) = (low - if low.is_finite() { wide(low) } else { 0.0 }, high + if high.is_finite() { wide(high) } else { 0.0 });
+    let (low, high) =
+        (low - if low.is_finite() { wide(low) } else { 0.0 }, high + if high.is_finite() { wide(high) } else { 0.0 });
     // An infinite end that overflow gave stands for numbers beyond the largest.
     let low = if low == f64::INFINITY { f64::MAX } else { low };
     let high = if high == f64::NEG_INFINITY { f64::MIN } else { high };

@@ -59,27 +59,31 @@ fn mass_matrix<'a, L: Lagrangian>(
     bounds: &[(f64, f64)],
 ) -> MatrixForms {
     let (n, stride) = (bounds.len() / 2, arena.stride());
-    let state: Vec<Number<'a>> = bounds.iter().enumerate().map(|(axis, &(low, high))| {
-        let range = Interval::new(low, high);
-        let mut value = vec![0.0; stride];
-        (value[0], value[1 + axis]) = (range.middle(), range.radius());
-        arena.variable(&value, axis.checked_sub(n))
-    }).collect();
+    let state: Vec<Number<'a>> = bounds
+        .iter()
+        .enumerate()
+        .map(|(axis, &(low, high))| {
+            let range = Interval::new(low, high);
+            let mut value = vec![0.0; stride];
+            (value[0], value[1 + axis]) = (range.middle(), range.radius());
+            arena.variable(&value, axis.checked_sub(n))
+        })
+        .collect();
     let found = lagrangian.lagrangian(parameters, &state[..n], &state[n..]);
     let mut forms = vec![0.0; n * n * stride];
-    let known = !arena.was_read();
+    // A Lagrangian that may not be defined, or that read a value.
+    let known = found.range().is_bounded() && !arena.was_read();
     for (k, out) in forms.chunks_exact_mut(stride).enumerate() {
         match found {
             Number::Variable(arena, index) if known => arena.look(index, |number| {
                 let part = arena.second(k / n, k % n);
                 out.copy_from_slice(&number[part * stride..(part + 1) * stride]);
             }),
-            // A Lagrangian that does not move, or that read a value.
             Number::Constant(_) if known => {}
             _ => out.fill(f64::NAN),
         }
     }
-    MatrixForms { n, stride, forms }
+    MatrixForms { n, stride, forms, blamed: arena.blamed() }
 }
 
 /// Intervals `(n, n)` that hold the elements of the mass matrix `d2L/dv dv` of every state of a box, `(low, high)` of every coordinate and

@@ -132,8 +132,9 @@ pub fn set_function(out: &mut [f64], z: &[f64], at: &Derivatives, over: &Derivat
     }
     out[m] = raised(start.radius() + slope.abs() * z[m] + spread * distance + EPSILON * charge);
     let whole = over[order];
-    // Not a number is not below anything.
-    if whole.is_bounded() && !(deviation(out) <= whole.radius()) {
+    // Not a number is not narrower than anything.
+    let narrower = deviation(out) <= whole.radius();
+    if whole.is_bounded() && !narrower {
         set_constant(out, whole);
     }
 }

@@ -179,12 +179,7 @@ impl Div for Interval {
         if self.is_point() && self.low == 1.0 {
             return Self::outward(low, high);
         }
-        let ends = [
-            self.low / other.low,
-            self.low / other.high,
-            self.high / other.low,
-            self.high / other.high,
-        ];
+        let ends = [self.low / other.low, self.low / other.high, self.high / other.low, self.high / other.high];
         if ends.iter().any(|x| x.is_nan()) {
             return Self::ENTIRE;
         }

@@ -229,8 +229,8 @@ fn checked(n: usize, region: &Bounds, options: &Options) -> Result<Vec<(f64, f64
         if bounds.len() != n {
             return Err(CertificateError::Shape { what: names, expected: n, found: bounds.len() });
         }
-        let wrong = |(low, high): (f64, f64)| !(low <= high && low.is_finite() && high.is_finite() && (high - low).is_finite());
-        if let Some(index) = bounds.iter().position(|b| wrong(*b)) {
+        let right = |(low, high): (f64, f64)| low <= high && [low, high, high - low].iter().all(|x| x.is_finite());
+        if let Some(index) = bounds.iter().position(|b| !right(*b)) {
             let (low, high) = bounds[index];
             return Err(CertificateError::Bounds { what: name, index, low, high });
         }
@@ -240,7 +240,7 @@ fn checked(n: usize, region: &Bounds, options: &Options) -> Result<Vec<(f64, f64
         return Err(CertificateError::Signature { expected: n, positive, negative });
     }
     match options.condition {
-        Some(limit) if !(limit >= 1.0) => Err(CertificateError::Condition(limit)),
+        Some(limit) if limit.is_nan() || limit < 1.0 => Err(CertificateError::Condition(limit)),
         _ => Ok([region.positions.as_slice(), &region.velocities].concat()),
     }
 }

@@ -23,22 +23,34 @@ pub struct Arena {
     forms: RefCell<Vec<f64>>,
     /// Set when a value was read, on which the Lagrangian may then branch unseen.
     read: Cell<bool>,
+    /// Bits of the axes that a function depended on where it is not known.
+    blamed: Cell<u64>,
 }
 
 impl Arena {
     /// For `n` coordinates and `axes` axes of the box.
     pub fn new(n: usize, axes: usize) -> Self {
         let parts = 1 + n + n * (n + 1) / 2;
-        Self { n, stride: axes + 2, parts, forms: RefCell::default(), read: Cell::new(false) }
+        Self { n, stride: axes + 2, parts, forms: RefCell::default(), read: Cell::new(false), blamed: Cell::new(0) }
     }
     /// Forgets all numbers.
     pub fn clear(&self) {
         self.forms.borrow_mut().clear();
         self.read.set(false);
+        self.blamed.set(0);
     }
     /// `true` if a value was read since.
     pub fn was_read(&self) -> bool {
         self.read.get()
+    }
+    /// Bits of the axes along which a box has to be cut for what is not known to become so.
+    pub fn blamed(&self) -> u64 {
+        self.blamed.get()
+    }
+    /// Notes the axes on which a form depends.
+    fn blame(&self, form: &[f64]) {
+        let slopes = form[1..form.len() - 1].iter().enumerate().filter(|(_, slope)| **slope != 0.0);
+        self.blamed.set(slopes.fold(self.blamed.get(), |bits, (axis, _)| bits | 1 << (axis % 64)));
     }
     /// Forms of a number.
     pub fn parts(&self) -> usize {
@@ -127,6 +139,9 @@ impl<'a> Number<'a> {
             let z = part(0);
             let (at, over) = (derivatives(Interval::point(z[0])), derivatives(form::range(z)));
             form::set_function(&mut new[..stride], z, &at, &over, 0);
+            if !over.iter().all(|x| x.is_bounded()) {
+                arena.blame(z);
+            }
             if (1..=n).all(|i| form::is_zero(part(i))) && (1 + n..arena.parts).all(|k| form::is_zero(part(k))) {
                 return;
             }
@@ -179,13 +194,16 @@ impl<'a> Number<'a> {
         }
     }
 
-    /// A number of which nothing is known: what is left of a branch that the box does not decide.
-    fn undecided(self, others: &[Self]) -> Self {
-        let arena = [self].iter().chain(others).find_map(|x| match x {
-            Variable(arena, _) => Some(*arena),
-            Constant(_) => None,
-        });
-        arena.map_or(Constant(Interval::ENTIRE), Arena::unknown)
+    /// A number of which nothing is known: what is left of a branch that the box does not decide by these numbers.
+    fn undecided(by: &[Self]) -> Self {
+        let mut found = Constant(Interval::ENTIRE);
+        for x in by {
+            if let Variable(arena, index) = x {
+                arena.look(*index, |forms| arena.blame(&forms[..arena.stride]));
+                found = arena.unknown();
+            }
+        }
+        found
     }
 }
 
@@ -341,28 +359,28 @@ impl Real for Number<'_> {
         } else if rise.high < 0.0 {
             -quarter - (x / self).atan()
         } else {
-            self.undecided(&[x])
+            Self::undecided(&[self, x])
         }
     }
     fn max(self, other: Self) -> Self {
         match (self - other).positive() {
             Some(true) => self,
             Some(false) => other,
-            None => self.undecided(&[other]),
+            None => Self::undecided(&[self, other]),
         }
     }
     fn min(self, other: Self) -> Self {
         match (self - other).positive() {
             Some(true) => other,
             Some(false) => self,
-            None => self.undecided(&[other]),
+            None => Self::undecided(&[self, other]),
         }
     }
     fn select(self, if_positive: Self, otherwise: Self) -> Self {
         match self.positive() {
             Some(true) => if_positive,
             Some(false) => otherwise,
-            None => self.undecided(&[if_positive, otherwise]),
+            None => Self::undecided(&[self]),
         }
     }
     fn affine(weights: &[Self], bias: &[Self], x: &[Self]) -> Vec<Self> {

@@ -159,18 +159,20 @@ fn active_axes(source: &dyn Enclose, regions: &[(Vec<(f64, f64)>, f64)]) -> Vec<
 }
 
 /// The axis to cut and its middle: where the matrix changes most, by its plane and, for a share as large as the side, by the distance from
-/// it.
+/// it. Of a matrix that is not known, the longest side of those to blame.
 fn cut(waiting: &Waiting, spectrum: &Spectrum, scale: &[f64], active: &[bool]) -> Option<(usize, f64)> {
     let relative = |axis: usize| {
         let (low, high) = waiting.bounds[axis];
         if scale[axis] > 0.0 { (high - low) / scale[axis] } else { 0.0 }
     };
-    let axes = || (0..waiting.bounds.len()).filter(|&axis| active[axis]);
+    let known = spectrum.remainder.is_finite();
+    let blamed = |axis: usize| spectrum.blamed >> (axis % 64) & 1 == 1;
+    let any = known || spectrum.blamed == 0;
+    let axes = || (0..waiting.bounds.len()).filter(|&axis| if any { active[axis] } else { blamed(axis) });
     let sides: f64 = axes().map(relative).sum();
-    let finite = |x: f64| if x.is_finite() { x } else { 0.0 };
-    let remainder = if spectrum.remainder.is_finite() { spectrum.remainder } else { 1.0 };
     let score = |axis: usize| {
-        finite(spectrum.influence.get(axis).copied().unwrap_or(0.0)) + remainder * relative(axis) / sides.max(1e-300)
+        let side = relative(axis) / sides.max(f64::MIN_POSITIVE);
+        if known { spectrum.influence[axis] + spectrum.remainder * side } else { side }
     };
     let best = axes().max_by(|&a, &b| score(a).total_cmp(&score(b)).then(b.cmp(&a)))?;
     let (low, high) = waiting.bounds[best];
@@ -220,7 +222,8 @@ impl Found {
         if self.witness.is_some() {
             return;
         }
-        let state: Vec<f64> = waiting.bounds.iter().map(|&(low, high)| (0.5 * low + 0.5 * high).clamp(low, high)).collect();
+        let state: Vec<f64> =
+            waiting.bounds.iter().map(|&(low, high)| (0.5 * low + 0.5 * high).clamp(low, high)).collect();
         let point: Vec<(f64, f64)> = state.iter().map(|&x| (x, x)).collect();
         let mut at = None;
         source.each(&[&point], &mut |_, matrix| {
@@ -252,7 +255,8 @@ impl Options {
     /// `true` if the computed eigenvalues of a state make it worth a proof that it is a witness.
     fn suspects(&self, eigenvalues: &[f64], n: usize) -> bool {
         let size = |x: &f64| x.abs();
-        let condition = eigenvalues.iter().map(size).fold(0.0, f64::max) / eigenvalues.iter().map(size).fold(f64::INFINITY, f64::min);
+        let condition = eigenvalues.iter().map(size).fold(0.0, f64::max)
+            / eigenvalues.iter().map(size).fold(f64::INFINITY, f64::min);
         let positive = eigenvalues.iter().filter(|x| **x > 0.0).count();
         eigenvalues.len() == n
             && (positive != self.signature.positive || self.condition.is_some_and(|limit| condition > limit))

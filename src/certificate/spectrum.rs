@@ -10,6 +10,8 @@ pub struct MatrixForms {
     /// Numbers of a form.
     pub stride: usize,
     pub forms: Vec<f64>,
+    /// Bits of the axes along which a box has to be cut for what is not known to become so.
+    pub blamed: u64,
 }
 
 /// Proven facts about the eigenvalues of every matrix of an enclosure.
@@ -24,8 +26,10 @@ pub struct Spectrum {
     pub middle: Vec<f64>,
     /// For every axis of the box how much the matrix changes along it, relative to its eigenvalues.
     pub influence: Vec<f64>,
-    /// The same for the distance from the plane.
+    /// The same for the distance from the plane; infinite if the matrix is not known.
     pub remainder: f64,
+    /// The axes to blame for that, see [`MatrixForms::blamed`].
+    pub blamed: u64,
 }
 
 impl MatrixForms {
@@ -44,7 +48,13 @@ impl MatrixForms {
     pub fn spectrum(&self) -> Spectrum {
         let (n, stride) = (self.n, self.stride);
         let axes = stride - 2;
-        let nothing = || Spectrum { condition: (1.0, f64::INFINITY), influence: vec![0.0; axes], ..Spectrum::default() };
+        let nothing = || Spectrum {
+            condition: (1.0, f64::INFINITY),
+            influence: vec![0.0; axes],
+            remainder: f64::INFINITY,
+            blamed: self.blamed,
+            ..Spectrum::default()
+        };
         let centre: Vec<f64> = self.forms.iter().step_by(stride).copied().collect();
         let (mut values, mut vectors) = (vec![0.0; n], vec![0.0; n * n]);
         let found = eigh(n, &centre, &mut values, &mut vectors, &mut Workspace::new());
@@ -52,8 +62,8 @@ impl MatrixForms {
             return nothing();
         }
         let defect = orthogonality_defect(n, &vectors);
-        let mut spectrum = Spectrum { middle: values, ..nothing() };
-        if !(defect < 0.5) {
+        let mut spectrum = Spectrum { middle: values, remainder: 0.0, ..nothing() };
+        if defect.is_nan() || defect >= 0.5 {
             return spectrum;
         }
         let values = &spectrum.middle;
@@ -70,7 +80,8 @@ impl MatrixForms {
                 spectrum.remainder += scale * element[stride - 1];
             }
         }
-        let ranges = |rotated: &Self| -> Vec<Interval> { rotated.forms.chunks_exact(stride).map(form::range).collect() };
+        let ranges =
+            |rotated: &Self| -> Vec<Interval> { rotated.forms.chunks_exact(stride).map(form::range).collect() };
         // The distances element by element, or all together by their norm, which a rotation does not change.
         let turned = Interval::point(distance) * (Interval::point(1.0) + Interval::point(defect));
         spectrum.conclude(n, &ranges(&whole), &weights, 0.0, defect);
@@ -81,7 +92,7 @@ impl MatrixForms {
     /// The planes alone, and a bound of the norm of all matrices that remain: the largest sum of a row of distances.
     fn split(&self) -> (Self, f64) {
         let (n, stride) = (self.n, self.stride);
-        let mut planes = Self { n, stride, forms: self.forms.clone() };
+        let mut planes = Self { n, stride, forms: self.forms.clone(), blamed: 0 };
         let mut norm = 0.0;
         for row in planes.forms.chunks_exact_mut(n * stride) {
             let distances = row.iter_mut().skip(stride - 1).step_by(stride).map(std::mem::take);
@@ -95,7 +106,7 @@ impl MatrixForms {
     /// `U M U^T`.
     fn rotated(&self, u: &[f64]) -> Self {
         let (n, stride) = (self.n, self.stride);
-        let empty = || Self { n, stride, forms: vec![0.0; n * n * stride] };
+        let empty = || Self { n, stride, forms: vec![0.0; n * n * stride], blamed: 0 };
         let (mut half, mut whole) = (empty(), empty());
         for k in 0..n {
             for j in 0..n {
@@ -168,7 +179,7 @@ mod tests {
     /// Constant matrices, with a distance on every element.
     fn matrix(elements: &[f64], distance: f64) -> MatrixForms {
         let n = elements.len().isqrt();
-        MatrixForms { n, stride: 2, forms: elements.iter().flat_map(|&x| [x, distance]).collect() }
+        MatrixForms { n, stride: 2, forms: elements.iter().flat_map(|&x| [x, distance]).collect(), blamed: 0 }
     }
 
     #[test]

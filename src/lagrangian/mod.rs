@@ -16,7 +16,8 @@ pub mod systems;
 mod terms;
 
 pub use catalogue::{
-    Configured, Given, LagrangianVisitor, SystemError, build, configure, configure_system, exact_acceleration, find, systems,
+    Configured, Given, LagrangianVisitor, SystemError, build, configure, configure_system, exact_acceleration, find,
+    systems,
 };
 pub use description::{
     CoordinateDescription, Described, Description, DescriptionError, ParameterDescription, TrajectoryDescription,

@@ -53,9 +53,8 @@ fn every_entry_is_complete() {
 
 #[test]
 fn systems_are_where_they_should_be() {
-    let place = |name: &str, list: &[(&str, &str)], q: &[f64]| {
-        configure::<f64>(name, &given(list)).unwrap().place(q).unwrap()
-    };
+    let place =
+        |name: &str, list: &[(&str, &str)], q: &[f64]| configure::<f64>(name, &given(list)).unwrap().place(q).unwrap();
     let near = |(x, y): (f64, f64), (a, b): (f64, f64), size: f64| {
         // Sine and cosine to half a unit in the last place, angles as near as pi is.
         assert!((x - a).abs().max((y - b).abs()) <= 4.0 * f64::EPSILON * size, "({x}, {y}) for ({a}, {b})");

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 /// Rooms whose documentation is held to it.
-const ROOMS: [&str; 14] = [
+const ROOMS: [&str; 15] = [
     "storage",
     "scalar",
     "ops",
@@ -15,6 +15,7 @@ const ROOMS: [&str; 14] = [
     "lagrangian",
     "rollout",
     "network",
+    "certificate",
     "training",
     "analysis",
     "experiments",
