@@ -9,6 +9,7 @@
 //! | [`structures`] | black box, mechanical, metric; what is known beforehand; hybrids in Rust |
 //! | [`geometry`] | metric, connection, curvature of a Lagrangian, learned or written down |
 //! | [`symmetries`] | what is conserved: symmetries, charges, what two Lagrangians have in common |
+//! | [`certificates`] | proofs that a mass matrix has its signature |
 //! | [`method`] | equations, penalties, identities, units and conventions |
 //! | [`library`] | features, a Lagrangian of your own, states of your own, examples |
 //! | [`model_format`] | `model.safetensors`, readable without this crate |
@@ -32,6 +33,7 @@ macro_rules! page {
             "[structures]: crate::docs::structures\n",
             "[geometry]: crate::docs::geometry\n",
             "[symmetries]: crate::docs::symmetries\n",
+            "[certificates]: crate::docs::certificates\n",
             "[method]: crate::docs::method\n",
             "[conventions]: crate::docs::method#units-and-conventions\n",
             "[friction]: crate::docs::method#friction\n",
@@ -69,6 +71,7 @@ pages! {
     structures "structures.md";
     geometry "geometry.md";
     symmetries "symmetries.md";
+    certificates "certificates.md";
     method "method.md";
     library "library.md";
     model_format "model-format.md";

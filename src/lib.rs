@@ -30,10 +30,12 @@
 //! | differentiate a function of yours | [`tape::gradient`], [`tape::hessian`]; over many states [`tape::Program`] |
 //! | solve small symmetric systems in batches | [`linalg`] |
 //! | find what a Lagrangian conserves, compare two Lagrangians | [`symmetry::symmetries`], [`symmetry::quadratic`], [`symmetry::compare`] |
+//! | prove where a mass matrix has its signature | [`certificate`] |
 //! | judge a model: energy, coordinates, Lyapunov exponents | [`analysis`] |
 //!
 //! Rooms, each importing only from those above it: [`names`], [`storage`], [`scalar`], [`ops`], [`forward`], [`linalg`], [`tape`],
-//! [`recording`], [`lagrangian`], [`geometry`], [`rollout`], [`network`], [`symmetry`], [`training`], [`analysis`], [`experiments`], `report` (feature
+//! [`recording`], [`lagrangian`], [`geometry`], [`rollout`], [`network`], [`symmetry`], [`certificate`], [`training`], [`analysis`],
+//! [`experiments`], `report` (feature
 //! `plot`), `cli` (feature `cli`, the default; a library user leaves it out by `default-features = false`).
 //!
 //! # Shapes, units, numbers
@@ -156,6 +158,7 @@ pub mod geometry;
 
 pub mod network;
 
+pub mod certificate;
 #[cfg(feature = "rollout")]
 pub mod symmetry;
 

@@ -5,6 +5,7 @@
 //! of a configuration all mistakes are found, a line for each.
 
 mod attention;
+mod certify;
 mod changes;
 mod charges;
 mod check;
@@ -124,6 +125,8 @@ enum Command {
     Symmetries(symmetries::Args),
     /// Say what two Lagrangians have in common beyond factor and gauge.
     Compare(compare::Args),
+    /// Prove where the mass matrix has its signature, and a condition number below a bound.
+    Certify(certify::Args),
     /// Print a script that completes commands and options in a shell.
     Completions(manual::CompletionsArgs),
     /// Print the manual page of the program or of a command.
@@ -180,6 +183,7 @@ fn run(command: Command, words: &[OsString]) -> Result<(), CliError> {
         Command::Geometry(args) => geometry::run(&args),
         Command::Symmetries(args) => symmetries::run(&args),
         Command::Compare(args) => compare::run(&args),
+        Command::Certify(args) => certify::run(&args),
         Command::Completions(args) => manual::completions(&args, Cli::command()),
         Command::Man(args) => manual::man(&args, Cli::command()),
     }

@@ -18,7 +18,8 @@ mod taylor;
 mod terms;
 
 pub use catalogue::{
-    Configured, Given, SystemError, build, configure, configure_system, exact_acceleration, find, systems,
+    Configured, Given, LagrangianVisitor, SystemError, build, configure, configure_system, exact_acceleration, find,
+    systems,
 };
 pub use description::{
     CoordinateDescription, Described, Description, DescriptionError, ParameterDescription, TrajectoryDescription,

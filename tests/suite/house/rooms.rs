@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Rooms from top to bottom; a file may name its own room and those before it.
-const ROOMS: [&str; 17] = [
+const ROOMS: [&str; 19] = [
     "names",
     "storage",
     "scalar",
@@ -19,6 +19,7 @@ const ROOMS: [&str; 17] = [
     "rollout",
     "network",
     "symmetry",
+    "certificate",
     "training",
     "analysis",
     "experiments",

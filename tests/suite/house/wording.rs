@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 /// Rooms whose documentation is held to it.
-const ROOMS: [&str; 15] = [
+const ROOMS: [&str; 17] = [
     "storage",
     "scalar",
     "ops",
@@ -17,6 +17,7 @@ const ROOMS: [&str; 15] = [
     "rollout",
     "network",
     "symmetry",
+    "certificate",
     "training",
     "analysis",
     "experiments",

@@ -1,5 +1,6 @@
 //! The program `lnn` from outside.
 
+mod certify;
 mod check;
 mod configuration;
 mod conveniences;
