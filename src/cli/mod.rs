@@ -61,6 +61,7 @@ mod states;
 mod subject;
 mod systems;
 mod taken;
+mod tensors;
 mod train;
 mod train_config;
 
