@@ -66,6 +66,7 @@ mod subject;
 mod symmetries;
 mod systems;
 mod taken;
+mod tensors;
 mod train;
 mod train_config;
 
