@@ -29,10 +29,12 @@
 //! | differentiate a function of yours | [`tape::gradient`], [`tape::hessian`]; over many states [`tape::Program`] |
 //! | solve small symmetric systems in batches | [`linalg`] |
 //! | judge a model: energy, coordinates, Lyapunov exponents | [`analysis`] |
+//! | train, fit, evaluate, run an experiment, with all files and reports | `pipeline` (feature `pipeline`) |
 //!
 //! Rooms, each importing only from those above it: [`names`], [`storage`], [`scalar`], [`ops`], [`forward`], [`linalg`], [`tape`],
 //! [`recording`], [`lagrangian`], [`rollout`], [`network`], [`training`], [`analysis`], [`experiments`], `report` (feature
-//! `plot`), `cli` (feature `cli`, the default; a library user leaves it out by `default-features = false`).
+//! `plot`), `pipeline` (feature `pipeline`), `cli` (feature `cli`, the default; a library user leaves it out by
+//! `default-features = false`).
 //!
 //! # Shapes, units, numbers
 //!
@@ -166,6 +168,9 @@ pub mod experiments;
 
 #[cfg(feature = "plot")]
 pub mod report;
+
+#[cfg(feature = "pipeline")]
+pub mod pipeline;
 
 #[cfg(feature = "cli")]
 pub mod cli;

@@ -1,8 +1,10 @@
 //! Runs that `--resume DIR` of `lnn train` and `lnn fit` finds in the directory.
 
 use crate::cli::differences::differences;
+use crate::cli::folder::Folder;
 use crate::cli::said::Said;
 use crate::cli::{CliError, Kind, config, output};
+use crate::pipeline::RunOutput;
 use crate::storage::{Disk, read_regular};
 use crate::training::{CheckpointError, Config, NEWEST, PREVIOUS, saved};
 use serde::Deserialize;
@@ -146,6 +148,15 @@ pub fn keeping(directory: &Path) -> impl Fn(CliError) -> CliError {
             error
         }
     }
+}
+
+/// Removes the checkpoints of a training that is over.
+///
+/// # Errors
+/// A data error naming the directory.
+pub fn forget(folder: &Folder) -> Result<(), CliError> {
+    let checkpoints = RunOutput::checkpoints(folder);
+    Ok(checkpoints.map_or(Ok(()), |checkpoints| checkpoints.remove())?)
 }
 
 /// Says that there is nothing left to do.

@@ -2,14 +2,14 @@
 
 use crate::cli::changes::Changes;
 use crate::cli::config_file::{ConfigFile, Mistake};
-use crate::cli::learned::{all_parameters, given};
+use crate::cli::learned::given;
 use crate::cli::number::{count, finite, positive, seed};
 use crate::cli::print_config::{PrintFormat, commented, with_seed};
-use crate::cli::start::Start;
 use crate::cli::{CliError, chosen, output, source};
 use crate::lagrangian::system::System;
 use crate::lagrangian::{Configured, Description, DescriptionError, SystemError, configure_system, find};
 use crate::names::plain;
+use crate::pipeline::{StartModel as Start, all_parameters};
 use crate::training::{
     Config, Every, Precision, Preset, SamplingError, Schedule, TRAINING_SECTIONS, configuration_reference,
 };

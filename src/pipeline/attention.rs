@@ -1,74 +1,60 @@
-//! Work on a finished model: it shows how far it is, and Ctrl-C ends it.
+//! Work on a finished model: it says how far it is, and the flag of its [`Watch`] ends it.
 
-use crate::cli::CliError;
-use crate::cli::progress::Progress;
 use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Terms};
-use std::fmt;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use crate::pipeline::{Event, PipelineError, Watch};
+use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Evaluations between two looks at the bar.
+/// Evaluations between two reports.
 const OFTEN: u64 = 1024;
 
 /// Watch over such work.
-pub struct Attention {
-    /// Raised by Ctrl-C; none where Ctrl-C ends the program at once.
-    stop: Option<Arc<AtomicBool>>,
-    bar: Progress,
+#[derive(Debug)]
+pub(crate) struct Attention<'a> {
+    watch: &'a Watch,
+    /// Whether the flag counts.
+    counts: bool,
+    pieces: usize,
     done: AtomicU64,
     evaluations: AtomicU64,
 }
 
-impl fmt::Debug for Attention {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Attention").field("stop", &self.stop).finish_non_exhaustive()
-    }
-}
-
-impl Attention {
-    /// Attention to so many pieces of work. A flag that was raised before does not count: it ended the training, and the next
-    /// Ctrl-C ends the program.
-    pub fn new(stop: Option<&Arc<AtomicBool>>, pieces: usize) -> Self {
-        Self {
-            stop: stop.filter(|stop| !stop.load(Ordering::SeqCst)).cloned(),
-            bar: Progress::new(pieces as u64, "judged"),
-            done: AtomicU64::new(0),
-            evaluations: AtomicU64::new(0),
-        }
+impl<'a> Attention<'a> {
+    /// Attention to so many pieces of work. A flag that was raised before does not count: it ended the training.
+    pub fn new(watch: &'a Watch, pieces: usize) -> Self {
+        let counts = !watch.is_interrupted();
+        watch.say(Event::Judged { done: 0, total: pieces });
+        Self { watch, counts, pieces, done: AtomicU64::new(0), evaluations: AtomicU64::new(0) }
     }
 
     /// So many pieces more are done.
     pub fn advance(&self, pieces: usize) {
-        self.bar.advance(self.done.fetch_add(pieces as u64, Ordering::Relaxed) + pieces as u64);
+        let done = self.done.fetch_add(pieces as u64, Ordering::Relaxed) as usize + pieces;
+        self.watch.say(Event::Judged { done, total: self.pieces });
     }
 
-    /// `true` if Ctrl-C was pressed.
+    /// Whether the flag was raised meanwhile.
     pub fn is_interrupted(&self) -> bool {
-        self.stop.as_ref().is_some_and(|stop| stop.load(Ordering::SeqCst))
+        self.counts && self.watch.is_interrupted()
     }
 
-    /// Goes on unless Ctrl-C was pressed.
+    /// Goes on unless the flag was raised.
     ///
     /// # Errors
-    /// An interruption that says what is there and what is not.
-    pub fn check(&self) -> Result<(), CliError> {
-        if self.is_interrupted() {
-            let problem = "interrupted while the model was judged: the model is written, tables and report are not";
-            return Err(CliError::interrupted(problem));
-        }
-        Ok(())
+    /// [`PipelineError::Interrupted`].
+    pub fn check(&self) -> Result<(), PipelineError> {
+        if self.is_interrupted() { Err(PipelineError::Interrupted) } else { Ok(()) }
     }
 
-    /// The same model; after Ctrl-C it fails everywhere, which ends whatever integrates it.
-    pub fn watched<'a>(&'a self, model: &'a dyn EulerLagrange<f64>) -> Watched<'a> {
+    /// The same model; once the flag was raised it fails everywhere, which ends whatever integrates it.
+    pub fn watched<'b>(&'b self, model: &'b dyn EulerLagrange<f64>) -> Watched<'b> {
         Watched { model, attention: self }
     }
 }
 
 /// A model under [`Attention`].
-pub struct Watched<'a> {
+pub(crate) struct Watched<'a> {
     model: &'a dyn EulerLagrange<f64>,
-    attention: &'a Attention,
+    attention: &'a Attention<'a>,
 }
 
 impl EulerLagrange<f64> for Watched<'_> {
@@ -77,10 +63,10 @@ impl EulerLagrange<f64> for Watched<'_> {
     }
 
     fn terms(&self, q: &[f64], v: &[f64], request: Request, terms: &mut Terms<f64>) -> Result<(), MechanicsError> {
-        let Attention { bar, evaluations, .. } = self.attention;
+        let Attention { watch, evaluations, .. } = self.attention;
         let before = evaluations.fetch_add(1, Ordering::Relaxed);
         if before % OFTEN == 0 {
-            bar.say(&format!("{before} evaluations"));
+            watch.say(Event::Evaluations(before));
         }
         if self.attention.is_interrupted() {
             terms.clear();

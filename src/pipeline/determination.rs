@@ -1,9 +1,9 @@
 //! Tables of the ranges in which the data determine mass matrix, friction and energy of the model of `lnn fit`.
 
 use crate::analysis::{Determination, EnergyLoss, Estimate, Observed, determination, energy_loss, places};
-use crate::cli::CliError;
 use crate::lagrangian::EulerLagrange;
 use crate::names::number;
+use crate::pipeline::PipelineError;
 use crate::recording::Targets;
 use crate::report::{Report, text_table};
 use crate::training::Measured;
@@ -49,11 +49,11 @@ impl Determined {
     /// Looks at a model of recorded motion.
     ///
     /// # Errors
-    /// A data error if the states that were learned from cannot be had again.
-    pub fn new(model: &dyn EulerLagrange<f64>, measured: &Measured, targets: Targets) -> Result<Self, CliError> {
+    /// [`PipelineError::Recording`] if the states that were learned from cannot be had again.
+    pub fn new(model: &dyn EulerLagrange<f64>, measured: &Measured, targets: Targets) -> Result<Self, PipelineError> {
         let recording = &measured.training.recording;
         let names = &recording.coordinates;
-        let observed = Observed::new(measured, targets).map_err(CliError::data)?;
+        let observed = Observed::new(measured, targets)?;
         let (q, v) = places(measured);
         let found = determination(model, &recording.periodic, &observed, (&q, &v));
         let unit = match &found {

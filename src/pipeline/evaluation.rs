@@ -5,13 +5,15 @@ use crate::analysis::{
     ValidTimes, acceleration_errors, conserved_error, determinant_grid, lagrangian_grid, mass_matrix_error, statistics,
     wrong_signatures,
 };
-use crate::cli::attention::Attention;
-use crate::cli::{CliError, headline, memory};
 use crate::lagrangian::system::TrajectoryTest as Span;
 use crate::lagrangian::{Configured, EulerLagrange};
 use crate::names::{WIDTH, hundredths, number, rounded, wrapped};
+use crate::pipeline::attention::Attention;
+use crate::pipeline::report_files::{parameter_table, write_report_and_figures};
+use crate::pipeline::{Output, PipelineError, Watch, headline, memory};
 use crate::report::{Figure, Fit, GridComparison, Report, evaluation_figures, grid_figures, text_table};
 use crate::rollout::{Domain, Trajectory};
+use crate::training::{Stream, sample};
 use serde::Serialize;
 use std::fmt::Write as _;
 
@@ -19,6 +21,10 @@ use std::fmt::Write as _;
 const GRID: usize = 81;
 /// Relative tolerance of the learned motion in the paper's test.
 pub const RTOL: f64 = 1e-6;
+/// Fresh states on which accelerations are compared.
+const STATES: usize = 12_000;
+/// Starts of the trajectory test, as in the paper.
+pub(crate) const STARTS: usize = 4;
 /// Starts whose motion is drawn.
 const DRAWN: usize = 4;
 /// Velocities of the fast map of `det M`, in upper bounds of the validation states.
@@ -66,12 +72,12 @@ pub struct Motion {
     pub left_training_range: Option<String>,
 }
 
-/// Settings of an evaluation.
+/// States and starts of an evaluation, and how the learned motion is integrated.
 #[derive(Clone, Debug)]
-pub struct Plan<'a> {
-    /// Fresh states `(states, n)` on which accelerations are compared.
-    pub states: (&'a [f64], &'a [f64]),
-    /// Random starts.
+pub struct EvaluationOptions {
+    /// Fresh states `(states, n)`, `q` and `v`, on which accelerations are compared.
+    pub states: (Vec<f64>, Vec<f64>),
+    /// Random starts of the trajectory test.
     pub starts: usize,
     /// Where they lie and how long they move.
     pub span: Span,
@@ -83,25 +89,42 @@ pub struct Plan<'a> {
     pub seed: u64,
     /// Threads.
     pub threads: usize,
-    /// Watches over it: [`PIECES`] pieces of work.
-    pub attention: &'a Attention,
+}
+
+impl EvaluationOptions {
+    /// The paper's trajectory test from four starts, and 12,000 fresh states of the validation bounds; one thread.
+    ///
+    /// # Errors
+    /// [`PipelineError::Sampling`] for bounds that cannot be sampled.
+    pub fn new(system: &Configured<f64>, trained: Domain<f64>, seed: u64) -> Result<Self, PipelineError> {
+        let bounds = system.system.validation(system.coordinates);
+        let pairs = |bounds: &[(f64, f64)]| bounds.iter().map(|&(low, high)| [low, high]).collect::<Vec<_>>();
+        let bounds = (pairs(&bounds.positions), pairs(&bounds.velocities));
+        let mut random = Stream::Test.generator(seed);
+        let states = sample(system, "validation bounds", (&bounds.0, &bounds.1), STATES, &mut random)?;
+        let states = (states.q().to_vec(), states.v().to_vec());
+        let span = system.system.trajectory(system.coordinates);
+        Ok(Self { states, starts: STARTS, span, rtol: RTOL, trained, seed, threads: 1 })
+    }
 }
 
 /// Pieces of work of an evaluation: accelerations, motions, pictures, mass matrices.
-pub const PIECES: usize = 4;
+const PIECES: usize = 4;
 
 /// Compares a model with the system it learned.
 ///
 /// # Errors
-/// A data error if a picture cannot be drawn or the system cannot be built, an interruption.
+/// A system that cannot be built, motions that do not fit into memory, [`PipelineError::Interrupted`].
 pub fn evaluate(
     system: &Configured<f64>,
     learned: &dyn EulerLagrange<f64>,
-    plan: Plan<'_>,
-) -> Result<Evaluation, CliError> {
+    options: EvaluationOptions,
+    watch: &Watch,
+) -> Result<Evaluation, PipelineError> {
+    let (plan, attention) = (options, &Attention::new(watch, PIECES));
+    let (q, v) = (plan.states.0.as_slice(), plan.states.1.as_slice());
     let n = system.coordinates;
-    let exact = system.build().map_err(CliError::data)?;
-    let attention = plan.attention;
+    let exact = system.build()?;
     let (exact, learned) = (attention.watched(exact.as_ref()), attention.watched(learned));
     let (exact, learned): (&dyn EulerLagrange<f64>, &dyn EulerLagrange<f64>) = (&exact, &learned);
     let done = || {
@@ -110,7 +133,7 @@ pub fn evaluate(
     };
     let coordinates = system.system.coordinates(n);
     let periodic: Vec<bool> = coordinates.iter().map(|c| c.periodic).collect();
-    let accelerations = acceleration_errors(exact, learned, plan.states.0, plan.states.1);
+    let accelerations = acceleration_errors(exact, learned, q, v);
     done()?;
 
     let Span { start, t_end, dt } = plan.span;
@@ -131,7 +154,7 @@ pub fn evaluate(
         threads: plan.threads,
         ..defaults
     };
-    let runs = test.run_constrained(system, exact, learned).map_err(CliError::data)?;
+    let runs = test.run_constrained(system, exact, learned)?;
     done()?;
     let motion = |run: &TrajectoryRun<f64>| Motion {
         summary: run.summary(),
@@ -146,8 +169,8 @@ pub fn evaluate(
     attention.check()?;
     figures.extend(grids?);
     done()?;
-    let wrong_signature = wrong_signatures(exact, learned, plan.states.0, plan.states.1);
-    let mass_matrix = mass_matrix_error(exact, learned, plan.states.0);
+    let wrong_signature = wrong_signatures(exact, learned, q, v);
+    let mass_matrix = mass_matrix_error(exact, learned, q);
     done()?;
     Ok(Evaluation {
         accelerations,
@@ -185,14 +208,14 @@ fn grids(
     system: &Configured<f64>,
     exact: &dyn EulerLagrange<f64>,
     learned: &dyn EulerLagrange<f64>,
-) -> Result<Vec<Figure>, CliError> {
+) -> Result<Vec<Figure>, PipelineError> {
     let n = system.coordinates;
     let bounds = system.system.validation(n);
     let middle: Vec<f64> = bounds.positions.iter().map(|(low, high)| 0.5 * (low + high)).collect();
     // At rest a total time derivative in the learned L vanishes: what is left is a factor and a constant.
     let mut rest: Vec<f64> = bounds.velocities.iter().map(|(low, high)| 0.0f64.clamp(*low, *high)).collect();
     // A mass shell lets nothing rest in time.
-    system.impose_constraint(&middle, &mut rest).map_err(CliError::data)?;
+    system.impose_constraint(&middle, &mut rest)?;
     let fast = bounds.velocities.iter().map(|(_, high)| FAST * high).collect();
     let (rest, fast) = ([middle.clone(), rest].concat(), [middle, fast].concat());
     let ranges: Vec<(f64, f64)> = bounds.positions.into_iter().chain(bounds.velocities).collect();
@@ -232,8 +255,8 @@ fn grids(
             file: file.to_string(),
             x_label: labels[shown[0]].clone(),
             y_label: labels[shown[1]].clone(),
-            exact: exact.map_err(CliError::data)?,
-            learned: learned.map_err(CliError::data)?,
+            exact: exact?,
+            learned: learned?,
             fixed,
             fit: if quantity == "L" { Fit::Affine } else { Fit::Factor },
             signs: quantity != "L",
@@ -281,7 +304,41 @@ struct Table {
     rows: Vec<Vec<String>>,
 }
 
+/// Contents of `evaluation.json`.
+#[derive(Serialize)]
+struct Summary<'a> {
+    system: &'a str,
+    seed: u64,
+    validation_loss: f64,
+    #[serde(flatten)]
+    evaluation: &'a Evaluation,
+}
+
 impl Evaluation {
+    /// Writes `evaluation.json`, `report.html` and pictures, and returns the first; `model` and `validation_loss` are those
+    /// of the model's file, `seed` that of the starts.
+    ///
+    /// # Errors
+    /// [`PipelineError::Output`].
+    pub fn write(
+        &self,
+        system: &Configured<f64>,
+        (model, validation_loss): (&str, f64),
+        seed: u64,
+        output: &dyn Output,
+    ) -> Result<String, PipelineError> {
+        let summary = Summary { system: &system.system.name, seed, validation_loss, evaluation: self };
+        let json = serde_json::to_string_pretty(&summary).map_err(PipelineError::format)? + "\n";
+        output.write("evaluation.json", json.as_bytes())?;
+        let title = format!("{}: learned against exact", system.system.title);
+        let report = self
+            .summarise(Report::new(&title), &system.system.title)
+            .paragraph(&format!("Model {model}, starts of seed {seed}."));
+        let report = self.report(parameter_table(report, system));
+        write_report_and_figures(output, &report, self.figures.iter())?;
+        Ok(json)
+    }
+
     fn tables(&self) -> [Table; 3] {
         let units: Vec<&str> = self.coordinates.iter().map(|name| headline::named(name).1).collect();
         let unit = units.first().filter(|unit| units.iter().all(|other| other == *unit));
@@ -366,12 +423,12 @@ impl Evaluation {
     }
 
     /// The headline, at the beginning of a report about the system called `title`.
-    pub fn summarise(&self, report: Report, title: &str) -> Report {
+    pub(crate) fn summarise(&self, report: Report, title: &str) -> Report {
         headline::of_evaluation(title, self).begin(report)
     }
 
     /// Tables and pictures for a report.
-    pub fn report(&self, mut report: Report) -> Report {
+    pub(crate) fn report(&self, mut report: Report) -> Report {
         for Table { title, header, rows } in self.tables() {
             report = report.heading(&title).table(&header, &rows);
         }

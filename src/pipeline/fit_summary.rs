@@ -1,20 +1,19 @@
 //! Results of `lnn fit`: `summary.json`, tables for a terminal, report.
 
-use crate::cli::determined::Determined;
-use crate::cli::folder::Folder;
-use crate::cli::judgement::Judgement;
-use crate::cli::learning::{ended, training_pictures, write_report_and_figures};
-use crate::cli::{CliError, headline};
 use crate::names::{WIDTH, counted, hundredths, number, wrapped};
+use crate::pipeline::determination::Determined;
+use crate::pipeline::hold_out::HoldOut;
+use crate::pipeline::prepared_fit::PreparedFit;
+use crate::pipeline::report_files::{ended, training_pictures, write_report_and_figures};
+use crate::pipeline::{Output, PipelineError, headline};
 use crate::recording::{HeldOut, Recording, Targets};
 use crate::report::{Report, text_table};
 use crate::scalar::Scalar;
 use crate::training::shooting::Fitted;
-use crate::training::{Measured, Trained};
+use crate::training::{Config, Trained};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
-use std::time::Instant;
 
 /// One coordinate of `summary.json`: what the data are like and what smoothing makes of them, in SI units.
 #[derive(Serialize)]
@@ -55,7 +54,7 @@ struct Summary<'a> {
     training_seconds: f64,
     wall_seconds: f64,
     #[serde(flatten)]
-    judgement: &'a Judgement,
+    judgement: &'a HoldOut,
     #[serde(flatten)]
     determined: &'a Determined,
 }
@@ -76,73 +75,66 @@ const SMOOTHING: [&str; 6] =
     ["coordinate", "noise [SI]", "window [s]", "window [samples]", "error of a [SI]", "error of a over its rms [%]"];
 
 /// A learned model with its data.
-pub struct Found<'a, S> {
-    /// Name of the system.
-    pub name: &'a str,
-    /// Recorded motion.
-    pub recording: &'a Recording,
-    /// The same, smoothed and divided.
-    pub measured: &'a Measured,
-    /// Targets that were learned from.
-    pub targets: Targets,
-    /// Seed.
-    pub seed: u64,
+pub(crate) struct Found<'a, S> {
+    /// Recorded motion, as it is, smoothed and divided.
+    pub prepared: &'a PreparedFit<'a>,
+    /// The supervised training.
+    pub config: &'a Config,
     /// Threads.
     pub threads: usize,
-    /// The supervised training.
+    /// Result of the supervised training.
     pub trained: &'a Trained<S>,
     /// Constants of the known part of a grey box, by name.
     pub constants: BTreeMap<String, f64>,
     /// Multiple shooting, if there was any.
     pub shot: Option<&'a Fitted<S>>,
     /// Predictions of held-out motion.
-    pub judgement: &'a Judgement,
+    pub hold_out: &'a HoldOut,
     /// Ranges in which the data determine the model.
     pub determined: &'a Determined,
-    /// When the command began.
-    pub started: Instant,
 }
 
 impl<'a, S: Scalar> Found<'a, S> {
-    /// Writes `summary.json`, `report.html` and pictures, and returns the first as it is or in words.
+    /// Writes `summary.json`, `report.html` and pictures, and returns the first as it is and in words.
     ///
     /// # Errors
-    /// Pictures that cannot be drawn, files that cannot be written.
-    pub fn write(&self, folder: &Folder, toml: &str, as_json: bool) -> Result<String, CliError> {
+    /// [`PipelineError::Output`].
+    pub fn write(&self, output: &dyn Output, toml: &str) -> Result<(String, String), PipelineError> {
+        let (recording, name) = (&self.prepared.reading.recording, self.config.system.as_str());
         let summary = self.summary();
-        let json = serde_json::to_string_pretty(&summary).map_err(CliError::data)? + "\n";
-        folder.write("summary.json", json.as_bytes())?;
-        let periodic = &self.recording.periodic;
+        let json = serde_json::to_string_pretty(&summary).map_err(PipelineError::format)? + "\n";
+        output.write("summary.json", json.as_bytes())?;
+        let periodic = &recording.periodic;
         let unit = if periodic.iter().all(|periodic| *periodic) { "rad" } else { "SI units" };
-        let headline = headline::of_judgement(self.name, self.judgement, unit);
-        let opening = summary.opening(self.recording);
+        let headline = headline::of_hold_out(name, self.hold_out, unit);
+        let opening = summary.opening(recording);
         let mut figures = training_pictures(&self.trained.history);
         if let Some(shot) = self.shot {
             let mut later = training_pictures(&shot.history);
             later.iter_mut().for_each(|figure| figure.file.insert_str(0, "shooting_"));
             figures.extend(later);
         }
-        let report = headline.begin(Report::new(&format!("{}: learned from recorded motion", self.name)));
+        let report = headline.begin(Report::new(&format!("{name}: learned from recorded motion")));
         let report = report.preformatted(&wrapped(opening.trim_end(), WIDTH));
-        let report = self.determined.report(self.judgement.report(report)).heading("Training");
+        let report = self.determined.report(self.hold_out.report(report)).heading("Training");
         let report = report.figures(&figures).heading("Configuration").preformatted(toml);
-        write_report_and_figures(folder, &report, figures.iter().chain(&self.judgement.figures))?;
-        let tables = self.judgement.text() + &self.determined.text();
+        write_report_and_figures(output, &report, figures.iter().chain(&self.hold_out.figures))?;
+        let tables = self.hold_out.text() + &self.determined.text();
         let text = wrapped(&format!("{}\n{opening}{tables}", headline.text()), WIDTH);
-        let text = format!("{text}\nreport: {}\n", folder.file("report.html").display());
-        Ok(if as_json { json } else { text })
+        Ok((json, text))
     }
 
     fn summary(&self) -> Summary<'a> {
-        let Self { measured, trained, shot, .. } = self;
+        let Self { prepared, trained, shot, .. } = self;
+        let measured = &prepared.measured;
         let parts = [&measured.training, &measured.validation, &measured.test];
         Summary {
-            system: self.name,
+            system: &self.config.system,
             crate_version: env!("CARGO_PKG_VERSION"),
-            seed: self.seed,
+            seed: self.config.seed,
             precision: S::NAME,
             threads: self.threads,
-            targets: self.targets,
+            targets: prepared.targets,
             trajectories: parts.map(|part| part.recording.tracks.len()),
             samples: parts.map(|part| part.recording.samples()),
             held_out: &measured.held_out,
@@ -162,14 +154,15 @@ impl<'a, S: Scalar> Found<'a, S> {
             constants: self.constants.clone(),
             ended: ended(&trained.stop),
             training_seconds: trained.seconds + shot.map_or(0.0, |fitted| fitted.seconds),
-            wall_seconds: self.started.elapsed().as_secs_f64(),
-            judgement: self.judgement,
+            wall_seconds: prepared.started.elapsed().as_secs_f64(),
+            judgement: self.hold_out,
             determined: self.determined,
         }
     }
 
     fn coordinates(&self) -> Vec<Coordinate> {
-        let pairs = self.recording.coordinates.iter().zip(&self.measured.smoothing.coordinates);
+        let PreparedFit { reading, measured, .. } = self.prepared;
+        let pairs = reading.recording.coordinates.iter().zip(&measured.smoothing.coordinates);
         pairs
             .map(|(name, chosen)| Coordinate {
                 name: name.clone(),

@@ -2,15 +2,15 @@
 //! terminal and at the beginning of a report.
 
 use crate::analysis::{PredictionError, ValidTimes};
-use crate::cli::evaluation::Evaluation;
-use crate::cli::judgement::Judgement;
 use crate::experiments::{Row, Spread};
 use crate::names::{counted, number, percent};
+use crate::pipeline::evaluation::Evaluation;
+use crate::pipeline::hold_out::HoldOut;
 use crate::report::Report;
 
 /// A headline.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Headline {
+pub(crate) struct Headline {
     /// The result in a sentence.
     pub sentence: String,
     /// Quantities with their values.
@@ -31,7 +31,7 @@ impl Headline {
 }
 
 /// Name and unit of `name [unit]`.
-pub fn named(text: &str) -> (&str, &str) {
+pub(crate) fn named(text: &str) -> (&str, &str) {
     text.split_once(" [").map_or((text, ""), |(name, unit)| (name, unit.trim_end_matches(']')))
 }
 
@@ -55,7 +55,7 @@ fn valid_name(valid: &ValidTimes, [one, many]: [&str; 2]) -> String {
 }
 
 /// A model of a system that is known: `title` names it.
-pub fn of_evaluation(title: &str, found: &Evaluation) -> Headline {
+pub(crate) fn of_evaluation(title: &str, found: &Evaluation) -> Headline {
     let mass = found.mass_matrix.error.median;
     let matrix = if mass.is_finite() {
         format!("gives the mass matrix to {} up to one factor", percent(mass))
@@ -86,7 +86,7 @@ pub fn of_evaluation(title: &str, found: &Evaluation) -> Headline {
 }
 
 /// A model of recorded motion called `name`, whose coordinates are in `unit`.
-pub fn of_judgement(name: &str, found: &Judgement, unit: &str) -> Headline {
+pub(crate) fn of_hold_out(name: &str, found: &HoldOut, unit: &str) -> Headline {
     let signature = || {
         let what = "Held-out states whose mass matrix has the wrong signature".to_string();
         found.wrong_signature.is_finite().then(|| [what, percent(found.wrong_signature)])
@@ -129,7 +129,7 @@ fn predicted(model: &PredictionError, straight: &PredictionError, valid: Option<
 }
 
 /// An experiment: its best row beside the paper's best, and in how many rows it is below the paper.
-pub fn of_experiment(rows: &[Row]) -> Headline {
+pub(crate) fn of_experiment(rows: &[Row]) -> Headline {
     let lowest = |of: fn(&Row) -> Option<f64>| {
         let known = rows.iter().filter_map(|row| Some((row, of(row).filter(|loss| loss.is_finite())?)));
         known.min_by(|a, b| a.1.total_cmp(&b.1))

@@ -4,29 +4,30 @@ use crate::analysis::{
     PredictionError, Predictions, ValidTimes, Window, predict_by_constant_velocity, prediction_error, spread,
     window_valid_times,
 };
-use crate::cli::attention::Attention;
-use crate::cli::energy::{Balance, balance};
-use crate::cli::foretell::Foretold;
-use crate::cli::{CliError, forces};
 use crate::lagrangian::{EulerLagrange, Request, Terms};
 use crate::names::number;
+use crate::pipeline::attention::Attention;
+use crate::pipeline::energy::{Balance, balance};
+use crate::pipeline::prediction::HeldOutPredictions;
+use crate::pipeline::{PipelineError, Watch};
 use crate::report::{Figure, LinePlot, Report, Series, Turn, kept, line_plot, text_table};
+use crate::rollout::SampledForce;
 use crate::training::{Part, SignatureBuffers, has_signature};
 use serde::Serialize;
 
 /// Windows that are predicted at most; of more, evenly spaced ones.
-pub const WINDOWS: usize = 500;
+const WINDOWS: usize = 500;
 /// Samples ahead that are predicted unless told otherwise.
 const AHEAD: f64 = 200.0;
 /// Points of a curve of prediction errors.
 const POINTS: usize = 40;
 
-/// Settings of a judgement.
+/// Motion that judges a model, and how.
 #[derive(Clone, Copy, Debug)]
-pub struct Plan<'a> {
+pub struct HoldOutOptions<'a> {
     /// Motion that the model has not seen.
     pub part: &'a Part,
-    /// Time over which it is predicted, in s, if that is given.
+    /// Time over which it is predicted, in s; none for 200 samples, at most a quarter of the shortest trajectory.
     pub horizon: Option<f64>,
     /// The time-like coordinate, if there is one.
     pub time: Option<usize>,
@@ -34,13 +35,11 @@ pub struct Plan<'a> {
     pub forces: &'a [String],
     /// Threads.
     pub threads: usize,
-    /// Watches over it.
-    pub attention: &'a Attention,
 }
 
-/// Numbers and pictures.
+/// Predictions of motion that was held out, beside going on at constant velocity, in SI units.
 #[derive(Clone, Debug, Serialize)]
-pub struct Judgement {
+pub struct HoldOut {
     /// Errors of the model's motion, by time ahead.
     pub model: Vec<PredictionError>,
     /// How long the model's motion predicts the measured one, median over the windows; at least to their end where the error
@@ -50,7 +49,7 @@ pub struct Judgement {
     pub given_up: String,
     /// Errors of going on at the velocity of the start.
     pub constant_velocity: Vec<PredictionError>,
-    /// Fraction of the held-out states whose mass matrix has not the right signature.
+    /// Fraction of the held-out states whose mass matrix has not the right signature; `NaN` where nothing was held out.
     pub wrong_signature: f64,
     /// Energy along the held-out trajectories; none if there is none of it to be told.
     pub energy: Option<Balance>,
@@ -59,14 +58,19 @@ pub struct Judgement {
     pub figures: Vec<Figure>,
 }
 
-/// Predicts held-out motion.
+/// Predicts held-out motion in up to 500 windows and compares it with what was measured.
 ///
 /// # Errors
-/// A data error if a picture cannot be drawn, an interruption.
-pub fn judge(model: &dyn EulerLagrange<f64>, plan: &Plan<'_>) -> Result<Judgement, CliError> {
+/// [`PipelineError::Interrupted`].
+pub fn evaluate_hold_out(
+    model: &dyn EulerLagrange<f64>,
+    options: &HoldOutOptions<'_>,
+    watch: &Watch,
+) -> Result<HoldOut, PipelineError> {
+    let (attention, plan) = (&Attention::new(watch, WINDOWS), options);
     let (n, recording) = (model.coordinates(), &plan.part.recording);
     if recording.tracks.is_empty() {
-        return Ok(Judgement::nothing());
+        return Ok(HoldOut::nothing());
     }
     let horizon = plan.horizon.unwrap_or_else(|| horizon(plan.part));
     let mut windows: Vec<Window> = plan
@@ -78,9 +82,9 @@ pub fn judge(model: &dyn EulerLagrange<f64>, plan: &Plan<'_>) -> Result<Judgemen
         .collect();
     let stride = windows.len().div_ceil(WINDOWS).max(1);
     windows = windows.into_iter().step_by(stride).collect();
-    let watched = plan.attention.watched(model);
+    let watched = attention.watched(model);
     let model: &dyn EulerLagrange<f64> = &watched;
-    let foretold = Foretold::new(model, windows, plan.threads, plan.attention)?;
+    let foretold = HeldOutPredictions::new(model, windows, plan.threads, attention)?;
     let (windows, motion) = (&foretold.windows, &foretold.predictions);
     let straight = predict_by_constant_velocity(windows);
     let errors = |predictions: &Predictions, count: usize| -> Vec<PredictionError> {
@@ -101,18 +105,18 @@ pub fn judge(model: &dyn EulerLagrange<f64>, plan: &Plan<'_>) -> Result<Judgemen
         }
         if let Some(force) = &windows[0].force {
             let times: Vec<f64> = [0.0].iter().chain(&windows[0].times).copied().collect();
-            figures.extend(drawn(forces::plot(force, &times, plan.forces), "prediction_forces.svg", FORCE_CAPTION));
+            figures.extend(drawn(force_plot(force, &times, plan.forces), "prediction_forces.svg", FORCE_CAPTION));
         }
     }
     let tabled = |predictions: &Predictions| if windows.is_empty() { Vec::new() } else { errors(predictions, 4) };
     let (wrong_signature, energy) = (wrong_signature(model, plan.part, plan.time), balance(model, plan.part));
-    plan.attention.check()?;
+    attention.check()?;
     let spread = spread(
         &recording.tracks.iter().flat_map(|track| track.q.iter().copied()).collect::<Vec<_>>(),
         &recording.periodic,
     );
     let valid = window_valid_times(windows, motion, &recording.periodic, &spread);
-    Ok(Judgement {
+    Ok(HoldOut {
         model: tabled(motion),
         valid_time: ValidTimes::of(&valid.into_iter().map(|valid| (valid, None)).collect::<Vec<_>>()),
         constant_velocity: tabled(&straight),
@@ -183,6 +187,25 @@ fn example(window: &Window, predicted: &[f64], periodic: &[bool], i: usize, name
     }
 }
 
+/// Forces over time, one line each.
+fn force_plot(force: &SampledForce<f64>, times: &[f64], names: &[String]) -> LinePlot {
+    let mut values = vec![0.0; names.len()];
+    let mut columns = vec![Vec::with_capacity(times.len()); names.len()];
+    for &t in times {
+        force.at(t, &mut values);
+        columns.iter_mut().zip(&values).for_each(|(column, &value)| column.push(value));
+    }
+    LinePlot {
+        title: "Known forces".into(),
+        x_label: "time ahead [s]".into(),
+        y_label: "force [N, N m]".into(),
+        log_y: false,
+        series: names.iter().zip(&columns).map(|(name, column)| Series::new(name, times, column)).collect(),
+        turn: None,
+        level: None,
+    }
+}
+
 /// States evaluated at once.
 const CHUNK: usize = 4096;
 
@@ -213,7 +236,7 @@ fn wrong_signature(model: &dyn EulerLagrange<f64>, part: &Part, time: Option<usi
     wrong as f64 / f64::max(1.0, count as f64)
 }
 
-impl Judgement {
+impl HoldOut {
     const HEADERS: [&'static str; 7] = [
         "time ahead [s]",
         "median error [SI]",

@@ -1,24 +1,25 @@
 //! Work that would not fit into the machine's memory is refused before it begins.
 
-use crate::cli::CliError;
+use crate::pipeline::PipelineError;
 use crate::storage::available_memory;
 
 /// Refuses work that takes more memory than is available; where the system does not say how much is, only work whose
 /// memory cannot be counted.
 ///
 /// # Errors
-/// A data error with both figures.
-pub fn require(work: &str, needed: Option<u64>) -> Result<(), CliError> {
+/// [`PipelineError::Memory`] with both figures.
+pub(crate) fn require(work: &str, needed: Option<u64>) -> Result<(), PipelineError> {
     check(work, needed, available_memory())
 }
 
-fn check(work: &str, needed: Option<u64>, available: Option<u64>) -> Result<(), CliError> {
+fn check(work: &str, needed: Option<u64>, available: Option<u64>) -> Result<(), PipelineError> {
+    let refuse = |needed: Option<u64>, available: u64| {
+        let (work, needed, available) = (work.to_string(), needed.map(size), size(available));
+        Err(PipelineError::Memory { work, needed, available })
+    };
     match (needed, available) {
-        (None, _) => Err(CliError::data(format_args!("{work} takes more memory than can be counted"))),
-        (Some(needed), Some(available)) if needed > available => {
-            let (needed, available) = (size(needed), size(available));
-            Err(CliError::data(format_args!("{work} takes about {needed} of memory, {available} are available")))
-        }
+        (None, available) => refuse(None, available.unwrap_or(0)),
+        (Some(needed), Some(available)) if needed > available => refuse(Some(needed), available),
         _ => Ok(()),
     }
 }
@@ -37,7 +38,7 @@ fn size(bytes: u64) -> String {
 /// Bytes of `motions` sampled motions of `n` coordinates, `samples` each: `2 n + 2` numbers per sample, each held as it
 /// is made, as it is kept, as what is worked out of it, in vectors that may have grown to twice their length, and as
 /// `text` bytes of text.
-pub fn motions(motions: u64, samples: f64, n: usize, text: u64) -> Option<u64> {
+pub(crate) fn motions(motions: u64, samples: f64, n: usize, text: u64) -> Option<u64> {
     let numbers = (n as u64).checked_add(1)?.checked_mul(2)?;
     // A quotient beyond 64 bits saturates, and what is made of it overflows.
     let samples = (samples.abs().ceil() as u64).checked_add(1)?;

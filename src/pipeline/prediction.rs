@@ -1,9 +1,9 @@
 //! Predictions of held-out windows in bounded time, and why some were given up.
 
 use crate::analysis::{Predictions, Window, follow};
-use crate::cli::CliError;
-use crate::cli::attention::Attention;
 use crate::lagrangian::EulerLagrange;
+use crate::pipeline::PipelineError;
+use crate::pipeline::attention::Attention;
 use crate::rollout::RolloutError;
 use std::collections::BTreeMap;
 
@@ -14,7 +14,7 @@ const PILOT: usize = 40;
 const PART: usize = 32;
 
 /// Windows with what a model makes of them.
-pub struct Foretold {
+pub(crate) struct HeldOutPredictions {
     /// The windows that were predicted.
     pub windows: Vec<Window>,
     /// Their predictions.
@@ -25,17 +25,17 @@ pub struct Foretold {
     pub given_up: BTreeMap<&'static str, usize>,
 }
 
-impl Foretold {
+impl HeldOutPredictions {
     /// Predicts the windows, or few of them if those show that there is nothing to predict.
     ///
     /// # Errors
-    /// An interruption.
+    /// [`PipelineError::Interrupted`].
     pub fn new(
         model: &dyn EulerLagrange<f64>,
         mut windows: Vec<Window>,
         threads: usize,
-        attention: &Attention,
-    ) -> Result<Self, CliError> {
+        attention: &Attention<'_>,
+    ) -> Result<Self, PipelineError> {
         let all = windows.len();
         let stride = all.div_ceil(PILOT).max(1);
         let mut found = Self { windows: Vec::new(), predictions: Vec::new(), all, given_up: BTreeMap::new() };
@@ -84,8 +84,8 @@ fn in_parts(
     model: &dyn EulerLagrange<f64>,
     windows: &[Window],
     threads: usize,
-    attention: &Attention,
-) -> Result<(Predictions, Vec<Option<RolloutError>>), CliError> {
+    attention: &Attention<'_>,
+) -> Result<(Predictions, Vec<Option<RolloutError>>), PipelineError> {
     let (mut predictions, mut stops) = (Vec::with_capacity(windows.len()), Vec::with_capacity(windows.len()));
     for part in windows.chunks(PART) {
         let (foretold, ended) = follow(model, part, threads);
@@ -112,9 +112,9 @@ fn reason(stop: &RolloutError) -> &'static str {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::pipeline::Watch;
     use crate::rollout::models::{OSCILLATOR, SINGULAR};
-    use std::sync::Arc;
-    use std::sync::atomic::{AtomicBool, Ordering};
+    use std::sync::atomic::Ordering;
 
     fn windows(count: usize) -> Vec<Window> {
         let times: Vec<f64> = (1..20).map(|k| 0.1 * f64::from(k)).collect();
@@ -124,28 +124,30 @@ mod tests {
 
     #[test]
     fn a_model_that_fails_nearly_always_is_not_tried_everywhere() {
-        let attention = Attention::new(None, 1);
-        let found = Foretold::new(&SINGULAR, windows(400), 2, &attention).unwrap();
+        let watch = Watch::default();
+        let watch = Watch::default();
+        let attention = Attention::new(&watch, 1);
+        let found = HeldOutPredictions::new(&SINGULAR, windows(400), 2, &attention).unwrap();
         assert_eq!((found.windows.len(), found.predictions.len(), found.all), (PILOT, PILOT, 400));
         let remarks = found.remarks();
         assert!(remarks.starts_with("40 of 40 predictions were given up: 40 by a singular mass matrix"), "{remarks}");
         assert!(remarks.contains("of 400 windows only 40 were tried"), "{remarks}");
-        let well = Foretold::new(&OSCILLATOR, windows(100), 2, &attention).unwrap();
+        let well = HeldOutPredictions::new(&OSCILLATOR, windows(100), 2, &attention).unwrap();
         assert_eq!((well.windows.len(), well.remarks().as_str()), (100, ""));
     }
 
     #[test]
-    fn ctrl_c_ends_it() {
-        let stop = Arc::new(AtomicBool::new(false));
-        let attention = Attention::new(Some(&stop), 1);
-        stop.store(true, Ordering::SeqCst);
+    fn a_raised_flag_ends_it() {
+        let watch = Watch::default();
+        let attention = Attention::new(&watch, 1);
+        watch.interrupt.store(true, Ordering::SeqCst);
         let watched = attention.watched(&OSCILLATOR);
-        let Err(error) = Foretold::new(&watched, windows(100), 2, &attention) else { panic!("it goes on") };
+        let Err(error) = HeldOutPredictions::new(&watched, windows(100), 2, &attention) else { panic!("it goes on") };
         assert!(error.to_string().contains("interrupted while the model was judged"));
         let (predictions, stops) = follow(&watched, &windows(1), 1);
         assert!(predictions[0].iter().all(|x| x.is_nan()) && stops[0].is_some());
-        // The Ctrl-C that ended a training does not end the judgement of its model.
-        let later = Attention::new(Some(&stop), 1);
-        assert!(Foretold::new(&later.watched(&OSCILLATOR), windows(3), 2, &later).is_ok());
+        // The flag that ended a training does not end the judgement of its model.
+        let later = Attention::new(&watch, 1);
+        assert!(HeldOutPredictions::new(&later.watched(&OSCILLATOR), windows(3), 2, &later).is_ok());
     }
 }

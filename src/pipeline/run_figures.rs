@@ -1,11 +1,11 @@
 //! Pictures that the report of an experiment takes over from its runs.
 
-use crate::cli::results::CAPTIONS;
 use crate::experiments::{Experiment, Picture, Record, Run};
 use crate::names::counted;
+use crate::pipeline::CAPTIONS;
+use crate::pipeline::experiment_store::ExperimentStore;
 use crate::report::Report;
 use std::collections::BTreeMap;
-use std::path::Path;
 
 /// Beginnings of the names of pictures in the order of a report; training and whatever else come last.
 const ORDER: [&str; 9] = [
@@ -29,13 +29,13 @@ fn place_in_report(file: &str) -> usize {
 const TAKEN: usize = 1 << 20;
 
 /// A picture that a run drew.
-pub struct Taken {
+pub(crate) struct Taken {
     svg: Vec<u8>,
     caption: String,
 }
 
 /// The report with as many pictures of runs as [`TAKEN`] allows, and where the others are.
-pub fn within(taken: Vec<Taken>, report: Report) -> Report {
+pub(crate) fn within(taken: Vec<Taken>, report: Report) -> Report {
     let (mut room, mut left) = (TAKEN, 0);
     let mut report = report;
     for Taken { svg, caption, .. } in taken {
@@ -54,28 +54,30 @@ pub fn within(taken: Vec<Taken>, report: Report) -> Report {
     }
 }
 
-/// Names of the pictures in a directory that begin so, in the order of a report.
-fn pictures_in(directory: &Path, prefix: &str) -> Vec<String> {
-    let entries = std::fs::read_dir(directory).into_iter().flatten();
-    let names = entries.filter_map(|entry| entry.ok()?.file_name().into_string().ok());
-    let mut files: Vec<String> = names.filter(|name| name.starts_with(prefix) && name.ends_with(".svg")).collect();
+/// Names of the pictures of a run that begin so, in the order of a report.
+fn pictures_of(store: &dyn ExperimentStore, run: &str, prefix: &str) -> Vec<String> {
+    let mut files = store.names(run);
+    files.retain(|name| name.starts_with(prefix) && name.ends_with(".svg"));
     files.sort_by_cached_key(|file| (place_in_report(file), file.clone()));
     files
 }
 
 /// Pictures that the experiment takes over from the evaluations of its runs, as far as they are there.
-pub fn pictures_of_runs(experiment: &Experiment, results: &[(Run, Option<Record>)], path: &Path) -> Vec<Taken> {
+pub(crate) fn pictures_of_runs(
+    experiment: &Experiment,
+    results: &[(Run, Option<Record>)],
+    store: &dyn ExperimentStore,
+) -> Vec<Taken> {
     let mut figures = Vec::new();
     for prefix in experiment.pictures.iter().flat_map(|picture| match picture {
         Picture::Evaluation(prefixes) => *prefixes,
         _ => &[],
     }) {
         for (run, _) in results.iter().filter(|(_, record)| record.is_some()) {
-            let directory = path.join(&run.name);
-            let read = |file: &str| crate::storage::read_regular(&directory.join(file), 1 << 26).ok();
+            let read = |file: &str| store.read(&run.name, file);
             let captions: BTreeMap<String, String> =
                 read(CAPTIONS).and_then(|json| serde_json::from_slice(&json).ok()).unwrap_or_default();
-            for file in pictures_in(&directory, prefix) {
+            for file in pictures_of(store, &run.name, prefix) {
                 let Some(svg) = read(&file) else { continue };
                 let caption = match captions.get(&file) {
                     Some(caption) => format!("{}: {caption}", run.label),
@@ -92,6 +94,7 @@ pub fn pictures_of_runs(experiment: &Experiment, results: &[(Run, Option<Record>
 mod tests {
     use super::*;
     use crate::experiments::{Outcome, Scale, find};
+    use crate::pipeline::Directory;
 
     #[test]
     fn pictures_come_in_the_order_of_a_report() {
@@ -126,16 +129,19 @@ mod tests {
             times: Vec::new(),
             seconds: 0.0,
         };
-        let results = [(run, Some(record))];
-        let found = |name: &str| -> Vec<String> {
-            let captions = pictures_of_runs(find(name).unwrap(), &results, directory.path()).len();
-            let [Picture::Evaluation(prefixes)] = find(name).unwrap().pictures else { panic!("no pictures of runs") };
-            let files: Vec<String> = prefixes.iter().flat_map(|prefix| pictures_in(&folder, prefix)).collect();
+        let (name, results) = (run.name.clone(), [(run, Some(record))]);
+        let store = Directory::create(directory.path()).unwrap();
+        let found = |experiment: &str| -> Vec<String> {
+            let captions = pictures_of_runs(find(experiment).unwrap(), &results, &store).len();
+            let [Picture::Evaluation(prefixes)] = find(experiment).unwrap().pictures else {
+                panic!("no pictures of runs")
+            };
+            let files: Vec<String> = prefixes.iter().flat_map(|prefix| pictures_of(&store, &name, prefix)).collect();
             assert_eq!(captions, files.len());
             files
         };
         assert_eq!(found("double-pendulum"), ordered);
-        let figures = pictures_of_runs(find("training-range").unwrap(), &results, directory.path());
+        let figures = pictures_of_runs(find("training-range").unwrap(), &results, &store);
         assert_eq!(figures[0].caption, "Double pendulum: at rest");
         assert_eq!(figures[1].caption, "Double pendulum");
         assert_eq!(found("training-range"), ["det_mass_matrix.svg", "det_mass_matrix_fast.svg"]);

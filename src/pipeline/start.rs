@@ -1,30 +1,30 @@
 //! Training that starts from a model: the configuration takes the model's shape, and another shape is refused.
 
-use crate::cli::CliError;
-use crate::cli::learned::model_file;
 use crate::network::Architecture;
 use crate::network::file::{Header, ModelFile, StoredPrecision};
+use crate::pipeline::{PipelineError, model_file};
 use crate::scalar::Scalar;
 use crate::training::{Config, Known, Precision, Scaling};
 use serde_json::Value;
 use std::path::Path;
 
 /// The model to start from, as far as the shape of a training is concerned.
-pub struct Start {
+pub struct StartModel {
     /// Where it is, as the user said it.
     pub from: String,
     /// Header of its file.
     pub header: Header,
 }
 
-impl Start {
+impl StartModel {
     /// Reads a model, by file or by the directory of its run.
     ///
     /// # Errors
-    /// A data error for anything but a whole model file.
-    pub fn read(from: &str) -> Result<Self, CliError> {
+    /// [`PipelineError::NoModel`] and [`PipelineError::Model`] for anything but a whole model file.
+    pub fn read(from: &str) -> Result<Self, PipelineError> {
         let path = model_file(Path::new(from))?;
-        let ModelFile { header, .. } = ModelFile::<f64>::load(&path).map_err(|e| CliError::file(&path, e))?;
+        let loaded = ModelFile::<f64>::load(&path);
+        let ModelFile { header, .. } = loaded.map_err(|source| PipelineError::Model { path, source })?;
         Ok(Self { from: from.to_string(), header })
     }
 
@@ -54,35 +54,38 @@ impl Start {
     /// Refuses a configuration whose network, for coordinates that are angles or not, is not the model's.
     ///
     /// # Errors
-    /// A usage error naming everything that differs.
-    pub fn require(&self, config: &Config, periodic: Vec<bool>) -> Result<(), CliError> {
+    /// [`PipelineError::OtherShape`] naming everything that differs.
+    pub fn require(&self, config: &Config, periodic: Vec<bool>) -> Result<(), PipelineError> {
         let columns = self.header.columns.iter().take(periodic.len()).map(String::as_str);
-        let form = config.network.form(columns).map_err(CliError::usage)?;
+        let form = config.network.form(columns)?;
         let plain = config.architecture_with(periodic, self.header.architecture.scale.clone());
         let asked = Architecture { form, ..plain };
         let found = differences(&asked, &self.header.architecture);
         if found.is_empty() {
             return Ok(());
         }
-        Err(CliError::usage(format_args!("--from {}: the model has another shape: {}", self.from, found.join("; "))))
+        let place = format!("--from {}", self.from);
+        Err(PipelineError::OtherShape { place, differences: found, configuration: true })
     }
 }
 
 /// Weights and scales of a model that a training starts from; the architecture must have been found to fit.
 ///
 /// # Errors
-/// A data error for a model that cannot be read, or that is of another shape by now.
-pub fn weights<S: Scalar>(
+/// A model that cannot be read, or that is of another shape by now.
+pub(crate) fn weights<S: Scalar>(
     from: &str,
     asked: impl FnOnce(Vec<f64>) -> Architecture,
-) -> Result<(Vec<S>, Architecture), CliError> {
+) -> Result<(Vec<S>, Architecture), PipelineError> {
     let path = model_file(Path::new(from))?;
-    let ModelFile { header, weights } = ModelFile::load(&path).map_err(|e| CliError::file(&path, e))?;
+    let loaded = ModelFile::load(&path);
+    let ModelFile { header, weights } = loaded.map_err(|source| PipelineError::Model { path: path.clone(), source })?;
     let asked = asked(header.architecture.scale.clone());
-    match differences(&asked, &header.architecture).as_slice() {
-        [] => Ok((weights, asked)),
-        found => Err(CliError::file(&path, format_args!("the model has another shape: {}", found.join("; ")))),
+    let differences = differences(&asked, &header.architecture);
+    if differences.is_empty() {
+        return Ok((weights, asked));
     }
+    Err(PipelineError::OtherShape { place: path.display().to_string(), differences, configuration: false })
 }
 
 /// Differences between the shape asked for and that of a model.

@@ -1,30 +1,23 @@
-//! One training from configuration to files: model, history, summary, pictures, report.
+//! A training from its configuration to files: model, history, summary, pictures, report.
 
 use crate::analysis::{stretches, training_instability};
-use crate::cli::attention::Attention;
-use crate::cli::evaluation::{Evaluation, PIECES, Plan, RTOL, evaluate};
-use crate::cli::folder::Folder;
-use crate::cli::learned::{MODEL, all_parameters, given, trained_on};
-use crate::cli::results::{CAPTIONS, remove_stale};
-use crate::cli::systems::parameters;
-use crate::cli::{CliError, memory, output, start};
-use crate::experiments::{Outcome, Record};
+use crate::experiments::{Learned, Outcome, Record};
+use crate::lagrangian::Configured;
 use crate::lagrangian::system::TrajectoryTest;
-use crate::lagrangian::{Configured, configure_system};
 use crate::names::{counted, number};
 use crate::network::file::{FORMAT, Header, ModelFile, StoredPrecision};
 use crate::network::{Architecture, Layout, NetworkLagrangian};
-use crate::report::{Figure, HistoryRow, Report, training_figures};
+use crate::pipeline::checkpoints::Checkpoints;
+use crate::pipeline::evaluation::{Evaluation, EvaluationOptions, RTOL, STARTS, evaluate};
+use crate::pipeline::model::{all_parameters, trained_on};
+use crate::pipeline::report_files::{ended, history, parameter_table, training_pictures, write_report_and_figures};
+use crate::pipeline::{MODEL, Output, PipelineError, Watch, memory, start};
+use crate::report::Report;
 use crate::scalar::Scalar;
-use crate::storage::Disk;
 use crate::training::{
-    Config, Datasets, Epoch, Every, Hooks, Identity, Keeper, NEWEST, PREVIOUS, Phase, Precision, Restored,
-    SamplingError, Sitting, Snapshot, Stop, TrainingError, remove_checkpoints, resume, sample_all, training_memory,
+    Config, Datasets, Epoch, Phase, Precision, Sitting, Snapshot, Stop, resume, sample_all, training_memory,
 };
 use serde::Serialize;
-use std::collections::BTreeMap;
-use std::fmt::Write as _;
-use std::sync::Arc;
 use std::time::Instant;
 
 /// Contents of `summary.json`; losses in the paper's convention, errors in physical units.
@@ -49,79 +42,72 @@ struct Summary<'a> {
     evaluation: &'a Evaluation,
 }
 
-/// Amount of work that a run may take.
-#[derive(Clone, Copy, Debug)]
-pub struct Effort {
-    /// Threads of the training.
+/// Resources of a run, and its checkpoints.
+#[derive(Clone, Debug)]
+pub struct RunOptions {
+    /// Threads; results do not depend on them.
     pub threads: usize,
-    /// Starts of the trajectory test.
+    /// Starts of the trajectory test; a fit has none.
     pub starts: usize,
-    /// Fraction of the test's time span.
-    pub horizon: f64,
+    /// Fraction of the time span of the trajectory test.
+    pub span: f64,
+    /// Checkpoints, if they are wanted.
+    pub checkpoints: Option<Checkpoints>,
 }
 
-/// A run that ended, after its files were written.
+impl Default for RunOptions {
+    /// One thread, four starts over the whole time span, no checkpoints.
+    fn default() -> Self {
+        Self { threads: 1, starts: STARTS, span: 1.0, checkpoints: None }
+    }
+}
+
+/// A model of a known system, after its files were written.
 #[derive(Debug)]
-pub struct Finished {
-    /// Why training ended.
+pub struct TrainReport {
+    /// Reason for which training ended.
     pub stop: Stop,
+    /// Header of the model's file.
+    pub header: Header,
+    /// The network with its best weights.
+    pub network: NetworkLagrangian<f64>,
     /// Epochs that were run.
-    pub epochs: usize,
-    /// `summary.json`.
+    pub history: Vec<Epoch>,
+    /// The model beside the system it learned.
+    pub evaluation: Evaluation,
+    /// Text of `summary.json`.
     pub json: String,
-    /// Tables for a terminal.
-    pub text: String,
     /// The record that an experiment keeps of it.
     pub record: Record,
+    /// The losses in one line.
+    headline: String,
+    title: String,
 }
 
-/// Where a training begins.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Begin {
-    /// At its beginning.
-    Anew,
-    /// At its checkpoint, which must be there.
-    Resume,
-    /// At its checkpoint if there is one that fits, at its beginning if not.
-    Either,
+impl TrainReport {
+    /// Headline and tables for a terminal.
+    pub fn text(&self) -> String {
+        format!("{}\n{}\n", self.evaluation.text(&self.title), self.headline)
+    }
 }
 
-/// Use of checkpoints in a training.
-#[derive(Clone, Copy, Debug)]
-pub struct Keeping {
-    /// Interval at which one is written.
-    pub every: Every,
-    /// Place where the training begins.
-    pub start: Begin,
-}
-
-/// The checkpoint to go on from, or nothing, with old checkpoints out of the way.
+/// Trains in the configuration's precision, evaluates, and writes everything into the output.
 ///
 /// # Errors
-/// A data error for a checkpoint that must be there and is not, or that is of another run.
-pub fn begin<S: Scalar>(
-    keeper: &Keeper,
-    folder: &Folder,
-    parameters: usize,
-    states: usize,
-    start: Begin,
-) -> Result<Option<Snapshot<S>>, CliError> {
-    if start != Begin::Anew {
-        match keeper.restore(parameters, states) {
-            Ok(Restored { content, fallback }) => {
-                if let Some(problem) = fallback {
-                    let (newest, previous) = (folder.file(NEWEST), folder.file(PREVIOUS));
-                    let place = newest.display();
-                    output::note(&format!("{place}: {problem}; going on from {}", previous.display()));
-                }
-                return Ok(Some(content));
-            }
-            Err(error) if start == Begin::Resume => return Err(CliError::file(folder.path(), error)),
-            Err(_) => {}
-        }
+/// Bounds that cannot be sampled, penalties that do not fit, files that cannot be written;
+/// [`TrainingError::NothingLearned`](crate::training::TrainingError::NothingLearned) if no epoch gave a finite loss, also when
+/// the watch's flag ended the first one: then nothing was written.
+pub fn train(
+    config: &Config,
+    system: &Configured<f64>,
+    options: &RunOptions,
+    output: &dyn Output,
+    watch: &Watch,
+) -> Result<TrainReport, PipelineError> {
+    match config.precision {
+        Precision::F32 => train_in::<f32>(config, system, options, output, watch),
+        Precision::F64 => train_in::<f64>(config, system, options, output, watch),
     }
-    forget(folder)?;
-    Ok(None)
 }
 
 /// The network's shape, and the weights of the model that the training starts from, if it does: then the scales are the
@@ -130,109 +116,60 @@ fn begin_shape<S: Scalar>(
     config: &Config,
     system: &Configured<f64>,
     scale: Vec<f64>,
-) -> Result<(Architecture, Option<Vec<S>>), CliError> {
+) -> Result<(Architecture, Option<Vec<S>>), PipelineError> {
     let Some(from) = &config.from else { return Ok((config.architecture(system, scale), None)) };
     let (weights, architecture) = start::weights(from, |scale| config.architecture(system, scale))?;
     Ok((architecture, Some(weights)))
 }
 
-/// Removes the checkpoints of a training that is over.
-///
-/// # Errors
-/// A data error naming the directory.
-pub fn forget(folder: &Folder) -> Result<(), CliError> {
-    let cannot = |e| CliError::file(folder.path(), format_args!("cannot remove checkpoints: {e}"));
-    remove_checkpoints(&Disk, folder.path()).map_err(cannot)
-}
-
-/// Outcome of a training.
-#[derive(Debug)]
-pub enum Learning {
-    /// There is a model.
-    Finished(Box<Finished>),
-    /// No epoch gave a finite loss, and why; nothing was written.
-    Nothing(String),
-}
-
-/// Trains in the configuration's precision and writes everything into the directory. Checkpoints stay until
-/// [`forget`].
-///
-/// # Errors
-/// A usage error for bounds that cannot be sampled and for penalties that do not fit, a data error for files that cannot be
-/// written.
-pub fn learn(
-    folder: &Folder,
+fn train_in<S: Scalar>(
     config: &Config,
     system: &Configured<f64>,
-    effort: Effort,
-    hooks: &Hooks,
-    keeping: Keeping,
-) -> Result<Learning, CliError> {
-    match config.precision {
-        Precision::F32 => learn_in::<f32>(folder, config, system, effort, hooks, keeping),
-        Precision::F64 => learn_in::<f64>(folder, config, system, effort, hooks, keeping),
-    }
-}
-
-fn learn_in<S: Scalar>(
-    folder: &Folder,
-    config: &Config,
-    system: &Configured<f64>,
-    effort: Effort,
-    hooks: &Hooks,
-    keeping: Keeping,
-) -> Result<Learning, CliError> {
+    options: &RunOptions,
+    output: &dyn Output,
+    watch: &Watch,
+) -> Result<TrainReport, PipelineError> {
     let started = Instant::now();
     let unscaled = config.architecture(system, vec![1.0; system.coordinates]);
     memory::require("training", training_memory(config, &unscaled))?;
-    let (data, scale) = sample_all::<S>(config, system).map_err(|e| match e {
-        SamplingError::Dataset(_) => CliError::data(e),
-        _ => CliError::usage(e),
-    })?;
-    let penalty = config.penalty().map_err(CliError::usage)?;
+    let (data, scale) = sample_all::<S>(config, system)?;
+    let penalty = config.penalty()?;
     let (architecture, before) = begin_shape::<S>(config, system, scale)?;
     let imposed = imposed_velocities(system, &data);
-    let fresh = (data.test.cast::<f64>().q().to_vec(), data.test.cast::<f64>().v().to_vec());
-    let toml = toml::to_string(config).map_err(CliError::data)?;
-    let identity = Identity { config: toml.clone(), data: data.checksums() };
-    let keeper = Arc::new(Keeper::new(Arc::new(Disk), folder.path(), keeping.every, identity));
+    let fresh = data.test.cast::<f64>();
+    let fresh = (fresh.q().to_vec(), fresh.v().to_vec());
+    let toml = toml::to_string(config).map_err(PipelineError::format)?;
     let parameters = Layout::new(&architecture).parameters;
-    let start = begin(&keeper, folder, parameters, config.data.training, keeping.start)?;
-    let start = start.or_else(|| before.map(Snapshot::beginning_with));
-    let sitting = Sitting { keeper: Some(keeper), start };
-    let trained = match resume(config, &architecture, penalty, data, effort.threads, hooks, sitting) {
-        Ok(trained) => trained,
-        Err(error @ TrainingError::NothingLearned(_)) => return Ok(Learning::Nothing(error.to_string())),
-        Err(error) => return Err(CliError::data(error)),
-    };
+    let opened = options
+        .checkpoints
+        .as_ref()
+        .map(|checkpoints| checkpoints.open::<S>(&toml, data.checksums(), (parameters, config.data.training), watch));
+    let (keeper, restored) = opened.transpose()?.map_or((None, None), |(keeper, start)| (Some(keeper), start));
+    let start = restored.or_else(|| before.map(Snapshot::beginning_with));
+    let sitting = Sitting { keeper, start };
+    let trained = resume(config, &architecture, penalty, data, options.threads, &watch.hooks(), sitting)?;
 
     // The model first, then what is small, pictures last: on a full disk nothing that comes after can lose them.
-    let header = header(config, system, architecture.clone(), imposed, trained.validation_loss)?;
-    let domain = trained_on(&header);
+    let header = header(config, system, architecture.clone(), imposed, trained.validation_loss);
     let model = ModelFile { header, weights: trained.weights.clone() };
-    save(folder, &model)?;
-    folder.write("config.toml", toml.as_bytes())?;
-    folder.write("history.csv", history(&trained.history).as_bytes())?;
+    write_model(output, &model)?;
+    output.write("config.toml", toml.as_bytes())?;
+    output.write("history.csv", history(&trained.history).as_bytes())?;
 
     let scale = architecture.scale.iter().sum::<f64>() / architecture.scale.len() as f64;
-    let network = NetworkLagrangian::new(architecture, model.weights).map_err(CliError::data)?.cast::<f64>();
-    let Effort { threads, starts, horizon } = effort;
+    let network = NetworkLagrangian::new(architecture, model.weights)?.cast::<f64>();
     let test = system.system.trajectory(system.coordinates);
-    let plan = Plan {
-        states: (&fresh.0, &fresh.1),
-        starts,
-        span: TrajectoryTest { t_end: test.t_end * horizon, ..test },
+    let full = test.t_end;
+    let judging = EvaluationOptions {
+        states: fresh,
+        starts: options.starts,
+        span: TrajectoryTest { t_end: full * options.span, ..test },
         rtol: RTOL,
-        trained: domain,
+        trained: trained_on(&model.header),
         seed: config.seed,
-        threads,
-        attention: &Attention::new(Some(&hooks.interrupt), PIECES),
+        threads: options.threads,
     };
-    let evaluation = evaluate(system, &network, plan)?;
-    let finite = |x: f64| x.is_finite().then_some(x);
-    let losses: Vec<[Option<f64>; 2]> =
-        trained.history.iter().map(|e| [finite(e.training_loss), finite(e.validation_loss)]).collect();
-    let times = trained.history.iter().map(|e| e.seconds).collect();
+    let evaluation = evaluate(system, &network, judging, watch)?;
     let training_losses: Vec<f64> = trained.history.iter().map(|e| e.training_loss).collect();
     let instability = training_instability(&training_losses, &stretches(config));
     let summary = Summary {
@@ -240,7 +177,7 @@ fn learn_in<S: Scalar>(
         crate_version: env!("CARGO_PKG_VERSION"),
         seed: config.seed,
         precision: S::NAME,
-        threads,
+        threads: options.threads,
         epochs: trained.history.len(),
         weights: trained.weights.len(),
         validation_loss: trained.validation_loss,
@@ -253,42 +190,47 @@ fn learn_in<S: Scalar>(
         ended: ended(&trained.stop),
         evaluation: &evaluation,
     };
-    let json = serde_json::to_string_pretty(&summary).map_err(CliError::data)? + "\n";
-    folder.write("summary.json", json.as_bytes())?;
-    write_report(folder, system, &summary, &trained.history, &toml)?;
-    let text = format!(
-        "{}\n{}\nreport: {}\n",
-        evaluation.text(&system.system.title),
-        headline(&summary),
-        folder.file("report.html").display()
-    );
-    let outcome = Outcome::Learned(crate::experiments::Learned {
-        validation_loss: trained.validation_loss,
+    let json = serde_json::to_string_pretty(&summary).map_err(PipelineError::format)? + "\n";
+    output.write("summary.json", json.as_bytes())?;
+    write_report(output, system, &summary, &trained.history, &toml)?;
+    let headline = headline(&summary);
+    let learned = learned(&evaluation, (trained.validation_loss, instability), scale, (full, options.span));
+    let record = record(learned, &trained.history, trained.seconds);
+    let title = system.system.title.to_string();
+    let (stop, history, header) = (trained.stop, trained.history, model.header);
+    Ok(TrainReport { stop, header, network, history, evaluation, json, record, headline, title })
+}
+
+/// A number that a record can hold.
+fn finite(x: f64) -> Option<f64> {
+    x.is_finite().then_some(x)
+}
+
+/// Figures of a learned model for an experiment.
+fn learned(
+    evaluation: &Evaluation,
+    (validation_loss, instability): (f64, Option<f64>),
+    scale: f64,
+    (t_end, share): (f64, f64),
+) -> Learned {
+    let motions = || evaluation.trajectories.iter().map(|motion| &motion.summary);
+    Learned {
+        validation_loss,
         instability,
         scale,
         wrong_signature: evaluation.wrong_signature,
-        energy_errors: evaluation.trajectories.iter().map(|t| finite(t.summary.energy_error.mean)).collect(),
-        stretching: evaluation
-            .trajectories
-            .iter()
-            .map(|t| finite(t.summary.lyapunov_exponent? * test.t_end * horizon))
-            .collect(),
-        integrated: evaluation.trajectories.iter().filter(|t| t.summary.stopped.is_none()).count(),
-    });
-    Ok(Learning::Finished(Box::new(Finished {
-        epochs: trained.history.len(),
-        json,
-        text,
-        record: Record { outcome, losses, times, seconds: trained.seconds },
-        stop: trained.stop,
-    })))
+        energy_errors: motions().map(|motion| finite(motion.energy_error.mean)).collect(),
+        stretching: motions().map(|motion| finite(motion.lyapunov_exponent? * t_end * share)).collect(),
+        integrated: motions().filter(|motion| motion.stopped.is_none()).count(),
+    }
 }
 
-pub(super) fn ended(stop: &Stop) -> String {
-    match stop {
-        Stop::Finished => "finished".to_string(),
-        Stop::Interrupted => "interrupted".to_string(),
-        Stop::Failed(error) => error.to_string(),
+fn record(learned: Learned, epochs: &[Epoch], seconds: f64) -> Record {
+    Record {
+        outcome: Outcome::Learned(learned),
+        losses: epochs.iter().map(|e| [finite(e.training_loss), finite(e.validation_loss)]).collect(),
+        times: epochs.iter().map(|e| e.seconds).collect(),
+        seconds,
     }
 }
 
@@ -307,11 +249,10 @@ fn header(
     architecture: Architecture,
     imposed: Option<(usize, [f64; 2])>,
     validation_loss: f64,
-) -> Result<Header, CliError> {
+) -> Header {
     // Defaults that change in a later version must not change this model.
     let mut parameters = all_parameters(system);
     parameters.extend(config.parameters.clone());
-    configure_system::<f64>(system.system.clone(), &given(&parameters)).map_err(CliError::data)?;
     let hull = |bounds: fn(&Phase) -> &Vec<[f64; 2]>| {
         (0..system.coordinates)
             .map(|i| {
@@ -324,7 +265,7 @@ fn header(
     if let Some((i, range)) = imposed {
         velocity[i] = range;
     }
-    Ok(Header {
+    Header {
         format: FORMAT,
         crate_version: env!("CARGO_PKG_VERSION").to_string(),
         architecture,
@@ -341,33 +282,16 @@ fn header(
         velocity,
         seed: config.seed,
         validation_loss,
-    })
+    }
 }
 
-/// `history.csv`: one row per epoch.
-pub(super) fn history(epochs: &[Epoch]) -> String {
-    let mut csv =
-        "epoch,phase,rate,training_loss,penalty,penalised,validation_loss,gradient_norm,left_out,skipped,seconds\n"
-            .to_string();
-    for e in epochs {
-        // Writing to a string cannot fail.
-        let _ = writeln!(
-            csv,
-            "{},{},{},{},{},{},{},{},{},{},{:.3}",
-            e.epoch,
-            e.phase,
-            e.rate,
-            e.training_loss,
-            e.penalty,
-            e.penalised,
-            e.validation_loss,
-            e.gradient_norm,
-            e.left_out,
-            e.skipped,
-            e.seconds
-        );
-    }
-    csv
+/// Writes the model's file.
+///
+/// # Errors
+/// [`PipelineError::Model`] for weights that make no file, [`PipelineError::Output`].
+pub(crate) fn write_model<S: Scalar>(output: &dyn Output, model: &ModelFile<S>) -> Result<(), PipelineError> {
+    let bytes = model.to_bytes().map_err(|source| PipelineError::Model { path: MODEL.into(), source })?;
+    output.write(MODEL, &bytes)
 }
 
 /// The figures of a run in one line.
@@ -387,69 +311,17 @@ fn headline(summary: &Summary<'_>) -> String {
     )
 }
 
-/// Adds the system's parameters to a report.
-pub(super) fn parameter_table(report: Report, system: &Configured<f64>) -> Report {
-    let values = all_parameters(system);
-    let row = |[symbol, _, unit, _]: &[String; 4]| {
-        let value = values.get(symbol).map(f64::to_string).unwrap_or_default();
-        vec![symbol.clone(), value, if unit == "1" { "-".to_string() } else { unit.clone() }]
-    };
-    let rows: Vec<Vec<String>> = parameters(&system.system).iter().map(row).collect();
-    if rows.is_empty() {
-        return report;
-    }
-    report.heading("Parameters of the system").table(&["parameter", "value", "unit"], &rows)
-}
-
 fn write_report(
-    folder: &Folder,
+    output: &dyn Output,
     system: &Configured<f64>,
     summary: &Summary<'_>,
     epochs: &[Epoch],
     toml: &str,
-) -> Result<(), CliError> {
+) -> Result<(), PipelineError> {
     let training = training_pictures(epochs);
     let report = Report::new(&format!("{}: learned", system.system.title));
     let report = summary.evaluation.summarise(report, &system.system.title).paragraph(&headline(summary));
     let report = summary.evaluation.report(parameter_table(report, system)).heading("Training");
     let report = report.figures(&training).heading("Configuration").preformatted(toml);
-    write_report_and_figures(folder, &report, training.iter().chain(&summary.evaluation.figures))
-}
-
-/// Writes the model, and lets what an earlier run left beside it go.
-///
-/// # Errors
-/// A data error naming the file.
-pub(super) fn save<S: Scalar>(folder: &Folder, model: &ModelFile<S>) -> Result<(), CliError> {
-    let file = folder.file(MODEL);
-    model.save(&file).map_err(|e| CliError::file(&file, e))?;
-    remove_stale(folder)
-}
-
-/// Pictures of a history.
-pub(super) fn training_pictures(epochs: &[Epoch]) -> Vec<Figure> {
-    let row = |e: &Epoch| HistoryRow {
-        epoch: e.epoch as f64,
-        training_loss: e.training_loss,
-        validation_loss: e.validation_loss,
-        learning_rate: e.rate,
-        gradient_norm: e.gradient_norm,
-        penalty: e.penalty,
-    };
-    training_figures(&epochs.iter().map(row).collect::<Vec<_>>())
-}
-
-/// Writes [`CAPTIONS`], which name the pictures and tell what they show, the report, and the pictures.
-///
-/// # Errors
-/// A data error naming the file.
-pub(super) fn write_report_and_figures<'a>(
-    folder: &Folder,
-    report: &Report,
-    figures: impl Iterator<Item = &'a Figure> + Clone,
-) -> Result<(), CliError> {
-    let captions: BTreeMap<&str, &str> = figures.clone().map(|f| (f.file.as_str(), f.caption.as_str())).collect();
-    folder.write(CAPTIONS, serde_json::to_string_pretty(&captions).map_err(CliError::data)?.as_bytes())?;
-    folder.write("report.html", report.to_html().as_bytes())?;
-    figures.into_iter().try_for_each(|figure| folder.write(&figure.file, figure.picture.to_svg().as_bytes()))
+    write_report_and_figures(output, &report, training.iter().chain(&summary.evaluation.figures))
 }

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Rooms from top to bottom; a file may name its own room and those before it.
-const ROOMS: [&str; 16] = [
+const ROOMS: [&str; 17] = [
     "names",
     "storage",
     "scalar",
@@ -21,6 +21,7 @@ const ROOMS: [&str; 16] = [
     "analysis",
     "experiments",
     "report",
+    "pipeline",
     "cli",
 ];
 
