@@ -109,12 +109,12 @@ fn perform(
                 let on = how_to_go_on(folder.path());
                 return Err(CliError::interrupted(format_args!("interrupted before the first epoch ended{on}")));
             }
-            return Err(forget(folder).err().unwrap_or_else(|| error.into()));
+            return Err(forget(folder.path()).err().unwrap_or_else(|| error.into()));
         }
         Err(error) => return Err(error.into()),
     };
     if fitted.stop != Stop::Interrupted {
-        forget(folder)?;
+        forget(folder.path())?;
     }
     if args.json {
         output::print(&fitted.json)?;

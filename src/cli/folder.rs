@@ -88,11 +88,11 @@ impl Output for Folder {
     /// evaluation left before the new one is written.
     fn write(&self, name: &str, bytes: &[u8]) -> Result<(), PipelineError> {
         if name == "evaluation.json" {
-            results::remove_stale_evaluation(self)?;
+            results::remove_stale_evaluation(&self.path)?;
         }
         let path = self.file(name);
         write_atomically(&path, bytes).map_err(|e| PipelineError::output(&path, format_args!("cannot write: {e}")))?;
-        if name == MODEL { results::remove_stale(self) } else { Ok(()) }
+        if name == MODEL { results::remove_stale(&self.path) } else { Ok(()) }
     }
 }
 

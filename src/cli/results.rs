@@ -2,7 +2,6 @@
 
 use crate::cli::CliError;
 use crate::cli::files::{holds_something, same_file};
-use crate::cli::folder::Folder;
 use crate::cli::resume::{command, has_checkpoint};
 use crate::pipeline::{CAPTIONS, MODEL, PipelineError};
 use crate::storage::{Disk, Files, read_regular};
@@ -129,10 +128,10 @@ pub fn require_room(directory: &Path, writer: Writer, overwrite: bool) -> Result
 ///
 /// # Errors
 /// [`PipelineError::Output`] naming what cannot be removed.
-pub fn remove_stale(folder: &Folder) -> Result<(), PipelineError> {
-    remove(folder.path(), &LEARNED[1..])?;
-    remove(folder.path(), &EVALUATED)?;
-    for entry in fs::read_dir(folder.path()).into_iter().flatten().flatten() {
+pub fn remove_stale(directory: &Path) -> Result<(), PipelineError> {
+    remove(directory, &LEARNED[1..])?;
+    remove(directory, &EVALUATED)?;
+    for entry in fs::read_dir(directory).into_iter().flatten().flatten() {
         let name = entry.file_name();
         let number = name.to_str().and_then(|name| name.strip_prefix("evaluation"));
         let numbered =
@@ -151,8 +150,8 @@ pub fn remove_stale(folder: &Folder) -> Result<(), PipelineError> {
 ///
 /// # Errors
 /// [`PipelineError::Output`] naming what cannot be removed.
-pub fn remove_stale_evaluation(folder: &Folder) -> Result<(), PipelineError> {
-    remove(folder.path(), &EVALUATED)
+pub fn remove_stale_evaluation(directory: &Path) -> Result<(), PipelineError> {
+    remove(directory, &EVALUATED)
 }
 
 /// Removes the pictures that the captions name, then the files.
@@ -179,6 +178,7 @@ fn captioned(directory: &Path) -> Vec<PathBuf> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cli::folder::Folder;
 
     #[test]
     fn captions_name_pictures_of_their_directory_alone() {
@@ -204,7 +204,7 @@ mod tests {
         }
         fs::write(folder.file("evaluation-2/mine.txt"), "x").unwrap();
         assert!(found(folder.path()).unwrap().contains("model.safetensors, config.toml"));
-        remove_stale(&folder).unwrap();
+        remove_stale(folder.path()).unwrap();
         let mut left: Vec<String> =
             fs::read_dir(folder.path()).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
         left.sort();

@@ -1,12 +1,10 @@
 //! Runs that `--resume DIR` of `lnn train` and `lnn fit` finds in the directory.
 
 use crate::cli::differences::differences;
-use crate::cli::folder::Folder;
 use crate::cli::said::Said;
 use crate::cli::{CliError, Kind, config, output};
-use crate::pipeline::RunOutput;
 use crate::storage::{Disk, read_regular};
-use crate::training::{CheckpointError, Config, NEWEST, PREVIOUS, saved};
+use crate::training::{CheckpointError, Config, NEWEST, PREVIOUS, remove_checkpoints, saved};
 use serde::Deserialize;
 use std::path::Path;
 
@@ -154,9 +152,9 @@ pub fn keeping(directory: &Path) -> impl Fn(CliError) -> CliError {
 ///
 /// # Errors
 /// A data error naming the directory.
-pub fn forget(folder: &Folder) -> Result<(), CliError> {
-    let checkpoints = RunOutput::checkpoints(folder);
-    Ok(checkpoints.map_or(Ok(()), |checkpoints| checkpoints.remove())?)
+pub fn forget(directory: &Path) -> Result<(), CliError> {
+    let cannot = |e| CliError::file(directory, format_args!("cannot remove checkpoints: {e}"));
+    remove_checkpoints(&Disk, directory).map_err(cannot)
 }
 
 /// Says that there is nothing left to do.

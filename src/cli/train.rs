@@ -37,13 +37,13 @@ pub fn run(args: &Args) -> Result<(), CliError> {
             return Err(CliError::interrupted(format_args!("{problem}{}", how_to_go_on(folder.path()))));
         }
         Err(error @ PipelineError::Training(TrainingError::NothingLearned(_))) => {
-            forget(&folder)?;
+            forget(folder.path())?;
             return Err(error.into());
         }
         Err(error) => return Err(resume::keeping(folder.path())(error.into())),
     };
     if trained.stop != Stop::Interrupted {
-        forget(&folder)?;
+        forget(folder.path())?;
     }
     if args.json {
         output::print(&trained.json)?;

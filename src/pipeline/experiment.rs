@@ -2,7 +2,7 @@
 
 use crate::experiments::{Experiment, Outcome, Record, Run, Scale};
 use crate::pipeline::checkpoints::Begin;
-use crate::pipeline::experiment_report::{ExperimentReport, conclude};
+use crate::pipeline::experiment_report::{ExperimentReport, Results, conclude};
 use crate::pipeline::experiment_store::ExperimentStore;
 use crate::pipeline::train::{RunOptions, train};
 use crate::pipeline::{Event, PipelineError, RECORD, Watch};
@@ -12,9 +12,6 @@ use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
-
-/// Runs with their records, as far as they are finished.
-pub type Results = Vec<(Run, Option<Record>)>;
 
 /// Runs an experiment, `runs` of it, on so many threads, and writes table, pictures and report; runs whose records are in the
 /// store and are of the same configuration are not run again. `beside` are curves of loss against time from elsewhere.

@@ -1,8 +1,7 @@
 //! The report of an experiment: table, pictures, page, words.
 
-use crate::experiments::{Experiment, Row, Scale};
+use crate::experiments::{Experiment, Record, Row, Run, Scale};
 use crate::names::{WIDTH, counted, wrapped};
-use crate::pipeline::experiment::Results;
 use crate::pipeline::experiment_store::ExperimentStore;
 use crate::pipeline::run_figures::{pictures_of_runs, within};
 use crate::pipeline::{PipelineError, headline};
@@ -12,6 +11,9 @@ use crate::report::{
 };
 use std::fmt::Write as _;
 use std::time::Instant;
+
+/// Runs with their records, as far as they are finished.
+pub type Results = Vec<(Run, Option<Record>)>;
 
 /// An experiment after its files were written.
 #[derive(Debug)]

@@ -6,13 +6,6 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// Name of the model's file.
-pub const MODEL: &str = "model.safetensors";
-/// Name of the file with the captions of a run's pictures, by file name; written before them, so that each is known.
-pub const CAPTIONS: &str = "captions.json";
-/// Name of the file that a finished run of an experiment has.
-pub const RECORD: &str = "record.json";
-
 /// Sink for the files of a pipeline. The model is written first, then what is small, pictures last: on a full disk nothing that
 /// comes after can lose them.
 pub trait Output: Sync {

@@ -125,7 +125,6 @@ mod tests {
     #[test]
     fn a_model_that_fails_nearly_always_is_not_tried_everywhere() {
         let watch = Watch::default();
-        let watch = Watch::default();
         let attention = Attention::new(&watch, 1);
         let found = HeldOutPredictions::new(&SINGULAR, windows(400), 2, &attention).unwrap();
         assert_eq!((found.windows.len(), found.predictions.len(), found.all), (PILOT, PILOT, 400));
