@@ -10,6 +10,7 @@ use std::process::ExitCode;
 
 /// Kind of a failure, as far as a calling script cares.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Kind {
     /// Arguments or configuration: exit code 2.
     Usage,

@@ -14,13 +14,15 @@ use crate::cli::resume::{self, forget, how_to_go_on};
 use crate::cli::said::Said;
 use crate::cli::watch::watch;
 use crate::cli::{CliError, interrupt, output};
+use crate::configuration::{Precision, Regularizer};
 use crate::network::Structure;
 use crate::pipeline::{
     Begin, Checkpoints, FitConfig, FitOptions, PipelineError, PreparedFit, RunOptions, StartModel, fit, shorten,
 };
+use crate::presets::configuration_reference;
 use crate::recording::Targets;
-use crate::training::shooting::Shooting;
-use crate::training::{Precision, Regularizer, Stop, configuration_reference};
+use crate::shooting::Shooting;
+use crate::training::Stop;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;

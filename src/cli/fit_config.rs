@@ -6,9 +6,11 @@ use crate::cli::fit_args::Args;
 use crate::cli::number::positive;
 use crate::cli::print_config::{commented, with_seed};
 use crate::cli::recording_args::{RecordingArgs, unit};
+use crate::configuration::Config;
+use crate::optimizers::Schedule;
 use crate::pipeline::{FIT_SECTIONS, FitColumns, FitConfig, HELD_OUT};
-use crate::training::shooting::Shooting;
-use crate::training::{Config, Preset, SHOOTING_SECTION, Schedule, Section, TRAINING_SECTIONS, section_reference};
+use crate::presets::{Preset, SHOOTING_SECTION, Section, TRAINING_SECTIONS, section_reference};
+use crate::shooting::Shooting;
 use std::path::PathBuf;
 
 /// Files and columns as the arguments give them.
@@ -100,7 +102,7 @@ impl Settled {
         args.name = args.name.or(file.has("training.system").then_some(training.system));
         args.precision = args.precision.or(Some(training.precision.into()));
         args.from = args.from.or(training.from);
-        if let crate::training::Regularizer::LorentzianSylvester { time, .. } = training.penalty {
+        if let crate::configuration::Regularizer::LorentzianSylvester { time, .. } = training.penalty {
             args.timelike = args.timelike.or(Some(time));
         }
         if args.recording.data.is_empty() || args.recording.coords.is_empty() {

@@ -2,13 +2,12 @@
 
 use crate::cli::CliError;
 use crate::cli::chosen::{self, learned_system};
-use crate::lagrangian::{Configured, configure_system, find};
+use crate::lagrangian::{Configured, configure_system, configure_values, find};
 use crate::network::NetworkLagrangian;
 use crate::network::file::{Header, ModelFile};
 use crate::pipeline::{self, trained_on};
 use crate::rollout::Domain;
 use crate::scalar::Scalar;
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// A trained model.
@@ -51,8 +50,7 @@ impl<S: Scalar> Learned<S> {
             return Err(CliError::file(path, format_args!("{:?}, which it learned, {problem}", self.header.system)));
         }
         let system = learned_system(&self.header).map_err(|e| CliError::file(path, e))?;
-        let configured =
-            configure_system(system, &given(&self.header.parameters)).map_err(|e| CliError::file(path, e))?;
+        let configured = configure_values(system, &self.header.parameters).map_err(|e| CliError::file(path, e))?;
         if configured.system.columns(configured.coordinates) != self.header.columns {
             return Err(CliError::file(path, format_args!("columns are not those of {}", self.header.system)));
         }
@@ -79,9 +77,4 @@ impl<S: Scalar> Learned<S> {
     pub fn domain(&self) -> Domain<S> {
         trained_on(&self.header)
     }
-}
-
-/// Parameters in the form the catalogue takes them.
-pub fn given(parameters: &BTreeMap<String, f64>) -> Vec<(String, String)> {
-    parameters.iter().map(|(symbol, value)| (symbol.clone(), value.to_string())).collect()
 }

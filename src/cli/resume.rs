@@ -3,8 +3,9 @@
 use crate::cli::differences::differences;
 use crate::cli::said::Said;
 use crate::cli::{CliError, Kind, config, output};
+use crate::configuration::Config;
 use crate::storage::{Disk, read_regular};
-use crate::training::{CheckpointError, Config, NEWEST, PREVIOUS, remove_checkpoints, saved};
+use crate::training::{CheckpointError, NEWEST, PREVIOUS, remove_checkpoints, saved};
 use serde::Deserialize;
 use std::path::Path;
 

@@ -9,10 +9,11 @@ use crate::cli::resume::{self, Found, Learner, configuration, find, forget, how_
 use crate::cli::train_config::Args;
 use crate::cli::watch::watch;
 use crate::cli::{CliError, interrupt, output};
+use crate::configuration::Config;
 use crate::lagrangian::Configured;
 use crate::names::counted;
 use crate::pipeline::{Begin, Checkpoints, PipelineError, RunOptions, TrainReport, train};
-use crate::training::{Config, NEWEST, Stop, TrainingError};
+use crate::training::{NEWEST, Stop, TrainingError};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 

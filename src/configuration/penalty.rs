@@ -1,6 +1,6 @@
 //! Which violations of the mass matrix's signature are penalised.
 
-use crate::training::config::{ConfigError, place};
+use crate::configuration::error::{ConfigError, place};
 use serde::{Deserialize, Serialize};
 
 /// Regularizer of a configuration; `lambda` is its weight beside the loss (the paper tries 1 to 10,000).

@@ -1,8 +1,8 @@
 //! States with their accelerations: what a network learns from.
 
 use crate::network::file::StoredPrecision;
-use crate::network::file::container::checksum;
 use crate::scalar::{Real, Scalar};
+use crate::storage::container::checksum;
 use thiserror::Error;
 
 /// States and accelerations in physical units, all `(states, n)` row-major, perhaps with known external forces.
@@ -20,6 +20,7 @@ pub struct Dataset<S> {
 
 /// Why numbers do not make a dataset.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
 pub enum DatasetError {
     /// Lengths disagree.
     #[error("{what}: expected {expected} numbers, found {found}")]
@@ -132,7 +133,7 @@ impl<S: Scalar> Dataset<S> {
     }
 
     /// Lets a state pass `u` times as fast, backwards if `u` is negative: `v -> u v`, `a -> u^2 a`.
-    pub(super) fn change_pace(&mut self, state: usize, u: S) {
+    pub(crate) fn change_pace(&mut self, state: usize, u: S) {
         let range = state * self.coordinates..(state + 1) * self.coordinates;
         self.v[range.clone()].iter_mut().for_each(|v| *v = u * *v);
         self.a[range].iter_mut().for_each(|a| *a = u * u * *a);

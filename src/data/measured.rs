@@ -2,17 +2,15 @@
 //!
 //! Whole trajectories are held out, never rows: neighbouring samples are nearly the same state. Derivatives come from
 //! local polynomials ([`Smoothing`]) unless they were measured; accelerations so obtained start a network that may then
-//! be fitted through its motion ([`shooting`](crate::training::shooting)).
+//! be fitted through its motion ([`shooting`](crate::shooting)).
 
+use crate::data::dataset::{Dataset, DatasetError};
+use crate::data::datasets::Datasets;
+use crate::data::estimated::{Estimated, Noise};
 use crate::recording::smooth::{SmoothError, SmoothOptions, Smoothed, Smoothing};
 use crate::recording::survey::{Stillness, plan, stillness};
 use crate::recording::{HeldOut, HoldOutError, Recording, Targets};
 use crate::scalar::Scalar;
-use crate::training::config::Config;
-use crate::training::dataset::{Dataset, DatasetError};
-use crate::training::preset::recorded;
-use crate::training::shooting::{Estimated, Noise};
-use crate::training::trainer::Datasets;
 use thiserror::Error;
 
 /// Preparation of recorded motion.
@@ -37,6 +35,7 @@ impl Default for Preparation {
 
 /// Why recorded motion cannot be learned from.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum MeasuredError {
     /// Too little to hold anything out.
     #[error(transparent)]
@@ -77,7 +76,7 @@ impl Part {
         Ok(Self { recording, states })
     }
 
-    /// Trajectories for [`shooting::fit`](crate::training::shooting::fit).
+    /// Trajectories for [`shooting::fit`](crate::shooting::fit).
     pub fn estimated(&self) -> Vec<Estimated<'_>> {
         let pairs = self.recording.tracks.iter().zip(&self.states);
         pairs.map(|(track, states)| Estimated { track, q: &states.q, v: &states.v }).collect()
@@ -194,31 +193,7 @@ impl Measured {
             .collect();
         Noise { q, v }
     }
-
-    /// A configuration for these states: the network and the rates of the quick preset, 30,000 steps in whole epochs.
-    pub fn config<S: Scalar>(&self, name: &str, data: &Datasets<S>) -> Config {
-        let [training, validation, test] = [&data.training[0], &data.validation, &data.test];
-        let [position, velocity] = ranges(training);
-        let [validation_position, validation_velocity] = ranges(validation);
-        let sizes = [training.len(), validation.len(), test.len()];
-        recorded(name, sizes, [position, velocity], [validation_position, validation_velocity], STEPS)
-    }
 }
-
-/// Range of every coordinate and of every velocity.
-fn ranges<S: Scalar>(data: &Dataset<S>) -> [Vec<[f64; 2]>; 2] {
-    let n = data.coordinates();
-    [data.q(), data.v()].map(|values| {
-        let range = |i: usize| {
-            let all = values.iter().skip(i).step_by(n).map(|x| x.to_f64());
-            all.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)])
-        };
-        (0..n).map(range).collect()
-    })
-}
-
-/// Steps of a supervised training.
-const STEPS: usize = 30_000;
 
 /// Least noise that is believed, beside the size of the data.
 const LEAST_NOISE: f64 = 1e-6;

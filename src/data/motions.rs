@@ -1,10 +1,10 @@
 //! Training states along exact motions.
 
+use crate::data::bounds::boxes;
+use crate::data::draw::{Drawn, SamplingError, draw};
 use crate::lagrangian::Configured;
 use crate::lagrangian::system::Coordinate;
 use crate::rollout::{Domain, Method, Options, rollout};
-use crate::training::preset::boxes;
-use crate::training::sampling::{Drawn, SamplingError, draw};
 use rand::Rng;
 use std::f64::consts::TAU;
 
@@ -17,7 +17,7 @@ const PER_MOTION: f64 = 10.0;
 ///
 /// # Errors
 /// [`SamplingError::Motions`] if hardly any motion stays within the bounds for a while.
-pub(super) fn along_motions(
+pub(crate) fn along_motions(
     system: &Configured<f64>,
     field: &str,
     (position, velocity): (&[[f64; 2]], &[[f64; 2]]),
@@ -84,8 +84,9 @@ fn turn_back(q: &mut [f64], coordinates: &[Coordinate], bounds: &[[f64; 2]], rng
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::data::sample_all;
     use crate::lagrangian::configure;
-    use crate::training::{Preset, sample_all};
+    use crate::presets::Preset;
     use std::f64::consts::PI;
 
     #[test]
@@ -129,7 +130,7 @@ mod tests {
             &[[-5.0, 5.0], [-5.0, 5.0], [-5.0, 5.0], [0.4, 6.0]][..],
             &[[0.0, 0.0], [-2.0, 2.0], [-2.0, 2.0], [-2.0, 2.0]][..],
         );
-        let mut rng = crate::training::Stream::Training(0).generator(3);
+        let mut rng = crate::random::RngStream::Training(0).generator(3);
         let drawn = along_motions(&system, "phase[0].position", bounds, &[], 500, &mut rng).unwrap();
         for (q, v) in drawn.q.chunks(4).zip(drawn.v.chunks(4)) {
             let mut shell = v.to_vec();

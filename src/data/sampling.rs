@@ -1,46 +1,14 @@
 //! Training data of hand-written systems: uniform states with exact accelerations.
 
-use crate::lagrangian::{Configured, DescriptionError, SystemError};
+use crate::configuration::Config;
+use crate::data::dataset::{Dataset, DatasetError};
+use crate::data::datasets::Datasets;
+use crate::data::draw::{Drawn, SamplingError, draw};
+use crate::data::motions::along_motions;
+use crate::lagrangian::Configured;
+use crate::random::RngStream;
 use crate::scalar::Scalar;
-use crate::training::config::{Config, ConfigError};
-use crate::training::dataset::{Dataset, DatasetError};
-use crate::training::motions::along_motions;
-use crate::training::trainer::{Datasets, Stream};
 use rand::Rng;
-use thiserror::Error;
-
-/// Why states could not be sampled.
-#[derive(Debug, Error)]
-pub enum SamplingError {
-    /// The system does not exist or has no such parameter.
-    #[error(transparent)]
-    System(#[from] SystemError),
-    /// A wrong description of a system.
-    #[error("description.{0}")]
-    Description(#[from] DescriptionError),
-    /// The configuration is out of range.
-    #[error(transparent)]
-    Config(#[from] ConfigError),
-    /// Most of the box lies outside the domain of the system.
-    #[error("{field}: most of these bounds lie where {demand} is violated or accelerations are not finite")]
-    Domain {
-        /// Which bounds.
-        field: String,
-        /// Demand of the system.
-        demand: &'static str,
-    },
-    /// Motions of the trajectory test hardly pass through the box.
-    #[error(
-        "{field}: hardly any motion of the trajectory test stays within these bounds; data.motions asks for such states"
-    )]
-    Motions {
-        /// Which bounds.
-        field: String,
-    },
-    /// The accelerations do not fit the precision.
-    #[error(transparent)]
-    Dataset(#[from] DatasetError),
-}
 
 /// Draws `states` states uniformly from a box, with their exact accelerations, all in double precision.
 ///
@@ -57,62 +25,6 @@ pub fn sample(
     rng: &mut impl Rng,
 ) -> Result<Dataset<f64>, SamplingError> {
     fill(Drawn::default(), system, field, bounds, &[], states, rng)
-}
-
-/// States as they are drawn, with their exact accelerations.
-#[derive(Default)]
-pub(super) struct Drawn {
-    pub q: Vec<f64>,
-    pub v: Vec<f64>,
-    pub a: Vec<f64>,
-}
-
-impl Drawn {
-    /// Takes a state, unless it lies outside the system's domain or has no finite acceleration: then what is demanded.
-    pub fn take(
-        &mut self,
-        system: &Configured<f64>,
-        q: &[f64],
-        v: &[f64],
-    ) -> Result<Option<&'static str>, SamplingError> {
-        let a = system.exact_acceleration(q, v)?;
-        let finite = a.iter().all(|a| a.is_finite());
-        let demand = system.check_domain(q).err().or((!finite).then_some("a finite acceleration"));
-        if demand.is_none() {
-            self.q.extend(q);
-            self.v.extend(v);
-            self.a.extend(a);
-        }
-        Ok(demand)
-    }
-}
-
-/// Coordinates and velocities of a state, uniform within bounds; half of the [`logarithmic`](crate::training::Phase::logarithmic)
-/// coordinates uniform in their logarithm.
-pub(super) fn draw(
-    (position, velocity): (&[[f64; 2]], &[[f64; 2]]),
-    logarithmic: &[bool],
-    rng: &mut impl Rng,
-) -> (Vec<f64>, Vec<f64>) {
-    let mut uniform = |bounds: &[[f64; 2]]| -> Vec<f64> {
-        let one = |&[low, high]: &[f64; 2]| match high - low {
-            length if length.is_infinite() => {
-                let share = rng.random::<f64>();
-                (1.0 - share) * low + share * high
-            }
-            _ if low < high => rng.random_range(low..high),
-            _ => low,
-        };
-        bounds.iter().map(one).collect()
-    };
-    let (mut q, v) = (uniform(position), uniform(velocity));
-    for (i, q) in q.iter_mut().enumerate() {
-        if logarithmic.get(i) == Some(&true) && rng.random::<bool>() {
-            let [low, high] = position[i];
-            *q = low * (high / low).powf(rng.random::<f64>());
-        }
-    }
-    (q, v)
 }
 
 /// Draws further states, up to `states`, as [`sample`] does.
@@ -140,7 +52,7 @@ fn fill(
     Ok(Dataset::new(n, drawn.q, drawn.v, drawn.a)?)
 }
 
-/// The states with the weights of [`Data::relative`](crate::training::Data::relative).
+/// The states with the weights of [`Data::relative`](crate::configuration::Data::relative).
 fn weigh(set: Dataset<f64>, floor: f64) -> Result<Dataset<f64>, DatasetError> {
     let scale = set.physical_scale();
     let size = |a: &[f64]| a.iter().zip(&scale).map(|(a, s)| (a / s).abs()).sum::<f64>() / scale.len() as f64;
@@ -190,7 +102,7 @@ pub fn sample_all<S: Scalar>(
     for (k, phase) in config.phases.iter().enumerate() {
         let field = format!("phase[{k}].position");
         let bounds = (phase.position.as_slice(), phase.velocity.as_slice());
-        let mut rng = Stream::Training(k).generator(seed);
+        let mut rng = RngStream::Training(k).generator(seed);
         let states = config.data.training;
         let moving = (config.data.motions * states as f64).round() as usize;
         let drawn = along_motions(system, &field, bounds, &phase.logarithmic, moving, &mut rng)?;
@@ -204,8 +116,8 @@ pub fn sample_all<S: Scalar>(
     let data = &config.data;
     let bounds = (data.validation_position.as_slice(), data.validation_velocity.as_slice());
     let field = "data.validation_position";
-    let validation = sample(system, field, bounds, data.validation, &mut Stream::Validation.generator(seed))?;
-    let test = sample(system, field, bounds, data.test, &mut Stream::Test.generator(seed))?;
+    let validation = sample(system, field, bounds, data.validation, &mut RngStream::Validation.generator(seed))?;
+    let test = sample(system, field, bounds, data.test, &mut RngStream::Test.generator(seed))?;
     let training = training.iter().map(Dataset::cast).collect();
     Ok((Datasets { training, validation: validation.cast(), test: test.cast() }, scale))
 }
@@ -214,7 +126,7 @@ pub fn sample_all<S: Scalar>(
 mod tests {
     use super::*;
     use crate::lagrangian::{Request, Terms, configure};
-    use crate::training::preset::Preset;
+    use crate::presets::Preset;
 
     #[test]
     fn every_state_of_a_relativistic_system_is_on_the_mass_shell() {
@@ -291,7 +203,7 @@ mod tests {
         let still = Dataset::new(2, vec![1.0, 4.0], vec![0.0; 2], vec![0.0; 2]).unwrap();
         assert_eq!(weigh(still, 2.0).unwrap().weight(0), 1.0);
         // Slowed and reversed states keep them.
-        let mut rng = Stream::Test.generator(0);
+        let mut rng = RngStream::Test.generator(0);
         let slowed = leave_shell(weighed.clone(), 1.0, &mut rng).unwrap();
         for k in 0..2 {
             let squared = slowed.a()[2 * k] / weighed.a()[2 * k];
@@ -364,7 +276,7 @@ mod tests {
             let expected = "[low, high] no further apart than the largest number, found [-1e308, 1e308]";
             assert_eq!(refused, format!("{field}[1]: expected {expected}"));
         }
-        let mut rng = Stream::Test.generator(0);
+        let mut rng = RngStream::Test.generator(0);
         let (q, v) = draw((&[wide; 50], &[[2.0, 2.0]]), &[], &mut rng);
         assert!(q.iter().all(|q| q.is_finite()) && q.iter().any(|q| *q < 0.0) && q.iter().any(|q| *q > 0.0));
         assert_eq!(v, [2.0]);
@@ -389,7 +301,7 @@ mod tests {
     fn velocities_beyond_light_are_drawn_again_or_refused() {
         let system = configure::<f64>("charged-particle", &[]).unwrap();
         let at = |low: f64, high: f64| {
-            let mut rng = Stream::Test.generator(0);
+            let mut rng = RngStream::Test.generator(0);
             sample(&system, "box", (&[[0.0, 1.0]; 3], &[[low, high]; 3]), 100, &mut rng)
         };
         let set = at(-1.0, 1.0).unwrap();

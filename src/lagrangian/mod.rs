@@ -5,19 +5,21 @@
 
 mod catalogue;
 mod complete;
+mod configure;
 mod derivatives;
 mod description;
 mod expression;
 mod expression_lagrangian;
 mod hand_written;
 mod inverse;
+mod range;
 pub mod system;
+#[doc(hidden)]
 pub mod systems;
 mod terms;
 
-pub use catalogue::{
-    Configured, Given, SystemError, build, configure, configure_system, exact_acceleration, find, systems,
-};
+pub use catalogue::{Configured, Given, SystemError, find, systems};
+pub use configure::{build, configure, configure_system, configure_values, exact_acceleration};
 pub use description::{
     CoordinateDescription, Described, Description, DescriptionError, ParameterDescription, TrajectoryDescription,
 };

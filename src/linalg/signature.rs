@@ -28,9 +28,9 @@ impl<S: Scalar> Violation<S> {
     }
 }
 
-/// Buffers of this module.
+/// SignatureBuffers of this module.
 #[derive(Debug)]
-pub struct Buffers<S> {
+pub struct SignatureBuffers<S> {
     block: Vec<S>,
     scaling: Vec<S>,
     gradient: Vec<S>,
@@ -42,7 +42,7 @@ pub struct Buffers<S> {
     workspace: Workspace<S>,
 }
 
-impl<S: Scalar> Default for Buffers<S> {
+impl<S: Scalar> Default for SignatureBuffers<S> {
     fn default() -> Self {
         Self {
             block: Vec::new(),
@@ -79,7 +79,12 @@ pub fn characteristic_scales<S: Scalar>(n: usize, diagonals: &[S]) -> Vec<S> {
 /// `true` if `M`, `(n, n)`, is positive definite, or with a time-like coordinate `M_tt < 0` and the rest positive definite.
 ///
 /// `false` also where rounding leaves it open.
-pub fn has_signature<S: Scalar>(n: usize, matrix: &[S], time: Option<usize>, buffers: &mut Buffers<S>) -> bool {
+pub fn has_signature<S: Scalar>(
+    n: usize,
+    matrix: &[S],
+    time: Option<usize>,
+    buffers: &mut SignatureBuffers<S>,
+) -> bool {
     buffers.gradient.resize(n * n, <S as Real>::zero());
     match time {
         None => is_positive_definite(n, matrix, &mut buffers.gradient),
@@ -106,7 +111,7 @@ fn spatial(n: usize, time: usize) -> impl Iterator<Item = usize> {
 pub fn eigenvalue_violation<S: Scalar>(
     n: usize,
     matrix: &[S],
-    buffers: &mut Buffers<S>,
+    buffers: &mut SignatureBuffers<S>,
     found: &mut Violation<S>,
 ) -> Result<(), LinalgError> {
     found.clear();
@@ -126,7 +131,7 @@ pub fn eigenvalue_violation<S: Scalar>(
 }
 
 /// Sylvester's criterion on `M`, `(n, n)`, with characteristic scales `c`, `(n)`; formula in
-/// [`Penalty::Sylvester`](crate::training::Penalty::Sylvester).
+/// [`Penalty::Sylvester`](crate::configuration::Penalty::Sylvester).
 ///
 /// With `D = diag(c_i^(-1/2))`, `det M_k / (s_k + eps) = det (D M D)_k / (1 + eps/s_k)`: minors are taken of the scaled
 /// matrix. The gradient of a minor is its adjugate, also where the minor is singular.
@@ -138,7 +143,7 @@ pub fn sylvester_violation<S: Scalar>(
     matrix: &[S],
     scales: &[S],
     time: Option<usize>,
-    buffers: &mut Buffers<S>,
+    buffers: &mut SignatureBuffers<S>,
     found: &mut Violation<S>,
 ) -> Result<(), LinalgError> {
     found.clear();
@@ -156,7 +161,7 @@ pub fn sylvester_violation<S: Scalar>(
     }
     let axes = || (0..n).filter(|&i| Some(i) != time);
     let m = axes().count();
-    let Buffers { block, scaling, .. } = buffers;
+    let SignatureBuffers { block, scaling, .. } = buffers;
     scaling.clear();
     scaling.extend(axes().map(|i| if scales[i] > zero { scales[i].sqrt().recip() } else { one }));
     block.clear();
@@ -165,7 +170,7 @@ pub fn sylvester_violation<S: Scalar>(
         block.extend(axes().zip(scaling.iter()).map(|(j, &e)| (matrix[i * n + j] * d) * e));
     }
     minor_violations(m, || axes().map(|i| scales[i]), buffers, found)?;
-    let Buffers { gradient, values, vectors, scaling, workspace, .. } = buffers;
+    let SignatureBuffers { gradient, values, vectors, scaling, workspace, .. } = buffers;
     if gradient.iter().all(|g| *g == zero) {
         return Ok(());
     }
@@ -185,11 +190,11 @@ pub fn sylvester_violation<S: Scalar>(
 fn minor_violations<S: Scalar, I: Iterator<Item = S>>(
     m: usize,
     scales: impl Fn() -> I,
-    buffers: &mut Buffers<S>,
+    buffers: &mut SignatureBuffers<S>,
     found: &mut Violation<S>,
 ) -> Result<(), LinalgError> {
     let (zero, one) = (<S as Real>::zero(), <S as Real>::one());
-    let Buffers { block, gradient, leading, adjugate: adjoint, minors, workspace, .. } = buffers;
+    let SignatureBuffers { block, gradient, leading, adjugate: adjoint, minors, workspace, .. } = buffers;
     gradient.clear();
     gradient.resize(m * m, zero);
     leading_minors(m, block, minors, workspace)?;

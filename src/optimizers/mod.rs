@@ -1,8 +1,10 @@
 //! Adam, RAdam and SOAP with L2 weight decay and gradient clipping, one step at a time.
 
+mod schedule;
 mod soap;
 
-pub(super) use soap::Block;
+pub use schedule::Schedule;
+pub(crate) use soap::Block;
 
 use crate::scalar::{Real, Scalar, vectorized};
 use serde::{Deserialize, Serialize};
@@ -11,6 +13,7 @@ use soap::Eigenbasis;
 /// Which update rule.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum Method {
     /// Adam (Kingma, Ba 2015) with bias correction.
     Adam,
@@ -41,7 +44,7 @@ impl Method {
 }
 
 /// Moments as a checkpoint keeps them.
-pub(super) struct Stored<'a, S> {
+pub(crate) struct Stored<'a, S> {
     /// First moments.
     pub first: &'a [S],
     /// Second moments.
@@ -79,7 +82,7 @@ fn blocks(method: Method, matrices: impl IntoIterator<Item = (usize, usize, usiz
 
 /// Numbers that [`Moments::for_method`] keeps beside two for each parameter: what a checkpoint holds of them, and all;
 /// `None` if they cannot be counted.
-pub(super) fn eigenbasis_numbers(
+pub(crate) fn eigenbasis_numbers(
     method: Method,
     matrices: impl IntoIterator<Item = (usize, usize, usize)>,
 ) -> Option<(usize, usize)> {
@@ -120,7 +123,7 @@ impl<S: Scalar> Moments<S> {
     }
 
     /// State of the optimiser as a checkpoint keeps it.
-    pub(super) fn stored(&self) -> Stored<'_, S> {
+    pub(crate) fn stored(&self) -> Stored<'_, S> {
         let mut bases = Vec::new();
         self.bases.iter().for_each(|basis| basis.store(&mut bases));
         let blocks = self.bases.iter().map(Eigenbasis::block).collect();
@@ -128,7 +131,7 @@ impl<S: Scalar> Moments<S> {
     }
 
     /// Moments from what [`Moments::stored`] gave: `None` if `blocks` and `bases` do not fit.
-    pub(super) fn restore(first: Vec<S>, second: Vec<S>, step: u32, blocks: &[Block], bases: &[S]) -> Option<Self> {
+    pub(crate) fn restore(first: Vec<S>, second: Vec<S>, step: u32, blocks: &[Block], bases: &[S]) -> Option<Self> {
         if !Block::fit(blocks, first.len()) || Block::numbers(blocks)? != bases.len() {
             return None;
         }
@@ -146,7 +149,7 @@ impl<S: Scalar> Moments<S> {
     }
 
     /// [`Moments::update`] with the eigenbases shared out over the threads of a pool; the result does not depend on them.
-    pub(super) fn update_on(
+    pub(crate) fn update_on(
         &mut self,
         pool: soap::Threads<'_>,
         weights: &mut [S],

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 /// Course of the learning rate within a phase.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum Schedule {
     /// The rate stays.
     Constant,

@@ -19,7 +19,7 @@ const LONGEST: usize = 1024;
 /// A weight matrix within the flat parameters, row-major.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(in crate::training) struct Block {
+pub(crate) struct Block {
     /// Offset of its first element.
     pub start: usize,
     /// Rows.
@@ -39,13 +39,13 @@ impl Block {
     }
 
     /// Numbers that the eigenbases of these matrices keep; `None` if they cannot be counted.
-    pub(in crate::training) fn numbers(blocks: &[Self]) -> Option<usize> {
+    pub(crate) fn numbers(blocks: &[Self]) -> Option<usize> {
         let of = |block: &Self| block.sides().iter().map(|size| 2 * size * size).sum();
         blocks.iter().map(of).try_fold(0_usize, |sum, numbers: usize| sum.checked_add(numbers))
     }
 
     /// `true` if the matrices, in order, lie side by side within this many parameters.
-    pub(super) fn fit(blocks: &[Self], parameters: usize) -> bool {
+    pub(crate) fn fit(blocks: &[Self], parameters: usize) -> bool {
         let end = blocks.iter().try_fold(0, |end, block| {
             let next = block.rows.checked_mul(block.cols).and_then(|size| block.start.checked_add(size));
             next.filter(|_| block.start >= end)
@@ -184,7 +184,7 @@ fn norm<S: Scalar>(a: &[S]) -> S {
 
 /// The eigenbases of one weight matrix.
 #[derive(Clone, Debug)]
-pub(super) struct Eigenbasis<S> {
+pub(crate) struct Eigenbasis<S> {
     block: Block,
     left: Side<S>,
     right: Side<S>,
@@ -297,24 +297,24 @@ impl Choice {
 }
 
 /// Turns the matrices of a gradient into their eigenbases, in place.
-pub(super) fn enter<S: Scalar>(bases: &mut [Eigenbasis<S>], gradient: &mut [S], first: bool, pool: Threads<'_>) {
+pub(crate) fn enter<S: Scalar>(bases: &mut [Eigenbasis<S>], gradient: &mut [S], first: bool, pool: Threads<'_>) {
     turn(bases, gradient, pool, |basis, gradient| basis.enter(gradient, first));
 }
 
 /// Turns the matrices of a direction back, in place.
-pub(super) fn leave<S: Scalar>(bases: &mut [Eigenbasis<S>], direction: &mut [S], pool: Threads<'_>) {
+pub(crate) fn leave<S: Scalar>(bases: &mut [Eigenbasis<S>], direction: &mut [S], pool: Threads<'_>) {
     turn(bases, direction, pool, Eigenbasis::leave);
 }
 
 /// Follows the eigenbases where it is time, the first moments with them.
-pub(super) fn follow<S: Scalar>(bases: &mut [Eigenbasis<S>], first_moments: &mut [S], step: u32, pool: Threads<'_>) {
+pub(crate) fn follow<S: Scalar>(bases: &mut [Eigenbasis<S>], first_moments: &mut [S], step: u32, pool: Threads<'_>) {
     if step.is_multiple_of(EVERY) {
         turn(bases, first_moments, pool, Eigenbasis::follow);
     }
 }
 
 /// The threads to work on: a pool, or the caller's own. Never rayon's global pool, which belongs to the application.
-pub(super) type Threads<'a> = Option<&'a rayon::ThreadPool>;
+pub(crate) type Threads<'a> = Option<&'a rayon::ThreadPool>;
 
 fn turn<S: Scalar>(
     bases: &mut [Eigenbasis<S>],
@@ -335,7 +335,7 @@ fn turn<S: Scalar>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::training::optimizer::{Method, Moments, Update};
+    use crate::optimizers::{Method, Moments, Update};
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 

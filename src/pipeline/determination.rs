@@ -1,12 +1,12 @@
 //! Tables of the ranges in which the data determine mass matrix, friction and energy of the model of `lnn fit`.
 
 use crate::analysis::{Determination, EnergyLoss, Estimate, Observed, determination, energy_loss, places};
+use crate::data::Measured;
 use crate::lagrangian::EulerLagrange;
 use crate::names::number;
 use crate::pipeline::PipelineError;
 use crate::recording::Targets;
 use crate::report::{Report, text_table};
-use crate::training::Measured;
 use serde::Serialize;
 
 /// One quantity and its range.

@@ -1,8 +1,8 @@
 //! Where the energy of held-out motion goes by a model: change, work, friction and what is left.
 
+use crate::data::Part;
 use crate::lagrangian::{EulerLagrange, Request, Terms};
 use crate::rollout::{Driven, SampledForce, Trajectory};
-use crate::training::Part;
 use serde::Serialize;
 
 /// States evaluated at once.

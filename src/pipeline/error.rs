@@ -1,12 +1,14 @@
 //! Failures of a pipeline.
 
 use crate::analysis::GridError;
+use crate::configuration::ConfigError;
+use crate::data::{MeasuredError, SamplingError};
 use crate::lagrangian::SystemError;
 use crate::network::NetworkError;
 use crate::network::file::ModelFileError;
 use crate::recording::smooth::SmoothError;
-use crate::training::shooting::ShootingError;
-use crate::training::{CheckpointError, ConfigError, MeasuredError, SamplingError, TrainingError};
+use crate::shooting::ShootingError;
+use crate::training::{CheckpointError, TrainingError};
 use std::fmt;
 use std::path::{Path, PathBuf};
 

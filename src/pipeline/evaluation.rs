@@ -5,13 +5,14 @@ use crate::analysis::{
     ValidTimes, acceleration_errors, conserved_error, determinant_grid, lagrangian_grid, mass_matrix_error, statistics,
     wrong_signatures,
 };
+use crate::data::sample;
 use crate::lagrangian::system::TrajectoryTest as Span;
 use crate::lagrangian::{Configured, EulerLagrange};
 use crate::pipeline::attention::Attention;
 use crate::pipeline::{PipelineError, Watch, memory};
+use crate::random::RngStream;
 use crate::report::{Figure, Fit, GridComparison, evaluation_figures, grid_figures};
 use crate::rollout::{Domain, Trajectory};
-use crate::training::{Stream, sample};
 use serde::Serialize;
 
 /// Points of a grid along each axis.
@@ -97,7 +98,7 @@ impl EvaluationOptions {
         let bounds = system.system.validation(system.coordinates);
         let pairs = |bounds: &[(f64, f64)]| bounds.iter().map(|&(low, high)| [low, high]).collect::<Vec<_>>();
         let bounds = (pairs(&bounds.positions), pairs(&bounds.velocities));
-        let mut random = Stream::Test.generator(seed);
+        let mut random = RngStream::Test.generator(seed);
         let states = sample(system, "validation bounds", (&bounds.0, &bounds.1), STATES, &mut random)?;
         let states = (states.q().to_vec(), states.v().to_vec());
         let span = system.system.trajectory(system.coordinates);

@@ -1,6 +1,7 @@
 //! A fit of recorded motion: learning, judgement by motion that was held out, files.
 
-use crate::network::file::container::checksum;
+use crate::configuration::Precision;
+use crate::data::{Datasets, Measured};
 use crate::network::file::{FORMAT, Header, ModelFile, StoredPrecision};
 use crate::network::{Architecture, Layout, NetworkLagrangian};
 use crate::pipeline::determination::Determined;
@@ -15,10 +16,9 @@ use crate::pipeline::train::{RunOptions, write_model};
 use crate::pipeline::{Event, Output, PipelineError, Watch, memory};
 use crate::recording::Targets;
 use crate::scalar::Scalar;
-use crate::training::shooting::{self, Task};
-use crate::training::{
-    Datasets, Epoch, Measured, Precision, Sitting, Snapshot, Stop, Trained, resume as train, training_memory,
-};
+use crate::shooting::{self, Task};
+use crate::storage::container::checksum;
+use crate::training::{Epoch, Sitting, Snapshot, Stop, Trained, resume as train, training_memory};
 
 /// A model of recorded motion, after its files were written.
 #[derive(Debug)]

@@ -1,9 +1,11 @@
 //! The configuration of a fit, as `config.toml` holds it.
 
+use crate::configuration::{Config, ConfigError};
+use crate::data::Preparation;
+use crate::presets::{Key, Section};
 use crate::recording::Targets;
 use crate::recording::smooth::SmoothOptions;
-use crate::training::shooting::Shooting;
-use crate::training::{Config, ConfigError, Key, Preparation, Section};
+use crate::shooting::Shooting;
 use serde::{Deserialize, Serialize};
 
 /// Share of the samples that is held out unless told otherwise.

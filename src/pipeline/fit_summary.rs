@@ -1,5 +1,6 @@
 //! Results of `lnn fit`: `summary.json`, tables for a terminal, report.
 
+use crate::configuration::Config;
 use crate::names::{WIDTH, counted, hundredths, number, wrapped};
 use crate::pipeline::determination::Determined;
 use crate::pipeline::hold_out::HoldOut;
@@ -9,8 +10,8 @@ use crate::pipeline::{Output, PipelineError, headline};
 use crate::recording::{HeldOut, Recording, Targets};
 use crate::report::{Report, text_table};
 use crate::scalar::Scalar;
-use crate::training::shooting::Fitted;
-use crate::training::{Config, Trained};
+use crate::shooting::Fitted;
+use crate::training::Trained;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;

@@ -4,7 +4,9 @@ use crate::analysis::{
     PredictionError, Predictions, ValidTimes, Window, predict_by_constant_velocity, prediction_error, spread,
     window_valid_times,
 };
+use crate::data::Part;
 use crate::lagrangian::{EulerLagrange, Request, Terms};
+use crate::linalg::{SignatureBuffers, has_signature};
 use crate::names::number;
 use crate::pipeline::attention::Attention;
 use crate::pipeline::energy::{Balance, balance};
@@ -12,7 +14,6 @@ use crate::pipeline::prediction::HeldOutPredictions;
 use crate::pipeline::{PipelineError, Watch};
 use crate::report::{Figure, LinePlot, Report, Series, Turn, kept, line_plot, text_table};
 use crate::rollout::SampledForce;
-use crate::training::{Part, SignatureBuffers, has_signature};
 use serde::Serialize;
 
 /// Windows that are predicted at most; of more, evenly spaced ones.

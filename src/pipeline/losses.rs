@@ -1,9 +1,11 @@
 //! Losses of weights that something else than the supervised training left.
 
+use crate::configuration::Penalty;
+use crate::data::Dataset;
 use crate::network::Architecture;
 use crate::pipeline::PipelineError;
 use crate::scalar::Scalar;
-use crate::training::{Dataset, Objective, Penalty, Trained, TrainingError};
+use crate::training::{Objective, Trained, TrainingError};
 
 /// States that judge a model: those that chose the best epoch, and those that chose nothing.
 pub(crate) struct Judges<S> {
@@ -25,8 +27,7 @@ impl<S: Scalar> Judges<S> {
         threads: usize,
         trained: &mut Trained<S>,
     ) -> Result<(), PipelineError> {
-        let mut objective = Objective::new(architecture, penalty, threads)
-            .map_err(|source| TrainingError::Threads { threads, source })?;
+        let mut objective = Objective::new(architecture, penalty, threads).map_err(TrainingError::from)?;
         let loss = objective.loss(&trained.weights, &self.validation).loss.to_f64();
         // A model file says a number; of weights that give no state an acceleration there is none.
         trained.validation_loss = if loss.is_finite() { loss } else { f64::MAX };

@@ -5,7 +5,7 @@
 //!
 //! | function | from | to |
 //! |---|---|---|
-//! | [`train`] | a [`Config`](crate::training::Config) | a model of a known system and its [`Evaluation`] |
+//! | [`train`] | a [`Config`](crate::configuration::Config) | a model of a known system and its [`Evaluation`] |
 //! | [`fit`] | recorded motion and a [`FitConfig`] | a model, judged by motion that was held out ([`HoldOut`]) |
 //! | [`evaluate`] | a model and the system it learned | an [`Evaluation`] |
 //! | [`run_experiment`] | an [`Experiment`](crate::experiments::Experiment) | the records of its runs, a table, a report |
@@ -19,7 +19,7 @@
 //! ```
 //! use lnn::pipeline::{FitOptions, InMemory, PreparedFit, RunOptions, Watch, fit};
 //! use lnn::recording::{Reading, Recording, Track};
-//! use lnn::training::Precision;
+//! use lnn::configuration::Precision;
 //!
 //! // Two swings of a pendulum: an angle every 20 ms.
 //! let swing = |amplitude: f64| -> Vec<f64> { (0..400).map(|k| amplitude * (0.06 * f64::from(k)).sin()).collect() };
@@ -80,12 +80,15 @@ pub use determination::Determined;
 pub use energy::Balance;
 pub use error::PipelineError;
 pub use evaluation::{Evaluation, EvaluationOptions, Motion, RTOL, evaluate};
-pub use experiment::{finished_record, run_experiment};
+pub(crate) use experiment::finished_record;
+pub use experiment::run_experiment;
 pub use experiment_report::{ExperimentReport, Results};
 pub use experiment_store::{ExperimentStore, RunOutput};
-pub use file_names::{CAPTIONS, MODEL, RECORD};
+pub use file_names::MODEL;
+pub(crate) use file_names::{CAPTIONS, RECORD};
 pub use fit::{FitReport, fit};
-pub use fit_config::{FIT_SECTIONS, FitColumns, FitConfig, FitOptions, HELD_OUT};
+pub(crate) use fit_config::FIT_SECTIONS;
+pub use fit_config::{FitColumns, FitConfig, FitOptions, HELD_OUT};
 pub use hold_out::{HoldOut, HoldOutOptions, evaluate_hold_out};
 pub use model::{model_file, trained_on};
 pub use output::{Directory, InMemory, Output};

@@ -1,11 +1,13 @@
 //! Recorded motion made ready for a fit: derivatives, division, the configuration that suits it.
 
+use crate::configuration::{Config, Precision};
+use crate::data::Measured;
 use crate::pipeline::PipelineError;
 use crate::pipeline::fit_config::{FitColumns, FitConfig, FitOptions};
+use crate::presets::suggested;
 use crate::recording::survey::{Survey, SurveyOptions, survey};
 use crate::recording::{Reading, Targets};
 use crate::scalar::Scalar;
-use crate::training::{Config, Measured, Precision};
 use std::time::Instant;
 
 /// Recorded motion with its derivatives, divided into what is learned from, what chooses the best epoch and what judges.
@@ -75,7 +77,7 @@ impl<'a> PreparedFit<'a> {
         training: Config,
         horizon: Option<f64>,
         recording: FitColumns,
-        shooting: Option<crate::training::shooting::Shooting>,
+        shooting: Option<crate::shooting::Shooting>,
     ) -> FitConfig {
         let FitOptions { held_out, window, noise, .. } = self.options.clone();
         FitConfig { targets: Some(self.targets), held_out, window, noise, horizon, recording, shooting, training }
@@ -91,7 +93,7 @@ impl<'a> PreparedFit<'a> {
 
     fn suggest_in<S: Scalar>(&self, name: &str) -> Result<Config, PipelineError> {
         let data = self.measured.datasets::<S>(self.targets)?;
-        Ok(self.measured.config(name, &data))
+        Ok(suggested(name, &data))
     }
 }
 

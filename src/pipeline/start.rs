@@ -1,10 +1,10 @@
 //! Training that starts from a model: the configuration takes the model's shape, and another shape is refused.
 
+use crate::configuration::{Config, Known, Precision, Scaling};
 use crate::network::Architecture;
 use crate::network::file::{Header, ModelFile, StoredPrecision};
 use crate::pipeline::{PipelineError, model_file};
 use crate::scalar::Scalar;
-use crate::training::{Config, Known, Precision, Scaling};
 use serde_json::Value;
 use std::path::Path;
 

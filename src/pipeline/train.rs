@@ -1,6 +1,8 @@
 //! A training from its configuration to files: model, history, summary, pictures, report.
 
 use crate::analysis::{stretches, training_instability};
+use crate::configuration::{Config, Phase, Precision};
+use crate::data::{Datasets, sample_all};
 use crate::experiments::{Learned, Outcome, Record};
 use crate::lagrangian::Configured;
 use crate::lagrangian::system::TrajectoryTest;
@@ -14,9 +16,7 @@ use crate::pipeline::report_files::{ended, history, parameter_table, training_pi
 use crate::pipeline::{MODEL, Output, PipelineError, Watch, memory, start};
 use crate::report::Report;
 use crate::scalar::Scalar;
-use crate::training::{
-    Config, Datasets, Epoch, Phase, Precision, Sitting, Snapshot, Stop, resume, sample_all, training_memory,
-};
+use crate::training::{Epoch, Sitting, Snapshot, Stop, resume, training_memory};
 use serde::Serialize;
 use std::time::Instant;
 

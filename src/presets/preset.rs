@@ -1,16 +1,18 @@
 //! Configurations that ship with the program.
 
+use crate::configuration::Regularizer;
+use crate::configuration::{Config, Data, Network, OnFailure, Optimizer, Phase, Precision, Scaling};
+use crate::data::boxes;
 use crate::lagrangian::Configured;
-use crate::lagrangian::system::Bounds;
+use crate::lagrangian::system::{Bounds, PaperBudget, PaperPhase, StateAdvice};
 use crate::network::{Initialization, InputLayer, Nonlinearity, Structure};
-use crate::training::config::{Config, Data, Network, OnFailure, Optimizer, Phase, Precision, Scaling};
-use crate::training::optimizer::Method;
-use crate::training::penalty::Regularizer;
-use crate::training::schedule::Schedule;
+use crate::optimizers::Method;
+use crate::optimizers::Schedule;
 use std::f64::consts::PI;
 
 /// A configuration by name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Preset {
     /// A useful model within a minute on two cores.
     Quick,
@@ -18,11 +20,6 @@ pub enum Preset {
     Best,
     /// The paper's own budget and choices.
     Paper,
-}
-
-/// Bounds in the form of a configuration.
-pub(super) fn boxes(bounds: &[(f64, f64)]) -> Vec<[f64; 2]> {
-    bounds.iter().map(|&(low, high)| [low, high]).collect()
 }
 
 impl Preset {
@@ -135,16 +132,8 @@ fn phase(epochs: usize, rate: f64, position: Vec<[f64; 2]>, velocity: Vec<[f64; 
     }
 }
 
-/// Where the presets of our own draw their training states, and how these count.
-struct States {
-    bounds: Bounds,
-    logarithmic: Vec<bool>,
-    relative: f64,
-    motions: f64,
-}
-
 /// The paper's box with a single turn of every angle, wider where the motions of the trajectory test soon leave it.
-fn training_states(system: &Configured<f64>) -> States {
+fn training_states(system: &Configured<f64>) -> (Bounds, StateAdvice) {
     let n = system.coordinates;
     let mut bounds: Bounds = system.system.training(n);
     // Embedded angles repeat: one turn is all there is, unless somebody wants less.
@@ -154,31 +143,12 @@ fn training_states(system: &Configured<f64>) -> States {
             *bound = (0.0, 2.0 * PI);
         }
     }
-    let (mut logarithmic, mut relative, mut motions) = (Vec::new(), 0.0, 0.0);
-    match system.system.name.as_ref() {
-        // A short spring turns fast, and its angle is accelerated a thousand times more than others.
-        "spring-pendulum" => {
-            bounds.velocities = vec![(-7.0, 7.0), (-10.0, 10.0)];
-            (logarithmic, relative) = (vec![true, false], 0.1);
-        }
-        // Near the poles the azimuth turns fast, and most great circles of the test are slower than the box.
-        "sphere-geodesic" => {
-            bounds.velocities[1] = (-6.5, 6.5);
-            (relative, motions) = (0.3, 0.5);
-        }
-        // z = z_0 / cos(tau) from rest: towards the horizon everything falls ever faster.
-        "ads2-geodesic" | "ads3-geodesic" | "ads4-geodesic" => {
-            bounds.positions[n - 1].0 = 0.4;
-            bounds.velocities[n - 1] = (-2.4, 2.4);
-            (logarithmic, relative, motions) = ((1..=n).map(|i| i == n).collect(), 1.0, 0.3);
-        }
-        _ => {}
-    }
-    States { bounds, logarithmic, relative, motions }
+    let advice = system.system.learning.states.map_or_else(StateAdvice::default, |advise| advise(&mut bounds));
+    (bounds, advice)
 }
 
 fn ours(system: &Configured<f64>, size: Size) -> Config {
-    let States { bounds, logarithmic, relative, motions } = training_states(system);
+    let (bounds, StateAdvice { logarithmic, relative, motions }) = training_states(system);
     let phase = phase(size.epochs, 5e-3, boxes(&bounds.positions), boxes(&bounds.velocities));
     let base = base(system, 60_000, network(size.width));
     let off_shell = if system.constrained_coordinate().is_some() { OFF_SHELL } else { 0.0 };
@@ -193,7 +163,7 @@ fn ours(system: &Configured<f64>, size: Size) -> Config {
 
 /// The quick preset for recorded states: numbers of training, validation and test states, bounds of coordinates and
 /// velocities of training and validation, and how many steps to take, in whole epochs.
-pub(super) fn recorded(
+pub(crate) fn recorded(
     name: &str,
     [training, validation, test]: [usize; 3],
     [position, velocity]: [Vec<[f64; 2]>; 2],
@@ -231,18 +201,9 @@ pub(super) fn recorded(
 /// Lorentzian metric could satisfy; its text says Lorentzian Sylvester, and that is what stands here.
 fn paper(system: &Configured<f64>) -> Option<Config> {
     let n = system.coordinates;
-    /// Epochs, rate, lowest rate.
-    type Stretch = (usize, f64, f64);
-    let (states, hidden, phases): (_, _, &[Stretch]) = match system.system.name.as_ref() {
-        "double-pendulum" => (60_000, vec![500; 3], &[(300, 1e-3, 1e-6), (200, 4e-5, 1e-7), (200, 1e-5, 1e-8)]),
-        "triple-pendulum" => (60_000, vec![500; 3], &[(500, 1e-3, 1e-7)]),
-        "spring-pendulum" => (60_000, vec![600; 2], &[(500, 5e-4, 1e-7)]),
-        "sphere-geodesic" => (50_000, vec![500; 3], &[(50, 1e-3, 1e-6)]),
-        "ads4-geodesic" => (120_000, vec![500; 3], &[(300, 1e-3, 1e-7)]),
-        _ => return None,
-    };
+    let PaperBudget { states, hidden, phases } = system.system.learning.paper?;
     let network = Network {
-        hidden,
+        hidden: hidden.to_vec(),
         activation: Nonlinearity::Gelu,
         alpha: 1.0,
         time_like: None,
@@ -258,12 +219,9 @@ fn paper(system: &Configured<f64>) -> Option<Config> {
         initialization: Initialization::Default,
     };
     let bounds: Bounds = system.system.training(n);
-    let phase = |(k, &(epochs, rate, eta_min)): (usize, &Stretch)| {
-        let mut position = boxes(&bounds.positions);
-        if system.system.name == "double-pendulum" {
-            // The first phase sees three turns, the others one turn and a little more.
-            position = vec![if k == 0 { [-3.0 * PI, 3.0 * PI] } else { [-PI / 10.0, 21.0 * PI / 10.0] }; n];
-        }
+    let phase = |phase: &PaperPhase| {
+        let PaperPhase { epochs, rate, lowest_rate: eta_min, positions } = *phase;
+        let position = positions.map_or_else(|| boxes(&bounds.positions), |all| boxes(&vec![all; n]));
         let velocity = boxes(&bounds.velocities);
         Phase {
             epochs,
@@ -276,6 +234,6 @@ fn paper(system: &Configured<f64>) -> Option<Config> {
             logarithmic: vec![],
         }
     };
-    let phases = phases.iter().enumerate().map(phase).collect();
+    let phases = phases.iter().map(phase).collect();
     Some(Config { phases, ..base(system, states, network) })
 }

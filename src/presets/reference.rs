@@ -1,9 +1,9 @@
 //! The keys of configuration files: one table, from which commented configurations and the reference page are made.
 
+use crate::configuration::Config;
 use crate::lagrangian::configure;
-use crate::training::config::Config;
-use crate::training::preset::Preset;
-use crate::training::shooting::Shooting;
+use crate::presets::Preset;
+use crate::shooting::Shooting;
 use serde_json::Value;
 
 /// A key of a configuration file.
@@ -301,8 +301,8 @@ pub fn section_reference(section: &Section<'_>, values: &Value, whose: &str) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::configuration::{Known, Polish, Regularizer};
     use crate::network::{InputLayer, Nonlinearity};
-    use crate::training::{Known, Polish, Regularizer};
     use std::collections::BTreeSet;
 
     /// Paths of all keys of a value, tables of lists included; what stands in `open` is not descended into.

@@ -1,17 +1,20 @@
 //! From recorded trajectories and a first guess of the weights to a network fitted through its motion.
 
+use crate::configuration::ConfigError;
+use crate::configuration::Penalty;
+use crate::data::{Estimated, Noise};
 use crate::network::{Architecture, Layout, NetworkError};
+use crate::random::RngStream;
 use crate::recording::TrackError;
 use crate::scalar::Scalar;
+use crate::shooting::objective::Shots;
+use crate::shooting::segments::Segments;
+use crate::shooting::settings::Shooting;
+use crate::shooting::solver::{ShootingProblem, ShootingSolver};
 use crate::training::checkpoint::{Snapshot, Underway};
-use crate::training::config::ConfigError;
-use crate::training::penalty::Penalty;
-use crate::training::shooting::objective::Shots;
-use crate::training::shooting::segments::{Estimated, Noise, Segments};
-use crate::training::shooting::settings::Shooting;
-use crate::training::shooting::solver::{ShootingProblem, ShootingSolver};
-use crate::training::solver::{Epoch, Hooks, Saver, TrainingState};
-use crate::training::trainer::{Log, Sitting, Stop, Stream, TrainingError};
+use crate::training::epoch::Epoch;
+use crate::training::solver::{Hooks, Saver, TrainingState};
+use crate::training::trainer::{Log, Sitting, Stop, TrainingError};
 use argmin::core::observers::ObserverMode;
 use argmin::core::{Executor, State, TerminationReason, TerminationStatus};
 use thiserror::Error;
@@ -61,6 +64,7 @@ pub struct Fitted<S> {
 
 /// Why a network could not be fitted.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum ShootingError {
     /// A setting is out of range.
     #[error(transparent)]
@@ -157,7 +161,7 @@ fn difference<S: Scalar>(shots: &mut Shots<S>, weights: &[S], coarse: &Segments<
     (square / count).sqrt()
 }
 
-/// Fits a network through its motion; see the [module](crate::training::shooting).
+/// Fits a network through its motion; see the [module](crate::shooting).
 ///
 /// The same task and seed give the same bytes on any number of `threads`. A segment whose motion is not finite, whose mass
 /// matrix is singular or whose state leaves ten times the range of the data is left out of the step and counted in
@@ -195,7 +199,7 @@ pub fn resume<S: Scalar>(
     task.check()?;
     let per_segment = settings.samples_per_segment;
     let mut shots = Shots::new(task.architecture, task.penalty, (settings.continuity, settings.huber), threads)
-        .map_err(|source| TrainingError::Threads { threads, source })?;
+        .map_err(TrainingError::from)?;
     let training = match settings.steps {
         Some(steps) => task.cut(TRAINING, per_segment, steps)?,
         None => fine_enough(&mut shots, &task, per_segment)?,
@@ -211,7 +215,7 @@ pub fn resume<S: Scalar>(
         }
         None => (None, None),
     };
-    let rng = Stream::Order(0).generator(task.seed);
+    let rng = RngStream::Order(0).generator(task.seed);
     let mut solver = ShootingSolver::new(settings, &problem, rng, hooks, saver);
     let mut state = TrainingState::<S>::new().param(task.weights.clone());
     if let Some(Underway { course, history, best, best_loss, best_epoch, shooting: Some(shot) }) = underway {

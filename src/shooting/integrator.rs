@@ -11,12 +11,12 @@
 //! The forward pass keeps states and accelerations of all stages; the reverse pass evaluates the network there once more,
 //! with what the adjoint identity needs. Every gradient is that of this map, exactly.
 
+use crate::configuration::Penalty;
 use crate::network::Model;
 use crate::scalar::{Real, Scalar};
+use crate::shooting::motion::Motion;
+use crate::shooting::segments::Segments;
 use crate::tape::Depth;
-use crate::training::penalty::Penalty;
-use crate::training::shooting::motion::Motion;
-use crate::training::shooting::segments::Segments;
 
 /// Integrates chunks of segments; buffers are reused from chunk to chunk.
 pub(super) struct Integrator<S> {

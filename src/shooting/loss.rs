@@ -1,8 +1,8 @@
 //! Residuals of the samples of a chunk of segments, and of the joints at their ends.
 
 use crate::scalar::{Real, Scalar, Sum};
-use crate::training::shooting::integrator::Integrator;
-use crate::training::shooting::segments::Segments;
+use crate::shooting::integrator::Integrator;
+use crate::shooting::segments::Segments;
 
 /// `r^2` up to `|r| = bound`, linear beyond with the same slope (Huber 1964, twice his function).
 #[derive(Clone, Copy, Debug)]

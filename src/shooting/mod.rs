@@ -28,8 +28,13 @@ mod settings;
 mod solver;
 mod starts;
 
-pub use fit::{Fitted, ShootingError, Task, fit, resume};
+#[doc(hidden)]
+pub use fit::resume;
+pub use fit::{Fitted, ShootingError, Task, fit};
+#[doc(hidden)]
 pub use objective::{ShotReport, Shots};
-pub use segments::{Estimated, Noise, Segments};
+#[doc(hidden)]
+pub use segments::Segments;
 pub use settings::Shooting;
+#[doc(hidden)]
 pub use starts::Curvature;

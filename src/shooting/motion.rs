@@ -4,14 +4,14 @@
 //! places of this file and nowhere else: [`Motion::accelerate`] adds them, [`Motion::pull_back`] takes `lam = M^-1 u`
 //! through what `D` depends on.
 
+use crate::configuration::Penalty;
+use crate::linalg::{
+    SignatureBuffers as Buffers, Violation, characteristic_scales, eigenvalue_violation, sylvester_violation,
+};
 use crate::linalg::{Workspace, solve};
 use crate::network::{Dynamics, Model};
 use crate::scalar::{Real, Scalar};
 use crate::tape::{Depth, MixedDirections};
-use crate::training::penalty::Penalty;
-use crate::training::signature::{
-    Buffers, Violation, characteristic_scales, eigenvalue_violation, sylvester_violation,
-};
 use crate::training::violations::Violations;
 
 /// The equation of motion on a chunk of states; buffers are reused from call to call.

@@ -3,15 +3,18 @@
 //! A batch is cut into stripes and chunks whose sizes do not depend on the number of threads, and every sum is taken in
 //! their order: the same numbers on any number of threads.
 
+use crate::configuration::Penalty;
 use crate::network::{Architecture, Model};
 use crate::scalar::{Real, Scalar, Sum};
-use crate::training::penalty::Penalty;
-use crate::training::shooting::integrator::Integrator;
-use crate::training::shooting::loss::{Huber, add_loss, each_residual, gap};
-use crate::training::shooting::segments::Segments;
-use crate::training::shooting::starts::{Curvature, Linearisation};
+use crate::shooting::integrator::Integrator;
+use crate::shooting::loss::{Huber, add_loss, each_residual, gap};
+use crate::shooting::segments::Segments;
+use crate::shooting::starts::{Curvature, Linearisation};
+use crate::training::ThreadsError;
+use crate::training::objective::threads as start_threads;
 use crate::training::stripes::sum_gradients;
 use rayon::prelude::*;
+use std::sync::Arc;
 
 /// Segments integrated together.
 const CHUNK: usize = 8;
@@ -41,7 +44,7 @@ pub struct Shots<S> {
     penalty: Penalty,
     huber: Huber<S>,
     continuity: S,
-    pool: rayon::ThreadPool,
+    pool: Arc<rayon::ThreadPool>,
     stripes: Vec<Stripe<S>>,
 }
 
@@ -229,7 +232,7 @@ impl<S: Scalar> Segments<S> {
 
 impl<S: Scalar> Shots<S> {
     /// For networks of this shape on `threads` threads; `continuity` and `huber` as in
-    /// [`Shooting`](crate::training::shooting::Shooting).
+    /// [`Shooting`](crate::shooting::Shooting).
     ///
     /// # Errors
     /// When the threads cannot be started.
@@ -238,8 +241,8 @@ impl<S: Scalar> Shots<S> {
         penalty: Penalty,
         (continuity, huber): (f64, f64),
         threads: usize,
-    ) -> Result<Self, rayon::ThreadPoolBuildError> {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.max(1)).build()?;
+    ) -> Result<Self, ThreadsError> {
+        let pool = start_threads(threads)?;
         let (huber, continuity) = (Huber::new(huber), S::of_f64(continuity));
         Ok(Self { model: architecture.model(), penalty, huber, continuity, pool, stripes: Vec::new() })
     }

@@ -5,32 +5,13 @@
 //! of positions and velocities at both, whose error is of the integrator's own order 4. Periodic coordinates are counted
 //! from a multiple of `2 pi` near the segment's start, so that a motion of many turns loses no digits.
 
+use crate::data::{Estimated, Noise};
 use crate::network::Architecture;
-use crate::recording::{Track, hermite};
+use crate::recording::hermite;
 use crate::rollout::SampledForce;
 use crate::scalar::{Real, Scalar};
 use std::f64::consts::TAU;
 use std::ops::Range;
-
-/// A recorded trajectory with the states that were estimated from it, by smoothing for instance.
-#[derive(Clone, Copy, Debug)]
-pub struct Estimated<'a> {
-    /// Measured values.
-    pub track: &'a Track,
-    /// Estimated positions, `(samples, n)` in physical units, unwrapped as in the track.
-    pub q: &'a [f64],
-    /// Estimated velocities, `(samples, n)`.
-    pub v: &'a [f64],
-}
-
-/// Standard deviations of the noise of what was measured, in physical units.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Noise {
-    /// Of each position, `(n)`, positive.
-    pub q: Vec<f64>,
-    /// Of each velocity, `(n)`, positive; empty if velocities were not measured or shall not be used.
-    pub v: Vec<f64>,
-}
 
 /// A state may leave the range of the data by this factor before its segment is given up.
 const RANGE: f64 = 10.0;

@@ -1,7 +1,8 @@
 //! Settings of multiple shooting.
 
-use crate::training::config::{ConfigError, Faults};
-use crate::training::optimizer::Method;
+use crate::configuration::ConfigError;
+use crate::configuration::Faults;
+use crate::optimizers::Method;
 use serde::{Deserialize, Serialize};
 
 /// Choices of a fit through motion. Keys that are not given have their defaults; others are refused.

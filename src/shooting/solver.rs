@@ -1,18 +1,19 @@
 //! Multiple shooting as an argmin solver: one iteration is one epoch, the cost is the validation loss.
 
+use crate::optimizers::Schedule;
+use crate::optimizers::{Method, Moments, Update};
+use crate::random::RandomGenerator;
 use crate::scalar::{Real, Scalar};
+use crate::shooting::objective::{ShotReport, Shots};
+use crate::shooting::segments::Segments;
+use crate::shooting::settings::Shooting;
+use crate::shooting::starts::Curvature;
 use crate::training::checkpoint::{Clock, Course, Keeper, Shot, Underway};
-use crate::training::optimizer::{Method, Moments, Update};
-use crate::training::schedule::Schedule;
-use crate::training::shooting::objective::{ShotReport, Shots};
-use crate::training::shooting::segments::Segments;
-use crate::training::shooting::settings::Shooting;
-use crate::training::shooting::starts::Curvature;
-use crate::training::solver::{Epoch, Hooks, Means, Progress, Saver, TrainingState};
+use crate::training::epoch::{Epoch, Means};
+use crate::training::solver::{Hooks, Progress, Saver, TrainingState};
 use argmin::core::{Error, KV, Problem, Solver, State, TerminationReason, TerminationStatus};
 use argmin::kv;
 use rand::seq::SliceRandom;
-use rand_chacha::ChaCha8Rng;
 use std::sync::atomic::Ordering;
 
 /// At most one in this many validation segments may be left out of a loss that counts.
@@ -67,7 +68,7 @@ impl<S: Scalar> ShootingSolver<S> {
     pub fn new(
         settings: &Shooting,
         problem: &ShootingProblem<S>,
-        rng: ChaCha8Rng,
+        rng: RandomGenerator,
         hooks: &Hooks,
         saver: Option<Saver<S>>,
     ) -> Self {

@@ -9,8 +9,8 @@
 
 use crate::linalg::{Workspace, solve};
 use crate::scalar::{Real, Scalar};
-use crate::training::shooting::loss::Huber;
-use crate::training::shooting::segments::Segments;
+use crate::shooting::loss::Huber;
+use crate::shooting::segments::Segments;
 
 /// Weight, beside the observations, of a start that stays where it is: keeps `H` regular where data say nothing.
 const DAMPING: f64 = 1e-2;

@@ -5,7 +5,8 @@ use thiserror::Error;
 
 /// Why a model file, or another file of the same make, could not be written or read.
 #[derive(Debug, Error)]
-pub enum ModelFileError {
+#[non_exhaustive]
+pub enum ContainerError {
     /// Missing, not a regular file, too large, or refused by the system.
     #[error(transparent)]
     Read(#[from] ReadError),

@@ -8,7 +8,7 @@ use std::fmt;
 struct Unambiguous;
 
 /// Checks that no object in `text` names a key twice, at any depth.
-pub(super) fn check_unambiguous(text: &[u8]) -> Result<(), serde_json::Error> {
+pub(crate) fn check_unambiguous(text: &[u8]) -> Result<(), serde_json::Error> {
     serde_json::from_slice::<Unambiguous>(text).map(|_| ())
 }
 

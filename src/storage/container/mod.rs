@@ -4,17 +4,23 @@
 //! hexadecimal digits, the CRC-32 (IEEE) of that JSON text up to the comma before `"checksum"`, followed by the bytes of
 //! the tensors in the order of the file. The same content gives the same bytes; a changed bit anywhere is refused.
 
-use super::json::check_unambiguous;
-use super::{ModelFileError, StoredPrecision};
+mod error;
+mod json;
+mod precision;
+
+pub use error::ContainerError;
+pub use precision::StoredPrecision;
+
 use crate::names::{one_line, plain};
 use crate::scalar::Scalar;
+use json::check_unambiguous;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 
 /// Largest description that is read, in bytes.
-pub(super) const MAX_HEADER: u64 = 1 << 20;
+pub(crate) const MAX_HEADER: u64 = 1 << 20;
 
 /// Marks of the files of one kind.
 #[derive(Clone, Copy, Debug)]
@@ -60,7 +66,7 @@ fn stored_dtype(precision: StoredPrecision) -> Dtype {
     }
 }
 
-pub(super) fn checksum_field(checksum: u32) -> String {
+pub(crate) fn checksum_field(checksum: u32) -> String {
     format!(",\"checksum\":\"{checksum:08x}\"}}")
 }
 
@@ -79,11 +85,11 @@ pub fn checksum<'a, S: Scalar>(numbers: impl IntoIterator<Item = &'a S>, precisi
 /// The bytes of a file; the description must have the fields `format` and `crate_version`.
 ///
 /// # Errors
-/// [`ModelFileError::Header`] or [`ModelFileError::NotSafetensors`] for what cannot be written.
-pub fn pack(kind: &Kind, header: &impl Serialize, mut tensors: Vec<Tensor>) -> Result<Vec<u8>, ModelFileError> {
+/// [`ContainerError::Header`] or [`ContainerError::NotSafetensors`] for what cannot be written.
+pub fn pack(kind: &Kind, header: &impl Serialize, mut tensors: Vec<Tensor>) -> Result<Vec<u8>, ContainerError> {
     // The payload in the file is in safetensors' own order.
     tensors.sort_by(|a, b| b.dtype.cmp(&a.dtype).then_with(|| a.name.cmp(&b.name)));
-    let text = serde_json::to_string(header).map_err(|e| ModelFileError::Header(e.to_string()))?;
+    let text = serde_json::to_string(header).map_err(|e| ContainerError::Header(e.to_string()))?;
     let body = text.strip_suffix('}').unwrap_or(&text);
     let mut checksum = crc32fast::Hasher::new();
     checksum.update(body.as_bytes());
@@ -100,15 +106,15 @@ pub fn pack(kind: &Kind, header: &impl Serialize, mut tensors: Vec<Tensor>) -> R
 /// Description and tensors of a file; never panics and allocates no more than a small multiple of its bytes.
 ///
 /// # Errors
-/// [`ModelFileError`] for anything but a whole, undamaged file of this kind and format.
-pub fn unpack<'a, H: DeserializeOwned>(kind: &Kind, bytes: &'a [u8]) -> Result<(H, Tensors<'a>), ModelFileError> {
+/// [`ContainerError`] for anything but a whole, undamaged file of this kind and format.
+pub fn unpack<'a, H: DeserializeOwned>(kind: &Kind, bytes: &'a [u8]) -> Result<(H, Tensors<'a>), ContainerError> {
     check_container(bytes)?;
     let (start, metadata) = SafeTensors::read_metadata(bytes).map_err(damaged)?;
-    let foreign = || ModelFileError::Foreign { kind: kind.name, key: kind.key };
+    let foreign = || ContainerError::Foreign { kind: kind.name, key: kind.key };
     let map = metadata.metadata().as_ref().ok_or_else(foreign)?;
     let header = read_header(kind, map.get(kind.key).ok_or_else(foreign)?, &bytes[8 + start..])?;
     if map.len() != 1 {
-        return Err(ModelFileError::Header(format!("expected {:?} as the only metadata key", kind.key)));
+        return Err(ContainerError::Header(format!("expected {:?} as the only metadata key", kind.key)));
     }
     Ok((header, Tensors(SafeTensors::deserialize(bytes).map_err(damaged)?)))
 }
@@ -121,12 +127,12 @@ impl Tensors<'_> {
     /// Refuses tensors that are not known.
     ///
     /// # Errors
-    /// [`ModelFileError::ExtraTensor`] naming the first in the order of names.
-    pub fn check_names(&self, known: impl Fn(&str) -> bool) -> Result<(), ModelFileError> {
+    /// [`ContainerError::ExtraTensor`] naming the first in the order of names.
+    pub fn check_names(&self, known: impl Fn(&str) -> bool) -> Result<(), ContainerError> {
         let mut names = self.0.names();
         names.sort_unstable();
         match names.iter().find(|name| !known(name)) {
-            Some(extra) => Err(ModelFileError::ExtraTensor(extra.escape_debug().take(60).collect())),
+            Some(extra) => Err(ContainerError::ExtraTensor(extra.escape_debug().take(60).collect())),
             None => Ok(()),
         }
     }
@@ -140,7 +146,7 @@ impl Tensors<'_> {
         name: &str,
         shape: &[usize],
         precision: StoredPrecision,
-    ) -> Result<Vec<S>, ModelFileError> {
+    ) -> Result<Vec<S>, ContainerError> {
         let data = self.data(name, shape, stored_dtype(precision), precision.name())?;
         Ok(match precision {
             StoredPrecision::F32 => {
@@ -154,41 +160,41 @@ impl Tensors<'_> {
     ///
     /// # Errors
     /// It is missing, or its type or shape is another.
-    pub fn indices(&self, name: &str, length: usize) -> Result<Vec<u32>, ModelFileError> {
+    pub fn indices(&self, name: &str, length: usize) -> Result<Vec<u32>, ContainerError> {
         let data = self.data(name, &[length], Dtype::U32, "u32")?;
         Ok(data.as_chunks().0.iter().map(|b| u32::from_le_bytes(*b)).collect())
     }
 
-    fn data(&self, name: &str, shape: &[usize], dtype: Dtype, expected: &'static str) -> Result<&[u8], ModelFileError> {
-        let tensor = self.0.tensor(name).map_err(|_| ModelFileError::MissingTensor(name.to_string()))?;
+    fn data(&self, name: &str, shape: &[usize], dtype: Dtype, expected: &'static str) -> Result<&[u8], ContainerError> {
+        let tensor = self.0.tensor(name).map_err(|_| ContainerError::MissingTensor(name.to_string()))?;
         let name = name.to_string();
         if tensor.dtype() != dtype {
             let found = format!("{:?}", tensor.dtype()).to_lowercase();
-            return Err(ModelFileError::WrongType { name, expected, found });
+            return Err(ContainerError::WrongType { name, expected, found });
         }
         if tensor.shape() != shape {
-            return Err(ModelFileError::WrongShape { name, expected: shape.to_vec(), found: tensor.shape().to_vec() });
+            return Err(ContainerError::WrongShape { name, expected: shape.to_vec(), found: tensor.shape().to_vec() });
         }
         Ok(tensor.data())
     }
 }
 
-fn damaged(error: safetensors::SafeTensorError) -> ModelFileError {
-    ModelFileError::NotSafetensors(one_line(&error.to_string()))
+fn damaged(error: safetensors::SafeTensorError) -> ContainerError {
+    ContainerError::NotSafetensors(one_line(&error.to_string()))
 }
 
 /// Refuses formats that this version does not read.
-pub(super) fn check_version(supported: u32, found: u32, writer: &str) -> Result<(), ModelFileError> {
+pub(crate) fn check_version(supported: u32, found: u32, writer: &str) -> Result<(), ContainerError> {
     if found == supported {
         return Ok(());
     }
     let (reader, writer) = (env!("CARGO_PKG_VERSION"), writer.escape_debug().take(40).collect());
-    Err(ModelFileError::Version { writer, found, reader, supported })
+    Err(ContainerError::Version { writer, found, reader, supported })
 }
 
 /// Limits the description before it is parsed, and refuses one that two readers could understand differently.
-fn check_container(bytes: &[u8]) -> Result<(), ModelFileError> {
-    let refuse = |text: &str| Err(ModelFileError::NotSafetensors(text.to_string()));
+fn check_container(bytes: &[u8]) -> Result<(), ContainerError> {
+    let refuse = |text: &str| Err(ContainerError::NotSafetensors(text.to_string()));
     let Some(length) = bytes.first_chunk::<8>().map(|b| u64::from_le_bytes(*b)) else {
         return refuse("shorter than 8 bytes");
     };
@@ -198,24 +204,24 @@ fn check_container(bytes: &[u8]) -> Result<(), ModelFileError> {
     match bytes[8..].get(..length as usize) {
         None => refuse("cut off"),
         Some(text) => {
-            check_unambiguous(text).map_err(|e| ModelFileError::NotSafetensors(one_line(&plain(&e.to_string()))))
+            check_unambiguous(text).map_err(|e| ContainerError::NotSafetensors(one_line(&plain(&e.to_string()))))
         }
     }
 }
 
 /// The description, its version and checksum tested first.
-fn read_header<H: DeserializeOwned>(kind: &Kind, text: &str, payload: &[u8]) -> Result<H, ModelFileError> {
+fn read_header<H: DeserializeOwned>(kind: &Kind, text: &str, payload: &[u8]) -> Result<H, ContainerError> {
     /// Part that every version of the format has.
     #[derive(Deserialize)]
     struct Version {
         format: u32,
         crate_version: String,
     }
-    let malformed = |e: serde_json::Error| ModelFileError::Header(one_line(&plain(&e.to_string())));
+    let malformed = |e: serde_json::Error| ContainerError::Header(one_line(&plain(&e.to_string())));
     let version: Version = serde_json::from_str(text).map_err(malformed)?;
     check_version(kind.format, version.format, &version.crate_version)?;
 
-    let missing = || ModelFileError::Header("no checksum".to_string());
+    let missing = || ContainerError::Header("no checksum".to_string());
     let cut = text.len().checked_sub(checksum_field(0).len()).ok_or_else(missing)?;
     let (body, field) = text.split_at_checked(cut).ok_or_else(missing)?;
     let digits =
@@ -227,7 +233,7 @@ fn read_header<H: DeserializeOwned>(kind: &Kind, text: &str, payload: &[u8]) -> 
     let found = checksum.finalize();
     // Comparing the text as well refuses digits written in another way.
     if found != expected || field != checksum_field(expected) {
-        return Err(ModelFileError::Checksum { expected, found });
+        return Err(ContainerError::Checksum { expected, found });
     }
     let body = format!("{body}}}");
     check_unambiguous(body.as_bytes()).map_err(malformed)?;
