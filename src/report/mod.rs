@@ -18,7 +18,7 @@ pub use experiment::{Curve, EXPERIMENT_HEADER};
 pub(crate) use experiment::{
     REDUCTION_HEADER, experiment_curves, experiment_figures, experiment_table, experiment_view, reduction_table,
 };
-pub(crate) use grids::{Fit, GridComparison, grid_figures};
+pub use grids::{Fit, GridComparison, grid_figures};
 pub use html::Report;
 pub use plot::{HeatMap, Level, LinePlot, Picture, PlotError, Series, Trace, heat_maps, line_plot, trace_plot};
 pub use table::text_table;
