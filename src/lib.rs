@@ -21,6 +21,7 @@
 //! |---|---|
 //! | write a Lagrangian, or take one of the catalogue | [`lagrangian::Lagrangian`], [`lagrangian::systems()`] |
 //! | get `L`, `p`, `M`, `a`, `E` of states | [`lagrangian::EulerLagrange::terms`] |
+//! | know metric, connection and curvature at a point | [`geometry::geometries`] |
 //! | integrate, with error control or symplectically | [`rollout::rollout`], [`rollout::rollout_many`] |
 //! | learn from accelerations | [`training::run`] (a configuration), [`training::train`] (your own [`data::Dataset`]) |
 //! | know every key of a configuration | [`presets::configuration_reference`], [`presets::TRAINING_SECTIONS`] |
@@ -28,13 +29,16 @@
 //! | store and load models | [`network::file::ModelFile`] |
 //! | differentiate a function of yours | [`tape::gradient`], [`tape::hessian`]; over many states [`tape::Program`] |
 //! | solve small symmetric systems in batches | [`linalg`] |
+//! | find what a Lagrangian conserves, compare two Lagrangians | [`symmetry::symmetries`], [`symmetry::quadratic`], [`symmetry::compare`] |
+//! | prove where a mass matrix has its signature | [`certificate`] |
 //! | judge a model: energy, coordinates, Lyapunov exponents | [`analysis`] |
 //! | train, fit, evaluate, run an experiment, with all files and reports | `pipeline` (feature `pipeline`) |
 //!
 //! Rooms, each importing only from those above it: `names`, [`scalar`], `storage`, [`random`], `ops`, [`forward`], [`linalg`],
-//! [`tape`], [`recording`], [`lagrangian`], [`rollout`], [`network`], [`optimizers`], [`configuration`], [`data`], [`training`],
-//! [`shooting`], [`presets`], [`analysis`], [`experiments`], `report` (feature `plot`), `pipeline` (feature `pipeline`), `cli`
-//! (feature `cli`, the default; a library user leaves it out by `default-features = false`).
+//! [`tape`], [`recording`], [`lagrangian`], [`geometry`], [`rollout`], [`network`], [`symmetry`], [`certificate`], [`optimizers`],
+//! [`configuration`], [`data`], [`training`], [`shooting`], [`presets`], [`analysis`], [`experiments`], `report` (feature `plot`),
+//! `pipeline` (feature `pipeline`), `cli` (feature `cli`, the default; a library user leaves it out by
+//! `default-features = false`).
 //!
 //! # Shapes, units, numbers
 //!
@@ -158,7 +162,13 @@ pub mod recording;
 
 pub mod lagrangian;
 
+pub mod geometry;
+
 pub mod network;
+
+pub mod certificate;
+#[cfg(feature = "rollout")]
+pub mod symmetry;
 
 #[cfg(feature = "training")]
 pub mod optimizers;

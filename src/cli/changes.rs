@@ -88,13 +88,7 @@ impl Changes {
             config.network.activation = activation;
         }
         if let Some(structure) = self.structure {
-            config.network.structure = structure;
-            if structure != Structure::BlackBox {
-                // The signature holds by construction, and motion on a mass shell tells the whole metric.
-                config.penalty = Regularizer::None;
-                config.data.off_shell = 0.0;
-                config.network.learn_alpha = false;
-            }
+            config.take_structure(structure);
         }
         if !self.cyclic.is_empty() {
             config.network.cyclic.clone_from(&self.cyclic);

@@ -133,6 +133,11 @@ fn perform(
     }
 }
 
+/// Width of the network beside a known part, and its weight decay: small, since what network and constants share is not
+/// identifiable and should go to the constants.
+const RESIDUAL_WIDTH: usize = 8;
+const RESIDUAL_DECAY: f64 = 0.01;
+
 /// The configuration that suits the data, changed by the file, by the model to start from and by the arguments.
 fn configured(settled: &Settled, prepared: &PreparedFit<'_>, precision: Precision) -> Result<FitConfig, CliError> {
     let (args, targets) = (&settled.args, prepared.targets());
@@ -140,6 +145,10 @@ fn configured(settled: &Settled, prepared: &PreparedFit<'_>, precision: Precisio
     let start = args.from.as_deref().map(StartModel::read).transpose()?;
     if targets == Targets::Motion && args.changes.epochs.is_none() && !settled.has_epochs() {
         shorten(&mut suggested);
+    }
+    if args.changes.known.is_some() {
+        suggested.network.hidden = vec![RESIDUAL_WIDTH];
+        suggested.optimizer.weight_decay = RESIDUAL_DECAY;
     }
     if let Some(start) = &start {
         start.shape(&mut suggested);
@@ -168,7 +177,8 @@ fn configured(settled: &Settled, prepared: &PreparedFit<'_>, precision: Precisio
 
 /// Multiple shooting by the file and the arguments.
 fn shooting_of(settled: &Settled) -> Shooting {
-    let mut shooting = settled.shooting();
+    let default = if settled.args.changes.known.is_some() { Shooting::grey_box() } else { Shooting::default() };
+    let mut shooting = settled.shooting().unwrap_or(default);
     shooting.epochs = settled.args.shooting_epochs.unwrap_or(shooting.epochs);
     shooting.samples_per_segment = settled.args.segment.unwrap_or(shooting.samples_per_segment);
     shooting

@@ -69,7 +69,7 @@ pub struct Settled {
     /// The arguments.
     pub args: Args,
     file: Option<ConfigFile>,
-    shooting: Shooting,
+    shooting: Option<Shooting>,
 }
 
 impl Settled {
@@ -79,7 +79,7 @@ impl Settled {
     /// A data error for a file that cannot be read, usage errors for everything in it.
     pub fn of(args: &Args) -> Result<Self, CliError> {
         let Some(path) = &args.config else {
-            return Ok(Self { args: args.clone(), file: None, shooting: Shooting::default() });
+            return Ok(Self { args: args.clone(), file: None, shooting: None });
         };
         let file = ConfigFile::read(path)?;
         let coordinates = file.get(&["recording", "coords"]).and_then(toml::Value::as_array).map_or(0, Vec::len);
@@ -89,7 +89,6 @@ impl Settled {
         mistakes.extend(found.faults(n).into_iter().map(Mistake::from));
         file.check(mistakes)?;
         let FitConfig { targets, held_out, window, noise, horizon, recording, shooting, training } = found;
-        let shooting = shooting.unwrap_or_default();
         let mut args = args.clone();
         args.recording = under(recording, &args.recording);
         args.targets = args.targets.or(targets.map(Into::into));
@@ -109,6 +108,7 @@ impl Settled {
             let missing = if args.recording.data.is_empty() { "recording.files" } else { "recording.coords" };
             file.check(vec![Mistake::new("recording", format!("{missing}: neither here nor an argument"))])?;
         }
+        let shooting = shooting.filter(|_| file.has("shooting"));
         Ok(Self { args, file: Some(file), shooting })
     }
 
@@ -139,8 +139,8 @@ impl Settled {
         self.file.as_ref().is_some_and(|file| file.has("training.phase[0].epochs"))
     }
 
-    /// Multiple shooting by the file.
-    pub fn shooting(&self) -> Shooting {
+    /// Multiple shooting by the file, if it says anything of it.
+    pub fn shooting(&self) -> Option<Shooting> {
         self.shooting.clone()
     }
 }

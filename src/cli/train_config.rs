@@ -336,7 +336,11 @@ impl Args {
             PresetName::Best => (Preset::Best, "best"),
             PresetName::Paper => (Preset::Paper, "paper"),
         };
-        preset.config(system).ok_or_else(|| {
+        let config = match self.changes.structure {
+            Some(structure) => preset.config_of(system, structure),
+            None => preset.config(system),
+        };
+        config.ok_or_else(|| {
             let name = &system.system.name;
             CliError::usage(format_args!("--preset {known}: there is none for {name}, use quick or --config"))
         })

@@ -19,6 +19,8 @@ mod matmul;
 mod minimum_norm;
 mod minors;
 mod signature;
+#[cfg(feature = "rollout")]
+mod singular;
 mod solve;
 mod systems;
 
@@ -36,4 +38,6 @@ pub use minors::{Scaled, adjugate, leading_minors};
 pub use signature::{SignatureBuffers, has_signature};
 #[doc(hidden)]
 pub use signature::{Violation, characteristic_scales, eigenvalue_violation, sylvester_violation};
+#[cfg(feature = "rollout")]
+pub(crate) use singular::singular;
 pub use solve::solve;

@@ -66,6 +66,8 @@ pub struct Update {
     pub rate: f64,
     /// L2 weight decay, added to the gradient.
     pub weight_decay: f64,
+    /// Parameters that decay, the first ones: constants of nature behind the weights do not.
+    pub decaying: usize,
     /// The gradient's norm is cut to this; infinity leaves it.
     pub clip: f64,
 }
@@ -164,20 +166,26 @@ impl<S: Scalar> Moments<S> {
         let clip = S::of_f64(if norm > update.clip { update.clip / norm } else { 1.0 });
         let decay = S::of_f64(update.weight_decay);
         let advance = self.rule(update);
+        let decaying = update.decaying.min(weights.len());
+        vectorized(
+            #[inline(always)]
+            || {
+                let (of_weights, constants) = gradient.split_at_mut(decaying);
+                of_weights.iter_mut().zip(&*weights).for_each(|(g, &w)| *g = *g * clip + decay * w);
+                constants.iter_mut().for_each(|g| *g *= clip);
+            },
+        );
         let moments = self.first.iter_mut().zip(self.second.iter_mut());
         if self.bases.is_empty() {
             vectorized(
                 #[inline(always)]
                 move || {
                     for ((w, &g), (m, v)) in weights.iter_mut().zip(&*gradient).zip(moments) {
-                        *w -= advance(m, v, g * clip + decay * *w);
+                        *w -= advance(m, v, g);
                     }
                 },
             );
             return norm;
-        }
-        for (g, &w) in gradient.iter_mut().zip(&*weights) {
-            *g = *g * clip + decay * w;
         }
         soap::enter(&mut self.bases, gradient, self.step == 1, pool);
         vectorized(
@@ -259,7 +267,7 @@ mod tests {
     use super::*;
 
     fn plain(method: Method, rate: f64) -> Update {
-        Update { method, rate, weight_decay: 0.0, clip: f64::INFINITY }
+        Update { method, rate, weight_decay: 0.0, decaying: usize::MAX, clip: f64::INFINITY }
     }
 
     #[test]

@@ -392,7 +392,7 @@ mod tests {
         let matrices = [(1, 3, 2), (7, 1, 4)];
         let mut moments = Moments::<f64>::for_method(Method::Soap, 12, matrices);
         let mut weights = random(12, 1);
-        let update = Update { method: Method::Soap, rate: 0.1, weight_decay: 0.0, clip: 1.0 };
+        let update = Update { method: Method::Soap, rate: 0.1, weight_decay: 0.0, decaying: usize::MAX, clip: 1.0 };
         for step in 0..25 {
             moments.update(&mut weights, &mut random(12, step), &update);
         }
@@ -449,7 +449,7 @@ mod tests {
                 moments.update(
                     &mut weights,
                     &mut gradient,
-                    &Update { method, rate, weight_decay: 0.0, clip: f64::INFINITY },
+                    &Update { method, rate, weight_decay: 0.0, decaying: usize::MAX, clip: f64::INFINITY },
                 );
             }
             loss

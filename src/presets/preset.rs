@@ -31,6 +31,30 @@ impl Preset {
             Self::Paper => paper(system),
         }
     }
+
+    /// The configuration of a system for a Lagrangian of this structure; the presets of our own take bolder steps where a
+    /// signature cannot be lost.
+    pub fn config_of(self, system: &Configured<f64>, structure: Structure) -> Option<Config> {
+        let mut config = self.config(system)?;
+        config.take_structure(structure);
+        if structure != Structure::BlackBox && self != Self::Paper {
+            config.phases.iter_mut().for_each(|phase| phase.rate *= STRUCTURE_RATE);
+        }
+        Some(config)
+    }
+}
+
+impl Config {
+    /// Changes the structure. But for a black box the signature holds by construction, and motion on a mass shell tells the
+    /// whole metric: there is no penalty, no state off the shell and no `alpha` to be learned.
+    pub fn take_structure(&mut self, structure: Structure) {
+        self.network.structure = structure;
+        if structure != Structure::BlackBox {
+            self.penalty = Regularizer::None;
+            self.data.off_shell = 0.0;
+            self.network.learn_alpha = false;
+        }
+    }
 }
 
 /// Name of the time-like coordinate of a system.
@@ -77,6 +101,9 @@ fn base(system: &Configured<f64>, states: usize, network: Network) -> Config {
 fn optimizer(method: Method) -> Optimizer {
     Optimizer { method, batch: 128, weight_decay: WEIGHT_DECAY, clip: 1.0, averaging: 0.0, on_failure: OnFailure::Skip }
 }
+
+/// Learning rate of structures over that of a black box.
+const STRUCTURE_RATE: f64 = 2.0;
 
 /// Choices in which the presets of our own differ.
 #[derive(Clone, Copy)]

@@ -75,6 +75,12 @@ impl Default for Shooting {
 }
 
 impl Shooting {
+    /// Settings of a small network beside a known Lagrangian whose constants are learned: longer and bolder, for a constant
+    /// has a longer way to go than a weight, and with more weight decay, which leaves the constants alone.
+    pub fn grey_box() -> Self {
+        Self { method: Method::Soap, rate: 0.01, epochs: 400, weight_decay: 3e-3, ..Self::default() }
+    }
+
     /// Checks every range.
     ///
     /// # Errors

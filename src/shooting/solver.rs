@@ -179,7 +179,13 @@ impl<S: Scalar> ShootingSolver<S> {
         let report: ShotReport<S> = shots.step(weights, training, &self.starts.at, rows, gradients);
         means.left_out += report.left_out;
         let settings = &self.settings;
-        let update = Update { method: settings.method, rate, weight_decay: settings.weight_decay, clip: settings.clip };
+        let update = Update {
+            method: settings.method,
+            rate,
+            weight_decay: settings.weight_decay,
+            decaying: shots.model().weights(),
+            clip: settings.clip,
+        };
         let norm = if report.left_out < rows.len() {
             moments.update_on(Some(shots.pool()), weights, &mut self.gradient, &update)
         } else {

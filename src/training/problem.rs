@@ -8,8 +8,8 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Problem of an argmin run: a network's parameters, the states it learns from and those it is judged by.
 ///
-/// The cost of parameters `w` is loss plus penalty plus `weight_decay |w|^2 / 2` over all training states, and the gradient is
-/// its derivative; a line search that asks for both at one point has one evaluation. Every solver of argmin's, of this crate's
+/// The cost of parameters is loss plus penalty plus `weight_decay |w|^2 / 2` over all training states, `w` the weights among
+/// them, and the gradient is its derivative; a line search that asks for both at one point has one evaluation. Every solver of argmin's, of this crate's
 /// ([`EpochSolver`](crate::training::EpochSolver)) or of your own takes it: those that go by batches call
 /// [`TrainingProblem::step`].
 pub struct TrainingProblem<'a, S> {
@@ -108,6 +108,7 @@ impl<'a, S: Scalar> TrainingProblem<'a, S> {
         last.gradient.resize(weights.len(), <S as Real>::zero());
         let report = objective.step(weights, self.training, rows, &mut last.gradient);
         let decay = S::of_f64(self.weight_decay);
+        let weights = &weights[..objective.model().weights()];
         let square = weights.iter().fold(<S as Real>::zero(), |sum, &w| sum + w * w);
         last.cost = report.loss + report.penalty + S::half() * decay * square;
         for (g, &w) in last.gradient.iter_mut().zip(weights) {

@@ -220,6 +220,7 @@ impl<S: Scalar> EpochSolver<S> {
             method: self.optimizer.method,
             rate,
             weight_decay: self.optimizer.weight_decay,
+            decaying: problem.objective().model().weights(),
             clip: self.optimizer.clip,
         };
         let gradient = &mut self.gradient;

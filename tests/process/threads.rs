@@ -86,7 +86,7 @@ fn threads_are_the_callers_choice() {
     assert!(gradients[0] == gradients[1], "the number of threads changes nothing");
     assert!(shot(&architecture, &file.weights, 1) == shot(&architecture, &file.weights, 3));
     let mut moments = Moments::for_method(Method::Soap, file.weights.len(), Layout::new(&architecture).matrices());
-    let update = Update { method: Method::Soap, rate: 1e-3, weight_decay: 0.0, clip: 1.0 };
+    let update = Update { method: Method::Soap, rate: 1e-3, weight_decay: 0.0, decaying: usize::MAX, clip: 1.0 };
     assert!(moments.update(&mut file.weights.clone(), &mut gradients[0], &update) > 0.0);
     // Rayon's global pool can be built once in the life of a process: nobody has done so.
     rayon::ThreadPoolBuilder::new().num_threads(1).build_global().expect("the global pool belongs to the application");

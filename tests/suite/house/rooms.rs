@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Rooms from top to bottom; a file may name its own room and those before it.
-const ROOMS: [&str; 23] = [
+const ROOMS: [&str; 26] = [
     "names",
     "scalar",
     "storage",
@@ -16,8 +16,11 @@ const ROOMS: [&str; 23] = [
     "tape",
     "recording",
     "lagrangian",
+    "geometry",
     "rollout",
     "network",
+    "symmetry",
+    "certificate",
     "optimizers",
     "configuration",
     "data",

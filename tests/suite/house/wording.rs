@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 /// Rooms whose documentation is held to it.
-const ROOMS: [&str; 14] = [
+const ROOMS: [&str; 17] = [
     "storage",
     "scalar",
     "ops",
@@ -13,8 +13,11 @@ const ROOMS: [&str; 14] = [
     "tape",
     "recording",
     "lagrangian",
+    "geometry",
     "rollout",
     "network",
+    "symmetry",
+    "certificate",
     "training",
     "analysis",
     "experiments",

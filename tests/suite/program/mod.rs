@@ -1,5 +1,6 @@
 //! The program `lnn` from outside.
 
+mod certify;
 mod check;
 mod configuration;
 mod conveniences;
@@ -8,6 +9,7 @@ mod experiment;
 mod fit;
 mod fit_resume;
 mod forces;
+mod geometry;
 mod hostile;
 mod inspect;
 mod motion;
@@ -17,6 +19,7 @@ mod resume;
 mod screen;
 mod signals;
 mod still;
+mod symmetries;
 mod system_files;
 mod train;
 mod words;

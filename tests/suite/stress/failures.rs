@@ -82,7 +82,8 @@ fn overflowing_states<S: Scalar>() {
             let (report, gradient) = step(&shape, (Penalty::None, 2), &theta, &data, &all_rows(batch));
             assert_eq!((report.failure, report.left_out), (Some(Failure::NotFinite { row: p }), 1), "batch {batch}");
             let mut moved = theta.clone();
-            let update = Update { method: Method::Radam, rate: 1e-3, weight_decay: 1e-6, clip: 1.0 };
+            let update =
+                Update { method: Method::Radam, rate: 1e-3, weight_decay: 1e-6, decaying: usize::MAX, clip: 1.0 };
             if !Moments::new(theta.len()).update(&mut moved, &mut gradient.clone(), &update).is_finite() {
                 assert_eq!(moved, theta);
             }

@@ -1,0 +1,202 @@
+//! Closed intervals of `f64` with outward rounding.
+
+use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
+
+/// All numbers from `low` to `high`; what an operation gives holds every result of numbers in its operands.
+///
+/// Sums, products, quotients and roots are rounded to nearest by the hardware and then moved outward by one number, which is the most
+/// that they can be off. Where a result is not defined for every number of an operand (a quotient by an interval that holds 0, the
+/// root of one that reaches below it), it is [`Interval::ENTIRE`], of which nothing can be concluded.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Interval {
+    /// The lower end.
+    pub low: f64,
+    /// The upper end.
+    pub high: f64,
+}
+
+impl Interval {
+    /// The whole line: nothing is known.
+    pub const ENTIRE: Self = Self { low: f64::NEG_INFINITY, high: f64::INFINITY };
+    /// 0 alone.
+    pub const ZERO: Self = Self::point(0.0);
+
+    /// From `low` to `high`; everything if the two are not in order or not numbers.
+    #[inline]
+    pub fn new(low: f64, high: f64) -> Self {
+        if low <= high { Self { low, high } } else { Self::ENTIRE }
+    }
+    /// One number alone; of `NaN`, see [`Interval::new`].
+    #[inline]
+    pub const fn point(x: f64) -> Self {
+        if x.is_nan() { Self::ENTIRE } else { Self { low: x, high: x } }
+    }
+    /// From `-radius` to `radius`.
+    #[inline]
+    pub fn symmetric(radius: f64) -> Self {
+        Self::new(-radius, radius)
+    }
+    /// The same ends moved outward by one number each.
+    #[inline]
+    pub(super) fn outward(low: f64, high: f64) -> Self {
+        if low <= high { Self { low: low.next_down(), high: high.next_up() } } else { Self::ENTIRE }
+    }
+    /// A number near the middle that lies in the interval; 0 if the interval has no end on both sides.
+    #[inline]
+    pub fn middle(self) -> f64 {
+        let middle = 0.5 * self.low + 0.5 * self.high;
+        if middle.is_finite() { middle.clamp(self.low, self.high) } else { 0.0 }
+    }
+    /// Largest distance of a number of the interval from its [`Interval::middle`], rounded up.
+    #[inline]
+    pub fn radius(self) -> f64 {
+        if self.low == self.high {
+            return 0.0;
+        }
+        let middle = self.middle();
+        (self.high - middle).max(middle - self.low).next_up()
+    }
+    /// Largest absolute value.
+    #[inline]
+    pub fn magnitude(self) -> f64 {
+        self.low.abs().max(self.high.abs())
+    }
+    /// Smallest absolute value.
+    #[inline]
+    pub fn mignitude(self) -> f64 {
+        if self.contains(0.0) { 0.0 } else { self.low.abs().min(self.high.abs()) }
+    }
+    /// `true` if `x` is in it.
+    #[inline]
+    pub fn contains(self, x: f64) -> bool {
+        self.low <= x && x <= self.high
+    }
+    /// `true` for a single number.
+    #[inline]
+    pub fn is_point(self) -> bool {
+        self.low == self.high
+    }
+    /// `true` if both ends are finite.
+    #[inline]
+    pub fn is_bounded(self) -> bool {
+        self.low.is_finite() && self.high.is_finite()
+    }
+    /// The numbers in both; one of the two, as each holds the truth, if rounding left none.
+    #[inline]
+    pub fn meet(self, other: Self) -> Self {
+        let (low, high) = (self.low.max(other.low), self.high.min(other.high));
+        if low <= high { Self { low, high } } else { self }
+    }
+    /// The smallest interval that holds both.
+    #[inline]
+    pub fn hull(self, other: Self) -> Self {
+        Self { low: self.low.min(other.low), high: self.high.max(other.high) }
+    }
+    /// The squares.
+    #[inline]
+    pub fn square(self) -> Self {
+        let (low, high) = (self.mignitude(), self.magnitude());
+        Self { low: (low * low).next_down().max(0.0), high: (high * high).next_up() }
+    }
+    /// The integer powers.
+    pub fn power(self, exponent: i32) -> Self {
+        if exponent < 0 {
+            return Self::point(1.0) / self.power_of(exponent.unsigned_abs());
+        }
+        self.power_of(exponent.unsigned_abs())
+    }
+    fn power_of(self, exponent: u32) -> Self {
+        match exponent {
+            0 => Self::point(1.0),
+            1 => self,
+            // Of an even power the ends are those of the absolute values.
+            even if even % 2 == 0 => self.square().power_of(even / 2),
+            // An odd power increases.
+            odd => {
+                let at = |x: f64| Self::point(x) * Self::point(x).square().power_of(odd / 2);
+                Self { low: at(self.low).low, high: at(self.high).high }
+            }
+        }
+    }
+}
+
+impl Neg for Interval {
+    type Output = Self;
+    #[inline]
+    fn neg(self) -> Self {
+        Self { low: -self.high, high: -self.low }
+    }
+}
+impl Add for Interval {
+    type Output = Self;
+    #[inline]
+    fn add(self, other: Self) -> Self {
+        Self::outward(self.low + other.low, self.high + other.high)
+    }
+}
+impl Sub for Interval {
+    type Output = Self;
+    #[inline]
+    fn sub(self, other: Self) -> Self {
+        self + -other
+    }
+}
+
+/// A product of ends, where 0 times infinity is 0: an infinite end stands for large finite numbers.
+#[inline]
+fn product(a: f64, b: f64) -> f64 {
+    if a == 0.0 || b == 0.0 { 0.0 } else { a * b }
+}
+
+impl Mul for Interval {
+    type Output = Self;
+    #[inline]
+    fn mul(self, other: Self) -> Self {
+        let ends = [
+            product(self.low, other.low),
+            product(self.low, other.high),
+            product(self.high, other.low),
+            product(self.high, other.high),
+        ];
+        if ends == [0.0; 4] {
+            // Exact, unless a product underflowed.
+            let exact = self == Self::ZERO || other == Self::ZERO;
+            return if exact { Self::ZERO } else { Self::outward(0.0, 0.0) };
+        }
+        let low = ends.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = ends.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        Self::outward(low, high)
+    }
+}
+impl Div for Interval {
+    type Output = Self;
+    #[inline]
+    fn div(self, other: Self) -> Self {
+        if other.contains(0.0) {
+            return Self::ENTIRE;
+        }
+        let (low, high) = (1.0 / other.high, 1.0 / other.low);
+        if self.is_point() && self.low == 1.0 {
+            return Self::outward(low, high);
+        }
+        let ends = [self.low / other.low, self.low / other.high, self.high / other.low, self.high / other.high];
+        if ends.iter().any(|x| x.is_nan()) {
+            return Self::ENTIRE;
+        }
+        let low = ends.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = ends.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        Self::outward(low, high)
+    }
+}
+
+macro_rules! assign {
+    ($($name:ident $method:ident $sign:tt)*) => {$(
+        impl $name for Interval {
+            #[inline]
+            fn $method(&mut self, other: Self) {
+                *self = *self $sign other;
+            }
+        }
+    )*};
+}
+assign! { AddAssign add_assign + SubAssign sub_assign - MulAssign mul_assign * DivAssign div_assign / }

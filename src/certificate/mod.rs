@@ -1,0 +1,267 @@
+//! Certificates: where in a region of states the mass matrix `M = d2L/dv dv` is proven to have its signature, and a condition number below a
+//! bound.
+//!
+//! A Lagrangian, learned or written down, is evaluated once per box of states with numbers that carry its value and its first and second
+//! derivatives along the velocities, each as a plane over the box and a bound of the distance from it (a first-order Taylor model). What
+//! comes out encloses the mass matrix of every state of the box; Gershgorin's and Sylvester's theorems prove the signs of its eigenvalues
+//! and bound its condition number. Boxes that are not decided are cut in two.
+//!
+//! # What is proven
+//!
+//! Every statement is about the Lagrangian as a function of real numbers whose weights, parameters and constants are those of the program.
+//! The rounding of the proof itself is covered everywhere: [`Interval`]s are rounded outward, first-order forms charge to their distance
+//! what a sum or a product may have lost, and the functions of the standard library are granted 8 units in the last place. What a program
+//! rounds when it evaluates the same mass matrix at one state is not part of the statement; it moves eigenvalues by about the condition
+//! number times `1e-16`, relative to the smallest.
+//!
+//! A box in which a branch of the Lagrangian (`select`, `max`, `|x|`) is not decided, or where it is not defined, stays open.
+
+mod affine;
+mod elementary;
+mod enclosure;
+mod form;
+mod function;
+mod interval;
+mod network;
+mod number;
+mod search;
+mod spectrum;
+#[cfg(test)]
+mod tests;
+
+pub use enclosure::mass_matrix_enclosure;
+pub use interval::Interval;
+pub use network::certify_network;
+pub use search::Verdict;
+
+use crate::lagrangian::system::Bounds;
+use crate::lagrangian::{Configured, Lagrangian, LagrangianVisitor};
+use crate::scalar::Scalar;
+use enclosure::{Enclose, Source};
+use search::{Tree, search};
+use std::time::{Duration, Instant};
+use thiserror::Error;
+
+/// Largest number of coordinates.
+const MOST_COORDINATES: usize = 32;
+
+/// Numbers of positive and of negative eigenvalues of a mass matrix.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Signature {
+    /// Positive eigenvalues.
+    pub positive: usize,
+    /// Negative eigenvalues.
+    pub negative: usize,
+}
+
+impl Signature {
+    /// Of `n` coordinates, one of which may be a time: all positive but one for the time.
+    pub fn of(n: usize, time_like: bool) -> Self {
+        let negative = usize::from(time_like && n > 0);
+        Self { positive: n - negative, negative }
+    }
+}
+
+/// Aim and limits of a search.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Options {
+    /// Signature to be proven.
+    pub signature: Signature,
+    /// Largest condition number allowed, `max |eigenvalue| / min |eigenvalue|` of the matrix in the units of the coordinates, at least 1;
+    /// `None` for any.
+    pub condition: Option<f64>,
+    /// Time in s after which no further box is evaluated.
+    pub seconds: f64,
+    /// Boxes after which no further one is evaluated: a search that ends by it, not by time, is the same every time, on any number of
+    /// threads.
+    pub boxes: usize,
+    /// Threads.
+    pub threads: usize,
+}
+
+impl Options {
+    /// Ten seconds on one thread, any condition number, at most 10 million boxes.
+    pub fn new(signature: Signature) -> Self {
+        Self { signature, condition: None, seconds: 10.0, boxes: 10_000_000, threads: 1 }
+    }
+}
+
+/// A state where the mass matrix is proven not to be as it should.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Witness {
+    /// Coordinates `(n)`.
+    pub q: Vec<f64>,
+    /// Velocities `(n)`.
+    pub v: Vec<f64>,
+    /// Eigenvalues of the mass matrix there, ascending, rounded.
+    pub eigenvalues: Vec<f64>,
+}
+
+/// Outcome of a search: shares of the region, which add up to 1, and what was proven of a single state.
+#[derive(Clone, Debug)]
+pub struct Certificate {
+    /// Share in which every state is proven to be as it should.
+    pub certified: f64,
+    /// Share in which every state is proven not to be.
+    pub refuted: f64,
+    /// Share of which neither is proven.
+    pub open: f64,
+    /// Boxes evaluated.
+    pub boxes: usize,
+    /// A state that is proven not to be as it should, if one was found.
+    pub witness: Option<Witness>,
+    /// Proven bound of the condition number in the whole certified share; `None` if no box was certified by enclosures.
+    pub condition: Option<f64>,
+    /// `true` if the structure of the model proves the signature at every state, in the region and outside of it.
+    pub by_construction: bool,
+    /// Time taken.
+    pub elapsed: Duration,
+    regions: Vec<Vec<(f64, f64)>>,
+    tree: Tree,
+    /// Coordinates that are reduced to one turn before the Lagrangian sees them.
+    wrapped: Vec<bool>,
+}
+
+impl Certificate {
+    /// What is known of a state: `q` and `v`, both `(n)`. [`Verdict::Open`] outside the region and for a state of the wrong length.
+    ///
+    /// A few comparisons: an integrator may ask at every step.
+    pub fn verdict<S: Scalar>(&self, q: &[S], v: &[S]) -> Verdict {
+        let wrapped = |(i, x): (usize, &S)| if self.wrapped.get(i) == Some(&true) { x.wrap_angle() } else { *x };
+        let state: Vec<f64> = q.iter().enumerate().map(wrapped).chain(v.iter().copied()).map(S::to_f64).collect();
+        let holds = |region: &&Vec<(f64, f64)>| {
+            region.len() == state.len() && region.iter().zip(&state).all(|(b, x)| b.0 <= *x && *x <= b.1)
+        };
+        let found = self.regions.iter().position(|region| holds(&region));
+        found.map_or(Verdict::Open, |root| self.tree.verdict(root, &state))
+    }
+}
+
+/// Why there is no certificate.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum CertificateError {
+    /// A region with bounds for another number of coordinates.
+    #[error("expected bounds of {expected} {what}, found {found}")]
+    Shape {
+        /// Coordinates or velocities.
+        what: &'static str,
+        /// Number of coordinates.
+        expected: usize,
+        /// Pairs found.
+        found: usize,
+    },
+    /// Bounds that hold no number, or too many.
+    #[error("bounds of {what} {index}: expected two finite numbers in order, found {low} and {high}")]
+    Bounds {
+        /// Coordinate or velocity.
+        what: &'static str,
+        /// Index from 0.
+        index: usize,
+        /// Lower bound found.
+        low: f64,
+        /// Upper bound found.
+        high: f64,
+    },
+    /// A signature of a matrix of another size.
+    #[error("expected a signature of {expected} eigenvalues, found {positive} positive and {negative} negative ones")]
+    Signature {
+        /// Number of coordinates.
+        expected: usize,
+        /// Positive eigenvalues.
+        positive: usize,
+        /// Negative eigenvalues.
+        negative: usize,
+    },
+    /// A condition number that no matrix has, or no number.
+    #[error("expected a condition number of at least 1, found {0}")]
+    Condition(f64),
+    /// More coordinates than the enclosures are made for.
+    #[error("expected at most {MOST_COORDINATES} coordinates, found {0}")]
+    Coordinates(usize),
+    /// A system that is not of the catalogue and has no description.
+    #[error("the system has no Lagrangian that can be evaluated")]
+    NoLagrangian,
+}
+
+/// Searches a region for where the mass matrix of a Lagrangian has its signature.
+///
+/// `parameters` are those that the Lagrangian takes, enclosed if no `f64` is equal to one.
+///
+/// # Errors
+/// [`CertificateError`] for a region, a signature or a condition number that does not fit.
+pub fn certify<L: Lagrangian, S: Scalar>(
+    lagrangian: &L,
+    parameters: &[S],
+    region: &Bounds,
+    options: &Options,
+) -> Result<Certificate, CertificateError> {
+    let bounds = checked(lagrangian.coordinates(), region, options)?;
+    Ok(certificate(&Source::new(lagrangian, parameters), vec![(bounds, 1.0)], options))
+}
+
+/// As [`certify`], for a system of the catalogue or by its description.
+///
+/// # Errors
+/// As there, and [`CertificateError::NoLagrangian`].
+pub fn certify_system<S: Scalar>(
+    configured: &Configured<S>,
+    region: &Bounds,
+    options: &Options,
+) -> Result<Certificate, CertificateError> {
+    struct Certify<'a, S>(&'a [S], &'a Bounds, &'a Options);
+    impl<S: Scalar> LagrangianVisitor for Certify<'_, S> {
+        type Output = Result<Certificate, CertificateError>;
+        fn visit<L: Lagrangian>(self, lagrangian: &L) -> Self::Output {
+            certify(lagrangian, self.0, self.1, self.2)
+        }
+    }
+    configured.visit(Certify(&configured.parameters, region, options)).unwrap_or(Err(CertificateError::NoLagrangian))
+}
+
+/// The bounds of positions and velocities, one after the other, if everything fits together.
+fn checked(n: usize, region: &Bounds, options: &Options) -> Result<Vec<(f64, f64)>, CertificateError> {
+    if n > MOST_COORDINATES {
+        return Err(CertificateError::Coordinates(n));
+    }
+    for (names, name, bounds) in
+        [("coordinates", "coordinate", &region.positions), ("velocities", "velocity", &region.velocities)]
+    {
+        if bounds.len() != n {
+            return Err(CertificateError::Shape { what: names, expected: n, found: bounds.len() });
+        }
+        let right = |(low, high): (f64, f64)| low <= high && [low, high, high - low].iter().all(|x| x.is_finite());
+        if let Some(index) = bounds.iter().position(|b| !right(*b)) {
+            let (low, high) = bounds[index];
+            return Err(CertificateError::Bounds { what: name, index, low, high });
+        }
+    }
+    let Signature { positive, negative } = options.signature;
+    if positive + negative != n {
+        return Err(CertificateError::Signature { expected: n, positive, negative });
+    }
+    match options.condition {
+        Some(limit) if limit.is_nan() || limit < 1.0 => Err(CertificateError::Condition(limit)),
+        _ => Ok([region.positions.as_slice(), &region.velocities].concat()),
+    }
+}
+
+/// A search over regions with their shares.
+fn certificate(source: &dyn Enclose, regions: Vec<(Vec<(f64, f64)>, f64)>, options: &Options) -> Certificate {
+    let start = Instant::now();
+    let roots = regions.iter().map(|(bounds, _)| bounds.clone()).collect();
+    let found = search(source, regions, options);
+    Certificate {
+        certified: found.certified,
+        refuted: found.refuted,
+        // Shares of halvings are exact in binary; of cut turns they are rounded.
+        open: (1.0 - found.certified - found.refuted).max(0.0),
+        boxes: found.boxes,
+        witness: found.witness,
+        condition: (found.condition > 0.0).then_some(found.condition),
+        by_construction: false,
+        elapsed: start.elapsed(),
+        regions: roots,
+        tree: found.tree,
+        wrapped: vec![false; source.coordinates()],
+    }
+}

@@ -1,0 +1,208 @@
+//! What is proven of the eigenvalues of all matrices of an enclosure.
+
+use super::form;
+use super::interval::Interval;
+use crate::linalg::{Workspace, eigh};
+
+/// A symmetric matrix `(n, n)` whose elements are first-order forms over a box.
+pub struct MatrixForms {
+    pub n: usize,
+    /// Numbers of a form.
+    pub stride: usize,
+    pub forms: Vec<f64>,
+    /// Bits of the axes along which a box has to be cut for what is not known to become so.
+    pub blamed: u64,
+}
+
+/// Proven facts about the eigenvalues of every matrix of an enclosure.
+#[derive(Clone, Debug, Default)]
+pub struct Spectrum {
+    /// Numbers of positive and negative eigenvalues, if they are the same everywhere and none is 0.
+    pub inertia: Option<(usize, usize)>,
+    /// The condition number `max |eigenvalue| / min |eigenvalue|` is nowhere below the first and nowhere above the second; `(1, inf)` if
+    /// nothing is known.
+    pub condition: (f64, f64),
+    /// Eigenvalues in the middle, ascending, as computed: not an enclosure. Empty if the middle is not finite.
+    pub middle: Vec<f64>,
+    /// For every axis of the box how much the matrix changes along it, relative to its eigenvalues.
+    pub influence: Vec<f64>,
+    /// The same for the distance from the plane; infinite if the matrix is not known.
+    pub remainder: f64,
+    /// The axes to blame for that, see [`MatrixForms::blamed`].
+    pub blamed: u64,
+}
+
+impl MatrixForms {
+    /// The form of an element.
+    pub fn element(&self, i: usize, j: usize) -> &[f64] {
+        &self.forms[(i * self.n + j) * self.stride..(i * self.n + j + 1) * self.stride]
+    }
+
+    /// Proves what it can.
+    ///
+    /// With the computed eigenvectors `u_k` of the middle as rows of `U`, `B = U M U^T` is nearly diagonal, as long as the box is small.
+    /// Where every row `k` is dominated by its diagonal, `d_k |B_kk| > sum_l d_l |B_kl|` for some `d > 0`, no matrix on the way from `B`
+    /// to its diagonal is singular: the signs of the diagonal are those of the eigenvalues (Gershgorin), and by Sylvester's law also of
+    /// those of `M`. The rounding of `U` is no matter there; for the condition number Ostrowski's theorem bounds it: with
+    /// `|U U^T - 1| <= delta` every eigenvalue of `B` is one of `M` times a factor from `1 - delta` to `1 + delta`.
+    pub fn spectrum(&self) -> Spectrum {
+        let (n, stride) = (self.n, self.stride);
+        let axes = stride - 2;
+        let nothing = || Spectrum {
+            condition: (1.0, f64::INFINITY),
+            influence: vec![0.0; axes],
+            remainder: f64::INFINITY,
+            blamed: self.blamed,
+            ..Spectrum::default()
+        };
+        let centre: Vec<f64> = self.forms.iter().step_by(stride).copied().collect();
+        let (mut values, mut vectors) = (vec![0.0; n], vec![0.0; n * n]);
+        let found = eigh(n, &centre, &mut values, &mut vectors, &mut Workspace::new());
+        if found.is_err() || values.iter().chain(&vectors).any(|x| !x.is_finite()) {
+            return nothing();
+        }
+        let defect = orthogonality_defect(n, &vectors);
+        let mut spectrum = Spectrum { middle: values, remainder: 0.0, ..nothing() };
+        if defect.is_nan() || defect >= 0.5 {
+            return spectrum;
+        }
+        let values = &spectrum.middle;
+        let largest = values.iter().fold(0.0, |a: f64, x| a.max(x.abs()));
+        let weight = |k: usize| values[k].abs().max(1e-14 * largest).max(f64::MIN_POSITIVE).sqrt().recip();
+        let weights: Vec<f64> = (0..n).map(weight).collect();
+        let (planes, distance) = self.split();
+        let whole = self.rotated(&vectors);
+        for k in 0..n {
+            for l in 0..n {
+                let (element, scale) = (whole.element(k, l), weights[k] * weights[l]);
+                let slopes = spectrum.influence.iter_mut().zip(&element[1..]);
+                slopes.for_each(|(sum, slope)| *sum += scale * slope.abs());
+                spectrum.remainder += scale * element[stride - 1];
+            }
+        }
+        let ranges =
+            |rotated: &Self| -> Vec<Interval> { rotated.forms.chunks_exact(stride).map(form::range).collect() };
+        // The distances element by element, or all together by their norm, which a rotation does not change.
+        let turned = Interval::point(distance) * (Interval::point(1.0) + Interval::point(defect));
+        spectrum.conclude(n, &ranges(&whole), &weights, 0.0, defect);
+        spectrum.conclude(n, &ranges(&planes.rotated(&vectors)), &weights, turned.high, defect);
+        spectrum
+    }
+
+    /// The planes alone, and a bound of the norm of all matrices that remain: the largest sum of a row of distances.
+    fn split(&self) -> (Self, f64) {
+        let (n, stride) = (self.n, self.stride);
+        let mut planes = Self { n, stride, forms: self.forms.clone(), blamed: 0 };
+        let mut norm = 0.0;
+        for row in planes.forms.chunks_exact_mut(n * stride) {
+            let distances = row.iter_mut().skip(stride - 1).step_by(stride).map(std::mem::take);
+            let sum = distances.fold(Interval::ZERO, |sum, r| sum + Interval::point(r)).high;
+            // Not a number is above everything.
+            norm = if sum <= norm { norm } else { sum };
+        }
+        (planes, norm)
+    }
+
+    /// `U M U^T`.
+    fn rotated(&self, u: &[f64]) -> Self {
+        let (n, stride) = (self.n, self.stride);
+        let empty = || Self { n, stride, forms: vec![0.0; n * n * stride], blamed: 0 };
+        let (mut half, mut whole) = (empty(), empty());
+        for k in 0..n {
+            for j in 0..n {
+                let out = &mut half.forms[(k * n + j) * stride..(k * n + j + 1) * stride];
+                (0..n).for_each(|i| form::add_scaled(out, u[k * n + i], self.element(i, j)));
+            }
+        }
+        for k in 0..n {
+            for l in 0..n {
+                let out = &mut whole.forms[(k * n + l) * stride..(k * n + l + 1) * stride];
+                (0..n).for_each(|j| form::add_scaled(out, u[l * n + j], half.element(k, j)));
+            }
+        }
+        whole
+    }
+}
+
+/// A bound of `|U U^T - 1|`, rows of `U` one after the other.
+fn orthogonality_defect(n: usize, u: &[f64]) -> f64 {
+    let row = |k: usize| {
+        let sum = (0..n).fold(Interval::ZERO, |sum, l| {
+            let start = Interval::point(if k == l { -1.0 } else { 0.0 });
+            let product = (0..n).fold(start, |s, i| s + Interval::point(u[k * n + i]) * Interval::point(u[l * n + i]));
+            sum + product.abs()
+        });
+        sum.high
+    };
+    (0..n).map(row).fold(0.0, f64::max)
+}
+
+impl Spectrum {
+    /// From the ranges of the elements of a matrix, `(n, n)`, that differs from `B` by one of at most the norm `distance`, and weights
+    /// `d`. What was known before is kept.
+    fn conclude(&mut self, n: usize, ranges: &[Interval], weights: &[f64], distance: f64, defect: f64) {
+        let diagonal = |k: usize| ranges[k * n + k];
+        let distance = Interval::new(0.0, distance);
+        // sum_l d_l |B_kl| / d_k is also the radius of a disc about B_kk: D^-1 B D has the eigenvalues of B.
+        let disc = |k: usize| {
+            let sum = (0..n).filter(|&l| l != k).fold(Interval::ZERO, |sum, l| {
+                sum + Interval::point(weights[l]) * Interval::point(ranges[k * n + l].magnitude())
+            });
+            let radius = sum / Interval::point(weights[k]) + distance;
+            diagonal(k).abs() + Interval::symmetric(radius.magnitude())
+        };
+        let discs: Vec<Interval> = (0..n).map(disc).collect();
+        // Comparisons fail for what is not a number.
+        if !discs.iter().all(|disc| disc.low > 0.0) {
+            return;
+        }
+        let positive = (0..n).filter(|&k| diagonal(k).low > 0.0).count();
+        self.inertia = Some((positive, n - positive));
+        let least = discs.iter().fold(f64::INFINITY, |a, disc| a.min(disc.low));
+        let most = discs.iter().fold(0.0, |a: f64, disc| a.max(disc.high));
+        let one = Interval::point(1.0);
+        let factor = (one + Interval::point(defect)) / (one - Interval::point(defect));
+        let above = Interval::point(most) / Interval::point(least) * factor;
+        // Rayleigh's quotient of u_k bounds the largest from below, |M u_k| / |u_k| the smallest from above.
+        let largest = (0..n).fold(0.0, |a: f64, k| a.max((diagonal(k).abs() - distance).low));
+        let column = |k: usize| (0..n).fold(distance, |sum, l| sum + ranges[k * n + l].abs()).high;
+        let smallest = (0..n).map(column).fold(f64::INFINITY, f64::min);
+        let below = Interval::point(largest) / Interval::point(smallest) / factor;
+        self.condition = (self.condition.0.max(below.low), self.condition.1.min(above.high));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Constant matrices, with a distance on every element.
+    fn matrix(elements: &[f64], distance: f64) -> MatrixForms {
+        let n = elements.len().isqrt();
+        MatrixForms { n, stride: 2, forms: elements.iter().flat_map(|&x| [x, distance]).collect(), blamed: 0 }
+    }
+
+    #[test]
+    fn signs_and_condition_numbers_are_proven_as_far_as_they_go() {
+        // Eigenvalues 1 and 3.
+        let sharp = matrix(&[2.0, 1.0, 1.0, 2.0], 0.0).spectrum();
+        assert_eq!(sharp.inertia, Some((2, 0)));
+        assert!(sharp.condition.0 <= 3.0 && sharp.condition.1 >= 3.0, "{:?}", sharp.condition);
+        assert!(sharp.condition.1 - sharp.condition.0 < 1e-13);
+        // A disturbance of norm 2 * 0.45 keeps 1 positive, one of norm 2 * 0.55 does not.
+        let near = matrix(&[2.0, 1.0, 1.0, 2.0], 0.45).spectrum();
+        assert_eq!(near.inertia, Some((2, 0)));
+        // The worst: eigenvalues 1 - 0.9 and 3.9.
+        assert!(near.condition.0 <= 3.0 && near.condition.1 >= 39.0 * (1.0 - 1e-12), "{:?}", near.condition);
+        assert_eq!(matrix(&[2.0, 1.0, 1.0, 2.0], 0.55).spectrum().inertia, None);
+        // Eigenvalues 3 and -1; elements of very different size.
+        assert_eq!(matrix(&[1.0, 2.0, 2.0, 1.0], 0.1).spectrum().inertia, Some((1, 1)));
+        assert_eq!(matrix(&[1e12, 0.0, 0.0, -1e-12], 0.0).spectrum().inertia, Some((1, 1)));
+        for lost in [f64::NAN, f64::INFINITY] {
+            let unknown = matrix(&[2.0, 1.0, 1.0, 2.0], lost).spectrum();
+            assert_eq!((unknown.inertia, unknown.condition), (None, (1.0, f64::INFINITY)));
+            assert_eq!(matrix(&[lost, 0.0, 0.0, 1.0], 0.0).spectrum().inertia, None);
+        }
+        assert_eq!(matrix(&[0.0, 0.0, 0.0, 0.0], 0.0).spectrum().inertia, None);
+    }
+}

@@ -1,0 +1,498 @@
+//! Enclosures against exact values, certificates against systems whose signature is known.
+
+use super::function::{derivatives, smooth_bounds};
+use super::*;
+use crate::forward::HyperDual;
+use crate::lagrangian::{EulerLagrange, HandWritten, Request, Terms};
+use crate::linalg::{Inertia, inertia};
+use crate::network::{
+    Architecture, Form, Initialization, InputLayer, NetworkLagrangian, Nonlinearity, Structure, initial_weights,
+};
+use crate::ops::Unary;
+use crate::scalar::{Dd, Real};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+/// Functions with ends between which their arguments are drawn.
+const FUNCTIONS: [(Unary, f64, f64); 24] = [
+    (Unary::Neg, -5.0, 5.0),
+    (Unary::Recip, 0.1, 9.0),
+    (Unary::Powi(5), -3.0, 3.0),
+    (Unary::Powi(-3), -3.0, -0.2),
+    (Unary::Sqrt, 0.1, 9.0),
+    (Unary::Exp, -9.0, 9.0),
+    (Unary::ExpM1, -3.0, 3.0),
+    (Unary::Ln, 0.1, 9.0),
+    (Unary::Ln1p, -0.9, 5.0),
+    (Unary::Sin, -20.0, 20.0),
+    (Unary::Cos, -20.0, 20.0),
+    (Unary::Tan, -1.2, 1.2),
+    (Unary::Asin, -0.9, 0.9),
+    (Unary::Acos, -0.9, 0.9),
+    (Unary::Atan, -4.0, 4.0),
+    (Unary::Sinh, -4.0, 4.0),
+    (Unary::Cosh, -4.0, 4.0),
+    (Unary::Tanh, -6.0, 6.0),
+    (Unary::Erfc, -4.0, 4.0),
+    (Unary::Logistic, -20.0, 20.0),
+    (Unary::Softplus, -20.0, 20.0),
+    (Unary::Gelu, -7.0, 7.0),
+    (Unary::XTanh, -20.0, 20.0),
+    (Unary::Abs, 0.1, 5.0),
+];
+
+fn holds(interval: Interval, x: Dd) -> bool {
+    Dd::of_f64(interval.low) <= x && x <= Dd::of_f64(interval.high)
+}
+
+/// Value and four derivatives by the table of operations in double-double numbers.
+fn exact(f: Unary, x: f64) -> [Dd; 5] {
+    let (one, zero) = (<Dd as Real>::one(), <Dd as Real>::zero());
+    let at = HyperDual::new(Dd::of_f64(x), one, one, zero);
+    let (value, first, second) = f.jet(at);
+    [value.value, first.value, second.value, second.s, second.st]
+}
+
+/// Derivatives of the table lose some digits of double-double numbers, but far fewer than half of them.
+fn nearly(interval: Interval) -> Interval {
+    let slack = 1e-24 * (1.0 + interval.magnitude());
+    Interval { low: interval.low - slack, high: interval.high + slack }
+}
+
+#[test]
+fn functions_and_derivatives_are_enclosed() {
+    let mut random = ChaCha8Rng::seed_from_u64(1);
+    for (f, low, high) in FUNCTIONS {
+        for k in 0..400 {
+            let (a, b) = (random.random_range(low..high), random.random_range(low..high));
+            // Points, narrow ranges, wide ranges.
+            let b = [a, a + 1e-3 * (b - a), b][k % 3];
+            let range = Interval::new(a.min(b), a.max(b));
+            let found = derivatives(f, range);
+            for part in [0.0, 0.3, 0.7, 1.0] {
+                let x = (range.low + part * (range.high - range.low)).clamp(range.low, range.high);
+                for (order, (found, exact)) in found.iter().zip(exact(f, x)).enumerate() {
+                    assert!(holds(nearly(*found), exact), "{f:?} ({order}) of {range:?} at {x}: {found:?}, {exact}");
+                }
+            }
+            if k % 3 == 0 {
+                // A point loses digits only to the condition of the function.
+                let width = |x: &Interval| x.high - x.low;
+                let size = found.iter().fold(1e-3, |a: f64, x| a.max(x.magnitude()));
+                assert!(found.iter().all(|x| width(x) < 1e-11 * size), "{f:?} at {a}: {found:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn arithmetic_is_rounded_outward() {
+    let mut random = ChaCha8Rng::seed_from_u64(2);
+    for _ in 0..20_000 {
+        let mut draw = || {
+            let (a, b): (f64, f64) = (random.random_range(-2.0..2.0), random.random_range(-2.0..2.0));
+            (Interval::new(a.min(b), a.max(b)), a, b)
+        };
+        let ((x, a, b), (y, c, d)) = (draw(), draw());
+        for (p, q) in [(a, c), (a, d), (b, c), (b, d)] {
+            let (p, q) = (Dd::of_f64(p), Dd::of_f64(q));
+            assert!(holds(x + y, p + q) && holds(x - y, p - q) && holds(x * y, p * q));
+            assert!(holds(x / y, p / q), "{x:?} / {y:?}");
+            assert!(
+                holds(x.square(), p * p)
+                    && holds(x.power(3), p * p * p)
+                    && holds(-x, -p)
+                    && holds(x.abs(), Real::abs(p))
+            );
+        }
+    }
+    let third = Interval::point(1.0) / Interval::point(3.0);
+    assert!(holds(third, Dd::of_f64(1.0) / Dd::of_f64(3.0)) && !third.is_point());
+    let across = Interval::new(-1.0, 2.0);
+    assert_eq!(Interval::point(1.0) / across, Interval::ENTIRE);
+    for lost in [across.sqrt(), across.ln(), across.asin(), Interval::new(1.0, 2.0).tan(), across.real_power(0.5)] {
+        assert_eq!(lost, Interval::ENTIRE);
+    }
+    assert_eq!(across.square(), Interval::new(0.0, 4.0_f64.next_up()));
+    assert!(Interval::new(1.0, 2.0).sin_cos().0.contains(1.0) && Interval::new(3.0, 3.2).sin_cos().1.contains(-1.0));
+    assert!(
+        Interval::point(800.0).exp().high.is_infinite() && Interval::point(800.0).exp().low >= f64::MAX.next_down()
+    );
+    assert_eq!(Interval::new(f64::NAN, 1.0), Interval::ENTIRE);
+}
+
+/// The fifth derivative of functions with suprema, in intervals.
+fn fifth(f: Unary, x: Interval) -> Interval {
+    let number = Interval::point;
+    let square = x.square();
+    // With p = s(x) s(-x), s the logistic function.
+    let logistic = |x: Interval| {
+        let p = x.logistic() * (-x).logistic();
+        p * (number(1.0) - p * (number(30.0) - number(120.0) * p))
+    };
+    let fourth = |f: Unary, x: Interval| derivatives(f, x)[4];
+    match f {
+        Unary::Logistic => logistic(x),
+        Unary::Softplus => fourth(Unary::Logistic, x),
+        Unary::Tanh => number(64.0) * logistic(number(2.0) * x),
+        Unary::LnCosh => fourth(Unary::Tanh, x),
+        Unary::XTanh => number(2.0) * x * logistic(x) + number(10.0) * fourth(Unary::Logistic, x),
+        Unary::Gelu => {
+            let density = (-(square * number(0.5))).exp() / (number(2.0) * Interval::pi()).sqrt();
+            density * x * (number(18.0) + square * (square - number(11.0)))
+        }
+        _ => {
+            let density = number(2.0) / Interval::pi().sqrt() * (-square).exp();
+            density * (number(12.0) + number(16.0) * square * (square - number(3.0)))
+        }
+    }
+}
+
+/// Suprema by cutting the line, up to where tails fall, into pieces on which they hold.
+#[test]
+fn suprema_hold() {
+    for f in [Unary::Logistic, Unary::Softplus, Unary::Tanh, Unary::LnCosh, Unary::XTanh, Unary::Gelu, Unary::Erfc] {
+        let bounds = smooth_bounds(f).unwrap();
+        for (order, &bound) in bounds.iter().enumerate().filter(|(_, bound)| bound.is_finite()) {
+            let mut pieces = vec![Interval::new(-40.0, 40.0)];
+            let mut largest = 0.0_f64;
+            while let Some(piece) = pieces.pop() {
+                let at = |x: Interval| if order == 5 { fifth(f, x) } else { super::function::formulas(f, x)[order] };
+                if at(piece).magnitude() <= bound {
+                    continue;
+                }
+                let middle = piece.middle();
+                largest = largest.max(at(Interval::point(middle)).mignitude());
+                assert!(largest <= bound && piece.radius() > 1e-12, "{f:?} {order}: {bound} at {middle}");
+                pieces.extend([Interval::new(piece.low, middle), Interval::new(middle, piece.high)]);
+            }
+            assert!(largest > 0.9 * bound, "{f:?} {order}: {largest} far below {bound}");
+        }
+    }
+}
+
+/// Mass matrix of a state in double-double numbers.
+fn exact_matrix(model: &dyn EulerLagrange<Dd>, q: &[f64], v: &[f64]) -> Vec<Dd> {
+    let wide = |x: &[f64]| x.iter().map(|&x| Dd::of_f64(x)).collect::<Vec<_>>();
+    let mut terms = Terms::default();
+    model.terms(&wide(q), &wide(v), Request::MASS_MATRIX, &mut terms).unwrap();
+    terms.mass_matrix
+}
+
+/// A box within bounds, of a side as a share of theirs, and states in it.
+fn boxed(random: &mut ChaCha8Rng, bounds: &[(f64, f64)], side: f64) -> (Vec<(f64, f64)>, Vec<Vec<f64>>) {
+    let part = |&(low, high): &(f64, f64)| {
+        let start = low + (1.0 - side) * random.random_range(0.0..=1.0) * (high - low);
+        (start, start + side * (high - low))
+    };
+    let found: Vec<(f64, f64)> = bounds.iter().map(part).collect();
+    let mut state = || {
+        found
+            .iter()
+            .map(|&(low, high)| (low + random.random_range(0.0..=1.0) * (high - low)).clamp(low, high))
+            .collect()
+    };
+    let states = (0..6).map(|_| state()).collect();
+    (found, states)
+}
+
+/// Checks that boxes of several sizes enclose the mass matrices of states in them, and that enclosures shrink with the boxes.
+fn check_enclosures<L: Lagrangian>(
+    name: &str,
+    lagrangian: &L,
+    parameters: &[f64],
+    exact: &dyn EulerLagrange<Dd>,
+    bounds: &Bounds,
+) {
+    let n = lagrangian.coordinates();
+    let mut random = ChaCha8Rng::seed_from_u64(3);
+    let all = [bounds.positions.as_slice(), &bounds.velocities].concat();
+    for side in [0.3, 0.03, 1e-3, 1e-6, 0.0] {
+        let mut widest = 0.0_f64;
+        for _ in 0..12 {
+            let (place, states) = boxed(&mut random, &all, side);
+            let found = mass_matrix_enclosure(lagrangian, parameters, &place[..n], &place[n..]);
+            for state in states {
+                let matrix = exact_matrix(exact, &state[..n], &state[n..]);
+                for (found, exact) in found.iter().zip(matrix) {
+                    let slack = 1e-22 * (1.0 + exact.to_f64().abs());
+                    let near = Interval { low: found.low - slack, high: found.high + slack };
+                    assert!(holds(near, exact), "{name}: {found:?} without {exact} in {place:?}");
+                    widest = widest.max((found.high - found.low) / (1.0 + exact.to_f64().abs()));
+                }
+            }
+        }
+        if side <= 1e-6 {
+            assert!(widest < if side == 0.0 { 1e-10 } else { 1e-2 }, "{name}: {widest} for sides of {side}");
+        }
+    }
+}
+
+/// A visitor that checks the enclosures of a system.
+struct Check<'a>(&'a Configured<f64>);
+
+impl LagrangianVisitor for Check<'_> {
+    type Output = ();
+    fn visit<L: Lagrangian>(self, lagrangian: &L) {
+        let Configured { system, coordinates, parameters } = self.0;
+        let wide = Configured {
+            system: system.clone(),
+            coordinates: *coordinates,
+            parameters: parameters.iter().map(|&x| Dd::of_f64(x)).collect::<Vec<_>>(),
+        };
+        let exact = wide.build().unwrap();
+        check_enclosures(&system.name, lagrangian, parameters, &*exact, &system.training(*coordinates));
+    }
+}
+
+#[test]
+fn systems_are_enclosed() {
+    for system in crate::lagrangian::systems() {
+        let configured = crate::lagrangian::configure::<f64>(&system.name, &[]).unwrap();
+        configured.visit(Check(&configured)).unwrap();
+    }
+}
+
+/// A network of two coordinates, the first an angle.
+fn architecture(activation: Nonlinearity, structure: Structure) -> Architecture {
+    Architecture {
+        coordinates: 2,
+        hidden: vec![8, 6],
+        activation,
+        alpha: if structure == Structure::BlackBox { 0.5 } else { 0.0 },
+        time_like: None,
+        scale: vec![1.5, 0.7],
+        periodic: vec![true, false],
+        embed_periodic: true,
+        input_layer: InputLayer::None,
+        dissipation: None,
+        form: Form { structure, ..Form::default() },
+    }
+}
+
+fn network(architecture: Architecture, seed: u64) -> NetworkLagrangian<f64> {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let weights = initial_weights(&architecture, Initialization::VariancePreserving, &mut random);
+    NetworkLagrangian::new(architecture, weights).unwrap()
+}
+
+#[test]
+fn networks_are_enclosed() {
+    let bounds = Bounds { positions: vec![(0.0, 6.2), (-1.0, 1.0)], velocities: vec![(-2.0, 2.0), (-1.0, 1.5)] };
+    for (seed, activation) in (4..).zip(Nonlinearity::ALL) {
+        for structure in Structure::ALL {
+            let mut shape = architecture(activation, structure);
+            match structure {
+                Structure::BlackBox => shape.form.even_in_v = seed % 2 == 0,
+                Structure::Mechanical => shape.input_layer = InputLayer::Dyt,
+                Structure::Metric => (shape.time_like, shape.embed_periodic) = (Some(1), false),
+            }
+            let model = network(shape, seed);
+            let exact = model.cast::<Dd>();
+            let name = format!("{activation} {}", structure.name());
+            check_enclosures(&name, model.architecture(), model.weights(), &exact, &bounds);
+        }
+    }
+}
+
+/// `L` by a formula over `x` and `y`.
+fn formula(text: &str) -> crate::lagrangian::ExpressionLagrangian {
+    crate::lagrangian::ExpressionLagrangian::new(&["x", "y"], &[], text).unwrap()
+}
+
+fn limited(signature: Signature, boxes: usize) -> Options {
+    Options { boxes, seconds: 1e9, ..Options::new(signature) }
+}
+
+const DEFINITE: Signature = Signature { positive: 2, negative: 0 };
+
+#[test]
+fn the_double_pendulum_is_certified_everywhere() {
+    let configured = crate::lagrangian::configure::<f64>("double-pendulum", &[]).unwrap();
+    let region = Bounds::uniform(2, (-3.2, 3.2), (-9.0, 9.0));
+    let found = certify_system(&configured, &region, &limited(DEFINITE, 20_000)).unwrap();
+    assert_eq!((found.certified, found.refuted, found.open, found.witness.clone()), (1.0, 0.0, 0.0, None));
+    // M = [[2, c], [c, 1]], c = cos(theta1 - theta2): the largest condition number is at c = 1, (3 + sqrt 5) / (3 - sqrt 5) = 6.854.
+    let largest = (3.0 + 5f64.sqrt()) / (3.0 - 5f64.sqrt());
+    assert!(found.condition.unwrap() >= largest);
+    assert!(matches!(found.verdict(&[0.1, 3.0], &[1.0, -8.0]), Verdict::Certified { condition } if condition > 2.0));
+    assert_eq!(found.verdict(&[4.0, 3.0], &[1.0, -8.0]), Verdict::Open);
+    assert_eq!(found.verdict(&[0.1], &[1.0]), Verdict::Open);
+    let bounded = |condition| {
+        let options = Options { condition: Some(condition), ..limited(DEFINITE, 20_000) };
+        certify_system(&configured, &region, &options).unwrap()
+    };
+    let within = bounded(6.9);
+    assert_eq!(within.certified, 1.0);
+    assert!((largest..=6.9).contains(&within.condition.unwrap()));
+    // sqrt((1 + 4 c^2)): eigenvalues (3 +- sqrt(1 + 4 c^2)) / 2, the ratio is above 5 where sqrt(1 + 4 c^2) > 2.
+    let above = bounded(5.0);
+    let share = 2.0 / std::f64::consts::PI * 0.75f64.sqrt().acos();
+    assert!(above.refuted > 0.8 * share && above.refuted + above.open > 0.99 * share, "{above:?}");
+    let witness = above.witness.unwrap();
+    assert!((witness.q[0] - witness.q[1]).cos().abs() > 0.75f64.sqrt());
+    assert!(witness.eigenvalues[1] / witness.eigenvalues[0] > 5.0);
+}
+
+#[test]
+fn a_change_of_sign_is_found_where_it_is() {
+    // M = diag(x, 1) is definite for x > 0, two thirds of the region.
+    let lagrangian = formula("x*x_dot^2/2 + y_dot^2/2 + sin(y)*x");
+    let region = Bounds { positions: vec![(-1.0, 2.0), (-1.0, 1.0)], velocities: vec![(-1.0, 1.0); 2] };
+    let found = certify::<_, f64>(&lagrangian, &[], &region, &limited(DEFINITE, 60)).unwrap();
+    assert!(found.open < 1e-4 && found.open > 0.0, "{found:?}");
+    assert!((found.certified - 2.0 / 3.0).abs() <= found.open && (found.refuted - 1.0 / 3.0).abs() <= found.open);
+    let witness = found.witness.as_ref().unwrap();
+    assert!(witness.q[0] < 0.0 && witness.eigenvalues == [witness.q[0], 1.0], "{witness:?}");
+    assert_eq!(found.verdict(&[-0.5, 0.0], &[0.0, 0.0]), Verdict::Refuted);
+    assert!(matches!(found.verdict(&[0.5, 0.0], &[0.0, 0.0]), Verdict::Certified { .. }));
+    // The other way round.
+    let indefinite = Signature { positive: 1, negative: 1 };
+    let turned = certify::<_, f64>(&lagrangian, &[], &region, &limited(indefinite, 60)).unwrap();
+    assert_eq!((turned.certified, turned.refuted), (found.refuted, found.certified));
+    // A singular matrix everywhere: nothing is proven.
+    let singular = formula("(x_dot + y_dot)^2/2");
+    let nothing = certify::<_, f64>(&singular, &[], &region, &limited(DEFINITE, 60)).unwrap();
+    assert_eq!((nothing.open, nothing.witness), (1.0, None));
+}
+
+#[test]
+fn what_is_not_decided_stays_open() {
+    let region = Bounds { positions: vec![(-1.0, 1.0); 2], velocities: vec![(-1.0, 1.0); 2] };
+    let open = |text: &str| certify::<_, f64>(&formula(text), &[], &region, &limited(DEFINITE, 400)).unwrap();
+    // Kinks of L: |x_dot| has no second derivative at 0, whatever it is elsewhere.
+    let kink = open("x_dot^2 + y_dot^2 + abs(x_dot)");
+    assert!(kink.certified > 0.9 && kink.open > 0.0 && kink.refuted == 0.0, "{kink:?}");
+    assert_eq!(kink.verdict(&[0.3, 0.2], &[0.0, 0.2]), Verdict::Open);
+    // Where L is not defined.
+    let undefined = open("x_dot^2*exp(sqrt(x)) + y_dot^2");
+    assert!(undefined.certified < 0.5 && undefined.certified > 0.4 && undefined.refuted == 0.0, "{undefined:?}");
+    let potential = open("x_dot^2 + y_dot^2 - ln(y)");
+    assert!(potential.certified < 0.5 && potential.certified > 0.49 && potential.refuted == 0.0, "{potential:?}");
+    struct Reader;
+    impl Lagrangian for Reader {
+        fn coordinates(&self) -> usize {
+            2
+        }
+        fn lagrangian<R: Real>(&self, _: &[R], q: &[R], v: &[R]) -> R {
+            let zero = R::Scalar::of_f64(0.0);
+            if q[0].primal() >= zero { v[0] * v[0] + v[1] * v[1] } else { v[0] * v[1] }
+        }
+    }
+    let read = certify::<_, f64>(&Reader, &[], &region, &limited(DEFINITE, 100)).unwrap();
+    assert_eq!(read.open, 1.0);
+}
+
+#[test]
+fn no_certified_box_of_a_network_holds_a_violation() {
+    let mut shape = architecture(Nonlinearity::Gelu, Structure::BlackBox);
+    shape.alpha = 0.15;
+    let model = network(shape, 17);
+    let region = Bounds { positions: vec![(0.0, 6.28), (-1.0, 1.0)], velocities: vec![(-1.0, 1.0); 2] };
+    let found = certify_network(&model, &region, &limited(DEFINITE, 12_000)).unwrap();
+    assert!(found.certified > 0.05 && found.refuted > 0.05, "{found:?}");
+    assert!((found.certified + found.refuted + found.open - 1.0).abs() < 1e-12);
+    let mut random = ChaCha8Rng::seed_from_u64(5);
+    let (mut certified, mut refuted) = (0, 0);
+    for _ in 0..4000 {
+        let mut draw =
+            |bounds: &[(f64, f64)]| bounds.iter().map(|b| random.random_range(b.0..b.1)).collect::<Vec<f64>>();
+        let (q, v) = (draw(&region.positions), draw(&region.velocities));
+        let mut terms = Terms::default();
+        model.terms(&q, &v, Request::MASS_MATRIX, &mut terms).unwrap();
+        let Inertia { positive, .. } = inertia(2, &terms.mass_matrix, &mut [0.0; 4]).unwrap();
+        match found.verdict(&q, &v) {
+            Verdict::Certified { condition } => {
+                let (mut values, mut workspace) = ([0.0; 2], crate::linalg::Workspace::new());
+                crate::linalg::eigenvalues(2, &terms.mass_matrix, &mut values, &mut workspace).unwrap();
+                assert!(positive == 2 && values[1] / values[0] <= condition * (1.0 + 1e-9), "{q:?} {v:?} {values:?}");
+                certified += 1;
+            }
+            Verdict::Refuted => {
+                assert!(positive < 2, "{q:?} {v:?}");
+                refuted += 1;
+            }
+            Verdict::Open => {}
+        }
+    }
+    assert!((f64::from(certified) / 4000.0 - found.certified).abs() < 0.05);
+    assert!((f64::from(refuted) / 4000.0 - found.refuted).abs() < 0.05);
+    let witness = found.witness.unwrap();
+    let matrix = exact_matrix(&model.cast::<Dd>(), &witness.q, &witness.v);
+    assert!(inertia(2, &matrix, &mut vec![<Dd as Real>::zero(); 4]).unwrap().positive < 2);
+}
+
+#[test]
+fn structures_are_certified_by_construction() {
+    let region = Bounds { positions: vec![(0.0, 6.28), (-1.0, 1.0)], velocities: vec![(-1.0, 1.0); 2] };
+    let indefinite = Signature { positive: 1, negative: 1 };
+    for (structure, time_like, signature) in [
+        (Structure::Mechanical, None, DEFINITE),
+        (Structure::Metric, None, DEFINITE),
+        (Structure::Metric, Some(0), indefinite),
+    ] {
+        let shape = Architecture { time_like, ..architecture(Nonlinearity::Softplus, structure) };
+        let model = network(shape, 18);
+        let found = certify_network(&model, &region, &limited(signature, 100)).unwrap();
+        assert_eq!((found.certified, found.open, found.boxes, found.by_construction), (1.0, 0.0, 0, true));
+        assert!(matches!(found.verdict(&[1.0, 0.0], &[0.0, 0.0]), Verdict::Certified { .. }));
+        // A condition number has to be enclosed.
+        let options = Options { condition: Some(1e4), ..limited(signature, 4000) };
+        let bounded = certify_network(&model, &region, &options).unwrap();
+        assert!(bounded.by_construction && bounded.boxes > 0 && bounded.certified > 0.9, "{bounded:?}");
+        assert!(bounded.condition.unwrap() <= 1e4);
+        // A known part may spoil the signature, another one is not that of the structure.
+        let other = if signature == DEFINITE { indefinite } else { DEFINITE };
+        let wrong = certify_network(&model, &region, &limited(other, 400)).unwrap();
+        assert!(!wrong.by_construction && wrong.certified == 0.0 && wrong.refuted > 0.0);
+    }
+}
+
+#[test]
+fn threads_and_turns_change_nothing() {
+    let mut shape = architecture(Nonlinearity::XTanh, Structure::BlackBox);
+    shape.embed_periodic = false;
+    let model = network(shape, 19);
+    let certified = |positions: (f64, f64), threads: usize| {
+        let region = Bounds { positions: vec![positions, (-0.2, 0.2)], velocities: vec![(-0.2, 0.2); 2] };
+        certify_network(&model, &region, &Options { threads, ..limited(DEFINITE, 3000) }).unwrap()
+    };
+    let (one, three) = (certified((1.0, 2.0), 1), certified((1.0, 2.0), 3));
+    assert_eq!((one.certified, one.refuted, one.boxes), (three.certified, three.refuted, three.boxes));
+    assert_eq!((one.witness, one.condition), (three.witness, three.condition));
+    // The network knows an angle up to turns; a region over the end of a turn has two parts.
+    let turn = std::f64::consts::TAU;
+    let moved = certified((1.0 - 3.0 * turn, 2.0 - 3.0 * turn), 1);
+    assert!((moved.certified - one.certified).abs() < 0.02 && (moved.refuted - one.refuted).abs() < 0.02);
+    let both = certified((-0.5, 0.25), 1);
+    let parts = (certified((turn - 0.5, turn), 1), certified((0.0, 0.25), 1));
+    let expected = (2.0 * parts.0.certified + parts.1.certified) / 3.0;
+    assert!((both.certified - expected).abs() < 0.05, "{} {expected}", both.certified);
+    for (angle, part) in [(-0.3, &parts.0), (turn - 0.3, &parts.0), (0.1, &parts.1), (turn + 0.1, &parts.1)] {
+        let state = ([angle, 0.01], [0.01, 0.02]);
+        let kind = |verdict: Verdict| std::mem::discriminant(&verdict);
+        assert_eq!(kind(both.verdict(&state.0, &state.1)), kind(part.verdict(&state.0, &state.1)), "{angle}");
+    }
+}
+
+#[test]
+fn what_does_not_fit_is_refused() {
+    let lagrangian = formula("x_dot^2 + y_dot^2");
+    let region = Bounds::uniform(2, (-1.0, 1.0), (-1.0, 1.0));
+    let error = |region: &Bounds, options: Options| certify::<_, f64>(&lagrangian, &[], region, &options).unwrap_err();
+    let options = Options::new(DEFINITE);
+    let short = Bounds { velocities: vec![(0.0, 1.0)], ..region.clone() };
+    assert_eq!(error(&short, options).to_string(), "expected bounds of 2 velocities, found 1");
+    for bad in [(1.0, -1.0), (f64::NAN, 1.0), (0.0, f64::INFINITY)] {
+        let wrong = Bounds { positions: vec![(0.0, 1.0), bad], ..region.clone() };
+        assert!(matches!(error(&wrong, options), CertificateError::Bounds { what: "coordinate", index: 1, .. }));
+    }
+    let three = Options::new(Signature { positive: 2, negative: 1 });
+    assert!(matches!(error(&region, three), CertificateError::Signature { expected: 2, .. }));
+    for bad in [0.5, f64::NAN] {
+        assert!(matches!(error(&region, Options { condition: Some(bad), ..options }), CertificateError::Condition(_)));
+    }
+    // A point is a region.
+    let point = Bounds::uniform(2, (0.5, 0.5), (0.0, 0.0));
+    assert_eq!(certify::<_, f64>(&lagrangian, &[], &point, &options).unwrap().certified, 1.0);
+}

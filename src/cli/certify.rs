@@ -1,0 +1,223 @@
+//! `lnn certify`: where the mass matrix is proven to have its signature.
+
+use crate::certificate::{Certificate, CertificateError, Options, Signature, certify_network, certify_system};
+use crate::cli::chosen::{self, learned_system};
+use crate::cli::learned::Learned;
+use crate::cli::number::{count, finite, positive, threads};
+use crate::cli::source::parameter;
+use crate::cli::{CliError, output};
+use crate::lagrangian::configure_system;
+use crate::lagrangian::system::Bounds;
+use crate::names::{counted, unknown};
+use crate::network::file::Header;
+use serde_json::{Map, Value, json};
+use std::f64::consts::TAU;
+use std::path::PathBuf;
+
+/// Arguments.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// A system by name (`lnn systems` lists them), or by the file that describes it.
+    #[arg(long, value_name = "NAME|FILE.toml", required_unless_present = "model", conflicts_with = "model")]
+    system: Option<String>,
+    /// A trained model, a file or the directory of a run.
+    #[arg(long, value_name = "MODEL")]
+    model: Option<PathBuf>,
+    /// A parameter of the system; may be repeated.
+    #[arg(long, value_name = "SYMBOL=VALUE", num_args = 1.., value_parser = parameter, conflicts_with = "model")]
+    param: Vec<(String, String)>,
+    /// Region of states: bounds of columns, such as theta1=-1..1,theta1_dot=-3..3. Columns that are not named keep the
+    /// validation bounds of the system, of a model those of its training, and of an angle of a model one turn.
+    #[arg(long = "box", value_name = "COLUMN=LOW..HIGH,..", value_delimiter = ',', allow_hyphen_values = true, value_parser = side)]
+    region: Vec<(String, (f64, f64))>,
+    /// Largest condition number allowed, the ratio of the largest to the smallest absolute eigenvalue of the mass matrix in the units of
+    /// the coordinates [default: any].
+    #[arg(long, value_name = "K", allow_hyphen_values = true, value_parser = condition)]
+    condition: Option<f64>,
+    /// Numbers of positive and of negative eigenvalues [default: all positive, but for one if a coordinate is a time].
+    #[arg(long, value_name = "P,N", value_parser = signature)]
+    signature: Option<Signature>,
+    /// Time after which no further box is evaluated, in seconds.
+    #[arg(long, value_name = "T", default_value = "10", allow_hyphen_values = true, value_parser = positive)]
+    seconds: f64,
+    /// Boxes after which no further one is evaluated; a search that ends by them is the same every time.
+    #[arg(long, value_name = "N", default_value = "10000000", allow_hyphen_values = true, value_parser = count)]
+    boxes: usize,
+    /// Threads; those of a search that ends by --boxes do not change it [default: all].
+    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = count)]
+    threads: Option<usize>,
+    /// Text, or one JSON object.
+    #[arg(long, value_enum, value_name = "FORMAT", default_value = "table")]
+    format: Format,
+    /// The same as --format json.
+    #[arg(long, conflicts_with = "format")]
+    json: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum Format {
+    /// One object.
+    Json,
+    /// Text.
+    Table,
+}
+
+/// `column=low..high`.
+fn side(text: &str) -> Result<(String, (f64, f64)), String> {
+    let found = text.split_once('=').and_then(|(name, range)| {
+        let (low, high) = range.split_once("..")?;
+        Some((name.trim().to_string(), (finite(low).ok()?, finite(high).ok()?)))
+    });
+    let ordered = |(_, (low, high)): &(String, (f64, f64))| low <= high && (high - low).is_finite();
+    found.filter(ordered).ok_or_else(|| "expected COLUMN=LOW..HIGH, two finite numbers in order".to_string())
+}
+
+/// A condition number.
+fn condition(text: &str) -> Result<f64, String> {
+    finite(text).ok().filter(|x| *x >= 1.0).ok_or_else(|| "expected a finite number of at least 1".to_string())
+}
+
+/// `positive,negative`.
+fn signature(text: &str) -> Result<Signature, String> {
+    let pair = text.split_once(',').and_then(|(p, n)| Some((p.trim().parse().ok()?, n.trim().parse().ok()?)));
+    let found = pair.map(|(positive, negative)| Signature { positive, negative });
+    found.ok_or_else(|| "expected P,N, the numbers of positive and of negative eigenvalues".to_string())
+}
+
+/// Searches and prints what was proven.
+///
+/// # Errors
+/// A usage error for an unknown system, a wrong parameter or a region that does not fit, a data error for a bad model.
+pub fn run(args: &Args) -> Result<(), CliError> {
+    let refused = |error: CertificateError| CliError::usage(error);
+    let (name, columns, options, found) = match &args.model {
+        Some(path) => {
+            let Learned { header, network } = Learned::<f64>::load(path)?;
+            let time = learned_system(&header).ok().and_then(|system| system.time_like);
+            let options = args.options(header.columns.len() / 2, header.architecture.time_like.or(time).is_some());
+            let region = args.region(&header.columns, trained(&header))?;
+            let found = certify_network(&network, &region, &options).map_err(refused)?;
+            (header.system, header.columns, options, found)
+        }
+        None => {
+            let system = chosen::system(args.system.as_deref().unwrap_or_default())?;
+            let configured = configure_system::<f64>(system, &args.param).map_err(CliError::usage)?;
+            let n = configured.coordinates;
+            let columns = configured.system.columns(n);
+            let options = args.options(n, configured.system.time_like.is_some());
+            let region = args.region(&columns, configured.system.validation(n))?;
+            let found = certify_system(&configured, &region, &options).map_err(refused)?;
+            (configured.system.name.to_string(), columns, options, found)
+        }
+    };
+    if args.json || args.format == Format::Json {
+        return output::print(&format!("{}\n", object(&name, &columns, &options, &found)));
+    }
+    output::print(&table(&columns, &options, &found))
+}
+
+/// The states a model was trained on; all of one turn of an angle.
+fn trained(header: &Header) -> Bounds {
+    let pair = |b: &[f64; 2]| (b[0], b[1]);
+    let turn = |(b, &periodic): (&[f64; 2], &bool)| if periodic { (0.0, TAU) } else { pair(b) };
+    Bounds {
+        positions: header.position.iter().zip(&header.architecture.periodic).map(turn).collect(),
+        velocities: header.velocity.iter().map(pair).collect(),
+    }
+}
+
+impl Args {
+    fn options(&self, n: usize, time_like: bool) -> Options {
+        Options {
+            signature: self.signature.unwrap_or(Signature::of(n, time_like)),
+            condition: self.condition,
+            seconds: self.seconds,
+            boxes: self.boxes,
+            threads: threads(self.threads),
+        }
+    }
+
+    /// The bounds with those of the named columns replaced.
+    fn region(&self, columns: &[String], usual: Bounds) -> Result<Bounds, CliError> {
+        let n = columns.len() / 2;
+        let mut bounds = usual;
+        for (k, (name, range)) in self.region.iter().enumerate() {
+            let place = columns.iter().position(|column| column == name).ok_or_else(|| {
+                let problem = unknown("column", name, columns.iter().map(String::as_str));
+                CliError::usage(format_args!("--box: {problem}"))
+            })?;
+            if self.region[..k].iter().any(|(earlier, _)| earlier == name) {
+                return Err(CliError::usage(format_args!("--box: column {name} is given twice")));
+            }
+            let side = if place < n { &mut bounds.positions[place] } else { &mut bounds.velocities[place - n] };
+            *side = *range;
+        }
+        Ok(bounds)
+    }
+}
+
+fn object(name: &str, columns: &[String], options: &Options, found: &Certificate) -> Value {
+    let witness = found.witness.as_ref().map(|witness| {
+        let state = columns.iter().zip(witness.q.iter().chain(&witness.v));
+        let state: Map<String, Value> = state.map(|(column, x)| (column.clone(), json!(x))).collect();
+        json!({ "state": state, "eigenvalues": witness.eigenvalues })
+    });
+    json!({
+        "system": name,
+        "signature": [options.signature.positive, options.signature.negative],
+        "condition": options.condition,
+        "certified": found.certified,
+        "refuted": found.refuted,
+        "open": found.open,
+        "boxes": found.boxes,
+        "witness": witness,
+        "by_construction": found.by_construction,
+        "condition_bound": found.condition,
+        "seconds": found.elapsed.as_secs_f64(),
+    })
+}
+
+fn table(columns: &[String], options: &Options, found: &Certificate) -> String {
+    let Signature { positive, negative } = options.signature;
+    let limit = options.condition.map_or(String::new(), |k| format!(" and a condition number of at most {k}"));
+    let boxes = counted(found.boxes, "box", "boxes");
+    let mut text = format!(
+        "Share of the region where the mass matrix is proven to have {positive} positive and {negative} negative eigenvalues{limit}:\n"
+    );
+    let share = |name: &str, x: f64| format!("  {name:<12} {:>9.4} %\n", 100.0 * x);
+    text += &share("certified", found.certified);
+    text += &share("refuted", found.refuted);
+    text += &share("open", found.open);
+    if found.by_construction {
+        text += "The structure of the model proves the signature at every state.\n";
+    }
+    if let Some(bound) = found.condition {
+        text += &format!("Condition number in the certified share: at most {bound:.6}.\n");
+    }
+    if let Some(witness) = &found.witness {
+        let state = columns.iter().zip(witness.q.iter().chain(&witness.v));
+        text += "A state where it is proven not to be so:\n";
+        text += &state.map(|(column, x)| format!("  {column:<12} {x:>24.16e}\n")).collect::<String>();
+        let values = witness.eigenvalues.iter().map(|x| format!("  {:<12} {x:>24.16e}\n", "eigenvalue"));
+        text += &values.collect::<String>();
+    }
+    text + &format!("{boxes}, {:.2} s\n", found.elapsed.as_secs_f64())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sides_and_signatures_are_read() {
+        assert_eq!(side("x_dot=-1.5..2e1"), Ok(("x_dot".to_string(), (-1.5, 20.0))));
+        assert_eq!(side(" x = 1 .. 1 "), Ok(("x".to_string(), (1.0, 1.0))));
+        for bad in ["", "x", "x=1", "x=1:2", "x=2..1", "x=0..inf", "x=..", "x=nan..1", "x=-1e308..1e308"] {
+            assert!(side(bad).is_err(), "{bad}");
+        }
+        assert_eq!(signature("3,1"), Ok(Signature { positive: 3, negative: 1 }));
+        assert!(["3", "3,-1", "a,b", ""].iter().all(|bad| signature(bad).is_err()));
+        assert_eq!(condition("1"), Ok(1.0));
+        assert!(["0.5", "nan", "inf", ""].iter().all(|bad| condition(bad).is_err()));
+    }
+}
