@@ -6,10 +6,13 @@
 mod networks;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use lnn::configuration::Penalty;
+use lnn::data::Dataset;
 use lnn::network::{Architecture, Initialization, initial_weights};
+use lnn::optimizers::{Method, Moments, Update};
 use lnn::scalar::Scalar;
 use lnn::tape::{Depth, Evaluation, STATES};
-use lnn::training::{Dataset, Method, Moments, Objective, Penalty, Update};
+use lnn::training::Objective;
 use networks::architecture;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;

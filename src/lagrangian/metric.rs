@@ -1,6 +1,6 @@
 //! The mass matrix with its first and second derivatives by the coordinates: the metric of `L` and what curvature is made of.
 
-use super::MechanicsError;
+use super::error::MechanicsError;
 use super::taylor::{Space, Taylor};
 use crate::scalar::{Real, Scalar};
 

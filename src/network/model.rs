@@ -31,6 +31,7 @@ struct Workspace<S> {
 
 /// Why weights do not make a network.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
 pub enum NetworkError {
     /// A list of the architecture has the wrong length, or there is no coordinate or hidden layer.
     #[error("architecture: {0}")]

@@ -43,6 +43,7 @@ mod echelon;
 mod error;
 mod field;
 mod find;
+mod killing;
 mod orthonormal;
 mod region;
 mod sample;

@@ -1,7 +1,7 @@
 //! Training as a problem of argmin's: loss and gradient of a network over a training set.
 
+use crate::data::Dataset;
 use crate::scalar::{Real, Scalar};
-use crate::training::dataset::Dataset;
 use crate::training::objective::{BatchReport, Objective};
 use argmin::core::{CostFunction, Error, Gradient};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -29,7 +29,7 @@ struct Evaluator<S> {
 
 /// Cost and gradient of the full training set.
 #[derive(Clone)]
-pub(super) struct Evaluated<S> {
+pub(crate) struct Evaluated<S> {
     pub at: Vec<S>,
     pub cost: S,
     pub gradient: Vec<S>,
@@ -77,17 +77,17 @@ impl<'a, S: Scalar> TrainingProblem<'a, S> {
     }
 
     /// The objective that evaluates batches.
-    pub(super) fn objective(&mut self) -> &mut Objective<S> {
+    pub(crate) fn objective(&mut self) -> &mut Objective<S> {
         &mut self.evaluator.get_mut().unwrap_or_else(PoisonError::into_inner).objective
     }
 
     /// `true` if these parameters are evaluated already.
-    pub(super) fn is_known(&self, weights: &[S]) -> bool {
+    pub(crate) fn is_known(&self, weights: &[S]) -> bool {
         self.lock().last.is_of(weights)
     }
 
     /// The result of the last evaluation.
-    pub(super) fn last<T>(&self, read: impl FnOnce(&Evaluated<S>) -> T) -> T {
+    pub(crate) fn last<T>(&self, read: impl FnOnce(&Evaluated<S>) -> T) -> T {
         read(&self.lock().last)
     }
 

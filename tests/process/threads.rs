@@ -2,12 +2,16 @@
 #![cfg(target_os = "linux")]
 
 use crate::alone;
+use lnn::configuration::Penalty;
+use lnn::data::Dataset;
+use lnn::data::{Estimated, Noise};
 use lnn::lagrangian::{EulerLagrange, Request, Terms, build};
 use lnn::network::{Architecture, Layout, NetworkLagrangian, file::ModelFile};
+use lnn::optimizers::{Method, Moments, Update};
 use lnn::recording::Track;
 use lnn::rollout::{Options, rollout, rollout_many};
-use lnn::training::shooting::{Estimated, Noise, Shooting, Task, fit};
-use lnn::training::{Dataset, Hooks, Method, Moments, Objective, Penalty, Update};
+use lnn::shooting::{Shooting, Task, fit};
+use lnn::training::{Hooks, Objective};
 use std::path::Path;
 use std::time::{Duration, Instant};
 

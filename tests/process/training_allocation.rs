@@ -2,8 +2,11 @@
 
 use crate::alone;
 use crate::counting::allocations;
+use lnn::configuration::Penalty;
+use lnn::data::Dataset;
 use lnn::network::{Architecture, Form, Initialization, InputLayer, Layout, Nonlinearity, initial_weights};
-use lnn::training::{Dataset, Method, Moments, Objective, Penalty, Update};
+use lnn::optimizers::{Method, Moments, Update};
+use lnn::training::Objective;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

@@ -1,9 +1,10 @@
 //! The crate inside another program: global state, errors, dependencies.
 
+use lnn::data::Dataset;
 use lnn::lagrangian::{EulerLagrange, HandWritten, Terms, systems::double_pendulum::DoublePendulum};
 use lnn::network::{NetworkLagrangian, file::ModelFile};
 use lnn::rollout::Options;
-use lnn::training::{Dataset, Objective};
+use lnn::training::Objective;
 use lnn::{analysis, linalg, network, recording, rollout as motion, scalar, storage, tape, training};
 use std::path::{Path, PathBuf};
 use std::process::Command;

@@ -4,11 +4,14 @@ use super::objective::{all_rows, architecture, states, step, weights};
 use super::record::{Row, exact};
 use crate::common::accuracy::{cast, configure};
 use crate::common::matrices::{dd, norm, times};
+use lnn::configuration::Penalty;
+use lnn::data::{Dataset, DatasetError};
 use lnn::lagrangian::{EulerLagrange, MechanicsError, Request, Terms};
 use lnn::linalg::{self, Failure as MatrixFailure, LinalgError, Workspace};
 use lnn::network::{NetworkLagrangian, Nonlinearity};
+use lnn::optimizers::{Method, Moments, Update};
 use lnn::scalar::{Dd, Real, Scalar};
-use lnn::training::{Dataset, DatasetError, Failure, Method, Moments, Objective, Penalty, Update};
+use lnn::training::{Failure, Objective};
 use std::time::Instant;
 
 const BATCHES: [usize; 8] = [1, 2, 23, 24, 63, 65, 130, 1024];
