@@ -154,15 +154,16 @@ fn suprema_hold() {
     for f in [Unary::Logistic, Unary::Softplus, Unary::Tanh, Unary::LnCosh, Unary::XTanh, Unary::Gelu, Unary::Erfc] {
         let bounds = smooth_bounds(f).unwrap();
         for (order, &bound) in bounds.iter().enumerate().filter(|(_, bound)| bound.is_finite()) {
-            let mut pieces = vec![Interval::new(-40.0, 40.0)];
+            let mut pieces: Vec<Interval> =
+                (-640..640).map(|k| Interval::new(f64::from(k) / 16.0, f64::from(k + 1) / 16.0)).collect();
             let mut largest = 0.0_f64;
             while let Some(piece) = pieces.pop() {
                 let at = |x: Interval| if order == 5 { fifth(f, x) } else { super::function::formulas(f, x)[order] };
+                let middle = piece.middle();
+                largest = largest.max(at(Interval::point(middle)).mignitude());
                 if at(piece).magnitude() <= bound {
                     continue;
                 }
-                let middle = piece.middle();
-                largest = largest.max(at(Interval::point(middle)).mignitude());
                 assert!(largest <= bound && piece.radius() > 1e-12, "{f:?} {order}: {bound} at {middle}");
                 pieces.extend([Interval::new(piece.low, middle), Interval::new(middle, piece.high)]);
             }
