@@ -389,8 +389,8 @@ fn no_certified_box_of_a_network_holds_a_violation() {
     let mut shape = architecture(Nonlinearity::Gelu, Structure::BlackBox);
     shape.alpha = 0.15;
     let model = network(shape, 17);
-    let region = Bounds { positions: vec![(0.0, 6.28), (-1.0, 1.0)], velocities: vec![(-1.0, 1.0); 2] };
-    let found = certify_network(&model, &region, &limited(DEFINITE, 12_000)).unwrap();
+    let region = Bounds { positions: vec![(0.5, 2.0), (-1.0, 0.0)], velocities: vec![(-1.0, 0.5), (-0.5, 1.0)] };
+    let found = certify_network(&model, &region, &limited(DEFINITE, 40_000)).unwrap();
     assert!(found.certified > 0.05 && found.refuted > 0.05, "{found:?}");
     assert!((found.certified + found.refuted + found.open - 1.0).abs() < 1e-12);
     let mut random = ChaCha8Rng::seed_from_u64(5);
