@@ -3,7 +3,7 @@
 use super::function::{derivatives, smooth_bounds};
 use super::*;
 use crate::forward::HyperDual;
-use crate::lagrangian::{EulerLagrange, HandWritten, Request, Terms};
+use crate::lagrangian::{EulerLagrange, Request, Terms};
 use crate::linalg::{Inertia, inertia};
 use crate::network::{
     Architecture, Form, Initialization, InputLayer, NetworkLagrangian, Nonlinearity, Structure, initial_weights,
@@ -420,12 +420,12 @@ fn no_certified_box_of_a_network_holds_a_violation() {
     assert!((f64::from(refuted) / 4000.0 - found.refuted).abs() < 0.05);
     let witness = found.witness.unwrap();
     let matrix = exact_matrix(&model.cast::<Dd>(), &witness.q, &witness.v);
-    assert!(inertia(2, &matrix, &mut vec![<Dd as Real>::zero(); 4]).unwrap().positive < 2);
+    assert!(inertia(2, &matrix, &mut [<Dd as Real>::zero(); 4]).unwrap().positive < 2);
 }
 
 #[test]
 fn structures_are_certified_by_construction() {
-    let region = Bounds { positions: vec![(0.0, 6.28), (-1.0, 1.0)], velocities: vec![(-1.0, 1.0); 2] };
+    let region = Bounds { positions: vec![(0.0, 6.2), (-1.0, 1.0)], velocities: vec![(-1.0, 1.0); 2] };
     let indefinite = Signature { positive: 1, negative: 1 };
     for (structure, time_like, signature) in [
         (Structure::Mechanical, None, DEFINITE),
