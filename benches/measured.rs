@@ -31,11 +31,13 @@ mod video;
 use lnn::analysis::{
     PredictionError, Predictions, Window, predict_by_constant_velocity, predict_by_motion, prediction_error,
 };
+use lnn::configuration::{Config, Penalty};
+use lnn::data::{Datasets, Measured, Preparation};
 use lnn::lagrangian::EulerLagrange;
 use lnn::network::NetworkLagrangian;
 use lnn::recording::{Recording, Targets, Track};
-use lnn::training::shooting::{Shooting, Task, fit};
-use lnn::training::{Config, Datasets, Hooks, Measured, Penalty, Preparation, train};
+use lnn::shooting::{Shooting, Task, fit};
+use lnn::training::{Hooks, train};
 use plain::Plain;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -104,7 +106,7 @@ struct Line {
 /// Learns a Lagrangian as `lnn fit` does.
 fn learned(measured: &Measured, friction: bool, targets: Targets, scale: Scale) -> NetworkLagrangian<f64> {
     let data: Datasets<f32> = measured.datasets(targets).expect("states with full windows");
-    let mut config: Config = measured.config("double pendulum", &data);
+    let mut config: Config = lnn::presets::suggested("double pendulum", &data);
     config.network.hidden = scale.hidden.to_vec();
     config.network.dissipation = friction.then_some(16);
     let suggested = config.phases[0].epochs;
@@ -173,7 +175,7 @@ fn lines(recording: &Recording, measured: &Measured, other: Option<&Measured>, s
     let Some(scale) = scale else { return lines };
     add("plain network on smoothed accelerations", &mut || {
         let data: Datasets<f32> = measured.datasets(Targets::Smoothed).expect("states with full windows");
-        let config = measured.config("plain", &data);
+        let config = lnn::presets::suggested("plain", &data);
         let epochs = scale.epochs.unwrap_or(config.phases[0].epochs);
         let model = Plain::learn(&data.training[0], &scale.hidden, epochs, config.phases[0].rate, 0);
         predict_by_motion(&model as &dyn EulerLagrange<f64>, &windows, THREADS)

@@ -6,10 +6,13 @@
 mod networks;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use lnn::configuration::Penalty;
+use lnn::data::Dataset;
 use lnn::network::{Architecture, Initialization, initial_weights};
+use lnn::optimizers::{Method, Moments, Update};
 use lnn::scalar::Scalar;
 use lnn::tape::{Depth, Evaluation, STATES};
-use lnn::training::{Dataset, Method, Moments, Objective, Penalty, Update};
+use lnn::training::Objective;
 use networks::architecture;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -63,7 +66,7 @@ fn step<S: Scalar>(c: &mut Criterion, n: usize, width: usize, batch: usize) {
         let penalty = Penalty::Eigenvalue { lambda: 5.0 };
         let mut objective = Objective::new(&architecture, penalty, threads).expect("threads");
         let mut moments = Moments::new(weights.len());
-        let update = Update { method: Method::Radam, rate: 1e-5, weight_decay: 1e-6, clip: 1.0 };
+        let update = Update { method: Method::Radam, rate: 1e-5, weight_decay: 1e-6, decaying: usize::MAX, clip: 1.0 };
         let id = BenchmarkId::new(format!("{threads} threads"), format!("n{n} w{width} b{batch} {}", S::NAME));
         group.bench_function(id, |b| {
             b.iter(|| {

@@ -3,9 +3,11 @@
 //! `cargo bench --bench soak -- --minutes 30` prints a line per minute and at the end the slope of a straight line through
 //! all rounds after the first tenth, in kB per hour and per round. Linux only (`/proc/self/status`).
 
+use lnn::configuration::Config;
 use lnn::lagrangian::configure;
+use lnn::presets::Preset;
 use lnn::rollout::{Method, Options, rollout_many, rollout_together};
-use lnn::training::{Config, Hooks, Preset, run};
+use lnn::training::{Hooks, run};
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
@@ -17,7 +19,7 @@ fn config(seed: u64) -> Config {
     (config.data.training, config.data.validation, config.data.test) = (4000, 500, 500);
     config.network.hidden = vec![64; 2];
     config.phases[0].epochs = 3;
-    config.polish = Some(lnn::training::Polish { iterations: 3, memory: 5 });
+    config.polish = Some(lnn::configuration::Polish { iterations: 3, memory: 5 });
     config
 }
 

@@ -76,12 +76,15 @@ fn benches(c: &mut Criterion) {
     ratios::<f32>(hessian_f32);
     ratios::<f64>(hessian_f64);
     let mut rng = ChaCha8Rng::seed_from_u64(1);
-    for system in lagrangian::systems() {
-        let n = system.size.default();
-        let configured = lagrangian::configure::<f64>(&system.name, &[]).expect("the defaults are valid");
+    let longer = ["8", "20"].map(|n| ("n-pendulum", vec![("n".to_string(), n.to_string())]));
+    let systems = lagrangian::systems().iter().map(|system| (system.name.as_ref(), Vec::new())).chain(longer);
+    for (name, given) in systems {
+        let configured = lagrangian::configure::<f64>(name, &given).expect("the values are valid");
+        let (system, n) = (&configured.system, configured.coordinates);
         let built = configured.build().expect("the system is of the catalogue");
         let bounds = system.validation(n);
-        let mut group = c.benchmark_group(system.name.as_ref());
+        let number = given.first().map_or(String::new(), |(_, n)| format!(" of {n}"));
+        let mut group = c.benchmark_group(format!("{name}{number}"));
         group.sample_size(20).warm_up_time(Duration::from_millis(300)).measurement_time(Duration::from_millis(1500));
         for batch in [1, 16, 128, 1024] {
             let mut draw = |b: &[(f64, f64)]| -> Vec<f64> {
@@ -93,14 +96,14 @@ fn benches(c: &mut Criterion) {
             }
             let mut terms = Terms::default();
             group.throughput(Throughput::Elements(batch as u64));
-            for (name, request) in
+            for (what, request) in
                 [("energy", Request::ENERGY), ("acceleration", Request::ACCELERATION), ("all", Request::ALL)]
             {
-                group.bench_function(BenchmarkId::new(name, batch), |b| {
+                group.bench_function(BenchmarkId::new(what, batch), |b| {
                     b.iter(|| built.terms(black_box(&q), &v, request, &mut terms));
                 });
             }
-            if system.name == "double-pendulum" {
+            if name == "double-pendulum" {
                 group.bench_function(BenchmarkId::new("num-dual hessian", batch), |b| {
                     b.iter(|| {
                         q.chunks_exact(2).zip(v.chunks_exact(2)).for_each(|(q, v)| hessian_f64(q, v));

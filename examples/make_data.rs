@@ -7,8 +7,8 @@ use lnn::lagrangian::{
     EulerLagrange, HandWritten, MechanicsError, Request, Terms, systems::double_pendulum::DoublePendulum,
 };
 use lnn::linalg::Workspace;
+use lnn::random::RngStream;
 use lnn::rollout::{Options, rollout};
-use lnn::training::Stream;
 use rand_distr::{Distribution, StandardNormal};
 use std::fmt::Write;
 
@@ -55,7 +55,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 pub fn made() -> Result<String, Box<dyn std::error::Error>> {
     let ideal = HandWritten::new(DoublePendulum, vec![1.0, 1.0, 1.0, 1.0, 9.81]);
     let model = Damped { ideal, joints: [0.08, 0.05] };
-    let (mut csv, mut rng) = ("run,t,theta1,theta2\n".to_string(), Stream::Training(0).generator(0));
+    let (mut csv, mut rng) = ("run,t,theta1,theta2\n".to_string(), RngStream::Training(0).generator(0));
     for (run, start) in [[1.2, 1.9], [-2.0, -0.6], [2.4, 0.3], [0.4, -2.6]].into_iter().enumerate() {
         let motion = rollout(&model, &start, &[0.0; 2], &Options::reference(5.0, 0.01));
         let energy = motion.trajectory.energy.clone().unwrap_or_default();

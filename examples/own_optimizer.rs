@@ -3,11 +3,14 @@
 use argmin::core::{CostFunction, Error, Executor, Gradient, IterState, KV, Problem, Solver, State};
 use argmin::solver::conjugategradient::{NonlinearConjugateGradient, beta::PolakRibierePlus};
 use argmin::solver::{linesearch::MoreThuenteLineSearch, quasinewton::LBFGS};
+use lnn::configuration::Penalty;
+use lnn::data::Dataset;
 use lnn::lagrangian::configure;
 use lnn::network::{Initialization, initial_weights};
-use lnn::training::{
-    Dataset, EpochSolver, Method, Objective, Penalty, Preset, Stream, TrainingError, TrainingProblem, TrainingState,
-};
+use lnn::optimizers::Method;
+use lnn::presets::Preset;
+use lnn::random::RngStream;
+use lnn::training::{EpochSolver, Objective, TrainingError, TrainingProblem, TrainingState};
 use std::f64::consts::TAU;
 
 type Iteration = IterState<Vec<f64>, Vec<f64>, (), (), (), f64>;
@@ -54,10 +57,9 @@ pub fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut config = Preset::Quick.config(&configure("harmonic-oscillator", &[])?).ok_or("no preset")?;
     config.network.hidden = vec![16];
     let architecture = config.architecture_with(vec![true], training.physical_scale());
-    let start: Vec<f64> = initial_weights(&architecture, Initialization::Default, &mut Stream::Weights.generator(1));
+    let start: Vec<f64> = initial_weights(&architecture, Initialization::Default, &mut RngStream::Weights.generator(1));
     let problem = || -> Result<_, TrainingError> {
-        let objective = Objective::new(&architecture, Penalty::None, 2)
-            .map_err(|source| TrainingError::Threads { threads: 2, source })?;
+        let objective = Objective::new(&architecture, Penalty::None, 2)?;
         Ok(TrainingProblem::new(objective, &training, &validation, 0.0))
     };
     let before = problem()?.validation_loss(&start).loss;
@@ -84,7 +86,7 @@ pub fn main() -> Result<(), Box<dyn std::error::Error>> {
 
     for method in [Method::Radam, Method::Soap] {
         (config.optimizer.method, config.optimizer.batch) = (method, 32);
-        let (mut phase, rng) = (config.phases[0].clone(), Stream::Order(0).generator(1));
+        let (mut phase, rng) = (config.phases[0].clone(), RngStream::Order(0).generator(1));
         (phase.epochs, phase.rate) = (100, 0.01);
         let solver = EpochSolver::new(config.optimizer.clone(), phase, rng, training.len());
         let state = TrainingState::new().param(start.clone()).max_iters(100);

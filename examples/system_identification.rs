@@ -6,8 +6,8 @@ use argmin::core::{CostFunction, Error, Executor, Gradient, State};
 use argmin::solver::{linesearch::MoreThuenteLineSearch, quasinewton::LBFGS};
 use lnn::lagrangian::{Lagrangian, system::Closed, systems::double_pendulum::DoublePendulum};
 use lnn::linalg::{Workspace, solve};
+use lnn::random::RngStream;
 use lnn::tape::{Depth, Evaluation, MixedDirections, Recorded, STATES};
-use lnn::training::Stream;
 use rand_distr::{Distribution, StandardNormal, Uniform};
 use std::sync::Arc;
 
@@ -59,7 +59,7 @@ impl Gradient for Misfit {
 
 /// Largest relative error of the parameters learned from states with this noise, in parts of the rms acceleration.
 fn identify(count: usize, noise: f64) -> Result<f64, Error> {
-    let (mut rng, uniform) = (Stream::Training(0).generator(1), Uniform::new(-3.0, 3.0)?);
+    let (mut rng, uniform) = (RngStream::Training(0).generator(1), Uniform::new(-3.0, 3.0)?);
     let mut lanes = vec![[0.0_f64; 6]; count];
     for lane in &mut lanes {
         let (x, target) = lane.split_at_mut(4);

@@ -7,6 +7,8 @@
 //! | [`configuration`] | every key of `config.toml`, presets |
 //! | [`recorded_motion`] | data of your own: formats, noise, friction, films |
 //! | [`structures`] | black box, mechanical, metric; what is known beforehand; hybrids in Rust |
+//! | [`geometry`] | metric, connection, curvature of a Lagrangian, learned or written down |
+//! | [`symmetries`] | what is conserved: symmetries, charges, what two Lagrangians have in common |
 //! | [`certificates`] | proofs that a mass matrix has its signature |
 //! | [`method`] | equations, penalties, identities, units and conventions |
 //! | [`library`] | features, a Lagrangian of your own, states of your own, examples |
@@ -29,6 +31,8 @@ macro_rules! page {
             "[presets]: crate::docs::configuration#presets\n",
             "[recorded-motion]: crate::docs::recorded_motion\n",
             "[structures]: crate::docs::structures\n",
+            "[geometry]: crate::docs::geometry\n",
+            "[symmetries]: crate::docs::symmetries\n",
             "[certificates]: crate::docs::certificates\n",
             "[method]: crate::docs::method\n",
             "[conventions]: crate::docs::method#units-and-conventions\n",
@@ -65,6 +69,8 @@ pages! {
     configuration "configuration.md";
     recorded_motion "recorded-motion.md";
     structures "structures.md";
+    geometry "geometry.md";
+    symmetries "symmetries.md";
     certificates "certificates.md";
     method "method.md";
     library "library.md";

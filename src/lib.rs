@@ -5,8 +5,8 @@
 //!
 //! ```text
 //! measured motion  recording::Recording ─┐
-//! states with a    training::Dataset  ───┼─► training::train ─► network::NetworkLagrangian ◄─► network::file::ModelFile
-//! closed form      training::sample   ───┘                               │
+//! states with a    data::Dataset  ───┼─► training::train ─► network::NetworkLagrangian ◄─► network::file::ModelFile
+//! closed form      data::sample   ───┘                               │
 //! L written down   lagrangian::Lagrangian ─► lagrangian::HandWritten ────┤
 //!                                                                        ▼
 //!                                                       lagrangian::EulerLagrange: L, p, M, a, E of a batch
@@ -21,19 +21,24 @@
 //! |---|---|
 //! | write a Lagrangian, or take one of the catalogue | [`lagrangian::Lagrangian`], [`lagrangian::systems()`] |
 //! | get `L`, `p`, `M`, `a`, `E` of states | [`lagrangian::EulerLagrange::terms`] |
+//! | know metric, connection and curvature at a point | [`geometry::geometries`] |
 //! | integrate, with error control or symplectically | [`rollout::rollout`], [`rollout::rollout_many`] |
-//! | learn from accelerations | [`training::run`] (a configuration), [`training::train`] (your own [`training::Dataset`]) |
-//! | know every key of a configuration | [`training::configuration_reference`], [`training::TRAINING_SECTIONS`] |
+//! | learn from accelerations | [`training::run`] (a configuration), [`training::train`] (your own [`data::Dataset`]) |
+//! | know every key of a configuration | [`presets::configuration_reference`], [`presets::TRAINING_SECTIONS`] |
 //! | minimise your own loss of a network | [`training::Objective`], or [`tape::Recorded`] and [`tape::Evaluation`] below it |
 //! | store and load models | [`network::file::ModelFile`] |
 //! | differentiate a function of yours | [`tape::gradient`], [`tape::hessian`]; over many states [`tape::Program`] |
 //! | solve small symmetric systems in batches | [`linalg`] |
+//! | find what a Lagrangian conserves, compare two Lagrangians | [`symmetry::symmetries`], [`symmetry::quadratic`], [`symmetry::compare`] |
 //! | prove where a mass matrix has its signature | [`certificate`] |
 //! | judge a model: energy, coordinates, Lyapunov exponents | [`analysis`] |
+//! | train, fit, evaluate, run an experiment, with all files and reports | `pipeline` (feature `pipeline`) |
 //!
-//! Rooms, each importing only from those above it: [`names`], [`storage`], [`scalar`], [`ops`], [`forward`], [`linalg`], [`tape`],
-//! [`recording`], [`lagrangian`], [`rollout`], [`network`], [`certificate`], [`training`], [`analysis`], [`experiments`], `report` (feature
-//! `plot`), `cli` (feature `cli`, the default; a library user leaves it out by `default-features = false`).
+//! Rooms, each importing only from those above it: `names`, [`scalar`], `storage`, [`random`], `ops`, [`forward`], [`linalg`],
+//! [`tape`], [`recording`], [`lagrangian`], [`geometry`], [`rollout`], [`network`], [`symmetry`], [`certificate`], [`optimizers`],
+//! [`configuration`], [`data`], [`training`], [`shooting`], [`presets`], [`analysis`], [`experiments`], `report` (feature `plot`),
+//! `pipeline` (feature `pipeline`), `cli` (feature `cli`, the default; a library user leaves it out by
+//! `default-features = false`).
 //!
 //! # Shapes, units, numbers
 //!
@@ -91,7 +96,8 @@
 //!
 //! ```
 //! use lnn::lagrangian::configure;
-//! use lnn::training::{Hooks, Preset, run};
+//! use lnn::training::{Hooks, run};
+//! use lnn::presets::Preset;
 //!
 //! let system = configure::<f64>("harmonic-oscillator", &[])?;
 //! let mut config = Preset::Quick.config(&system).unwrap();
@@ -105,7 +111,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! With states of your own, make a [`training::Dataset`] for each of training, validation and test, and call
+//! With states of your own, make a [`data::Dataset`] for each of training, validation and test, and call
 //! [`training::train`] with the same configuration.
 //!
 //! # Derivatives by the tape
@@ -132,12 +138,17 @@
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 
+#[doc(hidden)]
 pub mod names;
-
-pub mod storage;
 
 pub mod scalar;
 
+#[doc(hidden)]
+pub mod storage;
+
+pub mod random;
+
+#[doc(hidden)]
 pub mod ops;
 
 pub mod forward;
@@ -151,12 +162,31 @@ pub mod recording;
 
 pub mod lagrangian;
 
+pub mod geometry;
+
 pub mod network;
 
 pub mod certificate;
+#[cfg(feature = "rollout")]
+pub mod symmetry;
+
+#[cfg(feature = "training")]
+pub mod optimizers;
+
+#[cfg(feature = "training")]
+pub mod configuration;
+
+#[cfg(feature = "training")]
+pub mod data;
 
 #[cfg(feature = "training")]
 pub mod training;
+
+#[cfg(feature = "training")]
+pub mod shooting;
+
+#[cfg(feature = "training")]
+pub mod presets;
 
 #[cfg(feature = "rollout")]
 pub mod rollout;
@@ -170,7 +200,11 @@ pub mod experiments;
 #[cfg(feature = "plot")]
 pub mod report;
 
+#[cfg(feature = "pipeline")]
+pub mod pipeline;
+
 #[cfg(feature = "cli")]
+#[doc(hidden)]
 pub mod cli;
 
 #[cfg(all(any(doc, doctest), feature = "cli"))]

@@ -10,12 +10,14 @@ mod products;
 #[path = "../shared/turns.rs"]
 mod turns;
 
+use lnn::configuration::Penalty;
+use lnn::data::Dataset;
 use lnn::lagrangian::{EulerLagrange, Request, Terms};
 use lnn::network::{Architecture, Initialization, NetworkLagrangian, initial_weights};
 use lnn::rollout::{rollout_many, rollout_together};
 use lnn::scalar::Scalar;
 use lnn::tape::{Depth, Evaluation, STATES};
-use lnn::training::{Dataset, Objective, Penalty};
+use lnn::training::Objective;
 use networks::architecture;
 use products::Products;
 use rand::{Rng, SeedableRng};

@@ -6,13 +6,16 @@
 
 use super::Scale;
 use lnn::analysis::{Determination, Estimate, Observed, determination, places};
+use lnn::configuration::Penalty;
+use lnn::data::{Measured, Preparation};
 use lnn::lagrangian::{EulerLagrange, HandWritten, Lagrangian, MechanicsError, Request, Terms};
 use lnn::linalg::Workspace;
 use lnn::network::NetworkLagrangian;
+use lnn::random::RngStream;
 use lnn::recording::{Recording, Targets, Track};
 use lnn::rollout::{Options, rollout};
 use lnn::scalar::Real;
-use lnn::training::{Hooks, Measured, Penalty, Preparation, Stream, train};
+use lnn::training::{Hooks, train};
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 use std::time::Instant;
@@ -85,7 +88,7 @@ impl EulerLagrange<f64> for Driven {
 
 /// Runs of a cart-pendulum at 100 Hz with noise of 0.2 mm and 1 mrad.
 fn recording(forced: bool, runs: usize, seconds: f64, seed: u64) -> Recording {
-    let rng = &mut Stream::Training(0).generator(seed);
+    let rng = &mut RngStream::Training(0).generator(seed);
     let tracks = (0..runs).map(|run| {
         let force = forced.then(|| (rng.random_range(2.0..8.0), rng.random_range(-0.5..0.5)));
         let model = Driven::new(force);
@@ -118,7 +121,7 @@ fn one(forced: bool, runs: usize, seconds: f64, seed: u64, scale: Scale) -> Vec<
     let preparation = Preparation { seed, ..Preparation::default() };
     let measured = Measured::new(&recording, &preparation).expect("long trajectories");
     let data = measured.datasets::<f32>(Targets::Smoothed).expect("states with full windows");
-    let mut config = measured.config("cart-pendulum", &data);
+    let mut config = lnn::presets::suggested("cart-pendulum", &data);
     config.seed = seed;
     config.network.hidden = scale.hidden.to_vec();
     config.network.dissipation = Some(16);

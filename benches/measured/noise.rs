@@ -3,12 +3,12 @@
 
 use super::{Scale, learned};
 use lnn::analysis::acceleration_errors;
+use lnn::data::{Measured, Preparation};
 use lnn::lagrangian::{Configured, EulerLagrange, Request, Terms, configure};
+use lnn::random::{RandomGenerator, RngStream};
 use lnn::recording::{Recording, Targets, Track};
 use lnn::rollout::{Options, Trajectory, rollout};
-use lnn::training::{Measured, Preparation, Stream};
 use rand::Rng;
-use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use std::time::Instant;
 
@@ -16,7 +16,7 @@ use std::time::Instant;
 const NOISE: f64 = 0.01;
 
 /// Motion from a random start at moderate energy.
-fn motion(exact: &dyn EulerLagrange<f64>, rng: &mut ChaCha8Rng) -> Trajectory<f64> {
+fn motion(exact: &dyn EulerLagrange<f64>, rng: &mut RandomGenerator) -> Trajectory<f64> {
     let mut draw = |size: f64| [0, 1].map(|_| rng.random_range(-size..size));
     let (q, v) = (draw(1.5), draw(1.0));
     let options = Options { energy: false, ..Options::reference(4.99, 0.01) };
@@ -31,7 +31,7 @@ fn accelerations(exact: &dyn EulerLagrange<f64>, q: &[f64], v: &[f64]) -> Vec<f6
 
 /// Exact states with their accelerations, and positions alone with noise.
 fn recordings(exact: &dyn EulerLagrange<f64>, count: usize, seed: u64) -> [Recording; 2] {
-    let rng = &mut Stream::Training(0).generator(seed);
+    let rng = &mut RngStream::Training(0).generator(seed);
     let motions: Vec<_> = (0..count).map(|_| motion(exact, rng)).collect();
     let sigma = [0, 1].map(|i| {
         let all = || motions.iter().flat_map(|m| m.q.iter().skip(i).step_by(2));
@@ -66,7 +66,7 @@ pub fn compare(count: usize, seeds: std::ops::Range<u64>, scale: Scale) -> Vec<S
     let mut rows = Vec::new();
     for seed in seeds {
         let [clean, noisy] = recordings(exact.as_ref(), count, seed);
-        let rng = &mut Stream::Test.generator(seed);
+        let rng = &mut RngStream::Test.generator(seed);
         let fresh: Vec<_> = (0..count.div_ceil(5)).map(|_| motion(exact.as_ref(), rng)).collect();
         let q: Vec<f64> = fresh.iter().flat_map(|m| m.q.iter().copied()).collect();
         let v: Vec<f64> = fresh.iter().flat_map(|m| m.v.iter().copied()).collect();

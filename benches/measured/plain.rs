@@ -1,7 +1,7 @@
 //! A plain network for accelerations: no mechanics in it, the first thing that a user would try.
 
+use lnn::data::Dataset;
 use lnn::lagrangian::{EulerLagrange, MechanicsError, Request, Terms};
-use lnn::training::Dataset;
 use nalgebra::{DMatrix, DVector};
 use rand::seq::SliceRandom;
 use rand::{Rng, SeedableRng};

@@ -1,9 +1,9 @@
 //! Recorded rows read and surveyed as `lnn check FILE --coords q1,q2` does: seconds, and the memory that it took.
 
+use lnn::random::RngStream;
 use lnn::recording::Columns;
 use lnn::recording::read::read_recording;
 use lnn::recording::survey::{Survey, SurveyOptions, survey};
-use lnn::training::Stream;
 use rand_distr::{Distribution, StandardNormal};
 use std::fs::File;
 use std::io::{BufWriter, Write};
@@ -18,7 +18,7 @@ const NOISE: f64 = 1e-3;
 /// One trajectory of two coordinates that swing, columns `t,q1,q2` with six decimals.
 fn write(path: &Path, rows: usize) -> std::io::Result<()> {
     let mut file = BufWriter::with_capacity(1 << 20, File::create(path)?);
-    let mut rng = Stream::Training(0).generator(0);
+    let mut rng = RngStream::Training(0).generator(0);
     let mut noise = || NOISE * Distribution::<f64>::sample(&StandardNormal, &mut rng);
     writeln!(file, "t,q1,q2")?;
     for k in 0..rows {

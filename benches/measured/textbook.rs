@@ -9,8 +9,8 @@
 //! ```
 
 use lnn::analysis::Window;
+use lnn::data::Measured;
 use lnn::lagrangian::{EulerLagrange, MechanicsError, Request, Terms};
-use lnn::training::Measured;
 use nalgebra::{SMatrix, SVector};
 
 /// `a`, `b`, `g1`, `g2` in s^-2, `f1`, `f2` in s^-1.

@@ -10,9 +10,11 @@ mod networks;
 mod products;
 mod recipe;
 
+use lnn::configuration::Penalty;
+use lnn::data::Dataset;
 use lnn::network::{Architecture, Initialization, initial_weights};
 use lnn::scalar::Scalar;
-use lnn::training::{Dataset, Objective, Penalty};
+use lnn::training::Objective;
 use networks::{SCALE, architecture};
 use products::Products;
 use rand::{Rng, SeedableRng};

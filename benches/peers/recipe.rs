@@ -1,9 +1,11 @@
 //! What the paper's training of the double pendulum starts from, for a peer: scaled states, weights, settings.
 
 use super::{Outcome, write};
+use lnn::data::{Dataset, sample_all};
 use lnn::lagrangian::configure;
 use lnn::network::initial_weights;
-use lnn::training::{Dataset, Preset, Stream, sample_all};
+use lnn::presets::Preset;
+use lnn::random::RngStream;
 use std::path::Path;
 
 /// Writes states `NAME.x`, `.w`, `.a` (positions, velocities, accelerations in units of the scales), `weights` and
@@ -27,9 +29,9 @@ pub fn write_all(directory: &Path, states: usize) -> Outcome<()> {
         set(&format!("training{k}"), training)?;
     }
     set("validation", &data.validation)?;
-    let mut rng = Stream::Weights.generator(config.seed);
+    let mut rng = RngStream::Weights.generator(config.seed);
     write(directory, "weights", &initial_weights::<f64>(&architecture, config.network.initialization, &mut rng))?;
-    let phase = |p: &lnn::training::Phase| serde_json::json!({ "epochs": p.epochs, "rate": p.rate, "eta_min": p.eta_min, "t_max": p.t_max });
+    let phase = |p: &lnn::configuration::Phase| serde_json::json!({ "epochs": p.epochs, "rate": p.rate, "eta_min": p.eta_min, "t_max": p.t_max });
     let recipe = serde_json::json!({
         "n": architecture.coordinates,
         "width": architecture.hidden[0],

@@ -2,11 +2,11 @@
 
 use super::super::common::nested::reference;
 use super::super::common::{accuracy::cast, of_scalar, solve};
+use lnn::data::Dataset;
 use lnn::lagrangian::Lagrangian;
 use lnn::network::{Architecture, Form, Initialization, InputLayer, NetworkLagrangian, Nonlinearity, initial_weights};
 use lnn::scalar::{Real, Scalar};
 use lnn::tape::ScalarFunction;
-use lnn::training::Dataset;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

@@ -1,10 +1,12 @@
 //! The learned double pendulum: read from a file, or trained for a few epochs and kept in the output directory.
 
 use super::options::Options;
+use lnn::configuration::{Config, Precision};
 use lnn::lagrangian::configure;
 use lnn::network::NetworkLagrangian;
 use lnn::network::file::{FORMAT, Header, ModelFile, StoredPrecision};
-use lnn::training::{Config, Hooks, Precision, Preset, run};
+use lnn::presets::Preset;
+use lnn::training::{Hooks, run};
 use std::path::Path;
 
 /// The network of `--model`, or of a short training.

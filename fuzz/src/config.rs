@@ -2,8 +2,8 @@
 //! configuration.
 
 use lnn::cli::parse_config;
+use lnn::configuration::Config;
 use lnn::lagrangian::configure;
-use lnn::training::Config;
 
 /// Reads the bytes.
 pub fn run(bytes: &[u8]) {

@@ -1,7 +1,7 @@
 //! Steady loss of energy in recorded motion: the mark of friction.
 
+use crate::data::Part;
 use crate::lagrangian::{EulerLagrange, Request, Terms};
-use crate::training::Part;
 use serde::{Deserialize, Serialize};
 
 /// Energy that recorded motion loses by a model that conserves it.

@@ -1,6 +1,7 @@
 //! Training instability: how much a loss oscillates about its trend (Hamzaogullari and Ozakin, appendix B).
 
-use crate::training::{Config, Schedule};
+use crate::configuration::Config;
+use crate::optimizers::Schedule;
 use std::ops::Range;
 
 /// Window of the filter in epochs.

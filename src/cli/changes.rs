@@ -2,8 +2,8 @@
 
 use crate::cli::number::{count, positive, weight};
 use crate::cli::{CliError, chosen};
+use crate::configuration::{Config, Known, Regularizer};
 use crate::network::{Initialization, Nonlinearity, Structure};
-use crate::training::{Config, Known, Regularizer};
 
 /// Changes of a configuration.
 #[derive(Clone, Debug, Default, clap::Args)]
@@ -88,13 +88,7 @@ impl Changes {
             config.network.activation = activation;
         }
         if let Some(structure) = self.structure {
-            config.network.structure = structure;
-            if structure != Structure::BlackBox {
-                // The signature holds by construction, and motion on a mass shell tells the whole metric.
-                config.penalty = Regularizer::None;
-                config.data.off_shell = 0.0;
-                config.network.learn_alpha = false;
-            }
+            config.take_structure(structure);
         }
         if !self.cyclic.is_empty() {
             config.network.cyclic.clone_from(&self.cyclic);
@@ -194,7 +188,7 @@ fn scale_epochs(config: &mut Config, total: usize) -> Result<(), CliError> {
 mod tests {
     use super::*;
     use crate::lagrangian::configure;
-    use crate::training::Preset;
+    use crate::presets::Preset;
 
     fn changed(preset: Preset, system: &str, changes: Changes) -> Result<Config, String> {
         let mut config = preset.config(&configure(system, &[]).unwrap()).unwrap();

@@ -54,8 +54,8 @@ impl Mistake {
     }
 }
 
-impl From<crate::training::ConfigError> for Mistake {
-    fn from(fault: crate::training::ConfigError) -> Self {
+impl From<crate::configuration::ConfigError> for Mistake {
+    fn from(fault: crate::configuration::ConfigError) -> Self {
         let problem = format!("expected {}, found {}", fault.expected, fault.found);
         Self { key: fault.field, problem }
     }
@@ -361,8 +361,9 @@ fn is_list_of_tables(items: &[Value]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::configuration::{Config, Polish, Regularizer};
     use crate::lagrangian::configure;
-    use crate::training::{Config, Polish, Preset, Regularizer};
+    use crate::presets::Preset;
 
     fn base(system: &str) -> Config {
         Preset::Quick.config(&configure(system, &[]).unwrap()).unwrap()

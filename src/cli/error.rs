@@ -2,6 +2,7 @@
 
 use crate::cli::interrupt;
 use crate::names::one_line;
+use crate::pipeline::PipelineError;
 use std::fmt;
 use std::io;
 use std::path::Path;
@@ -9,6 +10,7 @@ use std::process::ExitCode;
 
 /// Kind of a failure, as far as a calling script cares.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Kind {
     /// Arguments or configuration: exit code 2.
     Usage,
@@ -75,6 +77,22 @@ impl CliError {
             Kind::Interrupted => interrupt::exit_code(),
             Kind::ClosedPipe => 0,
         })
+    }
+}
+
+impl From<PipelineError> for CliError {
+    fn from(error: PipelineError) -> Self {
+        match &error {
+            PipelineError::Config(faults) if faults.len() > 1 => {
+                Self::all_usage(faults.iter().map(ToString::to_string)).err().unwrap_or_else(|| Self::usage(error))
+            }
+            PipelineError::Interrupted => Self::interrupted(error),
+            PipelineError::InterruptedRuns { .. } => {
+                Self::interrupted(format_args!("{error}; the same command goes on from there"))
+            }
+            _ if error.is_configuration() => Self::usage(error),
+            _ => Self::data(error),
+        }
     }
 }
 

@@ -1,22 +1,16 @@
 //! `lnn evaluate`: a model against the system it learned.
 
-use crate::cli::attention::Attention;
-use crate::cli::evaluation::{Evaluation, PIECES, Plan, RTOL, evaluate};
 use crate::cli::learned::{Learned, model_file};
-use crate::cli::learning::{parameter_table, write_report_and_figures};
 use crate::cli::number::{bounds, count, positive, seed, threads, tolerance};
 use crate::cli::place::{self, Wanted};
-use crate::cli::results::{Writer, remove_stale_evaluation};
+use crate::cli::results::Writer;
+use crate::cli::watch::watch;
 use crate::cli::{CliError, output, source};
 use crate::lagrangian::Configured;
 use crate::lagrangian::system::{Bounds, TrajectoryTest};
-use crate::report::Report;
-use crate::training::{Stream, sample};
-use serde::Serialize;
+use crate::pipeline::{EvaluationOptions, RTOL, evaluate};
 use std::path::{Path, PathBuf};
-
-/// Fresh states on which accelerations are compared.
-const STATES: usize = 12_000;
+use std::sync::Arc;
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
@@ -64,16 +58,6 @@ pub struct Args {
     json: bool,
 }
 
-/// Contents of `evaluation.json`.
-#[derive(Serialize)]
-struct Summary<'a> {
-    system: &'a str,
-    seed: u64,
-    validation_loss: f64,
-    #[serde(flatten)]
-    evaluation: &'a Evaluation,
-}
-
 /// The paper's starts and time span, as far as the arguments do not replace them.
 fn span(args: &Args, system: &Configured<f64>) -> Result<TrajectoryTest, CliError> {
     let n = system.coordinates;
@@ -109,36 +93,13 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let folder = place::open(&wanted)?;
 
     let seed = args.seed.unwrap_or(learned.header.seed);
-    let bounds = system.system.validation(system.coordinates);
-    let pairs = |bounds: &[(f64, f64)]| bounds.iter().map(|&(low, high)| [low, high]).collect::<Vec<_>>();
-    let bounds = (pairs(&bounds.positions), pairs(&bounds.velocities));
-    let mut random = Stream::Test.generator(seed);
-    let states =
-        sample(&system, "validation bounds", (&bounds.0, &bounds.1), STATES, &mut random).map_err(CliError::data)?;
-
-    let plan = Plan {
-        states: (states.q(), states.v()),
-        starts: args.starts,
-        span: span(args, &system)?,
-        rtol: args.rtol,
-        trained: learned.domain(),
-        seed,
-        threads: threads(args.threads),
-        // Ctrl-C ends the program at once: nothing is lost.
-        attention: &Attention::new(None, PIECES),
-    };
-    let evaluation = evaluate(&system, &learned.network, plan)?;
-    let validation_loss = learned.header.validation_loss;
-    let summary = Summary { system: &system.system.name, seed, validation_loss, evaluation: &evaluation };
-    let json = serde_json::to_string_pretty(&summary).map_err(CliError::data)? + "\n";
-    let title = format!("{}: learned against exact", system.system.title);
-    let report = evaluation
-        .summarise(Report::new(&title), &system.system.title)
-        .paragraph(&format!("Model {}, starts of seed {seed}.", args.model.display()));
-    remove_stale_evaluation(&folder)?;
-    folder.write("evaluation.json", json.as_bytes())?;
-    let report = evaluation.report(parameter_table(report, &system));
-    write_report_and_figures(&folder, &report, evaluation.figures.iter())?;
+    let usual = EvaluationOptions::new(&system, learned.domain(), seed)?;
+    let (span, threads) = (span(args, &system)?, threads(args.threads));
+    let options = EvaluationOptions { starts: args.starts, span, rtol: args.rtol, threads, ..usual };
+    // Ctrl-C ends the program at once: nothing is lost.
+    let evaluation = evaluate(&system, &learned.network, options, &watch(&Arc::default()))?;
+    let model = args.model.display().to_string();
+    let json = evaluation.write(&system, (&model, learned.header.validation_loss), seed, &folder)?;
     if args.json {
         return output::print(&json);
     }

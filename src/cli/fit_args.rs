@@ -1,12 +1,12 @@
 //! Arguments of `lnn fit`.
 
 use crate::cli::changes::Changes;
-use crate::cli::fit_config::HELD_OUT;
 use crate::cli::number::{count, positive, weight};
 use crate::cli::plain_name::plain_name;
 use crate::cli::print_config::PrintFormat;
 use crate::cli::recording_args::RecordingArgs;
 use crate::cli::train_config::{PrecisionName, every};
+use crate::pipeline::HELD_OUT;
 use crate::recording::Targets;
 use crate::training::Every;
 use std::path::{Path, PathBuf};

@@ -1,7 +1,8 @@
 //! A directory that a command fills, held by one run at a time.
 
 use crate::cli::holder::Holder;
-use crate::cli::{CliError, output};
+use crate::cli::{CliError, output, results};
+use crate::pipeline::{Checkpoints, Directory, ExperimentStore, MODEL, Output, PipelineError, RunOutput};
 use crate::storage::{Disk, remove_leftovers, write_atomically};
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, Read, Write};
@@ -80,14 +81,43 @@ impl Folder {
     pub fn file(&self, name: &str) -> PathBuf {
         self.path.join(name)
     }
+}
 
-    /// Writes a file whole or not at all.
-    ///
-    /// # Errors
-    /// A data error naming the file.
-    pub fn write(&self, name: &str, bytes: &[u8]) -> Result<(), CliError> {
+impl Output for Folder {
+    /// Writes a file whole or not at all. What an earlier run left goes when the new model has taken its place, what an earlier
+    /// evaluation left before the new one is written.
+    fn write(&self, name: &str, bytes: &[u8]) -> Result<(), PipelineError> {
+        if name == "evaluation.json" {
+            results::remove_stale_evaluation(&self.path)?;
+        }
         let path = self.file(name);
-        write_atomically(&path, bytes).map_err(|e| CliError::file(&path, format_args!("cannot write: {e}")))
+        write_atomically(&path, bytes).map_err(|e| PipelineError::output(&path, format_args!("cannot write: {e}")))?;
+        if name == MODEL { results::remove_stale(&self.path) } else { Ok(()) }
+    }
+}
+
+impl RunOutput for Folder {
+    fn remove(&self, name: &str) -> Result<(), PipelineError> {
+        Directory::at(&self.path).remove(name)
+    }
+
+    fn checkpoints(&self) -> Option<Checkpoints> {
+        Directory::at(&self.path).checkpoints()
+    }
+}
+
+impl ExperimentStore for Folder {
+    fn read(&self, run: &str, name: &str) -> Option<Vec<u8>> {
+        Directory::at(&self.path).read(run, name)
+    }
+
+    fn names(&self, run: &str) -> Vec<String> {
+        Directory::at(&self.path).names(run)
+    }
+
+    fn open_run(&self, run: &str) -> Result<Box<dyn RunOutput + '_>, PipelineError> {
+        let folder = Self::open(&self.path.join(run)).map_err(|error| PipelineError::Place(error.to_string()))?;
+        Ok(Box::new(folder))
     }
 }
 

@@ -6,8 +6,8 @@ use crate::cli::states::{column_names, parse_table};
 use crate::cli::{CliError, output, states};
 use crate::names::unknown;
 use crate::network::file::Header;
+use crate::pipeline::usual_force;
 use crate::recording::factor;
-use crate::report::{LinePlot, Series};
 use crate::rollout::SampledForce;
 use crate::storage::read_regular;
 use std::path::{Path, PathBuf};
@@ -28,20 +28,14 @@ pub struct ForceArgs {
     force_units: Vec<(String, String)>,
 }
 
-/// Name of the force conjugate to a coordinate where the data gave it none.
-pub fn usual(coordinate: &str) -> String {
-    format!("{coordinate}_force")
-}
-
 /// Names of a model's forces, one per coordinate: those of its data, or `COORDINATE_force`.
 pub fn names(header: &Header) -> Vec<String> {
     let coordinates = &header.columns[..header.columns.len() / 2];
-    if header.forces.is_empty() { coordinates.iter().map(|name| usual(name)).collect() } else { header.forces.clone() }
-}
-
-/// Columns of recorded forces as a model remembers them; numbers of columns are no names.
-pub fn recorded(columns: &[String]) -> Vec<String> {
-    if columns.iter().any(|name| name.parse::<f64>().is_ok()) { Vec::new() } else { columns.to_vec() }
+    if header.forces.is_empty() {
+        coordinates.iter().map(|name| usual_force(name)).collect()
+    } else {
+        header.forces.clone()
+    }
 }
 
 impl ForceArgs {
@@ -72,7 +66,7 @@ impl ForceArgs {
             match given.split_once('=') {
                 Some((name, value)) if !Path::new(given).exists() => {
                     let name = name.trim();
-                    let usual = |i: &usize| known[*i] == name || usual(&coordinates[*i]) == name;
+                    let usual = |i: &usize| known[*i] == name || usual_force(&coordinates[*i]) == name;
                     let Some(i) = (0..known.len()).find(usual) else {
                         let problem = unknown("force", name, known.iter().map(String::as_str));
                         return Err(CliError::usage(format_args!("--force: {problem}")));
@@ -132,7 +126,7 @@ impl ForceArgs {
         let mut columns = vec![time];
         let mut places: Vec<Option<usize>> = Vec::with_capacity(known.len());
         for ((name, coordinate), constant) in known.iter().zip(coordinates).zip(constants) {
-            let column = [name.clone(), usual(coordinate)].into_iter().find(there);
+            let column = [name.clone(), usual_force(coordinate)].into_iter().find(there);
             if let (Some(column), Some(_)) = (&column, constant) {
                 let problem = format!("--force: {column} is a constant and a column of {}", path.display());
                 return Err(CliError::usage(problem));
@@ -185,24 +179,5 @@ impl ForceArgs {
             }
         }
         Ok(force)
-    }
-}
-
-/// Forces over time, one line each.
-pub fn plot(force: &SampledForce<f64>, times: &[f64], names: &[String]) -> LinePlot {
-    let mut values = vec![0.0; names.len()];
-    let mut columns = vec![Vec::with_capacity(times.len()); names.len()];
-    for &t in times {
-        force.at(t, &mut values);
-        columns.iter_mut().zip(&values).for_each(|(column, &value)| column.push(value));
-    }
-    LinePlot {
-        title: "Known forces".into(),
-        x_label: "time ahead [s]".into(),
-        y_label: "force [N, N m]".into(),
-        log_y: false,
-        series: names.iter().zip(&columns).map(|(name, column)| Series::new(name, times, column)).collect(),
-        turn: None,
-        level: None,
     }
 }

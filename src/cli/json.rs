@@ -25,6 +25,17 @@ pub fn matrix<S: Scalar>(values: &[S], columns: usize) -> String {
     format!("[{}]", values.chunks(columns.max(1)).map(vector).collect::<Vec<_>>().join(","))
 }
 
+/// Nested lists of the components of a tensor with `rank` indices of `n` values each, the last index innermost.
+pub fn tensor<S: Scalar>(values: &[S], n: usize, rank: usize) -> String {
+    match rank {
+        0 | 1 => vector(values),
+        _ => {
+            let parts = values.chunks((values.len() / n.max(1)).max(1)).map(|part| tensor(part, n, rank - 1));
+            format!("[{}]", parts.collect::<Vec<_>>().join(","))
+        }
+    }
+}
+
 /// A quoted string.
 pub fn string(text: &str) -> String {
     serde_json::Value::from(text).to_string()
@@ -49,6 +60,9 @@ mod tests {
         assert_eq!(number(f64::NAN), "null");
         assert_eq!(number(f32::INFINITY), "null");
         assert_eq!(matrix(&[1f32, 2.0, 3.0, 4.0], 2), "[[1.00000000e0,2.00000000e0],[3.00000000e0,4.00000000e0]]");
+        let cube: Vec<f64> = (0..8).map(f64::from).collect();
+        let nested: Vec<Vec<Vec<f64>>> = serde_json::from_str(&tensor(&cube, 2, 3)).unwrap();
+        assert_eq!(nested, [[[0.0, 1.0], [2.0, 3.0]], [[4.0, 5.0], [6.0, 7.0]]]);
         assert_eq!(string("a\"b\n"), r#""a\"b\n""#);
     }
 }

@@ -2,13 +2,12 @@
 
 use crate::cli::CliError;
 use crate::cli::chosen::{self, learned_system};
-use crate::lagrangian::system::Size;
-use crate::lagrangian::{Configured, configure_system, find};
+use crate::lagrangian::{Configured, configure_system, configure_values, find};
 use crate::network::NetworkLagrangian;
 use crate::network::file::{Header, ModelFile};
+use crate::pipeline::{self, trained_on};
 use crate::rollout::Domain;
 use crate::scalar::Scalar;
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// A trained model.
@@ -19,23 +18,12 @@ pub struct Learned<S> {
     pub network: NetworkLagrangian<S>,
 }
 
-/// Name of the model file in the directory of a run.
-pub const MODEL: &str = "model.safetensors";
-
 /// The file of a model that is given by its file or by the directory of its run.
 ///
 /// # Errors
 /// A data error for a directory without a model.
 pub fn model_file(path: &Path) -> Result<PathBuf, CliError> {
-    if !path.is_dir() {
-        return Ok(path.to_path_buf());
-    }
-    let file = path.join(MODEL);
-    if file.exists() {
-        Ok(file)
-    } else {
-        Err(CliError::file(path, format_args!("there is no {MODEL} in this directory")))
-    }
+    Ok(pipeline::model_file(path)?)
 }
 
 impl<S: Scalar> Learned<S> {
@@ -62,8 +50,7 @@ impl<S: Scalar> Learned<S> {
             return Err(CliError::file(path, format_args!("{:?}, which it learned, {problem}", self.header.system)));
         }
         let system = learned_system(&self.header).map_err(|e| CliError::file(path, e))?;
-        let configured =
-            configure_system(system, &given(&self.header.parameters)).map_err(|e| CliError::file(path, e))?;
+        let configured = configure_values(system, &self.header.parameters).map_err(|e| CliError::file(path, e))?;
         if configured.system.columns(configured.coordinates) != self.header.columns {
             return Err(CliError::file(path, format_args!("columns are not those of {}", self.header.system)));
         }
@@ -90,27 +77,4 @@ impl<S: Scalar> Learned<S> {
     pub fn domain(&self) -> Domain<S> {
         trained_on(&self.header)
     }
-}
-
-/// The states a model was trained on; periodic coordinates are unbounded.
-pub fn trained_on<S: Scalar>(header: &Header) -> Domain<S> {
-    let bound = |&[low, high]: &[f64; 2]| (S::of_f64(low), S::of_f64(high));
-    let periodic = &header.architecture.periodic;
-    let positions = header.position.iter().zip(periodic).map(|(b, &p)| (!p).then(|| bound(b)));
-    Domain::new(positions.chain(header.velocity.iter().map(|b| Some(bound(b)))).collect())
-}
-
-/// Values of all parameters of a system, its size among them.
-pub fn all_parameters(system: &Configured<f64>) -> BTreeMap<String, f64> {
-    let named = system.system.parameters.iter().map(|p| p.symbol.to_string());
-    let mut parameters: BTreeMap<_, _> = named.zip(system.parameters.iter().copied()).collect();
-    if let Size::Chosen { symbol, .. } = system.system.size {
-        parameters.insert(symbol.to_string(), system.coordinates as f64);
-    }
-    parameters
-}
-
-/// Parameters in the form the catalogue takes them.
-pub fn given(parameters: &BTreeMap<String, f64>) -> Vec<(String, String)> {
-    parameters.iter().map(|(symbol, value)| (symbol.clone(), value.to_string())).collect()
 }

@@ -4,42 +4,34 @@
 //! arguments or configuration, 130 Ctrl-C, 143 SIGTERM. A failure is one line, `error: FILE: row 3, column theta1: ...`;
 //! of a configuration all mistakes are found, a line for each.
 
-mod attention;
 mod certify;
 mod changes;
+mod charges;
 mod check;
 mod chosen;
+mod compare;
 mod config;
 mod config_file;
-mod determined;
 mod differences;
-mod energy;
 mod error;
 mod evaluate;
-mod evaluation;
 mod experiment;
 mod files;
 mod fit;
 mod fit_args;
 mod fit_config;
 mod fit_resume;
-mod fit_summary;
 mod folder;
 mod forces;
-mod foretell;
-mod headline;
+mod geometry;
 mod holder;
 mod input;
 mod inspect;
 mod interrupt;
 mod inverse;
 mod json;
-mod judgement;
 mod learned;
-mod learning;
-mod losses;
 mod manual;
-mod memory;
 mod misunderstood;
 mod motion;
 mod number;
@@ -47,6 +39,7 @@ mod output;
 mod place;
 mod plain_name;
 mod print_config;
+mod probe;
 mod progress;
 mod recording_args;
 mod results;
@@ -56,13 +49,14 @@ mod said;
 mod shown;
 mod source;
 mod spool;
-mod start;
 mod states;
 mod subject;
+mod symmetries;
 mod systems;
-mod taken;
+mod tensors;
 mod train;
 mod train_config;
+mod watch;
 
 pub use chosen::parse_system;
 pub use config::parse as parse_config;
@@ -114,6 +108,12 @@ enum Command {
     Experiment(experiment::Args),
     /// Print the Euler-Lagrange terms of states, every digit of them.
     Inspect(inspect::Args),
+    /// Print metric, Christoffel symbols and curvature of points, every digit of them.
+    Geometry(geometry::Args),
+    /// Find the symmetries of a Lagrangian and what its motion conserves.
+    Symmetries(symmetries::Args),
+    /// Say what two Lagrangians have in common beyond factor and gauge.
+    Compare(compare::Args),
     /// Prove where the mass matrix has its signature, and a condition number below a bound.
     Certify(certify::Args),
     /// Print a script that completes commands and options in a shell.
@@ -169,6 +169,9 @@ fn run(command: Command, words: &[OsString]) -> Result<(), CliError> {
         Command::Evaluate(args) => evaluate::run(&args),
         Command::Experiment(args) => experiment::run(&args),
         Command::Inspect(args) => inspect::run(&args),
+        Command::Geometry(args) => geometry::run(&args),
+        Command::Symmetries(args) => symmetries::run(&args),
+        Command::Compare(args) => compare::run(&args),
         Command::Certify(args) => certify::run(&args),
         Command::Completions(args) => manual::completions(&args, Cli::command()),
         Command::Man(args) => manual::man(&args, Cli::command()),

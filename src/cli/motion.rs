@@ -1,5 +1,6 @@
 //! Results of a roll-out beside its samples: where it left the training range, pictures, facts in JSON.
 
+use crate::cli::charges::Charges;
 use crate::cli::{CliError, input, output};
 use crate::names::{counted, rounded};
 use crate::report::{Figure, LinePlot, Picture, Report, Series, line_plot};
@@ -175,6 +176,9 @@ pub struct Facts<'a> {
     pub energy_defect: Option<f64>,
     /// Where the motion left the training range.
     pub left_training_range: Option<&'a Leaving>,
+    /// Charges of the symmetries along the motion, if asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub charges: Option<&'a Charges>,
     /// The file of the samples.
     pub out: String,
 }
@@ -244,8 +248,9 @@ impl Facts<'_> {
             ),
             _ => String::new(),
         };
+        let charges = self.charges.map_or(String::new(), Charges::text);
         format!(
-            "{} to t = {}{unit}, {}, {}{iterations}, in {}\n{balance}",
+            "{} to t = {}{unit}, {}, {}{iterations}, in {}\n{balance}{charges}",
             counted(self.samples, "sample", "samples"),
             self.t_end,
             counted(self.steps, "step", "steps"),

@@ -71,7 +71,7 @@ fn numbered(path: &Path, number: u32) -> PathBuf {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cli::learned::MODEL;
+    use crate::pipeline::{MODEL, Output};
 
     #[test]
     fn the_first_free_directory_serves() {

@@ -1,6 +1,6 @@
 //! Commented configurations: every key with what it means, its allowed values and the value it has.
 
-use crate::training::{Key, Section};
+use crate::presets::{Key, Section};
 use toml::{Table, Value};
 
 /// Longest line of a comment.
@@ -109,8 +109,9 @@ fn comment(text: &str) -> String {
 mod tests {
     use super::*;
     use crate::cli::parse_config;
+    use crate::configuration::{Config, Polish};
     use crate::lagrangian::{configure, systems};
-    use crate::training::{Config, Polish, Preset, TRAINING_SECTIONS};
+    use crate::presets::{Preset, TRAINING_SECTIONS};
 
     fn print(config: &Config) -> String {
         commented(&TRAINING_SECTIONS, &Table::try_from(config).unwrap(), &|name| Some(format!("about {name}")))

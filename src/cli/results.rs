@@ -2,17 +2,14 @@
 
 use crate::cli::CliError;
 use crate::cli::files::{holds_something, same_file};
-use crate::cli::folder::Folder;
-use crate::cli::learned::MODEL;
 use crate::cli::resume::{command, has_checkpoint};
+use crate::pipeline::{CAPTIONS, MODEL, PipelineError};
 use crate::storage::{Disk, Files, read_regular};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// File with the captions of a run's pictures, by file name; written before them, so that each is known.
-pub const CAPTIONS: &str = "captions.json";
 /// Files that only trainings and fits write.
 const LEARNED: [&str; 5] = [MODEL, "config.toml", "history.csv", "shooting.csv", "summary.json"];
 /// Files that evaluations write; trainings and fits have the last two as well.
@@ -130,11 +127,11 @@ pub fn require_room(directory: &Path, writer: Writer, overwrite: bool) -> Result
 /// Removes what an earlier run left, all but the model: to be called when the new run's model has taken its place.
 ///
 /// # Errors
-/// A data error naming what cannot be removed.
-pub fn remove_stale(folder: &Folder) -> Result<(), CliError> {
-    remove(folder.path(), &LEARNED[1..])?;
-    remove(folder.path(), &EVALUATED)?;
-    for entry in fs::read_dir(folder.path()).into_iter().flatten().flatten() {
+/// [`PipelineError::Output`] naming what cannot be removed.
+pub fn remove_stale(directory: &Path) -> Result<(), PipelineError> {
+    remove(directory, &LEARNED[1..])?;
+    remove(directory, &EVALUATED)?;
+    for entry in fs::read_dir(directory).into_iter().flatten().flatten() {
         let name = entry.file_name();
         let number = name.to_str().and_then(|name| name.strip_prefix("evaluation"));
         let numbered =
@@ -152,18 +149,19 @@ pub fn remove_stale(folder: &Folder) -> Result<(), CliError> {
 /// Removes what an earlier evaluation left.
 ///
 /// # Errors
-/// A data error naming what cannot be removed.
-pub fn remove_stale_evaluation(folder: &Folder) -> Result<(), CliError> {
-    remove(folder.path(), &EVALUATED)
+/// [`PipelineError::Output`] naming what cannot be removed.
+pub fn remove_stale_evaluation(directory: &Path) -> Result<(), PipelineError> {
+    remove(directory, &EVALUATED)
 }
 
 /// Removes the pictures that the captions name, then the files.
-fn remove(directory: &Path, names: &[&str]) -> Result<(), CliError> {
+fn remove(directory: &Path, names: &[&str]) -> Result<(), PipelineError> {
     let captions = if names.contains(&CAPTIONS) { captioned(directory) } else { Vec::new() };
     for path in captions.into_iter().chain(names.iter().map(|name| directory.join(name))) {
         // A device behind a link holds nothing of an earlier run.
         if path.is_file() || path.is_symlink() && !path.exists() {
-            Disk.remove(&path).map_err(|e| CliError::file(&path, format_args!("cannot remove what was there: {e}")))?;
+            let cannot = |e| PipelineError::output(&path, format_args!("cannot remove what was there: {e}"));
+            Disk.remove(&path).map_err(cannot)?;
         }
     }
     Ok(())
@@ -180,6 +178,7 @@ fn captioned(directory: &Path) -> Vec<PathBuf> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cli::folder::Folder;
 
     #[test]
     fn captions_name_pictures_of_their_directory_alone() {
@@ -205,7 +204,7 @@ mod tests {
         }
         fs::write(folder.file("evaluation-2/mine.txt"), "x").unwrap();
         assert!(found(folder.path()).unwrap().contains("model.safetensors, config.toml"));
-        remove_stale(&folder).unwrap();
+        remove_stale(folder.path()).unwrap();
         let mut left: Vec<String> =
             fs::read_dir(folder.path()).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
         left.sort();

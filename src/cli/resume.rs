@@ -3,8 +3,9 @@
 use crate::cli::differences::differences;
 use crate::cli::said::Said;
 use crate::cli::{CliError, Kind, config, output};
+use crate::configuration::Config;
 use crate::storage::{Disk, read_regular};
-use crate::training::{CheckpointError, Config, NEWEST, PREVIOUS, saved};
+use crate::training::{CheckpointError, NEWEST, PREVIOUS, remove_checkpoints, saved};
 use serde::Deserialize;
 use std::path::Path;
 
@@ -146,6 +147,15 @@ pub fn keeping(directory: &Path) -> impl Fn(CliError) -> CliError {
             error
         }
     }
+}
+
+/// Removes the checkpoints of a training that is over.
+///
+/// # Errors
+/// A data error naming the directory.
+pub fn forget(directory: &Path) -> Result<(), CliError> {
+    let cannot = |e| CliError::file(directory, format_args!("cannot remove checkpoints: {e}"));
+    remove_checkpoints(&Disk, directory).map_err(cannot)
 }
 
 /// Says that there is nothing left to do.

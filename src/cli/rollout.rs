@@ -1,9 +1,11 @@
 //! `lnn rollout`: the motion of a model from one state.
 
+use crate::cli::charges::Charges;
 use crate::cli::files::require_free;
 use crate::cli::forces::ForceArgs;
 use crate::cli::motion::{Facts, Target, Watch, picture_file, place};
 use crate::cli::number::{finite, positive, tolerance};
+use crate::cli::probe::Probe;
 use crate::cli::source::parameter;
 use crate::cli::subject::Subject;
 use crate::cli::{CliError, input, interrupt, output};
@@ -66,6 +68,10 @@ pub struct Args {
     /// Picture of the coordinates against time, or a page with velocities and energy as well.
     #[arg(long, value_name = "FILE.svg|FILE.html", value_parser = picture_file)]
     plot: Option<PathBuf>,
+    /// Say what the model's symmetries conserve along the motion, and what part of its drift is the model's, what the
+    /// integrator's.
+    #[arg(long)]
+    charges: bool,
     /// Replace the files.
     #[arg(long)]
     overwrite: bool,
@@ -153,6 +159,9 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         check_target(plot).map_err(|e| CliError::file(plot, format_args!("cannot write: {e}")))?;
     }
     let force = args.forces.force(&columns[..q.len()], &subject.forces, args.t_start, args.t_end)?;
+    if args.charges && force.is_some() {
+        return Err(CliError::usage("--charges: forces from outside change them; leave the forces out"));
+    }
     let mut target = Target::create(&args.out, standard)?;
     let header = Trajectory { energy: Some(vec![]), ..Trajectory::<f64>::empty(q.len()) };
     target.append(&header.csv_header(columns).map_err(CliError::data)?)?;
@@ -165,9 +174,15 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         })
     });
     let mut watch = Watch::new(subject.range(), columns);
+    let mut sampled = args.charges.then(|| Trajectory::<f64>::empty(q.len()));
     let (stop, mut failed) = (interrupt::flag().map_err(CliError::signals)?, None);
     let mut take = |piece: &Trajectory<f64>| {
         watch.add(piece);
+        if let Some(sampled) = &mut sampled {
+            sampled.t.extend(&piece.t);
+            sampled.q.extend(&piece.q);
+            sampled.v.extend(&piece.v);
+        }
         let written = target.append(&piece.csv_rows());
         let balanced = balances.as_mut().map_or(Ok(()), |sum| sum.add(piece)).map_err(CliError::data);
         failed = written.and(balanced).err();
@@ -205,6 +220,16 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     }
     let statistics = result.statistics;
     let balance = balances.map(Balances::finish).transpose().map_err(CliError::data)?;
+    let charges = match &sampled {
+        Some(motion) => {
+            let probe = match &args.model {
+                Some(path) => Probe::model(path)?,
+                None => Probe::system(args.system.as_deref().unwrap_or_default(), &args.param)?,
+            };
+            Some(Charges::new(&probe, motion)?)
+        }
+        None => None,
+    };
     let facts = Facts {
         system: &subject.name,
         samples: result.samples,
@@ -218,6 +243,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         dissipated: balance.map(|balance| balance.dissipated),
         energy_defect: balance.map(|balance| balance.defect()),
         left_training_range: watch.leaving.as_ref(),
+        charges: charges.as_ref(),
         out: place(&args.out),
     };
     if args.json {

@@ -4,6 +4,7 @@ use crate::cli::learned::Learned;
 use crate::cli::{CliError, chosen, forces};
 use crate::lagrangian::system::System;
 use crate::lagrangian::{EulerLagrange, configure_system};
+use crate::pipeline::usual_force;
 use crate::scalar::Scalar;
 use std::borrow::Cow;
 use std::path::Path;
@@ -35,7 +36,7 @@ impl<S: Scalar> Source<S> {
         let configured = configure_system::<S>(system, given).map_err(CliError::usage)?;
         let model = configured.build().map_err(CliError::usage)?;
         let columns = configured.system.columns(configured.coordinates);
-        let forces = columns[..configured.coordinates].iter().map(|name| forces::usual(name)).collect();
+        let forces = columns[..configured.coordinates].iter().map(|name| usual_force(name)).collect();
         Ok(Self { model, columns, forces })
     }
 

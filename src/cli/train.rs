@@ -2,23 +2,20 @@
 
 use crate::cli::folder::Folder;
 use crate::cli::learned::model_file;
-use crate::cli::learning::{Begin, Effort, Finished, Keeping, Learning, forget, learn};
 use crate::cli::number::threads;
 use crate::cli::place::{self, Wanted};
-use crate::cli::progress::Progress as Bar;
 use crate::cli::results::Writer;
-use crate::cli::resume::{self, Found, Learner, configuration, find, how_to_go_on, require_same, say_finished};
+use crate::cli::resume::{self, Found, Learner, configuration, find, forget, how_to_go_on, require_same, say_finished};
 use crate::cli::train_config::Args;
+use crate::cli::watch::watch;
 use crate::cli::{CliError, interrupt, output};
+use crate::configuration::Config;
 use crate::lagrangian::Configured;
 use crate::names::counted;
-use crate::training::{Config, Hooks, NEWEST, Progress, Stop};
+use crate::pipeline::{Begin, Checkpoints, PipelineError, RunOptions, TrainReport, train};
+use crate::training::{NEWEST, Stop, TrainingError};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-
-/// Starts of the trajectory test, as in the paper.
-const STARTS: usize = 4;
+use std::sync::atomic::Ordering;
 
 /// Trains and writes everything into the output directory; goes on with a training that was stopped, if asked to.
 ///
@@ -31,25 +28,30 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     }
     let Some(Task { config, system, folder, start }) = Task::of(args)? else { return Ok(()) };
     let stop = interrupt::flag().map_err(CliError::signals)?;
-    let effort = Effort { threads: threads(args.threads), starts: STARTS, horizon: 1.0 };
-    let keeping = Keeping { every: args.checkpoint_every, start };
-    let learned = learn(&folder, &config, &system, effort, &hooks(&stop), keeping);
-    let finished = match learned.map_err(resume::keeping(folder.path()))? {
-        Learning::Finished(finished) => finished,
-        Learning::Nothing(_) if stop.load(Ordering::SeqCst) => {
+    let checkpoints = Checkpoints::new(folder.path(), args.checkpoint_every).beginning(start);
+    let options =
+        RunOptions { threads: threads(args.threads), checkpoints: Some(checkpoints), ..RunOptions::default() };
+    let trained = match train(&config, &system, &options, &folder, &watch(&stop)) {
+        Ok(trained) => trained,
+        Err(PipelineError::Training(TrainingError::NothingLearned(_))) if stop.load(Ordering::SeqCst) => {
             let problem = "interrupted before the first epoch ended";
             return Err(CliError::interrupted(format_args!("{problem}{}", how_to_go_on(folder.path()))));
         }
-        Learning::Nothing(reason) => {
-            forget(&folder)?;
-            return Err(CliError::data(reason));
+        Err(error @ PipelineError::Training(TrainingError::NothingLearned(_))) => {
+            forget(folder.path())?;
+            return Err(error.into());
         }
+        Err(error) => return Err(resume::keeping(folder.path())(error.into())),
     };
-    if finished.stop != Stop::Interrupted {
-        forget(&folder)?;
+    if trained.stop != Stop::Interrupted {
+        forget(folder.path())?;
     }
-    output::print(if args.json { &finished.json } else { &finished.text })?;
-    conclude(&finished, folder.path())
+    if args.json {
+        output::print(&trained.json)?;
+    } else {
+        output::print(&format!("{}report: {}\n", trained.text(), folder.file("report.html").display()))?;
+    }
+    conclude(&trained, folder.path())
 }
 
 /// A training: configuration, system, directory and beginning.
@@ -98,29 +100,11 @@ impl Task {
 }
 
 /// The exit of a training that did not run to its end.
-fn conclude(finished: &Finished, path: &Path) -> Result<(), CliError> {
-    let kept = format!("the best of {} is in {}", counted(finished.epochs, "epoch", "epochs"), path.display());
+fn conclude(finished: &TrainReport, path: &Path) -> Result<(), CliError> {
+    let kept = format!("the best of {} is in {}", counted(finished.history.len(), "epoch", "epochs"), path.display());
     match &finished.stop {
         Stop::Finished => Ok(()),
         Stop::Interrupted => Err(CliError::interrupted(format_args!("interrupted, {kept}{}", how_to_go_on(path)))),
         Stop::Failed(error) => Err(CliError::data(format_args!("training stopped: {error}; {kept}"))),
-    }
-}
-
-/// Progress on standard error, Ctrl-C.
-pub(super) fn hooks(stop: &Arc<AtomicBool>) -> Hooks {
-    let bar: std::sync::OnceLock<Bar> = std::sync::OnceLock::new();
-    Hooks {
-        watcher: Some(Arc::new(move |progress| match progress {
-            Progress::Step { step, steps, .. } => {
-                bar.get_or_init(|| Bar::new(steps as u64, "steps")).advance(step as u64);
-            }
-            Progress::Epoch(epoch) => {
-                if let Some(bar) = bar.get() {
-                    bar.show(epoch.validation_loss, epoch.rate);
-                }
-            }
-        })),
-        interrupt: Arc::clone(stop),
     }
 }

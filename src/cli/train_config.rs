@@ -2,19 +2,23 @@
 
 use crate::cli::changes::Changes;
 use crate::cli::config_file::{ConfigFile, Mistake};
-use crate::cli::learned::{all_parameters, given};
 use crate::cli::number::{count, finite, positive, seed};
 use crate::cli::print_config::{PrintFormat, commented, with_seed};
-use crate::cli::start::Start;
 use crate::cli::{CliError, chosen, output, source};
+use crate::configuration::{Config, Precision};
+use crate::data::SamplingError;
 use crate::lagrangian::system::System;
-use crate::lagrangian::{Configured, Description, DescriptionError, SystemError, configure_system, find};
-use crate::names::plain;
-use crate::training::{
-    Config, Every, Precision, Preset, SamplingError, Schedule, TRAINING_SECTIONS, configuration_reference,
+use crate::lagrangian::{
+    Configured, Description, DescriptionError, SystemError, configure_system, configure_values, find,
 };
+use crate::names::plain;
+use crate::optimizers::Schedule;
+use crate::pipeline::{StartModel as Start, all_parameters};
+use crate::presets::{Preset, TRAINING_SECTIONS, configuration_reference};
+use crate::training::Every;
 use serde::Deserialize;
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Arguments.
@@ -207,19 +211,20 @@ impl Args {
             Err(_) => Cow::Borrowed(find("double-pendulum").map_err(CliError::usage)?),
         };
         let mut parameters = match &start {
-            Some(start) if start.header.system == name => given(&start.header.parameters),
-            _ => Vec::new(),
+            Some(start) if start.header.system == name => start.header.parameters.clone(),
+            _ => BTreeMap::new(),
         };
         let mut mistakes: Vec<Mistake> = system.as_ref().err().map(Unusable::mistake).into_iter().collect();
-        replace(&mut parameters, &file.as_ref().map(file_parameters).unwrap_or_default());
+        parameters.extend(file.as_ref().map(file_parameters).unwrap_or_default());
         // What is wrong in the arguments is not the file's.
         match &system {
             Ok(system) => drop(configure_system::<f64>(system.clone(), &self.param).map_err(CliError::usage)?),
             Err(_) if file.is_some() && self.system_argument().is_none() => {}
             Err(error) => return Err(CliError::usage(error)),
         }
-        replace(&mut parameters, &self.param);
-        let (system, known) = match (system, configure_system::<f64>(usable.clone(), &parameters)) {
+        let given = self.param.iter().filter_map(|(symbol, text)| Some((symbol.clone(), finite(text).ok()?)));
+        parameters.extend(given);
+        let (system, known) = match (system, configure_values::<f64>(usable.clone(), &parameters)) {
             (Ok(_), Ok(system)) => (system, true),
             (Ok(_), Err(error)) => {
                 mistakes.extend(wrong_parameters(&usable, &parameters, &error));
@@ -331,25 +336,23 @@ impl Args {
             PresetName::Best => (Preset::Best, "best"),
             PresetName::Paper => (Preset::Paper, "paper"),
         };
-        preset.config(system).ok_or_else(|| {
+        let config = match self.changes.structure {
+            Some(structure) => preset.config_of(system, structure),
+            None => preset.config(system),
+        };
+        config.ok_or_else(|| {
             let name = &system.system.name;
             CliError::usage(format_args!("--preset {known}: there is none for {name}, use quick or --config"))
         })
     }
 }
 
-/// The numbers of a file's `[parameters]` as the catalogue takes them.
-fn file_parameters(file: &ConfigFile) -> Vec<(String, String)> {
+/// The numbers of a file's `[parameters]`.
+fn file_parameters(file: &ConfigFile) -> BTreeMap<String, f64> {
     let table = file.get(&["parameters"]).and_then(toml::Value::as_table);
     let number = |value: &toml::Value| value.as_float().or_else(|| value.as_integer().map(|x| x as f64));
     let entries = table.into_iter().flatten();
-    entries.filter_map(|(symbol, value)| Some((symbol.clone(), number(value)?.to_string()))).collect()
-}
-
-/// Takes later values in the place of earlier ones.
-fn replace(parameters: &mut Vec<(String, String)>, later: &[(String, String)]) {
-    parameters.retain(|(symbol, _)| later.iter().all(|(new, _)| new != symbol));
-    parameters.extend_from_slice(later);
+    entries.filter_map(|(symbol, value)| Some((symbol.clone(), number(value)?))).collect()
 }
 
 /// The system that is asked for, by name or with its description.
@@ -382,10 +385,11 @@ impl Unusable {
 }
 
 /// Mistakes in the parameters of a system, each of them by itself.
-fn wrong_parameters(system: &System, parameters: &[(String, String)], error: &SystemError) -> Vec<Mistake> {
-    let alone = parameters.iter().filter_map(|one| {
-        let problem = configure_system::<f64>(Cow::Owned(system.clone()), std::slice::from_ref(one)).err()?;
-        Some(Mistake::new(format!("parameters.{}", one.0), problem))
+fn wrong_parameters(system: &System, parameters: &BTreeMap<String, f64>, error: &SystemError) -> Vec<Mistake> {
+    let alone = parameters.iter().filter_map(|(symbol, value)| {
+        let one = BTreeMap::from([(symbol.clone(), *value)]);
+        let problem = configure_values::<f64>(Cow::Owned(system.clone()), &one).err()?;
+        Some(Mistake::new(format!("parameters.{symbol}"), problem))
     });
     let found: Vec<Mistake> = alone.collect();
     if found.is_empty() { vec![Mistake::new("parameters", error)] } else { found }

@@ -1,6 +1,6 @@
 //! Shares of the paper's budget that an experiment may take.
 
-use crate::training::Config;
+use crate::configuration::Config;
 
 /// Size of an experiment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -15,8 +15,8 @@ pub use budget::Scale;
 pub use record::{Learned, Outcome, Record, Row, Spread};
 pub use remarks::{Quantity, Reduction};
 
+use crate::configuration::Config;
 use crate::names::unknown;
-use crate::training::Config;
 
 /// Figures that the paper reports for a group of runs, in its own convention.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -1,9 +1,10 @@
 //! The paper's network experiments, all on the double pendulum (its appendix "Training details of network experiments").
 
 use super::{Experiment, Picture, Quantity, Reduction, Reported, Run, slug};
+use crate::configuration::{Config, Regularizer, Scaling};
 use crate::lagrangian::configure;
 use crate::network::{Initialization, InputLayer, Nonlinearity};
-use crate::training::{Config, Preset, Regularizer, Scaling};
+use crate::presets::Preset;
 use std::f64::consts::PI;
 
 /// Angle bounds of a training.

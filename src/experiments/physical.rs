@@ -2,7 +2,7 @@
 
 use super::{Experiment, Picture, Reported, Run};
 use crate::lagrangian::configure;
-use crate::training::Preset;
+use crate::presets::Preset;
 
 /// Everything an evaluation draws.
 const ALL: &[Picture] = &[Picture::Evaluation(&[""])];

@@ -2,8 +2,10 @@
 
 use super::physical::TRIPLE;
 use super::{Experiment, Picture, Reported, Run};
+use crate::configuration::Config;
 use crate::lagrangian::configure;
-use crate::training::{Config, Method, Preset};
+use crate::optimizers::Method;
+use crate::presets::Preset;
 
 /// The paper's systems with what it reports of them.
 const SYSTEMS: [(&str, Reported); 5] = [

@@ -1,7 +1,8 @@
 //! Remarks for the comparison of a table with the paper's: conventions, and the reductions that the paper states.
 
 use super::{Experiment, Outcome, Record, Run};
-use crate::training::{Method, Regularizer};
+use crate::configuration::Regularizer;
+use crate::optimizers::Method;
 
 /// A quantity of which the paper states by how much it is lower in one group of runs than in another.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,7 +1,7 @@
 //! The hand-written systems by name: description, Euler-Lagrange terms, closed-form acceleration.
 
 use super::derivatives::{Need, State, evaluate};
-use super::system::{Closed, Range, Size, System};
+use super::system::{Closed, System};
 use super::{EulerLagrange, ExpressionLagrangian, HandWritten, Lagrangian, Request, Terms};
 use crate::linalg::Workspace;
 use crate::names::unknown;
@@ -195,89 +195,8 @@ pub fn find(name: &str) -> Result<&'static System, SystemError> {
     SYSTEMS.iter().find(|system| system.name == name).ok_or_else(|| unknown_system(name))
 }
 
-/// Reads the parameters of a system in the working precision; those not given take their defaults.
-///
-/// # Errors
-/// [`SystemError`] for an unknown name or symbol, a repeated symbol, a value that is no number or out of range.
-pub fn configure<S: Scalar>(name: &str, given: &Given) -> Result<Configured<S>, SystemError> {
-    configure_system(Cow::Borrowed(find(name)?), given)
-}
-
-/// As [`configure`], for a system at hand: one of the catalogue, or one by its [description](super::Description).
-///
-/// # Errors
-/// [`SystemError`] for an unknown or repeated symbol, a value that is no number or out of range.
-pub fn configure_system<S: Scalar>(system: Cow<'static, System>, given: &Given) -> Result<Configured<S>, SystemError> {
-    let name = || system.name.to_string();
-    let count = match system.size {
-        Size::Fixed(_) => None,
-        Size::Chosen { symbol, .. } => Some(symbol),
-    };
-    for (i, (symbol, _)) in given.iter().enumerate() {
-        let known = system.parameters.iter().map(|p| p.symbol.as_ref()).chain(count);
-        if !known.clone().any(|k| k == symbol) {
-            let (system, known) = (name(), known.map(String::from).collect());
-            return Err(SystemError::UnknownParameter { system, symbol: symbol.clone(), known });
-        }
-        if given[..i].iter().any(|(earlier, _)| earlier == symbol) {
-            return Err(SystemError::Repeated { symbol: symbol.clone() });
-        }
-    }
-    let text = |symbol: &str| given.iter().find(|(s, _)| s == symbol).map(|(_, text)| text.trim());
-    let coordinates = match system.size {
-        Size::Fixed(n) => n,
-        Size::Chosen { symbol, default, least, most } => match text(symbol) {
-            None => default,
-            Some(found) => {
-                found.parse().ok().filter(|n| (least..=most).contains(n)).ok_or_else(|| SystemError::Value {
-                    system: name(),
-                    symbol: symbol.into(),
-                    demand: format!("an integer from {least} to {most}"),
-                    found: found.into(),
-                })?
-            }
-        },
-    };
-    let mut parameters = Vec::with_capacity(system.parameters.len());
-    for parameter in system.parameters.iter() {
-        let found = text(&parameter.symbol).unwrap_or(&parameter.default);
-        let zero = S::of_f64(0.0);
-        let allowed = |value: &S| {
-            value.is_finite()
-                && match parameter.range {
-                    Range::Any => true,
-                    Range::AtLeastZero => *value >= zero,
-                    Range::Positive => *value > zero,
-                }
-        };
-        parameters.push(S::parse(found).filter(allowed).ok_or_else(|| SystemError::Value {
-            system: name(),
-            symbol: parameter.symbol.to_string(),
-            demand: parameter.range.text().into(),
-            found: found.into(),
-        })?);
-    }
-    Ok(Configured { system, coordinates, parameters })
-}
-
-/// The Euler-Lagrange terms of a system with the given parameters.
-///
-/// # Errors
-/// As [`configure`].
-pub fn build<S: Scalar>(name: &str, given: &Given) -> Result<Box<dyn EulerLagrange<S>>, SystemError> {
-    configure(name, given)?.build()
-}
-
-/// The acceleration of one state by the closed form, which shares nothing with [`build`] but the parameters.
-///
-/// # Errors
-/// As [`configure`]; [`SystemError::State`] for a state of the wrong length.
-pub fn exact_acceleration<S: Scalar>(name: &str, given: &Given, q: &[S], v: &[S]) -> Result<Vec<S>, SystemError> {
-    configure(name, given)?.exact_acceleration(q, v)
-}
-
 impl<S: Scalar> Configured<S> {
-    /// As [`build`].
+    /// As [`build`](super::build).
     ///
     /// # Errors
     /// [`SystemError::UnknownSystem`] if the description is not of the catalogue or the scalar is none of `f32`, `f64` and
@@ -289,7 +208,7 @@ impl<S: Scalar> Configured<S> {
     pub fn visit<V: LagrangianVisitor>(&self, visitor: V) -> Option<V::Output> {
         shown(self, visitor)
     }
-    /// As [`exact_acceleration`]; of a system by its description, for which no closed form is known, by differentiating its
+    /// As [`exact_acceleration`](super::exact_acceleration); of a system by its description, for which no closed form is known, by differentiating its
     /// Lagrangian. `NaN` where the mass matrix is singular.
     ///
     /// # Errors

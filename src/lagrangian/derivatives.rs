@@ -3,6 +3,7 @@
 use super::{Lagrangian, Request};
 use crate::forward::{Dual, HyperDual, Jet2};
 use crate::scalar::Real;
+use crate::tape::Depth;
 use std::array::from_fn;
 
 /// Which derivatives a request needs.
@@ -32,6 +33,15 @@ impl Need {
             .enumerate()
             .map(|(bit, needed)| usize::from(needed) << bit)
             .sum()
+    }
+    /// The least depth of an evaluation that fills what is needed.
+    pub fn depth(self) -> Depth {
+        match self {
+            Self { coriolis: true, .. } => Depth::Motion,
+            Self { mass_matrix: true, .. } => Depth::MassMatrix,
+            Self { momentum, dl_dq, .. } if momentum || dl_dq => Depth::Gradient,
+            _ => Depth::Value,
+        }
     }
     fn second_order(self) -> bool {
         self.mass_matrix || self.coriolis

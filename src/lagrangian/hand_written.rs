@@ -1,22 +1,25 @@
 //! A Lagrangian written by hand, with values for its parameters, as a source of Euler-Lagrange terms.
 
 use super::derivatives::{Need, State, evaluate};
-use super::{EulerLagrange, Lagrangian, MechanicsError, Request, Terms};
+use super::taylor::Taylor;
+use super::{EulerLagrange, Lagrangian, MechanicsError, MetricJet, Request, Terms, metric_jets};
 use crate::linalg::Workspace;
-use crate::scalar::{Real, Scalar};
-use crate::tape::{Program, Replay, TapeError, Tracer};
+use crate::scalar::{Dd, Real, Scalar};
+use crate::tape::{self, Evaluation, Program, Replay, STATES, TapeError, Tracer};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 /// Batches from this size on are replayed from a recorded program; a chunk of lanes is not worth it below.
 const REPLAY_FROM: usize = 24;
-/// Programs of more coordinates are not recorded: their expressions outgrow the caches.
-const REPLAY_COORDINATES: usize = 8;
+/// More coordinates are left to the engine's sweeps, whose cost grows with `n` where second derivatives one by one grow with
+/// `n^2`.
+const REPLAY_COORDINATES: usize = 4;
 
 /// A Lagrangian and the values of its parameters.
 ///
-/// Few states are evaluated one at a time by forward numbers on the stack; large batches replay a program recorded on
-/// first use, its lanes side by side. Both give the same numbers up to rounding. A Lagrangian that branches on its
-/// data cannot be recorded and is always evaluated state by state.
+/// Of up to four coordinates few states are evaluated one at a time by forward numbers on the stack, and large batches replay a
+/// program recorded on first use, its lanes side by side; more coordinates take `n + 3` sweeps of a
+/// [`tape::Recorded`] function. All give the same numbers up to rounding. A Lagrangian that branches on its data cannot be
+/// recorded and is always evaluated state by state.
 #[derive(Debug)]
 pub struct HandWritten<L, S> {
     system: L,
@@ -78,6 +81,8 @@ struct Evaluator<S> {
     parameters: Vec<S>,
     /// The program of the value, recorded on first use.
     value: OnceLock<Option<Recorded<S>>>,
+    /// The value as the engine's sweeps take it.
+    engine: OnceLock<Option<Arc<tape::Recorded<S>>>>,
     /// One program per combination of needed terms.
     programs: [OnceLock<Option<Arc<Program<S>>>>; 32],
     /// Buffers not in use; as many as there were callers at a time.
@@ -88,6 +93,7 @@ struct Evaluator<S> {
 struct Scratch<S> {
     workspace: Workspace<S>,
     replays: Vec<(usize, Replay<S>)>,
+    evaluation: Option<Evaluation<S>>,
 }
 
 impl<L: Lagrangian, S: Scalar> HandWritten<L, S> {
@@ -96,6 +102,7 @@ impl<L: Lagrangian, S: Scalar> HandWritten<L, S> {
         let evaluator = Evaluator {
             parameters,
             value: OnceLock::new(),
+            engine: OnceLock::new(),
             programs: [const { OnceLock::new() }; 32],
             pool: Mutex::new(Vec::new()),
         };
@@ -108,10 +115,28 @@ impl<L: Lagrangian, S: Scalar> HandWritten<L, S> {
 }
 
 impl<S: Scalar> Evaluator<S> {
+    /// The program of the value, recorded on first use.
+    fn value(&self, form: &dyn Form<S>) -> Option<&Recorded<S>> {
+        let count = self.parameters.len();
+        self.value.get_or_init(|| form.value(count).ok().map(|value| Recorded { value })).as_ref()
+    }
+
+    /// The metric jets of a batch in numbers that are as precise or more so, by the program of the value.
+    fn metric_jets<T: Scalar>(
+        &self,
+        form: &dyn Form<S>,
+        q: &[S],
+        v: &[S],
+    ) -> Result<Vec<MetricJet<T>>, MechanicsError> {
+        let value = self.value(form).ok_or(MechanicsError::Derivatives { what: "mass matrix" })?;
+        let cast = |numbers: &[S]| -> Vec<T> { numbers.iter().map(|x| x.cast()).collect() };
+        let parameters: Vec<Taylor<'static, T>> = cast(&self.parameters).into_iter().map(Taylor::constant).collect();
+        metric_jets(form.coordinates(), (&cast(q), &cast(v)), |q, v| value.lagrangian(&parameters, q, v))
+    }
+
     /// The program that computes what is needed, recorded on first use.
     fn program(&self, form: &dyn Form<S>, need: Need) -> Option<Arc<Program<S>>> {
-        let count = self.parameters.len();
-        let value = self.value.get_or_init(|| form.value(count).ok().map(|value| Recorded { value })).as_ref()?;
+        let (value, count) = (self.value(form)?, self.parameters.len());
         let recorded = self.programs[need.index()].get_or_init(|| {
             let n = Lagrangian::coordinates(value);
             let record = Program::record(2 * n, count, |inputs, parameters| {
@@ -120,6 +145,40 @@ impl<S: Scalar> Evaluator<S> {
             record.ok().map(Arc::new)
         });
         recorded.clone()
+    }
+
+    /// Fills the needed fields of a batch by the engine's sweeps; whether that was possible.
+    fn sweep(
+        &self,
+        form: &dyn Form<S>,
+        (q, v): (&[S], &[S]),
+        need: Need,
+        terms: &mut Terms<S>,
+        scratch: &mut Scratch<S>,
+    ) -> bool {
+        let n = form.coordinates();
+        let recorded = self.engine.get_or_init(|| {
+            let value = self.value(form)?;
+            let one = vec![<S as Real>::one(); n];
+            let record = tape::Recorded::new(one, self.parameters.len(), |p, q, v| value.lagrangian(p, q, v));
+            record.ok().map(Arc::new)
+        });
+        let Some(recorded) = recorded else { return false };
+        let evaluation = scratch.evaluation.get_or_insert_with(|| Evaluation::new(Arc::clone(recorded)));
+        for (chunk, (q, v)) in q.chunks(STATES * n).zip(v.chunks(STATES * n)).enumerate() {
+            evaluation.evaluate(&self.parameters, q, v, need.depth());
+            let fields = [
+                (need.lagrangian, &mut terms.lagrangian, &evaluation.lagrangian, 1),
+                (need.momentum, &mut terms.momentum, &evaluation.momentum, n),
+                (need.dl_dq, &mut terms.dl_dq, &evaluation.dl_dq, n),
+                (need.mass_matrix, &mut terms.mass_matrix, &evaluation.mass_matrix, n * n),
+                (need.coriolis, &mut terms.coriolis, &evaluation.coriolis, n),
+            ];
+            for (_, to, from, width) in fields.into_iter().filter(|(needed, ..)| *needed) {
+                to[chunk * STATES * width..][..from.len()].copy_from_slice(from);
+            }
+        }
+        true
     }
 
     /// Fills the needed fields of a batch by replaying a program; whether that was possible.
@@ -172,8 +231,11 @@ impl<S: Scalar> Evaluator<S> {
         terms.dl_dq.resize(size(need.dl_dq, n), S::nan());
         terms.mass_matrix.resize(size(need.mass_matrix, n * n), S::nan());
         terms.coriolis.resize(size(need.coriolis, n), S::nan());
-        let by_program = batch >= REPLAY_FROM && n <= REPLAY_COORDINATES;
-        if !(by_program && self.replay(form, (q, v), need, terms, scratch)) {
+        let done = match (n > REPLAY_COORDINATES, batch >= REPLAY_FROM) {
+            (true, _) => self.sweep(form, (q, v), need, terms, scratch),
+            (false, large) => large && self.replay(form, (q, v), need, terms, scratch),
+        };
+        if !done {
             form.states(&self.parameters, q, v, need, terms);
         }
         terms.complete(n, v, request, &mut scratch.workspace)
@@ -224,5 +286,15 @@ impl<L: Lagrangian, S: Scalar> EulerLagrange<S> for HandWritten<L, S> {
 
     fn terms(&self, q: &[S], v: &[S], request: Request, terms: &mut Terms<S>) -> Result<(), MechanicsError> {
         self.evaluator.terms(&self.system, q, v, request, terms)
+    }
+
+    fn metric_jets(&self, q: &[S], v: &[S]) -> Result<Vec<MetricJet<S>>, MechanicsError> {
+        self.evaluator.metric_jets(&self.system, q, v)
+    }
+
+    fn wide_metric_jets(&self, q: &[S], v: &[S]) -> Result<Option<Vec<MetricJet<Dd>>>, MechanicsError> {
+        let worth = S::epsilon().to_f64() > Dd::epsilon().to_f64()
+            && Lagrangian::coordinates(&self.system) <= REPLAY_COORDINATES;
+        worth.then(|| self.evaluator.metric_jets(&self.system, q, v)).transpose()
     }
 }

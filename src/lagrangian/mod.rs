@@ -5,28 +5,36 @@
 
 mod catalogue;
 mod complete;
+mod configure;
 mod derivatives;
 mod description;
+mod error;
 mod expression;
 mod expression_lagrangian;
 mod hand_written;
 mod inverse;
+mod metric;
+mod range;
 pub mod system;
+#[doc(hidden)]
 pub mod systems;
+mod taylor;
 mod terms;
 
-pub use catalogue::{
-    Configured, Given, LagrangianVisitor, SystemError, build, configure, configure_system, exact_acceleration, find,
-    systems,
-};
+pub use catalogue::{Configured, Given, LagrangianVisitor, SystemError, find, systems};
+pub use configure::{build, configure, configure_system, configure_values, exact_acceleration};
 pub use description::{
     CoordinateDescription, Described, Description, DescriptionError, ParameterDescription, TrajectoryDescription,
 };
+pub use error::MechanicsError;
 pub use expression::{Expression, ExpressionError};
 pub use expression_lagrangian::ExpressionLagrangian;
 pub use hand_written::HandWritten;
 pub use inverse::{InverseDynamics, inverse_dynamics};
-pub use terms::{EulerLagrange, MechanicsError, Request, Terms};
+pub use metric::MetricJet;
+pub(crate) use metric::metric_jets;
+pub(crate) use taylor::Taylor;
+pub use terms::{EulerLagrange, Request, Terms};
 
 use crate::scalar::Real;
 

@@ -2,8 +2,8 @@
 
 use super::Lagrangian;
 use super::description::Described;
+pub use super::range::Range;
 use crate::scalar::Real;
-use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::sync::Arc;
 
@@ -26,32 +26,6 @@ impl Coordinate {
     /// A length in metres.
     pub fn length(name: impl Into<Cow<'static, str>>) -> Self {
         Self { name: name.into(), unit: Cow::Borrowed("m"), periodic: false }
-    }
-}
-
-/// Values a parameter may take, besides being finite.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Range {
-    /// Any finite number.
-    #[default]
-    #[serde(rename = "any")]
-    Any,
-    /// Zero or more.
-    #[serde(rename = "at least 0")]
-    AtLeastZero,
-    /// More than zero.
-    #[serde(rename = "positive")]
-    Positive,
-}
-
-impl Range {
-    /// The condition in words.
-    pub const fn text(self) -> &'static str {
-        match self {
-            Self::Any => "finite",
-            Self::AtLeastZero => "finite and at least 0",
-            Self::Positive => "finite and above 0",
-        }
     }
 }
 
@@ -179,6 +153,62 @@ impl<T: Clone> PerSize<T> {
     }
 }
 
+/// Advice on learning a system from states with their accelerations.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct LearningAdvice {
+    /// States to learn from, where the box of the training states alone does not do.
+    pub states: Option<fn(bounds: &mut Bounds) -> StateAdvice>,
+    /// The paper's budget, if the system is one of its own.
+    pub paper: Option<PaperBudget>,
+}
+
+impl LearningAdvice {
+    /// No advice: the box of the training states does, and the paper has nothing on the system.
+    pub const NONE: Self = Self { states: None, paper: None };
+}
+
+/// Choices that go with the bounds of the training states.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct StateAdvice {
+    /// Coordinates of which half are drawn uniform in their logarithm; empty for none.
+    pub logarithmic: Vec<bool>,
+    /// Size, over the mean one, of accelerations from which on residuals count relatively; 0 for none.
+    pub relative: f64,
+    /// Share of the states that lie along motions of the trajectory test.
+    pub motions: f64,
+}
+
+/// The paper's budget for a system.
+#[derive(Clone, Copy, Debug)]
+pub struct PaperBudget {
+    /// Training states.
+    pub states: usize,
+    /// Widths of the hidden layers.
+    pub hidden: &'static [usize],
+    /// Phases of the schedule.
+    pub phases: &'static [PaperPhase],
+}
+
+/// A phase of the paper's schedule.
+#[derive(Clone, Copy, Debug)]
+pub struct PaperPhase {
+    /// Epochs.
+    pub epochs: usize,
+    /// Learning rate at the start.
+    pub rate: f64,
+    /// Lowest learning rate.
+    pub lowest_rate: f64,
+    /// Bounds of all positions, where they are others than the box of the training states.
+    pub positions: Option<(f64, f64)>,
+}
+
+impl PaperPhase {
+    /// A phase over the box of the training states.
+    pub const fn new(epochs: usize, rate: f64, lowest_rate: f64) -> Self {
+        Self { epochs, rate, lowest_rate, positions: None }
+    }
+}
+
 /// Knowledge about a system: an entry of the catalogue, or a
 /// [description](super::Description) of one's own.
 #[derive(Clone, Debug)]
@@ -213,6 +243,8 @@ pub struct System {
     pub plane: Option<Plane>,
     /// Quantity that is conserved beside the energy, if there is one.
     pub conserved: Option<Conserved>,
+    /// Advice on learning it.
+    pub learning: LearningAdvice,
     /// The description with its Lagrangian, for a system that is none of the catalogue's.
     pub described: Option<Arc<Described>>,
 }

@@ -1,6 +1,8 @@
 //! Euler-Lagrange terms of a batch of states: what may be asked for, where it is stored, how the rest follows.
 
-use crate::scalar::Scalar;
+use super::error::MechanicsError;
+use super::metric::MetricJet;
+use crate::scalar::{Dd, Scalar};
 use std::ops::BitOr;
 
 /// Which terms a caller needs; nothing else is computed.
@@ -91,38 +93,6 @@ impl<S: Scalar> Terms<S> {
     }
 }
 
-/// Why terms could not be computed.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum MechanicsError {
-    /// A slice has the wrong length.
-    #[error("{what}: expected {expected} numbers, found {found}")]
-    Shape {
-        /// Which argument.
-        what: &'static str,
-        /// Numbers expected.
-        expected: usize,
-        /// Numbers found.
-        found: usize,
-    },
-    /// The mass matrix of a state cannot be solved with.
-    #[error("mass matrix of state {row} is singular (condition number {condition:.3e})")]
-    Singular {
-        /// Row of the batch.
-        row: usize,
-        /// Estimated 2-norm condition number (infinite if exactly singular).
-        condition: f64,
-    },
-    /// A term is not finite.
-    #[error("{what} of state {row} is not finite")]
-    NotFinite {
-        /// Row of the batch.
-        row: usize,
-        /// Which term.
-        what: &'static str,
-    },
-}
-
 /// Anything that moves by a Lagrangian: a hand-written system or a trained network, in physical units.
 ///
 /// Object safe: roll-outs, evaluation and reports take `&dyn EulerLagrange<S>`.
@@ -138,6 +108,28 @@ pub trait EulerLagrange<S: Scalar>: Send + Sync {
     /// [`MechanicsError`] naming the first row that fails. Terms other than the acceleration are filled even when a
     /// mass matrix is singular, and the accelerations of the other rows are right; those of failed rows are `NaN`.
     fn terms(&self, q: &[S], v: &[S], request: Request, terms: &mut Terms<S>) -> Result<(), MechanicsError>;
+
+    /// The metric `M = d2L/dv dv` of every state with its first and second derivatives by the coordinates, exact to rounding.
+    ///
+    /// `q` and `v` are `(batch, n)` in physical units. Numbers that are not finite are passed on.
+    ///
+    /// # Errors
+    /// [`MechanicsError::Shape`]; [`MechanicsError::Derivatives`] of a model that cannot be differentiated: one that branches on its
+    /// data, or a type of one's own that leaves this method as it is.
+    fn metric_jets(&self, q: &[S], v: &[S]) -> Result<Vec<MetricJet<S>>, MechanicsError> {
+        let _ = (q, v);
+        Err(MechanicsError::Derivatives { what: "mass matrix" })
+    }
+
+    /// The same in double-double numbers, where a model can give them at a cost that is worth it: curvature is a difference of
+    /// larger terms, of flat space in curved coordinates. `None` of models that cannot, or are that precise themselves.
+    ///
+    /// # Errors
+    /// As [`EulerLagrange::metric_jets`].
+    fn wide_metric_jets(&self, q: &[S], v: &[S]) -> Result<Option<Vec<MetricJet<Dd>>>, MechanicsError> {
+        let _ = (q, v);
+        Ok(None)
+    }
 
     /// `true` if the motion keeps the energy `E = p.v - L`: no friction, no other force beside those of `L`.
     fn conserves_energy(&self) -> bool {

@@ -18,11 +18,15 @@ mod large_systems;
 mod matmul;
 mod minimum_norm;
 mod minors;
+mod signature;
+#[cfg(feature = "rollout")]
+mod singular;
 mod solve;
 mod systems;
 
 pub(crate) use batch::Buffer;
-pub use batch::{LANES, Workspace};
+pub(crate) use batch::LANES;
+pub use batch::Workspace;
 pub use condition::condition_number;
 pub use eigh::{eigenvalues, eigh};
 pub use error::{Failure, LinalgError};
@@ -31,4 +35,9 @@ pub use inverse::inverse;
 pub use matmul::{MatMut, MatRef, gemm};
 pub use minimum_norm::{MinimumNorm, minimum_norm};
 pub use minors::{Scaled, adjugate, leading_minors};
+pub use signature::{SignatureBuffers, has_signature};
+#[doc(hidden)]
+pub use signature::{Violation, characteristic_scales, eigenvalue_violation, sylvester_violation};
+#[cfg(feature = "rollout")]
+pub(crate) use singular::singular;
 pub use solve::solve;

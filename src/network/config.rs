@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 /// Distribution of the initial weights.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum Initialization {
     /// Uniform in `+-1/sqrt(fan_in)`, weights and biases.
     Default,
@@ -24,6 +25,7 @@ pub enum Initialization {
 /// Layer between the input features and the first dense layer.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum InputLayer {
     /// Nothing.
     #[default]

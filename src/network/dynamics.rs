@@ -12,13 +12,23 @@ pub struct Model<S> {
     lagrangian: Arc<Recorded<S>>,
     dissipation: Option<Arc<Recorded<S>>>,
     periodic: Vec<bool>,
+    weights: usize,
 }
 
 impl<S: Scalar> Model<S> {
     /// A model of `lagrangian`, whose scales and parameters are also those of `dissipation`; `periodic` coordinates are angles
     /// that [`Model::wrap`] reduces to `[0, 2 pi)`.
     pub fn new(lagrangian: Arc<Recorded<S>>, dissipation: Option<Arc<Recorded<S>>>, periodic: Vec<bool>) -> Self {
-        Self { lagrangian, dissipation, periodic }
+        let weights = lagrangian.parameters();
+        Self { lagrangian, dissipation, periodic, weights }
+    }
+    /// The same model with physical constants behind its first `weights` parameters: no weight decay draws them to zero.
+    ///
+    /// # Panics
+    /// If there are fewer parameters.
+    pub fn with_weights(self, weights: usize) -> Self {
+        assert!(weights <= self.parameters(), "weights among {} parameters", self.parameters());
+        Self { weights, ..self }
     }
     /// The Lagrangian.
     pub fn lagrangian(&self) -> &Arc<Recorded<S>> {
@@ -35,6 +45,10 @@ impl<S: Scalar> Model<S> {
     /// Number of parameters.
     pub fn parameters(&self) -> usize {
         self.lagrangian.parameters()
+    }
+    /// Number of parameters that are weights of a network, the first ones.
+    pub fn weights(&self) -> usize {
+        self.weights
     }
     /// Scales `s_i` of the coordinates.
     pub fn scale(&self) -> &[S] {
@@ -61,14 +75,15 @@ impl Architecture {
     /// If the architecture contradicts itself (see [`Architecture::validate`]).
     pub fn model<S: Scalar>(&self) -> Model<S> {
         let scale = || self.scale.iter().map(|&s| S::of_f64(s)).collect();
-        let parameters = Layout::new(self).parameters;
+        let layout = Layout::new(self);
+        let parameters = layout.parameters;
         let record = Recorded::new(scale(), parameters, |p, q, v| self.lagrangian(p, q, v));
         let lagrangian = Arc::new(record.expect("networks read no values"));
         let dissipation = self.dissipation.map(|_| {
             let record = Recorded::new(scale(), parameters, |p, q, v| self.rayleigh_dissipation(p, q, v));
             Arc::new(record.expect("dissipations read no values"))
         });
-        Model::new(lagrangian, dissipation, self.periodic.clone())
+        Model::new(lagrangian, dissipation, self.periodic.clone()).with_weights(layout.known.start)
     }
 }
 

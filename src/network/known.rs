@@ -9,11 +9,6 @@ use crate::network::{Architecture, Layout};
 use crate::scalar::{Real, Scalar};
 use std::collections::BTreeMap;
 
-/// Constants of a known part that are learned.
-pub(super) fn learned(description: &Description) -> usize {
-    description.parameters.values().filter(|parameter| parameter.learn).count()
-}
-
 /// The system that a known part describes.
 pub(super) fn system(description: &Description, n: usize) -> Result<System, String> {
     let system = description.system().map_err(|error| error.to_string())?;

@@ -1,5 +1,6 @@
 //! Where the parameters of a network sit in its flat vector: a sum of branches, each a chain of layers.
 
+use crate::lagrangian::Description;
 use crate::network::{Activation, Architecture, InputLayer, Structure};
 use std::ops::Range;
 
@@ -159,7 +160,7 @@ impl Layout {
         let parameters = dissipation.map_or(parameters, |dissipation| dissipation.direction_range().end);
         let alpha = (form.learn_alpha && black_box).then_some(parameters);
         let parameters = parameters + usize::from(alpha.is_some());
-        let learned = form.known.as_ref().map_or(0, |known| crate::network::known::learned(known));
+        let learned = form.known.as_ref().map_or(0, |known| learned(known));
         let known = parameters..parameters + learned;
         Self { branches, parameters: known.end, position_features, features, dissipation, alpha, known }
     }
@@ -185,4 +186,9 @@ impl Chain {
         self.width = outputs;
         self.layers.push(layer);
     }
+}
+
+/// Constants of a known part that are learned.
+fn learned(description: &Description) -> usize {
+    description.parameters.values().filter(|parameter| parameter.learn).count()
 }

@@ -16,8 +16,10 @@ mod structure;
 
 pub use crate::ops::Activation;
 pub use config::{Architecture, Initialization, InputLayer};
+#[doc(hidden)]
 pub use dynamics::{Dynamics, Model};
 pub use init::initial_weights;
+#[doc(hidden)]
 pub use layout::{Branch, DissipationLayout, Layer, Layout, LinearMap};
 pub use model::{NetworkError, NetworkLagrangian};
 pub use nonlinearity::{Nonlinearity, UnknownNonlinearity};

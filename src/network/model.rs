@@ -1,9 +1,9 @@
 //! A trained network as a mechanical system in physical units.
 
-use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Terms};
+use crate::lagrangian::{EulerLagrange, Lagrangian, MechanicsError, MetricJet, Request, Taylor, Terms, metric_jets};
 use crate::linalg;
 use crate::network::{Architecture, Dynamics, Form, Layout, Model, Structure};
-use crate::scalar::Scalar;
+use crate::scalar::{Real, Scalar};
 use crate::tape::{Depth, STATES};
 use std::sync::{Mutex, PoisonError};
 use thiserror::Error;
@@ -31,6 +31,7 @@ struct Workspace<S> {
 
 /// Why weights do not make a network.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
 pub enum NetworkError {
     /// A list of the architecture has the wrong length, or there is no coordinate or hidden layer.
     #[error("architecture: {0}")]
@@ -220,6 +221,14 @@ impl<S: Scalar> EulerLagrange<S> for NetworkLagrangian<S> {
         let outcome = terms.complete(n, v, request, &mut workspace.linalg);
         self.idle.lock().unwrap_or_else(PoisonError::into_inner).push(workspace);
         outcome
+    }
+
+    fn metric_jets(&self, q: &[S], v: &[S]) -> Result<Vec<MetricJet<S>>, MechanicsError> {
+        let weights: Vec<Taylor<'static, S>> = self.weights.iter().map(|&w| Taylor::constant(w)).collect();
+        let mut wrapped = q.to_vec();
+        self.model.wrap(&mut wrapped);
+        let n = self.architecture.coordinates;
+        metric_jets(n, (&wrapped, v), |q, v| self.architecture.lagrangian(&weights, q, v))
     }
 
     fn conserves_energy(&self) -> bool {

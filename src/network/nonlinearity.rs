@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 /// Activation of the hidden layers, as a configuration chooses it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum Nonlinearity {
     /// `x Phi(x)`, exact (error function).
     Gelu,

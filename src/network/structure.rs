@@ -17,6 +17,7 @@ use serde::{Deserialize, Serialize};
 /// Structure of a Lagrangian: how it is made of the network's outputs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum Structure {
     /// The paper's: one output, a function of positions and velocities.
     #[default]

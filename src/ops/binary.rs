@@ -93,3 +93,11 @@ table! {
     /// The smaller one.
     Min min(a, b, y, da, db) = shares(b, a), flat(da);
 }
+
+impl Binary {
+    /// `f(a, b)`, compiled once for a kind of number: for interpreters, which choose `f` at run time.
+    #[inline(never)]
+    pub fn evaluate<R: Real>(self, a: R, b: R) -> R {
+        self.value(a, b)
+    }
+}

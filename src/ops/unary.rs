@@ -146,6 +146,11 @@ table! {
 }
 
 impl Unary {
+    /// `f(x)`, compiled once for a kind of number: for interpreters, which choose `f` at run time.
+    #[inline(never)]
+    pub fn evaluate<R: Real>(self, x: R) -> R {
+        self.value(x)
+    }
     /// `(f(x), f'(x))`, sharing the work where the two are found together.
     #[inline(always)]
     pub fn value_first<R: Real>(self, x: R) -> (R, R) {

@@ -132,6 +132,7 @@ impl HeldOut {
     }
 }
 
+#[cfg(test)]
 /// Divides a recording into training and validation, see [`HeldOut::choose`].
 ///
 /// # Errors

@@ -13,10 +13,11 @@ mod targets;
 mod track;
 mod units;
 
-pub use between::hermite;
+pub(crate) use between::hermite;
 pub use columns::{Columns, ColumnsError};
-pub use hold_out::{HeldOut, HoldOutError, hold_out};
+pub use hold_out::{HeldOut, HoldOutError};
 pub use reading::{Cut, Dropped, Reading, Rows};
-pub use targets::{LARGE_ERROR, Targets};
+pub(crate) use targets::LARGE_ERROR;
+pub use targets::Targets;
 pub use track::{Recording, Track, TrackError};
 pub use units::factor;

@@ -32,6 +32,7 @@ pub struct Recording {
 
 /// Why numbers do not make a trajectory.
 #[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
 pub enum TrackError {
     /// Lengths disagree.
     #[error("{track}: {what}: expected {}, found {found}", crate::names::counted(*expected, "number", "numbers"))]

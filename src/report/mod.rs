@@ -13,17 +13,17 @@ mod test_pictures;
 mod training;
 mod turn;
 
-pub use evaluation::evaluation_figures;
-pub use experiment::{
-    Curve, EXPERIMENT_HEADER, REDUCTION_HEADER, experiment_curves, experiment_figures, experiment_table,
-    experiment_view, reduction_table,
+pub(crate) use evaluation::evaluation_figures;
+pub use experiment::{Curve, EXPERIMENT_HEADER};
+pub(crate) use experiment::{
+    REDUCTION_HEADER, experiment_curves, experiment_figures, experiment_table, experiment_view, reduction_table,
 };
 pub use grids::{Fit, GridComparison, grid_figures};
 pub use html::Report;
 pub use plot::{HeatMap, Level, LinePlot, Picture, PlotError, Series, Trace, heat_maps, line_plot, trace_plot};
 pub use table::text_table;
-pub use training::{HistoryRow, training_figures};
-pub use turn::Turn;
+pub(crate) use training::{HistoryRow, training_figures};
+pub(crate) use turn::Turn;
 
 /// One picture of a report.
 #[derive(Clone, Debug, PartialEq)]

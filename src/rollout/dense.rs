@@ -5,8 +5,10 @@
 //! `y0 + s (r1 + (1-s) (r2 + s (r3 + (1-s) (r4 + ...))))`, `s` in `[0, 1]` along the step; it meets `y` and `dy/dt` at
 //! both ends.
 
-use super::ode::Rhs;
 use crate::scalar::{Real, Scalar};
+
+/// A right-hand side `dy = f(t, y)`, `t` the elapsed time.
+pub(super) type Rhs<'a, S, E> = dyn FnMut(S, &[S], &mut [S]) -> Result<(), E> + 'a;
 
 /// Weights of the fifth coefficient of DOPRI5 over its stages (Shampine's, order 4).
 const DOPRI5: Weights = &[

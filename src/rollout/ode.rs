@@ -11,7 +11,7 @@
 //! - The node of stage 12 in its order 8 table is wrong (0 for 1): the time of that stage is taken from the one before.
 
 use super::Statistics;
-use super::dense::{Interpolant, Step};
+use super::dense::{Interpolant, Rhs, Step};
 use super::samples::Times;
 use crate::scalar::{Real, Scalar};
 use nalgebra::allocator::Allocator;
@@ -19,9 +19,6 @@ use nalgebra::{DefaultAllocator, Dim, OVector};
 use ode_solvers::dop_shared::{FloatNumber, IntegrationError};
 use ode_solvers::{DVector, Dop853, Dopri5, OutputType, SVector, System};
 use std::cell::RefCell;
-
-/// A right-hand side `dy = f(t, y)`, `t` the elapsed time.
-pub(super) type Rhs<'a, S, E> = dyn FnMut(S, &[S], &mut [S]) -> Result<(), E> + 'a;
 
 /// Receives sample `k` with its state, and says whether to go on.
 pub(super) type Output<'a, S> = dyn FnMut(usize, &[S]) -> bool + 'a;

@@ -1,7 +1,6 @@
 //! Options of a roll-out.
 
 use super::RolloutError;
-use super::samples::blur;
 use crate::scalar::{Real, Scalar};
 use serde::{Deserialize, Serialize};
 
@@ -12,6 +11,7 @@ use serde::{Deserialize, Serialize};
 /// friction has no energy to keep: [`Method::Variational`] refuses it, the Gauss methods keep their order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
+#[non_exhaustive]
 pub enum Method {
     /// Dormand and Prince (1980), order 5(4), interpolation of order 4.
     Dopri5,
@@ -217,6 +217,13 @@ impl<S: Scalar> Options<S> {
             _ => Ok(()),
         }
     }
+}
+
+/// Rounding of the quotient of time span and `dt`: one this close to a whole number is whole, for the times carry no more
+/// digits. From one half on the samples themselves cannot be told apart.
+pub(super) fn blur<S: Scalar>(options: &Options<S>) -> S {
+    let span = options.t_end - options.t0;
+    S::epsilon().ldexp(2) * (options.t0.abs() + options.t_end.abs() + span.abs()) / options.dt.abs()
 }
 
 #[cfg(test)]

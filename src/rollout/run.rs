@@ -1,9 +1,10 @@
 //! Roll-outs of one start and of many.
 
 use super::fixed::{self, Stepper};
+use super::keep::Keep;
 use super::ode::Adaptive;
-use super::{Force, Integrable, Method, Options, RolloutError, Statistics, Trajectory, UnderflowCause, adaptive};
-use crate::lagrangian::{EulerLagrange, MechanicsError};
+use super::{Force, Integrable, Method, Options, RolloutError, Statistics, Trajectory, adaptive};
+use crate::lagrangian::EulerLagrange;
 use crate::scalar::Scalar;
 
 /// Result of a roll-out.
@@ -31,31 +32,6 @@ impl<S: Scalar> Rollout<S> {
         match self.stop {
             None => Ok(self.trajectory),
             Some(error) => Err(error),
-        }
-    }
-}
-
-/// Why the derivative of a state, or a step, cannot be had.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) enum Failure {
-    Domain { component: usize, value: f64, lower: f64, upper: f64 },
-    State,
-    Model(MechanicsError),
-    NotConverged { iterations: usize, residual: f64 },
-}
-
-impl Failure {
-    /// A state `(q, v)` that must be finite and inside the domain.
-    pub(super) fn check<S: Scalar>(domain: Option<&super::Domain<S>>, state: &[S]) -> Result<(), Self> {
-        if state.iter().any(|x| !x.is_finite()) {
-            return Err(Self::State);
-        }
-        match domain.and_then(|domain| domain.violation(state)) {
-            None => Ok(()),
-            Some((component, lower, upper)) => {
-                let (value, lower, upper) = (state[component].to_f64(), lower.to_f64(), upper.to_f64());
-                Err(Self::Domain { component, value, lower, upper })
-            }
         }
     }
 }
@@ -97,9 +73,6 @@ pub(super) fn fixed<S: Scalar>(
 ) -> Rollout<S> {
     collected(model, options, |keep| integrate_fixed(model, force, (q, v), options, keep))
 }
-
-/// Receives the time, coordinates and velocities of every sample in order, and says whether to go on.
-pub(super) type Keep<'a, S> = dyn FnMut(S, &[S], &[S]) -> bool + 'a;
 
 /// The samples of a motion as a trajectory, with the energies if options ask for them.
 fn collected<S: Scalar>(
@@ -194,19 +167,4 @@ fn reachable<S: Scalar>(q: &[S], v: &[S], options: &Options<S>) -> Result<(), Ro
         S::NAME
     );
     Err(RolloutError::Invalid { what: "atol", problem })
-}
-
-pub(super) fn typed(failure: Failure, t: f64, state: Vec<f64>, step: f64) -> RolloutError {
-    match failure {
-        Failure::Domain { component, value, lower, upper } => {
-            RolloutError::LeftDomain { t, state, component, value, lower, upper }
-        }
-        Failure::State => RolloutError::NotFinite { t, state, what: "state" },
-        Failure::Model(MechanicsError::Singular { condition, .. }) => {
-            RolloutError::SingularMass { t, state, condition }
-        }
-        Failure::Model(MechanicsError::NotFinite { what, .. }) => RolloutError::NotFinite { t, state, what },
-        Failure::NotConverged { iterations, residual } => RolloutError::NotConverged { t, state, iterations, residual },
-        Failure::Model(error) => RolloutError::StepUnderflow { t, state, step, cause: UnderflowCause::Model(error) },
-    }
 }

@@ -1,6 +1,6 @@
 //! Times of the samples, worked out one by one: ten million of them take no memory.
 
-use super::Options;
+use super::options::{Options, blur};
 use crate::scalar::{Real, Scalar};
 
 /// Elapsed times of samples, ascending from 0.
@@ -101,13 +101,6 @@ impl<S: Scalar> Times<S> for Samples<S> {
     fn get(&self, k: usize) -> Option<S> {
         (k <= self.regular).then(|| self.elapsed(k))
     }
-}
-
-/// Rounding of the quotient of time span and `dt`: one this close to a whole number is whole, for the times carry no more
-/// digits. From one half on the samples themselves cannot be told apart.
-pub(super) fn blur<S: Scalar>(options: &Options<S>) -> S {
-    let span = options.t_end - options.t0;
-    S::epsilon().ldexp(2) * (options.t0.abs() + options.t_end.abs() + span.abs()) / options.dt.abs()
 }
 
 #[cfg(test)]

@@ -14,9 +14,13 @@ mod sum;
 
 pub use dd::{Dd, UnreadableNumber};
 pub use float::AnyFloat;
+#[doc(hidden)]
 pub use lanes::{Exponential, Lanes, cos_lanes, exp_lanes, ln_lanes, sin_cos_lanes, sin_lanes, sqrt_lanes, tanh_lanes};
+#[doc(hidden)]
 pub use simd::vectorized;
+#[doc(hidden)]
 pub use slices::{Slice, SliceMut};
+#[doc(hidden)]
 pub use sum::Sum;
 
 use std::fmt::{Debug, Display};

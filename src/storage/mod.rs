@@ -1,5 +1,7 @@
 //! Files read within limits and written whole or not at all; memory that is left.
 
+#[cfg(feature = "model-files")]
+pub mod container;
 mod files;
 mod memory;
 mod read;

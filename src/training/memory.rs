@@ -1,10 +1,10 @@
 //! Memory that a training takes, known before it is taken.
 
+use crate::configuration::Regularizer;
+use crate::configuration::{Config, Precision};
 use crate::network::{Architecture, Layout};
-use crate::training::config::{Config, Precision};
+use crate::optimizers::eigenbasis_numbers;
 use crate::training::objective::{CHUNK, STRIPES};
-use crate::training::optimizer::eigenbasis_numbers;
-use crate::training::penalty::Regularizer;
 
 /// Vectors of all weights that training holds: weights, gradient, two moments, average, the best of the phase and of those
 /// before (each twice), the last two that were validated, and the start.
@@ -101,7 +101,7 @@ fn sum<const N: usize>(terms: [Option<u64>; N]) -> Option<u64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::training::preset::Preset;
+    use crate::presets::Preset;
 
     fn memory(change: impl FnOnce(&mut Config)) -> Option<u64> {
         let system = crate::lagrangian::configure("double-pendulum", &[]).unwrap();

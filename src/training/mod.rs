@@ -1,47 +1,27 @@
-//! Datasets, losses, regularizers, optimisers hosted by argmin, the trainer.
+//! Training: losses, penalties, the solvers hosted by argmin, checkpoints.
 
-mod checkpoint;
-mod config;
-mod dataset;
-mod measured;
+pub(crate) mod checkpoint;
+pub(crate) mod epoch;
 mod memory;
-mod motions;
-mod objective;
-mod optimizer;
-mod penalty;
+pub(crate) mod objective;
 mod polish;
-mod preset;
 mod problem;
 mod recipe;
-mod reference;
-mod sampling;
-mod schedule;
-pub mod shooting;
-mod signature;
-mod solver;
-mod stripes;
-mod trainer;
-mod violations;
+pub(crate) mod solver;
+pub(crate) mod stripes;
+pub(crate) mod trainer;
+pub(crate) mod violations;
 
-pub use checkpoint::{
-    CheckpointError, Every, Identity, Keeper, NEWEST, PREVIOUS, Restored, Saved, Snapshot, remove_checkpoints, saved,
-};
-pub use config::{Config, ConfigError, Data, Known, Network, OnFailure, Optimizer, Phase, Polish, Precision, Scaling};
-pub use dataset::{Dataset, DatasetError};
-pub use measured::{Measured, MeasuredError, Part, Preparation};
+pub use checkpoint::{CheckpointError, Every, NEWEST, PREVIOUS};
+#[doc(hidden)]
+pub use checkpoint::{Identity, Keeper, Restored, Saved, Snapshot, remove_checkpoints, saved};
+pub use epoch::Epoch;
+#[doc(hidden)]
 pub use memory::training_memory;
-pub use objective::{BatchReport, Failure, Objective};
-pub use optimizer::{Method, Moments, Update};
-pub use penalty::{Penalty, Regularizer};
-pub use preset::Preset;
+pub use objective::{BatchReport, Failure, Objective, ThreadsError};
 pub use problem::TrainingProblem;
 pub use recipe::{Outcome, RecipeError, run};
-pub use reference::{Key, SHOOTING_SECTION, Section, TRAINING_SECTIONS, configuration_reference, section_reference};
-pub use sampling::{SamplingError, sample, sample_all};
-pub use schedule::Schedule;
-pub use signature::{
-    Buffers as SignatureBuffers, Violation, characteristic_scales, eigenvalue_violation, has_signature,
-    sylvester_violation,
-};
-pub use solver::{Epoch, EpochSolver, Hooks, Progress, StepError, TrainingState, Watcher};
-pub use trainer::{Datasets, Sitting, Stop, Stream, Trained, TrainingError, resume, train};
+pub use solver::{EpochSolver, Hooks, Progress, StepError, TrainingState, Watcher};
+#[doc(hidden)]
+pub use trainer::{Sitting, resume};
+pub use trainer::{Stop, Trained, TrainingError, train};

@@ -11,24 +11,25 @@
 //! A batch is cut into stripes and chunks whose sizes do not depend on the number of threads, and every sum is taken in
 //! their order: the same numbers on any number of threads.
 
+use crate::configuration::Penalty;
+use crate::data::Dataset;
 use crate::linalg::{self, Workspace, solve};
+use crate::linalg::{
+    SignatureBuffers as Buffers, Violation, characteristic_scales, eigenvalue_violation, has_signature,
+    sylvester_violation,
+};
 use crate::network::{Architecture, Dynamics, Model};
 use crate::scalar::{Real, Scalar, Sum};
 use crate::tape::{Depth, MixedDirections, STATES};
-use crate::training::dataset::Dataset;
-use crate::training::penalty::Penalty;
-use crate::training::signature::{
-    Buffers, Violation, characteristic_scales, eigenvalue_violation, has_signature, sylvester_violation,
-};
 use crate::training::stripes::sum_gradients;
 use crate::training::violations::Violations;
 use rayon::prelude::*;
 use std::sync::Arc;
 
 /// States evaluated together.
-pub(super) const CHUNK: usize = STATES;
+pub(crate) const CHUNK: usize = STATES;
 /// Stripes a batch is cut into at most; each has its own gradient.
-pub(super) const STRIPES: usize = 8;
+pub(crate) const STRIPES: usize = 8;
 
 /// Outcome of a batch.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -75,9 +76,20 @@ pub struct Objective<S> {
 /// Threads for all that a run computes.
 ///
 /// # Errors
-/// When they cannot be started.
-pub(super) fn threads(count: usize) -> Result<Arc<rayon::ThreadPool>, rayon::ThreadPoolBuildError> {
-    rayon::ThreadPoolBuilder::new().num_threads(count.max(1)).build().map(Arc::new)
+/// [`ThreadsError`].
+pub(crate) fn threads(count: usize) -> Result<Arc<rayon::ThreadPool>, ThreadsError> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(count.max(1)).build();
+    pool.map(Arc::new).map_err(|error| ThreadsError { threads: count, problem: error.to_string() })
+}
+
+/// Threads that could not be started.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("cannot start {threads} threads: {problem}")]
+pub struct ThreadsError {
+    /// Number asked for.
+    pub threads: usize,
+    /// Message of the operating system.
+    pub problem: String,
 }
 
 /// A contiguous part of a batch with its own buffers.
@@ -332,11 +344,7 @@ impl<S: Scalar> Objective<S> {
     ///
     /// # Errors
     /// When the threads cannot be started.
-    pub fn new(
-        architecture: &Architecture,
-        penalty: Penalty,
-        threads: usize,
-    ) -> Result<Self, rayon::ThreadPoolBuildError> {
+    pub fn new(architecture: &Architecture, penalty: Penalty, threads: usize) -> Result<Self, ThreadsError> {
         Self::of_model(architecture.model(), penalty, threads)
     }
 
@@ -344,22 +352,22 @@ impl<S: Scalar> Objective<S> {
     ///
     /// # Errors
     /// When the threads cannot be started.
-    pub fn of_model(model: Model<S>, penalty: Penalty, threads: usize) -> Result<Self, rayon::ThreadPoolBuildError> {
+    pub fn of_model(model: Model<S>, penalty: Penalty, threads: usize) -> Result<Self, ThreadsError> {
         Ok(Self::on(self::threads(threads)?, model, penalty))
     }
 
     /// An objective for any model on threads that others use too.
-    pub(super) fn on(pool: Arc<rayon::ThreadPool>, model: Model<S>, penalty: Penalty) -> Self {
+    pub(crate) fn on(pool: Arc<rayon::ThreadPool>, model: Model<S>, penalty: Penalty) -> Self {
         Self { model, penalty, pool, stripes: Vec::new() }
     }
 
     /// The model that is trained.
-    pub(super) fn model(&self) -> &Model<S> {
+    pub(crate) fn model(&self) -> &Model<S> {
         &self.model
     }
 
     /// The threads.
-    pub(super) fn pool(&self) -> &rayon::ThreadPool {
+    pub(crate) fn pool(&self) -> &rayon::ThreadPool {
         &self.pool
     }
 

@@ -4,10 +4,11 @@
 //! absolute value, whose kinks end the line search sooner or later; what stands then is the iterate of the lowest
 //! validation loss, which may be the start.
 
+use crate::configuration::Polish;
 use crate::training::checkpoint::Clock;
-use crate::training::config::Polish;
+use crate::training::epoch::Epoch;
 use crate::training::problem::TrainingProblem;
-use crate::training::solver::{Epoch, Hooks, Progress};
+use crate::training::solver::{Hooks, Progress};
 use argmin::core::{CostFunction, Error, Executor, Gradient, IterState, KV, Problem, Solver, State, TerminationStatus};
 use argmin::solver::linesearch::MoreThuenteLineSearch;
 use argmin::solver::quasinewton::LBFGS;
@@ -17,7 +18,7 @@ use std::sync::atomic::Ordering;
 const EVALUATIONS: usize = 20;
 
 /// Start of a polishing, the same for every iteration.
-pub(super) struct Start {
+pub(crate) struct Start {
     /// Parameters to begin with.
     pub weights: Vec<f64>,
     /// Their validation loss.
@@ -31,7 +32,7 @@ pub(super) struct Start {
 }
 
 /// Result of a polishing.
-pub(super) struct Polished {
+pub(crate) struct Polished {
     /// Parameters of the lowest validation loss, if lower than at the start.
     pub weights: Option<Vec<f64>>,
     /// Lowest validation loss.
@@ -169,7 +170,7 @@ impl<'p, 'a, L: Solver<Bounded<'p, 'a>, Iteration>> Solver<Bounded<'p, 'a>, Iter
 ///
 /// # Errors
 /// The words of argmin if not even the start could be evaluated.
-pub(super) fn polish(settings: &Polish, problem: &TrainingProblem<'_, f64>, start: Start) -> Result<Polished, String> {
+pub(crate) fn polish(settings: &Polish, problem: &TrainingProblem<'_, f64>, start: Start) -> Result<Polished, String> {
     let Start { weights, validation_loss, last, clock, hooks } = start;
     let bounded = Bounded { problem, hooks: &hooks, budget: settings.iterations.saturating_mul(EVALUATIONS) };
     let polished = Polished { weights: None, validation_loss, history: Vec::new() };

@@ -1,15 +1,15 @@
 //! Training as a problem of argmin's: loss and gradient of a network over a training set.
 
+use crate::data::Dataset;
 use crate::scalar::{Real, Scalar};
-use crate::training::dataset::Dataset;
 use crate::training::objective::{BatchReport, Objective};
 use argmin::core::{CostFunction, Error, Gradient};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Problem of an argmin run: a network's parameters, the states it learns from and those it is judged by.
 ///
-/// The cost of parameters `w` is loss plus penalty plus `weight_decay |w|^2 / 2` over all training states, and the gradient is
-/// its derivative; a line search that asks for both at one point has one evaluation. Every solver of argmin's, of this crate's
+/// The cost of parameters is loss plus penalty plus `weight_decay |w|^2 / 2` over all training states, `w` the weights among
+/// them, and the gradient is its derivative; a line search that asks for both at one point has one evaluation. Every solver of argmin's, of this crate's
 /// ([`EpochSolver`](crate::training::EpochSolver)) or of your own takes it: those that go by batches call
 /// [`TrainingProblem::step`].
 pub struct TrainingProblem<'a, S> {
@@ -29,7 +29,7 @@ struct Evaluator<S> {
 
 /// Cost and gradient of the full training set.
 #[derive(Clone)]
-pub(super) struct Evaluated<S> {
+pub(crate) struct Evaluated<S> {
     pub at: Vec<S>,
     pub cost: S,
     pub gradient: Vec<S>,
@@ -77,17 +77,17 @@ impl<'a, S: Scalar> TrainingProblem<'a, S> {
     }
 
     /// The objective that evaluates batches.
-    pub(super) fn objective(&mut self) -> &mut Objective<S> {
+    pub(crate) fn objective(&mut self) -> &mut Objective<S> {
         &mut self.evaluator.get_mut().unwrap_or_else(PoisonError::into_inner).objective
     }
 
     /// `true` if these parameters are evaluated already.
-    pub(super) fn is_known(&self, weights: &[S]) -> bool {
+    pub(crate) fn is_known(&self, weights: &[S]) -> bool {
         self.lock().last.is_of(weights)
     }
 
     /// The result of the last evaluation.
-    pub(super) fn last<T>(&self, read: impl FnOnce(&Evaluated<S>) -> T) -> T {
+    pub(crate) fn last<T>(&self, read: impl FnOnce(&Evaluated<S>) -> T) -> T {
         read(&self.lock().last)
     }
 
@@ -108,6 +108,7 @@ impl<'a, S: Scalar> TrainingProblem<'a, S> {
         last.gradient.resize(weights.len(), <S as Real>::zero());
         let report = objective.step(weights, self.training, rows, &mut last.gradient);
         let decay = S::of_f64(self.weight_decay);
+        let weights = &weights[..objective.model().weights()];
         let square = weights.iter().fold(<S as Real>::zero(), |sum, &w| sum + w * w);
         last.cost = report.loss + report.penalty + S::half() * decay * square;
         for (g, &w) in last.gradient.iter_mut().zip(weights) {

@@ -4,18 +4,18 @@
 //! that move, their moments, the order of the data and the random state: its course, which a checkpoint can hold between
 //! any two steps.
 
+use crate::configuration::{OnFailure, Optimizer, Phase};
+use crate::optimizers::Schedule;
+use crate::optimizers::{Moments, Update};
+use crate::random::RandomGenerator;
 use crate::scalar::{Real, Scalar};
 use crate::training::checkpoint::{Clock, Course, Ended, Keeper, Underway};
-use crate::training::config::{OnFailure, Optimizer, Phase};
+use crate::training::epoch::{Epoch, Means};
 use crate::training::objective::Failure;
-use crate::training::optimizer::{Moments, Update};
 use crate::training::problem::TrainingProblem;
-use crate::training::schedule::Schedule;
 use argmin::core::{Error, IterState, KV, Problem, Solver, State, TerminationReason, TerminationStatus};
 use argmin::kv;
 use rand::seq::SliceRandom;
-use rand_chacha::ChaCha8Rng;
-use serde::Serialize;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -25,35 +25,9 @@ const LEFT_OUT: usize = 100;
 /// State of an argmin run: parameters and validation loss.
 pub type TrainingState<S> = IterState<Vec<S>, (), (), (), (), f64>;
 
-/// One row of the history.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Epoch {
-    /// Counted from 1 over all phases.
-    pub epoch: usize,
-    /// Counted from 1.
-    pub phase: usize,
-    /// Learning rate at the start of the epoch.
-    pub rate: f64,
-    /// Mean loss of the epoch's batches, paper convention, without penalty.
-    pub training_loss: f64,
-    /// Mean penalty of the epoch's batches, with its weight.
-    pub penalty: f64,
-    /// Fraction of states whose penalty was active.
-    pub penalised: f64,
-    /// Validation loss, paper convention.
-    pub validation_loss: f64,
-    /// Mean norm of the gradients before clipping.
-    pub gradient_norm: f64,
-    /// States left out because they gave no finite acceleration.
-    pub left_out: usize,
-    /// Steps skipped because they were not finite.
-    pub skipped: usize,
-    /// Seconds since the start of training.
-    pub seconds: f64,
-}
-
 /// News of a training that runs.
 #[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
 pub enum Progress<'a> {
     /// A step was taken: `(step, steps)` of all phases and the mean loss of the epoch so far.
     Step {
@@ -84,6 +58,7 @@ pub struct Hooks {
 
 /// Why a step stopped the training.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum StepError {
     /// A state of the batch failed.
     #[error("step {step}: {failure}")]
@@ -129,15 +104,15 @@ pub struct EpochSolver<S> {
 }
 
 /// Who keeps the checkpoints, and what went before this phase.
-pub(super) struct Saver<S> {
-    pub(super) keeper: Arc<Keeper>,
-    pub(super) ended: Ended<S>,
+pub(crate) struct Saver<S> {
+    pub(crate) keeper: Arc<Keeper>,
+    pub(crate) ended: Ended<S>,
     /// Seconds of what went before, where that has a clock of its own.
-    pub(super) seconds: f64,
+    pub(crate) seconds: f64,
 }
 
 /// The run that a phase is part of.
-pub(super) struct Run<S> {
+pub(crate) struct Run<S> {
     /// Counted from 1.
     pub phase_number: usize,
     /// Epochs before this phase.
@@ -154,19 +129,6 @@ pub(super) struct Run<S> {
     pub saver: Option<Saver<S>>,
 }
 
-/// Running means over the steps of an epoch.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Means {
-    pub(super) loss: f64,
-    pub(super) penalty: f64,
-    pub(super) norm: f64,
-    pub(super) penalised: usize,
-    pub(super) left_out: usize,
-    pub(super) skipped: usize,
-    pub(super) taken: usize,
-    pub(super) last_failure: Option<Failure>,
-}
-
 /// States of a step: no more than there are, at least one.
 fn batch(optimizer: &Optimizer, states: usize) -> usize {
     optimizer.batch.min(states).max(1)
@@ -175,7 +137,7 @@ fn batch(optimizer: &Optimizer, states: usize) -> usize {
 impl<S: Scalar> EpochSolver<S> {
     /// A solver for one phase over `states` training states, shuffled by `rng`; host it in an argmin `Executor` whose
     /// state starts with the initial weights and runs for `phase.epochs` iterations.
-    pub fn new(optimizer: Optimizer, phase: Phase, rng: ChaCha8Rng, states: usize) -> Self {
+    pub fn new(optimizer: Optimizer, phase: Phase, rng: RandomGenerator, states: usize) -> Self {
         let steps = phase.epochs * states.div_ceil(batch(&optimizer, states));
         Self {
             optimizer,
@@ -194,29 +156,29 @@ impl<S: Scalar> EpochSolver<S> {
     }
 
     /// Makes this phase a part of a longer run.
-    pub(super) fn within(self, run: Run<S>) -> Self {
+    pub(crate) fn within(self, run: Run<S>) -> Self {
         let Run { phase_number, epoch, step, steps, clock, hooks, saver } = run;
         let course = Course { epoch, step, ..self.course };
         Self { phase_number, steps, clock, hooks, saver, course, ..self }
     }
 
     /// Goes on from where an earlier sitting was.
-    pub(super) fn restored(self, course: Course<S>, history: Vec<Epoch>) -> Self {
+    pub(crate) fn restored(self, course: Course<S>, history: Vec<Epoch>) -> Self {
         Self { course, history, restored: true, ..self }
     }
 
     /// Epochs of this phase that are over.
-    pub(super) fn iteration(&self) -> u64 {
+    pub(crate) fn iteration(&self) -> u64 {
         self.course.iteration
     }
 
     /// Steps of the whole run so far.
-    pub(super) fn step(&self) -> usize {
+    pub(crate) fn step(&self) -> usize {
         self.course.step
     }
 
     /// Its rows, and why it stopped, if a step failed.
-    pub(super) fn finish(self) -> (Vec<Epoch>, Option<StepError>) {
+    pub(crate) fn finish(self) -> (Vec<Epoch>, Option<StepError>) {
         (self.history, self.stopped)
     }
 
@@ -258,6 +220,7 @@ impl<S: Scalar> EpochSolver<S> {
             method: self.optimizer.method,
             rate,
             weight_decay: self.optimizer.weight_decay,
+            decaying: problem.objective().model().weights(),
             clip: self.optimizer.clip,
         };
         let gradient = &mut self.gradient;

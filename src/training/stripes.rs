@@ -7,7 +7,7 @@ use rayon::prelude::*;
 const BLOCK: usize = 1 << 14;
 
 /// Writes the sum of the gradients of all `stripes`, at least one, to `out`; nothing is allocated.
-pub(super) fn sum_gradients<S: Scalar, T: Sync>(
+pub(crate) fn sum_gradients<S: Scalar, T: Sync>(
     pool: &rayon::ThreadPool,
     stripes: &[T],
     gradient: impl Fn(&T) -> &[S] + Sync,

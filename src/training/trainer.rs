@@ -1,59 +1,27 @@
 //! Runs the phases of a training and gathers what came out.
 
+use crate::configuration::Penalty;
+use crate::configuration::{Config, ConfigError, Phase};
+use crate::data::{Dataset, Datasets};
 use crate::network::{Architecture, initial_weights};
+use crate::random::RngStream;
 use crate::scalar::Scalar;
 use crate::training::checkpoint::{Clock, Ended, Keeper, Snapshot, Underway};
-use crate::training::config::{Config, ConfigError, Phase};
-use crate::training::dataset::Dataset;
-use crate::training::objective::{self, BatchReport, Objective};
-use crate::training::penalty::Penalty;
+use crate::training::epoch::Epoch;
+use crate::training::objective::{self, BatchReport, Objective, ThreadsError};
 use crate::training::polish::{Start, polish};
 use crate::training::problem::TrainingProblem;
-use crate::training::solver::{Epoch, EpochSolver, Hooks, Run, Saver, StepError, TrainingState};
+use crate::training::solver::{EpochSolver, Hooks, Run, Saver, StepError, TrainingState};
 use argmin::core::observers::{Observe, ObserverMode};
 use argmin::core::{Error, Executor, KV, State, TerminationReason, TerminationStatus};
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
 use std::any::Any;
 use std::borrow::Cow;
 use std::sync::Arc;
 use thiserror::Error;
 
-/// Streams of the random generator: one seed, independent draws for each purpose.
-#[derive(Clone, Copy, Debug)]
-pub enum Stream {
-    /// Initial weights.
-    Weights,
-    /// Order of the data in a phase.
-    Order(usize),
-    /// Training states of a phase.
-    Training(usize),
-    /// Validation states.
-    Validation,
-    /// Test states.
-    Test,
-    /// Starts of the trajectory test.
-    Trajectories,
-}
-
-impl Stream {
-    /// The generator of this purpose.
-    pub fn generator(self, seed: u64) -> ChaCha8Rng {
-        let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        rng.set_stream(match self {
-            Self::Weights => 0,
-            Self::Validation => 1,
-            Self::Test => 2,
-            Self::Trajectories => 3,
-            Self::Order(phase) => 16 + 2 * phase as u64,
-            Self::Training(phase) => 17 + 2 * phase as u64,
-        });
-        rng
-    }
-}
-
 /// Why training ended.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Stop {
     /// All epochs were run.
     Finished,
@@ -86,7 +54,7 @@ pub struct Trained<S> {
 
 impl<S: Scalar> Trained<S> {
     /// The end of this training as a checkpoint holds it, for what goes on from there, such as
-    /// [`shooting::resume`](crate::training::shooting::resume).
+    /// [`shooting::resume`](crate::shooting::resume).
     pub fn snapshot(&self, config: &Config) -> Snapshot<S> {
         let ended = Ended {
             phases: config.phases.len(),
@@ -103,6 +71,7 @@ impl<S: Scalar> Trained<S> {
 
 /// Why training could not run.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum TrainingError {
     /// The configuration is out of range.
     #[error(transparent)]
@@ -116,40 +85,14 @@ pub enum TrainingError {
         found: usize,
     },
     /// Threads could not be started.
-    #[error("cannot start {threads} threads: {source}")]
-    Threads {
-        /// Number asked for.
-        threads: usize,
-        /// Message of the operating system.
-        source: rayon::ThreadPoolBuildError,
-    },
+    #[error(transparent)]
+    Threads(#[from] ThreadsError),
     /// The host of the optimiser failed.
     #[error("the optimiser failed: {0}")]
     Optimizer(String),
     /// No epoch gave a finite validation loss.
     #[error("no epoch gave a finite validation loss{}", .0.map(|e| format!(": {e}")).unwrap_or_default())]
     NothingLearned(Option<StepError>),
-}
-
-/// Datasets of a run, in the precision of training.
-#[derive(Clone, Debug)]
-pub struct Datasets<S> {
-    /// Training states of each phase.
-    pub training: Vec<Dataset<S>>,
-    /// Validation states.
-    pub validation: Dataset<S>,
-    /// Fresh states for the final figure.
-    pub test: Dataset<S>,
-}
-
-impl<S: Scalar> Datasets<S> {
-    /// Name and checksum of each set: training of every phase, validation, test.
-    pub fn checksums(&self) -> Vec<(String, u32)> {
-        let training =
-            self.training.iter().enumerate().map(|(k, set)| (format!("training states of phase {}", k + 1), set));
-        let others = [("validation states".to_string(), &self.validation), ("test states".to_string(), &self.test)];
-        training.chain(others).map(|(name, set)| (name, set.checksum())).collect()
-    }
 }
 
 /// Where a training keeps its checkpoints and what it goes on from.
@@ -197,7 +140,7 @@ pub fn resume<S: Scalar>(
     if phases != found {
         return Err(TrainingError::Datasets { phases, found });
     }
-    let pool = objective::threads(threads).map_err(|source| TrainingError::Threads { threads, source })?;
+    let pool = objective::threads(threads)?;
     let model = architecture.model();
     let objective = || Objective::on(Arc::clone(&pool), model.clone(), penalty);
     let batches = |states: usize| states.div_ceil(config.optimizer.batch.min(states));
@@ -205,7 +148,7 @@ pub fn resume<S: Scalar>(
     let steps = pairs().map(|(phase, data)| phase.epochs * batches(data.len())).sum();
     let Sitting { keeper, start } = sitting;
     let Snapshot { seconds, mut ended, mut underway } = start.unwrap_or_else(|| {
-        let mut rng = Stream::Weights.generator(config.seed);
+        let mut rng = RngStream::Weights.generator(config.seed);
         let weights = initial_weights(architecture, config.network.initialization, &mut rng);
         Snapshot { seconds: 0.0, ended: Ended::none(weights), underway: None }
     });
@@ -215,7 +158,7 @@ pub fn resume<S: Scalar>(
     let shooting = underway.as_ref().is_some_and(|underway| underway.shooting.is_some());
     for (number, (phase, training)) in pairs().enumerate().skip(ended.phases) {
         let problem = TrainingProblem::new(objective(), training, &data.validation, config.optimizer.weight_decay);
-        let rng = Stream::Order(number).generator(config.seed);
+        let rng = RngStream::Order(number).generator(config.seed);
         let run = Run {
             phase_number: number + 1,
             epoch: ended.history.len(),
@@ -282,7 +225,7 @@ fn in_double<S: Scalar>(data: &Dataset<S>) -> Cow<'_, Dataset<f64>> {
 }
 
 /// Writes every epoch to the log.
-pub(super) struct Log;
+pub(crate) struct Log;
 
 impl<I: State> Observe<I> for Log {
     fn observe_iter(&mut self, state: &I, kv: &KV) -> Result<(), Error> {

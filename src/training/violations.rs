@@ -1,12 +1,12 @@
 //! Gradients of penalties: mixed directions of the states that violate, evaluated in full chunks of their own.
 
+use crate::linalg::Violation;
 use crate::network::{Dynamics, Model};
 use crate::scalar::{Scalar, Sum};
 use crate::tape::{Depth, MixedDirections, STATES};
-use crate::training::signature::Violation;
 
 /// States whose mass matrices have a penalty, and the directions of its gradient.
-pub(super) struct Violations<S> {
+pub(crate) struct Violations<S> {
     model: Model<S>,
     /// Made when there is a violation for the first time.
     dynamics: Option<Dynamics<S>>,

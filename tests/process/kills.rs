@@ -1,9 +1,11 @@
 //! The program killed at random moments: at most one interval is lost, and the end is the same to the last byte.
 #![cfg(all(feature = "cli", unix))]
 
+use lnn::configuration::Config;
 use lnn::lagrangian::configure;
+use lnn::presets::Preset;
 use lnn::storage::Disk;
-use lnn::training::{Config, NEWEST, PREVIOUS, Preset, saved};
+use lnn::training::{NEWEST, PREVIOUS, saved};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde_json::Value;

@@ -2,12 +2,12 @@
 
 use crate::alone;
 use crate::counting::peak;
+use lnn::configuration::{Config, Polish, Precision, Regularizer};
+use lnn::data::sample_all;
 use lnn::lagrangian::configure;
+use lnn::presets::Preset;
 use lnn::storage::Disk;
-use lnn::training::{
-    Config, Every, Hooks, Identity, Keeper, Polish, Precision, Preset, Regularizer, Sitting, resume, sample_all,
-    training_memory,
-};
+use lnn::training::{Every, Hooks, Identity, Keeper, Sitting, resume, training_memory};
 use std::sync::Arc;
 
 fn config(system: &str, hidden: &[usize], states: usize) -> Config {

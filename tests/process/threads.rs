@@ -2,12 +2,16 @@
 #![cfg(target_os = "linux")]
 
 use crate::alone;
+use lnn::configuration::Penalty;
+use lnn::data::Dataset;
+use lnn::data::{Estimated, Noise};
 use lnn::lagrangian::{EulerLagrange, Request, Terms, build};
 use lnn::network::{Architecture, Layout, NetworkLagrangian, file::ModelFile};
+use lnn::optimizers::{Method, Moments, Update};
 use lnn::recording::Track;
 use lnn::rollout::{Options, rollout, rollout_many};
-use lnn::training::shooting::{Estimated, Noise, Shooting, Task, fit};
-use lnn::training::{Dataset, Hooks, Method, Moments, Objective, Penalty, Update};
+use lnn::shooting::{Shooting, Task, fit};
+use lnn::training::{Hooks, Objective};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
@@ -82,7 +86,7 @@ fn threads_are_the_callers_choice() {
     assert!(gradients[0] == gradients[1], "the number of threads changes nothing");
     assert!(shot(&architecture, &file.weights, 1) == shot(&architecture, &file.weights, 3));
     let mut moments = Moments::for_method(Method::Soap, file.weights.len(), Layout::new(&architecture).matrices());
-    let update = Update { method: Method::Soap, rate: 1e-3, weight_decay: 0.0, clip: 1.0 };
+    let update = Update { method: Method::Soap, rate: 1e-3, weight_decay: 0.0, decaying: usize::MAX, clip: 1.0 };
     assert!(moments.update(&mut file.weights.clone(), &mut gradients[0], &update) > 0.0);
     // Rayon's global pool can be built once in the life of a process: nobody has done so.
     rayon::ThreadPoolBuilder::new().num_threads(1).build_global().expect("the global pool belongs to the application");

@@ -2,8 +2,11 @@
 
 use crate::alone;
 use crate::counting::allocations;
+use lnn::configuration::Penalty;
+use lnn::data::Dataset;
 use lnn::network::{Architecture, Form, Initialization, InputLayer, Layout, Nonlinearity, initial_weights};
-use lnn::training::{Dataset, Method, Moments, Objective, Penalty, Update};
+use lnn::optimizers::{Method, Moments, Update};
+use lnn::training::Objective;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -41,7 +44,7 @@ fn allocates_nothing(activation: Nonlinearity, input_layer: InputLayer, dissipat
     for method in [Method::Radam, Method::Soap] {
         let mut gradient = weights.clone();
         let mut moments = Moments::for_method(method, weights.len(), layout.matrices());
-        let update = Update { method, rate: 1e-6, weight_decay: 1e-6, clip: 1.0 };
+        let update = Update { method, rate: 1e-6, weight_decay: 1e-6, decaying: usize::MAX, clip: 1.0 };
         let mut step = || {
             let report = objective.step(&weights, &data, &rows, &mut gradient);
             assert_eq!(report.penalised, 256);

@@ -5,6 +5,7 @@
 
 mod autodiff;
 mod common;
+mod geometry;
 mod house;
 mod linalg;
 mod mechanics;
@@ -13,4 +14,5 @@ mod program;
 mod recording;
 mod rollout;
 mod stress;
+mod symmetry;
 mod training;

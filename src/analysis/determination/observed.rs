@@ -1,7 +1,7 @@
 //! Observations that a model is compared with.
 
+use crate::data::{Measured, MeasuredError};
 use crate::recording::Targets;
-use crate::training::{Measured, MeasuredError};
 
 /// States with the accelerations that were learned from.
 #[derive(Clone, Debug, Default, PartialEq)]

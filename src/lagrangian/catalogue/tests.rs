@@ -1,4 +1,5 @@
 use super::*;
+use crate::lagrangian::{configure, exact_acceleration};
 
 fn given(list: &[(&str, &str)]) -> Vec<(String, String)> {
     list.iter().map(|&(s, t)| (s.into(), t.into())).collect()

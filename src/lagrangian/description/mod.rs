@@ -8,7 +8,7 @@ mod system;
 
 use super::ExpressionLagrangian;
 use super::expression::{ExpressionError, Formula};
-use super::system::Range;
+use super::range::Range;
 use crate::scalar::Real;
 use quantity::{Decimal, Quantity};
 use serde::{Deserialize, Serialize};

@@ -2,7 +2,9 @@
 
 use super::{Described, Description, DescriptionError, Quantity};
 use crate::lagrangian::expression::{Compiler, Expression, Meaning, Value, is_name, is_reserved};
-use crate::lagrangian::system::{Bounds, Coordinate, Parameter, PerSize, Range, Size, System, TrajectoryTest};
+use crate::lagrangian::system::{
+    Bounds, Coordinate, LearningAdvice, Parameter, PerSize, Range, Size, System, TrajectoryTest,
+};
 use crate::lagrangian::{ExpressionLagrangian, systems};
 use crate::names::unknown;
 use crate::ops::{Binary, Unary};
@@ -70,6 +72,7 @@ impl Description {
             domain: None,
             plane: None,
             conserved: None,
+            learning: LearningAdvice::NONE,
             described: Some(Arc::new(Described {
                 description: self.clone(),
                 lagrangian: ExpressionLagrangian::compiled(n, compiler.formula(value)),

@@ -58,8 +58,8 @@ impl Formula {
         for Instruction { operation, out } in &self.instructions {
             let read = |operand: Operand| self.read(operand, registers, parameters, q, v);
             let value = match *operation {
-                Operation::Unary(function, a) => function.value(read(a)),
-                Operation::Binary(function, a, b) => function.value(read(a), read(b)),
+                Operation::Unary(function, a) => function.evaluate(read(a)),
+                Operation::Binary(function, a, b) => function.evaluate(read(a), read(b)),
             };
             registers[*out as usize] = value;
         }

@@ -7,6 +7,7 @@ use super::token::{Kind, Token, tokens};
 use super::tree::{Expression, Node};
 use crate::names::nearest;
 use crate::ops::{Binary, Unary};
+use std::str::FromStr;
 
 /// Deepest nesting of parentheses, signs and powers: far more than anybody writes, far less than the stack holds.
 const MAX_DEPTH: usize = 100;
@@ -195,5 +196,13 @@ impl<'a> Parser<'a> {
             _ => "",
         };
         ExpressionError::new(found.column, format!("expected {expected}, found {}{hint}", found.shown()))
+    }
+}
+
+impl FromStr for Expression {
+    type Err = ExpressionError;
+
+    fn from_str(text: &str) -> Result<Self, ExpressionError> {
+        parse(text)
     }
 }

@@ -1,11 +1,8 @@
 //! Tree of a formula, before its names mean anything.
 
-use super::error::ExpressionError;
 use super::functions::{Function, PI, name_of};
-use super::parse::parse;
 use crate::ops::{Binary, Unary};
 use std::fmt;
-use std::str::FromStr;
 
 /// A part of a formula; operands are parts before it.
 #[derive(Clone, Debug, PartialEq)]
@@ -27,14 +24,6 @@ pub(super) enum Node {
 pub struct Expression {
     /// Operands before what is made of them, the whole last.
     pub(super) nodes: Vec<Node>,
-}
-
-impl FromStr for Expression {
-    type Err = ExpressionError;
-
-    fn from_str(text: &str) -> Result<Self, ExpressionError> {
-        parse(text)
-    }
 }
 
 impl Expression {

@@ -11,4 +11,5 @@ pub const SYSTEM: System = anti_de_sitter::system(
     "Geodesic of AdS2 in half-space coordinates",
     2,
     "t_dot = sqrt(z_dot^2 + (z/L)^2)",
+    None,
 );

@@ -11,4 +11,5 @@ pub const SYSTEM: System = anti_de_sitter::system(
     "Geodesic of AdS3 in half-space coordinates",
     3,
     "t_dot = sqrt(x_dot^2 + z_dot^2 + (z/L)^2)",
+    None,
 );

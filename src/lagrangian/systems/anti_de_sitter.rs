@@ -2,7 +2,10 @@
 
 use super::{length, lengths};
 use crate::lagrangian::Lagrangian;
-use crate::lagrangian::system::{Bounds, Closed, Conserved, Parameter, PerSize, Plane, Size, System, TrajectoryTest};
+use crate::lagrangian::system::{
+    Bounds, Closed, Conserved, LearningAdvice, PaperBudget, Parameter, PerSize, Plane, Size, StateAdvice, System,
+    TrajectoryTest,
+};
 use crate::scalar::Real;
 use std::borrow::Cow;
 
@@ -35,7 +38,13 @@ fn states(n: usize) -> Bounds {
 }
 
 /// Catalogue entry of `n` coordinates.
-pub const fn system(name: &'static str, title: &'static str, n: usize, constraint: &'static str) -> System {
+pub const fn system(
+    name: &'static str,
+    title: &'static str,
+    n: usize,
+    constraint: &'static str,
+    paper: Option<PaperBudget>,
+) -> System {
     System {
         name: Cow::Borrowed(name),
         title: Cow::Borrowed(title),
@@ -71,6 +80,16 @@ pub const fn system(name: &'static str, title: &'static str, n: usize, constrain
                 (0..q.len() - 1).map(|i| sign(i) * (radius / z).powi(2) * v[i]).collect()
             },
         }),
+        learning: LearningAdvice {
+            // z = z_0 / cos(tau) from rest: towards the horizon everything falls ever faster.
+            states: Some(|bounds| {
+                let n = bounds.positions.len();
+                bounds.positions[n - 1].0 = 0.4;
+                bounds.velocities[n - 1] = (-2.4, 2.4);
+                StateAdvice { logarithmic: (1..=n).map(|i| i == n).collect(), relative: 1.0, motions: 0.3 }
+            }),
+            paper,
+        },
         described: None,
     }
 }

@@ -2,7 +2,9 @@
 
 use super::{ACCELERATION_OF_GRAVITY, LAST_BOB, NOWHERE, angles, chain, length, mass};
 use crate::lagrangian::Lagrangian;
-use crate::lagrangian::system::{Bounds, Closed, Parameter, PerSize, Plane, Size, System, TrajectoryTest};
+use crate::lagrangian::system::{
+    Bounds, Closed, LearningAdvice, PaperBudget, PaperPhase, Parameter, PerSize, Plane, Size, System, TrajectoryTest,
+};
 use crate::scalar::Real;
 use std::borrow::Cow;
 use std::f64::consts::PI;
@@ -39,6 +41,19 @@ pub const SYSTEM: System = System {
         },
     }),
     conserved: None,
+    // The paper's first phase sees three turns, the others one turn and a little more.
+    learning: LearningAdvice {
+        states: None,
+        paper: Some(PaperBudget {
+            states: 60_000,
+            hidden: &[500; 3],
+            phases: &[
+                PaperPhase { positions: Some((-3.0 * PI, 3.0 * PI)), ..PaperPhase::new(300, 1e-3, 1e-6) },
+                PaperPhase { positions: Some((-PI / 10.0, 21.0 * PI / 10.0)), ..PaperPhase::new(200, 4e-5, 1e-7) },
+                PaperPhase { positions: Some((-PI / 10.0, 21.0 * PI / 10.0)), ..PaperPhase::new(200, 1e-5, 1e-8) },
+            ],
+        }),
+    },
     described: None,
 };
 

@@ -2,7 +2,9 @@
 
 use super::{lengths, mass};
 use crate::lagrangian::Lagrangian;
-use crate::lagrangian::system::{Bounds, Closed, Parameter, PerSize, Range, Size, System, TrajectoryTest};
+use crate::lagrangian::system::{
+    Bounds, Closed, LearningAdvice, Parameter, PerSize, Range, Size, System, TrajectoryTest,
+};
 use crate::scalar::Real;
 use std::borrow::Cow;
 
@@ -32,6 +34,7 @@ pub const SYSTEM: System = System {
     domain: None,
     plane: None,
     conserved: None,
+    learning: LearningAdvice::NONE,
     described: None,
 };
 

@@ -2,7 +2,9 @@
 
 use super::{X_AND_Y, lengths};
 use crate::lagrangian::Lagrangian;
-use crate::lagrangian::system::{Bounds, Closed, Parameter, PerSize, Range, Size, System, TrajectoryTest};
+use crate::lagrangian::system::{
+    Bounds, Closed, LearningAdvice, Parameter, PerSize, Range, Size, System, TrajectoryTest,
+};
 use crate::scalar::Real;
 use std::borrow::Cow;
 
@@ -33,6 +35,7 @@ pub const SYSTEM: System = System {
     domain: None,
     plane: Some(X_AND_Y),
     conserved: None,
+    learning: LearningAdvice::NONE,
     described: None,
 };
 

@@ -2,7 +2,9 @@
 
 use super::{X_AND_Y, lengths};
 use crate::lagrangian::Lagrangian;
-use crate::lagrangian::system::{Bounds, Closed, Conserved, Parameter, PerSize, Range, Size, System, TrajectoryTest};
+use crate::lagrangian::system::{
+    Bounds, Closed, Conserved, LearningAdvice, Parameter, PerSize, Range, Size, System, TrajectoryTest,
+};
 use crate::scalar::Real;
 use std::borrow::Cow;
 
@@ -32,6 +34,7 @@ pub const SYSTEM: System = System {
     domain: Some(|_, q| if q[0] != 0.0 || q[1] != 0.0 { Ok(()) } else { Err("x and y must not both vanish") }),
     plane: Some(X_AND_Y),
     conserved: Some(Conserved { name: "angular momentum [m^2/s]", vector: |_, q, v| vec![q[0] * v[1] - q[1] * v[0]] }),
+    learning: LearningAdvice::NONE,
     described: None,
 };
 

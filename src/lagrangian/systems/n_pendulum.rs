@@ -2,7 +2,9 @@
 
 use super::{ACCELERATION_OF_GRAVITY, LAST_BOB, NOWHERE, angles, chain, length, mass};
 use crate::lagrangian::Lagrangian;
-use crate::lagrangian::system::{Bounds, Closed, Parameter, PerSize, Plane, Size, System, TrajectoryTest};
+use crate::lagrangian::system::{
+    Bounds, Closed, LearningAdvice, Parameter, PerSize, Plane, Size, System, TrajectoryTest,
+};
 use crate::scalar::Real;
 use std::borrow::Cow;
 use std::f64::consts::PI;
@@ -42,6 +44,7 @@ pub const SYSTEM: System = System {
         },
     }),
     conserved: None,
+    learning: LearningAdvice::NONE,
     described: None,
 };
 

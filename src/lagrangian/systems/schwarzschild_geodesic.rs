@@ -3,7 +3,8 @@
 use super::angular_velocity;
 use crate::lagrangian::Lagrangian;
 use crate::lagrangian::system::{
-    Bounds, Closed, Conserved, Coordinate, Parameter, PerSize, Plane, Range, Size, System, TrajectoryTest,
+    Bounds, Closed, Conserved, Coordinate, LearningAdvice, Parameter, PerSize, Plane, Range, Size, System,
+    TrajectoryTest,
 };
 use crate::scalar::Real;
 use std::borrow::Cow;
@@ -65,6 +66,7 @@ pub const SYSTEM: System = System {
             [[redshift(mass, q[1]) * v[0]].as_slice(), &momentum].concat()
         },
     }),
+    learning: LearningAdvice::NONE,
     described: None,
 };
 

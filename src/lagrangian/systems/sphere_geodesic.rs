@@ -3,7 +3,8 @@
 use super::{NOWHERE, angular_velocity, length, mass};
 use crate::lagrangian::Lagrangian;
 use crate::lagrangian::system::{
-    Bounds, Closed, Conserved, Coordinate, Parameter, PerSize, Plane, Size, System, TrajectoryTest,
+    Bounds, Closed, Conserved, Coordinate, LearningAdvice, PaperBudget, PaperPhase, Parameter, PerSize, Plane, Size,
+    StateAdvice, System, TrajectoryTest,
 };
 use crate::scalar::Real;
 use std::borrow::Cow;
@@ -60,6 +61,14 @@ pub const SYSTEM: System = System {
             angular_velocity([q[0], q[1]], [v[0], v[1]]).map(|x| m * radius * radius * x).to_vec()
         },
     }),
+    learning: LearningAdvice {
+        // Near the poles the azimuth turns fast, and most great circles of the test are slower than the box.
+        states: Some(|bounds| {
+            bounds.velocities[1] = (-6.5, 6.5);
+            StateAdvice { logarithmic: Vec::new(), relative: 0.3, motions: 0.5 }
+        }),
+        paper: Some(PaperBudget { states: 50_000, hidden: &[500; 3], phases: &[PaperPhase::new(50, 1e-3, 1e-6)] }),
+    },
     described: None,
 };
 

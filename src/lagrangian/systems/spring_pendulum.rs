@@ -3,7 +3,8 @@
 use super::{ACCELERATION_OF_GRAVITY, length, mass};
 use crate::lagrangian::Lagrangian;
 use crate::lagrangian::system::{
-    Bounds, Closed, Coordinate, Parameter, PerSize, Plane, Range, Size, System, TrajectoryTest,
+    Bounds, Closed, Coordinate, LearningAdvice, PaperBudget, PaperPhase, Parameter, PerSize, Plane, Range, Size,
+    StateAdvice, System, TrajectoryTest,
 };
 use crate::scalar::Real;
 use std::borrow::Cow;
@@ -42,6 +43,14 @@ pub const SYSTEM: System = System {
     domain: Some(|_, q| if q[0] > 0.0 { Ok(()) } else { Err("r must be positive") }),
     plane: Some(Plane { labels: ["x [m]", "y [m]"], point: |_, q| (q[0] * q[1].sin(), -(q[0] * q[1].cos())) }),
     conserved: None,
+    learning: LearningAdvice {
+        // A short spring turns fast, and its angle is accelerated a thousand times more than others.
+        states: Some(|bounds| {
+            bounds.velocities = vec![(-7.0, 7.0), (-10.0, 10.0)];
+            StateAdvice { logarithmic: vec![true, false], relative: 0.1, motions: 0.0 }
+        }),
+        paper: Some(PaperBudget { states: 60_000, hidden: &[600; 2], phases: &[PaperPhase::new(500, 5e-4, 1e-7)] }),
+    },
     described: None,
 };
 

@@ -2,7 +2,9 @@
 
 use super::{ACCELERATION_OF_GRAVITY, LAST_BOB, NOWHERE, angles, chain, length, mass};
 use crate::lagrangian::Lagrangian;
-use crate::lagrangian::system::{Bounds, Closed, Parameter, PerSize, Plane, Size, System, TrajectoryTest};
+use crate::lagrangian::system::{
+    Bounds, Closed, LearningAdvice, PaperBudget, PaperPhase, Parameter, PerSize, Plane, Size, System, TrajectoryTest,
+};
 use crate::scalar::Real;
 use std::borrow::Cow;
 use std::f64::consts::PI;
@@ -40,6 +42,10 @@ pub const SYSTEM: System = System {
         },
     }),
     conserved: None,
+    learning: LearningAdvice {
+        states: None,
+        paper: Some(PaperBudget { states: 60_000, hidden: &[500; 3], phases: &[PaperPhase::new(500, 1e-3, 1e-7)] }),
+    },
     described: None,
 };
 

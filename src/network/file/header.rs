@@ -1,9 +1,8 @@
 //! Header of a model file.
 
-use super::ModelFileError;
-use super::container::check_version;
 use crate::lagrangian::Description;
 use crate::network::Architecture;
+use crate::storage::container::{ContainerError, StoredPrecision, check_version};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -15,26 +14,6 @@ pub const MAX_COORDINATES: usize = 256;
 
 /// Largest width of a hidden layer.
 pub const MAX_WIDTH: usize = 1 << 16;
-
-/// Number type of the stored weights.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum StoredPrecision {
-    /// Single precision.
-    F32,
-    /// Double precision.
-    F64,
-}
-
-impl StoredPrecision {
-    /// `"f32"` or `"f64"`.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::F32 => "f32",
-            Self::F64 => "f64",
-        }
-    }
-}
 
 /// Everything needed to rebuild a model but its weights.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -74,11 +53,11 @@ impl Header {
     /// Checks that lengths agree, numbers are finite and sizes are sensible.
     ///
     /// # Errors
-    /// [`ModelFileError::Header`] or [`ModelFileError::Version`].
-    pub fn validate(&self) -> Result<(), ModelFileError> {
+    /// [`ContainerError::Header`] or [`ContainerError::Version`].
+    pub fn validate(&self) -> Result<(), ContainerError> {
         check_version(FORMAT, self.format, &self.crate_version)?;
-        let require = |ok: bool, text: &str| if ok { Ok(()) } else { Err(ModelFileError::Header(text.to_string())) };
-        self.architecture.validate().map_err(|e| ModelFileError::Header(e.to_string()))?;
+        let require = |ok: bool, text: &str| if ok { Ok(()) } else { Err(ContainerError::Header(text.to_string())) };
+        self.architecture.validate().map_err(|e| ContainerError::Header(e.to_string()))?;
         let (n, hidden) = (self.architecture.coordinates, &self.architecture.hidden);
         require(n <= MAX_COORDINATES, &format!("coordinates: expected at most {MAX_COORDINATES}"))?;
         require(hidden.len() <= 64, "hidden: expected at most 64 widths")?;

@@ -19,21 +19,21 @@
 //! digits, the CRC-32 (IEEE) of that JSON text up to the comma before `"checksum"`, followed by the bytes of the tensors.
 //! A changed bit anywhere is refused. The same model gives the same bytes.
 
-pub mod container;
-mod error;
 mod header;
-mod json;
 #[cfg(test)]
 mod tests;
 
-pub use error::ModelFileError;
-pub use header::{FORMAT, Header, MAX_COORDINATES, MAX_WIDTH, StoredPrecision};
+pub use crate::storage::container::StoredPrecision;
+pub use header::{FORMAT, Header, MAX_COORDINATES, MAX_WIDTH};
 
-use self::container::{Kind, Tensor, pack, unpack};
 use crate::network::{Architecture, DissipationLayout, Layout, LinearMap};
 use crate::scalar::Scalar;
+use crate::storage::container::{ContainerError, Kind, Tensor, pack, unpack};
 use crate::storage::{Disk, Files, read_regular, write_whole};
 use std::path::Path;
+
+/// Failure of a model file.
+pub type ModelFileError = ContainerError;
 
 /// Largest file that is read, in bytes.
 pub const MAX_BYTES: u64 = 1 << 30;

@@ -7,6 +7,7 @@ use thiserror::Error;
 
 /// Why files do not make a recording.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum DataError {
     /// The description of the columns contradicts itself.
     #[error(transparent)]
@@ -26,6 +27,7 @@ pub enum DataError {
 
 /// A problem of a file; rows are lines of a text file or rows of an array, from 1.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum Problem {
     /// The file itself.
     #[error(transparent)]

@@ -2,7 +2,7 @@
 
 use super::Problem;
 use super::builder::Builder;
-use super::npy::Element;
+use super::element::Element;
 use std::io::Read;
 
 /// Rows read at a time.

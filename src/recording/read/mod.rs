@@ -2,6 +2,7 @@
 
 mod builder;
 mod csv;
+mod element;
 mod error;
 mod fill;
 mod npy;
@@ -12,7 +13,7 @@ mod shared;
 mod text;
 
 pub use error::{DataError, Problem};
-pub use pieces::LEAST;
+pub(crate) use pieces::LEAST;
 #[cfg(feature = "cli")]
 #[cfg(feature = "cli")]
 pub(crate) use text::{Separator, comment, names_in, split};

@@ -2,6 +2,7 @@
 
 use super::Problem;
 use super::builder::Builder;
+use super::element::Element;
 use super::fill::{Source, fill};
 use super::select::Selection;
 use super::shared::Shared;
@@ -13,16 +14,6 @@ use std::io::{BufReader, Read};
 pub const MAGIC: &[u8] = b"\x93NUMPY";
 /// Longest header in bytes; NumPy itself takes no longer one without being asked to.
 const LONGEST: usize = 10_000;
-
-/// Type of the elements.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Element {
-    /// `f`, `i` or `u`.
-    kind: u8,
-    /// Bytes.
-    size: usize,
-    big_endian: bool,
-}
 
 /// An array before its numbers are read.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -73,7 +64,7 @@ impl Header {
         input.read_exact(&mut text).map_err(short)?;
         let text = String::from_utf8(text).map_err(|_| Problem::Array("the array's header is no text".to_string()))?;
         let header = Self { start: prefix + length as u64, ..Self::parse(&text)? };
-        let bytes = (header.rows as u128) * (header.columns as u128) * (header.element.size as u128);
+        let bytes = (header.rows as u128) * (header.columns as u128) * (header.element.size() as u128);
         let behind = available.saturating_sub(header.start);
         if bytes != u128::from(behind) {
             let (rows, columns) = (header.rows, header.columns);
@@ -120,49 +111,6 @@ impl Header {
     }
 }
 
-impl Element {
-    /// A type string such as `<f8`.
-    fn parse(name: &str) -> Result<Self, Problem> {
-        let expected = "expected floats of 4 or 8 bytes or integers of 1 to 8";
-        let found = |what: &str| Problem::Array(format!("an array of {what} ({name}), {expected}"));
-        let bytes = name.as_bytes();
-        let (&[order, kind], Some(size)) = (bytes.get(..2).unwrap_or(&[0, 0]), name.get(2..)) else {
-            return Err(found("unknown elements"));
-        };
-        match (kind, size.parse::<usize>()) {
-            (b'f', Ok(size @ (4 | 8))) | (b'i' | b'u', Ok(size @ (1 | 2 | 4 | 8))) => {
-                Ok(Self { kind, size, big_endian: order == b'>' })
-            }
-            (b'O', _) => Err(found("Python objects")),
-            (b'c', _) => Err(found("complex numbers")),
-            (b'S' | b'U', _) => Err(found("text")),
-            (b'b', _) => Err(found("truth values")),
-            _ => Err(found("other elements")),
-        }
-    }
-
-    /// Bytes of an element.
-    pub fn size(self) -> usize {
-        self.size
-    }
-
-    /// The nearest `f64` of an element's bytes.
-    pub fn decode(self, bytes: &[u8]) -> f64 {
-        let mut word = [0; 8];
-        for (k, byte) in bytes.iter().enumerate() {
-            word[if self.big_endian { self.size - 1 - k } else { k }] = *byte;
-        }
-        let bits = u64::from_le_bytes(word);
-        let unused = 64 - 8 * self.size as u32;
-        match (self.kind, self.size) {
-            (b'f', 4) => f64::from(f32::from_bits(bits as u32)),
-            (b'f', _) => f64::from_bits(bits),
-            (b'i', _) => ((bits << unused) as i64 >> unused) as f64,
-            _ => bits as f64,
-        }
-    }
-}
-
 /// Reads a table of numbers in a file of its own.
 pub fn read(file: Shared, available: u64, columns: &Columns) -> Result<Builder<'_>, Problem> {
     let header = Header::read(&mut BufReader::new(file.clone()), available)?;
@@ -190,7 +138,7 @@ pub fn table<'a, 'f>(
     let mut sources = Vec::new();
     if fortran {
         for (column, place) in wanted {
-            let before = (rows * column * element.size) as u64;
+            let before = (rows * column * element.size()) as u64;
             sources.push(source(open(start + before)?, 1, vec![(0, place)]));
         }
     } else {

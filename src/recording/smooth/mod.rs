@@ -4,7 +4,7 @@ mod local_fit;
 mod noise;
 mod window;
 
-pub use local_fit::MOST_DEGREE;
+pub(crate) use local_fit::MOST_DEGREE;
 pub use noise::Noise;
 pub(crate) use noise::{contrast_weights, noise};
 pub use window::Quality;
@@ -37,6 +37,7 @@ impl Default for SmoothOptions {
 
 /// Why no derivatives can be taken.
 #[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
 pub enum SmoothError {
     /// An option out of its range.
     #[error("{what}: expected {expected}, found {found}")]

@@ -8,7 +8,8 @@ mod warnings;
 
 pub use consistency::Consistency;
 pub use coordinate::CoordinateSurvey;
-pub use motionless::{Stillness, stillness};
+pub use motionless::Stillness;
+pub(crate) use motionless::stillness;
 pub use suspicious::{Kind, Suspicion};
 
 use crate::recording::smooth::{SmoothError, SmoothOptions, Smoothing};

@@ -9,6 +9,7 @@ const MOVES: f64 = 1.2;
 
 /// Way in which a coordinate stands still.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Stillness {
     /// It keeps one value in every trajectory.
     Constant(f64),

@@ -17,6 +17,7 @@ const MOST: usize = 1000;
 /// Kind of a suspicious place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
+#[non_exhaustive]
 pub enum Kind {
     /// One sample far from its neighbours.
     Outlier,

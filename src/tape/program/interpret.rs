@@ -21,8 +21,8 @@ impl<S: Scalar> Program<S> {
                 Node::Input(index) => inputs[index as usize],
                 Node::Parameter(index) => parameters[index as usize],
                 Node::Constant(value) => R::constant(value.cast()),
-                Node::Unary(f, a) => f.value(row(a)),
-                Node::Binary(f, a, b) => f.value(row(a), row(b)),
+                Node::Unary(f, a) => f.evaluate(row(a)),
+                Node::Binary(f, a, b) => f.evaluate(row(a), row(b)),
                 Node::Select(c, a, b) => row(c).select(row(a), row(b)),
                 Node::SinCos(a) => {
                     let (sin, cos) = row(a).sin_cos();

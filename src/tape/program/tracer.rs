@@ -50,13 +50,13 @@ impl<'t, S: Scalar> Tracer<'t, S> {
     }
     fn table1(self, f: Unary) -> Self {
         match self.recorder {
-            None => Self::constant(f.value(self.value)),
+            None => Self::constant(f.evaluate(self.value)),
             Some(recorder) => recorder.tracer(recorder.row(Node::Unary(f, recorder.row_of(self)))),
         }
     }
     fn table2(self, other: Self, f: Binary) -> Self {
         match self.recorder.or(other.recorder) {
-            None => Self::constant(f.value(self.value, other.value)),
+            None => Self::constant(f.evaluate(self.value, other.value)),
             Some(recorder) => {
                 let (a, b) = (recorder.row_of(self), recorder.row_of(other));
                 recorder.tracer(recorder.row(Node::Binary(f, a, b)))

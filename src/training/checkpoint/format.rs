@@ -1,13 +1,14 @@
 //! The bytes of a checkpoint.
 
-use super::{Course, Ended, Identity, Saved, Shot, Snapshot, Underway, precision};
-use crate::network::file::container::{Kind, Tensor, Tensors, pack, unpack};
+use super::identity::{Identity, Saved};
+use super::{Course, Ended, Shot, Snapshot, Underway, precision};
 use crate::network::file::{ModelFileError, StoredPrecision};
+use crate::optimizers::{Block, Moments, Stored};
+use crate::random::RandomGenerator;
 use crate::scalar::Scalar;
+use crate::storage::container::{Kind, Tensor, Tensors, pack, unpack};
+use crate::training::epoch::{Epoch, Means};
 use crate::training::objective::Failure;
-use crate::training::optimizer::{Block, Moments, Stored};
-use crate::training::solver::{Epoch, Means};
-use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
 const CHECKPOINT: Kind = Kind { name: "checkpoint", key: "lnn-checkpoint", format: 1 };
@@ -15,7 +16,7 @@ const CHECKPOINT: Kind = Kind { name: "checkpoint", key: "lnn-checkpoint", forma
 /// Everything but the tensors; numbers that may be infinite are the bits of `f64`.
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Header {
+pub(crate) struct Header {
     format: u32,
     crate_version: String,
     precision: StoredPrecision,
@@ -35,7 +36,7 @@ pub(super) struct Header {
 const MOST: u64 = 1 << 52;
 
 impl Header {
-    pub(super) fn into_saved(self) -> Saved {
+    pub(crate) fn into_saved(self) -> Saved {
         let (epochs, steps) = self.underway.map_or((0, self.steps), |underway| (underway.epochs, underway.step));
         Saved { config: self.identity.config, epochs: self.epochs.saturating_add(epochs), steps }
     }
@@ -58,7 +59,7 @@ impl Header {
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct UnderwayHeader {
-    rng: ChaCha8Rng,
+    rng: RandomGenerator,
     order: usize,
     moments: u32,
     /// Weight matrices whose moments are taken in eigenbases.
@@ -198,7 +199,7 @@ fn history(rows: &[f64]) -> Vec<Epoch> {
 ///
 /// # Errors
 /// A number type that files do not know.
-pub(super) fn encode<S: Scalar>(
+pub(crate) fn encode<S: Scalar>(
     identity: &Identity,
     seconds: f64,
     ended: &Ended<S>,
@@ -260,12 +261,12 @@ pub(super) fn encode<S: Scalar>(
 }
 
 /// The description alone, of a file that is whole.
-pub(super) fn decode_header(bytes: &[u8]) -> Result<Header, ModelFileError> {
+pub(crate) fn decode_header(bytes: &[u8]) -> Result<Header, ModelFileError> {
     unpack(&CHECKPOINT, bytes).map(|(header, _)| header)
 }
 
 /// Description and content of a whole checkpoint; never panics.
-pub(super) fn decode<S: Scalar>(bytes: &[u8]) -> Result<(Header, Snapshot<S>), ModelFileError> {
+pub(crate) fn decode<S: Scalar>(bytes: &[u8]) -> Result<(Header, Snapshot<S>), ModelFileError> {
     let (header, file) = unpack::<Header>(&CHECKPOINT, bytes)?;
     header.check_counts()?;
     let vector = |name: &str| file.numbers::<S>(name, &[header.parameters], header.precision);
@@ -359,7 +360,7 @@ fn permutation(order: Vec<u32>) -> Result<Vec<u32>, ModelFileError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::training::trainer::Stream;
+    use crate::random::RngStream;
     use rand::Rng;
 
     fn snapshot() -> (Identity, Snapshot<f32>) {
@@ -376,7 +377,7 @@ mod tests {
             skipped: 8,
             seconds: 9.5,
         };
-        let mut rng = Stream::Order(3).generator(9);
+        let mut rng = RngStream::Order(3).generator(9);
         let mut draw = |count: usize| -> Vec<f32> { (0..count).map(|_| rng.random_range(-1.0..1.0)).collect() };
         let (weights, average, best) = (draw(5), draw(5), draw(5));
         let matrices = [Block { start: 1, rows: 2, cols: 2 }];

@@ -1,11 +1,11 @@
 //! Checkpoints in a directory: when to write one, the newest and the one before, going on from either.
 
 use super::format::{Header, decode, decode_header, encode};
+use super::identity::{Identity, Saved};
 use super::{Ended, Snapshot, Underway};
 use crate::network::file::ModelFileError;
 use crate::scalar::Scalar;
 use crate::storage::{Files, ReadError, replace};
-use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -30,18 +30,9 @@ pub enum Every {
     Seconds(f64),
 }
 
-/// Identity of a training, written into its checkpoints: a run resumes only from a checkpoint with the same identity.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Identity {
-    /// The configuration, in the words of whoever trains.
-    pub config: String,
-    /// Name and checksum of each set of states.
-    pub data: Vec<(String, u32)>,
-}
-
 /// Why there is nothing to go on from.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum CheckpointError {
     /// No checkpoint in the directory.
     #[error("there is no checkpoint")]
@@ -103,7 +94,7 @@ impl Keeper {
     }
 
     /// `true` if a checkpoint is due between two steps of an epoch.
-    pub(in crate::training) fn is_due(&self) -> bool {
+    pub(crate) fn is_due(&self) -> bool {
         let state = self.state();
         match (self.every, state.last) {
             (Every::Seconds(seconds), Some((last, _))) => {
@@ -116,7 +107,7 @@ impl Keeper {
     }
 
     /// `true` if a checkpoint is due when so many epochs have been completed.
-    pub(in crate::training) fn is_due_after(&self, epochs: usize) -> bool {
+    pub(crate) fn is_due_after(&self, epochs: usize) -> bool {
         let last = self.state().last;
         match (self.every, last) {
             (Every::Epochs(every), Some((_, last))) => epochs.saturating_sub(last) >= every,
@@ -126,7 +117,7 @@ impl Keeper {
 
     /// Writes a checkpoint; if that fails the one before stands, training goes on, and a
     /// warning in the log tells.
-    pub(in crate::training) fn save<S: Scalar>(&self, seconds: f64, ended: &Ended<S>, underway: Option<&Underway<S>>) {
+    pub(crate) fn save<S: Scalar>(&self, seconds: f64, ended: &Ended<S>, underway: Option<&Underway<S>>) {
         let began = Instant::now();
         let mut state = self.state();
         let (newest, previous) = (self.directory.join(NEWEST), self.directory.join(PREVIOUS));
@@ -198,17 +189,6 @@ pub fn remove_checkpoints(files: &dyn Files, directory: &Path) -> std::io::Resul
         }
     }
     Ok(())
-}
-
-/// Header of a checkpoint, without its numbers.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Saved {
-    /// Configuration of the training.
-    pub config: String,
-    /// Epochs completed, polishing included.
-    pub epochs: usize,
-    /// Steps taken.
-    pub steps: usize,
 }
 
 /// The training whose checkpoint is in a directory.

@@ -1,14 +1,14 @@
 //! Checkpoints: everything a training needs to go on as if it had never stopped.
 //!
 //! A checkpoint is a safetensors file of the same make as a model file
-//! ([`container`](crate::network::file::container)), metadata key `lnn-checkpoint`. Its description holds the
+//! ([`container`](crate::storage::container)), metadata key `lnn-checkpoint`. Its description holds the
 //! configuration in the words of whoever trains, checksums of the data, and the numbers that are no tensors, floating
 //! point ones as the bits of `f64`. Tensors, in the precision of the training unless said otherwise:
 //!
 //! - `best`: parameters of the best epoch of the phases that ended; `history`, `f64` of shape `(epochs, 11)`: their rows;
 //! - while a phase is under way `weights`, `moments.first`, `moments.second` and `average` of its last step, `order` of
 //!   the states in its epoch (`u32`), `phase.best` and `phase.history`;
-//! - while [multiple shooting](crate::training::shooting) is under way behind the last phase the same of segments, without
+//! - while [multiple shooting](crate::shooting) is under way behind the last phase the same of segments, without
 //!   an average, and `shooting.starts`, `shooting.validation_starts`, `shooting.matrices` and `shooting.jacobian`, the
 //!   starts of all segments and the curvature of the loss by them.
 //!
@@ -16,25 +16,25 @@
 //! with the state of the random generator. Polishing has no state of its own: it begins again from the phases' end.
 
 mod format;
+mod identity;
 mod keeper;
 
-pub use keeper::{
-    CheckpointError, Every, Identity, Keeper, NEWEST, PREVIOUS, Restored, Saved, remove_checkpoints, saved,
-};
+pub use identity::{Identity, Saved};
+pub use keeper::{CheckpointError, Every, Keeper, NEWEST, PREVIOUS, Restored, remove_checkpoints, saved};
 
 use crate::network::file::{ModelFileError, StoredPrecision};
+use crate::optimizers::Moments;
+use crate::random::RandomGenerator;
 use crate::scalar::Scalar;
-use crate::training::optimizer::Moments;
-use crate::training::solver::{Epoch, Means};
-use rand_chacha::ChaCha8Rng;
+use crate::training::epoch::{Epoch, Means};
 use std::time::Instant;
 
 /// A training at some step.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Snapshot<S> {
-    pub(super) seconds: f64,
-    pub(super) ended: Ended<S>,
-    pub(super) underway: Option<Underway<S>>,
+    pub(crate) seconds: f64,
+    pub(crate) ended: Ended<S>,
+    pub(crate) underway: Option<Underway<S>>,
 }
 
 impl<S: Scalar> Snapshot<S> {
@@ -76,7 +76,7 @@ impl<S> Snapshot<S> {
 
 /// Result of the phases that have ended.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Ended<S> {
+pub(crate) struct Ended<S> {
     /// Number of phases that have ended.
     pub phases: usize,
     /// `true` if polishing has ended too.
@@ -104,7 +104,7 @@ impl<S> Ended<S> {
 
 /// A phase, or multiple shooting, between two of its steps.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Underway<S> {
+pub(crate) struct Underway<S> {
     pub course: Course<S>,
     /// One row per epoch of the phase.
     pub history: Vec<Epoch>,
@@ -120,7 +120,7 @@ pub(super) struct Underway<S> {
 
 /// The starts of segments between two steps of multiple shooting.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Shot<S> {
+pub(crate) struct Shot<S> {
     /// Seconds of multiple shooting.
     pub seconds: f64,
     /// Validation loss of the weights it began with.
@@ -131,16 +131,16 @@ pub(super) struct Shot<S> {
     pub starts: Vec<S>,
     pub validation_starts: Vec<S>,
     /// Curvature and derivatives of the last linearisation, as
-    /// [`Curvature`](crate::training::shooting::Curvature) keeps them.
+    /// [`Curvature`](crate::shooting::Curvature) keeps them.
     pub matrices: Vec<S>,
     pub jacobian: Vec<S>,
 }
 
 /// State that moves from step to step within a phase; the states of multiple shooting are segments.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Course<S> {
+pub(crate) struct Course<S> {
     /// Draws the order of every epoch.
-    pub rng: ChaCha8Rng,
+    pub rng: RandomGenerator,
     /// States in the order of the epoch.
     pub order: Vec<u32>,
     /// The weights that move.
@@ -165,7 +165,7 @@ pub(super) struct Course<S> {
 
 impl<S: Scalar> Course<S> {
     /// Before the first step of a phase over `states` states.
-    pub fn new(rng: ChaCha8Rng, states: usize) -> Self {
+    pub fn new(rng: RandomGenerator, states: usize) -> Self {
         Self {
             rng,
             order: (0..states as u32).collect(),
@@ -184,7 +184,7 @@ impl<S: Scalar> Course<S> {
 
 /// Seconds of training, all sittings together.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Clock {
+pub(crate) struct Clock {
     since: Instant,
     before: f64,
 }

@@ -343,7 +343,7 @@ fn every_option_is_in_the_guide() {
 fn the_configuration_reference_is_that_of_the_types() {
     let path = "docs/configuration.md";
     let page = read(path);
-    let of_training = lnn::training::configuration_reference();
+    let of_training = lnn::presets::configuration_reference();
     // A fit's reference goes on with that of a training.
     let whole = lnn(&["fit", "data.csv", "--coords", "q", "--print-config=markdown"]).stdout;
     let of_fit = whole.strip_suffix(&of_training).expect("the keys of a training follow those of a fit");
@@ -361,7 +361,7 @@ fn the_configuration_reference_is_that_of_the_types() {
     }
     let toml: Vec<&str> =
         lines(&page).1.into_iter().filter(|(language, _)| *language == "toml").map(|(_, line)| line).collect();
-    let config: lnn::training::Config =
+    let config: lnn::configuration::Config =
         lnn::cli::parse_config(&toml.join("\n")).expect("the example is a configuration");
     config.validate(2).unwrap();
 }

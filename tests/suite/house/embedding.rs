@@ -1,9 +1,10 @@
 //! The crate inside another program: global state, errors, dependencies.
 
+use lnn::data::Dataset;
 use lnn::lagrangian::{EulerLagrange, HandWritten, Terms, systems::double_pendulum::DoublePendulum};
 use lnn::network::{NetworkLagrangian, file::ModelFile};
 use lnn::rollout::Options;
-use lnn::training::{Dataset, Objective};
+use lnn::training::Objective;
 use lnn::{analysis, linalg, network, recording, rollout as motion, scalar, storage, tape, training};
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -21,7 +22,7 @@ const _: () = {
     shared::<Terms<f64>>();
     shared::<Dataset<f32>>();
     shared::<Objective<f32>>();
-    shared::<training::Config>();
+    shared::<lnn::configuration::Config>();
     shared::<training::Trained<f32>>();
     shared::<training::Hooks>();
     shared::<ModelFile<f32>>();
@@ -47,11 +48,11 @@ const _: () = {
     error::<tape::TapeError>();
     error::<analysis::GridError>();
     error::<training::CheckpointError>();
-    error::<training::ConfigError>();
-    error::<training::DatasetError>();
+    error::<lnn::configuration::ConfigError>();
+    error::<lnn::data::DatasetError>();
     error::<training::Failure>();
     error::<training::RecipeError>();
-    error::<training::SamplingError>();
+    error::<lnn::data::SamplingError>();
     error::<training::StepError>();
     error::<training::TrainingError>();
 };

@@ -1,5 +1,6 @@
 //! The repository itself: order of rooms, examples, use by other programs, seeds of the fuzz targets.
 
+mod circles;
 mod docs;
 mod embedding;
 mod examples;

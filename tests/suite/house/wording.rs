@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 /// Rooms whose documentation is held to it.
-const ROOMS: [&str; 15] = [
+const ROOMS: [&str; 17] = [
     "storage",
     "scalar",
     "ops",
@@ -13,8 +13,10 @@ const ROOMS: [&str; 15] = [
     "tape",
     "recording",
     "lagrangian",
+    "geometry",
     "rollout",
     "network",
+    "symmetry",
     "certificate",
     "training",
     "analysis",

@@ -1,12 +1,14 @@
 //! The engine over a number of another crate, beside `f64`.
 
+use lnn::configuration::Penalty;
+use lnn::data::Dataset;
 use lnn::lagrangian::systems::double_pendulum::DoublePendulum;
 use lnn::lagrangian::{EulerLagrange, HandWritten, Request, Terms, configure};
 use lnn::network::{Architecture, Form, Initialization, InputLayer, NetworkLagrangian, Nonlinearity, initial_weights};
 use lnn::rollout::{Method, Options, rollout_fixed};
 use lnn::scalar::{AnyFloat, Real, Scalar};
 use lnn::tape::{Depth, Evaluation, MixedDirections, ScalarFunction, gradient};
-use lnn::training::{Dataset, Objective, Penalty};
+use lnn::training::Objective;
 use ordered_float::OrderedFloat;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;

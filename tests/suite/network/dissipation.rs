@@ -4,19 +4,19 @@
 use crate::common::accuracy::{cast, largest};
 use crate::common::damped::Damped;
 use crate::common::{of_scalar, properties};
+use lnn::configuration::{Config, Data, Network, OnFailure, Optimizer, Phase, Precision, Regularizer, Scaling};
+use lnn::data::{Dataset, Datasets};
 use lnn::forward::HyperDual;
 use lnn::lagrangian::{EulerLagrange, Request, Terms};
 use lnn::linalg::Workspace;
 use lnn::network::{
     Architecture, Form, Initialization, InputLayer, Layout, NetworkLagrangian, Nonlinearity, Structure, initial_weights,
 };
+use lnn::optimizers::{Method as Update, Schedule};
 use lnn::rollout::{Method, Options, RolloutError, rollout, rollout_fixed, rollout_together};
 use lnn::scalar::{Dd, Real, Scalar};
 use lnn::tape::{Depth, Evaluation, MixedDirections, ScalarFunction, gradient};
-use lnn::training::{
-    Config, Data, Dataset, Datasets, Hooks, Method as Update, Network, OnFailure, Optimizer, Phase, Precision,
-    Regularizer, Scaling, Schedule, train,
-};
+use lnn::training::{Hooks, train};
 use proptest::prelude::*;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;

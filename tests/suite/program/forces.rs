@@ -2,12 +2,14 @@
 #![cfg(feature = "cli")]
 
 use crate::common::program::{Folder, Run, lnn, model, text};
+use lnn::configuration::Penalty;
+use lnn::data::{Measured, Preparation};
 use lnn::lagrangian::configure;
 use lnn::network::file::ModelFile;
 use lnn::recording::Columns;
 use lnn::recording::read::read_recording;
 use lnn::rollout::{Driven, Options, SampledForce};
-use lnn::training::{Measured, Objective, Penalty, Preparation};
+use lnn::training::Objective;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde_json::Value;

@@ -4,7 +4,7 @@
 use crate::common::program::{Folder, Run, command, lnn, model, text};
 use crate::program::fit::{COLUMNS, pendulum};
 use lnn::lagrangian::configure;
-use lnn::training::Preset;
+use lnn::presets::Preset;
 use std::fs;
 use std::path::Path;
 

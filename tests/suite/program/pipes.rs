@@ -3,7 +3,7 @@
 
 use crate::common::program::{Folder, HEADER, Run, command, lnn, text};
 use lnn::lagrangian::configure;
-use lnn::training::Preset;
+use lnn::presets::Preset;
 use serde_json::Value;
 use std::fs;
 use std::io::{BufRead, BufReader, Read};

@@ -1,8 +1,10 @@
 //! Trainings that are stopped and gone on with, from outside.
 #![cfg(all(feature = "cli", unix))]
 
+use lnn::configuration::Config;
 use lnn::lagrangian::configure;
-use lnn::training::{Config, NEWEST, PREVIOUS, Preset};
+use lnn::presets::Preset;
+use lnn::training::{NEWEST, PREVIOUS};
 use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -3,8 +3,9 @@
 
 use crate::common::program::{Folder, Run, command, lnn, text};
 use lnn::lagrangian::configure;
+use lnn::presets::Preset;
 use lnn::storage::Disk;
-use lnn::training::{NEWEST, Preset, saved};
+use lnn::training::{NEWEST, saved};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;

@@ -2,9 +2,10 @@
 #![cfg(feature = "cli")]
 
 use crate::common::program::{joined, lead};
+use lnn::configuration::Config;
 use lnn::lagrangian::configure;
 use lnn::network::file::ModelFile;
-use lnn::training::{Config, Preset};
+use lnn::presets::Preset;
 use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};

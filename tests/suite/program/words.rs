@@ -3,8 +3,9 @@
 
 use crate::common::program::{Folder, HEADER, inspect, lnn, model, text};
 use lnn::cli::{check_arguments, parse_config};
+use lnn::configuration::Config;
 use lnn::lagrangian::configure;
-use lnn::training::{Config, Preset};
+use lnn::presets::Preset;
 use std::ffi::OsString;
 
 /// Words of machines and of this program's insides.

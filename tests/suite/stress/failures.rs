@@ -4,11 +4,14 @@ use super::objective::{all_rows, architecture, states, step, weights};
 use super::record::{Row, exact};
 use crate::common::accuracy::{cast, configure};
 use crate::common::matrices::{dd, norm, times};
+use lnn::configuration::Penalty;
+use lnn::data::{Dataset, DatasetError};
 use lnn::lagrangian::{EulerLagrange, MechanicsError, Request, Terms};
 use lnn::linalg::{self, Failure as MatrixFailure, LinalgError, Workspace};
 use lnn::network::{NetworkLagrangian, Nonlinearity};
+use lnn::optimizers::{Method, Moments, Update};
 use lnn::scalar::{Dd, Real, Scalar};
-use lnn::training::{Dataset, DatasetError, Failure, Method, Moments, Objective, Penalty, Update};
+use lnn::training::{Failure, Objective};
 use std::time::Instant;
 
 const BATCHES: [usize; 8] = [1, 2, 23, 24, 63, 65, 130, 1024];
@@ -79,7 +82,8 @@ fn overflowing_states<S: Scalar>() {
             let (report, gradient) = step(&shape, (Penalty::None, 2), &theta, &data, &all_rows(batch));
             assert_eq!((report.failure, report.left_out), (Some(Failure::NotFinite { row: p }), 1), "batch {batch}");
             let mut moved = theta.clone();
-            let update = Update { method: Method::Radam, rate: 1e-3, weight_decay: 1e-6, clip: 1.0 };
+            let update =
+                Update { method: Method::Radam, rate: 1e-3, weight_decay: 1e-6, decaying: usize::MAX, clip: 1.0 };
             if !Moments::new(theta.len()).update(&mut moved, &mut gradient.clone(), &update).is_finite() {
                 assert_eq!(moved, theta);
             }

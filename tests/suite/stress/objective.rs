@@ -1,10 +1,12 @@
 //! Networks and batches that the cases of training share.
 
 use crate::common::accuracy::cast;
+use lnn::configuration::Penalty;
+use lnn::data::Dataset;
 use lnn::network::{Architecture, Form, Initialization, InputLayer, Nonlinearity, initial_weights};
 use lnn::scalar::{Dd, Scalar};
 use lnn::tape::{Depth, Evaluation, STATES};
-use lnn::training::{BatchReport, Dataset, Objective, Penalty};
+use lnn::training::{BatchReport, Objective};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

@@ -5,8 +5,8 @@ use super::record::{Row, exact};
 use crate::common::accuracy::cast;
 use crate::common::matrices::{dd, norm, with_spectrum};
 use lnn::linalg::{self, Inertia, Workspace};
+use lnn::linalg::{SignatureBuffers, Violation, characteristic_scales, eigenvalue_violation, sylvester_violation};
 use lnn::scalar::{Dd, Real, Scalar};
-use lnn::training::{SignatureBuffers, Violation, characteristic_scales, eigenvalue_violation, sylvester_violation};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

@@ -4,11 +4,13 @@ use super::objective::{all_rows, architecture, mass_matrices, states, step, weig
 use super::record::{Row, exact};
 use crate::common::accuracy::{cast, largest};
 use crate::common::matrices::dd;
+use lnn::configuration::Penalty;
+use lnn::data::Dataset;
 use lnn::lagrangian::{EulerLagrange, Request, Terms};
 use lnn::linalg::{self, Workspace};
 use lnn::network::{NetworkLagrangian, Nonlinearity};
 use lnn::scalar::{Dd, Real, Scalar};
-use lnn::training::{Dataset, Objective, Penalty};
+use lnn::training::Objective;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

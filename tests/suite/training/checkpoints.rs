@@ -1,12 +1,15 @@
 //! A training that is stopped anywhere and goes on is the training that was never stopped, to the last bit.
 
+use lnn::configuration::{Config, Phase, Polish};
+use lnn::data::{Datasets, sample_all};
 use lnn::lagrangian::configure;
 use lnn::network::{Architecture, Layout};
+use lnn::presets::Preset;
 use lnn::scalar::Scalar;
 use lnn::storage::Disk;
 use lnn::training::{
-    CheckpointError, Config, Datasets, Epoch, Every, Hooks, Identity, Keeper, NEWEST, PREVIOUS, Phase, Polish, Preset,
-    Progress, Sitting, Stop, Trained, TrainingError, remove_checkpoints, resume, sample_all, saved, train,
+    CheckpointError, Epoch, Every, Hooks, Identity, Keeper, NEWEST, PREVIOUS, Progress, Sitting, Stop, Trained,
+    TrainingError, remove_checkpoints, resume, saved, train,
 };
 use std::fs;
 use std::path::Path;

@@ -1,13 +1,14 @@
 //! Every operation on files made to fail in every way: what is read afterwards is the old content or the new.
 
 use super::faulty::{Fault, Faulty};
+use lnn::configuration::Config;
+use lnn::data::sample_all;
 use lnn::lagrangian::configure;
 use lnn::network::file::{FORMAT, Header, ModelFile, StoredPrecision};
 use lnn::network::{Architecture, Form, InputLayer, Layout, Nonlinearity};
+use lnn::presets::Preset;
 use lnn::storage::{Disk, Files, write_whole};
-use lnn::training::{
-    Config, Every, Hooks, Identity, Keeper, NEWEST, PREVIOUS, Preset, Progress, Sitting, Stop, resume, sample_all,
-};
+use lnn::training::{Every, Hooks, Identity, Keeper, NEWEST, PREVIOUS, Progress, Sitting, Stop, resume};
 use std::fs;
 use std::path::Path;
 use std::sync::Arc;

@@ -2,11 +2,14 @@
 
 use crate::common::accuracy::cast;
 use crate::common::properties;
+use lnn::configuration::Penalty;
+use lnn::data::Dataset;
+use lnn::data::{Estimated, Noise};
 use lnn::network::{Architecture, Form, Initialization, InputLayer, Layout, Nonlinearity, initial_weights};
 use lnn::recording::Track;
 use lnn::scalar::{Dd, Scalar};
-use lnn::training::shooting::{Estimated, Noise, Segments, Shots};
-use lnn::training::{Dataset, Objective, Penalty};
+use lnn::shooting::{Segments, Shots};
+use lnn::training::Objective;
 use proptest::prelude::*;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;

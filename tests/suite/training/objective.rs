@@ -1,15 +1,17 @@
 //! The training objective against reverse mode through the whole loss; the trainer's promises.
 
 use crate::common::{of_scalar, properties, solve};
+use lnn::configuration::{
+    Config, Data, Network, OnFailure, Optimizer, Penalty, Phase, Polish, Precision, Regularizer, Scaling,
+};
+use lnn::data::{Dataset, Datasets};
 use lnn::forward::HyperDual;
 use lnn::lagrangian::Lagrangian;
 use lnn::network::{Architecture, Form, Initialization, InputLayer, Layout, Nonlinearity, Structure, initial_weights};
+use lnn::optimizers::{Method, Schedule};
 use lnn::scalar::{Dd, Real, Scalar};
 use lnn::tape::{ScalarFunction, gradient};
-use lnn::training::{
-    Config, Data, Dataset, Datasets, Failure, Hooks, Method, Network, Objective, OnFailure, Optimizer, Penalty, Phase,
-    Polish, Precision, Regularizer, Scaling, Schedule, Stop, Trained, TrainingError, train,
-};
+use lnn::training::{Failure, Hooks, Objective, Stop, Trained, TrainingError, train};
 use proptest::prelude::*;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -1,10 +1,10 @@
 //! Regularizers of single mass matrices: zeros, signs, scales, gradients.
 
 use crate::common::properties;
-use lnn::scalar::{Dd, Scalar};
-use lnn::training::{
+use lnn::linalg::{
     SignatureBuffers, Violation, characteristic_scales, eigenvalue_violation, has_signature, sylvester_violation,
 };
+use lnn::scalar::{Dd, Scalar};
 use proptest::prelude::*;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -1,9 +1,11 @@
 //! Every preset of every system: it trains, to the same bits on any number of threads, on states that its motions go through.
 
 use lnn::analysis::StartBox;
+use lnn::configuration::Config;
 use lnn::lagrangian::{configure, systems};
+use lnn::presets::Preset;
 use lnn::rollout::{Options, rollout};
-use lnn::training::{Config, Hooks, Preset, run};
+use lnn::training::{Hooks, run};
 
 /// The preset with few states, few epochs and narrow layers, everything else as it ships.
 fn shrunk(mut config: Config) -> Config {

@@ -3,19 +3,18 @@
 use crate::common::accuracy::{cast, largest};
 use crate::common::nested::reference;
 use crate::common::{of_scalar, properties};
+use lnn::configuration::Penalty;
+use lnn::data::{Dataset, Datasets};
+use lnn::data::{Estimated, Noise};
 use lnn::lagrangian::configure;
 use lnn::network::{Architecture, Form, Initialization, InputLayer, Layout, LinearMap, Nonlinearity, initial_weights};
+use lnn::presets::Preset;
 use lnn::recording::Track;
 use lnn::scalar::{Dd, Real, Scalar};
+use lnn::shooting::{self, Curvature, Fitted, Segments, Shooting, ShootingError, Shots, Task, fit};
 use lnn::storage::Disk;
 use lnn::tape::{Depth, Evaluation, MixedDirections, ScalarFunction, gradient};
-use lnn::training::shooting::{
-    self, Curvature, Estimated, Fitted, Noise, Segments, Shooting, ShootingError, Shots, Task, fit,
-};
-use lnn::training::{
-    Dataset, Datasets, Every, Hooks, Identity, Keeper, Objective, Penalty, Preset, Progress, Sitting, Stop,
-    TrainingError, resume,
-};
+use lnn::training::{Every, Hooks, Identity, Keeper, Objective, Progress, Sitting, Stop, TrainingError, resume};
 use proptest::prelude::*;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -1,0 +1,149 @@
+//! `lnn geometry`: metric, connection and curvature of points, full digits.
+
+use crate::cli::shown::{CHUNK, report_failures};
+use crate::cli::source::{Source, parameter};
+use crate::cli::states::parse_table;
+use crate::cli::{CliError, input, output, states, tensors};
+use crate::geometry::{GeometryError, geometries};
+use crate::lagrangian::{EulerLagrange, Request, Terms};
+use crate::scalar::{Dd, Real, Scalar};
+use std::path::PathBuf;
+
+/// Arguments.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// A system by name (`lnn systems` lists them), or by the file that describes it.
+    #[arg(long, value_name = "NAME|FILE.toml", required_unless_present = "model", conflicts_with = "model")]
+    system: Option<String>,
+    /// A trained model, a file or the directory of a run.
+    #[arg(long, value_name = "MODEL")]
+    model: Option<PathBuf>,
+    /// A parameter of the system, decimal text read in the working precision; may be repeated.
+    #[arg(long, value_name = "SYMBOL=VALUE", num_args = 1.., value_parser = parameter, conflicts_with = "model")]
+    param: Vec<(String, String)>,
+    /// CSV of points, or - for standard input: the coordinates as header, in any order; other columns are left out.
+    #[arg(long, value_name = "FILE.csv")]
+    points: PathBuf,
+    /// The velocity at which the mass matrix is taken, in the order of the coordinates; it matters to Lagrangians that are not
+    /// quadratic in the velocities alone [default: zeros].
+    #[arg(long, value_name = "V1,V2,..", allow_hyphen_values = true)]
+    velocity: Option<String>,
+    /// Precision of everything, the reading of the points included.
+    #[arg(long, value_enum, value_name = "TYPE", default_value = "f64")]
+    precision: Precision,
+    /// One JSON object per line, or text: the components that are not zero, each of those that are equal by symmetry once.
+    #[arg(long, value_enum, value_name = "FORMAT", default_value = "json")]
+    format: Format,
+    /// The same as --format json.
+    #[arg(long, conflicts_with = "format")]
+    json: bool,
+}
+
+#[derive(Clone, Copy, Debug, clap::ValueEnum)]
+enum Precision {
+    /// Single, 9 digits.
+    F32,
+    /// Double, 17 digits.
+    F64,
+    /// Double-double, about 32 digits.
+    Dd,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum Format {
+    /// One object per line.
+    Json,
+    /// Text.
+    Table,
+}
+
+/// Numbers of second derivatives that are held at a time, about.
+const NUMBERS: usize = 1 << 20;
+
+/// Prints one object per point.
+///
+/// # Errors
+/// A usage or data error; after the last point, a data error if the metric of any point is degenerate or not finite.
+pub fn run(args: &Args) -> Result<(), CliError> {
+    match args.precision {
+        Precision::F32 => geometry::<f32>(args),
+        Precision::F64 => geometry::<f64>(args),
+        Precision::Dd => geometry::<Dd>(args),
+    }
+}
+
+fn geometry<S: Scalar>(args: &Args) -> Result<(), CliError> {
+    let source = match &args.model {
+        Some(path) => Source::<S>::model(path)?,
+        None => Source::<S>::system(args.system.as_deref().unwrap_or_default(), &args.param)?,
+    };
+    let n = source.columns.len() / 2;
+    let names = &source.columns[..n];
+    let velocity = velocity(args.velocity.as_deref(), names)?;
+    let place = input::name(&args.points);
+    let told = |e: &dyn std::fmt::Display| CliError::data(format_args!("{place}: {e}"));
+    let bytes = input::read(&args.points, states::MAX_BYTES).map_err(|e| told(&e))?;
+    let table = parse_table::<S>(&bytes, names).map_err(|e| told(&e))?;
+    drop(bytes);
+    if varies(&*source.model, &table.values[..n], &velocity) {
+        output::note(
+            "the mass matrix depends on the velocity; --velocity chooses where it is taken, here at rest or as given",
+        );
+    }
+
+    let chunk = (NUMBERS / n.pow(4)).clamp(1, CHUNK);
+    let mut failures: Vec<(usize, String)> = Vec::new();
+    for (points, rows) in table.values.chunks(chunk * n).zip(table.rows.chunks(chunk)) {
+        let found = geometries(&*source.model, points, &velocity).map_err(CliError::data)?;
+        let mut text = String::new();
+        for ((found, q), &row) in found.into_iter().zip(points.chunks(n)).zip(rows) {
+            let problem = found.as_ref().err().map(GeometryError::to_string);
+            let fields = match &found {
+                Ok(found) => tensors::fields(&found.metric.components, Some(found)),
+                Err(_) => tensors::fields(&metric(&*source.model, q, &velocity), None),
+            };
+            text += &match args.format {
+                Format::Json => tensors::object(n, &fields, problem.as_deref()),
+                Format::Table => tensors::block(names, row, &fields, problem.as_deref()),
+            };
+            failures.extend(problem.map(|problem| (row, problem)));
+        }
+        output::print(&text)?;
+    }
+    report_failures(&place, &failures)
+}
+
+/// The metric of a point, whatever it is like.
+fn metric<S: Scalar>(model: &dyn EulerLagrange<S>, q: &[S], v: &[S]) -> Vec<S> {
+    let mut terms = Terms::default();
+    // It is filled where it is not finite too.
+    let _ = model.terms(q, v, Request::MASS_MATRIX, &mut terms);
+    terms.mass_matrix
+}
+
+/// The velocity as given, zeros otherwise.
+fn velocity<S: Scalar>(given: Option<&str>, names: &[String]) -> Result<Vec<S>, CliError> {
+    let Some(text) = given else { return Ok(vec![<S as Real>::zero(); names.len()]) };
+    let numbers: Option<Vec<S>> = text.split(',').map(|x| S::parse(x.trim()).filter(|x| x.is_finite())).collect();
+    let expected = format!("expected {} finite numbers ({})", names.len(), names.join(","));
+    let numbers = numbers.ok_or_else(|| CliError::usage(format_args!("--velocity: {expected}, found {text:?}")))?;
+    match numbers.len() {
+        found if found == names.len() => Ok(numbers),
+        found => Err(CliError::usage(format_args!("--velocity: {expected}, found {found}"))),
+    }
+}
+
+/// `true` if the mass matrix of a point is another one at another velocity, beyond rounding.
+fn varies<S: Scalar>(model: &dyn EulerLagrange<S>, q: &[S], v: &[S]) -> bool {
+    let n = q.len();
+    let moved = v.iter().enumerate().map(|(i, &v)| v + S::of_f64(0.25 / (i + 1) as f64));
+    let both: Vec<S> = v.iter().copied().chain(moved).collect();
+    let mut terms = Terms::default();
+    if model.terms(&q.repeat(2), &both, Request::MASS_MATRIX, &mut terms).is_err() {
+        return false;
+    }
+    let (first, second) = terms.mass_matrix.split_at(n * n);
+    let most = first.iter().map(|x| x.abs().to_f64()).fold(0.0, f64::max);
+    let tolerance = most * S::epsilon().to_f64() * 1e4;
+    first.iter().zip(second).any(|(&a, &b)| (a - b).abs().to_f64() > tolerance)
+}

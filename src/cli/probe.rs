@@ -1,0 +1,196 @@
+//! A Lagrangian that is looked into: a system or a model, the states on which it is looked at, functions of its coordinates.
+
+use crate::cli::CliError;
+use crate::cli::chosen::{self, learned_system};
+use crate::cli::learned::Learned;
+use crate::cli::number::bounds;
+use crate::cli::source::Source;
+use crate::lagrangian::{Configured, EulerLagrange, configure_system};
+use crate::names::unknown;
+use crate::symmetry::{Basis, Chart, Degrees, Region};
+use std::path::Path;
+
+/// A Lagrangian with what is known of its coordinates.
+pub struct Probe {
+    /// Name of the system.
+    pub name: String,
+    /// Its terms.
+    pub model: Box<dyn EulerLagrange<f64>>,
+    /// Coordinates, then velocities.
+    pub columns: Vec<String>,
+    /// The states of interest: those of a system on which errors are stated, those a model was trained on.
+    pub region: Region,
+    /// `true` for a system, whose terms are exact.
+    pub exact: bool,
+    periodic: Vec<bool>,
+    units: Vec<String>,
+    /// The system, or the one that a model learned: its mass shell and its domain.
+    system: Option<Configured<f64>>,
+}
+
+/// `NAME=LOW:HIGH`, the bounds of a column.
+pub type Bound = (String, [f64; 2]);
+
+/// Reads [`Bound`].
+///
+/// # Errors
+/// The form that was expected.
+pub fn bound(text: &str) -> Result<Bound, String> {
+    let wrong = || "expected NAME=LOW:HIGH, such as r=4:12 or r_dot=-0.3:0.3".to_string();
+    let (name, range) = text.split_once('=').ok_or_else(wrong)?;
+    match bounds(range) {
+        Ok((low, high)) if !name.trim().is_empty() => Ok((name.trim().to_string(), [low, high])),
+        _ => Err(wrong()),
+    }
+}
+
+impl Probe {
+    /// A system by name or by file.
+    ///
+    /// # Errors
+    /// A usage error for an unknown name, a mistake in a file or a wrong parameter.
+    pub fn system(name: &str, given: &[(String, String)]) -> Result<Self, CliError> {
+        let system = chosen::system(name)?;
+        let Source { model, columns, .. } = Source::configured(system.clone(), given)?;
+        let configured = configure_system::<f64>(system, given).map_err(CliError::usage)?;
+        let n = configured.coordinates;
+        let (bounds, coordinates) = (configured.system.validation(n), configured.system.coordinates(n));
+        let pairs = |list: Vec<(f64, f64)>| list.into_iter().map(|(low, high)| [low, high]).collect();
+        Ok(Self {
+            name: configured.system.name.to_string(),
+            model,
+            columns,
+            region: Region { position: pairs(bounds.positions), velocity: pairs(bounds.velocities) },
+            exact: true,
+            periodic: coordinates.iter().map(|c| c.periodic).collect(),
+            units: coordinates.iter().map(|c| c.unit.to_string()).collect(),
+            system: Some(configured),
+        })
+    }
+
+    /// A trained model, by its file or by the directory of its run.
+    ///
+    /// # Errors
+    /// A data error for anything but a whole model file.
+    pub fn model(path: &Path) -> Result<Self, CliError> {
+        let learned = Learned::<f64>::load(path)?;
+        // A model of recorded motion has no system; its coordinates have no units then.
+        let known = learned_system(&learned.header).is_ok();
+        let system = if known { Some(learned.system(path)?) } else { None };
+        let Learned { header, network } = learned;
+        let units = match &system {
+            Some(system) => system.system.coordinates(system.coordinates).iter().map(|c| c.unit.to_string()).collect(),
+            None => vec![String::new(); network.coordinates()],
+        };
+        Ok(Self {
+            name: header.system,
+            model: Box::new(network),
+            columns: header.columns,
+            region: Region { position: header.position, velocity: header.velocity },
+            exact: false,
+            periodic: header.architecture.periodic,
+            units,
+            system,
+        })
+    }
+
+    /// One of the two: a file that ends in `.toml` and a name of the catalogue are systems, any other file or directory is a model.
+    ///
+    /// # Errors
+    /// As [`Probe::system`] and [`Probe::model`].
+    pub fn either(text: &str, given: &[(String, String)]) -> Result<Self, CliError> {
+        let path = Path::new(text);
+        let model = path.exists() && !chosen::is_file(text);
+        match (model, given.is_empty()) {
+            (true, true) => Self::model(path),
+            (true, false) => Err(CliError::usage(format_args!("{text}: a model has no parameters to choose"))),
+            _ => Self::system(text, given),
+        }
+    }
+
+    /// Replaces bounds of columns.
+    ///
+    /// # Errors
+    /// A usage error for a column that is not there.
+    pub fn narrow(&mut self, ranges: &[Bound]) -> Result<(), CliError> {
+        let n = self.model.coordinates();
+        for (name, range) in ranges {
+            match self.columns.iter().position(|column| column == name) {
+                Some(k) if k < n => self.region.position[k] = *range,
+                Some(k) => self.region.velocity[k - n] = *range,
+                None => {
+                    let problem = unknown("column", name, self.columns.iter().map(String::as_str));
+                    return Err(CliError::usage(format_args!("--region: {problem}")));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Narrows the states of both to those of both.
+    ///
+    /// # Errors
+    /// A usage error if there are none.
+    pub fn meet(&mut self, other: &mut Self) -> Result<(), CliError> {
+        let Region { position, velocity } = &mut self.region;
+        let ranges = position.iter_mut().chain(velocity);
+        let others = other.region.position.iter_mut().chain(&mut other.region.velocity);
+        for ((own, beside), name) in ranges.zip(others).zip(&self.columns) {
+            let both = [own[0].max(beside[0]), own[1].min(beside[1])];
+            // The velocity that a mass shell fixes has no bounds.
+            let both = match (own[0] < own[1], beside[0] < beside[1]) {
+                (true, true) => both,
+                (true, false) => *own,
+                _ => *beside,
+            };
+            if both[0] > both[1] {
+                let [a, b] = [own, beside].map(|range| format!("{}:{}", range[0], range[1]));
+                return Err(CliError::usage(format_args!("{name}: no state in common, {a} and {b}; --region chooses")));
+            }
+            (*own, *beside) = (both, both);
+        }
+        Ok(())
+    }
+
+    /// Names of the coordinates.
+    pub fn coordinates(&self) -> &[String] {
+        &self.columns[..self.model.coordinates()]
+    }
+
+    /// Functions of the coordinates up to these degrees, or those that are usual for its coordinates.
+    pub fn basis(&self, degrees: Option<Degrees>) -> (Basis, Degrees) {
+        let parts = self.periodic.iter().zip(&self.units).zip(&self.region.position);
+        let charts: Vec<Chart> = parts.map(|((periodic, unit), range)| Chart::of(*periodic, unit, *range)).collect();
+        let degrees = degrees.unwrap_or_else(|| Degrees::usual(&charts));
+        (Basis::new(self.coordinates(), &charts, degrees), degrees)
+    }
+
+    /// States `(states, n)` of the region, on the mass shell and inside the domain of the system.
+    ///
+    /// # Errors
+    /// A usage error if hardly any state of the region is inside.
+    pub fn states(&self, states: usize, seed: u64) -> Result<(Vec<f64>, Vec<f64>), CliError> {
+        self.states_beside(self, states, seed)
+    }
+
+    /// The same, inside the domain of another system as well, whose mass shell serves if this one has none.
+    ///
+    /// # Errors
+    /// As [`Probe::states`].
+    pub fn states_beside(&self, other: &Self, states: usize, seed: u64) -> Result<(Vec<f64>, Vec<f64>), CliError> {
+        let systems: Vec<_> = [other, self].into_iter().filter_map(|probe| probe.system.as_ref()).collect();
+        let accept = |q: &[f64], v: &mut [f64]| {
+            systems.iter().all(|system| system.check_domain(q).is_ok() && system.impose_constraint(q, v).is_ok())
+        };
+        let (q, v) = self.region.states(states, seed, accept);
+        if q.len() < states * self.model.coordinates() {
+            return Err(CliError::usage("--region: nearly all of its states are outside the domain of the system"));
+        }
+        Ok((q, v))
+    }
+}
+
+/// Number of states that are drawn for so many unknown coefficients.
+pub fn enough(unknowns: usize) -> usize {
+    (3 * unknowns).max(400)
+}

@@ -1,0 +1,269 @@
+//! `lnn symmetries`: what a Lagrangian conserves.
+
+use crate::cli::probe::{Bound, Probe, bound, enough};
+use crate::cli::source::parameter;
+use crate::cli::{CliError, number, output};
+use crate::names::{WIDTH, counted, number as digits, wrapped};
+use crate::report::text_table;
+use crate::symmetry::{Degrees, EXACT, Quadratic, Symmetries, quadratic, quadratic_unknowns, symmetries, unknowns};
+use serde::Serialize;
+use std::path::PathBuf;
+
+/// Arguments.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// A system by name (`lnn systems` lists them), or by the file that describes it.
+    #[arg(long, value_name = "NAME|FILE.toml", required_unless_present = "model", conflicts_with = "model")]
+    system: Option<String>,
+    /// A trained model, a file or the directory of a run.
+    #[arg(long, value_name = "MODEL")]
+    model: Option<PathBuf>,
+    /// A parameter of the system; may be repeated.
+    #[arg(long, value_name = "SYMBOL=VALUE", num_args = 1.., value_parser = parameter, conflicts_with = "model")]
+    param: Vec<(String, String)>,
+    /// Functions that fields are made of, by family and total degree: polynomial, trigonometric, hyperbolic; chosen by the
+    /// coordinates if not given.
+    #[arg(long, value_name = "FAMILY:DEGREE,..", value_parser = degrees)]
+    basis: Option<Degrees>,
+    /// Bounds of the states that are looked at, such as r=4:12 or r_dot=-0.3:0.3; those of the system, or those the model was
+    /// trained on, if not given.
+    #[arg(long, value_name = "NAME=LOW:HIGH,..", value_delimiter = ',', value_parser = bound)]
+    region: Vec<Bound>,
+    /// States that are looked at; three for every unknown coefficient if not given.
+    #[arg(long, value_name = "N", value_parser = number::count)]
+    points: Option<usize>,
+    /// Seed of the states.
+    #[arg(long, value_name = "N", default_value = "0", value_parser = number::seed)]
+    seed: u64,
+    /// Singular values up to this one count as zero; 1e-8 for a system, the largest gap for a model, if not given.
+    #[arg(long, value_name = "T", value_parser = number::positive)]
+    tolerance: Option<f64>,
+    /// Look for conserved quantities of second degree in the momenta as well.
+    #[arg(long)]
+    quadratic: bool,
+    /// Text, or one JSON object.
+    #[arg(long, value_enum, value_name = "FORMAT", default_value = "table")]
+    format: Format,
+    /// The same as --format json.
+    #[arg(long, conflicts_with = "format")]
+    json: bool,
+}
+
+/// Form of a result.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Format {
+    /// Text.
+    Table,
+    /// One object.
+    Json,
+}
+
+/// Degrees of families of functions.
+///
+/// # Errors
+/// The form that was expected.
+pub fn degrees(text: &str) -> Result<Degrees, String> {
+    text.parse()
+}
+
+/// Findings, as JSON.
+#[derive(Debug, Serialize)]
+struct Found {
+    system: String,
+    /// Point symmetries; null if there is no gap between singular values.
+    count: Option<usize>,
+    /// First singular value that is not zero over the last that is.
+    gap: Option<f64>,
+    /// Name of the algebra.
+    name: Option<String>,
+    fields: Vec<String>,
+    /// Function `F` of every field whose flow changes `L` by `dF/dt`.
+    gauge_functions: Vec<String>,
+    structure_constants: Vec<Vec<Vec<f64>>>,
+    killing_form_signature: [usize; 3],
+    /// Rest of the commutators beside combinations of the fields, relative.
+    closure: f64,
+    /// The symmetry of time, which is not counted: the energy is conserved.
+    time_translation: bool,
+    singular_values: Vec<f64>,
+    basis: Families,
+    /// Functions of the basis.
+    functions: usize,
+    points: usize,
+    seed: u64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    quadratic: Option<Second>,
+}
+
+#[derive(Debug, Serialize)]
+struct Families {
+    polynomial: usize,
+    trigonometric: usize,
+    hyperbolic: usize,
+}
+
+#[derive(Debug, Serialize)]
+struct Second {
+    /// New conserved quantities; null if there is no gap.
+    count: Option<usize>,
+    /// All of these functions, known ones included.
+    with_known: Option<usize>,
+    gap: Option<f64>,
+    conserved: Vec<String>,
+    singular_values: Vec<f64>,
+}
+
+impl From<Quadratic> for Second {
+    fn from(found: Quadratic) -> Self {
+        let with_known = found.separation.count;
+        Self {
+            count: with_known.map(|_| found.conserved.len()),
+            with_known,
+            gap: found.separation.gap,
+            conserved: found.conserved.iter().map(|quantity| quantity.text()).collect(),
+            singular_values: found.singular_values,
+        }
+    }
+}
+
+/// Finds symmetries and prints them.
+///
+/// # Errors
+/// A usage error for a wrong system or region, a data error for a bad model or terms that are not finite.
+pub fn run(args: &Args) -> Result<(), CliError> {
+    let mut probe = match &args.model {
+        Some(path) => Probe::model(path)?,
+        None => Probe::system(args.system.as_deref().unwrap_or_default(), &args.param)?,
+    };
+    probe.narrow(&args.region)?;
+    let (basis, families) = probe.basis(args.basis);
+    let n = probe.model.coordinates();
+    let own = unknowns(n, basis.len());
+    // Of quadratic quantities cyclic coordinates leave fewer functions than this.
+    let wanted = if args.quadratic { own.max(quadratic_unknowns(n, basis.len()).min(MOST)) } else { own };
+    let points = args.points.unwrap_or_else(|| enough(wanted));
+    let (q, v) = probe.states(points, args.seed)?;
+    let tolerance = args.tolerance.or(probe.exact.then_some(EXACT));
+    let model = probe.model.as_ref();
+    let found = symmetries(model, &basis, (&q, &v), tolerance).map_err(CliError::data)?;
+    let second = match args.quadratic {
+        true => Some(quadratic(model, &basis, &found.fields, (&q, &v), tolerance).map_err(CliError::data)?.into()),
+        false => None,
+    };
+    let Symmetries { singular_values, separation, fields, algebra, .. } = found;
+    let found = Found {
+        system: probe.name.clone(),
+        count: separation.count,
+        gap: separation.gap,
+        name: algebra.as_ref().and_then(|algebra| algebra.name.clone()),
+        fields: fields.iter().map(|field| field.text(&basis)).collect(),
+        gauge_functions: fields.iter().map(|field| field.gauge_text(&basis)).collect(),
+        killing_form_signature: algebra.as_ref().map_or([0; 3], |algebra| algebra.killing_form_signature),
+        closure: algebra.as_ref().map_or(0.0, |algebra| algebra.closure),
+        structure_constants: algebra.map_or(Vec::new(), |algebra| algebra.structure_constants),
+        time_translation: model.conserves_energy(),
+        singular_values,
+        basis: Families {
+            polynomial: families.polynomial,
+            trigonometric: families.trigonometric,
+            hyperbolic: families.hyperbolic,
+        },
+        functions: basis.len(),
+        points,
+        seed: args.seed,
+        quadratic: second,
+    };
+    if args.json || args.format == Format::Json {
+        return output::print(&(serde_json::to_string(&found).map_err(CliError::data)? + "\n"));
+    }
+    output::print(&found.text())
+}
+
+/// Unknown coefficients of quadratic quantities for which states are drawn, at most.
+const MOST: usize = 900;
+/// Singular values that are shown beyond the gap.
+const BEYOND: usize = 5;
+
+impl Found {
+    fn text(&self) -> String {
+        let time = if self.time_translation {
+            "time translation (the energy is conserved)"
+        } else {
+            "no time translation (friction takes energy)"
+        };
+        let mut text = match self.count {
+            None => format!("{}: no gap between singular values, so no number of symmetries; {time}\n", self.system),
+            Some(0) => format!("{}: no point symmetry in space; {time}\n", self.system),
+            Some(count) => {
+                let name = self.name.as_deref().unwrap_or("of no name known here");
+                let count = counted(count, "point symmetry", "point symmetries");
+                format!("{}: {count}, algebra {name}; {time}\n", self.system)
+            }
+        };
+        let last = self.count.unwrap_or(0) + BEYOND;
+        let shown: Vec<String> = self.singular_values.iter().take(last.min(20)).map(|x| digits(*x)).collect();
+        let more = if self.singular_values.len() > shown.len() { ", .." } else { "" };
+        text += &wrapped(&format!("singular values {}{more}\n", shown.join(", ")), WIDTH);
+        if let Some(gap) = self.gap {
+            text += &format!("gap {}\n", digits(gap));
+        }
+        if !self.fields.is_empty() {
+            let gauged = self.gauge_functions.iter().any(|gauge| gauge != "0");
+            let rows = self.fields.iter().zip(&self.gauge_functions).enumerate().map(|(k, (field, gauge))| {
+                let gauge = gauged.then(|| gauge.clone());
+                [format!("X{}", k + 1), field.clone()].into_iter().chain(gauge).collect()
+            });
+            let headers = &["field", "components", "gauge function"][..if gauged { 3 } else { 2 }];
+            text += &format!("\n{}", text_table(headers, &rows.collect::<Vec<Vec<String>>>()));
+            text += &self.commutators();
+            let [negative, positive, zero] = self.killing_form_signature;
+            text += &format!("Killing form: {negative} negative, {positive} positive, {zero} zero\n");
+        }
+        if let Some(second) = &self.quadratic {
+            text += &second.text();
+        }
+        text
+    }
+
+    /// Commutators that do not vanish, each a line.
+    fn commutators(&self) -> String {
+        let c = &self.structure_constants;
+        let mut text = String::new();
+        for a in 0..c.len() {
+            for b in a + 1..c.len() {
+                let terms = c[a][b].iter().enumerate().filter(|(_, x)| **x != 0.0);
+                let terms: Vec<String> = terms.map(|(k, x)| format!("{} X{}", factor(*x), k + 1)).collect();
+                if !terms.is_empty() {
+                    let sum = terms.join(" ");
+                    text += &format!("[X{}, X{}] = {}\n", a + 1, b + 1, sum.trim_start_matches("+ "));
+                }
+            }
+        }
+        text
+    }
+}
+
+/// A factor with its sign, 1 left out.
+fn factor(x: f64) -> String {
+    let sign = if x < 0.0 { "-" } else { "+" };
+    let size = x.abs();
+    if (size - 1.0).abs() < 1e-6 { sign.to_string() } else { format!("{sign} {}", digits(size)) }
+}
+
+impl Second {
+    fn text(&self) -> String {
+        match self.count {
+            None => "\nquantities quadratic in the momenta: no gap, so no number\n".to_string(),
+            Some(0) => {
+                "\nno conserved quantity quadratic in the momenta beyond the energy and products of charges\n".into()
+            }
+            Some(count) => {
+                let count = counted(count, "conserved quantity", "conserved quantities");
+                let list: String = self.conserved.iter().map(|quantity| format!("  {quantity}\n")).collect();
+                let text =
+                    format!("\n{count} quadratic in the momenta beyond the energy and products of charges:\n{list}");
+                wrapped(&text, WIDTH)
+            }
+        }
+    }
+}

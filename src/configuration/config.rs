@@ -1,0 +1,348 @@
+//! Everything that determines a training run; written beside every model as `config.toml`.
+
+use crate::configuration::error::{ConfigError, Faults, place};
+use crate::configuration::penalty::Regularizer;
+use crate::lagrangian::Description;
+use crate::network::file::MAX_WIDTH;
+use crate::network::{Form, Initialization, InputLayer, Nonlinearity, Structure};
+use crate::optimizers::Method;
+use crate::optimizers::Schedule;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Precision of weights and arithmetic in training.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Precision {
+    /// Single precision.
+    F32,
+    /// Double precision.
+    F64,
+}
+
+/// Reaction to a state without a finite acceleration or a gradient that is not finite.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum OnFailure {
+    /// States with a singular mass matrix are left out; a step that is not finite is skipped, weights unchanged.
+    Skip,
+    /// Training stops before the weights change and says step and row.
+    Stop,
+}
+
+/// Scaling of the coordinates.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Scaling {
+    /// `s_i` is the largest of `|q_i|` and `|v_i|` over the training set of the first phase.
+    Physical,
+    /// All `s_i` are 1.
+    None,
+}
+
+/// A complete training run. Keys that are not listed are refused.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Config {
+    /// Name of the system.
+    pub system: String,
+    /// Seed of everything random: states, weights, order of the data.
+    pub seed: u64,
+    /// Precision of weights and arithmetic.
+    pub precision: Precision,
+    /// Model whose weights the training starts from, instead of random ones: a file, or the directory of a run.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub from: Option<String>,
+    /// Parameters of the system; those that are not given have its defaults.
+    #[serde(default)]
+    pub parameters: BTreeMap<String, f64>,
+    /// The system itself, if it is none of the catalogue's; its name is `system`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub description: Option<Description>,
+    /// Sampled states.
+    pub data: Data,
+    /// Shape of the network.
+    pub network: Network,
+    /// Penalty on the mass matrix.
+    #[serde(default)]
+    pub penalty: Regularizer,
+    /// Update rule.
+    pub optimizer: Optimizer,
+    /// Phases in order, each from the best weights of the one before.
+    #[serde(rename = "phase")]
+    pub phases: Vec<Phase>,
+    /// Full-batch polishing after the last phase.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub polish: Option<Polish>,
+}
+
+/// Full-batch L-BFGS in double precision on the states of the last phase, from the best weights so far.
+///
+/// Keys that are not given have their defaults: 100 iterations, 20 pairs.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Polish {
+    /// Iterations at most.
+    pub iterations: usize,
+    /// Pairs of steps and gradient differences that are kept.
+    pub memory: usize,
+}
+
+impl Default for Polish {
+    fn default() -> Self {
+        Self { iterations: 100, memory: 20 }
+    }
+}
+
+fn is_zero(x: &f64) -> bool {
+    *x == 0.0
+}
+
+/// States that are sampled uniformly within bounds.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Data {
+    /// Number of training states.
+    pub training: usize,
+    /// Number of validation states; the best epoch is chosen on them.
+    pub validation: usize,
+    /// Fraction of the training states of a system with a mass shell that are drawn off it: their velocity is `u` times one on
+    /// the shell, `|u|` from 0.03 to 1 and uniform in its logarithm, of either sign, their acceleration `u^2` times as
+    /// large, as for every geodesic, and their residuals weigh `1/u^2` in the training loss. On the shell alone the metric
+    /// is not identifiable.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub off_shell: f64,
+    /// Fraction of the training states that lie on exact motions from the starts of the system's trajectory test, at any
+    /// time with equal chance, as long as these stay within the bounds of the phase. A [`Phase::logarithmic`] coordinate is so
+    /// in half of the starts as well; `off_shell` and `relative` treat these states like all others.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub motions: f64,
+    /// With a number `f` above 0 a training state weighs `f m / (f m + |a|)`, `|a|` the mean size of its scaled accelerations
+    /// and `m` the mean over all states: errors count relative to accelerations above `f m`, and a few large ones do not
+    /// outweigh the others.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub relative: f64,
+    /// Number of fresh states on which the final model is judged.
+    pub test: usize,
+    /// Validation and test bounds of each coordinate.
+    pub validation_position: Vec<[f64; 2]>,
+    /// Validation and test bounds of each velocity; those of a velocity that a mass shell fixes mean nothing.
+    pub validation_velocity: Vec<[f64; 2]>,
+}
+
+/// Shape of the network.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Network {
+    /// Widths of the hidden layers; the branches of a hybrid share them equally.
+    pub hidden: Vec<usize>,
+    /// Activation of the hidden layers.
+    pub activation: Nonlinearity,
+    /// Factor of the added `|v|^2` of scaled velocities.
+    pub alpha: f64,
+    /// Name of the coordinate whose square counts negative in the added term, `alpha (-t'^2 + x'^2 + ..)`; without it all
+    /// squares are added.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub time_like: Option<String>,
+    /// Scaling of the coordinates.
+    pub scaling: Scaling,
+    /// Feed sine and cosine of periodic coordinates.
+    pub embed_periodic: bool,
+    /// Layer before the first dense one.
+    #[serde(default)]
+    pub input_layer: InputLayer,
+    /// Units of a learned Rayleigh dissipation; without it the motion keeps its energy.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub dissipation: Option<usize>,
+    /// Structure of the Lagrangian: how it is made of the network's outputs.
+    #[serde(default)]
+    pub structure: Structure,
+    /// Names of the coordinates that the Lagrangian does not depend on.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub cyclic: Vec<String>,
+    /// `true` if the Lagrangian is even in the velocities.
+    #[serde(default)]
+    pub even_in_v: bool,
+    /// `true` if `alpha` is learned.
+    #[serde(default)]
+    pub learn_alpha: bool,
+    /// A Lagrangian that is known and added: a grey box.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub known: Option<Known>,
+    /// Distribution of the initial weights.
+    pub initialization: Initialization,
+}
+
+/// The known part of a grey box: a file, as a user writes it, or what it says, as a run keeps it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum Known {
+    /// Path of a system file.
+    File(String),
+    /// Its content.
+    Description(Box<Description>),
+}
+
+/// Update rule.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Optimizer {
+    /// Adam or RAdam.
+    pub method: Method,
+    /// States per step.
+    pub batch: usize,
+    /// L2 weight decay, added to the gradient.
+    pub weight_decay: f64,
+    /// The gradient's norm is cut to this.
+    pub clip: f64,
+    /// Weights are averaged over about `1/(1 - averaging)` steps for validation and the final model; 0: not averaged.
+    pub averaging: f64,
+    /// Reaction to a step that fails.
+    pub on_failure: OnFailure,
+}
+
+/// A stretch of training with its own states and learning rates.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Phase {
+    /// Passes through the training states.
+    pub epochs: usize,
+    /// Initial learning rate.
+    pub rate: f64,
+    /// Lowest learning rate.
+    pub eta_min: f64,
+    /// Course of the rate.
+    pub schedule: Schedule,
+    /// Epochs from highest to lowest rate of `cosine-annealing`.
+    pub t_max: f64,
+    /// Training bounds of each coordinate.
+    pub position: Vec<[f64; 2]>,
+    /// Training bounds of each velocity; those of a velocity that a mass shell fixes mean nothing.
+    pub velocity: Vec<[f64; 2]>,
+    /// For which coordinates half of the training states are uniform in the logarithm, where the low end of the bounds needs more
+    /// of them than its length; none if empty.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub logarithmic: Vec<bool>,
+}
+
+impl Network {
+    /// Index of the coordinate [`time_like`](Self::time_like) among these names, if there is one.
+    ///
+    /// # Errors
+    /// A name that is none of them.
+    pub fn time_like_index<'a>(
+        &self,
+        coordinates: impl Iterator<Item = &'a str>,
+    ) -> Result<Option<usize>, ConfigError> {
+        self.time_like.as_ref().map(|name| place("network.time_like", name, coordinates)).transpose()
+    }
+}
+
+impl Network {
+    /// Knowledge of the Lagrangian beforehand, for coordinates with these names.
+    ///
+    /// # Errors
+    /// A cyclic coordinate that is none of them.
+    pub fn form<'a>(&self, coordinates: impl Iterator<Item = &'a str> + Clone) -> Result<Form, ConfigError> {
+        let index = |name: &String| place("network.cyclic", name, coordinates.clone());
+        Ok(Form {
+            structure: self.structure,
+            cyclic: self.cyclic.iter().map(index).collect::<Result<_, _>>()?,
+            even_in_v: self.even_in_v,
+            learn_alpha: self.learn_alpha,
+            known: match &self.known {
+                Some(Known::Description(description)) => Some(description.clone()),
+                // Whoever reads a configuration reads the file too.
+                Some(Known::File(_)) | None => None,
+            },
+        })
+    }
+}
+
+impl Config {
+    /// Checks every range, for a system of `n` coordinates.
+    ///
+    /// # Errors
+    /// The first value out of range.
+    pub fn validate(&self, n: usize) -> Result<(), ConfigError> {
+        self.faults(n).into_iter().next().map_or(Ok(()), Err)
+    }
+
+    /// Every value out of range, for a system of `n` coordinates, in the order of the keys.
+    pub fn faults(&self, n: usize) -> Vec<ConfigError> {
+        let mut faults = Faults::default();
+        const STATES: usize = 1 << 30;
+        let data = &self.data;
+        faults.count(data.training, "data.training", STATES);
+        faults.count(data.validation, "data.validation", STATES);
+        faults.count(data.test, "data.test", STATES);
+        for (value, field) in [(data.off_shell, "data.off_shell"), (data.motions, "data.motions")] {
+            faults.number(value, field, (0.0..=1.0).contains(&value), "a number from 0 to 1");
+        }
+        faults.at_least_zero(data.relative, "data.relative");
+        faults.bounds("data.validation_position", &data.validation_position, n);
+        faults.bounds("data.validation_velocity", &data.validation_velocity, n);
+        self.network_faults(&mut faults);
+        faults.at_least_zero(self.penalty.lambda(), "penalty.lambda");
+        let optimizer = &self.optimizer;
+        faults.count(optimizer.batch, "optimizer.batch", STATES);
+        faults.at_least_zero(optimizer.weight_decay, "optimizer.weight_decay");
+        faults.number(optimizer.clip, "optimizer.clip", optimizer.clip > 0.0, "a positive number");
+        let averaging = optimizer.averaging;
+        let ok = (0.0..1.0).contains(&averaging);
+        faults.number(averaging, "optimizer.averaging", ok, "a number from 0 to below 1");
+        faults.check(!self.phases.is_empty(), "phase", "at least one phase", "none".to_string());
+        for (k, phase) in self.phases.iter().enumerate() {
+            phase.faults(k, n, &mut faults);
+        }
+        if let Some(polish) = &self.polish {
+            faults.count(polish.iterations, "polish.iterations", 1 << 24);
+            faults.count(polish.memory, "polish.memory", 1000);
+        }
+        faults.0
+    }
+
+    fn network_faults(&self, faults: &mut Faults) {
+        let network = &self.network;
+        let hidden = &network.hidden;
+        let ok = !hidden.is_empty() && hidden.len() <= 64;
+        faults.check(ok, "network.hidden", "1 to 64 widths", hidden.len().to_string());
+        for (k, &width) in hidden.iter().enumerate() {
+            let field = format!("network.hidden[{k}]");
+            let even = "an even width, for quadratic-softplus is two networks of half the width";
+            let ok = width.is_multiple_of(network.activation.branches().len());
+            if faults.count(width, &field, MAX_WIDTH) {
+                faults.check(ok, &field, even, width.to_string());
+            }
+        }
+        faults.number(network.alpha, "network.alpha", network.alpha.is_finite(), "a finite number");
+        if let Some(units) = network.dissipation {
+            faults.count(units, "network.dissipation", MAX_WIDTH);
+        }
+    }
+}
+
+impl Phase {
+    /// Every value of phase `k` that is out of range, for `n` coordinates.
+    fn faults(&self, k: usize, n: usize, faults: &mut Faults) {
+        let field = |name: &str| format!("phase[{k}].{name}");
+        faults.count(self.epochs, &field("epochs"), 1 << 24);
+        let positive = |x: f64| x.is_finite() && x > 0.0;
+        if faults.number(self.rate, &field("rate"), positive(self.rate), "a positive number") {
+            let ok = (0.0..=self.rate).contains(&self.eta_min);
+            faults.number(self.eta_min, &field("eta_min"), ok, "a number from 0 to the rate");
+        }
+        faults.number(self.t_max, &field("t_max"), positive(self.t_max), "a positive number of epochs");
+        faults.bounds(&field("position"), &self.position, n);
+        faults.bounds(&field("velocity"), &self.velocity, n);
+        let logarithmic = &self.logarithmic;
+        let found = format!("{} for {n}", logarithmic.len());
+        let expected = "nothing or true or false for each coordinate";
+        faults.check(logarithmic.is_empty() || logarithmic.len() == n, &field("logarithmic"), expected, found);
+        for (i, &[low, _]) in self.position.iter().enumerate() {
+            let ok = low > 0.0 || !logarithmic.get(i).copied().unwrap_or(false);
+            let expected = "a lowest coordinate above 0 to take its logarithm";
+            faults.check(ok, &field(&format!("position[{i}]")), expected, format!("{low}"));
+        }
+    }
+}

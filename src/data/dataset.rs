@@ -1,0 +1,205 @@
+//! States with their accelerations: what a network learns from.
+
+use crate::network::file::StoredPrecision;
+use crate::scalar::{Real, Scalar};
+use crate::storage::container::checksum;
+use thiserror::Error;
+
+/// States and accelerations in physical units, all `(states, n)` row-major, perhaps with known external forces.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Dataset<S> {
+    coordinates: usize,
+    q: Vec<S>,
+    v: Vec<S>,
+    a: Vec<S>,
+    /// Empty if there are none.
+    force: Vec<S>,
+    /// Empty if all are 1.
+    weight: Vec<S>,
+}
+
+/// Why numbers do not make a dataset.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum DatasetError {
+    /// Lengths disagree.
+    #[error("{what}: expected {expected} numbers, found {found}")]
+    Shape {
+        /// Which array.
+        what: &'static str,
+        /// Numbers expected.
+        expected: usize,
+        /// Numbers found.
+        found: usize,
+    },
+    /// A number is infinite or `NaN`.
+    #[error("{what} {column} of state {row} is not finite")]
+    NotFinite {
+        /// Which array.
+        what: &'static str,
+        /// State, from 0.
+        row: usize,
+        /// Coordinate, from 0.
+        column: usize,
+    },
+    /// No states.
+    #[error("a dataset needs at least one state")]
+    Empty,
+}
+
+/// Checks the length of an array and that it is finite.
+fn check<S: Scalar>(what: &'static str, values: &[S], expected: usize, n: usize) -> Result<(), DatasetError> {
+    if values.len() != expected {
+        return Err(DatasetError::Shape { what, expected, found: values.len() });
+    }
+    match values.iter().position(|x| !x.is_finite()) {
+        Some(k) => Err(DatasetError::NotFinite { what, row: k / n, column: k % n }),
+        None => Ok(()),
+    }
+}
+
+impl<S: Scalar> Dataset<S> {
+    /// Checks shapes and finiteness.
+    ///
+    /// # Errors
+    /// [`DatasetError`] naming the first offending array, row and column.
+    pub fn new(coordinates: usize, q: Vec<S>, v: Vec<S>, a: Vec<S>) -> Result<Self, DatasetError> {
+        if coordinates == 0 || q.is_empty() {
+            return Err(DatasetError::Empty);
+        }
+        let expected = q.len() / coordinates * coordinates;
+        for (what, values) in [("coordinate", &q), ("velocity", &v), ("acceleration", &a)] {
+            check(what, values, expected, coordinates)?;
+        }
+        Ok(Self { coordinates, q, v, a, force: Vec::new(), weight: Vec::new() })
+    }
+
+    /// The same states under known external generalized forces `Q`, `(states, n)` in physical units (N, N m), conjugate to
+    /// the coordinates: `Q.dq` is work in J.
+    ///
+    /// Accelerations alone leave the unit of `L` free. Forces fix it: with `M_ij` in scaled coordinates `s_i s_j` times
+    /// that in physical ones, `M a = g - c - dD/dv + Q` takes the force `s_i Q_i` in J, so that `L` comes out in J and the
+    /// dissipated power in W.
+    ///
+    /// # Errors
+    /// [`DatasetError`] naming the first offending row and column.
+    pub fn with_forces(self, force: Vec<S>) -> Result<Self, DatasetError> {
+        check("force", &force, self.q.len(), self.coordinates)?;
+        Ok(Self { force, ..self })
+    }
+
+    /// The same states, their residuals multiplied by these weights in the loss, `(states)`.
+    ///
+    /// # Errors
+    /// [`DatasetError`] for a wrong number of weights or one that is not finite.
+    pub fn with_weights(self, weight: Vec<S>) -> Result<Self, DatasetError> {
+        check("weight", &weight, self.len(), 1)?;
+        Ok(Self { weight, ..self })
+    }
+
+    /// Number of coordinates `n`.
+    pub fn coordinates(&self) -> usize {
+        self.coordinates
+    }
+    /// Number of states.
+    pub fn len(&self) -> usize {
+        self.q.len() / self.coordinates
+    }
+    /// `true` if there is no state; never, once built.
+    pub fn is_empty(&self) -> bool {
+        self.q.is_empty()
+    }
+    /// Coordinates `(states, n)`.
+    pub fn q(&self) -> &[S] {
+        &self.q
+    }
+    /// Velocities `(states, n)`.
+    pub fn v(&self) -> &[S] {
+        &self.v
+    }
+    /// Accelerations `(states, n)`.
+    pub fn a(&self) -> &[S] {
+        &self.a
+    }
+
+    /// Known external generalized forces `(states, n)`; empty if there are none.
+    pub fn force(&self) -> &[S] {
+        &self.force
+    }
+
+    /// Weight of a state's residuals in the loss.
+    pub fn weight(&self, state: usize) -> S {
+        self.weight.get(state).copied().unwrap_or(<S as Real>::one())
+    }
+
+    /// Lets a state pass `u` times as fast, backwards if `u` is negative: `v -> u v`, `a -> u^2 a`.
+    pub(crate) fn change_pace(&mut self, state: usize, u: S) {
+        let range = state * self.coordinates..(state + 1) * self.coordinates;
+        self.v[range.clone()].iter_mut().for_each(|v| *v = u * *v);
+        self.a[range].iter_mut().for_each(|a| *a = u * u * *a);
+    }
+
+    /// One scale per coordinate: the largest of `|q_i|` and `|v_i|` over all states, 1 where both vanish.
+    pub fn physical_scale(&self) -> Vec<f64> {
+        let n = self.coordinates;
+        (0..n)
+            .map(|i| {
+                let largest = |x: &[S]| x.iter().skip(i).step_by(n).fold(0.0_f64, |m, x| m.max(x.to_f64().abs()));
+                let scale = largest(&self.q).max(largest(&self.v));
+                if scale > 0.0 { scale } else { 1.0 }
+            })
+            .collect()
+    }
+
+    /// Smallest and largest velocity of coordinate `i`.
+    pub fn velocity_range(&self, i: usize) -> [f64; 2] {
+        let all = self.v.iter().skip(i).step_by(self.coordinates).map(|v| v.to_f64());
+        all.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(v), high.max(v)])
+    }
+
+    /// CRC-32 of coordinates, velocities, accelerations, forces and weights in double precision.
+    pub fn checksum(&self) -> u32 {
+        let all = self.q.iter().chain(&self.v).chain(&self.a).chain(&self.force).chain(&self.weight);
+        checksum(all, StoredPrecision::F64)
+    }
+
+    /// The same states in another precision.
+    pub fn cast<T: Scalar>(&self) -> Dataset<T> {
+        let cast = |x: &[S]| x.iter().map(|&x| x.cast()).collect();
+        Dataset {
+            coordinates: self.coordinates,
+            q: cast(&self.q),
+            v: cast(&self.v),
+            a: cast(&self.a),
+            force: cast(&self.force),
+            weight: cast(&self.weight),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn offending_numbers_are_named() {
+        let bad = Dataset::new(2, vec![0.0; 4], vec![0.0, 0.0, 0.0, f64::NAN], vec![0.0; 4]);
+        assert_eq!(bad, Err(DatasetError::NotFinite { what: "velocity", row: 1, column: 1 }));
+        let short = Dataset::new(2, vec![0.0; 4], vec![0.0; 2], vec![0.0; 4]);
+        assert_eq!(short, Err(DatasetError::Shape { what: "velocity", expected: 4, found: 2 }));
+        assert_eq!(Dataset::<f64>::new(2, vec![], vec![], vec![]), Err(DatasetError::Empty));
+        let good = Dataset::new(2, vec![0.0; 4], vec![0.0; 4], vec![0.0; 4]).unwrap();
+        let bad = good.clone().with_forces(vec![0.0, f64::INFINITY, 0.0, 0.0]);
+        assert_eq!(bad, Err(DatasetError::NotFinite { what: "force", row: 0, column: 1 }));
+        let forced = good.clone().with_forces(vec![1.0; 4]).unwrap();
+        assert!(forced.checksum() != good.checksum() && forced.cast::<f32>().force() == [1.0; 4]);
+        assert_eq!(good.with_forces(vec![]), Err(DatasetError::Shape { what: "force", expected: 4, found: 0 }));
+    }
+
+    #[test]
+    fn the_scale_is_the_largest_of_coordinate_and_velocity() {
+        let data = Dataset::new(2, vec![1.0, -3.0, 0.5, 0.0], vec![-2.0, 1.0, 0.0, 0.0], vec![9.0; 4]).unwrap();
+        assert_eq!(data.physical_scale(), vec![2.0, 3.0]);
+        assert_eq!((data.velocity_range(0), data.velocity_range(1)), ([-2.0, 0.0], [0.0, 1.0]));
+    }
+}

@@ -1,0 +1,19 @@
+//! Data: states with their accelerations, sampled from known systems or taken from recorded motion.
+
+mod bounds;
+mod dataset;
+mod datasets;
+mod draw;
+mod estimated;
+mod measured;
+mod motions;
+mod of_config;
+mod sampling;
+
+pub(crate) use bounds::boxes;
+pub use dataset::{Dataset, DatasetError};
+pub use datasets::Datasets;
+pub use draw::SamplingError;
+pub use estimated::{Estimated, Noise};
+pub use measured::{Measured, MeasuredError, Part, Preparation};
+pub use sampling::{sample, sample_all};

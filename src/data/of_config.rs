@@ -1,0 +1,83 @@
+//! System, penalty and shape of the network that a configuration asks for.
+
+use crate::configuration::{Config, ConfigError, Penalty, Regularizer, Scaling};
+use crate::data::draw::SamplingError;
+use crate::lagrangian::system::System;
+use crate::lagrangian::{Configured, configure_values, find};
+use crate::network::{Architecture, Form};
+use std::borrow::Cow;
+
+impl Config {
+    /// The configured system in double precision.
+    ///
+    /// # Errors
+    /// Unknown system or parameter, or a value out of range.
+    pub fn system(&self) -> Result<Configured<f64>, SamplingError> {
+        Ok(configure_values(self.system_entry()?, &self.parameters)?)
+    }
+
+    /// The system: the catalogue's entry, or the one of its description.
+    ///
+    /// # Errors
+    /// Unknown system, or a description that is wrong or of another name.
+    pub fn system_entry(&self) -> Result<Cow<'static, System>, SamplingError> {
+        match &self.description {
+            None => Ok(Cow::Borrowed(find(&self.system)?)),
+            Some(description) if description.name != self.system => Err(SamplingError::Config(ConfigError {
+                field: "description.name".to_string(),
+                expected: "the name of the system",
+                found: format!("`{}` for `{}`", description.name, self.system),
+            })),
+            Some(description) => Ok(Cow::Owned(description.system()?)),
+        }
+    }
+
+    /// The penalty, its time-like coordinate looked up in the system if it names one.
+    ///
+    /// # Errors
+    /// Unknown system or parameter, or a name that is no coordinate of it.
+    pub fn penalty(&self) -> Result<Penalty, SamplingError> {
+        let coordinates = match self.penalty {
+            Regularizer::LorentzianSylvester { .. } => {
+                let system = self.system()?;
+                system.system.coordinates(system.coordinates)
+            }
+            _ => Vec::new(),
+        };
+        Ok(self.penalty.penalty(coordinates.iter().map(|c| c.name.as_ref()))?)
+    }
+
+    /// Shape of the network for a system, with physical scales `scale` (used if the configuration scales).
+    pub fn architecture(&self, system: &Configured<f64>, scale: Vec<f64>) -> Architecture {
+        let coordinates = system.system.coordinates(system.coordinates);
+        let names = coordinates.iter().map(|c| c.name.as_ref());
+        // A name that is no coordinate is refused where the states are sampled.
+        let time_like = self.network.time_like_index(names.clone()).unwrap_or_default();
+        let form = self.network.form(names).unwrap_or_default();
+        let architecture = self.architecture_with(coordinates.iter().map(|c| c.periodic).collect(), scale);
+        Architecture { time_like, form, ..architecture }
+    }
+
+    /// Shape of the network for coordinates that are angles or not, with physical scales `scale` (used if the configuration
+    /// scales), both of length `n`; without a time-like coordinate, which has to be looked up by its name
+    /// ([`Network::time_like_index`](crate::configuration::Network::time_like_index)).
+    pub fn architecture_with(&self, periodic: Vec<bool>, scale: Vec<f64>) -> Architecture {
+        let n = periodic.len();
+        Architecture {
+            coordinates: n,
+            hidden: self.network.hidden.clone(),
+            activation: self.network.activation,
+            alpha: self.network.alpha,
+            time_like: None,
+            scale: match self.network.scaling {
+                Scaling::Physical => scale,
+                Scaling::None => vec![1.0; n],
+            },
+            periodic,
+            embed_periodic: self.network.embed_periodic,
+            input_layer: self.network.input_layer,
+            dissipation: self.network.dissipation,
+            form: Form::default(),
+        }
+    }
+}

@@ -1,0 +1,311 @@
+//! Training data of hand-written systems: uniform states with exact accelerations.
+
+use crate::configuration::Config;
+use crate::data::dataset::{Dataset, DatasetError};
+use crate::data::datasets::Datasets;
+use crate::data::draw::{Drawn, SamplingError, draw};
+use crate::data::motions::along_motions;
+use crate::lagrangian::Configured;
+use crate::random::RngStream;
+use crate::scalar::Scalar;
+use rand::Rng;
+
+/// Draws `states` states uniformly from a box, with their exact accelerations, all in double precision.
+///
+/// A system with a mass shell is put on it: the velocity of its time-like coordinate follows from the other numbers, its
+/// bounds mean nothing. States outside the system's domain, or with an acceleration that is not finite, are drawn again.
+///
+/// # Errors
+/// [`SamplingError::Domain`] if more than nine in ten draws are refused.
+pub fn sample(
+    system: &Configured<f64>,
+    field: &str,
+    bounds: (&[[f64; 2]], &[[f64; 2]]),
+    states: usize,
+    rng: &mut impl Rng,
+) -> Result<Dataset<f64>, SamplingError> {
+    fill(Drawn::default(), system, field, bounds, &[], states, rng)
+}
+
+/// Draws further states, up to `states`, as [`sample`] does.
+fn fill(
+    mut drawn: Drawn,
+    system: &Configured<f64>,
+    field: &str,
+    bounds: (&[[f64; 2]], &[[f64; 2]]),
+    logarithmic: &[bool],
+    states: usize,
+    rng: &mut impl Rng,
+) -> Result<Dataset<f64>, SamplingError> {
+    let n = system.coordinates;
+    let mut refused = 0_usize;
+    while drawn.q.len() < states * n {
+        let (q, mut v) = draw(bounds, logarithmic, rng);
+        system.impose_constraint(&q, &mut v)?;
+        if let Some(demand) = drawn.take(system, &q, &v)? {
+            refused += 1;
+            if refused > 1000 && refused > 9 * (drawn.q.len() / n) {
+                return Err(SamplingError::Domain { field: field.to_string(), demand });
+            }
+        }
+    }
+    Ok(Dataset::new(n, drawn.q, drawn.v, drawn.a)?)
+}
+
+/// The states with the weights of [`Data::relative`](crate::configuration::Data::relative).
+fn weigh(set: Dataset<f64>, floor: f64) -> Result<Dataset<f64>, DatasetError> {
+    let scale = set.physical_scale();
+    let size = |a: &[f64]| a.iter().zip(&scale).map(|(a, s)| (a / s).abs()).sum::<f64>() / scale.len() as f64;
+    let sizes: Vec<f64> = set.a().chunks_exact(scale.len()).map(size).collect();
+    let floor = floor * sizes.iter().sum::<f64>() / sizes.len() as f64;
+    // Without any acceleration every state counts the same.
+    let weight = |size: f64| if floor > 0.0 { floor / (floor + size) } else { 1.0 };
+    set.with_weights(sizes.into_iter().map(weight).collect())
+}
+
+/// Slowest velocity off a mass shell, as a part of one on it.
+const SLOWEST: f64 = 0.03;
+
+/// Slows a `fraction` of geodesic states down and reverses half of them: `v -> u v`, `a -> u^2 a`, `|u|` between
+/// [`SLOWEST`] and 1, uniform in its logarithm.
+///
+/// Their residuals weigh `1 / u^2`: an error of the connection counts at every speed alike.
+fn leave_shell(mut set: Dataset<f64>, fraction: f64, rng: &mut impl Rng) -> Result<Dataset<f64>, DatasetError> {
+    let mut weights = Vec::with_capacity(set.len());
+    for k in 0..set.len() {
+        let (chance, depth, reversed) = (rng.random::<f64>(), rng.random::<f64>(), rng.random::<bool>());
+        let mut weight = set.weight(k);
+        if chance < fraction {
+            let u = SLOWEST.powf(depth);
+            set.change_pace(k, if reversed { -u } else { u });
+            weight /= u * u;
+        }
+        weights.push(weight);
+    }
+    set.with_weights(weights)
+}
+
+/// All datasets of a run in its precision, with the physical scale of the first phase's training states.
+///
+/// # Errors
+/// [`SamplingError`].
+pub fn sample_all<S: Scalar>(
+    config: &Config,
+    system: &Configured<f64>,
+) -> Result<(Datasets<S>, Vec<f64>), SamplingError> {
+    config.validate(system.coordinates)?;
+    let coordinates = system.system.coordinates(system.coordinates);
+    config.network.time_like_index(coordinates.iter().map(|c| c.name.as_ref()))?;
+    config.network.form(coordinates.iter().map(|c| c.name.as_ref()))?;
+    let seed = config.seed;
+    let mut training = Vec::with_capacity(config.phases.len());
+    for (k, phase) in config.phases.iter().enumerate() {
+        let field = format!("phase[{k}].position");
+        let bounds = (phase.position.as_slice(), phase.velocity.as_slice());
+        let mut rng = RngStream::Training(k).generator(seed);
+        let states = config.data.training;
+        let moving = (config.data.motions * states as f64).round() as usize;
+        let drawn = along_motions(system, &field, bounds, &phase.logarithmic, moving, &mut rng)?;
+        let set = fill(drawn, system, &field, bounds, &phase.logarithmic, states, &mut rng)?;
+        let set = if config.data.relative > 0.0 { weigh(set, config.data.relative)? } else { set };
+        let off = config.data.off_shell;
+        let slowed = off > 0.0 && system.constrained_coordinate().is_some();
+        training.push(if slowed { leave_shell(set, off, &mut rng)? } else { set });
+    }
+    let scale = training[0].physical_scale();
+    let data = &config.data;
+    let bounds = (data.validation_position.as_slice(), data.validation_velocity.as_slice());
+    let field = "data.validation_position";
+    let validation = sample(system, field, bounds, data.validation, &mut RngStream::Validation.generator(seed))?;
+    let test = sample(system, field, bounds, data.test, &mut RngStream::Test.generator(seed))?;
+    let training = training.iter().map(Dataset::cast).collect();
+    Ok((Datasets { training, validation: validation.cast(), test: test.cast() }, scale))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lagrangian::{Request, Terms, configure};
+    use crate::presets::Preset;
+
+    #[test]
+    fn every_state_of_a_relativistic_system_is_on_the_mass_shell() {
+        let mut seen = 0;
+        for system in crate::lagrangian::systems().iter().filter(|s| s.constraint.is_some()) {
+            let configured = configure::<f64>(&system.name, &[]).unwrap();
+            let mut config = Preset::Quick.config(&configured).unwrap();
+            (config.data.training, config.data.validation, config.data.test) = (500, 200, 100);
+            config.data.off_shell = 0.0;
+            let (data, scale) = sample_all::<f64>(&config, &configured).unwrap();
+            let i = configured.constrained_coordinate().unwrap();
+            for set in data.training.iter().chain([&data.validation, &data.test]) {
+                let mut terms = Terms::default();
+                let exact = configured.build().unwrap();
+                exact.terms(set.q(), set.v(), Request::ENERGY, &mut terms).unwrap();
+                // 2 L = g(v, v) = -1; the terms of the sum are p_i v_i.
+                for ((l, p), v) in terms
+                    .lagrangian
+                    .iter()
+                    .zip(terms.momentum.chunks(set.coordinates()))
+                    .zip(set.v().chunks(set.coordinates()))
+                {
+                    let terms: f64 = p.iter().zip(v).map(|(p, v)| (p * v).abs()).sum();
+                    assert!((2.0 * l + 1.0).abs() <= 16.0 * f64::EPSILON * terms, "{}: {l} {terms}", system.name);
+                }
+                assert!(set.velocity_range(i)[0] > 0.0);
+            }
+            assert!(scale[i] >= data.training[0].velocity_range(i)[1] && scale.iter().all(|s| s.is_finite()));
+            // Whatever the bounds of the constrained velocity, nothing changes.
+            config.phases[0].velocity[i] = [-7.0, -7.0];
+            assert_eq!(sample_all::<f64>(&config, &configured).unwrap().0.training, data.training);
+            seen += 1;
+        }
+        assert_eq!(seen, 4);
+    }
+
+    #[test]
+    fn states_off_the_shell_are_states_of_the_same_motion() {
+        let system = configure::<f64>("ads4-geodesic", &[]).unwrap();
+        let mut config = Preset::Quick.config(&system).unwrap();
+        (config.data.training, config.data.validation, config.data.test) = (2000, 10, 10);
+        (config.data.off_shell, config.data.relative) = (0.25, 0.0);
+        let (data, _) = sample_all::<f64>(&config, &system).unwrap();
+        let (set, mut terms) = (&data.training[0], Terms::default());
+        let exact = system.build().unwrap();
+        exact.terms(set.q(), set.v(), Request::ENERGY | Request::ACCELERATION, &mut terms).unwrap();
+        let (mut off, mut reversed, mut slow) = (0, 0, 0);
+        for k in 0..set.len() {
+            let (v, a) = (&set.v()[4 * k..][..4], &set.a()[4 * k..][..4]);
+            // 2 L = g(v, v) = -u^2.
+            let u = (-2.0 * terms.lagrangian[k]).sqrt();
+            assert!((0.03 * (1.0 - 1e-12)..=1.0 + 1e-9).contains(&u), "{u}");
+            assert!((set.weight(k) * u * u - 1.0).abs() < 1e-9);
+            let exact = &terms.acceleration[4 * k..][..4];
+            let size = exact.iter().fold(0.0f64, |m, a| m.max(a.abs()));
+            assert!(a.iter().zip(exact).all(|(a, b)| (a - b).abs() <= 1e-12 * size));
+            off += usize::from(u < 1.0 - 1e-9);
+            reversed += usize::from(v[0] < 0.0);
+            slow += usize::from(u < 0.03f64.sqrt());
+        }
+        // Binomial: means 500, 250, 250, deviations 19, 15, 15.
+        assert!((400..600).contains(&off) && (175..325).contains(&reversed) && (175..325).contains(&slow));
+        assert!((0..10).all(|k| data.validation.weight(k) == 1.0));
+        config.data.off_shell = 1.5;
+        assert!(matches!(sample_all::<f64>(&config, &system), Err(SamplingError::Config(_))));
+    }
+
+    #[test]
+    fn relative_weights_fall_with_the_acceleration() {
+        let set = Dataset::new(2, vec![1.0, 4.0, -2.0, 0.0], vec![0.0; 4], vec![2.0, 0.0, 2.0, 20.0]).unwrap();
+        // Scales 2 and 4: sizes 1/2 and 3, mean 7/4.
+        let weighed = weigh(set.clone(), 2.0).unwrap();
+        assert_eq!([weighed.weight(0), weighed.weight(1)], [3.5 / 4.0, 3.5 / 6.5]);
+        let still = Dataset::new(2, vec![1.0, 4.0], vec![0.0; 2], vec![0.0; 2]).unwrap();
+        assert_eq!(weigh(still, 2.0).unwrap().weight(0), 1.0);
+        // Slowed and reversed states keep them.
+        let mut rng = RngStream::Test.generator(0);
+        let slowed = leave_shell(weighed.clone(), 1.0, &mut rng).unwrap();
+        for k in 0..2 {
+            let squared = slowed.a()[2 * k] / weighed.a()[2 * k];
+            assert!((slowed.weight(k) * squared / weighed.weight(k) - 1.0).abs() < 1e-12 && squared < 1.0);
+        }
+        let system = configure::<f64>("spring-pendulum", &[]).unwrap();
+        let mut config = Preset::Quick.config(&system).unwrap();
+        (config.data.training, config.data.validation, config.data.test) = (50, 10, 10);
+        let (data, _) = sample_all::<f64>(&config, &system).unwrap();
+        assert!((0..50).all(|k| (1e-6..1.0).contains(&data.training[0].weight(k))));
+        config.data.relative = -1.0;
+        let refused = sample_all::<f64>(&config, &system).unwrap_err().to_string();
+        assert_eq!(refused, "data.relative: expected a finite number of at least 0, found -1");
+    }
+
+    #[test]
+    fn half_of_a_logarithmic_coordinate_is_uniform_in_its_logarithm() {
+        let system = configure::<f64>("ads2-geodesic", &[]).unwrap();
+        let mut config = Preset::Quick.config(&system).unwrap();
+        (config.data.training, config.data.validation, config.data.test) = (8000, 10, 10);
+        config.data.motions = 0.0;
+        config.phases[0].position = vec![[-5.0, 5.0], [0.25, 64.0]];
+        let below_four = |logarithmic: &[bool]| {
+            let mut config = config.clone();
+            config.phases[0].logarithmic = logarithmic.to_vec();
+            let (data, _) = sample_all::<f64>(&config, &system).unwrap();
+            let z = data.training[0].q().chunks(2).map(|q| q[1]);
+            assert!(z.clone().all(|z| (0.25..=64.0).contains(&z)));
+            z.filter(|z| *z < 4.0).count()
+        };
+        // 3.75 of 63.75 uniformly, 4 of 8 doublings logarithmically; the means' deviations are 21 and 41.
+        let (plain, mixed) = (below_four(&[]), below_four(&[false, true]));
+        assert!(plain.abs_diff(471) < 110 && mixed.abs_diff(2235) < 210, "{plain} {mixed}");
+        config.phases[0].logarithmic = vec![true, false];
+        let refused = sample_all::<f64>(&config, &system).unwrap_err().to_string();
+        assert!(refused.starts_with("phase[0].position[0]: expected a lowest coordinate above 0"), "{refused}");
+        config.phases[0].logarithmic = vec![true];
+        let refused = sample_all::<f64>(&config, &system).unwrap_err().to_string();
+        assert!(refused.starts_with("phase[0].logarithmic: expected nothing or true or false"), "{refused}");
+    }
+
+    #[test]
+    fn scales_of_the_papers_geodesics() {
+        let system = configure::<f64>("ads4-geodesic", &[]).unwrap();
+        let mut config = Preset::Paper.config(&system).unwrap();
+        assert_eq!((config.data.training, config.data.validation), (120_000, 24_000));
+        (config.data.training, config.data.validation, config.data.test) = (120_000, 10, 10);
+        let (_, scale) = sample_all::<f32>(&config, &system).unwrap();
+        // s_t = 6.18, s_x = s_y = 5.00, s_z = 6.00; t_dot is at most sqrt(1 + 1 + 0.6^2 + 6^2) = 6.20.
+        assert!((6.15..6.2).contains(&scale[0]), "{scale:?}");
+        assert!(scale[1..].iter().zip([5.0, 5.0, 6.0]).all(|(s, paper)| (s - paper).abs() < 0.005), "{scale:?}");
+    }
+
+    #[test]
+    fn bounds_longer_than_the_largest_number_are_refused_and_can_be_drawn_from() {
+        let system = configure::<f64>("double-pendulum", &[]).unwrap();
+        let quick = Preset::Quick.config(&system).unwrap();
+        let wide = [-1e308, 1e308];
+        type Bounds<'a> = fn(&mut Config) -> &mut Vec<[f64; 2]>;
+        let all: [(&str, Bounds<'_>); 4] = [
+            ("phase[0].position", |c| &mut c.phases[0].position),
+            ("phase[0].velocity", |c| &mut c.phases[0].velocity),
+            ("data.validation_position", |c| &mut c.data.validation_position),
+            ("data.validation_velocity", |c| &mut c.data.validation_velocity),
+        ];
+        for (field, bounds) in all {
+            let mut config = quick.clone();
+            bounds(&mut config)[1] = wide;
+            let refused = sample_all::<f64>(&config, &system).unwrap_err().to_string();
+            let expected = "[low, high] no further apart than the largest number, found [-1e308, 1e308]";
+            assert_eq!(refused, format!("{field}[1]: expected {expected}"));
+        }
+        let mut rng = RngStream::Test.generator(0);
+        let (q, v) = draw((&[wide; 50], &[[2.0, 2.0]]), &[], &mut rng);
+        assert!(q.iter().all(|q| q.is_finite()) && q.iter().any(|q| *q < 0.0) && q.iter().any(|q| *q > 0.0));
+        assert_eq!(v, [2.0]);
+    }
+
+    #[test]
+    fn a_time_like_coordinate_is_one_of_the_system() {
+        let system = configure::<f64>("ads4-geodesic", &[]).unwrap();
+        for preset in [Preset::Quick, Preset::Best, Preset::Paper] {
+            let config = preset.config(&system).unwrap();
+            assert_eq!(config.architecture(&system, vec![1.0; 4]).time_like, Some(0));
+        }
+        let mut config = Preset::Quick.config(&system).unwrap();
+        config.network.time_like = Some("w".to_string());
+        let refused = sample_all::<f64>(&config, &system).unwrap_err().to_string();
+        assert_eq!(refused, "network.time_like: expected the name of a coordinate, found `w`; there are t, x, y, z");
+        let pendulum = configure::<f64>("double-pendulum", &[]).unwrap();
+        assert_eq!(Preset::Quick.config(&pendulum).unwrap().network.time_like, None);
+    }
+
+    #[test]
+    fn velocities_beyond_light_are_drawn_again_or_refused() {
+        let system = configure::<f64>("charged-particle", &[]).unwrap();
+        let at = |low: f64, high: f64| {
+            let mut rng = RngStream::Test.generator(0);
+            sample(&system, "box", (&[[0.0, 1.0]; 3], &[[low, high]; 3]), 100, &mut rng)
+        };
+        let set = at(-1.0, 1.0).unwrap();
+        assert!(set.v().chunks(3).all(|v| v.iter().map(|v| v * v).sum::<f64>() < 1.0));
+        assert!(matches!(at(0.9, 1.0), Err(SamplingError::Domain { demand: "a finite acceleration", .. })));
+    }
+}

@@ -1,0 +1,120 @@
+//! The geometry of a Lagrangian: metric, connection, curvature at points.
+//!
+//! The metric is the mass matrix `g_ij = d2L/dv_i dv_j` as it is: of `L = g_ij v_i v_j/2` it is `g_ij`, of `L = m g_ij v_i v_j/2`
+//! it is `m g_ij`, whose curvature scalar is that of `g_ij` over `m`. Of a Lagrangian that is not quadratic in the velocities it
+//! is the one at a given velocity, which the derivatives keep; of a quadratic one the velocity does not matter.
+//!
+//! Derivatives are exact to rounding, up to the fourth of `L`. Conventions are those of Misner, Thorne and Wheeler, signature
+//! `-+++`:
+//!
+//! ```text
+//! G^k_ij  = g^kl (d_i g_lj + d_j g_li - d_l g_ij)/2
+//! R^a_bcd = d_c G^a_bd - d_d G^a_bc + G^a_ce G^e_bd - G^a_de G^e_bc
+//! R_bd    = R^a_bad,   R = g^bd R_bd
+//! ```
+//!
+//! so that the unit sphere has `R = 2`, anti-de Sitter space of unit radius in four dimensions `R = -12` and
+//! `R_abcd R^abcd = 24`. Tensors are flat, row-major in the order of their indices: `R^a_bcd` stands at `[a][b][c][d]`.
+//!
+//! ```
+//! use lnn::geometry::geometries;
+//! use lnn::lagrangian::build;
+//!
+//! let space = build::<f64>("ads4-geodesic", &[])?; // coordinates t, x, y, z
+//! let point = geometries(&*space, &[0.0, 0.3, -0.2, 1.5], &[0.0; 4])?.remove(0)?;
+//! assert_eq!((point.metric.signature.negative, point.metric.signature.positive), (1, 3));
+//! assert!((point.curvature.scalar + 12.0).abs() < 1e-13);
+//! assert!((point.curvature.kretschmann - 24.0).abs() < 1e-13);
+//! assert!((point.connection.symbols[0 * 16 + 0 * 4 + 3] + 1.0 / 1.5).abs() < 1e-15); // G^t_tz = -1/z
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod connection;
+mod curvature;
+mod error;
+mod metric;
+mod surfaces;
+mod tensor;
+
+pub use connection::Connection;
+pub use curvature::Curvature;
+pub use error::GeometryError;
+pub use metric::Metric;
+pub use surfaces::{Change, Character, Surface, characters, grid, surfaces};
+
+use crate::lagrangian::{EulerLagrange, MetricJet};
+use crate::scalar::Scalar;
+
+/// Metric, connection and curvature at a point.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Geometry<S> {
+    /// Metric, inverse, determinant, signature.
+    pub metric: Metric<S>,
+    /// Christoffel symbols.
+    pub connection: Connection<S>,
+    /// Curvature tensors.
+    pub curvature: Curvature<S>,
+}
+
+impl<S: Scalar> Geometry<S> {
+    /// The geometry of a metric with first and second derivatives.
+    ///
+    /// # Errors
+    /// [`GeometryError::Degenerate`] for a metric without inverse, [`GeometryError::NotFinite`], [`GeometryError::Shape`].
+    pub fn new(jet: &MetricJet<S>) -> Result<Self, GeometryError> {
+        let n = jet.coordinates();
+        for (what, rank, found) in
+            [("first derivatives", 3, jet.first.len()), ("second derivatives", 4, jet.second.len())]
+        {
+            error::expect_length(what, n.pow(rank), found)?;
+        }
+        let metric = Metric::new(n, &jet.metric)?;
+        if jet.first.iter().chain(&jet.second).any(|x| !x.is_finite()) {
+            return Err(GeometryError::NotFinite { what: "a derivative of the metric" });
+        }
+        let connection = Connection::new(jet, &metric);
+        let curvature = Curvature::new(jet, &metric, &connection);
+        if curvature.riemann.iter().any(|x| !x.is_finite()) {
+            return Err(GeometryError::NotFinite { what: "the curvature" });
+        }
+        Ok(Self { metric, connection, curvature })
+    }
+
+    /// The same in other numbers.
+    ///
+    /// # Errors
+    /// [`GeometryError::NotFinite`] where they do not reach that far.
+    pub fn rounded<T: Scalar>(&self) -> Result<Geometry<T>, GeometryError> {
+        let Self { metric, connection, curvature } = self;
+        let rounded =
+            Geometry { metric: metric.rounded(), connection: connection.rounded(), curvature: curvature.rounded() };
+        let Geometry { metric, connection, curvature } = &rounded;
+        let tensors: [&[T]; 4] = [&metric.components, &metric.inverse, &connection.symbols, &curvature.riemann];
+        if tensors.into_iter().flatten().any(|x| !x.is_finite()) {
+            return Err(GeometryError::NotFinite { what: "the geometry, rounded," });
+        }
+        Ok(rounded)
+    }
+}
+
+/// The geometry of a model at points `(batch, n)` in physical units, each with its own failure.
+///
+/// `velocity`, `(n)`, is the one at which the mass matrix is taken: zeros unless `L` is more than quadratic in the velocities.
+/// Lagrangians that are written down are computed in double-double numbers and rounded at the end; networks in their own numbers.
+///
+/// # Errors
+/// [`GeometryError::Shape`]; what [`EulerLagrange::metric_jets`] refuses.
+#[allow(clippy::type_complexity)]
+pub fn geometries<S: Scalar>(
+    model: &dyn EulerLagrange<S>,
+    points: &[S],
+    velocity: &[S],
+) -> Result<Vec<Result<Geometry<S>, GeometryError>>, GeometryError> {
+    let n = model.coordinates();
+    error::expect_length("velocity", n, velocity.len())?;
+    let velocities = velocity.repeat(points.len() / n.max(1));
+    if let Some(jets) = model.wide_metric_jets(points, &velocities)? {
+        return Ok(jets.iter().map(|jet| Geometry::new(jet)?.rounded()).collect());
+    }
+    Ok(model.metric_jets(points, &velocities)?.iter().map(Geometry::new).collect())
+}

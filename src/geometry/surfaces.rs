@@ -1,0 +1,156 @@
+//! Surfaces where a metric changes its character: ergosurfaces, horizons, changes of signature.
+
+use super::GeometryError;
+use super::metric::determinant;
+use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Terms};
+use crate::linalg::{Inertia, inertia};
+use crate::scalar::{Real, Scalar};
+
+/// Character of a metric at a point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Character<S> {
+    /// `det g`; `NaN` where the metric is not finite.
+    pub determinant: S,
+    /// Numbers of negative, zero and positive eigenvalues; `None` where the metric is not finite.
+    pub signature: Option<Inertia>,
+}
+
+/// Behaviour of a determinant where it changes its sign.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Change {
+    /// It vanishes.
+    Zero,
+    /// It is infinite.
+    Pole,
+}
+
+/// Point of a surface on a line.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Surface<S> {
+    /// Coordinates `(n)`, to the precision of the numbers.
+    pub point: Vec<S>,
+    /// Behaviour of the determinant there.
+    pub change: Change,
+}
+
+/// Metrics of points `(batch, n)` with the same velocity, `(batch, n, n)`.
+fn metrics<S: Scalar>(model: &dyn EulerLagrange<S>, points: &[S], velocity: &[S]) -> Result<Vec<S>, GeometryError> {
+    let n = model.coordinates();
+    super::error::expect_length("velocity", n, velocity.len())?;
+    let mut terms = Terms::default();
+    match model.terms(points, &velocity.repeat(points.len() / n.max(1)), Request::MASS_MATRIX, &mut terms) {
+        // Metrics are filled where they are not finite too: on a horizon, at a pole.
+        Ok(()) | Err(MechanicsError::NotFinite { .. }) => Ok(terms.mass_matrix),
+        Err(error) => Err(error.into()),
+    }
+}
+
+/// The character of the metric at points `(batch, n)`, such as those of a [`grid`], at a velocity `(n)`.
+///
+/// # Errors
+/// [`GeometryError::Shape`] and the model's own.
+pub fn characters<S: Scalar>(
+    model: &dyn EulerLagrange<S>,
+    points: &[S],
+    velocity: &[S],
+) -> Result<Vec<Character<S>>, GeometryError> {
+    let n = model.coordinates();
+    let mut scratch = vec![S::nan(); n * n];
+    let character = |metric: &[S]| Character {
+        determinant: determinant(n, metric),
+        signature: inertia(n, metric, &mut scratch).ok(),
+    };
+    Ok(metrics(model, points, velocity)?.chunks_exact((n * n).max(1)).map(character).collect())
+}
+
+/// Points `(batch, n)` over the values of some coordinates, the others as in `base`: the last axis runs fastest.
+///
+/// Axes of coordinates that `base` does not have are left out.
+pub fn grid<S: Scalar>(base: &[S], axes: &[(usize, Vec<S>)]) -> Vec<S> {
+    let mut points = vec![base.to_vec()];
+    for (i, values) in axes.iter().filter(|(i, _)| *i < base.len()) {
+        let along = |point: Vec<S>| {
+            values.iter().map(move |&value| {
+                let mut point = point.clone();
+                point[*i] = value;
+                point
+            })
+        };
+        points = points.into_iter().flat_map(along).collect();
+    }
+    points.concat()
+}
+
+/// Where the determinant of a block of the metric changes its sign on the straight line of coordinates from `from` to `to`, both
+/// `(n)`, at a velocity `(n)`.
+///
+/// | block | surface |
+/// |---|---|
+/// | the time | ergosurface, where `g_tt = 0` (of a static metric also its horizon) |
+/// | time and the angle of a symmetry axis | horizon of a rotating black hole: no observer can stay at its place |
+/// | all coordinates but one | where the surfaces of that one become null: a horizon in coordinates that are regular there |
+/// | all coordinates | the signature changes |
+///
+/// The line is cut into `steps` equal pieces; every piece whose ends differ in sign is halved until its ends are neighbours.
+/// Two surfaces within a piece, and determinants that touch zero, are not seen.
+///
+/// # Errors
+/// [`GeometryError::Shape`] for slices of the wrong length, or a block that is empty or names a coordinate that there is not; the
+/// model's own.
+pub fn surfaces<S: Scalar>(
+    model: &dyn EulerLagrange<S>,
+    block: &[usize],
+    (from, to): (&[S], &[S]),
+    velocity: &[S],
+    steps: usize,
+) -> Result<Vec<Surface<S>>, GeometryError> {
+    let n = model.coordinates();
+    for (what, end) in [("start of the line", from), ("end of the line", to)] {
+        super::error::expect_length(what, n, end.len())?;
+    }
+    if let Some(found) = block.iter().copied().find(|&i| i >= n).or(block.is_empty().then_some(0)) {
+        return Err(GeometryError::Shape { what: "block of the metric", expected: n, found });
+    }
+    let point = |s: S| -> Vec<S> { from.iter().zip(to).map(|(&a, &b)| a + s * (b - a)).collect() };
+    let value = |metric: &[S]| {
+        let part: Vec<S> = block.iter().flat_map(|&i| block.iter().map(move |&j| metric[i * n + j])).collect();
+        determinant(block.len(), &part)
+    };
+    let steps = steps.max(1);
+    let places: Vec<S> = (0..=steps).map(|k| S::of_f64(k as f64) / S::of_f64(steps as f64)).collect();
+    let points: Vec<S> = places.iter().flat_map(|&s| point(s)).collect();
+    let values: Vec<S> = metrics(model, &points, velocity)?.chunks_exact(n * n).map(value).collect();
+    let mut found = Vec::new();
+    let zero = <S as Real>::zero();
+    for (ends, signs) in places.windows(2).zip(values.windows(2)) {
+        // An exact zero belongs to the piece that ends with it.
+        let [(mut low, mut at_low), (mut high, mut at_high)] = [(ends[0], signs[0]), (ends[1], signs[1])];
+        if at_high == zero {
+            found.push(Surface { point: point(high), change: Change::Zero });
+            continue;
+        }
+        if !((at_low < zero && at_high > zero) || (at_low > zero && at_high < zero)) {
+            continue;
+        }
+        let outside = at_low.abs().max(at_high.abs());
+        let change = loop {
+            let middle = (low + high) * <S as Real>::half();
+            let between = middle > low && middle < high;
+            if !between {
+                break if at_low.abs().min(at_high.abs()) > outside { Change::Pole } else { Change::Zero };
+            }
+            let at_middle = value(&metrics(model, &point(middle), velocity)?);
+            if at_middle == zero || !at_middle.is_finite() {
+                low = middle;
+                break if at_middle == zero { Change::Zero } else { Change::Pole };
+            }
+            if (at_middle > zero) == (at_low > zero) {
+                (low, at_low) = (middle, at_middle);
+            } else {
+                (high, at_high) = (middle, at_middle);
+            }
+        };
+        found.push(Surface { point: point(low), change });
+    }
+    Ok(found)
+}

@@ -1,0 +1,39 @@
+//! Failures of the terms of a batch.
+
+/// Why terms could not be computed.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum MechanicsError {
+    /// A slice has the wrong length.
+    #[error("{what}: expected {expected} numbers, found {found}")]
+    Shape {
+        /// Which argument.
+        what: &'static str,
+        /// Numbers expected.
+        expected: usize,
+        /// Numbers found.
+        found: usize,
+    },
+    /// The mass matrix of a state cannot be solved with.
+    #[error("mass matrix of state {row} is singular (condition number {condition:.3e})")]
+    Singular {
+        /// Row of the batch.
+        row: usize,
+        /// Estimated 2-norm condition number (infinite if exactly singular).
+        condition: f64,
+    },
+    /// A term is not finite.
+    #[error("{what} of state {row} is not finite")]
+    NotFinite {
+        /// Row of the batch.
+        row: usize,
+        /// Which term.
+        what: &'static str,
+    },
+    /// Derivatives that a model does not have.
+    #[error("{what}: this model has no such derivatives")]
+    Derivatives {
+        /// Of which term.
+        what: &'static str,
+    },
+}

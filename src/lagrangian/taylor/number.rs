@@ -1,0 +1,257 @@
+//! Arithmetic and functions of Taylor polynomials.
+
+use super::{Place, Taylor};
+use crate::forward::{HyperDual, assign_operators};
+use crate::ops::{Binary, Unary};
+use crate::scalar::{Real, Scalar};
+use std::ops::{Add, Div, Mul, Neg, Sub};
+
+impl<'a, S: Scalar> Taylor<'a, S> {
+    /// `self * factor`, a factor 0 leaving nothing.
+    fn scaled(self, factor: S) -> Self {
+        let (zero, one) = (<S as Real>::zero(), <S as Real>::one());
+        match self.place {
+            None => Self::constant(self.value * factor),
+            Some(_) if factor == zero => Self::constant(zero),
+            Some(_) if factor == one => self,
+            Some(place) => self.each(place, |x| x * factor),
+        }
+    }
+
+    /// The same linear map on every coefficient.
+    fn each(self, place: Place<'a, S>, map: impl Fn(S) -> S) -> Self {
+        place.space.number(place.degrees, |before, out| {
+            out.iter_mut().zip(place.of(before).0).for_each(|(out, &x)| *out = map(x));
+        })
+    }
+
+    /// The same number with another value.
+    fn with_value(self, value: S) -> Self {
+        match self.place {
+            None => Self::constant(value),
+            Some(place) => place.space.number(place.degrees, |before, out| {
+                out.copy_from_slice(place.of(before).0);
+                out[0] = value;
+            }),
+        }
+    }
+
+    /// `self + factor other`.
+    fn plus(self, factor: S, other: Self) -> Self {
+        let value = self.value + factor * other.value;
+        match (self.place, other.place) {
+            (None, None) => Self::constant(value),
+            (Some(_), None) if other.value == <S as Real>::zero() => self,
+            (Some(_), None) => self.with_value(value),
+            (None, Some(_)) => other.scaled(factor).with_value(value),
+            (Some(a), Some(b)) => {
+                let degrees = a.degrees.of_sum(b.degrees);
+                a.space.number(degrees, |before, out| {
+                    a.space.variables.add_scaled(<S as Real>::one(), a.of(before), (&mut *out, degrees));
+                    a.space.variables.add_scaled(factor, b.of(before), (out, degrees));
+                })
+            }
+        }
+    }
+
+    /// `f` of this number from the derivatives `f, f', .., f''''` at its value: `sum f^(k) h^k / k!`, `h` the rest of the number.
+    fn compose(self, derivatives: [S; 5]) -> Self {
+        let Some(place) = self.place else { return Self::constant(derivatives[0]) };
+        let (degrees, variables) = (place.degrees.of_series(), place.space.variables);
+        let order = place.degrees.total();
+        let factorial = [1.0, 1.0, 2.0, 6.0, 24.0].map(S::of_f64);
+        let coefficient = |k: usize| derivatives[k] / factorial[k];
+        let mut scratch = place.space.scratch.borrow_mut();
+        let [rest, sum, next] = &mut *scratch;
+        place.space.number(degrees, |before, out| {
+            let zero = <S as Real>::zero();
+            rest.clear();
+            rest.extend_from_slice(place.of(before).0);
+            rest[0] = zero;
+            for buffer in [&mut *sum, &mut *next] {
+                buffer.clear();
+                buffer.resize(out.len(), zero);
+            }
+            // Horner's rule.
+            variables.add_scaled(coefficient(order), (rest, place.degrees), (sum, degrees));
+            sum[0] = coefficient(order - 1);
+            for k in (0..order - 1).rev() {
+                variables.multiply((sum, degrees), (rest, place.degrees), (next, degrees));
+                next[0] = coefficient(k);
+                std::mem::swap(sum, next);
+            }
+            out.copy_from_slice(sum);
+        })
+    }
+
+    /// A function of the table; its third and fourth derivatives are those of its second.
+    fn chain(self, f: Unary) -> Self {
+        let zero = <S as Real>::zero();
+        match self.place {
+            None => Self::constant(f.value(self.value)),
+            Some(place) if place.degrees.total() <= 2 => {
+                let (y, d, s) = f.jet(self.value);
+                self.compose([y, d, s, zero, zero])
+            }
+            Some(_) => {
+                let one = <S as Real>::one();
+                let (y, d, s) = f.jet(HyperDual::new(self.value, one, one, zero));
+                self.compose([y.value, d.value, s.value, s.s, s.st])
+            }
+        }
+    }
+
+    /// The constant power of a number that is not constant: `b (b - 1) .. a^(b - k)`.
+    fn constant_power(self, exponent: S) -> Self {
+        let (mut factor, mut power) = (<S as Real>::one(), exponent);
+        let mut derivatives = [<S as Real>::zero(); 5];
+        for derivative in &mut derivatives {
+            if factor != <S as Real>::zero() {
+                *derivative = factor * self.value.powf(power);
+            }
+            factor *= power;
+            power -= <S as Real>::one();
+        }
+        self.compose(derivatives)
+    }
+}
+
+impl<S: Scalar> Neg for Taylor<'_, S> {
+    type Output = Self;
+    fn neg(self) -> Self {
+        match self.place {
+            None => Self::constant(-self.value),
+            Some(place) => self.each(place, |x| -x),
+        }
+    }
+}
+impl<S: Scalar> Add for Taylor<'_, S> {
+    type Output = Self;
+    fn add(self, other: Self) -> Self {
+        self.plus(<S as Real>::one(), other)
+    }
+}
+impl<S: Scalar> Sub for Taylor<'_, S> {
+    type Output = Self;
+    fn sub(self, other: Self) -> Self {
+        self.plus(-<S as Real>::one(), other)
+    }
+}
+impl<S: Scalar> Mul for Taylor<'_, S> {
+    type Output = Self;
+    fn mul(self, other: Self) -> Self {
+        match (self.place, other.place) {
+            (_, None) => self.scaled(other.value),
+            (None, _) => other.scaled(self.value),
+            (Some(a), Some(b)) => {
+                let degrees = a.degrees.of_product(b.degrees);
+                a.space.number(degrees, |before, out| {
+                    a.space.variables.multiply(a.of(before), b.of(before), (out, degrees));
+                })
+            }
+        }
+    }
+}
+impl<S: Scalar> Div for Taylor<'_, S> {
+    type Output = Self;
+    #[allow(clippy::suspicious_arithmetic_impl)]
+    fn div(self, other: Self) -> Self {
+        match (self.place, other.place) {
+            (None, None) => Self::constant(self.value / other.value),
+            (Some(place), None) => self.each(place, |x| x / other.value),
+            (_, Some(_)) => self * other.chain(Unary::Recip),
+        }
+    }
+}
+assign_operators!([S: Scalar] Taylor<'_, S>);
+
+/// Callback of `unary_methods`: one method of [`Real`] per row of the table.
+macro_rules! taylor_unary {
+    ($($name:ident $method:ident)*) => {$(
+        fn $method(self) -> Self {
+            self.chain(Unary::$name)
+        }
+    )*};
+}
+
+impl<S: Scalar> Real for Taylor<'_, S> {
+    type Scalar = S;
+
+    fn constant(value: S) -> Self {
+        Self { value, place: None }
+    }
+    fn primal(self) -> S {
+        self.value
+    }
+    fn is_exact_zero(self) -> bool {
+        self.place.is_none() && self.value == <S as Real>::zero()
+    }
+    crate::ops::unary_methods! { taylor_unary }
+    fn powi(self, exponent: i32) -> Self {
+        match exponent {
+            1 => self,
+            2 => self * self,
+            _ => self.chain(Unary::Powi(exponent)),
+        }
+    }
+    fn powf(self, exponent: Self) -> Self {
+        match (self.place, exponent.place) {
+            (None, None) => Self::constant(self.value.powf(exponent.value)),
+            (Some(_), None) => self.constant_power(exponent.value),
+            // `ln |a|` stands for `ln a`.
+            (_, Some(_)) => {
+                let growth = (exponent * self.abs().ln()).with_value(<S as Real>::zero());
+                growth.exp().scaled(self.value.powf(exponent.value))
+            }
+        }
+    }
+    fn atan2(self, x: Self) -> Self {
+        let angle = self.value.atan2(x.value);
+        if self.place.is_none() && x.place.is_none() {
+            return Self::constant(angle);
+        }
+        // The angle between the point and the number about it.
+        let larger = self.value.abs().max(x.value.abs());
+        let (cos, sin) = (x.value / larger, self.value / larger);
+        let across = self.scaled(cos).plus(-<S as Real>::one(), x.scaled(sin));
+        let along = self.scaled(sin) + x.scaled(cos);
+        (across / along).with_value(<S as Real>::zero()).atan().with_value(angle)
+    }
+    fn max(self, other: Self) -> Self {
+        let (own, others) = Binary::Max.first(self.value, other.value, self.value);
+        self.scaled(own) + other.scaled(others)
+    }
+    fn min(self, other: Self) -> Self {
+        let (own, others) = Binary::Min.first(self.value, other.value, self.value);
+        self.scaled(own) + other.scaled(others)
+    }
+    fn select(self, if_positive: Self, otherwise: Self) -> Self {
+        let zero = <S as Real>::zero();
+        if self.value > zero {
+            if_positive
+        } else if self.value <= zero {
+            otherwise
+        } else {
+            Self::constant(self.value)
+        }
+    }
+    fn sin_cos(self) -> (Self, Self) {
+        let (sin, cos) = self.value.sin_cos();
+        (self.compose([sin, cos, -sin, -cos, sin]), self.compose([cos, -sin, -cos, sin, cos]))
+    }
+
+    /// One matrix product where the weights are constants.
+    fn affine(weights: &[Self], bias: &[Self], x: &[Self]) -> Vec<Self> {
+        assert!(!x.is_empty() && weights.len().is_multiple_of(x.len()), "a matrix of whole rows");
+        assert!(bias.is_empty() || bias.len() == weights.len() / x.len(), "a bias for every row");
+        let constant = |numbers: &[Self]| numbers.iter().all(|number| number.place.is_none());
+        let places: Vec<Place<'_, S>> = x.iter().filter_map(|x| x.place).collect();
+        let (Some(first), true) = (places.first(), constant(weights) && constant(bias)) else {
+            let product = |row: &[Self]| row.iter().zip(x).fold(Self::zero(), |sum, (&w, &x)| sum + w * x);
+            let rows = weights.chunks_exact(x.len()).map(product);
+            return rows.zip(bias.iter().copied().chain(std::iter::repeat(Self::zero()))).map(|(y, b)| y + b).collect();
+        };
+        let degrees = places.iter().fold(first.degrees, |all, place| all.of_sum(place.degrees));
+        first.space.layer(degrees, weights, bias, x)
+    }
+}

@@ -1,0 +1,103 @@
+//! Checkpoints of a pipeline: where they are kept, and whether a training goes on from one.
+
+use crate::pipeline::{Event, PipelineError, Watch};
+use crate::scalar::Scalar;
+use crate::storage::{Disk, Files};
+use crate::training::{Every, Identity, Keeper, NEWEST, PREVIOUS, Restored, Snapshot, remove_checkpoints};
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Place where a training begins.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Begin {
+    /// Its beginning; old checkpoints are removed.
+    #[default]
+    Anew,
+    /// Its checkpoint, which must be there.
+    Resume,
+    /// Its checkpoint if there is one that fits, its beginning if not.
+    Either,
+}
+
+/// Checkpoints of a training. They stay until [`Checkpoints::remove`].
+#[derive(Clone)]
+pub struct Checkpoints {
+    files: Arc<dyn Files>,
+    directory: PathBuf,
+    every: Every,
+    begin: Begin,
+    /// Text that is kept in a checkpoint and must be the same when the training goes on; the configuration if none.
+    identity: Option<String>,
+}
+
+impl fmt::Debug for Checkpoints {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Checkpoints")
+            .field("directory", &self.directory)
+            .field("every", &self.every)
+            .finish_non_exhaustive()
+    }
+}
+
+impl Checkpoints {
+    /// Checkpoints in a directory, of a training that begins anew.
+    pub fn new(directory: &Path, every: Every) -> Self {
+        let (files, directory) = (Arc::new(Disk), directory.to_path_buf());
+        Self { files, directory, every, begin: Begin::Anew, identity: None }
+    }
+
+    /// The same for a training that begins elsewhere.
+    pub fn beginning(self, begin: Begin) -> Self {
+        Self { begin, ..self }
+    }
+
+    /// The same with a text that is kept in every checkpoint and must be the same when the training goes on, instead of the
+    /// configuration.
+    pub fn identified_by(self, text: String) -> Self {
+        Self { identity: Some(text), ..self }
+    }
+
+    /// Removes them: the training is over.
+    ///
+    /// # Errors
+    /// [`PipelineError::Output`] naming the directory.
+    pub fn remove(&self) -> Result<(), PipelineError> {
+        let cannot = |e| PipelineError::output(&self.directory, format_args!("cannot remove checkpoints: {e}"));
+        remove_checkpoints(self.files.as_ref(), &self.directory).map_err(cannot)
+    }
+
+    /// Who writes them, and the one to go on from, or none, with old checkpoints out of the way.
+    ///
+    /// # Errors
+    /// [`PipelineError::Checkpoint`] for one that must be there and is not, or that is of another run.
+    pub(crate) fn open<S: Scalar>(
+        &self,
+        config: &str,
+        data: Vec<(String, u32)>,
+        (parameters, states): (usize, usize),
+        watch: &Watch,
+    ) -> Result<(Arc<Keeper>, Option<Snapshot<S>>), PipelineError> {
+        let config = self.identity.clone().unwrap_or_else(|| config.to_string());
+        let identity = Identity { config, data };
+        let keeper = Arc::new(Keeper::new(Arc::clone(&self.files), &self.directory, self.every, identity));
+        if self.begin != Begin::Anew {
+            match keeper.restore(parameters, states) {
+                Ok(Restored { content, fallback }) => {
+                    if let Some(problem) = fallback {
+                        let (newest, previous) = (self.directory.join(NEWEST), self.directory.join(PREVIOUS));
+                        let place = newest.display();
+                        watch.say(Event::Note(&format!("{place}: {problem}; going on from {}", previous.display())));
+                    }
+                    return Ok((keeper, Some(content)));
+                }
+                Err(source) if self.begin == Begin::Resume => {
+                    return Err(PipelineError::Checkpoint { directory: self.directory.clone(), source });
+                }
+                Err(_) => {}
+            }
+        }
+        self.remove()?;
+        Ok((keeper, None))
+    }
+}

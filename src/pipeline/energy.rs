@@ -1,0 +1,133 @@
+//! Where the energy of held-out motion goes by a model: change, work, friction and what is left.
+
+use crate::data::Part;
+use crate::lagrangian::{EulerLagrange, Request, Terms};
+use crate::rollout::{Driven, SampledForce, Trajectory};
+use serde::Serialize;
+
+/// States evaluated at once.
+const CHUNK: usize = 4096;
+
+/// Energy along held-out trajectories, means over the trajectories in the unit of the learned `L`, which is J only where
+/// forces were given: `change = work - friction + defect`.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct Balance {
+    /// Trajectories counted.
+    pub trajectories: usize,
+    /// Mean over the samples of `p.v/2`, the kinetic energy of a mechanical system.
+    pub kinetic: f64,
+    /// Energy at the end of a trajectory less that at its start.
+    pub change: f64,
+    /// Work of the known forces.
+    pub work: f64,
+    /// Energy taken by friction.
+    pub friction: f64,
+    /// Energy that is not accounted for.
+    pub defect: f64,
+    /// Root mean square over the trajectories of the same: what in the mean may cancel.
+    pub defect_rms: f64,
+    /// `true` if any force was known.
+    #[serde(skip)]
+    pub forced: bool,
+}
+
+/// The balance at the estimated states with full windows; none if no trajectory has one.
+pub fn balance(model: &dyn EulerLagrange<f64>, part: &Part) -> Option<Balance> {
+    let n = model.coordinates();
+    let mut sums = Balance::default();
+    let mut samples = 0.0;
+    let mut terms = Terms::default();
+    for (track, states) in part.recording.tracks.iter().zip(&part.states) {
+        let rows = states.interior();
+        let of = |values: &[f64]| values[rows.start * n..rows.end * n].to_vec();
+        let (q, v) = (of(&states.q), of(&states.v));
+        let trajectory = Trajectory { coordinates: n, t: states.times[rows.clone()].to_vec(), q, v, energy: None };
+        let force = SampledForce::recorded(track);
+        let balance = match &force {
+            Some(force) => Driven::new(model, force).energy_balance(&trajectory),
+            None => trajectory.energy_balance(model),
+        };
+        let Ok(balance) = balance else { continue };
+        sums.trajectories += 1;
+        sums.forced |= force.is_some();
+        sums.change += balance.change;
+        sums.work += balance.work;
+        sums.friction += balance.dissipated;
+        sums.defect += balance.defect();
+        sums.defect_rms += balance.defect().powi(2);
+        for (q, v) in trajectory.q.chunks(CHUNK * n).zip(trajectory.v.chunks(CHUNK * n)) {
+            let _ = model.terms(q, v, Request::MOMENTUM, &mut terms);
+            sums.kinetic += 0.5 * terms.momentum.iter().zip(v).map(|(p, v)| p * v).sum::<f64>();
+            samples += (q.len() / n) as f64;
+        }
+    }
+    let mean = |sum: f64| sum / sums.trajectories as f64;
+    (sums.trajectories > 0).then(|| Balance {
+        kinetic: sums.kinetic / samples,
+        change: mean(sums.change),
+        work: mean(sums.work),
+        friction: mean(sums.friction),
+        defect: mean(sums.defect),
+        defect_rms: mean(sums.defect_rms).sqrt(),
+        ..sums
+    })
+}
+
+impl Balance {
+    /// The balance in two lines, its parts over the mean kinetic energy.
+    pub fn text(&self) -> String {
+        let tenths = |x: f64| (1e3 * x / self.kinetic.abs()).round();
+        let [change, work, friction] = [self.change, self.work, self.friction].map(tenths);
+        // Of the rounded parts, so that they add up as they stand.
+        let rest = change - work + friction;
+        let percent = |tenths: f64| format!("{:.1} %", tenths / 10.0 + 0.0);
+        let count = self.trajectories;
+        let (along, spread) = match count {
+            1 => ("the held-out trajectory".to_string(), String::new()),
+            _ => {
+                let rms = percent(tenths(self.defect_rms));
+                (format!("{count} held-out trajectories (mean)"), format!(" (rms {rms})"))
+            }
+        };
+        let work =
+            if self.forced { format!("work of the known forces {} - ", percent(work)) } else { "- ".to_string() };
+        format!(
+            "energy along {along}, over the mean kinetic energy:\n  change {} = {work}taken by friction {} + not accounted for \
+             {}{spread}\n",
+            percent(change),
+            percent(friction),
+            percent(rest)
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_add_up_as_they_stand() {
+        let balance = Balance {
+            trajectories: 3,
+            kinetic: -2.0,
+            change: -0.30009,
+            work: 0.10006,
+            friction: 0.50006,
+            defect: 0.09991,
+            defect_rms: 0.2,
+            forced: true,
+        };
+        let text = balance.text();
+        let part = |after: &str| -> f64 {
+            let rest = &text[text.find(after).unwrap() + after.len()..];
+            rest.split_whitespace().next().unwrap().parse().unwrap()
+        };
+        let [change, work, friction, rest] = ["change ", "known forces ", "by friction ", "accounted for "].map(part);
+        assert!((change - (work - friction + rest)).abs() < 1e-9, "{text}");
+        assert!((rest - 5.0).abs() < 0.11 && text.contains("3 held-out trajectories (mean)"), "{text}");
+        assert!(text.contains("(rms 10.0 %)") && text.lines().all(|line| line.len() <= 120), "{text}");
+        let free = Balance { trajectories: 1, forced: false, work: 0.0, ..balance }.text();
+        assert!(free.contains("along the held-out trajectory,") && !free.contains("forces"), "{free}");
+        assert!(!free.contains("rms"), "{free}");
+    }
+}

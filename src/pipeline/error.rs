@@ -1,0 +1,143 @@
+//! Failures of a pipeline.
+
+use crate::analysis::GridError;
+use crate::configuration::ConfigError;
+use crate::data::{MeasuredError, SamplingError};
+use crate::lagrangian::SystemError;
+use crate::network::NetworkError;
+use crate::network::file::ModelFileError;
+use crate::recording::smooth::SmoothError;
+use crate::shooting::ShootingError;
+use crate::training::{CheckpointError, TrainingError};
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+/// Failure of a pipeline.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum PipelineError {
+    /// Values of a configuration out of range, all of them.
+    #[error("{}", .0.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))]
+    Config(Vec<ConfigError>),
+    /// Unknown system, or parameters that it does not have.
+    #[error(transparent)]
+    System(#[from] SystemError),
+    /// States that cannot be sampled.
+    #[error(transparent)]
+    Sampling(#[from] SamplingError),
+    /// Recorded motion that cannot be learned from.
+    #[error(transparent)]
+    Recording(#[from] MeasuredError),
+    /// Recorded motion without derivatives.
+    #[error(transparent)]
+    Smooth(#[from] SmoothError),
+    /// Measured accelerations asked for where none were given.
+    #[error("no accelerations were given")]
+    NoAccelerations,
+    /// A shape of the network that contradicts itself.
+    #[error(transparent)]
+    Network(#[from] NetworkError),
+    /// A model to start from that has another shape than the configuration.
+    #[error("{place}: the model has another shape: {}", .differences.join("; "))]
+    OtherShape {
+        /// The model: `--from MODEL` of a configuration, or its file if that has changed since.
+        place: String,
+        /// Differences, in words.
+        differences: Vec<String>,
+        /// Whether the configuration is wrong, and not the file.
+        configuration: bool,
+    },
+    /// A model file that cannot be read or made.
+    #[error("{}: {source}", path.display())]
+    Model {
+        /// The file.
+        path: PathBuf,
+        /// The problem.
+        source: ModelFileError,
+    },
+    /// A directory in which a model was looked for.
+    #[error("{}: there is no {} in this directory", .0.display(), crate::pipeline::MODEL)]
+    NoModel(PathBuf),
+    /// Training failed.
+    #[error(transparent)]
+    Training(#[from] TrainingError),
+    /// Multiple shooting failed.
+    #[error(transparent)]
+    Shooting(#[from] ShootingError),
+    /// A checkpoint that must be there and is not, or that is of another run.
+    #[error("{}: {source}", directory.display())]
+    Checkpoint {
+        /// Directory of the checkpoints.
+        directory: PathBuf,
+        /// The problem.
+        source: CheckpointError,
+    },
+    /// A picture that cannot be laid out.
+    #[error(transparent)]
+    Grid(#[from] GridError),
+    /// Work that would not fit into the machine's memory.
+    #[error("{work} takes {}", match needed {
+        Some(needed) => format!("about {needed} of memory, {available} are available"),
+        None => "more memory than can be counted".to_string(),
+    })]
+    Memory {
+        /// The work.
+        work: String,
+        /// Memory that it takes, in words; none if it cannot be counted.
+        needed: Option<String>,
+        /// Memory that there is, in words.
+        available: String,
+    },
+    /// A file that could not be written or removed.
+    #[error("{}: {problem}", path.display())]
+    Output {
+        /// The file.
+        path: PathBuf,
+        /// The problem.
+        problem: String,
+    },
+    /// A place for a run that cannot be had, such as one that another process holds.
+    #[error("{0}")]
+    Place(String),
+    /// A result that its format cannot hold.
+    #[error("{0}")]
+    Format(String),
+    /// The flag of the watch was raised while a finished model was judged.
+    #[error("interrupted while the model was judged: the model is written, tables and report are not")]
+    Interrupted,
+    /// The flag of the watch was raised while an experiment ran.
+    #[error("interrupted with {finished} of {} finished", crate::names::counted(*total, "run", "runs"))]
+    InterruptedRuns {
+        /// Runs that are finished.
+        finished: usize,
+        /// Runs asked for.
+        total: usize,
+    },
+}
+
+impl PipelineError {
+    /// A file that could not be written or removed.
+    pub fn output(path: &Path, problem: impl fmt::Display) -> Self {
+        Self::Output { path: path.to_path_buf(), problem: problem.to_string() }
+    }
+
+    /// Whether the configuration is at fault, and not data, files or the machine.
+    pub fn is_configuration(&self) -> bool {
+        match self {
+            Self::Config(_) | Self::System(_) | Self::Network(_) | Self::NoAccelerations => true,
+            Self::Sampling(error) => !matches!(error, SamplingError::Dataset(_)),
+            Self::OtherShape { configuration, .. } => *configuration,
+            _ => false,
+        }
+    }
+
+    pub(crate) fn format(error: impl fmt::Display) -> Self {
+        Self::Format(error.to_string())
+    }
+}
+
+impl From<ConfigError> for PipelineError {
+    fn from(error: ConfigError) -> Self {
+        Self::Config(vec![error])
+    }
+}

@@ -1,0 +1,339 @@
+//! Evaluation of a model: accelerations, trajectories and pictures against the hand-written system.
+
+use crate::analysis::{
+    Axis, ErrorDistribution, MassMatrixError, StartBox, Statistics, TrajectoryRun, TrajectorySummary, TrajectoryTest,
+    ValidTimes, acceleration_errors, conserved_error, determinant_grid, lagrangian_grid, mass_matrix_error, statistics,
+    wrong_signatures,
+};
+use crate::data::sample;
+use crate::lagrangian::system::TrajectoryTest as Span;
+use crate::lagrangian::{Configured, EulerLagrange};
+use crate::pipeline::attention::Attention;
+use crate::pipeline::{PipelineError, Watch, memory};
+use crate::random::RngStream;
+use crate::report::{Figure, Fit, GridComparison, evaluation_figures, grid_figures};
+use crate::rollout::{Domain, Trajectory};
+use serde::Serialize;
+
+/// Points of a grid along each axis.
+const GRID: usize = 81;
+/// Relative tolerance of the learned motion in the paper's test.
+pub const RTOL: f64 = 1e-6;
+/// Fresh states on which accelerations are compared.
+const STATES: usize = 12_000;
+/// Starts of the trajectory test, as in the paper.
+pub(crate) const STARTS: usize = 4;
+/// Starts whose motion is drawn.
+const DRAWN: usize = 4;
+/// Velocities of the fast map of `det M`, in upper bounds of the validation states.
+const FAST: f64 = 0.99;
+
+/// Numbers of an evaluation, all in physical units.
+#[derive(Clone, Debug, Serialize)]
+pub struct Evaluation {
+    /// Error of the accelerations of fresh states, one entry per coordinate.
+    pub accelerations: Vec<ErrorDistribution>,
+    /// Fraction of the fresh states whose mass matrix has not the signature of the exact one.
+    pub wrong_signature: f64,
+    /// Error of the mass matrix, of a geodesic the metric, at rest at the positions of the fresh states.
+    pub mass_matrix: MassMatrixError,
+    /// Time for which the learned motion predicts the exact one, median over the starts.
+    pub valid_time: Option<ValidTimes>,
+    /// One entry per random start.
+    pub trajectories: Vec<Motion>,
+    /// Names of the accelerations' coordinates, with the accelerations' units.
+    #[serde(skip)]
+    pub coordinates: Vec<String>,
+    /// Unit of all coordinates together.
+    #[serde(skip)]
+    pub unit: String,
+    /// Unit of times.
+    #[serde(skip)]
+    pub time_unit: String,
+    /// Name of what the exact motion conserves beside its energy.
+    #[serde(skip)]
+    pub conserved: Option<&'static str>,
+    /// Pictures.
+    #[serde(skip)]
+    pub figures: Vec<Figure>,
+}
+
+/// One start of the trajectory test.
+#[derive(Clone, Debug, Serialize)]
+pub struct Motion {
+    /// Errors against exact motion.
+    #[serde(flatten)]
+    pub summary: TrajectorySummary,
+    /// Relative error of what the exact motion conserves beside its energy, if it does.
+    pub conserved_error: Option<Statistics>,
+    /// The first sample at which the learned motion had left the states the model was trained on, in words.
+    pub left_training_range: Option<String>,
+}
+
+/// States and starts of an evaluation, and how the learned motion is integrated.
+#[derive(Clone, Debug)]
+pub struct EvaluationOptions {
+    /// Fresh states `(states, n)`, `q` and `v`, on which accelerations are compared.
+    pub states: (Vec<f64>, Vec<f64>),
+    /// Random starts of the trajectory test.
+    pub starts: usize,
+    /// Where they lie and how long they move.
+    pub span: Span,
+    /// Relative tolerance of the learned motion; the absolute one is a hundredth of it.
+    pub rtol: f64,
+    /// The states the model was trained on.
+    pub trained: Domain<f64>,
+    /// Seed of the starts.
+    pub seed: u64,
+    /// Threads.
+    pub threads: usize,
+}
+
+impl EvaluationOptions {
+    /// The paper's trajectory test from four starts, and 12,000 fresh states of the validation bounds; one thread.
+    ///
+    /// # Errors
+    /// [`PipelineError::Sampling`] for bounds that cannot be sampled.
+    pub fn new(system: &Configured<f64>, trained: Domain<f64>, seed: u64) -> Result<Self, PipelineError> {
+        let bounds = system.system.validation(system.coordinates);
+        let pairs = |bounds: &[(f64, f64)]| bounds.iter().map(|&(low, high)| [low, high]).collect::<Vec<_>>();
+        let bounds = (pairs(&bounds.positions), pairs(&bounds.velocities));
+        let mut random = RngStream::Test.generator(seed);
+        let states = sample(system, "validation bounds", (&bounds.0, &bounds.1), STATES, &mut random)?;
+        let states = (states.q().to_vec(), states.v().to_vec());
+        let span = system.system.trajectory(system.coordinates);
+        Ok(Self { states, starts: STARTS, span, rtol: RTOL, trained, seed, threads: 1 })
+    }
+}
+
+/// Pieces of work of an evaluation: accelerations, motions, pictures, mass matrices.
+const PIECES: usize = 4;
+
+/// Compares a model with the system it learned.
+///
+/// # Errors
+/// A system that cannot be built, motions that do not fit into memory, [`PipelineError::Interrupted`].
+pub fn evaluate(
+    system: &Configured<f64>,
+    learned: &dyn EulerLagrange<f64>,
+    options: EvaluationOptions,
+    watch: &Watch,
+) -> Result<Evaluation, PipelineError> {
+    let (plan, attention) = (options, &Attention::new(watch, PIECES));
+    let (q, v) = (plan.states.0.as_slice(), plan.states.1.as_slice());
+    let n = system.coordinates;
+    let exact = system.build()?;
+    let (exact, learned) = (attention.watched(exact.as_ref()), attention.watched(learned));
+    let (exact, learned): (&dyn EulerLagrange<f64>, &dyn EulerLagrange<f64>) = (&exact, &learned);
+    let done = || {
+        attention.advance(1);
+        attention.check()
+    };
+    let coordinates = system.system.coordinates(n);
+    let periodic: Vec<bool> = coordinates.iter().map(|c| c.periodic).collect();
+    let accelerations = acceleration_errors(exact, learned, q, v);
+    done()?;
+
+    let Span { start, t_end, dt } = plan.span;
+    // Exact and learned.
+    memory::require("the evaluation", memory::motions((plan.starts as u64).saturating_mul(2), t_end / dt, n, 0))?;
+    let defaults = TrajectoryTest::new(StartBox { q: start.positions, v: start.velocities }, periodic);
+    // Steps grow with the time, and with the fifth root of the accuracy.
+    let longer = (t_end / system.system.trajectory(n).t_end).max(1.0) * (defaults.rtol / plan.rtol).max(1.0).powf(0.2);
+    let test = TrajectoryTest {
+        starts: plan.starts,
+        seed: plan.seed,
+        t_end,
+        dt,
+        rtol: plan.rtol,
+        atol: 1e-2 * plan.rtol,
+        max_steps: (longer * defaults.max_steps as f64) as usize,
+        lyapunov: true,
+        threads: plan.threads,
+        ..defaults
+    };
+    let runs = test.run_constrained(system, exact, learned)?;
+    done()?;
+    let motion = |run: &TrajectoryRun<f64>| Motion {
+        summary: run.summary(),
+        conserved_error: conserved_error(system, &run.learned.trajectory).map(statistics),
+        left_training_range: leaving(&run.learned.trajectory, &plan.trained, &system.system.columns(n)),
+    };
+
+    let portraits = test.portraits(exact, learned, &runs[..runs.len().min(DRAWN)]);
+    attention.check()?;
+    let mut figures = evaluation_figures(&runs, &portraits, system);
+    let grids = grids(system, exact, learned);
+    attention.check()?;
+    figures.extend(grids?);
+    done()?;
+    let wrong_signature = wrong_signatures(exact, learned, q, v);
+    let mass_matrix = mass_matrix_error(exact, learned, q);
+    done()?;
+    Ok(Evaluation {
+        accelerations,
+        wrong_signature,
+        mass_matrix,
+        valid_time: ValidTimes::of(&runs.iter().map(|run| (run.valid, run.chaos())).collect::<Vec<_>>()),
+        trajectories: runs.iter().map(motion).collect(),
+        coordinates: coordinates
+            .iter()
+            .map(|c| format!("{} [{}/{}^2]", c.name, c.unit, system.system.time_unit))
+            .collect(),
+        unit: match coordinates.iter().find(|c| c.unit != coordinates[0].unit) {
+            None => coordinates[0].unit.to_string(),
+            Some(_) => "its unit".to_string(),
+        },
+        time_unit: system.system.time_unit.to_string(),
+        conserved: system.system.conserved.map(|conserved| conserved.name),
+        figures,
+    })
+}
+
+/// The first sample outside the states a model was trained on.
+fn leaving(trajectory: &Trajectory<f64>, trained: &Domain<f64>, columns: &[String]) -> Option<String> {
+    (0..trajectory.len()).find_map(|k| {
+        let (q, v) = trajectory.state(k);
+        let (component, ..) = trained.violation(&[q, v].concat())?;
+        let name = columns.get(component).map_or("a component", String::as_str);
+        Some(format!("{name} outside the training range at {:.1}", trajectory.t[k]))
+    })
+}
+
+/// `L` and `det M` at rest over the first two coordinates, or over coordinate and velocity if there is only one; with more
+/// than one, `det M` also at velocities close to the upper end of the validation bounds, where wrong signs appear first.
+fn grids(
+    system: &Configured<f64>,
+    exact: &dyn EulerLagrange<f64>,
+    learned: &dyn EulerLagrange<f64>,
+) -> Result<Vec<Figure>, PipelineError> {
+    let n = system.coordinates;
+    let bounds = system.system.validation(n);
+    let middle: Vec<f64> = bounds.positions.iter().map(|(low, high)| 0.5 * (low + high)).collect();
+    // At rest a total time derivative in the learned L vanishes: what is left is a factor and a constant.
+    let mut rest: Vec<f64> = bounds.velocities.iter().map(|(low, high)| 0.0f64.clamp(*low, *high)).collect();
+    // A mass shell lets nothing rest in time.
+    system.impose_constraint(&middle, &mut rest)?;
+    let fast = bounds.velocities.iter().map(|(_, high)| FAST * high).collect();
+    let (rest, fast) = ([middle.clone(), rest].concat(), [middle, fast].concat());
+    let ranges: Vec<(f64, f64)> = bounds.positions.into_iter().chain(bounds.velocities).collect();
+    let labels = system.system.labels(n);
+    // A spacetime is shown over space, where there are two dimensions of it.
+    let shown = if system.system.time_like == Some(0) && n > 2 { [1, n - 1] } else { [0, 1] };
+    let axes =
+        shown.map(|component| Axis { component, from: ranges[component].0, to: ranges[component].1, points: GRID });
+
+    // L is -1/2 everywhere on a mass shell and would show nothing there. M is compared on the shell, where it was trained.
+    let impose = |q: &[f64], v: &mut [f64]| system.impose_constraint(q, v).unwrap_or_else(|_| v.fill(f64::NAN));
+    let lagrangian = |model: &dyn EulerLagrange<f64>| lagrangian_grid(model, &rest, axes);
+    let determinant = |model: &dyn EulerLagrange<f64>, state: &[f64]| determinant_grid(model, state, axes, impose);
+    let mut pairs = vec![
+        ("L", "lagrangian", fixed(system, &rest, axes, false), lagrangian(exact), lagrangian(learned)),
+        (
+            "det M",
+            "det_mass_matrix",
+            fixed(system, &rest, axes, true),
+            determinant(exact, &rest),
+            determinant(learned, &rest),
+        ),
+    ];
+    if n > 1 {
+        pairs.push((
+            "Fast det M",
+            "det_mass_matrix_fast",
+            fixed(system, &fast, axes, true),
+            determinant(exact, &fast),
+            determinant(learned, &fast),
+        ));
+    }
+    let mut figures = Vec::new();
+    for (quantity, file, fixed, exact, learned) in pairs {
+        let comparison = GridComparison {
+            quantity: quantity.to_string(),
+            file: file.to_string(),
+            x_label: labels[shown[0]].clone(),
+            y_label: labels[shown[1]].clone(),
+            exact: exact?,
+            learned: learned?,
+            fixed,
+            fit: if quantity == "L" { Fit::Affine } else { Fit::Factor },
+            signs: quantity != "L",
+        };
+        // A model that is finite nowhere on the grid has no picture; the tables say so.
+        figures.extend(grid_figures(&comparison).ok().map(|(mut figure, _)| {
+            figure.caption += if system.system.time_unit == "s" { " SI units." } else { " Geometric units." };
+            figure
+        }));
+    }
+    Ok(figures)
+}
+
+/// The components of `(q, v)` that a grid leaves fixed, in words, neighbours of equal value together; `imposed` if the
+/// velocity of a time-like coordinate follows from the mass shell at every point.
+fn fixed(system: &Configured<f64>, state: &[f64], axes: [Axis; 2], imposed: bool) -> String {
+    let n = system.coordinates;
+    let (columns, units) = (system.system.columns(n), system.system.units(n));
+    let shell = system.constrained_coordinate().filter(|_| imposed).map(|i| n + i);
+    let mut groups: Vec<(Vec<&str>, String)> = Vec::new();
+    for (k, &x) in state.iter().enumerate() {
+        if axes.iter().any(|axis| axis.component == k) {
+            continue;
+        }
+        let value = match shell {
+            Some(shell) if shell == k => "by the mass shell".to_string(),
+            // Four decimals; adding 0 turns -0 into 0.
+            _ => format!("= {} {}", (1e4 * x).round() / 1e4 + 0.0, units[k]),
+        };
+        match groups.last_mut() {
+            Some((names, of)) if *of == value => names.push(columns[k].as_str()),
+            _ => groups.push((vec![columns[k].as_str()], value)),
+        }
+    }
+    groups.iter().map(|(names, value)| format!("{} {value}", names.join(", "))).collect::<Vec<_>>().join("; ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lagrangian::configure;
+
+    #[test]
+    fn grids_say_where_they_are() {
+        let captions = |name: &str| -> Vec<(String, String)> {
+            let system = configure::<f64>(name, &[]).unwrap();
+            let exact = system.build().unwrap();
+            let figures = grids(&system, exact.as_ref(), exact.as_ref()).unwrap();
+            figures.into_iter().map(|figure| (figure.file, figure.caption)).collect()
+        };
+        let begins = |captions: &[(String, String)], expected: &[(&str, &str)]| {
+            assert_eq!(captions.len(), expected.len());
+            for ((file, caption), (name, text)) in captions.iter().zip(expected) {
+                assert!(file == name && caption.starts_with(text), "{file}: {caption}");
+            }
+        };
+        let rest = "theta3 = 3.1416 rad; theta1_dot, theta2_dot, theta3_dot = 0 rad/s: exact";
+        begins(
+            &captions("triple-pendulum"),
+            &[
+                ("lagrangian.svg", &format!("L at {rest}")),
+                ("det_mass_matrix.svg", &format!("det M at {rest}")),
+                (
+                    "det_mass_matrix_fast.svg",
+                    "Fast det M at theta3 = 3.1416 rad; theta1_dot, theta2_dot, theta3_dot = 9.9 rad/s: exact",
+                ),
+            ],
+        );
+        begins(
+            &captions("ads2-geodesic"),
+            &[
+                ("lagrangian.svg", "L at t_dot = 3.25 m/m; z_dot = 0 m/m: exact"),
+                ("det_mass_matrix.svg", "det M at t_dot by the mass shell; z_dot = 0 m/m: exact"),
+                ("det_mass_matrix_fast.svg", "Fast det M at t_dot by the mass shell; z_dot = 0.594 m/m: exact"),
+            ],
+        );
+        // The velocity is an axis: there is no fast map.
+        let one = captions("harmonic-oscillator");
+        begins(&one, &[("lagrangian.svg", "L: exact"), ("det_mass_matrix.svg", "det M: exact")]);
+        assert!(one[1].1.contains("right sign at every point") && !one[0].1.contains("sign"));
+    }
+}

@@ -1,0 +1,157 @@
+//! Tables, report and `evaluation.json` of an evaluation.
+
+use crate::analysis::MassMatrixError;
+use crate::lagrangian::Configured;
+use crate::names::{WIDTH, hundredths, number, rounded, wrapped};
+use crate::pipeline::evaluation::Evaluation;
+use crate::pipeline::report_files::{parameter_table, write_report_and_figures};
+use crate::pipeline::{Output, PipelineError, headline};
+use crate::report::{Report, text_table};
+use serde::Serialize;
+use std::fmt::Write as _;
+
+/// Stands where there is no finite number.
+const NONE: &str = "-";
+
+/// A table of a report.
+struct Table {
+    title: String,
+    header: Vec<String>,
+    rows: Vec<Vec<String>>,
+}
+
+/// Contents of `evaluation.json`.
+#[derive(Serialize)]
+struct Summary<'a> {
+    system: &'a str,
+    seed: u64,
+    validation_loss: f64,
+    #[serde(flatten)]
+    evaluation: &'a Evaluation,
+}
+
+impl Evaluation {
+    /// Writes `evaluation.json`, `report.html` and pictures, and returns the first; `model` and `validation_loss` are those
+    /// of the model's file, `seed` that of the starts.
+    ///
+    /// # Errors
+    /// [`PipelineError::Output`].
+    pub fn write(
+        &self,
+        system: &Configured<f64>,
+        (model, validation_loss): (&str, f64),
+        seed: u64,
+        output: &dyn Output,
+    ) -> Result<String, PipelineError> {
+        let summary = Summary { system: &system.system.name, seed, validation_loss, evaluation: self };
+        let json = serde_json::to_string_pretty(&summary).map_err(PipelineError::format)? + "\n";
+        output.write("evaluation.json", json.as_bytes())?;
+        let title = format!("{}: learned against exact", system.system.title);
+        let report = self
+            .summarise(Report::new(&title), &system.system.title)
+            .paragraph(&format!("Model {model}, starts of seed {seed}."));
+        let report = self.report(parameter_table(report, system));
+        write_report_and_figures(output, &report, self.figures.iter())?;
+        Ok(json)
+    }
+
+    fn tables(&self) -> [Table; 3] {
+        let units: Vec<&str> = self.coordinates.iter().map(|name| headline::named(name).1).collect();
+        let unit = units.first().filter(|unit| units.iter().all(|other| other == *unit));
+        let accelerations = self.coordinates.iter().zip(&self.accelerations).map(|(name, e)| {
+            let numbers = [e.mean, e.rms, e.median, e.p99, e.max].map(number);
+            let name = if unit.is_some() { headline::named(name).0 } else { name };
+            [vec![name.to_string()], numbers.to_vec(), vec![e.failed.to_string()]].concat()
+        });
+        let measures = ["mean", "rms", "median", "99 % below", "max"];
+        let of_unit = |measure: &str| format!("{measure} [{}]", unit.unwrap_or(&"its unit"));
+        let trajectories = self.trajectories.iter().enumerate().map(|(k, motion)| {
+            let t = &motion.summary;
+            let fastest = t.velocity_error.iter().fold(f64::NAN, |m, v| m.max(v.max));
+            let valid = format!("{}{}", number(t.valid.time), if t.valid.at_least { "+" } else { "" });
+            let mut row = vec![(k + 1).to_string(), format!("{:.1}", t.compared_until), valid];
+            row.extend([t.coordinate_error.mean, t.coordinate_error.max, fastest].map(number));
+            row.extend([t.energy_error.mean, t.energy_error.max].map(hundredths));
+            row.extend(motion.conserved_error.map(|conserved| hundredths(conserved.max)));
+            let time = t.lyapunov_exponent.filter(|exponent| *exponent > 0.0).map(f64::recip);
+            row.push(time.map_or(NONE.to_string(), |time| rounded(time, 2)));
+            let exact = t.reference_stopped.as_ref().map(|stop| format!("exact motion: {stop}"));
+            let remarks = [motion.left_training_range.clone(), t.stopped.clone(), exact];
+            row.push(remarks.into_iter().flatten().collect::<Vec<_>>().join("; "));
+            row
+        });
+        let t_end = self.trajectories.iter().fold(0.0, |m: f64, motion| m.max(motion.summary.compared_until));
+        let MassMatrixError { factor, error: m } = &self.mass_matrix;
+        let matrix = [m.mean, m.median, m.p99, m.max].map(hundredths);
+        let matrix = [vec![number(*factor)], matrix.to_vec(), vec![m.failed.to_string()]].concat();
+        let header = |names: &[&str]| names.iter().map(ToString::to_string).collect();
+        let until = format!("until [{}]", self.time_unit);
+        let lyapunov = format!("Lyapunov time [{}]", self.time_unit);
+        let conserved = self.conserved.map(|_| "conserved, max [%]");
+        let [mean, most] = ["mean", "max"].map(|which| format!("coordinates, {which} [{}]", self.unit));
+        let fastest = format!("velocities, max [{}/{}]", self.unit, self.time_unit);
+        let valid = format!("valid [{}]", self.time_unit);
+        let mut motions = vec!["start", &until, &valid, &mean, &most, &fastest, "energy, mean [%]", "energy, max [%]"];
+        motions.extend(conserved.into_iter().chain([lyapunov.as_str(), "remarks"]));
+        let mut about = String::from("Trajectories from random starts against exact motion");
+        if let Some(name) = self.conserved {
+            let _ = write!(about, "; conserved: {name}");
+        }
+        if t_end > 1.0 {
+            let (time, unit) = (t_end / t_end.ln(), &self.time_unit);
+            let _ = write!(about, "; motion without chaos has a Lyapunov time of about {time:.0} {unit}");
+        }
+        [
+            Table {
+                title: "Error of accelerations on fresh states".into(),
+                header: [vec!["acceleration of".to_string()], measures.map(of_unit).to_vec(), vec!["failed".into()]]
+                    .concat(),
+                rows: accelerations.collect(),
+            },
+            Table {
+                title: "Relative error of the mass matrix at rest, up to one factor".into(),
+                header: header(&["factor [1]", "mean [%]", "median [%]", "99 % below [%]", "max [%]", "failed"]),
+                rows: vec![matrix],
+            },
+            Table { title: about, header: header(&motions), rows: trajectories.collect() },
+        ]
+    }
+
+    /// Headline and tables for a terminal, of a model of the system called `title`.
+    pub fn text(&self, title: &str) -> String {
+        let tables = self.tables();
+        let text = tables.iter().map(|t| format!("{}\n{}", t.title, text_table(&t.header, &t.rows)));
+        let first = headline::of_evaluation(title, self).text();
+        wrapped(&format!("{first}\n{}{}", text.collect::<Vec<_>>().join("\n"), self.note()), WIDTH)
+    }
+
+    /// Meaning of [`NONE`], if there is one in the tables.
+    fn note(&self) -> String {
+        let tables = self.tables();
+        let mut cells = tables.iter().flat_map(|table| table.rows.iter().flatten());
+        let none = cells.any(|cell| cell == NONE);
+        if none {
+            "\n-: no finite number; failed states and remarks say why, no Lyapunov time means no chaos\n"
+        } else {
+            ""
+        }
+        .to_string()
+    }
+
+    /// The headline, at the beginning of a report about the system called `title`.
+    pub(crate) fn summarise(&self, report: Report, title: &str) -> Report {
+        headline::of_evaluation(title, self).begin(report)
+    }
+
+    /// Tables and pictures for a report.
+    pub(crate) fn report(&self, mut report: Report) -> Report {
+        for Table { title, header, rows } in self.tables() {
+            report = report.heading(&title).table(&header, &rows);
+        }
+        let note = self.note();
+        if !note.is_empty() {
+            report = report.paragraph(note.trim());
+        }
+        report.heading("Learned against exact").figures(&self.figures)
+    }
+}

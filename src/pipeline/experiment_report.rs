@@ -1,0 +1,125 @@
+//! The report of an experiment: table, pictures, page, words.
+
+use crate::experiments::{Experiment, Record, Row, Run, Scale};
+use crate::names::{WIDTH, counted, wrapped};
+use crate::pipeline::experiment_store::ExperimentStore;
+use crate::pipeline::run_figures::{pictures_of_runs, within};
+use crate::pipeline::{PipelineError, headline};
+use crate::report::{
+    Curve, EXPERIMENT_HEADER, REDUCTION_HEADER, Report, experiment_curves, experiment_figures, experiment_table,
+    experiment_view, reduction_table, text_table,
+};
+use std::fmt::Write as _;
+use std::time::Instant;
+
+/// Runs with their records, as far as they are finished.
+pub type Results = Vec<(Run, Option<Record>)>;
+
+/// An experiment after its files were written.
+#[derive(Debug)]
+pub struct ExperimentReport {
+    /// Runs with their records.
+    pub results: Results,
+    /// One row per label.
+    pub rows: Vec<Row>,
+    /// Cells of `table.csv`, under [`EXPERIMENT_HEADER`].
+    pub table: Vec<Vec<String>>,
+    /// Seconds of training of all runs.
+    pub training_seconds: f64,
+    text: String,
+}
+
+impl ExperimentReport {
+    /// Headline and tables for a terminal.
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+}
+
+/// Conventions of the table.
+const CONVENTIONS: &str = "Losses are the paper's: half the mean absolute error of scaled accelerations; times the mean scale \
+                           they are physical. Several runs: mean [lowest, highest]. Wrong signature: share of the fresh \
+                           states. Integrated: starts of the trajectory test whose learned motion reached its end.";
+
+/// Writes table, pictures and report.
+pub(crate) fn conclude(
+    experiment: &Experiment,
+    scale: Scale,
+    results: Results,
+    beside: &[Curve],
+    store: &dyn ExperimentStore,
+    started: Instant,
+) -> Result<ExperimentReport, PipelineError> {
+    let rows = experiment.rows(&results);
+    let (table, (header, view)) = (experiment_table(&rows), experiment_view(&rows));
+    let mut curves = experiment_curves(&results);
+    curves.extend_from_slice(beside);
+    store.write("table.csv", csv(&table).as_bytes())?;
+    if experiment.is_timed() {
+        store.write("curves.csv", curves_csv(&curves).as_bytes())?;
+    }
+    let figures = experiment_figures(experiment, &results, &curves);
+    let taken = pictures_of_runs(experiment, &results, store);
+    let training: f64 = results.iter().filter_map(|(_, record)| record.as_ref()).map(|record| record.seconds).sum();
+    let note = format!(
+        "Scale {}, {}, {training:.0} s of training, {:.0} s on the clock this time.",
+        scale.name(),
+        counted(results.len(), "run", "runs"),
+        started.elapsed().as_secs_f64()
+    );
+    let headline = headline::of_experiment(&rows);
+    let report = headline
+        .begin(Report::new(experiment.title))
+        .paragraph(&format!("Regenerates: {}.", experiment.paper))
+        .paragraph(&format!("The paper: {}", experiment.finding))
+        .paragraph(&note)
+        .table(&header, &view)
+        .paragraph(CONVENTIONS);
+    let remarks = experiment.remarks(&results.iter().map(|(run, _)| run).collect::<Vec<_>>());
+    let reductions = reduction_table(&experiment.reductions(&results));
+    let report = remarks.iter().fold(report, |report, remark| report.paragraph(remark));
+    let report = if reductions.is_empty() { report } else { report.table(&REDUCTION_HEADER, &reductions) };
+    let report = within(taken, report.figures(&figures));
+    store.write("report.html", report.to_html().as_bytes())?;
+    figures.iter().try_for_each(|figure| store.write(&figure.file, figure.picture.to_svg().as_bytes()))?;
+
+    let (energies, others): (Vec<usize>, Vec<usize>) =
+        (1..header.len()).partition(|&k| ["energy", "motions"].iter().any(|word| header[k].contains(word)));
+    let table_of = |columns: &[usize]| {
+        let columns: Vec<usize> = [0].iter().chain(columns).copied().collect();
+        let rows: Vec<Vec<&str>> = view.iter().map(|row| columns.iter().map(|&k| row[k].as_str()).collect()).collect();
+        text_table(&columns.iter().map(|&k| header[k]).collect::<Vec<_>>(), &rows)
+    };
+    let tables =
+        [others, energies].iter().filter(|columns| !columns.is_empty()).map(|c| table_of(c)).collect::<Vec<_>>();
+    let mut text = format!("{}\n{}\n", headline.text(), tables.join("\n"));
+    remarks.iter().for_each(|remark| text += &format!("{remark}\n"));
+    if !reductions.is_empty() {
+        text += &format!("\n{}", text_table(&REDUCTION_HEADER, &reductions));
+    }
+    let (title, paper) = (experiment.title, experiment.paper);
+    let place = if paper == "-" { String::new() } else { format!(" (of the paper: {paper})") };
+    let text = wrapped(&format!("{title}{place}\n{text}\n{note}\n"), WIDTH);
+    Ok(ExperimentReport { results, rows, table, training_seconds: training, text })
+}
+
+/// Loss against time of every curve, as far as they are known.
+fn curves_csv(curves: &[Curve]) -> String {
+    let mut csv = String::from("run,seconds,validation_loss\n");
+    for Curve { label, points } in curves {
+        let label = label.replace('"', "\"\"");
+        for (seconds, loss) in points {
+            let _ = writeln!(csv, "\"{label}\",{seconds},{loss}");
+        }
+    }
+    csv
+}
+
+/// Comma-separated values; cells hold brackets and words, so all are quoted.
+fn csv(table: &[Vec<String>]) -> String {
+    let line = |cells: &mut dyn Iterator<Item = &str>| {
+        cells.map(|cell| format!("\"{}\"", cell.replace('"', "\"\""))).collect::<Vec<_>>().join(",") + "\n"
+    };
+    let rows = table.iter().map(|row| line(&mut row.iter().map(String::as_str)));
+    line(&mut EXPERIMENT_HEADER.into_iter()) + &rows.collect::<String>()
+}

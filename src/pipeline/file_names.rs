@@ -1,0 +1,8 @@
+//! Names of files that pipelines write.
+
+/// Name of the model's file.
+pub const MODEL: &str = "model.safetensors";
+/// Name of the file with the captions of a run's pictures, by file name; written before them, so that each is known.
+pub const CAPTIONS: &str = "captions.json";
+/// Name of the file that a finished run of an experiment has.
+pub const RECORD: &str = "record.json";

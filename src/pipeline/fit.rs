@@ -1,0 +1,220 @@
+//! A fit of recorded motion: learning, judgement by motion that was held out, files.
+
+use crate::configuration::Precision;
+use crate::data::{Datasets, Measured};
+use crate::network::file::{FORMAT, Header, ModelFile, StoredPrecision};
+use crate::network::{Architecture, Layout, NetworkLagrangian};
+use crate::pipeline::determination::Determined;
+use crate::pipeline::fit_config::FitConfig;
+use crate::pipeline::fit_summary::Found;
+use crate::pipeline::hold_out::{HoldOut, HoldOutOptions, evaluate_hold_out};
+use crate::pipeline::losses::Judges;
+use crate::pipeline::prepared_fit::PreparedFit;
+use crate::pipeline::report_files::history;
+use crate::pipeline::start::{StartModel, weights};
+use crate::pipeline::train::{RunOptions, write_model};
+use crate::pipeline::{Event, Output, PipelineError, Watch, memory};
+use crate::recording::Targets;
+use crate::scalar::Scalar;
+use crate::shooting::{self, Task};
+use crate::storage::container::checksum;
+use crate::training::{Epoch, Sitting, Snapshot, Stop, Trained, resume as train, training_memory};
+
+/// A model of recorded motion, after its files were written.
+#[derive(Debug)]
+pub struct FitReport {
+    /// Reason for which learning ended.
+    pub stop: Stop,
+    /// Header of the model's file.
+    pub header: Header,
+    /// The network with its best weights.
+    pub network: NetworkLagrangian<f64>,
+    /// Epochs of the supervised training.
+    pub history: Vec<Epoch>,
+    /// Predictions of motion that was held out.
+    pub hold_out: HoldOut,
+    /// Ranges in which the data determine mass matrix, friction and energy.
+    pub determined: Determined,
+    /// Text of `summary.json`.
+    pub json: String,
+    pub(crate) text: String,
+}
+
+impl FitReport {
+    /// Headline and tables for a terminal.
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+}
+
+/// Name of the force conjugate to a coordinate where the data gave it none.
+pub(crate) fn usual_force(coordinate: &str) -> String {
+    format!("{coordinate}_force")
+}
+
+/// Learns from recorded motion in the configuration's precision, judges by motion that was held out, and writes everything into
+/// the output.
+///
+/// # Errors
+/// Configurations out of range, data that cannot be learned from, files that cannot be written;
+/// [`TrainingError::NothingLearned`](crate::training::TrainingError::NothingLearned) if no epoch gave a finite loss, also when
+/// the watch's flag ended the first one: then nothing was written.
+pub fn fit(
+    prepared: &PreparedFit<'_>,
+    config: &FitConfig,
+    options: &RunOptions,
+    output: &dyn Output,
+    watch: &Watch,
+) -> Result<FitReport, PipelineError> {
+    match config.training.precision {
+        Precision::F32 => fit_in::<f32>(prepared, config, options, output, watch),
+        Precision::F64 => fit_in::<f64>(prepared, config, options, output, watch),
+    }
+}
+
+fn fit_in<S: Scalar>(
+    prepared: &PreparedFit<'_>,
+    fit_config: &FitConfig,
+    options: &RunOptions,
+    output: &dyn Output,
+    watch: &Watch,
+) -> Result<FitReport, PipelineError> {
+    let PreparedFit { measured, targets, .. } = prepared;
+    let (recording, config, threads) = (&prepared.reading.recording, &fit_config.training, options.threads);
+    let names = &recording.coordinates;
+    let mut data = measured.datasets::<S>(*targets)?;
+    let faults = config.faults(names.len());
+    if !faults.is_empty() {
+        return Err(PipelineError::Config(faults));
+    }
+    let periodic = recording.periodic.clone();
+    let time_like = config.network.time_like_index(names.iter().map(String::as_str))?;
+    let form = config.network.form(names.iter().map(String::as_str))?;
+    let shaped = |scale| {
+        let plain = config.architecture_with(periodic.clone(), scale);
+        Architecture { time_like, form: form.clone(), ..plain }
+    };
+    let (architecture, weights) = match &config.from {
+        Some(from) => {
+            StartModel::read(from)?.require(config, periodic.clone())?;
+            let (weights, shape) = weights(from, shaped)?;
+            (shape, Some(weights))
+        }
+        None => (shaped(data.training[0].physical_scale()), None),
+    };
+    // Every phase learns from the same states.
+    data.training = vec![data.training.swap_remove(0); config.phases.len()];
+    architecture.validate()?;
+    memory::require("training", training_memory(config, &architecture))?;
+    let penalty = config.penalty.penalty(names.iter().map(String::as_str))?;
+
+    let judges = Judges { validation: data.validation.clone(), test: data.test.clone() };
+    let toml = toml::to_string(fit_config).map_err(PipelineError::format)?;
+    let sizes = (Layout::new(&architecture).parameters, data.training[0].len());
+    let opened = options.checkpoints.as_ref();
+    let opened = opened.map(|checkpoints| checkpoints.open::<S>(&toml, checksums(measured, &data), sizes, watch));
+    let (keeper, restored) = opened.transpose()?.map_or((None, None), |(keeper, start)| (Some(keeper), start));
+    let shots = restored.clone().filter(Snapshot::is_shooting);
+    let start = restored.or_else(|| weights.map(Snapshot::beginning_with));
+    let sitting = Sitting { keeper: keeper.clone(), start };
+    let mut trained = train(config, &architecture, penalty, data, threads, &watch.hooks(), sitting)?;
+    let mut shot = None;
+    if let (Targets::Motion, Stop::Finished) = (targets, &trained.stop) {
+        let settings = fit_config.shooting.clone().unwrap_or_default();
+        let (training, validation) = (measured.training.estimated(), measured.validation.estimated());
+        let noise = measured.noise();
+        let task = Task {
+            architecture: &architecture,
+            penalty,
+            weights: trained.weights.clone(),
+            training: &training,
+            validation: &validation,
+            noise: &noise,
+            seed: config.seed,
+        };
+        let start = Some(shots.unwrap_or_else(|| trained.snapshot(config)));
+        let sitting = Sitting { keeper, start };
+        let fitted = shooting::resume(&settings, task, threads, &watch.hooks(), sitting)?;
+        trained.weights.clone_from(&fitted.weights);
+        trained.stop.clone_from(&fitted.stop);
+        judges.judge(&architecture, penalty, threads, &mut trained)?;
+        shot = Some(fitted);
+    }
+
+    // The model first, then what is small, pictures last: on a full disk nothing that comes after can lose them.
+    let header = header(names, fit_config, &architecture, &trained);
+    let model = ModelFile { header, weights: trained.weights.clone() };
+    write_model(output, &model)?;
+    output.write("config.toml", toml.as_bytes())?;
+    output.write("history.csv", history(&trained.history).as_bytes())?;
+    if let Some(shot) = &shot {
+        output.write("shooting.csv", history(&shot.history).as_bytes())?;
+    }
+
+    let network = NetworkLagrangian::new(architecture, model.weights)?.cast::<f64>();
+    let forces = match fit_config.recording.force.as_slice() {
+        [] => names.iter().map(|name| usual_force(name)).collect(),
+        known => known.to_vec(),
+    };
+    let held_out =
+        HoldOutOptions { part: &measured.test, horizon: fit_config.horizon, time: time_like, forces: &forces, threads };
+    let hold_out = evaluate_hold_out(&network, &held_out, watch)?;
+    let determined = Determined::new(&network, measured, *targets)?;
+    determined.suggestion().iter().for_each(|text| watch.say(Event::Note(text)));
+    let found = Found {
+        prepared,
+        config,
+        threads,
+        trained: &trained,
+        constants: network.architecture().known_constants(network.weights()),
+        shot: shot.as_ref(),
+        hold_out: &hold_out,
+        determined: &determined,
+    };
+    let (json, text) = found.write(output, &toml)?;
+    let (stop, history, header) = (trained.stop, trained.history, model.header);
+    Ok(FitReport { stop, header, network, history, hold_out, determined, json, text })
+}
+
+/// Name and checksum of everything that is learned from.
+fn checksums<S: Scalar>(measured: &Measured, data: &Datasets<S>) -> Vec<(String, u32)> {
+    let parts = [&measured.training, &measured.validation];
+    let tracks = parts.into_iter().flat_map(|part| &part.recording.tracks);
+    let numbers = tracks.flat_map(|track| [&track.times, &track.q, &track.v, &track.a, &track.force]).flatten();
+    let recorded = ("recorded motion".to_string(), checksum(numbers, StoredPrecision::F64));
+    data.checksums().into_iter().chain([recorded]).collect()
+}
+
+/// Columns of recorded forces as a model remembers them; numbers of columns are no names.
+fn named_forces(columns: &[String]) -> Vec<String> {
+    if columns.iter().any(|name| name.parse::<f64>().is_ok()) { Vec::new() } else { columns.to_vec() }
+}
+
+/// Header of the model file of this run.
+fn header<S: Scalar>(
+    names: &[String],
+    fit_config: &FitConfig,
+    architecture: &Architecture,
+    trained: &Trained<S>,
+) -> Header {
+    let config = &fit_config.training;
+    let velocities = names.iter().map(|name| format!("{name}_dot"));
+    Header {
+        format: FORMAT,
+        crate_version: env!("CARGO_PKG_VERSION").to_string(),
+        architecture: architecture.clone(),
+        system: config.system.clone(),
+        parameters: Default::default(),
+        columns: names.iter().cloned().chain(velocities).collect(),
+        forces: named_forces(&fit_config.recording.force),
+        description: None,
+        precision: match config.precision {
+            Precision::F32 => StoredPrecision::F32,
+            Precision::F64 => StoredPrecision::F64,
+        },
+        position: config.phases[0].position.clone(),
+        velocity: config.phases[0].velocity.clone(),
+        seed: config.seed,
+        validation_loss: trained.validation_loss,
+    }
+}

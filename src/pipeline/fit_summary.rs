@@ -1,0 +1,244 @@
+//! Results of `lnn fit`: `summary.json`, tables for a terminal, report.
+
+use crate::configuration::Config;
+use crate::names::{WIDTH, counted, hundredths, number, wrapped};
+use crate::pipeline::determination::Determined;
+use crate::pipeline::hold_out::HoldOut;
+use crate::pipeline::prepared_fit::PreparedFit;
+use crate::pipeline::report_files::{ended, training_pictures, write_report_and_figures};
+use crate::pipeline::{Output, PipelineError, headline};
+use crate::recording::{HeldOut, Recording, Targets};
+use crate::report::{Report, text_table};
+use crate::scalar::Scalar;
+use crate::shooting::Fitted;
+use crate::training::Trained;
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+
+/// One coordinate of `summary.json`: what the data are like and what smoothing makes of them, in SI units.
+#[derive(Serialize)]
+struct Coordinate {
+    name: String,
+    noise: f64,
+    window_samples: usize,
+    window_seconds: f64,
+    acceleration_error: f64,
+    acceleration_error_relative: f64,
+}
+
+/// Contents of `summary.json`.
+#[derive(Serialize)]
+struct Summary<'a> {
+    system: &'a str,
+    crate_version: &'static str,
+    seed: u64,
+    precision: &'static str,
+    threads: usize,
+    targets: Targets,
+    trajectories: [usize; 3],
+    samples: [usize; 3],
+    held_out: &'a HeldOut,
+    coordinates: Vec<Coordinate>,
+    epochs: usize,
+    weights: usize,
+    /// Loss (paper) against the accelerations the network was trained on, of the validation and the held-out part.
+    validation_loss: f64,
+    /// None where nothing was held out.
+    test_loss: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    shooting: Option<ShootingSummary>,
+    /// Constants of the known part of a grey box.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    constants: BTreeMap<String, f64>,
+    ended: String,
+    training_seconds: f64,
+    wall_seconds: f64,
+    #[serde(flatten)]
+    judgement: &'a HoldOut,
+    #[serde(flatten)]
+    determined: &'a Determined,
+}
+
+/// Multiple shooting in `summary.json`; losses are mean squared residuals in units of noise.
+#[derive(Serialize)]
+struct ShootingSummary {
+    epochs: usize,
+    segments: usize,
+    steps_per_segment: usize,
+    start_loss: f64,
+    validation_loss: f64,
+    integration_error: f64,
+}
+
+/// Header of the table of what smoothing makes of the coordinates.
+const SMOOTHING: [&str; 6] =
+    ["coordinate", "noise [SI]", "window [s]", "window [samples]", "error of a [SI]", "error of a over its rms [%]"];
+
+/// A learned model with its data.
+pub(crate) struct Found<'a, S> {
+    /// Recorded motion, as it is, smoothed and divided.
+    pub prepared: &'a PreparedFit<'a>,
+    /// The supervised training.
+    pub config: &'a Config,
+    /// Threads.
+    pub threads: usize,
+    /// Result of the supervised training.
+    pub trained: &'a Trained<S>,
+    /// Constants of the known part of a grey box, by name.
+    pub constants: BTreeMap<String, f64>,
+    /// Multiple shooting, if there was any.
+    pub shot: Option<&'a Fitted<S>>,
+    /// Predictions of held-out motion.
+    pub hold_out: &'a HoldOut,
+    /// Ranges in which the data determine the model.
+    pub determined: &'a Determined,
+}
+
+impl<'a, S: Scalar> Found<'a, S> {
+    /// Writes `summary.json`, `report.html` and pictures, and returns the first as it is and in words.
+    ///
+    /// # Errors
+    /// [`PipelineError::Output`].
+    pub fn write(&self, output: &dyn Output, toml: &str) -> Result<(String, String), PipelineError> {
+        let (recording, name) = (&self.prepared.reading.recording, self.config.system.as_str());
+        let summary = self.summary();
+        let json = serde_json::to_string_pretty(&summary).map_err(PipelineError::format)? + "\n";
+        output.write("summary.json", json.as_bytes())?;
+        let periodic = &recording.periodic;
+        let unit = if periodic.iter().all(|periodic| *periodic) { "rad" } else { "SI units" };
+        let headline = headline::of_hold_out(name, self.hold_out, unit);
+        let opening = summary.opening(recording);
+        let mut figures = training_pictures(&self.trained.history);
+        if let Some(shot) = self.shot {
+            let mut later = training_pictures(&shot.history);
+            later.iter_mut().for_each(|figure| figure.file.insert_str(0, "shooting_"));
+            figures.extend(later);
+        }
+        let report = headline.begin(Report::new(&format!("{name}: learned from recorded motion")));
+        let report = report.preformatted(&wrapped(opening.trim_end(), WIDTH));
+        let report = self.determined.report(self.hold_out.report(report)).heading("Training");
+        let report = report.figures(&figures).heading("Configuration").preformatted(toml);
+        write_report_and_figures(output, &report, figures.iter().chain(&self.hold_out.figures))?;
+        let tables = self.hold_out.text() + &self.determined.text();
+        let text = wrapped(&format!("{}\n{opening}{tables}", headline.text()), WIDTH);
+        Ok((json, text))
+    }
+
+    fn summary(&self) -> Summary<'a> {
+        let Self { prepared, trained, shot, .. } = self;
+        let measured = &prepared.measured;
+        let parts = [&measured.training, &measured.validation, &measured.test];
+        Summary {
+            system: &self.config.system,
+            crate_version: env!("CARGO_PKG_VERSION"),
+            seed: self.config.seed,
+            precision: S::NAME,
+            threads: self.threads,
+            targets: prepared.targets,
+            trajectories: parts.map(|part| part.recording.tracks.len()),
+            samples: parts.map(|part| part.recording.samples()),
+            held_out: &measured.held_out,
+            coordinates: self.coordinates(),
+            epochs: trained.history.len(),
+            weights: trained.weights.len(),
+            validation_loss: trained.validation_loss,
+            test_loss: (measured.held_out != HeldOut::Nothing).then(|| trained.test.loss.to_f64()),
+            shooting: shot.map(|fitted| ShootingSummary {
+                epochs: fitted.history.len(),
+                segments: fitted.segments.0,
+                steps_per_segment: fitted.steps,
+                start_loss: fitted.start_loss,
+                validation_loss: fitted.validation_loss,
+                integration_error: fitted.integration_error,
+            }),
+            constants: self.constants.clone(),
+            ended: ended(&trained.stop),
+            training_seconds: trained.seconds + shot.map_or(0.0, |fitted| fitted.seconds),
+            wall_seconds: prepared.started.elapsed().as_secs_f64(),
+            judgement: self.hold_out,
+            determined: self.determined,
+        }
+    }
+
+    fn coordinates(&self) -> Vec<Coordinate> {
+        let PreparedFit { reading, measured, .. } = self.prepared;
+        let pairs = reading.recording.coordinates.iter().zip(&measured.smoothing.coordinates);
+        pairs
+            .map(|(name, chosen)| Coordinate {
+                name: name.clone(),
+                noise: chosen.noise.sigma,
+                window_samples: chosen.quality.window,
+                window_seconds: chosen.seconds,
+                acceleration_error: chosen.quality.total(2),
+                acceleration_error_relative: chosen.quality.relative(),
+            })
+            .collect()
+    }
+}
+
+impl Summary<'_> {
+    /// Data, losses and times of the run in words, with the table of what smoothing makes of the coordinates.
+    fn opening(&self, recording: &Recording) -> String {
+        let [training, validation, test] = self.samples;
+        let way = match self.targets {
+            Targets::Measured => "measured accelerations",
+            Targets::Smoothed => "smoothed accelerations",
+            Targets::Motion => "the motion itself (multiple shooting)",
+        };
+        let judged = match self.held_out {
+            HeldOut::Nothing => "best epoch chosen on the same samples, judged by nothing".to_string(),
+            held => {
+                let held = held.describe(recording);
+                format!("best epoch chosen on {validation} samples, judged on {test} that were held out: {held}")
+            }
+        };
+        let mut text = format!(
+            "learned from {way}: {} of {}\n{judged}\n\n",
+            counted(training, "sample", "samples"),
+            counted(self.trajectories[0], "trajectory", "trajectories")
+        );
+        // Writing to a string cannot fail.
+        let row = |c: &Coordinate| {
+            let lost = "no larger than its error".to_string();
+            let error = c.acceleration_error_relative;
+            vec![
+                c.name.clone(),
+                number(c.noise),
+                number(c.window_seconds),
+                c.window_samples.to_string(),
+                number(c.acceleration_error),
+                if error.is_finite() { hundredths(error) } else { lost },
+            ]
+        };
+        text += &text_table(&SMOOTHING, &self.coordinates.iter().map(row).collect::<Vec<_>>());
+        let _ = writeln!(
+            text,
+            "\nloss (paper) against those accelerations: validation {}{}; {}, {}, seed {}",
+            number(self.validation_loss),
+            self.test_loss.map_or(String::new(), |loss| match loss {
+                x if x.is_finite() => format!(", held out {}", number(x)),
+                _ => ", held out not finite".to_string(),
+            }),
+            counted(self.epochs, "epoch", "epochs"),
+            counted(self.weights, "weight", "weights"),
+            self.seed
+        );
+        if let Some(shooting) = &self.shooting {
+            let _ = writeln!(
+                text,
+                "mean squared residual of predictions, in units of the noise: {} before, {} after {} over {} (1 is noise alone)",
+                number(shooting.start_loss),
+                number(shooting.validation_loss),
+                counted(shooting.epochs, "epoch", "epochs"),
+                counted(shooting.segments, "segment", "segments")
+            );
+        }
+        if !self.constants.is_empty() {
+            let constants: Vec<String> = self.constants.iter().map(|(k, &x)| format!("{k} {}", number(x))).collect();
+            let _ = writeln!(text, "constants of the known part: {}", constants.join(", "));
+        }
+        let _ = writeln!(text, "{:.1} s of training, {:.1} s in all\n", self.training_seconds, self.wall_seconds);
+        text
+    }
+}

@@ -1,0 +1,37 @@
+//! Losses of weights that something else than the supervised training left.
+
+use crate::configuration::Penalty;
+use crate::data::Dataset;
+use crate::network::Architecture;
+use crate::pipeline::PipelineError;
+use crate::scalar::Scalar;
+use crate::training::{Objective, Trained, TrainingError};
+
+/// States that judge a model: those that chose the best epoch, and those that chose nothing.
+pub(crate) struct Judges<S> {
+    /// Validation states.
+    pub validation: Dataset<S>,
+    /// Fresh states.
+    pub test: Dataset<S>,
+}
+
+impl<S: Scalar> Judges<S> {
+    /// Puts the losses of the weights as they are into `trained`, in place of those that its training left.
+    ///
+    /// # Errors
+    /// [`TrainingError::Threads`] if threads cannot be started.
+    pub fn judge(
+        &self,
+        architecture: &Architecture,
+        penalty: Penalty,
+        threads: usize,
+        trained: &mut Trained<S>,
+    ) -> Result<(), PipelineError> {
+        let mut objective = Objective::new(architecture, penalty, threads).map_err(TrainingError::from)?;
+        let loss = objective.loss(&trained.weights, &self.validation).loss.to_f64();
+        // A model file says a number; of weights that give no state an acceleration there is none.
+        trained.validation_loss = if loss.is_finite() { loss } else { f64::MAX };
+        trained.test = objective.loss(&trained.weights, &self.test);
+        Ok(())
+    }
+}

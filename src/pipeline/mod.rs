@@ -1,0 +1,102 @@
+//! Pipelines: a training, a fit of recorded motion, an evaluation, an experiment, each from its configuration to model, tables,
+//! pictures and report.
+//!
+//! The command line and every other door call the same four functions:
+//!
+//! | function | from | to |
+//! |---|---|---|
+//! | [`train`] | a [`Config`](crate::configuration::Config) | a model of a known system and its [`Evaluation`] |
+//! | [`fit`] | recorded motion and a [`FitConfig`] | a model, judged by motion that was held out ([`HoldOut`]) |
+//! | [`evaluate`] | a model and the system it learned | an [`Evaluation`] |
+//! | [`run_experiment`] | an [`Experiment`](crate::experiments::Experiment) | the records of its runs, a table, a report |
+//!
+//! Files go into an [`Output`], of which a [`Directory`] and [`InMemory`] are two; what happens meanwhile comes as an [`Event`] to
+//! the [`Watch`], whose flag ends the work. Nothing is printed, no directory is locked, and files that stand where an [`Output`]
+//! writes are replaced.
+//!
+//! # A fit of recorded motion, judged
+//!
+//! ```
+//! use lnn::pipeline::{FitOptions, InMemory, PreparedFit, RunOptions, Watch, fit};
+//! use lnn::recording::{Reading, Recording, Track};
+//! use lnn::configuration::Precision;
+//!
+//! // Two swings of a pendulum: an angle every 20 ms.
+//! let swing = |amplitude: f64| -> Vec<f64> { (0..400).map(|k| amplitude * (0.06 * f64::from(k)).sin()).collect() };
+//! let times: Vec<f64> = (0..400).map(|k| 0.02 * f64::from(k)).collect();
+//! let trajectory = |name: &str, amplitude| Track {
+//!     name: name.into(), times: times.clone(), q: swing(amplitude), v: vec![], a: vec![], force: vec![],
+//! };
+//! let recording = Recording {
+//!     coordinates: vec!["angle".into()],
+//!     periodic: vec![true],
+//!     tracks: vec![trajectory("first", 0.3), trajectory("second", 0.2), trajectory("third", 0.25)],
+//! };
+//!
+//! let loaded = Reading::from(recording);
+//! let prepared = PreparedFit::new(&loaded, &FitOptions { held_out: 0.3, ..FitOptions::default() })?;
+//! let mut config = prepared.suggest("pendulum", Precision::F32)?;
+//! config.training.network.hidden = vec![8]; // as small as can be: this runs in a moment
+//! (config.training.phases[0].epochs, config.training.phases[0].t_max) = (2, 2.0);
+//!
+//! let files = InMemory::default();
+//! let fitted = fit(&prepared, &config, &RunOptions::default(), &files, &Watch::default())?;
+//! assert_eq!(fitted.history.len(), 2);
+//! assert!(fitted.hold_out.model[0].median.is_finite()); // rad, a quarter of the horizon ahead
+//! assert!(files.get("report.html").is_some() && files.get("model.safetensors").is_some());
+//! # Ok::<(), lnn::pipeline::PipelineError>(())
+//! ```
+
+mod attention;
+mod checkpoints;
+mod determination;
+mod energy;
+mod error;
+mod evaluation;
+mod evaluation_tables;
+mod experiment;
+mod experiment_report;
+mod experiment_store;
+mod file_names;
+mod fit;
+mod fit_config;
+mod fit_summary;
+mod headline;
+mod hold_out;
+mod losses;
+pub(crate) mod memory;
+mod model;
+mod output;
+mod prediction;
+mod prepared_fit;
+mod report_files;
+mod run_figures;
+mod start;
+mod train;
+mod watch;
+
+pub use checkpoints::{Begin, Checkpoints};
+pub use determination::Determined;
+pub use energy::Balance;
+pub use error::PipelineError;
+pub use evaluation::{Evaluation, EvaluationOptions, Motion, RTOL, evaluate};
+pub(crate) use experiment::finished_record;
+pub use experiment::run_experiment;
+pub use experiment_report::{ExperimentReport, Results};
+pub use experiment_store::{ExperimentStore, RunOutput};
+pub use file_names::MODEL;
+pub(crate) use file_names::{CAPTIONS, RECORD};
+pub use fit::{FitReport, fit};
+pub(crate) use fit_config::FIT_SECTIONS;
+pub use fit_config::{FitColumns, FitConfig, FitOptions, HELD_OUT};
+pub use hold_out::{HoldOut, HoldOutOptions, evaluate_hold_out};
+pub use model::{model_file, trained_on};
+pub use output::{Directory, InMemory, Output};
+pub use prepared_fit::PreparedFit;
+pub use start::StartModel;
+pub use train::{RunOptions, TrainReport, train};
+pub use watch::{Event, EventSink, Watch};
+
+pub(crate) use fit::usual_force;
+pub(crate) use model::all_parameters;
+pub(crate) use prepared_fit::shorten;

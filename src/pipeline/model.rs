@@ -1,0 +1,40 @@
+//! Model files of runs: where they lie, the states they were trained on, the parameters of their systems.
+
+use crate::lagrangian::Configured;
+use crate::lagrangian::system::Size;
+use crate::network::file::Header;
+use crate::pipeline::{MODEL, PipelineError};
+use crate::rollout::Domain;
+use crate::scalar::Scalar;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// The file of a model that is given by its file or by the directory of its run.
+///
+/// # Errors
+/// [`PipelineError::NoModel`] for a directory without a model.
+pub fn model_file(path: &Path) -> Result<PathBuf, PipelineError> {
+    if !path.is_dir() {
+        return Ok(path.to_path_buf());
+    }
+    let file = path.join(MODEL);
+    if file.exists() { Ok(file) } else { Err(PipelineError::NoModel(path.to_path_buf())) }
+}
+
+/// The states a model was trained on; periodic coordinates are unbounded.
+pub fn trained_on<S: Scalar>(header: &Header) -> Domain<S> {
+    let bound = |&[low, high]: &[f64; 2]| (S::of_f64(low), S::of_f64(high));
+    let periodic = &header.architecture.periodic;
+    let positions = header.position.iter().zip(periodic).map(|(b, &p)| (!p).then(|| bound(b)));
+    Domain::new(positions.chain(header.velocity.iter().map(|b| Some(bound(b)))).collect())
+}
+
+/// Values of all parameters of a system, its size among them.
+pub(crate) fn all_parameters(system: &Configured<f64>) -> BTreeMap<String, f64> {
+    let named = system.system.parameters.iter().map(|p| p.symbol.to_string());
+    let mut parameters: BTreeMap<_, _> = named.zip(system.parameters.iter().copied()).collect();
+    if let Size::Chosen { symbol, .. } = system.system.size {
+        parameters.insert(symbol.to_string(), system.coordinates as f64);
+    }
+    parameters
+}

@@ -1,0 +1,152 @@
+//! Predictions of held-out windows in bounded time, and why some were given up.
+
+use crate::analysis::{Predictions, Window, follow};
+use crate::lagrangian::EulerLagrange;
+use crate::pipeline::PipelineError;
+use crate::pipeline::attention::Attention;
+use crate::rollout::RolloutError;
+use std::collections::BTreeMap;
+
+/// Windows that are tried first, evenly spaced: if more than half of them are given up, the rest would be too, each after
+/// as many steps as are allowed.
+const PILOT: usize = 40;
+/// Windows between two looks at the bar; a multiple of the motions that are integrated together.
+const PART: usize = 32;
+
+/// Windows with what a model makes of them.
+pub(crate) struct HeldOutPredictions {
+    /// The windows that were predicted.
+    pub windows: Vec<Window>,
+    /// Their predictions.
+    pub predictions: Predictions,
+    /// Windows there were.
+    pub all: usize,
+    /// Why predictions were given up, and how many.
+    pub given_up: BTreeMap<&'static str, usize>,
+}
+
+impl HeldOutPredictions {
+    /// Predicts the windows, or few of them if those show that there is nothing to predict.
+    ///
+    /// # Errors
+    /// [`PipelineError::Interrupted`].
+    pub fn new(
+        model: &dyn EulerLagrange<f64>,
+        mut windows: Vec<Window>,
+        threads: usize,
+        attention: &Attention<'_>,
+    ) -> Result<Self, PipelineError> {
+        let all = windows.len();
+        let stride = all.div_ceil(PILOT).max(1);
+        let mut found = Self { windows: Vec::new(), predictions: Vec::new(), all, given_up: BTreeMap::new() };
+        if stride > 1 {
+            let pilot: Vec<Window> = windows.iter().step_by(stride).cloned().collect();
+            let (predictions, stops) = in_parts(model, &pilot, threads, attention)?;
+            if 2 * stops.iter().flatten().count() > pilot.len() {
+                found.count(&stops);
+                (found.windows, found.predictions) = (pilot, predictions);
+                return Ok(found);
+            }
+        }
+        let (predictions, stops) = in_parts(model, &windows, threads, attention)?;
+        found.count(&stops);
+        (found.windows, found.predictions) = (std::mem::take(&mut windows), predictions);
+        Ok(found)
+    }
+
+    fn count(&mut self, stops: &[Option<RolloutError>]) {
+        for stop in stops.iter().flatten() {
+            *self.given_up.entry(reason(stop)).or_default() += 1;
+        }
+    }
+
+    /// Predictions that were given up or left out, in words; nothing if all went well.
+    pub fn remarks(&self) -> String {
+        let mut text = String::new();
+        let predicted = self.windows.len();
+        if !self.given_up.is_empty() {
+            let count: usize = self.given_up.values().sum();
+            let reasons = self.given_up.iter().map(|(reason, count)| format!("{count} by {reason}"));
+            let reasons = reasons.collect::<Vec<_>>().join(", ");
+            text += &format!(
+                "{count} of {predicted} predictions were given up: {reasons}; they count as infinitely wrong\n"
+            );
+        }
+        if predicted < self.all {
+            text += &format!("of {} windows only {predicted} were tried, for most of these failed\n", self.all);
+        }
+        text
+    }
+}
+
+/// Predictions part by part, under attention.
+fn in_parts(
+    model: &dyn EulerLagrange<f64>,
+    windows: &[Window],
+    threads: usize,
+    attention: &Attention<'_>,
+) -> Result<(Predictions, Vec<Option<RolloutError>>), PipelineError> {
+    let (mut predictions, mut stops) = (Vec::with_capacity(windows.len()), Vec::with_capacity(windows.len()));
+    for part in windows.chunks(PART) {
+        let (foretold, ended) = follow(model, part, threads);
+        attention.advance(part.len());
+        attention.check()?;
+        predictions.extend(foretold);
+        stops.extend(ended);
+    }
+    Ok((predictions, stops))
+}
+
+/// Why a motion ended, in a few words.
+fn reason(stop: &RolloutError) -> &'static str {
+    match stop {
+        RolloutError::SingularMass { .. } => "a singular mass matrix",
+        RolloutError::TooManySteps { .. } => "a motion too wild for the steps allowed",
+        RolloutError::StepUnderflow { .. } => "steps that became too small",
+        RolloutError::LeftDomain { .. } => "leaving the domain",
+        RolloutError::NotConverged { .. } => "steps that did not converge",
+        _ => "numbers that are not finite",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pipeline::Watch;
+    use crate::rollout::models::{OSCILLATOR, SINGULAR};
+    use std::sync::atomic::Ordering;
+
+    fn windows(count: usize) -> Vec<Window> {
+        let times: Vec<f64> = (1..20).map(|k| 0.1 * f64::from(k)).collect();
+        let window = Window { q: vec![0.0], v: vec![-1.0], measured: vec![0.0; times.len()], times, force: None };
+        vec![window; count]
+    }
+
+    #[test]
+    fn a_model_that_fails_nearly_always_is_not_tried_everywhere() {
+        let watch = Watch::default();
+        let attention = Attention::new(&watch, 1);
+        let found = HeldOutPredictions::new(&SINGULAR, windows(400), 2, &attention).unwrap();
+        assert_eq!((found.windows.len(), found.predictions.len(), found.all), (PILOT, PILOT, 400));
+        let remarks = found.remarks();
+        assert!(remarks.starts_with("40 of 40 predictions were given up: 40 by a singular mass matrix"), "{remarks}");
+        assert!(remarks.contains("of 400 windows only 40 were tried"), "{remarks}");
+        let well = HeldOutPredictions::new(&OSCILLATOR, windows(100), 2, &attention).unwrap();
+        assert_eq!((well.windows.len(), well.remarks().as_str()), (100, ""));
+    }
+
+    #[test]
+    fn a_raised_flag_ends_it() {
+        let watch = Watch::default();
+        let attention = Attention::new(&watch, 1);
+        watch.interrupt.store(true, Ordering::SeqCst);
+        let watched = attention.watched(&OSCILLATOR);
+        let Err(error) = HeldOutPredictions::new(&watched, windows(100), 2, &attention) else { panic!("it goes on") };
+        assert!(error.to_string().contains("interrupted while the model was judged"));
+        let (predictions, stops) = follow(&watched, &windows(1), 1);
+        assert!(predictions[0].iter().all(|x| x.is_nan()) && stops[0].is_some());
+        // The flag that ended a training does not end the judgement of its model.
+        let later = Attention::new(&watch, 1);
+        assert!(HeldOutPredictions::new(&later.watched(&OSCILLATOR), windows(3), 2, &later).is_ok());
+    }
+}

@@ -1,0 +1,105 @@
+//! Recorded motion made ready for a fit: derivatives, division, the configuration that suits it.
+
+use crate::configuration::{Config, Precision};
+use crate::data::Measured;
+use crate::pipeline::PipelineError;
+use crate::pipeline::fit_config::{FitColumns, FitConfig, FitOptions};
+use crate::presets::suggested;
+use crate::recording::survey::{Survey, SurveyOptions, survey};
+use crate::recording::{Reading, Targets};
+use crate::scalar::Scalar;
+use std::time::Instant;
+
+/// Recorded motion with its derivatives, divided into what is learned from, what chooses the best epoch and what judges.
+#[derive(Debug)]
+pub struct PreparedFit<'a> {
+    pub(crate) reading: &'a Reading,
+    pub(crate) options: FitOptions,
+    pub(crate) measured: Measured,
+    pub(crate) targets: Targets,
+    /// Time at which the work began, for the time that the summary states.
+    pub started: Instant,
+}
+
+impl<'a> PreparedFit<'a> {
+    /// Smooths and divides recorded motion; a [`Recording`](crate::recording::Recording) in memory becomes a [`Reading`] by
+    /// `into`.
+    ///
+    /// # Errors
+    /// [`PipelineError::Recording`] for motion that cannot be learned from, [`PipelineError::NoAccelerations`] if measured
+    /// ones are asked for and there are none.
+    pub fn new(reading: &'a Reading, options: &FitOptions) -> Result<Self, PipelineError> {
+        let started = Instant::now();
+        let measured = Measured::new(&reading.recording, &options.preparation())?;
+        let targets = options.targets.unwrap_or_else(|| measured.advice());
+        if targets == Targets::Measured && !measured.training.recording.has_accelerations() {
+            return Err(PipelineError::NoAccelerations);
+        }
+        Ok(Self { reading, options: options.clone(), measured, targets, started })
+    }
+
+    /// Targets that are learned from.
+    pub fn targets(&self) -> Targets {
+        self.targets
+    }
+
+    /// The recorded motion, smoothed and divided.
+    pub fn measured(&self) -> &Measured {
+        &self.measured
+    }
+
+    /// Survey of the recorded motion, with warnings of what will hinder a fit.
+    ///
+    /// # Errors
+    /// [`PipelineError::Smooth`] for motion without derivatives.
+    pub fn survey(&self) -> Result<Survey, PipelineError> {
+        let FitOptions { held_out: validation, seed, .. } = self.options;
+        let smooth = self.options.preparation().smoothing;
+        Ok(survey(self.reading, &SurveyOptions { smooth, validation, seed })?)
+    }
+
+    /// The configuration that suits the data, of a system called `name`.
+    ///
+    /// # Errors
+    /// [`PipelineError::Recording`], if no sample has a full window around it for instance.
+    pub fn suggest(&self, name: &str, precision: Precision) -> Result<FitConfig, PipelineError> {
+        let mut training = Config { seed: self.options.seed, precision, ..self.suggest_training(name, precision)? };
+        let shooting = (self.targets == Targets::Motion).then(Default::default);
+        if shooting.is_some() {
+            shorten(&mut training);
+        }
+        Ok(self.config(training, None, FitColumns::default(), shooting))
+    }
+
+    /// The configuration of this fit with these parts.
+    pub(crate) fn config(
+        &self,
+        training: Config,
+        horizon: Option<f64>,
+        recording: FitColumns,
+        shooting: Option<crate::shooting::Shooting>,
+    ) -> FitConfig {
+        let FitOptions { held_out, window, noise, .. } = self.options.clone();
+        FitConfig { targets: Some(self.targets), held_out, window, noise, horizon, recording, shooting, training }
+    }
+
+    /// The supervised training that suits the data.
+    pub(crate) fn suggest_training(&self, name: &str, precision: Precision) -> Result<Config, PipelineError> {
+        match precision {
+            Precision::F32 => self.suggest_in::<f32>(name),
+            Precision::F64 => self.suggest_in::<f64>(name),
+        }
+    }
+
+    fn suggest_in<S: Scalar>(&self, name: &str) -> Result<Config, PipelineError> {
+        let data = self.measured.datasets::<S>(self.targets)?;
+        Ok(suggested(name, &data))
+    }
+}
+
+/// Shortens a supervised training that multiple shooting follows to a third.
+pub(crate) fn shorten(training: &mut Config) {
+    let phase = &mut training.phases[0];
+    phase.epochs = phase.epochs.div_ceil(3);
+    phase.t_max = phase.epochs as f64;
+}

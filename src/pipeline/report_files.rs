@@ -1,0 +1,92 @@
+//! Files of a report: the page, its pictures and their captions, the history of a training.
+
+use crate::lagrangian::Configured;
+use crate::lagrangian::system::Size;
+use crate::pipeline::model::all_parameters;
+use crate::pipeline::{CAPTIONS, Output, PipelineError};
+use crate::report::{Figure, HistoryRow, Report, training_figures};
+use crate::training::{Epoch, Stop};
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+
+/// Writes [`CAPTIONS`], which name the pictures and tell what they show, the report, and the pictures.
+///
+/// # Errors
+/// [`PipelineError::Output`].
+pub(crate) fn write_report_and_figures<'a>(
+    output: &dyn Output,
+    report: &Report,
+    figures: impl Iterator<Item = &'a Figure> + Clone,
+) -> Result<(), PipelineError> {
+    let captions: BTreeMap<&str, &str> = figures.clone().map(|f| (f.file.as_str(), f.caption.as_str())).collect();
+    output.write(CAPTIONS, serde_json::to_string_pretty(&captions).map_err(PipelineError::format)?.as_bytes())?;
+    output.write("report.html", report.to_html().as_bytes())?;
+    figures.into_iter().try_for_each(|figure| output.write(&figure.file, figure.picture.to_svg().as_bytes()))
+}
+
+/// Adds the system's parameters to a report.
+pub(crate) fn parameter_table(report: Report, system: &Configured<f64>) -> Report {
+    let values = all_parameters(system);
+    let named = system.system.parameters.iter().map(|p| (p.symbol.as_ref(), p.unit.as_ref()));
+    let size = match system.system.size {
+        Size::Fixed(_) => None,
+        Size::Chosen { symbol, .. } => Some((symbol, "1")),
+    };
+    let row = |(symbol, unit): (&str, &str)| {
+        let value = values.get(symbol).map(f64::to_string).unwrap_or_default();
+        vec![symbol.to_string(), value, if unit == "1" { "-" } else { unit }.to_string()]
+    };
+    let rows: Vec<Vec<String>> = named.chain(size).map(row).collect();
+    if rows.is_empty() {
+        return report;
+    }
+    report.heading("Parameters of the system").table(&["parameter", "value", "unit"], &rows)
+}
+
+/// The text of `history.csv`: one row per epoch.
+pub(crate) fn history(epochs: &[Epoch]) -> String {
+    let mut csv =
+        "epoch,phase,rate,training_loss,penalty,penalised,validation_loss,gradient_norm,left_out,skipped,seconds\n"
+            .to_string();
+    for e in epochs {
+        // Writing to a string cannot fail.
+        let _ = writeln!(
+            csv,
+            "{},{},{},{},{},{},{},{},{},{},{:.3}",
+            e.epoch,
+            e.phase,
+            e.rate,
+            e.training_loss,
+            e.penalty,
+            e.penalised,
+            e.validation_loss,
+            e.gradient_norm,
+            e.left_out,
+            e.skipped,
+            e.seconds
+        );
+    }
+    csv
+}
+
+/// Pictures of a history.
+pub(crate) fn training_pictures(epochs: &[Epoch]) -> Vec<Figure> {
+    let row = |e: &Epoch| HistoryRow {
+        epoch: e.epoch as f64,
+        training_loss: e.training_loss,
+        validation_loss: e.validation_loss,
+        learning_rate: e.rate,
+        gradient_norm: e.gradient_norm,
+        penalty: e.penalty,
+    };
+    training_figures(&epochs.iter().map(row).collect::<Vec<_>>())
+}
+
+/// The end of a training as `summary.json` tells it.
+pub(crate) fn ended(stop: &Stop) -> String {
+    match stop {
+        Stop::Finished => "finished".to_string(),
+        Stop::Interrupted => "interrupted".to_string(),
+        Stop::Failed(error) => error.to_string(),
+    }
+}

@@ -1,0 +1,102 @@
+//! Watches: what a pipeline says while it runs, and the flag that ends it.
+
+use crate::training::{Epoch, Hooks, Progress};
+use std::fmt;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Report of a pipeline under way.
+#[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
+pub enum Event<'a> {
+    /// A step of a training: `done` of `total` steps.
+    Step {
+        /// Steps taken so far.
+        done: usize,
+        /// Steps of the whole training.
+        total: usize,
+    },
+    /// An epoch of a training ended.
+    Epoch(&'a Epoch),
+    /// Pieces of work on a finished model: `done` of `total`.
+    Judged {
+        /// Pieces done.
+        done: usize,
+        /// Pieces of all the work.
+        total: usize,
+    },
+    /// Evaluations of the model that is judged, so far.
+    Evaluations(u64),
+    /// Runs of an experiment that are finished: `done` of `total`.
+    Runs {
+        /// Runs that are finished.
+        done: usize,
+        /// Runs asked for.
+        total: usize,
+    },
+    /// Remark for the user, one line.
+    Note(&'a str),
+}
+
+/// Receiver of events; called from several threads.
+pub type EventSink = Arc<dyn Fn(Event<'_>) + Send + Sync>;
+
+/// Events and interruption of a pipeline.
+#[derive(Clone, Default)]
+pub struct Watch {
+    /// Receiver of events, if there is one.
+    pub events: Option<EventSink>,
+    /// Flag that ends the work when it is raised: a training after its step, with the best model so far; an evaluation with
+    /// [`PipelineError::Interrupted`](crate::pipeline::PipelineError::Interrupted).
+    pub interrupt: Arc<AtomicBool>,
+}
+
+impl fmt::Debug for Watch {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Watch").field("interrupt", &self.interrupt).finish_non_exhaustive()
+    }
+}
+
+impl Watch {
+    /// A watch that hands events on.
+    pub fn new(events: impl Fn(Event<'_>) + Send + Sync + 'static) -> Self {
+        Self { events: Some(Arc::new(events)), interrupt: Arc::default() }
+    }
+
+    /// The same with no events but remarks.
+    pub(crate) fn remarks_alone(&self) -> Self {
+        let events = self.events.clone().map(|events| {
+            let remarks: EventSink = Arc::new(move |event: Event<'_>| {
+                if matches!(event, Event::Note(_)) {
+                    events(event);
+                }
+            });
+            remarks
+        });
+        Self { events, interrupt: Arc::clone(&self.interrupt) }
+    }
+
+    /// Whether the flag was raised.
+    pub fn is_interrupted(&self) -> bool {
+        self.interrupt.load(Ordering::SeqCst)
+    }
+
+    /// Hands an event on.
+    pub(crate) fn say(&self, event: Event<'_>) {
+        if let Some(events) = &self.events {
+            events(event);
+        }
+    }
+
+    /// The same for a training.
+    pub(crate) fn hooks(&self) -> Hooks {
+        let watcher = self.events.clone().map(|events| {
+            let watcher: crate::training::Watcher = Arc::new(move |progress: Progress<'_>| match progress {
+                Progress::Step { step, steps, .. } => events(Event::Step { done: step, total: steps }),
+                Progress::Epoch(epoch) => events(Event::Epoch(epoch)),
+            });
+            watcher
+        });
+        Hooks { watcher, interrupt: Arc::clone(&self.interrupt) }
+    }
+}

@@ -1,0 +1,266 @@
+//! Configurations that ship with the program.
+
+use crate::configuration::Regularizer;
+use crate::configuration::{Config, Data, Network, OnFailure, Optimizer, Phase, Precision, Scaling};
+use crate::data::boxes;
+use crate::lagrangian::Configured;
+use crate::lagrangian::system::{Bounds, PaperBudget, PaperPhase, StateAdvice};
+use crate::network::{Initialization, InputLayer, Nonlinearity, Structure};
+use crate::optimizers::Method;
+use crate::optimizers::Schedule;
+use std::f64::consts::PI;
+
+/// A configuration by name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Preset {
+    /// A useful model within a minute on two cores.
+    Quick,
+    /// Wider layers and more epochs than [`Preset::Quick`].
+    Best,
+    /// The paper's own budget and choices.
+    Paper,
+}
+
+impl Preset {
+    /// The configuration of a system; `None` if the preset has none for it.
+    pub fn config(self, system: &Configured<f64>) -> Option<Config> {
+        match self {
+            Self::Quick => Some(ours(system, QUICK)),
+            Self::Best => Some(ours(system, BEST)),
+            Self::Paper => paper(system),
+        }
+    }
+
+    /// The configuration of a system for a Lagrangian of this structure; the presets of our own take bolder steps where a
+    /// signature cannot be lost.
+    pub fn config_of(self, system: &Configured<f64>, structure: Structure) -> Option<Config> {
+        let mut config = self.config(system)?;
+        config.take_structure(structure);
+        if structure != Structure::BlackBox && self != Self::Paper {
+            config.phases.iter_mut().for_each(|phase| phase.rate *= STRUCTURE_RATE);
+        }
+        Some(config)
+    }
+}
+
+impl Config {
+    /// Changes the structure. But for a black box the signature holds by construction, and motion on a mass shell tells the
+    /// whole metric: there is no penalty, no state off the shell and no `alpha` to be learned.
+    pub fn take_structure(&mut self, structure: Structure) {
+        self.network.structure = structure;
+        if structure != Structure::BlackBox {
+            self.penalty = Regularizer::None;
+            self.data.off_shell = 0.0;
+            self.network.learn_alpha = false;
+        }
+    }
+}
+
+/// Name of the time-like coordinate of a system.
+fn time_like(system: &Configured<f64>) -> Option<String> {
+    let coordinates = system.system.coordinates(system.coordinates);
+    system.system.time_like.and_then(|index| coordinates.into_iter().nth(index)).map(|time| time.name.into_owned())
+}
+
+/// The penalty on a wrong signature: eigenvalues, or Lorentzian Sylvester where a coordinate is a time.
+fn regularizer(system: &Configured<f64>, lambda: f64) -> Regularizer {
+    match time_like(system) {
+        Some(time) => Regularizer::LorentzianSylvester { lambda, time },
+        None => Regularizer::Eigenvalue { lambda },
+    }
+}
+
+fn base(system: &Configured<f64>, states: usize, network: Network) -> Config {
+    let validation: Bounds = system.system.validation(system.coordinates);
+    Config {
+        system: system.system.name.to_string(),
+        seed: 0,
+        precision: Precision::F32,
+        from: None,
+        description: system.system.described.as_ref().map(|described| described.description.clone()),
+        parameters: Default::default(),
+        data: Data {
+            training: states,
+            validation: states / 5,
+            off_shell: 0.0,
+            motions: 0.0,
+            relative: 0.0,
+            test: states / 5,
+            validation_position: boxes(&validation.positions),
+            validation_velocity: boxes(&validation.velocities),
+        },
+        network: Network { time_like: time_like(system), ..network },
+        penalty: regularizer(system, 5.0),
+        optimizer: optimizer(Method::Radam),
+        phases: Vec::new(),
+        polish: None,
+    }
+}
+
+fn optimizer(method: Method) -> Optimizer {
+    Optimizer { method, batch: 128, weight_decay: WEIGHT_DECAY, clip: 1.0, averaging: 0.0, on_failure: OnFailure::Skip }
+}
+
+/// Learning rate of structures over that of a black box.
+const STRUCTURE_RATE: f64 = 2.0;
+
+/// Choices in which the presets of our own differ.
+#[derive(Clone, Copy)]
+struct Size {
+    width: usize,
+    epochs: usize,
+    weight_decay: f64,
+}
+
+const QUICK: Size = Size { width: 128, epochs: 40, weight_decay: WEIGHT_DECAY };
+
+const BEST: Size = Size { width: 192, epochs: 100, weight_decay: 0.0 };
+
+/// The paper's.
+const WEIGHT_DECAY: f64 = 1e-6;
+
+/// Part of the states off a mass shell in the presets of our own.
+const OFF_SHELL: f64 = 0.75;
+
+/// Weight of the penalty of the presets of our own.
+const PENALTY: f64 = 100.0;
+
+fn network(width: usize) -> Network {
+    Network {
+        hidden: vec![width; 3],
+        activation: Nonlinearity::Gelu,
+        alpha: 1.0,
+        time_like: None,
+        scaling: Scaling::Physical,
+        embed_periodic: true,
+        input_layer: InputLayer::None,
+        structure: Structure::BlackBox,
+        cyclic: Vec::new(),
+        even_in_v: false,
+        learn_alpha: false,
+        known: None,
+        initialization: Initialization::Default,
+        dissipation: None,
+    }
+}
+
+/// One fall of the rate to zero.
+fn phase(epochs: usize, rate: f64, position: Vec<[f64; 2]>, velocity: Vec<[f64; 2]>) -> Phase {
+    Phase {
+        epochs,
+        rate,
+        eta_min: 0.0,
+        schedule: Schedule::Cosine,
+        t_max: epochs as f64,
+        position,
+        velocity,
+        logarithmic: vec![],
+    }
+}
+
+/// The paper's box with a single turn of every angle, wider where the motions of the trajectory test soon leave it.
+fn training_states(system: &Configured<f64>) -> (Bounds, StateAdvice) {
+    let n = system.coordinates;
+    let mut bounds: Bounds = system.system.training(n);
+    // Embedded angles repeat: one turn is all there is, unless somebody wants less.
+    let whole = system.system.described.is_none();
+    for (bound, coordinate) in bounds.positions.iter_mut().zip(system.system.coordinates(n)) {
+        if coordinate.periodic && whole {
+            *bound = (0.0, 2.0 * PI);
+        }
+    }
+    let advice = system.system.learning.states.map_or_else(StateAdvice::default, |advise| advise(&mut bounds));
+    (bounds, advice)
+}
+
+fn ours(system: &Configured<f64>, size: Size) -> Config {
+    let (bounds, StateAdvice { logarithmic, relative, motions }) = training_states(system);
+    let phase = phase(size.epochs, 5e-3, boxes(&bounds.positions), boxes(&bounds.velocities));
+    let base = base(system, 60_000, network(size.width));
+    let off_shell = if system.constrained_coordinate().is_some() { OFF_SHELL } else { 0.0 };
+    Config {
+        data: Data { off_shell, relative, motions, ..base.data },
+        penalty: regularizer(system, PENALTY),
+        optimizer: Optimizer { weight_decay: size.weight_decay, ..optimizer(Method::Soap) },
+        phases: vec![Phase { logarithmic, ..phase }],
+        ..base
+    }
+}
+
+/// The quick preset for recorded states: numbers of training, validation and test states, bounds of coordinates and
+/// velocities of training and validation, and how many steps to take, in whole epochs.
+pub(crate) fn recorded(
+    name: &str,
+    [training, validation, test]: [usize; 3],
+    [position, velocity]: [Vec<[f64; 2]>; 2],
+    [validation_position, validation_velocity]: [Vec<[f64; 2]>; 2],
+    steps: usize,
+) -> Config {
+    let optimizer = optimizer(Method::Radam);
+    let epochs = steps.div_ceil(training.div_ceil(optimizer.batch));
+    Config {
+        system: name.to_string(),
+        seed: 0,
+        precision: Precision::F32,
+        from: None,
+        description: None,
+        parameters: Default::default(),
+        data: Data {
+            training,
+            validation,
+            test,
+            off_shell: 0.0,
+            motions: 0.0,
+            relative: 0.0,
+            validation_position,
+            validation_velocity,
+        },
+        network: network(QUICK.width),
+        penalty: Regularizer::Eigenvalue { lambda: PENALTY },
+        optimizer,
+        phases: vec![phase(epochs, 3e-3, position, velocity)],
+        polish: None,
+    }
+}
+
+/// Appendix "Training details" of Hamzaogullari and Ozakin. Its table for AdS4 lists the eigenvalue penalty, which no
+/// Lorentzian metric could satisfy; its text says Lorentzian Sylvester, and that is what stands here.
+fn paper(system: &Configured<f64>) -> Option<Config> {
+    let n = system.coordinates;
+    let PaperBudget { states, hidden, phases } = system.system.learning.paper?;
+    let network = Network {
+        hidden: hidden.to_vec(),
+        activation: Nonlinearity::Gelu,
+        alpha: 1.0,
+        time_like: None,
+        scaling: Scaling::Physical,
+        embed_periodic: false,
+        input_layer: InputLayer::None,
+        dissipation: None,
+        structure: Structure::BlackBox,
+        cyclic: Vec::new(),
+        even_in_v: false,
+        learn_alpha: false,
+        known: None,
+        initialization: Initialization::Default,
+    };
+    let bounds: Bounds = system.system.training(n);
+    let phase = |phase: &PaperPhase| {
+        let PaperPhase { epochs, rate, lowest_rate: eta_min, positions } = *phase;
+        let position = positions.map_or_else(|| boxes(&bounds.positions), |all| boxes(&vec![all; n]));
+        let velocity = boxes(&bounds.velocities);
+        Phase {
+            epochs,
+            rate,
+            eta_min,
+            schedule: Schedule::CosineAnnealing,
+            t_max: 30.0,
+            position,
+            velocity,
+            logarithmic: vec![],
+        }
+    };
+    let phases = phases.iter().map(phase).collect();
+    Some(Config { phases, ..base(system, states, network) })
+}

@@ -1,0 +1,58 @@
+//! Random streams: one seed, independent draws for each purpose.
+
+use rand::{RngCore, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
+
+/// Generator of random numbers of one [`RngStream`]: any function over [`rand::Rng`] takes it, its state can be stored.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct RandomGenerator(ChaCha8Rng);
+
+impl RngCore for RandomGenerator {
+    #[inline]
+    fn next_u32(&mut self) -> u32 {
+        self.0.next_u32()
+    }
+    #[inline]
+    fn next_u64(&mut self) -> u64 {
+        self.0.next_u64()
+    }
+    #[inline]
+    fn fill_bytes(&mut self, bytes: &mut [u8]) {
+        self.0.fill_bytes(bytes);
+    }
+}
+
+/// Streams of the random generator: one seed, independent draws for each purpose.
+#[derive(Clone, Copy, Debug)]
+pub enum RngStream {
+    /// Initial weights.
+    Weights,
+    /// Order of the data in a phase.
+    Order(usize),
+    /// Training states of a phase.
+    Training(usize),
+    /// Validation states.
+    Validation,
+    /// Test states.
+    Test,
+    /// Starts of the trajectory test.
+    Trajectories,
+}
+
+impl RngStream {
+    /// The generator of this purpose.
+    pub fn generator(self, seed: u64) -> RandomGenerator {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        rng.set_stream(match self {
+            Self::Weights => 0,
+            Self::Validation => 1,
+            Self::Test => 2,
+            Self::Trajectories => 3,
+            Self::Order(phase) => 16 + 2 * phase as u64,
+            Self::Training(phase) => 17 + 2 * phase as u64,
+        });
+        RandomGenerator(rng)
+    }
+}

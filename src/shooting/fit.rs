@@ -1,0 +1,275 @@
+//! From recorded trajectories and a first guess of the weights to a network fitted through its motion.
+
+use crate::configuration::ConfigError;
+use crate::configuration::Penalty;
+use crate::data::{Estimated, Noise};
+use crate::network::{Architecture, Layout, NetworkError};
+use crate::random::RngStream;
+use crate::recording::TrackError;
+use crate::scalar::Scalar;
+use crate::shooting::objective::Shots;
+use crate::shooting::segments::Segments;
+use crate::shooting::settings::Shooting;
+use crate::shooting::solver::{ShootingProblem, ShootingSolver};
+use crate::training::checkpoint::{Snapshot, Underway};
+use crate::training::epoch::Epoch;
+use crate::training::solver::{Hooks, Saver, TrainingState};
+use crate::training::trainer::{Log, Sitting, Stop, TrainingError};
+use argmin::core::observers::ObserverMode;
+use argmin::core::{Executor, State, TerminationReason, TerminationStatus};
+use thiserror::Error;
+
+/// A network and the recorded motion it is fitted to.
+#[derive(Clone, Debug)]
+pub struct Task<'a, S> {
+    /// Shape of the network.
+    pub architecture: &'a Architecture,
+    /// Penalty on the mass matrix at the start of every integration step.
+    pub penalty: Penalty,
+    /// Weights to begin with, of a supervised training on smoothed accelerations for instance.
+    pub weights: Vec<S>,
+    /// Trajectories to learn from.
+    pub training: &'a [Estimated<'a>],
+    /// Trajectories that choose the best epoch.
+    pub validation: &'a [Estimated<'a>],
+    /// Noise of the measurements; where there is none, the accuracy that is asked for.
+    pub noise: &'a Noise,
+    /// Seed of the order of segments.
+    pub seed: u64,
+}
+
+/// A network fitted through its motion.
+#[derive(Clone, Debug)]
+pub struct Fitted<S> {
+    /// Parameters of the best validation epoch; those given if no epoch was better.
+    pub weights: Vec<S>,
+    /// One row per epoch; losses are mean squared residuals in units of noise, states are segments.
+    pub history: Vec<Epoch>,
+    /// Validation loss of the parameters given.
+    pub start_loss: f64,
+    /// Best validation loss, 1 where only noise is left.
+    pub validation_loss: f64,
+    /// Why fitting ended.
+    pub stop: Stop,
+    /// Segments of the training trajectories, and their samples.
+    pub segments: (usize, usize),
+    /// Integration steps per segment.
+    pub steps: usize,
+    /// Root mean square difference of predictions when steps are halved, in units of noise, at the parameters returned and
+    /// the estimated starts. Steps were chosen for the parameters given: much above 0.05, ask for more of them.
+    pub integration_error: f64,
+    /// Seconds spent.
+    pub seconds: f64,
+}
+
+/// Why a network could not be fitted.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum ShootingError {
+    /// A setting is out of range.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// A trajectory contradicts itself.
+    #[error(transparent)]
+    Track(#[from] TrackError),
+    /// The architecture contradicts itself or has another number of weights.
+    #[error(transparent)]
+    Network(#[from] NetworkError),
+    /// Estimated states or standard deviations are missing or not finite.
+    #[error("{what}: expected {expected}, found {found}")]
+    Estimate {
+        /// Which numbers.
+        what: String,
+        /// Values that are allowed.
+        expected: String,
+        /// The value found.
+        found: String,
+    },
+    /// No two samples follow each other closely enough for a segment.
+    #[error("{what}: no trajectory has two samples that follow each other")]
+    TooShort {
+        /// Training or validation trajectories.
+        what: &'static str,
+    },
+    /// Training failed.
+    #[error(transparent)]
+    Training(#[from] TrainingError),
+}
+
+fn estimate(what: String, expected: impl ToString, found: impl ToString) -> ShootingError {
+    ShootingError::Estimate { what, expected: expected.to_string(), found: found.to_string() }
+}
+
+impl<S: Scalar> Task<'_, S> {
+    /// Checks every shape and number.
+    fn check(&self) -> Result<(), ShootingError> {
+        self.architecture.validate()?;
+        let n = self.architecture.coordinates;
+        // Parameters of other terms of the motion may stand behind those of the network.
+        let (expected, found) = (Layout::new(self.architecture).parameters, self.weights.len());
+        if found < expected {
+            return Err(NetworkError::Weights { expected, found }.into());
+        }
+        for trajectory in self.training.iter().chain(self.validation) {
+            let track = trajectory.track;
+            track.validate(n)?;
+            for (name, values) in [("positions", trajectory.q), ("velocities", trajectory.v)] {
+                let what = || format!("{}: estimated {name}", track.name);
+                if values.len() != track.len() * n {
+                    return Err(estimate(what(), format!("{} numbers", track.len() * n), values.len()));
+                }
+                if let Some(at) = values.iter().position(|x| !x.is_finite()) {
+                    return Err(estimate(what(), "finite numbers", format!("{} in sample {}", values[at], at / n)));
+                }
+            }
+        }
+        let lists = [("positions", &self.noise.q, false), ("velocities", &self.noise.v, true)];
+        for (name, sigma, optional) in lists {
+            let what = || format!("standard deviations of {name}");
+            if sigma.len() != n && !(optional && sigma.is_empty()) {
+                return Err(estimate(what(), format!("{n} numbers"), sigma.len()));
+            }
+            if let Some(bad) = sigma.iter().find(|s| !(s.is_finite() && **s > 0.0)) {
+                return Err(estimate(what(), "positive numbers", bad));
+            }
+        }
+        Ok(())
+    }
+
+    /// The trajectories cut into segments, if there is any.
+    fn cut(&self, which: &'static str, per_segment: usize, steps: usize) -> Result<Segments<S>, ShootingError> {
+        let trajectories = if which == TRAINING { self.training } else { self.validation };
+        let segments = Segments::new(self.architecture, trajectories, self.noise, per_segment, steps);
+        if segments.is_empty() { Err(ShootingError::TooShort { what: which }) } else { Ok(segments) }
+    }
+}
+
+const TRAINING: &str = "training trajectories";
+const VALIDATION: &str = "validation trajectories";
+/// Largest root mean square error of the integrator, in units of noise.
+const INTEGRATION_ERROR: f64 = 0.05;
+/// Segments on which it is measured.
+const PROBES: usize = 64;
+
+/// Root mean square difference of the predictions of two cuts of the same trajectories, in units of noise.
+fn difference<S: Scalar>(shots: &mut Shots<S>, weights: &[S], coarse: &Segments<S>, fine: &Segments<S>) -> f64 {
+    let rows = coarse.cross_section(PROBES);
+    let mut residuals = |segments: &Segments<S>| shots.residuals(weights, segments, segments.starts(), &rows);
+    let (coarse, fine) = (residuals(coarse), residuals(fine));
+    let differences = coarse.iter().zip(&fine).map(|(&a, &b)| (a - b).to_f64()).filter(|d| d.is_finite());
+    let (square, count) = differences.fold((0.0, 0.0), |(square, count), d| (square + d * d, count + 1.0));
+    (square / count).sqrt()
+}
+
+/// Fits a network through its motion; see the [module](crate::shooting).
+///
+/// The same task and seed give the same bytes on any number of `threads`. A segment whose motion is not finite, whose mass
+/// matrix is singular or whose state leaves ten times the range of the data is left out of the step and counted in
+/// [`Epoch::left_out`].
+///
+/// # Errors
+/// [`ShootingError`]; a fit that was interrupted after its first epoch returns its best.
+pub fn fit<S: Scalar>(
+    settings: &Shooting,
+    task: Task<'_, S>,
+    threads: usize,
+    hooks: &Hooks,
+) -> Result<Fitted<S>, ShootingError> {
+    resume(settings, task, threads, hooks, Sitting { keeper: None, start: None })
+}
+
+/// [`fit`] with checkpoints, and from one: the result is that of a fit that was never stopped, but for the times.
+///
+/// `sitting.start` is the training that gave the task its weights ([`Trained::snapshot`]), or what
+/// [`Keeper::restore`](crate::training::Keeper::restore) found of the same training, task and settings; without it no
+/// checkpoint is written.
+///
+/// # Errors
+/// As [`fit`]; a checkpoint of other segments.
+///
+/// [`Trained::snapshot`]: crate::training::Trained::snapshot
+pub fn resume<S: Scalar>(
+    settings: &Shooting,
+    task: Task<'_, S>,
+    threads: usize,
+    hooks: &Hooks,
+    sitting: Sitting<S>,
+) -> Result<Fitted<S>, ShootingError> {
+    settings.validate()?;
+    task.check()?;
+    let per_segment = settings.samples_per_segment;
+    let mut shots = Shots::new(task.architecture, task.penalty, (settings.continuity, settings.huber), threads)
+        .map_err(TrainingError::from)?;
+    let training = match settings.steps {
+        Some(steps) => task.cut(TRAINING, per_segment, steps)?,
+        None => fine_enough(&mut shots, &task, per_segment)?,
+    };
+    let steps = training.steps;
+    let validation = task.cut(VALIDATION, per_segment, steps)?;
+    let segments = (training.len(), training.samples());
+    let problem = ShootingProblem { shots, training, validation };
+    let Sitting { keeper, start } = sitting;
+    let (saver, underway) = match start {
+        Some(Snapshot { seconds, ended, underway }) => {
+            (keeper.map(|keeper| Saver { keeper, ended, seconds }), underway)
+        }
+        None => (None, None),
+    };
+    let rng = RngStream::Order(0).generator(task.seed);
+    let mut solver = ShootingSolver::new(settings, &problem, rng, hooks, saver);
+    let mut state = TrainingState::<S>::new().param(task.weights.clone());
+    if let Some(Underway { course, history, best, best_loss, best_epoch, shooting: Some(shot) }) = underway {
+        (state.iter, state.last_best_iter) = (course.iteration, best_epoch);
+        (state.cost, state.best_cost) = (best_loss, best_loss);
+        (state.param, state.best_param) = (Some(best.clone()), Some(best));
+        let segments = problem.training.len();
+        solver
+            .restore(&problem, course, history, shot)
+            .ok_or_else(|| estimate("checkpoint".to_string(), format!("{segments} segments"), "others"))?;
+    }
+    let mut result = Executor::new(problem, solver)
+        .add_observer(Log, ObserverMode::Always)
+        .configure(|_| state.max_iters(settings.epochs as u64))
+        .timer(false)
+        .run()
+        .map_err(|error| TrainingError::Optimizer(error.to_string()))?;
+    let validation_loss = result.state.get_best_cost();
+    let weights = match result.state.get_best_param() {
+        Some(best) if validation_loss.is_finite() => best.clone(),
+        _ => return Err(TrainingError::NothingLearned(None).into()),
+    };
+    let integration_error = match result.problem.problem.as_mut() {
+        Some(problem) => {
+            let fine = task.cut(TRAINING, per_segment, 2 * steps)?;
+            difference(&mut problem.shots, &weights, &problem.training, &fine)
+        }
+        None => f64::NAN,
+    };
+    let stop = match result.state.get_termination_status() {
+        TerminationStatus::Terminated(TerminationReason::Interrupt) => Stop::Interrupted,
+        _ => Stop::Finished,
+    };
+    let seconds = result.solver.seconds();
+    let (history, start_loss) = (result.solver.history, result.solver.start_loss);
+    Ok(Fitted { weights, history, start_loss, validation_loss, stop, segments, steps, integration_error, seconds })
+}
+
+/// Training segments with as few steps as keep the integrator's error far below the noise, for the weights given.
+///
+/// Tried are an eighth as many steps as a segment has samples, and from there twice as many each time, up to eight per
+/// sample. Weights that move nothing in range, or differ without bound, get one step per sample.
+fn fine_enough<S: Scalar>(
+    shots: &mut Shots<S>,
+    task: &Task<'_, S>,
+    per_segment: usize,
+) -> Result<Segments<S>, ShootingError> {
+    let mut coarse = task.cut(TRAINING, per_segment, per_segment.div_ceil(8))?;
+    while coarse.steps <= 4 * per_segment {
+        let fine = task.cut(TRAINING, per_segment, 2 * coarse.steps)?;
+        if difference(shots, &task.weights, &coarse, &fine) <= INTEGRATION_ERROR {
+            return Ok(coarse);
+        }
+        coarse = fine;
+    }
+    task.cut(TRAINING, per_segment, per_segment)
+}

@@ -1,0 +1,152 @@
+//! Accelerations of a chunk of states and their vector-Jacobian product: the equation of motion of shooting.
+//!
+//! `M a = g - c - dD/dv + Q` in scaled coordinates, `D` the dissipation and `Q` known external forces. They enter in two
+//! places of this file and nowhere else: [`Motion::accelerate`] adds them, [`Motion::pull_back`] takes `lam = M^-1 u`
+//! through what `D` depends on.
+
+use crate::configuration::Penalty;
+use crate::linalg::{
+    SignatureBuffers as Buffers, Violation, characteristic_scales, eigenvalue_violation, sylvester_violation,
+};
+use crate::linalg::{Workspace, solve};
+use crate::network::{Dynamics, Model};
+use crate::scalar::{Real, Scalar};
+use crate::tape::{Depth, MixedDirections};
+use crate::training::violations::Violations;
+
+/// The equation of motion on a chunk of states; buffers are reused from call to call.
+pub(super) struct Motion<S> {
+    model: Model<S>,
+    dynamics: Dynamics<S>,
+    directions: MixedDirections<S>,
+    violations: Violations<S>,
+    scale: Vec<S>,
+    /// Physical states.
+    q: Vec<S>,
+    v: Vec<S>,
+    right: Vec<S>,
+    solution: Vec<S>,
+    workspace: Workspace<S>,
+    signature: Buffers<S>,
+    violation: Violation<S>,
+}
+
+impl<S: Scalar> Motion<S> {
+    pub fn new(model: &Model<S>) -> Self {
+        Self {
+            model: model.clone(),
+            dynamics: Dynamics::new(model),
+            directions: MixedDirections::default(),
+            violations: Violations::new(model),
+            scale: model.scale().to_vec(),
+            q: Vec::new(),
+            v: Vec::new(),
+            right: Vec::new(),
+            solution: Vec::new(),
+            workspace: Workspace::new(),
+            signature: Buffers::default(),
+            violation: Violation::default(),
+        }
+    }
+
+    /// Evaluates the model at scaled states, `(states, n)`; angles are reduced to one turn first.
+    pub fn evaluate(&mut self, weights: &[S], q: &[S], v: &[S], depth: Depth) {
+        let n = self.scale.len();
+        self.q.clear();
+        self.v.clear();
+        self.q.extend(q.iter().enumerate().map(|(k, &q)| q * self.scale[k % n]));
+        self.v.extend(v.iter().enumerate().map(|(k, &v)| v * self.scale[k % n]));
+        self.model.wrap(&mut self.q);
+        self.dynamics.evaluate(weights, &self.q, &self.v, depth, true);
+    }
+
+    /// Accelerations `M^-1 (g - c - dD/dv + Q)` of the states evaluated last under scaled external forces, `(states, n)` or empty.
+    ///
+    /// A state without one is no longer alive; the acceleration of those that are not is 0.
+    pub fn accelerate(&mut self, external: &[S], alive: &mut [bool], acceleration: &mut [S]) {
+        let n = self.scale.len();
+        self.dynamics.right_hand_sides(&mut self.right);
+        for (right, &force) in self.right.iter_mut().zip(external) {
+            *right += force;
+        }
+        // Failed rows are `NaN` and looked for below.
+        let _ = solve(n, &self.dynamics.lagrangian().mass_matrix, &self.right, acceleration, &mut self.workspace);
+        for (alive, a) in alive.iter_mut().zip(acceleration.chunks_exact_mut(n)) {
+            *alive &= a.iter().all(|a| a.is_finite());
+            if !*alive {
+                a.fill(<S as Real>::zero());
+            }
+        }
+    }
+
+    /// Adds `u da/dtheta` to `gradient` and the derivatives of `u a` by the scaled state to `dq`, `dv`, over the states that
+    /// are alive; evaluated to [`Depth::Training`] before. `a` are their accelerations.
+    pub fn pull_back(
+        &mut self,
+        weights: &[S],
+        (a, u): (&[S], &[S]),
+        alive: &[bool],
+        gradient: &mut [S],
+        (dq, dv): (&mut [S], &mut [S]),
+    ) {
+        let n = self.scale.len();
+        let Some(good) = alive.iter().position(|alive| *alive) else { return };
+        self.solution.resize(u.len(), <S as Real>::zero());
+        // Matrices that failed belong to states that are not alive.
+        let _ = solve(n, &self.dynamics.lagrangian().mass_matrix, u, &mut self.solution, &mut self.workspace);
+        self.directions.clear(true);
+        self.directions.s.extend(self.solution.iter().map(|&lambda| -lambda));
+        self.directions.t.extend_from_slice(a);
+        let mut replaced = false;
+        for (state, _) in alive.iter().enumerate().filter(|(_, alive)| !**alive) {
+            let range = state * n..(state + 1) * n;
+            self.directions.s[range.clone()].fill(<S as Real>::zero());
+            self.directions.t[range].fill(<S as Real>::zero());
+            self.q.copy_within(good * n..(good + 1) * n, state * n);
+            self.v.copy_within(good * n..(good + 1) * n, state * n);
+            replaced = true;
+        }
+        if replaced {
+            // Zero directions on finite numbers leave the others out.
+            self.dynamics.evaluate(weights, &self.q, &self.v, Depth::Training, true);
+        }
+        self.dynamics.add_gradient(weights, &self.directions, gradient, Some((dq, dv)));
+    }
+
+    /// Value of `lambda` times the sum of the states' violations and how many violate; adds its gradient by the weights.
+    ///
+    /// The states are taken as given: the data decide them, not the penalty. Sylvester's scales are those of this chunk.
+    pub fn add_penalty(
+        &mut self,
+        weights: &[S],
+        (penalty, lambda): (Penalty, S),
+        alive: &[bool],
+        gradient: &mut [S],
+    ) -> (S, usize) {
+        let n = self.scale.len();
+        let matrices = &self.dynamics.lagrangian().mass_matrix;
+        let scales = match penalty {
+            Penalty::None => return (<S as Real>::zero(), 0),
+            Penalty::Eigenvalue { .. } => Vec::new(),
+            Penalty::Sylvester { .. } => {
+                let chosen = matrices.chunks_exact(n * n).zip(alive).filter(|(_, alive)| **alive);
+                let diagonals: Vec<S> = chosen.flat_map(|(m, _)| m.iter().step_by(n + 1).copied()).collect();
+                characteristic_scales(n, &diagonals)
+            }
+        };
+        self.violations.reset();
+        for (state, matrix) in matrices.chunks_exact(n * n).enumerate().filter(|(state, _)| alive[*state]) {
+            let (signature, found) = (&mut self.signature, &mut self.violation);
+            let outcome = match penalty {
+                Penalty::Sylvester { time, .. } => sylvester_violation(n, matrix, &scales, time, signature, found),
+                _ => eigenvalue_violation(n, matrix, signature, found),
+            };
+            if outcome.is_ok() {
+                let range = state * n..(state + 1) * n;
+                self.violations.push((&self.q[range.clone()], &self.v[range]), &self.violation, lambda);
+            }
+        }
+        self.violations.add_gradient(weights, true, gradient);
+        (self.violations.penalty.value(), self.violations.count)
+    }
+}

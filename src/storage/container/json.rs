@@ -1,0 +1,73 @@
+//! JSON without duplicate keys: one text, one meaning for every reader.
+
+use serde::de::{self, Deserialize, Deserializer, MapAccess, SeqAccess, Visitor};
+use std::collections::HashSet;
+use std::fmt;
+
+/// Any JSON value in which no object names a key twice.
+struct Unambiguous;
+
+/// Checks that no object in `text` names a key twice, at any depth.
+pub(crate) fn check_unambiguous(text: &[u8]) -> Result<(), serde_json::Error> {
+    serde_json::from_slice::<Unambiguous>(text).map(|_| ())
+}
+
+impl<'de> Deserialize<'de> for Unambiguous {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(Unambiguous)
+    }
+}
+
+impl<'de> Visitor<'de> for Unambiguous {
+    type Value = Self;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("JSON")
+    }
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Self, A::Error> {
+        let mut seen = HashSet::new();
+        while let Some(key) = map.next_key::<String>()? {
+            if seen.contains(&key) {
+                return Err(de::Error::custom(format_args!("duplicate key {key:?}")));
+            }
+            map.next_value::<Unambiguous>()?;
+            seen.insert(key);
+        }
+        Ok(self)
+    }
+    fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<Self, A::Error> {
+        while seq.next_element::<Unambiguous>()?.is_some() {}
+        Ok(self)
+    }
+    fn visit_bool<E>(self, _: bool) -> Result<Self, E> {
+        Ok(self)
+    }
+    fn visit_i64<E>(self, _: i64) -> Result<Self, E> {
+        Ok(self)
+    }
+    fn visit_u64<E>(self, _: u64) -> Result<Self, E> {
+        Ok(self)
+    }
+    fn visit_f64<E>(self, _: f64) -> Result<Self, E> {
+        Ok(self)
+    }
+    fn visit_str<E>(self, _: &str) -> Result<Self, E> {
+        Ok(self)
+    }
+    fn visit_unit<E>(self) -> Result<Self, E> {
+        Ok(self)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::check_unambiguous;
+
+    #[test]
+    fn duplicates_are_found_at_any_depth() {
+        assert!(check_unambiguous(br#"{"a": [1, -2.5, null, true, "x", {"b": {}}], "b": 1}"#).is_ok());
+        assert!(check_unambiguous(br#"{"a": 1, "a": 2}"#).is_err());
+        assert!(check_unambiguous(br#"{"c": [{"a": 1, "\u0061": 2}]}"#).is_err());
+        assert!(check_unambiguous("[".repeat(100_000).as_bytes()).is_err());
+    }
+}

@@ -1,0 +1,23 @@
+//! Number types of files.
+
+use serde::{Deserialize, Serialize};
+
+/// Number type of stored numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum StoredPrecision {
+    /// Single precision.
+    F32,
+    /// Double precision.
+    F64,
+}
+
+impl StoredPrecision {
+    /// `"f32"` or `"f64"`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::F32 => "f32",
+            Self::F64 => "f64",
+        }
+    }
+}

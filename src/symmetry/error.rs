@@ -1,0 +1,49 @@
+//! Errors of searches for symmetries.
+
+/// Why nothing could be found out.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SymmetryError {
+    /// Slices of states of unfit lengths.
+    #[error("expected as many velocities as coordinates, whole states of {coordinates}; found {q} and {v} numbers")]
+    Shape {
+        /// Number of coordinates of the model.
+        coordinates: usize,
+        /// Numbers of the coordinates found.
+        q: usize,
+        /// Numbers of the velocities found.
+        v: usize,
+    },
+    /// Terms that are not finite.
+    #[error("the terms of L are finite at {found} of {states} states alone")]
+    States {
+        /// States asked for.
+        states: usize,
+        /// States with finite terms.
+        found: usize,
+    },
+    /// More unknowns than equations.
+    #[error(
+        "{unknowns} unknown coefficients need as many states at least, found {states}: more states or a smaller basis"
+    )]
+    TooFew {
+        /// Unknowns.
+        unknowns: usize,
+        /// States.
+        states: usize,
+    },
+    /// A basis for another number of coordinates.
+    #[error("the functions are of {found} coordinates, the model has {expected}")]
+    Basis {
+        /// Number of coordinates of the model.
+        expected: usize,
+        /// Number of coordinates of the basis.
+        found: usize,
+    },
+    /// Numbers of a decomposition that are not finite.
+    #[error("{what} is not finite")]
+    NotFinite {
+        /// Which.
+        what: &'static str,
+    },
+}

@@ -1,0 +1,209 @@
+//! Point symmetries of a Lagrangian: vector fields along which it changes by a total derivative at most.
+
+use super::basis::{Basis, Values};
+use super::echelon::reduce;
+use super::orthonormal::{Orthonormal, orthonormal};
+use super::sample::Sample;
+use super::separation::Separation;
+use super::{Algebra, Field, SymmetryError};
+use crate::lagrangian::EulerLagrange;
+use crate::linalg::{Workspace, eigh, singular};
+
+/// Functions of which less is left beside the others count as their combinations, as `sin^2` beside `1` and `cos 2x`.
+const DEPENDENT: f64 = 1e-7;
+
+/// Noise of exact terms: singular values below it are zero.
+pub const EXACT: f64 = 1e-8;
+
+/// Result of a search for symmetries.
+#[derive(Clone, Debug)]
+pub struct Symmetries {
+    /// Functions that the fields are made of.
+    pub basis: Basis,
+    /// Ascending; of fields of unit size the mean change of `L` along them, relative to the size of its terms.
+    pub singular_values: Vec<f64>,
+    /// Number of symmetries and the gap behind them.
+    pub separation: Separation,
+    /// The symmetries, in reduced echelon form; empty if there is no gap.
+    pub fields: Vec<Field>,
+    /// The Lie algebra that they form; `None` without symmetries.
+    pub algebra: Option<Algebra>,
+}
+
+/// Values of functions, and their derivatives along the velocity, at all states: one column per function.
+pub(crate) struct Columns {
+    pub values: Vec<Vec<f64>>,
+    pub rates: Vec<Vec<f64>>,
+}
+
+impl Columns {
+    pub fn new(basis: &Basis, sample: &Sample) -> Self {
+        let (n, states) = (sample.n, sample.len());
+        let mut columns =
+            Self { values: vec![vec![0.0; states]; basis.len()], rates: vec![vec![0.0; states]; basis.len()] };
+        let mut at = Values::default();
+        for (k, (q, v)) in sample.q.chunks_exact(n).zip(sample.v.chunks_exact(n)).enumerate() {
+            basis.evaluate(q, &mut at);
+            for (f, (value, gradient)) in at.value.iter().zip(at.gradient.chunks_exact(n)).enumerate() {
+                columns.values[f][k] = *value;
+                columns.rates[f][k] = gradient.iter().zip(v).map(|(d, v)| d * v).sum();
+            }
+        }
+        columns
+    }
+}
+
+/// Finds the point symmetries of a Lagrangian whose fields are made of a basis.
+///
+/// A field `xi(q)` is a symmetry if `xi.dL/dq + (D xi v).dL/dv = dF/dt` for a gauge function `F(q)`: its flow changes `L` by a
+/// total derivative, and `p.xi - F` is conserved (Noether 1918). Of `L = g_ij v^i v^j / 2` these are the Killing fields.
+/// The equation is linear in the coefficients of `xi` and `F`; it is written down at the states `(q, v)`, `(states, n)`, each
+/// relative to the size of the terms of `L` there, `F` is projected out, and `xi` is measured by its length `|xi|_M` in an
+/// orthonormal frame of the mass matrix, averaged over the states. The singular values then do not depend on how the fields
+/// are written, and the zero ones are the symmetries. `L` that does not depend on time has the symmetry of time besides; it is
+/// not counted.
+///
+/// `tolerance` is the noise of the terms, [`EXACT`] for a Lagrangian written down; without one, for a learned model, the largest
+/// gap decides (see [`Separation`]). States should be drawn from an open set, several times as many as there are unknown
+/// coefficients, [`unknowns`].
+///
+/// # Errors
+/// [`SymmetryError`].
+pub fn symmetries(
+    model: &dyn EulerLagrange<f64>,
+    basis: &Basis,
+    (q, v): (&[f64], &[f64]),
+    tolerance: Option<f64>,
+) -> Result<Symmetries, SymmetryError> {
+    let sample = Sample::new(model, q, v)?;
+    if basis.names().len() != sample.n {
+        return Err(SymmetryError::Basis { expected: sample.n, found: basis.names().len() });
+    }
+    search(&sample, basis, tolerance)
+}
+
+/// Number of unknown coefficients of fields and gauge function over a basis of `functions` functions of `n` coordinates.
+pub fn unknowns(n: usize, functions: usize) -> usize {
+    (n + 1) * functions
+}
+
+/// [`symmetries`] of a Lagrangian whose terms are at hand.
+pub(crate) fn search(sample: &Sample, basis: &Basis, tolerance: Option<f64>) -> Result<Symmetries, SymmetryError> {
+    let (n, states, functions) = (sample.n, sample.len(), basis.len());
+    let columns = Columns::new(basis, sample);
+    let plain = orthonormal(&columns.values, DEPENDENT);
+    let (values, rates) = (&plain.columns, plain.mixed(&columns.rates));
+    let count = n * values.len();
+    if states < unknowns(n, values.len()) {
+        return Err(SymmetryError::TooFew { unknowns: unknowns(n, values.len()), states });
+    }
+    let weight: Vec<f64> = sample.size.iter().map(|size| 1.0 / size).collect();
+    let equation = |i: usize, f: usize| -> Vec<f64> {
+        (0..states)
+            .map(|k| weight[k] * (sample.g[k * n + i] * values[f][k] + sample.p[k * n + i] * rates[f][k]))
+            .collect()
+    };
+    let mut equations: Vec<Vec<f64>> =
+        (0..n).flat_map(|i| (0..values.len()).map(move |f| (i, f))).map(|(i, f)| equation(i, f)).collect();
+    let gauge = gauge(sample, &rates, &weight);
+    let free = equations.clone();
+    equations.iter_mut().for_each(|column| gauge.remove(column));
+    let unit = unit_fields(sample, values)?;
+    let mixed = combined(&unit, &equations);
+    let found = singular(&mixed).ok_or(SymmetryError::NotFinite { what: "the equation of a symmetry" })?;
+    let separation = Separation::new(&found.values, tolerance);
+    let zero = separation.count.unwrap_or(0);
+    let mut rows: Vec<Vec<f64>> = Vec::with_capacity(zero);
+    for vector in &found.vectors[..zero] {
+        let mut field = vec![0.0; count];
+        for (share, unit) in vector.iter().zip(&unit) {
+            field.iter_mut().zip(unit).for_each(|(sum, x)| *sum += share * x);
+        }
+        let change = combined(std::slice::from_ref(&field), &free).remove(0);
+        let change = gauge.given(&gauge.along(&change), rates.len());
+        let parts = field.chunks_exact(values.len()).chain([change.as_slice()]);
+        rows.push(parts.flat_map(|part| plain.given(part, functions)).collect());
+    }
+    let sizes = sizes(sample, &columns.values);
+    let noise = found.values[..zero].last().map_or(0.0, |last| (10.0 * last).clamp(1e-9, 0.05));
+    reduce(&mut rows, &sizes, noise, 0);
+    let fields: Vec<Field> = rows
+        .into_iter()
+        .map(|mut row| {
+            let gauge = row.split_off(n * functions);
+            let mut field = Field { coefficients: row, gauge };
+            field.clean_gauge(sample, &columns.values, noise);
+            field.turn();
+            field
+        })
+        .collect();
+    let algebra = if fields.is_empty() { None } else { Some(Algebra::new(sample, basis, &fields, noise)?) };
+    Ok(Symmetries { basis: basis.clone(), singular_values: found.values, separation, fields, algebra })
+}
+
+/// Orthonormal columns of `dF/dt` for all functions `F`; the constant has none. For `L` that is even in the velocity `dF/dt`
+/// can be no part of its change, which is even too.
+fn gauge(sample: &Sample, rates: &[Vec<f64>], weight: &[f64]) -> Orthonormal {
+    if sample.even {
+        return orthonormal(&[], DEPENDENT);
+    }
+    let weighed = |rate: &Vec<f64>| rate.iter().zip(weight).map(|(r, w)| r * w).collect();
+    orthonormal(&rates.iter().map(weighed).collect::<Vec<Vec<f64>>>(), DEPENDENT)
+}
+
+/// Combinations of the fields `values[f] d_i` that are orthonormal in the mean over the states by the frame, as rows
+/// `(fields, n * functions)`.
+fn unit_fields(sample: &Sample, values: &[Vec<f64>]) -> Result<Vec<Vec<f64>>, SymmetryError> {
+    let (n, functions) = (sample.n, values.len());
+    let count = n * functions;
+    let mut gram = vec![0.0; count * count];
+    for i in 0..n {
+        for j in i..n {
+            let part: Vec<f64> = (0..sample.len()).map(|k| sample.frame[k * n * n + i * n + j]).collect();
+            for a in 0..functions {
+                let weighed: Vec<f64> = values[a].iter().zip(&part).map(|(x, m)| x * m).collect();
+                for b in 0..functions {
+                    let product = super::orthonormal::dot(&weighed, &values[b]);
+                    gram[(i * functions + a) * count + j * functions + b] = product;
+                    gram[(j * functions + b) * count + i * functions + a] = product;
+                }
+            }
+        }
+    }
+    let (mut sizes, mut vectors) = (vec![0.0; count], vec![0.0; count * count]);
+    eigh(count, &gram, &mut sizes, &mut vectors, &mut Workspace::new())
+        .map_err(|_| SymmetryError::NotFinite { what: "the size of a field" })?;
+    let largest = sizes.iter().fold(0.0, |m: f64, s| m.max(*s));
+    let rows = sizes.iter().zip(vectors.chunks_exact(count));
+    Ok(rows
+        .filter(|(size, _)| **size > 1e-13 * largest)
+        .map(|(size, row)| row.iter().map(|x| x / size.sqrt()).collect())
+        .collect())
+}
+
+/// Combinations of columns, one for every row of coefficients.
+fn combined(rows: &[Vec<f64>], columns: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    use crate::linalg::{MatMut, MatRef, gemm};
+    let (count, states) = (columns.len(), columns.first().map_or(0, Vec::len));
+    let (left, right) = (rows.concat(), columns.concat());
+    let mut product = vec![0.0; rows.len() * states];
+    gemm(
+        MatMut::new(&mut product, rows.len(), states),
+        false,
+        1.0,
+        MatRef::new(&left, rows.len(), count),
+        MatRef::new(&right, count, states),
+    );
+    product.chunks_exact(states.max(1)).map(<[f64]>::to_vec).collect()
+}
+
+/// Root mean squares of the fields `function d_i` by the frame.
+fn sizes(sample: &Sample, values: &[Vec<f64>]) -> Vec<f64> {
+    let (n, states) = (sample.n, sample.len() as f64);
+    let field = |i: usize, value: &Vec<f64>| {
+        let square = value.iter().enumerate().map(|(k, x)| x * x * sample.frame[k * n * n + i * (n + 1)]);
+        (square.sum::<f64>() / states).sqrt()
+    };
+    let field = &field;
+    (0..n).flat_map(|i| values.iter().map(move |value| field(i, value))).collect()
+}

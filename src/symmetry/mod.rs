@@ -1,0 +1,62 @@
+//! Symmetries found in a Lagrangian, not imposed on it; what they conserve; what two Lagrangians have in common.
+//!
+//! A point symmetry is a vector field `xi(q)` with `xi.dL/dq + (D xi v).dL/dv = dF/dt` for a gauge function `F(q)`: its flow maps
+//! motions to motions, and its charge `p.xi - F` is conserved (Noether 1918). Of geodesics these are the Killing fields of the
+//! metric. [`symmetries`] finds them over a [`Basis`] of functions of the coordinates, as the null space of linear equations at
+//! sampled states, names the Lie [`Algebra`] that they form, and says honestly where there is no gap between what vanishes and
+//! what does not. [`quadratic`] finds conserved quantities of second degree in the momenta, such as Carter's constant and the
+//! vector of Runge and Lenz; [`charges`] follows charges along a motion; [`compare`] takes the freedom of a Lagrangian, factor
+//! and gauge, out before it compares. All of them need `dL/dv` and `dL/dq` alone, and take systems, descriptions in files
+//! and learned models alike.
+//!
+//! ```
+//! use lnn::lagrangian::build;
+//! use lnn::symmetry::{Basis, Chart, Degrees, EXACT, Region, symmetries};
+//!
+//! let sphere = build::<f64>("sphere-geodesic", &[])?;
+//! let (names, charts) = (["theta", "phi"].map(String::from), [Chart::Polar, Chart::Circle]);
+//! let basis = Basis::new(&names, &charts, Degrees::usual(&charts));
+//! let region = Region { position: vec![[0.3, 2.8], [0.0, 6.3]], velocity: vec![[-1.0, 1.0]; 2] };
+//! let (q, v) = region.states(200, 0, |_, _| true);
+//! let found = symmetries(&*sphere, &basis, (&q, &v), Some(EXACT))?;
+//! assert_eq!(found.separation.count, Some(3));
+//! assert_eq!(found.fields[2].text(&basis), "d_phi");
+//! assert_eq!(found.fields[0].text(&basis), "sin(phi) d_theta + cot(theta)*cos(phi) d_phi");
+//! assert_eq!(found.algebra.unwrap().name.as_deref(), Some("so(3)"));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! # Measures
+//!
+//! Equations are taken relative to the size of the terms of `L` at each state; fields are measured by their length `|xi|_M` in an
+//! orthonormal frame of the mass matrix, averaged over the states, never by their effect on `L`. Singular values are therefore the
+//! relative change of `L` along a field of unit size, whatever units, basis and linear dependences between its functions. Numbers are
+//! `f64`: a search is a fit over samples, whose errors are those of the model or of roundings.
+
+mod algebra;
+mod basis;
+mod charges;
+mod classify;
+mod compare;
+mod conserved;
+mod echelon;
+mod error;
+mod field;
+mod find;
+mod killing;
+mod orthonormal;
+mod region;
+mod sample;
+mod separation;
+mod sparse;
+
+pub use algebra::Algebra;
+pub use basis::{Basis, Chart, Degrees};
+pub use charges::{Charge, charges};
+pub use compare::{Comparison, compare};
+pub use conserved::{Conserved, Quadratic, quadratic, quadratic_unknowns};
+pub use error::SymmetryError;
+pub use field::Field;
+pub use find::{EXACT, Symmetries, symmetries, unknowns};
+pub use region::Region;
+pub use separation::Separation;

@@ -1,0 +1,166 @@
+//! States at which a Lagrangian is asked for its terms, with the size of motion and of terms there.
+
+use super::SymmetryError;
+use crate::lagrangian::{EulerLagrange, Request, Terms};
+use crate::linalg::{Workspace, eigh};
+
+/// Terms of a Lagrangian at states `(states, n)`.
+#[derive(Clone, Debug)]
+pub(crate) struct Sample {
+    /// Number of coordinates.
+    pub n: usize,
+    /// Coordinates, `(states, n)`.
+    pub q: Vec<f64>,
+    /// Velocities, `(states, n)`.
+    pub v: Vec<f64>,
+    /// `dL/dv`, `(states, n)`.
+    pub p: Vec<f64>,
+    /// `dL/dq`, `(states, n)`.
+    pub g: Vec<f64>,
+    /// `E = p.v - L`, `(states)`.
+    pub energy: Vec<f64>,
+    /// `|M|`, the mass matrix with the magnitudes of its eigenvalues, `(states, n, n)`.
+    pub frame: Vec<f64>,
+    /// Size of the terms of `xi.g + (D xi v).p` at every state for a field of unit size, `(states)`.
+    pub size: Vec<f64>,
+    /// Time in which momenta change by themselves at every state, `(states)`.
+    pub pace: Vec<f64>,
+    /// `true` if `L(q, -v) = L(q, v)`.
+    pub even: bool,
+    /// `true` if `L` is a quadratic form of the velocity, as that of geodesics: then it is the energy.
+    pub homogeneous: bool,
+}
+
+/// Relative rounding of terms that differ between `v` and `-v`.
+const EVEN: f64 = 1e-10;
+
+impl Sample {
+    /// The terms of `model` at states where they are finite.
+    ///
+    /// # Errors
+    /// [`SymmetryError::Shape`] for slices of unfit lengths, [`SymmetryError::States`] if fewer than half of the states have
+    /// finite terms.
+    pub fn new(model: &dyn EulerLagrange<f64>, q: &[f64], v: &[f64]) -> Result<Self, SymmetryError> {
+        let n = model.coordinates();
+        if q.len() != v.len() || n == 0 || !q.len().is_multiple_of(n) {
+            return Err(SymmetryError::Shape { coordinates: n, q: q.len(), v: v.len() });
+        }
+        let request = Request::MOMENTUM | Request::DL_DQ | Request::MASS_MATRIX | Request::ENERGY;
+        let (mut terms, mut back) = (Terms::default(), Terms::default());
+        // A state that is not finite is reported and left out below.
+        let _ = model.terms(q, v, request, &mut terms);
+        let reversed: Vec<f64> = v.iter().map(|v| -v).collect();
+        let _ = model.terms(q, &reversed, Request::MOMENTUM | Request::DL_DQ, &mut back);
+        let mut sample = Self {
+            n,
+            q: vec![],
+            v: vec![],
+            p: vec![],
+            g: vec![],
+            energy: vec![],
+            frame: vec![],
+            size: vec![],
+            pace: vec![],
+            even: true,
+            homogeneous: true,
+        };
+        let states = q.len() / n;
+        for k in 0..states {
+            let (one, matrix) = (k * n..(k + 1) * n, k * n * n..(k + 1) * n * n);
+            let [Some(p), Some(g)] = [&terms.momentum, &terms.dl_dq].map(|x| x.get(one.clone())) else { continue };
+            let (Some(m), Some(&energy)) = (terms.mass_matrix.get(matrix), terms.energy.get(k)) else { continue };
+            if !p.iter().chain(g).chain(m).chain([&energy]).all(|x| x.is_finite()) {
+                continue;
+            }
+            sample.q.extend_from_slice(&q[one.clone()]);
+            sample.v.extend_from_slice(&v[one.clone()]);
+            sample.p.extend_from_slice(p);
+            sample.g.extend_from_slice(g);
+            sample.energy.push(energy);
+            sample.frame.extend_from_slice(m);
+            let same = |here: &[f64], there: &[f64], sign: f64| {
+                let size = here.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+                here.iter().zip(there).all(|(a, b)| (a - sign * b).abs() <= EVEN * size)
+            };
+            let action: f64 = p.iter().zip(&v[one.clone()]).map(|(p, v)| p * v).sum();
+            let size: f64 = p.iter().zip(&v[one.clone()]).map(|(p, v)| (p * v).abs()).sum();
+            sample.homogeneous &= (action - 2.0 * energy).abs() <= EVEN * size;
+            let reversed = [&back.momentum, &back.dl_dq].map(|x| x.get(one.clone()));
+            sample.even &= match reversed {
+                [Some(there), Some(pull)] => same(p, there, -1.0) && same(g, pull, 1.0),
+                _ => false,
+            };
+        }
+        let found = sample.energy.len();
+        if 2 * found < states || found == 0 {
+            return Err(SymmetryError::States { states, found });
+        }
+        sample.measure();
+        Ok(sample)
+    }
+
+    /// Number of states.
+    pub fn len(&self) -> usize {
+        self.energy.len()
+    }
+
+    /// Turns mass matrices into frames and finds the sizes of the terms.
+    ///
+    /// Of a field of unit size `|xi|_M`, `xi.g` is at most `|g|` and `(D xi v).p` about `|v| |p|` over the length on which the
+    /// field changes, for which the spread of the coordinates stands; all norms are those of the frame.
+    fn measure(&mut self) {
+        let (n, states) = (self.n, self.len());
+        let (mut values, mut vectors) = (vec![0.0; states * n], vec![0.0; states * n * n]);
+        // Matrices are finite.
+        let _ = eigh(n, &self.frame, &mut values, &mut vectors, &mut Workspace::new());
+        let spread = self.spread();
+        let (mut length, mut parts, mut momenta) = (0.0, Vec::with_capacity(states), Vec::with_capacity(states));
+        for k in 0..states {
+            let (w, u) = (&values[k * n..(k + 1) * n], &vectors[k * n * n..(k + 1) * n * n]);
+            let largest = w.iter().fold(f64::MIN_POSITIVE, |m, w| m.max(w.abs()));
+            let w: Vec<f64> = w.iter().map(|w| w.abs().max(1e-12 * largest)).collect();
+            let norm = |x: &[f64], inverse: bool| -> f64 {
+                let square = w.iter().zip(u.chunks_exact(n)).map(|(w, u)| {
+                    let along: f64 = u.iter().zip(x).map(|(u, x)| u * x).sum();
+                    along * along * if inverse { 1.0 / w } else { *w }
+                });
+                square.sum::<f64>().sqrt()
+            };
+            let one = k * n..(k + 1) * n;
+            let momentum = norm(&self.p[one.clone()], true);
+            let motion = norm(&self.v[one.clone()], false) * momentum;
+            momenta.push(momentum);
+            parts.push([motion, norm(&self.g[one], true)]);
+            length += norm(&spread, false).powi(2) / states as f64;
+            for i in 0..n {
+                for j in 0..n {
+                    let entry = w.iter().zip(u.chunks_exact(n)).map(|(w, u)| w * u[i] * u[j]);
+                    self.frame[k * n * n + i * n + j] = entry.sum();
+                }
+            }
+        }
+        let length = length.sqrt();
+        let least = f64::MIN_POSITIVE.sqrt();
+        self.size = parts.iter().map(|[motion, pull]| (motion / length).hypot(*pull).max(least)).collect();
+        self.pace = momenta.iter().zip(&self.size).map(|(momentum, size)| momentum / size).collect();
+    }
+
+    /// For every coordinate whether `L` does not depend on it.
+    pub fn cyclic(&self) -> Vec<bool> {
+        let size = |i: usize| self.g.iter().skip(i).step_by(self.n).fold(0.0, |m: f64, g| m.max(g.abs()));
+        let momentum = self.p.iter().fold(f64::MIN_POSITIVE, |m: f64, p| m.max(p.abs()));
+        (0..self.n).map(|i| size(i) <= EVEN * momentum).collect()
+    }
+
+    /// Root mean square of every coordinate about its mean; 1 for one that is the same everywhere.
+    fn spread(&self) -> Vec<f64> {
+        let states = self.len() as f64;
+        let one = |i: usize| {
+            let values = || self.q.iter().skip(i).step_by(self.n);
+            let mean = values().sum::<f64>() / states;
+            let rms = (values().map(|x| (x - mean).powi(2)).sum::<f64>() / states).sqrt();
+            if rms > 0.0 { rms } else { 1.0 }
+        };
+        (0..self.n).map(one).collect()
+    }
+}

@@ -1,0 +1,24 @@
+//! What a checkpoint says about its training.
+
+use serde::{Deserialize, Serialize};
+
+/// Identity of a training, written into its checkpoints: a run resumes only from a checkpoint with the same identity.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Identity {
+    /// The configuration, in the words of whoever trains.
+    pub config: String,
+    /// Name and checksum of each set of states.
+    pub data: Vec<(String, u32)>,
+}
+
+/// Header of a checkpoint, without its numbers.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Saved {
+    /// Configuration of the training.
+    pub config: String,
+    /// Epochs completed, polishing included.
+    pub epochs: usize,
+    /// Steps taken.
+    pub steps: usize,
+}

@@ -1,0 +1,7 @@
+//! The geometry of Lagrangians: curvature against closed forms, identities of random metrics, surfaces.
+
+mod closed_forms;
+mod identities;
+mod networks;
+mod spaces;
+mod surfaces;

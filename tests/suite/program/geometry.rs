@@ -1,0 +1,117 @@
+//! `lnn geometry` from outside.
+
+use crate::common::program::{Folder, lnn, model};
+use serde_json::Value;
+
+const KEYS: [&str; 11] = [
+    "metric",
+    "inverse_metric",
+    "determinant",
+    "signature",
+    "christoffel",
+    "riemann",
+    "ricci",
+    "ricci_scalar",
+    "einstein",
+    "weyl",
+    "kretschmann",
+];
+
+fn close(value: &Value, exact: f64) -> bool {
+    (value.as_f64().unwrap() - exact).abs() <= 1e-13 * exact.abs().max(1.0)
+}
+
+#[test]
+fn every_tensor_is_printed() {
+    let folder = Folder::new();
+    // Other columns are left out.
+    let points = folder.file("p.csv", "z,t,x,y,tau\n2,0,0,0,9\n0.5,1,2,3,9\n");
+    let objects = lnn(&["geometry", "--system", "ads4-geodesic", "--points", &points]).objects();
+    assert_eq!(objects.len(), 2);
+    for (object, z) in objects.iter().zip([2.0f64, 0.5]) {
+        let keys: Vec<_> = object.as_object().unwrap().keys().collect();
+        assert_eq!(keys.len(), KEYS.len());
+        assert!(KEYS.iter().all(|key| keys.iter().any(|found| found == key)));
+        assert_eq!(object["signature"], serde_json::json!([1, 3]));
+        assert!(close(&object["metric"][0][0], -1.0 / z.powi(2)) && close(&object["inverse_metric"][3][3], z.powi(2)));
+        assert!(close(&object["determinant"], -1.0 / z.powi(8)));
+        // Upper index first: G^z_tt = -1/z, G^t_tz = -1/z.
+        assert!(close(&object["christoffel"][3][0][0], -1.0 / z) && close(&object["christoffel"][0][0][3], -1.0 / z));
+        assert!(close(&object["christoffel"][3][1][1], 1.0 / z));
+        // R^x_yxy = -g_yy.
+        assert!(close(&object["riemann"][1][2][1][2], -1.0 / z.powi(2)));
+        assert!(close(&object["ricci"][0][0], 3.0 / z.powi(2)) && close(&object["ricci_scalar"], -12.0));
+        assert!(close(&object["einstein"][1][1], 3.0 / z.powi(2)) && close(&object["kretschmann"], 24.0));
+        assert!(close(&object["weyl"][0][1][0][1], 0.0));
+    }
+}
+
+#[test]
+fn precisions_parameters_and_tables() {
+    let folder = Folder::new();
+    let points = folder.file("p.csv", "theta,phi\n0.1,0\n");
+    let run = |more: &[&str]| lnn(&[&["geometry", "--system", "sphere-geodesic", "--points", &points], more].concat());
+    let scalar = |more: &[&str]| {
+        run(more).stdout.split("\"ricci_scalar\":").nth(1).unwrap().split(',').next().unwrap().to_string()
+    };
+    let digits = |text: &str| text.split('e').next().unwrap().chars().filter(char::is_ascii_digit).count();
+    // One third of a square metre.
+    let parameters = ["--param", "R=3", "--precision"];
+    let printed = ["f32", "f64", "dd"].map(|precision| scalar(&[&parameters[..], &[precision]].concat()));
+    assert_eq!((digits(&printed[0]), digits(&printed[1])), (9, 17));
+    assert!(
+        printed[2].starts_with("0.22222222222222222222222222") || printed[2].starts_with("2.2222222222222222222222222"),
+        "{}",
+        printed[2]
+    );
+    // 0.1 is one tenth in double-double: sin(0.1)^2.
+    let wide = run(&["--precision", "dd"]).stdout;
+    assert!(wide.contains("0.00996671107937918444") || wide.contains("9.96671107937918444"), "{wide}");
+    let table = run(&["--format", "table"]).stdout;
+    assert!(table.starts_with("row 2\n") && table.contains("phi,phi"), "{table}");
+    assert!(table.lines().all(|line| line.len() <= 120) && !table.contains("theta,phi "), "{table}");
+    assert_eq!(run(&["--json"]).stdout, run(&[]).stdout);
+    assert_eq!(run(&["--velocity", "-1,2"]).stdout, run(&[]).stdout);
+}
+
+#[test]
+fn a_degenerate_point_is_named_and_the_others_are_printed() {
+    let folder = Folder::new();
+    let points = folder.file("p.csv", "theta,phi\n1,0\n0,0\n2,0\n");
+    let run = lnn(&["geometry", "--system", "sphere-geodesic", "--points", &points]);
+    assert_eq!(run.code, Some(1));
+    let objects: Vec<Value> = run.stdout.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    assert_eq!(objects.len(), 3);
+    assert!(objects[1]["error"].as_str().unwrap().contains("degenerate") && objects[1]["riemann"].is_null());
+    assert!(objects[1]["metric"][0][0] == 1.0 && objects[1]["determinant"] == 0.0);
+    assert!(objects[0].get("error").is_none() && close(&objects[2]["ricci_scalar"], 2.0));
+    assert!(run.stderr.starts_with("error: ") && run.stderr.contains("row 3: the metric is degenerate"));
+    // A horizon in coordinates that end there.
+    let points = folder.file("h.csv", "t,r,theta,phi\n0,2,1,0\n");
+    let run = lnn(&["geometry", "--system", "schwarzschild-geodesic", "--points", &points]);
+    assert_eq!(run.code, Some(1));
+    let object: Value = serde_json::from_str(&run.stdout).unwrap();
+    assert!(object["metric"].is_null() && object["error"] == "the metric is not finite");
+}
+
+#[test]
+fn models_have_a_geometry_and_mistakes_are_named() {
+    let folder = Folder::new();
+    let path = folder.path("model.safetensors");
+    model().save(&path).unwrap();
+    let path = path.to_str().unwrap();
+    let points = folder.file("p.csv", "theta1,theta2\n0.5,1\n7,2\n");
+    let run = lnn(&["geometry", "--model", path, "--points", &points, "--precision", "dd"]);
+    assert_eq!((run.code, run.stdout.lines().count()), (Some(0), 2));
+    assert!(run.stderr.starts_with("note: ") && run.stderr.contains("--velocity"), "{}", run.stderr);
+    let moved = lnn(&["geometry", "--model", path, "--points", &points, "--precision", "dd", "--velocity", "1,2"]);
+    assert_ne!(run.stdout, moved.stdout);
+    let refused = |velocity: &str, parts: &[&str]| {
+        lnn(&["geometry", "--model", path, "--points", &points, "--velocity", velocity]).refused(2, parts);
+    };
+    refused("1", &["--velocity", "expected 2", "found 1"]);
+    refused("1,x", &["--velocity", "finite numbers (theta1,theta2)"]);
+    let missing = folder.file("m.csv", "theta1\n0.5\n");
+    lnn(&["geometry", "--model", path, "--points", &missing]).refused(1, &["missing column theta2"]);
+    lnn(&["geometry", "--points", &points]).refused(2, &["--system"]);
+}
