@@ -235,7 +235,12 @@ impl Found {
                 let terms: Vec<String> = terms.map(|(k, x)| format!("{} X{}", factor(*x), k + 1)).collect();
                 if !terms.is_empty() {
                     let sum = terms.join(" ");
-                    text += &format!("[X{}, X{}] = {}\n", a + 1, b + 1, sum.trim_start_matches("+ "));
+                    text += &format!(
+                        "[X{}, X{}] = {}\n",
+                        a + 1,
+                        b + 1,
+                        sum.strip_prefix("+ ").map_or_else(|| sum.replacen("- ", "-", 1), String::from)
+                    );
                 }
             }
         }
