@@ -31,7 +31,7 @@ pub struct Args {
     /// Bounds of the states that are looked at, such as r=4:12 or r_dot=-0.3:0.3; what both have in common if not given.
     #[arg(long, value_name = "NAME=LOW:HIGH,..", value_delimiter = ',', value_parser = bound)]
     region: Vec<Bound>,
-    /// States that are looked at; three for every unknown coefficient if not given.
+    /// States that are looked at; two for every unknown coefficient if not given.
     #[arg(long, value_name = "N", value_parser = number::count)]
     points: Option<usize>,
     /// Seed of the states.
