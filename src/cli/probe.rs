@@ -161,8 +161,10 @@ impl Probe {
     pub fn basis(&self, degrees: Option<Degrees>) -> (Basis, Degrees) {
         let parts = self.periodic.iter().zip(&self.units).zip(&self.region.position);
         let charts: Vec<Chart> = parts.map(|((periodic, unit), range)| Chart::of(*periodic, unit, *range)).collect();
-        let degrees = degrees.unwrap_or_else(|| Degrees::usual(&charts));
-        (Basis::new(self.coordinates(), &charts, degrees), degrees)
+        match degrees {
+            Some(degrees) => (Basis::new(self.coordinates(), &charts, degrees), degrees),
+            None => Basis::usual(self.coordinates(), &charts),
+        }
     }
 
     /// States `(states, n)` of the region, on the mass shell and inside the domain of the system.
@@ -192,5 +194,5 @@ impl Probe {
 
 /// Number of states that are drawn for so many unknown coefficients.
 pub fn enough(unknowns: usize) -> usize {
-    (3 * unknowns).max(400)
+    (2 * unknowns).max(400)
 }

@@ -29,7 +29,7 @@ pub struct Args {
     /// trained on, if not given.
     #[arg(long, value_name = "NAME=LOW:HIGH,..", value_delimiter = ',', value_parser = bound)]
     region: Vec<Bound>,
-    /// States that are looked at; three for every unknown coefficient if not given.
+    /// States that are looked at; two for every unknown coefficient if not given.
     #[arg(long, value_name = "N", value_parser = number::count)]
     points: Option<usize>,
     /// Seed of the states.
@@ -180,7 +180,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
 }
 
 /// Unknown coefficients of quadratic quantities for which states are drawn, at most.
-const MOST: usize = 900;
+const MOST: usize = 1300;
 /// Singular values that are shown beyond the gap.
 const BEYOND: usize = 5;
 
@@ -205,8 +205,15 @@ impl Found {
         let more = if self.singular_values.len() > shown.len() { ", .." } else { "" };
         text += &wrapped(&format!("singular values {}{more}\n", shown.join(", ")), WIDTH);
         if let Some(gap) = self.gap {
-            text += &format!("gap {}\n", digits(gap));
+            text += &format!("gap {}", digits(gap));
         }
+        let Families { polynomial, trigonometric, hyperbolic } = self.basis;
+        text += &format!(
+            "{}{} functions (polynomial:{polynomial},trigonometric:{trigonometric},hyperbolic:{hyperbolic}), {} states\n",
+            if self.gap.is_some() { "; " } else { "" },
+            self.functions,
+            self.points
+        );
         if !self.fields.is_empty() {
             let gauged = self.gauge_functions.iter().any(|gauge| gauge != "0");
             let rows = self.fields.iter().zip(&self.gauge_functions).enumerate().map(|(k, (field, gauge))| {
@@ -235,7 +242,12 @@ impl Found {
                 let terms: Vec<String> = terms.map(|(k, x)| format!("{} X{}", factor(*x), k + 1)).collect();
                 if !terms.is_empty() {
                     let sum = terms.join(" ");
-                    text += &format!("[X{}, X{}] = {}\n", a + 1, b + 1, sum.trim_start_matches("+ "));
+                    text += &format!(
+                        "[X{}, X{}] = {}\n",
+                        a + 1,
+                        b + 1,
+                        sum.strip_prefix("+ ").map_or_else(|| sum.replacen("- ", "-", 1), String::from)
+                    );
                 }
             }
         }

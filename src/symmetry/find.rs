@@ -1,6 +1,6 @@
 //! Point symmetries of a Lagrangian: vector fields along which it changes by a total derivative at most.
 
-use super::basis::{Basis, Values};
+use super::basis::{Basis, MOST_UNKNOWNS, Values, unknowns};
 use super::echelon::reduce;
 use super::orthonormal::{Orthonormal, orthonormal};
 use super::sample::Sample;
@@ -65,7 +65,7 @@ impl Columns {
 ///
 /// `tolerance` is the noise of the terms, [`EXACT`] for a Lagrangian written down; without one, for a learned model, the largest
 /// gap decides (see [`Separation`]). States should be drawn from an open set, several times as many as there are unknown
-/// coefficients, [`unknowns`].
+/// coefficients, [`unknowns`](super::unknowns).
 ///
 /// # Errors
 /// [`SymmetryError`].
@@ -82,14 +82,12 @@ pub fn symmetries(
     search(&sample, basis, tolerance)
 }
 
-/// Number of unknown coefficients of fields and gauge function over a basis of `functions` functions of `n` coordinates.
-pub fn unknowns(n: usize, functions: usize) -> usize {
-    (n + 1) * functions
-}
-
 /// [`symmetries`] of a Lagrangian whose terms are at hand.
 pub(crate) fn search(sample: &Sample, basis: &Basis, tolerance: Option<f64>) -> Result<Symmetries, SymmetryError> {
     let (n, states, functions) = (sample.n, sample.len(), basis.len());
+    if unknowns(n, functions) > MOST_UNKNOWNS {
+        return Err(SymmetryError::TooMany { unknowns: unknowns(n, functions), most: MOST_UNKNOWNS });
+    }
     let columns = Columns::new(basis, sample);
     let plain = orthonormal(&columns.values, DEPENDENT);
     let (values, rates) = (&plain.columns, plain.mixed(&columns.rates));
