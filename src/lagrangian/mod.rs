@@ -20,6 +20,7 @@ pub mod system;
 pub mod systems;
 mod taylor;
 mod terms;
+mod with_forces;
 
 pub use catalogue::{Configured, Given, LagrangianVisitor, SystemError, find, systems};
 pub use configure::{build, configure, configure_system, configure_values, exact_acceleration};
@@ -35,6 +36,7 @@ pub use metric::MetricJet;
 pub(crate) use metric::metric_jets;
 pub(crate) use taylor::Taylor;
 pub use terms::{EulerLagrange, Request, Terms};
+pub use with_forces::{Dissipation, GeneralizedForce, Rayleigh, WithForces};
 
 use crate::scalar::Real;
 

@@ -168,3 +168,17 @@ pub fn lead(report: &str) -> String {
     let (_, rest) = report.split_once("class=\"lead\">").unwrap();
     rest.split_once("</p>").unwrap().0.replace("&#39;", "'")
 }
+
+/// Waits until something has happened, half a minute at most.
+pub fn wait_until(what: &str, happened: impl Fn() -> bool) {
+    let limit = Instant::now() + Duration::from_secs(30);
+    while !happened() {
+        assert!(Instant::now() < limit, "{what} does not come");
+        thread::sleep(Duration::from_millis(10));
+    }
+}
+
+/// Waits until a file is there.
+pub fn wait_for(path: &Path) {
+    wait_until(&path.display().to_string(), || path.exists());
+}

@@ -2,7 +2,7 @@
 //! apart.
 
 use crate::common::accuracy::{cast, largest};
-use crate::common::damped::Damped;
+use crate::common::damped;
 use crate::common::{of_scalar, properties};
 use lnn::configuration::{Config, Data, Network, OnFailure, Optimizer, Phase, Precision, Regularizer, Scaling};
 use lnn::data::{Dataset, Datasets};
@@ -253,7 +253,7 @@ fn friction_adds_to_the_forces_of_the_same_lagrangian() {
 
 #[test]
 fn the_energy_of_a_motion_goes_where_friction_takes_it() {
-    let model = Damped::chain(2);
+    let model = damped::chain(2);
     let (q, v) = ([2.0, 2.5], [0.5, -1.0]);
     let at = |dt: f64| {
         let options = Options { rtol: 1e-12, atol: 1e-12, method: Method::Dop853, ..Options::new(3.0, dt) };
@@ -275,7 +275,7 @@ fn the_energy_of_a_motion_goes_where_friction_takes_it() {
 /// Orders 2, 4 and 6 on a motion with friction, the same motion for all.
 #[test]
 fn gauss_methods_integrate_friction_and_the_variational_one_refuses() {
-    let model = Damped::chain(2);
+    let model = damped::chain(2);
     let (q, v) = ([2.0, 2.5], [0.5, -1.0]);
     let reference = Options { rtol: 1e-13, atol: 1e-13, ..Options::reference(0.5, 0.5) };
     let exact = rollout(&model, &q, &v, &reference).complete().unwrap();
@@ -437,7 +437,7 @@ fn learn(model: &dyn EulerLagrange<f64>, units: Option<usize>, epochs: usize, fo
 /// is what the joints take, in units of the factor by which `M` was found. Known torques leave no factor.
 #[test]
 fn friction_is_learned_beside_the_lagrangian() {
-    let model = Damped::chain(2);
+    let model = damped::chain(2);
     let (without, with) = (learn(&model, None, 60, false), learn(&model, Some(16), 60, false));
     // Measured: 0.159 without, 0.037 with.
     assert!(without.acceleration > 0.1, "{without:?}");
@@ -460,7 +460,7 @@ fn separation() {
     println!("relative errors    acceleration                     mass     power of      mean");
     println!(" n  epochs  without friction      with    matrix  single states     power    seconds");
     for n in 1..=3 {
-        let model = Damped::chain(n);
+        let model = damped::chain(n);
         for epochs in [60, 400] {
             let start = Instant::now();
             let (without, with) = (learn(&model, None, epochs, false), learn(&model, Some(16), epochs, false));
