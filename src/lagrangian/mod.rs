@@ -4,11 +4,11 @@
 //! `a = M^-1 (g - c + Q)`, `E = p.v - L`; `Q` are forces that do not follow from `L`, such as friction. Batches are row-major: `(batch, n)` and `(batch, n, n)`.
 
 mod catalogue;
-mod complete;
 mod configure;
 mod derivatives;
 mod description;
 mod error;
+mod euler_lagrange;
 mod expression;
 mod expression_lagrangian;
 mod hand_written;

@@ -1,7 +1,7 @@
 //! The program `lnn` from outside: runs with a time limit, files to give it, a small model.
 
 use lnn::network::file::{FORMAT, Header, ModelFile, StoredPrecision};
-use lnn::network::{Architecture, Form, InputLayer, Layout, Nonlinearity};
+use lnn::network::{ActivationChoice, Architecture, Form, InputLayer, Layout};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fs;
@@ -129,7 +129,7 @@ pub fn model() -> ModelFile<f32> {
     let architecture = Architecture {
         coordinates: 2,
         hidden: vec![8, 8],
-        activation: Nonlinearity::Softplus,
+        activation: ActivationChoice::Softplus,
         alpha: 0.5,
         time_like: None,
         scale: vec![3.0, 4.0],

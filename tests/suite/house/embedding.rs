@@ -22,7 +22,7 @@ const _: () = {
     shared::<Terms<f64>>();
     shared::<Dataset<f32>>();
     shared::<Objective<f32>>();
-    shared::<training::Config>();
+    shared::<lnn::configuration::Config>();
     shared::<training::Trained<f32>>();
     shared::<training::Hooks>();
     shared::<ModelFile<f32>>();
@@ -40,21 +40,23 @@ const _: () = {
     error::<motion::RolloutError>();
     error::<motion::UnderflowCause>();
     error::<network::NetworkError>();
-    error::<network::UnknownNonlinearity>();
+    error::<network::UnknownActivation>();
     error::<network::file::ModelFileError>();
-    error::<recording::TrackError>();
+    error::<recording::TrajectoryError>();
     error::<scalar::UnreadableNumber>();
     error::<storage::ReadError>();
     error::<tape::TapeError>();
     error::<analysis::GridError>();
     error::<training::CheckpointError>();
-    error::<training::ConfigError>();
-    error::<training::DatasetError>();
+    error::<lnn::configuration::ConfigError>();
+    error::<lnn::data::DatasetError>();
     error::<training::Failure>();
     error::<training::RecipeError>();
-    error::<training::SamplingError>();
+    error::<lnn::data::SamplingError>();
     error::<training::StepError>();
     error::<training::TrainingError>();
+    error::<training::ThreadsError>();
+    error::<lnn::pipeline::PipelineError>();
 };
 
 fn root() -> &'static Path {

@@ -10,7 +10,8 @@ use lnn::forward::HyperDual;
 use lnn::lagrangian::{EulerLagrange, Request, Terms};
 use lnn::linalg::Workspace;
 use lnn::network::{
-    Architecture, Form, Initialization, InputLayer, Layout, NetworkLagrangian, Nonlinearity, Structure, initial_weights,
+    ActivationChoice, Architecture, Form, Initialization, InputLayer, Layout, NetworkLagrangian, Structure,
+    initial_weights,
 };
 use lnn::optimizers::{Method as Update, Schedule};
 use lnn::rollout::{Method, Options, RolloutError, rollout, rollout_fixed, rollout_together};
@@ -33,7 +34,7 @@ fn architecture(n: usize, units: usize) -> Architecture {
     Architecture {
         coordinates: n,
         hidden: vec![6, 4],
-        activation: Nonlinearity::Gelu,
+        activation: ActivationChoice::Gelu,
         alpha: 1.0,
         time_like: None,
         scale: (0..n).map(|i| 1.5 + i as f64 / 2.0).collect(),
@@ -46,7 +47,7 @@ fn architecture(n: usize, units: usize) -> Architecture {
 }
 
 fn cases() -> impl Strategy<Value = Case> {
-    let kind = (prop::sample::select(&Nonlinearity::ALL[..]), any::<bool>(), any::<bool>());
+    let kind = (prop::sample::select(&ActivationChoice::ALL[..]), any::<bool>(), any::<bool>());
     (1_usize..=4, 1_usize..40, kind, any::<u64>()).prop_map(|(n, units, (activation, embed_periodic, dyt), seed)| {
         let input_layer = if dyt { InputLayer::Dyt } else { InputLayer::None };
         Case { architecture: Architecture { activation, embed_periodic, input_layer, ..architecture(n, units) }, seed }
@@ -341,7 +342,7 @@ fn config(units: Option<usize>, epochs: usize) -> Config {
         },
         network: Network {
             hidden: vec![48; 2],
-            activation: Nonlinearity::Gelu,
+            activation: ActivationChoice::Gelu,
             alpha: 1.0,
             time_like: None,
             scaling: Scaling::Physical,

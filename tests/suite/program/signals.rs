@@ -5,8 +5,7 @@ use crate::common::program::{Folder, Run, command, lnn, text, wait_for, wait_unt
 use lnn::lagrangian::configure;
 use lnn::presets::Preset;
 use lnn::storage::Disk;
-use lnn::training::{NEWEST, saved};
-use std::path::Path;
+use lnn::training::{LATEST, saved};
 use std::process::{Child, Command, Stdio};
 
 /// A training of so many epochs.
@@ -46,14 +45,14 @@ fn a_batch_system_ends_a_training_with_everything_kept() {
     assert!(saved(&Disk, &out).unwrap().content.epochs > 0);
 
     // A second signal ends at once, with its own exit code, and the checkpoint stays. A new checkpoint says that training goes on.
-    let written = || out.join(NEWEST).metadata().and_then(|data| data.modified()).ok();
+    let written = || out.join(LATEST).metadata().and_then(|data| data.modified()).ok();
     let before = written();
     let child = start(&["train", "--resume", &text(&out), "--checkpoint-every", "1"]);
     wait_until("a new checkpoint", || written().is_some_and(|now| Some(now) != before));
     send("-INT", &child);
     send("-TERM", &child);
     assert!(matches!(child.wait_with_output().unwrap().status.code(), Some(143 | 130)));
-    assert!(out.join(NEWEST).is_file());
+    assert!(out.join(LATEST).is_file());
 }
 
 #[test]
@@ -97,5 +96,5 @@ fn on_a_full_disk_pictures_are_lost_first() {
     // With room on the disk the rest comes.
     let resumed = lnn(&["train", "--resume", &text(&out)]);
     assert_eq!((resumed.code, resumed.stderr.as_str()), (Some(0), ""));
-    assert!(out.join("report.html").is_file() && out.join("lagrangian.svg").is_file() && !out.join(NEWEST).exists());
+    assert!(out.join("report.html").is_file() && out.join("lagrangian.svg").is_file() && !out.join(LATEST).exists());
 }
