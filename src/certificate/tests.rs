@@ -3,7 +3,7 @@
 use super::function::{derivatives, smooth_bounds};
 use super::*;
 use crate::forward::HyperDual;
-use crate::lagrangian::{EulerLagrange, HandWritten, Request, Terms};
+use crate::lagrangian::{EulerLagrange, Request, Terms};
 use crate::linalg::{Inertia, inertia};
 use crate::network::{
     ActivationChoice, Architecture, Form, Initialization, InputLayer, NetworkLagrangian, Structure, initial_weights,

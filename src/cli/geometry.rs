@@ -1,12 +1,11 @@
 //! `lnn geometry`: metric, connection and curvature of points, full digits.
 
-use crate::cli::shown::{CHUNK, explain, report_failures};
+use crate::cli::shown::{CHUNK, report_failures};
 use crate::cli::source::{Source, parameter};
 use crate::cli::states::parse_table;
-use crate::cli::{CliError, input, json, output, states};
-use crate::geometry::{Geometry, GeometryError};
-use crate::lagrangian::{EulerLagrange, MetricJet, Request, Terms};
-use crate::linalg::{Inertia, inertia};
+use crate::cli::{CliError, input, output, states, tensors};
+use crate::geometry::{GeometryError, geometries};
+use crate::lagrangian::{EulerLagrange, Request, Terms};
 use crate::scalar::{Dd, Real, Scalar};
 use std::path::PathBuf;
 
@@ -58,7 +57,7 @@ enum Format {
     Table,
 }
 
-/// Numbers of the jets that are held at a time, about.
+/// Numbers of second derivatives that are held at a time, about.
 const NUMBERS: usize = 1 << 20;
 
 /// Prints one object per point.
@@ -95,22 +94,31 @@ fn geometry<S: Scalar>(args: &Args) -> Result<(), CliError> {
     let chunk = (NUMBERS / n.pow(4)).clamp(1, CHUNK);
     let mut failures: Vec<(usize, String)> = Vec::new();
     for (points, rows) in table.values.chunks(chunk * n).zip(table.rows.chunks(chunk)) {
-        let velocities = velocity.repeat(rows.len());
-        let jets = source.model.metric_jets(points, &velocities).map_err(|e| CliError::data(explain(e)))?;
+        let found = geometries(&*source.model, points, &velocity).map_err(CliError::data)?;
         let mut text = String::new();
-        for (jet, &row) in jets.iter().zip(rows) {
-            let found = Geometry::new(jet);
+        for ((found, q), &row) in found.into_iter().zip(points.chunks(n)).zip(rows) {
             let problem = found.as_ref().err().map(GeometryError::to_string);
-            let fields = fields(jet, found.ok().as_ref());
+            let fields = match &found {
+                Ok(found) => tensors::fields(&found.metric.components, Some(found)),
+                Err(_) => tensors::fields(&metric(&*source.model, q, &velocity), None),
+            };
             text += &match args.format {
-                Format::Json => object(n, &fields, problem.as_deref()),
-                Format::Table => block(names, row, &fields, problem.as_deref()),
+                Format::Json => tensors::object(n, &fields, problem.as_deref()),
+                Format::Table => tensors::block(names, row, &fields, problem.as_deref()),
             };
             failures.extend(problem.map(|problem| (row, problem)));
         }
         output::print(&text)?;
     }
     report_failures(&place, &failures)
+}
+
+/// The metric of a point, whatever it is like.
+fn metric<S: Scalar>(model: &dyn EulerLagrange<S>, q: &[S], v: &[S]) -> Vec<S> {
+    let mut terms = Terms::default();
+    // It is filled where it is not finite too.
+    let _ = model.terms(q, v, Request::MASS_MATRIX, &mut terms);
+    terms.mass_matrix
 }
 
 /// The velocity as given, zeros otherwise.
@@ -138,108 +146,4 @@ fn varies<S: Scalar>(model: &dyn EulerLagrange<S>, q: &[S], v: &[S]) -> bool {
     let most = first.iter().map(|x| x.abs().to_f64()).fold(0.0, f64::max);
     let tolerance = most * S::epsilon().to_f64() * 1e4;
     first.iter().zip(second).any(|(&a, &b)| (a - b).abs().to_f64() > tolerance)
-}
-
-/// A result, in the order in which results are printed.
-struct Field<S> {
-    name: &'static str,
-    value: Value<S>,
-}
-
-enum Value<S> {
-    /// What the point does not have.
-    Missing,
-    Number(S),
-    Signature(Inertia),
-    /// A tensor of some rank; the indices of its components that the others follow from.
-    Tensor(Vec<S>, usize, fn(&[usize]) -> bool),
-}
-
-/// Everything there is to say about a point.
-fn fields<S: Scalar>(jet: &MetricJet<S>, found: Option<&Geometry<S>>) -> Vec<Field<S>> {
-    let n = jet.coordinates();
-    let field = |name, value: Option<Value<S>>| Field { name, value: value.unwrap_or(Value::Missing) };
-    let tensor = |rank, independent| move |values: Vec<S>| Value::Tensor(values, rank, independent);
-    let finite = jet.metric.iter().all(|x| x.is_finite());
-    let signature = inertia(n, &jet.metric, &mut vec![S::nan(); n * n]).ok();
-    let singular = signature.filter(|signature| signature.zero > 0).map(|_| <S as Real>::zero());
-    let (metric, curvature) = (found.map(|f| &f.metric), found.map(|f| &f.curvature));
-    let of = |what: fn(&Geometry<S>) -> Vec<S>| found.map(what);
-    vec![
-        field("metric", finite.then(|| tensor(2, symmetric)(jet.metric.clone()))),
-        field("inverse_metric", of(|f| f.metric.inverse.clone()).map(tensor(2, symmetric))),
-        field("determinant", metric.map(|metric| metric.determinant).or(singular).map(Value::Number)),
-        field("signature", signature.map(Value::Signature)),
-        field("christoffel", of(|f| f.connection.symbols.clone()).map(tensor(3, symmetric))),
-        field("riemann", of(|f| f.curvature.riemann.clone()).map(tensor(4, antisymmetric))),
-        field("ricci", of(|f| f.curvature.ricci.clone()).map(tensor(2, symmetric))),
-        field("ricci_scalar", curvature.map(|curvature| Value::Number(curvature.scalar))),
-        field("einstein", of(|f| f.curvature.einstein(&f.metric)).map(tensor(2, symmetric))),
-        field("weyl", of(|f| f.curvature.weyl(&f.metric)).map(tensor(4, two_pairs))),
-        field("kretschmann", found.map(|f| Value::Number(f.curvature.kretschmann(&f.metric)))),
-    ]
-}
-
-/// Symmetric in the last two indices.
-fn symmetric(at: &[usize]) -> bool {
-    at.iter().rev().nth(1) <= at.last()
-}
-
-/// Antisymmetric in the last two indices.
-fn antisymmetric(at: &[usize]) -> bool {
-    at.iter().rev().nth(1) < at.last()
-}
-
-/// Antisymmetric in the first and in the last two indices, symmetric in the pairs.
-fn two_pairs(at: &[usize]) -> bool {
-    at[0] < at[1] && at[2] < at[3] && at[..2] <= at[2..]
-}
-
-/// A point as a line of JSON.
-fn object<S: Scalar>(n: usize, fields: &[Field<S>], problem: Option<&str>) -> String {
-    let mut parts: Vec<String> = fields
-        .iter()
-        .map(|field| {
-            let value = match &field.value {
-                Value::Missing => "null".to_string(),
-                Value::Number(x) => json::number(*x),
-                Value::Signature(signature) => format!("[{},{}]", signature.negative, signature.positive),
-                Value::Tensor(values, rank, _) => json::tensor(values, n, *rank),
-            };
-            format!("\"{}\":{value}", field.name)
-        })
-        .collect();
-    parts.extend(problem.map(|text| format!("\"error\":{}", json::string(text))));
-    format!("{{{}}}\n", parts.join(","))
-}
-
-/// A point as a block of text: components below rounding of the largest of their tensor are left out.
-fn block<S: Scalar>(names: &[String], row: usize, fields: &[Field<S>], problem: Option<&str>) -> String {
-    let n = names.len();
-    let mut text = format!("row {row}\n");
-    let mut line = |name: &str, at: &str, value: &str| text += &format!("  {name:<15} {at:<25} {value}\n");
-    for Field { name, value } in fields {
-        match value {
-            Value::Missing => {}
-            Value::Number(x) => line(name, "", &json::number(*x)),
-            Value::Signature(signature) => {
-                line(name, "", &format!("{} negative, {} positive", signature.negative, signature.positive));
-            }
-            Value::Tensor(values, rank, independent) => {
-                let most = values.iter().map(|x| x.abs().to_f64()).fold(0.0, f64::max);
-                let least = most * 64.0 * S::epsilon().to_f64();
-                for (place, x) in values.iter().enumerate().filter(|(_, x)| x.abs().to_f64() > least) {
-                    let at: Vec<usize> = (0..*rank as u32).rev().map(|k| place / n.pow(k) % n).collect();
-                    if independent(&at) {
-                        let at: Vec<&str> = at.iter().map(|&i| names[i].as_str()).collect();
-                        line(name, &at.join(","), &json::number(*x));
-                    }
-                }
-            }
-        }
-    }
-    if let Some(problem) = problem {
-        line("error", problem, "");
-    }
-    text.lines().map(|line| format!("{}\n", line.trim_end())).collect()
 }

@@ -53,6 +53,7 @@ mod states;
 mod subject;
 mod symmetries;
 mod systems;
+mod tensors;
 mod train;
 mod train_config;
 mod watch;

@@ -1,6 +1,6 @@
 //! The Levi-Civita connection at a point.
 
-use super::tensor::{dot, move_first};
+use super::tensor::{dot, move_first, rounded};
 use super::{GeometryError, Metric};
 use crate::lagrangian::MetricJet;
 use crate::scalar::{Real, Scalar};
@@ -32,6 +32,11 @@ impl<S: Scalar> Connection<S> {
         }
         let symbols = move_first(n, &metric.inverse, &lowered);
         Self { n, lowered, symbols }
+    }
+
+    /// The same in other numbers.
+    pub(super) fn rounded<T: Scalar>(&self) -> Connection<T> {
+        Connection { n: self.n, lowered: rounded(&self.lowered), symbols: rounded(&self.symbols) }
     }
 
     /// `G^k_ij u^i w^j`, `(n)`; `-G^k_ij v^i v^j` is the acceleration of a geodesic.

@@ -1,6 +1,6 @@
 //! Curvature at a point.
 
-use super::tensor::{dot, move_first, move_second};
+use super::tensor::{dot, move_first, move_second, rounded};
 use super::{Connection, Metric};
 use crate::lagrangian::MetricJet;
 use crate::scalar::{Real, Scalar};
@@ -17,6 +17,17 @@ pub struct Curvature<S> {
     pub ricci: Vec<S>,
     /// `R = g^bd R_bd`: 2 on the unit sphere.
     pub scalar: S,
+    /// Einstein's tensor `G_ab = R_ab - g_ab R/2`, `(n, n)`; 0 for one and two coordinates, where it vanishes identically.
+    pub einstein: Vec<S>,
+    /// Weyl's tensor `C_abcd` at `[a][b][c][d]`, `(n, n, n, n)`, all indices down; 0 for three coordinates and fewer, where it
+    /// vanishes identically or is not defined.
+    ///
+    /// ```text
+    /// C_abcd = R_abcd - (g_ac R_bd - g_ad R_bc - g_bc R_ad + g_bd R_ac)/(n - 2) + R (g_ac g_bd - g_ad g_bc)/((n - 1)(n - 2))
+    /// ```
+    pub weyl: Vec<S>,
+    /// Kretschmann's scalar `R_abcd R^abcd`: `48 M^2/r^6` outside a mass.
+    pub kretschmann: S,
 }
 
 impl<S: Scalar> Curvature<S> {
@@ -57,56 +68,24 @@ impl<S: Scalar> Curvature<S> {
         }
         let scalar = dot(metric.inverse.iter().copied(), ricci.iter().copied());
         let riemann = move_first(n, &metric.inverse, &lowered);
-        Self { n, lowered, riemann, ricci, scalar }
+        let einstein = einstein(metric, &ricci, scalar);
+        let weyl = weyl(metric, &lowered, &ricci, scalar);
+        let kretschmann = kretschmann(metric, &riemann);
+        Self { n, lowered, riemann, ricci, scalar, einstein, weyl, kretschmann }
     }
 
-    /// Einstein's tensor `G_ab = R_ab - g_ab R/2`, `(n, n)`; 0 for one and two coordinates, where it vanishes identically.
-    pub fn einstein(&self, metric: &Metric<S>) -> Vec<S> {
-        if self.n <= 2 {
-            return vec![<S as Real>::zero(); self.n * self.n];
+    /// The same in other numbers.
+    pub(super) fn rounded<T: Scalar>(&self) -> Curvature<T> {
+        Curvature {
+            n: self.n,
+            lowered: rounded(&self.lowered),
+            riemann: rounded(&self.riemann),
+            ricci: rounded(&self.ricci),
+            scalar: self.scalar.cast(),
+            einstein: rounded(&self.einstein),
+            weyl: rounded(&self.weyl),
+            kretschmann: self.kretschmann.cast(),
         }
-        let half = self.scalar * <S as Real>::half();
-        self.ricci.iter().zip(&metric.components).map(|(&r, &g)| r - half * g).collect()
-    }
-
-    /// Weyl's tensor `C_abcd` at `[a][b][c][d]`, `(n, n, n, n)`, all indices down; 0 for three coordinates and fewer, where it
-    /// vanishes identically or is not defined.
-    ///
-    /// ```text
-    /// C_abcd = R_abcd - (g_ac R_bd - g_ad R_bc - g_bc R_ad + g_bd R_ac)/(n - 2) + R (g_ac g_bd - g_ad g_bc)/((n - 1)(n - 2))
-    /// ```
-    pub fn weyl(&self, metric: &Metric<S>) -> Vec<S> {
-        let n = self.n;
-        if n <= 3 {
-            return vec![<S as Real>::zero(); n.pow(4)];
-        }
-        let (size, g, r) = (S::of_f64(n as f64), &metric.components, &self.ricci);
-        let (one, two) = (<S as Real>::one(), <S as Real>::two());
-        let (traces, trace) = ((size - two).recip(), self.scalar / ((size - one) * (size - two)));
-        let at = |of: &[S], i: usize, j: usize| of[i * n + j];
-        let component = |(place, &whole): (usize, &S)| {
-            let (a, b, c, d) = (place / n.pow(3), place / n.pow(2) % n, place / n % n, place % n);
-            if a == b || c == d {
-                return <S as Real>::zero();
-            }
-            let single = at(g, a, c) * at(r, b, d) - at(g, a, d) * at(r, b, c) - at(g, b, c) * at(r, a, d)
-                + at(g, b, d) * at(r, a, c);
-            let double = at(g, a, c) * at(g, b, d) - at(g, a, d) * at(g, b, c);
-            whole - traces * single + trace * double
-        };
-        self.lowered.iter().enumerate().map(component).collect()
-    }
-
-    /// Kretschmann's scalar `R_abcd R^abcd`: `48 M^2/r^6` outside a mass.
-    pub fn kretschmann(&self, metric: &Metric<S>) -> S {
-        let n = self.n;
-        // R^ab_cd R^cd_ab, each pair of indices once.
-        let mixed = move_second(n, &metric.inverse, &self.riemann);
-        let pairs = || (0..n).flat_map(|a| (a + 1..n).map(move |b| a * n + b));
-        let product =
-            |ab: usize| dot(pairs().map(|cd| mixed[ab * n * n + cd]), pairs().map(|cd| mixed[cd * n * n + ab]));
-        let four = <S as Real>::two() * <S as Real>::two();
-        four * pairs().fold(<S as Real>::zero(), |sum, ab| sum + product(ab))
     }
 
     /// Geodesic deviation `D^2 x^a/dt^2 = -R^a_bcd u^b x^c u^d`, `(n)`: relative acceleration of neighbours `x` apart that
@@ -127,4 +106,46 @@ impl<S: Scalar> Curvature<S> {
         let area = metric.product(u, u) * metric.product(w, w) - metric.product(u, w).sqr();
         -metric.product(u, &turned) / area
     }
+}
+
+/// [`Curvature::einstein`].
+fn einstein<S: Scalar>(metric: &Metric<S>, ricci: &[S], scalar: S) -> Vec<S> {
+    if metric.coordinates() <= 2 {
+        return vec![<S as Real>::zero(); ricci.len()];
+    }
+    let half = scalar * <S as Real>::half();
+    ricci.iter().zip(&metric.components).map(|(&r, &g)| r - half * g).collect()
+}
+
+/// [`Curvature::weyl`].
+fn weyl<S: Scalar>(metric: &Metric<S>, lowered: &[S], r: &[S], scalar: S) -> Vec<S> {
+    let (n, g) = (metric.coordinates(), &metric.components[..]);
+    if n <= 3 {
+        return vec![<S as Real>::zero(); lowered.len()];
+    }
+    let size = S::of_f64(n as f64);
+    let (one, two) = (<S as Real>::one(), <S as Real>::two());
+    let (traces, trace) = ((size - two).recip(), scalar / ((size - one) * (size - two)));
+    let at = |of: &[S], i: usize, j: usize| of[i * n + j];
+    let component = |(place, &whole): (usize, &S)| {
+        let (a, b, c, d) = (place / n.pow(3), place / n.pow(2) % n, place / n % n, place % n);
+        if a == b || c == d {
+            return <S as Real>::zero();
+        }
+        let single = at(g, a, c) * at(r, b, d) - at(g, a, d) * at(r, b, c) - at(g, b, c) * at(r, a, d)
+            + at(g, b, d) * at(r, a, c);
+        let double = at(g, a, c) * at(g, b, d) - at(g, a, d) * at(g, b, c);
+        whole - traces * single + trace * double
+    };
+    lowered.iter().enumerate().map(component).collect()
+}
+
+/// [`Curvature::kretschmann`]: `R^ab_cd R^cd_ab`, each pair of indices once.
+fn kretschmann<S: Scalar>(metric: &Metric<S>, riemann: &[S]) -> S {
+    let n = metric.coordinates();
+    let mixed = move_second(n, &metric.inverse, riemann);
+    let pairs = || (0..n).flat_map(|a| (a + 1..n).map(move |b| a * n + b));
+    let product = |ab: usize| dot(pairs().map(|cd| mixed[ab * n * n + cd]), pairs().map(|cd| mixed[cd * n * n + ab]));
+    let four = <S as Real>::two() * <S as Real>::two();
+    four * pairs().fold(<S as Real>::zero(), |sum, ab| sum + product(ab))
 }

@@ -1,7 +1,7 @@
 //! The metric at a point: inverse, determinant, signature.
 
 use super::GeometryError;
-use super::tensor::dot;
+use super::tensor::{dot, rounded};
 use crate::linalg::{Inertia, LinalgError, Workspace, inertia, inverse, leading_minors};
 use crate::scalar::{Real, Scalar};
 
@@ -44,6 +44,17 @@ impl<S: Scalar> Metric<S> {
         }
         let determinant = determinant(n, components);
         Ok(Self { n, components: components.to_vec(), inverse: found, determinant, signature })
+    }
+
+    /// The same in other numbers.
+    pub(super) fn rounded<T: Scalar>(&self) -> Metric<T> {
+        Metric {
+            n: self.n,
+            components: rounded(&self.components),
+            inverse: rounded(&self.inverse),
+            determinant: self.determinant.cast(),
+            signature: self.signature,
+        }
     }
 
     /// Number of coordinates `n`.

@@ -24,7 +24,7 @@
 //! let point = geometries(&*space, &[0.0, 0.3, -0.2, 1.5], &[0.0; 4])?.remove(0)?;
 //! assert_eq!((point.metric.signature.negative, point.metric.signature.positive), (1, 3));
 //! assert!((point.curvature.scalar + 12.0).abs() < 1e-13);
-//! assert!((point.curvature.kretschmann(&point.metric) - 24.0).abs() < 1e-13);
+//! assert!((point.curvature.kretschmann - 24.0).abs() < 1e-13);
 //! assert!((point.connection.symbols[0 * 16 + 0 * 4 + 3] + 1.0 / 1.5).abs() < 1e-15); // G^t_tz = -1/z
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
@@ -79,11 +79,28 @@ impl<S: Scalar> Geometry<S> {
         }
         Ok(Self { metric, connection, curvature })
     }
+
+    /// The same in other numbers.
+    ///
+    /// # Errors
+    /// [`GeometryError::NotFinite`] where they do not reach that far.
+    pub fn rounded<T: Scalar>(&self) -> Result<Geometry<T>, GeometryError> {
+        let Self { metric, connection, curvature } = self;
+        let rounded =
+            Geometry { metric: metric.rounded(), connection: connection.rounded(), curvature: curvature.rounded() };
+        let Geometry { metric, connection, curvature } = &rounded;
+        let tensors: [&[T]; 4] = [&metric.components, &metric.inverse, &connection.symbols, &curvature.riemann];
+        if tensors.into_iter().flatten().any(|x| !x.is_finite()) {
+            return Err(GeometryError::NotFinite { what: "the geometry, rounded," });
+        }
+        Ok(rounded)
+    }
 }
 
 /// The geometry of a model at points `(batch, n)` in physical units, each with its own failure.
 ///
 /// `velocity`, `(n)`, is the one at which the mass matrix is taken: zeros unless `L` is more than quadratic in the velocities.
+/// Lagrangians that are written down are computed in double-double numbers and rounded at the end; networks in their own numbers.
 ///
 /// # Errors
 /// [`GeometryError::Shape`]; what [`EulerLagrange::metric_jets`] refuses.
@@ -95,6 +112,9 @@ pub fn geometries<S: Scalar>(
 ) -> Result<Vec<Result<Geometry<S>, GeometryError>>, GeometryError> {
     let n = model.coordinates();
     error::expect_length("velocity", n, velocity.len())?;
-    let jets = model.metric_jets(points, &velocity.repeat(points.len() / n.max(1)))?;
-    Ok(jets.iter().map(Geometry::new).collect())
+    let velocities = velocity.repeat(points.len() / n.max(1));
+    if let Some(jets) = model.wide_metric_jets(points, &velocities)? {
+        return Ok(jets.iter().map(|jet| Geometry::new(jet)?.rounded()).collect());
+    }
+    Ok(model.metric_jets(points, &velocities)?.iter().map(Geometry::new).collect())
 }

@@ -26,3 +26,8 @@ pub(super) fn move_first<S: Scalar>(n: usize, h: &[S], tensor: &[S]) -> Vec<S> {
 pub(super) fn move_second<S: Scalar>(n: usize, h: &[S], tensor: &[S]) -> Vec<S> {
     tensor.chunks_exact(tensor.len() / n).flat_map(|part| move_first(n, h, part)).collect()
 }
+
+/// The same numbers in another precision.
+pub(super) fn rounded<S: Scalar, T: Scalar>(tensor: &[S]) -> Vec<T> {
+    tensor.iter().map(|x| x.cast()).collect()
+}

@@ -4,7 +4,7 @@ use super::derivatives::{Need, State, evaluate};
 use super::taylor::Taylor;
 use super::{EulerLagrange, Lagrangian, MechanicsError, MetricJet, Request, Terms, metric_jets};
 use crate::linalg::Workspace;
-use crate::scalar::{Real, Scalar};
+use crate::scalar::{Dd, Real, Scalar};
 use crate::tape::{self, Evaluation, Program, Replay, STATES, TapeError, Tracer};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
@@ -121,11 +121,17 @@ impl<S: Scalar> Evaluator<S> {
         self.value.get_or_init(|| form.value(count).ok().map(|value| Recorded { value })).as_ref()
     }
 
-    /// The metric jets of a batch, by the program of the value.
-    fn metric_jets(&self, form: &dyn Form<S>, q: &[S], v: &[S]) -> Result<Vec<MetricJet<S>>, MechanicsError> {
+    /// The metric jets of a batch in numbers that are as precise or more so, by the program of the value.
+    fn metric_jets<T: Scalar>(
+        &self,
+        form: &dyn Form<S>,
+        q: &[S],
+        v: &[S],
+    ) -> Result<Vec<MetricJet<T>>, MechanicsError> {
         let value = self.value(form).ok_or(MechanicsError::Derivatives { what: "mass matrix" })?;
-        let parameters: Vec<Taylor<'static, S>> = self.parameters.iter().map(|&p| Taylor::constant(p)).collect();
-        metric_jets(form.coordinates(), (q, v), |q, v| value.lagrangian(&parameters, q, v))
+        let cast = |numbers: &[S]| -> Vec<T> { numbers.iter().map(|x| x.cast()).collect() };
+        let parameters: Vec<Taylor<'static, T>> = cast(&self.parameters).into_iter().map(Taylor::constant).collect();
+        metric_jets(form.coordinates(), (&cast(q), &cast(v)), |q, v| value.lagrangian(&parameters, q, v))
     }
 
     /// The program that computes what is needed, recorded on first use.
@@ -284,5 +290,11 @@ impl<L: Lagrangian, S: Scalar> EulerLagrange<S> for HandWritten<L, S> {
 
     fn metric_jets(&self, q: &[S], v: &[S]) -> Result<Vec<MetricJet<S>>, MechanicsError> {
         self.evaluator.metric_jets(&self.system, q, v)
+    }
+
+    fn wide_metric_jets(&self, q: &[S], v: &[S]) -> Result<Option<Vec<MetricJet<Dd>>>, MechanicsError> {
+        let worth = S::epsilon().to_f64() > Dd::epsilon().to_f64()
+            && Lagrangian::coordinates(&self.system) <= REPLAY_COORDINATES;
+        worth.then(|| self.evaluator.metric_jets(&self.system, q, v)).transpose()
     }
 }

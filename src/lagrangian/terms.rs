@@ -2,7 +2,7 @@
 
 use super::error::MechanicsError;
 use super::metric::MetricJet;
-use crate::scalar::Scalar;
+use crate::scalar::{Dd, Scalar};
 use std::ops::BitOr;
 
 /// Which terms a caller needs; nothing else is computed.
@@ -124,6 +124,16 @@ pub trait EulerLagrange<S: Scalar>: Send + Sync {
     fn metric_jets(&self, q: &[S], v: &[S]) -> Result<Vec<MetricJet<S>>, MechanicsError> {
         let _ = (q, v);
         Err(MechanicsError::Derivatives { what: "mass matrix" })
+    }
+
+    /// The same in double-double numbers, where a model can give them at a cost that is worth it: curvature is a difference of
+    /// larger terms, of flat space in curved coordinates. `None` of models that cannot, or are that precise themselves.
+    ///
+    /// # Errors
+    /// As [`EulerLagrange::metric_jets`].
+    fn wide_metric_jets(&self, q: &[S], v: &[S]) -> Result<Option<Vec<MetricJet<Dd>>>, MechanicsError> {
+        let _ = (q, v);
+        Ok(None)
     }
 
     /// `true` if the motion keeps the energy `E = p.v - L`: no friction, no other force beside those of `L`.

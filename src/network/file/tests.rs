@@ -1,8 +1,8 @@
 //! Round trips, damage and foreign files.
 
-use super::container::{MAX_HEADER, checksum_field};
 use super::*;
 use crate::network::{ActivationChoice, Form, InputLayer};
+use crate::storage::container::{MAX_HEADER, checksum_field};
 use proptest::prelude::*;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use std::collections::{BTreeMap, HashMap};

@@ -4,7 +4,7 @@ use super::spaces::dd;
 use lnn::geometry::geometries;
 use lnn::lagrangian::{EulerLagrange, Request, Terms};
 use lnn::network::{ActivationChoice, Architecture, Form, InputLayer, Layout, NetworkLagrangian, Structure};
-use lnn::scalar::{Dd, Scalar};
+use lnn::scalar::{Dd, Real, Scalar};
 
 fn network(activation: ActivationChoice, structure: Structure, even: bool) -> NetworkLagrangian<f64> {
     let time_like = (structure != Structure::Mechanical).then_some(0);

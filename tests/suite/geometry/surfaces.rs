@@ -4,7 +4,7 @@ use super::spaces::{SPACES, Space, dd};
 use crate::common::accuracy::configure;
 use lnn::geometry::{Change, GeometryError, Metric, characters, geometries, grid, surfaces};
 use lnn::linalg::Inertia;
-use lnn::scalar::{Dd, Real};
+use lnn::scalar::{Dd, Real, Scalar};
 
 fn space(name: &str) -> &'static Space {
     SPACES.iter().find(|space| space.name == name).unwrap()

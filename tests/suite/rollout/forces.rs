@@ -56,6 +56,7 @@ fn bound(method: Method) -> f64 {
         Method::Midpoint | Method::Variational => 2e-3,
         Method::Gauss4 => 1e-7,
         Method::Gauss6 => 1e-10,
+        method => panic!("no bound is known for {method:?}"),
     }
 }
 
