@@ -15,7 +15,7 @@ pub struct Changes {
     /// half the widths [default: the configuration's, gelu in all presets].
     #[arg(long, value_name = "NAME", value_parser = activation)]
     pub activation: Option<ActivationChoice>,
-    /// How the Lagrangian is made of the network's outputs: black-box, mechanical (a positive mass matrix, potentials) or metric (of
+    /// Way in which the Lagrangian is made of the network's outputs: black-box, mechanical (a positive mass matrix, potentials) or metric (of
     /// geodesics, with its signature); the last two need no penalty and have none unless one is chosen [default: the
     /// configuration's, black-box in all presets].
     #[arg(long, value_name = "NAME", value_parser = structure)]

@@ -3,7 +3,7 @@
 use super::{EulerLagrange, MechanicsError, MetricJet, Request, Terms};
 use crate::forward::Dual;
 use crate::linalg::Workspace;
-use crate::scalar::{Real, Scalar};
+use crate::scalar::{Dd, Real, Scalar};
 
 /// Generalized forces that do not follow from a Lagrangian; closures `Fn(&[S], &[S], &mut [S])` of coordinates, velocities and
 /// forces are such.
@@ -114,6 +114,10 @@ impl<S: Scalar, M: EulerLagrange<S>, F: GeneralizedForce<S>> EulerLagrange<S> fo
         self.model.metric_jets(q, v)
     }
 
+    fn wide_metric_jets(&self, q: &[S], v: &[S]) -> Result<Option<Vec<MetricJet<Dd>>>, MechanicsError> {
+        self.model.wide_metric_jets(q, v)
+    }
+
     fn conserves_energy(&self) -> bool {
         false
     }
@@ -134,6 +138,10 @@ impl<S: Scalar, T: EulerLagrange<S> + ?Sized> EulerLagrange<S> for Box<T> {
 
     fn metric_jets(&self, q: &[S], v: &[S]) -> Result<Vec<MetricJet<S>>, MechanicsError> {
         (**self).metric_jets(q, v)
+    }
+
+    fn wide_metric_jets(&self, q: &[S], v: &[S]) -> Result<Option<Vec<MetricJet<Dd>>>, MechanicsError> {
+        (**self).wide_metric_jets(q, v)
     }
 
     fn conserves_energy(&self) -> bool {
