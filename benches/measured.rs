@@ -32,10 +32,10 @@ use lnn::analysis::{
     PredictionError, Predictions, Window, predict_by_constant_velocity, predict_by_motion, prediction_error,
 };
 use lnn::configuration::{Config, Penalty};
-use lnn::data::{Datasets, Measured, Preparation};
+use lnn::data::{Datasets, Measured, PrepareOptions};
 use lnn::lagrangian::EulerLagrange;
 use lnn::network::NetworkLagrangian;
-use lnn::recording::{Recording, Targets, Track};
+use lnn::recording::{RecordedTrajectory, Recording, Targets};
 use lnn::shooting::{Shooting, Task, fit};
 use lnn::training::{Hooks, train};
 use plain::Plain;
@@ -77,7 +77,7 @@ fn recording(path: &Path, text: &str) -> Result<Recording, String> {
     }
     let times = (0..film.angles.len()).map(|k| k as f64 / RATE).collect();
     let (q, name) = (film.angles.concat(), path.display().to_string());
-    let track = Track { name, times, q, v: vec![], a: vec![], force: vec![] };
+    let track = RecordedTrajectory { name, times, q, v: vec![], a: vec![], force: vec![] };
     let coordinates = ["theta1", "theta2"].map(String::from).to_vec();
     Ok(Recording { coordinates, periodic: vec![true; 2], tracks: vec![track] })
 }
@@ -86,14 +86,14 @@ fn recording(path: &Path, text: &str) -> Result<Recording, String> {
 fn made() -> Recording {
     let times: Vec<f64> = (0..1200).map(|k| k as f64 / RATE).collect();
     let q = times.iter().flat_map(|t| [(3.0 * t).cos() * (-0.1 * t).exp(), 0.5 * (5.0 * t).sin()]).collect();
-    let track = Track { name: "made".into(), times, q, v: vec![], a: vec![], force: vec![] };
+    let track = RecordedTrajectory { name: "made".into(), times, q, v: vec![], a: vec![], force: vec![] };
     let coordinates = ["theta1", "theta2"].map(String::from).to_vec();
     Recording { coordinates, periodic: vec![true; 2], tracks: vec![track] }
 }
 
 /// A recording smoothed and divided as `lnn fit` does.
 fn measured(recording: &Recording) -> Measured {
-    Measured::new(recording, &Preparation::default()).expect("a recording long enough")
+    Measured::new(recording, &PrepareOptions::default()).expect("a recording long enough")
 }
 
 /// A predictor's errors at a few times, and how long it learned.

@@ -3,43 +3,23 @@
 //! Four runs of five seconds, friction in both joints, angles 100 times a second with a noise of 0.5 % of their rms.
 //! Without arguments it compares the file with what it would write; `-- --write` writes it.
 
-use lnn::lagrangian::{
-    EulerLagrange, HandWritten, MechanicsError, Request, Terms, systems::double_pendulum::DoublePendulum,
-};
-use lnn::linalg::Workspace;
+use lnn::lagrangian::{Dissipation, Rayleigh, WithForces, configure};
 use lnn::random::RngStream;
 use lnn::rollout::{Options, rollout};
+use lnn::scalar::{Real, Scalar};
 use rand_distr::{Distribution, StandardNormal};
 use std::fmt::Write;
 
 const FILE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/data/pendulum.csv");
 const NOISE: f64 = 0.005;
 
-/// A double pendulum of 1 m and 1 kg, g = 9.81 m/s^2, with viscous joints: Rayleigh's dissipation
-/// `D = (c1 v1^2 + c2 (v2 - v1)^2)/2`, c in N m s; anything that gives accelerations can be rolled out.
-struct Damped {
-    ideal: HandWritten<DoublePendulum, f64>,
-    joints: [f64; 2],
-}
+/// Viscous joints: Rayleigh's dissipation `D = (c1 v1^2 + c2 (v2 - v1)^2)/2`, c in N m s.
+struct Joints([f64; 2]);
 
-impl EulerLagrange<f64> for Damped {
-    fn coordinates(&self) -> usize {
-        2
-    }
-    fn conserves_energy(&self) -> bool {
-        false
-    }
-    fn terms(&self, q: &[f64], v: &[f64], what: Request, terms: &mut Terms<f64>) -> Result<(), MechanicsError> {
-        self.ideal.terms(q, v, what, terms)?;
-        if what.includes(Request::FORCE) {
-            for v in v.chunks_exact(2) {
-                let (base, between) = (self.joints[0] * v[0], self.joints[1] * (v[1] - v[0]));
-                terms.force.extend([between - base, -between]);
-                terms.dissipation.push(base * v[0] + between * (v[1] - v[0]));
-            }
-        }
-        // M a = dL/dq - c - dD/dv
-        terms.complete(2, v, what, &mut Workspace::new())
+impl Dissipation for Joints {
+    fn dissipation<R: Real>(&self, _q: &[R], v: &[R]) -> R {
+        let [base, between] = self.0.map(|c| R::constant(Scalar::of_f64(c)));
+        (base * v[0].sqr() + between * (v[1] - v[0]).sqr()) * R::half()
     }
 }
 
@@ -53,8 +33,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 
 /// The recording as CSV.
 pub fn made() -> Result<String, Box<dyn std::error::Error>> {
-    let ideal = HandWritten::new(DoublePendulum, vec![1.0, 1.0, 1.0, 1.0, 9.81]);
-    let model = Damped { ideal, joints: [0.08, 0.05] };
+    // 1 m and 1 kg each, g = 9.81 m/s^2; anything that gives accelerations can be rolled out.
+    let ideal = configure::<f64>("double-pendulum", &[])?.build()?;
+    let model = WithForces::new(ideal, Rayleigh(Joints([0.08, 0.05])));
     let (mut csv, mut rng) = ("run,t,theta1,theta2\n".to_string(), RngStream::Training(0).generator(0));
     for (run, start) in [[1.2, 1.9], [-2.0, -0.6], [2.4, 0.3], [0.4, -2.6]].into_iter().enumerate() {
         let motion = rollout(&model, &start, &[0.0; 2], &Options::reference(5.0, 0.01));

@@ -7,12 +7,12 @@
 use super::Scale;
 use lnn::analysis::{Determination, Estimate, Observed, determination, places};
 use lnn::configuration::Penalty;
-use lnn::data::{Measured, Preparation};
+use lnn::data::{Measured, PrepareOptions};
 use lnn::lagrangian::{EulerLagrange, HandWritten, Lagrangian, MechanicsError, Request, Terms};
 use lnn::linalg::Workspace;
 use lnn::network::NetworkLagrangian;
 use lnn::random::RngStream;
-use lnn::recording::{Recording, Targets, Track};
+use lnn::recording::{RecordedTrajectory, Recording, Targets};
 use lnn::rollout::{Options, rollout};
 use lnn::scalar::Real;
 use lnn::training::{Hooks, train};
@@ -101,7 +101,7 @@ fn recording(forced: bool, runs: usize, seconds: f64, seed: u64) -> Recording {
         let sigma = [2e-4, 1e-3];
         let noisy = motion.q.iter().enumerate();
         let q = noisy.map(|(k, q)| q + sigma[k % 2] * Distribution::<f64>::sample(&StandardNormal, rng));
-        Track { name: format!("run {run}"), times: motion.t, q: q.collect(), v: vec![], a: vec![], force }
+        RecordedTrajectory { name: format!("run {run}"), times: motion.t, q: q.collect(), v: vec![], a: vec![], force }
     });
     let tracks = tracks.collect();
     Recording { coordinates: ["x", "angle"].map(String::from).to_vec(), periodic: vec![false, true], tracks }
@@ -118,7 +118,7 @@ fn energy_error(model: &[f64], exact: &[f64]) -> f64 {
 /// One recording: what was stated, and the truth in its unit.
 fn one(forced: bool, runs: usize, seconds: f64, seed: u64, scale: Scale) -> Vec<(&'static str, Estimate, f64)> {
     let recording = recording(forced, runs, seconds, seed);
-    let preparation = Preparation { seed, ..Preparation::default() };
+    let preparation = PrepareOptions { seed, ..PrepareOptions::default() };
     let measured = Measured::new(&recording, &preparation).expect("long trajectories");
     let data = measured.datasets::<f32>(Targets::Smoothed).expect("states with full windows");
     let mut config = lnn::presets::suggested("cart-pendulum", &data);

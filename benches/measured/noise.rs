@@ -3,10 +3,10 @@
 
 use super::{Scale, learned};
 use lnn::analysis::acceleration_errors;
-use lnn::data::{Measured, Preparation};
+use lnn::data::{Measured, PrepareOptions};
 use lnn::lagrangian::{Configured, EulerLagrange, Request, Terms, configure};
 use lnn::random::{RandomGenerator, RngStream};
-use lnn::recording::{Recording, Targets, Track};
+use lnn::recording::{RecordedTrajectory, Recording, Targets};
 use lnn::rollout::{Options, Trajectory, rollout};
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -39,7 +39,7 @@ fn recordings(exact: &dyn EulerLagrange<f64>, count: usize, seed: u64) -> [Recor
         let mean = all().sum::<f64>() / size;
         NOISE * (all().map(|q| (q - mean).powi(2)).sum::<f64>() / size).sqrt()
     });
-    let track = |k: usize, m: &Trajectory<f64>| Track {
+    let track = |k: usize, m: &Trajectory<f64>| RecordedTrajectory {
         name: format!("run {k}"),
         times: m.t.clone(),
         q: m.q.clone(),
@@ -47,11 +47,11 @@ fn recordings(exact: &dyn EulerLagrange<f64>, count: usize, seed: u64) -> [Recor
         a: accelerations(exact, &m.q, &m.v),
         force: vec![],
     };
-    let clean: Vec<Track> = motions.iter().enumerate().map(|(k, m)| track(k, m)).collect();
+    let clean: Vec<RecordedTrajectory> = motions.iter().enumerate().map(|(k, m)| track(k, m)).collect();
     let noisy = clean.iter().map(|track| {
         let moved = |(k, q): (usize, &f64)| q + sigma[k % 2] * Distribution::<f64>::sample(&StandardNormal, rng);
         let q = track.q.iter().enumerate().map(moved).collect();
-        Track { q, v: vec![], a: vec![], ..track.clone() }
+        RecordedTrajectory { q, v: vec![], a: vec![], ..track.clone() }
     });
     let noisy = noisy.collect();
     let coordinates = ["theta1", "theta2"].map(String::from).to_vec();
@@ -73,7 +73,7 @@ pub fn compare(count: usize, seeds: std::ops::Range<u64>, scale: Scale) -> Vec<S
         let size = accelerations(exact.as_ref(), &q, &v).iter().map(|a| a.abs()).sum::<f64>() / q.len() as f64;
         let mut try_one = |name: &str, recording: &Recording, targets: Targets| {
             let start = Instant::now();
-            let preparation = Preparation { seed, ..Preparation::default() };
+            let preparation = PrepareOptions { seed, ..PrepareOptions::default() };
             let measured = Measured::new(recording, &preparation).expect("long trajectories");
             let model = learned(&measured, false, targets, scale);
             let errors = acceleration_errors(exact.as_ref(), &model, &q, &v);

@@ -1,6 +1,6 @@
 //! The network that speed is measured on.
 
-use lnn::network::{Architecture, Form, InputLayer, Nonlinearity};
+use lnn::network::{ActivationChoice, Architecture, Form, InputLayer};
 
 /// Scale of every coordinate.
 pub const SCALE: f64 = 10.0;
@@ -11,7 +11,7 @@ pub fn architecture(n: usize, width: usize, alpha: f64) -> Architecture {
     Architecture {
         coordinates: n,
         hidden: vec![width; 3],
-        activation: Nonlinearity::Gelu,
+        activation: ActivationChoice::Gelu,
         alpha,
         time_like: None,
         scale: vec![SCALE; n],

@@ -4,7 +4,9 @@ use super::super::common::nested::reference;
 use super::super::common::{accuracy::cast, of_scalar, solve};
 use lnn::data::Dataset;
 use lnn::lagrangian::Lagrangian;
-use lnn::network::{Architecture, Form, Initialization, InputLayer, NetworkLagrangian, Nonlinearity, initial_weights};
+use lnn::network::{
+    ActivationChoice, Architecture, Form, Initialization, InputLayer, NetworkLagrangian, initial_weights,
+};
 use lnn::scalar::{Real, Scalar};
 use lnn::tape::ScalarFunction;
 use rand::{Rng, SeedableRng};
@@ -30,7 +32,7 @@ impl Case {
         let architecture = Architecture {
             coordinates: n,
             hidden: vec![width; 3],
-            activation: Nonlinearity::Gelu,
+            activation: ActivationChoice::Gelu,
             alpha: 1.0,
             time_like: None,
             scale: vec![REACH; n],

@@ -5,7 +5,7 @@ use super::accuracy::{apart, cast, finite, largest};
 use super::bytes::{Bytes, Random};
 use super::nested::{Reference, reference};
 use lnn::lagrangian::{EulerLagrange, Request, Terms};
-use lnn::network::{Architecture, Form, InputLayer, Layout, NetworkLagrangian, Nonlinearity};
+use lnn::network::{ActivationChoice, Architecture, Form, InputLayer, Layout, NetworkLagrangian};
 use lnn::scalar::{Dd, Scalar};
 use lnn::tape::{Depth, Evaluation};
 
@@ -18,7 +18,7 @@ const STATES: usize = 2;
 
 fn architecture(bytes: &mut Bytes<'_>) -> Architecture {
     let coordinates = 1 + bytes.below(3);
-    let activation = Nonlinearity::ALL[bytes.below(Nonlinearity::ALL.len())];
+    let activation = ActivationChoice::ALL[bytes.below(ActivationChoice::ALL.len())];
     let layers = 1 + bytes.below(3);
     Architecture {
         coordinates,

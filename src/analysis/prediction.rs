@@ -6,7 +6,7 @@
 use super::summary::quantile;
 use super::{ValidTime, angle_difference, relative_error, valid_time};
 use crate::lagrangian::EulerLagrange;
-use crate::recording::{Track, hermite};
+use crate::recording::{RecordedTrajectory, hermite};
 use crate::rollout::{Force, Options, RolloutError, SampledForce, Start, rollout_each};
 use serde::{Deserialize, Serialize};
 
@@ -29,7 +29,7 @@ impl Window {
     /// Windows of `seconds` one after the other through the samples `interior` of a track of `n` coordinates, with the
     /// estimated states `q` and `v`, `(samples, n)`, at its samples; a rest that is shorter is left out.
     pub fn cut(
-        track: &Track,
+        track: &RecordedTrajectory,
         (q, v): (&[f64], &[f64]),
         interior: std::ops::Range<usize>,
         n: usize,
@@ -202,11 +202,11 @@ mod tests {
     use crate::rollout::models::{OSCILLATOR, SINGULAR};
 
     /// A swing `cos t` every tenth of a second.
-    fn swing(samples: usize) -> (Track, Vec<f64>) {
+    fn swing(samples: usize) -> (RecordedTrajectory, Vec<f64>) {
         let times: Vec<f64> = (0..samples).map(|k| 0.1 * k as f64).collect();
         let q = times.iter().map(|t| t.cos()).collect();
         let v = times.iter().map(|t| -t.sin()).collect();
-        (Track { name: "swing".into(), times, q, v: vec![], a: vec![], force: vec![] }, v)
+        (RecordedTrajectory { name: "swing".into(), times, q, v: vec![], a: vec![], force: vec![] }, v)
     }
 
     #[test]

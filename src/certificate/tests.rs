@@ -6,7 +6,7 @@ use crate::forward::HyperDual;
 use crate::lagrangian::{EulerLagrange, Request, Terms};
 use crate::linalg::{Inertia, inertia};
 use crate::network::{
-    Architecture, Form, Initialization, InputLayer, NetworkLagrangian, Nonlinearity, Structure, initial_weights,
+    ActivationChoice, Architecture, Form, Initialization, InputLayer, NetworkLagrangian, Structure, initial_weights,
 };
 use crate::ops::Unary;
 use crate::scalar::{Dd, Real};
@@ -255,7 +255,7 @@ fn systems_are_enclosed() {
 }
 
 /// A network of two coordinates, the first an angle.
-fn architecture(activation: Nonlinearity, structure: Structure) -> Architecture {
+fn architecture(activation: ActivationChoice, structure: Structure) -> Architecture {
     Architecture {
         coordinates: 2,
         hidden: vec![8, 6],
@@ -280,7 +280,7 @@ fn network(architecture: Architecture, seed: u64) -> NetworkLagrangian<f64> {
 #[test]
 fn networks_are_enclosed() {
     let bounds = Bounds { positions: vec![(0.0, 6.2), (-1.0, 1.0)], velocities: vec![(-2.0, 2.0), (-1.0, 1.5)] };
-    for (seed, activation) in (4..).zip(Nonlinearity::ALL) {
+    for (seed, activation) in (4..).zip(ActivationChoice::ALL) {
         for structure in Structure::ALL {
             let mut shape = architecture(activation, structure);
             match structure {
@@ -386,7 +386,7 @@ fn what_is_not_decided_stays_open() {
 
 #[test]
 fn no_certified_box_of_a_network_holds_a_violation() {
-    let mut shape = architecture(Nonlinearity::Gelu, Structure::BlackBox);
+    let mut shape = architecture(ActivationChoice::Gelu, Structure::BlackBox);
     shape.alpha = 0.15;
     let model = network(shape, 17);
     let region = Bounds { positions: vec![(0.5, 2.0), (-1.0, 0.0)], velocities: vec![(-1.0, 0.5), (-0.5, 1.0)] };
@@ -432,7 +432,7 @@ fn structures_are_certified_by_construction() {
         (Structure::Metric, None, DEFINITE),
         (Structure::Metric, Some(0), indefinite),
     ] {
-        let shape = Architecture { time_like, ..architecture(Nonlinearity::Softplus, structure) };
+        let shape = Architecture { time_like, ..architecture(ActivationChoice::Softplus, structure) };
         let model = network(shape, 18);
         let found = certify_network(&model, &region, &limited(signature, 100)).unwrap();
         assert_eq!((found.certified, found.open, found.boxes, found.by_construction), (1.0, 0.0, 0, true));
@@ -451,7 +451,7 @@ fn structures_are_certified_by_construction() {
 
 #[test]
 fn threads_and_turns_change_nothing() {
-    let mut shape = architecture(Nonlinearity::XTanh, Structure::BlackBox);
+    let mut shape = architecture(ActivationChoice::XTanh, Structure::BlackBox);
     shape.embed_periodic = false;
     let model = network(shape, 19);
     let certified = |positions: (f64, f64), threads: usize| {

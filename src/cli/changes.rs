@@ -3,7 +3,7 @@
 use crate::cli::number::{count, positive, weight};
 use crate::cli::{CliError, chosen};
 use crate::configuration::{Config, Known, Regularizer};
-use crate::network::{Initialization, Nonlinearity, Structure};
+use crate::network::{ActivationChoice, Initialization, Structure};
 
 /// Changes of a configuration.
 #[derive(Clone, Debug, Default, clap::Args)]
@@ -14,8 +14,8 @@ pub struct Changes {
     /// Activation of the hidden layers: gelu, softplus, x-tanh, tanh, quadratic, or quadratic-softplus, which is two networks of
     /// half the widths [default: the configuration's, gelu in all presets].
     #[arg(long, value_name = "NAME", value_parser = activation)]
-    pub activation: Option<Nonlinearity>,
-    /// How the Lagrangian is made of the network's outputs: black-box, mechanical (a positive mass matrix, potentials) or metric (of
+    pub activation: Option<ActivationChoice>,
+    /// Way in which the Lagrangian is made of the network's outputs: black-box, mechanical (a positive mass matrix, potentials) or metric (of
     /// geodesics, with its signature); the last two need no penalty and have none unless one is chosen [default: the
     /// configuration's, black-box in all presets].
     #[arg(long, value_name = "NAME", value_parser = structure)]
@@ -61,9 +61,9 @@ pub enum PenaltyName {
 }
 
 /// An activation by name.
-fn activation(text: &str) -> Result<Nonlinearity, String> {
-    let known = Nonlinearity::ALL.map(Nonlinearity::name);
-    let found = Nonlinearity::ALL.into_iter().find(|choice| choice.name() == text);
+fn activation(text: &str) -> Result<ActivationChoice, String> {
+    let known = ActivationChoice::ALL.map(ActivationChoice::name);
+    let found = ActivationChoice::ALL.into_iter().find(|choice| choice.name() == text);
     found.ok_or_else(|| crate::names::unknown("activation", text, known))
 }
 

@@ -8,7 +8,7 @@ use crate::network::file::Header;
 use std::borrow::Cow;
 use std::path::Path;
 
-/// Whether an argument is the file of a system, not a name of the catalogue.
+/// `true` if an argument is the file of a system, not a name of the catalogue.
 pub fn is_file(system: &str) -> bool {
     Path::new(system).extension().is_some_and(|end| end.eq_ignore_ascii_case("toml"))
 }

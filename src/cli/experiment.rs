@@ -153,7 +153,7 @@ fn curve((label, file): &(String, PathBuf)) -> Result<Curve, CliError> {
     let [time, loss] = ["seconds", "validation_loss"].map(str::to_string);
     let columns = Columns { coords: vec![loss], time: Some(time), ..Columns::default() };
     let reading = read_recording(&[file], &columns).map_err(CliError::data)?;
-    let points = |track: crate::recording::Track| track.times.into_iter().zip(track.q).collect::<Vec<_>>();
+    let points = |track: crate::recording::RecordedTrajectory| track.times.into_iter().zip(track.q).collect::<Vec<_>>();
     Ok(Curve { label: label.clone(), points: reading.recording.tracks.into_iter().flat_map(points).collect() })
 }
 

@@ -6,7 +6,7 @@ use crate::cli::folder::Folder;
 use crate::cli::input::is_standard;
 use crate::cli::resume::{Found, Learner, find, say_finished};
 use crate::cli::said::Said;
-use crate::training::NEWEST;
+use crate::training::LATEST;
 use clap::parser::ValueSource;
 use clap::{ArgMatches, CommandFactory, FromArgMatches, Parser};
 use std::ffi::{OsStr, OsString};
@@ -51,10 +51,10 @@ impl Order {
                 return Ok(None);
             }
             Found::Unfinished(text) => Said::parse(&text)
-                .ok_or_else(|| CliError::file(&path.join(NEWEST), "the command of the fit is not in it"))?,
+                .ok_or_else(|| CliError::file(&path.join(LATEST), "the command of the fit is not in it"))?,
         };
         let mut saved = matches(&said.arguments).map_err(|e| {
-            CliError::file(&path.join(NEWEST), format_args!("the command in it is not understood: {e}"))
+            CliError::file(&path.join(LATEST), format_args!("the command in it is not understood: {e}"))
         })?;
         require_same(path, &saved, words)?;
         let mut saved = Words::from_arg_matches_mut(&mut saved).map_err(|e| CliError::file(path, e))?.args;

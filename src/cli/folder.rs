@@ -1,6 +1,6 @@
 //! A directory that a command fills, held by one run at a time.
 
-use crate::cli::holder::Holder;
+use crate::cli::lock_owner::LockOwner;
 use crate::cli::{CliError, output, results};
 use crate::pipeline::{Checkpoints, Directory, ExperimentStore, MODEL, Output, PipelineError, RunOutput};
 use crate::storage::{Disk, remove_leftovers, write_atomically};
@@ -146,12 +146,12 @@ fn lock(directory: &Path) -> Result<Lock, CliError> {
     match file.try_lock() {
         Ok(()) => {}
         Err(TryLockError::WouldBlock) => {
-            let holder = Holder::parse(&before).map(|holder| format!(" ({holder})")).unwrap_or_default();
+            let holder = LockOwner::parse(&before).map(|holder| format!(" ({holder})")).unwrap_or_default();
             return Ok(Lock::Held(holder));
         }
         Err(TryLockError::Error(e)) => return Err(cannot(e)),
     }
-    let own = Holder::this().text();
+    let own = LockOwner::this().text();
     file.set_len(0).and_then(|()| io::Seek::rewind(&mut file)).map_err(cannot)?;
     file.write_all(own.as_bytes()).and_then(|()| file.flush()).map_err(cannot)?;
     // A holder that removed the file between opening and locking left a lock on a file without a name.
@@ -161,7 +161,7 @@ fn lock(directory: &Path) -> Result<Lock, CliError> {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Lock::Gone),
         Err(error) => return Err(cannot(error)),
     }
-    if let Some(holder) = Holder::parse(&before) {
+    if let Some(holder) = LockOwner::parse(&before) {
         output::note(&format!("{}: taken over from {holder}, which is gone", directory.display()));
     }
     Ok(Lock::Ours(file))

@@ -63,7 +63,7 @@ pub fn commented(sections: &[Section<'_>], root: &Table, remarks: &dyn Fn(&str) 
     text
 }
 
-/// Whether a value is a table, or a list of tables.
+/// `true` if a value is a table, or a list of tables.
 fn has_tables(value: &Value) -> bool {
     value.is_table() || value.as_array().is_some_and(|items| items.iter().any(Value::is_table))
 }

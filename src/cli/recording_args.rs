@@ -3,7 +3,7 @@
 use crate::cli::spool::read_spooled;
 use crate::cli::{CliError, number};
 use crate::recording::read::{DataError, Problem, read_recording};
-use crate::recording::{Columns, Reading};
+use crate::recording::{Columns, LoadedRecording};
 use std::path::PathBuf;
 
 /// Recorded motion.
@@ -81,7 +81,7 @@ impl RecordingArgs {
     ///
     /// # Errors
     /// A usage error for arguments that contradict each other, a data error for the first file that is not as said.
-    pub fn read(&self) -> Result<Reading, CliError> {
+    pub fn read(&self) -> Result<LoadedRecording, CliError> {
         read_spooled(&self.data, |files| read_recording(files, &self.meaning())).map_err(|error| match &error {
             DataError::File { problem, .. } => CliError::data(format_args!("{error}{}", self.help(problem))),
             _ => CliError::usage(format_args!("{}{error}", option(&error.to_string()))),

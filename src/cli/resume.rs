@@ -5,7 +5,7 @@ use crate::cli::said::Said;
 use crate::cli::{CliError, Kind, config, output};
 use crate::configuration::Config;
 use crate::storage::{Disk, read_regular};
-use crate::training::{CheckpointError, NEWEST, PREVIOUS, remove_checkpoints, saved};
+use crate::training::{CheckpointError, LATEST, PREVIOUS, remove_checkpoints, saved};
 use serde::Deserialize;
 use std::path::Path;
 
@@ -38,7 +38,7 @@ pub enum Found {
 
 /// `true` if a directory holds a training that can go on.
 pub fn has_checkpoint(directory: &Path) -> bool {
-    [NEWEST, PREVIOUS].iter().any(|name| directory.join(name).exists())
+    [LATEST, PREVIOUS].iter().any(|name| directory.join(name).exists())
 }
 
 /// Looks for a run of this kind to go on with.

@@ -1,7 +1,7 @@
 //! Recorded motion from standard input: it goes through a temporary file, for arrays are read in several passes.
 
 use crate::cli::input;
-use crate::recording::Reading;
+use crate::recording::LoadedRecording;
 use crate::recording::read::{DataError, Problem};
 use std::fs::{self, OpenOptions};
 use std::io;
@@ -42,8 +42,8 @@ impl Drop for Spool {
 /// Reads files of which one may be `-`, standard input; what is found says so by that name.
 pub fn read_spooled(
     files: &[PathBuf],
-    read: impl FnOnce(&[PathBuf]) -> Result<Reading, DataError>,
-) -> Result<Reading, DataError> {
+    read: impl FnOnce(&[PathBuf]) -> Result<LoadedRecording, DataError>,
+) -> Result<LoadedRecording, DataError> {
     let standard = input::name(Path::new("-"));
     let (mut found, mut spool) = (Vec::with_capacity(files.len()), None);
     for file in files {

@@ -1,4 +1,4 @@
-//! What a roll-out moves: a trained model, or a system.
+//! Subject of a roll-out: a trained model, or a system.
 
 use crate::cli::chosen::{self, learned_system};
 use crate::cli::learned::{Learned, model_file};

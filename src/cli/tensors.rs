@@ -13,7 +13,7 @@ pub struct Field<S> {
 
 /// Kinds of results.
 pub enum Value<S> {
-    /// What the point does not have.
+    /// Quantities that the point does not have.
     Missing,
     Number(S),
     Signature(Inertia),

@@ -13,7 +13,7 @@ use crate::configuration::Config;
 use crate::lagrangian::Configured;
 use crate::names::counted;
 use crate::pipeline::{Begin, Checkpoints, PipelineError, RunOptions, TrainReport, train};
-use crate::training::{NEWEST, Stop, TrainingError};
+use crate::training::{LATEST, Stop, TrainingError};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 
@@ -90,7 +90,7 @@ impl Task {
                 Ok(None)
             }
             Found::Unfinished(text) => {
-                let saved = configuration(path, NEWEST, &text)?;
+                let saved = configuration(path, LATEST, &text)?;
                 require_same(path, &saved, &args.resolve_beside(&saved)?)?;
                 let system = args.check(&saved)?;
                 Ok(Some(Self { config: *saved, system, folder, start: Begin::Resume }))

@@ -4,7 +4,7 @@ use crate::configuration::error::{ConfigError, Faults, place};
 use crate::configuration::penalty::Regularizer;
 use crate::lagrangian::Description;
 use crate::network::file::MAX_WIDTH;
-use crate::network::{Form, Initialization, InputLayer, Nonlinearity, Structure};
+use crate::network::{ActivationChoice, Form, Initialization, InputLayer, Structure};
 use crate::optimizers::Method;
 use crate::optimizers::Schedule;
 use serde::{Deserialize, Serialize};
@@ -137,7 +137,7 @@ pub struct Network {
     /// Widths of the hidden layers; the branches of a hybrid share them equally.
     pub hidden: Vec<usize>,
     /// Activation of the hidden layers.
-    pub activation: Nonlinearity,
+    pub activation: ActivationChoice,
     /// Factor of the added `|v|^2` of scaled velocities.
     pub alpha: f64,
     /// Name of the coordinate whose square counts negative in the added term, `alpha (-t'^2 + x'^2 + ..)`; without it all

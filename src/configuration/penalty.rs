@@ -81,7 +81,7 @@ impl Regularizer {
     ///
     /// # Errors
     /// A time-like coordinate that is none of them.
-    pub fn penalty<'a>(&self, coordinates: impl Iterator<Item = &'a str>) -> Result<Penalty, ConfigError> {
+    pub fn resolve<'a>(&self, coordinates: impl Iterator<Item = &'a str>) -> Result<Penalty, ConfigError> {
         Ok(match *self {
             _ if self.lambda() == 0.0 => Penalty::None,
             Self::None => Penalty::None,

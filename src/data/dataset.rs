@@ -133,7 +133,7 @@ impl<S: Scalar> Dataset<S> {
     }
 
     /// Lets a state pass `u` times as fast, backwards if `u` is negative: `v -> u v`, `a -> u^2 a`.
-    pub(crate) fn change_pace(&mut self, state: usize, u: S) {
+    pub(crate) fn rescale_time(&mut self, state: usize, u: S) {
         let range = state * self.coordinates..(state + 1) * self.coordinates;
         self.v[range.clone()].iter_mut().for_each(|v| *v = u * *v);
         self.a[range].iter_mut().for_each(|a| *a = u * u * *a);

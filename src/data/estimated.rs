@@ -1,12 +1,12 @@
 //! Recorded trajectories with the states estimated from them, and their noise.
 
-use crate::recording::Track;
+use crate::recording::RecordedTrajectory;
 
 /// A recorded trajectory with the states that were estimated from it, by smoothing for instance.
 #[derive(Clone, Copy, Debug)]
-pub struct Estimated<'a> {
+pub struct StateEstimate<'a> {
     /// Measured values.
-    pub track: &'a Track,
+    pub track: &'a RecordedTrajectory,
     /// Estimated positions, `(samples, n)` in physical units, unwrapped as in the track.
     pub q: &'a [f64],
     /// Estimated velocities, `(samples, n)`.

@@ -6,7 +6,7 @@
 
 use crate::data::dataset::{Dataset, DatasetError};
 use crate::data::datasets::Datasets;
-use crate::data::estimated::{Estimated, Noise};
+use crate::data::estimated::{Noise, StateEstimate};
 use crate::recording::smooth::{SmoothError, SmoothOptions, Smoothed, Smoothing};
 use crate::recording::survey::{Stillness, plan, stillness};
 use crate::recording::{HeldOut, HoldOutError, Recording, Targets};
@@ -15,7 +15,7 @@ use thiserror::Error;
 
 /// Preparation of recorded motion.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Preparation {
+pub struct PrepareOptions {
     /// Local polynomials.
     pub smoothing: SmoothOptions,
     /// Share of the samples held out to judge; half as much of the rest chooses the best epoch. With 0 everything is learned
@@ -27,7 +27,7 @@ pub struct Preparation {
     pub seed: u64,
 }
 
-impl Default for Preparation {
+impl Default for PrepareOptions {
     fn default() -> Self {
         Self { smoothing: SmoothOptions::default(), held_out: 0.2, most_states: 60_000, seed: 0 }
     }
@@ -77,9 +77,9 @@ impl Part {
     }
 
     /// Trajectories for [`shooting::fit`](crate::shooting::fit).
-    pub fn estimated(&self) -> Vec<Estimated<'_>> {
+    pub fn estimated(&self) -> Vec<StateEstimate<'_>> {
         let pairs = self.recording.tracks.iter().zip(&self.states);
-        pairs.map(|(track, states)| Estimated { track, q: &states.q, v: &states.v }).collect()
+        pairs.map(|(track, states)| StateEstimate { track, q: &states.q, v: &states.v }).collect()
     }
 
     /// States away from the ends of trajectories, or all of them if nothing had to be derived; at most about `most`.
@@ -134,8 +134,8 @@ impl Measured {
     ///
     /// # Errors
     /// [`MeasuredError`].
-    pub fn new(recording: &Recording, preparation: &Preparation) -> Result<Self, MeasuredError> {
-        let Preparation { smoothing: options, held_out: share, most_states, seed } = preparation;
+    pub fn new(recording: &Recording, preparation: &PrepareOptions) -> Result<Self, MeasuredError> {
+        let PrepareOptions { smoothing: options, held_out: share, most_states, seed } = preparation;
         let (alone, smoothing) = plan(recording, options)?;
         if let Some((i, how)) = (0..recording.n()).find_map(|i| Some((i, stillness(recording, i, &alone)?))) {
             return Err(MeasuredError::Motionless { coordinate: recording.coordinates[i].clone(), how });

@@ -14,6 +14,6 @@ pub(crate) use bounds::boxes;
 pub use dataset::{Dataset, DatasetError};
 pub use datasets::Datasets;
 pub use draw::SamplingError;
-pub use estimated::{Estimated, Noise};
-pub use measured::{Measured, MeasuredError, Part, Preparation};
+pub use estimated::{Noise, StateEstimate};
+pub use measured::{Measured, MeasuredError, Part, PrepareOptions};
 pub use sampling::{sample, sample_all};

@@ -44,7 +44,7 @@ impl Config {
             }
             _ => Vec::new(),
         };
-        Ok(self.penalty.penalty(coordinates.iter().map(|c| c.name.as_ref()))?)
+        Ok(self.penalty.resolve(coordinates.iter().map(|c| c.name.as_ref()))?)
     }
 
     /// Shape of the network for a system, with physical scales `scale` (used if the configuration scales).

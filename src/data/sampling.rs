@@ -70,14 +70,14 @@ const SLOWEST: f64 = 0.03;
 /// [`SLOWEST`] and 1, uniform in its logarithm.
 ///
 /// Their residuals weigh `1 / u^2`: an error of the connection counts at every speed alike.
-fn leave_shell(mut set: Dataset<f64>, fraction: f64, rng: &mut impl Rng) -> Result<Dataset<f64>, DatasetError> {
+fn rescale_geodesics(mut set: Dataset<f64>, fraction: f64, rng: &mut impl Rng) -> Result<Dataset<f64>, DatasetError> {
     let mut weights = Vec::with_capacity(set.len());
     for k in 0..set.len() {
         let (chance, depth, reversed) = (rng.random::<f64>(), rng.random::<f64>(), rng.random::<bool>());
         let mut weight = set.weight(k);
         if chance < fraction {
             let u = SLOWEST.powf(depth);
-            set.change_pace(k, if reversed { -u } else { u });
+            set.rescale_time(k, if reversed { -u } else { u });
             weight /= u * u;
         }
         weights.push(weight);
@@ -110,7 +110,7 @@ pub fn sample_all<S: Scalar>(
         let set = if config.data.relative > 0.0 { weigh(set, config.data.relative)? } else { set };
         let off = config.data.off_shell;
         let slowed = off > 0.0 && system.constrained_coordinate().is_some();
-        training.push(if slowed { leave_shell(set, off, &mut rng)? } else { set });
+        training.push(if slowed { rescale_geodesics(set, off, &mut rng)? } else { set });
     }
     let scale = training[0].physical_scale();
     let data = &config.data;
@@ -204,7 +204,7 @@ mod tests {
         assert_eq!(weigh(still, 2.0).unwrap().weight(0), 1.0);
         // Slowed and reversed states keep them.
         let mut rng = RngStream::Test.generator(0);
-        let slowed = leave_shell(weighed.clone(), 1.0, &mut rng).unwrap();
+        let slowed = rescale_geodesics(weighed.clone(), 1.0, &mut rng).unwrap();
         for k in 0..2 {
             let squared = slowed.a()[2 * k] / weighed.a()[2 * k];
             assert!((slowed.weight(k) * squared / weighed.weight(k) - 1.0).abs() < 1e-12 && squared < 1.0);

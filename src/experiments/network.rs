@@ -3,7 +3,7 @@
 use super::{Experiment, Picture, Quantity, Reduction, Reported, Run, slug};
 use crate::configuration::{Config, Regularizer, Scaling};
 use crate::lagrangian::configure;
-use crate::network::{Initialization, InputLayer, Nonlinearity};
+use crate::network::{ActivationChoice, Initialization, InputLayer};
 use crate::presets::Preset;
 use std::f64::consts::PI;
 
@@ -104,7 +104,7 @@ pub(super) const SCALING: Experiment = Experiment {
     runs: || {
         let model = |label: &str, scaling: Scaling, input_layer: InputLayer| {
             let mut config = baseline();
-            config.network.activation = Nonlinearity::XTanh;
+            config.network.activation = ActivationChoice::XTanh;
             config.network.scaling = scaling;
             config.network.input_layer = input_layer;
             run(label, label, config)
@@ -125,14 +125,14 @@ pub(super) const QUADRATIC_TERM: Experiment = Experiment {
     pictures: &[Picture::TradeOff],
     reductions: &[],
     runs: || {
-        let model = |activation: Nonlinearity, alpha: f64| {
+        let model = |activation: ActivationChoice, alpha: f64| {
             let mut config = baseline();
             config.network.activation = activation;
             config.network.alpha = alpha;
             let with = if alpha == 0.0 { "without |v|^2" } else { "with |v|^2" };
             run(with, &format!("{activation} {with}"), config)
         };
-        let pendulum = [Nonlinearity::Gelu, Nonlinearity::XTanh, Nonlinearity::Softplus]
+        let pendulum = [ActivationChoice::Gelu, ActivationChoice::XTanh, ActivationChoice::Softplus]
             .into_iter()
             .flat_map(|activation| [1.0, 0.0].map(|alpha| model(activation, alpha)));
         pendulum.chain(spacetime()).collect()
@@ -152,7 +152,7 @@ fn spacetime() -> [Run; 3] {
 }
 
 /// Activations of the paper with both initialisations.
-fn activation_run(label: &str, activation: Nonlinearity, initialization: Initialization) -> Run {
+fn activation_run(label: &str, activation: ActivationChoice, initialization: Initialization) -> Run {
     let mut config = baseline();
     config.network.activation = activation;
     config.network.initialization = initialization;
@@ -169,10 +169,10 @@ pub(super) const ACTIVATIONS: Experiment = Experiment {
     reductions: &[],
     runs: || {
         [
-            ("GELU", Nonlinearity::Gelu, 0.00738, 0.01452),
-            ("x tanh(kx)", Nonlinearity::XTanh, 0.01114, 0.05048),
-            ("softplus", Nonlinearity::Softplus, 0.04452, 0.02850),
-            ("quadratic-softplus hybrid", Nonlinearity::QuadraticSoftplus, 0.16380, 0.04915),
+            ("GELU", ActivationChoice::Gelu, 0.00738, 0.01452),
+            ("x tanh(kx)", ActivationChoice::XTanh, 0.01114, 0.05048),
+            ("softplus", ActivationChoice::Softplus, 0.04452, 0.02850),
+            ("quadratic-softplus hybrid", ActivationChoice::QuadraticSoftplus, 0.16380, 0.04915),
         ]
         .into_iter()
         .flat_map(|(label, activation, loss, instability)| {
@@ -195,8 +195,8 @@ pub(super) const INITIALIZATION: Experiment = Experiment {
     pictures: &[Picture::TradeOff],
     reductions: &[],
     runs: || {
+        use ActivationChoice::{Gelu, QuadraticSoftplus as Hybrid, Softplus, XTanh};
         use Initialization::{Default as Plain, VariancePreserving as Custom};
-        use Nonlinearity::{Gelu, QuadraticSoftplus as Hybrid, Softplus, XTanh};
         [
             ("GELU v2", Gelu, Plain, 1, 0.006859, 0.02867),
             ("GELU", Gelu, Plain, 0, 0.007114, 0.01179),
@@ -263,9 +263,14 @@ pub(super) const OLD_TRICKS: Experiment = Experiment {
         };
         let ours = Config { penalty: Regularizer::Eigenvalue { lambda: 100.0 }, ..trained_on(baseline(), EXTENDED) };
         vec![
-            old("Cranmer initialisation, as in the paper", Nonlinearity::Softplus, Initialization::CranmerPaper, 0.0),
-            old("Cranmer initialisation, as in his code", Nonlinearity::Softplus, Initialization::Cranmer, 0.0),
-            old("Liu tricks", Nonlinearity::QuadraticSoftplus, Initialization::Default, 1.0),
+            old(
+                "Cranmer initialisation, as in the paper",
+                ActivationChoice::Softplus,
+                Initialization::CranmerPaper,
+                0.0,
+            ),
+            old("Cranmer initialisation, as in his code", ActivationChoice::Softplus, Initialization::Cranmer, 0.0),
+            old("Liu tricks", ActivationChoice::QuadraticSoftplus, Initialization::Default, 1.0),
             run("paper's model", "paper's model", ours),
         ]
     },

@@ -1,7 +1,7 @@
 //! The hand-written systems by name: description, Euler-Lagrange terms, closed-form acceleration.
 
 use super::derivatives::{Need, State, evaluate};
-use super::system::{Closed, System};
+use super::system::{ClosedForm, System};
 use super::{EulerLagrange, ExpressionLagrangian, HandWritten, Lagrangian, Request, Terms};
 use crate::linalg::Workspace;
 use crate::names::unknown;

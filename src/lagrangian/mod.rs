@@ -4,11 +4,11 @@
 //! `a = M^-1 (g - c + Q)`, `E = p.v - L`; `Q` are forces that do not follow from `L`, such as friction. Batches are row-major: `(batch, n)` and `(batch, n, n)`.
 
 mod catalogue;
-mod complete;
 mod configure;
 mod derivatives;
 mod description;
 mod error;
+mod euler_lagrange;
 mod expression;
 mod expression_lagrangian;
 mod hand_written;
@@ -20,6 +20,7 @@ pub mod system;
 pub mod systems;
 mod taylor;
 mod terms;
+mod with_forces;
 
 pub use catalogue::{Configured, Given, LagrangianVisitor, SystemError, find, systems};
 pub use configure::{build, configure, configure_system, configure_values, exact_acceleration};
@@ -35,6 +36,7 @@ pub use metric::MetricJet;
 pub(crate) use metric::metric_jets;
 pub(crate) use taylor::Taylor;
 pub use terms::{EulerLagrange, Request, Terms};
+pub use with_forces::{Dissipation, GeneralizedForce, Rayleigh, WithForces};
 
 use crate::scalar::Real;
 

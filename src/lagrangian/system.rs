@@ -229,7 +229,7 @@ pub struct System {
     /// The coordinate that is a time (Lorentzian systems).
     pub time_like: Option<usize>,
     /// The mass shell `g(v, v) = -1` solved for the velocity of the time-like coordinate, in words of the columns;
-    /// [`Closed::constrained_velocity`] is the formula.
+    /// [`ClosedForm::constrained_velocity`] is the formula.
     pub constraint: Option<&'static str>,
     /// Box of the training states.
     pub training: PerSize<Bounds>,
@@ -289,7 +289,7 @@ impl System {
 }
 
 /// A Lagrangian with a closed-form acceleration to compare with.
-pub trait Closed: Lagrangian {
+pub trait ClosedForm: Lagrangian {
     /// `a(q, v)`, written down without differentiating the Lagrangian.
     fn acceleration<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> Vec<R>;
 

@@ -32,6 +32,11 @@ impl Request {
     /// Everything.
     pub const ALL: Self = Self(255);
 
+    /// The same without the solution for the acceleration; what it is made of stays.
+    pub(crate) const fn without_solution(self) -> Self {
+        Self(self.0 & !32)
+    }
+
     /// `true` if all of `other` is asked for.
     #[inline]
     pub const fn includes(self, other: Self) -> bool {

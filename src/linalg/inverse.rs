@@ -2,7 +2,7 @@
 
 use super::Workspace;
 use super::error::{LinalgError, expect_length};
-use super::systems::Systems;
+use super::linear_systems::Systems;
 use crate::scalar::Scalar;
 
 /// Inverses of a batch of symmetric matrices, `(batch, n, n)`, symmetric by construction.

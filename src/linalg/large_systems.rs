@@ -2,7 +2,7 @@
 
 use super::batch::{Second, Workspace};
 use super::error::Failure;
-use super::systems::{Systems, examine, is_harmless, suspicious};
+use super::linear_systems::{Systems, examine, is_harmless, suspicious};
 use crate::scalar::{Real, Scalar, Slice, SliceMut, vectorized};
 use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
 use faer::linalg::lu::partial_pivoting::{factor, solve};

@@ -15,6 +15,7 @@ mod inverse;
 mod jacobi;
 mod large;
 mod large_systems;
+mod linear_systems;
 mod matmul;
 mod minimum_norm;
 mod minors;
@@ -22,7 +23,6 @@ mod signature;
 #[cfg(feature = "rollout")]
 mod singular;
 mod solve;
-mod systems;
 
 pub(crate) use batch::Buffer;
 pub(crate) use batch::LANES;

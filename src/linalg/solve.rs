@@ -2,7 +2,7 @@
 
 use super::Workspace;
 use super::error::{LinalgError, expect_length};
-use super::systems::Systems;
+use super::linear_systems::Systems;
 use crate::scalar::Scalar;
 
 /// Solves `M_b x_b = r_b` for a batch of symmetric matrices, definite or not.

@@ -1,6 +1,6 @@
 //! Shape of a network Lagrangian.
 
-use super::{Form, Nonlinearity};
+use super::{ActivationChoice, Form};
 use serde::{Deserialize, Serialize};
 
 /// Distribution of the initial weights.
@@ -52,7 +52,7 @@ pub struct Architecture {
     /// The branches of a hybrid share them equally.
     pub hidden: Vec<usize>,
     /// Activation of the hidden layers.
-    pub activation: Nonlinearity,
+    pub activation: ActivationChoice,
     /// Factor of the added `|v|^2` of scaled velocities; 0 leaves it out.
     pub alpha: f64,
     /// The coordinate whose square counts negative in the added term: `alpha (-t'^2 + x'^2 + ..)`, the signature of a

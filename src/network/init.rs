@@ -125,11 +125,11 @@ fn draw<S: Scalar>(layer: &Layer, place: Place, kind: Initialization, rng: &mut 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::network::{Activation, Form, InputLayer, Nonlinearity};
+    use crate::network::{Activation, ActivationChoice, Form, InputLayer};
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
 
-    fn architecture(activation: Nonlinearity) -> Architecture {
+    fn architecture(activation: ActivationChoice) -> Architecture {
         Architecture {
             coordinates: 2,
             hidden: vec![300, 200],
@@ -161,7 +161,7 @@ mod tests {
     /// Deviations of weights and biases of a single network and of both branches of a hybrid, against `expected(widths,
     /// activation)`: weights and biases of every layer.
     fn every_branch_follows(kind: Initialization, expected: impl Fn([f64; 3], Activation) -> [[f64; 2]; 3]) {
-        for choice in [Nonlinearity::Softplus, Nonlinearity::XTanh, Nonlinearity::QuadraticSoftplus] {
+        for choice in [ActivationChoice::Softplus, ActivationChoice::XTanh, ActivationChoice::QuadraticSoftplus] {
             let architecture = architecture(choice);
             let weights = drawn(&architecture, kind);
             let branches = Layout::new(&architecture).branches;
@@ -222,7 +222,7 @@ mod tests {
 
     /// Deviations of the maps of four layers of 100.
     fn deep_maps_deviate_by(kind: Initialization, expected: [f64; 5]) {
-        let deeper = Architecture { hidden: vec![100; 4], ..architecture(Nonlinearity::Gelu) };
+        let deeper = Architecture { hidden: vec![100; 4], ..architecture(ActivationChoice::Gelu) };
         let weights = drawn(&deeper, kind);
         let layers = &Layout::new(&deeper).branches[0].layers;
         assert_eq!(layers.len(), expected.len());
@@ -234,7 +234,7 @@ mod tests {
 
     #[test]
     fn near_zero_weights_are_the_default_ones_with_a_small_output() {
-        for choice in [Nonlinearity::Gelu, Nonlinearity::QuadraticSoftplus] {
+        for choice in [ActivationChoice::Gelu, ActivationChoice::QuadraticSoftplus] {
             let architecture = Architecture { input_layer: InputLayer::Dyt, ..architecture(choice) };
             let mut expected = drawn(&architecture, Initialization::Default);
             for branch in Layout::new(&architecture).branches {
@@ -249,7 +249,7 @@ mod tests {
     fn a_structure_begins_with_a_nearly_constant_mass_matrix() {
         use crate::lagrangian::{EulerLagrange, Request, Terms};
         let form = Form { structure: Structure::Mechanical, ..Form::default() };
-        let architecture = Architecture { form, ..architecture(Nonlinearity::Gelu) };
+        let architecture = Architecture { form, ..architecture(ActivationChoice::Gelu) };
         let weights = drawn(&architecture, Initialization::Default);
         let model = crate::network::NetworkLagrangian::new(architecture, weights).unwrap();
         let mut terms = Terms::default();
@@ -265,7 +265,7 @@ mod tests {
     #[test]
     fn a_dissipation_is_drawn_after_the_lagrangian_and_starts_small() {
         for kind in [Initialization::Default, Initialization::Cranmer] {
-            let plain = architecture(Nonlinearity::QuadraticSoftplus);
+            let plain = architecture(ActivationChoice::QuadraticSoftplus);
             let damped = Architecture { dissipation: Some(40), ..plain.clone() };
             let (without, with) = (drawn(&plain, kind), drawn(&damped, kind));
             let (lagrangian, friction) = with.split_at(without.len());
@@ -285,7 +285,7 @@ mod tests {
 
     #[test]
     fn an_input_layer_starts_as_stated_and_draws_nothing() {
-        for choice in [Nonlinearity::Gelu, Nonlinearity::QuadraticSoftplus] {
+        for choice in [ActivationChoice::Gelu, ActivationChoice::QuadraticSoftplus] {
             let plain = architecture(choice);
             let dyt = Architecture { input_layer: InputLayer::Dyt, ..plain.clone() };
             for kind in [

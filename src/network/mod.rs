@@ -1,6 +1,7 @@
 //! The network Lagrangian: a sum of multilayer perceptrons as `L(q, v)`, and a Rayleigh dissipation beside it, evaluated
 //! in batches.
 
+mod activation_choice;
 mod config;
 mod dynamics;
 mod features;
@@ -10,11 +11,11 @@ mod init;
 mod known;
 mod layout;
 mod model;
-mod nonlinearity;
 mod recorded;
 mod structure;
 
 pub use crate::ops::Activation;
+pub use activation_choice::{ActivationChoice, UnknownActivation};
 pub use config::{Architecture, Initialization, InputLayer};
 #[doc(hidden)]
 pub use dynamics::{Dynamics, Model};
@@ -22,5 +23,4 @@ pub use init::initial_weights;
 #[doc(hidden)]
 pub use layout::{Branch, DissipationLayout, Layer, Layout, LinearMap};
 pub use model::{NetworkError, NetworkLagrangian};
-pub use nonlinearity::{Nonlinearity, UnknownNonlinearity};
 pub use structure::{Form, Structure};

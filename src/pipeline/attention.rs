@@ -11,7 +11,7 @@ const OFTEN: u64 = 1024;
 #[derive(Debug)]
 pub(crate) struct Attention<'a> {
     watch: &'a Watch,
-    /// Whether the flag counts.
+    /// `true` if the flag counts.
     counts: bool,
     pieces: usize,
     done: AtomicU64,
@@ -32,7 +32,7 @@ impl<'a> Attention<'a> {
         self.watch.say(Event::Judged { done, total: self.pieces });
     }
 
-    /// Whether the flag was raised meanwhile.
+    /// `true` if the flag was raised meanwhile.
     pub fn is_interrupted(&self) -> bool {
         self.counts && self.watch.is_interrupted()
     }

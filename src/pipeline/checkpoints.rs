@@ -3,7 +3,7 @@
 use crate::pipeline::{Event, PipelineError, Watch};
 use crate::scalar::Scalar;
 use crate::storage::{Disk, Files};
-use crate::training::{Every, Identity, Keeper, NEWEST, PREVIOUS, Restored, Snapshot, remove_checkpoints};
+use crate::training::{CheckpointManager, Every, Identity, LATEST, PREVIOUS, Restored, Snapshot, remove_checkpoints};
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -77,15 +77,15 @@ impl Checkpoints {
         data: Vec<(String, u32)>,
         (parameters, states): (usize, usize),
         watch: &Watch,
-    ) -> Result<(Arc<Keeper>, Option<Snapshot<S>>), PipelineError> {
+    ) -> Result<(Arc<CheckpointManager>, Option<Snapshot<S>>), PipelineError> {
         let config = self.identity.clone().unwrap_or_else(|| config.to_string());
         let identity = Identity { config, data };
-        let keeper = Arc::new(Keeper::new(Arc::clone(&self.files), &self.directory, self.every, identity));
+        let keeper = Arc::new(CheckpointManager::new(Arc::clone(&self.files), &self.directory, self.every, identity));
         if self.begin != Begin::Anew {
             match keeper.restore(parameters, states) {
                 Ok(Restored { content, fallback }) => {
                     if let Some(problem) = fallback {
-                        let (newest, previous) = (self.directory.join(NEWEST), self.directory.join(PREVIOUS));
+                        let (newest, previous) = (self.directory.join(LATEST), self.directory.join(PREVIOUS));
                         let place = newest.display();
                         watch.say(Event::Note(&format!("{place}: {problem}; going on from {}", previous.display())));
                     }

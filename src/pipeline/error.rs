@@ -44,7 +44,7 @@ pub enum PipelineError {
         place: String,
         /// Differences, in words.
         differences: Vec<String>,
-        /// Whether the configuration is wrong, and not the file.
+        /// `true` if the configuration is wrong, and not the file.
         configuration: bool,
     },
     /// A model file that cannot be read or made.
@@ -121,7 +121,7 @@ impl PipelineError {
         Self::Output { path: path.to_path_buf(), problem: problem.to_string() }
     }
 
-    /// Whether the configuration is at fault, and not data, files or the machine.
+    /// `true` if the configuration is at fault, and not data, files or the machine.
     pub fn is_configuration(&self) -> bool {
         match self {
             Self::Config(_) | Self::System(_) | Self::Network(_) | Self::NoAccelerations => true,

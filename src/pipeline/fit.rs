@@ -8,7 +8,7 @@ use crate::pipeline::determination::Determined;
 use crate::pipeline::fit_config::FitConfig;
 use crate::pipeline::fit_summary::Found;
 use crate::pipeline::hold_out::{HoldOut, HoldOutOptions, evaluate_hold_out};
-use crate::pipeline::losses::Judges;
+use crate::pipeline::losses::LossStates;
 use crate::pipeline::prepared_fit::PreparedFit;
 use crate::pipeline::report_files::history;
 use crate::pipeline::start::{StartModel, weights};
@@ -18,7 +18,7 @@ use crate::recording::Targets;
 use crate::scalar::Scalar;
 use crate::shooting::{self, Task};
 use crate::storage::container::checksum;
-use crate::training::{Epoch, Sitting, Snapshot, Stop, Trained, resume as train, training_memory};
+use crate::training::{Epoch, ResumeOptions, Snapshot, Stop, Trained, resume as train, training_memory};
 
 /// A model of recorded motion, after its files were written.
 #[derive(Debug)]
@@ -106,9 +106,9 @@ fn fit_in<S: Scalar>(
     data.training = vec![data.training.swap_remove(0); config.phases.len()];
     architecture.validate()?;
     memory::require("training", training_memory(config, &architecture))?;
-    let penalty = config.penalty.penalty(names.iter().map(String::as_str))?;
+    let penalty = config.penalty.resolve(names.iter().map(String::as_str))?;
 
-    let judges = Judges { validation: data.validation.clone(), test: data.test.clone() };
+    let judges = LossStates { validation: data.validation.clone(), test: data.test.clone() };
     let toml = toml::to_string(fit_config).map_err(PipelineError::format)?;
     let sizes = (Layout::new(&architecture).parameters, data.training[0].len());
     let opened = options.checkpoints.as_ref();
@@ -116,7 +116,7 @@ fn fit_in<S: Scalar>(
     let (keeper, restored) = opened.transpose()?.map_or((None, None), |(keeper, start)| (Some(keeper), start));
     let shots = restored.clone().filter(Snapshot::is_shooting);
     let start = restored.or_else(|| weights.map(Snapshot::beginning_with));
-    let sitting = Sitting { keeper: keeper.clone(), start };
+    let sitting = ResumeOptions { keeper: keeper.clone(), start };
     let mut trained = train(config, &architecture, penalty, data, threads, &watch.hooks(), sitting)?;
     let mut shot = None;
     if let (Targets::Motion, Stop::Finished) = (targets, &trained.stop) {
@@ -133,7 +133,7 @@ fn fit_in<S: Scalar>(
             seed: config.seed,
         };
         let start = Some(shots.unwrap_or_else(|| trained.snapshot(config)));
-        let sitting = Sitting { keeper, start };
+        let sitting = ResumeOptions { keeper, start };
         let fitted = shooting::resume(&settings, task, threads, &watch.hooks(), sitting)?;
         trained.weights.clone_from(&fitted.weights);
         trained.stop.clone_from(&fitted.stop);

@@ -1,7 +1,7 @@
 //! The configuration of a fit, as `config.toml` holds it.
 
 use crate::configuration::{Config, ConfigError};
-use crate::data::Preparation;
+use crate::data::PrepareOptions;
 use crate::presets::{Key, Section};
 use crate::recording::Targets;
 use crate::recording::smooth::SmoothOptions;
@@ -138,9 +138,9 @@ impl Default for FitOptions {
 
 impl FitOptions {
     /// The same for the division of a recording.
-    pub(crate) fn preparation(&self) -> Preparation {
+    pub(crate) fn preparation(&self) -> PrepareOptions {
         let smoothing = SmoothOptions { window: self.window, noise: self.noise.clone(), ..SmoothOptions::default() };
-        Preparation { smoothing, held_out: self.held_out, seed: self.seed, ..Preparation::default() }
+        PrepareOptions { smoothing, held_out: self.held_out, seed: self.seed, ..PrepareOptions::default() }
     }
 }
 

@@ -43,8 +43,8 @@ pub struct HoldOutOptions<'a> {
 pub struct HoldOut {
     /// Errors of the model's motion, by time ahead.
     pub model: Vec<PredictionError>,
-    /// How long the model's motion predicts the measured one, median over the windows; at least to their end where the error
-    /// stays small. None without windows.
+    /// Time for which the model's motion predicts the measured one, median over the windows; at least to their end where the
+    /// error stays small. None without windows.
     pub valid_time: Option<ValidTimes>,
     /// Which predictions were given up and why, in words; empty if none was.
     pub given_up: String,

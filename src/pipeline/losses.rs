@@ -8,14 +8,14 @@ use crate::scalar::Scalar;
 use crate::training::{Objective, Trained, TrainingError};
 
 /// States that judge a model: those that chose the best epoch, and those that chose nothing.
-pub(crate) struct Judges<S> {
+pub(crate) struct LossStates<S> {
     /// Validation states.
     pub validation: Dataset<S>,
     /// Fresh states.
     pub test: Dataset<S>,
 }
 
-impl<S: Scalar> Judges<S> {
+impl<S: Scalar> LossStates<S> {
     /// Puts the losses of the weights as they are into `trained`, in place of those that its training left.
     ///
     /// # Errors

@@ -18,13 +18,13 @@
 //!
 //! ```
 //! use lnn::pipeline::{FitOptions, InMemory, PreparedFit, RunOptions, Watch, fit};
-//! use lnn::recording::{Reading, Recording, Track};
+//! use lnn::recording::{LoadedRecording, Recording, RecordedTrajectory};
 //! use lnn::configuration::Precision;
 //!
 //! // Two swings of a pendulum: an angle every 20 ms.
 //! let swing = |amplitude: f64| -> Vec<f64> { (0..400).map(|k| amplitude * (0.06 * f64::from(k)).sin()).collect() };
 //! let times: Vec<f64> = (0..400).map(|k| 0.02 * f64::from(k)).collect();
-//! let trajectory = |name: &str, amplitude| Track {
+//! let trajectory = |name: &str, amplitude| RecordedTrajectory {
 //!     name: name.into(), times: times.clone(), q: swing(amplitude), v: vec![], a: vec![], force: vec![],
 //! };
 //! let recording = Recording {
@@ -33,7 +33,7 @@
 //!     tracks: vec![trajectory("first", 0.3), trajectory("second", 0.2), trajectory("third", 0.25)],
 //! };
 //!
-//! let loaded = Reading::from(recording);
+//! let loaded = LoadedRecording::from(recording);
 //! let prepared = PreparedFit::new(&loaded, &FitOptions { held_out: 0.3, ..FitOptions::default() })?;
 //! let mut config = prepared.suggest("pendulum", Precision::F32)?;
 //! config.training.network.hidden = vec![8]; // as small as can be: this runs in a moment

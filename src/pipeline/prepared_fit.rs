@@ -6,14 +6,14 @@ use crate::pipeline::PipelineError;
 use crate::pipeline::fit_config::{FitColumns, FitConfig, FitOptions};
 use crate::presets::suggested;
 use crate::recording::survey::{Survey, SurveyOptions, survey};
-use crate::recording::{Reading, Targets};
+use crate::recording::{LoadedRecording, Targets};
 use crate::scalar::Scalar;
 use std::time::Instant;
 
 /// Recorded motion with its derivatives, divided into what is learned from, what chooses the best epoch and what judges.
 #[derive(Debug)]
 pub struct PreparedFit<'a> {
-    pub(crate) reading: &'a Reading,
+    pub(crate) reading: &'a LoadedRecording,
     pub(crate) options: FitOptions,
     pub(crate) measured: Measured,
     pub(crate) targets: Targets,
@@ -22,13 +22,13 @@ pub struct PreparedFit<'a> {
 }
 
 impl<'a> PreparedFit<'a> {
-    /// Smooths and divides recorded motion; a [`Recording`](crate::recording::Recording) in memory becomes a [`Reading`] by
+    /// Smooths and divides recorded motion; a [`Recording`](crate::recording::Recording) in memory becomes a [`LoadedRecording`] by
     /// `into`.
     ///
     /// # Errors
     /// [`PipelineError::Recording`] for motion that cannot be learned from, [`PipelineError::NoAccelerations`] if measured
     /// ones are asked for and there are none.
-    pub fn new(reading: &'a Reading, options: &FitOptions) -> Result<Self, PipelineError> {
+    pub fn new(reading: &'a LoadedRecording, options: &FitOptions) -> Result<Self, PipelineError> {
         let started = Instant::now();
         let measured = Measured::new(&reading.recording, &options.preparation())?;
         let targets = options.targets.unwrap_or_else(|| measured.advice());

@@ -16,7 +16,7 @@ use crate::pipeline::report_files::{ended, history, parameter_table, training_pi
 use crate::pipeline::{MODEL, Output, PipelineError, Watch, memory, start};
 use crate::report::Report;
 use crate::scalar::Scalar;
-use crate::training::{Epoch, Sitting, Snapshot, Stop, resume, training_memory};
+use crate::training::{Epoch, ResumeOptions, Snapshot, Stop, resume, training_memory};
 use serde::Serialize;
 use std::time::Instant;
 
@@ -146,7 +146,7 @@ fn train_in<S: Scalar>(
         .map(|checkpoints| checkpoints.open::<S>(&toml, data.checksums(), (parameters, config.data.training), watch));
     let (keeper, restored) = opened.transpose()?.map_or((None, None), |(keeper, start)| (Some(keeper), start));
     let start = restored.or_else(|| before.map(Snapshot::beginning_with));
-    let sitting = Sitting { keeper, start };
+    let sitting = ResumeOptions { keeper, start };
     let trained = resume(config, &architecture, penalty, data, options.threads, &watch.hooks(), sitting)?;
 
     // The model first, then what is small, pictures last: on a full disk nothing that comes after can lose them.

@@ -76,7 +76,7 @@ impl Watch {
         Self { events, interrupt: Arc::clone(&self.interrupt) }
     }
 
-    /// Whether the flag was raised.
+    /// `true` if the flag was raised.
     pub fn is_interrupted(&self) -> bool {
         self.interrupt.load(Ordering::SeqCst)
     }

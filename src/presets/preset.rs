@@ -5,7 +5,7 @@ use crate::configuration::{Config, Data, Network, OnFailure, Optimizer, Phase, P
 use crate::data::boxes;
 use crate::lagrangian::Configured;
 use crate::lagrangian::system::{Bounds, PaperBudget, PaperPhase, StateAdvice};
-use crate::network::{Initialization, InputLayer, Nonlinearity, Structure};
+use crate::network::{ActivationChoice, Initialization, InputLayer, Structure};
 use crate::optimizers::Method;
 use crate::optimizers::Schedule;
 use std::f64::consts::PI;
@@ -129,7 +129,7 @@ const PENALTY: f64 = 100.0;
 fn network(width: usize) -> Network {
     Network {
         hidden: vec![width; 3],
-        activation: Nonlinearity::Gelu,
+        activation: ActivationChoice::Gelu,
         alpha: 1.0,
         time_like: None,
         scaling: Scaling::Physical,
@@ -231,7 +231,7 @@ fn paper(system: &Configured<f64>) -> Option<Config> {
     let PaperBudget { states, hidden, phases } = system.system.learning.paper?;
     let network = Network {
         hidden: hidden.to_vec(),
-        activation: Nonlinearity::Gelu,
+        activation: ActivationChoice::Gelu,
         alpha: 1.0,
         time_like: None,
         scaling: Scaling::Physical,

@@ -302,7 +302,7 @@ pub fn section_reference(section: &Section<'_>, values: &Value, whose: &str) -> 
 mod tests {
     use super::*;
     use crate::configuration::{Known, Polish, Regularizer};
-    use crate::network::{InputLayer, Nonlinearity};
+    use crate::network::{ActivationChoice, InputLayer};
     use std::collections::BTreeSet;
 
     /// Paths of all keys of a value, tables of lists included; what stands in `open` is not descended into.
@@ -351,7 +351,7 @@ mod tests {
             let section = TRAINING_SECTIONS.iter().find(|s| s.name == section).unwrap();
             section.keys.iter().find(|k| k.name == key).unwrap().values.split(", ").collect()
         };
-        let mut known = Nonlinearity::ALL.map(Nonlinearity::name).to_vec();
+        let mut known = ActivationChoice::ALL.map(ActivationChoice::name).to_vec();
         let mut listed = values("network", "activation");
         known.sort_unstable();
         listed.sort_unstable();

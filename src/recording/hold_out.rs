@@ -1,7 +1,7 @@
 //! Training and validation, apart by whole trajectories.
 
 use crate::names::counted;
-use crate::recording::{Recording, Track};
+use crate::recording::{RecordedTrajectory, Recording};
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
@@ -92,7 +92,7 @@ impl HeldOut {
 
     /// Training and validation.
     pub fn divide(&self, recording: &Recording) -> (Recording, Recording) {
-        let with = |tracks: Vec<Track>| Recording { tracks, ..bare(recording) };
+        let with = |tracks: Vec<RecordedTrajectory>| Recording { tracks, ..bare(recording) };
         match self {
             Self::Nothing => (recording.clone(), bare(recording)),
             Self::Tracks(held) => {
@@ -153,9 +153,9 @@ fn bare(recording: &Recording) -> Recording {
 }
 
 /// Samples of a track of `n` coordinates.
-fn section(track: &Track, n: usize, range: Range<usize>, which: &str) -> Track {
+fn section(track: &RecordedTrajectory, n: usize, range: Range<usize>, which: &str) -> RecordedTrajectory {
     let part = |values: &[f64]| values.get(range.start * n..range.end * n).unwrap_or(&[]).to_vec();
-    Track {
+    RecordedTrajectory {
         name: format!("{} ({which})", track.name),
         times: track.times[range.clone()].to_vec(),
         q: part(&track.q),
@@ -170,7 +170,7 @@ mod tests {
     use super::*;
 
     fn recording(lengths: &[usize]) -> Recording {
-        let tracks = lengths.iter().enumerate().map(|(k, length)| Track {
+        let tracks = lengths.iter().enumerate().map(|(k, length)| RecordedTrajectory {
             name: format!("run{k}"),
             times: (0..*length).map(|j| j as f64).collect(),
             q: (0..2 * length).map(|j| (100 * k + j) as f64).collect(),

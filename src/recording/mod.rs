@@ -1,7 +1,7 @@
 //! Recorded motion: what somebody measured, as it was measured; its derivatives, and what it is good for.
 
-mod between;
 mod columns;
+mod hermite;
 mod hold_out;
 #[cfg(feature = "data")]
 pub mod read;
@@ -13,11 +13,11 @@ mod targets;
 mod track;
 mod units;
 
-pub(crate) use between::hermite;
 pub use columns::{Columns, ColumnsError};
+pub(crate) use hermite::hermite;
 pub use hold_out::{HeldOut, HoldOutError};
-pub use reading::{Cut, Dropped, Reading, Rows};
+pub use reading::{Cut, Dropped, LoadedRecording, Rows};
 pub(crate) use targets::LARGE_ERROR;
 pub use targets::Targets;
-pub use track::{Recording, Track, TrackError};
+pub use track::{RecordedTrajectory, Recording, TrajectoryError};
 pub use units::factor;

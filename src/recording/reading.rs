@@ -64,7 +64,7 @@ pub struct Dropped {
 
 /// A recording and where it comes from.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Reading {
+pub struct LoadedRecording {
     /// Recorded motion, in SI.
     pub recording: Recording,
     /// Rows of the samples of every trajectory.
@@ -81,7 +81,7 @@ pub struct Reading {
     pub dropped: Vec<Dropped>,
 }
 
-impl From<Recording> for Reading {
+impl From<Recording> for LoadedRecording {
     /// A recording made in memory: its rows are samples, counted from 1.
     fn from(recording: Recording) -> Self {
         let rows = vec![Rows::default(); recording.tracks.len()];

@@ -48,7 +48,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn middles() {
+    fn medians_and_quantiles_are_those_of_sorted_values() {
         assert_eq!(median(&mut [3.0, 1.0, 2.0]), 2.0);
         assert_eq!(quantile(&mut [4.0, 3.0, 1.0, 2.0, 5.0], 1.0), 5.0);
         assert!(median(&mut []).is_nan());

@@ -4,7 +4,7 @@ use thiserror::Error;
 
 /// One recorded trajectory of `n` coordinates: positions at increasing times, and what else was measured.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Track {
+pub struct RecordedTrajectory {
     /// Where it comes from, such as a file's name.
     pub name: String,
     /// Times of the samples in s, strictly increasing, `(samples)`.
@@ -27,13 +27,13 @@ pub struct Recording {
     /// Which coordinates are angles, in rad.
     pub periodic: Vec<bool>,
     /// The trajectories.
-    pub tracks: Vec<Track>,
+    pub tracks: Vec<RecordedTrajectory>,
 }
 
 /// Why numbers do not make a trajectory.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
-pub enum TrackError {
+pub enum TrajectoryError {
     /// Lengths disagree.
     #[error("{track}: {what}: expected {}, found {found}", crate::names::counted(*expected, "number", "numbers"))]
     Shape {
@@ -66,7 +66,7 @@ pub enum TrackError {
     },
 }
 
-impl Track {
+impl RecordedTrajectory {
     /// Number of samples.
     pub fn len(&self) -> usize {
         self.times.len()
@@ -80,8 +80,8 @@ impl Track {
     /// Checks shapes for `n` coordinates, finiteness and the order of times.
     ///
     /// # Errors
-    /// The first [`TrackError`].
-    pub fn validate(&self, n: usize) -> Result<(), TrackError> {
+    /// The first [`TrajectoryError`].
+    pub fn validate(&self, n: usize) -> Result<(), TrajectoryError> {
         let track = || self.name.clone();
         let expected = self.len() * n;
         for (what, values, optional) in [
@@ -91,17 +91,17 @@ impl Track {
             ("forces", &self.force, true),
         ] {
             if values.len() != expected && !(optional && values.is_empty()) {
-                return Err(TrackError::Shape { track: track(), what, expected, found: values.len() });
+                return Err(TrajectoryError::Shape { track: track(), what, expected, found: values.len() });
             }
             if let Some(at) = values.iter().position(|x| !x.is_finite()) {
-                return Err(TrackError::NotFinite { track: track(), what, sample: at / n.max(1) });
+                return Err(TrajectoryError::NotFinite { track: track(), what, sample: at / n.max(1) });
             }
         }
         if let Some(sample) = self.times.iter().position(|t| !t.is_finite()) {
-            return Err(TrackError::NotFinite { track: track(), what: "time", sample });
+            return Err(TrajectoryError::NotFinite { track: track(), what: "time", sample });
         }
         match self.times.windows(2).position(|pair| pair[1] <= pair[0]) {
-            Some(at) => Err(TrackError::Order { track: track(), sample: at + 1 }),
+            Some(at) => Err(TrajectoryError::Order { track: track(), sample: at + 1 }),
             None => Ok(()),
         }
     }
@@ -125,7 +125,7 @@ impl Recording {
 
     /// Samples of all trajectories.
     pub fn samples(&self) -> usize {
-        self.tracks.iter().map(Track::len).sum()
+        self.tracks.iter().map(RecordedTrajectory::len).sum()
     }
 }
 
@@ -135,7 +135,7 @@ mod tests {
 
     #[test]
     fn what_is_wrong_is_named() {
-        let good = Track {
+        let good = RecordedTrajectory {
             name: "swing".into(),
             times: vec![0.0, 0.1, 0.2],
             q: vec![1.0, 2.0, 1.1, 2.1, 1.2, 2.2],
@@ -144,11 +144,11 @@ mod tests {
             force: vec![],
         };
         assert_eq!(good.validate(2), Ok(()));
-        let short = Track { v: vec![0.0; 4], ..good.clone() };
+        let short = RecordedTrajectory { v: vec![0.0; 4], ..good.clone() };
         assert_eq!(short.validate(2).unwrap_err().to_string(), "swing: velocities: expected 6 numbers, found 4");
-        let late = Track { times: vec![0.0, 0.1, 0.1], ..good.clone() };
-        assert_eq!(late.validate(2), Err(TrackError::Order { track: "swing".into(), sample: 2 }));
-        let broken = Track { q: vec![1.0, 2.0, f64::NAN, 2.1, 1.2, 2.2], ..good };
+        let late = RecordedTrajectory { times: vec![0.0, 0.1, 0.1], ..good.clone() };
+        assert_eq!(late.validate(2), Err(TrajectoryError::Order { track: "swing".into(), sample: 2 }));
+        let broken = RecordedTrajectory { q: vec![1.0, 2.0, f64::NAN, 2.1, 1.2, 2.2], ..good };
         assert!(broken.validate(2).unwrap_err().to_string().contains("positions of sample 1"));
     }
 }

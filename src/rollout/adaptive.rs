@@ -1,7 +1,7 @@
 //! Steps under error control, piece by piece where a force from outside is not smooth.
 
 use super::force::{Piece, pieces};
-use super::keep::{Keep, typed};
+use super::keep::{Keep, into_error};
 use super::ode::{Adaptive, Ended, Ran, Task};
 use super::samples::{Part, Samples, Times};
 use super::{Domain, Failure, Force, Integrable, Options, RolloutError, Statistics, UnderflowCause};
@@ -129,7 +129,7 @@ fn stopped<S: Integrable>(
         None => left(motion.options.domain.as_ref(), reached, t, state),
         Some(Ended::Stopped) => Some(RolloutError::Stopped { t }),
         Some(Ended::TooManySteps) => Some(RolloutError::TooManySteps { t, steps: motion.options.max_steps }),
-        Some(Ended::Failed(failure)) => Some(typed(failure, t, state, step)),
+        Some(Ended::Failed(failure)) => Some(into_error(failure, t, state, step)),
         Some(Ended::Underflow) => {
             let mut slope = vec![S::nan(); reached.len()];
             let largest_acceleration = match motion.derivative(piece, elapsed, reached, &mut slope) {

@@ -3,7 +3,7 @@
 use super::compensated::{Compensated, State};
 use super::force::{Piece, pieces};
 use super::gauss::Gauss;
-use super::keep::{Keep, typed};
+use super::keep::{Keep, into_error};
 use super::phase::Phase;
 use super::samples::{Samples, Times};
 use super::variational::Variational;
@@ -73,7 +73,7 @@ pub(super) fn run<S: Scalar>(
     let start: Vec<S> = q.iter().chain(v).copied().collect();
     let moving = Failure::check(domain, &start).and_then(|()| phase.momentum(q, v));
     let stop = match moving {
-        Err(failure) => Some(typed(failure, options.t0.to_f64(), start.iter().map(|x| x.to_f64()).collect(), 0.0)),
+        Err(failure) => Some(into_error(failure, options.t0.to_f64(), start.iter().map(|x| x.to_f64()).collect(), 0.0)),
         Ok(p) => {
             let state = State { q: Compensated::new(q.to_vec()), p: Compensated::new(p) };
             let mut position = Position { state, near: v.to_vec(), since: zero, steps: 0, h: zero };
@@ -217,6 +217,6 @@ impl<S: Scalar> Position<S> {
         let v = self.velocity(phase).unwrap_or_else(|_| self.near.clone());
         let state = self.state.q.high.iter().chain(&v).map(|x| x.to_f64()).collect();
         let step = if self.steps == 0 && self.since == <S as Real>::zero() { 0.0 } else { self.h.to_f64() };
-        typed(failure, self.time(options, backwards).to_f64(), state, step)
+        into_error(failure, self.time(options, backwards).to_f64(), state, step)
     }
 }

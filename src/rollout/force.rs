@@ -2,7 +2,7 @@
 
 use super::RolloutError;
 #[cfg(feature = "data")]
-use crate::recording::Track;
+use crate::recording::RecordedTrajectory;
 use crate::scalar::{Real, Scalar};
 use std::cmp::Ordering;
 
@@ -90,7 +90,7 @@ impl<S: Scalar> SampledForce<S> {
 #[cfg(feature = "data")]
 impl SampledForce<f64> {
     /// The known external forces of a recorded trajectory; `None` if there are none.
-    pub fn recorded(track: &Track) -> Option<Self> {
+    pub fn recorded(track: &RecordedTrajectory) -> Option<Self> {
         let n = track.force.len().checked_div(track.len()).filter(|n| *n > 0)?;
         Self::new(n, track.times.clone(), track.force.clone()).ok()
     }

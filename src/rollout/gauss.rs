@@ -17,9 +17,9 @@
 //! stays, and there is no symplectic form to keep.
 
 use super::Failure;
-use super::chord::{Chord, Equations};
 use super::compensated::State;
 use super::phase::{Defect, Derivatives, Phase};
+use super::simplified_newton::{Equations, SimplifiedNewton};
 use crate::scalar::{Real, Scalar};
 
 /// Nodes `c`, weights `b`, `m_ij = a_ij / b_j`, row-major.
@@ -165,7 +165,7 @@ impl<S: Scalar> Equations<S> for Stages<'_, S> {
 #[derive(Clone, Debug)]
 pub(super) struct Gauss<S> {
     tableau: Tableau<S>,
-    chord: Chord<S>,
+    chord: SimplifiedNewton<S>,
     h: S,
     steps: Vec<S>,
     after: Vec<S>,
@@ -197,7 +197,7 @@ impl<S: Scalar> Gauss<S> {
             .collect();
         let vector = vec![zero; s * n];
         Self {
-            chord: Chord::new(s * n),
+            chord: SimplifiedNewton::new(s * n),
             h: zero,
             steps: vec![zero; s],
             after: vec![zero; s],

@@ -33,7 +33,7 @@ impl Failure {
 pub(super) type Keep<'a, S> = dyn FnMut(S, &[S], &[S]) -> bool + 'a;
 
 /// The error of a motion that a step ended.
-pub(super) fn typed(failure: Failure, t: f64, state: Vec<f64>, step: f64) -> RolloutError {
+pub(super) fn into_error(failure: Failure, t: f64, state: Vec<f64>, step: f64) -> RolloutError {
     match failure {
         Failure::Domain { component, value, lower, upper } => {
             RolloutError::LeftDomain { t, state, component, value, lower, upper }

@@ -15,7 +15,6 @@
 
 mod adaptive;
 mod balance;
-mod chord;
 mod compensated;
 mod dense;
 mod driven;
@@ -32,6 +31,7 @@ mod phase;
 mod pieces;
 mod run;
 mod samples;
+mod simplified_newton;
 mod trajectory;
 mod variational;
 

@@ -15,9 +15,9 @@
 //! Source: Marsden and West, Discrete mechanics and variational integrators (2001), 1.3.1 and 2.3.1.
 
 use super::Failure;
-use super::chord::{Chord, Equations};
 use super::compensated::State;
 use super::phase::{Defect, Derivatives, Phase};
+use super::simplified_newton::{Equations, SimplifiedNewton};
 use crate::scalar::{Real, Scalar};
 
 /// `p0 + D1 L_d(q0, q0 + h u) = 0` for the mean velocity `u`.
@@ -73,7 +73,7 @@ impl<S: Scalar> Equations<S> for Discrete<'_, S> {
 /// The integrator with what it keeps from step to step.
 #[derive(Clone, Debug)]
 pub(super) struct Variational<S> {
-    chord: Chord<S>,
+    chord: SimplifiedNewton<S>,
     h: S,
     /// Mean velocities of the last two steps of this size.
     past: [Vec<S>; 2],
@@ -91,7 +91,7 @@ impl<S: Scalar> Variational<S> {
         let zero = <S as Real>::zero();
         let vector = vec![zero; n];
         Self {
-            chord: Chord::new(n),
+            chord: SimplifiedNewton::new(n),
             h: zero,
             past: [vector.clone(), vector.clone()],
             known: 0,

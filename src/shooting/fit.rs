@@ -2,19 +2,19 @@
 
 use crate::configuration::ConfigError;
 use crate::configuration::Penalty;
-use crate::data::{Estimated, Noise};
+use crate::data::{Noise, StateEstimate};
 use crate::network::{Architecture, Layout, NetworkError};
 use crate::random::RngStream;
-use crate::recording::TrackError;
+use crate::recording::TrajectoryError;
 use crate::scalar::Scalar;
-use crate::shooting::objective::Shots;
+use crate::shooting::objective::ShootingObjective;
 use crate::shooting::segments::Segments;
 use crate::shooting::settings::Shooting;
 use crate::shooting::solver::{ShootingProblem, ShootingSolver};
-use crate::training::checkpoint::{Snapshot, Underway};
+use crate::training::checkpoint::{PhaseState, Snapshot};
 use crate::training::epoch::Epoch;
 use crate::training::solver::{Hooks, Saver, TrainingState};
-use crate::training::trainer::{Log, Sitting, Stop, TrainingError};
+use crate::training::trainer::{Log, ResumeOptions, Stop, TrainingError};
 use argmin::core::observers::ObserverMode;
 use argmin::core::{Executor, State, TerminationReason, TerminationStatus};
 use thiserror::Error;
@@ -29,9 +29,9 @@ pub struct Task<'a, S> {
     /// Weights to begin with, of a supervised training on smoothed accelerations for instance.
     pub weights: Vec<S>,
     /// Trajectories to learn from.
-    pub training: &'a [Estimated<'a>],
+    pub training: &'a [StateEstimate<'a>],
     /// Trajectories that choose the best epoch.
-    pub validation: &'a [Estimated<'a>],
+    pub validation: &'a [StateEstimate<'a>],
     /// Noise of the measurements; where there is none, the accuracy that is asked for.
     pub noise: &'a Noise,
     /// Seed of the order of segments.
@@ -71,7 +71,7 @@ pub enum ShootingError {
     Config(#[from] ConfigError),
     /// A trajectory contradicts itself.
     #[error(transparent)]
-    Track(#[from] TrackError),
+    RecordedTrajectory(#[from] TrajectoryError),
     /// The architecture contradicts itself or has another number of weights.
     #[error(transparent)]
     Network(#[from] NetworkError),
@@ -152,7 +152,12 @@ const INTEGRATION_ERROR: f64 = 0.05;
 const PROBES: usize = 64;
 
 /// Root mean square difference of the predictions of two cuts of the same trajectories, in units of noise.
-fn difference<S: Scalar>(shots: &mut Shots<S>, weights: &[S], coarse: &Segments<S>, fine: &Segments<S>) -> f64 {
+fn difference<S: Scalar>(
+    shots: &mut ShootingObjective<S>,
+    weights: &[S],
+    coarse: &Segments<S>,
+    fine: &Segments<S>,
+) -> f64 {
     let rows = coarse.cross_section(PROBES);
     let mut residuals = |segments: &Segments<S>| shots.residuals(weights, segments, segments.starts(), &rows);
     let (coarse, fine) = (residuals(coarse), residuals(fine));
@@ -175,13 +180,13 @@ pub fn fit<S: Scalar>(
     threads: usize,
     hooks: &Hooks,
 ) -> Result<Fitted<S>, ShootingError> {
-    resume(settings, task, threads, hooks, Sitting { keeper: None, start: None })
+    resume(settings, task, threads, hooks, ResumeOptions { keeper: None, start: None })
 }
 
 /// [`fit`] with checkpoints, and from one: the result is that of a fit that was never stopped, but for the times.
 ///
 /// `sitting.start` is the training that gave the task its weights ([`Trained::snapshot`]), or what
-/// [`Keeper::restore`](crate::training::Keeper::restore) found of the same training, task and settings; without it no
+/// [`CheckpointManager::restore`](crate::training::Keeper::restore) found of the same training, task and settings; without it no
 /// checkpoint is written.
 ///
 /// # Errors
@@ -193,13 +198,14 @@ pub fn resume<S: Scalar>(
     task: Task<'_, S>,
     threads: usize,
     hooks: &Hooks,
-    sitting: Sitting<S>,
+    sitting: ResumeOptions<S>,
 ) -> Result<Fitted<S>, ShootingError> {
     settings.validate()?;
     task.check()?;
     let per_segment = settings.samples_per_segment;
-    let mut shots = Shots::new(task.architecture, task.penalty, (settings.continuity, settings.huber), threads)
-        .map_err(TrainingError::from)?;
+    let mut shots =
+        ShootingObjective::new(task.architecture, task.penalty, (settings.continuity, settings.huber), threads)
+            .map_err(TrainingError::from)?;
     let training = match settings.steps {
         Some(steps) => task.cut(TRAINING, per_segment, steps)?,
         None => fine_enough(&mut shots, &task, per_segment)?,
@@ -208,7 +214,7 @@ pub fn resume<S: Scalar>(
     let validation = task.cut(VALIDATION, per_segment, steps)?;
     let segments = (training.len(), training.samples());
     let problem = ShootingProblem { shots, training, validation };
-    let Sitting { keeper, start } = sitting;
+    let ResumeOptions { keeper, start } = sitting;
     let (saver, underway) = match start {
         Some(Snapshot { seconds, ended, underway }) => {
             (keeper.map(|keeper| Saver { keeper, ended, seconds }), underway)
@@ -218,7 +224,7 @@ pub fn resume<S: Scalar>(
     let rng = RngStream::Order(0).generator(task.seed);
     let mut solver = ShootingSolver::new(settings, &problem, rng, hooks, saver);
     let mut state = TrainingState::<S>::new().param(task.weights.clone());
-    if let Some(Underway { course, history, best, best_loss, best_epoch, shooting: Some(shot) }) = underway {
+    if let Some(PhaseState { course, history, best, best_loss, best_epoch, shooting: Some(shot) }) = underway {
         (state.iter, state.last_best_iter) = (course.iteration, best_epoch);
         (state.cost, state.best_cost) = (best_loss, best_loss);
         (state.param, state.best_param) = (Some(best.clone()), Some(best));
@@ -259,7 +265,7 @@ pub fn resume<S: Scalar>(
 /// Tried are an eighth as many steps as a segment has samples, and from there twice as many each time, up to eight per
 /// sample. Weights that move nothing in range, or differ without bound, get one step per sample.
 fn fine_enough<S: Scalar>(
-    shots: &mut Shots<S>,
+    shots: &mut ShootingObjective<S>,
     task: &Task<'_, S>,
     per_segment: usize,
 ) -> Result<Segments<S>, ShootingError> {

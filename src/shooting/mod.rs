@@ -16,7 +16,7 @@
 //! Bock, H. G. (1981), "Numerical treatment of inverse problems in chemical reaction kinetics" (multiple shooting);
 //! Hager, W. W. (2000), "Runge-Kutta methods in optimal control and the transformed adjoint system" (its discrete adjoint).
 //!
-//! [`fit`] does it all; [`Segments`] and [`Shots`] are its parts.
+//! [`fit`] does it all; [`Segments`] and [`ShootingObjective`] are its parts.
 
 mod fit;
 mod integrator;
@@ -32,7 +32,7 @@ mod starts;
 pub use fit::resume;
 pub use fit::{Fitted, ShootingError, Task, fit};
 #[doc(hidden)]
-pub use objective::{ShotReport, Shots};
+pub use objective::{ShootingObjective, ShootingReport};
 #[doc(hidden)]
 pub use segments::Segments;
 pub use settings::Shooting;

@@ -1,6 +1,6 @@
 //! Loss of a batch of segments with its gradient by weights and starts, residuals, and linearisations by the starts.
 //!
-//! A batch is cut into stripes and chunks whose sizes do not depend on the number of threads, and every sum is taken in
+//! A batch is cut into shards and chunks whose sizes do not depend on the number of threads, and every sum is taken in
 //! their order: the same numbers on any number of threads.
 
 use crate::configuration::Penalty;
@@ -12,18 +12,18 @@ use crate::shooting::segments::Segments;
 use crate::shooting::starts::{Curvature, Linearisation};
 use crate::training::ThreadsError;
 use crate::training::objective::threads as start_threads;
-use crate::training::stripes::sum_gradients;
+use crate::training::reduction::sum_gradients;
 use rayon::prelude::*;
 use std::sync::Arc;
 
 /// Segments integrated together.
 const CHUNK: usize = 8;
 /// Stripes a batch is cut into at most; each has its own gradient.
-const STRIPES: usize = 8;
+const SHARDS: usize = 8;
 
 /// Outcome of a batch of segments.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ShotReport<S> {
+pub struct ShootingReport<S> {
     /// Mean of `rho` over the residuals that count, 1 where only noise is left; `NaN` if none does.
     pub loss: S,
     /// Mean of `rho` over the components of the gaps; 0 if there are none.
@@ -39,13 +39,13 @@ pub struct ShotReport<S> {
 }
 
 /// Shoots batches of segments; owns the threads and every buffer.
-pub struct Shots<S> {
+pub struct ShootingObjective<S> {
     model: Model<S>,
     penalty: Penalty,
     huber: Huber<S>,
     continuity: S,
     pool: Arc<rayon::ThreadPool>,
-    stripes: Vec<Stripe<S>>,
+    shards: Vec<Shard<S>>,
 }
 
 /// Segments, their starts `(segments, 2, n)`, and the weights that move them.
@@ -56,10 +56,10 @@ struct Given<'a, S> {
 }
 
 /// A contiguous part of a batch with its own buffers.
-pub(super) struct Stripe<S> {
+pub(super) struct Shard<S> {
     pub integrator: Integrator<S>,
     gradient: Vec<S>,
-    /// Gradients by the starts of the stripe's segments and of those that follow them, `(rows, 2, n)`.
+    /// Gradients by the starts of the shard's segments and of those that follow them, `(rows, 2, n)`.
     start_gradient: Vec<S>,
     next_gradient: Vec<S>,
     /// Residuals, by request.
@@ -77,7 +77,7 @@ pub(super) struct Stripe<S> {
     left_out: usize,
 }
 
-impl<S: Scalar> Stripe<S> {
+impl<S: Scalar> Shard<S> {
     fn new(model: &Model<S>) -> Self {
         Self {
             integrator: Integrator::new(model),
@@ -230,7 +230,7 @@ impl<S: Scalar> Segments<S> {
     }
 }
 
-impl<S: Scalar> Shots<S> {
+impl<S: Scalar> ShootingObjective<S> {
     /// For networks of this shape on `threads` threads; `continuity` and `huber` as in
     /// [`Shooting`](crate::shooting::Shooting).
     ///
@@ -244,7 +244,7 @@ impl<S: Scalar> Shots<S> {
     ) -> Result<Self, ThreadsError> {
         let pool = start_threads(threads)?;
         let (huber, continuity) = (Huber::new(huber), S::of_f64(continuity));
-        Ok(Self { model: architecture.model(), penalty, huber, continuity, pool, stripes: Vec::new() })
+        Ok(Self { model: architecture.model(), penalty, huber, continuity, pool, shards: Vec::new() })
     }
 
     /// The model that is trained.
@@ -257,18 +257,18 @@ impl<S: Scalar> Shots<S> {
         &self.pool
     }
 
-    /// Runs `work` on the chunks of every stripe of `rows`; returns the number of stripes.
-    fn run(&mut self, rows: &[u32], parameters: usize, work: impl Fn(&mut Stripe<S>, &[u32]) + Sync) -> usize {
-        let size = rows.len().div_ceil(CHUNK).div_ceil(STRIPES).max(1) * CHUNK;
+    /// Runs `work` on the chunks of every shard of `rows`; returns the number of shards.
+    fn run(&mut self, rows: &[u32], parameters: usize, work: impl Fn(&mut Shard<S>, &[u32]) + Sync) -> usize {
+        let size = rows.len().div_ceil(CHUNK).div_ceil(SHARDS).max(1) * CHUNK;
         let count = rows.len().div_ceil(size);
-        while self.stripes.len() < count {
-            self.stripes.push(Stripe::new(&self.model));
+        while self.shards.len() < count {
+            self.shards.push(Shard::new(&self.model));
         }
-        let stripes = &mut self.stripes[..count];
+        let shards = &mut self.shards[..count];
         self.pool.install(|| {
-            stripes.par_iter_mut().zip(rows.par_chunks(size)).for_each(|(stripe, rows)| {
-                stripe.reset(parameters);
-                rows.chunks(CHUNK).for_each(|rows| work(stripe, rows));
+            shards.par_iter_mut().zip(rows.par_chunks(size)).for_each(|(shard, rows)| {
+                shard.reset(parameters);
+                rows.chunks(CHUNK).for_each(|rows| work(shard, rows));
             });
         });
         count
@@ -287,7 +287,7 @@ impl<S: Scalar> Shots<S> {
         starts: &[S],
         rows: &[u32],
         (gradient, start_gradient): (&mut [S], &mut [S]),
-    ) -> ShotReport<S> {
+    ) -> ShootingReport<S> {
         let given = Given { weights, segments, starts };
         let (penalty, huber) = (self.penalty, self.huber);
         let all: usize = rows.iter().map(|&row| segments.residuals(row as usize)).sum();
@@ -295,28 +295,28 @@ impl<S: Scalar> Shots<S> {
         let mut shoot = |counted: usize| {
             let weight = count::<S>(counted).recip();
             let continuity = self.continuity * weight;
-            let stripes = self.run(rows, weights.len(), |stripe, rows| {
-                stripe.shoot(&given, rows);
-                stripe.add_losses(&given, rows, huber, (weight, continuity));
-                stripe.add_gradient(weights, (penalty, lambda), segments.n);
+            let shards = self.run(rows, weights.len(), |shard, rows| {
+                shard.shoot(&given, rows);
+                shard.add_losses(&given, rows, huber, (weight, continuity));
+                shard.add_gradient(weights, (penalty, lambda), segments.n);
             });
-            (stripes, self.stripes[..stripes].iter().map(|stripe| stripe.counted).sum())
+            (shards, self.shards[..shards].iter().map(|shard| shard.counted).sum())
         };
-        let (mut stripes, counted) = shoot(all);
+        let (mut shards, counted) = shoot(all);
         if 0 < counted && counted < all {
             // How many residuals count is known only now.
-            (stripes, _) = shoot(counted);
+            (shards, _) = shoot(counted);
         }
-        sum_gradients(&self.pool, &self.stripes[..stripes], |stripe| &stripe.gradient, gradient);
-        self.gather_starts(stripes, rows, segments, start_gradient);
-        self.report(stripes)
+        sum_gradients(&self.pool, &self.shards[..shards], |shard| &shard.gradient, gradient);
+        self.gather_starts(shards, rows, segments, start_gradient);
+        self.report(shards)
     }
 
     /// Gradients by the starts of the segments `rows` and of those that follow them.
-    fn gather_starts(&self, stripes: usize, rows: &[u32], segments: &Segments<S>, start_gradient: &mut [S]) {
+    fn gather_starts(&self, shards: usize, rows: &[u32], segments: &Segments<S>, start_gradient: &mut [S]) {
         let width = 2 * segments.n;
         start_gradient.fill(<S as Real>::zero());
-        let parts = || self.stripes[..stripes].iter();
+        let parts = || self.shards[..shards].iter();
         let own = parts().flat_map(|part| part.start_gradient.chunks_exact(width));
         let next = parts().flat_map(|part| part.next_gradient.chunks_exact(width));
         for ((&row, own), next) in rows.iter().zip(own).zip(next) {
@@ -333,26 +333,26 @@ impl<S: Scalar> Shots<S> {
     }
 
     /// Loss of the segments `rows`, no gradient.
-    pub fn loss(&mut self, weights: &[S], segments: &Segments<S>, starts: &[S], rows: &[u32]) -> ShotReport<S> {
+    pub fn loss(&mut self, weights: &[S], segments: &Segments<S>, starts: &[S], rows: &[u32]) -> ShootingReport<S> {
         let given = Given { weights, segments, starts };
         let huber = self.huber;
         let zero = <S as Real>::zero();
-        let stripes = self.run(rows, 0, |stripe, rows| {
-            stripe.shoot(&given, rows);
-            stripe.add_losses(&given, rows, huber, (zero, zero));
+        let shards = self.run(rows, 0, |shard, rows| {
+            shard.shoot(&given, rows);
+            shard.add_losses(&given, rows, huber, (zero, zero));
         });
-        self.report(stripes)
+        self.report(shards)
     }
 
     /// Residuals of the segments `rows` in units of noise, sample by sample: positions each with its velocity, if that was
     /// measured; `NaN` for segments that are left out.
     pub fn residuals(&mut self, weights: &[S], segments: &Segments<S>, starts: &[S], rows: &[u32]) -> Vec<S> {
         let given = Given { weights, segments, starts };
-        let stripes = self.run(rows, 0, |stripe, rows| {
-            stripe.shoot(&given, rows);
-            stripe.add_values(segments, rows);
+        let shards = self.run(rows, 0, |shard, rows| {
+            shard.shoot(&given, rows);
+            shard.add_values(segments, rows);
         });
-        self.stripes[..stripes].iter().flat_map(|stripe| stripe.values.iter().copied()).collect()
+        self.shards[..shards].iter().flat_map(|shard| shard.values.iter().copied()).collect()
     }
 
     /// Linearises all segments by their starts, lets `curvature` hold what it is for [`Curvature::correct`], and moves
@@ -364,17 +364,17 @@ impl<S: Scalar> Shots<S> {
         starts: &mut [S],
         curvature: &mut Curvature<S>,
         share: f64,
-    ) -> ShotReport<S> {
+    ) -> ShootingReport<S> {
         let rows: Vec<u32> = (0..segments.len() as u32).collect();
         let given = Given { weights, segments, starts: &*starts };
         let (huber, continuity) = (self.huber, self.continuity);
-        let stripes = self.run(&rows, 0, |stripe, rows| stripe.add_curvature(&given, rows, huber, continuity));
+        let shards = self.run(&rows, 0, |shard, rows| shard.add_curvature(&given, rows, huber, continuity));
         let mut gradient = vec![<S as Real>::zero(); starts.len()];
-        self.gather_starts(stripes, &rows, segments, &mut gradient);
-        let parts = self.stripes[..stripes].iter().map(|s| (s.curvature.as_slice(), s.jacobian.as_slice()));
+        self.gather_starts(shards, &rows, segments, &mut gradient);
+        let parts = self.shards[..shards].iter().map(|s| (s.curvature.as_slice(), s.jacobian.as_slice()));
         curvature.set(segments, parts);
         curvature.correct(segments, starts, &gradient, share);
-        self.report(stripes)
+        self.report(shards)
     }
 
     /// Moves the starts of the segments `rows`, and a little those of their followers, by `share` of a Gauss-Newton step
@@ -390,29 +390,29 @@ impl<S: Scalar> Shots<S> {
         let given = Given { weights, segments, starts: &*starts };
         let (huber, continuity) = (self.huber, self.continuity);
         let held = &*curvature;
-        let stripes = self.run(rows, 0, |stripe, rows| {
-            stripe.add_start_gradients(&given, rows, held, (huber, continuity));
+        let shards = self.run(rows, 0, |shard, rows| {
+            shard.add_start_gradients(&given, rows, held, (huber, continuity));
         });
-        self.gather_starts(stripes, rows, segments, start_gradient);
+        self.gather_starts(shards, rows, segments, start_gradient);
         curvature.correct(segments, starts, start_gradient, share);
     }
 
-    fn report(&self, stripes: usize) -> ShotReport<S> {
+    fn report(&self, shards: usize) -> ShootingReport<S> {
         let (mut residual, mut gap, mut penalty) = (Sum::default(), Sum::default(), Sum::default());
         let (mut counted, mut gaps, mut penalised, mut left_out) = (0, 0, 0, 0);
-        for stripe in &self.stripes[..stripes] {
-            residual.add(stripe.sums[0].value());
-            gap.add(stripe.sums[1].value());
-            penalty.add(stripe.penalty.value());
-            counted += stripe.counted;
-            gaps += stripe.gaps;
-            penalised += stripe.penalised;
-            left_out += stripe.left_out;
+        for shard in &self.shards[..shards] {
+            residual.add(shard.sums[0].value());
+            gap.add(shard.sums[1].value());
+            penalty.add(shard.penalty.value());
+            counted += shard.counted;
+            gaps += shard.gaps;
+            penalised += shard.penalised;
+            left_out += shard.left_out;
         }
         // No residual, no loss: the mean of nothing is not 0.
         let loss = residual.value() / count::<S>(counted);
         let gap = gap.value() / count::<S>(gaps.max(1));
-        ShotReport { loss, gap, penalty: penalty.value(), penalised, left_out, residuals: counted }
+        ShootingReport { loss, gap, penalty: penalty.value(), penalised, left_out, residuals: counted }
     }
 }
 

@@ -5,7 +5,7 @@
 //! of positions and velocities at both, whose error is of the integrator's own order 4. Periodic coordinates are counted
 //! from a multiple of `2 pi` near the segment's start, so that a motion of many turns loses no digits.
 
-use crate::data::{Estimated, Noise};
+use crate::data::{Noise, StateEstimate};
 use crate::network::Architecture;
 use crate::recording::hermite;
 use crate::rollout::SampledForce;
@@ -111,7 +111,7 @@ impl<S: Scalar> Segments<S> {
     /// Samples that stand alone between pauses are left out. Shapes must have been checked.
     pub fn new(
         architecture: &Architecture,
-        trajectories: &[Estimated<'_>],
+        trajectories: &[StateEstimate<'_>],
         noise: &Noise,
         per_segment: usize,
         steps: usize,
@@ -160,7 +160,7 @@ impl<S: Scalar> Segments<S> {
     fn push(
         &mut self,
         architecture: &Architecture,
-        trajectory: &Estimated<'_>,
+        trajectory: &StateEstimate<'_>,
         use_velocity: bool,
         piece: &Piece,
         force: Option<Option<&SampledForce<f64>>>,

@@ -4,11 +4,11 @@ use crate::optimizers::Schedule;
 use crate::optimizers::{Method, Moments, Update};
 use crate::random::RandomGenerator;
 use crate::scalar::{Real, Scalar};
-use crate::shooting::objective::{ShotReport, Shots};
+use crate::shooting::objective::{ShootingObjective, ShootingReport};
 use crate::shooting::segments::Segments;
 use crate::shooting::settings::Shooting;
 use crate::shooting::starts::Curvature;
-use crate::training::checkpoint::{Clock, Course, Keeper, Shot, Underway};
+use crate::training::checkpoint::{CheckpointManager, Clock, OptimizerState, PhaseState, Shot};
 use crate::training::epoch::{Epoch, Means};
 use crate::training::solver::{Hooks, Progress, Saver, TrainingState};
 use argmin::core::{Error, KV, Problem, Solver, State, TerminationReason, TerminationStatus};
@@ -23,7 +23,7 @@ const PREPARATION: usize = 3;
 
 /// Problem of an argmin run.
 pub(super) struct ShootingProblem<S> {
-    pub shots: Shots<S>,
+    pub shots: ShootingObjective<S>,
     pub training: Segments<S>,
     pub validation: Segments<S>,
 }
@@ -39,7 +39,7 @@ impl<S: Scalar> Starts<S> {
         Self { at: segments.starts().to_vec(), curvature: Curvature::default() }
     }
 
-    fn refine(&mut self, shots: &mut Shots<S>, weights: &[S], segments: &Segments<S>) {
+    fn refine(&mut self, shots: &mut ShootingObjective<S>, weights: &[S], segments: &Segments<S>) {
         shots.refine(weights, segments, &mut self.at, &mut self.curvature, 1.0);
     }
 }
@@ -48,7 +48,7 @@ impl<S: Scalar> Starts<S> {
 pub(super) struct ShootingSolver<S> {
     settings: Shooting,
     hooks: Hooks,
-    course: Course<S>,
+    course: OptimizerState<S>,
     gradient: Vec<S>,
     starts: Starts<S>,
     start_gradient: Vec<S>,
@@ -72,7 +72,7 @@ impl<S: Scalar> ShootingSolver<S> {
         hooks: &Hooks,
         saver: Option<Saver<S>>,
     ) -> Self {
-        let mut course = Course::new(rng, problem.training.len());
+        let mut course = OptimizerState::new(rng, problem.training.len());
         course.epoch = saver.as_ref().map_or(0, |saver| saver.ended.history.len());
         Self {
             settings: settings.clone(),
@@ -95,12 +95,13 @@ impl<S: Scalar> ShootingSolver<S> {
     pub fn restore(
         &mut self,
         problem: &ShootingProblem<S>,
-        course: Course<S>,
+        course: OptimizerState<S>,
         history: Vec<Epoch>,
         shot: Shot<S>,
     ) -> Option<()> {
-        let lengths =
-            |course: &Course<S>, starts: &[S], validation: &[S]| [course.order.len(), starts.len(), validation.len()];
+        let lengths = |course: &OptimizerState<S>, starts: &[S], validation: &[S]| {
+            [course.order.len(), starts.len(), validation.len()]
+        };
         let expected = lengths(&self.course, &self.starts.at, &self.validation_starts.at);
         if lengths(&course, &shot.starts, &shot.validation_starts) != expected {
             return None;
@@ -120,13 +121,13 @@ impl<S: Scalar> ShootingSolver<S> {
     }
 
     /// Writes a checkpoint, if somebody keeps them and one is due.
-    fn save_if(&self, state: &TrainingState<S>, is_due: impl Fn(&Keeper) -> bool) {
+    fn save_if(&self, state: &TrainingState<S>, is_due: impl Fn(&CheckpointManager) -> bool) {
         let Some(Saver { keeper, ended, seconds }) = self.saver.as_ref().filter(|saver| is_due(&saver.keeper)) else {
             return;
         };
         let best = state.get_best_param().or(state.get_param());
         let (matrices, jacobian) = self.starts.curvature.stored();
-        let underway = Underway {
+        let underway = PhaseState {
             course: self.course.clone(),
             history: self.history.clone(),
             best: best.unwrap_or(&ended.weights).clone(),
@@ -167,7 +168,7 @@ impl<S: Scalar> ShootingSolver<S> {
 
     /// One update of the weights and of the starts of the segments `rows` of the order.
     fn take_step(&mut self, problem: &mut ShootingProblem<S>, rows: std::ops::Range<usize>, rate: f64, steps: usize) {
-        let Course { order, weights, moments, means, step, .. } = &mut self.course;
+        let OptimizerState { order, weights, moments, means, step, .. } = &mut self.course;
         *step += 1;
         let step = *step;
         let ShootingProblem { shots, training, .. } = problem;
@@ -176,7 +177,7 @@ impl<S: Scalar> ShootingSolver<S> {
         let share = self.settings.start_share;
         shots.settle(weights, training, (at, rows), (curvature, &mut self.start_gradient), share);
         let gradients = (self.gradient.as_mut_slice(), self.start_gradient.as_mut_slice());
-        let report: ShotReport<S> = shots.step(weights, training, &self.starts.at, rows, gradients);
+        let report: ShootingReport<S> = shots.step(weights, training, &self.starts.at, rows, gradients);
         means.left_out += report.left_out;
         let settings = &self.settings;
         let update = Update {
@@ -230,7 +231,7 @@ impl<S: Scalar> Solver<ShootingProblem<S>, TrainingState<S>> for ShootingSolver<
         if self.restored {
             return Ok((state, None));
         }
-        let Course { weights, moments, .. } = &mut self.course;
+        let OptimizerState { weights, moments, .. } = &mut self.course;
         if let Some(given) = state.get_param() {
             weights.clone_from(given);
         }
@@ -258,7 +259,7 @@ impl<S: Scalar> Solver<ShootingProblem<S>, TrainingState<S>> for ShootingSolver<
             if self.course.iteration.is_multiple_of(self.settings.curvature_every as u64) {
                 self.starts.refine(&mut problem.shots, &self.course.weights, &problem.training);
             }
-            let Course { order, rng, means, .. } = &mut self.course;
+            let OptimizerState { order, rng, means, .. } = &mut self.course;
             order.shuffle(rng);
             (*means, self.gap) = (Means::default(), 0.0);
         }
@@ -273,7 +274,7 @@ impl<S: Scalar> Solver<ShootingProblem<S>, TrainingState<S>> for ShootingSolver<
             if self.interrupted() {
                 return Ok((state, None));
             }
-            self.save_if(&state, Keeper::is_due);
+            self.save_if(&state, CheckpointManager::is_due);
         }
         let means = std::mem::take(&mut self.course.means);
         self.course.batch = 0;

@@ -4,7 +4,7 @@ use crate::configuration::Regularizer;
 use crate::configuration::{Config, Precision};
 use crate::network::{Architecture, Layout};
 use crate::optimizers::eigenbasis_numbers;
-use crate::training::objective::{CHUNK, STRIPES};
+use crate::training::objective::{CHUNK, SHARDS};
 
 /// Vectors of all weights that training holds: weights, gradient, two moments, average, the best of the phase and of those
 /// before (each twice), the last two that were validated, and the start.
@@ -27,9 +27,9 @@ const POLISH: u64 = 14;
 /// - weights: `(12 + 24) s P`, the second for writing a checkpoint;
 /// - eigenbases of SOAP: `s (4 r + 2 m)` with `r` numbers in the squares over the sides of all weight matrices and `m` in the
 ///   matrices, and `8 s r` for writing a checkpoint;
-/// - stripes: `s (P + 64 j (w (2 c + 21) + 4 f c + 10 n^2 + 20 n + 6 K))` for each of the up to 8 parts of a batch, `c = n + 2`
+/// - shards: `s (P + 64 j (w (2 c + 21) + 4 f c + 10 n^2 + 20 n + 6 K))` for each of the up to 8 parts of a batch, `c = n + 2`
 ///   channels and `j` evaluations side by side, 1 without penalty and 2 with one, the latter with `n^2` more numbers per state;
-/// - polishing with memory `m`, which makes `s = 8` in the stripes: `24 n (N + V) + 4 N + 8 P (2 m + 14)`.
+/// - polishing with memory `m`, which makes `s = 8` in the shards: `24 n (N + V) + 4 N + 8 P (2 m + 14)`.
 pub fn training_memory(config: &Config, architecture: &Architecture) -> Option<u64> {
     let layout = Layout::new(architecture);
     let number = match config.precision {
@@ -56,8 +56,8 @@ pub fn training_memory(config: &Config, architecture: &Architecture) -> Option<u
 
     let largest = (data.training.min(config.optimizer.batch)).max(data.validation).max(data.test);
     let largest = if config.polish.is_some() { largest.max(data.training) } else { largest } as u64;
-    let stripes = largest.div_ceil(CHUNK as u64).min(STRIPES as u64);
-    let batch = largest.div_ceil(STRIPES as u64).max(CHUNK as u64);
+    let shards = largest.div_ceil(CHUNK as u64).min(SHARDS as u64);
+    let batch = largest.div_ceil(SHARDS as u64).max(CHUNK as u64);
     let (channels, penalised) = (n + 2, !matches!(config.penalty, Regularizer::None));
     let evaluations = if penalised { 2 } else { 1 };
     let square = product([n, n])?;
@@ -83,7 +83,7 @@ pub fn training_memory(config: &Config, architecture: &Architecture) -> Option<u
         states,
         bases,
         product([(VECTORS + CHECKPOINT) * number, weights]),
-        product([wide, stripes, of_stripe?]),
+        product([wide, shards, of_stripe?]),
         polish,
     ])
 }

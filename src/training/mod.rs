@@ -7,14 +7,14 @@ pub(crate) mod objective;
 mod polish;
 mod problem;
 mod recipe;
+pub(crate) mod reduction;
 pub(crate) mod solver;
-pub(crate) mod stripes;
 pub(crate) mod trainer;
 pub(crate) mod violations;
 
-pub use checkpoint::{CheckpointError, Every, NEWEST, PREVIOUS};
+pub use checkpoint::{CheckpointError, Every, LATEST, PREVIOUS};
 #[doc(hidden)]
-pub use checkpoint::{Identity, Keeper, Restored, Saved, Snapshot, remove_checkpoints, saved};
+pub use checkpoint::{CheckpointManager, Identity, Restored, Saved, Snapshot, remove_checkpoints, saved};
 pub use epoch::Epoch;
 #[doc(hidden)]
 pub use memory::training_memory;
@@ -23,5 +23,5 @@ pub use problem::TrainingProblem;
 pub use recipe::{Outcome, RecipeError, run};
 pub use solver::{EpochSolver, Hooks, Progress, StepError, TrainingState, Watcher};
 #[doc(hidden)]
-pub use trainer::{Sitting, resume};
+pub use trainer::{ResumeOptions, resume};
 pub use trainer::{Stop, Trained, TrainingError, train};

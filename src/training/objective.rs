@@ -8,7 +8,7 @@
 //! are any. A loss `l(a)` depends on the parameters of `D` by `dl = -lam.d(dD/dv)`, `lam = M^-1 dl/da`; those of `L` enter as
 //! without friction, at the `a` that has it.
 //!
-//! A batch is cut into stripes and chunks whose sizes do not depend on the number of threads, and every sum is taken in
+//! A batch is cut into shards and chunks whose sizes do not depend on the number of threads, and every sum is taken in
 //! their order: the same numbers on any number of threads.
 
 use crate::configuration::Penalty;
@@ -21,7 +21,7 @@ use crate::linalg::{
 use crate::network::{Architecture, Dynamics, Model};
 use crate::scalar::{Real, Scalar, Sum};
 use crate::tape::{Depth, MixedDirections, STATES};
-use crate::training::stripes::sum_gradients;
+use crate::training::reduction::sum_gradients;
 use crate::training::violations::Violations;
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -29,7 +29,7 @@ use std::sync::Arc;
 /// States evaluated together.
 pub(crate) const CHUNK: usize = STATES;
 /// Stripes a batch is cut into at most; each has its own gradient.
-pub(crate) const STRIPES: usize = 8;
+pub(crate) const SHARDS: usize = 8;
 
 /// Outcome of a batch.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -70,7 +70,7 @@ pub struct Objective<S> {
     model: Model<S>,
     penalty: Penalty,
     pool: Arc<rayon::ThreadPool>,
-    stripes: Vec<Stripe<S>>,
+    shards: Vec<Shard<S>>,
 }
 
 /// Threads for all that a run computes.
@@ -93,7 +93,7 @@ pub struct ThreadsError {
 }
 
 /// A contiguous part of a batch with its own buffers.
-struct Stripe<S> {
+struct Shard<S> {
     dynamics: Dynamics<S>,
     directions: MixedDirections<S>,
     violations: Violations<S>,
@@ -116,7 +116,7 @@ struct Stripe<S> {
     failure: Option<Failure>,
 }
 
-impl<S: Scalar> Stripe<S> {
+impl<S: Scalar> Shard<S> {
     fn new(model: &Model<S>) -> Self {
         Self {
             dynamics: Dynamics::new(model),
@@ -358,7 +358,7 @@ impl<S: Scalar> Objective<S> {
 
     /// An objective for any model on threads that others use too.
     pub(crate) fn on(pool: Arc<rayon::ThreadPool>, model: Model<S>, penalty: Penalty) -> Self {
-        Self { model, penalty, pool, stripes: Vec::new() }
+        Self { model, penalty, pool, shards: Vec::new() }
     }
 
     /// The model that is trained.
@@ -371,17 +371,17 @@ impl<S: Scalar> Objective<S> {
         &self.pool
     }
 
-    /// Runs `work` on every stripe of `rows`, at most [`STRIPES`] of whole chunks each.
-    fn run(&mut self, rows: &[u32], work: impl Fn(&mut Stripe<S>, &[u32]) + Sync) -> usize {
+    /// Runs `work` on every shard of `rows`, at most [`SHARDS`] of whole chunks each.
+    fn run(&mut self, rows: &[u32], work: impl Fn(&mut Shard<S>, &[u32]) + Sync) -> usize {
         let chunks = rows.len().div_ceil(CHUNK);
-        let size = chunks.div_ceil(STRIPES) * CHUNK;
+        let size = chunks.div_ceil(SHARDS) * CHUNK;
         let count = rows.len().div_ceil(size);
-        while self.stripes.len() < count {
-            self.stripes.push(Stripe::new(&self.model));
+        while self.shards.len() < count {
+            self.shards.push(Shard::new(&self.model));
         }
-        let stripes = &mut self.stripes[..count];
+        let shards = &mut self.shards[..count];
         self.pool.install(|| {
-            stripes.par_iter_mut().zip(rows.par_chunks(size)).for_each(|(stripe, rows)| work(stripe, rows));
+            shards.par_iter_mut().zip(rows.par_chunks(size)).for_each(|(shard, rows)| work(shard, rows));
         });
         count
     }
@@ -393,70 +393,70 @@ impl<S: Scalar> Objective<S> {
     pub fn step(&mut self, weights: &[S], data: &Dataset<S>, rows: &[u32], gradient: &mut [S]) -> BatchReport<S> {
         let penalty = self.penalty;
         let lambda = S::of_f64(penalty.lambda()) / S::of_f64(rows.len() as f64);
-        let mut stripes = self.evaluate(weights, data, rows, rows.len(), lambda);
-        let counted = rows.len() - self.left_out(stripes);
+        let mut shards = self.evaluate(weights, data, rows, rows.len(), lambda);
+        let counted = rows.len() - self.left_out(shards);
         if 0 < counted && counted < rows.len() {
             // How many count is known only now; to repeat the few batches that leave states out is cheaper than to keep
             // the gradients of loss and penalty apart in all.
-            stripes = self.evaluate(weights, data, rows, counted, lambda);
+            shards = self.evaluate(weights, data, rows, counted, lambda);
         }
         if let Penalty::Sylvester { time, .. } = penalty
-            && self.stripes[..stripes].iter().any(|stripe| !stripe.suspects.is_empty())
+            && self.shards[..shards].iter().any(|shard| !shard.suspects.is_empty())
         {
-            let scales = self.scales(stripes, data.coordinates());
-            self.run(rows, |stripe, rows| stripe.add_sylvester(weights, data, rows, &scales, (lambda, time)));
+            let scales = self.scales(shards, data.coordinates());
+            self.run(rows, |shard, rows| shard.add_sylvester(weights, data, rows, &scales, (lambda, time)));
         }
-        let stripes = &self.stripes[..stripes];
-        sum_gradients(&self.pool, stripes, |stripe| &stripe.gradient, gradient);
-        self.report(stripes.len(), rows.len(), data.coordinates())
+        let shards = &self.shards[..shards];
+        sum_gradients(&self.pool, shards, |shard| &shard.gradient, gradient);
+        self.report(shards.len(), rows.len(), data.coordinates())
     }
 
     /// Sums of loss, penalty and gradient over the batch, of which `counted` states are not left out; Sylvester's penalty
-    /// apart. Returns the number of stripes.
+    /// apart. Returns the number of shards.
     fn evaluate(&mut self, weights: &[S], data: &Dataset<S>, rows: &[u32], counted: usize, lambda: S) -> usize {
         let weight = (S::of_f64(2.0 * data.coordinates() as f64) * S::of_f64(counted as f64)).recip();
         let penalty = self.penalty;
-        self.run(rows, |stripe, rows| {
-            stripe.reset(weights.len());
+        self.run(rows, |shard, rows| {
+            shard.reset(weights.len());
             for rows in rows.chunks(CHUNK) {
-                stripe.add_chunk(weights, data, rows, weight, (penalty, lambda));
+                shard.add_chunk(weights, data, rows, weight, (penalty, lambda));
             }
-            stripe.violations.add_gradient(weights, true, &mut stripe.gradient);
+            shard.violations.add_gradient(weights, true, &mut shard.gradient);
         })
     }
 
-    /// States that the stripes left out.
-    fn left_out(&self, stripes: usize) -> usize {
-        self.stripes[..stripes].iter().map(|stripe| stripe.left_out).sum()
+    /// States that the shards left out.
+    fn left_out(&self, shards: usize) -> usize {
+        self.shards[..shards].iter().map(|shard| shard.left_out).sum()
     }
 
-    /// Characteristic scales of the batch that the stripes hold.
-    fn scales(&self, stripes: usize, n: usize) -> Vec<S> {
-        let diagonals: Vec<S> = self.stripes[..stripes].iter().flat_map(|s| s.diagonal.iter().copied()).collect();
+    /// Characteristic scales of the batch that the shards hold.
+    fn scales(&self, shards: usize, n: usize) -> Vec<S> {
+        let diagonals: Vec<S> = self.shards[..shards].iter().flat_map(|s| s.diagonal.iter().copied()).collect();
         characteristic_scales(n, &diagonals)
     }
 
     /// Loss of a whole dataset, no gradient.
     pub fn loss(&mut self, weights: &[S], data: &Dataset<S>) -> BatchReport<S> {
         let rows: Vec<u32> = (0..data.len() as u32).collect();
-        let stripes = self.run(&rows, |stripe, rows| {
-            stripe.reset(0);
+        let shards = self.run(&rows, |shard, rows| {
+            shard.reset(0);
             for rows in rows.chunks(CHUNK) {
-                stripe.add_losses(weights, data, rows);
+                shard.add_losses(weights, data, rows);
             }
         });
-        self.report(stripes, rows.len(), data.coordinates())
+        self.report(shards, rows.len(), data.coordinates())
     }
 
-    fn report(&self, stripes: usize, states: usize, n: usize) -> BatchReport<S> {
+    fn report(&self, shards: usize, states: usize, n: usize) -> BatchReport<S> {
         let (mut residual, mut penalty) = (Sum::default(), Sum::default());
         let (mut penalised, mut left_out, mut failure) = (0, 0, None);
-        for stripe in &self.stripes[..stripes] {
-            residual.add(stripe.residual.value());
-            penalty.add(stripe.violations.penalty.value());
-            penalised += stripe.violations.count;
-            left_out += stripe.left_out;
-            failure = failure.or(stripe.failure);
+        for shard in &self.shards[..shards] {
+            residual.add(shard.residual.value());
+            penalty.add(shard.violations.penalty.value());
+            penalised += shard.violations.count;
+            left_out += shard.left_out;
+            failure = failure.or(shard.failure);
         }
         // No state, no loss: the mean of nothing is not 0.
         let loss = residual.value() / S::of_f64((2 * n * (states - left_out)) as f64);

@@ -9,7 +9,7 @@ use crate::optimizers::Schedule;
 use crate::optimizers::{Moments, Update};
 use crate::random::RandomGenerator;
 use crate::scalar::{Real, Scalar};
-use crate::training::checkpoint::{Clock, Course, Ended, Keeper, Underway};
+use crate::training::checkpoint::{CheckpointManager, Clock, Ended, OptimizerState, PhaseState};
 use crate::training::epoch::{Epoch, Means};
 use crate::training::objective::Failure;
 use crate::training::problem::TrainingProblem;
@@ -91,7 +91,7 @@ pub struct EpochSolver<S> {
     optimizer: Optimizer,
     phase: Phase,
     phase_number: usize,
-    course: Course<S>,
+    course: OptimizerState<S>,
     /// `true` if the course began in an earlier sitting.
     restored: bool,
     gradient: Vec<S>,
@@ -105,7 +105,7 @@ pub struct EpochSolver<S> {
 
 /// Who keeps the checkpoints, and what went before this phase.
 pub(crate) struct Saver<S> {
-    pub(crate) keeper: Arc<Keeper>,
+    pub(crate) keeper: Arc<CheckpointManager>,
     pub(crate) ended: Ended<S>,
     /// Seconds of what went before, where that has a clock of its own.
     pub(crate) seconds: f64,
@@ -143,7 +143,7 @@ impl<S: Scalar> EpochSolver<S> {
             optimizer,
             phase,
             phase_number: 1,
-            course: Course::new(rng, states),
+            course: OptimizerState::new(rng, states),
             restored: false,
             gradient: Vec::new(),
             steps,
@@ -158,12 +158,12 @@ impl<S: Scalar> EpochSolver<S> {
     /// Makes this phase a part of a longer run.
     pub(crate) fn within(self, run: Run<S>) -> Self {
         let Run { phase_number, epoch, step, steps, clock, hooks, saver } = run;
-        let course = Course { epoch, step, ..self.course };
+        let course = OptimizerState { epoch, step, ..self.course };
         Self { phase_number, steps, clock, hooks, saver, course, ..self }
     }
 
     /// Goes on from where an earlier sitting was.
-    pub(crate) fn restored(self, course: Course<S>, history: Vec<Epoch>) -> Self {
+    pub(crate) fn restored(self, course: OptimizerState<S>, history: Vec<Epoch>) -> Self {
         Self { course, history, restored: true, ..self }
     }
 
@@ -199,7 +199,7 @@ impl<S: Scalar> EpochSolver<S> {
         rows: std::ops::Range<usize>,
         rate: f64,
     ) -> Result<(), StepError> {
-        let Course { order, weights, moments, means, step, .. } = &mut self.course;
+        let OptimizerState { order, weights, moments, means, step, .. } = &mut self.course;
         *step += 1;
         let step = *step;
         let rows = &order[rows];
@@ -250,7 +250,7 @@ impl<S: Scalar> EpochSolver<S> {
         if self.optimizer.averaging == 0.0 {
             return;
         }
-        let Course { weights, average, averaged_steps, .. } = &mut self.course;
+        let OptimizerState { weights, average, averaged_steps, .. } = &mut self.course;
         *averaged_steps += 1;
         let keep = self.optimizer.averaging.min(1.0 - 1.0 / *averaged_steps as f64);
         let take = S::of_f64(1.0 - keep);
@@ -270,12 +270,12 @@ impl<S: Scalar> EpochSolver<S> {
     }
 
     /// Writes a checkpoint, if somebody keeps them and one is due.
-    fn save_if(&self, state: &TrainingState<S>, is_due: impl Fn(&Keeper) -> bool) {
+    fn save_if(&self, state: &TrainingState<S>, is_due: impl Fn(&CheckpointManager) -> bool) {
         let Some(Saver { keeper, ended, .. }) = self.saver.as_ref().filter(|saver| is_due(&saver.keeper)) else {
             return;
         };
         let best = state.get_best_param().or(state.get_param());
-        let underway = Underway {
+        let underway = PhaseState {
             course: self.course.clone(),
             history: self.history.clone(),
             best: best.unwrap_or(&ended.weights).clone(),
@@ -320,7 +320,7 @@ impl<'a, S: Scalar> Solver<TrainingProblem<'a, S>, TrainingState<S>> for EpochSo
         self.gradient.resize(self.course.weights.len(), <S as Real>::zero());
         let begun: f64 = self.course.iteration as f64;
         if self.course.batch == 0 {
-            let Course { order, rng, means, .. } = &mut self.course;
+            let OptimizerState { order, rng, means, .. } = &mut self.course;
             order.shuffle(rng);
             *means = Means::default();
         }
@@ -343,7 +343,7 @@ impl<'a, S: Scalar> Solver<TrainingProblem<'a, S>, TrainingState<S>> for EpochSo
             if self.hooks.interrupt.load(Ordering::Relaxed) {
                 return Ok((state, None));
             }
-            self.save_if(&state, Keeper::is_due);
+            self.save_if(&state, CheckpointManager::is_due);
         }
         let means = std::mem::take(&mut self.course.means);
         self.course.batch = 0;

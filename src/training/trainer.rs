@@ -6,7 +6,7 @@ use crate::data::{Dataset, Datasets};
 use crate::network::{Architecture, initial_weights};
 use crate::random::RngStream;
 use crate::scalar::Scalar;
-use crate::training::checkpoint::{Clock, Ended, Keeper, Snapshot, Underway};
+use crate::training::checkpoint::{CheckpointManager, Clock, Ended, PhaseState, Snapshot};
 use crate::training::epoch::Epoch;
 use crate::training::objective::{self, BatchReport, Objective, ThreadsError};
 use crate::training::polish::{Start, polish};
@@ -96,10 +96,10 @@ pub enum TrainingError {
 }
 
 /// Where a training keeps its checkpoints and what it goes on from.
-pub struct Sitting<S> {
+pub struct ResumeOptions<S> {
     /// Keeps checkpoints, if anybody does.
-    pub keeper: Option<Arc<Keeper>>,
-    /// The checkpoint that [`Keeper::restore`] found, or nothing for a training from its beginning.
+    pub keeper: Option<Arc<CheckpointManager>>,
+    /// The checkpoint that [`CheckpointManager::restore`] found, or nothing for a training from its beginning.
     pub start: Option<Snapshot<S>>,
 }
 
@@ -117,12 +117,12 @@ pub fn train<S: Scalar>(
     threads: usize,
     hooks: &Hooks,
 ) -> Result<Trained<S>, TrainingError> {
-    resume(config, architecture, penalty, data, threads, hooks, Sitting { keeper: None, start: None })
+    resume(config, architecture, penalty, data, threads, hooks, ResumeOptions { keeper: None, start: None })
 }
 
 /// [`train`] with checkpoints, and from one: the result is that of a training that was never stopped, but for the times.
 ///
-/// A checkpoint must be of the same configuration and data, which [`Keeper::restore`] sees to.
+/// A checkpoint must be of the same configuration and data, which [`CheckpointManager::restore`] sees to.
 ///
 /// # Errors
 /// As [`train`].
@@ -133,7 +133,7 @@ pub fn resume<S: Scalar>(
     data: Datasets<S>,
     threads: usize,
     hooks: &Hooks,
-    sitting: Sitting<S>,
+    sitting: ResumeOptions<S>,
 ) -> Result<Trained<S>, TrainingError> {
     config.validate(architecture.coordinates)?;
     let (phases, found) = (config.phases.len(), data.training.len());
@@ -146,7 +146,7 @@ pub fn resume<S: Scalar>(
     let batches = |states: usize| states.div_ceil(config.optimizer.batch.min(states));
     let pairs = || config.phases.iter().zip(&data.training);
     let steps = pairs().map(|(phase, data)| phase.epochs * batches(data.len())).sum();
-    let Sitting { keeper, start } = sitting;
+    let ResumeOptions { keeper, start } = sitting;
     let Snapshot { seconds, mut ended, mut underway } = start.unwrap_or_else(|| {
         let mut rng = RngStream::Weights.generator(config.seed);
         let weights = initial_weights(architecture, config.network.initialization, &mut rng);
@@ -243,11 +243,11 @@ fn run_phase<S: Scalar>(
     mut solver: EpochSolver<S>,
     (phase, batch): (&Phase, usize),
     ended: &mut Ended<S>,
-    underway: Option<Underway<S>>,
+    underway: Option<PhaseState<S>>,
 ) -> Result<Stop, TrainingError> {
     let states = problem.training().len();
     let mut state = TrainingState::<S>::new().param(ended.weights.clone());
-    if let Some(Underway { course, history, best, best_loss, best_epoch, .. }) = underway {
+    if let Some(PhaseState { course, history, best, best_loss, best_epoch, .. }) = underway {
         solver = solver.restored(course, history);
         state.iter = solver.iteration();
         state.last_best_iter = best_epoch;

@@ -5,7 +5,7 @@ use lnn::configuration::Config;
 use lnn::lagrangian::configure;
 use lnn::presets::Preset;
 use lnn::storage::Disk;
-use lnn::training::{NEWEST, PREVIOUS, saved};
+use lnn::training::{LATEST, PREVIOUS, saved};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde_json::Value;
@@ -113,7 +113,7 @@ fn survive(case: &Case, kills: usize, seed: u64) {
     let (mut done, mut finished) = (0, 0);
     while done < kills {
         // From its beginning again when it has come to its end, so that every stretch of it is hit.
-        let go_on = killed.join(NEWEST).exists() || killed.join(PREVIOUS).exists();
+        let go_on = killed.join(LATEST).exists() || killed.join(PREVIOUS).exists();
         let arguments = if go_on { resume(&killed) } else { start(&killed) };
         let mut child = lnn(&arguments.iter().map(String::as_str).collect::<Vec<_>>());
         std::thread::sleep(Duration::from_secs_f64(span.as_secs_f64() * random.random_range(0.0..0.6)));
@@ -131,7 +131,7 @@ fn survive(case: &Case, kills: usize, seed: u64) {
             None if status.success() => finished += 1,
             None => done += 1,
         }
-        if killed.join(NEWEST).exists() || killed.join(PREVIOUS).exists() {
+        if killed.join(LATEST).exists() || killed.join(PREVIOUS).exists() {
             let found = saved(&Disk, &killed).unwrap().content;
             if let Some(configuration) = case.configuration {
                 assert_eq!(found.config, configuration());
@@ -141,7 +141,7 @@ fn survive(case: &Case, kills: usize, seed: u64) {
             assert!(found.epochs >= log.unwrap_or(0), "{found:?}, but epoch {log:?} had ended");
         }
     }
-    if killed.join(NEWEST).exists() || killed.join(PREVIOUS).exists() {
+    if killed.join(LATEST).exists() || killed.join(PREVIOUS).exists() {
         succeed(&resume(&killed).iter().map(String::as_str).collect::<Vec<_>>());
     } else if finished == 0 || !killed.join("model.safetensors").exists() {
         succeed(&start(&killed).iter().map(String::as_str).collect::<Vec<_>>());

@@ -4,11 +4,11 @@
 use crate::alone;
 use lnn::configuration::Penalty;
 use lnn::data::Dataset;
-use lnn::data::{Estimated, Noise};
+use lnn::data::{Noise, StateEstimate};
 use lnn::lagrangian::{EulerLagrange, Request, Terms, build};
 use lnn::network::{Architecture, Layout, NetworkLagrangian, file::ModelFile};
 use lnn::optimizers::{Method, Moments, Update};
-use lnn::recording::Track;
+use lnn::recording::RecordedTrajectory;
 use lnn::rollout::{Options, rollout, rollout_many};
 use lnn::shooting::{Shooting, Task, fit};
 use lnn::training::{Hooks, Objective};
@@ -25,8 +25,8 @@ fn shot(architecture: &Architecture, weights: &[f64], threads: usize) -> Vec<f64
     let times: Vec<f64> = (0..40).map(|k| 0.02 * f64::from(k)).collect();
     let q: Vec<f64> = times.iter().flat_map(|t| [0.5 * (3.0 * t).sin(), 0.4 * (4.0 * t).cos()]).collect();
     let v: Vec<f64> = times.iter().flat_map(|t| [1.5 * (3.0 * t).cos(), -1.6 * (4.0 * t).sin()]).collect();
-    let track = Track { name: String::new(), times, q: q.clone(), v: vec![], a: vec![], force: vec![] };
-    let tracks = [Estimated { track: &track, q: &q, v: &v }];
+    let track = RecordedTrajectory { name: String::new(), times, q: q.clone(), v: vec![], a: vec![], force: vec![] };
+    let tracks = [StateEstimate { track: &track, q: &q, v: &v }];
     let noise = Noise { q: vec![0.1; 2], v: vec![] };
     let task = Task {
         architecture,

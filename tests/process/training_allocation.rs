@@ -4,7 +4,7 @@ use crate::alone;
 use crate::counting::allocations;
 use lnn::configuration::Penalty;
 use lnn::data::Dataset;
-use lnn::network::{Architecture, Form, Initialization, InputLayer, Layout, Nonlinearity, initial_weights};
+use lnn::network::{ActivationChoice, Architecture, Form, Initialization, InputLayer, Layout, initial_weights};
 use lnn::optimizers::{Method, Moments, Update};
 use lnn::training::Objective;
 use rand::{Rng, SeedableRng};
@@ -15,11 +15,11 @@ fn a_training_step_allocates_nothing_after_the_first() {
     if !alone("training_allocation::a_training_step_allocates_nothing_after_the_first") {
         return;
     }
-    allocates_nothing(Nonlinearity::Gelu, InputLayer::None, None);
-    allocates_nothing(Nonlinearity::QuadraticSoftplus, InputLayer::Dyt, Some(16));
+    allocates_nothing(ActivationChoice::Gelu, InputLayer::None, None);
+    allocates_nothing(ActivationChoice::QuadraticSoftplus, InputLayer::Dyt, Some(16));
 }
 
-fn allocates_nothing(activation: Nonlinearity, input_layer: InputLayer, dissipation: Option<usize>) {
+fn allocates_nothing(activation: ActivationChoice, input_layer: InputLayer, dissipation: Option<usize>) {
     let architecture = Architecture {
         coordinates: 2,
         hidden: vec![96; 3],

@@ -3,7 +3,7 @@
 use super::{length, lengths};
 use crate::lagrangian::Lagrangian;
 use crate::lagrangian::system::{
-    Bounds, Closed, Conserved, LearningAdvice, PaperBudget, Parameter, PerSize, Plane, Size, StateAdvice, System,
+    Bounds, ClosedForm, Conserved, LearningAdvice, PaperBudget, Parameter, PerSize, Plane, Size, StateAdvice, System,
     TrajectoryTest,
 };
 use crate::scalar::Real;
@@ -109,7 +109,7 @@ impl Lagrangian for AdsGeodesic {
     }
 }
 
-impl Closed for AdsGeodesic {
+impl ClosedForm for AdsGeodesic {
     /// `t'' = 2 t' z'/z`, likewise `x` and `y`; `z'' = (t'^2 - x'^2 - y'^2 + z'^2)/z`.
     fn acceleration<R: Real>(&self, _parameters: &[R], q: &[R], v: &[R]) -> Vec<R> {
         let last = self.n - 1;

@@ -3,7 +3,7 @@
 use super::{X_AND_Y, lengths, mass};
 use crate::lagrangian::Lagrangian;
 use crate::lagrangian::system::{
-    Bounds, Closed, LearningAdvice, Parameter, PerSize, Range, Size, System, TrajectoryTest,
+    Bounds, ClosedForm, LearningAdvice, Parameter, PerSize, Range, Size, System, TrajectoryTest,
 };
 use crate::scalar::Real;
 use std::borrow::Cow;
@@ -77,7 +77,7 @@ impl Lagrangian for ChargedParticle {
     }
 }
 
-impl Closed for ChargedParticle {
+impl ClosedForm for ChargedParticle {
     /// `gamma m a = q (E + v x B - v (v.E) / c^2)`.
     fn acceleration<R: Real>(&self, parameters: &[R], _q: &[R], v: &[R]) -> Vec<R> {
         let [m, charge, c, b, e] = *parameters else { return Vec::new() };

@@ -3,7 +3,8 @@
 use super::{ACCELERATION_OF_GRAVITY, LAST_BOB, NOWHERE, angles, chain, length, mass};
 use crate::lagrangian::Lagrangian;
 use crate::lagrangian::system::{
-    Bounds, Closed, LearningAdvice, PaperBudget, PaperPhase, Parameter, PerSize, Plane, Size, System, TrajectoryTest,
+    Bounds, ClosedForm, LearningAdvice, PaperBudget, PaperPhase, Parameter, PerSize, Plane, Size, System,
+    TrajectoryTest,
 };
 use crate::scalar::Real;
 use std::borrow::Cow;
@@ -72,7 +73,7 @@ impl Lagrangian for DoublePendulum {
     }
 }
 
-impl Closed for DoublePendulum {
+impl ClosedForm for DoublePendulum {
     /// The paper's formulas with the denominator `1 - a1 a2` written without cancellation, `m1 + m2 sin^2 (q1 - q2)`.
     fn acceleration<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> Vec<R> {
         let [m1, m2, l1, l2, g] = *parameters else { return Vec::new() };

@@ -3,7 +3,7 @@
 use super::{lengths, mass};
 use crate::lagrangian::Lagrangian;
 use crate::lagrangian::system::{
-    Bounds, Closed, LearningAdvice, Parameter, PerSize, Range, Size, System, TrajectoryTest,
+    Bounds, ClosedForm, LearningAdvice, Parameter, PerSize, Range, Size, System, TrajectoryTest,
 };
 use crate::scalar::Real;
 use std::borrow::Cow;
@@ -50,7 +50,7 @@ impl Lagrangian for HarmonicOscillator {
     }
 }
 
-impl Closed for HarmonicOscillator {
+impl ClosedForm for HarmonicOscillator {
     fn acceleration<R: Real>(&self, parameters: &[R], q: &[R], _v: &[R]) -> Vec<R> {
         let [m, k] = *parameters else { return Vec::new() };
         vec![-(k * q[0]) / m]

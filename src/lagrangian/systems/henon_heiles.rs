@@ -3,7 +3,7 @@
 use super::{X_AND_Y, lengths};
 use crate::lagrangian::Lagrangian;
 use crate::lagrangian::system::{
-    Bounds, Closed, LearningAdvice, Parameter, PerSize, Range, Size, System, TrajectoryTest,
+    Bounds, ClosedForm, LearningAdvice, Parameter, PerSize, Range, Size, System, TrajectoryTest,
 };
 use crate::scalar::Real;
 use std::borrow::Cow;
@@ -52,7 +52,7 @@ impl Lagrangian for HenonHeiles {
     }
 }
 
-impl Closed for HenonHeiles {
+impl ClosedForm for HenonHeiles {
     fn acceleration<R: Real>(&self, parameters: &[R], q: &[R], _v: &[R]) -> Vec<R> {
         let [lambda] = *parameters else { return Vec::new() };
         let (x, y) = (q[0], q[1]);

@@ -3,7 +3,7 @@
 use super::{X_AND_Y, lengths};
 use crate::lagrangian::Lagrangian;
 use crate::lagrangian::system::{
-    Bounds, Closed, Conserved, LearningAdvice, Parameter, PerSize, Range, Size, System, TrajectoryTest,
+    Bounds, ClosedForm, Conserved, LearningAdvice, Parameter, PerSize, Range, Size, System, TrajectoryTest,
 };
 use crate::scalar::Real;
 use std::borrow::Cow;
@@ -50,7 +50,7 @@ impl Lagrangian for Kepler {
     }
 }
 
-impl Closed for Kepler {
+impl ClosedForm for Kepler {
     /// `a = -mu (x, y) / r^3`.
     fn acceleration<R: Real>(&self, parameters: &[R], q: &[R], _v: &[R]) -> Vec<R> {
         let [mu] = *parameters else { return Vec::new() };

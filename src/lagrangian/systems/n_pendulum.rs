@@ -3,7 +3,7 @@
 use super::{ACCELERATION_OF_GRAVITY, LAST_BOB, NOWHERE, angles, chain, length, mass};
 use crate::lagrangian::Lagrangian;
 use crate::lagrangian::system::{
-    Bounds, Closed, LearningAdvice, Parameter, PerSize, Plane, Size, System, TrajectoryTest,
+    Bounds, ClosedForm, LearningAdvice, Parameter, PerSize, Plane, Size, System, TrajectoryTest,
 };
 use crate::scalar::Real;
 use std::borrow::Cow;
@@ -69,7 +69,7 @@ impl Lagrangian for NPendulum {
     }
 }
 
-impl Closed for NPendulum {
+impl ClosedForm for NPendulum {
     fn acceleration<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> Vec<R> {
         let Some((loads, lengths, g)) = self.loads(parameters) else { return Vec::new() };
         chain::acceleration(&loads, &lengths, g, q, v)

@@ -3,7 +3,7 @@
 use super::angular_velocity;
 use crate::lagrangian::Lagrangian;
 use crate::lagrangian::system::{
-    Bounds, Closed, Conserved, Coordinate, LearningAdvice, Parameter, PerSize, Plane, Range, Size, System,
+    Bounds, ClosedForm, Conserved, Coordinate, LearningAdvice, Parameter, PerSize, Plane, Range, Size, System,
     TrajectoryTest,
 };
 use crate::scalar::Real;
@@ -95,7 +95,7 @@ impl Lagrangian for SchwarzschildGeodesic {
     }
 }
 
-impl Closed for SchwarzschildGeodesic {
+impl ClosedForm for SchwarzschildGeodesic {
     /// `t'' = -2M t' r' / (r (r - 2M))`, `r'' = M (r'^2/f - f t'^2)/r^2 + (r - 2M) (theta'^2 + sin^2 theta phi'^2)`,
     /// `theta'' = -2 r' theta'/r + sin theta cos theta phi'^2`, `phi'' = -2 phi' (r'/r + cot theta theta')`.
     fn acceleration<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> Vec<R> {

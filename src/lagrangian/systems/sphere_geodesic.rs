@@ -3,8 +3,8 @@
 use super::{NOWHERE, angular_velocity, length, mass};
 use crate::lagrangian::Lagrangian;
 use crate::lagrangian::system::{
-    Bounds, Closed, Conserved, Coordinate, LearningAdvice, PaperBudget, PaperPhase, Parameter, PerSize, Plane, Size,
-    StateAdvice, System, TrajectoryTest,
+    Bounds, ClosedForm, Conserved, Coordinate, LearningAdvice, PaperBudget, PaperPhase, Parameter, PerSize, Plane,
+    Size, StateAdvice, System, TrajectoryTest,
 };
 use crate::scalar::Real;
 use std::borrow::Cow;
@@ -84,7 +84,7 @@ impl Lagrangian for SphereGeodesic {
     }
 }
 
-impl Closed for SphereGeodesic {
+impl ClosedForm for SphereGeodesic {
     fn acceleration<R: Real>(&self, _parameters: &[R], q: &[R], v: &[R]) -> Vec<R> {
         let (sin, cos) = q[0].sin_cos();
         vec![sin * cos * v[1].sqr(), -R::two() * (cos / sin) * v[0] * v[1]]

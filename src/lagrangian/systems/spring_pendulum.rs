@@ -3,7 +3,7 @@
 use super::{ACCELERATION_OF_GRAVITY, length, mass};
 use crate::lagrangian::Lagrangian;
 use crate::lagrangian::system::{
-    Bounds, Closed, Coordinate, LearningAdvice, PaperBudget, PaperPhase, Parameter, PerSize, Plane, Range, Size,
+    Bounds, ClosedForm, Coordinate, LearningAdvice, PaperBudget, PaperPhase, Parameter, PerSize, Plane, Range, Size,
     StateAdvice, System, TrajectoryTest,
 };
 use crate::scalar::Real;
@@ -67,7 +67,7 @@ impl Lagrangian for SpringPendulum {
     }
 }
 
-impl Closed for SpringPendulum {
+impl ClosedForm for SpringPendulum {
     fn acceleration<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> Vec<R> {
         let [m, k, l0, g] = *parameters else { return Vec::new() };
         let (r, (sin, cos)) = (q[0], q[1].sin_cos());

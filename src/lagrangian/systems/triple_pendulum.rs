@@ -3,7 +3,8 @@
 use super::{ACCELERATION_OF_GRAVITY, LAST_BOB, NOWHERE, angles, chain, length, mass};
 use crate::lagrangian::Lagrangian;
 use crate::lagrangian::system::{
-    Bounds, Closed, LearningAdvice, PaperBudget, PaperPhase, Parameter, PerSize, Plane, Size, System, TrajectoryTest,
+    Bounds, ClosedForm, LearningAdvice, PaperBudget, PaperPhase, Parameter, PerSize, Plane, Size, System,
+    TrajectoryTest,
 };
 use crate::scalar::Real;
 use std::borrow::Cow;
@@ -67,7 +68,7 @@ impl Lagrangian for TriplePendulum {
     }
 }
 
-impl Closed for TriplePendulum {
+impl ClosedForm for TriplePendulum {
     /// `M a = F` with the paper's mass matrix and forces.
     fn acceleration<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> Vec<R> {
         let Some((loads, lengths, g)) = loads(parameters) else { return Vec::new() };

@@ -1,7 +1,7 @@
 //! Round trips, damage and foreign files.
 
 use super::*;
-use crate::network::{Form, InputLayer, Nonlinearity};
+use crate::network::{ActivationChoice, Form, InputLayer};
 use crate::storage::container::{MAX_HEADER, checksum_field};
 use proptest::prelude::*;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
@@ -14,7 +14,7 @@ fn header(hidden: Vec<usize>, embed_periodic: bool, precision: StoredPrecision) 
         architecture: Architecture {
             coordinates: 2,
             hidden,
-            activation: Nonlinearity::Gelu,
+            activation: ActivationChoice::Gelu,
             alpha: 0.1,
             time_like: None,
             scale: vec![0.1 + 0.2, 10.0 / 3.0],
@@ -45,7 +45,7 @@ fn model(hidden: Vec<usize>, precision: StoredPrecision) -> ModelFile<f64> {
 fn every_kind(hidden: &[usize]) -> Vec<ModelFile<f64>> {
     let mut models = Vec::new();
     for precision in [StoredPrecision::F32, StoredPrecision::F64] {
-        for activation in [Nonlinearity::Gelu, Nonlinearity::QuadraticSoftplus] {
+        for activation in [ActivationChoice::Gelu, ActivationChoice::QuadraticSoftplus] {
             for input_layer in [InputLayer::None, InputLayer::Dyt] {
                 let mut header = header(hidden.to_vec(), true, precision);
                 header.architecture.activation = activation;
@@ -338,7 +338,7 @@ proptest! {
     fn random_models_survive(
         hidden in prop::collection::vec(1usize..6, 1..4),
         embed in any::<bool>(),
-        activation in prop::sample::select(&Nonlinearity::ALL[..]),
+        activation in prop::sample::select(&ActivationChoice::ALL[..]),
         input_layer in prop::sample::select(vec![InputLayer::None, InputLayer::Dyt]),
         dissipation in prop::option::of(1usize..5),
         seed in any::<u64>(),

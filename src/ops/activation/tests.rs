@@ -207,7 +207,7 @@ fn derivatives_are_slopes() {
 }
 
 #[test]
-fn gains() {
+fn variance_gains_agree_with_quadrature() {
     assert!((Activation::Quadratic.variance_gain() - 0.5).abs() < 1e-12);
     assert!((Activation::Identity.variance_gain() - 1.0).abs() < 1e-12);
     // 30-digit quadrature with mpmath.

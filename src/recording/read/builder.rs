@@ -3,7 +3,7 @@
 use super::Problem;
 use super::select::Selection;
 use crate::recording::reading::Rows;
-use crate::recording::{Columns, Track};
+use crate::recording::{Columns, RecordedTrajectory};
 use std::collections::HashMap;
 use std::f64::consts::TAU;
 
@@ -17,7 +17,7 @@ pub struct Growing {
     /// Rows of its samples.
     pub rows: Rows,
     /// The measured track, its name empty.
-    pub track: Track,
+    pub track: RecordedTrajectory,
     /// The row before, as it stands in the file.
     last: Vec<f64>,
     last_row: u64,
@@ -141,7 +141,7 @@ impl<'a> Builder<'a> {
         let label = label.map(ToString::to_string);
         let room = |columns: usize| Vec::with_capacity(self.expected * columns);
         let Columns { coords, velocity, acceleration, force, .. } = self.columns;
-        let track = Track {
+        let track = RecordedTrajectory {
             times: room(1),
             q: room(coords.len()),
             v: room(velocity.len()),
@@ -155,7 +155,7 @@ impl<'a> Builder<'a> {
 }
 
 /// No samples.
-pub fn empty() -> Track {
+pub fn empty() -> RecordedTrajectory {
     let none = Vec::new;
-    Track { name: String::new(), times: none(), q: none(), v: none(), a: none(), force: none() }
+    RecordedTrajectory { name: String::new(), times: none(), q: none(), v: none(), a: none(), force: none() }
 }

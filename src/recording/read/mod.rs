@@ -18,7 +18,7 @@ pub(crate) use pieces::LEAST;
 #[cfg(feature = "cli")]
 pub(crate) use text::{Separator, comment, names_in, split};
 
-use crate::recording::reading::Reading;
+use crate::recording::reading::LoadedRecording;
 use crate::recording::{Columns, Recording};
 use crate::storage::open_regular;
 use builder::Builder;
@@ -40,13 +40,13 @@ const MAX_BYTES: u64 = 1 << 36;
 ///
 /// # Errors
 /// [`DataError`], naming the file and, where there is one, row and column.
-pub fn read_recording<P: AsRef<Path>>(paths: &[P], columns: &Columns) -> Result<Reading, DataError> {
+pub fn read_recording<P: AsRef<Path>>(paths: &[P], columns: &Columns) -> Result<LoadedRecording, DataError> {
     columns.validate()?;
     if paths.is_empty() {
         return Err(DataError::NoFiles);
     }
     let recording = Recording { coordinates: columns.coords.clone(), periodic: columns.periodic(), tracks: Vec::new() };
-    let mut reading = Reading { files: paths.len(), ..Reading::from(recording) };
+    let mut reading = LoadedRecording { files: paths.len(), ..LoadedRecording::from(recording) };
     for (k, path) in paths.iter().enumerate() {
         let path = path.as_ref();
         let again = paths[..k].iter().any(|earlier| earlier.as_ref() == path);
@@ -57,7 +57,7 @@ pub fn read_recording<P: AsRef<Path>>(paths: &[P], columns: &Columns) -> Result<
 }
 
 /// Adds the trajectories of one file.
-fn add_file(path: &Path, columns: &Columns, reading: &mut Reading) -> Result<(), Problem> {
+fn add_file(path: &Path, columns: &Columns, reading: &mut LoadedRecording) -> Result<(), Problem> {
     let (file, size) = open_regular(path, MAX_BYTES)?;
     let builder = parse(file, size, columns)?;
     reading.time = builder.selection().time().map(ToString::to_string);

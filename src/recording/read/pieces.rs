@@ -1,8 +1,8 @@
 //! Trajectories without gaps in time.
 
 use super::builder::{Growing, empty};
-use crate::recording::Track;
-use crate::recording::reading::{Cut, Dropped, Reading};
+use crate::recording::RecordedTrajectory;
+use crate::recording::reading::{Cut, Dropped, LoadedRecording};
 use crate::recording::statistics::steps;
 
 /// Fewest samples of a trajectory.
@@ -12,7 +12,7 @@ pub const LEAST: usize = 16;
 ///
 /// A gap is a step longer than one and a half usual steps; if sampling is uneven, longer than the usual step and six
 /// robust standard deviations of the steps.
-pub fn add(file: &str, growing: Growing, reading: &mut Reading) -> usize {
+pub fn add(file: &str, growing: Growing, reading: &mut LoadedRecording) -> usize {
     let Growing { label, rows, mut track, .. } = growing;
     let (usual, spread) = steps(&track.times);
     let longest = usual + (0.5 * usual).max(6.0 * spread);
@@ -45,7 +45,7 @@ pub fn add(file: &str, growing: Growing, reading: &mut Reading) -> usize {
             std::mem::replace(&mut track, empty())
         } else {
             let cut = |values: &[f64]| values.get(start * n..end * n).unwrap_or(&[]).to_vec();
-            Track {
+            RecordedTrajectory {
                 name: format!("{name} rows {first}-{last}"),
                 times: track.times[start..end].to_vec(),
                 q: cut(&track.q),

@@ -19,7 +19,7 @@ fn file(name: &str, content: &[u8]) -> (tempfile::TempDir, std::path::PathBuf) {
     (folder, path)
 }
 
-fn read(content: impl AsRef<[u8]>, columns: &Columns) -> Result<Reading, DataError> {
+fn read(content: impl AsRef<[u8]>, columns: &Columns) -> Result<LoadedRecording, DataError> {
     let (_folder, path) = file("data", content.as_ref());
     read_recording(&[path], columns)
 }
@@ -178,7 +178,10 @@ fn uneven_sampling_is_not_cut() {
         t += if k == 99 { 2.0 } else { 0.1 + 0.08 * (1.7 * f64::from(k)).sin() };
     }
     let reading = read(&text, &coordinates("q")).unwrap();
-    assert_eq!(reading.recording.tracks.iter().map(crate::recording::Track::len).collect::<Vec<_>>(), [100, 100]);
+    assert_eq!(
+        reading.recording.tracks.iter().map(crate::recording::RecordedTrajectory::len).collect::<Vec<_>>(),
+        [100, 100]
+    );
 }
 
 #[test]

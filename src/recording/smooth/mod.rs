@@ -11,7 +11,7 @@ pub use window::Quality;
 
 use crate::names::counted;
 use crate::recording::statistics::{median, steps};
-use crate::recording::{Recording, Track};
+use crate::recording::{RecordedTrajectory, Recording};
 use local_fit::{Estimate, LocalFit};
 use thiserror::Error;
 use window::Signal;
@@ -156,7 +156,7 @@ impl Smoothing {
         let regular: Vec<bool> = tracks.iter().map(|track| is_regular(&track.times)).collect();
         let mut usual: Vec<f64> = tracks.iter().filter(|t| t.len() > 1).map(|t| steps(&t.times).0).collect();
         let step = median(&mut usual);
-        let longest = tracks.iter().map(Track::len).max().unwrap_or(0);
+        let longest = tracks.iter().map(RecordedTrajectory::len).max().unwrap_or(0);
         let short = |needed| SmoothError::Short { track: "the longest trajectory".into(), samples: longest, needed };
         let coordinates = (0..n).map(|i| {
             let position = match &options.noise {
@@ -178,7 +178,7 @@ impl Smoothing {
     }
 
     /// The signal of coordinate `i` on trajectories whose steps are equal or not.
-    fn signal<'a>(&self, tracks: &'a [Track], regular: &'a [bool], i: usize) -> Signal<'a> {
+    fn signal<'a>(&self, tracks: &'a [RecordedTrajectory], regular: &'a [bool], i: usize) -> Signal<'a> {
         let Chosen { noise, velocity_noise, .. } = self.coordinates[i];
         let ratio = velocity_noise.and_then(|velocity| ratio(noise, velocity, self.step));
         Signal { tracks, regular, n: self.coordinates.len(), i, sigma: noise.sigma, ratio, degree: self.degree }
@@ -186,7 +186,12 @@ impl Smoothing {
 
     /// Calls `visit` with position, velocity and acceleration of coordinate `i` at places spread evenly over the
     /// trajectories, and where they are: trajectory and sample.
-    pub(crate) fn visit(&self, recording: &Recording, i: usize, mut visit: impl FnMut([f64; 3], &Track, usize)) {
+    pub(crate) fn visit(
+        &self,
+        recording: &Recording,
+        i: usize,
+        mut visit: impl FnMut([f64; 3], &RecordedTrajectory, usize),
+    ) {
         let regular: Vec<bool> = recording.tracks.iter().map(|track| is_regular(&track.times)).collect();
         let signal = self.signal(&recording.tracks, &regular, i);
         signal.visit(self.coordinates[i].quality.window, |estimate, _, track, at| visit(estimate.values, track, at));
@@ -203,7 +208,7 @@ impl Smoothing {
     }
 
     /// Window of coordinate `i` in samples of a trajectory: as many seconds as chosen, at most all of the trajectory.
-    fn samples(&self, i: usize, track: &Track) -> usize {
+    fn samples(&self, i: usize, track: &RecordedTrajectory) -> usize {
         let least = (self.degree + 3) | 1;
         let samples = (self.coordinates[i].seconds / steps(&track.times).0).round() as usize;
         let most = track.len() - (track.len() + 1) % 2;
@@ -214,7 +219,7 @@ impl Smoothing {
     ///
     /// # Errors
     /// [`SmoothError`] for a trajectory of fewer samples than coefficients, or of another shape than the recording's.
-    pub fn apply(&self, track: &Track) -> Result<Smoothed, SmoothError> {
+    pub fn apply(&self, track: &RecordedTrajectory) -> Result<Smoothed, SmoothError> {
         let (n, length) = (self.coordinates.len(), track.len());
         let needed = (self.degree + 3) | 1;
         if length < needed {

@@ -17,16 +17,16 @@ fn exact(t: f64) -> [[f64; 2]; 3] {
     std::array::from_fn(|k| [x[k], y[k]])
 }
 
-fn track(times: Vec<f64>, sigma: f64, velocity_sigma: Option<f64>, seed: u64) -> Track {
+fn track(times: Vec<f64>, sigma: f64, velocity_sigma: Option<f64>, seed: u64) -> RecordedTrajectory {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut noisy = |x: f64, sigma: f64| x + sigma * Distribution::<f64>::sample(&StandardNormal, &mut rng);
     let q = times.iter().flat_map(|t| exact(*t)[0]).map(|x| noisy(x, sigma)).collect();
     let v = times.iter().flat_map(|t| exact(*t)[1]);
     let v = velocity_sigma.map(|sigma| v.map(|x| noisy(x, sigma)).collect()).unwrap_or_default();
-    Track { name: "waves".into(), times, q, v, a: vec![], force: vec![] }
+    RecordedTrajectory { name: "waves".into(), times, q, v, a: vec![], force: vec![] }
 }
 
-fn recording(tracks: Vec<Track>) -> Recording {
+fn recording(tracks: Vec<RecordedTrajectory>) -> Recording {
     Recording { coordinates: vec!["x".into(), "y".into()], periodic: vec![false; 2], tracks }
 }
 
@@ -145,7 +145,7 @@ fn polynomials_come_back_at_the_ends_too() {
         let quartic = |t: f64| 1.0 - t + 2.0 * t * t - t.powi(3) + 0.3 * t.powi(4);
         let second = |t: f64| 4.0 - 6.0 * t + 3.6 * t * t;
         let q = times.iter().flat_map(|t| [quartic(*t), 7.0]).collect();
-        let track = Track { name: "p".into(), times, q, v: vec![], a: vec![], force: vec![] };
+        let track = RecordedTrajectory { name: "p".into(), times, q, v: vec![], a: vec![], force: vec![] };
         let recording = recording(vec![track]);
         let options = SmoothOptions { window: Some(11), noise: Some(vec![1.0, 1.0]), ..SmoothOptions::default() };
         let smoothed = Smoothing::choose(&recording, &options).unwrap().apply(&recording.tracks[0]).unwrap();
@@ -173,6 +173,6 @@ fn options_and_shapes_are_checked() {
     let smoothing = Smoothing::choose(&good, &SmoothOptions::default()).unwrap();
     let short = track(even(6, 0.1), 1e-3, None, 1);
     assert!(matches!(smoothing.apply(&short), Err(SmoothError::Short { samples: 6, needed: 7, .. })));
-    let broken = Track { q: vec![0.0; 3], ..good.tracks[0].clone() };
+    let broken = RecordedTrajectory { q: vec![0.0; 3], ..good.tracks[0].clone() };
     assert!(matches!(smoothing.apply(&broken), Err(SmoothError::Shape { n: 2, .. })));
 }

@@ -1,6 +1,6 @@
 //! Length of the window: as long as noise demands, as short as the motion allows.
 
-use crate::recording::Track;
+use crate::recording::RecordedTrajectory;
 use crate::recording::smooth::local_fit::{Estimate, LocalFit};
 use serde::Serialize;
 
@@ -44,7 +44,7 @@ impl Quality {
 #[derive(Clone, Copy)]
 pub struct Signal<'a> {
     /// The trajectories.
-    pub tracks: &'a [Track],
+    pub tracks: &'a [RecordedTrajectory],
     /// `true` for each whose steps are equal.
     pub regular: &'a [bool],
     /// Number of coordinates.
@@ -61,12 +61,19 @@ pub struct Signal<'a> {
 
 impl Signal<'_> {
     /// Recomputes the rows for `window` samples of a track from `first` on, evaluated at sample `at`.
-    pub fn fit(&self, fit: &mut LocalFit, track: &Track, first: usize, window: usize, at: usize) {
+    pub fn fit(&self, fit: &mut LocalFit, track: &RecordedTrajectory, first: usize, window: usize, at: usize) {
         fit.compute(&track.times[first..first + window], track.times[at], self.degree, self.ratio);
     }
 
     /// Position, velocity and acceleration at sample `at` by the rows of the window from `first` on.
-    pub fn estimate(&self, fit: &LocalFit, track: &Track, first: usize, window: usize, at: usize) -> Estimate {
+    pub fn estimate(
+        &self,
+        fit: &LocalFit,
+        track: &RecordedTrajectory,
+        first: usize,
+        window: usize,
+        at: usize,
+    ) -> Estimate {
         let part = first * self.n..(first + window) * self.n;
         let ratio = self.ratio.unwrap_or(0.0);
         let v = if self.ratio.is_some() { &track.v[part.clone()] } else { &[] };
@@ -76,8 +83,8 @@ impl Signal<'_> {
 
     /// Calls `visit` with the estimate of a window and its rows at places spread evenly over all trajectories; windows
     /// that would reach over an end are moved inwards. Gives the share of the places on trajectories long enough.
-    pub fn visit(&self, window: usize, mut visit: impl FnMut(&Estimate, &LocalFit, &Track, usize)) -> f64 {
-        let total: usize = self.tracks.iter().map(Track::len).sum();
+    pub fn visit(&self, window: usize, mut visit: impl FnMut(&Estimate, &LocalFit, &RecordedTrajectory, usize)) -> f64 {
+        let total: usize = self.tracks.iter().map(RecordedTrajectory::len).sum();
         let centres = CENTRES.min(total);
         let (mut fit, mut fitted) = (LocalFit::default(), None);
         let (mut number, mut start, mut visited) = (0, 0, 0);
@@ -135,7 +142,7 @@ impl Signal<'_> {
     /// Polynomial Modelling, 1996, section 4.2: residual squares by a pilot of higher degree), lengths tried in steps
     /// of about a tenth.
     pub fn best(&self) -> Option<Quality> {
-        let longest = self.tracks.iter().map(Track::len).max().unwrap_or(0);
+        let longest = self.tracks.iter().map(RecordedTrajectory::len).max().unwrap_or(0);
         let least = (self.degree + 3) | 1;
         let (mut window, mut best) = (least, None::<Quality>);
         while window <= LONGEST && (window <= longest / 2 || window == least) {

@@ -14,7 +14,7 @@ pub use suspicious::{Kind, Suspicion};
 
 use crate::recording::smooth::{SmoothError, SmoothOptions, Smoothing};
 use crate::recording::statistics::steps;
-use crate::recording::{Cut, Dropped, HeldOut, Reading, Recording, Targets};
+use crate::recording::{Cut, Dropped, HeldOut, LoadedRecording, Recording, Targets};
 use consistency::compare;
 use serde::Serialize;
 
@@ -42,7 +42,7 @@ impl Default for SurveyOptions {
 
 /// One trajectory.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct TrackSurvey {
+pub struct TrajectorySurvey {
     /// Its name.
     pub name: String,
     /// Row of its first sample in the file.
@@ -73,7 +73,7 @@ pub struct Survey {
     /// Median step in s.
     pub step: f64,
     /// The trajectories.
-    pub tracks: Vec<TrackSurvey>,
+    pub tracks: Vec<TrajectorySurvey>,
     /// Rows left out because they repeat the row before.
     pub duplicates: usize,
     /// Gaps in time.
@@ -118,7 +118,7 @@ pub fn plan(recording: &Recording, options: &SmoothOptions) -> Result<(Smoothing
 ///
 /// # Errors
 /// [`SmoothError`] for options out of range, or trajectories too short for any window.
-pub fn survey(reading: &Reading, options: &SurveyOptions) -> Result<Survey, SmoothError> {
+pub fn survey(reading: &LoadedRecording, options: &SurveyOptions) -> Result<Survey, SmoothError> {
     let recording = &reading.recording;
     let n = recording.n();
     let (alone, planned) = plan(recording, &options.smooth)?;
@@ -135,7 +135,7 @@ pub fn survey(reading: &Reading, options: &SurveyOptions) -> Result<Survey, Smoo
     let tracks = tracks.map(|(track, rows)| {
         let (step, spread) = steps(&track.times);
         let last = track.len() - 1;
-        TrackSurvey {
+        TrajectorySurvey {
             name: track.name.clone(),
             first_row: rows.row(0),
             last_row: rows.row(last),
@@ -173,7 +173,7 @@ pub fn survey(reading: &Reading, options: &SurveyOptions) -> Result<Survey, Smoo
 }
 
 /// Counts steps of an angle between samples that are too long to be unwrapped.
-fn guesses(reading: &Reading, i: usize, coordinate: &mut CoordinateSurvey) {
+fn guesses(reading: &LoadedRecording, i: usize, coordinate: &mut CoordinateSurvey) {
     let n = reading.recording.n();
     for (track, rows) in reading.recording.tracks.iter().zip(&reading.rows) {
         for k in 1..track.len() {

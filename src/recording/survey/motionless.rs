@@ -52,7 +52,7 @@ pub fn stillness(recording: &Recording, i: usize, smoothing: &Smoothing) -> Opti
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::recording::Track;
+    use crate::recording::RecordedTrajectory;
     use crate::recording::smooth::SmoothOptions;
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
@@ -63,7 +63,7 @@ mod tests {
         let times: Vec<f64> = (0..800).map(|k| 0.01 * f64::from(k)).collect();
         let q =
             times.iter().map(|t| motion(*t) + sigma * Distribution::<f64>::sample(&StandardNormal, &mut rng)).collect();
-        let track = Track { name: "t".into(), times, q, v: vec![], a: vec![], force: vec![] };
+        let track = RecordedTrajectory { name: "t".into(), times, q, v: vec![], a: vec![], force: vec![] };
         let recording = Recording { coordinates: vec!["x".into()], periodic: vec![false], tracks: vec![track] };
         let smoothing = Smoothing::choose(&recording, &SmoothOptions::default()).unwrap();
         stillness(&recording, 0, &smoothing)

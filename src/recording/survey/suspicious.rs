@@ -1,6 +1,6 @@
 //! Samples that do not look like motion: spikes, jumps, kinks, frozen sensors.
 
-use crate::recording::Reading;
+use crate::recording::LoadedRecording;
 use crate::recording::smooth::{contrast_weights, is_regular};
 use crate::recording::statistics::robust_deviation;
 use serde::Serialize;
@@ -59,7 +59,7 @@ const PATTERNS: [(Kind, &[f64]); 3] = [
 /// Sixth differences, scaled to the noise of one sample, are noise alone where motion is smooth. Where one is beyond six
 /// standard deviations (robust, from their median) and its neighbours have the other sign (motion that is sampled too
 /// coarsely has the same), the pattern around it tells what happened.
-pub fn find(reading: &Reading, i: usize, sigma: f64, found: &mut Vec<Suspicion>) -> usize {
+pub fn find(reading: &LoadedRecording, i: usize, sigma: f64, found: &mut Vec<Suspicion>) -> usize {
     let (recording, n) = (&reading.recording, reading.recording.n());
     let (mut count, mut z) = (0, Vec::new());
     for (track, rows) in recording.tracks.iter().zip(&reading.rows) {
@@ -153,7 +153,7 @@ fn frozen(samples: usize, q: impl Fn(usize) -> f64, sigma: f64, mut report: impl
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::recording::{Recording, Track};
+    use crate::recording::{RecordedTrajectory, Recording};
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
     use rand_distr::{Distribution, StandardNormal};
@@ -164,10 +164,10 @@ mod tests {
         let mut noisy = |x: f64| x + 1e-3 * Distribution::<f64>::sample(&StandardNormal, &mut rng);
         let clean: Vec<f64> = times.iter().map(|t| noisy((3.0 * t).sin() + 0.2 * (11.0 * t).cos())).collect();
         let q = clean.iter().enumerate().map(|(k, x)| change(k, *x)).collect();
-        let track = Track { name: "t".into(), times, q, v: vec![], a: vec![], force: vec![] };
+        let track = RecordedTrajectory { name: "t".into(), times, q, v: vec![], a: vec![], force: vec![] };
         let recording = Recording { coordinates: vec!["x".into()], periodic: vec![false], tracks: vec![track] };
         let mut found = Vec::new();
-        let count = find(&Reading::from(recording), 0, 1e-3, &mut found);
+        let count = find(&LoadedRecording::from(recording), 0, 1e-3, &mut found);
         assert_eq!(count, found.len());
         found.into_iter().map(|s| (s.row, s.kind, s.size)).collect()
     }

@@ -1,5 +1,5 @@
 use super::*;
-use crate::recording::{Recording, Track};
+use crate::recording::{RecordedTrajectory, Recording};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -12,12 +12,12 @@ fn swing(sigma: f64, rate: f64, velocity_factor: Option<f64>) -> Recording {
     let q = times.iter().map(|t| noisy(0.5 * (4.0 * t).sin())).collect();
     let v = |factor: f64| times.iter().map(|t| factor * 2.0 * (4.0 * t).cos()).collect();
     let v = velocity_factor.map(v).unwrap_or_default();
-    let track = Track { name: "swing".into(), times, q, v, a: vec![], force: vec![] };
+    let track = RecordedTrajectory { name: "swing".into(), times, q, v, a: vec![], force: vec![] };
     Recording { coordinates: vec!["x".into()], periodic: vec![true], tracks: vec![track] }
 }
 
 fn look(recording: Recording) -> Survey {
-    survey(&Reading::from(recording), &SurveyOptions::default()).unwrap()
+    survey(&LoadedRecording::from(recording), &SurveyOptions::default()).unwrap()
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! The bytes of a checkpoint.
 
 use super::identity::{Identity, Saved};
-use super::{Course, Ended, Shot, Snapshot, Underway, precision};
+use super::{Ended, OptimizerState, PhaseState, Shot, Snapshot, precision};
 use crate::network::file::{ModelFileError, StoredPrecision};
 use crate::optimizers::{Block, Moments, Stored};
 use crate::random::RandomGenerator;
@@ -203,7 +203,7 @@ pub(crate) fn encode<S: Scalar>(
     identity: &Identity,
     seconds: f64,
     ended: &Ended<S>,
-    underway: Option<&Underway<S>>,
+    underway: Option<&PhaseState<S>>,
 ) -> Result<Vec<u8>, ModelFileError> {
     let precision = precision::<S>()
         .ok_or_else(|| ModelFileError::Header(format!("no checkpoint can hold {} numbers", S::NAME)))?;
@@ -212,7 +212,7 @@ pub(crate) fn encode<S: Scalar>(
         Tensor::new(name.to_string(), vec![history.len(), COLUMNS], &rows(history), StoredPrecision::F64)
     };
     let mut tensors = vec![vector("best", &ended.weights), table("history", &ended.history)];
-    if let Some(Underway { course, history, best, shooting, .. }) = underway {
+    if let Some(PhaseState { course, history, best, shooting, .. }) = underway {
         let Stored { first, second, bases, .. } = course.moments.stored();
         tensors.push(vector("weights", &course.weights));
         tensors.push(vector("moments.first", first));
@@ -240,7 +240,7 @@ pub(crate) fn encode<S: Scalar>(
         epochs: ended.history.len(),
         steps: ended.steps,
         states: ended.states,
-        underway: underway.map(|Underway { course, history, best_loss, best_epoch, shooting, .. }| UnderwayHeader {
+        underway: underway.map(|PhaseState { course, history, best_loss, best_epoch, shooting, .. }| UnderwayHeader {
             rng: course.rng.clone(),
             order: course.order.len(),
             moments: course.moments.stored().step,
@@ -281,8 +281,8 @@ pub(crate) fn decode<S: Scalar>(bytes: &[u8]) -> Result<(Header, Snapshot<S>), M
     };
     let underway = match &header.underway {
         None => None,
-        Some(stored) => Some(Underway {
-            course: Course {
+        Some(stored) => Some(PhaseState {
+            course: OptimizerState {
                 rng: stored.rng.clone(),
                 order: permutation(file.indices("order", stored.order)?)?,
                 weights: vector("weights")?,
@@ -394,7 +394,7 @@ mod tests {
             taken: 4,
             last_failure: Some(Failure::Singular { row: 3, condition: f64::INFINITY }),
         };
-        let course = Course {
+        let course = OptimizerState {
             rng,
             order: vec![2, 0, 1, 3],
             weights,
@@ -407,7 +407,7 @@ mod tests {
             batch: 3,
             means,
         };
-        let underway = Underway {
+        let underway = PhaseState {
             course,
             history: vec![row(2, 0.5)],
             best,

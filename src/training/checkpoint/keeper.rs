@@ -2,7 +2,7 @@
 
 use super::format::{Header, decode, decode_header, encode};
 use super::identity::{Identity, Saved};
-use super::{Ended, Snapshot, Underway};
+use super::{Ended, PhaseState, Snapshot};
 use crate::network::file::ModelFileError;
 use crate::scalar::Scalar;
 use crate::storage::{Files, ReadError, replace};
@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 use thiserror::Error;
 
 /// Name of the newest checkpoint.
-pub const NEWEST: &str = "checkpoint.safetensors";
+pub const LATEST: &str = "checkpoint.safetensors";
 /// Name of the one before it.
 pub const PREVIOUS: &str = "checkpoint.previous.safetensors";
 /// Largest checkpoint that is read, in bytes.
@@ -69,7 +69,7 @@ pub struct Restored<T> {
 }
 
 /// Writes and reads the checkpoints of one training in one directory.
-pub struct Keeper {
+pub struct CheckpointManager {
     files: Arc<dyn Files>,
     directory: PathBuf,
     every: Every,
@@ -86,7 +86,7 @@ struct State {
     keep: bool,
 }
 
-impl Keeper {
+impl CheckpointManager {
     /// Checkpoints of this training in `directory`.
     pub fn new(files: Arc<dyn Files>, directory: &Path, every: Every, identity: Identity) -> Self {
         let state = State { last: None, cost: Duration::ZERO, keep: true };
@@ -117,10 +117,10 @@ impl Keeper {
 
     /// Writes a checkpoint; if that fails the one before stands, training goes on, and a
     /// warning in the log tells.
-    pub(crate) fn save<S: Scalar>(&self, seconds: f64, ended: &Ended<S>, underway: Option<&Underway<S>>) {
+    pub(crate) fn save<S: Scalar>(&self, seconds: f64, ended: &Ended<S>, underway: Option<&PhaseState<S>>) {
         let began = Instant::now();
         let mut state = self.state();
-        let (newest, previous) = (self.directory.join(NEWEST), self.directory.join(PREVIOUS));
+        let (newest, previous) = (self.directory.join(LATEST), self.directory.join(PREVIOUS));
         let written = encode(&self.identity, seconds, ended, underway).and_then(|bytes| {
             replace(self.files.as_ref(), &newest, &previous, &bytes, state.keep).map_err(ModelFileError::Write)
         });
@@ -182,7 +182,7 @@ impl Keeper {
 /// That of the file system.
 pub fn remove_checkpoints(files: &dyn Files, directory: &Path) -> std::io::Result<()> {
     // The newest last: while there is a checkpoint it is the newest.
-    for name in [PREVIOUS, NEWEST] {
+    for name in [PREVIOUS, LATEST] {
         match files.remove(&directory.join(name)) {
             Err(error) if error.kind() != std::io::ErrorKind::NotFound => return Err(error),
             _ => {}
@@ -206,7 +206,7 @@ fn newest_whole<T>(
     decode: impl Fn(&[u8]) -> Result<T, ModelFileError>,
 ) -> Result<Restored<T>, CheckpointError> {
     let read = |name: &str| decode(&files.read(&directory.join(name), MAX_BYTES)?);
-    let newest = match read(NEWEST) {
+    let newest = match read(LATEST) {
         Ok(content) => return Ok(Restored { content, fallback: None }),
         Err(error @ ModelFileError::Version { .. }) => return Err(CheckpointError::Version(Box::new(error))),
         Err(error) => error,

@@ -20,7 +20,7 @@ mod identity;
 mod keeper;
 
 pub use identity::{Identity, Saved};
-pub use keeper::{CheckpointError, Every, Keeper, NEWEST, PREVIOUS, Restored, remove_checkpoints, saved};
+pub use keeper::{CheckpointError, CheckpointManager, Every, LATEST, PREVIOUS, Restored, remove_checkpoints, saved};
 
 use crate::network::file::{ModelFileError, StoredPrecision};
 use crate::optimizers::Moments;
@@ -34,7 +34,7 @@ use std::time::Instant;
 pub struct Snapshot<S> {
     pub(crate) seconds: f64,
     pub(crate) ended: Ended<S>,
-    pub(crate) underway: Option<Underway<S>>,
+    pub(crate) underway: Option<PhaseState<S>>,
 }
 
 impl<S: Scalar> Snapshot<S> {
@@ -104,8 +104,8 @@ impl<S> Ended<S> {
 
 /// A phase, or multiple shooting, between two of its steps.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Underway<S> {
-    pub course: Course<S>,
+pub(crate) struct PhaseState<S> {
+    pub course: OptimizerState<S>,
     /// One row per epoch of the phase.
     pub history: Vec<Epoch>,
     /// Parameters of the phase's best epoch; those it started with if there is none.
@@ -138,7 +138,7 @@ pub(crate) struct Shot<S> {
 
 /// State that moves from step to step within a phase; the states of multiple shooting are segments.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Course<S> {
+pub(crate) struct OptimizerState<S> {
     /// Draws the order of every epoch.
     pub rng: RandomGenerator,
     /// States in the order of the epoch.
@@ -163,7 +163,7 @@ pub(crate) struct Course<S> {
     pub means: Means,
 }
 
-impl<S: Scalar> Course<S> {
+impl<S: Scalar> OptimizerState<S> {
     /// Before the first step of a phase over `states` states.
     pub fn new(rng: RandomGenerator, states: usize) -> Self {
         Self {

@@ -5,7 +5,9 @@ use crate::common::accuracy::cast;
 use crate::common::nested::{Reference, reference_of};
 use crate::common::properties;
 use lnn::lagrangian::Lagrangian;
-use lnn::network::{Architecture, Form, Initialization, InputLayer, Layout, Nonlinearity, Structure, initial_weights};
+use lnn::network::{
+    ActivationChoice, Architecture, Form, Initialization, InputLayer, Layout, Structure, initial_weights,
+};
 use lnn::scalar::{Dd, Real, Scalar};
 use lnn::tape::{Depth, Evaluation, MixedDirections, Recorded, ScalarFunction, gradient};
 use proptest::prelude::*;
@@ -232,7 +234,7 @@ fn every_structure_agrees_with_nested_forward_numbers() {
         let architecture = Architecture {
             coordinates: 3,
             hidden: vec![5, 4],
-            activation: [Nonlinearity::Gelu, Nonlinearity::QuadraticSoftplus][k % 2],
+            activation: [ActivationChoice::Gelu, ActivationChoice::QuadraticSoftplus][k % 2],
             alpha: 0.8,
             time_like,
             scale: vec![1.5, 2.0, 0.5],

@@ -1,7 +1,7 @@
 //! The program `lnn` from outside: runs with a time limit, files to give it, a small model.
 
 use lnn::network::file::{FORMAT, Header, ModelFile, StoredPrecision};
-use lnn::network::{Architecture, Form, InputLayer, Layout, Nonlinearity};
+use lnn::network::{ActivationChoice, Architecture, Form, InputLayer, Layout};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fs;
@@ -129,7 +129,7 @@ pub fn model() -> ModelFile<f32> {
     let architecture = Architecture {
         coordinates: 2,
         hidden: vec![8, 8],
-        activation: Nonlinearity::Softplus,
+        activation: ActivationChoice::Softplus,
         alpha: 0.5,
         time_like: None,
         scale: vec![3.0, 4.0],
@@ -167,4 +167,18 @@ pub fn joined(text: &str) -> String {
 pub fn lead(report: &str) -> String {
     let (_, rest) = report.split_once("class=\"lead\">").unwrap();
     rest.split_once("</p>").unwrap().0.replace("&#39;", "'")
+}
+
+/// Waits until something has happened, half a minute at most.
+pub fn wait_until(what: &str, happened: impl Fn() -> bool) {
+    let limit = Instant::now() + Duration::from_secs(30);
+    while !happened() {
+        assert!(Instant::now() < limit, "{what} does not come");
+        thread::sleep(Duration::from_millis(10));
+    }
+}
+
+/// Waits until a file is there.
+pub fn wait_for(path: &Path) {
+    wait_until(&path.display().to_string(), || path.exists());
 }

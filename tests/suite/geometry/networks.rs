@@ -3,10 +3,10 @@
 use super::spaces::dd;
 use lnn::geometry::geometries;
 use lnn::lagrangian::{EulerLagrange, Request, Terms};
-use lnn::network::{Architecture, Form, InputLayer, Layout, NetworkLagrangian, Nonlinearity, Structure};
+use lnn::network::{ActivationChoice, Architecture, Form, InputLayer, Layout, NetworkLagrangian, Structure};
 use lnn::scalar::{Dd, Real, Scalar};
 
-fn network(activation: Nonlinearity, structure: Structure, even: bool) -> NetworkLagrangian<f64> {
+fn network(activation: ActivationChoice, structure: Structure, even: bool) -> NetworkLagrangian<f64> {
     let time_like = (structure != Structure::Mechanical).then_some(0);
     let architecture = Architecture {
         coordinates: 3,
@@ -52,7 +52,7 @@ fn differences(model: &NetworkLagrangian<Dd>, q: &[Dd], v: &[Dd], (k, l): (usize
 #[test]
 fn jets_are_derivatives_of_the_mass_matrix() {
     for structure in Structure::ALL {
-        for (k, activation) in Nonlinearity::ALL.into_iter().enumerate() {
+        for (k, activation) in ActivationChoice::ALL.into_iter().enumerate() {
             let model = network(activation, structure, k % 2 == 1);
             // The angles are some turns away.
             let (q, v) = ([0.3, 7.0, -9.0], [0.4, -0.2, 0.1]);
@@ -81,7 +81,7 @@ fn jets_are_derivatives_of_the_mass_matrix() {
 /// Every precision gives the same curvature, and a batch what its points give one by one.
 #[test]
 fn precisions_and_batches_agree() {
-    let model = network(Nonlinearity::Gelu, Structure::Metric, false);
+    let model = network(ActivationChoice::Gelu, Structure::Metric, false);
     let points = [0.3, 0.5, -0.2, 1.1, 2.0, 0.4];
     let both = geometries(&model, &points, &[0.0; 3]).unwrap();
     for (k, found) in both.into_iter().enumerate() {

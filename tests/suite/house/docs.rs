@@ -9,11 +9,11 @@ use std::path::{Path, PathBuf};
 
 /// Lines around what is generated from the table of configuration keys.
 const GENERATED: [&str; 2] =
-    ["<!-- generated from src/training/reference.rs -->\n\n", "<!-- end of the generated part -->\n"];
+    ["<!-- generated from src/presets/reference.rs -->\n\n", "<!-- end of the generated part -->\n"];
 
 /// The same around the keys of a fit.
 const OF_A_FIT: [&str; 2] =
-    ["<!-- generated from src/cli/fit_config.rs -->\n\n", "<!-- end of the generated part of fits -->\n"];
+    ["<!-- generated from src/pipeline/fit_config.rs -->\n\n", "<!-- end of the generated part of fits -->\n"];
 
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))

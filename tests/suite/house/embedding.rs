@@ -40,9 +40,9 @@ const _: () = {
     error::<motion::RolloutError>();
     error::<motion::UnderflowCause>();
     error::<network::NetworkError>();
-    error::<network::UnknownNonlinearity>();
+    error::<network::UnknownActivation>();
     error::<network::file::ModelFileError>();
-    error::<recording::TrackError>();
+    error::<recording::TrajectoryError>();
     error::<scalar::UnreadableNumber>();
     error::<storage::ReadError>();
     error::<tape::TapeError>();
@@ -55,6 +55,8 @@ const _: () = {
     error::<lnn::data::SamplingError>();
     error::<training::StepError>();
     error::<training::TrainingError>();
+    error::<training::ThreadsError>();
+    error::<lnn::pipeline::PipelineError>();
 };
 
 fn root() -> &'static Path {

@@ -4,9 +4,11 @@ use std::fs;
 use std::path::Path;
 
 /// Rooms whose documentation is held to it.
-const ROOMS: [&str; 17] = [
-    "storage",
+const ROOMS: [&str; 26] = [
+    "names",
     "scalar",
+    "storage",
+    "random",
     "ops",
     "forward",
     "linalg",
@@ -18,10 +20,17 @@ const ROOMS: [&str; 17] = [
     "network",
     "symmetry",
     "certificate",
+    "optimizers",
+    "configuration",
+    "data",
     "training",
+    "shooting",
+    "presets",
     "analysis",
     "experiments",
     "report",
+    "pipeline",
+    "cli",
 ];
 
 /// Lines of a folder's sources that begin a comment of documentation with a word that names nothing, and all such comments.

@@ -4,7 +4,9 @@ use lnn::configuration::Penalty;
 use lnn::data::Dataset;
 use lnn::lagrangian::systems::double_pendulum::DoublePendulum;
 use lnn::lagrangian::{EulerLagrange, HandWritten, Request, Terms, configure};
-use lnn::network::{Architecture, Form, Initialization, InputLayer, NetworkLagrangian, Nonlinearity, initial_weights};
+use lnn::network::{
+    ActivationChoice, Architecture, Form, Initialization, InputLayer, NetworkLagrangian, initial_weights,
+};
 use lnn::rollout::{Method, Options, rollout_fixed};
 use lnn::scalar::{AnyFloat, Real, Scalar};
 use lnn::tape::{Depth, Evaluation, MixedDirections, ScalarFunction, gradient};
@@ -51,7 +53,7 @@ fn motion<S: Scalar>(model: &dyn EulerLagrange<S>) -> Results {
 }
 
 /// A recorded network: its terms, and the gradient of its mixed derivatives by the weights.
-fn network<S: Scalar>(activation: Nonlinearity) -> Results {
+fn network<S: Scalar>(activation: ActivationChoice) -> Results {
     let architecture = Architecture {
         coordinates: 2,
         hidden: [12, 12].map(|width| width * activation.branches().len()).to_vec(),
@@ -110,7 +112,7 @@ fn special<S: Scalar>() -> Results {
 fn everything<S: Scalar>() -> Results {
     let mut results = terms::<S>(&double_pendulum::<S>());
     results.extend(motion::<S>(&double_pendulum::<S>()));
-    for activation in Nonlinearity::ALL {
+    for activation in ActivationChoice::ALL {
         results.extend(network::<S>(activation));
     }
     results.extend(special::<S>());

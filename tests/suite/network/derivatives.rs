@@ -3,7 +3,9 @@
 use crate::common::accuracy::cast;
 use crate::common::nested::reference;
 use crate::common::{of_scalar, properties};
-use lnn::network::{Architecture, Form, Initialization, InputLayer, Layout, LinearMap, Nonlinearity, initial_weights};
+use lnn::network::{
+    ActivationChoice, Architecture, Form, Initialization, InputLayer, Layout, LinearMap, initial_weights,
+};
 use lnn::scalar::{Dd, Real, Scalar};
 use lnn::tape::{Depth, Evaluation, MixedDirections, ScalarFunction, gradient};
 use proptest::prelude::*;
@@ -16,7 +18,8 @@ struct Case {
 }
 
 fn cases() -> impl Strategy<Value = Case> {
-    let shape = (1_usize..=6, prop::collection::vec(1_usize..24, 1..4), prop::sample::select(&Nonlinearity::ALL[..]));
+    let shape =
+        (1_usize..=6, prop::collection::vec(1_usize..24, 1..4), prop::sample::select(&ActivationChoice::ALL[..]));
     let input_layer = prop::sample::select(vec![InputLayer::None, InputLayer::Dyt]);
     (shape, input_layer, prop::collection::vec(any::<bool>(), 6), any::<bool>(), any::<u64>()).prop_map(
         |((n, hidden, activation), input_layer, periodic, embed_periodic, seed)| Case {
@@ -217,7 +220,7 @@ proptest! {
 
 /// Every kind of model at every small number of coordinates: one or two branches, with and without an input layer.
 fn models() -> impl Iterator<Item = Case> {
-    let kinds = [Nonlinearity::XTanh, Nonlinearity::QuadraticSoftplus]
+    let kinds = [ActivationChoice::XTanh, ActivationChoice::QuadraticSoftplus]
         .into_iter()
         .flat_map(|activation| [InputLayer::None, InputLayer::Dyt].map(|input_layer| (activation, input_layer)));
     kinds.flat_map(|(activation, input_layer)| {
@@ -253,7 +256,7 @@ fn both_identities_hold_for_every_kind_of_model() {
 /// A hybrid is the sum of two networks of half the widths with the same features, `alpha |v/s|^2` counted once.
 #[test]
 fn a_hybrid_is_the_sum_of_its_branches() {
-    for case in models().filter(|case| case.architecture.activation == Nonlinearity::QuadraticSoftplus) {
+    for case in models().filter(|case| case.architecture.activation == ActivationChoice::QuadraticSoftplus) {
         let (weights, q, v) = draw::<f64>(&case, 3);
         let evaluate = |architecture: &Architecture, weights: &[f64]| {
             let chunk = evaluated(architecture, weights, [&q, &v], Depth::Motion);
@@ -264,8 +267,8 @@ fn a_hybrid_is_the_sum_of_its_branches() {
             Architecture { activation, alpha, hidden, ..case.architecture.clone() }
         };
         let (softplus, quadratic) = weights.split_at(weights.len() / 2);
-        let one = evaluate(&half(Nonlinearity::Softplus, case.architecture.alpha), softplus);
-        let two = evaluate(&half(Nonlinearity::Quadratic, 0.0), quadratic);
+        let one = evaluate(&half(ActivationChoice::Softplus, case.architecture.alpha), softplus);
+        let two = evaluate(&half(ActivationChoice::Quadratic, 0.0), quadratic);
         let sum: Vec<f64> = one.iter().zip(&two).map(|(a, b)| a + b).collect();
         assert!(difference(&evaluate(&case.architecture, &weights), &sum) < 1e-14);
     }
@@ -277,7 +280,7 @@ fn dynamic_tanh_stands_before_the_first_dense_layer() {
     let plain = Architecture {
         coordinates: 1,
         hidden: vec![1],
-        activation: Nonlinearity::Quadratic,
+        activation: ActivationChoice::Quadratic,
         alpha: 0.5,
         time_like: None,
         scale: vec![2.0],
@@ -303,7 +306,7 @@ fn widths_that_a_hybrid_cannot_halve_are_refused() {
         assert_eq!(case.architecture.validate(), Ok(()));
         for width in [1, 5] {
             let odd = Architecture { hidden: vec![4, width], ..case.architecture.clone() };
-            let hybrid = odd.activation == Nonlinearity::QuadraticSoftplus;
+            let hybrid = odd.activation == ActivationChoice::QuadraticSoftplus;
             match odd.validate() {
                 Ok(()) => assert!(!hybrid),
                 Err(error) => {
@@ -324,7 +327,7 @@ fn shallower_evaluations_give_the_same_numbers() {
         architecture: Architecture {
             coordinates: 3,
             hidden: vec![17, 9],
-            activation: Nonlinearity::Softplus,
+            activation: ActivationChoice::Softplus,
             alpha: 1.0,
             time_like: None,
             scale: vec![2.0; 3],
@@ -356,7 +359,7 @@ fn the_added_term_follows_the_time_like_coordinate() {
     let plain = Architecture {
         coordinates: 3,
         hidden: vec![2],
-        activation: Nonlinearity::Gelu,
+        activation: ActivationChoice::Gelu,
         alpha: 1.5,
         time_like: None,
         scale: vec![2.0, 4.0, 1.0],

@@ -2,7 +2,7 @@
 //! apart.
 
 use crate::common::accuracy::{cast, largest};
-use crate::common::damped::Damped;
+use crate::common::damped;
 use crate::common::{of_scalar, properties};
 use lnn::configuration::{Config, Data, Network, OnFailure, Optimizer, Phase, Precision, Regularizer, Scaling};
 use lnn::data::{Dataset, Datasets};
@@ -10,7 +10,8 @@ use lnn::forward::HyperDual;
 use lnn::lagrangian::{EulerLagrange, Request, Terms};
 use lnn::linalg::Workspace;
 use lnn::network::{
-    Architecture, Form, Initialization, InputLayer, Layout, NetworkLagrangian, Nonlinearity, Structure, initial_weights,
+    ActivationChoice, Architecture, Form, Initialization, InputLayer, Layout, NetworkLagrangian, Structure,
+    initial_weights,
 };
 use lnn::optimizers::{Method as Update, Schedule};
 use lnn::rollout::{Method, Options, RolloutError, rollout, rollout_fixed, rollout_together};
@@ -33,7 +34,7 @@ fn architecture(n: usize, units: usize) -> Architecture {
     Architecture {
         coordinates: n,
         hidden: vec![6, 4],
-        activation: Nonlinearity::Gelu,
+        activation: ActivationChoice::Gelu,
         alpha: 1.0,
         time_like: None,
         scale: (0..n).map(|i| 1.5 + i as f64 / 2.0).collect(),
@@ -46,7 +47,7 @@ fn architecture(n: usize, units: usize) -> Architecture {
 }
 
 fn cases() -> impl Strategy<Value = Case> {
-    let kind = (prop::sample::select(&Nonlinearity::ALL[..]), any::<bool>(), any::<bool>());
+    let kind = (prop::sample::select(&ActivationChoice::ALL[..]), any::<bool>(), any::<bool>());
     (1_usize..=4, 1_usize..40, kind, any::<u64>()).prop_map(|(n, units, (activation, embed_periodic, dyt), seed)| {
         let input_layer = if dyt { InputLayer::Dyt } else { InputLayer::None };
         Case { architecture: Architecture { activation, embed_periodic, input_layer, ..architecture(n, units) }, seed }
@@ -253,7 +254,7 @@ fn friction_adds_to_the_forces_of_the_same_lagrangian() {
 
 #[test]
 fn the_energy_of_a_motion_goes_where_friction_takes_it() {
-    let model = Damped::chain(2);
+    let model = damped::chain(2);
     let (q, v) = ([2.0, 2.5], [0.5, -1.0]);
     let at = |dt: f64| {
         let options = Options { rtol: 1e-12, atol: 1e-12, method: Method::Dop853, ..Options::new(3.0, dt) };
@@ -275,7 +276,7 @@ fn the_energy_of_a_motion_goes_where_friction_takes_it() {
 /// Orders 2, 4 and 6 on a motion with friction, the same motion for all.
 #[test]
 fn gauss_methods_integrate_friction_and_the_variational_one_refuses() {
-    let model = Damped::chain(2);
+    let model = damped::chain(2);
     let (q, v) = ([2.0, 2.5], [0.5, -1.0]);
     let reference = Options { rtol: 1e-13, atol: 1e-13, ..Options::reference(0.5, 0.5) };
     let exact = rollout(&model, &q, &v, &reference).complete().unwrap();
@@ -341,7 +342,7 @@ fn config(units: Option<usize>, epochs: usize) -> Config {
         },
         network: Network {
             hidden: vec![48; 2],
-            activation: Nonlinearity::Gelu,
+            activation: ActivationChoice::Gelu,
             alpha: 1.0,
             time_like: None,
             scaling: Scaling::Physical,
@@ -437,7 +438,7 @@ fn learn(model: &dyn EulerLagrange<f64>, units: Option<usize>, epochs: usize, fo
 /// is what the joints take, in units of the factor by which `M` was found. Known torques leave no factor.
 #[test]
 fn friction_is_learned_beside_the_lagrangian() {
-    let model = Damped::chain(2);
+    let model = damped::chain(2);
     let (without, with) = (learn(&model, None, 60, false), learn(&model, Some(16), 60, false));
     // Measured: 0.159 without, 0.037 with.
     assert!(without.acceleration > 0.1, "{without:?}");
@@ -460,7 +461,7 @@ fn separation() {
     println!("relative errors    acceleration                     mass     power of      mean");
     println!(" n  epochs  without friction      with    matrix  single states     power    seconds");
     for n in 1..=3 {
-        let model = Damped::chain(n);
+        let model = damped::chain(n);
         for epochs in [60, 400] {
             let start = Instant::now();
             let (without, with) = (learn(&model, None, epochs, false), learn(&model, Some(16), epochs, false));

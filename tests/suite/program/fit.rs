@@ -1,7 +1,7 @@
 //! `lnn fit` from outside: recorded swings of a pendulum, learned by networks small enough for a test.
 #![cfg(feature = "cli")]
 
-use crate::common::damped::Damped;
+use crate::common::damped;
 use crate::common::program::{Folder, Run, joined, lead, lnn, text};
 use lnn::lagrangian::{EulerLagrange, Request, Terms};
 use lnn::network::file::ModelFile;
@@ -48,8 +48,8 @@ pub(super) fn swings(model: &dyn EulerLagrange<f64>, runs: usize, seconds: f64, 
 
 /// Swings of one pendulum over 3 s.
 pub(super) fn pendulum(runs: usize, damped: bool, sigma: f64) -> String {
-    let model = Damped::chain(1);
-    swings(if damped { &model } else { model.exact.as_ref() }, runs, 3.0, sigma)
+    let model = damped::chain(1);
+    swings(if damped { &model } else { model.model().as_ref() }, runs, 3.0, sigma)
 }
 
 /// What the columns of one pendulum mean.
@@ -161,7 +161,7 @@ fn the_same_bytes_on_any_number_of_threads() {
 #[test]
 fn measured_accelerations_and_friction_are_learned() {
     let folder = Folder::new();
-    let data = folder.file("swings.csv", swings(&Damped::chain(2), 80, 2.0, 0.0));
+    let data = folder.file("swings.csv", swings(&damped::chain(2), 80, 2.0, 0.0));
     let names = ["--coords", "upper,lower", "--periodic", "upper,lower", "--velocity", "upper_dot,lower_dot"];
     let more =
         ["--acceleration", "upper_ddot,lower_ddot", "--trajectory", "run", "--hidden", "32,32", "--epochs", "150"];

@@ -3,7 +3,7 @@
 
 use crate::common::program::{Folder, Run, command, lnn, text};
 use crate::program::fit::{COLUMNS, pendulum};
-use lnn::training::{NEWEST, PREVIOUS};
+use lnn::training::{LATEST, PREVIOUS};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
@@ -77,7 +77,7 @@ fn a_fit_stopped_in_the_middle_comes_to_the_same_end() {
     let again = [&base[..], &["--resume", &out, "--checkpoint-every", "3"]].concat();
     let last = stopped(&again, shooting, &folder);
     assert!(last.ends_with(&on), "{last}");
-    assert!(folder.path("out").join(NEWEST).is_file());
+    assert!(folder.path("out").join(LATEST).is_file());
 
     // Other data are refused, the same at another place are taken; a damaged checkpoint is not the end.
     let other = folder.file("other.csv", pendulum(6, true, 0.004));
@@ -85,12 +85,12 @@ fn a_fit_stopped_in_the_middle_comes_to_the_same_end() {
     assert!(refused.code == Some(1) && refused.stderr.contains("the checkpoint is of other"), "{}", refused.stderr);
     fs::rename(&data, folder.path("moved.csv")).unwrap();
     resume(&[]).refused(1, &["swings.csv", "no such file"]);
-    fs::write(folder.path("out").join(NEWEST), b"damaged").unwrap();
+    fs::write(folder.path("out").join(LATEST), b"damaged").unwrap();
     let resumed = resume(&[&text(&folder.path("moved.csv")), "--threads", "1"]);
     succeeded(&resumed);
     assert!(resumed.stderr.contains(PREVIOUS), "{}", resumed.stderr);
     assert!(result(&folder.path("out")) == result(&folder.path("whole")));
-    assert!(!folder.path("out").join(NEWEST).exists() && !folder.path("out").join(PREVIOUS).exists());
+    assert!(!folder.path("out").join(LATEST).exists() && !folder.path("out").join(PREVIOUS).exists());
     let config = |run: &str| fs::read_to_string(folder.path(run).join("config.toml")).unwrap();
     assert_eq!(config("out").replace("moved.csv", "swings.csv"), config("whole"));
 

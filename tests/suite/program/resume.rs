@@ -4,7 +4,7 @@
 use lnn::configuration::Config;
 use lnn::lagrangian::configure;
 use lnn::presets::Preset;
-use lnn::training::{NEWEST, PREVIOUS};
+use lnn::training::{LATEST, PREVIOUS};
 use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -60,7 +60,7 @@ impl Folder {
     /// Trains into `out` and presses Ctrl-C after the first checkpoint.
     fn stopped(&self, out: &str) -> Output {
         let child = self.train(out, &[]);
-        wait_for(&self.path(out).join(NEWEST));
+        wait_for(&self.path(out).join(LATEST));
         std::thread::sleep(Duration::from_millis(100));
         interrupt(&child);
         child.wait_with_output().unwrap()
@@ -115,7 +115,7 @@ fn a_training_stopped_in_the_middle_comes_to_the_same_end() {
     let stopped = folder.stopped("stopped");
     let out = folder.text("stopped");
     refused(&stopped, 130, &["interrupted", &format!("go on with: lnn train --resume {out}")]);
-    assert!(folder.path("stopped").join(NEWEST).exists());
+    assert!(folder.path("stopped").join(LATEST).exists());
 
     // Another configuration is refused, and so is beginning anew on top of what is there.
     refused(&folder.resume("stopped", &["--seed", "5"]), 2, &["seed: 0 in the checkpoint, 5 asked for"]);
@@ -131,7 +131,7 @@ fn a_training_stopped_in_the_middle_comes_to_the_same_end() {
     refused(&anew, 1, &["unfinished", &format!("lnn train --resume {out}")]);
 
     // A damaged newest checkpoint: the one before serves, and a line says so.
-    fs::write(folder.path("stopped").join(NEWEST), b"damaged").unwrap();
+    fs::write(folder.path("stopped").join(LATEST), b"damaged").unwrap();
     let resumed = folder.resume("stopped", &["--threads", "2"]);
     assert!(stderr(&resumed).starts_with("note: ") && stderr(&resumed).contains(PREVIOUS), "{}", stderr(&resumed));
     succeeded(&resumed);
@@ -140,7 +140,7 @@ fn a_training_stopped_in_the_middle_comes_to_the_same_end() {
         result
     };
     assert!(threads(result(&folder.path("stopped"))) == threads(result(&folder.path("whole"))));
-    assert!(!folder.path("stopped").join(NEWEST).exists() && !folder.path("stopped").join(PREVIOUS).exists());
+    assert!(!folder.path("stopped").join(LATEST).exists() && !folder.path("stopped").join(PREVIOUS).exists());
 
     // Finished: nothing is left to do.
     let before = fs::metadata(folder.path("stopped").join("summary.json")).unwrap().modified().unwrap();
@@ -157,8 +157,8 @@ fn nothing_to_go_on_from_is_an_error() {
     refused(&folder.resume("none", &[]), 1, &["none", "no such directory"]);
     fs::create_dir(folder.path("empty")).unwrap();
     refused(&folder.resume("empty", &[]), 1, &["empty", "no checkpoint"]);
-    fs::write(folder.path("empty").join(NEWEST), b"x").unwrap();
-    refused(&folder.resume("empty", &[]), 1, &["empty", NEWEST, PREVIOUS]);
+    fs::write(folder.path("empty").join(LATEST), b"x").unwrap();
+    refused(&folder.resume("empty", &[]), 1, &["empty", LATEST, PREVIOUS]);
     for value in ["0", "-1", "0s", "1.5", "s", "nans", "1e999s"] {
         let output = folder.train("out", &["--checkpoint-every", value]).wait_with_output().unwrap();
         refused(&output, 2, &["--checkpoint-every"]);
@@ -170,7 +170,7 @@ fn nothing_to_go_on_from_is_an_error() {
 fn a_second_ctrl_c_ends_at_once() {
     let folder = Folder::new(1_000_000);
     let child = folder.train("out", &[]);
-    wait_for(&folder.path("out").join(NEWEST));
+    wait_for(&folder.path("out").join(LATEST));
     interrupt(&child);
     std::thread::sleep(Duration::from_millis(50));
     // It may have ended by now.
@@ -185,7 +185,7 @@ fn a_directory_has_one_run_and_outlives_a_dead_one() {
     let folder = Folder::new(1_000_000);
     let mut child = folder.train("out", &[]);
     let process = child.id();
-    wait_for(&folder.path("out").join(NEWEST));
+    wait_for(&folder.path("out").join(LATEST));
     let second = folder.train("out", &[]).wait_with_output().unwrap();
     refused(&second, 1, &["another run", &format!("process {process} on "), " since 20", " UTC"]);
     child.kill().unwrap();
@@ -220,7 +220,7 @@ fn full_disks_and_lost_directories_are_named() {
     // A directory that vanishes under a running training.
     let long = Folder::new(1_000_000);
     let child = long.train("gone", &[]);
-    wait_for(&long.path("gone").join(NEWEST));
+    wait_for(&long.path("gone").join(LATEST));
     fs::rename(long.path("gone"), long.path("elsewhere")).unwrap();
     std::thread::sleep(Duration::from_millis(300));
     interrupt(&child);

@@ -2,7 +2,7 @@
 #![cfg(feature = "cli")]
 
 use super::fit::swings;
-use crate::common::damped::Damped;
+use crate::common::damped;
 use crate::common::program::{Folder, Run, command, lnn};
 use lnn::cli::check_arguments;
 use std::ffi::OsString;
@@ -81,7 +81,7 @@ fn lines_fit_headers_have_units_and_numbers_are_plain() {
     for file in ["double_pendulum.safetensors", "double_pendulum.toml"] {
         fs::copy(data.join(file), folder.path(file)).unwrap();
     }
-    folder.file("swings.csv", swings(&Damped::chain(2), 8, 2.0, 1e-3));
+    folder.file("swings.csv", swings(&damped::chain(2), 8, 2.0, 1e-3));
     // One sample is wrong, and the path is long.
     let mut rows: Vec<String> =
         fs::read_to_string(data.join("pendulum.csv")).unwrap().lines().map(Into::into).collect();

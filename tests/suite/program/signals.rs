@@ -1,14 +1,12 @@
 //! SIGTERM, as batch systems send it, and disks that fill up: what was learned is kept.
 #![cfg(all(feature = "cli", unix))]
 
-use crate::common::program::{Folder, Run, command, lnn, text};
+use crate::common::program::{Folder, Run, command, lnn, text, wait_for, wait_until};
 use lnn::lagrangian::configure;
 use lnn::presets::Preset;
 use lnn::storage::Disk;
-use lnn::training::{NEWEST, saved};
-use std::path::Path;
+use lnn::training::{LATEST, saved};
 use std::process::{Child, Command, Stdio};
-use std::time::Duration;
 
 /// A training of so many epochs.
 fn configuration(folder: &Folder, epochs: usize) -> String {
@@ -26,16 +24,6 @@ fn start(arguments: &[&str]) -> Child {
 fn send(signal: &str, child: &Child) {
     // The process may have ended by now.
     let _ = Command::new("kill").args([signal, &child.id().to_string()]).stderr(Stdio::null()).status().unwrap();
-}
-
-fn wait_for(path: &Path) {
-    for _ in 0..1500 {
-        if path.exists() {
-            return;
-        }
-        std::thread::sleep(Duration::from_millis(20));
-    }
-    panic!("{} does not come", path.display());
 }
 
 #[test]
@@ -56,24 +44,32 @@ fn a_batch_system_ends_a_training_with_everything_kept() {
     assert!(out.join("model.safetensors").is_file() && out.join("report.html").is_file());
     assert!(saved(&Disk, &out).unwrap().content.epochs > 0);
 
-    // A second signal ends at once, with its own exit code, and the checkpoint stays.
-    let child = start(&["train", "--resume", &text(&out)]);
-    wait_for(&out.join(".lnn.lock"));
-    std::thread::sleep(Duration::from_millis(300));
+    // A second signal ends at once, with its own exit code, and the checkpoint stays. A new checkpoint says that training goes on.
+    let written = || out.join(LATEST).metadata().and_then(|data| data.modified()).ok();
+    let before = written();
+    let child = start(&["train", "--resume", &text(&out), "--checkpoint-every", "1"]);
+    wait_until("a new checkpoint", || written().is_some_and(|now| Some(now) != before));
     send("-INT", &child);
     send("-TERM", &child);
     assert!(matches!(child.wait_with_output().unwrap().status.code(), Some(143 | 130)));
-    assert!(out.join(NEWEST).is_file());
+    assert!(out.join(LATEST).is_file());
 }
 
 #[test]
 fn a_motion_ends_with_the_samples_that_it_has() {
     let folder = Folder::new();
     let model = folder.file("m", crate::common::program::model().to_bytes().unwrap());
-    let out = text(&folder.path("out.csv"));
+    let out_file = folder.path("out.csv");
+    let out = text(&out_file);
     let state = ["--state", "1,1,0,0", "--t-end", "900", "--dt", "0.00001", "--beyond-range"];
     let child = start(&[&["rollout", &model, "--out", &out], &state[..]].concat());
-    std::thread::sleep(Duration::from_secs(1));
+    // Samples go into a temporary file beside the one asked for, a piece at a time.
+    let begun = |entry: std::fs::DirEntry| {
+        let samples = entry.file_name().to_string_lossy().starts_with(".out.csv");
+        samples && entry.metadata().is_ok_and(|data| data.len() > 0)
+    };
+    let folder = out_file.parent().unwrap();
+    wait_until("samples", || std::fs::read_dir(folder).unwrap().flatten().any(begun));
     send("-TERM", &child);
     let output = child.wait_with_output().unwrap();
     let stderr = String::from_utf8_lossy(&output.stderr);
@@ -100,5 +96,5 @@ fn on_a_full_disk_pictures_are_lost_first() {
     // With room on the disk the rest comes.
     let resumed = lnn(&["train", "--resume", &text(&out)]);
     assert_eq!((resumed.code, resumed.stderr.as_str()), (Some(0), ""));
-    assert!(out.join("report.html").is_file() && out.join("lagrangian.svg").is_file() && !out.join(NEWEST).exists());
+    assert!(out.join("report.html").is_file() && out.join("lagrangian.svg").is_file() && !out.join(LATEST).exists());
 }

@@ -1,7 +1,7 @@
 //! Training, roll-out and evaluation from outside, on networks too small to learn much.
 #![cfg(feature = "cli")]
 
-use crate::common::program::{joined, lead};
+use crate::common::program::{joined, lead, wait_for};
 use lnn::configuration::Config;
 use lnn::lagrangian::configure;
 use lnn::network::file::ModelFile;
@@ -321,14 +321,15 @@ fn ctrl_c_keeps_the_best_model() {
     long.phases[0].epochs = 1_000_000;
     let (config, out) = (folder.config(&long), text(&folder.path("out")));
     let child = Command::new(env!("CARGO_BIN_EXE_lnn"))
-        .args(["train", "--config", &config, "--out", &out])
+        .args(["train", "--config", &config, "--out", &out, "--checkpoint-every", "1"])
         .stdout(std::process::Stdio::piped())
         .stderr(std::process::Stdio::piped())
         .spawn()
         .unwrap();
     let second = lnn_when_locked(&config, &folder.path("out"));
     refused(&second, 1, &["another run"]);
-    std::thread::sleep(std::time::Duration::from_secs(2));
+    // The second checkpoint is written when an epoch has ended.
+    wait_for(&folder.path("out/checkpoint.previous.safetensors"));
     let signalled = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
     assert!(signalled.success());
     let output = child.wait_with_output().unwrap();
@@ -341,11 +342,6 @@ fn ctrl_c_keeps_the_best_model() {
 /// A second run into a directory, once the first has taken it.
 #[cfg(unix)]
 fn lnn_when_locked(config: &str, out: &Path) -> Output {
-    for _ in 0..200 {
-        if out.join(".lnn.lock").exists() {
-            break;
-        }
-        std::thread::sleep(std::time::Duration::from_millis(50));
-    }
+    wait_for(&out.join(".lnn.lock"));
     lnn(&["train", "--config", config, "--out", &text(out)])
 }

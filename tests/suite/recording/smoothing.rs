@@ -2,7 +2,7 @@
 
 use lnn::lagrangian::{Request, Terms, build};
 use lnn::recording::smooth::{SmoothOptions, Smoothed, Smoothing};
-use lnn::recording::{Recording, Track};
+use lnn::recording::{RecordedTrajectory, Recording};
 use lnn::rollout::{Options, rollout};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -18,7 +18,7 @@ fn pendulum() -> (Recording, [Vec<f64>; 3]) {
     model.terms(&motion.q, &motion.v, Request::ACCELERATION, &mut terms).unwrap();
     let mut rng = ChaCha8Rng::seed_from_u64(4);
     let noise = |x: &f64| x + SIGMA * Distribution::<f64>::sample(&StandardNormal, &mut rng);
-    let track = Track {
+    let track = RecordedTrajectory {
         name: "double pendulum".into(),
         times: motion.t.clone(),
         q: motion.q.iter().map(noise).collect(),

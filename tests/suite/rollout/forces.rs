@@ -1,6 +1,6 @@
 //! Motions under forces from outside, against closed forms and against Lagrangians that hold the same force.
 
-use crate::common::damped::Damped;
+use crate::common::damped;
 use lnn::lagrangian::systems::double_pendulum::DoublePendulum;
 use lnn::lagrangian::systems::harmonic_oscillator::HarmonicOscillator;
 use lnn::lagrangian::{EulerLagrange, HandWritten, Lagrangian, Request, Terms, inverse_dynamics};
@@ -177,7 +177,7 @@ fn jumps_and_kinks_cost_nothing_where_they_are_known() {
 
 #[test]
 fn work_and_friction_make_the_change_of_energy() {
-    let chain = Damped::chain(2);
+    let chain = damped::chain(2);
     let motor = |t: f64, q: &[f64], v: &[f64], force: &mut [f64]| {
         force[0] = 4.0 * (3.0 * t).sin() - q[0];
         force[1] = 1.0 - 0.2 * v[1];
@@ -275,7 +275,7 @@ fn a_force_that_fails_is_named() {
 /// The inverse question gives back what drove.
 #[test]
 fn the_forces_of_a_motion_are_found_again() {
-    let chain = Damped::chain(2);
+    let chain = damped::chain(2);
     let (q, v) = ([0.4, -0.2, 1.0, 2.0], [1.0, 0.5, -2.0, 0.3]);
     let torque = [2.0, -1.0, 0.25, 4.0];
     let steady = |row: usize| SampledForce::constant(torque[2 * row..2 * row + 2].to_vec()).unwrap();

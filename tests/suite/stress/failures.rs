@@ -8,7 +8,7 @@ use lnn::configuration::Penalty;
 use lnn::data::{Dataset, DatasetError};
 use lnn::lagrangian::{EulerLagrange, MechanicsError, Request, Terms};
 use lnn::linalg::{self, Failure as MatrixFailure, LinalgError, Workspace};
-use lnn::network::{NetworkLagrangian, Nonlinearity};
+use lnn::network::{ActivationChoice, NetworkLagrangian};
 use lnn::optimizers::{Method, Moments, Update};
 use lnn::scalar::{Dd, Real, Scalar};
 use lnn::training::{Failure, Objective};
@@ -23,7 +23,7 @@ fn positions(batch: usize) -> impl Iterator<Item = usize> {
 
 /// One bad number in the coordinates or velocities of a batch: its row is named, every other row is what it was.
 fn bad_states<S: Scalar>() {
-    let shape = architecture(2, &[8, 8], Nonlinearity::Gelu, 1.0);
+    let shape = architecture(2, &[8, 8], ActivationChoice::Gelu, 1.0);
     let network = NetworkLagrangian::new(shape.clone(), weights::<S>(&shape, 1)).unwrap();
     let pendulum = configure::<S>("double-pendulum", &[]).build().unwrap();
     let models: [(&str, &dyn EulerLagrange<S>); 2] = [("network", &network), ("double pendulum", &*pendulum)];
@@ -70,7 +70,7 @@ fn bad_states<S: Scalar>() {
 
 /// One state of a batch whose evaluation overflows: the step names its row.
 fn overflowing_states<S: Scalar>() {
-    let shape = architecture(2, &[6, 6], Nonlinearity::Quadratic, 1.0);
+    let shape = architecture(2, &[6, 6], ActivationChoice::Quadratic, 1.0);
     let theta = weights::<S>(&shape, 1);
     let mut checks = 0;
     for batch in BATCHES {
@@ -101,7 +101,7 @@ fn overflowing_states<S: Scalar>() {
 /// saturate its unit, which is a finite limit: then the step is a step of finite numbers.
 fn bad_weights<S: Scalar>() {
     let mut checks = 0;
-    for activation in Nonlinearity::ALL {
+    for activation in ActivationChoice::ALL {
         let shape = architecture(2, &[4, 4], activation, 1.0);
         let theta = weights::<S>(&shape, 1);
         for batch in [1, 65] {
@@ -183,7 +183,7 @@ fn hilbert<S: Scalar>() {
 fn massless<S: Scalar>() {
     let mut checks = 0;
     for n in 1..=6 {
-        let shape = architecture(n, &[5, 5], Nonlinearity::Softplus, 0.0);
+        let shape = architecture(n, &[5, 5], ActivationChoice::Softplus, 0.0);
         let nothing = vec![S::of_f64(0.0); weights::<S>(&shape, 1).len()];
         // The second velocity has no weights.
         let mut blind = weights::<S>(&shape, 1);
@@ -225,7 +225,7 @@ fn case_22_singular_mass_matrices() {
 fn subnormal<S: Scalar>() {
     let mut checks = 0;
     let mut slowest = 0.0_f64;
-    for activation in Nonlinearity::ALL {
+    for activation in ActivationChoice::ALL {
         let shape = architecture(2, &[32, 32], activation, 1.0);
         let usual = weights::<S>(&shape, 1);
         let data = states::<S>(2, 256, 7);

@@ -11,7 +11,7 @@ use lnn::lagrangian::systems::{
 };
 use lnn::lagrangian::{self, EulerLagrange, HandWritten, Lagrangian, Request, Terms};
 use lnn::linalg::{self, Workspace};
-use lnn::network::{NetworkLagrangian, Nonlinearity};
+use lnn::network::{ActivationChoice, NetworkLagrangian};
 use lnn::scalar::{Dd, Real, Scalar};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -62,7 +62,7 @@ fn energy_is_kept<S: Scalar>() {
     let mut rng = ChaCha8Rng::seed_from_u64(29);
     let mut random = Row::new::<S>(29, "grad E . (v, a) = 0: random networks");
     for n in 1..=6 {
-        for activation in Nonlinearity::ALL {
+        for activation in ActivationChoice::ALL {
             for (alpha, seed) in [(1.0, 1), (0.0, 2), (-0.3, 3)] {
                 let shape = architecture(n, &[12, 12], activation, alpha);
                 let network = NetworkLagrangian::new(shape.clone(), weights::<S>(&shape, seed)).unwrap();

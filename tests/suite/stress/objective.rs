@@ -3,7 +3,7 @@
 use crate::common::accuracy::cast;
 use lnn::configuration::Penalty;
 use lnn::data::Dataset;
-use lnn::network::{Architecture, Form, Initialization, InputLayer, Nonlinearity, initial_weights};
+use lnn::network::{ActivationChoice, Architecture, Form, Initialization, InputLayer, initial_weights};
 use lnn::scalar::{Dd, Scalar};
 use lnn::tape::{Depth, Evaluation, STATES};
 use lnn::training::{BatchReport, Objective};
@@ -11,7 +11,7 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 /// No coordinate is an angle: reducing it would be one more rounding of the input.
-pub fn architecture(n: usize, hidden: &[usize], activation: Nonlinearity, alpha: f64) -> Architecture {
+pub fn architecture(n: usize, hidden: &[usize], activation: ActivationChoice, alpha: f64) -> Architecture {
     Architecture {
         coordinates: n,
         hidden: hidden.to_vec(),

@@ -8,7 +8,7 @@ use lnn::configuration::Penalty;
 use lnn::data::Dataset;
 use lnn::lagrangian::{EulerLagrange, Request, Terms};
 use lnn::linalg::{self, Workspace};
-use lnn::network::{NetworkLagrangian, Nonlinearity};
+use lnn::network::{ActivationChoice, NetworkLagrangian};
 use lnn::scalar::{Dd, Real, Scalar};
 use lnn::training::Objective;
 use rand::{Rng, SeedableRng};
@@ -63,7 +63,7 @@ fn loss_gradients<S: Scalar>() {
         ["M, unit n eps |M|", "a, unit n eps kappa |a|", "gradient of loss + 100 penalty, unit n eps kappa |.|"]
             .map(|name| Row::new::<S>(13, name));
     for n in 1..=6 {
-        for activation in Nonlinearity::ALL {
+        for activation in ActivationChoice::ALL {
             // Positive definite, negative definite, and whatever the network makes of it.
             for alpha in [1.0, -0.5, 0.02] {
                 let shape = architecture(n, &[16, 16], activation, alpha);
@@ -126,7 +126,7 @@ fn sylvester_of_two(m: &[Dd], c: [Dd; 2]) -> Dd {
 fn medians<S: Scalar>() {
     let mut row = Row::new::<S>(26, "Sylvester's penalty by the lower median");
     for batch in [1, 2, 6, 64, 130] {
-        let shape = architecture(2, &[8, 8], Nonlinearity::Gelu, -0.1);
+        let shape = architecture(2, &[8, 8], ActivationChoice::Gelu, -0.1);
         let theta = weights::<S>(&shape, 26);
         let data = states::<S>(2, batch, 27);
         let matrices = mass_matrices(&shape, &theta, &data);
@@ -158,7 +158,7 @@ fn case_26_lower_medians_of_even_batches() {
 /// The loss of a few states repeated very often is that of those states.
 fn many_rows<S: Scalar>(count: usize) {
     let mut row = Row::new::<S>(36, "mean over many rows, unit eps log2 N");
-    let shape = architecture(1, &[2], Nonlinearity::Softplus, 1.0);
+    let shape = architecture(1, &[2], ActivationChoice::Softplus, 1.0);
     let theta = weights::<S>(&shape, 36);
     let few = states::<S>(1, 5, 37);
     let repeat = |x: &[S]| x.iter().copied().cycle().take(count).collect::<Vec<S>>();
@@ -195,7 +195,7 @@ fn case_36_ten_million_rows() {
 /// Gradients of the parts of a batch add up to that of the batch; threads change no bit.
 fn splits<S: Scalar>() {
     let mut row = Row::new::<S>(37, "gradient of a split batch, unit eps log2 B |terms|");
-    let shape = architecture(2, &[16, 16], Nonlinearity::Gelu, 0.5);
+    let shape = architecture(2, &[16, 16], ActivationChoice::Gelu, 0.5);
     let theta = weights::<S>(&shape, 38);
     let mut checks = 0;
     for batch in [2, 64, 100, 1000] {

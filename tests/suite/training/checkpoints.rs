@@ -8,8 +8,8 @@ use lnn::presets::Preset;
 use lnn::scalar::Scalar;
 use lnn::storage::Disk;
 use lnn::training::{
-    CheckpointError, Epoch, Every, Hooks, Identity, Keeper, NEWEST, PREVIOUS, Progress, Sitting, Stop, Trained,
-    TrainingError, remove_checkpoints, resume, saved, train,
+    CheckpointError, CheckpointManager, Epoch, Every, Hooks, Identity, LATEST, PREVIOUS, Progress, ResumeOptions, Stop,
+    Trained, TrainingError, remove_checkpoints, resume, saved, train,
 };
 use std::fs;
 use std::path::Path;
@@ -48,9 +48,9 @@ impl<S: Scalar> Case<S> {
         train(&self.config, &self.architecture, penalty, self.data.clone(), 1, &Hooks::default()).unwrap()
     }
 
-    fn keeper(&self, directory: &Path, every: Every) -> Arc<Keeper> {
+    fn keeper(&self, directory: &Path, every: Every) -> Arc<CheckpointManager> {
         let identity = Identity { config: format!("{:?}", self.config), data: self.data.checksums() };
-        Arc::new(Keeper::new(Arc::new(Disk), directory, every, identity))
+        Arc::new(CheckpointManager::new(Arc::new(Disk), directory, every, identity))
     }
 
     /// Trains from the checkpoint in the directory, if there is one.
@@ -62,7 +62,7 @@ impl<S: Scalar> Case<S> {
             Err(CheckpointError::Missing) => None,
             Err(error) => panic!("{error}"),
         };
-        let sitting = Sitting { keeper: Some(keeper), start };
+        let sitting = ResumeOptions { keeper: Some(keeper), start };
         let penalty = self.config.penalty().unwrap();
         resume(&self.config, &self.architecture, penalty, self.data.clone(), threads, hooks, sitting)
     }
@@ -140,7 +140,7 @@ fn checkpoints_between_stops_come_as_often_as_asked_for() {
     let directory = tempfile::tempdir().unwrap();
     let epochs = |every: Every| {
         remove_checkpoints(&Disk, directory.path()).unwrap();
-        let (newest, seen) = (directory.path().join(NEWEST), std::sync::Mutex::new(Vec::new()));
+        let (newest, seen) = (directory.path().join(LATEST), std::sync::Mutex::new(Vec::new()));
         let seen = Arc::new(seen);
         let (list, keeper) = (Arc::clone(&seen), case.keeper(directory.path(), every));
         let parameters = Layout::new(&case.architecture).parameters;
@@ -170,7 +170,7 @@ fn the_previous_checkpoint_serves_when_the_newest_is_damaged() {
     let case = Case::<f32>::new(config());
     let whole = case.whole();
     let directory = tempfile::tempdir().unwrap();
-    let (newest, previous) = (directory.path().join(NEWEST), directory.path().join(PREVIOUS));
+    let (newest, previous) = (directory.path().join(LATEST), directory.path().join(PREVIOUS));
     let _ = case.sit(directory.path(), Every::Epochs(1), 1, &stop_after(10));
     let parameters = Layout::new(&case.architecture).parameters;
     let restore = || case.keeper(directory.path(), Every::Epochs(1)).restore::<f32>(parameters, 200);
@@ -196,7 +196,7 @@ fn the_previous_checkpoint_serves_when_the_newest_is_damaged() {
     fs::write(&newest, b"x").unwrap();
     fs::write(&previous, b"y").unwrap();
     let error = restore().unwrap_err().to_string();
-    assert!(error.contains(NEWEST) && error.contains(PREVIOUS), "{error}");
+    assert!(error.contains(LATEST) && error.contains(PREVIOUS), "{error}");
     remove_checkpoints(&Disk, directory.path()).unwrap();
     assert!(matches!(restore(), Err(CheckpointError::Missing)));
 }

@@ -5,10 +5,12 @@ use lnn::configuration::Config;
 use lnn::data::sample_all;
 use lnn::lagrangian::configure;
 use lnn::network::file::{FORMAT, Header, ModelFile, StoredPrecision};
-use lnn::network::{Architecture, Form, InputLayer, Layout, Nonlinearity};
+use lnn::network::{ActivationChoice, Architecture, Form, InputLayer, Layout};
 use lnn::presets::Preset;
 use lnn::storage::{Disk, Files, write_whole};
-use lnn::training::{Every, Hooks, Identity, Keeper, NEWEST, PREVIOUS, Progress, Sitting, Stop, resume};
+use lnn::training::{
+    CheckpointManager, Every, Hooks, Identity, LATEST, PREVIOUS, Progress, ResumeOptions, Stop, resume,
+};
 use std::fs;
 use std::path::Path;
 use std::sync::Arc;
@@ -18,7 +20,7 @@ fn model(value: f64) -> ModelFile<f64> {
     let architecture = Architecture {
         coordinates: 1,
         hidden: vec![3],
-        activation: Nonlinearity::Gelu,
+        activation: ActivationChoice::Gelu,
         alpha: 0.0,
         time_like: None,
         scale: vec![1.0],
@@ -138,7 +140,9 @@ fn sit(directory: &Path, files: Arc<dyn Files>, steps: usize) -> usize {
     let architecture = config.architecture(&system, scale);
     let identity = Identity { config: String::new(), data: data.checksums() };
     let parameters = Layout::new(&architecture).parameters;
-    let keeper = |files: Arc<dyn Files>| Arc::new(Keeper::new(files, directory, Every::Seconds(1e9), identity.clone()));
+    let keeper = |files: Arc<dyn Files>| {
+        Arc::new(CheckpointManager::new(files, directory, Every::Seconds(1e9), identity.clone()))
+    };
     let start = keeper(Arc::new(Disk)).restore(parameters, 64).ok().map(|restored| restored.content);
     let began = start.as_ref().map_or(0, |snapshot| snapshot.steps());
     let interrupt = Arc::new(AtomicBool::new(false));
@@ -149,7 +153,7 @@ fn sit(directory: &Path, files: Arc<dyn Files>, steps: usize) -> usize {
         }
     };
     let hooks = Hooks { watcher: Some(Arc::new(watcher)), interrupt };
-    let sitting = Sitting { keeper: Some(keeper(files)), start };
+    let sitting = ResumeOptions { keeper: Some(keeper(files)), start };
     let penalty = config.penalty().unwrap();
     // In the first epoch nothing has been learned yet.
     if let Ok(trained) = resume(&config, &architecture, penalty, data, 1, &hooks, sitting) {
@@ -163,16 +167,16 @@ fn a_checkpoint_is_the_old_one_or_the_new_one() {
     // One checkpoint at the beginning of a sitting, one at its end.
     let kept = tempfile::tempdir().unwrap();
     assert_eq!(sit(kept.path(), Arc::new(Disk), 2), 0);
-    assert_eq!(names(kept.path()), [PREVIOUS, NEWEST]);
+    assert_eq!(names(kept.path()), [PREVIOUS, LATEST]);
     let attempts = every_fault(|fault, files, place| {
         let directory = tempfile::tempdir().unwrap();
-        for name in [NEWEST, PREVIOUS] {
+        for name in [LATEST, PREVIOUS] {
             fs::copy(kept.path().join(name), directory.path().join(name)).unwrap();
         }
         assert_eq!(sit(directory.path(), files.clone(), 1), 2, "{place}");
         let lasting = matches!(fault, Fault::Full | Fault::Device | Fault::Interrupted | Fault::Death);
         if !lasting {
-            assert_eq!(names(directory.path()), [PREVIOUS, NEWEST], "{place}");
+            assert_eq!(names(directory.path()), [PREVIOUS, LATEST], "{place}");
         }
         // Steps 2 or 3 are there, from whichever file, and the training goes on from them.
         let began = sit(directory.path(), Arc::new(Disk), 1);

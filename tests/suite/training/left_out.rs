@@ -4,11 +4,11 @@ use crate::common::accuracy::cast;
 use crate::common::properties;
 use lnn::configuration::Penalty;
 use lnn::data::Dataset;
-use lnn::data::{Estimated, Noise};
-use lnn::network::{Architecture, Form, Initialization, InputLayer, Layout, Nonlinearity, initial_weights};
-use lnn::recording::Track;
+use lnn::data::{Noise, StateEstimate};
+use lnn::network::{ActivationChoice, Architecture, Form, Initialization, InputLayer, Layout, initial_weights};
+use lnn::recording::RecordedTrajectory;
 use lnn::scalar::{Dd, Scalar};
-use lnn::shooting::{Segments, Shots};
+use lnn::shooting::{Segments, ShootingObjective};
 use lnn::training::Objective;
 use proptest::prelude::*;
 use rand::{Rng, SeedableRng};
@@ -18,7 +18,7 @@ fn architecture(n: usize, alpha: f64) -> Architecture {
     Architecture {
         coordinates: n,
         hidden: vec![6, 5],
-        activation: Nonlinearity::Softplus,
+        activation: ActivationChoice::Softplus,
         alpha,
         time_like: None,
         scale: (0..n).map(|i| 2.0 + i as f64).collect(),
@@ -87,11 +87,11 @@ proptest! {
 }
 
 /// A wave and a half in 15 samples, two coordinates.
-fn track(name: &str) -> Track {
+fn track(name: &str) -> RecordedTrajectory {
     let times: Vec<f64> = (0..15).map(|k| 0.1 * f64::from(k)).collect();
     let q = times.iter().flat_map(|t| [(2.0 * t).sin(), 0.5 * (3.0 * t).cos()]).collect();
     let v = times.iter().flat_map(|t| [2.0 * (2.0 * t).cos(), -1.5 * (3.0 * t).sin()]).collect();
-    Track { name: name.to_string(), times, q, v, a: vec![], force: vec![] }
+    RecordedTrajectory { name: name.to_string(), times, q, v, a: vec![], force: vec![] }
 }
 
 /// Weights and starts together, gaps included.
@@ -99,8 +99,8 @@ fn track(name: &str) -> Track {
 fn the_gradient_of_shooting_is_that_of_the_mean_over_the_segments_that_count() {
     let architecture = architecture(2, 0.75);
     let tracks = [track("one"), track("two")];
-    let estimated: Vec<Estimated<'_>> =
-        tracks.iter().map(|track| Estimated { track, q: &track.q, v: &track.v }).collect();
+    let estimated: Vec<StateEstimate<'_>> =
+        tracks.iter().map(|track| StateEstimate { track, q: &track.q, v: &track.v }).collect();
     let noise = Noise { q: vec![0.05; 2], v: vec![0.1; 2] };
     let double = Segments::<f64>::new(&architecture, &estimated, &noise, 5, 4);
     let exact = Segments::<Dd>::new(&architecture, &estimated, &noise, 5, 4);
@@ -112,7 +112,7 @@ fn the_gradient_of_shooting_is_that_of_the_mean_over_the_segments_that_count() {
     let (rows, parameters) = ([0, 1, 2, 4], Layout::new(&architecture).parameters);
     let (mut by_weights, mut by_starts) = (vec![0.0; parameters], vec![0.0; starts.len()]);
     let continuity = 0.5;
-    let mut shots = Shots::<f64>::new(&architecture, Penalty::None, (continuity, 2.0), 2).unwrap();
+    let mut shots = ShootingObjective::<f64>::new(&architecture, Penalty::None, (continuity, 2.0), 2).unwrap();
     let report = shots.step(&weights, &double, &starts, &rows, (&mut by_weights, &mut by_starts));
     assert_eq!((double.len(), report.left_out), (6, 1));
     // Five samples, two coordinates, positions and velocities; three segments count.
@@ -124,7 +124,7 @@ fn the_gradient_of_shooting_is_that_of_the_mean_over_the_segments_that_count() {
     let gaps = Dd::of_f64(continuity * 2.0 * 4.0 / report.residuals as f64);
     let value = |x: &[Dd]| {
         let (weights, starts) = x.split_at(parameters);
-        let mut shots = Shots::<Dd>::new(&architecture, Penalty::None, (continuity, 2.0), 1).unwrap();
+        let mut shots = ShootingObjective::<Dd>::new(&architecture, Penalty::None, (continuity, 2.0), 1).unwrap();
         let report = shots.loss(weights, &exact, starts, &rows);
         assert_eq!(report.left_out, 1);
         report.loss + report.gap * gaps

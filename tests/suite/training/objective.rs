@@ -7,7 +7,9 @@ use lnn::configuration::{
 use lnn::data::{Dataset, Datasets};
 use lnn::forward::HyperDual;
 use lnn::lagrangian::Lagrangian;
-use lnn::network::{Architecture, Form, Initialization, InputLayer, Layout, Nonlinearity, Structure, initial_weights};
+use lnn::network::{
+    ActivationChoice, Architecture, Form, Initialization, InputLayer, Layout, Structure, initial_weights,
+};
 use lnn::optimizers::{Method, Schedule};
 use lnn::scalar::{Dd, Real, Scalar};
 use lnn::tape::{ScalarFunction, gradient};
@@ -22,7 +24,7 @@ fn architecture(n: usize, hidden: &[usize]) -> Architecture {
     Architecture {
         coordinates: n,
         hidden: hidden.to_vec(),
-        activation: Nonlinearity::Gelu,
+        activation: ActivationChoice::Gelu,
         alpha: 0.3,
         time_like: None,
         scale: (0..n).map(|i| 2.0 + i as f64).collect(),
@@ -154,16 +156,16 @@ impl<S: Scalar> ScalarFunction for MeanLoss<'_, S> {
 }
 
 /// Activation, input layer, units of the dissipation.
-type Model = (Nonlinearity, InputLayer, Option<usize>);
+type Model = (ActivationChoice, InputLayer, Option<usize>);
 
 /// One or two branches, with and without an input layer, with and without friction.
 const MODELS: [Model; 6] = [
-    (Nonlinearity::Gelu, InputLayer::None, None),
-    (Nonlinearity::Gelu, InputLayer::Dyt, None),
-    (Nonlinearity::QuadraticSoftplus, InputLayer::None, None),
-    (Nonlinearity::QuadraticSoftplus, InputLayer::Dyt, None),
-    (Nonlinearity::Gelu, InputLayer::None, Some(5)),
-    (Nonlinearity::QuadraticSoftplus, InputLayer::Dyt, Some(3)),
+    (ActivationChoice::Gelu, InputLayer::None, None),
+    (ActivationChoice::Gelu, InputLayer::Dyt, None),
+    (ActivationChoice::QuadraticSoftplus, InputLayer::None, None),
+    (ActivationChoice::QuadraticSoftplus, InputLayer::Dyt, None),
+    (ActivationChoice::Gelu, InputLayer::None, Some(5)),
+    (ActivationChoice::QuadraticSoftplus, InputLayer::Dyt, Some(3)),
 ];
 
 fn gradient_agrees<S: Scalar>(
@@ -420,7 +422,7 @@ fn config(epochs: usize) -> Config {
         },
         network: Network {
             hidden: vec![16, 16],
-            activation: Nonlinearity::Gelu,
+            activation: ActivationChoice::Gelu,
             alpha: 1.0,
             time_like: None,
             scaling: Scaling::Physical,
@@ -520,7 +522,7 @@ fn a_configuration_needs_no_input_layer_and_even_widths_for_a_hybrid() {
     assert!(text.contains(field));
     assert_eq!(serde_json::from_str::<Config>(&text.replace(field, "")).unwrap(), config);
     config.network.input_layer = InputLayer::Dyt;
-    config.network.activation = Nonlinearity::QuadraticSoftplus;
+    config.network.activation = ActivationChoice::QuadraticSoftplus;
     config.network.initialization = Initialization::NearZero;
     let text = serde_json::to_string(&config).unwrap();
     for name in ["\"dyt\"", "\"quadratic-softplus\"", "\"near-zero\""] {
@@ -534,7 +536,7 @@ fn a_configuration_needs_no_input_layer_and_even_widths_for_a_hybrid() {
         assert_eq!((error.field.as_str(), error.found), ("network.hidden[1]", width.to_string()));
         assert!(error.expected.contains("even") && error.expected.contains("quadratic-softplus"));
     }
-    config.network.activation = Nonlinearity::Softplus;
+    config.network.activation = ActivationChoice::Softplus;
     assert_eq!(config.validate(2), Ok(()));
 }
 
@@ -602,7 +604,7 @@ fn a_singular_mass_matrix_stops_or_is_left_out_by_choice() {
 fn validation_states_that_are_left_out_never_make_the_best_epoch() {
     let config = config(2);
     // Far from 0 a softplus is linear to the last bit: M vanishes on states moved there, and on them alone.
-    let activation = Nonlinearity::Softplus;
+    let activation = ActivationChoice::Softplus;
     let shape = architecture(2, &config.network.hidden);
     let architecture = Architecture { activation, alpha: 0.0, embed_periodic: false, ..shape };
     let near = datasets();
@@ -623,7 +625,7 @@ fn one_number_that_is_not_finite_is_named_and_never_reaches_the_weights() {
     let mut data = datasets();
     data.training[0] = bad;
     let mut skipping = config(2);
-    skipping.network.activation = Nonlinearity::Quadratic;
+    skipping.network.activation = ActivationChoice::Quadratic;
     let mut stopping = skipping.clone();
     stopping.optimizer.on_failure = OnFailure::Stop;
     let error = run(&stopping, data.clone(), 2, &Hooks::default()).unwrap_err().to_string();

@@ -5,16 +5,20 @@ use crate::common::nested::reference;
 use crate::common::{of_scalar, properties};
 use lnn::configuration::Penalty;
 use lnn::data::{Dataset, Datasets};
-use lnn::data::{Estimated, Noise};
+use lnn::data::{Noise, StateEstimate};
 use lnn::lagrangian::configure;
-use lnn::network::{Architecture, Form, Initialization, InputLayer, Layout, LinearMap, Nonlinearity, initial_weights};
+use lnn::network::{
+    ActivationChoice, Architecture, Form, Initialization, InputLayer, Layout, LinearMap, initial_weights,
+};
 use lnn::presets::Preset;
-use lnn::recording::Track;
+use lnn::recording::RecordedTrajectory;
 use lnn::scalar::{Dd, Real, Scalar};
-use lnn::shooting::{self, Curvature, Fitted, Segments, Shooting, ShootingError, Shots, Task, fit};
+use lnn::shooting::{self, Curvature, Fitted, Segments, Shooting, ShootingError, ShootingObjective, Task, fit};
 use lnn::storage::Disk;
 use lnn::tape::{Depth, Evaluation, MixedDirections, ScalarFunction, gradient};
-use lnn::training::{Every, Hooks, Identity, Keeper, Objective, Progress, Sitting, Stop, TrainingError, resume};
+use lnn::training::{
+    CheckpointManager, Every, Hooks, Identity, Objective, Progress, ResumeOptions, Stop, TrainingError, resume,
+};
 use proptest::prelude::*;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -23,7 +27,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-fn small(n: usize, activation: Nonlinearity, input_layer: InputLayer, embed_periodic: bool) -> Architecture {
+fn small(n: usize, activation: ActivationChoice, input_layer: InputLayer, embed_periodic: bool) -> Architecture {
     Architecture {
         coordinates: n,
         hidden: vec![6, 4],
@@ -136,7 +140,7 @@ fn input_gradients<S: Scalar>(architecture: &Architecture, seed: u64, moving: bo
 #[test]
 fn input_gradients_agree_with_nested_forward_numbers() {
     let mut worst = [0.0_f64; 3];
-    for (k, activation) in Nonlinearity::ALL.into_iter().enumerate() {
+    for (k, activation) in ActivationChoice::ALL.into_iter().enumerate() {
         for n in 1..=4 {
             for (input_layer, embed, moving) in [
                 (InputLayer::None, true, true),
@@ -165,7 +169,7 @@ proptest! {
     fn input_gradients_of_random_networks(
         n in 1_usize..=4,
         hidden in prop::collection::vec(1_usize..6, 1..4),
-        activation in prop::sample::select(&Nonlinearity::ALL[..]),
+        activation in prop::sample::select(&ActivationChoice::ALL[..]),
         dyt in any::<bool>(),
         embed in any::<bool>(),
         seed in any::<u64>(),
@@ -179,7 +183,7 @@ proptest! {
 }
 
 /// A made-up recording: smooth, irregular in time, of nothing in particular.
-fn track(n: usize, samples: usize, seed: u64, measures: bool) -> Track {
+fn track(n: usize, samples: usize, seed: u64, measures: bool) -> RecordedTrajectory {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut time = 0.0;
     let times: Vec<f64> = (0..samples)
@@ -196,11 +200,11 @@ fn track(n: usize, samples: usize, seed: u64, measures: bool) -> Track {
     let v = all(&|t, i| 2.0 * (2.0 * t + phase[i]).cos());
     let force = if measures { all(&|t, i| 0.3 * (t + i as f64).sin()) } else { Vec::new() };
     let v = if measures { v } else { Vec::new() };
-    Track { name: format!("track {seed}"), times, q, v, a: Vec::new(), force }
+    RecordedTrajectory { name: format!("track {seed}"), times, q, v, a: Vec::new(), force }
 }
 
 /// Estimates that are a little off.
-fn estimates(track: &Track, n: usize, error: f64, seed: u64) -> (Vec<f64>, Vec<f64>) {
+fn estimates(track: &RecordedTrajectory, n: usize, error: f64, seed: u64) -> (Vec<f64>, Vec<f64>) {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut off = |x: f64| x + error * rng.random_range(-1.0..1.0);
     let q: Vec<f64> = track.q.iter().map(|&q| off(q)).collect();
@@ -217,7 +221,7 @@ fn estimates(track: &Track, n: usize, error: f64, seed: u64) -> (Vec<f64>, Vec<f
 
 /// Tracks with estimated states.
 struct Motion {
-    tracks: Vec<Track>,
+    tracks: Vec<RecordedTrajectory>,
     states: Vec<(Vec<f64>, Vec<f64>)>,
 }
 
@@ -228,9 +232,9 @@ impl Motion {
         Self { tracks, states }
     }
 
-    fn estimated(&self) -> Vec<Estimated<'_>> {
+    fn estimated(&self) -> Vec<StateEstimate<'_>> {
         let pairs = self.tracks.iter().zip(&self.states);
-        pairs.map(|(track, (q, v))| Estimated { track, q, v }).collect()
+        pairs.map(|(track, (q, v))| StateEstimate { track, q, v }).collect()
     }
 }
 
@@ -242,13 +246,13 @@ fn segments<S: Scalar>(architecture: &Architecture, motion: &Motion, per_segment
     Segments::new(architecture, &motion.estimated(), &noise(architecture.coordinates), per_segment, steps)
 }
 
-fn shots<S: Scalar>(architecture: &Architecture, penalty: Penalty, threads: usize) -> Shots<S> {
-    Shots::new(architecture, penalty, (0.5, 2.0), threads).unwrap()
+fn shots<S: Scalar>(architecture: &Architecture, penalty: Penalty, threads: usize) -> ShootingObjective<S> {
+    ShootingObjective::new(architecture, penalty, (0.5, 2.0), threads).unwrap()
 }
 
-/// What [`Shots::step`] differentiates, for `joints` gaps of the `rows`.
+/// What [`ShootingObjective::step`] differentiates, for `joints` gaps of the `rows`.
 fn objective<S: Scalar>(
-    shots: &mut Shots<S>,
+    shots: &mut ShootingObjective<S>,
     segments: &Segments<S>,
     (weights, starts): (&[S], &[S]),
     (rows, joints): (&[u32], usize),
@@ -263,9 +267,9 @@ fn objective<S: Scalar>(
 #[test]
 fn the_gradient_through_the_integrator_is_that_of_the_discrete_map() {
     let kinds = [
-        (1, Nonlinearity::Gelu, InputLayer::None, true, None),
-        (2, Nonlinearity::Softplus, InputLayer::None, true, Some(3)),
-        (2, Nonlinearity::QuadraticSoftplus, InputLayer::Dyt, false, None),
+        (1, ActivationChoice::Gelu, InputLayer::None, true, None),
+        (2, ActivationChoice::Softplus, InputLayer::None, true, Some(3)),
+        (2, ActivationChoice::QuadraticSoftplus, InputLayer::Dyt, false, None),
     ];
     for (n, activation, input_layer, embed, dissipation) in kinds {
         let architecture = Architecture { dissipation, ..small(n, activation, input_layer, embed) };
@@ -315,7 +319,7 @@ fn the_gradient_through_the_integrator_is_that_of_the_discrete_map() {
 /// accelerations.
 #[test]
 fn the_penalty_is_that_of_supervised_training() {
-    let architecture = Architecture { alpha: -0.4, ..small(2, Nonlinearity::Gelu, InputLayer::None, true) };
+    let architecture = Architecture { alpha: -0.4, ..small(2, ActivationChoice::Gelu, InputLayer::None, true) };
     let motion = Motion::made_up(2, 8);
     let segments = segments::<f64>(&architecture, &motion, 4, 1);
     let weights: Vec<f64> = draw_weights(&architecture, &mut ChaCha8Rng::seed_from_u64(4));
@@ -357,7 +361,7 @@ fn the_penalty_is_that_of_supervised_training() {
 /// Predictions, at the steps' ends and between them, err by the fourth power of the step.
 #[test]
 fn the_method_has_order_four() {
-    let architecture = small(2, Nonlinearity::Softplus, InputLayer::None, true);
+    let architecture = small(2, ActivationChoice::Softplus, InputLayer::None, true);
     let mut motion = Motion::made_up(2, 24);
     // A force given by samples has kinks.
     motion.tracks.iter_mut().for_each(|track| track.force.clear());
@@ -395,7 +399,7 @@ fn the_method_has_order_four() {
 /// Whole turns, and which ones a recording counts, change nothing but rounding.
 #[test]
 fn turns_do_not_matter() {
-    let architecture = small(2, Nonlinearity::Gelu, InputLayer::None, false);
+    let architecture = small(2, ActivationChoice::Gelu, InputLayer::None, false);
     let weights: Vec<f64> = draw_weights(&architecture, &mut ChaCha8Rng::seed_from_u64(6));
     let at = |turns: f64| {
         let mut motion = Motion::made_up(2, 12);
@@ -417,15 +421,15 @@ fn turns_do_not_matter() {
 /// Gauss-Newton steps lead to starts where the exact gradient vanishes.
 #[test]
 fn refinement_ends_where_the_gradient_by_the_starts_vanishes() {
-    let architecture = small(1, Nonlinearity::Gelu, InputLayer::None, true);
+    let architecture = small(1, ActivationChoice::Gelu, InputLayer::None, true);
     let motion = Motion::made_up(1, 24);
     let weights: Vec<f64> = draw_weights(&architecture, &mut ChaCha8Rng::seed_from_u64(8));
     let segments = segments::<f64>(&architecture, &motion, 8, 4);
     let rows: Vec<u32> = (0..segments.len() as u32).collect();
-    let mut shots = Shots::<f64>::new(&architecture, Penalty::None, (0.5, f64::INFINITY), 2).unwrap();
+    let mut shots = ShootingObjective::<f64>::new(&architecture, Penalty::None, (0.5, f64::INFINITY), 2).unwrap();
     let (mut starts, mut curvature) = (segments.starts().to_vec(), Curvature::default());
     let (mut by_weights, mut by_starts) = (vec![0.0; weights.len()], starts.clone());
-    let mut slope = |shots: &mut Shots<f64>, starts: &[f64]| {
+    let mut slope = |shots: &mut ShootingObjective<f64>, starts: &[f64]| {
         let report = shots.step(&weights, &segments, starts, &rows, (&mut by_weights, &mut by_starts));
         (report.loss, by_starts.iter().fold(0.0_f64, |m, g| m.max(g.abs())))
     };
@@ -450,7 +454,7 @@ fn refinement_ends_where_the_gradient_by_the_starts_vanishes() {
 /// Segments without motion are left out and counted, and give no gradient.
 #[test]
 fn singular_mass_matrices_are_left_out() {
-    let architecture = Architecture { alpha: 0.0, ..small(2, Nonlinearity::Gelu, InputLayer::None, true) };
+    let architecture = Architecture { alpha: 0.0, ..small(2, ActivationChoice::Gelu, InputLayer::None, true) };
     let motion = Motion::made_up(2, 8);
     let segments = segments::<f32>(&architecture, &motion, 4, 2);
     let weights = vec![0.0_f32; Layout::new(&architecture).parameters];
@@ -489,7 +493,7 @@ fn fit_motion<S: Scalar>(
 
 #[test]
 fn the_same_bytes_on_any_number_of_threads() {
-    let architecture = small(2, Nonlinearity::Gelu, InputLayer::None, true);
+    let architecture = small(2, ActivationChoice::Gelu, InputLayer::None, true);
     let motion = Motion::made_up(2, 300);
     let weights: Vec<f32> = draw_weights(&architecture, &mut ChaCha8Rng::seed_from_u64(9));
     // Some epoch must be better than the start, or nothing would be compared.
@@ -517,7 +521,7 @@ fn oscillator(samples: usize, error: f64) -> Motion {
             times.iter().map(|t| -2.0 * size * (2.0 * t + phase).sin() + rng.random_range(-0.1..0.1)).collect();
         let q: Vec<f64> = exact.iter().map(|q| q + error * rng.random_range(-1.0..1.0)).collect();
         states.push((q.clone(), v));
-        tracks.push(Track { name: format!("{k}"), times, q, v: vec![], a: vec![], force: vec![] });
+        tracks.push(RecordedTrajectory { name: format!("{k}"), times, q, v: vec![], a: vec![], force: vec![] });
     }
     Motion { tracks, states }
 }
@@ -528,7 +532,7 @@ fn exact_positions_teach_exact_accelerations() {
     let architecture = Architecture {
         coordinates: 1,
         hidden: vec![8],
-        activation: Nonlinearity::Quadratic,
+        activation: ActivationChoice::Quadratic,
         alpha: 1.0,
         time_like: None,
         scale: vec![2.0],
@@ -577,7 +581,7 @@ fn exact_positions_teach_exact_accelerations() {
 
 #[test]
 fn an_interrupt_keeps_the_best_so_far() {
-    let architecture = small(2, Nonlinearity::Gelu, InputLayer::None, true);
+    let architecture = small(2, ActivationChoice::Gelu, InputLayer::None, true);
     let motion = Motion::made_up(2, 24);
     let weights: Vec<f64> = draw_weights(&architecture, &mut ChaCha8Rng::seed_from_u64(9));
     let hooks = Hooks::default();
@@ -589,7 +593,7 @@ fn an_interrupt_keeps_the_best_so_far() {
 /// The training that gave the weights is but an epoch of nothing; what is held is multiple shooting behind it.
 #[test]
 fn stopping_after_any_step_changes_nothing() {
-    let architecture = small(2, Nonlinearity::Gelu, InputLayer::None, true);
+    let architecture = small(2, ActivationChoice::Gelu, InputLayer::None, true);
     let motion = Motion::made_up(2, 24);
     let tracks = motion.estimated();
     let noise = noise(2);
@@ -605,10 +609,10 @@ fn stopping_after_any_step_changes_nothing() {
     // As a program does it: the training from the checkpoint or the beginning, then multiple shooting.
     let sit = |directory: &Path, every: Every, threads: usize, hooks: &Hooks| {
         let identity = Identity { config: "fit".to_string(), data: data.checksums() };
-        let keeper = Arc::new(Keeper::new(Arc::new(Disk), directory, every, identity));
+        let keeper = Arc::new(CheckpointManager::new(Arc::new(Disk), directory, every, identity));
         let start = keeper.restore::<f64>(Layout::new(&architecture).parameters, 8).ok().map(|found| found.content);
         let shots = start.clone().filter(|snapshot| snapshot.is_shooting());
-        let sitting = Sitting { keeper: Some(Arc::clone(&keeper)), start };
+        let sitting = ResumeOptions { keeper: Some(Arc::clone(&keeper)), start };
         let trained =
             resume(&config, &architecture, Penalty::None, data.clone(), threads, &Hooks::default(), sitting).unwrap();
         let (training, validation) = (&tracks[..], &tracks[..]);
@@ -616,7 +620,7 @@ fn stopping_after_any_step_changes_nothing() {
         let penalty = Penalty::None;
         let task = Task { architecture: &architecture, penalty, weights, training, validation, noise: &noise, seed: 1 };
         let start = Some(shots.unwrap_or_else(|| trained.snapshot(&config)));
-        shooting::resume(&settings, task, threads, hooks, Sitting { keeper: Some(keeper), start }).unwrap()
+        shooting::resume(&settings, task, threads, hooks, ResumeOptions { keeper: Some(keeper), start }).unwrap()
     };
     let stop_after = |steps: usize| {
         let interrupt = Arc::new(AtomicBool::new(false));
@@ -658,19 +662,19 @@ fn stopping_after_any_step_changes_nothing() {
 
 #[test]
 fn bad_numbers_are_named() {
-    let architecture = small(2, Nonlinearity::Gelu, InputLayer::None, true);
+    let architecture = small(2, ActivationChoice::Gelu, InputLayer::None, true);
     let motion = Motion::made_up(2, 8);
     let tracks = motion.estimated();
     let weights: Vec<f64> = draw_weights(&architecture, &mut ChaCha8Rng::seed_from_u64(9));
     let good = noise(2);
-    let message = |noise: &Noise, weights: &[f64], training: &[Estimated<'_>]| {
+    let message = |noise: &Noise, weights: &[f64], training: &[StateEstimate<'_>]| {
         let (architecture, weights, validation) = (&architecture, weights.to_vec(), training);
         let task = Task { architecture, penalty: Penalty::None, weights, training, validation, noise, seed: 1 };
         fit(&quick(), task, 1, &Hooks::default()).unwrap_err().to_string()
     };
     let short = Noise { q: vec![0.1], v: vec![] };
     let zero = Noise { q: vec![0.1, 0.0], v: vec![] };
-    let off = [Estimated { q: &tracks[0].q[1..], ..tracks[0] }];
+    let off = [StateEstimate { q: &tracks[0].q[1..], ..tracks[0] }];
     let sigma = "standard deviations of positions";
     assert_eq!(message(&short, &weights, &tracks), format!("{sigma}: expected 2 numbers, found 1"));
     assert_eq!(message(&zero, &weights, &tracks), format!("{sigma}: expected positive numbers, found 0"));

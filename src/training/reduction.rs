@@ -1,4 +1,4 @@
-//! Sums over the stripes of a batch in their order: the same numbers on any number of threads.
+//! Sums over the shards of a batch in their order: the same numbers on any number of threads.
 
 use crate::scalar::Scalar;
 use rayon::prelude::*;
@@ -6,19 +6,19 @@ use rayon::prelude::*;
 /// Parameters summed at a time.
 const BLOCK: usize = 1 << 14;
 
-/// Writes the sum of the gradients of all `stripes`, at least one, to `out`; nothing is allocated.
+/// Writes the sum of the gradients of all `shards`, at least one, to `out`; nothing is allocated.
 pub(crate) fn sum_gradients<S: Scalar, T: Sync>(
     pool: &rayon::ThreadPool,
-    stripes: &[T],
+    shards: &[T],
     gradient: impl Fn(&T) -> &[S] + Sync,
     out: &mut [S],
 ) {
     pool.install(|| {
         out.par_chunks_mut(BLOCK).enumerate().for_each(|(k, block)| {
             let range = k * BLOCK..k * BLOCK + block.len();
-            block.copy_from_slice(&gradient(&stripes[0])[range.clone()]);
-            for stripe in &stripes[1..] {
-                for (sum, &g) in block.iter_mut().zip(&gradient(stripe)[range.clone()]) {
+            block.copy_from_slice(&gradient(&shards[0])[range.clone()]);
+            for shard in &shards[1..] {
+                for (sum, &g) in block.iter_mut().zip(&gradient(shard)[range.clone()]) {
                     *sum += g;
                 }
             }

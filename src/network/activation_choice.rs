@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
-pub enum Nonlinearity {
+pub enum ActivationChoice {
     /// `x Phi(x)`, exact (error function).
     Gelu,
     /// `ln(1 + e^x)`.
@@ -22,7 +22,7 @@ pub enum Nonlinearity {
     QuadraticSoftplus,
 }
 
-impl Nonlinearity {
+impl ActivationChoice {
     /// Every choice.
     pub const ALL: [Self; 6] =
         [Self::Gelu, Self::Softplus, Self::XTanh, Self::Tanh, Self::Quadratic, Self::QuadraticSoftplus];
@@ -48,7 +48,7 @@ impl Nonlinearity {
     }
 }
 
-impl std::fmt::Display for Nonlinearity {
+impl std::fmt::Display for ActivationChoice {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.pad(self.name())
     }
@@ -56,14 +56,14 @@ impl std::fmt::Display for Nonlinearity {
 
 /// A text that names no activation.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("unknown activation `{0}`; known are {known}", known = Nonlinearity::ALL.map(Nonlinearity::name).join(", "))]
-pub struct UnknownNonlinearity(pub String);
+#[error("unknown activation `{0}`; known are {known}", known = ActivationChoice::ALL.map(ActivationChoice::name).join(", "))]
+pub struct UnknownActivation(pub String);
 
-impl std::str::FromStr for Nonlinearity {
-    type Err = UnknownNonlinearity;
+impl std::str::FromStr for ActivationChoice {
+    type Err = UnknownActivation;
 
-    fn from_str(text: &str) -> Result<Self, UnknownNonlinearity> {
-        Self::ALL.into_iter().find(|a| a.name() == text).ok_or_else(|| UnknownNonlinearity(text.to_owned()))
+    fn from_str(text: &str) -> Result<Self, UnknownActivation> {
+        Self::ALL.into_iter().find(|a| a.name() == text).ok_or_else(|| UnknownActivation(text.to_owned()))
     }
 }
 
@@ -73,12 +73,12 @@ mod tests {
 
     #[test]
     fn names_agree_with_serde() {
-        for choice in Nonlinearity::ALL {
+        for choice in ActivationChoice::ALL {
             assert_eq!(serde_json::to_string(&choice).unwrap(), format!("\"{choice}\""));
-            assert_eq!(choice.to_string().parse::<Nonlinearity>(), Ok(choice));
+            assert_eq!(choice.to_string().parse::<ActivationChoice>(), Ok(choice));
         }
         for unknown in ["relu", "identity"] {
-            let error = unknown.parse::<Nonlinearity>().unwrap_err().to_string();
+            let error = unknown.parse::<ActivationChoice>().unwrap_err().to_string();
             assert!(error.contains(unknown) && error.ends_with("quadratic, quadratic-softplus"), "{error}");
         }
     }

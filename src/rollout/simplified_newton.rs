@@ -22,7 +22,7 @@ const PATIENCE: usize = 1;
 
 /// The inverse of an iteration matrix and how well it did.
 #[derive(Clone, Debug)]
-pub(super) struct Chord<S> {
+pub(super) struct SimplifiedNewton<S> {
     inverse: Vec<S>,
     /// Fewest evaluations a step took with this matrix.
     least: usize,
@@ -32,7 +32,7 @@ pub(super) struct Chord<S> {
     unit: Vec<S>,
 }
 
-impl<S: Scalar> Chord<S> {
+impl<S: Scalar> SimplifiedNewton<S> {
     /// Without a matrix, for `size` unknowns.
     pub(super) fn new(size: usize) -> Self {
         let zero = <S as Real>::zero();

@@ -5,14 +5,14 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 /// A process that writes into a directory.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Holder {
+pub struct LockOwner {
     process: u32,
     host: String,
     /// Seconds since 1970, UTC.
     since: u64,
 }
 
-impl Holder {
+impl LockOwner {
     /// This process, from now on.
     pub fn this() -> Self {
         let since = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |time| time.as_secs());
@@ -33,7 +33,7 @@ impl Holder {
     }
 }
 
-impl fmt::Display for Holder {
+impl fmt::Display for LockOwner {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { process, host, since } = self;
         write!(f, "process {process} on {host} since {}", utc(*since))
@@ -81,10 +81,10 @@ mod tests {
 
     #[test]
     fn the_text_comes_back() {
-        let holder = Holder::this();
-        assert_eq!(Holder::parse(&holder.text()), Some(holder));
+        let holder = LockOwner::this();
+        assert_eq!(LockOwner::parse(&holder.text()), Some(holder));
         for bad in ["", "process x\nhost a\nsince 1\n", "process 1\nsince 1\n", "process 1\nhost a\nsince -1\n"] {
-            assert_eq!(Holder::parse(bad), None, "{bad}");
+            assert_eq!(LockOwner::parse(bad), None, "{bad}");
         }
     }
 }

@@ -66,7 +66,7 @@ impl<S: Scalar> Systems<'_, S> {
                             let largest = elimination::load((n, 1), matrices, right, start, system);
                             let pivots = elimination::solve((n, 1), system);
                             if store((n, 1), system, &pivots, &largest, false, solutions, start) {
-                                self.look_again::<W>(solutions, start, second, failures);
+                                self.refine::<W>(solutions, start, second, failures);
                             }
                         }
                     });
@@ -76,7 +76,7 @@ impl<S: Scalar> Systems<'_, S> {
                             let largest = elimination::load((n, n), matrices, right, start, system);
                             let pivots = elimination::solve((n, n), system);
                             if store((n, n), system, &pivots, &largest, right.is_none(), solutions, start) {
-                                self.look_again::<W>(solutions, start, second, failures);
+                                self.refine::<W>(solutions, start, second, failures);
                             }
                         }
                     });
@@ -92,7 +92,7 @@ impl<S: Scalar> Systems<'_, S> {
     /// working precision, and what is left after the two cancel has a larger backward error than either.
     #[cold]
     #[inline(never)]
-    fn look_again<const W: usize>(
+    fn refine<const W: usize>(
         &self,
         solutions: &mut [S],
         start: usize,
