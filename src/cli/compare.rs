@@ -1,6 +1,6 @@
 //! `lnn compare`: what two Lagrangians have in common beyond factor and gauge.
 
-use crate::cli::probe::{Bound, Probe, bound, enough};
+use crate::cli::probe::{Bound, Probe, bound};
 use crate::cli::source::parameter;
 use crate::cli::symmetries::{Format, degrees};
 use crate::cli::{CliError, number, output};
@@ -70,7 +70,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     first.meet(&mut second)?;
     first.narrow(&args.region)?;
     let (basis, _) = first.basis(args.basis);
-    let points = args.points.unwrap_or_else(|| enough(basis.len()));
+    let points = args.points.unwrap_or_else(|| first.enough(basis.len()));
     // On the mass shell of a system, rather than where a model says nothing.
     let (q, v) = first.states_beside(&second, points, args.seed)?;
     let found = compare(first.model.as_ref(), second.model.as_ref(), &basis, (&q, &v)).map_err(CliError::data)?;
