@@ -103,7 +103,11 @@ pub(crate) fn sparsest(
         let floor = (NOTHING * size).min(0.1 * near);
         active.retain(|i| (x[*i] * sizes[*i]).abs() > floor);
     }
-    (0..count).filter(|i| (x[*i] * sizes[*i]).abs() <= NOTHING * size).for_each(|i| x[i] = 0.0);
+    for (x, s) in x.iter_mut().zip(sizes) {
+        if (*x * s).abs() <= NOTHING * size {
+            *x = 0.0;
+        }
+    }
     let before = residual(start).max((noise * size).powi(2) * 1e-2);
     (residual(&x) <= WORTH * WORTH * before).then_some(x)
 }
