@@ -88,7 +88,7 @@ fn finished(directory: &Path) -> Result<(Found, Learner), CliError> {
         (Some((Summary { ended, .. }, _)), _) if ended != "interrupted" => {
             Err(CliError::file(directory, format_args!("this training has ended: {ended}")))
         }
-        _ => Err(CliError::file(directory, format_args!("there is no checkpoint ({NEWEST}) to go on from"))),
+        _ => Err(CliError::file(directory, format_args!("there is no checkpoint ({LATEST}) to go on from"))),
     }
 }
 

@@ -38,7 +38,7 @@ pub enum CheckpointError {
     #[error("there is no checkpoint")]
     Missing,
     /// Neither the newest checkpoint nor the one before can be read.
-    #[error("{NEWEST}: {newest}; {PREVIOUS}: {previous}")]
+    #[error("{LATEST}: {newest}; {PREVIOUS}: {previous}")]
     Damaged {
         /// Problem of the newest.
         newest: Box<ModelFileError>,
