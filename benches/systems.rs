@@ -5,6 +5,7 @@ mod ratio;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use lnn::cli::parse_system;
+use lnn::geometry::geometries;
 use lnn::lagrangian::{self, Request, Terms};
 use lnn::scalar::Scalar;
 use nalgebra_of_num_dual::SVector;
@@ -101,6 +102,12 @@ fn benches(c: &mut Criterion) {
             {
                 group.bench_function(BenchmarkId::new(what, batch), |b| {
                     b.iter(|| built.terms(black_box(&q), &v, request, &mut terms));
+                });
+            }
+            if system.time_like.is_some() && batch == 128 {
+                let rest = vec![0.0; n];
+                group.bench_function(BenchmarkId::new("geometry", batch), |b| {
+                    b.iter(|| geometries(&*built, black_box(&q), &rest));
                 });
             }
             if name == "double-pendulum" {

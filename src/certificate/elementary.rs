@@ -6,7 +6,7 @@
 
 use super::interval::Interval;
 use crate::scalar::Real;
-use std::f64::consts::{FRAC_PI_2, PI};
+use std::f64::consts::PI;
 
 /// Relative error that a function is granted: 8 units in the last place.
 const MARGIN: f64 = 8.0 * f64::EPSILON;
@@ -152,18 +152,5 @@ impl Interval {
         let power = |x: f64| x.powf(exponent);
         let found = if exponent < 0.0 { self.decreasing(power) } else { self.increasing(power) };
         within(found, 0.0, f64::INFINITY)
-    }
-    /// Angle of the points `(x, self)`; everything if they may lie on the cut `x <= 0, self = 0`.
-    pub fn atan2(self, x: Self) -> Self {
-        let quarter = Self { low: FRAC_PI_2, high: FRAC_PI_2.next_up() };
-        if x.low > 0.0 {
-            (self / x).atan()
-        } else if self.low > 0.0 {
-            quarter - (x / self).atan()
-        } else if self.high < 0.0 {
-            -quarter - (x / self).atan()
-        } else {
-            Self::ENTIRE
-        }
     }
 }

@@ -8,6 +8,8 @@ use super::function::Derivatives;
 use super::interval::Interval;
 
 const EPSILON: f64 = f64::EPSILON;
+/// Largest share of the radius of a range that the distance from a plane may have.
+const WORTHWHILE: f64 = 0.7;
 /// Covers what underflow loses.
 const TINY: f64 = 1e-290;
 
@@ -116,7 +118,7 @@ pub fn add_product(out: &mut [f64], a: &[f64], b: &[f64]) {
 }
 
 /// `f(z)` or one of its first two derivatives, the `order`-th, by Taylor's formula about the centre of `z`; `at` are the derivatives of
-/// `f` there and `over` those over the range of `z`. Where the range itself is narrower than what the formula gives, the range.
+/// `f` there and `over` those over the range of `z`. Where the range is not much wider than the distance from the plane, the range.
 pub fn set_function(out: &mut [f64], z: &[f64], at: &Derivatives, over: &Derivatives, order: usize) {
     let m = z.len() - 1;
     let distance = deviation(z);
@@ -132,9 +134,9 @@ pub fn set_function(out: &mut [f64], z: &[f64], at: &Derivatives, over: &Derivat
     }
     out[m] = raised(start.radius() + slope.abs() * z[m] + spread * distance + EPSILON * charge);
     let whole = over[order];
-    // Not a number is not narrower than anything.
-    let narrower = deviation(out) <= whole.radius();
-    if whole.is_bounded() && !narrower {
+    // A plane keeps what functions have in common, as long as the distance from it is small beside the range; not a number is not.
+    let worthwhile = out[m] <= WORTHWHILE * whole.radius();
+    if whole.is_bounded() && !worthwhile {
         set_constant(out, whole);
     }
 }

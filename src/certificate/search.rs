@@ -3,6 +3,7 @@
 use super::enclosure::Enclose;
 use super::spectrum::Spectrum;
 use super::{Options, Signature, Witness};
+use std::fmt::{Debug, Formatter};
 use std::time::{Duration, Instant};
 
 /// What is known of a box.
@@ -28,9 +29,16 @@ struct Node {
 }
 
 /// The tree of boxes.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Default)]
 pub struct Tree {
     nodes: Vec<Node>,
+}
+
+impl Debug for Tree {
+    /// The number of boxes: there may be millions.
+    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+        write!(f, "Tree of {} boxes", self.nodes.len())
+    }
 }
 
 /// A box that waits for its turn.

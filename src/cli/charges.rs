@@ -1,11 +1,11 @@
 //! Charges of the symmetries of a model along its motion, for `lnn rollout --charges`.
 
 use crate::cli::CliError;
-use crate::cli::probe::{Probe, enough};
+use crate::cli::probe::Probe;
 use crate::names::rounded;
 use crate::report::text_table;
 use crate::rollout::Trajectory;
-use crate::symmetry::{EXACT, charges, symmetries, unknowns};
+use crate::symmetry::{charges, unknowns};
 use serde::Serialize;
 
 /// Seed of the states on which symmetries are sought.
@@ -41,13 +41,12 @@ impl Charges {
     /// # Errors
     /// A usage error for a region outside the domain, a data error for terms that are not finite.
     pub fn new(probe: &Probe, motion: &Trajectory<f64>) -> Result<Self, CliError> {
-        let (basis, _) = probe.basis(None);
-        let model = probe.model.as_ref();
-        let (q, v) = probe.states(enough(unknowns(model.coordinates(), basis.len())), SEED)?;
-        let tolerance = probe.exact.then_some(EXACT);
-        let found = symmetries(model, &basis, (&q, &v), tolerance).map_err(CliError::data)?;
-        let all = charges(model, &basis, &found.fields, motion).map_err(CliError::data)?;
-        let names = std::iter::once("energy".to_string()).chain(found.fields.iter().map(|field| field.text(&basis)));
+        let (largest, model) = (probe.basis(None).0, probe.model.as_ref());
+        let (q, v) = probe.states(probe.enough(unknowns(model.coordinates(), largest.len())), SEED)?;
+        let (found, _) = probe.symmetries(None, (&q, &v), None)?;
+        let basis = &found.basis;
+        let all = charges(model, basis, &found.fields, motion).map_err(CliError::data)?;
+        let names = std::iter::once("energy".to_string()).chain(found.fields.iter().map(|field| field.text(basis)));
         let rows = names.zip(&all).map(|(symmetry, charge)| {
             let ends = [charge.values.first(), charge.values.last()].map(|x| x.copied().unwrap_or(f64::NAN));
             Row {

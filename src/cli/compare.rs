@@ -1,6 +1,6 @@
 //! `lnn compare`: what two Lagrangians have in common beyond factor and gauge.
 
-use crate::cli::probe::{Bound, Probe, bound, enough};
+use crate::cli::probe::{Bound, Probe, bound};
 use crate::cli::source::parameter;
 use crate::cli::symmetries::{Format, degrees};
 use crate::cli::{CliError, number, output};
@@ -31,7 +31,7 @@ pub struct Args {
     /// Bounds of the states that are looked at, such as r=4:12 or r_dot=-0.3:0.3; what both have in common if not given.
     #[arg(long, value_name = "NAME=LOW:HIGH,..", value_delimiter = ',', value_parser = bound)]
     region: Vec<Bound>,
-    /// States that are looked at; three for every unknown coefficient if not given.
+    /// States that are looked at; two for every unknown coefficient if not given.
     #[arg(long, value_name = "N", value_parser = number::count)]
     points: Option<usize>,
     /// Seed of the states.
@@ -70,7 +70,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     first.meet(&mut second)?;
     first.narrow(&args.region)?;
     let (basis, _) = first.basis(args.basis);
-    let points = args.points.unwrap_or_else(|| enough(basis.len()));
+    let points = args.points.unwrap_or_else(|| first.enough(basis.len()));
     // On the mass shell of a system, rather than where a model says nothing.
     let (q, v) = first.states_beside(&second, points, args.seed)?;
     let found = compare(first.model.as_ref(), second.model.as_ref(), &basis, (&q, &v)).map_err(CliError::data)?;
@@ -88,11 +88,15 @@ impl Compared<'_> {
             let power = if k == 0 { "B".to_string() } else { format!("B^{}", k + 1) };
             format!("{} {power}", rounded(*factor, 6))
         });
+        let (gauge, function) = match found.gauge_formula.as_str() {
+            "0" => ("", String::new()),
+            formula => (" + dF/dt", format!(", F = {formula}")),
+        };
+        let sign = if found.constant < 0.0 { "-" } else { "+" };
         let text = format!(
-            "A = {} + dF/dt + {}, F = {}, as near as can be at {} states\n",
+            "A = {}{gauge} {sign} {}{function}, as near as can be at {} states\n",
             powers.collect::<Vec<_>>().join(" + "),
-            rounded(found.constant, 6),
-            found.gauge_formula,
+            rounded(found.constant.abs(), 6),
             self.points
         );
         let rows = [

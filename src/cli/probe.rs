@@ -7,7 +7,7 @@ use crate::cli::number::bounds;
 use crate::cli::source::Source;
 use crate::lagrangian::{Configured, EulerLagrange, configure_system};
 use crate::names::unknown;
-use crate::symmetry::{Basis, Chart, Degrees, Region};
+use crate::symmetry::{Basis, Chart, Degrees, EXACT, Region, Symmetries, symmetries};
 use std::path::Path;
 
 /// A Lagrangian with what is known of its coordinates.
@@ -18,7 +18,7 @@ pub struct Probe {
     pub model: Box<dyn EulerLagrange<f64>>,
     /// Coordinates, then velocities.
     pub columns: Vec<String>,
-    /// The states of interest: those of a system on which errors are stated, those a model was trained on.
+    /// The states of interest: those of a system on which errors are stated, the middle of those a model was trained on.
     pub region: Region,
     /// `true` for a system, whose terms are exact.
     pub exact: bool,
@@ -78,6 +78,9 @@ impl Probe {
         let known = learned_system(&learned.header).is_ok();
         let system = if known { Some(learned.system(path)?) } else { None };
         let Learned { header, network } = learned;
+        let periodic = header.architecture.periodic.iter().copied();
+        let position = header.position.into_iter().zip(periodic);
+        let position = position.map(|(range, periodic)| if periodic { range } else { inner(range) }).collect();
         let units = match &system {
             Some(system) => system.system.coordinates(system.coordinates).iter().map(|c| c.unit.to_string()).collect(),
             None => vec![String::new(); network.coordinates()],
@@ -86,7 +89,7 @@ impl Probe {
             name: header.system,
             model: Box::new(network),
             columns: header.columns,
-            region: Region { position: header.position, velocity: header.velocity },
+            region: Region { position, velocity: header.velocity.into_iter().map(inner).collect() },
             exact: false,
             periodic: header.architecture.periodic,
             units,
@@ -161,8 +164,52 @@ impl Probe {
     pub fn basis(&self, degrees: Option<Degrees>) -> (Basis, Degrees) {
         let parts = self.periodic.iter().zip(&self.units).zip(&self.region.position);
         let charts: Vec<Chart> = parts.map(|((periodic, unit), range)| Chart::of(*periodic, unit, *range)).collect();
-        let degrees = degrees.unwrap_or_else(|| Degrees::usual(&charts));
-        (Basis::new(self.coordinates(), &charts, degrees), degrees)
+        match degrees {
+            Some(degrees) => (Basis::new(self.coordinates(), &charts, degrees), degrees),
+            None => Basis::usual(self.coordinates(), &charts),
+        }
+    }
+
+    /// The bases in which symmetries are sought: the one of these degrees, or the usual one; of a model, whose errors hide symmetries
+    /// among many functions, also those of lower powers.
+    pub fn bases(&self, degrees: Option<Degrees>) -> Vec<(Basis, Degrees)> {
+        let (basis, highest) = self.basis(degrees);
+        let mut all = vec![(basis, highest)];
+        if degrees.is_none() && !self.exact {
+            for polynomial in (0..highest.polynomial).rev() {
+                let lower = self.basis(Some(Degrees { polynomial, ..highest }));
+                let shorter = all.last().is_some_and(|(last, _)| lower.0.len() < last.len());
+                all.extend(Some(lower).filter(|(basis, _)| shorter && basis.len() > 1));
+            }
+        }
+        all
+    }
+
+    /// Point symmetries: in the basis that shows the most of them, of such in the one with the widest gap.
+    ///
+    /// # Errors
+    /// A data error if nothing can be found out.
+    pub fn symmetries(
+        &self,
+        degrees: Option<Degrees>,
+        (q, v): (&[f64], &[f64]),
+        tolerance: Option<f64>,
+    ) -> Result<(Symmetries, Degrees), CliError> {
+        let tolerance = tolerance.or(self.exact.then_some(EXACT));
+        let mut best: Option<(Symmetries, Degrees)> = None;
+        for (basis, degrees) in self.bases(degrees) {
+            let found = symmetries(self.model.as_ref(), &basis, (q, v), tolerance).map_err(CliError::data)?;
+            let rank = |found: &Symmetries| (found.separation.count, found.separation.gap.unwrap_or(f64::INFINITY));
+            if best.as_ref().is_none_or(|(best, _)| rank(&found) > rank(best)) {
+                best = Some((found, degrees));
+            }
+        }
+        best.ok_or_else(|| CliError::data("there is no basis"))
+    }
+
+    /// States that are looked at for so many unknown coefficients.
+    pub fn enough(&self, unknowns: usize) -> usize {
+        (2 * unknowns).max(if self.exact { 400 } else { 1000 })
     }
 
     /// States `(states, n)` of the region, on the mass shell and inside the domain of the system.
@@ -190,7 +237,11 @@ impl Probe {
     }
 }
 
-/// Number of states that are drawn for so many unknown coefficients.
-pub fn enough(unknowns: usize) -> usize {
-    (3 * unknowns).max(400)
+/// Part of every range of its training that a model is looked at: near the edges it is worst.
+const INNER: f64 = 0.8;
+
+/// The middle of a range.
+fn inner([low, high]: [f64; 2]) -> [f64; 2] {
+    let (middle, half) = (0.5 * (low + high), 0.5 * INNER * (high - low));
+    [middle - half, middle + half]
 }

@@ -1,11 +1,11 @@
 //! `lnn symmetries`: what a Lagrangian conserves.
 
-use crate::cli::probe::{Bound, Probe, bound, enough};
+use crate::cli::probe::{Bound, Probe, bound};
 use crate::cli::source::parameter;
 use crate::cli::{CliError, number, output};
 use crate::names::{WIDTH, counted, number as digits, wrapped};
 use crate::report::text_table;
-use crate::symmetry::{Degrees, EXACT, Quadratic, Symmetries, quadratic, quadratic_unknowns, symmetries, unknowns};
+use crate::symmetry::{Degrees, EXACT, Quadratic, Symmetries, quadratic, quadratic_unknowns, unknowns};
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -25,11 +25,12 @@ pub struct Args {
     /// coordinates if not given.
     #[arg(long, value_name = "FAMILY:DEGREE,..", value_parser = degrees)]
     basis: Option<Degrees>,
-    /// Bounds of the states that are looked at, such as r=4:12 or r_dot=-0.3:0.3; those of the system, or those the model was
-    /// trained on, if not given.
+    /// Bounds of the states that are looked at, such as r=4:12 or r_dot=-0.3:0.3; those of the system, or the middle of
+    /// those the model was trained on, if not given.
     #[arg(long, value_name = "NAME=LOW:HIGH,..", value_delimiter = ',', value_parser = bound)]
     region: Vec<Bound>,
-    /// States that are looked at; three for every unknown coefficient if not given.
+    /// States that are looked at; two for every unknown coefficient, at least 400 for a system
+    /// and 1000 for a model, if not given.
     #[arg(long, value_name = "N", value_parser = number::count)]
     points: Option<usize>,
     /// Seed of the states.
@@ -136,21 +137,23 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         None => Probe::system(args.system.as_deref().unwrap_or_default(), &args.param)?,
     };
     probe.narrow(&args.region)?;
-    let (basis, families) = probe.basis(args.basis);
+    let (basis, _) = probe.basis(args.basis);
     let n = probe.model.coordinates();
     let own = unknowns(n, basis.len());
     // Of quadratic quantities cyclic coordinates leave fewer functions than this.
     let wanted = if args.quadratic { own.max(quadratic_unknowns(n, basis.len()).min(MOST)) } else { own };
-    let points = args.points.unwrap_or_else(|| enough(wanted));
+    let points = args.points.unwrap_or_else(|| probe.enough(wanted));
     let (q, v) = probe.states(points, args.seed)?;
     let tolerance = args.tolerance.or(probe.exact.then_some(EXACT));
     let model = probe.model.as_ref();
-    let found = symmetries(model, &basis, (&q, &v), tolerance).map_err(CliError::data)?;
+    let (found, families) = probe.symmetries(args.basis, (&q, &v), args.tolerance)?;
     let second = match args.quadratic {
-        true => Some(quadratic(model, &basis, &found.fields, (&q, &v), tolerance).map_err(CliError::data)?.into()),
+        true => {
+            Some(quadratic(model, &found.basis, &found.fields, (&q, &v), tolerance).map_err(CliError::data)?.into())
+        }
         false => None,
     };
-    let Symmetries { singular_values, separation, fields, algebra, .. } = found;
+    let Symmetries { basis, singular_values, separation, fields, algebra } = found;
     let found = Found {
         system: probe.name.clone(),
         count: separation.count,
@@ -180,7 +183,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
 }
 
 /// Unknown coefficients of quadratic quantities for which states are drawn, at most.
-const MOST: usize = 900;
+const MOST: usize = 1300;
 /// Singular values that are shown beyond the gap.
 const BEYOND: usize = 5;
 
@@ -205,8 +208,15 @@ impl Found {
         let more = if self.singular_values.len() > shown.len() { ", .." } else { "" };
         text += &wrapped(&format!("singular values {}{more}\n", shown.join(", ")), WIDTH);
         if let Some(gap) = self.gap {
-            text += &format!("gap {}\n", digits(gap));
+            text += &format!("gap {}", digits(gap));
         }
+        let Families { polynomial, trigonometric, hyperbolic } = self.basis;
+        text += &format!(
+            "{}{} functions (polynomial:{polynomial},trigonometric:{trigonometric},hyperbolic:{hyperbolic}), {} states\n",
+            if self.gap.is_some() { "; " } else { "" },
+            self.functions,
+            self.points
+        );
         if !self.fields.is_empty() {
             let gauged = self.gauge_functions.iter().any(|gauge| gauge != "0");
             let rows = self.fields.iter().zip(&self.gauge_functions).enumerate().map(|(k, (field, gauge))| {
@@ -235,7 +245,12 @@ impl Found {
                 let terms: Vec<String> = terms.map(|(k, x)| format!("{} X{}", factor(*x), k + 1)).collect();
                 if !terms.is_empty() {
                     let sum = terms.join(" ");
-                    text += &format!("[X{}, X{}] = {}\n", a + 1, b + 1, sum.trim_start_matches("+ "));
+                    text += &format!(
+                        "[X{}, X{}] = {}\n",
+                        a + 1,
+                        b + 1,
+                        sum.strip_prefix("+ ").map_or_else(|| sum.replacen("- ", "-", 1), String::from)
+                    );
                 }
             }
         }

@@ -76,9 +76,11 @@ impl Default for Shooting {
 
 impl Shooting {
     /// Settings of a small network beside a known Lagrangian whose constants are learned: longer and bolder, for a constant
-    /// has a longer way to go than a weight, and with more weight decay, which leaves the constants alone.
+    /// has a longer way to go than a weight; with more weight decay, which leaves the constants alone; and with segments joined
+    /// as closely as samples are followed, for constants are known by the long run.
     pub fn grey_box() -> Self {
-        Self { method: Method::Soap, rate: 0.01, epochs: 400, weight_decay: 3e-3, ..Self::default() }
+        let (method, rate, epochs, weight_decay, continuity) = (Method::Soap, 0.01, 400, 3e-3, 1.0);
+        Self { method, rate, epochs, weight_decay, continuity, ..Self::default() }
     }
 
     /// Checks every range.

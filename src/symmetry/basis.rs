@@ -76,6 +76,10 @@ impl FromStr for Degrees {
     }
 }
 
+/// Unknown coefficients of a search, at most: gigabytes.
+pub(super) const MOST_UNKNOWNS: usize = 4000;
+/// Unknown coefficients of a search over a basis that nobody asked for, at most: seconds.
+const USUAL: usize = 1300;
 /// Highest degree of a family.
 const MOST: usize = 12;
 
@@ -262,6 +266,23 @@ impl Basis {
         Self { names: names.to_vec(), factors, products: products.into_iter().map(|(product, _)| product).collect() }
     }
 
+    /// [`Degrees::usual`] of these charts, or lower ones as far as the unknown coefficients of a search for symmetries would be too
+    /// many: first those of powers, then those of harmonics.
+    pub fn usual(names: &[String], charts: &[Chart]) -> (Self, Degrees) {
+        let mut degrees = Degrees::usual(charts);
+        let mut basis = Self::new(names, charts, degrees);
+        while unknowns(names.len(), basis.len()) > USUAL {
+            let lower = [
+                Degrees { polynomial: degrees.polynomial.saturating_sub(1), ..degrees },
+                Degrees { trigonometric: degrees.trigonometric.saturating_sub(1), ..degrees },
+            ];
+            let shorter = lower.map(|lower| (Self::new(names, charts, lower), lower));
+            let Some(next) = shorter.into_iter().find(|(next, _)| next.len() < basis.len()) else { break };
+            (basis, degrees) = next;
+        }
+        (basis, degrees)
+    }
+
     /// The functions that do not depend on these coordinates, times each of the two first harmonics of the coordinate `angle`,
     /// if one is given.
     #[must_use]
@@ -326,6 +347,11 @@ impl Basis {
     }
 }
 
+/// Number of unknown coefficients of fields and gauge function over a basis of `functions` functions of `n` coordinates.
+pub fn unknowns(n: usize, functions: usize) -> usize {
+    (n + 1) * functions
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -358,6 +384,17 @@ mod tests {
         for text in ["", "x^2", "cot(theta)*cos(phi)", "x/r", "sin(phi)/sin(theta)", "1/r^2/sin(theta)", "x*coth(r)"] {
             assert!(texts.iter().any(|known| known == text), "{text:?} is none of {texts:?}");
         }
+    }
+
+    #[test]
+    fn usual_functions_are_not_too_many() {
+        let of = |charts: &[Chart]| Basis::usual(&vec!["q".to_string(); charts.len()], charts).1;
+        let whole = Degrees { polynomial: 2, trigonometric: 2, hyperbolic: 0 };
+        assert_eq!(of(&[Chart::Line, Chart::HalfLine, Chart::Polar, Chart::Circle]), whole);
+        assert_eq!(of(&[Chart::Circle; 20]).trigonometric, 1);
+        let turning = of(&[Chart::Line, Chart::HalfLine, Chart::Polar, Chart::Polar, Chart::Circle]);
+        assert_eq!((turning.polynomial, turning.trigonometric), (0, 3));
+        assert_eq!(of(&[Chart::Line; 64]).polynomial, 0);
     }
 
     #[test]

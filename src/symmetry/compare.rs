@@ -20,14 +20,15 @@ pub struct Comparison {
     pub gauge_formula: String,
     /// The constant, in the unit of `A`.
     pub constant: f64,
-    /// Rest of the momenta and of the values of `A` beside `f(B) + dF/dt + constant`, root mean square over that of `A`.
+    /// Rest of the momenta and of the values of `A` beside `f(B) + dF/dt + constant`, root mean square over that of `A`, values
+    /// about their mean.
     pub lagrangian: f64,
     /// Difference of the accelerations, root mean square in the frame of `|M|` of `B` over that of the larger ones.
     pub motion: f64,
     /// Rest of the mass matrix of `A` beside that of `f(B)`, root mean square over that of `A`, in the same frame.
     pub mass_matrix: f64,
     /// Rest of the energy of `A` beside the best polynomial of that of `B`, of first degree unless `f` has a higher one, root
-    /// mean square over that of the energy of `A` about its mean.
+    /// mean square over that of the energy of `A` about its mean, or over the energy where that of `B` is the same at all states.
     pub energy: f64,
 }
 
@@ -38,10 +39,11 @@ const DEPENDENT: f64 = 1e-9;
 
 /// Compares two Lagrangians at states `(q, v)`, `(states, n)`: what they have in common beyond the freedom that `L` has.
 ///
-/// The motion determines `L` at best up to a factor and a total derivative, `L -> s L + dF(q)/dt`, up to a constant besides; that of
-/// geodesics, along which `L` is the energy, up to a function `f(L)`. The best `s` (or `f`, a polynomial of degree 3) and `F`,
-/// over the functions of a basis, follow by linear least squares from the momenta and the values of both. They are taken
-/// out, and what is left is stated by quantity. Where `L` is the same on all states, as on a mass shell, `f` is a factor.
+/// The motion determines `L` at best up to a factor and a total derivative, `L -> s L + dF(q)/dt`, and up to a constant; that of
+/// geodesics, along which `L` is the energy, up to a function `f(L)`, where `B` is the metric. The best `s` (or `f`, a
+/// polynomial of degree 3) and `F`, over the functions of a basis, follow by linear least squares from the momenta of both, in the
+/// frame of `|M|` of `B`, the constant from the values. They are taken out, and what is left is stated by quantity. Where `L` is the
+/// same on all states, as on a mass shell, `f` is a factor.
 ///
 /// # Errors
 /// [`SymmetryError`].
@@ -92,76 +94,67 @@ impl Fit {
     fn new(a: &Sample, b: &Sample, basis: &Basis) -> Result<Self, SymmetryError> {
         let (n, states, functions) = (b.n, b.len(), basis.len());
         let (values, own) = (lagrangians(a), lagrangians(b));
-        let powers = if a.homogeneous && b.homogeneous { POWERS } else { 1 };
-        // Per state n momenta in the frame of B, then the value; both of size 1.
-        let rows = n + 1;
+        let powers = if b.homogeneous { POWERS } else { 1 };
+        // Of two that are even in the velocities no difference is a dF/dt, which is odd.
+        let functions = if a.even && b.even { 0 } else { functions };
         let frames = Frames::new(b)?;
-        let scale: Vec<f64> =
-            (0..states).map(|k| 1.0 / norm(&frames.down(k, &b.p[k * n..(k + 1) * n])).max(1e-300)).collect();
-        let spread = |x: &[f64]| {
-            let mean = x.iter().sum::<f64>() / states as f64;
-            (x.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / states as f64).sqrt()
-        };
-        let motion = b.p.iter().zip(&b.v).map(|(p, v)| (p * v).abs()).sum::<f64>() / states as f64;
-        let unit = 1.0 / spread(&own).max(motion).max(1e-300);
-        let column = |momentum: &dyn Fn(usize) -> Vec<f64>, value: &dyn Fn(usize) -> f64| -> Vec<f64> {
-            (0..states)
-                .flat_map(|k| {
-                    let mut part: Vec<f64> = frames.down(k, &momentum(k)).iter().map(|x| x * scale[k]).collect();
-                    part.push(value(k) * unit);
-                    part
-                })
-                .collect()
+        let rms = |x: &[f64]| norm(x) / (x.len() as f64).sqrt();
+        let motion: Vec<f64> = b.p.chunks_exact(n).zip(b.v.chunks_exact(n)).map(|(p, v)| dot(p, v)).collect();
+        let unit = 1.0 / rms(&motion).max(f64::MIN_POSITIVE.sqrt());
+        // Momenta in the frame of B, `(states, n)`, and values, `(states)`, both beside those of the motion of B.
+        let at_states = |momentum: &dyn Fn(usize) -> Vec<f64>| -> Vec<f64> {
+            (0..states).flat_map(|k| frames.down(k, &momentum(k))).collect()
         };
         let p = |sample: &Sample, k: usize, factor: f64| -> Vec<f64> {
             sample.p[k * n..(k + 1) * n].iter().map(|p| p * factor).collect()
         };
-        let mut columns = Vec::new();
-        for power in 1..=powers {
-            let slope = |k: usize| power as f64 * (own[k] * unit).powi(power as i32 - 1);
-            let value = |k: usize| (own[k] * unit).powi(power as i32) / unit;
-            columns.push(column(&|k| p(b, k, slope(k)), &value));
-        }
         let mut at = vec![Values::default(); states];
         at.iter_mut().zip(b.q.chunks_exact(n)).for_each(|(at, q)| basis.evaluate(q, at));
-        for f in 0..functions {
-            let gradient = |k: usize| at[k].gradient[f * n..(f + 1) * n].to_vec();
-            columns.push(column(&gradient, &|k| dot(&gradient(k), &b.v[k * n..(k + 1) * n])));
-        }
-        columns.push(column(&|_| vec![0.0; n], &|_| 1.0));
-        if states * rows < columns.len() {
+        let gradient = |f: usize, k: usize| &at[k].gradient[f * n..(f + 1) * n];
+        // Higher powers come last: on a mass shell they say nothing that the first does not.
+        let power = |k: usize, power: usize| power as f64 * (own[k] * unit).powi(power as i32 - 1);
+        let first = std::iter::once(at_states(&|k| p(b, k, 1.0)));
+        let gauges = (0..functions).map(|f| at_states(&|k| gradient(f, k).to_vec()));
+        let higher = (2..=powers).map(|m| at_states(&|k| p(b, k, power(k, m))));
+        let columns: Vec<Vec<f64>> = first.chain(gauges).chain(higher).collect();
+        if states * n < columns.len() {
             return Err(SymmetryError::TooFew { unknowns: columns.len(), states });
         }
-        let target = column(&|k| p(a, k, 1.0), &|k| values[k]);
-        // Of geodesics the higher powers come last: on a mass shell they say nothing that the first does not.
-        let higher = columns.drain(1..powers).collect::<Vec<_>>();
-        columns.extend(higher);
+        let target = at_states(&|k| p(a, k, 1.0));
         let plain = orthonormal(&columns, DEPENDENT);
         let mut solution = plain.given(&plain.along(&target), columns.len());
-        let mut rest = target.clone();
-        plain.remove(&mut rest);
-        // The constant of the value is no part of what there is to explain.
-        let mut size = target;
-        let constant = orthonormal(&columns[functions + 1..functions + 2], DEPENDENT);
-        constant.remove(&mut size);
-        let whole = norm(&size);
+        let whole = norm(&target);
         // Roundings are no terms.
-        for (k, (c, column)) in solution.iter_mut().zip(&columns).enumerate() {
-            if k > 0 && k != functions + 1 && (*c * norm(column)).abs() <= 1e-9 * whole {
+        for (c, column) in solution.iter_mut().zip(&columns).skip(1) {
+            if (*c * norm(column)).abs() <= 1e-9 * whole {
                 *c = 0.0;
             }
         }
-        let higher = solution.split_off(functions + 2);
-        let gauge = solution[1..=functions].to_vec();
-        let factors = std::iter::once(solution[0]).chain(higher).enumerate();
+        let mut rest = target.clone();
+        solution.iter().zip(&columns).for_each(|(c, column)| add(&mut rest, column, -c));
+        let higher = solution.split_off(functions + 1);
+        let mut gauge = solution.split_off(1);
+        let factors = solution.into_iter().chain(higher).enumerate();
         let factors: Vec<f64> = factors.map(|(k, c)| c * unit.powi(k as i32)).collect();
         let kept = 1 + factors.iter().skip(1).rposition(|c| *c != 0.0).map_or(0, |last| last + 1);
-        Ok(Self {
-            factors: factors[..kept].to_vec(),
-            gauge,
-            constant: solution[functions + 1],
-            rest: if whole > 0.0 { norm(&rest) / whole } else { 0.0 },
-        })
+        let mut left: Vec<f64> = (0..states)
+            .map(|k| {
+                let f: f64 = factors.iter().enumerate().map(|(m, c)| c * own[k].powi(m as i32 + 1)).sum();
+                let v = &b.v[k * n..(k + 1) * n];
+                values[k] - f - gauge.iter().enumerate().map(|(f, c)| c * dot(gradient(f, k), v)).sum::<f64>()
+            })
+            .collect();
+        gauge.resize(basis.len(), 0.0);
+        let constant = left.iter().sum::<f64>() / states as f64;
+        left.iter_mut().for_each(|x| *x -= constant);
+        let mean = values.iter().sum::<f64>() / states as f64;
+        let about: Vec<f64> = values.iter().map(|x| x - mean).collect();
+        // Momenta weigh as the values of the motion of B do.
+        let weight = rms(&motion) / (norm(&columns[0]) / (states as f64).sqrt()).max(f64::MIN_POSITIVE.sqrt());
+        let size = |momenta: &[f64], values: &[f64]| (weight * norm(momenta)).hypot(norm(values));
+        let whole = size(&target, &about);
+        let rest = if whole > 0.0 { size(&rest, &left) / whole } else { 0.0 };
+        Ok(Self { factors: factors[..kept].to_vec(), gauge, constant, rest })
     }
 
     /// `f'` and `f''` at a value of `B`.
@@ -218,10 +211,15 @@ impl Fit {
         let known = orthonormal(&(0..=self.factors.len()).map(power).collect::<Vec<_>>(), DEPENDENT);
         let mut rest = a.energy.clone();
         known.remove(&mut rest);
-        let mut about = a.energy.clone();
-        orthonormal(&[vec![1.0; a.len()]], DEPENDENT).remove(&mut about);
-        // On a mass shell the energy is the same everywhere, and there is nothing to compare but roundings.
-        if norm(&about) <= 1e-9 * norm(&a.energy) { 0.0 } else { norm(&rest) / norm(&about) }
+        let about = |energy: &[f64]| {
+            let mut about = energy.to_vec();
+            orthonormal(&[vec![1.0; energy.len()]], DEPENDENT).remove(&mut about);
+            norm(&about)
+        };
+        // On a mass shell the energy is the same everywhere, and only its own size is left to compare with.
+        let constant = about(&b.energy) <= 1e-9 * norm(&b.energy);
+        let whole = if constant { norm(&a.energy) } else { about(&a.energy) };
+        if norm(&rest) <= f64::EPSILON * norm(&a.energy) { 0.0 } else { norm(&rest) / whole }
     }
 }
 

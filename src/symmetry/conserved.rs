@@ -1,6 +1,6 @@
 //! Conserved quantities that are quadratic in the momenta: Carter's constant, the vector of Runge and Lenz.
 
-use super::basis::{Basis, Values};
+use super::basis::{Basis, MOST_UNKNOWNS, Values};
 use super::echelon::reduce;
 use super::field::{join, sum};
 use super::find::Columns;
@@ -183,7 +183,6 @@ fn search(
     tolerance: Option<f64>,
 ) -> Result<Quadratic, SymmetryError> {
     let (n, states) = (sample.n, sample.len());
-    let functions = Columns::new(basis, sample);
     let mut monomials: Vec<Monomial> = (0..n).flat_map(|i| (i..n).map(move |j| Monomial::Quadratic(i, j))).collect();
     monomials.push(Monomial::Energy);
     if !sample.even {
@@ -192,6 +191,11 @@ fn search(
     if !sample.homogeneous {
         monomials.push(Monomial::One);
     }
+    let unknowns = monomials.len() * basis.len();
+    if unknowns > MOST_UNKNOWNS {
+        return Err(SymmetryError::TooMany { unknowns, most: MOST_UNKNOWNS });
+    }
+    let functions = Columns::new(basis, sample);
     let (mut places, mut values, mut rates) = (Vec::new(), Vec::new(), Vec::new());
     for f in 0..basis.len() {
         for &monomial in &monomials {

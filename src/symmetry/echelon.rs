@@ -6,7 +6,9 @@
 /// as long as their entry is not much smaller than the largest that is left. What is below `noise` of the largest weighed entry of
 /// its row becomes 0. Rows are ordered by their pivots. The first `fixed` rows take part before the others. Entries beyond the
 /// weighed columns are carried along.
-pub(crate) fn reduce(rows: &mut [Vec<f64>], sizes: &[f64], noise: f64, fixed: usize) {
+///
+/// Returns the pivot of every row.
+pub(crate) fn reduce(rows: &mut [Vec<f64>], sizes: &[f64], noise: f64, fixed: usize) -> Vec<usize> {
     let mut pivots: Vec<usize> = Vec::new();
     for done in 0..rows.len() {
         let candidates = done..if done < fixed { fixed } else { rows.len() };
@@ -52,6 +54,11 @@ pub(crate) fn reduce(rows: &mut [Vec<f64>], sizes: &[f64], noise: f64, fixed: us
     let order = |row: &Vec<f64>| row.iter().position(|x| *x != 0.0);
     rows[..fixed].sort_by_key(order);
     rows[fixed..].sort_by_key(order);
+    let pivot = |k: usize| {
+        let lone = |column: &usize| rows.iter().enumerate().all(|(l, row)| row[*column] == f64::from(u8::from(k == l)));
+        (0..sizes.len()).find(lone)
+    };
+    (0..rows.len()).filter_map(pivot).collect()
 }
 
 #[cfg(test)]
@@ -62,7 +69,7 @@ mod tests {
     fn rows_become_simple() {
         // Combinations of (1, 0, 2, 0) and (0, 1, 0, -1), with rounding.
         let mut rows = vec![vec![0.6, 0.8, 1.2, -0.8], vec![0.8, -0.6, 1.6, 0.6 + 1e-15]];
-        reduce(&mut rows, &[1.0; 4], 1e-12, 0);
+        assert_eq!(reduce(&mut rows, &[1.0; 4], 1e-12, 0), [0, 1]);
         let near = |row: &[f64], other: &[f64]| row.iter().zip(other).all(|(a, b)| (a - b).abs() < 1e-14);
         assert!(near(&rows[0], &[1.0, 0.0, 2.0, 0.0]) && near(&rows[1], &[0.0, 1.0, 0.0, -1.0]), "{rows:?}");
         assert_eq!((rows[0][1], rows[1][0], rows[1][2]), (0.0, 0.0, 0.0));

@@ -32,6 +32,14 @@ pub enum SymmetryError {
         /// States.
         states: usize,
     },
+    /// A basis of too many functions.
+    #[error("{unknowns} unknown coefficients are too many, at most {most}: a smaller basis")]
+    TooMany {
+        /// Unknowns.
+        unknowns: usize,
+        /// Unknowns that there may be.
+        most: usize,
+    },
     /// A basis for another number of coordinates.
     #[error("the functions are of {found} coordinates, the model has {expected}")]
     Basis {

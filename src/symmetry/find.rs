@@ -1,11 +1,11 @@
 //! Point symmetries of a Lagrangian: vector fields along which it changes by a total derivative at most.
 
-use super::basis::{Basis, Values};
+use super::basis::{Basis, MOST_UNKNOWNS, Values, unknowns};
 use super::echelon::reduce;
 use super::orthonormal::{Orthonormal, orthonormal};
 use super::sample::Sample;
 use super::separation::Separation;
-use super::{Algebra, Field, SymmetryError};
+use super::{Algebra, Field, SymmetryError, sparse};
 use crate::lagrangian::EulerLagrange;
 use crate::linalg::{Workspace, eigh, singular};
 
@@ -65,7 +65,7 @@ impl Columns {
 ///
 /// `tolerance` is the noise of the terms, [`EXACT`] for a Lagrangian written down; without one, for a learned model, the largest
 /// gap decides (see [`Separation`]). States should be drawn from an open set, several times as many as there are unknown
-/// coefficients, [`unknowns`].
+/// coefficients, [`unknowns`](super::unknowns).
 ///
 /// # Errors
 /// [`SymmetryError`].
@@ -82,14 +82,12 @@ pub fn symmetries(
     search(&sample, basis, tolerance)
 }
 
-/// Number of unknown coefficients of fields and gauge function over a basis of `functions` functions of `n` coordinates.
-pub fn unknowns(n: usize, functions: usize) -> usize {
-    (n + 1) * functions
-}
-
 /// [`symmetries`] of a Lagrangian whose terms are at hand.
 pub(crate) fn search(sample: &Sample, basis: &Basis, tolerance: Option<f64>) -> Result<Symmetries, SymmetryError> {
     let (n, states, functions) = (sample.n, sample.len(), basis.len());
+    if unknowns(n, functions) > MOST_UNKNOWNS {
+        return Err(SymmetryError::TooMany { unknowns: unknowns(n, functions), most: MOST_UNKNOWNS });
+    }
     let columns = Columns::new(basis, sample);
     let plain = orthonormal(&columns.values, DEPENDENT);
     let (values, rates) = (&plain.columns, plain.mixed(&columns.rates));
@@ -126,7 +124,12 @@ pub(crate) fn search(sample: &Sample, basis: &Basis, tolerance: Option<f64>) -> 
     }
     let sizes = sizes(sample, &columns.values);
     let noise = found.values[..zero].last().map_or(0.0, |last| (10.0 * last).clamp(1e-9, 0.05));
-    reduce(&mut rows, &sizes, noise, 0);
+    let pivots = reduce(&mut rows, &sizes, noise, 0);
+    if tolerance.is_none() && zero > 0 && pivots.len() == zero {
+        // A model has the fields nearly: those of few functions among all that are as good.
+        let unknowns = Unknowns { sample, columns: &columns, plain: &plain, gauge: &gauge, weight: &weight };
+        unknowns.simplify(&mut rows, &pivots, &sizes, found.values[zero - 1]);
+    }
     let fields: Vec<Field> = rows
         .into_iter()
         .map(|mut row| {
@@ -139,6 +142,48 @@ pub(crate) fn search(sample: &Sample, basis: &Basis, tolerance: Option<f64>) -> 
         .collect();
     let algebra = if fields.is_empty() { None } else { Some(Algebra::new(sample, basis, &fields, noise)?) };
     Ok(Symmetries { basis: basis.clone(), singular_values: found.values, separation, fields, algebra })
+}
+
+/// The equation of a symmetry in the coefficients of the functions as they are.
+struct Unknowns<'a> {
+    sample: &'a Sample,
+    columns: &'a Columns,
+    plain: &'a Orthonormal,
+    gauge: &'a Orthonormal,
+    weight: &'a [f64],
+}
+
+impl Unknowns<'_> {
+    /// Change of `L` along the field `function d_i` at all states, and its part that is no gauge.
+    fn change(&self, i: usize, f: usize) -> Vec<f64> {
+        let n = self.sample.n;
+        let rows = self.columns.values[f].iter().zip(&self.columns.rates[f]).zip(self.weight).enumerate();
+        rows.map(|(k, ((x, dx), w))| w * (self.sample.g[k * n + i] * x + self.sample.p[k * n + i] * dx)).collect()
+    }
+
+    /// Replaces rows of coefficients by such with few entries, as far as their equations hold as well to `noise`.
+    fn simplify(&self, rows: &mut [Vec<f64>], pivots: &[usize], sizes: &[f64], noise: f64) {
+        let functions = self.columns.values.len();
+        let places: Vec<usize> =
+            (0..self.sample.n).flat_map(|i| self.plain.kept.iter().map(move |f| i * functions + f)).collect();
+        let free: Vec<Vec<f64>> = places.iter().map(|at| self.change(at / functions, at % functions)).collect();
+        let mut fixed = free.clone();
+        fixed.iter_mut().for_each(|column| self.gauge.remove(column));
+        let gram = sparse::gram(&fixed);
+        let weights: Vec<f64> = places.iter().map(|at| sizes[*at]).collect();
+        for (row, pivot) in rows.iter_mut().zip(pivots) {
+            let taken: Vec<bool> = places.iter().map(|at| pivots.contains(at) && at != pivot).collect();
+            let Some(own) = places.iter().position(|at| at == pivot) else { continue };
+            let start: Vec<f64> = places.iter().map(|at| row[*at]).collect();
+            let Some(found) = sparse::sparsest(&gram, &start, &weights, own, &taken, noise) else { continue };
+            let change = combined(std::slice::from_ref(&found), &free).remove(0);
+            let change = self.gauge.given(&self.gauge.along(&change), self.plain.kept.len());
+            row.fill(0.0);
+            places.iter().zip(found).for_each(|(at, x)| row[*at] = x);
+            let split = self.sample.n * functions;
+            row[split..].copy_from_slice(&self.plain.given(&change, functions));
+        }
+    }
 }
 
 /// Orthonormal columns of `dF/dt` for all functions `F`; the constant has none. For `L` that is even in the velocity `dF/dt`

@@ -51,12 +51,12 @@ mod separation;
 mod sparse;
 
 pub use algebra::Algebra;
-pub use basis::{Basis, Chart, Degrees};
+pub use basis::{Basis, Chart, Degrees, unknowns};
 pub use charges::{Charge, charges};
 pub use compare::{Comparison, compare};
 pub use conserved::{Conserved, Quadratic, quadratic, quadratic_unknowns};
 pub use error::SymmetryError;
 pub use field::Field;
-pub use find::{EXACT, Symmetries, symmetries, unknowns};
+pub use find::{EXACT, Symmetries, symmetries};
 pub use region::Region;
 pub use separation::Separation;

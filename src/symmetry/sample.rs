@@ -69,7 +69,8 @@ impl Sample {
             let (one, matrix) = (k * n..(k + 1) * n, k * n * n..(k + 1) * n * n);
             let [Some(p), Some(g)] = [&terms.momentum, &terms.dl_dq].map(|x| x.get(one.clone())) else { continue };
             let (Some(m), Some(&energy)) = (terms.mass_matrix.get(matrix), terms.energy.get(k)) else { continue };
-            if !p.iter().chain(g).chain(m).chain([&energy]).all(|x| x.is_finite()) {
+            let state = q[one.clone()].iter().chain(&v[one.clone()]);
+            if !state.chain(p).chain(g).chain(m).chain([&energy]).all(|x| x.is_finite()) {
                 continue;
             }
             sample.q.extend_from_slice(&q[one.clone()]);

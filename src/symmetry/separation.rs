@@ -18,7 +18,7 @@ const SMALL: f64 = 0.1;
 /// Least gap by which values are told apart when nothing is known of the noise.
 const APART: f64 = 10.0;
 /// Noise that a model has at the least: smaller values are not told apart.
-const NOISE: f64 = 1e-4;
+const NOISE: f64 = 1e-3;
 /// Least gap above a known noise.
 const ABOVE: f64 = 30.0;
 
@@ -27,7 +27,7 @@ impl Separation {
     ///
     /// With a tolerance the first value above it must exceed the last below it 30 times, and the tolerance itself three
     /// times. Without one, values above 0.1 are not zero, and the cut is where the ratio of neighbours is largest, 10 at
-    /// least, values below 1e-4 taken as that. Otherwise there is no gap and no count.
+    /// least, values below 1e-3 taken as that. Otherwise there is no gap and no count.
     pub fn new(values: &[f64], tolerance: Option<f64>) -> Self {
         // Nothing is smaller than the rounding of a number near 1.
         let floor = f64::EPSILON;
@@ -67,6 +67,8 @@ mod tests {
         assert_eq!(at(&[1e-4, 2e-3, 3e-3, 0.2], None).count, Some(3));
         // Imposed symmetries beside learned ones.
         assert_eq!(at(&[0.0, 1e-9, 2e-3, 0.05], None).count, Some(3));
+        // What two exact ones beside stand out from may still be noise.
+        assert_eq!(at(&[1e-6, 2e-6, 4e-3, 0.02], None).count, None);
         assert_eq!(at(&[1e-3, 5e-3, 2e-2, 0.09], None).count, None);
         assert_eq!(at(&[0.2, 0.3], None), Separation { count: Some(0), gap: Some(2.0) });
         assert_eq!(at(&[], None).count, Some(0));

@@ -141,7 +141,7 @@ fn empty_space_has_no_ricci_tensor_and_all_of_it_is_weyls() {
             if q.len() > 3 {
                 let weyl = &found.curvature.weyl;
                 let rest: Vec<Dd> = weyl.iter().zip(&found.curvature.lowered).map(|(&c, &r)| c - r).collect();
-                assert!(largest(&rest) < unit && largest(&weyl) > 1e-8, "{}", space.name);
+                assert!(largest(&rest) < unit && largest(weyl) > 1e-8, "{}", space.name);
             }
         }
     }

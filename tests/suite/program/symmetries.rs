@@ -33,7 +33,7 @@ fn symmetries_of_a_system_are_told_in_json_and_in_words() {
 #[test]
 fn options_choose_basis_region_and_states() {
     let kepler = ["symmetries", "--system", "kepler", "--json", "--param", "mu=2", "--basis", "polynomial:1"];
-    let found = object(&[&kepler[..], &["--region", "x=1:3,y_dot=-1:1", "--points", "50", "--seed", "7"]].concat());
+    let found = object(&[&kepler[..], &["--region", "x=-1:3,y_dot=-1:1", "--points", "50", "--seed", "7"]].concat());
     assert_eq!((found["count"].as_u64(), found["functions"].as_u64()), (Some(1), Some(3)));
     assert_eq!((found["points"].as_u64(), found["seed"].as_u64()), (Some(50), Some(7)));
     for (more, problem) in [

@@ -120,6 +120,13 @@ fn wrong_questions_are_refused() {
     let basis = plane.basis(None);
     assert_eq!(ask(&basis, &q, &v), SymmetryError::TooFew { unknowns: 18, states: 10 });
     assert_eq!(ask(&basis, &q, &v[1..]), SymmetryError::Shape { coordinates: 2, q: 20, v: 19 });
+    let many = plane.basis("polynomial:12".parse().ok());
+    assert!(symmetries(plane.model.as_ref(), &many, (&q, &v), None).is_err());
+    let all = Subject::formula(&["a", "b", "c", "d", "e"].map(line), "a_dot*b_dot + c_dot*d_dot + e_dot^2");
+    let (q5, v5) = all.states(5);
+    let many = all.basis("polynomial:7".parse().ok());
+    let refused = symmetries(all.model.as_ref(), &many, (&q5, &v5), None).unwrap_err();
+    assert_eq!(refused, SymmetryError::TooMany { unknowns: 4752, most: 4000 });
     let other = Subject::formula(&[line("x")], "x_dot^2/2").basis(None);
     assert_eq!(ask(&other, &q, &v), SymmetryError::Basis { expected: 2, found: 1 });
     assert_eq!(ask(&basis, &[f64::NAN; 20], &v), SymmetryError::States { states: 10, found: 0 });
