@@ -20,23 +20,35 @@ mod valid_time;
 
 pub use accelerations::acceleration_errors;
 pub(crate) use affine::{AffineFit, affine_fit, factor_fit};
+#[doc(hidden)]
 pub use conserved::conserved_error;
 pub(crate) use coordinates::angle_difference;
+#[doc(hidden)]
 pub use coordinates::{CoordinateError, coordinate_error, velocity_error};
-pub use determination::{Determination, Estimate, Observed, RANGE, determination, places};
+pub use determination::{Determination, Estimate, determination};
+#[doc(hidden)]
+pub use determination::{Observed, RANGE, places};
 pub use dissipation::{EnergyLoss, energy_loss};
-pub use energy::{EnergyError, energy_drift, energy_error};
+#[doc(hidden)]
+pub use energy::energy_drift;
+pub use energy::{EnergyError, energy_error};
+#[doc(hidden)]
 pub use grid::{Axis, Grid, GridError, determinant_grid, lagrangian_grid};
-pub use instability::{stretches, training_instability};
+#[doc(hidden)]
+pub use instability::stretches;
+pub use instability::training_instability;
 pub use lyapunov::{Lyapunov, REGULAR, lyapunov};
 pub use mass_matrix::{MassMatrixError, mass_matrix_error};
+#[doc(hidden)]
 pub use portrait::Portrait;
+pub use prediction::PredictionError;
 pub(crate) use prediction::window_valid_times;
-pub use prediction::{
-    PredictionError, Predictions, Window, follow, predict_by_constant_velocity, predict_by_motion, prediction_error,
-};
+#[doc(hidden)]
+pub use prediction::{Predictions, Window, follow, predict_by_constant_velocity, predict_by_motion, prediction_error};
 pub use signature::wrong_signatures;
 pub use summary::{ErrorDistribution, Statistics, statistics};
 pub use trajectories::{StartBox, TrajectoryRun, TrajectorySummary, TrajectoryTest};
 pub(crate) use valid_time::relative_error;
-pub use valid_time::{VALID, ValidTime, ValidTimes, spread, valid_time};
+pub use valid_time::{VALID, ValidTime, ValidTimes};
+#[doc(hidden)]
+pub use valid_time::{spread, valid_time};

@@ -1,0 +1,131 @@
+"""Counts what the crate shows: python3 tests/scripts/public_items.py [SRC] [--list]
+
+Counted are modules, items (functions, types, traits, constants) and inherent methods that a path of public modules and re-exports leads to.
+What `#[doc(hidden)]` hides is not: it is there for the program, its tests and its benchmarks.
+"""
+
+import collections
+import os
+import re
+import sys
+
+ITEM = re.compile(r"^pub (?:const |unsafe |async )*(fn|struct|enum|trait|type|const|static|union)\s+(\w+)", re.M)
+IMPL = re.compile(r"^impl(?:<(?:[^<>]|<[^<>]*>)*>)?\s+(\w+)(?:<[^{]*>)?\s*(?:where[^{]*)?\{", re.M)
+ATTRIBUTES = r"((?:^#\[[^\n]*\]\n)*)"
+
+
+def stripped(text):
+    """Source without comments, literals and unit tests."""
+    text = re.sub(r"//[^\n]*", "", text)
+    text = re.sub(r'"(?:\\.|[^"\\])*"', '""', text, flags=re.S)
+    tests = text.find("#[cfg(test)]\nmod tests {")
+    return text if tests < 0 else text[:tests]
+
+
+def read(root):
+    files = {}
+    for folder, _, names in os.walk(root):
+        for name in (name for name in names if name.endswith(".rs") and name != "main.rs"):
+            module = os.path.relpath(os.path.join(folder, name), root)[:-3].replace("/", "::")
+            module = "" if module == "lib" else re.sub(r"::mod$", "", module)
+            with open(os.path.join(folder, name), encoding="utf-8") as file:
+                files[module] = stripped(file.read())
+    return files
+
+
+def leaves(prefix, tree):
+    """Paths of a `use` tree, each with the name it gets."""
+    tree = tree.strip()
+    group = re.match(r"^((?:\w+::)*)\{(.*)\}$", tree, re.S)
+    if not group:
+        path, _, name = tree.partition(" as ")
+        path = prefix + path.strip().split("::")
+        return [(path, name.strip() or path[-1])]
+    found, depth, part = [], 0, ""
+    for c in group.group(2) + ",":
+        depth += (c == "{") - (c == "}")
+        if c == "," and depth == 0:
+            found += leaves(prefix + group.group(1).split("::")[:-1], part) if part.strip() else []
+            part = ""
+        else:
+            part += c
+    return found
+
+
+class Surface:
+    def __init__(self, files):
+        self.files, self.modules, self.items = files, set(), set()
+        self.own = {module: {name: kind for kind, name in ITEM.findall(text)} for module, text in files.items()}
+        self.show("")
+
+    def below(self, module, name):
+        return f"{module}::{name}" if module else name
+
+    def uses(self, module, hidden):
+        for attributes, scope, tree in re.findall(ATTRIBUTES + r"^pub(\([^)]*\))? use ([^;]*);", self.files[module], re.M):
+            if hidden or not (scope or "doc(hidden)" in attributes):
+                yield from leaves([], re.sub(r"\s+", " ", tree))
+
+    def resolve(self, path, module):
+        if path[0] == "crate":
+            module, path = "", path[1:]
+        while path and path[0] in ("self", "super"):
+            module = "::".join(module.split("::")[:-1]) if path[0] == "super" else module
+            path = path[1:]
+        while path and self.below(module, path[0]) in self.files:
+            module, path = self.below(module, path[0]), path[1:]
+        return module, path
+
+    def export(self, module, name, depth=0):
+        if name in self.own.get(module, ()):
+            self.items.add((module, name))
+        elif depth < 8 and module in self.files:
+            for path, known in self.uses(module, True):
+                if known == name:
+                    origin, rest = self.resolve(path, module)
+                    if rest:
+                        self.export(origin, rest[0], depth + 1)
+
+    def show(self, module):
+        if module in self.modules:
+            return
+        self.modules.add(module)
+        self.items |= {(module, name) for name in self.own[module]}
+        for attributes, name in re.findall(ATTRIBUTES + r"^pub mod (\w+);", self.files[module], re.M):
+            if "doc(hidden)" not in attributes and self.below(module, name) in self.files:
+                self.show(self.below(module, name))
+        for path, _ in self.uses(module, False):
+            origin, rest = self.resolve(path, module)
+            if rest:
+                self.export(origin, rest[0])
+            else:
+                self.show(origin)
+
+    def methods(self):
+        types = {name for module, name in self.items if self.own[module][name] in ("struct", "enum", "type", "trait")}
+        count = 0
+        for text in self.files.values():
+            for found in IMPL.finditer(text):
+                if found.group(1) in types:
+                    depth, end = 0, found.end() - 1
+                    while True:
+                        depth += (text[end] == "{") - (text[end] == "}")
+                        end += 1
+                        if depth == 0:
+                            break
+                    count += len(re.findall(r"^    pub (?:const |unsafe )*fn ", text[found.end() : end], re.M))
+        return count
+
+
+def main():
+    arguments = [argument for argument in sys.argv[1:] if argument != "--list"]
+    surface = Surface(read(arguments[0] if arguments else os.path.join(os.path.dirname(__file__), "../../src")))
+    modules, items, methods = len(surface.modules) - 1, len(surface.items), surface.methods()
+    print(f"{modules + items + methods} public: {modules} modules, {items} items, {methods} methods")
+    rooms = collections.Counter(module.split("::")[0] for module, _ in surface.items)
+    print(", ".join(f"{room or 'crate'} {count}" for room, count in rooms.most_common()))
+    if "--list" in sys.argv:
+        print("\n".join(f"{module}::{name}" for module, name in sorted(surface.items)))
+
+
+main()
