@@ -49,6 +49,10 @@ impl Arena {
     }
     /// Notes the axes on which a form depends.
     fn blame(&self, form: &[f64]) {
+        if !form::deviation(form).is_finite() {
+            // Those to blame for it have been noted where it came from.
+            return;
+        }
         let slopes = form[1..form.len() - 1].iter().enumerate().filter(|(_, slope)| **slope != 0.0);
         self.blamed.set(slopes.fold(self.blamed.get(), |bits, (axis, _)| bits | 1 << (axis % 64)));
     }

@@ -138,7 +138,7 @@ fn judge(source: &dyn Enclose, chunk: &[Waiting], threads: usize, deadline: Opti
     spectra
 }
 
-/// Axes along which the mass matrix changes at some of a few places, or at all places where it is not known.
+/// Axes along which the mass matrix changes at some of a few places; all if it is not known to change at any.
 fn active_axes(source: &dyn Enclose, regions: &[(Vec<(f64, f64)>, f64)]) -> Vec<bool> {
     let axes = 2 * source.coordinates();
     let places: Vec<Vec<(f64, f64)>> = regions
@@ -159,10 +159,14 @@ fn active_axes(source: &dyn Enclose, regions: &[(Vec<(f64, f64)>, f64)]) -> Vec<
     let places: Vec<&[(f64, f64)]> = places.iter().map(Vec::as_slice).collect();
     source.each(&places, &mut |_, matrix| {
         for form in matrix.forms.chunks_exact(matrix.stride) {
-            active.iter_mut().zip(&form[1..]).for_each(|(active, slope)| *active |= *slope != 0.0);
+            let slopes = active.iter_mut().zip(&form[1..]);
+            slopes.for_each(|(active, slope)| *active |= slope.is_finite() && *slope != 0.0);
         }
         true
     });
+    if !active.contains(&true) {
+        active.fill(true);
+    }
     active
 }
 

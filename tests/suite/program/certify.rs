@@ -26,12 +26,15 @@ fn systems_are_certified_and_refuted_with_a_witness() {
         (whole["by_construction"].as_bool(), whole["signature"].to_string()),
         (Some(false), "[2,0]".to_string())
     );
-    // The metric of a black hole is Lorentzian inside of its horizon too.
     let hole = ["--system", "schwarzschild-geodesic", "--boxes", "2000", "--seconds", "1000"];
     let outside = object(&hole);
-    assert_eq!((outside["signature"].to_string(), shares(&outside)), ("[3,1]".to_string(), [1.0, 0.0, 0.0]));
+    let nearly = |share: f64| share > 1.0 - 1e-12;
+    // The Lagrangian has a branch at f = 1/2, r = 4 M: what lies there stays open.
+    let [certified, refuted, _] = shares(&outside);
+    assert!(nearly(certified) && refuted == 0.0 && outside["signature"].to_string() == "[3,1]", "{outside}");
     let definite = object(&[&hole[..], &["--signature", "4,0"]].concat());
-    assert_eq!(shares(&definite), [0.0, 1.0, 0.0]);
+    let [certified, refuted, _] = shares(&definite);
+    assert!(nearly(refuted) && certified == 0.0, "{definite}");
     let state = definite["witness"]["state"].as_object().unwrap();
     assert_eq!(state.len(), 8);
     assert!(state.contains_key("r") && state.contains_key("phi_dot"));
