@@ -195,7 +195,7 @@ impl Unknowns<'_> {
             let Some(found) = sparse::sparsest(&gram, &start, &weights, own, &taken, noise) else { continue };
             // Large terms that cancel may leave a small field, which changes L by more than its size allows.
             let part = combined(std::slice::from_ref(&found), &fixed).remove(0);
-            if !(norm(&part) <= WORSE * noise * self.size(&places, &found)) {
+            if norm(&part) > WORSE * noise * self.size(&places, &found) {
                 continue;
             }
             let change = combined(std::slice::from_ref(&found), &free).remove(0);
