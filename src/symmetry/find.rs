@@ -2,7 +2,7 @@
 
 use super::basis::{Basis, MOST_UNKNOWNS, Values, unknowns};
 use super::echelon::reduce;
-use super::orthonormal::{Orthonormal, orthonormal};
+use super::orthonormal::{Orthonormal, dot, norm, orthonormal};
 use super::sample::Sample;
 use super::separation::Separation;
 use super::{Algebra, Field, SymmetryError, sparse};
@@ -11,6 +11,9 @@ use crate::linalg::{Workspace, eigh, singular};
 
 /// Functions of which less is left beside the others count as their combinations, as `sin^2` beside `1` and `cos 2x`.
 const DEPENDENT: f64 = 1e-7;
+
+/// Growth of the noise of a field that fewer functions are worth.
+const WORSE: f64 = 3.0;
 
 /// Noise of exact terms: singular values below it are zero.
 pub const EXACT: f64 = 1e-8;
@@ -161,6 +164,20 @@ impl Unknowns<'_> {
         rows.map(|(k, ((x, dx), w))| w * (self.sample.g[k * n + i] * x + self.sample.p[k * n + i] * dx)).collect()
     }
 
+    /// Length of a field in the frame, over all states.
+    fn size(&self, places: &[usize], coefficients: &[f64]) -> f64 {
+        let (n, functions) = (self.sample.n, self.columns.values.len());
+        let square = |k: usize| -> f64 {
+            let mut xi = vec![0.0; n];
+            for (at, c) in places.iter().zip(coefficients).filter(|(_, c)| **c != 0.0) {
+                xi[at / functions] += c * self.columns.values[at % functions][k];
+            }
+            let frame = self.sample.frame[k * n * n..(k + 1) * n * n].chunks_exact(n);
+            frame.zip(&xi).map(|(row, x)| x * dot(row, &xi)).sum()
+        };
+        (0..self.sample.len()).map(square).sum::<f64>().sqrt()
+    }
+
     /// Replaces rows of coefficients by such with few entries, as far as their equations hold as well to `noise`.
     fn simplify(&self, rows: &mut [Vec<f64>], pivots: &[usize], sizes: &[f64], noise: f64) {
         let functions = self.columns.values.len();
@@ -176,6 +193,11 @@ impl Unknowns<'_> {
             let Some(own) = places.iter().position(|at| at == pivot) else { continue };
             let start: Vec<f64> = places.iter().map(|at| row[*at]).collect();
             let Some(found) = sparse::sparsest(&gram, &start, &weights, own, &taken, noise) else { continue };
+            // Large terms that cancel may leave a small field, which changes L by more than its size allows.
+            let part = combined(std::slice::from_ref(&found), &fixed).remove(0);
+            if norm(&part) > WORSE * noise * self.size(&places, &found) {
+                continue;
+            }
             let change = combined(std::slice::from_ref(&found), &free).remove(0);
             let change = self.gauge.given(&self.gauge.along(&change), self.plain.kept.len());
             row.fill(0.0);

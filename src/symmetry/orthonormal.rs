@@ -25,7 +25,8 @@ pub(crate) fn orthonormal(given: &[Vec<f64>], least: f64) -> Orthonormal {
             }
         }
         let left = norm(&rest);
-        if !(left > least * length) {
+        // A column of zeros has nothing to give.
+        if left <= least * length {
             continue;
         }
         let mut mix = vec![0.0; result.columns.len() + 1];

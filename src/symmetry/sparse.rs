@@ -88,6 +88,9 @@ pub(crate) fn sparsest(
     for step in 0..STEPS {
         let near = size * 0.5_f64.powi(step as i32);
         let m = active.len();
+        if m == 0 {
+            break;
+        }
         let mut matrix = vec![0.0; m * m];
         for (a, i) in active.iter().enumerate() {
             active.iter().enumerate().for_each(|(b, j)| matrix[a * m + b] = gram[i * count + j]);
@@ -120,10 +123,10 @@ mod tests {
     fn few_entries_are_preferred() {
         // a = b + c nearly, and a = d nearly: one entry is enough.
         let columns = vec![
-            vec![1.0, 1.0, 0.0, 0.001],
+            vec![1.0, 1.0, 0.0, 0.0],
             vec![1.0, 0.0, 0.001, 0.0],
-            vec![0.0, 1.0, 0.0, 0.001],
-            vec![1.001, 1.0, 0.001, 0.0],
+            vec![0.0, 1.0, 0.001, 0.0],
+            vec![1.0, 1.0, 0.0, 0.001],
         ];
         let start = [1.0, -0.5, -0.5, -0.5];
         let found = sparsest(&gram(&columns), &start, &[1.0; 4], 0, &[false; 4], 1e-3).unwrap();
