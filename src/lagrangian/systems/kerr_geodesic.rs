@@ -41,7 +41,7 @@ pub const SYSTEM: System = System {
     size: Size::Fixed(4),
     time_unit: Cow::Borrowed("m"),
     time_like: Some(0),
-    constraint: Some("t_dot = C/(sqrt(b^2 - g_tt C) - b), b = g_tphi phi_dot, C = 1 + g_rr r_dot^2 + .. + g_phiphi phi_dot^2"),
+    constraint: Some("t_dot = C/(sqrt(b^2 - g_tt C) - b), b = g_tphi phi_dot, C = 1 + g(v, v) of t_dot = 0"),
     training: PerSize::Rule(|_| bounds((-0.5 * PI, 2.5 * PI))),
     validation: PerSize::Rule(|_| bounds((0.0, 2.0 * PI))),
     trajectory: PerSize::Rule(|_| TrajectoryTest {
@@ -168,19 +168,15 @@ impl Closed for KerrGeodesic {
         // (-Delta A^2 + sin^2 theta B^2)/Sigma^2 with its sign turned.
         let bent = (delta * time.sqr() - (sin * azimuth).sqr()) / sigma.sqr();
         let sigma_theta = -two * spin.sqr() * sin * cos;
-        let along_r = r * bent + (two * r * phi_dot * sin.sqr() * azimuth - half * delta_slope * time.sqr()) / sigma
+        let along_r = r * bent
+            + (two * r * phi_dot * sin.sqr() * azimuth - half * delta_slope * time.sqr()) / sigma
             + r * (r_dot.sqr() / delta + theta_dot.sqr())
             - half * sigma * delta_slope * (r_dot / delta).sqr();
         let along_theta = half * sigma_theta * (bent + r_dot.sqr() / delta + theta_dot.sqr())
             + sin * cos * (two * spin * delta * time * phi_dot + azimuth.sqr()) / sigma;
         let sigma_rate = two * r * r_dot + sigma_theta * theta_dot;
         let stretch_rate = (sigma_rate - sigma * delta_slope * r_dot / delta) / delta;
-        vec![
-            t,
-            delta * (along_r - r_dot * stretch_rate) / sigma,
-            (along_theta - theta_dot * sigma_rate) / sigma,
-            phi,
-        ]
+        vec![t, delta * (along_r - r_dot * stretch_rate) / sigma, (along_theta - theta_dot * sigma_rate) / sigma, phi]
     }
 
     /// `t' = C/(sqrt(b^2 - g_tt C) - b)`, `b = g_tphi phi'`, `C = 1 + g(v, v)` of the velocity without `t'`: the future outside and

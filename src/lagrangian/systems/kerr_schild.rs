@@ -3,8 +3,8 @@
 use super::{length, lengths};
 use crate::lagrangian::Lagrangian;
 use crate::lagrangian::system::{
-    Bounds, Closed, Conserved, LearningAdvice, Parameter, PerSize, Plane, Range, ShellAdvice, Size, StateAdvice, System,
-    TrajectoryTest,
+    Bounds, Closed, Conserved, LearningAdvice, Parameter, PerSize, Plane, Range, ShellAdvice, Size, StateAdvice,
+    System, TrajectoryTest,
 };
 use crate::scalar::{Real, Scalar};
 use std::borrow::Cow;
@@ -34,7 +34,7 @@ static OF_SCHWARZSCHILD: [Parameter; 1] = [MASS];
 static OF_KERR: [Parameter; 2] = [MASS, SPIN];
 static OF_REISSNER_NORDSTROM: [Parameter; 2] = [MASS, CHARGE];
 
-const CONSTRAINT: &str = "t_dot = C/(sqrt(b^2 + (1 - f) C) - b), b = f (l.v), C = 1 + v^2 + f (l.v)^2, v = (x_dot, y_dot, z_dot)";
+const CONSTRAINT: &str = "t_dot = C/(sqrt(b^2 + (1 - f) C) - b), b = f l.v, C = 1 + v^2 + f (l.v)^2";
 
 fn bounds(positions: [(f64, f64); 4], velocity: (f64, f64)) -> Bounds {
     // The velocity of t follows from the mass shell.
