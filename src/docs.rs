@@ -8,6 +8,7 @@
 //! | [`recorded_motion`] | data of your own: formats, noise, friction, films |
 //! | [`structures`] | black box, mechanical, metric; what is known beforehand; hybrids in Rust |
 //! | [`geometry`] | metric, connection, curvature of a Lagrangian, learned or written down |
+//! | [`black_holes`] | the metric of a black hole learned from free fall, and what is read off it |
 //! | [`symmetries`] | what is conserved: symmetries, charges, what two Lagrangians have in common |
 //! | [`certificates`] | proofs that a mass matrix has its signature |
 //! | [`method`] | equations, penalties, identities, units and conventions |
@@ -70,6 +71,7 @@ pages! {
     recorded_motion "recorded-motion.md";
     structures "structures.md";
     geometry "geometry.md";
+    black_holes "black-holes.md";
     symmetries "symmetries.md";
     certificates "certificates.md";
     method "method.md";

@@ -57,7 +57,7 @@ mod tests {
             }
             seen.push(system.system.name.clone());
         }
-        assert_eq!(seen.len(), 6, "{seen:?}");
+        assert_eq!(seen.len(), 10, "{seen:?}");
     }
 
     #[test]

@@ -4,7 +4,7 @@ use crate::configuration::error::{ConfigError, Faults, place};
 use crate::configuration::penalty::Regularizer;
 use crate::lagrangian::Description;
 use crate::network::file::MAX_WIDTH;
-use crate::network::{ActivationChoice, Form, Initialization, InputLayer, Structure};
+use crate::network::{ActivationChoice, Form, Initialization, InputLayer, Radial, Structure};
 use crate::optimizers::Method;
 use crate::optimizers::Schedule;
 use serde::{Deserialize, Serialize};
@@ -122,12 +122,55 @@ pub struct Data {
     /// outweigh the others.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub relative: f64,
+    /// Names of Cartesian coordinates around a centre: all states are drawn in a [`Shell`] around it, training, validation and test,
+    /// instead of the boxes of these coordinates and of the velocities; empty for none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub shell: Vec<String>,
+    /// Lowest and highest distance of the shell from its centre, in the unit of the coordinates.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shell_radius: Option<[f64; 2]>,
+    /// Largest rapidity of states in a shell; 1 if left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rapidity: Option<f64>,
     /// Number of fresh states on which the final model is judged.
     pub test: usize,
     /// Validation and test bounds of each coordinate.
     pub validation_position: Vec<[f64; 2]>,
     /// Validation and test bounds of each velocity; those of a velocity that a mass shell fixes mean nothing.
     pub validation_velocity: Vec<[f64; 2]>,
+}
+
+/// States in a shell around a centre: directions uniform over the sphere, distances uniform in their logarithm.
+///
+/// Velocities are those of free fall: rapidities uniform from 0 to `rapidity`, in any direction of the local frame of an observer whom the
+/// surface of equal time sees at rest. With [`Data::relative`] `f` a training state weighs `1/(|a| + f m)`, `m` the median of `|a|` among the
+/// states about as far from the centre: near and far count alike.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Shell<'a> {
+    /// Names of the Cartesian coordinates around the centre.
+    pub coordinates: &'a [String],
+    /// Lowest and highest distance from it, in the unit of the coordinates.
+    pub radius: [f64; 2],
+    /// Largest rapidity.
+    pub rapidity: f64,
+}
+
+impl Data {
+    /// The shell in which states are drawn, if there is one.
+    ///
+    /// # Errors
+    /// A shell without radius.
+    pub fn shell(&self) -> Result<Option<Shell<'_>>, ConfigError> {
+        if self.shell.is_empty() {
+            return Ok(None);
+        }
+        let radius = self.shell_radius.ok_or_else(|| ConfigError {
+            field: "data.shell_radius".to_string(),
+            expected: "[low, high] beside data.shell",
+            found: "none".to_string(),
+        })?;
+        Ok(Some(Shell { coordinates: &self.shell, radius, rapidity: self.rapidity.unwrap_or(1.0) }))
+    }
 }
 
 /// Shape of the network.
@@ -160,6 +203,12 @@ pub struct Network {
     /// Names of the coordinates that the Lagrangian does not depend on.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub cyclic: Vec<String>,
+    /// Names of groups of Cartesian coordinates around a centre that enter by direction and distance, see [`Radial`].
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub radial: Vec<Vec<String>>,
+    /// Distance that counts as 1 for them, in the unit of the coordinates; 1 if left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub radial_unit: Option<f64>,
     /// `true` if the Lagrangian is even in the velocities.
     #[serde(default)]
     pub even_in_v: bool,
@@ -242,10 +291,16 @@ impl Network {
     /// Knowledge of the Lagrangian beforehand, for coordinates with these names.
     ///
     /// # Errors
-    /// A cyclic coordinate that is none of them.
+    /// A cyclic or radial coordinate that is none of them.
     pub fn form<'a>(&self, coordinates: impl Iterator<Item = &'a str> + Clone) -> Result<Form, ConfigError> {
         let index = |name: &String| place("network.cyclic", name, coordinates.clone());
+        let radial = |group: &Vec<String>| -> Result<Radial, ConfigError> {
+            let place = |name: &String| place("network.radial", name, coordinates.clone());
+            let coordinates = group.iter().map(place).collect::<Result<_, _>>()?;
+            Ok(Radial { coordinates, unit: self.radial_unit.unwrap_or(1.0) })
+        };
         Ok(Form {
+            radial: self.radial.iter().map(radial).collect::<Result<_, _>>()?,
             structure: self.structure,
             cyclic: self.cyclic.iter().map(index).collect::<Result<_, _>>()?,
             even_in_v: self.even_in_v,
@@ -280,6 +335,15 @@ impl Config {
             faults.number(value, field, (0.0..=1.0).contains(&value), "a number from 0 to 1");
         }
         faults.at_least_zero(data.relative, "data.relative");
+        match data.shell() {
+            Ok(Some(Shell { radius: [low, high], rapidity, .. })) => {
+                let ok = low > 0.0 && low < high && high.is_finite();
+                faults.check(ok, "data.shell_radius", "[low, high], 0 < low < high", format!("[{low}, {high}]"));
+                faults.at_least_zero(rapidity, "data.rapidity");
+            }
+            Ok(None) => {}
+            Err(fault) => faults.0.push(fault),
+        }
         faults.bounds("data.validation_position", &data.validation_position, n);
         faults.bounds("data.validation_velocity", &data.validation_velocity, n);
         self.network_faults(&mut faults);
@@ -316,6 +380,8 @@ impl Config {
             }
         }
         faults.number(network.alpha, "network.alpha", network.alpha.is_finite(), "a finite number");
+        let unit = network.radial_unit.unwrap_or(1.0);
+        faults.number(unit, "network.radial_unit", unit.is_finite() && unit > 0.0, "a positive number");
         if let Some(units) = network.dissipation {
             faults.count(units, "network.dissipation", MAX_WIDTH);
         }

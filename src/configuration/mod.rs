@@ -4,7 +4,7 @@ mod config;
 mod error;
 mod penalty;
 
-pub use config::{Config, Data, Known, Network, OnFailure, Optimizer, Phase, Polish, Precision, Scaling};
+pub use config::{Config, Data, Known, Network, OnFailure, Optimizer, Phase, Polish, Precision, Scaling, Shell};
 pub use error::ConfigError;
-pub(crate) use error::Faults;
+pub(crate) use error::{Faults, place};
 pub use penalty::{Penalty, Regularizer};

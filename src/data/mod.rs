@@ -9,6 +9,7 @@ mod measured;
 mod motions;
 mod of_config;
 mod sampling;
+mod shell;
 
 pub(crate) use bounds::boxes;
 pub use dataset::{Dataset, DatasetError};

@@ -5,6 +5,7 @@ use crate::data::dataset::{Dataset, DatasetError};
 use crate::data::datasets::Datasets;
 use crate::data::draw::{Drawn, SamplingError, draw};
 use crate::data::motions::along_motions;
+use crate::data::shell::{in_shell, weigh_by_distance};
 use crate::lagrangian::Configured;
 use crate::random::RngStream;
 use crate::scalar::Scalar;
@@ -104,6 +105,15 @@ pub fn sample_all<S: Scalar>(
         let bounds = (phase.position.as_slice(), phase.velocity.as_slice());
         let mut rng = RngStream::Training(k).generator(seed);
         let states = config.data.training;
+        if let Some(shell) = config.data.shell()? {
+            let set = in_shell(system, &shell, (&field, &phase.position), states, &mut rng)?;
+            let set = match config.data.relative {
+                floor if floor > 0.0 => weigh_by_distance(set, system, &shell, floor)?,
+                _ => set,
+            };
+            training.push(set);
+            continue;
+        }
         let moving = (config.data.motions * states as f64).round() as usize;
         let drawn = along_motions(system, &field, bounds, &phase.logarithmic, moving, &mut rng)?;
         let set = fill(drawn, system, &field, bounds, &phase.logarithmic, states, &mut rng)?;
@@ -116,8 +126,14 @@ pub fn sample_all<S: Scalar>(
     let data = &config.data;
     let bounds = (data.validation_position.as_slice(), data.validation_velocity.as_slice());
     let field = "data.validation_position";
-    let validation = sample(system, field, bounds, data.validation, &mut RngStream::Validation.generator(seed))?;
-    let test = sample(system, field, bounds, data.test, &mut RngStream::Test.generator(seed))?;
+    let judged = |states: usize, stream: RngStream| {
+        let mut rng = stream.generator(seed);
+        match data.shell()? {
+            Some(shell) => in_shell(system, &shell, (field, bounds.0), states, &mut rng),
+            None => sample(system, field, bounds, states, &mut rng),
+        }
+    };
+    let (validation, test) = (judged(data.validation, RngStream::Validation)?, judged(data.test, RngStream::Test)?);
     let training = training.iter().map(Dataset::cast).collect();
     Ok((Datasets { training, validation: validation.cast(), test: test.cast() }, scale))
 }
@@ -160,7 +176,7 @@ mod tests {
             assert_eq!(sample_all::<f64>(&config, &configured).unwrap().0.training, data.training);
             seen += 1;
         }
-        assert_eq!(seen, 4);
+        assert_eq!(seen, 8);
     }
 
     #[test]

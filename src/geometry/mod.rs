@@ -33,6 +33,7 @@ mod connection;
 mod curvature;
 mod error;
 mod metric;
+mod orbits;
 mod surfaces;
 mod tensor;
 
@@ -40,6 +41,7 @@ pub use connection::Connection;
 pub use curvature::Curvature;
 pub use error::GeometryError;
 pub use metric::Metric;
+pub use orbits::{CircularOrbit, Equator, Sense, Symmetric, Turn};
 pub use surfaces::{Change, Character, Surface, characters, grid, surfaces};
 
 use crate::lagrangian::{EulerLagrange, MetricJet};

@@ -157,6 +157,10 @@ catalogue! {
     ads3_geodesic: |n| super::systems::ads3_geodesic::AdsGeodesic { n };
     ads4_geodesic: |n| super::systems::ads4_geodesic::AdsGeodesic { n };
     schwarzschild_geodesic: |_| super::systems::schwarzschild_geodesic::SchwarzschildGeodesic;
+    schwarzschild_cartesian: |_| super::systems::schwarzschild_cartesian::KerrSchild::Schwarzschild;
+    reissner_nordstrom_cartesian: |_| super::systems::reissner_nordstrom_cartesian::KerrSchild::ReissnerNordstrom;
+    kerr_geodesic: |_| super::systems::kerr_geodesic::KerrGeodesic;
+    kerr_cartesian: |_| super::systems::kerr_cartesian::KerrSchild::Kerr;
 }
 
 /// [`construct`], compiled in this crate once for each of its scalars instead of again in every crate that calls it: all

@@ -176,6 +176,19 @@ pub struct StateAdvice {
     pub relative: f64,
     /// Share of the states that lie along motions of the trajectory test.
     pub motions: f64,
+    /// Shell around a centre whose states are drawn instead of those of a box.
+    pub shell: Option<ShellAdvice>,
+}
+
+/// Shell around a centre, and how fast what moves in it is at most.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ShellAdvice {
+    /// Cartesian coordinates around the centre.
+    pub coordinates: &'static [usize],
+    /// Lowest and highest distance from it.
+    pub radius: (f64, f64),
+    /// Largest rapidity in a local frame.
+    pub rapidity: f64,
 }
 
 /// The paper's budget for a system.

@@ -92,6 +92,17 @@ impl Architecture {
         if *structure != Structure::BlackBox && (0..n).all(|i| cyclic.contains(&i)) {
             return fault(format!("expected a coordinate that is not cyclic for `{name}`"));
         }
+        let mut grouped: Vec<usize> = self.form.radial.iter().flat_map(|group| group.coordinates.clone()).collect();
+        grouped.sort_unstable();
+        let free = |i: usize| i < n && !self.periodic[i] && !cyclic.contains(&i);
+        if grouped.windows(2).any(|pair| pair[0] == pair[1]) || !grouped.iter().all(|&i| free(i)) {
+            return fault(format!(
+                "expected radial coordinates below {n}, each once, no angles, not cyclic, found {grouped:?}"
+            ));
+        }
+        if let Some(group) = self.form.radial.iter().find(|group| !(group.unit.is_finite() && group.unit > 0.0)) {
+            return fault(format!("expected a positive unit of radial coordinates, found {}", group.unit));
+        }
         if let Some(known) = &self.form.known {
             let described = crate::network::known::system(known, n);
             described.map_err(|problem| NetworkError::Architecture(format!("known: {problem}")))?;

@@ -54,12 +54,31 @@ pub struct Form {
     pub even_in_v: bool,
     /// `true` if `alpha` of a black box is learned.
     pub learn_alpha: bool,
+    /// Groups of coordinates that enter by direction and distance; files without this key have none.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub radial: Vec<Radial>,
     /// A Lagrangian that is known, in physical units, and added; its constants marked `learn` are learned.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub known: Option<Box<Description>>,
 }
 
+/// Cartesian coordinates `x` around a centre, seen near and far alike: each enters as `(x_i/R) ln(R/u)` and as `(x_i/R) (u/R)`, `R` the
+/// distance from the centre. At the centre itself there is no feature.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Radial {
+    /// The coordinates.
+    pub coordinates: Vec<usize>,
+    /// Distance `u`, in the unit of the coordinates: that of the nearest states serves well.
+    pub unit: f64,
+}
+
 impl Form {
+    /// `true` if coordinate `i` belongs to a radial group.
+    pub fn is_radial(&self, i: usize) -> bool {
+        self.radial.iter().any(|group| group.coordinates.contains(&i))
+    }
+
     /// `true` if nothing is known.
     pub fn is_default(&self) -> bool {
         *self == Self::default()

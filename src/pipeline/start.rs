@@ -40,6 +40,9 @@ impl StartModel {
         let name = |i: &usize| self.header.columns.get(*i).cloned();
         (network.structure, network.cyclic) =
             (model.form.structure, model.form.cyclic.iter().filter_map(name).collect());
+        network.radial =
+            model.form.radial.iter().map(|group| group.coordinates.iter().filter_map(name).collect()).collect();
+        network.radial_unit = model.form.radial.first().map(|group| group.unit);
         (network.even_in_v, network.learn_alpha) = (model.form.even_in_v, model.form.learn_alpha);
         network.known = model.form.known.clone().map(Known::Description);
         let scaled = model.scale.iter().any(|scale| *scale != 1.0);

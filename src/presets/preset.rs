@@ -4,7 +4,7 @@ use crate::configuration::Regularizer;
 use crate::configuration::{Config, Data, Network, OnFailure, Optimizer, Phase, Precision, Scaling};
 use crate::data::boxes;
 use crate::lagrangian::Configured;
-use crate::lagrangian::system::{Bounds, PaperBudget, PaperPhase, StateAdvice};
+use crate::lagrangian::system::{Bounds, PaperBudget, PaperPhase, ShellAdvice, StateAdvice};
 use crate::network::{ActivationChoice, Initialization, InputLayer, Structure};
 use crate::optimizers::Method;
 use crate::optimizers::Schedule;
@@ -86,6 +86,9 @@ fn base(system: &Configured<f64>, states: usize, network: Network) -> Config {
             off_shell: 0.0,
             motions: 0.0,
             relative: 0.0,
+            shell: Vec::new(),
+            shell_radius: None,
+            rapidity: None,
             test: states / 5,
             validation_position: boxes(&validation.positions),
             validation_velocity: boxes(&validation.velocities),
@@ -137,6 +140,8 @@ fn network(width: usize) -> Network {
         input_layer: InputLayer::None,
         structure: Structure::BlackBox,
         cyclic: Vec::new(),
+        radial: Vec::new(),
+        radial_unit: None,
         even_in_v: false,
         learn_alpha: false,
         known: None,
@@ -175,17 +180,35 @@ fn training_states(system: &Configured<f64>) -> (Bounds, StateAdvice) {
 }
 
 fn ours(system: &Configured<f64>, size: Size) -> Config {
-    let (bounds, StateAdvice { logarithmic, relative, motions }) = training_states(system);
+    let (bounds, StateAdvice { logarithmic, relative, motions, shell }) = training_states(system);
     let phase = phase(size.epochs, 5e-3, boxes(&bounds.positions), boxes(&bounds.velocities));
     let base = base(system, 60_000, network(size.width));
     let off_shell = if system.constrained_coordinate().is_some() { OFF_SHELL } else { 0.0 };
-    Config {
+    let config = Config {
         data: Data { off_shell, relative, motions, ..base.data },
         penalty: regularizer(system, PENALTY),
         optimizer: Optimizer { weight_decay: size.weight_decay, ..optimizer(Method::Soap) },
         phases: vec![Phase { logarithmic, ..phase }],
         ..base
+    };
+    match shell {
+        Some(shell) => around_a_centre(config, system, shell),
+        None => config,
     }
+}
+
+/// The metric of a field around a centre, the same at all times: states in a shell, features of direction and distance.
+fn around_a_centre(mut config: Config, system: &Configured<f64>, shell: ShellAdvice) -> Config {
+    let names = system.system.coordinates(system.coordinates);
+    let coordinates: Vec<String> = shell.coordinates.iter().map(|&i| names[i].name.to_string()).collect();
+    let (low, high) = shell.radius;
+    config.take_structure(Structure::Metric);
+    config.network.cyclic = config.network.time_like.iter().cloned().collect();
+    config.network.scaling = Scaling::None;
+    (config.network.radial, config.network.radial_unit) = (vec![coordinates.clone()], Some(low));
+    config.data.shell = coordinates;
+    (config.data.shell_radius, config.data.rapidity) = (Some([low, high]), Some(shell.rapidity));
+    config
 }
 
 /// The quick preset for recorded states: numbers of training, validation and test states, bounds of coordinates and
@@ -213,6 +236,9 @@ pub(crate) fn recorded(
             off_shell: 0.0,
             motions: 0.0,
             relative: 0.0,
+            shell: Vec::new(),
+            shell_radius: None,
+            rapidity: None,
             validation_position,
             validation_velocity,
         },
@@ -240,6 +266,8 @@ fn paper(system: &Configured<f64>) -> Option<Config> {
         dissipation: None,
         structure: Structure::BlackBox,
         cyclic: Vec::new(),
+        radial: Vec::new(),
+        radial_unit: None,
         even_in_v: false,
         learn_alpha: false,
         known: None,

@@ -91,6 +91,25 @@ pub const TRAINING_SECTIONS: [Section<'static>; 9] = [
                 "With f above 0 a state weighs f m / (f m + |a|), |a| its scaled acceleration and m the mean of all: a few \
                  huge accelerations do not outweigh the others.",
             ),
+            optional(
+                "shell",
+                "[\"x\", \"y\", \"z\"]",
+                "names of Cartesian coordinates around a centre",
+                "All states lie in a shell around the centre, instead of their bounds: directions uniform, distances uniform in their \
+                 logarithm, velocities time-like; relative then compares with states about as far from the centre.",
+            ),
+            optional(
+                "shell_radius",
+                "[1.2, 40]",
+                "[low, high] above 0, in the unit of the coordinates",
+                "Lowest and highest distance of the shell from its centre.",
+            ),
+            optional(
+                "rapidity",
+                "1.2",
+                "from 0; 1 unless set",
+                "Largest rapidity of states in a shell, in the frame of an observer at rest in the surface of equal time.",
+            ),
             key("test", "1 to 2^30", "Number of fresh states on which the final model is judged."),
             key(
                 "validation_position",
@@ -129,6 +148,14 @@ pub const TRAINING_SECTIONS: [Section<'static>; 9] = [
                 "names of coordinates",
                 "Coordinates that the Lagrangian does not depend on.",
             ),
+            optional(
+                "radial",
+                "[[\"x\", \"y\", \"z\"]]",
+                "lists of names of Cartesian coordinates",
+                "Coordinates that enter by direction and distance R from a centre, as (x_i/R) ln(R/u) and (x_i/R) (u/R): for \
+                 fields that reach from near to far.",
+            ),
+            optional("radial_unit", "1.2", "a positive number; 1 unless set", "The distance u of radial coordinates."),
             key("even_in_v", "true, false", "Make the Lagrangian even in the velocities."),
             key("alpha", "a finite number", "Factor of the added |v|^2 of scaled velocities, of a black box."),
             key("learn_alpha", "true, false", "Learn alpha too; a black box only."),
@@ -336,6 +363,9 @@ mod tests {
         config.network.known = Some(Known::File("a.toml".to_string()));
         config.polish = Some(Polish::default());
         config.data.motions = 0.5;
+        config.data.shell = vec!["x".to_string()];
+        (config.data.shell_radius, config.data.rapidity) = (Some([1.0, 2.0]), Some(1.0));
+        (config.network.radial, config.network.radial_unit) = (vec![vec!["x".to_string()]], Some(2.0));
         let mut found = BTreeSet::new();
         paths(&serde_json::to_value(&config).unwrap(), "", &mut found);
         assert_eq!(found, listed(&TRAINING_SECTIONS));

@@ -72,6 +72,8 @@ fn systems_are_where_they_should_be() {
     near(place("spring-pendulum", &[], &[3.0, FRAC_PI_3]), (3.0 * root, -1.5), 3.0);
     near(place("sphere-geodesic", &[("R", "2")], &[FRAC_PI_3, PI]), (-2.0 * root, 1.0), 2.0);
     near(place("schwarzschild-geodesic", &[], &[7.0, 4.0, 1.0, FRAC_PI_6]), (4.0 * root, 2.0), 4.0);
+    near(place("kerr-geodesic", &[], &[7.0, 4.0, 1.0, FRAC_PI_6]), (4.0 * root, 2.0), 4.0);
+    assert_eq!(place("kerr-cartesian", &[], &[7.0, 4.0, 1.0, 2.0]), (4.0, 1.0));
     assert_eq!(place("kepler", &[], &[1.5, -2.0]), (1.5, -2.0));
     assert_eq!(place("henon-heiles", &[], &[0.25, 0.5]), (0.25, 0.5));
     assert_eq!(place("charged-particle", &[], &[1.0, 2.0, 3.0]), (1.0, 2.0));

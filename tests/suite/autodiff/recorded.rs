@@ -242,7 +242,7 @@ fn every_structure_agrees_with_nested_forward_numbers() {
             embed_periodic: true,
             input_layer: if k == 3 { InputLayer::Dyt } else { InputLayer::None },
             dissipation: None,
-            form: Form { structure, cyclic: cyclic.clone(), even_in_v, learn_alpha, known: None },
+            form: Form { structure, cyclic: cyclic.clone(), even_in_v, learn_alpha, radial: Vec::new(), known: None },
         };
         let architecture = Architecture { hidden: vec![6, 4], ..architecture };
         assert_eq!(architecture.validate(), Ok(()));

@@ -3,5 +3,6 @@
 mod closed_forms;
 mod identities;
 mod networks;
+mod orbits;
 mod spaces;
 mod surfaces;

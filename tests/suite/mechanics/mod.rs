@@ -1,5 +1,6 @@
 //! Euler-Lagrange terms of hand-written systems.
 
+mod black_holes;
 mod described;
 mod random;
 mod relativity;

@@ -208,7 +208,7 @@ fn signatures_are_exact_and_sampled_states_on_the_mass_shell() {
     signatures::<f64>(&mut rng);
     signatures::<f32>(&mut rng);
     signatures::<Dd>(&mut rng);
-    assert_eq!(relativistic().count(), 4);
+    assert_eq!(relativistic().count(), 8);
 }
 
 #[test]

@@ -1,0 +1,195 @@
+//! Free fall outside a spinning black hole, in the coordinates of Boyer and Lindquist.
+
+use crate::lagrangian::Lagrangian;
+use crate::lagrangian::system::{
+    Bounds, Closed, Conserved, Coordinate, LearningAdvice, Parameter, PerSize, Plane, Range, Size, System,
+    TrajectoryTest,
+};
+use crate::scalar::{Real, Scalar};
+use std::borrow::Cow;
+use std::f64::consts::PI;
+
+/// `L = (-Delta A^2/Sigma + sin^2 theta B^2/Sigma + Sigma (r'^2/Delta + theta'^2))/2` per unit of mass.
+///
+/// `A = t' - a sin^2 theta phi'`, `B = (r^2 + a^2) phi' - a t'`, `Delta = r^2 - 2 M r + a^2`, `Sigma = r^2 + a^2 cos^2 theta`; `a` is the
+/// angular momentum per mass. `' = d/dtau`, `tau` the proper time; geometric units, `G = c = 1`: all in metres.
+///
+/// Source: Boyer and Lindquist, J. Math. Phys. 8, 265 (1967), in the orthogonal forms of Carter, Phys. Rev. 174, 1559 (1968).
+#[derive(Clone, Copy, Debug)]
+pub struct KerrGeodesic;
+
+static PARAMETERS: [Parameter; 2] =
+    [Parameter::new("M", "1", "m", Range::Positive), Parameter::new("a", "0.9", "m", Range::Any)];
+
+fn bounds(phi: (f64, f64)) -> Bounds {
+    Bounds {
+        positions: vec![(-10.0, 10.0), (3.0, 15.0), (0.1 * PI, 0.9 * PI), phi],
+        // The velocity of t follows from the mass shell.
+        velocities: vec![(0.0, 0.0), (-0.3, 0.3), (-0.1, 0.1), (-0.1, 0.1)],
+    }
+}
+
+/// Catalogue entry.
+pub const SYSTEM: System = System {
+    name: Cow::Borrowed("kerr-geodesic"),
+    title: Cow::Borrowed("Geodesic of the Kerr metric"),
+    coordinates: PerSize::Rule(|_| {
+        let theta = Coordinate { periodic: false, ..Coordinate::angle("theta") };
+        vec![Coordinate::length("t"), Coordinate::length("r"), theta, Coordinate::angle("phi")]
+    }),
+    parameters: Cow::Borrowed(&PARAMETERS),
+    size: Size::Fixed(4),
+    time_unit: Cow::Borrowed("m"),
+    time_like: Some(0),
+    constraint: Some("t_dot = C/(sqrt(b^2 - g_tt C) - b), b = g_tphi phi_dot, C = 1 + g(v, v) of t_dot = 0"),
+    training: PerSize::Rule(|_| bounds((-0.5 * PI, 2.5 * PI))),
+    validation: PerSize::Rule(|_| bounds((0.0, 2.0 * PI))),
+    trajectory: PerSize::Rule(|_| TrajectoryTest {
+        start: Bounds {
+            positions: vec![(0.0, 0.0), (6.0, 12.0), (0.4 * PI, 0.6 * PI), (0.0, 2.0 * PI)],
+            velocities: vec![(0.0, 0.0), (-0.1, 0.1), (-0.02, 0.02), (-0.05, 0.05)],
+        },
+        t_end: 5.0,
+        dt: 0.05,
+    }),
+    domain: Some(|parameters, q| match (parameters, q) {
+        (&[mass, spin], &[_, r, theta, _])
+            if r > mass + (mass * mass - spin * spin).max(0.0).sqrt() && theta.sin() != 0.0 =>
+        {
+            Ok(())
+        }
+        _ => Err("r must be above M + sqrt(M^2 - a^2) and theta keep away from the poles"),
+    }),
+    // Seen along the axis, r as if space were flat.
+    plane: Some(Plane {
+        labels: ["r cos phi [m]", "r sin phi [m]"],
+        point: |_, q| (q[1] * q[3].cos(), q[1] * q[3].sin()),
+    }),
+    conserved: Some(Conserved {
+        name: "energy, angular momentum about the axis and root of Carter's constant K per mass [1, m, m]",
+        vector: |parameters, q, v| {
+            let Some(form) = Forms::new(parameters, q, v) else { return vec![f64::NAN] };
+            let [time, azimuth] = form.momenta();
+            let carter = KerrGeodesic.carter(parameters, q, v).unwrap_or(f64::NAN);
+            vec![-time, azimuth, carter.max(0.0).sqrt()]
+        },
+    }),
+    learning: LearningAdvice::NONE,
+    described: None,
+};
+
+/// Carter's forms at a state.
+struct Forms<R> {
+    spin: R,
+    r: R,
+    sin: R,
+    cos: R,
+    /// `Sigma`.
+    sigma: R,
+    /// `Delta`.
+    delta: R,
+    /// `d Delta/dr = 2 (r - M)`.
+    delta_slope: R,
+    /// `A = t' - a sin^2 theta phi'`.
+    time: R,
+    /// `B = (r^2 + a^2) phi' - a t'`.
+    azimuth: R,
+}
+
+impl<R: Real> Forms<R> {
+    fn new(parameters: &[R], q: &[R], v: &[R]) -> Option<Self> {
+        let [mass, spin] = *parameters else { return None };
+        let (r, (sin, cos)) = (q[1], q[2].sin_cos());
+        let fall = r - mass;
+        Some(Self {
+            spin,
+            r,
+            sin,
+            cos,
+            sigma: r.sqr() + (spin * cos).sqr(),
+            delta: r * (fall - mass) + spin.sqr(),
+            delta_slope: fall + fall,
+            time: v[0] - spin * sin.sqr() * v[3],
+            azimuth: (r.sqr() + spin.sqr()) * v[3] - spin * v[0],
+        })
+    }
+
+    /// `p_t` and `p_phi`.
+    fn momenta(&self) -> [R; 2] {
+        let (time, azimuth) = (self.delta * self.time / self.sigma, self.sin.sqr() * self.azimuth / self.sigma);
+        [-(time + self.spin * azimuth), self.spin * self.sin.sqr() * time + (self.r.sqr() + self.spin.sqr()) * azimuth]
+    }
+
+    /// `2 L`.
+    fn interval(&self, v: &[R]) -> R {
+        let turned = (self.sin * self.azimuth).sqr() - self.delta * self.time.sqr();
+        turned / self.sigma + self.sigma * (v[1].sqr() / self.delta + v[2].sqr())
+    }
+}
+
+impl KerrGeodesic {
+    /// Carter's constant `K = Sigma^2 theta'^2 + sin^2 theta B^2 - a^2 cos^2 theta g(v, v)`: never negative for free fall slower than light,
+    /// `(L_z - a E)^2` in the equator; `Q = K - (L_z - a E)^2`. `None` for a wrong number of parameters.
+    ///
+    /// Source: Carter, Phys. Rev. 174, 1559 (1968).
+    pub fn carter<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> Option<R> {
+        let form = Forms::new(parameters, q, v)?;
+        let turned = (form.sigma * v[2]).sqr() + (form.sin * form.azimuth).sqr();
+        Some(turned - (form.spin * form.cos).sqr() * form.interval(v))
+    }
+}
+
+impl Lagrangian for KerrGeodesic {
+    const COORDINATES: Option<usize> = Some(4);
+
+    fn coordinates(&self) -> usize {
+        4
+    }
+    fn lagrangian<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> R {
+        Forms::new(parameters, q, v).map_or(R::constant(Scalar::nan()), |form| R::half() * form.interval(v))
+    }
+}
+
+impl Closed for KerrGeodesic {
+    /// From `Delta A = (r^2 + a^2) E - a L_z` and `B = L_z/sin^2 theta - a E`, whose `E` and `L_z` are constant, for `t''` and `phi''`;
+    /// `r'' = Delta (dL/dr - r' (Sigma/Delta)')/Sigma`, `theta'' = (dL/dtheta - theta' Sigma')/Sigma`.
+    fn acceleration<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> Vec<R> {
+        let Some(form) = Forms::new(parameters, q, v) else { return Vec::new() };
+        let [time_momentum, angular] = form.momenta();
+        let Forms { spin, r, sin, cos, sigma, delta, delta_slope, time, azimuth } = form;
+        let (two, half) = (R::two(), R::half());
+        let (r_dot, theta_dot, phi_dot) = (v[1], v[2], v[3]);
+        let time_rate = -r_dot * (two * r * time_momentum + time * delta_slope) / delta;
+        let azimuth_rate = -two * angular * cos * theta_dot / (sin * sin.sqr());
+        let alpha = time_rate + two * spin * sin * cos * theta_dot * phi_dot;
+        let beta = azimuth_rate - two * r * r_dot * phi_dot;
+        let t = ((r.sqr() + spin.sqr()) * alpha + spin * sin.sqr() * beta) / sigma;
+        let phi = (beta + spin * alpha) / sigma;
+        // (-Delta A^2 + sin^2 theta B^2)/Sigma^2 with its sign turned.
+        let bent = (delta * time.sqr() - (sin * azimuth).sqr()) / sigma.sqr();
+        let sigma_theta = -two * spin.sqr() * sin * cos;
+        let along_r = r * bent
+            + (two * r * phi_dot * sin.sqr() * azimuth - half * delta_slope * time.sqr()) / sigma
+            + r * (r_dot.sqr() / delta + theta_dot.sqr())
+            - half * sigma * delta_slope * (r_dot / delta).sqr();
+        let along_theta = half * sigma_theta * (bent + r_dot.sqr() / delta + theta_dot.sqr())
+            + sin * cos * (two * spin * delta * time * phi_dot + azimuth.sqr()) / sigma;
+        let sigma_rate = two * r * r_dot + sigma_theta * theta_dot;
+        let stretch_rate = (sigma_rate - sigma * delta_slope * r_dot / delta) / delta;
+        vec![t, delta * (along_r - r_dot * stretch_rate) / sigma, (along_theta - theta_dot * sigma_rate) / sigma, phi]
+    }
+
+    /// `t' = C/(sqrt(b^2 - g_tt C) - b)`, `b = g_tphi phi'`, `C = 1 + g(v, v)` of the velocity without `t'`: the future outside and
+    /// inside the ergosphere alike.
+    fn constrained_velocity<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> Option<R> {
+        let still = [R::zero(), v[1], v[2], v[3]];
+        let form = Forms::new(parameters, q, &still)?;
+        let b = form.momenta()[0];
+        let stretch = (form.spin * form.sin).sqr() - form.delta;
+        let c = R::one() + form.interval(&still);
+        let root = (b.sqr() - stretch / form.sigma * c).sqrt();
+        // Of b > 0, a motion against the spin, the other form does not cancel; it needs g_tt < 0.
+        let outside = b.select(-stretch, -R::one());
+        Some(outside.select((root + b) * form.sigma / (-stretch), c / (root - b)))
+    }
+}
