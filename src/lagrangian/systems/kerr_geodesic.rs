@@ -2,7 +2,7 @@
 
 use crate::lagrangian::Lagrangian;
 use crate::lagrangian::system::{
-    Bounds, Closed, Conserved, Coordinate, LearningAdvice, Parameter, PerSize, Plane, Range, Size, System,
+    Bounds, ClosedForm, Conserved, Coordinate, LearningAdvice, Parameter, PerSize, Plane, Range, Size, System,
     TrajectoryTest,
 };
 use crate::scalar::{Real, Scalar};
@@ -150,7 +150,7 @@ impl Lagrangian for KerrGeodesic {
     }
 }
 
-impl Closed for KerrGeodesic {
+impl ClosedForm for KerrGeodesic {
     /// From `Delta A = (r^2 + a^2) E - a L_z` and `B = L_z/sin^2 theta - a E`, whose `E` and `L_z` are constant, for `t''` and `phi''`;
     /// `r'' = Delta (dL/dr - r' (Sigma/Delta)')/Sigma`, `theta'' = (dL/dtheta - theta' Sigma')/Sigma`.
     fn acceleration<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> Vec<R> {

@@ -3,7 +3,7 @@
 use super::{length, lengths};
 use crate::lagrangian::Lagrangian;
 use crate::lagrangian::system::{
-    Bounds, Closed, Conserved, LearningAdvice, Parameter, PerSize, Plane, Range, ShellAdvice, Size, StateAdvice,
+    Bounds, ClosedForm, Conserved, LearningAdvice, Parameter, PerSize, Plane, Range, ShellAdvice, Size, StateAdvice,
     System, TrajectoryTest,
 };
 use crate::scalar::{Real, Scalar};
@@ -245,7 +245,7 @@ impl Lagrangian for KerrSchild {
     }
 }
 
-impl Closed for KerrSchild {
+impl ClosedForm for KerrSchild {
     /// `a = eta^-1 b - f l^# (l^#.b)`, `l^# = eta^-1 l`, the inverse of `eta + f l l` at
     /// `b_k = w^2 f_k/2 + f w (l_k.v) - (f' w + f l'.v) l_k - f w l_k'`, `w = l.v`, `_k = d/dx_k`.
     fn acceleration<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> Vec<R> {
