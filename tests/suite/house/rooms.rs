@@ -225,11 +225,10 @@ fn leaked_crates(source: &str, path: &str) -> Vec<&'static str> {
             token == foreign && !own && (path || (k > 0 && tokens[k - 1] == "use"))
         })
     };
-    ADAPTERS
-        .iter()
-        .filter(|(foreign, home)| !path.starts_with(home) && names(foreign))
-        .map(|(foreign, _)| *foreign)
-        .collect()
+    let homes = |foreign: &str| ADAPTERS.iter().filter(move |(name, _)| *name == foreign);
+    let foreign: BTreeSet<&str> = ADAPTERS.iter().map(|(name, _)| *name).collect();
+    let at_home = |name: &str| homes(name).any(|(_, home)| path.starts_with(home));
+    foreign.into_iter().filter(|name| names(name) && !at_home(name)).collect()
 }
 
 fn rust_files(directory: &Path, found: &mut Vec<PathBuf>) {

@@ -57,7 +57,8 @@ fn systems_are_certified_and_refuted_with_a_witness() {
 
 #[test]
 fn a_model_is_certified_in_part_and_says_where() {
-    let limits = ["--model", MODEL, "--boxes", "500", "--seconds", "1000", "--threads"];
+    let region = "theta1=-0.5..0.5,theta2=-0.5..0.5,theta1_dot=-0.8..0.8,theta2_dot=-0.8..0.8";
+    let limits = ["--model", MODEL, "--box", region, "--boxes", "100", "--seconds", "1000", "--threads"];
     let (one, two) = (object(&[&limits[..], &["1"]].concat()), object(&[&limits[..], &["2"]].concat()));
     let [certified, refuted, open] = shares(&one);
     assert!((certified + refuted + open - 1.0).abs() < 1e-12 && open < 1.0);
