@@ -225,11 +225,9 @@ fn leaked_crates(source: &str, path: &str) -> Vec<&'static str> {
             token == foreign && !own && (path || (k > 0 && tokens[k - 1] == "use"))
         })
     };
-    ADAPTERS
-        .iter()
-        .filter(|(foreign, home)| !path.starts_with(home) && names(foreign))
-        .map(|(foreign, _)| *foreign)
-        .collect()
+    let homes = |foreign: &str| ADAPTERS.iter().filter(move |(name, _)| *name == foreign).map(|(_, home)| *home);
+    let crates: BTreeSet<&'static str> = ADAPTERS.iter().map(|(foreign, _)| *foreign).collect();
+    crates.into_iter().filter(|foreign| !homes(foreign).any(|home| path.starts_with(home)) && names(foreign)).collect()
 }
 
 fn rust_files(directory: &Path, found: &mut Vec<PathBuf>) {
