@@ -14,7 +14,7 @@ pub struct Source<'l, L> {
     pub parameters: Vec<Interval>,
 }
 
-/// What the search asks of a Lagrangian.
+/// Questions of the search to a Lagrangian.
 pub trait Enclose: Sync {
     /// Number of coordinates `n`.
     fn coordinates(&self) -> usize;

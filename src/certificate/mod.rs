@@ -123,7 +123,7 @@ pub struct Certificate {
 }
 
 impl Certificate {
-    /// What is known of a state: `q` and `v`, both `(n)`. [`Verdict::Open`] outside the region and for a state of the wrong length.
+    /// Knowledge of a state: `q` and `v`, both `(n)`. [`Verdict::Open`] outside the region and for a state of the wrong length.
     ///
     /// A few comparisons: an integrator may ask at every step.
     pub fn verdict<S: Scalar>(&self, q: &[S], v: &[S]) -> Verdict {

@@ -6,7 +6,7 @@ use super::{Options, Signature, Witness};
 use std::fmt::{Debug, Formatter};
 use std::time::{Duration, Instant};
 
-/// What is known of a box.
+/// Knowledge of a box.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Verdict {
     /// Every state has the signature, and a condition number of at most `condition`.
@@ -49,7 +49,7 @@ struct Waiting {
     share: f64,
 }
 
-/// What a search found.
+/// Findings of a search.
 #[derive(Default)]
 pub struct Found {
     pub tree: Tree,

@@ -1,4 +1,4 @@
-//! What is proven of the eigenvalues of all matrices of an enclosure.
+//! Proofs about the eigenvalues of all matrices of an enclosure.
 
 use super::form;
 use super::interval::Interval;

@@ -77,7 +77,7 @@ pub struct Configured<S> {
 
 /// Something to do with the Lagrangian of a system, whatever its type is.
 pub trait LagrangianVisitor {
-    /// What comes of it.
+    /// Result of the visit.
     type Output;
 
     /// Takes the Lagrangian; its parameters are [`Configured::parameters`].

@@ -1,4 +1,4 @@
-//! What a checkpoint says about its training.
+//! Identity of the training that a checkpoint is of.
 
 use serde::{Deserialize, Serialize};
 

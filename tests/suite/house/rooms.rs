@@ -225,10 +225,9 @@ fn leaked_crates(source: &str, path: &str) -> Vec<&'static str> {
             token == foreign && !own && (path || (k > 0 && tokens[k - 1] == "use"))
         })
     };
-    let homes = |foreign: &str| ADAPTERS.iter().filter(move |(name, _)| *name == foreign);
-    let foreign: BTreeSet<&str> = ADAPTERS.iter().map(|(name, _)| *name).collect();
-    let at_home = |name: &str| homes(name).any(|(_, home)| path.starts_with(home));
-    foreign.into_iter().filter(|name| names(name) && !at_home(name)).collect()
+    let at_home = |foreign: &str| ADAPTERS.iter().any(|(name, home)| *name == foreign && path.starts_with(home));
+    let crates: BTreeSet<&'static str> = ADAPTERS.iter().map(|(foreign, _)| *foreign).collect();
+    crates.into_iter().filter(|foreign| !at_home(foreign) && names(foreign)).collect()
 }
 
 fn rust_files(directory: &Path, found: &mut Vec<PathBuf>) {
