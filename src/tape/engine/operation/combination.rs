@@ -19,6 +19,7 @@ impl<S: Scalar> Combination<S> {
         let (second, by) = b.unwrap_or((a, factor));
         Self { operands: [a, second], factors: [factor, by], count: if b.is_some() { 2 } else { 1 } }
     }
+    #[allow(clippy::type_complexity)]
     fn linear(&self) -> Linear<'_, impl Fn(&mut [S], View<'_, S>, &[S], usize)> {
         let add =
             |target: &mut [S], _: View<'_, S>, source: &[S], k: usize| add_scaled(target, self.factors[k], source);

@@ -13,6 +13,7 @@ pub(crate) struct Select {
 }
 
 impl Select {
+    #[allow(clippy::type_complexity)]
     fn linear<S: Scalar>(&self) -> Linear<'_, impl Fn(&mut [S], View<'_, S>, &[S], usize)> {
         let add = |target: &mut [S], forward: View<'_, S>, source: &[S], branch: usize| {
             let (condition, zero) = (forward.plane(self.condition, 0), <S as Real>::zero());
