@@ -33,6 +33,7 @@ macro_rules! page {
             "[recorded-motion]: crate::docs::recorded_motion\n",
             "[structures]: crate::docs::structures\n",
             "[geometry]: crate::docs::geometry\n",
+            "[black-holes]: crate::docs::black_holes\n",
             "[symmetries]: crate::docs::symmetries\n",
             "[certificates]: crate::docs::certificates\n",
             "[method]: crate::docs::method\n",
