@@ -143,7 +143,7 @@ pub(crate) struct Subject<'a> {
 }
 
 impl Physics {
-    /// What a model is like; `check` is called between the parts and ends them by its error.
+    /// Physics of a model; `check` is called between the parts and ends them by its error.
     ///
     /// # Errors
     /// That of `check`; a system that cannot be built.

@@ -69,7 +69,7 @@ impl<S: Scalar> Domain<S> {
     }
 
     /// Bounds of every component of `(q, v)`.
-    pub fn bounds(&self) -> &[Option<(S, S)>] {
+    pub(crate) fn bounds(&self) -> &[Option<(S, S)>] {
         &self.bounds
     }
 
