@@ -167,16 +167,16 @@ impl Physics {
             figures: Vec::new(),
         };
         let exact = subject.system.map(Configured::build).transpose()?;
-        found.curvature(subject, &region, exact.as_deref());
+        found.find_curvature(subject, &region, exact.as_deref());
         check()?;
-        found.symmetries(subject, &region, exact.as_deref());
+        found.find_symmetries(subject, &region, exact.as_deref());
         check()?;
-        found.certificate(subject, &region);
+        found.find_certificate(subject, &region);
         check()?;
         Ok(found)
     }
 
-    fn curvature(&mut self, subject: &Subject<'_>, region: &Region, exact: Option<&dyn EulerLagrange<f64>>) {
+    fn find_curvature(&mut self, subject: &Subject<'_>, region: &Region, exact: Option<&dyn EulerLagrange<f64>>) {
         let (network, n) = (subject.network, subject.network.coordinates());
         let (q, v) = subject.states(region, POINTS.0);
         let form = &network.architecture().form;
@@ -227,7 +227,7 @@ impl Physics {
         }));
     }
 
-    fn symmetries(&mut self, subject: &Subject<'_>, region: &Region, exact: Option<&dyn EulerLagrange<f64>>) {
+    fn find_symmetries(&mut self, subject: &Subject<'_>, region: &Region, exact: Option<&dyn EulerLagrange<f64>>) {
         let (network, n) = (subject.network, subject.network.coordinates());
         let charts = subject.charts(region);
         let names = self.coordinates.clone();
@@ -246,13 +246,13 @@ impl Physics {
         match search(exact, true) {
             Ok(found) => {
                 self.exact_symmetries = Some(FoundSymmetries::from(&found));
-                self.charges(subject, exact, &found);
+                self.follow_charges(subject, exact, &found);
             }
             Err(problem) => self.left_out.push(format!("symmetries of the system: {problem}")),
         }
     }
 
-    fn charges(&mut self, subject: &Subject<'_>, exact: &dyn EulerLagrange<f64>, found: &Symmetries) {
+    fn follow_charges(&mut self, subject: &Subject<'_>, exact: &dyn EulerLagrange<f64>, found: &Symmetries) {
         let Some(motion) = subject.motion.filter(|motion| motion.len() > 1) else { return };
         if !exact.conserves_energy() {
             self.left_out.push("drift of charges: friction takes them".into());
@@ -277,7 +277,7 @@ impl Physics {
             .collect();
     }
 
-    fn certificate(&mut self, subject: &Subject<'_>, region: &Region) {
+    fn find_certificate(&mut self, subject: &Subject<'_>, region: &Region) {
         let network = subject.network;
         let n = network.coordinates();
         let time = subject.system.and_then(|system| system.system.time_like).or(network.architecture().time_like);
