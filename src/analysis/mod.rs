@@ -4,6 +4,7 @@ mod accelerations;
 mod affine;
 mod conserved;
 mod coordinates;
+mod curvature;
 mod determination;
 mod dissipation;
 mod energy;
@@ -25,6 +26,8 @@ pub use conserved::conserved_error;
 pub(crate) use coordinates::angle_difference;
 #[doc(hidden)]
 pub use coordinates::{CoordinateError, coordinate_error, velocity_error};
+pub use curvature::{MetricComponent, Spread};
+pub(crate) use curvature::{curvature_grid, curvature_scalars, is_metric, metric_components};
 pub use determination::{Determination, Estimate, determination};
 #[doc(hidden)]
 pub use determination::{Observed, RANGE, places};

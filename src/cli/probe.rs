@@ -7,7 +7,7 @@ use crate::cli::number::bounds;
 use crate::cli::source::Source;
 use crate::lagrangian::{Configured, EulerLagrange, configure_system};
 use crate::names::unknown;
-use crate::symmetry::{Basis, Chart, Degrees, EXACT, Region, Symmetries, symmetries};
+use crate::symmetry::{Basis, Chart, Degrees, Region, Symmetries, bases, enough, middle, most_symmetries};
 use std::path::Path;
 
 /// A Lagrangian with what is known of its coordinates.
@@ -80,7 +80,7 @@ impl Probe {
         let Learned { header, network } = learned;
         let periodic = header.architecture.periodic.iter().copied();
         let position = header.position.into_iter().zip(periodic);
-        let position = position.map(|(range, periodic)| if periodic { range } else { inner(range) }).collect();
+        let position = position.map(|(range, periodic)| if periodic { range } else { middle(range) }).collect();
         let units = match &system {
             Some(system) => system.system.coordinates(system.coordinates).iter().map(|c| c.unit.to_string()).collect(),
             None => vec![String::new(); network.coordinates()],
@@ -89,7 +89,7 @@ impl Probe {
             name: header.system,
             model: Box::new(network),
             columns: header.columns,
-            region: Region { position, velocity: header.velocity.into_iter().map(inner).collect() },
+            region: Region { position, velocity: header.velocity.into_iter().map(middle).collect() },
             exact: false,
             periodic: header.architecture.periodic,
             units,
@@ -160,29 +160,17 @@ impl Probe {
         &self.columns[..self.model.coordinates()]
     }
 
-    /// Functions of the coordinates up to these degrees, or those that are usual for its coordinates.
-    pub fn basis(&self, degrees: Option<Degrees>) -> (Basis, Degrees) {
+    fn charts(&self) -> Vec<Chart> {
         let parts = self.periodic.iter().zip(&self.units).zip(&self.region.position);
-        let charts: Vec<Chart> = parts.map(|((periodic, unit), range)| Chart::of(*periodic, unit, *range)).collect();
-        match degrees {
-            Some(degrees) => (Basis::new(self.coordinates(), &charts, degrees), degrees),
-            None => Basis::usual(self.coordinates(), &charts),
-        }
+        parts.map(|((periodic, unit), range)| Chart::of(*periodic, unit, *range)).collect()
     }
 
-    /// The bases in which symmetries are sought: the one of these degrees, or the usual one; of a model, whose errors hide symmetries
-    /// among many functions, also those of lower powers.
-    pub fn bases(&self, degrees: Option<Degrees>) -> Vec<(Basis, Degrees)> {
-        let (basis, highest) = self.basis(degrees);
-        let mut all = vec![(basis, highest)];
-        if degrees.is_none() && !self.exact {
-            for polynomial in (0..highest.polynomial).rev() {
-                let lower = self.basis(Some(Degrees { polynomial, ..highest }));
-                let shorter = all.last().is_some_and(|(last, _)| lower.0.len() < last.len());
-                all.extend(Some(lower).filter(|(basis, _)| shorter && basis.len() > 1));
-            }
+    /// Functions of the coordinates up to these degrees, or those that are usual for its coordinates.
+    pub fn basis(&self, degrees: Option<Degrees>) -> (Basis, Degrees) {
+        match degrees {
+            Some(degrees) => (Basis::new(self.coordinates(), &self.charts(), degrees), degrees),
+            None => Basis::usual(self.coordinates(), &self.charts()),
         }
-        all
     }
 
     /// Point symmetries: in the basis that shows the most of them, of such in the one with the widest gap.
@@ -192,24 +180,16 @@ impl Probe {
     pub fn symmetries(
         &self,
         degrees: Option<Degrees>,
-        (q, v): (&[f64], &[f64]),
+        states: (&[f64], &[f64]),
         tolerance: Option<f64>,
     ) -> Result<(Symmetries, Degrees), CliError> {
-        let tolerance = tolerance.or(self.exact.then_some(EXACT));
-        let mut best: Option<(Symmetries, Degrees)> = None;
-        for (basis, degrees) in self.bases(degrees) {
-            let found = symmetries(self.model.as_ref(), &basis, (q, v), tolerance).map_err(CliError::data)?;
-            let rank = |found: &Symmetries| (found.separation.count, found.separation.gap.unwrap_or(f64::INFINITY));
-            if best.as_ref().is_none_or(|(best, _)| rank(&found) > rank(best)) {
-                best = Some((found, degrees));
-            }
-        }
-        best.ok_or_else(|| CliError::data("there is no basis"))
+        let bases = bases(self.coordinates(), &self.charts(), degrees, self.exact);
+        most_symmetries(self.model.as_ref(), bases, states, (tolerance, self.exact)).map_err(CliError::data)
     }
 
     /// States that are looked at for so many unknown coefficients.
     pub fn enough(&self, unknowns: usize) -> usize {
-        (2 * unknowns).max(if self.exact { 400 } else { 1000 })
+        enough(unknowns, self.exact)
     }
 
     /// States `(states, n)` of the region, on the mass shell and inside the domain of the system.
@@ -235,13 +215,4 @@ impl Probe {
         }
         Ok((q, v))
     }
-}
-
-/// Part of every range of its training that a model is looked at: near the edges it is worst.
-const INNER: f64 = 0.8;
-
-/// The middle of a range.
-fn inner([low, high]: [f64; 2]) -> [f64; 2] {
-    let (middle, half) = (0.5 * (low + high), 0.5 * INNER * (high - low));
-    [middle - half, middle + half]
 }

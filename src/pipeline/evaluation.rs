@@ -8,7 +8,9 @@ use crate::analysis::{
 use crate::data::sample;
 use crate::lagrangian::system::TrajectoryTest as Span;
 use crate::lagrangian::{Configured, EulerLagrange};
+use crate::network::NetworkLagrangian;
 use crate::pipeline::attention::Attention;
+use crate::pipeline::physics::{Physics, Subject};
 use crate::pipeline::{PipelineError, Watch, memory};
 use crate::random::RngStream;
 use crate::report::{Figure, Fit, GridComparison, evaluation_figures, grid_figures};
@@ -41,6 +43,8 @@ pub struct Evaluation {
     pub valid_time: Option<ValidTimes>,
     /// One entry per random start.
     pub trajectories: Vec<Motion>,
+    /// Curvature, symmetries, charges and signature.
+    pub physics: Physics,
     /// Names of the accelerations' coordinates, with the accelerations' units.
     #[serde(skip)]
     pub coordinates: Vec<String>,
@@ -115,7 +119,7 @@ const PIECES: usize = 4;
 /// A system that cannot be built, motions that do not fit into memory, [`PipelineError::Interrupted`].
 pub fn evaluate(
     system: &Configured<f64>,
-    learned: &dyn EulerLagrange<f64>,
+    network: &NetworkLagrangian<f64>,
     options: EvaluationOptions,
     watch: &Watch,
 ) -> Result<Evaluation, PipelineError> {
@@ -123,7 +127,7 @@ pub fn evaluate(
     let (q, v) = (plan.states.0.as_slice(), plan.states.1.as_slice());
     let n = system.coordinates;
     let exact = system.build()?;
-    let (exact, learned) = (attention.watched(exact.as_ref()), attention.watched(learned));
+    let (exact, learned) = (attention.watched(exact.as_ref()), attention.watched(network));
     let (exact, learned): (&dyn EulerLagrange<f64>, &dyn EulerLagrange<f64>) = (&exact, &learned);
     let done = || {
         attention.advance(1);
@@ -167,6 +171,16 @@ pub fn evaluate(
     attention.check()?;
     figures.extend(grids?);
     done()?;
+    let subject = Subject {
+        network,
+        trained: &plan.trained,
+        system: Some(system),
+        columns: system.system.columns(n),
+        labels: system.system.labels(n),
+        motion: portraits.first().map(|portrait| &portrait.learned),
+        threads: plan.threads,
+    };
+    let physics = Physics::new(&subject, &|| attention.check())?;
     let wrong_signature = wrong_signatures(exact, learned, q, v);
     let mass_matrix = mass_matrix_error(exact, learned, q);
     done()?;
@@ -176,6 +190,7 @@ pub fn evaluate(
         mass_matrix,
         valid_time: ValidTimes::of(&runs.iter().map(|run| (run.valid, run.chaos())).collect::<Vec<_>>()),
         trajectories: runs.iter().map(motion).collect(),
+        physics,
         coordinates: coordinates
             .iter()
             .map(|c| format!("{} [{}/{}^2]", c.name, c.unit, system.system.time_unit))

@@ -51,7 +51,7 @@ impl Evaluation {
             .summarise(Report::new(&title), &system.system.title)
             .paragraph(&format!("Model {model}, starts of seed {seed}."));
         let report = self.report(parameter_table(report, system));
-        write_report_and_figures(output, &report, self.figures.iter())?;
+        write_report_and_figures(output, &report, self.figures.iter().chain(&self.physics.figures))?;
         Ok(json)
     }
 
@@ -152,6 +152,6 @@ impl Evaluation {
         if !note.is_empty() {
             report = report.paragraph(note.trim());
         }
-        report.heading("Learned against exact").figures(&self.figures)
+        self.physics.report(report.heading("Learned against exact").figures(&self.figures))
     }
 }

@@ -9,6 +9,8 @@ use crate::pipeline::fit_config::FitConfig;
 use crate::pipeline::fit_summary::Found;
 use crate::pipeline::hold_out::{HoldOut, HoldOutOptions, evaluate_hold_out};
 use crate::pipeline::losses::LossStates;
+use crate::pipeline::model::trained_on;
+use crate::pipeline::physics::{Physics, Subject};
 use crate::pipeline::prepared_fit::PreparedFit;
 use crate::pipeline::report_files::history;
 use crate::pipeline::start::{StartModel, weights};
@@ -35,6 +37,8 @@ pub struct FitReport {
     pub hold_out: HoldOut,
     /// Ranges in which the data determine mass matrix, friction and energy.
     pub determined: Determined,
+    /// Curvature, symmetries and signature.
+    pub physics: Physics,
     /// Text of `summary.json`.
     pub json: String,
     pub(crate) text: String,
@@ -159,6 +163,16 @@ fn fit_in<S: Scalar>(
     let held_out =
         HoldOutOptions { part: &measured.test, horizon: fit_config.horizon, time: time_like, forces: &forces, threads };
     let hold_out = evaluate_hold_out(&network, &held_out, watch)?;
+    let subject = Subject {
+        network: &network,
+        trained: &trained_on(&model.header),
+        system: None,
+        columns: model.header.columns.clone(),
+        labels: names.clone(),
+        motion: None,
+        threads,
+    };
+    let physics = Physics::new(&subject, &|| Ok(()))?;
     let determined = Determined::new(&network, measured, *targets)?;
     determined.suggestion().iter().for_each(|text| watch.say(Event::Note(text)));
     let found = Found {
@@ -170,10 +184,11 @@ fn fit_in<S: Scalar>(
         shot: shot.as_ref(),
         hold_out: &hold_out,
         determined: &determined,
+        physics: &physics,
     };
     let (json, text) = found.write(output, &toml)?;
     let (stop, history, header) = (trained.stop, trained.history, model.header);
-    Ok(FitReport { stop, header, network, history, hold_out, determined, json, text })
+    Ok(FitReport { stop, header, network, history, hold_out, determined, physics, json, text })
 }
 
 /// Name and checksum of everything that is learned from.

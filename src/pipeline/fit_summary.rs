@@ -4,6 +4,7 @@ use crate::configuration::Config;
 use crate::names::{WIDTH, counted, hundredths, number, wrapped};
 use crate::pipeline::determination::Determined;
 use crate::pipeline::hold_out::HoldOut;
+use crate::pipeline::physics::Physics;
 use crate::pipeline::prepared_fit::PreparedFit;
 use crate::pipeline::report_files::{ended, training_pictures, write_report_and_figures};
 use crate::pipeline::{Output, PipelineError, headline};
@@ -58,6 +59,7 @@ struct Summary<'a> {
     judgement: &'a HoldOut,
     #[serde(flatten)]
     determined: &'a Determined,
+    physics: &'a Physics,
 }
 
 /// Multiple shooting in `summary.json`; losses are mean squared residuals in units of noise.
@@ -93,6 +95,8 @@ pub(crate) struct Found<'a, S> {
     pub hold_out: &'a HoldOut,
     /// Ranges in which the data determine the model.
     pub determined: &'a Determined,
+    /// Curvature, symmetries and signature.
+    pub physics: &'a Physics,
 }
 
 impl<'a, S: Scalar> Found<'a, S> {
@@ -117,9 +121,14 @@ impl<'a, S: Scalar> Found<'a, S> {
         }
         let report = headline.begin(Report::new(&format!("{name}: learned from recorded motion")));
         let report = report.preformatted(&wrapped(opening.trim_end(), WIDTH));
-        let report = self.determined.report(self.hold_out.report(report)).heading("Training");
+        let report = self.determined.report(self.hold_out.report(report));
+        let report = self.physics.report(report).heading("Training");
         let report = report.figures(&figures).heading("Configuration").preformatted(toml);
-        write_report_and_figures(output, &report, figures.iter().chain(&self.hold_out.figures))?;
+        write_report_and_figures(
+            output,
+            &report,
+            figures.iter().chain(&self.hold_out.figures).chain(&self.physics.figures),
+        )?;
         let tables = self.hold_out.text() + &self.determined.text();
         let text = wrapped(&format!("{}\n{opening}{tables}", headline.text()), WIDTH);
         Ok((json, text))
@@ -158,6 +167,7 @@ impl<'a, S: Scalar> Found<'a, S> {
             wall_seconds: prepared.started.elapsed().as_secs_f64(),
             judgement: self.hold_out,
             determined: self.determined,
+            physics: self.physics,
         }
     }
 

@@ -323,5 +323,8 @@ fn write_report(
     let report = summary.evaluation.summarise(report, &system.system.title).paragraph(&headline(summary));
     let report = summary.evaluation.report(parameter_table(report, system)).heading("Training");
     let report = report.figures(&training).heading("Configuration").preformatted(toml);
-    write_report_and_figures(output, &report, training.iter().chain(&summary.evaluation.figures))
+    write_report_and_figures(output, &report, {
+        let Evaluation { figures, physics, .. } = summary.evaluation;
+        training.iter().chain(figures).chain(&physics.figures)
+    })
 }

@@ -1,6 +1,7 @@
 //! Plots, tables and the HTML report.
 
 mod base64;
+mod curvature;
 mod escape;
 mod evaluation;
 mod experiment;
@@ -13,6 +14,7 @@ mod test_pictures;
 mod training;
 mod turn;
 
+pub(crate) use curvature::{CurvatureMap, curvature_figure};
 pub(crate) use evaluation::evaluation_figures;
 pub use experiment::{Curve, EXPERIMENT_HEADER};
 pub(crate) use experiment::{

@@ -68,6 +68,11 @@ impl<S: Scalar> Domain<S> {
         self.bounds.is_empty()
     }
 
+    /// Bounds of every component of `(q, v)`.
+    pub(crate) fn bounds(&self) -> &[Option<(S, S)>] {
+        &self.bounds
+    }
+
     /// First component of `(q, v)` outside its bounds, with the bounds.
     pub fn violation(&self, state: &[S]) -> Option<(usize, S, S)> {
         self.bounds.iter().zip(state).enumerate().find_map(|(index, (bounds, &x))| match *bounds {

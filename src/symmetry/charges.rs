@@ -1,6 +1,7 @@
 //! Charges of symmetries along a motion, and where their drift comes from.
 
 use super::basis::{Basis, Values};
+use super::orthonormal::dot;
 use super::{Field, SymmetryError};
 use crate::lagrangian::{EulerLagrange, Request, Terms};
 use crate::rollout::Trajectory;
@@ -79,6 +80,48 @@ pub fn charges(
         .collect())
 }
 
+/// The [`charges`] of an exact Lagrangian along the motion of a learned one.
+///
+/// They do not depend on the factor and the gauge up to which a learned Lagrangian is determined. The part of the model is the
+/// integral of `xi.M (a_learned - a_exact)`, of the energy that of `v.M (a_learned - a_exact)`, `M` and `a_exact` of the exact
+/// Lagrangian, which is to have the symmetries and no friction; the rest is the integrator's.
+///
+/// # Errors
+/// As [`charges`].
+pub(crate) fn drifts(
+    (exact, learned): (&dyn EulerLagrange<f64>, &dyn EulerLagrange<f64>),
+    basis: &Basis,
+    fields: &[Field],
+    motion: &Trajectory<f64>,
+) -> Result<Vec<Charge>, SymmetryError> {
+    let mut all = charges(exact, basis, fields, motion)?;
+    let n = exact.coordinates();
+    let (mut right, mut other, mut at) = (Terms::default(), Terms::default(), Values::default());
+    let mut rates = vec![Vec::with_capacity(motion.len()); all.len()];
+    for (q, v) in motion.q.chunks(CHUNK * n).zip(motion.v.chunks(CHUNK * n)) {
+        let failed = |_| SymmetryError::States { states: motion.len(), found: 0 };
+        exact.terms(q, v, Request::MASS_MATRIX | Request::ACCELERATION, &mut right).map_err(failed)?;
+        learned.terms(q, v, Request::ACCELERATION, &mut other).map_err(failed)?;
+        for (k, (q, v)) in q.chunks_exact(n).zip(v.chunks_exact(n)).enumerate() {
+            let one = k * n..(k + 1) * n;
+            let excess: Vec<f64> =
+                other.acceleration[one.clone()].iter().zip(&right.acceleration[one]).map(|(a, b)| a - b).collect();
+            let rows = right.mass_matrix[k * n * n..(k + 1) * n * n].chunks_exact(n);
+            let pull: Vec<f64> = rows.map(|row| dot(row, &excess)).collect();
+            basis.evaluate(q, &mut at);
+            rates[0].push(dot(v, &pull));
+            for (field, rates) in fields.iter().zip(&mut rates[1..]) {
+                rates.push(dot(&field.vector(&at, n), &pull));
+            }
+        }
+    }
+    for (charge, rates) in all.iter_mut().zip(&rates) {
+        charge.by_model = integral(&motion.t, rates);
+        charge.by_integrator = charge.drift - charge.by_model;
+    }
+    Ok(all)
+}
+
 /// Integral of samples by Simpson's rule for uneven steps, two at a time; a last single step by the parabola through the last three
 /// samples.
 fn integral(t: &[f64], y: &[f64]) -> f64 {
@@ -107,6 +150,49 @@ fn integral(t: &[f64], y: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::rollout::{Method, Options, rollout};
+    use crate::symmetry::{Chart, Degrees};
+
+    /// A particle in the plane under a constant acceleration along `y`, `drop`: `L = m |v|^2 / 2 + m drop y`.
+    struct Particle;
+
+    impl crate::lagrangian::Lagrangian for Particle {
+        fn coordinates(&self) -> usize {
+            2
+        }
+        fn lagrangian<R: crate::scalar::Real>(&self, p: &[R], q: &[R], v: &[R]) -> R {
+            p[0] * (R::half() * (v[0].sqr() + v[1].sqr()) + p[1] * q[1])
+        }
+    }
+
+    #[test]
+    fn drifts_tell_a_wrong_force_whatever_the_factor() {
+        let particle = |mass, drop| crate::lagrangian::HandWritten::new(Particle, vec![mass, drop]);
+        let basis =
+            Basis::new(&["x", "y"].map(String::from), &[Chart::Line; 2], "polynomial:1".parse::<Degrees>().unwrap());
+        // d_x and d_y; a constant is the first function.
+        let functions = basis.len();
+        let field = |i: usize| {
+            let mut coefficients = vec![0.0; 2 * functions];
+            coefficients[i * functions] = 1.0;
+            Field { coefficients, gauge: vec![0.0; functions] }
+        };
+        let (exact, learned) = (particle(2.0, 0.0), particle(-5.0, 0.01));
+        let options = Options { method: Method::Gauss6, step: Some(0.01), ..Options::new(3.0, 0.01) };
+        let motion = rollout(&learned, &[0.0, 0.0], &[0.7, 0.2], &options).complete().unwrap();
+        let found = drifts((&exact, &learned), &basis, &[field(0), field(1)], &motion).unwrap();
+        // Momenta 2 v, energy |v|^2; v_y grows by 0.03.
+        let expected = [0.23 * 0.23 - 0.2 * 0.2, 0.0, 0.06];
+        for (charge, expected) in found.iter().zip(expected) {
+            assert!((charge.drift - expected).abs() < 1e-12, "{} {expected}", charge.drift);
+            assert!((charge.by_model - expected).abs() < 1e-12 && charge.by_integrator.abs() < 1e-12);
+        }
+        // A motion that nothing moves so is the integrator's.
+        let mut wrong = motion.clone();
+        wrong.v.iter_mut().skip(2 * wrong.t.len() - 2).for_each(|v| *v += 0.5);
+        let found = drifts((&exact, &exact), &basis, &[field(0)], &wrong).unwrap();
+        assert!((found[1].by_integrator - 1.0).abs() < 1e-12 && found[1].by_model.abs() < 1e-12);
+    }
 
     #[test]
     fn parabolas_are_integrated_exactly() {

@@ -34,6 +34,7 @@
 //! `f64`: a search is a fit over samples, whose errors are those of the model or of roundings.
 
 mod algebra;
+mod bases;
 mod basis;
 mod charges;
 mod classify;
@@ -51,7 +52,9 @@ mod separation;
 mod sparse;
 
 pub use algebra::Algebra;
+pub(crate) use bases::{bases, enough, most_symmetries};
 pub use basis::{Basis, Chart, Degrees, unknowns};
+pub(crate) use charges::drifts;
 pub use charges::{Charge, charges};
 pub use compare::{Comparison, compare};
 pub use conserved::{Conserved, Quadratic, quadratic, quadratic_unknowns};
@@ -59,4 +62,5 @@ pub use error::SymmetryError;
 pub use field::Field;
 pub use find::{EXACT, Symmetries, symmetries};
 pub use region::Region;
+pub(crate) use region::middle;
 pub use separation::Separation;

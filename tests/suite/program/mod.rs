@@ -14,6 +14,7 @@ mod hostile;
 mod inspect;
 mod motion;
 mod overwrite;
+mod physics;
 mod pipes;
 mod resume;
 mod screen;

@@ -1,0 +1,352 @@
+//! Physics of a model: metric, curvature, symmetries, charges, signature, beside those of the system it learned.
+//!
+//! All of it is bounded by work, not by time: what depends on the clock would not be the same in every run.
+
+use crate::analysis::{
+    Axis, MetricComponent, Spread, curvature_grid, curvature_scalars, is_metric, mass_matrix_error, metric_components,
+};
+use crate::certificate::{Options, Signature, certify_network};
+use crate::lagrangian::system::Bounds;
+use crate::lagrangian::{Configured, EulerLagrange};
+use crate::network::{NetworkLagrangian, Structure};
+use crate::pipeline::PipelineError;
+use crate::report::{CurvatureMap, Figure, curvature_figure};
+use crate::rollout::{Domain, Trajectory};
+use crate::symmetry::{Chart, Region, Symmetries, bases, drifts, enough, middle, most_symmetries, unknowns};
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// Points of the curvature, and of its map along each axis, at most.
+const POINTS: (usize, usize) = (100, 21);
+/// Points of a map along each axis that are worth a picture.
+const WORTH: usize = 8;
+/// Weights times `n^3` times points of the curvature, at most: a second or so.
+const CURVATURE_WORK: usize = 100_000_000;
+/// Weights times `n^2` times boxes of a certificate, at most: a second or so.
+const BOXES_WORK: usize = 80_000_000;
+/// Boxes of a certificate, at most.
+const BOXES: usize = 2000;
+/// Seed of the states that are looked at.
+const SEED: u64 = 0;
+
+/// Curvature scalar of the learned metric at rest, times the factor up to which a Lagrangian is determined.
+#[derive(Clone, Debug, Serialize)]
+pub struct CurvatureScalar {
+    /// Factor by which the learned metric comes nearest to the exact one; 1 without one.
+    pub factor: f64,
+    /// Of the model, after the factor.
+    pub learned: Spread,
+    /// Of the system, if it is known.
+    pub exact: Option<Spread>,
+}
+
+/// Point symmetries that were found.
+#[derive(Clone, Debug, Serialize)]
+pub struct FoundSymmetries {
+    /// Their number; none if there is no gap between singular values.
+    pub count: Option<usize>,
+    /// First singular value that is not zero over the last that is.
+    pub gap: Option<f64>,
+    /// Name of the algebra, if it has one.
+    pub name: Option<String>,
+    /// Formulas of the fields.
+    pub fields: Vec<String>,
+}
+
+impl From<&Symmetries> for FoundSymmetries {
+    fn from(found: &Symmetries) -> Self {
+        Self {
+            count: found.separation.count,
+            gap: found.separation.gap,
+            name: found.algebra.as_ref().and_then(|algebra| algebra.name.clone()),
+            fields: found.fields.iter().map(|field| field.text(&found.basis)).collect(),
+        }
+    }
+}
+
+/// Drift of a charge that the exact system has, along the learned motion.
+#[derive(Clone, Debug, Serialize)]
+pub struct ChargeDrift {
+    /// `energy`, or the field whose charge it is.
+    pub symmetry: String,
+    /// Charge at the start.
+    pub start: f64,
+    /// Charge at the end less that at the start, the sum of the next two.
+    pub drift: f64,
+    /// Part of the model, whose acceleration is not the exact one.
+    pub by_model: f64,
+    /// The rest.
+    pub by_integrator: f64,
+}
+
+/// Shares of the region where the mass matrix is proven to have its signature, and not to have it.
+#[derive(Clone, Debug, Serialize)]
+pub struct ProvenSignature {
+    /// Positive eigenvalues that are to be proven.
+    pub positive: usize,
+    /// Negative ones.
+    pub negative: usize,
+    /// `true` if the structure of the model proves it at every state.
+    pub by_construction: bool,
+    /// Share in which it is proven.
+    pub certified: f64,
+    /// Share in which the opposite is proven.
+    pub refuted: f64,
+    /// Share in which neither is proven by so many boxes.
+    pub open: f64,
+    /// Boxes that were evaluated.
+    pub boxes: usize,
+}
+
+/// Physics of a model over a region of states.
+#[derive(Clone, Debug, Serialize)]
+pub struct Physics {
+    /// Bounds of the states that were looked at, by column.
+    pub region: BTreeMap<String, [f64; 2]>,
+    /// Components of the metric, of geodesics alone.
+    pub metric: Vec<MetricComponent>,
+    /// Curvature scalar, of geodesics in two dimensions at least.
+    pub curvature_scalar: Option<CurvatureScalar>,
+    /// Point symmetries of the model.
+    pub symmetries: Option<FoundSymmetries>,
+    /// Those of the system, if it is known.
+    pub exact_symmetries: Option<FoundSymmetries>,
+    /// Drifts of the charges of the system along the first learned motion, as far as it is drawn; the energy first.
+    pub charges: Vec<ChargeDrift>,
+    /// Time until which they were followed.
+    pub charges_until: f64,
+    /// Certificate of the signature.
+    pub signature: Option<ProvenSignature>,
+    /// Parts that are missing and why.
+    pub left_out: Vec<String>,
+    /// Names of the coordinates.
+    #[serde(skip)]
+    pub coordinates: Vec<String>,
+    /// Pictures.
+    #[serde(skip)]
+    pub figures: Vec<Figure>,
+}
+
+/// A model with what is known of it.
+pub(crate) struct Subject<'a> {
+    pub network: &'a NetworkLagrangian<f64>,
+    /// States that it was trained on; periodic coordinates are unbounded.
+    pub trained: &'a Domain<f64>,
+    /// The system it learned, if it is known.
+    pub system: Option<&'a Configured<f64>>,
+    /// Names of coordinates and velocities, with units as labels of axes.
+    pub columns: Vec<String>,
+    pub labels: Vec<String>,
+    /// Learned motion along which charges are followed.
+    pub motion: Option<&'a Trajectory<f64>>,
+    pub threads: usize,
+}
+
+impl Physics {
+    /// Physics of a model; `check` is called between the parts and ends them by its error.
+    ///
+    /// # Errors
+    /// That of `check`; a system that cannot be built.
+    pub(crate) fn new(
+        subject: &Subject<'_>,
+        check: &dyn Fn() -> Result<(), PipelineError>,
+    ) -> Result<Self, PipelineError> {
+        let region = subject.region();
+        let ranges = region.position.iter().chain(&region.velocity).copied();
+        let mut found = Self {
+            region: subject.columns.iter().cloned().zip(ranges).collect(),
+            metric: Vec::new(),
+            curvature_scalar: None,
+            symmetries: None,
+            exact_symmetries: None,
+            charges: Vec::new(),
+            charges_until: 0.0,
+            signature: None,
+            left_out: Vec::new(),
+            coordinates: subject.columns[..subject.network.coordinates()].to_vec(),
+            figures: Vec::new(),
+        };
+        let exact = subject.system.map(Configured::build).transpose()?;
+        found.find_curvature(subject, &region, exact.as_deref());
+        check()?;
+        found.find_symmetries(subject, &region, exact.as_deref());
+        check()?;
+        found.find_certificate(subject, &region);
+        check()?;
+        Ok(found)
+    }
+
+    fn find_curvature(&mut self, subject: &Subject<'_>, region: &Region, exact: Option<&dyn EulerLagrange<f64>>) {
+        let (network, n) = (subject.network, subject.network.coordinates());
+        let (q, v) = subject.states(region, POINTS.0);
+        let form = &network.architecture().form;
+        let metric = match exact {
+            Some(exact) => is_metric(exact, &q, &v),
+            None => form.structure == Structure::Metric && form.known.is_none(),
+        };
+        if !metric || q.is_empty() {
+            return;
+        }
+        let most = CURVATURE_WORK / (network.weights().len() * n.pow(3)).max(1);
+        let q = &q[..n * most.clamp(1, q.len() / n)];
+        let factor = exact.map_or(1.0, |exact| mass_matrix_error(exact, network, q).factor);
+        self.metric = metric_components(exact, network, q, factor);
+        if n < 2 {
+            return;
+        }
+        // R of `s g` is `R/s`.
+        let scaled = |values: Vec<f64>| values.iter().map(|r| r / factor).collect::<Vec<f64>>();
+        self.curvature_scalar = Some(CurvatureScalar {
+            factor,
+            learned: Spread::of(&scaled(curvature_scalars(network, q))),
+            exact: exact.map(|exact| Spread::of(&curvature_scalars(exact, q))),
+        });
+        let side = most.saturating_sub(q.len() / n).isqrt().min(POINTS.1);
+        if side < WORTH {
+            self.left_out.push("map of the curvature scalar: too many weights for a picture in a second".into());
+            return;
+        }
+        let time = subject.system.and_then(|system| system.system.time_like);
+        let shown = if n > 2 && time.or(network.architecture().time_like) == Some(0) { [1, n - 1] } else { [0, 1] };
+        let axis = |i: usize| {
+            let [from, to] = region.position[i];
+            Axis { component: i, from, to, points: side }
+        };
+        let middle: Vec<f64> = region.position.iter().map(|[low, high]| 0.5 * (low + high)).collect();
+        let grid = |model: &dyn EulerLagrange<f64>| curvature_grid(model, &middle, shown.map(axis));
+        let fixed: Vec<String> = (0..n)
+            .filter(|i| !shown.contains(i))
+            .map(|i| format!("{} = {}", self.coordinates[i], (1e4 * middle[i]).round() / 1e4 + 0.0))
+            .collect();
+        self.figures.extend(curvature_figure(&CurvatureMap {
+            x_label: subject.labels[shown[0]].clone(),
+            y_label: subject.labels[shown[1]].clone(),
+            learned: grid(network).map(|r| r / factor),
+            exact: exact.map(grid),
+            fixed: fixed.join(", "),
+        }));
+    }
+
+    fn find_symmetries(&mut self, subject: &Subject<'_>, region: &Region, exact: Option<&dyn EulerLagrange<f64>>) {
+        let (network, n) = (subject.network, subject.network.coordinates());
+        let charts = subject.charts(region);
+        let names = self.coordinates.clone();
+        let search = |model: &dyn EulerLagrange<f64>, exact: bool| -> Result<Symmetries, String> {
+            let bases = bases(&names, &charts, None, exact);
+            let functions = bases.iter().map(|(basis, _)| basis.len()).max().unwrap_or(0);
+            let (q, v) = subject.states(region, enough(unknowns(n, functions), exact));
+            let found = most_symmetries(model, bases, (&q, &v), (None, exact));
+            found.map(|(found, _)| found).map_err(|problem| problem.to_string())
+        };
+        match search(network, false) {
+            Ok(found) => self.symmetries = Some(FoundSymmetries::from(&found)),
+            Err(problem) => self.left_out.push(format!("symmetries of the model: {problem}")),
+        }
+        let Some(exact) = exact else { return };
+        match search(exact, true) {
+            Ok(found) => {
+                self.exact_symmetries = Some(FoundSymmetries::from(&found));
+                self.follow_charges(subject, exact, &found);
+            }
+            Err(problem) => self.left_out.push(format!("symmetries of the system: {problem}")),
+        }
+    }
+
+    fn follow_charges(&mut self, subject: &Subject<'_>, exact: &dyn EulerLagrange<f64>, found: &Symmetries) {
+        let Some(motion) = subject.motion.filter(|motion| motion.len() > 1) else { return };
+        if !exact.conserves_energy() {
+            self.left_out.push("drift of charges: friction takes them".into());
+            return;
+        }
+        let all = match drifts((exact, subject.network), &found.basis, &found.fields, motion) {
+            Ok(all) => all,
+            Err(problem) => return self.left_out.push(format!("drift of charges: {problem}")),
+        };
+        let fields = found.fields.iter().map(|field| field.text(&found.basis));
+        let names = std::iter::once("energy".to_string()).chain(fields);
+        self.charges_until = motion.t.last().copied().unwrap_or(0.0);
+        self.charges = names
+            .zip(&all)
+            .map(|(symmetry, charge)| ChargeDrift {
+                symmetry,
+                start: charge.values[0],
+                drift: charge.drift,
+                by_model: charge.by_model,
+                by_integrator: charge.by_integrator,
+            })
+            .collect();
+    }
+
+    fn find_certificate(&mut self, subject: &Subject<'_>, region: &Region) {
+        let network = subject.network;
+        let n = network.coordinates();
+        let time = subject.system.and_then(|system| system.system.time_like).or(network.architecture().time_like);
+        let signature = Signature::of(n, time.is_some());
+        let boxes = BOXES_WORK / (network.weights().len() * n.pow(2)).max(1);
+        let options = Options {
+            seconds: f64::INFINITY,
+            boxes: boxes.clamp(1, BOXES),
+            threads: subject.threads,
+            ..Options::new(signature)
+        };
+        let pairs = |ranges: &[[f64; 2]]| ranges.iter().map(|&[low, high]| (low, high)).collect();
+        let bounds = Bounds { positions: pairs(&region.position), velocities: pairs(&region.velocity) };
+        match certify_network(network, &bounds, &options) {
+            Ok(proven) => {
+                self.signature = Some(ProvenSignature {
+                    positive: signature.positive,
+                    negative: signature.negative,
+                    by_construction: proven.by_construction,
+                    certified: proven.certified,
+                    refuted: proven.refuted,
+                    open: proven.open,
+                    boxes: proven.boxes,
+                });
+            }
+            Err(problem) => self.left_out.push(format!("certificate of the signature: {problem}")),
+        }
+    }
+}
+
+impl Subject<'_> {
+    /// The middle of the states that the model was trained on, of a known system of those on which errors are stated as well;
+    /// angles go round.
+    fn region(&self) -> Region {
+        let n = self.network.coordinates();
+        let stated = self.system.map(|system| {
+            let bounds = system.system.validation(n);
+            [bounds.positions, bounds.velocities].concat()
+        });
+        let periodic = &self.network.architecture().periodic;
+        let range = |(k, trained): (usize, &Option<(f64, f64)>)| {
+            let stated = stated.as_ref().map(|stated| stated[k]);
+            let (low, high) = match (*trained, stated) {
+                (Some(a), Some(b)) if a.0.max(b.0) < a.1.min(b.1) => (a.0.max(b.0), a.1.min(b.1)),
+                (Some(a), _) => a,
+                (None, Some(b)) => b,
+                (None, None) => (0.0, std::f64::consts::TAU),
+            };
+            if k < n && periodic[k] { [low, high] } else { middle([low, high]) }
+        };
+        let mut all: Vec<[f64; 2]> = self.trained.bounds().iter().enumerate().map(range).collect();
+        let velocity = all.split_off(n);
+        Region { position: all, velocity }
+    }
+
+    /// States `(states, n)` of the region, on the mass shell and inside the domain of the system.
+    fn states(&self, region: &Region, states: usize) -> (Vec<f64>, Vec<f64>) {
+        let inside = |q: &[f64], v: &mut [f64]| {
+            let fits =
+                |system: &Configured<f64>| system.check_domain(q).is_ok() && system.impose_constraint(q, v).is_ok();
+            self.system.is_none_or(fits)
+        };
+        region.states(states, SEED, inside)
+    }
+
+    fn charts(&self, region: &Region) -> Vec<Chart> {
+        let units = self.system.map(|system| system.system.units(system.coordinates));
+        let unit = |i: usize| units.as_ref().map_or("", |units| units[i].as_str());
+        let periodic = self.network.architecture().periodic.iter().zip(&region.position).enumerate();
+        periodic.map(|(i, (periodic, range))| Chart::of(*periodic, unit(i), *range)).collect()
+    }
+}

@@ -1,0 +1,117 @@
+//! Section of a report about the physics of a model.
+
+use crate::names::{number, rounded};
+use crate::pipeline::physics::{FoundSymmetries, Physics};
+use crate::report::Report;
+
+/// Stands where there is no number.
+const NONE: &str = "-";
+
+/// A number with four digits, or none.
+fn shown(x: Option<f64>) -> String {
+    x.map_or(NONE.to_string(), |x| rounded(x, 4))
+}
+
+impl Physics {
+    /// Tables, pictures, and what is missing.
+    pub(crate) fn report(&self, report: Report) -> Report {
+        let about =
+            "Metric, curvature, symmetries and signature over the middle of the states that the model was trained on.";
+        let report = self.curvature(self.metric(report.heading("Physics").paragraph(about)));
+        let report = self.certificate(self.charges(self.symmetries(report)));
+        let report = if self.left_out.is_empty() {
+            report
+        } else {
+            report.paragraph(&format!("Left out: {}.", self.left_out.join("; ")))
+        };
+        if self.figures.is_empty() { report } else { report.figures(&self.figures) }
+    }
+
+    fn metric(&self, report: Report) -> Report {
+        if self.metric.is_empty() {
+            return report;
+        }
+        let rows: Vec<Vec<String>> = self
+            .metric
+            .iter()
+            .map(|component| {
+                let [i, j] = component.indices.map(|i| self.coordinates[i].as_str());
+                let numbers = [Some(component.learned), component.exact, component.error].map(shown);
+                [vec![format!("g_{i}_{j}")], numbers.to_vec()].concat()
+            })
+            .collect();
+        report.table(&["metric at rest, root mean square", "learned", "exact", "difference"], &rows)
+    }
+
+    fn curvature(&self, report: Report) -> Report {
+        let Some(curvature) = &self.curvature_scalar else { return report };
+        let pair = [("learned", Some(curvature.learned)), ("exact", curvature.exact)];
+        let rows: Vec<Vec<String>> = pair
+            .into_iter()
+            .filter_map(|(name, spread)| Some((name, spread?)))
+            .map(|(name, spread)| {
+                let numbers = [spread.median, spread.low, spread.high].map(|x| rounded(x, 4));
+                let points = [spread.points, spread.failed].map(|x| x.to_string());
+                [vec![name.to_string()], numbers.to_vec(), points.to_vec()].concat()
+            })
+            .collect();
+        let report =
+            report.table(&["curvature scalar R", "median", "1 % below", "99 % below", "points", "failed"], &rows);
+        if curvature.exact.is_none() {
+            return report;
+        }
+        let factor = rounded(curvature.factor, 4);
+        report.paragraph(&format!(
+            "The learned metric is taken times {factor}, the factor by which it is nearest to the exact one."
+        ))
+    }
+
+    fn symmetries(&self, report: Report) -> Report {
+        let pair = [("learned", &self.symmetries), ("exact", &self.exact_symmetries)];
+        let row = |(name, found): (&str, &FoundSymmetries)| {
+            let count = found.count.map_or("no gap, no number".to_string(), |count| count.to_string());
+            let algebra = found.name.clone().unwrap_or(NONE.to_string());
+            vec![name.to_string(), count, found.gap.map_or(NONE.to_string(), number), algebra, found.fields.join("; ")]
+        };
+        let rows: Vec<Vec<String>> =
+            pair.iter().filter_map(|(name, found)| Some(row((name, found.as_ref()?)))).collect();
+        if rows.is_empty() {
+            return report;
+        }
+        report.table(&["point symmetries", "number", "gap", "algebra", "fields"], &rows)
+    }
+
+    fn charges(&self, report: Report) -> Report {
+        if self.charges.is_empty() {
+            return report;
+        }
+        let rows: Vec<Vec<String>> = self
+            .charges
+            .iter()
+            .map(|charge| {
+                let drifts = [charge.drift, charge.by_model, charge.by_integrator].map(number);
+                [vec![charge.symmetry.clone(), rounded(charge.start, 6)], drifts.to_vec()].concat()
+            })
+            .collect();
+        let until = number(self.charges_until);
+        report
+            .paragraph(&format!("Charges of the exact system along the learned motion of start 1, until {until}:"))
+            .table(&["charge of", "start", "drift", "by the model", "by the integrator"], &rows)
+    }
+
+    fn certificate(&self, report: Report) -> Report {
+        let Some(proven) = &self.signature else { return report };
+        let signs = format!("{} positive and {} negative eigenvalues", proven.positive, proven.negative);
+        if proven.by_construction {
+            return report
+                .paragraph(&format!("The structure of the model proves {signs} of the mass matrix at every state."));
+        }
+        let shares = [proven.certified, proven.refuted, proven.open].map(|share| rounded(100.0 * share, 4)).to_vec();
+        report
+            .paragraph(&format!(
+                "Share of the region where the mass matrix is proven to have {signs}, by {} boxes:",
+                proven.boxes
+            ))
+            .table(&["proven [%]", "proven not [%]", "open [%]"], &[shares])
+    }
+}
