@@ -50,8 +50,11 @@ fn factor(learned: &dyn EulerLagrange<f64>, q: &[f64], v: &[f64]) -> Result<f64,
     Ok(shells[shells.len() / 2])
 }
 
+/// Quantities by name, nothing where the metric has none.
+type Figures = Vec<(&'static str, Option<f64>)>;
+
 /// What a metric says of its equator.
-fn equator(model: &dyn EulerLagrange<f64>) -> Result<Vec<(&'static str, Option<f64>)>, Box<dyn Error>> {
+fn equator(model: &dyn EulerLagrange<f64>) -> Result<Figures, Box<dyn Error>> {
     let ray = Equator { model, time: 0, radius: 1, turn: Turn::Across(2), point: &[0.0; 4] };
     let (outside, through) = ((1.3, 20.0), (1.25, 20.0));
     let radius = |orbit: Option<CircularOrbit<f64>>| orbit.map(|orbit| orbit.radius);

@@ -90,8 +90,7 @@ pub struct TrajectoryRun<S> {
     pub drift: EnergyError,
     /// Chaos of the exact motion, if asked for and found.
     pub lyapunov: Option<Lyapunov>,
-    /// Error of the learned coordinates relative to the spread of the exact ones, one per sample of both
-    /// ([`relative_error`]).
+    /// Error of the learned coordinates relative to the spread of the exact ones, one per sample of both.
     pub relative: Vec<f64>,
     /// Time of valid prediction of the learned motion.
     pub valid: ValidTime,
@@ -116,7 +115,7 @@ pub struct TrajectorySummary {
     pub energy_drift: Statistics,
     /// Largest finite-time Lyapunov exponent of the exact motion, if it was asked for.
     pub lyapunov_exponent: Option<f64>,
-    /// Time of valid prediction ([`valid_time`]) of the learned motion.
+    /// Time of valid prediction of the learned motion.
     pub valid: ValidTime,
     /// The same in Lyapunov times, if the exact motion is chaotic.
     pub valid_lyapunov_times: Option<f64>,

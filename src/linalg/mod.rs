@@ -1,7 +1,7 @@
 //! Batched small dense linear algebra: solve, minimum-norm solution, symmetric eigen, inertia, minors; products.
 //!
 //! Matrices are row-major `(batch, n, n)` slices, vectors `(batch, n)`. Kernels run on lanes: element `(i, j)` of
-//! [`LANES`] matrices side by side, every lane through the same branch-free steps, so that a matrix gives the same
+//! `LANES` matrices side by side, every lane through the same branch-free steps, so that a matrix gives the same
 //! bits wherever it stands in a batch. A [`Workspace`] is reused; nothing else allocates for matrices up to the size
 //! from which faer takes over.
 

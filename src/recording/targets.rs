@@ -19,7 +19,7 @@ pub enum Targets {
 
 impl Targets {
     /// The way that suits the data: measured accelerations if there are any, smoothed ones if they are good to
-    /// [`LARGE_ERROR`], the motion itself if not. `error` is that of smoothed accelerations over their size.
+    /// `LARGE_ERROR`, the motion itself if not. `error` is that of smoothed accelerations over their size.
     pub fn advised(has_accelerations: bool, error: f64) -> Self {
         if has_accelerations {
             Self::Measured

@@ -4,7 +4,7 @@ use super::{Figure, LinePlot, Series, kept, line_plot};
 use crate::experiments::{Experiment, Outcome, Picture, Record, Reduction, Row, Run, Spread};
 use crate::names::rounded;
 
-/// Header of [`experiment_table`]: names of columns in files, of our figures and of the paper's beside them.
+/// Header of the table of an experiment: names of columns in files, of our figures and of the paper's beside them.
 pub const EXPERIMENT_HEADER: [&str; 16] = [
     "run",
     "runs",

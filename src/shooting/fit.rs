@@ -186,7 +186,7 @@ pub fn fit<S: Scalar>(
 /// [`fit`] with checkpoints, and from one: the result is that of a fit that was never stopped, but for the times.
 ///
 /// `sitting.start` is the training that gave the task its weights ([`Trained::snapshot`]), or what
-/// [`CheckpointManager::restore`](crate::training::Keeper::restore) found of the same training, task and settings; without it no
+/// `CheckpointManager::restore` found of the same training, task and settings; without it no
 /// checkpoint is written.
 ///
 /// # Errors

@@ -70,13 +70,13 @@ fn both_charts_of_kerr_have_one_metric_and_the_same_constants() {
 #[test]
 fn without_spin_and_charge_all_holes_are_schwarzschilds() {
     let mut rng = ChaCha8Rng::seed_from_u64(72);
-    let pairs: [(&str, &[(&str, &str)], &str); 3] = [
-        ("kerr-geodesic", &[("a", "0")], "schwarzschild-geodesic"),
-        ("kerr-cartesian", &[("a", "0")], "schwarzschild-cartesian"),
-        ("reissner-nordstrom-cartesian", &[("Q", "0")], "schwarzschild-cartesian"),
+    let pairs = [
+        ("kerr-geodesic", [("a", "0")], "schwarzschild-geodesic"),
+        ("kerr-cartesian", [("a", "0")], "schwarzschild-cartesian"),
+        ("reissner-nordstrom-cartesian", [("Q", "0")], "schwarzschild-cartesian"),
     ];
     for (name, list, plain) in pairs {
-        let (hole, plain) = (configure::<Dd>(name, &given(list)).unwrap(), configure::<Dd>(plain, &[]).unwrap());
+        let (hole, plain) = (configure::<Dd>(name, &given(&list)).unwrap(), configure::<Dd>(plain, &[]).unwrap());
         let bounds = plain.system.validation(4);
         for _ in 0..20 {
             let mut draw = |bounds: &[(f64, f64)]| -> Vec<Dd> {

@@ -31,7 +31,7 @@ fn systems_are_certified_and_refuted_with_a_witness() {
     let nearly = |share: f64| share > 1.0 - 1e-12;
     // The Lagrangian has a branch at f = 1/2, r = 4 M: what lies there stays open.
     let [certified, refuted, _] = shares(&outside);
-    assert!(nearly(certified) && refuted == 0.0 && outside["signature"].to_string() == "[3,1]", "{outside}");
+    assert!(nearly(certified) && refuted == 0.0 && outside["signature"] == serde_json::json!([3, 1]), "{outside}");
     let definite = object(&[&hole[..], &["--signature", "4,0"]].concat());
     let [certified, refuted, _] = shares(&definite);
     assert!(nearly(refuted) && certified == 0.0, "{definite}");

@@ -62,7 +62,7 @@ fn a_sphere_is_told_by_its_curvature_and_its_symmetries() {
 #[test]
 fn a_fit_has_the_part_of_the_model() {
     let folder = Folder::new();
-    let data = folder.file("data.csv", &pendulum(4, false, 1e-4));
+    let data = folder.file("data.csv", pendulum(4, false, 1e-4));
     let out = text(&folder.path("fitted"));
     let fit = ["fit", &data, "--hidden", "8", "--epochs", "2", "--shooting-epochs", "1", "--out", &out];
     let run = lnn(&[&fit[..], &COLUMNS].concat());
