@@ -1,5 +1,6 @@
 //! `lnn geometry`: metric, connection and curvature of points, full digits.
 
+use crate::cli::number::Precision;
 use crate::cli::shown::{CHUNK, report_failures};
 use crate::cli::source::{Source, parameter};
 use crate::cli::states::parse_table;
@@ -37,16 +38,6 @@ pub struct Args {
     /// The same as --format json.
     #[arg(long, conflicts_with = "format")]
     json: bool,
-}
-
-#[derive(Clone, Copy, Debug, clap::ValueEnum)]
-enum Precision {
-    /// Single, 9 digits.
-    F32,
-    /// Double, 17 digits.
-    F64,
-    /// Double-double, about 32 digits.
-    Dd,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]

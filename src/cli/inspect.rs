@@ -1,6 +1,7 @@
 //! `lnn inspect`: the Euler-Lagrange terms of states, full digits.
 
 use crate::cli::inverse::inverse;
+use crate::cli::number::Precision;
 use crate::cli::shown::{CHUNK, Field, Format, Shape, explain, report_failures, show};
 use crate::cli::source::{Source, parameter};
 use crate::cli::{CliError, States, input, output, parse_states, states};
@@ -40,16 +41,6 @@ pub struct Args {
     /// The same as --format json.
     #[arg(long, conflicts_with = "format")]
     json: bool,
-}
-
-#[derive(Clone, Copy, Debug, clap::ValueEnum)]
-enum Precision {
-    /// Single, 9 digits.
-    F32,
-    /// Double, 17 digits.
-    F64,
-    /// Double-double, about 32 digits.
-    Dd,
 }
 
 /// Prints one object per state.

@@ -2,6 +2,17 @@
 
 use crate::rollout::Options;
 
+/// Precision that a command computes in.
+#[derive(Clone, Copy, Debug, clap::ValueEnum)]
+pub enum Precision {
+    /// Single, 9 digits.
+    F32,
+    /// Double, 17 digits.
+    F64,
+    /// Double-double, about 32 digits.
+    Dd,
+}
+
 /// A finite decimal number.
 pub fn finite(text: &str) -> Result<f64, String> {
     match text.trim().parse::<f64>() {

@@ -255,24 +255,7 @@ pub(crate) fn recorded(
 fn paper(system: &Configured<f64>) -> Option<Config> {
     let n = system.coordinates;
     let PaperBudget { states, hidden, phases } = system.system.learning.paper?;
-    let network = Network {
-        hidden: hidden.to_vec(),
-        activation: ActivationChoice::Gelu,
-        alpha: 1.0,
-        time_like: None,
-        scaling: Scaling::Physical,
-        embed_periodic: false,
-        input_layer: InputLayer::None,
-        dissipation: None,
-        structure: Structure::BlackBox,
-        cyclic: Vec::new(),
-        radial: Vec::new(),
-        radial_unit: None,
-        even_in_v: false,
-        learn_alpha: false,
-        known: None,
-        initialization: Initialization::Default,
-    };
+    let network = Network { hidden: hidden.to_vec(), embed_periodic: false, ..network(0) };
     let bounds: Bounds = system.system.training(n);
     let phase = |phase: &PaperPhase| {
         let PaperPhase { epochs, rate, lowest_rate: eta_min, positions } = *phase;

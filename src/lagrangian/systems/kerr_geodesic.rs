@@ -1,10 +1,8 @@
 //! Free fall outside a spinning black hole, in the coordinates of Boyer and Lindquist.
 
+use super::schwarzschild_geodesic::{PLANE, bounds, coordinates, trajectory};
 use crate::lagrangian::Lagrangian;
-use crate::lagrangian::system::{
-    Bounds, ClosedForm, Conserved, Coordinate, LearningAdvice, Parameter, PerSize, Plane, Range, Size, System,
-    TrajectoryTest,
-};
+use crate::lagrangian::system::{ClosedForm, Conserved, LearningAdvice, Parameter, PerSize, Range, Size, System};
 use crate::scalar::{Real, Scalar};
 use std::borrow::Cow;
 use std::f64::consts::PI;
@@ -21,22 +19,11 @@ pub struct KerrGeodesic;
 static PARAMETERS: [Parameter; 2] =
     [Parameter::new("M", "1", "m", Range::Positive), Parameter::new("a", "0.9", "m", Range::Any)];
 
-fn bounds(phi: (f64, f64)) -> Bounds {
-    Bounds {
-        positions: vec![(-10.0, 10.0), (3.0, 15.0), (0.1 * PI, 0.9 * PI), phi],
-        // The velocity of t follows from the mass shell.
-        velocities: vec![(0.0, 0.0), (-0.3, 0.3), (-0.1, 0.1), (-0.1, 0.1)],
-    }
-}
-
 /// Catalogue entry.
 pub const SYSTEM: System = System {
     name: Cow::Borrowed("kerr-geodesic"),
     title: Cow::Borrowed("Geodesic of the Kerr metric"),
-    coordinates: PerSize::Rule(|_| {
-        let theta = Coordinate { periodic: false, ..Coordinate::angle("theta") };
-        vec![Coordinate::length("t"), Coordinate::length("r"), theta, Coordinate::angle("phi")]
-    }),
+    coordinates: PerSize::Rule(|_| coordinates()),
     parameters: Cow::Borrowed(&PARAMETERS),
     size: Size::Fixed(4),
     time_unit: Cow::Borrowed("m"),
@@ -44,14 +31,7 @@ pub const SYSTEM: System = System {
     constraint: Some("t_dot = C/(sqrt(b^2 - g_tt C) - b), b = g_tphi phi_dot, C = 1 + g(v, v) of t_dot = 0"),
     training: PerSize::Rule(|_| bounds((-0.5 * PI, 2.5 * PI))),
     validation: PerSize::Rule(|_| bounds((0.0, 2.0 * PI))),
-    trajectory: PerSize::Rule(|_| TrajectoryTest {
-        start: Bounds {
-            positions: vec![(0.0, 0.0), (6.0, 12.0), (0.4 * PI, 0.6 * PI), (0.0, 2.0 * PI)],
-            velocities: vec![(0.0, 0.0), (-0.1, 0.1), (-0.02, 0.02), (-0.05, 0.05)],
-        },
-        t_end: 5.0,
-        dt: 0.05,
-    }),
+    trajectory: PerSize::Rule(|_| trajectory()),
     domain: Some(|parameters, q| match (parameters, q) {
         (&[mass, spin], &[_, r, theta, _])
             if r > mass + (mass * mass - spin * spin).max(0.0).sqrt() && theta.sin() != 0.0 =>
@@ -60,11 +40,7 @@ pub const SYSTEM: System = System {
         }
         _ => Err("r must be above M + sqrt(M^2 - a^2) and theta keep away from the poles"),
     }),
-    // Seen along the axis, r as if space were flat.
-    plane: Some(Plane {
-        labels: ["r cos phi [m]", "r sin phi [m]"],
-        point: |_, q| (q[1] * q[3].cos(), q[1] * q[3].sin()),
-    }),
+    plane: Some(PLANE),
     conserved: Some(Conserved {
         name: "energy, angular momentum about the axis and root of Carter's constant K per mass [1, m, m]",
         vector: |parameters, q, v| {

@@ -18,7 +18,8 @@ pub struct SchwarzschildGeodesic;
 
 static PARAMETERS: [Parameter; 1] = [Parameter::new("M", "1", "m", Range::Positive)];
 
-fn bounds(phi: (f64, f64)) -> Bounds {
+/// States outside a hole in `t`, `r`, `theta`, `phi`.
+pub(super) fn bounds(phi: (f64, f64)) -> Bounds {
     Bounds {
         positions: vec![(-10.0, 10.0), (3.0, 15.0), (0.1 * PI, 0.9 * PI), phi],
         // The velocity of t follows from the mass shell.
@@ -26,14 +27,33 @@ fn bounds(phi: (f64, f64)) -> Bounds {
     }
 }
 
+/// `t`, `r`, `theta`, `phi`.
+pub(super) fn coordinates() -> Vec<Coordinate> {
+    let theta = Coordinate { periodic: false, ..Coordinate::angle("theta") };
+    vec![Coordinate::length("t"), Coordinate::length("r"), theta, Coordinate::angle("phi")]
+}
+
+/// Orbits that the trajectory test begins.
+pub(super) fn trajectory() -> TrajectoryTest {
+    TrajectoryTest {
+        start: Bounds {
+            positions: vec![(0.0, 0.0), (6.0, 12.0), (0.4 * PI, 0.6 * PI), (0.0, 2.0 * PI)],
+            velocities: vec![(0.0, 0.0), (-0.1, 0.1), (-0.02, 0.02), (-0.05, 0.05)],
+        },
+        t_end: 5.0,
+        dt: 0.05,
+    }
+}
+
+/// The plane seen along the axis, `r` as if space were flat.
+pub(super) const PLANE: Plane =
+    Plane { labels: ["r cos phi [m]", "r sin phi [m]"], point: |_, q| (q[1] * q[3].cos(), q[1] * q[3].sin()) };
+
 /// Catalogue entry.
 pub const SYSTEM: System = System {
     name: Cow::Borrowed("schwarzschild-geodesic"),
     title: Cow::Borrowed("Geodesic of the Schwarzschild metric"),
-    coordinates: PerSize::Rule(|_| {
-        let theta = Coordinate { periodic: false, ..Coordinate::angle("theta") };
-        vec![Coordinate::length("t"), Coordinate::length("r"), theta, Coordinate::angle("phi")]
-    }),
+    coordinates: PerSize::Rule(|_| coordinates()),
     parameters: Cow::Borrowed(&PARAMETERS),
     size: Size::Fixed(4),
     time_unit: Cow::Borrowed("m"),
@@ -41,23 +61,12 @@ pub const SYSTEM: System = System {
     constraint: Some("t_dot = sqrt((1 + r_dot^2/f + r^2 (theta_dot^2 + sin(theta)^2 phi_dot^2))/f), f = 1 - 2 M/r"),
     training: PerSize::Rule(|_| bounds((-0.5 * PI, 2.5 * PI))),
     validation: PerSize::Rule(|_| bounds((0.0, 2.0 * PI))),
-    trajectory: PerSize::Rule(|_| TrajectoryTest {
-        start: Bounds {
-            positions: vec![(0.0, 0.0), (6.0, 12.0), (0.4 * PI, 0.6 * PI), (0.0, 2.0 * PI)],
-            velocities: vec![(0.0, 0.0), (-0.1, 0.1), (-0.02, 0.02), (-0.05, 0.05)],
-        },
-        t_end: 5.0,
-        dt: 0.05,
-    }),
+    trajectory: PerSize::Rule(|_| trajectory()),
     domain: Some(|parameters, q| match (parameters, q) {
         (&[mass], &[_, r, theta, _]) if r > 2.0 * mass && theta.sin() != 0.0 => Ok(()),
         _ => Err("r must be above 2 M and theta keep away from the poles"),
     }),
-    // Seen along the axis, r as if space were flat.
-    plane: Some(Plane {
-        labels: ["r cos phi [m]", "r sin phi [m]"],
-        point: |_, q| (q[1] * q[3].cos(), q[1] * q[3].sin()),
-    }),
+    plane: Some(PLANE),
     conserved: Some(Conserved {
         name: "energy and angular momentum per mass [1, m]",
         vector: |parameters, q, v| {

@@ -1,37 +1,8 @@
 //! Words of documentation: a sentence begins with the noun it is about.
 
+use super::rooms::ROOMS;
 use std::fs;
 use std::path::Path;
-
-/// Rooms whose documentation is held to it.
-const ROOMS: [&str; 26] = [
-    "names",
-    "scalar",
-    "storage",
-    "random",
-    "ops",
-    "forward",
-    "linalg",
-    "tape",
-    "recording",
-    "lagrangian",
-    "geometry",
-    "rollout",
-    "network",
-    "symmetry",
-    "certificate",
-    "optimizers",
-    "configuration",
-    "data",
-    "training",
-    "shooting",
-    "presets",
-    "analysis",
-    "experiments",
-    "report",
-    "pipeline",
-    "cli",
-];
 
 /// Lines of a folder's sources that begin a comment of documentation with a word that names nothing, and all such comments.
 fn search(folder: &Path, found: &mut Vec<String>) -> usize {
