@@ -172,6 +172,9 @@ pub mod certificate;
 #[cfg(feature = "rollout")]
 pub mod symmetry;
 
+#[cfg(feature = "rollout")]
+pub mod relativity;
+
 #[cfg(feature = "training")]
 pub mod optimizers;
 

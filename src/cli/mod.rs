@@ -209,14 +209,18 @@ fn report(error: &CliError) {
 
 /// Diagnostics go to standard error, chosen by the environment variable `LNN_LOG` (such as `debug`).
 fn watch_log() -> Result<(), CliError> {
-    use tracing_subscriber::EnvFilter;
+    use tracing_subscriber::Layer as _;
+    use tracing_subscriber::filter::{LevelFilter, Targets};
+    use tracing_subscriber::layer::SubscriberExt as _;
+    use tracing_subscriber::util::SubscriberInitExt as _;
     let filter = match std::env::var("LNN_LOG") {
-        Ok(text) => EnvFilter::try_new(&text).map_err(|e| CliError::usage(format_args!("LNN_LOG: {e}")))?,
-        Err(std::env::VarError::NotPresent) => EnvFilter::new("warn"),
+        Ok(text) => text.parse::<Targets>().map_err(|e| CliError::usage(format_args!("LNN_LOG: {e}")))?,
+        Err(std::env::VarError::NotPresent) => Targets::new().with_default(LevelFilter::WARN),
         Err(error) => return Err(CliError::usage(format_args!("LNN_LOG: {error}"))),
     };
+    let lines = tracing_subscriber::fmt::layer().with_writer(std::io::stderr).with_filter(filter);
     // Already installed when several commands run in one process (tests): keep the first.
-    let _ = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).try_init();
+    let _ = tracing_subscriber::registry().with(lines).try_init();
     Ok(())
 }
 

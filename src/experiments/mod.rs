@@ -4,6 +4,7 @@
 //! An [`Experiment`] turns a [`Scale`] and a number of seeds into [`Run`]s; whoever trains them hands back one
 //! [`Record`] per run, and [`Experiment::rows`] gathers them into the paper's table beside ours.
 
+mod black_holes;
 mod budget;
 mod network;
 mod physical;
@@ -68,6 +69,8 @@ pub enum Picture {
     TradeOff,
     /// Lowest validation loss so far against seconds of training, a line per run.
     Clock,
+    /// What the learned metrics say of a black hole, beside the exact ones: a table per row.
+    BlackHole,
     /// Pictures of every run's evaluation whose file name begins so.
     Evaluation(&'static [&'static str]),
 }
@@ -107,6 +110,7 @@ static EXPERIMENTS: &[Experiment] = &[
     presets::QUICK,
     presets::BEST,
     presets::TIME_TO_ACCURACY,
+    black_holes::BLACK_HOLES,
 ];
 
 /// All experiments, in the order of the paper.

@@ -29,6 +29,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod bound;
 mod connection;
 mod curvature;
 mod error;
@@ -37,6 +38,7 @@ mod orbits;
 mod surfaces;
 mod tensor;
 
+pub use bound::Turning;
 pub use connection::Connection;
 pub use curvature::Curvature;
 pub use error::GeometryError;

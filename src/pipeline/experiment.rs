@@ -61,7 +61,7 @@ pub fn run_experiment(
         let finished = results.iter().filter(|(_, record)| record.is_some()).count();
         return Err(PipelineError::InterruptedRuns { finished, total });
     }
-    conclude(experiment, scale, results, beside, store, started)
+    conclude(experiment, scale, results, beside, store, (started, watch))
 }
 
 /// The record of a run: the one that is there if it was made from the same configuration, or a new one. `None` if it was

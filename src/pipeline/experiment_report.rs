@@ -3,10 +3,11 @@
 use crate::experiments::{Experiment, Record, Row, Run, Scale};
 use crate::names::{WIDTH, counted, wrapped};
 use crate::pipeline::experiment_store::ExperimentStore;
+use crate::pipeline::readings::reading_tables;
 use crate::pipeline::run_figures::{pictures_of_runs, within};
-use crate::pipeline::{PipelineError, headline};
+use crate::pipeline::{PipelineError, Watch, headline};
 use crate::report::{
-    Curve, EXPERIMENT_HEADER, REDUCTION_HEADER, Report, experiment_curves, experiment_figures, experiment_table,
+    Curve, EXPERIMENT_HEADER, READING_HEADER, REDUCTION_HEADER, Report, experiment_curves, experiment_figures, experiment_table,
     experiment_view, reduction_table, text_table,
 };
 use std::fmt::Write as _;
@@ -48,7 +49,7 @@ pub(crate) fn conclude(
     results: Results,
     beside: &[Curve],
     store: &dyn ExperimentStore,
-    started: Instant,
+    (started, watch): (Instant, &Watch),
 ) -> Result<ExperimentReport, PipelineError> {
     let rows = experiment.rows(&results);
     let (table, (header, view)) = (experiment_table(&rows), experiment_view(&rows));
@@ -79,6 +80,8 @@ pub(crate) fn conclude(
     let reductions = reduction_table(&experiment.reductions(&results));
     let report = remarks.iter().fold(report, |report, remark| report.paragraph(remark));
     let report = if reductions.is_empty() { report } else { report.table(&REDUCTION_HEADER, &reductions) };
+    let read = reading_tables(experiment, &results, store, watch)?;
+    let report = read.iter().fold(report, |report, (label, table)| report.heading(label).table(&READING_HEADER, table));
     let report = within(taken, report.figures(&figures));
     store.write("report.html", report.to_html().as_bytes())?;
     figures.iter().try_for_each(|figure| store.write(&figure.file, figure.picture.to_svg().as_bytes()))?;
@@ -96,6 +99,9 @@ pub(crate) fn conclude(
     remarks.iter().for_each(|remark| text += &format!("{remark}\n"));
     if !reductions.is_empty() {
         text += &format!("\n{}", text_table(&REDUCTION_HEADER, &reductions));
+    }
+    for (label, table) in &read {
+        text += &format!("\n{label}\n{}", text_table(&READING_HEADER, table));
     }
     let (title, paper) = (experiment.title, experiment.paper);
     let place = if paper == "-" { String::new() } else { format!(" (of the paper: {paper})") };

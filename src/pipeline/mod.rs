@@ -71,6 +71,7 @@ mod physics;
 mod physics_report;
 mod prediction;
 mod prepared_fit;
+mod readings;
 mod report_files;
 mod run_figures;
 mod start;

@@ -221,7 +221,7 @@ pub fn experiment_figures(experiment: &Experiment, results: &[(Run, Option<Recor
                     level: None,
                 },
             ),
-            Picture::Evaluation(_) => {}
+            Picture::Evaluation(_) | Picture::BlackHole => {}
         }
     }
     figures

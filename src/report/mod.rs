@@ -8,6 +8,7 @@ mod experiment;
 mod grids;
 mod html;
 mod plot;
+mod readings;
 mod table;
 #[cfg(test)]
 mod test_pictures;
@@ -23,6 +24,7 @@ pub(crate) use experiment::{
 pub use grids::{Fit, GridComparison, grid_figures};
 pub use html::Report;
 pub use plot::{HeatMap, Level, LinePlot, Picture, PlotError, Series, Trace, heat_maps, line_plot, trace_plot};
+pub(crate) use readings::{READING_HEADER, reading_table};
 pub use table::text_table;
 pub(crate) use training::{HistoryRow, training_figures};
 pub(crate) use turn::Turn;

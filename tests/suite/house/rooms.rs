@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Rooms from top to bottom; a file may name its own room and those before it.
-pub(super) const ROOMS: [&str; 26] = [
+pub(super) const ROOMS: [&str; 27] = [
     "names",
     "scalar",
     "storage",
@@ -20,6 +20,7 @@ pub(super) const ROOMS: [&str; 26] = [
     "rollout",
     "network",
     "symmetry",
+    "relativity",
     "certificate",
     "optimizers",
     "configuration",

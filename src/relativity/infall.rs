@@ -1,0 +1,40 @@
+//! Free fall through a horizon.
+
+use super::Around;
+use super::event::{State, passing, zero};
+use crate::lagrangian::{EulerLagrange, Request, Terms};
+use crate::linalg::{Inertia, inertia};
+
+/// A fall from a state down to a distance.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Infall {
+    /// Time of the motion: the proper time of a motion on the mass shell.
+    pub time: f64,
+    /// `true` if the metric has the signature of the start at all samples.
+    pub keeps_signature: bool,
+}
+
+fn signature(model: &dyn EulerLagrange<f64>, state: &State) -> Option<Inertia> {
+    let mut terms = Terms::default();
+    model.terms(&state.q, &state.v, Request::MASS_MATRIX, &mut terms).ok()?;
+    let n = model.coordinates();
+    inertia(n, &terms.mass_matrix, &mut vec![0.0; n * n]).ok()
+}
+
+/// The fall from `(q, v)` to the distance `to` from the centre, sampled every `dt`, until `t_end`; `None` if the motion does not get there.
+pub fn infall(
+    model: &dyn EulerLagrange<f64>,
+    (q, v): (&[f64], &[f64]),
+    (around, to): (Around, f64),
+    (t_end, dt): (f64, f64),
+) -> Option<Infall> {
+    let above = |state: &State| around.distance(&state.q) - to;
+    let first = signature(model, &State { t: 0.0, q: q.to_vec(), v: v.to_vec() });
+    let mut keeps_signature = first.is_some();
+    let found = passing(model, (q, v), (t_end, dt), |state| {
+        keeps_signature &= signature(model, state) == first;
+        above(state) <= 0.0
+    })?;
+    let end = zero(model, &found, above).ok()?;
+    Some(Infall { time: end.t, keeps_signature })
+}

@@ -1,0 +1,85 @@
+//! Parameters of a system whose metric comes nearest to a learned one: mass, spin, charge.
+
+use super::shells::{factor, metrics};
+use crate::lagrangian::{Configured, EulerLagrange, MechanicsError, configure_values};
+use crate::linalg::{Workspace, solve};
+use std::collections::BTreeMap;
+
+/// Steps of Levenberg and Marquardt, at most.
+const STEPS: usize = 60;
+/// Change of a parameter by which derivatives are taken, relative; the result does not depend on it.
+const DIFFERENCE: f64 = 1e-5;
+
+/// Values by symbol.
+type Values = BTreeMap<String, f64>;
+
+/// Residuals of the metric of a system with these parameters beside a learned one, each point relative to the size of its metric, after
+/// the best factor; `None` where there is no such system.
+fn residuals(system: &Configured<f64>, values: &Values, learned: &[f64], points: &[f64]) -> Option<Vec<f64>> {
+    let model = configure_values::<f64>(system.system.clone(), values).ok()?.build().ok()?;
+    let n = model.coordinates();
+    let exact = metrics(model.as_ref(), points).ok()?;
+    let factor = factor(n, &exact, learned);
+    let pairs = exact.chunks_exact(n * n).zip(learned.chunks_exact(n * n));
+    let all: Vec<f64> = pairs
+        .flat_map(|(g, h)| {
+            let size = g.iter().map(|x| x * x).sum::<f64>().sqrt();
+            g.iter().zip(h).map(move |(a, b)| (b / factor - a) / size)
+        })
+        .collect();
+    all.iter().all(|x| x.is_finite()).then_some(all)
+}
+
+fn square(residuals: &[f64]) -> f64 {
+    residuals.iter().map(|r| r * r).sum()
+}
+
+/// The values of the parameters of `system`, by symbol, for which its metric comes nearest to that of `learned` up to a factor at `points`,
+/// `(points, n)`: least squares by the method of Levenberg and Marquardt from `start`.
+///
+/// # Errors
+/// Those of the learned model.
+pub fn nearest_parameters(
+    system: &Configured<f64>,
+    learned: &dyn EulerLagrange<f64>,
+    points: &[f64],
+    start: &Values,
+) -> Result<Option<Values>, MechanicsError> {
+    let learned = metrics(learned, points)?;
+    let of = |values: &Values| residuals(system, values, &learned, points);
+    let (mut values, symbols) = (start.clone(), start.keys().cloned().collect::<Vec<_>>());
+    let (Some(mut now), count) = (of(&values), symbols.len()) else { return Ok(None) };
+    let (mut damping, mut workspace) = (1e-3, Workspace::default());
+    for _ in 0..STEPS {
+        let mut columns = Vec::with_capacity(count);
+        for symbol in &symbols {
+            let step = DIFFERENCE * (1.0 + values[symbol].abs());
+            let moved = |by: f64| {
+                let mut values = values.clone();
+                values.entry(symbol.clone()).and_modify(|x| *x += by);
+                of(&values)
+            };
+            let (Some(more), Some(less)) = (moved(step), moved(-step)) else { return Ok(None) };
+            columns.push(more.iter().zip(&less).map(|(a, b)| (a - b) / (2.0 * step)).collect::<Vec<f64>>());
+        }
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let mut normal: Vec<f64> = columns.iter().flat_map(|a| columns.iter().map(move |b| dot(a, b))).collect();
+        let down: Vec<f64> = columns.iter().map(|column| -dot(column, &now)).collect();
+        (0..count).for_each(|k| normal[k * count + k] *= 1.0 + damping);
+        let mut step = vec![0.0; count];
+        if solve(count, &normal, &down, &mut step, &mut workspace).is_err() {
+            return Ok(None);
+        }
+        let mut trial = values.clone();
+        symbols.iter().zip(&step).for_each(|(symbol, step)| *trial.entry(symbol.clone()).or_default() += step);
+        let small = symbols.iter().zip(&step).all(|(symbol, step)| step.abs() < 1e-12 * (1.0 + values[symbol].abs()));
+        match of(&trial).filter(|then| square(then) <= square(&now)) {
+            Some(then) => (values, now, damping) = (trial, then, damping * 0.1),
+            None => damping *= 10.0,
+        }
+        if small || damping > 1e12 {
+            break;
+        }
+    }
+    Ok(Some(values))
+}

@@ -1,0 +1,288 @@
+//! What a learned metric says of a hole, beside the exact one: from free fall slower than light alone.
+
+use super::infall::infall;
+use super::parameters::nearest_parameters;
+use super::periastron::radial_period;
+use super::shells::{factor, metric_deviation, metrics};
+use super::{Around, conserved_drift};
+use crate::geometry::{CircularOrbit, GeometryError, Sense, geometries};
+use crate::lagrangian::{Configured, EulerLagrange};
+use crate::symmetry::{Basis, Chart, Degrees, EXACT, Region, symmetries};
+use serde::{Deserialize, Serialize};
+use std::f64::consts::TAU;
+
+/// A quantity read off a learned metric.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Reading {
+    /// Its name, with the unit of length `M`.
+    pub quantity: String,
+    /// Value of the exact metric, if the quantity is not an error itself.
+    pub exact: Option<f64>,
+    /// Value of the learned metric; none if there is no such thing in it.
+    pub learned: Option<f64>,
+    /// Error, relative where there is an exact value; none if it has no learned one.
+    pub error: Option<f64>,
+    /// Error that is aimed at.
+    pub aim: f64,
+}
+
+/// A system and a metric that learned it.
+#[derive(Clone, Copy)]
+pub struct Pair<'a> {
+    /// The exact one.
+    pub exact: &'a dyn EulerLagrange<f64>,
+    /// The learned one, up to a factor.
+    pub learned: &'a dyn EulerLagrange<f64>,
+    /// The system of the exact one.
+    pub system: &'a Configured<f64>,
+    /// The coordinates of both.
+    pub around: Around,
+    /// Distances that were learned.
+    pub range: (f64, f64),
+}
+
+/// Points of the deviation of the metric.
+const POINTS: usize = 4000;
+/// Distance from which the mass is read, where nothing but its attraction is left.
+const FAR: f64 = 1e6;
+/// Semilatus rectum over mass, and eccentricity, of bound orbits.
+const ORBITS: [(f64, f64); 8] =
+    [(8.0, 0.2), (8.0, 0.5), (15.0, 0.2), (15.0, 0.5), (30.0, 0.2), (30.0, 0.5), (50.0, 0.2), (50.0, 0.5)];
+/// Samples of a radial period.
+const SAMPLES: f64 = 400.0;
+
+impl Pair<'_> {
+    fn reading(quantity: impl Into<String>, exact: Option<f64>, learned: Option<f64>, aim: f64) -> Option<Reading> {
+        let exact = exact?;
+        let error = learned.map(|learned| (learned / exact - 1.0).abs());
+        Some(Reading { quantity: quantity.into(), exact: Some(exact), learned, error, aim })
+    }
+
+    /// A quantity that is an error.
+    fn error(quantity: impl Into<String>, error: Option<f64>, aim: f64) -> Reading {
+        Reading { quantity: quantity.into(), exact: None, learned: None, error, aim }
+    }
+
+    /// Something of both metrics.
+    fn both<T>(
+        &self,
+        of: impl Fn(&dyn EulerLagrange<f64>) -> Result<T, GeometryError>,
+    ) -> Result<(T, Option<T>), GeometryError> {
+        Ok((of(self.exact)?, of(self.learned).ok()))
+    }
+
+    /// Mass of the exact metric by its attraction from afar.
+    fn mass(&self) -> Result<f64, GeometryError> {
+        let origin = self.around.origin();
+        let metric = self.around.equator(self.exact, &origin).at(FAR)?;
+        Ok(-0.5 * metric.first[0] * FAR * FAR)
+    }
+
+    /// Everything that can be read, the lengths in units of the mass; `said` is called with the name of every part before it begins.
+    ///
+    /// # Errors
+    /// Those of the exact metric; what the learned one refuses is a reading without a value.
+    pub fn readings(&self, said: &dyn Fn(&str)) -> Result<Vec<Reading>, GeometryError> {
+        let mass = self.mass()?;
+        let mut all = Vec::new();
+        said("metric");
+        let factor = self.metric(mass, &mut all)?;
+        said("orbits");
+        self.equator(mass, &mut all)?;
+        self.periastra(mass, &mut all)?;
+        said("infall");
+        self.fall(mass, &mut all)?;
+        said("parameters");
+        self.parameters(mass, &mut all)?;
+        said("curvature");
+        self.curvature(mass, factor, &mut all)?;
+        said("symmetries");
+        self.symmetries(mass, &mut all);
+        Ok(all)
+    }
+
+    /// Distances in units of the mass, as far as they were learned.
+    fn within(&self, mass: f64, (low, high): (f64, f64)) -> (f64, f64) {
+        ((low * mass).max(self.range.0), (high * mass).min(self.range.1))
+    }
+
+    fn metric(&self, mass: f64, all: &mut Vec<Reading>) -> Result<f64, GeometryError> {
+        let n = self.exact.coordinates();
+        let points = self.around.points(POINTS, self.within(mass, (1.5, 20.0)));
+        let found = metrics(self.learned, &points).ok();
+        let factor = match &found {
+            Some(learned) => factor(n, &metrics(self.exact, &points)?, learned),
+            None => f64::NAN,
+        };
+        let deviation = metric_deviation((self.exact, self.learned), factor, &points).ok();
+        all.push(Self::error("metric, R from 1.5 to 20 M, median", deviation.map(|d| d.median), 2e-4));
+        all.push(Self::error("metric, R from 1.5 to 20 M, 99 %", deviation.map(|d| d.p99), 3e-3));
+        Ok(factor)
+    }
+
+    fn equator(&self, mass: f64, all: &mut Vec<Reading>) -> Result<(), GeometryError> {
+        let origin = self.around.origin();
+        let range = self.within(mass, (1.3, 20.0));
+        let dragging = |model: &dyn EulerLagrange<f64>| Ok(self.around.equator(model, &origin).at(4.0 * mass)?.dragging());
+        let (turns, learned_turns) = self.both(dragging)?;
+        let spins = turns.abs() > 1e-12 / mass;
+        let senses = [(Sense::Forward, ", forward"), (Sense::Backward, ", backward")];
+        let radius = |orbit: Option<CircularOrbit<f64>>| orbit.map(|orbit| orbit.radius / mass);
+        let impact = |orbit: Option<CircularOrbit<f64>>| orbit.map(|orbit| orbit.impact_parameter() / mass);
+        let stable_aim = if spins { 3e-3 } else { 1e-3 };
+        let light_aim = if spins { 1e-3 } else { 5e-4 };
+        for (sense, suffix) in &senses[..if spins { 2 } else { 1 }] {
+            let suffix = if spins { suffix } else { "" };
+            let stable = |model: &dyn EulerLagrange<f64>| {
+                self.around.equator(model, &origin).innermost_stable(range, *sense).map(radius)
+            };
+            let (exact, learned) = self.both(stable)?;
+            let name = format!("innermost stable orbit{suffix} [M]");
+            all.extend(Self::reading(name, exact, learned.flatten(), stable_aim));
+            let light = |model: &dyn EulerLagrange<f64>| self.around.equator(model, &origin).light(range, *sense);
+            let (exact, learned) = self.both(light)?;
+            let learned = learned.flatten();
+            let name = format!("orbit of light{suffix} [M]");
+            all.extend(Self::reading(name, radius(exact), radius(learned), light_aim));
+            let name = format!("critical impact parameter{suffix} [M]");
+            all.extend(Self::reading(name, impact(exact), impact(learned), light_aim));
+        }
+        let through = self.within(mass, (1.25, 20.0));
+        let (exact, learned) = self.both(|model| self.around.equator(model, &origin).horizon(through))?;
+        let scaled = |radius: Option<f64>| radius.map(|radius| radius / mass);
+        all.extend(Self::reading("horizon [M]", scaled(exact), scaled(learned.flatten()), 5e-3));
+        if spins {
+            let (exact, learned) = self.both(|model| self.around.equator(model, &origin).ergosurface(through))?;
+            all.extend(Self::reading("ergosurface [M]", scaled(exact), scaled(learned.flatten()), 5e-3));
+            let learned = learned_turns.map(|turns| turns * mass);
+            all.extend(Self::reading("frame dragging at 4 M [1/M]", Some(turns * mass), learned, 5e-3));
+        }
+        Ok(())
+    }
+
+    fn periastra(&self, mass: f64, all: &mut Vec<Reading>) -> Result<(), GeometryError> {
+        let origin = self.around.origin();
+        let exact = self.around.equator(self.exact, &origin);
+        let spins = exact.at(4.0 * mass)?.dragging().abs() > 1e-12 / mass;
+        for sense in [Sense::Forward, Sense::Backward].into_iter().take(if spins { 2 } else { 1 }) {
+            for (p, e) in ORBITS {
+                let (near, far) = (p / (1.0 + e) * mass, p / (1.0 - e) * mass);
+                if near < self.range.0 {
+                    continue;
+                }
+                let Some(turning) = exact.between(near, far, sense)? else { continue };
+                let [q, v] = self.around.turning(near, &turning);
+                let kepler = TAU * (0.5 * (near + far)).powf(1.5) / mass.sqrt();
+                let advance = |model: &dyn EulerLagrange<f64>| {
+                    let found = radial_period(model, (&q, &v), self.around, (4.0 * kepler, kepler / SAMPLES))?;
+                    Some(found.advance)
+                };
+                // What falls in or turns elsewhere is no orbit between the two.
+                let Some(truth) = advance(self.exact).filter(|advance| *advance > 0.0) else { continue };
+                let suffix = match (spins, sense) {
+                    (false, _) => "",
+                    (true, Sense::Forward) => ", forward",
+                    (true, Sense::Backward) => ", backward",
+                };
+                let name = format!("periastron advance, p = {p} M, e = {e}{suffix} [rad]");
+                all.extend(Self::reading(name, Some(truth), advance(self.learned), 2e-3));
+            }
+        }
+        Ok(())
+    }
+
+    fn fall(&self, mass: f64, all: &mut Vec<Reading>) -> Result<(), GeometryError> {
+        if self.range.0 > 1.5 * mass {
+            return Ok(());
+        }
+        let direction = [0.48, 0.6, 0.64];
+        let (q, mut v) = (self.around.place(10.0 * mass, direction), [0.0; 4]);
+        let n = self.exact.coordinates();
+        let (time, metric) = (self.around.time(), metrics(self.exact, &q)?);
+        v[time] = (-metric[time * n + time]).sqrt().recip();
+        let fall = |model| infall(model, (&q, &v), (self.around, 1.5 * mass), (200.0 * mass, 0.25 * mass));
+        let (truth, learned) = (fall(self.exact), fall(self.learned));
+        let kept = learned.filter(|fall| fall.keeps_signature).map(|fall| fall.time / mass);
+        let name = "infall from rest at 10 M to 1.5 M, signature kept: proper time [M]";
+        all.extend(Self::reading(name, truth.map(|fall| fall.time / mass), kept, 1e-3));
+        // An inclined bound orbit.
+        let (q, mut v) = (self.around.place(10.0 * mass, [1.0, 0.0, 0.0]), [0.0; 4]);
+        if let Around::Cartesian { space: [_, y, z], .. } = self.around {
+            (v[y], v[z]) = (0.25, 0.25);
+            if self.system.impose_constraint(&q, &mut v).is_ok() {
+                let drift = conserved_drift(self.system, self.learned, (&q, &v), (1000.0 * mass, mass));
+                all.push(Self::error("conserved quantities along an inclined orbit, drift until 1000 M", drift, 1e-4));
+            }
+        }
+        Ok(())
+    }
+
+    fn parameters(&self, mass: f64, all: &mut Vec<Reading>) -> Result<(), GeometryError> {
+        let points = self.around.points(POINTS / 8, self.within(mass, (1.5, 20.0)));
+        let symbols = self.system.system.parameters.iter().map(|p| p.symbol.to_string());
+        let exact: Vec<(String, f64)> = symbols.zip(self.system.parameters.iter().copied()).collect();
+        // From values that are far off.
+        let start = exact.iter().map(|(symbol, value)| (symbol.clone(), 0.6 * value)).collect();
+        let found = nearest_parameters(self.system, self.learned, &points, &start)?;
+        for (symbol, value) in exact.into_iter().filter(|(_, value)| *value != 0.0) {
+            let learned = found.as_ref().and_then(|found| found.get(&symbol).copied());
+            all.extend(Self::reading(format!("parameter {symbol}"), Some(value), learned, 5e-3));
+        }
+        Ok(())
+    }
+
+    fn curvature(&self, mass: f64, factor: f64, all: &mut Vec<Reading>) -> Result<(), GeometryError> {
+        let size = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>().sqrt();
+        for distance in [3.0, 6.0, 10.0] {
+            let points = self.around.points(12, (distance * mass, distance * mass));
+            let rest = [0.0; 4];
+            let of = |model| geometries(model, &points, &rest)?.into_iter().collect::<Result<Vec<_>, _>>();
+            let (exact, learned) = (of(self.exact)?, of(self.learned).ok());
+            let largest = |errors: &mut dyn Iterator<Item = f64>| errors.fold(0.0, f64::max);
+            let vacuum = exact.iter().all(|point| size(&point.curvature.ricci) < 1e-6 * size(&point.curvature.riemann));
+            if vacuum {
+                let share = learned.as_ref().map(|learned| {
+                    largest(&mut learned.iter().map(|p| size(&p.curvature.ricci) / size(&p.curvature.riemann)))
+                });
+                all.push(Self::error(format!("Ricci over Riemann at {distance} M, largest"), share, 1e-2));
+            }
+            let error = learned.as_ref().map(|learned| {
+                largest(&mut learned.iter().zip(&exact).map(|(learned, exact)| {
+                    (learned.curvature.kretschmann * factor * factor / exact.curvature.kretschmann - 1.0).abs()
+                }))
+            });
+            all.push(Self::error(format!("Kretschmann's scalar at {distance} M, largest error"), error, 2e-2));
+        }
+        Ok(())
+    }
+
+    /// Numbers of point symmetries of both, among fields linear in the coordinates or in sines and cosines of angles.
+    fn symmetries(&self, mass: f64, all: &mut Vec<Reading>) {
+        let coordinates = self.system.system.coordinates(4);
+        let names: Vec<String> = coordinates.iter().map(|c| c.name.to_string()).collect();
+        let (charts, degrees) = match self.around {
+            Around::Cartesian { .. } => {
+                (vec![Chart::Line; 4], Degrees { polynomial: 1, trigonometric: 0, hyperbolic: 0 })
+            }
+            Around::Spherical { polar, azimuth, .. } => {
+                let mut charts = vec![Chart::Line; 4];
+                (charts[polar], charts[azimuth]) = (Chart::Polar, Chart::Circle);
+                let usual = Degrees::usual(&charts);
+                (charts, Degrees { polynomial: 0, ..usual })
+            }
+        };
+        let basis = Basis::new(&names, &charts, degrees);
+        let (low, high) = self.within(mass, (2.5, 12.0));
+        let points = self.around.points(1000, (low, high));
+        let region = Region { position: vec![[0.0, 1.0]; 4], velocity: vec![[-0.5, 0.5]; 4] };
+        let (_, mut v) = region.states(points.len() / 4, 0, |_, _| true);
+        v.chunks_exact_mut(4).for_each(|v| v[self.around.time()] += 1.5);
+        let count = |model, tolerance| {
+            let found = symmetries(model, &basis, (&points, &v), tolerance).ok()?;
+            Some((found.separation.count? as f64, found.separation.gap))
+        };
+        let (exact, learned) = (count(self.exact, Some(EXACT)), count(self.learned, None));
+        let only = |found: Option<(f64, Option<f64>)>| found.map(|(count, _)| count);
+        all.extend(Self::reading("point symmetries", only(exact), only(learned), 0.0));
+    }
+}
