@@ -18,7 +18,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let system = configure_values::<f64>(Cow::Borrowed(find(&header.system)?), &header.parameters)?;
     let coordinates = system.system.coordinates(system.coordinates);
     let names: Vec<&str> = coordinates.iter().map(|c| c.name.as_ref()).collect();
-    let around = Around::of_names(&names).ok_or("expected the coordinates of a hole: t, x, y, z or t, r, theta, phi")?;
+    let around =
+        Around::of_names(&names).ok_or("expected the coordinates of a hole: t, x, y, z or t, r, theta, phi")?;
     let (learned, exact) = (NetworkLagrangian::new(header.architecture, weights)?, system.build()?);
     let pair = Pair { exact: &*exact, learned: &learned, system: &system, around, range: (1.2, 40.0) };
 

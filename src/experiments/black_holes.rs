@@ -1,26 +1,32 @@
 //! Holes learned from free fall, and read.
 
-use super::{Experiment, Picture, Reported, Run};
+use super::{Experiment, Picture, Reported, Run, slug};
 use crate::configuration::{Config, Regularizer};
-use crate::lagrangian::configure;
+use crate::lagrangian::{Configured, configure};
 use crate::network::Structure;
 use crate::presets::Preset;
 
 /// Holes in coordinates that pass through the horizon.
 const HOLES: [&str; 2] = ["schwarzschild-cartesian", "kerr-cartesian"];
 
-fn config(preset: Preset, system: &str) -> Config {
-    let configured = configure(system, &[]).unwrap_or_else(|e| unreachable!("{e}"));
-    preset.config(&configured).unwrap_or_else(|| unreachable!("a preset of every system"))
+fn hole(name: &str) -> Configured<f64> {
+    configure(name, &[]).unwrap_or_else(|e| unreachable!("{e}"))
 }
 
 fn run(name: &str, label: String, config: Config) -> Run {
     Run { name: name.into(), label, abscissa: None, group: String::new(), config, reported: Reported::NOTHING }
 }
 
-/// Both holes by a preset.
-fn holes(preset: Preset, name: &str) -> impl Iterator<Item = Run> {
-    HOLES.into_iter().map(move |hole| run(&format!("{name}-{hole}"), format!("{name}, {hole}"), config(preset, hole)))
+/// A hole by a preset.
+fn learned(preset: Preset, name: &str, hole: &Configured<f64>) -> Run {
+    let system = &hole.system.name;
+    let config = preset.config(hole).unwrap_or_else(|| unreachable!("a preset of every system"));
+    run(&slug(&format!("{name}-{system}")), format!("{name}, {system}"), config)
+}
+
+/// A hole by both presets.
+pub(super) fn runs_of(hole: &Configured<f64>) -> Vec<Run> {
+    vec![learned(Preset::Quick, "quick", hole), learned(Preset::Best, "best", hole)]
 }
 
 pub(super) const BLACK_HOLES: Experiment = Experiment {
@@ -32,16 +38,17 @@ pub(super) const BLACK_HOLES: Experiment = Experiment {
     reductions: &[],
     runs: || {
         let time = || "t".to_string();
-        let mut black_box = config(Preset::Quick, HOLES[0]);
+        let mut black_box = learned(Preset::Quick, "quick", &hole(HOLES[0])).config;
         black_box.take_structure(Structure::BlackBox);
         black_box.penalty = Regularizer::LorentzianSylvester { lambda: 100.0, time: time() };
-        let mut spherical = config(Preset::Quick, "schwarzschild-geodesic");
+        let mut spherical = learned(Preset::Quick, "quick", &hole("schwarzschild-geodesic")).config;
         spherical.take_structure(Structure::Metric);
         spherical.network.cyclic = vec![time()];
         let beside = [
             run("black-box", format!("black box, {}", HOLES[0]), black_box),
             run("spherical", "spherical coordinates, schwarzschild-geodesic".to_string(), spherical),
         ];
-        holes(Preset::Quick, "quick").chain(holes(Preset::Best, "best")).chain(beside).collect()
+        let of = |preset, name| HOLES.into_iter().map(move |system| learned(preset, name, &hole(system)));
+        of(Preset::Quick, "quick").chain(of(Preset::Best, "best")).chain(beside).collect()
     },
 };

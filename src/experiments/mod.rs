@@ -17,6 +17,7 @@ pub use record::{Learned, Outcome, Record, Row, Spread};
 pub use remarks::{Quantity, Reduction};
 
 use crate::configuration::Config;
+use crate::lagrangian::Configured;
 use crate::names::unknown;
 
 /// Figures that the paper reports for a group of runs, in its own convention.
@@ -135,7 +136,16 @@ impl Experiment {
 
     /// The runs at a scale, each for `seeds` seeds from 0; runs that the paper itself repeats keep their own seeds apart.
     pub fn runs(&self, scale: Scale, seeds: usize) -> Vec<Run> {
-        let runs = (self.runs)();
+        Self::seeded((self.runs)(), scale, seeds)
+    }
+
+    /// The runs of a system of one's own instead of the experiment's; `None` if it is about certain systems.
+    pub fn runs_of(&self, system: &Configured<f64>, scale: Scale, seeds: usize) -> Option<Vec<Run>> {
+        let about_any = self.pictures.contains(&Picture::BlackHole);
+        about_any.then(|| Self::seeded(black_holes::runs_of(system), scale, seeds))
+    }
+
+    fn seeded(runs: Vec<Run>, scale: Scale, seeds: usize) -> Vec<Run> {
         let alone = runs.len() == 1;
         let stride = 1 + runs.iter().map(|run| run.config.seed).max().unwrap_or(0);
         (0..seeds as u64)

@@ -181,10 +181,10 @@ pub struct StateAdvice {
 }
 
 /// Shell around a centre, and how fast what moves in it is at most.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct ShellAdvice {
     /// Cartesian coordinates around the centre.
-    pub coordinates: &'static [usize],
+    pub coordinates: Cow<'static, [usize]>,
     /// Lowest and highest distance from it.
     pub radius: (f64, f64),
     /// Largest rapidity in a local frame.

@@ -73,7 +73,9 @@ pub enum PipelineError {
         source: CheckpointError,
     },
     /// A system of which no black hole can be read.
-    #[error("{0}: expected a metric of t, x, y, z or t, r, theta, phi around a centre, learned over a range of distances")]
+    #[error(
+        "{0}: expected a metric of t, x, y, z or t, r, theta, phi around a centre, learned over a range of distances"
+    )]
     Hole(String),
     /// A picture that cannot be laid out.
     #[error(transparent)]

@@ -7,8 +7,8 @@ use crate::pipeline::readings::reading_tables;
 use crate::pipeline::run_figures::{pictures_of_runs, within};
 use crate::pipeline::{PipelineError, Watch, headline};
 use crate::report::{
-    Curve, EXPERIMENT_HEADER, READING_HEADER, REDUCTION_HEADER, Report, experiment_curves, experiment_figures, experiment_table,
-    experiment_view, reduction_table, text_table,
+    Curve, EXPERIMENT_HEADER, READING_HEADER, REDUCTION_HEADER, Report, experiment_curves, experiment_figures,
+    experiment_table, experiment_view, reduction_table, text_table,
 };
 use std::fmt::Write as _;
 use std::time::Instant;

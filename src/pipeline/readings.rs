@@ -31,7 +31,11 @@ fn around(config: &Config, system: &Configured<f64>) -> Option<(Around, (f64, f6
 /// # Errors
 /// A model file that cannot be read, a system without the coordinates of a hole, files that cannot be written; none for a run
 /// without a model.
-pub(crate) fn readings_of(run: &Run, store: &dyn ExperimentStore, watch: &Watch) -> Result<Vec<Reading>, PipelineError> {
+pub(crate) fn readings_of(
+    run: &Run,
+    store: &dyn ExperimentStore,
+    watch: &Watch,
+) -> Result<Vec<Reading>, PipelineError> {
     if let Some(readings) = store.read(&run.name, READINGS).and_then(|json| serde_json::from_slice(&json).ok()) {
         return Ok(readings);
     }
@@ -80,7 +84,9 @@ pub(crate) fn reading_tables(
     let line = |cells: &mut dyn Iterator<Item = &str>| cells.map(cell).collect::<Vec<_>>().join(",") + "\n";
     let mut csv = line(&mut ["row"].into_iter().chain(READING_HEADER));
     for (label, table) in &tables {
-        csv.extend(table.iter().map(|row| line(&mut [label.as_str()].into_iter().chain(row.iter().map(String::as_str)))));
+        csv.extend(
+            table.iter().map(|row| line(&mut [label.as_str()].into_iter().chain(row.iter().map(String::as_str)))),
+        );
     }
     store.write("readings.csv", csv.as_bytes())?;
     Ok(tables)

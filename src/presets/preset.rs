@@ -175,7 +175,10 @@ fn training_states(system: &Configured<f64>) -> (Bounds, StateAdvice) {
             *bound = (0.0, 2.0 * PI);
         }
     }
-    let advice = system.system.learning.states.map_or_else(StateAdvice::default, |advise| advise(&mut bounds));
+    let mut advice = system.system.learning.states.map_or_else(StateAdvice::default, |advise| advise(&mut bounds));
+    if let Some(shell) = system.system.described.as_ref().and_then(|described| described.around_centre.clone()) {
+        (advice.shell, advice.relative) = (Some(shell), 1.0);
+    }
     (bounds, advice)
 }
 

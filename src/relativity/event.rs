@@ -19,13 +19,7 @@ pub(super) struct State {
 
 /// Options of the motions that are followed.
 pub(super) fn options(t_end: f64, dt: f64) -> Options<f64> {
-    Options {
-        method: Method::Dop853,
-        rtol: TOLERANCE,
-        atol: TOLERANCE,
-        energy: false,
-        ..Options::new(t_end, dt)
-    }
+    Options { method: Method::Dop853, rtol: TOLERANCE, atol: TOLERANCE, energy: false, ..Options::new(t_end, dt) }
 }
 
 /// The first sample at which `next` says so, with the one before it.

@@ -38,3 +38,25 @@ pub fn infall(
     let end = zero(model, &found, above).ok()?;
     Some(Infall { time: end.t, keeps_signature })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lagrangian::build;
+
+    #[test]
+    fn a_fall_from_rest_is_a_cycloid_through_the_horizon() {
+        let around = Around::Cartesian { time: 0, space: [1, 2, 3] };
+        let hole = build::<f64>("schwarzschild-cartesian", &[]).unwrap();
+        let (start, end) = (10.0_f64, 1.5);
+        let q = around.place(start, [0.48, 0.6, 0.64]);
+        let v = [(1.0 - 2.0 / start).sqrt().recip(), 0.0, 0.0, 0.0];
+        let found = infall(&*hole, (&q, &v), (around, end), (100.0, 0.25)).unwrap();
+        // r = r0 (1 + cos x)/2, tau = sqrt(r0^3/8M) (x + sin x).
+        let x = (2.0 * end / start - 1.0).acos();
+        let exact = (start.powi(3) / 8.0).sqrt() * (x + x.sin());
+        assert!((found.time / exact - 1.0).abs() < 1e-9, "{} {exact}", found.time);
+        assert!(found.keeps_signature);
+        assert_eq!(infall(&*hole, (&q, &v), (around, end), (10.0, 0.25)), None);
+    }
+}

@@ -8,6 +8,7 @@ mod parameters;
 mod periastron;
 mod readings;
 mod shells;
+mod spheroidal;
 
 pub use around::Around;
 pub(crate) use drift::conserved_drift;

@@ -83,3 +83,22 @@ pub fn nearest_parameters(
     }
     Ok(Some(values))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lagrangian::{build, configure};
+    use crate::relativity::Around;
+
+    #[test]
+    fn mass_and_spin_are_found_from_far_off() {
+        let around = Around::Cartesian { time: 0, space: [1, 2, 3] };
+        let given = [("M".to_string(), "1.3".to_string()), ("a".to_string(), "-0.7".to_string())];
+        let (hole, system) =
+            (build::<f64>("kerr-cartesian", &given).unwrap(), configure("kerr-cartesian", &[]).unwrap());
+        let start = [("M".to_string(), 0.8), ("a".to_string(), 0.2)].into();
+        let points = around.points(200, (2.0, 20.0));
+        let found = nearest_parameters(&system, &*hole, &points, &start).unwrap().unwrap();
+        assert!((found["M"] - 1.3).abs() < 1e-9 && (found["a"] + 0.7).abs() < 1e-9, "{found:?}");
+    }
+}

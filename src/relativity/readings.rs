@@ -4,10 +4,11 @@ use super::infall::infall;
 use super::parameters::nearest_parameters;
 use super::periastron::radial_period;
 use super::shells::{factor, metric_deviation, metrics};
+use super::spheroidal::Spheroidal;
 use super::{Around, conserved_drift};
 use crate::geometry::{CircularOrbit, GeometryError, Sense, geometries};
 use crate::lagrangian::{Configured, EulerLagrange};
-use crate::symmetry::{Basis, Chart, Degrees, EXACT, Region, symmetries};
+use crate::symmetry::{Basis, Chart, Degrees, EXACT, Region, quadratic, symmetries};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
@@ -123,7 +124,8 @@ impl Pair<'_> {
     fn equator(&self, mass: f64, all: &mut Vec<Reading>) -> Result<(), GeometryError> {
         let origin = self.around.origin();
         let range = self.within(mass, (1.3, 20.0));
-        let dragging = |model: &dyn EulerLagrange<f64>| Ok(self.around.equator(model, &origin).at(4.0 * mass)?.dragging());
+        let dragging =
+            |model: &dyn EulerLagrange<f64>| Ok(self.around.equator(model, &origin).at(4.0 * mass)?.dragging());
         let (turns, learned_turns) = self.both(dragging)?;
         let spins = turns.abs() > 1e-12 / mass;
         let senses = [(Sense::Forward, ", forward"), (Sense::Backward, ", backward")];
@@ -256,6 +258,33 @@ impl Pair<'_> {
         Ok(())
     }
 
+    /// Numbers of conserved quantities of second degree in the momenta beyond the energy and products of charges, among functions of the
+    /// polar angle of spheroidal coordinates: Carter's constant, around a spin.
+    fn carter(&self, mass: f64, all: &mut Vec<Reading>) {
+        let Around::Cartesian { time, space } = self.around else { return };
+        let symbol = self.system.system.parameters.iter().position(|p| p.symbol == "a");
+        let Some(&spin) = symbol.and_then(|i| self.system.parameters.get(i)).filter(|spin| **spin != 0.0) else {
+            return;
+        };
+        let names = ["t", "r", "theta", "phi"].map(String::from);
+        let charts = [Chart::Line, Chart::Line, Chart::Polar, Chart::Line];
+        let basis = Basis::new(&names, &charts, Degrees { polynomial: 0, trigonometric: 2, hyperbolic: 0 });
+        let (low, high) = self.within(mass, (2.5, 12.0));
+        let region = Region {
+            position: vec![[0.0, 1.0], [low, high], [0.5, 2.6], [0.0, TAU]],
+            velocity: vec![[1.0, 2.0], [-0.5, 0.5], [-0.1, 0.1], [-0.1, 0.1]],
+        };
+        let (q, v) = region.states(1000, 0, |_, _| true);
+        let count = |model, tolerance| {
+            let model = Spheroidal { model, spin, time, space };
+            let found = symmetries(&model, &basis, (&q, &v), tolerance).ok()?;
+            let found = quadratic(&model, &basis, &found.fields, (&q, &v), tolerance).ok()?;
+            found.separation.count.map(|_| found.conserved.len() as f64)
+        };
+        let (exact, learned) = (count(self.exact, Some(EXACT)), count(self.learned, None));
+        all.extend(Self::reading("quadratic charges beyond products: Carter's", exact, learned, 0.0));
+    }
+
     /// Numbers of point symmetries of both, among fields linear in the coordinates or in sines and cosines of angles.
     fn symmetries(&self, mass: f64, all: &mut Vec<Reading>) {
         let coordinates = self.system.system.coordinates(4);
@@ -284,5 +313,44 @@ impl Pair<'_> {
         let (exact, learned) = (count(self.exact, Some(EXACT)), count(self.learned, None));
         let only = |found: Option<(f64, Option<f64>)>| found.map(|(count, _)| count);
         all.extend(Self::reading("point symmetries", only(exact), only(learned), 0.0));
+        self.carter(mass, all);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lagrangian::configure;
+
+    fn of(name: &str, around: Around, range: (f64, f64)) -> Vec<Reading> {
+        let system = configure::<f64>(name, &[("M".to_string(), "2".to_string())]).unwrap();
+        let exact = system.build().unwrap();
+        let pair = Pair { exact: &*exact, learned: &*exact, system: &system, around, range };
+        pair.readings(&|_| ()).unwrap()
+    }
+
+    #[test]
+    fn the_exact_metric_reads_as_itself() {
+        let cartesian = Around::Cartesian { time: 0, space: [1, 2, 3] };
+        let readings = of("kerr-cartesian", cartesian, (2.0, 80.0));
+        for reading in &readings {
+            assert!(reading.error.is_some_and(|error| error < 1e-8), "{reading:?}");
+        }
+        let value = |name: &str| readings.iter().find(|r| r.quantity == name).and_then(|r| r.learned).unwrap();
+        assert_eq!((value("point symmetries"), value("quadratic charges beyond products: Carter's")), (2.0, 1.0));
+        assert!((value("parameter a") - 0.9).abs() < 1e-9);
+    }
+
+    #[test]
+    fn what_lies_outside_the_learned_distances_is_not_read() {
+        let spherical = Around::Spherical { time: 0, radius: 1, polar: 2, azimuth: 3 };
+        let readings = of("schwarzschild-geodesic", spherical, (6.0, 30.0));
+        let value = |name: &str| readings.iter().find(|r| r.quantity == name).and_then(|r| r.learned);
+        // Lengths in units of the mass, 2 here.
+        assert!((value("innermost stable orbit [M]").unwrap() - 6.0).abs() < 1e-9);
+        assert!(value("orbit of light [M]").is_none_or(|r| (r - 3.0).abs() < 1e-9));
+        assert_eq!(value("horizon [M]"), None);
+        assert_eq!(value("point symmetries"), Some(4.0));
+        assert!(readings.iter().all(|r| !r.quantity.contains("infall")));
     }
 }

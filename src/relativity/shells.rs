@@ -70,3 +70,38 @@ pub fn metric_deviation(
     let at = |share: usize| errors.get((errors.len() * share / 100).min(errors.len().max(1) - 1)).copied();
     Ok(MetricDeviation { median: at(50).unwrap_or(f64::NAN), p99: at(99).unwrap_or(f64::NAN) })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lagrangian::build;
+    use crate::relativity::Around;
+
+    #[test]
+    fn directions_and_distances_fill_a_shell_evenly() {
+        let all: Vec<(f64, [f64; 3])> = directions(1000, (1.0, 100.0)).collect();
+        let mean = |of: &dyn Fn(&(f64, [f64; 3])) -> f64| all.iter().map(of).sum::<f64>() / 1000.0;
+        assert!((mean(&|(r, _)| r.ln()) - 10.0_f64.ln()).abs() < 0.01);
+        for i in 0..3 {
+            assert!(mean(&|(_, d)| d[i]).abs() < 5e-3);
+            assert!((mean(&|(_, d)| d[i] * d[i]) - 1.0 / 3.0).abs() < 5e-3);
+        }
+    }
+
+    #[test]
+    fn the_deviation_of_a_metric_is_that_of_its_components() {
+        let around = Around::Cartesian { time: 0, space: [1, 2, 3] };
+        let with =
+            |mass: &str| build::<f64>("schwarzschild-cartesian", &[("M".to_string(), mass.to_string())]).unwrap();
+        let (exact, other) = (with("1"), with("1.01"));
+        let points = around.points(500, (10.0, 10.0));
+        let same = metric_deviation((&*exact, &*exact), 1.0, &points).unwrap();
+        assert_eq!((same.median, same.p99), (0.0, 0.0));
+        // f = 2 M/r changes by 0.002 in the direction of a null vector of length sqrt 2 in all four coordinates.
+        let found = metric_deviation((&*exact, &*other), 1.0, &points).unwrap();
+        let size = metrics(&*exact, &points[..4]).unwrap().iter().map(|x| x * x).sum::<f64>().sqrt();
+        assert!((found.median - 0.004 / size).abs() < 1e-6 && (found.p99 - found.median).abs() < 1e-9, "{found:?}");
+        let scaled: Vec<f64> = metrics(&*exact, &points).unwrap().iter().map(|x| 2.5 * x).collect();
+        assert!((factor(4, &metrics(&*exact, &points).unwrap(), &scaled) - 2.5).abs() < 1e-14);
+    }
+}

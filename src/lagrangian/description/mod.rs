@@ -9,6 +9,7 @@ mod system;
 use super::ExpressionLagrangian;
 use super::expression::{ExpressionError, Formula};
 use super::range::Range;
+use super::system::ShellAdvice;
 use crate::scalar::Real;
 use quantity::{Decimal, Quantity};
 use serde::{Deserialize, Serialize};
@@ -49,6 +50,22 @@ pub struct Description {
     /// Motions on which a model is tried.
     #[serde(default, skip_serializing_if = "TrajectoryDescription::is_empty")]
     pub trajectory: TrajectoryDescription,
+    /// Shell in which training states lie, of the metric of a field around a centre; those of the bounds if left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shell: Option<ShellDescription>,
+}
+
+/// Shell around a centre.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ShellDescription {
+    /// Names of the Cartesian coordinates around the centre.
+    pub coordinates: Vec<String>,
+    /// Lowest and highest distance from it.
+    pub radius: [Quantity; 2],
+    /// Largest rapidity in a local frame; 1 if left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rapidity: Option<Quantity>,
 }
 
 /// A coordinate.
@@ -138,6 +155,8 @@ pub struct Described {
     pub lagrangian: ExpressionLagrangian,
     /// The velocity of the time-like coordinate on the mass shell.
     shell: Option<Formula>,
+    /// Where training states lie, if not within their bounds.
+    pub around_centre: Option<ShellAdvice>,
 }
 
 impl Described {

@@ -3,7 +3,7 @@
 use super::{Described, Description, DescriptionError, Quantity};
 use crate::lagrangian::expression::{Compiler, Expression, Meaning, Value, is_name, is_reserved};
 use crate::lagrangian::system::{
-    Bounds, Coordinate, LearningAdvice, Parameter, PerSize, Range, Size, System, TrajectoryTest,
+    Bounds, Coordinate, LearningAdvice, Parameter, PerSize, Range, ShellAdvice, Size, System, TrajectoryTest,
 };
 use crate::lagrangian::{ExpressionLagrangian, systems};
 use crate::names::unknown;
@@ -57,6 +57,7 @@ impl Description {
         let training = self.bounds("training", &self.training, base.clone())?;
         let validation = self.bounds("validation", &self.validation, base)?;
         let trajectory = self.trajectory_test(&validation)?;
+        let around_centre = self.shell_advice(shell.and(time_like))?;
         Ok(System {
             name: Cow::Owned(self.name.clone()),
             title: Cow::Owned(self.title.clone().unwrap_or_else(|| self.name.clone())),
@@ -77,6 +78,7 @@ impl Description {
                 description: self.clone(),
                 lagrangian: ExpressionLagrangian::compiled(n, compiler.formula(value)),
                 shell: shell.map(|shell| compiler.formula(shell)),
+                around_centre,
             })),
         })
     }
@@ -283,6 +285,43 @@ impl Description {
             }
         }
         Ok(bounds)
+    }
+
+    /// The shell of the training states; `time` is the time-like coordinate of a mass shell.
+    fn shell_advice(&self, time: Option<usize>) -> Outcome<Option<ShellAdvice>> {
+        let Some(shell) = &self.shell else { return Ok(None) };
+        if time.is_none() {
+            let problem = "expected a metric with a time_like coordinate that has no velocity_bounds";
+            return Err(DescriptionError::new("shell", problem));
+        }
+        let names = || self.coordinates.iter().map(|c| c.name.as_str());
+        let mut coordinates = Vec::with_capacity(shell.coordinates.len());
+        for name in &shell.coordinates {
+            match names().position(|known| known == name) {
+                Some(i) if Some(i) != time && !coordinates.contains(&i) => coordinates.push(i),
+                Some(_) => {
+                    let problem = format!("expected coordinates of space, each once, found {name:?}");
+                    return Err(DescriptionError::new("shell.coordinates", problem));
+                }
+                None => return Err(DescriptionError::new("shell.coordinates", unknown("coordinate", name, names()))),
+            }
+        }
+        if coordinates.is_empty() {
+            return Err(DescriptionError::new("shell.coordinates", "expected one name at least"));
+        }
+        let radius = ordered("shell.radius", &shell.radius)?;
+        let rapidity = shell.rapidity.map_or(1.0, |rapidity| rapidity.0);
+        if radius.0 <= 0.0 {
+            return Err(DescriptionError::new(
+                "shell.radius",
+                format!("expected distances above 0, found {}", radius.0),
+            ));
+        }
+        if !(rapidity.is_finite() && rapidity >= 0.0) {
+            let problem = format!("expected a finite number, at least 0, found {rapidity}");
+            return Err(DescriptionError::new("shell.rapidity", problem));
+        }
+        Ok(Some(ShellAdvice { coordinates: coordinates.into(), radius, rapidity }))
     }
 
     fn trajectory_test(&self, validation: &Bounds) -> Outcome<TrajectoryTest> {

@@ -99,15 +99,24 @@ pub const fn system(hole: KerrSchild) -> System {
             },
         }),
         learning: LearningAdvice {
-            states: Some(|_| StateAdvice {
-                logarithmic: Vec::new(),
-                relative: 1.0,
-                motions: 0.0,
-                shell: Some(ShellAdvice { coordinates: &[1, 2, 3], radius: (1.2, 40.0), rapidity: 1.2 }),
+            states: Some(match hole {
+                // The ring of a spin lies at R = a.
+                KerrSchild::Kerr => |_| around(1.35),
+                KerrSchild::Schwarzschild | KerrSchild::ReissnerNordstrom => |_| around(1.2),
             }),
             paper: None,
         },
         described: None,
+    }
+}
+
+/// States from inside the horizon to where periastra advance by little.
+fn around(low: f64) -> StateAdvice {
+    StateAdvice {
+        logarithmic: Vec::new(),
+        relative: 1.0,
+        motions: 0.0,
+        shell: Some(ShellAdvice { coordinates: Cow::Borrowed(&[1, 2, 3]), radius: (low, 110.0), rapidity: 1.2 }),
     }
 }
 
