@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Rooms from top to bottom; a file may name its own room and those before it.
-pub(super) const ROOMS: [&str; 26] = [
+pub(super) const ROOMS: [&str; 27] = [
     "names",
     "scalar",
     "storage",
@@ -20,6 +20,7 @@ pub(super) const ROOMS: [&str; 26] = [
     "rollout",
     "network",
     "symmetry",
+    "relativity",
     "certificate",
     "optimizers",
     "configuration",
@@ -35,7 +36,7 @@ pub(super) const ROOMS: [&str; 26] = [
 ];
 
 /// Crates and the only places that may name them.
-const ADAPTERS: [(&str, &str); 16] = [
+const ADAPTERS: [(&str, &str); 17] = [
     ("pulp", "src/scalar/"),
     ("xprec", "src/scalar/"),
     ("libm", "src/scalar/"),
@@ -47,6 +48,7 @@ const ADAPTERS: [(&str, &str); 16] = [
     ("safetensors", "src/storage/container/"),
     ("crc32fast", "src/storage/container/"),
     ("zip", "src/recording/read/npz.rs"),
+    ("flate2", "src/report/plot/png.rs"),
     ("clap", "src/cli/"),
     ("clap_complete", "src/cli/"),
     ("clap_mangen", "src/cli/"),
