@@ -30,13 +30,14 @@
 //! | differentiate a function of yours | [`tape::gradient`], [`tape::hessian`]; over many states [`tape::Program`] |
 //! | solve small symmetric systems in batches | [`linalg`] |
 //! | find what a Lagrangian conserves, compare two Lagrangians | [`symmetry::symmetries`], [`symmetry::quadratic`], [`symmetry::compare`] |
+//! | see the shadow of a black hole and the sky around it | [`relativity::shadow()`], [`relativity::outline`] |
 //! | prove where a mass matrix has its signature | [`certificate`] |
 //! | judge a model: energy, coordinates, Lyapunov exponents | [`analysis`] |
 //! | train, fit, evaluate, run an experiment, with all files and reports | `pipeline` (feature `pipeline`) |
 //!
 //! Rooms, each importing only from those above it: `names`, [`scalar`], `storage`, [`random`], `ops`, [`forward`], [`linalg`],
-//! [`tape`], [`recording`], [`lagrangian`], [`geometry`], [`rollout`], [`network`], [`symmetry`], [`certificate`], [`optimizers`],
-//! [`configuration`], [`data`], [`training`], [`shooting`], [`presets`], [`analysis`], [`experiments`], `report` (feature `plot`),
+//! [`tape`], [`recording`], [`lagrangian`], [`geometry`], [`rollout`], [`network`], [`symmetry`], [`relativity`], [`certificate`],
+//! [`optimizers`], [`configuration`], [`data`], [`training`], [`shooting`], [`presets`], [`analysis`], [`experiments`], `report` (feature `plot`),
 //! `pipeline` (feature `pipeline`), `cli` (feature `cli`, the default; a library user leaves it out by
 //! `default-features = false`).
 //!

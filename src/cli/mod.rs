@@ -46,6 +46,8 @@ mod results;
 mod resume;
 mod rollout;
 mod said;
+mod shadow;
+mod shadow_facts;
 mod shown;
 mod source;
 mod spool;
@@ -110,6 +112,8 @@ enum Command {
     Inspect(inspect::Args),
     /// Print metric, Christoffel symbols and curvature of points, every digit of them.
     Geometry(geometry::Args),
+    /// Follow light through a metric, learned or exact: the shadow of a black hole and the sky around it.
+    Shadow(shadow::Args),
     /// Find the symmetries of a Lagrangian and what its motion conserves.
     Symmetries(symmetries::Args),
     /// Say what two Lagrangians have in common beyond factor and gauge.
@@ -170,6 +174,7 @@ fn run(command: Command, words: &[OsString]) -> Result<(), CliError> {
         Command::Experiment(args) => experiment::run(&args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Geometry(args) => geometry::run(&args),
+        Command::Shadow(args) => shadow::run(&args),
         Command::Symmetries(args) => symmetries::run(&args),
         Command::Compare(args) => compare::run(&args),
         Command::Certify(args) => certify::run(&args),

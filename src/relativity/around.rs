@@ -1,5 +1,6 @@
 //! Coordinates around a centre: distances, directions, the equator.
 
+use super::Chart;
 use super::shells::directions;
 use crate::geometry::{Equator, Turn, Turning};
 use crate::lagrangian::EulerLagrange;
@@ -9,12 +10,7 @@ use std::f64::consts::FRAC_PI_2;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Around {
     /// `t`, `x`, `y`, `z`.
-    Cartesian {
-        /// Index of the time.
-        time: usize,
-        /// Indices of `x`, `y`, `z`.
-        space: [usize; 3],
-    },
+    Cartesian(Chart),
     /// `t`, `r`, `theta`, `phi`.
     Spherical {
         /// Index of the time.
@@ -33,7 +29,7 @@ impl Around {
     pub fn of_names(names: &[&str]) -> Option<Self> {
         let index = |name: &str| names.iter().position(|n| *n == name);
         let time = index("t").filter(|_| names.len() == 4)?;
-        let cartesian = || Some(Self::Cartesian { time, space: [index("x")?, index("y")?, index("z")?] });
+        let cartesian = || Some(Self::Cartesian(Chart { time, space: [index("x")?, index("y")?, index("z")?] }));
         let spherical =
             || Some(Self::Spherical { time, radius: index("r")?, polar: index("theta")?, azimuth: index("phi")? });
         cartesian().or_else(spherical)
@@ -42,7 +38,7 @@ impl Around {
     /// Index of the time.
     pub fn time(self) -> usize {
         match self {
-            Self::Cartesian { time, .. } | Self::Spherical { time, .. } => time,
+            Self::Cartesian(Chart { time, .. }) | Self::Spherical { time, .. } => time,
         }
     }
 
@@ -50,7 +46,7 @@ impl Around {
     pub fn place(self, distance: f64, [x, y, z]: [f64; 3]) -> [f64; 4] {
         let mut q = [0.0; 4];
         match self {
-            Self::Cartesian { space, .. } => {
+            Self::Cartesian(Chart { space, .. }) => {
                 space.iter().zip([x, y, z]).for_each(|(&i, x)| q[i] = distance * x);
             }
             Self::Spherical { radius, polar, azimuth, .. } => {
@@ -68,7 +64,7 @@ impl Around {
     /// Distance from the centre.
     pub fn distance(self, q: &[f64]) -> f64 {
         match self {
-            Self::Cartesian { space, .. } => space.iter().map(|&i| q[i] * q[i]).sum::<f64>().sqrt(),
+            Self::Cartesian(Chart { space, .. }) => space.iter().map(|&i| q[i] * q[i]).sum::<f64>().sqrt(),
             Self::Spherical { radius, .. } => q[radius],
         }
     }
@@ -76,7 +72,7 @@ impl Around {
     /// A number of the sign of the rate of the distance.
     pub fn outward(self, q: &[f64], v: &[f64]) -> f64 {
         match self {
-            Self::Cartesian { space, .. } => space.iter().map(|&i| q[i] * v[i]).sum(),
+            Self::Cartesian(Chart { space, .. }) => space.iter().map(|&i| q[i] * v[i]).sum(),
             Self::Spherical { radius, .. } => v[radius],
         }
     }
@@ -84,7 +80,7 @@ impl Around {
     /// Angle about the axis, up to full turns.
     pub fn azimuth(self, q: &[f64]) -> f64 {
         match self {
-            Self::Cartesian { space: [x, y, _], .. } => q[y].atan2(q[x]),
+            Self::Cartesian(Chart { space: [x, y, _], .. }) => q[y].atan2(q[x]),
             Self::Spherical { azimuth, .. } => q[azimuth],
         }
     }
@@ -92,7 +88,7 @@ impl Around {
     /// Position in space, `(x, y, z)` of the distance and the angles.
     pub fn position(self, q: &[f64]) -> [f64; 3] {
         match self {
-            Self::Cartesian { space, .. } => space.map(|i| q[i]),
+            Self::Cartesian(Chart { space, .. }) => space.map(|i| q[i]),
             Self::Spherical { radius, polar, azimuth, .. } => {
                 let across = q[radius] * q[polar].sin();
                 [across * q[azimuth].cos(), across * q[azimuth].sin(), q[radius] * q[polar].cos()]
@@ -112,7 +108,7 @@ impl Around {
     /// The equator of a metric along `x`; `origin` is that of [`Around::origin`].
     pub fn equator<'a>(self, model: &'a dyn EulerLagrange<f64>, origin: &'a [f64; 4]) -> Equator<'a, f64> {
         let (time, radius, turn) = match self {
-            Self::Cartesian { time, space: [x, y, _] } => (time, x, Turn::Across(y)),
+            Self::Cartesian(Chart { time, space: [x, y, _] }) => (time, x, Turn::Across(y)),
             Self::Spherical { time, radius, azimuth, .. } => (time, radius, Turn::Angle(azimuth)),
         };
         Equator { model, time, radius, turn, point: origin }
@@ -123,7 +119,7 @@ impl Around {
         let (q, mut v) = (self.place(distance, [1.0, 0.0, 0.0]), [0.0; 4]);
         v[self.time()] = turning.time_rate;
         match self {
-            Self::Cartesian { space: [_, y, _], .. } => v[y] = distance * turning.turning_rate,
+            Self::Cartesian(Chart { space: [_, y, _], .. }) => v[y] = distance * turning.turning_rate,
             Self::Spherical { azimuth, .. } => v[azimuth] = turning.turning_rate,
         }
         [q, v]

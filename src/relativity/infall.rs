@@ -43,10 +43,11 @@ pub fn infall(
 mod tests {
     use super::*;
     use crate::lagrangian::build;
+    use crate::relativity::Chart;
 
     #[test]
     fn a_fall_from_rest_is_a_cycloid_through_the_horizon() {
-        let around = Around::Cartesian { time: 0, space: [1, 2, 3] };
+        let around = Around::Cartesian(Chart::default());
         let hole = build::<f64>("schwarzschild-cartesian", &[]).unwrap();
         let (start, end) = (10.0_f64, 1.5);
         let q = around.place(start, [0.48, 0.6, 0.64]);

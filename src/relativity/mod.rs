@@ -1,19 +1,64 @@
-//! Black holes: orbits, falls and surfaces of a metric, learned or written down.
+//! Black holes, learned or written down: what is read off their metrics, and what a camera near them sees.
+//!
+//! A [`Pair`] of an exact metric and a learned one gives [`Reading`]s: orbits of matter and of light, the advance of periastra
+//! ([`radial_period`]), falls through a horizon ([`infall`]), mass and spin ([`nearest_parameters`]), curvature, symmetries.
+//!
+//! A [`Camera`] stands at a place of a metric whose space has Cartesian coordinates around a centre. Through every pixel a null geodesic is
+//! followed backwards in time, by the accelerations of the model alone, until it comes from far away, where its direction is that of a point
+//! of the sky, or piles up at a horizon: that pixel belongs to the shadow. [`shadow()`] does so for a picture, [`outline`] finds the edge of the
+//! shadow by bisection, with the impact parameters of its rays, and [`Sky`] gives the colours.
+//!
+//! ```
+//! use lnn::lagrangian::build;
+//! use lnn::relativity::{Camera, Sky, Tracing, outline, shadow};
+//!
+//! let hole = build::<f64>("schwarzschild-cartesian", &[])?;
+//! let camera = Camera { width: 24, height: 24, ..Camera::new(20.0, 1.4) };
+//! let seen = shadow(&*hole, &camera, &Tracing::of(&camera), &|_| ())?;
+//! let image = Sky::around(&camera).image(&seen);
+//! assert_eq!((image.pixels.len(), image.pixels[12 * 24 + 12]), (24 * 24, [0, 0, 0]));
+//! let edge = outline(&*hole, &camera, &Tracing::of(&camera), 8)?.unwrap();
+//! assert!((edge.right().celestial[0] - 27f64.sqrt()).abs() < 1e-5);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod around;
+mod camera;
+mod chart;
+mod dormand_prince;
 mod drift;
+mod error;
 mod event;
+mod image;
 mod infall;
+mod outline;
 mod parameters;
 mod periastron;
+mod rays;
 mod readings;
+mod shadow;
 mod shells;
+mod sky;
 mod spheroidal;
+mod tetrad;
+mod vector;
 
 pub use around::Around;
+pub use camera::{Camera, Observer};
+pub use chart::Chart;
 pub(crate) use drift::conserved_drift;
+pub use error::RelativityError;
+pub use image::Image;
 pub use infall::{Infall, infall};
+pub use outline::{Edge, Outline, outline};
 pub use parameters::nearest_parameters;
 pub use periastron::{RadialPeriod, radial_period};
+pub use rays::{Fate, Ray, Tracing, trace};
 pub use readings::{Pair, Reading};
+pub use shadow::{Difference, Shadow, shadow};
 pub use shells::{MetricDeviation, metric_deviation};
+pub use sky::{Sky, difference_image};
+pub use tetrad::Tetrad;
+
+#[cfg(test)]
+mod tests;

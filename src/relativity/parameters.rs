@@ -88,11 +88,11 @@ pub fn nearest_parameters(
 mod tests {
     use super::*;
     use crate::lagrangian::{build, configure};
-    use crate::relativity::Around;
+    use crate::relativity::{Around, Chart};
 
     #[test]
     fn mass_and_spin_are_found_from_far_off() {
-        let around = Around::Cartesian { time: 0, space: [1, 2, 3] };
+        let around = Around::Cartesian(Chart::default());
         let given = [("M".to_string(), "1.3".to_string()), ("a".to_string(), "-0.7".to_string())];
         let (hole, system) =
             (build::<f64>("kerr-cartesian", &given).unwrap(), configure("kerr-cartesian", &[]).unwrap());

@@ -53,6 +53,7 @@ mod tests {
     use super::*;
     use crate::geometry::Sense;
     use crate::lagrangian::build;
+    use crate::relativity::Chart;
     use std::f64::consts::PI;
 
     /// `2 int_0^pi dx / sqrt(1 - (6 + 2 e cos x)/p) - 2 pi`, by the trapezoidal rule, which converges geometrically here.
@@ -68,7 +69,7 @@ mod tests {
     #[test]
     fn orbits_of_schwarzschild_precess_by_the_closed_form_in_both_coordinates() {
         let around = [
-            ("schwarzschild-cartesian", Around::Cartesian { time: 0, space: [1, 2, 3] }),
+            ("schwarzschild-cartesian", Around::Cartesian(Chart::default())),
             ("schwarzschild-geodesic", Around::Spherical { time: 0, radius: 1, polar: 2, azimuth: 3 }),
         ];
         for (name, around) in around {
@@ -93,7 +94,7 @@ mod tests {
 
     #[test]
     fn what_falls_in_has_no_period() {
-        let around = Around::Cartesian { time: 0, space: [1, 2, 3] };
+        let around = Around::Cartesian(Chart::default());
         let hole = build::<f64>("schwarzschild-cartesian", &[]).unwrap();
         let (q, v) = ([0.0, 6.0, 0.0, 0.0], [1.3, 0.0, 0.1, 0.0]);
         assert_eq!(radial_period(&*hole, (&q, &v), around, (400.0, 0.5)), None);

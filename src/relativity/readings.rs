@@ -5,10 +5,10 @@ use super::parameters::nearest_parameters;
 use super::periastron::radial_period;
 use super::shells::{factor, metric_deviation, metrics};
 use super::spheroidal::Spheroidal;
-use super::{Around, conserved_drift};
+use super::{Around, Chart, conserved_drift};
 use crate::geometry::{CircularOrbit, GeometryError, Sense, geometries};
 use crate::lagrangian::{Configured, EulerLagrange};
-use crate::symmetry::{Basis, Chart, Degrees, EXACT, Region, quadratic, symmetries};
+use crate::symmetry::{self, Basis, Degrees, EXACT, Region, quadratic, symmetries};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
@@ -209,7 +209,7 @@ impl Pair<'_> {
         all.extend(Self::reading(name, truth.map(|fall| fall.time / mass), kept, 1e-3));
         // An inclined bound orbit.
         let (q, mut v) = (self.around.place(10.0 * mass, [1.0, 0.0, 0.0]), [0.0; 4]);
-        if let Around::Cartesian { space: [_, y, z], .. } = self.around {
+        if let Around::Cartesian(Chart { space: [_, y, z], .. }) = self.around {
             (v[y], v[z]) = (0.25, 0.25);
             if self.system.impose_constraint(&q, &mut v).is_ok() {
                 let drift = conserved_drift(self.system, self.learned, (&q, &v), (1000.0 * mass, mass));
@@ -261,13 +261,13 @@ impl Pair<'_> {
     /// Numbers of conserved quantities of second degree in the momenta beyond the energy and products of charges, among functions of the
     /// polar angle of spheroidal coordinates: Carter's constant, around a spin.
     fn carter(&self, mass: f64, all: &mut Vec<Reading>) {
-        let Around::Cartesian { time, space } = self.around else { return };
+        let Around::Cartesian(Chart { time, space }) = self.around else { return };
         let symbol = self.system.system.parameters.iter().position(|p| p.symbol == "a");
         let Some(&spin) = symbol.and_then(|i| self.system.parameters.get(i)).filter(|spin| **spin != 0.0) else {
             return;
         };
         let names = ["t", "r", "theta", "phi"].map(String::from);
-        let charts = [Chart::Line, Chart::Line, Chart::Polar, Chart::Line];
+        let charts = [symmetry::Chart::Line, symmetry::Chart::Line, symmetry::Chart::Polar, symmetry::Chart::Line];
         let basis = Basis::new(&names, &charts, Degrees { polynomial: 0, trigonometric: 2, hyperbolic: 0 });
         let (low, high) = self.within(mass, (2.5, 12.0));
         let region = Region {
@@ -290,12 +290,12 @@ impl Pair<'_> {
         let coordinates = self.system.system.coordinates(4);
         let names: Vec<String> = coordinates.iter().map(|c| c.name.to_string()).collect();
         let (charts, degrees) = match self.around {
-            Around::Cartesian { .. } => {
-                (vec![Chart::Line; 4], Degrees { polynomial: 1, trigonometric: 0, hyperbolic: 0 })
+            Around::Cartesian(_) => {
+                (vec![symmetry::Chart::Line; 4], Degrees { polynomial: 1, trigonometric: 0, hyperbolic: 0 })
             }
             Around::Spherical { polar, azimuth, .. } => {
-                let mut charts = vec![Chart::Line; 4];
-                (charts[polar], charts[azimuth]) = (Chart::Polar, Chart::Circle);
+                let mut charts = vec![symmetry::Chart::Line; 4];
+                (charts[polar], charts[azimuth]) = (symmetry::Chart::Polar, symmetry::Chart::Circle);
                 let usual = Degrees::usual(&charts);
                 (charts, Degrees { polynomial: 0, ..usual })
             }
@@ -331,7 +331,7 @@ mod tests {
 
     #[test]
     fn the_exact_metric_reads_as_itself() {
-        let cartesian = Around::Cartesian { time: 0, space: [1, 2, 3] };
+        let cartesian = Around::Cartesian(Chart::default());
         let readings = of("kerr-cartesian", cartesian, (2.0, 80.0));
         for reading in &readings {
             assert!(reading.error.is_some_and(|error| error < 1e-8), "{reading:?}");

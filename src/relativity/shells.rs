@@ -75,7 +75,7 @@ pub fn metric_deviation(
 mod tests {
     use super::*;
     use crate::lagrangian::build;
-    use crate::relativity::Around;
+    use crate::relativity::{Around, Chart};
 
     #[test]
     fn directions_and_distances_fill_a_shell_evenly() {
@@ -90,7 +90,7 @@ mod tests {
 
     #[test]
     fn the_deviation_of_a_metric_is_that_of_its_components() {
-        let around = Around::Cartesian { time: 0, space: [1, 2, 3] };
+        let around = Around::Cartesian(Chart::default());
         let with =
             |mass: &str| build::<f64>("schwarzschild-cartesian", &[("M".to_string(), mass.to_string())]).unwrap();
         let (exact, other) = (with("1"), with("1.01"));

@@ -23,7 +23,10 @@ pub(crate) use experiment::{
 };
 pub use grids::{Fit, GridComparison, grid_figures};
 pub use html::Report;
-pub use plot::{HeatMap, Level, LinePlot, Picture, PlotError, Series, Trace, heat_maps, line_plot, trace_plot};
+pub use plot::{
+    HeatMap, Level, LinePlot, OrbitPlot, Picture, PlotError, Series, Trace, heat_maps, line_plot, orbit_picture, png,
+    trace_plot,
+};
 pub(crate) use readings::{READING_HEADER, reading_table};
 pub use table::text_table;
 pub(crate) use training::{HistoryRow, training_figures};

@@ -5,6 +5,7 @@ mod axes;
 mod colours;
 mod heat_map;
 mod lines;
+mod orbits;
 mod picture;
 mod png;
 mod simplify;
@@ -13,7 +14,9 @@ mod trace;
 
 pub use heat_map::heat_maps;
 pub use lines::line_plot;
+pub use orbits::{OrbitPlot, orbit_picture};
 pub use picture::Picture;
+pub use png::png;
 pub use trace::trace_plot;
 
 use super::turn::Turn;

@@ -1,6 +1,11 @@
-//! Small PNG images of at most 256 colours (W3C, Portable Network Graphics, second edition, 2003).
+//! PNG images (W3C, Portable Network Graphics, second edition, 2003): small ones of at most 256 colours, and pictures of any colours.
 //!
 //! A grid of a heat map has a few thousand points: a byte each, not compressed, is smaller than what compresses it.
+
+use crate::relativity::Image;
+use flate2::Compression;
+use flate2::write::ZlibEncoder;
+use std::io::Write as _;
 
 /// Bytes of one stored block of a zlib stream at most.
 const BLOCK: usize = 65_535;
@@ -8,18 +13,41 @@ const BLOCK: usize = 65_535;
 /// PNG of `rows` from the top, each with an index into `palette` per pixel.
 pub(super) fn indexed(rows: &[Vec<u8>], palette: &[[u8; 3]]) -> Vec<u8> {
     let (width, height) = (rows.first().map_or(0, Vec::len), rows.len());
-    let mut image = b"\x89PNG\r\n\x1a\n".to_vec();
-    let mut header = Vec::with_capacity(13);
-    header.extend((width as u32).to_be_bytes());
-    header.extend((height as u32).to_be_bytes());
-    // Eight bits, indexed, deflate, adaptive filters, not interlaced.
-    header.extend([8, 3, 0, 0, 0]);
-    chunk(&mut image, b"IHDR", &header);
+    let mut image = begin(width, height, INDEXED);
     chunk(&mut image, b"PLTE", palette.as_flattened());
     // Every row begins with its filter: none.
     let raw: Vec<u8> = rows.iter().flat_map(|row| std::iter::once(0).chain(row.iter().copied())).collect();
     chunk(&mut image, b"IDAT", &stored(&raw));
     chunk(&mut image, b"IEND", &[]);
+    image
+}
+
+/// PNG of a picture, compressed.
+pub fn png(picture: &Image) -> Vec<u8> {
+    let mut image = begin(picture.width, picture.height, TRUE_COLOUR);
+    let rows = picture.pixels.chunks_exact(picture.width.max(1));
+    let raw: Vec<u8> = rows.flat_map(|row| std::iter::once(0).chain(row.as_flattened().iter().copied())).collect();
+    let mut encoder = ZlibEncoder::new(Vec::new(), Compression::best());
+    let compressed = encoder.write_all(&raw).and_then(|()| encoder.finish());
+    // Nothing fails that is written to memory; stored, it is a picture as well.
+    chunk(&mut image, b"IDAT", &compressed.unwrap_or_else(|_| stored(&raw)));
+    chunk(&mut image, b"IEND", &[]);
+    image
+}
+
+/// Kinds of pixels in the header.
+const INDEXED: u8 = 3;
+const TRUE_COLOUR: u8 = 2;
+
+/// Signature and header of an image.
+fn begin(width: usize, height: usize, kind: u8) -> Vec<u8> {
+    let mut image = b"\x89PNG\r\n\x1a\n".to_vec();
+    let mut header = Vec::with_capacity(13);
+    header.extend((width as u32).to_be_bytes());
+    header.extend((height as u32).to_be_bytes());
+    // Eight bits, deflate, adaptive filters, not interlaced.
+    header.extend([8, kind, 0, 0, 0]);
+    chunk(&mut image, b"IHDR", &header);
     image
 }
 
@@ -61,6 +89,7 @@ fn crc32(bytes: &[u8]) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::io::Read as _;
 
     #[test]
     fn checksums_are_the_standards() {
@@ -80,5 +109,20 @@ mod tests {
         assert!(png.windows(6).any(|w| w == [0, 0, 1, 0, 2, 1]));
         let wide = stored(&vec![7; BLOCK + 1]);
         assert_eq!((wide.len(), wide[2], wide[2 + 5 + BLOCK]), (2 + 5 + BLOCK + 5 + 1 + 4, 0, 1));
+    }
+
+    #[test]
+    fn pictures_hold_their_pixels() {
+        let picture = Image { width: 3, height: 2, pixels: (0..6).map(|k| [k, 2 * k, 7]).collect() };
+        let file = png(&picture);
+        assert!(file.starts_with(b"\x89PNG\r\n\x1a\n\0\0\0\x0dIHDR\0\0\0\x03\0\0\0\x02\x08\x02"));
+        let data = file.windows(4).position(|w| w == b"IDAT").unwrap();
+        let length = u32::from_be_bytes(file[data - 4..data].try_into().unwrap()) as usize;
+        let mut raw = Vec::new();
+        flate2::read::ZlibDecoder::new(&file[data + 4..data + 4 + length]).read_to_end(&mut raw).unwrap();
+        assert_eq!(raw, [0, 0, 0, 7, 1, 2, 7, 2, 4, 7, 0, 3, 6, 7, 4, 8, 7, 5, 10, 7]);
+        // One colour takes next to nothing.
+        let plain = Image { width: 400, height: 400, pixels: vec![[1, 2, 3]; 160_000] };
+        assert!(png(&plain).len() < 2000);
     }
 }

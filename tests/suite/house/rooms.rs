@@ -36,7 +36,7 @@ pub(super) const ROOMS: [&str; 27] = [
 ];
 
 /// Crates and the only places that may name them.
-const ADAPTERS: [(&str, &str); 16] = [
+const ADAPTERS: [(&str, &str); 17] = [
     ("pulp", "src/scalar/"),
     ("xprec", "src/scalar/"),
     ("libm", "src/scalar/"),
@@ -48,6 +48,7 @@ const ADAPTERS: [(&str, &str); 16] = [
     ("safetensors", "src/storage/container/"),
     ("crc32fast", "src/storage/container/"),
     ("zip", "src/recording/read/npz.rs"),
+    ("flate2", "src/report/plot/png.rs"),
     ("clap", "src/cli/"),
     ("clap_complete", "src/cli/"),
     ("clap_mangen", "src/cli/"),

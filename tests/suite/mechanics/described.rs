@@ -13,6 +13,7 @@ use std::borrow::Cow;
 const PENDULUM: &str = include_str!("../../../examples/systems/pendulum.toml");
 const TWO_PENDULA: &str = include_str!("../../../examples/systems/two_pendula.toml");
 const BLACK_HOLE: &str = include_str!("../../../examples/systems/black_hole.toml");
+const CARTESIAN: &str = include_str!("../../../examples/systems/black_hole_cartesian.toml");
 const KERR: &str = include_str!("../../../examples/systems/kerr.toml");
 
 fn described<S: Scalar>(text: &str, given: &[(&str, &str)]) -> Configured<S> {
@@ -56,11 +57,12 @@ fn written_systems_are_the_catalogues() {
     let mut rng = ChaCha8Rng::seed_from_u64(31);
     /// A file, the catalogue's name of the same system, its parameters.
     type Case<'a> = (&'a str, &'a str, &'a [(&'a str, &'a str)]);
-    let cases: [Case<'_>; 4] = [
+    let cases: [Case<'_>; 5] = [
         (TWO_PENDULA, "double-pendulum", &[]),
         (TWO_PENDULA, "double-pendulum", &[("m1", "0.1"), ("l2", "2.3"), ("g", "9.81")]),
         (BLACK_HOLE, "schwarzschild-geodesic", &[]),
         (BLACK_HOLE, "schwarzschild-geodesic", &[("M", "0.3")]),
+        (CARTESIAN, "schwarzschild-cartesian", &[]),
     ];
     for (text, name, given) in cases {
         let worst = [

@@ -18,6 +18,7 @@ mod physics;
 mod pipes;
 mod resume;
 mod screen;
+mod shadow;
 mod signals;
 mod still;
 mod symmetries;

@@ -1,0 +1,259 @@
+//! `lnn shadow`: rays of light through a metric, as a picture of the shadow and the sky around it.
+
+use crate::cli::files::require_free;
+use crate::cli::learned::{Learned, model_file};
+use crate::cli::number::{count, finite, positive, threads, weight};
+use crate::cli::progress::Progress;
+use crate::cli::shadow_facts::{Facts, View};
+use crate::cli::source::{Source, parameter};
+use crate::cli::{CliError, chosen, output};
+use crate::lagrangian::EulerLagrange;
+use crate::names::unknown;
+use crate::relativity::{
+    Camera, Chart, Image, Observer, RelativityError, Sky, Tracing, difference_image, outline, shadow,
+};
+use crate::report::png;
+use crate::storage::{check_target, write_atomically};
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Instant;
+
+/// Arguments.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// A system by name (`lnn systems` lists them), or by the file that describes it: the exact metric.
+    #[arg(long, value_name = "NAME|FILE.toml", required_unless_present = "model")]
+    system: Option<String>,
+    /// A trained model, a file or the directory of a run: the learned metric, beside the exact one if that is given.
+    #[arg(long, value_name = "MODEL")]
+    model: Option<PathBuf>,
+    /// A parameter of the system; may be repeated.
+    #[arg(long, value_name = "SYMBOL=VALUE", num_args = 1.., value_parser = parameter, requires = "system")]
+    param: Vec<(String, String)>,
+    /// The coordinate that is the time, on which the metric does not depend.
+    #[arg(long, value_name = "NAME", default_value = "t")]
+    time: String,
+    /// The coordinates that are the places, Cartesian ones around the centre; the last is the axis.
+    #[arg(long, value_name = "X,Y,Z", default_value = "x,y,z", value_delimiter = ',')]
+    space: Vec<String>,
+    /// Distance of the camera from the centre, in the unit of the coordinates.
+    #[arg(long, value_name = "R", default_value = "20", allow_hyphen_values = true, value_parser = positive)]
+    distance: f64,
+    /// Angle of the camera from the axis, in degrees, 0 to 180.
+    #[arg(long, value_name = "DEGREES", default_value = "80", allow_hyphen_values = true, value_parser = finite)]
+    inclination: f64,
+    /// Angle of the camera about the axis, in degrees, from x towards y.
+    #[arg(long, value_name = "DEGREES", default_value = "0", allow_hyphen_values = true, value_parser = finite)]
+    azimuth: f64,
+    /// Motion of the camera.
+    #[arg(long, value_enum, value_name = "NAME", default_value = "rest")]
+    observer: ObserverName,
+    /// Angle between the left and the right end of the picture, in degrees, below 180.
+    #[arg(long, value_name = "DEGREES", default_value = "70", allow_hyphen_values = true, value_parser = positive)]
+    field_of_view: f64,
+    /// Pixels of a row.
+    #[arg(long, value_name = "N", default_value = "400", allow_hyphen_values = true, value_parser = count)]
+    width: usize,
+    /// Rows [default: as many as pixels of a row].
+    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = count)]
+    height: Option<usize>,
+    /// Distance from which on a ray that leaves has come from the sky; a learned metric is known as far as it was trained
+    /// [default: twice the distance of the camera].
+    #[arg(long, value_name = "R", allow_hyphen_values = true, value_parser = positive)]
+    far: Option<f64>,
+    /// Relative error of a step of a ray; the edge of the shadow is found with a hundredth of it.
+    #[arg(long, value_name = "T", default_value = "1e-6", allow_hyphen_values = true, value_parser = positive)]
+    tolerance: f64,
+    /// Directions in which the edge of the shadow is found by bisection, a multiple of four; 0 leaves it out.
+    #[arg(long, value_name = "N", default_value = "64", allow_hyphen_values = true, value_parser = edges)]
+    edges: usize,
+    /// Threads; the picture does not depend on them [default: all].
+    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = count)]
+    threads: Option<usize>,
+    /// Picture: of two metrics the exact one, the learned one, and their difference.
+    #[arg(long, value_name = "FILE.png", value_parser = image_file)]
+    out: PathBuf,
+    /// Replace the file.
+    #[arg(long)]
+    overwrite: bool,
+    /// Print what there is to say as a JSON object instead of text.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Clone, Copy, Debug, clap::ValueEnum)]
+enum ObserverName {
+    /// At rest.
+    Rest,
+    /// Along the normal of the slices of equal time; in coordinates of Kerr and Schild it falls.
+    Normal,
+}
+
+/// Directions around the centre.
+fn edges(text: &str) -> Result<usize, String> {
+    let number = weight(text).ok().filter(|x| x % 4.0 == 0.0 && *x <= 4096.0);
+    number.map(|x| x as usize).ok_or_else(|| "expected a multiple of four from 0 to 4096".to_string())
+}
+
+/// A file that ends in `.png`.
+fn image_file(text: &str) -> Result<PathBuf, String> {
+    let path = PathBuf::from(text);
+    let known = path.extension().is_some_and(|end| end.eq_ignore_ascii_case("png"));
+    if known { Ok(path) } else { Err("expected a file that ends in .png".to_string()) }
+}
+
+/// The metrics to look through, with the names of their coordinates.
+struct Metrics {
+    system: String,
+    coordinates: Vec<String>,
+    /// Unit of the coordinates, if it is known.
+    unit: Option<String>,
+    /// Name of each, and its terms.
+    models: Vec<(&'static str, Box<dyn EulerLagrange<f64>>)>,
+}
+
+impl Args {
+    /// Reads what there is to look through.
+    fn metrics(&self) -> Result<Metrics, CliError> {
+        let (mut system, mut columns, mut unit, mut models) = (String::new(), Vec::new(), None, Vec::new());
+        let learned = self.model.as_deref().map(Learned::<f64>::load).transpose()?;
+        if let Some(name) = &self.system {
+            let configured = match &learned {
+                Some(learned) => learned.beside(name, &self.param)?,
+                None => {
+                    crate::lagrangian::configure_system(chosen::system(name)?, &self.param).map_err(CliError::usage)?
+                }
+            };
+            let source = Source::<f64>::configured(configured.system.clone(), &self.param)?;
+            (system, columns) = (configured.system.name.to_string(), source.columns);
+            unit = Some(configured.system.time_unit.to_string());
+            models.push(("exact", source.model));
+        }
+        if let Some(Learned { header, network }) = learned {
+            if models.is_empty() {
+                unit = chosen::learned_system(&header).ok().map(|system| system.time_unit.to_string());
+            }
+            (system, columns) = (header.system, header.columns);
+            models.push(("learned", Box::new(network)));
+        }
+        let coordinates = columns[..columns.len() / 2].to_vec();
+        Ok(Metrics { system, coordinates, unit, models })
+    }
+
+    fn chart(&self, coordinates: &[String]) -> Result<Chart, CliError> {
+        let place = |option: &str, name: &str| {
+            coordinates.iter().position(|coordinate| coordinate == name.trim()).ok_or_else(|| {
+                let problem = unknown("coordinate", name, coordinates.iter().map(String::as_str));
+                CliError::usage(format_args!("{option}: {problem}"))
+            })
+        };
+        let [x, y, z] = self.space.as_slice() else {
+            return Err(CliError::usage(format_args!("--space: expected three names, found {}", self.space.len())));
+        };
+        let time = place("--time", &self.time)?;
+        Ok(Chart { time, space: [place("--space", x)?, place("--space", y)?, place("--space", z)?] })
+    }
+
+    fn camera(&self, chart: Chart) -> Camera {
+        Camera {
+            chart,
+            azimuth: self.azimuth.to_radians(),
+            observer: match self.observer {
+                ObserverName::Rest => Observer::Rest,
+                ObserverName::Normal => Observer::Normal,
+            },
+            field_of_view: self.field_of_view.to_radians(),
+            width: self.width,
+            height: self.height.unwrap_or(self.width),
+            ..Camera::new(self.distance, self.inclination.to_radians())
+        }
+    }
+}
+
+/// Traces, writes the picture and prints what it shows.
+///
+/// # Errors
+/// A usage error for an unknown system, wrong parameters, a camera that cannot be; a data error for a bad model and for a picture that cannot be
+/// written.
+pub fn run(args: &Args) -> Result<(), CliError> {
+    let Metrics { system, coordinates, unit, models } = args.metrics()?;
+    let camera = args.camera(args.chart(&coordinates)?);
+    let mut tracing = Tracing { tolerance: args.tolerance, threads: threads(args.threads), ..Tracing::of(&camera) };
+    tracing.far = args.far.unwrap_or(tracing.far);
+    let model = args.model.as_deref().map(model_file).transpose()?;
+    let file = args.system.as_ref().filter(|name| chosen::is_file(name)).map(PathBuf::from);
+    let inputs: Vec<_> = model.iter().chain(&file).map(PathBuf::as_path).collect();
+    require_free(&args.out, &inputs, args.overwrite)?;
+    check_target(&args.out).map_err(|e| CliError::file(&args.out, format_args!("cannot write: {e}")))?;
+
+    let pixels = camera.width.saturating_mul(camera.height).saturating_mul(models.len());
+    let (progress, done) = (Progress::new(pixels as u64, "rays"), AtomicU64::new(0));
+    let advance = |rays: usize| {
+        let rays = rays as u64;
+        progress.advance(done.fetch_add(rays, Ordering::Relaxed) + rays);
+    };
+    let mut views = Vec::new();
+    for (name, model) in &models {
+        progress.say(name);
+        let began = Instant::now();
+        let shadow = shadow(&**model, &camera, &tracing, &advance).map_err(refused)?;
+        let seconds = began.elapsed().as_secs_f64();
+        let outline = match args.edges {
+            0 => None,
+            edges => outline(&**model, &camera, &tracing, edges).map_err(refused)?,
+        };
+        views.push(View { name, shadow, outline, seconds });
+    }
+    drop(progress);
+
+    let sky = Sky::around(&camera);
+    let mut images: Vec<Image> = views.iter().map(|view| sky.image(&view.shadow)).collect();
+    if let [exact, learned] = views.as_slice() {
+        images.push(difference_image(&exact.shadow, &learned.shadow).map_err(refused)?);
+    }
+    let picture = png(&Image::beside(&images, GAP));
+    write_atomically(&args.out, &picture).map_err(|e| CliError::file(&args.out, format_args!("cannot write: {e}")))?;
+    let facts = Facts { system: &system, unit: unit.as_deref(), camera: &camera, tracing: &tracing, views: &views };
+    let told = if args.json { facts.json(&images) } else { facts.text(&images, &args.out) };
+    output::print(&told.map_err(refused)?)
+}
+
+/// White columns between pictures.
+const GAP: usize = 8;
+
+/// What cannot be traced, with the option that says so.
+fn refused(error: RelativityError) -> CliError {
+    match &error {
+        RelativityError::Invalid { what, expected, .. } => {
+            let option = match *what {
+                "distance" => "--distance",
+                "inclination" => return CliError::usage("--inclination: expected 0 to 180 degrees"),
+                "azimuth" => "--azimuth",
+                "field of view" => return CliError::usage("--field-of-view: expected an angle below 180 degrees"),
+                "pixels" => return CliError::usage("--width, --height: expected at most 2^28 pixels"),
+                "tolerance" => "--tolerance",
+                "far distance" => "--far",
+                _ => return CliError::usage(error),
+            };
+            CliError::usage(format_args!("{option}: expected {expected}"))
+        }
+        RelativityError::NothingRests => {
+            CliError::usage(format_args!("--observer rest: {error}; --observer normal may be there"))
+        }
+        RelativityError::Chart { .. } => CliError::usage("--time, --space: expected four different coordinates"),
+        RelativityError::Coordinates { .. } => CliError::usage(error),
+        _ => CliError::data(error),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_are_read() {
+        assert_eq!((edges("0"), edges(" 64 ")), (Ok(0), Ok(64)));
+        assert!(["3", "-4", "4100", "x", ""].iter().all(|bad| edges(bad).is_err()));
+        assert!(image_file("a.PNG").is_ok() && image_file("a.svg").is_err() && image_file("png").is_err());
+    }
+}

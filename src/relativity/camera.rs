@@ -1,0 +1,140 @@
+//! The camera: where it stands, how it moves, and the direction of every pixel.
+
+use super::chart::Chart;
+use super::error::{RelativityError, expect};
+use super::vector::{norm, times};
+use std::f64::consts::PI;
+
+/// Motion of the camera.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Observer {
+    /// At rest: its places do not change.
+    #[default]
+    Rest,
+    /// Along the normal of the slices of equal time. In the coordinates of Kerr and Schild it falls, from outside the horizon or within.
+    Normal,
+}
+
+/// A camera that looks at the centre.
+///
+/// Up is the direction of falling inclination: a hole whose spin points along `z` turns from the left towards the camera.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Camera {
+    /// Coordinates of the metric.
+    pub chart: Chart,
+    /// Distance from the centre, the Euclidean one of the coordinates, in their unit.
+    pub distance: f64,
+    /// Angle from the axis `z`, in rad, from 0 to pi.
+    pub inclination: f64,
+    /// Angle about the axis `z` from `x` towards `y`, in rad.
+    pub azimuth: f64,
+    /// Motion.
+    pub observer: Observer,
+    /// Angle between the left and the right end of the picture, in rad, below pi.
+    pub field_of_view: f64,
+    /// Pixels of a row.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+}
+
+/// Pixels at most: more would be a mistake.
+const MOST: usize = 1 << 28;
+
+impl Camera {
+    /// A camera at rest over `x` with 400 x 400 pixels of 70 degrees, at a distance and an inclination in rad.
+    pub fn new(distance: f64, inclination: f64) -> Self {
+        Self {
+            chart: Chart::default(),
+            distance,
+            inclination,
+            azimuth: 0.0,
+            observer: Observer::Rest,
+            field_of_view: 70f64.to_radians(),
+            width: 400,
+            height: 400,
+        }
+    }
+
+    /// Refuses numbers that make no picture.
+    ///
+    /// # Errors
+    /// [`RelativityError::Invalid`].
+    pub(super) fn check(&self) -> Result<(), RelativityError> {
+        let Self { distance, inclination, azimuth, field_of_view, width, height, .. } = *self;
+        let positive = distance.is_finite() && distance > 0.0;
+        expect(positive, "distance", "a finite number above 0", distance)?;
+        expect((0.0..=PI).contains(&inclination), "inclination", "0 to pi", inclination)?;
+        expect(azimuth.is_finite(), "azimuth", "a finite number", azimuth)?;
+        let narrow = field_of_view > 0.0 && field_of_view < PI;
+        expect(narrow, "field of view", "an angle between 0 and pi", field_of_view)?;
+        let pixels = width.checked_mul(height).filter(|pixels| (1..=MOST).contains(pixels));
+        expect(pixels.is_some(), "pixels", "1 to 2^28", width as f64 * height as f64)
+    }
+
+    /// Directions right, up and forward in the coordinates of space, orthonormal in the Euclidean sense.
+    pub fn axes(&self) -> [[f64; 3]; 3] {
+        let ((si, ci), (sa, ca)) = (self.inclination.sin_cos(), self.azimuth.sin_cos());
+        [[-sa, ca, 0.0], [-ci * ca, -ci * sa, si], [-si * ca, -si * sa, -ci]]
+    }
+
+    /// Coordinates of the camera at the time 0.
+    pub fn event(&self) -> [f64; 4] {
+        self.chart.vector(0.0, times(-self.distance, self.axes()[2]))
+    }
+
+    /// Direction that a place of the picture shows: parts right, up and forward, a unit vector. Columns and rows are counted from the upper left
+    /// corner; the middle of the first pixel is `(0.5, 0.5)`.
+    pub fn direction(&self, column: f64, row: f64) -> [f64; 3] {
+        let (width, height) = (self.width as f64, self.height as f64);
+        let scale = 2.0 * (0.5 * self.field_of_view).tan() / width;
+        let toward = [scale * (column - 0.5 * width), scale * (0.5 * height - row), 1.0];
+        times(norm(toward).recip(), toward)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::vector::dot;
+    use super::*;
+
+    #[test]
+    fn pixels_have_their_directions() {
+        let camera = Camera { width: 40, height: 20, ..Camera::new(10.0, 1.1) };
+        assert_eq!(camera.direction(20.0, 10.0), [0.0, 0.0, 1.0]);
+        let [right, up, forward] = camera.direction(40.0, 10.0);
+        assert!((right.atan2(forward) - 35f64.to_radians()).abs() < 1e-15 && up == 0.0);
+        let corner = camera.direction(0.0, 0.0);
+        assert!(corner[0] < 0.0 && corner[1] == -corner[0] / 2.0 && (norm(corner) - 1.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn it_looks_at_the_centre() {
+        for (inclination, azimuth) in [(0.0, 0.0), (0.7, -2.0), (PI / 2.0, 1.0), (PI, 0.3)] {
+            let camera = Camera { azimuth, ..Camera::new(10.0, inclination) };
+            let [right, up, forward] = camera.axes();
+            let place = camera.chart.space_of(camera.event());
+            assert!(norm(place) - 10.0 < 1e-14 && (dot(place, forward) + 10.0).abs() < 1e-14);
+            assert!(dot(right, up).abs() + dot(up, forward).abs() + dot(right, forward).abs() < 1e-15);
+            // Right x up points backwards.
+            let z = right[0] * up[1] - right[1] * up[0];
+            assert!((z + forward[2]).abs() < 1e-15);
+        }
+    }
+
+    #[test]
+    fn numbers_without_a_picture_are_refused() {
+        let fine = Camera::new(10.0, 1.0);
+        assert_eq!(fine.check(), Ok(()));
+        for wrong in [
+            Camera { distance: 0.0, ..fine },
+            Camera { inclination: -0.1, ..fine },
+            Camera { azimuth: f64::NAN, ..fine },
+            Camera { field_of_view: PI, ..fine },
+            Camera { width: 0, ..fine },
+            Camera { height: usize::MAX, ..fine },
+        ] {
+            assert!(matches!(wrong.check(), Err(RelativityError::Invalid { .. })), "{wrong:?}");
+        }
+    }
+}

@@ -1,0 +1,294 @@
+//! Null geodesics, batches of them: each ray has steps of its own, and all rays of a batch are evaluated by one call per stage.
+
+use super::camera::Camera;
+use super::chart::Chart;
+use super::dormand_prince::{A, ERROR, STAGES};
+use super::error::{RelativityError, expect};
+use super::vector::{along, dot, norm, times};
+use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Terms};
+use crate::rollout::in_order;
+
+/// End of a ray that was followed backwards in time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Fate {
+    /// It piled up at a horizon: no light comes this way.
+    Captured,
+    /// It came from far away: the place on the sky, a unit vector of space.
+    Escaped([f64; 3]),
+    /// Neither, within the steps allowed, or it met a place where the metric is none.
+    Unfinished,
+}
+
+/// A ray that has ended.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ray {
+    /// Its end.
+    pub fate: Fate,
+    /// Steps taken, rejected ones included.
+    pub steps: usize,
+    /// `g(k, k)` at the end over the sum of the sizes of its terms; 0 of a light ray.
+    pub drift: f64,
+}
+
+/// Choices of ray tracing.
+///
+/// | name | default | purpose | range |
+/// |---|---|---|---|
+/// | `tolerance` | 1e-6 | relative error of place and tangent in a step | above 0 |
+/// | `far` | twice the distance of the camera | distance from which on a ray that leaves has escaped | above 0 |
+/// | `capture` | 0 | distance within which a ray is captured in any case | at least 0 |
+/// | `growth` | 1e3 | growth of `|k|`, Euclidean, at which a ray is captured | above 1 |
+/// | `most_steps` | 2000 | steps after which a ray is left unfinished | above 0 |
+/// | `threads` | 1 | threads; no result depends on them | above 0 |
+///
+/// A ray that is followed backwards to a future horizon does not reach it: in coordinates that are regular there, those of Kerr and Schild, it
+/// comes nearer and nearer while `dt` grows beyond all bounds within a finite affine parameter, `|k|` as the inverse of the distance from the
+/// horizon. A ray that turns around does so outside the orbit of light, with a growth of a few; only next to the largest spins, `a > 0.999 M`,
+/// does it come near the default.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tracing {
+    /// Relative error of a step.
+    pub tolerance: f64,
+    /// Distance of the sky.
+    pub far: f64,
+    /// Distance of capture.
+    pub capture: f64,
+    /// Growth of `|k|` at capture.
+    pub growth: f64,
+    /// Most steps.
+    pub most_steps: usize,
+    /// Threads.
+    pub threads: usize,
+}
+
+impl Tracing {
+    /// The defaults for a camera.
+    pub fn of(camera: &Camera) -> Self {
+        Self { tolerance: 1e-6, far: 2.0 * camera.distance, capture: 0.0, growth: 1e3, most_steps: 2000, threads: 1 }
+    }
+
+    /// Refuses numbers that trace nothing.
+    fn check(&self) -> Result<(), RelativityError> {
+        let finite_above = |x: f64, least: f64| x.is_finite() && x > least;
+        expect(finite_above(self.tolerance, 0.0), "tolerance", "a finite number above 0", self.tolerance)?;
+        expect(finite_above(self.far, 0.0), "far distance", "a finite number above 0", self.far)?;
+        expect(self.capture >= 0.0, "distance of capture", "at least 0", self.capture)?;
+        expect(self.growth > 1.0, "growth at capture", "above 1", self.growth)
+    }
+}
+
+/// Parts that rays are cut into, whatever the number of threads, and the bounds of their size: one call of a model is for that many.
+const BLOCKS: (usize, usize, usize) = (8, 32, 1024);
+/// First step and longest step over the distance from the centre.
+const STEP: (f64, f64) = (0.05, 1.0);
+/// Smallest step over the distance from the centre.
+const LEAST: f64 = 1e-12;
+/// Part of a step that is kept, and the bounds of its change.
+const SAFETY: (f64, f64, f64) = (0.9, 0.2, 5.0);
+/// Distance beyond the sky to which a step may lead, over that of the sky.
+const BEYOND: f64 = 1e-3;
+
+/// Follows rays from events with tangents `k`, `(4)` each, along which the affine parameter grows; the order is kept.
+///
+/// `progress` is told the number of rays of every block that is done, from any thread.
+///
+/// # Errors
+/// [`RelativityError`] for choices out of range and what the model refuses other than single states.
+pub fn trace(
+    model: &dyn EulerLagrange<f64>,
+    chart: &Chart,
+    starts: &[([f64; 4], [f64; 4])],
+    tracing: &Tracing,
+    progress: &(dyn Fn(usize) + Sync),
+) -> Result<Vec<Ray>, RelativityError> {
+    tracing.check()?;
+    chart.check(model.coordinates())?;
+    let block = starts.len().div_ceil(BLOCKS.0).clamp(BLOCKS.1, BLOCKS.2);
+    let blocks: Vec<_> = starts.chunks(block).collect();
+    let traced = in_order(&blocks, tracing.threads, |block| {
+        let rays = Batch { model, chart, tracing, terms: Terms::default() }.trace(block);
+        progress(block.len());
+        rays
+    });
+    let mut rays = Vec::with_capacity(starts.len());
+    for block in traced {
+        rays.extend(block?);
+    }
+    Ok(rays)
+}
+
+/// A ray on its way.
+#[derive(Clone, Copy)]
+struct Moving {
+    /// Place in the batch.
+    index: usize,
+    q: [f64; 4],
+    k: [f64; 4],
+    /// `dk` by the affine parameter.
+    a: [f64; 4],
+    step: f64,
+    /// `|k|` at the start.
+    size: f64,
+    steps: usize,
+    /// `true` after a step that was refused.
+    refused: bool,
+}
+
+/// A ray that has ended, with its last state.
+#[derive(Clone, Copy)]
+struct Ended {
+    fate: Fate,
+    steps: usize,
+    q: [f64; 4],
+    k: [f64; 4],
+}
+
+/// Rays that share their calls of the model.
+struct Batch<'a> {
+    model: &'a dyn EulerLagrange<f64>,
+    chart: &'a Chart,
+    tracing: &'a Tracing,
+    terms: Terms<f64>,
+}
+
+impl Batch<'_> {
+    /// Accelerations of states, one by one `NaN` where the metric is none.
+    fn accelerations(&mut self, q: &[[f64; 4]], k: &[[f64; 4]], to: &mut Vec<[f64; 4]>) -> Result<(), RelativityError> {
+        let outcome = self.model.terms(q.as_flattened(), k.as_flattened(), Request::ACCELERATION, &mut self.terms);
+        let (found, []) = self.terms.acceleration.as_chunks::<4>() else { return Err(no_accelerations(outcome)) };
+        match outcome {
+            Ok(()) | Err(MechanicsError::Singular { .. } | MechanicsError::NotFinite { .. })
+                if found.len() == q.len() =>
+            {
+                to.clear();
+                to.extend_from_slice(found);
+                Ok(())
+            }
+            other => Err(no_accelerations(other)),
+        }
+    }
+
+    fn trace(mut self, starts: &[([f64; 4], [f64; 4])]) -> Result<Vec<Ray>, RelativityError> {
+        let nowhere = Ended { fate: Fate::Unfinished, steps: 0, q: [f64::NAN; 4], k: [f64::NAN; 4] };
+        let mut ended = vec![nowhere; starts.len()];
+        let (mut q, mut k): (Vec<_>, Vec<_>) = starts.iter().copied().unzip();
+        let (mut places, mut tangents) = (Vec::new(), vec![Vec::new(); STAGES]);
+        let mut slopes: Vec<Vec<[f64; 4]>> = vec![Vec::new(); STAGES];
+        self.accelerations(&q, &k, &mut slopes[0])?;
+        let mut moving: Vec<Moving> = Vec::with_capacity(starts.len());
+        for (index, ((&q, &k), &a)) in q.iter().zip(&k).zip(&slopes[0]).enumerate() {
+            let distance = norm(self.chart.space_of(q));
+            let step = STEP.0 * distance / norm(self.chart.space_of(k));
+            moving.push(Moving { index, q, k, a, step, size: norm(k), steps: 0, refused: false });
+        }
+        self.sort_out(&mut moving, &mut ended);
+        while !moving.is_empty() {
+            moving.iter_mut().for_each(|ray| ray.step = ray.step.min(self.longest(ray)));
+            tangents[0].clear();
+            tangents[0].extend(moving.iter().map(|ray| ray.k));
+            slopes[0].clear();
+            slopes[0].extend(moving.iter().map(|ray| ray.a));
+            for (stage, row) in A.iter().enumerate() {
+                (q, k) = (std::mem::take(&mut q), std::mem::take(&mut k));
+                q.clear();
+                k.clear();
+                for (at, ray) in moving.iter().enumerate() {
+                    let (mut place, mut tangent) = (ray.q, ray.k);
+                    for (j, a) in row[..=stage].iter().enumerate().filter(|(_, a)| **a != 0.0) {
+                        place = along(place, ray.step * a, tangents[j][at]);
+                        tangent = along(tangent, ray.step * a, slopes[j][at]);
+                    }
+                    q.push(place);
+                    k.push(tangent);
+                }
+                self.accelerations(&q, &k, &mut slopes[stage + 1])?;
+                tangents[stage + 1].clone_from(&k);
+            }
+            places.clone_from(&q);
+            for (at, ray) in moving.iter_mut().enumerate() {
+                let of = |from: &[Vec<[f64; 4]>]| {
+                    ERROR.iter().zip(from).fold([0.0; 4], |sum, (e, stage)| along(sum, ray.step * e, stage[at]))
+                };
+                let (place, tangent) = (of(&tangents), of(&slopes));
+                let distance = norm(self.chart.space_of(ray.q)).max(norm(self.chart.space_of(places[at])));
+                let size = norm(ray.k).max(norm(k[at]));
+                let error =
+                    (norm(self.chart.space_of(place)) / distance).max(norm(tangent) / size) / self.tracing.tolerance;
+                let fine = error.is_finite() && distance.is_finite() && size.is_finite();
+                let change = if fine { SAFETY.0 * error.powf(-0.2) } else { SAFETY.1 };
+                ray.steps += 1;
+                if fine && error <= 1.0 {
+                    (ray.q, ray.k, ray.a) = (places[at], k[at], slopes[STAGES - 1][at]);
+                    ray.step *= change.clamp(SAFETY.1, if ray.refused { 1.0 } else { SAFETY.2 });
+                } else {
+                    ray.step *= change.clamp(SAFETY.1, SAFETY.0);
+                }
+                ray.refused = !(fine && error <= 1.0);
+            }
+            self.sort_out(&mut moving, &mut ended);
+        }
+        self.finish(&ended)
+    }
+
+    /// Longest step: in proportion to the distance from the centre, and hardly beyond the distance of the sky.
+    fn longest(&self, ray: &Moving) -> f64 {
+        let (place, tangent) = (self.chart.space_of(ray.q), self.chart.space_of(ray.k));
+        let (distance, speed, far) = (norm(place), norm(tangent), self.tracing.far);
+        let toward = dot(place, tangent) / speed;
+        let room = toward * toward + far * far - distance * distance;
+        let most = if distance < far { (room.sqrt() - toward) * (1.0 + BEYOND) + BEYOND * far } else { f64::INFINITY };
+        most.min(STEP.1 * distance) / speed
+    }
+
+    /// Takes the rays that have ended out of those that move.
+    fn sort_out(&self, moving: &mut Vec<Moving>, ended: &mut [Ended]) {
+        moving.retain(|ray| {
+            let Some(fate) = self.fate(ray) else { return true };
+            ended[ray.index] = Ended { fate, steps: ray.steps, q: ray.q, k: ray.k };
+            false
+        });
+    }
+
+    /// Its end, if a ray has ended.
+    fn fate(&self, ray: &Moving) -> Option<Fate> {
+        let (place, tangent) = (self.chart.space_of(ray.q), self.chart.space_of(ray.k));
+        let (distance, speed) = (norm(place), norm(tangent));
+        if distance <= self.tracing.capture || norm(ray.k) > self.tracing.growth * ray.size {
+            return Some(Fate::Captured);
+        }
+        if distance >= self.tracing.far && dot(place, tangent) > 0.0 {
+            return Some(Fate::Escaped(times(speed.recip(), tangent)));
+        }
+        let stuck =
+            ray.step * speed < LEAST * distance || !ray.step.is_finite() || ray.a.iter().any(|a| !a.is_finite());
+        (stuck || ray.steps >= self.tracing.most_steps).then_some(Fate::Unfinished)
+    }
+
+    /// What rays were like, with the drift of `g(k, k)`.
+    fn finish(mut self, ended: &[Ended]) -> Result<Vec<Ray>, RelativityError> {
+        let (q, k): (Vec<_>, Vec<_>) = ended.iter().map(|ray| (ray.q, ray.k)).unzip();
+        match self.model.terms(q.as_flattened(), k.as_flattened(), Request::MASS_MATRIX, &mut self.terms) {
+            Ok(()) | Err(MechanicsError::Singular { .. } | MechanicsError::NotFinite { .. }) => {}
+            Err(error) => return Err(error.into()),
+        }
+        let metrics = self.terms.mass_matrix.chunks_exact(16).map(Some).chain(std::iter::repeat(None));
+        let drift = |metric: &[f64], k: [f64; 4]| {
+            let terms = || (0..16).map(|at| metric[at] * k[at / 4] * k[at % 4]);
+            terms().sum::<f64>().abs() / terms().map(f64::abs).sum::<f64>()
+        };
+        let ray = |(ray, metric): (&Ended, Option<&[f64]>)| Ray {
+            fate: ray.fate,
+            steps: ray.steps,
+            drift: metric.map_or(f64::NAN, |metric| drift(metric, ray.k)),
+        };
+        Ok(ended.iter().zip(metrics).map(ray).collect())
+    }
+}
+
+/// The refusal of a model, or that of its answer.
+fn no_accelerations(outcome: Result<(), MechanicsError>) -> RelativityError {
+    match outcome {
+        Err(error) => error.into(),
+        Ok(()) => MechanicsError::NotFinite { row: 0, what: "acceleration" }.into(),
+    }
+}
