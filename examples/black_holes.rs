@@ -21,12 +21,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     let around =
         Around::of_names(&names).ok_or("expected the coordinates of a hole: t, x, y, z or t, r, theta, phi")?;
     let (learned, exact) = (NetworkLagrangian::new(header.architecture, weights)?, system.build()?);
-    let pair = Pair { exact: &*exact, learned: &learned, system: &system, around, range: (1.2, 40.0) };
+    let pair = Pair { exact: &*exact, learned: &learned, system: &system, around, range: (1.35, 110.0) };
 
     println!("{}", header.system);
     println!("{:70} {:>11} {:>11} {:>9} {:>7}", "", "exact", "learned", "error", "aim");
     let value = |x: Option<f64>| x.map_or("-".to_string(), |x| format!("{x:.6}"));
-    for reading in pair.readings(&|_| ())? {
+    for reading in pair.readings()? {
         let error = reading.error.map_or("-".to_string(), |error| format!("{:.4} %", 100.0 * error));
         let (exact, learned, aim) = (value(reading.exact), value(reading.learned), 100.0 * reading.aim);
         println!("{:70} {exact:>11} {learned:>11} {error:>11} {aim:>5.2} %", reading.quantity);

@@ -4,6 +4,7 @@ use crate::experiments::{Experiment, Outcome, Record, Run, Scale};
 use crate::pipeline::checkpoints::Begin;
 use crate::pipeline::experiment_report::{ExperimentReport, Results, conclude};
 use crate::pipeline::experiment_store::ExperimentStore;
+use crate::pipeline::readings::READINGS;
 use crate::pipeline::train::{RunOptions, train};
 use crate::pipeline::{Event, PipelineError, RECORD, Watch};
 use crate::report::Curve;
@@ -61,7 +62,7 @@ pub fn run_experiment(
         let finished = results.iter().filter(|(_, record)| record.is_some()).count();
         return Err(PipelineError::InterruptedRuns { finished, total });
     }
-    conclude(experiment, scale, results, beside, store, (started, watch))
+    conclude(experiment, scale, results, beside, store, (started, threads, watch))
 }
 
 /// The record of a run: the one that is there if it was made from the same configuration, or a new one. `None` if it was
@@ -80,6 +81,7 @@ fn one(
     let output = store.open_run(&run.name)?;
     // That of another configuration must not be found beside the new one.
     output.remove(RECORD)?;
+    output.remove(READINGS)?;
     let system = run.config.system()?;
     run.config.validate(system.coordinates)?;
     let (starts, span) = scale.trajectories();

@@ -3,7 +3,7 @@
 use crate::experiments::{Experiment, Record, Row, Run, Scale};
 use crate::names::{WIDTH, counted, wrapped};
 use crate::pipeline::experiment_store::ExperimentStore;
-use crate::pipeline::readings::reading_tables;
+use crate::pipeline::readings::{RowOfHoles, rows_of_holes};
 use crate::pipeline::run_figures::{pictures_of_runs, within};
 use crate::pipeline::{PipelineError, Watch, headline};
 use crate::report::{
@@ -49,7 +49,7 @@ pub(crate) fn conclude(
     results: Results,
     beside: &[Curve],
     store: &dyn ExperimentStore,
-    (started, watch): (Instant, &Watch),
+    (started, threads, watch): (Instant, usize, &Watch),
 ) -> Result<ExperimentReport, PipelineError> {
     let rows = experiment.rows(&results);
     let (table, (header, view)) = (experiment_table(&rows), experiment_view(&rows));
@@ -80,8 +80,8 @@ pub(crate) fn conclude(
     let reductions = reduction_table(&experiment.reductions(&results));
     let report = remarks.iter().fold(report, |report, remark| report.paragraph(remark));
     let report = if reductions.is_empty() { report } else { report.table(&REDUCTION_HEADER, &reductions) };
-    let read = reading_tables(experiment, &results, store, watch)?;
-    let report = read.iter().fold(report, |report, (label, table)| report.heading(label).table(&READING_HEADER, table));
+    let holes = rows_of_holes(experiment, &results, (store, threads), watch)?;
+    let report = holes.iter().fold(report, |report, row| row.add_to(report));
     let report = within(taken, report.figures(&figures));
     store.write("report.html", report.to_html().as_bytes())?;
     figures.iter().try_for_each(|figure| store.write(&figure.file, figure.picture.to_svg().as_bytes()))?;
@@ -100,7 +100,7 @@ pub(crate) fn conclude(
     if !reductions.is_empty() {
         text += &format!("\n{}", text_table(&REDUCTION_HEADER, &reductions));
     }
-    for (label, table) in &read {
+    for RowOfHoles { label, table, .. } in &holes {
         text += &format!("\n{label}\n{}", text_table(&READING_HEADER, table));
     }
     let (title, paper) = (experiment.title, experiment.paper);

@@ -63,6 +63,7 @@ mod fit_config;
 mod fit_summary;
 mod headline;
 mod hold_out;
+mod hole_pictures;
 mod losses;
 pub(crate) mod memory;
 mod model;

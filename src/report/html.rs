@@ -112,6 +112,18 @@ impl Report {
         self
     }
 
+    /// Adds a picture from the bytes of a PNG file.
+    #[must_use]
+    pub fn pixels(mut self, png: &[u8], caption: &str) -> Self {
+        let (data, caption) = (base64(png), escape(caption));
+        let _ = writeln!(
+            self.body,
+            "<figure><div class=\"scroll\"><img alt=\"{caption}\" src=\"data:image/png;base64,{data}\"></div>\
+             <figcaption>{caption}</figcaption></figure>"
+        );
+        self
+    }
+
     /// Adds a picture from the bytes of an SVG file, which can do nothing but be seen.
     #[must_use]
     pub fn image(mut self, svg: &[u8], caption: &str) -> Self {

@@ -1,0 +1,67 @@
+//! Pictures of a learned black hole beside the exact one: orbits, shadow and sky.
+
+use crate::pipeline::PipelineError;
+use crate::relativity::{Around, Camera, Image, Pair, Sky, Tracing, difference_image, orbits, shadow};
+use crate::report::{Figure, OrbitPlot, Series, kept, orbit_picture, png};
+
+/// Pixels along the edge of a picture of the sky.
+const PIXELS: usize = 160;
+/// Distance of the camera over the mass, and its angle from the axis.
+const CAMERA: (f64, f64) = (20.0, 1.4);
+/// White columns between pictures.
+const GAP: usize = 8;
+
+/// Orbits of the exact metric, wide, and of the learned one over them; none where there is nothing to show.
+pub(crate) fn orbit_figure(pair: &Pair<'_>, mass: f64) -> Option<Figure> {
+    let origin = pair.around.origin();
+    let range = (1.2 * mass, 20.0 * mass);
+    let hole = pair.around.equator(pair.exact, &origin).horizon(range).ok().flatten();
+    let inner = pair.range.0.max(1.2 * mass);
+    let found = orbits(pair.exact, pair.around, mass, inner).ok()?;
+    let panel = |orbit: &crate::relativity::Orbit| {
+        let series = |name: &str, points, over| Series { name: name.to_string(), points, over };
+        let exact = series("exact", orbit.path(pair.exact, pair.around), false);
+        let learned = series("learned", orbit.path(pair.learned, pair.around), true);
+        (orbit.title.to_string(), vec![exact, learned])
+    };
+    let labels = ["x", "y"].map(|axis| format!("{axis} [m]"));
+    let [x_label, y_label] = labels;
+    let plot = OrbitPlot { x_label, y_label, hole, panels: found.iter().map(panel).collect() };
+    kept(
+        "orbits.svg",
+        orbit_picture(&plot),
+        "Orbits in the equator from the same states: exact and learned.".to_string(),
+    )
+}
+
+/// Shadow and sky through the exact metric, through the learned one, and their difference, as PNG; `None` for coordinates that are not
+/// Cartesian, and where nothing rests at the place of the camera.
+///
+/// # Errors
+/// [`PipelineError::Interrupted`], if `interrupted` says so.
+pub(crate) fn sky_picture(
+    pair: &Pair<'_>,
+    mass: f64,
+    threads: usize,
+    interrupted: &(dyn Fn() -> bool + Sync),
+) -> Result<Option<Vec<u8>>, PipelineError> {
+    let Around::Cartesian(chart) = pair.around else { return Ok(None) };
+    let camera = Camera { chart, width: PIXELS, height: PIXELS, ..Camera::new(CAMERA.0 * mass, CAMERA.1) };
+    let tracing = Tracing { threads, ..Tracing::of(&camera) };
+    let mut views = Vec::new();
+    for model in [pair.exact, pair.learned] {
+        if interrupted() {
+            return Err(PipelineError::Interrupted);
+        }
+        match shadow(model, &camera, &tracing, &|_| ()) {
+            Ok(view) => views.push(view),
+            Err(_) => return Ok(None),
+        }
+    }
+    let sky = Sky::around(&camera);
+    let mut images: Vec<Image> = views.iter().map(|view| sky.image(view)).collect();
+    if let [exact, learned] = views.as_slice() {
+        images.extend(difference_image(exact, learned).ok());
+    }
+    Ok(Some(png(&Image::beside(&images, GAP))))
+}
