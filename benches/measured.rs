@@ -7,17 +7,21 @@
 //!
 //! And made motion of a cart-pendulum, where the masses are known that a fit can or cannot tell.
 //!
+//! And made orbits around a black hole with noise, of which the hole is read.
+//!
 //! `cargo bench --bench measured -- --part films FILM.csv...` takes films as `examples/pendulum_video.rs` does, 400 frames a second;
 //! without files those of Asseman, Kornuta and Ozcan ("Learning beyond simulated physics", 2018) if they stand in
 //! `../shared/data/ibm-double-pendulum`; gravity pulls along the x axis of these pictures. Every film is a recording of its own: the first four fifths are learned from, the
 //! rest is predicted, 0.5 s at a time. `-- --part noise` is the made motion, `-- --part rows` reads and surveys ten million
 //! rows and says what that took, `-- --part textbook` the films without what has to be trained, `-- --part determination` the
-//! cart-pendulum, two minutes; without `--part` all. Writes `films.csv`, `noise.csv` and `determination.csv` into `target/measured`.
+//! cart-pendulum, two minutes, `-- --part orbits` orbits around a hole, half an hour; without `--part` all. Writes `films.csv`, `noise.csv`, `determination.csv` and `orbits.csv` into `target/measured`.
 
 #[path = "measured/determination.rs"]
 mod determination;
 #[path = "measured/noise.rs"]
 mod noise;
+#[path = "measured/orbits.rs"]
+mod orbits;
 #[path = "measured/plain.rs"]
 mod plain;
 #[path = "measured/rows.rs"]
@@ -54,7 +58,7 @@ const AHEAD: [f64; 4] = [0.125, 0.25, 0.375, HORIZON];
 const THREADS: usize = 2;
 
 /// What can be measured.
-const PARTS: &[&str] = &["rows", "noise", "films", "textbook", "determination"];
+const PARTS: &[&str] = &["rows", "noise", "films", "textbook", "determination", "orbits"];
 
 /// Seeds of the cart-pendulums: those before them chose how many samples count as one.
 const SEEDS: std::ops::Range<u64> = 20..40;
@@ -199,6 +203,7 @@ pub fn trial() {
     assert_eq!(lines(&made(), &measured, Some(&measured), Some(scale)).len(), 8);
     assert_eq!(noise::compare(5, 0..1, scale).len(), 3);
     assert_eq!(determination::compare(0..1, (4, 3.0), scale).len(), 12);
+    assert_eq!(orbits::compare(&[(6, 0.001)], true, (Some(1), 1)).len(), 15);
     let place = tempfile::tempdir().expect("a folder");
     let found = rows::time(&place.path().join("rows.csv"), 2000);
     assert_eq!((found.samples, found.cuts.len(), found.warnings.len()), (2000, 0, 0));
@@ -234,6 +239,14 @@ fn main() {
         let rows = determination::compare(SEEDS, (12, 8.0), small);
         let csv = format!("forces,seed,quantity,learned,low,high,truth\n{}\n", rows.join("\n"));
         std::fs::write(folder.join("determination.csv"), csv).expect("room for the results");
+    }
+    if parts.iter().any(|part| part == "orbits") {
+        println!("errors: {}", orbits::TOLD.join("; "));
+        let counts = [10, 30, 100, 300];
+        let cases: Vec<(usize, f64)> = [0.01, 0.001].iter().flat_map(|&noise| counts.map(|n| (n, noise))).collect();
+        let rows = orbits::compare(&cases, true, (None, THREADS));
+        let csv = format!("learned_by,orbits,noise,quantity,error,seconds\n{}\n", rows.join("\n"));
+        std::fs::write(folder.join("orbits.csv"), csv).expect("room for the results");
     }
     if parts.iter().any(|part| part == "films") {
         std::fs::write(folder.join("films.csv"), filmed(films, Some(scale))).expect("room for the results");
