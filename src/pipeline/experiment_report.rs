@@ -80,7 +80,7 @@ pub(crate) fn conclude(
     let reductions = reduction_table(&experiment.reductions(&results));
     let report = remarks.iter().fold(report, |report, remark| report.paragraph(remark));
     let report = if reductions.is_empty() { report } else { report.table(&REDUCTION_HEADER, &reductions) };
-    let holes = rows_of_holes(experiment, &results, (store, threads), watch)?;
+    let holes = rows_of_holes(experiment, &results, (store, scale, threads), watch)?;
     let report = holes.iter().fold(report, |report, row| row.add_to(report));
     let report = within(taken, report.figures(&figures));
     store.write("report.html", report.to_html().as_bytes())?;

@@ -4,8 +4,6 @@ use crate::pipeline::PipelineError;
 use crate::relativity::{Around, Camera, Image, Pair, Sky, Tracing, difference_image, orbits, shadow};
 use crate::report::{Figure, OrbitPlot, Series, kept, orbit_picture, png};
 
-/// Pixels along the edge of a picture of the sky.
-const PIXELS: usize = 160;
 /// Distance of the camera over the mass, and its angle from the axis.
 const CAMERA: (f64, f64) = (20.0, 1.4);
 /// White columns between pictures.
@@ -34,7 +32,7 @@ pub(crate) fn orbit_figure(pair: &Pair<'_>, mass: f64) -> Option<Figure> {
     )
 }
 
-/// Shadow and sky through the exact metric, through the learned one, and their difference, as PNG; `None` for coordinates that are not
+/// Shadow and sky through the exact metric, through the learned one, and their difference, as PNG of so many pixels along an edge; `None` for coordinates that are not
 /// Cartesian, and where nothing rests at the place of the camera.
 ///
 /// # Errors
@@ -42,11 +40,11 @@ pub(crate) fn orbit_figure(pair: &Pair<'_>, mass: f64) -> Option<Figure> {
 pub(crate) fn sky_picture(
     pair: &Pair<'_>,
     mass: f64,
-    threads: usize,
+    (pixels, threads): (usize, usize),
     interrupted: &(dyn Fn() -> bool + Sync),
 ) -> Result<Option<Vec<u8>>, PipelineError> {
     let Around::Cartesian(chart) = pair.around else { return Ok(None) };
-    let camera = Camera { chart, width: PIXELS, height: PIXELS, ..Camera::new(CAMERA.0 * mass, CAMERA.1) };
+    let camera = Camera { chart, width: pixels, height: pixels, ..Camera::new(CAMERA.0 * mass, CAMERA.1) };
     let tracing = Tracing { threads, ..Tracing::of(&camera) };
     let mut views = Vec::new();
     for model in [pair.exact, pair.learned] {

@@ -1,7 +1,7 @@
 //! What the models of an experiment say of their black holes, beside the exact metrics: tables and pictures.
 
 use crate::configuration::Config;
-use crate::experiments::{Experiment, Picture, Record, Run};
+use crate::experiments::{Experiment, Picture, Record, Run, Scale};
 use crate::lagrangian::{Configured, EulerLagrange};
 use crate::network::NetworkLagrangian;
 use crate::network::file::ModelFile;
@@ -15,6 +15,9 @@ use crate::report::{READING_HEADER, Report, reading_table};
 pub(crate) const READINGS: &str = "readings.json";
 const ORBITS: &str = "orbits.svg";
 const SKY: &str = "sky.png";
+
+/// Pixels along the edge of a picture of the sky.
+const PIXELS: usize = 160;
 
 /// Captions of the pictures.
 const ORBITS_CAPTION: &str = "Orbits in the equator from the same states, exact and learned; the disc is the horizon.";
@@ -104,7 +107,7 @@ fn readings_of(run: &Run, store: &dyn ExperimentStore, watch: &Watch) -> Result<
 /// Orbits and sky of a run: those of its files, or new ones, which are kept there.
 fn pictures_of(
     run: &Run,
-    (store, threads): (&dyn ExperimentStore, usize),
+    (store, sky): (&dyn ExperimentStore, (usize, usize)),
     watch: &Watch,
 ) -> Result<[Option<Vec<u8>>; 2], PipelineError> {
     let there = [ORBITS, SKY].map(|name| store.read(&run.name, name));
@@ -116,7 +119,7 @@ fn pictures_of(
     let mass = pair.mass().map_err(|_| PipelineError::Hole(run.config.system.clone()))?;
     watch.say(Event::Note(&format!("tracing light through the metric of {}", run.name)));
     let orbits = orbit_figure(&pair, mass).map(|figure| figure.picture.to_svg().into_bytes());
-    let sky = sky_picture(&pair, mass, threads, &|| watch.is_interrupted())?;
+    let sky = sky_picture(&pair, mass, sky, &|| watch.is_interrupted())?;
     let output = store.open_run(&run.name)?;
     for (name, bytes) in [(ORBITS, &orbits), (SKY, &sky)] {
         bytes.as_ref().map_or(Ok(()), |bytes| output.write(name, bytes))?;
@@ -131,7 +134,7 @@ fn pictures_of(
 pub(crate) fn rows_of_holes(
     experiment: &Experiment,
     results: &[(Run, Option<Record>)],
-    (store, threads): (&dyn ExperimentStore, usize),
+    (store, scale, threads): (&dyn ExperimentStore, Scale, usize),
     watch: &Watch,
 ) -> Result<Vec<RowOfHoles>, PipelineError> {
     if !experiment.pictures.contains(&Picture::BlackHole) {
@@ -146,8 +149,9 @@ pub(crate) fn rows_of_holes(
             None => rows.push((run, vec![readings])),
         }
     }
+    let pixels = if scale == Scale::Smoke { 12 } else { PIXELS };
     let row = |(run, readings): (&Run, Vec<Vec<Reading>>)| {
-        let [orbits, sky] = pictures_of(run, (store, threads), watch)?;
+        let [orbits, sky] = pictures_of(run, (store, (pixels, threads)), watch)?;
         Ok(RowOfHoles { label: run.label.clone(), table: reading_table(&readings), orbits, sky })
     };
     let rows = rows.into_iter().map(row).collect::<Result<Vec<_>, PipelineError>>()?;

@@ -6,6 +6,8 @@ use std::ops::ControlFlow;
 
 /// Local error of the motions that are followed.
 const TOLERANCE: f64 = 1e-11;
+/// Steps of a motion, at most: many times what an orbit takes.
+const STEPS: usize = 50_000;
 /// Steps of the search between two samples, at most.
 const REFINEMENTS: usize = 60;
 
@@ -19,7 +21,14 @@ pub(super) struct State {
 
 /// Options of the motions that are followed.
 pub(super) fn options(t_end: f64, dt: f64) -> Options<f64> {
-    Options { method: Method::Dop853, rtol: TOLERANCE, atol: TOLERANCE, energy: false, ..Options::new(t_end, dt) }
+    Options {
+        method: Method::Dop853,
+        rtol: TOLERANCE,
+        atol: TOLERANCE,
+        max_steps: STEPS,
+        energy: false,
+        ..Options::new(t_end, dt)
+    }
 }
 
 /// The first sample at which `next` says so, with the one before it.
