@@ -4,6 +4,8 @@ use crate::common::accuracy::{cast, configure, input_conditions, largest, output
 use lnn::cli::parse_system;
 use lnn::lagrangian::{Configured, EulerLagrange, ExpressionLagrangian, Request, Terms, configure_system};
 use lnn::linalg::{self, Workspace};
+use lnn::network::Structure;
+use lnn::presets::Preset;
 use lnn::rollout::{Options, rollout};
 use lnn::scalar::{Dd, Scalar};
 use rand::SeedableRng;
@@ -362,4 +364,35 @@ fn what_is_to_be_learned_is_kept() {
     // A number alone is a parameter.
     let short = PENDULUM.replace("{ default = 9.8, unit = \"m/s^2\" }", "9.8");
     assert_eq!(parse_system(&short).unwrap().parameters[0].default, "9.8");
+}
+
+#[test]
+fn a_shell_says_where_training_states_lie_and_is_checked() {
+    let hole = described::<f64>(CARTESIAN, &[]);
+    let config = Preset::Quick.config(&hole).unwrap();
+    assert_eq!((config.data.shell_radius, config.data.rapidity), (Some([1.2, 110.0]), Some(1.2)));
+    assert_eq!(
+        (config.data.shell.as_slice(), config.network.radial.len()),
+        (["x", "y", "z"].map(String::from).as_slice(), 1)
+    );
+    assert_eq!(
+        (config.network.structure, config.network.cyclic.as_slice()),
+        (Structure::Metric, ["t".to_string()].as_slice())
+    );
+    // It is what the catalogue's hole learns from, but for the name of the system.
+    let catalogue = Preset::Quick.config(&configure::<f64>("schwarzschild-cartesian", &[])).unwrap();
+    assert_eq!((&config.data, &config.phases), (&catalogue.data, &catalogue.phases));
+    for (old, new, message) in [
+        ("[\"x\", \"y\", \"z\"]", "[\"x\", \"u\"]", "shell.coordinates: unknown coordinate \"u\""),
+        ("[\"x\", \"y\", \"z\"]", "[\"x\", \"x\"]", "expected coordinates of space, each once, found \"x\""),
+        ("[\"x\", \"y\", \"z\"]", "[\"t\"]", "expected coordinates of space, each once, found \"t\""),
+        ("[\"x\", \"y\", \"z\"]", "[]", "shell.coordinates: expected one name at least"),
+        ("radius = [1.2, 110]", "radius = [0, 110]", "shell.radius: expected distances above 0"),
+        ("rapidity = 1.2", "rapidity = -1", "shell.rapidity: expected a finite number, at least 0"),
+        ("time_like = true", "time_like = false", "coordinates[0]: missing key \"velocity_bounds\""),
+    ] {
+        assert!(CARTESIAN.contains(old), "{old}");
+        let (line, problem) = parse_system(&CARTESIAN.replacen(old, new, 1)).map(|_| ()).unwrap_err();
+        assert!(problem.to_string().contains(message) && line > 1, "{line}: {problem}");
+    }
 }
