@@ -5,7 +5,7 @@ use crate::cli::folder::{Folder, Locked};
 use crate::cli::heartbeat::Heartbeat;
 use crate::cli::{CliError, output};
 use crate::pipeline::{Checkpoints, Directory, Output, PipelineError, RunOutput};
-use crate::storage::{Claim, Claimant, Disk, Files, Holder, LockOwner, ReadError, Taken, remove_leftovers};
+use crate::storage::{Claim, Claimant, Disk, Files, Holder, ReadError, Taken, remove_leftovers};
 use std::fs::File;
 use std::io;
 use std::path::Path;

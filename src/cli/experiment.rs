@@ -10,7 +10,7 @@ use crate::cli::{CliError, interrupt, output};
 use crate::experiments::{Experiment, Run, Scale, experiments, find};
 use crate::names::{WIDTH, counted, wrapped};
 use crate::pipeline::{
-    Directory, ExperimentReport, RECORD, Watch, finish_runs, finished_record, merge_experiment, run_experiment,
+    Directory, ExperimentReport, RECORD, finish_runs, finished_record, merge_experiment, run_experiment,
 };
 use crate::recording::Columns;
 use crate::recording::read::read_recording;
@@ -44,7 +44,7 @@ pub struct Args {
     overwrite: bool,
 }
 
-/// What is done beside running.
+/// Work on an experiment beside running it.
 #[derive(Debug, clap::Subcommand)]
 enum Action {
     /// Write table, pictures and report from the records of finished runs, whichever machines they ran on; nothing is run.

@@ -55,7 +55,7 @@ impl fmt::Display for LockOwner {
     }
 }
 
-/// What only processes on this machine, since it was started, know of it; `None` where the system does not tell.
+/// Mark of this machine since it was started, which its processes have in common; `None` where the system does not tell.
 pub fn machine() -> Option<String> {
     let text = std::fs::read_to_string("/proc/sys/kernel/random/boot_id").ok()?;
     Some(text.trim().to_string()).filter(|id| !id.is_empty() && id.len() <= 64)

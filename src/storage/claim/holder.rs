@@ -26,7 +26,7 @@ impl State {
 pub struct Holder {
     /// Its process.
     pub owner: LockOwner,
-    /// What processes of its machine have in common, if that is known.
+    /// Mark that processes of its machine have in common, if that is known.
     pub(super) machine: Option<String>,
     /// Silence after which its claim may be taken over.
     pub lease: Duration,

@@ -33,7 +33,7 @@ const ATTEMPTS: usize = 20;
 /// Who claims: this process, with the lease of its claims.
 #[derive(Clone, Debug)]
 pub struct Claimant {
-    /// What processes of this machine have in common, if that is known.
+    /// Mark that processes of this machine have in common, if that is known.
     machine: Option<String>,
     lease: Duration,
 }
