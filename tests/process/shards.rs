@@ -19,7 +19,7 @@ const PROCESSES: usize = 8;
 /// Arguments about the runs in a directory.
 fn of_runs(out: &Path) -> Vec<String> {
     let out = out.to_str().unwrap();
-    [NAME, "--scale", "smoke", "--out", out].map(String::from).to_vec()
+    [NAME, "--scale", "smoke", "--seeds", "4", "--out", out].map(String::from).to_vec()
 }
 
 /// Words of a command, behind `lnn experiment`.
@@ -60,6 +60,7 @@ struct Turn {
     begin: f64,
     end: f64,
     finished: bool,
+    killed: bool,
 }
 
 /// Turns by their runs, as a log tells them: `2026-01-31T12:00:00.5Z  INFO lnn::pipeline::experiment: claimed run="x"`.
@@ -68,7 +69,7 @@ fn turns(log: &str, killed: Option<f64>) -> Vec<(String, Turn)> {
     for line in log.lines().filter(|line| line.contains("INFO")) {
         let (time, run) = (time(line), line.split("run=\"").nth(1).and_then(|rest| rest.split('"').next()).unwrap());
         if line.contains(": claimed ") {
-            turns.push((run.to_string(), Turn { begin: time, end: f64::NAN, finished: false }));
+            turns.push((run.to_string(), Turn { begin: time, end: f64::NAN, finished: false, killed: false }));
         } else {
             let (_, turn) = turns.iter_mut().rev().find(|(name, _)| name == run).expect("a turn begins with a claim");
             (turn.end, turn.finished) = (time, line.contains(": finished "));
@@ -76,6 +77,7 @@ fn turns(log: &str, killed: Option<f64>) -> Vec<(String, Turn)> {
     }
     for (run, turn) in turns.iter_mut().filter(|(_, turn)| turn.end.is_nan()) {
         turn.end = killed.unwrap_or_else(|| panic!("{run}: the claim was neither finished nor left"));
+        turn.killed = true;
     }
     turns
 }
@@ -112,8 +114,8 @@ fn states(out: &Path) -> BTreeMap<String, String> {
 }
 
 /// Eight processes on one experiment: four of them have a share each, the others all of it. Kills at most so many; returns how
-/// many were killed.
-fn survive(out: &Path, kills: usize, random: &mut ChaCha8Rng) -> usize {
+/// many were killed, and how many of these at work on a run.
+fn survive(out: &Path, kills: usize, random: &mut ChaCha8Rng) -> (usize, usize) {
     fs::create_dir_all(out).unwrap();
     let arguments = |process: usize| {
         let share = format!("{}/{}", process + 1, PROCESSES / 2);
@@ -128,7 +130,7 @@ fn survive(out: &Path, kills: usize, random: &mut ChaCha8Rng) -> usize {
     let mut under_way: Vec<(usize, Process)> = (0..PROCESSES).map(|process| (process, start(process))).collect();
     let (mut done, mut found) = (0, Vec::new());
     while !under_way.is_empty() {
-        std::thread::sleep(Duration::from_secs_f64(random.random_range(0.0..0.3)));
+        std::thread::sleep(Duration::from_secs_f64(random.random_range(0.0..0.2)));
         let victim = random.random_range(0..under_way.len());
         if done < kills {
             let (process, victim) = &mut under_way[victim];
@@ -152,6 +154,7 @@ fn survive(out: &Path, kills: usize, random: &mut ChaCha8Rng) -> usize {
         });
     }
 
+    let at_work = found.iter().filter(|(_, turn)| turn.killed).count();
     let mut by_run: BTreeMap<String, Vec<Turn>> = BTreeMap::new();
     found.into_iter().for_each(|(run, turn)| by_run.entry(run).or_default().push(turn));
     for (run, turns) in &mut by_run {
@@ -163,7 +166,7 @@ fn survive(out: &Path, kills: usize, random: &mut ChaCha8Rng) -> usize {
     let states = states(out);
     assert!(states.values().all(|state| state == "finished"), "{states:?}");
     assert!(states.keys().eq(by_run.keys()), "{:?}", by_run.keys());
-    done
+    (done, at_work)
 }
 
 #[test]
@@ -174,12 +177,13 @@ fn fifty_kills_of_eight_processes() {
     let expected = tables(&alone);
     assert!(expected.contains_key("table.csv") && expected.contains_key("report.html") && expected.len() > 3);
     let mut random = ChaCha8Rng::seed_from_u64(1);
-    let (mut killed, mut round) = (0, 0);
+    let (mut killed, mut at_work, mut round) = (0, 0, 0);
     // As many rounds as it takes.
     while killed < 50 {
         round += 1;
         let out = folder.path().join(format!("round {round}"));
-        killed += survive(&out, 50 - killed, &mut random);
+        let (more, of_these) = survive(&out, 50 - killed, &mut random);
+        (killed, at_work) = (killed + more, at_work + of_these);
         for _ in 0..2 {
             succeed(&words(&["merge"], &out, &[]));
             let merged = tables(&out);
@@ -188,11 +192,13 @@ fn fifty_kills_of_eight_processes() {
                 assert!(*bytes == expected[name], "{name} differs in round {round}");
             }
         }
+        println!("round {round}: {killed} kills so far, {at_work} at work on a run");
         for run in states(&out).keys() {
             let model = |out: &Path| fs::read(out.join(format!("{NAME}-smoke/{run}/model.safetensors"))).unwrap();
             assert!(model(&out) == model(&alone), "the models of {run} differ");
         }
     }
+    assert!(at_work >= 10, "only {at_work} of {killed} kills hit a claimant at work");
 }
 
 #[test]
