@@ -3,6 +3,7 @@
 //! | page | for |
 //! |---|---|
 //! | [`commands`] | every command and option of the program, exit codes, files |
+//! | [`many_machines`] | an experiment on a cluster or by many processes: shares, claims, one table |
 //! | [`system_files`] | a system of your own as a text file: Lagrangian or metric, formulas |
 //! | [`configuration`] | every key of `config.toml`, presets |
 //! | [`recorded_motion`] | data of your own: formats, noise, friction, films |
@@ -26,6 +27,7 @@ macro_rules! page {
     ($file:literal) => {
         concat!(
             "[commands]: crate::docs::commands\n",
+            "[many-machines]: crate::docs::many_machines\n",
             "[rollout]: crate::docs::commands#lnn-rollout\n",
             "[configuration]: crate::docs::configuration\n",
             "[system-files]: crate::docs::system_files\n",
@@ -67,6 +69,7 @@ macro_rules! pages {
 
 pages! {
     commands "commands.md";
+    many_machines "many-machines.md";
     system_files "system-files.md";
     configuration "configuration.md";
     recorded_motion "recorded-motion.md";

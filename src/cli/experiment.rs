@@ -1,21 +1,59 @@
-//! `lnn experiment`: the paper's tables and figures, one command each; finished runs are not run again.
+//! `lnn experiment`: the paper's tables and figures, one command each, on one machine or many; finished runs are not run again.
 
+use crate::cli::experiment_folder::ExperimentFolder;
+use crate::cli::experiment_list::{Listed, list};
 use crate::cli::files::{holds_something, require_free};
-use crate::cli::folder::Folder;
-use crate::cli::number::{count, threads};
+use crate::cli::number::{count, positive, threads};
+use crate::cli::shard::Shard;
 use crate::cli::watch::watch;
 use crate::cli::{CliError, interrupt, output};
 use crate::experiments::{Experiment, Run, Scale, experiments, find};
-use crate::names::{WIDTH, wrapped};
-use crate::pipeline::{Directory, RECORD, Watch, finished_record, run_experiment};
+use crate::names::{WIDTH, counted, wrapped};
+use crate::pipeline::{
+    Directory, ExperimentReport, RECORD, finish_runs, finished_record, merge_experiment, run_experiment,
+};
 use crate::recording::Columns;
 use crate::recording::read::read_recording;
 use crate::report::{Curve, EXPERIMENT_HEADER, text_table};
+use crate::storage::Claimant;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
+#[command(args_conflicts_with_subcommands = true, disable_help_subcommand = true)]
 pub struct Args {
+    #[command(subcommand)]
+    action: Option<Action>,
+    #[command(flatten)]
+    chosen: Chosen,
+    /// Threads; as many runs go side by side, and the results do not depend on them [default: all].
+    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = count)]
+    threads: Option<usize>,
+    /// Only the I-th of N shares of the runs, I from 1 to N; no tables are written [default: that of a Slurm array, or all].
+    #[arg(long, value_name = "I/N")]
+    shard: Option<Shard>,
+    /// Seconds after which a process that is not heard of loses its run to another machine.
+    #[arg(long, value_name = "SECONDS", default_value = "120", allow_hyphen_values = true, value_parser = lease)]
+    lease: Duration,
+    /// List the runs: finished, claimed by which process, or open.
+    #[arg(long, requires = "name", conflicts_with_all = ["beside", "overwrite"])]
+    list: bool,
+    /// Replace finished runs that are of other configurations.
+    #[arg(long)]
+    overwrite: bool,
+}
+
+/// Work on an experiment beside running it.
+#[derive(Debug, clap::Subcommand)]
+enum Action {
+    /// Write table, pictures and report from the records of finished runs, whichever machines they ran on; nothing is run.
+    Merge(Chosen),
+}
+
+/// Experiments and what of them.
+#[derive(Debug, clap::Args)]
+struct Chosen {
     /// An experiment by name, or `all`; without a name they are listed with the tables and figures they regenerate.
     name: Option<String>,
     /// Share of the paper's budget.
@@ -27,9 +65,6 @@ pub struct Args {
     /// Only the runs whose row of the table begins with this text; a later command without it goes on from there.
     #[arg(long, value_name = "TEXT")]
     only: Option<String>,
-    /// Threads; as many runs go side by side, and the results do not depend on them [default: all].
-    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = count)]
-    threads: Option<usize>,
     /// A curve from elsewhere for the picture of time-to-accuracy: a CSV with the columns seconds and validation_loss; may be
     /// repeated.
     #[arg(long, value_name = "LABEL=FILE.csv", value_parser = beside)]
@@ -40,9 +75,6 @@ pub struct Args {
     /// One JSON object per line instead of tables.
     #[arg(long)]
     json: bool,
-    /// Replace finished runs that are of other configurations.
-    #[arg(long)]
-    overwrite: bool,
 }
 
 #[derive(Clone, Copy, Debug, clap::ValueEnum)]
@@ -55,50 +87,155 @@ enum ScaleName {
     Paper,
 }
 
-/// Runs experiments, or lists them.
-///
-/// # Errors
-/// A usage error for an unknown name, a data error for a directory that cannot be written or that another run holds, an
-/// interruption; runs that are finished stay finished.
-pub fn run(args: &Args) -> Result<(), CliError> {
-    let Some(name) = &args.name else {
-        interrupt::end_at_once().map_err(CliError::signals)?;
-        return output::print(&listing(args.json));
-    };
-    let scale = match args.scale {
-        ScaleName::Smoke => Scale::Smoke,
-        ScaleName::Short => Scale::Short,
-        ScaleName::Paper => Scale::Paper,
-    };
-    let chosen: Vec<&Experiment> =
-        if name == "all" { experiments().iter().collect() } else { vec![find(name).map_err(CliError::usage)?] };
-    let chosen = chosen_runs(args, &chosen, scale)?;
-    for (experiment, runs) in &chosen {
-        let path = args.out.join(format!("{}-{}", experiment.name, scale.name()));
-        let inputs: Vec<&Path> = args.beside.iter().map(|(_, file)| file.as_path()).collect();
-        WRITTEN.iter().try_for_each(|name| require_free(&path.join(name), &inputs, true))?;
-        if !args.overwrite {
-            require_same(&path, runs)?;
+impl Chosen {
+    fn scale(&self) -> Scale {
+        match self.scale {
+            ScaleName::Smoke => Scale::Smoke,
+            ScaleName::Short => Scale::Short,
+            ScaleName::Paper => Scale::Paper,
         }
     }
-    let curves = args.beside.iter().map(curve).collect::<Result<Vec<Curve>, CliError>>()?;
+
+    /// The experiments asked for.
+    fn experiments(&self) -> Result<Vec<&'static Experiment>, CliError> {
+        match self.name.as_deref() {
+            Some("all") => Ok(experiments().iter().collect()),
+            Some(name) => Ok(vec![find(name).map_err(CliError::usage)?]),
+            None => Err(CliError::usage("missing the name of an experiment, or `all`")),
+        }
+    }
+
+    /// Directory of an experiment.
+    fn directory(&self, experiment: &Experiment) -> PathBuf {
+        self.out.join(format!("{}-{}", experiment.name, self.scale().name()))
+    }
+
+    /// Words of a command about the same runs, behind a verb.
+    fn words(&self, experiment: &Experiment) -> String {
+        let mut words = format!("{} --scale {}", experiment.name, self.scale().name());
+        if self.seeds != 1 {
+            words += &format!(" --seeds {}", self.seeds);
+        }
+        if self.out != Path::new("runs/experiments") {
+            words += &format!(" --out {}", self.out.display());
+        }
+        words
+    }
+}
+
+/// Runs experiments, a share of them, or lists them; makes tables of what others ran.
+///
+/// # Errors
+/// A usage error for an unknown name or a share that cannot be told, a data error for a directory that cannot be written or
+/// records that are missing, an interruption; runs that are finished stay finished.
+pub fn run(args: &Args) -> Result<(), CliError> {
+    if let Some(Action::Merge(chosen)) = &args.action {
+        return merge(chosen, &Claimant::this(args.lease));
+    }
+    let chosen = &args.chosen;
+    if chosen.name.is_none() {
+        interrupt::end_at_once().map_err(CliError::signals)?;
+        return output::print(&listing(chosen.json));
+    }
+    let claimant = Claimant::this(args.lease);
+    let all = numbered(chosen_runs(chosen, &chosen.experiments()?)?);
+    if args.list {
+        interrupt::end_at_once().map_err(CliError::signals)?;
+        return listed(chosen, share(all, args.shard), &claimant);
+    }
+    let shard = match args.shard {
+        Some(shard) => Some(shard),
+        None => Shard::of_slurm(|name| std::env::var(name).ok()).map_err(CliError::usage)?.inspect(|shard| {
+            output::note(&format!("share {shard} of the runs, by SLURM_ARRAY_TASK_ID; --shard 1/1 takes all of them"));
+        }),
+    };
+    let shard = shard.filter(|shard| shard.is_part());
+    let shares = share(all, shard);
+    for (experiment, runs) in &shares {
+        require_writable(chosen, experiment)?;
+        if !args.overwrite {
+            let replace = "--overwrite replaces it, or choose another --out";
+            require_same(&chosen.directory(experiment), runs.iter().map(|(_, run)| run), replace)?;
+        }
+    }
+    let curves = curves(chosen)?;
     let stop = interrupt::flag().map_err(CliError::signals)?;
-    for (experiment, runs) in chosen {
-        let path = args.out.join(format!("{}-{}", experiment.name, scale.name()));
-        perform((experiment, scale), runs, threads(args.threads), &path, (&curves, &watch(&stop), args.json))?;
+    for (experiment, runs) in shares {
+        let folder = ExperimentFolder::new(&chosen.directory(experiment), claimant.clone());
+        let (threads, watch) = (threads(args.threads), watch(&stop));
+        let runs: Vec<Run> = runs.into_iter().map(|(_, run)| run).collect();
+        let of = (experiment, chosen.scale());
+        match shard {
+            None => told(chosen, experiment, &run_experiment(of, runs, threads, &curves, &folder, &watch)?)?,
+            Some(shard) => {
+                let results = finish_runs(of, runs, threads, &folder, &watch)?;
+                told_of_share(chosen, experiment, shard, results.len())?;
+            }
+        }
     }
     Ok(())
 }
 
+/// Makes table, pictures and report of the records that are there.
+fn merge(chosen: &Chosen, claimant: &Claimant) -> Result<(), CliError> {
+    let all = chosen_runs(chosen, &chosen.experiments()?)?;
+    for (experiment, runs) in &all {
+        require_writable(chosen, experiment)?;
+        let same = "give the --scale and --seeds that the runs were made with";
+        require_same(&chosen.directory(experiment), runs.iter(), same)?;
+    }
+    let curves = curves(chosen)?;
+    let stop = interrupt::flag().map_err(CliError::signals)?;
+    for (experiment, runs) in all {
+        let path = chosen.directory(experiment);
+        let folder = ExperimentFolder::new(&path, claimant.clone());
+        let of = (experiment, chosen.scale());
+        let done = merge_experiment(of, runs, &curves, &folder, &watch(&stop))
+            .map_err(|error| CliError::file(&path, error))?;
+        if done.finished < done.results.len() {
+            let open = counted(done.results.len() - done.finished, "run is", "runs are");
+            let words = chosen.words(experiment);
+            output::note(&format!("{open} not finished; `lnn experiment {words} --list` says which"));
+        }
+        told(chosen, experiment, &done)?;
+    }
+    Ok(())
+}
+
+/// Runs with their numbers, which count on from one experiment to the next.
+type Numbered = Vec<(&'static Experiment, Vec<(usize, Run)>)>;
+
+/// Gives every run its number, from 0.
+fn numbered(all: Vec<(&'static Experiment, Vec<Run>)>) -> Numbered {
+    let mut numbers = 0..;
+    all.into_iter().map(|(experiment, runs)| (experiment, numbers.by_ref().zip(runs).collect())).collect()
+}
+
+/// The runs of a share, of those experiments that have any in it.
+fn share(all: Numbered, shard: Option<Shard>) -> Numbered {
+    let Some(shard) = shard else { return all };
+    let of = |(experiment, mut runs): (&'static Experiment, Vec<(usize, Run)>)| {
+        runs.retain(|(number, _)| shard.holds(*number));
+        (experiment, runs)
+    };
+    all.into_iter().map(of).filter(|(_, runs)| !runs.is_empty()).collect()
+}
+
+/// Refuses tables that cannot be written, or that the command reads.
+fn require_writable(chosen: &Chosen, experiment: &Experiment) -> Result<(), CliError> {
+    let inputs: Vec<&Path> = chosen.beside.iter().map(|(_, file)| file.as_path()).collect();
+    let path = chosen.directory(experiment);
+    WRITTEN.iter().try_for_each(|name| require_free(&path.join(name), &inputs, true))
+}
+
 /// The experiments with those of their runs that were asked for, if there are any.
-fn chosen_runs<'a>(
-    args: &Args,
-    chosen: &[&'a Experiment],
-    scale: Scale,
-) -> Result<Vec<(&'a Experiment, Vec<Run>)>, CliError> {
-    let all = || chosen.iter().map(|experiment| (*experiment, experiment.runs(scale, args.seeds)));
-    let Some(text) = &args.only else { return Ok(all().collect()) };
-    let of = |(experiment, runs): (&'a Experiment, Vec<Run>)| {
+fn chosen_runs(
+    chosen: &Chosen,
+    experiments: &[&'static Experiment],
+) -> Result<Vec<(&'static Experiment, Vec<Run>)>, CliError> {
+    let all = || experiments.iter().map(|experiment| (*experiment, experiment.runs(chosen.scale(), chosen.seeds)));
+    let Some(text) = &chosen.only else { return Ok(all().collect()) };
+    let of = |(experiment, runs): (&'static Experiment, Vec<Run>)| {
         (experiment, runs.into_iter().filter(|run| run.label.starts_with(text)).collect::<Vec<Run>>())
     };
     let kept: Vec<_> = all().map(of).filter(|(_, runs)| !runs.is_empty()).collect();
@@ -121,8 +258,8 @@ fn seeds(text: &str) -> Result<usize, String> {
 /// Tables of an experiment, made anew of the records of its runs.
 const WRITTEN: [&str; 2] = ["table.csv", "curves.csv"];
 
-/// Refuses a directory with finished runs of other configurations than those asked for.
-fn require_same(path: &Path, runs: &[Run]) -> Result<(), CliError> {
+/// Refuses a directory with finished runs of other configurations than those asked for; `hint` says what to do then.
+fn require_same<'a>(path: &Path, runs: impl Iterator<Item = &'a Run>, hint: &str) -> Result<(), CliError> {
     let store = Directory::at(path);
     let mut others = Vec::new();
     for run in runs {
@@ -132,10 +269,18 @@ fn require_same(path: &Path, runs: &[Run]) -> Result<(), CliError> {
     }
     let Some((first, more)) = others.split_first() else { return Ok(()) };
     let more = if more.is_empty() { String::new() } else { format!(" (and {} more)", more.len()) };
-    let problem = format!(
-        "a finished run of another configuration is there{more}; --overwrite replaces it, or choose another --out"
-    );
+    let problem = format!("a finished run of another configuration is there{more}; {hint}");
     Err(CliError::file(&path.join(first), problem))
+}
+
+/// A lease, from a tenth of a second to a day.
+fn lease(text: &str) -> Result<Duration, String> {
+    let seconds = positive(text)?;
+    if (0.1..=86_400.0).contains(&seconds) {
+        Ok(Duration::from_secs_f64(seconds))
+    } else {
+        Err("expected seconds from 0.1 to 86400".to_string())
+    }
 }
 
 /// `label=file`.
@@ -146,6 +291,11 @@ fn beside(text: &str) -> Result<(String, PathBuf), String> {
         }
         _ => Err("expected LABEL=FILE.csv".to_string()),
     }
+}
+
+/// The curves from elsewhere.
+fn curves(chosen: &Chosen) -> Result<Vec<Curve>, CliError> {
+    chosen.beside.iter().map(curve).collect()
 }
 
 /// A curve of loss against time from a file.
@@ -172,25 +322,34 @@ fn listing(json: bool) -> String {
     text_table(&["experiment", "of the paper", "runs"], &rows)
 }
 
-fn perform(
-    (experiment, scale): (&Experiment, Scale),
-    runs: Vec<Run>,
-    threads: usize,
-    path: &Path,
-    (beside, watch, json): (&[Curve], &Watch, bool),
-) -> Result<(), CliError> {
-    let folder = Folder::open(path)?;
-    let done = run_experiment((experiment, scale), runs, threads, beside, &folder, watch)?;
-    let report = folder.file("report.html");
-    if json {
+/// Prints the runs with their states.
+fn listed(chosen: &Chosen, runs: Numbered, claimant: &Claimant) -> Result<(), CliError> {
+    let mut all = Vec::new();
+    for (experiment, runs) in runs {
+        all.extend(list(&chosen.directory(experiment), experiment.name, runs, claimant)?);
+    }
+    if chosen.json {
+        return output::print(
+            &all.iter().map(|run| format!("{}\n", run.json(chosen.scale().name()))).collect::<String>(),
+        );
+    }
+    let rows: Vec<Vec<String>> = all.iter().map(Listed::row).collect();
+    output::print(&text_table(&["number", "experiment", "run", "state"], &rows))
+}
+
+/// Prints the table of an experiment.
+fn told(chosen: &Chosen, experiment: &Experiment, done: &ExperimentReport) -> Result<(), CliError> {
+    let report = chosen.directory(experiment).join("report.html");
+    if chosen.json {
         let row = |cells: &Vec<String>| {
             let named = EXPERIMENT_HEADER.iter().zip(cells);
             named.map(|(name, cell)| (name.to_string(), cell.as_str().into())).collect::<serde_json::Map<_, _>>()
         };
         let object = serde_json::json!({
             "experiment": experiment.name,
-            "scale": scale.name(),
+            "scale": chosen.scale().name(),
             "runs": done.results.len(),
+            "finished": done.finished,
             "training_seconds": done.training_seconds,
             "rows": done.table.iter().map(row).collect::<Vec<_>>(),
             "report": report.display().to_string(),
@@ -198,4 +357,20 @@ fn perform(
         return output::print(&format!("{object}\n"));
     }
     output::print(&(done.text().to_string() + &wrapped(&format!("report: {}\n\n", report.display()), WIDTH)))
+}
+
+/// Prints what became of a share of an experiment.
+fn told_of_share(chosen: &Chosen, experiment: &Experiment, shard: Shard, runs: usize) -> Result<(), CliError> {
+    if chosen.json {
+        let (name, scale) = (experiment.name, chosen.scale().name());
+        let object = serde_json::json!({
+            "experiment": name, "scale": scale, "shard": shard.to_string(), "runs": runs, "finished": runs,
+        });
+        return output::print(&format!("{object}\n"));
+    }
+    let (name, words) = (experiment.name, chosen.words(experiment));
+    output::print(&format!(
+        "{name}: share {shard} is finished, {}; table and report of all shares by\nlnn experiment merge {words}\n",
+        counted(runs, "run", "runs")
+    ))
 }

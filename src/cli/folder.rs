@@ -1,9 +1,8 @@
 //! A directory that a command fills, held by one run at a time.
 
-use crate::cli::lock_owner::LockOwner;
 use crate::cli::{CliError, output, results};
-use crate::pipeline::{Checkpoints, Directory, ExperimentStore, MODEL, Output, PipelineError, RunOutput};
-use crate::storage::{Disk, remove_leftovers, write_atomically};
+use crate::pipeline::{MODEL, Output, PipelineError};
+use crate::storage::{Disk, LockOwner, remove_leftovers, write_atomically};
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
@@ -34,6 +33,15 @@ pub enum Attempt {
     Held(String),
 }
 
+/// Result of an attempt to lock a directory.
+#[derive(Debug)]
+pub enum Locked {
+    /// It is ours; taken over from a process that is gone, if there is one.
+    Ours(Folder, Option<LockOwner>),
+    /// Another process holds it; which, as far as that is known.
+    Held(Option<LockOwner>),
+}
+
 impl Folder {
     /// Creates the directory if need be, takes its lock, and removes what writers killed in the middle left.
     ///
@@ -53,14 +61,30 @@ impl Folder {
     /// # Errors
     /// A data error if it cannot be created or written.
     pub fn attempt(path: &Path) -> Result<Attempt, CliError> {
+        Ok(match Self::lock(path)? {
+            Locked::Ours(folder, before) => {
+                remove_leftovers(&Disk, path);
+                if let Some(holder) = before {
+                    output::note(&format!("{}: taken over from {holder}, which is gone", path.display()));
+                }
+                Attempt::Open(folder)
+            }
+            Locked::Held(holder) => Attempt::Held(holder.map(|holder| format!(" ({holder})")).unwrap_or_default()),
+        })
+    }
+
+    /// Creates the directory if need be and takes its lock; what writers killed in the middle left stays.
+    ///
+    /// # Errors
+    /// A data error if it cannot be created or written.
+    pub fn lock(path: &Path) -> Result<Locked, CliError> {
         fs::create_dir_all(path).map_err(|e| CliError::file(path, format_args!("cannot create the directory: {e}")))?;
         for _ in 0..ATTEMPTS {
             match lock(path)? {
-                Lock::Ours(lock) => {
-                    remove_leftovers(&Disk, path);
-                    return Ok(Attempt::Open(Self { path: path.to_path_buf(), _lock: lock }));
+                Lock::Ours(lock, before) => {
+                    return Ok(Locked::Ours(Self { path: path.to_path_buf(), _lock: lock }, before));
                 }
-                Lock::Held(holder) => return Ok(Attempt::Held(holder)),
+                Lock::Held(holder) => return Ok(Locked::Held(holder)),
                 Lock::Gone => {}
             }
         }
@@ -70,6 +94,13 @@ impl Folder {
                 "cannot lock the directory: other processes took it in each of {ATTEMPTS} attempts; try again"
             ),
         ))
+    }
+
+    /// The process that holds the lock of a directory, if one does; inside, which, as far as that is known.
+    pub fn holder(path: &Path) -> Option<Option<LockOwner>> {
+        let mut file = File::open(path.join(LOCK)).ok()?;
+        let owner = LockOwner::parse(&text(&mut file));
+        matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)).then_some(owner)
     }
 
     /// The directory.
@@ -96,37 +127,12 @@ impl Output for Folder {
     }
 }
 
-impl RunOutput for Folder {
-    fn remove(&self, name: &str) -> Result<(), PipelineError> {
-        Directory::at(&self.path).remove(name)
-    }
-
-    fn checkpoints(&self) -> Option<Checkpoints> {
-        Directory::at(&self.path).checkpoints()
-    }
-}
-
-impl ExperimentStore for Folder {
-    fn read(&self, run: &str, name: &str) -> Option<Vec<u8>> {
-        Directory::at(&self.path).read(run, name)
-    }
-
-    fn names(&self, run: &str) -> Vec<String> {
-        Directory::at(&self.path).names(run)
-    }
-
-    fn open_run(&self, run: &str) -> Result<Box<dyn RunOutput + '_>, PipelineError> {
-        let folder = Self::open(&self.path.join(run)).map_err(|error| PipelineError::Place(error.to_string()))?;
-        Ok(Box::new(folder))
-    }
-}
-
 /// The lock file of a directory.
 enum Lock {
-    /// Locked by us.
-    Ours(File),
-    /// Locked by another process, in words.
-    Held(String),
+    /// Locked by us; left by a process that is gone, if there is one.
+    Ours(File, Option<LockOwner>),
+    /// Locked by another process.
+    Held(Option<LockOwner>),
     /// Removed by its holder meanwhile.
     Gone,
 }
@@ -145,10 +151,7 @@ fn lock(directory: &Path) -> Result<Lock, CliError> {
     let cannot = |e: io::Error| CliError::file(directory, format_args!("cannot lock the directory: {e}"));
     match file.try_lock() {
         Ok(()) => {}
-        Err(TryLockError::WouldBlock) => {
-            let holder = LockOwner::parse(&before).map(|holder| format!(" ({holder})")).unwrap_or_default();
-            return Ok(Lock::Held(holder));
-        }
+        Err(TryLockError::WouldBlock) => return Ok(Lock::Held(LockOwner::parse(&before))),
         Err(TryLockError::Error(e)) => return Err(cannot(e)),
     }
     let own = LockOwner::this().text();
@@ -161,10 +164,7 @@ fn lock(directory: &Path) -> Result<Lock, CliError> {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Lock::Gone),
         Err(error) => return Err(cannot(error)),
     }
-    if let Some(holder) = LockOwner::parse(&before) {
-        output::note(&format!("{}: taken over from {holder}, which is gone", directory.display()));
-    }
-    Ok(Lock::Ours(file))
+    Ok(Lock::Ours(file, LockOwner::parse(&before)))
 }
 
 /// The beginning of a file, as far as it is text.

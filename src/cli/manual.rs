@@ -41,9 +41,11 @@ pub fn completions(args: &CompletionsArgs, mut program: Command) -> Result<(), C
 pub fn man(args: &ManArgs, program: Command) -> Result<(), CliError> {
     let mut program = program.disable_help_subcommand(true);
     program.build();
-    let pages: Vec<Command> = std::iter::once(program.clone()).chain(program.get_subcommands().cloned()).collect();
+    let commands = || program.get_subcommands().cloned();
+    let pages: Vec<Command> = std::iter::once(program.clone()).chain(commands()).collect();
     if let Some(directory) = &args.out {
-        return pages.iter().try_for_each(|command| write(directory, command));
+        let inner: Vec<Command> = commands().flat_map(|c| c.get_subcommands().cloned().collect::<Vec<_>>()).collect();
+        return pages.iter().chain(&inner).try_for_each(|command| write(directory, command));
     }
     let name = args.command.as_deref().unwrap_or(program.get_name());
     let found = pages.iter().find(|command| command.get_name() == name).ok_or_else(|| {

@@ -63,7 +63,7 @@ fn options(arguments: &[OsString]) -> Vec<String> {
     let mut program = Cli::command();
     program.build();
     let named = arguments.iter().skip(1).filter_map(|argument| argument.to_str());
-    let command = named.filter_map(|name| program.find_subcommand(name)).next().unwrap_or(&program);
+    let command = named.fold(&program, |command, name| command.find_subcommand(name).unwrap_or(command));
     let mut known: Vec<String> =
         command.get_arguments().filter_map(|a| a.get_long()).map(|l| format!("--{l}")).collect();
     known.sort();
@@ -96,6 +96,12 @@ mod tests {
                 "--rtol: double precision cannot keep it, the least is 2e-15, found \"1e-30\"",
             ),
             ("lnn check data.csv", "missing --coords <q1,q2>"),
+            ("lnn experiment merge quick --seds 3", "unknown option \"--seds\", did you mean \"--seeds\"?"),
+            ("lnn experiment merge quick --shard 1/2", "unknown option \"--shard\", expected one of --"),
+            (
+                "lnn experiment quick --shard 0/2",
+                "--shard: expected I/N, two whole numbers, I from 1 to N, found \"0/2\"",
+            ),
             (
                 "lnn check d --coords x --rate 5 --time t",
                 "the argument '--rate <HZ>' cannot be used with '--time <COLUMN>'",

@@ -134,6 +134,11 @@ impl Experiment {
         self.pictures.contains(&Picture::Clock)
     }
 
+    /// `true` if black holes are read off its models.
+    pub fn reads_holes(&self) -> bool {
+        self.pictures.contains(&Picture::BlackHole)
+    }
+
     /// The runs at a scale, each for `seeds` seeds from 0; runs that the paper itself repeats keep their own seeds apart.
     pub fn runs(&self, scale: Scale, seeds: usize) -> Vec<Run> {
         Self::seeded((self.runs)(), scale, seeds)
@@ -141,8 +146,7 @@ impl Experiment {
 
     /// The runs of a system of one's own instead of the experiment's; `None` if it is about certain systems.
     pub fn runs_of(&self, system: &Configured<f64>, scale: Scale, seeds: usize) -> Option<Vec<Run>> {
-        let about_any = self.pictures.contains(&Picture::BlackHole);
-        about_any.then(|| Self::seeded(black_holes::runs_of(system), scale, seeds))
+        self.reads_holes().then(|| Self::seeded(black_holes::runs_of(system), scale, seeds))
     }
 
     fn seeded(runs: Vec<Run>, scale: Scale, seeds: usize) -> Vec<Run> {

@@ -110,6 +110,12 @@ pub enum PipelineError {
     /// The flag of the watch was raised while a finished model was judged.
     #[error("interrupted while the model was judged: the model is written, tables and report are not")]
     Interrupted,
+    /// Tables of an experiment none of whose runs is finished.
+    #[error("none of {} is finished: there are no records to make tables of", crate::names::counted(*total, "run", "runs"))]
+    NothingFinished {
+        /// Runs asked for.
+        total: usize,
+    },
     /// The flag of the watch was raised while an experiment ran.
     #[error("interrupted with {finished} of {} finished", crate::names::counted(*total, "run", "runs"))]
     InterruptedRuns {

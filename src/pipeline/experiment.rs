@@ -1,21 +1,24 @@
-//! Experiments: their runs side by side, those that are finished not again, and the tables that come of them.
+//! Experiments: their runs side by side, in this process and others, those that are finished not again, and the tables that come
+//! of them.
 
 use crate::experiments::{Experiment, Outcome, Record, Run, Scale};
 use crate::pipeline::checkpoints::Begin;
+use crate::pipeline::experiment_queue::Queue;
 use crate::pipeline::experiment_report::{ExperimentReport, Results, conclude};
-use crate::pipeline::experiment_store::ExperimentStore;
-use crate::pipeline::readings::READINGS;
+use crate::pipeline::experiment_store::{ExperimentStore, RunClaim, RunOutput};
+use crate::pipeline::readings::{READINGS, read_hole};
 use crate::pipeline::train::{RunOptions, train};
 use crate::pipeline::{Event, PipelineError, RECORD, Watch};
 use crate::report::Curve;
 use crate::training::{Stop, TrainingError};
-use std::collections::BTreeMap;
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Mutex, PoisonError};
+use std::sync::Arc;
 use std::time::Instant;
 
 /// Runs an experiment, `runs` of it, on so many threads, and writes table, pictures and report; runs whose records are in the
 /// store and are of the same configuration are not run again. `beside` are curves of loss against time from elsewhere.
+///
+/// Several processes may run the same experiment in the same store at a time, if the store has claims: each run is one
+/// process's, and this returns when all of `runs` are finished, by whomever.
 ///
 /// # Errors
 /// Files that cannot be written, [`PipelineError::InterruptedRuns`]; runs that are finished stay finished.
@@ -28,22 +31,61 @@ pub fn run_experiment(
     watch: &Watch,
 ) -> Result<ExperimentReport, PipelineError> {
     let started = Instant::now();
+    let results = finish_runs((experiment, scale), runs, threads, store, watch)?;
+    conclude((experiment, scale), results, beside, store, watch, Some(started))
+}
+
+/// Writes table, pictures and report from the records that are in a store, and from nothing else; nothing is run. The same records
+/// give the same bytes, whichever machines they were made on.
+///
+/// # Errors
+/// [`PipelineError::NothingFinished`]; files that cannot be written.
+pub fn merge_experiment(
+    (experiment, scale): (&Experiment, Scale),
+    runs: Vec<Run>,
+    beside: &[Curve],
+    store: &dyn ExperimentStore,
+    watch: &Watch,
+) -> Result<ExperimentReport, PipelineError> {
+    let with_record = |run: Run| finished_record(store, &run).map(|record| (run, record));
+    let results = runs.into_iter().map(with_record).collect::<Result<Results, PipelineError>>()?;
+    if results.iter().all(|(_, record)| record.is_none()) {
+        return Err(PipelineError::NothingFinished { total: results.len() });
+    }
+    conclude((experiment, scale), results, beside, store, watch, None)
+}
+
+/// Runs `runs` of an experiment until each is finished, by this process or by another that claimed it; no tables are written.
+///
+/// # Errors
+/// As of [`run_experiment`].
+pub fn finish_runs(
+    (experiment, scale): (&Experiment, Scale),
+    runs: Vec<Run>,
+    threads: usize,
+    store: &dyn ExperimentStore,
+    watch: &Watch,
+) -> Result<Results, PipelineError> {
     let total = runs.len();
-    let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
-    let results: Mutex<BTreeMap<usize, Result<Option<Record>, PipelineError>>> = Mutex::new(BTreeMap::new());
     let abreast = if experiment.is_timed() { 1 } else { threads.min(total).max(1) };
+    let queue = Queue::new(total);
     watch.say(Event::Runs { done: 0, total });
     let work = || {
-        loop {
-            let index = next.fetch_add(1, Ordering::Relaxed);
+        while let Some(index) = queue.next(watch) {
             let Some(run) = runs.get(index) else { break };
-            let result = one(run, scale, (threads / abreast).max(1), store, watch);
-            watch.say(Event::Runs { done: done.fetch_add(1, Ordering::Relaxed) + 1, total });
-            let failed = result.is_err();
-            results.lock().unwrap_or_else(PoisonError::into_inner).insert(index, result);
-            if failed || watch.is_interrupted() {
-                // No new runs; those of the other threads come to their own end.
-                next.store(total, Ordering::Relaxed);
+            match one(run, (experiment, scale), (threads / abreast).max(1), store, watch) {
+                Ok(Turn::Held(holder)) => {
+                    if queue.put_back(index) {
+                        watch.say(Event::Note(&format!("{}: {holder} works on it; waiting for its record", run.name)));
+                    }
+                }
+                // No other is begun: the flag of the watch is up.
+                Ok(Turn::Interrupted) => {}
+                Ok(Turn::Finished(record)) => {
+                    let done = queue.finish(index, Ok(record));
+                    watch.say(Event::Runs { done, total });
+                }
+                Err(error) => _ = queue.finish(index, Err(error)),
             }
         }
     };
@@ -52,33 +94,74 @@ pub fn run_experiment(
             scope.spawn(work);
         }
     });
-    let mut found = results.into_inner().unwrap_or_else(PoisonError::into_inner);
+    let mut found = queue.into_results();
     let results = runs
         .into_iter()
         .enumerate()
-        .map(|(index, run)| Ok((run, found.remove(&index).transpose()?.flatten())))
+        .map(|(index, run)| Ok((run, found.remove(&index).transpose()?)))
         .collect::<Result<Results, PipelineError>>()?;
-    if watch.is_interrupted() {
-        let finished = results.iter().filter(|(_, record)| record.is_some()).count();
+    let finished = results.iter().filter(|(_, record)| record.is_some()).count();
+    if finished < total && watch.is_interrupted() {
         return Err(PipelineError::InterruptedRuns { finished, total });
     }
-    conclude(experiment, scale, results, beside, store, (started, threads, watch))
+    Ok(results)
 }
 
-/// The record of a run: the one that is there if it was made from the same configuration, or a new one. `None` if it was
-/// interrupted.
+/// End of a turn of a run.
+enum Turn {
+    /// It has a record.
+    Finished(Record),
+    /// Another process works on it; which, in words.
+    Held(String),
+    /// The flag of the watch was raised.
+    Interrupted,
+}
+
+/// The record of a run: the one that is there if it was made from the same configuration, or a new one.
 fn one(
     run: &Run,
-    scale: Scale,
+    (experiment, scale): (&Experiment, Scale),
     threads: usize,
     store: &dyn ExperimentStore,
     watch: &Watch,
-) -> Result<Option<Record>, PipelineError> {
+) -> Result<Turn, PipelineError> {
     if let Some(record) = finished_record(store, run)? {
-        return Ok(Some(record));
+        return Ok(Turn::Finished(record));
     }
+    let output = match store.claim_run(&run.name, &watch.interrupt)? {
+        RunClaim::Ours(output) => output,
+        RunClaim::Held(holder) => return Ok(Turn::Held(holder)),
+    };
+    // Whoever had it before may have finished it.
+    if let Some(record) = finished_record(store, run)? {
+        output.finish();
+        return Ok(Turn::Finished(record));
+    }
+    tracing::info!(run = run.name, "claimed");
+    let turn = match make(run, (experiment, scale), threads, output.as_ref(), watch) {
+        Ok(Some(record)) => Turn::Finished(record),
+        Err(_) | Ok(None) if output.is_lost() => Turn::Held("another process, which has taken it over".to_string()),
+        Ok(None) => Turn::Interrupted,
+        Err(error) => return Err(error),
+    };
+    if matches!(turn, Turn::Finished(_)) {
+        tracing::info!(run = run.name, "finished");
+        output.finish();
+    } else {
+        tracing::info!(run = run.name, "left");
+    }
+    Ok(turn)
+}
+
+/// Makes the record of a run that is ours; `None` if it was interrupted.
+fn make(
+    run: &Run,
+    (experiment, scale): (&Experiment, Scale),
+    threads: usize,
+    output: &dyn RunOutput,
+    watch: &Watch,
+) -> Result<Option<Record>, PipelineError> {
     let toml = toml::to_string(&run.config).map_err(PipelineError::format)?;
-    let output = store.open_run(&run.name)?;
     // That of another configuration must not be found beside the new one.
     output.remove(RECORD)?;
     output.remove(READINGS)?;
@@ -89,7 +172,9 @@ fn one(
     // A run that was stopped goes on from its checkpoint.
     let checkpoints = output.checkpoints().map(|checkpoints| checkpoints.beginning(Begin::Either));
     let options = RunOptions { threads, starts, span, checkpoints };
-    let trained = train(&run.config, &system, &options, output.as_ref(), &watch.remarks_alone());
+    let interrupt = output.interrupt().unwrap_or_else(|| Arc::clone(&watch.interrupt));
+    let watch = Watch { interrupt, ..watch.remarks_alone() };
+    let trained = train(&run.config, &system, &options, output, &watch);
     let judged_or_empty = matches!(
         &trained,
         Ok(_) | Err(PipelineError::Interrupted | PipelineError::Training(TrainingError::NothingLearned(_)))
@@ -99,6 +184,9 @@ fn one(
         Ok(trained) => {
             if let Stop::Failed(error) = &trained.stop {
                 tracing::warn!(run = run.name, %error, "training stopped early");
+            }
+            if experiment.reads_holes() {
+                read_hole(run, &trained.network, (scale, threads), output, &watch)?;
             }
             trained.record
         }

@@ -25,6 +25,8 @@ pub struct ExperimentReport {
     pub rows: Vec<Row>,
     /// Cells of `table.csv`, under [`EXPERIMENT_HEADER`].
     pub table: Vec<Vec<String>>,
+    /// Runs that are finished.
+    pub finished: usize,
     /// Seconds of training of all runs.
     pub training_seconds: f64,
     text: String,
@@ -42,49 +44,49 @@ const CONVENTIONS: &str = "Losses are the paper's: half the mean absolute error 
                            they are physical. Several runs: mean [lowest, highest]. Wrong signature: share of the fresh \
                            states. Integrated: starts of the trajectory test whose learned motion reached its end.";
 
-/// Writes table, pictures and report.
+/// Writes table, pictures and report. They depend on the records alone: what the clock told, but for curves of loss against time,
+/// is said in words for a terminal, where `started` is the beginning of this process's work.
 pub(crate) fn conclude(
-    experiment: &Experiment,
-    scale: Scale,
+    (experiment, scale): (&Experiment, Scale),
     results: Results,
     beside: &[Curve],
     store: &dyn ExperimentStore,
-    (started, threads, watch): (Instant, usize, &Watch),
+    watch: &Watch,
+    started: Option<Instant>,
 ) -> Result<ExperimentReport, PipelineError> {
     let rows = experiment.rows(&results);
     let (table, (header, view)) = (experiment_table(&rows), experiment_view(&rows));
     let mut curves = experiment_curves(&results);
     curves.extend_from_slice(beside);
-    store.write("table.csv", csv(&table).as_bytes())?;
+    let output = store.open_tables(&watch.interrupt)?;
+    output.write("table.csv", csv(&table).as_bytes())?;
     if experiment.is_timed() {
-        store.write("curves.csv", curves_csv(&curves).as_bytes())?;
+        output.write("curves.csv", curves_csv(&curves).as_bytes())?;
     }
     let figures = experiment_figures(experiment, &results, &curves);
     let taken = pictures_of_runs(experiment, &results, store);
     let training: f64 = results.iter().filter_map(|(_, record)| record.as_ref()).map(|record| record.seconds).sum();
-    let note = format!(
-        "Scale {}, {}, {training:.0} s of training, {:.0} s on the clock this time.",
-        scale.name(),
-        counted(results.len(), "run", "runs"),
-        started.elapsed().as_secs_f64()
-    );
+    let finished = results.iter().filter(|(_, record)| record.is_some()).count();
+    let of_all = if finished == results.len() { String::new() } else { format!(", {finished} of them finished") };
+    let budget = format!("Scale {}, {}{of_all}", scale.name(), counted(results.len(), "run", "runs"));
     let headline = headline::of_experiment(&rows);
     let report = headline
         .begin(Report::new(experiment.title))
         .paragraph(&format!("Regenerates: {}.", experiment.paper))
         .paragraph(&format!("The paper: {}", experiment.finding))
-        .paragraph(&note)
+        .paragraph(&format!("{budget}."))
         .table(&header, &view)
         .paragraph(CONVENTIONS);
     let remarks = experiment.remarks(&results.iter().map(|(run, _)| run).collect::<Vec<_>>());
     let reductions = reduction_table(&experiment.reductions(&results));
     let report = remarks.iter().fold(report, |report, remark| report.paragraph(remark));
     let report = if reductions.is_empty() { report } else { report.table(&REDUCTION_HEADER, &reductions) };
-    let holes = rows_of_holes(experiment, &results, (store, scale, threads), watch)?;
+    let holes = rows_of_holes(experiment, &results, store, output.as_ref())?;
     let report = holes.iter().fold(report, |report, row| row.add_to(report));
     let report = within(taken, report.figures(&figures));
-    store.write("report.html", report.to_html().as_bytes())?;
-    figures.iter().try_for_each(|figure| store.write(&figure.file, figure.picture.to_svg().as_bytes()))?;
+    output.write("report.html", report.to_html().as_bytes())?;
+    figures.iter().try_for_each(|figure| output.write(&figure.file, figure.picture.to_svg().as_bytes()))?;
+    drop(output);
 
     let (energies, others): (Vec<usize>, Vec<usize>) =
         (1..header.len()).partition(|&k| ["energy", "motions"].iter().any(|word| header[k].contains(word)));
@@ -103,10 +105,12 @@ pub(crate) fn conclude(
     for RowOfHoles { label, table, .. } in &holes {
         text += &format!("\n{label}\n{}", text_table(&READING_HEADER, table));
     }
+    let clock = started.map(|began| format!(", {:.0} s on the clock this time", began.elapsed().as_secs_f64()));
+    let note = format!("{budget}, {training:.0} s of training{}.", clock.unwrap_or_default());
     let (title, paper) = (experiment.title, experiment.paper);
     let place = if paper == "-" { String::new() } else { format!(" (of the paper: {paper})") };
     let text = wrapped(&format!("{title}{place}\n{text}\n{note}\n"), WIDTH);
-    Ok(ExperimentReport { results, rows, table, training_seconds: training, text })
+    Ok(ExperimentReport { results, rows, table, finished, training_seconds: training, text })
 }
 
 /// Loss against time of every curve, as far as they are known.

@@ -1,6 +1,5 @@
 //! Pictures of a learned black hole beside the exact one: orbits, shadow and sky.
 
-use crate::pipeline::PipelineError;
 use crate::relativity::{Around, Camera, Image, Pair, Sky, Tracing, difference_image, orbits, shadow};
 use crate::report::{Figure, OrbitPlot, Series, kept, orbit_picture, png};
 
@@ -33,33 +32,28 @@ pub(crate) fn orbit_figure(pair: &Pair<'_>, mass: f64) -> Option<Figure> {
 }
 
 /// Shadow and sky through the exact metric, through the learned one, and their difference, as PNG of so many pixels along an edge; `None` for coordinates that are not
-/// Cartesian, and where nothing rests at the place of the camera.
-///
-/// # Errors
-/// [`PipelineError::Interrupted`], if `interrupted` says so.
+/// Cartesian, where nothing rests at the place of the camera, and when
+/// `interrupted` says so.
 pub(crate) fn sky_picture(
     pair: &Pair<'_>,
     mass: f64,
     (pixels, threads): (usize, usize),
     interrupted: &(dyn Fn() -> bool + Sync),
-) -> Result<Option<Vec<u8>>, PipelineError> {
-    let Around::Cartesian(chart) = pair.around else { return Ok(None) };
+) -> Option<Vec<u8>> {
+    let Around::Cartesian(chart) = pair.around else { return None };
     let camera = Camera { chart, width: pixels, height: pixels, ..Camera::new(CAMERA.0 * mass, CAMERA.1) };
     let tracing = Tracing { threads, ..Tracing::of(&camera) };
     let mut views = Vec::new();
     for model in [pair.exact, pair.learned] {
         if interrupted() {
-            return Err(PipelineError::Interrupted);
+            return None;
         }
-        match shadow(model, &camera, &tracing, &|_| ()) {
-            Ok(view) => views.push(view),
-            Err(_) => return Ok(None),
-        }
+        views.push(shadow(model, &camera, &tracing, &|_| ()).ok()?);
     }
     let sky = Sky::around(&camera);
     let mut images: Vec<Image> = views.iter().map(|view| sky.image(view)).collect();
     if let [exact, learned] = views.as_slice() {
         images.extend(difference_image(exact, learned).ok());
     }
-    Ok(Some(png(&Image::beside(&images, GAP))))
+    Some(png(&Image::beside(&images, GAP)))
 }

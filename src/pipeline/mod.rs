@@ -1,7 +1,7 @@
 //! Pipelines: a training, a fit of recorded motion, an evaluation, an experiment, each from its configuration to model, tables,
 //! pictures and report.
 //!
-//! The command line and every other door call the same four functions:
+//! The command line and every other door call the same functions:
 //!
 //! | function | from | to |
 //! |---|---|---|
@@ -9,9 +9,11 @@
 //! | [`fit`] | recorded motion and a [`FitConfig`] | a model, judged by motion that was held out ([`HoldOut`]) |
 //! | [`evaluate`] | a model and the system it learned | an [`Evaluation`] |
 //! | [`run_experiment`] | an [`Experiment`](crate::experiments::Experiment) | the records of its runs, a table, a report |
+//! | [`finish_runs`] | some of its runs, a machine's share | their records |
+//! | [`merge_experiment`] | the records that several machines made | table and report |
 //!
 //! Files go into an [`Output`], of which a [`Directory`] and [`InMemory`] are two; what happens meanwhile comes as an [`Event`] to
-//! the [`Watch`], whose flag ends the work. Nothing is printed, no directory is locked, and files that stand where an [`Output`]
+//! the [`Watch`], whose flag ends the work. Nothing is printed, a [`Directory`] is not locked, and files that stand where an [`Output`]
 //! writes are replaced.
 //!
 //! # A fit of recorded motion, judged
@@ -55,6 +57,7 @@ mod error;
 mod evaluation;
 mod evaluation_tables;
 mod experiment;
+mod experiment_queue;
 mod experiment_report;
 mod experiment_store;
 mod file_names;
@@ -85,9 +88,9 @@ pub use energy::Balance;
 pub use error::PipelineError;
 pub use evaluation::{Evaluation, EvaluationOptions, Motion, RTOL, evaluate};
 pub(crate) use experiment::finished_record;
-pub use experiment::run_experiment;
+pub use experiment::{finish_runs, merge_experiment, run_experiment};
 pub use experiment_report::{ExperimentReport, Results};
-pub use experiment_store::{ExperimentStore, RunOutput};
+pub use experiment_store::{ExperimentStore, RunClaim, RunOutput};
 pub use file_names::MODEL;
 pub(crate) use file_names::{CAPTIONS, RECORD};
 pub use fit::{FitReport, fit};

@@ -1,13 +1,14 @@
 //! What the models of an experiment say of their black holes, beside the exact metrics: tables and pictures.
 
 use crate::configuration::Config;
-use crate::experiments::{Experiment, Picture, Record, Run, Scale};
-use crate::lagrangian::{Configured, EulerLagrange};
+use crate::experiments::{Experiment, Record, Run, Scale};
+use crate::geometry::GeometryError;
+use crate::lagrangian::Configured;
 use crate::network::NetworkLagrangian;
 use crate::network::file::ModelFile;
 use crate::pipeline::experiment_store::ExperimentStore;
 use crate::pipeline::hole_pictures::{orbit_figure, sky_picture};
-use crate::pipeline::{Event, MODEL, PipelineError, Watch};
+use crate::pipeline::{MODEL, Output, PipelineError, Watch};
 use crate::relativity::{Around, Pair, Reading};
 use crate::report::{READING_HEADER, Report, reading_table};
 
@@ -50,34 +51,6 @@ impl RowOfHoles {
     }
 }
 
-/// The model of a finished run and the hole that it learned.
-struct Hole {
-    system: Configured<f64>,
-    exact: Box<dyn EulerLagrange<f64>>,
-    learned: NetworkLagrangian<f64>,
-    around: Around,
-    range: (f64, f64),
-}
-
-impl Hole {
-    /// Reads the model of a run; `None` for a run that learned nothing.
-    fn load(run: &Run, store: &dyn ExperimentStore) -> Result<Option<Self>, PipelineError> {
-        let system = run.config.system()?;
-        let unfit = || PipelineError::Hole(run.config.system.clone());
-        let (around, range) = around(&run.config, &system).ok_or_else(unfit)?;
-        let Some(bytes) = store.read(&run.name, MODEL) else { return Ok(None) };
-        let wrong = |source| PipelineError::Model { path: MODEL.into(), source };
-        let ModelFile { header, weights } = ModelFile::<f64>::from_bytes(&bytes).map_err(wrong)?;
-        let learned = NetworkLagrangian::new(header.architecture, weights)?;
-        Ok(Some(Self { exact: system.build()?, system, learned, around, range }))
-    }
-
-    fn pair(&self) -> Pair<'_> {
-        let Self { system, exact, learned, around, range } = self;
-        Pair { exact: exact.as_ref(), learned, system, around: *around, range: *range }
-    }
-}
-
 /// Coordinates and learned distances of a configuration; `None` if they are not those around a centre.
 fn around(config: &Config, system: &Configured<f64>) -> Option<(Around, (f64, f64))> {
     let coordinates = system.system.coordinates(system.coordinates);
@@ -91,40 +64,58 @@ fn around(config: &Config, system: &Configured<f64>) -> Option<(Around, (f64, f6
     Some((around, range?))
 }
 
-/// The readings of a finished run: those of its file, or new ones, which are kept there; none for a run without a model.
-fn readings_of(run: &Run, store: &dyn ExperimentStore, watch: &Watch) -> Result<Vec<Reading>, PipelineError> {
+/// What `look` sees of the hole of a configuration beside a model that learned it.
+///
+/// # Errors
+/// [`PipelineError::Hole`] for a system that is none.
+fn look_at<T>(
+    config: &Config,
+    learned: &NetworkLagrangian<f64>,
+    look: impl FnOnce(&Pair<'_>) -> Result<T, GeometryError>,
+) -> Result<T, PipelineError> {
+    let system = config.system()?;
+    let unfit = || PipelineError::Hole(config.system.clone());
+    let (around, range) = around(config, &system).ok_or_else(unfit)?;
+    let exact = system.build()?;
+    let pair = Pair { exact: exact.as_ref(), learned, system: &system, around, range };
+    look(&pair).map_err(|_| unfit())
+}
+
+/// Reads the hole of a model that was just learned, into the output of its run; of the first seed pictures too.
+///
+/// # Errors
+/// A system without the coordinates of a hole, files that cannot be written.
+pub(crate) fn read_hole(
+    run: &Run,
+    learned: &NetworkLagrangian<f64>,
+    (scale, threads): (Scale, usize),
+    output: &dyn Output,
+    watch: &Watch,
+) -> Result<(), PipelineError> {
+    let pixels = if scale == Scale::Smoke { 12 } else { PIXELS };
+    let wanted = run.config.seed == 0;
+    let (readings, orbits, sky) = look_at(&run.config, learned, |pair| {
+        let (readings, mass) = (pair.readings()?, pair.mass()?);
+        let orbits = wanted.then(|| orbit_figure(pair, mass)).flatten();
+        let sky = if wanted { sky_picture(pair, mass, (pixels, threads), &|| watch.is_interrupted()) } else { None };
+        Ok((readings, orbits, sky))
+    })?;
+    output
+        .write(READINGS, (serde_json::to_string_pretty(&readings).map_err(PipelineError::format)? + "\n").as_bytes())?;
+    orbits.map_or(Ok(()), |figure| output.write(ORBITS, figure.picture.to_svg().as_bytes()))?;
+    sky.map_or(Ok(()), |png| output.write(SKY, &png))
+}
+
+/// The readings of a finished run: those of its file, or those of its model; none for a run that learned nothing.
+fn readings_of(run: &Run, store: &dyn ExperimentStore) -> Result<Vec<Reading>, PipelineError> {
     if let Some(readings) = store.read(&run.name, READINGS).and_then(|json| serde_json::from_slice(&json).ok()) {
         return Ok(readings);
     }
-    let Some(hole) = Hole::load(run, store)? else { return Ok(Vec::new()) };
-    watch.say(Event::Note(&format!("reading the hole of {}", run.name)));
-    let readings = hole.pair().readings().map_err(|_| PipelineError::Hole(run.config.system.clone()))?;
-    let json = serde_json::to_string_pretty(&readings).map_err(PipelineError::format)? + "\n";
-    store.open_run(&run.name)?.write(READINGS, json.as_bytes())?;
-    Ok(readings)
-}
-
-/// Orbits and sky of a run: those of its files, or new ones, which are kept there.
-fn pictures_of(
-    run: &Run,
-    (store, sky): (&dyn ExperimentStore, (usize, usize)),
-    watch: &Watch,
-) -> Result<[Option<Vec<u8>>; 2], PipelineError> {
-    let there = [ORBITS, SKY].map(|name| store.read(&run.name, name));
-    if there.iter().all(Option::is_some) {
-        return Ok(there);
-    }
-    let Some(hole) = Hole::load(run, store)? else { return Ok(there) };
-    let pair = hole.pair();
-    let mass = pair.mass().map_err(|_| PipelineError::Hole(run.config.system.clone()))?;
-    watch.say(Event::Note(&format!("tracing light through the metric of {}", run.name)));
-    let orbits = orbit_figure(&pair, mass).map(|figure| figure.picture.to_svg().into_bytes());
-    let sky = sky_picture(&pair, mass, sky, &|| watch.is_interrupted())?;
-    let output = store.open_run(&run.name)?;
-    for (name, bytes) in [(ORBITS, &orbits), (SKY, &sky)] {
-        bytes.as_ref().map_or(Ok(()), |bytes| output.write(name, bytes))?;
-    }
-    Ok([orbits, sky])
+    let Some(bytes) = store.read(&run.name, MODEL) else { return Ok(Vec::new()) };
+    let wrong = |source| PipelineError::Model { path: MODEL.into(), source };
+    let ModelFile { header, weights } = ModelFile::<f64>::from_bytes(&bytes).map_err(wrong)?;
+    let learned = NetworkLagrangian::new(header.architecture, weights)?;
+    look_at(&run.config, &learned, |pair| pair.readings())
 }
 
 /// What the finished runs of an experiment read, row by row; written as `readings.csv` too. None for an experiment that reads no holes.
@@ -134,28 +125,27 @@ fn pictures_of(
 pub(crate) fn rows_of_holes(
     experiment: &Experiment,
     results: &[(Run, Option<Record>)],
-    (store, scale, threads): (&dyn ExperimentStore, Scale, usize),
-    watch: &Watch,
+    store: &dyn ExperimentStore,
+    output: &dyn Output,
 ) -> Result<Vec<RowOfHoles>, PipelineError> {
-    if !experiment.pictures.contains(&Picture::BlackHole) {
+    if !experiment.reads_holes() {
         return Ok(Vec::new());
     }
     let mut rows: Vec<(&Run, Vec<Vec<Reading>>)> = Vec::new();
     for (run, _) in results.iter().filter(|(_, record)| record.is_some()) {
-        let readings = readings_of(run, store, watch)?;
+        let readings = readings_of(run, store)?;
         match rows.iter_mut().find(|(first, _)| first.label == run.label) {
             _ if readings.is_empty() => {}
             Some((_, all)) => all.push(readings),
             None => rows.push((run, vec![readings])),
         }
     }
-    let pixels = if scale == Scale::Smoke { 12 } else { PIXELS };
     let row = |(run, readings): (&Run, Vec<Vec<Reading>>)| {
-        let [orbits, sky] = pictures_of(run, (store, (pixels, threads)), watch)?;
-        Ok(RowOfHoles { label: run.label.clone(), table: reading_table(&readings), orbits, sky })
+        let [orbits, sky] = [ORBITS, SKY].map(|name| store.read(&run.name, name));
+        RowOfHoles { label: run.label.clone(), table: reading_table(&readings), orbits, sky }
     };
-    let rows = rows.into_iter().map(row).collect::<Result<Vec<_>, PipelineError>>()?;
-    store.write("readings.csv", csv(&rows).as_bytes())?;
+    let rows: Vec<RowOfHoles> = rows.into_iter().map(row).collect();
+    output.write("readings.csv", csv(&rows).as_bytes())?;
     Ok(rows)
 }
 

@@ -4,6 +4,7 @@ mod allocation;
 mod counting;
 mod kills;
 mod memory;
+mod shards;
 mod streams;
 mod threads;
 mod training_allocation;

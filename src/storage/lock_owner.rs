@@ -1,4 +1,4 @@
-//! Who holds a directory: process, machine and time, as the lock file says them.
+//! Who holds a directory: process, machine and time, as lock files and claims say them.
 
 use std::fmt;
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -17,6 +17,21 @@ impl LockOwner {
     pub fn this() -> Self {
         let since = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |time| time.as_secs());
         Self { process: std::process::id(), host: host(), since }
+    }
+
+    /// Number of the process.
+    pub fn process(&self) -> u32 {
+        self.process
+    }
+
+    /// Name of its machine.
+    pub fn host(&self) -> &str {
+        &self.host
+    }
+
+    /// Beginning, in seconds since 1970, UTC.
+    pub fn since(&self) -> u64 {
+        self.since
     }
 
     /// The text of the lock file.
@@ -38,6 +53,12 @@ impl fmt::Display for LockOwner {
         let Self { process, host, since } = self;
         write!(f, "process {process} on {host} since {}", utc(*since))
     }
+}
+
+/// Mark of this machine since it was started, which its processes have in common; `None` where the system does not tell.
+pub fn machine() -> Option<String> {
+    let text = std::fs::read_to_string("/proc/sys/kernel/random/boot_id").ok()?;
+    Some(text.trim().to_string()).filter(|id| !id.is_empty() && id.len() <= 64)
 }
 
 /// Name of this machine.
