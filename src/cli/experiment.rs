@@ -5,9 +5,11 @@ use crate::cli::experiment_list::{Listed, list};
 use crate::cli::files::{holds_something, require_free};
 use crate::cli::number::{count, positive, threads};
 use crate::cli::shard::Shard;
+use crate::cli::source::parameter;
 use crate::cli::watch::watch;
-use crate::cli::{CliError, interrupt, output};
+use crate::cli::{CliError, chosen, interrupt, output};
 use crate::experiments::{Experiment, Run, Scale, experiments, find};
+use crate::lagrangian::{Configured, configure_system};
 use crate::names::{WIDTH, counted, wrapped};
 use crate::pipeline::{
     Directory, ExperimentReport, RECORD, finish_runs, finished_record, merge_experiment, run_experiment,
@@ -16,6 +18,7 @@ use crate::recording::Columns;
 use crate::recording::read::read_recording;
 use crate::report::{Curve, EXPERIMENT_HEADER, text_table};
 use crate::storage::Claimant;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -65,6 +68,13 @@ struct Chosen {
     /// Only the runs whose row of the table begins with this text; a later command without it goes on from there.
     #[arg(long, value_name = "TEXT")]
     only: Option<String>,
+    /// Another system than those of the experiment, by name or by the file that describes it: of black-holes, whose coordinates
+    /// are t, x, y, z or t, r, theta, phi.
+    #[arg(long, value_name = "NAME|FILE.toml", requires = "name")]
+    system: Option<String>,
+    /// A parameter of that system; may be repeated.
+    #[arg(long, value_name = "SYMBOL=VALUE", num_args = 1.., value_parser = parameter, requires = "system")]
+    param: Vec<(String, String)>,
     /// A curve from elsewhere for the picture of time-to-accuracy: a CSV with the columns seconds and validation_loss; may be
     /// repeated.
     #[arg(long, value_name = "LABEL=FILE.csv", value_parser = beside)]
@@ -105,6 +115,17 @@ impl Chosen {
         }
     }
 
+    /// The system that was asked for instead of the experiment's own, with the parameters given.
+    #[allow(clippy::type_complexity)]
+    fn own_system(&self) -> Result<Option<(Configured<f64>, BTreeMap<String, f64>)>, CliError> {
+        let Some(name) = &self.system else { return Ok(None) };
+        let configured = configure_system::<f64>(chosen::system(name)?, &self.param).map_err(CliError::usage)?;
+        let symbols = configured.system.parameters.iter().map(|p| p.symbol.to_string());
+        let values: BTreeMap<String, f64> = symbols.zip(configured.parameters.iter().copied()).collect();
+        let given = self.param.iter().filter_map(|(symbol, _)| Some((symbol.clone(), *values.get(symbol)?))).collect();
+        Ok(Some((configured, given)))
+    }
+
     /// Directory of an experiment.
     fn directory(&self, experiment: &Experiment) -> PathBuf {
         self.out.join(format!("{}-{}", experiment.name, self.scale().name()))
@@ -116,6 +137,10 @@ impl Chosen {
         if self.seeds != 1 {
             words += &format!(" --seeds {}", self.seeds);
         }
+        if let Some(system) = &self.system {
+            words += &format!(" --system {system}");
+        }
+        words.extend(self.param.iter().map(|(symbol, value)| format!(" --param {symbol}={value}")));
         if self.out != Path::new("runs/experiments") {
             words += &format!(" --out {}", self.out.display());
         }
@@ -233,7 +258,19 @@ fn chosen_runs(
     chosen: &Chosen,
     experiments: &[&'static Experiment],
 ) -> Result<Vec<(&'static Experiment, Vec<Run>)>, CliError> {
-    let all = || experiments.iter().map(|experiment| (*experiment, experiment.runs(chosen.scale(), chosen.seeds)));
+    let own = chosen.own_system()?;
+    let runs = |experiment: &Experiment| match &own {
+        None => Ok(experiment.runs(chosen.scale(), chosen.seeds)),
+        Some((system, parameters)) => {
+            experiment.runs_of((system, parameters), chosen.scale(), chosen.seeds).ok_or_else(|| {
+                let name = experiment.name;
+                CliError::usage(format_args!("--system: {name} is about systems of its own; black-holes takes another"))
+            })
+        }
+    };
+    let every = experiments.iter().map(|experiment| Ok((*experiment, runs(experiment)?)));
+    let every = every.collect::<Result<Vec<_>, CliError>>()?;
+    let all = || every.iter().cloned();
     let Some(text) = &chosen.only else { return Ok(all().collect()) };
     let of = |(experiment, runs): (&'static Experiment, Vec<Run>)| {
         (experiment, runs.into_iter().filter(|run| run.label.starts_with(text)).collect::<Vec<Run>>())
@@ -256,7 +293,7 @@ fn seeds(text: &str) -> Result<usize, String> {
 }
 
 /// Tables of an experiment, made anew of the records of its runs.
-const WRITTEN: [&str; 2] = ["table.csv", "curves.csv"];
+const WRITTEN: [&str; 3] = ["table.csv", "curves.csv", "readings.csv"];
 
 /// Refuses a directory with finished runs of other configurations than those asked for; `hint` says what to do then.
 fn require_same<'a>(path: &Path, runs: impl Iterator<Item = &'a Run>, hint: &str) -> Result<(), CliError> {

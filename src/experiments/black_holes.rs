@@ -5,6 +5,7 @@ use crate::configuration::{Config, Regularizer};
 use crate::lagrangian::{Configured, configure};
 use crate::network::Structure;
 use crate::presets::Preset;
+use std::collections::BTreeMap;
 
 /// Holes in coordinates that pass through the horizon.
 const HOLES: [&str; 2] = ["schwarzschild-cartesian", "kerr-cartesian"];
@@ -24,9 +25,15 @@ fn learned(preset: Preset, name: &str, hole: &Configured<f64>) -> Run {
     run(&slug(&format!("{name}-{system}")), format!("{name}, {system}"), config)
 }
 
-/// A hole by both presets.
-pub(super) fn runs_of(hole: &Configured<f64>) -> Vec<Run> {
-    vec![learned(Preset::Quick, "quick", hole), learned(Preset::Best, "best", hole)]
+/// A hole with these parameters, the others being the system's, by both presets.
+pub(super) fn runs_of(hole: &Configured<f64>, parameters: &BTreeMap<String, f64>) -> Vec<Run> {
+    let told: String = parameters.iter().map(|(symbol, value)| format!(", {symbol} = {value}")).collect();
+    let of = |(preset, name)| {
+        let run = learned(preset, name, hole);
+        let (name, label) = (slug(&format!("{}{told}", run.name)), format!("{}{told}", run.label));
+        Run { name, label, config: Config { parameters: parameters.clone(), ..run.config }, ..run }
+    };
+    [(Preset::Quick, "quick"), (Preset::Best, "best")].map(of).to_vec()
 }
 
 pub(super) const BLACK_HOLES: Experiment = Experiment {

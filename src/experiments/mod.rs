@@ -19,6 +19,7 @@ pub use remarks::{Quantity, Reduction};
 use crate::configuration::Config;
 use crate::lagrangian::Configured;
 use crate::names::unknown;
+use std::collections::BTreeMap;
 
 /// Figures that the paper reports for a group of runs, in its own convention.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -144,9 +145,15 @@ impl Experiment {
         Self::seeded((self.runs)(), scale, seeds)
     }
 
-    /// The runs of a system of one's own instead of the experiment's; `None` if it is about certain systems.
-    pub fn runs_of(&self, system: &Configured<f64>, scale: Scale, seeds: usize) -> Option<Vec<Run>> {
-        self.reads_holes().then(|| Self::seeded(black_holes::runs_of(system), scale, seeds))
+    /// The runs of another system than the experiment's own, with these parameters and otherwise its own; `None` if the experiment is about
+    /// certain systems.
+    pub fn runs_of(
+        &self,
+        (system, parameters): (&Configured<f64>, &BTreeMap<String, f64>),
+        scale: Scale,
+        seeds: usize,
+    ) -> Option<Vec<Run>> {
+        self.reads_holes().then(|| Self::seeded(black_holes::runs_of(system, parameters), scale, seeds))
     }
 
     fn seeded(runs: Vec<Run>, scale: Scale, seeds: usize) -> Vec<Run> {
