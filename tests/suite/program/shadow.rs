@@ -2,8 +2,8 @@
 
 use crate::common::program::{Folder, lnn, text};
 use lnn::lagrangian::configure;
-use lnn::network::file::{Header, ModelFile, StoredPrecision};
 use lnn::network::Layout;
+use lnn::network::file::{Header, ModelFile, StoredPrecision};
 use serde_json::Value;
 use std::fs;
 
@@ -86,7 +86,11 @@ fn learned_and_exact_stand_side_by_side() {
     lnn(&both).refused(1, &["sky.png", "--overwrite"]);
     let told = lnn(&[&both[..], &["--overwrite", "--edges", "4"]].concat());
     assert_eq!((told.code, told.stderr.as_str()), (Some(0), ""));
-    assert!(told.stdout.contains("left edge, impact parameter [m]") && told.stdout.contains("-5.196"), "{}", told.stdout);
+    assert!(
+        told.stdout.contains("left edge, impact parameter [m]") && told.stdout.contains("-5.196"),
+        "{}",
+        told.stdout
+    );
     assert!(told.stdout.lines().all(|line| line.chars().count() <= 120), "{}", told.stdout);
     // The model alone.
     let alone = lnn(&["shadow", "--model", &model, "--out", &text(&folder.path("one.png")), "--width", "8", "--json"]);
