@@ -57,8 +57,8 @@ pub struct Args {
     /// Rows [default: as many as pixels of a row].
     #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = count)]
     height: Option<usize>,
-    /// Distance from which on a ray that leaves has come from the sky; a learned metric is known as far as it was trained
-    /// [default: twice the distance of the camera].
+    /// Distance from which on a ray that leaves has come from the sky [default: 100 times the distance of the camera, twice with a
+    /// learned metric, which is known as far as it was trained].
     #[arg(long, value_name = "R", allow_hyphen_values = true, value_parser = positive)]
     far: Option<f64>,
     /// Relative error of a step of a ray; the edge of the shadow is found with a hundredth of it.
@@ -179,7 +179,8 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let Metrics { system, coordinates, unit, models } = args.metrics()?;
     let camera = args.camera(args.chart(&coordinates)?);
     let mut tracing = Tracing { tolerance: args.tolerance, threads: threads(args.threads), ..Tracing::of(&camera) };
-    tracing.far = args.far.unwrap_or(tracing.far);
+    let exact = if args.model.is_none() { FAR * camera.distance } else { tracing.far };
+    tracing.far = args.far.unwrap_or(exact);
     let model = args.model.as_deref().map(model_file).transpose()?;
     let file = args.system.as_ref().filter(|name| chosen::is_file(name)).map(PathBuf::from);
     let inputs: Vec<_> = model.iter().chain(&file).map(PathBuf::as_path).collect();
@@ -218,6 +219,8 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     output::print(&told.map_err(refused)?)
 }
 
+/// Distance of the sky of an exact metric over that of the camera.
+const FAR: f64 = 100.0;
 /// White columns between pictures.
 const GAP: usize = 8;
 

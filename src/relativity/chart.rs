@@ -1,6 +1,6 @@
 //! Coordinates of a metric: which is the time, which are the places.
 
-use super::RelativityError;
+use super::error::RelativityError;
 
 /// Indices of the coordinates of a metric: a time, on which it does not depend, and Cartesian places around a centre at their origin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

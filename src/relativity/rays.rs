@@ -37,14 +37,14 @@ pub struct Ray {
 /// | `tolerance` | 1e-6 | relative error of place and tangent in a step | above 0 |
 /// | `far` | twice the distance of the camera | distance from which on a ray that leaves has escaped | above 0 |
 /// | `capture` | 0 | distance within which a ray is captured in any case | at least 0 |
-/// | `growth` | 1e3 | growth of `|k|`, Euclidean, at which a ray is captured | above 1 |
+/// | `growth` | 1e5 | growth of `|k|`, Euclidean, at which a ray is captured | above 1 |
 /// | `most_steps` | 2000 | steps after which a ray is left unfinished | above 0 |
 /// | `threads` | 1 | threads; no result depends on them | above 0 |
 ///
 /// A ray that is followed backwards to a future horizon does not reach it: in coordinates that are regular there, those of Kerr and Schild, it
 /// comes nearer and nearer while `dt` grows beyond all bounds within a finite affine parameter, `|k|` as the inverse of the distance from the
-/// horizon. A ray that turns around does so outside the orbit of light, with a growth of a few; only next to the largest spins, `a > 0.999 M`,
-/// does it come near the default.
+/// horizon. A ray that turns around does so outside the orbit of light, with a growth of a few, of a thousand at `a = 0.998 M`, where that orbit
+/// is next to the horizon.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tracing {
     /// Relative error of a step.
@@ -64,7 +64,7 @@ pub struct Tracing {
 impl Tracing {
     /// The defaults for a camera.
     pub fn of(camera: &Camera) -> Self {
-        Self { tolerance: 1e-6, far: 2.0 * camera.distance, capture: 0.0, growth: 1e3, most_steps: 2000, threads: 1 }
+        Self { tolerance: 1e-6, far: 2.0 * camera.distance, capture: 0.0, growth: 1e5, most_steps: 2000, threads: 1 }
     }
 
     /// Refuses numbers that trace nothing.
@@ -80,7 +80,7 @@ impl Tracing {
 /// Parts that rays are cut into, whatever the number of threads, and the bounds of their size: one call of a model is for that many.
 const BLOCKS: (usize, usize, usize) = (8, 32, 1024);
 /// First step and longest step over the distance from the centre.
-const STEP: (f64, f64) = (0.05, 1.0);
+const STEP: (f64, f64) = (0.2, 1.0);
 /// Smallest step over the distance from the centre.
 const LEAST: f64 = 1e-12;
 /// Part of a step that is kept, and the bounds of its change.
