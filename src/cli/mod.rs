@@ -51,6 +51,7 @@ mod source;
 mod spool;
 mod states;
 mod subject;
+mod surfaces;
 mod symmetries;
 mod systems;
 mod tensors;
