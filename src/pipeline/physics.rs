@@ -15,7 +15,7 @@ use crate::pipeline::PipelineError;
 use crate::pipeline::common_ground::{CommonGround, gauge_functions};
 use crate::report::{Figure, QuantityMap, quantity_figure};
 use crate::rollout::{Domain, Trajectory};
-use crate::symmetry::{Chart, Region, Symmetries, bases, drifts, enough, middle, most_symmetries, unknowns};
+use crate::symmetry::{Chart, Degrees, Region, Symmetries, bases, drifts, enough, middle, most_symmetries, unknowns};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -62,15 +62,18 @@ pub struct FoundSymmetries {
     pub name: Option<String>,
     /// Formulas of the fields.
     pub fields: Vec<String>,
+    /// Degrees of the functions in which they were found, such as `polynomial:1,trigonometric:2,hyperbolic:0`.
+    pub basis: String,
 }
 
-impl From<&Symmetries> for FoundSymmetries {
-    fn from(found: &Symmetries) -> Self {
+impl FoundSymmetries {
+    fn new(found: &Symmetries, degrees: Degrees) -> Self {
         Self {
             count: found.separation.count,
             gap: found.separation.gap,
             name: found.algebra.as_ref().and_then(|algebra| algebra.name.clone()),
             fields: found.fields.iter().map(|field| field.text(&found.basis)).collect(),
+            basis: degrees.to_string(),
         }
     }
 }
@@ -216,7 +219,7 @@ impl Physics {
         }
         let found = self.common_ground.as_ref().and_then(|common| common.factor);
         // Of a black box on a mass shell only a comparison at rest knows the factor there.
-        let at_rest = |exact| mass_matrix_error(exact, network, &q).factor;
+        let at_rest = |exact: &dyn EulerLagrange<f64>| mass_matrix_error(exact, network, &q).factor;
         let factor = found.or_else(|| exact.map(at_rest)).unwrap_or(1.0);
         let most = (CURVATURE_WORK / (network.weights().len() * n.pow(3)).max(1)).max(1);
         self.metric = metric_components(exact, network, &q[..n * most.min(q.len() / n)], factor);
@@ -314,21 +317,20 @@ impl Physics {
         let (network, n) = (subject.network, subject.network.coordinates());
         let charts = subject.charts(region);
         let names = self.coordinates.clone();
-        let search = |model: &dyn EulerLagrange<f64>, exact: bool| -> Result<Symmetries, String> {
+        let search = |model: &dyn EulerLagrange<f64>, exact: bool| -> Result<(Symmetries, Degrees), String> {
             let bases = bases(&names, &charts, None, exact);
             let functions = bases.iter().map(|(basis, _)| basis.len()).max().unwrap_or(0);
             let (q, v) = subject.states(region, enough(unknowns(n, functions), exact));
-            let found = most_symmetries(model, bases, (&q, &v), (None, exact));
-            found.map(|(found, _)| found).map_err(|problem| problem.to_string())
+            most_symmetries(model, bases, (&q, &v), (None, exact)).map_err(|problem| problem.to_string())
         };
         match search(network, false) {
-            Ok(found) => self.symmetries = Some(FoundSymmetries::from(&found)),
+            Ok((found, degrees)) => self.symmetries = Some(FoundSymmetries::new(&found, degrees)),
             Err(problem) => self.left_out.push(format!("symmetries of the model: {problem}")),
         }
         let Some(exact) = exact else { return };
         match search(exact, true) {
-            Ok(found) => {
-                self.exact_symmetries = Some(FoundSymmetries::from(&found));
+            Ok((found, degrees)) => {
+                self.exact_symmetries = Some(FoundSymmetries::new(&found, degrees));
                 self.follow_charges(subject, exact, &found);
             }
             Err(problem) => self.left_out.push(format!("symmetries of the system: {problem}")),
