@@ -7,9 +7,8 @@ use crate::scalar::{Dd, Scalar};
 /// A model with a [`Certificate`] that is asked at every state: `dL/dq`, mass matrix and acceleration of a state that is not certified fail
 /// with [`MechanicsError::Uncertified`].
 ///
-/// An integrator stops where the certified region ends, as at the bound of a domain, and says so
-/// (`RolloutError::Uncertified`): every state that moved it is one where the mass matrix is proven to have its signature. `L`, momenta and the
-/// energy are given everywhere.
+/// An integrator stops where the certified region ends, as at the bound of a domain, and says so (`RolloutError::Uncertified`): at every
+/// state that moved it the mass matrix is proven to have its signature. `L`, momenta and the energy are given everywhere.
 #[derive(Clone, Debug)]
 pub struct Guarded<'a, M> {
     model: M,

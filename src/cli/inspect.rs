@@ -109,8 +109,7 @@ fn inspect<S: Scalar>(args: &Args) -> Result<(), CliError> {
             for ((q, v), &row) in q.chunks(n).zip(v.chunks(n)).zip(rows) {
                 let problem = model.terms(q, v, Request::ALL, &mut terms).err().map(explain);
                 let spectrum = spectrum(n, &terms.mass_matrix);
-                text +=
-                    &show(args.format, row, &fields(n, 0, &terms, &spectrum, factor.as_ref()), problem.as_deref());
+                text += &show(args.format, row, &fields(n, 0, &terms, &spectrum, factor.as_ref()), problem.as_deref());
                 failures.extend(problem.map(|text| (row, text)));
             }
         }

@@ -36,8 +36,7 @@ impl<S: Scalar> Line<'_, S> {
             })
         });
         let block = block.collect::<Result<Vec<usize>, CliError>>()?;
-        let found =
-            surfaces(&*source.model, &block, self.ends, self.velocity, self.steps).map_err(CliError::data)?;
+        let found = surfaces(&*source.model, &block, self.ends, self.velocity, self.steps).map_err(CliError::data)?;
         output::print(&if table { self.table(names, &found) } else { self.object(names, &found) })
     }
 

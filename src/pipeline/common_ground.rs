@@ -13,13 +13,13 @@ pub struct CommonGround {
     pub factor: Option<f64>,
     /// Coefficients of `f`, from the first power: one, or of geodesics several.
     pub factors: Vec<f64>,
-    /// What is left of momenta and values.
+    /// Rest of momenta and values.
     pub lagrangian: f64,
     /// Difference of the accelerations.
     pub motion: f64,
-    /// What is left of the mass matrix.
+    /// Rest of the mass matrix.
     pub mass_matrix: f64,
-    /// What is left of the energy.
+    /// Rest of the energy.
     pub energy: f64,
     /// States compared.
     pub states: usize,
@@ -59,7 +59,7 @@ impl CommonGround {
         })
     }
 
-    /// What is left, by quantity.
+    /// Rests by quantity.
     pub(crate) fn left(&self) -> [(&'static str, f64); 4] {
         [
             ("Lagrangian", self.lagrangian),

@@ -117,7 +117,7 @@ pub struct ProvenSignature {
 pub struct Physics {
     /// Bounds of the states that were looked at, by column.
     pub region: BTreeMap<String, [f64; 2]>,
-    /// What the learned Lagrangian has in common with the exact one beyond factor and gauge, if the system is known.
+    /// Common ground with the exact Lagrangian, if the system is known: factor and gauge, and what is left.
     pub common_ground: Option<CommonGround>,
     /// Components of the metric, of geodesics alone.
     pub metric: Vec<MetricComponent>,
@@ -281,7 +281,8 @@ impl Physics {
             }
         }
         if maps.len() > MAPS {
-            self.left_out.push(format!("maps of {} components of the metric beyond the first {MAPS}", maps.len() - MAPS));
+            self.left_out
+                .push(format!("maps of {} components of the metric beyond the first {MAPS}", maps.len() - MAPS));
         }
         self.figures.extend(maps.iter().take(MAPS).filter_map(quantity_figure));
     }

@@ -39,9 +39,7 @@ impl<S: Scalar> CanonicalForm<S> {
     /// precision.
     pub fn at(model: &dyn EulerLagrange<S>, q0: &[S], v0: &[S]) -> Result<Self, SymmetryError> {
         let n = model.coordinates();
-        for (what, found) in
-            [("coordinates of the base state", q0.len()), ("velocities of the base state", v0.len())]
-        {
+        for (what, found) in [("coordinates of the base state", q0.len()), ("velocities of the base state", v0.len())] {
             if found != n {
                 return Err(SymmetryError::Base(MechanicsError::Shape { what, expected: n, found }));
             }

@@ -15,8 +15,8 @@ pub struct Comparison {
     /// Coefficients of `f`, from the first power of `B`: a factor, or for geodesics of a metric a polynomial, whose first coefficient
     /// `f'(0)` is the factor of the mass matrix at rest.
     pub factors: Vec<f64>,
-    /// `true` if `B` is a metric whose Lagrangian is the same at all states, as on a mass shell, and `A` is not a metric: then the states know
-    /// `f'` and `f''` at this one value, and `f'(0)` is extrapolated.
+    /// `true` if `B` is a metric whose Lagrangian is the same at all states, as on a mass shell, and `A` is not a metric: then the
+    /// states know `f'` and `f''` at this one value, and `f'(0)` is extrapolated.
     pub on_shell: bool,
     /// Coefficients of the gauge function `F`, one for every function of the basis.
     pub gauge: Vec<f64>,

@@ -104,7 +104,9 @@ fn canonical_forms_agree_at_the_base_state() {
     let plain = inspect("double-pendulum", &states, &[]).objects();
     let base = inspect("double-pendulum", &states, &["--canonical"]).objects();
     assert_eq!(base[0]["lagrangian"], 0.0);
-    assert!(numbers(&base[0]["momentum"]).iter().all(|p| *p == 0.0) && base[0]["energy"].as_f64().unwrap().abs() < 1e-14);
+    assert!(
+        numbers(&base[0]["momentum"]).iter().all(|p| *p == 0.0) && base[0]["energy"].as_f64().unwrap().abs() < 1e-14
+    );
     let matrix: Vec<f64> = base[0]["mass_matrix"].as_array().unwrap().iter().flat_map(numbers).collect();
     assert!((matrix[0] * matrix[3] - matrix[1] * matrix[2] - 1.0).abs() < 1e-14);
     for (before, after) in plain.iter().zip(&base) {
