@@ -1,6 +1,7 @@
 //! Metric and curvature of geodesics: learned against exact.
 
 use super::grid::{Axis, Grid};
+use super::mass_matrix::matrices_at_rest;
 use super::summary::quantile;
 use crate::geometry::geometries;
 use crate::lagrangian::{EulerLagrange, Request, Terms};
@@ -56,9 +57,9 @@ pub(crate) fn curvature_scalars(model: &dyn EulerLagrange<f64>, q: &[f64]) -> Ve
     q.chunks(CHUNK * n).flat_map(scalars).collect()
 }
 
-/// The same over two coordinates, the others as at `point`.
-pub(crate) fn curvature_grid(model: &dyn EulerLagrange<f64>, point: &[f64], axes: [Axis; 2]) -> Grid {
-    let (x, y) = (axes[0].values(), axes[1].values());
+/// Values of the axes and points `(points, n)` over them, the other coordinates as at `point`.
+fn plane(point: &[f64], axes: [Axis; 2]) -> ([Vec<f64>; 2], Vec<f64>) {
+    let [x, y] = axes.map(|axis| axis.values());
     let mut q = Vec::with_capacity(x.len() * y.len() * point.len());
     let mut moved = point.to_vec();
     for second in &y {
@@ -67,7 +68,31 @@ pub(crate) fn curvature_grid(model: &dyn EulerLagrange<f64>, point: &[f64], axes
             q.extend_from_slice(&moved);
         }
     }
+    ([x, y], q)
+}
+
+/// The curvature scalar over two coordinates, the others as at `point`.
+pub(crate) fn curvature_grid(model: &dyn EulerLagrange<f64>, point: &[f64], axes: [Axis; 2]) -> Grid {
+    let ([x, y], q) = plane(point, axes);
     Grid { x, y, values: curvature_scalars(model, &q) }
+}
+
+/// Components of the mass matrix at rest over two coordinates, the others as at `point`, in the order of [`indices`].
+pub(crate) fn metric_grids(model: &dyn EulerLagrange<f64>, point: &[f64], axes: [Axis; 2]) -> Vec<Grid> {
+    let ([x, y], q) = plane(point, axes);
+    let (n, matrices) = (point.len(), matrices_at_rest(model, &q));
+    let grid = |[i, j]: [usize; 2]| Grid { x: x.clone(), y: y.clone(), values: component(n, &matrices, [i, j]) };
+    indices(n).map(grid).collect()
+}
+
+/// Indices of the components of a symmetric matrix, the first not above the second.
+fn indices(n: usize) -> impl Iterator<Item = [usize; 2]> {
+    (0..n).flat_map(move |i| (i..n).map(move |j| [i, j]))
+}
+
+/// One component of matrices `(points, n, n)`, `(points)`.
+fn component(n: usize, matrices: &[f64], [i, j]: [usize; 2]) -> Vec<f64> {
+    matrices.iter().skip(i * n + j).step_by(n * n).copied().collect()
 }
 
 /// Component of a learned metric at rest, after the factor of a comparison, and of the exact one: root mean squares over points.
@@ -91,28 +116,20 @@ pub(crate) fn metric_components(
     factor: f64,
 ) -> Vec<MetricComponent> {
     let n = learned.coordinates();
-    let rest = vec![0.0; q.len()];
-    let matrices = |model: &dyn EulerLagrange<f64>| {
-        let mut terms = Terms::default();
-        // Failures of single points leave matrices that are not finite, and their means so.
-        let _ = model.terms(q, &rest, Request::MASS_MATRIX, &mut terms);
-        terms.mass_matrix
-    };
-    let learned: Vec<f64> = matrices(learned).iter().map(|x| factor * x).collect();
-    let exact = exact.map(matrices);
+    let learned: Vec<f64> = matrices_at_rest(learned, q).iter().map(|x| factor * x).collect();
+    let exact = exact.map(|exact| matrices_at_rest(exact, q));
     let points = (q.len() / n.max(1)).max(1) as f64;
     let rms = |values: &mut dyn Iterator<Item = f64>| (values.map(|x| x * x).sum::<f64>() / points).sqrt();
-    let component = |(i, j): (usize, usize)| {
-        let of = |all: &'_ [f64]| -> Vec<f64> { all.iter().skip(i * n + j).step_by(n * n).copied().collect() };
-        let (own, beside) = (of(&learned), exact.as_deref().map(of));
+    let compared = |at: [usize; 2]| {
+        let (own, beside) = (component(n, &learned, at), exact.as_ref().map(|exact| component(n, exact, at)));
         MetricComponent {
-            indices: [i, j],
+            indices: at,
             learned: rms(&mut own.iter().copied()),
             exact: beside.as_ref().map(|beside| rms(&mut beside.iter().copied())),
             error: beside.as_ref().map(|beside| rms(&mut own.iter().zip(beside).map(|(a, b)| a - b))),
         }
     };
-    (0..n).flat_map(|i| (i..n).map(move |j| (i, j))).map(component).collect()
+    indices(n).map(compared).collect()
 }
 
 #[cfg(test)]
@@ -153,6 +170,17 @@ mod tests {
         });
         let grid = curvature_grid(&sphere(0.5, 0.0), &[0.0; 2], axes);
         assert!(grid.values.len() == 6 && grid.values.iter().all(|r| (r - 8.0).abs() < 1e-11));
+    }
+
+    #[test]
+    fn maps_of_the_metric_are_those_of_its_components() {
+        let axis = |component, from, to, points| Axis { component, from, to, points };
+        let grids = metric_grids(&sphere(2.0, 0.0), &[0.0; 2], [axis(0, 0.5, 1.5, 3), axis(1, 0.0, 1.0, 2)]);
+        assert_eq!((grids.len(), grids[0].x.len(), grids[0].y.len()), (3, 3, 2));
+        assert!(grids[0].values.iter().all(|g| *g == 4.0) && grids[1].values.iter().all(|g| *g == 0.0));
+        for (k, g) in grids[2].values.iter().enumerate() {
+            assert!((g - 4.0 * grids[2].point(k).0.sin().powi(2)).abs() < 1e-15);
+        }
     }
 
     #[test]

@@ -18,6 +18,14 @@ pub struct MassMatrixError {
     pub error: ErrorDistribution,
 }
 
+/// Mass matrices at rest at the positions `q`, `(states, n)`: `(states, n, n)`.
+pub(super) fn matrices_at_rest<S: Scalar>(model: &dyn EulerLagrange<S>, q: &[S]) -> Vec<f64> {
+    let mut terms = Terms::default();
+    // Failures of single states leave matrices that are not finite.
+    let _ = model.terms(q, &vec![<S as Real>::zero(); q.len()], Request::MASS_MATRIX, &mut terms);
+    terms.mass_matrix.iter().map(|x| x.to_f64()).collect()
+}
+
 /// Compares the matrices at rest at the positions `q`, `(states, n)`.
 pub fn mass_matrix_error<S: Scalar>(
     exact: &dyn EulerLagrange<S>,
@@ -25,14 +33,7 @@ pub fn mass_matrix_error<S: Scalar>(
     q: &[S],
 ) -> MassMatrixError {
     let size = exact.coordinates() * exact.coordinates();
-    let v = vec![<S as Real>::zero(); q.len()];
-    let matrices = |model: &dyn EulerLagrange<S>| -> Vec<f64> {
-        let mut terms = Terms::default();
-        // Failures of single states leave matrices that are not finite.
-        let _ = model.terms(q, &v, Request::MASS_MATRIX, &mut terms);
-        terms.mass_matrix.iter().map(|x| x.to_f64()).collect()
-    };
-    let (exact, learned) = (matrices(exact), matrices(learned));
+    let (exact, learned) = (matrices_at_rest(exact, q), matrices_at_rest(learned, q));
     let states = exact.len().max(learned.len()) / size;
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     let pairs: Vec<(&[f64], &[f64])> = exact

@@ -27,7 +27,7 @@ pub(crate) use coordinates::angle_difference;
 #[doc(hidden)]
 pub use coordinates::{CoordinateError, coordinate_error, velocity_error};
 pub use curvature::{MetricComponent, Spread};
-pub(crate) use curvature::{curvature_grid, curvature_scalars, is_metric, metric_components};
+pub(crate) use curvature::{curvature_grid, curvature_scalars, is_metric, metric_components, metric_grids};
 pub use determination::{Determination, Estimate, determination};
 #[doc(hidden)]
 pub use determination::{Observed, RANGE, places};

@@ -21,6 +21,7 @@ mod elementary;
 mod enclosure;
 mod form;
 mod function;
+mod guard;
 mod interval;
 mod network;
 mod number;
@@ -30,6 +31,7 @@ mod spectrum;
 mod tests;
 
 pub use enclosure::mass_matrix_enclosure;
+pub use guard::Guarded;
 pub use interval::Interval;
 pub use network::certify_network;
 pub use search::Verdict;
@@ -125,7 +127,7 @@ pub struct Certificate {
 impl Certificate {
     /// Knowledge of a state: `q` and `v`, both `(n)`. [`Verdict::Open`] outside the region and for a state of the wrong length.
     ///
-    /// A few comparisons: an integrator may ask at every step.
+    /// A few comparisons: an integrator may ask at every step, as it does of a [`Guarded`] model.
     pub fn verdict<S: Scalar>(&self, q: &[S], v: &[S]) -> Verdict {
         let wrapped = |(i, x): (usize, &S)| if self.wrapped.get(i) == Some(&true) { x.wrap_angle() } else { *x };
         let state: Vec<f64> = q.iter().enumerate().map(wrapped).chain(v.iter().copied()).map(S::to_f64).collect();

@@ -1,9 +1,10 @@
 //! `lnn geometry`: metric, connection and curvature of points, full digits.
 
-use crate::cli::number::Precision;
+use crate::cli::number::{Precision, count, list};
 use crate::cli::shown::{CHUNK, report_failures};
 use crate::cli::source::{Source, parameter};
 use crate::cli::states::parse_table;
+use crate::cli::surfaces::Line;
 use crate::cli::{CliError, input, output, states, tensors};
 use crate::geometry::{GeometryError, geometries};
 use crate::lagrangian::{EulerLagrange, Request, Terms};
@@ -23,8 +24,22 @@ pub struct Args {
     #[arg(long, value_name = "SYMBOL=VALUE", num_args = 1.., value_parser = parameter, conflicts_with = "model")]
     param: Vec<(String, String)>,
     /// CSV of points, or - for standard input: the coordinates as header, in any order; other columns are left out.
-    #[arg(long, value_name = "FILE.csv")]
-    points: PathBuf,
+    #[arg(long, value_name = "FILE.csv", required_unless_present = "surface", conflicts_with = "surface")]
+    points: Option<PathBuf>,
+    /// Coordinates of a block of the metric: the points of a line are printed where its determinant changes its sign, instead of the
+    /// geometry of points. The time finds ergosurfaces and static horizons, the time with the angle about the axis the horizons of
+    /// rotating black holes, all coordinates changes of signature.
+    #[arg(long, value_name = "NAME,..", value_delimiter = ',', requires_all = ["from", "to"])]
+    surface: Vec<String>,
+    /// Start of the line, in the order of the coordinates.
+    #[arg(long, value_name = "Q1,Q2,..", requires = "surface", allow_hyphen_values = true)]
+    from: Option<String>,
+    /// End of the line.
+    #[arg(long, value_name = "Q1,Q2,..", requires = "surface", allow_hyphen_values = true)]
+    to: Option<String>,
+    /// Pieces of the line: of two changes of sign in one nothing is seen.
+    #[arg(long, value_name = "N", default_value = "200", requires = "surface", value_parser = count)]
+    steps: usize,
     /// The velocity at which the mass matrix is taken, in the order of the coordinates; it matters to Lagrangians that are not
     /// quadratic in the velocities alone [default: zeros].
     #[arg(long, value_name = "V1,V2,..", allow_hyphen_values = true)]
@@ -51,7 +66,7 @@ enum Format {
 /// Numbers of second derivatives that are held at a time, about.
 const NUMBERS: usize = 1 << 20;
 
-/// Prints one object per point.
+/// Prints one object per point, or the surfaces on a line.
 ///
 /// # Errors
 /// A usage or data error; after the last point, a data error if the metric of any point is degenerate or not finite.
@@ -70,17 +85,23 @@ fn geometry<S: Scalar>(args: &Args) -> Result<(), CliError> {
     };
     let n = source.columns.len() / 2;
     let names = &source.columns[..n];
-    let velocity = velocity(args.velocity.as_deref(), names)?;
-    let place = input::name(&args.points);
+    let velocity = match &args.velocity {
+        Some(text) => list("--velocity", text, names)?,
+        None => vec![<S as Real>::zero(); n],
+    };
+    if let (Some(from), Some(to)) = (&args.from, &args.to) {
+        let ends: [Vec<S>; 2] = [list("--from", from, names)?, list("--to", to, names)?];
+        note_velocity(&*source.model, &ends[0], &velocity);
+        let line = Line { block: &args.surface, ends: (&ends[0], &ends[1]), velocity: &velocity, steps: args.steps };
+        return line.print(&source, !args.json && args.format == Format::Table);
+    }
+    let Some(points) = &args.points else { return Err(CliError::usage("--points: expected a file")) };
+    let place = input::name(points);
     let told = |e: &dyn std::fmt::Display| CliError::data(format_args!("{place}: {e}"));
-    let bytes = input::read(&args.points, states::MAX_BYTES).map_err(|e| told(&e))?;
+    let bytes = input::read(points, states::MAX_BYTES).map_err(|e| told(&e))?;
     let table = parse_table::<S>(&bytes, names).map_err(|e| told(&e))?;
     drop(bytes);
-    if varies(&*source.model, &table.values[..n], &velocity) {
-        output::note(
-            "the mass matrix depends on the velocity; --velocity chooses where it is taken, here at rest or as given",
-        );
-    }
+    note_velocity(&*source.model, &table.values[..n], &velocity);
 
     let chunk = (NUMBERS / n.pow(4)).clamp(1, CHUNK);
     let mut failures: Vec<(usize, String)> = Vec::new();
@@ -112,15 +133,12 @@ fn metric<S: Scalar>(model: &dyn EulerLagrange<S>, q: &[S], v: &[S]) -> Vec<S> {
     terms.mass_matrix
 }
 
-/// The velocity as given, zeros otherwise.
-fn velocity<S: Scalar>(given: Option<&str>, names: &[String]) -> Result<Vec<S>, CliError> {
-    let Some(text) = given else { return Ok(vec![<S as Real>::zero(); names.len()]) };
-    let numbers: Option<Vec<S>> = text.split(',').map(|x| S::parse(x.trim()).filter(|x| x.is_finite())).collect();
-    let expected = format!("expected {} finite numbers ({})", names.len(), names.join(","));
-    let numbers = numbers.ok_or_else(|| CliError::usage(format_args!("--velocity: {expected}, found {text:?}")))?;
-    match numbers.len() {
-        found if found == names.len() => Ok(numbers),
-        found => Err(CliError::usage(format_args!("--velocity: {expected}, found {found}"))),
+/// Says so if the velocity matters to the metric.
+fn note_velocity<S: Scalar>(model: &dyn EulerLagrange<S>, q: &[S], v: &[S]) {
+    if varies(model, q, v) {
+        output::note(
+            "the mass matrix depends on the velocity; --velocity chooses where it is taken, here at rest or as given",
+        );
     }
 }
 

@@ -1,13 +1,14 @@
 //! `lnn inspect`: the Euler-Lagrange terms of states, full digits.
 
 use crate::cli::inverse::inverse;
-use crate::cli::number::Precision;
+use crate::cli::number::{Precision, list};
 use crate::cli::shown::{CHUNK, Field, Format, Shape, explain, report_failures, show};
 use crate::cli::source::{Source, parameter};
 use crate::cli::{CliError, States, input, output, parse_states, states};
-use crate::lagrangian::{Request, Terms};
+use crate::lagrangian::{EulerLagrange, Request, Terms};
 use crate::linalg::{Workspace, eigenvalues};
 use crate::scalar::{Dd, Scalar};
+use crate::symmetry::{Canonical, CanonicalForm, SymmetryError};
 use std::path::PathBuf;
 
 /// Arguments.
@@ -32,6 +33,17 @@ pub struct Args {
     /// aside.
     #[arg(long)]
     inverse: bool,
+    /// Factor and gauge, up to which motion determines L, fixed at a base state, coordinates before velocities [default: the first state
+    /// of the file]: what is printed is s (L - L0 - p0.(v - v0)) with |det M0| |s|^n = 1, which has L = 0 and p = 0 there.
+    #[arg(
+        long,
+        value_name = "Q1,..,V1,..",
+        num_args = 0..=1,
+        require_equals = true,
+        default_missing_value = "",
+        conflicts_with = "inverse"
+    )]
+    canonical: Option<String>,
     /// Precision of everything, the reading of the states included.
     #[arg(long, value_enum, value_name = "TYPE", default_value = "f64")]
     precision: Precision,
@@ -75,27 +87,60 @@ fn inspect<S: Scalar>(args: &Args) -> Result<(), CliError> {
     drop(bytes);
 
     let n = source.columns.len() / 2;
+    let Source { model, columns, .. } = source;
+    let (model, factor) = match &args.canonical {
+        None => (model, None),
+        Some(text) => {
+            let (model, form) = canonical(model, text, &columns, (&states.q, &states.v))?;
+            (model, Some(form.factor))
+        }
+    };
     let mut failures: Vec<(usize, String)> = Vec::new();
     let mut terms = Terms::default();
     for ((q, v), rows) in states.q.chunks(CHUNK * n).zip(states.v.chunks(CHUNK * n)).zip(states.rows.chunks(CHUNK)) {
         let mut text = String::new();
-        if source.model.terms(q, v, Request::ALL, &mut terms).is_ok() {
+        if model.terms(q, v, Request::ALL, &mut terms).is_ok() {
             let spectrum = spectrum(n, &terms.mass_matrix);
             for (k, &row) in rows.iter().enumerate() {
-                text += &show(args.format, row, &fields(n, k, &terms, &spectrum), None);
+                text += &show(args.format, row, &fields(n, k, &terms, &spectrum, factor.as_ref()), None);
             }
         } else {
             // One state of the chunk failed: take them one by one, so that each says its own reason.
             for ((q, v), &row) in q.chunks(n).zip(v.chunks(n)).zip(rows) {
-                let problem = source.model.terms(q, v, Request::ALL, &mut terms).err().map(explain);
+                let problem = model.terms(q, v, Request::ALL, &mut terms).err().map(explain);
                 let spectrum = spectrum(n, &terms.mass_matrix);
-                text += &show(args.format, row, &fields(n, 0, &terms, &spectrum), problem.as_deref());
+                text += &show(args.format, row, &fields(n, 0, &terms, &spectrum, factor.as_ref()), problem.as_deref());
                 failures.extend(problem.map(|text| (row, text)));
             }
         }
         output::print(&text)?;
     }
     report_failures(&place, &failures)
+}
+
+/// A model with its Lagrangian.
+type Model<S> = Box<dyn EulerLagrange<S>>;
+
+/// The model in its canonical form at the base state of `text`, at the first of the states `(q, v)` if that is empty.
+fn canonical<S: Scalar>(
+    model: Model<S>,
+    text: &str,
+    columns: &[String],
+    (q, v): (&[S], &[S]),
+) -> Result<(Model<S>, CanonicalForm<S>), CliError> {
+    let n = columns.len() / 2;
+    let base = match (text, q.get(..n), v.get(..n)) {
+        ("", Some(q), Some(v)) => [q, v].concat(),
+        _ => list("--canonical", text, columns)?,
+    };
+    let form = CanonicalForm::at(model.as_ref(), &base[..n], &base[n..]).map_err(|error| {
+        let problem = match error {
+            SymmetryError::Base(error) => explain(error),
+            error => error.to_string(),
+        };
+        CliError::data(format_args!("--canonical: no canonical form at the base state: {problem}"))
+    })?;
+    Ok((Box::new(Canonical::new(model, form.clone())), form))
 }
 
 /// Eigenvalues of a batch of mass matrices, ascending; of one that is not finite, `NaN`.
@@ -106,8 +151,14 @@ fn spectrum<S: Scalar>(n: usize, matrices: &[S]) -> Vec<S> {
     values
 }
 
-/// Everything there is to say about state `k` of a batch.
-fn fields<'a, S>(n: usize, k: usize, terms: &'a Terms<S>, spectrum: &'a [S]) -> Vec<Field<'a, S>> {
+/// Everything there is to say about state `k` of a batch; `factor` is that of a canonical form.
+fn fields<'a, S>(
+    n: usize,
+    k: usize,
+    terms: &'a Terms<S>,
+    spectrum: &'a [S],
+    factor: Option<&'a S>,
+) -> Vec<Field<'a, S>> {
     let part = |values: &'a [S], size: usize| values.get(k * size..(k + 1) * size).unwrap_or(&[]);
     let number = |name, values| Field { name, values: part(values, 1), shape: Shape::Number };
     let vector = |name, values| Field { name, values: part(values, n), shape: Shape::Vector };
@@ -124,5 +175,7 @@ fn fields<'a, S>(n: usize, k: usize, terms: &'a Terms<S>, spectrum: &'a [S]) -> 
     if !terms.force.is_empty() {
         fields.extend([vector("force", &terms.force), number("dissipation", &terms.dissipation)]);
     }
+    let factor = factor.map(|factor| std::slice::from_ref(factor));
+    fields.extend(factor.map(|values| Field { name: "canonical_factor", values, shape: Shape::Number }));
     fields
 }

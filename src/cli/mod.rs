@@ -57,6 +57,7 @@ mod source;
 mod spool;
 mod states;
 mod subject;
+mod surfaces;
 mod symmetries;
 mod systems;
 mod tensors;

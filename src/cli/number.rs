@@ -1,6 +1,8 @@
 //! Numbers of the command line, with their ranges.
 
+use crate::cli::CliError;
 use crate::rollout::Options;
+use crate::scalar::Scalar;
 
 /// Precision that a command computes in.
 #[derive(Clone, Copy, Debug, clap::ValueEnum)]
@@ -55,6 +57,20 @@ pub fn bounds(text: &str) -> Result<(f64, f64), String> {
 /// A whole number above 0.
 pub fn count(text: &str) -> Result<usize, String> {
     text.trim().parse().ok().filter(|n| *n > 0).ok_or_else(|| "expected a whole number above 0".to_string())
+}
+
+/// A finite number for each of `names`, separated by commas, read in the precision of `S`; `option` is what asked for them.
+///
+/// # Errors
+/// A usage error that says how many were expected of what.
+pub fn list<S: Scalar>(option: &str, text: &str, names: &[String]) -> Result<Vec<S>, CliError> {
+    let numbers: Option<Vec<S>> = text.split(',').map(|x| S::parse(x.trim()).filter(|x| x.is_finite())).collect();
+    let expected = format!("expected {} finite numbers ({})", names.len(), names.join(","));
+    let numbers = numbers.ok_or_else(|| CliError::usage(format_args!("{option}: {expected}, found {text:?}")))?;
+    match numbers.len() {
+        found if found == names.len() => Ok(numbers),
+        found => Err(CliError::usage(format_args!("{option}: {expected}, found {found}"))),
+    }
 }
 
 /// Number of threads: as asked for, or all there are.

@@ -212,9 +212,10 @@ impl Found {
         }
         let Families { polynomial, trigonometric, hyperbolic } = self.basis;
         text += &format!(
-            "{}{} functions (polynomial:{polynomial},trigonometric:{trigonometric},hyperbolic:{hyperbolic}), {} states\n",
+            "{}{} functions ({}), {} states\n",
             if self.gap.is_some() { "; " } else { "" },
             self.functions,
+            Degrees { polynomial, trigonometric, hyperbolic },
             self.points
         );
         if !self.fields.is_empty() {

@@ -30,6 +30,12 @@ pub enum MechanicsError {
         /// Which term.
         what: &'static str,
     },
+    /// A state at which the mass matrix is not certified, of a model that is to move where it is.
+    #[error("mass matrix of state {row} is not certified")]
+    Uncertified {
+        /// Row of the batch.
+        row: usize,
+    },
     /// Derivatives that a model does not have.
     #[error("{what}: this model has no such derivatives")]
     Derivatives {

@@ -55,7 +55,7 @@ impl Evaluation {
         Ok(json)
     }
 
-    fn tables(&self) -> [Table; 3] {
+    fn tables(&self) -> Vec<Table> {
         let units: Vec<&str> = self.coordinates.iter().map(|name| headline::named(name).1).collect();
         let unit = units.first().filter(|unit| units.iter().all(|other| other == *unit));
         let accelerations = self.coordinates.iter().zip(&self.accelerations).map(|(name, e)| {
@@ -101,7 +101,17 @@ impl Evaluation {
             let (time, unit) = (t_end / t_end.ln(), &self.time_unit);
             let _ = write!(about, "; motion without chaos has a Lyapunov time of about {time:.0} {unit}");
         }
-        [
+        let common = self.physics.common_ground.as_ref().map(|common| {
+            let powers: Vec<String> = common.factors.iter().map(|factor| number(*factor)).collect();
+            let distances = common.left().map(|(_, distance)| hundredths(distance));
+            let left = common.left().map(|(name, _)| format!("{name} [%]"));
+            Table {
+                title: "What is left of the learned Lagrangian beside factor and gauge of the exact one".into(),
+                header: [vec!["factor [1]".to_string()], left.to_vec(), vec!["states".into()]].concat(),
+                rows: vec![[vec![powers.join("; ")], distances.to_vec(), vec![common.states.to_string()]].concat()],
+            }
+        });
+        let tables = [
             Table {
                 title: "Error of accelerations on fresh states".into(),
                 header: [vec!["acceleration of".to_string()], measures.map(of_unit).to_vec(), vec!["failed".into()]]
@@ -114,7 +124,8 @@ impl Evaluation {
                 rows: vec![matrix],
             },
             Table { title: about, header: header(&motions), rows: trajectories.collect() },
-        ]
+        ];
+        common.into_iter().chain(tables).collect()
     }
 
     /// Headline and tables for a terminal, of a model of the system called `title`.

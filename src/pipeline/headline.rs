@@ -57,10 +57,11 @@ fn valid_name(valid: &ValidTimes, [one, many]: [&str; 2]) -> String {
 /// A model of a system that is known: `title` names it.
 pub(crate) fn of_evaluation(title: &str, found: &Evaluation) -> Headline {
     let mass = found.mass_matrix.error.median;
-    let matrix = if mass.is_finite() {
-        format!("gives the mass matrix to {} up to one factor", percent(mass))
-    } else {
-        "gives no mass matrix that can be compared".to_string()
+    let common = found.physics.common_ground.as_ref();
+    let matrix = match common.map(|common| common.mass_matrix).filter(|x| x.is_finite()) {
+        Some(left) => format!("gives the mass matrix to {} up to one factor", percent(left)),
+        None if mass.is_finite() => format!("gives the mass matrix to {} up to one factor", percent(mass)),
+        None => "gives no mass matrix that can be compared".to_string(),
     };
     let predicts = match &found.valid_time {
         Some(valid) => format!(", and predicts the motion for {}", valid_time(valid, &found.time_unit)),
@@ -76,6 +77,9 @@ pub(crate) fn of_evaluation(title: &str, found: &Evaluation) -> Headline {
         format!("{name} {} {unit}", number(error.median))
     });
     add("Accelerations of fresh states, median error", errors.collect::<Vec<_>>().join(", "));
+    if let Some(common) = common {
+        add("Left of the learned Lagrangian beside factor and gauge", common.text());
+    }
     add("Mass matrix at rest, median error", percent(mass));
     let mut energies: Vec<f64> = found.trajectories.iter().map(|t| t.summary.energy_error.mean).collect();
     energies.retain(|x| x.is_finite());

@@ -51,6 +51,7 @@
 
 mod attention;
 mod checkpoints;
+mod common_ground;
 mod determination;
 mod energy;
 mod error;
@@ -83,6 +84,7 @@ mod train;
 mod watch;
 
 pub use checkpoints::{Begin, Checkpoints};
+pub use common_ground::CommonGround;
 pub use determination::Determined;
 pub use energy::Balance;
 pub use error::PipelineError;

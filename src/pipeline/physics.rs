@@ -1,25 +1,36 @@
-//! Physics of a model: metric, curvature, symmetries, charges, signature, beside those of the system it learned.
+//! Physics of a model: metric, curvature, symmetries, charges, signature, beside those of the system it learned, and what it has in
+//! common with it.
 //!
 //! All of it is bounded by work, not by time: what depends on the clock would not be the same in every run.
 
 use crate::analysis::{
-    Axis, MetricComponent, Spread, curvature_grid, curvature_scalars, is_metric, mass_matrix_error, metric_components,
+    Axis, Grid, MetricComponent, Spread, curvature_grid, curvature_scalars, is_metric, mass_matrix_error,
+    metric_components, metric_grids,
 };
 use crate::certificate::{Options, Signature, certify_network};
 use crate::lagrangian::system::Bounds;
 use crate::lagrangian::{Configured, EulerLagrange};
 use crate::network::{NetworkLagrangian, Structure};
 use crate::pipeline::PipelineError;
-use crate::report::{CurvatureMap, Figure, curvature_figure};
+use crate::pipeline::common_ground::{CommonGround, gauge_functions};
+use crate::report::{Figure, QuantityMap, quantity_figure};
 use crate::rollout::{Domain, Trajectory};
-use crate::symmetry::{Chart, Region, Symmetries, bases, drifts, enough, middle, most_symmetries, unknowns};
+use crate::symmetry::{Chart, Degrees, Region, Symmetries, bases, drifts, enough, middle, most_symmetries, unknowns};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
 /// Points of the curvature, and of its map along each axis, at most.
 const POINTS: (usize, usize) = (100, 21);
+/// Points of a map of the metric along each axis, at most.
+const METRIC_POINTS: usize = 41;
 /// Points of a map along each axis that are worth a picture.
 const WORTH: usize = 8;
+/// Components of a metric that have a map, at most.
+const MAPS: usize = 10;
+/// Components off the diagonal that have a map exceed this part of those on it, root mean squares.
+const SHOWN: f64 = 0.02;
+/// Weights times `n` times points of the maps of a metric, at most: a second or so.
+const METRIC_WORK: usize = 150_000_000;
 /// Weights times `n^3` times points of the curvature, at most: a second or so.
 const CURVATURE_WORK: usize = 100_000_000;
 /// Weights times `n^2` times boxes of a certificate, at most: a second or so.
@@ -51,15 +62,18 @@ pub struct FoundSymmetries {
     pub name: Option<String>,
     /// Formulas of the fields.
     pub fields: Vec<String>,
+    /// Degrees of the functions in which they were found, such as `polynomial:1,trigonometric:2,hyperbolic:0`.
+    pub basis: String,
 }
 
-impl From<&Symmetries> for FoundSymmetries {
-    fn from(found: &Symmetries) -> Self {
+impl FoundSymmetries {
+    fn new(found: &Symmetries, degrees: Degrees) -> Self {
         Self {
             count: found.separation.count,
             gap: found.separation.gap,
             name: found.algebra.as_ref().and_then(|algebra| algebra.name.clone()),
             fields: found.fields.iter().map(|field| field.text(&found.basis)).collect(),
+            basis: degrees.to_string(),
         }
     }
 }
@@ -103,6 +117,8 @@ pub struct ProvenSignature {
 pub struct Physics {
     /// Bounds of the states that were looked at, by column.
     pub region: BTreeMap<String, [f64; 2]>,
+    /// Common ground with the exact Lagrangian, if the system is known: factor and gauge, and what is left.
+    pub common_ground: Option<CommonGround>,
     /// Components of the metric, of geodesics alone.
     pub metric: Vec<MetricComponent>,
     /// Curvature scalar, of geodesics in two dimensions at least.
@@ -155,6 +171,7 @@ impl Physics {
         let ranges = region.position.iter().chain(&region.velocity).copied();
         let mut found = Self {
             region: subject.columns.iter().cloned().zip(ranges).collect(),
+            common_ground: None,
             metric: Vec::new(),
             curvature_scalar: None,
             symmetries: None,
@@ -167,7 +184,9 @@ impl Physics {
             figures: Vec::new(),
         };
         let exact = subject.system.map(Configured::build).transpose()?;
-        found.find_curvature(subject, &region, exact.as_deref());
+        found.find_common_ground(subject, &region, exact.as_deref());
+        check()?;
+        found.find_geometry(subject, &region, exact.as_deref());
         check()?;
         found.find_symmetries(subject, &region, exact.as_deref());
         check()?;
@@ -176,7 +195,18 @@ impl Physics {
         Ok(found)
     }
 
-    fn find_curvature(&mut self, subject: &Subject<'_>, region: &Region, exact: Option<&dyn EulerLagrange<f64>>) {
+    fn find_common_ground(&mut self, subject: &Subject<'_>, region: &Region, exact: Option<&dyn EulerLagrange<f64>>) {
+        let Some(exact) = exact else { return };
+        let (basis, states) = gauge_functions(&self.coordinates, &subject.charts(region));
+        let (q, v) = subject.states(region, states);
+        match CommonGround::new(subject.network, exact, &basis, (&q, &v)) {
+            Ok(found) => self.common_ground = Some(found),
+            Err(problem) => self.left_out.push(format!("common ground with the system: {problem}")),
+        }
+    }
+
+    /// Metric and curvature, of geodesics.
+    fn find_geometry(&mut self, subject: &Subject<'_>, region: &Region, exact: Option<&dyn EulerLagrange<f64>>) {
         let (network, n) = (subject.network, subject.network.coordinates());
         let (q, v) = subject.states(region, POINTS.0);
         let form = &network.architecture().form;
@@ -187,13 +217,85 @@ impl Physics {
         if !metric || q.is_empty() {
             return;
         }
-        let most = CURVATURE_WORK / (network.weights().len() * n.pow(3)).max(1);
-        let q = &q[..n * most.clamp(1, q.len() / n)];
-        let factor = exact.map_or(1.0, |exact| mass_matrix_error(exact, network, q).factor);
-        self.metric = metric_components(exact, network, q, factor);
+        let found = self.common_ground.as_ref().and_then(|common| common.factor);
+        // Of a black box on a mass shell only a comparison at rest knows the factor there.
+        let at_rest = |exact: &dyn EulerLagrange<f64>| mass_matrix_error(exact, network, &q).factor;
+        let factor = found.or_else(|| exact.map(at_rest)).unwrap_or(1.0);
+        let most = (CURVATURE_WORK / (network.weights().len() * n.pow(3)).max(1)).max(1);
+        self.metric = metric_components(exact, network, &q[..n * most.min(q.len() / n)], factor);
         if n < 2 {
             return;
         }
+        let plane = self.plane(subject, region);
+        self.map_metric(network, exact, factor, &plane);
+        self.find_curvature((network, exact), &q, (factor, most), &plane);
+    }
+
+    /// The two coordinates over which maps are drawn, those of space if there are two.
+    fn plane(&self, subject: &Subject<'_>, region: &Region) -> Plane {
+        let n = self.coordinates.len();
+        let time = subject.system.and_then(|system| system.system.time_like);
+        let time = time.or(subject.network.architecture().time_like);
+        let shown = if n > 2 && time == Some(0) { [1, n - 1] } else { [0, 1] };
+        let middle: Vec<f64> = region.position.iter().map(|[low, high]| 0.5 * (low + high)).collect();
+        let fixed: Vec<String> = (0..n)
+            .filter(|i| !shown.contains(i))
+            .map(|i| format!("{} = {}", self.coordinates[i], (1e4 * middle[i]).round() / 1e4 + 0.0))
+            .collect();
+        Plane {
+            shown: shown.map(|i| (i, region.position[i])),
+            labels: shown.map(|i| subject.labels[i].clone()),
+            middle,
+            fixed: fixed.join(", "),
+        }
+    }
+
+    fn map_metric(
+        &mut self,
+        network: &NetworkLagrangian<f64>,
+        exact: Option<&dyn EulerLagrange<f64>>,
+        factor: f64,
+        plane: &Plane,
+    ) {
+        let points = METRIC_WORK / (network.weights().len() * self.coordinates.len()).max(1);
+        let side = points.isqrt().min(METRIC_POINTS);
+        if side < WORTH {
+            return self.left_out.push("maps of the metric: too many weights for pictures in a second".into());
+        }
+        let size = |component: &MetricComponent| component.exact.unwrap_or(0.0).max(component.learned);
+        let diagonal = |i: usize| self.metric.iter().find(|c| c.indices == [i; 2]).map_or(0.0, size);
+        let worth = |component: &MetricComponent| {
+            let [i, j] = component.indices;
+            i == j || size(component) > SHOWN * (diagonal(i) * diagonal(j)).sqrt()
+        };
+        let grids = |model: &dyn EulerLagrange<f64>| metric_grids(model, &plane.middle, plane.axes(side));
+        let (learned, mut beside) = (grids(network), exact.map(|exact| grids(exact).into_iter()));
+        let mut maps = Vec::new();
+        for (component, learned) in self.metric.iter().zip(learned) {
+            let exact = beside.as_mut().and_then(Iterator::next);
+            if worth(component) {
+                let name = component.indices.map(|i| self.coordinates[i].as_str()).join("_");
+                let about = format!("Component g_{name} of the metric at rest");
+                let quantity = format!("g_{name}");
+                maps.push(plane.map([quantity, about, format!("metric_{name}")], learned.map(|g| factor * g), exact));
+            }
+        }
+        if maps.len() > MAPS {
+            self.left_out
+                .push(format!("maps of {} components of the metric beyond the first {MAPS}", maps.len() - MAPS));
+        }
+        self.figures.extend(maps.iter().take(MAPS).filter_map(quantity_figure));
+    }
+
+    fn find_curvature(
+        &mut self,
+        (network, exact): (&NetworkLagrangian<f64>, Option<&dyn EulerLagrange<f64>>),
+        q: &[f64],
+        (factor, most): (f64, usize),
+        plane: &Plane,
+    ) {
+        let n = self.coordinates.len();
+        let q = &q[..n * most.min(q.len() / n)];
         // R of `s g` is `R/s`.
         let scaled = |values: Vec<f64>| values.iter().map(|r| r / factor).collect::<Vec<f64>>();
         self.curvature_scalar = Some(CurvatureScalar {
@@ -206,46 +308,30 @@ impl Physics {
             self.left_out.push("map of the curvature scalar: too many weights for a picture in a second".into());
             return;
         }
-        let time = subject.system.and_then(|system| system.system.time_like);
-        let shown = if n > 2 && time.or(network.architecture().time_like) == Some(0) { [1, n - 1] } else { [0, 1] };
-        let axis = |i: usize| {
-            let [from, to] = region.position[i];
-            Axis { component: i, from, to, points: side }
-        };
-        let middle: Vec<f64> = region.position.iter().map(|[low, high]| 0.5 * (low + high)).collect();
-        let grid = |model: &dyn EulerLagrange<f64>| curvature_grid(model, &middle, shown.map(axis));
-        let fixed: Vec<String> = (0..n)
-            .filter(|i| !shown.contains(i))
-            .map(|i| format!("{} = {}", self.coordinates[i], (1e4 * middle[i]).round() / 1e4 + 0.0))
-            .collect();
-        self.figures.extend(curvature_figure(&CurvatureMap {
-            x_label: subject.labels[shown[0]].clone(),
-            y_label: subject.labels[shown[1]].clone(),
-            learned: grid(network).map(|r| r / factor),
-            exact: exact.map(grid),
-            fixed: fixed.join(", "),
-        }));
+        let grid = |model: &dyn EulerLagrange<f64>| curvature_grid(model, &plane.middle, plane.axes(side));
+        let names = ["R", "Curvature scalar R of the metric", "curvature_scalar"].map(String::from);
+        let map = plane.map(names, grid(network).map(|r| r / factor), exact.map(grid));
+        self.figures.extend(quantity_figure(&map));
     }
 
     fn find_symmetries(&mut self, subject: &Subject<'_>, region: &Region, exact: Option<&dyn EulerLagrange<f64>>) {
         let (network, n) = (subject.network, subject.network.coordinates());
         let charts = subject.charts(region);
         let names = self.coordinates.clone();
-        let search = |model: &dyn EulerLagrange<f64>, exact: bool| -> Result<Symmetries, String> {
+        let search = |model: &dyn EulerLagrange<f64>, exact: bool| -> Result<(Symmetries, Degrees), String> {
             let bases = bases(&names, &charts, None, exact);
             let functions = bases.iter().map(|(basis, _)| basis.len()).max().unwrap_or(0);
             let (q, v) = subject.states(region, enough(unknowns(n, functions), exact));
-            let found = most_symmetries(model, bases, (&q, &v), (None, exact));
-            found.map(|(found, _)| found).map_err(|problem| problem.to_string())
+            most_symmetries(model, bases, (&q, &v), (None, exact)).map_err(|problem| problem.to_string())
         };
         match search(network, false) {
-            Ok(found) => self.symmetries = Some(FoundSymmetries::from(&found)),
+            Ok((found, degrees)) => self.symmetries = Some(FoundSymmetries::new(&found, degrees)),
             Err(problem) => self.left_out.push(format!("symmetries of the model: {problem}")),
         }
         let Some(exact) = exact else { return };
         match search(exact, true) {
-            Ok(found) => {
-                self.exact_symmetries = Some(FoundSymmetries::from(&found));
+            Ok((found, degrees)) => {
+                self.exact_symmetries = Some(FoundSymmetries::new(&found, degrees));
                 self.follow_charges(subject, exact, &found);
             }
             Err(problem) => self.left_out.push(format!("symmetries of the system: {problem}")),
@@ -305,6 +391,25 @@ impl Physics {
             }
             Err(problem) => self.left_out.push(format!("certificate of the signature: {problem}")),
         }
+    }
+}
+
+/// Two coordinates with their ranges, and where the others are fixed.
+struct Plane {
+    shown: [(usize, [f64; 2]); 2],
+    labels: [String; 2],
+    middle: Vec<f64>,
+    fixed: String,
+}
+
+impl Plane {
+    fn axes(&self, points: usize) -> [Axis; 2] {
+        self.shown.map(|(component, [from, to])| Axis { component, from, to, points })
+    }
+
+    fn map(&self, [quantity, about, file]: [String; 3], learned: Grid, exact: Option<Grid>) -> QuantityMap {
+        let (labels, fixed) = (self.labels.clone(), self.fixed.clone());
+        QuantityMap { quantity, about, file, labels, learned, exact, fixed }
     }
 }
 

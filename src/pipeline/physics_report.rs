@@ -71,14 +71,15 @@ impl Physics {
         let row = |(name, found): (&str, &FoundSymmetries)| {
             let count = found.count.map_or("no gap, no number".to_string(), |count| count.to_string());
             let algebra = found.name.clone().unwrap_or(NONE.to_string());
-            vec![name.to_string(), count, found.gap.map_or(NONE.to_string(), number), algebra, found.fields.join("; ")]
+            let gap = found.gap.map_or(NONE.to_string(), number);
+            vec![name.to_string(), count, gap, algebra, found.fields.join("; "), found.basis.clone()]
         };
         let rows: Vec<Vec<String>> =
             pair.iter().filter_map(|(name, found)| Some(row((name, found.as_ref()?)))).collect();
         if rows.is_empty() {
             return report;
         }
-        report.table(&["point symmetries", "number", "gap", "algebra", "fields"], &rows)
+        report.table(&["point symmetries", "number", "gap", "algebra", "fields", "functions of degree"], &rows)
     }
 
     fn charges(&self, report: Report) -> Report {

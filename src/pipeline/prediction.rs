@@ -101,6 +101,7 @@ fn in_parts(
 fn reason(stop: &RolloutError) -> &'static str {
     match stop {
         RolloutError::SingularMass { .. } => "a singular mass matrix",
+        RolloutError::Uncertified { .. } => "a mass matrix that is not certified",
         RolloutError::TooManySteps { .. } => "a motion too wild for the steps allowed",
         RolloutError::StepUnderflow { .. } => "steps that became too small",
         RolloutError::LeftDomain { .. } => "leaving the domain",

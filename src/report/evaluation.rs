@@ -1,6 +1,6 @@
 //! Pictures of the motions of an evaluation.
 
-use super::{Figure, Level, LinePlot, Series, Trace, Turn, kept, line_plot, trace_plot};
+use super::{Figure, Level, LinePlot, Series, Trace, Turn, file_part, kept, line_plot, trace_plot};
 use crate::analysis::{Portrait, TrajectoryRun, VALID, ValidTimes};
 use crate::lagrangian::Configured;
 use crate::rollout::Trajectory;
@@ -199,11 +199,6 @@ fn component<S: Scalar>(trajectory: &Trajectory<S>, k: usize) -> Vec<f64> {
     let n = trajectory.coordinates;
     let (values, offset) = if k < n { (&trajectory.q, k) } else { (&trajectory.v, k - n) };
     values.chunks_exact(n.max(1)).filter_map(|row| row.get(offset)).map(|x| x.to_f64()).collect()
-}
-
-/// A name as part of a file name.
-fn file_part(name: &str) -> String {
-    name.chars().map(|c| if c.is_ascii_alphanumeric() || c == '_' { c } else { '_' }).collect()
 }
 
 #[cfg(test)]

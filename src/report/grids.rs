@@ -1,5 +1,6 @@
 //! Pictures of learned and exact functions on a grid.
 
+use super::quantity_map::{difference_panel, panel};
 use super::{Figure, HeatMap, PlotError, heat_maps};
 use crate::analysis::{AffineFit, Grid, affine_fit, factor_fit};
 
@@ -74,19 +75,13 @@ pub fn grid_figures(comparison: &GridComparison) -> Result<(Figure, Option<Affin
         Some(share) => format!("{quantity} learned, {share:.2} % of wrong sign"),
         None => format!("{quantity} learned"),
     };
-    let map = |title: String, grid: Grid, range, diverging, marks| HeatMap {
-        title,
-        x_label: comparison.x_label.clone(),
-        y_label: comparison.y_label.clone(),
-        grid,
-        range,
-        diverging,
-        marks,
-    };
+    let labels = [comparison.x_label.clone(), comparison.y_label.clone()];
+    let range = Some((low, high));
+    let exact = panel(format!("{quantity} exact"), &labels, &comparison.exact);
     let picture = heat_maps(&[
-        map(format!("{quantity} exact"), comparison.exact.clone(), Some((low, high)), false, Vec::new()),
-        map(learned_title, learned, Some((low, high)), false, marks),
-        map("learned \u{2212} exact".into(), difference, None, true, Vec::new()),
+        HeatMap { range, ..exact },
+        HeatMap { range, marks, ..panel(learned_title, &labels, &learned) },
+        difference_panel(&labels, &difference),
     ])?;
     let fixed = if comparison.fixed.is_empty() { String::new() } else { format!(" at {}", comparison.fixed) };
     let learned = match fit {

@@ -1,13 +1,13 @@
 //! Plots, tables and the HTML report.
 
 mod base64;
-mod curvature;
 mod escape;
 mod evaluation;
 mod experiment;
 mod grids;
 mod html;
 mod plot;
+mod quantity_map;
 mod readings;
 mod table;
 #[cfg(test)]
@@ -15,7 +15,6 @@ mod test_pictures;
 mod training;
 mod turn;
 
-pub(crate) use curvature::{CurvatureMap, curvature_figure};
 pub(crate) use evaluation::evaluation_figures;
 pub use experiment::{Curve, EXPERIMENT_HEADER};
 pub(crate) use experiment::{
@@ -27,6 +26,7 @@ pub use plot::{
     HeatMap, Level, LinePlot, OrbitPlot, Picture, PlotError, Series, Trace, heat_maps, line_plot, orbit_picture, png,
     trace_plot,
 };
+pub(crate) use quantity_map::{QuantityMap, quantity_figure};
 pub(crate) use readings::{READING_HEADER, reading_table};
 pub use table::text_table;
 pub(crate) use training::{HistoryRow, training_figures};
@@ -47,4 +47,9 @@ pub struct Figure {
 pub fn kept(file: &str, drawn: Result<Picture, PlotError>, caption: String) -> Option<Figure> {
     let picture = drawn.ok()?;
     Some(Figure { file: file.to_string(), picture, caption })
+}
+
+/// A name as part of a file name.
+fn file_part(name: &str) -> String {
+    name.chars().map(|c| if c.is_ascii_alphanumeric() || c == '_' { c } else { '_' }).collect()
 }

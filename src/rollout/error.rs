@@ -58,6 +58,14 @@ pub enum RolloutError {
         /// Condition number just ahead.
         condition: f64,
     },
+    /// The trajectory leaves the states at which the mass matrix is certified.
+    #[error("the mass matrix is not certified just after t = {t}")]
+    Uncertified {
+        /// Last time at which it was.
+        t: f64,
+        /// State `(q, v)` at `t`.
+        state: Vec<f64>,
+    },
     /// A state or an acceleration is not finite.
     #[error("{what} is not finite just after t = {t}")]
     NotFinite {
@@ -115,6 +123,7 @@ impl RolloutError {
             Self::Invalid { .. } => None,
             Self::LeftDomain { t, .. }
             | Self::SingularMass { t, .. }
+            | Self::Uncertified { t, .. }
             | Self::NotFinite { t, .. }
             | Self::StepUnderflow { t, .. }
             | Self::NotConverged { t, .. }

@@ -42,6 +42,7 @@ pub(super) fn into_error(failure: Failure, t: f64, state: Vec<f64>, step: f64) -
         Failure::Model(MechanicsError::Singular { condition, .. }) => {
             RolloutError::SingularMass { t, state, condition }
         }
+        Failure::Model(MechanicsError::Uncertified { .. }) => RolloutError::Uncertified { t, state },
         Failure::Model(MechanicsError::NotFinite { what, .. }) => RolloutError::NotFinite { t, state, what },
         Failure::NotConverged { iterations, residual } => RolloutError::NotConverged { t, state, iterations, residual },
         Failure::Model(error) => RolloutError::StepUnderflow { t, state, step, cause: UnderflowCause::Model(error) },

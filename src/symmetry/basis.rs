@@ -2,6 +2,7 @@
 
 use crate::names::unknown;
 use std::f64::consts::PI;
+use std::fmt::{self, Display, Formatter};
 use std::str::FromStr;
 
 /// Values that a coordinate takes, which decide the functions of it that are tried.
@@ -47,6 +48,14 @@ pub struct Degrees {
     pub hyperbolic: usize,
 }
 
+/// The text that is read back, every family with its degree.
+impl Display for Degrees {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let Self { polynomial, trigonometric, hyperbolic } = self;
+        write!(f, "polynomial:{polynomial},trigonometric:{trigonometric},hyperbolic:{hyperbolic}")
+    }
+}
+
 /// Degrees in a text such as `polynomial:2,trigonometric:1`; a family that is not there has degree 0.
 ///
 /// ```
@@ -54,6 +63,7 @@ pub struct Degrees {
 ///
 /// let degrees: Degrees = "polynomial:2,trigonometric:1".parse().unwrap();
 /// assert_eq!((degrees.polynomial, degrees.trigonometric, degrees.hyperbolic), (2, 1, 0));
+/// assert_eq!(degrees.to_string(), "polynomial:2,trigonometric:1,hyperbolic:0");
 /// assert!("polynomial:-1".parse::<Degrees>().is_err());
 /// ```
 impl FromStr for Degrees {

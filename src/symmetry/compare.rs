@@ -12,8 +12,12 @@ use serde::Serialize;
 /// distance is relative, 0 for equal ones.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Comparison {
-    /// Coefficients of `f`, from the first power of `B`: a factor, or for geodesics of a metric a polynomial.
+    /// Coefficients of `f`, from the first power of `B`: a factor, or for geodesics of a metric a polynomial, whose first coefficient
+    /// `f'(0)` is the factor of the mass matrix at rest.
     pub factors: Vec<f64>,
+    /// `true` if `B` is a metric whose Lagrangian is the same at all states, as on a mass shell, and `A` is not a metric: then the
+    /// states know `f'` and `f''` at this one value, and `f'(0)` is extrapolated.
+    pub on_shell: bool,
     /// Coefficients of the gauge function `F`, one for every function of the basis.
     pub gauge: Vec<f64>,
     /// `F` as a formula.
@@ -42,8 +46,9 @@ const DEPENDENT: f64 = 1e-9;
 /// The motion determines `L` at best up to a factor and a total derivative, `L -> s L + dF(q)/dt`, and up to a constant; that of
 /// geodesics, along which `L` is the energy, up to a function `f(L)`, where `B` is the metric. The best `s` (or `f`, a
 /// polynomial of degree 3) and `F`, over the functions of a basis, follow by linear least squares from the momenta of both, in the
-/// frame of `|M|` of `B`, the constant from the values. They are taken out, and what is left is stated by quantity. Where `L` is the
-/// same on all states, as on a mass shell, `f` is a factor.
+/// frame of `|M|` of `B`, the constant from the values. They are taken out, and what is left is stated by quantity. Of two metrics
+/// `f` is a factor. Where `B` is the same on all states, as on a mass shell, momenta know `f'` there, and `f''` follows from the mass
+/// matrices, `f' M + f'' p p^T`.
 ///
 /// # Errors
 /// [`SymmetryError`].
@@ -61,12 +66,13 @@ pub fn compare(
     let of_a = Sample::new(a, q, v)?;
     let of_b = Sample::new(b, &of_a.q, &of_a.v)?;
     let of_a = Sample::new(a, &of_b.q, &of_b.v)?;
-    let fit = Fit::new(&of_a, &of_b, basis)?;
+    let mut fit = Fit::new(&of_a, &of_b, basis)?;
     let (mass_matrix, motion) = fit.mechanics(a, b, &of_b)?;
     let energy = fit.energy(&of_a, &of_b);
     Ok(Comparison {
         gauge_formula: field::sum(fit.gauge.iter().enumerate().map(|(f, c)| (*c, basis.text(f)))),
         factors: fit.factors,
+        on_shell: fit.on_shell,
         gauge: fit.gauge,
         constant: fit.constant,
         lagrangian: fit.rest,
@@ -79,6 +85,7 @@ pub fn compare(
 /// The best `f` and `F`.
 struct Fit {
     factors: Vec<f64>,
+    on_shell: bool,
     gauge: Vec<f64>,
     constant: f64,
     rest: f64,
@@ -94,7 +101,8 @@ impl Fit {
     fn new(a: &Sample, b: &Sample, basis: &Basis) -> Result<Self, SymmetryError> {
         let (n, states, functions) = (b.n, b.len(), basis.len());
         let (values, own) = (lagrangians(a), lagrangians(b));
-        let powers = if b.homogeneous { POWERS } else { 1 };
+        // A function of one metric that is another one is a factor.
+        let powers = if b.homogeneous && !a.homogeneous { POWERS } else { 1 };
         // Of two that are even in the velocities no difference is a dF/dt, which is odd.
         let functions = if a.even && b.even { 0 } else { functions };
         let frames = Frames::new(b)?;
@@ -154,7 +162,33 @@ impl Fit {
         let size = |momenta: &[f64], values: &[f64]| (weight * norm(momenta)).hypot(norm(values));
         let whole = size(&target, &about);
         let rest = if whole > 0.0 { size(&rest, &left) / whole } else { 0.0 };
-        Ok(Self { factors: factors[..kept].to_vec(), gauge, constant, rest })
+        let level = own.iter().sum::<f64>() / states as f64;
+        let on_shell = powers > 1 && own.iter().all(|x| (x - level).abs() <= DEPENDENT * level.abs());
+        Ok(Self { factors: factors[..kept].to_vec(), on_shell, gauge, constant, rest })
+    }
+
+    /// The `f''` at the one value of `B` on a mass shell that leaves the least of the mass matrices `M_A - f' M_B`, `f'` as it was.
+    fn bend(&mut self, [first, second]: [&Terms<f64>; 2], sample: &Sample, frames: &Frames) {
+        let (n, own) = (sample.n, lagrangians(sample));
+        let level = own.iter().sum::<f64>() / own.len() as f64;
+        let [slope, _] = self.slopes(level);
+        let (mut along, mut whole) = (0.0, 0.0);
+        for k in 0..sample.len() {
+            let of = |terms: &Terms<f64>| terms.mass_matrix[k * n * n..(k + 1) * n * n].to_vec();
+            let (mut rest, metric) = (of(first), of(second));
+            add(&mut rest, &metric, -slope);
+            // Beside p p^T a matrix X has the part p.X p, both in the frame.
+            let raised: Vec<f64> = frames.raised(k, &sample.p[k * n..(k + 1) * n]);
+            let size = dot(&raised, &sample.p[k * n..(k + 1) * n]);
+            let image = rest.chunks_exact(n).map(|row| dot(row, &raised));
+            along += image.zip(&raised).map(|(x, u)| x * u).sum::<f64>();
+            whole += size * size;
+        }
+        let bend = along / whole;
+        if bend.is_finite() && bend != 0.0 {
+            self.factors = vec![slope - bend * level, 0.5 * bend];
+            self.constant += 0.5 * bend * level * level;
+        }
     }
 
     /// `f'` and `f''` at a value of `B`.
@@ -169,7 +203,7 @@ impl Fit {
 
     /// Distances of mass matrices and of accelerations.
     fn mechanics(
-        &self,
+        &mut self,
         a: &dyn EulerLagrange<f64>,
         b: &dyn EulerLagrange<f64>,
         sample: &Sample,
@@ -180,6 +214,9 @@ impl Fit {
         for (model, terms) in [(a, &mut first), (b, &mut second)] {
             // A state whose mass matrix is singular has no acceleration to compare.
             let _ = model.terms(&sample.q, &sample.v, Request::ACCELERATION, terms);
+        }
+        if self.on_shell {
+            self.bend([&first, &second], sample, &frames);
         }
         let (mut left, mut whole, mut apart, mut size) = (0.0, 0.0, 0.0, 0.0);
         for k in 0..sample.len() {
@@ -254,6 +291,13 @@ impl Frames {
     /// A momentum in the frame.
     fn down(&self, k: usize, x: &[f64]) -> Vec<f64> {
         self.at(k).map(|(w, u)| dot(u, x) / w).collect()
+    }
+
+    /// The vector `|M|^-1 p` of a momentum.
+    fn raised(&self, k: usize, p: &[f64]) -> Vec<f64> {
+        let mut raised = vec![0.0; self.n];
+        self.at(k).for_each(|(w, u)| add(&mut raised, u, dot(u, p) / (w * w)));
+        raised
     }
 
     /// Square of a symmetric matrix in the frame.

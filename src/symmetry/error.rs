@@ -1,5 +1,7 @@
 //! Errors of searches for symmetries.
 
+use crate::lagrangian::MechanicsError;
+
 /// Why nothing could be found out.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -48,6 +50,9 @@ pub enum SymmetryError {
         /// Number of coordinates of the basis.
         found: usize,
     },
+    /// A base state at which a Lagrangian has no canonical form.
+    #[error("no canonical form at this state: {0}")]
+    Base(MechanicsError),
     /// Numbers of a decomposition that are not finite.
     #[error("{what} is not finite")]
     NotFinite {

@@ -6,7 +6,7 @@
 //! sampled states, names the Lie [`Algebra`] that they form, and says honestly where there is no gap between what vanishes and
 //! what does not. [`quadratic`] finds conserved quantities of second degree in the momenta, such as Carter's constant and the
 //! vector of Runge and Lenz; [`charges`] follows charges along a motion; [`compare`] takes the freedom of a Lagrangian, factor
-//! and gauge, out before it compares. All of them need `dL/dv` and `dL/dq` alone, and take systems, descriptions in files
+//! and gauge, out before it compares, and [`Canonical`] fixes both at a base state. All of them take systems, descriptions in files
 //! and learned models alike.
 //!
 //! ```
@@ -36,6 +36,7 @@
 mod algebra;
 mod bases;
 mod basis;
+mod canonical;
 mod charges;
 mod classify;
 mod compare;
@@ -54,6 +55,7 @@ mod sparse;
 pub use algebra::Algebra;
 pub(crate) use bases::{bases, enough, most_symmetries};
 pub use basis::{Basis, Chart, Degrees, unknowns};
+pub use canonical::{Canonical, CanonicalForm};
 pub(crate) use charges::drifts;
 pub use charges::{Charge, charges};
 pub use compare::{Comparison, compare};

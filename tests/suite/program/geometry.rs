@@ -115,3 +115,56 @@ fn models_have_a_geometry_and_mistakes_are_named() {
     lnn(&["geometry", "--model", path, "--points", &missing]).refused(1, &["missing column theta2"]);
     lnn(&["geometry", "--points", &points]).refused(2, &["--system"]);
 }
+
+/// Values of a coordinate at the surfaces on a line, with what the determinant does there.
+fn surfaces(arguments: &[&str], coordinate: &str) -> Vec<(f64, String)> {
+    let run = lnn(&[&["geometry"], arguments].concat());
+    assert_eq!((run.code, run.stderr.as_str()), (Some(0), ""), "{}", run.stdout);
+    let found: Value = serde_json::from_str(&run.stdout).unwrap();
+    let all = found["surfaces"].as_array().unwrap().iter();
+    all.map(|at| (at["point"][coordinate].as_f64().unwrap(), at["change"].as_str().unwrap().to_string())).collect()
+}
+
+#[test]
+fn horizons_and_ergosurfaces_are_those_of_closed_forms() {
+    let is = |found: &[(f64, String)], radii: &[f64]| {
+        assert_eq!(found.len(), radii.len(), "{found:?}");
+        for ((r, change), exact) in found.iter().zip(radii) {
+            assert!((r - exact).abs() < 1e-14 * exact.abs() && change == "zero", "{found:?} {radii:?}");
+        }
+    };
+    let hole = ["--system", "schwarzschild-geodesic", "--surface", "t", "--from", "0,1,1.2,0", "--to", "0,6,1.2,0"];
+    is(&surfaces(&hole, "r"), &[2.0]);
+    is(&surfaces(&[&hole[..], &["--param", "M=1.5", "--steps", "7"]].concat(), "r"), &[3.0]);
+    // Outward and inward, through the same horizon.
+    let cartesian = ["--system", "schwarzschild-cartesian", "--surface", "t", "--from", "0,-5,0,0", "--to", "0,6,0,0"];
+    is(&surfaces(&cartesian, "x"), &[-2.0, 2.0]);
+    // Ergosurface r = 1 + sqrt(1 - a^2 cos^2 theta), horizon 1 + sqrt(1 - a^2), at several angles and spins.
+    for (a, theta) in [("0.5", 0.4f64), ("0.9", 1.1), ("0.99", 2.5)] {
+        let spin: f64 = a.parse().unwrap();
+        let [from, to] = ["1.05", "3"].map(|r| format!("0,{r},{theta},0"));
+        let line = ["--system", "kerr-geodesic", "--param", &format!("a={a}"), "--from", &from, "--to", &to];
+        let ergosurface = 1.0 + (1.0 - (spin * theta.cos()).powi(2)).sqrt();
+        is(&surfaces(&[&line[..], &["--surface", "t"]].concat(), "r"), &[ergosurface]);
+        let horizon = 1.0 + (1.0 - spin * spin).sqrt();
+        is(&surfaces(&[&line[..], &["--surface", "t,phi"]].concat(), "r"), &[horizon]);
+    }
+}
+
+#[test]
+fn a_line_without_a_surface_and_mistakes() {
+    let line = ["geometry", "--system", "ads4-geodesic", "--from", "0,0,0,1", "--to", "0,0,0,5"];
+    let surface = |block: &str| lnn(&[&line[..], &["--surface", block]].concat());
+    let found = surface("t");
+    assert_eq!((found.code, found.stdout.as_str()), (Some(0), "{\"block\":[\"t\"],\"surfaces\":[]}\n"));
+    surface("t,w").refused(2, &["--surface", "unknown coordinate \"w\""]);
+    surface("t,t").refused(2, &["--surface", "t is given twice"]);
+    lnn(&[&line[..5], &["--surface", "t"]].concat()).refused(2, &["--to"]);
+    lnn(&[&line[..4], &["0,1", "--to", "0,0,0,5", "--surface", "t"]].concat()).refused(2, &["--from", "expected 4"]);
+    let hole = ["geometry", "--system", "schwarzschild-geodesic", "--surface", "t", "--format", "table"];
+    let told = lnn(&[&hole[..], &["--from", "0,1,1.2,0", "--to", "0,6,1.2,0"]].concat()).stdout;
+    assert!(told.starts_with("determinant of the metric's block t: 1 change of sign on the line\n"), "{told}");
+    assert!(told.contains("zero") && told.lines().all(|line| line.chars().count() <= 120), "{told}");
+    let wide = lnn(&[&hole[..5], &["--from", "0,1,1.2,0", "--to", "0,6,1.2,0", "--precision", "dd"]].concat()).stdout;
+    assert!(wide.contains("\"r\":2"), "{wide}");
+}

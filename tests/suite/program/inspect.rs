@@ -98,6 +98,39 @@ fn inspect_prints_every_term() {
 }
 
 #[test]
+fn canonical_forms_agree_at_the_base_state() {
+    let folder = Folder::new();
+    let states = folder.file("s.csv", format!("{HEADER}0.3,0.2,1,-1\n0.7,-1.2,0.5,2\n"));
+    let plain = inspect("double-pendulum", &states, &[]).objects();
+    let base = inspect("double-pendulum", &states, &["--canonical"]).objects();
+    assert_eq!(base[0]["lagrangian"], 0.0);
+    assert!(
+        numbers(&base[0]["momentum"]).iter().all(|p| *p == 0.0) && base[0]["energy"].as_f64().unwrap().abs() < 1e-14
+    );
+    let matrix: Vec<f64> = base[0]["mass_matrix"].as_array().unwrap().iter().flat_map(numbers).collect();
+    assert!((matrix[0] * matrix[3] - matrix[1] * matrix[2] - 1.0).abs() < 1e-14);
+    for (before, after) in plain.iter().zip(&base) {
+        assert_eq!(before["acceleration"], after["acceleration"]);
+        assert_eq!(after.as_object().unwrap().len(), before.as_object().unwrap().len() + 1);
+    }
+    // Twice the masses are the same arm, at a base state that is named as well.
+    let named = "--canonical=0.3,0.2,1,-1";
+    let heavy = inspect("double-pendulum", &states, &[named, "--param", "m1=2", "m2=2"]).objects();
+    for key in ["lagrangian", "energy", "canonical_factor"] {
+        let half = if key == "canonical_factor" { 0.5 } else { 1.0 };
+        for (one, two) in base.iter().zip(&heavy) {
+            let [one, two] = [one, two].map(|state| state[key].as_f64().unwrap());
+            assert!((half * one - two).abs() < 1e-13, "{key}: {one} {two}");
+        }
+    }
+    let told = inspect("double-pendulum", &states, &["--canonical", "--format", "table"]).stdout;
+    assert!(told.contains("canonical_factor"), "{told}");
+    inspect("double-pendulum", &states, &["--canonical=1,2"]).refused(2, &["--canonical", "expected 4", "found 2"]);
+    let pole = folder.file("p.csv", "theta,phi,theta_dot,phi_dot\n0,2,3,4\n");
+    inspect("sphere-geodesic", &pole, &["--canonical"]).refused(1, &["--canonical", "the mass matrix is singular"]);
+}
+
+#[test]
 fn inspect_takes_columns_in_any_order_and_parameters_in_any_form() {
     let folder = Folder::new();
     let straight = folder.file("a.csv", format!("{HEADER}0.1,0.2,0.3,0.4\n"));

@@ -42,6 +42,20 @@ fn a_sphere_is_told_by_its_curvature_and_its_symmetries() {
     assert_eq!(signature["by_construction"].as_bool(), Some(true));
     assert_eq!(numbers(signature, &["positive", "negative", "certified", "open"]), [2.0, 0.0, 1.0, 0.0]);
     assert_eq!(physics["metric"].as_array().unwrap().len(), 3);
+    // One factor serves metric, curvature and the comparison.
+    let common = &physics["common_ground"];
+    let [factor, motion, matrix, energy] = numbers(common, &["factor", "motion", "mass_matrix", "energy"])[..] else {
+        panic!()
+    };
+    assert_eq!(factor, curvature["factor"].as_f64().unwrap());
+    assert!((factor * common["factors"][0].as_f64().unwrap() - 1.0).abs() < 1e-12, "{common}");
+    assert!([motion, matrix, energy].iter().all(|x| *x > 1e-6 && *x < 0.5), "{common}");
+    let told = &run.stdout;
+    assert!(told.contains("What is left of the learned Lagrangian beside factor and gauge"), "{told}");
+    assert!(told.contains("beside factor and gauge: Lagrangian "), "{told}");
+    for file in ["metric_theta_theta.svg", "metric_phi_phi.svg"] {
+        assert!(folder.path("sphere").join(file).exists(), "no {file}");
+    }
 
     let report = fs::read_to_string(folder.path("sphere/report.html")).unwrap();
     let section = report.split("<h2>Physics</h2>").nth(1).unwrap().split("<h2>").next().unwrap();
@@ -71,6 +85,7 @@ fn a_fit_has_the_part_of_the_model() {
         serde_json::from_str(&fs::read_to_string(folder.path("fitted/summary.json")).unwrap()).unwrap();
     let physics = &summary["physics"];
     assert!(physics["curvature_scalar"].is_null() && physics["exact_symmetries"].is_null());
+    assert!(physics["common_ground"].is_null());
     assert!(physics["charges"].as_array().unwrap().is_empty() && physics["symmetries"].is_object());
     // A black box is searched box by box.
     let shares = numbers(&physics["signature"], &["certified", "refuted", "open"]);

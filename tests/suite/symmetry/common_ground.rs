@@ -1,6 +1,6 @@
 //! Comparison up to factor, gauge, and functions of `L` of geodesics.
 
-use super::{Coordinate, PHI, Subject, THETA, line};
+use super::{Coordinate, PHI, Subject, THETA, line, radius};
 use lnn::symmetry::{Comparison, compare};
 
 fn compared(a: &Subject, b: &Subject) -> Comparison {
@@ -53,6 +53,29 @@ fn geodesics_have_functions_of_their_lagrangian() {
     let found = compared(&curved, &sphere);
     assert!(distances(&found).iter().all(|x| *x < 1e-10), "{found:?}");
     assert!((found.factors[0] - 3.0).abs() < 1e-9 && (found.factors[1] - 1.0).abs() < 1e-9, "{found:?}");
+}
+
+#[test]
+fn a_mass_shell_knows_two_derivatives_of_the_function() {
+    let metric = "(-t_dot^2 + x_dot^2)/(2*x^2)";
+    let coordinates = [line("t"), radius("x")];
+    let plain = Subject::formula(&coordinates, metric);
+    let (q, mut v) = plain.states(200);
+    for (q, v) in q.chunks(2).zip(v.chunks_mut(2)) {
+        v[0] = (v[1] * v[1] + q[1] * q[1]).sqrt();
+    }
+    let compared = |formula: &str| {
+        let other = Subject::formula(&coordinates, formula);
+        compare(other.model.as_ref(), plain.model.as_ref(), &plain.basis(None), (&q, &v)).unwrap()
+    };
+    // On the shell L = -1/2: f = L^2 + 3 L has the slope 2 and the second derivative 2 there.
+    let found = compared(&format!("({metric})^2 + 3*{metric} + 7"));
+    assert!(found.on_shell && distances(&found).iter().all(|x| *x < 1e-10), "{found:?}");
+    assert!((found.factors[0] - 3.0).abs() < 1e-9 && (found.factors[1] - 1.0).abs() < 1e-9, "{found:?}");
+    assert!((found.constant - 7.0).abs() < 1e-9, "{found:?}");
+    // Another metric is a factor beside, and nothing is bent.
+    let found = compared(&format!("3*{metric}"));
+    assert!(!found.on_shell && found.factors.len() == 1 && (found.factors[0] - 3.0).abs() < 1e-12, "{found:?}");
 }
 
 #[test]

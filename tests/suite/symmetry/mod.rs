@@ -1,5 +1,6 @@
 //! Symmetries, conserved quantities and common ground of Lagrangians whose answers are known.
 
+mod canonical;
 mod charges;
 mod common_ground;
 mod exact;

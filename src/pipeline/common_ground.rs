@@ -1,0 +1,76 @@
+//! Common ground of a learned Lagrangian and the exact one: factor and gauge, and what is left beside them.
+
+use crate::lagrangian::EulerLagrange;
+use crate::names::percent;
+use crate::symmetry::{Basis, Chart, SymmetryError, compare};
+use serde::Serialize;
+
+/// Best `learned = f(exact) + dF/dt + constant`, and what is left of the learned Lagrangian, relative.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct CommonGround {
+    /// Factor by which the learned Lagrangian, gauge taken out, becomes the exact one, of geodesics at rest; none where the states, all on
+    /// a mass shell, do not tell.
+    pub factor: Option<f64>,
+    /// Coefficients of `f`, from the first power: one, or of geodesics several.
+    pub factors: Vec<f64>,
+    /// Rest of momenta and values.
+    pub lagrangian: f64,
+    /// Difference of the accelerations.
+    pub motion: f64,
+    /// Rest of the mass matrix.
+    pub mass_matrix: f64,
+    /// Rest of the energy.
+    pub energy: f64,
+    /// States compared.
+    pub states: usize,
+}
+
+/// States that are compared at the least.
+const STATES: usize = 400;
+
+/// Functions that gauge functions are made of, and how many states are compared for them.
+pub(crate) fn gauge_functions(names: &[String], charts: &[Chart]) -> (Basis, usize) {
+    let (basis, _) = Basis::usual(names, charts);
+    let states = STATES.max(basis.len());
+    (basis, states)
+}
+
+impl CommonGround {
+    /// Compares at states `(states, n)`; gauge functions are over `basis`.
+    ///
+    /// # Errors
+    /// [`SymmetryError`].
+    pub(crate) fn new(
+        learned: &dyn EulerLagrange<f64>,
+        exact: &dyn EulerLagrange<f64>,
+        basis: &Basis,
+        (q, v): (&[f64], &[f64]),
+    ) -> Result<Self, SymmetryError> {
+        let found = compare(learned, exact, basis, (q, v))?;
+        let slope = found.factors.first().copied().filter(|slope| *slope != 0.0 && !found.on_shell);
+        Ok(Self {
+            factor: slope.map(f64::recip),
+            factors: found.factors,
+            lagrangian: found.lagrangian,
+            motion: found.motion,
+            mass_matrix: found.mass_matrix,
+            energy: found.energy,
+            states: q.len() / learned.coordinates().max(1),
+        })
+    }
+
+    /// Rests by quantity.
+    pub(crate) fn left(&self) -> [(&'static str, f64); 4] {
+        [
+            ("Lagrangian", self.lagrangian),
+            ("motion", self.motion),
+            ("mass matrix", self.mass_matrix),
+            ("energy", self.energy),
+        ]
+    }
+
+    /// The distances in a line.
+    pub(crate) fn text(&self) -> String {
+        self.left().map(|(name, distance)| format!("{name} {}", percent(distance))).join(", ")
+    }
+}
