@@ -279,8 +279,8 @@ fn filmed(mut films: Vec<PathBuf>, scale: Option<Scale>) -> String {
         let other = Some(&recordings[(k + 1) % recordings.len()].1).filter(|_| recordings.len() > 1);
         for Line { name: predictor, errors, seconds } in lines(recording, measured, other, scale) {
             for e in errors {
-                let PredictionError { seconds: ahead, rms, median, most, windows, missing } = e;
-                writeln!(csv, "{name},{predictor},{ahead},{median},{rms},{most},{windows},{missing},{seconds:.1}")
+                let PredictionError { seconds: ahead, rms, median, p90, windows, missing } = e;
+                writeln!(csv, "{name},{predictor},{ahead},{median},{rms},{p90},{windows},{missing},{seconds:.1}")
                     .expect("writing to a string");
             }
         }

@@ -19,7 +19,7 @@ fn config(seed: u64) -> Config {
     (config.data.training, config.data.validation, config.data.test) = (4000, 500, 500);
     config.network.hidden = vec![64; 2];
     config.phases[0].epochs = 3;
-    config.polish = Some(lnn::configuration::Polish { iterations: 3, memory: 5 });
+    config.lbfgs = Some(lnn::configuration::Lbfgs { iterations: 3, memory: 5 });
     config
 }
 

@@ -164,7 +164,7 @@ fn told(way: Way, orbits: usize, noise: f64, (epochs, threads): (Option<usize>, 
     let time = || "t".to_string();
     training.network.time_like = Some(time());
     training.network.cyclic = vec![time()];
-    training.data.relative = 1.0;
+    training.data.acceleration_weighting = 1.0;
     match way {
         Way::BlackBox => training.penalty = Regularizer::LorentzianSylvester { lambda: 100.0, time: time() },
         Way::Metric | Way::Spherical => training.take_structure(Structure::Metric),

@@ -2,6 +2,7 @@
 //! are found at once.
 
 use crate::cli::config::lines;
+use crate::cli::renamed_keys::rename;
 use crate::cli::{CliError, input};
 use crate::names::plain;
 use serde::Serialize;
@@ -86,9 +87,13 @@ impl ConfigFile {
     /// A usage error for text that is not TOML.
     pub fn parse(name: String, text: &str) -> Result<Self, CliError> {
         let (small, large) = without_large(text);
+        let refused = |line: usize, problem: &str| CliError::usage(format_args!("{name}:{line}: {problem}"));
         match lines(text).and_then(|lines| Ok((lines, crate::cli::config::parse(&small)?))) {
-            Ok((lines, table)) => Ok(Self { name, table, lines, large }),
-            Err((line, problem)) => Err(CliError::usage(format_args!("{name}:{line}: {problem}"))),
+            Ok((mut lines, mut table)) => {
+                rename(&mut table, &mut lines).map_err(|(line, problem)| refused(line, &problem))?;
+                Ok(Self { name, table, lines, large })
+            }
+            Err((line, problem)) => Err(refused(line, &problem)),
         }
     }
 
@@ -361,7 +366,7 @@ fn is_list_of_tables(items: &[Value]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::configuration::{Config, Polish, Regularizer};
+    use crate::configuration::{Config, Lbfgs, Regularizer};
     use crate::lagrangian::configure;
     use crate::presets::Preset;
 
@@ -379,12 +384,12 @@ mod tests {
     #[test]
     fn missing_keys_have_the_bases_values() {
         let text =
-            "seed = 7\n[network]\nhidden = [8]\n[optimizer]\nclip = inf\n[polish]\nmemory = 3\n[parameters]\nm1 = 2\n";
+            "seed = 7\n[network]\nhidden = [8]\n[optimizer]\nclip = inf\n[lbfgs]\nmemory = 3\n[parameters]\nm1 = 2\n";
         let (config, mistakes) = over("double-pendulum", text);
         assert!(mistakes.is_empty(), "{mistakes:?}");
         let mut expected = base("double-pendulum");
         (expected.seed, expected.network.hidden, expected.optimizer.clip) = (7, vec![8], f64::INFINITY);
-        expected.polish = Some(Polish { memory: 3, ..Polish::default() });
+        expected.lbfgs = Some(Lbfgs { memory: 3, ..Lbfgs::default() });
         expected.parameters.insert("m1".to_string(), 2.0);
         assert_eq!(config, expected);
         // Phases are as many as the file's; those beyond the base's are as its last.
@@ -393,6 +398,39 @@ mod tests {
         assert_eq!(config.phases.len(), 2);
         assert_eq!((config.phases[0].epochs, config.phases[1].epochs, config.phases[1].rate), (3, 40, 1.0));
         assert_eq!(over("double-pendulum", "").0, base("double-pendulum"));
+    }
+
+    #[test]
+    fn keys_have_the_names_of_earlier_versions_too() {
+        let old = "[data]\nmotions = 0.25\noff_shell = 0.5\nrelative = 2\n[[phase]]\nlogarithmic = [false, true]\n\
+                   [polish]\nmemory = 3\n";
+        let new = "[data]\ntrajectory_fraction = 0.25\nrescaled_fraction = 0.5\nacceleration_weighting = 2\n[[phase]]\n\
+                   log_uniform = [false, true]\n[lbfgs]\nmemory = 3\n";
+        // Beside the base's own values of these keys.
+        let (config, mistakes) = over("spring-pendulum", old);
+        assert!(mistakes.is_empty(), "{mistakes:?}");
+        assert_eq!(config, over("spring-pendulum", new).0);
+        assert_eq!((config.data.trajectory_fraction, config.data.rescaled_fraction), (0.25, 0.5));
+        assert_eq!((config.data.acceleration_weighting, config.lbfgs.map(|l| l.memory)), (2.0, Some(3)));
+        assert_eq!(config.phases[0].log_uniform, [false, true]);
+        // Whole files of earlier versions are read one by one.
+        let base = base("spring-pendulum");
+        let written = toml::to_string(&Config { lbfgs: Some(Lbfgs::default()), ..base.clone() }).unwrap();
+        let words = [("acceleration_weighting", "relative"), ("log_uniform", "logarithmic"), ("[lbfgs]", "[polish]")];
+        let past = words.iter().fold(written, |text, (new, old)| {
+            assert!(text.contains(new), "{text}");
+            text.replace(new, old)
+        });
+        let read: Config = toml::from_str(&past).unwrap();
+        assert_eq!(read, Config { lbfgs: Some(Lbfgs::default()), ..base });
+        // Mistakes have the lines of the file and the names of now.
+        let wrong = |text: &str| over("double-pendulum", text).1;
+        let found = wrong("[data]\nmotions = 'x'\n[polish]\nmemory = 3\niterations = -1\n");
+        assert!(found.len() == 2 && found[0].starts_with("c.toml:2: data.trajectory_fraction: "), "{found:?}");
+        assert!(found[1].starts_with("c.toml:5: lbfgs.iterations: "), "{found:?}");
+        let both = ConfigFile::parse("c.toml".to_string(), "[data]\nmotions = 1\ntrajectory_fraction = 1\n");
+        let both = both.unwrap_err().to_string();
+        assert_eq!(both, "c.toml:2: data.motions: the same key as data.trajectory_fraction, expected one of them");
     }
 
     #[test]
@@ -426,7 +464,7 @@ mod tests {
     #[test]
     fn all_mistakes_are_found() {
         let text = "sede = 1\nprecision = 'f16'\n[netwrok]\nhidden = [1]\nalpha = 1\n[network]\nhiden = [1]\nalpha = 'x'\n\
-                    [data]\ntraining = -1\n[[phase]]\nrate = true\n[[phase]]\nepoch = 3\n[polish]\nmemory = 3\nitration = 4\n";
+                    [data]\ntraining = -1\n[[phase]]\nrate = true\n[[phase]]\nepoch = 3\n[lbfgs]\nmemory = 3\nitration = 4\n";
         let (config, mistakes) = over("double-pendulum", text);
         let beginnings = [
             "c.toml:1: sede: unknown key",
@@ -437,14 +475,14 @@ mod tests {
             "c.toml:10: data.training: ",
             "c.toml:12: phase[0].rate: ",
             "c.toml:14: phase[1].epoch: unknown key",
-            "c.toml:17: polish.itration: unknown key",
+            "c.toml:17: lbfgs.itration: unknown key",
         ];
         assert_eq!(mistakes.len(), beginnings.len(), "{mistakes:#?}");
         for (mistake, beginning) in mistakes.iter().zip(beginnings) {
             assert!(mistake.starts_with(beginning), "{mistake} is not {beginning}");
         }
         // What is right is taken.
-        assert_eq!(config.polish.unwrap().memory, 3);
+        assert_eq!(config.lbfgs.unwrap().memory, 3);
     }
 
     #[test]

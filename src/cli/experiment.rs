@@ -28,6 +28,8 @@ use std::time::Duration;
 pub struct Args {
     #[command(subcommand)]
     action: Option<Action>,
+    /// An experiment by name, or `all`; without a name they are listed with the tables and figures they regenerate.
+    name: Option<String>,
     #[command(flatten)]
     chosen: Chosen,
     /// Threads; as many runs go side by side, and the results do not depend on them [default: all].
@@ -51,14 +53,17 @@ pub struct Args {
 #[derive(Debug, clap::Subcommand)]
 enum Action {
     /// Write table, pictures and report from the records of finished runs, whichever machines they ran on; nothing is run.
-    Merge(Chosen),
+    Merge {
+        /// An experiment by name, or `all`.
+        name: String,
+        #[command(flatten)]
+        chosen: Chosen,
+    },
 }
 
-/// Experiments and what of them.
+/// Which runs of experiments, and where they are.
 #[derive(Debug, clap::Args)]
 struct Chosen {
-    /// An experiment by name, or `all`; without a name they are listed with the tables and figures they regenerate.
-    name: Option<String>,
     /// Share of the paper's budget.
     #[arg(long, value_enum, value_name = "SCALE", default_value = "short")]
     scale: ScaleName,
@@ -106,15 +111,6 @@ impl Chosen {
         }
     }
 
-    /// The experiments asked for.
-    fn experiments(&self) -> Result<Vec<&'static Experiment>, CliError> {
-        match self.name.as_deref() {
-            Some("all") => Ok(experiments().iter().collect()),
-            Some(name) => Ok(vec![find(name).map_err(CliError::usage)?]),
-            None => Err(CliError::usage("missing the name of an experiment, or `all`")),
-        }
-    }
-
     /// The system that was asked for instead of the experiment's own, with the parameters given.
     #[allow(clippy::type_complexity)]
     fn own_system(&self) -> Result<Option<(Configured<f64>, BTreeMap<String, f64>)>, CliError> {
@@ -141,6 +137,9 @@ impl Chosen {
             words += &format!(" --system {system}");
         }
         words.extend(self.param.iter().map(|(symbol, value)| format!(" --param {symbol}={value}")));
+        if let Some(text) = &self.only {
+            words += &format!(" --only {text:?}");
+        }
         if self.out != Path::new("runs/experiments") {
             words += &format!(" --out {}", self.out.display());
         }
@@ -154,16 +153,16 @@ impl Chosen {
 /// A usage error for an unknown name or a share that cannot be told, a data error for a directory that cannot be written or
 /// records that are missing, an interruption; runs that are finished stay finished.
 pub fn run(args: &Args) -> Result<(), CliError> {
-    if let Some(Action::Merge(chosen)) = &args.action {
-        return merge(chosen, &Claimant::this(args.lease));
+    let claimant = Claimant::this(args.lease);
+    if let Some(Action::Merge { name, chosen }) = &args.action {
+        return merge(name, chosen, &claimant);
     }
     let chosen = &args.chosen;
-    if chosen.name.is_none() {
+    let Some(name) = &args.name else {
         interrupt::end_at_once().map_err(CliError::signals)?;
         return output::print(&listing(chosen.json));
-    }
-    let claimant = Claimant::this(args.lease);
-    let all = numbered(chosen_runs(chosen, &chosen.experiments()?)?);
+    };
+    let all = numbered(chosen_runs(chosen, name)?);
     if args.list {
         interrupt::end_at_once().map_err(CliError::signals)?;
         return listed(chosen, share(all, args.shard), &claimant);
@@ -202,8 +201,8 @@ pub fn run(args: &Args) -> Result<(), CliError> {
 }
 
 /// Makes table, pictures and report of the records that are there.
-fn merge(chosen: &Chosen, claimant: &Claimant) -> Result<(), CliError> {
-    let all = chosen_runs(chosen, &chosen.experiments()?)?;
+fn merge(name: &str, chosen: &Chosen, claimant: &Claimant) -> Result<(), CliError> {
+    let all = chosen_runs(chosen, name)?;
     for (experiment, runs) in &all {
         require_writable(chosen, experiment)?;
         let same = "give the --scale and --seeds that the runs were made with";
@@ -253,11 +252,10 @@ fn require_writable(chosen: &Chosen, experiment: &Experiment) -> Result<(), CliE
     WRITTEN.iter().try_for_each(|name| require_free(&path.join(name), &inputs, true))
 }
 
-/// The experiments with those of their runs that were asked for, if there are any.
-fn chosen_runs(
-    chosen: &Chosen,
-    experiments: &[&'static Experiment],
-) -> Result<Vec<(&'static Experiment, Vec<Run>)>, CliError> {
+/// The experiments of a name, or all, with those of their runs that were asked for, if there are any.
+fn chosen_runs(chosen: &Chosen, name: &str) -> Result<Vec<(&'static Experiment, Vec<Run>)>, CliError> {
+    let named: Vec<&'static Experiment> =
+        if name == "all" { experiments().iter().collect() } else { vec![find(name).map_err(CliError::usage)?] };
     let own = chosen.own_system()?;
     let runs = |experiment: &Experiment| match &own {
         None => Ok(experiment.runs(chosen.scale(), chosen.seeds)),
@@ -268,7 +266,7 @@ fn chosen_runs(
             })
         }
     };
-    let every = experiments.iter().map(|experiment| Ok((*experiment, runs(experiment)?)));
+    let every = named.iter().map(|experiment| Ok((*experiment, runs(experiment)?)));
     let every = every.collect::<Result<Vec<_>, CliError>>()?;
     let all = || every.iter().cloned();
     let Some(text) = &chosen.only else { return Ok(all().collect()) };

@@ -125,7 +125,7 @@ impl Settled {
         for (k, phase) in training.phases.iter_mut().enumerate() {
             let all = &suggested.phases[0];
             (phase.position, phase.velocity) = (all.position.clone(), all.velocity.clone());
-            phase.logarithmic.clear();
+            phase.log_uniform.clear();
             let has = |key: &str| file.has(&format!("training.phase[{k}].{key}"));
             if has("epochs") && !has("t_max") && phase.schedule != Schedule::CosineAnnealing {
                 phase.t_max = phase.epochs as f64;

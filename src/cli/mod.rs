@@ -45,6 +45,7 @@ mod print_config;
 mod probe;
 mod progress;
 mod recording_args;
+mod renamed_keys;
 mod results;
 mod resume;
 mod rollout;

@@ -109,7 +109,7 @@ fn comment(text: &str) -> String {
 mod tests {
     use super::*;
     use crate::cli::parse_config;
-    use crate::configuration::{Config, Polish};
+    use crate::configuration::{Config, Lbfgs};
     use crate::lagrangian::{configure, systems};
     use crate::presets::{Preset, TRAINING_SECTIONS};
 
@@ -127,7 +127,7 @@ mod tests {
                 config.optimizer.clip = f64::INFINITY;
                 let text = print(&config);
                 assert_eq!(parse_config::<Config>(&text).unwrap(), config, "{text}");
-                config.polish = Some(Polish::default());
+                config.lbfgs = Some(Lbfgs::default());
                 config.network.dissipation = Some(3);
                 config.from = Some("a \"b\"".to_string());
                 assert_eq!(parse_config::<Config>(&print(&config)).unwrap(), config);
@@ -149,9 +149,9 @@ mod tests {
         }
         assert!(text.lines().all(|line| !line.starts_with('#') || line.chars().count() <= WIDTH));
         assert_eq!(text.matches("\n[[phase]]").count(), 3);
-        let taken_in = text.replace("# [polish]", "[polish]").replace("# iterations", "iterations");
+        let taken_in = text.replace("# [lbfgs]", "[lbfgs]").replace("# iterations", "iterations");
         let taken_in = taken_in.replace("# memory", "memory").replace("# dissipation =", "dissipation =");
         let config: Config = parse_config(&taken_in).unwrap();
-        assert_eq!((config.polish, config.network.dissipation), (Some(Polish::default()), Some(16)));
+        assert_eq!((config.lbfgs, config.network.dissipation), (Some(Lbfgs::default()), Some(16)));
     }
 }

@@ -71,9 +71,9 @@ pub struct Config {
     /// Phases in order, each from the best weights of the one before.
     #[serde(rename = "phase")]
     pub phases: Vec<Phase>,
-    /// Full-batch polishing after the last phase.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub polish: Option<Polish>,
+    /// Full-batch L-BFGS after the last phase.
+    #[serde(default, alias = "polish", skip_serializing_if = "Option::is_none")]
+    pub lbfgs: Option<Lbfgs>,
 }
 
 /// Full-batch L-BFGS in double precision on the states of the last phase, from the best weights so far.
@@ -81,14 +81,14 @@ pub struct Config {
 /// Keys that are not given have their defaults: 100 iterations, 20 pairs.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct Polish {
+pub struct Lbfgs {
     /// Iterations at most.
     pub iterations: usize,
     /// Pairs of steps and gradient differences that are kept.
     pub memory: usize,
 }
 
-impl Default for Polish {
+impl Default for Lbfgs {
     fn default() -> Self {
         Self { iterations: 100, memory: 20 }
     }
@@ -110,18 +110,18 @@ pub struct Data {
     /// the shell, `|u|` from 0.03 to 1 and uniform in its logarithm, of either sign, their acceleration `u^2` times as
     /// large, as for every geodesic, and their residuals weigh `1/u^2` in the training loss. On the shell alone the metric
     /// is not identifiable.
-    #[serde(default, skip_serializing_if = "is_zero")]
-    pub off_shell: f64,
+    #[serde(default, alias = "off_shell", skip_serializing_if = "is_zero")]
+    pub rescaled_fraction: f64,
     /// Fraction of the training states that lie on exact motions from the starts of the system's trajectory test, at any
-    /// time with equal chance, as long as these stay within the bounds of the phase. A [`Phase::logarithmic`] coordinate is so
-    /// in half of the starts as well; `off_shell` and `relative` treat these states like all others.
-    #[serde(default, skip_serializing_if = "is_zero")]
-    pub motions: f64,
+    /// time with equal chance, as long as these stay within the bounds of the phase. A [`Phase::log_uniform`] coordinate is so
+    /// in half of the starts as well; `rescaled_fraction` and `acceleration_weighting` treat these states like all others.
+    #[serde(default, alias = "motions", skip_serializing_if = "is_zero")]
+    pub trajectory_fraction: f64,
     /// With a number `f` above 0 a training state weighs `f m / (f m + |a|)`, `|a|` the mean size of its scaled accelerations
     /// and `m` the mean over all states: errors count relative to accelerations above `f m`, and a few large ones do not
     /// outweigh the others.
-    #[serde(default, skip_serializing_if = "is_zero")]
-    pub relative: f64,
+    #[serde(default, alias = "relative", skip_serializing_if = "is_zero")]
+    pub acceleration_weighting: f64,
     /// Names of Cartesian coordinates around a centre: all states are drawn in a [`Shell`] around it, training, validation and test,
     /// instead of the boxes of these coordinates and of the velocities; empty for none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -143,8 +143,8 @@ pub struct Data {
 /// States in a shell around a centre: directions uniform over the sphere, distances uniform in their logarithm.
 ///
 /// Velocities are those of free fall: rapidities uniform from 0 to `rapidity`, in any direction of the local frame of an observer whom the
-/// surface of equal time sees at rest. With [`Data::relative`] `f` a training state weighs `1/(|a| + f m)`, `m` the median of `|a|` among the
-/// states about as far from the centre: near and far count alike.
+/// surface of equal time sees at rest. With [`Data::acceleration_weighting`] `f` a training state weighs `1/(|a| + f m)`, `m` the
+/// median of `|a|` among the states about as far from the centre: near and far count alike.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shell<'a> {
     /// Names of the Cartesian coordinates around the centre.
@@ -270,8 +270,8 @@ pub struct Phase {
     pub velocity: Vec<[f64; 2]>,
     /// For which coordinates half of the training states are uniform in the logarithm, where the low end of the bounds needs more
     /// of them than its length; none if empty.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub logarithmic: Vec<bool>,
+    #[serde(default, alias = "logarithmic", skip_serializing_if = "Vec::is_empty")]
+    pub log_uniform: Vec<bool>,
 }
 
 impl Network {
@@ -331,10 +331,12 @@ impl Config {
         faults.count(data.training, "data.training", STATES);
         faults.count(data.validation, "data.validation", STATES);
         faults.count(data.test, "data.test", STATES);
-        for (value, field) in [(data.off_shell, "data.off_shell"), (data.motions, "data.motions")] {
+        for (value, field) in
+            [(data.rescaled_fraction, "data.rescaled_fraction"), (data.trajectory_fraction, "data.trajectory_fraction")]
+        {
             faults.number(value, field, (0.0..=1.0).contains(&value), "a number from 0 to 1");
         }
-        faults.at_least_zero(data.relative, "data.relative");
+        faults.at_least_zero(data.acceleration_weighting, "data.acceleration_weighting");
         match data.shell() {
             Ok(Some(Shell { radius: [low, high], rapidity, .. })) => {
                 let ok = low > 0.0 && low < high && high.is_finite();
@@ -359,9 +361,9 @@ impl Config {
         for (k, phase) in self.phases.iter().enumerate() {
             phase.faults(k, n, &mut faults);
         }
-        if let Some(polish) = &self.polish {
-            faults.count(polish.iterations, "polish.iterations", 1 << 24);
-            faults.count(polish.memory, "polish.memory", 1000);
+        if let Some(lbfgs) = &self.lbfgs {
+            faults.count(lbfgs.iterations, "lbfgs.iterations", 1 << 24);
+            faults.count(lbfgs.memory, "lbfgs.memory", 1000);
         }
         faults.0
     }
@@ -401,12 +403,12 @@ impl Phase {
         faults.number(self.t_max, &field("t_max"), positive(self.t_max), "a positive number of epochs");
         faults.bounds(&field("position"), &self.position, n);
         faults.bounds(&field("velocity"), &self.velocity, n);
-        let logarithmic = &self.logarithmic;
-        let found = format!("{} for {n}", logarithmic.len());
+        let log_uniform = &self.log_uniform;
+        let found = format!("{} for {n}", log_uniform.len());
         let expected = "nothing or true or false for each coordinate";
-        faults.check(logarithmic.is_empty() || logarithmic.len() == n, &field("logarithmic"), expected, found);
+        faults.check(log_uniform.is_empty() || log_uniform.len() == n, &field("log_uniform"), expected, found);
         for (i, &[low, _]) in self.position.iter().enumerate() {
-            let ok = low > 0.0 || !logarithmic.get(i).copied().unwrap_or(false);
+            let ok = low > 0.0 || !log_uniform.get(i).copied().unwrap_or(false);
             let expected = "a lowest coordinate above 0 to take its logarithm";
             faults.check(ok, &field(&format!("position[{i}]")), expected, format!("{low}"));
         }

@@ -3,8 +3,10 @@
 mod config;
 mod error;
 mod penalty;
+mod renamed;
 
-pub use config::{Config, Data, Known, Network, OnFailure, Optimizer, Phase, Polish, Precision, Scaling, Shell};
+pub use config::{Config, Data, Known, Lbfgs, Network, OnFailure, Optimizer, Phase, Precision, Scaling, Shell};
 pub use error::ConfigError;
 pub(crate) use error::{Faults, place};
 pub use penalty::{Penalty, Regularizer};
+pub use renamed::{RENAMED, Renamed, in_current_words};

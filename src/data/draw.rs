@@ -29,7 +29,7 @@ pub enum SamplingError {
     },
     /// Motions of the trajectory test hardly pass through the box.
     #[error(
-        "{field}: hardly any motion of the trajectory test stays within these bounds; data.motions asks for such states"
+        "{field}: hardly any motion of the trajectory test stays within these bounds; data.trajectory_fraction asks for such states"
     )]
     Motions {
         /// Which bounds.
@@ -68,11 +68,11 @@ impl Drawn {
     }
 }
 
-/// Coordinates and velocities of a state, uniform within bounds; half of the [`logarithmic`](crate::configuration::Phase::logarithmic)
+/// Coordinates and velocities of a state, uniform within bounds; half of the [`log_uniform`](crate::configuration::Phase::log_uniform)
 /// coordinates uniform in their logarithm.
 pub(crate) fn draw(
     (position, velocity): (&[[f64; 2]], &[[f64; 2]]),
-    logarithmic: &[bool],
+    log_uniform: &[bool],
     rng: &mut impl Rng,
 ) -> (Vec<f64>, Vec<f64>) {
     let mut uniform = |bounds: &[[f64; 2]]| -> Vec<f64> {
@@ -88,7 +88,7 @@ pub(crate) fn draw(
     };
     let (mut q, v) = (uniform(position), uniform(velocity));
     for (i, q) in q.iter_mut().enumerate() {
-        if logarithmic.get(i) == Some(&true) && rng.random::<bool>() {
+        if log_uniform.get(i) == Some(&true) && rng.random::<bool>() {
             let [low, high] = position[i];
             *q = low * (high / low).powf(rng.random::<f64>());
         }

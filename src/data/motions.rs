@@ -13,7 +13,7 @@ const PER_MOTION: f64 = 10.0;
 
 /// Draws `states` states of exact motions from the starts of the system's trajectory test, every sample up to its end with
 /// the same chance; a motion ends where it leaves the bounds. An angle is turned back into its bounds, to any turn that lies
-/// within them. Starts are drawn as states are, half of the logarithmic coordinates uniform in their logarithm.
+/// within them. Starts are drawn as states are, half of the log-uniform coordinates uniform in their logarithm.
 ///
 /// # Errors
 /// [`SamplingError::Motions`] if hardly any motion stays within the bounds for a while.
@@ -21,7 +21,7 @@ pub(crate) fn along_motions(
     system: &Configured<f64>,
     field: &str,
     (position, velocity): (&[[f64; 2]], &[[f64; 2]]),
-    logarithmic: &[bool],
+    log_uniform: &[bool],
     states: usize,
     rng: &mut impl Rng,
 ) -> Result<Drawn, SamplingError> {
@@ -49,7 +49,7 @@ pub(crate) fn along_motions(
             return Err(SamplingError::Motions { field: field.to_string() });
         }
         motions += 1;
-        let (start, mut speed) = draw((&places, &speeds), logarithmic, rng);
+        let (start, mut speed) = draw((&places, &speeds), log_uniform, rng);
         system.impose_constraint(&start, &mut speed)?;
         let motion = rollout(exact.as_ref(), &start, &speed, &options).trajectory;
         for (q, v) in motion.q.chunks_exact(n).zip(motion.v.chunks_exact(n)) {
@@ -96,8 +96,8 @@ mod tests {
         (config.data.training, config.data.validation, config.data.test) = (2000, 10, 10);
         config.phases[0].position = vec![[0.2, PI - 0.2], [0.5, 13.5]];
         config.phases[0].velocity = vec![[-5.0, 5.0], [-15.0, 15.0]];
-        let mut seen = |motions: f64| {
-            config.data.motions = motions;
+        let mut seen = |fraction: f64| {
+            config.data.trajectory_fraction = fraction;
             let (data, _) = sample_all::<f64>(&config, &system).unwrap();
             let set = &data.training[0];
             assert_eq!(set.len(), 2000);
@@ -146,12 +146,12 @@ mod tests {
     fn bounds_that_no_motion_passes_through_are_refused() {
         let system = configure::<f64>("ads2-geodesic", &[]).unwrap();
         let mut config = Preset::Quick.config(&system).unwrap();
-        (config.data.training, config.data.motions) = (500, 0.1);
+        (config.data.training, config.data.trajectory_fraction) = (500, 0.1);
         config.phases[0].position[1] = [5.0, 6.0];
         let refused = sample_all::<f64>(&config, &system).unwrap_err().to_string();
         assert!(refused.starts_with("phase[0].position: hardly any motion"), "{refused}");
-        config.data.motions = f64::NAN;
+        config.data.trajectory_fraction = f64::NAN;
         let refused = sample_all::<f64>(&config, &system).unwrap_err().to_string();
-        assert_eq!(refused, "data.motions: expected a number from 0 to 1, found NaN");
+        assert_eq!(refused, "data.trajectory_fraction: expected a number from 0 to 1, found NaN");
     }
 }

@@ -34,14 +34,14 @@ fn fill(
     system: &Configured<f64>,
     field: &str,
     bounds: (&[[f64; 2]], &[[f64; 2]]),
-    logarithmic: &[bool],
+    log_uniform: &[bool],
     states: usize,
     rng: &mut impl Rng,
 ) -> Result<Dataset<f64>, SamplingError> {
     let n = system.coordinates;
     let mut refused = 0_usize;
     while drawn.q.len() < states * n {
-        let (q, mut v) = draw(bounds, logarithmic, rng);
+        let (q, mut v) = draw(bounds, log_uniform, rng);
         system.impose_constraint(&q, &mut v)?;
         if let Some(demand) = drawn.take(system, &q, &v)? {
             refused += 1;
@@ -53,7 +53,7 @@ fn fill(
     Ok(Dataset::new(n, drawn.q, drawn.v, drawn.a)?)
 }
 
-/// The states with the weights of [`Data::relative`](crate::configuration::Data::relative).
+/// The states with the weights of [`Data::acceleration_weighting`](crate::configuration::Data::acceleration_weighting).
 fn weigh(set: Dataset<f64>, floor: f64) -> Result<Dataset<f64>, DatasetError> {
     let scale = set.physical_scale();
     let size = |a: &[f64]| a.iter().zip(&scale).map(|(a, s)| (a / s).abs()).sum::<f64>() / scale.len() as f64;
@@ -107,18 +107,22 @@ pub fn sample_all<S: Scalar>(
         let states = config.data.training;
         if let Some(shell) = config.data.shell()? {
             let set = in_shell(system, &shell, (&field, &phase.position), states, &mut rng)?;
-            let set = match config.data.relative {
+            let set = match config.data.acceleration_weighting {
                 floor if floor > 0.0 => weigh_by_distance(set, system, &shell, floor)?,
                 _ => set,
             };
             training.push(set);
             continue;
         }
-        let moving = (config.data.motions * states as f64).round() as usize;
-        let drawn = along_motions(system, &field, bounds, &phase.logarithmic, moving, &mut rng)?;
-        let set = fill(drawn, system, &field, bounds, &phase.logarithmic, states, &mut rng)?;
-        let set = if config.data.relative > 0.0 { weigh(set, config.data.relative)? } else { set };
-        let off = config.data.off_shell;
+        let moving = (config.data.trajectory_fraction * states as f64).round() as usize;
+        let drawn = along_motions(system, &field, bounds, &phase.log_uniform, moving, &mut rng)?;
+        let set = fill(drawn, system, &field, bounds, &phase.log_uniform, states, &mut rng)?;
+        let set = if config.data.acceleration_weighting > 0.0 {
+            weigh(set, config.data.acceleration_weighting)?
+        } else {
+            set
+        };
+        let off = config.data.rescaled_fraction;
         let slowed = off > 0.0 && system.constrained_coordinate().is_some();
         training.push(if slowed { rescale_geodesics(set, off, &mut rng)? } else { set });
     }
@@ -151,7 +155,7 @@ mod tests {
             let configured = configure::<f64>(&system.name, &[]).unwrap();
             let mut config = Preset::Quick.config(&configured).unwrap();
             (config.data.training, config.data.validation, config.data.test) = (500, 200, 100);
-            config.data.off_shell = 0.0;
+            config.data.rescaled_fraction = 0.0;
             let (data, scale) = sample_all::<f64>(&config, &configured).unwrap();
             let i = configured.constrained_coordinate().unwrap();
             for set in data.training.iter().chain([&data.validation, &data.test]) {
@@ -184,7 +188,7 @@ mod tests {
         let system = configure::<f64>("ads4-geodesic", &[]).unwrap();
         let mut config = Preset::Quick.config(&system).unwrap();
         (config.data.training, config.data.validation, config.data.test) = (2000, 10, 10);
-        (config.data.off_shell, config.data.relative) = (0.25, 0.0);
+        (config.data.rescaled_fraction, config.data.acceleration_weighting) = (0.25, 0.0);
         let (data, _) = sample_all::<f64>(&config, &system).unwrap();
         let (set, mut terms) = (&data.training[0], Terms::default());
         let exact = system.build().unwrap();
@@ -206,7 +210,7 @@ mod tests {
         // Binomial: means 500, 250, 250, deviations 19, 15, 15.
         assert!((400..600).contains(&off) && (175..325).contains(&reversed) && (175..325).contains(&slow));
         assert!((0..10).all(|k| data.validation.weight(k) == 1.0));
-        config.data.off_shell = 1.5;
+        config.data.rescaled_fraction = 1.5;
         assert!(matches!(sample_all::<f64>(&config, &system), Err(SamplingError::Config(_))));
     }
 
@@ -230,9 +234,9 @@ mod tests {
         (config.data.training, config.data.validation, config.data.test) = (50, 10, 10);
         let (data, _) = sample_all::<f64>(&config, &system).unwrap();
         assert!((0..50).all(|k| (1e-6..1.0).contains(&data.training[0].weight(k))));
-        config.data.relative = -1.0;
+        config.data.acceleration_weighting = -1.0;
         let refused = sample_all::<f64>(&config, &system).unwrap_err().to_string();
-        assert_eq!(refused, "data.relative: expected a finite number of at least 0, found -1");
+        assert_eq!(refused, "data.acceleration_weighting: expected a finite number of at least 0, found -1");
     }
 
     #[test]
@@ -240,11 +244,11 @@ mod tests {
         let system = configure::<f64>("ads2-geodesic", &[]).unwrap();
         let mut config = Preset::Quick.config(&system).unwrap();
         (config.data.training, config.data.validation, config.data.test) = (8000, 10, 10);
-        config.data.motions = 0.0;
+        config.data.trajectory_fraction = 0.0;
         config.phases[0].position = vec![[-5.0, 5.0], [0.25, 64.0]];
-        let below_four = |logarithmic: &[bool]| {
+        let below_four = |log_uniform: &[bool]| {
             let mut config = config.clone();
-            config.phases[0].logarithmic = logarithmic.to_vec();
+            config.phases[0].log_uniform = log_uniform.to_vec();
             let (data, _) = sample_all::<f64>(&config, &system).unwrap();
             let z = data.training[0].q().chunks(2).map(|q| q[1]);
             assert!(z.clone().all(|z| (0.25..=64.0).contains(&z)));
@@ -253,12 +257,12 @@ mod tests {
         // 3.75 of 63.75 uniformly, 4 of 8 doublings logarithmically; the means' deviations are 21 and 41.
         let (plain, mixed) = (below_four(&[]), below_four(&[false, true]));
         assert!(plain.abs_diff(471) < 110 && mixed.abs_diff(2235) < 210, "{plain} {mixed}");
-        config.phases[0].logarithmic = vec![true, false];
+        config.phases[0].log_uniform = vec![true, false];
         let refused = sample_all::<f64>(&config, &system).unwrap_err().to_string();
         assert!(refused.starts_with("phase[0].position[0]: expected a lowest coordinate above 0"), "{refused}");
-        config.phases[0].logarithmic = vec![true];
+        config.phases[0].log_uniform = vec![true];
         let refused = sample_all::<f64>(&config, &system).unwrap_err().to_string();
-        assert!(refused.starts_with("phase[0].logarithmic: expected nothing or true or false"), "{refused}");
+        assert!(refused.starts_with("phase[0].log_uniform: expected nothing or true or false"), "{refused}");
     }
 
     #[test]

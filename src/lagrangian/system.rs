@@ -171,11 +171,11 @@ impl LearningAdvice {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct StateAdvice {
     /// Coordinates of which half are drawn uniform in their logarithm; empty for none.
-    pub logarithmic: Vec<bool>,
+    pub log_uniform: Vec<bool>,
     /// Size, over the mean one, of accelerations from which on residuals count relatively; 0 for none.
-    pub relative: f64,
+    pub acceleration_weighting: f64,
     /// Share of the states that lie along motions of the trajectory test.
-    pub motions: f64,
+    pub trajectory_fraction: f64,
     /// Shell around a centre whose states are drawn instead of those of a box.
     pub shell: Option<ShellAdvice>,
 }

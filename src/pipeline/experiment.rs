@@ -1,6 +1,7 @@
 //! Experiments: their runs side by side, in this process and others, those that are finished not again, and the tables that come
 //! of them.
 
+use crate::configuration::in_current_words;
 use crate::experiments::{Experiment, Outcome, Record, Run, Scale};
 use crate::pipeline::checkpoints::Begin;
 use crate::pipeline::experiment_queue::Queue;
@@ -212,6 +213,34 @@ fn make(
 pub fn finished_record(store: &dyn ExperimentStore, run: &Run) -> Result<Option<Record>, PipelineError> {
     let toml = toml::to_string(&run.config).map_err(PipelineError::format)?;
     let record = store.read(&run.name, RECORD).and_then(|json| serde_json::from_slice(&json).ok());
-    let same = || store.read(&run.name, "config.toml").is_some_and(|text| text == toml.as_bytes());
+    let current = |bytes: &[u8]| in_current_words(&String::from_utf8_lossy(bytes));
+    let same = || store.read(&run.name, "config.toml").is_some_and(|text| current(&text) == toml);
     Ok(record.filter(|_| same()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::experiments::find;
+    use crate::pipeline::Directory;
+
+    #[test]
+    fn runs_of_earlier_versions_are_finished() {
+        let directory = tempfile::tempdir().unwrap();
+        let store = Directory::at(directory.path());
+        let runs = find("quick").unwrap().runs(Scale::Smoke, 1);
+        let run = runs.iter().find(|run| run.config.system == "spring-pendulum").unwrap();
+        let folder = directory.path().join(&run.name);
+        std::fs::create_dir(&folder).unwrap();
+        let outcome = Outcome::Nothing { reason: String::new() };
+        let record = Record { outcome, losses: Vec::new(), times: Vec::new(), seconds: 0.0 };
+        std::fs::write(folder.join(RECORD), serde_json::to_string(&record).unwrap()).unwrap();
+        let now = toml::to_string(&run.config).unwrap();
+        let past = now.replace("acceleration_weighting", "relative").replace("log_uniform", "logarithmic");
+        assert!(past.contains("\nrelative = ") && past.contains("\nlogarithmic = "), "{past}");
+        for (config, finished) in [(&now, true), (&past, true), (&now.replace("seed = 0", "seed = 7"), false)] {
+            std::fs::write(folder.join("config.toml"), config).unwrap();
+            assert_eq!(finished_record(&store, run).unwrap().is_some(), finished, "{config}");
+        }
+    }
 }

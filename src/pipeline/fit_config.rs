@@ -108,7 +108,7 @@ impl FitConfig {
             fault.field.insert_str(0, "training.");
             fault
         });
-        let decided = ["training.data.", "position", "velocity", "logarithmic"];
+        let decided = ["training.data.", "position", "velocity", "log_uniform"];
         let training = training.filter(|fault| !decided.iter().any(|part| fault.field.contains(part)));
         found.extend(training.chain(self.shooting.iter().flat_map(Shooting::faults)));
         found

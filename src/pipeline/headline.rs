@@ -172,7 +172,7 @@ mod tests {
 
     #[test]
     fn predictions_are_compared_with_constant_velocity() {
-        let error = |median: f64| PredictionError { seconds: 0.5, rms: 1.0, median, most: 2.0, windows: 9, missing: 0 };
+        let error = |median: f64| PredictionError { seconds: 0.5, rms: 1.0, median, p90: 2.0, windows: 9, missing: 0 };
         let said = |model, straight| predicted(&error(model), &error(straight), Some("1.20 s"), "rad");
         assert_eq!(
             said(0.0196, 1.96),

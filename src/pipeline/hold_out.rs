@@ -252,7 +252,7 @@ impl HoldOut {
         let pairs = self.model.iter().zip(&self.constant_velocity);
         pairs
             .map(|(model, straight)| {
-                let numbers = [model.median, model.most, model.rms, straight.median].map(number);
+                let numbers = [model.median, model.p90, model.rms, straight.median].map(number);
                 let counts = [model.windows, model.missing].map(|count| count.to_string());
                 [vec![number(model.seconds)], numbers.to_vec(), counts.to_vec()].concat()
             })

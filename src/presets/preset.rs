@@ -51,7 +51,7 @@ impl Config {
         self.network.structure = structure;
         if structure != Structure::BlackBox {
             self.penalty = Regularizer::None;
-            self.data.off_shell = 0.0;
+            self.data.rescaled_fraction = 0.0;
             self.network.learn_alpha = false;
         }
     }
@@ -83,9 +83,9 @@ fn base(system: &Configured<f64>, states: usize, network: Network) -> Config {
         data: Data {
             training: states,
             validation: states / 5,
-            off_shell: 0.0,
-            motions: 0.0,
-            relative: 0.0,
+            rescaled_fraction: 0.0,
+            trajectory_fraction: 0.0,
+            acceleration_weighting: 0.0,
             shell: Vec::new(),
             shell_radius: None,
             rapidity: None,
@@ -97,7 +97,7 @@ fn base(system: &Configured<f64>, states: usize, network: Network) -> Config {
         penalty: regularizer(system, 5.0),
         optimizer: optimizer(Method::Radam),
         phases: Vec::new(),
-        polish: None,
+        lbfgs: None,
     }
 }
 
@@ -160,7 +160,7 @@ fn phase(epochs: usize, rate: f64, position: Vec<[f64; 2]>, velocity: Vec<[f64; 
         t_max: epochs as f64,
         position,
         velocity,
-        logarithmic: vec![],
+        log_uniform: vec![],
     }
 }
 
@@ -177,21 +177,22 @@ fn training_states(system: &Configured<f64>) -> (Bounds, StateAdvice) {
     }
     let mut advice = system.system.learning.states.map_or_else(StateAdvice::default, |advise| advise(&mut bounds));
     if let Some(shell) = system.system.described.as_ref().and_then(|described| described.around_centre.clone()) {
-        (advice.shell, advice.relative) = (Some(shell), 1.0);
+        (advice.shell, advice.acceleration_weighting) = (Some(shell), 1.0);
     }
     (bounds, advice)
 }
 
 fn ours(system: &Configured<f64>, size: Size) -> Config {
-    let (bounds, StateAdvice { logarithmic, relative, motions, shell }) = training_states(system);
+    let (bounds, StateAdvice { log_uniform, acceleration_weighting, trajectory_fraction, shell }) =
+        training_states(system);
     let phase = phase(size.epochs, 5e-3, boxes(&bounds.positions), boxes(&bounds.velocities));
     let base = base(system, 60_000, network(size.width));
-    let off_shell = if system.constrained_coordinate().is_some() { OFF_SHELL } else { 0.0 };
+    let rescaled_fraction = if system.constrained_coordinate().is_some() { OFF_SHELL } else { 0.0 };
     let config = Config {
-        data: Data { off_shell, relative, motions, ..base.data },
+        data: Data { rescaled_fraction, acceleration_weighting, trajectory_fraction, ..base.data },
         penalty: regularizer(system, PENALTY),
         optimizer: Optimizer { weight_decay: size.weight_decay, ..optimizer(Method::Soap) },
-        phases: vec![Phase { logarithmic, ..phase }],
+        phases: vec![Phase { log_uniform, ..phase }],
         ..base
     };
     match shell {
@@ -236,9 +237,9 @@ pub(crate) fn recorded(
             training,
             validation,
             test,
-            off_shell: 0.0,
-            motions: 0.0,
-            relative: 0.0,
+            rescaled_fraction: 0.0,
+            trajectory_fraction: 0.0,
+            acceleration_weighting: 0.0,
             shell: Vec::new(),
             shell_radius: None,
             rapidity: None,
@@ -249,7 +250,7 @@ pub(crate) fn recorded(
         penalty: Regularizer::Eigenvalue { lambda: PENALTY },
         optimizer,
         phases: vec![phase(epochs, 3e-3, position, velocity)],
-        polish: None,
+        lbfgs: None,
     }
 }
 
@@ -272,7 +273,7 @@ fn paper(system: &Configured<f64>) -> Option<Config> {
             t_max: 30.0,
             position,
             velocity,
-            logarithmic: vec![],
+            log_uniform: vec![],
         }
     };
     let phases = phases.iter().map(phase).collect();

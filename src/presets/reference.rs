@@ -72,20 +72,20 @@ pub const TRAINING_SECTIONS: [Section<'static>; 9] = [
             key("training", "1 to 2^30", "Number of training states of every phase."),
             key("validation", "1 to 2^30", "Number of validation states; the best epoch is chosen on them."),
             optional(
-                "off_shell",
+                "rescaled_fraction",
                 "0.75",
                 "0 to 1; 0 unless set",
                 "Fraction of the training states of a geodesic that are slowed down or reversed, off the mass shell: on the \
                  shell alone the metric is not identifiable.",
             ),
             optional(
-                "motions",
+                "trajectory_fraction",
                 "0.3",
                 "0 to 1; 0 unless set",
                 "Fraction of the training states that lie on exact motions from the starts of the trajectory test.",
             ),
             optional(
-                "relative",
+                "acceleration_weighting",
                 "0.1",
                 "from 0; 0 unless set",
                 "With f above 0 a state weighs f m / (f m + |a|), |a| its scaled acceleration and m the mean of all: a few \
@@ -96,7 +96,7 @@ pub const TRAINING_SECTIONS: [Section<'static>; 9] = [
                 "[\"x\", \"y\", \"z\"]",
                 "names of Cartesian coordinates around a centre",
                 "All states lie in a shell around the centre, instead of their bounds: directions uniform, distances uniform in their \
-                 logarithm, velocities time-like; relative then compares with states about as far from the centre.",
+                 logarithm, velocities time-like; acceleration_weighting then compares with states about as far from the centre.",
             ),
             optional(
                 "shell_radius",
@@ -244,7 +244,7 @@ pub const TRAINING_SECTIONS: [Section<'static>; 9] = [
                 "Bounds of their velocities; those of a velocity that a mass shell fixes mean nothing.",
             ),
             optional(
-                "logarithmic",
+                "log_uniform",
                 "[true, false]",
                 "true or false for each coordinate",
                 "For which coordinates half of the states are uniform in the logarithm.",
@@ -252,7 +252,7 @@ pub const TRAINING_SECTIONS: [Section<'static>; 9] = [
         ],
     },
     Section {
-        name: "polish",
+        name: "lbfgs",
         purpose: "Full-batch L-BFGS in double precision after the last phase; without this table there is none.",
         keys: &[
             optional("iterations", "100", "1 to 2^24", "Iterations at most."),
@@ -328,7 +328,7 @@ pub fn section_reference(section: &Section<'_>, values: &Value, whose: &str) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::configuration::{Known, Polish, Regularizer};
+    use crate::configuration::{Known, Lbfgs, Regularizer};
     use crate::network::{ActivationChoice, InputLayer};
     use std::collections::BTreeSet;
 
@@ -361,8 +361,8 @@ mod tests {
         config.network.dissipation = Some(16);
         config.network.cyclic = vec!["t".to_string()];
         config.network.known = Some(Known::File("a.toml".to_string()));
-        config.polish = Some(Polish::default());
-        config.data.motions = 0.5;
+        config.lbfgs = Some(Lbfgs::default());
+        config.data.trajectory_fraction = 0.5;
         config.data.shell = vec!["x".to_string()];
         (config.data.shell_radius, config.data.rapidity) = (Some([1.0, 2.0]), Some(1.0));
         (config.network.radial, config.network.radial_unit) = (vec![vec!["x".to_string()]], Some(2.0));

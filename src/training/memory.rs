@@ -14,7 +14,7 @@ const COPIES: u64 = 4;
 /// Vectors of all weights in a checkpoint, as often as each is held while it is written.
 const CHECKPOINT: u64 = 6 * COPIES;
 /// Vectors of all weights that polishing holds beside two for each pair it remembers.
-const POLISH: u64 = 14;
+const LBFGS: u64 = 14;
 
 /// Bytes that a training takes at most, about; `None` if they cannot be counted in 64 bits.
 ///
@@ -55,7 +55,7 @@ pub fn training_memory(config: &Config, architecture: &Architecture) -> Option<u
     let bases = product([number, sum([Some(held as u64), product([COPIES, kept as u64])])?]);
 
     let largest = (data.training.min(config.optimizer.batch)).max(data.validation).max(data.test);
-    let largest = if config.polish.is_some() { largest.max(data.training) } else { largest } as u64;
+    let largest = if config.lbfgs.is_some() { largest.max(data.training) } else { largest } as u64;
     let shards = largest.div_ceil(CHUNK as u64).min(SHARDS as u64);
     let batch = largest.div_ceil(SHARDS as u64).max(CHUNK as u64);
     let (channels, penalised) = (n + 2, !matches!(config.penalty, Regularizer::None));
@@ -70,13 +70,13 @@ pub fn training_memory(config: &Config, architecture: &Architecture) -> Option<u
     ]);
     let suspects = if penalised { product([square + n + 1, batch]) } else { Some(0) };
     let of_stripe = sum([Some(weights), product([CHUNK as u64, evaluations, of_state?]), suspects]);
-    let wide = if config.polish.is_some() { 8 } else { number };
-    let polish = match &config.polish {
+    let wide = if config.lbfgs.is_some() { 8 } else { number };
+    let lbfgs = match &config.lbfgs {
         None => Some(0),
-        Some(polish) => sum([
+        Some(lbfgs) => sum([
             product([24, n, once?]),
             product([4, training]),
-            product([8, weights, 2 * polish.memory as u64 + POLISH]),
+            product([8, weights, 2 * lbfgs.memory as u64 + LBFGS]),
         ]),
     };
     sum([
@@ -84,7 +84,7 @@ pub fn training_memory(config: &Config, architecture: &Architecture) -> Option<u
         bases,
         product([(VECTORS + CHECKPOINT) * number, weights]),
         product([wide, shards, of_stripe?]),
-        polish,
+        lbfgs,
     ])
 }
 

@@ -2,9 +2,9 @@
 
 pub(crate) mod checkpoint;
 pub(crate) mod epoch;
+mod lbfgs;
 mod memory;
 pub(crate) mod objective;
-mod polish;
 mod problem;
 mod recipe;
 pub(crate) mod reduction;

@@ -8,8 +8,8 @@ use crate::random::RngStream;
 use crate::scalar::Scalar;
 use crate::training::checkpoint::{CheckpointManager, Clock, Ended, PhaseState, Snapshot};
 use crate::training::epoch::Epoch;
+use crate::training::lbfgs::{Start, lbfgs};
 use crate::training::objective::{self, BatchReport, Objective, ThreadsError};
-use crate::training::polish::{Start, polish};
 use crate::training::problem::TrainingProblem;
 use crate::training::solver::{EpochSolver, Hooks, Run, Saver, StepError, TrainingState};
 use argmin::core::observers::{Observe, ObserverMode};
@@ -58,7 +58,7 @@ impl<S: Scalar> Trained<S> {
     pub fn snapshot(&self, config: &Config) -> Snapshot<S> {
         let ended = Ended {
             phases: config.phases.len(),
-            polished: config.polish.is_some(),
+            polished: config.lbfgs.is_some(),
             weights: self.weights.clone(),
             validation_loss: self.validation_loss,
             history: self.history.clone(),
@@ -179,7 +179,7 @@ pub fn resume<S: Scalar>(
             keeper.save(clock.seconds(), ended, None);
         }
     };
-    if let (Some(settings), Some(training), Stop::Finished) = (&config.polish, data.training.last(), &stop)
+    if let (Some(settings), Some(training), Stop::Finished) = (&config.lbfgs, data.training.last(), &stop)
         && ended.validation_loss.is_finite()
         && !ended.polished
     {
@@ -194,7 +194,7 @@ pub fn resume<S: Scalar>(
         let (learned, judged) = (in_double(training), in_double(&data.validation));
         let objective = Objective::on(Arc::clone(&pool), architecture.model(), penalty);
         let problem = TrainingProblem::new(objective, &learned, &judged, config.optimizer.weight_decay);
-        let polished = polish(settings, &problem, start).map_err(TrainingError::Optimizer)?;
+        let polished = lbfgs(settings, &problem, start).map_err(TrainingError::Optimizer)?;
         if let Some(best) = polished.weights {
             ended.weights = best.iter().map(|&w| S::of_f64(w)).collect();
         }

@@ -2,7 +2,7 @@
 
 use crate::alone;
 use crate::counting::peak;
-use lnn::configuration::{Config, Polish, Precision, Regularizer};
+use lnn::configuration::{Config, Lbfgs, Precision, Regularizer};
 use lnn::data::sample_all;
 use lnn::lagrangian::configure;
 use lnn::presets::Preset;
@@ -47,7 +47,7 @@ fn a_training_takes_what_was_said() {
     let mut penalised = config("triple-pendulum", &[64, 64], 4096);
     penalised.penalty = Regularizer::Eigenvalue { lambda: 1.0 };
     let mut polished = config("double-pendulum", &[100, 100], 4096);
-    polished.polish = Some(Polish { iterations: 12, memory: 10 });
+    polished.lbfgs = Some(Lbfgs { iterations: 12, memory: 10 });
     for (name, config) in [("wide", wide), ("many", many), ("penalised", penalised), ("polished", polished)] {
         let system = config.system().unwrap();
         let said = training_memory(&config, &config.architecture(&system, vec![1.0; system.coordinates])).unwrap();

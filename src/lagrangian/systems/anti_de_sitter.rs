@@ -86,7 +86,12 @@ pub const fn system(
                 let n = bounds.positions.len();
                 bounds.positions[n - 1].0 = 0.4;
                 bounds.velocities[n - 1] = (-2.4, 2.4);
-                StateAdvice { logarithmic: (1..=n).map(|i| i == n).collect(), relative: 1.0, motions: 0.3, shell: None }
+                StateAdvice {
+                    log_uniform: (1..=n).map(|i| i == n).collect(),
+                    acceleration_weighting: 1.0,
+                    trajectory_fraction: 0.3,
+                    shell: None,
+                }
             }),
             paper,
         },

@@ -113,9 +113,9 @@ pub const fn system(hole: KerrSchild) -> System {
 /// States from inside the horizon to where periastra advance by little.
 fn around(low: f64) -> StateAdvice {
     StateAdvice {
-        logarithmic: Vec::new(),
-        relative: 1.0,
-        motions: 0.0,
+        log_uniform: Vec::new(),
+        acceleration_weighting: 1.0,
+        trajectory_fraction: 0.0,
         shell: Some(ShellAdvice { coordinates: Cow::Borrowed(&[1, 2, 3]), radius: (low, 110.0), rapidity: 1.2 }),
     }
 }

@@ -65,7 +65,7 @@ pub const SYSTEM: System = System {
         // Near the poles the azimuth turns fast, and most great circles of the test are slower than the box.
         states: Some(|bounds| {
             bounds.velocities[1] = (-6.5, 6.5);
-            StateAdvice { logarithmic: Vec::new(), relative: 0.3, motions: 0.5, shell: None }
+            StateAdvice { log_uniform: Vec::new(), acceleration_weighting: 0.3, trajectory_fraction: 0.5, shell: None }
         }),
         paper: Some(PaperBudget { states: 50_000, hidden: &[500; 3], phases: &[PaperPhase::new(50, 1e-3, 1e-6)] }),
     },

@@ -47,7 +47,12 @@ pub const SYSTEM: System = System {
         // A short spring turns fast, and its angle is accelerated a thousand times more than others.
         states: Some(|bounds| {
             bounds.velocities = vec![(-7.0, 7.0), (-10.0, 10.0)];
-            StateAdvice { logarithmic: vec![true, false], relative: 0.1, motions: 0.0, shell: None }
+            StateAdvice {
+                log_uniform: vec![true, false],
+                acceleration_weighting: 0.1,
+                trajectory_fraction: 0.0,
+                shell: None,
+            }
         }),
         paper: Some(PaperBudget { states: 60_000, hidden: &[600; 2], phases: &[PaperPhase::new(500, 5e-4, 1e-7)] }),
     },

@@ -14,7 +14,7 @@ pub use holder::Holder;
 use holder::State;
 
 use crate::storage::lock_owner::{LockOwner, machine};
-use crate::storage::read_regular;
+use crate::storage::read::{ReadError, read_regular};
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
@@ -245,8 +245,8 @@ fn numbers(directory: &Path) -> io::Result<Vec<u64>> {
 fn read(path: &Path) -> io::Result<(String, SystemTime)> {
     let modified = File::open(path)?.metadata()?.modified()?;
     let bytes = read_regular(path, MAX_BYTES).map_err(|error| match error {
-        super::ReadError::Io(error) => error,
-        super::ReadError::Missing => ErrorKind::NotFound.into(),
+        ReadError::Io(error) => error,
+        ReadError::Missing => ErrorKind::NotFound.into(),
         other => io::Error::new(ErrorKind::InvalidData, other.to_string()),
     })?;
     Ok((String::from_utf8_lossy(&bytes).into_owned(), modified))

@@ -333,9 +333,9 @@ fn config(units: Option<usize>, epochs: usize) -> Config {
         data: Data {
             training: 1,
             validation: 1,
-            off_shell: 0.0,
-            motions: 0.0,
-            relative: 0.0,
+            rescaled_fraction: 0.0,
+            trajectory_fraction: 0.0,
+            acceleration_weighting: 0.0,
             shell: Vec::new(),
             shell_radius: None,
             rapidity: None,
@@ -378,9 +378,9 @@ fn config(units: Option<usize>, epochs: usize) -> Config {
             t_max: epochs as f64,
             position: bounds(),
             velocity: bounds(),
-            logarithmic: vec![],
+            log_uniform: vec![],
         }],
-        polish: None,
+        lbfgs: None,
     }
 }
 

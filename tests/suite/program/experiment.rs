@@ -150,3 +150,124 @@ fn wrong_names_and_directories_are_refused() {
         assert!(stderr.starts_with("error: ") && stderr.lines().count() == 1 && stderr.contains(part), "{stderr}");
     }
 }
+
+/// `NAME: share 1/2 is finished, ..` and the rest of what a share prints.
+fn share(out: &Path, given: &str) -> String {
+    let out = out.to_str().unwrap();
+    succeeded(&lnn(&["scaling", "--scale", "smoke", "--threads", "1", "--shard", given, "--out", out]))
+}
+
+#[test]
+fn shares_together_make_what_one_process_makes() {
+    let temporary = tempfile::tempdir().unwrap();
+    let [alone, shared] = ["alone", "shared"].map(|name| temporary.path().join(name));
+    smoke("scaling", &alone, "1");
+    let list = || -> Vec<serde_json::Value> {
+        let listed =
+            succeeded(&lnn(&["scaling", "--scale", "smoke", "--list", "--json", "--out", shared.to_str().unwrap()]));
+        listed.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+    };
+    let states = || list().iter().map(|run| run["state"].as_str().unwrap().to_string()).collect::<Vec<_>>();
+    let merge = || lnn(&["merge", "scaling", "--scale", "smoke", "--out", shared.to_str().unwrap()]);
+    assert_eq!(states(), ["open"; 3]);
+    // Looking leaves no traces.
+    assert!(!shared.exists());
+    let refused = merge();
+    let stderr = String::from_utf8_lossy(&refused.stderr);
+    assert!(refused.status.code() == Some(1) && stderr.contains("none of 3 runs is finished"), "{stderr}");
+
+    let printed = share(&shared, "1/2");
+    assert!(printed.contains("share 1/2 is finished, 2 runs") && printed.contains("lnn experiment merge scaling"));
+    assert_eq!(states(), ["finished", "open", "finished"]);
+    let folder = shared.join("scaling-smoke");
+    assert!(!folder.join("table.csv").exists());
+    // Of a part there are tables too.
+    let part = merge();
+    let stderr = String::from_utf8_lossy(&part.stderr);
+    assert!(part.status.success() && stderr.contains("1 run is not finished"), "{stderr}");
+    let report = fs::read_to_string(folder.join("report.html")).unwrap();
+    assert!(report.contains("3 runs, 2 of them finished"));
+
+    // A run that another machine has claimed, and one that it left long ago.
+    let run = folder.join("no-scaling-seed0");
+    fs::create_dir_all(&run).unwrap();
+    let claim = run.join(".lnn.claim.1");
+    let beats = "beats 00000000000000000001";
+    let text = format!("process 7\nhost far\nsince 0\nmachine x\nserial 0\nlease 600\n{beats}\nheld    \n");
+    fs::write(&claim, text).unwrap();
+    let claimed = &list()[1];
+    assert_eq!((claimed["state"].as_str(), claimed["claimed_by"]["host"].as_str()), (Some("claimed"), Some("far")));
+    let hour = std::time::Duration::from_secs(3600);
+    let file = fs::OpenOptions::new().write(true).open(&claim).unwrap();
+    file.set_modified(std::time::SystemTime::now() - hour).unwrap();
+    assert_eq!(states(), ["finished", "open", "finished"]);
+    let taken = lnn(&["scaling", "--scale", "smoke", "--shard", "2/2", "--out", shared.to_str().unwrap()]);
+    let stderr = String::from_utf8_lossy(&taken.stderr);
+    assert!(taken.status.success() && stderr.contains("taken over from process 7 on far"), "{stderr}");
+    assert_eq!(states(), ["finished"; 3]);
+    assert!(!claim.exists());
+
+    // The bytes do not depend on who made the records, nor on how often they are merged.
+    let files = |out: &Path| -> Vec<(String, Vec<u8>)> {
+        let entries = fs::read_dir(out.join("scaling-smoke")).unwrap().map(|entry| entry.unwrap().path());
+        let mut files: Vec<_> = entries.filter(|path| path.is_file()).collect();
+        files.sort();
+        let name = |path: &Path| path.file_name().unwrap().to_str().unwrap().to_string();
+        files.iter().map(|path| (name(path), fs::read(path).unwrap())).collect()
+    };
+    for _ in 0..2 {
+        succeeded(&merge());
+        assert!(files(&shared) == files(&alone));
+    }
+    assert!(files(&alone).iter().any(|(name, _)| name == "report.html"));
+}
+
+#[test]
+fn arrays_of_slurm_are_shares() {
+    let out = tempfile::tempdir().unwrap();
+    let task = |variables: &[(&str, &str)], arguments: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_lnn"));
+        variables.iter().for_each(|(part, value)| _ = command.env(format!("SLURM_ARRAY_TASK_{part}"), value));
+        let out = ["--scale", "smoke", "--out", out.path().to_str().unwrap()];
+        command.args(["experiment", "scaling"]).args(out).args(arguments).output().unwrap()
+    };
+    let last = [("ID", "3"), ("COUNT", "3"), ("MIN", "1"), ("MAX", "3")];
+    let output = task(&last, &["--json"]);
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success() && stderr.contains("share 3/3 of the runs, by SLURM_ARRAY_TASK_ID"), "{stderr}");
+    let object: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!((object["shard"].as_str(), object["finished"].as_u64()), (Some("3/3"), Some(1)));
+    let made = |run: &str| out.path().join("scaling-smoke").join(run).join("record.json").exists();
+    assert_eq!(["physical-scaling-seed0", "no-scaling-seed0", "dyt-seed0"].map(made), [false, false, true]);
+    // A share that is given has the last word, and does not fail for variables that tell none.
+    let gap = [("ID", "7"), ("COUNT", "2"), ("MIN", "3"), ("MAX", "7")];
+    let refused = task(&gap, &[]);
+    let stderr = String::from_utf8_lossy(&refused.stderr);
+    assert!(refused.status.code() == Some(2) && stderr.contains("--shard I/N says which share it is"), "{stderr}");
+    let output = task(&gap, &["--shard", "1/3"]);
+    assert!(output.status.success() && output.stderr.is_empty());
+    assert_eq!(["physical-scaling-seed0", "no-scaling-seed0", "dyt-seed0"].map(made), [true, false, true]);
+}
+
+#[test]
+fn processes_without_a_share_divide_the_runs() {
+    let out = tempfile::tempdir().unwrap();
+    let start = || {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_lnn"));
+        let out = out.path().to_str().unwrap();
+        command.args(["experiment", "scaling", "--scale", "smoke", "--threads", "1", "--out", out]);
+        command.env("LNN_LOG", "lnn::pipeline::experiment=info");
+        command.stdout(std::process::Stdio::piped()).stderr(std::process::Stdio::piped()).spawn().unwrap()
+    };
+    let processes = [start(), start(), start()];
+    let mut finished = 0;
+    for process in processes {
+        let output = process.wait_with_output().unwrap();
+        let stderr = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success(), "{stderr}");
+        assert!(String::from_utf8_lossy(&output.stdout).contains("Scale smoke, 3 runs"));
+        finished += stderr.lines().filter(|line| line.contains(": finished ")).count();
+    }
+    assert_eq!(finished, 3);
+    assert!(out.path().join("scaling-smoke/report.html").is_file());
+}

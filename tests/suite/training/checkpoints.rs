@@ -1,6 +1,6 @@
 //! A training that is stopped anywhere and goes on is the training that was never stopped, to the last bit.
 
-use lnn::configuration::{Config, Phase, Polish};
+use lnn::configuration::{Config, Lbfgs, Phase};
 use lnn::data::{Datasets, sample_all};
 use lnn::lagrangian::configure;
 use lnn::network::{Architecture, Layout};
@@ -25,7 +25,7 @@ fn config() -> Config {
     config.optimizer.averaging = 0.9;
     config.phases[0].epochs = 3;
     config.phases.push(Phase { rate: 1e-3, epochs: 2, ..config.phases[0].clone() });
-    config.polish = Some(Polish { iterations: 3, memory: 4 });
+    config.lbfgs = Some(Lbfgs { iterations: 3, memory: 4 });
     config
 }
 
@@ -221,4 +221,43 @@ fn other_configurations_data_and_networks_are_refused() {
     assert!(error.to_string().ends_with("other data: validation states"), "{error}");
     assert!(restore(&case, parameters + 1, 200).unwrap_err().to_string().contains("weights"));
     assert!(restore(&case, parameters, 100).unwrap_err().to_string().contains("200 states"));
+}
+
+#[test]
+fn checkpoints_of_earlier_versions_are_of_the_same_configuration() {
+    let mut config = config();
+    (config.data.trajectory_fraction, config.data.acceleration_weighting) = (0.5, 0.25);
+    (config.data.rescaled_fraction, config.phases[0].log_uniform) = (0.125, vec![false, false]);
+    let now = toml::to_string(&config).unwrap();
+    let words = [
+        ("trajectory_fraction", "motions"),
+        ("acceleration_weighting", "relative"),
+        ("rescaled_fraction", "off_shell"),
+        ("log_uniform", "logarithmic"),
+        ("[lbfgs]", "[polish]"),
+    ];
+    let past = words.iter().fold(now.clone(), |text, (new, old)| {
+        let replaced = text.replace(new, old);
+        assert_ne!(replaced, text, "{new}");
+        replaced
+    });
+    assert_eq!(toml::from_str::<Config>(&past).unwrap(), config);
+    let case = Case::<f32>::new(config);
+    let whole = case.whole();
+    let directory = tempfile::tempdir().unwrap();
+    let sit = |text: &str, hooks: &Hooks| {
+        let identity = Identity { config: text.to_string(), data: case.data.checksums() };
+        let keeper = CheckpointManager::new(Arc::new(Disk), directory.path(), Every::Epochs(1), identity);
+        let start = match keeper.restore(Layout::new(&case.architecture).parameters, 200) {
+            Ok(restored) => Some(restored.content),
+            Err(CheckpointError::Missing) => None,
+            Err(error) => panic!("{error}"),
+        };
+        let sitting = ResumeOptions { keeper: Some(Arc::new(keeper)), start };
+        let penalty = case.config.penalty().unwrap();
+        resume(&case.config, &case.architecture, penalty, case.data.clone(), 1, hooks, sitting)
+    };
+    let _ = sit(&past, &stop_after(7));
+    assert!(saved(&Disk, directory.path()).unwrap().content.config.contains("[polish]"));
+    assert_same(&sit(&now, &Hooks::default()).unwrap(), &whole, "from a checkpoint of an earlier version");
 }

@@ -2,7 +2,7 @@
 
 use crate::common::{of_scalar, properties, solve};
 use lnn::configuration::{
-    Config, Data, Network, OnFailure, Optimizer, Penalty, Phase, Polish, Precision, Regularizer, Scaling,
+    Config, Data, Lbfgs, Network, OnFailure, Optimizer, Penalty, Phase, Precision, Regularizer, Scaling,
 };
 use lnn::data::{Dataset, Datasets};
 use lnn::forward::HyperDual;
@@ -345,7 +345,7 @@ fn polishing_lowers_the_loss_and_keeps_the_best() {
     let mut config = config(3);
     config.optimizer.averaging = 0.0;
     let before = run(&config, datasets(), 1, &Hooks::default()).unwrap();
-    config.polish = Some(Polish { iterations: 30, memory: 8 });
+    config.lbfgs = Some(Lbfgs { iterations: 30, memory: 8 });
     let after = run(&config, datasets(), 2, &Hooks::default()).unwrap();
     let rows = before.history.len();
     // The phases are what they were; polishing has rows of its own, without a learning rate.
@@ -413,9 +413,9 @@ fn config(epochs: usize) -> Config {
         data: Data {
             training: 700,
             validation: 100,
-            off_shell: 0.0,
-            motions: 0.0,
-            relative: 0.0,
+            rescaled_fraction: 0.0,
+            trajectory_fraction: 0.0,
+            acceleration_weighting: 0.0,
             shell: Vec::new(),
             shell_radius: None,
             rapidity: None,
@@ -459,11 +459,11 @@ fn config(epochs: usize) -> Config {
                 t_max: 1.0,
                 position: vec![[-1.0, 1.0]; 2],
                 velocity: vec![[-1.0, 1.0]; 2],
-                logarithmic: vec![],
+                log_uniform: vec![],
             };
             2
         ],
-        polish: None,
+        lbfgs: None,
     }
 }
 

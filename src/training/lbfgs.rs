@@ -4,7 +4,7 @@
 //! absolute value, whose kinks end the line search sooner or later; what stands then is the iterate of the lowest
 //! validation loss, which may be the start.
 
-use crate::configuration::Polish;
+use crate::configuration::Lbfgs;
 use crate::training::checkpoint::Clock;
 use crate::training::epoch::Epoch;
 use crate::training::problem::TrainingProblem;
@@ -154,7 +154,7 @@ impl<'p, 'a, L: Solver<Bounded<'p, 'a>, Iteration>> Solver<Bounded<'p, 'a>, Iter
     ) -> Result<(Iteration, Option<KV>), Error> {
         let (state, record) = self.solver.next_iter(problem, state)?;
         let (iteration, cost) = (state.get_iter(), state.get_cost());
-        tracing::info!(iteration, %cost, "polish");
+        tracing::info!(iteration, %cost, "lbfgs");
         if let Some(weights) = state.get_param() {
             self.record.note(weights);
         }
@@ -170,7 +170,7 @@ impl<'p, 'a, L: Solver<Bounded<'p, 'a>, Iteration>> Solver<Bounded<'p, 'a>, Iter
 ///
 /// # Errors
 /// The words of argmin if not even the start could be evaluated.
-pub(crate) fn polish(settings: &Polish, problem: &TrainingProblem<'_, f64>, start: Start) -> Result<Polished, String> {
+pub(crate) fn lbfgs(settings: &Lbfgs, problem: &TrainingProblem<'_, f64>, start: Start) -> Result<Polished, String> {
     let Start { weights, validation_loss, last, clock, hooks } = start;
     let bounded = Bounded { problem, hooks: &hooks, budget: settings.iterations.saturating_mul(EVALUATIONS) };
     let polished = Polished { weights: None, validation_loss, history: Vec::new() };
