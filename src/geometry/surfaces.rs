@@ -123,8 +123,8 @@ pub fn surfaces<S: Scalar>(
     let mut found = Vec::new();
     let zero = <S as Real>::zero();
     // A single place where the metric is not finite, such as a horizon that is met exactly, hides no change of sign.
-    let finite = (0..=steps).filter(|&k| values[k].is_finite());
-    let finite: Vec<usize> = finite.collect();
+    let finite = values.iter().enumerate().filter(|(_, value)| value.is_finite());
+    let finite: Vec<usize> = finite.map(|(k, _)| k).collect();
     for ends in finite.windows(2).filter(|ends| ends[1] - ends[0] <= 2) {
         let [(mut low, mut at_low), (mut high, mut at_high)] = [ends[0], ends[1]].map(|k| (places[k], values[k]));
         // An exact zero belongs to the piece that ends with it.
