@@ -99,8 +99,7 @@ impl Compared<'_> {
             rounded(found.constant.abs(), 6),
             self.points
         );
-        let shell =
-            "B is the same at all states: f is known at this one value, its second coefficient by mass matrices\n";
+        let shell = "B is the same at all states: f is known at this one value, mass matrices up to a part h p p^T\n";
         let text = text + if found.on_shell { shell } else { "" };
         let rows = [
             ("Lagrangian, what is left", found.lagrangian),

@@ -92,7 +92,7 @@ pub fn grid<S: Scalar>(base: &[S], axes: &[(usize, Vec<S>)]) -> Vec<S> {
 /// | all coordinates | the signature changes |
 ///
 /// The line is cut into `steps` equal pieces; every piece whose ends differ in sign is halved until its ends are neighbours.
-/// Two surfaces within a piece, and determinants that touch zero, are not seen.
+/// Two surfaces within a piece, and determinants that touch zero, are not seen. A place where the metric is not finite is passed over.
 ///
 /// # Errors
 /// [`GeometryError::Shape`] for slices of the wrong length, or a block that is empty or names a coordinate that there is not; the
@@ -122,9 +122,12 @@ pub fn surfaces<S: Scalar>(
     let values: Vec<S> = metrics(model, &points, velocity)?.chunks_exact(n * n).map(value).collect();
     let mut found = Vec::new();
     let zero = <S as Real>::zero();
-    for (ends, signs) in places.windows(2).zip(values.windows(2)) {
+    // A single place where the metric is not finite, such as a horizon that is met exactly, hides no change of sign.
+    let finite = values.iter().enumerate().filter(|(_, value)| value.is_finite());
+    let finite: Vec<usize> = finite.map(|(k, _)| k).collect();
+    for ends in finite.windows(2).filter(|ends| ends[1] - ends[0] <= 2) {
+        let [(mut low, mut at_low), (mut high, mut at_high)] = [ends[0], ends[1]].map(|k| (places[k], values[k]));
         // An exact zero belongs to the piece that ends with it.
-        let [(mut low, mut at_low), (mut high, mut at_high)] = [(ends[0], signs[0]), (ends[1], signs[1])];
         if at_high == zero {
             found.push(Surface { point: point(high), change: Change::Zero });
             continue;
@@ -133,24 +136,34 @@ pub fn surfaces<S: Scalar>(
             continue;
         }
         let outside = at_low.abs().max(at_high.abs());
-        let change = loop {
-            let middle = (low + high) * <S as Real>::half();
-            let between = middle > low && middle < high;
-            if !between {
-                break if at_low.abs().min(at_high.abs()) > outside { Change::Pole } else { Change::Zero };
+        loop {
+            let within = |part: f64| Some(low + S::of_f64(part) * (high - low)).filter(|s| *s > low && *s < high);
+            let mut at_inside = None;
+            // The metric may be singular on the surface itself, not beside it.
+            for s in [0.5, 0.375, 0.625].into_iter().filter_map(within) {
+                let at = value(&metrics(model, &point(s), velocity)?);
+                if at.is_finite() {
+                    at_inside = Some((s, at));
+                    break;
+                }
             }
-            let at_middle = value(&metrics(model, &point(middle), velocity)?);
-            if at_middle == zero || !at_middle.is_finite() {
-                low = middle;
-                break if at_middle == zero { Change::Zero } else { Change::Pole };
+            let Some((inside, at_inside)) = at_inside else { break };
+            if at_inside == zero {
+                (low, high, at_low, at_high) = (inside, inside, zero, zero);
+                break;
             }
-            if (at_middle > zero) == (at_low > zero) {
-                (low, at_low) = (middle, at_middle);
+            if (at_inside > zero) == (at_low > zero) {
+                (low, at_low) = (inside, at_inside);
             } else {
-                (high, at_high) = (middle, at_middle);
+                (high, at_high) = (inside, at_inside);
             }
-        };
-        found.push(Surface { point: point(low), change });
+        }
+        // A stretch without a metric has no surface that could be told.
+        if high - low > S::epsilon().ldexp(8) {
+            continue;
+        }
+        let change = if at_low.abs().min(at_high.abs()) > outside { Change::Pole } else { Change::Zero };
+        found.push(Surface { point: point((low + high) * <S as Real>::half()), change });
     }
     Ok(found)
 }

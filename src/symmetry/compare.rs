@@ -16,7 +16,7 @@ pub struct Comparison {
     /// `f'(0)` is the factor of the mass matrix at rest.
     pub factors: Vec<f64>,
     /// `true` if `B` is a metric whose Lagrangian is the same at all states, as on a mass shell, and `A` is not a metric: then the
-    /// states know `f'` and `f''` at this one value, and `f'(0)` is extrapolated.
+    /// states know `f'` at this one value, and mass matrices up to a part `h p p^T`.
     pub on_shell: bool,
     /// Coefficients of the gauge function `F`, one for every function of the basis.
     pub gauge: Vec<f64>,
@@ -40,15 +40,17 @@ pub struct Comparison {
 const POWERS: usize = 3;
 /// Part of a column that must be left beside the others.
 const DEPENDENT: f64 = 1e-9;
+/// Part of the whole below which a term is rounding.
+const ROUNDING: f64 = 1e-9;
 
 /// Compares two Lagrangians at states `(q, v)`, `(states, n)`: what they have in common beyond the freedom that `L` has.
 ///
 /// The motion determines `L` at best up to a factor and a total derivative, `L -> s L + dF(q)/dt`, and up to a constant; that of
 /// geodesics, along which `L` is the energy, up to a function `f(L)`, where `B` is the metric. The best `s` (or `f`, a
-/// polynomial of degree 3) and `F`, over the functions of a basis, follow by linear least squares from the momenta of both, in the
-/// frame of `|M|` of `B`, the constant from the values. They are taken out, and what is left is stated by quantity. Of two metrics
-/// `f` is a factor. Where `B` is the same on all states, as on a mass shell, momenta know `f'` there, and `f''` follows from the mass
-/// matrices, `f' M + f'' p p^T`.
+/// polynomial of degree 3), follows by linear least squares from the mass matrices, which know nothing of a gauge, `F`, over the functions
+/// of a basis, from the momenta, both in the frame of `|M|` of `B`, the constant from the values. They are taken out, and what is left is
+/// stated by quantity. Of two metrics `f` is a factor. Where `B` is the same on all states, as on a mass shell, motion does not see
+/// `(B - B0)^2 h(q, v)`, `B0` that value: `f` is a factor, and of the mass matrices the part `h p p^T` is left aside at every state.
 ///
 /// # Errors
 /// [`SymmetryError`].
@@ -66,8 +68,13 @@ pub fn compare(
     let of_a = Sample::new(a, q, v)?;
     let of_b = Sample::new(b, &of_a.q, &of_a.v)?;
     let of_a = Sample::new(a, &of_b.q, &of_b.v)?;
-    let mut fit = Fit::new(&of_a, &of_b, basis)?;
-    let (mass_matrix, motion) = fit.mechanics(a, b, &of_b)?;
+    let [mut first, mut second] = [Terms::default(), Terms::default()];
+    for (model, terms) in [(a, &mut first), (b, &mut second)] {
+        // A state whose mass matrix is singular has no acceleration to compare.
+        let _ = model.terms(&of_b.q, &of_b.v, Request::ACCELERATION, terms);
+    }
+    let fit = Fit::new((&of_a, &of_b), [&first, &second], basis)?;
+    let (mass_matrix, motion) = fit.mechanics([&first, &second], &of_b)?;
     let energy = fit.energy(&of_a, &of_b);
     Ok(Comparison {
         gauge_formula: field::sum(fit.gauge.iter().enumerate().map(|(f, c)| (*c, basis.text(f)))),
@@ -98,7 +105,7 @@ fn lagrangians(sample: &Sample) -> Vec<f64> {
 }
 
 impl Fit {
-    fn new(a: &Sample, b: &Sample, basis: &Basis) -> Result<Self, SymmetryError> {
+    fn new((a, b): (&Sample, &Sample), terms: [&Terms<f64>; 2], basis: &Basis) -> Result<Self, SymmetryError> {
         let (n, states, functions) = (b.n, b.len(), basis.len());
         let (values, own) = (lagrangians(a), lagrangians(b));
         // A function of one metric that is another one is a factor.
@@ -119,35 +126,31 @@ impl Fit {
         let mut at = vec![Values::default(); states];
         at.iter_mut().zip(b.q.chunks_exact(n)).for_each(|(at, q)| basis.evaluate(q, at));
         let gradient = |f: usize, k: usize| &at[k].gradient[f * n..(f + 1) * n];
-        // Higher powers come last: on a mass shell they say nothing that the first does not.
-        let power = |k: usize, power: usize| power as f64 * (own[k] * unit).powi(power as i32 - 1);
-        let first = std::iter::once(at_states(&|k| p(b, k, 1.0)));
-        let gauges = (0..functions).map(|f| at_states(&|k| gradient(f, k).to_vec()));
-        let higher = (2..=powers).map(|m| at_states(&|k| p(b, k, power(k, m))));
-        let columns: Vec<Vec<f64>> = first.chain(gauges).chain(higher).collect();
+        let level = own.iter().sum::<f64>() / states as f64;
+        let on_shell = powers > 1 && own.iter().all(|x| (x - level).abs() <= DEPENDENT * level.abs());
+        let powers = if on_shell { 1 } else { powers };
+        let factors = factors(terms, (b, &own), &frames, (powers, unit, on_shell));
+        let found = Self { factors, on_shell, gauge: Vec::new(), constant: 0.0, rest: 0.0 };
+        let columns: Vec<Vec<f64>> = (0..functions).map(|f| at_states(&|k| gradient(f, k).to_vec())).collect();
         if states * n < columns.len() {
             return Err(SymmetryError::TooFew { unknowns: columns.len(), states });
         }
-        let target = at_states(&|k| p(a, k, 1.0));
+        let (target, scale) = (at_states(&|k| p(a, k, 1.0)), at_states(&|k| p(b, k, 1.0)));
+        let mut rest = target.clone();
+        add(&mut rest, &at_states(&|k| p(b, k, found.slopes(own[k])[0])), -1.0);
         let plain = orthonormal(&columns, DEPENDENT);
-        let mut solution = plain.given(&plain.along(&target), columns.len());
+        let mut gauge = plain.given(&plain.along(&rest), columns.len());
         let whole = norm(&target);
         // Roundings are no terms.
-        for (c, column) in solution.iter_mut().zip(&columns).skip(1) {
-            if (*c * norm(column)).abs() <= 1e-9 * whole {
+        for (c, column) in gauge.iter_mut().zip(&columns) {
+            if (*c * norm(column)).abs() <= ROUNDING * whole {
                 *c = 0.0;
             }
         }
-        let mut rest = target.clone();
-        solution.iter().zip(&columns).for_each(|(c, column)| add(&mut rest, column, -c));
-        let higher = solution.split_off(functions + 1);
-        let mut gauge = solution.split_off(1);
-        let factors = solution.into_iter().chain(higher).enumerate();
-        let factors: Vec<f64> = factors.map(|(k, c)| c * unit.powi(k as i32)).collect();
-        let kept = 1 + factors.iter().skip(1).rposition(|c| *c != 0.0).map_or(0, |last| last + 1);
+        gauge.iter().zip(&columns).for_each(|(c, column)| add(&mut rest, column, -c));
         let mut left: Vec<f64> = (0..states)
             .map(|k| {
-                let f: f64 = factors.iter().enumerate().map(|(m, c)| c * own[k].powi(m as i32 + 1)).sum();
+                let f: f64 = found.factors.iter().enumerate().map(|(m, c)| c * own[k].powi(m as i32 + 1)).sum();
                 let v = &b.v[k * n..(k + 1) * n];
                 values[k] - f - gauge.iter().enumerate().map(|(f, c)| c * dot(gradient(f, k), v)).sum::<f64>()
             })
@@ -158,37 +161,11 @@ impl Fit {
         let mean = values.iter().sum::<f64>() / states as f64;
         let about: Vec<f64> = values.iter().map(|x| x - mean).collect();
         // Momenta weigh as the values of the motion of B do.
-        let weight = rms(&motion) / (norm(&columns[0]) / (states as f64).sqrt()).max(f64::MIN_POSITIVE.sqrt());
+        let weight = rms(&motion) / (norm(&scale) / (states as f64).sqrt()).max(f64::MIN_POSITIVE.sqrt());
         let size = |momenta: &[f64], values: &[f64]| (weight * norm(momenta)).hypot(norm(values));
         let whole = size(&target, &about);
         let rest = if whole > 0.0 { size(&rest, &left) / whole } else { 0.0 };
-        let level = own.iter().sum::<f64>() / states as f64;
-        let on_shell = powers > 1 && own.iter().all(|x| (x - level).abs() <= DEPENDENT * level.abs());
-        Ok(Self { factors: factors[..kept].to_vec(), on_shell, gauge, constant, rest })
-    }
-
-    /// The `f''` at the one value of `B` on a mass shell that leaves the least of the mass matrices `M_A - f' M_B`, `f'` as it was.
-    fn bend(&mut self, [first, second]: [&Terms<f64>; 2], sample: &Sample, frames: &Frames) {
-        let (n, own) = (sample.n, lagrangians(sample));
-        let level = own.iter().sum::<f64>() / own.len() as f64;
-        let [slope, _] = self.slopes(level);
-        let (mut along, mut whole) = (0.0, 0.0);
-        for k in 0..sample.len() {
-            let of = |terms: &Terms<f64>| terms.mass_matrix[k * n * n..(k + 1) * n * n].to_vec();
-            let (mut rest, metric) = (of(first), of(second));
-            add(&mut rest, &metric, -slope);
-            // Beside p p^T a matrix X has the part p.X p, both in the frame.
-            let raised: Vec<f64> = frames.raised(k, &sample.p[k * n..(k + 1) * n]);
-            let size = dot(&raised, &sample.p[k * n..(k + 1) * n]);
-            let image = rest.chunks_exact(n).map(|row| dot(row, &raised));
-            along += image.zip(&raised).map(|(x, u)| x * u).sum::<f64>();
-            whole += size * size;
-        }
-        let bend = along / whole;
-        if bend.is_finite() && bend != 0.0 {
-            self.factors = vec![slope - bend * level, 0.5 * bend];
-            self.constant += 0.5 * bend * level * level;
-        }
+        Ok(Self { gauge, constant, rest, ..found })
     }
 
     /// `f'` and `f''` at a value of `B`.
@@ -202,22 +179,9 @@ impl Fit {
     }
 
     /// Distances of mass matrices and of accelerations.
-    fn mechanics(
-        &mut self,
-        a: &dyn EulerLagrange<f64>,
-        b: &dyn EulerLagrange<f64>,
-        sample: &Sample,
-    ) -> Result<(f64, f64), SymmetryError> {
+    fn mechanics(&self, [first, second]: [&Terms<f64>; 2], sample: &Sample) -> Result<(f64, f64), SymmetryError> {
         let (n, frames) = (sample.n, Frames::new(sample)?);
         let own = lagrangians(sample);
-        let [mut first, mut second] = [Terms::default(), Terms::default()];
-        for (model, terms) in [(a, &mut first), (b, &mut second)] {
-            // A state whose mass matrix is singular has no acceleration to compare.
-            let _ = model.terms(&sample.q, &sample.v, Request::ACCELERATION, terms);
-        }
-        if self.on_shell {
-            self.bend([&first, &second], sample, &frames);
-        }
         let (mut left, mut whole, mut apart, mut size) = (0.0, 0.0, 0.0, 0.0);
         for k in 0..sample.len() {
             let (matrix, one) = (k * n * n..(k + 1) * n * n, k * n..(k + 1) * n);
@@ -227,9 +191,14 @@ impl Fit {
             for (e, rest) in rest.iter_mut().enumerate() {
                 *rest = m[e] - slope * second.mass_matrix[matrix.start + e] - curve * p[e / n] * p[e % n];
             }
-            left += frames.square(k, &rest);
-            whole += frames.square(k, m);
-            let [x, y] = [&first, &second].map(|terms| &terms.acceleration[one.clone()]);
+            let mut rest = frames.matrix(k, &rest);
+            if self.on_shell {
+                without(&mut rest, &frames.down(k, p));
+            }
+            left += dot(&rest, &rest);
+            let m = frames.matrix(k, m);
+            whole += dot(&m, &m);
+            let [x, y] = [first, second].map(|terms| &terms.acceleration[one.clone()]);
             let difference: Vec<f64> = x.iter().zip(y).map(|(x, y)| x - y).collect();
             let [d, x, y] = [&difference[..], x, y].map(|a| norm(&frames.up(k, a)));
             if d.is_finite() {
@@ -293,20 +262,68 @@ impl Frames {
         self.at(k).map(|(w, u)| dot(u, x) / w).collect()
     }
 
-    /// The vector `|M|^-1 p` of a momentum.
-    fn raised(&self, k: usize, p: &[f64]) -> Vec<f64> {
-        let mut raised = vec![0.0; self.n];
-        self.at(k).for_each(|(w, u)| add(&mut raised, u, dot(u, p) / (w * w)));
-        raised
-    }
-
-    /// Square of a symmetric matrix in the frame.
-    fn square(&self, k: usize, matrix: &[f64]) -> f64 {
-        let columns = self.at(k).map(|(w, u)| {
+    /// A symmetric matrix in the frame, `(n, n)`.
+    fn matrix(&self, k: usize, matrix: &[f64]) -> Vec<f64> {
+        let column = |(w, u): (f64, &[f64])| {
             let mut image = vec![0.0; self.n];
             matrix.chunks_exact(self.n).zip(u).for_each(|(row, u)| add(&mut image, row, u / w));
             self.down(k, &image)
-        });
-        columns.map(|column| dot(&column, &column)).sum()
+        };
+        self.at(k).flat_map(column).collect()
     }
+}
+
+/// Takes the part along `p p^T` out of a matrix `(n, n)`.
+fn without(matrix: &mut [f64], p: &[f64]) {
+    let n = p.len();
+    let part: f64 = matrix.chunks_exact(n).zip(p).map(|(row, x)| x * dot(row, p)).sum();
+    let square = dot(p, p).powi(2);
+    if square > 0.0 {
+        matrix.iter_mut().enumerate().for_each(|(e, m)| *m -= part / square * p[e / n] * p[e % n]);
+    }
+}
+
+/// Coefficients of `f`, from the first power: the best ones of `M_A = f' M_B + f'' p p^T`, beside parts along `p p^T` on a mass shell;
+/// `unit` is the size of `1/B`.
+fn factors(
+    [first, second]: [&Terms<f64>; 2],
+    (sample, own): (&Sample, &[f64]),
+    frames: &Frames,
+    (powers, unit, on_shell): (usize, f64, bool),
+) -> Vec<f64> {
+    let n = sample.n;
+    let at_states = |matrix: &dyn Fn(usize, usize) -> f64| -> Vec<f64> {
+        let one = |k: usize| {
+            let entries: Vec<f64> = (0..n * n).map(|e| matrix(k, e)).collect();
+            let mut entries = frames.matrix(k, &entries);
+            if on_shell {
+                without(&mut entries, &frames.down(k, &sample.p[k * n..(k + 1) * n]));
+            }
+            entries
+        };
+        (0..sample.len()).flat_map(one).collect()
+    };
+    // Of the power m of B times the unit, over the unit.
+    let power = |m: usize| {
+        at_states(&|k, e| {
+            let (m_, b, p) = (m as f64, own[k] * unit, &sample.p[k * n..(k + 1) * n]);
+            let bent = if m > 1 { m_ * (m_ - 1.0) * unit * b.powi(m as i32 - 2) * p[e / n] * p[e % n] } else { 0.0 };
+            m_ * b.powi(m as i32 - 1) * second.mass_matrix[k * n * n + e] + bent
+        })
+    };
+    let columns: Vec<Vec<f64>> = (1..=powers).map(power).collect();
+    let target = at_states(&|k, e| first.mass_matrix[k * n * n + e]);
+    let plain = orthonormal(&columns, DEPENDENT);
+    let mut solution = plain.given(&plain.along(&target), columns.len());
+    let whole = norm(&target);
+    // Roundings are no terms.
+    for (c, column) in solution.iter_mut().zip(&columns).skip(1) {
+        if (*c * norm(column)).abs() <= ROUNDING * whole {
+            *c = 0.0;
+        }
+    }
+    while solution.len() > 1 && solution.last() == Some(&0.0) {
+        solution.pop();
+    }
+    solution.iter().enumerate().map(|(m, c)| c * unit.powi(m as i32)).collect()
 }
