@@ -189,7 +189,6 @@ impl Batch<'_> {
             slopes[0].clear();
             slopes[0].extend(moving.iter().map(|ray| ray.a));
             for (stage, row) in A.iter().enumerate() {
-                (q, k) = (std::mem::take(&mut q), std::mem::take(&mut k));
                 q.clear();
                 k.clear();
                 for (at, ray) in moving.iter().enumerate() {
