@@ -224,7 +224,7 @@ const FAR: f64 = 100.0;
 /// White columns between pictures.
 const GAP: usize = 8;
 
-/// What cannot be traced, with the option that says so.
+/// An error with the option that helps.
 fn refused(error: RelativityError) -> CliError {
     match &error {
         RelativityError::Invalid { what, expected, .. } => {

@@ -1,4 +1,4 @@
-//! What `lnn shadow` has to say, as text or as a JSON object.
+//! Facts of `lnn shadow`, as text or as a JSON object.
 
 use crate::names::{counted, hundredths, rounded};
 use crate::relativity::{Camera, Difference, Image, Outline, RelativityError, Shadow, Tracing};
@@ -6,7 +6,7 @@ use crate::report::text_table;
 use serde_json::{Map, Value, json};
 use std::path::Path;
 
-/// What was seen through a metric.
+/// Rays through a metric, and the edge of its shadow.
 pub struct View<'a> {
     /// `exact` or `learned`.
     pub name: &'a str,
@@ -40,7 +40,7 @@ pub struct Facts<'a> {
     pub unit: Option<&'a str>,
     /// The camera.
     pub camera: &'a Camera,
-    /// How it was traced.
+    /// Choices of the tracing.
     pub tracing: &'a Tracing,
     /// The exact metric, the learned one, or both.
     pub views: &'a [View<'a>],

@@ -103,9 +103,9 @@ mod tests {
         let camera = Camera { width: 40, height: 20, ..Camera::new(10.0, 1.1) };
         assert_eq!(camera.direction(20.0, 10.0), [0.0, 0.0, 1.0]);
         let [right, up, forward] = camera.direction(40.0, 10.0);
-        assert!((right.atan2(forward) - 35f64.to_radians()).abs() < 1e-15 && up == 0.0);
+        assert!((right.atan2(forward) - 35f64.to_radians()).abs() < 1e-14 && up == 0.0);
         let corner = camera.direction(0.0, 0.0);
-        assert!(corner[0] < 0.0 && corner[1] == -corner[0] / 2.0 && (norm(corner) - 1.0).abs() < 1e-15);
+        assert!(corner[0] < 0.0 && corner[1] == -corner[0] / 2.0 && (norm(corner) - 1.0).abs() < 1e-14);
     }
 
     #[test]
@@ -115,10 +115,10 @@ mod tests {
             let [right, up, forward] = camera.axes();
             let place = camera.chart.space_of(camera.event());
             assert!(norm(place) - 10.0 < 1e-14 && (dot(place, forward) + 10.0).abs() < 1e-14);
-            assert!(dot(right, up).abs() + dot(up, forward).abs() + dot(right, forward).abs() < 1e-15);
+            assert!(dot(right, up).abs() + dot(up, forward).abs() + dot(right, forward).abs() < 1e-14);
             // Right x up points backwards.
             let z = right[0] * up[1] - right[1] * up[0];
-            assert!((z + forward[2]).abs() < 1e-15);
+            assert!((z + forward[2]).abs() < 1e-14);
         }
     }
 

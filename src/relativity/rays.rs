@@ -189,7 +189,6 @@ impl Batch<'_> {
             slopes[0].clear();
             slopes[0].extend(moving.iter().map(|ray| ray.a));
             for (stage, row) in A.iter().enumerate() {
-                (q, k) = (std::mem::take(&mut q), std::mem::take(&mut k));
                 q.clear();
                 k.clear();
                 for (at, ray) in moving.iter().enumerate() {
@@ -253,7 +252,7 @@ impl Batch<'_> {
     fn fate(&self, ray: &Moving) -> Option<Fate> {
         let (place, tangent) = (self.chart.space_of(ray.q), self.chart.space_of(ray.k));
         let (distance, speed) = (norm(place), norm(tangent));
-        if distance <= self.tracing.capture || norm(ray.k) > self.tracing.growth * ray.size {
+        if distance < self.tracing.capture || norm(ray.k) > self.tracing.growth * ray.size {
             return Some(Fate::Captured);
         }
         if distance >= self.tracing.far && dot(place, tangent) > 0.0 {
@@ -264,7 +263,7 @@ impl Batch<'_> {
         (stuck || ray.steps >= self.tracing.most_steps).then_some(Fate::Unfinished)
     }
 
-    /// What rays were like, with the drift of `g(k, k)`.
+    /// The rays, each with the drift of `g(k, k)`.
     fn finish(mut self, ended: &[Ended]) -> Result<Vec<Ray>, RelativityError> {
         let (q, k): (Vec<_>, Vec<_>) = ended.iter().map(|ray| (ray.q, ray.k)).unzip();
         match self.model.terms(q.as_flattened(), k.as_flattened(), Request::MASS_MATRIX, &mut self.terms) {

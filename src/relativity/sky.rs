@@ -130,7 +130,7 @@ mod tests {
         let difference = first.difference(&second).unwrap();
         assert_eq!(difference.shadow, 0.25);
         assert!(
-            (difference.most - 0.4).abs() < 1e-15 && (first.share(), second.unfinished(), first.steps()) == (0.5, 0, 8)
+            (difference.most - 0.4).abs() < 1e-14 && (first.share(), second.unfinished(), first.steps()) == (0.5, 0, 8)
         );
         let small = Shadow { width: 2, height: 2, ..second };
         assert!(matches!(first.difference(&small), Err(RelativityError::Sizes { .. })));

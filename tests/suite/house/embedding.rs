@@ -57,6 +57,7 @@ const _: () = {
     error::<training::TrainingError>();
     error::<training::ThreadsError>();
     error::<lnn::pipeline::PipelineError>();
+    error::<lnn::relativity::RelativityError>();
 };
 
 fn root() -> &'static Path {
