@@ -2,7 +2,7 @@
 //! are found at once.
 
 use crate::cli::config::lines;
-use crate::cli::renamed_keys::rename;
+use crate::cli::renamed_keys::{rename, without_old};
 use crate::cli::{CliError, input};
 use crate::names::plain;
 use serde::Serialize;
@@ -334,7 +334,7 @@ impl Filled {
         let unknown = problem.strip_prefix("unknown field `").and_then(|rest| rest.split('`').next());
         let at = path.iter().position(|step| matches!(step, Step::Key(name) if Some(name.as_str()) == unknown));
         let path = at.map_or(path, |at| &path[..=at]);
-        let mistake = Mistake::new(text_of(path), plain(problem));
+        let mistake = Mistake::new(text_of(path), plain(&without_old(problem)));
         if !self.mistakes.contains(&mistake) {
             self.mistakes.push(mistake);
         }

@@ -22,6 +22,14 @@ pub fn rename(table: &mut Table, lines: &mut BTreeMap<String, usize>) -> Result<
     Ok(())
 }
 
+/// A message of a reader that lists known keys, without those of earlier versions.
+pub fn without_old(message: &str) -> String {
+    let Some((before, known)) = message.split_once(", expected one of ") else { return message.to_string() };
+    let is_old = |name: &&str| RENAMED.iter().any(|renamed| name.trim_matches('`') == renamed.old);
+    let known: Vec<&str> = known.split(", ").filter(|name| !is_old(name)).collect();
+    format!("{before}, expected one of {}", known.join(", "))
+}
+
 /// Renames a key of a configuration whose paths begin so.
 fn rename_in(
     config: &mut Table,
@@ -66,4 +74,17 @@ fn rename_key(
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn keys_of_earlier_versions_are_not_offered() {
+        let listed =
+            "unknown field `motions`, expected one of `motions`, `trajectory_fraction`, `polish`, `test`, `relative`";
+        assert_eq!(without_old(listed), "unknown field `motions`, expected one of `trajectory_fraction`, `test`");
+        assert_eq!(without_old("missing field `relative`"), "missing field `relative`");
+    }
 }
