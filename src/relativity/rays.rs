@@ -43,8 +43,8 @@ pub struct Ray {
 ///
 /// A ray that is followed backwards to a future horizon does not reach it: in coordinates that are regular there, those of Kerr and Schild, it
 /// comes nearer and nearer while `dt` grows beyond all bounds within a finite affine parameter, `|k|` as the inverse of the distance from the
-/// horizon. A ray that turns around does so outside the orbit of light, with a growth of a few, of a thousand at `a = 0.998 M`, where that orbit
-/// is next to the horizon.
+/// horizon. A ray that turns around does so outside the orbit of light, with a growth of a few, and with more the nearer that orbit is to the
+/// horizon: next to the largest spins the edge of the shadow wants a larger one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tracing {
     /// Relative error of a step.
