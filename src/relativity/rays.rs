@@ -37,7 +37,7 @@ pub struct Ray {
 /// | `tolerance` | 1e-6 | relative error of place and tangent in a step | above 0 |
 /// | `far` | twice the distance of the camera | distance from which on a ray that leaves has escaped | above 0 |
 /// | `capture` | 0 | distance within which a ray is captured in any case | at least 0 |
-/// | `growth` | 1e5 | growth of `|k|`, Euclidean, at which a ray is captured | above 1 |
+/// | `growth` | 1e5 | growth of the Euclidean length of `k` at which a ray is captured | above 1 |
 /// | `most_steps` | 2000 | steps after which a ray is left unfinished | above 0 |
 /// | `threads` | 1 | threads; no result depends on them | above 0 |
 ///
