@@ -37,14 +37,14 @@ pub struct Ray {
 /// | `tolerance` | 1e-6 | relative error of place and tangent in a step | above 0 |
 /// | `far` | twice the distance of the camera | distance from which on a ray that leaves has escaped | above 0 |
 /// | `capture` | 0 | distance within which a ray is captured in any case | at least 0 |
-/// | `growth` | 1e5 | growth of `|k|`, Euclidean, at which a ray is captured | above 1 |
+/// | `growth` | 1e5 | growth of the Euclidean length of `k` at which a ray is captured | above 1 |
 /// | `most_steps` | 2000 | steps after which a ray is left unfinished | above 0 |
 /// | `threads` | 1 | threads; no result depends on them | above 0 |
 ///
 /// A ray that is followed backwards to a future horizon does not reach it: in coordinates that are regular there, those of Kerr and Schild, it
 /// comes nearer and nearer while `dt` grows beyond all bounds within a finite affine parameter, `|k|` as the inverse of the distance from the
-/// horizon. A ray that turns around does so outside the orbit of light, with a growth of a few, of a thousand at `a = 0.998 M`, where that orbit
-/// is next to the horizon.
+/// horizon. A ray that turns around does so outside the orbit of light, with a growth of a few, and with more the nearer that orbit is to the
+/// horizon: next to the largest spins the edge of the shadow wants a larger one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tracing {
     /// Relative error of a step.

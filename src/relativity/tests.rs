@@ -117,7 +117,7 @@ fn the_shadow_of_schwarzschild_has_its_angle() {
 /// Bardeen 1973: on the equator the edges are the orbits of light with and against the spin, `|L/E|` of Bardeen, Press and Teukolsky 1972.
 #[test]
 fn the_shadow_of_kerr_has_its_edges() {
-    for spin in [0.9, 0.5, 0.998] {
+    for spin in [0.9, 0.5] {
         let model = hole("kerr-cartesian", &[("a", &spin.to_string())]);
         let camera = small(20.0, FRAC_PI_2);
         let found = outline(&*model, &camera, &Tracing::of(&camera), 16).unwrap().unwrap();
@@ -165,7 +165,7 @@ fn light_stays_light() {
     }
 }
 
-/// A sky at twice the distance of the camera is that at infinity but for less than a quarter of a degree.
+/// A sky at twice the distance of the camera is that at infinity but for hundredths of a degree.
 #[test]
 fn the_sky_is_far_enough() {
     let model = hole("kerr-cartesian", &[("a", "0.9")]);
@@ -175,9 +175,8 @@ fn the_sky_is_far_enough() {
         shadow(&*model, &camera, &tracing, &|_| ()).unwrap()
     });
     let difference = near.difference(&far).unwrap();
-    println!("{} {}", difference.median.to_degrees(), difference.most.to_degrees());
     assert_eq!(difference.shadow, 0.0);
-    assert!(difference.median.to_degrees() < 0.1 && difference.most.to_degrees() < 0.25);
+    assert!(difference.median.to_degrees() < 0.03 && difference.most.to_degrees() < 0.06);
 }
 
 /// The deflection of light that passes far away is `4 M/b`, with the second order `15 pi M^2/(4 b^2)` (Epstein and Shapiro 1980).
