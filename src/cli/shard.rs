@@ -45,7 +45,7 @@ impl Shard {
             (steps % step == 0 && steps / step < count).then_some(steps / step)
         };
         // The last of a list with gaps lies beyond its count.
-        let gaps = most.is_some_and(|most| position(most) != Some(count - 1));
+        let gaps = most.is_some_and(|most| most.saturating_sub(least) / step >= count);
         let index = position(id).filter(|_| !gaps);
         let index = index.ok_or_else(|| unknown(&format!("not one of {count} numbers in even steps from {least}")))?;
         Ok(Some(Self { index: index + 1, count }))
@@ -104,7 +104,8 @@ mod tests {
             ("ID=1 COUNT=8 MIN=1 MAX=8", "1/8"),
             ("ID=8 COUNT=8 MIN=1 MAX=8", "8/8"),
             ("ID=14 COUNT=3 MIN=10 MAX=14 STEP=2", "3/3"),
-            // --array=0-9:4
+            // --array=0-9:4, whose last is 8.
+            ("ID=4 COUNT=3 MIN=0 MAX=9 STEP=4", "2/3"),
             ("ID=8 COUNT=3 MIN=0 MAX=8 STEP=4", "3/3"),
             ("ID=5 COUNT=1 MIN=5 MAX=5", "1/1"),
             ("ID=2 COUNT=4", "3/4"),
