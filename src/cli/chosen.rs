@@ -1,6 +1,7 @@
 //! The system that a command is about: one of the catalogue by its name, or one of one's own by its file.
 
-use crate::cli::config_file::{ConfigFile, Mistake};
+use crate::cli::config_file::ConfigFile;
+use crate::cli::mistake::Mistake;
 use crate::cli::{CliError, config};
 use crate::lagrangian::system::System;
 use crate::lagrangian::{Description, find};

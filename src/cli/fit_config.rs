@@ -1,8 +1,9 @@
 //! The configuration of a fit, as `config.toml` holds it and `--config` reads it.
 
 use crate::cli::CliError;
-use crate::cli::config_file::{ConfigFile, Mistake};
+use crate::cli::config_file::ConfigFile;
 use crate::cli::fit_args::Args;
+use crate::cli::mistake::Mistake;
 use crate::cli::number::positive;
 use crate::cli::print_config::{commented, with_seed};
 use crate::cli::recording_args::{RecordingArgs, unit};

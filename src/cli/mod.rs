@@ -35,6 +35,7 @@ mod inverse;
 mod json;
 mod learned;
 mod manual;
+mod mistake;
 mod misunderstood;
 mod motion;
 mod number;

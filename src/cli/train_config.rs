@@ -1,7 +1,8 @@
 //! Arguments of `lnn train` and the configuration they come to.
 
 use crate::cli::changes::Changes;
-use crate::cli::config_file::{ConfigFile, Mistake};
+use crate::cli::config_file::ConfigFile;
+use crate::cli::mistake::Mistake;
 use crate::cli::number::{count, finite, positive, seed};
 use crate::cli::print_config::{PrintFormat, commented, with_seed};
 use crate::cli::{CliError, chosen, output, source};

@@ -71,7 +71,7 @@ pub enum Picture {
     TradeOff,
     /// Lowest validation loss so far against seconds of training, a line per run.
     Clock,
-    /// What the learned metrics say of a black hole, beside the exact ones: a table per row.
+    /// Quantities of black holes read off the learned metrics, beside the exact ones: a table per row.
     BlackHole,
     /// Pictures of every run's evaluation whose file name begins so.
     Evaluation(&'static [&'static str]),

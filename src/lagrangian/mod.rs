@@ -15,6 +15,7 @@ mod hand_written;
 mod inverse;
 mod metric;
 mod range;
+mod shell_advice;
 pub mod system;
 #[doc(hidden)]
 pub mod systems;

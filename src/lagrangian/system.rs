@@ -3,6 +3,7 @@
 use super::Lagrangian;
 use super::description::Described;
 pub use super::range::Range;
+pub use super::shell_advice::ShellAdvice;
 use crate::scalar::Real;
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -178,17 +179,6 @@ pub struct StateAdvice {
     pub trajectory_fraction: f64,
     /// Shell around a centre whose states are drawn instead of those of a box.
     pub shell: Option<ShellAdvice>,
-}
-
-/// Shell around a centre, and how fast what moves in it is at most.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ShellAdvice {
-    /// Cartesian coordinates around the centre.
-    pub coordinates: Cow<'static, [usize]>,
-    /// Lowest and highest distance from it.
-    pub radius: (f64, f64),
-    /// Largest rapidity in a local frame.
-    pub rapidity: f64,
 }
 
 /// The paper's budget for a system.

@@ -107,7 +107,7 @@ impl Evaluation {
             let left = common.left().map(|(name, _)| format!("{name} [%]"));
             Table {
                 title: "What is left of the learned Lagrangian beside factor and gauge of the exact one".into(),
-                header: [vec!["factor [1]".to_string()], left.to_vec(), vec!["states".into()]].concat(),
+                header: [vec!["factor [1]".to_string()], left.to_vec(), vec!["states [1]".into()]].concat(),
                 rows: vec![[vec![powers.join("; ")], distances.to_vec(), vec![common.states.to_string()]].concat()],
             }
         });

@@ -23,7 +23,7 @@ pub(crate) struct Queue {
 struct State {
     /// Runs, each with the time before which it is not tried again.
     waiting: VecDeque<(usize, Option<Instant>)>,
-    /// How often another process was seen to work on a run.
+    /// Times that another process was seen to work on a run.
     seen: BTreeMap<usize, u64>,
     results: BTreeMap<usize, Found>,
 }

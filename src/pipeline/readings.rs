@@ -1,4 +1,4 @@
-//! What the models of an experiment say of their black holes, beside the exact metrics: tables and pictures.
+//! Black holes as the models of an experiment have them, beside the exact metrics: tables and pictures.
 
 use crate::configuration::Config;
 use crate::experiments::{Experiment, Record, Run, Scale};
@@ -64,7 +64,7 @@ fn around(config: &Config, system: &Configured<f64>) -> Option<(Around, (f64, f6
     Some((around, range?))
 }
 
-/// What `look` sees of the hole of a configuration beside a model that learned it.
+/// Result of `look` at the hole of a configuration and at a model that learned it.
 ///
 /// # Errors
 /// [`PipelineError::Hole`] for a system that is none.
@@ -118,7 +118,7 @@ fn readings_of(run: &Run, store: &dyn ExperimentStore) -> Result<Vec<Reading>, P
     look_at(&run.config, &learned, |pair| pair.readings())
 }
 
-/// What the finished runs of an experiment read, row by row; written as `readings.csv` too. None for an experiment that reads no holes.
+/// Readings of the finished runs of an experiment, row by row; written as `readings.csv` too. None for an experiment that reads no holes.
 ///
 /// # Errors
 /// A model file that cannot be read, a system without the coordinates of a hole, files that cannot be written.

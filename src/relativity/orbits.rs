@@ -10,7 +10,7 @@ use std::f64::consts::TAU;
 /// A motion in the equator from a state until a time, or until it comes to a distance.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Orbit {
-    /// What it is.
+    /// Title of a picture.
     pub title: &'static str,
     /// Coordinates at the start.
     pub q: [f64; 4],

@@ -1,4 +1,4 @@
-//! What a learned metric says of a hole, beside the exact one: from free fall slower than light alone.
+//! Quantities read off a learned metric of a hole, beside those of the exact one.
 
 use super::infall::infall;
 use super::parameters::nearest_parameters;

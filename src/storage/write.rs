@@ -208,10 +208,15 @@ impl Drop for Draft<'_> {
 /// End of the name of a temporary file.
 const TEMPORARY: &str = ".tmp";
 
+/// A number that no other call in this process gives.
+pub(in crate::storage) fn serial() -> usize {
+    static COUNTER: AtomicUsize = AtomicUsize::new(0);
+    COUNTER.fetch_add(1, Ordering::Relaxed)
+}
+
 /// `.NAME.PROCESS.NUMBER.tmp`.
 fn temporary_name(name: &OsStr) -> OsString {
-    static COUNTER: AtomicUsize = AtomicUsize::new(0);
-    let number = COUNTER.fetch_add(1, Ordering::Relaxed);
+    let number = serial();
     let mut temporary = OsString::from(".");
     temporary.push(name);
     temporary.push(format!(".{}.{number}{TEMPORARY}", std::process::id()));

@@ -9,7 +9,7 @@ mod system;
 use super::ExpressionLagrangian;
 use super::expression::{ExpressionError, Formula};
 use super::range::Range;
-use super::system::ShellAdvice;
+use super::shell_advice::ShellAdvice;
 use crate::scalar::Real;
 use quantity::{Decimal, Quantity};
 use serde::{Deserialize, Serialize};

@@ -15,6 +15,7 @@ use holder::State;
 
 use crate::storage::lock_owner::{LockOwner, machine};
 use crate::storage::read::{ReadError, read_regular};
+use crate::storage::write::serial;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
@@ -154,9 +155,8 @@ impl Claimant {
 
 impl Claim {
     fn new(directory: &Path, number: u64, claimant: &Claimant) -> Self {
-        /// Tells the claims of a process apart.
-        static SERIAL: AtomicU64 = AtomicU64::new(0);
-        let serial = SERIAL.fetch_add(1, Ordering::Relaxed);
+        // Tells the claims of a process apart.
+        let serial = serial();
         let machine = claimant.machine.as_deref().unwrap_or_default();
         let (owner, lease) = (LockOwner::this().text(), claimant.lease.as_secs_f64());
         let head = format!("{owner}machine {machine}\nserial {serial}\nlease {lease}\n");
@@ -261,8 +261,7 @@ fn silence(directory: &Path, modified: SystemTime) -> Duration {
 
 /// The time by the clock of the machine that holds the files: that of a file made now.
 fn probe(directory: &Path) -> io::Result<SystemTime> {
-    static COUNTER: AtomicU64 = AtomicU64::new(0);
-    let number = COUNTER.fetch_add(1, Ordering::Relaxed);
+    let number = serial();
     // Like other temporary files, so that one left behind is removed.
     let path = directory.join(format!(".lnn.clock.{}.{number}.tmp", std::process::id()));
     let modified = OpenOptions::new().write(true).create_new(true).open(&path).and_then(|mut file| {
@@ -273,7 +272,7 @@ fn probe(directory: &Path) -> io::Result<SystemTime> {
     modified
 }
 
-/// What cannot be removed does no harm.
+/// Leaves a failure aside: a file that cannot be removed does no harm.
 fn ignore(_: io::Result<()>) {}
 
 #[cfg(test)]

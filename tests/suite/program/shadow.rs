@@ -65,7 +65,7 @@ fn a_metric_in_a_file_casts_the_shadow_of_the_catalogues() {
             assert!((number(side) - sign * 27f64.sqrt()).abs() < 1e-5, "{side}: {seen}");
         }
         assert!((number("area") / (27.0 * std::f64::consts::PI) - 1.0).abs() < 1e-5, "{seen}");
-        assert!(number("share") > 0.08 && number("drift") < 1e-5 && number("unfinished") == 0.0, "{seen}");
+        assert!(number("share") > 0.08 && number("drift") < 1e-4 && number("unfinished") == 0.0, "{seen}");
         assert!(seen.get("learned").is_none() && seen.get("difference").is_none());
     }
 }
