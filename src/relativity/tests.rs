@@ -128,7 +128,7 @@ fn the_shadow_of_kerr_has_its_edges() {
         // What comes from the left comes with the spin.
         let (left, right) = (found.left().celestial, found.right().celestial);
         assert!((left[0] + impact(spin)).abs() < 1e-5, "{left:?} for {}", impact(spin));
-        assert!((right[0] + impact(-spin)).abs() < 1e-5, "{right:?} for {}", impact(-spin));
+        assert!((right[0] - impact(-spin)).abs() < 1e-5, "{right:?} for {}", impact(-spin));
         assert!(found.left().angle < found.right().angle);
         // Above and below alike.
         let (top, bottom) = (found.top().celestial, found.bottom().celestial);
@@ -150,7 +150,8 @@ fn no_result_depends_on_the_number_of_threads() {
     let one = of(1);
     assert_eq!(one, of(3));
     assert_eq!(one.unfinished(), 0);
-    assert!(one.share() > 0.03 && one.share() < 0.2, "{}", one.share());
+    // About that of a disc of the angle without spin, 18.8 degrees, in a picture of 70.
+    assert!((one.share() - 0.24).abs() < 0.02, "{}", one.share());
     let difference = one.difference(&one).unwrap();
     assert_eq!((difference.shadow, difference.median, difference.most), (0.0, 0.0, 0.0));
 }
