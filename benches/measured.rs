@@ -14,7 +14,7 @@
 //! `../shared/data/ibm-double-pendulum`; gravity pulls along the x axis of these pictures. Every film is a recording of its own: the first four fifths are learned from, the
 //! rest is predicted, 0.5 s at a time. `-- --part noise` is the made motion, `-- --part rows` reads and surveys ten million
 //! rows and says what that took, `-- --part textbook` the films without what has to be trained, `-- --part determination` the
-//! cart-pendulum, two minutes, `-- --part orbits` orbits around a hole, half an hour; without `--part` all. Writes `films.csv`, `noise.csv`, `determination.csv` and `orbits.csv` into `target/measured`.
+//! cart-pendulum, two minutes, `-- --part orbits` orbits around a hole, a quarter of an hour; without `--part` all. Writes `films.csv`, `noise.csv`, `determination.csv` and `orbits.csv` into `target/measured`.
 
 #[path = "measured/determination.rs"]
 mod determination;

@@ -174,6 +174,9 @@ fn told(way: Way, orbits: usize, noise: f64, (epochs, threads): (Option<usize>, 
         training.network.radial = vec![["x", "y", "z"].map(String::from).to_vec()];
         training.network.radial_unit = Some(2.0);
     }
+    // A third of the usual steps.
+    training.phases[0].epochs = training.phases[0].epochs.div_ceil(3);
+    training.phases[0].t_max = training.phases[0].epochs as f64;
     if let Some(epochs) = epochs {
         (training.phases[0].epochs, training.phases[0].t_max) = (epochs, epochs as f64);
         training.network.hidden = vec![8];

@@ -47,7 +47,8 @@ pub fn orbits(
     let equator = around.equator(model, &origin);
     let kepler = |a: f64| TAU * a.powf(1.5) / mass.sqrt();
     // From periastron, with the time of a revolution after Kepler.
-    let bound = |p: f64, e: f64| -> Result<Option<([[f64; 4]; 2], f64)>, GeometryError> {
+    type Start = ([[f64; 4]; 2], f64);
+    let bound = |p: f64, e: f64| -> Result<Option<Start>, GeometryError> {
         let (near, far) = (p / (1.0 + e) * mass, p / (1.0 - e) * mass);
         let turning = equator.between(near, far, Sense::Forward)?;
         Ok(turning.map(|turning| (around.turning(near, &turning), kepler(0.5 * (near + far)))))

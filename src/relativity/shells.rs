@@ -79,8 +79,9 @@ mod tests {
 
     #[test]
     fn directions_and_distances_fill_a_shell_evenly() {
-        let all: Vec<(f64, [f64; 3])> = directions(1000, (1.0, 100.0)).collect();
-        let mean = |of: &dyn Fn(&(f64, [f64; 3])) -> f64| all.iter().map(of).sum::<f64>() / 1000.0;
+        type Place = (f64, [f64; 3]);
+        let all: Vec<Place> = directions(1000, (1.0, 100.0)).collect();
+        let mean = |of: &dyn Fn(&Place) -> f64| all.iter().map(of).sum::<f64>() / 1000.0;
         assert!((mean(&|(r, _)| r.ln()) - 10.0_f64.ln()).abs() < 0.01);
         for i in 0..3 {
             assert!(mean(&|(_, d)| d[i]).abs() < 5e-3);
