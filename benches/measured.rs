@@ -117,7 +117,9 @@ fn learned(measured: &Measured, friction: bool, targets: Targets, scale: Scale) 
     let suggested = if targets == Targets::Motion { suggested.div_ceil(3) } else { suggested };
     config.phases[0].epochs = scale.epochs.unwrap_or(suggested);
     config.phases[0].t_max = config.phases[0].epochs as f64;
-    let architecture = config.architecture_with(vec![true; 2], data.training[0].physical_scale());
+    let architecture =
+        config.architecture_with(["theta1", "theta2"].into_iter(), vec![true; 2], data.training[0].physical_scale());
+    let architecture = architecture.expect("no names in the configuration");
     let penalty = Penalty::Eigenvalue { lambda: config.penalty.lambda() };
     let hooks = Hooks::default();
     let mut weights = train(&config, &architecture, penalty, data, THREADS, &hooks).expect("a training").weights;

@@ -56,7 +56,7 @@ pub fn main() -> Result<(), Box<dyn std::error::Error>> {
     let (training, validation) = (states(256, 0.0)?, states(100, 0.3)?);
     let mut config = Preset::Quick.config(&configure("harmonic-oscillator", &[])?).ok_or("no preset")?;
     config.network.hidden = vec![16];
-    let architecture = config.architecture_with(vec![true], training.physical_scale());
+    let architecture = config.architecture_with(["q"].into_iter(), vec![true], training.physical_scale())?;
     let start: Vec<f64> = initial_weights(&architecture, Initialization::Default, &mut RngStream::Weights.generator(1));
     let problem = || -> Result<_, TrainingError> {
         let objective = Objective::new(&architecture, Penalty::None, 2)?;

@@ -127,7 +127,9 @@ fn one(forced: bool, runs: usize, seconds: f64, seed: u64, scale: Scale) -> Vec<
     config.network.dissipation = Some(16);
     let epochs = scale.epochs.unwrap_or(config.phases[0].epochs);
     (config.phases[0].epochs, config.phases[0].t_max) = (epochs, epochs as f64);
-    let architecture = config.architecture_with(recording.periodic.clone(), data.training[0].physical_scale());
+    let names = recording.coordinates.iter().map(String::as_str);
+    let scale = data.training[0].physical_scale();
+    let architecture = config.architecture_with(names, recording.periodic.clone(), scale).expect("names of its own");
     let penalty = Penalty::Eigenvalue { lambda: config.penalty.lambda() };
     let trained = train(&config, &architecture, penalty, data, 2, &Hooks::default()).expect("a training");
     let model = NetworkLagrangian::new(architecture, trained.weights).expect("its weights").cast::<f64>();

@@ -15,7 +15,7 @@ pub fn write_all(directory: &Path, states: usize) -> Outcome<()> {
     let mut config = Preset::Paper.config(&system).ok_or("the paper has a double pendulum")?;
     config.data.training = config.data.training.min(states);
     let (data, scale) = sample_all::<f64>(&config, &system)?;
-    let architecture = config.architecture(&system, scale.clone());
+    let architecture = config.architecture(&system, scale.clone())?;
     let scaled = |x: &[f64]| -> Vec<f64> {
         x.chunks(scale.len()).flat_map(|row| row.iter().zip(&scale).map(|(x, s)| x / s)).collect()
     };

@@ -4,7 +4,7 @@ use crate::configuration::{Config, ConfigError, Penalty, Regularizer, Scaling};
 use crate::data::draw::SamplingError;
 use crate::lagrangian::system::System;
 use crate::lagrangian::{Configured, configure_values, find};
-use crate::network::{Architecture, Form};
+use crate::network::Architecture;
 use std::borrow::Cow;
 
 impl Config {
@@ -48,27 +48,33 @@ impl Config {
     }
 
     /// Shape of the network for a system, with physical scales `scale` (used if the configuration scales).
-    pub fn architecture(&self, system: &Configured<f64>, scale: Vec<f64>) -> Architecture {
+    ///
+    /// # Errors
+    /// A name in the configuration that is no coordinate of the system.
+    pub fn architecture(&self, system: &Configured<f64>, scale: Vec<f64>) -> Result<Architecture, ConfigError> {
         let coordinates = system.system.coordinates(system.coordinates);
         let names = coordinates.iter().map(|c| c.name.as_ref());
-        // A name that is no coordinate is refused where the states are sampled.
-        let time_like = self.network.time_like_index(names.clone()).unwrap_or_default();
-        let form = self.network.form(names).unwrap_or_default();
-        let architecture = self.architecture_with(coordinates.iter().map(|c| c.periodic).collect(), scale);
-        Architecture { time_like, form, ..architecture }
+        self.architecture_with(names, coordinates.iter().map(|c| c.periodic).collect(), scale)
     }
 
-    /// Shape of the network for coordinates that are angles or not, with physical scales `scale` (used if the configuration
-    /// scales), both of length `n`; without a time-like coordinate, which has to be looked up by its name
-    /// ([`Network::time_like_index`](crate::configuration::Network::time_like_index)).
-    pub fn architecture_with(&self, periodic: Vec<bool>, scale: Vec<f64>) -> Architecture {
+    /// Shape of the network for coordinates by these names that are angles or not, with physical scales `scale` (used if the
+    /// configuration scales), both of length `n`.
+    ///
+    /// # Errors
+    /// A name in the configuration that is none of them.
+    pub fn architecture_with<'a>(
+        &self,
+        names: impl Iterator<Item = &'a str> + Clone,
+        periodic: Vec<bool>,
+        scale: Vec<f64>,
+    ) -> Result<Architecture, ConfigError> {
         let n = periodic.len();
-        Architecture {
+        Ok(Architecture {
             coordinates: n,
             hidden: self.network.hidden.clone(),
             activation: self.network.activation,
             alpha: self.network.alpha,
-            time_like: None,
+            time_like: self.network.time_like_index(names.clone())?,
             scale: match self.network.scaling {
                 Scaling::Physical => scale,
                 Scaling::None => vec![1.0; n],
@@ -77,7 +83,7 @@ impl Config {
             embed_periodic: self.network.embed_periodic,
             input_layer: self.network.input_layer,
             dissipation: self.network.dissipation,
-            form: Form::default(),
-        }
+            form: self.network.form(names)?,
+        })
     }
 }

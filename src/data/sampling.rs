@@ -95,9 +95,7 @@ pub fn sample_all<S: Scalar>(
     system: &Configured<f64>,
 ) -> Result<(Datasets<S>, Vec<f64>), SamplingError> {
     config.validate(system.coordinates)?;
-    let coordinates = system.system.coordinates(system.coordinates);
-    config.network.time_like_index(coordinates.iter().map(|c| c.name.as_ref()))?;
-    config.network.form(coordinates.iter().map(|c| c.name.as_ref()))?;
+    config.architecture(system, vec![1.0; system.coordinates])?;
     let seed = config.seed;
     let mut training = Vec::with_capacity(config.phases.len());
     for (k, phase) in config.phases.iter().enumerate() {
@@ -307,7 +305,7 @@ mod tests {
         let system = configure::<f64>("ads4-geodesic", &[]).unwrap();
         for preset in [Preset::Quick, Preset::Best, Preset::Paper] {
             let config = preset.config(&system).unwrap();
-            assert_eq!(config.architecture(&system, vec![1.0; 4]).time_like, Some(0));
+            assert_eq!(config.architecture(&system, vec![1.0; 4]).unwrap().time_like, Some(0));
         }
         let mut config = Preset::Quick.config(&system).unwrap();
         config.network.time_like = Some("w".to_string());

@@ -92,19 +92,14 @@ fn fit_in<S: Scalar>(
         return Err(PipelineError::Config(faults));
     }
     let periodic = recording.periodic.clone();
-    let time_like = config.network.time_like_index(names.iter().map(String::as_str))?;
-    let form = config.network.form(names.iter().map(String::as_str))?;
-    let shaped = |scale| {
-        let plain = config.architecture_with(periodic.clone(), scale);
-        Architecture { time_like, form: form.clone(), ..plain }
-    };
+    let shaped = |scale| config.architecture_with(names.iter().map(String::as_str), periodic.clone(), scale);
     let (architecture, weights) = match &config.from {
         Some(from) => {
             StartModel::read(from)?.require(config, periodic.clone())?;
             let (weights, shape) = weights(from, shaped)?;
             (shape, Some(weights))
         }
-        None => (shaped(data.training[0].physical_scale()), None),
+        None => (shaped(data.training[0].physical_scale())?, None),
     };
     // Every phase learns from the same states.
     data.training = vec![data.training.swap_remove(0); config.phases.len()];
@@ -155,13 +150,14 @@ fn fit_in<S: Scalar>(
         output.write("shooting.csv", history(&shot.history).as_bytes())?;
     }
 
+    let time = architecture.time_like;
     let network = NetworkLagrangian::new(architecture, model.weights)?.cast::<f64>();
     let forces = match fit_config.recording.force.as_slice() {
         [] => names.iter().map(|name| usual_force(name)).collect(),
         known => known.to_vec(),
     };
-    let held_out =
-        HoldOutOptions { part: &measured.test, horizon: fit_config.horizon, time: time_like, forces: &forces, threads };
+    let (part, horizon) = (&measured.test, fit_config.horizon);
+    let held_out = HoldOutOptions { part, horizon, time, forces: &forces, threads };
     let hold_out = evaluate_hold_out(&network, &held_out, watch)?;
     let subject = Subject {
         network: &network,

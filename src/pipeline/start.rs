@@ -1,6 +1,6 @@
 //! Training that starts from a model: the configuration takes the model's shape, and another shape is refused.
 
-use crate::configuration::{Config, Known, Precision, Scaling};
+use crate::configuration::{Config, ConfigError, Known, Precision, Scaling};
 use crate::network::Architecture;
 use crate::network::file::{Header, ModelFile, StoredPrecision};
 use crate::pipeline::{PipelineError, model_file};
@@ -60,9 +60,7 @@ impl StartModel {
     /// [`PipelineError::OtherShape`] naming everything that differs.
     pub fn require(&self, config: &Config, periodic: Vec<bool>) -> Result<(), PipelineError> {
         let columns = self.header.columns.iter().take(periodic.len()).map(String::as_str);
-        let form = config.network.form(columns)?;
-        let plain = config.architecture_with(periodic, self.header.architecture.scale.clone());
-        let asked = Architecture { form, ..plain };
+        let asked = config.architecture_with(columns, periodic, self.header.architecture.scale.clone())?;
         let found = differences(&asked, &self.header.architecture);
         if found.is_empty() {
             return Ok(());
@@ -75,15 +73,15 @@ impl StartModel {
 /// Weights and scales of a model that a training starts from; the architecture must have been found to fit.
 ///
 /// # Errors
-/// A model that cannot be read, or that is of another shape by now.
+/// A model that cannot be read, or that is of another shape by now; a name that is no coordinate.
 pub(crate) fn weights<S: Scalar>(
     from: &str,
-    asked: impl FnOnce(Vec<f64>) -> Architecture,
+    asked: impl FnOnce(Vec<f64>) -> Result<Architecture, ConfigError>,
 ) -> Result<(Vec<S>, Architecture), PipelineError> {
     let path = model_file(Path::new(from))?;
     let loaded = ModelFile::load(&path);
     let ModelFile { header, weights } = loaded.map_err(|source| PipelineError::Model { path: path.clone(), source })?;
-    let asked = asked(header.architecture.scale.clone());
+    let asked = asked(header.architecture.scale.clone())?;
     let differences = differences(&asked, &header.architecture);
     if differences.is_empty() {
         return Ok((weights, asked));

@@ -117,7 +117,7 @@ fn begin_shape<S: Scalar>(
     system: &Configured<f64>,
     scale: Vec<f64>,
 ) -> Result<(Architecture, Option<Vec<S>>), PipelineError> {
-    let Some(from) = &config.from else { return Ok((config.architecture(system, scale), None)) };
+    let Some(from) = &config.from else { return Ok((config.architecture(system, scale)?, None)) };
     let (weights, architecture) = start::weights(from, |scale| config.architecture(system, scale))?;
     Ok((architecture, Some(weights)))
 }
@@ -130,7 +130,7 @@ fn train_in<S: Scalar>(
     watch: &Watch,
 ) -> Result<TrainReport, PipelineError> {
     let started = Instant::now();
-    let unscaled = config.architecture(system, vec![1.0; system.coordinates]);
+    let unscaled = config.architecture(system, vec![1.0; system.coordinates])?;
     memory::require("training", training_memory(config, &unscaled))?;
     let (data, scale) = sample_all::<S>(config, system)?;
     let penalty = config.penalty()?;

@@ -107,7 +107,7 @@ mod tests {
         let system = crate::lagrangian::configure("double-pendulum", &[]).unwrap();
         let mut config = Preset::Quick.config(&system).unwrap();
         change(&mut config);
-        training_memory(&config, &config.architecture(&system, vec![1.0; 2]))
+        training_memory(&config, &config.architecture(&system, vec![1.0; 2]).unwrap())
     }
 
     #[test]

@@ -42,7 +42,7 @@ pub enum RecipeError {
 pub fn run<S: Scalar>(config: &Config, threads: usize, hooks: &Hooks) -> Result<Outcome<S>, RecipeError> {
     let system = config.system()?;
     let (data, scale) = sample_all::<S>(config, &system)?;
-    let architecture = config.architecture(&system, scale);
+    let architecture = config.architecture(&system, scale).map_err(SamplingError::Config)?;
     let trained = train(config, &architecture, config.penalty()?, data, threads, hooks)?;
     let model = NetworkLagrangian::new(architecture, trained.weights.clone())?;
     Ok(Outcome { system, model, trained })

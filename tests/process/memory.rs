@@ -26,7 +26,7 @@ fn measured(config: &Config) -> u64 {
     let system = config.system().unwrap();
     let taken = peak(|| {
         let (data, scale) = sample_all::<f32>(config, &system).unwrap();
-        let architecture = config.architecture(&system, scale);
+        let architecture = config.architecture(&system, scale).unwrap();
         let identity = Identity { config: String::new(), data: data.checksums() };
         let keeper = Arc::new(CheckpointManager::new(Arc::new(Disk), directory.path(), Every::Epochs(1), identity));
         let sitting = ResumeOptions { keeper: Some(keeper), start: None };
@@ -50,7 +50,8 @@ fn a_training_takes_what_was_said() {
     polished.lbfgs = Some(Lbfgs { iterations: 12, memory: 10 });
     for (name, config) in [("wide", wide), ("many", many), ("penalised", penalised), ("polished", polished)] {
         let system = config.system().unwrap();
-        let said = training_memory(&config, &config.architecture(&system, vec![1.0; system.coordinates])).unwrap();
+        let said =
+            training_memory(&config, &config.architecture(&system, vec![1.0; system.coordinates]).unwrap()).unwrap();
         let taken = measured(&config);
         println!("{name}: said {said}, taken {taken}, ratio {:.2}", said as f64 / taken as f64);
         assert!(taken <= said && said <= 4 * taken, "{name}: said {said}, taken {taken}");

@@ -59,6 +59,21 @@ fn a_training_starts_from_a_model() {
 }
 
 #[test]
+fn a_training_starts_from_a_metric() {
+    let folder = Folder::new();
+    let out = |name: &str| text(&folder.path(name));
+    let small = folder.file("small.toml", "[data]\ntraining = 256\nvalidation = 64\ntest = 64\n");
+    let train = |name: &str, more: &[&str]| {
+        let run = lnn(&[&["train", "--config", &small, "--epochs", "1", "--out", &out(name)], more].concat());
+        assert_eq!((run.code, run.stderr.as_str()), (Some(0), ""));
+        ModelFile::<f64>::load(&folder.path(name).join("model.safetensors")).unwrap().header.architecture
+    };
+    let first = train("first", &["kerr-cartesian", "--hidden", "8"]);
+    assert_eq!((first.time_like, &*first.form.cyclic, first.form.radial.len()), (Some(0), &[0][..], 1));
+    assert_eq!(train("second", &["--from", &out("first")]), first);
+}
+
+#[test]
 fn a_fit_starts_from_a_model_and_holds_nothing_out() {
     let folder = Folder::new();
     let mut csv = "run,t,x\n".to_string();

@@ -22,7 +22,7 @@ fn size(folder: &Folder, name: &str) -> (u32, u32) {
 fn flat_network(folder: &Folder) -> String {
     let system = configure::<f64>("schwarzschild-cartesian", &[]).unwrap();
     let config = lnn::presets::Preset::Quick.config(&system).unwrap();
-    let architecture = config.architecture(&system, vec![1.0; 4]);
+    let architecture = config.architecture(&system, vec![1.0; 4]).unwrap();
     assert_eq!(architecture.form.cyclic, [0]);
     let weights = vec![0.0; Layout::new(&architecture).parameters];
     let columns = system.system.columns(4);

@@ -39,7 +39,7 @@ impl<S: Scalar> Case<S> {
     fn new(config: Config) -> Self {
         let system = config.system().unwrap();
         let (data, scale) = sample_all::<S>(&config, &system).unwrap();
-        let architecture = config.architecture(&system, scale);
+        let architecture = config.architecture(&system, scale).unwrap();
         Self { config, architecture, data }
     }
 

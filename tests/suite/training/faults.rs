@@ -137,7 +137,7 @@ fn sit(directory: &Path, files: Arc<dyn Files>, steps: usize) -> usize {
     let config = config();
     let system = config.system().unwrap();
     let (data, scale) = sample_all::<f32>(&config, &system).unwrap();
-    let architecture = config.architecture(&system, scale);
+    let architecture = config.architecture(&system, scale).unwrap();
     let identity = Identity { config: String::new(), data: data.checksums() };
     let parameters = Layout::new(&architecture).parameters;
     let keeper = |files: Arc<dyn Files>| {
