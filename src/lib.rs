@@ -36,8 +36,8 @@
 //! | train, fit, evaluate, run an experiment, with all files and reports | `pipeline` (feature `pipeline`) |
 //!
 //! Rooms, each importing only from those above it: `names`, [`scalar`], `storage`, [`random`], `ops`, [`forward`], [`linalg`],
-//! [`tape`], [`recording`], [`lagrangian`], [`geometry`], [`rollout`], [`network`], [`symmetry`], [`relativity`], [`certificate`],
-//! [`optimizers`], [`configuration`], [`data`], [`training`], [`shooting`], [`presets`], [`analysis`], [`experiments`], `report` (feature `plot`),
+//! [`tape`], [`recording`], [`lagrangian`], [`geometry`], [`rollout`], [`network`], [`symmetry`], [`certificate`],
+//! [`optimizers`], [`configuration`], [`data`], [`training`], [`shooting`], [`presets`], [`analysis`], [`relativity`], [`experiments`], `report` (feature `plot`),
 //! `pipeline` (feature `pipeline`), `cli` (feature `cli`, the default; a library user leaves it out by
 //! `default-features = false`).
 //!

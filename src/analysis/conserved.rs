@@ -4,6 +4,12 @@ use crate::lagrangian::Configured;
 use crate::rollout::Trajectory;
 use crate::scalar::Scalar;
 
+/// `|C - C(0)| / |C(0)|` (Euclidean norms), by `C(0)` and `C`.
+pub(crate) fn conserved_change(first: &[f64], vector: &[f64]) -> f64 {
+    let distance = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
+    distance(vector, first) / distance(first, &vec![0.0; first.len()])
+}
+
 /// `|C(t) - C(0)| / |C(0)|` (Euclidean norms) of the system's [conserved vector](crate::lagrangian::system::Conserved) along
 /// any trajectory, one value per sample; `None` for a system without one or a trajectory of another number of coordinates.
 ///
@@ -18,9 +24,7 @@ pub fn conserved_error<S: Scalar>(system: &Configured<S>, trajectory: &Trajector
         .collect();
     let vectors = vectors?;
     let Some(first) = vectors.first() else { return Some(Vec::new()) };
-    let distance = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
-    let size = distance(first, &vec![0.0; first.len()]);
-    Some(vectors.iter().map(|vector| distance(vector, first) / size).collect())
+    Some(vectors.iter().map(|vector| conserved_change(first, vector)).collect())
 }
 
 #[cfg(test)]

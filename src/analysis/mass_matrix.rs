@@ -19,11 +19,32 @@ pub struct MassMatrixError {
 }
 
 /// Mass matrices at rest at the positions `q`, `(states, n)`: `(states, n, n)`.
-pub(super) fn matrices_at_rest<S: Scalar>(model: &dyn EulerLagrange<S>, q: &[S]) -> Vec<f64> {
+pub(crate) fn matrices_at_rest<S: Scalar>(model: &dyn EulerLagrange<S>, q: &[S]) -> Vec<f64> {
     let mut terms = Terms::default();
     // Failures of single states leave matrices that are not finite.
     let _ = model.terms(q, &vec![<S as Real>::zero(); q.len()], Request::MASS_MATRIX, &mut terms);
     terms.mass_matrix.iter().map(|x| x.to_f64()).collect()
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// Matrices of `size` numbers that are finite in both lists, the first of each pair not zero.
+fn pairs<'a>(size: usize, exact: &'a [f64], learned: &'a [f64]) -> impl Iterator<Item = (&'a [f64], &'a [f64])> {
+    let pairs = exact.chunks_exact(size).zip(learned.chunks_exact(size));
+    pairs.filter(|(a, b)| a.iter().chain(*b).all(|x| x.is_finite()) && dot(a, a) > 0.0)
+}
+
+/// Factor `s` of the smallest sum of `|s M_learned - M_exact|^2 / |M_exact|^2` over matrices of `size` numbers.
+pub(crate) fn nearest_factor(size: usize, exact: &[f64], learned: &[f64]) -> f64 {
+    let (mut product, mut square) = (0.0, 0.0);
+    for (a, b) in pairs(size, exact, learned) {
+        let scale = dot(a, a).recip();
+        product += scale * dot(a, b);
+        square += scale * dot(b, b);
+    }
+    product / square
 }
 
 /// Compares the matrices at rest at the positions `q`, `(states, n)`.
@@ -35,24 +56,12 @@ pub fn mass_matrix_error<S: Scalar>(
     let size = exact.coordinates() * exact.coordinates();
     let (exact, learned) = (matrices_at_rest(exact, q), matrices_at_rest(learned, q));
     let states = exact.len().max(learned.len()) / size;
-    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-    let pairs: Vec<(&[f64], &[f64])> = exact
-        .chunks_exact(size)
-        .zip(learned.chunks_exact(size))
-        .filter(|(a, b)| a.iter().chain(*b).all(|x| x.is_finite()) && dot(a, a) > 0.0)
-        .collect();
-    let (mut product, mut square) = (0.0, 0.0);
-    for (a, b) in &pairs {
-        let scale = dot(a, a).recip();
-        product += scale * dot(a, b);
-        square += scale * dot(b, b);
-    }
-    let factor = product / square;
-    let error = |(a, b): &(&[f64], &[f64])| {
-        let difference: Vec<f64> = a.iter().zip(*b).map(|(a, b)| factor * b - a).collect();
+    let factor = nearest_factor(size, &exact, &learned);
+    let error = |(a, b): (&[f64], &[f64])| {
+        let difference: Vec<f64> = a.iter().zip(b).map(|(a, b)| factor * b - a).collect();
         (dot(&difference, &difference) / dot(a, a)).sqrt()
     };
-    let errors: Vec<f64> = pairs.iter().map(error).collect();
+    let errors: Vec<f64> = pairs(size, &exact, &learned).map(error).collect();
     let failed = states - errors.len();
     MassMatrixError { factor, error: ErrorDistribution::of(errors, failed) }
 }

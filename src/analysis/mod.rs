@@ -22,6 +22,7 @@ mod valid_time;
 pub use accelerations::acceleration_errors;
 pub(crate) use affine::{AffineFit, affine_fit, factor_fit};
 #[doc(hidden)]
+pub(crate) use conserved::conserved_change;
 pub use conserved::conserved_error;
 pub(crate) use coordinates::angle_difference;
 #[doc(hidden)]
@@ -42,6 +43,7 @@ pub use instability::stretches;
 pub use instability::training_instability;
 pub use lyapunov::{Lyapunov, REGULAR, lyapunov};
 pub use mass_matrix::{MassMatrixError, mass_matrix_error};
+pub(crate) use mass_matrix::{matrices_at_rest, nearest_factor};
 #[doc(hidden)]
 pub use portrait::Portrait;
 pub use prediction::PredictionError;

@@ -3,7 +3,7 @@
 use super::function::{derivatives, smooth_bounds};
 use super::*;
 use crate::forward::HyperDual;
-use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Terms, configure};
+use crate::lagrangian::{EulerLagrange, Request, Terms};
 use crate::linalg::{Inertia, inertia};
 use crate::network::{
     ActivationChoice, Architecture, Form, Initialization, InputLayer, NetworkLagrangian, Structure, initial_weights,
@@ -297,11 +297,11 @@ fn networks_are_enclosed() {
 }
 
 /// `L` by a formula over `x` and `y`.
-fn formula(text: &str) -> crate::lagrangian::ExpressionLagrangian {
+pub(super) fn formula(text: &str) -> crate::lagrangian::ExpressionLagrangian {
     crate::lagrangian::ExpressionLagrangian::new(&["x", "y"], &[], text).unwrap()
 }
 
-fn limited(signature: Signature, boxes: usize) -> Options {
+pub(super) fn limited(signature: Signature, boxes: usize) -> Options {
     Options { boxes, seconds: 1e9, ..Options::new(signature) }
 }
 
@@ -355,44 +355,6 @@ fn a_change_of_sign_is_found_where_it_is() {
     let singular = formula("(x_dot + y_dot)^2/2");
     let nothing = certify::<_, f64>(&singular, &[], &region, &limited(DEFINITE, 60)).unwrap();
     assert_eq!((nothing.open, nothing.witness), (1.0, None));
-}
-
-#[test]
-fn a_guarded_model_fails_where_nothing_is_certified() {
-    // M = diag(1 - q_0^2/4, 1) is certified within |q_0| < 2, and the region ends at 3.
-    let system = formula("(1 - x^2/4)*x_dot^2/2 + y_dot^2/2 - x*y");
-    let region = Bounds { positions: vec![(-3.0, 3.0), (-1.0, 1.0)], velocities: vec![(-1.0, 1.0); 2] };
-    let found = certify(&system, &[] as &[f64], &region, &limited(Signature::of(2, false), 4000)).unwrap();
-    let guarded = Guarded::new(crate::lagrangian::HandWritten::<_, f64>::new(system, vec![]), &found);
-    let (q, v) = ([0.5, 0.0, 2.5, 0.0, 0.5, 1.5], [0.1, 0.2, 0.1, 0.2, 0.0, 0.0]);
-    let [mut plain, mut terms] = [Terms::default(), Terms::default()];
-    guarded.model().terms(&q, &v, Request::ALL, &mut plain).unwrap();
-    let refused = guarded.terms(&q, &v, Request::ACCELERATION, &mut terms);
-    assert_eq!(refused, Err(MechanicsError::Uncertified { row: 1 }));
-    assert!(terms.acceleration[..2] == plain.acceleration[..2] && terms.acceleration[2..].iter().all(|a| a.is_nan()));
-    guarded.terms(&q, &v, Request::ENERGY, &mut terms).unwrap();
-    assert_eq!(terms.energy, plain.energy);
-    guarded.terms(&q[..2], &v[..2], Request::ALL, &mut terms).unwrap();
-    assert_eq!(terms.acceleration, plain.acceleration[..2]);
-}
-
-#[cfg(feature = "rollout")]
-#[test]
-fn integrators_stop_where_the_certificate_ends() {
-    use crate::rollout::{self, Method, RolloutError, rollout};
-    let pendulum = configure::<f64>("double-pendulum", &[]).unwrap();
-    let region = Bounds::uniform(2, (-3.2, 3.2), (-2.0, 2.0));
-    let found = certify_system(&pendulum, &region, &limited(Signature::of(2, false), 1000)).unwrap();
-    assert_eq!(found.certified, 1.0);
-    let guarded = Guarded::new(pendulum.build().unwrap(), &found);
-    for (method, slack) in [(Method::Dopri5, 1e-3), (Method::Dop853, 1e-3), (Method::Gauss4, 0.2)] {
-        let options = rollout::Options { method, ..rollout::Options::new(5.0, 0.01) };
-        let motion = rollout(&guarded, &[1.5, 1.0], &[0.0, 0.0], &options);
-        let Some(RolloutError::Uncertified { t, state }) = motion.stop else { panic!("{:?}", motion.stop) };
-        let fastest = state[2..].iter().fold(0.0f64, |m, v| m.max(v.abs()));
-        assert!(t > 0.05 && t < 5.0 && fastest <= 2.0 && fastest > 2.0 - slack, "{method:?} {t} {state:?}");
-        assert!(motion.trajectory.v.iter().all(|v| v.abs() <= 2.0 + 1e-6));
-    }
 }
 
 #[test]

@@ -62,3 +62,54 @@ impl<S: Scalar> Equator<'_, S> {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Turn;
+    use crate::lagrangian::{EulerLagrange, build};
+    use std::f64::consts::FRAC_PI_2;
+
+    const ORIGIN: [f64; 4] = [0.0, 0.0, FRAC_PI_2, 0.0];
+
+    fn equator(model: &dyn EulerLagrange<f64>) -> Equator<'_, f64> {
+        Equator { model, time: 0, radius: 1, turn: Turn::Angle(3), point: &ORIGIN }
+    }
+
+    #[test]
+    fn turning_points_of_schwarzschild_have_the_closed_form() {
+        let hole = build::<f64>("schwarzschild-geodesic", &[]).unwrap();
+        let equator = equator(&*hole);
+        for (p, e) in [(7.5, 0.3), (10.0, 0.1), (40.0, 0.6)] {
+            let (near, far) = (p / (1.0 + e), p / (1.0 - e));
+            let forward = equator.between(near, far, Sense::Forward).unwrap().unwrap();
+            // Chandrasekhar, The Mathematical Theory of Black Holes, section 19.
+            let common = p - 3.0 - e * e;
+            let (energy, momentum) = ((((p - 2.0).powi(2) - 4.0 * e * e) / p / common).sqrt(), p / common.sqrt());
+            assert!((forward.energy - energy).abs() < 1e-12 && (forward.angular_momentum - momentum).abs() < 1e-10);
+            assert!((forward.time_rate - energy / (1.0 - 2.0 / near)).abs() < 1e-11);
+            assert!((forward.turning_rate - momentum / near.powi(2)).abs() < 1e-11);
+            let backward = equator.between(near, far, Sense::Backward).unwrap().unwrap();
+            assert!((backward.angular_momentum + momentum).abs() < 1e-10);
+        }
+        // Within the orbit of light, at 3 M, no matter turns.
+        assert_eq!(equator.between(2.4, 2.8, Sense::Forward).unwrap(), None);
+    }
+
+    #[test]
+    fn both_turning_points_of_kerr_have_the_same_constants() {
+        let hole = build::<f64>("kerr-geodesic", &[("a".to_string(), "0.9".to_string())]).unwrap();
+        let equator = equator(&*hole);
+        for sense in [Sense::Forward, Sense::Backward] {
+            let [near, far] = [(10.0, 25.0), (25.0, 10.0)].map(|(a, b)| equator.between(a, b, sense).unwrap().unwrap());
+            assert!((near.energy - far.energy).abs() < 1e-12);
+            assert!((near.angular_momentum - far.angular_momentum).abs() < 1e-11);
+            for (radius, found) in [(10.0, near), (25.0, far)] {
+                let [tt, tp, pp] = equator.at(radius).unwrap().value;
+                let (t, p) = (found.time_rate, found.turning_rate);
+                assert!((tt * t * t + 2.0 * tp * t * p + pp * p * p + 1.0).abs() < 1e-12);
+                assert_eq!(p > 0.0, sense == Sense::Forward);
+            }
+        }
+    }
+}

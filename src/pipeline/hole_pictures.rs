@@ -21,8 +21,12 @@ pub(crate) fn orbit_figure(pair: &Pair<'_>, mass: f64) -> Option<Figure> {
         let learned = series("learned", orbit.path(pair.learned, pair.around), true);
         (orbit.title.to_string(), vec![exact, learned])
     };
-    let labels = ["x", "y"].map(|axis| format!("{axis} [m]"));
-    let [x_label, y_label] = labels;
+    let coordinates = pair.system.system.coordinates(pair.system.coordinates);
+    // The radius, or a coordinate of space.
+    let along_x = pair.around.place(1.0, [1.0, 0.0, 0.0]);
+    let distance = along_x.iter().zip(&coordinates).find(|(x, _)| **x == 1.0);
+    let unit = distance.map_or_else(String::new, |(_, coordinate)| format!(" [{}]", coordinate.unit));
+    let [x_label, y_label] = ["x", "y"].map(|axis| format!("{axis}{unit}"));
     let plot = OrbitPlot { x_label, y_label, hole, panels: found.iter().map(panel).collect() };
     kept(
         "orbits.svg",
@@ -31,8 +35,8 @@ pub(crate) fn orbit_figure(pair: &Pair<'_>, mass: f64) -> Option<Figure> {
     )
 }
 
-/// Shadow and sky through the exact metric, through the learned one, and their difference, as PNG of so many pixels along an edge; `None` for coordinates that are not
-/// Cartesian, where nothing rests at the place of the camera, and when
+/// Shadow and sky through the exact metric, through the learned one, and their difference, as PNG of so many pixels along
+/// an edge; `None` for coordinates that are not Cartesian, where nothing rests at the place of the camera, and when
 /// `interrupted` says so.
 pub(crate) fn sky_picture(
     pair: &Pair<'_>,

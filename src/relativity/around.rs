@@ -1,7 +1,7 @@
 //! Coordinates around a centre: distances, directions, the equator.
 
 use super::Chart;
-use super::shells::directions;
+use super::directions::directions;
 use crate::geometry::{Equator, Turn, Turning};
 use crate::lagrangian::EulerLagrange;
 use std::f64::consts::FRAC_PI_2;

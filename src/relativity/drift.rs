@@ -1,6 +1,7 @@
 //! Drift of what the exact motion conserves along a motion of a model.
 
 use super::event::passing;
+use crate::analysis::conserved_change;
 use crate::lagrangian::{Configured, EulerLagrange};
 
 /// Largest change of the system's conserved vector along the motion of a model from `(q, v)` until `t_end`, sampled every `dt`, relative to
@@ -12,11 +13,10 @@ pub(crate) fn conserved_drift(
     (t_end, dt): (f64, f64),
 ) -> Option<f64> {
     let start = system.conserved(q, v)?;
-    let distance = |other: &[f64]| start.iter().zip(other).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
-    let size = distance(&vec![0.0; start.len()]);
     let mut worst = 0.0_f64;
     passing(model, (q, v), (t_end, dt), |state| {
-        worst = worst.max(system.conserved(&state.q, &state.v).map_or(f64::NAN, |vector| distance(&vector)) / size);
+        let now = system.conserved(&state.q, &state.v);
+        worst = worst.max(now.map_or(f64::NAN, |vector| conserved_change(&start, &vector)));
         state.t >= t_end
     })?;
     worst.is_finite().then_some(worst)

@@ -2,8 +2,9 @@
 
 use super::Around;
 use super::event::{State, passing, zero};
-use crate::lagrangian::{EulerLagrange, Request, Terms};
-use crate::linalg::{Inertia, inertia};
+use crate::geometry::characters;
+use crate::lagrangian::EulerLagrange;
+use crate::linalg::Inertia;
 
 /// A fall from a state down to a distance.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -15,10 +16,7 @@ pub struct Infall {
 }
 
 fn signature(model: &dyn EulerLagrange<f64>, state: &State) -> Option<Inertia> {
-    let mut terms = Terms::default();
-    model.terms(&state.q, &state.v, Request::MASS_MATRIX, &mut terms).ok()?;
-    let n = model.coordinates();
-    inertia(n, &terms.mass_matrix, &mut vec![0.0; n * n]).ok()
+    characters(model, &state.q, &state.v).ok()?.first()?.signature
 }
 
 /// The fall from `(q, v)` to the distance `to` from the centre, sampled every `dt`, until `t_end`; `None` if the motion does not get there.

@@ -25,6 +25,7 @@
 mod around;
 mod camera;
 mod chart;
+mod directions;
 mod dormand_prince;
 mod drift;
 mod error;
@@ -38,7 +39,6 @@ mod periastron;
 mod rays;
 mod readings;
 mod shadow;
-mod shells;
 mod sky;
 mod spheroidal;
 mod tetrad;
@@ -58,7 +58,6 @@ pub use periastron::{RadialPeriod, radial_period};
 pub use rays::{Fate, Ray, Tracing, trace};
 pub use readings::{Pair, Reading};
 pub use shadow::{Difference, Shadow, shadow};
-pub use shells::{MetricDeviation, metric_deviation};
 pub use sky::{Sky, difference_image};
 pub use tetrad::Tetrad;
 

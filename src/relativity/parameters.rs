@@ -1,7 +1,7 @@
 //! Parameters of a system whose metric comes nearest to a learned one: mass, spin, charge.
 
-use super::shells::{factor, metrics};
-use crate::lagrangian::{Configured, EulerLagrange, MechanicsError, configure_values};
+use crate::analysis::{matrices_at_rest, nearest_factor};
+use crate::lagrangian::{Configured, EulerLagrange, configure_values};
 use crate::linalg::{Workspace, solve};
 use std::collections::BTreeMap;
 
@@ -18,13 +18,13 @@ type Values = BTreeMap<String, f64>;
 fn residuals(system: &Configured<f64>, values: &Values, learned: &[f64], points: &[f64]) -> Option<Vec<f64>> {
     let model = configure_values::<f64>(system.system.clone(), values).ok()?.build().ok()?;
     let n = model.coordinates();
-    let exact = metrics(model.as_ref(), points).ok()?;
-    let factor = factor(n, &exact, learned);
+    let exact = matrices_at_rest(model.as_ref(), points);
+    let factor = nearest_factor(n * n, &exact, learned);
     let pairs = exact.chunks_exact(n * n).zip(learned.chunks_exact(n * n));
     let all: Vec<f64> = pairs
         .flat_map(|(g, h)| {
             let size = g.iter().map(|x| x * x).sum::<f64>().sqrt();
-            g.iter().zip(h).map(move |(a, b)| (b / factor - a) / size)
+            g.iter().zip(h).map(move |(a, b)| (factor * b - a) / size)
         })
         .collect();
     all.iter().all(|x| x.is_finite()).then_some(all)
@@ -35,20 +35,18 @@ fn square(residuals: &[f64]) -> f64 {
 }
 
 /// The values of the parameters of `system`, by symbol, for which its metric comes nearest to that of `learned` up to a factor at `points`,
-/// `(points, n)`: least squares by the method of Levenberg and Marquardt from `start`.
-///
-/// # Errors
-/// Those of the learned model.
+/// `(points, n)`: least squares by the method of Levenberg and Marquardt from `start`;
+/// `None` where one of the two metrics is not finite.
 pub fn nearest_parameters(
     system: &Configured<f64>,
     learned: &dyn EulerLagrange<f64>,
     points: &[f64],
     start: &Values,
-) -> Result<Option<Values>, MechanicsError> {
-    let learned = metrics(learned, points)?;
+) -> Option<Values> {
+    let learned = matrices_at_rest(learned, points);
     let of = |values: &Values| residuals(system, values, &learned, points);
     let (mut values, symbols) = (start.clone(), start.keys().cloned().collect::<Vec<_>>());
-    let (Some(mut now), count) = (of(&values), symbols.len()) else { return Ok(None) };
+    let (mut now, count) = (of(&values)?, symbols.len());
     let (mut damping, mut workspace) = (1e-3, Workspace::default());
     for _ in 0..STEPS {
         let mut columns = Vec::with_capacity(count);
@@ -59,7 +57,7 @@ pub fn nearest_parameters(
                 values.entry(symbol.clone()).and_modify(|x| *x += by);
                 of(&values)
             };
-            let (Some(more), Some(less)) = (moved(step), moved(-step)) else { return Ok(None) };
+            let (more, less) = (moved(step)?, moved(-step)?);
             columns.push(more.iter().zip(&less).map(|(a, b)| (a - b) / (2.0 * step)).collect::<Vec<f64>>());
         }
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
@@ -67,9 +65,7 @@ pub fn nearest_parameters(
         let down: Vec<f64> = columns.iter().map(|column| -dot(column, &now)).collect();
         (0..count).for_each(|k| normal[k * count + k] *= 1.0 + damping);
         let mut step = vec![0.0; count];
-        if solve(count, &normal, &down, &mut step, &mut workspace).is_err() {
-            return Ok(None);
-        }
+        solve(count, &normal, &down, &mut step, &mut workspace).ok()?;
         let mut trial = values.clone();
         symbols.iter().zip(&step).for_each(|(symbol, step)| *trial.entry(symbol.clone()).or_default() += step);
         let small = symbols.iter().zip(&step).all(|(symbol, step)| step.abs() < 1e-12 * (1.0 + values[symbol].abs()));
@@ -81,7 +77,7 @@ pub fn nearest_parameters(
             break;
         }
     }
-    Ok(Some(values))
+    Some(values)
 }
 
 #[cfg(test)]
@@ -98,7 +94,7 @@ mod tests {
             (build::<f64>("kerr-cartesian", &given).unwrap(), configure("kerr-cartesian", &[]).unwrap());
         let start = [("M".to_string(), 0.8), ("a".to_string(), 0.2)].into();
         let points = around.points(200, (2.0, 20.0));
-        let found = nearest_parameters(&system, &*hole, &points, &start).unwrap().unwrap();
+        let found = nearest_parameters(&system, &*hole, &points, &start).unwrap();
         assert!((found["M"] - 1.3).abs() < 1e-9 && (found["a"] + 0.7).abs() < 1e-9, "{found:?}");
     }
 }

@@ -3,9 +3,9 @@
 use super::infall::infall;
 use super::parameters::nearest_parameters;
 use super::periastron::radial_period;
-use super::shells::{factor, metric_deviation, metrics};
 use super::spheroidal::Spheroidal;
 use super::{Around, Chart, conserved_drift};
+use crate::analysis::{mass_matrix_error, matrices_at_rest};
 use crate::geometry::{CircularOrbit, GeometryError, Sense, geometries};
 use crate::lagrangian::{Configured, EulerLagrange};
 use crate::symmetry::{self, Basis, Degrees, EXACT, Region, quadratic, symmetries};
@@ -89,11 +89,11 @@ impl Pair<'_> {
     pub fn readings(&self) -> Result<Vec<Reading>, GeometryError> {
         let mass = self.mass()?;
         let mut all = Vec::new();
-        let factor = self.metric(mass, &mut all)?;
+        let factor = self.metric(mass, &mut all);
         self.equator(mass, &mut all)?;
         self.periastra(mass, &mut all)?;
-        self.fall(mass, &mut all)?;
-        self.parameters(mass, &mut all)?;
+        self.fall(mass, &mut all);
+        self.parameters(mass, &mut all);
         self.curvature(mass, factor, &mut all)?;
         self.symmetries(mass, &mut all);
         Ok(all)
@@ -104,18 +104,14 @@ impl Pair<'_> {
         ((low * mass).max(self.range.0), (high * mass).min(self.range.1))
     }
 
-    fn metric(&self, mass: f64, all: &mut Vec<Reading>) -> Result<f64, GeometryError> {
-        let n = self.exact.coordinates();
+    /// The error of the metric, and the factor by which the learned one comes nearest.
+    fn metric(&self, mass: f64, all: &mut Vec<Reading>) -> f64 {
         let points = self.around.points(POINTS, self.within(mass, (1.5, 20.0)));
-        let found = metrics(self.learned, &points).ok();
-        let factor = match &found {
-            Some(learned) => factor(n, &metrics(self.exact, &points)?, learned),
-            None => f64::NAN,
-        };
-        let deviation = metric_deviation((self.exact, self.learned), factor, &points).ok();
-        all.push(Self::error("metric, R from 1.5 to 20 M, median", deviation.map(|d| d.median), 2e-4));
-        all.push(Self::error("metric, R from 1.5 to 20 M, 99 %", deviation.map(|d| d.p99), 3e-3));
-        Ok(factor)
+        let found = mass_matrix_error(self.exact, self.learned, &points);
+        let error = Some(found.error).filter(|error| error.failed == 0);
+        all.push(Self::error("metric, R from 1.5 to 20 M, median", error.map(|error| error.median), 2e-4));
+        all.push(Self::error("metric, R from 1.5 to 20 M, 99 %", error.map(|error| error.p99), 3e-3));
+        found.factor
     }
 
     fn equator(&self, mass: f64, all: &mut Vec<Reading>) -> Result<(), GeometryError> {
@@ -124,21 +120,20 @@ impl Pair<'_> {
         let dragging =
             |model: &dyn EulerLagrange<f64>| Ok(self.around.equator(model, &origin).at(4.0 * mass)?.dragging());
         let (turns, learned_turns) = self.both(dragging)?;
-        let spins = turns.abs() > 1e-12 / mass;
-        let senses = [(Sense::Forward, ", forward"), (Sense::Backward, ", backward")];
+        let senses = self.senses(mass)?;
+        let spins = senses.len() > 1;
         let radius = |orbit: Option<CircularOrbit<f64>>| orbit.map(|orbit| orbit.radius / mass);
         let impact = |orbit: Option<CircularOrbit<f64>>| orbit.map(|orbit| orbit.impact_parameter() / mass);
         let stable_aim = if spins { 3e-3 } else { 1e-3 };
         let light_aim = if spins { 1e-3 } else { 5e-4 };
-        for (sense, suffix) in &senses[..if spins { 2 } else { 1 }] {
-            let suffix = if spins { suffix } else { "" };
+        for &(sense, suffix) in senses {
             let stable = |model: &dyn EulerLagrange<f64>| {
-                self.around.equator(model, &origin).innermost_stable(range, *sense).map(radius)
+                self.around.equator(model, &origin).innermost_stable(range, sense).map(radius)
             };
             let (exact, learned) = self.both(stable)?;
             let name = format!("innermost stable orbit{suffix} [M]");
             all.extend(Self::reading(name, exact, learned.flatten(), stable_aim));
-            let light = |model: &dyn EulerLagrange<f64>| self.around.equator(model, &origin).light(range, *sense);
+            let light = |model: &dyn EulerLagrange<f64>| self.around.equator(model, &origin).light(range, sense);
             let (exact, learned) = self.both(light)?;
             let learned = learned.flatten();
             let name = format!("orbit of light{suffix} [M]");
@@ -159,11 +154,22 @@ impl Pair<'_> {
         Ok(())
     }
 
+    /// Senses of motion in the equator that differ, and their names: one without a spin.
+    fn senses(&self, mass: f64) -> Result<&'static [(Sense, &'static str)], GeometryError> {
+        let origin = self.around.origin();
+        let turns = self.around.equator(self.exact, &origin).at(4.0 * mass)?.dragging();
+        let spins = turns.abs() > 1e-12 / mass;
+        Ok(if spins {
+            &[(Sense::Forward, ", forward"), (Sense::Backward, ", backward")]
+        } else {
+            &[(Sense::Forward, "")]
+        })
+    }
+
     fn periastra(&self, mass: f64, all: &mut Vec<Reading>) -> Result<(), GeometryError> {
         let origin = self.around.origin();
         let exact = self.around.equator(self.exact, &origin);
-        let spins = exact.at(4.0 * mass)?.dragging().abs() > 1e-12 / mass;
-        for sense in [Sense::Forward, Sense::Backward].into_iter().take(if spins { 2 } else { 1 }) {
+        for &(sense, suffix) in self.senses(mass)? {
             for (p, e) in ORBITS {
                 let (near, far) = (p / (1.0 + e) * mass, p / (1.0 - e) * mass);
                 if near < self.range.0 {
@@ -178,11 +184,6 @@ impl Pair<'_> {
                 };
                 // What falls in or turns elsewhere is no orbit between the two.
                 let Some(truth) = advance(self.exact).filter(|advance| *advance > 0.0) else { continue };
-                let suffix = match (spins, sense) {
-                    (false, _) => "",
-                    (true, Sense::Forward) => ", forward",
-                    (true, Sense::Backward) => ", backward",
-                };
                 let name = format!("periastron advance, p = {p} M, e = {e}{suffix} [rad]");
                 all.extend(Self::reading(name, Some(truth), advance(self.learned), 2e-3));
             }
@@ -190,14 +191,14 @@ impl Pair<'_> {
         Ok(())
     }
 
-    fn fall(&self, mass: f64, all: &mut Vec<Reading>) -> Result<(), GeometryError> {
+    fn fall(&self, mass: f64, all: &mut Vec<Reading>) {
         if self.range.0 > 1.5 * mass {
-            return Ok(());
+            return;
         }
         let direction = [0.48, 0.6, 0.64];
         let (q, mut v) = (self.around.place(10.0 * mass, direction), [0.0; 4]);
         let n = self.exact.coordinates();
-        let (time, metric) = (self.around.time(), metrics(self.exact, &q)?);
+        let (time, metric) = (self.around.time(), matrices_at_rest(self.exact, &q));
         v[time] = (-metric[time * n + time]).sqrt().recip();
         let fall = |model| infall(model, (&q, &v), (self.around, 1.5 * mass), (200.0 * mass, 0.25 * mass));
         let (truth, learned) = (fall(self.exact), fall(self.learned));
@@ -213,21 +214,19 @@ impl Pair<'_> {
                 all.push(Self::error("conserved quantities along an inclined orbit, drift until 1000 M", drift, 1e-4));
             }
         }
-        Ok(())
     }
 
-    fn parameters(&self, mass: f64, all: &mut Vec<Reading>) -> Result<(), GeometryError> {
+    fn parameters(&self, mass: f64, all: &mut Vec<Reading>) {
         let points = self.around.points(POINTS / 8, self.within(mass, (1.5, 20.0)));
         let symbols = self.system.system.parameters.iter().map(|p| p.symbol.to_string());
         let exact: Vec<(String, f64)> = symbols.zip(self.system.parameters.iter().copied()).collect();
         // From values that are far off.
         let start = exact.iter().map(|(symbol, value)| (symbol.clone(), 0.6 * value)).collect();
-        let found = nearest_parameters(self.system, self.learned, &points, &start)?;
+        let found = nearest_parameters(self.system, self.learned, &points, &start);
         for (symbol, value) in exact.into_iter().filter(|(_, value)| *value != 0.0) {
             let learned = found.as_ref().and_then(|found| found.get(&symbol).copied());
             all.extend(Self::reading(format!("parameter {symbol}"), Some(value), learned, 5e-3));
         }
-        Ok(())
     }
 
     fn curvature(&self, mass: f64, factor: f64, all: &mut Vec<Reading>) -> Result<(), GeometryError> {
@@ -249,7 +248,7 @@ impl Pair<'_> {
             let size = largest(&mut exact.iter().map(|point| point.curvature.kretschmann.abs()));
             let error = learned.as_ref().map(|learned| {
                 largest(&mut learned.iter().zip(&exact).map(|(learned, exact)| {
-                    (learned.curvature.kretschmann * factor * factor - exact.curvature.kretschmann).abs() / size
+                    (learned.curvature.kretschmann / (factor * factor) - exact.curvature.kretschmann).abs() / size
                 }))
             });
             all.push(Self::error(
@@ -311,11 +310,10 @@ impl Pair<'_> {
         v.chunks_exact_mut(4).for_each(|v| v[self.around.time()] += 1.5);
         let count = |model, tolerance| {
             let found = symmetries(model, &basis, (&points, &v), tolerance).ok()?;
-            Some((found.separation.count? as f64, found.separation.gap))
+            Some(found.separation.count? as f64)
         };
         let (exact, learned) = (count(self.exact, Some(EXACT)), count(self.learned, None));
-        let only = |found: Option<(f64, Option<f64>)>| found.map(|(count, _)| count);
-        all.extend(Self::reading("point symmetries", only(exact), only(learned), 0.0));
+        all.extend(Self::reading("point symmetries", exact, learned, 0.0));
         self.carter(mass, all);
     }
 }

@@ -114,26 +114,24 @@ impl Report {
 
     /// Adds a picture from the bytes of a PNG file.
     #[must_use]
-    pub fn pixels(mut self, png: &[u8], caption: &str) -> Self {
-        let (data, caption) = (base64(png), escape(caption));
-        let _ = writeln!(
-            self.body,
-            "<figure><div class=\"scroll\"><img alt=\"{caption}\" src=\"data:image/png;base64,{data}\"></div>\
-             <figcaption>{caption}</figcaption></figure>"
-        );
-        self
+    pub fn pixels(self, png: &[u8], caption: &str) -> Self {
+        self.figure(("image/png", png), "", caption)
     }
 
     /// Adds a picture from the bytes of an SVG file, which can do nothing but be seen.
     #[must_use]
-    pub fn image(mut self, svg: &[u8], caption: &str) -> Self {
-        let (data, caption) = (base64(svg), escape(caption));
+    pub fn image(self, svg: &[u8], caption: &str) -> Self {
         // Panels that cannot wrap are scrolled where there is no room for them.
         let panels = svg.windows(8).filter(|bytes| bytes == b"\n<svg x=").count();
-        let class = if panels > 1 { " class=\"panels\"" } else { "" };
+        self.figure(("image/svg+xml", svg), if panels > 1 { " class=\"panels\"" } else { "" }, caption)
+    }
+
+    /// A picture of a media type, with attributes, over its caption.
+    fn figure(mut self, (media, bytes): (&str, &[u8]), attributes: &str, caption: &str) -> Self {
+        let (data, caption) = (base64(bytes), escape(caption));
         let _ = writeln!(
             self.body,
-            "<figure><div class=\"scroll\"><img{class} alt=\"{caption}\" src=\"data:image/svg+xml;base64,{data}\"></div>\
+            "<figure><div class=\"scroll\"><img{attributes} alt=\"{caption}\" src=\"data:{media};base64,{data}\"></div>\
              <figcaption>{caption}</figcaption></figure>"
         );
         self
