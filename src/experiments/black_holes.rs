@@ -48,8 +48,8 @@ pub(super) const BLACK_HOLES: Experiment = Experiment {
         let mut black_box = learned(Preset::Quick, "quick", &hole(HOLES[0])).config;
         black_box.take_structure(Structure::BlackBox);
         black_box.penalty = Regularizer::LorentzianSylvester { lambda: 100.0, time: time() };
-        let mut spherical = learned(Preset::Quick, "quick", &hole("schwarzschild-geodesic")).config;
-        spherical.take_structure(Structure::Metric);
+        let spherical = Preset::Quick.config_of(&hole("schwarzschild-geodesic"), Structure::Metric);
+        let mut spherical = spherical.unwrap_or_else(|| unreachable!("a preset of every system"));
         spherical.network.cyclic = vec![time()];
         let beside = [
             run("black-box", format!("black box, {}", HOLES[0]), black_box),

@@ -29,6 +29,8 @@ pub struct HandWritten<L, S> {
 /// Code that is compiled for every Lagrangian apart: its terms state by state, and the recording of its value.
 trait Form<S>: Send + Sync {
     fn coordinates(&self) -> usize;
+    /// Number of parameters, if the Lagrangian says so.
+    fn parameter_count(&self) -> Option<usize>;
     /// Fills the needed fields of a batch, which have their sizes.
     fn states(&self, parameters: &[S], q: &[S], v: &[S], need: Need, terms: &mut Terms<S>);
     /// The program whose one output is the value.
@@ -38,6 +40,9 @@ trait Form<S>: Send + Sync {
 impl<L: Lagrangian, S: Scalar> Form<S> for L {
     fn coordinates(&self) -> usize {
         Lagrangian::coordinates(self)
+    }
+    fn parameter_count(&self) -> Option<usize> {
+        Lagrangian::parameter_count(self)
     }
     fn states(&self, parameters: &[S], q: &[S], v: &[S], need: Need, terms: &mut Terms<S>) {
         let n = Lagrangian::coordinates(self).max(1);
@@ -97,7 +102,8 @@ struct Scratch<S> {
 }
 
 impl<L: Lagrangian, S: Scalar> HandWritten<L, S> {
-    /// A Lagrangian with parameter values in the order it takes them.
+    /// A Lagrangian with parameter values in the order it takes them; another number of them than
+    /// [`Lagrangian::parameter_count`] is an error of every call.
     pub fn new(system: L, parameters: Vec<S>) -> Self {
         let evaluator = Evaluator {
             parameters,
@@ -115,6 +121,15 @@ impl<L: Lagrangian, S: Scalar> HandWritten<L, S> {
 }
 
 impl<S: Scalar> Evaluator<S> {
+    /// Refuses parameters of another number than the Lagrangian takes.
+    fn require_parameters(&self, form: &dyn Form<S>) -> Result<(), MechanicsError> {
+        let found = self.parameters.len();
+        match form.parameter_count().filter(|&expected| expected != found) {
+            Some(expected) => Err(MechanicsError::Shape { what: "parameters", expected, found }),
+            None => Ok(()),
+        }
+    }
+
     /// The program of the value, recorded on first use.
     fn value(&self, form: &dyn Form<S>) -> Option<&Recorded<S>> {
         let count = self.parameters.len();
@@ -128,6 +143,7 @@ impl<S: Scalar> Evaluator<S> {
         q: &[S],
         v: &[S],
     ) -> Result<Vec<MetricJet<T>>, MechanicsError> {
+        self.require_parameters(form)?;
         let value = self.value(form).ok_or(MechanicsError::Derivatives { what: "mass matrix" })?;
         let cast = |numbers: &[S]| -> Vec<T> { numbers.iter().map(|x| x.cast()).collect() };
         let parameters: Vec<Taylor<'static, T>> = cast(&self.parameters).into_iter().map(Taylor::constant).collect();
@@ -211,6 +227,7 @@ impl<S: Scalar> Evaluator<S> {
         terms: &mut Terms<S>,
         scratch: &mut Scratch<S>,
     ) -> Result<(), MechanicsError> {
+        self.require_parameters(form)?;
         let n = form.coordinates();
         let batch = q.len() / n.max(1);
         let shape = |what, found| MechanicsError::Shape { what, expected: batch * n, found };

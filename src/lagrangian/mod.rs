@@ -53,6 +53,12 @@ pub trait Lagrangian: Send + Sync {
     /// Number of coordinates `n`.
     fn coordinates(&self) -> usize;
 
+    /// Number of parameters that [`Lagrangian::lagrangian`] takes; whoever says it has any other number of values refused by an
+    /// error, [`MechanicsError::Shape`].
+    fn parameter_count(&self) -> Option<usize> {
+        None
+    }
+
     /// `L(q, v)` in joules (or the unit of action per unit of the evolution parameter).
     ///
     /// `parameters` in the order the system declares, `q` and `v` of length `n`.

@@ -76,7 +76,7 @@ impl Description {
             learning: LearningAdvice::NONE,
             described: Some(Arc::new(Described {
                 description: self.clone(),
-                lagrangian: ExpressionLagrangian::compiled(n, compiler.formula(value)),
+                lagrangian: ExpressionLagrangian::compiled((n, self.parameters.len()), compiler.formula(value)),
                 shell: shell.map(|shell| compiler.formula(shell)),
                 around_centre,
             })),

@@ -43,6 +43,15 @@ fn every_experiment_of_the_paper_runs() {
         let sentence = lead(&report);
         assert!(sentence.starts_with("Lowest loss ") && joined(&printed).contains(&sentence), "{sentence}");
         assert!(report.len() < 2_000_000, "{}: {}", experiment.name, report.len());
+        if experiment.name == "black-holes" {
+            assert!(fs::read_to_string(folder.join("readings.csv")).unwrap().contains("innermost stable orbit"));
+            for run in runs.iter().filter(|run| run.label.contains("cartesian")) {
+                for (picture, head) in [("orbits.svg", &b"<svg"[..]), ("sky.png", b"\x89PNG")] {
+                    let bytes = fs::read(folder.join(&run.name).join(picture)).unwrap();
+                    assert!(bytes.starts_with(head), "{}/{picture}", run.name);
+                }
+            }
+        }
         // Relativistic runs are held to their signature, not to positive eigenvalues.
         if experiment.name == "ads4-geodesic" {
             let config = fs::read_to_string(folder.join(&runs[0].name).join("config.toml")).unwrap();
@@ -54,6 +63,20 @@ fn every_experiment_of_the_paper_runs() {
     for experiment in lnn::experiments::experiments() {
         assert!(page.contains(&format!("| `{}` | {} |", experiment.name, experiment.paper)), "{}", experiment.name);
     }
+}
+
+#[test]
+fn a_hole_of_ones_own_is_read_like_those_of_the_experiment() {
+    let out = tempfile::tempdir().unwrap();
+    let hole = ["--system", "reissner-nordstrom-cartesian", "--param", "Q=0.5", "--scale", "smoke", "--only", "quick"];
+    let out_dir = ["--threads", "1", "--out", out.path().to_str().unwrap()];
+    let printed = succeeded(&lnn(&[&["black-holes"], &hole[..], &out_dir].concat()));
+    assert!(printed.contains("quick, reissner-nordstrom-cartesian, Q = 0.5"), "{printed}");
+    let readings = fs::read_to_string(out.path().join("black-holes-smoke/readings.csv")).unwrap();
+    assert!(readings.contains("parameter Q") && !readings.contains("kerr"), "{readings}");
+    let refused = lnn(&[&["old-tricks"], &hole[..4], &out_dir].concat());
+    let told = String::from_utf8_lossy(&refused.stderr);
+    assert!(refused.status.code() == Some(2) && told.contains("old-tricks is about systems of its own"), "{told}");
 }
 
 #[test]
