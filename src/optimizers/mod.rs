@@ -1,5 +1,6 @@
 //! Adam, RAdam and SOAP with L2 weight decay and gradient clipping, one step at a time.
 
+mod orthonormal;
 mod schedule;
 mod soap;
 
