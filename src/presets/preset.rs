@@ -36,13 +36,9 @@ impl Preset {
     /// signature cannot be lost.
     pub fn config_of(self, system: &Configured<f64>, structure: Structure) -> Option<Config> {
         let mut config = self.config(system)?;
-        let known = config.network.structure != Structure::BlackBox;
         config.take_structure(structure);
         if structure != Structure::BlackBox && self != Self::Paper {
             config.phases.iter_mut().for_each(|phase| phase.rate *= STRUCTURE_RATE);
-            if !known {
-                longer(&mut config);
-            }
         }
         Some(config)
     }
@@ -111,10 +107,6 @@ fn optimizer(method: Method) -> Optimizer {
 
 /// Learning rate of structures over that of a black box.
 const STRUCTURE_RATE: f64 = 2.0;
-
-/// Batch and epochs of structures in the presets of our own, over those of a black box.
-const STRUCTURE_BATCH: usize = 4;
-const STRUCTURE_EPOCHS: usize = 3;
 
 /// Choices in which the presets of our own differ.
 #[derive(Clone, Copy)]
@@ -209,6 +201,11 @@ fn ours(system: &Configured<f64>, size: Size) -> Config {
     }
 }
 
+/// Batch and epochs of the presets of our own around a centre, over those elsewhere: more epochs of larger batches cost no more
+/// time and end lower.
+const SHELL_BATCH: usize = 4;
+const SHELL_EPOCHS: usize = 3;
+
 /// The metric of a field around a centre, the same at all times: states in a shell, features of direction and distance.
 fn around_a_centre(mut config: Config, system: &Configured<f64>, shell: ShellAdvice) -> Config {
     let names = system.system.coordinates(system.coordinates);
@@ -220,17 +217,12 @@ fn around_a_centre(mut config: Config, system: &Configured<f64>, shell: ShellAdv
     (config.network.radial, config.network.radial_unit) = (vec![coordinates.clone()], Some(low));
     config.data.shell = coordinates;
     (config.data.shell_radius, config.data.rapidity) = (Some([low, high]), Some(shell.rapidity));
-    longer(&mut config);
-    config
-}
-
-/// More epochs of larger batches: they cost about the same time and end lower.
-fn longer(config: &mut Config) {
-    config.optimizer.batch *= STRUCTURE_BATCH;
+    config.optimizer.batch *= SHELL_BATCH;
     for phase in &mut config.phases {
-        phase.epochs *= STRUCTURE_EPOCHS;
-        phase.t_max *= STRUCTURE_EPOCHS as f64;
+        phase.epochs *= SHELL_EPOCHS;
+        phase.t_max *= SHELL_EPOCHS as f64;
     }
+    config
 }
 
 /// The quick preset for recorded states: numbers of training, validation and test states, bounds of coordinates and

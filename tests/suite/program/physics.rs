@@ -13,7 +13,7 @@ fn numbers(object: &Value, keys: &[&str]) -> Vec<f64> {
 fn a_sphere_is_told_by_its_curvature_and_its_symmetries() {
     let folder = Folder::new();
     let out = text(&folder.path("sphere"));
-    let (network, budget) = (["--structure", "metric", "--hidden", "24,24"], ["--epochs", "12", "--threads", "2"]);
+    let (network, budget) = (["--structure", "metric", "--hidden", "24,24"], ["--epochs", "4", "--threads", "2"]);
     let train = ["train", "sphere-geodesic", "--out", &out];
     let run = lnn(&[&train[..], &network, &budget].concat());
     assert_eq!(run.code, Some(0), "{}", run.stderr);
