@@ -1,4 +1,4 @@
-//! A network trained by a solver of one's own, and by argmin's and this crate's, all on the same problem.
+//! A network trained by a solver of one's own, by argmin's, and by batches with this crate's optimisers, all on the same problem.
 
 use argmin::core::{CostFunction, Error, Executor, Gradient, IterState, KV, Problem, Solver, State};
 use argmin::solver::conjugategradient::{NonlinearConjugateGradient, beta::PolakRibierePlus};
@@ -7,10 +7,11 @@ use lnn::configuration::Penalty;
 use lnn::data::Dataset;
 use lnn::lagrangian::configure;
 use lnn::network::{Initialization, initial_weights};
-use lnn::optimizers::Method;
+use lnn::optimizers::{Method, Update};
 use lnn::presets::Preset;
 use lnn::random::RngStream;
-use lnn::training::{EpochSolver, Objective, TrainingError, TrainingProblem, TrainingState};
+use lnn::training::{Objective, TrainingError, TrainingProblem};
+use rand::seq::SliceRandom;
 use std::f64::consts::TAU;
 
 type Iteration = IterState<Vec<f64>, Vec<f64>, (), (), (), f64>;
@@ -85,13 +86,18 @@ pub fn main() -> Result<(), Box<dyn std::error::Error>> {
     judge("conjugate gradients", run.state.get_best_param())?;
 
     for method in [Method::Radam, Method::Soap] {
-        (config.optimizer.method, config.optimizer.batch) = (method, 32);
-        let (mut phase, rng) = (config.phases[0].clone(), RngStream::Order(0).generator(1));
-        (phase.epochs, phase.rate) = (100, 0.01);
-        let solver = EpochSolver::new(config.optimizer.clone(), phase, rng, training.len());
-        let state = TrainingState::new().param(start.clone()).max_iters(100);
-        let run = Executor::new(problem()?, solver).configure(|_| state).run()?;
-        judge(method.name(), run.state.get_best_param())?;
+        let (mut problem, mut weights, mut gradient) = (problem()?, start.clone(), vec![0.0; start.len()]);
+        let mut moments = problem.moments(method);
+        let (mut order, mut rng) = ((0..training.len() as u32).collect::<Vec<_>>(), RngStream::Order(0).generator(1));
+        let update = Update { method, rate: 0.01, weight_decay: 0.0, decaying: 0, clip: 10.0 };
+        for _ in 0..100 {
+            order.shuffle(&mut rng);
+            for rows in order.chunks(32) {
+                problem.step(&weights, rows, &mut gradient);
+                moments.update(&mut weights, &mut gradient, &update);
+            }
+        }
+        judge(method.name(), Some(&weights))?;
     }
     Ok(())
 }

@@ -141,8 +141,7 @@
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 
-#[doc(hidden)]
-pub mod names;
+pub(crate) mod names;
 
 pub mod scalar;
 
@@ -204,6 +203,7 @@ pub mod analysis;
 pub mod experiments;
 
 #[cfg(feature = "plot")]
+#[doc(hidden)]
 pub mod report;
 
 #[cfg(feature = "pipeline")]

@@ -15,10 +15,10 @@ pub fn run(bytes: &[u8]) {
             return assert!(!problem.is_empty());
         }
     };
-    let description = &system.described.as_ref().expect("it comes from a description").description;
+    let description = system.description().expect("it comes from a description");
     let written = toml::to_string(description).expect("a description can be written");
     let again = parse_system(&written).expect("and read again");
-    assert_eq!(&again.described.as_ref().expect("as before").description, description);
+    assert_eq!(again.description().expect("as before"), description);
     let n = system.size.default();
     assert_eq!((system.columns(n).len(), system.learned_parameters().len()), (2 * n, system.parameters.len()));
     let configured = configure_system::<f64>(Cow::Owned(system), &[]).expect("the defaults are in range");

@@ -10,7 +10,7 @@ pub(crate) fn conserved_change(first: &[f64], vector: &[f64]) -> f64 {
     distance(vector, first) / distance(first, &vec![0.0; first.len()])
 }
 
-/// `|C(t) - C(0)| / |C(0)|` (Euclidean norms) of the system's [conserved vector](crate::lagrangian::system::Conserved) along
+/// `|C(t) - C(0)| / |C(0)|` (Euclidean norms) of the system's conserved vector along
 /// any trajectory, one value per sample; `None` for a system without one or a trajectory of another number of coordinates.
 ///
 /// `NaN` where `C(0)` vanishes and so does the difference.

@@ -18,6 +18,7 @@ pub struct CoordinateError {
 
 impl CoordinateError {
     /// First time at which the largest error exceeds `threshold`.
+    #[cfg(test)]
     pub fn time_above(&self, threshold: f64) -> Option<f64> {
         self.t.iter().zip(&self.max).find(|&(_, &error)| error.is_nan() || error > threshold).map(|(&t, _)| t)
     }

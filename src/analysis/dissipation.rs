@@ -21,7 +21,7 @@ pub struct EnergyLoss {
 
 impl EnergyLoss {
     /// `true` if motion loses energy steadily: nearly everywhere, by more than chance, and enough to matter.
-    pub fn is_steady(&self) -> bool {
+    pub(crate) fn is_steady(&self) -> bool {
         let lost = self.per_second * self.seconds;
         self.stretches >= 5 && self.per_second > 4.0 * self.error && self.losing >= 0.8 && lost > 0.01
     }

@@ -18,7 +18,7 @@ pub struct EnergyError {
 
 impl EnergyError {
     /// Mean, maximum and last value.
-    pub fn statistics(&self) -> Statistics {
+    pub(crate) fn statistics(&self) -> Statistics {
         statistics(self.error.iter().copied())
     }
 }

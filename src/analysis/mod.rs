@@ -27,11 +27,10 @@ pub use conserved::conserved_error;
 pub(crate) use coordinates::angle_difference;
 #[doc(hidden)]
 pub use coordinates::{CoordinateError, coordinate_error, velocity_error};
-pub use curvature::{MetricComponent, Spread};
+pub(crate) use curvature::{MetricComponent, Spread};
 pub(crate) use curvature::{curvature_grid, curvature_scalars, is_metric, metric_components, metric_grids};
-pub use determination::{Determination, Estimate, determination};
 #[doc(hidden)]
-pub use determination::{Observed, RANGE, places};
+pub use determination::{Determination, Estimate, Observed, RANGE, determination, places};
 pub use dissipation::{EnergyLoss, energy_loss};
 #[doc(hidden)]
 pub use energy::energy_drift;
@@ -40,8 +39,10 @@ pub use energy::{EnergyError, energy_error};
 pub use grid::{Axis, Grid, GridError, determinant_grid, lagrangian_grid};
 #[doc(hidden)]
 pub use instability::stretches;
-pub use instability::training_instability;
-pub use lyapunov::{Lyapunov, REGULAR, lyapunov};
+pub(crate) use instability::training_instability;
+#[doc(hidden)]
+pub use lyapunov::REGULAR;
+pub use lyapunov::{Lyapunov, lyapunov};
 pub use mass_matrix::{MassMatrixError, mass_matrix_error};
 pub(crate) use mass_matrix::{matrices_at_rest, nearest_factor};
 #[doc(hidden)]
@@ -52,8 +53,8 @@ pub(crate) use prediction::window_valid_times;
 pub use prediction::{Predictions, Window, follow, predict_by_constant_velocity, predict_by_motion, prediction_error};
 pub use signature::wrong_signatures;
 pub use summary::{ErrorDistribution, Statistics, statistics};
+#[doc(hidden)]
 pub use trajectories::{StartBox, TrajectoryRun, TrajectorySummary, TrajectoryTest};
 pub(crate) use valid_time::relative_error;
-pub use valid_time::{VALID, ValidTime, ValidTimes};
 #[doc(hidden)]
-pub use valid_time::{spread, valid_time};
+pub use valid_time::{VALID, ValidTime, ValidTimes, spread, valid_time};

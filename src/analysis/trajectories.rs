@@ -149,6 +149,7 @@ impl<S: Integrable> TrajectoryTest<S> {
     }
 
     /// Runs the starts of the box with both models; the results are in their order and do not depend on `threads`.
+    #[cfg(test)]
     pub fn run(&self, exact: &dyn EulerLagrange<S>, learned: &dyn EulerLagrange<S>) -> Vec<TrajectoryRun<S>> {
         self.run_from(&self.bounds.starts::<S>(self.starts, self.seed), exact, learned)
     }

@@ -1,6 +1,5 @@
 //! Enclosure of the mass matrices of a box of states.
 
-use super::form;
 use super::interval::Interval;
 use super::number::{Arena, Number};
 use super::spectrum::MatrixForms;
@@ -93,7 +92,8 @@ fn mass_matrix<'a, L: Lagrangian>(
 ///
 /// # Panics
 /// If there are not `n` pairs of each.
-pub fn mass_matrix_enclosure<L: Lagrangian, S: Scalar>(
+#[cfg(test)]
+pub(crate) fn mass_matrix_enclosure<L: Lagrangian, S: Scalar>(
     lagrangian: &L,
     parameters: &[S],
     positions: &[(f64, f64)],
@@ -104,7 +104,7 @@ pub fn mass_matrix_enclosure<L: Lagrangian, S: Scalar>(
     let bounds = [positions, velocities].concat();
     let mut found = Vec::new();
     Source::new(lagrangian, parameters).each(&[&bounds], &mut |_, matrix| {
-        found = matrix.forms.chunks_exact(matrix.stride).map(form::range).collect();
+        found = matrix.forms.chunks_exact(matrix.stride).map(super::form::range).collect();
         true
     });
     found

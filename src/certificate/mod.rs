@@ -9,7 +9,7 @@
 //! # What is proven
 //!
 //! Every statement is about the Lagrangian as a function of real numbers whose weights, parameters and constants are those of the program.
-//! The rounding of the proof itself is covered everywhere: [`Interval`]s are rounded outward, first-order forms charge to their distance
+//! The rounding of the proof itself is covered everywhere: `Interval`s are rounded outward, first-order forms charge to their distance
 //! what a sum or a product may have lost, and the functions of the standard library are granted 8 units in the last place. What a program
 //! rounds when it evaluates the same mass matrix at one state is not part of the statement; it moves eigenvalues by about the condition
 //! number times `1e-16`, relative to the smallest.
@@ -30,9 +30,7 @@ mod spectrum;
 #[cfg(test)]
 mod tests;
 
-pub use enclosure::mass_matrix_enclosure;
 pub use guard::Guarded;
-pub use interval::Interval;
 pub use network::certify_network;
 pub use search::Verdict;
 
@@ -141,6 +139,7 @@ impl Certificate {
 
 /// Why there is no certificate.
 #[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
 pub enum CertificateError {
     /// A region with bounds for another number of coordinates.
     #[error("expected bounds of {expected} {what}, found {found}")]

@@ -1,6 +1,8 @@
 //! Enclosures against exact values, certificates against systems whose signature is known.
 
+use super::enclosure::mass_matrix_enclosure;
 use super::function::{derivatives, smooth_bounds};
+use super::interval::Interval;
 use super::*;
 use crate::forward::HyperDual;
 use crate::lagrangian::{EulerLagrange, Request, Terms};

@@ -23,6 +23,7 @@ pub enum Precision {
 /// Reaction to a state without a finite acceleration or a gradient that is not finite.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum OnFailure {
     /// States with a singular mass matrix are left out; a step that is not finite is skipped, weights unchanged.
     Skip,
@@ -33,6 +34,7 @@ pub enum OnFailure {
 /// Scaling of the coordinates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum Scaling {
     /// `s_i` is the largest of `|q_i|` and `|v_i|` over the training set of the first phase.
     Physical,
@@ -160,7 +162,7 @@ impl Data {
     ///
     /// # Errors
     /// A shell without radius.
-    pub fn shell(&self) -> Result<Option<Shell<'_>>, ConfigError> {
+    pub(crate) fn shell(&self) -> Result<Option<Shell<'_>>, ConfigError> {
         if self.shell.is_empty() {
             return Ok(None);
         }
@@ -279,7 +281,7 @@ impl Network {
     ///
     /// # Errors
     /// A name that is none of them.
-    pub fn time_like_index<'a>(
+    pub(crate) fn time_like_index<'a>(
         &self,
         coordinates: impl Iterator<Item = &'a str>,
     ) -> Result<Option<usize>, ConfigError> {
@@ -292,7 +294,7 @@ impl Network {
     ///
     /// # Errors
     /// A cyclic or radial coordinate that is none of them.
-    pub fn form<'a>(&self, coordinates: impl Iterator<Item = &'a str> + Clone) -> Result<Form, ConfigError> {
+    pub(crate) fn form<'a>(&self, coordinates: impl Iterator<Item = &'a str> + Clone) -> Result<Form, ConfigError> {
         let index = |name: &String| place("network.cyclic", name, coordinates.clone());
         let radial = |group: &Vec<String>| -> Result<Radial, ConfigError> {
             let place = |name: &String| place("network.radial", name, coordinates.clone());
@@ -324,7 +326,7 @@ impl Config {
     }
 
     /// Every value out of range, for a system of `n` coordinates, in the order of the keys.
-    pub fn faults(&self, n: usize) -> Vec<ConfigError> {
+    pub(crate) fn faults(&self, n: usize) -> Vec<ConfigError> {
         let mut faults = Faults::default();
         const STATES: usize = 1 << 30;
         let data = &self.data;

@@ -9,4 +9,4 @@ pub use config::{Config, Data, Known, Lbfgs, Network, OnFailure, Optimizer, Phas
 pub use error::ConfigError;
 pub(crate) use error::{Faults, place};
 pub use penalty::{Penalty, Regularizer};
-pub use renamed::{RENAMED, Renamed, in_current_words};
+pub(crate) use renamed::{RENAMED, Renamed, in_current_words};

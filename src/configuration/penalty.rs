@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 /// Regularizer of a configuration; `lambda` is its weight beside the loss (the paper tries 1 to 10,000).
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", tag = "kind", deny_unknown_fields)]
+#[non_exhaustive]
 pub enum Regularizer {
     /// None; neither spectrum nor minors are ever computed.
     #[default]
@@ -31,6 +32,7 @@ pub enum Regularizer {
 
 /// A penalty on scaled mass matrices `M`, `(batch, n, n)`; formulas in Hamzaogullari and Ozakin, "Hessian Regularization".
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub enum Penalty {
     /// Nothing.
     #[default]
@@ -81,7 +83,7 @@ impl Regularizer {
     ///
     /// # Errors
     /// A time-like coordinate that is none of them.
-    pub fn resolve<'a>(&self, coordinates: impl Iterator<Item = &'a str>) -> Result<Penalty, ConfigError> {
+    pub(crate) fn resolve<'a>(&self, coordinates: impl Iterator<Item = &'a str>) -> Result<Penalty, ConfigError> {
         Ok(match *self {
             _ if self.lambda() == 0.0 => Penalty::None,
             Self::None => Penalty::None,

@@ -152,7 +152,7 @@ impl<S: Scalar> Dataset<S> {
     }
 
     /// Smallest and largest velocity of coordinate `i`.
-    pub fn velocity_range(&self, i: usize) -> [f64; 2] {
+    pub(crate) fn velocity_range(&self, i: usize) -> [f64; 2] {
         let all = self.v.iter().skip(i).step_by(self.coordinates).map(|v| v.to_f64());
         all.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(v), high.max(v)])
     }

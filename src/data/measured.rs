@@ -123,7 +123,7 @@ pub struct Measured {
     /// The part that judges.
     pub test: Part,
     /// Which part of the recording judges.
-    pub held_out: HeldOut,
+    pub(crate) held_out: HeldOut,
     /// Most states of a supervised training.
     most_states: usize,
 }
@@ -157,7 +157,7 @@ impl Measured {
     }
 
     /// The way that suits the data.
-    pub fn advice(&self) -> Targets {
+    pub(crate) fn advice(&self) -> Targets {
         Targets::advised(self.training.recording.has_accelerations(), self.smoothing.acceleration_error())
     }
 

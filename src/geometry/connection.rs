@@ -18,7 +18,7 @@ pub struct Connection<S> {
 
 impl<S: Scalar> Connection<S> {
     /// The connection of a metric with first derivatives.
-    pub fn new(jet: &MetricJet<S>, metric: &Metric<S>) -> Self {
+    pub(crate) fn new(jet: &MetricJet<S>, metric: &Metric<S>) -> Self {
         let n = metric.coordinates();
         let d = |k: usize, i: usize, j: usize| jet.first[(k * n + i) * n + j];
         let mut lowered = vec![<S as Real>::zero(); n * n * n];

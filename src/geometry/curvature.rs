@@ -36,7 +36,7 @@ impl<S: Scalar> Curvature<S> {
     /// ```text
     /// R_abcd = (d_b d_c g_ad + d_a d_d g_bc - d_a d_c g_bd - d_b d_d g_ac)/2 + G_ebc G^e_ad - G_ebd G^e_ac
     /// ```
-    pub fn new(jet: &MetricJet<S>, metric: &Metric<S>, connection: &Connection<S>) -> Self {
+    pub(crate) fn new(jet: &MetricJet<S>, metric: &Metric<S>, connection: &Connection<S>) -> Self {
         let n = metric.coordinates();
         let zero = <S as Real>::zero();
         let place = |a: usize, b: usize, c: usize, d: usize| ((a * n + b) * n + c) * n + d;

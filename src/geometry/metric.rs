@@ -58,7 +58,7 @@ impl<S: Scalar> Metric<S> {
     }
 
     /// Number of coordinates `n`.
-    pub fn coordinates(&self) -> usize {
+    pub(crate) fn coordinates(&self) -> usize {
         self.n
     }
 

@@ -65,7 +65,7 @@ impl<S: Scalar> Geometry<S> {
     ///
     /// # Errors
     /// [`GeometryError::Degenerate`] for a metric without inverse, [`GeometryError::NotFinite`], [`GeometryError::Shape`].
-    pub fn new(jet: &MetricJet<S>) -> Result<Self, GeometryError> {
+    pub(crate) fn new(jet: &MetricJet<S>) -> Result<Self, GeometryError> {
         let n = jet.coordinates();
         for (what, rank, found) in
             [("first derivatives", 3, jet.first.len()), ("second derivatives", 4, jet.second.len())]
@@ -88,7 +88,7 @@ impl<S: Scalar> Geometry<S> {
     ///
     /// # Errors
     /// [`GeometryError::NotFinite`] where they do not reach that far.
-    pub fn rounded<T: Scalar>(&self) -> Result<Geometry<T>, GeometryError> {
+    pub(crate) fn rounded<T: Scalar>(&self) -> Result<Geometry<T>, GeometryError> {
         let Self { metric, connection, curvature } = self;
         let rounded =
             Geometry { metric: metric.rounded(), connection: connection.rounded(), curvature: curvature.rounded() };

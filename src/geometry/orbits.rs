@@ -79,7 +79,7 @@ fn form<S: Scalar>([tt, tp, pp]: [S; 3], w: S) -> S {
 
 impl<S: Scalar> Symmetric<S> {
     /// Angular velocity of the circular orbit of this sense, timelike or not; `None` where there is none.
-    pub fn angular_velocity(&self, sense: Sense) -> Option<S> {
+    pub(crate) fn angular_velocity(&self, sense: Sense) -> Option<S> {
         let [tt, tp, pp] = self.first;
         let root = tp * tp - tt * pp;
         if root.is_nan() || root < <S as Real>::zero() {
@@ -90,13 +90,13 @@ impl<S: Scalar> Symmetric<S> {
     }
 
     /// `-g(k, k)` of the orbit's direction `k = d/dt + w d/dp`, over the size of its terms: positive of matter, 0 of light.
-    pub fn lag(&self, sense: Sense) -> Option<S> {
+    pub(crate) fn lag(&self, sense: Sense) -> Option<S> {
         let w = self.angular_velocity(sense)?;
         Some(-form(self.value, w) / Real::abs(self.value[2] * w * w))
     }
 
     /// A number of the sign of `dE/dr` of the circular orbits: positive where they are stable. `None` where there is no such orbit of matter.
-    pub fn stability(&self, sense: Sense) -> Option<S> {
+    pub(crate) fn stability(&self, sense: Sense) -> Option<S> {
         let w = self.angular_velocity(sense)?;
         let ([tt, tp, pp], [tt1, tp1, pp1]) = (self.value, self.first);
         let slope = -form(self.second, w) / (<S as Real>::two() * (tp1 + pp1 * w));
@@ -107,7 +107,7 @@ impl<S: Scalar> Symmetric<S> {
     }
 
     /// `g_tp^2 - g_tt g_pp`: positive outside a horizon, where something can stay at its radius, negative inside.
-    pub fn room(&self) -> S {
+    pub(crate) fn room(&self) -> S {
         let [tt, tp, pp] = self.value;
         tp * tp - tt * pp
     }

@@ -209,11 +209,11 @@ impl<S: Scalar> Configured<S> {
         construct_once(self).ok_or_else(|| unknown_system(&self.system.name))
     }
     /// Shows the Lagrangian to a visitor; `None` if the description is not of the catalogue.
-    pub fn visit<V: LagrangianVisitor>(&self, visitor: V) -> Option<V::Output> {
+    pub(crate) fn visit<V: LagrangianVisitor>(&self, visitor: V) -> Option<V::Output> {
         shown(self, visitor)
     }
-    /// As [`exact_acceleration`](super::exact_acceleration); of a system by its description, for which no closed form is known, by differentiating its
-    /// Lagrangian. `NaN` where the mass matrix is singular.
+    /// Acceleration of one state by the closed form, which shares nothing with the Lagrangian but the parameters; of a system by its
+    /// description, for which no closed form is known, by differentiating its Lagrangian. `NaN` where the mass matrix is singular.
     ///
     /// # Errors
     /// [`SystemError::State`] for a state of the wrong length.
@@ -262,13 +262,13 @@ impl<S: Scalar> Configured<S> {
     }
     /// `(x, y)` of coordinates in the system's [`Plane`](super::system::Plane); `None` without a plane or for a wrong
     /// number of coordinates.
-    pub fn place(&self, q: &[S]) -> Option<(f64, f64)> {
+    pub(crate) fn place(&self, q: &[S]) -> Option<(f64, f64)> {
         let plane = self.system.plane.filter(|_| q.len() == self.coordinates)?;
         Some((plane.point)(&leading(&self.parameters), &leading(q)))
     }
     /// The system's [`Conserved`](super::system::Conserved) vector at a state; `None` without one or for a state of the wrong
     /// length.
-    pub fn conserved(&self, q: &[S], v: &[S]) -> Option<Vec<f64>> {
+    pub(crate) fn conserved(&self, q: &[S], v: &[S]) -> Option<Vec<f64>> {
         let conserved = self.system.conserved.filter(|_| self.check_lengths(q, v).is_ok())?;
         Some((conserved.vector)(&leading(&self.parameters), &leading(q), &leading(v)))
     }

@@ -60,14 +60,6 @@ pub fn build<S: Scalar>(name: &str, given: &Given) -> Result<Box<dyn EulerLagran
     configure(name, given)?.build()
 }
 
-/// The acceleration of one state by the closed form, which shares nothing with [`build`] but the parameters.
-///
-/// # Errors
-/// As [`configure`]; [`SystemError::State`] for a state of the wrong length.
-pub fn exact_acceleration<S: Scalar>(name: &str, given: &Given, q: &[S], v: &[S]) -> Result<Vec<S>, SystemError> {
-    configure(name, given)?.exact_acceleration(q, v)
-}
-
 /// Refuses a symbol that the system does not have.
 fn require_symbol(system: &System, symbol: &str) -> Result<(), SystemError> {
     let count = match system.size {

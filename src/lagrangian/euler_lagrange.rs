@@ -93,7 +93,7 @@ impl<S: Scalar> Terms<S> {
     ///
     /// # Errors
     /// [`MechanicsError`] naming the first row whose force is not finite or whose mass matrix is singular.
-    pub fn add_force(
+    pub(crate) fn add_force(
         &mut self,
         n: usize,
         v: &[S],

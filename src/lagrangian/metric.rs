@@ -26,7 +26,7 @@ impl<S: Scalar> MetricJet<S> {
     }
 
     /// Number of coordinates `n`.
-    pub fn coordinates(&self) -> usize {
+    pub(crate) fn coordinates(&self) -> usize {
         self.metric.len().isqrt()
     }
 }

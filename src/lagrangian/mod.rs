@@ -23,11 +23,10 @@ mod taylor;
 mod terms;
 mod with_forces;
 
-pub use catalogue::{Configured, Given, LagrangianVisitor, SystemError, find, systems};
-pub use configure::{build, configure, configure_system, configure_values, exact_acceleration};
-pub use description::{
-    CoordinateDescription, Described, Description, DescriptionError, ParameterDescription, TrajectoryDescription,
-};
+pub(crate) use catalogue::LagrangianVisitor;
+pub use catalogue::{Configured, SystemError, find, systems};
+pub use configure::{build, configure, configure_system, configure_values};
+pub use description::{Description, DescriptionError};
 pub use error::MechanicsError;
 pub use expression::{Expression, ExpressionError};
 pub use expression_lagrangian::ExpressionLagrangian;

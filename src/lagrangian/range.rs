@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 /// Values a parameter may take, besides being finite.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub enum Range {
     /// Any finite number.
     #[default]
@@ -19,7 +20,7 @@ pub enum Range {
 
 impl Range {
     /// The condition in words.
-    pub const fn text(self) -> &'static str {
+    pub(crate) const fn text(self) -> &'static str {
         match self {
             Self::Any => "finite",
             Self::AtLeastZero => "finite and at least 0",

@@ -1,9 +1,9 @@
 //! Facts about a hand-written system apart from its Lagrangian.
 
 use super::Lagrangian;
-use super::description::Described;
+use super::description::{Described, Description};
 pub use super::range::Range;
-pub use super::shell_advice::ShellAdvice;
+pub(crate) use super::shell_advice::ShellAdvice;
 use crate::scalar::Real;
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -21,11 +21,11 @@ pub struct Coordinate {
 
 impl Coordinate {
     /// A periodic angle in radians.
-    pub fn angle(name: impl Into<Cow<'static, str>>) -> Self {
+    pub(crate) fn angle(name: impl Into<Cow<'static, str>>) -> Self {
         Self { name: name.into(), unit: Cow::Borrowed("rad"), periodic: true }
     }
     /// A length in metres.
-    pub fn length(name: impl Into<Cow<'static, str>>) -> Self {
+    pub(crate) fn length(name: impl Into<Cow<'static, str>>) -> Self {
         Self { name: name.into(), unit: Cow::Borrowed("m"), periodic: false }
     }
 }
@@ -47,7 +47,7 @@ pub struct Parameter {
 
 impl Parameter {
     /// A constant whose value is known.
-    pub const fn new(symbol: &'static str, default: &'static str, unit: &'static str, range: Range) -> Self {
+    pub(crate) const fn new(symbol: &'static str, default: &'static str, unit: &'static str, range: Range) -> Self {
         let (symbol, default, unit) = (Cow::Borrowed(symbol), Cow::Borrowed(default), Cow::Borrowed(unit));
         Self { symbol, default, unit, range, learn: false }
     }
@@ -109,11 +109,11 @@ pub struct TrajectoryTest {
 }
 
 /// Refuses coordinates outside a chart, given the parameters, with what is demanded of them.
-pub type Domain = fn(parameters: &[f64], q: &[f64]) -> Result<(), &'static str>;
+pub(crate) type Domain = fn(parameters: &[f64], q: &[f64]) -> Result<(), &'static str>;
 
 /// A plane in which a picture shows where a system is, in space rather than over its coordinates.
 #[derive(Clone, Copy, Debug)]
-pub struct Plane {
+pub(crate) struct Plane {
     /// Labels of the horizontal and the vertical axis, with units.
     pub labels: [&'static str; 2],
     /// `(x, y)` from the values of [`System::parameters`] and `n` coordinates. Finite wherever both are finite and the
@@ -123,11 +123,11 @@ pub struct Plane {
 }
 
 /// Components of a vector at a state, given the parameters.
-pub type Vector = fn(parameters: &[f64], q: &[f64], v: &[f64]) -> Vec<f64>;
+pub(crate) type Vector = fn(parameters: &[f64], q: &[f64], v: &[f64]) -> Vec<f64>;
 
 /// Quantity that exact motion conserves beside its energy.
 #[derive(Clone, Copy, Debug)]
-pub struct Conserved {
+pub(crate) struct Conserved {
     /// Name, with unit.
     pub name: &'static str,
     /// Components of the conserved vector at a state, from the values of [`System::parameters`]; never all zero on a
@@ -137,7 +137,7 @@ pub struct Conserved {
 
 /// Property that depends on the number of coordinates of a system.
 #[derive(Clone, Debug)]
-pub enum PerSize<T> {
+pub(crate) enum PerSize<T> {
     /// For any number of coordinates.
     Rule(fn(usize) -> T),
     /// For the one number that the system has.
@@ -156,7 +156,7 @@ impl<T: Clone> PerSize<T> {
 
 /// Advice on learning a system from states with their accelerations.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct LearningAdvice {
+pub(crate) struct LearningAdvice {
     /// States to learn from, where the box of the training states alone does not do.
     pub states: Option<fn(bounds: &mut Bounds) -> StateAdvice>,
     /// The paper's budget, if the system is one of its own.
@@ -170,7 +170,7 @@ impl LearningAdvice {
 
 /// Choices that go with the bounds of the training states.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct StateAdvice {
+pub(crate) struct StateAdvice {
     /// Coordinates of which half are drawn uniform in their logarithm; empty for none.
     pub log_uniform: Vec<bool>,
     /// Size, over the mean one, of accelerations from which on residuals count relatively; 0 for none.
@@ -183,7 +183,7 @@ pub struct StateAdvice {
 
 /// The paper's budget for a system.
 #[derive(Clone, Copy, Debug)]
-pub struct PaperBudget {
+pub(crate) struct PaperBudget {
     /// Training states.
     pub states: usize,
     /// Widths of the hidden layers.
@@ -194,7 +194,7 @@ pub struct PaperBudget {
 
 /// A phase of the paper's schedule.
 #[derive(Clone, Copy, Debug)]
-pub struct PaperPhase {
+pub(crate) struct PaperPhase {
     /// Epochs.
     pub epochs: usize,
     /// Learning rate at the start.
@@ -223,7 +223,7 @@ pub struct System {
     /// Number of coordinates.
     pub size: Size,
     /// Coordinates, in order.
-    pub coordinates: PerSize<Vec<Coordinate>>,
+    pub(crate) coordinates: PerSize<Vec<Coordinate>>,
     /// Constants, in the order the Lagrangian takes them; [`Size::Chosen`] adds one more.
     pub parameters: Cow<'static, [Parameter]>,
     /// Unit of the evolution parameter: `s`, or `m` for proper time in geometric units (`G = c = 1`, where times and
@@ -235,24 +235,28 @@ pub struct System {
     /// [`ClosedForm::constrained_velocity`] is the formula.
     pub constraint: Option<&'static str>,
     /// Box of the training states.
-    pub training: PerSize<Bounds>,
+    pub(crate) training: PerSize<Bounds>,
     /// Box of the states on which errors are stated.
-    pub validation: PerSize<Bounds>,
+    pub(crate) validation: PerSize<Bounds>,
     /// Trajectory test.
-    pub trajectory: PerSize<TrajectoryTest>,
+    pub(crate) trajectory: PerSize<TrajectoryTest>,
     /// Where the coordinates make sense; the error says what is demanded.
-    pub domain: Option<Domain>,
+    pub(crate) domain: Option<Domain>,
     /// Where it is in a plane; `None` for systems of one coordinate, whose coordinate over time says all.
-    pub plane: Option<Plane>,
+    pub(crate) plane: Option<Plane>,
     /// Quantity that is conserved beside the energy, if there is one.
-    pub conserved: Option<Conserved>,
+    pub(crate) conserved: Option<Conserved>,
     /// Advice on learning it.
-    pub learning: LearningAdvice,
+    pub(crate) learning: LearningAdvice,
     /// The description with its Lagrangian, for a system that is none of the catalogue's.
-    pub described: Option<Arc<Described>>,
+    pub(crate) described: Option<Arc<Described>>,
 }
 
 impl System {
+    /// The description that the system was made from; none for a system of the catalogue.
+    pub fn description(&self) -> Option<&Description> {
+        self.described.as_deref().map(|described| &described.description)
+    }
     /// Coordinates, in order, of the system of `n` coordinates.
     pub fn coordinates(&self, n: usize) -> Vec<Coordinate> {
         self.coordinates.of(n)
@@ -280,11 +284,11 @@ impl System {
         positions.chain(coordinates.iter().map(|c| format!("{}_dot", c.name))).collect()
     }
     /// The same columns with their units (`theta1_dot [rad/s]`): labels of axes.
-    pub fn labels(&self, n: usize) -> Vec<String> {
+    pub(crate) fn labels(&self, n: usize) -> Vec<String> {
         self.columns(n).iter().zip(self.units(n)).map(|(column, unit)| format!("{column} [{unit}]")).collect()
     }
     /// Units of the same columns (`rad`, `rad/s`).
-    pub fn units(&self, n: usize) -> Vec<String> {
+    pub(crate) fn units(&self, n: usize) -> Vec<String> {
         let coordinates = self.coordinates(n);
         let positions = coordinates.iter().map(|c| c.unit.to_string());
         positions.chain(coordinates.iter().map(|c| format!("{}/{}", c.unit, self.time_unit))).collect()

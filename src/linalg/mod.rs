@@ -32,12 +32,16 @@ pub use eigh::{eigenvalues, eigh};
 pub use error::{Failure, LinalgError};
 pub use inertia::{Inertia, inertia, is_positive_definite};
 pub use inverse::inverse;
-pub use matmul::{MatMut, MatRef, gemm};
-pub use minimum_norm::{MinimumNorm, minimum_norm};
-pub use minors::{Scaled, adjugate, leading_minors};
-pub use signature::{SignatureBuffers, has_signature};
 #[doc(hidden)]
-pub use signature::{Violation, characteristic_scales, eigenvalue_violation, sylvester_violation};
+pub use matmul::{MatMut, MatRef, gemm};
+#[doc(hidden)]
+pub use minimum_norm::{MinimumNorm, minimum_norm};
+#[doc(hidden)]
+pub use minors::{Scaled, adjugate, leading_minors};
+#[doc(hidden)]
+pub use signature::{
+    SignatureBuffers, Violation, characteristic_scales, eigenvalue_violation, has_signature, sylvester_violation,
+};
 #[cfg(feature = "rollout")]
 pub(crate) use singular::singular;
 pub use solve::solve;

@@ -37,7 +37,7 @@ pub enum InputLayer {
 
 impl InputLayer {
     /// `true` if there is none.
-    pub fn is_none(&self) -> bool {
+    pub(crate) fn is_none(&self) -> bool {
         *self == Self::None
     }
 }

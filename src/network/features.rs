@@ -9,13 +9,13 @@ use crate::scalar::Real;
 impl Architecture {
     /// Input features made of coordinates: two per embedded angle and radial coordinate, one per other coordinate, none of cyclic
     /// ones.
-    pub fn position_features(&self) -> usize {
+    pub(crate) fn position_features(&self) -> usize {
         let seen = (0..self.coordinates).filter(|i| !self.form.cyclic.contains(i));
         seen.map(|i| if self.embeds(i) || self.form.is_radial(i) { 2 } else { 1 }).sum()
     }
 
     /// `true` if coordinate `i` enters by its sine and cosine.
-    pub fn embeds(&self, i: usize) -> bool {
+    pub(crate) fn embeds(&self, i: usize) -> bool {
         self.embed_periodic && self.periodic[i]
     }
 

@@ -32,13 +32,13 @@ fn value<R: Real>(parameter: &Parameter, theta: Option<R>) -> R {
 impl Architecture {
     /// Values of all constants of the known part, in the order of their names, with the flat parameters of the model; empty
     /// without a known part, or with one that describes no system.
-    pub fn known_parameters<R: Real>(&self, parameters: &[R]) -> Vec<R> {
+    pub(crate) fn known_parameters<R: Real>(&self, parameters: &[R]) -> Vec<R> {
         let described = self.form.known.as_ref().and_then(|known| system(known, self.coordinates).ok());
         described.map_or_else(Vec::new, |system| self.constants(&system, parameters))
     }
 
     /// The same by name, in double precision.
-    pub fn known_constants<S: Scalar>(&self, parameters: &[S]) -> BTreeMap<String, f64> {
+    pub(crate) fn known_constants<S: Scalar>(&self, parameters: &[S]) -> BTreeMap<String, f64> {
         let names = self.form.known.iter().flat_map(|known| known.parameters.keys().cloned());
         names.zip(self.known_parameters(parameters).into_iter().map(Scalar::to_f64)).collect()
     }

@@ -61,6 +61,7 @@ impl Branch {
         &self.layers[..self.layers.len() - 1]
     }
     /// Weights of the linear output.
+    #[cfg(test)]
     pub fn output_range(&self) -> Range<usize> {
         self.layers[self.layers.len() - 1].weight_range()
     }

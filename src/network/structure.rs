@@ -75,17 +75,17 @@ pub struct Radial {
 
 impl Form {
     /// `true` if coordinate `i` belongs to a radial group.
-    pub fn is_radial(&self, i: usize) -> bool {
+    pub(crate) fn is_radial(&self, i: usize) -> bool {
         self.radial.iter().any(|group| group.coordinates.contains(&i))
     }
 
     /// `true` if nothing is known.
-    pub fn is_default(&self) -> bool {
+    pub(crate) fn is_default(&self) -> bool {
         *self == Self::default()
     }
 
     /// Outputs of the network for `n` coordinates.
-    pub fn outputs(&self, n: usize) -> usize {
+    pub(crate) fn outputs(&self, n: usize) -> usize {
         let triangle = n * (n + 1) / 2;
         match self.structure {
             Structure::BlackBox => 1,

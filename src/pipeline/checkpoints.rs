@@ -48,13 +48,13 @@ impl Checkpoints {
     }
 
     /// The same for a training that begins elsewhere.
-    pub fn beginning(self, begin: Begin) -> Self {
+    pub(crate) fn beginning(self, begin: Begin) -> Self {
         Self { begin, ..self }
     }
 
     /// The same with a text that is kept in every checkpoint and must be the same when the training goes on, instead of the
     /// configuration.
-    pub fn identified_by(self, text: String) -> Self {
+    pub(crate) fn identified_by(self, text: String) -> Self {
         Self { identity: Some(text), ..self }
     }
 

@@ -40,26 +40,26 @@ pub struct Evaluation {
     /// Error of the mass matrix, of a geodesic the metric, at rest at the positions of the fresh states.
     pub mass_matrix: MassMatrixError,
     /// Time for which the learned motion predicts the exact one, median over the starts.
-    pub valid_time: Option<ValidTimes>,
+    pub(crate) valid_time: Option<ValidTimes>,
     /// One entry per random start.
-    pub trajectories: Vec<Motion>,
+    pub(crate) trajectories: Vec<Motion>,
     /// Curvature, symmetries, charges and signature.
-    pub physics: Physics,
+    pub(crate) physics: Physics,
     /// Names of the accelerations' coordinates, with the accelerations' units.
     #[serde(skip)]
-    pub coordinates: Vec<String>,
+    pub(crate) coordinates: Vec<String>,
     /// Unit of all coordinates together.
     #[serde(skip)]
-    pub unit: String,
+    pub(crate) unit: String,
     /// Unit of times.
     #[serde(skip)]
-    pub time_unit: String,
+    pub(crate) time_unit: String,
     /// Name of what the exact motion conserves beside its energy.
     #[serde(skip)]
-    pub conserved: Option<&'static str>,
+    pub(crate) conserved: Option<&'static str>,
     /// Pictures.
     #[serde(skip)]
-    pub figures: Vec<Figure>,
+    pub(crate) figures: Vec<Figure>,
 }
 
 /// One start of the trajectory test.

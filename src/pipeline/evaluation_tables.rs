@@ -36,7 +36,7 @@ impl Evaluation {
     ///
     /// # Errors
     /// [`PipelineError::Output`].
-    pub fn write(
+    pub(crate) fn write(
         &self,
         system: &Configured<f64>,
         (model, validation_loss): (&str, f64),
@@ -129,7 +129,7 @@ impl Evaluation {
     }
 
     /// Headline and tables for a terminal, of a model of the system called `title`.
-    pub fn text(&self, title: &str) -> String {
+    pub(crate) fn text(&self, title: &str) -> String {
         let tables = self.tables();
         let text = tables.iter().map(|t| format!("{}\n{}", t.title, text_table(&t.header, &t.rows)));
         let first = headline::of_evaluation(title, self).text();

@@ -1,6 +1,6 @@
 //! The report of an experiment: table, pictures, page, words.
 
-use crate::experiments::{Experiment, Record, Row, Run, Scale};
+use crate::experiments::{Experiment, Record, Run, Scale};
 use crate::names::{WIDTH, counted, wrapped};
 use crate::pipeline::experiment_store::ExperimentStore;
 use crate::pipeline::readings::{RowOfHoles, rows_of_holes};
@@ -21,8 +21,6 @@ pub type Results = Vec<(Run, Option<Record>)>;
 pub struct ExperimentReport {
     /// Runs with their records.
     pub results: Results,
-    /// One row per label.
-    pub rows: Vec<Row>,
     /// Cells of `table.csv`, under [`EXPERIMENT_HEADER`].
     pub table: Vec<Vec<String>>,
     /// Runs that are finished.
@@ -110,7 +108,7 @@ pub(crate) fn conclude(
     let (title, paper) = (experiment.title, experiment.paper);
     let place = if paper == "-" { String::new() } else { format!(" (of the paper: {paper})") };
     let text = wrapped(&format!("{title}{place}\n{text}\n{note}\n"), WIDTH);
-    Ok(ExperimentReport { results, rows, table, finished, training_seconds: training, text })
+    Ok(ExperimentReport { results, table, finished, training_seconds: training, text })
 }
 
 /// Loss against time of every curve, as far as they are known.

@@ -35,10 +35,6 @@ pub struct FitReport {
     pub history: Vec<Epoch>,
     /// Predictions of motion that was held out.
     pub hold_out: HoldOut,
-    /// Ranges in which the data determine mass matrix, friction and energy.
-    pub determined: Determined,
-    /// Curvature, symmetries and signature.
-    pub physics: Physics,
     /// Text of `summary.json`.
     pub json: String,
     pub(crate) text: String,
@@ -184,7 +180,7 @@ fn fit_in<S: Scalar>(
     };
     let (json, text) = found.write(output, &toml)?;
     let (stop, history, header) = (trained.stop, trained.history, model.header);
-    Ok(FitReport { stop, header, network, history, hold_out, determined, physics, json, text })
+    Ok(FitReport { stop, header, network, history, hold_out, json, text })
 }
 
 /// Name and checksum of everything that is learned from.

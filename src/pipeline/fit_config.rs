@@ -79,14 +79,14 @@ pub struct FitColumns {
 
 impl FitConfig {
     /// The same of files that may have other names.
-    pub fn without_files(&self) -> Self {
+    pub(crate) fn without_files(&self) -> Self {
         let mut other = self.clone();
         other.recording.files.clear();
         other
     }
 
     /// Every value out of range, for `n` coordinates, in the order of the keys. What the data alone decide is not looked at.
-    pub fn faults(&self, n: usize) -> Vec<ConfigError> {
+    pub(crate) fn faults(&self, n: usize) -> Vec<ConfigError> {
         let fault = |field: &str, expected: &'static str, found: String| ConfigError {
             field: field.to_string(),
             expected,

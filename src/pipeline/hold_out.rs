@@ -45,7 +45,7 @@ pub struct HoldOut {
     pub model: Vec<PredictionError>,
     /// Time for which the model's motion predicts the measured one, median over the windows; at least to their end where the
     /// error stays small. None without windows.
-    pub valid_time: Option<ValidTimes>,
+    pub(crate) valid_time: Option<ValidTimes>,
     /// Which predictions were given up and why, in words; empty if none was.
     pub given_up: String,
     /// Errors of going on at the velocity of the start.
@@ -53,7 +53,7 @@ pub struct HoldOut {
     /// Fraction of the held-out states whose mass matrix has not the right signature; `NaN` where nothing was held out.
     pub wrong_signature: f64,
     /// Energy along the held-out trajectories; none if there is none of it to be told.
-    pub energy: Option<Balance>,
+    pub(crate) energy: Option<Balance>,
     /// Pictures.
     #[serde(skip)]
     pub figures: Vec<Figure>,
@@ -290,7 +290,7 @@ impl HoldOut {
     }
 
     /// For a terminal.
-    pub fn text(&self) -> String {
+    pub(crate) fn text(&self) -> String {
         if self.is_of_nothing() {
             return self.remarks();
         }
@@ -302,7 +302,7 @@ impl HoldOut {
     }
 
     /// Adds tables and pictures to a report.
-    pub fn report(&self, report: Report) -> Report {
+    pub(crate) fn report(&self, report: Report) -> Report {
         if self.is_of_nothing() {
             return report.heading("Predictions of held-out motion").paragraph(self.remarks().trim_end());
         }

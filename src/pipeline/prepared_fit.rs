@@ -39,20 +39,15 @@ impl<'a> PreparedFit<'a> {
     }
 
     /// Targets that are learned from.
-    pub fn targets(&self) -> Targets {
+    pub(crate) fn targets(&self) -> Targets {
         self.targets
-    }
-
-    /// The recorded motion, smoothed and divided.
-    pub fn measured(&self) -> &Measured {
-        &self.measured
     }
 
     /// Survey of the recorded motion, with warnings of what will hinder a fit.
     ///
     /// # Errors
     /// [`PipelineError::Smooth`] for motion without derivatives.
-    pub fn survey(&self) -> Result<Survey, PipelineError> {
+    pub(crate) fn survey(&self) -> Result<Survey, PipelineError> {
         let FitOptions { held_out: validation, seed, .. } = self.options;
         let smooth = self.options.preparation().smoothing;
         Ok(survey(self.reading, &SurveyOptions { smooth, validation, seed })?)

@@ -29,7 +29,7 @@ impl StartModel {
     }
 
     /// Gives a configuration the model's shape and precision.
-    pub fn shape(&self, config: &mut Config) {
+    pub(crate) fn shape(&self, config: &mut Config) {
         let model = &self.header.architecture;
         let network = &mut config.network;
         network.hidden.clone_from(&model.hidden);
@@ -58,7 +58,7 @@ impl StartModel {
     ///
     /// # Errors
     /// [`PipelineError::OtherShape`] naming everything that differs.
-    pub fn require(&self, config: &Config, periodic: Vec<bool>) -> Result<(), PipelineError> {
+    pub(crate) fn require(&self, config: &Config, periodic: Vec<bool>) -> Result<(), PipelineError> {
         let columns = self.header.columns.iter().take(periodic.len()).map(String::as_str);
         let asked = config.architecture_with(columns, periodic, self.header.architecture.scale.clone())?;
         let found = differences(&asked, &self.header.architecture);

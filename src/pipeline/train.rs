@@ -78,7 +78,7 @@ pub struct TrainReport {
     /// Text of `summary.json`.
     pub json: String,
     /// The record that an experiment keeps of it.
-    pub record: Record,
+    pub(crate) record: Record,
     /// The losses in one line.
     headline: String,
     title: String,

@@ -77,7 +77,7 @@ impl Watch {
     }
 
     /// `true` if the flag was raised.
-    pub fn is_interrupted(&self) -> bool {
+    pub(crate) fn is_interrupted(&self) -> bool {
         self.interrupt.load(Ordering::SeqCst)
     }
 

@@ -34,7 +34,7 @@ impl Preset {
 
     /// The configuration of a system for a Lagrangian of this structure; the presets of our own take bolder steps where a
     /// signature cannot be lost.
-    pub fn config_of(self, system: &Configured<f64>, structure: Structure) -> Option<Config> {
+    pub(crate) fn config_of(self, system: &Configured<f64>, structure: Structure) -> Option<Config> {
         let mut config = self.config(system)?;
         config.take_structure(structure);
         if structure != Structure::BlackBox && self != Self::Paper {

@@ -26,6 +26,7 @@ impl RngCore for RandomGenerator {
 
 /// Streams of the random generator: one seed, independent draws for each purpose.
 #[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
 pub enum RngStream {
     /// Initial weights.
     Weights,

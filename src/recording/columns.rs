@@ -24,7 +24,7 @@ pub struct Columns {
     pub trajectory: Option<String>,
     /// Coordinates that are angles, in rad after conversion.
     pub periodic: Vec<String>,
-    /// Column and its unit or factor to SI, see [`factor`].
+    /// Column and its unit, such as `deg` or `mm`, or its factor to SI.
     pub units: Vec<(String, String)>,
     /// Names of all columns of files without a header, by position.
     pub names: Option<Vec<String>>,
@@ -51,12 +51,12 @@ impl Columns {
     }
 
     /// Factor of a column to SI.
-    pub fn factor(&self, name: &str) -> f64 {
+    pub(crate) fn factor(&self, name: &str) -> f64 {
         self.units.iter().find(|(column, _)| column == name).and_then(|(_, unit)| factor(unit).ok()).unwrap_or(1.0)
     }
 
     /// Which coordinates are angles.
-    pub fn periodic(&self) -> Vec<bool> {
+    pub(crate) fn periodic(&self) -> Vec<bool> {
         self.coords.iter().map(|name| self.periodic.contains(name)).collect()
     }
 
@@ -66,7 +66,7 @@ impl Columns {
     /// [`ColumnsError`]: no coordinates, another number of velocities, accelerations or forces than of coordinates, a
     /// column used twice, an angle that is no coordinate, an unknown unit, a unit of a column that is not used, time and
     /// rate both given, a rate that is not positive.
-    pub fn validate(&self) -> Result<(), ColumnsError> {
+    pub(crate) fn validate(&self) -> Result<(), ColumnsError> {
         let wrong = |text: String| Err(ColumnsError(text));
         if self.coords.is_empty() {
             return wrong("expected the columns of the coordinates".to_string());

@@ -31,6 +31,7 @@ pub enum HeldOut {
 
 /// Why nothing can be held out.
 #[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
 pub enum HoldOutError {
     /// Not a share.
     #[error("share of the data held out: expected 0, or a number between 0 and 1, found {0}")]

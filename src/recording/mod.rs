@@ -15,9 +15,10 @@ mod units;
 
 pub use columns::{Columns, ColumnsError};
 pub(crate) use hermite::hermite;
-pub use hold_out::{HeldOut, HoldOutError};
+pub(crate) use hold_out::HeldOut;
+pub use hold_out::HoldOutError;
 pub use reading::{Cut, Dropped, LoadedRecording, Rows};
 pub(crate) use targets::LARGE_ERROR;
 pub use targets::Targets;
 pub use track::{RecordedTrajectory, Recording, TrajectoryError};
-pub use units::factor;
+pub(crate) use units::factor;

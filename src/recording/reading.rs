@@ -9,7 +9,7 @@ pub struct Rows(Vec<(usize, u64)>);
 
 impl Rows {
     /// Notes that sample `sample` stands on line `row`; samples come in order.
-    pub fn note(&mut self, sample: usize, row: u64) {
+    pub(crate) fn note(&mut self, sample: usize, row: u64) {
         if self.0.is_empty() || self.row(sample) != row {
             self.0.push((sample, row));
         }
@@ -25,7 +25,7 @@ impl Rows {
     }
 
     /// The rows of samples `start..end`, counted anew from 0.
-    pub fn part(&self, start: usize, end: usize) -> Self {
+    pub(crate) fn part(&self, start: usize, end: usize) -> Self {
         let mut rows = Self(vec![(0, self.row(start))]);
         for (first, row) in self.0.iter().filter(|(first, _)| *first > start && *first < end) {
             rows.0.push((first - start, *row));

@@ -8,6 +8,7 @@ pub const LARGE_ERROR: f64 = 0.1;
 /// Quantity that a network learns from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum Targets {
     /// Accelerations that were measured.
     Measured,
@@ -20,7 +21,7 @@ pub enum Targets {
 impl Targets {
     /// The way that suits the data: measured accelerations if there are any, smoothed ones if they are good to
     /// `LARGE_ERROR`, the motion itself if not. `error` is that of smoothed accelerations over their size.
-    pub fn advised(has_accelerations: bool, error: f64) -> Self {
+    pub(crate) fn advised(has_accelerations: bool, error: f64) -> Self {
         if has_accelerations {
             Self::Measured
         } else if error <= LARGE_ERROR {

@@ -114,12 +114,12 @@ impl Recording {
     }
 
     /// `true` if every trajectory has measured velocities.
-    pub fn has_velocities(&self) -> bool {
+    pub(crate) fn has_velocities(&self) -> bool {
         !self.tracks.is_empty() && self.tracks.iter().all(|track| !track.v.is_empty())
     }
 
     /// `true` if every trajectory has measured accelerations.
-    pub fn has_accelerations(&self) -> bool {
+    pub(crate) fn has_accelerations(&self) -> bool {
         !self.tracks.is_empty() && self.tracks.iter().all(|track| !track.a.is_empty())
     }
 

@@ -8,6 +8,7 @@ use std::f64::consts::FRAC_PI_2;
 
 /// Which coordinates say where something is around a centre; the axis of a spin is `z`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Around {
     /// `t`, `x`, `y`, `z`.
     Cartesian(Chart),
@@ -36,14 +37,14 @@ impl Around {
     }
 
     /// Index of the time.
-    pub fn time(self) -> usize {
+    pub(crate) fn time(self) -> usize {
         match self {
             Self::Cartesian(Chart { time, .. }) | Self::Spherical { time, .. } => time,
         }
     }
 
     /// The place of a distance in a direction `(x, y, z)` of unit length, `(4)`, at time 0.
-    pub fn place(self, distance: f64, [x, y, z]: [f64; 3]) -> [f64; 4] {
+    pub(crate) fn place(self, distance: f64, [x, y, z]: [f64; 3]) -> [f64; 4] {
         let mut q = [0.0; 4];
         match self {
             Self::Cartesian(Chart { space, .. }) => {
@@ -57,7 +58,7 @@ impl Around {
     }
 
     /// Points `(points, 4)` in all directions, their distances uniform in the logarithm.
-    pub fn points(self, points: usize, range: (f64, f64)) -> Vec<f64> {
+    pub(crate) fn points(self, points: usize, range: (f64, f64)) -> Vec<f64> {
         directions(points, range).flat_map(|(distance, direction)| self.place(distance, direction)).collect()
     }
 
@@ -70,7 +71,7 @@ impl Around {
     }
 
     /// A number of the sign of the rate of the distance.
-    pub fn outward(self, q: &[f64], v: &[f64]) -> f64 {
+    pub(crate) fn outward(self, q: &[f64], v: &[f64]) -> f64 {
         match self {
             Self::Cartesian(Chart { space, .. }) => space.iter().map(|&i| q[i] * v[i]).sum(),
             Self::Spherical { radius, .. } => v[radius],
@@ -78,7 +79,7 @@ impl Around {
     }
 
     /// Angle about the axis, up to full turns.
-    pub fn azimuth(self, q: &[f64]) -> f64 {
+    pub(crate) fn azimuth(self, q: &[f64]) -> f64 {
         match self {
             Self::Cartesian(Chart { space: [x, y, _], .. }) => q[y].atan2(q[x]),
             Self::Spherical { azimuth, .. } => q[azimuth],
@@ -86,7 +87,7 @@ impl Around {
     }
 
     /// Position in space, `(x, y, z)` of the distance and the angles.
-    pub fn position(self, q: &[f64]) -> [f64; 3] {
+    pub(crate) fn position(self, q: &[f64]) -> [f64; 3] {
         match self {
             Self::Cartesian(Chart { space, .. }) => space.map(|i| q[i]),
             Self::Spherical { radius, polar, azimuth, .. } => {

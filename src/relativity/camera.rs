@@ -7,6 +7,7 @@ use std::f64::consts::PI;
 
 /// Motion of the camera.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Observer {
     /// At rest: its places do not change.
     #[default]
@@ -73,19 +74,19 @@ impl Camera {
     }
 
     /// Directions right, up and forward in the coordinates of space, orthonormal in the Euclidean sense.
-    pub fn axes(&self) -> [[f64; 3]; 3] {
+    pub(crate) fn axes(&self) -> [[f64; 3]; 3] {
         let ((si, ci), (sa, ca)) = (self.inclination.sin_cos(), self.azimuth.sin_cos());
         [[-sa, ca, 0.0], [-ci * ca, -ci * sa, si], [-si * ca, -si * sa, -ci]]
     }
 
     /// Coordinates of the camera at the time 0.
-    pub fn event(&self) -> [f64; 4] {
+    pub(crate) fn event(&self) -> [f64; 4] {
         self.chart.vector(0.0, times(-self.distance, self.axes()[2]))
     }
 
     /// Direction that a place of the picture shows: parts right, up and forward, a unit vector. Columns and rows are counted from the upper left
     /// corner; the middle of the first pixel is `(0.5, 0.5)`.
-    pub fn direction(&self, column: f64, row: f64) -> [f64; 3] {
+    pub(crate) fn direction(&self, column: f64, row: f64) -> [f64; 3] {
         let (width, height) = (self.width as f64, self.height as f64);
         let scale = 2.0 * (0.5 * self.field_of_view).tan() / width;
         let toward = [scale * (column - 0.5 * width), scale * (0.5 * height - row), 1.0];

@@ -34,12 +34,12 @@ impl Chart {
     }
 
     /// The places of a vector `(4)`.
-    pub fn space_of(&self, vector: [f64; 4]) -> [f64; 3] {
+    pub(crate) fn space_of(&self, vector: [f64; 4]) -> [f64; 3] {
         self.space.map(|i| vector[i])
     }
 
     /// The vector of a time and places, `(4)`.
-    pub fn vector(&self, time: f64, space: [f64; 3]) -> [f64; 4] {
+    pub(crate) fn vector(&self, time: f64, space: [f64; 3]) -> [f64; 4] {
         let mut vector = [0.0; 4];
         vector[self.time] = time;
         self.space.iter().zip(space).for_each(|(&i, x)| vector[i] = x);

@@ -12,7 +12,7 @@ use std::f64::consts::{PI, TAU};
 pub struct Edge {
     /// Angle from the direction of the centre, in the frame of the camera, in rad.
     pub angle: f64,
-    /// Celestial coordinates of its ray ([`Tetrad::celestial`]), in the unit of the coordinates: to the right, and above.
+    /// Celestial coordinates of its ray, in the unit of the coordinates: to the right, and above.
     pub celestial: [f64; 2],
 }
 

@@ -15,7 +15,7 @@ pub struct Shadow {
     /// Rows.
     pub height: usize,
     /// Rays, row by row from the upper left corner.
-    pub rays: Vec<Ray>,
+    pub(crate) rays: Vec<Ray>,
 }
 
 /// Differences of two pictures.
@@ -60,12 +60,12 @@ pub(super) fn angle(a: [f64; 3], b: [f64; 3]) -> f64 {
 
 impl Shadow {
     /// Share of the pixels that belong to the shadow.
-    pub fn share(&self) -> f64 {
+    pub(crate) fn share(&self) -> f64 {
         self.count(|fate| fate == Fate::Captured) as f64 / self.rays.len() as f64
     }
 
     /// Number of rays that were left unfinished.
-    pub fn unfinished(&self) -> usize {
+    pub(crate) fn unfinished(&self) -> usize {
         self.count(|fate| fate == Fate::Unfinished)
     }
 
@@ -74,12 +74,12 @@ impl Shadow {
     }
 
     /// Steps of all rays, rejected ones included; each evaluates the model six times.
-    pub fn steps(&self) -> usize {
+    pub(crate) fn steps(&self) -> usize {
         self.rays.iter().map(|ray| ray.steps).sum()
     }
 
     /// Largest drift of `g(k, k)` over the sum of the sizes of its terms, of the rays that escaped.
-    pub fn drift(&self) -> f64 {
+    pub(crate) fn drift(&self) -> f64 {
         let escaped = self.rays.iter().filter(|ray| matches!(ray.fate, Fate::Escaped(_)));
         escaped.map(|ray| ray.drift).fold(0.0, f64::max)
     }
@@ -88,7 +88,7 @@ impl Shadow {
     ///
     /// # Errors
     /// [`RelativityError::Sizes`].
-    pub fn difference(&self, other: &Self) -> Result<Difference, RelativityError> {
+    pub(crate) fn difference(&self, other: &Self) -> Result<Difference, RelativityError> {
         let (mut apart, mut angles) = (0, Vec::new());
         for pair in self.pairs(other)? {
             match pair {

@@ -45,7 +45,7 @@ impl Sky {
     }
 
     /// Colour of a direction, a unit vector.
-    pub fn colour(&self, direction: [f64; 3]) -> [u8; 3] {
+    pub(crate) fn colour(&self, direction: [f64; 3]) -> [u8; 3] {
         if angle(direction, self.disc.0) < self.disc.1 {
             return [255; 3];
         }

@@ -1,5 +1,7 @@
 //! Rays, shadows and pictures against closed forms.
 
+use super::rays::{Fate, trace};
+use super::tetrad::Tetrad;
 use super::vector::{norm, product, times};
 use super::*;
 use crate::lagrangian::{EulerLagrange, HandWritten, Lagrangian, build};

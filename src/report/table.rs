@@ -8,7 +8,7 @@ const GAP: usize = 2;
 const LEAST: usize = 24;
 
 /// Text of a table with aligned columns: numbers to the right, words to the left, no trailing blanks, lines of at most
-/// [`WIDTH`] characters.
+/// `WIDTH` characters.
 ///
 /// A table that is wider has its headers cut at blanks, then its longest words, and at last it is cut into several tables below
 /// each other, which begin with the same column. Rows may be shorter than the header. A cell counts as a number if it begins

@@ -48,7 +48,7 @@ impl<'a, S: Scalar> Driven<'a, S> {
     }
 
     /// [`rollout_in_pieces`](super::rollout_in_pieces) under the force.
-    pub fn rollout_in_pieces(
+    pub(crate) fn rollout_in_pieces(
         &self,
         q: &[S],
         v: &[S],

@@ -67,12 +67,12 @@ impl<S: Scalar> SampledForce<S> {
     }
 
     /// First and last time.
-    pub fn span(&self) -> (S, S) {
+    pub(crate) fn span(&self) -> (S, S) {
         (self.times[0], self.times[self.times.len() - 1])
     }
 
     /// `Q` at a time into `force`, `(n)`.
-    pub fn at(&self, t: S, force: &mut [S]) {
+    pub(crate) fn at(&self, t: S, force: &mut [S]) {
         let n = self.n;
         if self.times.len() == 1 {
             return force.copy_from_slice(&self.values);
@@ -90,7 +90,7 @@ impl<S: Scalar> SampledForce<S> {
 #[cfg(feature = "data")]
 impl SampledForce<f64> {
     /// The known external forces of a recorded trajectory; `None` if there are none.
-    pub fn recorded(track: &RecordedTrajectory) -> Option<Self> {
+    pub(crate) fn recorded(track: &RecordedTrajectory) -> Option<Self> {
         let n = track.force.len().checked_div(track.len()).filter(|n| *n > 0)?;
         Self::new(n, track.times.clone(), track.force.clone()).ok()
     }

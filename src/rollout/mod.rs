@@ -44,6 +44,7 @@ pub use force::{Force, SampledForce};
 use keep::Failure;
 pub use ode::Integrable;
 pub use options::{Domain, Method, Options};
+#[doc(hidden)]
 pub use pieces::{Balances, Ending, rollout_in_pieces};
 pub use run::{Rollout, rollout, rollout_fixed};
 pub use trajectory::{Statistics, Trajectory};

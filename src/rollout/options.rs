@@ -29,7 +29,7 @@ pub enum Method {
 
 impl Method {
     /// Its name, as in a configuration.
-    pub const fn name(self) -> &'static str {
+    pub(crate) const fn name(self) -> &'static str {
         match self {
             Self::Dopri5 => "dopri5",
             Self::Dop853 => "dop853",
@@ -59,13 +59,8 @@ impl<S: Scalar> Domain<S> {
     }
 
     /// Number of components `2n`.
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.bounds.len()
-    }
-
-    /// `true` if no component is described.
-    pub fn is_empty(&self) -> bool {
-        self.bounds.is_empty()
     }
 
     /// Bounds of every component of `(q, v)`.
@@ -74,7 +69,7 @@ impl<S: Scalar> Domain<S> {
     }
 
     /// First component of `(q, v)` outside its bounds, with the bounds.
-    pub fn violation(&self, state: &[S]) -> Option<(usize, S, S)> {
+    pub(crate) fn violation(&self, state: &[S]) -> Option<(usize, S, S)> {
         self.bounds.iter().zip(state).enumerate().find_map(|(index, (bounds, &x))| match *bounds {
             Some((lower, upper)) if !(x >= lower && x <= upper) => Some((index, lower, upper)),
             _ => None,
@@ -104,7 +99,7 @@ impl<S: Scalar> Domain<S> {
 /// | `t_end` | given | time of the last sample; before `t0` integrates backwards | finite |
 /// | `dt` | given | distance of samples; its sign is ignored | finite, not 0, at most 10^8 samples |
 /// | `method` | `Dopri5` | integrator | |
-/// | `rtol`, `atol` | 1e-6, 1e-8 | local error per step: `atol + rtol abs(y)` per component, root mean square | >= 0, not both 0, not finer than [`Options::least_tolerance`] of the state |
+/// | `rtol`, `atol` | 1e-6, 1e-8 | local error per step: `atol + rtol abs(y)` per component, root mean square | >= 0, not both 0, not finer than the rounding of the state |
 /// | `step` | `dt` | longest step of the structure-preserving methods, cut to the distance of samples; `rtol` and `atol` mean nothing to them | finite, > 0 |
 /// | `max_steps` | 1,000,000 | attempts of all steps | >= 1 |
 /// | `domain` | none | where the trajectory must stay | `2n` components |
@@ -163,7 +158,7 @@ impl<S: Scalar> Options<S> {
 
     /// Finest relative tolerance that the scalar can keep, about nine of its roundings: 1e-6 in `f32`, 2e-15 in `f64`. Below
     /// it steps shrink until they no longer advance the time, and never arrive.
-    pub fn least_tolerance() -> S {
+    pub(crate) fn least_tolerance() -> S {
         S::of_f64(if S::epsilon().to_f64() > 1e-12 { 1e-6 } else { 2e-15 })
     }
 
@@ -171,7 +166,7 @@ impl<S: Scalar> Options<S> {
     ///
     /// # Errors
     /// [`RolloutError::Invalid`] naming the option.
-    pub fn check(&self, n: usize) -> Result<(), RolloutError> {
+    pub(crate) fn check(&self, n: usize) -> Result<(), RolloutError> {
         let invalid = |what, problem: String| Err(RolloutError::Invalid { what, problem });
         for (what, value) in [("t0", self.t0), ("t_end", self.t_end), ("dt", self.dt)] {
             if !value.is_finite() {

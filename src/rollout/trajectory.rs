@@ -126,7 +126,7 @@ impl<S: Scalar> Trajectory<S> {
     ///
     /// # Errors
     /// As there.
-    pub fn csv_header<T: AsRef<str>>(&self, columns: &[T]) -> Result<String, RolloutError> {
+    pub(crate) fn csv_header<T: AsRef<str>>(&self, columns: &[T]) -> Result<String, RolloutError> {
         let n = self.coordinates;
         if columns.len() != 2 * n {
             return Err(RolloutError::Invalid {

@@ -78,7 +78,7 @@ impl Shooting {
     /// Settings of a small network beside a known Lagrangian whose constants are learned: longer and bolder, for a constant
     /// has a longer way to go than a weight; with more weight decay, which leaves the constants alone; and with segments joined
     /// as closely as samples are followed, for constants are known by the long run.
-    pub fn grey_box() -> Self {
+    pub(crate) fn grey_box() -> Self {
         let (method, rate, epochs, weight_decay, continuity) = (Method::Soap, 0.01, 400, 3e-3, 1.0);
         Self { method, rate, epochs, weight_decay, continuity, ..Self::default() }
     }
@@ -87,12 +87,12 @@ impl Shooting {
     ///
     /// # Errors
     /// The first value out of range.
-    pub fn validate(&self) -> Result<(), ConfigError> {
+    pub(crate) fn validate(&self) -> Result<(), ConfigError> {
         self.faults().into_iter().next().map_or(Ok(()), Err)
     }
 
     /// Every value out of range, in the order of the keys.
-    pub fn faults(&self) -> Vec<ConfigError> {
+    pub(crate) fn faults(&self) -> Vec<ConfigError> {
         let mut faults = Faults::default();
         let within = 2..=1 << 16;
         let found = self.samples_per_segment.to_string();

@@ -23,7 +23,7 @@ pub enum Chart {
 impl Chart {
     /// The chart of a coordinate of this unit over this range: an angle that is not periodic and stays between two poles, any
     /// other angle, a number of one sign, any number. A number of unit 1 between 0 and `pi` may be a polar angle.
-    pub fn of(periodic: bool, unit: &str, [low, high]: [f64; 2]) -> Self {
+    pub(crate) fn of(periodic: bool, unit: &str, [low, high]: [f64; 2]) -> Self {
         let between_poles = low > 0.0 && high < PI;
         match (periodic, unit) {
             (true, _) => Self::Circle,
@@ -278,7 +278,7 @@ impl Basis {
 
     /// [`Degrees::usual`] of these charts, or lower ones as far as the unknown coefficients of a search for symmetries would be too
     /// many: first those of powers, then those of harmonics.
-    pub fn usual(names: &[String], charts: &[Chart]) -> (Self, Degrees) {
+    pub(crate) fn usual(names: &[String], charts: &[Chart]) -> (Self, Degrees) {
         let mut degrees = Degrees::usual(charts);
         let mut basis = Self::new(names, charts, degrees);
         while unknowns(names.len(), basis.len()) > USUAL {
@@ -316,7 +316,7 @@ impl Basis {
     }
 
     /// Names of the coordinates.
-    pub fn names(&self) -> &[String] {
+    pub(crate) fn names(&self) -> &[String] {
         &self.names
     }
 
@@ -345,7 +345,7 @@ impl Basis {
     }
 
     /// Function `k` as a formula; empty for the constant.
-    pub fn text(&self, k: usize) -> String {
+    pub(crate) fn text(&self, k: usize) -> String {
         let factors = self.products[k].iter().enumerate().map(|(i, &f)| self.factors[i][f].text(&self.names[i]));
         let (below, above): (Vec<String>, Vec<String>) =
             factors.filter(|text| !text.is_empty()).partition(|text| text.starts_with("1/"));

@@ -55,7 +55,7 @@ impl<S: Scalar> CanonicalForm<S> {
     }
 
     /// `p0.v0 - L0`, the energy of the base state before it is taken out.
-    pub fn energy(&self) -> S {
+    pub(crate) fn energy(&self) -> S {
         let action = self.momentum.iter().zip(&self.velocity).map(|(&p, &v)| p * v);
         action.fold(-self.lagrangian, |sum, x| sum + x)
     }

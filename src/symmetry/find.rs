@@ -68,7 +68,7 @@ impl Columns {
 ///
 /// `tolerance` is the noise of the terms, [`EXACT`] for a Lagrangian written down; without one, for a learned model, the largest
 /// gap decides (see [`Separation`]). States should be drawn from an open set, several times as many as there are unknown
-/// coefficients, [`unknowns`](super::unknowns).
+/// coefficients.
 ///
 /// # Errors
 /// [`SymmetryError`].

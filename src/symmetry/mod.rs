@@ -54,12 +54,14 @@ mod sparse;
 
 pub use algebra::Algebra;
 pub(crate) use bases::{bases, enough, most_symmetries};
-pub use basis::{Basis, Chart, Degrees, unknowns};
+pub(crate) use basis::unknowns;
+pub use basis::{Basis, Chart, Degrees};
 pub use canonical::{Canonical, CanonicalForm};
 pub(crate) use charges::drifts;
 pub use charges::{Charge, charges};
 pub use compare::{Comparison, compare};
-pub use conserved::{Conserved, Quadratic, quadratic, quadratic_unknowns};
+pub(crate) use conserved::quadratic_unknowns;
+pub use conserved::{Conserved, Quadratic, quadratic};
 pub use error::SymmetryError;
 pub use field::Field;
 pub use find::{EXACT, Symmetries, symmetries};

@@ -28,7 +28,7 @@ impl Separation {
     /// With a tolerance the first value above it must exceed the last below it 30 times, and the tolerance itself three
     /// times. Without one, values above 0.1 are not zero, and the cut is where the ratio of neighbours is largest, 10 at
     /// least, values below 1e-3 taken as that. Otherwise there is no gap and no count.
-    pub fn new(values: &[f64], tolerance: Option<f64>) -> Self {
+    pub(crate) fn new(values: &[f64], tolerance: Option<f64>) -> Self {
         // Nothing is smaller than the rounding of a number near 1.
         let floor = f64::EPSILON;
         let ratio = |k: usize, below: f64| values.get(k).map(|above| above / below.max(floor));

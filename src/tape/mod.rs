@@ -16,7 +16,7 @@
 //! variable and one per operation on two variables; functions of one variable, constant factors and constant summands
 //! need none. The sweep holds `s` bytes per node besides, in [`Adjoints`]. A reset keeps the memory and costs nothing per
 //! node (the one after a recording that outgrew the room allocates room for it); the next sweep clears one adjoint per
-//! node recorded, not per node held. A [`Replay`] holds `s` bytes per row, lane and chunk of [`LANES`] states for the
+//! node recorded, not per node held. A [`Replay`] holds `s` bytes per row, lane and chunk of 64 states for the
 //! values, those of one chunk for the adjoints; [`Replay::evaluate`] those of one chunk alone.
 //!
 //! In all of them constants are never recorded and variables of two recordings never mix silently. In the first two a zero
@@ -36,5 +36,5 @@ pub use driver::{
 pub use eager::{Adjoints, Statistics, Tape};
 pub use engine::{Depth, Evaluation, MixedDirections, Recorded, STATES};
 pub use error::TapeError;
-pub use program::{LANES, Program, Replay, Tracer};
+pub use program::{Program, Replay, Tracer};
 pub use var::Var;

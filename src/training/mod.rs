@@ -12,16 +12,18 @@ pub(crate) mod solver;
 pub(crate) mod trainer;
 pub(crate) mod violations;
 
-pub use checkpoint::{CheckpointError, Every, LATEST, PREVIOUS};
+pub use checkpoint::{CheckpointError, Every};
 #[doc(hidden)]
-pub use checkpoint::{CheckpointManager, Identity, Restored, Saved, Snapshot, remove_checkpoints, saved};
+pub use checkpoint::{
+    CheckpointManager, Identity, LATEST, PREVIOUS, Restored, Saved, Snapshot, remove_checkpoints, saved,
+};
 pub use epoch::Epoch;
 #[doc(hidden)]
 pub use memory::training_memory;
 pub use objective::{BatchReport, Failure, Objective, ThreadsError};
 pub use problem::TrainingProblem;
 pub use recipe::{Outcome, RecipeError, run};
-pub use solver::{EpochSolver, Hooks, Progress, StepError, TrainingState, Watcher};
+pub use solver::{Hooks, Progress, StepError, Watcher};
 #[doc(hidden)]
 pub use trainer::{ResumeOptions, resume};
 pub use trainer::{Stop, Trained, TrainingError, train};

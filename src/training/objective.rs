@@ -352,7 +352,7 @@ impl<S: Scalar> Objective<S> {
     ///
     /// # Errors
     /// When the threads cannot be started.
-    pub fn of_model(model: Model<S>, penalty: Penalty, threads: usize) -> Result<Self, ThreadsError> {
+    pub(crate) fn of_model(model: Model<S>, penalty: Penalty, threads: usize) -> Result<Self, ThreadsError> {
         Ok(Self::on(self::threads(threads)?, model, penalty))
     }
 

@@ -1,6 +1,7 @@
 //! Training as a problem of argmin's: loss and gradient of a network over a training set.
 
 use crate::data::Dataset;
+use crate::optimizers::{Method, Moments};
 use crate::scalar::{Real, Scalar};
 use crate::training::objective::{BatchReport, Objective};
 use argmin::core::{CostFunction, Error, Gradient};
@@ -9,9 +10,8 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 /// Problem of an argmin run: a network's parameters, the states it learns from and those it is judged by.
 ///
 /// The cost of parameters is loss plus penalty plus `weight_decay |w|^2 / 2` over all training states, `w` the weights among
-/// them, and the gradient is its derivative; a line search that asks for both at one point has one evaluation. Every solver of argmin's, of this crate's
-/// ([`EpochSolver`](crate::training::EpochSolver)) or of your own takes it: those that go by batches call
-/// [`TrainingProblem::step`].
+/// them, and the gradient is its derivative; a line search that asks for both at one point has one evaluation. Every solver of argmin's or of
+/// your own takes it; what goes by batches calls [`TrainingProblem::step`], and [`Moments::update`] with its gradients.
 pub struct TrainingProblem<'a, S> {
     evaluator: Mutex<Evaluator<S>>,
     training: &'a Dataset<S>,
@@ -51,13 +51,19 @@ impl<'a, S: Scalar> TrainingProblem<'a, S> {
     }
 
     /// States to learn from.
-    pub fn training(&self) -> &'a Dataset<S> {
+    pub(crate) fn training(&self) -> &'a Dataset<S> {
         self.training
     }
 
     /// States that choose among parameters.
-    pub fn validation(&self) -> &'a Dataset<S> {
+    pub(crate) fn validation(&self) -> &'a Dataset<S> {
         self.validation
+    }
+
+    /// Moments before the first step of an update rule, with the weight matrices that SOAP turns.
+    pub fn moments(&mut self, method: Method) -> Moments<S> {
+        let model = self.objective().model();
+        Moments::for_method(method, model.parameters(), model.matrices())
     }
 
     /// Loss, penalty and gradient of a batch, the training states `rows`, without weight decay; `gradient` is overwritten.
@@ -72,7 +78,7 @@ impl<'a, S: Scalar> TrainingProblem<'a, S> {
     }
 
     /// Evaluations of the full training set so far.
-    pub fn evaluations(&self) -> usize {
+    pub(crate) fn evaluations(&self) -> usize {
         self.lock().evaluations
     }
 

@@ -6,7 +6,7 @@
 
 use crate::configuration::{OnFailure, Optimizer, Phase};
 use crate::optimizers::Schedule;
-use crate::optimizers::{Moments, Update};
+use crate::optimizers::Update;
 use crate::random::RandomGenerator;
 use crate::scalar::{Real, Scalar};
 use crate::training::checkpoint::{CheckpointManager, Clock, Ended, OptimizerState, PhaseState};
@@ -182,11 +182,6 @@ impl<S: Scalar> EpochSolver<S> {
         (self.history, self.stopped)
     }
 
-    /// One row per epoch so far.
-    pub fn history(&self) -> &[Epoch] {
-        &self.history
-    }
-
     fn rate(&self, epoch_of_phase: f64) -> f64 {
         let p = &self.phase;
         p.schedule.rate(p.rate, p.eta_min, p.t_max, epoch_of_phase, p.epochs as f64)
@@ -305,8 +300,7 @@ impl<'a, S: Scalar> Solver<TrainingProblem<'a, S>, TrainingState<S>> for EpochSo
             course.average.clone_from(&course.weights);
             course.averaged_steps = 0;
             let problem = problem.problem.as_mut().ok_or_else(|| Error::msg("the training problem is missing"))?;
-            let matrices = problem.objective().model().matrices().into_iter();
-            course.moments = Moments::for_method(self.optimizer.method, course.weights.len(), matrices);
+            course.moments = problem.moments(self.optimizer.method);
         }
         Ok((state, None))
     }

@@ -102,18 +102,21 @@ class Surface:
                 self.show(origin)
 
     def methods(self):
-        types = {name for module, name in self.items if self.own[module][name] in ("struct", "enum", "type", "trait")}
-        count = 0
-        for text in self.files.values():
+        """Public methods of the types shown, by room; a type's methods stand in its own room."""
+        kinds = ("struct", "enum", "type", "trait")
+        types = {(module.split("::")[0], name) for module, name in self.items if self.own[module][name] in kinds}
+        count = collections.Counter()
+        for module, text in self.files.items():
+            room = module.split("::")[0]
             for found in IMPL.finditer(text):
-                if found.group(1) in types:
+                if (room, found.group(1)) in types:
                     depth, end = 0, found.end() - 1
                     while True:
                         depth += (text[end] == "{") - (text[end] == "}")
                         end += 1
                         if depth == 0:
                             break
-                    count += len(re.findall(r"^    pub (?:const |unsafe )*fn ", text[found.end() : end], re.M))
+                    count[room] += len(re.findall(r"^    pub (?:const |unsafe )*fn ", text[found.end() : end], re.M))
         return count
 
 
@@ -121,9 +124,10 @@ def main():
     arguments = [argument for argument in sys.argv[1:] if argument != "--list"]
     surface = Surface(read(arguments[0] if arguments else os.path.join(os.path.dirname(__file__), "../../src")))
     modules, items, methods = len(surface.modules) - 1, len(surface.items), surface.methods()
-    print(f"{modules + items + methods} public: {modules} modules, {items} items, {methods} methods")
+    count = methods.total()
+    print(f"{modules + items + count} public: {modules} modules, {items} items, {count} methods")
     rooms = collections.Counter(module.split("::")[0] for module, _ in surface.items)
-    print(", ".join(f"{room or 'crate'} {count}" for room, count in rooms.most_common()))
+    print(", ".join(f"{room or 'crate'} {count} + {methods[room]}" for room, count in rooms.most_common()))
     if "--list" in sys.argv:
         print("\n".join(f"{module}::{name}" for module, name in sorted(surface.items)))
 

@@ -1,5 +1,5 @@
 use super::*;
-use crate::lagrangian::{configure, exact_acceleration};
+use crate::lagrangian::configure;
 
 fn given(list: &[(&str, &str)]) -> Vec<(String, String)> {
     list.iter().map(|&(s, t)| (s.into(), t.into())).collect()
@@ -131,7 +131,7 @@ fn parameters_are_read_and_refused() {
         assert!(matches!(error("n-pendulum", &[("n", bad)]), SystemError::Value { symbol, .. } if symbol == "n"));
     }
     assert!(matches!(
-        exact_acceleration::<f64>("double-pendulum", &[], &[1.0], &[1.0, 2.0]),
+        configure::<f64>("double-pendulum", &[]).unwrap().exact_acceleration(&[1.0], &[1.0, 2.0]),
         Err(SystemError::State { expected: 2, found: 1, .. })
     ));
 }

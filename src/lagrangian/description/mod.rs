@@ -31,10 +31,10 @@ pub struct Description {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub lagrangian: Option<String>,
     /// Coordinates, in order.
-    pub coordinates: Vec<CoordinateDescription>,
+    pub(crate) coordinates: Vec<CoordinateDescription>,
     /// Constants by name.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub parameters: BTreeMap<String, ParameterDescription>,
+    pub(crate) parameters: BTreeMap<String, ParameterDescription>,
     /// Names for formulas; they may use each other in any order.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub definitions: BTreeMap<String, String>,
@@ -49,10 +49,10 @@ pub struct Description {
     pub validation: BTreeMap<String, [Quantity; 2]>,
     /// Motions on which a model is tried.
     #[serde(default, skip_serializing_if = "TrajectoryDescription::is_empty")]
-    pub trajectory: TrajectoryDescription,
+    pub(crate) trajectory: TrajectoryDescription,
     /// Shell in which training states lie, of the metric of a field around a centre; those of the bounds if left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub shell: Option<ShellDescription>,
+    pub(crate) shell: Option<ShellDescription>,
 }
 
 /// Shell around a centre.
@@ -60,7 +60,7 @@ pub struct Description {
 #[serde(deny_unknown_fields)]
 pub struct ShellDescription {
     /// Names of the Cartesian coordinates around the centre.
-    pub coordinates: Vec<String>,
+    pub(crate) coordinates: Vec<String>,
     /// Lowest and highest distance from it.
     pub radius: [Quantity; 2],
     /// Largest rapidity in a local frame; 1 if left out.

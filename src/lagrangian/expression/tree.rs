@@ -28,7 +28,7 @@ pub struct Expression {
 
 impl Expression {
     /// The names of quantities in it, in order, each as often as it occurs.
-    pub fn names(&self) -> impl Iterator<Item = &str> {
+    pub(crate) fn names(&self) -> impl Iterator<Item = &str> {
         self.nodes.iter().filter_map(|node| match node {
             Node::Name(name, _) => Some(name.as_str()),
             _ => None,

@@ -54,7 +54,7 @@ impl Header {
     ///
     /// # Errors
     /// [`ContainerError::Header`] or [`ContainerError::Version`].
-    pub fn validate(&self) -> Result<(), ContainerError> {
+    pub(crate) fn validate(&self) -> Result<(), ContainerError> {
         check_version(FORMAT, self.format, &self.crate_version)?;
         let require = |ok: bool, text: &str| if ok { Ok(()) } else { Err(ContainerError::Header(text.to_string())) };
         self.architecture.validate().map_err(|e| ContainerError::Header(e.to_string()))?;

@@ -24,7 +24,8 @@ mod header;
 mod tests;
 
 pub use crate::storage::container::StoredPrecision;
-pub use header::{FORMAT, Header, MAX_COORDINATES, MAX_WIDTH};
+pub(crate) use header::MAX_WIDTH;
+pub use header::{FORMAT, Header};
 
 use crate::network::{Architecture, DissipationLayout, Layout, LinearMap};
 use crate::scalar::Scalar;
@@ -36,7 +37,7 @@ use std::path::Path;
 pub type ModelFileError = ContainerError;
 
 /// Largest file that is read, in bytes.
-pub const MAX_BYTES: u64 = 1 << 30;
+pub(crate) const MAX_BYTES: u64 = 1 << 30;
 
 /// Marks of a model file.
 const MODEL: Kind = Kind { name: "model", key: "lnn", format: FORMAT };
@@ -64,7 +65,7 @@ impl<S: Scalar> ModelFile<S> {
     /// The bytes of the file; weights are rounded to `header.precision` (exact when they came from there).
     ///
     /// # Errors
-    /// A header that fails [`Header::validate`], a wrong number of weights, a weight that is not finite.
+    /// A header that contradicts itself, a wrong number of weights, a weight that is not finite.
     pub fn to_bytes(&self) -> Result<Vec<u8>, ModelFileError> {
         self.header.validate()?;
         let slots = slots(&self.header.architecture)?;
@@ -127,7 +128,7 @@ impl<S: Scalar> ModelFile<S> {
         write_whole(files, path, &self.to_bytes()?).map_err(ModelFileError::Write)
     }
 
-    /// Reads a regular file of at most [`MAX_BYTES`].
+    /// Reads a regular file of at most 1 GiB.
     ///
     /// # Errors
     /// As [`ModelFile::from_bytes`], and [`ModelFileError::Read`].

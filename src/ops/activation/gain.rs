@@ -8,7 +8,7 @@ impl Activation {
     ///
     /// Trapezoidal rule with step 1/16 on `[-14, 14]`; accurate to `1e-12`, for the integrand is analytic in a strip of
     /// half-width `pi/2` or wider, where the rule converges like `e^(-2 pi (pi/2) 16)`.
-    pub fn variance_gain(self) -> f64 {
+    pub(crate) fn variance_gain(self) -> f64 {
         const STEP: f64 = 1.0 / 16.0;
         let mean: f64 = (-224..=224)
             .map(|k| {

@@ -8,6 +8,7 @@ use crate::scalar::Real;
 
 /// Elementwise function that ends a layer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum Activation {
     /// `x Phi(x)`, exact (error function).
     Gelu,

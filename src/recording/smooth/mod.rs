@@ -198,12 +198,12 @@ impl Smoothing {
     }
 
     /// Expected error of the accelerations over their size, of the worst coordinate.
-    pub fn acceleration_error(&self) -> f64 {
+    pub(crate) fn acceleration_error(&self) -> f64 {
         self.coordinates.iter().map(|chosen| chosen.quality.relative()).fold(0.0, f64::max)
     }
 
     /// Longest window in samples of a trajectory with the usual step.
-    pub fn window(&self) -> usize {
+    pub(crate) fn window(&self) -> usize {
         self.coordinates.iter().map(|chosen| chosen.quality.window).max().unwrap_or(0)
     }
 

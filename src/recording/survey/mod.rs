@@ -6,11 +6,10 @@ mod motionless;
 mod suspicious;
 mod warnings;
 
-pub use consistency::Consistency;
-pub use coordinate::CoordinateSurvey;
-pub use motionless::Stillness;
+pub(crate) use coordinate::CoordinateSurvey;
+pub(crate) use motionless::Stillness;
 pub(crate) use motionless::stillness;
-pub use suspicious::{Kind, Suspicion};
+pub(crate) use suspicious::{Kind, Suspicion};
 
 use crate::recording::smooth::{SmoothError, SmoothOptions, Smoothing};
 use crate::recording::statistics::steps;
@@ -19,7 +18,7 @@ use consistency::compare;
 use serde::Serialize;
 
 /// Samples per period of the fast motion below which sampling is called coarse.
-pub const FEW_SAMPLES: f64 = 20.0;
+pub(crate) const FEW_SAMPLES: f64 = 20.0;
 /// A step of an angle, in rad, from which on unwrapping is a guess.
 const GUESS: f64 = 2.0;
 
@@ -42,7 +41,7 @@ impl Default for SurveyOptions {
 
 /// One trajectory.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct TrajectorySurvey {
+pub(crate) struct TrajectorySurvey {
     /// Its name.
     pub name: String,
     /// Row of its first sample in the file.
@@ -73,7 +72,7 @@ pub struct Survey {
     /// Median step in s.
     pub step: f64,
     /// The trajectories.
-    pub tracks: Vec<TrajectorySurvey>,
+    pub(crate) tracks: Vec<TrajectorySurvey>,
     /// Rows left out because they repeat the row before.
     pub duplicates: usize,
     /// Gaps in time.
@@ -81,9 +80,9 @@ pub struct Survey {
     /// Stretches between gaps that are too short.
     pub dropped: Vec<Dropped>,
     /// The coordinates.
-    pub coordinates: Vec<CoordinateSurvey>,
+    pub(crate) coordinates: Vec<CoordinateSurvey>,
     /// Places that do not look like smooth motion with noise; of very many the first.
-    pub suspicious: Vec<Suspicion>,
+    pub(crate) suspicious: Vec<Suspicion>,
     /// Number of suspicious places.
     pub suspicious_count: usize,
     /// Degree of the polynomials of smoothing.
@@ -91,7 +90,7 @@ pub struct Survey {
     /// The advised way to learn.
     pub targets: Targets,
     /// Part that would be held out for validation.
-    pub held_out: Option<HeldOut>,
+    pub(crate) held_out: Option<HeldOut>,
     /// The same in words.
     pub held_out_text: String,
     /// Names of coordinates that stand still: nothing can be learned from them.
@@ -105,7 +104,7 @@ pub struct Survey {
 ///
 /// # Errors
 /// [`SmoothError`] for options out of range, or trajectories too short for any window.
-pub fn plan(recording: &Recording, options: &SmoothOptions) -> Result<(Smoothing, Smoothing), SmoothError> {
+pub(crate) fn plan(recording: &Recording, options: &SmoothOptions) -> Result<(Smoothing, Smoothing), SmoothError> {
     let alone = Smoothing::choose(recording, &SmoothOptions { velocities: false, ..options.clone() })?;
     let holds = |i: usize| compare(recording, i, 1, &alone).holds();
     let trusted = options.velocities && recording.has_velocities() && (0..recording.n()).all(holds);

@@ -164,6 +164,7 @@ impl Claim {
     }
 
     /// Number of the claim: one more than that of claimants before.
+    #[cfg(test)]
     pub fn number(&self) -> u64 {
         self.number
     }

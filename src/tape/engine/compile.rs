@@ -65,11 +65,11 @@ impl<S: Scalar> Recorded<S> {
         self.parameters
     }
     /// Scales `s_i` of the coordinates.
-    pub fn scale(&self) -> &[S] {
+    pub(crate) fn scale(&self) -> &[S] {
         &self.scale
     }
     /// Offset among the parameters, rows and columns of every weight matrix, in order.
-    pub fn matrices(&self) -> Vec<(usize, usize, usize)> {
+    pub(crate) fn matrices(&self) -> Vec<(usize, usize, usize)> {
         let dense = |operation: &Operation<S>| match operation {
             Operation::Dense(dense) => Some((dense.weights, dense.outputs, dense.inputs)),
             _ => None,

@@ -20,7 +20,7 @@ pub struct MixedDirections<S> {
 
 impl<S> MixedDirections<S> {
     /// Forgets all directions; keeps the buffers.
-    pub fn clear(&mut self, moving: bool) {
+    pub(crate) fn clear(&mut self, moving: bool) {
         self.s.clear();
         self.t.clear();
         self.moving = moving;
@@ -83,12 +83,8 @@ impl<S: Scalar> Evaluation<S> {
         }
     }
 
-    /// Number of coordinates `n`.
-    pub fn coordinates(&self) -> usize {
-        self.recorded.coordinates()
-    }
     /// The Lagrangian.
-    pub fn recorded(&self) -> &Arc<Recorded<S>> {
+    pub(crate) fn recorded(&self) -> &Arc<Recorded<S>> {
         &self.recorded
     }
 

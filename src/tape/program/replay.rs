@@ -42,10 +42,6 @@ impl<S: Scalar> Replay<S> {
             program,
         }
     }
-    /// The program.
-    pub fn program(&self) -> &Program<S> {
-        &self.program
-    }
 
     /// Computes `outputs` `(lanes, outputs)` from `inputs` `(lanes, inputs)` and `parameters`, all row-major.
     ///

@@ -23,6 +23,7 @@ const COST: u32 = 100;
 
 /// Time between two checkpoints.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Every {
     /// When so many epochs have ended since the last.
     Epochs(usize),
