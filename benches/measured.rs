@@ -36,7 +36,7 @@ use lnn::analysis::{
     PredictionError, Predictions, Window, predict_by_constant_velocity, predict_by_motion, prediction_error,
 };
 use lnn::configuration::{Config, Penalty};
-use lnn::data::{Datasets, Measured, PrepareOptions};
+use lnn::data::{Datasets, PrepareOptions, RecordingSplit};
 use lnn::lagrangian::EulerLagrange;
 use lnn::network::NetworkLagrangian;
 use lnn::recording::{RecordedTrajectory, Recording, Targets};
@@ -96,8 +96,8 @@ fn made() -> Recording {
 }
 
 /// A recording smoothed and divided as `lnn fit` does.
-fn measured(recording: &Recording) -> Measured {
-    Measured::new(recording, &PrepareOptions::default()).expect("a recording long enough")
+fn measured(recording: &Recording) -> RecordingSplit {
+    RecordingSplit::new(recording, &PrepareOptions::default()).expect("a recording long enough")
 }
 
 /// A predictor's errors at a few times, and how long it learned.
@@ -108,7 +108,7 @@ struct Line {
 }
 
 /// Learns a Lagrangian as `lnn fit` does.
-fn learned(measured: &Measured, friction: bool, targets: Targets, scale: Scale) -> NetworkLagrangian<f64> {
+fn learned(measured: &RecordingSplit, friction: bool, targets: Targets, scale: Scale) -> NetworkLagrangian<f64> {
     let data: Datasets<f32> = measured.datasets(targets).expect("states with full windows");
     let mut config: Config = lnn::presets::suggested("double pendulum", &data);
     config.network.hidden = scale.hidden.to_vec();
@@ -144,7 +144,12 @@ fn learned(measured: &Measured, friction: bool, targets: Targets, scale: Scale) 
 
 /// Predictions of the rest of a film by all that can be learned from its first part, and by the textbook's pendulum learned
 /// from another; without `scale` nothing is trained.
-fn lines(recording: &Recording, measured: &Measured, other: Option<&Measured>, scale: Option<Scale>) -> Vec<Line> {
+fn lines(
+    recording: &Recording,
+    measured: &RecordingSplit,
+    other: Option<&RecordingSplit>,
+    scale: Option<Scale>,
+) -> Vec<Line> {
     for (name, c) in recording.coordinates.iter().zip(&measured.smoothing.coordinates) {
         let (noise, relative) = (c.noise.sigma, 100.0 * c.quality.relative());
         println!("{name}: noise {noise:.2e} rad, windows of {:.3} s, accelerations good to {relative:.1} %", c.seconds);
@@ -273,7 +278,7 @@ fn filmed(mut films: Vec<PathBuf>, scale: Option<Scale>) -> String {
         let measured = measured(&recording);
         (recording, measured)
     };
-    let recordings: Vec<(Recording, Measured)> = films.iter().map(read).collect();
+    let recordings: Vec<(Recording, RecordingSplit)> = films.iter().map(read).collect();
     for (k, film) in films.iter().enumerate() {
         let name = film.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
         println!("{name}");

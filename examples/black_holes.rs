@@ -7,7 +7,7 @@ use lnn::lagrangian::{configure_values, find};
 use lnn::network::NetworkLagrangian;
 use lnn::network::file::ModelFile;
 use lnn::pipeline::model_file;
-use lnn::relativity::{Around, Pair};
+use lnn::relativity::{CentralCoordinates, LearnedHole};
 use std::borrow::Cow;
 use std::error::Error;
 use std::path::Path;
@@ -18,10 +18,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     let system = configure_values::<f64>(Cow::Borrowed(find(&header.system)?), &header.parameters)?;
     let coordinates = system.system.coordinates(system.coordinates);
     let names: Vec<&str> = coordinates.iter().map(|c| c.name.as_ref()).collect();
-    let around =
-        Around::of_names(&names).ok_or("expected the coordinates of a hole: t, x, y, z or t, r, theta, phi")?;
+    let around = CentralCoordinates::of_names(&names)
+        .ok_or("expected the coordinates of a hole: t, x, y, z or t, r, theta, phi")?;
     let (learned, exact) = (NetworkLagrangian::new(header.architecture, weights)?, system.build()?);
-    let pair = Pair { exact: &*exact, learned: &learned, system: &system, around, range: (1.35, 110.0) };
+    let pair = LearnedHole { exact: &*exact, learned: &learned, system: &system, around, range: (1.35, 110.0) };
 
     println!("{}", header.system);
     println!("{:70} {:>11} {:>11} {:>9} {:>7}", "", "exact", "learned", "error", "aim");

@@ -7,7 +7,7 @@
 use super::Scale;
 use lnn::analysis::{Determination, Estimate, Observed, determination, places};
 use lnn::configuration::Penalty;
-use lnn::data::{Measured, PrepareOptions};
+use lnn::data::{PrepareOptions, RecordingSplit};
 use lnn::lagrangian::{EulerLagrange, HandWritten, Lagrangian, MechanicsError, Request, Terms};
 use lnn::linalg::Workspace;
 use lnn::network::NetworkLagrangian;
@@ -119,7 +119,7 @@ fn energy_error(model: &[f64], exact: &[f64]) -> f64 {
 fn one(forced: bool, runs: usize, seconds: f64, seed: u64, scale: Scale) -> Vec<(&'static str, Estimate, f64)> {
     let recording = recording(forced, runs, seconds, seed);
     let preparation = PrepareOptions { seed, ..PrepareOptions::default() };
-    let measured = Measured::new(&recording, &preparation).expect("long trajectories");
+    let measured = RecordingSplit::new(&recording, &preparation).expect("long trajectories");
     let data = measured.datasets::<f32>(Targets::Smoothed).expect("states with full windows");
     let mut config = lnn::presets::suggested("cart-pendulum", &data);
     config.seed = seed;

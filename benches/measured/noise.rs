@@ -3,8 +3,8 @@
 
 use super::{Scale, learned};
 use lnn::analysis::acceleration_errors;
-use lnn::data::{Measured, PrepareOptions};
-use lnn::lagrangian::{Configured, EulerLagrange, Request, Terms, configure};
+use lnn::data::{PrepareOptions, RecordingSplit};
+use lnn::lagrangian::{EulerLagrange, Request, SystemInstance, Terms, configure};
 use lnn::random::{RandomGenerator, RngStream};
 use lnn::recording::{RecordedTrajectory, Recording, Targets};
 use lnn::rollout::{Options, Trajectory, rollout};
@@ -61,7 +61,7 @@ fn recordings(exact: &dyn EulerLagrange<f64>, count: usize, seed: u64) -> [Recor
 /// Prints and returns rows `seed,learned from,error,seconds`: the mean of `|a - exact|` over that of `|exact|`, on the states
 /// of trajectories that nobody has seen.
 pub fn compare(count: usize, seeds: std::ops::Range<u64>, scale: Scale) -> Vec<String> {
-    let system: Configured<f64> = configure("double-pendulum", &[]).expect("the defaults are valid");
+    let system: SystemInstance<f64> = configure("double-pendulum", &[]).expect("the defaults are valid");
     let exact = system.build().expect("the defaults are valid");
     let mut rows = Vec::new();
     for seed in seeds {
@@ -74,7 +74,7 @@ pub fn compare(count: usize, seeds: std::ops::Range<u64>, scale: Scale) -> Vec<S
         let mut try_one = |name: &str, recording: &Recording, targets: Targets| {
             let start = Instant::now();
             let preparation = PrepareOptions { seed, ..PrepareOptions::default() };
-            let measured = Measured::new(recording, &preparation).expect("long trajectories");
+            let measured = RecordingSplit::new(recording, &preparation).expect("long trajectories");
             let model = learned(&measured, false, targets, scale);
             let errors = acceleration_errors(exact.as_ref(), &model, &q, &v);
             let mean = errors.iter().map(|e| e.mean).sum::<f64>() / errors.len() as f64;

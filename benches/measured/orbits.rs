@@ -6,12 +6,12 @@
 
 use lnn::configuration::{Precision, Regularizer};
 use lnn::geometry::Sense;
-use lnn::lagrangian::{Configured, EulerLagrange, configure};
+use lnn::lagrangian::{EulerLagrange, SystemInstance, configure};
 use lnn::network::Structure;
 use lnn::pipeline::{FitOptions, InMemory, PreparedFit, RunOptions, Watch, fit};
 use lnn::random::{RandomGenerator, RngStream};
 use lnn::recording::{LoadedRecording, RecordedTrajectory, Recording, Targets};
-use lnn::relativity::{Around, Chart, Pair, Reading};
+use lnn::relativity::{CentralCoordinates, Chart, LearnedHole, Reading};
 use lnn::rollout::{Options, rollout};
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -51,15 +51,15 @@ impl Way {
         }
     }
 
-    fn system(self) -> Configured<f64> {
+    fn system(self) -> SystemInstance<f64> {
         let name = if self == Self::Spherical { "schwarzschild-geodesic" } else { "schwarzschild-cartesian" };
         configure(name, &[]).expect("the defaults are valid")
     }
 
-    fn around(self) -> Around {
+    fn around(self) -> CentralCoordinates {
         match self {
-            Self::Spherical => Around::Spherical { time: 0, radius: 1, polar: 2, azimuth: 3 },
-            _ => Around::Cartesian(Chart::default()),
+            Self::Spherical => CentralCoordinates::Spherical { time: 0, radius: 1, polar: 2, azimuth: 3 },
+            _ => CentralCoordinates::Cartesian(Chart::default()),
         }
     }
 }
@@ -82,11 +82,11 @@ fn turned(rng: &mut RandomGenerator) -> impl Fn([f64; 3]) -> [f64; 3] + use<> {
 /// An orbit in Cartesian coordinates, sampled by its own clock.
 fn orbit(
     hole: &dyn EulerLagrange<f64>,
-    system: &Configured<f64>,
+    system: &SystemInstance<f64>,
     bound: bool,
     rng: &mut RandomGenerator,
 ) -> Vec<[f64; 4]> {
-    let around = Around::Cartesian(Chart::default());
+    let around = CentralCoordinates::Cartesian(Chart::default());
     let [q, v] = if bound {
         let (p, e) = (rng.random_range(8.0..24.0), rng.random_range(0.0..0.5));
         let origin = around.origin();
@@ -186,7 +186,7 @@ fn told(way: Way, orbits: usize, noise: f64, (epochs, threads): (Option<usize>, 
     let (system, learned) = (way.system(), fitted.network);
     let exact = system.build().expect("the defaults are valid");
     let range = if way == Way::Spherical { (3.0, 36.0) } else { (2.5, 36.0) };
-    let pair = Pair { exact: &*exact, learned: &learned, system: &system, around: way.around(), range };
+    let pair = LearnedHole { exact: &*exact, learned: &learned, system: &system, around: way.around(), range };
     pair.readings().expect("an exact metric")
 }
 

@@ -9,7 +9,7 @@
 //! ```
 
 use lnn::analysis::Window;
-use lnn::data::Measured;
+use lnn::data::RecordingSplit;
 use lnn::lagrangian::{EulerLagrange, MechanicsError, Request, Terms};
 use nalgebra::{SMatrix, SVector};
 
@@ -67,7 +67,7 @@ impl Textbook {
     /// The start is linear: the equations are linear in the constants, with smoothed states and accelerations in them.
     /// Then Gauss and Newton's method, damped as Levenberg and Marquardt do, on the predictions of the measured angles
     /// from smoothed states a quarter of a second apart, weighted so that the few chaotic stretches do not decide.
-    pub fn fit(measured: &Measured) -> Self {
+    pub fn fit(measured: &RecordingSplit) -> Self {
         let (mut best, windows) = (Self(linear(measured)), windows(measured));
         let mut residuals = best.residuals(&windows);
         let mut damping = 1e-3;
@@ -121,7 +121,7 @@ impl Textbook {
 }
 
 /// Stretches of the training part, each [`SPAN`] long.
-fn windows(measured: &Measured) -> Vec<Window> {
+fn windows(measured: &RecordingSplit) -> Vec<Window> {
     let estimated = measured.training.estimated();
     let pairs = estimated.iter().zip(&measured.training.states);
     pairs.flat_map(|(e, s)| Window::cut(e.track, (e.q, e.v), s.interior(), 2, SPAN)).collect()
@@ -134,7 +134,7 @@ fn median(residuals: &[f64]) -> f64 {
 }
 
 /// Least squares of both equations, the first written for its acceleration.
-fn linear(measured: &Measured) -> Constants {
+fn linear(measured: &RecordingSplit) -> Constants {
     let (mut normal, mut right) = (SMatrix::<f64, 6, 6>::identity() * 1e-9, Constants::zeros());
     for (estimated, states) in measured.training.estimated().iter().zip(&measured.training.states) {
         for k in states.interior() {

@@ -3,7 +3,7 @@
 use super::super::common::accuracy::{configure, recast};
 use super::learned;
 use super::options::Options;
-use lnn::lagrangian::{Configured, EulerLagrange};
+use lnn::lagrangian::{EulerLagrange, SystemInstance};
 use lnn::scalar::Dd;
 
 /// A motion. All its numbers are exact in both precisions; times are multiples of powers of two.
@@ -44,8 +44,8 @@ pub const LEARNED: &str = "learned double pendulum";
 pub fn problems(options: &Options) -> Result<Vec<Problem>, String> {
     let mut list = Vec::new();
     for (name, system, q, v, t_end, dt) in STARTS {
-        let narrow: Configured<f64> = configure(system, &[]);
-        let wide: Configured<Dd> = recast(&narrow);
+        let narrow: SystemInstance<f64> = configure(system, &[]);
+        let wide: SystemInstance<Dd> = recast(&narrow);
         let (q, mut v) = (q.to_vec(), v.to_vec());
         narrow.impose_constraint(&q, &mut v).map_err(|e| e.to_string())?;
         let model = narrow.build().map_err(|e| e.to_string())?;

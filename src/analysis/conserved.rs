@@ -1,6 +1,6 @@
 //! Errors of what the exact motion conserves beside its energy, along a trajectory.
 
-use crate::lagrangian::Configured;
+use crate::lagrangian::SystemInstance;
 use crate::rollout::Trajectory;
 use crate::scalar::Scalar;
 
@@ -14,7 +14,7 @@ pub(crate) fn conserved_change(first: &[f64], vector: &[f64]) -> f64 {
 /// any trajectory, one value per sample; `None` for a system without one or a trajectory of another number of coordinates.
 ///
 /// `NaN` where `C(0)` vanishes and so does the difference.
-pub fn conserved_error<S: Scalar>(system: &Configured<S>, trajectory: &Trajectory<S>) -> Option<Vec<f64>> {
+pub fn conserved_error<S: Scalar>(system: &SystemInstance<S>, trajectory: &Trajectory<S>) -> Option<Vec<f64>> {
     system.system.conserved?;
     let vectors: Option<Vec<Vec<f64>>> = (0..trajectory.len())
         .map(|k| {

@@ -1,6 +1,6 @@
 //! Steady loss of energy in recorded motion: the mark of friction.
 
-use crate::data::Part;
+use crate::data::Split;
 use crate::lagrangian::{EulerLagrange, Request, Terms};
 use serde::{Deserialize, Serialize};
 
@@ -34,7 +34,7 @@ const SAMPLES: usize = 64;
 
 /// Energy lost along the estimated states of recorded motion, work of known forces taken out: the slope of straight lines
 /// through `E - work` over stretches of the trajectories. `None` where the model gives no energy.
-pub fn energy_loss(model: &dyn EulerLagrange<f64>, part: &Part) -> Option<EnergyLoss> {
+pub fn energy_loss(model: &dyn EulerLagrange<f64>, part: &Split) -> Option<EnergyLoss> {
     let n = model.coordinates();
     let pieces = STRETCHES.div_ceil(part.states.len().max(1)).max(1);
     let (mut slopes, mut seconds) = (Vec::new(), 0.0);

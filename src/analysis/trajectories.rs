@@ -4,7 +4,7 @@ use super::{
     CoordinateError, EnergyError, Lyapunov, Statistics, ValidTime, coordinate_error, energy_drift, energy_error,
     lyapunov, relative_error, spread, statistics, valid_time, velocity_error,
 };
-use crate::lagrangian::{Configured, EulerLagrange, SystemError};
+use crate::lagrangian::{EulerLagrange, SystemError, SystemInstance};
 use crate::rollout::{Domain, Integrable, Method, Options, Rollout, Trajectory, rollout_many};
 use crate::scalar::Scalar;
 use rand::{Rng, SeedableRng};
@@ -160,7 +160,7 @@ impl<S: Integrable> TrajectoryTest<S> {
     /// [`SystemError::State`] if box and system differ in the number of coordinates.
     pub fn run_constrained(
         &self,
-        system: &Configured<S>,
+        system: &SystemInstance<S>,
         exact: &dyn EulerLagrange<S>,
         learned: &dyn EulerLagrange<S>,
     ) -> Result<Vec<TrajectoryRun<S>>, SystemError> {

@@ -35,7 +35,7 @@ pub use network::certify_network;
 pub use search::Verdict;
 
 use crate::lagrangian::system::Bounds;
-use crate::lagrangian::{Configured, Lagrangian, LagrangianVisitor};
+use crate::lagrangian::{Lagrangian, LagrangianVisitor, SystemInstance};
 use crate::scalar::Scalar;
 use enclosure::{Enclose, Source};
 use search::{Tree, search};
@@ -205,7 +205,7 @@ pub fn certify<L: Lagrangian, S: Scalar>(
 /// # Errors
 /// As there, and [`CertificateError::NoLagrangian`].
 pub fn certify_system<S: Scalar>(
-    configured: &Configured<S>,
+    configured: &SystemInstance<S>,
     region: &Bounds,
     options: &Options,
 ) -> Result<Certificate, CertificateError> {

@@ -232,13 +232,13 @@ fn check_enclosures<L: Lagrangian>(
 }
 
 /// A visitor that checks the enclosures of a system.
-struct Check<'a>(&'a Configured<f64>);
+struct Check<'a>(&'a SystemInstance<f64>);
 
 impl LagrangianVisitor for Check<'_> {
     type Output = ();
     fn visit<L: Lagrangian>(self, lagrangian: &L) {
-        let Configured { system, coordinates, parameters } = self.0;
-        let wide = Configured {
+        let SystemInstance { system, coordinates, parameters } = self.0;
+        let wide = SystemInstance {
             system: system.clone(),
             coordinates: *coordinates,
             parameters: parameters.iter().map(|&x| Dd::of_f64(x)).collect::<Vec<_>>(),

@@ -6,7 +6,7 @@ use crate::cli::place::{self, Wanted};
 use crate::cli::results::Writer;
 use crate::cli::watch::watch;
 use crate::cli::{CliError, output, source};
-use crate::lagrangian::Configured;
+use crate::lagrangian::SystemInstance;
 use crate::lagrangian::system::{Bounds, TrajectoryTest};
 use crate::pipeline::{EvaluationOptions, RTOL, evaluate};
 use std::path::{Path, PathBuf};
@@ -59,7 +59,7 @@ pub struct Args {
 }
 
 /// The paper's starts and time span, as far as the arguments do not replace them.
-fn span(args: &Args, system: &Configured<f64>) -> Result<TrajectoryTest, CliError> {
+fn span(args: &Args, system: &SystemInstance<f64>) -> Result<TrajectoryTest, CliError> {
     let n = system.coordinates;
     let replaced = |option: &str, given: &[(f64, f64)], paper: Vec<(f64, f64)>| match given {
         [] => Ok(paper),

@@ -9,7 +9,7 @@ use crate::cli::source::parameter;
 use crate::cli::watch::watch;
 use crate::cli::{CliError, chosen, interrupt, output};
 use crate::experiments::{Experiment, Run, Scale, experiments, find};
-use crate::lagrangian::{Configured, configure_system};
+use crate::lagrangian::{SystemInstance, configure_system};
 use crate::names::{WIDTH, counted, wrapped};
 use crate::pipeline::{
     Directory, ExperimentReport, RECORD, finish_runs, finished_record, merge_experiment, run_experiment,
@@ -113,7 +113,7 @@ impl Chosen {
 
     /// The system that was asked for instead of the experiment's own, with the parameters given.
     #[allow(clippy::type_complexity)]
-    fn own_system(&self) -> Result<Option<(Configured<f64>, BTreeMap<String, f64>)>, CliError> {
+    fn own_system(&self) -> Result<Option<(SystemInstance<f64>, BTreeMap<String, f64>)>, CliError> {
         let Some(name) = &self.system else { return Ok(None) };
         let configured = configure_system::<f64>(chosen::system(name)?, &self.param).map_err(CliError::usage)?;
         let symbols = configured.system.parameters.iter().map(|p| p.symbol.to_string());

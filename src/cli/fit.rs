@@ -22,7 +22,7 @@ use crate::pipeline::{
 use crate::presets::configuration_reference;
 use crate::recording::Targets;
 use crate::shooting::Shooting;
-use crate::training::Stop;
+use crate::training::StopReason;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
@@ -115,7 +115,7 @@ fn perform(
         }
         Err(error) => return Err(error.into()),
     };
-    if fitted.stop != Stop::Interrupted {
+    if fitted.stop != StopReason::Interrupted {
         forget(folder.path())?;
     }
     if args.json {
@@ -124,12 +124,12 @@ fn perform(
         output::print(&format!("{}\nreport: {}\n", fitted.text(), folder.file("report.html").display()))?;
     }
     match &fitted.stop {
-        Stop::Finished => Ok(()),
-        Stop::Interrupted => {
+        StopReason::Finished => Ok(()),
+        StopReason::Interrupted => {
             let (place, on) = (folder.path().display(), how_to_go_on(folder.path()));
             Err(CliError::interrupted(format_args!("interrupted, the best model so far is in {place}{on}")))
         }
-        Stop::Failed(error) => Err(CliError::data(format_args!("training stopped: {error}"))),
+        StopReason::Failed(error) => Err(CliError::data(format_args!("training stopped: {error}"))),
     }
 }
 

@@ -8,7 +8,7 @@ use crate::cli::recording_args::RecordingArgs;
 use crate::cli::train_config::{PrecisionName, every};
 use crate::pipeline::HELD_OUT;
 use crate::recording::Targets;
-use crate::training::Every;
+use crate::training::CheckpointInterval;
 use std::path::{Path, PathBuf};
 
 /// Arguments.
@@ -86,7 +86,7 @@ pub struct Args {
     pub resume: Option<PathBuf>,
     /// Write a checkpoint every N epochs, or every Ts seconds with an s behind the number.
     #[arg(long, value_name = "N|Ts", default_value = "60s", allow_hyphen_values = true, value_parser = every)]
-    pub checkpoint_every: Every,
+    pub checkpoint_every: CheckpointInterval,
     /// Print summary.json instead of tables.
     #[arg(long)]
     pub json: bool,

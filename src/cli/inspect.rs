@@ -168,7 +168,7 @@ fn fields<'a, S>(
         vector("dl_dq", &terms.dl_dq),
         Field { name: "mass_matrix", values: part(&terms.mass_matrix, n * n), shape: Shape::Matrix },
         vector("eigenvalues", spectrum),
-        vector("coriolis", &terms.coriolis),
+        vector("coriolis", &terms.momentum_drift),
         vector("acceleration", &terms.acceleration),
         number("energy", &terms.energy),
     ];

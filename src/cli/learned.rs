@@ -2,7 +2,7 @@
 
 use crate::cli::CliError;
 use crate::cli::chosen::{self, learned_system};
-use crate::lagrangian::{Configured, configure_system, configure_values, find};
+use crate::lagrangian::{SystemInstance, configure_system, configure_values, find};
 use crate::network::NetworkLagrangian;
 use crate::network::file::{Header, ModelFile};
 use crate::pipeline::{self, trained_on};
@@ -43,7 +43,7 @@ impl<S: Scalar> Learned<S> {
     ///
     /// # Errors
     /// A data error for a system of which there are only recordings.
-    pub fn system(&self, path: &Path) -> Result<Configured<f64>, CliError> {
+    pub fn system(&self, path: &Path) -> Result<SystemInstance<f64>, CliError> {
         let known = self.header.description.is_some() || find(&self.header.system).is_ok();
         if !known {
             let problem = "is no system of `lnn systems`: there is no exact motion to compare the model with; --system FILE.toml names one";
@@ -61,7 +61,7 @@ impl<S: Scalar> Learned<S> {
     ///
     /// # Errors
     /// A usage error for an unknown system, a wrong parameter, or other columns.
-    pub fn beside(&self, name: &str, given: &[(String, String)]) -> Result<Configured<f64>, CliError> {
+    pub fn beside(&self, name: &str, given: &[(String, String)]) -> Result<SystemInstance<f64>, CliError> {
         let configured = configure_system(chosen::system(name)?, given).map_err(CliError::usage)?;
         let columns = configured.system.columns(configured.coordinates);
         if columns != self.header.columns {

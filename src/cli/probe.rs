@@ -5,7 +5,7 @@ use crate::cli::chosen::{self, learned_system};
 use crate::cli::learned::Learned;
 use crate::cli::number::bounds;
 use crate::cli::source::Source;
-use crate::lagrangian::{Configured, EulerLagrange, configure_system};
+use crate::lagrangian::{EulerLagrange, SystemInstance, configure_system};
 use crate::names::unknown;
 use crate::symmetry::{Basis, Chart, Degrees, Region, Symmetries, bases, enough, middle, most_symmetries};
 use std::path::Path;
@@ -25,7 +25,7 @@ pub struct Probe {
     periodic: Vec<bool>,
     units: Vec<String>,
     /// The system, or the one that a model learned: its mass shell and its domain.
-    system: Option<Configured<f64>>,
+    system: Option<SystemInstance<f64>>,
 }
 
 /// `NAME=LOW:HIGH`, the bounds of a column.

@@ -10,10 +10,10 @@ use crate::cli::train_config::Args;
 use crate::cli::watch::watch;
 use crate::cli::{CliError, interrupt, output};
 use crate::configuration::Config;
-use crate::lagrangian::Configured;
+use crate::lagrangian::SystemInstance;
 use crate::names::counted;
 use crate::pipeline::{Begin, Checkpoints, PipelineError, RunOptions, TrainReport, train};
-use crate::training::{LATEST, Stop, TrainingError};
+use crate::training::{LATEST, StopReason, TrainingError};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 
@@ -43,7 +43,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         }
         Err(error) => return Err(resume::keeping(folder.path())(error.into())),
     };
-    if trained.stop != Stop::Interrupted {
+    if trained.stop != StopReason::Interrupted {
         forget(folder.path())?;
     }
     if args.json {
@@ -57,7 +57,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
 /// A training: configuration, system, directory and beginning.
 struct Task {
     config: Config,
-    system: Configured<f64>,
+    system: SystemInstance<f64>,
     folder: Folder,
     start: Begin,
 }
@@ -103,8 +103,10 @@ impl Task {
 fn conclude(finished: &TrainReport, path: &Path) -> Result<(), CliError> {
     let kept = format!("the best of {} is in {}", counted(finished.history.len(), "epoch", "epochs"), path.display());
     match &finished.stop {
-        Stop::Finished => Ok(()),
-        Stop::Interrupted => Err(CliError::interrupted(format_args!("interrupted, {kept}{}", how_to_go_on(path)))),
-        Stop::Failed(error) => Err(CliError::data(format_args!("training stopped: {error}; {kept}"))),
+        StopReason::Finished => Ok(()),
+        StopReason::Interrupted => {
+            Err(CliError::interrupted(format_args!("interrupted, {kept}{}", how_to_go_on(path))))
+        }
+        StopReason::Failed(error) => Err(CliError::data(format_args!("training stopped: {error}; {kept}"))),
     }
 }

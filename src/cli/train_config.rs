@@ -10,13 +10,13 @@ use crate::configuration::{Config, Precision};
 use crate::data::SamplingError;
 use crate::lagrangian::system::System;
 use crate::lagrangian::{
-    Configured, Description, DescriptionError, SystemError, configure_system, configure_values, find,
+    Description, DescriptionError, SystemError, SystemInstance, configure_system, configure_values, find,
 };
 use crate::names::plain;
 use crate::optimizers::Schedule;
 use crate::pipeline::{StartModel as Start, all_parameters};
 use crate::presets::{Preset, TRAINING_SECTIONS, configuration_reference};
-use crate::training::Every;
+use crate::training::CheckpointInterval;
 use serde::Deserialize;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -74,7 +74,7 @@ pub struct Args {
     pub resume: Option<PathBuf>,
     /// Write a checkpoint every N epochs, or every Ts seconds with an s behind the number.
     #[arg(long, value_name = "N|Ts", default_value = "60s", allow_hyphen_values = true, value_parser = every)]
-    pub checkpoint_every: Every,
+    pub checkpoint_every: CheckpointInterval,
     /// Print summary.json instead of tables.
     #[arg(long)]
     pub json: bool,
@@ -122,7 +122,7 @@ impl Args {
     ///
     /// # Errors
     /// Usage errors naming everything that is wrong, or a data error for a file that cannot be read.
-    pub fn resolve(&self) -> Result<(Config, Configured<f64>), CliError> {
+    pub fn resolve(&self) -> Result<(Config, SystemInstance<f64>), CliError> {
         self.settle(None)
     }
 
@@ -170,7 +170,7 @@ impl Args {
     ///
     /// # Errors
     /// Usage errors naming everything that is wrong.
-    pub fn check(&self, config: &Config) -> Result<Configured<f64>, CliError> {
+    pub fn check(&self, config: &Config) -> Result<SystemInstance<f64>, CliError> {
         let system = config.system().map_err(CliError::usage)?;
         CliError::all_usage(config.faults(system.coordinates).into_iter().map(|fault| fault.to_string()))?;
         Ok(system)
@@ -196,7 +196,7 @@ impl Args {
     }
 
     /// The configuration that files and arguments come to; `saved` has a system where they name none.
-    fn settle(&self, saved: Option<&Config>) -> Result<(Config, Configured<f64>), CliError> {
+    fn settle(&self, saved: Option<&Config>) -> Result<(Config, SystemInstance<f64>), CliError> {
         let mut file = self.config.as_deref().map(ConfigFile::read).transpose()?;
         let from = self.from.clone().or_else(|| file.as_ref()?.text(&["from"]));
         let start = from.as_deref().map(Start::read).transpose()?;
@@ -331,7 +331,7 @@ impl Args {
     }
 
     /// The preset's configuration of the system.
-    fn preset_config(&self, system: &Configured<f64>) -> Result<Config, CliError> {
+    fn preset_config(&self, system: &SystemInstance<f64>) -> Result<Config, CliError> {
         let (preset, known) = match self.preset.unwrap_or(PresetName::Quick) {
             PresetName::Quick => (Preset::Quick, "quick"),
             PresetName::Best => (Preset::Best, "best"),
@@ -408,10 +408,10 @@ fn with_periods(file: &ConfigFile, mut config: Config) -> Config {
 }
 
 /// Interval of checkpoints: `10` epochs, `90s`.
-pub fn every(text: &str) -> Result<Every, String> {
+pub fn every(text: &str) -> Result<CheckpointInterval, String> {
     match text.trim().strip_suffix('s') {
-        Some(seconds) => positive(seconds).map(Every::Seconds),
-        None => count(text).map(Every::Epochs),
+        Some(seconds) => positive(seconds).map(CheckpointInterval::Seconds),
+        None => count(text).map(CheckpointInterval::Epochs),
     }
     .map_err(|_| "expected a number of epochs, such as 10, or of seconds, such as 90s".to_string())
 }

@@ -2,7 +2,7 @@
 
 use crate::configuration::ConfigError;
 use crate::data::dataset::DatasetError;
-use crate::lagrangian::{Configured, DescriptionError, SystemError};
+use crate::lagrangian::{DescriptionError, SystemError, SystemInstance};
 use rand::Rng;
 use thiserror::Error;
 
@@ -52,7 +52,7 @@ impl Drawn {
     /// Takes a state, unless it lies outside the system's domain or has no finite acceleration: then what is demanded.
     pub fn take(
         &mut self,
-        system: &Configured<f64>,
+        system: &SystemInstance<f64>,
         q: &[f64],
         v: &[f64],
     ) -> Result<Option<&'static str>, SamplingError> {

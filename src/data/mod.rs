@@ -5,9 +5,9 @@ mod dataset;
 mod datasets;
 mod draw;
 mod estimated;
-mod measured;
 mod motions;
 mod of_config;
+mod recording_split;
 mod sampling;
 mod shell;
 
@@ -16,5 +16,5 @@ pub use dataset::{Dataset, DatasetError};
 pub use datasets::Datasets;
 pub use draw::SamplingError;
 pub use estimated::{Noise, StateEstimate};
-pub use measured::{Measured, MeasuredError, Part, PrepareOptions};
+pub use recording_split::{PrepareOptions, RecordingSplit, RecordingSplitError, Split};
 pub use sampling::{sample, sample_all};

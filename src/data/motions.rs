@@ -2,7 +2,7 @@
 
 use crate::data::bounds::boxes;
 use crate::data::draw::{Drawn, SamplingError, draw};
-use crate::lagrangian::Configured;
+use crate::lagrangian::SystemInstance;
 use crate::lagrangian::system::Coordinate;
 use crate::rollout::{Domain, Method, Options, rollout};
 use rand::Rng;
@@ -18,7 +18,7 @@ const PER_MOTION: f64 = 10.0;
 /// # Errors
 /// [`SamplingError::Motions`] if hardly any motion stays within the bounds for a while.
 pub(crate) fn along_motions(
-    system: &Configured<f64>,
+    system: &SystemInstance<f64>,
     field: &str,
     (position, velocity): (&[[f64; 2]], &[[f64; 2]]),
     log_uniform: &[bool],

@@ -3,7 +3,7 @@
 use crate::configuration::{Config, ConfigError, Penalty, Regularizer, Scaling};
 use crate::data::draw::SamplingError;
 use crate::lagrangian::system::System;
-use crate::lagrangian::{Configured, configure_values, find};
+use crate::lagrangian::{SystemInstance, configure_values, find};
 use crate::network::Architecture;
 use std::borrow::Cow;
 
@@ -12,7 +12,7 @@ impl Config {
     ///
     /// # Errors
     /// Unknown system or parameter, or a value out of range.
-    pub fn system(&self) -> Result<Configured<f64>, SamplingError> {
+    pub fn system(&self) -> Result<SystemInstance<f64>, SamplingError> {
         Ok(configure_values(self.system_entry()?, &self.parameters)?)
     }
 
@@ -51,7 +51,7 @@ impl Config {
     ///
     /// # Errors
     /// A name in the configuration that is no coordinate of the system.
-    pub fn architecture(&self, system: &Configured<f64>, scale: Vec<f64>) -> Result<Architecture, ConfigError> {
+    pub fn architecture(&self, system: &SystemInstance<f64>, scale: Vec<f64>) -> Result<Architecture, ConfigError> {
         let coordinates = system.system.coordinates(system.coordinates);
         let names = coordinates.iter().map(|c| c.name.as_ref());
         self.architecture_with(names, coordinates.iter().map(|c| c.periodic).collect(), scale)

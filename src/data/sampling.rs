@@ -6,7 +6,7 @@ use crate::data::datasets::Datasets;
 use crate::data::draw::{Drawn, SamplingError, draw};
 use crate::data::motions::along_motions;
 use crate::data::shell::{in_shell, weigh_by_distance};
-use crate::lagrangian::Configured;
+use crate::lagrangian::SystemInstance;
 use crate::random::RngStream;
 use crate::scalar::Scalar;
 use rand::Rng;
@@ -19,7 +19,7 @@ use rand::Rng;
 /// # Errors
 /// [`SamplingError::Domain`] if more than nine in ten draws are refused.
 pub fn sample(
-    system: &Configured<f64>,
+    system: &SystemInstance<f64>,
     field: &str,
     bounds: (&[[f64; 2]], &[[f64; 2]]),
     states: usize,
@@ -31,7 +31,7 @@ pub fn sample(
 /// Draws further states, up to `states`, as [`sample`] does.
 fn fill(
     mut drawn: Drawn,
-    system: &Configured<f64>,
+    system: &SystemInstance<f64>,
     field: &str,
     bounds: (&[[f64; 2]], &[[f64; 2]]),
     log_uniform: &[bool],
@@ -92,7 +92,7 @@ fn rescale_geodesics(mut set: Dataset<f64>, fraction: f64, rng: &mut impl Rng) -
 /// [`SamplingError`].
 pub fn sample_all<S: Scalar>(
     config: &Config,
-    system: &Configured<f64>,
+    system: &SystemInstance<f64>,
 ) -> Result<(Datasets<S>, Vec<f64>), SamplingError> {
     config.validate(system.coordinates)?;
     config.architecture(system, vec![1.0; system.coordinates])?;

@@ -3,7 +3,7 @@
 use crate::configuration::{ConfigError, Shell};
 use crate::data::dataset::Dataset;
 use crate::data::draw::{Drawn, SamplingError, draw};
-use crate::lagrangian::{Configured, EulerLagrange, Request, Terms};
+use crate::lagrangian::{EulerLagrange, Request, SystemInstance, Terms};
 use crate::linalg::{Workspace, inverse};
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -14,7 +14,7 @@ use rand_distr::{Distribution, StandardNormal};
 /// [`SamplingError::Config`] for a system without a time or coordinates that it does not have; [`SamplingError::Domain`] if more than nine in
 /// ten draws lie outside the system's domain or where surfaces of equal time are not space-like.
 pub(crate) fn in_shell(
-    system: &Configured<f64>,
+    system: &SystemInstance<f64>,
     shell: &Shell<'_>,
     (field, position): (&str, &[[f64; 2]]),
     states: usize,
@@ -54,7 +54,7 @@ pub(crate) fn in_shell(
 }
 
 /// Indices of the coordinates of a shell.
-fn places(system: &Configured<f64>, shell: &Shell<'_>) -> Result<Vec<usize>, ConfigError> {
+fn places(system: &SystemInstance<f64>, shell: &Shell<'_>) -> Result<Vec<usize>, ConfigError> {
     let names = system.system.coordinates(system.coordinates);
     let place = |name: &String| crate::configuration::place("data.shell", name, names.iter().map(|c| c.name.as_ref()));
     shell.coordinates.iter().map(place).collect()
@@ -114,7 +114,7 @@ const ALIKE: usize = 200;
 /// The states with the weights `1/(|a| + floor m)`, `m` the median of `|a|` among [`ALIKE`] states about as far from the centre.
 pub(crate) fn weigh_by_distance(
     set: Dataset<f64>,
-    system: &Configured<f64>,
+    system: &SystemInstance<f64>,
     shell: &Shell<'_>,
     floor: f64,
 ) -> Result<Dataset<f64>, SamplingError> {

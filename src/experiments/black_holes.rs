@@ -2,7 +2,7 @@
 
 use super::{Experiment, Picture, Reported, Run, slug};
 use crate::configuration::{Config, Regularizer};
-use crate::lagrangian::{Configured, configure};
+use crate::lagrangian::{SystemInstance, configure};
 use crate::network::Structure;
 use crate::presets::Preset;
 use std::collections::BTreeMap;
@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 /// Holes in coordinates that pass through the horizon.
 const HOLES: [&str; 2] = ["schwarzschild-cartesian", "kerr-cartesian"];
 
-fn hole(name: &str) -> Configured<f64> {
+fn hole(name: &str) -> SystemInstance<f64> {
     configure(name, &[]).unwrap_or_else(|e| unreachable!("{e}"))
 }
 
@@ -19,14 +19,14 @@ fn run(name: &str, label: String, config: Config) -> Run {
 }
 
 /// A hole by a preset.
-fn learned(preset: Preset, name: &str, hole: &Configured<f64>) -> Run {
+fn learned(preset: Preset, name: &str, hole: &SystemInstance<f64>) -> Run {
     let system = &hole.system.name;
     let config = preset.config(hole).unwrap_or_else(|| unreachable!("a preset of every system"));
     run(&slug(&format!("{name}-{system}")), format!("{name}, {system}"), config)
 }
 
 /// A hole with these parameters, the others being the system's, by both presets.
-pub(super) fn runs_of(hole: &Configured<f64>, parameters: &BTreeMap<String, f64>) -> Vec<Run> {
+pub(super) fn runs_of(hole: &SystemInstance<f64>, parameters: &BTreeMap<String, f64>) -> Vec<Run> {
     let told: String = parameters.iter().map(|(symbol, value)| format!(", {symbol} = {value}")).collect();
     let of = |(preset, name)| {
         let run = learned(preset, name, hole);

@@ -17,7 +17,7 @@ pub use record::{Learned, Outcome, Record, Row, Spread};
 pub use remarks::{Quantity, Reduction};
 
 use crate::configuration::Config;
-use crate::lagrangian::Configured;
+use crate::lagrangian::SystemInstance;
 use crate::names::unknown;
 use std::collections::BTreeMap;
 
@@ -149,7 +149,7 @@ impl Experiment {
     /// certain systems.
     pub fn runs_of(
         &self,
-        (system, parameters): (&Configured<f64>, &BTreeMap<String, f64>),
+        (system, parameters): (&SystemInstance<f64>, &BTreeMap<String, f64>),
         scale: Scale,
         seeds: usize,
     ) -> Option<Vec<Run>> {

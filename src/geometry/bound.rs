@@ -6,7 +6,7 @@ use crate::scalar::{Real, Scalar};
 
 /// Free fall in the equator at a turning point, where its radius stands still.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Turning<S> {
+pub struct TurningPoint<S> {
     /// Energy per mass.
     pub energy: S,
     /// Angular momentum per mass.
@@ -19,7 +19,7 @@ pub struct Turning<S> {
 
 impl<S: Scalar> Symmetric<S> {
     /// The state of matter of `energy` and `ratio = L/E` that turns here: `g(v, v) = -1` with `v` along the symmetries alone.
-    fn turning(&self, ratio: S) -> Option<Turning<S>> {
+    fn turning(&self, ratio: S) -> Option<TurningPoint<S>> {
         let [tt, tp, pp] = self.value;
         // E^2 pp + 2 E L tp + L^2 tt = tp^2 - tt pp, the inverse of the block of the symmetries.
         let square = self.room() / (pp + (tp + tp + tt * ratio) * ratio);
@@ -30,7 +30,7 @@ impl<S: Scalar> Symmetric<S> {
         let angular_momentum = ratio * energy;
         let (time_rate, turning_rate) =
             ((pp * energy + tp * angular_momentum) / self.room(), -(tp * energy + tt * angular_momentum) / self.room());
-        (time_rate > <S as Real>::zero()).then_some(Turning { energy, angular_momentum, time_rate, turning_rate })
+        (time_rate > <S as Real>::zero()).then_some(TurningPoint { energy, angular_momentum, time_rate, turning_rate })
     }
 }
 
@@ -42,7 +42,7 @@ impl<S: Scalar> Equator<'_, S> {
     ///
     /// # Errors
     /// As [`Equator::at`].
-    pub fn between(&self, near: S, far: S, sense: Sense) -> Result<Option<Turning<S>>, GeometryError> {
+    pub fn between(&self, near: S, far: S, sense: Sense) -> Result<Option<TurningPoint<S>>, GeometryError> {
         let (here, there) = (self.at(near)?, self.at(far)?);
         let of = |metric: &Symmetric<S>| metric.value.map(|component| component / metric.room());
         let (a, b) = (of(&here), of(&there));
@@ -54,7 +54,7 @@ impl<S: Scalar> Equator<'_, S> {
         }
         let root = Real::sqrt(root);
         let of_root = |root: S| here.turning((root - tp) / tt);
-        let mut found: Vec<Turning<S>> = [of_root(root), of_root(-root)].into_iter().flatten().collect();
+        let mut found: Vec<TurningPoint<S>> = [of_root(root), of_root(-root)].into_iter().flatten().collect();
         found.sort_by(|a, b| a.turning_rate.to_f64().total_cmp(&b.turning_rate.to_f64()));
         Ok(match sense {
             Sense::Forward => found.pop().filter(|turning| turning.turning_rate > <S as Real>::zero()),

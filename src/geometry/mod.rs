@@ -38,7 +38,7 @@ mod orbits;
 mod surfaces;
 mod tensor;
 
-pub use bound::Turning;
+pub use bound::TurningPoint;
 pub use connection::Connection;
 pub use curvature::Curvature;
 pub use error::GeometryError;

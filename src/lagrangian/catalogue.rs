@@ -1,6 +1,6 @@
 //! The hand-written systems by name: description, Euler-Lagrange terms, closed-form acceleration.
 
-use super::derivatives::{Need, State, evaluate};
+use super::derivatives::{RequestedTerms, State, evaluate};
 use super::system::{ClosedForm, System};
 use super::{EulerLagrange, ExpressionLagrangian, HandWritten, Lagrangian, Request, Terms};
 use crate::linalg::Workspace;
@@ -66,7 +66,7 @@ pub type Given = [(String, String)];
 
 /// A system with its size and the values of its parameters.
 #[derive(Clone, Debug)]
-pub struct Configured<S> {
+pub struct SystemInstance<S> {
     /// Description.
     pub system: Cow<'static, System>,
     /// Number of coordinates.
@@ -80,7 +80,7 @@ pub trait LagrangianVisitor {
     /// Result of the visit.
     type Output;
 
-    /// Takes the Lagrangian; its parameters are [`Configured::parameters`].
+    /// Takes the Lagrangian; its parameters are [`SystemInstance::parameters`].
     fn visit<L: Lagrangian>(self, lagrangian: &L) -> Self::Output;
 }
 
@@ -94,7 +94,7 @@ macro_rules! catalogue {
         enum Place { $($module),* }
 
         /// The Euler-Lagrange terms of a configured system.
-        fn construct<S: Scalar>(configured: &Configured<S>) -> Option<Box<dyn EulerLagrange<S>>> {
+        fn construct<S: Scalar>(configured: &SystemInstance<S>) -> Option<Box<dyn EulerLagrange<S>>> {
             let n = configured.coordinates;
             if let Some(described) = &configured.system.described {
                 let parameters = configured.parameters.clone();
@@ -108,7 +108,7 @@ macro_rules! catalogue {
         }
 
         /// Shows a visitor the Lagrangian of a configured system.
-        fn shown<S, V: LagrangianVisitor>(configured: &Configured<S>, visitor: V) -> Option<V::Output> {
+        fn shown<S, V: LagrangianVisitor>(configured: &SystemInstance<S>, visitor: V) -> Option<V::Output> {
             let n = configured.coordinates;
             if let Some(described) = &configured.system.described {
                 return Some(visitor.visit(&described.lagrangian));
@@ -121,7 +121,7 @@ macro_rules! catalogue {
         }
 
         /// The closed-form acceleration of a configured system.
-        fn closed<S: Scalar>(configured: &Configured<S>, q: &[S], v: &[S]) -> Vec<S> {
+        fn closed<S: Scalar>(configured: &SystemInstance<S>, q: &[S], v: &[S]) -> Vec<S> {
             let n = configured.coordinates;
             $(if configured.system.name == SYSTEMS[Place::$module as usize].name {
                 let make: fn(usize) -> _ = $make;
@@ -131,7 +131,7 @@ macro_rules! catalogue {
         }
 
         /// The velocity of the time-like coordinate on the mass shell, if the system has one.
-        fn constrained<S: Scalar>(configured: &Configured<S>, q: &[S], v: &[S]) -> Option<S> {
+        fn constrained<S: Scalar>(configured: &SystemInstance<S>, q: &[S], v: &[S]) -> Option<S> {
             let n = configured.coordinates;
             $(if configured.system.name == SYSTEMS[Place::$module as usize].name {
                 let make: fn(usize) -> _ = $make;
@@ -165,14 +165,14 @@ catalogue! {
 
 /// [`construct`], compiled in this crate once for each of its scalars instead of again in every crate that calls it: all
 /// systems under all forward numbers are much code.
-fn construct_once<S: Scalar>(configured: &Configured<S>) -> Option<Box<dyn EulerLagrange<S>>> {
-    fn single(configured: &Configured<f32>) -> Option<Box<dyn EulerLagrange<f32>>> {
+fn construct_once<S: Scalar>(configured: &SystemInstance<S>) -> Option<Box<dyn EulerLagrange<S>>> {
+    fn single(configured: &SystemInstance<f32>) -> Option<Box<dyn EulerLagrange<f32>>> {
         construct(configured)
     }
-    fn double(configured: &Configured<f64>) -> Option<Box<dyn EulerLagrange<f64>>> {
+    fn double(configured: &SystemInstance<f64>) -> Option<Box<dyn EulerLagrange<f64>>> {
         construct(configured)
     }
-    fn double_double(configured: &Configured<Dd>) -> Option<Box<dyn EulerLagrange<Dd>>> {
+    fn double_double(configured: &SystemInstance<Dd>) -> Option<Box<dyn EulerLagrange<Dd>>> {
         construct(configured)
     }
     let configured: &dyn Any = configured;
@@ -199,7 +199,7 @@ pub fn find(name: &str) -> Result<&'static System, SystemError> {
     SYSTEMS.iter().find(|system| system.name == name).ok_or_else(|| unknown_system(name))
 }
 
-impl<S: Scalar> Configured<S> {
+impl<S: Scalar> SystemInstance<S> {
     /// As [`build`](super::build).
     ///
     /// # Errors
@@ -262,7 +262,7 @@ impl<S: Scalar> Configured<S> {
     }
     /// `(x, y)` of coordinates in the system's [`Plane`](super::system::Plane); `None` without a plane or for a wrong
     /// number of coordinates.
-    pub(crate) fn place(&self, q: &[S]) -> Option<(f64, f64)> {
+    pub(crate) fn position_in_plane(&self, q: &[S]) -> Option<(f64, f64)> {
         let plane = self.system.plane.filter(|_| q.len() == self.coordinates)?;
         Some((plane.point)(&leading(&self.parameters), &leading(q)))
     }
@@ -277,9 +277,9 @@ impl<S: Scalar> Configured<S> {
 /// The acceleration of one state by the Euler-Lagrange equations of a Lagrangian.
 fn differentiated<S: Scalar>(lagrangian: &ExpressionLagrangian, parameters: &[S], q: &[S], v: &[S]) -> Vec<S> {
     let mut terms = Terms::default();
-    let (n, need) = (q.len(), Need::of(Request::ACCELERATION));
-    let Terms { lagrangian: value, momentum, dl_dq, mass_matrix, coriolis, .. } = &mut terms;
-    for (field, size) in [(&mut *dl_dq, n), (&mut *mass_matrix, n * n), (&mut *coriolis, n)] {
+    let (n, need) = (q.len(), RequestedTerms::of(Request::ACCELERATION));
+    let Terms { lagrangian: value, momentum, dl_dq, mass_matrix, momentum_drift, .. } = &mut terms;
+    for (field, size) in [(&mut *dl_dq, n), (&mut *mass_matrix, n * n), (&mut *momentum_drift, n)] {
         field.resize(size, S::nan());
     }
     evaluate(
@@ -288,7 +288,7 @@ fn differentiated<S: Scalar>(lagrangian: &ExpressionLagrangian, parameters: &[S]
         q,
         v,
         need,
-        &mut State { lagrangian: value, momentum, dl_dq, mass_matrix, coriolis },
+        &mut State { lagrangian: value, momentum, dl_dq, mass_matrix, momentum_drift },
     );
     // A row that fails has the acceleration NaN, which is what there is to say of one state.
     let _ = terms.complete(q.len(), v, Request::ACCELERATION, &mut Workspace::new());

@@ -1,7 +1,7 @@
 //! Systems with the values of their parameters, as text or as numbers.
 
 use super::EulerLagrange;
-use super::catalogue::{Configured, Given, SystemError, find};
+use super::catalogue::{Given, SystemError, SystemInstance, find};
 use super::range::Range;
 use super::system::{Size, System};
 use crate::scalar::Scalar;
@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 ///
 /// # Errors
 /// [`SystemError`] for an unknown name or symbol, a repeated symbol, a value that is no number or out of range.
-pub fn configure<S: Scalar>(name: &str, given: &Given) -> Result<Configured<S>, SystemError> {
+pub fn configure<S: Scalar>(name: &str, given: &Given) -> Result<SystemInstance<S>, SystemError> {
     configure_system(Cow::Borrowed(find(name)?), given)
 }
 
@@ -20,7 +20,10 @@ pub fn configure<S: Scalar>(name: &str, given: &Given) -> Result<Configured<S>, 
 ///
 /// # Errors
 /// [`SystemError`] for an unknown or repeated symbol, a value that is no number or out of range.
-pub fn configure_system<S: Scalar>(system: Cow<'static, System>, given: &Given) -> Result<Configured<S>, SystemError> {
+pub fn configure_system<S: Scalar>(
+    system: Cow<'static, System>,
+    given: &Given,
+) -> Result<SystemInstance<S>, SystemError> {
     for (i, (symbol, _)) in given.iter().enumerate() {
         require_symbol(&system, symbol)?;
         if given[..i].iter().any(|(earlier, _)| earlier == symbol) {
@@ -42,7 +45,7 @@ pub fn configure_system<S: Scalar>(system: Cow<'static, System>, given: &Given) 
 pub fn configure_values<S: Scalar>(
     system: Cow<'static, System>,
     values: &BTreeMap<String, f64>,
-) -> Result<Configured<S>, SystemError> {
+) -> Result<SystemInstance<S>, SystemError> {
     values.keys().try_for_each(|symbol| require_symbol(&system, symbol))?;
     let whole = |x: f64| (x >= 0.0 && x.fract() == 0.0).then_some(x as usize);
     assemble(
@@ -79,7 +82,7 @@ fn assemble<S: Scalar>(
     system: Cow<'static, System>,
     size: impl Fn(&str) -> Option<(Option<usize>, String)>,
     value: impl Fn(&str) -> Option<(Option<S>, String)>,
-) -> Result<Configured<S>, SystemError> {
+) -> Result<SystemInstance<S>, SystemError> {
     let refused = |symbol: &str, demand: String, found: String| SystemError::Value {
         system: system.name.to_string(),
         symbol: symbol.to_string(),
@@ -111,7 +114,7 @@ fn assemble<S: Scalar>(
         let demand = || parameter.range.text().to_string();
         parameters.push(found.filter(allowed).ok_or_else(|| refused(&parameter.symbol, demand(), text))?);
     }
-    Ok(Configured { system, coordinates, parameters })
+    Ok(SystemInstance { system, coordinates, parameters })
 }
 
 #[cfg(test)]

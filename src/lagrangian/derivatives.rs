@@ -8,27 +8,27 @@ use std::array::from_fn;
 
 /// Which derivatives a request needs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Need {
+pub(super) struct RequestedTerms {
     pub lagrangian: bool,
     pub momentum: bool,
     pub dl_dq: bool,
     pub mass_matrix: bool,
-    pub coriolis: bool,
+    pub momentum_drift: bool,
 }
 
-impl Need {
+impl RequestedTerms {
     pub fn of(request: Request) -> Self {
         Self {
             lagrangian: request.includes(Request::LAGRANGIAN),
             momentum: request.includes(Request::MOMENTUM),
             dl_dq: request.includes(Request::DL_DQ),
             mass_matrix: request.includes(Request::MASS_MATRIX),
-            coriolis: request.includes(Request::CORIOLIS),
+            momentum_drift: request.includes(Request::MOMENTUM_DRIFT),
         }
     }
     /// A number below 32 that names the combination.
     pub fn index(self) -> usize {
-        [self.lagrangian, self.momentum, self.dl_dq, self.mass_matrix, self.coriolis]
+        [self.lagrangian, self.momentum, self.dl_dq, self.mass_matrix, self.momentum_drift]
             .into_iter()
             .enumerate()
             .map(|(bit, needed)| usize::from(needed) << bit)
@@ -37,14 +37,14 @@ impl Need {
     /// The least depth of an evaluation that fills what is needed.
     pub fn depth(self) -> Depth {
         match self {
-            Self { coriolis: true, .. } => Depth::Motion,
+            Self { momentum_drift: true, .. } => Depth::Motion,
             Self { mass_matrix: true, .. } => Depth::MassMatrix,
             Self { momentum, dl_dq, .. } if momentum || dl_dq => Depth::Gradient,
             _ => Depth::Value,
         }
     }
     fn second_order(self) -> bool {
-        self.mass_matrix || self.coriolis
+        self.mass_matrix || self.momentum_drift
     }
 }
 
@@ -54,7 +54,7 @@ pub(super) struct State<'a, R> {
     pub momentum: &'a mut [R],
     pub dl_dq: &'a mut [R],
     pub mass_matrix: &'a mut [R],
-    pub coriolis: &'a mut [R],
+    pub momentum_drift: &'a mut [R],
 }
 
 /// Fills what is needed.
@@ -63,7 +63,7 @@ pub(super) fn evaluate<L: Lagrangian, R: Real>(
     parameters: &[R],
     q: &[R],
     v: &[R],
-    need: Need,
+    need: RequestedTerms,
     out: &mut State<'_, R>,
 ) {
     if !need.second_order() {
@@ -127,7 +127,7 @@ fn first_order<L: Lagrangian, R: Real>(
     parameters: &[R],
     q: &[R],
     v: &[R],
-    need: Need,
+    need: RequestedTerms,
     out: &mut State<'_, R>,
 ) {
     if need.lagrangian {
@@ -156,7 +156,7 @@ fn jets<L: Lagrangian, R: Real, const H: usize, const N: usize>(
     parameters: &[R],
     q: &[R],
     v: &[R],
-    need: Need,
+    need: RequestedTerms,
     out: &mut State<'_, R>,
 ) {
     let mut lifted = Few::new(parameters, Jet2::<R, N>::lift);
@@ -178,12 +178,12 @@ fn jets<L: Lagrangian, R: Real, const H: usize, const N: usize>(
                 out.mass_matrix[i * H + j] = found.second(H + i, H + j);
             }
         }
-        if need.coriolis {
+        if need.momentum_drift {
             let mut sum = found.second(H + i, 0) * v[0];
             for (j, &speed) in v.iter().enumerate().skip(1) {
                 sum += found.second(H + i, j) * speed;
             }
-            out.coriolis[i] = sum;
+            out.momentum_drift[i] = sum;
         }
     }
 }
@@ -194,7 +194,7 @@ fn directions<L: Lagrangian, R: Real>(
     parameters: &[R],
     q: &[R],
     v: &[R],
-    need: Need,
+    need: RequestedTerms,
     out: &mut State<'_, R>,
 ) {
     first_order(system, parameters, q, v, need, out);
@@ -213,11 +213,11 @@ fn directions<L: Lagrangian, R: Real>(
                 out.mass_matrix[j * n + i] = mixed;
             }
         }
-        if need.coriolis {
+        if need.momentum_drift {
             for (number, &speed) in hq.iter_mut().zip(v) {
                 number.t = speed;
             }
-            out.coriolis[i] = system.lagrangian(parameters, hq, hv).st;
+            out.momentum_drift[i] = system.lagrangian(parameters, hq, hv).st;
             for number in hq.iter_mut() {
                 number.t = R::zero();
             }

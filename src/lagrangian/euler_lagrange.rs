@@ -7,9 +7,11 @@ use crate::scalar::{Real, Scalar};
 impl<S: Scalar> Terms<S> {
     /// Empties every field, keeping the buffers.
     pub fn clear(&mut self) {
-        let Self { lagrangian, momentum, dl_dq, mass_matrix, coriolis, force, dissipation, acceleration, energy } =
+        let Self { lagrangian, momentum, dl_dq, mass_matrix, momentum_drift, force, dissipation, acceleration, energy } =
             self;
-        for field in [lagrangian, momentum, dl_dq, mass_matrix, coriolis, force, dissipation, acceleration, energy] {
+        for field in
+            [lagrangian, momentum, dl_dq, mass_matrix, momentum_drift, force, dissipation, acceleration, energy]
+        {
             field.clear();
         }
     }
@@ -48,12 +50,12 @@ impl<S: Scalar> Terms<S> {
         if request.includes(Request::ACCELERATION) {
             expect("mass matrices", batch * n * n, self.mass_matrix.len())?;
             expect("dL/dq", batch * n, self.dl_dq.len())?;
-            expect("coriolis terms", batch * n, self.coriolis.len())?;
+            expect("momentum drifts", batch * n, self.momentum_drift.len())?;
             self.acceleration.clear();
             self.acceleration.resize(batch * n, S::nan());
             let mut right = workspace.take_vector();
             right.clear();
-            right.extend(self.dl_dq.iter().zip(&self.coriolis).map(|(&g, &c)| g - c));
+            right.extend(self.dl_dq.iter().zip(&self.momentum_drift).map(|(&g, &c)| g - c));
             if !self.force.is_empty() {
                 expect("generalized forces", batch * n, self.force.len())?;
                 right.iter_mut().zip(&self.force).for_each(|(right, &force)| *right += force);
@@ -67,7 +69,7 @@ impl<S: Scalar> Terms<S> {
             ("momentum", &self.momentum, n),
             ("dL/dq", &self.dl_dq, n),
             ("mass matrix", &self.mass_matrix, n * n),
-            ("coriolis term", &self.coriolis, n),
+            ("momentum drift", &self.momentum_drift, n),
             ("generalized force", &self.force, n),
             ("dissipated power", &self.dissipation, 1),
             ("energy", &self.energy, 1),
@@ -186,7 +188,7 @@ mod tests {
             lagrangian: vec![1.0, 2.0, 3.0],
             momentum: vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0],
             dl_dq: vec![3.0, 4.0, 1.0, 1.0, 1.0, 1.0],
-            coriolis: vec![1.0; 6],
+            momentum_drift: vec![1.0; 6],
             mass_matrix: vec![1.0, 0.0, 0.0, -1.0, 1.0, 1.0, 1.0, 1.0, 2.0, 0.0, 0.0, 2.0],
             ..Terms::default()
         };
@@ -209,7 +211,7 @@ mod tests {
     fn forces_beside_those_of_the_lagrangian_accelerate() {
         let mut terms = Terms {
             dl_dq: vec![3.0, 4.0],
-            coriolis: vec![1.0; 2],
+            momentum_drift: vec![1.0; 2],
             force: vec![-1.0, 2.0],
             mass_matrix: vec![2.0, 0.0, 0.0, 4.0],
             ..Terms::default()
@@ -228,7 +230,7 @@ mod tests {
     fn forces_from_outside_are_added() {
         let mut terms = Terms {
             dl_dq: vec![3.0, 4.0, 0.0, 0.0],
-            coriolis: vec![1.0, 1.0, 0.0, 0.0],
+            momentum_drift: vec![1.0, 1.0, 0.0, 0.0],
             mass_matrix: vec![2.0, 0.0, 0.0, 4.0, 1.0, 0.0, 0.0, 1.0],
             ..Terms::default()
         };
@@ -260,7 +262,7 @@ mod tests {
     fn one_coordinate_is_divided() {
         let mut terms = Terms {
             dl_dq: vec![6.0, 1.0, 1e300],
-            coriolis: vec![0.0; 3],
+            momentum_drift: vec![0.0; 3],
             mass_matrix: vec![-2.0, 0.0, 1e-300],
             ..Terms::default()
         };

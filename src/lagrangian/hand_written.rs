@@ -1,6 +1,6 @@
 //! A Lagrangian written by hand, with values for its parameters, as a source of Euler-Lagrange terms.
 
-use super::derivatives::{Need, State, evaluate};
+use super::derivatives::{RequestedTerms, State, evaluate};
 use super::taylor::Taylor;
 use super::{EulerLagrange, Lagrangian, MechanicsError, MetricJet, Request, Terms, metric_jets};
 use crate::linalg::Workspace;
@@ -32,7 +32,7 @@ trait Form<S>: Send + Sync {
     /// Number of parameters, if the Lagrangian says so.
     fn parameter_count(&self) -> Option<usize>;
     /// Fills the needed fields of a batch, which have their sizes.
-    fn states(&self, parameters: &[S], q: &[S], v: &[S], need: Need, terms: &mut Terms<S>);
+    fn states(&self, parameters: &[S], q: &[S], v: &[S], need: RequestedTerms, terms: &mut Terms<S>);
     /// The program whose one output is the value.
     fn value(&self, parameters: usize) -> Result<Program<S>, TapeError>;
 }
@@ -44,7 +44,7 @@ impl<L: Lagrangian, S: Scalar> Form<S> for L {
     fn parameter_count(&self) -> Option<usize> {
         Lagrangian::parameter_count(self)
     }
-    fn states(&self, parameters: &[S], q: &[S], v: &[S], need: Need, terms: &mut Terms<S>) {
+    fn states(&self, parameters: &[S], q: &[S], v: &[S], need: RequestedTerms, terms: &mut Terms<S>) {
         let n = Lagrangian::coordinates(self).max(1);
         for (row, (q, v)) in q.chunks_exact(n).zip(v.chunks_exact(n)).enumerate() {
             let part = |needed: bool, width: usize| if needed { row * width..(row + 1) * width } else { 0..0 };
@@ -53,7 +53,7 @@ impl<L: Lagrangian, S: Scalar> Form<S> for L {
                 momentum: &mut terms.momentum[part(need.momentum, n)],
                 dl_dq: &mut terms.dl_dq[part(need.dl_dq, n)],
                 mass_matrix: &mut terms.mass_matrix[part(need.mass_matrix, n * n)],
-                coriolis: &mut terms.coriolis[part(need.coriolis, n)],
+                momentum_drift: &mut terms.momentum_drift[part(need.momentum_drift, n)],
             };
             evaluate(self, parameters, q, v, need, &mut state);
         }
@@ -151,7 +151,7 @@ impl<S: Scalar> Evaluator<S> {
     }
 
     /// The program that computes what is needed, recorded on first use.
-    fn program(&self, form: &dyn Form<S>, need: Need) -> Option<Arc<Program<S>>> {
+    fn program(&self, form: &dyn Form<S>, need: RequestedTerms) -> Option<Arc<Program<S>>> {
         let (value, count) = (self.value(form)?, self.parameters.len());
         let recorded = self.programs[need.index()].get_or_init(|| {
             let n = Lagrangian::coordinates(value);
@@ -168,7 +168,7 @@ impl<S: Scalar> Evaluator<S> {
         &self,
         form: &dyn Form<S>,
         (q, v): (&[S], &[S]),
-        need: Need,
+        need: RequestedTerms,
         terms: &mut Terms<S>,
         scratch: &mut Scratch<S>,
     ) -> bool {
@@ -188,7 +188,7 @@ impl<S: Scalar> Evaluator<S> {
                 (need.momentum, &mut terms.momentum, &evaluation.momentum, n),
                 (need.dl_dq, &mut terms.dl_dq, &evaluation.dl_dq, n),
                 (need.mass_matrix, &mut terms.mass_matrix, &evaluation.mass_matrix, n * n),
-                (need.coriolis, &mut terms.coriolis, &evaluation.coriolis, n),
+                (need.momentum_drift, &mut terms.momentum_drift, &evaluation.momentum_drift, n),
             ];
             for (_, to, from, width) in fields.into_iter().filter(|(needed, ..)| *needed) {
                 to[chunk * STATES * width..][..from.len()].copy_from_slice(from);
@@ -202,7 +202,7 @@ impl<S: Scalar> Evaluator<S> {
         &self,
         form: &dyn Form<S>,
         (q, v): (&[S], &[S]),
-        need: Need,
+        need: RequestedTerms,
         terms: &mut Terms<S>,
         scratch: &mut Scratch<S>,
     ) -> bool {
@@ -213,8 +213,8 @@ impl<S: Scalar> Evaluator<S> {
             replays.len() - 1
         });
         // The order of the recording; what is not needed is empty.
-        let Terms { lagrangian, momentum, dl_dq, mass_matrix, coriolis, .. } = terms;
-        let outputs: &mut [&mut [S]] = &mut [lagrangian, momentum, dl_dq, mass_matrix, coriolis];
+        let Terms { lagrangian, momentum, dl_dq, mass_matrix, momentum_drift, .. } = terms;
+        let outputs: &mut [&mut [S]] = &mut [lagrangian, momentum, dl_dq, mass_matrix, momentum_drift];
         replays[at].1.evaluate(q.len() / form.coordinates(), &[q, v], &self.parameters, outputs).is_ok()
     }
 
@@ -237,7 +237,7 @@ impl<S: Scalar> Evaluator<S> {
         if v.len() != q.len() {
             return Err(shape("velocities", v.len()));
         }
-        let need = Need::of(request);
+        let need = RequestedTerms::of(request);
         for field in [&mut terms.force, &mut terms.dissipation, &mut terms.acceleration, &mut terms.energy] {
             field.clear();
         }
@@ -247,7 +247,7 @@ impl<S: Scalar> Evaluator<S> {
         terms.momentum.resize(size(need.momentum, n), S::nan());
         terms.dl_dq.resize(size(need.dl_dq, n), S::nan());
         terms.mass_matrix.resize(size(need.mass_matrix, n * n), S::nan());
-        terms.coriolis.resize(size(need.coriolis, n), S::nan());
+        terms.momentum_drift.resize(size(need.momentum_drift, n), S::nan());
         let done = match (n > REPLAY_COORDINATES, batch >= REPLAY_FROM) {
             (true, _) => self.sweep(form, (q, v), need, terms, scratch),
             (false, large) => large && self.replay(form, (q, v), need, terms, scratch),
@@ -280,7 +280,7 @@ fn record<'t, S: Scalar>(
     parameters: &[Tracer<'t, S>],
     q: &[Tracer<'t, S>],
     v: &[Tracer<'t, S>],
-    need: Need,
+    need: RequestedTerms,
 ) -> Vec<Tracer<'t, S>> {
     let n = q.len();
     let field = |needed: bool, width: usize| vec![Tracer::zero(); if needed { width } else { 0 }];
@@ -289,10 +289,10 @@ fn record<'t, S: Scalar>(
         field(need.momentum, n),
         field(need.dl_dq, n),
         field(need.mass_matrix, n * n),
-        field(need.coriolis, n),
+        field(need.momentum_drift, n),
     ];
-    let [lagrangian, momentum, dl_dq, mass_matrix, coriolis] = &mut fields;
-    evaluate(system, parameters, q, v, need, &mut State { lagrangian, momentum, dl_dq, mass_matrix, coriolis });
+    let [lagrangian, momentum, dl_dq, mass_matrix, momentum_drift] = &mut fields;
+    evaluate(system, parameters, q, v, need, &mut State { lagrangian, momentum, dl_dq, mass_matrix, momentum_drift });
     fields.concat()
 }
 

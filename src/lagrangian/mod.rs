@@ -24,7 +24,7 @@ mod terms;
 mod with_forces;
 
 pub(crate) use catalogue::LagrangianVisitor;
-pub use catalogue::{Configured, SystemError, find, systems};
+pub use catalogue::{SystemError, SystemInstance, find, systems};
 pub use configure::{build, configure, configure_system, configure_values};
 pub use description::{Description, DescriptionError};
 pub use error::MechanicsError;

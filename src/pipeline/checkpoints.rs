@@ -3,7 +3,9 @@
 use crate::pipeline::{Event, PipelineError, Watch};
 use crate::scalar::Scalar;
 use crate::storage::{Disk, Files};
-use crate::training::{CheckpointManager, Every, Identity, LATEST, PREVIOUS, Restored, Snapshot, remove_checkpoints};
+use crate::training::{
+    CheckpointInterval, CheckpointManager, Fingerprint, LATEST, PREVIOUS, Restored, Snapshot, remove_checkpoints,
+};
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -25,7 +27,7 @@ pub enum Begin {
 pub struct Checkpoints {
     files: Arc<dyn Files>,
     directory: PathBuf,
-    every: Every,
+    every: CheckpointInterval,
     begin: Begin,
     /// Text that is kept in a checkpoint and must be the same when the training goes on; the configuration if none.
     identity: Option<String>,
@@ -42,7 +44,7 @@ impl fmt::Debug for Checkpoints {
 
 impl Checkpoints {
     /// Checkpoints in a directory, of a training that begins anew.
-    pub fn new(directory: &Path, every: Every) -> Self {
+    pub fn new(directory: &Path, every: CheckpointInterval) -> Self {
         let (files, directory) = (Arc::new(Disk), directory.to_path_buf());
         Self { files, directory, every, begin: Begin::Anew, identity: None }
     }
@@ -84,7 +86,7 @@ impl Checkpoints {
         watch: &Watch,
     ) -> Result<(Arc<CheckpointManager>, Option<Snapshot<S>>), PipelineError> {
         let config = self.identity.clone().unwrap_or_else(|| config.to_string());
-        let identity = Identity { config, data };
+        let identity = Fingerprint { config, data };
         let keeper = Arc::new(CheckpointManager::new(Arc::clone(&self.files), &self.directory, self.every, identity));
         if self.begin != Begin::Anew {
             match keeper.restore(parameters, states) {

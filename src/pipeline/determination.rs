@@ -1,7 +1,7 @@
 //! Tables of the ranges in which the data determine mass matrix, friction and energy of the model of `lnn fit`.
 
 use crate::analysis::{Determination, EnergyLoss, Estimate, Observed, determination, energy_loss, places};
-use crate::data::Measured;
+use crate::data::RecordingSplit;
 use crate::lagrangian::EulerLagrange;
 use crate::names::number;
 use crate::pipeline::PipelineError;
@@ -50,7 +50,11 @@ impl Determined {
     ///
     /// # Errors
     /// [`PipelineError::Recording`] if the states that were learned from cannot be had again.
-    pub fn new(model: &dyn EulerLagrange<f64>, measured: &Measured, targets: Targets) -> Result<Self, PipelineError> {
+    pub fn new(
+        model: &dyn EulerLagrange<f64>,
+        measured: &RecordingSplit,
+        targets: Targets,
+    ) -> Result<Self, PipelineError> {
         let recording = &measured.training.recording;
         let names = &recording.coordinates;
         let observed = Observed::new(measured, targets)?;

@@ -1,6 +1,6 @@
 //! Where the energy of held-out motion goes by a model: change, work, friction and what is left.
 
-use crate::data::Part;
+use crate::data::Split;
 use crate::lagrangian::{EulerLagrange, Request, Terms};
 use crate::rollout::{Driven, SampledForce, Trajectory};
 use serde::Serialize;
@@ -32,7 +32,7 @@ pub struct Balance {
 }
 
 /// The balance at the estimated states with full windows; none if no trajectory has one.
-pub fn balance(model: &dyn EulerLagrange<f64>, part: &Part) -> Option<Balance> {
+pub fn balance(model: &dyn EulerLagrange<f64>, part: &Split) -> Option<Balance> {
     let n = model.coordinates();
     let mut sums = Balance::default();
     let mut samples = 0.0;

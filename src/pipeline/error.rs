@@ -2,7 +2,7 @@
 
 use crate::analysis::GridError;
 use crate::configuration::ConfigError;
-use crate::data::{MeasuredError, SamplingError};
+use crate::data::{RecordingSplitError, SamplingError};
 use crate::lagrangian::SystemError;
 use crate::network::NetworkError;
 use crate::network::file::ModelFileError;
@@ -27,7 +27,7 @@ pub enum PipelineError {
     Sampling(#[from] SamplingError),
     /// Recorded motion that cannot be learned from.
     #[error(transparent)]
-    Recording(#[from] MeasuredError),
+    Recording(#[from] RecordingSplitError),
     /// Recorded motion without derivatives.
     #[error(transparent)]
     Smooth(#[from] SmoothError),

@@ -7,7 +7,7 @@ use crate::analysis::{
 };
 use crate::data::sample;
 use crate::lagrangian::system::TrajectoryTest as Span;
-use crate::lagrangian::{Configured, EulerLagrange};
+use crate::lagrangian::{EulerLagrange, SystemInstance};
 use crate::network::NetworkLagrangian;
 use crate::pipeline::attention::Attention;
 use crate::pipeline::physics::{Physics, Subject};
@@ -98,7 +98,7 @@ impl EvaluationOptions {
     ///
     /// # Errors
     /// [`PipelineError::Sampling`] for bounds that cannot be sampled.
-    pub fn new(system: &Configured<f64>, trained: Domain<f64>, seed: u64) -> Result<Self, PipelineError> {
+    pub fn new(system: &SystemInstance<f64>, trained: Domain<f64>, seed: u64) -> Result<Self, PipelineError> {
         let bounds = system.system.validation(system.coordinates);
         let pairs = |bounds: &[(f64, f64)]| bounds.iter().map(|&(low, high)| [low, high]).collect::<Vec<_>>();
         let bounds = (pairs(&bounds.positions), pairs(&bounds.velocities));
@@ -118,7 +118,7 @@ const PIECES: usize = 4;
 /// # Errors
 /// A system that cannot be built, motions that do not fit into memory, [`PipelineError::Interrupted`].
 pub fn evaluate(
-    system: &Configured<f64>,
+    system: &SystemInstance<f64>,
     network: &NetworkLagrangian<f64>,
     options: EvaluationOptions,
     watch: &Watch,
@@ -218,7 +218,7 @@ fn leaving(trajectory: &Trajectory<f64>, trained: &Domain<f64>, columns: &[Strin
 /// `L` and `det M` at rest over the first two coordinates, or over coordinate and velocity if there is only one; with more
 /// than one, `det M` also at velocities close to the upper end of the validation bounds, where wrong signs appear first.
 fn grids(
-    system: &Configured<f64>,
+    system: &SystemInstance<f64>,
     exact: &dyn EulerLagrange<f64>,
     learned: &dyn EulerLagrange<f64>,
 ) -> Result<Vec<Figure>, PipelineError> {
@@ -285,7 +285,7 @@ fn grids(
 
 /// The components of `(q, v)` that a grid leaves fixed, in words, neighbours of equal value together; `imposed` if the
 /// velocity of a time-like coordinate follows from the mass shell at every point.
-fn fixed(system: &Configured<f64>, state: &[f64], axes: [Axis; 2], imposed: bool) -> String {
+fn fixed(system: &SystemInstance<f64>, state: &[f64], axes: [Axis; 2], imposed: bool) -> String {
     let n = system.coordinates;
     let (columns, units) = (system.system.columns(n), system.system.units(n));
     let shell = system.constrained_coordinate().filter(|_| imposed).map(|i| n + i);

@@ -1,7 +1,7 @@
 //! Tables, report and `evaluation.json` of an evaluation.
 
 use crate::analysis::MassMatrixError;
-use crate::lagrangian::Configured;
+use crate::lagrangian::SystemInstance;
 use crate::names::{WIDTH, hundredths, number, rounded, wrapped};
 use crate::pipeline::evaluation::Evaluation;
 use crate::pipeline::report_files::{parameter_table, write_report_and_figures};
@@ -38,7 +38,7 @@ impl Evaluation {
     /// [`PipelineError::Output`].
     pub(crate) fn write(
         &self,
-        system: &Configured<f64>,
+        system: &SystemInstance<f64>,
         (model, validation_loss): (&str, f64),
         seed: u64,
         output: &dyn Output,

@@ -11,7 +11,7 @@ use crate::pipeline::readings::{READINGS, read_hole};
 use crate::pipeline::train::{RunOptions, train};
 use crate::pipeline::{Event, PipelineError, RECORD, Watch};
 use crate::report::Curve;
-use crate::training::{Stop, TrainingError};
+use crate::training::{StopReason, TrainingError};
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -183,7 +183,7 @@ fn make(
     let record = match trained {
         _ if judged_or_empty && watch.is_interrupted() => return Ok(None),
         Ok(trained) => {
-            if let Stop::Failed(error) = &trained.stop {
+            if let StopReason::Failed(error) = &trained.stop {
                 tracing::warn!(run = run.name, %error, "training stopped early");
             }
             if experiment.reads_holes() {

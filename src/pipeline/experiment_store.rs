@@ -2,7 +2,7 @@
 
 use crate::pipeline::{Checkpoints, Directory, Output, PipelineError};
 use crate::storage::read_regular;
-use crate::training::Every;
+use crate::training::CheckpointInterval;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
@@ -89,6 +89,6 @@ impl RunOutput for Directory {
     }
 
     fn checkpoints(&self) -> Option<Checkpoints> {
-        Some(Checkpoints::new(self.path(), Every::Seconds(CHECKPOINT_SECONDS)))
+        Some(Checkpoints::new(self.path(), CheckpointInterval::Seconds(CHECKPOINT_SECONDS)))
     }
 }

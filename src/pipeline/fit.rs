@@ -1,7 +1,7 @@
 //! A fit of recorded motion: learning, judgement by motion that was held out, files.
 
 use crate::configuration::Precision;
-use crate::data::{Datasets, Measured};
+use crate::data::{Datasets, RecordingSplit};
 use crate::network::file::{FORMAT, Header, ModelFile, StoredPrecision};
 use crate::network::{Architecture, Layout, NetworkLagrangian};
 use crate::pipeline::determination::Determined;
@@ -20,13 +20,13 @@ use crate::recording::Targets;
 use crate::scalar::Scalar;
 use crate::shooting::{self, Task};
 use crate::storage::container::checksum;
-use crate::training::{Epoch, ResumeOptions, Snapshot, Stop, Trained, resume as train, training_memory};
+use crate::training::{Epoch, ResumeOptions, Snapshot, StopReason, Trained, resume as train, training_memory};
 
 /// A model of recorded motion, after its files were written.
 #[derive(Debug)]
 pub struct FitReport {
     /// Reason for which learning ended.
-    pub stop: Stop,
+    pub stop: StopReason,
     /// Header of the model's file.
     pub header: Header,
     /// The network with its best weights.
@@ -114,7 +114,7 @@ fn fit_in<S: Scalar>(
     let sitting = ResumeOptions { keeper: keeper.clone(), start };
     let mut trained = train(config, &architecture, penalty, data, threads, &watch.hooks(), sitting)?;
     let mut shot = None;
-    if let (Targets::Motion, Stop::Finished) = (targets, &trained.stop) {
+    if let (Targets::Motion, StopReason::Finished) = (targets, &trained.stop) {
         let settings = fit_config.shooting.clone().unwrap_or_default();
         let (training, validation) = (measured.training.estimated(), measured.validation.estimated());
         let noise = measured.noise();
@@ -184,7 +184,7 @@ fn fit_in<S: Scalar>(
 }
 
 /// Name and checksum of everything that is learned from.
-fn checksums<S: Scalar>(measured: &Measured, data: &Datasets<S>) -> Vec<(String, u32)> {
+fn checksums<S: Scalar>(measured: &RecordingSplit, data: &Datasets<S>) -> Vec<(String, u32)> {
     let parts = [&measured.training, &measured.validation];
     let tracks = parts.into_iter().flat_map(|part| &part.recording.tracks);
     let numbers = tracks.flat_map(|track| [&track.times, &track.q, &track.v, &track.a, &track.force]).flatten();

@@ -4,7 +4,7 @@ use crate::analysis::{
     PredictionError, Predictions, ValidTimes, Window, predict_by_constant_velocity, prediction_error, spread,
     window_valid_times,
 };
-use crate::data::Part;
+use crate::data::Split;
 use crate::lagrangian::{EulerLagrange, Request, Terms};
 use crate::linalg::{SignatureBuffers, has_signature};
 use crate::names::number;
@@ -27,7 +27,7 @@ const POINTS: usize = 40;
 #[derive(Clone, Copy, Debug)]
 pub struct HoldOutOptions<'a> {
     /// Motion that the model has not seen.
-    pub part: &'a Part,
+    pub part: &'a Split,
     /// Time over which it is predicted, in s; none for 200 samples, at most a quarter of the shortest trajectory.
     pub horizon: Option<f64>,
     /// The time-like coordinate, if there is one.
@@ -135,7 +135,7 @@ const FORCE_CAPTION: &str =
     "Known forces in the first held-out window; the prediction takes them as linear between the samples.";
 
 /// A quarter of the shortest trajectory, at most [`AHEAD`] samples.
-fn horizon(part: &Part) -> f64 {
+fn horizon(part: &Split) -> f64 {
     let spans = part.states.iter().filter_map(|states| {
         let times = &states.times[states.interior()];
         let span = times.last()? - times.first()?;
@@ -214,7 +214,7 @@ const CHUNK: usize = 4096;
 const STATES: usize = 20_000;
 
 /// Fraction of the states with full windows whose mass matrix has not the right signature, or is not finite.
-fn wrong_signature(model: &dyn EulerLagrange<f64>, part: &Part, time: Option<usize>) -> f64 {
+fn wrong_signature(model: &dyn EulerLagrange<f64>, part: &Split, time: Option<usize>) -> f64 {
     let n = model.coordinates();
     let (mut wrong, mut count) = (0, 0);
     let (mut terms, mut buffers) = (Terms::default(), SignatureBuffers::default());

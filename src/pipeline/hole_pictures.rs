@@ -1,6 +1,8 @@
 //! Pictures of a learned black hole beside the exact one: orbits, shadow and sky.
 
-use crate::relativity::{Around, Camera, Image, Pair, Sky, Tracing, difference_image, orbits, shadow};
+use crate::relativity::{
+    Camera, CentralCoordinates, Image, LearnedHole, Sky, Tracing, difference_image, orbits, shadow,
+};
 use crate::report::{Figure, OrbitPlot, Series, kept, orbit_picture, png};
 
 /// Distance of the camera over the mass, and its angle from the axis.
@@ -9,7 +11,7 @@ const CAMERA: (f64, f64) = (20.0, 1.4);
 const GAP: usize = 8;
 
 /// Orbits of the exact metric, wide, and of the learned one over them; none where there is nothing to show.
-pub(crate) fn orbit_figure(pair: &Pair<'_>, mass: f64) -> Option<Figure> {
+pub(crate) fn orbit_figure(pair: &LearnedHole<'_>, mass: f64) -> Option<Figure> {
     let origin = pair.around.origin();
     let range = (1.2 * mass, 20.0 * mass);
     let hole = pair.around.equator(pair.exact, &origin).horizon(range).ok().flatten();
@@ -39,12 +41,12 @@ pub(crate) fn orbit_figure(pair: &Pair<'_>, mass: f64) -> Option<Figure> {
 /// an edge; `None` for coordinates that are not Cartesian, where nothing rests at the place of the camera, and when
 /// `interrupted` says so.
 pub(crate) fn sky_picture(
-    pair: &Pair<'_>,
+    pair: &LearnedHole<'_>,
     mass: f64,
     (pixels, threads): (usize, usize),
     interrupted: &(dyn Fn() -> bool + Sync),
 ) -> Option<Vec<u8>> {
-    let Around::Cartesian(chart) = pair.around else { return None };
+    let CentralCoordinates::Cartesian(chart) = pair.around else { return None };
     let camera = Camera { chart, width: pixels, height: pixels, ..Camera::new(CAMERA.0 * mass, CAMERA.1) };
     let tracing = Tracing { threads, ..Tracing::of(&camera) };
     let mut views = Vec::new();

@@ -1,6 +1,6 @@
 //! Model files of runs: where they lie, the states they were trained on, the parameters of their systems.
 
-use crate::lagrangian::Configured;
+use crate::lagrangian::SystemInstance;
 use crate::lagrangian::system::Size;
 use crate::network::file::Header;
 use crate::pipeline::{MODEL, PipelineError};
@@ -30,7 +30,7 @@ pub fn trained_on<S: Scalar>(header: &Header) -> Domain<S> {
 }
 
 /// Values of all parameters of a system, its size among them.
-pub(crate) fn all_parameters(system: &Configured<f64>) -> BTreeMap<String, f64> {
+pub(crate) fn all_parameters(system: &SystemInstance<f64>) -> BTreeMap<String, f64> {
     let named = system.system.parameters.iter().map(|p| p.symbol.to_string());
     let mut parameters: BTreeMap<_, _> = named.zip(system.parameters.iter().copied()).collect();
     if let Size::Chosen { symbol, .. } = system.system.size {

@@ -9,7 +9,7 @@ use crate::analysis::{
 };
 use crate::certificate::{Options, Signature, certify_network};
 use crate::lagrangian::system::Bounds;
-use crate::lagrangian::{Configured, EulerLagrange};
+use crate::lagrangian::{EulerLagrange, SystemInstance};
 use crate::network::{NetworkLagrangian, Structure};
 use crate::pipeline::PipelineError;
 use crate::pipeline::common_ground::{CommonGround, gauge_functions};
@@ -149,7 +149,7 @@ pub(crate) struct Subject<'a> {
     /// States that it was trained on; periodic coordinates are unbounded.
     pub trained: &'a Domain<f64>,
     /// The system it learned, if it is known.
-    pub system: Option<&'a Configured<f64>>,
+    pub system: Option<&'a SystemInstance<f64>>,
     /// Names of coordinates and velocities, with units as labels of axes.
     pub columns: Vec<String>,
     pub labels: Vec<String>,
@@ -183,7 +183,7 @@ impl Physics {
             coordinates: subject.columns[..subject.network.coordinates()].to_vec(),
             figures: Vec::new(),
         };
-        let exact = subject.system.map(Configured::build).transpose()?;
+        let exact = subject.system.map(SystemInstance::build).transpose()?;
         found.find_common_ground(subject, &region, exact.as_deref());
         check()?;
         found.find_geometry(subject, &region, exact.as_deref());
@@ -442,7 +442,7 @@ impl Subject<'_> {
     fn states(&self, region: &Region, states: usize) -> (Vec<f64>, Vec<f64>) {
         let inside = |q: &[f64], v: &mut [f64]| {
             let fits =
-                |system: &Configured<f64>| system.check_domain(q).is_ok() && system.impose_constraint(q, v).is_ok();
+                |system: &SystemInstance<f64>| system.check_domain(q).is_ok() && system.impose_constraint(q, v).is_ok();
             self.system.is_none_or(fits)
         };
         region.states(states, SEED, inside)

@@ -1,7 +1,7 @@
 //! Recorded motion made ready for a fit: derivatives, division, the configuration that suits it.
 
 use crate::configuration::{Config, Precision};
-use crate::data::Measured;
+use crate::data::RecordingSplit;
 use crate::pipeline::PipelineError;
 use crate::pipeline::fit_config::{FitColumns, FitConfig, FitOptions};
 use crate::presets::suggested;
@@ -15,7 +15,7 @@ use std::time::Instant;
 pub struct PreparedFit<'a> {
     pub(crate) reading: &'a LoadedRecording,
     pub(crate) options: FitOptions,
-    pub(crate) measured: Measured,
+    pub(crate) measured: RecordingSplit,
     pub(crate) targets: Targets,
     /// Time at which the work began, for the time that the summary states.
     pub started: Instant,
@@ -30,7 +30,7 @@ impl<'a> PreparedFit<'a> {
     /// ones are asked for and there are none.
     pub fn new(reading: &'a LoadedRecording, options: &FitOptions) -> Result<Self, PipelineError> {
         let started = Instant::now();
-        let measured = Measured::new(&reading.recording, &options.preparation())?;
+        let measured = RecordingSplit::new(&reading.recording, &options.preparation())?;
         let targets = options.targets.unwrap_or_else(|| measured.advice());
         if targets == Targets::Measured && !measured.training.recording.has_accelerations() {
             return Err(PipelineError::NoAccelerations);

@@ -3,13 +3,13 @@
 use crate::configuration::Config;
 use crate::experiments::{Experiment, Record, Run, Scale};
 use crate::geometry::GeometryError;
-use crate::lagrangian::Configured;
+use crate::lagrangian::SystemInstance;
 use crate::network::NetworkLagrangian;
 use crate::network::file::ModelFile;
 use crate::pipeline::experiment_store::ExperimentStore;
 use crate::pipeline::hole_pictures::{orbit_figure, sky_picture};
 use crate::pipeline::{MODEL, Output, PipelineError, Watch};
-use crate::relativity::{Around, Pair, Reading};
+use crate::relativity::{CentralCoordinates, LearnedHole, Reading};
 use crate::report::{READING_HEADER, Report, reading_table};
 
 /// Names of the files of a run: its readings, its orbits, its sky.
@@ -52,14 +52,14 @@ impl RowOfHoles {
 }
 
 /// Coordinates and learned distances of a configuration; `None` if they are not those around a centre.
-fn around(config: &Config, system: &Configured<f64>) -> Option<(Around, (f64, f64))> {
+fn around(config: &Config, system: &SystemInstance<f64>) -> Option<(CentralCoordinates, (f64, f64))> {
     let coordinates = system.system.coordinates(system.coordinates);
     let names: Vec<&str> = coordinates.iter().map(|c| c.name.as_ref()).collect();
-    let around = Around::of_names(&names)?;
+    let around = CentralCoordinates::of_names(&names)?;
     let box_of = |i: usize| config.phases.first().and_then(|phase| phase.position.get(i)).map(|b| (b[0], b[1]));
     let range = match around {
-        Around::Cartesian(_) => config.data.shell_radius.map(|[low, high]| (low, high)),
-        Around::Spherical { radius, .. } => box_of(radius),
+        CentralCoordinates::Cartesian(_) => config.data.shell_radius.map(|[low, high]| (low, high)),
+        CentralCoordinates::Spherical { radius, .. } => box_of(radius),
     };
     Some((around, range?))
 }
@@ -71,13 +71,13 @@ fn around(config: &Config, system: &Configured<f64>) -> Option<(Around, (f64, f6
 fn look_at<T>(
     config: &Config,
     learned: &NetworkLagrangian<f64>,
-    look: impl FnOnce(&Pair<'_>) -> Result<T, GeometryError>,
+    look: impl FnOnce(&LearnedHole<'_>) -> Result<T, GeometryError>,
 ) -> Result<T, PipelineError> {
     let system = config.system()?;
     let unfit = || PipelineError::Hole(config.system.clone());
     let (around, range) = around(config, &system).ok_or_else(unfit)?;
     let exact = system.build()?;
-    let pair = Pair { exact: exact.as_ref(), learned, system: &system, around, range };
+    let pair = LearnedHole { exact: exact.as_ref(), learned, system: &system, around, range };
     look(&pair).map_err(|_| unfit())
 }
 

@@ -1,11 +1,11 @@
 //! Files of a report: the page, its pictures and their captions, the history of a training.
 
-use crate::lagrangian::Configured;
+use crate::lagrangian::SystemInstance;
 use crate::lagrangian::system::Size;
 use crate::pipeline::model::all_parameters;
 use crate::pipeline::{CAPTIONS, Output, PipelineError};
 use crate::report::{Figure, HistoryRow, Report, training_figures};
-use crate::training::{Epoch, Stop};
+use crate::training::{Epoch, StopReason};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
@@ -25,7 +25,7 @@ pub(crate) fn write_report_and_figures<'a>(
 }
 
 /// Adds the system's parameters to a report.
-pub(crate) fn parameter_table(report: Report, system: &Configured<f64>) -> Report {
+pub(crate) fn parameter_table(report: Report, system: &SystemInstance<f64>) -> Report {
     let values = all_parameters(system);
     let named = system.system.parameters.iter().map(|p| (p.symbol.as_ref(), p.unit.as_ref()));
     let size = match system.system.size {
@@ -83,10 +83,10 @@ pub(crate) fn training_pictures(epochs: &[Epoch]) -> Vec<Figure> {
 }
 
 /// The end of a training as `summary.json` tells it.
-pub(crate) fn ended(stop: &Stop) -> String {
+pub(crate) fn ended(stop: &StopReason) -> String {
     match stop {
-        Stop::Finished => "finished".to_string(),
-        Stop::Interrupted => "interrupted".to_string(),
-        Stop::Failed(error) => error.to_string(),
+        StopReason::Finished => "finished".to_string(),
+        StopReason::Interrupted => "interrupted".to_string(),
+        StopReason::Failed(error) => error.to_string(),
     }
 }

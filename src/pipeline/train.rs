@@ -4,7 +4,7 @@ use crate::analysis::{stretches, training_instability};
 use crate::configuration::{Config, Phase, Precision};
 use crate::data::{Datasets, sample_all};
 use crate::experiments::{Learned, Outcome, Record};
-use crate::lagrangian::Configured;
+use crate::lagrangian::SystemInstance;
 use crate::lagrangian::system::TrajectoryTest;
 use crate::names::{counted, number};
 use crate::network::file::{FORMAT, Header, ModelFile, StoredPrecision};
@@ -16,7 +16,7 @@ use crate::pipeline::report_files::{ended, history, parameter_table, training_pi
 use crate::pipeline::{MODEL, Output, PipelineError, Watch, memory, start};
 use crate::report::Report;
 use crate::scalar::Scalar;
-use crate::training::{Epoch, ResumeOptions, Snapshot, Stop, resume, training_memory};
+use crate::training::{Epoch, ResumeOptions, Snapshot, StopReason, resume, training_memory};
 use serde::Serialize;
 use std::time::Instant;
 
@@ -66,7 +66,7 @@ impl Default for RunOptions {
 #[derive(Debug)]
 pub struct TrainReport {
     /// Reason for which training ended.
-    pub stop: Stop,
+    pub stop: StopReason,
     /// Header of the model's file.
     pub header: Header,
     /// The network with its best weights.
@@ -99,7 +99,7 @@ impl TrainReport {
 /// the watch's flag ended the first one: then nothing was written.
 pub fn train(
     config: &Config,
-    system: &Configured<f64>,
+    system: &SystemInstance<f64>,
     options: &RunOptions,
     output: &dyn Output,
     watch: &Watch,
@@ -114,7 +114,7 @@ pub fn train(
 /// model's.
 fn begin_shape<S: Scalar>(
     config: &Config,
-    system: &Configured<f64>,
+    system: &SystemInstance<f64>,
     scale: Vec<f64>,
 ) -> Result<(Architecture, Option<Vec<S>>), PipelineError> {
     let Some(from) = &config.from else { return Ok((config.architecture(system, scale)?, None)) };
@@ -124,7 +124,7 @@ fn begin_shape<S: Scalar>(
 
 fn train_in<S: Scalar>(
     config: &Config,
-    system: &Configured<f64>,
+    system: &SystemInstance<f64>,
     options: &RunOptions,
     output: &dyn Output,
     watch: &Watch,
@@ -236,7 +236,7 @@ fn record(learned: Learned, epochs: &[Epoch], seconds: f64) -> Record {
 
 /// The velocity that the mass shell fixes and its range over the training states, which no bounds of the configuration
 /// tell.
-fn imposed_velocities<S: Scalar>(system: &Configured<f64>, data: &Datasets<S>) -> Option<(usize, [f64; 2])> {
+fn imposed_velocities<S: Scalar>(system: &SystemInstance<f64>, data: &Datasets<S>) -> Option<(usize, [f64; 2])> {
     let i = system.constrained_coordinate()?;
     let ranges = data.training.iter().map(|set| set.velocity_range(i));
     ranges.reduce(|[low, high], [l, h]| [low.min(l), high.max(h)]).map(|range| (i, range))
@@ -245,7 +245,7 @@ fn imposed_velocities<S: Scalar>(system: &Configured<f64>, data: &Datasets<S>) -
 /// Header of the model file of this run.
 fn header(
     config: &Config,
-    system: &Configured<f64>,
+    system: &SystemInstance<f64>,
     architecture: Architecture,
     imposed: Option<(usize, [f64; 2])>,
     validation_loss: f64,
@@ -313,7 +313,7 @@ fn headline(summary: &Summary<'_>) -> String {
 
 fn write_report(
     output: &dyn Output,
-    system: &Configured<f64>,
+    system: &SystemInstance<f64>,
     summary: &Summary<'_>,
     epochs: &[Epoch],
     toml: &str,

@@ -3,7 +3,7 @@
 use crate::configuration::Regularizer;
 use crate::configuration::{Config, Data, Network, OnFailure, Optimizer, Phase, Precision, Scaling};
 use crate::data::boxes;
-use crate::lagrangian::Configured;
+use crate::lagrangian::SystemInstance;
 use crate::lagrangian::system::{Bounds, PaperBudget, PaperPhase, ShellAdvice, StateAdvice};
 use crate::network::{ActivationChoice, Initialization, InputLayer, Structure};
 use crate::optimizers::Method;
@@ -24,7 +24,7 @@ pub enum Preset {
 
 impl Preset {
     /// The configuration of a system; `None` if the preset has none for it.
-    pub fn config(self, system: &Configured<f64>) -> Option<Config> {
+    pub fn config(self, system: &SystemInstance<f64>) -> Option<Config> {
         match self {
             Self::Quick => Some(ours(system, QUICK)),
             Self::Best => Some(ours(system, BEST)),
@@ -34,7 +34,7 @@ impl Preset {
 
     /// The configuration of a system for a Lagrangian of this structure; the presets of our own take bolder steps where a
     /// signature cannot be lost.
-    pub(crate) fn config_of(self, system: &Configured<f64>, structure: Structure) -> Option<Config> {
+    pub(crate) fn config_of(self, system: &SystemInstance<f64>, structure: Structure) -> Option<Config> {
         let mut config = self.config(system)?;
         config.take_structure(structure);
         if structure != Structure::BlackBox && self != Self::Paper {
@@ -58,20 +58,20 @@ impl Config {
 }
 
 /// Name of the time-like coordinate of a system.
-fn time_like(system: &Configured<f64>) -> Option<String> {
+fn time_like(system: &SystemInstance<f64>) -> Option<String> {
     let coordinates = system.system.coordinates(system.coordinates);
     system.system.time_like.and_then(|index| coordinates.into_iter().nth(index)).map(|time| time.name.into_owned())
 }
 
 /// The penalty on a wrong signature: eigenvalues, or Lorentzian Sylvester where a coordinate is a time.
-fn regularizer(system: &Configured<f64>, lambda: f64) -> Regularizer {
+fn regularizer(system: &SystemInstance<f64>, lambda: f64) -> Regularizer {
     match time_like(system) {
         Some(time) => Regularizer::LorentzianSylvester { lambda, time },
         None => Regularizer::Eigenvalue { lambda },
     }
 }
 
-fn base(system: &Configured<f64>, states: usize, network: Network) -> Config {
+fn base(system: &SystemInstance<f64>, states: usize, network: Network) -> Config {
     let validation: Bounds = system.system.validation(system.coordinates);
     Config {
         system: system.system.name.to_string(),
@@ -165,7 +165,7 @@ fn phase(epochs: usize, rate: f64, position: Vec<[f64; 2]>, velocity: Vec<[f64; 
 }
 
 /// The paper's box with a single turn of every angle, wider where the motions of the trajectory test soon leave it.
-fn training_states(system: &Configured<f64>) -> (Bounds, StateAdvice) {
+fn training_states(system: &SystemInstance<f64>) -> (Bounds, StateAdvice) {
     let n = system.coordinates;
     let mut bounds: Bounds = system.system.training(n);
     // Embedded angles repeat: one turn is all there is, unless somebody wants less.
@@ -182,7 +182,7 @@ fn training_states(system: &Configured<f64>) -> (Bounds, StateAdvice) {
     (bounds, advice)
 }
 
-fn ours(system: &Configured<f64>, size: Size) -> Config {
+fn ours(system: &SystemInstance<f64>, size: Size) -> Config {
     let (bounds, StateAdvice { log_uniform, acceleration_weighting, trajectory_fraction, shell }) =
         training_states(system);
     let phase = phase(size.epochs, 5e-3, boxes(&bounds.positions), boxes(&bounds.velocities));
@@ -207,7 +207,7 @@ const SHELL_BATCH: usize = 4;
 const SHELL_EPOCHS: usize = 3;
 
 /// The metric of a field around a centre, the same at all times: states in a shell, features of direction and distance.
-fn around_a_centre(mut config: Config, system: &Configured<f64>, shell: ShellAdvice) -> Config {
+fn around_a_centre(mut config: Config, system: &SystemInstance<f64>, shell: ShellAdvice) -> Config {
     let names = system.system.coordinates(system.coordinates);
     let coordinates: Vec<String> = shell.coordinates.iter().map(|&i| names[i].name.to_string()).collect();
     let (low, high) = shell.radius;
@@ -266,7 +266,7 @@ pub(crate) fn recorded(
 
 /// Appendix "Training details" of Hamzaogullari and Ozakin. Its table for AdS4 lists the eigenvalue penalty, which no
 /// Lorentzian metric could satisfy; its text says Lorentzian Sylvester, and that is what stands here.
-fn paper(system: &Configured<f64>) -> Option<Config> {
+fn paper(system: &SystemInstance<f64>) -> Option<Config> {
     let n = system.coordinates;
     let PaperBudget { states, hidden, phases } = system.system.learning.paper?;
     let network = Network { hidden: hidden.to_vec(), embed_periodic: false, ..network(0) };

@@ -2,12 +2,12 @@
 
 use super::event::passing;
 use crate::analysis::conserved_change;
-use crate::lagrangian::{Configured, EulerLagrange};
+use crate::lagrangian::{EulerLagrange, SystemInstance};
 
 /// Largest change of the system's conserved vector along the motion of a model from `(q, v)` until `t_end`, sampled every `dt`, relative to
 /// its length at the start; `None` for a system without one, or a motion that does not reach the end.
 pub(crate) fn conserved_drift(
-    system: &Configured<f64>,
+    system: &SystemInstance<f64>,
     model: &dyn EulerLagrange<f64>,
     (q, v): (&[f64], &[f64]),
     (t_end, dt): (f64, f64),

@@ -1,6 +1,6 @@
 //! Free fall through a horizon.
 
-use super::Around;
+use super::CentralCoordinates;
 use super::event::{State, passing, zero};
 use crate::geometry::characters;
 use crate::lagrangian::EulerLagrange;
@@ -23,7 +23,7 @@ fn signature(model: &dyn EulerLagrange<f64>, state: &State) -> Option<Inertia> {
 pub fn infall(
     model: &dyn EulerLagrange<f64>,
     (q, v): (&[f64], &[f64]),
-    (around, to): (Around, f64),
+    (around, to): (CentralCoordinates, f64),
     (t_end, dt): (f64, f64),
 ) -> Option<Infall> {
     let above = |state: &State| around.distance(&state.q) - to;
@@ -45,7 +45,7 @@ mod tests {
 
     #[test]
     fn a_fall_from_rest_is_a_cycloid_through_the_horizon() {
-        let around = Around::Cartesian(Chart::default());
+        let around = CentralCoordinates::Cartesian(Chart::default());
         let hole = build::<f64>("schwarzschild-cartesian", &[]).unwrap();
         let (start, end) = (10.0_f64, 1.5);
         let q = around.place(start, [0.48, 0.6, 0.64]);

@@ -1,6 +1,6 @@
 //! Black holes, learned or written down: what is read off their metrics, and what a camera near them sees.
 //!
-//! A [`Pair`] of an exact metric and a learned one gives [`Reading`]s: orbits of matter and of light, the advance of periastra
+//! A [`LearnedHole`] of an exact metric and a learned one gives [`Reading`]s: orbits of matter and of light, the advance of periastra
 //! ([`radial_period`]), falls through a horizon ([`infall`]), mass and spin ([`nearest_parameters`]), curvature, symmetries.
 //!
 //! A [`Camera`] stands at a place of a metric whose space has Cartesian coordinates around a centre. Through every pixel a null geodesic is
@@ -22,8 +22,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-mod around;
 mod camera;
+mod central_coordinates;
 mod chart;
 mod directions;
 mod dormand_prince;
@@ -44,8 +44,8 @@ mod spheroidal;
 mod tetrad;
 mod vector;
 
-pub use around::Around;
 pub use camera::{Camera, Observer};
+pub use central_coordinates::CentralCoordinates;
 pub use chart::Chart;
 pub(crate) use drift::conserved_drift;
 pub use error::RelativityError;
@@ -56,7 +56,7 @@ pub use outline::{Edge, Outline, outline};
 pub use parameters::nearest_parameters;
 pub use periastron::{RadialPeriod, radial_period};
 pub use rays::{Fate, Ray, Tracing, trace};
-pub use readings::{Pair, Reading};
+pub use readings::{LearnedHole, Reading};
 pub use shadow::{Difference, Shadow, shadow};
 pub use sky::{Sky, difference_image};
 pub use tetrad::Tetrad;

@@ -1,6 +1,6 @@
 //! Orbits that show what a hole does to matter: a precessing ellipse, a zoom and whirl, a plunge.
 
-use super::Around;
+use super::CentralCoordinates;
 use super::event::passing;
 use super::periastron::radial_period;
 use crate::geometry::{GeometryError, Sense};
@@ -39,7 +39,7 @@ const EXCESS: f64 = 3e-3;
 /// Those of the metric.
 pub fn orbits(
     model: &dyn EulerLagrange<f64>,
-    around: Around,
+    around: CentralCoordinates,
     mass: f64,
     inner: f64,
 ) -> Result<Vec<Orbit>, GeometryError> {
@@ -85,8 +85,12 @@ pub fn orbits(
     if let Some(w) = circle.angular_velocity(Sense::Forward).map(|w| 0.6 * w) {
         let [tt, tp, pp] = circle.value;
         let time_rate = (-(tt + (tp + tp + pp * w) * w)).sqrt().recip();
-        let turning =
-            crate::geometry::Turning { energy: 0.0, angular_momentum: 0.0, time_rate, turning_rate: w * time_rate };
+        let turning = crate::geometry::TurningPoint {
+            energy: 0.0,
+            angular_momentum: 0.0,
+            time_rate,
+            turning_rate: w * time_rate,
+        };
         let [q, v] = around.turning(place, &turning);
         if time_rate.is_finite() {
             found.push(Orbit { title: "Plunge", q, v, t_end: kepler(place), dt: kepler(place) / 4000.0, inner });
@@ -97,7 +101,7 @@ pub fn orbits(
 
 impl Orbit {
     /// The path `(x, y)` of a model from this start, as far as it gets.
-    pub fn path(&self, model: &dyn EulerLagrange<f64>, around: Around) -> Vec<(f64, f64)> {
+    pub fn path(&self, model: &dyn EulerLagrange<f64>, around: CentralCoordinates) -> Vec<(f64, f64)> {
         let mut path = Vec::new();
         passing(model, (&self.q, &self.v), (self.t_end, self.dt), |state| {
             let [x, y, _] = around.position(&state.q);
@@ -116,7 +120,7 @@ mod tests {
 
     #[test]
     fn a_hole_has_all_three_and_they_do_what_they_are_called() {
-        let around = Around::Cartesian(Chart::default());
+        let around = CentralCoordinates::Cartesian(Chart::default());
         for name in ["schwarzschild-cartesian", "kerr-cartesian"] {
             let hole = build::<f64>(name, &[]).unwrap();
             let found = orbits(&*hole, around, 1.0, 1.5).unwrap();

@@ -1,7 +1,7 @@
 //! Parameters of a system whose metric comes nearest to a learned one: mass, spin, charge.
 
 use crate::analysis::{matrices_at_rest, nearest_factor};
-use crate::lagrangian::{Configured, EulerLagrange, configure_values};
+use crate::lagrangian::{EulerLagrange, SystemInstance, configure_values};
 use crate::linalg::{Workspace, solve};
 use std::collections::BTreeMap;
 
@@ -15,7 +15,7 @@ type Values = BTreeMap<String, f64>;
 
 /// Residuals of the metric of a system with these parameters beside a learned one, each point relative to the size of its metric, after
 /// the best factor; `None` where there is no such system.
-fn residuals(system: &Configured<f64>, values: &Values, learned: &[f64], points: &[f64]) -> Option<Vec<f64>> {
+fn residuals(system: &SystemInstance<f64>, values: &Values, learned: &[f64], points: &[f64]) -> Option<Vec<f64>> {
     let model = configure_values::<f64>(system.system.clone(), values).ok()?.build().ok()?;
     let n = model.coordinates();
     let exact = matrices_at_rest(model.as_ref(), points);
@@ -38,7 +38,7 @@ fn square(residuals: &[f64]) -> f64 {
 /// `(points, n)`: least squares by the method of Levenberg and Marquardt from `start`;
 /// `None` where one of the two metrics is not finite.
 pub fn nearest_parameters(
-    system: &Configured<f64>,
+    system: &SystemInstance<f64>,
     learned: &dyn EulerLagrange<f64>,
     points: &[f64],
     start: &Values,
@@ -84,11 +84,11 @@ pub fn nearest_parameters(
 mod tests {
     use super::*;
     use crate::lagrangian::{build, configure};
-    use crate::relativity::{Around, Chart};
+    use crate::relativity::{CentralCoordinates, Chart};
 
     #[test]
     fn mass_and_spin_are_found_from_far_off() {
-        let around = Around::Cartesian(Chart::default());
+        let around = CentralCoordinates::Cartesian(Chart::default());
         let given = [("M".to_string(), "1.3".to_string()), ("a".to_string(), "-0.7".to_string())];
         let (hole, system) =
             (build::<f64>("kerr-cartesian", &given).unwrap(), configure("kerr-cartesian", &[]).unwrap());

@@ -1,6 +1,6 @@
 //! Precession of bound orbits.
 
-use super::Around;
+use super::CentralCoordinates;
 use super::event::{State, passing, zero};
 use crate::lagrangian::EulerLagrange;
 use std::f64::consts::TAU;
@@ -20,7 +20,7 @@ pub struct RadialPeriod {
 pub fn radial_period(
     model: &dyn EulerLagrange<f64>,
     (q, v): (&[f64], &[f64]),
-    around: Around,
+    around: CentralCoordinates,
     (t_end, dt): (f64, f64),
 ) -> Option<RadialPeriod> {
     let outward = |state: &State| around.outward(&state.q, &state.v);
@@ -69,8 +69,8 @@ mod tests {
     #[test]
     fn orbits_of_schwarzschild_precess_by_the_closed_form_in_both_coordinates() {
         let around = [
-            ("schwarzschild-cartesian", Around::Cartesian(Chart::default())),
-            ("schwarzschild-geodesic", Around::Spherical { time: 0, radius: 1, polar: 2, azimuth: 3 }),
+            ("schwarzschild-cartesian", CentralCoordinates::Cartesian(Chart::default())),
+            ("schwarzschild-geodesic", CentralCoordinates::Spherical { time: 0, radius: 1, polar: 2, azimuth: 3 }),
         ];
         for (name, around) in around {
             let hole = build::<f64>(name, &[]).unwrap();
@@ -94,7 +94,7 @@ mod tests {
 
     #[test]
     fn what_falls_in_has_no_period() {
-        let around = Around::Cartesian(Chart::default());
+        let around = CentralCoordinates::Cartesian(Chart::default());
         let hole = build::<f64>("schwarzschild-cartesian", &[]).unwrap();
         let (q, v) = ([0.0, 6.0, 0.0, 0.0], [1.3, 0.0, 0.1, 0.0]);
         assert_eq!(radial_period(&*hole, (&q, &v), around, (400.0, 0.5)), None);

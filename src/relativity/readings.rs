@@ -4,10 +4,10 @@ use super::infall::infall;
 use super::parameters::nearest_parameters;
 use super::periastron::radial_period;
 use super::spheroidal::Spheroidal;
-use super::{Around, Chart, conserved_drift};
+use super::{CentralCoordinates, Chart, conserved_drift};
 use crate::analysis::{mass_matrix_error, matrices_at_rest};
 use crate::geometry::{CircularOrbit, GeometryError, Sense, geometries};
-use crate::lagrangian::{Configured, EulerLagrange};
+use crate::lagrangian::{EulerLagrange, SystemInstance};
 use crate::symmetry::{self, Basis, Degrees, EXACT, Region, quadratic, symmetries};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
@@ -29,15 +29,15 @@ pub struct Reading {
 
 /// A system and a metric that learned it.
 #[derive(Clone, Copy)]
-pub struct Pair<'a> {
+pub struct LearnedHole<'a> {
     /// The exact one.
     pub exact: &'a dyn EulerLagrange<f64>,
     /// The learned one, up to a factor.
     pub learned: &'a dyn EulerLagrange<f64>,
     /// The system of the exact one.
-    pub system: &'a Configured<f64>,
+    pub system: &'a SystemInstance<f64>,
     /// The coordinates of both.
-    pub around: Around,
+    pub around: CentralCoordinates,
     /// Distances that were learned.
     pub range: (f64, f64),
 }
@@ -52,7 +52,7 @@ const ORBITS: [(f64, f64); 8] =
 /// Samples of a radial period.
 const SAMPLES: f64 = 400.0;
 
-impl Pair<'_> {
+impl LearnedHole<'_> {
     fn reading(quantity: impl Into<String>, exact: Option<f64>, learned: Option<f64>, aim: f64) -> Option<Reading> {
         let exact = exact?;
         let error = learned.map(|learned| (learned / exact - 1.0).abs());
@@ -207,7 +207,7 @@ impl Pair<'_> {
         all.extend(Self::reading(name, truth.map(|fall| fall.time / mass), kept, 1e-3));
         // An inclined bound orbit.
         let (q, mut v) = (self.around.place(10.0 * mass, [1.0, 0.0, 0.0]), [0.0; 4]);
-        if let Around::Cartesian(Chart { space: [_, y, z], .. }) = self.around {
+        if let CentralCoordinates::Cartesian(Chart { space: [_, y, z], .. }) = self.around {
             (v[y], v[z]) = (0.25, 0.25);
             if self.system.impose_constraint(&q, &mut v).is_ok() {
                 let drift = conserved_drift(self.system, self.learned, (&q, &v), (1000.0 * mass, mass));
@@ -263,7 +263,7 @@ impl Pair<'_> {
     /// Numbers of conserved quantities of second degree in the momenta beyond the energy and products of charges, among functions of the
     /// polar angle of spheroidal coordinates: Carter's constant, around a spin.
     fn carter(&self, mass: f64, all: &mut Vec<Reading>) {
-        let Around::Cartesian(Chart { time, space }) = self.around else { return };
+        let CentralCoordinates::Cartesian(Chart { time, space }) = self.around else { return };
         let symbol = self.system.system.parameters.iter().position(|p| p.symbol == "a");
         let Some(&spin) = symbol.and_then(|i| self.system.parameters.get(i)).filter(|spin| **spin != 0.0) else {
             return;
@@ -292,10 +292,10 @@ impl Pair<'_> {
         let coordinates = self.system.system.coordinates(4);
         let names: Vec<String> = coordinates.iter().map(|c| c.name.to_string()).collect();
         let (charts, degrees) = match self.around {
-            Around::Cartesian(_) => {
+            CentralCoordinates::Cartesian(_) => {
                 (vec![symmetry::Chart::Line; 4], Degrees { polynomial: 1, trigonometric: 0, hyperbolic: 0 })
             }
-            Around::Spherical { polar, azimuth, .. } => {
+            CentralCoordinates::Spherical { polar, azimuth, .. } => {
                 let mut charts = vec![symmetry::Chart::Line; 4];
                 (charts[polar], charts[azimuth]) = (symmetry::Chart::Polar, symmetry::Chart::Circle);
                 let usual = Degrees::usual(&charts);
@@ -323,17 +323,17 @@ mod tests {
     use super::*;
     use crate::lagrangian::configure;
 
-    fn of(name: &str, given: &[(&str, &str)], around: Around, range: (f64, f64)) -> Vec<Reading> {
+    fn of(name: &str, given: &[(&str, &str)], around: CentralCoordinates, range: (f64, f64)) -> Vec<Reading> {
         let given: Vec<_> = given.iter().map(|(symbol, value)| (symbol.to_string(), value.to_string())).collect();
         let system = configure::<f64>(name, &given).unwrap();
         let exact = system.build().unwrap();
-        let pair = Pair { exact: &*exact, learned: &*exact, system: &system, around, range };
+        let pair = LearnedHole { exact: &*exact, learned: &*exact, system: &system, around, range };
         pair.readings().unwrap()
     }
 
     #[test]
     fn the_exact_metric_reads_as_itself() {
-        let cartesian = Around::Cartesian(Chart::default());
+        let cartesian = CentralCoordinates::Cartesian(Chart::default());
         let readings = of("kerr-cartesian", &[("M", "2"), ("a", "1.8")], cartesian, (2.7, 80.0));
         for reading in &readings {
             assert!(reading.error.is_some_and(|error| error < 1e-8), "{reading:?}");
@@ -345,7 +345,7 @@ mod tests {
 
     #[test]
     fn what_lies_outside_the_learned_distances_is_not_read() {
-        let spherical = Around::Spherical { time: 0, radius: 1, polar: 2, azimuth: 3 };
+        let spherical = CentralCoordinates::Spherical { time: 0, radius: 1, polar: 2, azimuth: 3 };
         let readings = of("schwarzschild-geodesic", &[("M", "2")], spherical, (6.0, 30.0));
         let value = |name: &str| readings.iter().find(|r| r.quantity == name).and_then(|r| r.learned);
         // Lengths in units of the mass, 2 here.

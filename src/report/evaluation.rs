@@ -2,7 +2,7 @@
 
 use super::{Figure, Level, LinePlot, Series, Trace, Turn, file_part, kept, line_plot, trace_plot};
 use crate::analysis::{Portrait, TrajectoryRun, VALID, ValidTimes};
-use crate::lagrangian::Configured;
+use crate::lagrangian::SystemInstance;
 use crate::rollout::Trajectory;
 use crate::scalar::Scalar;
 
@@ -26,7 +26,7 @@ type Part<S> = fn(&TrajectoryRun<S>) -> (&[f64], &[f64]);
 pub fn evaluation_figures<S: Scalar>(
     runs: &[TrajectoryRun<S>],
     portraits: &[Portrait<S>],
-    system: &Configured<S>,
+    system: &SystemInstance<S>,
 ) -> Vec<Figure> {
     let mut figures = Vec::new();
     if let Some(Portrait { exact, learned }) = portraits.first() {
@@ -43,18 +43,18 @@ pub fn evaluation_figures<S: Scalar>(
 type Pair<'a, S> = [(&'static str, &'a Trajectory<S>); 2];
 
 /// Label of the evolution parameter.
-fn time_label<S>(system: &Configured<S>) -> String {
+fn time_label<S>(system: &SystemInstance<S>) -> String {
     let parameter = if system.system.time_like.is_some() { "proper time" } else { "t" };
     format!("{parameter} [{}]", system.system.time_unit)
 }
 
 /// Lines over the evolution parameter.
-fn over_time<S>(system: &Configured<S>, title: &str, y_label: &str, log_y: bool, series: Vec<Series>) -> LinePlot {
+fn over_time<S>(system: &SystemInstance<S>, title: &str, y_label: &str, log_y: bool, series: Vec<Series>) -> LinePlot {
     let x_label = time_label(system);
     LinePlot { title: title.into(), x_label, y_label: y_label.into(), log_y, series, turn: None, level: None }
 }
 
-fn errors_over_time<S: Scalar>(figures: &mut Vec<Figure>, runs: &[TrajectoryRun<S>], system: &Configured<S>) {
+fn errors_over_time<S: Scalar>(figures: &mut Vec<Figure>, runs: &[TrajectoryRun<S>], system: &SystemInstance<S>) {
     let mut units = system.system.units(system.coordinates);
     units.truncate(system.coordinates);
     units.sort();
@@ -113,7 +113,7 @@ fn errors_over_time<S: Scalar>(figures: &mut Vec<Figure>, runs: &[TrajectoryRun<
 }
 
 /// Coordinates of the first start, and velocities if there is a time-like coordinate: rates of clocks.
-fn first_over_time<S: Scalar>(figures: &mut Vec<Figure>, pair: Pair<'_, S>, system: &Configured<S>) {
+fn first_over_time<S: Scalar>(figures: &mut Vec<Figure>, pair: Pair<'_, S>, system: &SystemInstance<S>) {
     let n = system.coordinates;
     let (coordinates, columns) = (system.system.coordinates(n), system.system.columns(n));
     let labels = system.system.labels(n);
@@ -146,10 +146,10 @@ fn from_dark_to_bright<S: Scalar>(trajectory: &Trajectory<S>, unit: &str) -> Str
 }
 
 /// Every portrayed start in the plane of the system.
-fn traces<S: Scalar>(figures: &mut Vec<Figure>, portraits: &[Portrait<S>], system: &Configured<S>) {
+fn traces<S: Scalar>(figures: &mut Vec<Figure>, portraits: &[Portrait<S>], system: &SystemInstance<S>) {
     let Some(plane) = system.system.plane else { return };
     let path = |label: &str, trajectory: &Trajectory<S>| {
-        let places = (0..trajectory.len()).filter_map(|k| system.place(trajectory.state(k).0));
+        let places = (0..trajectory.len()).filter_map(|k| system.position_in_plane(trajectory.state(k).0));
         Series { points: places.collect(), ..Series::new(label, &[], &[]) }
     };
     for (k, Portrait { exact, learned }) in portraits.iter().enumerate() {
@@ -164,7 +164,7 @@ fn traces<S: Scalar>(figures: &mut Vec<Figure>, portraits: &[Portrait<S>], syste
 }
 
 /// The first start in the planes of coordinate and velocity.
-fn phases<S: Scalar>(figures: &mut Vec<Figure>, pair: Pair<'_, S>, system: &Configured<S>) {
+fn phases<S: Scalar>(figures: &mut Vec<Figure>, pair: Pair<'_, S>, system: &SystemInstance<S>) {
     let n = system.coordinates;
     let (columns, labels) = (system.system.columns(n), system.system.labels(n));
     for (i, coordinate) in system.system.coordinates(n).iter().enumerate().take(COORDINATES) {

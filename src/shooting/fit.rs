@@ -14,7 +14,7 @@ use crate::shooting::solver::{ShootingProblem, ShootingSolver};
 use crate::training::checkpoint::{PhaseState, Snapshot};
 use crate::training::epoch::Epoch;
 use crate::training::solver::{Hooks, Saver, TrainingState};
-use crate::training::trainer::{Log, ResumeOptions, Stop, TrainingError};
+use crate::training::trainer::{Log, ResumeOptions, StopReason, TrainingError};
 use argmin::core::observers::ObserverMode;
 use argmin::core::{Executor, State, TerminationReason, TerminationStatus};
 use thiserror::Error;
@@ -50,7 +50,7 @@ pub struct Fitted<S> {
     /// Best validation loss, 1 where only noise is left.
     pub validation_loss: f64,
     /// Why fitting ended.
-    pub stop: Stop,
+    pub stop: StopReason,
     /// Segments of the training trajectories, and their samples.
     pub segments: (usize, usize),
     /// Integration steps per segment.
@@ -252,8 +252,8 @@ pub fn resume<S: Scalar>(
         None => f64::NAN,
     };
     let stop = match result.state.get_termination_status() {
-        TerminationStatus::Terminated(TerminationReason::Interrupt) => Stop::Interrupted,
-        _ => Stop::Finished,
+        TerminationStatus::Terminated(TerminationReason::Interrupt) => StopReason::Interrupted,
+        _ => StopReason::Finished,
     };
     let seconds = result.solver.seconds();
     let (history, start_loss) = (result.solver.history, result.solver.start_loss);

@@ -12,18 +12,18 @@ pub(crate) mod solver;
 pub(crate) mod trainer;
 pub(crate) mod violations;
 
-pub use checkpoint::{CheckpointError, Every};
+pub use checkpoint::{CheckpointError, CheckpointInterval};
 #[doc(hidden)]
 pub use checkpoint::{
-    CheckpointManager, Identity, LATEST, PREVIOUS, Restored, Saved, Snapshot, remove_checkpoints, saved,
+    CheckpointManager, Fingerprint, LATEST, PREVIOUS, Restored, Saved, Snapshot, remove_checkpoints, saved,
 };
 pub use epoch::Epoch;
 #[doc(hidden)]
 pub use memory::training_memory;
 pub use objective::{BatchReport, Failure, Objective, ThreadsError};
 pub use problem::TrainingProblem;
-pub use recipe::{Outcome, RecipeError, run};
+pub use recipe::{RecipeError, TrainingResult, run};
 pub use solver::{Hooks, Progress, StepError, Watcher};
 #[doc(hidden)]
 pub use trainer::{ResumeOptions, resume};
-pub use trainer::{Stop, Trained, TrainingError, train};
+pub use trainer::{StopReason, Trained, TrainingError, train};

@@ -2,7 +2,7 @@
 
 use crate::configuration::Config;
 use crate::data::{SamplingError, sample_all};
-use crate::lagrangian::Configured;
+use crate::lagrangian::SystemInstance;
 use crate::network::{NetworkError, NetworkLagrangian};
 use crate::scalar::Scalar;
 use crate::training::solver::Hooks;
@@ -11,9 +11,9 @@ use thiserror::Error;
 
 /// A trained network with what led to it.
 #[derive(Debug)]
-pub struct Outcome<S> {
+pub struct TrainingResult<S> {
     /// The system it learned from.
-    pub system: Configured<f64>,
+    pub system: SystemInstance<f64>,
     /// The network with its best weights.
     pub model: NetworkLagrangian<S>,
     /// History and losses.
@@ -39,11 +39,11 @@ pub enum RecipeError {
 ///
 /// # Errors
 /// [`RecipeError`].
-pub fn run<S: Scalar>(config: &Config, threads: usize, hooks: &Hooks) -> Result<Outcome<S>, RecipeError> {
+pub fn run<S: Scalar>(config: &Config, threads: usize, hooks: &Hooks) -> Result<TrainingResult<S>, RecipeError> {
     let system = config.system()?;
     let (data, scale) = sample_all::<S>(config, &system)?;
     let architecture = config.architecture(&system, scale).map_err(SamplingError::Config)?;
     let trained = train(config, &architecture, config.penalty()?, data, threads, hooks)?;
     let model = NetworkLagrangian::new(architecture, trained.weights.clone())?;
-    Ok(Outcome { system, model, trained })
+    Ok(TrainingResult { system, model, trained })
 }

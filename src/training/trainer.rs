@@ -22,7 +22,7 @@ use thiserror::Error;
 /// Why training ended.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
-pub enum Stop {
+pub enum StopReason {
     /// All epochs were run.
     Finished,
     /// The interrupt flag was raised; the best model so far stands.
@@ -43,7 +43,7 @@ pub struct Trained<S> {
     /// Loss on fresh states that chose nothing, paper convention.
     pub test: BatchReport<S>,
     /// Why training ended.
-    pub stop: Stop,
+    pub stop: StopReason,
     /// Steps taken.
     pub steps: usize,
     /// States that went through a step.
@@ -153,7 +153,7 @@ pub fn resume<S: Scalar>(
         Snapshot { seconds: 0.0, ended: Ended::none(weights), underway: None }
     });
     let clock = Clock::after(seconds);
-    let mut stop = Stop::Finished;
+    let mut stop = StopReason::Finished;
     // Then this training is over, and its checkpoint is that of what came after it.
     let shooting = underway.as_ref().is_some_and(|underway| underway.shooting.is_some());
     for (number, (phase, training)) in pairs().enumerate().skip(ended.phases) {
@@ -170,7 +170,7 @@ pub fn resume<S: Scalar>(
         };
         let solver = EpochSolver::new(config.optimizer.clone(), phase.clone(), rng, training.len()).within(run);
         stop = run_phase(problem, solver, (phase, config.optimizer.batch), &mut ended, underway.take())?;
-        if stop != Stop::Finished {
+        if stop != StopReason::Finished {
             break;
         }
     }
@@ -179,7 +179,7 @@ pub fn resume<S: Scalar>(
             keeper.save(clock.seconds(), ended, None);
         }
     };
-    if let (Some(settings), Some(training), Stop::Finished) = (&config.lbfgs, data.training.last(), &stop)
+    if let (Some(settings), Some(training), StopReason::Finished) = (&config.lbfgs, data.training.last(), &stop)
         && ended.validation_loss.is_finite()
         && !ended.polished
     {
@@ -203,14 +203,14 @@ pub fn resume<S: Scalar>(
         ended.history.extend(polished.history);
         ended.polished = true;
         if hooks.interrupt.load(std::sync::atomic::Ordering::Relaxed) {
-            stop = Stop::Interrupted;
+            stop = StopReason::Interrupted;
         }
     }
     if ended.validation_loss.is_infinite() {
-        let error = if let Stop::Failed(error) = stop { Some(error) } else { None };
+        let error = if let StopReason::Failed(error) = stop { Some(error) } else { None };
         return Err(TrainingError::NothingLearned(error));
     }
-    if stop == Stop::Finished && !shooting {
+    if stop == StopReason::Finished && !shooting {
         keep(&ended);
     }
     let seconds = clock.seconds();
@@ -244,7 +244,7 @@ fn run_phase<S: Scalar>(
     (phase, batch): (&Phase, usize),
     ended: &mut Ended<S>,
     underway: Option<PhaseState<S>>,
-) -> Result<Stop, TrainingError> {
+) -> Result<StopReason, TrainingError> {
     let states = problem.training().len();
     let mut state = TrainingState::<S>::new().param(ended.weights.clone());
     if let Some(PhaseState { course, history, best, best_loss, best_epoch, .. }) = underway {
@@ -274,8 +274,8 @@ fn run_phase<S: Scalar>(
         (ended.validation_loss, ended.weights) = (cost, best.clone());
     }
     Ok(match (stopped, result.state.get_termination_status()) {
-        (Some(error), _) => Stop::Failed(error),
-        (None, TerminationStatus::Terminated(TerminationReason::Interrupt)) => Stop::Interrupted,
-        _ => Stop::Finished,
+        (Some(error), _) => StopReason::Failed(error),
+        (None, TerminationStatus::Terminated(TerminationReason::Interrupt)) => StopReason::Interrupted,
+        _ => StopReason::Finished,
     })
 }

@@ -7,7 +7,9 @@ use lnn::data::sample_all;
 use lnn::lagrangian::configure;
 use lnn::presets::Preset;
 use lnn::storage::Disk;
-use lnn::training::{CheckpointManager, Every, Hooks, Identity, ResumeOptions, resume, training_memory};
+use lnn::training::{
+    CheckpointInterval, CheckpointManager, Fingerprint, Hooks, ResumeOptions, resume, training_memory,
+};
 use std::sync::Arc;
 
 fn config(system: &str, hidden: &[usize], states: usize) -> Config {
@@ -27,8 +29,9 @@ fn measured(config: &Config) -> u64 {
     let taken = peak(|| {
         let (data, scale) = sample_all::<f32>(config, &system).unwrap();
         let architecture = config.architecture(&system, scale).unwrap();
-        let identity = Identity { config: String::new(), data: data.checksums() };
-        let keeper = Arc::new(CheckpointManager::new(Arc::new(Disk), directory.path(), Every::Epochs(1), identity));
+        let identity = Fingerprint { config: String::new(), data: data.checksums() };
+        let keeper =
+            Arc::new(CheckpointManager::new(Arc::new(Disk), directory.path(), CheckpointInterval::Epochs(1), identity));
         let sitting = ResumeOptions { keeper: Some(keeper), start: None };
         let penalty = config.penalty().unwrap();
         resume(config, &architecture, penalty, data, 2, &Hooks::default(), sitting).unwrap();

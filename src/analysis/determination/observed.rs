@@ -1,6 +1,6 @@
 //! Observations that a model is compared with.
 
-use crate::data::{Measured, MeasuredError};
+use crate::data::{RecordingSplit, RecordingSplitError};
 use crate::recording::Targets;
 
 /// States with the accelerations that were learned from.
@@ -22,7 +22,7 @@ pub struct Observed {
 const PLACES: usize = 2000;
 
 /// Held-out states `(q, v)`, evenly spaced, over which means are taken; those learned from if nothing was held out.
-pub fn places(measured: &Measured) -> (Vec<f64>, Vec<f64>) {
+pub fn places(measured: &RecordingSplit) -> (Vec<f64>, Vec<f64>) {
     let part = if measured.test.states.is_empty() { &measured.training } else { &measured.test };
     let n = part.recording.n();
     let stride = part.recording.samples().div_ceil(PLACES).max(1);
@@ -46,8 +46,8 @@ impl Observed {
     /// sign over half a swing: samples within half the fast period count as one.
     ///
     /// # Errors
-    /// As [`Measured::datasets`].
-    pub fn new(measured: &Measured, targets: Targets) -> Result<Self, MeasuredError> {
+    /// As [`RecordingSplit::datasets`].
+    pub fn new(measured: &RecordingSplit, targets: Targets) -> Result<Self, RecordingSplitError> {
         let data = measured.datasets::<f64>(targets)?.training.remove(0);
         let n = data.coordinates();
         let stride = data.len().div_ceil(STATES).max(1);

@@ -54,8 +54,9 @@ fn every_entry_is_complete() {
 
 #[test]
 fn systems_are_where_they_should_be() {
-    let place =
-        |name: &str, list: &[(&str, &str)], q: &[f64]| configure::<f64>(name, &given(list)).unwrap().place(q).unwrap();
+    let place = |name: &str, list: &[(&str, &str)], q: &[f64]| {
+        configure::<f64>(name, &given(list)).unwrap().position_in_plane(q).unwrap()
+    };
     let near = |(x, y): (f64, f64), (a, b): (f64, f64), size: f64| {
         // Sine and cosine to half a unit in the last place, angles as near as pi is.
         assert!((x - a).abs().max((y - b).abs()) <= 4.0 * f64::EPSILON * size, "({x}, {y}) for ({a}, {b})");
@@ -80,7 +81,7 @@ fn systems_are_where_they_should_be() {
     assert_eq!(place("ads2-geodesic", &[], &[1.0, 2.0]), (1.0, 2.0));
     assert_eq!(place("ads3-geodesic", &[], &[1.0, 2.0, 3.0]), (2.0, 3.0));
     assert_eq!(place("ads4-geodesic", &[], &[1.0, 2.0, 3.0, 4.0]), (2.0, 4.0));
-    assert_eq!(configure::<f64>("kepler", &[]).unwrap().place(&[1.0]), None);
+    assert_eq!(configure::<f64>("kepler", &[]).unwrap().position_in_plane(&[1.0]), None);
 }
 
 #[test]
@@ -90,7 +91,7 @@ fn places_are_finite_and_no_larger_than_the_system() {
         let configured = configure::<f64>(&system.name, &[]).unwrap();
         let bounds = system.training(n).positions;
         let Some(plane) = system.plane else {
-            assert_eq!((n, configured.place(&[0.5])), (1, None), "{}", system.name);
+            assert_eq!((n, configured.position_in_plane(&[0.5])), (1, None), "{}", system.name);
             continue;
         };
         assert!(plane.labels.iter().all(|label| label.ends_with(" [m]")), "{}", system.name);
@@ -103,7 +104,7 @@ fn places_are_finite_and_no_larger_than_the_system() {
             // A different fraction of each coordinate's range in every state.
             let part = |i: usize| (0.618_034 * f64::from(k) * (1.0 + i as f64).sqrt()).fract();
             let q: Vec<f64> = bounds.iter().enumerate().map(|(i, b)| b.0 + (b.1 - b.0) * part(i)).collect();
-            let (x, y) = configured.place(&q).unwrap();
+            let (x, y) = configured.position_in_plane(&q).unwrap();
             assert!(x.is_finite() && y.is_finite() && x.hypot(y) <= size * (1.0 + 1e-15 * n as f64), "{q:?}");
         }
     }

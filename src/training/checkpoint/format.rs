@@ -1,6 +1,6 @@
 //! The bytes of a checkpoint.
 
-use super::identity::{Identity, Saved};
+use super::fingerprint::{Fingerprint, Saved};
 use super::{Ended, OptimizerState, PhaseState, Shot, Snapshot, precision};
 use crate::network::file::{ModelFileError, StoredPrecision};
 use crate::optimizers::{Block, Moments, Stored};
@@ -20,7 +20,7 @@ pub(crate) struct Header {
     format: u32,
     crate_version: String,
     precision: StoredPrecision,
-    pub identity: Identity,
+    pub identity: Fingerprint,
     parameters: usize,
     seconds: f64,
     phases: usize,
@@ -200,7 +200,7 @@ fn history(rows: &[f64]) -> Vec<Epoch> {
 /// # Errors
 /// A number type that files do not know.
 pub(crate) fn encode<S: Scalar>(
-    identity: &Identity,
+    identity: &Fingerprint,
     seconds: f64,
     ended: &Ended<S>,
     underway: Option<&PhaseState<S>>,
@@ -363,7 +363,7 @@ mod tests {
     use crate::random::RngStream;
     use rand::Rng;
 
-    fn snapshot() -> (Identity, Snapshot<f32>) {
+    fn snapshot() -> (Fingerprint, Snapshot<f32>) {
         let row = |epoch: usize, loss: f64| Epoch {
             epoch,
             phase: 1,
@@ -415,7 +415,7 @@ mod tests {
             best_epoch: 0,
             shooting: None,
         };
-        let identity = Identity { config: "a = \"b\"\n".to_string(), data: vec![("test".to_string(), 5)] };
+        let identity = Fingerprint { config: "a = \"b\"\n".to_string(), data: vec![("test".to_string(), 5)] };
         (identity, Snapshot { seconds: 0.1 + 0.2, ended, underway: Some(underway) })
     }
 

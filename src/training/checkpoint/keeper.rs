@@ -1,7 +1,7 @@
 //! Checkpoints in a directory: when to write one, the newest and the one before, going on from either.
 
+use super::fingerprint::{Fingerprint, Saved};
 use super::format::{Header, decode, decode_header, encode};
-use super::identity::{Identity, Saved};
 use super::{Ended, PhaseState, Snapshot};
 use crate::configuration::in_current_words;
 use crate::network::file::ModelFileError;
@@ -24,7 +24,7 @@ const COST: u32 = 100;
 /// Time between two checkpoints.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
-pub enum Every {
+pub enum CheckpointInterval {
     /// When so many epochs have ended since the last.
     Epochs(usize),
     /// At the first step after so many seconds since the last, later if writing would take more than a hundredth of the
@@ -74,8 +74,8 @@ pub struct Restored<T> {
 pub struct CheckpointManager {
     files: Arc<dyn Files>,
     directory: PathBuf,
-    every: Every,
-    identity: Identity,
+    every: CheckpointInterval,
+    identity: Fingerprint,
     state: Mutex<State>,
 }
 
@@ -90,7 +90,7 @@ struct State {
 
 impl CheckpointManager {
     /// Checkpoints of this training in `directory`.
-    pub fn new(files: Arc<dyn Files>, directory: &Path, every: Every, identity: Identity) -> Self {
+    pub fn new(files: Arc<dyn Files>, directory: &Path, every: CheckpointInterval, identity: Fingerprint) -> Self {
         let state = State { last: None, cost: Duration::ZERO, keep: true };
         Self { files, directory: directory.to_path_buf(), every, identity, state: Mutex::new(state) }
     }
@@ -99,12 +99,12 @@ impl CheckpointManager {
     pub(crate) fn is_due(&self) -> bool {
         let state = self.state();
         match (self.every, state.last) {
-            (Every::Seconds(seconds), Some((last, _))) => {
+            (CheckpointInterval::Seconds(seconds), Some((last, _))) => {
                 let elapsed = last.elapsed();
                 elapsed.as_secs_f64() >= seconds && elapsed >= state.cost.saturating_mul(COST)
             }
             (_, None) => true,
-            (Every::Epochs(_), Some(_)) => false,
+            (CheckpointInterval::Epochs(_), Some(_)) => false,
         }
     }
 
@@ -112,7 +112,7 @@ impl CheckpointManager {
     pub(crate) fn is_due_after(&self, epochs: usize) -> bool {
         let last = self.state().last;
         match (self.every, last) {
-            (Every::Epochs(every), Some((_, last))) => epochs.saturating_sub(last) >= every,
+            (CheckpointInterval::Epochs(every), Some((_, last))) => epochs.saturating_sub(last) >= every,
             _ => self.is_due(),
         }
     }

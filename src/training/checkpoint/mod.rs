@@ -15,12 +15,14 @@
 //! A phase is held to the step: the next batch of the epoch and the sums over its batches so far are in the description,
 //! with the state of the random generator. Polishing has no state of its own: it begins again from the phases' end.
 
+mod fingerprint;
 mod format;
-mod identity;
 mod keeper;
 
-pub use identity::{Identity, Saved};
-pub use keeper::{CheckpointError, CheckpointManager, Every, LATEST, PREVIOUS, Restored, remove_checkpoints, saved};
+pub use fingerprint::{Fingerprint, Saved};
+pub use keeper::{
+    CheckpointError, CheckpointInterval, CheckpointManager, LATEST, PREVIOUS, Restored, remove_checkpoints, saved,
+};
 
 use crate::network::file::{ModelFileError, StoredPrecision};
 use crate::optimizers::Moments;
@@ -42,7 +44,7 @@ impl<S: Scalar> Snapshot<S> {
     ///
     /// # Errors
     /// A number type that files do not know.
-    pub fn to_bytes(&self, identity: &Identity) -> Result<Vec<u8>, ModelFileError> {
+    pub fn to_bytes(&self, identity: &Fingerprint) -> Result<Vec<u8>, ModelFileError> {
         format::encode(identity, self.seconds, &self.ended, self.underway.as_ref())
     }
 
@@ -50,7 +52,7 @@ impl<S: Scalar> Snapshot<S> {
     ///
     /// # Errors
     /// [`ModelFileError`] for anything but a whole checkpoint.
-    pub fn from_bytes(bytes: &[u8]) -> Result<(Identity, Self), ModelFileError> {
+    pub fn from_bytes(bytes: &[u8]) -> Result<(Fingerprint, Self), ModelFileError> {
         format::decode(bytes).map(|(header, snapshot)| (header.identity, snapshot))
     }
 }

@@ -1,7 +1,7 @@
 //! Errors of a system's outputs in units of rounding and condition.
 
 use lnn::lagrangian::system::Bounds;
-use lnn::lagrangian::{self, Configured, EulerLagrange, Request, Terms};
+use lnn::lagrangian::{self, EulerLagrange, Request, SystemInstance, Terms};
 use lnn::linalg::{self, Workspace};
 use lnn::scalar::{Dd, Scalar};
 use rand::Rng;
@@ -10,18 +10,22 @@ pub fn cast<S: Scalar, T: Scalar>(x: &[S]) -> Vec<T> {
     x.iter().map(|x| x.cast()).collect()
 }
 
-pub fn configure<S: Scalar>(name: &str, given: &[(&str, &str)]) -> Configured<S> {
+pub fn configure<S: Scalar>(name: &str, given: &[(&str, &str)]) -> SystemInstance<S> {
     let given: Vec<(String, String)> = given.iter().map(|&(s, t)| (s.into(), t.into())).collect();
     lagrangian::configure(name, &given).unwrap()
 }
 
 /// The same system, with the same numbers, in another precision.
-pub fn recast<S: Scalar, T: Scalar>(system: &Configured<S>) -> Configured<T> {
-    Configured { system: system.system.clone(), coordinates: system.coordinates, parameters: cast(&system.parameters) }
+pub fn recast<S: Scalar, T: Scalar>(system: &SystemInstance<S>) -> SystemInstance<T> {
+    SystemInstance {
+        system: system.system.clone(),
+        coordinates: system.coordinates,
+        parameters: cast(&system.parameters),
+    }
 }
 
 /// A random state of a box, on the mass shell if the system has one.
-pub fn random_state<S: Scalar>(system: &Configured<S>, bounds: &Bounds, rng: &mut impl Rng) -> (Vec<S>, Vec<S>) {
+pub fn random_state<S: Scalar>(system: &SystemInstance<S>, bounds: &Bounds, rng: &mut impl Rng) -> (Vec<S>, Vec<S>) {
     let mut draw = |b: &[(f64, f64)]| b.iter().map(|b| S::of_f64(rng.random_range(b.0..=b.1))).collect::<Vec<S>>();
     let (q, mut v) = (draw(&bounds.positions), draw(&bounds.velocities));
     system.impose_constraint(&q, &mut v).unwrap();
@@ -41,7 +45,7 @@ pub fn outputs<S: Scalar>(system: &dyn EulerLagrange<S>, q: &[S], v: &[S]) -> Ve
         ("dl_dq", terms.dl_dq),
         ("mass_matrix", terms.mass_matrix),
         ("eigenvalues", eigenvalues),
-        ("coriolis", terms.coriolis),
+        ("coriolis", terms.momentum_drift),
         ("acceleration", terms.acceleration),
         ("energy", terms.energy),
     ]
@@ -53,7 +57,7 @@ pub fn largest(x: &[Dd]) -> f64 {
 
 /// What relative perturbations of the inputs (angles: reduced ones) do to each component of each output, summed over
 /// the inputs.
-pub fn input_conditions(system: &Configured<Dd>, q: &[Dd], v: &[Dd], base: &[(&str, Vec<Dd>)]) -> Vec<Vec<f64>> {
+pub fn input_conditions(system: &SystemInstance<Dd>, q: &[Dd], v: &[Dd], base: &[(&str, Vec<Dd>)]) -> Vec<Vec<f64>> {
     let step = Dd::of_f64(2f64.powi(-50));
     let n = q.len();
     let mut conditions: Vec<Vec<f64>> = base.iter().map(|(_, b)| vec![0.0; b.len()]).collect();

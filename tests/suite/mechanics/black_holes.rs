@@ -42,7 +42,7 @@ fn both_charts_of_kerr_have_one_metric_and_the_same_constants() {
             let q = [draw(-5.0, 5.0), draw(4.2, 20.0), draw(0.2, 2.9), draw(-3.0, 3.0)];
             let v = [draw(0.5, 3.0), draw(-0.5, 0.5), draw(-0.1, 0.1), draw(-0.1, 0.1)];
             let (x, u) = cartesian(m, a, &q, &v);
-            let terms = |system: &lnn::lagrangian::Configured<Dd>, q: &[Dd], v: &[Dd]| {
+            let terms = |system: &lnn::lagrangian::SystemInstance<Dd>, q: &[Dd], v: &[Dd]| {
                 let mut terms = Terms::default();
                 system.build().unwrap().terms(q, v, Request::ALL, &mut terms).unwrap();
                 terms

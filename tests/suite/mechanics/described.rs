@@ -2,7 +2,7 @@
 
 use crate::common::accuracy::{cast, configure, input_conditions, largest, outputs, random_state, recast};
 use lnn::cli::parse_system;
-use lnn::lagrangian::{Configured, EulerLagrange, ExpressionLagrangian, Request, Terms, configure_system};
+use lnn::lagrangian::{EulerLagrange, ExpressionLagrangian, Request, SystemInstance, Terms, configure_system};
 use lnn::linalg::{self, Workspace};
 use lnn::network::Structure;
 use lnn::presets::Preset;
@@ -18,7 +18,7 @@ const BLACK_HOLE: &str = include_str!("../../../examples/systems/black_hole.toml
 const CARTESIAN: &str = include_str!("../../../examples/systems/black_hole_cartesian.toml");
 const KERR: &str = include_str!("../../../examples/systems/kerr.toml");
 
-fn described<S: Scalar>(text: &str, given: &[(&str, &str)]) -> Configured<S> {
+fn described<S: Scalar>(text: &str, given: &[(&str, &str)]) -> SystemInstance<S> {
     let given: Vec<(String, String)> = given.iter().map(|&(s, t)| (s.into(), t.into())).collect();
     configure_system(Cow::Owned(parse_system(text).unwrap()), &given).unwrap()
 }
@@ -27,7 +27,7 @@ fn described<S: Scalar>(text: &str, given: &[(&str, &str)]) -> Configured<S> {
 /// form as well, in units of rounding and condition.
 fn agree<S: Scalar>(text: &str, name: &str, given: &[(&str, &str)], rng: &mut ChaCha8Rng) -> f64 {
     let (written, catalogue) = (described::<S>(text, given), configure::<S>(name, given));
-    let wide: Configured<Dd> = recast(&catalogue);
+    let wide: SystemInstance<Dd> = recast(&catalogue);
     let (built, judge, n) = (written.build().unwrap(), wide.build().unwrap(), catalogue.coordinates);
     let mut worst = 0f64;
     for _ in 0..20 {

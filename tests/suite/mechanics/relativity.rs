@@ -2,7 +2,7 @@
 
 use crate::common::accuracy::{cast, configure, input_conditions, outputs, random_state, recast};
 use lnn::lagrangian::system::{Bounds, System};
-use lnn::lagrangian::{self, Configured, EulerLagrange, HandWritten, Lagrangian, MechanicsError, Request, Terms};
+use lnn::lagrangian::{self, EulerLagrange, HandWritten, Lagrangian, MechanicsError, Request, SystemInstance, Terms};
 use lnn::linalg::{self, Inertia};
 use lnn::rollout::{Options, rollout};
 use lnn::scalar::{Dd, Real, Scalar};
@@ -11,8 +11,8 @@ use rand_chacha::ChaCha8Rng;
 
 /// Worst R over every component of every output of a state, and the condition of the acceleration: the largest relative
 /// change of a component per relative change of the inputs.
-fn hard_point<S: Scalar>(system: &Configured<S>, q: &[S], v: &[S]) -> (f64, f64) {
-    let wide: Configured<Dd> = recast(system);
+fn hard_point<S: Scalar>(system: &SystemInstance<S>, q: &[S], v: &[S]) -> (f64, f64) {
+    let wide: SystemInstance<Dd> = recast(system);
     let found = outputs(&*system.build().unwrap(), q, v);
     let closed = system.exact_acceleration(q, v).unwrap();
     let (q, v): (Vec<Dd>, Vec<Dd>) = (cast(q), cast(v));
@@ -239,12 +239,14 @@ fn energy_and_mass_shell_are_kept_along_the_motion() {
                 let part = |x: &[f64]| x[k * n..(k + 1) * n].to_vec();
                 let (q, v, p, g) = (part(&path.q), part(&path.v), part(&terms.momentum), part(&terms.dl_dq));
                 let mass = &terms.mass_matrix[k * n * n..(k + 1) * n * n];
-                let coriolis = part(&terms.coriolis);
+                let momentum_drift = part(&terms.momentum_drift);
                 // dE/dv = M v, dE/dq = (d2L/dq dv) v - g, of the size of c and g.
                 let slope: f64 = (0..n)
                     .map(|i| {
                         let row: f64 = (0..n).map(|j| (mass[i * n + j] * v[j]).abs()).sum();
-                        row * (1.0 + v[i].abs()) + (g[i].abs() + coriolis[i].abs()) * (1.0 + q[i].abs()) + p[i].abs()
+                        row * (1.0 + v[i].abs())
+                            + (g[i].abs() + momentum_drift[i].abs()) * (1.0 + q[i].abs())
+                            + p[i].abs()
                     })
                     .sum();
                 steps * options.rtol * slope

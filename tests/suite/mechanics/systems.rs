@@ -1,7 +1,7 @@
 //! Hand-written systems: every output against double-double, an independent table and closed forms.
 
 use crate::common::accuracy::{cast, configure, input_conditions, largest, outputs, random_state, recast};
-use lnn::lagrangian::{self, Configured, Request, Terms};
+use lnn::lagrangian::{self, Request, SystemInstance, Terms};
 use lnn::linalg::{self, Workspace};
 use lnn::scalar::{Dd, Scalar};
 use rand::SeedableRng;
@@ -10,7 +10,7 @@ use rand_chacha::ChaCha8Rng;
 /// Worst R of every output of a system over random states.
 fn accuracy<S: Scalar>(name: &str, given: &[(&str, &str)], rng: &mut ChaCha8Rng) -> Vec<(&'static str, f64)> {
     let system = configure::<S>(name, given);
-    let wide: Configured<Dd> = recast(&system);
+    let wide: SystemInstance<Dd> = recast(&system);
     let n = system.coordinates;
     let (narrow, judge) = (system.build().unwrap(), wide.build().unwrap());
     let bounds = system.system.validation(n);
@@ -94,7 +94,7 @@ fn double_double_agrees_with_an_independent_table() {
             let given: Vec<(String, String)> =
                 field[3].split(' ').filter_map(|p| p.split_once('=')).map(|(s, t)| (s.into(), t.into())).collect();
             // Parameters are binary fractions: the same in every precision.
-            let system: Configured<Dd> = recast(&lagrangian::configure::<f64>(field[2], &given).unwrap());
+            let system: SystemInstance<Dd> = recast(&lagrangian::configure::<f64>(field[2], &given).unwrap());
             let (q, v) = (numbers(field[4]), numbers(field[5]));
             current = outputs(&*system.build().unwrap(), &q, &v);
             exact = system.exact_acceleration(&q, &v).unwrap();
@@ -135,7 +135,7 @@ fn closed_forms_agree<S: Scalar>(rng: &mut ChaCha8Rng) {
             let given = [("n", text.as_str())];
             let given = if matches!(system.size, lagrangian::system::Size::Fixed(_)) { &given[..0] } else { &given };
             let configured = configure::<S>(&system.name, given);
-            let wide: Configured<Dd> = recast(&configured);
+            let wide: SystemInstance<Dd> = recast(&configured);
             let (built, judge) = (configured.build().unwrap(), wide.build().unwrap());
             let bounds = system.validation(n);
             for _ in 0..5 {
@@ -195,7 +195,7 @@ fn batches_replayed_agree_with_single_states_and_requests_with_each_other() {
             close("mass", &one.mass_matrix, &all.mass_matrix[row * n * n..][..n * n]);
             close("momentum", &one.momentum, &all.momentum[row * n..][..n]);
             close("dl_dq", &one.dl_dq, &all.dl_dq[row * n..][..n]);
-            close("coriolis", &one.coriolis, &all.coriolis[row * n..][..n]);
+            close("coriolis", &one.momentum_drift, &all.momentum_drift[row * n..][..n]);
             close("acceleration", &one.acceleration, &all.acceleration[row * n..][..n]);
             close("energy", &one.energy, &all.energy[row..=row]);
         }
@@ -204,7 +204,7 @@ fn batches_replayed_agree_with_single_states_and_requests_with_each_other() {
             let mut some = Terms::default();
             built.terms(&q[..rows * n], &v[..rows * n], request, &mut some).unwrap();
             close("momentum", &some.momentum, &all.momentum[..rows * n]);
-            assert!(some.mass_matrix.is_empty() && some.acceleration.is_empty() && some.coriolis.is_empty());
+            assert!(some.mass_matrix.is_empty() && some.acceleration.is_empty() && some.momentum_drift.is_empty());
             if request == Request::ENERGY {
                 close("energy", &some.energy, &all.energy[..rows]);
                 assert!(some.dl_dq.is_empty());

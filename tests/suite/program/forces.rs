@@ -3,7 +3,7 @@
 
 use crate::common::program::{Folder, Run, lnn, model, text};
 use lnn::configuration::Penalty;
-use lnn::data::{Measured, PrepareOptions};
+use lnn::data::{PrepareOptions, RecordingSplit};
 use lnn::lagrangian::configure;
 use lnn::network::file::ModelFile;
 use lnn::recording::Columns;
@@ -271,7 +271,7 @@ fn a_model_fitted_through_its_motion_has_its_own_losses() {
         ..Columns::default()
     };
     let recording = read_recording(&[&data], &meaning).unwrap().recording;
-    let measured = Measured::new(&recording, &PrepareOptions::default()).unwrap();
+    let measured = RecordingSplit::new(&recording, &PrepareOptions::default()).unwrap();
     let sets = measured.datasets::<f32>(lnn::recording::Targets::Motion).unwrap();
     let mut objective = Objective::new(&header.architecture, Penalty::None, 1).unwrap();
     let [validation, test] = [&sets.validation, &sets.test].map(|set| f64::from(objective.loss(&weights, set).loss));

@@ -64,7 +64,9 @@ fn is_canonical<S: Scalar>(name: &str, seed: u64) {
     let (old, new) = (terms(canonical.model().as_ref(), &q, &v), terms(&canonical, &q, &v));
     assert!(old.acceleration == new.acceleration, "{name}");
     let s = form.factor;
-    for (old, new) in [(&old.mass_matrix, &new.mass_matrix), (&old.dl_dq, &new.dl_dq), (&old.coriolis, &new.coriolis)] {
+    for (old, new) in
+        [(&old.mass_matrix, &new.mass_matrix), (&old.dl_dq, &new.dl_dq), (&old.momentum_drift, &new.momentum_drift)]
+    {
         assert!(old.iter().zip(new).all(|(&a, &b)| a * s == b), "{name}");
     }
     let action: S = new.momentum.iter().zip(&v).fold(-new.lagrangian[0], |sum, (&p, &v)| sum + p * v);
@@ -124,7 +126,7 @@ fn a_lagrangian_in_canonical_form_is_a_lagrangian() {
         (&a.momentum, &b.momentum),
         (&a.dl_dq, &b.dl_dq),
         (&a.mass_matrix, &b.mass_matrix),
-        (&a.coriolis, &b.coriolis),
+        (&a.momentum_drift, &b.momentum_drift),
         (&a.acceleration, &b.acceleration),
         (&a.energy, &b.energy),
     ] {

@@ -8,8 +8,8 @@ use lnn::presets::Preset;
 use lnn::scalar::Scalar;
 use lnn::storage::Disk;
 use lnn::training::{
-    CheckpointError, CheckpointManager, Epoch, Every, Hooks, Identity, LATEST, PREVIOUS, Progress, ResumeOptions, Stop,
-    Trained, TrainingError, remove_checkpoints, resume, saved, train,
+    CheckpointError, CheckpointInterval, CheckpointManager, Epoch, Fingerprint, Hooks, LATEST, PREVIOUS, Progress,
+    ResumeOptions, StopReason, Trained, TrainingError, remove_checkpoints, resume, saved, train,
 };
 use std::fs;
 use std::path::Path;
@@ -48,13 +48,19 @@ impl<S: Scalar> Case<S> {
         train(&self.config, &self.architecture, penalty, self.data.clone(), 1, &Hooks::default()).unwrap()
     }
 
-    fn keeper(&self, directory: &Path, every: Every) -> Arc<CheckpointManager> {
-        let identity = Identity { config: format!("{:?}", self.config), data: self.data.checksums() };
+    fn keeper(&self, directory: &Path, every: CheckpointInterval) -> Arc<CheckpointManager> {
+        let identity = Fingerprint { config: format!("{:?}", self.config), data: self.data.checksums() };
         Arc::new(CheckpointManager::new(Arc::new(Disk), directory, every, identity))
     }
 
     /// Trains from the checkpoint in the directory, if there is one.
-    fn sit(&self, directory: &Path, every: Every, threads: usize, hooks: &Hooks) -> Result<Trained<S>, TrainingError> {
+    fn sit(
+        &self,
+        directory: &Path,
+        every: CheckpointInterval,
+        threads: usize,
+        hooks: &Hooks,
+    ) -> Result<Trained<S>, TrainingError> {
         let keeper = self.keeper(directory, every);
         let parameters = Layout::new(&self.architecture).parameters;
         let start = match keeper.restore(parameters, self.config.data.training) {
@@ -105,9 +111,9 @@ fn stopping_after_any_step_changes_nothing() {
     assert!(whole.history.len() > 5);
     for steps in 1..=STEPS {
         let directory = tempfile::tempdir().unwrap();
-        let every = Every::Seconds(1e9);
+        let every = CheckpointInterval::Seconds(1e9);
         match case.sit(directory.path(), every, 1, &stop_after(steps)) {
-            Ok(stopped) => assert_eq!(stopped.stop, Stop::Interrupted),
+            Ok(stopped) => assert_eq!(stopped.stop, StopReason::Interrupted),
             Err(error) => assert!(matches!(error, TrainingError::NothingLearned(None)) && steps <= 4, "{error}"),
         }
         let found = case.sit(directory.path(), every, 2, &Hooks::default()).unwrap();
@@ -123,7 +129,7 @@ fn stopping_after_every_step_changes_nothing() {
     let case = Case::<f64>::new(config);
     let whole = case.whole();
     let directory = tempfile::tempdir().unwrap();
-    let every = Every::Epochs(1);
+    let every = CheckpointInterval::Epochs(1);
     for _ in 0..STEPS {
         let _ = case.sit(directory.path(), every, 1, &stop_after(1));
     }
@@ -138,7 +144,7 @@ fn stopping_after_every_step_changes_nothing() {
 fn checkpoints_between_stops_come_as_often_as_asked_for() {
     let case = Case::<f32>::new(config());
     let directory = tempfile::tempdir().unwrap();
-    let epochs = |every: Every| {
+    let epochs = |every: CheckpointInterval| {
         remove_checkpoints(&Disk, directory.path()).unwrap();
         let (newest, seen) = (directory.path().join(LATEST), std::sync::Mutex::new(Vec::new()));
         let seen = Arc::new(seen);
@@ -158,11 +164,11 @@ fn checkpoints_between_stops_come_as_often_as_asked_for() {
         steps.dedup();
         steps
     };
-    assert_eq!(epochs(Every::Epochs(1)), [0, 4, 8, 12, 16]);
-    assert_eq!(epochs(Every::Epochs(2)), [0, 8, 16]);
-    assert_eq!(epochs(Every::Seconds(1e9)), [0]);
+    assert_eq!(epochs(CheckpointInterval::Epochs(1)), [0, 4, 8, 12, 16]);
+    assert_eq!(epochs(CheckpointInterval::Epochs(2)), [0, 8, 16]);
+    assert_eq!(epochs(CheckpointInterval::Seconds(1e9)), [0]);
     // By time a checkpoint comes at the next step, but writing must not take more than a hundredth of the time.
-    assert!(epochs(Every::Seconds(1e-9)).len() <= STEPS);
+    assert!(epochs(CheckpointInterval::Seconds(1e-9)).len() <= STEPS);
 }
 
 #[test]
@@ -171,9 +177,9 @@ fn the_previous_checkpoint_serves_when_the_newest_is_damaged() {
     let whole = case.whole();
     let directory = tempfile::tempdir().unwrap();
     let (newest, previous) = (directory.path().join(LATEST), directory.path().join(PREVIOUS));
-    let _ = case.sit(directory.path(), Every::Epochs(1), 1, &stop_after(10));
+    let _ = case.sit(directory.path(), CheckpointInterval::Epochs(1), 1, &stop_after(10));
     let parameters = Layout::new(&case.architecture).parameters;
-    let restore = || case.keeper(directory.path(), Every::Epochs(1)).restore::<f32>(parameters, 200);
+    let restore = || case.keeper(directory.path(), CheckpointInterval::Epochs(1)).restore::<f32>(parameters, 200);
     assert_eq!((restore().unwrap().content.steps(), restore().unwrap().fallback), (10, None));
     let good = fs::read(&newest).unwrap();
     let before = fs::read(&previous).unwrap();
@@ -185,12 +191,12 @@ fn the_previous_checkpoint_serves_when_the_newest_is_damaged() {
         assert!(saved(&Disk, directory.path()).unwrap().fallback.is_some());
     }
     // The damaged one does not take the place of the good one.
-    let _ = case.sit(directory.path(), Every::Seconds(1e9), 1, &stop_after(1));
+    let _ = case.sit(directory.path(), CheckpointInterval::Seconds(1e9), 1, &stop_after(1));
     assert_eq!(fs::read(&previous).unwrap(), before);
     assert_eq!((restore().unwrap().content.steps(), restore().unwrap().fallback), (9, None));
     fs::remove_file(&newest).unwrap();
     assert!(restore().unwrap().fallback.unwrap().contains("no such file"));
-    let found = case.sit(directory.path(), Every::Epochs(1), 1, &Hooks::default()).unwrap();
+    let found = case.sit(directory.path(), CheckpointInterval::Epochs(1), 1, &Hooks::default()).unwrap();
     assert_same(&found, &whole, "from the previous checkpoint");
 
     fs::write(&newest, b"x").unwrap();
@@ -205,10 +211,10 @@ fn the_previous_checkpoint_serves_when_the_newest_is_damaged() {
 fn other_configurations_data_and_networks_are_refused() {
     let case = Case::<f32>::new(config());
     let directory = tempfile::tempdir().unwrap();
-    let _ = case.sit(directory.path(), Every::Epochs(1), 1, &stop_after(5));
+    let _ = case.sit(directory.path(), CheckpointInterval::Epochs(1), 1, &stop_after(5));
     let parameters = Layout::new(&case.architecture).parameters;
     let restore = |case: &Case<f32>, parameters, states| {
-        let keeper = case.keeper(directory.path(), Every::Epochs(1));
+        let keeper = case.keeper(directory.path(), CheckpointInterval::Epochs(1));
         keeper.restore::<f32>(parameters, states).map(|found| found.content.steps())
     };
     assert_eq!(restore(&case, parameters, 200).unwrap(), 5);
@@ -246,8 +252,8 @@ fn checkpoints_of_earlier_versions_are_of_the_same_configuration() {
     let whole = case.whole();
     let directory = tempfile::tempdir().unwrap();
     let sit = |text: &str, hooks: &Hooks| {
-        let identity = Identity { config: text.to_string(), data: case.data.checksums() };
-        let keeper = CheckpointManager::new(Arc::new(Disk), directory.path(), Every::Epochs(1), identity);
+        let identity = Fingerprint { config: text.to_string(), data: case.data.checksums() };
+        let keeper = CheckpointManager::new(Arc::new(Disk), directory.path(), CheckpointInterval::Epochs(1), identity);
         let start = match keeper.restore(Layout::new(&case.architecture).parameters, 200) {
             Ok(restored) => Some(restored.content),
             Err(CheckpointError::Missing) => None,

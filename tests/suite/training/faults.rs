@@ -9,7 +9,8 @@ use lnn::network::{ActivationChoice, Architecture, Form, InputLayer, Layout};
 use lnn::presets::Preset;
 use lnn::storage::{Disk, Files, write_whole};
 use lnn::training::{
-    CheckpointManager, Every, Hooks, Identity, LATEST, PREVIOUS, Progress, ResumeOptions, Stop, resume,
+    CheckpointInterval, CheckpointManager, Fingerprint, Hooks, LATEST, PREVIOUS, Progress, ResumeOptions, StopReason,
+    resume,
 };
 use std::fs;
 use std::path::Path;
@@ -138,10 +139,10 @@ fn sit(directory: &Path, files: Arc<dyn Files>, steps: usize) -> usize {
     let system = config.system().unwrap();
     let (data, scale) = sample_all::<f32>(&config, &system).unwrap();
     let architecture = config.architecture(&system, scale).unwrap();
-    let identity = Identity { config: String::new(), data: data.checksums() };
+    let identity = Fingerprint { config: String::new(), data: data.checksums() };
     let parameters = Layout::new(&architecture).parameters;
     let keeper = |files: Arc<dyn Files>| {
-        Arc::new(CheckpointManager::new(files, directory, Every::Seconds(1e9), identity.clone()))
+        Arc::new(CheckpointManager::new(files, directory, CheckpointInterval::Seconds(1e9), identity.clone()))
     };
     let start = keeper(Arc::new(Disk)).restore(parameters, 64).ok().map(|restored| restored.content);
     let began = start.as_ref().map_or(0, |snapshot| snapshot.steps());
@@ -157,7 +158,7 @@ fn sit(directory: &Path, files: Arc<dyn Files>, steps: usize) -> usize {
     let penalty = config.penalty().unwrap();
     // In the first epoch nothing has been learned yet.
     if let Ok(trained) = resume(&config, &architecture, penalty, data, 1, &hooks, sitting) {
-        assert_eq!(trained.stop, Stop::Interrupted);
+        assert_eq!(trained.stop, StopReason::Interrupted);
     }
     began
 }

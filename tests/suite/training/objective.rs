@@ -13,7 +13,7 @@ use lnn::network::{
 use lnn::optimizers::{Method, Schedule};
 use lnn::scalar::{Dd, Real, Scalar};
 use lnn::tape::{ScalarFunction, gradient};
-use lnn::training::{Failure, Hooks, Objective, Stop, Trained, TrainingError, train};
+use lnn::training::{Failure, Hooks, Objective, StopReason, Trained, TrainingError, train};
 use proptest::prelude::*;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -495,7 +495,7 @@ fn training_learns_and_keeps_the_best_epoch() {
     let mut config = config(12);
     config.optimizer.batch = 20;
     let trained = run(&config, datasets(), 2, &Hooks::default()).unwrap();
-    assert_eq!((trained.stop, trained.history.len()), (Stop::Finished, 24));
+    assert_eq!((trained.stop, trained.history.len()), (StopReason::Finished, 24));
     let losses: Vec<f64> = trained.history.iter().map(|e| e.validation_loss).collect();
     let best = losses.iter().copied().fold(f64::INFINITY, f64::min);
     assert_eq!(trained.validation_loss, best);
@@ -570,7 +570,7 @@ fn an_interrupt_ends_training_with_the_best_so_far() {
         }
     });
     let trained = run(&config(12), datasets(), 2, &Hooks { watcher: Some(watcher), interrupt }).unwrap();
-    assert_eq!((trained.stop, trained.history.len()), (Stop::Interrupted, 4));
+    assert_eq!((trained.stop, trained.history.len()), (StopReason::Interrupted, 4));
     assert!(trained.validation_loss.is_finite());
 }
 

@@ -17,7 +17,8 @@ use lnn::shooting::{self, Curvature, Fitted, Segments, Shooting, ShootingError, 
 use lnn::storage::Disk;
 use lnn::tape::{Depth, Evaluation, MixedDirections, ScalarFunction, gradient};
 use lnn::training::{
-    CheckpointManager, Every, Hooks, Identity, Objective, Progress, ResumeOptions, Stop, TrainingError, resume,
+    CheckpointInterval, CheckpointManager, Fingerprint, Hooks, Objective, Progress, ResumeOptions, StopReason,
+    TrainingError, resume,
 };
 use proptest::prelude::*;
 use rand::{Rng, SeedableRng};
@@ -565,13 +566,13 @@ fn exact_positions_teach_exact_accelerations() {
         ..Shooting::default()
     };
     let fitted = fit(&settings, task, 1, &Hooks::default()).unwrap();
-    assert_eq!((fitted.segments, fitted.stop.clone(), fitted.history.len()), ((20, 320), Stop::Finished, 200));
+    assert_eq!((fitted.segments, fitted.stop.clone(), fitted.history.len()), ((20, 320), StopReason::Finished, 200));
     let (q, v): (Vec<f64>, Vec<f64>) =
         (0..50).map(|k| 0.9 * f64::from(k)).map(|s| (0.9 * s.cos(), 1.8 * s.sin())).unzip();
     let mut chunk = Evaluation::new(architecture.model().lagrangian().clone());
     chunk.evaluate(&fitted.weights, &q, &v, Depth::Motion);
     let error = (0..q.len())
-        .map(|k| (2.0 * (chunk.dl_dq[k] - chunk.coriolis[k]) / chunk.mass_matrix[k] + 4.0 * q[k]).abs())
+        .map(|k| (2.0 * (chunk.dl_dq[k] - chunk.momentum_drift[k]) / chunk.mass_matrix[k] + 4.0 * q[k]).abs())
         .sum::<f64>()
         / q.iter().map(|q| 4.0 * q.abs()).sum::<f64>();
     println!("loss {} -> {}, acceleration error {error:.4}", fitted.start_loss, fitted.validation_loss);
@@ -587,7 +588,7 @@ fn an_interrupt_keeps_the_best_so_far() {
     let hooks = Hooks::default();
     hooks.interrupt.store(true, Ordering::Relaxed);
     let fitted = fit_motion(&quick(), &architecture, weights.clone(), &motion, 1, &hooks).unwrap();
-    assert_eq!((fitted.stop, fitted.weights), (Stop::Interrupted, weights));
+    assert_eq!((fitted.stop, fitted.weights), (StopReason::Interrupted, weights));
 }
 
 /// The training that gave the weights is but an epoch of nothing; what is held is multiple shooting behind it.
@@ -607,8 +608,8 @@ fn stopping_after_any_step_changes_nothing() {
     config.phases[0].epochs = 1;
     let settings = Shooting { epochs: 4, curvature_every: 3, batch: 2, ..quick() };
     // As a program does it: the training from the checkpoint or the beginning, then multiple shooting.
-    let sit = |directory: &Path, every: Every, threads: usize, hooks: &Hooks| {
-        let identity = Identity { config: "fit".to_string(), data: data.checksums() };
+    let sit = |directory: &Path, every: CheckpointInterval, threads: usize, hooks: &Hooks| {
+        let identity = Fingerprint { config: "fit".to_string(), data: data.checksums() };
         let keeper = Arc::new(CheckpointManager::new(Arc::new(Disk), directory, every, identity));
         let start = keeper.restore::<f64>(Layout::new(&architecture).parameters, 8).ok().map(|found| found.content);
         let shots = start.clone().filter(|snapshot| snapshot.is_shooting());
@@ -639,23 +640,23 @@ fn stopping_after_any_step_changes_nothing() {
         (rows, fitted.weights.clone(), [fitted.start_loss, fitted.validation_loss, fitted.integration_error])
     };
     let directory = || tempfile::tempdir().unwrap();
-    let whole = sit(directory().path(), Every::Seconds(1e9), 1, &Hooks::default());
+    let whole = sit(directory().path(), CheckpointInterval::Seconds(1e9), 1, &Hooks::default());
     let per_epoch = whole.segments.0.div_ceil(2);
-    assert_eq!((whole.history.len(), whole.stop.clone()), (4, Stop::Finished));
+    assert_eq!((whole.history.len(), whole.stop.clone()), (4, StopReason::Finished));
     assert!(per_epoch >= 3, "{per_epoch}");
     for steps in 1..=4 * per_epoch {
         let place = directory();
-        let stopped = sit(place.path(), Every::Seconds(1e9), 1, &stop_after(steps));
-        assert_eq!(stopped.stop, Stop::Interrupted);
-        let found = sit(place.path(), Every::Epochs(1), 2, &Hooks::default());
-        assert!(numbers(&found) == numbers(&whole) && found.stop == Stop::Finished, "stopped after step {steps}");
+        let stopped = sit(place.path(), CheckpointInterval::Seconds(1e9), 1, &stop_after(steps));
+        assert_eq!(stopped.stop, StopReason::Interrupted);
+        let found = sit(place.path(), CheckpointInterval::Epochs(1), 2, &Hooks::default());
+        assert!(numbers(&found) == numbers(&whole) && found.stop == StopReason::Finished, "stopped after step {steps}");
     }
     // Stopped after every step.
     let place = directory();
     for _ in 0..4 * per_epoch {
-        sit(place.path(), Every::Epochs(1), 1, &stop_after(1));
+        sit(place.path(), CheckpointInterval::Epochs(1), 1, &stop_after(1));
     }
-    assert!(numbers(&sit(place.path(), Every::Epochs(1), 1, &Hooks::default())) == numbers(&whole));
+    assert!(numbers(&sit(place.path(), CheckpointInterval::Epochs(1), 1, &Hooks::default())) == numbers(&whole));
     let saved = lnn::training::saved(&Disk, place.path()).unwrap().content;
     assert!(saved.epochs > 1, "{saved:?}");
 }

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 /// Identity of a training, written into its checkpoints: a run resumes only from a checkpoint with the same identity.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Identity {
+pub struct Fingerprint {
     /// The configuration, in the words of whoever trains.
     pub config: String,
     /// Name and checksum of each set of states.

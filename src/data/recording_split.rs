@@ -36,7 +36,7 @@ impl Default for PrepareOptions {
 /// Why recorded motion cannot be learned from.
 #[derive(Debug, Error)]
 #[non_exhaustive]
-pub enum MeasuredError {
+pub enum RecordingSplitError {
     /// Too little to hold anything out.
     #[error(transparent)]
     HoldOut(#[from] HoldOutError),
@@ -63,14 +63,14 @@ pub enum MeasuredError {
 
 /// Trajectories with the states estimated from them.
 #[derive(Clone, Debug)]
-pub struct Part {
+pub struct Split {
     /// The recorded motion.
     pub recording: Recording,
     /// States of every trajectory.
     pub states: Vec<Smoothed>,
 }
 
-impl Part {
+impl Split {
     fn new(recording: Recording, smoothing: &Smoothing) -> Result<Self, SmoothError> {
         let states = recording.tracks.iter().map(|track| smoothing.apply(track)).collect::<Result<_, _>>()?;
         Ok(Self { recording, states })
@@ -113,32 +113,32 @@ impl Part {
 
 /// Recorded motion, ready to learn from.
 #[derive(Clone, Debug)]
-pub struct Measured {
+pub struct RecordingSplit {
     /// Noise and windows.
     pub smoothing: Smoothing,
     /// The part to train on.
-    pub training: Part,
+    pub training: Split,
     /// The part that chooses the best epoch.
-    pub validation: Part,
+    pub validation: Split,
     /// The part that judges.
-    pub test: Part,
+    pub test: Split,
     /// Which part of the recording judges.
     pub(crate) held_out: HeldOut,
     /// Most states of a supervised training.
     most_states: usize,
 }
 
-impl Measured {
+impl RecordingSplit {
     /// Chooses windows, takes derivatives and divides the trajectories. Where nothing is left to choose the best epoch,
     /// what judges does that too.
     ///
     /// # Errors
-    /// [`MeasuredError`].
-    pub fn new(recording: &Recording, preparation: &PrepareOptions) -> Result<Self, MeasuredError> {
+    /// [`RecordingSplitError`].
+    pub fn new(recording: &Recording, preparation: &PrepareOptions) -> Result<Self, RecordingSplitError> {
         let PrepareOptions { smoothing: options, held_out: share, most_states, seed } = preparation;
         let (alone, smoothing) = plan(recording, options)?;
         if let Some((i, how)) = (0..recording.n()).find_map(|i| Some((i, stillness(recording, i, &alone)?))) {
-            return Err(MeasuredError::Motionless { coordinate: recording.coordinates[i].clone(), how });
+            return Err(RecordingSplitError::Motionless { coordinate: recording.coordinates[i].clone(), how });
         }
         let divide = |recording: &Recording, share: f64| {
             let held_out = HeldOut::choose(recording, share, smoothing.window(), *seed)?;
@@ -151,7 +151,7 @@ impl Measured {
             Ok((_, training, validation)) => (training, validation),
             Err(_) => (rest, test.clone()),
         };
-        let part = |recording| Part::new(recording, &smoothing);
+        let part = |recording| Split::new(recording, &smoothing);
         let (training, validation, test) = (part(training)?, part(validation)?, part(test)?);
         Ok(Self { training, validation, test, held_out, most_states: *most_states, smoothing })
     }
@@ -165,11 +165,11 @@ impl Measured {
     /// validation.
     ///
     /// # Errors
-    /// [`MeasuredError::Dataset`], if no sample has a full window around it for instance.
-    pub fn datasets<S: Scalar>(&self, targets: Targets) -> Result<Datasets<S>, MeasuredError> {
+    /// [`RecordingSplitError::Dataset`], if no sample has a full window around it for instance.
+    pub fn datasets<S: Scalar>(&self, targets: Targets) -> Result<Datasets<S>, RecordingSplitError> {
         let most = self.most_states;
-        let dataset = |which, part: &Part, most| {
-            part.dataset::<S>(targets, most).map_err(|source| MeasuredError::Dataset { which, source })
+        let dataset = |which, part: &Split, most| {
+            part.dataset::<S>(targets, most).map_err(|source| RecordingSplitError::Dataset { which, source })
         };
         let validation = dataset("validation states", &self.validation, most / 5)?;
         let test = match self.held_out {

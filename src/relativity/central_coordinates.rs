@@ -2,14 +2,14 @@
 
 use super::Chart;
 use super::directions::directions;
-use crate::geometry::{Equator, Turn, Turning};
+use crate::geometry::{Equator, Turn, TurningPoint};
 use crate::lagrangian::EulerLagrange;
 use std::f64::consts::FRAC_PI_2;
 
 /// Which coordinates say where something is around a centre; the axis of a spin is `z`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
-pub enum Around {
+pub enum CentralCoordinates {
     /// `t`, `x`, `y`, `z`.
     Cartesian(Chart),
     /// `t`, `r`, `theta`, `phi`.
@@ -25,7 +25,7 @@ pub enum Around {
     },
 }
 
-impl Around {
+impl CentralCoordinates {
     /// Recognizes `t, x, y, z` and `t, r, theta, phi` by their names, in any order; `None` for other coordinates.
     pub fn of_names(names: &[&str]) -> Option<Self> {
         let index = |name: &str| names.iter().position(|n| *n == name);
@@ -97,7 +97,7 @@ impl Around {
         }
     }
 
-    /// A point of the equator, for [`Around::equator`].
+    /// A point of the equator, for [`CentralCoordinates::equator`].
     pub fn origin(self) -> [f64; 4] {
         let mut q = [0.0; 4];
         if let Self::Spherical { polar, .. } = self {
@@ -106,7 +106,7 @@ impl Around {
         q
     }
 
-    /// The equator of a metric along `x`; `origin` is that of [`Around::origin`].
+    /// The equator of a metric along `x`; `origin` is that of [`CentralCoordinates::origin`].
     pub fn equator<'a>(self, model: &'a dyn EulerLagrange<f64>, origin: &'a [f64; 4]) -> Equator<'a, f64> {
         let (time, radius, turn) = match self {
             Self::Cartesian(Chart { time, space: [x, y, _] }) => (time, x, Turn::Across(y)),
@@ -116,7 +116,7 @@ impl Around {
     }
 
     /// The state of a motion that turns in the equator at a distance.
-    pub fn turning(self, distance: f64, turning: &Turning<f64>) -> [[f64; 4]; 2] {
+    pub fn turning(self, distance: f64, turning: &TurningPoint<f64>) -> [[f64; 4]; 2] {
         let (q, mut v) = (self.place(distance, [1.0, 0.0, 0.0]), [0.0; 4]);
         v[self.time()] = turning.time_rate;
         match self {
