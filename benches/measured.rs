@@ -24,6 +24,8 @@ mod noise;
 mod orbits;
 #[path = "measured/plain.rs"]
 mod plain;
+#[path = "measured/recorded_orbits.rs"]
+mod recorded_orbits;
 #[path = "measured/rows.rs"]
 mod rows;
 #[path = "measured/textbook.rs"]

@@ -1,27 +1,21 @@
 //! Recorded orbits around a Schwarzschild hole, positions with noise: what of the hole a fit tells, by the number of orbits and the noise.
 //!
-//! The clock is the proper time of what falls: a beacon whose ticks are counted. At every tick its place and the coordinate time are taken, all
-//! four with noise of a part of the distance. Two in three orbits are bound, p from 8 to 24 M, e to 0.5; the others plunge from rest, more or
-//! less, to 2.3 M.
+//! At every tick of the clock of what falls its place and the coordinate time are taken, all four with noise of a part of the distance.
 
-use lnn::configuration::{Precision, Regularizer};
-use lnn::geometry::Sense;
-use lnn::lagrangian::{EulerLagrange, SystemInstance, configure};
+use super::recorded_orbits::{self, Orbit, distance};
+use lnn::configuration::{Precision, Regularizer, Scaling};
+use lnn::lagrangian::{SystemInstance, configure};
 use lnn::network::Structure;
 use lnn::pipeline::{FitOptions, InMemory, PreparedFit, RunOptions, Watch, fit};
-use lnn::random::{RandomGenerator, RngStream};
+use lnn::recording::smooth::{SmoothOptions, Smoothing};
 use lnn::recording::{LoadedRecording, RecordedTrajectory, Recording, Targets};
 use lnn::relativity::{CentralCoordinates, Chart, LearnedHole, Reading};
-use lnn::rollout::{Options, rollout};
-use rand::Rng;
-use rand_distr::{Distribution, StandardNormal};
 use std::time::Instant;
 
-/// Samples of an orbit, and the proper time between two.
-const SAMPLES: usize = 400;
-const TICK: f64 = 1.0;
-/// Distance at which a plunge is lost from sight.
-const LOST: f64 = 2.3;
+/// Distances between which the accuracy of accelerations is told.
+const DISTANCES: [f64; 6] = [2.05, 4.0, 6.0, 10.0, 16.0, 50.0];
+/// Least distance seen in `t, r, theta, phi`, whose time has no end at the horizon.
+const SPHERICAL: f64 = 2.3;
 /// What is told of the hole.
 pub const TOLD: [&str; 5] = [
     "metric, R from 1.5 to 20 M, median",
@@ -64,99 +58,72 @@ impl Way {
     }
 }
 
-/// A rotation of space, uniform, by Shoemake's quaternions.
-fn turned(rng: &mut RandomGenerator) -> impl Fn([f64; 3]) -> [f64; 3] + use<> {
-    let mut normal = || -> f64 { StandardNormal.sample(rng) };
-    let q = [normal(), normal(), normal(), normal()];
-    let size = q.iter().map(|x| x * x).sum::<f64>().sqrt();
-    let [w, x, y, z] = q.map(|x| x / size);
-    move |[a, b, c]| {
-        [
-            (1.0 - 2.0 * (y * y + z * z)) * a + 2.0 * (x * y - w * z) * b + 2.0 * (x * z + w * y) * c,
-            2.0 * (x * y + w * z) * a + (1.0 - 2.0 * (x * x + z * z)) * b + 2.0 * (y * z - w * x) * c,
-            2.0 * (x * z - w * y) * a + 2.0 * (y * z + w * x) * b + (1.0 - 2.0 * (x * x + y * y)) * c,
-        ]
-    }
-}
-
-/// An orbit in Cartesian coordinates, sampled by its own clock.
-fn orbit(
-    hole: &dyn EulerLagrange<f64>,
-    system: &SystemInstance<f64>,
-    bound: bool,
-    rng: &mut RandomGenerator,
-) -> Vec<[f64; 4]> {
-    let around = CentralCoordinates::Cartesian(Chart::default());
-    let [q, v] = if bound {
-        let (p, e) = (rng.random_range(8.0..24.0), rng.random_range(0.0..0.5));
-        let origin = around.origin();
-        let sense = if rng.random::<bool>() { Sense::Forward } else { Sense::Backward };
-        let turning = around.equator(hole, &origin).between(p / (1.0 + e), p / (1.0 - e), sense);
-        around.turning(p / (1.0 + e), &turning.expect("a metric").expect("a bound orbit"))
-    } else {
-        let (distance, across) = (rng.random_range(6.0..16.0), rng.random_range(-0.1..0.1));
-        let mut v = [0.0, rng.random_range(-0.3..0.1), across, 0.0];
-        let q = [0.0, distance, 0.0, 0.0];
-        system.impose_constraint(&q, &mut v).expect("outside the horizon");
-        [q, v]
-    };
-    let turn = turned(rng);
-    let space = |x: &[f64]| turn([x[1], x[2], x[3]]);
-    let ([a, b, c], [d, e, f]) = (space(&q), space(&v));
-    let options = Options { energy: false, ..Options::reference(TICK * (SAMPLES - 1) as f64, TICK) };
-    let motion = rollout(hole, &[q[0], a, b, c], &[v[0], d, e, f], &options).trajectory;
-    let rows = motion.q.chunks_exact(4).map(|q| [q[0], q[1], q[2], q[3]]);
-    rows.take_while(|q| around.distance(q) > LOST).collect()
-}
-
 /// The coordinates of a way, angles unwrapped.
-fn seen(way: Way, path: &[[f64; 4]]) -> Vec<f64> {
+fn seen(way: Way, path: &[f64]) -> Vec<f64> {
     if way != Way::Spherical {
-        return path.concat();
+        return path.to_vec();
     }
     let (mut all, mut last) = (Vec::new(), 0.0_f64);
-    for [t, x, y, z] in path {
-        let r = (x * x + y * y + z * z).sqrt();
-        let phi = y.atan2(*x);
+    for q in path.chunks_exact(4) {
+        let (r, phi) = (distance(q), q[2].atan2(q[1]));
         last = phi + std::f64::consts::TAU * ((last - phi) / std::f64::consts::TAU).round();
         // The time of Schwarzschild's coordinates runs apart from that of Kerr and Schild.
-        all.extend([t - 2.0 * (0.5 * r - 1.0).abs().ln(), r, (z / r).acos(), last]);
+        all.extend([q[0] - 2.0 * (0.5 * r - 1.0).abs().ln(), r, (q[3] / r).acos(), last]);
     }
     all
 }
 
-fn recording(way: Way, orbits: usize, noise: f64, seed: u64) -> Recording {
-    let rng = &mut RngStream::Training(0).generator(seed);
-    let system = Way::Metric.system();
-    let hole = system.build().expect("the defaults are valid");
-    let mut tracks = Vec::new();
-    for k in 0..orbits {
-        let path = orbit(hole.as_ref(), &system, k % 3 != 2, rng);
-        let distances: Vec<f64> = path.iter().map(|q| (q[1] * q[1] + q[2] * q[2] + q[3] * q[3]).sqrt()).collect();
-        let noisy: Vec<[f64; 4]> = path
-            .iter()
-            .zip(&distances)
-            .map(|(q, r)| q.map(|x| x + noise * r * Distribution::<f64>::sample(&StandardNormal, rng)))
-            .collect();
-        let times = (0..path.len()).map(|k| TICK * k as f64).collect();
-        let track = RecordedTrajectory {
+/// Orbits as they were seen.
+fn recording(way: Way, orbits: &[Orbit]) -> Recording {
+    let tracks = orbits.iter().enumerate().map(|(k, orbit)| {
+        let least = if way == Way::Spherical { SPHERICAL } else { 0.0 };
+        let seen_rows = orbit.q.chunks_exact(4).take_while(|q| distance(q) > least).count();
+        RecordedTrajectory {
             name: format!("orbit {k}"),
-            times,
-            q: seen(way, &noisy),
+            times: orbit.times[..seen_rows].to_vec(),
+            q: seen(way, &orbit.noisy[..4 * seen_rows]),
             v: vec![],
             a: vec![],
             force: vec![],
-        };
-        tracks.push(track);
-    }
+        }
+    });
     let names = if way == Way::Spherical { ["t", "r", "theta", "phi"] } else { ["t", "x", "y", "z"] };
     let periodic = vec![false, false, false, way == Way::Spherical];
-    Recording { coordinates: names.map(String::from).to_vec(), periodic, tracks }
+    Recording { coordinates: names.map(String::from).to_vec(), periodic, tracks: tracks.collect() }
+}
+
+/// Median relative errors of smoothed accelerations between [`DISTANCES`], with windows that vary and with one window, at the states
+/// that have full windows of the first kind.
+fn accelerations(orbits: usize, noise: f64) -> [Vec<f64>; 2] {
+    let orbits = recorded_orbits::orbits(orbits, noise, 0);
+    let recording = recording(Way::Metric, &orbits);
+    let varying = Smoothing::choose(&recording, &SmoothOptions::default()).expect("long orbits");
+    let constant = Smoothing { varying: false, ..varying.clone() };
+    let size = |a: &[f64]| a.iter().map(|a| a * a).sum::<f64>().sqrt();
+    let mut errors = [(); 2].map(|()| vec![Vec::new(); DISTANCES.len() - 1]);
+    for (track, orbit) in recording.tracks.iter().zip(&orbits) {
+        let found = [&varying, &constant].map(|smoothing| smoothing.apply(track).expect("a long orbit"));
+        for row in found[0].interior() {
+            let row = 4 * row..4 * row + 4;
+            let far = distance(&orbit.q[row.clone()]);
+            let part = DISTANCES[1..].iter().position(|most| far < *most).unwrap_or(DISTANCES.len() - 2);
+            let exact = &orbit.a[row.clone()];
+            for (errors, smoothed) in errors.iter_mut().zip(&found) {
+                let error: Vec<f64> = smoothed.a[row.clone()].iter().zip(exact).map(|(a, b)| a - b).collect();
+                errors[part].push(size(&error) / size(exact));
+            }
+        }
+    }
+    let median = |mut errors: Vec<f64>| {
+        errors.sort_by(f64::total_cmp);
+        errors.get(errors.len() / 2).copied().unwrap_or(f64::NAN)
+    };
+    errors.map(|errors| errors.into_iter().map(median).collect())
 }
 
 /// Fits one recording as `lnn fit` does, and reads the hole.
 fn told(way: Way, orbits: usize, noise: f64, (epochs, threads): (Option<usize>, usize)) -> Vec<Reading> {
-    let loaded = LoadedRecording::from(recording(way, orbits, noise, 0));
+    let loaded = LoadedRecording::from(recording(way, &recorded_orbits::orbits(orbits, noise, 0)));
     let options = FitOptions { targets: Some(Targets::Smoothed), ..FitOptions::default() };
     let prepared = PreparedFit::new(&loaded, &options).expect("long orbits");
     let mut config = prepared.suggest("orbits", Precision::F32).expect("states with full windows");
@@ -170,7 +137,7 @@ fn told(way: Way, orbits: usize, noise: f64, (epochs, threads): (Option<usize>, 
         Way::Metric | Way::Spherical => training.take_structure(Structure::Metric),
     }
     if way != Way::Spherical {
-        training.network.scaling = lnn::configuration::Scaling::None;
+        training.network.scaling = Scaling::None;
         training.network.radial = vec![["x", "y", "z"].map(String::from).to_vec()];
         training.network.radial_unit = Some(2.0);
     }
@@ -193,6 +160,16 @@ fn told(way: Way, orbits: usize, noise: f64, (epochs, threads): (Option<usize>, 
 /// Prints and returns rows `learned by,orbits,noise,quantity,error,seconds`.
 pub fn compare(cases: &[(usize, f64)], beside: bool, work: (Option<usize>, usize)) -> Vec<String> {
     let mut rows = Vec::new();
+    let orbits = cases.iter().map(|case| case.0).max().unwrap_or(0).min(100);
+    let mut noises: Vec<f64> = cases.iter().map(|case| case.1).collect();
+    noises.dedup();
+    for noise in noises {
+        for (windows, errors) in ["varying windows", "one window"].iter().zip(accelerations(orbits, noise)) {
+            let errors: Vec<String> = errors.iter().map(|e| format!("{:.2} %", 100.0 * e)).collect();
+            let noise = 100.0 * noise;
+            println!("  accelerations, {orbits:4} orbits, noise {noise:5.2} %, {windows:15}: {}", errors.join("  "));
+        }
+    }
     let ways = [Way::Metric, Way::BlackBox, Way::Spherical];
     for way in &ways[..if beside { 3 } else { 1 }] {
         // The others once, where the first has it easy.

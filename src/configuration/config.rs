@@ -122,6 +122,9 @@ pub struct Data {
     /// With a number `f` above 0 a training state weighs `f m / (f m + |a|)`, `|a|` the mean size of its scaled accelerations
     /// and `m` the mean over all states: errors count relative to accelerations above `f m`, and a few large ones do not
     /// outweigh the others.
+    ///
+    /// A fit adds the error to expect of a smoothed acceleration to `|a|`; with [radial coordinates](Network::radial) a state weighs
+    /// `1/(|a| + f m)`, `m` the median about as far from the centre. The same weights choose its best epoch.
     #[serde(default, alias = "relative", skip_serializing_if = "is_zero")]
     pub acceleration_weighting: f64,
     /// Names of Cartesian coordinates around a centre: all states are drawn in a [`Shell`] around it, training, validation and test,

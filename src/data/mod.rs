@@ -10,6 +10,7 @@ mod of_config;
 mod recording_split;
 mod sampling;
 mod shell;
+mod weights;
 
 pub(crate) use bounds::boxes;
 pub use dataset::{Dataset, DatasetError};

@@ -7,9 +7,10 @@
 use crate::data::dataset::{Dataset, DatasetError};
 use crate::data::datasets::Datasets;
 use crate::data::estimated::{Noise, StateEstimate};
+use crate::data::weights::Weighting;
 use crate::recording::smooth::{SmoothError, SmoothOptions, Smoothed, Smoothing};
 use crate::recording::survey::{Stillness, plan, stillness};
-use crate::recording::{HeldOut, HoldOutError, Recording, Targets};
+use crate::recording::{HeldOut, HoldOutError, RecordedTrajectory, Recording, Targets};
 use crate::scalar::Scalar;
 use thiserror::Error;
 
@@ -61,6 +62,15 @@ pub enum RecordingSplitError {
     },
 }
 
+/// A sample that is learned from.
+struct Row<'a> {
+    track: &'a RecordedTrajectory,
+    states: &'a Smoothed,
+    row: usize,
+    /// `true` if its acceleration was measured.
+    measured: bool,
+}
+
 /// Trajectories with the states estimated from them.
 #[derive(Clone, Debug)]
 pub struct Split {
@@ -82,28 +92,44 @@ impl Split {
         pairs.map(|(track, states)| StateEstimate { track, q: &states.q, v: &states.v }).collect()
     }
 
-    /// States away from the ends of trajectories, or all of them if nothing had to be derived; at most about `most`.
-    fn dataset<S: Scalar>(&self, targets: Targets, most: usize) -> Result<Dataset<S>, DatasetError> {
-        let n = self.recording.n();
+    /// Samples that are learned from: away from the ends of trajectories, or all of them if nothing had to be derived; at most
+    /// about `most`. Each with `true` if its acceleration is a measured one.
+    fn rows(&self, targets: Targets, most: usize) -> impl Iterator<Item = Row<'_>> {
         let stride = self.recording.samples().div_ceil(most.max(1)).max(1);
-        let (mut q, mut v, mut a, mut force) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        for (track, states) in self.recording.tracks.iter().zip(&self.states) {
+        self.recording.tracks.iter().zip(&self.states).flat_map(move |(track, states)| {
             let measured = targets == Targets::Measured && !track.a.is_empty();
             // Positions and velocities as measured belong to accelerations as measured.
             let complete = measured && !track.v.is_empty();
             let rows = if complete { 0..track.len() } else { states.interior() };
-            for row in rows.step_by(stride) {
-                let row = row * n..(row + 1) * n;
-                let of = |values: &[f64]| values[row.clone()].iter().map(|&x| S::of_f64(x)).collect::<Vec<S>>();
-                let position = of(if complete { &track.q } else { &states.q });
-                q.extend(
-                    position.iter().zip(&self.recording.periodic).map(|(q, &p)| if p { q.wrap_angle() } else { *q }),
-                );
-                v.extend(of(if complete { &track.v } else { &states.v }));
-                a.extend(of(if measured { &track.a } else { &states.a }));
-                if !track.force.is_empty() {
-                    force.extend(of(&track.force));
-                }
+            rows.step_by(stride).map(move |row| Row { track, states, row, measured })
+        })
+    }
+
+    /// Errors to expect of the accelerations of [`dataset`](Self::dataset), `(states, n)`; 0 of measured ones.
+    fn errors(&self, targets: Targets, most: usize) -> Vec<f64> {
+        let n = self.recording.n();
+        let mut errors = Vec::new();
+        for Row { states, row, measured, .. } in self.rows(targets, most) {
+            let of = |k: usize| if measured { 0.0 } else { states.a_error[k].hypot(states.a_bias[k]) };
+            errors.extend((row * n..(row + 1) * n).map(of));
+        }
+        errors
+    }
+
+    /// The states of [`rows`](Self::rows).
+    fn dataset<S: Scalar>(&self, targets: Targets, most: usize) -> Result<Dataset<S>, DatasetError> {
+        let n = self.recording.n();
+        let (mut q, mut v, mut a, mut force) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        for Row { track, states, row, measured } in self.rows(targets, most) {
+            let complete = measured && !track.v.is_empty();
+            let row = row * n..(row + 1) * n;
+            let of = |values: &[f64]| values[row.clone()].iter().map(|&x| S::of_f64(x)).collect::<Vec<S>>();
+            let position = of(if complete { &track.q } else { &states.q });
+            q.extend(position.iter().zip(&self.recording.periodic).map(|(q, &p)| if p { q.wrap_angle() } else { *q }));
+            v.extend(of(if complete { &track.v } else { &states.v }));
+            a.extend(of(if measured { &track.a } else { &states.a }));
+            if !track.force.is_empty() {
+                force.extend(of(&track.force));
             }
         }
         let data = Dataset::new(n, q, v, a)?;
@@ -179,6 +205,30 @@ impl RecordingSplit {
         Ok(Datasets { training: vec![dataset("training states", &self.training, most)?], validation, test })
     }
 
+    /// The datasets with weights of the training and validation states: `1/(|a| + f m + e)`, `e` the error to expect of an acceleration,
+    /// `f` above 0; `m` is the mean of `|a|`, or with coordinates `around` a centre the median about as far from it.
+    ///
+    /// # Errors
+    /// As [`datasets`](Self::datasets).
+    pub(crate) fn weigh<S: Scalar>(
+        &self,
+        data: Datasets<S>,
+        targets: Targets,
+        (floor, scale, around): (f64, &[f64], &[usize]),
+    ) -> Result<Datasets<S>, RecordingSplitError> {
+        let weigh = |which, set, part: &Split, most| {
+            let errors = part.errors(targets, most);
+            let weighting = Weighting { floor, scale, errors: &errors };
+            let set = if around.is_empty() { weighting.relative(set) } else { weighting.by_distance(set, around) };
+            set.map_err(|source| RecordingSplitError::Dataset { which, source })
+        };
+        let Datasets { training, validation, test } = data;
+        let training = training.into_iter().map(|set| weigh("training states", set, &self.training, self.most_states));
+        let training = training.collect::<Result<_, _>>()?;
+        let validation = weigh("validation states", validation, &self.validation, self.most_states / 5)?;
+        Ok(Datasets { training, validation, test })
+    }
+
     /// Standard deviations of the noise; where data have none, a millionth of their spread.
     pub fn noise(&self) -> Noise {
         let n = self.training.recording.n();
@@ -197,3 +247,45 @@ impl RecordingSplit {
 
 /// Least noise that is believed, beside the size of the data.
 const LEAST_NOISE: f64 = 1e-6;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    #[test]
+    fn weights_of_recorded_states_count_size_and_error_of_their_accelerations() {
+        let mut rng = ChaCha8Rng::seed_from_u64(6);
+        let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
+        let mut track = |k: usize| {
+            let times: Vec<f64> = (0..200).map(|j| 0.05 * f64::from(j)).collect();
+            let wave = |t: f64| (1.0 + k as f64) * (2.0 * t + k as f64).sin();
+            let q = times.iter().flat_map(|t| [wave(*t), wave(t + 1.0)]).map(|q| q + 0.01 * normal()).collect();
+            RecordedTrajectory { name: k.to_string(), times, q, v: vec![], a: vec![], force: vec![] }
+        };
+        let tracks = (0..10).map(&mut track).collect();
+        let recording = Recording { coordinates: vec!["x".into(), "y".into()], periodic: vec![false; 2], tracks };
+        let measured = RecordingSplit::new(&recording, &PrepareOptions::default()).unwrap();
+        let plain = measured.datasets::<f64>(Targets::Smoothed).unwrap();
+        for around in [&[][..], &[0, 1]] {
+            let choice = (1.0, &[1.0, 1.0][..], around);
+            let weighted = measured.weigh(plain.clone(), Targets::Smoothed, choice).unwrap();
+            let without = |set: &Dataset<f64>| {
+                let weighting = Weighting { floor: 1.0, scale: &[1.0; 2], errors: &[] };
+                let set = set.clone();
+                if around.is_empty() { weighting.relative(set) } else { weighting.by_distance(set, around) }.unwrap()
+            };
+            for (set, plain) in [(&weighted.training[0], &plain.training[0]), (&weighted.validation, &plain.validation)]
+            {
+                let exact = without(plain);
+                assert_eq!((set.q(), set.a()), (plain.q(), plain.a()));
+                // Errors are some hundredths of the accelerations.
+                let ratio = |k: usize| set.weight(k) / exact.weight(k);
+                assert!((0..set.len()).all(|k| ratio(k) < 1.0 && ratio(k) > 0.5), "{around:?}");
+            }
+            assert_eq!(weighted.test, plain.test);
+        }
+    }
+}

@@ -6,6 +6,7 @@ use crate::data::datasets::Datasets;
 use crate::data::draw::{Drawn, SamplingError, draw};
 use crate::data::motions::along_motions;
 use crate::data::shell::{in_shell, weigh_by_distance};
+use crate::data::weights::Weighting;
 use crate::lagrangian::SystemInstance;
 use crate::random::RngStream;
 use crate::scalar::Scalar;
@@ -51,17 +52,6 @@ fn fill(
         }
     }
     Ok(Dataset::new(n, drawn.q, drawn.v, drawn.a)?)
-}
-
-/// The states with the weights of [`Data::acceleration_weighting`](crate::configuration::Data::acceleration_weighting).
-fn weigh(set: Dataset<f64>, floor: f64) -> Result<Dataset<f64>, DatasetError> {
-    let scale = set.physical_scale();
-    let size = |a: &[f64]| a.iter().zip(&scale).map(|(a, s)| (a / s).abs()).sum::<f64>() / scale.len() as f64;
-    let sizes: Vec<f64> = set.a().chunks_exact(scale.len()).map(size).collect();
-    let floor = floor * sizes.iter().sum::<f64>() / sizes.len() as f64;
-    // Without any acceleration every state counts the same.
-    let weight = |size: f64| if floor > 0.0 { floor / (floor + size) } else { 1.0 };
-    set.with_weights(sizes.into_iter().map(weight).collect())
 }
 
 /// Slowest velocity off a mass shell, as a part of one on it.
@@ -116,7 +106,8 @@ pub fn sample_all<S: Scalar>(
         let drawn = along_motions(system, &field, bounds, &phase.log_uniform, moving, &mut rng)?;
         let set = fill(drawn, system, &field, bounds, &phase.log_uniform, states, &mut rng)?;
         let set = if config.data.acceleration_weighting > 0.0 {
-            weigh(set, config.data.acceleration_weighting)?
+            let (floor, scale) = (config.data.acceleration_weighting, set.physical_scale());
+            Weighting { floor, scale: &scale, errors: &[] }.relative(set)?
         } else {
             set
         };
@@ -216,6 +207,10 @@ mod tests {
     fn relative_weights_fall_with_the_acceleration() {
         let set = Dataset::new(2, vec![1.0, 4.0, -2.0, 0.0], vec![0.0; 4], vec![2.0, 0.0, 2.0, 20.0]).unwrap();
         // Scales 2 and 4: sizes 1/2 and 3, mean 7/4.
+        let weigh = |set: Dataset<f64>, floor: f64| {
+            let scale = set.physical_scale();
+            Weighting { floor, scale: &scale, errors: &[] }.relative(set)
+        };
         let weighed = weigh(set.clone(), 2.0).unwrap();
         assert_eq!([weighed.weight(0), weighed.weight(1)], [3.5 / 4.0, 3.5 / 6.5]);
         let still = Dataset::new(2, vec![1.0, 4.0], vec![0.0; 2], vec![0.0; 2]).unwrap();

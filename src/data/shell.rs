@@ -3,6 +3,7 @@
 use crate::configuration::{ConfigError, Shell};
 use crate::data::dataset::Dataset;
 use crate::data::draw::{Drawn, SamplingError, draw};
+use crate::data::weights::Weighting;
 use crate::lagrangian::{EulerLagrange, Request, SystemInstance, Terms};
 use crate::linalg::{Workspace, inverse};
 use rand::Rng;
@@ -108,32 +109,15 @@ fn within(h: &[Vec<f64>], ahead: &[f64]) -> Option<Vec<f64>> {
     Some(e)
 }
 
-/// States that are about as far from the centre.
-const ALIKE: usize = 200;
-
-/// The states with the weights `1/(|a| + floor m)`, `m` the median of `|a|` among [`ALIKE`] states about as far from the centre.
+/// The states with weights by which near and far count alike, see [`Weighting::by_distance`].
 pub(crate) fn weigh_by_distance(
     set: Dataset<f64>,
     system: &SystemInstance<f64>,
     shell: &Shell<'_>,
     floor: f64,
 ) -> Result<Dataset<f64>, SamplingError> {
-    let n = set.coordinates();
-    let around = places(system, shell)?;
-    let distance = |k: usize| around.iter().map(|&i| set.q()[k * n + i].powi(2)).sum::<f64>();
-    let sizes: Vec<f64> = set.a().chunks_exact(n).map(|a| a.iter().map(|a| a.abs()).sum::<f64>() / n as f64).collect();
-    let mut order: Vec<usize> = (0..set.len()).collect();
-    order.sort_by(|&a, &b| distance(a).total_cmp(&distance(b)));
-    let mut weights = vec![1.0; set.len()];
-    for group in order.chunks(ALIKE) {
-        let mut alike: Vec<f64> = group.iter().map(|&k| sizes[k]).collect();
-        alike.sort_by(f64::total_cmp);
-        let middle = alike[alike.len() / 2];
-        // Where nothing is accelerated every state counts the same.
-        let weight = |size: f64| if floor * middle > 0.0 { (size + floor * middle).recip() } else { 1.0 };
-        group.iter().for_each(|&k| weights[k] = weight(sizes[k]));
-    }
-    Ok(set.with_weights(weights)?)
+    let scale = vec![1.0; set.coordinates()];
+    Ok(Weighting { floor, scale: &scale, errors: &[] }.by_distance(set, &places(system, shell)?)?)
 }
 
 #[cfg(test)]

@@ -97,9 +97,14 @@ fn fit_in<S: Scalar>(
         }
         None => (shaped(data.training[0].physical_scale())?, None),
     };
+    architecture.validate()?;
+    let floor = config.data.acceleration_weighting;
+    if floor > 0.0 {
+        let around: Vec<usize> = architecture.form.radial.first().map(|r| r.coordinates.clone()).unwrap_or_default();
+        data = measured.weigh(data, *targets, (floor, &architecture.scale, &around))?;
+    }
     // Every phase learns from the same states.
     data.training = vec![data.training.swap_remove(0); config.phases.len()];
-    architecture.validate()?;
     memory::require("training", training_memory(config, &architecture))?;
     let penalty = config.penalty.resolve(names.iter().map(String::as_str))?;
 

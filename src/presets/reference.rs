@@ -89,7 +89,7 @@ pub const TRAINING_SECTIONS: [Section<'static>; 9] = [
                 "0.1",
                 "from 0; 0 unless set",
                 "With f above 0 a state weighs f m / (f m + |a|), |a| its scaled acceleration and m the mean of all: a few \
-                 huge accelerations do not outweigh the others.",
+                 huge accelerations do not outweigh the others. A fit adds the error to expect to |a|.",
             ),
             optional(
                 "shell",

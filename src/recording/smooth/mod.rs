@@ -2,6 +2,7 @@
 
 mod local_fit;
 mod noise;
+mod pace;
 mod window;
 
 pub(crate) use local_fit::MOST_DEGREE;
@@ -13,6 +14,9 @@ use crate::names::counted;
 use crate::recording::statistics::{median, steps};
 use crate::recording::{RecordedTrajectory, Recording};
 use local_fit::{Estimate, LocalFit};
+use noise::along;
+use pace::Usual;
+use std::collections::BTreeMap;
 use thiserror::Error;
 use window::Signal;
 
@@ -21,7 +25,8 @@ use window::Signal;
 pub struct SmoothOptions {
     /// Degree of the polynomials, 2 to 8.
     pub degree: usize,
-    /// Length of the windows in samples, odd and at least `degree + 3`; chosen per coordinate if not given.
+    /// Length of the windows in samples, odd and at least `degree + 3`, the same everywhere; if not given, a usual length is chosen per
+    /// coordinate, and windows follow pace and noise along every trajectory.
     pub window: Option<usize>,
     /// Standard deviations of the positions' noise, one per coordinate; estimated if not given.
     pub noise: Option<Vec<f64>>,
@@ -82,7 +87,7 @@ pub struct Chosen {
     pub seconds: f64,
 }
 
-/// Smoothing of a recording: one window per coordinate, the same in seconds for all trajectories.
+/// Smoothing of a recording: a usual window per coordinate, the same in seconds for all trajectories.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Smoothing {
     /// Degree of the polynomials.
@@ -91,6 +96,9 @@ pub struct Smoothing {
     pub coordinates: Vec<Chosen>,
     /// Median step in s.
     pub step: f64,
+    /// `true` if windows are shorter than usual where the motion is fast, and longer where it is slow; `false` if their length
+    /// was given.
+    pub varying: bool,
 }
 
 /// A trajectory with derivatives; all arrays are `(samples, n)`.
@@ -120,14 +128,15 @@ pub struct Smoothed {
     /// Estimated bias of the accelerations.
     pub a_bias: Vec<f64>,
     /// Samples left and right that have no full window around them: their errors are several times larger.
-    pub margin: usize,
+    pub margins: [usize; 2],
 }
 
 impl Smoothed {
     /// Samples with full windows.
     pub fn interior(&self) -> std::ops::Range<usize> {
-        let end = self.times.len().saturating_sub(self.margin);
-        self.margin.min(end)..end
+        let [before, after] = self.margins;
+        let end = self.times.len().saturating_sub(after);
+        before.min(end)..end
     }
 }
 
@@ -174,7 +183,8 @@ impl Smoothing {
             let seconds = (quality.window - 1) as f64 * step;
             Ok(Chosen { noise: position, velocity_noise: velocity, quality, seconds })
         });
-        Ok(Self { degree: options.degree, coordinates: coordinates.collect::<Result<_, _>>()?, step })
+        let coordinates = coordinates.collect::<Result<_, _>>()?;
+        Ok(Self { degree: options.degree, coordinates, step, varying: options.window.is_none() })
     }
 
     /// The signal of coordinate `i` on trajectories whose steps are equal or not.
@@ -235,11 +245,21 @@ impl Smoothing {
         }
         let regular = is_regular(&track.times);
         let tracks = std::slice::from_ref(track);
-        for i in 0..n {
-            let signal = self.signal(tracks, std::slice::from_ref(&regular), i);
-            let window = self.samples(i, track);
-            smoothed.margin = smoothed.margin.max(window / 2);
-            smooth(&signal, window, &mut smoothed);
+        let usual: Vec<Usual<'_>> = (0..n)
+            .map(|i| Usual {
+                signal: self.signal(tracks, std::slice::from_ref(&regular), i),
+                sigmas: along((&track.times, &track.q), regular, (n, i), self.coordinates[i].noise),
+                window: self.samples(i, track),
+                error: self.coordinates[i].quality.total(2),
+            })
+            .collect();
+        let windows =
+            if self.varying { pace::windows(&usual) } else { usual.iter().map(|u| vec![u.window; length]).collect() };
+        for (usual, windows) in usual.iter().zip(&windows) {
+            let before = (0..length).find(|&at| at >= windows[at] / 2).unwrap_or(length);
+            let after = (0..length).find(|&left| left >= windows[length - 1 - left] / 2).unwrap_or(length);
+            smoothed.margins = [smoothed.margins[0].max(before), smoothed.margins[1].max(after)];
+            smooth(usual, windows, &mut smoothed);
         }
         Ok(smoothed)
     }
@@ -251,32 +271,50 @@ fn ratio(position: Noise, velocity: Noise, step: f64) -> Option<f64> {
     ratio.is_finite().then_some(ratio)
 }
 
-/// Fills column `signal.i` of all arrays.
-fn smooth(signal: &Signal<'_>, window: usize, smoothed: &mut Smoothed) {
+/// Fills column `signal.i` of all arrays by a window of its own around every sample.
+fn smooth(Usual { signal, sigmas, .. }: &Usual<'_>, windows: &[usize], smoothed: &mut Smoothed) {
     let (track, n, i) = (&signal.tracks[0], signal.n, signal.i);
-    let (length, half) = (track.len(), window / 2);
-    let mut fit = LocalFit::default();
-    let mut centred = false;
-    // Squared change by two more degrees, and the part of it that noise explains.
+    let length = track.len();
+    let mut elsewhere = LocalFit::default();
+    // Where steps are equal, the rows of all full windows of a length are the same.
+    let mut centred: BTreeMap<usize, LocalFit> = BTreeMap::new();
+    // Squared change by two more degrees without the part of it that noise explains, in units of the noise.
     let mut excess: [Vec<f64>; 3] = std::array::from_fn(|_| vec![0.0; length]);
-    for at in 0..length {
+    let full: Vec<bool> = windows.iter().enumerate().map(|(at, w)| at >= w / 2 && at + w / 2 < length).collect();
+    for (at, &window) in windows.iter().enumerate() {
+        let half = window / 2;
         let first = at.saturating_sub(half).min(length - window);
-        let middle = first + half == at;
-        if !(signal.regular[0] && centred && middle) {
-            signal.fit(&mut fit, track, first, window, at);
-        }
-        centred = middle;
-        let Estimate { values, changes } = signal.estimate(&fit, track, first, window, at);
+        let compute = |fit: &mut LocalFit| signal.fit(fit, track, first, window, at);
+        let fit = if signal.regular[0] && full[at] {
+            centred.entry(window).or_insert_with(|| {
+                let mut fit = LocalFit::default();
+                compute(&mut fit);
+                fit
+            })
+        } else {
+            compute(&mut elsewhere);
+            &elsewhere
+        };
+        let Estimate { values, changes } = signal.estimate(fit, track, first, window, at);
         for (k, [value, error, _]) in smoothed.arrays().into_iter().enumerate() {
             value[at * n + i] = values[k];
-            error[at * n + i] = signal.sigma * fit.variance[k].sqrt();
-            excess[k][at] = changes[k] * changes[k] - signal.sigma * signal.sigma * fit.change_variance[k];
+            error[at * n + i] = sigmas[at] * fit.variance[k].sqrt();
+            excess[k][at] =
+                (changes[k] / sigmas[at]).powi(2) / fit.variance[k] - fit.change_variance[k] / fit.variance[k];
         }
     }
-    for (excess, [_, _, bias]) in excess.iter().zip(smoothed.arrays()) {
-        for at in 0..length {
-            let near = &excess[at.saturating_sub(window)..(at + window + 1).min(length)];
-            bias[at * n + i] = (near.iter().sum::<f64>() / near.len() as f64).max(0.0).sqrt();
+    // A single change is no more than a sign of the bias: the mean of its square over a window to either side is. One-sided windows
+    // count only for each other.
+    for (excess, [_, error, bias]) in excess.iter().zip(smoothed.arrays()) {
+        let counted = |at: &usize| full[*at];
+        for (at, window) in windows.iter().enumerate() {
+            let near = at.saturating_sub(*window)..(at + window + 1).min(length);
+            let (sum, count) = if full[at] {
+                near.filter(counted).fold((0.0, 0), |(sum, count), k| (sum + excess[k], count + 1))
+            } else {
+                (excess[near.clone()].iter().sum(), near.len())
+            };
+            bias[at * n + i] = error[at * n + i] * (sum / count as f64).max(0.0).sqrt();
         }
     }
 }

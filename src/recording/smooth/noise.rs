@@ -70,6 +70,40 @@ pub fn noise<'a>(signals: impl Iterator<Item = (&'a [f64], &'a [f64])> + Clone, 
     }
 }
 
+/// Contrasts to either side that tell the noise at a sample.
+const NEAR: usize = 64;
+/// Noise at a sample over that of the recording, or the inverse, up to which they are taken to be the same.
+const SAME: f64 = 2.0;
+
+/// Noise at every sample of column `i` of a trajectory: where the contrasts near it say plainly another than that of the recording, theirs.
+///
+/// Squares above those of four standard deviations count as four: a spoilt sample is not noise.
+pub(super) fn along((times, x): (&[f64], &[f64]), regular: bool, (n, i): (usize, usize), noise: Noise) -> Vec<f64> {
+    let Noise { sigma, order, resolved } = noise;
+    let count = times.len().saturating_sub(order);
+    if order == 0 || !resolved || count < NEAR || sigma <= 0.0 {
+        return vec![sigma; times.len()];
+    }
+    let mut weights = [0.0; ORDERS[ORDERS.len() - 1] + 1];
+    // Sums of squares up to each contrast, in units of the noise of the recording.
+    let mut sums = vec![0.0; count + 1];
+    for start in 0..count {
+        if !(regular && start > 0) {
+            contrast_weights(&times[start..=start + order], &mut weights[..=order]);
+        }
+        let relative = |j: usize| (x[(start + j) * n + i] - x[start * n + i]) / sigma;
+        let contrast = weights[..=order].iter().enumerate().map(|(j, weight)| weight * relative(j)).sum::<f64>();
+        sums[start + 1] = sums[start] + contrast.abs().min(4.0).powi(2);
+    }
+    let at = |sample: usize| {
+        let middle = sample.saturating_sub(order / 2);
+        let (first, end) = (middle.saturating_sub(NEAR).min(count - NEAR), (middle + NEAR + 1).min(count));
+        let ratio = ((sums[end] - sums[first]) / (end - first) as f64).sqrt();
+        if ratio * SAME < 1.0 || ratio > SAME { sigma * ratio.max(1e-3) } else { sigma }
+    };
+    (0..times.len()).map(at).collect()
+}
+
 /// Weights of the divided difference of all samples at these times, scaled to square sum 1.
 pub(crate) fn contrast_weights(times: &[f64], weights: &mut [f64]) {
     let [first, .., last] = times else { return };
@@ -114,6 +148,28 @@ mod tests {
             assert!(found.resolved, "{jitter} {omega} {sigma}: {found:?}");
             let constant = noise([(times.as_slice(), x.as_slice())].into_iter(), 2, 0);
             assert_eq!(constant.sigma, 9.0 * f64::EPSILON);
+        }
+    }
+
+    #[test]
+    fn noise_that_varies_is_followed() {
+        let mut rng = ChaCha8Rng::seed_from_u64(4);
+        let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
+        let times: Vec<f64> = (0..3000).map(|k| 0.01 * f64::from(k)).collect();
+        let sigma = |k: usize, varies: bool| if varies && k < 600 { 1e-3 } else { 1e-2 };
+        for varies in [true, false] {
+            let x: Vec<f64> =
+                times.iter().enumerate().map(|(k, t)| (5.0 * t).sin() + sigma(k, varies) * normal()).collect();
+            let signal = (times.as_slice(), x.as_slice());
+            let found = noise([signal].into_iter(), 1, 0);
+            let local = along(signal, true, (1, 0), found);
+            for k in (0..500).chain(700..3000) {
+                let ratio = local[k] / sigma(k, varies);
+                assert!((0.5..2.0).contains(&ratio), "{varies} {k}: {ratio}");
+                assert!(varies || local[k] == found.sigma, "{k}: even noise is that of the recording");
+            }
+            let given = Noise { sigma: 0.5, order: 0, resolved: true };
+            assert!(along(signal, true, (1, 0), given).iter().all(|s| *s == 0.5));
         }
     }
 

@@ -128,6 +128,57 @@ fn the_chosen_window_is_nearly_the_best() {
     }
 }
 
+/// Kepler's ellipse of eccentricity 0.7 around a centre of mass 1, semi-major axis 1: position and acceleration.
+fn kepler(t: f64) -> [[f64; 2]; 2] {
+    let e: f64 = 0.7;
+    let anomaly = (0..50).fold(t, |x, _| x - (x - e * x.sin() - t) / (1.0 - e * x.cos()));
+    let (x, y) = (anomaly.cos() - e, (1.0 - e * e).sqrt() * anomaly.sin());
+    let cube = x.hypot(y).powi(3);
+    [[x, y], [-x / cube, -y / cube]]
+}
+
+#[test]
+fn accelerations_of_an_eccentric_orbit_are_better_by_windows_that_vary() {
+    let mut rng = ChaCha8Rng::seed_from_u64(8);
+    let times = even(2000, 0.01);
+    for sigma in [1e-4, 1e-3] {
+        let mut normal = || sigma * Distribution::<f64>::sample(&StandardNormal, &mut rng);
+        let q = times.iter().flat_map(|t| kepler(*t)[0]).map(|x| x + normal()).collect();
+        let name = "orbit".to_string();
+        let recording =
+            recording(vec![RecordedTrajectory { name, times: times.clone(), q, v: vec![], a: vec![], force: vec![] }]);
+        let [varying, constant] = [true, false].map(|varying| {
+            let smoothing = Smoothing::choose(&recording, &SmoothOptions::default()).unwrap();
+            assert!(smoothing.varying);
+            let smoothed = Smoothing { varying, ..smoothing }.apply(&recording.tracks[0]).unwrap();
+            let mut errors: Vec<f64> = (100..1900)
+                .map(|k| {
+                    let [x, y] = kepler(times[k])[1];
+                    (smoothed.a[2 * k] - x).hypot(smoothed.a[2 * k + 1] - y) / x.hypot(y)
+                })
+                .collect();
+            crate::recording::statistics::median(&mut errors)
+        });
+        assert!(varying < 0.5 * constant, "{sigma}: {varying} {constant}");
+    }
+}
+
+#[test]
+fn windows_that_vary_do_no_harm_to_motion_of_even_pace() {
+    for (sigma, seed) in [(1e-3, 1), (1e-2, 2)] {
+        let recording = recording(vec![track(even(4000, 0.01), sigma, None, seed)]);
+        let [varying, constant] = [true, false].map(|varying| {
+            let smoothing = Smoothing::choose(&recording, &SmoothOptions::default()).unwrap();
+            let smoothed = Smoothing { varying, ..smoothing }.apply(&recording.tracks[0]).unwrap();
+            [0, 1].map(|i| acceleration_error(&smoothed, i))
+        });
+        for i in 0..2 {
+            println!("{sigma} {i}: {:.3}", varying[i] / constant[i]);
+            assert!(varying[i] < 1.2 * constant[i], "{sigma} {i}: {} {}", varying[i], constant[i]);
+        }
+    }
+}
+
 #[test]
 fn measured_velocities_help() {
     let times = even(2000, 0.01);
@@ -149,7 +200,7 @@ fn polynomials_come_back_at_the_ends_too() {
         let recording = recording(vec![track]);
         let options = SmoothOptions { window: Some(11), noise: Some(vec![1.0, 1.0]), ..SmoothOptions::default() };
         let smoothed = Smoothing::choose(&recording, &options).unwrap().apply(&recording.tracks[0]).unwrap();
-        assert_eq!((smoothed.margin, smoothed.interior()), (5, 5..35));
+        assert_eq!((smoothed.margins, smoothed.interior()), ([5, 5], 5..35));
         for (k, t) in smoothed.times.iter().enumerate() {
             // A row of standard error `e` for noise 1 carries rounding of numbers below 2 this far.
             let tolerance = |e: f64| 64.0 * f64::EPSILON * e.max(1.0);
