@@ -80,7 +80,13 @@ mod tests {
         let size = |k: usize| 0.5 * set.a()[2 * k];
         let plain = Weighting { floor: 1.0, scale: &[1.0; 2], errors: &[] };
         let even = plain.by_distance(set.clone(), &[0]).unwrap();
-        assert!((0..400).all(|k| (0.2..0.8).contains(&(even.weight(k) * size(k)))));
+        // Beside the median of each half, by distance.
+        let usual = |k: usize| size(if k < 200 { 99 } else { 299 });
+        assert!((0..400).all(|k| (even.weight(k) * (size(k) + usual(k)) - 1.0).abs() < 1e-14));
+        for half in [0..200, 200..400] {
+            let share = half.map(|k| even.weight(k) * size(k)).sum::<f64>() / 200.0;
+            assert!((share - 0.5).abs() < 0.05, "{share}");
+        }
         let relative = plain.relative(set.clone()).unwrap();
         let mean = (0..400).map(size).sum::<f64>() / 400.0;
         assert!((relative.weight(7) - mean / (mean + size(7))).abs() < 1e-15);
