@@ -1,7 +1,8 @@
 //! Black holes, learned or written down: what is read off their metrics, and what a camera near them sees.
 //!
 //! A [`LearnedHole`] of an exact metric and a learned one gives [`Reading`]s: orbits of matter and of light, the advance of periastra
-//! ([`radial_period`]), falls through a horizon ([`infall`]), mass and spin ([`nearest_parameters`]), curvature, symmetries.
+//! ([`radial_period`]), falls through a horizon ([`infall`]), mass and spin ([`nearest_parameters`]), curvature, symmetries; `LearnedHole` and
+//! `nearest_parameters` take the feature `training`.
 //!
 //! A [`Camera`] stands at a place of a metric whose space has Cartesian coordinates around a centre. Through every pixel a null geodesic is
 //! followed backwards in time, by the accelerations of the model alone, until it comes from far away, where its direction is that of a point
@@ -27,6 +28,7 @@ mod central_coordinates;
 mod chart;
 mod directions;
 mod dormand_prince;
+#[cfg(feature = "training")]
 mod drift;
 mod error;
 mod event;
@@ -34,9 +36,11 @@ mod image;
 mod infall;
 mod orbits;
 mod outline;
+#[cfg(feature = "training")]
 mod parameters;
 mod periastron;
 mod rays;
+#[cfg(feature = "training")]
 mod readings;
 mod shadow;
 mod sky;
@@ -47,15 +51,18 @@ mod vector;
 pub use camera::{Camera, Observer};
 pub use central_coordinates::CentralCoordinates;
 pub use chart::Chart;
+#[cfg(feature = "training")]
 pub(crate) use drift::conserved_drift;
 pub use error::RelativityError;
 pub use image::Image;
 pub use infall::{Infall, infall};
 pub use orbits::{Orbit, orbits};
 pub use outline::{Edge, Outline, outline};
+#[cfg(feature = "training")]
 pub use parameters::nearest_parameters;
 pub use periastron::{RadialPeriod, radial_period};
 pub use rays::{Fate, Ray, Tracing, trace};
+#[cfg(feature = "training")]
 pub use readings::{LearnedHole, Reading};
 pub use shadow::{Difference, Shadow, shadow};
 pub use sky::{Sky, difference_image};
