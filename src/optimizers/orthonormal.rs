@@ -9,9 +9,10 @@ const ROWS: usize = 16;
 /// Makes the rows orthonormal, one after the other: a block of rows against those before it by matrix products, then within
 /// itself, all of it twice (Giraud, Langou, Rozložník 2005: twice is enough; for blocks Barlow, Smoktunowicz 2013); `false` if
 /// a row vanishes or is not finite.
-pub(super) fn orthonormalize<S: Scalar>(size: usize, rows: &mut [S]) -> bool {
+///
+/// `scratch` has room for as many numbers as `rows`.
+pub(super) fn orthonormalize<S: Scalar>(size: usize, rows: &mut [S], scratch: &mut [S]) -> bool {
     let one = <S as Real>::one();
-    let mut along = vec![<S as Real>::zero(); ROWS * size];
     for start in (0..size).step_by(ROWS) {
         let (before, rest) = rows.split_at_mut(start * size);
         let count = ROWS.min(size - start);
@@ -21,7 +22,7 @@ pub(super) fn orthonormalize<S: Scalar>(size: usize, rows: &mut [S]) -> bool {
         }
         for _ in 0..2 {
             if start > 0 {
-                let (before, along) = (MatRef::new(before, start, size), &mut along[..count * start]);
+                let (before, along) = (MatRef::new(before, start, size), &mut scratch[..count * start]);
                 let now = MatRef::new(block, count, size);
                 gemm(MatMut::new(along, count, start), false, one, now, before.t());
                 let along = MatRef::new(along, count, start);
@@ -119,12 +120,12 @@ pub(super) mod tests {
                 }
             }
             let first = rows[..size].to_vec();
-            assert!(orthonormalize(size, &mut rows));
+            assert!(orthonormalize(size, &mut rows, &mut vec![0.0; size * size]));
             assert!(defect(size, &rows) < 20.0 * f64::EPSILON);
             let length = norm(&first);
             assert!(first.iter().zip(&rows).all(|(x, y)| (x / length - y).abs() < 1e-14));
         }
-        assert!(!orthonormalize(2, &mut [1.0, 0.0, f64::NAN, 1.0]));
-        assert!(!orthonormalize(2, &mut [0.0; 4]));
+        assert!(!orthonormalize(2, &mut [1.0, 0.0, f64::NAN, 1.0], &mut [0.0; 4]));
+        assert!(!orthonormalize(2, &mut [0.0; 4], &mut [0.0; 4]));
     }
 }

@@ -125,7 +125,7 @@ impl<S: Scalar> Side<S> {
         for (next, &vector) in self.next.iter_mut().zip(&self.vectors) {
             *next += shift * vector;
         }
-        if !orthonormalize(size, &mut self.next) {
+        if !orthonormalize(size, &mut self.next, &mut self.turn) {
             self.next.copy_from_slice(&self.vectors);
         }
         product(size, &mut self.turn, &self.next, MatRef::new(&self.vectors, size, size).t());
@@ -340,7 +340,8 @@ mod tests {
         const N: usize = 8;
         let matrix = |seed| {
             let (mut u, mut v) = (random(N * N, seed), random(N * N, seed + 1));
-            assert!(orthonormalize(N, &mut u) && orthonormalize(N, &mut v));
+            let scratch = &mut [0.0; N * N];
+            assert!(orthonormalize(N, &mut u, scratch) && orthonormalize(N, &mut v, scratch));
             let mut a = vec![0.0; N * N];
             for (k, (u, v)) in u.chunks_exact(N).zip(v.chunks_exact(N)).enumerate() {
                 let sigma = 10f64.powf(-3.0 * k as f64 / (N - 1) as f64);
