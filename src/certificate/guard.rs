@@ -38,20 +38,17 @@ impl<S: Scalar, M: EulerLagrange<S>> EulerLagrange<S> for Guarded<'_, M> {
             return outcome;
         }
         let n = self.coordinates().max(1);
-        let mut first = None;
+        let found = terms.take_failures(outcome)?;
         for (row, (q, v)) in q.chunks_exact(n).zip(v.chunks_exact(n)).enumerate() {
             if !matches!(self.certificate.verdict(q, v), Verdict::Certified { .. }) {
-                first = first.or(Some(row));
+                terms.failures.push(MechanicsError::Uncertified { row });
                 if let Some(acceleration) = terms.acceleration.get_mut(row * n..(row + 1) * n) {
                     acceleration.fill(S::nan());
                 }
             }
         }
-        match (outcome, first) {
-            (Err(error), _) => Err(error),
-            (Ok(()), Some(row)) => Err(MechanicsError::Uncertified { row }),
-            (Ok(()), None) => Ok(()),
-        }
+        terms.put_before(found);
+        terms.outcome()
     }
 
     fn metric_jets(&self, q: &[S], v: &[S]) -> Result<Vec<MetricJet<S>>, MechanicsError> {
@@ -90,6 +87,7 @@ mod tests {
         guarded.model().terms(&q, &v, Request::ALL, &mut plain).unwrap();
         let refused = guarded.terms(&q, &v, Request::ACCELERATION, &mut terms);
         assert_eq!(refused, Err(MechanicsError::Uncertified { row: 1 }));
+        assert_eq!(terms.failures, [1, 2].map(|row| MechanicsError::Uncertified { row }));
         assert!(
             terms.acceleration[..2] == plain.acceleration[..2] && terms.acceleration[2..].iter().all(|a| a.is_nan())
         );

@@ -99,19 +99,14 @@ fn inspect<S: Scalar>(args: &Args) -> Result<(), CliError> {
     let mut terms = Terms::default();
     for ((q, v), rows) in states.q.chunks(CHUNK * n).zip(states.v.chunks(CHUNK * n)).zip(states.rows.chunks(CHUNK)) {
         let mut text = String::new();
-        if model.terms(q, v, Request::ALL, &mut terms).is_ok() {
-            let spectrum = spectrum(n, &terms.mass_matrix);
-            for (k, &row) in rows.iter().enumerate() {
-                text += &show(args.format, row, &fields(n, k, &terms, &spectrum, factor.as_ref()), None);
-            }
-        } else {
-            // One state of the chunk failed: take them one by one, so that each says its own reason.
-            for ((q, v), &row) in q.chunks(n).zip(v.chunks(n)).zip(rows) {
-                let problem = model.terms(q, v, Request::ALL, &mut terms).err().map(explain);
-                let spectrum = spectrum(n, &terms.mass_matrix);
-                text += &show(args.format, row, &fields(n, 0, &terms, &spectrum, factor.as_ref()), problem.as_deref());
-                failures.extend(problem.map(|text| (row, text)));
-            }
+        let outcome = model.terms(q, v, Request::ALL, &mut terms);
+        let told = terms.take_failures(outcome).map_err(|error| CliError::data(format_args!("{place}: {error}")))?;
+        let spectrum = spectrum(n, &terms.mass_matrix);
+        let mut told = told.into_iter().peekable();
+        for (k, &row) in rows.iter().enumerate() {
+            let problem = told.next_if(|failure| failure.row() == Some(k)).map(explain);
+            text += &show(args.format, row, &fields(n, k, &terms, &spectrum, factor.as_ref()), problem.as_deref());
+            failures.extend(problem.map(|text| (row, text)));
         }
         output::print(&text)?;
     }

@@ -1,7 +1,9 @@
 //! Failures of the terms of a batch.
 
+use crate::linalg::Failure;
+
 /// Why terms could not be computed.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MechanicsError {
     /// A slice has the wrong length.
@@ -42,4 +44,30 @@ pub enum MechanicsError {
         /// Of which term.
         what: &'static str,
     },
+}
+
+impl MechanicsError {
+    /// Row of the state that failed; `None` of an error that is not about one state.
+    pub fn row(&self) -> Option<usize> {
+        match *self {
+            Self::Singular { row, .. } | Self::NotFinite { row, .. } | Self::Uncertified { row } => Some(row),
+            Self::Shape { .. } | Self::Derivatives { .. } => None,
+        }
+    }
+
+    /// The same of the state in another row.
+    pub(crate) fn at_row(mut self, to: usize) -> Self {
+        if let Self::Singular { row, .. } | Self::NotFinite { row, .. } | Self::Uncertified { row } = &mut self {
+            *row = to;
+        }
+        self
+    }
+
+    /// A state whose acceleration cannot be solved for.
+    pub(crate) fn unsolved(row: usize, failure: Failure) -> Self {
+        match failure {
+            Failure::Singular { condition } => Self::Singular { row, condition },
+            Failure::NotFinite => Self::NotFinite { row, what: "acceleration" },
+        }
+    }
 }

@@ -1,5 +1,6 @@
 //! The Euler-Lagrange formula: acceleration and energy from `L`, `p`, `g`, `M`, `c`, `Q`, whoever computed them.
 
+use super::failures::not_finite;
 use super::{MechanicsError, Request, Terms};
 use crate::linalg::{self, Failure, Workspace};
 use crate::scalar::{Real, Scalar};
@@ -7,8 +8,19 @@ use crate::scalar::{Real, Scalar};
 impl<S: Scalar> Terms<S> {
     /// Empties every field, keeping the buffers.
     pub fn clear(&mut self) {
-        let Self { lagrangian, momentum, dl_dq, mass_matrix, momentum_drift, force, dissipation, acceleration, energy } =
-            self;
+        let Self {
+            lagrangian,
+            momentum,
+            dl_dq,
+            mass_matrix,
+            momentum_drift,
+            force,
+            dissipation,
+            acceleration,
+            energy,
+            failures,
+        } = self;
+        failures.clear();
         for field in
             [lagrangian, momentum, dl_dq, mass_matrix, momentum_drift, force, dissipation, acceleration, energy]
         {
@@ -22,8 +34,8 @@ impl<S: Scalar> Terms<S> {
     /// beside those of `L`. One coordinate is divided, not factored.
     ///
     /// # Errors
-    /// [`MechanicsError`] naming the first row with a singular mass matrix or a term that is not finite; accelerations
-    /// of such rows are `NaN`, everything else is filled.
+    /// [`MechanicsError`] naming the first row with a singular mass matrix or a term that is not finite, every such row in
+    /// [`Terms::failures`]; accelerations that cannot be solved for are `NaN`, everything else is filled.
     pub fn complete(
         &mut self,
         n: usize,
@@ -35,7 +47,7 @@ impl<S: Scalar> Terms<S> {
         let expect = |what, expected: usize, found: usize| {
             if expected == found { Ok(()) } else { Err(MechanicsError::Shape { what, expected, found }) }
         };
-        let mut first = None;
+        self.failures.clear();
         if request.includes(Request::ENERGY) {
             expect("Lagrangians", batch, self.lagrangian.len())?;
             expect("momenta", batch * n, self.momentum.len())?;
@@ -60,7 +72,7 @@ impl<S: Scalar> Terms<S> {
                 expect("generalized forces", batch * n, self.force.len())?;
                 right.iter_mut().zip(&self.force).for_each(|(right, &force)| *right += force);
             }
-            first = accelerate(n, &self.mass_matrix, &right, &mut self.acceleration, workspace);
+            accelerate(n, &self.mass_matrix, &right, &mut self.acceleration, workspace, &mut self.failures);
             workspace.give_vector(right);
         }
         // What was not finite before the solve is named rather than the solve.
@@ -74,18 +86,9 @@ impl<S: Scalar> Terms<S> {
             ("dissipated power", &self.dissipation, 1),
             ("energy", &self.energy, 1),
         ];
-        let foreign = fields
-            .into_iter()
-            .filter_map(|(what, field, width)| first_not_finite(field).map(|at| (at / width.max(1), what)))
-            .min_by_key(|&(row, _)| row);
-        match (foreign, first) {
-            (None, None) => Ok(()),
-            (Some((row, what)), first) if first.is_none_or(|(failed, _)| row <= failed) => {
-                Err(MechanicsError::NotFinite { row, what })
-            }
-            (_, Some(failure)) => Err(typed(failure)),
-            (Some((row, what)), None) => Err(MechanicsError::NotFinite { row, what }),
-        }
+        let found = fields.into_iter().flat_map(|(what, field, width)| not_finite(what, field, width)).collect();
+        self.put_before(found);
+        self.outcome()
     }
 }
 
@@ -113,13 +116,12 @@ impl<S: Scalar> Terms<S> {
         if self.acceleration.len() != size {
             return shape("accelerations", size, self.acceleration.len());
         }
-        if let Some(at) = first_not_finite(external) {
-            return Err(MechanicsError::NotFinite { row: at / n.max(1), what: "external force" });
-        }
+        let mut found = std::mem::take(&mut self.failures);
+        found.extend(not_finite("external force", external, n));
         let mut change = workspace.take_vector();
         change.clear();
         change.resize(size, S::nan());
-        let first = accelerate(n, &self.mass_matrix, external, &mut change, workspace);
+        accelerate(n, &self.mass_matrix, external, &mut change, workspace, &mut self.failures);
         self.acceleration.iter_mut().zip(&change).for_each(|(a, &change)| *a += change);
         workspace.give_vector(change);
         self.force.resize(size, zero);
@@ -128,54 +130,38 @@ impl<S: Scalar> Terms<S> {
         for ((power, v), external) in self.dissipation.iter_mut().zip(v.chunks(n)).zip(external.chunks(n)) {
             *power -= v.iter().zip(external).fold(zero, |sum, (&v, &q)| sum + v * q);
         }
-        first.map_or(Ok(()), |failure| Err(typed(failure)))
+        self.put_before(found);
+        self.outcome()
     }
 }
 
-/// `M^-1 f` of a batch; the first row that fails.
+/// `M^-1 f` of a batch; rows that fail are added to `failures`.
 fn accelerate<S: Scalar>(
     n: usize,
     mass: &[S],
     force: &[S],
     acceleration: &mut [S],
     workspace: &mut Workspace<S>,
-) -> Option<(usize, Failure)> {
+    failures: &mut Vec<MechanicsError>,
+) {
     if n == 1 {
-        return divide(mass, force, acceleration);
-    }
-    let solved = linalg::solve(n, mass, force, acceleration, workspace);
-    solved.err().and_then(|_| workspace.failures().first().copied())
-}
-
-/// A row whose acceleration cannot be had, as an error.
-fn typed((row, failure): (usize, Failure)) -> MechanicsError {
-    match failure {
-        Failure::Singular { condition } => MechanicsError::Singular { row, condition },
-        Failure::NotFinite => MechanicsError::NotFinite { row, what: "acceleration" },
+        divide(mass, force, acceleration, failures);
+    } else if linalg::solve(n, mass, force, acceleration, workspace).is_err() {
+        failures.extend(workspace.failures().iter().map(|&(row, failure)| MechanicsError::unsolved(row, failure)));
     }
 }
 
-/// Where the first number stands that is not finite; whole blocks are looked at side by side.
-fn first_not_finite<S: Scalar>(field: &[S]) -> Option<usize> {
-    const BLOCK: usize = 64;
-    let all_finite = |block: &[S]| block.iter().fold(true, |all, x| all & x.is_finite());
-    let start = BLOCK * field.chunks(BLOCK).position(|block| !all_finite(block))?;
-    field[start..].iter().position(|x| !x.is_finite()).map(|at| start + at)
-}
-
-/// One coordinate: `a = f / M`; the first row that fails.
-fn divide<S: Scalar>(mass: &[S], force: &[S], acceleration: &mut [S]) -> Option<(usize, Failure)> {
-    let mut first = None;
+/// One coordinate: `a = f / M`.
+fn divide<S: Scalar>(mass: &[S], force: &[S], acceleration: &mut [S], failures: &mut Vec<MechanicsError>) {
     for (row, ((a, &f), &m)) in acceleration.iter_mut().zip(force).zip(mass).enumerate() {
         *a = f / m;
         if !a.is_finite() {
             *a = S::nan();
             let singular = m == <S as Real>::zero();
             let failure = if singular { Failure::Singular { condition: f64::INFINITY } } else { Failure::NotFinite };
-            first = first.or(Some((row, failure)));
+            failures.push(MechanicsError::unsolved(row, failure));
         }
     }
-    first
 }
 
 #[cfg(test)]
@@ -196,6 +182,7 @@ mod tests {
         let mut workspace = Workspace::new();
         let error = terms.complete(2, &v, Request::ALL, &mut workspace).unwrap_err();
         assert_eq!(error, MechanicsError::Singular { row: 1, condition: f64::INFINITY });
+        assert_eq!(terms.failures, [error]);
         assert_eq!(terms.energy, [2.0, 12.0, 3.0]);
         assert_eq!(terms.acceleration[..2], [2.0, -3.0]);
         assert!(terms.acceleration[2].is_nan() && terms.acceleration[3].is_nan());
@@ -203,6 +190,7 @@ mod tests {
         terms.momentum[1] = f64::NAN;
         let error = terms.complete(2, &v, Request::ALL, &mut workspace).unwrap_err();
         assert_eq!(error, MechanicsError::NotFinite { row: 0, what: "momentum" });
+        assert_eq!(terms.failures, [error, MechanicsError::Singular { row: 1, condition: f64::INFINITY }]);
         let error = terms.complete(3, &v, Request::ALL, &mut workspace).unwrap_err();
         assert!(matches!(error, MechanicsError::Shape { .. }));
     }
@@ -268,6 +256,7 @@ mod tests {
         };
         let error = terms.complete(1, &[0.0; 3], Request::ACCELERATION, &mut Workspace::new()).unwrap_err();
         assert_eq!(error, MechanicsError::Singular { row: 1, condition: f64::INFINITY });
+        assert_eq!(terms.failures, [error, MechanicsError::NotFinite { row: 2, what: "acceleration" }]);
         assert_eq!(terms.acceleration[0], -3.0);
         assert!(terms.acceleration[1].is_nan() && terms.acceleration[2].is_nan());
     }

@@ -11,6 +11,7 @@ mod error;
 mod euler_lagrange;
 mod expression;
 mod expression_lagrangian;
+mod failures;
 mod hand_written;
 mod inverse;
 mod metric;

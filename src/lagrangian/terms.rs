@@ -73,6 +73,8 @@ pub struct Terms<S> {
     pub acceleration: Vec<S>,
     /// `E = p.v - L`, `(batch)`.
     pub energy: Vec<S>,
+    /// One error for every row that failed, in the order of the rows; [`EulerLagrange::terms`] returns the first.
+    pub failures: Vec<MechanicsError>,
 }
 
 impl<S: Scalar> Terms<S> {
@@ -95,6 +97,10 @@ impl<S: Scalar> Terms<S> {
         copy(&mut self.dissipation, &batch.dissipation, 1, Request::FORCE);
         copy(&mut self.acceleration, &batch.acceleration, n, Request::ACCELERATION);
         copy(&mut self.energy, &batch.energy, 1, Request::ENERGY);
+        self.failures.clear();
+        let failed = batch.failures.iter().filter_map(|error| error.row().map(|row| (row, error)));
+        let here = failed.filter(|(row, _)| rows.contains(row));
+        self.failures.extend(here.map(|(row, error)| error.at_row(row - rows.start)));
     }
 }
 
@@ -110,8 +116,9 @@ pub trait EulerLagrange<S: Scalar>: Send + Sync {
     /// `q` and `v` are `(batch, n)` in physical units. `terms` is resized; its buffers are reused.
     ///
     /// # Errors
-    /// [`MechanicsError`] naming the first row that fails. Terms other than the acceleration are filled even when a
-    /// mass matrix is singular, and the accelerations of the other rows are right; those of failed rows are `NaN`.
+    /// [`MechanicsError`] naming the first row that fails; [`Terms::failures`] holds an error for each of them. Terms other than the
+    /// acceleration are filled even when a mass matrix is singular, and the accelerations of the other rows are right; those of
+    /// failed rows are `NaN`.
     fn terms(&self, q: &[S], v: &[S], request: Request, terms: &mut Terms<S>) -> Result<(), MechanicsError>;
 
     /// The metric `M = d2L/dv dv` of every state with its first and second derivatives by the coordinates, exact to rounding.

@@ -91,7 +91,8 @@ impl<S: Scalar, M: EulerLagrange<S>, F: GeneralizedForce<S>> EulerLagrange<S> fo
     fn terms(&self, q: &[S], v: &[S], request: Request, terms: &mut Terms<S>) -> Result<(), MechanicsError> {
         let n = self.coordinates();
         // The acceleration is solved for once, with all forces.
-        self.model.terms(q, v, request.without_solution(), terms)?;
+        let outcome = self.model.terms(q, v, request.without_solution(), terms);
+        let found = terms.take_failures(outcome)?;
         if request.includes(Request::FORCE) {
             terms.force.resize(v.len(), <S as Real>::zero());
             terms.dissipation.resize(v.len() / n.max(1), <S as Real>::zero());
@@ -107,7 +108,11 @@ impl<S: Scalar, M: EulerLagrange<S>, F: GeneralizedForce<S>> EulerLagrange<S> fo
                 }
             }
         }
-        terms.complete(n, v, request, &mut Workspace::new())
+        if let Err(error @ MechanicsError::Shape { .. }) = terms.complete(n, v, request, &mut Workspace::new()) {
+            return Err(error);
+        }
+        terms.put_before(found);
+        terms.outcome()
     }
 
     fn metric_jets(&self, q: &[S], v: &[S]) -> Result<Vec<MetricJet<S>>, MechanicsError> {

@@ -61,7 +61,10 @@ impl EulerLagrange<f64> for Spheroidal<'_> {
                 rate[4 * k + target] = (0..3).map(|j| place.first[i][j] * v[4 * k + 1 + j]).sum();
             }
         }
-        self.model.terms(&at, &rate, request, terms)?;
+        let outcome = self.model.terms(&at, &rate, request, terms);
+        if !terms.is_told_by_rows(&outcome) {
+            return outcome;
+        }
         let space = self.space;
         for (k, place) in places.iter().enumerate() {
             let speed = &v[4 * k + 1..4 * k + 4];
@@ -109,7 +112,7 @@ impl EulerLagrange<f64> for Spheroidal<'_> {
                 }
             }
         }
-        Ok(())
+        outcome
     }
 }
 

@@ -4,7 +4,7 @@ use super::force::{Piece, pieces};
 use super::keep::{Keep, into_error};
 use super::ode::{Adaptive, Ended, Ran, Task};
 use super::samples::{Part, Samples, Times};
-use super::{Domain, Failure, Force, Integrable, Options, RolloutError, Statistics, UnderflowCause};
+use super::{Domain, Force, Integrable, Options, RolloutError, Statistics, StepFailure, UnderflowCause};
 use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Terms};
 use crate::linalg::Workspace;
 use crate::scalar::{Real, Scalar};
@@ -34,21 +34,21 @@ impl<S: Scalar> Motion<'_, S> {
     }
 
     /// Derivative of `y = (q, v)` by the elapsed time.
-    fn derivative(&mut self, piece: &Piece<S>, elapsed: S, y: &[S], dy: &mut [S]) -> Result<(), Failure> {
+    fn derivative(&mut self, piece: &Piece<S>, elapsed: S, y: &[S], dy: &mut [S]) -> Result<(), StepFailure> {
         let n = self.n;
-        Failure::check(self.options.domain.as_ref(), y)?;
+        StepFailure::check(self.options.domain.as_ref(), y)?;
         let (q, v) = y.split_at(n);
-        self.model.terms(q, v, Request::ACCELERATION, &mut self.terms).map_err(Failure::Model)?;
+        self.model.terms(q, v, Request::ACCELERATION, &mut self.terms).map_err(StepFailure::Model)?;
         if self.terms.acceleration.len() != n {
             let (expected, found) = (n, self.terms.acceleration.len());
-            return Err(Failure::Model(MechanicsError::Shape { what: "acceleration", expected, found }));
+            return Err(StepFailure::Model(MechanicsError::Shape { what: "acceleration", expected, found }));
         }
         if let Some(force) = self.force {
             force.force(piece.time(self.time(elapsed)), q, v, &mut self.external);
-            self.terms.add_force(n, v, &self.external, &mut self.workspace).map_err(Failure::Model)?;
+            self.terms.add_force(n, v, &self.external, &mut self.workspace).map_err(StepFailure::Model)?;
         }
         if self.terms.acceleration.iter().any(|a| !a.is_finite()) {
-            return Err(Failure::Model(MechanicsError::NotFinite { row: 0, what: "acceleration" }));
+            return Err(StepFailure::Model(MechanicsError::NotFinite { row: 0, what: "acceleration" }));
         }
         let backwards = self.backwards();
         for (slope, &x) in dy.iter_mut().zip(v.iter().chain(&self.terms.acceleration)) {
@@ -117,7 +117,7 @@ pub(super) fn run<S: Integrable>(
 fn stopped<S: Integrable>(
     motion: &mut Motion<'_, S>,
     piece: &Piece<S>,
-    ended: Option<Ended<Failure>>,
+    ended: Option<Ended<StepFailure>>,
     valid: bool,
     (elapsed, reached, step): (S, &[S], S),
 ) -> Option<RolloutError> {

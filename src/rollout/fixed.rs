@@ -7,7 +7,7 @@ use super::keep::{Keep, into_error};
 use super::phase::Phase;
 use super::samples::{Samples, Times};
 use super::variational::Variational;
-use super::{Failure, Force, Method, Options, RolloutError, Statistics};
+use super::{Force, Method, Options, RolloutError, Statistics, StepFailure};
 use crate::lagrangian::EulerLagrange;
 use crate::scalar::{Real, Scalar};
 
@@ -29,7 +29,7 @@ impl<S: Scalar> Stepper<S> {
         }
     }
 
-    fn step(&mut self, phase: &mut Phase<'_, S>, state: &mut State<S>, v: &mut [S], h: S) -> Result<(), Failure> {
+    fn step(&mut self, phase: &mut Phase<'_, S>, state: &mut State<S>, v: &mut [S], h: S) -> Result<(), StepFailure> {
         match self {
             Self::Gauss(gauss) => gauss.step(phase, state, v, h),
             Self::Variational(variational) => variational.step(phase, state, v, h),
@@ -71,7 +71,7 @@ pub(super) fn run<S: Scalar>(
     let zero = <S as Real>::zero();
     let domain = options.domain.as_ref();
     let start: Vec<S> = q.iter().chain(v).copied().collect();
-    let moving = Failure::check(domain, &start).and_then(|()| phase.momentum(q, v));
+    let moving = StepFailure::check(domain, &start).and_then(|()| phase.momentum(q, v));
     let stop = match moving {
         Err(failure) => Some(into_error(failure, options.t0.to_f64(), start.iter().map(|x| x.to_f64()).collect(), 0.0)),
         Ok(p) => {
@@ -128,7 +128,7 @@ fn advance<S: Scalar>(
         }
         let arrived = position.velocity(phase).and_then(|v| {
             let sample: Vec<S> = position.state.q.high.iter().copied().chain(v).collect();
-            Failure::check(domain, &sample).map(|()| sample)
+            StepFailure::check(domain, &sample).map(|()| sample)
         });
         match arrived {
             Ok(sample) => {
@@ -182,20 +182,20 @@ fn stretch<S: Scalar>(
 }
 
 /// Checks the stages of the last step.
-fn inside<S: Scalar>(stepper: &Stepper<S>, n: usize, options: &Options<S>) -> Result<(), Failure> {
+fn inside<S: Scalar>(stepper: &Stepper<S>, n: usize, options: &Options<S>) -> Result<(), StepFailure> {
     let Some(domain) = options.domain.as_ref() else { return Ok(()) };
     let (q, v) = stepper.stages();
     let mut stage = vec![<S as Real>::zero(); 2 * n];
     for (q, v) in q.chunks_exact(n).zip(v.chunks_exact(n)) {
         stage[..n].copy_from_slice(q);
         stage[n..].copy_from_slice(v);
-        Failure::check(Some(domain), &stage)?;
+        StepFailure::check(Some(domain), &stage)?;
     }
     Ok(())
 }
 
 impl<S: Scalar> Position<S> {
-    fn velocity(&self, phase: &mut Phase<'_, S>) -> Result<Vec<S>, Failure> {
+    fn velocity(&self, phase: &mut Phase<'_, S>) -> Result<Vec<S>, StepFailure> {
         let mut v = self.near.clone();
         phase.velocity(&self.state.q.high, &self.state.p.high, &mut v)?;
         Ok(v)
@@ -210,7 +210,7 @@ impl<S: Scalar> Position<S> {
     fn failed(
         &self,
         phase: &mut Phase<'_, S>,
-        failure: Failure,
+        failure: StepFailure,
         options: &Options<S>,
         backwards: bool,
     ) -> RolloutError {

@@ -16,7 +16,7 @@
 //! symplecticity (Antonana, Makazaga and Murua 2017). Friction and forces from outside, `Q`, add to `dL/dq`: the order
 //! stays, and there is no symplectic form to keep.
 
-use super::Failure;
+use super::StepFailure;
 use super::compensated::State;
 use super::phase::{Defect, Derivatives, Phase};
 use super::simplified_newton::{Equations, SimplifiedNewton};
@@ -109,7 +109,7 @@ impl<S: Scalar> Stages<'_, S> {
 }
 
 impl<S: Scalar> Equations<S> for Stages<'_, S> {
-    fn residual(&mut self, phase: &mut Phase<'_, S>, x: &[S], residual: &mut [S]) -> Result<Defect<S>, Failure> {
+    fn residual(&mut self, phase: &mut Phase<'_, S>, x: &[S], residual: &mut [S]) -> Result<Defect<S>, StepFailure> {
         let (n, s) = (phase.n, self.tableau.stages());
         let (q, p) = (&self.state.q, &self.state.p);
         for i in 0..s {
@@ -131,7 +131,7 @@ impl<S: Scalar> Equations<S> for Stages<'_, S> {
 
     /// Block `(i, j)`: `delta_ij M + h a_ij (B - B^T - C) - h^2 (a^2)_ij K`, `B = dp/dq`, `K = dg/dq`, `C = dQ/dv` at the middle
     /// stage.
-    fn jacobian(&mut self, phase: &mut Phase<'_, S>, x: &[S], matrix: &mut [S]) -> Result<(), Failure> {
+    fn jacobian(&mut self, phase: &mut Phase<'_, S>, x: &[S], matrix: &mut [S]) -> Result<(), StepFailure> {
         let (n, s) = (phase.n, self.tableau.stages());
         let middle = s / 2 * n;
         for k in 0..n {
@@ -219,7 +219,7 @@ impl<S: Scalar> Gauss<S> {
         state: &mut State<S>,
         velocity: &mut [S],
         h: S,
-    ) -> Result<(), Failure> {
+    ) -> Result<(), StepFailure> {
         let (n, s) = (phase.n, self.tableau.stages());
         if h != self.h {
             self.h = h;
@@ -277,12 +277,12 @@ impl<S: Scalar> Gauss<S> {
         (&self.q, &self.v)
     }
 
-    fn solve_from(&mut self, phase: &mut Phase<'_, S>, state: &State<S>, velocity: &[S]) -> Result<(), Failure> {
+    fn solve_from(&mut self, phase: &mut Phase<'_, S>, state: &State<S>, velocity: &[S]) -> Result<(), StepFailure> {
         self.v.chunks_exact_mut(phase.n).for_each(|v| v.copy_from_slice(velocity));
         self.solve(phase, state)
     }
 
-    fn solve(&mut self, phase: &mut Phase<'_, S>, state: &State<S>) -> Result<(), Failure> {
+    fn solve(&mut self, phase: &mut Phase<'_, S>, state: &State<S>) -> Result<(), StepFailure> {
         let Self { tableau, chord, h, steps, after, v, q, p, g, derivatives, .. } = self;
         chord.solve(phase, &mut Stages { tableau, state, h: *h, steps, after, q, p, g, derivatives }, v)
     }

@@ -28,8 +28,10 @@ struct Round<S> {
     q: Vec<S>,
     v: Vec<S>,
     terms: Terms<S>,
-    /// `true` if every state of the round could be evaluated.
-    complete: bool,
+    /// All that was asked for.
+    request: Request,
+    /// `true` unless the round failed for a reason that is not that of single states.
+    is_told_by_rows: bool,
 }
 
 struct Asked<S> {
@@ -48,7 +50,8 @@ impl<'a, S: Scalar> Group<'a, S> {
             q: Vec::new(),
             v: Vec::new(),
             terms: Terms::default(),
-            complete: true,
+            request: Request::default(),
+            is_told_by_rows: true,
         };
         Self { model, round: Mutex::new(round), evaluated: Condvar::new() }
     }
@@ -76,7 +79,9 @@ impl<'a, S: Scalar> Group<'a, S> {
             *rows = first..round.q.len() / n;
             request = request | asked.request;
         }
-        round.complete = self.model.terms(&round.q, &round.v, request, &mut round.terms).is_ok();
+        let outcome = self.model.terms(&round.q, &round.v, request, &mut round.terms);
+        round.is_told_by_rows = round.terms.is_told_by_rows(&outcome);
+        round.request = request;
         round.number += 1;
         self.evaluated.notify_all();
     }
@@ -118,13 +123,71 @@ impl<S: Scalar> EulerLagrange<S> for Member<'_, '_, S> {
                 round = self.group.evaluated.wait(round).unwrap_or_else(PoisonError::into_inner);
             }
         }
-        if round.complete {
+        if round.is_told_by_rows {
             let rows = round.rows[self.index].clone();
             terms.copy_rows(&round.terms, self.coordinates(), rows, request);
-            return Ok(());
+            if terms.failures.is_empty() || request == round.request {
+                return terms.outcome();
+            }
         }
         drop(round);
-        // A state of the round failed: whose it was shows when each asks alone.
+        // What failed may be what only the others had asked for.
         self.group.model.terms(q, v, request, terms)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lagrangian::configure;
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    /// A model that counts how often it is asked.
+    struct Counted {
+        model: Box<dyn EulerLagrange<f64>>,
+        calls: AtomicUsize,
+    }
+
+    impl EulerLagrange<f64> for Counted {
+        fn coordinates(&self) -> usize {
+            self.model.coordinates()
+        }
+
+        fn terms(&self, q: &[f64], v: &[f64], request: Request, terms: &mut Terms<f64>) -> Result<(), MechanicsError> {
+            self.calls.fetch_add(1, Ordering::Relaxed);
+            self.model.terms(q, v, request, terms)
+        }
+    }
+
+    /// Outcomes of two members who ask at once, and the evaluations that took.
+    fn ask(requests: [Request; 2]) -> ([Result<(), MechanicsError>; 2], usize) {
+        let model = configure::<f64>("spring-pendulum", &[]).unwrap().build().unwrap();
+        let model = Counted { model, calls: AtomicUsize::new(0) };
+        let group = Group::new(&model, 2);
+        // The mass matrix is singular at r = 0.
+        let states = [[1.0, 0.3], [0.0, 0.3]];
+        let outcomes = std::thread::scope(|scope| {
+            let members = [0, 1].map(|k| {
+                let member = group.member(k);
+                scope.spawn(move || {
+                    let mut terms = Terms::default();
+                    let outcome = member.terms(&states[k], &[0.1, 0.2], requests[k], &mut terms);
+                    assert_eq!(terms.outcome(), outcome);
+                    outcome
+                })
+            });
+            members.map(|member| member.join().unwrap())
+        });
+        (outcomes, model.calls.into_inner())
+    }
+
+    #[test]
+    fn a_failure_is_told_to_whom_it_concerns_without_asking_again() {
+        let (outcomes, calls) = ask([Request::ACCELERATION; 2]);
+        assert!(matches!(outcomes, [Ok(()), Err(MechanicsError::Singular { row: 0, .. })]), "{outcomes:?}");
+        assert_eq!(calls, 1);
+        // What only the other had asked for does not fail a member.
+        let (outcomes, calls) = ask([Request::ACCELERATION, Request::ENERGY]);
+        assert_eq!((outcomes, calls), ([Ok(()), Ok(())], 2));
     }
 }

@@ -6,14 +6,14 @@ use crate::scalar::Scalar;
 
 /// Why the derivative of a state, or a step, cannot be had.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum Failure {
+pub(super) enum StepFailure {
     Domain { component: usize, value: f64, lower: f64, upper: f64 },
     State,
     Model(MechanicsError),
     NotConverged { iterations: usize, residual: f64 },
 }
 
-impl Failure {
+impl StepFailure {
     /// A state `(q, v)` that must be finite and inside the domain.
     pub(super) fn check<S: Scalar>(domain: Option<&super::Domain<S>>, state: &[S]) -> Result<(), Self> {
         if state.iter().any(|x| !x.is_finite()) {
@@ -33,18 +33,22 @@ impl Failure {
 pub(super) type Keep<'a, S> = dyn FnMut(S, &[S], &[S]) -> bool + 'a;
 
 /// The error of a motion that a step ended.
-pub(super) fn into_error(failure: Failure, t: f64, state: Vec<f64>, step: f64) -> RolloutError {
+pub(super) fn into_error(failure: StepFailure, t: f64, state: Vec<f64>, step: f64) -> RolloutError {
     match failure {
-        Failure::Domain { component, value, lower, upper } => {
+        StepFailure::Domain { component, value, lower, upper } => {
             RolloutError::LeftDomain { t, state, component, value, lower, upper }
         }
-        Failure::State => RolloutError::NotFinite { t, state, what: "state" },
-        Failure::Model(MechanicsError::Singular { condition, .. }) => {
+        StepFailure::State => RolloutError::NotFinite { t, state, what: "state" },
+        StepFailure::Model(MechanicsError::Singular { condition, .. }) => {
             RolloutError::SingularMass { t, state, condition }
         }
-        Failure::Model(MechanicsError::Uncertified { .. }) => RolloutError::Uncertified { t, state },
-        Failure::Model(MechanicsError::NotFinite { what, .. }) => RolloutError::NotFinite { t, state, what },
-        Failure::NotConverged { iterations, residual } => RolloutError::NotConverged { t, state, iterations, residual },
-        Failure::Model(error) => RolloutError::StepUnderflow { t, state, step, cause: UnderflowCause::Model(error) },
+        StepFailure::Model(MechanicsError::Uncertified { .. }) => RolloutError::Uncertified { t, state },
+        StepFailure::Model(MechanicsError::NotFinite { what, .. }) => RolloutError::NotFinite { t, state, what },
+        StepFailure::NotConverged { iterations, residual } => {
+            RolloutError::NotConverged { t, state, iterations, residual }
+        }
+        StepFailure::Model(error) => {
+            RolloutError::StepUnderflow { t, state, step, cause: UnderflowCause::Model(error) }
+        }
     }
 }

@@ -41,7 +41,7 @@ pub(crate) use ensemble::in_order;
 pub use ensemble::{Start, rollout_each, rollout_many, rollout_together};
 pub use error::{RolloutError, UnderflowCause};
 pub use force::{Force, SampledForce};
-use keep::Failure;
+use keep::StepFailure;
 pub use ode::Integrable;
 pub use options::{Domain, Method, Options};
 #[doc(hidden)]

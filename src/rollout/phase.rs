@@ -2,7 +2,7 @@
 //! `Q` is friction, zero for a model that conserves its energy, and a force from outside, if one acts.
 
 use super::force::Piece;
-use super::{Failure, Force};
+use super::{Force, StepFailure};
 use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Terms};
 use crate::linalg::{self, LinalgError, Workspace};
 use crate::scalar::{Real, Scalar};
@@ -122,7 +122,7 @@ impl<'a, S: Scalar> Phase<'a, S> {
 
     /// Adds the force from outside to that of the model; row `k` lies `after[k]` behind the start of the step, or all rows
     /// `after[0]`.
-    fn add_external(&mut self, q: &[S], v: &[S], after: &[S]) -> Result<(), Failure> {
+    fn add_external(&mut self, q: &[S], v: &[S], after: &[S]) -> Result<(), StepFailure> {
         let (Some(force), Some(piece)) = (self.force, self.piece) else { return Ok(()) };
         let (n, zero) = (self.n, <S as Real>::zero());
         self.terms.force.resize(q.len(), zero);
@@ -131,7 +131,7 @@ impl<'a, S: Scalar> Phase<'a, S> {
             let after = after.get(row).or(after.first()).copied().unwrap_or(zero);
             force.force(piece.time(self.start + after), q, v, &mut self.external);
             if self.external.iter().any(|x| !x.is_finite()) {
-                return Err(Failure::Model(MechanicsError::NotFinite { row: 0, what: "external force" }));
+                return Err(StepFailure::Model(MechanicsError::NotFinite { row: 0, what: "external force" }));
             }
             let sums = self.terms.force[row * n..(row + 1) * n].iter_mut();
             sums.zip(&self.external).for_each(|(sum, &force)| *sum += force);
@@ -140,13 +140,13 @@ impl<'a, S: Scalar> Phase<'a, S> {
     }
 
     /// Evaluates states; `after` says how far behind the start of the step they lie, see [`Phase::add_external`].
-    fn evaluate(&mut self, q: &[S], v: &[S], request: Request, after: &[S]) -> Result<(), Failure> {
+    fn evaluate(&mut self, q: &[S], v: &[S], request: Request, after: &[S]) -> Result<(), StepFailure> {
         if q.iter().chain(v).any(|x| !x.is_finite()) {
-            return Err(Failure::State);
+            return Err(StepFailure::State);
         }
         self.evaluations += q.len() / self.n;
         let request = if self.damped && request.includes(Request::DL_DQ) { request | Request::FORCE } else { request };
-        self.model.terms(q, v, request, &mut self.terms).map_err(Failure::Model)?;
+        self.model.terms(q, v, request, &mut self.terms).map_err(StepFailure::Model)?;
         if request.includes(Request::FORCE) {
             self.add_external(q, v, after)?;
             self.terms.dl_dq.iter_mut().zip(&self.terms.force).for_each(|(g, &force)| *g += force);
@@ -159,10 +159,10 @@ impl<'a, S: Scalar> Phase<'a, S> {
         for (asked, what, field, width) in fields {
             let expected = q.len() * width;
             if request.includes(asked) && field.len() != expected {
-                return Err(Failure::Model(MechanicsError::Shape { what, expected, found: field.len() }));
+                return Err(StepFailure::Model(MechanicsError::Shape { what, expected, found: field.len() }));
             }
             if request.includes(asked) && field.iter().any(|x| !x.is_finite()) {
-                return Err(Failure::Model(MechanicsError::NotFinite { row: 0, what }));
+                return Err(StepFailure::Model(MechanicsError::NotFinite { row: 0, what }));
             }
         }
         Ok(())
@@ -175,7 +175,7 @@ impl<'a, S: Scalar> Phase<'a, S> {
         v: &[S],
         after: &[S],
         (p, g): (&mut [S], &mut [S]),
-    ) -> Result<(), Failure> {
+    ) -> Result<(), StepFailure> {
         self.evaluate(q, v, Request::MOMENTUM | Request::DL_DQ, after)?;
         p.copy_from_slice(&self.terms.momentum);
         g.copy_from_slice(&self.terms.dl_dq);
@@ -183,7 +183,7 @@ impl<'a, S: Scalar> Phase<'a, S> {
     }
 
     /// `p` of one state.
-    pub(super) fn momentum(&mut self, q: &[S], v: &[S]) -> Result<Vec<S>, Failure> {
+    pub(super) fn momentum(&mut self, q: &[S], v: &[S]) -> Result<Vec<S>, StepFailure> {
         self.evaluate(q, v, Request::MOMENTUM, &[])?;
         Ok(self.terms.momentum.clone())
     }
@@ -191,7 +191,13 @@ impl<'a, S: Scalar> Phase<'a, S> {
     /// `M` as the model gives it, derivatives along `q`, and of `Q` along `v`, by forward differences over `sqrt(eps)`:
     /// enough for an iteration matrix. The differences are one batch of `n + 1` states, `2n + 1` with friction or a force
     /// from outside, `after` the start of the step.
-    pub(super) fn derivatives(&mut self, q: &[S], v: &[S], after: S, into: &mut Derivatives<S>) -> Result<(), Failure> {
+    pub(super) fn derivatives(
+        &mut self,
+        q: &[S],
+        v: &[S],
+        after: S,
+        into: &mut Derivatives<S>,
+    ) -> Result<(), StepFailure> {
         let n = self.n;
         let zero = <S as Real>::zero();
         self.evaluate(q, v, Request::MASS_MATRIX, &[])?;
@@ -242,7 +248,7 @@ impl<'a, S: Scalar> Phase<'a, S> {
     }
 
     /// Solves `dL/dv(q, v) = p` for `v` by Newton's method from the guess in `v`, to the last rounding.
-    pub(super) fn velocity(&mut self, q: &[S], p: &[S], v: &mut [S]) -> Result<(), Failure> {
+    pub(super) fn velocity(&mut self, q: &[S], p: &[S], v: &mut [S]) -> Result<(), StepFailure> {
         let n = self.n;
         let mut residual = vec![<S as Real>::zero(); n];
         let mut change = residual.clone();
@@ -261,7 +267,7 @@ impl<'a, S: Scalar> Phase<'a, S> {
                 return Ok(());
             }
             if sweep == MAX_SWEEPS {
-                return Err(Failure::NotConverged { iterations: sweep, residual: defect.overall.to_f64() });
+                return Err(StepFailure::NotConverged { iterations: sweep, residual: defect.overall.to_f64() });
             }
             best = best.best(defect);
             v.iter_mut().zip(&change).for_each(|(v, &c)| *v -= c);
@@ -271,8 +277,8 @@ impl<'a, S: Scalar> Phase<'a, S> {
 }
 
 /// A failed solve as a failure of the model.
-pub(super) fn singular(error: LinalgError) -> Failure {
-    Failure::Model(match error {
+pub(super) fn singular(error: LinalgError) -> StepFailure {
+    StepFailure::Model(match error {
         LinalgError::Singular { condition, .. } => MechanicsError::Singular { row: 0, condition },
         _ => MechanicsError::NotFinite { row: 0, what: "mass matrix" },
     })

@@ -1,6 +1,6 @@
 //! Newton's method with a matrix that is kept as long as it serves, iterated to the rounding floor.
 
-use super::Failure;
+use super::StepFailure;
 use super::phase::{Defect, Phase, singular};
 use crate::linalg::{LANES, solve};
 use crate::scalar::{Real, Scalar};
@@ -8,9 +8,9 @@ use crate::scalar::{Real, Scalar};
 /// Equations `F(x) = 0` of one step.
 pub(super) trait Equations<S: Scalar> {
     /// `F(x)` into `residual`, and how large it is.
-    fn residual(&mut self, phase: &mut Phase<'_, S>, x: &[S], residual: &mut [S]) -> Result<Defect<S>, Failure>;
+    fn residual(&mut self, phase: &mut Phase<'_, S>, x: &[S], residual: &mut [S]) -> Result<Defect<S>, StepFailure>;
     /// An approximation of `dF/dx` at `x`, row-major.
-    fn jacobian(&mut self, phase: &mut Phase<'_, S>, x: &[S], matrix: &mut [S]) -> Result<(), Failure>;
+    fn jacobian(&mut self, phase: &mut Phase<'_, S>, x: &[S], matrix: &mut [S]) -> Result<(), StepFailure>;
 }
 
 /// Evaluations of one step.
@@ -57,13 +57,13 @@ impl<S: Scalar> SimplifiedNewton<S> {
     /// sign, which drift (Hairer, McLachlan and Razakarivony 2008).
     ///
     /// # Errors
-    /// Those of the equations; [`Failure::NotConverged`]; a singular matrix.
+    /// Those of the equations; [`StepFailure::NotConverged`]; a singular matrix.
     pub(super) fn solve(
         &mut self,
         phase: &mut Phase<'_, S>,
         equations: &mut impl Equations<S>,
         x: &mut [S],
-    ) -> Result<(), Failure> {
+    ) -> Result<(), StepFailure> {
         let size = x.len();
         let (mut matrices, mut best) = (0, Defect::unknown());
         if self.stale {
@@ -79,7 +79,7 @@ impl<S: Scalar> SimplifiedNewton<S> {
                 self.stale = matrices > 1 || iteration > self.least + PATIENCE;
                 return Ok(());
             }
-            let failed = Failure::NotConverged { iterations: iteration, residual: defect.overall.to_f64() };
+            let failed = StepFailure::NotConverged { iterations: iteration, residual: defect.overall.to_f64() };
             if iteration == MAX_ITERATIONS {
                 return Err(failed);
             }
@@ -99,13 +99,18 @@ impl<S: Scalar> SimplifiedNewton<S> {
     }
 
     /// A new matrix at `x`, inverted.
-    fn refresh(&mut self, phase: &mut Phase<'_, S>, equations: &mut impl Equations<S>, x: &[S]) -> Result<(), Failure> {
+    fn refresh(
+        &mut self,
+        phase: &mut Phase<'_, S>,
+        equations: &mut impl Equations<S>,
+        x: &[S],
+    ) -> Result<(), StepFailure> {
         let size = x.len();
         (self.stale, self.least) = (true, MAX_ITERATIONS);
         equations.jacobian(phase, x, &mut self.matrix)?;
         if size == 1 {
             if self.matrix[0] == <S as Real>::zero() {
-                return Err(Failure::Model(crate::lagrangian::MechanicsError::Singular {
+                return Err(StepFailure::Model(crate::lagrangian::MechanicsError::Singular {
                     row: 0,
                     condition: f64::INFINITY,
                 }));

@@ -14,7 +14,7 @@
 //!
 //! Source: Marsden and West, Discrete mechanics and variational integrators (2001), 1.3.1 and 2.3.1.
 
-use super::Failure;
+use super::StepFailure;
 use super::compensated::State;
 use super::phase::{Defect, Derivatives, Phase};
 use super::simplified_newton::{Equations, SimplifiedNewton};
@@ -41,7 +41,7 @@ impl<S: Scalar> Discrete<'_, S> {
 }
 
 impl<S: Scalar> Equations<S> for Discrete<'_, S> {
-    fn residual(&mut self, phase: &mut Phase<'_, S>, x: &[S], residual: &mut [S]) -> Result<Defect<S>, Failure> {
+    fn residual(&mut self, phase: &mut Phase<'_, S>, x: &[S], residual: &mut [S]) -> Result<Defect<S>, StepFailure> {
         self.move_to(x);
         phase.momenta_and_forces(self.q, x, &[self.half_step], (self.p, self.g))?;
         let p0 = &self.state.p;
@@ -53,7 +53,7 @@ impl<S: Scalar> Equations<S> for Discrete<'_, S> {
     }
 
     /// `M + h/2 (B - B^T - C) - h^2/4 K`, `B = dp/dq`, `K = dg/dq`, `C = dQ/dv`.
-    fn jacobian(&mut self, phase: &mut Phase<'_, S>, x: &[S], matrix: &mut [S]) -> Result<(), Failure> {
+    fn jacobian(&mut self, phase: &mut Phase<'_, S>, x: &[S], matrix: &mut [S]) -> Result<(), StepFailure> {
         let n = phase.n;
         self.move_to(x);
         phase.derivatives(self.q, x, self.half_step, self.derivatives)?;
@@ -110,7 +110,7 @@ impl<S: Scalar> Variational<S> {
         state: &mut State<S>,
         velocity: &mut [S],
         h: S,
-    ) -> Result<(), Failure> {
+    ) -> Result<(), StepFailure> {
         if h != self.h {
             (self.h, self.known) = (h, 0);
             self.chord.forget();
@@ -147,7 +147,7 @@ impl<S: Scalar> Variational<S> {
         (&self.q, &self.u)
     }
 
-    fn solve(&mut self, phase: &mut Phase<'_, S>, state: &State<S>) -> Result<(), Failure> {
+    fn solve(&mut self, phase: &mut Phase<'_, S>, state: &State<S>) -> Result<(), StepFailure> {
         let Self { chord, h, u, q, p, g, derivatives, .. } = self;
         chord.solve(phase, &mut Discrete { state, half_step: *h * S::half(), q, p, g, derivatives }, u)
     }

@@ -1,6 +1,6 @@
 //! Rows of a history, and the sums they come from.
 
-use crate::training::objective::Failure;
+use crate::lagrangian::MechanicsError;
 use serde::Serialize;
 
 /// One row of the history.
@@ -40,5 +40,5 @@ pub(crate) struct Means {
     pub(crate) left_out: usize,
     pub(crate) skipped: usize,
     pub(crate) taken: usize,
-    pub(crate) last_failure: Option<Failure>,
+    pub(crate) last_failure: Option<MechanicsError>,
 }

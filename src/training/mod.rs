@@ -20,7 +20,7 @@ pub use checkpoint::{
 pub use epoch::Epoch;
 #[doc(hidden)]
 pub use memory::training_memory;
-pub use objective::{BatchReport, Failure, Objective, ThreadsError};
+pub use objective::{BatchReport, Objective, ThreadsError};
 pub use problem::TrainingProblem;
 pub use recipe::{RecipeError, TrainingResult, run};
 pub use solver::{Hooks, Progress, StepError, Watcher};

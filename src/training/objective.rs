@@ -13,11 +13,12 @@
 
 use crate::configuration::Penalty;
 use crate::data::Dataset;
-use crate::linalg::{self, Workspace, solve};
+use crate::lagrangian::MechanicsError;
 use crate::linalg::{
     SignatureBuffers as Buffers, Violation, characteristic_scales, eigenvalue_violation, has_signature,
     sylvester_violation,
 };
+use crate::linalg::{Workspace, solve};
 use crate::network::{Architecture, Dynamics, Model};
 use crate::scalar::{Real, Scalar, Sum};
 use crate::tape::{Depth, MixedDirections, STATES};
@@ -43,26 +44,7 @@ pub struct BatchReport<S> {
     /// States left out because they give no finite acceleration.
     pub left_out: usize,
     /// First state, by its row in the dataset, that failed, and why.
-    pub failure: Option<Failure>,
-}
-
-/// A state that gives no acceleration.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-pub enum Failure {
-    /// Its mass matrix is singular.
-    #[error("mass matrix of row {row} is singular (condition number {condition:.3e})")]
-    Singular {
-        /// Row of the dataset.
-        row: usize,
-        /// Condition number, infinite if exactly singular.
-        condition: f64,
-    },
-    /// The network gives no finite numbers there.
-    #[error("network is not finite on row {row}")]
-    NotFinite {
-        /// Row of the dataset.
-        row: usize,
-    },
+    pub failure: Option<MechanicsError>,
 }
 
 /// Evaluates batches; owns the threads and every buffer, so that a step allocates nothing after the first.
@@ -113,7 +95,7 @@ struct Shard<S> {
     scale: Vec<S>,
     residual: Sum<S>,
     left_out: usize,
-    failure: Option<Failure>,
+    failure: Option<MechanicsError>,
 }
 
 impl<S: Scalar> Shard<S> {
@@ -256,10 +238,7 @@ impl<S: Scalar> Shard<S> {
         for &(state, failure) in self.workspace.failures() {
             let row = rows[state] as usize;
             self.left_out += 1;
-            self.failure.get_or_insert(match failure {
-                linalg::Failure::Singular { condition } => Failure::Singular { row, condition },
-                linalg::Failure::NotFinite => Failure::NotFinite { row },
-            });
+            self.failure.get_or_insert(MechanicsError::unsolved(row, failure));
         }
     }
 

@@ -5,13 +5,13 @@
 //! any two steps.
 
 use crate::configuration::{OnFailure, Optimizer, Phase};
+use crate::lagrangian::MechanicsError;
 use crate::optimizers::Schedule;
 use crate::optimizers::Update;
 use crate::random::RandomGenerator;
 use crate::scalar::{Real, Scalar};
 use crate::training::checkpoint::{CheckpointManager, Clock, Ended, OptimizerState, PhaseState};
 use crate::training::epoch::{Epoch, Means};
-use crate::training::objective::Failure;
 use crate::training::problem::TrainingProblem;
 use argmin::core::{Error, IterState, KV, Problem, Solver, State, TerminationReason, TerminationStatus};
 use argmin::kv;
@@ -66,7 +66,7 @@ pub enum StepError {
         /// Counted from 1 over all phases.
         step: usize,
         /// Which row and why.
-        failure: Failure,
+        failure: MechanicsError,
     },
     /// The gradient is not finite.
     #[error("step {step}: the gradient is not finite (norm {norm})")]
@@ -82,7 +82,7 @@ pub enum StepError {
         /// Counted from 1 over all phases.
         epoch: usize,
         /// Failure of the last step.
-        failure: Failure,
+        failure: MechanicsError,
     },
 }
 
@@ -206,7 +206,7 @@ impl<S: Scalar> EpochSolver<S> {
                 return Err(StepError::State { step, failure });
             }
             tracing::debug!(step, %failure, "state left out");
-            if matches!(failure, Failure::NotFinite { .. }) || report.left_out == rows.len() {
+            if matches!(failure, MechanicsError::NotFinite { .. }) || report.left_out == rows.len() {
                 means.skipped += 1;
                 return Ok(());
             }

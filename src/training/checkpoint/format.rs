@@ -2,13 +2,14 @@
 
 use super::fingerprint::{Fingerprint, Saved};
 use super::{Ended, OptimizerState, PhaseState, Shot, Snapshot, precision};
+use crate::lagrangian::MechanicsError;
+use crate::linalg::Failure;
 use crate::network::file::{ModelFileError, StoredPrecision};
 use crate::optimizers::{Block, Moments, Stored};
 use crate::random::RandomGenerator;
 use crate::scalar::Scalar;
 use crate::storage::container::{Kind, Tensor, Tensors, pack, unpack};
 use crate::training::epoch::{Epoch, Means};
-use crate::training::objective::Failure;
 use serde::{Deserialize, Serialize};
 
 const CHECKPOINT: Kind = Kind { name: "checkpoint", key: "lnn-checkpoint", format: 1 };
@@ -124,9 +125,9 @@ impl From<&Means> for StoredMeans {
         Self {
             sums: [means.loss, means.penalty, means.norm].map(f64::to_bits),
             counts: [means.penalised, means.left_out, means.skipped, means.taken],
-            last_failure: means.last_failure.map(|failure| match failure {
-                Failure::Singular { row, condition } => (row, Some(condition.to_bits())),
-                Failure::NotFinite { row } => (row, None),
+            last_failure: means.last_failure.and_then(|failure| match failure {
+                MechanicsError::Singular { row, condition } => Some((row, Some(condition.to_bits()))),
+                other => other.row().map(|row| (row, None)),
             }),
         }
     }
@@ -136,9 +137,12 @@ impl From<&StoredMeans> for Means {
     fn from(stored: &StoredMeans) -> Self {
         let ([loss, penalty, norm], [penalised, left_out, skipped, taken]) =
             (stored.sums.map(f64::from_bits), stored.counts);
-        let last_failure = stored.last_failure.map(|(row, condition)| match condition {
-            Some(bits) => Failure::Singular { row, condition: f64::from_bits(bits) },
-            None => Failure::NotFinite { row },
+        let last_failure = stored.last_failure.map(|(row, condition)| {
+            let condition = condition.map(f64::from_bits);
+            MechanicsError::unsolved(
+                row,
+                condition.map_or(Failure::NotFinite, |condition| Failure::Singular { condition }),
+            )
         });
         Self { loss, penalty, norm, penalised, left_out, skipped, taken, last_failure }
     }
@@ -392,7 +396,7 @@ mod tests {
             left_out: 2,
             skipped: 3,
             taken: 4,
-            last_failure: Some(Failure::Singular { row: 3, condition: f64::INFINITY }),
+            last_failure: Some(MechanicsError::Singular { row: 3, condition: f64::INFINITY }),
         };
         let course = OptimizerState {
             rng,

@@ -50,7 +50,6 @@ const _: () = {
     error::<training::CheckpointError>();
     error::<lnn::configuration::ConfigError>();
     error::<lnn::data::DatasetError>();
-    error::<training::Failure>();
     error::<training::RecipeError>();
     error::<lnn::data::SamplingError>();
     error::<training::StepError>();

@@ -11,7 +11,7 @@ use lnn::linalg::{self, Failure as MatrixFailure, LinalgError, Workspace};
 use lnn::network::{ActivationChoice, NetworkLagrangian};
 use lnn::optimizers::{Method, Moments, Update};
 use lnn::scalar::{Dd, Real, Scalar};
-use lnn::training::{Failure, Objective};
+use lnn::training::Objective;
 use std::time::Instant;
 
 const BATCHES: [usize; 8] = [1, 2, 23, 24, 63, 65, 130, 1024];
@@ -80,7 +80,11 @@ fn overflowing_states<S: Scalar>() {
             q[2 * p] = S::max_value().sqrt();
             let data = Dataset::new(2, q, data.v().to_vec(), data.a().to_vec()).unwrap();
             let (report, gradient) = step(&shape, (Penalty::None, 2), &theta, &data, &all_rows(batch));
-            assert_eq!((report.failure, report.left_out), (Some(Failure::NotFinite { row: p }), 1), "batch {batch}");
+            assert_eq!(
+                (report.failure, report.left_out),
+                (Some(MechanicsError::NotFinite { row: p, what: "acceleration" }), 1),
+                "batch {batch}"
+            );
             let mut moved = theta.clone();
             let update =
                 Update { method: Method::Radam, rate: 1e-3, weight_decay: 1e-6, decaying: usize::MAX, clip: 1.0 };
@@ -113,7 +117,7 @@ fn bad_weights<S: Scalar>() {
                 wrong[k] = bad;
                 let report = objective.step(&wrong, &data, &all_rows(batch), &mut gradient);
                 if bad.is_nan() || report.failure.is_some() {
-                    let first = Some(Failure::NotFinite { row: 0 });
+                    let first = Some(MechanicsError::NotFinite { row: 0, what: "acceleration" });
                     assert!(report.failure == first || !bad.is_nan(), "{activation} weight {k}: {:?}", report.failure);
                     assert!(report.left_out == batch || !bad.is_nan());
                 } else {
@@ -196,7 +200,11 @@ fn massless<S: Scalar>() {
             {
                 let (report, gradient) = step(&shape, (penalty, 2), theta, &data, &all_rows(batch));
                 assert_eq!(report.left_out, batch, "n = {n}");
-                assert!(matches!(report.failure, Some(Failure::Singular { row: 0, .. })), "{:?}", report.failure);
+                assert!(
+                    matches!(report.failure, Some(MechanicsError::Singular { row: 0, .. })),
+                    "{:?}",
+                    report.failure
+                );
                 assert!(gradient.iter().all(|g| g.is_finite()), "n = {n}, {penalty:?}");
                 checks += 1;
             }

@@ -6,14 +6,14 @@ use lnn::configuration::{
 };
 use lnn::data::{Dataset, Datasets};
 use lnn::forward::HyperDual;
-use lnn::lagrangian::Lagrangian;
+use lnn::lagrangian::{Lagrangian, MechanicsError};
 use lnn::network::{
     ActivationChoice, Architecture, Form, Initialization, InputLayer, Layout, Structure, initial_weights,
 };
 use lnn::optimizers::{Method, Schedule};
 use lnn::scalar::{Dd, Real, Scalar};
 use lnn::tape::{ScalarFunction, gradient};
-use lnn::training::{Failure, Hooks, Objective, StopReason, Trained, TrainingError, train};
+use lnn::training::{Hooks, Objective, StopReason, Trained, TrainingError, train};
 use proptest::prelude::*;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -598,7 +598,7 @@ fn a_singular_mass_matrix_stops_or_is_left_out_by_choice() {
     let mut gradient = vec![f64::NAN; weights.len()];
     let report = objective.step(&weights, &data, &[3, 4], &mut gradient);
     assert_eq!(report.left_out, 2);
-    assert!(matches!(report.failure, Some(Failure::Singular { row: 3, .. })), "{:?}", report.failure);
+    assert!(matches!(report.failure, Some(MechanicsError::Singular { row: 3, .. })), "{:?}", report.failure);
     assert!(gradient.iter().all(|&g| g == 0.0));
     // The mean over no state is no loss, least of all 0.
     assert!(report.loss.is_nan() && objective.loss(&weights, &data).loss.is_nan());

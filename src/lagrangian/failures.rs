@@ -1,0 +1,95 @@
+//! Rows of a batch that failed: found, gathered from several hands, and reported.
+
+use super::{MechanicsError, Terms};
+use crate::scalar::Scalar;
+
+impl<S: Scalar> Terms<S> {
+    /// Adds failures to those that are there; one of a row is kept, and of `found` rather than of what is there.
+    pub(crate) fn put_before(&mut self, mut found: Vec<MechanicsError>) {
+        if found.is_empty() {
+            return;
+        }
+        found.append(&mut self.failures);
+        // The sort is stable, so that the first of a row stays the first.
+        found.sort_by_key(MechanicsError::row);
+        found.dedup_by_key(|error| error.row());
+        self.failures = found;
+    }
+
+    /// The first failure, as the outcome of the batch.
+    ///
+    /// # Errors
+    /// That failure.
+    pub(crate) fn outcome(&self) -> Result<(), MechanicsError> {
+        self.failures.first().map_or(Ok(()), |&error| Err(error))
+    }
+
+    /// Whether all that failed stands in [`Terms::failures`], so that the other rows can be used.
+    pub(crate) fn is_told_by_rows(&self, outcome: &Result<(), MechanicsError>) -> bool {
+        let first = self.failures.first().and_then(MechanicsError::row);
+        outcome.as_ref().err().is_none_or(|error| error.row().is_some() && error.row() == first)
+    }
+
+    /// Takes out the failures of a model that somebody adds to.
+    ///
+    /// # Errors
+    /// `outcome`, if that is not told row by row.
+    pub(crate) fn take_failures(
+        &mut self,
+        outcome: Result<(), MechanicsError>,
+    ) -> Result<Vec<MechanicsError>, MechanicsError> {
+        if !self.is_told_by_rows(&outcome) {
+            return outcome.map(|()| Vec::new());
+        }
+        Ok(if outcome.is_err() { std::mem::take(&mut self.failures) } else { Vec::new() })
+    }
+}
+
+/// Rows of a field `(batch, width)` that are not finite; whole blocks are looked at side by side.
+pub(super) fn not_finite<S: Scalar>(
+    what: &'static str,
+    field: &[S],
+    width: usize,
+) -> impl Iterator<Item = MechanicsError> {
+    const BLOCK: usize = 64;
+    let width = width.max(1);
+    let all_finite = |block: &[S]| block.iter().fold(true, |all, x| all & x.is_finite());
+    let clean = field.chunks(BLOCK).position(|block| !all_finite(block)).map_or(field.len(), |block| block * BLOCK);
+    let first = clean / width;
+    let rows = field[first * width..].chunks(width).enumerate();
+    rows.filter(move |(_, row)| !all_finite(row))
+        .map(move |(row, _)| MechanicsError::NotFinite { row: first + row, what })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_row_is_found_once_with_its_first_reason() {
+        let mut field = vec![0.0; 300];
+        field[131] = f64::NAN;
+        field[129] = f64::INFINITY;
+        field[299] = f64::NAN;
+        let found: Vec<_> = not_finite("momentum", &field, 3).collect();
+        let bad = |row| MechanicsError::NotFinite { row, what: "momentum" };
+        assert_eq!(found, [bad(43), bad(99)]);
+        assert_eq!(not_finite("momentum", &field[..129], 3).count(), 0);
+        let mut terms = Terms::<f64>::default();
+        terms.put_before(vec![MechanicsError::Uncertified { row: 99 }, MechanicsError::Uncertified { row: 7 }]);
+        terms.put_before(found);
+        assert_eq!(terms.failures, [MechanicsError::Uncertified { row: 7 }, bad(43), bad(99)]);
+        assert_eq!(terms.outcome(), Err(MechanicsError::Uncertified { row: 7 }));
+    }
+
+    #[test]
+    fn an_error_about_no_row_is_passed_on() {
+        let mut terms = Terms::<f64> { failures: vec![MechanicsError::Uncertified { row: 2 }], ..Terms::default() };
+        let other = Err(MechanicsError::Derivatives { what: "mass matrix" });
+        assert_eq!(terms.take_failures(other), Err(MechanicsError::Derivatives { what: "mass matrix" }));
+        assert_eq!(terms.take_failures(Ok(())), Ok(Vec::new()));
+        let told = terms.take_failures(Err(MechanicsError::Uncertified { row: 2 }));
+        assert_eq!(told, Ok(vec![MechanicsError::Uncertified { row: 2 }]));
+        assert_eq!(terms.outcome(), Ok(()));
+    }
+}
