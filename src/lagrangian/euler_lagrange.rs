@@ -241,7 +241,11 @@ mod tests {
         assert_eq!(error, MechanicsError::NotFinite { row: 0, what: "external force" });
         let error = one.add_force(1, &[3.0], &[1.0, 2.0], &mut workspace).unwrap_err();
         assert_eq!(error, MechanicsError::Shape { what: "external forces", expected: 1, found: 2 });
+        // The failure of the row stays that of the force before, until the terms are computed anew.
         one.mass_matrix[0] = 0.0;
+        let error = one.add_force(1, &[3.0], &[1.0], &mut workspace).unwrap_err();
+        assert_eq!(error, MechanicsError::NotFinite { row: 0, what: "external force" });
+        one.failures.clear();
         let error = one.add_force(1, &[3.0], &[1.0], &mut workspace).unwrap_err();
         assert_eq!(error, MechanicsError::Singular { row: 0, condition: f64::INFINITY });
     }

@@ -24,7 +24,7 @@ impl<S: Scalar> Terms<S> {
         self.failures.first().map_or(Ok(()), |&error| Err(error))
     }
 
-    /// Whether all that failed stands in [`Terms::failures`], so that the other rows can be used.
+    /// `true` if all that failed stands in [`Terms::failures`], so that the other rows can be used.
     pub(crate) fn is_told_by_rows(&self, outcome: &Result<(), MechanicsError>) -> bool {
         let first = self.failures.first().and_then(MechanicsError::row);
         outcome.as_ref().err().is_none_or(|error| error.row().is_some() && error.row() == first)

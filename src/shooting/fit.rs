@@ -1,22 +1,20 @@
 //! From recorded trajectories and a first guess of the weights to a network fitted through its motion.
 
-use crate::configuration::ConfigError;
-use crate::configuration::Penalty;
+use crate::configuration::{ConfigError, Penalty};
 use crate::data::{Noise, StateEstimate};
 use crate::network::{Architecture, Layout, NetworkError};
 use crate::random::RngStream;
 use crate::recording::TrajectoryError;
 use crate::scalar::Scalar;
+use crate::shooting::learner::{ShootingLearner, ShootingProblem};
 use crate::shooting::objective::ShootingObjective;
 use crate::shooting::segments::Segments;
 use crate::shooting::settings::Shooting;
-use crate::shooting::solver::{ShootingProblem, ShootingSolver};
-use crate::training::checkpoint::{PhaseState, Snapshot};
+use crate::training::checkpoint::{Clock, PhaseState, Snapshot};
 use crate::training::epoch::Epoch;
-use crate::training::solver::{Hooks, Saver, TrainingState};
-use crate::training::trainer::{Log, ResumeOptions, StopReason, TrainingError};
-use argmin::core::observers::ObserverMode;
-use argmin::core::{Executor, State, TerminationReason, TerminationStatus};
+use crate::training::phase::{Epochs, StopReason, run_epochs};
+use crate::training::solver::{EpochSolver, Hooks, Run, Saver};
+use crate::training::trainer::{ResumeOptions, TrainingError};
 use thiserror::Error;
 
 /// A network and the recorded motion it is fitted to.
@@ -217,46 +215,48 @@ pub fn resume<S: Scalar>(
     let ResumeOptions { keeper, start } = sitting;
     let (saver, underway) = match start {
         Some(Snapshot { seconds, ended, underway }) => {
-            (keeper.map(|keeper| Saver { keeper, ended, seconds }), underway)
+            (keeper.map(|keeper| Saver { keeper, ended, seconds: Some(seconds) }), underway)
         }
         None => (None, None),
     };
-    let rng = RngStream::Order(0).generator(task.seed);
-    let mut solver = ShootingSolver::new(settings, &problem, rng, hooks, saver);
-    let mut state = TrainingState::<S>::new().param(task.weights.clone());
-    if let Some(PhaseState { course, history, best, best_loss, best_epoch, shooting: Some(shot) }) = underway {
-        (state.iter, state.last_best_iter) = (course.iteration, best_epoch);
-        (state.cost, state.best_cost) = (best_loss, best_loss);
-        (state.param, state.best_param) = (Some(best.clone()), Some(best));
-        let segments = problem.training.len();
-        solver
-            .restore(&problem, course, history, shot)
-            .ok_or_else(|| estimate("checkpoint".to_string(), format!("{segments} segments"), "others"))?;
+    // Checkpoints count them with those of the training that gave the weights, the history of the fit does not.
+    let epochs_before = saver.as_ref().map_or(0, |saver| saver.ended.history.len());
+    let others = || estimate("checkpoint".to_string(), format!("{} segments", segments.0), "others");
+    let mut learner = ShootingLearner::new(&problem, settings.start_share, settings.curvature_every);
+    let mut underway = underway.filter(|underway| underway.shooting.is_some());
+    let mut clock = Clock::after(0.0);
+    if let Some(PhaseState { course, shooting, .. }) = &mut underway
+        && let Some(shot) = shooting.take()
+    {
+        if course.order.len() != segments.0 {
+            return Err(others());
+        }
+        clock = Clock::after(shot.seconds);
+        learner = learner.restored(&problem, shot).ok_or_else(others)?;
     }
-    let mut result = Executor::new(problem, solver)
-        .add_observer(Log, ObserverMode::Always)
-        .configure(|_| state.max_iters(settings.epochs as u64))
-        .timer(false)
-        .run()
-        .map_err(|error| TrainingError::Optimizer(error.to_string()))?;
-    let validation_loss = result.state.get_best_cost();
-    let weights = match result.state.get_best_param() {
-        Some(best) if validation_loss.is_finite() => best.clone(),
-        _ => return Err(TrainingError::NothingLearned(None).into()),
+    let run = Run {
+        phase_number: 1,
+        epoch: epochs_before,
+        epochs_before,
+        step: 0,
+        steps: None,
+        clock,
+        hooks: hooks.clone(),
+        saver,
     };
-    let integration_error = match result.problem.problem.as_mut() {
-        Some(problem) => {
+    let rng = RngStream::Order(0).generator(task.seed);
+    let solver = EpochSolver::new(learner, settings.optimizer(), settings.rates(), rng, segments.0).within(run);
+    let epochs = run_epochs(solver, problem, task.weights.clone(), underway).map_err(TrainingError::Optimizer)?;
+    let Epochs { problem, learner, history, best, cost: validation_loss, seconds, stop, .. } = epochs;
+    let weights = best.filter(|_| validation_loss.is_finite()).ok_or(TrainingError::NothingLearned(None))?;
+    let integration_error = match problem {
+        Some(mut problem) => {
             let fine = task.cut(TRAINING, per_segment, 2 * steps)?;
             difference(&mut problem.shots, &weights, &problem.training, &fine)
         }
         None => f64::NAN,
     };
-    let stop = match result.state.get_termination_status() {
-        TerminationStatus::Terminated(TerminationReason::Interrupt) => StopReason::Interrupted,
-        _ => StopReason::Finished,
-    };
-    let seconds = result.solver.seconds();
-    let (history, start_loss) = (result.solver.history, result.solver.start_loss);
+    let start_loss = learner.start_loss;
     Ok(Fitted { weights, history, start_loss, validation_loss, stop, segments, steps, integration_error, seconds })
 }
 

@@ -20,12 +20,12 @@
 
 mod fit;
 mod integrator;
+mod learner;
 mod loss;
 mod motion;
 mod objective;
 mod segments;
 mod settings;
-mod solver;
 mod starts;
 
 #[doc(hidden)]

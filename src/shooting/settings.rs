@@ -1,8 +1,8 @@
 //! Settings of multiple shooting.
 
-use crate::configuration::ConfigError;
-use crate::configuration::Faults;
-use crate::optimizers::Method;
+use crate::configuration::{ConfigError, Faults, OnFailure, Optimizer};
+use crate::optimizers::{Method, Schedule};
+use crate::training::solver::RateCourse;
 use serde::{Deserialize, Serialize};
 
 /// Choices of a fit through motion. Keys that are not given have their defaults; others are refused.
@@ -81,6 +81,18 @@ impl Shooting {
     pub(crate) fn grey_box() -> Self {
         let (method, rate, epochs, weight_decay, continuity) = (Method::Soap, 0.01, 400, 3e-3, 1.0);
         Self { method, rate, epochs, weight_decay, continuity, ..Self::default() }
+    }
+
+    /// Update rule of the weights, for batches of segments.
+    pub(crate) fn optimizer(&self) -> Optimizer {
+        let &Self { method, batch, weight_decay, clip, .. } = self;
+        Optimizer { method, batch, weight_decay, clip, averaging: 0.0, on_failure: OnFailure::Skip }
+    }
+
+    /// Half a cosine from the rate to 0.
+    pub(crate) fn rates(&self) -> RateCourse {
+        let &Self { epochs, rate, .. } = self;
+        RateCourse { epochs, rate, eta_min: 0.0, schedule: Schedule::Cosine, t_max: 1.0 }
     }
 
     /// Checks every range.

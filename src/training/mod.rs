@@ -3,8 +3,10 @@
 pub(crate) mod checkpoint;
 pub(crate) mod epoch;
 mod lbfgs;
+pub(crate) mod learner;
 mod memory;
 pub(crate) mod objective;
+pub(crate) mod phase;
 mod problem;
 mod recipe;
 pub(crate) mod reduction;
@@ -21,9 +23,10 @@ pub use epoch::Epoch;
 #[doc(hidden)]
 pub use memory::training_memory;
 pub use objective::{BatchReport, Objective, ThreadsError};
+pub use phase::StopReason;
 pub use problem::TrainingProblem;
 pub use recipe::{RecipeError, TrainingResult, run};
 pub use solver::{Hooks, Progress, StepError, Watcher};
 #[doc(hidden)]
 pub use trainer::{ResumeOptions, resume};
-pub use trainer::{StopReason, Trained, TrainingError, train};
+pub use trainer::{Trained, TrainingError, train};

@@ -1,4 +1,4 @@
-//! Stochastic training as an argmin solver: one iteration is one epoch, the cost is the validation loss.
+//! Learning by batches as an argmin solver: one iteration is one epoch, the cost is the validation loss.
 //!
 //! The parameters argmin sees are those that are validated (averaged, if averaging is on); the solver keeps the weights
 //! that move, their moments, the order of the data and the random state: its course, which a checkpoint can hold between
@@ -12,15 +12,12 @@ use crate::random::RandomGenerator;
 use crate::scalar::{Real, Scalar};
 use crate::training::checkpoint::{CheckpointManager, Clock, Ended, OptimizerState, PhaseState};
 use crate::training::epoch::{Epoch, Means};
-use crate::training::problem::TrainingProblem;
+use crate::training::learner::{Judgement, Learner};
 use argmin::core::{Error, IterState, KV, Problem, Solver, State, TerminationReason, TerminationStatus};
 use argmin::kv;
 use rand::seq::SliceRandom;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-
-/// At most one in this many validation states may be left out of a loss that counts.
-const LEFT_OUT: usize = 100;
 
 /// State of an argmin run: parameters and validation loss.
 pub type TrainingState<S> = IterState<Vec<S>, (), (), (), (), f64>;
@@ -86,11 +83,36 @@ pub enum StepError {
     },
 }
 
-/// Adam, RAdam or SOAP over mini-batches of a [`TrainingProblem`].
-pub struct EpochSolver<S> {
+/// Epochs and the course of their learning rate.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct RateCourse {
+    /// Passes through the samples.
+    pub epochs: usize,
+    /// Learning rate at the start.
+    pub rate: f64,
+    /// Lowest learning rate.
+    pub eta_min: f64,
+    /// Course from one to the other.
+    pub schedule: Schedule,
+    /// Epochs from highest to lowest rate of `cosine-annealing`.
+    pub t_max: f64,
+}
+
+impl From<&Phase> for RateCourse {
+    fn from(phase: &Phase) -> Self {
+        let &Phase { epochs, rate, eta_min, schedule, t_max, .. } = phase;
+        Self { epochs, rate, eta_min, schedule, t_max }
+    }
+}
+
+/// Adam, RAdam or SOAP over mini-batches of a [`Learner`]'s samples.
+pub(crate) struct EpochSolver<S, L> {
+    learner: L,
     optimizer: Optimizer,
-    phase: Phase,
+    rates: RateCourse,
     phase_number: usize,
+    /// Epochs of a history that this one does not count on.
+    epochs_before: usize,
     course: OptimizerState<S>,
     /// `true` if the course began in an earlier sitting.
     restored: bool,
@@ -107,8 +129,8 @@ pub struct EpochSolver<S> {
 pub(crate) struct Saver<S> {
     pub(crate) keeper: Arc<CheckpointManager>,
     pub(crate) ended: Ended<S>,
-    /// Seconds of what went before, where that has a clock of its own.
-    pub(crate) seconds: f64,
+    /// Seconds of what went before, where this run's clock does not count them.
+    pub(crate) seconds: Option<f64>,
 }
 
 /// The run that a phase is part of.
@@ -117,10 +139,12 @@ pub(crate) struct Run<S> {
     pub phase_number: usize,
     /// Epochs before this phase.
     pub epoch: usize,
+    /// Those of them that belong to another history.
+    pub epochs_before: usize,
     /// Steps before this phase.
     pub step: usize,
-    /// Steps of all phases.
-    pub steps: usize,
+    /// Steps of all phases, if there are others.
+    pub steps: Option<usize>,
     /// Time since training began.
     pub clock: Clock,
     /// Who watches.
@@ -129,21 +153,23 @@ pub(crate) struct Run<S> {
     pub saver: Option<Saver<S>>,
 }
 
-/// States of a step: no more than there are, at least one.
-fn batch(optimizer: &Optimizer, states: usize) -> usize {
-    optimizer.batch.min(states).max(1)
+/// Samples of a step: no more than there are, at least one.
+fn batch(optimizer: &Optimizer, samples: usize) -> usize {
+    optimizer.batch.min(samples).max(1)
 }
 
-impl<S: Scalar> EpochSolver<S> {
-    /// A solver for one phase over `states` training states, shuffled by `rng`; host it in an argmin `Executor` whose
-    /// state starts with the initial weights and runs for `phase.epochs` iterations.
-    pub fn new(optimizer: Optimizer, phase: Phase, rng: RandomGenerator, states: usize) -> Self {
-        let steps = phase.epochs * states.div_ceil(batch(&optimizer, states));
+impl<S: Scalar, L: Learner<S>> EpochSolver<S, L> {
+    /// A solver for one phase over `samples` training samples, shuffled by `rng`; host it in an argmin `Executor` whose
+    /// state starts with the initial weights and runs for `rates.epochs` iterations.
+    pub fn new(learner: L, optimizer: Optimizer, rates: RateCourse, rng: RandomGenerator, samples: usize) -> Self {
+        let steps = rates.epochs * samples.div_ceil(batch(&optimizer, samples));
         Self {
+            learner,
             optimizer,
-            phase,
+            rates,
             phase_number: 1,
-            course: OptimizerState::new(rng, states),
+            epochs_before: 0,
+            course: OptimizerState::new(rng, samples),
             restored: false,
             gradient: Vec::new(),
             steps,
@@ -157,9 +183,10 @@ impl<S: Scalar> EpochSolver<S> {
 
     /// Makes this phase a part of a longer run.
     pub(crate) fn within(self, run: Run<S>) -> Self {
-        let Run { phase_number, epoch, step, steps, clock, hooks, saver } = run;
+        let Run { phase_number, epoch, epochs_before, step, steps, clock, hooks, saver } = run;
         let course = OptimizerState { epoch, step, ..self.course };
-        Self { phase_number, steps, clock, hooks, saver, course, ..self }
+        let steps = steps.unwrap_or(self.steps);
+        Self { phase_number, epochs_before, steps, clock, hooks, saver, course, ..self }
     }
 
     /// Goes on from where an earlier sitting was.
@@ -167,9 +194,9 @@ impl<S: Scalar> EpochSolver<S> {
         Self { course, history, restored: true, ..self }
     }
 
-    /// Epochs of this phase that are over.
-    pub(crate) fn iteration(&self) -> u64 {
-        self.course.iteration
+    /// Epochs of this phase.
+    pub(crate) fn epochs(&self) -> usize {
+        self.rates.epochs
     }
 
     /// Steps of the whole run so far.
@@ -177,20 +204,25 @@ impl<S: Scalar> EpochSolver<S> {
         self.course.step
     }
 
-    /// Its rows, and why it stopped, if a step failed.
-    pub(crate) fn finish(self) -> (Vec<Epoch>, Option<StepError>) {
-        (self.history, self.stopped)
+    /// Seconds by the clock of the run.
+    pub(crate) fn seconds(&self) -> f64 {
+        self.clock.seconds()
+    }
+
+    /// Its rows, why it stopped, if a step failed, and what moved beside the weights.
+    pub(crate) fn finish(self) -> (Vec<Epoch>, Option<StepError>, L) {
+        (self.history, self.stopped, self.learner)
     }
 
     fn rate(&self, epoch_of_phase: f64) -> f64 {
-        let p = &self.phase;
-        p.schedule.rate(p.rate, p.eta_min, p.t_max, epoch_of_phase, p.epochs as f64)
+        let RateCourse { epochs, rate, eta_min, schedule, t_max } = self.rates;
+        schedule.rate(rate, eta_min, t_max, epoch_of_phase, epochs as f64)
     }
 
     /// Takes one step; an error means that the weights were not changed and training stops.
     fn take_step(
         &mut self,
-        problem: &mut TrainingProblem<'_, S>,
+        problem: &mut L::Problem,
         rows: std::ops::Range<usize>,
         rate: f64,
     ) -> Result<(), StepError> {
@@ -198,28 +230,28 @@ impl<S: Scalar> EpochSolver<S> {
         *step += 1;
         let step = *step;
         let rows = &order[rows];
-        let report = problem.step(weights, rows, &mut self.gradient);
+        let report = self.learner.step(problem, weights, rows, &mut self.gradient);
+        means.left_out += report.left_out;
         if let Some(failure) = report.failure {
             means.last_failure = Some(failure);
-            means.left_out += report.left_out;
             if self.optimizer.on_failure == OnFailure::Stop {
                 return Err(StepError::State { step, failure });
             }
             tracing::debug!(step, %failure, "state left out");
-            if matches!(failure, MechanicsError::NotFinite { .. }) || report.left_out == rows.len() {
-                means.skipped += 1;
-                return Ok(());
-            }
+        }
+        if matches!(report.failure, Some(MechanicsError::NotFinite { .. })) || report.left_out == rows.len() {
+            means.skipped += 1;
+            return Ok(());
         }
         let update = Update {
             method: self.optimizer.method,
             rate,
             weight_decay: self.optimizer.weight_decay,
-            decaying: problem.objective().model().weights(),
+            decaying: self.learner.decaying(problem),
             clip: self.optimizer.clip,
         };
         let gradient = &mut self.gradient;
-        let norm = moments.update_on(Some(problem.objective().pool()), weights, gradient, &update);
+        let norm = moments.update_on(Some(self.learner.pool(problem)), weights, gradient, &update);
         if !norm.is_finite() {
             if self.optimizer.on_failure == OnFailure::Stop {
                 return Err(StepError::Gradient { step, norm });
@@ -227,7 +259,9 @@ impl<S: Scalar> EpochSolver<S> {
             means.skipped += 1;
             return Ok(());
         }
+        self.learner.follow(problem);
         let loss = report.loss.to_f64();
+        let means = &mut self.course.means;
         means.taken += 1;
         means.loss += loss;
         means.penalty += report.penalty.to_f64();
@@ -266,7 +300,7 @@ impl<S: Scalar> EpochSolver<S> {
 
     /// Writes a checkpoint, if somebody keeps them and one is due.
     fn save_if(&self, state: &TrainingState<S>, is_due: impl Fn(&CheckpointManager) -> bool) {
-        let Some(Saver { keeper, ended, .. }) = self.saver.as_ref().filter(|saver| is_due(&saver.keeper)) else {
+        let Some(Saver { keeper, ended, seconds }) = self.saver.as_ref().filter(|saver| is_due(&saver.keeper)) else {
             return;
         };
         let best = state.get_best_param().or(state.get_param());
@@ -276,58 +310,61 @@ impl<S: Scalar> EpochSolver<S> {
             best: best.unwrap_or(&ended.weights).clone(),
             best_loss: state.get_best_cost(),
             best_epoch: state.get_last_best_iter(),
-            shooting: None,
+            shooting: self.learner.stored(self.seconds()),
         };
-        keeper.save(self.clock.seconds(), ended, Some(&underway));
+        keeper.save(seconds.unwrap_or_else(|| self.seconds()), ended, Some(&underway));
     }
 }
 
-impl<'a, S: Scalar> Solver<TrainingProblem<'a, S>, TrainingState<S>> for EpochSolver<S> {
+impl<S: Scalar, L: Learner<S>> Solver<L::Problem, TrainingState<S>> for EpochSolver<S, L> {
     fn name(&self) -> &str {
         self.optimizer.method.name()
     }
 
     fn init(
         &mut self,
-        problem: &mut Problem<TrainingProblem<'a, S>>,
+        problem: &mut Problem<L::Problem>,
         state: TrainingState<S>,
     ) -> Result<(TrainingState<S>, Option<KV>), Error> {
-        if !self.restored {
-            let course = &mut self.course;
-            if let Some(param) = state.get_param() {
-                course.weights.clone_from(param);
-            }
-            course.average.clone_from(&course.weights);
-            course.averaged_steps = 0;
-            let problem = problem.problem.as_mut().ok_or_else(|| Error::msg("the training problem is missing"))?;
-            course.moments = problem.moments(self.optimizer.method);
+        if self.restored {
+            return Ok((state, None));
         }
-        Ok((state, None))
+        let course = &mut self.course;
+        if let Some(param) = state.get_param() {
+            course.weights.clone_from(param);
+        }
+        course.average.clone_from(&course.weights);
+        course.averaged_steps = 0;
+        let problem = problem.problem.as_mut().ok_or_else(|| Error::msg("the training problem is missing"))?;
+        course.moments = self.learner.moments(problem, self.optimizer.method, course.weights.len());
+        let cost = self.learner.begin(problem, &course.weights);
+        Ok((if let Some(cost) = cost { state.cost(cost) } else { state }, None))
     }
 
     fn next_iter(
         &mut self,
-        problem: &mut Problem<TrainingProblem<'a, S>>,
+        problem: &mut Problem<L::Problem>,
         state: TrainingState<S>,
     ) -> Result<(TrainingState<S>, Option<KV>), Error> {
         let problem = problem.problem.as_mut().ok_or_else(|| Error::msg("the training problem is missing"))?;
         self.gradient.resize(self.course.weights.len(), <S as Real>::zero());
         let begun: f64 = self.course.iteration as f64;
         if self.course.batch == 0 {
-            let OptimizerState { order, rng, means, .. } = &mut self.course;
+            let OptimizerState { order, rng, means, weights, iteration, .. } = &mut self.course;
+            self.learner.begin_epoch(problem, weights, *iteration);
             order.shuffle(rng);
             *means = Means::default();
         }
-        let states = self.course.order.len();
-        let batch = batch(&self.optimizer, states);
-        let steps = states.div_ceil(batch);
+        let samples = self.course.order.len();
+        let batch = batch(&self.optimizer, samples);
+        let steps = samples.div_ceil(batch);
         while self.course.batch < steps {
             let k = self.course.batch;
-            let within = match self.phase.schedule {
+            let within = match self.rates.schedule {
                 Schedule::Cosine => k as f64 / steps as f64,
                 _ => 0.0,
             };
-            let rows = k * batch..((k + 1) * batch).min(states);
+            let rows = k * batch..((k + 1) * batch).min(samples);
             let rate = self.rate(begun + within);
             if let Err(error) = self.take_step(problem, rows, rate) {
                 self.stopped = Some(error);
@@ -347,31 +384,28 @@ impl<'a, S: Scalar> Solver<TrainingProblem<'a, S>, TrainingState<S>> for EpochSo
             self.stopped = Some(StepError::NoProgress { epoch: self.course.epoch, failure });
             return Ok((state, None));
         }
-        let validation = problem.validation_loss(self.validated());
-        let cost = validation.loss.to_f64();
+        let param = self.validated().to_vec();
+        let Judgement { loss, cost } = self.learner.judge(problem, &param);
         let taken = means.taken.max(1) as f64;
         let epoch = Epoch {
-            epoch: self.course.epoch,
+            epoch: self.course.epoch - self.epochs_before,
             phase: self.phase_number,
             rate: self.rate(begun),
             training_loss: means.loss / taken,
             penalty: means.penalty / taken,
-            penalised: means.penalised as f64 / states as f64,
-            validation_loss: cost,
+            penalised: means.penalised as f64 / (samples * self.learner.penalty_states(problem)) as f64,
+            validation_loss: loss,
             gradient_norm: means.norm / taken,
             left_out: means.left_out,
             skipped: means.skipped,
             seconds: self.clock.seconds(),
         };
-        let record = kv!("training_loss" => epoch.training_loss; "rate" => epoch.rate; "penalty" => epoch.penalty;);
+        let mut record = kv!("training_loss" => epoch.training_loss; "rate" => epoch.rate; "penalty" => epoch.penalty;);
+        self.learner.record(taken, &mut record);
         if let Some(watcher) = &self.hooks.watcher {
             watcher(Progress::Epoch(&epoch));
         }
         self.history.push(epoch);
-        // A loss that is not finite, or that passes over more than a few of the states, must never be the best.
-        let judged = LEFT_OUT * validation.left_out <= problem.validation().len();
-        let cost = if cost.is_finite() && judged { cost } else { f64::INFINITY };
-        let param = self.validated().to_vec();
         Ok((state.param(param).cost(cost), Some(record)))
     }
 

@@ -1,7 +1,7 @@
 //! Runs the phases of a training and gathers what came out.
 
 use crate::configuration::Penalty;
-use crate::configuration::{Config, ConfigError, Phase};
+use crate::configuration::{Config, ConfigError};
 use crate::data::{Dataset, Datasets};
 use crate::network::{Architecture, initial_weights};
 use crate::random::RngStream;
@@ -9,27 +9,15 @@ use crate::scalar::Scalar;
 use crate::training::checkpoint::{CheckpointManager, Clock, Ended, PhaseState, Snapshot};
 use crate::training::epoch::Epoch;
 use crate::training::lbfgs::{Start, lbfgs};
+use crate::training::learner::States;
 use crate::training::objective::{self, BatchReport, Objective, ThreadsError};
+use crate::training::phase::{StopReason, run_epochs};
 use crate::training::problem::TrainingProblem;
-use crate::training::solver::{EpochSolver, Hooks, Run, Saver, StepError, TrainingState};
-use argmin::core::observers::{Observe, ObserverMode};
-use argmin::core::{Error, Executor, KV, State, TerminationReason, TerminationStatus};
+use crate::training::solver::{EpochSolver, Hooks, Run, Saver, StepError};
 use std::any::Any;
 use std::borrow::Cow;
 use std::sync::Arc;
 use thiserror::Error;
-
-/// Why training ended.
-#[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
-pub enum StopReason {
-    /// All epochs were run.
-    Finished,
-    /// The interrupt flag was raised; the best model so far stands.
-    Interrupted,
-    /// A step failed; the best model so far stands.
-    Failed(StepError),
-}
 
 /// Result of a training.
 #[derive(Clone, Debug)]
@@ -162,14 +150,16 @@ pub fn resume<S: Scalar>(
         let run = Run {
             phase_number: number + 1,
             epoch: ended.history.len(),
+            epochs_before: 0,
             step: ended.steps,
-            steps,
+            steps: Some(steps),
             clock,
             hooks: hooks.clone(),
-            saver: keeper.clone().map(|keeper| Saver { keeper, ended: ended.clone(), seconds: 0.0 }),
+            saver: keeper.clone().map(|keeper| Saver { keeper, ended: ended.clone(), seconds: None }),
         };
-        let solver = EpochSolver::new(config.optimizer.clone(), phase.clone(), rng, training.len()).within(run);
-        stop = run_phase(problem, solver, (phase, config.optimizer.batch), &mut ended, underway.take())?;
+        let (states, optimizer) = (States::new(), config.optimizer.clone());
+        let solver = EpochSolver::new(states, optimizer, phase.into(), rng, training.len()).within(run);
+        stop = run_phase(problem, solver, config.optimizer.batch, &mut ended, underway.take())?;
         if stop != StopReason::Finished {
             break;
         }
@@ -224,58 +214,26 @@ fn in_double<S: Scalar>(data: &Dataset<S>) -> Cow<'_, Dataset<f64>> {
     (data as &dyn Any).downcast_ref().map_or_else(|| Cow::Owned(data.cast()), Cow::Borrowed)
 }
 
-/// Writes every epoch to the log.
-pub(crate) struct Log;
-
-impl<I: State> Observe<I> for Log {
-    fn observe_iter(&mut self, state: &I, kv: &KV) -> Result<(), Error> {
-        let (epoch, cost, best) = (state.get_iter(), state.get_cost(), state.get_best_cost());
-        tracing::info!(epoch, %cost, %best, record = ?kv.kv, "epoch");
-        Ok(())
-    }
-}
-
-/// Runs one phase through argmin, from its beginning or from where it was; adds what it came to and says why it ended.
+/// Runs one phase, from its beginning or from where it was; adds what it came to and says why it ended.
 ///
 /// Its best parameters stand if they beat those of the phases before.
-fn run_phase<S: Scalar>(
-    problem: TrainingProblem<'_, S>,
-    mut solver: EpochSolver<S>,
-    (phase, batch): (&Phase, usize),
+fn run_phase<'a, S: Scalar>(
+    problem: TrainingProblem<'a, S>,
+    solver: EpochSolver<S, States<'a>>,
+    batch: usize,
     ended: &mut Ended<S>,
     underway: Option<PhaseState<S>>,
 ) -> Result<StopReason, TrainingError> {
-    let states = problem.training().len();
-    let mut state = TrainingState::<S>::new().param(ended.weights.clone());
-    if let Some(PhaseState { course, history, best, best_loss, best_epoch, .. }) = underway {
-        solver = solver.restored(course, history);
-        state.iter = solver.iteration();
-        state.last_best_iter = best_epoch;
-        (state.cost, state.best_cost) = (best_loss, best_loss);
-        (state.param, state.best_param) = (Some(best.clone()), Some(best));
-    }
-    let result = Executor::new(problem, solver)
-        .add_observer(Log, ObserverMode::Always)
-        .configure(|_| state.max_iters(phase.epochs as u64))
-        .timer(false)
-        .run()
-        .map_err(|error| TrainingError::Optimizer(error.to_string()))?;
-    let solver = result.solver;
-    let step = solver.step();
+    let batch = batch.min(problem.training().len());
+    let epochs = run_epochs(solver, problem, ended.weights.clone(), underway).map_err(TrainingError::Optimizer)?;
     ended.phases += 1;
-    ended.states += step.saturating_sub(ended.steps).saturating_mul(batch.min(states));
-    ended.steps = step;
-    let (history, stopped) = solver.finish();
-    ended.history.extend(history);
-    let cost = result.state.get_best_cost();
-    if let Some(best) = result.state.get_best_param()
-        && cost < ended.validation_loss
+    ended.states += epochs.steps.saturating_sub(ended.steps).saturating_mul(batch);
+    ended.steps = epochs.steps;
+    ended.history.extend(epochs.history);
+    if let Some(best) = epochs.best
+        && epochs.cost < ended.validation_loss
     {
-        (ended.validation_loss, ended.weights) = (cost, best.clone());
+        (ended.validation_loss, ended.weights) = (epochs.cost, best);
     }
-    Ok(match (stopped, result.state.get_termination_status()) {
-        (Some(error), _) => StopReason::Failed(error),
-        (None, TerminationStatus::Terminated(TerminationReason::Interrupt)) => StopReason::Interrupted,
-        _ => StopReason::Finished,
-    })
+    Ok(epochs.stop)
 }

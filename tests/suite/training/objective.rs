@@ -634,7 +634,7 @@ fn one_number_that_is_not_finite_is_named_and_never_reaches_the_weights() {
     let mut stopping = skipping.clone();
     stopping.optimizer.on_failure = OnFailure::Stop;
     let error = run(&stopping, data.clone(), 2, &Hooks::default()).unwrap_err().to_string();
-    assert!(error.contains("step ") && error.contains("row 50"), "{error}");
+    assert!(error.contains("step ") && error.contains("state 50"), "{error}");
     let trained = run(&skipping, data, 2, &Hooks::default()).unwrap();
     assert!(trained.weights.iter().all(|w| w.is_finite()));
     assert!(trained.history[0].skipped > 0);

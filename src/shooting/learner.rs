@@ -1,0 +1,167 @@
+//! Segments of motion as what the loop over epochs learns from: their starts move beside the weights.
+
+use crate::optimizers::{Method, Moments};
+use crate::scalar::{Real, Scalar};
+use crate::shooting::objective::{ShootingObjective, ShootingReport};
+use crate::shooting::segments::Segments;
+use crate::shooting::starts::Curvature;
+use crate::training::BatchReport;
+use crate::training::checkpoint::Shot;
+use crate::training::learner::{Judgement, Learner};
+use argmin::core::KV;
+
+/// At most one in this many validation segments may be left out of a loss that counts.
+const LEFT_OUT: usize = 20;
+/// Gauss-Newton steps of all starts before the first epoch.
+const PREPARATION: usize = 3;
+
+/// Problem of an argmin run.
+pub(super) struct ShootingProblem<S> {
+    pub shots: ShootingObjective<S>,
+    pub training: Segments<S>,
+    pub validation: Segments<S>,
+}
+
+/// Segments' starts with their curvature.
+struct Starts<S> {
+    at: Vec<S>,
+    curvature: Curvature<S>,
+}
+
+impl<S: Scalar> Starts<S> {
+    fn of(segments: &Segments<S>) -> Self {
+        Self { at: segments.starts().to_vec(), curvature: Curvature::default() }
+    }
+
+    fn refine(&mut self, shots: &mut ShootingObjective<S>, weights: &[S], segments: &Segments<S>) {
+        shots.refine(weights, segments, &mut self.at, &mut self.curvature, 1.0);
+    }
+}
+
+/// Starts of all segments, moved by Gauss and Newton's method while the weights follow their gradient.
+pub(super) struct ShootingLearner<S> {
+    /// Part of a Gauss-Newton step that a start takes per visit.
+    share: f64,
+    /// Epochs between two linearisations by the starts.
+    curvature_every: u64,
+    starts: Starts<S>,
+    start_gradient: Vec<S>,
+    validation_starts: Starts<S>,
+    /// Residuals and gap of the last step.
+    last: (usize, f64),
+    /// Sum of the gaps over the batches of the epoch.
+    gap: f64,
+    /// Validation loss of the weights that were given.
+    pub start_loss: f64,
+}
+
+impl<S: Scalar> ShootingLearner<S> {
+    pub fn new(problem: &ShootingProblem<S>, share: f64, curvature_every: usize) -> Self {
+        Self {
+            share,
+            curvature_every: curvature_every as u64,
+            starts: Starts::of(&problem.training),
+            start_gradient: vec![<S as Real>::zero(); problem.training.starts().len()],
+            validation_starts: Starts::of(&problem.validation),
+            last: (0, 0.0),
+            gap: 0.0,
+            start_loss: f64::INFINITY,
+        }
+    }
+
+    /// Goes on from a checkpoint; `None` if that is of other segments.
+    pub fn restored(mut self, problem: &ShootingProblem<S>, shot: Shot<S>) -> Option<Self> {
+        let lengths = [self.starts.at.len(), self.validation_starts.at.len()];
+        if [shot.starts.len(), shot.validation_starts.len()] != lengths {
+            return None;
+        }
+        self.starts.curvature = Curvature::restore(&problem.training, &shot.matrices, &shot.jacobian)?;
+        (self.starts.at, self.validation_starts.at) = (shot.starts, shot.validation_starts);
+        (self.gap, self.start_loss) = (shot.gap, shot.start_loss);
+        Some(self)
+    }
+}
+
+impl<S: Scalar> Learner<S> for ShootingLearner<S> {
+    type Problem = ShootingProblem<S>;
+
+    fn moments(&mut self, problem: &mut Self::Problem, method: Method, parameters: usize) -> Moments<S> {
+        Moments::for_method(method, parameters, problem.shots.model().matrices())
+    }
+
+    fn decaying(&self, problem: &mut Self::Problem) -> usize {
+        problem.shots.model().weights()
+    }
+
+    fn pool<'p>(&self, problem: &'p mut Self::Problem) -> &'p rayon::ThreadPool {
+        problem.shots.pool()
+    }
+
+    fn begin(&mut self, problem: &mut Self::Problem, weights: &[S]) -> Option<f64> {
+        for _ in 1..PREPARATION {
+            self.starts.refine(&mut problem.shots, weights, &problem.training);
+            self.validation_starts.refine(&mut problem.shots, weights, &problem.validation);
+        }
+        self.start_loss = self.judge(problem, weights).cost;
+        Some(self.start_loss)
+    }
+
+    fn begin_epoch(&mut self, problem: &mut Self::Problem, weights: &[S], epoch: u64) {
+        if epoch.is_multiple_of(self.curvature_every) {
+            self.starts.refine(&mut problem.shots, weights, &problem.training);
+        }
+        self.gap = 0.0;
+    }
+
+    fn step(&mut self, problem: &mut Self::Problem, weights: &[S], rows: &[u32], gradient: &mut [S]) -> BatchReport<S> {
+        let ShootingProblem { shots, training, .. } = problem;
+        let Starts { at, curvature } = &mut self.starts;
+        shots.settle(weights, training, (at, rows), (curvature, &mut self.start_gradient), self.share);
+        let report = shots.step(weights, training, at, rows, (gradient, &mut self.start_gradient));
+        let ShootingReport { loss, gap, penalty, penalised, left_out, residuals } = report;
+        self.last = (residuals, gap.to_f64());
+        BatchReport { loss, penalty, penalised, left_out, failure: None }
+    }
+
+    fn follow(&mut self, problem: &mut Self::Problem) {
+        let (residuals, gap) = self.last;
+        // The gradient is of a mean, the curvature of a sum.
+        let sum = S::of_f64(residuals as f64);
+        self.start_gradient.iter_mut().for_each(|g| *g *= sum);
+        self.starts.curvature.correct(&problem.training, &mut self.starts.at, &self.start_gradient, self.share);
+        self.gap += gap;
+    }
+
+    fn penalty_states(&self, problem: &Self::Problem) -> usize {
+        problem.training.steps()
+    }
+
+    fn record(&self, batches: f64, record: &mut KV) {
+        record.kv.insert("gap".into(), (self.gap / batches).into());
+    }
+
+    /// From starts that fit the weights; infinite if too many segments are left out.
+    fn judge(&mut self, problem: &mut Self::Problem, weights: &[S]) -> Judgement {
+        let ShootingProblem { shots, validation, .. } = problem;
+        self.validation_starts.refine(shots, weights, validation);
+        let rows: Vec<u32> = (0..validation.len() as u32).collect();
+        let report = shots.loss(weights, validation, &self.validation_starts.at, &rows);
+        let loss = report.loss.to_f64();
+        let counts = loss.is_finite() && LEFT_OUT * report.left_out <= validation.len();
+        let loss = if counts { loss } else { f64::INFINITY };
+        Judgement { loss, cost: loss }
+    }
+
+    fn stored(&self, seconds: f64) -> Option<Shot<S>> {
+        let (matrices, jacobian) = self.starts.curvature.stored();
+        Some(Shot {
+            seconds,
+            start_loss: self.start_loss,
+            gap: self.gap,
+            starts: self.starts.at.clone(),
+            validation_starts: self.validation_starts.at.clone(),
+            matrices: matrices.to_vec(),
+            jacobian: jacobian.to_vec(),
+        })
+    }
+}

@@ -1,0 +1,112 @@
+//! Samples that the loop over epochs learns from: states of a dataset here, segments of motion in multiple shooting.
+
+use crate::optimizers::{Method, Moments};
+use crate::scalar::Scalar;
+use crate::training::checkpoint::Shot;
+use crate::training::objective::BatchReport;
+use crate::training::problem::TrainingProblem;
+use argmin::core::KV;
+use std::marker::PhantomData;
+
+/// At most one in this many validation states may be left out of a loss that counts.
+const LEFT_OUT: usize = 100;
+
+/// Loss of the validation samples.
+pub(crate) struct Judgement {
+    /// As the history shows it.
+    pub loss: f64,
+    /// As parameters are compared by it, infinite if it means nothing.
+    pub cost: f64,
+}
+
+/// Samples that are learned from batch by batch, with whatever moves beside the weights.
+pub(crate) trait Learner<S: Scalar> {
+    /// Evaluates batches.
+    type Problem;
+
+    /// Moments of so many parameters before the first step of an update rule.
+    fn moments(&mut self, problem: &mut Self::Problem, method: Method, parameters: usize) -> Moments<S>;
+
+    /// Number of weights that decay; they come first among the parameters.
+    fn decaying(&self, problem: &mut Self::Problem) -> usize;
+
+    /// Threads of the run.
+    fn pool<'p>(&self, problem: &'p mut Self::Problem) -> &'p rayon::ThreadPool;
+
+    /// Before the first epoch; the cost of the weights given, where the epochs have to beat it.
+    fn begin(&mut self, problem: &mut Self::Problem, weights: &[S]) -> Option<f64> {
+        let _ = (problem, weights);
+        None
+    }
+
+    /// Before epoch `epoch` of this phase, counted from 0.
+    fn begin_epoch(&mut self, problem: &mut Self::Problem, weights: &[S], epoch: u64) {
+        let _ = (problem, weights, epoch);
+    }
+
+    /// Loss, penalty and gradient of the samples `rows`; `gradient` is overwritten.
+    fn step(&mut self, problem: &mut Self::Problem, weights: &[S], rows: &[u32], gradient: &mut [S]) -> BatchReport<S>;
+
+    /// After the weights were moved by the gradient of the last step.
+    fn follow(&mut self, problem: &mut Self::Problem) {
+        let _ = problem;
+    }
+
+    /// States of one sample at which the penalty is taken.
+    fn penalty_states(&self, problem: &Self::Problem) -> usize {
+        let _ = problem;
+        1
+    }
+
+    /// Adds what the log should say of an epoch of so many batches.
+    fn record(&self, batches: f64, record: &mut KV) {
+        let _ = (batches, record);
+    }
+
+    /// Loss of the validation samples.
+    fn judge(&mut self, problem: &mut Self::Problem, weights: &[S]) -> Judgement;
+
+    /// Part of a checkpoint beside the weights, after `seconds` of this phase.
+    fn stored(&self, seconds: f64) -> Option<Shot<S>> {
+        let _ = seconds;
+        None
+    }
+}
+
+/// States of a [`TrainingProblem`]; nothing moves beside the weights.
+pub(crate) struct States<'a>(PhantomData<&'a ()>);
+
+impl States<'_> {
+    /// The states of any problem.
+    pub(crate) fn new() -> Self {
+        Self(PhantomData)
+    }
+}
+
+impl<'a, S: Scalar> Learner<S> for States<'a> {
+    type Problem = TrainingProblem<'a, S>;
+
+    fn moments(&mut self, problem: &mut Self::Problem, method: Method, _: usize) -> Moments<S> {
+        problem.moments(method)
+    }
+
+    fn decaying(&self, problem: &mut Self::Problem) -> usize {
+        problem.objective().model().weights()
+    }
+
+    fn pool<'p>(&self, problem: &'p mut Self::Problem) -> &'p rayon::ThreadPool {
+        problem.objective().pool()
+    }
+
+    fn step(&mut self, problem: &mut Self::Problem, weights: &[S], rows: &[u32], gradient: &mut [S]) -> BatchReport<S> {
+        problem.step(weights, rows, gradient)
+    }
+
+    /// A loss that is not finite, or that passes over more than a few of the states, is never the best.
+    fn judge(&mut self, problem: &mut Self::Problem, weights: &[S]) -> Judgement {
+        let report = problem.validation_loss(weights);
+        let loss = report.loss.to_f64();
+        let counts = loss.is_finite() && LEFT_OUT * report.left_out <= problem.validation().len();
+        Judgement { loss, cost: if counts { loss } else { f64::INFINITY } }
+    }
+}
