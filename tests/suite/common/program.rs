@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::{Command, Output, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
@@ -75,6 +75,11 @@ impl Run {
             }
         };
         Self { code: status.code(), stdout: out.join().unwrap(), stderr: err.join().unwrap() }
+    }
+
+    /// The run ended well.
+    pub fn succeeded(&self) {
+        assert_eq!(self.code, Some(0), "{}", self.stderr);
     }
 
     /// The run failed with this code and one line that says all of `parts`, and printed no result.
@@ -181,4 +186,11 @@ pub fn wait_until(what: &str, happened: impl Fn() -> bool) {
 /// Waits until a file is there.
 pub fn wait_for(path: &Path) {
     wait_until(&path.display().to_string(), || path.exists());
+}
+
+/// Standard output of a run that ended well and had nothing to warn of.
+pub fn said_by(output: &Output) -> String {
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    assert!(output.stderr.is_empty(), "{}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout.clone()).unwrap()
 }

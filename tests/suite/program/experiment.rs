@@ -1,7 +1,7 @@
 //! `lnn experiment` from outside: everything runs, nothing finished runs twice.
 #![cfg(feature = "cli")]
 
-use crate::common::program::{joined, lead};
+use crate::common::program::{joined, lead, said_by};
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
@@ -10,19 +10,13 @@ fn lnn(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_lnn")).arg("experiment").args(arguments).output().unwrap()
 }
 
-fn succeeded(output: &Output) -> String {
-    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
-    assert!(output.stderr.is_empty(), "{}", String::from_utf8_lossy(&output.stderr));
-    String::from_utf8(output.stdout.clone()).unwrap()
-}
-
 fn smoke(name: &str, out: &Path, threads: &str) -> String {
-    succeeded(&lnn(&[name, "--scale", "smoke", "--threads", threads, "--out", out.to_str().unwrap()]))
+    said_by(&lnn(&[name, "--scale", "smoke", "--threads", threads, "--out", out.to_str().unwrap()]))
 }
 
 #[test]
 fn every_experiment_of_the_paper_runs() {
-    let listed = succeeded(&lnn(&[]));
+    let listed = said_by(&lnn(&[]));
     let out = tempfile::tempdir().unwrap();
     let printed = smoke("all", out.path(), "2");
     for experiment in lnn::experiments::experiments() {
@@ -70,7 +64,7 @@ fn a_hole_of_ones_own_is_read_like_those_of_the_experiment() {
     let out = tempfile::tempdir().unwrap();
     let hole = ["--system", "reissner-nordstrom-cartesian", "--param", "Q=0.5", "--scale", "smoke", "--only", "quick"];
     let out_dir = ["--threads", "1", "--out", out.path().to_str().unwrap()];
-    let printed = succeeded(&lnn(&[&["black-holes"], &hole[..], &out_dir].concat()));
+    let printed = said_by(&lnn(&[&["black-holes"], &hole[..], &out_dir].concat()));
     assert!(printed.contains("quick, reissner-nordstrom-cartesian, Q = 0.5"), "{printed}");
     let readings = fs::read_to_string(out.path().join("black-holes-smoke/readings.csv")).unwrap();
     assert!(readings.contains("parameter Q") && !readings.contains("kerr"), "{readings}");
@@ -110,7 +104,7 @@ fn finished_runs_are_kept_and_missing_ones_made_again() {
     assert_eq!(refused.status.code(), Some(1));
     assert!(String::from_utf8_lossy(&refused.stderr).contains("curves.csv: this command reads it"));
     assert!(String::from_utf8(read(changed)).unwrap().contains("rate = 0.002"));
-    succeeded(&lnn(&[&again[..], &["--overwrite"]].concat()));
+    said_by(&lnn(&[&again[..], &["--overwrite"]].concat()));
     assert_eq!(String::from_utf8(read(kept)).unwrap(), marked);
     assert_eq!(read(changed), config.into_bytes());
     // The same numbers on another number of threads.
@@ -122,7 +116,7 @@ fn finished_runs_are_kept_and_missing_ones_made_again() {
 fn more_seeds_are_more_runs_of_the_same_rows() {
     let out = tempfile::tempdir().unwrap();
     let path = out.path().to_str().unwrap();
-    succeeded(&lnn(&["scaling", "--scale", "smoke", "--seeds", "2", "--out", path]));
+    said_by(&lnn(&["scaling", "--scale", "smoke", "--seeds", "2", "--out", path]));
     let folder = out.path().join("scaling-smoke");
     let table = fs::read_to_string(folder.join("table.csv")).unwrap();
     assert_eq!(table.lines().count(), 4);
@@ -137,7 +131,7 @@ fn single_rows_can_be_run_and_tables_say_what_they_compare() {
     let out = tempfile::tempdir().unwrap();
     let path = out.path().to_str().unwrap();
     let only = |text| lnn(&["scaling", "--scale", "smoke", "--only", text, "--out", path]);
-    let printed = succeeded(&only("DyT"));
+    let printed = said_by(&only("DyT"));
     let table = || fs::read_to_string(out.path().join("scaling-smoke/table.csv")).unwrap();
     assert!(table().lines().count() == 2 && table().lines().nth(1).unwrap().starts_with("\"DyT\""), "{}", table());
     for part in ["RAdam", "lambda = 5", "without the penalty"] {
@@ -177,7 +171,7 @@ fn wrong_names_and_directories_are_refused() {
 /// `NAME: share 1/2 is finished, ..` and the rest of what a share prints.
 fn share(out: &Path, given: &str) -> String {
     let out = out.to_str().unwrap();
-    succeeded(&lnn(&["scaling", "--scale", "smoke", "--threads", "1", "--shard", given, "--out", out]))
+    said_by(&lnn(&["scaling", "--scale", "smoke", "--threads", "1", "--shard", given, "--out", out]))
 }
 
 #[test]
@@ -187,7 +181,7 @@ fn shares_together_make_what_one_process_makes() {
     smoke("scaling", &alone, "1");
     let list = || -> Vec<serde_json::Value> {
         let listed =
-            succeeded(&lnn(&["scaling", "--scale", "smoke", "--list", "--json", "--out", shared.to_str().unwrap()]));
+            said_by(&lnn(&["scaling", "--scale", "smoke", "--list", "--json", "--out", shared.to_str().unwrap()]));
         listed.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
     };
     let states = || list().iter().map(|run| run["state"].as_str().unwrap().to_string()).collect::<Vec<_>>();
@@ -239,7 +233,7 @@ fn shares_together_make_what_one_process_makes() {
         files.iter().map(|path| (name(path), fs::read(path).unwrap())).collect()
     };
     for _ in 0..2 {
-        succeeded(&merge());
+        said_by(&merge());
         assert!(files(&shared) == files(&alone));
     }
     assert!(files(&alone).iter().any(|(name, _)| name == "report.html"));

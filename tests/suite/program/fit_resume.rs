@@ -1,7 +1,7 @@
 //! Fits that are stopped and gone on with, from outside.
 #![cfg(all(feature = "cli", unix))]
 
-use crate::common::program::{Folder, Run, command, lnn, text};
+use crate::common::program::{Folder, command, lnn, text};
 use crate::program::fit::{COLUMNS, pendulum};
 use lnn::training::{LATEST, PREVIOUS};
 use serde_json::Value;
@@ -22,10 +22,6 @@ fn result(directory: &Path) -> (Vec<u8>, Vec<String>, Value) {
         ["history.csv", "shooting.csv"].map(|name| fs::read_to_string(directory.join(name)).unwrap_or_default());
     let lines = histories.iter().flat_map(|csv| csv.lines()).map(|line| line.rsplit_once(',').unwrap().0.to_string());
     (read("model.safetensors"), lines.collect(), summary)
-}
-
-fn succeeded(run: &Run) {
-    assert_eq!(run.code, Some(0), "{}", run.stderr);
 }
 
 /// Runs a fit and ends it by SIGTERM as soon as `reached` says so of its log.
@@ -54,7 +50,7 @@ fn a_fit_stopped_in_the_middle_comes_to_the_same_end() {
     let fit = ["fit", &data, "--hidden", "16,16", "--targets", "motion", "--epochs", "40", "--shooting-epochs", "20"];
     let base = [&fit[..], &COLUMNS, &["--threads", "1"]].concat();
     let (whole, out) = (text(&folder.path("whole")), text(&folder.path("out")));
-    succeeded(&lnn(&[&base[..], &["--out", &whole]].concat()));
+    lnn(&[&base[..], &["--out", &whole]].concat()).succeeded();
 
     // Once in the training on accelerations, once in multiple shooting.
     let epochs = |log: &str| log.matches(" epoch=").count();
@@ -87,7 +83,7 @@ fn a_fit_stopped_in_the_middle_comes_to_the_same_end() {
     resume(&[]).refused(1, &["swings.csv", "no such file"]);
     fs::write(folder.path("out").join(LATEST), b"damaged").unwrap();
     let resumed = resume(&[&text(&folder.path("moved.csv")), "--threads", "1"]);
-    succeeded(&resumed);
+    resumed.succeeded();
     assert!(resumed.stderr.contains(PREVIOUS), "{}", resumed.stderr);
     assert!(result(&folder.path("out")) == result(&folder.path("whole")));
     assert!(!folder.path("out").join(LATEST).exists() && !folder.path("out").join(PREVIOUS).exists());

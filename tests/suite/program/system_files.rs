@@ -1,7 +1,7 @@
 //! Systems in files of one's own, from outside.
 #![cfg(all(feature = "cli", unix))]
 
-use crate::common::program::{Folder, Run, lnn, text};
+use crate::common::program::{Folder, lnn, text};
 use serde_json::Value;
 use std::fs;
 
@@ -11,20 +11,16 @@ const PENDULUM: &str = include_str!("../../../examples/systems/pendulum.toml");
 const SMALL: &str =
     "[data]\ntraining = 512\nvalidation = 64\ntest = 64\n[network]\nhidden = [8]\n[[phase]]\nepochs = 2\n";
 
-fn succeeded(run: &Run) {
-    assert_eq!(run.code, Some(0), "{}", run.stderr);
-}
-
 #[test]
 fn a_file_is_a_system_of_every_command_and_goes_with_its_model() {
     let folder = Folder::new();
     let (file, small) = (folder.file("my.toml", PENDULUM), folder.file("small.toml", SMALL));
     let run = text(&folder.path("run"));
     let train = |more: &[&str]| lnn(&[&["train", "--config", &small, "--threads", "1"], more].concat());
-    succeeded(&train(&["--system", &file, "--param", "l=0.5", "--out", &run]));
+    train(&["--system", &file, "--param", "l=0.5", "--out", &run]).succeeded();
     // As an argument, and where two are one too many.
     let other = text(&folder.path("other"));
-    succeeded(&train(&[&file, "--param", "l=0.5", "--out", &other]));
+    train(&[&file, "--param", "l=0.5", "--out", &other]).succeeded();
     assert_eq!(
         fs::read(folder.path("run/model.safetensors")).unwrap(),
         fs::read(folder.path("other/model.safetensors")).unwrap()
@@ -32,31 +28,31 @@ fn a_file_is_a_system_of_every_command_and_goes_with_its_model() {
     train(&[&file, "--system", &file]).refused(2, &["--system"]);
     // Everything else without the file.
     fs::remove_file(&file).unwrap();
-    succeeded(&lnn(&["evaluate", &run, "--starts", "1"]));
+    lnn(&["evaluate", &run, "--starts", "1"]).succeeded();
     let json: Value =
         serde_json::from_slice(&fs::read(folder.path("run/evaluation/evaluation.json")).unwrap()).unwrap();
     assert_eq!(json["system"], "pendulum");
     let again = text(&folder.path("again"));
-    succeeded(&lnn(&["train", "--config", &text(&folder.path("run/config.toml")), "--threads", "2", "--out", &again]));
+    lnn(&["train", "--config", &text(&folder.path("run/config.toml")), "--threads", "2", "--out", &again]).succeeded();
     assert_eq!(
         fs::read(folder.path("run/model.safetensors")).unwrap(),
         fs::read(folder.path("again/model.safetensors")).unwrap()
     );
-    succeeded(&lnn(&["train", "--from", &run, "--config", &small, "--out", &text(&folder.path("from"))]));
+    lnn(&["train", "--from", &run, "--config", &small, "--out", &text(&folder.path("from"))]).succeeded();
     let motion = text(&folder.path("motion.csv"));
     let roll = ["--state", "0.1,0", "--t-end", "1", "--dt", "0.1", "--out", &motion, "--json", "--overwrite"];
     let found = lnn(&[&["rollout", &run, "--beyond-range"], roll.as_slice()].concat());
-    succeeded(&found);
+    found.succeeded();
     assert_eq!(serde_json::from_str::<Value>(&found.stdout).unwrap()["time_unit"], "s");
     // The exact motion of the file.
     let file = folder.file("my.toml", PENDULUM);
-    succeeded(&lnn(&[&["rollout", "--system", &file, "--param", "l=0.5"], roll.as_slice()].concat()));
+    lnn(&[&["rollout", "--system", &file, "--param", "l=0.5"], roll.as_slice()].concat()).succeeded();
     let last = fs::read_to_string(&motion).unwrap();
     let theta: f64 = last.lines().last().unwrap().split(',').nth(1).unwrap().parse().unwrap();
     // Small oscillations: 0.1 cos(sqrt(g/l)), a little slower.
     assert!((theta - 0.1 * (9.8f64 / 0.5).sqrt().cos()).abs() < 3e-4, "{theta}");
     // Another system with the same columns, and one with other columns.
-    succeeded(&lnn(&["evaluate", &run, "--system", &file, "--param", "l=0.4", "--starts", "1"]));
+    lnn(&["evaluate", &run, "--system", &file, "--param", "l=0.4", "--starts", "1"]).succeeded();
     lnn(&["evaluate", &run, "--system", "kepler"])
         .refused(2, &["--system kepler: expected the model's columns theta,theta_dot"]);
 }
@@ -66,13 +62,13 @@ fn a_run_goes_on_with_its_own_system_alone() {
     let folder = Folder::new();
     let (file, small) = (folder.file("my.toml", PENDULUM), folder.file("small.toml", SMALL));
     let run = text(&folder.path("run"));
-    succeeded(&lnn(&["train", "--system", &file, "--config", &small, "--threads", "1", "--out", &run]));
+    lnn(&["train", "--system", &file, "--config", &small, "--threads", "1", "--out", &run]).succeeded();
     let resume = |file: &str| lnn(&["train", "--resume", &run, "--system", file]);
-    succeeded(&resume(&file));
+    resume(&file).succeeded();
     let changed = folder.file("my.toml", PENDULUM.replace("cos(theta)", "sin(theta)"));
     resume(&changed).refused(2, &["--resume", "description.lagrangian", "asked for"]);
     // A comment changes nothing.
-    succeeded(&resume(&folder.file("same.toml", format!("# the same\n{PENDULUM}"))));
+    resume(&folder.file("same.toml", format!("# the same\n{PENDULUM}"))).succeeded();
     // Its configuration with another file.
     let config = text(&folder.path("run/config.toml"));
     lnn(&["train", "--config", &config, "--system", &changed]).refused(2, &["another description of pendulum"]);
@@ -122,7 +118,7 @@ fn mistakes_name_file_line_key_and_column() {
         .refused(2, &["there is none for pendulum"]);
     // A configuration with a broken description.
     let printed = lnn(&["train", "--system", &folder.file("p.toml", PENDULUM), "--print-config"]);
-    succeeded(&printed);
+    printed.succeeded();
     let config = folder.file("c.toml", printed.stdout.replace("cos(theta)", "cos(thta)"));
     lnn(&["train", "--config", &config]).refused(2, &["c.toml:", "description.lagrangian: column 33: unknown name"]);
 }

@@ -1,7 +1,7 @@
 //! Training, roll-out and evaluation from outside, on networks too small to learn much.
 #![cfg(feature = "cli")]
 
-use crate::common::program::{joined, lead, wait_for};
+use crate::common::program::{joined, lead, said_by, wait_for};
 use lnn::configuration::Config;
 use lnn::lagrangian::configure;
 use lnn::network::file::ModelFile;
@@ -24,12 +24,6 @@ fn refused(output: &Output, code: i32, parts: &[&str]) {
         stderr.starts_with("error: ") && parts.iter().all(|part| stderr.contains(part)),
         "{stderr} lacks {parts:?}"
     );
-}
-
-fn succeeded(output: &Output) -> String {
-    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
-    assert!(output.stderr.is_empty(), "{}", String::from_utf8_lossy(&output.stderr));
-    String::from_utf8(output.stdout.clone()).unwrap()
 }
 
 fn text(path: &Path) -> String {
@@ -64,7 +58,7 @@ impl Folder {
     /// Trains the small configuration of a system into `out`.
     fn train(&self, system: &str, out: &str, more: &[&str]) -> String {
         let (config, out) = (self.config(&small(system)), text(&self.path(out)));
-        succeeded(&lnn(&[&["train", "--config", &config, "--out", &out], more].concat()))
+        said_by(&lnn(&[&["train", "--config", &config, "--out", &out], more].concat()))
     }
 }
 
@@ -107,8 +101,8 @@ fn a_training_leaves_a_complete_and_repeatable_folder() {
     // The written configuration repeats the run, on any number of threads; another seed does not.
     let (two, three) = (text(&folder.path("two")), text(&folder.path("three")));
     let written = text(&one.join("config.toml"));
-    succeeded(&lnn(&["train", "double-pendulum", "--config", &written, "--threads", "2", "--out", &two]));
-    let json = succeeded(&lnn(&["train", "--config", &written, "--seed", "5", "--out", &three, "--json"]));
+    said_by(&lnn(&["train", "double-pendulum", "--config", &written, "--threads", "2", "--out", &two]));
+    let json = said_by(&lnn(&["train", "--config", &written, "--seed", "5", "--out", &three, "--json"]));
     assert_eq!(serde_json::from_str::<Value>(&json).unwrap()["seed"], 5);
     let model = |name: &str| fs::read(folder.path(name).join("model.safetensors")).unwrap();
     assert_eq!(model("one"), model("two"));
@@ -142,7 +136,7 @@ fn a_model_moves_and_is_judged() {
     let middle: Vec<String> = header.position.iter().map(|b| (0.5 * (b[0] + b[1])).to_string()).collect();
     let start = format!("{},0,0", middle.join(","));
     for method in ["dopri5", "dop853"] {
-        succeeded(&rollout(&start, &["--method", method]));
+        said_by(&rollout(&start, &["--method", method]));
         let csv = fs::read_to_string(&out).unwrap();
         assert_eq!(csv.lines().count(), 4, "{csv}");
         assert_eq!(csv.lines().next().unwrap(), format!("t,{},energy", header.columns.join(",")));
@@ -175,9 +169,9 @@ fn a_model_moves_and_is_judged() {
         &["safetensors"],
     );
 
-    let table = succeeded(&lnn(&["evaluate", &model, "--starts", "2"]));
+    let table = said_by(&lnn(&["evaluate", &model, "--starts", "2"]));
     assert!(table.contains("accelerations") && table.contains("report.html"));
-    let json = succeeded(&lnn(&["evaluate", &model, "--overwrite", "--starts", "2", "--json"]));
+    let json = said_by(&lnn(&["evaluate", &model, "--overwrite", "--starts", "2", "--json"]));
     let json: Value = serde_json::from_str(&json).unwrap();
     assert_eq!(json["trajectories"].as_array().unwrap().len(), 2);
     assert!(folder.path("run/evaluation/lagrangian.svg").is_file());
@@ -185,7 +179,7 @@ fn a_model_moves_and_is_judged() {
     let evaluate =
         |more: &[&str]| lnn(&[&["evaluate", &model, "--overwrite", "--starts", "2", "--json"], more].concat());
     let (near, still) = (["--positions", "1:1.5,0.03:0.03"], ["--velocities", "0:0"]);
-    let json = succeeded(&evaluate(&[&near[..], &still, &["--until", "0.05", "--rtol", "1e-9"]].concat()));
+    let json = said_by(&evaluate(&[&near[..], &still, &["--until", "0.05", "--rtol", "1e-9"]].concat()));
     let json: Value = serde_json::from_str(&json).unwrap();
     for start in json["trajectories"].as_array().unwrap() {
         let numbers =
@@ -197,7 +191,7 @@ fn a_model_moves_and_is_judged() {
     }
     // Faster than the model was trained for.
     let fast = format!("{}:{0}", 3.0 * header.velocity[0][1]);
-    let table = succeeded(&lnn(&["evaluate", &model, "--overwrite", "--velocities", &fast, "--until", "0.1"]));
+    let table = said_by(&lnn(&["evaluate", &model, "--overwrite", "--velocities", &fast, "--until", "0.1"]));
     let left = format!("{} outside the training range at 0.0", header.columns[2]);
     assert!(joined(&table).contains(&left), "{table}");
     refused(&evaluate(&["--positions", "0:1,0:1,0:1"]), 2, &["--positions: expected 1 or 2 pairs LOW:HIGH, found 3"]);
@@ -228,9 +222,9 @@ fn a_relativistic_model_knows_the_range_of_the_imposed_velocity() {
         lnn(&[&["rollout", &model, "--state", state], &options[..]].concat())
     };
     let inside = 0.5 * high;
-    assert!(succeeded(&rollout(&format!("0,0,0,3,{inside},0,0,0"))).contains(" m, "));
+    assert!(said_by(&rollout(&format!("0,0,0,3,{inside},0,0,0"))).contains(" m, "));
     refused(&rollout("0,0,0,3,6.7,0,0,0"), 1, &["training range", "t_dot"]);
-    let json = succeeded(&lnn(&["evaluate", &model, "--overwrite", "--starts", "2", "--json"]));
+    let json = said_by(&lnn(&["evaluate", &model, "--overwrite", "--starts", "2", "--json"]));
     let json: Value = serde_json::from_str(&json).unwrap();
     for start in json["trajectories"].as_array().unwrap() {
         let number = |key: &str, k: usize| start[key][k].as_f64().unwrap();
