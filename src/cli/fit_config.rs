@@ -85,7 +85,7 @@ impl Settled {
         let file = ConfigFile::read(path)?;
         let coordinates = file.get(&["recording", "coords"]).and_then(toml::Value::as_array).map_or(0, Vec::len);
         let n = if args.recording.coords.is_empty() { coordinates } else { args.recording.coords.len() };
-        let (found, mut mistakes) = file.over(&stand_in(n)?)?;
+        let (found, mut mistakes) = file.over(&stand_in()?)?;
         mistakes.extend(column_mistakes(&found.recording));
         mistakes.extend(found.faults(n).into_iter().map(Mistake::from));
         file.check(mistakes)?;
@@ -120,12 +120,11 @@ impl Settled {
     /// A data error if the configuration cannot be written.
     pub fn training(&self, suggested: &Config) -> Result<Config, CliError> {
         let Some(file) = &self.file else { return Ok(suggested.clone()) };
-        let base = FitConfig { training: suggested.clone(), ..stand_in(suggested.data.validation_position.len())? };
+        let base = FitConfig { training: suggested.clone(), ..stand_in()? };
         let mut training = file.over(&base)?.0.training;
         training.data.clone_from(&suggested.data);
         for (k, phase) in training.phases.iter_mut().enumerate() {
-            let all = &suggested.phases[0];
-            (phase.position, phase.velocity) = (all.position.clone(), all.velocity.clone());
+            [&mut phase.position, &mut phase.velocity].into_iter().for_each(Vec::clear);
             phase.log_uniform.clear();
             let has = |key: &str| file.has(&format!("training.phase[{k}].{key}"));
             if has("epochs") && !has("t_max") && phase.schedule != Schedule::CosineAnnealing {
@@ -146,15 +145,15 @@ impl Settled {
     }
 }
 
-/// A configuration to tell the types of a file's keys by, for `n` coordinates.
-fn stand_in(n: usize) -> Result<FitConfig, CliError> {
+/// A configuration to tell the types of a file's keys by.
+fn stand_in() -> Result<FitConfig, CliError> {
     let system = crate::lagrangian::configure("double-pendulum", &[]).map_err(CliError::data)?;
     let mut training = Preset::Quick.config(&system).ok_or_else(|| CliError::data("there is no preset"))?;
-    let bounds = vec![[0.0, 0.0]; n];
     training.system = "measured".to_string();
-    training.data.validation_position.clone_from(&bounds);
-    training.data.validation_velocity.clone_from(&bounds);
-    (training.phases[0].position, training.phases[0].velocity) = (bounds.clone(), bounds);
+    let (data, phase) = (&mut training.data, &mut training.phases[0]);
+    let bounds =
+        [&mut data.validation_position, &mut data.validation_velocity, &mut phase.position, &mut phase.velocity];
+    bounds.into_iter().for_each(Vec::clear);
     Ok(FitConfig {
         targets: None,
         held_out: HELD_OUT,
@@ -198,7 +197,7 @@ mod tests {
 
     #[test]
     fn the_commented_configuration_is_the_configuration() {
-        let mut config = stand_in(2).unwrap();
+        let mut config = stand_in().unwrap();
         for full in [false, true] {
             if full {
                 (config.targets, config.window) = (Some(Targets::Motion), Some(21));

@@ -172,7 +172,7 @@ impl Args {
     /// Usage errors naming everything that is wrong.
     pub fn check(&self, config: &Config) -> Result<SystemInstance<f64>, CliError> {
         let system = config.system().map_err(CliError::usage)?;
-        CliError::all_usage(config.faults(system.coordinates).into_iter().map(|fault| fault.to_string()))?;
+        CliError::all_usage(config.sampling_faults(system.coordinates).into_iter().map(|fault| fault.to_string()))?;
         Ok(system)
     }
 
@@ -244,7 +244,7 @@ impl Args {
             config.seed = file.large(&["seed"]).unwrap_or(config.seed);
             mistakes.extend(wrong);
             if known {
-                mistakes.extend(config.faults(system.coordinates).into_iter().map(Mistake::from));
+                mistakes.extend(config.sampling_faults(system.coordinates).into_iter().map(Mistake::from));
                 mistakes.extend(config.penalty().err().map(|error| match error {
                     SamplingError::Config(fault) => Mistake::from(fault),
                     other => Mistake::new("", other),

@@ -139,9 +139,11 @@ pub struct Data {
     pub rapidity: Option<f64>,
     /// Number of fresh states on which the final model is judged.
     pub test: usize,
-    /// Validation and test bounds of each coordinate.
+    /// Validation and test bounds of each coordinate; states of one's own, recorded ones, need none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub validation_position: Vec<[f64; 2]>,
     /// Validation and test bounds of each velocity; those of a velocity that a mass shell fixes mean nothing.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub validation_velocity: Vec<[f64; 2]>,
 }
 
@@ -269,9 +271,11 @@ pub struct Phase {
     pub schedule: Schedule,
     /// Epochs from highest to lowest rate of `cosine-annealing`.
     pub t_max: f64,
-    /// Training bounds of each coordinate.
+    /// Training bounds of each coordinate; states of one's own, recorded ones, need none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub position: Vec<[f64; 2]>,
     /// Training bounds of each velocity; those of a velocity that a mass shell fixes mean nothing.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub velocity: Vec<[f64; 2]>,
     /// For which coordinates half of the training states are uniform in the logarithm, where the low end of the bounds needs more
     /// of them than its length; none if empty.
@@ -320,7 +324,7 @@ impl Network {
 }
 
 impl Config {
-    /// Checks every range, for a system of `n` coordinates.
+    /// Checks every range, for `n` coordinates; bounds of states may be left out, for who has states needs none.
     ///
     /// # Errors
     /// The first value out of range.
@@ -328,8 +332,17 @@ impl Config {
         self.faults(n).into_iter().next().map_or(Ok(()), Err)
     }
 
-    /// Every value out of range, for a system of `n` coordinates, in the order of the keys.
+    /// Every value out of range, for a training on states of `n` coordinates, in the order of the keys.
     pub(crate) fn faults(&self, n: usize) -> Vec<ConfigError> {
+        self.faults_with(n, false)
+    }
+
+    /// Every value out of range, bounds that are missing among them, for a training on states drawn of a system of `n` coordinates.
+    pub(crate) fn sampling_faults(&self, n: usize) -> Vec<ConfigError> {
+        self.faults_with(n, true)
+    }
+
+    fn faults_with(&self, n: usize, drawn: bool) -> Vec<ConfigError> {
         let mut faults = Faults::default();
         const STATES: usize = 1 << 30;
         let data = &self.data;
@@ -351,8 +364,8 @@ impl Config {
             Ok(None) => {}
             Err(fault) => faults.0.push(fault),
         }
-        faults.bounds("data.validation_position", &data.validation_position, n);
-        faults.bounds("data.validation_velocity", &data.validation_velocity, n);
+        faults.bounds("data.validation_position", &data.validation_position, drawn, n);
+        faults.bounds("data.validation_velocity", &data.validation_velocity, drawn, n);
         self.network_faults(&mut faults);
         faults.at_least_zero(self.penalty.lambda(), "penalty.lambda");
         let optimizer = &self.optimizer;
@@ -364,7 +377,7 @@ impl Config {
         faults.number(averaging, "optimizer.averaging", ok, "a number from 0 to below 1");
         faults.check(!self.phases.is_empty(), "phase", "at least one phase", "none".to_string());
         for (k, phase) in self.phases.iter().enumerate() {
-            phase.faults(k, n, &mut faults);
+            phase.faults(k, n, drawn, &mut faults);
         }
         if let Some(lbfgs) = &self.lbfgs {
             faults.count(lbfgs.iterations, "lbfgs.iterations", 1 << 24);
@@ -397,7 +410,7 @@ impl Config {
 
 impl Phase {
     /// Every value of phase `k` that is out of range, for `n` coordinates.
-    fn faults(&self, k: usize, n: usize, faults: &mut Faults) {
+    fn faults(&self, k: usize, n: usize, drawn: bool, faults: &mut Faults) {
         let field = |name: &str| format!("phase[{k}].{name}");
         faults.count(self.epochs, &field("epochs"), 1 << 24);
         let positive = |x: f64| x.is_finite() && x > 0.0;
@@ -406,8 +419,8 @@ impl Phase {
             faults.number(self.eta_min, &field("eta_min"), ok, "a number from 0 to the rate");
         }
         faults.number(self.t_max, &field("t_max"), positive(self.t_max), "a positive number of epochs");
-        faults.bounds(&field("position"), &self.position, n);
-        faults.bounds(&field("velocity"), &self.velocity, n);
+        faults.bounds(&field("position"), &self.position, drawn, n);
+        faults.bounds(&field("velocity"), &self.velocity, drawn, n);
         let log_uniform = &self.log_uniform;
         let found = format!("{} for {n}", log_uniform.len());
         let expected = "nothing or true or false for each coordinate";

@@ -56,7 +56,10 @@ impl Faults {
         self.check((1..=most).contains(&value), field, "a positive number of sensible size", value.to_string())
     }
     /// A finite `[low, high]` for each of `n` coordinates.
-    pub fn bounds(&mut self, field: &str, bounds: &[[f64; 2]], n: usize) {
+    pub fn bounds(&mut self, field: &str, bounds: &[[f64; 2]], required: bool, n: usize) {
+        if bounds.is_empty() && !required {
+            return;
+        }
         let found = format!("{} for {n}", bounds.len());
         self.check(bounds.len() == n, field, "one [low, high] per coordinate", found);
         for (k, &[low, high]) in bounds.iter().enumerate() {

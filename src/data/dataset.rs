@@ -151,10 +151,16 @@ impl<S: Scalar> Dataset<S> {
             .collect()
     }
 
-    /// Smallest and largest velocity of coordinate `i`.
-    pub(crate) fn velocity_range(&self, i: usize) -> [f64; 2] {
-        let all = self.v.iter().skip(i).step_by(self.coordinates).map(|v| v.to_f64());
-        all.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(v), high.max(v)])
+    /// Smallest and largest value of every coordinate, and of every velocity.
+    pub(crate) fn ranges(&self) -> [Vec<[f64; 2]>; 2] {
+        let n = self.coordinates;
+        [&self.q, &self.v].map(|values| {
+            let range = |i: usize| {
+                let all = values.iter().skip(i).step_by(n).map(|x| x.to_f64());
+                all.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)])
+            };
+            (0..n).map(range).collect()
+        })
     }
 
     /// CRC-32 of coordinates, velocities, accelerations, forces and weights in double precision.
@@ -200,6 +206,6 @@ mod tests {
     fn the_scale_is_the_largest_of_coordinate_and_velocity() {
         let data = Dataset::new(2, vec![1.0, -3.0, 0.5, 0.0], vec![-2.0, 1.0, 0.0, 0.0], vec![9.0; 4]).unwrap();
         assert_eq!(data.physical_scale(), vec![2.0, 3.0]);
-        assert_eq!((data.velocity_range(0), data.velocity_range(1)), ([-2.0, 0.0], [0.0, 1.0]));
+        assert_eq!(data.ranges()[1], [[-2.0, 0.0], [0.0, 1.0]]);
     }
 }

@@ -84,7 +84,9 @@ pub fn sample_all<S: Scalar>(
     config: &Config,
     system: &SystemInstance<f64>,
 ) -> Result<(Datasets<S>, Vec<f64>), SamplingError> {
-    config.validate(system.coordinates)?;
+    if let Some(fault) = config.sampling_faults(system.coordinates).into_iter().next() {
+        return Err(fault.into());
+    }
     config.architecture(system, vec![1.0; system.coordinates])?;
     let seed = config.seed;
     let mut training = Vec::with_capacity(config.phases.len());
@@ -161,9 +163,9 @@ mod tests {
                     let terms: f64 = p.iter().zip(v).map(|(p, v)| (p * v).abs()).sum();
                     assert!((2.0 * l + 1.0).abs() <= 16.0 * f64::EPSILON * terms, "{}: {l} {terms}", system.name);
                 }
-                assert!(set.velocity_range(i)[0] > 0.0);
+                assert!(set.ranges()[1][i][0] > 0.0);
             }
-            assert!(scale[i] >= data.training[0].velocity_range(i)[1] && scale.iter().all(|s| s.is_finite()));
+            assert!(scale[i] >= data.training[0].ranges()[1][i][1] && scale.iter().all(|s| s.is_finite()));
             // Whatever the bounds of the constrained velocity, nothing changes.
             config.phases[0].velocity[i] = [-7.0, -7.0];
             assert_eq!(sample_all::<f64>(&config, &configured).unwrap().0.training, data.training);

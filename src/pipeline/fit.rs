@@ -2,14 +2,14 @@
 
 use crate::configuration::Precision;
 use crate::data::{Datasets, RecordingSplit};
-use crate::network::file::{FORMAT, Header, ModelFile, StoredPrecision};
-use crate::network::{Architecture, Layout, NetworkLagrangian};
+use crate::network::file::{Header, ModelFile, StoredPrecision};
+use crate::network::{Layout, NetworkLagrangian};
 use crate::pipeline::determination::Determined;
 use crate::pipeline::fit_config::FitConfig;
 use crate::pipeline::fit_summary::Found;
 use crate::pipeline::hold_out::{HoldOut, HoldOutOptions, evaluate_hold_out};
 use crate::pipeline::losses::LossStates;
-use crate::pipeline::model::trained_on;
+use crate::pipeline::model::{header_of, trained_on};
 use crate::pipeline::physics::{Physics, Subject};
 use crate::pipeline::prepared_fit::PreparedFit;
 use crate::pipeline::report_files::history;
@@ -20,7 +20,7 @@ use crate::recording::Targets;
 use crate::scalar::Scalar;
 use crate::shooting::{self, Task};
 use crate::storage::container::checksum;
-use crate::training::{Epoch, ResumeOptions, Snapshot, StopReason, Trained, resume as train, training_memory};
+use crate::training::{Epoch, ResumeOptions, Snapshot, StopReason, resume as train, training_memory};
 
 /// A model of recorded motion, after its files were written.
 #[derive(Debug)]
@@ -103,6 +103,7 @@ fn fit_in<S: Scalar>(
         let around: Vec<usize> = architecture.form.radial.first().map(|r| r.coordinates.clone()).unwrap_or_default();
         data = measured.weigh(data, *targets, (floor, &architecture.scale, &around))?;
     }
+    let ranges = data.training[0].ranges();
     // Every phase learns from the same states.
     data.training = vec![data.training.swap_remove(0); config.phases.len()];
     memory::require("training", training_memory(config, &architecture))?;
@@ -142,7 +143,9 @@ fn fit_in<S: Scalar>(
     }
 
     // The model first, then what is small, pictures last: on a full disk nothing that comes after can lose them.
-    let header = header(names, fit_config, &architecture, &trained);
+    let columns = names.iter().cloned().chain(names.iter().map(|name| format!("{name}_dot"))).collect();
+    let header = header_of(config, architecture.clone(), columns, ranges, trained.validation_loss);
+    let header = Header { forces: named_forces(&fit_config.recording.force), ..header };
     let model = ModelFile { header, weights: trained.weights.clone() };
     write_model(output, &model)?;
     output.write("config.toml", toml.as_bytes())?;
@@ -200,33 +203,4 @@ fn checksums<S: Scalar>(measured: &RecordingSplit, data: &Datasets<S>) -> Vec<(S
 /// Columns of recorded forces as a model remembers them; numbers of columns are no names.
 fn named_forces(columns: &[String]) -> Vec<String> {
     if columns.iter().any(|name| name.parse::<f64>().is_ok()) { Vec::new() } else { columns.to_vec() }
-}
-
-/// Header of the model file of this run.
-fn header<S: Scalar>(
-    names: &[String],
-    fit_config: &FitConfig,
-    architecture: &Architecture,
-    trained: &Trained<S>,
-) -> Header {
-    let config = &fit_config.training;
-    let velocities = names.iter().map(|name| format!("{name}_dot"));
-    Header {
-        format: FORMAT,
-        crate_version: env!("CARGO_PKG_VERSION").to_string(),
-        architecture: architecture.clone(),
-        system: config.system.clone(),
-        parameters: Default::default(),
-        columns: names.iter().cloned().chain(velocities).collect(),
-        forces: named_forces(&fit_config.recording.force),
-        description: None,
-        precision: match config.precision {
-            Precision::F32 => StoredPrecision::F32,
-            Precision::F64 => StoredPrecision::F64,
-        },
-        position: config.phases[0].position.clone(),
-        velocity: config.phases[0].velocity.clone(),
-        seed: config.seed,
-        validation_loss: trained.validation_loss,
-    }
 }

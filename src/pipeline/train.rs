@@ -7,11 +7,11 @@ use crate::experiments::{Learned, Outcome, Record};
 use crate::lagrangian::SystemInstance;
 use crate::lagrangian::system::TrajectoryTest;
 use crate::names::{counted, number};
-use crate::network::file::{FORMAT, Header, ModelFile, StoredPrecision};
+use crate::network::file::{Header, ModelFile};
 use crate::network::{Architecture, Layout, NetworkLagrangian};
 use crate::pipeline::checkpoints::Checkpoints;
 use crate::pipeline::evaluation::{Evaluation, EvaluationOptions, RTOL, STARTS, evaluate};
-use crate::pipeline::model::{all_parameters, trained_on};
+use crate::pipeline::model::{all_parameters, header_of, trained_on};
 use crate::pipeline::report_files::{ended, history, parameter_table, training_pictures, write_report_and_figures};
 use crate::pipeline::{MODEL, Output, PipelineError, Watch, memory, start};
 use crate::report::Report;
@@ -238,7 +238,7 @@ fn record(learned: Learned, epochs: &[Epoch], seconds: f64) -> Record {
 /// tell.
 fn imposed_velocities<S: Scalar>(system: &SystemInstance<f64>, data: &Datasets<S>) -> Option<(usize, [f64; 2])> {
     let i = system.constrained_coordinate()?;
-    let ranges = data.training.iter().map(|set| set.velocity_range(i));
+    let ranges = data.training.iter().map(|set| set.ranges()[1][i]);
     ranges.reduce(|[low, high], [l, h]| [low.min(l), high.max(h)]).map(|range| (i, range))
 }
 
@@ -254,35 +254,19 @@ fn header(
     let mut parameters = all_parameters(system);
     parameters.extend(config.parameters.clone());
     let hull = |bounds: fn(&Phase) -> &Vec<[f64; 2]>| {
-        (0..system.coordinates)
-            .map(|i| {
-                let all = config.phases.iter().filter_map(|phase| bounds(phase).get(i));
-                all.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], b| [low.min(b[0]), high.max(b[1])])
-            })
-            .collect()
+        let range = |i: usize| {
+            let all = config.phases.iter().filter_map(|phase| bounds(phase).get(i));
+            all.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], b| [low.min(b[0]), high.max(b[1])])
+        };
+        (0..system.coordinates).map(range).collect()
     };
-    let mut velocity: Vec<[f64; 2]> = hull(|phase| &phase.velocity);
+    let mut ranges: [Vec<[f64; 2]>; 2] = [hull(|phase| &phase.position), hull(|phase| &phase.velocity)];
     if let Some((i, range)) = imposed {
-        velocity[i] = range;
+        ranges[1][i] = range;
     }
-    Header {
-        format: FORMAT,
-        crate_version: env!("CARGO_PKG_VERSION").to_string(),
-        architecture,
-        system: config.system.clone(),
-        parameters,
-        columns: system.system.columns(system.coordinates),
-        forces: Vec::new(),
-        description: config.description.clone(),
-        precision: match config.precision {
-            Precision::F32 => StoredPrecision::F32,
-            Precision::F64 => StoredPrecision::F64,
-        },
-        position: hull(|phase| &phase.position),
-        velocity,
-        seed: config.seed,
-        validation_loss,
-    }
+    let columns = system.system.columns(system.coordinates);
+    let header = header_of(config, architecture, columns, ranges, validation_loss);
+    Header { parameters, description: config.description.clone(), ..header }
 }
 
 /// Writes the model's file.

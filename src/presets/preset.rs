@@ -225,15 +225,9 @@ fn around_a_centre(mut config: Config, system: &SystemInstance<f64>, shell: Shel
     config
 }
 
-/// The quick preset for recorded states: numbers of training, validation and test states, bounds of coordinates and
-/// velocities of training and validation, and how many steps to take, in whole epochs.
-pub(crate) fn recorded(
-    name: &str,
-    [training, validation, test]: [usize; 3],
-    [position, velocity]: [Vec<[f64; 2]>; 2],
-    [validation_position, validation_velocity]: [Vec<[f64; 2]>; 2],
-    steps: usize,
-) -> Config {
+/// The quick preset for recorded states: numbers of training, validation and test states, and how many steps to take, in whole
+/// epochs.
+pub(crate) fn recorded(name: &str, [training, validation, test]: [usize; 3], steps: usize) -> Config {
     let optimizer = optimizer(Method::Radam);
     let epochs = steps.div_ceil(training.div_ceil(optimizer.batch));
     Config {
@@ -253,13 +247,13 @@ pub(crate) fn recorded(
             shell: Vec::new(),
             shell_radius: None,
             rapidity: None,
-            validation_position,
-            validation_velocity,
+            validation_position: Vec::new(),
+            validation_velocity: Vec::new(),
         },
         network: network(QUICK.width),
         penalty: Regularizer::Eigenvalue { lambda: PENALTY },
         optimizer,
-        phases: vec![phase(epochs, 3e-3, position, velocity)],
+        phases: vec![phase(epochs, 3e-3, Vec::new(), Vec::new())],
         lbfgs: None,
     }
 }

@@ -114,7 +114,7 @@ pub const TRAINING_SECTIONS: [Section<'static>; 9] = [
             key(
                 "validation_position",
                 "[low, high] for each coordinate, in its unit",
-                "Bounds of the coordinates of validation and test states.",
+                "Bounds of the coordinates of validation and test states; recorded states need none of the four bounds.",
             ),
             key(
                 "validation_velocity",
