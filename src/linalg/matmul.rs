@@ -1,5 +1,7 @@
-//! Matrix products `C = alpha A B` or `C += alpha A B`: faer's kernels for `f32` and `f64`, a plain loop otherwise.
+//! Matrix products `C = alpha A B` or `C += alpha A B`: faer's kernels for `f32` and `f64`, dot products for a few rows, a plain loop for other
+//! numbers.
 
+use super::few_rows::{FEW_ROWS, FewRows, Rows};
 use crate::scalar::{Real, Scalar, Slice, SliceMut};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Par};
@@ -106,14 +108,19 @@ fn over<'a, S, T>(view: MatRef<'a, S>, data: &'a [T]) -> MatRef<'a, T> {
     MatRef { data, rows: view.rows, cols: view.cols, stride: view.stride, transposed: view.transposed }
 }
 
-/// The product by faer.
-fn fast<T: faer::traits::ComplexField>(
-    c: MatMut<'_, T>,
+/// The product by faer, or by dot products where that is faster.
+fn fast<'a, T: faer::traits::ComplexField + Scalar>(
+    c: MatMut<'a, T>,
     accumulate: bool,
     alpha: T,
-    a: MatRef<'_, T>,
-    b: MatRef<'_, T>,
+    a: MatRef<'a, T>,
+    b: MatRef<'a, T>,
 ) {
+    if (c.rows <= FEW_ROWS || c.cols == 1) && b.transposed && !a.transposed {
+        let shape = (c.rows, c.cols, a.cols);
+        let rows = |m: MatRef<'a, T>| Rows { numbers: m.data, stride: m.stride };
+        return FewRows { a: rows(a), b: rows(b), c: c.data, stride: c.stride, shape, alpha, accumulate }.run();
+    }
     fn view<'a, T>(m: MatRef<'a, T>) -> faer::MatRef<'a, T> {
         let view = faer::MatRef::from_row_major_slice_with_stride(m.data, m.rows, m.cols, m.stride);
         if m.transposed { view.transpose() } else { view }
@@ -162,7 +169,19 @@ mod tests {
     }
 
     fn check<S: Scalar>() {
-        for (m, k, n) in [(1, 1, 1), (3, 4, 5), (17, 9, 33), (2, 0, 3), (0, 3, 2)] {
+        for (m, k, n) in [
+            (1, 1, 1),
+            (3, 4, 5),
+            (17, 9, 33),
+            (2, 0, 3),
+            (0, 3, 2),
+            (1, 33, 17),
+            (2, 16, 9),
+            (4, 40, 7),
+            (5, 8, 3),
+            (7, 19, 4),
+            (8, 5, 10),
+        ] {
             for (ta, tb) in [(false, false), (true, false), (false, true), (true, true)] {
                 let (a, b) = (numbers::<S>(m * k, 1), numbers::<S>(k * n, 2));
                 let (stride, mut c) = (n + 3, numbers::<S>(m * (n + 3), 3));

@@ -10,6 +10,7 @@ mod condition;
 mod eigh;
 mod elimination;
 mod error;
+mod few_rows;
 mod inertia;
 mod inverse;
 mod jacobi;

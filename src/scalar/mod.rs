@@ -5,6 +5,7 @@
 //! a model may name a float type.
 
 mod dd;
+mod dots;
 mod float;
 mod lanes;
 mod primitive;
@@ -13,11 +14,14 @@ mod slices;
 mod sum;
 
 pub use dd::{Dd, UnreadableNumber};
+#[doc(hidden)]
+pub use dots::Dots;
 pub use float::AnyFloat;
 #[doc(hidden)]
 pub use lanes::{Exponential, Lanes, cos_lanes, exp_lanes, ln_lanes, sin_cos_lanes, sin_lanes, sqrt_lanes, tanh_lanes};
 #[doc(hidden)]
 pub use simd::vectorized;
+pub(crate) use simd::{Simd, WithSimd, in_vectors};
 #[doc(hidden)]
 pub use slices::{Slice, SliceMut};
 #[doc(hidden)]
@@ -203,6 +207,7 @@ pub trait Real:
 pub trait Scalar:
     Real<Scalar = Self>
     + Lanes
+    + Dots
     + PartialEq
     + PartialOrd
     + Default

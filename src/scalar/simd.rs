@@ -1,4 +1,6 @@
-//! Run-time CPU dispatch for plain loops.
+//! Run-time CPU dispatch, for plain loops and for kernels in explicit vectors.
+
+pub(crate) use pulp::{Simd, WithSimd};
 
 /// Runs `kernel` compiled for the widest vector instructions this CPU has (AVX-512, AVX2 + FMA, NEON, or baseline).
 ///
@@ -15,4 +17,10 @@ pub fn vectorized<R>(kernel: impl FnOnce() -> R) -> R {
         }
     }
     pulp::Arch::new().dispatch(Kernel(kernel))
+}
+
+/// Runs a kernel in explicit vectors with the widest instructions this CPU has.
+#[inline(always)]
+pub(crate) fn in_vectors<K: WithSimd>(kernel: K) -> K::Output {
+    pulp::Arch::new().dispatch(kernel)
 }

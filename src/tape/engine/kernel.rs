@@ -47,32 +47,6 @@ pub(super) fn add_product3<S: Scalar>(out: &mut [S], x: &[S], y: &[S], z: &[S]) 
     );
 }
 
-/// Dot product in independent partial sums of fixed order: vectorises, and errs less than a running sum.
-#[inline(always)]
-pub(super) fn dot<S: Scalar>(a: &[S], b: &[S]) -> S {
-    const LANES: usize = 16;
-    let zero = <S as Real>::zero();
-    let mut sums = [zero; LANES];
-    let (a_chunks, b_chunks) = (a.chunks_exact(LANES), b.chunks_exact(LANES));
-    let mut rest = zero;
-    for (&x, &y) in a_chunks.remainder().iter().zip(b_chunks.remainder()) {
-        rest += x * y;
-    }
-    for (a, b) in a_chunks.zip(b_chunks) {
-        for k in 0..LANES {
-            sums[k] += a[k] * b[k];
-        }
-    }
-    let mut width = LANES / 2;
-    while width > 0 {
-        for k in 0..width {
-            sums[k] += sums[k + width];
-        }
-        width /= 2;
-    }
-    sums[0] + rest
-}
-
 /// Sum of a plane of one unit, in partial sums of fixed order.
 pub(super) fn sum<S: Scalar>(x: &[S]) -> S {
     let zero = <S as Real>::zero();

@@ -3,7 +3,7 @@
 use super::{Forward, MixedForward, MixedReverse, Reverse};
 use crate::linalg::{MatMut, MatRef, gemm};
 use crate::scalar::{Real, Scalar, vectorized};
-use crate::tape::engine::kernel::{add_rows, dot};
+use crate::tape::engine::kernel::add_rows;
 use crate::tape::engine::value::{Mixed, Order};
 
 /// `W x + b`, `W` `(outputs, inputs)` row-major and `b` `(outputs)` among the parameters.
@@ -26,12 +26,6 @@ impl Dense {
     /// `out = x W^T`, `x` `(rows, inputs)`.
     fn apply<S: Scalar>(&self, parameters: &[S], rows: usize, x: &[S], out: &mut [S]) {
         let matrix = self.matrix(parameters);
-        if self.outputs == 1 {
-            return vectorized(
-                #[inline(always)]
-                || out.iter_mut().zip(x.chunks_exact(self.inputs)).for_each(|(y, x)| *y = dot(matrix, x)),
-            );
-        }
         let weights = MatRef::new(matrix, self.outputs, self.inputs).t();
         let x = MatRef::new(x, rows, self.inputs);
         gemm(MatMut::new(out, rows, self.outputs), false, <S as Real>::one(), x, weights);

@@ -12,6 +12,7 @@
 //! | its reverse | `Bs += phi' Bs + A phi''[., x[t]]`, `Bt += phi' Bt + A phi''[x[s], .]`, `B0 += phi' B0 + phi''[x[s]] Bs + phi''[x[t]] Bt + A (phi''[x[st]] + phi'''[x[s], x[t]])` |
 
 mod combination;
+mod contraction;
 mod dense;
 mod elementwise;
 mod function;
@@ -22,6 +23,7 @@ mod product;
 mod select;
 
 pub(super) use combination::Combination;
+use contraction::{Contraction, ROWS};
 pub(super) use dense::Dense;
 pub(super) use elementwise::Elementwise;
 pub(super) use function::{Function, PARTIALS};
@@ -33,7 +35,7 @@ pub(super) use select::Select;
 use super::kernel::{add_product, add_product3};
 use super::value::{Kind, Mixed, Order, Store, Value, View};
 use super::{Depth, MixedDirections};
-use crate::scalar::{Real, Scalar, vectorized};
+use crate::scalar::{Real, Scalar, in_vectors};
 
 /// An operation; operands are values before it.
 #[derive(Clone, Debug)]
@@ -269,33 +271,10 @@ impl<S: Scalar> Second<S> {
         let velocities = &directions[drifts..];
         let x = &forward.all(x)[lanes * units..];
         super::kernel::resize(&mut self.curvature, units);
-        super::kernel::resize(&mut self.along, units);
-        let (curvature, along) = (&mut self.curvature[..units], &mut self.along[..units]);
+        super::kernel::resize(&mut self.along, ROWS * units);
+        let (curvature, along) = (&mut self.curvature[..units], &mut self.along[..ROWS * units]);
         let (mass, drift) = (&mut self.mass, &mut self.drift);
-        vectorized(
-            #[inline(always)]
-            || {
-                for lane in 0..lanes {
-                    let tangent = |k: usize| &x[(k * lanes + lane) * units..][..units];
-                    let own = lane * units..(lane + 1) * units;
-                    for ((c, &a), &d2) in curvature.iter_mut().zip(&adjoint[own.clone()]).zip(&d2[own]) {
-                        *c = a * d2;
-                    }
-                    for (k, &i) in velocities.iter().enumerate() {
-                        for ((s, &c), &x) in along.iter_mut().zip(&*curvature).zip(tangent(drifts + k)) {
-                            *s = c * x;
-                        }
-                        for (l, &j) in velocities.iter().enumerate().skip(k) {
-                            let pair = Self::pair(n, i - 1, j - 1);
-                            mass[pair * lanes + lane] += super::kernel::dot(along, tangent(drifts + l));
-                        }
-                        if drifts == 1 {
-                            drift[(i - 1) * lanes + lane] += super::kernel::dot(along, tangent(0));
-                        }
-                    }
-                }
-            },
-        );
+        in_vectors(Contraction { velocities, drifts, n, lanes, x, adjoint, d2, curvature, along, mass, drift });
     }
 }
 
