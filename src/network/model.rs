@@ -246,8 +246,8 @@ impl<S: Scalar> EulerLagrange<S> for NetworkLagrangian<S> {
         self.architecture.dissipation.is_none()
     }
 
-    /// From about 100,000 weights on: a single state then waits for them longer than threads take to meet.
+    /// From about 200,000 weights on: a single state then waits for them longer than threads take to meet.
     fn prefers_batches(&self) -> bool {
-        self.weights.len() >= 100_000
+        self.weights.len() >= 200_000
     }
 }
