@@ -108,6 +108,7 @@ def main():
             rows.append(row)
             cells = [f"{cell:.3g}" if isinstance(cell, float) else str(cell) for cell in row]
             print("| " + " | ".join(cells) + " |", flush=True)
+    os.makedirs(options.out, exist_ok=True)
     with open(os.path.join(options.out, "peers.csv"), "w", newline="") as file:
         csv.writer(file).writerows([header, *rows])
     for engine in [ours, *engines]:
