@@ -23,6 +23,8 @@ mod form;
 mod function;
 mod guard;
 mod interval;
+#[cfg(test)]
+mod interval_tests;
 mod network;
 mod number;
 mod search;

@@ -7,7 +7,7 @@ use crate::cli::mistake::Mistake;
 use crate::cli::number::positive;
 use crate::cli::print_config::{commented, with_seed};
 use crate::cli::recording_args::{RecordingArgs, unit};
-use crate::configuration::Config;
+use crate::configuration::{Config, Data};
 use crate::optimizers::Schedule;
 use crate::pipeline::{FIT_SECTIONS, FitColumns, FitConfig, HELD_OUT};
 use crate::presets::{Preset, SHOOTING_SECTION, Section, TRAINING_SECTIONS, section_reference};
@@ -113,25 +113,13 @@ impl Settled {
         Ok(Self { args, file: Some(file), shooting })
     }
 
-    /// The configuration that suits the data with the values of the file. What the data alone decide, numbers and bounds of
-    /// states, is not read.
+    /// The configuration that suits the data with the values of the file. Numbers and bounds of states, which the data alone decide, are not
+    /// read.
     ///
     /// # Errors
     /// A data error if the configuration cannot be written.
     pub fn training(&self, suggested: &Config) -> Result<Config, CliError> {
-        let Some(file) = &self.file else { return Ok(suggested.clone()) };
-        let base = FitConfig { training: suggested.clone(), ..stand_in()? };
-        let mut training = file.over(&base)?.0.training;
-        training.data.clone_from(&suggested.data);
-        for (k, phase) in training.phases.iter_mut().enumerate() {
-            [&mut phase.position, &mut phase.velocity].into_iter().for_each(Vec::clear);
-            phase.log_uniform.clear();
-            let has = |key: &str| file.has(&format!("training.phase[{k}].{key}"));
-            if has("epochs") && !has("t_max") && phase.schedule != Schedule::CosineAnnealing {
-                phase.t_max = phase.epochs as f64;
-            }
-        }
-        Ok(training)
+        self.file.as_ref().map_or_else(|| Ok(suggested.clone()), |file| training_of(file, suggested))
     }
 
     /// `true` if the file gives the number of epochs.
@@ -143,6 +131,23 @@ impl Settled {
     pub fn shooting(&self) -> Option<Shooting> {
         self.shooting.clone()
     }
+}
+
+/// The suggested training with the values of a file.
+fn training_of(file: &ConfigFile, suggested: &Config) -> Result<Config, CliError> {
+    let base = FitConfig { training: suggested.clone(), ..stand_in()? };
+    let mut training = file.over(&base)?.0.training;
+    let acceleration_weighting = training.data.acceleration_weighting;
+    training.data = Data { acceleration_weighting, ..suggested.data.clone() };
+    for (k, phase) in training.phases.iter_mut().enumerate() {
+        [&mut phase.position, &mut phase.velocity].into_iter().for_each(Vec::clear);
+        phase.log_uniform.clear();
+        let has = |key: &str| file.has(&format!("training.phase[{k}].{key}"));
+        if has("epochs") && !has("t_max") && phase.schedule != Schedule::CosineAnnealing {
+            phase.t_max = phase.epochs as f64;
+        }
+    }
+    Ok(training)
 }
 
 /// A configuration to tell the types of a file's keys by.
@@ -213,5 +218,18 @@ mod tests {
             }
         }
         assert!(fit_reference().contains("| `held_out` |"));
+    }
+
+    /// Bounds, which files of earlier versions hold, are passed over; how states weigh is not.
+    #[test]
+    fn a_file_says_how_states_weigh_and_not_where_they_lie() {
+        let text = "[training.data]\nacceleration_weighting = 0.5\ntraining = 7\nvalidation_position = [[0.0, 1.0]]\n\
+                    [[training.phase]]\nposition = [[0.0, 1.0]]\nvelocity = [[0.0, 1.0]]\n";
+        let suggested = stand_in().unwrap().training;
+        let file = ConfigFile::parse("fit.toml".to_string(), text).unwrap();
+        let training = training_of(&file, &suggested).unwrap();
+        assert_eq!(training.data, Data { acceleration_weighting: 0.5, ..suggested.data.clone() });
+        assert_eq!(training.phases, suggested.phases);
+        assert!(training.validate(2).is_ok() && training.validate(3).is_ok());
     }
 }

@@ -290,6 +290,11 @@ mod tests {
             let refused = sample_all::<f64>(&config, &system).unwrap_err().to_string();
             let expected = "[low, high] no further apart than the largest number, found [-1e308, 1e308]";
             assert_eq!(refused, format!("{field}[1]: expected {expected}"));
+            // Recorded states need no bounds, drawn ones do.
+            bounds(&mut config).clear();
+            assert!(config.validate(2).is_ok());
+            let refused = sample_all::<f64>(&config, &system).unwrap_err().to_string();
+            assert_eq!(refused, format!("{field}: expected one [low, high] per coordinate, found 0 for 2"));
         }
         let mut rng = RngStream::Test.generator(0);
         let (q, v) = draw((&[wide; 50], &[[2.0, 2.0]]), &[], &mut rng);

@@ -93,8 +93,8 @@ impl<S: Scalar> Terms<S> {
 }
 
 impl<S: Scalar> Terms<S> {
-    /// Adds forces from outside, `(batch, n)`, to terms that were computed with [`Request::ACCELERATION`]: `M^-1 Q` to the
-    /// accelerations, `Q` to the forces and `-v.Q` to the power they take.
+    /// Adds forces from outside, `(batch, n)`, to terms that were computed with [`Request::ACCELERATION`] and without a failure: `M^-1 Q` to
+    /// the accelerations, `Q` to the forces and `-v.Q` to the power they take.
     ///
     /// # Errors
     /// [`MechanicsError`] naming the first row whose force is not finite or whose mass matrix is singular.
@@ -116,8 +116,8 @@ impl<S: Scalar> Terms<S> {
         if self.acceleration.len() != size {
             return shape("accelerations", size, self.acceleration.len());
         }
-        let mut found = std::mem::take(&mut self.failures);
-        found.extend(not_finite("external force", external, n));
+        self.failures.clear();
+        let found = not_finite("external force", external, n).collect();
         let mut change = workspace.take_vector();
         change.clear();
         change.resize(size, S::nan());
@@ -241,11 +241,7 @@ mod tests {
         assert_eq!(error, MechanicsError::NotFinite { row: 0, what: "external force" });
         let error = one.add_force(1, &[3.0], &[1.0, 2.0], &mut workspace).unwrap_err();
         assert_eq!(error, MechanicsError::Shape { what: "external forces", expected: 1, found: 2 });
-        // The failure of the row stays that of the force before, until the terms are computed anew.
         one.mass_matrix[0] = 0.0;
-        let error = one.add_force(1, &[3.0], &[1.0], &mut workspace).unwrap_err();
-        assert_eq!(error, MechanicsError::NotFinite { row: 0, what: "external force" });
-        one.failures.clear();
         let error = one.add_force(1, &[3.0], &[1.0], &mut workspace).unwrap_err();
         assert_eq!(error, MechanicsError::Singular { row: 0, condition: f64::INFINITY });
     }

@@ -24,8 +24,12 @@ impl<S: Scalar> Terms<S> {
         self.failures.first().map_or(Ok(()), |&error| Err(error))
     }
 
-    /// `true` if all that failed stands in [`Terms::failures`], so that the other rows can be used.
-    pub(crate) fn is_told_by_rows(&self, outcome: &Result<(), MechanicsError>) -> bool {
+    /// `true` if all that failed stands in [`Terms::failures`], so that the other rows can be used. After a success none stands there, even
+    /// of a model that leaves the list alone.
+    pub(crate) fn settle_failures(&mut self, outcome: &Result<(), MechanicsError>) -> bool {
+        if outcome.is_ok() {
+            self.failures.clear();
+        }
         let first = self.failures.first().and_then(MechanicsError::row);
         outcome.as_ref().err().is_none_or(|error| error.row().is_some() && error.row() == first)
     }
@@ -38,10 +42,11 @@ impl<S: Scalar> Terms<S> {
         &mut self,
         outcome: Result<(), MechanicsError>,
     ) -> Result<Vec<MechanicsError>, MechanicsError> {
-        if !self.is_told_by_rows(&outcome) {
-            return outcome.map(|()| Vec::new());
+        if self.settle_failures(&outcome) {
+            Ok(std::mem::take(&mut self.failures))
+        } else {
+            outcome.map(|()| Vec::new())
         }
-        Ok(if outcome.is_err() { std::mem::take(&mut self.failures) } else { Vec::new() })
     }
 }
 
@@ -87,9 +92,12 @@ mod tests {
         let mut terms = Terms::<f64> { failures: vec![MechanicsError::Uncertified { row: 2 }], ..Terms::default() };
         let other = Err(MechanicsError::Derivatives { what: "mass matrix" });
         assert_eq!(terms.take_failures(other), Err(MechanicsError::Derivatives { what: "mass matrix" }));
-        assert_eq!(terms.take_failures(Ok(())), Ok(Vec::new()));
         let told = terms.take_failures(Err(MechanicsError::Uncertified { row: 2 }));
         assert_eq!(told, Ok(vec![MechanicsError::Uncertified { row: 2 }]));
+        assert_eq!(terms.outcome(), Ok(()));
+        // What an earlier batch left behind does not count.
+        terms.failures.push(MechanicsError::Uncertified { row: 2 });
+        assert_eq!(terms.take_failures(Ok(())), Ok(Vec::new()));
         assert_eq!(terms.outcome(), Ok(()));
     }
 }

@@ -62,7 +62,7 @@ impl EulerLagrange<f64> for Spheroidal<'_> {
             }
         }
         let outcome = self.model.terms(&at, &rate, request, terms);
-        if !terms.is_told_by_rows(&outcome) {
+        if !terms.settle_failures(&outcome) {
             return outcome;
         }
         let space = self.space;

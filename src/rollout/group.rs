@@ -80,7 +80,7 @@ impl<'a, S: Scalar> Group<'a, S> {
             request = request | asked.request;
         }
         let outcome = self.model.terms(&round.q, &round.v, request, &mut round.terms);
-        round.is_told_by_rows = round.terms.is_told_by_rows(&outcome);
+        round.is_told_by_rows = round.terms.settle_failures(&outcome);
         round.request = request;
         round.number += 1;
         self.evaluated.notify_all();

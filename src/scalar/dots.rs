@@ -13,7 +13,7 @@ pub trait Dots: Copy {
 }
 
 // Loops over indices, not closures: those would not inherit the instruction set.
-macro_rules! in_vectors {
+macro_rules! dots_in_vectors {
     ($number:ty, $vector:ident, $split:ident, $splat:ident, $load:ident, $multiply_add:ident, $sum:ident) => {
         impl Dots for $number {
             #[inline(always)]
@@ -73,11 +73,11 @@ macro_rules! in_vectors {
     };
 }
 
-in_vectors!(f32, f32s, as_simd_f32s, splat_f32s, partial_load_f32s, mul_add_e_f32s, reduce_sum_f32s);
-in_vectors!(f64, f64s, as_simd_f64s, splat_f64s, partial_load_f64s, mul_add_e_f64s, reduce_sum_f64s);
+dots_in_vectors!(f32, f32s, as_simd_f32s, splat_f32s, partial_load_f32s, mul_add_e_f32s, reduce_sum_f32s);
+dots_in_vectors!(f64, f64s, as_simd_f64s, splat_f64s, partial_load_f64s, mul_add_e_f64s, reduce_sum_f64s);
 
 /// The same by loops, for numbers without vectors: four partial sums.
-macro_rules! in_loops {
+macro_rules! dots_in_loops {
     ($zero:expr) => {
         #[inline(always)]
         fn dots<V: Simd, const R: usize, const O: usize>(_: V, a: [&[Self]; R], b: [&[Self]; O]) -> [[Self; R]; O] {
@@ -100,11 +100,11 @@ macro_rules! in_loops {
 }
 
 impl Dots for Dd {
-    in_loops!(<Self as num_traits::Zero>::zero());
+    dots_in_loops!(<Self as num_traits::Zero>::zero());
 }
 
 impl<F: Foreign> Dots for AnyFloat<F> {
-    in_loops!(<Self as num_traits::Zero>::zero());
+    dots_in_loops!(<Self as num_traits::Zero>::zero());
 }
 
 #[cfg(test)]
