@@ -111,7 +111,7 @@ pub(crate) struct EpochSolver<S, L> {
     optimizer: Optimizer,
     rates: RateCourse,
     phase_number: usize,
-    /// Epochs of a history that this one does not count on.
+    /// Epochs before those of its history.
     epochs_before: usize,
     course: OptimizerState<S>,
     /// `true` if the course began in an earlier sitting.
