@@ -1,8 +1,8 @@
 //! First order: value and one tangent.
 
 use super::{assign_operators, forward_real, forward_unary};
-use crate::ops::{Binary, Unary};
-use crate::scalar::Real;
+use crate::ops::Binary;
+use crate::scalar::{Elementary, Real};
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// `value + tangent * t` modulo `t^2`: a number and its derivative along one direction.
@@ -27,7 +27,7 @@ impl<T: Real> Dual<T> {
     }
     /// Chain rule.
     #[inline(always)]
-    fn chain1(self, f: Unary) -> Self {
+    fn chain1(self, f: impl Elementary) -> Self {
         let (value, first) = f.value_first(self.value);
         Self { value, tangent: first * self.tangent }
     }

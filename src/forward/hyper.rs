@@ -1,8 +1,8 @@
 //! Mixed second order: value, two tangents, one mixed coefficient.
 
 use super::{assign_operators, forward_real, forward_unary};
-use crate::ops::{Binary, Unary};
-use crate::scalar::Real;
+use crate::ops::Binary;
+use crate::scalar::{Elementary, Real};
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// `value + s S + t T + st S T` modulo `S^2`, `T^2`: a number on a surface `x(S, T)`, with `st = d2/dS dT`.
@@ -36,7 +36,7 @@ impl<T: Real> HyperDual<T> {
     }
     /// Chain rule.
     #[inline(always)]
-    fn chain1(self, f: Unary) -> Self {
+    fn chain1(self, f: impl Elementary) -> Self {
         self.compose(f.jet(self.value))
     }
     /// Chain rule in two arguments.

@@ -1,8 +1,8 @@
 //! Full second order in `N` variables: value, gradient, Hessian.
 
 use super::{assign_operators, forward_real, forward_unary};
-use crate::ops::{Binary, Unary};
-use crate::scalar::Real;
+use crate::ops::Binary;
+use crate::scalar::{Elementary, Real};
 use std::array::from_fn;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
@@ -60,7 +60,7 @@ impl<T: Real, const N: usize> Jet2<T, N> {
     }
     /// Chain rule.
     #[inline(always)]
-    fn chain1(self, f: Unary) -> Self {
+    fn chain1(self, f: impl Elementary) -> Self {
         self.compose(f.jet(self.value))
     }
     /// Chain rule in two arguments.

@@ -27,6 +27,10 @@ macro_rules! forward_real {
         fn primal(self) -> T::Scalar {
             self.value.primal()
         }
+        #[inline(always)]
+        fn elementary<F: crate::scalar::Elementary>(self, f: F) -> Self {
+            self.chain1(f)
+        }
         crate::ops::unary_methods! { forward_unary }
         #[inline(always)]
         fn powi(self, exponent: i32) -> Self {

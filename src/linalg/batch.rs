@@ -139,6 +139,11 @@ pub(super) fn select<S>(condition: bool, chosen: S, otherwise: S) -> S {
 #[repr(align(64))]
 pub(super) struct Aligned<T>(pub T);
 
+/// `true` if loops of known length gain something: with wider numbers the arithmetic is what takes the time.
+pub(super) const fn constant_sizes<S>() -> bool {
+    size_of::<S>() <= size_of::<f64>()
+}
+
 /// Calls `$body` with `$lanes` lanes of storage, small sizes as constants with the storage on the stack.
 ///
 /// `$n` is the size inside of `$count` and `$body`.
@@ -154,9 +159,9 @@ macro_rules! with_size {
             }};
         }
         match $size {
-            2 => constant!(2),
-            3 => constant!(3),
-            4 => constant!(4),
+            2 if const { super::batch::constant_sizes::<$scalar>() } => constant!(2),
+            3 if const { super::batch::constant_sizes::<$scalar>() } => constant!(3),
+            4 if const { super::batch::constant_sizes::<$scalar>() } => constant!(4),
             $n => {
                 let $lanes = $buffer.lanes::<$width>($count);
                 $body

@@ -59,7 +59,7 @@ fn run<S: Scalar>(
             large::eigh(n, m, w, u);
         }
         false
-    } else if size_of::<S>() < size_of::<f64>() {
+    } else if const { size_of::<S>() < size_of::<f64>() } {
         split::<S, { 2 * LANES }>(n, matrices, values, vectors, &mut workspace.block)
     } else {
         split::<S, LANES>(n, matrices, values, vectors, &mut workspace.block)
@@ -89,7 +89,9 @@ fn split<S: Scalar, const W: usize>(
     buffer: &mut Buffer<S>,
 ) -> bool {
     let batch = values.len() / n;
-    let alone = usize::from(batch % W == 1);
-    let finite = jacobi::decompose::<S, W>(n, matrices, values, vectors, (0, batch - alone), buffer);
-    jacobi::decompose::<S, 1>(n, matrices, values, vectors, (batch - alone, batch), buffer) & finite
+    let together = batch - usize::from(batch % W == 1);
+    let finite = jacobi::decompose::<S, W>(n, matrices, values, vectors, (0, together), buffer);
+    let done = if finite.is_some() { together } else { 0 };
+    let rest = jacobi::decompose::<S, 1>(n, matrices, values, vectors, (done, batch), buffer);
+    finite != Some(false) && rest != Some(false)
 }

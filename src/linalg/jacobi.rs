@@ -6,7 +6,7 @@
 //! element, so that no sweep is spent on denormals.
 
 use super::batch::{Aligned, Buffer, Lane, across, rows, select, with_size};
-use crate::scalar::{Real, Scalar, vectorized};
+use crate::scalar::{Real, Scalar, in_lanes};
 
 /// More sweeps than any matrix was seen to need (about ten at n = 20 in double-double).
 const SWEEPS: usize = 40;
@@ -14,7 +14,8 @@ const SWEEPS: usize = 40;
 /// Eigenvalues, ascending, and eigenvectors as rows (if `vectors` is not empty) of the matrices `start..end` of a
 /// batch in blocks of `W`; the upper triangle is read.
 ///
-/// The result is `true` if all is finite; the eigenvalues of a matrix that is not are `NaN`.
+/// The result is `true` if all is finite; the eigenvalues of a matrix that is not are `NaN`. It is `None`, and nothing is
+/// done, where the CPU does not serve so many lanes (see [`in_lanes`]).
 pub(super) fn decompose<S: Scalar, const W: usize>(
     n: usize,
     matrices: &[S],
@@ -22,13 +23,13 @@ pub(super) fn decompose<S: Scalar, const W: usize>(
     vectors: &mut [S],
     (start, end): (usize, usize),
     buffer: &mut Buffer<S>,
-) -> bool {
+) -> Option<bool> {
     // Elements within these bounds need no scaling.
     let reach = S::min_positive().ilogb() / -12;
     let one = <S as Real>::one();
     let range = (one.ldexp(-reach), one.ldexp(reach));
     let mut finite = true;
-    vectorized(
+    in_lanes::<W, _>(
         #[inline(always)]
         || {
             with_size!((S, W) n, buffer, |n| 2 * n * n + n + 2, |storage| {
@@ -42,9 +43,9 @@ pub(super) fn decompose<S: Scalar, const W: usize>(
                     finite &= store(n, (a, u), turns, &exponents, &probe, (&mut *values, &mut *vectors), start);
                 }
             });
+            finite
         },
-    );
-    finite
+    )
 }
 
 /// Loads a block; returns the largest absolute elements, and zero where all is finite, `NaN` otherwise.

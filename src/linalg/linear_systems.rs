@@ -3,7 +3,7 @@
 use super::batch::{Aligned, LANES, Lane, Second, Workspace, with_size};
 use super::error::Failure;
 use super::{condition, elimination};
-use crate::scalar::{Real, Scalar, vectorized};
+use crate::scalar::{Real, Scalar, in_lanes};
 
 /// A batch of systems `A X = B`.
 #[derive(Clone, Copy)]
@@ -36,7 +36,7 @@ impl<S: Scalar> Systems<'_, S> {
             return;
         }
         let batch = solutions.len() / (self.n * self.m).max(1);
-        if size_of::<S>() < size_of::<f64>() {
+        if const { size_of::<S>() < size_of::<f64>() } {
             self.split::<{ 2 * LANES }>(batch, solutions, workspace);
         } else {
             self.split::<LANES>(batch, solutions, workspace);
@@ -45,19 +45,26 @@ impl<S: Scalar> Systems<'_, S> {
 
     /// In blocks of `W`, a single row at the end alone.
     fn split<const W: usize>(&self, batch: usize, solutions: &mut [S], workspace: &mut Workspace<S>) {
-        let alone = usize::from(batch % W == 1);
-        self.blocks::<W>(0, batch - alone, solutions, workspace);
-        self.blocks::<1>(batch - alone, batch, solutions, workspace);
+        let together = batch - usize::from(batch % W == 1);
+        let done = if self.blocks::<W>(0, together, solutions, workspace) { together } else { 0 };
+        self.blocks::<1>(done, batch, solutions, workspace);
     }
 
-    fn blocks<const W: usize>(&self, start: usize, end: usize, solutions: &mut [S], workspace: &mut Workspace<S>) {
+    /// Whether that was possible, see [`in_lanes`].
+    fn blocks<const W: usize>(
+        &self,
+        start: usize,
+        end: usize,
+        solutions: &mut [S],
+        workspace: &mut Workspace<S>,
+    ) -> bool {
         if start == end {
-            return;
+            return true;
         }
         let &Self { n, m, matrices, right } = self;
         let (buffer, second, failures) = workspace.parts();
         let single = m == 1 && right.is_some();
-        vectorized(
+        in_lanes::<W, _>(
             #[inline(always)]
             || {
                 if single {
@@ -82,7 +89,8 @@ impl<S: Scalar> Systems<'_, S> {
                     });
                 }
             },
-        );
+        )
+        .is_some()
     }
 
     /// Solves rows `start..start + W` once more, with one step of iterative refinement where it is due, and finds out
@@ -102,7 +110,7 @@ impl<S: Scalar> Systems<'_, S> {
         let &Self { n, m, matrices, right } = self;
         let mut doubtful = [false; W];
         let Second { block, solution, dense } = second;
-        vectorized(
+        let done = in_lanes::<W, _>(
             #[inline(always)]
             || {
                 let (system, x) = (block.lanes::<W>(n * (n + m)), solution.lanes::<W>(n * m));
@@ -138,6 +146,7 @@ impl<S: Scalar> Systems<'_, S> {
                 }
             },
         );
+        debug_assert!(done.is_some(), "a first solution by as many lanes was possible");
         for row in (start..matrices.len() / (n * n)).take(W).filter(|row| doubtful[row - start]) {
             let x = &mut solutions[row * n * m..(row + 1) * n * m];
             if let Some(failure) = examine(n, &matrices[row * n * n..(row + 1) * n * n], x, dense) {

@@ -1,6 +1,6 @@
 //! Functions of one number.
 
-use crate::scalar::{Real, Scalar};
+use crate::scalar::{Elementary, Real, Scalar};
 
 /// `-1`, `0` or `1` by the sign of `x`: the derivative of `|x|` with the value 0 at both zeros.
 #[inline(always)]
@@ -149,7 +149,10 @@ impl Unary {
     /// `f(x)`, compiled once for a kind of number: for interpreters, which choose `f` at run time.
     #[inline(never)]
     pub fn evaluate<R: Real>(self, x: R) -> R {
-        self.value(x)
+        match self {
+            Self::Neg => -x,
+            _ => x.elementary(self),
+        }
     }
     /// `(f(x), f'(x))`, sharing the work where the two are found together.
     #[inline(always)]
@@ -171,5 +174,20 @@ impl Unary {
     pub fn jet<R: Real>(self, x: R) -> (R, R, R) {
         let (y, d) = self.value_first(x);
         (y, d, self.second(x, y, d))
+    }
+}
+
+impl Elementary for Unary {
+    #[inline(always)]
+    fn value<R: Real>(self, x: R) -> R {
+        Self::value(self, x)
+    }
+    #[inline(always)]
+    fn value_first<R: Real>(self, x: R) -> (R, R) {
+        Self::value_first(self, x)
+    }
+    #[inline(always)]
+    fn jet<R: Real>(self, x: R) -> (R, R, R) {
+        Self::jet(self, x)
     }
 }

@@ -21,7 +21,7 @@ pub use float::AnyFloat;
 pub use lanes::{Exponential, Lanes, cos_lanes, exp_lanes, ln_lanes, sin_cos_lanes, sin_lanes, sqrt_lanes, tanh_lanes};
 #[doc(hidden)]
 pub use simd::vectorized;
-pub(crate) use simd::{Simd, WithSimd, in_vectors};
+pub(crate) use simd::{Simd, WithSimd, in_lanes, in_vectors};
 #[doc(hidden)]
 pub use slices::{Slice, SliceMut};
 #[doc(hidden)]
@@ -29,6 +29,17 @@ pub use sum::Sum;
 
 use std::fmt::{Debug, Display};
 use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
+
+/// A function of one number with its derivatives, which is chosen at run time.
+#[doc(hidden)]
+pub trait Elementary: Copy {
+    /// `f(x)`.
+    fn value<R: Real>(self, x: R) -> R;
+    /// `(f(x), f'(x))`.
+    fn value_first<R: Real>(self, x: R) -> (R, R);
+    /// `(f(x), f'(x), f''(x))`.
+    fn jet<R: Real>(self, x: R) -> (R, R, R);
+}
 
 /// A real number that model code computes with: a float, a forward number over one, a tape variable over either.
 ///
@@ -164,6 +175,13 @@ pub trait Real:
     fn min(self, other: Self) -> Self;
     /// `if_positive` where `self > 0`, `otherwise` where it is not; `NaN` where `self` is. The recordable branch.
     fn select(self, if_positive: Self, otherwise: Self) -> Self;
+
+    /// `f(self)`, where one copy of the chain rule serves every function.
+    #[doc(hidden)]
+    #[inline(always)]
+    fn elementary<F: Elementary>(self, f: F) -> Self {
+        f.value(self)
+    }
 
     /// `self * self`.
     #[inline]
