@@ -4,7 +4,7 @@ use crate::cli::shown::{CHUNK, Field, Format, Shape, explain, report_failures, s
 use crate::cli::source::Source;
 use crate::cli::states::{column_names, parse_table};
 use crate::cli::{CliError, input, json, output, states};
-use crate::lagrangian::{InverseDynamics, inverse_dynamics};
+use crate::lagrangian::{InverseDynamics, inverse_dynamics_by_rows};
 use crate::scalar::Scalar;
 use std::path::Path;
 
@@ -39,30 +39,13 @@ pub fn inverse<S: Scalar>(path: &Path, format: Format, source: &Source<S>) -> Re
         };
         let (q, v, a) = (part(0..n), part(n..2 * n), part(2 * n..3 * n));
         let times: Vec<S> = if timed { part(3 * n..3 * n + 1) } else { Vec::new() };
-        let model = source.model.as_ref();
+        let (forces, told) = inverse_dynamics_by_rows(source.model.as_ref(), &q, &v, &a).map_err(|e| told(&e))?;
+        let mut told = told.into_iter().peekable();
         let mut text = String::new();
-        match inverse_dynamics(model, &q, &v, &a) {
-            Ok(forces) => {
-                for (k, &row) in rows.iter().enumerate() {
-                    text += &line(format, row, n, k, &forces, times.get(k), None);
-                }
-            }
-            // One state of the chunk failed: take them one by one, so that each says its own reason.
-            Err(_) => {
-                for (k, &row) in rows.iter().enumerate() {
-                    let one = k * n..(k + 1) * n;
-                    let forces = inverse_dynamics(model, &q[one.clone()], &v[one.clone()], &a[one]);
-                    let problem = forces.as_ref().err().cloned().map(explain);
-                    let nothing = || vec![S::nan(); n];
-                    let forces = forces.unwrap_or_else(|_| InverseDynamics {
-                        generalized: nothing(),
-                        friction: Vec::new(),
-                        external: nothing(),
-                    });
-                    text += &line(format, row, n, 0, &forces, times.get(k), problem.as_deref());
-                    failures.extend(problem.map(|problem| (row, problem)));
-                }
-            }
+        for (k, &row) in rows.iter().enumerate() {
+            let problem = told.next_if(|failure| failure.row() == Some(k)).map(explain);
+            text += &line(format, row, n, k, &forces, times.get(k), problem.as_deref());
+            failures.extend(problem.map(|problem| (row, problem)));
         }
         output::print(&text)?;
     }

@@ -4,7 +4,7 @@ use crate::configuration::error::{ConfigError, Faults, place};
 use crate::configuration::penalty::Regularizer;
 use crate::lagrangian::Description;
 use crate::network::file::MAX_WIDTH;
-use crate::network::{ActivationChoice, Form, Initialization, InputLayer, Radial, Structure};
+use crate::network::{ActivationChoice, Factor, Form, Initialization, InputLayer, Radial, Structure};
 use crate::optimizers::Method;
 use crate::optimizers::Schedule;
 use serde::{Deserialize, Serialize};
@@ -207,6 +207,9 @@ pub struct Network {
     /// Structure of the Lagrangian: how it is made of the network's outputs.
     #[serde(default)]
     pub structure: Structure,
+    /// How kinetic energy or metric of a structure are factored.
+    #[serde(default)]
+    pub factor: Factor,
     /// Names of the coordinates that the Lagrangian does not depend on.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub cyclic: Vec<String>,
@@ -311,6 +314,7 @@ impl Network {
         Ok(Form {
             radial: self.radial.iter().map(radial).collect::<Result<_, _>>()?,
             structure: self.structure,
+            factor: self.factor,
             cyclic: self.cyclic.iter().map(index).collect::<Result<_, _>>()?,
             even_in_v: self.even_in_v,
             learn_alpha: self.learn_alpha,

@@ -1,5 +1,6 @@
 //! The inverse question: which forces make a motion.
 
+use super::failures::not_finite;
 use super::{EulerLagrange, MechanicsError, Request, Terms};
 use crate::scalar::{Real, Scalar};
 
@@ -45,13 +46,28 @@ pub fn inverse_dynamics<S: Scalar>(
     v: &[S],
     a: &[S],
 ) -> Result<InverseDynamics<S>, MechanicsError> {
+    let (forces, failures) = inverse_dynamics_by_rows(model, q, v, a)?;
+    failures.first().map_or(Ok(forces), |&error| Err(error))
+}
+
+/// [`inverse_dynamics`] with an error for every row that fails, whose forces are `NaN`.
+///
+/// # Errors
+/// [`MechanicsError`] that is about no row.
+pub(crate) fn inverse_dynamics_by_rows<S: Scalar>(
+    model: &dyn EulerLagrange<S>,
+    q: &[S],
+    v: &[S],
+    a: &[S],
+) -> Result<(InverseDynamics<S>, Vec<MechanicsError>), MechanicsError> {
     let n = model.coordinates();
     if a.len() != v.len() {
         return Err(MechanicsError::Shape { what: "accelerations", expected: v.len(), found: a.len() });
     }
     let mut terms = Terms::default();
     let request = Request::MASS_MATRIX | Request::MOMENTUM_DRIFT | Request::DL_DQ | Request::FORCE;
-    model.terms(q, v, request, &mut terms)?;
+    let outcome = model.terms(q, v, request, &mut terms);
+    let told = terms.take_failures(outcome)?;
     let mut generalized = Vec::with_capacity(a.len());
     for (k, a) in a.chunks(n.max(1)).enumerate() {
         for i in 0..n {
@@ -60,13 +76,17 @@ pub fn inverse_dynamics<S: Scalar>(
             generalized.push(inertia + terms.momentum_drift[k * n + i] - terms.dl_dq[k * n + i]);
         }
     }
-    if let Some(at) = generalized.iter().position(|x| !x.is_finite()) {
-        return Err(MechanicsError::NotFinite { row: at / n.max(1), what: "generalized force" });
+    terms.put_before(not_finite("generalized force", &generalized, n).collect());
+    terms.put_before(told);
+    let (mut friction, failures) = (terms.force, terms.failures);
+    for row in failures.iter().filter_map(MechanicsError::row) {
+        for forces in [&mut generalized, &mut friction].into_iter().filter(|forces| !forces.is_empty()) {
+            forces[row * n..(row + 1) * n].fill(S::nan());
+        }
     }
-    let friction = terms.force;
     let external = match friction.as_slice() {
         [] => generalized.clone(),
         friction => generalized.iter().zip(friction).map(|(&all, &friction)| all - friction).collect(),
     };
-    Ok(InverseDynamics { generalized, friction, external })
+    Ok((InverseDynamics { generalized, friction, external }, failures))
 }

@@ -32,6 +32,8 @@ pub use error::MechanicsError;
 pub use expression::{Expression, ExpressionError};
 pub use expression_lagrangian::ExpressionLagrangian;
 pub use hand_written::HandWritten;
+#[cfg(feature = "cli")]
+pub(crate) use inverse::inverse_dynamics_by_rows;
 pub use inverse::{InverseDynamics, inverse_dynamics};
 pub use metric::MetricJet;
 pub(crate) use metric::metric_jets;

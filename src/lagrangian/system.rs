@@ -161,11 +161,13 @@ pub(crate) struct LearningAdvice {
     pub states: Option<fn(bounds: &mut Bounds) -> StateAdvice>,
     /// The paper's budget, if the system is one of its own.
     pub paper: Option<PaperBudget>,
+    /// Learning rate of a structure, where that of others is not good.
+    pub structure_rate: Option<f64>,
 }
 
 impl LearningAdvice {
     /// No advice: the box of the training states does, and the paper has nothing on the system.
-    pub const NONE: Self = Self { states: None, paper: None };
+    pub const NONE: Self = Self { states: None, paper: None, structure_rate: None };
 }
 
 /// Choices that go with the bounds of the training states.

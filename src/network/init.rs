@@ -14,9 +14,6 @@ const NEAR_ZERO: f64 = 0.01;
 /// Factor of the output weights of a structure, whose mass matrix then begins next to a constant.
 const VARIATION: f64 = 0.1;
 
-/// Initial biases of the diagonal of a structure's triangular factor: `softplus(1) = 1.31`.
-const DIAGONAL: f64 = 1.0;
-
 /// Initial `gamma` of every unit of a dissipation: the friction starts at `ln(1 + e^-5) = 0.0067`.
 const FRICTION: f64 = -5.0;
 
@@ -28,8 +25,8 @@ const FRICTION: f64 = -5.0;
 /// Those of a dissipation come after all others, which are the same without it: `gamma = -5`, `w = 0`, and `b` of length
 /// 1 in random directions.
 ///
-/// A structure begins, unless near zero, with a tenth of these output weights and with output biases that are 0 but for 1 on
-/// the diagonal of its triangular factor.
+/// A structure begins, unless near zero, with a tenth of these output weights and with output biases that are those of 1.7
+/// times the identity.
 pub fn initial_weights<S: Scalar>(architecture: &Architecture, kind: Initialization, rng: &mut impl Rng) -> Vec<S> {
     let layout = Layout::new(architecture);
     let mut weights = vec![<S as Real>::zero(); layout.parameters];
@@ -49,7 +46,7 @@ pub fn initial_weights<S: Scalar>(architecture: &Architecture, kind: Initializat
         }
     }
     if architecture.form.structure != Structure::BlackBox && kind != Initialization::NearZero {
-        settle(&layout, architecture.coordinates, &mut weights);
+        settle(&layout, &architecture.start(), &mut weights);
     }
     if let Some(alpha) = layout.alpha {
         weights[alpha] = S::of_f64(architecture.alpha);
@@ -65,14 +62,14 @@ pub fn initial_weights<S: Scalar>(architecture: &Architecture, kind: Initializat
 
 /// Begins a structure with a mass matrix near 1.7 times the identity and next to no forces: a random metric would move by its
 /// curvature, at every velocity, which has to be unlearned first.
-fn settle<S: Scalar>(layout: &Layout, n: usize, weights: &mut [S]) {
+fn settle<S: Scalar>(layout: &Layout, start: &[(usize, f64)], weights: &mut [S]) {
     for (k, branch) in layout.branches.iter().enumerate() {
         let output = &branch.layers[branch.layers.len() - 1];
         weights[output.weight_range()].iter_mut().for_each(|w| *w *= S::of_f64(VARIATION));
         let bias = &mut weights[output.bias_range()];
         bias.fill(<S as Real>::zero());
         if k == 0 {
-            (0..n).for_each(|i| bias[i * (i + 1) / 2 + i] = S::of_f64(DIAGONAL));
+            start.iter().for_each(|&(index, number)| bias[index] = S::of_f64(number));
         }
     }
 }
@@ -125,7 +122,7 @@ fn draw<S: Scalar>(layer: &Layer, place: Place, kind: Initialization, rng: &mut 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::network::{Activation, ActivationChoice, Form, InputLayer};
+    use crate::network::{Activation, ActivationChoice, Factor, Form, InputLayer};
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
 
@@ -248,17 +245,19 @@ mod tests {
     #[test]
     fn a_structure_begins_with_a_nearly_constant_mass_matrix() {
         use crate::lagrangian::{EulerLagrange, Request, Terms};
-        let form = Form { structure: Structure::Mechanical, ..Form::default() };
-        let architecture = Architecture { form, ..architecture(ActivationChoice::Gelu) };
-        let weights = drawn(&architecture, Initialization::Default);
-        let model = crate::network::NetworkLagrangian::new(architecture, weights).unwrap();
-        let mut terms = Terms::default();
-        let q: Vec<f64> = (0..40).map(|k| (1.7 * f64::from(k)).sin() * 3.0).collect();
-        model.terms(&q, &[1.0; 40], Request::ALL, &mut terms).unwrap();
-        let diagonal = (1.0_f64.exp().ln_1p() + 1e-3).powi(2);
-        for m in terms.mass_matrix.chunks_exact(4) {
-            let off = [m[0] - diagonal, m[1], m[2], m[3] - diagonal];
-            assert!(off.iter().all(|x| x.abs() < diagonal / 3.0), "{m:?}");
+        for factor in [Factor::Triangle, Factor::Rectangle] {
+            let form = Form { structure: Structure::Mechanical, factor, ..Form::default() };
+            let architecture = Architecture { form, ..architecture(ActivationChoice::Gelu) };
+            let weights = drawn(&architecture, Initialization::Default);
+            let model = crate::network::NetworkLagrangian::new(architecture, weights).unwrap();
+            let mut terms = Terms::default();
+            let q: Vec<f64> = (0..40).map(|k| (1.7 * f64::from(k)).sin() * 3.0).collect();
+            model.terms(&q, &[1.0; 40], Request::ALL, &mut terms).unwrap();
+            let diagonal = (1.0_f64.exp().ln_1p() + 1e-3).powi(2);
+            for m in terms.mass_matrix.chunks_exact(4) {
+                let off = [m[0] - diagonal, m[1], m[2], m[3] - diagonal];
+                assert!(off.iter().all(|x| x.abs() < diagonal / 3.0), "{m:?}");
+            }
         }
     }
 

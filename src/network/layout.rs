@@ -148,7 +148,7 @@ impl Layout {
                 chain.push(LinearMap::Dense, activation, width / activations.len(), true);
             }
             // A constant in the L of a black box moves nothing.
-            chain.push(LinearMap::Dense, Activation::Identity, form.outputs(n), !black_box);
+            chain.push(LinearMap::Dense, Activation::Identity, architecture.outputs(), !black_box);
             parameters = chain.offset;
             branches.push(Branch { layers: chain.layers });
         }

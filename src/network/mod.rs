@@ -23,4 +23,4 @@ pub use init::initial_weights;
 #[doc(hidden)]
 pub use layout::{Branch, DissipationLayout, Layer, Layout, LinearMap};
 pub use model::{NetworkError, NetworkLagrangian};
-pub use structure::{Form, Radial, Structure};
+pub use structure::{Factor, Form, Radial, Structure};

@@ -114,6 +114,17 @@ impl Architecture {
     }
 }
 
+impl Architecture {
+    /// Outputs of the network.
+    pub(crate) fn outputs(&self) -> usize {
+        self.form.outputs(self.coordinates, self.time_like.is_some())
+    }
+    /// The initial biases of a structure that are not 0.
+    pub(crate) fn start(&self) -> Vec<(usize, f64)> {
+        self.form.factor.start(self.coordinates, self.time_like.is_some())
+    }
+}
+
 impl<S: Scalar> NetworkLagrangian<S> {
     /// A network of this shape with these flat parameters (see [`Layout`]).
     ///

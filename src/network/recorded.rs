@@ -2,7 +2,7 @@
 //! as blocks on the tape.
 
 use crate::lagrangian::Lagrangian;
-use crate::network::structure::{Structure, quadratic_form, time_last};
+use crate::network::structure::{Structure, time_last};
 use crate::network::{Architecture, Layer, Layout, LinearMap};
 use crate::scalar::Real;
 
@@ -24,7 +24,7 @@ impl Lagrangian for Architecture {
             branches.fold(first, |sum, more| sum.iter().zip(&more).map(|(&a, &b)| a + b).collect())
         };
         let n = self.coordinates;
-        let triangle = n * (n + 1) / 2;
+        let (factor, lorentzian) = (self.form.factor, self.time_like.is_some());
         let learned = match self.form.structure {
             Structure::BlackBox => {
                 let at = |sign: R| {
@@ -40,13 +40,14 @@ impl Lagrangian for Architecture {
             Structure::Mechanical => {
                 let outputs = outputs(&positions);
                 let order = time_last(n, None);
-                let kinetic = quadratic_form(&outputs[..triangle], &velocities, &order, false);
-                let linear = outputs[triangle + 1..].iter().zip(&velocities);
-                linear.fold(kinetic - outputs[triangle], |sum, (&a, &v)| sum + a * v)
+                let (numbers, potentials) = outputs.split_at(factor.numbers(n, false));
+                let kinetic = factor.half_form(numbers, &velocities, &order, false);
+                let linear = potentials[1..].iter().zip(&velocities);
+                linear.fold(kinetic - potentials[0], |sum, (&a, &v)| sum + a * v)
             }
             Structure::Metric => {
                 let outputs = outputs(&positions);
-                quadratic_form(&outputs, &velocities, &time_last(n, self.time_like), self.time_like.is_some())
+                factor.half_form(&outputs, &velocities, &time_last(n, self.time_like), lorentzian)
             }
         };
         if self.form.known.is_some() { learned + self.known_lagrangian(parameters, q, v) } else { learned }

@@ -3,12 +3,12 @@
 //! | structure | `L` | by construction |
 //! |---|---|---|
 //! | black box | `N(q, v) + alpha v.eta.v`, `eta = diag(1, .., 1)`, -1 for a time-like coordinate | |
-//! | mechanical | `v.M(q) v/2 + A(q).v - V(q)`, `M = C C^T` | `M` positive definite |
-//! | metric | `g(q)(v, v)/2`, `g = C diag(1, .., 1, -1) C^T`, space first, time last; without a time `g = C C^T` | the signature of `g` |
+//! | mechanical | `v.M(q) v/2 + A(q).v - V(q)`, `M = F F^T` | `M` positive definite |
+//! | metric | `g(q)(v, v)/2`, `g = F diag(1, .., 1, -1) F^T`, space first, time last; without a time `g = F F^T` | the signature of `g` |
 //!
-//! `C` is lower triangular, its diagonal `softplus(c_ii) + 10^-3` positive. With the time last the factors are the 3 + 1 split:
-//! spatial metric positive definite, lapse positive, shift free. All velocities are scaled, `v_i/s_i`; the network of a mechanical
-//! Lagrangian or a metric sees positions alone.
+//! The factor `F` is a triangle or a rectangle, see [`Factor`]. With the time last a triangle is the 3 + 1 split: spatial metric
+//! positive definite, lapse positive, shift free. All velocities are scaled, `v_i/s_i`; the network of a mechanical Lagrangian or a
+//! metric sees positions alone.
 
 use crate::lagrangian::Description;
 use crate::scalar::Real;
@@ -48,6 +48,9 @@ impl Structure {
 pub struct Form {
     /// Structure of a Lagrangian: how it is made of the network's outputs.
     pub structure: Structure,
+    /// How kinetic energy or metric are factored; files without this key have a triangle.
+    #[serde(skip_serializing_if = "is_triangle")]
+    pub factor: Factor,
     /// Coordinates that `L` does not depend on: their momenta are conserved exactly.
     pub cyclic: Vec<usize>,
     /// `true` if `L(q, -v) = L(q, v)`: the motion can be run backwards.
@@ -84,35 +87,110 @@ impl Form {
         *self == Self::default()
     }
 
-    /// Outputs of the network for `n` coordinates.
-    pub(crate) fn outputs(&self, n: usize) -> usize {
-        let triangle = n * (n + 1) / 2;
+    /// Outputs of the network for `n` coordinates, one of them a time if `lorentzian`.
+    pub(crate) fn outputs(&self, n: usize, lorentzian: bool) -> usize {
         match self.structure {
             Structure::BlackBox => 1,
-            Structure::Mechanical => triangle + 1 + if self.even_in_v { 0 } else { n },
-            Structure::Metric => triangle,
+            Structure::Mechanical => self.factor.numbers(n, false) + 1 + if self.even_in_v { 0 } else { n },
+            Structure::Metric => self.factor.numbers(n, lorentzian),
         }
     }
 }
 
-/// Smallest diagonal element of a triangular factor.
+/// `true` for what files without the key have.
+fn is_triangle(factor: &Factor) -> bool {
+    *factor == Factor::Triangle
+}
+
+/// How the quadratic form of a structure is factored into a sum of squares.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Factor {
+    /// A lower triangle with the diagonal `softplus(c_ii) + 10^-3`: as many squares as coordinates.
+    #[default]
+    Triangle,
+    /// A rectangle of numbers of any sign beside `10^-6` times the identity: twice as many squares as coordinates in space, the
+    /// speeds in a space around it, smooth where the diagonal of a triangle has a root. A time has its own shift and lapse.
+    Rectangle,
+}
+
+/// Least diagonal element of a triangular factor, and of a lapse; its square is the least eigenvalue beside a rectangle.
 const LEAST: f64 = 1e-3;
 
-/// `v.C eta C^T v / 2` with `C` from the numbers of its lower triangle, row by row; `order` is the order of the coordinates in
-/// `C`, the last one counted negative if it is a time.
-pub(super) fn quadratic_form<R: Real>(triangle: &[R], v: &[R], order: &[usize], lorentzian: bool) -> R {
+/// Initial biases of the diagonal of a triangle: `softplus(1) = 1.31`.
+const DIAGONAL: f64 = 1.0;
+
+impl Factor {
+    /// Numbers of a form in `n` coordinates, one of them a time if it is `lorentzian`.
+    pub(super) fn numbers(self, n: usize, lorentzian: bool) -> usize {
+        let space = n - usize::from(lorentzian);
+        match self {
+            Self::Triangle => n * (n + 1) / 2,
+            Self::Rectangle => 2 * space * space + if lorentzian { n } else { 0 },
+        }
+    }
+
+    /// The numbers other than 0 of a form next to the identity times 1.7, with their indices.
+    pub(super) fn start(self, n: usize, lorentzian: bool) -> Vec<(usize, f64)> {
+        let space = n - usize::from(lorentzian);
+        match self {
+            Self::Triangle => (0..n).map(|i| (i * (i + 1) / 2 + i, DIAGONAL)).collect(),
+            Self::Rectangle => {
+                let lapse = lorentzian.then(|| (self.numbers(n, true) - 1, DIAGONAL));
+                (0..space).map(|i| (i * space + i, DIAGONAL.exp().ln_1p())).chain(lapse).collect()
+            }
+        }
+    }
+
+    /// Half the form of `v`; `order` is the order of the coordinates, the last one a time, counted negative, if it is
+    /// `lorentzian`.
+    ///
+    /// - Triangle: `v.C eta C^T v / 2`, the numbers those of `C`, row by row.
+    /// - Rectangle: `|B w|^2 / 2 - (N v_t)^2 / 2`, `w_i = v_i + shift_i v_t`, the numbers those of `B`, row by row, then the
+    ///   shift and the lapse `N`.
+    pub(super) fn half_form<R: Real>(self, numbers: &[R], v: &[R], order: &[usize], lorentzian: bool) -> R {
+        match self {
+            Self::Triangle => half_form_of_triangle(numbers, v, order, lorentzian),
+            Self::Rectangle => half_form_of_rectangle(numbers, v, order, lorentzian),
+        }
+    }
+}
+
+/// A positive number from any.
+fn positive<R: Real>(x: R) -> R {
+    x.softplus() + R::from_f64(LEAST)
+}
+
+fn half_form_of_triangle<R: Real>(triangle: &[R], v: &[R], order: &[usize], lorentzian: bool) -> R {
     let n = v.len();
     let mut half = R::zero();
     for k in 0..n {
         let along = (k..n).fold(R::zero(), |sum, i| {
             let element = triangle[i * (i + 1) / 2 + k];
-            let element = if i == k { element.softplus() + R::from_f64(LEAST) } else { element };
-            sum + element * v[order[i]]
+            sum + if i == k { positive(element) } else { element } * v[order[i]]
         });
         let square = along.sqr() * R::half();
         half = if lorentzian && k + 1 == n { half - square } else { half + square };
     }
     half
+}
+
+fn half_form_of_rectangle<R: Real>(numbers: &[R], v: &[R], order: &[usize], lorentzian: bool) -> R {
+    let space = v.len() - usize::from(lorentzian);
+    let (rectangle, rest) = numbers.split_at(2 * space * space);
+    let moved: Vec<R> = match order[space..] {
+        [time] => order[..space].iter().zip(rest).map(|(&i, &shift)| v[i] + shift * v[time]).collect(),
+        _ => order.iter().map(|&i| v[i]).collect(),
+    };
+    let square = |sum: R, x: R| sum + x.sqr();
+    let along = |row: &[R]| row.iter().zip(&moved).fold(R::zero(), |sum, (&b, &w)| sum + b * w);
+    let least = moved.iter().copied().fold(R::zero(), square) * R::from_f64(LEAST * LEAST);
+    let form = rectangle.chunks_exact(space).map(along).fold(least, square);
+    let form = match order[space..] {
+        [time] => form - (positive(rest[space]) * v[time]).sqr(),
+        _ => form,
+    };
+    form * R::half()
 }
 
 /// The coordinates with the time-like one last.
@@ -141,9 +219,26 @@ mod tests {
             for i in 0..3 {
                 let v: [f64; 3] = std::array::from_fn(|k| if k == i { 2.0 } else { 0.0 });
                 let expected = if i == time { -2.0 } else { 2.0 };
-                assert!((quadratic_form(&triangle, &v, &order, true) - expected).abs() < 1e-14);
+                assert!((Factor::Triangle.half_form(&triangle, &v, &order, true) - expected).abs() < 1e-14);
             }
         }
         assert_eq!(time_last(2, None), [0, 1]);
+    }
+
+    /// `|B w|^2 - (N v_t)^2` with the shift in `w`, and `10^-6 |w|^2`, for numbers worked out by hand.
+    #[test]
+    fn a_rectangle_is_a_sum_of_squares_with_shift_and_lapse() {
+        let lapse = (2.0 - LEAST).exp_m1().ln();
+        let rectangle = [1.0, 2.0, 0.0, -1.0, 3.0, 0.0, 0.0, 0.5];
+        let v = [0.5, 2.0, -1.0];
+        let order = time_last(3, Some(1));
+        // w = (0.5 + 0.25 * 2, -1 - 0.5 * 2) = (1, -2).
+        let squares = 9.0 + 4.0 + 9.0 + 1.0 + LEAST * LEAST * 5.0;
+        let lorentzian = [&rectangle[..], &[0.25, -0.5, lapse]].concat();
+        assert_eq!(lorentzian.len(), Factor::Rectangle.numbers(3, true));
+        let found: f64 = Factor::Rectangle.half_form(&lorentzian, &v, &order, true);
+        assert!((found - (squares - 16.0) / 2.0).abs() < 1e-13);
+        let found: f64 = Factor::Rectangle.half_form(&rectangle, &[1.0, -2.0], &[0, 1], false);
+        assert!((found - squares / 2.0).abs() < 1e-13);
     }
 }

@@ -40,6 +40,7 @@ impl StartModel {
         let name = |i: &usize| self.header.columns.get(*i).cloned();
         (network.structure, network.cyclic) =
             (model.form.structure, model.form.cyclic.iter().filter_map(name).collect());
+        network.factor = model.form.factor;
         network.radial =
             model.form.radial.iter().map(|group| group.coordinates.iter().filter_map(name).collect()).collect();
         network.radial_unit = model.form.radial.first().map(|group| group.unit);

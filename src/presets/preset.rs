@@ -5,7 +5,7 @@ use crate::configuration::{Config, Data, Network, OnFailure, Optimizer, Phase, P
 use crate::data::boxes;
 use crate::lagrangian::SystemInstance;
 use crate::lagrangian::system::{Bounds, PaperBudget, PaperPhase, ShellAdvice, StateAdvice};
-use crate::network::{ActivationChoice, Initialization, InputLayer, Structure};
+use crate::network::{ActivationChoice, Factor, Initialization, InputLayer, Structure};
 use crate::optimizers::Method;
 use crate::optimizers::Schedule;
 use std::f64::consts::PI;
@@ -38,7 +38,8 @@ impl Preset {
         let mut config = self.config(system)?;
         config.take_structure(structure);
         if structure != Structure::BlackBox && self != Self::Paper {
-            config.phases.iter_mut().for_each(|phase| phase.rate *= STRUCTURE_RATE);
+            let rate = system.system.learning.structure_rate.unwrap_or(STRUCTURE_RATE);
+            config.phases.iter_mut().for_each(|phase| phase.rate = rate);
         }
         Some(config)
     }
@@ -46,9 +47,12 @@ impl Preset {
 
 impl Config {
     /// Changes the structure. But for a black box the signature holds by construction, and motion on a mass shell tells the
-    /// whole metric: there is no penalty, no state off the shell and no `alpha` to be learned.
+    /// whole metric: there is no penalty, no state off the shell and no `alpha` to be learned. Without a time the factor is a
+    /// rectangle.
     pub fn take_structure(&mut self, structure: Structure) {
         self.network.structure = structure;
+        let free = structure != Structure::BlackBox && self.network.time_like.is_none();
+        self.network.factor = if free { Factor::Rectangle } else { Factor::Triangle };
         if structure != Structure::BlackBox {
             self.penalty = Regularizer::None;
             self.data.rescaled_fraction = 0.0;
@@ -105,8 +109,9 @@ fn optimizer(method: Method) -> Optimizer {
     Optimizer { method, batch: 128, weight_decay: WEIGHT_DECAY, clip: 1.0, averaging: 0.0, on_failure: OnFailure::Skip }
 }
 
-/// Learning rate of structures over that of a black box.
-const STRUCTURE_RATE: f64 = 2.0;
+/// Learning rates of a black box and of structures.
+const RATE: f64 = 5e-3;
+const STRUCTURE_RATE: f64 = 1e-2;
 
 /// Choices in which the presets of our own differ.
 #[derive(Clone, Copy)]
@@ -139,6 +144,7 @@ fn network(width: usize) -> Network {
         embed_periodic: true,
         input_layer: InputLayer::None,
         structure: Structure::BlackBox,
+        factor: Factor::Triangle,
         cyclic: Vec::new(),
         radial: Vec::new(),
         radial_unit: None,
@@ -185,7 +191,7 @@ fn training_states(system: &SystemInstance<f64>) -> (Bounds, StateAdvice) {
 fn ours(system: &SystemInstance<f64>, size: Size) -> Config {
     let (bounds, StateAdvice { log_uniform, acceleration_weighting, trajectory_fraction, shell }) =
         training_states(system);
-    let phase = phase(size.epochs, 5e-3, boxes(&bounds.positions), boxes(&bounds.velocities));
+    let phase = phase(size.epochs, RATE, boxes(&bounds.positions), boxes(&bounds.velocities));
     let base = base(system, 60_000, network(size.width));
     let rescaled_fraction = if system.constrained_coordinate().is_some() { OFF_SHELL } else { 0.0 };
     let config = Config {

@@ -142,6 +142,12 @@ pub const TRAINING_SECTIONS: [Section<'static>; 9] = [
                 "black-box, mechanical, metric",
                 "How the Lagrangian is made of the network's outputs; see structures.",
             ),
+            key(
+                "factor",
+                "triangle, rectangle",
+                "How kinetic energy or metric of a structure are factored: a triangle, or a rectangle of twice as many squares, which \
+                 is smooth where a triangle has a root.",
+            ),
             optional(
                 "cyclic",
                 "[\"t\"]",

@@ -94,6 +94,7 @@ pub const fn system(
                 }
             }),
             paper,
+            ..LearningAdvice::NONE
         },
         described: None,
     }

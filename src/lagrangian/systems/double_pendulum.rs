@@ -44,7 +44,6 @@ pub const SYSTEM: System = System {
     conserved: None,
     // The paper's first phase sees three turns, the others one turn and a little more.
     learning: LearningAdvice {
-        states: None,
         paper: Some(PaperBudget {
             states: 60_000,
             hidden: &[500; 3],
@@ -54,6 +53,7 @@ pub const SYSTEM: System = System {
                 PaperPhase { positions: Some((-PI / 10.0, 21.0 * PI / 10.0)), ..PaperPhase::new(200, 1e-5, 1e-8) },
             ],
         }),
+        ..LearningAdvice::NONE
     },
     described: None,
 };

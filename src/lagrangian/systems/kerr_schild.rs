@@ -104,7 +104,7 @@ pub const fn system(hole: KerrSchild) -> System {
                 KerrSchild::Kerr => |_| around(1.35),
                 KerrSchild::Schwarzschild | KerrSchild::ReissnerNordstrom => |_| around(1.2),
             }),
-            paper: None,
+            ..LearningAdvice::NONE
         },
         described: None,
     }

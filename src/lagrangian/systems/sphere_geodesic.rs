@@ -68,6 +68,7 @@ pub const SYSTEM: System = System {
             StateAdvice { log_uniform: Vec::new(), acceleration_weighting: 0.3, trajectory_fraction: 0.5, shell: None }
         }),
         paper: Some(PaperBudget { states: 50_000, hidden: &[500; 3], phases: &[PaperPhase::new(50, 1e-3, 1e-6)] }),
+        ..LearningAdvice::NONE
     },
     described: None,
 };

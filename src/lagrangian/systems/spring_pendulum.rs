@@ -55,6 +55,7 @@ pub const SYSTEM: System = System {
             }
         }),
         paper: Some(PaperBudget { states: 60_000, hidden: &[600; 2], phases: &[PaperPhase::new(500, 5e-4, 1e-7)] }),
+        ..LearningAdvice::NONE
     },
     described: None,
 };

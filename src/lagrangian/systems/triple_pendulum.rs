@@ -46,6 +46,7 @@ pub const SYSTEM: System = System {
     learning: LearningAdvice {
         states: None,
         paper: Some(PaperBudget { states: 60_000, hidden: &[500; 3], phases: &[PaperPhase::new(500, 1e-3, 1e-7)] }),
+        structure_rate: Some(1.6e-3),
     },
     described: None,
 };

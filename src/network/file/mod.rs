@@ -144,7 +144,7 @@ fn slots(architecture: &Architecture) -> Result<Vec<Slot>, ModelFileError> {
     let features = 3 * architecture.coordinates;
     let mut inputs = Some(features);
     let mut total = Some(architecture.activation.branches().len() * (1 + 2 * features));
-    for &outputs in architecture.hidden.iter().chain(&[architecture.form.outputs(architecture.coordinates)]) {
+    for &outputs in architecture.hidden.iter().chain(&[architecture.outputs()]) {
         let layer = inputs.and_then(|i| i.checked_add(1)).and_then(|i| i.checked_mul(outputs));
         total = total.zip(layer).and_then(|(a, b)| a.checked_add(b));
         inputs = Some(outputs);

@@ -6,7 +6,7 @@ use crate::common::nested::{Reference, reference_of};
 use crate::common::properties;
 use lnn::lagrangian::Lagrangian;
 use lnn::network::{
-    ActivationChoice, Architecture, Form, Initialization, InputLayer, Layout, Structure, initial_weights,
+    ActivationChoice, Architecture, Factor, Form, Initialization, InputLayer, Layout, Structure, initial_weights,
 };
 use lnn::scalar::{Dd, Real, Scalar};
 use lnn::tape::{Depth, Evaluation, MixedDirections, Recorded, ScalarFunction, gradient};
@@ -230,7 +230,10 @@ fn every_structure_agrees_with_nested_forward_numbers() {
         (Structure::Metric, Some(2), vec![], false, false),
         (Structure::Metric, None, vec![], false, false),
     ];
-    for (k, (structure, time_like, cyclic, even_in_v, learn_alpha)) in structures.into_iter().enumerate() {
+    let factored = structures
+        .into_iter()
+        .flat_map(|structure| [(structure.clone(), Factor::Triangle), (structure, Factor::Rectangle)]);
+    for (k, ((structure, time_like, cyclic, even_in_v, learn_alpha), factor)) in factored.enumerate() {
         let architecture = Architecture {
             coordinates: 3,
             hidden: vec![5, 4],
@@ -242,7 +245,7 @@ fn every_structure_agrees_with_nested_forward_numbers() {
             embed_periodic: true,
             input_layer: if k == 3 { InputLayer::Dyt } else { InputLayer::None },
             dissipation: None,
-            form: Form { structure, cyclic: cyclic.clone(), even_in_v, learn_alpha, radial: Vec::new(), known: None },
+            form: Form { structure, factor, cyclic: cyclic.clone(), even_in_v, learn_alpha, ..Form::default() },
         };
         let architecture = Architecture { hidden: vec![6, 4], ..architecture };
         assert_eq!(architecture.validate(), Ok(()));

@@ -10,7 +10,7 @@ use lnn::forward::HyperDual;
 use lnn::lagrangian::{EulerLagrange, Request, Terms};
 use lnn::linalg::Workspace;
 use lnn::network::{
-    ActivationChoice, Architecture, Form, Initialization, InputLayer, Layout, NetworkLagrangian, Structure,
+    ActivationChoice, Architecture, Factor, Form, Initialization, InputLayer, Layout, NetworkLagrangian, Structure,
     initial_weights,
 };
 use lnn::optimizers::{Method as Update, Schedule};
@@ -353,6 +353,7 @@ fn config(units: Option<usize>, epochs: usize) -> Config {
             input_layer: InputLayer::None,
             dissipation: units,
             structure: Structure::BlackBox,
+            factor: Factor::Triangle,
             cyclic: Vec::new(),
             radial: Vec::new(),
             radial_unit: None,

@@ -242,6 +242,15 @@ fn the_torques_of_a_motion_are_asked_for() {
     assert!(
         (row["external_force"][0].as_f64().unwrap() - 2.0 * row["external_force"][1].as_f64().unwrap()).abs() < 1e-12
     );
+    // Rows that fail say why, the others are as they are alone.
+    let mixed = std::fs::read_to_string(&level).unwrap() + "0,1,1e200,0,0,0\n" + "1,1,0,0,0,0\n" + "0,1,0,1e200,0,0\n";
+    let run = lnn(&["inspect", "--system", "double-pendulum", "--states", &folder.file("mixed.csv", mixed), "--inverse"]);
+    assert_eq!(run.code, Some(1), "{}", run.stderr);
+    let rows = run.objects();
+    let failed = |row: &Value| row.get("error").is_some() && row["external_force"][0].is_null();
+    assert_eq!(rows.iter().map(failed).collect::<Vec<_>>(), [false, true, false, true]);
+    assert!((rows[2]["external_force"][1].as_f64().unwrap() - 9.8 * 1.0_f64.sin()).abs() < 1e-12, "{:?}", rows[2]);
+    assert!(run.stderr.contains("row 3"), "{}", run.stderr);
     let missing = folder.file("missing.csv", "theta1,theta2,theta1_dot,theta2_dot\n1,1,0,0\n");
     let refused = |states: &str, more: &[&str], code, parts: &[&str]| {
         lnn(&[&["inspect", "--system", "double-pendulum", "--states", states], more].concat()).refused(code, parts);

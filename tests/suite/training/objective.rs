@@ -8,7 +8,7 @@ use lnn::data::{Dataset, Datasets};
 use lnn::forward::HyperDual;
 use lnn::lagrangian::{Lagrangian, MechanicsError};
 use lnn::network::{
-    ActivationChoice, Architecture, Form, Initialization, InputLayer, Layout, Structure, initial_weights,
+    ActivationChoice, Architecture, Factor, Form, Initialization, InputLayer, Layout, Structure, initial_weights,
 };
 use lnn::optimizers::{Method, Schedule};
 use lnn::scalar::{Dd, Real, Scalar};
@@ -433,6 +433,7 @@ fn config(epochs: usize) -> Config {
             input_layer: InputLayer::None,
             dissipation: None,
             structure: Structure::BlackBox,
+            factor: Factor::Triangle,
             cyclic: Vec::new(),
             radial: Vec::new(),
             radial_unit: None,
