@@ -109,13 +109,16 @@ pub enum Factor {
     /// A lower triangle with the diagonal `softplus(c_ii) + 10^-3`: as many squares as coordinates.
     #[default]
     Triangle,
-    /// A rectangle of numbers of any sign beside `10^-6` times the identity: twice as many squares as coordinates in space, the
+    /// A rectangle of numbers of any sign beside `10^-6` times the identity: three squares for every coordinate in space,
     /// speeds in a space around it, smooth where the diagonal of a triangle has a root. A time has its own shift and lapse.
     Rectangle,
 }
 
 /// Least diagonal element of a triangular factor, and of a lapse; its square is the least eigenvalue beside a rectangle.
 const LEAST: f64 = 1e-3;
+
+/// Rows of a rectangle for every coordinate in space: any metric is that of a surface in a space of enough dimensions.
+const ROWS: usize = 3;
 
 /// Initial biases of the diagonal of a triangle: `softplus(1) = 1.31`.
 const DIAGONAL: f64 = 1.0;
@@ -126,7 +129,7 @@ impl Factor {
         let space = n - usize::from(lorentzian);
         match self {
             Self::Triangle => n * (n + 1) / 2,
-            Self::Rectangle => 2 * space * space + if lorentzian { n } else { 0 },
+            Self::Rectangle => ROWS * space * space + if lorentzian { n } else { 0 },
         }
     }
 
@@ -139,6 +142,14 @@ impl Factor {
                 let lapse = lorentzian.then(|| (self.numbers(n, true) - 1, DIAGONAL));
                 (0..space).map(|i| (i * space + i, DIAGONAL.exp().ln_1p())).chain(lapse).collect()
             }
+        }
+    }
+
+    /// Factor of the initial output weights.
+    pub(super) fn variation(self) -> f64 {
+        match self {
+            Self::Triangle => 0.1,
+            Self::Rectangle => 0.3,
         }
     }
 
@@ -177,7 +188,7 @@ fn half_form_of_triangle<R: Real>(triangle: &[R], v: &[R], order: &[usize], lore
 
 fn half_form_of_rectangle<R: Real>(numbers: &[R], v: &[R], order: &[usize], lorentzian: bool) -> R {
     let space = v.len() - usize::from(lorentzian);
-    let (rectangle, rest) = numbers.split_at(2 * space * space);
+    let (rectangle, rest) = numbers.split_at(ROWS * space * space);
     let moved: Vec<R> = match order[space..] {
         [time] => order[..space].iter().zip(rest).map(|(&i, &shift)| v[i] + shift * v[time]).collect(),
         _ => order.iter().map(|&i| v[i]).collect(),
@@ -229,11 +240,11 @@ mod tests {
     #[test]
     fn a_rectangle_is_a_sum_of_squares_with_shift_and_lapse() {
         let lapse = (2.0 - LEAST).exp_m1().ln();
-        let rectangle = [1.0, 2.0, 0.0, -1.0, 3.0, 0.0, 0.0, 0.5];
+        let rectangle = [1.0, 2.0, 0.0, -1.0, 3.0, 0.0, 0.0, 0.5, 0.0, 0.0, -1.0, 0.0];
         let v = [0.5, 2.0, -1.0];
         let order = time_last(3, Some(1));
         // w = (0.5 + 0.25 * 2, -1 - 0.5 * 2) = (1, -2).
-        let squares = 9.0 + 4.0 + 9.0 + 1.0 + LEAST * LEAST * 5.0;
+        let squares = 9.0 + 4.0 + 9.0 + 1.0 + 1.0 + LEAST * LEAST * 5.0;
         let lorentzian = [&rectangle[..], &[0.25, -0.5, lapse]].concat();
         assert_eq!(lorentzian.len(), Factor::Rectangle.numbers(3, true));
         let found: f64 = Factor::Rectangle.half_form(&lorentzian, &v, &order, true);

@@ -32,13 +32,16 @@ impl Preset {
         }
     }
 
-    /// The configuration of a system for a Lagrangian of this structure; the presets of our own take bolder steps where a
-    /// signature cannot be lost.
+    /// The configuration of a system for a Lagrangian of this structure; the presets of our own take steps of their own
+    /// where a signature cannot be lost.
     pub(crate) fn config_of(self, system: &SystemInstance<f64>, structure: Structure) -> Option<Config> {
         let mut config = self.config(system)?;
         config.take_structure(structure);
         if structure != Structure::BlackBox && self != Self::Paper {
-            let rate = system.system.learning.structure_rate.unwrap_or(STRUCTURE_RATE);
+            let rate = system.system.learning.structure_rate.unwrap_or(match config.network.factor {
+                Factor::Triangle => TRIANGLE_RATE,
+                Factor::Rectangle => RATE,
+            });
             config.phases.iter_mut().for_each(|phase| phase.rate = rate);
         }
         Some(config)
@@ -109,9 +112,9 @@ fn optimizer(method: Method) -> Optimizer {
     Optimizer { method, batch: 128, weight_decay: WEIGHT_DECAY, clip: 1.0, averaging: 0.0, on_failure: OnFailure::Skip }
 }
 
-/// Learning rates of a black box and of structures.
+/// Learning rates of a black box or a rectangle, and of a triangle.
 const RATE: f64 = 5e-3;
-const STRUCTURE_RATE: f64 = 1e-2;
+const TRIANGLE_RATE: f64 = 1e-2;
 
 /// Choices in which the presets of our own differ.
 #[derive(Clone, Copy)]

@@ -145,7 +145,7 @@ pub const TRAINING_SECTIONS: [Section<'static>; 9] = [
             key(
                 "factor",
                 "triangle, rectangle",
-                "How kinetic energy or metric of a structure are factored: a triangle, or a rectangle of twice as many squares, which \
+                "How kinetic energy or metric of a structure are factored: a triangle, or a rectangle of three squares a coordinate, which \
                  is smooth where a triangle has a root.",
             ),
             optional(

@@ -244,7 +244,8 @@ fn the_torques_of_a_motion_are_asked_for() {
     );
     // Rows that fail say why, the others are as they are alone.
     let mixed = std::fs::read_to_string(&level).unwrap() + "0,1,1e200,0,0,0\n" + "1,1,0,0,0,0\n" + "0,1,0,1e200,0,0\n";
-    let run = lnn(&["inspect", "--system", "double-pendulum", "--states", &folder.file("mixed.csv", mixed), "--inverse"]);
+    let run =
+        lnn(&["inspect", "--system", "double-pendulum", "--states", &folder.file("mixed.csv", mixed), "--inverse"]);
     assert_eq!(run.code, Some(1), "{}", run.stderr);
     let rows = run.objects();
     let failed = |row: &Value| row.get("error").is_some() && row["external_force"][0].is_null();
