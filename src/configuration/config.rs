@@ -207,7 +207,7 @@ pub struct Network {
     /// Structure of the Lagrangian: how it is made of the network's outputs.
     #[serde(default)]
     pub structure: Structure,
-    /// How kinetic energy or metric of a structure are factored.
+    /// Factor of the kinetic energy or the metric of a structure.
     #[serde(default)]
     pub factor: Factor,
     /// Names of the coordinates that the Lagrangian does not depend on.

@@ -50,7 +50,7 @@ impl<S: Scalar> Systems<'_, S> {
         self.blocks::<1>(done, batch, solutions, workspace);
     }
 
-    /// Whether that was possible, see [`in_lanes`].
+    /// The rows `start..end` in blocks of `W`; `false`, with nothing done, where the CPU does not serve so many lanes.
     fn blocks<const W: usize>(
         &self,
         start: usize,

@@ -48,7 +48,7 @@ impl Structure {
 pub struct Form {
     /// Structure of a Lagrangian: how it is made of the network's outputs.
     pub structure: Structure,
-    /// How kinetic energy or metric are factored; files without this key have a triangle.
+    /// Factor of the kinetic energy or the metric; files without this key have a triangle.
     #[serde(skip_serializing_if = "is_triangle")]
     pub factor: Factor,
     /// Coordinates that `L` does not depend on: their momenta are conserved exactly.
@@ -102,7 +102,7 @@ fn is_triangle(factor: &Factor) -> bool {
     *factor == Factor::Triangle
 }
 
-/// How the quadratic form of a structure is factored into a sum of squares.
+/// Factor of the quadratic form of a structure, which makes it a sum of squares.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Factor {

@@ -247,7 +247,7 @@ fn the_torques_of_a_motion_are_asked_for() {
     let run =
         lnn(&["inspect", "--system", "double-pendulum", "--states", &folder.file("mixed.csv", mixed), "--inverse"]);
     assert_eq!(run.code, Some(1), "{}", run.stderr);
-    let rows = run.objects();
+    let rows: Vec<Value> = run.stdout.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
     let failed = |row: &Value| row.get("error").is_some() && row["external_force"][0].is_null();
     assert_eq!(rows.iter().map(failed).collect::<Vec<_>>(), [false, true, false, true]);
     assert!((rows[2]["external_force"][1].as_f64().unwrap() - 9.8 * 1.0_f64.sin()).abs() < 1e-12, "{:?}", rows[2]);
