@@ -4,6 +4,16 @@
 //! Hessian in `N` variables. They are [`Real`](crate::scalar::Real) over any `Real`: over floats, over each other and
 //! over tape variables. Only the chain, product and quotient rules stand here; elementary derivatives come from the
 //! [table of operations](crate::ops).
+//!
+//! ```
+//! use lnn::forward::Jet2;
+//! use lnn::scalar::Real;
+//!
+//! // x^2 sin y at (2, 0): the gradient is (0, 4), the mixed second derivative 2 x cos y = 4.
+//! let (x, y) = (Jet2::<f64, 2>::variable(2.0, 0), Jet2::variable(0.0, 1));
+//! let f = x.sqr() * y.sin();
+//! assert_eq!((f.value, f.gradient, f.second(0, 1)), (0.0, [0.0, 4.0], 4.0));
+//! ```
 
 mod dual;
 mod hyper;

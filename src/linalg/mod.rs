@@ -4,6 +4,19 @@
 //! `LANES` matrices side by side, every lane through the same branch-free steps, so that a matrix gives the same
 //! bits wherever it stands in a batch. A [`Workspace`] is reused; nothing else allocates for matrices up to the size
 //! from which faer takes over.
+//!
+//! ```
+//! use lnn::linalg::{LinalgError, Workspace, eigenvalues, solve};
+//!
+//! // Two systems at once: [[2, 1], [1, 2]] x = (3, 3) and diag(4, -1) x = (4, 1).
+//! let (matrices, right) = ([2.0, 1.0, 1.0, 2.0, 4.0, 0.0, 0.0, -1.0], [3.0, 3.0, 4.0, 1.0]);
+//! let (mut x, mut values, mut workspace) = ([0.0_f64; 4], [0.0; 4], Workspace::new());
+//! solve(2, &matrices, &right, &mut x, &mut workspace)?;
+//! assert!(x.iter().zip([1.0, 1.0, 1.0, -1.0]).all(|(x, exact)| (x - exact).abs() < 1e-15));
+//! eigenvalues(2, &matrices, &mut values, &mut workspace)?;
+//! assert!(values.iter().zip([1.0, 3.0, -1.0, 4.0]).all(|(w, exact)| (w - exact).abs() < 1e-15));
+//! # Ok::<(), LinalgError>(())
+//! ```
 
 mod batch;
 mod condition;

@@ -22,6 +22,23 @@
 //! In all of them constants are never recorded and variables of two recordings never mix silently. In the first two a zero
 //! adjoint times an infinite partial derivative contributes 0, so that a branch not taken leaves no `NaN`; a [`Recorded`]
 //! Lagrangian needs finite slopes in both branches.
+//!
+//! ```
+//! use lnn::scalar::Real;
+//! use lnn::tape::{Depth, Evaluation, Recorded, TapeError};
+//! use std::sync::Arc;
+//!
+//! // A bead on a rotating hoop, L = v^2/2 + w^2 sin^2 q / 2 + cos q, recorded once with w as parameter.
+//! let hoop = Recorded::new(vec![1.0], 1, |w, q, v| {
+//!     v[0].sqr() * Real::half() + (w[0] * q[0].sin()).sqr() * Real::half() + q[0].cos()
+//! })?;
+//! let mut evaluation = Evaluation::new(Arc::new(hoop));
+//! evaluation.evaluate(&[2.0], &[0.5], &[1.0], Depth::Motion);
+//! let (sin, cos) = 0.5_f64.sin_cos();
+//! assert!((evaluation.dl_dq[0] - sin * (4.0 * cos - 1.0)).abs() < 1e-15);
+//! assert_eq!((evaluation.momentum[0], evaluation.mass_matrix[0]), (1.0, 1.0));
+//! # Ok::<(), TapeError>(())
+//! ```
 
 mod driver;
 mod eager;
