@@ -39,11 +39,11 @@ pub fn inverse<S: Scalar>(path: &Path, format: Format, source: &Source<S>) -> Re
         };
         let (q, v, a) = (part(0..n), part(n..2 * n), part(2 * n..3 * n));
         let times: Vec<S> = if timed { part(3 * n..3 * n + 1) } else { Vec::new() };
-        let (forces, told) = inverse_dynamics_by_rows(source.model.as_ref(), &q, &v, &a).map_err(|e| told(&e))?;
-        let mut told = told.into_iter().peekable();
+        let (forces, failed) = inverse_dynamics_by_rows(source.model.as_ref(), &q, &v, &a).map_err(|e| told(&e))?;
+        let mut failed = failed.into_iter().peekable();
         let mut text = String::new();
         for (k, &row) in rows.iter().enumerate() {
-            let problem = told.next_if(|failure| failure.row() == Some(k)).map(explain);
+            let problem = failed.next_if(|failure| failure.row() == Some(k)).map(explain);
             text += &line(format, row, n, k, &forces, times.get(k), problem.as_deref());
             failures.extend(problem.map(|problem| (row, problem)));
         }

@@ -43,7 +43,7 @@ pub fn initial_weights<S: Scalar>(architecture: &Architecture, kind: Initializat
         }
     }
     if architecture.form.structure != Structure::BlackBox && kind != Initialization::NearZero {
-        settle(&layout, &architecture.start(), architecture.form.factor.variation(), &mut weights);
+        settle(&layout, &architecture.initial_biases(), architecture.form.factor.variation(), &mut weights);
     }
     if let Some(alpha) = layout.alpha {
         weights[alpha] = S::of_f64(architecture.alpha);
@@ -59,14 +59,14 @@ pub fn initial_weights<S: Scalar>(architecture: &Architecture, kind: Initializat
 
 /// Begins a structure with a mass matrix near 1.7 times the identity and next to no forces: a random metric would move by its
 /// curvature, at every velocity, which has to be unlearned first.
-fn settle<S: Scalar>(layout: &Layout, start: &[(usize, f64)], variation: f64, weights: &mut [S]) {
+fn settle<S: Scalar>(layout: &Layout, biases: &[(usize, f64)], variation: f64, weights: &mut [S]) {
     for (k, branch) in layout.branches.iter().enumerate() {
         let output = &branch.layers[branch.layers.len() - 1];
         weights[output.weight_range()].iter_mut().for_each(|w| *w *= S::of_f64(variation));
         let bias = &mut weights[output.bias_range()];
         bias.fill(<S as Real>::zero());
         if k == 0 {
-            start.iter().for_each(|&(index, number)| bias[index] = S::of_f64(number));
+            biases.iter().for_each(|&(index, number)| bias[index] = S::of_f64(number));
         }
     }
 }

@@ -4,6 +4,7 @@
 mod activation_choice;
 mod config;
 mod dynamics;
+mod factor;
 mod features;
 #[cfg(feature = "model-files")]
 pub mod file;
@@ -19,8 +20,9 @@ pub use activation_choice::{ActivationChoice, UnknownActivation};
 pub use config::{Architecture, Initialization, InputLayer};
 #[doc(hidden)]
 pub use dynamics::{Dynamics, Model};
+pub use factor::Factor;
 pub use init::initial_weights;
 #[doc(hidden)]
 pub use layout::{Branch, DissipationLayout, Layer, Layout, LinearMap};
 pub use model::{NetworkError, NetworkLagrangian};
-pub use structure::{Factor, Form, Radial, Structure};
+pub use structure::{Form, Radial, Structure};

@@ -119,9 +119,9 @@ impl Architecture {
     pub(crate) fn outputs(&self) -> usize {
         self.form.outputs(self.coordinates, self.time_like.is_some())
     }
-    /// The initial biases of a structure that are not 0.
-    pub(crate) fn start(&self) -> Vec<(usize, f64)> {
-        self.form.factor.start(self.coordinates, self.time_like.is_some())
+    /// Initial biases of a structure, those other than 0 with their indices.
+    pub(crate) fn initial_biases(&self) -> Vec<(usize, f64)> {
+        self.form.factor.initial_biases(self.coordinates, self.time_like.is_some())
     }
 }
 

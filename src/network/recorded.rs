@@ -2,8 +2,8 @@
 //! as blocks on the tape.
 
 use crate::lagrangian::Lagrangian;
-use crate::network::structure::{Structure, time_last};
-use crate::network::{Architecture, Layer, Layout, LinearMap};
+use crate::network::factor::time_last;
+use crate::network::{Architecture, Layer, Layout, LinearMap, Structure};
 use crate::scalar::Real;
 
 impl Lagrangian for Architecture {

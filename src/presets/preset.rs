@@ -32,8 +32,8 @@ impl Preset {
         }
     }
 
-    /// The configuration of a system for a Lagrangian of this structure; the presets of our own take steps of their own
-    /// where a signature cannot be lost.
+    /// The configuration of a system for a Lagrangian of this structure; the presets of our own have other rates where a
+    /// signature cannot be lost.
     pub(crate) fn config_of(self, system: &SystemInstance<f64>, structure: Structure) -> Option<Config> {
         let mut config = self.config(system)?;
         config.take_structure(structure);

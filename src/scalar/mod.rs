@@ -30,7 +30,7 @@ pub use sum::Sum;
 use std::fmt::{Debug, Display};
 use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
 
-/// A function of one number with its derivatives, which is chosen at run time.
+/// An elementary function of one number with its derivatives.
 #[doc(hidden)]
 pub trait Elementary: Copy {
     /// `f(x)`.

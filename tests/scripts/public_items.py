@@ -9,7 +9,7 @@ import os
 import re
 import sys
 
-ITEM = re.compile(r"^pub (?:const |unsafe |async )*(fn|struct|enum|trait|type|const|static|union)\s+(\w+)", re.M)
+ITEM = re.compile(r"(?<!#\[doc\(hidden\)\]\n)^pub (?:const |unsafe |async )*(fn|struct|enum|trait|type|const|static|union)\s+(\w+)", re.M)
 IMPL = re.compile(r"^impl(?:<(?:[^<>]|<[^<>]*>)*>)?\s+(\w+)(?:<[^{]*>)?\s*(?:where[^{]*)?\{", re.M)
 ATTRIBUTES = r"((?:^#\[[^\n]*\]\n)*)"
 

@@ -232,8 +232,9 @@ fn every_structure_agrees_with_nested_forward_numbers() {
     ];
     let factored = structures
         .into_iter()
+        .enumerate()
         .flat_map(|structure| [(structure.clone(), Factor::Triangle), (structure, Factor::Rectangle)]);
-    for (k, ((structure, time_like, cyclic, even_in_v, learn_alpha), factor)) in factored.enumerate() {
+    for ((k, (structure, time_like, cyclic, even_in_v, learn_alpha)), factor) in factored {
         let architecture = Architecture {
             coordinates: 3,
             hidden: vec![5, 4],
