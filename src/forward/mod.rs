@@ -1,7 +1,7 @@
 //! Forward numbers: values with directional derivatives.
 //!
 //! [`Dual`] carries one tangent, [`HyperDual`] one mixed second-order Taylor coefficient, [`Jet2`] the gradient and the
-//! Hessian in `N` variables. They are [`Real`](crate::scalar::Real) over any `Real`: over floats, over each other and
+//! Hessian in `N` variables, [`Jet`] a gradient in more variables than its Hessian. They are [`Real`](crate::scalar::Real) over any `Real`: over floats, over each other and
 //! over tape variables. Only the chain, product and quotient rules stand here; elementary derivatives come from the
 //! [table of operations](crate::ops).
 //!
@@ -21,10 +21,11 @@ mod jet;
 
 pub use dual::Dual;
 pub use hyper::HyperDual;
-pub use jet::Jet2;
+pub(crate) use jet::array;
+pub use jet::{Jet, Jet2};
 
 /// The part of [`Real`](crate::scalar::Real) that is the same for every forward number, given `constant`, `chain1`
-/// (a table entry of one number), `chain2` (of two), `zip3` (componentwise `select`) and the base type `T`.
+/// (a table entry of one number), `chain2` (of two) and the base type `T`.
 macro_rules! forward_real {
     () => {
         type Scalar = T::Scalar;
@@ -38,7 +39,7 @@ macro_rules! forward_real {
             self.value.primal()
         }
         #[inline(always)]
-        fn elementary<F: crate::scalar::Elementary>(self, f: F) -> Self {
+        fn elementary<E: crate::scalar::Elementary>(self, f: E) -> Self {
             self.chain1(f)
         }
         crate::ops::unary_methods! { forward_unary }

@@ -1,10 +1,9 @@
 //! `L`, `p`, `g`, `M`, `c` of one state by forward numbers over any base: floats, or tracers that record a program.
 
 use super::{Lagrangian, Request};
-use crate::forward::{Dual, HyperDual, Jet2};
+use crate::forward::{Dual, HyperDual, Jet, array};
 use crate::scalar::Real;
 use crate::tape::Depth;
-use std::array::from_fn;
 
 /// Which derivatives a request needs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -72,9 +71,9 @@ pub(super) fn evaluate<L: Lagrangian, R: Real>(
     // Conditions that the compiler decides: code for other numbers of coordinates is not generated.
     match q.len() {
         1 if const { may_be::<L>(1) } => jets::<L, R, 1, 2>(system, parameters, q, v, need, out),
-        2 if const { may_be::<L>(2) } => jets::<L, R, 2, 4>(system, parameters, q, v, need, out),
-        3 if const { may_be::<L>(3) } => jets::<L, R, 3, 6>(system, parameters, q, v, need, out),
-        4 if const { may_be::<L>(4) } => jets::<L, R, 4, 8>(system, parameters, q, v, need, out),
+        2 if const { may_be::<L>(2) } => jets::<L, R, 2, 3>(system, parameters, q, v, need, out),
+        3 if const { may_be::<L>(3) } => jets::<L, R, 3, 4>(system, parameters, q, v, need, out),
+        4 if const { may_be::<L>(4) } => jets::<L, R, 4, 5>(system, parameters, q, v, need, out),
         _ => {
             if const { may_be_large::<L>() } {
                 directions(system, parameters, q, v, need, out);
@@ -110,7 +109,7 @@ impl<T: Real> Few<T> {
     fn new<R: Copy>(numbers: &[R], lift: impl Fn(R) -> T) -> Self {
         let length = numbers.len();
         if length <= 8 {
-            let array = from_fn(|i| numbers.get(i).map_or_else(T::zero, |&x| lift(x)));
+            let array = array(|i| numbers.get(i).map_or_else(T::zero, |&x| lift(x)));
             Self { array, vector: Vec::new(), length }
         } else {
             Self { array: [T::zero(); 8], vector: numbers.iter().map(|&x| lift(x)).collect(), length }
@@ -150,7 +149,7 @@ fn first_order<L: Lagrangian, R: Real>(
     }
 }
 
-/// Everything from one evaluation with all second derivatives; `N = 2 H`.
+/// Everything from one evaluation with the second derivatives by the velocities and along `(v, 0)`; `N = H + 1`.
 fn jets<L: Lagrangian, R: Real, const H: usize, const N: usize>(
     system: &L,
     parameters: &[R],
@@ -159,31 +158,33 @@ fn jets<L: Lagrangian, R: Real, const H: usize, const N: usize>(
     need: RequestedTerms,
     out: &mut State<'_, R>,
 ) {
-    let mut lifted = Few::new(parameters, Jet2::<R, N>::lift);
-    let jet_q: [Jet2<R, N>; H] = from_fn(|i| Jet2::variable(q[i], i));
-    let jet_v: [Jet2<R, N>; H] = from_fn(|i| Jet2::variable(v[i], H + i));
+    let mut lifted = Few::new(parameters, Jet::<R, N, H>::lift);
+    let mut jet_q = [Jet::lift(R::zero()); H];
+    let mut jet_v = jet_q;
+    for i in 0..H {
+        jet_v[i] = Jet::variable(v[i], i);
+        // The coordinates move along the last direction of second order; `dL/dq` needs the first alone.
+        jet_q[i] = Jet::variable(q[i], N + i);
+        jet_q[i].gradient[H] = v[i];
+    }
     let found = system.lagrangian(lifted.get(), &jet_q, &jet_v);
     if need.lagrangian {
         out.lagrangian[0] = found.value;
     }
     for i in 0..H {
         if need.dl_dq {
-            out.dl_dq[i] = found.gradient[i];
+            out.dl_dq[i] = found.linear[i];
         }
         if need.momentum {
-            out.momentum[i] = found.gradient[H + i];
+            out.momentum[i] = found.gradient[i];
         }
         if need.mass_matrix {
             for j in 0..H {
-                out.mass_matrix[i * H + j] = found.second(H + i, H + j);
+                out.mass_matrix[i * H + j] = found.second(i, j);
             }
         }
         if need.momentum_drift {
-            let mut sum = found.second(H + i, 0) * v[0];
-            for (j, &speed) in v.iter().enumerate().skip(1) {
-                sum += found.second(H + i, j) * speed;
-            }
-            out.momentum_drift[i] = sum;
+            out.momentum_drift[i] = found.second(H, i);
         }
     }
 }

@@ -76,32 +76,32 @@ pub trait Real:
     }
 
     /// The constant nearest to `value`: exact unless the scalar is `f32`.
-    #[inline]
+    #[inline(always)]
     fn from_f64(value: f64) -> Self {
         Self::constant(Self::Scalar::of_f64(value))
     }
     /// The constant `numerator / denominator`, rounded once in the working precision.
-    #[inline]
+    #[inline(always)]
     fn ratio(numerator: i32, denominator: i32) -> Self {
         Self::constant(Self::Scalar::of_f64(f64::from(numerator)) / Self::Scalar::of_f64(f64::from(denominator)))
     }
     /// 0.
-    #[inline]
+    #[inline(always)]
     fn zero() -> Self {
         Self::from_f64(0.0)
     }
     /// 1.
-    #[inline]
+    #[inline(always)]
     fn one() -> Self {
         Self::from_f64(1.0)
     }
     /// 2.
-    #[inline]
+    #[inline(always)]
     fn two() -> Self {
         Self::from_f64(2.0)
     }
     /// 1/2.
-    #[inline]
+    #[inline(always)]
     fn half() -> Self {
         Self::from_f64(0.5)
     }
@@ -184,12 +184,12 @@ pub trait Real:
     }
 
     /// `self * self`.
-    #[inline]
+    #[inline(always)]
     fn sqr(self) -> Self {
         self * self
     }
     /// Sine and cosine together.
-    #[inline]
+    #[inline(always)]
     fn sin_cos(self) -> (Self, Self) {
         (self.sin(), self.cos())
     }
@@ -199,7 +199,7 @@ pub trait Real:
         self * factor + summand
     }
     /// `max(self, 0)`; derivative 0 at 0, `NaN` passed on.
-    #[inline]
+    #[inline(always)]
     fn relu(self) -> Self {
         self.select(self, Self::zero())
     }
