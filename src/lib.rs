@@ -24,7 +24,7 @@
 //! | know metric, connection and curvature at a point | [`geometry::geometries`] |
 //! | integrate, with error control or symplectically | [`rollout::rollout`], [`rollout::rollout_many`] |
 //! | learn from accelerations | [`training::run`] (a configuration), [`training::train`] (your own [`data::Dataset`]) |
-//! | know every key of a configuration | [`presets::configuration_reference`], [`presets::TRAINING_SECTIONS`] |
+//! | know every key of a configuration | the page [`docs::configuration`] |
 //! | minimise your own loss of a network | [`training::Objective`], or [`tape::Recorded`] and [`tape::Evaluation`] below it |
 //! | store and load models | [`network::file::ModelFile`] |
 //! | differentiate a function of yours | [`tape::gradient`], [`tape::hessian`]; over many states [`tape::Program`] |

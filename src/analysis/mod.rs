@@ -1,4 +1,22 @@
 //! Energy and trajectory errors, comparisons of learned and exact Lagrangians, predictions of recorded motion.
+//!
+//! ```
+//! use lnn::analysis::{energy_error, mass_matrix_error};
+//! use lnn::lagrangian::build;
+//! use lnn::rollout::{Options, rollout};
+//!
+//! // A double pendulum, and one whose second mass is 1 % too heavy, as a learned model might have it.
+//! let exact = build::<f64>("double-pendulum", &[])?;
+//! let heavy = build::<f64>("double-pendulum", &[("m2".to_string(), "1.01".to_string())])?;
+//! let found = mass_matrix_error(&*exact, &*heavy, &[0.0, 0.0, 1.0, 0.2, -2.0, 1.5]); // at three positions
+//! assert!(found.error.count == 3 && found.error.max < 0.01);
+//!
+//! // How far its motion is from keeping the exact energy, relative to 1 J at least.
+//! let motion = rollout(&*heavy, &[1.0, 0.5], &[0.0, 0.0], &Options::new(5.0, 0.1)).complete()?;
+//! let error = energy_error(&*exact, &motion, 1.0);
+//! assert!(error.error.iter().all(|e| *e < 0.05) && error.error.iter().any(|e| *e > 1e-4));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod accelerations;
 mod affine;

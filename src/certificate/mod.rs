@@ -15,6 +15,25 @@
 //! number times `1e-16`, relative to the smallest.
 //!
 //! A box in which a branch of the Lagrangian (`select`, `max`, `|x|`) is not decided, or where it is not defined, stays open.
+//!
+//! # Example
+//!
+//! ```
+//! use lnn::certificate::{Options, Signature, Verdict, certify_system};
+//! use lnn::lagrangian::configure;
+//! use lnn::lagrangian::system::Bounds;
+//!
+//! let pendulum = configure::<f64>("double-pendulum", &[])?;
+//! let region = Bounds::uniform(2, (-3.2, 3.2), (-9.0, 9.0)); // rad, rad/s
+//! let options = Options { boxes: 20_000, ..Options::new(Signature { positive: 2, negative: 0 }) };
+//! let found = certify_system(&pendulum, &region, &options)?;
+//! assert_eq!((found.certified, found.refuted, found.open), (1.0, 0.0, 0.0));
+//! // M = [[2, c], [c, 1]] with c = cos(theta1 - theta2): the largest condition number is 6.854, at c = 1.
+//! assert!(found.condition.unwrap() > 6.854);
+//! assert!(matches!(found.verdict(&[0.1, 3.0], &[1.0, -8.0]), Verdict::Certified { .. }));
+//! assert_eq!(found.verdict(&[4.0, 3.0], &[1.0, -8.0]), Verdict::Open); // outside
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod affine;
 mod elementary;

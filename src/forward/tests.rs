@@ -1,6 +1,6 @@
 //! Every row of the table: derivatives of one order against differences of the order below, in double-double.
 
-use super::{Dual, HyperDual, Jet2};
+use super::{Dual, HyperDual, Jet, Jet2};
 use crate::ops::{Binary, Unary};
 use crate::scalar::{Dd, Real, Scalar};
 
@@ -78,6 +78,10 @@ fn check_binary(f: Binary, a: Dd, b: Dd) {
         (jet.second(1, 1), dbb),
     ] {
         close(got, want, &format!("{f:?} jet"));
+    }
+    let jet = f.value(Jet::<Dd, 1, 1>::variable(a, 0), Jet::variable(b, 1));
+    for (got, want) in [(jet.gradient[0], da), (jet.linear[0], db), (jet.second(0, 0), daa)] {
+        close(got, want, &format!("{f:?} jet of first order in one variable"));
     }
     let (p, q) = (HyperDual::new(a, dd(1.0), dd(2.0), dd(0.5)), HyperDual::new(b, dd(-1.0), dd(3.0), dd(0.25)));
     let hyper = f.value(p, q);

@@ -1,4 +1,13 @@
 //! Presets: configurations that ship with the crate, and the reference of all keys.
+//!
+//! ```
+//! use lnn::lagrangian::configure;
+//! use lnn::presets::Preset;
+//!
+//! let config = Preset::Quick.config(&configure("double-pendulum", &[])?).unwrap();
+//! assert!(config.phases[0].epochs > 0 && !config.network.hidden.is_empty());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod measured;
 mod preset;

@@ -1,4 +1,13 @@
 //! Random streams: one seed, independent draws for each purpose.
+//!
+//! ```
+//! use lnn::random::RngStream;
+//! use rand::Rng;
+//!
+//! let draw = |seed| -> f64 { RngStream::Weights.generator(seed).random() };
+//! assert_eq!(draw(7), draw(7));
+//! assert_ne!(draw(7), draw(8));
+//! ```
 
 use rand::{RngCore, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -1,4 +1,21 @@
 //! Recorded motion: what somebody measured, as it was measured; its derivatives, and what it is good for.
+//!
+//! ```
+//! use lnn::recording::Columns;
+//! use lnn::recording::read::read_recording;
+//! use lnn::recording::smooth::{SmoothOptions, Smoothing};
+//!
+//! // Angles of a double pendulum every 10 ms, several runs in one file.
+//! let angles = ["theta1", "theta2"].map(String::from).to_vec();
+//! let columns = Columns { periodic: angles.clone(), coords: angles, trajectory: Some("run".into()), ..Columns::default() };
+//! let recording = read_recording(&["examples/data/pendulum.csv"], &columns)?.recording;
+//! assert_eq!((recording.n(), recording.tracks[0].times[1]), (2, 0.01));
+//!
+//! let smoothing = Smoothing::choose(&recording, &SmoothOptions::default())?;
+//! let motion = smoothing.apply(&recording.tracks[0])?; // positions, velocities, accelerations and their errors
+//! assert_eq!(motion.a.len(), recording.tracks[0].q.len());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod columns;
 mod hermite;

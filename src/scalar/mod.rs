@@ -3,6 +3,18 @@
 //! Everything above this room is generic over [`Scalar`] (`f32`, `f64`, [`Dd`], and any [`num_traits::Float`] as
 //! [`AnyFloat`]). A Lagrangian is written over [`Real`], which forward numbers and tape variables implement too; nothing in
 //! a model may name a float type.
+//!
+//! ```
+//! use lnn::scalar::{Dd, Real, Scalar};
+//!
+//! // One formula, every number: the distance between two close roots loses digits in `f64` that double-double keeps.
+//! fn gap<R: Real>(x: R) -> R {
+//!     (x * x + R::one()).sqrt() - x
+//! }
+//! let exact = 1.0 / 2e8; // to the leading digits, at x = 1e8
+//! let (lost, kept) = (gap(1e8_f64), gap(Dd::of_f64(1e8)).to_f64());
+//! assert!((lost - exact).abs() > 0.1 * exact && (kept - exact).abs() < 1e-15 * exact);
+//! ```
 
 mod dd;
 mod dots;
