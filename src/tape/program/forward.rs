@@ -34,8 +34,8 @@ pub(super) fn forward<S: Scalar>(program: &[Instruction<S>], environment: &Envir
                 let Some((out, rest)) = after.split_first_mut() else { continue };
                 match &instruction.node {
                     Node::Input(index) => load(environment, *index as usize, out),
-                    Node::Parameter(index) => *out = [environment.parameters[*index as usize]; LANES],
-                    Node::Constant(value) => *out = [*value; LANES],
+                    Node::Parameter(index) => out.fill(environment.parameters[*index as usize]),
+                    Node::Constant(value) => out.fill(*value),
                     Node::Unary(f, a) => unary(*f, get(*a), out),
                     Node::SinCos(a) => {
                         if let Some(cos) = rest.first_mut() {
@@ -59,19 +59,23 @@ pub(super) fn forward<S: Scalar>(program: &[Instruction<S>], environment: &Envir
 /// One input of all lanes.
 #[inline(always)]
 fn load<S: Scalar>(environment: &Environment<'_, S>, mut index: usize, out: &mut Row<S>) {
-    let &Environment { inputs, lanes, start, .. } = environment;
-    for field in inputs {
-        let width = field.len() / lanes;
-        if index < width {
-            let (states, last) = (&field[start * width..], lanes - 1 - start);
-            for l in 0..LANES {
-                out[l] = states[l.min(last) * width + index];
-            }
-            return;
+    let mut value = S::nan();
+    let mut filled = 0;
+    for field in environment.inputs {
+        let width = field.len() / environment.lanes;
+        if index >= width {
+            index -= width;
+            continue;
         }
-        index -= width;
+        let states = field[environment.start * width..].chunks_exact(width);
+        for (target, state) in out.iter_mut().zip(states) {
+            value = state[index];
+            *target = value;
+            filled += 1;
+        }
+        break;
     }
-    *out = [S::nan(); LANES];
+    out[filled..].fill(value);
 }
 
 #[inline(always)]

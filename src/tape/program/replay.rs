@@ -114,11 +114,9 @@ impl<S: Scalar> Replay<S> {
             });
             for field in outputs.iter_mut() {
                 let width = field.len() / lanes;
-                let states = &mut field[start * width..];
-                for column in 0..width {
-                    let Some(source) = next.next() else { break };
-                    for (state, &value) in source[..LANES.min(lanes - start)].iter().enumerate() {
-                        states[state * width + column] = value;
+                for (column, source) in next.by_ref().take(width).enumerate() {
+                    for (state, &value) in field[start * width..].chunks_exact_mut(width).zip(source) {
+                        state[column] = value;
                     }
                 }
             }
