@@ -46,14 +46,14 @@ pub(super) const BLACK_HOLES: Experiment = Experiment {
     runs: || {
         let time = || "t".to_string();
         let mut black_box = learned(Preset::Quick, "quick", &hole(HOLES[0])).config;
-        let (batch, phase) = (black_box.optimizer.batch, black_box.phases[0].clone());
+        let (optimizer, phase) = (black_box.optimizer.clone(), black_box.phases[0].clone());
         black_box.take_structure(Structure::BlackBox);
         black_box.penalty = Regularizer::LorentzianSylvester { lambda: 100.0, time: time() };
         let spherical = Preset::Quick.config_of(&hole("schwarzschild-geodesic"), Structure::Metric);
         let mut spherical = spherical.unwrap_or_else(|| unreachable!("a preset of every system"));
         spherical.network.cyclic = vec![time()];
         // The same budget.
-        spherical.optimizer.batch = batch;
+        spherical.optimizer = optimizer;
         (spherical.phases[0].epochs, spherical.phases[0].t_max) = (phase.epochs, phase.t_max);
         let beside = [
             run("black-box", format!("black box, {}", HOLES[0]), black_box),

@@ -33,7 +33,7 @@ impl Preset {
     }
 
     /// The configuration of a system for a Lagrangian of this structure; the presets of our own have other rates where a
-    /// signature cannot be lost.
+    /// signature cannot be lost, and but around a centre no decay and a gradient that is seldom cut.
     pub(crate) fn config_of(self, system: &SystemInstance<f64>, structure: Structure) -> Option<Config> {
         let mut config = self.config(system)?;
         config.take_structure(structure);
@@ -43,6 +43,9 @@ impl Preset {
                 Factor::Rectangle => RATE,
             });
             config.phases.iter_mut().for_each(|phase| phase.rate = rate);
+            if config.data.shell.is_empty() {
+                config.optimizer = Optimizer { weight_decay: 0.0, clip: STRUCTURE_CLIP, ..config.optimizer };
+            }
         }
         Some(config)
     }
@@ -115,6 +118,9 @@ fn optimizer(method: Method) -> Optimizer {
 /// Learning rates of a black box or a rectangle, and of a triangle.
 const RATE: f64 = 5e-3;
 const TRIANGLE_RATE: f64 = 1e-2;
+
+/// Largest norm of a structure's gradient: above those of ordinary steps.
+const STRUCTURE_CLIP: f64 = 10.0;
 
 /// Choices in which the presets of our own differ.
 #[derive(Clone, Copy)]
@@ -291,4 +297,23 @@ fn paper(system: &SystemInstance<f64>) -> Option<Config> {
     };
     let phases = phases.iter().map(phase).collect();
     Some(Config { phases, ..base(system, states, network) })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lagrangian::configure;
+
+    #[test]
+    fn structures_neither_decay_nor_cut_but_around_a_centre() {
+        let choices = |name: &str, structure| {
+            let config = Preset::Quick.config_of(&configure(name, &[]).unwrap(), structure).unwrap();
+            (config.optimizer.weight_decay, config.optimizer.clip, config.phases[0].rate)
+        };
+        assert_eq!(choices("double-pendulum", Structure::Mechanical), (0.0, 10.0, 5e-3));
+        assert_eq!(choices("triple-pendulum", Structure::Mechanical), (0.0, 10.0, 1.6e-3));
+        assert_eq!(choices("ads4-geodesic", Structure::Metric), (0.0, 10.0, 1e-2));
+        assert_eq!(choices("double-pendulum", Structure::BlackBox), (1e-6, 1.0, 5e-3));
+        assert_eq!(choices("schwarzschild-cartesian", Structure::Metric), (1e-6, 1.0, 1e-2));
+    }
 }
