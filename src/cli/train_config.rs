@@ -13,6 +13,7 @@ use crate::lagrangian::{
     Description, DescriptionError, SystemError, SystemInstance, configure_system, configure_values, find,
 };
 use crate::names::plain;
+use crate::network::Structure;
 use crate::optimizers::Schedule;
 use crate::pipeline::{StartModel as Start, all_parameters};
 use crate::presets::{Preset, TRAINING_SECTIONS, configuration_reference};
@@ -239,6 +240,10 @@ impl Args {
             start.shape(&mut config);
         }
         if let Some(file) = &file {
+            // A file with a structure means what the argument means, and does not write zeros down.
+            if file.text(&["network", "structure"]).is_some_and(|structure| structure != Structure::BlackBox.name()) {
+                config.data.rescaled_fraction = 0.0;
+            }
             let (filled, wrong) = file.over(&config)?;
             config = with_periods(file, filled);
             config.seed = file.large(&["seed"]).unwrap_or(config.seed);

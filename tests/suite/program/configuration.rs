@@ -107,6 +107,22 @@ fn all_mistakes_of_a_file_are_listed_at_once() {
 }
 
 #[test]
+fn printed_structures_are_read_back_as_they_are() {
+    let folder = Folder::new();
+    for (system, structure) in
+        [("ads4-geodesic", "metric"), ("sphere-geodesic", "metric"), ("triple-pendulum", "mechanical")]
+    {
+        let printed = lnn(&["train", system, "--structure", structure, "--print-config"]).stdout;
+        let file = folder.file("printed.toml", &printed);
+        assert_eq!(lnn(&["train", "--config", &file, "--print-config"]).stdout, printed, "{system}");
+        let off_shell = folder.file("off_shell.toml", printed.replace("[data]\n", "[data]\nrescaled_fraction = 0.5\n"));
+        let read = lnn(&["train", "--config", &off_shell, "--print-config"]);
+        let config: Config = parse_config(&read.stdout).unwrap();
+        assert_eq!(config.data.rescaled_fraction, 0.5, "{}", read.stderr);
+    }
+}
+
+#[test]
 fn what_is_changed_most_has_options() {
     let changed = |system: &str, more: &[&str]| -> Config {
         let run = lnn(&[&["train", system, "--print-config"], more].concat());
