@@ -33,7 +33,7 @@ impl Preset {
     }
 
     /// The configuration of a system for a Lagrangian of this structure; the presets of our own have other rates where a
-    /// signature cannot be lost, and but around a centre no decay and a gradient that is seldom cut.
+    /// signature cannot be lost and, except around a centre, no weight decay and a higher clip.
     pub(crate) fn config_of(self, system: &SystemInstance<f64>, structure: Structure) -> Option<Config> {
         let mut config = self.config(system)?;
         config.take_structure(structure);
@@ -305,7 +305,7 @@ mod tests {
     use crate::lagrangian::configure;
 
     #[test]
-    fn structures_neither_decay_nor_cut_but_around_a_centre() {
+    fn structures_have_no_weight_decay_and_a_higher_clip_except_around_a_centre() {
         let choices = |name: &str, structure| {
             let config = Preset::Quick.config_of(&configure(name, &[]).unwrap(), structure).unwrap();
             (config.optimizer.weight_decay, config.optimizer.clip, config.phases[0].rate)
