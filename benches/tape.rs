@@ -71,8 +71,8 @@ fn nodes(c: &mut Criterion) {
 fn recorded<'t, S: Scalar>(p: &[Var<'t, S>], data: &[S]) -> Var<'t, S> {
     let mut sum = Var::zero();
     for row in data.chunks(6) {
-        let z: [Var<'_, S>; 6] = std::array::from_fn(|i| Var::lift(row[i]));
-        sum += error(p, &z[..4], &z[4..]);
+        let lift = |i: usize| Var::lift(row[i]);
+        sum += error(p, &[lift(0), lift(1), lift(2), lift(3)], &[lift(4), lift(5)]);
     }
     sum
 }
@@ -174,15 +174,14 @@ fn second_order(c: &mut Criterion) {
     let x = [0.3f64, -0.7, 1.1, 0.2];
     group.bench_function("all four variables", |b| {
         b.iter(|| {
-            let z: [Jet2<f64, 4>; 4] = std::array::from_fn(|i| Jet2::variable(black_box(x[i]), i));
-            lagrangian([z[0], z[1]], [z[2], z[3]])
+            let z = |i: usize| Jet2::<f64, 4>::variable(black_box(x[i]), i);
+            lagrangian([z(0), z(1)], [z(2), z(3)])
         });
     });
     group.bench_function("velocities only", |b| {
         b.iter(|| {
-            let z: [Jet2<f64, 2>; 4] =
-                std::array::from_fn(|i| if i < 2 { Jet2::lift(black_box(x[i])) } else { Jet2::variable(x[i], i - 2) });
-            lagrangian([z[0], z[1]], [z[2], z[3]])
+            let (q, v) = (|i: usize| Jet2::<f64, 2>::lift(black_box(x[i])), |i: usize| Jet2::variable(x[2 + i], i));
+            lagrangian([q(0), q(1)], [v(0), v(1)])
         });
     });
     let program = Program::<f64>::record(4, 0, |x, _| {

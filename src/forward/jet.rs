@@ -118,9 +118,9 @@ impl<T: Real, const N: usize, const F: usize> Jet<T, N, F> {
     }
     /// The same operation on every component.
     #[inline(always)]
-    fn each(&self, other: &Self, f: impl Fn(T, T) -> T) -> Self {
+    fn each(&self, other: &Self, f: impl Fn(T, T) -> T + Copy) -> Self {
         let value = f(self.value, other.value);
-        Self::build((self, other), value, &f, |i, j, _| f(self.lower[i][j], other.lower[i][j]))
+        Self::build((self, other), value, f, |i, j, _| f(self.lower[i][j], other.lower[i][j]))
     }
 }
 

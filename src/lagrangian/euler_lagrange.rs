@@ -3,7 +3,7 @@
 use super::failures::not_finite;
 use super::{MechanicsError, Request, Terms};
 use crate::linalg::{self, Failure, Workspace};
-use crate::scalar::{Real, Scalar};
+use crate::scalar::{Real, Scalar, update};
 
 impl<S: Scalar> Terms<S> {
     /// Empties every field, keeping the buffers.
@@ -53,10 +53,11 @@ impl<S: Scalar> Terms<S> {
             expect("momenta", batch * n, self.momentum.len())?;
             self.energy.clear();
             for (row, &lagrangian) in self.lagrangian.iter().enumerate() {
-                let range = row * n..(row + 1) * n;
-                let action =
-                    self.momentum[range.clone()].iter().zip(&v[range]).fold(-lagrangian, |e, (&p, &v)| e + p * v);
-                self.energy.push(action);
+                let mut energy = -lagrangian;
+                for i in row * n..(row + 1) * n {
+                    energy += self.momentum[i] * v[i];
+                }
+                self.energy.push(energy);
             }
         }
         if request.includes(Request::ACCELERATION) {
@@ -67,10 +68,11 @@ impl<S: Scalar> Terms<S> {
             self.acceleration.resize(batch * n, S::nan());
             let mut right = workspace.take_vector();
             right.clear();
-            right.extend(self.dl_dq.iter().zip(&self.momentum_drift).map(|(&g, &c)| g - c));
+            right.extend_from_slice(&self.dl_dq);
+            update(&mut right, &self.momentum_drift, |right, c| *right -= c);
             if !self.force.is_empty() {
                 expect("generalized forces", batch * n, self.force.len())?;
-                right.iter_mut().zip(&self.force).for_each(|(right, &force)| *right += force);
+                update(&mut right, &self.force, |right, force| *right += force);
             }
             accelerate(n, &self.mass_matrix, &right, &mut self.acceleration, workspace, &mut self.failures);
             workspace.give_vector(right);
@@ -86,7 +88,10 @@ impl<S: Scalar> Terms<S> {
             ("dissipated power", &self.dissipation, 1),
             ("energy", &self.energy, 1),
         ];
-        let found = fields.into_iter().flat_map(|(what, field, width)| not_finite(what, field, width)).collect();
+        let mut found = Vec::new();
+        for &(what, field, width) in &fields {
+            found.append(&mut not_finite(what, field, width));
+        }
         self.put_before(found);
         self.outcome()
     }
@@ -117,15 +122,15 @@ impl<S: Scalar> Terms<S> {
             return shape("accelerations", size, self.acceleration.len());
         }
         self.failures.clear();
-        let found = not_finite("external force", external, n).collect();
+        let found = not_finite("external force", external, n);
         let mut change = workspace.take_vector();
         change.clear();
         change.resize(size, S::nan());
         accelerate(n, &self.mass_matrix, external, &mut change, workspace, &mut self.failures);
-        self.acceleration.iter_mut().zip(&change).for_each(|(a, &change)| *a += change);
+        update(&mut self.acceleration, &change, |a, change| *a += change);
         workspace.give_vector(change);
         self.force.resize(size, zero);
-        self.force.iter_mut().zip(external).for_each(|(force, &external)| *force += external);
+        update(&mut self.force, external, |force, external| *force += external);
         self.dissipation.resize(size / n.max(1), zero);
         for ((power, v), external) in self.dissipation.iter_mut().zip(v.chunks(n)).zip(external.chunks(n)) {
             *power -= v.iter().zip(external).fold(zero, |sum, (&v, &q)| sum + v * q);

@@ -50,20 +50,26 @@ impl<S: Scalar> Terms<S> {
     }
 }
 
-/// Rows of a field `(batch, width)` that are not finite; whole blocks are looked at side by side.
-pub(super) fn not_finite<S: Scalar>(
-    what: &'static str,
-    field: &[S],
-    width: usize,
-) -> impl Iterator<Item = MechanicsError> {
-    const BLOCK: usize = 64;
-    let width = width.max(1);
-    let all_finite = |block: &[S]| block.iter().fold(true, |all, x| all & x.is_finite());
-    let clean = field.chunks(BLOCK).position(|block| !all_finite(block)).map_or(field.len(), |block| block * BLOCK);
-    let first = clean / width;
-    let rows = field[first * width..].chunks(width).enumerate();
-    rows.filter(move |(_, row)| !all_finite(row))
-        .map(move |(row, _)| MechanicsError::NotFinite { row: first + row, what })
+/// Rows of a field `(batch, width)` that are not finite.
+#[inline]
+pub(super) fn not_finite<S: Scalar>(what: &'static str, field: &[S], width: usize) -> Vec<MechanicsError> {
+    if all_finite(field) { Vec::new() } else { rows_not_finite(what, field, width) }
+}
+
+#[cold]
+fn rows_not_finite<S: Scalar>(what: &'static str, field: &[S], width: usize) -> Vec<MechanicsError> {
+    let rows = field.chunks(width.max(1)).enumerate().filter(|(_, row)| !all_finite(row));
+    rows.map(|(row, _)| MechanicsError::NotFinite { row, what }).collect()
+}
+
+/// `true` if every number is finite; no branch before the end.
+#[inline(always)]
+fn all_finite<S: Scalar>(numbers: &[S]) -> bool {
+    let mut all = true;
+    for x in numbers {
+        all &= x.is_finite();
+    }
+    all
 }
 
 #[cfg(test)]
@@ -76,10 +82,10 @@ mod tests {
         field[131] = f64::NAN;
         field[129] = f64::INFINITY;
         field[299] = f64::NAN;
-        let found: Vec<_> = not_finite("momentum", &field, 3).collect();
+        let found = not_finite("momentum", &field, 3);
         let bad = |row| MechanicsError::NotFinite { row, what: "momentum" };
         assert_eq!(found, [bad(43), bad(99)]);
-        assert_eq!(not_finite("momentum", &field[..129], 3).count(), 0);
+        assert_eq!(not_finite("momentum", &field[..129], 3), []);
         let mut terms = Terms::<f64>::default();
         terms.put_before(vec![MechanicsError::Uncertified { row: 99 }, MechanicsError::Uncertified { row: 7 }]);
         terms.put_before(found);

@@ -46,7 +46,8 @@ impl<L: Lagrangian, S: Scalar> Form<S> for L {
     }
     fn states(&self, parameters: &[S], q: &[S], v: &[S], need: RequestedTerms, terms: &mut Terms<S>) {
         let n = Lagrangian::coordinates(self).max(1);
-        for (row, (q, v)) in q.chunks_exact(n).zip(v.chunks_exact(n)).enumerate() {
+        for row in 0..q.len() / n {
+            let (q, v) = (&q[row * n..][..n], &v[row * n..][..n]);
             let part = |needed: bool, width: usize| if needed { row * width..(row + 1) * width } else { 0..0 };
             let mut state = State {
                 lagrangian: &mut terms.lagrangian[part(need.lagrangian, 1)],
@@ -91,7 +92,8 @@ struct Evaluator<S> {
     /// One program per combination of needed terms.
     programs: [OnceLock<Option<Arc<Program<S>>>>; 32],
     /// Buffers not in use; as many as there were callers at a time.
-    pool: Mutex<Vec<Scratch<S>>>,
+    #[allow(clippy::vec_box)] // They go in and out at every call.
+    pool: Mutex<Vec<Box<Scratch<S>>>>,
 }
 
 #[derive(Debug, Default)]

@@ -76,7 +76,7 @@ pub(crate) fn inverse_dynamics_by_rows<S: Scalar>(
             generalized.push(inertia + terms.momentum_drift[k * n + i] - terms.dl_dq[k * n + i]);
         }
     }
-    terms.put_before(not_finite("generalized force", &generalized, n).collect());
+    terms.put_before(not_finite("generalized force", &generalized, n));
     terms.put_before(told);
     let (mut friction, failures) = (terms.force, terms.failures);
     for row in failures.iter().filter_map(MechanicsError::row) {

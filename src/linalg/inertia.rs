@@ -17,6 +17,7 @@ pub struct Inertia {
 /// `true` if every pivot of `M = L D L^T` without exchanges is positive.
 ///
 /// `scratch` holds `n^2` numbers. Wrong only where an eigenvalue is within rounding of zero; `false` for `NaN`.
+#[inline]
 pub fn is_positive_definite<S: Scalar>(n: usize, matrix: &[S], scratch: &mut [S]) -> bool {
     let zero = <S as Real>::zero();
     let a = &mut scratch[..n * n];

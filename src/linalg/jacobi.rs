@@ -243,8 +243,9 @@ fn turn<S: Scalar, const W: usize>(
         }
         if q < n && !vectors.is_empty() {
             let (head, tail) = vectors.split_at_mut(q * n);
-            for (x, y) in head[p * n..p * n + n].iter_mut().zip(&mut tail[..n]) {
-                (*x, *y) = rotate(x, y, &s, &tau);
+            let (x, y) = (&mut head[p * n..p * n + n], &mut tail[..n]);
+            for k in 0..n {
+                (x[k], y[k]) = rotate(&x[k], &y[k], &s, &tau);
             }
         }
     }
@@ -309,8 +310,9 @@ fn store<S: Scalar, const W: usize>(
             values[rank] = if exponents[l] == 0 { value } else { value.ldexp(exponents[l]) };
             if !u.is_empty() {
                 let row = &mut vectors[((start + l) * n + rank) * n..][..n];
-                for (x, u) in row.iter_mut().zip(&u[i * n..i * n + n]) {
-                    *x = u[l] + zero;
+                let u = &u[i * n..i * n + n];
+                for k in 0..n {
+                    row[k] = u[k][l] + zero;
                 }
             }
         }

@@ -226,14 +226,33 @@ fn finish<S: Scalar, const W: usize>(
             }
         }
     }
-    for (l, row) in solutions[start * n * m..].chunks_exact_mut(n * m).take(W).enumerate() {
+    let rows = &mut solutions[start * n * m..];
+    if rows.len() >= W * n * m {
+        write_rows(W, (n, m), system, rows);
+    } else {
+        write_last_rows((n, m), system, rows);
+    }
+    probe
+}
+
+/// Writes the solutions of the first `count` systems out as rows.
+#[inline(always)]
+fn write_rows<S: Scalar, const W: usize>(count: usize, (n, m): (usize, usize), system: &[Lane<S, W>], rows: &mut [S]) {
+    for l in 0..count {
+        let row = &mut rows[l * n * m..][..n * m];
         for i in 0..n {
             for c in 0..m {
-                row[i * m + c] = system[i * width + n + c][l];
+                row[i * m + c] = system[i * (n + m) + n + c][l];
             }
         }
     }
-    probe
+}
+
+/// The same for the last block of a batch, which need not be full.
+#[cold]
+#[inline(never)]
+fn write_last_rows<S: Scalar, const W: usize>((n, m): (usize, usize), system: &[Lane<S, W>], rows: &mut [S]) {
+    write_rows(rows.len() / (n * m), (n, m), system, rows);
 }
 
 /// The verdict on a matrix with a small pivot or a solution that is not finite.

@@ -2,7 +2,7 @@
 //! numbers.
 
 use super::few_rows::{FEW_ROWS, FewRows, Rows};
-use crate::scalar::{Real, Scalar, Slice, SliceMut};
+use crate::scalar::{Real, Scalar, Slice, SliceMut, update};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Par};
 
@@ -150,9 +150,7 @@ fn plain<S: Scalar>(c: MatMut<'_, S>, accumulate: bool, alpha: S, a: MatRef<'_, 
                 }
             } else {
                 let source = &b.data[k * b.stride..k * b.stride + b.cols];
-                for (target, &value) in row.iter_mut().zip(source) {
-                    *target += factor * value;
-                }
+                update(row, source, |target, value| *target += factor * value);
             }
         }
     }

@@ -20,6 +20,7 @@ mod dd;
 mod dots;
 mod float;
 mod lanes;
+mod loops;
 mod primitive;
 mod simd;
 mod slices;
@@ -31,6 +32,7 @@ pub use dots::Dots;
 pub use float::AnyFloat;
 #[doc(hidden)]
 pub use lanes::{Exponential, Lanes, cos_lanes, exp_lanes, ln_lanes, sin_cos_lanes, sin_lanes, sqrt_lanes, tanh_lanes};
+pub(crate) use loops::{Column, copy_column, update, update_column, update2, update3};
 #[doc(hidden)]
 pub use simd::vectorized;
 pub(crate) use simd::{Simd, WithSimd, in_lanes, in_vectors};

@@ -36,41 +36,44 @@ impl Activation {
 
     /// `f = act(z)` elementwise. All slices have the same length.
     pub fn value<S: Scalar>(self, z: &[S], f: &mut [S]) {
-        debug_assert_eq!(z.len(), f.len());
         each_activation!(self, jet => {
-            for (&x, f) in z.iter().zip(f.iter_mut()) {
-                *f = jet(x)[0];
+            let n = z.len();
+            let f = &mut f[..n];
+            for k in 0..n {
+                f[k] = jet(z[k])[0];
             }
         });
     }
 
     /// Value and first derivative, elementwise. All slices have the same length.
     pub fn jet1<S: Scalar>(self, z: &[S], f: &mut [S], d1: &mut [S]) {
-        debug_assert!([f.len(), d1.len()].iter().all(|&n| n == z.len()));
         each_activation!(self, jet => {
-            for ((&x, f), d1) in z.iter().zip(f.iter_mut()).zip(d1.iter_mut()) {
-                [*f, *d1, ..] = jet(x);
+            let n = z.len();
+            let (f, d1) = (&mut f[..n], &mut d1[..n]);
+            for k in 0..n {
+                [f[k], d1[k], ..] = jet(z[k]);
             }
         });
     }
 
     /// Value and two derivatives, elementwise. All slices have the same length.
     pub fn jet2<S: Scalar>(self, z: &[S], f: &mut [S], d1: &mut [S], d2: &mut [S]) {
-        debug_assert!([f.len(), d1.len(), d2.len()].iter().all(|&n| n == z.len()));
         each_activation!(self, jet => {
-            for (((&x, f), d1), d2) in z.iter().zip(f.iter_mut()).zip(d1.iter_mut()).zip(d2.iter_mut()) {
-                [*f, *d1, *d2, ..] = jet(x);
+            let n = z.len();
+            let (f, d1, d2) = (&mut f[..n], &mut d1[..n], &mut d2[..n]);
+            for k in 0..n {
+                [f[k], d1[k], d2[k], ..] = jet(z[k]);
             }
         });
     }
 
     /// Value and three derivatives, elementwise. All slices have the same length.
     pub fn jet3<S: Scalar>(self, z: &[S], f: &mut [S], d1: &mut [S], d2: &mut [S], d3: &mut [S]) {
-        debug_assert!([f.len(), d1.len(), d2.len(), d3.len()].iter().all(|&n| n == z.len()));
         each_activation!(self, jet => {
-            let first = z.iter().zip(f.iter_mut()).zip(d1.iter_mut());
-            for ((((&x, f), d1), d2), d3) in first.zip(d2.iter_mut()).zip(d3.iter_mut()) {
-                [*f, *d1, *d2, *d3, _] = jet(x);
+            let n = z.len();
+            let (f, d1, d2, d3) = (&mut f[..n], &mut d1[..n], &mut d2[..n], &mut d3[..n]);
+            for k in 0..n {
+                [f[k], d1[k], d2[k], d3[k], _] = jet(z[k]);
             }
         });
     }

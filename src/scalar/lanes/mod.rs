@@ -5,7 +5,7 @@ mod pieces;
 #[cfg(test)]
 mod tests;
 
-use super::{Real, Scalar, vectorized};
+use super::{Real, Scalar, update, vectorized};
 
 /// `e^y` in pieces, so that a product with it is rounded once even where it underflows.
 ///
@@ -66,9 +66,7 @@ pub trait Lanes: Sized + Copy + PartialOrd {
 #[inline(always)]
 fn map<S: Scalar>(x: &[S], out: &mut [S], f: impl Fn(S) -> S) {
     debug_assert_eq!(x.len(), out.len());
-    for (&x, out) in x.iter().zip(out.iter_mut()) {
-        *out = f(x);
-    }
+    update(out, x, |out, x| *out = f(x));
 }
 
 /// `out = e^x`, elementwise; all slices of these functions have the same length.
@@ -126,17 +124,22 @@ fn is_fast<S: Scalar>(x: S) -> bool {
 /// `true` if some angle needs the scalar function: too large, infinite or `NaN`.
 #[inline(always)]
 fn any_large<S: Scalar>(x: &[S]) -> bool {
-    x.iter().fold(false, |any, &x| any | !is_fast(x))
+    let mut any = false;
+    for &x in x {
+        any |= !is_fast(x);
+    }
+    any
 }
 
 /// `sin = sin(x)`, `cos = cos(x)`, elementwise, angles in radians of any size.
 pub fn sin_cos_lanes<S: Scalar>(x: &[S], sin: &mut [S], cos: &mut [S]) {
-    debug_assert!(x.len() == sin.len() && x.len() == cos.len());
     let large = vectorized(
         #[inline(always)]
         || {
-            for ((&x, sin), cos) in x.iter().zip(sin.iter_mut()).zip(cos.iter_mut()) {
-                (*sin, *cos) = x.lane_sin_cos();
+            let n = x.len();
+            let (sin, cos) = (&mut sin[..n], &mut cos[..n]);
+            for k in 0..n {
+                (sin[k], cos[k]) = x[k].lane_sin_cos();
             }
             any_large(x)
         },

@@ -5,6 +5,8 @@ use super::{Exponential, Lanes};
 /// `even[0] + odd[0] x + even[1] x^2 + ...` by two interleaved Horner rules in `square = x^2`.
 trait Polynomial: Sized {
     fn polynomial<const E: usize, const O: usize>(self, square: Self, even: [Self; E], odd: [Self; O]) -> Self;
+    /// `c[0] + c[1] x + c[2] x^2 + ...` by Horner's rule.
+    fn series<const N: usize>(self, c: [Self; N]) -> Self;
 }
 
 macro_rules! impl_pieces {
@@ -18,10 +20,18 @@ macro_rules! impl_pieces {
         impl Polynomial for $float {
             #[inline(always)]
             fn polynomial<const E: usize, const O: usize>(self, square: Self, even: [Self; E], odd: [Self; O]) -> Self {
-                let horner = |sum: Self, &c: &Self| sum.mul_add(square, c);
-                let even_part = even[..E - 1].iter().rev().fold(even[E - 1], horner);
-                let odd_part = odd[..O - 1].iter().rev().fold(odd[O - 1], horner);
-                odd_part.mul_add(self, even_part)
+                square.series(odd).mul_add(self, square.series(even))
+            }
+            // A loop, for it to be compiled into every kernel whatever the level of optimisation.
+            #[inline(always)]
+            fn series<const N: usize>(self, c: [Self; N]) -> Self {
+                let mut sum = c[N - 1];
+                let mut k = N - 1;
+                while k > 0 {
+                    k -= 1;
+                    sum = sum.mul_add(self, c[k]);
+                }
+                sum
             }
         }
 
@@ -89,7 +99,7 @@ macro_rules! impl_pieces {
                 let s = f / (2.0 + f);
                 let square = s * s;
                 let half = 0.5 * f * f;
-                let rest = square * $artanh.iter().rev().fold(0.0, |sum: Self, &c| sum.mul_add(square, c));
+                let rest = square * square.series($artanh);
                 let inner = half - k.mul_add($ln2_low, s * (half + rest));
                 let value = k.mul_add($ln2_high, f - inner);
                 let value = if self == <$float>::INFINITY { self } else { value };
@@ -114,12 +124,11 @@ macro_rules! impl_pieces {
                 let lost = (r - (z - back)) - (p + back) - n.mul_add($quarter_middle, -p);
                 let rest = n.mul_add(-$quarter_low, lost);
                 let square = z * z;
-                let series = |c: &[Self]| c.iter().rev().fold(0.0, |sum: Self, &c| sum.mul_add(square, c));
                 // sin(z + rest) and cos(z + rest)
-                let sin = z + (square * z).mul_add(series(&$sin), rest);
+                let sin = z + (square * z).mul_add(square.series($sin), rest);
                 let half = 0.5 * square;
                 let near = 1.0 - half;
-                let cos = near + ((1.0 - near) - half + (square * square).mul_add(series(&$cos), -z * rest));
+                let cos = near + ((1.0 - near) - half + (square * square).mul_add(square.series($cos), -z * rest));
                 let bits = shifted.to_bits();
                 let (a, b) = if bits & 1 == 0 { (sin, cos) } else { (cos, sin) };
                 let sign = |x: Self, bit: $bits| $float::from_bits(x.to_bits() ^ (bit & 2) << (<$bits>::BITS - 2));

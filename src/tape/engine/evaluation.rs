@@ -4,7 +4,7 @@ use super::kernel::resize;
 use super::operation::{Forward, Kept, MixedForward, MixedReverse, PARTIALS, Reverse, Second};
 use super::value::{Kind, Order, Store, View};
 use super::{Depth, Recorded, STATES};
-use crate::scalar::{Real, Scalar};
+use crate::scalar::{Column, Real, Scalar, update_column};
 use std::sync::Arc;
 
 /// Directions of mixed Taylor coefficients `L_st`, one of every state; vectors are in scaled coordinates.
@@ -167,8 +167,8 @@ impl<S: Scalar> Evaluation<S> {
             field.resize(lanes * n, zero);
             for (i, input) in recorded.inputs[first..first + n].iter().enumerate() {
                 let Some(input) = *input else { continue };
-                let column = field[i..].iter_mut().step_by(n).zip(adjoints.plane(input, 0));
-                column.for_each(|(to, &a)| *to = a * recorded.scale[i]);
+                let (scale, adjoint) = (recorded.scale[i], Column::all(adjoints.plane(input, 0)));
+                update_column(lanes, Column::new(field, i, n), adjoint, |to, a| *to = a * scale);
             }
         };
         by(&mut self.dl_dq, 0);
@@ -178,8 +178,9 @@ impl<S: Scalar> Evaluation<S> {
             for i in 0..n {
                 for j in i..n {
                     let plane = &self.second.mass[Second::<S>::pair(n, i, j) * lanes..][..lanes];
-                    for (matrix, &m) in self.mass_matrix.chunks_exact_mut(n * n).zip(plane) {
-                        (matrix[i * n + j], matrix[j * n + i]) = (m, m);
+                    for place in [i * n + j, j * n + i] {
+                        let element = Column::new(&mut self.mass_matrix[..], place, n * n);
+                        update_column(lanes, element, Column::all(plane), |to, m| *to = m);
                     }
                 }
             }
@@ -187,7 +188,8 @@ impl<S: Scalar> Evaluation<S> {
         if depth >= Depth::Motion {
             self.momentum_drift.resize(lanes * n, zero);
             for (i, plane) in self.second.drift.chunks_exact(lanes).enumerate() {
-                self.momentum_drift[i..].iter_mut().step_by(n).zip(plane).for_each(|(to, &c)| *to = c);
+                let column = Column::new(&mut self.momentum_drift[..], i, n);
+                update_column(lanes, column, Column::all(plane), |to, c| *to = c);
             }
         }
     }

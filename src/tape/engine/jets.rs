@@ -2,7 +2,7 @@
 
 use crate::forward::Dual;
 use crate::ops::{Activation, Binary, Unary};
-use crate::scalar::{Real, Scalar, exp_lanes, sin_cos_lanes, vectorized};
+use crate::scalar::{Real, Scalar, exp_lanes, sin_cos_lanes, update, vectorized};
 
 /// The activation whose vectorised closed forms serve a function of the table.
 fn activation(f: Unary) -> Option<Activation> {
@@ -27,7 +27,7 @@ pub(super) fn jets<S: Scalar>(f: Unary, order: usize, x: &[S], y: &mut [S], [d1,
         };
     }
     match f {
-        _ if order == 0 => y.iter_mut().zip(x).for_each(|(y, &x)| *y = f.value(x)),
+        _ if order == 0 => update(y, x, |y, x| *y = f.value(x)),
         Unary::Sin | Unary::Cos => {
             let (other, sign) = (d1, if f == Unary::Sin { S::of_f64(1.0) } else { S::of_f64(-1.0) });
             if f == Unary::Sin {
@@ -51,7 +51,7 @@ pub(super) fn jets<S: Scalar>(f: Unary, order: usize, x: &[S], y: &mut [S], [d1,
         }
         // The derivatives are those of tanh.
         Unary::LnCosh => {
-            y.iter_mut().zip(x).for_each(|(y, &x)| *y = x.ln_cosh());
+            update(y, x, |y, x| *y = x.ln_cosh());
             match order {
                 1 => Activation::Tanh.value(x, d1),
                 2 => Activation::Tanh.jet1(x, d1, d2),

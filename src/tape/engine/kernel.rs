@@ -1,6 +1,6 @@
 //! Loops over planes.
 
-use crate::scalar::{Real, Scalar, vectorized};
+use crate::scalar::{Real, Scalar, update, update2, update3, vectorized};
 
 /// Runs a loop over `count` numbers for the widest vector instructions, as it is where that is not worth a call.
 #[inline(always)]
@@ -13,11 +13,7 @@ pub(super) fn add_scaled<S: Scalar>(out: &mut [S], a: S, x: &[S]) {
     dispatched(
         out.len(),
         #[inline(always)]
-        || {
-            for (out, &x) in out.iter_mut().zip(x) {
-                *out += a * x;
-            }
-        },
+        || update(out, x, |out, x| *out += a * x),
     );
 }
 
@@ -26,11 +22,7 @@ pub(super) fn add_product<S: Scalar>(out: &mut [S], x: &[S], y: &[S]) {
     dispatched(
         out.len(),
         #[inline(always)]
-        || {
-            for ((out, &x), &y) in out.iter_mut().zip(x).zip(y) {
-                *out += x * y;
-            }
-        },
+        || update2(out, x, y, |out, x, y| *out += x * y),
     );
 }
 
@@ -39,11 +31,7 @@ pub(super) fn add_product3<S: Scalar>(out: &mut [S], x: &[S], y: &[S], z: &[S]) 
     dispatched(
         out.len(),
         #[inline(always)]
-        || {
-            for (((out, &x), &y), &z) in out.iter_mut().zip(x).zip(y).zip(z) {
-                *out += x * y * z;
-            }
-        },
+        || update3(out, x, y, z, |out, x, y, z| *out += x * y * z),
     );
 }
 
@@ -58,10 +46,9 @@ pub(super) fn add_rows<S: Scalar>(plane: &[S], total: &mut [S]) {
     vectorized(
         #[inline(always)]
         || {
-            for row in plane.chunks_exact(total.len()) {
-                for (sum, &x) in total.iter_mut().zip(row) {
-                    *sum += x;
-                }
+            let units = total.len();
+            for row in 0..plane.len() / units.max(1) {
+                update(total, &plane[row * units..][..units], |sum, x| *sum += x);
             }
         },
     );

@@ -123,13 +123,16 @@ impl Layout {
         Self { directions, channels, width: n + 1, ..layout }
     }
     /// Number of channels of a value.
+    #[inline]
     pub fn count(&self, value: usize) -> usize {
         self.counts[value]
     }
     /// Directions of the tangents of a value, in the order of its channels from 1 on.
+    #[inline]
     pub fn directions(&self, value: usize) -> &[usize] {
         &self.directions[value]
     }
+    #[inline]
     fn range(&self, value: usize, lanes: usize) -> Range<usize> {
         let start = self.starts[value] * lanes;
         start..start + self.counts[value] * self.units[value] * lanes
@@ -153,15 +156,18 @@ pub(super) struct View<'a, S> {
 
 impl<'a, S> View<'a, S> {
     /// All planes of a value.
+    #[inline]
     pub fn all(&self, value: usize) -> &'a [S] {
         &self.numbers[self.layout.range(value, self.lanes)]
     }
     /// One plane of a value.
+    #[inline]
     pub fn plane(&self, value: usize, channel: usize) -> &'a [S] {
         let size = self.layout.units[value] * self.lanes;
         &self.all(value)[channel * size..(channel + 1) * size]
     }
     /// The tangent along a direction, if the value has one.
+    #[inline]
     pub fn tangent(&self, value: usize, direction: usize) -> Option<&'a [S]> {
         let channel = self.layout.channels[value * self.layout.width + direction];
         (channel > 0).then(|| self.plane(value, channel))
@@ -169,24 +175,29 @@ impl<'a, S> View<'a, S> {
 }
 
 impl<S> Store<'_, S> {
+    #[inline]
     pub fn view(&self) -> View<'_, S> {
         View { layout: self.layout, lanes: self.lanes, numbers: self.numbers }
     }
     /// The values before a value, and the planes of the value itself.
+    #[inline]
     pub fn split(&mut self, value: usize) -> (View<'_, S>, &mut [S]) {
         let range = self.layout.range(value, self.lanes);
         let (before, rest) = self.numbers.split_at_mut(range.start);
         (View { layout: self.layout, lanes: self.lanes, numbers: before }, &mut rest[..range.end - range.start])
     }
     /// The planes of a value, and what was computed before it, to be added to.
+    #[inline]
     pub fn reverse(&mut self, value: usize) -> (Store<'_, S>, &[S]) {
         let range = self.layout.range(value, self.lanes);
         let (before, rest) = self.numbers.split_at_mut(range.start);
         (Store { layout: self.layout, lanes: self.lanes, numbers: before }, &rest[..range.end - range.start])
     }
+    #[inline]
     pub fn all_mut(&mut self, value: usize) -> &mut [S] {
         &mut self.numbers[self.layout.range(value, self.lanes)]
     }
+    #[inline]
     pub fn plane_mut(&mut self, value: usize, channel: usize) -> &mut [S] {
         let size = self.layout.units[value] * self.lanes;
         &mut self.all_mut(value)[channel * size..(channel + 1) * size]

@@ -2,7 +2,7 @@
 
 use super::{Instruction, LANES, Node, Row, elementary};
 use crate::ops::{Binary, Unary};
-use crate::scalar::{Scalar, vectorized};
+use crate::scalar::{Column, Scalar, copy_column, vectorized};
 
 /// Data that an instruction may read besides the rows of its own section.
 pub(super) struct Environment<'a, S> {
@@ -34,8 +34,8 @@ pub(super) fn forward<S: Scalar>(program: &[Instruction<S>], environment: &Envir
                 let Some((out, rest)) = after.split_first_mut() else { continue };
                 match &instruction.node {
                     Node::Input(index) => load(environment, *index as usize, out),
-                    Node::Parameter(index) => out.fill(environment.parameters[*index as usize]),
-                    Node::Constant(value) => out.fill(*value),
+                    Node::Parameter(index) => fill(environment.parameters[*index as usize], out),
+                    Node::Constant(value) => fill(*value, out),
                     Node::Unary(f, a) => unary(*f, get(*a), out),
                     Node::SinCos(a) => {
                         if let Some(cos) = rest.first_mut() {
@@ -59,23 +59,28 @@ pub(super) fn forward<S: Scalar>(program: &[Instruction<S>], environment: &Envir
 /// One input of all lanes.
 #[inline(always)]
 fn load<S: Scalar>(environment: &Environment<'_, S>, mut index: usize, out: &mut Row<S>) {
-    let mut value = S::nan();
-    let mut filled = 0;
+    let states = LANES.min(environment.lanes - environment.start);
     for field in environment.inputs {
         let width = field.len() / environment.lanes;
         if index >= width {
             index -= width;
             continue;
         }
-        let states = field[environment.start * width..].chunks_exact(width);
-        for (target, state) in out.iter_mut().zip(states) {
-            value = state[index];
-            *target = value;
-            filled += 1;
-        }
+        let field = Column::new(&field[environment.start * width..], index, width);
+        copy_column(states, Column::all(&mut out[..]), field);
         break;
     }
-    out[filled..].fill(value);
+    let last = out[states - 1];
+    for l in states..LANES {
+        out[l] = last;
+    }
+}
+
+#[inline(always)]
+fn fill<S: Scalar>(value: S, out: &mut Row<S>) {
+    for l in 0..LANES {
+        out[l] = value;
+    }
 }
 
 #[inline(always)]

@@ -4,7 +4,7 @@ use super::backward::{INPUTS, PARAMETERS, Sweep};
 use super::forward::{Environment, forward};
 use super::{LANES, Node, Program, Row};
 use crate::linalg::Buffer;
-use crate::scalar::{Real, Scalar};
+use crate::scalar::{Column, Real, Scalar, copy_column};
 use crate::tape::error::{TapeError, check_length};
 use std::sync::Arc;
 
@@ -115,9 +115,8 @@ impl<S: Scalar> Replay<S> {
             for field in outputs.iter_mut() {
                 let width = field.len() / lanes;
                 for (column, source) in next.by_ref().take(width).enumerate() {
-                    for (state, &value) in field[start * width..].chunks_exact_mut(width).zip(source) {
-                        state[column] = value;
-                    }
+                    let to = Column::new(&mut field[start * width..], column, width);
+                    copy_column(LANES.min(lanes - start), to, Column::all(source));
                 }
             }
         }

@@ -2,7 +2,7 @@
 
 use super::{Forward, MixedForward, MixedReverse, Reverse};
 use crate::linalg::{MatMut, MatRef, gemm};
-use crate::scalar::{Real, Scalar, vectorized};
+use crate::scalar::{Real, Scalar, update, vectorized};
 use crate::tape::engine::kernel::add_rows;
 use crate::tape::engine::value::{Mixed, Order};
 
@@ -38,10 +38,9 @@ impl Dense {
             return vectorized(
                 #[inline(always)]
                 || {
-                    for (row, &a) in below.chunks_exact_mut(self.inputs).zip(adjoint) {
-                        for (sum, &w) in row.iter_mut().zip(matrix) {
-                            *sum = if accumulate { *sum + a * w } else { a * w };
-                        }
+                    for lane in 0..rows {
+                        let (row, a) = (&mut below[lane * self.inputs..][..self.inputs], adjoint[lane]);
+                        update(row, matrix, |sum, w| *sum = if accumulate { *sum + a * w } else { a * w });
                     }
                 },
             );
@@ -69,10 +68,8 @@ impl Dense {
             vectorized(
                 #[inline(always)]
                 || {
-                    for row in planes[..lanes * self.outputs].chunks_exact_mut(self.outputs) {
-                        for (x, &b) in row.iter_mut().zip(bias) {
-                            *x += b;
-                        }
+                    for lane in 0..lanes {
+                        update(&mut planes[lane * self.outputs..][..self.outputs], bias, |x, b| *x += b);
                     }
                 },
             );
@@ -123,10 +120,8 @@ impl Dense {
                     let (plane_s, plane_t) = (&mut before_t[s * size..][row.clone()], &mut from_t[row.clone()]);
                     for (k, &i) in velocities.iter().enumerate() {
                         let (by_s, by_t) = (directions.s[lane * n + i], directions.t[lane * n + i]);
-                        for ((s, t), &e) in plane_s.iter_mut().zip(plane_t.iter_mut()).zip(tangent(2 + k)) {
-                            *s = if k == 0 { by_s * e } else { *s + by_s * e };
-                            *t += by_t * e;
-                        }
+                        update(plane_s, tangent(2 + k), |s, e| *s = if k == 0 { by_s * e } else { *s + by_s * e });
+                        update(plane_t, tangent(2 + k), |t, e| *t += by_t * e);
                     }
                 }
             },

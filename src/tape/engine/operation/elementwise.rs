@@ -2,7 +2,7 @@
 
 use super::{Forward, MixedForward, MixedReverse, Reverse};
 use crate::ops::Unary;
-use crate::scalar::{Real, Scalar, vectorized};
+use crate::scalar::{Real, Scalar, update2, update3, vectorized};
 use crate::tape::engine::Depth;
 use crate::tape::engine::jets::jets;
 use crate::tape::engine::value::{Kind, Mixed};
@@ -65,11 +65,9 @@ impl Elementwise {
         vectorized(
             #[inline(always)]
             || {
-                for (channel, y) in tangents.chunks_exact_mut(size).enumerate() {
-                    let x = before.plane(self.x, channel + 1);
-                    for ((y, &x), &d1) in y.iter_mut().zip(x).zip(d1) {
-                        *y = d1 * x;
-                    }
+                for channel in 0..tangents.len() / size {
+                    let (y, x) = (&mut tangents[channel * size..][..size], before.plane(self.x, channel + 1));
+                    update2(y, x, d1, |y, x, d1| *y = d1 * x);
                 }
             },
         );
@@ -82,11 +80,7 @@ impl Elementwise {
         let target = before.plane_mut(self.x, 0);
         vectorized(
             #[inline(always)]
-            || {
-                for ((sum, &a), &d1) in target.iter_mut().zip(adjoint).zip(d1) {
-                    *sum = if overwritten { a * d1 } else { *sum + a * d1 };
-                }
-            },
+            || update2(target, adjoint, d1, |sum, a, d1| *sum = if overwritten { a * d1 } else { *sum + a * d1 }),
         );
         if sweep.depth < Depth::MassMatrix || sweep.kept.values[self.x].kind != Kind::Velocity {
             return;
@@ -94,7 +88,7 @@ impl Elementwise {
         if self.units == 1 {
             let lanes = adjoint.len();
             let mut curvature = [<S as Real>::zero(); crate::tape::engine::STATES];
-            curvature.iter_mut().zip(adjoint).zip(d2).for_each(|((c, &a), &d2)| *c = a * d2);
+            update2(&mut curvature, adjoint, d2, |c, a, d2| *c = a * d2);
             sweep.second.add_square(self.x, sweep.kept.forward, &curvature[..lanes]);
         } else {
             sweep.second.add_block((self.x, self.units), sweep.kept.forward, adjoint, d2);
@@ -113,16 +107,10 @@ impl Elementwise {
             #[inline(always)]
             || {
                 for (y, x) in [(ys, xs), (yt, xt)] {
-                    for ((y, &x), &d1) in y.iter_mut().zip(x).zip(d1) {
-                        *y = d1 * x;
-                    }
+                    update2(y, x, d1, |y, x, d1| *y = d1 * x);
                 }
-                for ((y, &x), &d1) in yst.iter_mut().zip(xst).zip(d1) {
-                    *y = d1 * x;
-                }
-                for (((y, &xs), &xt), &d2) in yst.iter_mut().zip(xs).zip(xt).zip(d2) {
-                    *y += d2 * (xs * xt);
-                }
+                update2(yst, xst, d1, |y, x, d1| *y = d1 * x);
+                update3(yst, xs, xt, d2, |y, xs, xt, d2| *y += d2 * (xs * xt));
             },
         );
     }

@@ -2,7 +2,7 @@
 
 use super::{Forward, MixedForward, MixedReverse, Reverse, add_if};
 use crate::ops::Binary;
-use crate::scalar::{Real, Scalar};
+use crate::scalar::{Real, Scalar, update2};
 use crate::tape::engine::jets::partials;
 use crate::tape::engine::kernel::{add_product, add_product3};
 use crate::tape::engine::{Depth, STATES};
@@ -100,7 +100,7 @@ impl Function {
 /// `w d` of every lane; 0 past their number.
 fn weighted<S: Scalar>(w: &[S], d: &[S]) -> [S; STATES] {
     let mut product = [<S as Real>::zero(); STATES];
-    product.iter_mut().zip(w).zip(d).for_each(|((product, &w), &d)| *product = w * d);
+    update2(&mut product, w, d, |product, w, d| *product = w * d);
     product
 }
 

@@ -1,7 +1,7 @@
 //! Numbers of several values put side by side, and single numbers taken out of a value.
 
 use super::{Forward, MixedForward, MixedReverse, Reverse};
-use crate::scalar::{Real, Scalar};
+use crate::scalar::{Column, Real, Scalar, update_column};
 use crate::tape::engine::value::Mixed;
 
 /// Unit by unit: the value and its unit that each comes from.
@@ -10,15 +10,23 @@ pub(crate) struct Gather {
     pub sources: Vec<(usize, usize)>,
 }
 
-/// Every `units`-th number of a plane from `unit` on.
-fn column<S>(plane: &[S], unit: usize, lanes: usize) -> impl Iterator<Item = &S> {
-    plane[unit..].iter().step_by(plane.len() / lanes)
+/// One unit of a plane.
+fn column<S>(plane: &[S], unit: usize, lanes: usize) -> Column<&[S]> {
+    Column::new(plane, unit, plane.len() / lanes)
 }
 
 /// The same, to be written.
-fn column_mut<S>(plane: &mut [S], unit: usize, lanes: usize) -> impl Iterator<Item = &mut S> {
+fn column_mut<S>(plane: &mut [S], unit: usize, lanes: usize) -> Column<&mut [S]> {
     let units = plane.len() / lanes;
-    plane[unit..].iter_mut().step_by(units)
+    Column::new(plane, unit, units)
+}
+
+/// Copies a unit; what is not there is zero.
+fn copy<S: Scalar>(lanes: usize, to: Column<&mut [S]>, from: Option<Column<&[S]>>) {
+    match from {
+        Some(from) => update_column(lanes, to, from, |to, x| *to = x),
+        None => update_column(lanes, to, Column::new(&[<S as Real>::zero()], 0, 0), |to, zero| *to = zero),
+    }
 }
 
 impl Gather {
@@ -30,11 +38,7 @@ impl Gather {
         for (direction, plane) in channels.zip(planes.chunks_exact_mut(size)) {
             let of = |x| direction.map_or_else(|| Some(before.plane(x, 0)), |&direction| before.tangent(x, direction));
             for (to, &(value, unit)) in self.sources.iter().enumerate() {
-                let target = column_mut(plane, to, lanes);
-                match of(value) {
-                    Some(from) => target.zip(column(from, unit, lanes)).for_each(|(to, &x)| *to = x),
-                    None => target.for_each(|to| *to = <S as Real>::zero()),
-                }
+                copy(lanes, column_mut(plane, to, lanes), of(value).map(|from| column(from, unit, lanes)));
             }
         }
     }
@@ -44,7 +48,7 @@ impl Gather {
         let lanes = before.lanes;
         for (from, &(value, unit)) in self.sources.iter().enumerate() {
             let target = column_mut(before.plane_mut(value, 0), unit, lanes);
-            target.zip(column(adjoint, from, lanes)).for_each(|(sum, &a)| *sum += a);
+            update_column(lanes, target, column(adjoint, from, lanes), |sum, a| *sum += a);
         }
     }
 
@@ -56,14 +60,9 @@ impl Gather {
         for channel in [|m: &Mixed| m.s, |m: &Mixed| m.t, |m: &Mixed| m.st] {
             let Some(plane) = channel(&own).map(|channel| &mut planes[channel * size..][..size]) else { continue };
             for (to, &(value, unit)) in self.sources.iter().enumerate() {
-                let target = column_mut(plane, to, lanes);
-                match channel(&values[value].mixed(order)) {
-                    Some(from) => {
-                        let from = column(before.plane(value, from), unit, lanes);
-                        target.zip(from).for_each(|(to, &x)| *to = x);
-                    }
-                    None => target.for_each(|to| *to = <S as Real>::zero()),
-                }
+                let from =
+                    channel(&values[value].mixed(order)).map(|from| column(before.plane(value, from), unit, lanes));
+                copy(lanes, column_mut(plane, to, lanes), from);
             }
         }
     }
@@ -82,7 +81,7 @@ impl Gather {
                 if let (Some(own), Some(to)) = (channel(&own), channel(&to)) {
                     let target = column_mut(before.plane_mut(value, to), unit, lanes);
                     let source = column(&adjoint[own * size..][..size], from, lanes);
-                    target.zip(source).for_each(|(sum, &b)| *sum += b);
+                    update_column(lanes, target, source, |sum, b| *sum += b);
                 }
             }
         }

@@ -1,7 +1,7 @@
 //! Coordinates and velocities.
 
 use super::{Forward, MixedForward, MixedReverse, Reverse};
-use crate::scalar::{Real, Scalar};
+use crate::scalar::{Column, Real, Scalar, update_column};
 
 /// Input `index` of a state `(q, v)`: a coordinate below `n`, a velocity from there on.
 #[derive(Clone, Copy, Debug)]
@@ -18,11 +18,11 @@ impl Input {
         let directions = sweep.store.layout.directions(out);
         let planes = sweep.store.all_mut(out);
         let (value, tangents) = planes.split_at_mut(lanes);
-        value.iter_mut().zip(field.chunks_exact(n)).for_each(|(to, row)| *to = row[column]);
+        update_column(lanes, Column::all(value), Column::new(field, column, n), |to, x| *to = x);
         for (plane, &direction) in tangents.chunks_exact_mut(lanes).zip(directions) {
             match direction {
                 0 if self.index < n => {
-                    plane.iter_mut().zip(sweep.v.chunks_exact(n)).for_each(|(to, v)| *to = v[column])
+                    update_column(lanes, Column::all(plane), Column::new(sweep.v, column, n), |to, v| *to = v);
                 }
                 0 => plane.fill(<S as Real>::zero()),
                 _ => plane.fill(sweep.scale[column]),
@@ -45,7 +45,8 @@ impl Input {
                 if factor == zero {
                     plane.fill(zero);
                 } else {
-                    plane.iter_mut().zip(field.chunks_exact(n)).for_each(|(to, row)| *to = factor * row[column]);
+                    let (rows, field) = (plane.len(), Column::new(field, column, n));
+                    update_column(rows, Column::all(plane), field, |to, x| *to = factor * x);
                 }
             }
         };
@@ -70,7 +71,8 @@ impl Input {
         let mut add = |field: &mut [S], channel: Option<usize>| {
             if let Some(channel) = channel {
                 let plane = sweep.adjoints.plane_mut(out, channel);
-                field.chunks_exact_mut(n).zip(plane).for_each(|(row, b)| row[column] += scale * *b);
+                let (rows, field) = (plane.len(), Column::new(field, column, n));
+                update_column(rows, field, Column::all(plane), |to, b| *to += scale * b);
             }
         };
         if position {

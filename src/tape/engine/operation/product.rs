@@ -1,7 +1,7 @@
 //! Products of two numbers: `phi'' = 1` across the operands.
 
 use super::{Forward, MixedForward, MixedReverse, Reverse, add_if, add_if_both};
-use crate::scalar::{Real, Scalar, vectorized};
+use crate::scalar::{Real, Scalar, update2, vectorized};
 use crate::tape::engine::Depth;
 
 /// `a b`.
@@ -19,7 +19,7 @@ impl Product {
         let (value, tangents) = planes.split_at_mut(lanes);
         vectorized(
             #[inline(always)]
-            || value.iter_mut().zip(a).zip(b).for_each(|((y, &a), &b)| *y = a * b),
+            || update2(value, a, b, |y, a, b| *y = a * b),
         );
         tangents.fill(<S as Real>::zero());
         for (&direction, plane) in layout.directions(out).iter().zip(tangents.chunks_exact_mut(lanes)) {

@@ -2,7 +2,7 @@
 
 use super::linear::Linear;
 use super::{Forward, MixedForward, MixedReverse, Reverse};
-use crate::scalar::{Real, Scalar};
+use crate::scalar::{Real, Scalar, update2};
 use crate::tape::engine::value::View;
 
 /// The first branch where the condition is positive, the second where it is not; `NaN` where it is `NaN`.
@@ -17,9 +17,9 @@ impl Select {
     fn linear<S: Scalar>(&self) -> Linear<'_, impl Fn(&mut [S], View<'_, S>, &[S], usize)> {
         let add = |target: &mut [S], forward: View<'_, S>, source: &[S], branch: usize| {
             let (condition, zero) = (forward.plane(self.condition, 0), <S as Real>::zero());
-            for ((out, &c), &w) in target.iter_mut().zip(condition).zip(source) {
+            update2(target, condition, source, |out, c, w| {
                 *out += if branch == 0 { c.select(w, zero) } else { c.select(zero, w) };
-            }
+            });
         };
         Linear { operands: &self.branches, add }
     }
