@@ -21,7 +21,7 @@ fn column_mut<S>(plane: &mut [S], unit: usize, lanes: usize) -> Column<&mut [S]>
     Column::new(plane, unit, units)
 }
 
-/// Copies a unit; what is not there is zero.
+/// Copies a unit; what is not there is zero, by a column that stays where it is.
 fn copy<S: Scalar>(lanes: usize, to: Column<&mut [S]>, from: Option<Column<&[S]>>) {
     match from {
         Some(from) => update_column(lanes, to, from, |to, x| *to = x),
