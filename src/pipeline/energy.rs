@@ -2,7 +2,7 @@
 
 use crate::data::Split;
 use crate::lagrangian::{EulerLagrange, Request, Terms};
-use crate::rollout::{Driven, SampledForce, Trajectory};
+use crate::rollout::{Driven, Trajectory};
 use serde::Serialize;
 
 /// States evaluated at once.
@@ -42,7 +42,7 @@ pub fn balance(model: &dyn EulerLagrange<f64>, part: &Split) -> Option<Balance> 
         let of = |values: &[f64]| values[rows.start * n..rows.end * n].to_vec();
         let (q, v) = (of(&states.q), of(&states.v));
         let trajectory = Trajectory { coordinates: n, t: states.times[rows.clone()].to_vec(), q, v, energy: None };
-        let force = SampledForce::recorded(track);
+        let force = track.sampled_force();
         let balance = match &force {
             Some(force) => Driven::new(model, force).energy_balance(&trajectory),
             None => trajectory.energy_balance(model),

@@ -18,6 +18,8 @@
 //! ```
 
 mod columns;
+#[cfg(feature = "rollout")]
+mod force;
 mod hermite;
 mod hold_out;
 #[cfg(feature = "data")]

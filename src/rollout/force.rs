@@ -1,8 +1,6 @@
 //! Forces from outside: what drives a motion beside its own Lagrangian and friction.
 
 use super::RolloutError;
-#[cfg(feature = "data")]
-use crate::recording::RecordedTrajectory;
 use crate::scalar::{Real, Scalar};
 use std::cmp::Ordering;
 
@@ -84,15 +82,6 @@ impl<S: Scalar> SampledForce<S> {
         for (i, force) in force.iter_mut().enumerate() {
             *force = (one - s) * self.values[(after - 1) * n + i] + s * self.values[after * n + i];
         }
-    }
-}
-
-#[cfg(feature = "data")]
-impl SampledForce<f64> {
-    /// The known external forces of a recorded trajectory; `None` if there are none.
-    pub(crate) fn recorded(track: &RecordedTrajectory) -> Option<Self> {
-        let n = track.force.len().checked_div(track.len()).filter(|n| *n > 0)?;
-        Self::new(n, track.times.clone(), track.force.clone()).ok()
     }
 }
 
