@@ -3,7 +3,7 @@
 //! | page | for |
 //! |---|---|
 //! | [`commands`] | every command and option of the program, exit codes, files |
-//! | [`many_machines`] | an experiment on a cluster or by many processes: shares, claims, one table |
+//! | [`many_machines`] | an experiment on a cluster or by many processes: shares, one table |
 //! | [`system_files`] | a system of your own as a text file: Lagrangian or metric, formulas |
 //! | [`configuration`] | every key of `config.toml`, presets |
 //! | [`recorded_motion`] | data of your own: formats, noise, friction, films |

@@ -1,9 +1,8 @@
-//! `lnn experiment`: the paper's tables and figures, one command each, on one machine or many; finished runs are not run again.
+//! `lnn experiment`: the paper's tables and figures, one command each, whole or in shares; finished runs are not run again.
 
-use crate::cli::experiment_folder::ExperimentFolder;
 use crate::cli::experiment_list::{Listed, list};
 use crate::cli::files::{holds_something, require_free};
-use crate::cli::number::{count, positive, threads};
+use crate::cli::number::{count, threads};
 use crate::cli::shard::Shard;
 use crate::cli::source::parameter;
 use crate::cli::watch::watch;
@@ -12,15 +11,13 @@ use crate::experiments::{Experiment, Run, Scale, experiments, find};
 use crate::lagrangian::{SystemInstance, configure_system};
 use crate::names::{WIDTH, counted, wrapped};
 use crate::pipeline::{
-    Directory, ExperimentReport, RECORD, finish_runs, finished_record, merge_experiment, run_experiment,
+    ExperimentDirectory, ExperimentReport, RECORD, finish_runs, finished_record, merge_experiment, run_experiment,
 };
 use crate::recording::Columns;
 use crate::recording::read::read_recording;
 use crate::report::{Curve, EXPERIMENT_HEADER, text_table};
-use crate::storage::Claimant;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
@@ -38,10 +35,7 @@ pub struct Args {
     /// Only the I-th of N shares of the runs, I from 1 to N; no tables are written [default: that of a Slurm array, or all].
     #[arg(long, value_name = "I/N")]
     shard: Option<Shard>,
-    /// Seconds after which a process that is not heard of loses its run to another machine.
-    #[arg(long, value_name = "SECONDS", default_value = "120", allow_hyphen_values = true, value_parser = lease)]
-    lease: Duration,
-    /// List the runs: finished, claimed by which process, or open.
+    /// List the runs: finished, in progress, or open.
     #[arg(long, requires = "name", conflicts_with_all = ["beside", "overwrite"])]
     list: bool,
     /// Replace finished runs that are of other configurations.
@@ -153,9 +147,8 @@ impl Chosen {
 /// A usage error for an unknown name or a share that cannot be told, a data error for a directory that cannot be written or
 /// records that are missing, an interruption; runs that are finished stay finished.
 pub fn run(args: &Args) -> Result<(), CliError> {
-    let claimant = Claimant::this(args.lease);
     if let Some(Action::Merge { name, chosen }) = &args.action {
-        return merge(name, chosen, &claimant);
+        return merge(name, chosen);
     }
     let chosen = &args.chosen;
     let Some(name) = &args.name else {
@@ -165,7 +158,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let all = numbered(chosen_runs(chosen, name)?);
     if args.list {
         interrupt::end_at_once().map_err(CliError::signals)?;
-        return listed(chosen, share(all, args.shard), &claimant);
+        return listed(chosen, share(all, args.shard));
     }
     let shard = match args.shard {
         Some(shard) => Some(shard),
@@ -185,7 +178,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let curves = curves(chosen)?;
     let stop = interrupt::flag().map_err(CliError::signals)?;
     for (experiment, runs) in shares {
-        let folder = ExperimentFolder::new(&chosen.directory(experiment), claimant.clone());
+        let folder = ExperimentDirectory::new(&chosen.directory(experiment));
         let (threads, watch) = (threads(args.threads), watch(&stop));
         let runs: Vec<Run> = runs.into_iter().map(|(_, run)| run).collect();
         let of = (experiment, chosen.scale());
@@ -201,7 +194,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
 }
 
 /// Makes table, pictures and report of the records that are there.
-fn merge(name: &str, chosen: &Chosen, claimant: &Claimant) -> Result<(), CliError> {
+fn merge(name: &str, chosen: &Chosen) -> Result<(), CliError> {
     let all = chosen_runs(chosen, name)?;
     for (experiment, runs) in &all {
         require_writable(chosen, experiment)?;
@@ -209,13 +202,12 @@ fn merge(name: &str, chosen: &Chosen, claimant: &Claimant) -> Result<(), CliErro
         require_same(&chosen.directory(experiment), runs.iter(), same)?;
     }
     let curves = curves(chosen)?;
-    let stop = interrupt::flag().map_err(CliError::signals)?;
+    interrupt::end_at_once().map_err(CliError::signals)?;
     for (experiment, runs) in all {
         let path = chosen.directory(experiment);
-        let folder = ExperimentFolder::new(&path, claimant.clone());
+        let folder = ExperimentDirectory::new(&path);
         let of = (experiment, chosen.scale());
-        let done = merge_experiment(of, runs, &curves, &folder, &watch(&stop))
-            .map_err(|error| CliError::file(&path, error))?;
+        let done = merge_experiment(of, runs, &curves, &folder).map_err(|error| CliError::file(&path, error))?;
         if done.finished < done.results.len() {
             let open = counted(done.results.len() - done.finished, "run is", "runs are");
             let words = chosen.words(experiment);
@@ -295,7 +287,7 @@ const WRITTEN: [&str; 3] = ["table.csv", "curves.csv", "readings.csv"];
 
 /// Refuses a directory with finished runs of other configurations than those asked for; `hint` says what to do then.
 fn require_same<'a>(path: &Path, runs: impl Iterator<Item = &'a Run>, hint: &str) -> Result<(), CliError> {
-    let store = Directory::at(path);
+    let store = ExperimentDirectory::new(path);
     let mut others = Vec::new();
     for run in runs {
         if holds_something(&path.join(&run.name).join(RECORD)) && finished_record(&store, run)?.is_none() {
@@ -306,16 +298,6 @@ fn require_same<'a>(path: &Path, runs: impl Iterator<Item = &'a Run>, hint: &str
     let more = if more.is_empty() { String::new() } else { format!(" (and {} more)", more.len()) };
     let problem = format!("a finished run of another configuration is there{more}; {hint}");
     Err(CliError::file(&path.join(first), problem))
-}
-
-/// A lease, from a tenth of a second to a day.
-fn lease(text: &str) -> Result<Duration, String> {
-    let seconds = positive(text)?;
-    if (0.1..=86_400.0).contains(&seconds) {
-        Ok(Duration::from_secs_f64(seconds))
-    } else {
-        Err("expected seconds from 0.1 to 86400".to_string())
-    }
 }
 
 /// `label=file`.
@@ -358,10 +340,10 @@ fn listing(json: bool) -> String {
 }
 
 /// Prints the runs with their states.
-fn listed(chosen: &Chosen, runs: Numbered, claimant: &Claimant) -> Result<(), CliError> {
+fn listed(chosen: &Chosen, runs: Numbered) -> Result<(), CliError> {
     let mut all = Vec::new();
     for (experiment, runs) in runs {
-        all.extend(list(&chosen.directory(experiment), experiment.name, runs, claimant)?);
+        all.extend(list(&chosen.directory(experiment), experiment.name, runs)?);
     }
     if chosen.json {
         return output::print(

@@ -1,14 +1,12 @@
-//! The runs of an experiment with their states: finished, claimed by which process, open.
+//! The runs of an experiment with their states: finished, in progress, open.
 
 use crate::cli::CliError;
 use crate::cli::files::holds_something;
-use crate::cli::folder::Folder;
 use crate::cli::resume::has_checkpoint;
 use crate::experiments::Run;
-use crate::pipeline::{Directory, RECORD, finished_record};
-use crate::storage::{Claimant, Holder, LockOwner, Standing};
+use crate::pipeline::{ExperimentDirectory, RECORD, finished_record};
+use crate::storage::{DirectoryLock, LockOwner};
 use serde_json::{Value, json};
-use std::io;
 use std::path::Path;
 
 /// A run with its state.
@@ -28,47 +26,32 @@ enum State {
     /// It has a record of another configuration.
     OtherConfiguration,
     /// A process works on it; which, as far as that is known.
-    Claimed(Option<LockOwner>, Option<Holder>),
-    /// Nobody works on it; `true` if it goes on from a checkpoint.
+    InProgress(Option<LockOwner>),
+    /// No process works on it; `true` if it resumes from a checkpoint.
     Open(bool),
 }
 
-/// The numbered runs of the experiment in a directory with their states, as they are while one looks.
+/// The numbered runs of the experiment in a directory with their present states.
 ///
 /// # Errors
-/// A configuration that TOML cannot hold, a directory that cannot be read.
-pub fn list(
-    directory: &Path,
-    experiment: &'static str,
-    runs: Vec<(usize, Run)>,
-    claimant: &Claimant,
-) -> Result<Vec<Listed>, CliError> {
+/// A configuration that TOML cannot hold.
+pub fn list(directory: &Path, experiment: &'static str, runs: Vec<(usize, Run)>) -> Result<Vec<Listed>, CliError> {
     let listed = |(number, run): (usize, Run)| {
-        let state = state(directory, &run, claimant)?;
+        let state = state(directory, &run)?;
         Ok(Listed { number, experiment, run, state })
     };
     runs.into_iter().map(listed).collect()
 }
 
-fn state(directory: &Path, run: &Run, claimant: &Claimant) -> Result<State, CliError> {
-    if finished_record(&Directory::at(directory), run)?.is_some() {
+fn state(directory: &Path, run: &Run) -> Result<State, CliError> {
+    if finished_record(&ExperimentDirectory::new(directory), run)?.is_some() {
         return Ok(State::Finished);
     }
     let path = directory.join(&run.name);
-    let locked = Folder::holder(&path);
-    // Without the lock, a claim of this machine is that of a dead process.
-    let standing = match claimant.standing(&path, locked.is_none(), 0) {
-        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(Standing::Free(1, None)),
-        other => other.map_err(|e| CliError::file(&path, format_args!("cannot read: {e}"))),
-    }?;
-    Ok(match (standing, locked) {
-        (Standing::Held(holder), locked) => {
-            let owner = holder.as_ref().map(|holder| holder.owner.clone());
-            State::Claimed(owner.or(locked.flatten()), holder)
-        }
-        (Standing::Free(..), Some(owner)) => State::Claimed(owner, None),
-        (Standing::Free(..), None) if holds_something(&path.join(RECORD)) => State::OtherConfiguration,
-        (Standing::Free(..), None) => State::Open(has_checkpoint(&path)),
+    Ok(match DirectoryLock::holder(&path) {
+        Some(owner) => State::InProgress(owner),
+        None if holds_something(&path.join(RECORD)) => State::OtherConfiguration,
+        None => State::Open(has_checkpoint(&path)),
     })
 }
 
@@ -78,9 +61,8 @@ impl Listed {
         let state = match &self.state {
             State::Finished => "finished".to_string(),
             State::OtherConfiguration => "finished, of another configuration".to_string(),
-            State::Claimed(_, Some(holder)) => format!("claimed by {holder}"),
-            State::Claimed(Some(owner), None) => format!("claimed by {owner}"),
-            State::Claimed(None, None) => "claimed".to_string(),
+            State::InProgress(Some(owner)) => format!("in progress, {owner}"),
+            State::InProgress(None) => "in progress".to_string(),
             State::Open(false) => "open".to_string(),
             State::Open(true) => "open, with a checkpoint".to_string(),
         };
@@ -89,21 +71,11 @@ impl Listed {
 
     /// The same as an object.
     pub fn json(&self, scale: &str) -> Value {
-        let state = match &self.state {
-            State::Finished => "finished",
-            State::OtherConfiguration => "other-configuration",
-            State::Claimed(..) => "claimed",
-            State::Open(_) => "open",
-        };
-        let claimed_by = match &self.state {
-            State::Claimed(Some(owner), holder) => json!({
-                "process": owner.process(),
-                "host": owner.host(),
-                "since": owner.since(),
-                "silent_seconds": holder.as_ref().map(|holder| holder.silent.as_secs_f64()),
-                "lease_seconds": holder.as_ref().map(|holder| holder.lease.as_secs_f64()),
-            }),
-            _ => Value::Null,
+        let (state, owner) = match &self.state {
+            State::Finished => ("finished", None),
+            State::OtherConfiguration => ("other-configuration", None),
+            State::InProgress(owner) => ("in-progress", owner.as_ref()),
+            State::Open(_) => ("open", None),
         };
         json!({
             "number": self.number,
@@ -113,7 +85,7 @@ impl Listed {
             "row": self.run.label,
             "state": state,
             "checkpoint": matches!(self.state, State::Open(true)),
-            "claimed_by": claimed_by,
+            "owner": owner.map(|owner| json!({ "process": owner.process, "host": owner.host })),
         })
     }
 }

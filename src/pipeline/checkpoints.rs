@@ -60,11 +60,6 @@ impl Checkpoints {
         Self { identity: Some(text), ..self }
     }
 
-    /// The same written through other operations of files.
-    pub(crate) fn through(self, files: Arc<dyn Files>) -> Self {
-        Self { files, ..self }
-    }
-
     /// Removes them: the training is over.
     ///
     /// # Errors

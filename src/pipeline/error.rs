@@ -6,6 +6,7 @@ use crate::data::{RecordingSplitError, SamplingError};
 use crate::lagrangian::SystemError;
 use crate::network::NetworkError;
 use crate::network::file::ModelFileError;
+use crate::recording::read::DataError;
 use crate::recording::smooth::SmoothError;
 use crate::shooting::ShootingError;
 use crate::training::{CheckpointError, TrainingError};
@@ -25,6 +26,9 @@ pub enum PipelineError {
     /// States that cannot be sampled.
     #[error(transparent)]
     Sampling(#[from] SamplingError),
+    /// Files of recorded motion that cannot be read.
+    #[error(transparent)]
+    Data(#[from] DataError),
     /// Recorded motion that cannot be learned from.
     #[error(transparent)]
     Recording(#[from] RecordingSplitError),
@@ -101,9 +105,14 @@ pub enum PipelineError {
         /// The problem.
         problem: String,
     },
-    /// A place for a run that cannot be had, such as one that another process holds.
-    #[error("{0}")]
-    Place(String),
+    /// A directory that another process works in.
+    #[error("{}: another run is writing into this directory ({owner})", path.display())]
+    Held {
+        /// The directory.
+        path: PathBuf,
+        /// The other process.
+        owner: String,
+    },
     /// A result that its format cannot hold.
     #[error("{0}")]
     Format(String),
@@ -115,6 +124,14 @@ pub enum PipelineError {
     NothingFinished {
         /// Runs asked for.
         total: usize,
+    },
+    /// Runs of an experiment that another process works on.
+    #[error("{} left to other processes, the first to {owner}; start again when they have ended", crate::names::counted(*held, "run is", "runs are"))]
+    HeldRuns {
+        /// Runs that other processes work on.
+        held: usize,
+        /// The process that works on the first of them.
+        owner: String,
     },
     /// The flag of the watch was raised while an experiment ran.
     #[error("interrupted with {finished} of {} finished", crate::names::counted(*total, "run", "runs"))]

@@ -1,42 +1,39 @@
-//! Experiments: their runs side by side, in this process and others, those that are finished not again, and the tables that come
-//! of them.
+//! Experiments: their runs side by side, finished ones not again, and the tables made of their records.
 
-use crate::configuration::in_current_words;
 use crate::experiments::{Experiment, Outcome, Record, Run, Scale};
 use crate::pipeline::checkpoints::Begin;
-use crate::pipeline::experiment_queue::Queue;
+use crate::pipeline::experiment_directory::{ExperimentDirectory, LockedDirectory};
 use crate::pipeline::experiment_report::{ExperimentReport, Results, conclude};
-use crate::pipeline::experiment_store::{ExperimentStore, RunClaim, RunOutput};
 use crate::pipeline::readings::{READINGS, read_hole};
 use crate::pipeline::train::{RunOptions, train};
-use crate::pipeline::{Event, PipelineError, RECORD, Watch};
+use crate::pipeline::{Event, Output, PipelineError, RECORD, Watch};
 use crate::report::Curve;
 use crate::training::{StopReason, TrainingError};
-use std::sync::Arc;
+use std::collections::BTreeMap;
+use std::panic::resume_unwind;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Instant;
 
 /// Runs an experiment, `runs` of it, on so many threads, and writes table, pictures and report; runs whose records are in the
-/// store and are of the same configuration are not run again. `beside` are curves of loss against time from elsewhere.
-///
-/// Several processes may run the same experiment in the same store at a time, if the store has claims: each run is one
-/// process's, and this returns when all of `runs` are finished, by whomever.
+/// directory and are of the same configuration are not run again. `beside` are curves of loss against time from elsewhere.
 ///
 /// # Errors
-/// Files that cannot be written, [`PipelineError::InterruptedRuns`]; runs that are finished stay finished.
+/// Files that cannot be written, [`PipelineError::InterruptedRuns`], [`PipelineError::HeldRuns`] if another process works on some of
+/// the runs; runs that are finished stay finished.
 pub fn run_experiment(
     (experiment, scale): (&Experiment, Scale),
     runs: Vec<Run>,
     threads: usize,
     beside: &[Curve],
-    store: &dyn ExperimentStore,
+    store: &ExperimentDirectory,
     watch: &Watch,
 ) -> Result<ExperimentReport, PipelineError> {
     let started = Instant::now();
     let results = finish_runs((experiment, scale), runs, threads, store, watch)?;
-    conclude((experiment, scale), results, beside, store, watch, Some(started))
+    conclude((experiment, scale), results, beside, store, Some(started))
 }
 
-/// Writes table, pictures and report from the records that are in a store, and from nothing else; nothing is run. The same records
+/// Writes table, pictures and report from the records that are in a directory, and from nothing else; nothing is run. The same records
 /// give the same bytes, whichever machines they were made on.
 ///
 /// # Errors
@@ -45,18 +42,17 @@ pub fn merge_experiment(
     (experiment, scale): (&Experiment, Scale),
     runs: Vec<Run>,
     beside: &[Curve],
-    store: &dyn ExperimentStore,
-    watch: &Watch,
+    store: &ExperimentDirectory,
 ) -> Result<ExperimentReport, PipelineError> {
     let with_record = |run: Run| finished_record(store, &run).map(|record| (run, record));
     let results = runs.into_iter().map(with_record).collect::<Result<Results, PipelineError>>()?;
     if results.iter().all(|(_, record)| record.is_none()) {
         return Err(PipelineError::NothingFinished { total: results.len() });
     }
-    conclude((experiment, scale), results, beside, store, watch, None)
+    conclude((experiment, scale), results, beside, store, None)
 }
 
-/// Runs `runs` of an experiment until each is finished, by this process or by another that claimed it; no tables are written.
+/// Runs `runs` of an experiment, so many side by side; no tables are written. A run that another process works on is left to it.
 ///
 /// # Errors
 /// As of [`run_experiment`].
@@ -64,102 +60,81 @@ pub fn finish_runs(
     (experiment, scale): (&Experiment, Scale),
     runs: Vec<Run>,
     threads: usize,
-    store: &dyn ExperimentStore,
+    store: &ExperimentDirectory,
     watch: &Watch,
 ) -> Result<Results, PipelineError> {
     let total = runs.len();
     let abreast = if experiment.is_timed() { 1 } else { threads.min(total).max(1) };
-    let queue = Queue::new(total);
     watch.say(Event::Runs { done: 0, total });
+    let (next, done, failed) = (AtomicUsize::new(0), AtomicUsize::new(0), AtomicBool::new(false));
     let work = || {
-        while let Some(index) = queue.next(watch) {
+        let mut results = Vec::new();
+        while !failed.load(Ordering::SeqCst) && !watch.is_interrupted() {
+            let index = next.fetch_add(1, Ordering::SeqCst);
             let Some(run) = runs.get(index) else { break };
-            match one(run, (experiment, scale), (threads / abreast).max(1), store, watch) {
-                Ok(Turn::Held(holder)) => {
-                    if queue.put_back(index) {
-                        watch.say(Event::Note(&format!("{}: {holder} works on it; waiting for its record", run.name)));
-                    }
-                }
-                // No other is begun: the flag of the watch is up.
-                Ok(Turn::Interrupted) => {}
-                Ok(Turn::Finished(record)) => {
-                    let done = queue.finish(index, Ok(record));
+            let result = one(run, (experiment, scale), (threads / abreast).max(1), store, watch);
+            match &result {
+                Ok(Some(_)) => {
+                    let done = 1 + done.fetch_add(1, Ordering::SeqCst);
                     watch.say(Event::Runs { done, total });
                 }
-                Err(error) => _ = queue.finish(index, Err(error)),
+                Ok(None) | Err(PipelineError::Held { .. }) => {}
+                Err(_) => failed.store(true, Ordering::SeqCst),
             }
+            results.push((index, result));
         }
+        results
     };
-    std::thread::scope(|scope| {
-        for _ in 0..abreast {
-            scope.spawn(work);
-        }
+    let mut results: BTreeMap<usize, Result<Option<Record>, PipelineError>> = std::thread::scope(|scope| {
+        let workers: Vec<_> = (0..abreast).map(|_| scope.spawn(work)).collect();
+        workers.into_iter().flat_map(|worker| worker.join().unwrap_or_else(|panic| resume_unwind(panic))).collect()
     });
-    let mut found = queue.into_results();
-    let results = runs
-        .into_iter()
-        .enumerate()
-        .map(|(index, run)| Ok((run, found.remove(&index).transpose()?)))
-        .collect::<Result<Results, PipelineError>>()?;
-    let finished = results.iter().filter(|(_, record)| record.is_some()).count();
-    if finished < total && watch.is_interrupted() {
-        return Err(PipelineError::InterruptedRuns { finished, total });
+    let (mut finished, mut held) = (Vec::new(), Vec::new());
+    for (index, run) in runs.into_iter().enumerate() {
+        match results.remove(&index).unwrap_or(Ok(None)) {
+            Ok(record) => finished.push((run, record)),
+            // The process may have ended since.
+            Err(PipelineError::Held { owner, .. }) => match finished_record(store, &run)? {
+                None => held.push(owner),
+                record => finished.push((run, record)),
+            },
+            Err(error) => return Err(error),
+        }
     }
-    Ok(results)
+    if watch.is_interrupted() && done.load(Ordering::SeqCst) < total {
+        return Err(PipelineError::InterruptedRuns { finished: done.load(Ordering::SeqCst), total });
+    }
+    match held.first() {
+        Some(owner) => Err(PipelineError::HeldRuns { held: held.len(), owner: owner.clone() }),
+        None => Ok(finished),
+    }
 }
 
-/// End of a turn of a run.
-enum Turn {
-    /// It has a record.
-    Finished(Record),
-    /// Another process works on it; which, in words.
-    Held(String),
-    /// The flag of the watch was raised.
-    Interrupted,
-}
-
-/// The record of a run: the one that is there if it was made from the same configuration, or a new one.
+/// The record of a run: the one that is there if it was made from the same configuration, or a new one; `None` if it was interrupted.
 fn one(
     run: &Run,
-    (experiment, scale): (&Experiment, Scale),
+    of: (&Experiment, Scale),
     threads: usize,
-    store: &dyn ExperimentStore,
+    store: &ExperimentDirectory,
     watch: &Watch,
-) -> Result<Turn, PipelineError> {
+) -> Result<Option<Record>, PipelineError> {
     if let Some(record) = finished_record(store, run)? {
-        return Ok(Turn::Finished(record));
+        return Ok(Some(record));
     }
-    let output = match store.claim_run(&run.name, &watch.interrupt)? {
-        RunClaim::Ours(output) => output,
-        RunClaim::Held(holder) => return Ok(Turn::Held(holder)),
-    };
-    // Whoever had it before may have finished it.
-    if let Some(record) = finished_record(store, run)? {
-        output.finish();
-        return Ok(Turn::Finished(record));
+    let output = store.open_run(&run.name)?;
+    // The process that held the directory before may have finished the run.
+    match finished_record(store, run)? {
+        None => make(run, of, threads, &output, watch),
+        record => Ok(record),
     }
-    tracing::info!(run = run.name, "claimed");
-    let turn = match make(run, (experiment, scale), threads, output.as_ref(), watch) {
-        Ok(Some(record)) => Turn::Finished(record),
-        Err(_) | Ok(None) if output.is_lost() => Turn::Held("another process, which has taken it over".to_string()),
-        Ok(None) => Turn::Interrupted,
-        Err(error) => return Err(error),
-    };
-    if matches!(turn, Turn::Finished(_)) {
-        tracing::info!(run = run.name, "finished");
-        output.finish();
-    } else {
-        tracing::info!(run = run.name, "left");
-    }
-    Ok(turn)
 }
 
-/// Makes the record of a run that is ours; `None` if it was interrupted.
+/// Makes the record of a run; `None` if it was interrupted.
 fn make(
     run: &Run,
     (experiment, scale): (&Experiment, Scale),
     threads: usize,
-    output: &dyn RunOutput,
+    output: &LockedDirectory,
     watch: &Watch,
 ) -> Result<Option<Record>, PipelineError> {
     let toml = toml::to_string(&run.config).map_err(PipelineError::format)?;
@@ -171,10 +146,9 @@ fn make(
     let (starts, span) = scale.trajectories();
     let began = Instant::now();
     // A run that was stopped goes on from its checkpoint.
-    let checkpoints = output.checkpoints().map(|checkpoints| checkpoints.beginning(Begin::Either));
+    let checkpoints = Some(output.checkpoints().beginning(Begin::Either));
     let options = RunOptions { threads, starts, span, checkpoints };
-    let interrupt = output.interrupt().unwrap_or_else(|| Arc::clone(&watch.interrupt));
-    let watch = Watch { interrupt, ..watch.remarks_alone() };
+    let watch = watch.remarks_alone();
     let trained = train(&run.config, &system, &options, output, &watch);
     let judged_or_empty = matches!(
         &trained,
@@ -206,41 +180,13 @@ fn make(
     Ok(Some(record))
 }
 
-/// The record of a run in a store, if it was made from this configuration.
+/// The record of a run in a directory, if it was made from this configuration.
 ///
 /// # Errors
 /// A configuration that TOML cannot hold.
-pub fn finished_record(store: &dyn ExperimentStore, run: &Run) -> Result<Option<Record>, PipelineError> {
+pub fn finished_record(store: &ExperimentDirectory, run: &Run) -> Result<Option<Record>, PipelineError> {
     let toml = toml::to_string(&run.config).map_err(PipelineError::format)?;
     let record = store.read(&run.name, RECORD).and_then(|json| serde_json::from_slice(&json).ok());
-    let current = |bytes: &[u8]| in_current_words(&String::from_utf8_lossy(bytes));
-    let same = || store.read(&run.name, "config.toml").is_some_and(|text| current(&text) == toml);
+    let same = || store.read(&run.name, "config.toml").is_some_and(|text| text == toml.as_bytes());
     Ok(record.filter(|_| same()))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::experiments::find;
-    use crate::pipeline::Directory;
-
-    #[test]
-    fn runs_of_earlier_versions_are_finished() {
-        let directory = tempfile::tempdir().unwrap();
-        let store = Directory::at(directory.path());
-        let runs = find("quick").unwrap().runs(Scale::Smoke, 1);
-        let run = runs.iter().find(|run| run.config.system == "spring-pendulum").unwrap();
-        let folder = directory.path().join(&run.name);
-        std::fs::create_dir(&folder).unwrap();
-        let outcome = Outcome::Nothing { reason: String::new() };
-        let record = Record { outcome, losses: Vec::new(), times: Vec::new(), seconds: 0.0 };
-        std::fs::write(folder.join(RECORD), serde_json::to_string(&record).unwrap()).unwrap();
-        let now = toml::to_string(&run.config).unwrap();
-        let past = now.replace("acceleration_weighting", "relative").replace("log_uniform", "logarithmic");
-        assert!(past.contains("\nrelative = ") && past.contains("\nlogarithmic = "), "{past}");
-        for (config, finished) in [(&now, true), (&past, true), (&now.replace("seed = 0", "seed = 7"), false)] {
-            std::fs::write(folder.join("config.toml"), config).unwrap();
-            assert_eq!(finished_record(&store, run).unwrap().is_some(), finished, "{config}");
-        }
-    }
 }

@@ -2,10 +2,10 @@
 
 use crate::experiments::{Experiment, Record, Run, Scale};
 use crate::names::{WIDTH, counted, wrapped};
-use crate::pipeline::experiment_store::ExperimentStore;
+use crate::pipeline::experiment_directory::ExperimentDirectory;
 use crate::pipeline::readings::{RowOfHoles, rows_of_holes};
 use crate::pipeline::run_figures::{pictures_of_runs, within};
-use crate::pipeline::{PipelineError, Watch, headline};
+use crate::pipeline::{Output, PipelineError, headline};
 use crate::report::{
     Curve, EXPERIMENT_HEADER, READING_HEADER, REDUCTION_HEADER, Report, experiment_curves, experiment_figures,
     experiment_table, experiment_view, reduction_table, text_table,
@@ -48,15 +48,14 @@ pub(crate) fn conclude(
     (experiment, scale): (&Experiment, Scale),
     results: Results,
     beside: &[Curve],
-    store: &dyn ExperimentStore,
-    watch: &Watch,
+    store: &ExperimentDirectory,
     started: Option<Instant>,
 ) -> Result<ExperimentReport, PipelineError> {
     let rows = experiment.rows(&results);
     let (table, (header, view)) = (experiment_table(&rows), experiment_view(&rows));
     let mut curves = experiment_curves(&results);
     curves.extend_from_slice(beside);
-    let output = store.open_tables(&watch.interrupt)?;
+    let output = store.open_tables()?;
     output.write("table.csv", csv(&table).as_bytes())?;
     if experiment.is_timed() {
         output.write("curves.csv", curves_csv(&curves).as_bytes())?;
@@ -79,7 +78,7 @@ pub(crate) fn conclude(
     let reductions = reduction_table(&experiment.reductions(&results));
     let report = remarks.iter().fold(report, |report, remark| report.paragraph(remark));
     let report = if reductions.is_empty() { report } else { report.table(&REDUCTION_HEADER, &reductions) };
-    let holes = rows_of_holes(experiment, &results, store, output.as_ref())?;
+    let holes = rows_of_holes(experiment, &results, store, &output)?;
     let report = holes.iter().fold(report, |report, row| row.add_to(report));
     let report = within(taken, report.figures(&figures));
     output.write("report.html", report.to_html().as_bytes())?;

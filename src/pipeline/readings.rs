@@ -6,7 +6,7 @@ use crate::geometry::GeometryError;
 use crate::lagrangian::SystemInstance;
 use crate::network::NetworkLagrangian;
 use crate::network::file::ModelFile;
-use crate::pipeline::experiment_store::ExperimentStore;
+use crate::pipeline::experiment_directory::ExperimentDirectory;
 use crate::pipeline::hole_pictures::{orbit_figure, sky_picture};
 use crate::pipeline::{MODEL, Output, PipelineError, Watch};
 use crate::relativity::{CentralCoordinates, LearnedHole, Reading};
@@ -107,7 +107,7 @@ pub(crate) fn read_hole(
 }
 
 /// The readings of a finished run: those of its file, or those of its model; none for a run that learned nothing.
-fn readings_of(run: &Run, store: &dyn ExperimentStore) -> Result<Vec<Reading>, PipelineError> {
+fn readings_of(run: &Run, store: &ExperimentDirectory) -> Result<Vec<Reading>, PipelineError> {
     if let Some(readings) = store.read(&run.name, READINGS).and_then(|json| serde_json::from_slice(&json).ok()) {
         return Ok(readings);
     }
@@ -125,7 +125,7 @@ fn readings_of(run: &Run, store: &dyn ExperimentStore) -> Result<Vec<Reading>, P
 pub(crate) fn rows_of_holes(
     experiment: &Experiment,
     results: &[(Run, Option<Record>)],
-    store: &dyn ExperimentStore,
+    store: &ExperimentDirectory,
     output: &dyn Output,
 ) -> Result<Vec<RowOfHoles>, PipelineError> {
     if !experiment.reads_holes() {

@@ -3,7 +3,7 @@
 use crate::experiments::{Experiment, Picture, Record, Run};
 use crate::names::counted;
 use crate::pipeline::CAPTIONS;
-use crate::pipeline::experiment_store::ExperimentStore;
+use crate::pipeline::experiment_directory::ExperimentDirectory;
 use crate::report::Report;
 use std::collections::BTreeMap;
 
@@ -55,7 +55,7 @@ pub(crate) fn within(taken: Vec<Taken>, report: Report) -> Report {
 }
 
 /// Names of the pictures of a run that begin so, in the order of a report.
-fn pictures_of(store: &dyn ExperimentStore, run: &str, prefix: &str) -> Vec<String> {
+fn pictures_of(store: &ExperimentDirectory, run: &str, prefix: &str) -> Vec<String> {
     let mut files = store.names(run);
     files.retain(|name| name.starts_with(prefix) && name.ends_with(".svg"));
     files.sort_by_cached_key(|file| (place_in_report(file), file.clone()));
@@ -66,7 +66,7 @@ fn pictures_of(store: &dyn ExperimentStore, run: &str, prefix: &str) -> Vec<Stri
 pub(crate) fn pictures_of_runs(
     experiment: &Experiment,
     results: &[(Run, Option<Record>)],
-    store: &dyn ExperimentStore,
+    store: &ExperimentDirectory,
 ) -> Vec<Taken> {
     let mut figures = Vec::new();
     for prefix in experiment.pictures.iter().flat_map(|picture| match picture {
@@ -94,7 +94,6 @@ pub(crate) fn pictures_of_runs(
 mod tests {
     use super::*;
     use crate::experiments::{Outcome, Scale, find};
-    use crate::pipeline::Directory;
 
     #[test]
     fn pictures_come_in_the_order_of_a_report() {
@@ -130,7 +129,7 @@ mod tests {
             seconds: 0.0,
         };
         let (name, results) = (run.name.clone(), [(run, Some(record))]);
-        let store = Directory::create(directory.path()).unwrap();
+        let store = ExperimentDirectory::new(directory.path());
         let found = |experiment: &str| -> Vec<String> {
             let captions = pictures_of_runs(find(experiment).unwrap(), &results, &store).len();
             let [Picture::Evaluation(prefixes)] = find(experiment).unwrap().pictures else {

@@ -205,24 +205,24 @@ fn shares_together_make_what_one_process_makes() {
     let report = fs::read_to_string(folder.join("report.html")).unwrap();
     assert!(report.contains("3 runs, 2 of them finished"));
 
-    // A run that another machine has claimed, and one that it left long ago.
+    // A run that another process works on is left to it, and listed with it.
     let run = folder.join("no-scaling-seed0");
     fs::create_dir_all(&run).unwrap();
-    let claim = run.join(".lnn.claim.1");
-    let beats = "beats 00000000000000000001";
-    let text = format!("process 7\nhost far\nsince 0\nmachine x\nserial 0\nlease 600\n{beats}\nheld    \n");
-    fs::write(&claim, text).unwrap();
-    let claimed = &list()[1];
-    assert_eq!((claimed["state"].as_str(), claimed["claimed_by"]["host"].as_str()), (Some("claimed"), Some("far")));
-    let hour = std::time::Duration::from_secs(3600);
-    let file = fs::OpenOptions::new().write(true).open(&claim).unwrap();
-    file.set_modified(std::time::SystemTime::now() - hour).unwrap();
+    let lock = fs::File::create(run.join(".lnn.lock")).unwrap();
+    fs::write(run.join(".lnn.lock"), "process 7\nhost far\n").unwrap();
+    lock.lock().unwrap();
+    let listed = &list()[1];
+    let owner = (listed["owner"]["process"].as_u64(), listed["owner"]["host"].as_str());
+    assert_eq!((listed["state"].as_str(), owner), (Some("in-progress"), (Some(7), Some("far"))));
+    let second = ["scaling", "--scale", "smoke", "--shard", "2/2", "--out", shared.to_str().unwrap()];
+    let refused = lnn(&second);
+    let stderr = String::from_utf8_lossy(&refused.stderr);
+    assert!(refused.status.code() == Some(1) && stderr.contains("process 7 on far"), "{stderr}");
+    // Its death frees the lock.
+    drop(lock);
     assert_eq!(states(), ["finished", "open", "finished"]);
-    let taken = lnn(&["scaling", "--scale", "smoke", "--shard", "2/2", "--out", shared.to_str().unwrap()]);
-    let stderr = String::from_utf8_lossy(&taken.stderr);
-    assert!(taken.status.success() && stderr.contains("taken over from process 7 on far"), "{stderr}");
+    said_by(&lnn(&second));
     assert_eq!(states(), ["finished"; 3]);
-    assert!(!claim.exists());
 
     // The bytes do not depend on who made the records, nor on how often they are merged.
     let files = |out: &Path| -> Vec<(String, Vec<u8>)> {
@@ -264,27 +264,4 @@ fn arrays_of_slurm_are_shares() {
     let output = task(&gap, &["--shard", "1/3"]);
     assert!(output.status.success() && output.stderr.is_empty());
     assert_eq!(["physical-scaling-seed0", "no-scaling-seed0", "dyt-seed0"].map(made), [true, false, true]);
-}
-
-#[test]
-fn processes_without_a_share_divide_the_runs() {
-    let out = tempfile::tempdir().unwrap();
-    let start = || {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_lnn"));
-        let out = out.path().to_str().unwrap();
-        command.args(["experiment", "scaling", "--scale", "smoke", "--threads", "1", "--out", out]);
-        command.env("LNN_LOG", "lnn::pipeline::experiment=info");
-        command.stdout(std::process::Stdio::piped()).stderr(std::process::Stdio::piped()).spawn().unwrap()
-    };
-    let processes = [start(), start(), start()];
-    let mut finished = 0;
-    for process in processes {
-        let output = process.wait_with_output().unwrap();
-        let stderr = String::from_utf8_lossy(&output.stderr);
-        assert!(output.status.success(), "{stderr}");
-        assert!(String::from_utf8_lossy(&output.stdout).contains("Scale smoke, 3 runs"));
-        finished += stderr.lines().filter(|line| line.contains(": finished ")).count();
-    }
-    assert_eq!(finished, 3);
-    assert!(out.path().join("scaling-smoke/report.html").is_file());
 }

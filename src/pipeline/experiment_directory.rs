@@ -1,0 +1,128 @@
+//! Directory of an experiment: the files of its tables, and one directory per run, in which one process works at a time.
+
+use crate::pipeline::{Checkpoints, Directory, Output, PipelineError};
+use crate::storage::{Acquired, DirectoryLock, Disk, LockOwner, read_regular, remove_leftovers};
+use crate::training::CheckpointInterval;
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+
+/// Longest file that is read back, in bytes.
+const MAX_BYTES: u64 = 1 << 26;
+/// Seconds between two checkpoints of a run.
+const CHECKPOINT_SECONDS: f64 = 60.0;
+
+/// Directory of an experiment, created when something is written.
+#[derive(Clone, Debug)]
+pub struct ExperimentDirectory {
+    path: PathBuf,
+}
+
+impl ExperimentDirectory {
+    /// The directory of a path.
+    pub fn new(path: &Path) -> Self {
+        Self { path: path.to_path_buf() }
+    }
+
+    /// Directory of a run.
+    pub(crate) fn run(&self, run: &str) -> PathBuf {
+        self.path.join(run)
+    }
+
+    /// The bytes of a file of a run, if it is there.
+    pub(crate) fn read(&self, run: &str, name: &str) -> Option<Vec<u8>> {
+        read_regular(&self.run(run).join(name), MAX_BYTES).ok()
+    }
+
+    /// Names of the files of a run.
+    pub(crate) fn names(&self, run: &str) -> Vec<String> {
+        let entries = std::fs::read_dir(self.run(run)).into_iter().flatten();
+        entries.filter_map(|entry| entry.ok()?.file_name().into_string().ok()).collect()
+    }
+
+    /// Locks the directory of a run that begins or goes on.
+    ///
+    /// # Errors
+    /// [`PipelineError::Held`] if another process works in it; [`PipelineError::Output`] if it cannot be written.
+    pub(crate) fn open_run(&self, run: &str) -> Result<LockedDirectory, PipelineError> {
+        LockedDirectory::open(&self.run(run))
+    }
+
+    /// Locks the directory itself for tables, pictures and report.
+    ///
+    /// # Errors
+    /// As of [`open_run`](Self::open_run).
+    pub(crate) fn open_tables(&self) -> Result<LockedDirectory, PipelineError> {
+        LockedDirectory::open(&self.path)
+    }
+}
+
+/// A directory that no other process works in.
+#[derive(Debug)]
+pub(crate) struct LockedDirectory {
+    directory: Directory,
+    _lock: DirectoryLock,
+}
+
+impl LockedDirectory {
+    /// Creates the directory if need be, locks it, and removes what writers killed in the middle left.
+    fn open(path: &Path) -> Result<Self, PipelineError> {
+        let directory = Directory::create(path)?;
+        let held = |owner: Option<LockOwner>| {
+            let owner = owner.map_or_else(|| "another process".to_string(), |owner| owner.to_string());
+            PipelineError::Held { path: path.to_path_buf(), owner }
+        };
+        match DirectoryLock::acquire(path) {
+            Ok(Acquired::Lock(lock, _)) => {
+                remove_leftovers(&Disk, path);
+                Ok(Self { directory, _lock: lock })
+            }
+            Ok(Acquired::Held(owner)) => Err(held(owner)),
+            Err(error) if error.kind() == ErrorKind::ResourceBusy => Err(held(None)),
+            Err(error) => Err(PipelineError::output(path, format_args!("cannot lock the directory: {error}"))),
+        }
+    }
+
+    /// Removes a file, if it is there.
+    pub(crate) fn remove(&self, name: &str) -> Result<(), PipelineError> {
+        let path = self.directory.path().join(name);
+        match std::fs::remove_file(&path) {
+            Err(error) if error.kind() != ErrorKind::NotFound => Err(PipelineError::output(&path, error)),
+            _ => Ok(()),
+        }
+    }
+
+    /// Checkpoints of a run in the directory.
+    pub(crate) fn checkpoints(&self) -> Checkpoints {
+        Checkpoints::new(self.directory.path(), CheckpointInterval::Seconds(CHECKPOINT_SECONDS))
+    }
+}
+
+impl Output for LockedDirectory {
+    fn write(&self, name: &str, bytes: &[u8]) -> Result<(), PipelineError> {
+        self.directory.write(name, bytes)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_process_works_on_a_run_at_a_time() {
+        let temporary = tempfile::tempdir().unwrap();
+        let experiment = ExperimentDirectory::new(&temporary.path().join("experiment"));
+        assert!(experiment.names("run").is_empty() && experiment.read("run", "a").is_none());
+        let run = experiment.open_run("run").unwrap();
+        let refusal = experiment.open_run("run").unwrap_err();
+        let own = format!("process {} on ", std::process::id());
+        assert!(matches!(&refusal, PipelineError::Held { owner, .. } if owner.starts_with(&own)), "{refusal}");
+        run.write("a", b"1").unwrap();
+        let _tables = experiment.open_tables().unwrap();
+        drop(run);
+        let run = experiment.open_run("run").unwrap();
+        assert_eq!(experiment.read("run", "a").as_deref(), Some(&b"1"[..]));
+        run.remove("a").unwrap();
+        run.remove("a").unwrap();
+        assert_eq!(experiment.names("run"), [".lnn.lock"]);
+    }
+}

@@ -1,0 +1,156 @@
+//! Locks of directories: one process at a time works in a directory, and the system frees the lock with the process.
+
+use std::fmt;
+use std::fs::{self, File, OpenOptions, TryLockError};
+use std::io::{self, ErrorKind, Read, Write};
+use std::path::{Path, PathBuf};
+
+/// Name of the file that is locked; its text names the process.
+const LOCK: &str = ".lnn.lock";
+
+/// Longest text of a lock file that is read, in bytes.
+const MAX_BYTES: u64 = 1024;
+
+/// Attempts to lock a file that other processes remove meanwhile.
+const ATTEMPTS: usize = 100;
+
+/// The lock of a directory, held until it is dropped or the process ends.
+#[derive(Debug)]
+pub struct DirectoryLock {
+    path: PathBuf,
+    _file: File,
+}
+
+/// Outcome of [`DirectoryLock::acquire`].
+#[derive(Debug)]
+pub enum Acquired {
+    /// The lock; if a process died with it, that process.
+    Lock(DirectoryLock, Option<LockOwner>),
+    /// Another process holds the lock; which, if its file says so.
+    Held(Option<LockOwner>),
+}
+
+impl DirectoryLock {
+    /// Takes the lock of an existing directory, if no other process holds it.
+    ///
+    /// # Errors
+    /// The file system's; [`ErrorKind::ResourceBusy`] if other processes took and left the lock in every attempt.
+    pub fn acquire(directory: &Path) -> io::Result<Acquired> {
+        let path = directory.join(LOCK);
+        for _ in 0..ATTEMPTS {
+            let mut file = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(&path)?;
+            let before = text(&mut file);
+            match file.try_lock() {
+                Ok(()) => {}
+                Err(TryLockError::WouldBlock) => return Ok(Acquired::Held(LockOwner::parse(&before))),
+                Err(TryLockError::Error(error)) => return Err(error),
+            }
+            let own = LockOwner::this().text();
+            file.set_len(0)?;
+            io::Seek::rewind(&mut file)?;
+            file.write_all(own.as_bytes())?;
+            file.flush()?;
+            // A holder that removed the file between opening and locking left a lock on a file without a name.
+            match File::open(&path).map(|mut named| text(&mut named)) {
+                Ok(named) if named == own => {
+                    return Ok(Acquired::Lock(Self { path, _file: file }, LockOwner::parse(&before)));
+                }
+                Ok(_) => {}
+                Err(error) if error.kind() == ErrorKind::NotFound => {}
+                Err(error) => return Err(error),
+            }
+        }
+        Err(ErrorKind::ResourceBusy.into())
+    }
+
+    /// The process that holds the lock of a directory, if one does; the inner value is `None` if its file does not name it.
+    pub fn holder(directory: &Path) -> Option<Option<LockOwner>> {
+        let mut file = File::open(directory.join(LOCK)).ok()?;
+        let owner = LockOwner::parse(&text(&mut file));
+        matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)).then_some(owner)
+    }
+}
+
+impl Drop for DirectoryLock {
+    fn drop(&mut self) {
+        // A file left behind does no harm: the lock is what counts.
+        let _ = fs::remove_file(&self.path);
+    }
+}
+
+/// The beginning of a file, as far as it is text.
+fn text(file: &mut File) -> String {
+    let mut text = String::new();
+    // What cannot be read says nothing about the holder; the lock itself is what counts.
+    let _ = file.take(MAX_BYTES).read_to_string(&mut text);
+    text
+}
+
+/// The process that holds a lock.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LockOwner {
+    /// Its number.
+    pub process: u32,
+    /// Name of its machine.
+    pub host: String,
+}
+
+impl LockOwner {
+    /// This process.
+    fn this() -> Self {
+        let kernel = fs::read_to_string("/proc/sys/kernel/hostname").ok();
+        let variable = || ["HOSTNAME", "COMPUTERNAME"].iter().find_map(|name| std::env::var(name).ok());
+        let name = kernel.or_else(variable).unwrap_or_default();
+        let name: String = name.trim().chars().filter(|c| !c.is_control()).take(64).collect();
+        let host = if name.is_empty() { "unknown".to_string() } else { name };
+        Self { process: std::process::id(), host }
+    }
+
+    /// The text of the lock file.
+    fn text(&self) -> String {
+        format!("process {}\nhost {}\n", self.process, self.host)
+    }
+
+    /// Reads the text of a lock file.
+    fn parse(text: &str) -> Option<Self> {
+        let mut lines = text.lines();
+        let mut value = |key: &str| lines.next()?.strip_prefix(key)?.strip_prefix(' ');
+        let (process, host) = (value("process")?, value("host")?);
+        Some(Self { process: process.parse().ok()?, host: host.to_string() })
+    }
+}
+
+impl fmt::Display for LockOwner {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "process {} on {}", self.process, self.host)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_text_comes_back() {
+        let owner = LockOwner::this();
+        assert_eq!(LockOwner::parse(&owner.text()), Some(owner));
+        for bad in ["", "process x\nhost a\n", "process 1\n", "host a\nprocess 1\n"] {
+            assert_eq!(LockOwner::parse(bad), None, "{bad}");
+        }
+    }
+
+    #[test]
+    fn one_holder_at_a_time_is_named() {
+        let directory = tempfile::tempdir().unwrap();
+        let Acquired::Lock(lock, None) = DirectoryLock::acquire(directory.path()).unwrap() else { panic!("held") };
+        let Acquired::Held(Some(owner)) = DirectoryLock::acquire(directory.path()).unwrap() else { panic!("free") };
+        assert_eq!(owner.process, std::process::id());
+        assert_eq!(DirectoryLock::holder(directory.path()), Some(Some(owner)));
+        drop(lock);
+        assert_eq!(DirectoryLock::holder(directory.path()), None);
+        // A process that died left its file without a lock.
+        fs::write(directory.path().join(LOCK), "process 1\nhost far\n").unwrap();
+        let Acquired::Lock(_lock, Some(before)) = DirectoryLock::acquire(directory.path()).unwrap() else { panic!() };
+        assert_eq!(before.to_string(), "process 1 on far");
+    }
+}
