@@ -136,7 +136,6 @@ pub fn predict_by_constant_velocity(windows: &[Window]) -> Predictions {
 
 /// Distance of predicted and measured coordinates a given time after the start of the windows.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(from = "StoredError", into = "StoredError")]
 pub struct PredictionError {
     /// Time after the start in s.
     pub seconds: f64,
@@ -150,34 +149,6 @@ pub struct PredictionError {
     pub windows: usize,
     /// Windows without a prediction for this time.
     pub missing: usize,
-}
-
-/// A [`PredictionError`] in a file, where the percentile also has the name that it had in earlier versions.
-#[derive(Serialize, Deserialize)]
-struct StoredError {
-    seconds: f64,
-    rms: f64,
-    median: f64,
-    #[serde(default)]
-    p90: Option<f64>,
-    #[serde(default)]
-    most: Option<f64>,
-    windows: usize,
-    missing: usize,
-}
-
-impl From<PredictionError> for StoredError {
-    fn from(error: PredictionError) -> Self {
-        let PredictionError { seconds, rms, median, p90, windows, missing } = error;
-        Self { seconds, rms, median, p90: Some(p90), most: Some(p90), windows, missing }
-    }
-}
-
-impl From<StoredError> for PredictionError {
-    fn from(stored: StoredError) -> Self {
-        let StoredError { seconds, rms, median, p90, most, windows, missing } = stored;
-        Self { seconds, rms, median, p90: p90.or(most).unwrap_or(f64::NAN), windows, missing }
-    }
 }
 
 /// Errors `seconds` after the start, at the sample nearest to it; angles, marked by `periodic`, count modulo a turn.
@@ -236,18 +207,6 @@ mod tests {
         let q = times.iter().map(|t| t.cos()).collect();
         let v = times.iter().map(|t| -t.sin()).collect();
         (RecordedTrajectory { name: "swing".into(), times, q, v: vec![], a: vec![], force: vec![] }, v)
-    }
-
-    #[test]
-    fn percentiles_have_both_names_in_files() {
-        let error = PredictionError { seconds: 1.0, rms: 2.0, median: 1.5, p90: 3.0, windows: 9, missing: 0 };
-        let mut stored = serde_json::to_value(error).unwrap();
-        assert_eq!((stored["p90"].as_f64(), stored["most"].as_f64()), (Some(3.0), Some(3.0)));
-        let read = |stored: &serde_json::Value| serde_json::from_value::<PredictionError>(stored.clone()).unwrap();
-        assert_eq!(read(&stored), error);
-        // A file of an earlier version.
-        stored.as_object_mut().unwrap().remove("p90");
-        assert_eq!(read(&stored), error);
     }
 
     #[test]

@@ -1,6 +1,5 @@
 //! TOML configurations with errors that name file, line, key and the nearest known key.
 
-use crate::cli::renamed_keys::without_old;
 use crate::names::plain;
 use serde::de::DeserializeOwned;
 use std::collections::BTreeMap;
@@ -16,7 +15,7 @@ pub fn parse<T: DeserializeOwned>(text: &str) -> Result<T, (usize, String)> {
     toml::from_str(text).map_err(|error| {
         let span = error.span().unwrap_or(0..0);
         let line = 1 + text.as_bytes()[..span.start.min(text.len())].iter().filter(|b| **b == b'\n').count();
-        let problem = plain(&without_old(error.message()));
+        let problem = plain(error.message());
         match DeTable::parse(text).ok().and_then(|table| key_at(table.get_ref(), &span)) {
             Some(key) => (line, format!("{key}: {problem}")),
             None => (line, problem),

@@ -3,7 +3,6 @@
 
 use crate::cli::config::lines;
 use crate::cli::mistake::Mistake;
-use crate::cli::renamed_keys::{rename, without_old};
 use crate::cli::{CliError, input};
 use crate::names::plain;
 use serde::Serialize;
@@ -53,10 +52,7 @@ impl ConfigFile {
         let (small, large) = without_large(text);
         let refused = |line: usize, problem: &str| CliError::usage(format_args!("{name}:{line}: {problem}"));
         match lines(text).and_then(|lines| Ok((lines, crate::cli::config::parse(&small)?))) {
-            Ok((mut lines, mut table)) => {
-                rename(&mut table, &mut lines).map_err(|(line, problem)| refused(line, &problem))?;
-                Ok(Self { name, table, lines, large })
-            }
+            Ok((lines, table)) => Ok(Self { name, table, lines, large }),
             Err((line, problem)) => Err(refused(line, &problem)),
         }
     }
@@ -298,7 +294,7 @@ impl Filled {
         let unknown = problem.strip_prefix("unknown field `").and_then(|rest| rest.split('`').next());
         let at = path.iter().position(|step| matches!(step, Step::Key(name) if Some(name.as_str()) == unknown));
         let path = at.map_or(path, |at| &path[..=at]);
-        let mistake = Mistake::new(text_of(path), plain(&without_old(problem)));
+        let mistake = Mistake::new(text_of(path), plain(problem));
         if !self.mistakes.contains(&mistake) {
             self.mistakes.push(mistake);
         }
@@ -362,39 +358,6 @@ mod tests {
         assert_eq!(config.phases.len(), 2);
         assert_eq!((config.phases[0].epochs, config.phases[1].epochs, config.phases[1].rate), (3, 40, 1.0));
         assert_eq!(over("double-pendulum", "").0, base("double-pendulum"));
-    }
-
-    #[test]
-    fn keys_have_the_names_of_earlier_versions_too() {
-        let old = "[data]\nmotions = 0.25\noff_shell = 0.5\nrelative = 2\n[[phase]]\nlogarithmic = [false, true]\n\
-                   [polish]\nmemory = 3\n";
-        let new = "[data]\ntrajectory_fraction = 0.25\nrescaled_fraction = 0.5\nacceleration_weighting = 2\n[[phase]]\n\
-                   log_uniform = [false, true]\n[lbfgs]\nmemory = 3\n";
-        // Beside the base's own values of these keys.
-        let (config, mistakes) = over("spring-pendulum", old);
-        assert!(mistakes.is_empty(), "{mistakes:?}");
-        assert_eq!(config, over("spring-pendulum", new).0);
-        assert_eq!((config.data.trajectory_fraction, config.data.rescaled_fraction), (0.25, 0.5));
-        assert_eq!((config.data.acceleration_weighting, config.lbfgs.map(|l| l.memory)), (2.0, Some(3)));
-        assert_eq!(config.phases[0].log_uniform, [false, true]);
-        // Whole files of earlier versions are read one by one.
-        let base = base("spring-pendulum");
-        let written = toml::to_string(&Config { lbfgs: Some(Lbfgs::default()), ..base.clone() }).unwrap();
-        let words = [("acceleration_weighting", "relative"), ("log_uniform", "logarithmic"), ("[lbfgs]", "[polish]")];
-        let past = words.iter().fold(written, |text, (new, old)| {
-            assert!(text.contains(new), "{text}");
-            text.replace(new, old)
-        });
-        let read: Config = toml::from_str(&past).unwrap();
-        assert_eq!(read, Config { lbfgs: Some(Lbfgs::default()), ..base });
-        // Mistakes have the lines of the file and the names of now.
-        let wrong = |text: &str| over("double-pendulum", text).1;
-        let found = wrong("[data]\nmotions = 'x'\n[polish]\nmemory = 3\niterations = -1\n");
-        assert!(found.len() == 2 && found[0].starts_with("c.toml:2: data.trajectory_fraction: "), "{found:?}");
-        assert!(found[1].starts_with("c.toml:5: lbfgs.iterations: "), "{found:?}");
-        let both = ConfigFile::parse("c.toml".to_string(), "[data]\nmotions = 1\ntrajectory_fraction = 1\n");
-        let both = both.unwrap_err().to_string();
-        assert_eq!(both, "c.toml:2: data.motions: the same key as data.trajectory_fraction, expected one of them");
     }
 
     #[test]

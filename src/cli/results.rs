@@ -41,7 +41,7 @@ pub fn found(directory: &Path) -> Option<String> {
     if names.is_empty() { None } else { Some(described(directory).unwrap_or_else(|| listed(&names))) }
 }
 
-/// `true` if a file's name is a picture's; earlier versions wrote PNG.
+/// `true` if a file's name is a picture's.
 fn is_picture(name: &str) -> bool {
     name.ends_with(".svg") || name.ends_with(".png")
 }

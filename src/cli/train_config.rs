@@ -25,7 +25,6 @@ use std::path::{Path, PathBuf};
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
-#[command(mut_arg("learning_rate", |rate| rate.visible_alias("rate")))]
 pub struct Args {
     /// A system by name (`lnn systems` lists them), or by the file that describes it, FILE.toml [default: that of the
     /// configuration or of the model].

@@ -74,7 +74,7 @@ pub struct Config {
     #[serde(rename = "phase")]
     pub phases: Vec<Phase>,
     /// Full-batch L-BFGS after the last phase.
-    #[serde(default, alias = "polish", skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub lbfgs: Option<Lbfgs>,
 }
 
@@ -112,12 +112,12 @@ pub struct Data {
     /// the shell, `|u|` from 0.03 to 1 and uniform in its logarithm, of either sign, their acceleration `u^2` times as
     /// large, as for every geodesic, and their residuals weigh `1/u^2` in the training loss. On the shell alone the metric
     /// is not identifiable.
-    #[serde(default, alias = "off_shell", skip_serializing_if = "is_zero")]
+    #[serde(default, skip_serializing_if = "is_zero")]
     pub rescaled_fraction: f64,
     /// Fraction of the training states that lie on exact motions from the starts of the system's trajectory test, at any
     /// time with equal chance, as long as these stay within the bounds of the phase. A [`Phase::log_uniform`] coordinate is so
     /// in half of the starts as well; `rescaled_fraction` and `acceleration_weighting` treat these states like all others.
-    #[serde(default, alias = "motions", skip_serializing_if = "is_zero")]
+    #[serde(default, skip_serializing_if = "is_zero")]
     pub trajectory_fraction: f64,
     /// With a number `f` above 0 a training state weighs `f m / (f m + |a|)`, `|a|` the mean size of its scaled accelerations
     /// and `m` the mean over all states: errors count relative to accelerations above `f m`, and a few large ones do not
@@ -125,7 +125,7 @@ pub struct Data {
     ///
     /// A fit adds the error to expect of a smoothed acceleration to `|a|`; with [radial coordinates](Network::radial) a state weighs
     /// `1/(|a| + f m)`, `m` the median about as far from the centre. The same weights choose its best epoch.
-    #[serde(default, alias = "relative", skip_serializing_if = "is_zero")]
+    #[serde(default, skip_serializing_if = "is_zero")]
     pub acceleration_weighting: f64,
     /// Names of Cartesian coordinates around a centre: all states are drawn in a [`Shell`] around it, training, validation and test,
     /// instead of the boxes of these coordinates and of the velocities; empty for none.
@@ -282,7 +282,7 @@ pub struct Phase {
     pub velocity: Vec<[f64; 2]>,
     /// For which coordinates half of the training states are uniform in the logarithm, where the low end of the bounds needs more
     /// of them than its length; none if empty.
-    #[serde(default, alias = "logarithmic", skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub log_uniform: Vec<bool>,
 }
 

@@ -3,10 +3,8 @@
 mod config;
 mod error;
 mod penalty;
-mod renamed;
 
 pub use config::{Config, Data, Known, Lbfgs, Network, OnFailure, Optimizer, Phase, Precision, Scaling, Shell};
 pub use error::ConfigError;
 pub(crate) use error::{Faults, place};
 pub use penalty::{Penalty, Regularizer};
-pub(crate) use renamed::{RENAMED, Renamed, in_current_words};

@@ -3,7 +3,6 @@
 use super::fingerprint::{Fingerprint, Saved};
 use super::format::{Header, decode, decode_header, encode};
 use super::{Ended, PhaseState, Snapshot};
-use crate::configuration::in_current_words;
 use crate::network::file::ModelFileError;
 use crate::scalar::Scalar;
 use crate::storage::{Files, ReadError, replace};
@@ -153,7 +152,7 @@ impl CheckpointManager {
             return Err(CheckpointError::Data(names.join(", ")));
         }
         // After the data: a configuration may have been made for them.
-        if in_current_words(&header.identity.config) != in_current_words(&self.identity.config) {
+        if header.identity.config != self.identity.config {
             return Err(CheckpointError::Config { saved: header.identity.config });
         }
         if snapshot.ended.weights.len() != parameters {

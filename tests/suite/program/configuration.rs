@@ -130,11 +130,11 @@ fn what_is_changed_most_has_options() {
         parse_config(&run.stdout).unwrap()
     };
     let more = ["--hidden", "32,16", "--activation", "softplus", "--penalty", "sylvester", "--lambda", "7"];
-    let config = changed("double-pendulum", &[&more[..], &["--rate", "1e-3", "--epochs", "12"]].concat());
+    let config = changed("double-pendulum", &[&more[..], &["--learning-rate", "1e-3", "--epochs", "12"]].concat());
     assert_eq!((config.network.hidden.as_slice(), config.network.activation.name()), (&[32, 16][..], "softplus"));
     assert_eq!(config.penalty, Regularizer::Sylvester { lambda: 7.0 });
     assert_eq!((config.phases[0].rate, config.phases[0].epochs, config.phases[0].t_max), (1e-3, 12, 12.0));
-    let config = changed("double-pendulum", &["--preset", "paper", "--epochs", "70", "--rate", "1e-4"]);
+    let config = changed("double-pendulum", &["--preset", "paper", "--epochs", "70", "--learning-rate", "1e-4"]);
     let phases: Vec<(usize, f64)> = config.phases.iter().map(|phase| (phase.epochs, phase.t_max)).collect();
     assert_eq!(phases, [(30, 3.0), (20, 3.0), (20, 3.0)]);
     assert!((config.phases[1].rate - 4e-6).abs() < 1e-18 && config.phases[0].rate == 1e-4);
