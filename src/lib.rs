@@ -143,6 +143,8 @@
 
 pub(crate) mod names;
 
+pub mod prelude;
+
 pub mod scalar;
 
 #[doc(hidden)]

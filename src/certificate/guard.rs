@@ -1,8 +1,8 @@
 //! A model that moves only where its mass matrix is certified.
 
 use super::{Certificate, Verdict};
-use crate::lagrangian::{EulerLagrange, MechanicsError, MetricJet, Request, Terms};
-use crate::scalar::{Dd, Scalar};
+use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Terms};
+use crate::scalar::Scalar;
 
 /// A model with a [`Certificate`] that is asked at every state: `dL/dq`, mass matrix and acceleration of a state that is not certified fail
 /// with [`MechanicsError::Uncertified`].
@@ -51,20 +51,8 @@ impl<S: Scalar, M: EulerLagrange<S>> EulerLagrange<S> for Guarded<'_, M> {
         terms.outcome()
     }
 
-    fn metric_jets(&self, q: &[S], v: &[S]) -> Result<Vec<MetricJet<S>>, MechanicsError> {
-        self.model.metric_jets(q, v)
-    }
-
-    fn wide_metric_jets(&self, q: &[S], v: &[S]) -> Result<Option<Vec<MetricJet<Dd>>>, MechanicsError> {
-        self.model.wide_metric_jets(q, v)
-    }
-
-    fn conserves_energy(&self) -> bool {
-        self.model.conserves_energy()
-    }
-
-    fn prefers_batches(&self) -> bool {
-        self.model.prefers_batches()
+    fn inner(&self) -> Option<&dyn EulerLagrange<S>> {
+        Some(&self.model)
     }
 }
 

@@ -16,19 +16,8 @@ use std::path::PathBuf;
 
 /// Files and columns as the arguments give them.
 pub fn columns_of(args: &RecordingArgs) -> FitColumns {
-    FitColumns {
-        files: args.data.iter().map(|file| file.display().to_string()).collect(),
-        coords: args.coords.clone(),
-        velocity: args.velocity.clone(),
-        acceleration: args.acceleration.clone(),
-        force: args.force.clone(),
-        time: args.time.clone(),
-        rate: args.rate,
-        trajectory: args.trajectory.clone(),
-        periodic: args.periodic.clone(),
-        units: args.units.iter().map(|(column, unit)| format!("{column}={unit}")).collect(),
-        columns: args.columns.clone(),
-    }
+    let files = args.data.iter().map(|file| file.display().to_string()).collect();
+    FitColumns { files, ..FitColumns::from(&args.meaning()) }
 }
 
 /// Arguments with these values where they say nothing.

@@ -132,6 +132,23 @@ impl<S: Scalar> Dataset<S> {
         self.weight.get(state).copied().unwrap_or(<S as Real>::one())
     }
 
+    /// The states of these rows, in this order.
+    pub(crate) fn rows(&self, rows: &[usize]) -> Self {
+        let pick = |values: &[S], width: usize| {
+            let row = |&row: &usize| values.get(row * width..(row + 1) * width).unwrap_or_default();
+            rows.iter().flat_map(row).copied().collect()
+        };
+        let n = self.coordinates;
+        Self {
+            coordinates: n,
+            q: pick(&self.q, n),
+            v: pick(&self.v, n),
+            a: pick(&self.a, n),
+            force: pick(&self.force, n),
+            weight: pick(&self.weight, 1),
+        }
+    }
+
     /// Lets a state pass `u` times as fast, backwards if `u` is negative: `v -> u v`, `a -> u^2 a`.
     pub(crate) fn rescale_time(&mut self, state: usize, u: S) {
         let range = state * self.coordinates..(state + 1) * self.coordinates;

@@ -1,11 +1,13 @@
-//! System, penalty and shape of the network that a configuration asks for.
+//! System, penalty, shape of the network and header of the model file that a configuration asks for.
 
-use crate::configuration::{Config, ConfigError, Penalty, Regularizer, Scaling};
+use crate::configuration::{Config, ConfigError, Penalty, Precision, Regularizer, Scaling};
 use crate::data::draw::SamplingError;
 use crate::lagrangian::system::System;
 use crate::lagrangian::{SystemInstance, configure_values, find};
 use crate::network::Architecture;
+use crate::network::file::{FORMAT, Header, StoredPrecision};
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 
 impl Config {
     /// The configured system in double precision.
@@ -85,5 +87,34 @@ impl Config {
             dissipation: self.network.dissipation,
             form: self.network.form(names)?,
         })
+    }
+
+    /// Header of the file of a model that was learned by this configuration from states within `ranges`, of coordinates and of
+    /// velocities. It has no parameters of a system, no known forces and no description.
+    pub(crate) fn header(
+        &self,
+        architecture: Architecture,
+        columns: Vec<String>,
+        [position, velocity]: [Vec<[f64; 2]>; 2],
+        validation_loss: f64,
+    ) -> Header {
+        Header {
+            format: FORMAT,
+            crate_version: env!("CARGO_PKG_VERSION").to_string(),
+            architecture,
+            system: self.system.clone(),
+            parameters: BTreeMap::new(),
+            columns,
+            forces: Vec::new(),
+            description: None,
+            precision: match self.precision {
+                Precision::F32 => StoredPrecision::F32,
+                Precision::F64 => StoredPrecision::F64,
+            },
+            position,
+            velocity,
+            seed: self.seed,
+            validation_loss,
+        }
     }
 }

@@ -104,9 +104,21 @@ impl<S: Scalar> Terms<S> {
     }
 }
 
-/// Anything that moves by a Lagrangian: a hand-written system or a trained network, in physical units.
+/// A Lagrangian in motion: one written down or learned, with values for its parameters, in physical units.
 ///
-/// Object safe: roll-outs, evaluation and reports take `&dyn EulerLagrange<S>`.
+/// Two methods make a model: [`coordinates`](Self::coordinates) and [`terms`](Self::terms). A type that wraps another model adds
+/// [`inner`](Self::inner), and every other method then answers as that model does. The trait is object safe: roll-outs, evaluations
+/// and reports take `&dyn EulerLagrange<S>`.
+///
+/// ```
+/// use lnn::prelude::*;
+///
+/// let arm = lnn::lagrangian::build::<f64>("double-pendulum", &[])?;
+/// let a = arm.acceleration(&[0.3, 0.1], &[0.0, 0.0])?; // rad/s^2; several states, one after the other, give as many rows
+/// let m = arm.mass_matrix(&[0.3, 0.1], &[0.0, 0.0])?; // kg m^2, row by row
+/// assert!(a[0] < 0.0 && m.len() == 4 && m[1] == m[2]);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub trait EulerLagrange<S: Scalar>: Send + Sync {
     /// Number of coordinates `n`.
     fn coordinates(&self) -> usize;
@@ -121,16 +133,64 @@ pub trait EulerLagrange<S: Scalar>: Send + Sync {
     /// failed rows are `NaN`.
     fn terms(&self, q: &[S], v: &[S], request: Request, terms: &mut Terms<S>) -> Result<(), MechanicsError>;
 
+    /// The wrapped model of a type that wraps one. The methods below answer as it does, so that a wrapper cannot forget one of them;
+    /// it overrides those that it changes.
+    fn inner(&self) -> Option<&dyn EulerLagrange<S>> {
+        None
+    }
+
+    /// Accelerations `a` of a batch, `(batch, n)`.
+    ///
+    /// # Errors
+    /// As of [`terms`](Self::terms).
+    fn acceleration(&self, q: &[S], v: &[S]) -> Result<Vec<S>, MechanicsError> {
+        let mut terms = Terms::default();
+        self.terms(q, v, Request::ACCELERATION, &mut terms)?;
+        Ok(terms.acceleration)
+    }
+
+    /// Mass matrices `M = d2L/dv dv` of a batch, `(batch, n, n)`.
+    ///
+    /// # Errors
+    /// As of [`terms`](Self::terms).
+    fn mass_matrix(&self, q: &[S], v: &[S]) -> Result<Vec<S>, MechanicsError> {
+        let mut terms = Terms::default();
+        self.terms(q, v, Request::MASS_MATRIX, &mut terms)?;
+        Ok(terms.mass_matrix)
+    }
+
+    /// Momenta `p = dL/dv` of a batch, `(batch, n)`.
+    ///
+    /// # Errors
+    /// As of [`terms`](Self::terms).
+    fn momentum(&self, q: &[S], v: &[S]) -> Result<Vec<S>, MechanicsError> {
+        let mut terms = Terms::default();
+        self.terms(q, v, Request::MOMENTUM, &mut terms)?;
+        Ok(terms.momentum)
+    }
+
+    /// Energies `E = p.v - L` of a batch, `(batch)`.
+    ///
+    /// # Errors
+    /// As of [`terms`](Self::terms).
+    fn energy(&self, q: &[S], v: &[S]) -> Result<Vec<S>, MechanicsError> {
+        let mut terms = Terms::default();
+        self.terms(q, v, Request::ENERGY, &mut terms)?;
+        Ok(terms.energy)
+    }
+
     /// The metric `M = d2L/dv dv` of every state with its first and second derivatives by the coordinates, exact to rounding.
     ///
     /// `q` and `v` are `(batch, n)` in physical units. Numbers that are not finite are passed on.
     ///
     /// # Errors
     /// [`MechanicsError::Shape`]; [`MechanicsError::Derivatives`] of a model that cannot be differentiated: one that branches on its
-    /// data, or a type of one's own that leaves this method as it is.
+    /// data, or one that neither overrides this method nor wraps a model that does.
     fn metric_jets(&self, q: &[S], v: &[S]) -> Result<Vec<MetricJet<S>>, MechanicsError> {
-        let _ = (q, v);
-        Err(MechanicsError::Derivatives { what: "mass matrix" })
+        match self.inner() {
+            Some(inner) => inner.metric_jets(q, v),
+            None => Err(MechanicsError::Derivatives { what: "mass matrix" }),
+        }
     }
 
     /// The same in double-double numbers, where a model can give them at a cost that is worth it: curvature is a difference of
@@ -139,17 +199,75 @@ pub trait EulerLagrange<S: Scalar>: Send + Sync {
     /// # Errors
     /// As [`EulerLagrange::metric_jets`].
     fn wide_metric_jets(&self, q: &[S], v: &[S]) -> Result<Option<Vec<MetricJet<Dd>>>, MechanicsError> {
-        let _ = (q, v);
-        Ok(None)
+        self.inner().map_or(Ok(None), |inner| inner.wide_metric_jets(q, v))
     }
 
     /// `true` if the motion keeps the energy `E = p.v - L`: no friction, no other force beside those of `L`.
     fn conserves_energy(&self) -> bool {
-        true
+        self.inner().is_none_or(|inner| inner.conserves_energy())
     }
 
     /// `true` if several states at once take much less time per state than one, by more than threads need to meet.
     fn prefers_batches(&self) -> bool {
-        false
+        self.inner().is_some_and(|inner| inner.prefers_batches())
+    }
+}
+
+impl<S: Scalar> EulerLagrange<S> for Box<dyn EulerLagrange<S> + '_> {
+    fn coordinates(&self) -> usize {
+        (**self).coordinates()
+    }
+
+    fn terms(&self, q: &[S], v: &[S], request: Request, terms: &mut Terms<S>) -> Result<(), MechanicsError> {
+        (**self).terms(q, v, request, terms)
+    }
+
+    fn inner(&self) -> Option<&dyn EulerLagrange<S>> {
+        Some(&**self)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A model whose every method gives another answer than the default.
+    struct Odd;
+
+    impl EulerLagrange<f64> for Odd {
+        fn coordinates(&self) -> usize {
+            1
+        }
+        fn terms(&self, q: &[f64], v: &[f64], _: Request, terms: &mut Terms<f64>) -> Result<(), MechanicsError> {
+            terms.clear();
+            terms.acceleration.extend(q.iter().map(|q| -q));
+            terms.energy.extend(v.iter().map(|v| v * v));
+            Ok(())
+        }
+        fn metric_jets(&self, _: &[f64], _: &[f64]) -> Result<Vec<MetricJet<f64>>, MechanicsError> {
+            Ok(Vec::new())
+        }
+        fn wide_metric_jets(&self, _: &[f64], _: &[f64]) -> Result<Option<Vec<MetricJet<Dd>>>, MechanicsError> {
+            Ok(Some(Vec::new()))
+        }
+        fn conserves_energy(&self) -> bool {
+            false
+        }
+        fn prefers_batches(&self) -> bool {
+            true
+        }
+    }
+
+    #[test]
+    fn a_wrapper_answers_as_the_model_it_wraps() {
+        let boxed: Box<dyn EulerLagrange<f64>> = Box::new(Odd);
+        let twice: Box<dyn EulerLagrange<f64>> = Box::new(boxed);
+        for model in [&Odd as &dyn EulerLagrange<f64>, &*twice, &twice] {
+            assert_eq!(model.acceleration(&[2.0, 3.0], &[0.0, 1.0]), Ok(vec![-2.0, -3.0]));
+            assert_eq!(model.energy(&[2.0], &[3.0]), Ok(vec![9.0]));
+            assert!(model.metric_jets(&[], &[]).is_ok());
+            assert!(matches!(model.wide_metric_jets(&[], &[]), Ok(Some(_))));
+            assert!(!model.conserves_energy() && model.prefers_batches());
+        }
     }
 }

@@ -1,9 +1,9 @@
 //! Forces beside a Lagrangian: generalized forces `Q(q, v)`, or Rayleigh's dissipation, added to any model.
 
-use super::{EulerLagrange, MechanicsError, MetricJet, Request, Terms};
+use super::{EulerLagrange, MechanicsError, Request, Terms};
 use crate::forward::Dual;
 use crate::linalg::Workspace;
-use crate::scalar::{Dd, Real, Scalar};
+use crate::scalar::{Real, Scalar};
 
 /// Generalized forces that do not follow from a Lagrangian; closures `Fn(&[S], &[S], &mut [S])` of coordinates, velocities and
 /// forces are such.
@@ -115,46 +115,12 @@ impl<S: Scalar, M: EulerLagrange<S>, F: GeneralizedForce<S>> EulerLagrange<S> fo
         terms.outcome()
     }
 
-    fn metric_jets(&self, q: &[S], v: &[S]) -> Result<Vec<MetricJet<S>>, MechanicsError> {
-        self.model.metric_jets(q, v)
-    }
-
-    fn wide_metric_jets(&self, q: &[S], v: &[S]) -> Result<Option<Vec<MetricJet<Dd>>>, MechanicsError> {
-        self.model.wide_metric_jets(q, v)
+    fn inner(&self) -> Option<&dyn EulerLagrange<S>> {
+        Some(&self.model)
     }
 
     fn conserves_energy(&self) -> bool {
         false
-    }
-
-    fn prefers_batches(&self) -> bool {
-        self.model.prefers_batches()
-    }
-}
-
-impl<S: Scalar, T: EulerLagrange<S> + ?Sized> EulerLagrange<S> for Box<T> {
-    fn coordinates(&self) -> usize {
-        (**self).coordinates()
-    }
-
-    fn terms(&self, q: &[S], v: &[S], request: Request, terms: &mut Terms<S>) -> Result<(), MechanicsError> {
-        (**self).terms(q, v, request, terms)
-    }
-
-    fn metric_jets(&self, q: &[S], v: &[S]) -> Result<Vec<MetricJet<S>>, MechanicsError> {
-        (**self).metric_jets(q, v)
-    }
-
-    fn wide_metric_jets(&self, q: &[S], v: &[S]) -> Result<Option<Vec<MetricJet<Dd>>>, MechanicsError> {
-        (**self).wide_metric_jets(q, v)
-    }
-
-    fn conserves_energy(&self) -> bool {
-        (**self).conserves_energy()
-    }
-
-    fn prefers_batches(&self) -> bool {
-        (**self).prefers_batches()
     }
 }
 

@@ -75,11 +75,7 @@ impl EulerLagrange<f64> for Watched<'_> {
         self.model.terms(q, v, request, terms)
     }
 
-    fn conserves_energy(&self) -> bool {
-        self.model.conserves_energy()
-    }
-
-    fn prefers_batches(&self) -> bool {
-        self.model.prefers_batches()
+    fn inner(&self) -> Option<&dyn EulerLagrange<f64>> {
+        Some(self.model)
     }
 }

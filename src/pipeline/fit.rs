@@ -9,7 +9,7 @@ use crate::pipeline::fit_config::FitConfig;
 use crate::pipeline::fit_summary::Found;
 use crate::pipeline::hold_out::{HoldOut, HoldOutOptions, evaluate_hold_out};
 use crate::pipeline::losses::LossStates;
-use crate::pipeline::model::{header_of, trained_on};
+use crate::pipeline::model::trained_on;
 use crate::pipeline::physics::{Physics, Subject};
 use crate::pipeline::prepared_fit::PreparedFit;
 use crate::pipeline::report_files::history;
@@ -144,7 +144,7 @@ fn fit_in<S: Scalar>(
 
     // The model first, then what is small, pictures last: on a full disk nothing that comes after can lose them.
     let columns = names.iter().cloned().chain(names.iter().map(|name| format!("{name}_dot"))).collect();
-    let header = header_of(config, architecture.clone(), columns, ranges, trained.validation_loss);
+    let header = config.header(architecture.clone(), columns, ranges, trained.validation_loss);
     let header = Header { forces: named_forces(&fit_config.recording.force), ..header };
     let model = ModelFile { header, weights: trained.weights.clone() };
     write_model(output, &model)?;

@@ -3,8 +3,8 @@
 use crate::configuration::{Config, ConfigError};
 use crate::data::PrepareOptions;
 use crate::presets::{Key, Section};
-use crate::recording::Targets;
 use crate::recording::smooth::SmoothOptions;
+use crate::recording::{Columns, Targets};
 use crate::shooting::Shooting;
 use serde::{Deserialize, Serialize};
 
@@ -75,6 +75,26 @@ pub struct FitColumns {
     /// Names of all columns of files without a header.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub columns: Vec<String>,
+}
+
+impl From<&Columns> for FitColumns {
+    fn from(columns: &Columns) -> Self {
+        let Columns { coords, velocity, acceleration, force, time, rate, trajectory, periodic, units, names } =
+            columns.clone();
+        Self {
+            files: Vec::new(),
+            coords,
+            velocity,
+            acceleration,
+            force,
+            time,
+            rate,
+            trajectory,
+            periodic,
+            units: units.iter().map(|(column, unit)| format!("{column}={unit}")).collect(),
+            columns: names.unwrap_or_default(),
+        }
+    }
 }
 
 impl FitConfig {

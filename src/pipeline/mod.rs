@@ -13,8 +13,8 @@
 //! | [`merge_experiment`] | the records that several machines made | table and report |
 //!
 //! Files go into an [`Output`], of which a [`Directory`] and [`InMemory`] are two; what happens meanwhile comes as an [`Event`] to
-//! the [`Watch`], whose flag ends the work. Nothing is printed, a [`Directory`] is not locked, and files that stand where an [`Output`]
-//! writes are replaced.
+//! the [`Watch`], whose flag ends the work. Nothing is printed, a [`Directory`] is not locked (those of experiments are), and files that
+//! stand where an [`Output`] writes are replaced.
 //!
 //! # A fit of recorded motion, judged
 //!
@@ -58,11 +58,11 @@ mod error;
 mod evaluation;
 mod evaluation_tables;
 mod experiment;
-mod experiment_queue;
+mod experiment_directory;
 mod experiment_report;
-mod experiment_store;
 mod file_names;
 mod fit;
+mod fit_builder;
 mod fit_config;
 mod fit_summary;
 mod headline;
@@ -91,11 +91,12 @@ pub use error::PipelineError;
 pub use evaluation::{Evaluation, EvaluationOptions, Motion, RTOL, evaluate};
 pub(crate) use experiment::finished_record;
 pub use experiment::{finish_runs, merge_experiment, run_experiment};
+pub use experiment_directory::ExperimentDirectory;
 pub use experiment_report::{ExperimentReport, Results};
-pub use experiment_store::{ExperimentStore, RunClaim, RunOutput};
 pub use file_names::MODEL;
 pub(crate) use file_names::{CAPTIONS, RECORD};
 pub use fit::{FitReport, fit};
+pub use fit_builder::Fit;
 pub(crate) use fit_config::FIT_SECTIONS;
 pub use fit_config::{FitColumns, FitConfig, FitOptions, HELD_OUT};
 pub use hold_out::{HoldOut, HoldOutOptions, evaluate_hold_out};

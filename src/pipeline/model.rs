@@ -1,10 +1,8 @@
 //! Model files of runs: where they lie, the states they were trained on, the parameters of their systems.
 
-use crate::configuration::{Config, Precision};
 use crate::lagrangian::SystemInstance;
 use crate::lagrangian::system::Size;
-use crate::network::Architecture;
-use crate::network::file::{FORMAT, Header, StoredPrecision};
+use crate::network::file::Header;
 use crate::pipeline::{MODEL, PipelineError};
 use crate::rollout::Domain;
 use crate::scalar::Scalar;
@@ -39,33 +37,4 @@ pub(crate) fn all_parameters(system: &SystemInstance<f64>) -> BTreeMap<String, f
         parameters.insert(symbol.to_string(), system.coordinates as f64);
     }
     parameters
-}
-
-/// Header of a model's file: what was learned by a configuration from states within `ranges`, of coordinates and of velocities. It has no
-/// parameters of a system, no known forces and no description.
-pub(crate) fn header_of(
-    config: &Config,
-    architecture: Architecture,
-    columns: Vec<String>,
-    [position, velocity]: [Vec<[f64; 2]>; 2],
-    validation_loss: f64,
-) -> Header {
-    Header {
-        format: FORMAT,
-        crate_version: env!("CARGO_PKG_VERSION").to_string(),
-        architecture,
-        system: config.system.clone(),
-        parameters: BTreeMap::new(),
-        columns,
-        forces: Vec::new(),
-        description: None,
-        precision: match config.precision {
-            Precision::F32 => StoredPrecision::F32,
-            Precision::F64 => StoredPrecision::F64,
-        },
-        position,
-        velocity,
-        seed: config.seed,
-        validation_loss,
-    }
 }

@@ -11,7 +11,7 @@ use crate::network::file::{Header, ModelFile};
 use crate::network::{Architecture, Layout, NetworkLagrangian};
 use crate::pipeline::checkpoints::Checkpoints;
 use crate::pipeline::evaluation::{Evaluation, EvaluationOptions, RTOL, STARTS, evaluate};
-use crate::pipeline::model::{all_parameters, header_of, trained_on};
+use crate::pipeline::model::{all_parameters, trained_on};
 use crate::pipeline::report_files::{ended, history, parameter_table, training_pictures, write_report_and_figures};
 use crate::pipeline::{MODEL, Output, PipelineError, Watch, memory, start};
 use crate::report::Report;
@@ -265,7 +265,7 @@ fn header(
         ranges[1][i] = range;
     }
     let columns = system.system.columns(system.coordinates);
-    let header = header_of(config, architecture, columns, ranges, validation_loss);
+    let header = config.header(architecture, columns, ranges, validation_loss);
     Header { parameters, description: config.description.clone(), ..header }
 }
 

@@ -36,18 +36,27 @@ impl Preset {
     /// signature cannot be lost and, except around a centre, no weight decay and a higher clip.
     pub(crate) fn config_of(self, system: &SystemInstance<f64>, structure: Structure) -> Option<Config> {
         let mut config = self.config(system)?;
-        config.take_structure(structure);
-        if structure != Structure::BlackBox && self != Self::Paper {
-            let rate = system.system.learning.structure_rate.unwrap_or(match config.network.factor {
-                Factor::Triangle => TRIANGLE_RATE,
-                Factor::Rectangle => RATE,
-            });
-            config.phases.iter_mut().for_each(|phase| phase.rate = rate);
-            if config.data.shell.is_empty() {
-                config.optimizer = Optimizer { weight_decay: 0.0, clip: STRUCTURE_CLIP, ..config.optimizer };
-            }
+        match self {
+            Self::Paper => config.take_structure(structure),
+            Self::Quick | Self::Best => take_structure(&mut config, structure, system.system.learning.structure_rate),
         }
         Some(config)
+    }
+}
+
+/// Gives a configuration of ours a structure with the rate, weight decay and clip that suit it; `rate` overrides the first.
+pub(crate) fn take_structure(config: &mut Config, structure: Structure, rate: Option<f64>) {
+    config.take_structure(structure);
+    if structure == Structure::BlackBox {
+        return;
+    }
+    let rate = rate.unwrap_or(match config.network.factor {
+        Factor::Triangle => TRIANGLE_RATE,
+        Factor::Rectangle => RATE,
+    });
+    config.phases.iter_mut().for_each(|phase| phase.rate = rate);
+    if config.data.shell.is_empty() {
+        (config.optimizer.weight_decay, config.optimizer.clip) = (0.0, STRUCTURE_CLIP);
     }
 }
 
@@ -271,6 +280,12 @@ pub(crate) fn recorded(name: &str, [training, validation, test]: [usize; 3], ste
         phases: vec![phase(epochs, 3e-3, Vec::new(), Vec::new())],
         lbfgs: None,
     }
+}
+
+/// The quick preset for exact states of a system without a name; the numbers of states are theirs.
+pub(crate) fn of_states() -> Config {
+    let phases = vec![phase(QUICK.epochs, RATE, Vec::new(), Vec::new())];
+    Config { optimizer: optimizer(Method::Soap), phases, ..recorded("states", [1; 3], 1) }
 }
 
 /// Appendix "Training details" of Hamzaogullari and Ozakin. Its table for AdS4 lists the eigenvalue penalty, which no

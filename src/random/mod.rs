@@ -49,6 +49,8 @@ pub enum RngStream {
     Test,
     /// Starts of the trajectory test.
     Trajectories,
+    /// Division of given states into those that are learned from and those that are held out.
+    Parts,
 }
 
 impl RngStream {
@@ -60,6 +62,7 @@ impl RngStream {
             Self::Validation => 1,
             Self::Test => 2,
             Self::Trajectories => 3,
+            Self::Parts => 4,
             Self::Order(phase) => 16 + 2 * phase as u64,
             Self::Training(phase) => 17 + 2 * phase as u64,
         });

@@ -108,8 +108,8 @@ impl<S: Scalar> EulerLagrange<S> for Member<'_, '_, S> {
         self.group.model.coordinates()
     }
 
-    fn conserves_energy(&self) -> bool {
-        self.group.model.conserves_energy()
+    fn inner(&self) -> Option<&dyn EulerLagrange<S>> {
+        Some(self.group.model)
     }
 
     fn terms(&self, q: &[S], v: &[S], request: Request, terms: &mut Terms<S>) -> Result<(), MechanicsError> {

@@ -46,7 +46,7 @@ pub use ode::Integrable;
 pub use options::{Domain, Method, Options};
 #[doc(hidden)]
 pub use pieces::{Balances, Ending, rollout_in_pieces};
-pub use run::{Rollout, rollout, rollout_fixed};
+pub use run::{Motion, Rollout, rollout, rollout_fixed};
 pub use trajectory::{Statistics, Trajectory};
 
 #[cfg(test)]

@@ -36,6 +36,32 @@ impl<S: Scalar> Rollout<S> {
     }
 }
 
+/// Roll-outs as a method of every model.
+///
+/// ```
+/// use lnn::prelude::*;
+///
+/// let planet = lnn::lagrangian::build::<f64>("kepler", &[])?;
+/// let motion = planet.rollout(&[1.0, 0.0], &[0.0, 1.1], 10.0, 0.1)?; // 10 s, a sample every 0.1 s
+/// let energy = motion.energy.unwrap();
+/// assert!(motion.t.len() == 101 && (energy[100] - energy[0]).abs() < 1e-4);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub trait Motion<S: Integrable>: EulerLagrange<S> {
+    /// The motion from `(q, v)` at time 0, sampled every `dt` until `t_end`, by the adaptive method of [`Options::new`] with its
+    /// tolerances; [`rollout`] takes other options and keeps what was reached before a failure.
+    ///
+    /// # Errors
+    /// The reason for which the motion ended before `t_end`.
+    fn rollout(&self, q: &[S], v: &[S], t_end: S, dt: S) -> Result<Trajectory<S>, RolloutError>;
+}
+
+impl<S: Integrable, M: EulerLagrange<S>> Motion<S> for M {
+    fn rollout(&self, q: &[S], v: &[S], t_end: S, dt: S) -> Result<Trajectory<S>, RolloutError> {
+        rollout(self, q, v, &Options::new(t_end, dt)).complete()
+    }
+}
+
 /// Integrates `dq/dt = v`, `dv/dt = a(q, v)` from `(q, v)` at `options.t0` and samples it at `t0 + k dt` and `t_end`.
 ///
 /// `q` and `v` have length `n` and are in physical units. The domain is checked at every state that is evaluated, the

@@ -194,12 +194,8 @@ impl<S: Scalar, M: EulerLagrange<S>> EulerLagrange<S> for Canonical<M, S> {
         Ok(self.model.wide_metric_jets(q, v)?.map(|jets| scaled(jets, self.form.factor.cast())))
     }
 
-    fn conserves_energy(&self) -> bool {
-        self.model.conserves_energy()
-    }
-
-    fn prefers_batches(&self) -> bool {
-        self.model.prefers_batches()
+    fn inner(&self) -> Option<&dyn EulerLagrange<S>> {
+        Some(&self.model)
     }
 }
 

@@ -1,0 +1,194 @@
+//! A fit of recorded motion in one expression: files and columns, the choices that matter, the result.
+
+use crate::configuration::Precision;
+use crate::network::Structure;
+use crate::pipeline::fit::{FitReport, fit};
+use crate::pipeline::fit_config::{FitColumns, FitConfig, FitOptions};
+use crate::pipeline::prepared_fit::PreparedFit;
+use crate::pipeline::train::RunOptions;
+use crate::pipeline::{Directory, InMemory, Output, PipelineError, Watch};
+use crate::recording::read::read_recording;
+use crate::recording::{Columns, LoadedRecording, Recording, Targets};
+use std::path::PathBuf;
+
+/// Units of a learned dissipation.
+const FRICTION_UNITS: usize = 16;
+
+/// A fit of recorded motion.
+///
+/// Every choice has the default of `lnn fit`: if unsure, leave it. [`PreparedFit`] and [`fit`] are the two steps behind it.
+///
+/// ```
+/// use lnn::prelude::*;
+///
+/// let angles = ["theta1", "theta2"];
+/// let fit = Fit::new("examples/data/pendulum.csv").coordinates(angles).angles(angles).trajectory("run").friction(true);
+/// let fit = fit.configure(|config| {
+///     config.training.network.hidden = vec![8]; // as small as can be: this runs in a moment
+///     config.training.phases[0].epochs = 2;
+/// });
+/// let fitted = fit.run()?;
+/// println!("{}", fitted.text());
+/// assert!(fitted.hold_out.model[0].median.is_finite());
+/// let a = fitted.network.acceleration(&[0.3, 0.1], &[0.0, 0.0])?;
+/// # assert!(a[0].is_finite());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct Fit {
+    source: Source,
+    columns: Columns,
+    options: FitOptions,
+    change: Box<dyn FnOnce(&mut FitConfig)>,
+    friction: bool,
+    structure: Option<Structure>,
+    precision: Precision,
+    threads: usize,
+    out: Option<PathBuf>,
+    watch: Watch,
+}
+
+/// Origin of the motion.
+enum Source {
+    Files(Vec<PathBuf>),
+    Memory(Box<LoadedRecording>),
+}
+
+impl Fit {
+    /// A fit of a file: CSV, NPY or NPZ.
+    pub fn new(file: impl Into<PathBuf>) -> Self {
+        Self::of(Source::Files(vec![file.into()]))
+    }
+
+    /// A fit of several files, each of which holds at least a trajectory.
+    pub fn files(files: impl IntoIterator<Item = impl Into<PathBuf>>) -> Self {
+        Self::of(Source::Files(files.into_iter().map(Into::into).collect()))
+    }
+
+    /// A fit of motion in memory, which says itself what its coordinates are.
+    pub fn recording(recording: Recording) -> Self {
+        Self::of(Source::Memory(Box::new(LoadedRecording::from(recording))))
+    }
+
+    fn of(source: Source) -> Self {
+        Self {
+            source,
+            columns: Columns::default(),
+            options: FitOptions::default(),
+            change: Box::new(|_| {}),
+            friction: false,
+            structure: None,
+            precision: Precision::F32,
+            threads: 1,
+            out: None,
+            watch: Watch::default(),
+        }
+    }
+
+    /// Columns of the coordinates.
+    pub fn coordinates<const N: usize>(mut self, names: [&str; N]) -> Self {
+        self.columns.coords = names.map(String::from).to_vec();
+        self
+    }
+
+    /// Coordinates that are angles in rad.
+    pub fn angles<const N: usize>(mut self, names: [&str; N]) -> Self {
+        self.columns.periodic = names.map(String::from).to_vec();
+        self
+    }
+
+    /// Columns of known forces, one per coordinate, in N or N m.
+    pub fn forces<const N: usize>(mut self, names: [&str; N]) -> Self {
+        self.columns.force = names.map(String::from).to_vec();
+        self
+    }
+
+    /// Column whose value tells the trajectories of a file apart.
+    pub fn trajectory(mut self, column: &str) -> Self {
+        self.columns.trajectory = Some(column.to_string());
+        self
+    }
+
+    /// Changes what else is said of the columns: times, units, measured velocities.
+    pub fn columns(mut self, change: impl FnOnce(&mut Columns)) -> Self {
+        change(&mut self.columns);
+        self
+    }
+
+    /// Learns a friction beside the Lagrangian.
+    pub fn friction(self, friction: bool) -> Self {
+        Self { friction, ..self }
+    }
+
+    /// Builds the signature of the mass matrix in.
+    pub fn structure(self, structure: Structure) -> Self {
+        Self { structure: Some(structure), ..self }
+    }
+
+    /// Seed of the weights and of held-out trajectories.
+    pub fn seed(mut self, seed: u64) -> Self {
+        self.options.seed = seed;
+        self
+    }
+
+    /// Quantities to learn from, in place of those that the data advise.
+    pub fn targets(mut self, targets: Targets) -> Self {
+        self.options.targets = Some(targets);
+        self
+    }
+
+    /// Precision of weights and arithmetic in training.
+    pub fn precision(self, precision: Precision) -> Self {
+        Self { precision, ..self }
+    }
+
+    /// Threads; results do not depend on them.
+    pub fn threads(self, threads: usize) -> Self {
+        Self { threads, ..self }
+    }
+
+    /// Directory for model, tables, pictures and report, created if need be; without one nothing is written.
+    pub fn out(self, directory: impl Into<PathBuf>) -> Self {
+        Self { out: Some(directory.into()), ..self }
+    }
+
+    /// Receiver of progress and remarks, with a flag that ends the fit.
+    pub fn watch(self, watch: Watch) -> Self {
+        Self { watch, ..self }
+    }
+
+    /// Changes any other choice of the [`FitConfig`] that suits the data.
+    pub fn configure(self, change: impl FnOnce(&mut FitConfig) + 'static) -> Self {
+        Self { change: Box::new(change), ..self }
+    }
+
+    /// Reads, learns, and judges by held-out motion.
+    ///
+    /// # Errors
+    /// [`PipelineError::Data`] for files that are not as said; as of [`PreparedFit::new`] and [`fit`].
+    pub fn run(self) -> Result<FitReport, PipelineError> {
+        let Self { source, columns, options, change, friction, structure, precision, threads, out, watch } = self;
+        let (loaded, files) = match source {
+            Source::Files(files) => (read_recording(&files, &columns)?, files),
+            Source::Memory(loaded) => (*loaded, Vec::new()),
+        };
+        let stem = files.first().and_then(|file| file.file_stem());
+        let name = stem.map_or("recorded".to_string(), |stem| stem.to_string_lossy().into_owned());
+        let prepared = PreparedFit::new(&loaded, &options)?;
+        let mut config = prepared.suggest(&name, precision)?;
+        config.recording = FitColumns {
+            files: files.iter().map(|file| file.display().to_string()).collect(),
+            ..FitColumns::from(&columns)
+        };
+        config.training.network.dissipation = friction.then_some(FRICTION_UNITS);
+        if let Some(structure) = structure {
+            config.training.take_structure(structure);
+        }
+        change(&mut config);
+        let options = RunOptions { threads, ..RunOptions::default() };
+        let output: Box<dyn Output> = match &out {
+            Some(path) => Box::new(Directory::create(path)?),
+            None => Box::new(InMemory::default()),
+        };
+        fit(&prepared, &config, &options, output.as_ref(), &watch)
+    }
+}
