@@ -101,7 +101,8 @@ impl Split {
             // Positions and velocities as measured belong to accelerations as measured.
             let complete = measured && !track.v.is_empty();
             let rows = if complete { 0..track.len() } else { states.interior() };
-            rows.step_by(stride).map(move |row| Row { track, states, row, measured })
+            let rows = rows.step_by(stride).filter(move |row| complete || states.is_full(*row));
+            rows.map(move |row| Row { track, states, row, measured })
         })
     }
 
@@ -161,18 +162,34 @@ impl RecordingSplit {
     /// # Errors
     /// [`RecordingSplitError`].
     pub fn new(recording: &Recording, preparation: &PrepareOptions) -> Result<Self, RecordingSplitError> {
+        let takes: Vec<usize> = (0..recording.tracks.len()).collect();
+        Self::of_takes(recording, &takes, preparation)
+    }
+
+    /// The same for trajectories of which some belong together: `takes` has the number of the take of each, see
+    /// [`LoadedRecording::takes`](crate::recording::LoadedRecording::takes).
+    ///
+    /// # Errors
+    /// [`RecordingSplitError`].
+    pub fn of_takes(
+        recording: &Recording,
+        takes: &[usize],
+        preparation: &PrepareOptions,
+    ) -> Result<Self, RecordingSplitError> {
         let PrepareOptions { smoothing: options, held_out: share, most_states, seed } = preparation;
         let (alone, smoothing) = plan(recording, options)?;
         if let Some((i, how)) = (0..recording.n()).find_map(|i| Some((i, stillness(recording, i, &alone)?))) {
             return Err(RecordingSplitError::Motionless { coordinate: recording.coordinates[i].clone(), how });
         }
-        let divide = |recording: &Recording, share: f64| {
-            let held_out = HeldOut::choose(recording, share, smoothing.window(), *seed)?;
+        let divide = |recording: &Recording, takes: &[usize], share: f64| {
+            let held_out = HeldOut::choose(recording, takes, share, smoothing.window(), *seed)?;
             let (rest, held) = held_out.divide(recording);
             Ok::<_, HoldOutError>((held_out, rest, held))
         };
-        let (held_out, rest, test) = divide(recording, *share)?;
-        let (training, validation) = match divide(&rest, share / 2.0) {
+        let (held_out, rest, test) = divide(recording, takes, *share)?;
+        let kept = takes.iter().enumerate().filter(|(k, _)| !held_out.has_track(*k));
+        let kept: Vec<usize> = kept.map(|(_, take)| *take).collect();
+        let (training, validation) = match divide(&rest, &kept, share / 2.0) {
             Ok((HeldOut::Nothing, ..)) => (rest.clone(), rest),
             Ok((_, training, validation)) => (training, validation),
             Err(_) => (rest, test.clone()),
