@@ -18,7 +18,7 @@ use crate::recording::{RecordedTrajectory, Recording};
 use local_fit::Estimate;
 use noise::along;
 use pace::Usual;
-use signal::{Rows, Signal};
+use signal::{Fits, Signal};
 use thiserror::Error;
 
 /// Settings of derivatives; those that are not given are chosen from the data.
@@ -290,14 +290,14 @@ const STRETCHED: f64 = 1.5;
 fn smooth(Usual { signal, sigmas, .. }: &Usual<'_>, windows: &[usize], smoothed: &mut Smoothed) {
     let (times, clock, n, i) = (&signal.tracks[0].times, &signal.clocks[0], signal.n, signal.i);
     let length = times.len();
-    let mut rows = Rows::default();
+    let mut fits = Fits::default();
     // Squared change by two more degrees without the part of it that noise explains, in units of the noise.
     let mut excess: [Vec<f64>; 3] = std::array::from_fn(|_| vec![0.0; length]);
     let full: Vec<bool> = (0..length).map(|at| clock.surrounds(times, at, windows[at]) == [true; 2]).collect();
     for (at, &window) in windows.iter().enumerate() {
         let range = signal.window(0, at, window);
-        let usual = (full[at] && !clock.even).then(|| signal.even_variance(&mut rows, 0, window));
-        let fit = signal.fit(&mut rows, 0, range.clone(), (at, window));
+        let usual = (full[at] && !clock.even).then(|| signal.even_variance(&mut fits, 0, window));
+        let fit = signal.fit(&mut fits, 0, range.clone(), (at, window));
         if let Some(usual) = usual {
             let stretched = times[range.end - 1] - times[range.start] > STRETCHED * (window - 1) as f64 * clock.step;
             if stretched || fit.variance[2] > LACKING * usual {

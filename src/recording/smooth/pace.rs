@@ -1,6 +1,6 @@
 //! Windows that vary along a trajectory: shorter where the motion is fast, longer where it is slow.
 
-use crate::recording::smooth::signal::{Rows, Signal};
+use crate::recording::smooth::signal::{Fits, Signal};
 use crate::recording::smooth::window::Missed;
 
 /// Factors of a coordinate's usual window that are tried: `2^(k/3)`.
@@ -49,11 +49,11 @@ impl Tried {
             return None;
         }
         let (half, stride) = (window / 2, (window / PLACES).max(1));
-        let mut rows = Rows::default();
+        let mut fits = Fits::default();
         let (mut excess, mut variance) = (Vec::new(), Vec::new());
         for at in (half..track.len() - half).step_by(stride) {
             let range = signal.window(0, at, window);
-            let fit = signal.fit(&mut rows, 0, range.clone(), (at, window));
+            let fit = signal.fit(&mut fits, 0, range.clone(), (at, window));
             let change = signal.estimate(fit, 0, range, at).changes[2];
             let noise = sigmas[at] * sigmas[at];
             excess.push(change * change - noise * fit.change_variance[2]);

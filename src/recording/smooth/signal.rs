@@ -28,9 +28,9 @@ pub struct Signal<'a> {
     pub degree: usize,
 }
 
-/// Rows of local polynomials on one trajectory: those of full windows of equal steps are the same everywhere, and computed once.
+/// Fits of local polynomials on one trajectory: those of full windows of equal steps are the same everywhere, and computed once.
 #[derive(Default)]
-pub struct Rows {
+pub struct Fits {
     centred: BTreeMap<usize, LocalFit>,
     elsewhere: LocalFit,
 }
@@ -45,7 +45,7 @@ impl Signal<'_> {
     /// The rows of the samples `range`, a window of `window` usual steps, evaluated at sample `at`.
     pub fn fit<'r>(
         &self,
-        rows: &'r mut Rows,
+        fits: &'r mut Fits,
         track: usize,
         range: Range<usize>,
         (at, window): (usize, usize),
@@ -54,19 +54,19 @@ impl Signal<'_> {
         let centred = range.len() == window && at == range.start + window / 2;
         let compute = |fit: &mut LocalFit, times: &[f64], at: f64| fit.compute(times, at, self.degree, self.ratio);
         if centred && clock.is_even_over(&times[range.clone()]) {
-            return rows.centred.entry(window).or_insert_with(|| {
+            return fits.centred.entry(window).or_insert_with(|| {
                 let mut fit = LocalFit::default();
                 compute(&mut fit, &times[range], times[at]);
                 fit
             });
         }
-        compute(&mut rows.elsewhere, &times[range], times[at]);
-        &rows.elsewhere
+        compute(&mut fits.elsewhere, &times[range], times[at]);
+        &fits.elsewhere
     }
 
     /// Variance of the acceleration for noise of variance 1 in a full window of equal steps.
-    pub fn even_variance(&self, rows: &mut Rows, track: usize, window: usize) -> f64 {
-        let fit = rows.centred.entry(window).or_insert_with(|| {
+    pub fn even_variance(&self, fits: &mut Fits, track: usize, window: usize) -> f64 {
+        let fit = fits.centred.entry(window).or_insert_with(|| {
             let times: Vec<f64> = (0..window).map(|k| k as f64 * self.clocks[track].step).collect();
             let mut fit = LocalFit::default();
             fit.compute(&times, times[window / 2], self.degree, self.ratio);
@@ -95,14 +95,14 @@ impl Signal<'_> {
     ) -> f64 {
         let total: usize = self.tracks.iter().map(RecordedTrajectory::len).sum();
         let centres = CENTRES.min(total);
-        let mut rows = Rows::default();
+        let mut fits = Fits::default();
         let (mut number, mut start, mut visited) = (0, 0, 0);
         for c in 0..centres {
             let place = (2 * c + 1) * total / (2 * centres);
             while place >= start + self.tracks[number].len() {
                 start += self.tracks[number].len();
                 number += 1;
-                rows = Rows::default();
+                fits = Fits::default();
             }
             let (track, window) = (&self.tracks[number], length(number));
             if track.len() < self.degree + 3 {
@@ -110,7 +110,7 @@ impl Signal<'_> {
             }
             let Some(at) = self.clocks[number].centre(&track.times, place - start, window) else { continue };
             let range = self.window(number, at, window);
-            let fit = self.fit(&mut rows, number, range.clone(), (at, window));
+            let fit = self.fit(&mut fits, number, range.clone(), (at, window));
             visit(&self.estimate(fit, number, range, at), fit, number, at);
             visited += 1;
         }

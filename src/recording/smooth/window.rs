@@ -193,13 +193,16 @@ impl Signal<'_> {
                 sums.change_variance += noise * fit.change_variance[2];
             },
         );
+        if share < 0.5 {
+            return false;
+        }
         for ((sums, course), track) in sums.iter().zip(courses).zip(self.tracks).filter(|((s, _), _)| s.count > 0.0) {
             let [variance, square, change] = [sums.variance, sums.square, sums.change_variance].map(|x| x / sums.count);
             // Neighbours within half a window have the same errors.
             let independent = sums.count.min(2.0 * track.len() as f64 / window as f64);
             course.push(variance, square - change, change, independent);
         }
-        share >= 0.5
+        true
     }
 
     /// Mean over the samples of the logarithm of the squared error by window number `k`.

@@ -7,7 +7,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use std::f64::consts::TAU;
 
-const SIGMA: f64 = 1e-3;
+const SIGMA: f64 = 5e-3;
 const STEP: f64 = 0.01;
 const SAMPLES: usize = 201;
 const RUNS: usize = 40;
@@ -33,7 +33,7 @@ fn derivative(torques: &Torques, t: f64, [_, q2, v1, v2]: [f64; 4]) -> [f64; 4] 
 fn runs() -> Vec<(RecordedTrajectory, Vec<f64>)> {
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     let mut run = |number: usize| {
-        let pace = rng.random_range(0.5..2.5);
+        let pace = rng.random_range(0.5..4.0);
         let torques: Torques = [2.0, 0.25].map(|size| {
             std::array::from_fn(|_| {
                 let [size, f] = [size * pace * pace * rng.random_range(0.3..1.0), pace * rng.random_range(0.3..1.5)];
