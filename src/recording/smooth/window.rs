@@ -1,7 +1,6 @@
 //! Length of the window: as long as noise demands, as short as the motion allows.
 
 use crate::recording::RecordedTrajectory;
-use crate::recording::smooth::local_fit::LocalFit;
 use crate::recording::smooth::signal::Signal;
 use serde::Serialize;
 
