@@ -108,9 +108,8 @@ impl Clock {
         let mut first = times.partition_point(|t| *t < from).min(at);
         let mut end = times.partition_point(|t| *t <= from + width).max(at + 1);
         while end - first < least.min(length) {
-            let before = first.checked_sub(1).map_or(f64::INFINITY, |k| times[at] - times[k]);
-            let after = times.get(end).map_or(f64::INFINITY, |t| t - times[at]);
-            if before <= after { first -= 1 } else { end += 1 }
+            let nearer = || times[at] - times[first - 1] <= times[end] - times[at];
+            if end == length || (first > 0 && nearer()) { first -= 1 } else { end += 1 }
         }
         first..end
     }

@@ -95,7 +95,8 @@ fn turns(track: &RecordedTrajectory, periodic: &[bool], clock: &Clock, k: usize)
             (Some(a), Some(b)) => 0.5 * (a + b) * gap,
             (a, b) => a.or(b)? * gap,
         };
-        Some(((way - (track.q[(k + 1) * n + i] - track.q[k * n + i])) / TAU).round())
+        let turns = ((way - (track.q[(k + 1) * n + i] - track.q[k * n + i])) / TAU).round();
+        turns.is_finite().then_some(turns)
     };
     (0..n).map(of).collect()
 }
