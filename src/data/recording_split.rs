@@ -98,11 +98,18 @@ impl Split {
         let stride = self.recording.samples().div_ceil(most.max(1)).max(1);
         self.recording.tracks.iter().zip(&self.states).flat_map(move |(track, states)| {
             let measured = targets == Targets::Measured && !track.a.is_empty();
-            // Positions and velocities as measured belong to accelerations as measured.
-            let complete = measured && !track.v.is_empty();
+            let complete = is_complete(track, targets);
             let rows = if complete { 0..track.len() } else { states.interior() };
             let rows = rows.step_by(stride).filter(move |row| complete || states.is_full(*row));
             rows.map(move |row| Row { track, states, row, measured })
+        })
+    }
+
+    /// Samples that are not learned from: those at the ends of trajectories, and those near gaps, without full windows.
+    pub(crate) fn left_out(&self, targets: Targets) -> [usize; 2] {
+        let derived = self.recording.tracks.iter().zip(&self.states).filter(|(track, _)| !is_complete(track, targets));
+        derived.fold([0; 2], |[ends, gaps], (track, states)| {
+            [ends + track.len() - states.interior().len(), gaps + states.lacking.len()]
         })
     }
 
@@ -122,7 +129,7 @@ impl Split {
         let n = self.recording.n();
         let (mut q, mut v, mut a, mut force) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         for Row { track, states, row, measured } in self.rows(targets, most) {
-            let complete = measured && !track.v.is_empty();
+            let complete = is_complete(track, targets);
             let row = row * n..(row + 1) * n;
             let of = |values: &[f64]| values[row.clone()].iter().map(|&x| S::of_f64(x)).collect::<Vec<S>>();
             let position = of(if complete { &track.q } else { &states.q });
@@ -136,6 +143,11 @@ impl Split {
         let data = Dataset::new(n, q, v, a)?;
         if force.is_empty() { Ok(data) } else { data.with_forces(force) }
     }
+}
+
+/// `true` if nothing has to be derived: positions and velocities as measured belong to accelerations as measured.
+fn is_complete(track: &RecordedTrajectory, targets: Targets) -> bool {
+    targets == Targets::Measured && !track.a.is_empty() && !track.v.is_empty()
 }
 
 /// Recorded motion, ready to learn from.
@@ -171,7 +183,7 @@ impl RecordingSplit {
     ///
     /// # Errors
     /// [`RecordingSplitError`].
-    pub fn of_takes(
+    pub(crate) fn of_takes(
         recording: &Recording,
         takes: &[usize],
         preparation: &PrepareOptions,

@@ -149,7 +149,7 @@ impl<'a, S: Scalar> Found<'a, S> {
             targets: prepared.targets,
             trajectories: parts.map(|part| part.recording.tracks.len()),
             samples: parts.map(|part| part.recording.samples()),
-            time_steps: TimeSteps::new(prepared.reading, &measured.training),
+            time_steps: TimeSteps::new(prepared.reading, &measured.training, prepared.targets),
             held_out: &measured.held_out,
             coordinates: self.coordinates(),
             epochs: trained.history.len(),

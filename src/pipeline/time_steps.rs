@@ -2,7 +2,7 @@
 
 use crate::data::Split;
 use crate::names::{counted, percent};
-use crate::recording::{Bridged, Clock, LoadedRecording};
+use crate::recording::{Bridged, Clock, LoadedRecording, Targets};
 use serde::Serialize;
 
 /// Part of `summary.json`.
@@ -29,15 +29,12 @@ struct LeftOut {
 }
 
 impl TimeSteps {
-    /// Of a recording whose part `training` is learned from.
-    pub fn new(reading: &LoadedRecording, training: &Split) -> Self {
+    /// Of a recording whose part `training` is learned from by these targets.
+    pub fn new(reading: &LoadedRecording, training: &Split, targets: Targets) -> Self {
         let jitter = reading.recording.tracks.iter().map(|track| Clock::of(&track.times).jitter());
-        let ends = training.states.iter().map(|states| states.times.len() - states.interior().len());
-        let left_out = LeftOut {
-            between_gaps: reading.dropped.iter().map(|part| part.samples).sum(),
-            at_ends: ends.sum(),
-            near_gaps: training.states.iter().map(|states| states.lacking.len()).sum(),
-        };
+        let [at_ends, near_gaps] = training.left_out(targets);
+        let left_out =
+            LeftOut { between_gaps: reading.dropped.iter().map(|part| part.samples).sum(), at_ends, near_gaps };
         Self { bridged: reading.bridged, cuts: reading.cuts.len(), jitter: jitter.fold(0.0, f64::max), left_out }
     }
 
