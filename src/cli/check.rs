@@ -176,6 +176,12 @@ fn left_out(text: &mut String, found: &Survey) -> std::fmt::Result {
         let rows = counted(found.duplicates, "row that repeats", "rows that repeat");
         writeln!(text, "left out: {rows} the row before")?;
     }
+    if found.bridged.gaps > 0 {
+        let gaps = counted(found.bridged.gaps, "short gap", "short gaps");
+        let rows = counted(found.bridged.rows, "row is", "rows are");
+        let most = found.bridged.longest;
+        writeln!(text, "{gaps}: {rows} missing, at most {most} in one; trajectories go on across them")?;
+    }
     for cut in found.cuts.iter().take(LINES) {
         let (seconds, steps) = (short(cut.seconds), short(cut.steps));
         writeln!(

@@ -98,10 +98,18 @@ impl Split {
         let stride = self.recording.samples().div_ceil(most.max(1)).max(1);
         self.recording.tracks.iter().zip(&self.states).flat_map(move |(track, states)| {
             let measured = targets == Targets::Measured && !track.a.is_empty();
-            // Positions and velocities as measured belong to accelerations as measured.
-            let complete = measured && !track.v.is_empty();
+            let complete = is_complete(track, targets);
             let rows = if complete { 0..track.len() } else { states.interior() };
-            rows.step_by(stride).map(move |row| Row { track, states, row, measured })
+            let rows = rows.step_by(stride).filter(move |row| complete || states.is_full(*row));
+            rows.map(move |row| Row { track, states, row, measured })
+        })
+    }
+
+    /// Samples that are not learned from: those at the ends of trajectories, and those near gaps, without full windows.
+    pub(crate) fn left_out(&self, targets: Targets) -> [usize; 2] {
+        let derived = self.recording.tracks.iter().zip(&self.states).filter(|(track, _)| !is_complete(track, targets));
+        derived.fold([0; 2], |[ends, gaps], (track, states)| {
+            [ends + track.len() - states.interior().len(), gaps + states.lacking.len()]
         })
     }
 
@@ -121,7 +129,7 @@ impl Split {
         let n = self.recording.n();
         let (mut q, mut v, mut a, mut force) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         for Row { track, states, row, measured } in self.rows(targets, most) {
-            let complete = measured && !track.v.is_empty();
+            let complete = is_complete(track, targets);
             let row = row * n..(row + 1) * n;
             let of = |values: &[f64]| values[row.clone()].iter().map(|&x| S::of_f64(x)).collect::<Vec<S>>();
             let position = of(if complete { &track.q } else { &states.q });
@@ -135,6 +143,11 @@ impl Split {
         let data = Dataset::new(n, q, v, a)?;
         if force.is_empty() { Ok(data) } else { data.with_forces(force) }
     }
+}
+
+/// `true` if nothing has to be derived: positions and velocities as measured belong to accelerations as measured.
+fn is_complete(track: &RecordedTrajectory, targets: Targets) -> bool {
+    targets == Targets::Measured && !track.a.is_empty() && !track.v.is_empty()
 }
 
 /// Recorded motion, ready to learn from.
@@ -161,18 +174,34 @@ impl RecordingSplit {
     /// # Errors
     /// [`RecordingSplitError`].
     pub fn new(recording: &Recording, preparation: &PrepareOptions) -> Result<Self, RecordingSplitError> {
+        let takes: Vec<usize> = (0..recording.tracks.len()).collect();
+        Self::of_takes(recording, &takes, preparation)
+    }
+
+    /// The same for trajectories of which some belong together: `takes` has the number of the take of each, see
+    /// [`LoadedRecording::takes`](crate::recording::LoadedRecording::takes).
+    ///
+    /// # Errors
+    /// [`RecordingSplitError`].
+    pub(crate) fn of_takes(
+        recording: &Recording,
+        takes: &[usize],
+        preparation: &PrepareOptions,
+    ) -> Result<Self, RecordingSplitError> {
         let PrepareOptions { smoothing: options, held_out: share, most_states, seed } = preparation;
         let (alone, smoothing) = plan(recording, options)?;
         if let Some((i, how)) = (0..recording.n()).find_map(|i| Some((i, stillness(recording, i, &alone)?))) {
             return Err(RecordingSplitError::Motionless { coordinate: recording.coordinates[i].clone(), how });
         }
-        let divide = |recording: &Recording, share: f64| {
-            let held_out = HeldOut::choose(recording, share, smoothing.window(), *seed)?;
+        let divide = |recording: &Recording, takes: &[usize], share: f64| {
+            let held_out = HeldOut::choose(recording, takes, share, smoothing.window(), *seed)?;
             let (rest, held) = held_out.divide(recording);
             Ok::<_, HoldOutError>((held_out, rest, held))
         };
-        let (held_out, rest, test) = divide(recording, *share)?;
-        let (training, validation) = match divide(&rest, share / 2.0) {
+        let (held_out, rest, test) = divide(recording, takes, *share)?;
+        let kept = takes.iter().enumerate().filter(|(k, _)| !held_out.has_track(*k));
+        let kept: Vec<usize> = kept.map(|(_, take)| *take).collect();
+        let (training, validation) = match divide(&rest, &kept, share / 2.0) {
             Ok((HeldOut::Nothing, ..)) => (rest.clone(), rest),
             Ok((_, training, validation)) => (training, validation),
             Err(_) => (rest, test.clone()),

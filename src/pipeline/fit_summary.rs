@@ -7,6 +7,7 @@ use crate::pipeline::hold_out::HoldOut;
 use crate::pipeline::physics::Physics;
 use crate::pipeline::prepared_fit::PreparedFit;
 use crate::pipeline::report_files::{ended, training_pictures, write_report_and_figures};
+use crate::pipeline::time_steps::TimeSteps;
 use crate::pipeline::{Output, PipelineError, headline};
 use crate::recording::{HeldOut, Recording, Targets};
 use crate::report::{Report, text_table};
@@ -39,6 +40,7 @@ struct Summary<'a> {
     targets: Targets,
     trajectories: [usize; 3],
     samples: [usize; 3],
+    time_steps: TimeSteps,
     held_out: &'a HeldOut,
     coordinates: Vec<Coordinate>,
     epochs: usize,
@@ -147,6 +149,7 @@ impl<'a, S: Scalar> Found<'a, S> {
             targets: prepared.targets,
             trajectories: parts.map(|part| part.recording.tracks.len()),
             samples: parts.map(|part| part.recording.samples()),
+            time_steps: TimeSteps::new(prepared.reading, &measured.training, prepared.targets),
             held_out: &measured.held_out,
             coordinates: self.coordinates(),
             epochs: trained.history.len(),
@@ -204,9 +207,10 @@ impl Summary<'_> {
             }
         };
         let mut text = format!(
-            "learned from {way}: {} of {}\n{judged}\n\n",
+            "learned from {way}: {} of {}\n{}{judged}\n\n",
             counted(training, "sample", "samples"),
-            counted(self.trajectories[0], "trajectory", "trajectories")
+            counted(self.trajectories[0], "trajectory", "trajectories"),
+            self.time_steps.text()
         );
         // Writing to a string cannot fail.
         let row = |c: &Coordinate| {

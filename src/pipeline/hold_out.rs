@@ -28,7 +28,8 @@ const POINTS: usize = 40;
 pub struct HoldOutOptions<'a> {
     /// Motion that the model has not seen.
     pub part: &'a Split,
-    /// Time over which it is predicted, in s; none for 200 samples, at most a quarter of the shortest trajectory.
+    /// Time over which it is predicted, in s; none for 200 samples, at most a quarter of the shortest trajectory, pieces much shorter
+    /// than the others left aside.
     pub horizon: Option<f64>,
     /// The time-like coordinate, if there is one.
     pub time: Option<usize>,
@@ -134,14 +135,23 @@ const EXAMPLE_CAPTION: &str = "The first held-out window: measured, and predicte
 const FORCE_CAPTION: &str =
     "Known forces in the first held-out window; the prediction takes them as linear between the samples.";
 
-/// A quarter of the shortest trajectory, at most [`AHEAD`] samples.
+/// A quarter of the shortest of the long trajectories, at most [`AHEAD`] samples. Half the time belongs to trajectories of a length or
+/// longer ones; long is half as much: pieces between gaps do not shorten the horizon of the others.
 fn horizon(part: &Split) -> f64 {
-    let spans = part.states.iter().filter_map(|states| {
-        let times = &states.times[states.interior()];
-        let span = times.last()? - times.first()?;
-        Some((0.25 * span).min(AHEAD * span / (times.len() - 1).max(1) as f64))
+    let times = part.states.iter().map(|states| &states.times[states.interior()]);
+    let mut spans: Vec<(f64, usize)> =
+        times.filter_map(|times| Some((times.last()? - times.first()?, times.len() - 1))).collect();
+    spans.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let half = 0.5 * spans.iter().map(|(span, _)| span).sum::<f64>();
+    let mut sum = 0.0;
+    let usual = spans.iter().find(|(span, _)| {
+        sum += span;
+        sum >= half
     });
-    spans.fold(f64::INFINITY, f64::min)
+    let long = usual.map_or(0.0, |(span, _)| 0.5 * span);
+    let horizons = spans.iter().filter(|(span, _)| *span >= long);
+    let horizons = horizons.map(|(span, steps)| (0.25 * span).min(AHEAD * span / (*steps).max(1) as f64));
+    horizons.fold(f64::INFINITY, f64::min)
 }
 
 /// The picture, unless there is nothing to show.

@@ -80,6 +80,7 @@ mod readings;
 mod report_files;
 mod run_figures;
 mod start;
+mod time_steps;
 mod train;
 mod watch;
 

@@ -30,7 +30,7 @@ impl<'a> PreparedFit<'a> {
     /// ones are asked for and there are none.
     pub fn new(reading: &'a LoadedRecording, options: &FitOptions) -> Result<Self, PipelineError> {
         let started = Instant::now();
-        let measured = RecordingSplit::new(&reading.recording, &options.preparation())?;
+        let measured = RecordingSplit::of_takes(&reading.recording, &reading.takes, &options.preparation())?;
         let targets = options.targets.unwrap_or_else(|| measured.advice());
         if targets == Targets::Measured && !measured.training.recording.has_accelerations() {
             return Err(PipelineError::NoAccelerations);

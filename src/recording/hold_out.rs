@@ -6,6 +6,7 @@ use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
+use std::collections::BTreeMap;
 use std::ops::Range;
 use thiserror::Error;
 
@@ -49,13 +50,21 @@ pub enum HoldOutError {
 }
 
 impl HeldOut {
-    /// Chooses what is held out: trajectories in random order until they hold `fraction` of all samples, none that would
+    /// Chooses what is held out: takes in random order until they hold `fraction` of all samples, none that would
     /// make it more than twice as many, one at least and not all; of a single trajectory its last part, after a gap of `gap` samples, so that no window of
     /// smoothing reaches from one side to the other. Of a share of 0 nothing.
     ///
+    /// `takes` has the number of the take of every trajectory; those of one are held out together, unless there is no other take.
+    ///
     /// # Errors
     /// [`HoldOutError`].
-    pub fn choose(recording: &Recording, fraction: f64, gap: usize, seed: u64) -> Result<Self, HoldOutError> {
+    pub fn choose(
+        recording: &Recording,
+        takes: &[usize],
+        fraction: f64,
+        gap: usize,
+        seed: u64,
+    ) -> Result<Self, HoldOutError> {
         if fraction == 0.0 {
             return Ok(Self::Nothing);
         }
@@ -71,24 +80,39 @@ impl HeldOut {
             }
             return Ok(Self::End { start, gap });
         }
-        let mut order: Vec<usize> = (0..recording.tracks.len()).collect();
+        let mut parts: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+        for (track, take) in takes.iter().enumerate() {
+            parts.entry(*take).or_default().push(track);
+        }
+        if parts.len() < 2 {
+            parts = (0..recording.tracks.len()).map(|track| (track, vec![track])).collect();
+        }
+        let parts: Vec<Vec<usize>> = parts.into_values().collect();
+        let samples = |part: usize| parts[part].iter().map(|track| recording.tracks[*track].len()).sum::<usize>();
+        let mut order: Vec<usize> = (0..parts.len()).collect();
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream(STREAM);
         order.shuffle(&mut rng);
         let mut held = Vec::new();
         let mut count = 0;
-        for &track in &order {
-            let length = recording.tracks[track].len();
+        for &part in &order {
+            let length = samples(part);
             if count < wanted && count + length <= 2 * wanted && held.len() + 1 < order.len() {
                 count += length;
-                held.push(track);
+                held.push(part);
             }
         }
         if held.is_empty() {
-            held.extend(order.into_iter().min_by_key(|track| (recording.tracks[*track].len(), *track)));
+            held.extend(order.into_iter().min_by_key(|part| (samples(*part), *part)));
         }
+        let mut held: Vec<usize> = held.into_iter().flat_map(|part| parts[part].clone()).collect();
         held.sort_unstable();
         Ok(Self::Tracks(held))
+    }
+
+    /// `true` if a trajectory is held out as a whole.
+    pub fn has_track(&self, track: usize) -> bool {
+        matches!(self, Self::Tracks(held) if held.contains(&track))
     }
 
     /// Training and validation.
@@ -144,7 +168,8 @@ pub fn hold_out(
     gap: usize,
     seed: u64,
 ) -> Result<(Recording, Recording), HoldOutError> {
-    Ok(HeldOut::choose(recording, fraction, gap, seed)?.divide(recording))
+    let takes: Vec<usize> = (0..recording.tracks.len()).collect();
+    Ok(HeldOut::choose(recording, &takes, fraction, gap, seed)?.divide(recording))
 }
 
 /// The same coordinates without trajectories.
@@ -206,9 +231,23 @@ mod tests {
     }
 
     #[test]
+    fn takes_stay_whole() {
+        let all = recording(&[20, 30, 40, 20, 30, 25]);
+        for seed in 0..20 {
+            let HeldOut::Tracks(held) = HeldOut::choose(&all, &[0, 0, 1, 1, 2, 3], 0.2, 5, seed).unwrap() else {
+                panic!("several trajectories")
+            };
+            assert!([&[0, 1][..], &[2, 3], &[4], &[5], &[4, 5]].contains(&held.as_slice()), "{held:?}");
+        }
+        // Of a single take some of its parts are.
+        let held = HeldOut::choose(&all, &[7; 6], 0.2, 5, 0).unwrap();
+        assert!(matches!(held, HeldOut::Tracks(held) if !held.is_empty() && held.len() < 6));
+    }
+
+    #[test]
     fn the_end_of_a_single_one() {
         let one = recording(&[100]);
-        let held = HeldOut::choose(&one, 0.2, 10, 0).unwrap();
+        let held = HeldOut::choose(&one, &[0], 0.2, 10, 0).unwrap();
         assert_eq!(held, HeldOut::End { start: 80, gap: 10 });
         let (training, validation) = held.divide(&one);
         assert_eq!((training.samples(), validation.samples()), (70, 20));

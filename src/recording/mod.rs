@@ -17,6 +17,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod clock;
 mod columns;
 #[cfg(feature = "rollout")]
 mod force;
@@ -32,11 +33,12 @@ mod targets;
 mod track;
 mod units;
 
+pub(crate) use clock::Clock;
 pub use columns::{Columns, ColumnsError};
 pub(crate) use hermite::hermite;
 pub(crate) use hold_out::HeldOut;
 pub use hold_out::HoldOutError;
-pub use reading::{Cut, Dropped, LoadedRecording, Rows};
+pub use reading::{Bridged, Cut, Dropped, LoadedRecording, Rows};
 pub(crate) use targets::LARGE_ERROR;
 pub use targets::Targets;
 pub use track::{RecordedTrajectory, Recording, TrajectoryError};

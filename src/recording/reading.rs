@@ -49,6 +49,17 @@ pub struct Cut {
     pub steps: f64,
 }
 
+/// Short gaps in time, across which trajectories go on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Bridged {
+    /// Their number.
+    pub gaps: usize,
+    /// Rows that are missing in them.
+    pub rows: usize,
+    /// Rows that are missing in the longest.
+    pub longest: usize,
+}
+
 /// A stretch between gaps, too short to be used.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Dropped {
@@ -79,13 +90,19 @@ pub struct LoadedRecording {
     pub cuts: Vec<Cut>,
     /// Stretches left out.
     pub dropped: Vec<Dropped>,
+    /// Short gaps, across which trajectories go on.
+    pub bridged: Bridged,
+    /// Number of the take of every trajectory: those that gaps cut out of one have the same.
+    pub takes: Vec<usize>,
 }
 
 impl From<Recording> for LoadedRecording {
     /// A recording made in memory: its rows are samples, counted from 1.
     fn from(recording: Recording) -> Self {
         let rows = vec![Rows::default(); recording.tracks.len()];
-        Self { recording, rows, files: 0, time: None, duplicates: 0, cuts: Vec::new(), dropped: Vec::new() }
+        let takes = (0..recording.tracks.len()).collect();
+        let (cuts, dropped, bridged) = (Vec::new(), Vec::new(), Bridged::default());
+        Self { recording, rows, files: 0, time: None, duplicates: 0, cuts, dropped, bridged, takes }
     }
 }
 

@@ -31,18 +31,6 @@ pub fn rms(values: impl IntoIterator<Item = f64>) -> f64 {
     if count == 0 { 0.0 } else { (sum / count as f64).sqrt() }
 }
 
-/// Median step and robust spread of the steps of increasing times, both in s; of long records, of steps spread evenly.
-pub fn steps(times: &[f64]) -> (f64, f64) {
-    const MOST: usize = 1 << 17;
-    let stride = (times.len() / MOST).max(1);
-    let mut steps: Vec<f64> = times.windows(2).step_by(stride).map(|pair| pair[1] - pair[0]).collect();
-    let usual = median(&mut steps);
-    for step in &mut steps {
-        *step -= usual;
-    }
-    (usual, robust_deviation(&mut steps))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -53,7 +41,6 @@ mod tests {
         assert_eq!(quantile(&mut [4.0, 3.0, 1.0, 2.0, 5.0], 1.0), 5.0);
         assert!(median(&mut []).is_nan());
         assert_eq!(rms([3.0, -4.0, 0.0, 0.0]), 2.5);
-        assert_eq!(steps(&[0.0, 1.0, 2.0, 3.0, 9.0]), (1.0, 0.0));
         // A quarter of outliers moves the deviation little: the median of |x| is that of the others.
         assert!((robust_deviation(&mut [1.0, -1.0, 1.0, 1e9]) - 1.0 / NORMAL_MEDIAN).abs() < 1e-15);
     }

@@ -1,36 +1,52 @@
-//! Trajectories without gaps in time.
+//! Trajectories between gaps in time.
 
 use super::builder::{Growing, empty};
 use crate::recording::RecordedTrajectory;
+use crate::recording::clock::Clock;
 use crate::recording::reading::{Cut, Dropped, LoadedRecording};
-use crate::recording::statistics::steps;
+use std::f64::consts::TAU;
 
 /// Fewest samples of a trajectory.
 pub const LEAST: usize = 16;
+/// Difference in rad of two guesses of the way of an angle across a gap from which on neither is believed.
+const UNSURE: f64 = 1.5;
 
-/// Adds the stretches of a trajectory between gaps, the short ones left out; gives the samples of the longest.
+/// Adds the stretches of a trajectory between long gaps, those of few samples left out; gives the samples of the longest.
 ///
-/// A gap is a step longer than one and a half usual steps; if sampling is uneven, longer than the usual step and six
-/// robust standard deviations of the steps.
+/// A trajectory goes on across gaps of up to nine missing rows, an angle by the turn that suits its pace before and after; where that
+/// is a guess, and where gaps are longer, it is cut.
 pub fn add(file: &str, growing: Growing, reading: &mut LoadedRecording) -> usize {
     let Growing { label, rows, mut track, .. } = growing;
-    let (usual, spread) = steps(&track.times);
-    let longest = usual + (0.5 * usual).max(6.0 * spread);
+    let clock = Clock::of(&track.times);
     let mut bounds = vec![0];
+    let mut turned = Vec::new();
     for (k, pair) in track.times.windows(2).enumerate() {
         let seconds = pair[1] - pair[0];
-        if seconds > longest {
+        if seconds <= clock.longest {
+            continue;
+        }
+        let turns =
+            clock.reaches_across(seconds).then(|| turns(&track, &reading.recording.periodic, &clock, k)).flatten();
+        if let Some(turns) = turns {
+            let missing = clock.missing(seconds);
+            reading.bridged.gaps += 1;
+            reading.bridged.rows += missing;
+            reading.bridged.longest = reading.bridged.longest.max(missing);
+            turned.push((k + 1, turns));
+        } else {
             let (before, after) = (rows.row(k), rows.row(k + 1));
-            reading.cuts.push(Cut { file: file.to_string(), before, after, seconds, steps: seconds / usual });
+            reading.cuts.push(Cut { file: file.to_string(), before, after, seconds, steps: seconds / clock.step });
             bounds.push(k + 1);
         }
     }
+    turn(&mut track, &turned);
     bounds.push(track.len());
     let name = match &label {
         Some(label) => format!("{file} trajectory {label}"),
         None => file.to_string(),
     };
     let n = reading.recording.n();
+    let take = reading.takes.last().map_or(0, |take| take + 1);
     let mut most = 0;
     for pair in bounds.windows(2) {
         let (start, end) = (pair[0], pair[1]);
@@ -56,6 +72,47 @@ pub fn add(file: &str, growing: Growing, reading: &mut LoadedRecording) -> usize
         };
         reading.recording.tracks.push(part);
         reading.rows.push(rows.part(start, end));
+        reading.takes.push(take);
     }
     most
+}
+
+/// Full turns by which the coordinates must be moved from sample `k + 1` on so that they go on across the gap before it as they moved
+/// before and after; none if that is a guess.
+fn turns(track: &RecordedTrajectory, periodic: &[bool], clock: &Clock, k: usize) -> Option<Vec<f64>> {
+    let (n, gap) = (periodic.len(), track.times[k + 1] - track.times[k]);
+    let pace = |i: usize, before: Option<usize>| {
+        let at = before?;
+        let step = track.times.get(at + 1)? - track.times[at];
+        (step <= clock.longest).then(|| (track.q[(at + 1) * n + i] - track.q[at * n + i]) / step)
+    };
+    let of = |i: usize| {
+        if !periodic[i] {
+            return Some(0.0);
+        }
+        let way = match (pace(i, k.checked_sub(1)), pace(i, Some(k + 1))) {
+            (Some(a), Some(b)) if (a - b).abs() * gap > UNSURE => return None,
+            (Some(a), Some(b)) => 0.5 * (a + b) * gap,
+            (a, b) => a.or(b)? * gap,
+        };
+        let turns = ((way - (track.q[(k + 1) * n + i] - track.q[k * n + i])) / TAU).round();
+        turns.is_finite().then_some(turns)
+    };
+    (0..n).map(of).collect()
+}
+
+/// Moves the coordinates of all samples from each of these on by full turns.
+fn turn(track: &mut RecordedTrajectory, turned: &[(usize, Vec<f64>)]) {
+    let Some((_, first)) = turned.first() else { return };
+    let n = first.len();
+    let mut sums = vec![0.0; n];
+    for (number, (from, turns)) in turned.iter().enumerate() {
+        let end = turned.get(number + 1).map_or(track.len(), |(next, _)| *next);
+        sums.iter_mut().zip(turns).for_each(|(sum, turns)| *sum += turns);
+        if sums.iter().any(|sum| *sum != 0.0) {
+            for q in track.q[from * n..end * n].chunks_exact_mut(n) {
+                q.iter_mut().zip(&sums).for_each(|(q, sum)| *q += TAU * sum);
+            }
+        }
+    }
 }

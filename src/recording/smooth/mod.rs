@@ -3,6 +3,7 @@
 mod local_fit;
 mod noise;
 mod pace;
+mod signal;
 mod window;
 
 pub(crate) use local_fit::MOST_DEGREE;
@@ -11,14 +12,14 @@ pub(crate) use noise::{contrast_weights, noise};
 pub use window::Quality;
 
 use crate::names::counted;
-use crate::recording::statistics::{median, steps};
+use crate::recording::clock::Clock;
+use crate::recording::statistics::median;
 use crate::recording::{RecordedTrajectory, Recording};
-use local_fit::{Estimate, LocalFit};
+use local_fit::Estimate;
 use noise::along;
 use pace::Usual;
-use std::collections::BTreeMap;
+use signal::{Fits, Signal};
 use thiserror::Error;
-use window::Signal;
 
 /// Settings of derivatives; those that are not given are chosen from the data.
 #[derive(Clone, Debug, PartialEq)]
@@ -94,6 +95,9 @@ pub struct Smoothing {
     pub degree: usize,
     /// Every coordinate.
     pub coordinates: Vec<Chosen>,
+    /// Windows in samples of every coordinate on every trajectory of the recording, `(coordinates)(trajectories)`: the usual one but
+    /// where another is plainly better. Qualities are means over these.
+    pub own: Vec<Vec<usize>>,
     /// Median step in s.
     pub step: f64,
     /// `true` if windows are shorter than usual where the motion is fast, and longer where it is slow; `false` if their length
@@ -129,6 +133,8 @@ pub struct Smoothed {
     pub a_bias: Vec<f64>,
     /// Samples left and right that have no full window around them: their errors are several times larger.
     pub margins: [usize; 2],
+    /// Samples between the margins that a gap leaves without enough others around them, ascending.
+    pub lacking: Vec<usize>,
 }
 
 impl Smoothed {
@@ -138,14 +144,11 @@ impl Smoothed {
         let end = self.times.len().saturating_sub(after);
         before.min(end)..end
     }
-}
 
-/// `true` if steps are equal to within the rounding of the times.
-pub(crate) fn is_regular(times: &[f64]) -> bool {
-    let [first, .., last] = times else { return true };
-    let step = (last - first) / (times.len() - 1) as f64;
-    let tolerance = 8.0 * f64::EPSILON * first.abs().max(last.abs());
-    times.iter().enumerate().all(|(k, t)| (t - (first + k as f64 * step)).abs() <= tolerance)
+    /// `true` for a sample with a full window that no gap spoils.
+    pub fn is_full(&self, sample: usize) -> bool {
+        self.interior().contains(&sample) && self.lacking.binary_search(&sample).is_err()
+    }
 }
 
 impl Smoothing {
@@ -162,8 +165,8 @@ impl Smoothing {
                 return Err(SmoothError::Shape { track: track.name.clone(), n });
             }
         }
-        let regular: Vec<bool> = tracks.iter().map(|track| is_regular(&track.times)).collect();
-        let mut usual: Vec<f64> = tracks.iter().filter(|t| t.len() > 1).map(|t| steps(&t.times).0).collect();
+        let clocks: Vec<Clock> = tracks.iter().map(|track| Clock::of(&track.times)).collect();
+        let mut usual: Vec<f64> = clocks.iter().zip(tracks).filter(|(_, t)| t.len() > 1).map(|(c, _)| c.step).collect();
         let step = median(&mut usual);
         let longest = tracks.iter().map(RecordedTrajectory::len).max().unwrap_or(0);
         let short = |needed| SmoothError::Short { track: "the longest trajectory".into(), samples: longest, needed };
@@ -174,37 +177,39 @@ impl Smoothing {
             };
             let velocity = velocities.then(|| noise(tracks.iter().map(|t| (t.times.as_slice(), t.v.as_slice())), n, i));
             let ratio = velocity.and_then(|velocity| ratio(position, velocity, step));
-            let signal =
-                Signal { tracks, regular: &regular, n, i, sigma: position.sigma, ratio, degree: options.degree };
-            let quality = match options.window {
-                Some(window) => signal.quality(window).ok_or_else(|| short(window))?,
+            let signal = Signal { tracks, clocks: &clocks, n, i, sigma: position.sigma, ratio, degree: options.degree };
+            let (window, own) = match options.window {
+                Some(window) => (window, vec![window; tracks.len()]),
                 None => signal.best().ok_or_else(|| short(options.degree + 3))?,
             };
-            let seconds = (quality.window - 1) as f64 * step;
-            Ok(Chosen { noise: position, velocity_noise: velocity, quality, seconds })
+            let quality = signal.quality(window, &own).ok_or_else(|| short(window))?;
+            let seconds = (window - 1) as f64 * step;
+            Ok((Chosen { noise: position, velocity_noise: velocity, quality, seconds }, own))
         });
-        let coordinates = coordinates.collect::<Result<_, _>>()?;
-        Ok(Self { degree: options.degree, coordinates, step, varying: options.window.is_none() })
+        let (coordinates, own) = coordinates.collect::<Result<Vec<_>, _>>()?.into_iter().unzip();
+        Ok(Self { degree: options.degree, coordinates, own, step, varying: options.window.is_none() })
     }
 
-    /// The signal of coordinate `i` on trajectories whose steps are equal or not.
-    fn signal<'a>(&self, tracks: &'a [RecordedTrajectory], regular: &'a [bool], i: usize) -> Signal<'a> {
+    /// The signal of coordinate `i` on trajectories with their clocks.
+    fn signal<'a>(&self, tracks: &'a [RecordedTrajectory], clocks: &'a [Clock], i: usize) -> Signal<'a> {
         let Chosen { noise, velocity_noise, .. } = self.coordinates[i];
         let ratio = velocity_noise.and_then(|velocity| ratio(noise, velocity, self.step));
-        Signal { tracks, regular, n: self.coordinates.len(), i, sigma: noise.sigma, ratio, degree: self.degree }
+        Signal { tracks, clocks, n: self.coordinates.len(), i, sigma: noise.sigma, ratio, degree: self.degree }
     }
 
     /// Calls `visit` with position, velocity and acceleration of coordinate `i` at places spread evenly over the
-    /// trajectories, and where they are: trajectory and sample.
+    /// trajectories of the recording that windows were chosen on, and where they are: trajectory and sample.
     pub(crate) fn visit(
         &self,
         recording: &Recording,
         i: usize,
         mut visit: impl FnMut([f64; 3], &RecordedTrajectory, usize),
     ) {
-        let regular: Vec<bool> = recording.tracks.iter().map(|track| is_regular(&track.times)).collect();
-        let signal = self.signal(&recording.tracks, &regular, i);
-        signal.visit(self.coordinates[i].quality.window, |estimate, _, track, at| visit(estimate.values, track, at));
+        let clocks: Vec<Clock> = recording.tracks.iter().map(|track| Clock::of(&track.times)).collect();
+        let signal = self.signal(&recording.tracks, &clocks, i);
+        let Self { coordinates, own, .. } = self;
+        let window = |track: usize| own[i].get(track).copied().unwrap_or(coordinates[i].quality.window);
+        signal.visit(window, |found, _, track, at| visit(found.values, &recording.tracks[track], at));
     }
 
     /// Expected error of the accelerations over their size, of the worst coordinate.
@@ -218,9 +223,9 @@ impl Smoothing {
     }
 
     /// Window of coordinate `i` in samples of a trajectory: as many seconds as chosen, at most all of the trajectory.
-    fn samples(&self, i: usize, track: &RecordedTrajectory) -> usize {
+    fn samples(&self, i: usize, track: &RecordedTrajectory, clock: &Clock) -> usize {
         let least = (self.degree + 3) | 1;
-        let samples = (self.coordinates[i].seconds / steps(&track.times).0).round() as usize;
+        let samples = (self.coordinates[i].seconds / clock.step).round() as usize;
         let most = track.len() - (track.len() + 1) % 2;
         (samples | 1).clamp(least, most.max(least))
     }
@@ -243,24 +248,29 @@ impl Smoothing {
         for values in smoothed.arrays().into_iter().flatten() {
             values.resize(length * n, 0.0);
         }
-        let regular = is_regular(&track.times);
+        let clock = Clock::of(&track.times);
         let tracks = std::slice::from_ref(track);
         let usual: Vec<Usual<'_>> = (0..n)
             .map(|i| Usual {
-                signal: self.signal(tracks, std::slice::from_ref(&regular), i),
-                sigmas: along((&track.times, &track.q), regular, (n, i), self.coordinates[i].noise),
-                window: self.samples(i, track),
+                signal: self.signal(tracks, std::slice::from_ref(&clock), i),
+                sigmas: along((&track.times, &track.q), clock.even, (n, i), self.coordinates[i].noise),
+                window: self.samples(i, track, &clock),
                 error: self.coordinates[i].quality.total(2),
             })
             .collect();
         let windows =
             if self.varying { pace::windows(&usual) } else { usual.iter().map(|u| vec![u.window; length]).collect() };
         for (usual, windows) in usual.iter().zip(&windows) {
-            let before = (0..length).find(|&at| at >= windows[at] / 2).unwrap_or(length);
-            let after = (0..length).find(|&left| left >= windows[length - 1 - left] / 2).unwrap_or(length);
+            let surrounded = |at: usize| clock.surrounds(&track.times, at, windows[at]);
+            let before = (0..length).find(|&at| surrounded(at)[0]).unwrap_or(length);
+            let after = (0..length).find(|&left| surrounded(length - 1 - left)[1]).unwrap_or(length);
             smoothed.margins = [smoothed.margins[0].max(before), smoothed.margins[1].max(after)];
             smooth(usual, windows, &mut smoothed);
         }
+        let inside = smoothed.interior();
+        smoothed.lacking.sort_unstable();
+        smoothed.lacking.dedup();
+        smoothed.lacking.retain(|at| inside.contains(at));
         Ok(smoothed)
     }
 }
@@ -271,31 +281,30 @@ fn ratio(position: Noise, velocity: Noise, step: f64) -> Option<f64> {
     ratio.is_finite().then_some(ratio)
 }
 
+/// Variance of an acceleration near a gap, over that of a full window of equal steps, above which the sample is not learned from.
+const LACKING: f64 = 4.0;
+/// Time that a window spans near a gap, over its length, above which its sample is not learned from.
+const STRETCHED: f64 = 1.5;
+
 /// Fills column `signal.i` of all arrays by a window of its own around every sample.
 fn smooth(Usual { signal, sigmas, .. }: &Usual<'_>, windows: &[usize], smoothed: &mut Smoothed) {
-    let (track, n, i) = (&signal.tracks[0], signal.n, signal.i);
-    let length = track.len();
-    let mut elsewhere = LocalFit::default();
-    // Where steps are equal, the rows of all full windows of a length are the same.
-    let mut centred: BTreeMap<usize, LocalFit> = BTreeMap::new();
+    let (times, clock, n, i) = (&signal.tracks[0].times, &signal.clocks[0], signal.n, signal.i);
+    let length = times.len();
+    let mut fits = Fits::default();
     // Squared change by two more degrees without the part of it that noise explains, in units of the noise.
     let mut excess: [Vec<f64>; 3] = std::array::from_fn(|_| vec![0.0; length]);
-    let full: Vec<bool> = windows.iter().enumerate().map(|(at, w)| at >= w / 2 && at + w / 2 < length).collect();
+    let full: Vec<bool> = (0..length).map(|at| clock.surrounds(times, at, windows[at]) == [true; 2]).collect();
     for (at, &window) in windows.iter().enumerate() {
-        let half = window / 2;
-        let first = at.saturating_sub(half).min(length - window);
-        let compute = |fit: &mut LocalFit| signal.fit(fit, track, first, window, at);
-        let fit = if signal.regular[0] && full[at] {
-            centred.entry(window).or_insert_with(|| {
-                let mut fit = LocalFit::default();
-                compute(&mut fit);
-                fit
-            })
-        } else {
-            compute(&mut elsewhere);
-            &elsewhere
-        };
-        let Estimate { values, changes } = signal.estimate(fit, track, first, window, at);
+        let range = signal.window(0, at, window);
+        let usual = (full[at] && !clock.even).then(|| signal.even_variance(&mut fits, 0, window));
+        let fit = signal.fit(&mut fits, 0, range.clone(), (at, window));
+        if let Some(usual) = usual {
+            let stretched = times[range.end - 1] - times[range.start] > STRETCHED * (window - 1) as f64 * clock.step;
+            if stretched || fit.variance[2] > LACKING * usual {
+                smoothed.lacking.push(at);
+            }
+        }
+        let Estimate { values, changes } = signal.estimate(fit, 0, range, at);
         for (k, [value, error, _]) in smoothed.arrays().into_iter().enumerate() {
             value[at * n + i] = values[k];
             error[at * n + i] = sigmas[at] * fit.variance[k].sqrt();

@@ -1,7 +1,7 @@
 //! Windows that vary along a trajectory: shorter where the motion is fast, longer where it is slow.
 
-use crate::recording::smooth::local_fit::LocalFit;
-use crate::recording::smooth::window::Signal;
+use crate::recording::smooth::signal::{Fits, Signal};
+use crate::recording::smooth::window::Missed;
 
 /// Factors of a coordinate's usual window that are tried: `2^(k/3)`.
 const LEAST: i32 = -12;
@@ -10,8 +10,7 @@ const MOST: i32 = 9;
 const PLACES: usize = 8;
 /// Squared error of the usual windows up to which they are kept, over the least.
 const TOLERATED: f64 = 2.0;
-/// Squared error over the least at which longer windows are no longer tried: over several periods polynomials of either degree miss
-/// everything, and their difference says nothing.
+/// Squared error over the least at which longer windows are no longer tried.
 const HOPELESS: f64 = 4.0;
 
 /// A coordinate of one trajectory with its usual window in samples.
@@ -31,12 +30,16 @@ fn scaled(window: usize, k: f64) -> usize {
     ((window as f64 * (k / 3.0).exp2()).round() as usize) | 1
 }
 
-/// Squared errors of the accelerations by one window at places along the trajectory, noise and bias together.
+/// Errors of the accelerations by one window at places along the trajectory.
 struct Tried {
     first: usize,
     stride: usize,
-    squares: Vec<f64>,
+    /// Variance, squared bias and the variance of its estimate's change.
+    squares: Vec<[f64; 3]>,
 }
+
+/// Independent places within a window to either side.
+const INDEPENDENT: f64 = 4.0;
 
 impl Tried {
     /// Tries a window at places spread evenly; none if it is as long as half the trajectory, or too short for the polynomials.
@@ -46,29 +49,28 @@ impl Tried {
             return None;
         }
         let (half, stride) = (window / 2, (window / PLACES).max(1));
-        let (mut fit, mut fitted) = (LocalFit::default(), false);
+        let mut fits = Fits::default();
         let (mut excess, mut variance) = (Vec::new(), Vec::new());
         for at in (half..track.len() - half).step_by(stride) {
-            if !(signal.regular[0] && fitted) {
-                signal.fit(&mut fit, track, at - half, window, at);
-                fitted = true;
-            }
-            let change = signal.estimate(&fit, track, at - half, window, at).changes[2];
+            let range = signal.window(0, at, window);
+            let fit = signal.fit(&mut fits, 0, range.clone(), (at, window));
+            let change = signal.estimate(fit, 0, range, at).changes[2];
             let noise = sigmas[at] * sigmas[at];
             excess.push(change * change - noise * fit.change_variance[2]);
-            variance.push(noise * fit.variance[2]);
+            variance.push([fit.variance[2], fit.change_variance[2]].map(|variance| noise * variance));
         }
         // The change of one place is a single number: it is averaged over a window to either side.
         let near = window / stride;
         let squares = (0..excess.len()).map(|k| {
             let part = &excess[k.saturating_sub(near)..(k + near + 1).min(excess.len())];
-            variance[k] + (part.iter().sum::<f64>() / part.len() as f64).max(0.0)
+            let [noise, change] = variance[k];
+            [noise, part.iter().sum::<f64>() / part.len() as f64, change]
         });
         Some(Self { first: half, stride, squares: squares.collect() })
     }
 
-    /// Squared error at the nearest place.
-    fn at(&self, sample: usize) -> f64 {
+    /// Variance, squared bias and the variance of its estimate's change at the nearest place.
+    fn at(&self, sample: usize) -> [f64; 3] {
         let place = sample.saturating_sub(self.first) / self.stride;
         self.squares[place.min(self.squares.len() - 1)]
     }
@@ -113,8 +115,13 @@ pub fn windows(usual: &[Usual<'_>]) -> Vec<Vec<usize>> {
 fn choose(tried: &[(i32, Vec<Tried>)], told: &[&Usual<'_>], sample: usize) -> i32 {
     let mut squares: Vec<(i32, f64)> = Vec::with_capacity(tried.len());
     let mut best = f64::INFINITY;
+    let mut missed = vec![Missed::default(); told.len()];
     for (k, all) in tried {
-        let square: f64 = all.iter().zip(told).map(|(t, u)| t.at(sample) / (u.error * u.error)).sum();
+        let errors = all.iter().zip(told).zip(&mut missed).map(|((tried, usual), missed)| {
+            let [variance, bias, change] = tried.at(sample);
+            (variance + missed.bias(bias, change, INDEPENDENT)) / (usual.error * usual.error)
+        });
+        let square: f64 = errors.sum();
         if square > HOPELESS * best {
             break;
         }
@@ -132,6 +139,7 @@ fn choose(tried: &[(i32, Vec<Tried>)], told: &[&Usual<'_>], sample: usize) -> i3
 mod tests {
     use super::*;
     use crate::recording::RecordedTrajectory;
+    use crate::recording::clock::Clock;
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
     use rand_distr::{Distribution, StandardNormal};
@@ -145,10 +153,11 @@ mod tests {
         let q: Vec<f64> = q.enumerate().map(|(k, x)| x + [0.002, 0.004][k % 2] * normal()).collect();
         let length = times.len();
         let track = RecordedTrajectory { name: "waves".into(), times, q, v: vec![], a: vec![], force: vec![] };
+        let clocks = [Clock::of(&track.times)];
         let of = |i: usize| {
             let sigma = [0.002, 0.004][i];
             let tracks = std::slice::from_ref(&track);
-            let signal = Signal { tracks, regular: &[true], n: 2, i, sigma, ratio: None, degree: 4 };
+            let signal = Signal { tracks, clocks: &clocks, n: 2, i, sigma, ratio: None, degree: 4 };
             Usual { signal, sigmas: vec![sigma; length], window: usual, error: 10.0 * sigma }
         };
         windows(&[of(0), of(1)])

@@ -1,13 +1,15 @@
 //! Length of the window: as long as noise demands, as short as the motion allows.
 
 use crate::recording::RecordedTrajectory;
-use crate::recording::smooth::local_fit::{Estimate, LocalFit};
+use crate::recording::smooth::signal::Signal;
 use serde::Serialize;
 
-/// Places at which windows are tried.
-const CENTRES: usize = 2048;
 /// Longest window that is tried, in samples.
 const LONGEST: usize = 2001;
+/// Standard deviations by which an estimated squared bias lies above 0 that noise does not explain.
+const SURE: f64 = 3.0;
+/// Squared error of the usual window up to which a trajectory keeps it, over its least.
+const TOLERATED: f64 = 2.0;
 
 /// Errors of one coordinate's derivatives, on average over the recording.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -40,83 +42,93 @@ impl Quality {
     }
 }
 
-/// One coordinate of the trajectories with its noise.
-#[derive(Clone, Copy)]
-pub struct Signal<'a> {
-    /// The trajectories.
-    pub tracks: &'a [RecordedTrajectory],
-    /// `true` for each whose steps are equal.
-    pub regular: &'a [bool],
-    /// Number of coordinates.
-    pub n: usize,
-    /// Which one.
-    pub i: usize,
-    /// Noise of its positions.
-    pub sigma: f64,
-    /// Noise of positions over noise of velocities, in s, if velocities take part.
-    pub ratio: Option<f64>,
-    /// Degree of the polynomials.
-    pub degree: usize,
+/// Squared bias that longer windows have at least: the most that a shorter one surely has.
+///
+/// The bias of a window is estimated by the change that two more degrees make. Over several periods of the motion polynomials of either
+/// degree miss everything, and their change says nothing; but a window misses no less than a shorter one within it.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Missed(f64);
+
+impl Missed {
+    /// Squared bias of the next longer window from its estimate: `square`, the mean over so many independent places of the change's square
+    /// less the variance that noise gives it.
+    pub fn bias(&mut self, square: f64, variance: f64, independent: f64) -> f64 {
+        self.0 = self.sure(square, variance, independent);
+        square.max(self.0)
+    }
+
+    /// The part of it that is no chance.
+    fn sure(&self, square: f64, variance: f64, independent: f64) -> f64 {
+        self.0.max(square - SURE * variance * (2.0 / independent.max(1.0)).sqrt())
+    }
+}
+
+/// Errors of accelerations on one trajectory by the length of the window.
+#[derive(Clone, Debug, Default)]
+struct Course {
+    /// Squared errors, bias and variance together, of the windows in their order; of those too long for the trajectory none.
+    squares: Vec<f64>,
+    /// The part of each that is no chance.
+    sure: Vec<f64>,
+    /// Number of the window with the least error, up to where the error is plainly larger again.
+    best: usize,
+    past: bool,
+    missed: Missed,
+}
+
+/// Squared error over the least at which longer windows are no longer tried.
+const PAST: f64 = 4.0;
+
+impl Course {
+    fn push(&mut self, variance: f64, square: f64, change: f64, independent: f64) {
+        self.sure.push(variance + self.missed.sure(square, change, independent));
+        self.squares.push(variance + self.missed.bias(square, change, independent));
+        let (last, least) = (self.squares[self.squares.len() - 1], self.squares[self.best]);
+        self.past |= last > PAST * least;
+        if !self.past && last < least {
+            self.best = self.squares.len() - 1;
+        }
+    }
+
+    /// Squared error of window number `k`; of one too long for the trajectory that of the longest.
+    fn at(&self, k: usize) -> Option<f64> {
+        self.squares.get(k).or(self.squares.last()).copied()
+    }
+
+    /// Number of its own window beside the usual one.
+    fn own(&self, usual: usize) -> usize {
+        match (self.squares.get(self.best), self.sure.get(usual).or(self.sure.last())) {
+            (Some(least), Some(kept)) if *kept > TOLERATED * least => self.best,
+            _ => usual,
+        }
+    }
+}
+
+/// Sums over the places of one trajectory.
+#[derive(Clone, Copy, Debug, Default)]
+struct Sums {
+    count: f64,
+    variance: f64,
+    square: f64,
+    change_variance: f64,
+}
+
+/// Lengths of windows that are tried, in steps of about a tenth.
+fn lengths(least: usize, longest: usize) -> impl Iterator<Item = usize> {
+    let next = |window: usize| (window + 2).max((window + window / 10) | 1);
+    let most = LONGEST.min(longest / 2).max(least);
+    std::iter::successors(Some(least), move |window| Some(next(*window))).take_while(move |window| *window <= most)
 }
 
 impl Signal<'_> {
-    /// Recomputes the rows for `window` samples of a track from `first` on, evaluated at sample `at`.
-    pub fn fit(&self, fit: &mut LocalFit, track: &RecordedTrajectory, first: usize, window: usize, at: usize) {
-        fit.compute(&track.times[first..first + window], track.times[at], self.degree, self.ratio);
-    }
-
-    /// Position, velocity and acceleration at sample `at` by the rows of the window from `first` on.
-    pub fn estimate(
-        &self,
-        fit: &LocalFit,
-        track: &RecordedTrajectory,
-        first: usize,
-        window: usize,
-        at: usize,
-    ) -> Estimate {
-        let part = first * self.n..(first + window) * self.n;
-        let ratio = self.ratio.unwrap_or(0.0);
-        let v = if self.ratio.is_some() { &track.v[part.clone()] } else { &[] };
-        let q = track.q[part].iter().skip(self.i).step_by(self.n).copied();
-        fit.apply(track.q[at * self.n + self.i], q, v.iter().skip(self.i).step_by(self.n).map(|v| ratio * v))
-    }
-
-    /// Calls `visit` with the estimate of a window and its rows at places spread evenly over all trajectories; windows
-    /// that would reach over an end are moved inwards. Gives the share of the places on trajectories long enough.
-    pub fn visit(&self, window: usize, mut visit: impl FnMut(&Estimate, &LocalFit, &RecordedTrajectory, usize)) -> f64 {
-        let total: usize = self.tracks.iter().map(RecordedTrajectory::len).sum();
-        let centres = CENTRES.min(total);
-        let (mut fit, mut fitted) = (LocalFit::default(), None);
-        let (mut number, mut start, mut visited) = (0, 0, 0);
-        for c in 0..centres {
-            let place = (2 * c + 1) * total / (2 * centres);
-            while place >= start + self.tracks[number].len() {
-                start += self.tracks[number].len();
-                number += 1;
-            }
-            let track = &self.tracks[number];
-            if track.len() < window {
-                continue;
-            }
-            let first = (place - start).saturating_sub(window / 2).min(track.len() - window);
-            let at = first + window / 2;
-            if !(self.regular[number] && fitted == Some(number)) {
-                self.fit(&mut fit, track, first, window, at);
-                fitted = Some(number);
-            }
-            visit(&self.estimate(&fit, track, first, window, at), &fit, track, at);
-            visited += 1;
-        }
-        visited as f64 / centres.max(1) as f64
-    }
-
-    /// Errors by a window: variance from the noise; squared bias from the change by two more degrees, whose own
-    /// variance is taken out. None if fewer than half the samples are on trajectories long enough.
-    pub fn quality(&self, window: usize) -> Option<Quality> {
+    /// Errors by windows, the same in all trajectories or one for each: variance from the noise; squared bias from the change by two more
+    /// degrees, whose own variance is taken out. None if fewer than half the samples are on trajectories long enough.
+    pub fn quality(&self, window: usize, own: &[usize]) -> Option<Quality> {
         let noise = self.sigma * self.sigma;
         let (mut variance, mut bias) = ([0.0; 3], [0.0; 3]);
         let (mut mean_v, mut square_v, mut square_a, mut count) = (0.0, 0.0, 0.0, 0.0);
-        let share = self.visit(window, |estimate, fit, _, _| {
+        let length = |track: usize| own.get(track).copied().unwrap_or(window);
+        let share = self.visit(length, |estimate, fit, _, _| {
             for k in 0..3 {
                 variance[k] += noise * fit.variance[k];
                 bias[k] += estimate.changes[k] * estimate.changes[k] - noise * fit.change_variance[k];
@@ -138,24 +150,68 @@ impl Signal<'_> {
         })
     }
 
-    /// The window whose accelerations have the least squared bias and variance together (Fan and Gijbels, Local
-    /// Polynomial Modelling, 1996, section 4.2: residual squares by a pilot of higher degree), lengths tried in steps
-    /// of about a tenth.
-    pub fn best(&self) -> Option<Quality> {
+    /// The usual window and that of every trajectory.
+    ///
+    /// On a trajectory the best window is the one whose accelerations have the least squared bias and variance together (Fan and Gijbels,
+    /// Local Polynomial Modelling, 1996, section 4.2: residual squares by a pilot of higher degree). The usual one has the least mean over
+    /// the samples of the logarithm of that error: by its size itself a single fast trajectory would choose for all. Trajectories on which
+    /// the usual one is nearly as good as their best keep it. None if fewer than half the samples are on trajectories long enough.
+    pub fn best(&self) -> Option<(usize, Vec<usize>)> {
         let longest = self.tracks.iter().map(RecordedTrajectory::len).max().unwrap_or(0);
-        let least = (self.degree + 3) | 1;
-        let (mut window, mut best) = (least, None::<Quality>);
-        while window <= LONGEST && (window <= longest / 2 || window == least) {
-            let Some(quality) = self.quality(window) else { break };
-            match best {
-                // Past the first minimum: over several periods either degree misses everything, and their change says
-                // nothing.
-                Some(known) if quality.total(2) > 2.0 * known.total(2) => break,
-                Some(known) if known.total(2) <= quality.total(2) => {}
-                _ => best = Some(quality),
+        let mut courses = vec![Course::default(); self.tracks.len()];
+        let (mut tried, mut best, mut past) = (Vec::new(), None::<(usize, f64)>, false);
+        for window in lengths((self.degree + 3) | 1, longest) {
+            if !self.try_window(window, &mut courses) {
+                break;
             }
-            window = (window + 2).max((window + window / 10) | 1);
+            let mean = self.mean(&courses, tried.len());
+            past |= best.is_some_and(|(_, least)| mean > least + PAST.ln());
+            if !past && best.is_none_or(|(_, least)| mean < least) {
+                best = Some((tried.len(), mean));
+            }
+            tried.push(window);
+            if past && courses.iter().all(|course| course.past || course.squares.len() < tried.len()) {
+                break;
+            }
         }
-        best
+        let (usual, _) = best?;
+        Some((tried[usual], courses.iter().map(|course| tried[course.own(usual)]).collect()))
+    }
+
+    /// Adds the errors of a window to the courses of the trajectories that are long enough; `false` if these hold fewer than half the samples.
+    fn try_window(&self, window: usize, courses: &mut [Course]) -> bool {
+        let noise = self.sigma * self.sigma;
+        let mut sums = vec![Sums::default(); courses.len()];
+        let share = self.visit(
+            |_| window,
+            |estimate, fit, track, _| {
+                let sums = &mut sums[track];
+                sums.count += 1.0;
+                sums.variance += noise * fit.variance[2];
+                sums.square += estimate.changes[2] * estimate.changes[2];
+                sums.change_variance += noise * fit.change_variance[2];
+            },
+        );
+        if share < 0.5 {
+            return false;
+        }
+        for ((sums, course), track) in sums.iter().zip(courses).zip(self.tracks).filter(|((s, _), _)| s.count > 0.0) {
+            let [variance, square, change] = [sums.variance, sums.square, sums.change_variance].map(|x| x / sums.count);
+            // Neighbours within half a window have the same errors.
+            let independent = sums.count.min(2.0 * track.len() as f64 / window as f64);
+            course.push(variance, square - change, change, independent);
+        }
+        true
+    }
+
+    /// Mean over the samples of the logarithm of the squared error by window number `k`.
+    fn mean(&self, courses: &[Course], k: usize) -> f64 {
+        let (mut sum, mut count) = (0.0, 0.0);
+        for (course, track) in courses.iter().zip(self.tracks) {
+            if let Some(square) = course.at(k) {
+                (sum, count) = (sum + track.len() as f64 * square.ln(), count + track.len() as f64);
+            }
+        }
+        sum / count
     }
 }

@@ -11,9 +11,9 @@ pub(crate) use motionless::Stillness;
 pub(crate) use motionless::stillness;
 pub(crate) use suspicious::{Kind, Suspicion};
 
+use crate::recording::clock::Clock;
 use crate::recording::smooth::{SmoothError, SmoothOptions, Smoothing};
-use crate::recording::statistics::steps;
-use crate::recording::{Cut, Dropped, HeldOut, LoadedRecording, Recording, Targets};
+use crate::recording::{Bridged, Cut, Dropped, HeldOut, LoadedRecording, Recording, Targets};
 use consistency::compare;
 use serde::Serialize;
 
@@ -54,9 +54,9 @@ pub(crate) struct TrajectorySurvey {
     pub start: f64,
     /// Last time in s.
     pub end: f64,
-    /// Samples per second, by the median step.
+    /// Samples per second, by the usual step.
     pub rate: f64,
-    /// Robust standard deviation of the steps over their median.
+    /// Standard deviation of the steps that are no gaps over the usual one.
     pub jitter: f64,
 }
 
@@ -75,7 +75,9 @@ pub struct Survey {
     pub(crate) tracks: Vec<TrajectorySurvey>,
     /// Rows left out because they repeat the row before.
     pub duplicates: usize,
-    /// Gaps in time.
+    /// Short gaps in time, across which trajectories go on.
+    pub bridged: Bridged,
+    /// Long gaps in time, which cut trajectories.
     pub cuts: Vec<Cut>,
     /// Stretches between gaps that are too short.
     pub dropped: Vec<Dropped>,
@@ -132,7 +134,7 @@ pub fn survey(reading: &LoadedRecording, options: &SurveyOptions) -> Result<Surv
     }
     let tracks = recording.tracks.iter().zip(&reading.rows).filter(|(track, _)| !track.is_empty());
     let tracks = tracks.map(|(track, rows)| {
-        let (step, spread) = steps(&track.times);
+        let Clock { step, spread, .. } = Clock::of(&track.times);
         let last = track.len() - 1;
         TrajectorySurvey {
             name: track.name.clone(),
@@ -145,7 +147,8 @@ pub fn survey(reading: &LoadedRecording, options: &SurveyOptions) -> Result<Surv
             jitter: spread / step,
         }
     });
-    let held_out = HeldOut::choose(recording, options.validation, planned.window(), options.seed).ok();
+    let (share, gap, seed) = (options.validation, planned.window(), options.seed);
+    let held_out = HeldOut::choose(recording, &reading.takes, share, gap, seed).ok();
     let mut survey = Survey {
         files: reading.files,
         time: reading.time.clone(),
@@ -153,6 +156,7 @@ pub fn survey(reading: &LoadedRecording, options: &SurveyOptions) -> Result<Surv
         step: alone.step,
         tracks: tracks.collect(),
         duplicates: reading.duplicates,
+        bridged: reading.bridged,
         cuts: reading.cuts.clone(),
         dropped: reading.dropped.clone(),
         coordinates,
@@ -171,11 +175,12 @@ pub fn survey(reading: &LoadedRecording, options: &SurveyOptions) -> Result<Surv
     Ok(survey)
 }
 
-/// Counts steps of an angle between samples that are too long to be unwrapped.
+/// Counts steps of an angle between samples that are too long to be unwrapped; gaps have been looked at where trajectories are cut.
 fn guesses(reading: &LoadedRecording, i: usize, coordinate: &mut CoordinateSurvey) {
     let n = reading.recording.n();
     for (track, rows) in reading.recording.tracks.iter().zip(&reading.rows) {
-        for k in 1..track.len() {
+        let clock = Clock::of(&track.times);
+        for k in (1..track.len()).filter(|k| clock.missing(track.times[*k] - track.times[k - 1]) == 0) {
             if (track.q[k * n + i] - track.q[(k - 1) * n + i]).abs() > GUESS {
                 coordinate.ambiguous_turns += 1;
                 coordinate.first_ambiguous.get_or_insert_with(|| (track.name.clone(), rows.row(k)));

@@ -1,12 +1,15 @@
 //! Samples that do not look like motion: spikes, jumps, kinks, frozen sensors.
 
 use crate::recording::LoadedRecording;
-use crate::recording::smooth::{contrast_weights, is_regular};
+use crate::recording::clock::Clock;
+use crate::recording::smooth::contrast_weights;
 use crate::recording::statistics::robust_deviation;
 use serde::Serialize;
 
 /// Points of a contrast: sixth differences.
 const POINTS: usize = 7;
+/// Time that the neighbours of a contrast may span, over that of equal steps.
+const LONGEST: f64 = 1.7;
 /// Contrasts that far from 0, in standard deviations, are no noise.
 const LIMIT: f64 = 6.0;
 /// Fewest equal values in a row that may be a frozen sensor.
@@ -95,13 +98,19 @@ pub fn find(reading: &LoadedRecording, i: usize, sigma: f64, found: &mut Vec<Sus
     count
 }
 
-/// Contrasts of seven neighbours each, the first of them that of samples 0 to 6.
+/// Contrasts of seven neighbours each, the first of them that of samples 0 to 6; 0 where a gap lies between them, over which the motion
+/// is no noise either.
 fn differences(times: &[f64], q: impl Fn(usize) -> f64, z: &mut Vec<f64>) {
     z.clear();
-    let regular = is_regular(times);
+    let clock = Clock::of(times);
+    let longest = LONGEST * (POINTS - 1) as f64 * clock.step;
     let mut weights = [0.0; POINTS];
     for (start, window) in times.windows(POINTS).enumerate() {
-        if start == 0 || !regular {
+        if window[POINTS - 1] - window[0] > longest {
+            z.push(0.0);
+            continue;
+        }
+        if start == 0 || !clock.even {
             contrast_weights(window, &mut weights);
         }
         let origin = q(start);

@@ -2,8 +2,11 @@
 
 use super::suspicious::Kind;
 use super::{FEW_SAMPLES, Stillness, Survey};
-use crate::names::{counted, number};
+use crate::names::{counted, number, percent};
 use std::f64::consts::TAU;
+
+/// Share of the rows from which on those that are missing or left out are worth a warning.
+const MANY: f64 = 0.01;
 
 /// One sentence each.
 pub fn warnings(survey: &Survey, still: &[(usize, Stillness)]) -> Vec<String> {
@@ -55,6 +58,17 @@ pub fn warnings(survey: &Survey, still: &[(usize, Stillness)]) -> Vec<String> {
             let count = wraps(360.0);
             all.push(format!("{name} jumps by 360 {count} times: is it an angle in degrees (--units {name}=deg)?"));
         }
+    }
+    let dropped: usize = survey.dropped.iter().map(|part| part.samples).sum();
+    let (missing, gaps) = (survey.bridged.rows, counted(survey.bridged.gaps, "short gap", "short gaps"));
+    let share = |rows: usize| rows as f64 / (survey.samples + dropped + missing) as f64;
+    if share(missing) > MANY {
+        let rows = counted(missing, "row is", "rows are");
+        all.push(format!("{rows} missing in {gaps} ({}): smoothing reaches across them", percent(share(missing))));
+    }
+    if share(dropped) > MANY {
+        let rows = counted(dropped, "row is", "rows are");
+        all.push(format!("{rows} left out ({}): between gaps there are too few to be used", percent(share(dropped))));
     }
     if survey.suspicious_count > 0 {
         let places = counted(survey.suspicious_count, "place does", "places do");

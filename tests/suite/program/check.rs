@@ -101,6 +101,30 @@ fn what_is_wrong_with_the_motion_is_said() {
 }
 
 #[test]
+fn gaps_and_rows_left_out_are_counted() {
+    let folder = Folder::new();
+    let missing =
+        |k: usize| k % 40 == 17 || (500..504).contains(&k) || (800..820).contains(&k) || (830..850).contains(&k);
+    let rows = swing(2000, 5).into_iter().enumerate().filter(|(k, _)| !missing(*k)).map(|(_, row)| row);
+    let file = folder.file("film.csv", csv("t,x,y", &rows.collect::<Vec<_>>()));
+    let found = survey(&[&file], &["--coords", "x,y"]);
+    let bridged = &found["bridged"];
+    assert_eq!((&bridged["rows"], &bridged["longest"]), (&(49 + 4).into(), &4.into()));
+    assert_eq!(
+        (&found["dropped"][0]["samples"], &found["cuts"][0]["steps"].as_f64().unwrap().round()),
+        (&10.into(), &21.0)
+    );
+    assert_eq!((found["tracks"].as_array().unwrap().len(), &found["suspicious_count"]), (2, &0.into()));
+    near(&found["tracks"][0]["rate"], 100.0, 1e-6);
+    let warnings = found["warnings"].to_string();
+    assert!(warnings.contains("53 rows") && !warnings.contains("10 rows"), "{warnings}");
+    let text = check(&[&file], &["--coords", "x,y"]).stdout;
+    for part in ["50 short gaps", "53 rows", "10 samples between gaps"] {
+        assert!(text.contains(part), "{part:?} is not in\n{text}");
+    }
+}
+
+#[test]
 fn columns_units_and_angles() {
     let folder = Folder::new();
     // Degrees that wrap, milliseconds, no header, a column that tells runs apart.

@@ -128,6 +128,29 @@ fn recorded_positions_become_a_model_that_predicts() {
     lnn(&["evaluate", &model]).refused(1, &["measured"]);
 }
 
+/// Rows that a camera drops leave whole runs, and as good a model.
+#[test]
+fn recordings_with_dropped_rows_are_learned() {
+    let folder = Folder::new();
+    let mut rng = ChaCha8Rng::seed_from_u64(2);
+    let whole = pendulum(12, false, 0.0);
+    // The first rows are the header and the first of a run.
+    let kept = |(k, _): &(usize, &str)| *k < 2 || rng.random_range(0.0..1.0) >= 0.03;
+    let some: Vec<&str> = whole.lines().enumerate().filter(kept).map(|(_, line)| line).collect();
+    let data = folder.file("dropped.csv", some.join("\n") + "\n");
+    let run = fit(&folder, &data, "out", &["--epochs", "60"]);
+    let found = summary(&folder, &run, "out");
+    let runs: u64 = found["trajectories"].as_array().unwrap().iter().map(|count| count.as_u64().unwrap()).sum();
+    assert_eq!((runs, &found["time_steps"]["cuts"]), (12, &0.into()));
+    let missing = found["time_steps"]["bridged"]["rows"].as_u64().unwrap() as usize;
+    let dropped = whole.lines().count() - some.len();
+    // A row that is missing at the end of a run leaves no gap.
+    assert!(missing <= dropped && missing + 12 > dropped, "{missing} of {dropped}");
+    assert!(run.stdout.contains(&format!("({missing} rows missing")), "{}", run.stdout);
+    let (model, straight) = errors(&found);
+    assert!(model < 0.1 * straight, "{model} {straight}");
+}
+
 #[test]
 fn the_same_bytes_on_any_number_of_threads() {
     let folder = Folder::new();

@@ -1,3 +1,5 @@
 //! Recorded motion.
 
+mod arm;
+mod gaps;
 mod smoothing;

@@ -1,0 +1,69 @@
+//! Steps of time of recorded motion: gaps, uneven clocks, and the rows that a fit leaves out because of them.
+
+use crate::data::Split;
+use crate::names::{counted, percent};
+use crate::recording::{Bridged, Clock, LoadedRecording, Targets};
+use serde::Serialize;
+
+/// Part of `summary.json`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub(crate) struct TimeSteps {
+    /// Short gaps, across which trajectories go on.
+    bridged: Bridged,
+    /// Number of long gaps, which cut trajectories.
+    cuts: usize,
+    /// Standard deviation of the steps that are no gaps over the usual one, on the trajectory where it is largest.
+    jitter: f64,
+    left_out: LeftOut,
+}
+
+/// Rows that no acceleration was learned from.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+struct LeftOut {
+    /// Rows between gaps, too few for a trajectory.
+    between_gaps: usize,
+    /// Samples of the training part without a full window, at the ends of its trajectories.
+    at_ends: usize,
+    /// Samples of the training part that a gap leaves without enough others around them.
+    near_gaps: usize,
+}
+
+impl TimeSteps {
+    /// Of a recording whose part `training` is learned from by these targets.
+    pub fn new(reading: &LoadedRecording, training: &Split, targets: Targets) -> Self {
+        let jitter = reading.recording.tracks.iter().map(|track| Clock::of(&track.times).jitter());
+        let [at_ends, near_gaps] = training.left_out(targets);
+        let left_out =
+            LeftOut { between_gaps: reading.dropped.iter().map(|part| part.samples).sum(), at_ends, near_gaps };
+        Self { bridged: reading.bridged, cuts: reading.cuts.len(), jitter: jitter.fold(0.0, f64::max), left_out }
+    }
+
+    /// In words; empty where steps are even and there is no gap.
+    pub fn text(&self) -> String {
+        let mut parts = Vec::new();
+        let Bridged { gaps, rows, longest } = self.bridged;
+        if gaps > 0 {
+            let (gaps, rows) = (counted(gaps, "short gap", "short gaps"), counted(rows, "row", "rows"));
+            parts.push(format!("trajectories go on across {gaps} ({rows} missing, at most {longest} in one)"));
+        }
+        if self.cuts > 0 {
+            parts.push(format!("{} trajectories", counted(self.cuts, "long gap cuts", "long gaps cut")));
+        }
+        if self.jitter > ROUNDING {
+            parts.push(format!("steps of time vary by {}", percent(self.jitter)));
+        }
+        if parts.is_empty() {
+            return String::new();
+        }
+        let LeftOut { between_gaps, at_ends, near_gaps } = self.left_out;
+        let rows = counted(between_gaps, "row", "rows");
+        let samples = counted(at_ends, "training sample", "training samples");
+        format!(
+            "{}\nnot learned from: {rows} between gaps, {samples} at ends and {near_gaps} near gaps, without full windows\n",
+            parts.join("; ")
+        )
+    }
+}
+
+/// Jitter that is rounding of the times.
+const ROUNDING: f64 = 1e-6;
