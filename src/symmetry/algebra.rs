@@ -3,10 +3,10 @@
 use super::basis::{Basis, Values};
 use super::classify;
 use super::killing::{killing_form, signature};
-use super::orthonormal::dot;
+use super::orthonormal::{add, dot};
 use super::sample::Sample;
 use super::{Field, SymmetryError};
-use crate::linalg::{Workspace, inverse};
+use crate::linalg::{MatMut, MatRef, Workspace, gemm, inverse};
 use serde::Serialize;
 
 /// Structure of a Lie algebra of fields `X_1, .., X_m`.
@@ -14,8 +14,8 @@ use serde::Serialize;
 pub struct Algebra {
     /// `c[a][b][c]` of `[X_a, X_b] = sum_c c[a][b][c] X_c`, the nearest such combination where there is none.
     pub structure_constants: Vec<Vec<Vec<f64>>>,
-    /// Root mean square of what of the commutators of fields of unit length is no combination of the fields, times the length over which the
-    /// coordinates spread: 0 for an algebra.
+    /// Root mean square of what of the commutators of fields of unit length is no combination of the fields, every coordinate in units
+    /// of its spread over the states: 0 for an algebra.
     pub closure: f64,
     /// `true` if the commutators are combinations of the fields up to the noise of the fields; if not, the fields are no
     /// algebra, and neither constants nor signature mean anything.
@@ -30,51 +30,54 @@ pub struct Algebra {
 
 /// Fields whose algebra is looked at, at most: beyond, their commutators take minutes.
 pub(crate) const MOST_FIELDS: usize = 200;
-/// States at which commutators are looked at, at the least.
-const STATES: usize = 400;
+/// States at which commutators are looked at, at most, and products of numbers that are worth it: seconds.
+const STATES: (usize, usize) = (400, 10_000_000_000);
 
 impl Algebra {
     /// The algebra of fields whose coefficients have this relative noise.
     pub(crate) fn new(sample: &Sample, basis: &Basis, fields: &[Field], noise: f64) -> Result<Self, SymmetryError> {
         let (n, m) = (sample.n, fields.len());
-        let at_states = vectors(sample, basis, fields);
+        let pairs: Vec<(usize, usize)> = (0..m).flat_map(|a| (a + 1..m).map(move |b| (a, b))).collect();
+        // Each state has n equations for m unknown coefficients of every commutator.
+        let (few, worth) = (4 * m / n + 1, STATES.1 / (pairs.len() * n * m).max(1));
+        let at_states = vectors(sample, basis, fields, few.max(worth.min(STATES.0)));
         let states = at_states.len();
-        // Fields of unit length: which ones are how long depends on units.
-        let mean = |a: usize| at_states.iter().map(|at| dot(&at.vectors[a], &at.lowered[a])).sum::<f64>();
+        let mean = |a: usize| at_states.iter().map(|at| dot(&at.vectors[a], &at.vectors[a])).sum::<f64>();
         let lengths: Vec<f64> =
             (0..m).map(|a| (mean(a) / states as f64).sqrt().max(f64::MIN_POSITIVE.sqrt())).collect();
-        let pairs: Vec<(usize, usize)> = (0..m).flat_map(|a| (a + 1..m).map(move |b| (a, b))).collect();
-        let (mut gram, mut sides) = (vec![0.0; m * m], vec![vec![0.0; m]; pairs.len()]);
-        let mut squares = vec![0.0; pairs.len()];
+        let (mut gram, mut sides) = (vec![0.0; m * m], vec![0.0; pairs.len() * m]);
+        let (mut squares, mut brackets) = (vec![0.0; pairs.len()], Vec::with_capacity(pairs.len() * n));
         for at in &at_states {
-            let unit: Vec<Vec<f64>> =
-                at.lowered.iter().zip(&lengths).map(|(x, length)| x.iter().map(|x| x / length).collect()).collect();
-            let along = |c: usize, x: &[f64]| dot(&unit[c], x);
             // Points far out, where fields grow, count no more than the others.
-            let size: f64 = (0..m).map(|a| along(a, &at.vectors[a]) / lengths[a]).sum::<f64>().max(f64::MIN_POSITIVE);
-            for a in 0..m {
-                for b in 0..m {
-                    gram[a * m + b] += along(a, &at.vectors[b]) / (lengths[b] * size);
-                }
-            }
-            for (pair, &(a, b)) in pairs.iter().enumerate() {
-                let slope =
-                    |x: &[f64], slopes: &[f64]| -> Vec<f64> { slopes.chunks_exact(n).map(|row| dot(row, x)).collect() };
-                let (there, back) = (slope(&at.vectors[a], &at.slopes[b]), slope(&at.vectors[b], &at.slopes[a]));
+            let unit = at.vectors.iter().zip(&lengths).flat_map(|(x, length)| x.iter().map(move |x| x / length));
+            let unit: Vec<f64> = unit.collect();
+            let size = dot(&unit, &unit).max(f64::MIN_POSITIVE);
+            brackets.clear();
+            for (&(a, b), square) in pairs.iter().zip(&mut squares) {
                 let scale = 1.0 / (lengths[a] * lengths[b]);
-                let bracket: Vec<f64> = there.iter().zip(&back).map(|(x, y)| scale * (x - y)).collect();
-                (0..m).for_each(|c| sides[pair][c] += along(c, &bracket) / size);
-                squares[pair] += dot(&bracket, &lowered(at.frame, &bracket)) / size;
+                let rows = at.slopes[b].chunks_exact(n).zip(at.slopes[a].chunks_exact(n));
+                let (x, y) = (&at.vectors[a], &at.vectors[b]);
+                brackets.extend(rows.map(|(there, back)| scale * (dot(there, x) - dot(back, y))));
+                let bracket = &brackets[brackets.len() - n..];
+                *square += dot(bracket, bracket) / size;
             }
+            let fields = MatRef::new(&unit, m, n);
+            gemm(MatMut::new(&mut gram, m, m), true, 1.0 / size, fields, fields.t());
+            let brackets = MatRef::new(&brackets, pairs.len(), n);
+            gemm(MatMut::new(&mut sides, pairs.len(), m), true, 1.0 / size, brackets, fields.t());
         }
         let mut inverted = vec![0.0; m * m];
         inverse(m, &gram, &mut inverted, &mut Workspace::new())
             .map_err(|_| SymmetryError::NotFinite { what: "a commutator of fields" })?;
         let mut constants = vec![vec![vec![0.0; m]; m]; m];
         let mut rest = 0.0;
-        for ((&(a, b), side), square) in pairs.iter().zip(&sides).zip(&squares) {
-            let x: Vec<f64> = inverted.chunks_exact(m).map(|row| dot(row, side)).collect();
-            rest += (square - dot(&x, side)).max(0.0);
+        for ((&(a, b), side), square) in pairs.iter().zip(sides.chunks_exact(m)).zip(&squares) {
+            let by = |matrix: &[f64], x: &[f64]| matrix.chunks_exact(m).map(|row| dot(row, x)).collect::<Vec<f64>>();
+            let mut x = by(&inverted, side);
+            // Once more: fields may nearly depend on each other.
+            let left: Vec<f64> = side.iter().zip(by(&gram, &x)).map(|(side, found)| side - found).collect();
+            add(&mut x, &by(&inverted, &left), 1.0);
+            rest += (square - 2.0 * dot(&x, side) + dot(&x, &by(&gram, &x))).max(0.0);
             let scale = |c: usize| lengths[a] * lengths[b] / lengths[c];
             let x: Vec<f64> = x.iter().enumerate().map(|(c, x)| x * scale(c)).collect();
             let largest = x.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
@@ -86,7 +89,7 @@ impl Algebra {
         }
         // A difference of squares has only half of the digits.
         let rest = if rest > 1e-12 * squares.iter().sum::<f64>() { rest } else { 0.0 };
-        let closure = sample.length * (rest / states as f64).sqrt();
+        let closure = (rest / states as f64).sqrt();
         let tolerance = (30.0 * noise).clamp(1e-6, 0.1);
         let closes = closure <= tolerance;
         Ok(Self {
@@ -99,35 +102,33 @@ impl Algebra {
     }
 }
 
-/// Fields at a state.
-struct At<'a> {
-    /// `|M|`, `(n, n)`.
-    frame: &'a [f64],
+/// Fields at a state, every coordinate in units of its spread.
+struct At {
     /// The fields, `(n)` each.
     vectors: Vec<Vec<f64>>,
-    /// `|M|` times the fields.
-    lowered: Vec<Vec<f64>>,
     /// Their derivatives, `(n, n)` each.
     slopes: Vec<Vec<f64>>,
 }
 
-/// Fields at states that are spread over the sample: a few times as many equations as fields are enough.
-fn vectors<'a>(sample: &'a Sample, basis: &Basis, fields: &[Field]) -> Vec<At<'a>> {
-    let n = sample.n;
-    let step = (sample.len() / STATES.max(4 * fields.len())).max(1);
+/// Fields at about so many states that are spread over the sample.
+fn vectors(sample: &Sample, basis: &Basis, fields: &[Field], states: usize) -> Vec<At> {
+    let (n, spread) = (sample.n, sample.spread());
+    let step = (sample.len() / states).max(1);
     let mut at = Values::default();
-    let states = sample.q.chunks_exact(n).zip(sample.frame.chunks_exact(n * n)).step_by(step);
+    let vector = |field: &Field, at: &Values| -> Vec<f64> {
+        field.vector(at, n).iter().zip(&spread).map(|(x, unit)| x / unit).collect()
+    };
+    let slopes = |field: &Field, at: &Values| -> Vec<f64> {
+        field.derivative(at, n).iter().enumerate().map(|(e, x)| x * spread[e % n] / spread[e / n]).collect()
+    };
+    let states = sample.q.chunks_exact(n).step_by(step);
     states
-        .map(|(q, frame)| {
+        .map(|q| {
             basis.evaluate(q, &mut at);
-            let vectors: Vec<Vec<f64>> = fields.iter().map(|field| field.vector(&at, n)).collect();
-            let slopes = fields.iter().map(|field| field.derivative(&at, n)).collect();
-            At { frame, lowered: vectors.iter().map(|x| lowered(frame, x)).collect(), vectors, slopes }
+            At {
+                vectors: fields.iter().map(|field| vector(field, &at)).collect(),
+                slopes: fields.iter().map(|field| slopes(field, &at)).collect(),
+            }
         })
         .collect()
-}
-
-/// A matrix `(n, n)` times a vector.
-fn lowered(frame: &[f64], vector: &[f64]) -> Vec<f64> {
-    frame.chunks_exact(vector.len()).map(|row| dot(row, vector)).collect()
 }

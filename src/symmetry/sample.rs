@@ -25,8 +25,6 @@ pub(crate) struct Sample {
     pub size: Vec<f64>,
     /// Time in which momenta change by themselves at every state, `(states)`.
     pub pace: Vec<f64>,
-    /// Length over which the coordinates spread, in the frame, root mean square over the states.
-    pub length: f64,
     /// States at which the mass matrix is singular to working precision: there `L` is degenerate and determines no motion.
     pub singular: usize,
     /// `true` if `L(q, -v) = L(q, v)`.
@@ -65,7 +63,6 @@ impl Sample {
             frame: vec![],
             size: vec![],
             pace: vec![],
-            length: 0.0,
             singular: 0,
             even: true,
             homogeneous: true,
@@ -148,7 +145,6 @@ impl Sample {
             }
         }
         let length = length.sqrt();
-        self.length = length;
         let least = f64::MIN_POSITIVE.sqrt();
         self.size = parts.iter().map(|[motion, pull]| (motion / length).hypot(*pull).max(least)).collect();
         self.pace = momenta.iter().zip(&self.size).map(|(momentum, size)| momentum / size).collect();
@@ -162,7 +158,7 @@ impl Sample {
     }
 
     /// Root mean square of every coordinate about its mean; 1 for one that is the same everywhere.
-    fn spread(&self) -> Vec<f64> {
+    pub fn spread(&self) -> Vec<f64> {
         let states = self.len() as f64;
         let one = |i: usize| {
             let values = || self.q.iter().skip(i).step_by(self.n);

@@ -12,8 +12,20 @@ const WORSE: f64 = 10.0;
 ///
 /// `column` gives the column of an entry of `vector`; `sizes` are those of the functions that they belong to. The largest entry keeps
 /// its value, the other large ones follow by least squares. The new vector is taken if the residual, over that of all entries one by
-/// one, is below ten times `noise` or below 1e-9: whatever it leaves out was noise.
+/// one, is below ten times `noise` or below 1e-9: whatever it leaves out was noise. Once more, as long as that leaves out more: what was
+/// large before a fit may be small after it.
 pub(crate) fn polish(vector: &mut [f64], column: &dyn Fn(usize) -> Vec<f64>, sizes: &[f64], noise: f64) {
+    let entries = |vector: &[f64]| vector.iter().filter(|x| **x != 0.0).count();
+    loop {
+        let before = entries(vector);
+        polish_once(vector, column, sizes, noise);
+        if entries(vector) == before {
+            return;
+        }
+    }
+}
+
+fn polish_once(vector: &mut [f64], column: &dyn Fn(usize) -> Vec<f64>, sizes: &[f64], noise: f64) {
     let weighed: Vec<f64> = vector.iter().zip(sizes).map(|(x, s)| (x * s).abs()).collect();
     let largest = weighed.iter().fold(0.0, |m: f64, x| m.max(*x));
     let mut before = 0;
