@@ -3,7 +3,7 @@
 use super::grid::{Axis, Grid};
 use super::mass_matrix::matrices_at_rest;
 use super::summary::quantile;
-use crate::geometry::geometries;
+use crate::geometry::{at_once, geometries};
 use crate::lagrangian::{EulerLagrange, Request, Terms};
 use serde::Serialize;
 
@@ -41,7 +41,7 @@ pub(crate) fn is_metric(model: &dyn EulerLagrange<f64>, q: &[f64], v: &[f64]) ->
     terms.lagrangian.iter().zip(&terms.energy).all(|(l, e)| (l - e).abs() <= 1e-9 * (l.abs() + e.abs()))
 }
 
-/// Points whose geometry is computed at once.
+/// Points whose geometry is computed at once, at most.
 const CHUNK: usize = 64;
 
 /// Curvature scalar `R` of the mass matrix at rest, as a metric, at points `(points, n)`; `NaN` where there is none.
@@ -54,7 +54,7 @@ pub(crate) fn curvature_scalars(model: &dyn EulerLagrange<f64>, q: &[f64]) -> Ve
             Err(_) => vec![f64::NAN; points.len() / n],
         }
     };
-    q.chunks(CHUNK * n).flat_map(scalars).collect()
+    q.chunks(CHUNK.min(at_once(n)) * n).flat_map(scalars).collect()
 }
 
 /// Values of the axes and points `(points, n)` over them, the other coordinates as at `point`.

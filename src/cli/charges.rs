@@ -41,7 +41,7 @@ impl Charges {
     /// # Errors
     /// A usage error for a region outside the domain, a data error for terms that are not finite.
     pub fn new(probe: &Probe, motion: &Trajectory<f64>) -> Result<Self, CliError> {
-        let (largest, model) = (probe.basis(None).0, probe.model.as_ref());
+        let (largest, model) = (probe.basis(None)?.0, probe.model.as_ref());
         let (q, v) = probe.states(probe.enough(unknowns(model.coordinates(), largest.len())), SEED)?;
         let (found, _) = probe.symmetries(None, (&q, &v), None)?;
         let basis = &found.basis;

@@ -6,7 +6,7 @@ use crate::cli::symmetries::{Format, degrees};
 use crate::cli::{CliError, number, output};
 use crate::names::{WIDTH, number as digits, rounded, wrapped};
 use crate::report::text_table;
-use crate::symmetry::{Comparison, Degrees, compare};
+use crate::symmetry::{Comparison, Degrees, compare, unknowns};
 use serde::Serialize;
 
 /// Arguments.
@@ -69,8 +69,9 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     }
     first.meet(&mut second)?;
     first.narrow(&args.region)?;
-    let (basis, _) = first.basis(args.basis);
-    let points = args.points.unwrap_or_else(|| first.enough(basis.len()));
+    let (basis, _) = first.basis(args.basis)?;
+    let unknowns = unknowns(first.model.coordinates(), basis.len());
+    let points = first.points(args.points, first.enough(basis.len()), unknowns)?;
     // On the mass shell of a system, rather than where a model says nothing.
     let (q, v) = first.states_beside(&second, points, args.seed)?;
     let found = compare(first.model.as_ref(), second.model.as_ref(), &basis, (&q, &v)).map_err(CliError::data)?;
@@ -100,14 +101,21 @@ impl Compared<'_> {
             self.points
         );
         let shell = "B is the same at all states: f is known at this one value, mass matrices up to a part h p p^T\n";
-        let text = text + if found.on_shell { shell } else { "" };
+        let mut text = text + if found.on_shell { shell } else { "" };
+        if found.motionless_states > 0 {
+            text += &format!(
+                "one of the two is degenerate: at {} states its mass matrix is singular and determines no accelerations\n",
+                found.motionless_states
+            );
+        }
         let rows = [
             ("Lagrangian, what is left", found.lagrangian),
             ("motion, accelerations", found.motion),
             ("mass matrix, what is left", found.mass_matrix),
             ("energy, what is left", found.energy),
         ];
-        let rows: Vec<Vec<String>> = rows.iter().map(|(name, x)| vec![name.to_string(), digits(*x)]).collect();
+        let distance = |x: f64| if x.is_nan() { "unknown".to_string() } else { digits(x) };
+        let rows: Vec<Vec<String>> = rows.iter().map(|(name, x)| vec![name.to_string(), distance(*x)]).collect();
         format!("{}{}", wrapped(&text, WIDTH), text_table(&["quantity", "relative distance"], &rows))
     }
 }

@@ -6,7 +6,7 @@ use crate::cli::source::{Source, parameter};
 use crate::cli::states::parse_table;
 use crate::cli::surfaces::Line;
 use crate::cli::{CliError, input, output, states, tensors};
-use crate::geometry::{GeometryError, geometries};
+use crate::geometry::{GeometryError, MOST_COORDINATES, at_once, geometries};
 use crate::lagrangian::{EulerLagrange, Request, Terms};
 use crate::scalar::{Dd, Real, Scalar};
 use std::path::PathBuf;
@@ -37,8 +37,8 @@ pub struct Args {
     /// End of the line.
     #[arg(long, value_name = "Q1,Q2,..", requires = "surface", allow_hyphen_values = true)]
     to: Option<String>,
-    /// Pieces of the line: of two changes of sign in one nothing is seen.
-    #[arg(long, value_name = "N", default_value = "200", requires = "surface", value_parser = count)]
+    /// Pieces of the line, 1000000 at most: of two changes of sign in one nothing is seen.
+    #[arg(long, value_name = "N", default_value = "200", requires = "surface", value_parser = pieces)]
     steps: usize,
     /// The velocity at which the mass matrix is taken, in the order of the coordinates; it matters to Lagrangians that are not
     /// quadratic in the velocities alone [default: zeros].
@@ -63,8 +63,14 @@ enum Format {
     Table,
 }
 
-/// Numbers of second derivatives that are held at a time, about.
-const NUMBERS: usize = 1 << 20;
+/// Pieces of a line, at most: seconds of a metric that is written down.
+const PIECES: usize = 1_000_000;
+
+/// Reads a number of pieces.
+fn pieces(text: &str) -> Result<usize, String> {
+    let pieces = count(text).ok().filter(|pieces| *pieces <= PIECES);
+    pieces.ok_or_else(|| format!("expected a whole number from 1 to {PIECES}"))
+}
 
 /// Prints one object per point, or the surfaces on a line.
 ///
@@ -95,6 +101,9 @@ fn geometry<S: Scalar>(args: &Args) -> Result<(), CliError> {
         let line = Line { block: &args.surface, ends: (&ends[0], &ends[1]), velocity: &velocity, steps: args.steps };
         return line.print(&source, !args.json && args.format == Format::Table);
     }
+    if n > MOST_COORDINATES {
+        return Err(CliError::usage(GeometryError::TooMany { found: n, most: MOST_COORDINATES }));
+    }
     let Some(points) = &args.points else { return Err(CliError::usage("--points: expected a file")) };
     let place = input::name(points);
     let told = |e: &dyn std::fmt::Display| CliError::data(format_args!("{place}: {e}"));
@@ -103,7 +112,7 @@ fn geometry<S: Scalar>(args: &Args) -> Result<(), CliError> {
     drop(bytes);
     note_velocity(&*source.model, &table.values[..n], &velocity);
 
-    let chunk = (NUMBERS / n.pow(4)).clamp(1, CHUNK);
+    let chunk = at_once(n).min(CHUNK);
     let mut failures: Vec<(usize, String)> = Vec::new();
     for (points, rows) in table.values.chunks(chunk * n).zip(table.rows.chunks(chunk)) {
         let found = geometries(&*source.model, points, &velocity).map_err(CliError::data)?;

@@ -3,11 +3,14 @@
 use crate::cli::CliError;
 use crate::cli::chosen::{self, learned_system};
 use crate::cli::learned::Learned;
-use crate::cli::number::bounds;
+use crate::cli::number::{bounds, positive};
 use crate::cli::source::Source;
 use crate::lagrangian::{EulerLagrange, SystemInstance, configure_system};
 use crate::names::unknown;
-use crate::symmetry::{Basis, Chart, Degrees, Region, Symmetries, bases, enough, middle, most_symmetries};
+use crate::symmetry::{
+    Basis, Chart, Degrees, MOST_UNKNOWNS, Region, Symmetries, TOLERANCES, bases, enough, middle, most_states,
+    most_symmetries, unknowns,
+};
 use std::path::Path;
 
 /// A Lagrangian with what is known of its coordinates.
@@ -31,17 +34,33 @@ pub struct Probe {
 /// `NAME=LOW:HIGH`, the bounds of a column.
 pub type Bound = (String, [f64; 2]);
 
+/// Width of a range relative to its larger end, at the least: functions of a column that hardly moves are not told apart.
+const NARROWEST: f64 = 1e-6;
+
 /// Reads [`Bound`].
 ///
 /// # Errors
 /// The form that was expected.
 pub fn bound(text: &str) -> Result<Bound, String> {
-    let wrong = || "expected NAME=LOW:HIGH, such as r=4:12 or r_dot=-0.3:0.3".to_string();
+    let wrong = || {
+        format!(
+            "expected NAME=LOW:HIGH, such as r=4:12 or r_dot=-0.3:0.3, HIGH above LOW by {NARROWEST:e} of the larger at least"
+        )
+    };
     let (name, range) = text.split_once('=').ok_or_else(wrong)?;
-    match bounds(range) {
-        Ok((low, high)) if !name.trim().is_empty() => Ok((name.trim().to_string(), [low, high])),
-        _ => Err(wrong()),
-    }
+    let (low, high) = bounds(range).map_err(|_| wrong())?;
+    let wide = high - low > NARROWEST * low.abs().max(high.abs());
+    if wide && !name.trim().is_empty() { Ok((name.trim().to_string(), [low, high])) } else { Err(wrong()) }
+}
+
+/// Reads the singular value up to which a field counts as a symmetry.
+///
+/// # Errors
+/// The range.
+pub fn tolerance(text: &str) -> Result<f64, String> {
+    let [least, most] = TOLERANCES;
+    let value = positive(text).ok().filter(|x| (least..=most).contains(x));
+    value.ok_or_else(|| format!("expected a number from {least:.1e} (rounding) to {most} (no symmetry any more)"))
 }
 
 impl Probe {
@@ -142,14 +161,16 @@ impl Probe {
             let both = [own[0].max(beside[0]), own[1].min(beside[1])];
             // The velocity that a mass shell fixes has no bounds.
             let both = match (own[0] < own[1], beside[0] < beside[1]) {
+                // Ranges that touch have nothing in common on which functions could be told apart.
+                (true, true) if both[0] >= both[1] => {
+                    let [a, b] = [own, beside].map(|range| format!("{}:{}", range[0], range[1]));
+                    let problem = format_args!("{name}: no states in common, {a} and {b}; --region chooses");
+                    return Err(CliError::usage(problem));
+                }
                 (true, true) => both,
                 (true, false) => *own,
                 _ => *beside,
             };
-            if both[0] > both[1] {
-                let [a, b] = [own, beside].map(|range| format!("{}:{}", range[0], range[1]));
-                return Err(CliError::usage(format_args!("{name}: no state in common, {a} and {b}; --region chooses")));
-            }
             (*own, *beside) = (both, both);
         }
         Ok(())
@@ -166,10 +187,34 @@ impl Probe {
     }
 
     /// Functions of the coordinates up to these degrees, or those that are usual for its coordinates.
-    pub fn basis(&self, degrees: Option<Degrees>) -> (Basis, Degrees) {
-        match degrees {
-            Some(degrees) => (Basis::new(self.coordinates(), &self.charts(), degrees), degrees),
-            None => Basis::usual(self.coordinates(), &self.charts()),
+    ///
+    /// # Errors
+    /// A usage error for degrees of too many functions, which are not made.
+    pub fn basis(&self, degrees: Option<Degrees>) -> Result<(Basis, Degrees), CliError> {
+        let charts = self.charts();
+        let Some(degrees) = degrees else { return Ok(Basis::usual(self.coordinates(), &charts)) };
+        let unknowns = unknowns(charts.len(), Basis::count(&charts, degrees));
+        if unknowns > MOST_UNKNOWNS {
+            let found =
+                if unknowns == usize::MAX { "more than can be counted".to_string() } else { unknowns.to_string() };
+            return Err(CliError::usage(format_args!(
+                "--basis: expected degrees with at most {MOST_UNKNOWNS} unknown coefficients, found {found}"
+            )));
+        }
+        Ok((Basis::new(self.coordinates(), &charts, degrees), degrees))
+    }
+
+    /// Number of states that are looked at for so many unknown coefficients: as asked for, or the usual one, as far as there is room.
+    ///
+    /// # Errors
+    /// A usage error for more than there is room for.
+    pub fn points(&self, asked: Option<usize>, usual: usize, unknowns: usize) -> Result<usize, CliError> {
+        let most = most_states(self.model.coordinates(), unknowns);
+        match asked {
+            Some(points) if points > most => Err(CliError::usage(format_args!(
+                "--points: expected at most {most} states for {unknowns} unknown coefficients, found {points}"
+            ))),
+            asked => Ok(asked.unwrap_or(usual).min(most)),
         }
     }
 

@@ -1,11 +1,13 @@
 //! `lnn symmetries`: what a Lagrangian conserves.
 
-use crate::cli::probe::{Bound, Probe, bound};
+use crate::cli::probe::{Bound, Probe, bound, tolerance};
 use crate::cli::source::parameter;
 use crate::cli::{CliError, number, output};
 use crate::names::{WIDTH, counted, number as digits, wrapped};
 use crate::report::text_table;
-use crate::symmetry::{Degrees, EXACT, Quadratic, Symmetries, quadratic, quadratic_unknowns, unknowns};
+use crate::symmetry::{
+    Degrees, EXACT, MOST_FIELDS, MOST_UNKNOWNS, Quadratic, Symmetries, quadratic, quadratic_unknowns, unknowns,
+};
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -36,8 +38,8 @@ pub struct Args {
     /// Seed of the states.
     #[arg(long, value_name = "N", default_value = "0", value_parser = number::seed)]
     seed: u64,
-    /// Singular values up to this one count as zero; 1e-8 for a system, the largest gap for a model, if not given.
-    #[arg(long, value_name = "T", value_parser = number::positive)]
+    /// Singular values up to this one count as zero, 0.1 at most; 1e-8 for a system, the largest gap for a model, if not given.
+    #[arg(long, value_name = "T", value_parser = tolerance)]
     tolerance: Option<f64>,
     /// Look for conserved quantities of second degree in the momenta as well.
     #[arg(long)]
@@ -80,10 +82,15 @@ struct Found {
     fields: Vec<String>,
     /// Function `F` of every field whose flow changes `L` by `dF/dt`.
     gauge_functions: Vec<String>,
+    /// None of fields that are no algebra.
     structure_constants: Vec<Vec<Vec<f64>>>,
-    killing_form_signature: [usize; 3],
-    /// Rest of the commutators beside combinations of the fields, relative.
-    closure: f64,
+    killing_form_signature: Option<[usize; 3]>,
+    /// Rest of the commutators beside combinations of the fields, relative; null where it was not looked at.
+    closure: Option<f64>,
+    /// Whether that is nothing but noise, so that the fields are an algebra.
+    closes: Option<bool>,
+    /// States at which the mass matrix is singular.
+    singular_states: usize,
     /// The symmetry of time, which is not counted: the energy is conserved.
     time_translation: bool,
     singular_values: Vec<f64>,
@@ -137,12 +144,13 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         None => Probe::system(args.system.as_deref().unwrap_or_default(), &args.param)?,
     };
     probe.narrow(&args.region)?;
-    let (basis, _) = probe.basis(args.basis);
+    let (basis, _) = probe.basis(args.basis)?;
     let n = probe.model.coordinates();
     let own = unknowns(n, basis.len());
     // Of quadratic quantities cyclic coordinates leave fewer functions than this.
-    let wanted = if args.quadratic { own.max(quadratic_unknowns(n, basis.len()).min(MOST)) } else { own };
-    let points = args.points.unwrap_or_else(|| probe.enough(wanted));
+    let second = |most: usize| if args.quadratic { own.max(quadratic_unknowns(n, basis.len()).min(most)) } else { own };
+    let points = probe.points(args.points, probe.enough(second(MOST)), second(MOST_UNKNOWNS))?;
+    announce(own, points, args.quadratic);
     let (q, v) = probe.states(points, args.seed)?;
     let tolerance = args.tolerance.or(probe.exact.then_some(EXACT));
     let model = probe.model.as_ref();
@@ -153,17 +161,21 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         }
         false => None,
     };
-    let Symmetries { basis, singular_values, separation, fields, algebra } = found;
+    let Symmetries { basis, singular_values, separation, fields, algebra, states, singular_states } = found;
+    let closes = algebra.as_ref().map(|algebra| algebra.closes);
+    let closed = algebra.as_ref().filter(|algebra| algebra.closes);
     let found = Found {
         system: probe.name.clone(),
         count: separation.count,
         gap: separation.gap,
-        name: algebra.as_ref().and_then(|algebra| algebra.name.clone()),
+        name: closed.and_then(|algebra| algebra.name.clone()),
         fields: fields.iter().map(|field| field.text(&basis)).collect(),
         gauge_functions: fields.iter().map(|field| field.gauge_text(&basis)).collect(),
-        killing_form_signature: algebra.as_ref().map_or([0; 3], |algebra| algebra.killing_form_signature),
-        closure: algebra.as_ref().map_or(0.0, |algebra| algebra.closure),
-        structure_constants: algebra.map_or(Vec::new(), |algebra| algebra.structure_constants),
+        killing_form_signature: closed.map(|algebra| algebra.killing_form_signature),
+        closure: algebra.as_ref().map(|algebra| algebra.closure),
+        closes,
+        singular_states,
+        structure_constants: closed.map_or(Vec::new(), |algebra| algebra.structure_constants.clone()),
         time_translation: model.conserves_energy(),
         singular_values,
         basis: Families {
@@ -172,7 +184,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
             hyperbolic: families.hyperbolic,
         },
         functions: basis.len(),
-        points,
+        points: states,
         seed: args.seed,
         quadratic: second,
     };
@@ -187,7 +199,30 @@ const MOST: usize = 1300;
 /// Singular values that are shown beyond the gap.
 const BEYOND: usize = 5;
 
+/// Unknown coefficients squared times states from which a search takes some seconds.
+const LONG: f64 = 1e10;
+
+/// Says so before a long search, which is silent.
+fn announce(unknowns: usize, points: usize, quadratic: bool) {
+    if (unknowns as f64).powi(2) * points as f64 > LONG {
+        let more = if quadratic { ", and more for quadratic quantities" } else { "" };
+        output::note(&format!(
+            "{unknowns} unknown coefficients at {points} states{more}: this takes a while, less with a smaller --basis"
+        ));
+    }
+}
+
 impl Found {
+    /// What the fields are, in words.
+    fn algebra(&self) -> String {
+        match (self.closes, self.closure, self.name.as_deref()) {
+            (Some(true), _, Some(name)) => format!("algebra {name}"),
+            (Some(true), ..) => "algebra of no name known here".to_string(),
+            (_, Some(closure), _) => format!("which are no algebra (closure {})", digits(closure)),
+            _ => format!("more than the {MOST_FIELDS} whose algebra is looked at"),
+        }
+    }
+
     fn text(&self) -> String {
         let time = if self.time_translation {
             "time translation (the energy is conserved)"
@@ -198,11 +233,20 @@ impl Found {
             None => format!("{}: no gap between singular values, so no number of symmetries; {time}\n", self.system),
             Some(0) => format!("{}: no point symmetry in space; {time}\n", self.system),
             Some(count) => {
-                let name = self.name.as_deref().unwrap_or("of no name known here");
                 let count = counted(count, "point symmetry", "point symmetries");
-                format!("{}: {count}, algebra {name}; {time}\n", self.system)
+                format!("{}: {count}, {}; {time}\n", self.system, self.algebra())
             }
         };
+        if self.singular_states > 0 {
+            text += &wrapped(
+                &format!(
+                    "L is degenerate: its mass matrix is singular at {} of {} states and determines no motion there; a null \
+                     direction of it times any function may be a symmetry, so that the number depends on the functions\n",
+                    self.singular_states, self.points
+                ),
+                WIDTH,
+            );
+        }
         let last = self.count.unwrap_or(0) + BEYOND;
         let shown: Vec<String> = self.singular_values.iter().take(last.min(20)).map(|x| digits(*x)).collect();
         let more = if self.singular_values.len() > shown.len() { ", .." } else { "" };
@@ -227,8 +271,9 @@ impl Found {
             let headers = &["field", "components", "gauge function"][..if gauged { 3 } else { 2 }];
             text += &format!("\n{}", text_table(headers, &rows.collect::<Vec<Vec<String>>>()));
             text += &self.commutators();
-            let [negative, positive, zero] = self.killing_form_signature;
-            text += &format!("Killing form: {negative} negative, {positive} positive, {zero} zero\n");
+            if let Some([negative, positive, zero]) = self.killing_form_signature {
+                text += &format!("Killing form: {negative} negative, {positive} positive, {zero} zero\n");
+            }
         }
         if let Some(second) = &self.quadratic {
             text += &second.text();

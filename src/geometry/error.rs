@@ -28,6 +28,14 @@ pub enum GeometryError {
         /// Numbers found.
         found: usize,
     },
+    /// Curvature of more coordinates than there is room for.
+    #[error("{found} coordinates are too many, at most {most}: curvature has n^4 components")]
+    TooMany {
+        /// Coordinates of the model.
+        found: usize,
+        /// Coordinates that there may be.
+        most: usize,
+    },
     /// The model refused.
     #[error(transparent)]
     Mechanics(#[from] MechanicsError),

@@ -49,6 +49,14 @@ pub use surfaces::{Change, Character, Surface, characters, grid, surfaces};
 use crate::lagrangian::{EulerLagrange, MetricJet};
 use crate::scalar::Scalar;
 
+/// Coordinates of a metric whose curvature is computed, at most: a tensor has `n^4` numbers, a point takes 190 MB.
+pub(crate) const MOST_COORDINATES: usize = 32;
+
+/// Points of so many coordinates whose geometry is held at a time: about a million numbers of a tensor.
+pub(crate) fn at_once(n: usize) -> usize {
+    ((1 << 20) / n.pow(4).max(1)).max(1)
+}
+
 /// Metric, connection and curvature at a point.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Geometry<S> {
@@ -107,7 +115,7 @@ impl<S: Scalar> Geometry<S> {
 /// Lagrangians that are written down are computed in double-double numbers and rounded at the end; networks in their own numbers.
 ///
 /// # Errors
-/// [`GeometryError::Shape`]; what [`EulerLagrange::metric_jets`] refuses.
+/// [`GeometryError::Shape`]; [`GeometryError::TooMany`] for more than 32 coordinates; what [`EulerLagrange::metric_jets`] refuses.
 #[allow(clippy::type_complexity)]
 pub fn geometries<S: Scalar>(
     model: &dyn EulerLagrange<S>,
@@ -115,6 +123,9 @@ pub fn geometries<S: Scalar>(
     velocity: &[S],
 ) -> Result<Vec<Result<Geometry<S>, GeometryError>>, GeometryError> {
     let n = model.coordinates();
+    if n > MOST_COORDINATES {
+        return Err(GeometryError::TooMany { found: n, most: MOST_COORDINATES });
+    }
     error::expect_length("velocity", n, velocity.len())?;
     let velocities = velocity.repeat(points.len() / n.max(1));
     if let Some(jets) = model.wide_metric_jets(points, &velocities)? {

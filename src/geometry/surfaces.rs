@@ -81,6 +81,15 @@ pub fn grid<S: Scalar>(base: &[S], axes: &[(usize, Vec<S>)]) -> Vec<S> {
     points.concat()
 }
 
+/// Places of a line whose metrics are held at a time.
+const PLACES: usize = 1024;
+
+/// `true` if the sign differs at the ends of a piece, or the piece ends with an exact zero.
+fn changes<S: Scalar>(low: S, high: S) -> bool {
+    let zero = <S as Real>::zero();
+    high == zero || (low < zero && high > zero) || (low > zero && high < zero)
+}
+
 /// Where the determinant of a block of the metric changes its sign on the straight line of coordinates from `from` to `to`, both
 /// `(n)`, at a velocity `(n)`.
 ///
@@ -117,22 +126,30 @@ pub fn surfaces<S: Scalar>(
         determinant(block.len(), &part)
     };
     let steps = steps.max(1);
-    let places: Vec<S> = (0..=steps).map(|k| S::of_f64(k as f64) / S::of_f64(steps as f64)).collect();
-    let points: Vec<S> = places.iter().flat_map(|&s| point(s)).collect();
-    let values: Vec<S> = metrics(model, &points, velocity)?.chunks_exact(n * n).map(value).collect();
+    let place = |k: usize| S::of_f64(k as f64) / S::of_f64(steps as f64);
     let mut found = Vec::new();
     let zero = <S as Real>::zero();
-    // A single place where the metric is not finite, such as a horizon that is met exactly, hides no change of sign.
-    let finite = values.iter().enumerate().filter(|(_, value)| value.is_finite());
-    let finite: Vec<usize> = finite.map(|(k, _)| k).collect();
-    for ends in finite.windows(2).filter(|ends| ends[1] - ends[0] <= 2) {
-        let [(mut low, mut at_low), (mut high, mut at_high)] = [ends[0], ends[1]].map(|k| (places[k], values[k]));
+    // The last place where the metric is finite: its number and the value there.
+    let mut last: Option<(usize, S)> = None;
+    let mut pieces = Vec::new();
+    for start in (0..=steps).step_by(PLACES) {
+        let end = steps.min(start.saturating_add(PLACES - 1));
+        let points: Vec<S> = (start..=end).flat_map(|k| point(place(k))).collect();
+        let metrics = metrics(model, &points, velocity)?;
+        for (k, metric) in (start..=end).zip(metrics.chunks_exact(n * n)) {
+            let here = value(metric);
+            if !here.is_finite() {
+                continue;
+            }
+            // A single place where the metric is not finite, such as a horizon that is met exactly, hides no change of sign.
+            let before = last.replace((k, here)).filter(|(before, at)| k - before <= 2 && changes(*at, here));
+            pieces.extend(before.map(|(before, at)| [(place(before), at), (place(k), here)]));
+        }
+    }
+    for [(mut low, mut at_low), (mut high, mut at_high)] in pieces {
         // An exact zero belongs to the piece that ends with it.
         if at_high == zero {
             found.push(Surface { point: point(high), change: Change::Zero });
-            continue;
-        }
-        if !((at_low < zero && at_high > zero) || (at_low > zero && at_high < zero)) {
             continue;
         }
         let outside = at_low.abs().max(at_high.abs());

@@ -86,19 +86,21 @@ impl FromStr for Degrees {
     }
 }
 
-/// Unknown coefficients of a search, at most: gigabytes.
-pub(super) const MOST_UNKNOWNS: usize = 4000;
+/// Unknown coefficients of a search, at most: a minute or two.
+pub(crate) const MOST_UNKNOWNS: usize = 4000;
 /// Unknown coefficients of a search over a basis that nobody asked for, at most: seconds.
 const USUAL: usize = 1300;
+/// Unknown coefficients times states, at most; a search holds about eight times as many numbers, two gigabytes.
+const MOST_NUMBERS: usize = MOST_UNKNOWNS * 2 * MOST_UNKNOWNS;
 /// Highest degree of a family.
 const MOST: usize = 12;
 
 impl Degrees {
     /// Degree 2 of the powers; as many harmonics as the fields of a sphere in these coordinates need, one more than there are
-    /// polar angles, at least 2.
+    /// polar angles, from 2 to 12.
     pub fn usual(charts: &[Chart]) -> Self {
         let polar = charts.iter().filter(|chart| matches!(chart, Chart::Polar | Chart::Either)).count();
-        Self { polynomial: 2, trigonometric: (polar + 1).max(2), hyperbolic: 0 }
+        Self { polynomial: 2, trigonometric: (polar + 1).clamp(2, MOST), hyperbolic: 0 }
     }
 }
 
@@ -276,21 +278,48 @@ impl Basis {
         Self { names: names.to_vec(), factors, products: products.into_iter().map(|(product, _)| product).collect() }
     }
 
+    /// Number of functions of [`Basis::new`], counted without making them, at most `usize::MAX`.
+    pub(crate) fn count(charts: &[Chart], degrees: Degrees) -> usize {
+        let most = degrees.of_families();
+        let place = |used: [usize; FAMILIES]| (used[0] * (most[1] + 1) + used[1]) * (most[2] + 1) + used[2];
+        let all: Vec<[usize; FAMILIES]> = (0..=most[0])
+            .flat_map(|a| (0..=most[1]).flat_map(move |b| (0..=most[2]).map(move |c| [a, b, c])))
+            .collect();
+        // Products of the factors of the coordinates so far, by their degrees.
+        let mut products = vec![0_usize; all.len()];
+        products[0] = 1;
+        for chart in charts {
+            let mut longer = vec![0_usize; all.len()];
+            for factor in Factor::all(*chart, degrees) {
+                let family = factor.family();
+                for used in &all {
+                    let mut sum = *used;
+                    sum[family] += factor.degree();
+                    if sum[family] <= most[family] {
+                        let count = &mut longer[place(sum)];
+                        *count = count.saturating_add(products[place(*used)]);
+                    }
+                }
+            }
+            products = longer;
+        }
+        products.into_iter().fold(0, usize::saturating_add)
+    }
+
     /// [`Degrees::usual`] of these charts, or lower ones as far as the unknown coefficients of a search for symmetries would be too
     /// many: first those of powers, then those of harmonics.
     pub(crate) fn usual(names: &[String], charts: &[Chart]) -> (Self, Degrees) {
+        let count = |degrees: &Degrees| Self::count(charts, *degrees);
         let mut degrees = Degrees::usual(charts);
-        let mut basis = Self::new(names, charts, degrees);
-        while unknowns(names.len(), basis.len()) > USUAL {
+        while unknowns(names.len(), count(&degrees)) > USUAL {
             let lower = [
                 Degrees { polynomial: degrees.polynomial.saturating_sub(1), ..degrees },
                 Degrees { trigonometric: degrees.trigonometric.saturating_sub(1), ..degrees },
             ];
-            let shorter = lower.map(|lower| (Self::new(names, charts, lower), lower));
-            let Some(next) = shorter.into_iter().find(|(next, _)| next.len() < basis.len()) else { break };
-            (basis, degrees) = next;
+            let Some(next) = lower.into_iter().find(|lower| count(lower) < count(&degrees)) else { break };
+            degrees = next;
         }
-        (basis, degrees)
+        (Self::new(names, charts, degrees), degrees)
     }
 
     /// The functions that do not depend on these coordinates, times each of the two first harmonics of the coordinate `angle`,
@@ -359,7 +388,12 @@ impl Basis {
 
 /// Number of unknown coefficients of fields and gauge function over a basis of `functions` functions of `n` coordinates.
 pub fn unknowns(n: usize, functions: usize) -> usize {
-    (n + 1) * functions
+    (n + 1).saturating_mul(functions)
+}
+
+/// States that a search for so many unknown coefficients of `n` coordinates takes at most.
+pub(crate) fn most_states(n: usize, unknowns: usize) -> usize {
+    MOST_NUMBERS / unknowns.max(n * n).max(1)
 }
 
 #[cfg(test)]
@@ -405,6 +439,20 @@ mod tests {
         let turning = of(&[Chart::Line, Chart::HalfLine, Chart::Polar, Chart::Polar, Chart::Circle]);
         assert_eq!((turning.polynomial, turning.trigonometric), (0, 3));
         assert_eq!(of(&[Chart::Line; 64]).polynomial, 0);
+        // Even their number is beyond all counting.
+        let many = [Chart::Either; 64];
+        assert_eq!(Basis::count(&many, "polynomial:12,trigonometric:12,hyperbolic:12".parse().unwrap()), usize::MAX);
+        assert_eq!((of(&many).polynomial, of(&many).trigonometric), (0, 0));
+    }
+
+    #[test]
+    fn functions_are_counted_without_being_made() {
+        let charts = [Chart::Line, Chart::HalfLine, Chart::Polar, Chart::Circle, Chart::Either];
+        for degrees in ["polynomial:2,trigonometric:3", "hyperbolic:2,polynomial:1", "trigonometric:2,hyperbolic:1"] {
+            let degrees: Degrees = degrees.parse().unwrap();
+            let basis = Basis::new(&vec!["q".to_string(); charts.len()], &charts, degrees);
+            assert_eq!(Basis::count(&charts, degrees), basis.len(), "{degrees}");
+        }
     }
 
     #[test]

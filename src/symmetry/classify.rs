@@ -25,6 +25,9 @@ const SEMISIMPLE: [(usize, usize, &str); 13] = [
     (4, 6, "so(3,2)"),
 ];
 
+/// Dimensions of an algebra that is looked into, at most: what has a name here is far smaller.
+const MOST: usize = 64;
+
 /// Name of the algebra with these constants, known to `tolerance`; `None` for one that is not known here.
 ///
 /// Abelian, semisimple (of dimension 3, 6, 8, 9, 10), Euclidean `e(n)` and pseudo-Euclidean `iso(p,q)`, `n` from 2 to 5, the solvable
@@ -37,6 +40,9 @@ pub(crate) fn name(c: &Constants, tolerance: f64) -> Option<String> {
     let derived = derived(c, tolerance);
     if derived.columns.is_empty() {
         return Some(abelian(m));
+    }
+    if m > MOST {
+        return None;
     }
     let center = center(c, tolerance)?;
     if !center.is_empty() {
@@ -136,8 +142,9 @@ fn euclidean(c: &Constants, derived: &Orthonormal, tolerance: f64) -> Option<Str
 fn bracket(c: &Constants, x: &[f64], y: &[f64]) -> Vec<f64> {
     let m = c.len();
     let mut result = vec![0.0; m];
-    for (a, x) in x.iter().enumerate() {
-        for (b, y) in y.iter().enumerate() {
+    // Most elements that are asked for have few components.
+    for (a, x) in x.iter().enumerate().filter(|(_, x)| **x != 0.0) {
+        for (b, y) in y.iter().enumerate().filter(|(_, y)| **y != 0.0) {
             super::orthonormal::add(&mut result, &c[a][b], x * y);
         }
     }

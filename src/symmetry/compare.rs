@@ -1,9 +1,10 @@
 //! Common ground of two Lagrangians of the same coordinates: the motion, and more than that.
 
-use super::basis::{Basis, Values};
+use super::basis::{Basis, Values, unknowns};
+use super::find::room;
 use super::orthonormal::{add, dot, norm, orthonormal};
 use super::sample::Sample;
-use super::{SymmetryError, field};
+use super::{SymmetryError, field, sparse};
 use crate::lagrangian::{EulerLagrange, Request, Terms};
 use crate::linalg::{Workspace, eigh};
 use serde::Serialize;
@@ -20,15 +21,18 @@ pub struct Comparison {
     pub on_shell: bool,
     /// Coefficients of the gauge function `F`, one for every function of the basis.
     pub gauge: Vec<f64>,
-    /// `F` as a formula.
+    /// `F` as a formula, without functions whose coefficients the states do not tell.
     pub gauge_formula: String,
     /// The constant, in the unit of `A`.
     pub constant: f64,
     /// Rest of the momenta and of the values of `A` beside `f(B) + dF/dt + constant`, root mean square over that of `A`, values
     /// about their mean.
     pub lagrangian: f64,
-    /// Difference of the accelerations, root mean square in the frame of `|M|` of `B` over that of the larger ones.
+    /// Difference of the accelerations, root mean square in the frame of `|M|` of `B` over that of the larger ones; `NaN` without
+    /// accelerations.
     pub motion: f64,
+    /// States at which one of the two has no accelerations, its mass matrix being singular; `motion` is that of the others.
+    pub motionless_states: usize,
     /// Rest of the mass matrix of `A` beside that of `f(B)`, root mean square over that of `A`, in the same frame.
     pub mass_matrix: f64,
     /// Rest of the energy of `A` beside the best polynomial of that of `B`, of first degree unless `f` has a higher one, root
@@ -64,6 +68,7 @@ pub fn compare(
         let found = if a.coordinates() == b.coordinates() { basis.names().len() } else { a.coordinates() };
         return Err(SymmetryError::Basis { expected: b.coordinates(), found });
     }
+    room(b.coordinates(), unknowns(b.coordinates(), basis.len()), q.len() / b.coordinates().max(1))?;
     // States at which both are finite.
     let of_a = Sample::new(a, q, v)?;
     let of_b = Sample::new(b, &of_a.q, &of_a.v)?;
@@ -74,16 +79,17 @@ pub fn compare(
         let _ = model.terms(&of_b.q, &of_b.v, Request::ACCELERATION, terms);
     }
     let fit = Fit::new((&of_a, &of_b), [&first, &second], basis)?;
-    let (mass_matrix, motion) = fit.mechanics([&first, &second], &of_b)?;
+    let (mass_matrix, motion, motionless_states) = fit.mechanics([&first, &second], &of_b)?;
     let energy = fit.energy(&of_a, &of_b);
     Ok(Comparison {
-        gauge_formula: field::sum(fit.gauge.iter().enumerate().map(|(f, c)| (*c, basis.text(f)))),
+        gauge_formula: field::sum(fit.known_gauge.iter().enumerate().map(|(f, c)| (*c, basis.text(f)))),
         factors: fit.factors,
         on_shell: fit.on_shell,
         gauge: fit.gauge,
         constant: fit.constant,
         lagrangian: fit.rest,
         motion,
+        motionless_states,
         mass_matrix,
         energy,
     })
@@ -94,6 +100,8 @@ struct Fit {
     factors: Vec<f64>,
     on_shell: bool,
     gauge: Vec<f64>,
+    /// The same without what the states do not tell.
+    known_gauge: Vec<f64>,
     constant: f64,
     rest: f64,
 }
@@ -130,7 +138,7 @@ impl Fit {
         let on_shell = powers > 1 && own.iter().all(|x| (x - level).abs() <= DEPENDENT * level.abs());
         let powers = if on_shell { 1 } else { powers };
         let factors = factors(terms, (b, &own), &frames, (powers, unit, on_shell));
-        let found = Self { factors, on_shell, gauge: Vec::new(), constant: 0.0, rest: 0.0 };
+        let found = Self { factors, on_shell, gauge: vec![], known_gauge: vec![], constant: 0.0, rest: 0.0 };
         let columns: Vec<Vec<f64>> = (0..functions).map(|f| at_states(&|k| gradient(f, k).to_vec())).collect();
         if states * n < columns.len() {
             return Err(SymmetryError::TooFew { unknowns: columns.len(), states });
@@ -140,11 +148,14 @@ impl Fit {
         add(&mut rest, &at_states(&|k| p(b, k, found.slopes(own[k])[0])), -1.0);
         let plain = orthonormal(&columns, DEPENDENT);
         let mut gauge = plain.given(&plain.along(&rest), columns.len());
+        let mut known_gauge = sparse::significant(&columns, &rest, DEPENDENT);
         let whole = norm(&target);
         // Roundings are no terms.
-        for (c, column) in gauge.iter_mut().zip(&columns) {
-            if (*c * norm(column)).abs() <= ROUNDING * whole {
-                *c = 0.0;
+        for (k, column) in columns.iter().enumerate() {
+            for c in [&mut gauge[k], &mut known_gauge[k]] {
+                if (*c * norm(column)).abs() <= ROUNDING * whole {
+                    *c = 0.0;
+                }
             }
         }
         gauge.iter().zip(&columns).for_each(|(c, column)| add(&mut rest, column, -c));
@@ -165,7 +176,7 @@ impl Fit {
         let size = |momenta: &[f64], values: &[f64]| (weight * norm(momenta)).hypot(norm(values));
         let whole = size(&target, &about);
         let rest = if whole > 0.0 { size(&rest, &left) / whole } else { 0.0 };
-        Ok(Self { gauge, constant, rest, ..found })
+        Ok(Self { gauge, known_gauge, constant, rest, ..found })
     }
 
     /// `f'` and `f''` at a value of `B`.
@@ -178,11 +189,15 @@ impl Fit {
         })
     }
 
-    /// Distances of mass matrices and of accelerations.
-    fn mechanics(&self, [first, second]: [&Terms<f64>; 2], sample: &Sample) -> Result<(f64, f64), SymmetryError> {
+    /// Distances of mass matrices and of accelerations, states without the latter.
+    fn mechanics(
+        &self,
+        [first, second]: [&Terms<f64>; 2],
+        sample: &Sample,
+    ) -> Result<(f64, f64, usize), SymmetryError> {
         let (n, frames) = (sample.n, Frames::new(sample)?);
         let own = lagrangians(sample);
-        let (mut left, mut whole, mut apart, mut size) = (0.0, 0.0, 0.0, 0.0);
+        let (mut left, mut whole, mut apart, mut size, mut motionless) = (0.0, 0.0, 0.0, 0.0, 0);
         for k in 0..sample.len() {
             let (matrix, one) = (k * n * n..(k + 1) * n * n, k * n..(k + 1) * n);
             let [slope, curve] = self.slopes(own[k]);
@@ -204,10 +219,13 @@ impl Fit {
             if d.is_finite() {
                 apart += d * d;
                 size += x.max(y).powi(2);
+            } else {
+                motionless += 1;
             }
         }
         let ratio = |part: f64, whole: f64| if part == 0.0 { 0.0 } else { (part / whole).sqrt() };
-        Ok((ratio(left, whole), ratio(apart, size)))
+        let motion = if motionless < sample.len() { ratio(apart, size) } else { f64::NAN };
+        Ok((ratio(left, whole), motion, motionless))
     }
 
     /// Distance of the energies.

@@ -1,12 +1,12 @@
 //! Conserved quantities that are quadratic in the momenta: Carter's constant, the vector of Runge and Lenz.
 
-use super::basis::{Basis, MOST_UNKNOWNS, Values};
+use super::basis::{Basis, Values};
 use super::echelon::reduce;
 use super::field::{join, sum};
-use super::find::Columns;
+use super::find::{Columns, room};
 use super::orthonormal::{dot, norm, orthonormal};
 use super::sample::Sample;
-use super::separation::Separation;
+use super::separation::{Separation, check};
 use super::{Field, SymmetryError, sparse};
 use crate::lagrangian::EulerLagrange;
 use crate::linalg::singular;
@@ -122,10 +122,15 @@ pub fn quadratic(
     (q, v): (&[f64], &[f64]),
     tolerance: Option<f64>,
 ) -> Result<Quadratic, SymmetryError> {
-    let sample = Sample::new(model, q, v)?;
-    if basis.names().len() != sample.n {
-        return Err(SymmetryError::Basis { expected: sample.n, found: basis.names().len() });
+    let n = model.coordinates();
+    check(tolerance)?;
+    if basis.names().len() != n {
+        return Err(SymmetryError::Basis { expected: n, found: basis.names().len() });
     }
+    // 1, the energy, its square, charges, their products with the energy and with each other.
+    let products = 3 + 2 * fields.len() + fields.len() * (fields.len() + 1) / 2;
+    room(n, products, q.len() / n.max(1))?;
+    let sample = Sample::new(model, q, v)?;
     let known = known(&sample, basis, fields);
     let cyclic = sample.cyclic();
     let mut all: Option<Quadratic> = None;
@@ -191,11 +196,8 @@ fn search(
     if !sample.homogeneous {
         monomials.push(Monomial::One);
     }
-    let unknowns = monomials.len() * basis.len();
-    if unknowns > MOST_UNKNOWNS {
-        return Err(SymmetryError::TooMany { unknowns, most: MOST_UNKNOWNS });
-    }
-    let functions = Columns::new(basis, sample);
+    room(n, monomials.len() * basis.len(), states)?;
+    let functions = Columns::new(basis, sample)?;
     let (mut places, mut values, mut rates) = (Vec::new(), Vec::new(), Vec::new());
     for f in 0..basis.len() {
         for &monomial in &monomials {
@@ -248,7 +250,7 @@ fn search(
     reduce(&mut rows, &sizes, noise, old);
     let last = zero.len().checked_sub(1).map_or(0.0, |last| found.values[last]).max(f64::EPSILON);
     let conserved = rows.split_off(old).into_iter().map(|mut row| {
-        sparse::polish(&mut row, &rates, &sizes, last);
+        sparse::polish(&mut row, &|k| rates[k].clone(), &sizes, last);
         let terms = row.iter().zip(&places).filter(|(c, _)| **c != 0.0).map(|(c, (f, m))| (*c, *f, *m));
         Conserved { terms: terms.collect(), basis: basis.clone() }
     });

@@ -42,6 +42,26 @@ pub enum SymmetryError {
         /// Unknowns that there may be.
         most: usize,
     },
+    /// More states than a search has room for.
+    #[error("{states} states are too many for {unknowns} unknown coefficients, at most {most}")]
+    TooManyStates {
+        /// States.
+        states: usize,
+        /// Unknowns.
+        unknowns: usize,
+        /// States that there may be.
+        most: usize,
+    },
+    /// A tolerance at which nothing can be decided.
+    #[error("a tolerance of {found:e}: expected one from {least:e} to {most:e}")]
+    Tolerance {
+        /// The tolerance.
+        found: f64,
+        /// The least.
+        least: f64,
+        /// The largest.
+        most: f64,
+    },
     /// A basis for another number of coordinates.
     #[error("the functions are of {found} coordinates, the model has {expected}")]
     Basis {

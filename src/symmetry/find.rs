@@ -1,10 +1,11 @@
 //! Point symmetries of a Lagrangian: vector fields along which it changes by a total derivative at most.
 
-use super::basis::{Basis, MOST_UNKNOWNS, Values, unknowns};
+use super::algebra::MOST_FIELDS;
+use super::basis::{Basis, MOST_UNKNOWNS, Values, most_states, unknowns};
 use super::echelon::reduce;
 use super::orthonormal::{Orthonormal, dot, norm, orthonormal};
 use super::sample::Sample;
-use super::separation::Separation;
+use super::separation::{Separation, check};
 use super::{Algebra, Field, SymmetryError, sparse};
 use crate::lagrangian::EulerLagrange;
 use crate::linalg::{Workspace, eigh, singular};
@@ -14,6 +15,9 @@ const DEPENDENT: f64 = 1e-7;
 
 /// Growth of the noise of a field that fewer functions are worth.
 const WORSE: f64 = 3.0;
+
+/// Fields times the cube of their unknown coefficients up to which fields of few functions are sought, half a minute.
+const SIMPLE: f64 = 2e10;
 
 /// Noise of exact terms: singular values below it are zero.
 pub const EXACT: f64 = 1e-8;
@@ -29,8 +33,13 @@ pub struct Symmetries {
     pub separation: Separation,
     /// The symmetries, in reduced echelon form; empty if there is no gap.
     pub fields: Vec<Field>,
-    /// The Lie algebra that they form; `None` without symmetries.
+    /// The Lie algebra that they form; `None` without symmetries and of more than 200.
     pub algebra: Option<Algebra>,
+    /// States that were looked at, and those of them at which the mass matrix is singular to working precision. There `L` is
+    /// degenerate: it determines no motion, and whatever function multiplies a null direction of it may be a symmetry.
+    pub states: usize,
+    /// See `states`.
+    pub singular_states: usize,
 }
 
 /// Values of functions, and their derivatives along the velocity, at all states: one column per function.
@@ -40,7 +49,9 @@ pub(crate) struct Columns {
 }
 
 impl Columns {
-    pub fn new(basis: &Basis, sample: &Sample) -> Self {
+    /// # Errors
+    /// [`SymmetryError::NotFinite`] for functions that overflow.
+    pub fn new(basis: &Basis, sample: &Sample) -> Result<Self, SymmetryError> {
         let (n, states) = (sample.n, sample.len());
         let mut columns =
             Self { values: vec![vec![0.0; states]; basis.len()], rates: vec![vec![0.0; states]; basis.len()] };
@@ -52,7 +63,10 @@ impl Columns {
                 columns.rates[f][k] = gradient.iter().zip(v).map(|(d, v)| d * v).sum();
             }
         }
-        columns
+        if !columns.values.iter().chain(&columns.rates).all(|column| norm(column).is_finite()) {
+            return Err(SymmetryError::NotFinite { what: "a function of the coordinates" });
+        }
+        Ok(columns)
     }
 }
 
@@ -78,23 +92,35 @@ pub fn symmetries(
     (q, v): (&[f64], &[f64]),
     tolerance: Option<f64>,
 ) -> Result<Symmetries, SymmetryError> {
-    let sample = Sample::new(model, q, v)?;
-    if basis.names().len() != sample.n {
-        return Err(SymmetryError::Basis { expected: sample.n, found: basis.names().len() });
+    let n = model.coordinates();
+    check(tolerance)?;
+    if basis.names().len() != n {
+        return Err(SymmetryError::Basis { expected: n, found: basis.names().len() });
     }
-    search(&sample, basis, tolerance)
+    room(n, unknowns(n, basis.len()), q.len() / n.max(1))?;
+    search(&Sample::new(model, q, v)?, basis, tolerance)
+}
+
+/// Refuses a search that would take too much memory or time.
+///
+/// # Errors
+/// [`SymmetryError::TooMany`], [`SymmetryError::TooManyStates`].
+pub(super) fn room(n: usize, unknowns: usize, states: usize) -> Result<(), SymmetryError> {
+    if unknowns > MOST_UNKNOWNS {
+        return Err(SymmetryError::TooMany { unknowns, most: MOST_UNKNOWNS });
+    }
+    match most_states(n, unknowns) {
+        most if states > most => Err(SymmetryError::TooManyStates { states, unknowns, most }),
+        _ => Ok(()),
+    }
 }
 
 /// [`symmetries`] of a Lagrangian whose terms are at hand.
 pub(crate) fn search(sample: &Sample, basis: &Basis, tolerance: Option<f64>) -> Result<Symmetries, SymmetryError> {
     let (n, states, functions) = (sample.n, sample.len(), basis.len());
-    if unknowns(n, functions) > MOST_UNKNOWNS {
-        return Err(SymmetryError::TooMany { unknowns: unknowns(n, functions), most: MOST_UNKNOWNS });
-    }
-    let columns = Columns::new(basis, sample);
+    let columns = Columns::new(basis, sample)?;
     let plain = orthonormal(&columns.values, DEPENDENT);
     let (values, rates) = (&plain.columns, plain.mixed(&columns.rates));
-    let count = n * values.len();
     if states < unknowns(n, values.len()) {
         return Err(SymmetryError::TooFew { unknowns: unknowns(n, values.len()), states });
     }
@@ -114,24 +140,28 @@ pub(crate) fn search(sample: &Sample, basis: &Basis, tolerance: Option<f64>) -> 
     let found = singular(&mixed).ok_or(SymmetryError::NotFinite { what: "the equation of a symmetry" })?;
     let separation = Separation::new(&found.values, tolerance);
     let zero = separation.count.unwrap_or(0);
-    let mut rows: Vec<Vec<f64>> = Vec::with_capacity(zero);
-    for vector in &found.vectors[..zero] {
-        let mut field = vec![0.0; count];
-        for (share, unit) in vector.iter().zip(&unit) {
-            field.iter_mut().zip(unit).for_each(|(sum, x)| *sum += share * x);
-        }
-        let change = combined(std::slice::from_ref(&field), &free).remove(0);
-        let change = gauge.given(&gauge.along(&change), rates.len());
-        let parts = field.chunks_exact(values.len()).chain([change.as_slice()]);
-        rows.push(parts.flat_map(|part| plain.given(part, functions)).collect());
-    }
+    let null = combined(&found.vectors[..zero], &unit);
+    let changes = combined(&null, &free);
+    let mut rows: Vec<Vec<f64>> = null
+        .iter()
+        .zip(&changes)
+        .map(|(field, change)| {
+            let change = gauge.given(&gauge.along(change), rates.len());
+            let parts = field.chunks_exact(values.len()).chain([change.as_slice()]);
+            parts.flat_map(|part| plain.given(part, functions)).collect()
+        })
+        .collect();
     let sizes = sizes(sample, &columns.values);
-    let noise = found.values[..zero].last().map_or(0.0, |last| (10.0 * last).clamp(1e-9, 0.05));
+    let last = found.values[..zero].last().copied();
+    let noise = last.map_or(0.0, |last| (10.0 * last).clamp(1e-9, 0.05));
     let pivots = reduce(&mut rows, &sizes, noise, 0);
-    if tolerance.is_none() && zero > 0 && pivots.len() == zero {
-        // A model has the fields nearly: those of few functions among all that are as good.
+    if let Some(last) = last.filter(|_| pivots.len() == zero) {
         let unknowns = Unknowns { sample, columns: &columns, plain: &plain, gauge: &gauge, weight: &weight };
-        unknowns.simplify(&mut rows, &pivots, &sizes, found.values[zero - 1]);
+        match tolerance {
+            Some(_) => unknowns.polish(&mut rows, &pivots, &sizes, last.max(f64::EPSILON)),
+            // A model has the fields nearly: those of few functions among all that are as good.
+            None => unknowns.simplify(&mut rows, &pivots, &sizes, last),
+        }
     }
     let fields: Vec<Field> = rows
         .into_iter()
@@ -143,8 +173,12 @@ pub(crate) fn search(sample: &Sample, basis: &Basis, tolerance: Option<f64>) -> 
             field
         })
         .collect();
-    let algebra = if fields.is_empty() { None } else { Some(Algebra::new(sample, basis, &fields, noise)?) };
-    Ok(Symmetries { basis: basis.clone(), singular_values: found.values, separation, fields, algebra })
+    let algebra = match fields.len() {
+        1..=MOST_FIELDS => Some(Algebra::new(sample, basis, &fields, noise)?),
+        _ => None,
+    };
+    let (basis, singular_states) = (basis.clone(), sample.singular);
+    Ok(Symmetries { basis, singular_values: found.values, separation, fields, algebra, states, singular_states })
 }
 
 /// The equation of a symmetry in the coefficients of the functions as they are.
@@ -162,6 +196,28 @@ impl Unknowns<'_> {
         let n = self.sample.n;
         let rows = self.columns.values[f].iter().zip(&self.columns.rates[f]).zip(self.weight).enumerate();
         rows.map(|(k, ((x, dx), w))| w * (self.sample.g[k * n + i] * x + self.sample.p[k * n + i] * dx)).collect()
+    }
+
+    /// Takes out of rows of coefficients what is noise of functions that nearly depend on each other.
+    fn polish(&self, rows: &mut [Vec<f64>], pivots: &[usize], sizes: &[f64], noise: f64) {
+        let (n, functions) = (self.sample.n, self.columns.values.len());
+        let column = |place: usize| match (place / functions, place % functions) {
+            (i, f) if i < n => self.change(i, f),
+            (_, f) => self.columns.rates[f].iter().zip(self.weight).map(|(rate, w)| -rate * w).collect(),
+        };
+        // F stands beside p.xi.
+        let sample = self.sample;
+        let momentum: Vec<f64> = sample.pace.iter().zip(&sample.size).map(|(pace, size)| pace * size).collect();
+        let momentum = norm(&momentum).max(f64::MIN_POSITIVE.sqrt());
+        let sizes: Vec<f64> =
+            sizes.iter().copied().chain(self.columns.values.iter().map(|value| norm(value) / momentum)).collect();
+        for (row, pivot) in rows.iter_mut().zip(pivots) {
+            sparse::polish(row, &column, &sizes, noise);
+            let unit = row[*pivot];
+            if unit != 0.0 {
+                row.iter_mut().for_each(|x| *x /= unit);
+            }
+        }
     }
 
     /// Length of a field in the frame, over all states.
@@ -188,6 +244,9 @@ impl Unknowns<'_> {
         fixed.iter_mut().for_each(|column| self.gauge.remove(column));
         let gram = sparse::gram(&fixed);
         let weights: Vec<f64> = places.iter().map(|at| sizes[*at]).collect();
+        if rows.len() as f64 * (places.len() as f64).powi(3) > SIMPLE {
+            return;
+        }
         for (row, pivot) in rows.iter_mut().zip(pivots) {
             let taken: Vec<bool> = places.iter().map(|at| pivots.contains(at) && at != pivot).collect();
             let Some(own) = places.iter().position(|at| at == pivot) else { continue };

@@ -53,9 +53,10 @@ mod separation;
 mod sparse;
 
 pub use algebra::Algebra;
+pub(crate) use algebra::MOST_FIELDS;
 pub(crate) use bases::{bases, enough, most_symmetries};
-pub(crate) use basis::unknowns;
 pub use basis::{Basis, Chart, Degrees};
+pub(crate) use basis::{MOST_UNKNOWNS, most_states, unknowns};
 pub use canonical::{Canonical, CanonicalForm};
 pub(crate) use charges::drifts;
 pub use charges::{Charge, charges};
@@ -68,3 +69,4 @@ pub use find::{EXACT, Symmetries, symmetries};
 pub use region::Region;
 pub(crate) use region::middle;
 pub use separation::Separation;
+pub(crate) use separation::TOLERANCES;

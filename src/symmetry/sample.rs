@@ -2,7 +2,7 @@
 
 use super::SymmetryError;
 use crate::lagrangian::{EulerLagrange, Request, Terms};
-use crate::linalg::{Workspace, eigh};
+use crate::linalg::{Workspace, eigh, inertia};
 
 /// Terms of a Lagrangian at states `(states, n)`.
 #[derive(Clone, Debug)]
@@ -25,6 +25,8 @@ pub(crate) struct Sample {
     pub size: Vec<f64>,
     /// Time in which momenta change by themselves at every state, `(states)`.
     pub pace: Vec<f64>,
+    /// States at which the mass matrix is singular to working precision: there `L` is degenerate and determines no motion.
+    pub singular: usize,
     /// `true` if `L(q, -v) = L(q, v)`.
     pub even: bool,
     /// `true` if `L` is a quadratic form of the velocity, as that of geodesics: then it is the energy.
@@ -61,10 +63,11 @@ impl Sample {
             frame: vec![],
             size: vec![],
             pace: vec![],
+            singular: 0,
             even: true,
             homogeneous: true,
         };
-        let states = q.len() / n;
+        let (states, mut scratch) = (q.len() / n, vec![0.0; n * n]);
         for k in 0..states {
             let (one, matrix) = (k * n..(k + 1) * n, k * n * n..(k + 1) * n * n);
             let [Some(p), Some(g)] = [&terms.momentum, &terms.dl_dq].map(|x| x.get(one.clone())) else { continue };
@@ -79,6 +82,7 @@ impl Sample {
             sample.g.extend_from_slice(g);
             sample.energy.push(energy);
             sample.frame.extend_from_slice(m);
+            sample.singular += usize::from(inertia(n, m, &mut scratch).is_ok_and(|signs| signs.zero > 0));
             let same = |here: &[f64], there: &[f64], sign: f64| {
                 let size = here.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
                 here.iter().zip(there).all(|(a, b)| (a - sign * b).abs() <= EVEN * size)
@@ -154,7 +158,7 @@ impl Sample {
     }
 
     /// Root mean square of every coordinate about its mean; 1 for one that is the same everywhere.
-    fn spread(&self) -> Vec<f64> {
+    pub fn spread(&self) -> Vec<f64> {
         let states = self.len() as f64;
         let one = |i: usize| {
             let values = || self.q.iter().skip(i).step_by(self.n);

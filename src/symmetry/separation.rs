@@ -1,5 +1,6 @@
 //! Number of singular values that count as zero.
 
+use super::SymmetryError;
 use serde::Serialize;
 
 /// Singular values cut into those that count as zero and the others.
@@ -21,6 +22,21 @@ const APART: f64 = 10.0;
 const NOISE: f64 = 1e-3;
 /// Least gap above a known noise.
 const ABOVE: f64 = 30.0;
+/// Tolerances by which values can be judged: from the rounding of a number near 1 to the part below which a function may be
+/// meant to be zero.
+pub(crate) const TOLERANCES: [f64; 2] = [f64::EPSILON, SMALL];
+
+/// Refuses a tolerance that is none of [`TOLERANCES`].
+///
+/// # Errors
+/// [`SymmetryError::Tolerance`].
+pub(crate) fn check(tolerance: Option<f64>) -> Result<(), SymmetryError> {
+    let [least, most] = TOLERANCES;
+    match tolerance {
+        Some(found) if !(least..=most).contains(&found) => Err(SymmetryError::Tolerance { found, least, most }),
+        _ => Ok(()),
+    }
+}
 
 impl Separation {
     /// Cuts ascending values at a tolerance, the noise of exact terms, or, without one, at the largest gap.

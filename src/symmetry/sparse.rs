@@ -3,42 +3,125 @@
 use super::orthonormal::{add, dot, norm, orthonormal};
 use crate::linalg::{MatMut, MatRef, Workspace, gemm, solve};
 
-/// Entries below this part of the largest are tried without.
-const SMALL: f64 = 1e-4;
+/// Parts of the largest entry below which entries are tried without, one after the other.
+const SMALL: [f64; 4] = [1e-4, 1e-5, 1e-6, 1e-7];
 /// Residual of the null vector of few entries, in units of the one it replaces and of `1/SMALL` roundings.
 const WORSE: f64 = 10.0;
 
 /// Replaces a null vector of columns by one without its small entries, if that is one too.
 ///
-/// `vector` has one entry for each of `columns`; `sizes` are those of the functions that they belong to. The largest entry keeps
+/// `column` gives the column of an entry of `vector`; `sizes` are those of the functions that they belong to. The largest entry keeps
 /// its value, the other large ones follow by least squares. The new vector is taken if the residual, over that of all entries one by
-/// one, is below ten times `noise` or below 1e-9.
-pub(crate) fn polish(vector: &mut [f64], columns: &[Vec<f64>], sizes: &[f64], noise: f64) {
+/// one, is below ten times `noise` or below 1e-9: whatever it leaves out was noise. Once more, as long as that leaves out more: what was
+/// large before a fit may be small after it.
+pub(crate) fn polish(vector: &mut [f64], column: &dyn Fn(usize) -> Vec<f64>, sizes: &[f64], noise: f64) {
+    let entries = |vector: &[f64]| vector.iter().filter(|x| **x != 0.0).count();
+    loop {
+        let before = entries(vector);
+        polish_once(vector, column, sizes, noise);
+        if entries(vector) == before {
+            return;
+        }
+    }
+}
+
+fn polish_once(vector: &mut [f64], column: &dyn Fn(usize) -> Vec<f64>, sizes: &[f64], noise: f64) {
     let weighed: Vec<f64> = vector.iter().zip(sizes).map(|(x, s)| (x * s).abs()).collect();
     let largest = weighed.iter().fold(0.0, |m: f64, x| m.max(*x));
-    let mut support: Vec<usize> = (0..vector.len()).filter(|k| weighed[*k] > SMALL * largest).collect();
-    let Some(pivot) = support.iter().copied().max_by(|a, b| weighed[*a].total_cmp(&weighed[*b])) else { return };
-    support.retain(|k| *k != pivot);
-    let scaled: Vec<Vec<f64>> = support.iter().map(|k| columns[*k].clone()).collect();
-    let target: Vec<f64> = columns[pivot].iter().map(|x| -vector[pivot] * x).collect();
-    let plain = orthonormal(&scaled, 1e-10);
-    let solution = plain.given(&plain.along(&target), support.len());
+    let mut before = 0;
+    for small in SMALL {
+        let mut support: Vec<usize> = (0..vector.len()).filter(|k| weighed[*k] > small * largest).collect();
+        let Some(pivot) = support.iter().copied().max_by(|a, b| weighed[*a].total_cmp(&weighed[*b])) else { return };
+        support.retain(|k| *k != pivot);
+        // The same entries would be refused again.
+        if small < SMALL[0] && support.len() == before {
+            continue;
+        }
+        before = support.len();
+        if let Some(solution) = fitted(vector[pivot], &column(pivot), &support, column, noise) {
+            let kept = vector[pivot];
+            vector.fill(0.0);
+            vector[pivot] = kept;
+            support.into_iter().zip(solution).for_each(|(place, x)| vector[place] = x);
+            return;
+        }
+    }
+}
+
+/// Entries of `support` that take `value` times the pivot's column to zero, if they do.
+fn fitted(
+    value: f64,
+    pivot: &[f64],
+    support: &[usize],
+    column: &dyn Fn(usize) -> Vec<f64>,
+    noise: f64,
+) -> Option<Vec<f64>> {
+    let columns: Vec<Vec<f64>> = support.iter().map(|k| column(*k)).collect();
+    let target: Vec<f64> = pivot.iter().map(|x| -value * x).collect();
+    let plain = orthonormal(&columns, 1e-10);
+    let mut solution = plain.given(&plain.along(&target), support.len());
     let mut rest = target.clone();
     let mut whole = norm(&target).powi(2);
-    for (x, column) in solution.iter().zip(&scaled) {
+    for (x, column) in solution.iter().zip(&columns) {
         add(&mut rest, column, -x);
         whole += (x * norm(column)).powi(2);
     }
     let whole = whole.sqrt();
     if whole > 0.0 && norm(&rest) > (WORSE * noise).max(1e-9) * whole {
-        return;
+        return None;
     }
-    let kept = vector[pivot];
-    vector.fill(0.0);
-    vector[pivot] = kept;
-    let last = solution.iter().zip(&scaled).fold(0.0, |m: f64, (x, column)| m.max((x * norm(column)).abs()));
-    for ((place, x), column) in support.into_iter().zip(solution).zip(&scaled) {
-        vector[place] = if (x * norm(column)).abs() > 1e-10 * last { x } else { 0.0 };
+    let parts: Vec<f64> = solution.iter().zip(&columns).map(|(x, column)| (x * norm(column)).abs()).collect();
+    let last = parts.iter().fold(0.0, |m: f64, part| m.max(*part));
+    for (x, part) in solution.iter_mut().zip(&parts) {
+        if *part <= 1e-10 * last {
+            *x = 0.0;
+        }
+    }
+    Some(solution)
+}
+
+/// Coefficient below so many standard errors of its own are tried without.
+const CERTAIN: f64 = 2.0;
+
+/// Coefficients of the least-squares fit of columns to a target, 0 for those that the fit does not know: such below twice their own
+/// standard error are left out and the others fitted again, as long as the rest grows no more than by chance.
+pub(crate) fn significant(columns: &[Vec<f64>], target: &[f64], dependent: f64) -> Vec<f64> {
+    let mut support: Vec<usize> = (0..columns.len()).collect();
+    let mut found: Option<(Vec<f64>, f64)> = None;
+    loop {
+        let own: Vec<Vec<f64>> = support.iter().map(|k| columns[*k].clone()).collect();
+        let plain = orthonormal(&own, dependent);
+        let mut rest = target.to_vec();
+        let along = plain.along(target);
+        plain.remove(&mut rest);
+        let free = target.len().saturating_sub(plain.columns.len()).max(1) as f64;
+        let square = dot(&rest, &rest) / free;
+        // What was left out explained no more than as many columns of noise do, within two standard errors.
+        let left_out = (columns.len() - support.len()) as f64;
+        if let Some((before, least)) = &found
+            && square > least * (1.0 + CERTAIN * (2.0 * left_out).sqrt() / free)
+        {
+            return before.clone();
+        }
+        let mut errors = vec![0.0; support.len()];
+        for mix in &plain.mix {
+            mix.iter().zip(&plain.kept).for_each(|(x, k)| errors[*k] += x * x);
+        }
+        let solution = plain.given(&along, support.len());
+        let mut all = vec![0.0; columns.len()];
+        support.iter().zip(&solution).for_each(|(k, x)| all[*k] = *x);
+        let least = found.map_or(square, |(_, least)| least);
+        found = Some((all.clone(), least));
+        let kept: Vec<usize> = support
+            .iter()
+            .zip(solution.iter().zip(&errors))
+            .filter(|(_, (x, error))| x.abs() > CERTAIN * (square * **error).sqrt())
+            .map(|(k, _)| *k)
+            .collect();
+        if kept.len() == support.len() {
+            return all;
+        }
+        support = kept;
     }
 }
 
@@ -135,16 +218,31 @@ mod tests {
     }
 
     #[test]
+    fn coefficients_that_a_fit_does_not_know_are_zero() {
+        // 3 a and noise that neither b, which is nearly a, nor c explains.
+        let wave = |rate: f64| (0..200).map(|k| (rate * f64::from(k)).sin()).collect::<Vec<f64>>();
+        let (a, c, noise) = (wave(0.1), wave(0.37), wave(2.3));
+        let b: Vec<f64> = a.iter().zip(wave(1.7)).map(|(a, x)| a + 1e-3 * x).collect();
+        let target: Vec<f64> = a.iter().zip(&noise).map(|(a, x)| 3.0 * a + 0.1 * x).collect();
+        let found = significant(&[a.clone(), b, c.clone()], &target, 1e-9);
+        assert!((found[0] - 3.0).abs() < 0.05 && found[1..] == [0.0; 2], "{found:?}");
+        // Of two that explain it together neither is left out.
+        let both: Vec<f64> = a.iter().zip(&c).map(|(a, c)| a - 0.5 * c).collect();
+        let found = significant(&[a, c], &both, 1e-9);
+        assert!((found[0] - 1.0).abs() < 1e-12 && (found[1] + 0.5).abs() < 1e-12, "{found:?}");
+    }
+
+    #[test]
     fn noise_is_taken_out() {
         // 2 a - b = 0; c is no part of it.
         let columns = vec![vec![1.0, 2.0, 0.5], vec![2.0, 4.0, 1.0], vec![0.0, 1.0, 3.0]];
         let mut vector = vec![2.0 + 1e-6, -1.0, 1e-6];
-        polish(&mut vector, &columns, &[1.0; 3], 1e-6);
+        polish(&mut vector, &|k| columns[k].clone(), &[1.0; 3], 1e-6);
         assert!((vector[0] / vector[1] + 2.0).abs() < 1e-14 && vector[2] == 0.0, "{vector:?}");
         // An entry that is needed stays, small as it is.
         let columns = vec![vec![1.0, 0.0, 0.0], vec![1.0, 0.0, 1e-5], vec![0.0, 0.0, 1.0]];
         let mut vector = vec![1.0, -1.0, 1e-5];
-        polish(&mut vector, &columns, &[1.0; 3], 1e-12);
+        polish(&mut vector, &|k| columns[k].clone(), &[1.0; 3], 1e-12);
         assert_eq!(vector, [1.0, -1.0, 1e-5]);
     }
 }

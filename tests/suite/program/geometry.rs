@@ -161,6 +161,9 @@ fn a_line_without_a_surface_and_mistakes() {
     surface("t,t").refused(2, &["--surface", "t is given twice"]);
     lnn(&[&line[..5], &["--surface", "t"]].concat()).refused(2, &["--to"]);
     lnn(&[&line[..4], &["0,1", "--to", "0,0,0,5", "--surface", "t"]].concat()).refused(2, &["--from", "expected 4"]);
+    for steps in ["0", "1000001", "4294967296", "18446744073709551615"] {
+        lnn(&[&line[..], &["--surface", "t", "--steps", steps]].concat()).refused(2, &["--steps", "from 1 to 1000000"]);
+    }
     let hole = ["geometry", "--system", "schwarzschild-geodesic", "--surface", "t", "--format", "table"];
     let told = lnn(&[&hole[..], &["--from", "0,1,1.2,0", "--to", "0,6,1.2,0"]].concat()).stdout;
     assert!(told.starts_with("determinant of the metric's block t: 1 change of sign on the line\n"), "{told}");
@@ -168,4 +171,29 @@ fn a_line_without_a_surface_and_mistakes() {
     let wide = ["--system", "schwarzschild-geodesic", "--surface", "t", "--precision", "dd"];
     let found = surfaces(&[&wide[..], &["--from", "0,1,1.2,0", "--to", "0,6,1.2,0"]].concat(), "r");
     assert!(found.len() == 1 && (found[0].0 - 2.0).abs() < 1e-15, "{found:?}");
+}
+
+#[test]
+fn curvature_of_more_coordinates_than_fit_into_memory_is_refused() {
+    let folder = Folder::new();
+    for (count, code) in [(32, 0), (33, 2)] {
+        let names: Vec<String> = (0..count).map(|k| format!("q{k}")).collect();
+        let squares: Vec<String> = names.iter().map(|name| format!("{name}_dot^2/2")).collect();
+        let mut text = format!("name = \"flat\"\ntitle = \"Flat\"\nlagrangian = \"{}\"\n", squares.join(" + "));
+        for name in &names {
+            text += &format!("[[coordinates]]\nname = \"{name}\"\nbounds = [-1, 1]\nvelocity_bounds = [-1, 1]\n");
+        }
+        let system = folder.file(&format!("flat{count}.toml"), text);
+        let zeros = vec!["0"; count].join(",");
+        let points = folder.file("points.csv", format!("{}\n{zeros}\n", names.join(",")));
+        let run = lnn(&["geometry", "--system", &system, "--points", &points, "--format", "table"]);
+        match code {
+            0 => assert_eq!((run.code, run.stderr.as_str()), (Some(0), "")),
+            _ => run.refused(2, &["33 coordinates are too many, at most 32"]),
+        }
+        // A line needs no curvature.
+        let ones = vec!["1"; count].join(",");
+        let line = ["geometry", "--system", &system, "--surface", "q0", "--from", &zeros, "--to", &ones];
+        assert_eq!(lnn(&line).code, Some(0));
+    }
 }

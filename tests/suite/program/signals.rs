@@ -79,6 +79,17 @@ fn a_motion_ends_with_the_samples_that_it_has() {
     assert!(std::fs::read_to_string(&out).unwrap().lines().count() > 1);
 }
 
+#[test]
+fn a_long_search_says_so_and_ends_at_once() {
+    use std::io::{BufRead, BufReader};
+    let mut child = start(&["symmetries", "--system", "triple-pendulum", "--basis", "trigonometric:9"]);
+    let mut note = String::new();
+    BufReader::new(child.stderr.as_mut().unwrap()).read_line(&mut note).unwrap();
+    assert!(note.starts_with("note: ") && note.contains(" unknown coefficients at "), "{note}");
+    send("-TERM", &child);
+    assert_eq!(child.wait().unwrap().code(), Some(143));
+}
+
 /// Files may grow to a certain size, as on a disk that is almost full: model and tables fit, the report with its pictures
 /// does not.
 #[test]

@@ -41,10 +41,66 @@ fn options_choose_basis_region_and_states() {
         (["--region", "x=3:1"], "expected NAME=LOW:HIGH"),
         (["--basis", "fourier:2"], "unknown family \"fourier\""),
         (["--points", "0"], "expected a whole number above 0"),
+        (["--points", "100000000"], "--points: expected at most 1777777"),
+        (["--tolerance", "1e308"], "from 2.2e-16 (rounding) to 0.1"),
+        (["--tolerance", "1e-300"], "from 2.2e-16 (rounding) to 0.1"),
+        (["--region", "x=0:0"], "expected NAME=LOW:HIGH"),
+        (["--region", "y_dot=1:1.0000001"], "expected NAME=LOW:HIGH"),
     ] {
         lnn(&[&kepler[..4], &more].concat()).refused(2, &[problem]);
     }
     lnn(&[&kepler[..4], &["--points", "3"]].concat()).refused(1, &["more states or a smaller basis"]);
+}
+
+/// A system of so many coordinates of this unit and these bounds, a chain of masses.
+fn chain(folder: &Folder, count: usize, unit: &str, bounds: &str) -> String {
+    let names = |k: usize| format!("q{k}");
+    let squares: Vec<String> = (0..count).map(|k| format!("{}_dot^2/2", names(k))).collect();
+    let pulls: String = (1..count).map(|k| format!(" - ({} - {})^2", names(k - 1), names(k))).collect();
+    let mut text = format!("name = \"chain\"\ntitle = \"Chain\"\nlagrangian = \"{}{pulls}\"\n", squares.join(" + "));
+    for k in 0..count {
+        text += &format!(
+            "[[coordinates]]\nname = \"{}\"\nunit = \"{unit}\"\nbounds = {bounds}\nvelocity_bounds = [-1, 1]\n",
+            names(k)
+        );
+    }
+    folder.file("chain.toml", text)
+}
+
+#[test]
+fn many_coordinates_are_searched_or_refused_at_once() {
+    let folder = Folder::new();
+    // As many harmonics as for spheres in 16 polar angles would be beyond all memory.
+    let polar = chain(&folder, 16, "rad", "[0.5, 2.5]");
+    let found = object(&["symmetries", "--system", &polar, "--json"]);
+    assert!(found["functions"].as_u64().unwrap() < 80, "{}", found["functions"]);
+    for command in [&["symmetries", "--system", &polar][..], &["compare", &polar, &polar]] {
+        lnn(&[command, &["--basis", "trigonometric:12"]].concat()).refused(2, &["--basis: ", "at most 4000 "]);
+        lnn(&[command, &["--points", "100000000"]].concat()).refused(2, &["--points: expected at most "]);
+    }
+}
+
+#[test]
+fn a_degenerate_lagrangian_is_called_so() {
+    let folder = Folder::new();
+    let columns = ["x", "y"].map(|name| {
+        format!("[[coordinates]]\nname = \"{name}\"\nunit = \"m\"\nbounds = [-2, 2]\nvelocity_bounds = [-1, 1]\n")
+    });
+    let lagrangian = "name = \"flat\"\ntitle = \"Flat\"\nlagrangian = \"(x_dot + y_dot)^2/2\"\n";
+    let system = folder.file("flat.toml", format!("{lagrangian}{}", columns.concat()));
+    let found = object(&["symmetries", "--system", &system, "--json"]);
+    assert_eq!((found["singular_states"].as_u64(), found["closes"].as_bool()), (Some(400), Some(false)));
+    assert!(found["closure"].as_f64().unwrap() > 0.1);
+    assert!(found["name"].is_null() && found["killing_form_signature"].is_null(), "{found}");
+    assert_eq!(found["structure_constants"], serde_json::json!([]));
+    let told = lnn(&["symmetries", "--system", &system]).stdout;
+    assert!(told.contains("degenerate") && told.contains("closure") && !told.contains("[X1, X2]"), "{told}");
+    let regular = object(&["symmetries", "--system", "kepler", "--json"]);
+    assert_eq!((regular["singular_states"].as_u64(), regular["closes"].as_bool()), (Some(0), Some(true)));
+    // It has no accelerations that could be the same.
+    let same = object(&["compare", &system, &system, "--json"]);
+    assert!(same["motion"].is_null() && same["motionless_states"] == 400, "{same}");
+    assert!(same["mass_matrix"].as_f64().unwrap() < 1e-12, "{same}");
 }
 
 #[test]

@@ -91,6 +91,58 @@ fn gauge_functions_belong_to_their_fields() {
 }
 
 #[test]
+fn functions_that_nearly_depend_on_each_other_add_no_noise() {
+    // A hole with charge and cosmological constant, far from the poles: no function of r and theta of the metric is in the basis.
+    let f = "(1 - 2/r + 0.25/r^2 - 0.001*r^2/3)";
+    let sphere = "r^2*(theta_dot^2 + sin(theta)^2*phi_dot^2)/2";
+    let between = [std::f64::consts::FRAC_PI_4, 3.0 * std::f64::consts::FRAC_PI_4];
+    let far = ("r", Chart::HalfLine, [4.0, 10.0]);
+    let coordinates = [line("t"), far, ("theta", Chart::Polar, between), PHI];
+    let hole = Subject::formula(&coordinates, &format!("-{f}*t_dot^2/2 + r_dot^2/(2*{f}) + {sphere}"));
+    let fields = found(&hole, None, 4, "so(3)+R", [3, 0, 1]);
+    let turns = ["sin(phi) d_theta + cot(theta)*cos(phi) d_phi", "-cos(phi) d_theta + cot(theta)*sin(phi) d_phi"];
+    assert_eq!(fields, ["d_t", turns[0], turns[1], "d_phi"]);
+    // Gauge functions as well: a charge in a uniform field, in polar coordinates.
+    let plane = Subject::formula(&[far, PHI], "(r_dot^2 + r^2*phi_dot^2)/2 + r^2*phi_dot");
+    let fields = found(&plane, None, 3, "e(2)", [1, 0, 2]);
+    assert_eq!(fields, ["sin(phi) d_r + cos(phi)/r d_phi", "-cos(phi) d_r + sin(phi)/r d_phi", "d_phi"]);
+    let found = plane.symmetries(None);
+    let gauges: Vec<String> = found.fields.iter().map(|field| field.gauge_text(&found.basis)).collect();
+    assert_eq!(gauges, ["r*cos(phi)", "r*sin(phi)", "0"]);
+}
+
+#[test]
+fn fields_of_a_degenerate_lagrangian_have_no_algebra() {
+    let xyz = ["x", "y", "z"].map(line);
+    for (formula, basis, closes) in [
+        // A function times d_x - d_y is a symmetry, whatever the function; products of two are not in the basis.
+        ("(x_dot + y_dot)^2/2 + z_dot^2/2", None, false),
+        ("z_dot^2/2 - z^2", None, false),
+        ("(x_dot + y_dot)^2/2 + z_dot^2/2", degrees(0, 0), true),
+        ("z_dot^2/2 - z^2", degrees(0, 0), true),
+    ] {
+        let found = Subject::formula(&xyz, formula).symmetries(basis);
+        assert_eq!(found.singular_states, found.states, "{formula}");
+        let algebra = found.algebra.unwrap();
+        assert_eq!((algebra.name.as_deref(), algebra.closes), (None, closes), "{formula}: {}", algebra.closure);
+        assert_eq!(algebra.closure > 0.1, !closes, "{formula}: {}", algebra.closure);
+    }
+    let plane = Subject::formula(&xyz[..2], "(x_dot^2 + y_dot^2)/2").symmetries(None);
+    assert_eq!((plane.singular_states, plane.algebra.unwrap().closes), (0, true));
+}
+
+#[test]
+fn units_do_not_decide_whether_fields_are_an_algebra() {
+    for size in [1e-9, 1e9] {
+        let range = [-2.0 * size, 2.0 * size];
+        let coordinates = ["x", "y"].map(|name| (name, Chart::Line, range));
+        let mut plane = Subject::formula(&coordinates, "(x_dot^2 + y_dot^2)/2");
+        plane.region.velocity = vec![range; 2];
+        assert_eq!(found(&plane, None, 3, "e(2)", [1, 0, 2]), ["d_x", "-y d_x + x d_y", "d_y"]);
+    }
+}
+
+#[test]
 fn systems_without_symmetries_have_none() {
     let angles = ["theta1", "theta2", "theta3"].map(|name| (name, Chart::Circle, [0.0, 6.3]));
     let xy = [line("x"), line("y")];
@@ -127,6 +179,24 @@ fn wrong_questions_are_refused() {
     let many = all.basis("polynomial:7".parse().ok());
     let refused = symmetries(all.model.as_ref(), &many, (&q5, &v5), None).unwrap_err();
     assert_eq!(refused, SymmetryError::TooMany { unknowns: 4752, most: 4000 });
+    let [least, most] = [f64::EPSILON, 0.1];
+    for found in [1e308, 0.11, 1e-300, 0.0, -1.0] {
+        let refused = symmetries(plane.model.as_ref(), &basis, (&q, &v), Some(found)).unwrap_err();
+        assert_eq!(refused, SymmetryError::Tolerance { found, least, most });
+    }
+    assert!(matches!(
+        symmetries(plane.model.as_ref(), &basis, (&q, &v), Some(f64::NAN)),
+        Err(SymmetryError::Tolerance { .. })
+    ));
+    // 32 million numbers are 1.8 million states of 18 unknown coefficients.
+    let many = vec![0.5; 2 * 1_777_778];
+    assert_eq!(
+        ask(&basis, &many, &many),
+        SymmetryError::TooManyStates { states: 1_777_778, unknowns: 18, most: 1_777_777 }
+    );
+    // A square that overflows.
+    let far = vec![1e200; 100];
+    assert!(matches!(ask(&basis, &far, &vec![0.1; 100]), SymmetryError::NotFinite { .. }));
     let other = Subject::formula(&[line("x")], "x_dot^2/2").basis(None);
     assert_eq!(ask(&other, &q, &v), SymmetryError::Basis { expected: 2, found: 1 });
     assert_eq!(ask(&basis, &[f64::NAN; 20], &v), SymmetryError::States { states: 10, found: 0 });
