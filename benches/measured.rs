@@ -211,7 +211,7 @@ pub fn trial() {
     let measured = measured(&made());
     assert_eq!(lines(&made(), &measured, Some(&measured), Some(scale)).len(), 8);
     assert_eq!(noise::compare(5, 0..1, scale).len(), 3);
-    assert_eq!(determination::compare(0..1, (4, 3.0), scale).len(), 5 + 6 + 3 + 3 + 5);
+    assert_eq!(determination::compare(0..1, (4, 3.0), scale).len(), 5 + 6 + 3 + 3 + 5 + 3);
     assert_eq!(orbits::compare(&[(6, 0.001)], true, (Some(1), 1)).len(), 15);
     let place = tempfile::tempdir().expect("a folder");
     let found = rows::time(&place.path().join("rows.csv"), 2000);

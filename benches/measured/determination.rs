@@ -5,12 +5,12 @@
 //! on the cart or without; a driven pendulum; a planet; two pendula with friction in their joints. Positions have noise.
 
 use super::Scale;
-use lnn::analysis::{Determination, Estimate, Observed, determination};
-use lnn::configuration::Penalty;
+use lnn::analysis::{Determination, Estimate, Observed, constants, determination};
+use lnn::configuration::{Config, Known, Penalty};
 use lnn::data::{PrepareOptions, RecordingSplit};
 use lnn::lagrangian::{EulerLagrange, HandWritten, Lagrangian, MechanicsError, Request, Terms};
 use lnn::linalg::Workspace;
-use lnn::network::NetworkLagrangian;
+use lnn::network::{Initialization, NetworkLagrangian};
 use lnn::random::{RandomGenerator, RngStream};
 use lnn::recording::{RecordedTrajectory, Recording, Targets};
 use lnn::rollout::{Options, rollout};
@@ -111,7 +111,7 @@ pub const CASES: [Case; 5] = [
         start: cart_start,
     },
     Case {
-        name: "cart-pendulum, known force on the cart",
+        name: "cart-pendulum with a known force",
         exact: cart_pendulum,
         periodic: &[false, true],
         friction: &[0.3, 0.01],
@@ -121,7 +121,7 @@ pub const CASES: [Case; 5] = [
         start: cart_start,
     },
     Case {
-        name: "pendulum, known force",
+        name: "pendulum with a known force",
         exact: || Box::new(HandWritten::new(Pendulum, vec![0.5, 9.81])),
         periodic: &[true],
         friction: &[0.05],
@@ -235,24 +235,55 @@ fn energy_error(model: &[f64], exact: &[f64]) -> f64 {
     (squares.sum::<f64>() / model.len() as f64).sqrt()
 }
 
-/// One recording: what was stated, and the truth in its unit.
-fn one(case: &Case, runs: usize, seconds: f64, seed: u64, scale: Scale) -> Vec<(&'static str, Estimate, f64)> {
-    let recording = case.recording(runs, seconds, seed);
+/// A recording smoothed, and a model of it of the shape that `shape` gives; and the loss and the time of its training.
+fn learn(
+    recording: &Recording,
+    (seed, epochs): (u64, Option<usize>),
+    shape: impl FnOnce(&mut Config),
+) -> (RecordingSplit, NetworkLagrangian<f64>, String) {
     let preparation = PrepareOptions { seed, ..PrepareOptions::default() };
-    let measured = RecordingSplit::new(&recording, &preparation).expect("long trajectories");
+    let measured = RecordingSplit::new(recording, &preparation).expect("long trajectories");
     let data = measured.datasets::<f32>(Targets::Smoothed).expect("states with full windows");
     let mut config = lnn::presets::suggested("made", &data);
     config.seed = seed;
-    config.network.hidden = scale.hidden.to_vec();
-    config.network.dissipation = (!case.friction.is_empty()).then_some(16);
-    let epochs = scale.epochs.unwrap_or(config.phases[0].epochs);
+    let epochs = epochs.unwrap_or(config.phases[0].epochs);
     (config.phases[0].epochs, config.phases[0].t_max) = (epochs, epochs as f64);
+    shape(&mut config);
     let names = recording.coordinates.iter().map(String::as_str);
     let scale = data.training[0].physical_scale();
     let architecture = config.architecture_with(names, recording.periodic.clone(), scale).expect("names of its own");
     let penalty = Penalty::Eigenvalue { lambda: config.penalty.lambda() };
     let trained = train(&config, &architecture, penalty, data, 2, &Hooks::default()).expect("a training");
     let model = NetworkLagrangian::new(architecture, trained.weights).expect("its weights").cast::<f64>();
+    let remark = format!("seed {seed}: loss {:.4}, {:.0} s of training", trained.validation_loss, trained.seconds);
+    (measured, model, remark)
+}
+
+/// The learned constants of two pendula beside a small network, with the truth.
+fn grey_box(runs: usize, seconds: f64, seed: u64, epochs: Option<usize>) -> Vec<(&'static str, Estimate, f64)> {
+    let case = CASES.iter().find(|case| case.name == "two pendula").expect("a case of this name");
+    let known = include_str!("../../examples/systems/grey_pendula.toml");
+    let (measured, model, remark) = learn(&case.recording(runs, seconds, seed), (seed, epochs), |config| {
+        config.network.known = Some(Known::Description(Box::new(toml::from_str(known).expect("a system file"))));
+        config.network.alpha = 0.0;
+        config.network.initialization = Initialization::NearZero;
+        config.network.hidden = vec![8];
+        config.network.dissipation = Some(8);
+        config.optimizer.weight_decay = 0.01;
+    });
+    let started = Instant::now();
+    let found = constants(&model, &measured, 2).expect("enough stretches");
+    println!("  {remark}, {:.2} s to tell", started.elapsed().as_secs_f64());
+    [("g", 9.81), ("l2", 1.0), ("m2", 1.0)].into_iter().map(|(name, truth)| (name, found[name], truth)).collect()
+}
+
+/// One recording: what was stated, and the truth in its unit.
+fn one(case: &Case, runs: usize, seconds: f64, seed: u64, scale: Scale) -> Vec<(&'static str, Estimate, f64)> {
+    let recording = case.recording(runs, seconds, seed);
+    let (measured, model, remark) = learn(&recording, (seed, scale.epochs), |config| {
+        config.network.hidden = scale.hidden.to_vec();
+        config.network.dissipation = (!case.friction.is_empty()).then_some(16);
+    });
 
     let observed = Observed::new(&measured, Targets::Smoothed).expect("states with full windows");
     let started = Instant::now();
@@ -283,45 +314,49 @@ fn one(case: &Case, runs: usize, seconds: f64, seed: u64, scale: Scale) -> Vec<(
         // The unit itself.
         rows.remove(0);
     }
-    let loss = trained.validation_loss;
-    println!("  seed {seed}: loss {loss:.4}, {:.0} s of training, {took:.2} s to tell", trained.seconds);
+    println!("  {remark}, {took:.2} s to tell");
     rows
 }
 
 /// Prints and returns rows `case,seed,quantity,learned,low,high,truth`, and prints how often the truth lies within.
 pub fn compare(seeds: std::ops::Range<u64>, (runs, seconds): (usize, f64), scale: Scale) -> Vec<String> {
     let mut all = Vec::new();
-    let (mut held, mut stated) = (0, 0);
-    for case in &CASES {
-        println!("{}, {}:", case.name, if case.forced { "SI" } else { "over the mean of M11" });
-        // Times inside, half of the range and error of the learned value over the truth.
+    let mut total = [0; 2];
+    let mut count = |name: &str, of: &dyn Fn(u64) -> Vec<(&'static str, Estimate, f64)>| {
+        println!("{name}:");
+        // Times inside, squares of half of the range and of the error of the learned value, over the truth.
         let mut counts: Vec<(&str, usize, [f64; 2])> = Vec::new();
         for seed in seeds.clone() {
-            for (k, (name, estimate, truth)) in one(case, runs, seconds, seed, scale).into_iter().enumerate() {
+            for (k, (quantity, estimate, truth)) in of(seed).into_iter().enumerate() {
                 let Estimate { value, low, high } = estimate;
                 let inside = estimate.allows(truth);
                 println!(
-                    "    {name:18} {value:9.4} from {low:9.4} to {high:9.4}, true {truth:9.4}{}",
+                    "    {quantity:18} {value:9.4} from {low:9.4} to {high:9.4}, true {truth:9.4}{}",
                     if inside { "" } else { "  OUTSIDE" }
                 );
                 if counts.len() <= k {
-                    counts.push((name, 0, [0.0; 2]));
+                    counts.push((quantity, 0, [0.0; 2]));
                 }
                 counts[k].1 += usize::from(inside);
                 let relative = [0.5 * (high - low), value - truth].map(|x| (x / truth).powi(2));
                 counts[k].2.iter_mut().zip(relative).for_each(|(sum, x)| *sum += x);
-                all.push(format!("{},{seed},{name},{value},{low},{high},{truth}", case.name.replace(',', "")));
+                all.push(format!("{name},{seed},{quantity},{value},{low},{high},{truth}"));
             }
         }
-        for (name, inside, squares) in counts {
-            let count = seeds.end - seeds.start;
-            let [half, error] = squares.map(|square| 100.0 * (square / count as f64).sqrt());
+        let seeds = (seeds.end - seeds.start) as usize;
+        for (quantity, inside, squares) in counts {
+            let [half, error] = squares.map(|square| 100.0 * (square / seeds as f64).sqrt());
             println!(
-                "  {name:18} within its range in {inside} of {count}; half of it {half:.1} %, error {error:.1} % (rms)"
+                "  {quantity:18} in its range in {inside} of {seeds}; half of it {half:.1} %, error {error:.1} % (rms)"
             );
-            (held, stated) = (held + inside, stated + count as usize);
+            total = [total[0] + inside, total[1] + seeds];
         }
+    };
+    for case in &CASES {
+        count(case.name, &|seed| one(case, runs, seconds, seed, scale));
     }
+    count("constants of two pendula", &|seed| grey_box(runs, seconds, seed, scale.epochs));
+    let [held, stated] = total;
     println!("the truth lies within {held} of {stated} ranges, {:.1} %", 100.0 * held as f64 / stated as f64);
     all
 }

@@ -5,8 +5,8 @@
 //! which network and friction enter. What network and constants share is open: a weight may differ from the learned one by as
 //! much as the weights of its kind are large. The error of the step is that of all ranges, see the [module](super).
 
+use super::Estimate;
 use super::regression::{Sums, dot, groups, jackknife};
-use super::{Estimate, RANGE};
 use crate::configuration::Penalty;
 use crate::data::{RecordingSplit, StateEstimate};
 use crate::network::{Architecture, Layout, NetworkLagrangian};
@@ -17,7 +17,7 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 /// Samples of a stretch, and integration steps.
-const STRETCH: usize = 80;
+const STRETCH: usize = 40;
 /// Fewest samples of a stretch.
 const LEAST: usize = 8;
 /// Samples that are looked at; of more, evenly spaced stretches.
@@ -44,10 +44,10 @@ pub fn constants(
     let weights = network.weights();
     let columns = columns(&layout, weights);
     let stretches = Stretches::new(architecture, weights, measured, threads)?;
-    let parts = stretches.parts(weights, &columns)?;
+    let (parts, rows) = stretches.parts(weights, &columns)?;
     let sums = Sums::of(&parts);
-    let (trust, without) = sums.foretold(&parts)?;
-    let (mean, covariance) = (sums.solve(trust)?, sums.covariance(trust)?);
+    let trust = sums.trust(rows);
+    let (mean, covariance, without) = (sums.solve(trust)?, sums.covariance(trust)?, sums.without(&parts, trust)?);
     let count = columns.len();
     let at = |theta: &[f64]| {
         let mut moved = weights.to_vec();
@@ -58,10 +58,10 @@ pub fn constants(
     let [mut low, mut high] = [theta.to_vec(), theta.to_vec()];
     for (k, (low, high)) in low.iter_mut().zip(&mut high).enumerate() {
         let believed: f64 = covariance[k * count..(k + 1) * count].iter().map(|c| c * c).sum();
-        let half = RANGE * (believed + jackknife(mean[k], without.iter().map(|x| x[k]))).sqrt();
+        let deviation = (believed + jackknife(mean[k], without.iter().map(|x| x[k]))).sqrt();
         let scale = columns[k].1;
-        *low = low.min(*low + scale * (mean[k] - half));
-        *high = high.max(*high + scale * (mean[k] + half));
+        let range = Estimate::about(*low, scale * mean[k], scale * deviation);
+        (*low, *high) = (range.low, range.high);
     }
     let (value, low, high) = (at(theta), at(&low), at(&high));
     let learned = architecture.form.known.iter().flat_map(|known| &known.parameters).filter(|(_, p)| p.learn);
@@ -133,8 +133,8 @@ impl Stretches {
         self.objective.borrow_mut().residuals(weights, &self.segments, starts, &self.rows)
     }
 
-    /// Normal equations of groups of stretches, starts eliminated.
-    fn parts(&self, weights: &[f64], columns: &[(usize, f64)]) -> Option<Vec<Sums>> {
+    /// Normal equations of groups of stretches, starts eliminated, and the number of residuals that are left.
+    fn parts(&self, weights: &[f64], columns: &[(usize, f64)]) -> Option<(Vec<Sums>, usize)> {
         let base = self.residuals(weights, &self.starts);
         let width = 2 * self.n;
         let by_start: Vec<Vec<f64>> = (0..width)
@@ -173,7 +173,8 @@ impl Stretches {
         };
         let usable: Vec<Vec<Vec<f64>>> =
             (0..ends.len()).map(one).filter(|part| part.iter().flatten().all(|x| x.is_finite())).collect();
-        let groups = groups(usable.len())?;
+        let groups = groups(usable.len(), 1)?;
+        let residuals = usable.iter().map(|part| part[0].len() - width.min(part[0].len())).sum();
         let part = |group: Range<usize>| {
             let (mut rows, mut missed) = (Vec::new(), Vec::new());
             for columns in &usable[group] {
@@ -183,7 +184,7 @@ impl Stretches {
             }
             Sums::new(&rows, &missed)
         };
-        Some(groups.into_iter().map(part).collect())
+        Some((groups.into_iter().map(part).collect(), residuals))
     }
 }
 

@@ -43,7 +43,7 @@ pub fn decay(periodic: &[bool], observed: &Observed) -> Option<Decay> {
     let [angle] = *periodic else { return None };
     let functions = Functions::new(&[angle], &ranges(1, &observed.q), DEGREE);
     let states = observed.q.len();
-    let groups = groups(states)?;
+    let groups = groups(states, 5)?;
     let rms = |values: &[f64]| (values.iter().map(|x| x * x).sum::<f64>() / values.len().max(1) as f64).sqrt();
     let (speed, size, force) = (rms(&observed.v), rms(&observed.a), rms(&observed.force));
     if !(speed > 0.0 && size > 0.0) {

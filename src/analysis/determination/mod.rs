@@ -16,10 +16,11 @@
 //! Its error has three parts. What the data leave open has the size that was believed before them, `C C`. What noise does is
 //! read off the scatter of `x` when one of twenty groups of consecutive states is left out (the jackknife), which counts no
 //! sample as independent and needs no model of the noise. And what neither the model nor any change of it explains of the
-//! accelerations, beyond their expected error, may be an error of every quantity of that share of its size; so may the bias of
-//! smoothing. The factor of `W` is the one by which each group is foretold best from the others.
+//! accelerations, beyond their expected error, may be an error of every quantity of that share of its size. `W` has the inverse
+//! mean square of `e`, and as many samples as are independent: it only divides what the data say from what was believed.
 //!
-//! A range reaches two standard deviations to either side of the regression's middle, and holds the learned value.
+//! A range reaches two standard deviations to either side of the regression's middle. The regression is of first order: half the
+//! way from the learned value to the middle is one more standard deviation.
 //!
 //! Without known forces `L` has no unit: quantities are then over the mean `M` of the first coordinate.
 //!
@@ -58,6 +59,12 @@ pub struct Estimate {
 pub const RANGE: f64 = 2.0;
 
 impl Estimate {
+    /// The range of a value that a regression moves by `shift`, with this standard deviation. The regression is of first order: its
+    /// shift is believed to half its size, and the range holds the value itself.
+    fn about(value: f64, shift: f64, deviation: f64) -> Self {
+        let half = RANGE * deviation.hypot(0.5 * shift);
+        Self { value, low: value.min(value + shift - half), high: value.max(value + shift + half) }
+    }
     /// `true` if a number lies in the range.
     pub fn allows(&self, x: f64) -> bool {
         self.low <= x && x <= self.high

@@ -16,8 +16,8 @@ pub struct Observed {
     pub force: Vec<f64>,
     /// Root mean square error to expect of the accelerations of each coordinate, `(n)`: 0 of measured ones.
     pub error: Vec<f64>,
-    /// The part of it that has the same sign wherever the motion is the same: the bias of smoothing, `(n)`.
-    pub bias: Vec<f64>,
+    /// Number of errors of the accelerations that are independent, of each coordinate, `(n)`.
+    pub independent: Vec<f64>,
 }
 
 /// States that are looked at; of more, evenly spaced ones.
@@ -44,19 +44,28 @@ impl Observed {
         Ok(Some(Self::of(&measured.datasets::<f64>(targets)?.test, measured, targets)))
     }
 
+    /// Errors of smoothed accelerations are the same within a window; those of a model change with the state and are of one
+    /// sign over half a swing: samples within half the fast period count as one.
     fn of(data: &Dataset<f64>, measured: &RecordingSplit, targets: Targets) -> Self {
         let n = data.coordinates();
         let stride = data.len().div_ceil(STATES).max(1);
         let some = |values: &[f64]| values.chunks_exact(n).step_by(stride).flatten().copied().collect::<Vec<_>>();
         let quality = || measured.smoothing.coordinates.iter().map(|c| &c.quality);
-        let derived = if targets == Targets::Measured { 0.0 } else { 1.0 };
+        let derived = targets != Targets::Measured;
+        let samples = measured.training.recording.samples() as f64;
+        let independent = quality().map(|quality| {
+            let half = std::f64::consts::PI * quality.velocity / quality.acceleration / measured.smoothing.step;
+            let half = if half.is_finite() { half } else { 1.0 };
+            (samples / half.max(if derived { quality.window as f64 } else { 1.0 })).clamp(1.0, samples)
+        });
+        let independent = independent.collect();
         Self {
             q: some(data.q()),
             v: some(data.v()),
             a: some(data.a()),
             force: some(data.force()),
-            error: quality().map(|quality| derived * quality.total(2)).collect(),
-            bias: quality().map(|quality| derived * quality.bias[2]).collect(),
+            error: quality().map(|quality| if derived { quality.total(2) } else { 0.0 }).collect(),
+            independent,
         }
     }
 

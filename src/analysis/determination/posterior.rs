@@ -3,7 +3,7 @@
 use super::changes::{Changes, Row, Usual};
 use super::observed::Observed;
 use super::regression::{Sums, dot, groups, jackknife};
-use super::{Estimate, Linear, RANGE};
+use super::{Estimate, Linear};
 use crate::lagrangian::{EulerLagrange, Request, Terms};
 use crate::linalg::{Workspace, inverse};
 
@@ -16,7 +16,8 @@ pub(super) struct Data {
     missed: Vec<f64>,
     inverse: Vec<f64>,
     mass: Vec<f64>,
-    /// Mean square of the observed accelerations, of their expected error, and the bias over the size, of each coordinate.
+    /// Mean square of the observed accelerations, of their expected error, and the number of independent errors, of each
+    /// coordinate.
     observed: Vec<[f64; 3]>,
 }
 
@@ -63,11 +64,11 @@ impl Data {
             }
         }
         let states = data.states() as f64;
-        let of = |values: &[f64], i: usize| values.get(i).copied().unwrap_or(0.0);
+        let of = |values: &[f64], i: usize, usual: f64| values.get(i).copied().unwrap_or(usual);
         data.observed = (0..n)
             .map(|i| {
-                let square = squares[i] / states;
-                [square, of(&observed.error, i).powi(2), of(&observed.bias, i) / square.sqrt()]
+                let error = of(&observed.error, i, 0.0);
+                [squares[i] / states, error * error, of(&observed.independent, i, states)]
             })
             .collect();
         (data.q.len() > n).then_some(data)
@@ -116,12 +117,15 @@ impl Data {
     /// The changes that make up for what is missed.
     pub fn posterior(&self, changes: &Changes) -> Option<Posterior> {
         let (n, count) = (self.n, changes.len());
-        let groups = groups(self.states())?;
+        let groups = groups(self.states(), LEAST)?;
         let weights: Vec<f64> = mean_squares(n, &self.missed)
             .into_iter()
-            .zip(mean_squares(n, &self.a))
-            // Nothing is known better than numbers have digits.
-            .map(|(square, size)| square.max(1e-20 * size).max(f64::MIN_POSITIVE.sqrt()).recip())
+            .zip(&self.observed)
+            .map(|(square, [size, _, independent])| {
+                // Nothing is known better than numbers have digits.
+                let square = square.max(1e-20 * size).max(f64::MIN_POSITIVE.sqrt());
+                independent / (square * self.states() as f64)
+            })
             .collect();
         let mut parts = Vec::new();
         let mut row = Row::default();
@@ -139,7 +143,7 @@ impl Data {
             parts.push(Sums::new(&rows, &missed));
         }
         let sums = Sums::of(&parts);
-        let (trust, without) = sums.foretold(&parts)?;
+        let without = sums.without(&parts, 1.0)?;
         let mut left = Vec::with_capacity(self.missed.len());
         let mut rows = Vec::new();
         for (group, sizes) in groups.iter().zip(&without) {
@@ -150,11 +154,13 @@ impl Data {
                 left.extend(missed.iter().zip(rows.chunks_exact(count)).map(|(e, row)| e - dot(row, sizes)));
             }
         }
-        let floor = self.beyond(&mean_squares(n, &left)).into_iter().zip(&self.observed).map(|(f, o)| f.hypot(o[2]));
-        let (covariance, mean) = (sums.covariance(trust)?, sums.solve(trust)?);
-        Some(Posterior { covariance, mean, without, floor: floor.collect() })
+        let floor = self.beyond(&mean_squares(n, &left));
+        Some(Posterior { covariance: sums.covariance(1.0)?, mean: sums.solve(1.0)?, without, floor })
     }
 }
+
+/// Fewest states of a group.
+const LEAST: usize = 5;
 
 /// Mean square of each of `n` columns.
 fn mean_squares(n: usize, values: &[f64]) -> Vec<f64> {
@@ -186,9 +192,7 @@ impl Posterior {
     /// The range of a number whose consistent error is `floor`.
     pub fn estimate(&self, linear: &Linear, floor: f64) -> Estimate {
         let (middle, variance) = self.middle(&linear.slopes);
-        let half = RANGE * variance.sqrt().hypot(floor);
-        let value = linear.value;
-        Estimate { value, low: value.min(value + middle - half), high: value.max(value + middle + half) }
+        Estimate::about(linear.value, middle, variance.sqrt().hypot(floor))
     }
 
     /// Mean square of the error of a linear function.

@@ -1,20 +1,16 @@
 //! Regularised least squares over groups of consecutive states, and the scatter of what it gives without each of them.
 
 use crate::linalg::{MatMut, MatRef, Workspace, gemm, inverse, solve};
-use std::ops::{Range, RangeInclusive};
+use std::ops::Range;
 
 /// Groups that states are cut into, each long enough to be independent of the others.
 const GROUPS: usize = 20;
-/// Fewest groups, and least states of one.
+/// Fewest groups.
 const FEWEST: usize = 4;
-const LEAST: usize = 5;
 
-/// Powers of ten of the weight of the data that are tried.
-const TRUSTS: RangeInclusive<i32> = -5..=2;
-
-/// Groups of consecutive states; `None` if they are too few.
-pub fn groups(states: usize) -> Option<Vec<Range<usize>>> {
-    let groups = GROUPS.min(states / LEAST);
+/// Groups of at least `least` consecutive states; `None` if they are too few.
+pub fn groups(states: usize, least: usize) -> Option<Vec<Range<usize>>> {
+    let groups = GROUPS.min(states / least);
     let range = |group: usize| group * states / groups..(group + 1) * states / groups;
     (groups >= FEWEST).then(|| (0..groups).map(range).collect())
 }
@@ -101,17 +97,9 @@ impl Sums {
         Some(covariance)
     }
 
-    /// The weight of the data, beside what is believed before them, by which each part is foretold best from the others, and the
-    /// factors without each of them.
-    pub fn foretold(&self, parts: &[Self]) -> Option<(f64, Vec<Vec<f64>>)> {
-        let tried = TRUSTS.filter_map(|k| {
-            let trust = 10f64.powi(k);
-            let without = self.without(parts, trust)?;
-            let left: f64 = parts.iter().zip(&without).map(|(part, factors)| part.left(factors)).sum();
-            Some((left, trust, without))
-        });
-        let best = tried.min_by(|a, b| a.0.total_cmp(&b.0))?;
-        Some((best.1, best.2))
+    /// The weight of the data by which what the factors leave is of mean square 1, for `rows` rows of `A`.
+    pub fn trust(&self, rows: usize) -> f64 {
+        rows as f64 / self.square.max(f64::MIN_POSITIVE)
     }
 
     /// Square of what these factors leave.
@@ -143,7 +131,7 @@ mod tests {
                     [x, 2.0 * x + noise]
                 })
                 .collect();
-            let parts: Vec<Sums> = groups(states.len())
+            let parts: Vec<Sums> = groups(states.len(), 5)
                 .unwrap()
                 .into_iter()
                 .map(|group| {
@@ -158,6 +146,6 @@ mod tests {
         }
         let ratio = (stated / square).sqrt();
         assert!((0.85..1.2).contains(&ratio), "{ratio}");
-        assert!(groups(19).is_none() && groups(20).unwrap().len() == 4);
+        assert!(groups(19, 5).is_none() && groups(20, 5).unwrap().len() == 4);
     }
 }
