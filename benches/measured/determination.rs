@@ -338,7 +338,9 @@ pub fn compare(seeds: std::ops::Range<u64>, (runs, seconds): (usize, f64), scale
                     counts.push((quantity, 0, [0.0; 2]));
                 }
                 counts[k].1 += usize::from(inside);
-                let relative = [0.5 * (high - low), value - truth].map(|x| (x / truth).powi(2));
+                // What is 0 is compared with the unit.
+                let size = if truth == 0.0 { 1.0 } else { truth };
+                let relative = [0.5 * (high - low), value - truth].map(|x| (x / size).powi(2));
                 counts[k].2.iter_mut().zip(relative).for_each(|(sum, x)| *sum += x);
                 all.push(format!("{name},{seed},{quantity},{value},{low},{high},{truth}"));
             }

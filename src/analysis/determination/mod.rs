@@ -13,9 +13,10 @@
 //! the model's own size) come out of a linear regression, `C = (1 + A^T W A)^-1`, `x = C A^T W e`, with `A` the changes of the
 //! accelerations and `e` what they miss of the data. Every quantity that is linear in `L` and `D` follows.
 //!
-//! Its error has three parts. What the data leave open has the size that was believed before them, `C C`. What noise does is
+//! Its error has four parts. What the data leave open has the size that was believed before them, `C C`. What noise does is
 //! read off the scatter of `x` when one of twenty groups of consecutive states is left out (the jackknife), which counts no
-//! sample as independent and needs no model of the noise. And what neither the model nor any change of it explains of the
+//! sample as independent and needs no model of the noise. What the bias of smoothing does is how far `x` moves with accelerations
+//! by polynomials of two more degrees. And what neither the model nor any change of it explains of the
 //! accelerations, beyond their expected error, may be an error of every quantity of that share of its size. `W` has the inverse
 //! mean square of `e`, and as many samples as are independent: it only divides what the data say from what was believed.
 //!

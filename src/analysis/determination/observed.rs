@@ -16,6 +16,8 @@ pub struct Observed {
     pub force: Vec<f64>,
     /// Root mean square error to expect of the accelerations of each coordinate, `(n)`: 0 of measured ones.
     pub error: Vec<f64>,
+    /// The accelerations by smoothing of less bias and more noise, `(states, n)`, or nothing.
+    pub finer: Vec<f64>,
     /// Number of errors of the accelerations that are independent, of each coordinate, `(n)`.
     pub independent: Vec<f64>,
 }
@@ -30,7 +32,9 @@ impl Observed {
     /// As [`RecordingSplit::datasets`].
     pub fn new(measured: &RecordingSplit, targets: Targets) -> Result<Self, RecordingSplitError> {
         let data = measured.datasets::<f64>(targets)?.training.remove(0);
-        Ok(Self::of(&data, measured, targets))
+        let finer = if targets == Targets::Measured { None } else { measured.finer_accelerations() };
+        let finer = finer.filter(|finer| finer.len() == data.a().len()).map(|finer| some(data.coordinates(), &finer));
+        Ok(Self { finer: finer.unwrap_or_default(), ..Self::of(&data, measured, targets) })
     }
 
     /// The states that were held out to judge; `None` if there are none.
@@ -48,8 +52,7 @@ impl Observed {
     /// sign over half a swing: samples within half the fast period count as one.
     fn of(data: &Dataset<f64>, measured: &RecordingSplit, targets: Targets) -> Self {
         let n = data.coordinates();
-        let stride = data.len().div_ceil(STATES).max(1);
-        let some = |values: &[f64]| values.chunks_exact(n).step_by(stride).flatten().copied().collect::<Vec<_>>();
+        let some = |values: &[f64]| some(n, values);
         let quality = || measured.smoothing.coordinates.iter().map(|c| &c.quality);
         let derived = targets != Targets::Measured;
         let samples = measured.training.recording.samples() as f64;
@@ -65,6 +68,7 @@ impl Observed {
             a: some(data.a()),
             force: some(data.force()),
             error: quality().map(|quality| if derived { quality.total(2) } else { 0.0 }).collect(),
+            finer: Vec::new(),
             independent,
         }
     }
@@ -93,6 +97,12 @@ impl Observed {
         };
         (0..count).filter(outside).count() as f64 / f64::max(1.0, count as f64)
     }
+}
+
+/// Evenly spaced rows of `n` numbers, at most about [`STATES`].
+fn some(n: usize, values: &[f64]) -> Vec<f64> {
+    let stride = (values.len() / n).div_ceil(STATES).max(1);
+    values.chunks_exact(n).step_by(stride).flatten().copied().collect()
 }
 
 /// Share of a range by which a state may lie beyond it.

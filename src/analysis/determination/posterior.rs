@@ -14,6 +14,8 @@ pub(super) struct Data {
     pub v: Vec<f64>,
     a: Vec<f64>,
     missed: Vec<f64>,
+    /// Accelerations of less bias less the observed ones, or zeros.
+    finer: Vec<f64>,
     inverse: Vec<f64>,
     mass: Vec<f64>,
     /// Mean square of the observed accelerations, of their expected error, and the number of independent errors, of each
@@ -30,6 +32,7 @@ impl Data {
             v: vec![],
             a: vec![],
             missed: vec![],
+            finer: vec![],
             inverse: vec![],
             mass: vec![],
             observed: vec![],
@@ -59,6 +62,7 @@ impl Data {
                 data.v.extend_from_slice(v);
                 data.a.extend(a);
                 data.missed.extend(missed);
+                data.finer.extend((0..n).map(|i| observed.finer.get(k * n + i).map_or(0.0, |finer| finer - seen[i])));
                 data.inverse.extend(inverted);
                 data.mass.extend_from_slice(&terms.mass_matrix);
             }
@@ -144,18 +148,24 @@ impl Data {
         }
         let sums = Sums::of(&parts);
         let without = sums.without(&parts, 1.0)?;
-        let mut left = Vec::with_capacity(self.missed.len());
+        let (mut left, mut pull) = (Vec::with_capacity(self.missed.len()), vec![0.0; count]);
         let mut rows = Vec::new();
         for (group, sizes) in groups.iter().zip(&without) {
             for state in group.clone() {
                 rows.clear();
                 self.push_rows(state, changes, &mut row, &mut rows);
                 let missed = &self.missed[state * n..(state + 1) * n];
+                let finer = &self.finer[state * n..(state + 1) * n];
+                for ((row, finer), weight) in rows.chunks_exact(count).zip(finer).zip(&weights) {
+                    pull.iter_mut().zip(row).for_each(|(sum, x)| *sum += weight * finer * x);
+                }
                 left.extend(missed.iter().zip(rows.chunks_exact(count)).map(|(e, row)| e - dot(row, sizes)));
             }
         }
         let floor = self.beyond(&mean_squares(n, &left));
-        Some(Posterior { covariance: sums.covariance(1.0)?, mean: sums.solve(1.0)?, without, floor })
+        let covariance = sums.covariance(1.0)?;
+        let bias = covariance.chunks_exact(count).map(|row| dot(row, &pull)).collect();
+        Some(Posterior { covariance, mean: sums.solve(1.0)?, bias, without, floor })
     }
 }
 
@@ -174,6 +184,8 @@ pub(super) struct Posterior {
     covariance: Vec<f64>,
     /// `x`, by all states.
     mean: Vec<f64>,
+    /// Change of `x` by accelerations of less bias.
+    bias: Vec<f64>,
     /// `x` without each of the groups.
     without: Vec<Vec<f64>>,
     /// Of every coordinate, what neither the model nor its changes account for, over the size of the accelerations.
@@ -186,7 +198,8 @@ impl Posterior {
         let count = slopes.len();
         let middle = dot(slopes, &self.mean);
         let believed: f64 = self.covariance.chunks_exact(count).map(|row| dot(row, slopes).powi(2)).sum();
-        (middle, believed + jackknife(middle, self.without.iter().map(|sizes| dot(slopes, sizes))))
+        let noise = jackknife(middle, self.without.iter().map(|sizes| dot(slopes, sizes)));
+        (middle, believed + noise + dot(slopes, &self.bias).powi(2))
     }
 
     /// The range of a number whose consistent error is `floor`.
