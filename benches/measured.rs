@@ -5,7 +5,7 @@
 //!
 //! And made motion of a double pendulum with 1 % of noise, where the truth is known.
 //!
-//! And made motion of a cart-pendulum, where the masses are known that a fit can or cannot tell.
+//! And made motion of small systems, where the masses are known that a fit can or cannot tell.
 //!
 //! And made orbits around a black hole with noise, of which the hole is read.
 //!
@@ -14,7 +14,7 @@
 //! `../shared/data/ibm-double-pendulum`; gravity pulls along the x axis of these pictures. Every film is a recording of its own: the first four fifths are learned from, the
 //! rest is predicted, 0.5 s at a time. `-- --part noise` is the made motion, `-- --part rows` reads and surveys ten million
 //! rows and says what that took, `-- --part textbook` the films without what has to be trained, `-- --part determination` the
-//! cart-pendulum, two minutes, `-- --part orbits` orbits around a hole, a quarter of an hour; without `--part` all. Writes `films.csv`, `noise.csv`, `determination.csv` and `orbits.csv` into `target/measured`.
+//! small systems, some minutes, `-- --part orbits` orbits around a hole, a quarter of an hour; without `--part` all. Writes `films.csv`, `noise.csv`, `determination.csv` and `orbits.csv` into `target/measured`.
 
 #[path = "measured/determination.rs"]
 mod determination;
@@ -62,7 +62,7 @@ const THREADS: usize = 2;
 /// What can be measured.
 const PARTS: &[&str] = &["rows", "noise", "films", "textbook", "determination", "orbits"];
 
-/// Seeds of the cart-pendulums: those before them chose how many samples count as one.
+/// Seeds of the small systems: those before them served to choose.
 const SEEDS: std::ops::Range<u64> = 20..40;
 
 /// How much work is done.
@@ -211,7 +211,7 @@ pub fn trial() {
     let measured = measured(&made());
     assert_eq!(lines(&made(), &measured, Some(&measured), Some(scale)).len(), 8);
     assert_eq!(noise::compare(5, 0..1, scale).len(), 3);
-    assert_eq!(determination::compare(0..1, (4, 3.0), scale).len(), 12);
+    assert_eq!(determination::compare(0..1, (4, 3.0), scale).len(), 5 + 6 + 3 + 3 + 5 + 3);
     assert_eq!(orbits::compare(&[(6, 0.001)], true, (Some(1), 1)).len(), 15);
     let place = tempfile::tempdir().expect("a folder");
     let found = rows::time(&place.path().join("rows.csv"), 2000);
@@ -246,7 +246,7 @@ fn main() {
     if parts.iter().any(|part| part == "determination") {
         let small = Scale { epochs: Some(60), hidden: [48; 3], shooting_epochs: 0 };
         let rows = determination::compare(SEEDS, (12, 8.0), small);
-        let csv = format!("forces,seed,quantity,learned,low,high,truth\n{}\n", rows.join("\n"));
+        let csv = format!("case,seed,quantity,learned,low,high,truth\n{}\n", rows.join("\n"));
         std::fs::write(folder.join("determination.csv"), csv).expect("room for the results");
     }
     if parts.iter().any(|part| part == "orbits") {

@@ -1,17 +1,17 @@
-//! How well motion determines what is learned: cart-pendulums of known masses and frictions, twenty made recordings of
-//! them, and how often the ranges that a fit states hold the truth.
+//! How well motion determines what is learned from it: made recordings of small systems whose masses and frictions are known,
+//! and how often the ranges that a fit states hold the truth.
 //!
-//! A cart of 1 kg on a rail carries a pendulum of 0.3 kg at 0.5 m: `M = [[1.3, 0.15 cos q], [0.15 cos q, 0.075]]`, friction
-//! of 0.3 N s/m on the cart and 0.01 N m s in the joint, positions with noise; with a known force on the cart or without.
+//! A cart of 1 kg on a rail carries a pendulum of 0.3 kg at 0.5 m, with friction on the cart and in the joint, with a known force
+//! on the cart or without; a driven pendulum; a planet; two pendula with friction in their joints. Positions have noise.
 
 use super::Scale;
-use lnn::analysis::{Determination, Estimate, Observed, determination, places};
-use lnn::configuration::Penalty;
+use lnn::analysis::{Determination, Estimate, Observed, constants, determination};
+use lnn::configuration::{Config, Known, Penalty};
 use lnn::data::{PrepareOptions, RecordingSplit};
 use lnn::lagrangian::{EulerLagrange, HandWritten, Lagrangian, MechanicsError, Request, Terms};
 use lnn::linalg::Workspace;
-use lnn::network::NetworkLagrangian;
-use lnn::random::RngStream;
+use lnn::network::{Initialization, NetworkLagrangian};
+use lnn::random::{RandomGenerator, RngStream};
 use lnn::recording::{RecordedTrajectory, Recording, Targets};
 use lnn::rollout::{Options, rollout};
 use lnn::scalar::Real;
@@ -22,19 +22,6 @@ use std::time::Instant;
 
 /// Cart and pendulum; coordinates in m and, from the downward vertical, rad.
 struct CartPendulum;
-
-impl CartPendulum {
-    const CART: f64 = 1.0;
-    const BOB: f64 = 0.3;
-    const LENGTH: f64 = 0.5;
-    const FRICTION: [f64; 2] = [0.3, 0.01];
-
-    /// Mean of the mass matrix over angles, upper triangle.
-    fn mass(angles: impl Iterator<Item = f64>) -> [f64; 3] {
-        let (sum, count) = angles.fold((0.0, 0.0), |(sum, count), q| (sum + q.cos(), count + 1.0));
-        [Self::CART + Self::BOB, Self::BOB * Self::LENGTH * sum / count, Self::BOB * Self::LENGTH * Self::LENGTH]
-    }
-}
 
 impl Lagrangian for CartPendulum {
     fn coordinates(&self) -> usize {
@@ -48,19 +35,139 @@ impl Lagrangian for CartPendulum {
     }
 }
 
-/// A cart-pendulum with friction, and a force on the cart that depends on the cart's place: what a recording with a
-/// force in it is made by.
+/// A pendulum of 1 kg at 0.5 m.
+struct Pendulum;
+
+impl Lagrangian for Pendulum {
+    fn coordinates(&self) -> usize {
+        1
+    }
+    fn lagrangian<R: Real>(&self, p: &[R], q: &[R], v: &[R]) -> R {
+        R::half() * (p[0] * v[0]).sqr() + p[0] * p[1] * q[0].cos()
+    }
+}
+
+/// A planet around a star of attraction 1, in polar coordinates.
+struct Planet;
+
+impl Lagrangian for Planet {
+    fn coordinates(&self) -> usize {
+        2
+    }
+    fn lagrangian<R: Real>(&self, _: &[R], q: &[R], v: &[R]) -> R {
+        R::half() * (v[0].sqr() + (q[0] * v[1]).sqr()) + R::one() / q[0]
+    }
+}
+
+/// Two pendula of 1 kg at 1 m below each other.
+struct TwoPendula;
+
+impl Lagrangian for TwoPendula {
+    fn coordinates(&self) -> usize {
+        2
+    }
+    fn lagrangian<R: Real>(&self, p: &[R], q: &[R], v: &[R]) -> R {
+        let kinetic = v[0].sqr() + R::half() * v[1].sqr() + v[0] * v[1] * (q[0] - q[1]).cos();
+        kinetic + p[0] * (q[0].cos() + q[0].cos() + q[1].cos())
+    }
+}
+
+/// A kind of recordings.
+pub struct Case {
+    name: &'static str,
+    exact: fn() -> Box<dyn EulerLagrange<f64>>,
+    periodic: &'static [bool],
+    /// Friction coefficients of the coordinates, nothing for none.
+    friction: &'static [f64],
+    /// `true` if a known force pulls the first coordinate to a place.
+    forced: bool,
+    /// Noise of the positions.
+    sigma: &'static [f64],
+    /// Time between two samples in s.
+    step: f64,
+    /// Positions and velocities at the start.
+    start: fn(&mut RandomGenerator) -> [Vec<f64>; 2],
+}
+
+fn cart_pendulum() -> Box<dyn EulerLagrange<f64>> {
+    Box::new(HandWritten::new(CartPendulum, vec![1.0, 0.3, 0.5, 9.81]))
+}
+
+fn cart_start(rng: &mut RandomGenerator) -> [Vec<f64>; 2] {
+    let q = vec![rng.random_range(-0.3..0.3), rng.random_range(-2.0..2.0)];
+    [q, vec![rng.random_range(-0.8..0.8), rng.random_range(-3.0..3.0)]]
+}
+
+/// All of them.
+pub const CASES: [Case; 5] = [
+    Case {
+        name: "cart-pendulum",
+        exact: cart_pendulum,
+        periodic: &[false, true],
+        friction: &[0.3, 0.01],
+        forced: false,
+        sigma: &[2e-4, 1e-3],
+        step: 0.01,
+        start: cart_start,
+    },
+    Case {
+        name: "cart-pendulum with a known force",
+        exact: cart_pendulum,
+        periodic: &[false, true],
+        friction: &[0.3, 0.01],
+        forced: true,
+        sigma: &[2e-4, 1e-3],
+        step: 0.01,
+        start: cart_start,
+    },
+    Case {
+        name: "pendulum with a known force",
+        exact: || Box::new(HandWritten::new(Pendulum, vec![0.5, 9.81])),
+        periodic: &[true],
+        friction: &[0.05],
+        forced: true,
+        sigma: &[2e-3],
+        step: 0.01,
+        start: |rng| [vec![rng.random_range(-2.0..2.0)], vec![rng.random_range(-3.0..3.0)]],
+    },
+    Case {
+        name: "planet",
+        exact: || Box::new(HandWritten::new(Planet, vec![])),
+        periodic: &[false, true],
+        friction: &[],
+        forced: false,
+        sigma: &[1e-3, 1e-3],
+        step: 0.02,
+        start: |rng| {
+            let q = vec![rng.random_range(0.8..1.2), rng.random_range(-3.0..3.0)];
+            [q, vec![rng.random_range(-0.3..0.3), rng.random_range(0.8..1.2)]]
+        },
+    },
+    Case {
+        name: "two pendula",
+        exact: || Box::new(HandWritten::new(TwoPendula, vec![9.81])),
+        periodic: &[true, true],
+        friction: &[0.2, 0.1],
+        forced: false,
+        sigma: &[1e-3, 1e-3],
+        step: 0.01,
+        start: |rng| {
+            let q = vec![rng.random_range(-1.5..1.5), rng.random_range(-1.5..1.5)];
+            [q, vec![rng.random_range(-1.0..1.0), rng.random_range(-1.0..1.0)]]
+        },
+    },
+];
+
+/// A system with friction, and a force on its first coordinate that depends on the place: what a recording with a force in it is
+/// made by.
 struct Driven {
-    exact: HandWritten<CartPendulum, f64>,
+    exact: Box<dyn EulerLagrange<f64>>,
+    friction: &'static [f64],
     /// Stiffness of the force in N/m and offset in m.
     force: Option<(f64, f64)>,
 }
 
 impl Driven {
-    fn new(force: Option<(f64, f64)>) -> Self {
-        let p = vec![CartPendulum::CART, CartPendulum::BOB, CartPendulum::LENGTH, 9.81];
-        Self { exact: HandWritten::new(CartPendulum, p), force }
-    }
     fn drive(&self, x: f64) -> f64 {
         self.force.map_or(0.0, |(stiffness, offset)| -stiffness * (x - offset))
     }
@@ -68,43 +175,56 @@ impl Driven {
 
 impl EulerLagrange<f64> for Driven {
     fn coordinates(&self) -> usize {
-        2
+        self.exact.coordinates()
     }
     fn conserves_energy(&self) -> bool {
-        false
+        self.friction.is_empty() && self.force.is_none()
     }
     fn terms(&self, q: &[f64], v: &[f64], request: Request, terms: &mut Terms<f64>) -> Result<(), MechanicsError> {
+        let n = self.coordinates();
         self.exact.terms(q, v, request, terms)?;
-        if request.includes(Request::FORCE) {
-            for (q, v) in q.chunks_exact(2).zip(v.chunks_exact(2)) {
-                let [cart, joint] = CartPendulum::FRICTION;
-                terms.dissipation.push(cart * v[0] * v[0] + joint * v[1] * v[1]);
-                terms.force.extend([self.drive(q[0]) - cart * v[0], -joint * v[1]]);
+        if request.includes(Request::FORCE) && !self.conserves_energy() {
+            for (q, v) in q.chunks_exact(n).zip(v.chunks_exact(n)) {
+                let friction: Vec<f64> = (0..n).map(|i| self.friction.get(i).map_or(0.0, |f| f * v[i])).collect();
+                terms.dissipation.push(friction.iter().zip(v).map(|(f, v)| f * v).sum());
+                terms.force.extend((0..n).map(|i| if i == 0 { self.drive(q[0]) } else { 0.0 } - friction[i]));
             }
         }
-        terms.complete(2, v, request, &mut Workspace::new())
+        terms.complete(n, v, request, &mut Workspace::new())
     }
 }
 
-/// Runs of a cart-pendulum at 100 Hz with noise of 0.2 mm and 1 mrad.
-fn recording(forced: bool, runs: usize, seconds: f64, seed: u64) -> Recording {
-    let rng = &mut RngStream::Training(0).generator(seed);
-    let tracks = (0..runs).map(|run| {
-        let force = forced.then(|| (rng.random_range(2.0..8.0), rng.random_range(-0.5..0.5)));
-        let model = Driven::new(force);
-        let q = [rng.random_range(-0.3..0.3), rng.random_range(-2.0..2.0)];
-        let v = [rng.random_range(-0.8..0.8), rng.random_range(-3.0..3.0)];
-        let motion = rollout(&model, &q, &v, &Options { energy: false, ..Options::reference(seconds, 0.01) });
-        let motion = motion.complete().expect("a cart-pendulum moves on");
-        let force = motion.q.chunks_exact(2).flat_map(|q| [model.drive(q[0]), 0.0]);
-        let force = if forced { force.collect() } else { vec![] };
-        let sigma = [2e-4, 1e-3];
-        let noisy = motion.q.iter().enumerate();
-        let q = noisy.map(|(k, q)| q + sigma[k % 2] * Distribution::<f64>::sample(&StandardNormal, rng));
-        RecordedTrajectory { name: format!("run {run}"), times: motion.t, q: q.collect(), v: vec![], a: vec![], force }
-    });
-    let tracks = tracks.collect();
-    Recording { coordinates: ["x", "angle"].map(String::from).to_vec(), periodic: vec![false, true], tracks }
+impl Case {
+    /// Runs with noise.
+    pub fn recording(&self, runs: usize, seconds: f64, seed: u64) -> Recording {
+        let rng = &mut RngStream::Training(0).generator(seed);
+        let n = self.periodic.len();
+        let tracks = (0..runs).map(|run| {
+            let force = self.forced.then(|| (rng.random_range(2.0..8.0), rng.random_range(-0.5..0.5)));
+            let model = Driven { exact: (self.exact)(), friction: self.friction, force };
+            let [q, v] = (self.start)(rng);
+            let options = Options { energy: false, ..Options::reference(seconds, self.step) };
+            let motion = rollout(&model, &q, &v, &options).complete().expect("a system that moves on");
+            let force = motion.q.chunks_exact(n).flat_map(|q| {
+                let drive = model.drive(q[0]);
+                (0..n).map(move |i| if i == 0 { drive } else { 0.0 })
+            });
+            let force = if self.forced { force.collect() } else { vec![] };
+            let noisy = motion.q.iter().enumerate();
+            let q = noisy.map(|(k, q)| q + self.sigma[k % n] * Distribution::<f64>::sample(&StandardNormal, rng));
+            RecordedTrajectory {
+                name: format!("run {run}"),
+                times: motion.t,
+                q: q.collect(),
+                v: vec![],
+                a: vec![],
+                force,
+            }
+        });
+        let tracks = tracks.collect();
+        let coordinates = ["q1", "q2"][..n].iter().map(ToString::to_string).collect();
+        Recording { coordinates, periodic: self.periodic.to_vec(), tracks }
+    }
 }
 
 /// Root mean square distance of two energies, each about its mean.
@@ -115,88 +235,130 @@ fn energy_error(model: &[f64], exact: &[f64]) -> f64 {
     (squares.sum::<f64>() / model.len() as f64).sqrt()
 }
 
-/// One recording: what was stated, and the truth in its unit.
-fn one(forced: bool, runs: usize, seconds: f64, seed: u64, scale: Scale) -> Vec<(&'static str, Estimate, f64)> {
-    let recording = recording(forced, runs, seconds, seed);
+/// A recording smoothed, and a model of it of the shape that `shape` gives; and the loss and the time of its training.
+fn learn(
+    recording: &Recording,
+    (seed, epochs): (u64, Option<usize>),
+    shape: impl FnOnce(&mut Config),
+) -> (RecordingSplit, NetworkLagrangian<f64>, String) {
     let preparation = PrepareOptions { seed, ..PrepareOptions::default() };
-    let measured = RecordingSplit::new(&recording, &preparation).expect("long trajectories");
+    let measured = RecordingSplit::new(recording, &preparation).expect("long trajectories");
     let data = measured.datasets::<f32>(Targets::Smoothed).expect("states with full windows");
-    let mut config = lnn::presets::suggested("cart-pendulum", &data);
+    let mut config = lnn::presets::suggested("made", &data);
     config.seed = seed;
-    config.network.hidden = scale.hidden.to_vec();
-    config.network.dissipation = Some(16);
-    let epochs = scale.epochs.unwrap_or(config.phases[0].epochs);
+    let epochs = epochs.unwrap_or(config.phases[0].epochs);
     (config.phases[0].epochs, config.phases[0].t_max) = (epochs, epochs as f64);
+    shape(&mut config);
     let names = recording.coordinates.iter().map(String::as_str);
     let scale = data.training[0].physical_scale();
     let architecture = config.architecture_with(names, recording.periodic.clone(), scale).expect("names of its own");
     let penalty = Penalty::Eigenvalue { lambda: config.penalty.lambda() };
     let trained = train(&config, &architecture, penalty, data, 2, &Hooks::default()).expect("a training");
     let model = NetworkLagrangian::new(architecture, trained.weights).expect("its weights").cast::<f64>();
+    let remark = format!("seed {seed}: loss {:.4}, {:.0} s of training", trained.validation_loss, trained.seconds);
+    (measured, model, remark)
+}
+
+/// The learned constants of two pendula beside a small network, with the truth.
+fn grey_box(runs: usize, seconds: f64, seed: u64, epochs: Option<usize>) -> Vec<(&'static str, Estimate, f64)> {
+    let case = CASES.iter().find(|case| case.name == "two pendula").expect("a case of this name");
+    let known = include_str!("../../examples/systems/grey_pendula.toml");
+    let (measured, model, remark) = learn(&case.recording(runs, seconds, seed), (seed, epochs), |config| {
+        config.network.known = Some(Known::Description(Box::new(toml::from_str(known).expect("a system file"))));
+        config.network.alpha = 0.0;
+        config.network.initialization = Initialization::NearZero;
+        config.network.hidden = vec![8];
+        config.network.dissipation = Some(8);
+        config.optimizer.weight_decay = 0.01;
+    });
+    let started = Instant::now();
+    let found = constants(&model, &measured, 2).expect("enough stretches");
+    println!("  {remark}, {:.2} s to tell", started.elapsed().as_secs_f64());
+    [("g", 9.81), ("l2", 1.0), ("m2", 1.0)].into_iter().map(|(name, truth)| (name, found[name], truth)).collect()
+}
+
+/// One recording: what was stated, and the truth in its unit.
+fn one(case: &Case, runs: usize, seconds: f64, seed: u64, scale: Scale) -> Vec<(&'static str, Estimate, f64)> {
+    let recording = case.recording(runs, seconds, seed);
+    let (measured, model, remark) = learn(&recording, (seed, scale.epochs), |config| {
+        config.network.hidden = scale.hidden.to_vec();
+        config.network.dissipation = (!case.friction.is_empty()).then_some(16);
+    });
 
     let observed = Observed::new(&measured, Targets::Smoothed).expect("states with full windows");
-    let (q, v) = places(&measured);
     let started = Instant::now();
-    let found: Determination =
-        determination(&model, &recording.periodic, &observed, (&q, &v)).expect("a model of these states");
+    let found: Determination = determination(&model, &recording.periodic, &observed).expect("a model of these states");
     let took = started.elapsed().as_secs_f64();
 
-    let mass = CartPendulum::mass(q.iter().skip(1).step_by(2).copied());
-    let unit = if found.absolute { 1.0 } else { mass[0] };
-    let energy = |model: &dyn EulerLagrange<f64>, unit: f64| -> Vec<f64> {
+    let n = case.periodic.len();
+    let states = (observed.q.len() / n) as f64;
+    let of = |model: &dyn EulerLagrange<f64>| {
         let mut terms = Terms::default();
-        model.terms(&q, &v, Request::ENERGY, &mut terms).expect("regular states");
-        terms.energy.iter().map(|e| e / unit).collect()
+        let wanted = Request::ENERGY | Request::MASS_MATRIX;
+        model.terms(&observed.q, &observed.v, wanted, &mut terms).expect("regular states");
+        let mean = |at: usize| terms.mass_matrix.iter().skip(at).step_by(n * n).sum::<f64>() / states;
+        let mass: Vec<f64> = (0..n).flat_map(|i| (i..n).map(move |j| i * n + j)).map(mean).collect();
+        let unit = if found.absolute { 1.0 } else { mass[0] };
+        let energy: Vec<f64> = terms.energy.iter().map(|e| e / unit).collect();
+        (mass, unit, energy)
     };
-    let mut terms = Terms::default();
-    model.terms(&q, &v, Request::MASS_MATRIX, &mut terms).expect("regular states");
-    let learned = terms.mass_matrix.iter().step_by(4).sum::<f64>() / (q.len() / 2) as f64;
-    let learned = if found.absolute { 1.0 } else { learned };
-    let error = energy_error(&energy(&model, learned), &energy(&Driven::new(None).exact, unit));
-    let names = ["M11", "M12", "M22"];
+    let (mass, unit, energy) = of(&*(case.exact)());
+    let error = energy_error(&of(&model).2, &energy);
+    let names: &[&str] = if n == 1 { &["M11"] } else { &["M11", "M12", "M22"] };
     let mut rows: Vec<_> =
-        names.into_iter().zip(&found.mass_matrix).zip(mass).map(|((name, e), m)| (name, *e, m / unit)).collect();
-    let frictions = ["friction of x", "friction of angle"].into_iter().zip(&found.friction).zip(CartPendulum::FRICTION);
+        names.iter().copied().zip(&found.mass_matrix).zip(mass).map(|((name, e), m)| (name, *e, m / unit)).collect();
+    let frictions = ["friction of q1", "friction of q2"].into_iter().zip(&found.friction).zip(case.friction);
     rows.extend(frictions.map(|((name, e), truth)| (name, *e, truth / unit)));
     rows.push(("energy", found.energy, found.energy.value + error));
-    let loss = trained.validation_loss;
-    println!("  seed {seed}: loss {loss:.4}, {:.0} s of training, {took:.2} s to tell", trained.seconds);
+    if !found.absolute {
+        // The unit itself.
+        rows.remove(0);
+    }
+    println!("  {remark}, {took:.2} s to tell");
     rows
 }
 
-/// Prints and returns rows `forces,seed,quantity,learned,low,high,truth`, and prints how often the truth lies within.
+/// Prints and returns rows `case,seed,quantity,learned,low,high,truth`, and prints how often the truth lies within.
 pub fn compare(seeds: std::ops::Range<u64>, (runs, seconds): (usize, f64), scale: Scale) -> Vec<String> {
     let mut all = Vec::new();
-    for forced in [false, true] {
-        println!(
-            "cart-pendulum, {}:",
-            if forced { "known forces on the cart" } else { "no forces: over the mean of M11" }
-        );
-        let mut counts: Vec<(&str, usize, f64)> = Vec::new();
+    let mut total = [0; 2];
+    let mut count = |name: &str, of: &dyn Fn(u64) -> Vec<(&'static str, Estimate, f64)>| {
+        println!("{name}:");
+        // Times inside, squares of half of the range and of the error of the learned value, over the truth.
+        let mut counts: Vec<(&str, usize, [f64; 2])> = Vec::new();
         for seed in seeds.clone() {
-            for (k, (name, estimate, truth)) in one(forced, runs, seconds, seed, scale).into_iter().enumerate() {
-                let [low, high] = estimate.range();
+            for (k, (quantity, estimate, truth)) in of(seed).into_iter().enumerate() {
+                let Estimate { value, low, high } = estimate;
                 let inside = estimate.allows(truth);
                 println!(
-                    "    {name:18} {:9.4} from {low:9.4} to {high:9.4}, true {truth:9.4}{}",
-                    estimate.value,
+                    "    {quantity:18} {value:9.4} from {low:9.4} to {high:9.4}, true {truth:9.4}{}",
                     if inside { "" } else { "  OUTSIDE" }
                 );
                 if counts.len() <= k {
-                    counts.push((name, 0, 0.0));
+                    counts.push((quantity, 0, [0.0; 2]));
                 }
                 counts[k].1 += usize::from(inside);
-                counts[k].2 += estimate.deviation / estimate.value.abs();
-                all.push(format!("{},{seed},{name},{},{low},{high},{truth}", u8::from(forced), estimate.value));
+                // What is 0 is compared with the unit.
+                let size = if truth == 0.0 { 1.0 } else { truth };
+                let relative = [0.5 * (high - low), value - truth].map(|x| (x / size).powi(2));
+                counts[k].2.iter_mut().zip(relative).for_each(|(sum, x)| *sum += x);
+                all.push(format!("{name},{seed},{quantity},{value},{low},{high},{truth}"));
             }
         }
-        for (name, inside, relative) in counts {
-            let count = seeds.end - seeds.start;
+        let seeds = (seeds.end - seeds.start) as usize;
+        for (quantity, inside, squares) in counts {
+            let [half, error] = squares.map(|square| 100.0 * (square / seeds as f64).sqrt());
             println!(
-                "  {name:18} within its range in {inside} of {count}; mean deviation {:.1} %",
-                100.0 * relative / count as f64
+                "  {quantity:18} in its range in {inside} of {seeds}; half of it {half:.1} %, error {error:.1} % (rms)"
             );
+            total = [total[0] + inside, total[1] + seeds];
         }
+    };
+    for case in &CASES {
+        count(case.name, &|seed| one(case, runs, seconds, seed, scale));
     }
+    count("constants of two pendula", &|seed| grey_box(runs, seconds, seed, scale.epochs));
+    let [held, stated] = total;
+    println!("the truth lies within {held} of {stated} ranges, {:.1} %", 100.0 * held as f64 / stated as f64);
     all
 }

@@ -234,6 +234,18 @@ impl RecordingSplit {
         Ok(Datasets { training: vec![dataset("training states", &self.training, most)?], validation, test })
     }
 
+    /// The smoothed accelerations of the training states by polynomials of two more degrees: less bias, more noise. `None` where
+    /// the windows are too short for them.
+    pub(crate) fn finer_accelerations(&self) -> Option<Vec<f64>> {
+        let mut finer = self.smoothing.clone();
+        finer.degree += 2;
+        let mut part = self.training.clone();
+        for (track, states) in part.recording.tracks.iter().zip(&mut part.states) {
+            states.a = finer.apply(track).ok()?.a;
+        }
+        Some(part.dataset::<f64>(Targets::Smoothed, self.most_states).ok()?.a().to_vec())
+    }
+
     /// The datasets with weights of the training and validation states: `1/(|a| + f m + e)`, `e` the error to expect of an acceleration,
     /// `f` above 0; `m` is the mean of `|a|`, or with coordinates `around` a centre the median about as far from it.
     ///

@@ -1,13 +1,18 @@
 //! Tables of the ranges in which the data determine mass matrix, friction and energy of the model of `lnn fit`.
 
-use crate::analysis::{Determination, EnergyLoss, Estimate, Observed, determination, energy_loss, places};
+use crate::analysis::{
+    Decay, Determination, EnergyLoss, Estimate, Observed, constants, decay, determination, energy_loss, misfit,
+};
 use crate::data::RecordingSplit;
 use crate::lagrangian::EulerLagrange;
-use crate::names::number;
+use crate::names::{number, percent};
+use crate::network::NetworkLagrangian;
 use crate::pipeline::PipelineError;
+use crate::pipeline::hold_out::HoldOut;
 use crate::recording::Targets;
 use crate::report::{Report, text_table};
 use serde::Serialize;
+use std::collections::BTreeMap;
 
 /// One quantity and its range.
 #[derive(Clone, Debug, Serialize)]
@@ -26,10 +31,31 @@ pub struct Determined {
     determination: Vec<Quantity>,
     /// The unit of mass matrix, friction and energy: `SI` with known forces, else over the mean mass of a coordinate.
     unit: String,
-    /// Loss of energy along recorded motion, for a model without friction.
+    /// What the model misses of the accelerations of every coordinate beyond their expected error, over their size: of held-out
+    /// motion, of the learned one if nothing was held out. Empty where the model is not finite.
+    misfit: BTreeMap<String, f64>,
+    /// Share of the held-out states that lie outside of the learned ones.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    outside: Option<f64>,
+    /// Why no range is stated.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    withheld: Option<String>,
+    /// Learned constants of the known part of a grey box with their ranges.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    constant_ranges: BTreeMap<String, Estimate>,
+    /// Loss of energy along recorded motion of several coordinates, for a model without friction.
     #[serde(skip_serializing_if = "Option::is_none")]
     energy_loss: Option<EnergyLoss>,
+    /// Decay of recorded motion of one coordinate, for a model without friction.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    decay: Option<Decay>,
 }
+
+/// Largest misfit of a model whose ranges are stated, and of one whose loss of energy says anything of the motion.
+const MOST_MISFIT: f64 = 0.3;
+const MISFIT_OF_ENERGY: f64 = 0.5;
+/// Share of held-out states outside of the learned ones that is worth a word.
+const OUTSIDE: f64 = 0.1;
 
 /// Half of the range over the size: up to which a quantity is said to be determined.
 const WORDS: [(f64, &str); 3] = [(0.1, "well"), (0.5, "roughly"), (1.0, "poorly")];
@@ -37,40 +63,65 @@ const WORDS: [(f64, &str); 3] = [(0.1, "well"), (0.5, "roughly"), (1.0, "poorly"
 impl Quantity {
     /// A quantity that is compared with a `size` and is not negative, if `positive`.
     fn new(name: String, estimate: &Estimate, size: f64, positive: bool) -> Self {
-        let [low, high] = estimate.range();
+        let Estimate { value: learned, low, high } = *estimate;
         let relative = 0.5 * (high - low) / size;
         let determined = WORDS.iter().find(|(most, _)| relative <= *most).map_or("not", |(_, word)| word);
         let low = if positive { low.max(0.0) } else { low };
-        Self { name, learned: estimate.value, low, high, determined }
+        Self { name, learned, low, high, determined }
     }
 }
 
 impl Determined {
-    /// Looks at a model of recorded motion.
+    /// Looks at a model of recorded motion that was judged by `hold_out`.
     ///
     /// # Errors
     /// [`PipelineError::Recording`] if the states that were learned from cannot be had again.
-    pub fn new(
-        model: &dyn EulerLagrange<f64>,
-        measured: &RecordingSplit,
-        targets: Targets,
+    pub(crate) fn new(
+        model: &NetworkLagrangian<f64>,
+        (measured, targets): (&RecordingSplit, Targets),
+        hold_out: &HoldOut,
+        threads: usize,
     ) -> Result<Self, PipelineError> {
         let recording = &measured.training.recording;
-        let names = &recording.coordinates;
+        let (names, periodic) = (&recording.coordinates, &recording.periodic);
         let observed = Observed::new(measured, targets)?;
-        let (q, v) = places(measured);
-        let found = determination(model, &recording.periodic, &observed, (&q, &v));
-        let unit = match &found {
-            Some(found) if found.absolute => "SI".to_string(),
-            _ => format!("mean mass of {}", names[0]),
+        let held_out = Observed::held_out(measured, targets)?;
+        let missed = misfit(model, held_out.as_ref().unwrap_or(&observed));
+        let outside = held_out.as_ref().map(|held_out| observed.share_outside(held_out, periodic));
+        let misfit: BTreeMap<_, _> = names.iter().cloned().zip(missed.into_iter().flatten()).collect();
+        let withheld = withheld(&misfit, hold_out, held_out.is_some());
+        let found = if withheld.is_none() { determination(model, periodic, &observed) } else { None };
+        let unit = match observed.force.is_empty() {
+            false => "SI".to_string(),
+            true => format!("mean mass of {}", names[0]),
         };
-        let energy_loss = if model.conserves_energy() { energy_loss(model, &measured.training) } else { None };
-        Ok(Self { determination: found.map(|found| quantities(&found, names)).unwrap_or_default(), unit, energy_loss })
+        let conserves = model.conserves_energy();
+        let constants = if withheld.is_none() { constants(model, measured, threads) } else { None };
+        Ok(Self {
+            determination: found.map(|found| quantities(&found, names)).unwrap_or_default(),
+            unit,
+            misfit,
+            outside,
+            withheld,
+            constant_ranges: constants.unwrap_or_default(),
+            energy_loss: if conserves && names.len() > 1 { energy_loss(model, &measured.training) } else { None },
+            decay: if conserves { decay(periodic, &observed) } else { None },
+        })
     }
 
     /// A remark on standard error, if the data ask for friction.
     pub fn suggestion(&self) -> Option<String> {
-        let loss = self.energy_loss.filter(EnergyLoss::is_steady)?;
+        if let Some(decay) = self.decay.filter(Decay::is_certain) {
+            return Some(format!(
+                "the recorded motion decays, by {} per second of its velocity (standard error {}), which no force of the \
+                 coordinate explains: friction? --friction learns it",
+                number(decay.rate),
+                number(decay.error)
+            ));
+        }
+        // The energy of a model that does not explain the motion says nothing of it.
+        let explained = !self.misfit.is_empty() && self.misfit.values().all(|misfit| *misfit <= MISFIT_OF_ENERGY);
+        let loss = self.energy_loss.filter(EnergyLoss::is_steady).filter(|_| explained)?;
         Some(format!(
             "the recorded motion loses energy steadily, {:.2} of its mean kinetic energy per second, in {:.0} % of {} \
              stretches: friction? --friction learns it",
@@ -78,6 +129,11 @@ impl Determined {
             100.0 * loss.losing,
             loss.stretches
         ))
+    }
+
+    /// Range of a constant of the known part, if it is learned and the range holds.
+    pub(crate) fn constant(&self, name: &str) -> Option<&Estimate> {
+        self.constant_ranges.get(name)
     }
 
     fn headers(&self) -> [String; 5] {
@@ -99,30 +155,66 @@ impl Determined {
             "SI" => "In SI units, which the known forces fix.".to_string(),
             unit => format!("Relative to the {unit}: without known forces (--force) L has no unit."),
         };
-        format!("How well the data determine the model: ranges hold the truth in 19 cases of 20.\n{unit}")
+        format!(
+            "How well the data determine the model, in the mean over the learned states: ranges hold the truth in 19 cases of \
+             20.\n{unit}"
+        )
+    }
+
+    /// Why there is no table, in a sentence.
+    fn nothing(&self) -> String {
+        match &self.withheld {
+            Some(reason) => format!("How well the data determine the model is not stated: {reason}."),
+            None => "How well the data determine mass matrix, friction and energy cannot be said here.".to_string(),
+        }
+    }
+
+    /// A remark on held-out states that the learned ones do not surround.
+    fn beyond(&self) -> Option<String> {
+        let share = self.outside.filter(|share| *share > OUTSIDE)?;
+        Some(format!(
+            "{} of the held-out states lie outside of the learned ones: there nothing that is stated here holds.",
+            percent(share)
+        ))
     }
 
     /// For a terminal.
     pub fn text(&self) -> String {
+        let beyond = self.beyond().map_or(String::new(), |text| text + "\n");
         if self.determination.is_empty() {
-            return "how well the data determine mass matrix, friction and energy cannot be said here\n".to_string();
+            return format!("\n{}\n{beyond}", self.nothing());
         }
-        format!("\n{}\n{}", self.about(), text_table(&self.headers(), &self.rows()))
+        format!("\n{}\n{}{beyond}", self.about(), text_table(&self.headers(), &self.rows()))
     }
 
     /// Adds the table to a report.
     pub fn report(&self, report: Report) -> Report {
         let report = report.heading("What the data determine");
         let report = if self.determination.is_empty() {
-            report.paragraph(&self.text())
+            report.paragraph(&self.nothing())
         } else {
             report.paragraph(&self.about()).table(&self.headers(), &self.rows())
         };
-        match self.suggestion() {
-            Some(text) => report.paragraph(&text),
-            None => report,
-        }
+        let remarks = self.beyond().into_iter().chain(self.suggestion());
+        remarks.fold(report, |report, text| report.paragraph(&text))
     }
+}
+
+/// Why the ranges of a model would not hold: what it misses of the motion is no noise.
+fn withheld(misfit: &BTreeMap<String, f64>, hold_out: &HoldOut, held_out: bool) -> Option<String> {
+    let motion = if held_out { "held-out motion" } else { "the motion" };
+    let Some((name, worst)) = misfit.iter().max_by(|a, b| a.1.total_cmp(b.1)) else {
+        return Some(format!("the model is not finite on {motion}"));
+    };
+    if !(*worst <= MOST_MISFIT) {
+        let missed = percent(*worst);
+        return Some(format!(
+            "on {motion} the model misses {missed} of the acceleration of {name} beyond the error of the data, and a range holds \
+             only where what is missed is noise"
+        ));
+    }
+    let fails = hold_out.is_better() == Some(false);
+    fails.then(|| format!("the model predicts {motion} no better than constant velocity"))
 }
 
 fn quantities(found: &Determination, names: &[String]) -> Vec<Quantity> {

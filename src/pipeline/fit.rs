@@ -173,7 +173,7 @@ fn fit_in<S: Scalar>(
         threads,
     };
     let physics = Physics::new(&subject, &|| Ok(()))?;
-    let determined = Determined::new(&network, measured, *targets)?;
+    let determined = Determined::new(&network, (measured, *targets), &hold_out, threads)?;
     determined.suggestion().iter().for_each(|text| watch.say(Event::Note(text)));
     let found = Found {
         prepared,

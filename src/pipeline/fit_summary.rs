@@ -249,7 +249,11 @@ impl Summary<'_> {
             );
         }
         if !self.constants.is_empty() {
-            let constants: Vec<String> = self.constants.iter().map(|(k, &x)| format!("{k} {}", number(x))).collect();
+            let one = |(name, &x): (&String, &f64)| match self.determined.constant(name) {
+                Some(range) => format!("{name} {} ({} to {})", number(x), number(range.low), number(range.high)),
+                None => format!("{name} {}", number(x)),
+            };
+            let constants: Vec<String> = self.constants.iter().map(one).collect();
             let _ = writeln!(text, "constants of the known part: {}", constants.join(", "));
         }
         let _ = writeln!(text, "{:.1} s of training, {:.1} s in all\n", self.training_seconds, self.wall_seconds);

@@ -5,7 +5,7 @@ use crate::analysis::{PredictionError, ValidTimes};
 use crate::experiments::{Row, Spread};
 use crate::names::{counted, number, percent};
 use crate::pipeline::evaluation::Evaluation;
-use crate::pipeline::hold_out::HoldOut;
+use crate::pipeline::hold_out::{HoldOut, factor};
 use crate::report::Report;
 
 /// A headline.
@@ -119,9 +119,9 @@ fn predicted(model: &PredictionError, straight: &PredictionError, valid: Option<
     let (Some(valid), true) = (valid, model.median.is_finite()) else {
         return "the learned Lagrangian fails to predict most of the motion that it has not seen.".to_string();
     };
-    let compared = match straight.median / model.median {
-        factor if factor >= 1.05 => format!(", {} times more", number(factor)),
-        _ => ": the model is no better".to_string(),
+    let compared = match factor(model, straight) {
+        Some(factor) => format!(", {} times more", number(factor)),
+        None => ": the model is no better".to_string(),
     };
     format!(
         "the learned Lagrangian predicts motion that it has not seen for {valid}; {} s ahead it is off by {} {unit} (median), \

@@ -247,6 +247,11 @@ fn wrong_signature(model: &dyn EulerLagrange<f64>, part: &Split, time: Option<us
     wrong as f64 / f64::max(1.0, count as f64)
 }
 
+/// How many times a prediction is better than constant velocity; none if it is no better.
+pub(crate) fn factor(model: &PredictionError, straight: &PredictionError) -> Option<f64> {
+    Some(straight.median / model.median).filter(|factor| *factor >= 1.05)
+}
+
 impl HoldOut {
     const HEADERS: [&'static str; 7] = [
         "time ahead [s]",
@@ -280,6 +285,12 @@ impl HoldOut {
             energy: None,
             figures: Vec::new(),
         }
+    }
+
+    /// `true` if the model predicts better than constant velocity at any of the times ahead; none without predictions.
+    pub(crate) fn is_better(&self) -> Option<bool> {
+        let mut pairs = self.model.iter().zip(&self.constant_velocity);
+        (!self.model.is_empty()).then(|| pairs.any(|(model, straight)| factor(model, straight).is_some()))
     }
 
     /// `true` if there was nothing to judge by.

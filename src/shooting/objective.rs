@@ -224,7 +224,7 @@ impl<S: Scalar> Shard<S> {
 
 impl<S: Scalar> Segments<S> {
     /// Residuals of one segment.
-    pub(super) fn residuals(&self, segment: usize) -> usize {
+    pub(crate) fn residuals(&self, segment: usize) -> usize {
         let segment = &self.list[segment];
         segment.samples.len() * self.n * if segment.has_velocity { 2 } else { 1 }
     }

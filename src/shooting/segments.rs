@@ -233,6 +233,10 @@ impl<S: Scalar> Segments<S> {
     pub fn steps(&self) -> usize {
         self.steps
     }
+    /// Noise of component `k` of a start, `(2, n)`, scaled.
+    pub(crate) fn tolerance(&self, k: usize) -> S {
+        self.tau[k]
+    }
     /// Estimated starts `(q/s, v/s)`, `(segments, 2, n)`; positions from the segment's origin.
     pub fn starts(&self) -> &[S] {
         &self.starts

@@ -10,47 +10,65 @@
 //! ```
 //!
 //! so that changes `sum_k x_k phi_k` with normal `x_k` of standard deviation 1 before the data (the changes are scaled to
-//! the model's own size) have a normal distribution after them, `C = (1 + A^T W A)^-1`, `x = C A^T W e`, with `A` the
-//! changes of the accelerations and `e` what they miss of the data. `W` has the inverse mean square of `e`, and as many
-//! samples as are independent: neighbours have a common error. Every quantity that is linear in `L` and `D` follows, its
-//! standard deviation being that of the distribution and the distance of its middle from the learned one together.
+//! the model's own size) come out of a linear regression, `C = (1 + A^T W A)^-1`, `x = C A^T W e`, with `A` the changes of the
+//! accelerations and `e` what they miss of the data. Every quantity that is linear in `L` and `D` follows.
+//!
+//! Its error has four parts. What the data leave open has the size that was believed before them, `C C`. What noise does is
+//! read off the scatter of `x` when one of twenty groups of consecutive states is left out (the jackknife), which counts no
+//! sample as independent and needs no model of the noise. What the bias of smoothing does is how far `x` moves with accelerations
+//! by polynomials of two more degrees. And what neither the model nor any change of it explains of the
+//! accelerations, beyond their expected error, may be an error of every quantity of that share of its size. `W` has the inverse
+//! mean square of `e`, and as many samples as are independent: it only divides what the data say from what was believed.
+//!
+//! A range reaches two standard deviations to either side of the regression's middle. The regression is of first order: half the
+//! way from the learned value to the middle is one more standard deviation.
 //!
 //! Without known forces `L` has no unit: quantities are then over the mean `M` of the first coordinate.
 //!
-//! Source of the method: MacKay, Neural Computation 4 (1992) 448 (Laplace approximation around trained weights), here for
-//! functions that are linear in the equations instead of weights.
+//! Sources of the method: MacKay, Neural Computation 4 (1992) 448 (Laplace approximation around trained weights), here for
+//! functions that are linear in the equations instead of weights; Efron and Stein, Annals of Statistics 9 (1981) 586 (jackknife).
 
 mod changes;
+mod constants;
+mod decay;
 mod functions;
 mod observed;
+mod posterior;
+mod regression;
 
-pub use observed::{Observed, places};
+pub use constants::constants;
+pub use decay::{Decay, decay};
+pub use observed::Observed;
 
 use crate::lagrangian::{EulerLagrange, Request, Terms};
-use crate::linalg::{MatMut, MatRef, Workspace, gemm, inverse, solve};
-use changes::{Changes, Row, Usual};
+use changes::{Changes, Row};
+use posterior::{Data, Posterior};
 use serde::{Deserialize, Serialize};
 
-/// A learned number and where the data allow it to be.
+/// A learned number and the range in which the data allow it to be.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Estimate {
     /// The model's value.
     pub value: f64,
-    /// Standard deviation of what the data allow.
-    pub deviation: f64,
+    /// Lower end of the range, not above the value.
+    pub low: f64,
+    /// Upper end of the range, not below the value.
+    pub high: f64,
 }
 
 /// Standard deviations on either side that a range has: it holds the truth in 19 cases of 20.
 pub const RANGE: f64 = 2.0;
 
 impl Estimate {
-    /// Lower and upper end of the range.
-    pub fn range(&self) -> [f64; 2] {
-        [self.value - RANGE * self.deviation, self.value + RANGE * self.deviation]
+    /// The range of a value that a regression moves by `shift`, with this standard deviation. The regression is of first order: its
+    /// shift is believed to half its size, and the range holds the value itself.
+    fn about(value: f64, shift: f64, deviation: f64) -> Self {
+        let half = RANGE * deviation.hypot(0.5 * shift);
+        Self { value, low: value.min(value + shift - half), high: value.max(value + shift + half) }
     }
     /// `true` if a number lies in the range.
     pub fn allows(&self, x: f64) -> bool {
-        (x - self.value).abs() <= RANGE * self.deviation
+        self.low <= x && x <= self.high
     }
 }
 
@@ -67,37 +85,47 @@ pub struct Determination {
     pub energy: Estimate,
 }
 
-/// States whose changes are multiplied at once.
-const CHUNK: usize = 128;
-
-/// Ranges in which `observed` leaves `model`, for the states `at`, `(q, v)`, over which means are taken.
+/// Ranges in which `observed` leaves `model`; means are taken over its states.
 ///
 /// `None` where there is nothing to say: too many coordinates, too few states, or a model that is not finite on them.
-pub fn determination(
-    model: &dyn EulerLagrange<f64>,
-    periodic: &[bool],
-    observed: &Observed,
-    at: (&[f64], &[f64]),
-) -> Option<Determination> {
+pub fn determination(model: &dyn EulerLagrange<f64>, periodic: &[bool], observed: &Observed) -> Option<Determination> {
     let n = model.coordinates();
     let data = Data::new(model, observed)?;
-    let usual = data.usual(n)?;
-    let changes = Changes::new(periodic, &ranges(n, &data.q), &usual, !model.conserves_energy())?;
-    let posterior = data.posterior(n, &changes, observed)?;
-    let wanted = Wanted::new(model, &changes, at)?;
+    let changes = Changes::new(periodic, &ranges(n, &data.q), &data.usual()?, !model.conserves_energy())?;
+    let posterior = data.posterior(&changes)?;
+    let wanted = Wanted::new(model, &changes, (&data.q, &data.v))?;
     let absolute = !observed.force.is_empty();
     let unit = if absolute { None } else { wanted.mass.first().cloned() };
-    let estimate = |linear: &Linear| posterior.estimate(&linear.over(unit.as_ref()));
-    let energy = posterior.energy(&wanted, unit.as_ref());
+    let over = |linear: &Linear| linear.over(unit.as_ref());
+    let mass: Vec<Linear> = wanted.mass.iter().map(over).collect();
+    let pairs: Vec<(usize, usize)> = (0..n).flat_map(|i| (i..n).map(move |j| (i, j))).collect();
+    let own: Vec<f64> = pairs.iter().zip(&mass).filter(|((i, j), _)| i == j).map(|(_, mass)| mass.value).collect();
+    let floor = &posterior.floor;
+    let mass_floor = |&(i, j): &(usize, usize)| (floor[i] * own[i] * floor[j] * own[j]).abs().sqrt();
     let result = Determination {
         absolute,
-        mass_matrix: wanted.mass.iter().map(estimate).collect(),
-        friction: wanted.friction.iter().map(estimate).collect(),
-        energy,
+        mass_matrix: mass.iter().zip(&pairs).map(|(mass, pair)| posterior.estimate(mass, mass_floor(pair))).collect(),
+        friction: wanted
+            .friction
+            .iter()
+            .map(over)
+            .zip(floor)
+            .map(|(friction, floor)| posterior.estimate(&friction, floor * friction.value))
+            .collect(),
+        energy: wanted.energy(&posterior, unit.as_ref()),
     };
     let all = result.mass_matrix.iter().chain(&result.friction).chain([&result.energy]);
-    let finite = all.into_iter().all(|e| e.value.is_finite() && e.deviation.is_finite());
+    let finite = all.into_iter().all(|e| e.value.is_finite() && e.low.is_finite() && e.high.is_finite());
     finite.then_some(result)
+}
+
+/// What a model misses of the accelerations of every coordinate beyond their expected error, root mean square over their size:
+/// 0 where only noise is left, 1 for a model that explains nothing. `None` where the model is not finite.
+pub fn misfit(model: &dyn EulerLagrange<f64>, observed: &Observed) -> Option<Vec<f64>> {
+    let data = Data::new(model, observed)?;
+    // A model that fails on states does not explain them.
+    let failed = observed.q.len() > data.q.len() * 10 / 9;
+    (!failed).then(|| data.misfit())
 }
 
 /// A number of the model and its change by every change.
@@ -121,144 +149,6 @@ impl Linear {
         let value = self.value / unit.value;
         let slopes = self.slopes.iter().zip(&unit.slopes).map(|(s, u)| (s - value * u) / unit.value).collect();
         Self { value, slopes }
-    }
-}
-
-/// States on which the model is finite, with its own accelerations and what they miss.
-struct Data {
-    q: Vec<f64>,
-    v: Vec<f64>,
-    a: Vec<f64>,
-    missed: Vec<f64>,
-    inverse: Vec<f64>,
-    mass: Vec<f64>,
-}
-
-impl Data {
-    fn new(model: &dyn EulerLagrange<f64>, observed: &Observed) -> Option<Self> {
-        let n = model.coordinates();
-        let mut data = Self { q: vec![], v: vec![], a: vec![], missed: vec![], inverse: vec![], mass: vec![] };
-        let mut terms = Terms::default();
-        let mut workspace = Workspace::new();
-        for (k, (q, v)) in observed.q.chunks_exact(n).zip(observed.v.chunks_exact(n)).enumerate() {
-            if model.terms(q, v, Request::ACCELERATION, &mut terms).is_err() {
-                continue;
-            }
-            let mut inverted = vec![0.0; n * n];
-            if inverse(n, &terms.mass_matrix, &mut inverted, &mut workspace).is_err() {
-                continue;
-            }
-            let mut a = terms.acceleration.clone();
-            if let Some(force) = observed.force.get(k * n..(k + 1) * n) {
-                for (a, row) in a.iter_mut().zip(inverted.chunks_exact(n)) {
-                    *a += row.iter().zip(force).map(|(m, f)| m * f).sum::<f64>();
-                }
-            }
-            let missed: Vec<f64> = observed.a[k * n..(k + 1) * n].iter().zip(&a).map(|(a, b)| a - b).collect();
-            if missed.iter().chain(&inverted).all(|x| x.is_finite()) {
-                data.q.extend_from_slice(q);
-                data.v.extend_from_slice(v);
-                data.a.extend(a);
-                data.missed.extend(missed);
-                data.inverse.extend(inverted);
-                data.mass.extend_from_slice(&terms.mass_matrix);
-            }
-        }
-        (data.q.len() > n).then_some(data)
-    }
-
-    fn usual(&self, n: usize) -> Option<Usual> {
-        let states = (self.q.len() / n) as f64;
-        let rms =
-            |values: &[f64], i: usize| (values.iter().skip(i).step_by(n).map(|x| x * x).sum::<f64>() / states).sqrt();
-        let all = |values: &[f64]| (0..n).map(|i| rms(values, i)).collect::<Vec<_>>();
-        let mass =
-            (0..n).map(|i| self.mass.iter().skip(i * n + i).step_by(n * n).map(|m| m.abs()).sum::<f64>() / states);
-        let usual = Usual { mass: mass.collect(), velocity: all(&self.v), acceleration: all(&self.a) };
-        let positive = |values: &[f64]| values.iter().all(|x| x.is_finite() && *x > 0.0);
-        (positive(&usual.mass) && positive(&usual.velocity)).then_some(usual)
-    }
-
-    fn posterior(&self, n: usize, changes: &Changes, observed: &Observed) -> Option<Posterior> {
-        let (count, states) = (changes.len(), self.q.len() / n);
-        let weights: Vec<f64> = (0..n)
-            .map(|i| {
-                let square = self.missed.iter().skip(i).step_by(n).map(|e| e * e).sum::<f64>() / states as f64;
-                let size = self.a.iter().skip(i).step_by(n).map(|a| a * a).sum::<f64>() / states as f64;
-                // Nothing is known better than numbers have digits.
-                let square = square.max(1e-20 * size).max(f64::MIN_POSITIVE.sqrt());
-                (observed.independent.get(i).copied().unwrap_or(1.0) / (square * states as f64)).sqrt()
-            })
-            .collect();
-        let mut precision = vec![0.0; count * count];
-        (0..count).for_each(|k| precision[k * count + k] = 1.0);
-        let mut pull = vec![0.0; count];
-        let (mut row, mut rows, mut missed) = (Row::default(), Vec::new(), Vec::new());
-        for state in 0..states {
-            let at = state * n..(state + 1) * n;
-            changes.evaluate(&self.q[at.clone()], &self.v[at.clone()], &self.a[at.clone()], &mut row);
-            let inverse = &self.inverse[state * n * n..(state + 1) * n * n];
-            for i in 0..n {
-                let start = rows.len();
-                rows.resize(start + count, 0.0);
-                for j in 0..n {
-                    let factor = -weights[i] * inverse[i * n + j];
-                    let equation = &row.equation[j * count..(j + 1) * count];
-                    rows[start..].iter_mut().zip(equation).for_each(|(sum, x)| *sum += factor * x);
-                }
-                missed.push(weights[i] * self.missed[state * n + i]);
-            }
-            if missed.len() >= CHUNK || state + 1 == states {
-                let a = MatRef::new(&rows, missed.len(), count);
-                gemm(MatMut::new(&mut precision, count, count), true, 1.0, a.t(), a);
-                let e = MatRef::new(&missed, missed.len(), 1);
-                gemm(MatMut::new(&mut pull, count, 1), true, 1.0, a.t(), e);
-                rows.clear();
-                missed.clear();
-            }
-        }
-        let mut covariance = vec![0.0; count * count];
-        let mut workspace = Workspace::new();
-        inverse(count, &precision, &mut covariance, &mut workspace).ok()?;
-        let mut mean = vec![0.0; count];
-        solve(count, &precision, &pull, &mut mean, &mut workspace).ok()?;
-        Some(Posterior { covariance, mean })
-    }
-}
-
-/// Distribution of the sizes of the changes after the data.
-struct Posterior {
-    covariance: Vec<f64>,
-    mean: Vec<f64>,
-}
-
-impl Posterior {
-    /// Mean square of a linear function of the sizes.
-    fn square(&self, slopes: &[f64]) -> f64 {
-        let count = slopes.len();
-        let shift: f64 = slopes.iter().zip(&self.mean).map(|(s, m)| s * m).sum();
-        let rows = self.covariance.chunks_exact(count).zip(slopes);
-        let variance: f64 = rows.map(|(row, s)| s * row.iter().zip(slopes).map(|(c, s)| c * s).sum::<f64>()).sum();
-        variance.max(0.0) + shift * shift
-    }
-
-    fn estimate(&self, linear: &Linear) -> Estimate {
-        Estimate { value: linear.value, deviation: self.square(&linear.slopes).sqrt() }
-    }
-
-    /// Energy about its mean.
-    fn energy(&self, wanted: &Wanted, unit: Option<&Linear>) -> Estimate {
-        let mean = wanted.mean_energy();
-        let (mut value, mut square) = (0.0, 0.0);
-        for energy in &wanted.energy {
-            let mut about = energy.clone();
-            about.add(mean.value, &mean.slopes, -1.0);
-            let about = about.over(unit);
-            value += about.value * about.value;
-            square += self.square(&about.slopes);
-        }
-        let states = wanted.energy.len() as f64;
-        Estimate { value: (value / states).sqrt(), deviation: (square / states).sqrt() }
     }
 }
 
@@ -314,6 +204,24 @@ impl Wanted {
         wanted.mass.iter_mut().for_each(|mass| scale(mass, 1.0 / used));
         wanted.friction.iter_mut().zip(&squares).for_each(|(friction, square)| scale(friction, 1.0 / square));
         (used > 0.0 && !wanted.energy.is_empty()).then_some(wanted)
+    }
+
+    /// Energy about its mean, root mean square, and its error.
+    fn energy(&self, posterior: &Posterior, unit: Option<&Linear>) -> Estimate {
+        let mean = self.mean_energy();
+        let (mut value, mut square) = (0.0, 0.0);
+        for energy in &self.energy {
+            let mut about = energy.clone();
+            about.add(mean.value, &mean.slopes, -1.0);
+            let about = about.over(unit);
+            value += about.value * about.value;
+            square += posterior.square(&about.slopes);
+        }
+        let states = self.energy.len() as f64;
+        let value = (value / states).sqrt();
+        let floor = value * posterior.floor.iter().fold(0.0, |most: f64, x| most.max(*x));
+        let half = RANGE * (square / states).sqrt().hypot(floor);
+        Estimate { value, low: value - half, high: value + half }
     }
 
     fn mean_energy(&self) -> Linear {

@@ -1,9 +1,9 @@
 //! Observations that a model is compared with.
 
-use crate::data::{RecordingSplit, RecordingSplitError};
+use crate::data::{Dataset, RecordingSplit, RecordingSplitError};
 use crate::recording::Targets;
 
-/// States with the accelerations that were learned from.
+/// States with their accelerations, one trajectory after another in the order of time.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Observed {
     /// Coordinates, `(states, n)`.
@@ -14,26 +14,12 @@ pub struct Observed {
     pub a: Vec<f64>,
     /// Known external forces, `(states, n)`, or nothing.
     pub force: Vec<f64>,
-    /// Number of errors of the accelerations that are independent, of each coordinate.
+    /// Root mean square error to expect of the accelerations of each coordinate, `(n)`: 0 of measured ones.
+    pub error: Vec<f64>,
+    /// The accelerations by smoothing of less bias and more noise, `(states, n)`, or nothing.
+    pub finer: Vec<f64>,
+    /// Number of errors of the accelerations that are independent, of each coordinate, `(n)`.
     pub independent: Vec<f64>,
-}
-
-/// States over which means are taken, at most about.
-const PLACES: usize = 2000;
-
-/// Held-out states `(q, v)`, evenly spaced, over which means are taken; those learned from if nothing was held out.
-pub fn places(measured: &RecordingSplit) -> (Vec<f64>, Vec<f64>) {
-    let part = if measured.test.states.is_empty() { &measured.training } else { &measured.test };
-    let n = part.recording.n();
-    let stride = part.recording.samples().div_ceil(PLACES).max(1);
-    let (mut q, mut v) = (Vec::new(), Vec::new());
-    for states in &part.states {
-        for row in states.interior().step_by(stride) {
-            q.extend_from_slice(&states.q[row * n..(row + 1) * n]);
-            v.extend_from_slice(&states.v[row * n..(row + 1) * n]);
-        }
-    }
-    (q, v)
 }
 
 /// States that are looked at; of more, evenly spaced ones.
@@ -42,30 +28,101 @@ const STATES: usize = 4000;
 impl Observed {
     /// The states that a fit learned from.
     ///
-    /// Errors of smoothed accelerations are the same within a window; those of a model change with the state and are of one
-    /// sign over half a swing: samples within half the fast period count as one.
-    ///
     /// # Errors
     /// As [`RecordingSplit::datasets`].
     pub fn new(measured: &RecordingSplit, targets: Targets) -> Result<Self, RecordingSplitError> {
         let data = measured.datasets::<f64>(targets)?.training.remove(0);
+        let finer = if targets == Targets::Measured { None } else { measured.finer_accelerations() };
+        let finer = finer.filter(|finer| finer.len() == data.a().len()).map(|finer| some(data.coordinates(), &finer));
+        Ok(Self { finer: finer.unwrap_or_default(), ..Self::of(&data, measured, targets) })
+    }
+
+    /// The states that were held out to judge; `None` if there are none.
+    ///
+    /// # Errors
+    /// As [`RecordingSplit::datasets`].
+    pub fn held_out(measured: &RecordingSplit, targets: Targets) -> Result<Option<Self>, RecordingSplitError> {
+        if measured.test.states.is_empty() {
+            return Ok(None);
+        }
+        Ok(Some(Self::of(&measured.datasets::<f64>(targets)?.test, measured, targets)))
+    }
+
+    /// Errors of smoothed accelerations are the same within a window; those of a model change with the state and are of one
+    /// sign over half a swing: samples within half the fast period count as one.
+    fn of(data: &Dataset<f64>, measured: &RecordingSplit, targets: Targets) -> Self {
         let n = data.coordinates();
-        let stride = data.len().div_ceil(STATES).max(1);
-        let some = |values: &[f64]| values.chunks_exact(n).step_by(stride).flatten().copied().collect::<Vec<_>>();
-        let samples = measured.training.recording.samples() as f64;
+        let some = |values: &[f64]| some(n, values);
+        let quality = || measured.smoothing.coordinates.iter().map(|c| &c.quality);
         let derived = targets != Targets::Measured;
-        let smoothing = &measured.smoothing;
-        let independent = smoothing.coordinates.iter().map(|c| {
-            let half = std::f64::consts::PI * c.quality.velocity / c.quality.acceleration / smoothing.step;
+        let samples = measured.training.recording.samples() as f64;
+        let independent = quality().map(|quality| {
+            let half = std::f64::consts::PI * quality.velocity / quality.acceleration / measured.smoothing.step;
             let half = if half.is_finite() { half } else { 1.0 };
-            (samples / half.max(if derived { c.quality.window as f64 } else { 1.0 })).clamp(1.0, samples)
+            (samples / half.max(if derived { quality.window as f64 } else { 1.0 })).clamp(1.0, samples)
         });
-        Ok(Self {
+        let independent = independent.collect();
+        Self {
             q: some(data.q()),
             v: some(data.v()),
             a: some(data.a()),
             force: some(data.force()),
-            independent: independent.collect(),
-        })
+            error: quality().map(|quality| if derived { quality.total(2) } else { 0.0 }).collect(),
+            finer: Vec::new(),
+            independent,
+        }
+    }
+
+    /// Share of the `other` states that lie outside of these: beyond the range of a coordinate (of the cosine and the sine of
+    /// an angle, as a network sees it) or of a velocity, by more than a twentieth of the range.
+    pub fn share_outside(&self, other: &Self, periodic: &[bool]) -> f64 {
+        let n = periodic.len();
+        let seen = |states: &Self, k: usize| -> Vec<f64> {
+            let (q, v) = (&states.q[k * n..(k + 1) * n], &states.v[k * n..(k + 1) * n]);
+            let position =
+                q.iter().zip(periodic).flat_map(|(q, &angle)| if angle { [q.cos(), q.sin()] } else { [*q, 0.0] });
+            position.chain(v.iter().copied()).collect()
+        };
+        let mut ranges = vec![[f64::INFINITY, f64::NEG_INFINITY]; 3 * n];
+        for k in 0..self.q.len() / n {
+            ranges.iter_mut().zip(seen(self, k)).for_each(|(r, x)| *r = [r[0].min(x), r[1].max(x)]);
+        }
+        let count = other.q.len() / n;
+        let outside = |k: &usize| {
+            let beyond = |([low, high], x): (&[f64; 2], f64)| {
+                let margin = MARGIN * (high - low);
+                x < low - margin || x > high + margin
+            };
+            ranges.iter().zip(seen(other, *k)).any(beyond)
+        };
+        (0..count).filter(outside).count() as f64 / f64::max(1.0, count as f64)
+    }
+}
+
+/// Evenly spaced rows of `n` numbers, at most about [`STATES`].
+fn some(n: usize, values: &[f64]) -> Vec<f64> {
+    let stride = (values.len() / n).div_ceil(STATES).max(1);
+    values.chunks_exact(n).step_by(stride).flatten().copied().collect()
+}
+
+/// Share of a range by which a state may lie beyond it.
+const MARGIN: f64 = 0.05;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn states_beyond_the_learned_ones_are_counted() {
+        let states = |q: &[f64]| Observed { q: q.to_vec(), v: vec![0.0; q.len()], ..Observed::default() };
+        // Angles from -1 to 1, and lengths from 2 to 4.
+        let learned = states(&[-1.0, 2.0, 0.0, 4.0, 1.0, 3.0]);
+        let share = |q: &[f64]| learned.share_outside(&states(q), &[true, false]);
+        assert_eq!(share(&[0.5, 3.0, -0.9, 4.05]), 0.0);
+        assert_eq!(share(&[0.5 + std::f64::consts::TAU, 3.0]), 0.0);
+        assert_eq!(share(&[3.0, 3.0, 0.5, 3.0]), 0.5);
+        assert_eq!(share(&[0.0, 4.5]), 1.0);
+        let fast = Observed { v: vec![9.0, 0.0], ..states(&[0.0, 3.0]) };
+        assert_eq!(learned.share_outside(&fast, &[true, false]), 1.0);
     }
 }

@@ -2,6 +2,9 @@
 #![allow(dead_code, reason = "each test program uses its part")]
 
 pub mod accuracy;
+#[cfg(feature = "cli")]
+#[path = "../../../benches/shared/arm.rs"]
+pub mod arm;
 pub mod damped;
 pub mod matrices;
 pub mod nested;

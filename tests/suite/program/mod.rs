@@ -16,6 +16,7 @@ mod motion;
 mod overwrite;
 mod physics;
 mod pipes;
+mod ranges;
 mod resume;
 mod screen;
 mod shadow;
