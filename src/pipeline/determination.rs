@@ -206,7 +206,7 @@ fn withheld(misfit: &BTreeMap<String, f64>, hold_out: &HoldOut, held_out: bool) 
     let Some((name, worst)) = misfit.iter().max_by(|a, b| a.1.total_cmp(b.1)) else {
         return Some(format!("the model is not finite on {motion}"));
     };
-    if !(*worst <= MOST_MISFIT) {
+    if worst.is_nan() || *worst > MOST_MISFIT {
         let missed = percent(*worst);
         return Some(format!(
             "on {motion} the model misses {missed} of the acceleration of {name} beyond the error of the data, and a range holds \
