@@ -2,8 +2,8 @@
 
 use crate::cli::experiment_folder::ExperimentFolder;
 use crate::cli::experiment_list::{Listed, list};
-use crate::cli::files::{holds_something, require_free};
-use crate::cli::number::{count, positive, threads};
+use crate::cli::files::require_free;
+use crate::cli::number::{number, thread_count, threads, whole};
 use crate::cli::shard::Shard;
 use crate::cli::source::parameter;
 use crate::cli::watch::watch;
@@ -12,10 +12,11 @@ use crate::experiments::{Experiment, Run, Scale, experiments, find};
 use crate::lagrangian::{SystemInstance, configure_system};
 use crate::names::{WIDTH, counted, wrapped};
 use crate::pipeline::{
-    Directory, ExperimentReport, RECORD, finish_runs, finished_record, merge_experiment, run_experiment,
+    Directory, ExperimentReport, KeptRecord, finish_runs, kept_record, merge_experiment, run_experiment,
 };
 use crate::recording::Columns;
 use crate::recording::read::read_recording;
+use crate::relativity::depends_on_time;
 use crate::report::{Curve, EXPERIMENT_HEADER, text_table};
 use crate::storage::Claimant;
 use std::collections::BTreeMap;
@@ -33,7 +34,7 @@ pub struct Args {
     #[command(flatten)]
     chosen: Chosen,
     /// Threads; as many runs go side by side, and the results do not depend on them [default: all].
-    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = count)]
+    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = thread_count)]
     threads: Option<usize>,
     /// Only the I-th of N shares of the runs, I from 1 to N; no tables are written [default: that of a Slurm array, or all].
     #[arg(long, value_name = "I/N")]
@@ -68,7 +69,7 @@ struct Chosen {
     #[arg(long, value_enum, value_name = "SCALE", default_value = "short")]
     scale: ScaleName,
     /// Seeds of every run.
-    #[arg(long, value_name = "N", default_value = "1", allow_hyphen_values = true, value_parser = seeds)]
+    #[arg(long, value_name = "N", default_value = "1", allow_hyphen_values = true, value_parser = whole(1, MOST_SEEDS))]
     seeds: usize,
     /// Only the runs whose row of the table begins with this text; a later command without it goes on from there.
     #[arg(long, value_name = "TEXT")]
@@ -116,6 +117,7 @@ impl Chosen {
     fn own_system(&self) -> Result<Option<(SystemInstance<f64>, BTreeMap<String, f64>)>, CliError> {
         let Some(name) = &self.system else { return Ok(None) };
         let configured = configure_system::<f64>(chosen::system(name)?, &self.param).map_err(CliError::usage)?;
+        require_stationary(&configured)?;
         let symbols = configured.system.parameters.iter().map(|p| p.symbol.to_string());
         let values: BTreeMap<String, f64> = symbols.zip(configured.parameters.iter().copied()).collect();
         let given = self.param.iter().filter_map(|(symbol, _)| Some((symbol.clone(), *values.get(symbol)?))).collect();
@@ -147,6 +149,25 @@ impl Chosen {
     }
 }
 
+/// Refuses a metric that changes with its time: its orbits, horizons and shadows would be those of one moment.
+fn require_stationary(system: &SystemInstance<f64>) -> Result<(), CliError> {
+    let n = system.coordinates;
+    let Some(time) = system.system.time_like else { return Ok(()) };
+    let bounds = system.system.validation(n).positions;
+    // Points of the box at fractions that are all different.
+    let place = |k: usize, i: usize| (0.618_034 * (k + 1) as f64 * (2.0 + i as f64).sqrt()).fract();
+    let points =
+        (0..8).flat_map(|k| bounds.iter().enumerate().map(move |(i, (low, high))| low + place(k, i) * (high - low)));
+    let (points, span) = (points.collect::<Vec<f64>>(), bounds[time].1 - bounds[time].0);
+    let model = system.build().map_err(CliError::usage)?;
+    if depends_on_time(model.as_ref(), time, &points, span).map_err(CliError::data)? {
+        let name = &system.system.coordinates(n)[time].name;
+        let problem = "expected a metric that is the same at all times";
+        return Err(CliError::usage(format_args!("--system: the metric depends on its time {name}, {problem}")));
+    }
+    Ok(())
+}
+
 /// Runs experiments, a share of them, or lists them; makes tables of what others ran.
 ///
 /// # Errors
@@ -159,12 +180,10 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     }
     let chosen = &args.chosen;
     let Some(name) = &args.name else {
-        interrupt::end_at_once().map_err(CliError::signals)?;
         return output::print(&listing(chosen.json));
     };
     let all = numbered(chosen_runs(chosen, name)?);
     if args.list {
-        interrupt::end_at_once().map_err(CliError::signals)?;
         return listed(chosen, share(all, args.shard), &claimant);
     }
     let shard = match args.shard {
@@ -177,9 +196,13 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let shares = share(all, shard);
     for (experiment, runs) in &shares {
         require_writable(chosen, experiment)?;
+        let path = chosen.directory(experiment);
         if !args.overwrite {
+            if let Some(problem) = damaged(&path, runs.iter().map(|(_, run)| run))?.first() {
+                return Err(CliError::data(format_args!("{problem}; --overwrite makes its run again")));
+            }
             let replace = "--overwrite replaces it, or choose another --out";
-            require_same(&chosen.directory(experiment), runs.iter().map(|(_, run)| run), replace)?;
+            require_same(&path, runs.iter().map(|(_, run)| run), replace)?;
         }
     }
     let curves = curves(chosen)?;
@@ -210,10 +233,14 @@ fn merge(name: &str, chosen: &Chosen, claimant: &Claimant) -> Result<(), CliErro
     }
     let curves = curves(chosen)?;
     let stop = interrupt::flag().map_err(CliError::signals)?;
+    let mut left_out = Vec::new();
     for (experiment, runs) in all {
         let path = chosen.directory(experiment);
         let folder = ExperimentFolder::new(&path, claimant.clone());
         let of = (experiment, chosen.scale());
+        let damaged = damaged(&path, runs.iter())?;
+        damaged.iter().for_each(|problem| output::note(&format!("{problem}; its run is left out")));
+        left_out.extend(damaged);
         let done = merge_experiment(of, runs, &curves, &folder, &watch(&stop))
             .map_err(|error| CliError::file(&path, error))?;
         if done.finished < done.results.len() {
@@ -223,7 +250,13 @@ fn merge(name: &str, chosen: &Chosen, claimant: &Claimant) -> Result<(), CliErro
         }
         told(chosen, experiment, &done)?;
     }
-    Ok(())
+    match left_out.split_first() {
+        None => Ok(()),
+        Some((first, more)) => {
+            let more = if more.is_empty() { String::new() } else { format!(" (and {} more)", more.len()) };
+            Err(CliError::data(format_args!("{first}{more}; the tables are without what is damaged")))
+        }
+    }
 }
 
 /// Runs with their numbers, which count on from one experiment to the next.
@@ -283,12 +316,8 @@ fn chosen_runs(chosen: &Chosen, name: &str) -> Result<Vec<(&'static Experiment, 
     Ok(kept)
 }
 
-/// Seeds of every run, no more than can be listed.
-fn seeds(text: &str) -> Result<usize, String> {
-    const MOST: usize = 10_000;
-    let seeds = count(text)?;
-    if seeds <= MOST { Ok(seeds) } else { Err(format!("expected a whole number above 0, at most {MOST}")) }
-}
+/// Seeds of every run at most: no more than can be listed.
+const MOST_SEEDS: usize = 10_000;
 
 /// Tables of an experiment, made anew of the records of its runs.
 const WRITTEN: [&str; 3] = ["table.csv", "curves.csv", "readings.csv"];
@@ -298,7 +327,7 @@ fn require_same<'a>(path: &Path, runs: impl Iterator<Item = &'a Run>, hint: &str
     let store = Directory::at(path);
     let mut others = Vec::new();
     for run in runs {
-        if holds_something(&path.join(&run.name).join(RECORD)) && finished_record(&store, run)?.is_none() {
+        if matches!(kept_record(&store, run)?, KeptRecord::OtherConfiguration) {
             others.push(run.name.as_str());
         }
     }
@@ -308,14 +337,21 @@ fn require_same<'a>(path: &Path, runs: impl Iterator<Item = &'a Run>, hint: &str
     Err(CliError::file(&path.join(first), problem))
 }
 
+/// Runs with files that cannot be read: each file and what is wrong with it.
+fn damaged<'a>(path: &Path, runs: impl Iterator<Item = &'a Run>) -> Result<Vec<String>, CliError> {
+    let store = Directory::at(path);
+    let mut found = Vec::new();
+    for run in runs {
+        if let KeptRecord::Damaged(file, problem) = kept_record(&store, run)? {
+            found.push(format!("{}: {problem}", path.join(&run.name).join(file).display()));
+        }
+    }
+    Ok(found)
+}
+
 /// A lease, from a tenth of a second to a day.
 fn lease(text: &str) -> Result<Duration, String> {
-    let seconds = positive(text)?;
-    if (0.1..=86_400.0).contains(&seconds) {
-        Ok(Duration::from_secs_f64(seconds))
-    } else {
-        Err("expected seconds from 0.1 to 86400".to_string())
-    }
+    number(0.1, 86_400.0)(text).map(Duration::from_secs_f64)
 }
 
 /// `label=file`.

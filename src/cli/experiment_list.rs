@@ -1,11 +1,10 @@
 //! The runs of an experiment with their states: finished, claimed by which process, open.
 
 use crate::cli::CliError;
-use crate::cli::files::holds_something;
 use crate::cli::folder::Folder;
 use crate::cli::resume::has_checkpoint;
 use crate::experiments::Run;
-use crate::pipeline::{Directory, RECORD, finished_record};
+use crate::pipeline::{Directory, KeptRecord, kept_record};
 use crate::storage::{Claimant, Holder, LockOwner, Standing};
 use serde_json::{Value, json};
 use std::io;
@@ -27,6 +26,8 @@ enum State {
     Finished,
     /// It has a record of another configuration.
     OtherConfiguration,
+    /// It has a file that cannot be read, and why.
+    Damaged(&'static str, String),
     /// A process works on it; which, as far as that is known.
     Claimed(Option<LockOwner>, Option<Holder>),
     /// Nobody works on it; `true` if it goes on from a checkpoint.
@@ -51,9 +52,12 @@ pub fn list(
 }
 
 fn state(directory: &Path, run: &Run, claimant: &Claimant) -> Result<State, CliError> {
-    if finished_record(&Directory::at(directory), run)?.is_some() {
-        return Ok(State::Finished);
-    }
+    let kept = match kept_record(&Directory::at(directory), run)? {
+        KeptRecord::Finished(_) => return Ok(State::Finished),
+        KeptRecord::OtherConfiguration => Some(State::OtherConfiguration),
+        KeptRecord::Damaged(file, problem) => Some(State::Damaged(file, problem)),
+        KeptRecord::Nothing => None,
+    };
     let path = directory.join(&run.name);
     let locked = Folder::holder(&path);
     // Without the lock, a claim of this machine is that of a dead process.
@@ -67,8 +71,7 @@ fn state(directory: &Path, run: &Run, claimant: &Claimant) -> Result<State, CliE
             State::Claimed(owner.or(locked.flatten()), holder)
         }
         (Standing::Free(..), Some(owner)) => State::Claimed(owner, None),
-        (Standing::Free(..), None) if holds_something(&path.join(RECORD)) => State::OtherConfiguration,
-        (Standing::Free(..), None) => State::Open(has_checkpoint(&path)),
+        (Standing::Free(..), None) => kept.unwrap_or_else(|| State::Open(has_checkpoint(&path))),
     })
 }
 
@@ -78,6 +81,7 @@ impl Listed {
         let state = match &self.state {
             State::Finished => "finished".to_string(),
             State::OtherConfiguration => "finished, of another configuration".to_string(),
+            State::Damaged(file, problem) => format!("damaged, {file}: {problem}"),
             State::Claimed(_, Some(holder)) => format!("claimed by {holder}"),
             State::Claimed(Some(owner), None) => format!("claimed by {owner}"),
             State::Claimed(None, None) => "claimed".to_string(),
@@ -92,6 +96,7 @@ impl Listed {
         let state = match &self.state {
             State::Finished => "finished",
             State::OtherConfiguration => "other-configuration",
+            State::Damaged(..) => "damaged",
             State::Claimed(..) => "claimed",
             State::Open(_) => "open",
         };

@@ -6,7 +6,7 @@ use crate::cli::source::{Source, parameter};
 use crate::cli::states::parse_table;
 use crate::cli::surfaces::Line;
 use crate::cli::{CliError, input, output, states, tensors};
-use crate::geometry::{GeometryError, geometries};
+use crate::geometry::{GeometryError, MOST_CURVED, geometries};
 use crate::lagrangian::{EulerLagrange, Request, Terms};
 use crate::scalar::{Dd, Real, Scalar};
 use std::path::PathBuf;
@@ -94,6 +94,10 @@ fn geometry<S: Scalar>(args: &Args) -> Result<(), CliError> {
         note_velocity(&*source.model, &ends[0], &velocity);
         let line = Line { block: &args.surface, ends: (&ends[0], &ends[1]), velocity: &velocity, steps: args.steps };
         return line.print(&source, !args.json && args.format == Format::Table);
+    }
+    if n > MOST_CURVED {
+        let problem = format!("expected a metric of at most {MOST_CURVED} coordinates, found {n}");
+        return Err(CliError::usage(format_args!("--points: {problem}")));
     }
     let Some(points) = &args.points else { return Err(CliError::usage("--points: expected a file")) };
     let place = input::name(points);

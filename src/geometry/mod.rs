@@ -101,6 +101,9 @@ impl<S: Scalar> Geometry<S> {
     }
 }
 
+/// Coordinates of a metric whose curvature is asked for, at most: of `n` it has `n^4` numbers, which at 64 took 2.8 GB a point.
+pub(crate) const MOST_CURVED: usize = 32;
+
 /// The geometry of a model at points `(batch, n)` in physical units, each with its own failure.
 ///
 /// `velocity`, `(n)`, is the one at which the mass matrix is taken: zeros unless `L` is more than quadratic in the velocities.

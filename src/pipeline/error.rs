@@ -136,7 +136,7 @@ impl PipelineError {
     pub(crate) fn is_configuration(&self) -> bool {
         match self {
             Self::Config(_) | Self::System(_) | Self::Network(_) | Self::NoAccelerations => true,
-            Self::Sampling(error) => !matches!(error, SamplingError::Dataset(_)),
+            Self::Sampling(error) => !matches!(error, SamplingError::Dataset(_) | SamplingError::Interrupted),
             Self::OtherShape { configuration, .. } => *configuration,
             _ => false,
         }

@@ -1,7 +1,7 @@
 //! Experiments: their runs side by side, in this process and others, those that are finished not again, and the tables that come
 //! of them.
 
-use crate::configuration::in_current_words;
+use crate::configuration::{Config, in_current_words};
 use crate::experiments::{Experiment, Outcome, Record, Run, Scale};
 use crate::pipeline::checkpoints::Begin;
 use crate::pipeline::experiment_queue::Queue;
@@ -90,11 +90,7 @@ pub fn finish_runs(
             }
         }
     };
-    std::thread::scope(|scope| {
-        for _ in 0..abreast {
-            scope.spawn(work);
-        }
-    });
+    crate::storage::abreast(abreast, work);
     let mut found = queue.into_results();
     let results = runs
         .into_iter()
@@ -206,16 +202,56 @@ fn make(
     Ok(Some(record))
 }
 
+/// What a store holds of a run.
+#[derive(Debug)]
+pub(crate) enum KeptRecord {
+    /// Nothing: the run is not finished.
+    Nothing,
+    /// A record that was made from its configuration.
+    Finished(Record),
+    /// A record of another configuration.
+    OtherConfiguration,
+    /// A file that cannot be read, and why.
+    Damaged(&'static str, String),
+}
+
 /// The record of a run in a store, if it was made from this configuration.
 ///
 /// # Errors
 /// A configuration that TOML cannot hold.
-pub fn finished_record(store: &dyn ExperimentStore, run: &Run) -> Result<Option<Record>, PipelineError> {
+fn finished_record(store: &dyn ExperimentStore, run: &Run) -> Result<Option<Record>, PipelineError> {
+    Ok(match kept_record(store, run)? {
+        KeptRecord::Finished(record) => Some(record),
+        _ => None,
+    })
+}
+
+/// What a store holds of a run.
+///
+/// # Errors
+/// A configuration that TOML cannot hold.
+pub(crate) fn kept_record(store: &dyn ExperimentStore, run: &Run) -> Result<KeptRecord, PipelineError> {
+    const CONFIG: &str = "config.toml";
     let toml = toml::to_string(&run.config).map_err(PipelineError::format)?;
-    let record = store.read(&run.name, RECORD).and_then(|json| serde_json::from_slice(&json).ok());
-    let current = |bytes: &[u8]| in_current_words(&String::from_utf8_lossy(bytes));
-    let same = || store.read(&run.name, "config.toml").is_some_and(|text| current(&text) == toml);
-    Ok(record.filter(|_| same()))
+    let is_there = |file: &str| store.names(&run.name).iter().any(|name| name == file);
+    let Some(record) = store.read(&run.name, RECORD) else {
+        let unread = || KeptRecord::Damaged(RECORD, "cannot be read".to_string());
+        return Ok(if is_there(RECORD) { unread() } else { KeptRecord::Nothing });
+    };
+    let record = match serde_json::from_slice(&record) {
+        Ok(record) => record,
+        Err(error) => return Ok(KeptRecord::Damaged(RECORD, error.to_string())),
+    };
+    let Some(config) = store.read(&run.name, CONFIG) else {
+        let problem = if is_there(CONFIG) { "cannot be read" } else { "is missing beside a record" };
+        return Ok(KeptRecord::Damaged(CONFIG, problem.to_string()));
+    };
+    let config = in_current_words(&String::from_utf8_lossy(&config));
+    Ok(match toml::from_str::<Config>(&config) {
+        _ if config == toml => KeptRecord::Finished(record),
+        Ok(_) => KeptRecord::OtherConfiguration,
+        Err(error) => KeptRecord::Damaged(CONFIG, error.message().to_string()),
+    })
 }
 
 #[cfg(test)]
@@ -242,5 +278,20 @@ mod tests {
             std::fs::write(folder.join("config.toml"), config).unwrap();
             assert_eq!(finished_record(&store, run).unwrap().is_some(), finished, "{config}");
         }
+        // A file that is damaged is told from one of another configuration.
+        let kept = |file: &str, content: &str| {
+            std::fs::write(folder.join("config.toml"), &now).unwrap();
+            std::fs::write(folder.join(RECORD), serde_json::to_string(&record).unwrap()).unwrap();
+            std::fs::write(folder.join(file), content).unwrap();
+            kept_record(&store, run).unwrap()
+        };
+        let other = kept("config.toml", &now.replace("seed = 0", "seed = 7"));
+        assert!(matches!(other, KeptRecord::OtherConfiguration), "{other:?}");
+        for (file, content) in [(RECORD, "{\"outcome\""), (RECORD, ""), ("config.toml", &now[..40])] {
+            let found = kept(file, content);
+            assert!(matches!(&found, KeptRecord::Damaged(name, _) if *name == file), "{content}: {found:?}");
+        }
+        std::fs::remove_file(folder.join(RECORD)).unwrap();
+        assert!(matches!(kept_record(&store, run).unwrap(), KeptRecord::Nothing));
     }
 }

@@ -79,7 +79,7 @@ pub(crate) fn conclude(
     let reductions = reduction_table(&experiment.reductions(&results));
     let report = remarks.iter().fold(report, |report, remark| report.paragraph(remark));
     let report = if reductions.is_empty() { report } else { report.table(&REDUCTION_HEADER, &reductions) };
-    let holes = rows_of_holes(experiment, &results, store, output.as_ref())?;
+    let holes = rows_of_holes(experiment, &results, store, output.as_ref(), watch)?;
     let report = holes.iter().fold(report, |report, row| row.add_to(report));
     let report = within(taken, report.figures(&figures));
     output.write("report.html", report.to_html().as_bytes())?;

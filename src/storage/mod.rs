@@ -1,4 +1,4 @@
-//! Files read within limits and written whole or not at all; claims of directories; memory that is left.
+//! Files read within limits and written whole or not at all; claims of directories; memory and threads that the machine gives.
 
 mod claim;
 #[cfg(feature = "model-files")]
@@ -7,6 +7,7 @@ mod files;
 mod lock_owner;
 mod memory;
 mod read;
+mod threads;
 mod write;
 
 pub use claim::{Claim, Claimant, Holder, Standing, Taken};
@@ -14,4 +15,5 @@ pub use files::{Disk, Files};
 pub use lock_owner::LockOwner;
 pub use memory::available_memory;
 pub use read::{ReadError, open_regular, read_regular};
+pub(crate) use threads::{MOST_THREADS, abreast, in_order};
 pub use write::{Growing, check_target, remove_leftovers, replace, write_atomically, write_whole};
