@@ -8,7 +8,7 @@ use crate::cli::watch::watch;
 use crate::cli::{CliError, interrupt, output, source};
 use crate::lagrangian::SystemInstance;
 use crate::lagrangian::system::{Bounds, TrajectoryTest};
-use crate::pipeline::{EvaluationOptions, RTOL, evaluate};
+use crate::pipeline::{EvaluationOptions, PipelineError, RTOL, evaluate};
 use std::path::{Path, PathBuf};
 
 /// Arguments.
@@ -96,7 +96,12 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let (span, threads) = (span(args, &system)?, threads(args.threads));
     let options = EvaluationOptions { starts: args.starts, span, rtol: args.rtol, threads, ..usual };
     let stop = interrupt::flag().map_err(CliError::signals)?;
-    let evaluation = evaluate(&system, &learned.network, options, &watch(&stop))?;
+    let evaluation = match evaluate(&system, &learned.network, options, &watch(&stop)) {
+        Err(PipelineError::Interrupted) => {
+            return Err(CliError::interrupted("interrupted before anything was compared"));
+        }
+        evaluation => evaluation?,
+    };
     let model = args.model.display().to_string();
     let json = evaluation.write(&system, (&model, learned.header.validation_loss), seed, &folder)?;
     if args.json {

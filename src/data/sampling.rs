@@ -192,6 +192,16 @@ mod tests {
     }
 
     #[test]
+    fn a_raised_flag_ends_it() {
+        for name in ["harmonic-oscillator", "spring-pendulum", "schwarzschild-cartesian"] {
+            let system = configure::<f64>(name, &[]).unwrap();
+            let config = Preset::Quick.config(&system).unwrap();
+            let ended = sample_all_until::<f64>(&config, &system, &AtomicBool::new(true));
+            assert!(matches!(ended, Err(SamplingError::Interrupted)), "{name}");
+        }
+    }
+
+    #[test]
     fn states_off_the_shell_are_states_of_the_same_motion() {
         let system = configure::<f64>("ads4-geodesic", &[]).unwrap();
         let mut config = Preset::Quick.config(&system).unwrap();

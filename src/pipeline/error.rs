@@ -22,7 +22,7 @@ pub enum PipelineError {
     /// Unknown system, or parameters that it does not have.
     #[error(transparent)]
     System(#[from] SystemError),
-    /// States that cannot be sampled.
+    /// States that cannot be sampled, or a flag that ended it.
     #[error(transparent)]
     Sampling(#[from] SamplingError),
     /// Recorded motion that cannot be learned from.

@@ -172,7 +172,10 @@ pub fn evaluate(
     if !attention.is_interrupted() {
         portraits = test.portraits(exact, learned, &runs[..runs.len().min(DRAWN)]);
         figures = evaluation_figures(&runs, &portraits, system);
-        figures.extend(grids(system, exact, learned)?);
+        match grids(system, exact, learned) {
+            Err(_) if attention.is_interrupted() => {}
+            drawn => figures.extend(drawn?),
+        }
     }
     if attention.is_interrupted() {
         // They would show where the models were ended.
@@ -326,6 +329,53 @@ fn fixed(system: &SystemInstance<f64>, state: &[f64], axes: [Axis; 2], imposed: 
 mod tests {
     use super::*;
     use crate::lagrangian::configure;
+    use crate::network::Layout;
+    use crate::pipeline::Event;
+    use crate::presets::Preset;
+    use crate::report::Report;
+    use std::sync::Arc;
+    use std::sync::atomic::{AtomicBool, Ordering};
+
+    /// An evaluation that a flag ends behind so many of its pieces.
+    fn ended_behind(pieces: usize) -> Result<Evaluation, PipelineError> {
+        let system = configure::<f64>("harmonic-oscillator", &[]).unwrap();
+        let mut config = Preset::Quick.config(&system).unwrap();
+        config.network.hidden = vec![4];
+        let architecture = config.architecture(&system, vec![1.0]).unwrap();
+        // The term alpha |v|^2 alone: its motion is that of a free particle.
+        let weights = vec![0.0; Layout::new(&architecture).parameters];
+        let network = NetworkLagrangian::new(architecture, weights).unwrap();
+        let options = EvaluationOptions::new(&system, Domain::new(vec![None; 2]), 0).unwrap();
+        let span = Span { t_end: 1.0, ..options.span };
+        let states = (options.states.0[..50].to_vec(), options.states.1[..50].to_vec());
+        let flag = Arc::new(AtomicBool::new(false));
+        let raised = Arc::clone(&flag);
+        let events = move |event: Event<'_>| {
+            if matches!(event, Event::Judged { done, .. } if done == pieces && done > 0) {
+                raised.store(true, Ordering::SeqCst);
+            }
+        };
+        let watch = Watch { interrupt: flag, ..Watch::new(events) };
+        evaluate(&system, &network, EvaluationOptions { states, starts: 3, span, ..options }, &watch)
+    }
+
+    #[test]
+    fn what_was_compared_before_an_interruption_is_kept() {
+        let whole = ended_behind(0).unwrap();
+        assert!(whole.interrupted.is_none() && whole.trajectories.len() == 3 && !whole.figures.is_empty());
+        for (pieces, starts) in [(1, 0), (2, 3), (3, 3)] {
+            let part = ended_behind(pieces).unwrap();
+            let said = part.interrupted.as_deref().unwrap();
+            assert!(said.starts_with(&format!("{starts} of 3")), "{said}");
+            assert_eq!((part.trajectories.len(), part.figures.is_empty()), (starts, pieces < 3));
+            assert_eq!(part.accelerations[0].median, whole.accelerations[0].median);
+            assert_eq!(part.mass_matrix.factor, whole.mass_matrix.factor);
+            assert!(part.trajectories.iter().all(|motion| motion.summary.stopped.is_none()));
+            // It has its tables.
+            let report = part.report(part.summarise(Report::new("part"), "oscillator")).to_html();
+            assert!(report.contains("interrupted") && !part.text("oscillator").is_empty());
+        }
+    }
 
     #[test]
     fn grids_say_where_they_are() {

@@ -2,6 +2,7 @@
 //! of them.
 
 use crate::configuration::{Config, in_current_words};
+use crate::data::SamplingError;
 use crate::experiments::{Experiment, Outcome, Record, Run, Scale};
 use crate::pipeline::checkpoints::Begin;
 use crate::pipeline::experiment_queue::Queue;
@@ -174,7 +175,10 @@ fn make(
     let trained = train(&run.config, &system, &options, output, &watch);
     let judged_or_empty = matches!(
         &trained,
-        Ok(_) | Err(PipelineError::Interrupted | PipelineError::Training(TrainingError::NothingLearned(_)))
+        Ok(_)
+            | Err(PipelineError::Interrupted
+                | PipelineError::Sampling(SamplingError::Interrupted)
+                | PipelineError::Training(TrainingError::NothingLearned(_)))
     );
     let record = match trained {
         _ if judged_or_empty && watch.is_interrupted() => return Ok(None),

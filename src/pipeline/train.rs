@@ -2,7 +2,7 @@
 
 use crate::analysis::{stretches, training_instability};
 use crate::configuration::{Config, Penalty, Phase, Precision};
-use crate::data::{Datasets, SamplingError, sample_all_until};
+use crate::data::{Datasets, sample_all_until};
 use crate::experiments::{Learned, Outcome, Record};
 use crate::lagrangian::system::TrajectoryTest;
 use crate::lagrangian::{Request, SystemInstance, Terms};
@@ -132,10 +132,7 @@ fn train_in<S: Scalar>(
     let started = Instant::now();
     let unscaled = config.architecture(system, vec![1.0; system.coordinates])?;
     memory::require("training", training_memory(config, &unscaled))?;
-    let (data, scale) = match sample_all_until::<S>(config, system, &watch.interrupt) {
-        Err(SamplingError::Interrupted) => return Err(PipelineError::Interrupted),
-        sampled => sampled?,
-    };
+    let (data, scale) = sample_all_until::<S>(config, system, &watch.interrupt)?;
     remark_on_penalty(config, system, &data, watch)?;
     let penalty = config.penalty()?;
     let (architecture, before) = begin_shape::<S>(config, system, scale)?;

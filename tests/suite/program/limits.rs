@@ -34,6 +34,73 @@ fn every_value(base: &[&str], option: &str, form: &dyn Fn(&str) -> String) {
     }
 }
 
+/// Options of the commands below that take no number.
+const WORDS: [&str; 47] = [
+    "acceleration",
+    "activation",
+    "beside",
+    "box",
+    "columns",
+    "config",
+    "coords",
+    "cyclic",
+    "format",
+    "force",
+    "force-time",
+    "force-units",
+    "from",
+    "known",
+    "method",
+    "model",
+    "name",
+    "observer",
+    "only",
+    "out",
+    "param",
+    "penalty",
+    "periodic",
+    "plot",
+    "positions",
+    "precision",
+    "preset",
+    "print-config",
+    "resume",
+    "scale",
+    "shard",
+    "signature",
+    "space",
+    "state",
+    "structure",
+    "system",
+    "targets",
+    "time",
+    "timelike",
+    "trajectory",
+    "units",
+    "velocities",
+    "velocity",
+    "hidden",
+    "noise",
+    "friction",
+    "checkpoint-every",
+];
+
+/// Every option of these commands is one of the numbers that the tests of this file type, or takes no number.
+#[test]
+fn every_option_is_looked_at() {
+    let source = include_str!("limits.rs");
+    for name in ["train", "fit", "check", "rollout", "evaluate", "certify", "experiment", "shadow"] {
+        let help = lnn(&[name, "--help"]).stdout;
+        for line in help.lines().map(str::trim).filter(|line| line.starts_with('-') && line.contains(['<', '='])) {
+            let Some(option) = line.split("--").nth(1).and_then(|rest| rest.split([' ', '[', '=', '<']).next()) else {
+                continue;
+            };
+            let tried = source.contains(&format!("\"--{option}\""));
+            assert!(tried || WORDS.contains(&option), "{name} --{option}: {line}");
+        }
+    }
+}
+
 fn plain(value: &str) -> String {
     value.to_string()
 }
@@ -133,7 +200,7 @@ fn numbers_of_metrics_are_bounded() {
     for option in options.into_iter().chain(["--tolerance", "--edges", "--threads"]) {
         every_value(&shadow, option, &plain);
     }
-    every_value(&shadow, "--param", &|value| format!("m={value}"));
+    every_value(&shadow, "--param", &|value| format!("M={value}"));
     let certify = ["certify", "--system", "kepler", "--seconds", "0.2"];
     for option in ["--condition", "--seconds", "--boxes", "--threads"] {
         every_value(&certify, option, &plain);
