@@ -134,7 +134,8 @@ mod tests {
             &[[0.0, 0.0], [-2.0, 2.0], [-2.0, 2.0], [-2.0, 2.0]][..],
         );
         let mut rng = crate::random::RngStream::Training(0).generator(3);
-        let drawn = along_motions(&system, "phase[0].position", bounds, &[], 500, &mut rng).unwrap();
+        let drawn =
+            along_motions(&system, "phase[0].position", bounds, &[], 500, (&mut rng, &AtomicBool::new(false))).unwrap();
         for (q, v) in drawn.q.chunks(4).zip(drawn.v.chunks(4)) {
             let mut shell = v.to_vec();
             system.impose_constraint(q, &mut shell).unwrap();

@@ -120,6 +120,7 @@ fn swings(folder: &Folder) -> String {
 fn numbers_of_trainings_are_bounded() {
     let folder = Folder::new();
     let (out, data) = (text(&folder.path("out")), swings(&folder));
+    let small = folder.file("small.toml", "[data]\ntraining = 64\nvalidation = 16\ntest = 16\n");
     let train = [
         &[
             "train",
@@ -134,7 +135,7 @@ fn numbers_of_trainings_are_bounded() {
             &out,
             "--overwrite",
         ][..],
-        &["--config", &folder.file("small.toml", "[data]\ntraining = 64\nvalidation = 16\ntest = 16\n")],
+        &["--config", &small],
     ]
     .concat();
     for option in ["--seed", "--hidden", "--lambda", "--learning-rate", "--epochs", "--threads", "--checkpoint-every"] {
@@ -266,6 +267,39 @@ fn numbers_of_configurations_are_bounded() {
     }
 }
 
+/// The same of system files.
+#[test]
+fn numbers_of_system_files_are_bounded() {
+    let folder = Folder::new();
+    let out = text(&folder.path("out"));
+    let small = folder.file("small.toml", "[data]\ntraining = 64\nvalidation = 16\ntest = 16\n");
+    let usual = [("k", "1"), ("high", "1"), ("fast", "1"), ("t_end", "2"), ("dt", "0.1")];
+    for (changed, _) in usual {
+        for value in VALUES {
+            let of = |key: &str| {
+                usual.iter().find(|(k, _)| *k == key).map_or("", |(_, v)| if key == changed { value } else { v })
+            };
+            let system = format!(
+                "name = \"own\"\nlagrangian = \"x_dot^2/2 - k*x^2/2\"\n[parameters]\nk = \"{}\"\n[[coordinates]]\nname = \"x\"\n\
+                 bounds = [-2, {}]\nvelocity_bounds = [-2, {}]\n[trajectory]\nt_end = {}\ndt = {}\n",
+                of("k"),
+                of("high"),
+                of("fast"),
+                of("t_end"),
+                of("dt")
+            );
+            let file = folder.file("own.toml", system);
+            let train =
+                ["train", &file, "--hidden", "4", "--epochs", "1", "--threads", "1", "--out", &out, "--overwrite"];
+            let Run { code, stderr, .. } = bounded(&[&train[..], &["--config", &small]].concat());
+            assert!(
+                matches!(code, Some(0..=2)) && !stderr.contains("panicked"),
+                "{changed} = {value}: {code:?} {stderr}"
+            );
+        }
+    }
+}
+
 /// Without a thread more than the first the work is done by that one, or there is an error and no panic.
 #[test]
 fn threads_that_do_not_start_are_done_without() {
@@ -312,7 +346,7 @@ fn names_bounds_and_penalties_have_one_rule_each() {
     assert_eq!(rollout(&system("energetic", "[-1, 1]")).code, Some(0));
     rollout(&system("energy", "[-1, 1]")).refused(2, &["coordinates[0].name", "energy"]);
     for bounds in ["[1, 2, 3]", "[1]", "[]"] {
-        rollout(&system("x", bounds)).refused(2, &["one.toml:4: coordinates[0].bounds", "2"]);
+        rollout(&system("x", bounds)).refused(2, &["one.toml:5: coordinates[0].bounds", "2"]);
     }
     let config =
         folder.file("c.toml", "system = \"harmonic-oscillator\"\n[data]\nvalidation_position = [[-1, 1, 2]]\n");
