@@ -3,6 +3,7 @@
 use super::enclosure::Enclose;
 use super::spectrum::Spectrum;
 use super::{Options, Signature, Witness};
+use crate::storage::in_order;
 use std::fmt::{Debug, Formatter};
 use std::time::{Duration, Instant};
 
@@ -117,25 +118,18 @@ pub fn search(source: &dyn Enclose, regions: Vec<(Vec<(f64, f64)>, f64)>, option
 
 /// The spectra of boxes, `None` for those that time did not suffice for.
 fn judge(source: &dyn Enclose, chunk: &[Waiting], threads: usize, deadline: Option<Instant>) -> Vec<Option<Spectrum>> {
-    let mut spectra: Vec<Option<Spectrum>> = chunk.iter().map(|_| None).collect();
     let share = chunk.len().div_ceil(threads.max(1)).max(1);
-    let work = |boxes: &[Waiting], spectra: &mut [Option<Spectrum>]| {
+    let parts: Vec<&[Waiting]> = chunk.chunks(share).collect();
+    let judged = in_order(&parts, threads, |boxes| {
+        let mut spectra: Vec<Option<Spectrum>> = boxes.iter().map(|_| None).collect();
         let bounds: Vec<&[(f64, f64)]> = boxes.iter().map(|waiting| waiting.bounds.as_slice()).collect();
         source.each(&bounds, &mut |index, matrix| {
             spectra[index] = Some(matrix.spectrum());
             deadline.is_none_or(|deadline| Instant::now() < deadline)
         });
-    };
-    if chunk.len() <= share {
-        work(chunk, &mut spectra);
-    } else {
-        std::thread::scope(|scope| {
-            for (boxes, spectra) in chunk.chunks(share).zip(spectra.chunks_mut(share)) {
-                scope.spawn(|| work(boxes, spectra));
-            }
-        });
-    }
-    spectra
+        spectra
+    });
+    judged.into_iter().flatten().collect()
 }
 
 /// Axes along which the mass matrix changes at some of a few places; all if it is not known to change at any.

@@ -3,7 +3,7 @@
 use crate::certificate::{Certificate, CertificateError, Options, Signature, certify_network, certify_system};
 use crate::cli::chosen::{self, learned_system};
 use crate::cli::learned::Learned;
-use crate::cli::number::{count, finite, positive, threads};
+use crate::cli::number::{finite, seconds, thread_count, threads, whole};
 use crate::cli::source::parameter;
 use crate::cli::{CliError, output};
 use crate::lagrangian::configure_system;
@@ -38,13 +38,13 @@ pub struct Args {
     #[arg(long, value_name = "P,N", value_parser = signature)]
     signature: Option<Signature>,
     /// Time after which no further box is evaluated, in seconds.
-    #[arg(long, value_name = "T", default_value = "10", allow_hyphen_values = true, value_parser = positive)]
+    #[arg(long, value_name = "T", default_value = "10", allow_hyphen_values = true, value_parser = seconds)]
     seconds: f64,
     /// Boxes after which no further one is evaluated; a search that ends by them is the same every time.
-    #[arg(long, value_name = "N", default_value = "10000000", allow_hyphen_values = true, value_parser = count)]
+    #[arg(long, value_name = "N", default_value = "10000000", allow_hyphen_values = true, value_parser = whole(1, 100_000_000))]
     boxes: usize,
     /// Threads; those of a search that ends by --boxes do not change it [default: all].
-    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = count)]
+    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = thread_count)]
     threads: Option<usize>,
     /// Text, or one JSON object.
     #[arg(long, value_enum, value_name = "FORMAT", default_value = "table")]

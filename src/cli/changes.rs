@@ -1,15 +1,16 @@
 //! Options for what is changed most, of `train` and `fit` alike.
 
-use crate::cli::number::{count, positive, weight};
+use crate::cli::number::{number, positive, whole};
 use crate::cli::{CliError, chosen};
-use crate::configuration::{Config, Known, Regularizer};
+use crate::configuration::{Config, Known, MOST_EPOCHS, MOST_LAMBDA, MOST_RATE, Regularizer};
+use crate::network::file::MAX_WIDTH;
 use crate::network::{ActivationChoice, Initialization, Structure};
 
 /// Changes of a configuration.
 #[derive(Clone, Debug, Default, clap::Args)]
 pub struct Changes {
     /// Widths of the hidden layers [default: the configuration's; 128,128,128 in the preset quick and in fits].
-    #[arg(long, value_name = "W1,W2,..", value_delimiter = ',', allow_hyphen_values = true, value_parser = count)]
+    #[arg(long, value_name = "W1,W2,..", value_delimiter = ',', allow_hyphen_values = true, value_parser = whole(1, MAX_WIDTH))]
     pub hidden: Vec<usize>,
     /// Activation of the hidden layers: gelu, softplus, x-tanh, tanh, quadratic, or quadratic-softplus, which is two networks of
     /// half the widths [default: the configuration's, gelu in all presets].
@@ -37,13 +38,13 @@ pub struct Changes {
     #[arg(long, value_enum, value_name = "KIND")]
     pub penalty: Option<PenaltyName>,
     /// Weight of the penalty beside the loss.
-    #[arg(long, value_name = "L", allow_hyphen_values = true, value_parser = weight)]
+    #[arg(long, value_name = "L", allow_hyphen_values = true, value_parser = number(0.0, MOST_LAMBDA))]
     pub lambda: Option<f64>,
     /// Learning rate of the first phase; the rates of later phases and all lowest rates are scaled with it.
-    #[arg(long, value_name = "R", allow_hyphen_values = true, value_parser = positive)]
+    #[arg(long, value_name = "R", allow_hyphen_values = true, value_parser = learning_rate)]
     pub learning_rate: Option<f64>,
     /// Epochs of all phases together; the whole schedule is scaled, with the periods of its rates.
-    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = count)]
+    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = whole(1, MOST_EPOCHS))]
     pub epochs: Option<usize>,
 }
 
@@ -56,8 +57,15 @@ pub enum PenaltyName {
     Eigenvalue,
     /// Negative leading minors are penalised.
     Sylvester,
-    /// The same beside a time-like coordinate, whose own element must be negative.
+    /// The same beside a time-like coordinate, whose own element must be negative: not for metrics inside of a horizon or of an
+    /// ergosphere, where it is positive.
     LorentzianSylvester,
+}
+
+/// A learning rate.
+fn learning_rate(text: &str) -> Result<f64, String> {
+    let refused = || format!("expected a number above 0, at most {MOST_RATE}");
+    positive(text).ok().filter(|rate| *rate <= MOST_RATE).ok_or_else(refused)
 }
 
 /// An activation by name.
@@ -139,6 +147,11 @@ impl Changes {
             (None, Regularizer::Sylvester { .. }) => PenaltyName::Sylvester,
             (None, Regularizer::LorentzianSylvester { .. }) => PenaltyName::LorentzianSylvester,
         };
+        let time = config.network.time_like.as_deref().or(time);
+        if let (Some(time), PenaltyName::Eigenvalue | PenaltyName::Sylvester) = (time, kind) {
+            let problem = format!("the coordinate {time} is a time, expected lorentzian-sylvester or none");
+            return Err(CliError::usage(format_args!("--penalty: {problem}")));
+        }
         config.penalty = match kind {
             PenaltyName::None if self.lambda.is_some() => {
                 return Err(CliError::usage("--lambda: --penalty none has no weight"));
@@ -223,6 +236,14 @@ mod tests {
         assert_eq!(of("kepler", Some(Name::None), None), Ok(Regularizer::None));
         assert!(of("kepler", Some(Name::None), Some(1.0)).unwrap_err().contains("no weight"));
         assert!(of("kepler", Some(Name::LorentzianSylvester), None).unwrap_err().contains("no time-like coordinate"));
+        for classical in [Name::Eigenvalue, Name::Sylvester] {
+            let refused = of("ads4-geodesic", Some(classical), None).unwrap_err();
+            assert!(
+                refused.starts_with("--penalty: ") && refused.contains("lorentzian-sylvester or none"),
+                "{refused}"
+            );
+        }
+        assert_eq!(of("ads4-geodesic", Some(Name::None), None), Ok(Regularizer::None));
         let time = "t".to_string();
         let lorentzian = Regularizer::LorentzianSylvester { lambda: 2.0, time };
         assert_eq!(of("ads4-geodesic", None, Some(2.0)), Ok(lorentzian));

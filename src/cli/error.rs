@@ -16,7 +16,7 @@ pub enum Kind {
     Usage,
     /// Data or files: exit code 1.
     Data,
-    /// Ctrl-C, exit code 130, or SIGTERM, exit code 143.
+    /// Ctrl-C, exit code 130, SIGTERM, exit code 143, or SIGHUP, exit code 129.
     Interrupted,
     /// Whoever read our output has gone: no message, exit code 0.
     ClosedPipe,
@@ -50,7 +50,7 @@ impl CliError {
     pub fn file(path: &Path, problem: impl fmt::Display) -> Self {
         Self::data(format_args!("{}: {problem}", path.display()))
     }
-    /// Ctrl-C or SIGTERM; says what was kept.
+    /// A signal; says what was kept.
     pub fn interrupted(message: impl fmt::Display) -> Self {
         Self { kind: Kind::Interrupted, message: one_line(&message.to_string()) }
     }

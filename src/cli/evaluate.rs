@@ -1,16 +1,15 @@
 //! `lnn evaluate`: a model against the system it learned.
 
 use crate::cli::learned::{Learned, model_file};
-use crate::cli::number::{bounds, count, positive, seed, threads, tolerance};
+use crate::cli::number::{bounds, positive, seed, thread_count, threads, tolerance, whole};
 use crate::cli::place::{self, Wanted};
 use crate::cli::results::Writer;
 use crate::cli::watch::watch;
-use crate::cli::{CliError, output, source};
+use crate::cli::{CliError, interrupt, output, source};
 use crate::lagrangian::SystemInstance;
 use crate::lagrangian::system::{Bounds, TrajectoryTest};
-use crate::pipeline::{EvaluationOptions, RTOL, evaluate};
+use crate::pipeline::{EvaluationOptions, PipelineError, RTOL, evaluate};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
@@ -25,7 +24,7 @@ pub struct Args {
     #[arg(long, value_name = "SYMBOL=VALUE", requires = "system", value_parser = source::parameter)]
     param: Vec<(String, String)>,
     /// Random starts of the trajectory test.
-    #[arg(long, value_name = "N", default_value = "4", allow_hyphen_values = true, value_parser = count)]
+    #[arg(long, value_name = "N", default_value = "4", allow_hyphen_values = true, value_parser = whole(1, 1_000_000))]
     starts: usize,
     /// Seed of the states and starts [default: the model's].
     #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = seed)]
@@ -44,7 +43,7 @@ pub struct Args {
     #[arg(long, value_name = "R", default_value_t = RTOL, allow_hyphen_values = true, value_parser = tolerance)]
     rtol: f64,
     /// Threads [default: all].
-    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = count)]
+    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = thread_count)]
     threads: Option<usize>,
     /// Directory for evaluation.json, report.html and pictures; one that holds an evaluation is refused [default:
     /// evaluation beside the model, or the first free of evaluation-2, evaluation-3, ..].
@@ -96,16 +95,26 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let usual = EvaluationOptions::new(&system, learned.domain(), seed)?;
     let (span, threads) = (span(args, &system)?, threads(args.threads));
     let options = EvaluationOptions { starts: args.starts, span, rtol: args.rtol, threads, ..usual };
-    // Ctrl-C ends the program at once: nothing is lost.
-    let evaluation = evaluate(&system, &learned.network, options, &watch(&Arc::default()))?;
+    let stop = interrupt::flag().map_err(CliError::signals)?;
+    let evaluation = match evaluate(&system, &learned.network, options, &watch(&stop)) {
+        Err(PipelineError::Interrupted) => {
+            return Err(CliError::interrupted("interrupted before anything was compared"));
+        }
+        evaluation => evaluation?,
+    };
     let model = args.model.display().to_string();
     let json = evaluation.write(&system, (&model, learned.header.validation_loss), seed, &folder)?;
     if args.json {
-        return output::print(&json);
+        output::print(&json)?;
+    } else {
+        let report = folder.file("report.html");
+        output::print(&format!("{}\nreport: {}\n", evaluation.text(&system.system.title), report.display()))?;
     }
-    output::print(&format!(
-        "{}\nreport: {}\n",
-        evaluation.text(&system.system.title),
-        folder.file("report.html").display()
-    ))
+    match evaluation.interrupted {
+        Some(part) => {
+            let place = folder.path().display();
+            Err(CliError::interrupted(format_args!("interrupted, the evaluation in {place} is of {part}")))
+        }
+        None => Ok(()),
+    }
 }

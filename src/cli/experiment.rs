@@ -1,8 +1,8 @@
 //! `lnn experiment`: the paper's tables and figures, one command each, whole or in shares; finished runs are not run again.
 
 use crate::cli::experiment_list::{Listed, list};
-use crate::cli::files::{holds_something, require_free};
-use crate::cli::number::{count, threads};
+use crate::cli::files::require_free;
+use crate::cli::number::{thread_count, threads, whole};
 use crate::cli::shard::Shard;
 use crate::cli::source::parameter;
 use crate::cli::watch::watch;
@@ -11,10 +11,11 @@ use crate::experiments::{Experiment, Run, Scale, experiments, find};
 use crate::lagrangian::{SystemInstance, configure_system};
 use crate::names::{WIDTH, counted, wrapped};
 use crate::pipeline::{
-    ExperimentDirectory, ExperimentReport, RECORD, finish_runs, finished_record, merge_experiment, run_experiment,
+    ExperimentDirectory, ExperimentReport, KeptRecord, finish_runs, kept_record, merge_experiment, run_experiment,
 };
 use crate::recording::Columns;
 use crate::recording::read::read_recording;
+use crate::relativity::depends_on_time;
 use crate::report::{Curve, EXPERIMENT_HEADER, text_table};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -30,7 +31,7 @@ pub struct Args {
     #[command(flatten)]
     chosen: Chosen,
     /// Threads; as many runs go side by side, and the results do not depend on them [default: all].
-    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = count)]
+    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = thread_count)]
     threads: Option<usize>,
     /// Only the I-th of N shares of the runs, I from 1 to N; no tables are written [default: that of a Slurm array, or all].
     #[arg(long, value_name = "I/N")]
@@ -62,7 +63,7 @@ struct Chosen {
     #[arg(long, value_enum, value_name = "SCALE", default_value = "short")]
     scale: ScaleName,
     /// Seeds of every run.
-    #[arg(long, value_name = "N", default_value = "1", allow_hyphen_values = true, value_parser = seeds)]
+    #[arg(long, value_name = "N", default_value = "1", allow_hyphen_values = true, value_parser = whole(1, MOST_SEEDS))]
     seeds: usize,
     /// Only the runs whose row of the table begins with this text; a later command without it goes on from there.
     #[arg(long, value_name = "TEXT")]
@@ -110,6 +111,7 @@ impl Chosen {
     fn own_system(&self) -> Result<Option<(SystemInstance<f64>, BTreeMap<String, f64>)>, CliError> {
         let Some(name) = &self.system else { return Ok(None) };
         let configured = configure_system::<f64>(chosen::system(name)?, &self.param).map_err(CliError::usage)?;
+        require_stationary(&configured)?;
         let symbols = configured.system.parameters.iter().map(|p| p.symbol.to_string());
         let values: BTreeMap<String, f64> = symbols.zip(configured.parameters.iter().copied()).collect();
         let given = self.param.iter().filter_map(|(symbol, _)| Some((symbol.clone(), *values.get(symbol)?))).collect();
@@ -141,6 +143,25 @@ impl Chosen {
     }
 }
 
+/// Refuses a metric that changes with its time: its orbits, horizons and shadows would be those of one moment.
+fn require_stationary(system: &SystemInstance<f64>) -> Result<(), CliError> {
+    let n = system.coordinates;
+    let Some(time) = system.system.time_like else { return Ok(()) };
+    let bounds = system.system.validation(n).positions;
+    // Points of the box at fractions that are all different.
+    let place = |k: usize, i: usize| (0.618_034 * (k + 1) as f64 * (2.0 + i as f64).sqrt()).fract();
+    let points =
+        (0..8).flat_map(|k| bounds.iter().enumerate().map(move |(i, (low, high))| low + place(k, i) * (high - low)));
+    let (points, span) = (points.collect::<Vec<f64>>(), bounds[time].1 - bounds[time].0);
+    let model = system.build().map_err(CliError::usage)?;
+    if depends_on_time(model.as_ref(), time, &points, span).map_err(CliError::data)? {
+        let name = &system.system.coordinates(n)[time].name;
+        let problem = "expected a metric that is the same at all times";
+        return Err(CliError::usage(format_args!("--system: the metric depends on its time {name}, {problem}")));
+    }
+    Ok(())
+}
+
 /// Runs experiments, a share of them, or lists them; makes tables of what others ran.
 ///
 /// # Errors
@@ -152,12 +173,10 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     }
     let chosen = &args.chosen;
     let Some(name) = &args.name else {
-        interrupt::end_at_once().map_err(CliError::signals)?;
         return output::print(&listing(chosen.json));
     };
     let all = numbered(chosen_runs(chosen, name)?);
     if args.list {
-        interrupt::end_at_once().map_err(CliError::signals)?;
         return listed(chosen, share(all, args.shard));
     }
     let shard = match args.shard {
@@ -170,9 +189,13 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let shares = share(all, shard);
     for (experiment, runs) in &shares {
         require_writable(chosen, experiment)?;
+        let path = chosen.directory(experiment);
         if !args.overwrite {
+            if let Some(problem) = damaged(&path, runs.iter().map(|(_, run)| run))?.first() {
+                return Err(CliError::data(format_args!("{problem}; --overwrite makes its run again")));
+            }
             let replace = "--overwrite replaces it, or choose another --out";
-            require_same(&chosen.directory(experiment), runs.iter().map(|(_, run)| run), replace)?;
+            require_same(&path, runs.iter().map(|(_, run)| run), replace)?;
         }
     }
     let curves = curves(chosen)?;
@@ -202,12 +225,17 @@ fn merge(name: &str, chosen: &Chosen) -> Result<(), CliError> {
         require_same(&chosen.directory(experiment), runs.iter(), same)?;
     }
     let curves = curves(chosen)?;
-    interrupt::end_at_once().map_err(CliError::signals)?;
+    let stop = interrupt::flag().map_err(CliError::signals)?;
+    let mut left_out = Vec::new();
     for (experiment, runs) in all {
         let path = chosen.directory(experiment);
         let folder = ExperimentDirectory::new(&path);
         let of = (experiment, chosen.scale());
-        let done = merge_experiment(of, runs, &curves, &folder).map_err(|error| CliError::file(&path, error))?;
+        let damaged = damaged(&path, runs.iter())?;
+        damaged.iter().for_each(|problem| output::note(&format!("{problem}; its run is left out")));
+        left_out.extend(damaged);
+        let done = merge_experiment(of, runs, &curves, &folder, &watch(&stop))
+            .map_err(|error| CliError::file(&path, error))?;
         if done.finished < done.results.len() {
             let open = counted(done.results.len() - done.finished, "run is", "runs are");
             let words = chosen.words(experiment);
@@ -215,7 +243,13 @@ fn merge(name: &str, chosen: &Chosen) -> Result<(), CliError> {
         }
         told(chosen, experiment, &done)?;
     }
-    Ok(())
+    match left_out.split_first() {
+        None => Ok(()),
+        Some((first, more)) => {
+            let more = if more.is_empty() { String::new() } else { format!(" (and {} more)", more.len()) };
+            Err(CliError::data(format_args!("{first}{more}; the tables are without what is damaged")))
+        }
+    }
 }
 
 /// Runs with their numbers, which count on from one experiment to the next.
@@ -275,12 +309,8 @@ fn chosen_runs(chosen: &Chosen, name: &str) -> Result<Vec<(&'static Experiment, 
     Ok(kept)
 }
 
-/// Seeds of every run, no more than can be listed.
-fn seeds(text: &str) -> Result<usize, String> {
-    const MOST: usize = 10_000;
-    let seeds = count(text)?;
-    if seeds <= MOST { Ok(seeds) } else { Err(format!("expected a whole number above 0, at most {MOST}")) }
-}
+/// Seeds of every run at most: no more than can be listed.
+const MOST_SEEDS: usize = 10_000;
 
 /// Tables of an experiment, made anew of the records of its runs.
 const WRITTEN: [&str; 3] = ["table.csv", "curves.csv", "readings.csv"];
@@ -290,7 +320,7 @@ fn require_same<'a>(path: &Path, runs: impl Iterator<Item = &'a Run>, hint: &str
     let store = ExperimentDirectory::new(path);
     let mut others = Vec::new();
     for run in runs {
-        if holds_something(&path.join(&run.name).join(RECORD)) && finished_record(&store, run)?.is_none() {
+        if matches!(kept_record(&store, run)?, KeptRecord::OtherConfiguration) {
             others.push(run.name.as_str());
         }
     }
@@ -298,6 +328,18 @@ fn require_same<'a>(path: &Path, runs: impl Iterator<Item = &'a Run>, hint: &str
     let more = if more.is_empty() { String::new() } else { format!(" (and {} more)", more.len()) };
     let problem = format!("a finished run of another configuration is there{more}; {hint}");
     Err(CliError::file(&path.join(first), problem))
+}
+
+/// Runs with files that cannot be read: each file and what is wrong with it.
+fn damaged<'a>(path: &Path, runs: impl Iterator<Item = &'a Run>) -> Result<Vec<String>, CliError> {
+    let store = ExperimentDirectory::new(path);
+    let mut found = Vec::new();
+    for run in runs {
+        if let KeptRecord::Damaged(file, problem) = kept_record(&store, run)? {
+            found.push(format!("{}: {problem}", path.join(&run.name).join(file).display()));
+        }
+    }
+    Ok(found)
 }
 
 /// `label=file`.

@@ -1,10 +1,9 @@
 //! The runs of an experiment with their states: finished, in progress, open.
 
 use crate::cli::CliError;
-use crate::cli::files::holds_something;
 use crate::cli::resume::has_checkpoint;
 use crate::experiments::Run;
-use crate::pipeline::{ExperimentDirectory, RECORD, finished_record};
+use crate::pipeline::{ExperimentDirectory, KeptRecord, kept_record};
 use crate::storage::{DirectoryLock, LockOwner};
 use serde_json::{Value, json};
 use std::path::Path;
@@ -25,6 +24,8 @@ enum State {
     Finished,
     /// It has a record of another configuration.
     OtherConfiguration,
+    /// It has a file that cannot be read, and why.
+    Damaged(&'static str, String),
     /// A process works on it; which, as far as that is known.
     InProgress(Option<LockOwner>),
     /// No process works on it; `true` if it resumes from a checkpoint.
@@ -44,14 +45,16 @@ pub fn list(directory: &Path, experiment: &'static str, runs: Vec<(usize, Run)>)
 }
 
 fn state(directory: &Path, run: &Run) -> Result<State, CliError> {
-    if finished_record(&ExperimentDirectory::new(directory), run)?.is_some() {
-        return Ok(State::Finished);
-    }
+    let kept = match kept_record(&ExperimentDirectory::new(directory), run)? {
+        KeptRecord::Finished(_) => return Ok(State::Finished),
+        KeptRecord::OtherConfiguration => Some(State::OtherConfiguration),
+        KeptRecord::Damaged(file, problem) => Some(State::Damaged(file, problem)),
+        KeptRecord::Nothing => None,
+    };
     let path = directory.join(&run.name);
     Ok(match DirectoryLock::holder(&path) {
         Some(owner) => State::InProgress(owner),
-        None if holds_something(&path.join(RECORD)) => State::OtherConfiguration,
-        None => State::Open(has_checkpoint(&path)),
+        None => kept.unwrap_or_else(|| State::Open(has_checkpoint(&path))),
     })
 }
 
@@ -61,6 +64,7 @@ impl Listed {
         let state = match &self.state {
             State::Finished => "finished".to_string(),
             State::OtherConfiguration => "finished, of another configuration".to_string(),
+            State::Damaged(file, problem) => format!("damaged, {file}: {problem}"),
             State::InProgress(Some(owner)) => format!("in progress, {owner}"),
             State::InProgress(None) => "in progress".to_string(),
             State::Open(false) => "open".to_string(),
@@ -74,6 +78,7 @@ impl Listed {
         let (state, owner) = match &self.state {
             State::Finished => ("finished", None),
             State::OtherConfiguration => ("other-configuration", None),
+            State::Damaged(..) => ("damaged", None),
             State::InProgress(owner) => ("in-progress", owner.as_ref()),
             State::Open(_) => ("open", None),
         };

@@ -1,6 +1,5 @@
 //! `lnn fit`: learns from recorded motion, judges by motion that was held out, writes.
 
-use crate::cli::changes::PenaltyName;
 use crate::cli::fit_args::Args;
 use crate::cli::fit_config::{Settled, columns_of, commented_fit, fit_reference};
 use crate::cli::fit_resume::Order;
@@ -62,6 +61,7 @@ pub fn run(args: &Args, words: &[OsString]) -> Result<(), CliError> {
         }
         _ => error.into(),
     })?;
+    prepared.check_horizon(args.horizon).map_err(|fault| CliError::usage(format_args!("--{fault}")))?;
     let prepared = PreparedFit { started, ..prepared };
     prepared.survey()?.warnings.iter().for_each(|warning| output::note(warning));
     let forced = reading.recording.tracks.iter().any(|track| !track.force.is_empty());
@@ -161,11 +161,6 @@ fn configured(settled: &Settled, prepared: &PreparedFit<'_>, precision: Precisio
     config.network.dissipation = args.friction.or(config.network.dissipation);
     config.network.time_like = args.timelike.clone().or(config.network.time_like);
     if let Some(time) = &args.timelike {
-        let classical = [PenaltyName::Eigenvalue, PenaltyName::Sylvester];
-        if args.changes.penalty.is_some_and(|penalty| classical.contains(&penalty)) {
-            let problem = "a time-like coordinate needs lorentzian-sylvester, or none";
-            return Err(CliError::usage(format_args!("--penalty: {problem} (--timelike {time})")));
-        }
         if config.network.structure == Structure::BlackBox {
             config.penalty = Regularizer::LorentzianSylvester { lambda: config.penalty.lambda(), time: time.clone() };
         }

@@ -1,15 +1,21 @@
 //! Arguments of `lnn fit`.
 
 use crate::cli::changes::Changes;
-use crate::cli::number::{count, positive, weight};
+use crate::cli::number::{positive, seed, thread_count, weight, whole};
 use crate::cli::plain_name::plain_name;
 use crate::cli::print_config::PrintFormat;
 use crate::cli::recording_args::RecordingArgs;
 use crate::cli::train_config::{PrecisionName, every};
+use crate::configuration::MOST_EPOCHS;
+use crate::network::file::MAX_WIDTH;
 use crate::pipeline::HELD_OUT;
 use crate::recording::Targets;
+use crate::shooting::MOST_STEPS;
 use crate::training::CheckpointInterval;
 use std::path::{Path, PathBuf};
+
+/// Samples of a smoothing window at most.
+const MOST_WINDOW: usize = 1_000_001;
 
 /// Arguments.
 #[derive(Clone, Debug, clap::Args)]
@@ -34,13 +40,13 @@ pub struct Args {
     #[arg(long, value_enum, value_name = "WAY")]
     pub targets: Option<TargetsName>,
     /// Learn a friction beside L: a Rayleigh dissipation of so many units.
-    #[arg(long, value_name = "UNITS", num_args = 0..=1, default_missing_value = "16", value_parser = count)]
+    #[arg(long, value_name = "UNITS", num_args = 0..=1, default_missing_value = "16", value_parser = whole(1, MAX_WIDTH))]
     pub friction: Option<usize>,
     /// The coordinate that is a time: its diagonal element of the mass matrix is negative.
     #[arg(long, value_name = "COORDINATE")]
     pub timelike: Option<String>,
-    /// Length of the smoothing windows in samples, odd [default: chosen per coordinate].
-    #[arg(long, value_name = "SAMPLES", allow_hyphen_values = true, value_parser = count)]
+    /// Length of the smoothing windows in samples, odd, a million at most [default: chosen per coordinate].
+    #[arg(long, value_name = "SAMPLES", allow_hyphen_values = true, value_parser = whole(1, MOST_WINDOW))]
     pub window: Option<usize>,
     /// Standard deviation of the noise of every coordinate, in SI units [default: estimated].
     #[arg(long, value_name = "S1,S2,..", value_delimiter = ',', allow_hyphen_values = true, value_parser = positive)]
@@ -56,16 +62,16 @@ pub struct Args {
     #[command(flatten)]
     pub changes: Changes,
     /// Epochs of multiple shooting [default: 100].
-    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = count)]
+    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = whole(1, MOST_EPOCHS))]
     pub shooting_epochs: Option<usize>,
     /// Samples predicted from one start by multiple shooting [default: 20].
-    #[arg(long, value_name = "SAMPLES", allow_hyphen_values = true, value_parser = count)]
+    #[arg(long, value_name = "SAMPLES", allow_hyphen_values = true, value_parser = whole(2, MOST_STEPS))]
     pub segment: Option<usize>,
     /// Seed of held-out trajectories, weights and the order of the data [default: 0].
-    #[arg(long, value_name = "N", allow_hyphen_values = true)]
+    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = seed)]
     pub seed: Option<u64>,
     /// Threads; the result does not depend on them [default: all].
-    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = count)]
+    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = thread_count)]
     pub threads: Option<usize>,
     /// Precision of weights and arithmetic [default: f32].
     #[arg(long, value_enum, value_name = "TYPE")]

@@ -4,7 +4,7 @@ use crate::cli::CliError;
 use crate::cli::config_file::ConfigFile;
 use crate::cli::fit_args::Args;
 use crate::cli::mistake::Mistake;
-use crate::cli::number::positive;
+use crate::cli::number;
 use crate::cli::print_config::{commented, with_seed};
 use crate::cli::recording_args::{RecordingArgs, unit};
 use crate::configuration::{Config, Data};
@@ -47,8 +47,8 @@ fn column_mistakes(columns: &FitColumns) -> Vec<Mistake> {
     let wrong = |text: &String| unit(text).err();
     let units = columns.units.iter().enumerate();
     let units = units.filter_map(|(k, text)| Some(Mistake::new(format!("recording.units[{k}]"), wrong(text)?)));
-    let rate = columns.rate.filter(|rate| positive(&rate.to_string()).is_err());
-    let rate = rate.map(|rate| Mistake::new("recording.rate", format!("expected a number above 0, found {rate}")));
+    let rate = columns.rate.and_then(|rate| Some((rate, number::rate(&rate.to_string()).err()?)));
+    let rate = rate.map(|(rate, problem)| Mistake::new("recording.rate", format!("{problem}, found {rate}")));
     let both = columns.time.is_some() && columns.rate.is_some();
     let both = both.then(|| Mistake::new("recording.rate", "there is a column of times beside it"));
     units.chain(rate).chain(both).collect()

@@ -1,44 +1,75 @@
-//! Ctrl-C and SIGTERM, which batch systems send: training finishes its step first, everything else ends at once.
+//! Ctrl-C, SIGTERM, which batch systems send, and SIGHUP of a terminal that is closed: work that keeps what it has finishes its step
+//! first, everything else ends at once.
 
-use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::flag::{register, register_conditional_shutdown, register_usize};
 use std::io;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, OnceLock};
 
 /// Signals that end the program, with the exit code of each, 128 and its number.
-const SIGNALS: [(i32, u8); 2] = [(SIGINT, 130), (SIGTERM, 143)];
+const SIGNALS: [(i32, u8); 3] = [(SIGINT, 130), (SIGTERM, 143), (SIGHUP, 129)];
 
 /// Exit code of the signal that came last; a signal is the process's, and so is this.
 static CODE: AtomicUsize = AtomicUsize::new(SIGNALS[0].1 as usize);
 
-/// A flag that Ctrl-C or SIGTERM raises; a second one ends the program at once, with the exit code of that signal.
-///
-/// # Errors
-/// If the handler cannot be installed.
-pub fn flag() -> io::Result<Arc<AtomicBool>> {
-    let flag = Arc::new(AtomicBool::new(false));
-    for (signal, code) in SIGNALS {
-        // In this order: the first signal finds the flag down.
-        register_conditional_shutdown(signal, i32::from(code), Arc::clone(&flag))?;
-        register_usize(signal, &CODE, usize::from(code))?;
-        register(signal, Arc::clone(&flag))?;
-    }
-    Ok(flag)
-}
+/// While it is up, a signal ends the program at once; while it is down, a signal raises it.
+static FLAG: OnceLock<Arc<AtomicBool>> = OnceLock::new();
 
-/// Ctrl-C and SIGTERM end the program at once with their exit codes; files being written are whole or not there.
+/// Signals end the program at once with their exit codes, until [`flag`] asks for them; files being written are whole or not there.
 ///
 /// # Errors
-/// If the handler cannot be installed.
-pub fn end_at_once() -> io::Result<()> {
+/// If a handler cannot be installed.
+pub fn watch() -> io::Result<()> {
+    if FLAG.get().is_some() {
+        return Ok(());
+    }
+    let flag = FLAG.get_or_init(|| Arc::new(AtomicBool::new(true)));
     for (signal, code) in SIGNALS {
-        register_conditional_shutdown(signal, i32::from(code), Arc::new(AtomicBool::new(true)))?;
+        // What a parent told the program to ignore, as nohup does of SIGHUP, stays ignored.
+        if signal == SIGHUP && !ends(signal, std::fs::read_to_string("/proc/self/status").ok().as_deref()) {
+            continue;
+        }
+        // In this order: the first signal finds the flag down.
+        register_conditional_shutdown(signal, i32::from(code), Arc::clone(flag))?;
+        register_usize(signal, &CODE, usize::from(code))?;
+        register(signal, Arc::clone(flag))?;
     }
     Ok(())
+}
+
+/// The flag that a signal raises from now on; a second one ends the program at once, with the exit code of that signal.
+///
+/// # Errors
+/// As [`watch`].
+pub fn flag() -> io::Result<Arc<AtomicBool>> {
+    watch()?;
+    let flag = FLAG.get_or_init(Arc::default);
+    flag.store(false, Ordering::SeqCst);
+    Ok(Arc::clone(flag))
 }
 
 /// Exit code of the signal that came last, 130 if none came.
 pub fn exit_code() -> u8 {
     CODE.load(Ordering::SeqCst) as u8
+}
+
+/// `true` if a signal is known not to be ignored: the mask `SigIgn` of the process's status has a bit for each that is.
+fn ends(signal: i32, status: Option<&str>) -> bool {
+    let mask = status.and_then(|status| status.lines().find_map(|line| line.strip_prefix("SigIgn:")));
+    let mask = mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
+    mask.is_some_and(|mask| mask >> (signal - 1) & 1 == 0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_ignored_signal_stays_ignored() {
+        let status = |mask: &str| format!("Name:\tlnn\nSigIgn:\t{mask}\nSigCgt:\t0000000000000001\n");
+        assert!(ends(SIGHUP, Some(&status("0000000000001000"))));
+        assert!(!ends(SIGHUP, Some(&status("0000000000000001"))));
+        assert!(!ends(SIGHUP, Some(&status("x"))) && !ends(SIGHUP, None));
+    }
 }

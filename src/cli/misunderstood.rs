@@ -91,10 +91,7 @@ mod tests {
             ("lnn train x --preset gone", "--preset: unknown value \"gone\", expected one of quick, best, paper"),
             ("lnn train x --seed -1", "--seed: expected a whole number from 0 to 18446744073709551615, found \"-1\""),
             ("lnn train x --seed", "--seed: expected a value"),
-            (
-                "lnn evaluate m --rtol 1e-30",
-                "--rtol: double precision cannot keep it, the least is 2e-15, found \"1e-30\"",
-            ),
+            ("lnn evaluate m --rtol 1e-30", "--rtol: expected a number from 2e-15 to 1, found \"1e-30\""),
             ("lnn check data.csv", "missing --coords <q1,q2>"),
             ("lnn experiment merge quick --seds 3", "unknown option \"--seds\", did you mean \"--seeds\"?"),
             ("lnn experiment merge quick --shard 1/2", "unknown option \"--shard\", expected one of --"),

@@ -1,7 +1,7 @@
 //! The command-line program: arguments to library calls.
 //!
 //! Results go to standard output, messages and progress to standard error. Exit codes: 0 done, 1 data or files, 2
-//! arguments or configuration, 130 Ctrl-C, 143 SIGTERM. A failure is one line, `error: FILE: row 3, column theta1: ...`;
+//! arguments or configuration, 130 Ctrl-C, 143 SIGTERM, 129 SIGHUP. A failure is one line, `error: FILE: row 3, column theta1: ...`;
 //! of a configuration all mistakes are found, a line for each.
 
 mod certify;
@@ -163,10 +163,8 @@ pub fn check_arguments(arguments: impl IntoIterator<Item = OsString>) -> Result<
 
 /// Runs a command; `words` are its arguments as they were typed.
 fn run(command: Command, words: &[OsString]) -> Result<(), CliError> {
-    // Trainings, fits, roll-outs and experiments keep what they have when they are interrupted; the others have nothing to keep.
-    if !matches!(command, Command::Train(_) | Command::Fit(_) | Command::Rollout(_) | Command::Experiment(_)) {
-        interrupt::end_at_once().map_err(CliError::signals)?;
-    }
+    // A command that has something to keep asks for the flag before it begins its work.
+    interrupt::watch().map_err(CliError::signals)?;
     match command {
         Command::Systems(args) => systems::run(&args),
         Command::Check(args) => check::run(&args),

@@ -3,6 +3,7 @@
 use crate::cli::CliError;
 use crate::rollout::Options;
 use crate::scalar::Scalar;
+use crate::storage::MOST_THREADS;
 
 /// Precision that a command computes in.
 #[derive(Clone, Copy, Debug, clap::ValueEnum)]
@@ -33,13 +34,41 @@ pub fn weight(text: &str) -> Result<f64, String> {
     finite(text).ok().filter(|x| *x >= 0.0).ok_or_else(|| "expected a finite number of at least 0".to_string())
 }
 
-/// A relative tolerance that double precision can keep.
-pub fn tolerance(text: &str) -> Result<f64, String> {
-    let least = Options::<f64>::least_tolerance();
-    match positive(text)? {
-        fine if fine < least => Err(format!("double precision cannot keep it, the least is {least:e}")),
-        x => Ok(x),
+/// A parser of numbers from `least` to `most`.
+pub fn number(least: f64, most: f64) -> impl Fn(&str) -> Result<f64, String> + Clone + Send + Sync + 'static {
+    move |text| {
+        let refused = || format!("expected a number from {} to {}", digits(least), digits(most));
+        finite(text).ok().filter(|x| (least..=most).contains(x)).ok_or_else(refused)
     }
+}
+
+/// A bound, every digit of it.
+fn digits(x: f64) -> String {
+    if x == 0.0 || (1e-4..1e6).contains(&x.abs()) { x.to_string() } else { format!("{x:e}") }
+}
+
+/// A parser of whole numbers from `least` to `most`.
+pub fn whole(least: usize, most: usize) -> impl Fn(&str) -> Result<usize, String> + Clone + Send + Sync + 'static {
+    move |text| {
+        let refused = || format!("expected a whole number from {least} to {most}");
+        text.trim().parse().ok().filter(|n| (least..=most).contains(n)).ok_or_else(refused)
+    }
+}
+
+/// A relative tolerance of an integration in double precision, which keeps no finer one; a coarser one than 1 is none.
+pub fn tolerance(text: &str) -> Result<f64, String> {
+    number(Options::<f64>::least_tolerance(), 1.0)(text)
+}
+
+/// A time in seconds over which a command may work: up to a day.
+pub fn seconds(text: &str) -> Result<f64, String> {
+    const DAY: f64 = 86_400.0;
+    positive(text).ok().filter(|x| *x <= DAY).ok_or_else(|| format!("expected a number above 0, at most {DAY}"))
+}
+
+/// Samples per second of a recording.
+pub fn rate(text: &str) -> Result<f64, String> {
+    number(1e-9, 1e12)(text)
 }
 
 /// A seed.
@@ -73,9 +102,15 @@ pub fn list<S: Scalar>(option: &str, text: &str, names: &[String]) -> Result<Vec
     }
 }
 
+/// A number of threads.
+pub fn thread_count(text: &str) -> Result<usize, String> {
+    whole(1, MOST_THREADS)(text)
+}
+
 /// Number of threads: as asked for, or all there are.
 pub fn threads(asked: Option<usize>) -> usize {
-    asked.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, std::num::NonZero::get))
+    let all = || std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+    asked.unwrap_or_else(all).min(MOST_THREADS)
 }
 
 #[cfg(test)]
@@ -96,8 +131,15 @@ mod tests {
         assert!(count("1.0").is_err() && count("99999999999999999999").is_err());
         assert_eq!((positive("1e-3"), count("7")), (Ok(1e-3), Ok(7)));
         assert_eq!((tolerance("2e-15"), seed("18446744073709551615")), (Ok(2e-15), Ok(u64::MAX)));
-        assert_eq!(tolerance("1e-30").unwrap_err(), "double precision cannot keep it, the least is 2e-15");
-        assert!(["nan", "0", "-1e-6"].iter().all(|bad| tolerance(bad).is_err()));
+        assert!(["nan", "0", "-1e-6", "1e-30", "1.1", "1e308"].iter().all(|bad| tolerance(bad).is_err()));
+        assert!(tolerance("1e-30").unwrap_err().contains("2e-15"), "the bound is said");
+        assert_eq!((whole(2, 5)("5"), number(-1.0, 2.5)("-1"), seconds("86400")), (Ok(5), Ok(-1.0), Ok(86_400.0)));
+        assert!(["1", "6", "2.0", "-3", "18446744073709551616"].iter().all(|bad| whole(2, 5)(bad).is_err()));
+        assert!(["-1.1", "2.6", "nan", "inf"].iter().all(|bad| number(-1.0, 2.5)(bad).is_err()));
+        assert!(["0", "86401", "nan"].iter().all(|bad| seconds(bad).is_err()));
+        assert_eq!((thread_count("256"), rate("100")), (Ok(256), Ok(100.0)));
+        assert!(["0", "257", "4294967296"].iter().all(|bad| thread_count(bad).is_err()));
+        assert!(threads(None) >= 1 && threads(Some(7)) == 7);
         assert!(["-1", "1.5", "", "18446744073709551616"].iter().all(|bad| seed(bad).is_err()));
         assert_eq!((bounds("-0.5:1e3"), bounds(" 2 : 2 ")), (Ok((-0.5, 1000.0)), Ok((2.0, 2.0))));
         for bad in ["", "1", "1:", ":1", "2:1", "0:inf", "nan:nan", "0:1:2", "-1e308:1e308"] {

@@ -28,7 +28,7 @@ pub struct RecordingArgs {
     #[arg(long, value_name = "COLUMN", conflicts_with = "rate")]
     pub time: Option<String>,
     /// Samples per second, if no column holds the time.
-    #[arg(long, value_name = "HZ", value_parser = number::positive)]
+    #[arg(long, value_name = "HZ", value_parser = number::rate)]
     pub rate: Option<f64>,
     /// Column whose value tells the trajectories of a file apart.
     #[arg(long, value_name = "COLUMN")]

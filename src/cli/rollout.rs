@@ -9,6 +9,7 @@ use crate::cli::probe::Probe;
 use crate::cli::source::parameter;
 use crate::cli::subject::Subject;
 use crate::cli::{CliError, input, interrupt, output};
+use crate::lagrangian::Interruptible;
 use crate::names::{counted, rounded};
 use crate::rollout::{Balances, Driven, Method, Options, RolloutError, Trajectory, rollout_in_pieces};
 use crate::storage::check_target;
@@ -166,16 +167,18 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let header = Trajectory { energy: Some(vec![]), ..Trajectory::<f64>::empty(q.len()) };
     target.append(&header.csv_header(columns).map_err(CliError::data)?)?;
     let network = subject.model.as_ref();
-    let driven = force.as_ref().map(|force| Driven::new(network, force));
+    let (stop, mut failed) = (interrupt::flag().map_err(CliError::signals)?, None);
+    let moving = Interruptible::new(network, &stop);
+    let driven = force.as_ref().map(|force| Driven::new(&moving, force));
+    let balanced = force.as_ref().map(|force| Driven::new(network, force));
     let mut balances = (driven.is_some() || !network.conserves_energy()).then(|| {
-        Balances::new(q.len(), |t: &Trajectory<f64>| match &driven {
+        Balances::new(q.len(), |t: &Trajectory<f64>| match &balanced {
             Some(driven) => driven.energy_balance(t),
             None => t.energy_balance(network),
         })
     });
     let mut watch = Watch::new(subject.range(), columns);
     let mut sampled = args.charges.then(|| Trajectory::<f64>::empty(q.len()));
-    let (stop, mut failed) = (interrupt::flag().map_err(CliError::signals)?, None);
     let mut take = |piece: &Trajectory<f64>| {
         watch.add(piece);
         if let Some(sampled) = &mut sampled {
@@ -194,7 +197,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     };
     let result = match &driven {
         Some(driven) => driven.rollout_in_pieces(q, v, &options, &mut take),
-        None => rollout_in_pieces(network, q, v, &options, &mut take),
+        None => rollout_in_pieces(&moving, q, v, &options, &mut take),
     };
     if let Some(error) = failed {
         return Err(error);

@@ -2,21 +2,29 @@
 
 use crate::cli::files::require_free;
 use crate::cli::learned::{Learned, model_file};
-use crate::cli::number::{count, finite, positive, threads, weight};
+use crate::cli::number::{number, thread_count, threads, weight, whole};
 use crate::cli::progress::Progress;
 use crate::cli::shadow_facts::{Facts, View};
 use crate::cli::source::{Source, parameter};
-use crate::cli::{CliError, chosen, output};
-use crate::lagrangian::EulerLagrange;
-use crate::names::unknown;
+use crate::cli::{CliError, chosen, interrupt, output};
+use crate::lagrangian::{EulerLagrange, Interruptible, MechanicsError};
+use crate::names::{counted, unknown};
+use crate::pipeline::memory;
 use crate::relativity::{
-    Camera, Chart, Image, Observer, RelativityError, Sky, Tracing, difference_image, outline, shadow,
+    Camera, Chart, Image, MOST_PIXELS, Observer, RelativityError, Sky, TOLERANCES, Tracing, difference_image, outline,
+    shadow,
 };
 use crate::report::png;
 use crate::storage::{check_target, write_atomically};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
+
+/// Distances that a camera and the sky may have, in the unit of the coordinates.
+const NEAREST: f64 = 1e-12;
+const FARTHEST: f64 = 1e15;
+/// Bytes of a pixel of a metric while its picture is made, about: its ray twice, its colours.
+const PIXEL_BYTES: u64 = 112;
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
@@ -30,45 +38,45 @@ pub struct Args {
     /// A parameter of the system; may be repeated.
     #[arg(long, value_name = "SYMBOL=VALUE", num_args = 1.., value_parser = parameter, requires = "system")]
     param: Vec<(String, String)>,
-    /// The coordinate that is the time, on which the metric does not depend.
+    /// The coordinate that is the time; a metric that depends on it is refused.
     #[arg(long, value_name = "NAME", default_value = "t")]
     time: String,
     /// The coordinates that are the places, Cartesian ones around the centre; the last is the axis.
     #[arg(long, value_name = "X,Y,Z", default_value = "x,y,z", value_delimiter = ',')]
     space: Vec<String>,
     /// Distance of the camera from the centre, in the unit of the coordinates.
-    #[arg(long, value_name = "R", default_value = "20", allow_hyphen_values = true, value_parser = positive)]
+    #[arg(long, value_name = "R", default_value = "20", allow_hyphen_values = true, value_parser = number(NEAREST, FARTHEST))]
     distance: f64,
     /// Angle of the camera from the axis, in degrees, 0 to 180.
-    #[arg(long, value_name = "DEGREES", default_value = "80", allow_hyphen_values = true, value_parser = finite)]
+    #[arg(long, value_name = "DEGREES", default_value = "80", allow_hyphen_values = true, value_parser = number(0.0, 180.0))]
     inclination: f64,
-    /// Angle of the camera about the axis, in degrees, from x towards y.
-    #[arg(long, value_name = "DEGREES", default_value = "0", allow_hyphen_values = true, value_parser = finite)]
+    /// Angle of the camera about the axis, in degrees, from x towards y, -360 to 360.
+    #[arg(long, value_name = "DEGREES", default_value = "0", allow_hyphen_values = true, value_parser = number(-360.0, 360.0))]
     azimuth: f64,
     /// Motion of the camera.
     #[arg(long, value_enum, value_name = "NAME", default_value = "rest")]
     observer: ObserverName,
-    /// Angle between the left and the right end of the picture, in degrees, below 180.
-    #[arg(long, value_name = "DEGREES", default_value = "70", allow_hyphen_values = true, value_parser = positive)]
+    /// Angle between the left and the right end of the picture, in degrees, 179 at most.
+    #[arg(long, value_name = "DEGREES", default_value = "70", allow_hyphen_values = true, value_parser = number(1e-6, 179.0))]
     field_of_view: f64,
     /// Pixels of a row.
-    #[arg(long, value_name = "N", default_value = "400", allow_hyphen_values = true, value_parser = count)]
+    #[arg(long, value_name = "N", default_value = "400", allow_hyphen_values = true, value_parser = whole(1, MOST_PIXELS))]
     width: usize,
     /// Rows [default: as many as pixels of a row].
-    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = count)]
+    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = whole(1, MOST_PIXELS))]
     height: Option<usize>,
     /// Distance from which on a ray that leaves has come from the sky [default: 100 times the distance of the camera, twice with a
     /// learned metric, which is known as far as it was trained].
-    #[arg(long, value_name = "R", allow_hyphen_values = true, value_parser = positive)]
+    #[arg(long, value_name = "R", allow_hyphen_values = true, value_parser = number(NEAREST, FARTHEST))]
     far: Option<f64>,
-    /// Relative error of a step of a ray; the edge of the shadow is found with a hundredth of it.
-    #[arg(long, value_name = "T", default_value = "1e-6", allow_hyphen_values = true, value_parser = positive)]
+    /// Relative error of a step of a ray, 1e-12 to 0.01; the edge of the shadow is found with a hundredth of it, 1e-12 at least.
+    #[arg(long, value_name = "T", default_value = "1e-6", allow_hyphen_values = true, value_parser = number(TOLERANCES.0, TOLERANCES.1))]
     tolerance: f64,
     /// Directions in which the edge of the shadow is found by bisection, a multiple of four; 0 leaves it out.
     #[arg(long, value_name = "N", default_value = "64", allow_hyphen_values = true, value_parser = edges)]
     edges: usize,
     /// Threads; the picture does not depend on them [default: all].
-    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = count)]
+    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = thread_count)]
     threads: Option<usize>,
     /// Picture: of two metrics the exact one, the learned one, and their difference.
     #[arg(long, value_name = "FILE.png", value_parser = image_file)]
@@ -187,7 +195,13 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     require_free(&args.out, &inputs, args.overwrite)?;
     check_target(&args.out).map_err(|e| CliError::file(&args.out, format_args!("cannot write: {e}")))?;
 
-    let pixels = camera.width.saturating_mul(camera.height).saturating_mul(models.len());
+    let pixels = camera.width.saturating_mul(camera.height);
+    if pixels > MOST_PIXELS {
+        return Err(CliError::usage(format_args!("--width, --height: expected at most {MOST_PIXELS} pixels together")));
+    }
+    let pixels = pixels * models.len();
+    memory::require("the picture", (pixels as u64).checked_mul(PIXEL_BYTES))?;
+    let stop = interrupt::flag().map_err(CliError::signals)?;
     let (progress, done) = (Progress::new(pixels as u64, "rays"), AtomicU64::new(0));
     let advance = |rays: usize| {
         let rays = rays as u64;
@@ -195,17 +209,24 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     };
     let mut views = Vec::new();
     for (name, model) in &models {
+        if stop.load(Ordering::Relaxed) {
+            break;
+        }
         progress.say(name);
         let began = Instant::now();
-        let shadow = shadow(&**model, &camera, &tracing, &advance).map_err(refused)?;
+        let model = Interruptible::new(&**model, &stop);
+        let shadow = shadow(&model, &camera, &tracing, &advance).map_err(refused)?;
         let seconds = began.elapsed().as_secs_f64();
-        let outline = match args.edges {
-            0 => None,
-            edges => outline(&**model, &camera, &tracing, edges).map_err(refused)?,
+        let edge = match args.edges {
+            0 => Ok(None),
+            edges => outline(&model, &camera, &tracing, edges),
         };
+        // An edge between rays that were not followed is none.
+        let outline = if stop.load(Ordering::Relaxed) { None } else { edge.map_err(refused)? };
         views.push(View { name, shadow, outline, seconds });
     }
     drop(progress);
+    let interrupted = stop.load(Ordering::Relaxed);
 
     let sky = Sky::around(&camera);
     let mut images: Vec<Image> = views.iter().map(|view| sky.image(&view.shadow)).collect();
@@ -216,7 +237,15 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     write_atomically(&args.out, &picture).map_err(|e| CliError::file(&args.out, format_args!("cannot write: {e}")))?;
     let facts = Facts { system: &system, unit: unit.as_deref(), camera: &camera, tracing: &tracing, views: &views };
     let told = if args.json { facts.json(&images) } else { facts.text(&images, &args.out) };
-    output::print(&told.map_err(refused)?)
+    output::print(&told.map_err(refused)?)?;
+    if interrupted {
+        let done: usize = views.iter().map(|view| view.shadow.finished()).sum();
+        let (rays, place) = (counted(pixels, "ray", "rays"), args.out.display());
+        return Err(CliError::interrupted(format_args!(
+            "interrupted, {done} of {rays} followed to an end are in {place}"
+        )));
+    }
+    Ok(())
 }
 
 /// Distance of the sky of an exact metric over that of the camera.
@@ -233,7 +262,6 @@ fn refused(error: RelativityError) -> CliError {
                 "inclination" => return CliError::usage("--inclination: expected 0 to 180 degrees"),
                 "azimuth" => "--azimuth",
                 "field of view" => return CliError::usage("--field-of-view: expected an angle below 180 degrees"),
-                "pixels" => return CliError::usage("--width, --height: expected at most 2^28 pixels"),
                 "tolerance" => "--tolerance",
                 "far distance" => "--far",
                 _ => return CliError::usage(error),
@@ -242,6 +270,12 @@ fn refused(error: RelativityError) -> CliError {
         }
         RelativityError::NothingRests => {
             CliError::usage(format_args!("--observer rest: {error}; --observer normal may be there"))
+        }
+        RelativityError::DependsOnTime => {
+            CliError::usage(format_args!("--time: {error} (a model is, trained with --cyclic t)"))
+        }
+        RelativityError::Mechanics(MechanicsError::Interrupted) => {
+            CliError::interrupted("interrupted before the first ray")
         }
         RelativityError::Chart { .. } => CliError::usage("--time, --space: expected four different coordinates"),
         RelativityError::Coordinates { .. } => CliError::usage(error),

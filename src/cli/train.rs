@@ -10,6 +10,7 @@ use crate::cli::train_config::Args;
 use crate::cli::watch::watch;
 use crate::cli::{CliError, interrupt, output};
 use crate::configuration::Config;
+use crate::data::SamplingError;
 use crate::lagrangian::SystemInstance;
 use crate::names::counted;
 use crate::pipeline::{Begin, Checkpoints, PipelineError, RunOptions, TrainReport, train};
@@ -33,7 +34,10 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         RunOptions { threads: threads(args.threads), checkpoints: Some(checkpoints), ..RunOptions::default() };
     let trained = match train(&config, &system, &options, &folder, &watch(&stop)) {
         Ok(trained) => trained,
-        Err(PipelineError::Training(TrainingError::NothingLearned(_))) if stop.load(Ordering::SeqCst) => {
+        Err(
+            PipelineError::Sampling(SamplingError::Interrupted)
+            | PipelineError::Training(TrainingError::NothingLearned(_)),
+        ) if stop.load(Ordering::SeqCst) => {
             let problem = "interrupted before the first epoch ended";
             return Err(CliError::interrupted(format_args!("{problem}{}", how_to_go_on(folder.path()))));
         }

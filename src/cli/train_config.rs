@@ -3,10 +3,10 @@
 use crate::cli::changes::Changes;
 use crate::cli::config_file::ConfigFile;
 use crate::cli::mistake::Mistake;
-use crate::cli::number::{count, finite, positive, seed};
+use crate::cli::number::{finite, seconds, seed, thread_count, whole};
 use crate::cli::print_config::{PrintFormat, commented, with_seed};
 use crate::cli::{CliError, chosen, output, source};
-use crate::configuration::{Config, Precision};
+use crate::configuration::{Config, MOST_EPOCHS, Precision};
 use crate::data::SamplingError;
 use crate::lagrangian::system::System;
 use crate::lagrangian::{
@@ -57,7 +57,7 @@ pub struct Args {
     #[command(flatten)]
     changes: Changes,
     /// Threads; the result does not depend on them [default: all].
-    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = count)]
+    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = thread_count)]
     pub threads: Option<usize>,
     /// Precision of weights and arithmetic [default: the configuration's, f32 in all presets].
     #[arg(long, value_enum, value_name = "TYPE")]
@@ -172,7 +172,7 @@ impl Args {
     /// Usage errors naming everything that is wrong.
     pub fn check(&self, config: &Config) -> Result<SystemInstance<f64>, CliError> {
         let system = config.system().map_err(CliError::usage)?;
-        CliError::all_usage(config.sampling_faults(system.coordinates).into_iter().map(|fault| fault.to_string()))?;
+        CliError::all_usage(config.sampling_faults(&system).into_iter().map(|fault| fault.to_string()))?;
         Ok(system)
     }
 
@@ -248,7 +248,7 @@ impl Args {
             config.seed = file.large(&["seed"]).unwrap_or(config.seed);
             mistakes.extend(wrong);
             if known {
-                mistakes.extend(config.sampling_faults(system.coordinates).into_iter().map(Mistake::from));
+                mistakes.extend(config.sampling_faults(&system).into_iter().map(Mistake::from));
                 mistakes.extend(config.penalty().err().map(|error| match error {
                     SamplingError::Config(fault) => Mistake::from(fault),
                     other => Mistake::new("", other),
@@ -414,8 +414,8 @@ fn with_periods(file: &ConfigFile, mut config: Config) -> Config {
 /// Interval of checkpoints: `10` epochs, `90s`.
 pub fn every(text: &str) -> Result<CheckpointInterval, String> {
     match text.trim().strip_suffix('s') {
-        Some(seconds) => positive(seconds).map(CheckpointInterval::Seconds),
-        None => count(text).map(CheckpointInterval::Epochs),
+        Some(text) => seconds(text).map(CheckpointInterval::Seconds),
+        None => whole(1, MOST_EPOCHS)(text).map(CheckpointInterval::Epochs),
     }
-    .map_err(|_| "expected a number of epochs, such as 10, or of seconds, such as 90s".to_string())
+    .map_err(|problem| format!("{problem}, of epochs, such as 10, or of seconds with an s, such as 90s"))
 }

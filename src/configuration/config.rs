@@ -2,7 +2,7 @@
 
 use crate::configuration::error::{ConfigError, Faults, place};
 use crate::configuration::penalty::Regularizer;
-use crate::lagrangian::Description;
+use crate::lagrangian::{Description, SystemInstance, pair};
 use crate::network::file::MAX_WIDTH;
 use crate::network::{ActivationChoice, Factor, Form, Initialization, InputLayer, Radial, Structure};
 use crate::optimizers::Method;
@@ -41,6 +41,15 @@ pub enum Scaling {
     /// All `s_i` are 1.
     None,
 }
+
+/// Epochs of a phase or of multiple shooting at most, and iterations of L-BFGS: years.
+pub(crate) const MOST_EPOCHS: usize = 1 << 24;
+/// States of a set, or of a step, at most; their memory is looked at beside.
+const MOST_STATES: usize = 1 << 30;
+/// Largest weight of a penalty: beside it single precision has no digit of the loss left.
+pub(crate) const MOST_LAMBDA: f64 = 1e12;
+/// Highest learning rate.
+pub(crate) const MOST_RATE: f64 = 1000.0;
 
 /// A complete training run. Keys that are not listed are refused.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -132,7 +141,7 @@ pub struct Data {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub shell: Vec<String>,
     /// Lowest and highest distance of the shell from its centre, in the unit of the coordinates.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "pair::optional")]
     pub shell_radius: Option<[f64; 2]>,
     /// Largest rapidity of states in a shell; 1 if left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -140,10 +149,10 @@ pub struct Data {
     /// Number of fresh states on which the final model is judged.
     pub test: usize,
     /// Validation and test bounds of each coordinate; states of one's own, recorded ones, need none.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty", deserialize_with = "pair::list")]
     pub validation_position: Vec<[f64; 2]>,
     /// Validation and test bounds of each velocity; those of a velocity that a mass shell fixes mean nothing.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty", deserialize_with = "pair::list")]
     pub validation_velocity: Vec<[f64; 2]>,
 }
 
@@ -173,7 +182,7 @@ impl Data {
         }
         let radius = self.shell_radius.ok_or_else(|| ConfigError {
             field: "data.shell_radius".to_string(),
-            expected: "[low, high] beside data.shell",
+            expected: "[low, high] beside data.shell".into(),
             found: "none".to_string(),
         })?;
         Ok(Some(Shell { coordinates: &self.shell, radius, rapidity: self.rapidity.unwrap_or(1.0) }))
@@ -275,10 +284,10 @@ pub struct Phase {
     /// Epochs from highest to lowest rate of `cosine-annealing`.
     pub t_max: f64,
     /// Training bounds of each coordinate; states of one's own, recorded ones, need none.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty", deserialize_with = "pair::list")]
     pub position: Vec<[f64; 2]>,
     /// Training bounds of each velocity; those of a velocity that a mass shell fixes mean nothing.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty", deserialize_with = "pair::list")]
     pub velocity: Vec<[f64; 2]>,
     /// For which coordinates half of the training states are uniform in the logarithm, where the low end of the bounds needs more
     /// of them than its length; none if empty.
@@ -341,18 +350,24 @@ impl Config {
         self.faults_with(n, false)
     }
 
-    /// Every value out of range, bounds that are missing among them, for a training on states drawn of a system of `n` coordinates.
-    pub(crate) fn sampling_faults(&self, n: usize) -> Vec<ConfigError> {
-        self.faults_with(n, true)
+    /// Every value out of range, bounds that are missing among them, for a training on states drawn of a system.
+    pub(crate) fn sampling_faults(&self, system: &SystemInstance<f64>) -> Vec<ConfigError> {
+        let mut faults = Faults(self.faults_with(system.coordinates, true));
+        let coordinates = system.system.coordinates(system.coordinates);
+        let time = system.system.time_like.and_then(|index| coordinates.get(index)).map(|time| time.name.as_ref());
+        // One that the network names itself is among the faults already.
+        if self.network.time_like.is_none() {
+            self.penalty.time_faults(time, &mut faults);
+        }
+        faults.0
     }
 
     fn faults_with(&self, n: usize, drawn: bool) -> Vec<ConfigError> {
         let mut faults = Faults::default();
-        const STATES: usize = 1 << 30;
         let data = &self.data;
-        faults.count(data.training, "data.training", STATES);
-        faults.count(data.validation, "data.validation", STATES);
-        faults.count(data.test, "data.test", STATES);
+        faults.count(data.training, "data.training", MOST_STATES);
+        faults.count(data.validation, "data.validation", MOST_STATES);
+        faults.count(data.test, "data.test", MOST_STATES);
         for (value, field) in
             [(data.rescaled_fraction, "data.rescaled_fraction"), (data.trajectory_fraction, "data.trajectory_fraction")]
         {
@@ -371,9 +386,12 @@ impl Config {
         faults.bounds("data.validation_position", &data.validation_position, drawn, n);
         faults.bounds("data.validation_velocity", &data.validation_velocity, drawn, n);
         self.network_faults(&mut faults);
-        faults.at_least_zero(self.penalty.lambda(), "penalty.lambda");
+        let lambda = self.penalty.lambda();
+        let expected = format!("a number from 0 to {MOST_LAMBDA:e}");
+        faults.number(lambda, "penalty.lambda", (0.0..=MOST_LAMBDA).contains(&lambda), expected);
+        self.penalty.time_faults(self.network.time_like.as_deref(), &mut faults);
         let optimizer = &self.optimizer;
-        faults.count(optimizer.batch, "optimizer.batch", STATES);
+        faults.count(optimizer.batch, "optimizer.batch", MOST_STATES);
         faults.at_least_zero(optimizer.weight_decay, "optimizer.weight_decay");
         faults.number(optimizer.clip, "optimizer.clip", optimizer.clip > 0.0, "a positive number");
         let averaging = optimizer.averaging;
@@ -384,7 +402,7 @@ impl Config {
             phase.faults(k, n, drawn, &mut faults);
         }
         if let Some(lbfgs) = &self.lbfgs {
-            faults.count(lbfgs.iterations, "lbfgs.iterations", 1 << 24);
+            faults.count(lbfgs.iterations, "lbfgs.iterations", MOST_EPOCHS);
             faults.count(lbfgs.memory, "lbfgs.memory", 1000);
         }
         faults.0
@@ -416,9 +434,10 @@ impl Phase {
     /// Every value of phase `k` that is out of range, for `n` coordinates.
     fn faults(&self, k: usize, n: usize, drawn: bool, faults: &mut Faults) {
         let field = |name: &str| format!("phase[{k}].{name}");
-        faults.count(self.epochs, &field("epochs"), 1 << 24);
+        faults.count(self.epochs, &field("epochs"), MOST_EPOCHS);
         let positive = |x: f64| x.is_finite() && x > 0.0;
-        if faults.number(self.rate, &field("rate"), positive(self.rate), "a positive number") {
+        let expected = format!("a number above 0, at most {MOST_RATE}");
+        if faults.number(self.rate, &field("rate"), self.rate > 0.0 && self.rate <= MOST_RATE, expected) {
             let ok = (0.0..=self.rate).contains(&self.eta_min);
             faults.number(self.eta_min, &field("eta_min"), ok, "a number from 0 to the rate");
         }

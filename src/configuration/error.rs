@@ -1,5 +1,6 @@
 //! Values of a configuration that are out of range.
 
+use std::borrow::Cow;
 use thiserror::Error;
 
 /// A value of a configuration that is out of range.
@@ -9,7 +10,7 @@ pub struct ConfigError {
     /// Path of the value, such as `phase[0].rate`.
     pub field: String,
     /// Values that are allowed.
-    pub expected: &'static str,
+    pub expected: Cow<'static, str>,
     /// The value found.
     pub found: String,
 }
@@ -26,7 +27,7 @@ pub(crate) fn place<'a>(
     let names: Vec<&str> = coordinates.collect();
     names.iter().position(|known| *known == name).ok_or_else(|| ConfigError {
         field: field.to_string(),
-        expected: "the name of a coordinate",
+        expected: "the name of a coordinate".into(),
         found: format!("`{name}`; there are {}", names.join(", ")),
     })
 }
@@ -37,14 +38,14 @@ pub(crate) struct Faults(pub Vec<ConfigError>);
 
 impl Faults {
     /// Notes a value unless it is as expected; whether it is comes back.
-    pub fn check(&mut self, ok: bool, field: &str, expected: &'static str, found: String) -> bool {
+    pub fn check(&mut self, ok: bool, field: &str, expected: impl Into<Cow<'static, str>>, found: String) -> bool {
         if !ok {
-            self.0.push(ConfigError { field: field.to_string(), expected, found });
+            self.0.push(ConfigError { field: field.to_string(), expected: expected.into(), found });
         }
         ok
     }
     /// A number that is as expected or not.
-    pub fn number(&mut self, value: f64, field: &str, ok: bool, expected: &'static str) -> bool {
+    pub fn number(&mut self, value: f64, field: &str, ok: bool, expected: impl Into<Cow<'static, str>>) -> bool {
         self.check(ok, field, expected, format!("{value}"))
     }
     /// A finite number of at least 0.
@@ -53,7 +54,8 @@ impl Faults {
     }
     /// A whole number from 1 to `most`.
     pub fn count(&mut self, value: usize, field: &str, most: usize) -> bool {
-        self.check((1..=most).contains(&value), field, "a positive number of sensible size", value.to_string())
+        let expected = format!("a whole number from 1 to {most}");
+        self.check((1..=most).contains(&value), field, expected, value.to_string())
     }
     /// A finite `[low, high]` for each of `n` coordinates.
     pub fn bounds(&mut self, field: &str, bounds: &[[f64; 2]], required: bool, n: usize) {

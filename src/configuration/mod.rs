@@ -5,6 +5,7 @@ mod error;
 mod penalty;
 
 pub use config::{Config, Data, Known, Lbfgs, Network, OnFailure, Optimizer, Phase, Precision, Scaling, Shell};
+pub(crate) use config::{MOST_EPOCHS, MOST_LAMBDA, MOST_RATE};
 pub use error::ConfigError;
 pub(crate) use error::{Faults, place};
 pub use penalty::{Penalty, Regularizer};

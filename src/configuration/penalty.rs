@@ -1,6 +1,6 @@
 //! Which violations of the mass matrix's signature are penalised.
 
-use crate::configuration::error::{ConfigError, place};
+use crate::configuration::error::{ConfigError, Faults, place};
 use serde::{Deserialize, Serialize};
 
 /// Regularizer of a configuration; `lambda` is its weight beside the loss (the paper tries 1 to 10,000).
@@ -21,7 +21,8 @@ pub enum Regularizer {
         /// Weight of the penalty.
         lambda: f64,
     },
-    /// [`Penalty::Sylvester`] of a relativistic system.
+    /// [`Penalty::Sylvester`] of a relativistic system: it asks for a negative element of the time, which a metric has not inside of
+    /// a horizon or of an ergosphere.
     LorentzianSylvester {
         /// Weight of the penalty.
         lambda: f64,
@@ -45,7 +46,8 @@ pub enum Penalty {
     /// `lambda` times the batch mean of `sum_k relu(-det M_k) / (s_k + eps)`, `M_k` the leading `k` by `k` block,
     /// `s_k = c_1 .. c_k`, `c_i` the lower median of `|M_ii|` over the batch, a constant for the gradient, `eps` 1e-8.
     ///
-    /// With a time-like coordinate: the same sum over the block without it, plus `relu(M_tt) / (c_t + eps)`.
+    /// With a time-like coordinate: the same sum over the block without it, plus `relu(M_tt) / (c_t + eps)`. A metric whose `g_tt` is
+    /// positive, as inside of a horizon or of an ergosphere, is penalised for being right there.
     ///
     /// Invariant under `M -> s M` as long as `s_k` stays above `eps`. Where `s_k` falls below it, as after a learned
     /// Lagrangian shrank, the penalty fades with `s_k / eps` and at last no longer acts: the eigenvalue penalty or the
@@ -75,6 +77,22 @@ impl Regularizer {
             Self::None => 0.0,
             Self::Eigenvalue { lambda } | Self::Sylvester { lambda } | Self::LorentzianSylvester { lambda, .. } => {
                 lambda
+            }
+        }
+    }
+
+    /// What is wrong with it beside a time-like coordinate: a metric of space-time has a negative eigenvalue.
+    pub(super) fn time_faults(&self, time: Option<&str>, faults: &mut Faults) {
+        let Some(time) = time.filter(|_| self.lambda() > 0.0) else { return };
+        match self {
+            Self::None => {}
+            Self::Eigenvalue { .. } | Self::Sylvester { .. } => {
+                let kind = if matches!(self, Self::Sylvester { .. }) { "sylvester" } else { "eigenvalue" };
+                let expected = format!("lorentzian-sylvester or none beside the time-like coordinate {time}");
+                faults.check(false, "penalty.kind", expected, kind.to_string());
+            }
+            Self::LorentzianSylvester { time: other, .. } => {
+                faults.check(other == time, "penalty.time", format!("the time-like coordinate {time}"), other.clone());
             }
         }
     }

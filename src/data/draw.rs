@@ -4,6 +4,7 @@ use crate::configuration::ConfigError;
 use crate::data::dataset::DatasetError;
 use crate::lagrangian::{DescriptionError, SystemError, SystemInstance};
 use rand::Rng;
+use std::sync::atomic::{AtomicBool, Ordering};
 use thiserror::Error;
 
 /// Why states could not be sampled.
@@ -35,6 +36,9 @@ pub enum SamplingError {
         /// Which bounds.
         field: String,
     },
+    /// A flag ended it.
+    #[error("interrupted while states were drawn")]
+    Interrupted,
     /// The accelerations do not fit the precision.
     #[error(transparent)]
     Dataset(#[from] DatasetError),
@@ -49,6 +53,14 @@ pub(crate) struct Drawn {
 }
 
 impl Drawn {
+    /// Goes on unless a flag was raised.
+    ///
+    /// # Errors
+    /// [`SamplingError::Interrupted`].
+    pub fn go_on(interrupt: &AtomicBool) -> Result<(), SamplingError> {
+        if interrupt.load(Ordering::Relaxed) { Err(SamplingError::Interrupted) } else { Ok(()) }
+    }
+
     /// Takes a state, unless it lies outside the system's domain or has no finite acceleration: then what is demanded.
     pub fn take(
         &mut self,

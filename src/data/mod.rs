@@ -18,4 +18,5 @@ pub use datasets::Datasets;
 pub use draw::SamplingError;
 pub use estimated::{Noise, StateEstimate};
 pub use recording_split::{PrepareOptions, RecordingSplit, RecordingSplitError, Split};
+pub(crate) use sampling::sample_all_until;
 pub use sampling::{sample, sample_all};

@@ -2,11 +2,12 @@
 
 use crate::data::bounds::boxes;
 use crate::data::draw::{Drawn, SamplingError, draw};
-use crate::lagrangian::SystemInstance;
 use crate::lagrangian::system::Coordinate;
+use crate::lagrangian::{Interruptible, SystemInstance};
 use crate::rollout::{Domain, Method, Options, rollout};
 use rand::Rng;
 use std::f64::consts::TAU;
+use std::sync::atomic::AtomicBool;
 
 /// States that a motion of full length gives on average.
 const PER_MOTION: f64 = 10.0;
@@ -23,13 +24,14 @@ pub(crate) fn along_motions(
     (position, velocity): (&[[f64; 2]], &[[f64; 2]]),
     log_uniform: &[bool],
     states: usize,
-    rng: &mut impl Rng,
+    (rng, interrupt): (&mut impl Rng, &AtomicBool),
 ) -> Result<Drawn, SamplingError> {
     let n = system.coordinates;
     let test = system.system.trajectory(n);
     let [places, speeds] = [&test.start.positions, &test.start.velocities].map(|bounds| boxes(bounds));
     let coordinates = system.system.coordinates(n);
     let exact = system.build()?;
+    let exact = Interruptible::new(exact.as_ref(), interrupt);
     let fixed = system.constrained_coordinate();
     let chart = position.iter().zip(&coordinates).map(|(b, c)| (!c.periodic).then_some((b[0], b[1])));
     let pace = velocity.iter().enumerate().map(|(i, b)| (Some(i) != fixed).then_some((b[0], b[1])));
@@ -45,13 +47,14 @@ pub(crate) fn along_motions(
     let mut drawn = Drawn::default();
     let mut motions = 0;
     while drawn.q.len() < states * n {
+        Drawn::go_on(interrupt)?;
         if motions > 100 && drawn.q.len() < motions * n {
             return Err(SamplingError::Motions { field: field.to_string() });
         }
         motions += 1;
         let (start, mut speed) = draw((&places, &speeds), log_uniform, rng);
         system.impose_constraint(&start, &mut speed)?;
-        let motion = rollout(exact.as_ref(), &start, &speed, &options).trajectory;
+        let motion = rollout(&exact, &start, &speed, &options).trajectory;
         for (q, v) in motion.q.chunks_exact(n).zip(motion.v.chunks_exact(n)) {
             if drawn.q.len() == states * n || rng.random::<f64>() >= chance {
                 continue;
@@ -131,7 +134,8 @@ mod tests {
             &[[0.0, 0.0], [-2.0, 2.0], [-2.0, 2.0], [-2.0, 2.0]][..],
         );
         let mut rng = crate::random::RngStream::Training(0).generator(3);
-        let drawn = along_motions(&system, "phase[0].position", bounds, &[], 500, &mut rng).unwrap();
+        let drawn =
+            along_motions(&system, "phase[0].position", bounds, &[], 500, (&mut rng, &AtomicBool::new(false))).unwrap();
         for (q, v) in drawn.q.chunks(4).zip(drawn.v.chunks(4)) {
             let mut shell = v.to_vec();
             system.impose_constraint(q, &mut shell).unwrap();

@@ -27,7 +27,7 @@ impl Config {
             None => Ok(Cow::Borrowed(find(&self.system)?)),
             Some(description) if description.name != self.system => Err(SamplingError::Config(ConfigError {
                 field: "description.name".to_string(),
-                expected: "the name of the system",
+                expected: "the name of the system".into(),
                 found: format!("`{}` for `{}`", description.name, self.system),
             })),
             Some(description) => Ok(Cow::Owned(description.system()?)),

@@ -11,6 +11,7 @@ use crate::lagrangian::SystemInstance;
 use crate::random::RngStream;
 use crate::scalar::Scalar;
 use rand::Rng;
+use std::sync::atomic::AtomicBool;
 
 /// Draws `states` states uniformly from a box, with their exact accelerations, all in double precision.
 ///
@@ -26,8 +27,11 @@ pub fn sample(
     states: usize,
     rng: &mut impl Rng,
 ) -> Result<Dataset<f64>, SamplingError> {
-    fill(Drawn::default(), system, field, bounds, &[], states, rng)
+    fill(Drawn::default(), system, field, bounds, &[], states, (rng, &NEVER))
 }
+
+/// A flag that nobody raises.
+static NEVER: AtomicBool = AtomicBool::new(false);
 
 /// Draws further states, up to `states`, as [`sample`] does.
 fn fill(
@@ -37,11 +41,12 @@ fn fill(
     bounds: (&[[f64; 2]], &[[f64; 2]]),
     log_uniform: &[bool],
     states: usize,
-    rng: &mut impl Rng,
+    (rng, interrupt): (&mut impl Rng, &AtomicBool),
 ) -> Result<Dataset<f64>, SamplingError> {
     let n = system.coordinates;
     let mut refused = 0_usize;
     while drawn.q.len() < states * n {
+        Drawn::go_on(interrupt)?;
         let (q, mut v) = draw(bounds, log_uniform, rng);
         system.impose_constraint(&q, &mut v)?;
         if let Some(demand) = drawn.take(system, &q, &v)? {
@@ -84,7 +89,19 @@ pub fn sample_all<S: Scalar>(
     config: &Config,
     system: &SystemInstance<f64>,
 ) -> Result<(Datasets<S>, Vec<f64>), SamplingError> {
-    if let Some(fault) = config.sampling_faults(system.coordinates).into_iter().next() {
+    sample_all_until(config, system, &NEVER)
+}
+
+/// The same, ended by a flag.
+///
+/// # Errors
+/// [`SamplingError`].
+pub(crate) fn sample_all_until<S: Scalar>(
+    config: &Config,
+    system: &SystemInstance<f64>,
+    interrupt: &AtomicBool,
+) -> Result<(Datasets<S>, Vec<f64>), SamplingError> {
+    if let Some(fault) = config.sampling_faults(system).into_iter().next() {
         return Err(fault.into());
     }
     config.architecture(system, vec![1.0; system.coordinates])?;
@@ -96,7 +113,7 @@ pub fn sample_all<S: Scalar>(
         let mut rng = RngStream::Training(k).generator(seed);
         let states = config.data.training;
         if let Some(shell) = config.data.shell()? {
-            let set = in_shell(system, &shell, (&field, &phase.position), states, &mut rng)?;
+            let set = in_shell(system, &shell, (&field, &phase.position), states, (&mut rng, interrupt))?;
             let set = match config.data.acceleration_weighting {
                 floor if floor > 0.0 => weigh_by_distance(set, system, &shell, floor)?,
                 _ => set,
@@ -105,8 +122,8 @@ pub fn sample_all<S: Scalar>(
             continue;
         }
         let moving = (config.data.trajectory_fraction * states as f64).round() as usize;
-        let drawn = along_motions(system, &field, bounds, &phase.log_uniform, moving, &mut rng)?;
-        let set = fill(drawn, system, &field, bounds, &phase.log_uniform, states, &mut rng)?;
+        let drawn = along_motions(system, &field, bounds, &phase.log_uniform, moving, (&mut rng, interrupt))?;
+        let set = fill(drawn, system, &field, bounds, &phase.log_uniform, states, (&mut rng, interrupt))?;
         let set = if config.data.acceleration_weighting > 0.0 {
             let (floor, scale) = (config.data.acceleration_weighting, set.physical_scale());
             Weighting { floor, scale: &scale, errors: &[] }.relative(set)?
@@ -124,8 +141,8 @@ pub fn sample_all<S: Scalar>(
     let judged = |states: usize, stream: RngStream| {
         let mut rng = stream.generator(seed);
         match data.shell()? {
-            Some(shell) => in_shell(system, &shell, (field, bounds.0), states, &mut rng),
-            None => sample(system, field, bounds, states, &mut rng),
+            Some(shell) => in_shell(system, &shell, (field, bounds.0), states, (&mut rng, interrupt)),
+            None => fill(Drawn::default(), system, field, bounds, &[], states, (&mut rng, interrupt)),
         }
     };
     let (validation, test) = (judged(data.validation, RngStream::Validation)?, judged(data.test, RngStream::Test)?);
@@ -172,6 +189,16 @@ mod tests {
             seen += 1;
         }
         assert_eq!(seen, 8);
+    }
+
+    #[test]
+    fn a_raised_flag_ends_it() {
+        for name in ["harmonic-oscillator", "spring-pendulum", "schwarzschild-cartesian"] {
+            let system = configure::<f64>(name, &[]).unwrap();
+            let config = Preset::Quick.config(&system).unwrap();
+            let ended = sample_all_until::<f64>(&config, &system, &AtomicBool::new(true));
+            assert!(matches!(ended, Err(SamplingError::Interrupted)), "{name}");
+        }
     }
 
     #[test]

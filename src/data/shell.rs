@@ -8,6 +8,7 @@ use crate::lagrangian::{EulerLagrange, Request, SystemInstance, Terms};
 use crate::linalg::{Workspace, inverse};
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
+use std::sync::atomic::AtomicBool;
 
 /// Draws `states` states, as [`Shell`] says; coordinates that are not of the shell are uniform within `position`.
 ///
@@ -19,14 +20,14 @@ pub(crate) fn in_shell(
     shell: &Shell<'_>,
     (field, position): (&str, &[[f64; 2]]),
     states: usize,
-    rng: &mut impl Rng,
+    (rng, interrupt): (&mut impl Rng, &AtomicBool),
 ) -> Result<Dataset<f64>, SamplingError> {
     let n = system.coordinates;
     let around = places(system, shell)?;
     let Some(time) = system.system.time_like else {
         return Err(SamplingError::Config(ConfigError {
             field: "data.shell".to_string(),
-            expected: "a system with a time-like coordinate",
+            expected: "a system with a time-like coordinate".into(),
             found: format!("`{}`", system.system.name),
         }));
     };
@@ -34,6 +35,7 @@ pub(crate) fn in_shell(
     let [low, high] = shell.radius;
     let (mut drawn, mut refused) = (Drawn::default(), 0_usize);
     while drawn.q.len() < states * n {
+        Drawn::go_on(interrupt)?;
         let (mut q, _) = draw((position, &[]), &[], rng);
         let radius = low * (high / low).powf(rng.random::<f64>());
         for (&i, part) in around.iter().zip(direction(around.len(), rng)) {

@@ -38,6 +38,9 @@ pub enum MechanicsError {
         /// Row of the batch.
         row: usize,
     },
+    /// A model that a flag has ended.
+    #[error("interrupted")]
+    Interrupted,
     /// Derivatives that a model does not have.
     #[error("{what}: this model has no such derivatives")]
     Derivatives {
@@ -51,7 +54,7 @@ impl MechanicsError {
     pub fn row(&self) -> Option<usize> {
         match *self {
             Self::Singular { row, .. } | Self::NotFinite { row, .. } | Self::Uncertified { row } => Some(row),
-            Self::Shape { .. } | Self::Derivatives { .. } => None,
+            Self::Shape { .. } | Self::Interrupted | Self::Derivatives { .. } => None,
         }
     }
 

@@ -70,7 +70,7 @@ impl EulerLagrange<f64> for Watched<'_> {
         }
         if self.attention.is_interrupted() {
             terms.clear();
-            return Err(MechanicsError::NotFinite { row: 0, what: "an interrupted model" });
+            return Err(MechanicsError::Interrupted);
         }
         self.model.terms(q, v, request, terms)
     }

@@ -23,7 +23,7 @@ pub enum PipelineError {
     /// Unknown system, or parameters that it does not have.
     #[error(transparent)]
     System(#[from] SystemError),
-    /// States that cannot be sampled.
+    /// States that cannot be sampled, or a flag that ended it.
     #[error(transparent)]
     Sampling(#[from] SamplingError),
     /// Files of recorded motion that cannot be read.
@@ -153,7 +153,7 @@ impl PipelineError {
     pub(crate) fn is_configuration(&self) -> bool {
         match self {
             Self::Config(_) | Self::System(_) | Self::Network(_) | Self::NoAccelerations => true,
-            Self::Sampling(error) => !matches!(error, SamplingError::Dataset(_)),
+            Self::Sampling(error) => !matches!(error, SamplingError::Dataset(_) | SamplingError::Interrupted),
             Self::OtherShape { configuration, .. } => *configuration,
             _ => false,
         }

@@ -8,6 +8,7 @@ use crate::analysis::{
 use crate::data::sample;
 use crate::lagrangian::system::TrajectoryTest as Span;
 use crate::lagrangian::{EulerLagrange, SystemInstance};
+use crate::names::counted;
 use crate::network::NetworkLagrangian;
 use crate::pipeline::attention::Attention;
 use crate::pipeline::physics::{Physics, Subject};
@@ -45,6 +46,9 @@ pub struct Evaluation {
     pub(crate) trajectories: Vec<Motion>,
     /// Curvature, symmetries, charges and signature.
     pub(crate) physics: Physics,
+    /// What it is of, in words, if the flag ended it: starts whose motions came to their end, of all; pictures and physics may be missing.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub interrupted: Option<String>,
     /// Names of the accelerations' coordinates, with the accelerations' units.
     #[serde(skip)]
     pub(crate) coordinates: Vec<String>,
@@ -113,10 +117,10 @@ impl EvaluationOptions {
 /// Pieces of work of an evaluation: accelerations, motions, pictures, mass matrices.
 const PIECES: usize = 4;
 
-/// Compares a model with the system it learned.
+/// Compares a model with the system it learned. What was compared before the flag ended it is kept: see [`Evaluation::interrupted`].
 ///
 /// # Errors
-/// A system that cannot be built, motions that do not fit into memory, [`PipelineError::Interrupted`].
+/// A system that cannot be built, motions that do not fit into memory, [`PipelineError::Interrupted`] before anything was compared.
 pub fn evaluate(
     system: &SystemInstance<f64>,
     network: &NetworkLagrangian<f64>,
@@ -129,18 +133,17 @@ pub fn evaluate(
     let exact = system.build()?;
     let (exact, learned) = (attention.watched(exact.as_ref()), attention.watched(network));
     let (exact, learned): (&dyn EulerLagrange<f64>, &dyn EulerLagrange<f64>) = (&exact, &learned);
-    let done = || {
-        attention.advance(1);
-        attention.check()
-    };
     let coordinates = system.system.coordinates(n);
     let periodic: Vec<bool> = coordinates.iter().map(|c| c.periodic).collect();
-    let accelerations = acceleration_errors(exact, learned, q, v);
-    done()?;
-
     let Span { start, t_end, dt } = plan.span;
     // Exact and learned.
     memory::require("the evaluation", memory::motions((plan.starts as u64).saturating_mul(2), t_end / dt, n, 0))?;
+    let accelerations = acceleration_errors(exact, learned, q, v);
+    let wrong_signature = wrong_signatures(exact, learned, q, v);
+    let mass_matrix = mass_matrix_error(exact, learned, q);
+    attention.check()?;
+    attention.advance(1);
+
     let defaults = TrajectoryTest::new(StartBox { q: start.positions, v: start.velocities }, periodic);
     // Steps grow with the time, and with the fifth root of the accuracy.
     let longer = (t_end / system.system.trajectory(n).t_end).max(1.0) * (defaults.rtol / plan.rtol).max(1.0).powf(0.2);
@@ -156,21 +159,29 @@ pub fn evaluate(
         threads: plan.threads,
         ..defaults
     };
-    let runs = test.run_constrained(system, exact, learned)?;
-    done()?;
+    let mut runs = test.run_constrained(system, exact, learned)?;
+    runs.retain(|run| !run.is_interrupted());
+    attention.advance(1);
     let motion = |run: &TrajectoryRun<f64>| Motion {
         summary: run.summary(),
         conserved_error: conserved_error(system, &run.learned.trajectory).map(statistics),
         left_training_range: leaving(&run.learned.trajectory, &plan.trained, &system.system.columns(n)),
     };
 
-    let portraits = test.portraits(exact, learned, &runs[..runs.len().min(DRAWN)]);
-    attention.check()?;
-    let mut figures = evaluation_figures(&runs, &portraits, system);
-    let grids = grids(system, exact, learned);
-    attention.check()?;
-    figures.extend(grids?);
-    done()?;
+    let (mut portraits, mut figures) = (Vec::new(), Vec::new());
+    if !attention.is_interrupted() {
+        portraits = test.portraits(exact, learned, &runs[..runs.len().min(DRAWN)]);
+        figures = evaluation_figures(&runs, &portraits, system);
+        match grids(system, exact, learned) {
+            Err(_) if attention.is_interrupted() => {}
+            drawn => figures.extend(drawn?),
+        }
+    }
+    if attention.is_interrupted() {
+        // They would show where the models were ended.
+        (portraits, figures) = (Vec::new(), Vec::new());
+    }
+    attention.advance(1);
     let subject = Subject {
         network,
         trained: &plan.trained,
@@ -180,10 +191,16 @@ pub fn evaluate(
         motion: portraits.first().map(|portrait| &portrait.learned),
         threads: plan.threads,
     };
-    let physics = Physics::new(&subject, &|| attention.check())?;
-    let wrong_signature = wrong_signatures(exact, learned, q, v);
-    let mass_matrix = mass_matrix_error(exact, learned, q);
-    done()?;
+    let mut physics = Physics::nothing(&subject);
+    let interrupted = match physics.find(&subject, &|| attention.check()) {
+        Ok(()) => None,
+        Err(PipelineError::Interrupted) => {
+            physics.left_out.push("whatever is not here: interrupted".to_string());
+            Some(format!("{} of {}", runs.len(), counted(plan.starts, "start", "starts")))
+        }
+        Err(error) => return Err(error),
+    };
+    attention.advance(1);
     Ok(Evaluation {
         accelerations,
         wrong_signature,
@@ -191,6 +208,7 @@ pub fn evaluate(
         valid_time: ValidTimes::of(&runs.iter().map(|run| (run.valid, run.chaos())).collect::<Vec<_>>()),
         trajectories: runs.iter().map(motion).collect(),
         physics,
+        interrupted,
         coordinates: coordinates
             .iter()
             .map(|c| format!("{} [{}/{}^2]", c.name, c.unit, system.system.time_unit))
@@ -311,6 +329,53 @@ fn fixed(system: &SystemInstance<f64>, state: &[f64], axes: [Axis; 2], imposed: 
 mod tests {
     use super::*;
     use crate::lagrangian::configure;
+    use crate::network::Layout;
+    use crate::pipeline::Event;
+    use crate::presets::Preset;
+    use crate::report::Report;
+    use std::sync::Arc;
+    use std::sync::atomic::{AtomicBool, Ordering};
+
+    /// An evaluation that a flag ends behind so many of its pieces.
+    fn ended_behind(pieces: usize) -> Result<Evaluation, PipelineError> {
+        let system = configure::<f64>("harmonic-oscillator", &[]).unwrap();
+        let mut config = Preset::Quick.config(&system).unwrap();
+        config.network.hidden = vec![4];
+        let architecture = config.architecture(&system, vec![1.0]).unwrap();
+        // The term alpha |v|^2 alone: its motion is that of a free particle.
+        let weights = vec![0.0; Layout::new(&architecture).parameters];
+        let network = NetworkLagrangian::new(architecture, weights).unwrap();
+        let options = EvaluationOptions::new(&system, Domain::new(vec![None; 2]), 0).unwrap();
+        let span = Span { t_end: 1.0, ..options.span };
+        let states = (options.states.0[..50].to_vec(), options.states.1[..50].to_vec());
+        let flag = Arc::new(AtomicBool::new(false));
+        let raised = Arc::clone(&flag);
+        let events = move |event: Event<'_>| {
+            if matches!(event, Event::Judged { done, .. } if done == pieces && done > 0) {
+                raised.store(true, Ordering::SeqCst);
+            }
+        };
+        let watch = Watch { interrupt: flag, ..Watch::new(events) };
+        evaluate(&system, &network, EvaluationOptions { states, starts: 3, span, ..options }, &watch)
+    }
+
+    #[test]
+    fn what_was_compared_before_an_interruption_is_kept() {
+        let whole = ended_behind(0).unwrap();
+        assert!(whole.interrupted.is_none() && whole.trajectories.len() == 3 && !whole.figures.is_empty());
+        for (pieces, starts) in [(1, 0), (2, 3), (3, 3)] {
+            let part = ended_behind(pieces).unwrap();
+            let said = part.interrupted.as_deref().unwrap();
+            assert!(said.starts_with(&format!("{starts} of 3")), "{said}");
+            assert_eq!((part.trajectories.len(), part.figures.is_empty()), (starts, pieces < 3));
+            assert_eq!(part.accelerations[0].median, whole.accelerations[0].median);
+            assert_eq!(part.mass_matrix.factor, whole.mass_matrix.factor);
+            assert!(part.trajectories.iter().all(|motion| motion.summary.stopped.is_none()));
+            // It has its tables.
+            let report = part.report(part.summarise(Report::new("part"), "oscillator")).to_html();
+            assert!(report.contains("interrupted") && !part.text("oscillator").is_empty());
+        }
+    }
 
     #[test]
     fn grids_say_where_they_are() {

@@ -1,5 +1,7 @@
 //! Experiments: their runs side by side, finished ones not again, and the tables made of their records.
 
+use crate::configuration::Config;
+use crate::data::SamplingError;
 use crate::experiments::{Experiment, Outcome, Record, Run, Scale};
 use crate::pipeline::checkpoints::Begin;
 use crate::pipeline::experiment_directory::{ExperimentDirectory, LockedDirectory};
@@ -8,9 +10,8 @@ use crate::pipeline::readings::{READINGS, read_hole};
 use crate::pipeline::train::{RunOptions, train};
 use crate::pipeline::{Event, Output, PipelineError, RECORD, Watch};
 use crate::report::Curve;
+use crate::storage::in_order;
 use crate::training::{StopReason, TrainingError};
-use std::collections::BTreeMap;
-use std::panic::resume_unwind;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Instant;
 
@@ -30,7 +31,7 @@ pub fn run_experiment(
 ) -> Result<ExperimentReport, PipelineError> {
     let started = Instant::now();
     let results = finish_runs((experiment, scale), runs, threads, store, watch)?;
-    conclude((experiment, scale), results, beside, store, Some(started))
+    conclude((experiment, scale), results, beside, store, watch, Some(started))
 }
 
 /// Writes table, pictures and report from the records that are in a directory, and from nothing else; nothing is run. The same records
@@ -43,13 +44,14 @@ pub fn merge_experiment(
     runs: Vec<Run>,
     beside: &[Curve],
     store: &ExperimentDirectory,
+    watch: &Watch,
 ) -> Result<ExperimentReport, PipelineError> {
     let with_record = |run: Run| finished_record(store, &run).map(|record| (run, record));
     let results = runs.into_iter().map(with_record).collect::<Result<Results, PipelineError>>()?;
     if results.iter().all(|(_, record)| record.is_none()) {
         return Err(PipelineError::NothingFinished { total: results.len() });
     }
-    conclude((experiment, scale), results, beside, store, None)
+    conclude((experiment, scale), results, beside, store, watch, None)
 }
 
 /// Runs `runs` of an experiment, so many side by side; no tables are written. A run that another process works on is left to it.
@@ -66,47 +68,39 @@ pub fn finish_runs(
     let total = runs.len();
     let abreast = if experiment.is_timed() { 1 } else { threads.min(total).max(1) };
     watch.say(Event::Runs { done: 0, total });
-    let (next, done, failed) = (AtomicUsize::new(0), AtomicUsize::new(0), AtomicBool::new(false));
-    let work = || {
-        let mut results = Vec::new();
-        while !failed.load(Ordering::SeqCst) && !watch.is_interrupted() {
-            let index = next.fetch_add(1, Ordering::SeqCst);
-            let Some(run) = runs.get(index) else { break };
-            let result = one(run, (experiment, scale), (threads / abreast).max(1), store, watch);
-            match &result {
-                Ok(Some(_)) => {
-                    let done = 1 + done.fetch_add(1, Ordering::SeqCst);
-                    watch.say(Event::Runs { done, total });
-                }
-                Ok(None) | Err(PipelineError::Held { .. }) => {}
-                Err(_) => failed.store(true, Ordering::SeqCst),
-            }
-            results.push((index, result));
+    let (done, failed) = (AtomicUsize::new(0), AtomicBool::new(false));
+    let work = |run: &Run| {
+        if failed.load(Ordering::SeqCst) || watch.is_interrupted() {
+            return Ok(None);
         }
-        results
+        let result = one(run, (experiment, scale), (threads / abreast).max(1), store, watch);
+        match &result {
+            Ok(Some(_)) => watch.say(Event::Runs { done: 1 + done.fetch_add(1, Ordering::SeqCst), total }),
+            Ok(None) | Err(PipelineError::Held { .. }) => {}
+            Err(_) => failed.store(true, Ordering::SeqCst),
+        }
+        result
     };
-    let mut results: BTreeMap<usize, Result<Option<Record>, PipelineError>> = std::thread::scope(|scope| {
-        let workers: Vec<_> = (0..abreast).map(|_| scope.spawn(work)).collect();
-        workers.into_iter().flat_map(|worker| worker.join().unwrap_or_else(|panic| resume_unwind(panic))).collect()
-    });
-    let (mut finished, mut held) = (Vec::new(), Vec::new());
-    for (index, run) in runs.into_iter().enumerate() {
-        match results.remove(&index).unwrap_or(Ok(None)) {
-            Ok(record) => finished.push((run, record)),
+    let results = in_order(&runs, abreast, work);
+    let (mut found, mut held) = (Vec::new(), Vec::new());
+    for (run, result) in runs.into_iter().zip(results) {
+        match result {
+            Ok(record) => found.push((run, record)),
             // The process may have ended since.
             Err(PipelineError::Held { owner, .. }) => match finished_record(store, &run)? {
                 None => held.push(owner),
-                record => finished.push((run, record)),
+                record => found.push((run, record)),
             },
             Err(error) => return Err(error),
         }
     }
-    if watch.is_interrupted() && done.load(Ordering::SeqCst) < total {
-        return Err(PipelineError::InterruptedRuns { finished: done.load(Ordering::SeqCst), total });
+    let finished = found.iter().filter(|(_, record)| record.is_some()).count();
+    if watch.is_interrupted() && finished < total {
+        return Err(PipelineError::InterruptedRuns { finished, total });
     }
     match held.first() {
         Some(owner) => Err(PipelineError::HeldRuns { held: held.len(), owner: owner.clone() }),
-        None => Ok(finished),
+        None => Ok(found),
     }
 }
 
@@ -152,7 +146,10 @@ fn make(
     let trained = train(&run.config, &system, &options, output, &watch);
     let judged_or_empty = matches!(
         &trained,
-        Ok(_) | Err(PipelineError::Interrupted | PipelineError::Training(TrainingError::NothingLearned(_)))
+        Ok(_)
+            | Err(PipelineError::Interrupted
+                | PipelineError::Sampling(SamplingError::Interrupted)
+                | PipelineError::Training(TrainingError::NothingLearned(_)))
     );
     let record = match trained {
         _ if judged_or_empty && watch.is_interrupted() => return Ok(None),
@@ -180,13 +177,87 @@ fn make(
     Ok(Some(record))
 }
 
+/// What a directory holds of a run.
+#[derive(Debug)]
+pub(crate) enum KeptRecord {
+    /// Nothing: the run is not finished.
+    Nothing,
+    /// A record that was made from its configuration.
+    Finished(Record),
+    /// A record of another configuration.
+    OtherConfiguration,
+    /// A file that cannot be read, and why.
+    Damaged(&'static str, String),
+}
+
 /// The record of a run in a directory, if it was made from this configuration.
 ///
 /// # Errors
 /// A configuration that TOML cannot hold.
-pub fn finished_record(store: &ExperimentDirectory, run: &Run) -> Result<Option<Record>, PipelineError> {
+fn finished_record(store: &ExperimentDirectory, run: &Run) -> Result<Option<Record>, PipelineError> {
+    Ok(match kept_record(store, run)? {
+        KeptRecord::Finished(record) => Some(record),
+        _ => None,
+    })
+}
+
+/// What a directory holds of a run.
+///
+/// # Errors
+/// A configuration that TOML cannot hold.
+pub(crate) fn kept_record(store: &ExperimentDirectory, run: &Run) -> Result<KeptRecord, PipelineError> {
+    const CONFIG: &str = "config.toml";
     let toml = toml::to_string(&run.config).map_err(PipelineError::format)?;
-    let record = store.read(&run.name, RECORD).and_then(|json| serde_json::from_slice(&json).ok());
-    let same = || store.read(&run.name, "config.toml").is_some_and(|text| text == toml.as_bytes());
-    Ok(record.filter(|_| same()))
+    let is_there = |file: &str| store.names(&run.name).iter().any(|name| name == file);
+    let Some(record) = store.read(&run.name, RECORD) else {
+        let unread = || KeptRecord::Damaged(RECORD, "cannot be read".to_string());
+        return Ok(if is_there(RECORD) { unread() } else { KeptRecord::Nothing });
+    };
+    let record = match serde_json::from_slice(&record) {
+        Ok(record) => record,
+        Err(error) => return Ok(KeptRecord::Damaged(RECORD, error.to_string())),
+    };
+    let Some(config) = store.read(&run.name, CONFIG) else {
+        let problem = if is_there(CONFIG) { "cannot be read" } else { "is missing beside a record" };
+        return Ok(KeptRecord::Damaged(CONFIG, problem.to_string()));
+    };
+    let config = String::from_utf8_lossy(&config);
+    Ok(match toml::from_str::<Config>(&config) {
+        _ if config == toml => KeptRecord::Finished(record),
+        Ok(_) => KeptRecord::OtherConfiguration,
+        Err(error) => KeptRecord::Damaged(CONFIG, error.message().to_string()),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::experiments::find;
+
+    #[test]
+    fn damaged_runs_are_told_from_those_of_another_configuration() {
+        let directory = tempfile::tempdir().unwrap();
+        let store = ExperimentDirectory::new(directory.path());
+        let run = &find("quick").unwrap().runs(Scale::Smoke, 1)[0];
+        let folder = directory.path().join(&run.name);
+        std::fs::create_dir(&folder).unwrap();
+        let outcome = Outcome::Nothing { reason: String::new() };
+        let record = Record { outcome, losses: Vec::new(), times: Vec::new(), seconds: 0.0 };
+        let now = toml::to_string(&run.config).unwrap();
+        let kept = |file: &str, content: &str| {
+            std::fs::write(folder.join("config.toml"), &now).unwrap();
+            std::fs::write(folder.join(RECORD), serde_json::to_string(&record).unwrap()).unwrap();
+            std::fs::write(folder.join(file), content).unwrap();
+            kept_record(&store, run).unwrap()
+        };
+        assert!(matches!(kept("config.toml", &now), KeptRecord::Finished(_)));
+        let other = kept("config.toml", &now.replace("seed = 0", "seed = 7"));
+        assert!(matches!(other, KeptRecord::OtherConfiguration), "{other:?}");
+        for (file, content) in [(RECORD, "{\"outcome\""), (RECORD, ""), ("config.toml", &now[..40])] {
+            let found = kept(file, content);
+            assert!(matches!(&found, KeptRecord::Damaged(name, _) if *name == file), "{content}: {found:?}");
+        }
+        std::fs::remove_file(folder.join(RECORD)).unwrap();
+        assert!(matches!(kept_record(&store, run).unwrap(), KeptRecord::Nothing));
+    }
 }

@@ -5,7 +5,7 @@ use crate::names::{WIDTH, counted, wrapped};
 use crate::pipeline::experiment_directory::ExperimentDirectory;
 use crate::pipeline::readings::{RowOfHoles, rows_of_holes};
 use crate::pipeline::run_figures::{pictures_of_runs, within};
-use crate::pipeline::{Output, PipelineError, headline};
+use crate::pipeline::{Output, PipelineError, Watch, headline};
 use crate::report::{
     Curve, EXPERIMENT_HEADER, READING_HEADER, REDUCTION_HEADER, Report, experiment_curves, experiment_figures,
     experiment_table, experiment_view, reduction_table, text_table,
@@ -49,6 +49,7 @@ pub(crate) fn conclude(
     results: Results,
     beside: &[Curve],
     store: &ExperimentDirectory,
+    watch: &Watch,
     started: Option<Instant>,
 ) -> Result<ExperimentReport, PipelineError> {
     let rows = experiment.rows(&results);
@@ -78,7 +79,7 @@ pub(crate) fn conclude(
     let reductions = reduction_table(&experiment.reductions(&results));
     let report = remarks.iter().fold(report, |report, remark| report.paragraph(remark));
     let report = if reductions.is_empty() { report } else { report.table(&REDUCTION_HEADER, &reductions) };
-    let holes = rows_of_holes(experiment, &results, store, &output)?;
+    let holes = rows_of_holes(experiment, &results, store, &output, watch)?;
     let report = holes.iter().fold(report, |report, row| row.add_to(report));
     let report = within(taken, report.figures(&figures));
     output.write("report.html", report.to_html().as_bytes())?;

@@ -80,6 +80,7 @@ fn fit_in<S: Scalar>(
     watch: &Watch,
 ) -> Result<FitReport, PipelineError> {
     let PreparedFit { measured, targets, .. } = prepared;
+    prepared.check_horizon(fit_config.horizon)?;
     let (recording, config, threads) = (&prepared.reading.recording, &fit_config.training, options.threads);
     let names = &recording.coordinates;
     let mut data = measured.datasets::<S>(*targets)?;

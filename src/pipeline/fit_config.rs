@@ -109,7 +109,7 @@ impl FitConfig {
     pub(crate) fn faults(&self, n: usize) -> Vec<ConfigError> {
         let fault = |field: &str, expected: &'static str, found: String| ConfigError {
             field: field.to_string(),
-            expected,
+            expected: expected.into(),
             found,
         };
         let mut found = Vec::new();

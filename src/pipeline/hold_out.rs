@@ -135,6 +135,14 @@ const EXAMPLE_CAPTION: &str = "The first held-out window: measured, and predicte
 const FORCE_CAPTION: &str =
     "Known forces in the first held-out window; the prediction takes them as linear between the samples.";
 
+/// Times over which held-out motion can be predicted: from the shortest of its steps to the longest of its trajectories.
+pub(crate) fn horizons(part: &Split) -> Option<(f64, f64)> {
+    let times = || part.states.iter().map(|states| &states.times[states.interior()]);
+    let spans = times().filter_map(|times| Some(times.last()? - times.first()?)).filter(|span| *span > 0.0);
+    let steps = times().flat_map(|times| times.windows(2).map(|pair| pair[1] - pair[0]));
+    Some((steps.reduce(f64::min)?, spans.reduce(f64::max)?))
+}
+
 /// A quarter of the shortest of the long trajectories, at most [`AHEAD`] samples. Half the time belongs to trajectories of a length or
 /// longer ones; long is half as much: pieces between gaps do not shorten the horizon of the others.
 fn horizon(part: &Split) -> f64 {

@@ -90,7 +90,7 @@ pub use determination::Determined;
 pub use energy::Balance;
 pub use error::PipelineError;
 pub use evaluation::{Evaluation, EvaluationOptions, Motion, RTOL, evaluate};
-pub(crate) use experiment::finished_record;
+pub(crate) use experiment::{KeptRecord, kept_record};
 pub use experiment::{finish_runs, merge_experiment, run_experiment};
 pub use experiment_directory::ExperimentDirectory;
 pub use experiment_report::{ExperimentReport, Results};

@@ -8,6 +8,7 @@ use crate::analysis::{
     metric_components, metric_grids,
 };
 use crate::certificate::{Options, Signature, certify_network};
+use crate::geometry::MOST_COORDINATES;
 use crate::lagrangian::system::Bounds;
 use crate::lagrangian::{EulerLagrange, SystemInstance};
 use crate::network::{NetworkLagrangian, Structure};
@@ -167,9 +168,16 @@ impl Physics {
         subject: &Subject<'_>,
         check: &dyn Fn() -> Result<(), PipelineError>,
     ) -> Result<Self, PipelineError> {
+        let mut found = Self::nothing(subject);
+        found.find(subject, check)?;
+        Ok(found)
+    }
+
+    /// No part of it yet.
+    pub(crate) fn nothing(subject: &Subject<'_>) -> Self {
         let region = subject.region();
         let ranges = region.position.iter().chain(&region.velocity).copied();
-        let mut found = Self {
+        Self {
             region: subject.columns.iter().cloned().zip(ranges).collect(),
             common_ground: None,
             metric: Vec::new(),
@@ -182,17 +190,28 @@ impl Physics {
             left_out: Vec::new(),
             coordinates: subject.columns[..subject.network.coordinates()].to_vec(),
             figures: Vec::new(),
-        };
-        let exact = subject.system.map(SystemInstance::build).transpose()?;
-        found.find_common_ground(subject, &region, exact.as_deref());
+        }
+    }
+
+    /// Finds part after part; those that were found before an error are whole.
+    ///
+    /// # Errors
+    /// As [`Physics::new`].
+    pub(crate) fn find(
+        &mut self,
+        subject: &Subject<'_>,
+        check: &dyn Fn() -> Result<(), PipelineError>,
+    ) -> Result<(), PipelineError> {
+        let (region, exact) = (subject.region(), subject.system.map(SystemInstance::build).transpose()?);
         check()?;
-        found.find_geometry(subject, &region, exact.as_deref());
+        self.find_common_ground(subject, &region, exact.as_deref());
         check()?;
-        found.find_symmetries(subject, &region, exact.as_deref());
+        self.find_geometry(subject, &region, exact.as_deref());
         check()?;
-        found.find_certificate(subject, &region);
+        self.find_symmetries(subject, &region, exact.as_deref());
         check()?;
-        Ok(found)
+        self.find_certificate(subject, &region);
+        check()
     }
 
     fn find_common_ground(&mut self, subject: &Subject<'_>, region: &Region, exact: Option<&dyn EulerLagrange<f64>>) {
@@ -223,7 +242,7 @@ impl Physics {
         let factor = found.or_else(|| exact.map(at_rest)).unwrap_or(1.0);
         let most = (CURVATURE_WORK / (network.weights().len() * n.pow(3)).max(1)).max(1);
         self.metric = metric_components(exact, network, &q[..n * most.min(q.len() / n)], factor);
-        if n < 2 {
+        if !(2..=MOST_COORDINATES).contains(&n) {
             return;
         }
         let plane = self.plane(subject, region);

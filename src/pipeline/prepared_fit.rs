@@ -1,9 +1,11 @@
 //! Recorded motion made ready for a fit: derivatives, division, the configuration that suits it.
 
-use crate::configuration::{Config, Precision};
+use crate::configuration::{Config, ConfigError, Precision};
 use crate::data::RecordingSplit;
+use crate::names::rounded;
 use crate::pipeline::PipelineError;
 use crate::pipeline::fit_config::{FitColumns, FitConfig, FitOptions};
+use crate::pipeline::hold_out::horizons;
 use crate::presets::suggested;
 use crate::recording::survey::{Survey, SurveyOptions, survey};
 use crate::recording::{LoadedRecording, Targets};
@@ -41,6 +43,21 @@ impl<'a> PreparedFit<'a> {
     /// Targets that are learned from.
     pub(crate) fn targets(&self) -> Targets {
         self.targets
+    }
+
+    /// Refuses a horizon within which there is no sample, and one beyond which there is none.
+    ///
+    /// # Errors
+    /// The range that the held-out motion has.
+    pub(crate) fn check_horizon(&self, horizon: Option<f64>) -> Result<(), ConfigError> {
+        let (Some(found), Some((least, most))) = (horizon, horizons(&self.measured.test)) else { return Ok(()) };
+        // The last sample may be early or late by a rounding error of the times.
+        if (least * (1.0 - 1e-9)..=most * (1.0 + 1e-9)).contains(&found) {
+            return Ok(());
+        }
+        let (least, most) = (rounded(least, 6), rounded(most, 6));
+        let expected = format!("{least} to {most} s, from a step to the longest trajectory of the held-out motion");
+        Err(ConfigError { field: "horizon".to_string(), expected: expected.into(), found: found.to_string() })
     }
 
     /// Survey of the recorded motion, with warnings of what will hinder a fit.

@@ -8,7 +8,7 @@ use crate::network::NetworkLagrangian;
 use crate::network::file::ModelFile;
 use crate::pipeline::experiment_directory::ExperimentDirectory;
 use crate::pipeline::hole_pictures::{orbit_figure, sky_picture};
-use crate::pipeline::{MODEL, Output, PipelineError, Watch};
+use crate::pipeline::{Event, MODEL, Output, PipelineError, Watch};
 use crate::relativity::{CentralCoordinates, LearnedHole, Reading};
 use crate::report::{READING_HEADER, Report, reading_table};
 
@@ -118,22 +118,27 @@ fn readings_of(run: &Run, store: &ExperimentDirectory) -> Result<Vec<Reading>, P
     look_at(&run.config, &learned, |pair| pair.readings())
 }
 
-/// Readings of the finished runs of an experiment, row by row; written as `readings.csv` too. None for an experiment that reads no holes.
+/// Readings of the finished runs of an experiment, row by row; written as `readings.csv` too. None for an experiment that reads no holes. A run
+/// whose files give none is left out with a remark.
 ///
 /// # Errors
-/// A model file that cannot be read, a system without the coordinates of a hole, files that cannot be written.
+/// Files that cannot be written.
 pub(crate) fn rows_of_holes(
     experiment: &Experiment,
     results: &[(Run, Option<Record>)],
     store: &ExperimentDirectory,
     output: &dyn Output,
+    watch: &Watch,
 ) -> Result<Vec<RowOfHoles>, PipelineError> {
     if !experiment.reads_holes() {
         return Ok(Vec::new());
     }
     let mut rows: Vec<(&Run, Vec<Vec<Reading>>)> = Vec::new();
     for (run, _) in results.iter().filter(|(_, record)| record.is_some()) {
-        let readings = readings_of(run, store)?;
+        let readings = readings_of(run, store).unwrap_or_else(|error| {
+            watch.say(Event::Note(&format!("{}: {error}; it is left out of the readings", run.name)));
+            Vec::new()
+        });
         match rows.iter_mut().find(|(first, _)| first.label == run.label) {
             _ if readings.is_empty() => {}
             Some((_, all)) => all.push(readings),

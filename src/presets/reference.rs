@@ -201,8 +201,13 @@ pub const TRAINING_SECTIONS: [Section<'static>; 9] = [
         name: "penalty",
         purpose: "Penalty on a wrong signature of the mass matrix.",
         keys: &[
-            key("kind", "none, eigenvalue, sylvester, lorentzian-sylvester", "What is penalised."),
-            optional("lambda", "100.0", "from 0", "Weight beside the loss; not with kind none."),
+            key(
+                "kind",
+                "none, eigenvalue, sylvester, lorentzian-sylvester",
+                "What is penalised. Beside a time-like coordinate none or lorentzian-sylvester, which wants a negative element of \
+                 the time: not for metrics inside of a horizon or of an ergosphere, where it is positive.",
+            ),
+            optional("lambda", "100.0", "0 to 10^12", "Weight beside the loss; not with kind none."),
             optional("time", "\"t\"", "a coordinate", "The time-like coordinate; with lorentzian-sylvester only."),
         ],
     },
@@ -231,7 +236,7 @@ pub const TRAINING_SECTIONS: [Section<'static>; 9] = [
         purpose: "A stretch of training; may stand several times, each from the best weights of the one before.",
         keys: &[
             key("epochs", "1 to 2^24", "Passes through the training states."),
-            key("rate", "above 0", "Learning rate at the start."),
+            key("rate", "above 0 to 1000", "Learning rate at the start."),
             key("eta_min", "0 to the rate", "Lowest learning rate."),
             key(
                 "schedule",
@@ -277,7 +282,7 @@ pub const SHOOTING_SECTION: Section<'static> = Section {
         key("epochs", "1 to 2^24", "Passes through all segments."),
         key("batch", "1 to 2^30", "Segments per update of the weights."),
         key("method", "soap, radam, adam", "Update rule of the weights."),
-        key("rate", "above 0", "Learning rate at the start, falling to 0 by half a cosine."),
+        key("rate", "above 0 to 1000", "Learning rate at the start, falling to 0 by half a cosine."),
         key("weight_decay", "from 0", "L2 weight decay, added to the gradient."),
         key("clip", "above 0, inf for none", "The gradient's norm is cut to this."),
         key("continuity", "from 0", "Weight of the gap of a joint, in units of noise, beside one observation."),

@@ -182,7 +182,11 @@ impl<'a> Trainer<'a> {
     fn train_in<S: Scalar>(self) -> Result<Learned, TrainerError> {
         let Self { data, names, angles, mut config, threads } = self;
         let (n, found) = (data.coordinates(), data.len());
-        let fault = |field: &str, expected, found: String| ConfigError { field: field.to_string(), expected, found };
+        let fault = |field: &str, expected: &'static str, found| ConfigError {
+            field: field.to_string(),
+            expected: expected.into(),
+            found,
+        };
         if names.len() != n {
             let found = format!("{} for {n}", names.len());
             return Err(fault("coordinates", "a name for each coordinate", found).into());

@@ -1,7 +1,7 @@
 //! Meaning of the columns of recorded files.
 
 use crate::names::counted;
-use crate::names::unknown;
+use crate::names::{taken_column, unknown};
 use crate::recording::units::factor;
 use thiserror::Error;
 
@@ -90,6 +90,10 @@ impl Columns {
             if let Some((other, _)) = used[..k].iter().find(|(_, earlier)| earlier == name) {
                 return wrong(format!("column {name} is used twice, as {other} and as {what}"));
             }
+        }
+        let coordinates: Vec<&str> = self.coords.iter().map(String::as_str).collect();
+        if let Some((_, problem)) = taken_column(&coordinates) {
+            return wrong(format!("coordinate: {problem} in the header"));
         }
         if let Some(name) = self.periodic.iter().find(|name| !self.coords.contains(name)) {
             return wrong(format!("periodic: {}", unknown("coordinate", name, self.coords.iter().map(String::as_str))));

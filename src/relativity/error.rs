@@ -34,6 +34,9 @@ pub enum RelativityError {
     /// The camera would have to be faster than light.
     #[error("no camera rests at this place: it is within the ergosurface, or its time is no time there")]
     NothingRests,
+    /// A metric that is another one at another time.
+    #[error("the metric depends on its time, expected one that is the same at all times")]
+    DependsOnTime,
     /// A number that makes no picture.
     #[error("{what}: expected {expected}, found {found}")]
     Invalid {

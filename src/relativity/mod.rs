@@ -45,10 +45,11 @@ mod readings;
 mod shadow;
 mod sky;
 mod spheroidal;
+mod stationary;
 mod tetrad;
 mod vector;
 
-pub use camera::{Camera, Observer};
+pub use camera::{Camera, MOST_PIXELS, Observer};
 pub use central_coordinates::CentralCoordinates;
 pub use chart::Chart;
 #[cfg(feature = "training")]
@@ -61,11 +62,12 @@ pub use outline::{Edge, Outline, outline};
 #[cfg(feature = "training")]
 pub use parameters::nearest_parameters;
 pub use periastron::{RadialPeriod, radial_period};
-pub use rays::{Fate, Ray, Tracing, trace};
+pub use rays::{Fate, Ray, TOLERANCES, Tracing, trace};
 #[cfg(feature = "training")]
 pub use readings::{LearnedHole, Reading};
 pub use shadow::{Difference, Shadow, shadow};
 pub use sky::{Sky, difference_image};
+pub(crate) use stationary::depends_on_time;
 pub use tetrad::Tetrad;
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 
 use super::camera::Camera;
 use super::error::{RelativityError, expect};
-use super::rays::{Fate, Tracing, trace};
+use super::rays::{Fate, TOLERANCES, Tracing, trace};
 use super::tetrad::Tetrad;
 use crate::lagrangian::EulerLagrange;
 use std::f64::consts::{PI, TAU};
@@ -69,7 +69,7 @@ pub fn outline(
     expect(directions > 0, "directions", "at least 1", directions as f64)?;
     let tetrad = Tetrad::new(model, camera)?;
     let count = directions.next_multiple_of(4);
-    let tracing = Tracing { tolerance: (FINER * tracing.tolerance).max(1e-13), ..*tracing };
+    let tracing = Tracing { tolerance: (FINER * tracing.tolerance).max(TOLERANCES.0), ..*tracing };
     let toward = |k: usize, angle: f64| {
         let ((sin, cos), (up, right)) = (angle.sin_cos(), (TAU * k as f64 / count as f64).sin_cos());
         tetrad.ray([sin * right, sin * up, cos])

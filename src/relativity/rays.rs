@@ -6,7 +6,7 @@ use super::dormand_prince::{A, ERROR, STAGES};
 use super::error::{RelativityError, expect};
 use super::vector::{along, dot, norm, times};
 use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Terms};
-use crate::rollout::in_order;
+use crate::storage::in_order;
 
 /// End of a ray that was followed backwards in time.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,11 +30,14 @@ pub struct Ray {
     pub drift: f64,
 }
 
+/// Least and largest tolerance of a step.
+pub const TOLERANCES: (f64, f64) = (1e-12, 0.01);
+
 /// Choices of ray tracing.
 ///
 /// | name | default | purpose | range |
 /// |---|---|---|---|
-/// | `tolerance` | 1e-6 | relative error of place and tangent in a step | above 0 |
+/// | `tolerance` | 1e-6 | relative error of place and tangent in a step | 1e-12 to 0.01 |
 /// | `far` | twice the distance of the camera | distance from which on a ray that leaves has escaped | above 0 |
 /// | `capture` | 0 | distance within which a ray is captured in any case | at least 0 |
 /// | `growth` | 1e5 | growth of the Euclidean length of `k` at which a ray is captured | above 1 |
@@ -67,10 +70,11 @@ impl Tracing {
         Self { tolerance: 1e-6, far: 2.0 * camera.distance, capture: 0.0, growth: 1e5, most_steps: 2000, threads: 1 }
     }
 
-    /// Refuses numbers that trace nothing.
+    /// Refuses numbers that trace nothing: finer steps drown in rounding, coarser ones follow no geodesic.
     fn check(&self) -> Result<(), RelativityError> {
         let finite_above = |x: f64, least: f64| x.is_finite() && x > least;
-        expect(finite_above(self.tolerance, 0.0), "tolerance", "a finite number above 0", self.tolerance)?;
+        let (least, most) = TOLERANCES;
+        expect((least..=most).contains(&self.tolerance), "tolerance", "1e-12 to 0.01", self.tolerance)?;
         expect(finite_above(self.far, 0.0), "far distance", "a finite number above 0", self.far)?;
         expect(self.capture >= 0.0, "distance of capture", "at least 0", self.capture)?;
         expect(self.growth > 1.0, "growth at capture", "above 1", self.growth)
@@ -90,7 +94,8 @@ const BEYOND: f64 = 1e-3;
 
 /// Follows rays from events with tangents `k`, `(4)` each, along which the affine parameter grows; the order is kept.
 ///
-/// `progress` is told the number of rays of every block that is done, from any thread.
+/// `progress` is told the number of rays of every block that is done, from any thread. The rays that a model had not ended when it was
+/// interrupted are unfinished.
 ///
 /// # Errors
 /// [`RelativityError`] for choices out of range and what the model refuses other than single states.
@@ -101,16 +106,29 @@ pub fn trace(
     tracing: &Tracing,
     progress: &(dyn Fn(usize) + Sync),
 ) -> Result<Vec<Ray>, RelativityError> {
+    trace_each(model, chart, starts.len(), &|k| starts[k], tracing, progress)
+}
+
+/// The same of so many starts that are made when they are needed.
+pub(super) fn trace_each(
+    model: &dyn EulerLagrange<f64>,
+    chart: &Chart,
+    count: usize,
+    start: &(dyn Fn(usize) -> ([f64; 4], [f64; 4]) + Sync),
+    tracing: &Tracing,
+    progress: &(dyn Fn(usize) + Sync),
+) -> Result<Vec<Ray>, RelativityError> {
     tracing.check()?;
     chart.check(model.coordinates())?;
-    let block = starts.len().div_ceil(BLOCKS.0).clamp(BLOCKS.1, BLOCKS.2);
-    let blocks: Vec<_> = starts.chunks(block).collect();
-    let traced = in_order(&blocks, tracing.threads, |block| {
-        let rays = Batch { model, chart, tracing, terms: Terms::default() }.trace(block);
-        progress(block.len());
+    let block = count.div_ceil(BLOCKS.0).clamp(BLOCKS.1, BLOCKS.2);
+    let blocks: Vec<usize> = (0..count).step_by(block).collect();
+    let traced = in_order(&blocks, tracing.threads, |&first| {
+        let starts: Vec<_> = (first..count.min(first + block)).map(start).collect();
+        let rays = Batch { model, chart, tracing, terms: Terms::default() }.trace(&starts);
+        progress(starts.len());
         rays
     });
-    let mut rays = Vec::with_capacity(starts.len());
+    let mut rays = Vec::with_capacity(count);
     for block in traced {
         rays.extend(block?);
     }
@@ -171,6 +189,14 @@ impl Batch<'_> {
     fn trace(mut self, starts: &[([f64; 4], [f64; 4])]) -> Result<Vec<Ray>, RelativityError> {
         let nowhere = Ended { fate: Fate::Unfinished, steps: 0, q: [f64::NAN; 4], k: [f64::NAN; 4] };
         let mut ended = vec![nowhere; starts.len()];
+        match self.follow(starts, &mut ended) {
+            // The rays that have ended are there, the others are unfinished.
+            Ok(()) | Err(RelativityError::Mechanics(MechanicsError::Interrupted)) => self.finish(&ended),
+            Err(error) => Err(error),
+        }
+    }
+
+    fn follow(&mut self, starts: &[([f64; 4], [f64; 4])], ended: &mut [Ended]) -> Result<(), RelativityError> {
         let (mut q, mut k): (Vec<_>, Vec<_>) = starts.iter().copied().unzip();
         let (mut places, mut tangents) = (Vec::new(), vec![Vec::new(); STAGES]);
         let mut slopes: Vec<Vec<[f64; 4]>> = vec![Vec::new(); STAGES];
@@ -181,7 +207,7 @@ impl Batch<'_> {
             let step = STEP.0 * distance / norm(self.chart.space_of(k));
             moving.push(Moving { index, q, k, a, step, size: norm(k), steps: 0, refused: false });
         }
-        self.sort_out(&mut moving, &mut ended);
+        self.sort_out(&mut moving, ended);
         while !moving.is_empty() {
             moving.iter_mut().for_each(|ray| ray.step = ray.step.min(self.longest(ray)));
             tangents[0].clear();
@@ -224,9 +250,9 @@ impl Batch<'_> {
                 }
                 ray.refused = !(fine && error <= 1.0);
             }
-            self.sort_out(&mut moving, &mut ended);
+            self.sort_out(&mut moving, ended);
         }
-        self.finish(&ended)
+        Ok(())
     }
 
     /// Longest step: in proportion to the distance from the centre, and hardly beyond the distance of the sky.
@@ -267,7 +293,8 @@ impl Batch<'_> {
     fn finish(mut self, ended: &[Ended]) -> Result<Vec<Ray>, RelativityError> {
         let (q, k): (Vec<_>, Vec<_>) = ended.iter().map(|ray| (ray.q, ray.k)).unzip();
         match self.model.terms(q.as_flattened(), k.as_flattened(), Request::MASS_MATRIX, &mut self.terms) {
-            Ok(()) | Err(MechanicsError::Singular { .. } | MechanicsError::NotFinite { .. }) => {}
+            Ok(()) => {}
+            Err(MechanicsError::Singular { .. } | MechanicsError::NotFinite { .. } | MechanicsError::Interrupted) => {}
             Err(error) => return Err(error.into()),
         }
         let metrics = self.terms.mass_matrix.chunks_exact(16).map(Some).chain(std::iter::repeat(None));

@@ -2,7 +2,7 @@
 
 use super::camera::Camera;
 use super::error::RelativityError;
-use super::rays::{Fate, Ray, Tracing, trace};
+use super::rays::{Fate, Ray, Tracing, trace_each};
 use super::tetrad::Tetrad;
 use super::vector::{dot, norm};
 use crate::lagrangian::EulerLagrange;
@@ -31,7 +31,8 @@ pub struct Difference {
 
 /// Follows the ray of the middle of every pixel of a camera.
 ///
-/// `progress` is told the number of pixels of every block that is done, from any thread. The result does not depend on the number of threads.
+/// `progress` is told the number of pixels of every block that is done, from any thread. Pixels that a model had not reached when it was
+/// interrupted are unfinished. The result does not depend on the number of threads.
 ///
 /// # Errors
 /// [`RelativityError`].
@@ -47,8 +48,7 @@ pub fn shadow(
         let middle = camera.direction((pixel % width) as f64 + 0.5, (pixel / width) as f64 + 0.5);
         (tetrad.event, tetrad.ray(middle))
     };
-    let starts: Vec<_> = (0..width * height).map(start).collect();
-    Ok(Shadow { width, height, rays: trace(model, &chart, &starts, tracing, progress)? })
+    Ok(Shadow { width, height, rays: trace_each(model, &chart, width * height, &start, tracing, progress)? })
 }
 
 /// Angle between unit vectors, in rad, right near 0 too.
@@ -62,6 +62,11 @@ impl Shadow {
     /// Share of the pixels that belong to the shadow.
     pub(crate) fn share(&self) -> f64 {
         self.count(|fate| fate == Fate::Captured) as f64 / self.rays.len() as f64
+    }
+
+    /// Number of rays that were followed to an end.
+    pub(crate) fn finished(&self) -> usize {
+        self.rays.len() - self.unfinished()
     }
 
     /// Number of rays that were left unfinished.

@@ -4,9 +4,10 @@ use super::rays::{Fate, trace};
 use super::tetrad::Tetrad;
 use super::vector::{norm, product, times};
 use super::*;
-use crate::lagrangian::{EulerLagrange, HandWritten, Lagrangian, build};
+use crate::lagrangian::{EulerLagrange, HandWritten, Interruptible, Lagrangian, MechanicsError, build};
 use crate::scalar::Real;
 use std::f64::consts::{FRAC_PI_2, PI};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Flat space-time with a sign of every square.
 struct Flat([i8; 4]);
@@ -234,4 +235,35 @@ fn rays_that_do_not_end_are_unfinished() {
         trace(&*model, &camera.chart, &[start, ([0.0, 30.0, 0.0, 0.0], [-1.0, 1.0, 0.0, 0.0])], &tracing, &|_| ());
     let rays = rays.unwrap();
     assert_eq!((rays[0].fate, rays[1].fate), (Fate::Unfinished, Fate::Escaped([1.0, 0.0, 0.0])));
+}
+
+/// The rays of blocks that were followed before a flag was raised have their ends, the others none.
+#[test]
+fn an_interrupted_picture_has_the_rays_that_were_followed() {
+    let model = build::<f64>("schwarzschild-cartesian", &[]).unwrap();
+    let flag = AtomicBool::new(false);
+    let hole = Interruptible::new(&*model, &flag);
+    let camera = Camera { width: 20, height: 20, ..Camera::new(20.0, 1.4) };
+    let tracing = Tracing::of(&camera);
+    let whole = shadow(&hole, &camera, &tracing, &|_| ()).unwrap();
+    let part = shadow(&hole, &camera, &tracing, &|_| flag.store(true, Ordering::Relaxed)).unwrap();
+    assert_eq!((whole.finished(), part.rays.len()), (400, 400));
+    assert!((1..400).contains(&part.finished()), "{}", part.finished());
+    for (a, b) in part.rays.iter().zip(&whole.rays).filter(|(a, _)| a.fate != Fate::Unfinished) {
+        assert_eq!((a.fate, a.steps), (b.fate, b.steps));
+    }
+    assert_eq!(outline(&hole, &camera, &tracing, 4), Err(RelativityError::Mechanics(MechanicsError::Interrupted)));
+}
+
+/// At both ends of the tolerances every ray comes to an end; beyond them nothing is traced.
+#[test]
+fn tolerances_have_ends() {
+    let model = build::<f64>("schwarzschild-cartesian", &[]).unwrap();
+    let camera = Camera { width: 6, height: 6, ..Camera::new(20.0, 1.4) };
+    let of = |tolerance: f64| shadow(&*model, &camera, &Tracing { tolerance, ..Tracing::of(&camera) }, &|_| ());
+    let (fine, coarse) = (of(TOLERANCES.0).unwrap(), of(TOLERANCES.1).unwrap());
+    assert_eq!((fine.unfinished(), coarse.unfinished(), fine.share()), (0, 0, coarse.share()));
+    for wrong in [1e-30, 1e-13, 0.02, 1.0, f64::NAN] {
+        assert!(matches!(of(wrong), Err(RelativityError::Invalid { what: "tolerance", .. })), "{wrong}");
+    }
 }

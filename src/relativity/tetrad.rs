@@ -2,6 +2,7 @@
 
 use super::camera::{Camera, Observer};
 use super::error::RelativityError;
+use super::stationary::depends_on_time;
 use super::vector::{along, dot, lower, product, times};
 use crate::geometry::Metric;
 use crate::lagrangian::{EulerLagrange, Request, Terms};
@@ -18,6 +19,9 @@ pub struct Tetrad {
     camera: Camera,
 }
 
+/// Time of rays that matters, in distances of the camera.
+const SPAN: f64 = 10.0;
+
 impl Tetrad {
     /// The frame of a camera in a metric, by the method of Gram and Schmidt: velocity, forward, right, up.
     ///
@@ -27,6 +31,12 @@ impl Tetrad {
         camera.check()?;
         camera.chart.check(model.coordinates())?;
         let event = camera.event();
+        let centre = camera.chart.vector(0.0, times(0.5, camera.chart.space_of(event)));
+        let mirrored = camera.chart.vector(0.0, times(-1.0, camera.chart.space_of(event)));
+        let points = [event, centre, mirrored].concat();
+        if depends_on_time(model, camera.chart.time, &points, SPAN * camera.distance)? {
+            return Err(RelativityError::DependsOnTime);
+        }
         let mut terms = Terms::default();
         model.terms(&event, &[0.0; 4], Request::MASS_MATRIX, &mut terms)?;
         let found = Metric::new(4, &terms.mass_matrix)?;

@@ -5,8 +5,7 @@ use super::run::adaptive_or_fixed;
 use super::{Force, Integrable, Options, Rollout};
 use crate::lagrangian::EulerLagrange;
 use crate::scalar::Scalar;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use crate::storage::{MOST_THREADS, in_order};
 
 /// Motions of a group; more gain nothing, since products of eight states at a time are as quick per state as any.
 const GROUP: usize = 8;
@@ -73,7 +72,9 @@ fn together<S: Integrable>(
     threads: usize,
 ) -> Vec<Rollout<S>> {
     let groups: Vec<_> = starts.chunks(GROUP).collect();
-    in_order(&groups, threads, |group| roll_group(model, group, options)).into_iter().flatten().collect()
+    // Every motion of a group has a thread.
+    let abreast = threads.min(MOST_THREADS / GROUP);
+    in_order(&groups, abreast, |group| roll_group(model, group, options)).into_iter().flatten().collect()
 }
 
 fn roll_group<S: Integrable>(
@@ -89,37 +90,17 @@ fn roll_group<S: Integrable>(
             .into_iter()
             .zip(starts)
             .map(|(member, start)| {
-                scope.spawn(move || adaptive_or_fixed(&member, start.force, start.q, start.v, options))
+                // Without a thread the member is gone with the closure, and the others do not wait for it.
+                let work = move || adaptive_or_fixed(&member, start.force, start.q, start.v, options);
+                std::thread::Builder::new().spawn_scoped(scope, work)
             })
             .collect();
-        running.into_iter().map(|thread| thread.join().unwrap_or_else(|p| std::panic::resume_unwind(p))).collect()
+        let ended = running.into_iter().zip(starts).map(|(thread, start)| match thread {
+            Ok(thread) => thread.join().unwrap_or_else(|p| std::panic::resume_unwind(p)),
+            Err(_) => adaptive_or_fixed(model, start.force, start.q, start.v, options),
+        });
+        ended.collect()
     })
-}
-
-/// `work` on every item, by so many threads; the results keep the order of the items.
-pub(crate) fn in_order<T: Sync, R: Send>(items: &[T], threads: usize, work: impl Fn(&T) -> R + Sync) -> Vec<R> {
-    let threads = threads.clamp(1, items.len().max(1));
-    if threads == 1 {
-        return items.iter().map(work).collect();
-    }
-    let next = AtomicUsize::new(0);
-    let done = Mutex::new(Vec::with_capacity(items.len()));
-    std::thread::scope(|scope| {
-        for _ in 0..threads {
-            scope.spawn(|| {
-                while let Some((k, item)) = {
-                    let k = next.fetch_add(1, Ordering::Relaxed);
-                    items.get(k).map(|item| (k, item))
-                } {
-                    let result = work(item);
-                    done.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push((k, result));
-                }
-            });
-        }
-    });
-    let mut done = done.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
-    done.sort_by_key(|(k, _)| *k);
-    done.into_iter().map(|(_, result)| result).collect()
 }
 
 #[cfg(test)]

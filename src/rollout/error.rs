@@ -108,8 +108,8 @@ pub enum RolloutError {
         /// Attempts made.
         steps: usize,
     },
-    /// Whoever receives the samples takes no more.
-    #[error("stopped at t = {t} by the receiver of the samples")]
+    /// The receiver of the samples takes no more, or a flag ended the model.
+    #[error("stopped at t = {t}")]
     Stopped {
         /// Time of the last step taken.
         t: f64,

@@ -42,6 +42,7 @@ pub(super) fn into_error(failure: StepFailure, t: f64, state: Vec<f64>, step: f6
         StepFailure::Model(MechanicsError::Singular { condition, .. }) => {
             RolloutError::SingularMass { t, state, condition }
         }
+        StepFailure::Model(MechanicsError::Interrupted) => RolloutError::Stopped { t },
         StepFailure::Model(MechanicsError::Uncertified { .. }) => RolloutError::Uncertified { t, state },
         StepFailure::Model(MechanicsError::NotFinite { what, .. }) => RolloutError::NotFinite { t, state, what },
         StepFailure::NotConverged { iterations, residual } => {

@@ -37,7 +37,6 @@ mod variational;
 
 pub use balance::EnergyBalance;
 pub use driven::Driven;
-pub(crate) use ensemble::in_order;
 pub use ensemble::{Start, rollout_each, rollout_many, rollout_together};
 pub use error::{RolloutError, UnderflowCause};
 pub use force::{Force, SampledForce};

@@ -210,6 +210,17 @@ impl<S: Scalar> Options<S> {
         if self.max_steps == 0 {
             return invalid("max_steps", "must be at least 1".into());
         }
+        if self.method.is_structure_preserving() {
+            let shortest = self.step.map_or(self.dt.abs(), |step| S::min(step, self.dt.abs()));
+            // Rounding aside.
+            let steps = ((self.t_end - self.t0).abs() / shortest).to_f64() * (1.0 - 1e-6);
+            if steps > self.max_steps as f64 {
+                let what = if self.step.is_some_and(|step| step < self.dt.abs()) { "step" } else { "dt" };
+                let problem =
+                    format!("asks for {steps:.3e} steps of {shortest}, at most {} are allowed", self.max_steps);
+                return invalid(what, problem);
+            }
+        }
         match &self.domain {
             Some(domain) if domain.len() != 2 * n => {
                 invalid("domain", format!("expected {} components, found {}", 2 * n, domain.len()))
@@ -253,6 +264,13 @@ mod tests {
         assert_eq!(name(Options { step: Some(0.0), ..good.clone() }), "step");
         assert_eq!(name(Options { step: Some(f64::NAN), ..good.clone() }), "step");
         assert_eq!(name(Options { max_steps: 0, ..good.clone() }), "max_steps");
+        let fixed = Options { method: Method::Gauss4, ..good.clone() };
+        assert!(Options { step: Some(1e-6), ..fixed.clone() }.check(1).is_ok());
+        assert_eq!(name(Options { step: Some(9e-7), ..fixed.clone() }), "step");
+        assert_eq!(name(Options { step: Some(1e-308), ..fixed.clone() }), "step");
+        assert_eq!(name(Options { dt: 1e-7, ..fixed.clone() }), "dt");
+        assert!(Options { dt: 1e-7, ..good.clone() }.check(1).is_ok());
+        assert_eq!(name(Options { max_steps: 9, ..fixed }), "dt");
         assert_eq!(name(Options { domain: Some(Domain::new(vec![None])), ..good.clone() }), "domain");
     }
 

@@ -1,9 +1,12 @@
 //! Settings of multiple shooting.
 
-use crate::configuration::{ConfigError, Faults, OnFailure, Optimizer};
+use crate::configuration::{ConfigError, Faults, MOST_EPOCHS, MOST_RATE, OnFailure, Optimizer};
 use crate::optimizers::{Method, Schedule};
 use crate::training::solver::RateCourse;
 use serde::{Deserialize, Serialize};
+
+/// Samples of a segment and integration steps of it at most.
+pub(crate) const MOST_STEPS: usize = 1 << 16;
 
 /// Choices of a fit through motion. Keys that are not given have their defaults; others are refused.
 ///
@@ -14,7 +17,7 @@ use serde::{Deserialize, Serialize};
 /// | `epochs` | 100 | passes through all segments | 1 to 2^24 |
 /// | `batch` | 16 | segments per update of the weights | 1 to 2^30 |
 /// | `method` | RAdam | update rule of the weights | |
-/// | `rate` | 0.002 | learning rate, falling to 0 by half a cosine | above 0 |
+/// | `rate` | 0.002 | learning rate, falling to 0 by half a cosine | above 0 to 1000 |
 /// | `weight_decay` | 1e-6 | L2 weight decay, added to the gradient | from 0 |
 /// | `clip` | 1 | the gradient's norm is cut to this | above 0 |
 /// | `continuity` | 0.1 | weight of a joint's gap beside one observation | from 0 |
@@ -106,17 +109,17 @@ impl Shooting {
     /// Every value out of range, in the order of the keys.
     pub(crate) fn faults(&self) -> Vec<ConfigError> {
         let mut faults = Faults::default();
-        let within = 2..=1 << 16;
+        let within = 2..=MOST_STEPS;
         let found = self.samples_per_segment.to_string();
         let ok = within.contains(&self.samples_per_segment);
         faults.check(ok, "shooting.samples_per_segment", "2 to 65536 samples", found);
         if let Some(steps) = self.steps {
-            faults.check((1..=1 << 16).contains(&steps), "shooting.steps", "1 to 65536 steps", steps.to_string());
+            faults.check((1..=MOST_STEPS).contains(&steps), "shooting.steps", "1 to 65536 steps", steps.to_string());
         }
-        faults.count(self.epochs, "shooting.epochs", 1 << 24);
+        faults.count(self.epochs, "shooting.epochs", MOST_EPOCHS);
         faults.count(self.batch, "shooting.batch", 1 << 30);
-        let ok = self.rate.is_finite() && self.rate > 0.0;
-        faults.number(self.rate, "shooting.rate", ok, "a positive number");
+        let expected = format!("a number above 0, at most {MOST_RATE}");
+        faults.number(self.rate, "shooting.rate", self.rate > 0.0 && self.rate <= MOST_RATE, expected);
         faults.at_least_zero(self.weight_decay, "shooting.weight_decay");
         faults.number(self.clip, "shooting.clip", self.clip > 0.0, "a positive number");
         faults.at_least_zero(self.continuity, "shooting.continuity");
@@ -124,7 +127,7 @@ impl Shooting {
         faults.number(self.huber, "shooting.huber", self.huber > 0.0, expected);
         let ok = self.start_share > 0.0 && self.start_share <= 1.0;
         faults.number(self.start_share, "shooting.start_share", ok, "a number above 0, at most 1");
-        faults.count(self.curvature_every, "shooting.curvature_every", 1 << 24);
+        faults.count(self.curvature_every, "shooting.curvature_every", MOST_EPOCHS);
         faults.0
     }
 }

@@ -1,4 +1,4 @@
-//! Files read within limits and written whole or not at all; locks of directories; memory that is left.
+//! Files read within limits and written whole or not at all; locks of directories; memory and threads that the machine gives.
 
 #[cfg(feature = "model-files")]
 pub mod container;
@@ -6,10 +6,12 @@ mod files;
 mod lock;
 mod memory;
 mod read;
+mod threads;
 mod write;
 
 pub use files::{Disk, Files};
 pub use lock::{Acquired, DirectoryLock, LockOwner};
 pub use memory::available_memory;
 pub use read::{ReadError, open_regular, read_regular};
+pub(crate) use threads::{MOST_THREADS, in_order};
 pub use write::{Growing, check_target, remove_leftovers, replace, write_atomically, write_whole};

@@ -55,13 +55,19 @@ pub struct Objective<S> {
     shards: Vec<Shard<S>>,
 }
 
-/// Threads for all that a run computes.
+/// Threads for all that a run computes: as many as a batch has parts at most, and fewer where the system starts no more.
 ///
 /// # Errors
-/// [`ThreadsError`].
+/// [`ThreadsError`] if not even one can be started.
 pub(crate) fn threads(count: usize) -> Result<Arc<rayon::ThreadPool>, ThreadsError> {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(count.max(1)).build();
-    pool.map(Arc::new).map_err(|error| ThreadsError { threads: count, problem: error.to_string() })
+    let mut threads = count.clamp(1, SHARDS);
+    loop {
+        match rayon::ThreadPoolBuilder::new().num_threads(threads).build() {
+            Ok(pool) => return Ok(Arc::new(pool)),
+            Err(error) if threads == 1 => return Err(ThreadsError { threads, problem: error.to_string() }),
+            Err(_) => threads /= 2,
+        }
+    }
 }
 
 /// Threads that could not be started.

@@ -3,6 +3,7 @@
 //! The structures are those of a TOML file (`docs/system-files.md`), of the table `[description]` of a configuration and of
 //! the header of a model file.
 
+pub(crate) mod pair;
 mod quantity;
 mod system;
 
@@ -42,10 +43,10 @@ pub struct Description {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub metric: Option<BTreeMap<String, String>>,
     /// Bounds of training states by the names of their columns; the coordinates' own where left out.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty", deserialize_with = "pair::by_name")]
     pub training: BTreeMap<String, [Quantity; 2]>,
     /// The same of the states on which errors are stated.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty", deserialize_with = "pair::by_name")]
     pub validation: BTreeMap<String, [Quantity; 2]>,
     /// Motions on which a model is tried.
     #[serde(default, skip_serializing_if = "TrajectoryDescription::is_empty")]
@@ -62,6 +63,7 @@ pub struct ShellDescription {
     /// Names of the Cartesian coordinates around the centre.
     pub(crate) coordinates: Vec<String>,
     /// Lowest and highest distance from it.
+    #[serde(deserialize_with = "pair::one")]
     pub radius: [Quantity; 2],
     /// Largest rapidity in a local frame; 1 if left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -84,11 +86,11 @@ pub struct CoordinateDescription {
     #[serde(default, skip_serializing_if = "is_false")]
     pub time_like: bool,
     /// Lowest and highest value of interest; one turn for a periodic coordinate if left out.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "pair::optional")]
     pub bounds: Option<[Quantity; 2]>,
     /// The same of the velocity; without them the velocity of the time-like coordinate of a metric follows from
     /// `g(v, v) = -1`.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "pair::optional")]
     pub velocity_bounds: Option<[Quantity; 2]>,
 }
 
@@ -117,7 +119,7 @@ pub struct TrajectoryDescription {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub dt: Option<Quantity>,
     /// Bounds of the starts by columns; the middle half of the validation bounds where left out.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty", deserialize_with = "pair::by_name")]
     pub start: BTreeMap<String, [Quantity; 2]>,
 }
 

@@ -6,7 +6,7 @@ use crate::lagrangian::system::{
     Bounds, Coordinate, LearningAdvice, Parameter, PerSize, Range, ShellAdvice, Size, System, TrajectoryTest,
 };
 use crate::lagrangian::{ExpressionLagrangian, systems};
-use crate::names::unknown;
+use crate::names::{taken_column, unknown};
 use crate::ops::{Binary, Unary};
 use crate::scalar::{Dd, Scalar};
 use std::borrow::Cow;
@@ -136,6 +136,10 @@ impl Description {
                 None => Ok(()),
             }
         };
+        let names: Vec<&str> = self.coordinates.iter().map(|coordinate| coordinate.name.as_str()).collect();
+        if let Some((i, problem)) = taken_column(&names) {
+            return Err(DescriptionError::new(format!("coordinates[{i}].name"), problem));
+        }
         for (i, coordinate) in self.coordinates.iter().enumerate() {
             let key = || format!("coordinates[{i}].name");
             add(key(), &coordinate.name, Meaning::Position(i))?;

@@ -110,6 +110,20 @@ fn finished_runs_are_kept_and_missing_ones_made_again() {
     // The same numbers on another number of threads.
     assert_eq!(read("table.csv"), table);
     assert_eq!(read("liu-tricks-seed0/model.safetensors"), model);
+
+    // A damaged record is named and its run left out; the tables of the others are made.
+    fs::write(folder.join("liu-tricks-seed0/record.json"), &record[..record.len() / 2]).unwrap();
+    let merged = lnn(&["merge", "old-tricks", "--scale", "smoke", "--out", out.path().to_str().unwrap()]);
+    let stderr = String::from_utf8_lossy(&merged.stderr);
+    assert_eq!(merged.status.code(), Some(1), "{stderr}");
+    assert!(stderr.contains("liu-tricks-seed0/record.json: ") && !stderr.contains("another configuration"), "{stderr}");
+    let of_others = String::from_utf8(read("table.csv")).unwrap();
+    let whole = String::from_utf8(table).unwrap();
+    let different = of_others.lines().zip(whole.lines()).filter(|(a, b)| a != b).count();
+    assert!(!merged.stdout.is_empty() && different == 1 && of_others.lines().count() == whole.lines().count());
+    let refused = lnn(&again);
+    let stderr = String::from_utf8_lossy(&refused.stderr);
+    assert!(refused.status.code() == Some(1) && stderr.contains("liu-tricks-seed0/record.json: "), "{stderr}");
 }
 
 #[test]

@@ -279,8 +279,8 @@ fn configurations_are_placed() {
     with("[optimizer]", "[optimizer]\n[optimizer]", &["duplicate key"]);
     with("rate = 0.005", "rate = 1e999999999999", &["c.toml"]);
     // Out of range: with the key.
-    with("rate = 0.005", "rate = -0.003", &["phase[0].rate: expected a positive number, found -0.003"]);
-    with("rate = 0.005", "rate = inf", &["phase[0].rate: expected a positive number, found inf"]);
+    with("rate = 0.005", "rate = -0.003", &["phase[0].rate: expected a number above 0, at most 1000, found -0.003"]);
+    with("rate = 0.005", "rate = inf", &["phase[0].rate: expected a number above 0, at most 1000, found inf"]);
     with("epochs = 1", "epochs = 1099511627776", &["phase[0].epochs", "1099511627776"]);
     with("hidden = [2]", "hidden = [1099511627776]", &["network.hidden[0]", "1099511627776"]);
     with("training = 8", "training = 0", &["data.training", "found 0"]);
@@ -336,7 +336,7 @@ fn numbers_of_the_command_line_have_ranges() {
     for bad in ["nan", "inf", "-inf", "1e999", "", "one"] {
         with("1,2,3,4", &["--t-end", bad, "--dt", "0.5"], &["--t-end", "expected a finite number"]);
         with("1,2,3,4", &["--t-end", "1", "--dt", bad], &["--dt", "expected a finite number above 0"]);
-        with("1,2,3,4", &[&times[..], &["--rtol", bad]].concat(), &["--rtol", "expected a finite number above 0"]);
+        with("1,2,3,4", &[&times[..], &["--rtol", bad]].concat(), &["--rtol", "2e-15"]);
         with("1,2,3,4", &[&times[..], &["--step", bad, "--method", "gauss4"]].concat(), &["--step"]);
         with(&format!("1,2,3,{bad}"), &times, &["--state", "expected a finite number"]);
     }
@@ -349,9 +349,9 @@ fn numbers_of_the_command_line_have_ranges() {
     let zeros = "0,".repeat(50_000) + "0";
     with(&zeros, &times, &["--state: expected 4 numbers", "found 50001"]);
     for bad in ["-1", "0", "1.5", "18446744073709551616"] {
-        lnn(&["evaluate", &model, "--starts", bad]).refused(2, &["--starts", "expected a whole number above 0"]);
-        lnn(&["evaluate", &model, "--threads", bad]).refused(2, &["--threads", "expected a whole number above 0"]);
-        lnn(&["experiment", "scaling", "--seeds", bad]).refused(2, &["--seeds", "expected a whole number above 0"]);
+        lnn(&["evaluate", &model, "--starts", bad]).refused(2, &["--starts", "1000000"]);
+        lnn(&["evaluate", &model, "--threads", bad]).refused(2, &["--threads", "256"]);
+        lnn(&["experiment", "scaling", "--seeds", bad]).refused(2, &["--seeds", "10000"]);
     }
     lnn(&["experiment", "scalnig"]).refused(2, &["scalnig", "scaling"]);
     assert_eq!(folder.names(), ["m"]);

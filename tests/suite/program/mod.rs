@@ -12,6 +12,7 @@ mod forces;
 mod geometry;
 mod hostile;
 mod inspect;
+mod limits;
 mod motion;
 mod overwrite;
 mod physics;

@@ -7,6 +7,7 @@ use lnn::presets::Preset;
 use lnn::storage::Disk;
 use lnn::training::{LATEST, saved};
 use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
 
 /// A training of so many epochs.
 fn configuration(folder: &Folder, epochs: usize) -> String {
@@ -88,6 +89,63 @@ fn a_long_search_says_so_and_ends_at_once() {
     assert!(note.starts_with("note: ") && note.contains(" unknown coefficients at "), "{note}");
     send("-TERM", &child);
     assert_eq!(child.wait().unwrap().code(), Some(143));
+}
+
+/// Ends a command by a signal a second after its start, and gives its exit code, its words and the time that it took to end.
+fn ended(child: Child, signal: &str) -> (Option<i32>, String, Duration) {
+    std::thread::sleep(Duration::from_secs(1));
+    send(signal, &child);
+    let began = Instant::now();
+    let output = child.wait_with_output().unwrap();
+    (output.status.code(), String::from_utf8(output.stderr).unwrap(), began.elapsed())
+}
+
+/// Steps between two samples, pixels of a picture, boxes of a proof: every loop looks at its flag.
+#[test]
+fn every_loop_ends_soon_by_every_signal() {
+    let folder = Folder::new();
+    let (csv, png) = (text(&folder.path("r.csv")), text(&folder.path("s.png")));
+    let state = vec!["0.5"; 40].join(",");
+    let chain =
+        ["rollout", "--system", "n-pendulum", "--param", "n=20", "--state", &state, "--out", &csv, "--overwrite"];
+    let fixed = ["--method", "gauss6", "--t-end", "1", "--dt", "1", "--step", "1e-6"];
+    let adaptive = ["--t-end", "1e6", "--dt", "1e6", "--rtol", "1e-13"];
+    let shadow = ["shadow", "--system", "kerr-cartesian", "--width", "3000", "--threads", "1", "--out", &png];
+    let certify = ["certify", "--system", "n-pendulum", "--seconds", "1000", "--boxes", "100000000", "--threads", "1"];
+    for (signal, code) in [("-INT", 130), ("-TERM", 143), ("-HUP", 129)] {
+        for (arguments, words) in [
+            ([&chain[..], &fixed].concat(), "interrupted at t = "),
+            ([&chain[..], &adaptive].concat(), "interrupted at t = "),
+            (certify.to_vec(), ""),
+        ] {
+            let (found, stderr, took) = ended(start(&arguments), signal);
+            assert_eq!(found, Some(code), "{arguments:?}: {stderr}");
+            assert!(stderr.contains(words) && took < Duration::from_secs(3), "{arguments:?}, {took:?}: {stderr}");
+        }
+    }
+    // The samples up to there are written, and the energy of each.
+    let samples = std::fs::read_to_string(&csv).unwrap();
+    assert!(samples.lines().count() == 2 && !samples.contains("NaN"), "{samples}");
+    let (code, stderr, took) = ended(start(&shadow), "-TERM");
+    assert!(code == Some(143) && took < Duration::from_secs(3), "{took:?}: {stderr}");
+    assert!(stderr.contains("of 9000000 rays") && folder.path("s.png").is_file(), "{stderr}");
+}
+
+/// What a parent ignores stays ignored: nohup.
+#[test]
+fn an_ignored_hangup_ends_nothing() {
+    let folder = Folder::new();
+    let (state, csv) = (vec!["0.5"; 40].join(","), text(&folder.path("r.csv")));
+    let rollout = ["rollout", "--system", "n-pendulum", "--param", "n=20", "--state", &state, "--out", &csv];
+    let more = ["--t-end", "1e6", "--dt", "1e6", "--rtol", "1e-13"];
+    let mut shell = Command::new("sh");
+    shell.args(["-c", "trap '' HUP; exec \"$0\" \"$@\"", env!("CARGO_BIN_EXE_lnn")]).args(rollout).args(more);
+    let mut child = shell.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    std::thread::sleep(Duration::from_millis(500));
+    send("-HUP", &child);
+    std::thread::sleep(Duration::from_millis(500));
+    assert!(child.try_wait().unwrap().is_none());
+    assert_eq!(ended(child, "-TERM").0, Some(143));
 }
 
 /// Files may grow to a certain size, as on a disk that is almost full: model and tables fit, the report with its pictures

@@ -686,5 +686,5 @@ fn bad_numbers_are_named() {
     assert_eq!(message(&good, &weights, &[]), none);
     let settings = Shooting { rate: -1.0, ..quick() };
     let error = fit_motion(&settings, &architecture, weights.clone(), &motion, 1, &Hooks::default()).unwrap_err();
-    assert_eq!(error.to_string(), "shooting.rate: expected a positive number, found -1");
+    assert_eq!(error.to_string(), "shooting.rate: expected a number above 0, at most 1000, found -1");
 }
