@@ -169,7 +169,7 @@ impl Motion {
         let mut waves = || -> Waves {
             (1..=5)
                 .map(|k| {
-                    let frequency = TAU * 0.05 * f64::from(k) * rng.random_range(0.8..1.2);
+                    let frequency = TAU * 0.075 * f64::from(k) * rng.random_range(0.8..1.2);
                     [rng.random_range(0.1..0.3) / f64::from(k).sqrt(), frequency, rng.random_range(0.0..TAU)]
                 })
                 .collect()

@@ -19,6 +19,7 @@ use std::collections::BTreeMap;
 pub struct Quantity {
     name: String,
     learned: f64,
+    /// Ends of the range; not finite where the data leave the quantity open.
     low: f64,
     high: f64,
     determined: &'static str,
@@ -66,7 +67,7 @@ impl Quantity {
         let Estimate { value: learned, low, high } = *estimate;
         let relative = 0.5 * (high - low) / size;
         let determined = WORDS.iter().find(|(most, _)| relative <= *most).map_or("not", |(_, word)| word);
-        let low = if positive { low.max(0.0) } else { low };
+        let low = if positive && low.is_finite() { low.max(0.0) } else { low };
         Self { name, learned, low, high, determined }
     }
 }
@@ -206,7 +207,7 @@ fn withheld(misfit: &BTreeMap<String, f64>, hold_out: &HoldOut, held_out: bool) 
     let Some((name, worst)) = misfit.iter().max_by(|a, b| a.1.total_cmp(b.1)) else {
         return Some(format!("the model is not finite on {motion}"));
     };
-    if worst.is_nan() || *worst > MOST_MISFIT {
+    if *worst > MOST_MISFIT || worst.is_nan() {
         let missed = percent(*worst);
         return Some(format!(
             "on {motion} the model misses {missed} of the acceleration of {name} beyond the error of the data, and a range holds \

@@ -23,6 +23,9 @@
 //! A range reaches two standard deviations to either side of the regression's middle. The regression is of first order: half the
 //! way from the learned value to the middle is one more standard deviation.
 //!
+//! A number of which the data take away less than half of the deviation before them is open: its range would be a belief. So is
+//! `M` along a conserved momentum.
+//!
 //! Without known forces `L` has no unit: quantities are then over the mean `M` of the first coordinate.
 //!
 //! Sources of the method: MacKay, Neural Computation 4 (1992) 448 (Laplace approximation around trained weights), here for
@@ -35,6 +38,8 @@ mod functions;
 mod observed;
 mod posterior;
 mod regression;
+#[cfg(test)]
+mod tests;
 
 pub use constants::constants;
 pub use decay::{Decay, decay};
@@ -50,9 +55,9 @@ use serde::{Deserialize, Serialize};
 pub struct Estimate {
     /// The model's value.
     pub value: f64,
-    /// Lower end of the range, not above the value.
+    /// Lower end of the range, not above the value; infinite where the data leave the number open.
     pub low: f64,
-    /// Upper end of the range, not below the value.
+    /// Upper end of the range, not below the value; infinite where the data leave the number open.
     pub high: f64,
 }
 
@@ -65,6 +70,10 @@ impl Estimate {
     fn about(value: f64, shift: f64, deviation: f64) -> Self {
         let half = RANGE * deviation.hypot(0.5 * shift);
         Self { value, low: value.min(value + shift - half), high: value.max(value + shift + half) }
+    }
+    /// `true` if the data leave the number open: no range can be stated.
+    pub fn is_open(&self) -> bool {
+        self.high.is_infinite()
     }
     /// `true` if a number lies in the range.
     pub fn allows(&self, x: f64) -> bool {
@@ -115,7 +124,7 @@ pub fn determination(model: &dyn EulerLagrange<f64>, periodic: &[bool], observed
         energy: wanted.energy(&posterior, unit.as_ref()),
     };
     let all = result.mass_matrix.iter().chain(&result.friction).chain([&result.energy]);
-    let finite = all.into_iter().all(|e| e.value.is_finite() && e.low.is_finite() && e.high.is_finite());
+    let finite = all.into_iter().all(|e| e.value.is_finite() && !e.low.is_nan() && !e.high.is_nan());
     finite.then_some(result)
 }
 

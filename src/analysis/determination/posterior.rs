@@ -169,6 +169,8 @@ impl Data {
     }
 }
 
+/// Share of the deviation before the data that is left after them, from which on they leave a number open.
+const OPEN: f64 = 0.5;
 /// Fewest states of a group.
 const LEAST: usize = 5;
 
@@ -193,17 +195,25 @@ pub(super) struct Posterior {
 }
 
 impl Posterior {
-    /// Change of a linear function from the learned model to the middle, and its variance.
-    fn middle(&self, slopes: &[f64]) -> (f64, f64) {
-        let count = slopes.len();
-        let middle = dot(slopes, &self.mean);
-        let believed: f64 = self.covariance.chunks_exact(count).map(|row| dot(row, slopes).powi(2)).sum();
-        let noise = jackknife(middle, self.without.iter().map(|sizes| dot(slopes, sizes)));
-        (middle, believed + noise + dot(slopes, &self.bias).powi(2))
+    /// Variance of a linear function that the data leave open: of size before them, and only believed.
+    fn believed(&self, slopes: &[f64]) -> f64 {
+        self.covariance.chunks_exact(slopes.len()).map(|row| dot(row, slopes).powi(2)).sum()
     }
 
-    /// The range of a number whose consistent error is `floor`.
+    /// Change of a linear function from the learned model to the middle, and its variance.
+    fn middle(&self, slopes: &[f64]) -> (f64, f64) {
+        let middle = dot(slopes, &self.mean);
+        let noise = jackknife(middle, self.without.iter().map(|sizes| dot(slopes, sizes)));
+        (middle, self.believed(slopes) + noise + dot(slopes, &self.bias).powi(2))
+    }
+
+    /// The range of a number whose consistent error is `floor`; without ends where it would be what was believed and not what the
+    /// data say.
     pub fn estimate(&self, linear: &Linear, floor: f64) -> Estimate {
+        let before = dot(&linear.slopes, &linear.slopes);
+        if self.believed(&linear.slopes) > OPEN * OPEN * before {
+            return Estimate { value: linear.value, low: f64::NEG_INFINITY, high: f64::INFINITY };
+        }
         let (middle, variance) = self.middle(&linear.slopes);
         Estimate::about(linear.value, middle, variance.sqrt().hypot(floor))
     }

@@ -200,8 +200,10 @@ fn measured_accelerations_and_friction_are_learned() {
         assert_eq!(ranges.len(), if friction.is_empty() { 4 } else { 6 }, "{ranges:?}");
         assert_eq!((&ranges[0]["name"], &found["unit"]), (&"mean M[upper,upper]".into(), &"mean mass of upper".into()));
         for range in ranges {
-            let [low, learned, high] = ["low", "learned", "high"].map(|end| range[end].as_f64().unwrap());
-            assert!(low <= learned && learned <= high, "{range}");
+            let [low, learned, high] = ["low", "learned", "high"].map(|end| range[end].as_f64());
+            // What the data leave open has no range.
+            let holds = low <= learned && learned <= high && low.is_some();
+            assert!(holds || (low.is_none() && high.is_none() && range["determined"] == "not"), "{range}");
         }
         assert!(
             run.stdout.contains("mean M[upper,lower]") && run.stdout.contains("in 19 cases of 20"),
