@@ -3,6 +3,8 @@
 
 pub mod accuracy;
 pub mod damped;
+#[cfg(feature = "cli")]
+pub mod kinds;
 pub mod matrices;
 pub mod nested;
 #[cfg(feature = "cli")]
