@@ -1,16 +1,12 @@
 //! Training and validation, apart by whole trajectories.
 
 use crate::names::counted;
+use crate::random::RngStream;
 use crate::recording::{RecordedTrajectory, Recording};
-use rand::SeedableRng;
 use rand::seq::SliceRandom;
-use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 use std::ops::Range;
 use thiserror::Error;
-
-/// Stream of the generator that chooses trajectories; those of training are numbered from 0.
-const STREAM: u64 = 8;
 
 /// Part of a recording that is held out for validation.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -72,9 +68,7 @@ impl HeldOut {
             return Ok(Self::End { start, gap });
         }
         let mut order: Vec<usize> = (0..recording.tracks.len()).collect();
-        let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        rng.set_stream(STREAM);
-        order.shuffle(&mut rng);
+        order.shuffle(&mut RngStream::HeldOut.generator(seed));
         let mut held = Vec::new();
         let mut count = 0;
         for &track in &order {
