@@ -3,6 +3,7 @@
     python evaluate.py MODEL.safetensors STATES.csv
 
 prints {"lagrangian": L, "momentum": [p]} for every state. The CSV has the model's columns as header, in any order.
+A file whose header has a key or a value that this script does not read is refused by that name.
 """
 
 import csv
@@ -23,27 +24,120 @@ ACTIVATIONS = {
     "quadratic": np.square,
 }
 
+# Every key of a header that is read, or that changes neither L nor p; a list holds the values that are read, None stands for any.
+FORM = {
+    "structure": ["black-box", "mechanical", "metric"],
+    "factor": ["triangle", "rectangle"],
+    "cyclic": None,
+    "even_in_v": None,
+    "learn_alpha": None,
+    "radial": {"coordinates": None, "unit": None},
+}
+ARCHITECTURE = {
+    **dict.fromkeys(["coordinates", "hidden", "alpha", "time_like", "scale", "periodic", "embed_periodic", "dissipation"]),
+    "activation": [*ACTIVATIONS, "quadratic-softplus"],
+    "input_layer": ["none", "dyt"],
+    "form": FORM,
+}
+HEADER = {
+    **dict.fromkeys(["crate_version", "system", "description", "parameters", "columns", "forces", "precision"]),
+    **dict.fromkeys(["position", "velocity", "seed", "validation_loss"]),
+    "format": [1],
+    "architecture": ARCHITECTURE,
+}
 
-def lagrangian(header, tensors, q, v):
-    """L of states q, v of shape (batch, n), in the unit of the network."""
-    net = header["architecture"]
-    scale, features = np.array(net["scale"]), []
-    for i, periodic in enumerate(net["periodic"]):
-        angle = np.mod(q[:, i], 2 * np.pi) if periodic else q[:, i]
-        embedded = periodic and net["embed_periodic"]
-        features += [np.sin(angle), np.cos(angle)] if embedded else [angle / scale[i]]
-    features = np.stack(features + list((v / scale).T), axis=1)
+
+def check(table, keys=HEADER, path=""):
+    """Refuses a header that says what is not read."""
+    for key, value in table.items():
+        if key not in keys:
+            raise ValueError(f"the key {path}{key} is not read by this script")
+        if isinstance(keys[key], dict):
+            for part in value if isinstance(value, list) else [value]:
+                check(part, keys[key], f"{path}{key}.")
+        elif keys[key] is not None and value not in keys[key]:
+            raise ValueError(f"the value of {path}{key}, {json.dumps(value)}, is not read by this script")
+
+
+def form_of(net):
+    """What is known about the Lagrangian beforehand, keys that the file leaves out included."""
+    return {"structure": "black-box", "factor": "triangle", "cyclic": [], "radial": []} | net.get("form", {})
+
+
+def position_features(net, q):
+    """Features made of the coordinates: a list of columns."""
+    form, features = form_of(net), []
+    hidden = set(form["cyclic"]).union(*(group["coordinates"] for group in form["radial"]))
+    for i in (i for i in range(q.shape[1]) if i not in hidden):
+        angle = np.mod(q[:, i], 2 * np.pi) if net["periodic"][i] else q[:, i]
+        embedded = net["periodic"][i] and net["embed_periodic"]
+        features += [np.sin(angle), np.cos(angle)] if embedded else [angle / net["scale"][i]]
+    for group in form["radial"]:
+        x = q[:, group["coordinates"]].T
+        distance = np.sqrt(np.sum(x**2, axis=0))
+        for direction in x / distance:
+            features += [direction * np.log(distance / group["unit"]), direction * group["unit"] / distance]
+    return features
+
+
+def network(net, tensors, features):
+    """Outputs of the network for a list of columns, shape (batch, outputs)."""
     hybrid = net["activation"] == "quadratic-softplus"
     branches = {"branches.0.": "softplus", "branches.1.": "quadratic"} if hybrid else {"": net["activation"]}
-    total = net["alpha"] * np.sum((v / scale) ** 2, axis=1)
+    outputs = 0
     for prefix, activation in branches.items():
-        get, x = lambda name: tensors[prefix + name].astype(float), features
+        get, x = lambda name: tensors[prefix + name].astype(float), np.stack(features, axis=1)
         if net.get("input_layer") == "dyt":
             x = get("dyt.gamma") * np.tanh(get("dyt.alpha") * x) + get("dyt.beta")
         for k in range(len(net["hidden"])):
             x = ACTIVATIONS[activation](x @ get(f"layers.{k}.weight").T + get(f"layers.{k}.bias"))
-        total += (x @ get(f"layers.{len(net['hidden'])}.weight").T)[:, 0]
-    return total
+        last = f"layers.{len(net['hidden'])}."
+        # The output of a black box has no bias.
+        bias = get(last + "bias") if prefix + last + "bias" in tensors else 0
+        outputs = outputs + x @ get(last + "weight").T + bias
+    return outputs
+
+
+def half_form(factor, numbers, v, time):
+    """Half the quadratic form of scaled velocities v, shape (batch, n), from the numbers of its factor."""
+    n, positive = v.shape[1], lambda x: np.logaddexp(0, x) + 1e-3
+    space = n if time is None else n - 1
+    v = v[:, [i for i in range(n) if i != time] + ([] if time is None else [time])]
+    if factor == "triangle":
+        triangle, diagonal = np.zeros((len(v), n, n)), np.arange(n)
+        rows, columns = np.tril_indices(n)
+        triangle[:, rows, columns] = numbers
+        triangle[:, diagonal, diagonal] = positive(triangle[:, diagonal, diagonal])
+        squares = np.einsum("bik,bi->bk", triangle, v) ** 2
+        return (squares[:, :space].sum(axis=1) - squares[:, space:].sum(axis=1)) / 2
+    rectangle, rest = np.split(numbers, [3 * space**2], axis=1)
+    # The shift and the lapse of a time; without one there are neither.
+    moved = v if time is None else v[:, :space] + rest[:, :space] * v[:, space:]
+    lapsed = 0 if time is None else positive(rest[:, space]) * v[:, space]
+    squares = np.einsum("brk,bk->br", rectangle.reshape(-1, 3 * space, space), moved) ** 2
+    return (squares.sum(axis=1) + 1e-6 * np.sum(moved**2, axis=1) - lapsed**2) / 2
+
+
+def lagrangian(header, tensors, q, v):
+    """L of states q, v of shape (batch, n), in the unit of the network."""
+    check(header)
+    net = header["architecture"]
+    form, time = form_of(net), net.get("time_like")
+    positions, scaled = position_features(net, q), v / np.array(net["scale"])
+    if form["structure"] == "metric":
+        return half_form(form["factor"], network(net, tensors, positions), scaled, time)
+    if form["structure"] == "mechanical":
+        outputs, n = network(net, tensors, positions), v.shape[1]
+        count = n * (n + 1) // 2 if form["factor"] == "triangle" else 3 * n**2
+        numbers, potential, vector = np.split(outputs, [count, count + 1], axis=1)
+        # An even Lagrangian has no vector potential.
+        linear = np.sum(vector * scaled, axis=1) if vector.shape[1] else 0
+        return half_form(form["factor"], numbers, scaled, None) - potential[:, 0] + linear
+    at = lambda sign: network(net, tensors, positions + list(sign * scaled.T))[:, 0]
+    output = (at(1) + at(-1)) / 2 if form.get("even_in_v") else at(1)
+    signs = np.where(np.arange(v.shape[1]) == time, -1, 1)
+    alpha = tensors["alpha"].astype(float)[0] if form.get("learn_alpha") else net["alpha"]
+    return output + alpha * np.sum(signs * scaled**2, axis=1)
 
 
 def momentum(header, tensors, q, v):
@@ -71,7 +165,7 @@ def load(path):
     text = json.loads(data[8 : 8 + length])["__metadata__"]["lnn"]
     body = text[: text.rindex(',"checksum"')]
     if body + checksum(body, data) != text:
-        raise ValueError(f"{path}: the checksum is wrong")
+        raise ValueError("the checksum is wrong")
     return json.loads(body + "}"), safetensors.numpy.load(data)
 
 
@@ -95,4 +189,7 @@ def main(model, states):
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    try:
+        main(*sys.argv[1:])
+    except ValueError as error:
+        sys.exit(f"{sys.argv[1]}: {error}")

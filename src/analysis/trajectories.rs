@@ -5,10 +5,10 @@ use super::{
     lyapunov, relative_error, spread, statistics, valid_time, velocity_error,
 };
 use crate::lagrangian::{EulerLagrange, SystemError, SystemInstance};
+use crate::random::RngStream;
 use crate::rollout::{Domain, Integrable, Method, Options, Rollout, RolloutError, Trajectory, rollout_many};
 use crate::scalar::Scalar;
-use rand::{Rng, SeedableRng};
-use rand_chacha::ChaCha8Rng;
+use rand::Rng;
 use serde::{Deserialize, Serialize};
 
 /// Bounds of random starts, in physical units.
@@ -25,7 +25,7 @@ impl StartBox {
     ///
     /// A start depends only on the seed and on the starts before it: more starts extend the list.
     pub fn starts<S: Scalar>(&self, count: usize, seed: u64) -> Vec<(Vec<S>, Vec<S>)> {
-        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let mut random = RngStream::Trajectories.generator(seed);
         let mut draw = |bounds: &[(f64, f64)]| -> Vec<S> {
             bounds.iter().map(|(lower, upper)| S::of_f64(lower + (upper - lower) * random.random::<f64>())).collect()
         };
@@ -356,6 +356,8 @@ mod tests {
         let four = bounds.starts::<f64>(4, 7);
         assert_eq!(bounds.starts::<f64>(6, 7)[..4], four[..]);
         assert_ne!(bounds.starts::<f64>(4, 8), four);
+        // The draws of the initial weights are others.
+        assert_ne!(four[0].0[0], 6.0 * RngStream::Weights.generator(7).random::<f64>());
         assert!(four.iter().all(|(q, v)| (1.0..2.0).contains(&q[1]) && v.iter().all(|v| v.abs() <= 1.0)));
     }
 }

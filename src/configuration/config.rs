@@ -255,7 +255,7 @@ pub enum Known {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Optimizer {
-    /// Adam or RAdam.
+    /// Update rule.
     pub method: Method,
     /// States per step.
     pub batch: usize,

@@ -111,24 +111,16 @@ pub(crate) fn sample_all_until<S: Scalar>(
         let field = format!("phase[{k}].position");
         let bounds = (phase.position.as_slice(), phase.velocity.as_slice());
         let mut rng = RngStream::Training(k).generator(seed);
-        let states = config.data.training;
-        if let Some(shell) = config.data.shell()? {
+        let (states, floor) = (config.data.training, config.data.acceleration_weighting);
+        let set = if let Some(shell) = config.data.shell()? {
             let set = in_shell(system, &shell, (&field, &phase.position), states, (&mut rng, interrupt))?;
-            let set = match config.data.acceleration_weighting {
-                floor if floor > 0.0 => weigh_by_distance(set, system, &shell, floor)?,
-                _ => set,
-            };
-            training.push(set);
-            continue;
-        }
-        let moving = (config.data.trajectory_fraction * states as f64).round() as usize;
-        let drawn = along_motions(system, &field, bounds, &phase.log_uniform, moving, (&mut rng, interrupt))?;
-        let set = fill(drawn, system, &field, bounds, &phase.log_uniform, states, (&mut rng, interrupt))?;
-        let set = if config.data.acceleration_weighting > 0.0 {
-            let (floor, scale) = (config.data.acceleration_weighting, set.physical_scale());
-            Weighting { floor, scale: &scale, errors: &[] }.relative(set)?
+            if floor > 0.0 { weigh_by_distance(set, system, &shell, floor)? } else { set }
         } else {
-            set
+            let moving = (config.data.trajectory_fraction * states as f64).round() as usize;
+            let drawn = along_motions(system, &field, bounds, &phase.log_uniform, moving, (&mut rng, interrupt))?;
+            let set = fill(drawn, system, &field, bounds, &phase.log_uniform, states, (&mut rng, interrupt))?;
+            let scale = set.physical_scale();
+            if floor > 0.0 { Weighting { floor, scale: &scale, errors: &[] }.relative(set)? } else { set }
         };
         let off = config.data.rescaled_fraction;
         let slowed = off > 0.0 && system.constrained_coordinate().is_some();
@@ -203,7 +195,13 @@ mod tests {
 
     #[test]
     fn states_off_the_shell_are_states_of_the_same_motion() {
-        let system = configure::<f64>("ads4-geodesic", &[]).unwrap();
+        for name in ["ads4-geodesic", "schwarzschild-cartesian"] {
+            off_the_shell(name);
+        }
+    }
+
+    fn off_the_shell(name: &str) {
+        let system = configure::<f64>(name, &[]).unwrap();
         let mut config = Preset::Quick.config(&system).unwrap();
         (config.data.training, config.data.validation, config.data.test) = (2000, 10, 10);
         (config.data.rescaled_fraction, config.data.acceleration_weighting) = (0.25, 0.0);

@@ -1,7 +1,7 @@
 //! Holes learned from free fall, and read.
 
 use super::{Experiment, Picture, Reported, Run, slug};
-use crate::configuration::{Config, Regularizer};
+use crate::configuration::Config;
 use crate::lagrangian::{SystemInstance, configure};
 use crate::network::Structure;
 use crate::presets::Preset;
@@ -44,14 +44,14 @@ pub(super) const BLACK_HOLES: Experiment = Experiment {
     pictures: &[Picture::BlackHole],
     reductions: &[],
     runs: || {
-        let time = || "t".to_string();
-        let mut black_box = learned(Preset::Quick, "quick", &hole(HOLES[0])).config;
+        let structured = |name: &str, structure| {
+            let config = Preset::Quick.config_of(&hole(name), structure);
+            config.unwrap_or_else(|| unreachable!("a preset of every system"))
+        };
+        let black_box = structured(HOLES[0], Structure::BlackBox);
         let (optimizer, phase) = (black_box.optimizer.clone(), black_box.phases[0].clone());
-        black_box.take_structure(Structure::BlackBox);
-        black_box.penalty = Regularizer::LorentzianSylvester { lambda: 100.0, time: time() };
-        let spherical = Preset::Quick.config_of(&hole("schwarzschild-geodesic"), Structure::Metric);
-        let mut spherical = spherical.unwrap_or_else(|| unreachable!("a preset of every system"));
-        spherical.network.cyclic = vec![time()];
+        let mut spherical = structured("schwarzschild-geodesic", Structure::Metric);
+        spherical.network.cyclic = vec!["t".to_string()];
         // The same budget.
         spherical.optimizer = optimizer;
         (spherical.phases[0].epochs, spherical.phases[0].t_max) = (phase.epochs, phase.t_max);

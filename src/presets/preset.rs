@@ -33,12 +33,17 @@ impl Preset {
     }
 
     /// The configuration of a system for a Lagrangian of this structure; the presets of our own have other rates where a
-    /// signature cannot be lost and, except around a centre, no weight decay and a higher clip.
+    /// signature cannot be lost and, except around a centre, no weight decay and a higher clip. A black box has states off the
+    /// mass shell, whatever the structure that the preset chooses itself.
     pub(crate) fn config_of(self, system: &SystemInstance<f64>, structure: Structure) -> Option<Config> {
         let mut config = self.config(system)?;
-        match self {
-            Self::Paper => config.take_structure(structure),
-            Self::Quick | Self::Best => take_structure(&mut config, structure, system.system.learning.structure_rate),
+        if self == Self::Paper {
+            config.take_structure(structure);
+            return Some(config);
+        }
+        take_structure(&mut config, structure, system.system.learning.structure_rate);
+        if structure == Structure::BlackBox {
+            config.data.rescaled_fraction = off_shell(system);
         }
         Some(config)
     }
@@ -211,7 +216,7 @@ fn ours(system: &SystemInstance<f64>, size: Size) -> Config {
         training_states(system);
     let phase = phase(size.epochs, RATE, boxes(&bounds.positions), boxes(&bounds.velocities));
     let base = base(system, 60_000, network(size.width));
-    let rescaled_fraction = if system.constrained_coordinate().is_some() { OFF_SHELL } else { 0.0 };
+    let rescaled_fraction = off_shell(system);
     let config = Config {
         data: Data { rescaled_fraction, acceleration_weighting, trajectory_fraction, ..base.data },
         penalty: regularizer(system, PENALTY),
@@ -225,12 +230,18 @@ fn ours(system: &SystemInstance<f64>, size: Size) -> Config {
     }
 }
 
+/// Part of the states of a system off its mass shell, if it has one.
+fn off_shell(system: &SystemInstance<f64>) -> f64 {
+    if system.constrained_coordinate().is_some() { OFF_SHELL } else { 0.0 }
+}
+
 /// Batch and epochs of the presets of our own around a centre, over those elsewhere: more epochs of larger batches cost no more
 /// time and end lower.
 const SHELL_BATCH: usize = 4;
 const SHELL_EPOCHS: usize = 3;
 
-/// The metric of a field around a centre, the same at all times: states in a shell, features of direction and distance.
+/// The metric of a field around a centre, the same at all times: states in a shell, features of direction and distance. No penalty: the
+/// shell may reach inside a horizon, where `g_tt` is positive, which Lorentzian Sylvester forbids.
 fn around_a_centre(mut config: Config, system: &SystemInstance<f64>, shell: ShellAdvice) -> Config {
     let names = system.system.coordinates(system.coordinates);
     let coordinates: Vec<String> = shell.coordinates.iter().map(|&i| names[i].name.to_string()).collect();

@@ -198,7 +198,7 @@ impl<'a> Trainer<'a> {
             return Err(TrainerError::TooFew { found });
         }
         let mut order: Vec<usize> = (0..found).collect();
-        order.shuffle(&mut RngStream::Parts.generator(config.seed));
+        order.shuffle(&mut RngStream::HeldOut.generator(config.seed));
         let part = ((HELD_OUT * found as f64) as usize).max(1);
         let (validation, rest) = order.split_at(part);
         let (test, training) = rest.split_at(part);

@@ -49,23 +49,57 @@ pub enum RngStream {
     Test,
     /// Starts of the trajectory test.
     Trajectories,
-    /// Division of given states into those that are learned from and those that are held out.
-    Parts,
+    /// States at which a Lagrangian is examined.
+    Region,
+    /// Order of the segments of multiple shooting.
+    Segments,
+    /// Trajectories of a recording, or given states, that are held out.
+    HeldOut,
 }
 
 impl RngStream {
     /// The generator of this purpose.
     pub fn generator(self, seed: u64) -> RandomGenerator {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        rng.set_stream(match self {
+        rng.set_stream(self.number());
+        RandomGenerator(rng)
+    }
+
+    /// Number of the stream; every purpose has one of its own.
+    fn number(self) -> u64 {
+        match self {
             Self::Weights => 0,
             Self::Validation => 1,
             Self::Test => 2,
             Self::Trajectories => 3,
-            Self::Parts => 4,
+            Self::Region => 4,
+            Self::Segments => 5,
+            Self::HeldOut => 8,
             Self::Order(phase) => 16 + 2 * phase as u64,
             Self::Training(phase) => 17 + 2 * phase as u64,
-        });
-        RandomGenerator(rng)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn no_two_purposes_share_a_stream() {
+        let phased = (0..100).flat_map(|phase| [RngStream::Order(phase), RngStream::Training(phase)]);
+        let single = [
+            RngStream::Weights,
+            RngStream::Validation,
+            RngStream::Test,
+            RngStream::Trajectories,
+            RngStream::Region,
+            RngStream::Segments,
+            RngStream::HeldOut,
+        ];
+        let streams: Vec<RngStream> = single.into_iter().chain(phased).collect();
+        let first: BTreeSet<u64> = streams.iter().map(|stream| stream.generator(7).next_u64()).collect();
+        assert_eq!(first.len(), streams.len());
     }
 }

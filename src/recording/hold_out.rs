@@ -1,17 +1,13 @@
 //! Training and validation, apart by whole trajectories.
 
 use crate::names::counted;
+use crate::random::RngStream;
 use crate::recording::{RecordedTrajectory, Recording};
-use rand::SeedableRng;
 use rand::seq::SliceRandom;
-use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::ops::Range;
 use thiserror::Error;
-
-/// Stream of the generator that chooses trajectories; those of training are numbered from 0.
-const STREAM: u64 = 8;
 
 /// Part of a recording that is held out for validation.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -90,9 +86,7 @@ impl HeldOut {
         let parts: Vec<Vec<usize>> = parts.into_values().collect();
         let samples = |part: usize| parts[part].iter().map(|track| recording.tracks[*track].len()).sum::<usize>();
         let mut order: Vec<usize> = (0..parts.len()).collect();
-        let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        rng.set_stream(STREAM);
-        order.shuffle(&mut rng);
+        order.shuffle(&mut RngStream::HeldOut.generator(seed));
         let mut held = Vec::new();
         let mut count = 0;
         for &part in &order {

@@ -244,7 +244,7 @@ pub fn resume<S: Scalar>(
         hooks: hooks.clone(),
         saver,
     };
-    let rng = RngStream::Order(0).generator(task.seed);
+    let rng = RngStream::Segments.generator(task.seed);
     let solver = EpochSolver::new(learner, settings.optimizer(), settings.rates(), rng, segments.0).within(run);
     let epochs = run_epochs(solver, problem, task.weights.clone(), underway).map_err(TrainingError::Optimizer)?;
     let Epochs { problem, learner, history, best, cost: validation_loss, seconds, stop, .. } = epochs;

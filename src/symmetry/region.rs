@@ -1,7 +1,7 @@
 //! States drawn from a box.
 
-use rand::{Rng, SeedableRng};
-use rand_chacha::ChaCha8Rng;
+use crate::random::RngStream;
+use rand::Rng;
 
 /// A box of states: `[low, high]` of every coordinate and velocity.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,7 +26,7 @@ impl Region {
         seed: u64,
         mut accept: impl FnMut(&[f64], &mut [f64]) -> bool,
     ) -> (Vec<f64>, Vec<f64>) {
-        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let mut random = RngStream::Region.generator(seed);
         let mut draw = |bounds: &[[f64; 2]]| -> Vec<f64> {
             bounds.iter().map(|[low, high]| low + (high - low) * random.random::<f64>()).collect()
         };

@@ -1,23 +1,9 @@
 //! Model files: a network with everything needed to rebuild it, in one safetensors file.
 //!
-//! Tensors are `layers.K.weight`, shape `(out, in)` row-major, and `layers.K.bias`, shape `(out)`, `K` from 0; the last
-//! layer is linear, has one output and no bias. Numbers are `f32` or `f64`, all of one type. The input features are,
-//! for every coordinate in order, `sin q_i` and `cos q_i` if the coordinate is periodic and embedded and `q_i/s_i` if it
-//! is not, then `v_i/s_i` for every velocity. They are the inputs of layer 0; with the input layer `dyt` those are
-//! `gamma_i tanh(alpha x_i) + beta_i` of the features `x_i`, with the tensors `dyt.alpha`, shape `(1)`, `dyt.gamma` and
-//! `dyt.beta`, shape `(features)`. The network's output plus `alpha |v/s|^2` is the Lagrangian (`alpha` of the header);
-//! with `time_like`, the index of a coordinate from 0, the square of its velocity is taken away, not added.
-//!
-//! The activation `quadratic-softplus` has two such networks, whose outputs add up, with half the widths each: names
-//! start with `branches.0.` (softplus) and `branches.1.` (quadratic).
-//!
-//! A network with a dissipation of `K` units has the tensors `dissipation.gamma`, shape `(K)`, `dissipation.weight`, shape
-//! `(K, F)` over the features `f` of the coordinates, and `dissipation.direction`, shape `(K, n)`:
-//! `D = sum_k softplus(gamma_k + weight_k.f) ln cosh(direction_k.(v/s))`.
-//!
-//! The metadata has the one key `lnn`, a JSON object with the fields of [`Header`] and `checksum`: eight hexadecimal
-//! digits, the CRC-32 (IEEE) of that JSON text up to the comma before `"checksum"`, followed by the bytes of the tensors.
-//! A changed bit anywhere is refused. The same model gives the same bytes.
+//! `docs/model-format.md` describes every tensor and every key, and how `L` follows from them. The metadata have the one key `lnn`, a
+//! JSON object with the fields of [`Header`] and `checksum`: eight hexadecimal digits, the CRC-32 (IEEE) of that JSON text up to
+//! the comma before `"checksum"`, followed by the bytes of the tensors. A changed bit anywhere is refused. The same model gives the
+//! same bytes.
 
 mod header;
 #[cfg(test)]

@@ -6,6 +6,8 @@ pub mod accuracy;
 #[path = "../../../benches/shared/arm.rs"]
 pub mod arm;
 pub mod damped;
+#[cfg(feature = "cli")]
+pub mod kinds;
 pub mod matrices;
 pub mod nested;
 #[cfg(feature = "cli")]

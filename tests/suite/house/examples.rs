@@ -239,10 +239,9 @@ fn the_arms_of_a_real_pendulum_are_rigid() {
 
 #[cfg(feature = "cli")]
 mod python {
-    use crate::common::program::{Folder, lnn};
-    use lnn::network::Layout;
-    use lnn::network::file::{Header, ModelFile};
-    use serde_json::{Value, json};
+    use crate::common::kinds;
+    use crate::common::program::{Folder, lnn, text};
+    use serde_json::Value;
     use std::path::{Path, PathBuf};
     use std::process::{Command, Output};
 
@@ -287,59 +286,89 @@ mod python {
     }
 
     /// Both programs say the same of every state.
-    fn agree(python: &Path, model: &str, states: &str) {
-        let script = at("python/evaluate.py");
-        let theirs = lines(&run(python, &[script.to_str().unwrap(), model, states]));
+    fn agree(theirs: &[Value], model: &str, states: &str) {
         let ours = lnn(&["inspect", "--model", model, "--states", states, "--precision", "f64"]).stdout;
         let ours: Vec<Value> = ours.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
-        assert_eq!((theirs.len(), ours.len()), (4, 4));
-        let all = |name: &str| ours.iter().map(|o| number(&o[name]).abs()).fold(0.0, f64::max);
-        let size = all("lagrangian");
+        assert_eq!((theirs.len(), ours.len()), (4, 4), "{model}: {theirs:?}");
+        let size = ours.iter().map(|o| number(&o["lagrangian"]).abs()).fold(0.0, f64::max);
         for (theirs, ours) in theirs.iter().zip(&ours) {
             let difference = (number(&theirs["lagrangian"]) - number(&ours["lagrangian"])).abs();
-            // Sums of at most 16 terms, three layers: some hundred roundings.
+            // Sums of at most 27 terms, three layers: some hundred roundings.
             assert!(difference <= 1e-13 * size, "{model}: L differs by {difference:e}");
-            for i in 0..2 {
-                let difference = (number(&theirs["momentum"][i]) - number(&ours["momentum"][i])).abs();
+            let momenta = |value: &Value| value["momentum"].as_array().unwrap().iter().map(number).collect::<Vec<_>>();
+            for (theirs, ours) in momenta(theirs).into_iter().zip(momenta(ours)) {
                 // Central differences over 1e-3 of the scale, of order 4.
-                assert!(difference <= 1e-9 * size, "{model}: p differs by {difference:e}");
+                let difference = (theirs - ours).abs();
+                assert!(difference <= 1e-10 * size, "{model}: p differs by {difference:e}");
             }
         }
     }
 
     #[test]
-    fn python_evaluates_every_kind_of_model() {
+    fn python_evaluates_every_kind_of_model_or_names_the_key_that_it_does_not_read() {
         let Some(python) = python() else { return };
         let folder = Folder::new();
-        let states = folder.file("states.csv", STATES);
-        agree(&python, at("data/double_pendulum.safetensors").to_str().unwrap(), &states);
-        let shipped = ModelFile::<f64>::load(&at("data/double_pendulum.safetensors")).unwrap();
-        for (k, (activation, input_layer, embed, precision)) in [
-            ("gelu", "dyt", false, "f64"),
-            ("softplus", "none", true, "f32"),
-            ("x-tanh", "none", true, "f64"),
-            ("tanh", "dyt", true, "f32"),
-            ("quadratic", "none", false, "f32"),
-            ("quadratic-softplus", "dyt", true, "f64"),
-        ]
-        .into_iter()
-        .enumerate()
-        {
-            let mut header = serde_json::to_value(&shipped.header).unwrap();
-            header["precision"] = precision.into();
-            let architecture = &mut header["architecture"];
-            architecture["hidden"] = json!([6, 8]);
-            architecture["activation"] = activation.into();
-            architecture["input_layer"] = input_layer.into();
-            architecture["embed_periodic"] = embed.into();
-            architecture["alpha"] = 0.3.into();
-            let header: Header = serde_json::from_value(header).unwrap();
-            let count = Layout::new(&header.architecture).parameters;
-            let weights = (0..count).map(|k| (1.3 * k as f64).sin() / 2.0).collect();
-            let path = folder.path(&format!("{k}.safetensors"));
-            ModelFile::<f64> { header, weights }.save(&path).unwrap();
-            agree(&python, path.to_str().unwrap(), &states);
+        let states = folder.file("pendulum.csv", STATES);
+        let shipped = at("data/double_pendulum.safetensors");
+        let script = at("python/evaluate.py");
+        let [shipped, script] = [&shipped, &script].map(|path| path.to_str().unwrap());
+        agree(&lines(&run(&python, &[script, shipped, &states])), shipped, &states);
+        let states = folder.file("states.csv", kinds::STATES);
+        let kinds = kinds::kinds();
+        let paths: Vec<String> = (0..kinds.len()).map(|k| text(&folder.path(&format!("{k}.safetensors")))).collect();
+        for ((_, model), path) in kinds.iter().zip(&paths) {
+            model.save(path.as_ref()).unwrap();
         }
+        let each = "import sys, json, evaluate as e
+for model in sys.argv[2:]:
+    try:
+        e.main(model, sys.argv[1])
+    except ValueError as error:
+        print(json.dumps({'refused': str(error)}))";
+        let paths: Vec<&str> = paths.iter().map(String::as_str).collect();
+        let said = lines(&run(&python, &[&["-c", each, &states], &paths[..]].concat()));
+        let (mut said, mut refused) = (&said[..], 0);
+        for ((kind, model), path) in kinds.iter().zip(paths) {
+            if let Some(refusal) = said[0].get("refused") {
+                let named = refusal.as_str().unwrap().contains("architecture.form.known");
+                assert!(named && model.header.architecture.form.known.is_some(), "{kind}: {refusal}");
+                let output = run(&python, &[script, path, &states]);
+                assert!(output.status.code() == Some(1) && output.stdout.is_empty(), "{kind}: {output:?}");
+                (said, refused) = (&said[1..], refused + 1);
+            } else {
+                agree(&said[..4], path, &states);
+                said = &said[4..];
+            }
+        }
+        assert!(said.is_empty() && refused == 8);
+    }
+
+    #[test]
+    fn python_refuses_keys_and_values_of_a_header_that_it_does_not_know() {
+        let Some(python) = python() else { return };
+        let folder = Folder::new();
+        let (_, spacetime) =
+            kinds::kinds().into_iter().find(|(name, _)| name == "rectangle of a spacetime, radial").unwrap();
+        let path = text(&folder.path("model.safetensors"));
+        spacetime.save(path.as_ref()).unwrap();
+        let changed = "import sys, copy, numpy as np, evaluate as e
+header, tensors = e.load(sys.argv[1])
+e.lagrangian(header, tensors, np.ones((1, 3)), np.ones((1, 3)))
+net = lambda h: h['architecture']
+for table, key, value in [
+    (lambda h: h, 'novelty', 0), (net, 'novelty', None), (lambda h: net(h)['form'], 'novelty', False),
+    (lambda h: net(h)['form']['radial'][0], 'novelty', 1.5), (lambda h: h, 'format', 2), (net, 'activation', 'relu'),
+    (net, 'input_layer', 'norm'), (lambda h: net(h)['form'], 'structure', 'new'), (lambda h: net(h)['form'], 'factor', 'new'),
+]:
+    other = copy.deepcopy(header)
+    table(other)[key] = value
+    try:
+        e.lagrangian(other, tensors, np.ones((1, 3)), np.ones((1, 3)))
+        print(key, 'is not refused')
+    except ValueError as error:
+        assert key in str(error), error";
+        let output = run(&python, &["-c", changed, &path]);
+        assert!(output.status.success() && output.stdout.is_empty(), "{output:?}");
     }
 
     #[test]

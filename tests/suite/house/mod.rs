@@ -5,5 +5,7 @@ mod docs;
 mod embedding;
 mod examples;
 mod fuzz_seeds;
+#[cfg(feature = "cli")]
+mod model_format;
 mod rooms;
 mod wording;

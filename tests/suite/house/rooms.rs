@@ -36,8 +36,9 @@ pub(super) const ROOMS: [&str; 27] = [
 ];
 
 /// Crates and the only places that may name them.
-const ADAPTERS: [(&str, &str); 17] = [
+const ADAPTERS: [(&str, &str); 18] = [
     ("pulp", "src/scalar/"),
+    ("rand_chacha", "src/random/"),
     ("xprec", "src/scalar/"),
     ("libm", "src/scalar/"),
     ("faer", "src/linalg/"),

@@ -7,32 +7,32 @@
 //! |---|---|
 //! | a model cut off anywhere, any flipped bit | `network::file::tests::every_prefix_and_every_flipped_bit_is_refused`; `damaged_models_are_refused` for the program |
 //! | trailing bytes, holes and overlaps of tensors | `containers_that_lie_are_refused` |
-//! | length of the description 2^63, gigabytes, deep JSON | `containers_that_lie_are_refused`, `network::file::json::tests` |
+//! | length of the description 2^63, gigabytes, deep JSON | `containers_that_lie_are_refused`, `storage::container::json::tests` |
 //! | tiny file, huge shape | `claims_cost_nothing` |
 //! | duplicate keys, duplicate tensors | `containers_that_lie_are_refused`, `network::file::tests::foreign_newer_and_ambiguous_files_are_named` |
 //! | NaN and infinity in weights | `weights_and_versions_are_checked` |
 //! | code in a file | impossible: numbers and one JSON object; unknown tensors and keys are refused (`network::file::tests::tensors_that_do_not_fit_are_named`, `claims_of_the_description_are_checked`) |
-//! | newer version, other number type, foreign safetensors | `weights_and_versions_are_checked`, `cli::files_that_are_no_models_are_data_errors` |
-//! | CSV: nan, inf, 1e999, empty field | `cli::states::tests::fields_are_checked`, `cli::bad_states_are_data_errors`, `states_are_placed_by_row_and_column` |
+//! | newer version, other number type, foreign safetensors | `weights_and_versions_are_checked`, `inspect::files_that_are_no_models_are_data_errors` |
+//! | CSV: nan, inf, 1e999, empty field | `cli::states::tests::fields_are_checked`, `inspect::bad_states_are_data_errors`, `states_are_placed_by_row_and_column` |
 //! | CSV: ragged, header missing, BOM, CRLF, semicolons, no row, one row | the same |
 //! | recorded motion: all of this, gaps, duplicates, NPY and NPZ | `check::bad_files_are_refused`, `recording::read::tests` |
 //! | sizes 0, 1, 2^40; widths beyond the memory | `sizes_are_refused_before_anything_is_allocated`, `claims_cost_nothing` |
-//! | batch 0, -1; rate NaN, negative, 0; dt 0; t infinite | `configurations_are_placed`, `numbers_of_the_command_line_have_ranges`, `cli_train::wrong_trainings_are_refused_before_anything_is_written` |
+//! | batch 0, -1; rate NaN, negative, 0; dt 0; t infinite | `configurations_are_placed`, `numbers_of_the_command_line_have_ranges`, `train::wrong_trainings_are_refused_before_anything_is_written` |
 //! | configuration: typo, duplicate, wrong type | `configurations_are_placed`, `cli::config::tests` |
-//! | disk full, I/O errors, short and interrupted writes | `faults`: every operation fails once, and for good; `cli_resume::full_disks_and_lost_directories_are_named`; `cli::devices_closed_pipes_and_full_disks_end_quietly_or_with_a_line` for standard output |
+//! | disk full, I/O errors, short and interrupted writes | `faults`: every operation fails once, and for good; `resume::full_disks_and_lost_directories_are_named`; `inspect::devices_closed_pipes_and_full_disks_end_quietly_or_with_a_line` for standard output |
 //! | kill -9 at any moment | `kills::twenty_kills` (200 by `cargo test --test process kills -- --ignored`), `faults::a_checkpoint_is_the_old_one_or_the_new_one` |
-//! | read-only directory, directory as target, no parent | `targets_that_cannot_be_written_are_named`, `cli_train::directories_that_cannot_be_written_are_named_before_training` |
-//! | Ctrl-C, once and twice | `cli_train::ctrl_c_keeps_the_best_model`, `cli_resume::a_second_ctrl_c_ends_at_once` |
+//! | read-only directory, directory as target, no parent | `targets_that_cannot_be_written_are_named`, `train::directories_that_cannot_be_written_are_named_before_training` |
+//! | Ctrl-C, once and twice | `train::ctrl_c_keeps_the_best_model`, `resume::a_second_ctrl_c_ends_at_once` |
 //! | SIGTERM; pictures that do not fit on the disk | `signals` |
 //! | an output that is an input, or there already | `overwrite`, `cli::files::tests`, `cli::place::tests` |
 //! | names that lead out of their directory | `cli::plain_name::tests`, `fit::what_cannot_be_learned_from_is_named` |
 //! | a fit stopped or killed | `fit_resume`, `kills::ten_kills_of_a_fit` |
 //! | reader of a pipe gone | `pipes` |
-//! | two runs, one directory | `cli::folder::tests::one_run_at_a_time`, `cli_resume::a_directory_has_one_run_and_outlives_a_dead_one` |
+//! | two runs, one directory | `cli::folder::tests::one_run_at_a_time`, `resume::a_directory_has_one_run_and_outlives_a_dead_one` |
 //! | loss NaN, singular mass matrix in training | `training::one_number_that_is_not_finite_is_named_and_never_reaches_the_weights`, `a_singular_mass_matrix_stops_or_is_left_out_by_choice` |
-//! | resume under another configuration or other data | `checkpoints::other_configurations_data_and_networks_are_refused`, `cli_resume::a_training_stopped_in_the_middle_comes_to_the_same_end` |
-//! | training that does not fit into memory | `cli_resume::work_that_does_not_fit_into_memory_is_refused`, `memory` |
-//! | roll-out leaves its domain | `cli_train::a_model_moves_and_is_judged` |
+//! | resume under another configuration or other data | `checkpoints::other_configurations_data_and_networks_are_refused`, `resume::a_training_stopped_in_the_middle_comes_to_the_same_end` |
+//! | training that does not fit into memory | `resume::work_that_does_not_fit_into_memory_is_refused`, `memory` |
+//! | roll-out leaves its domain | `train::a_model_moves_and_is_judged` |
 //! | symbolic link, FIFO, /dev/zero, directory as input | `only_regular_files_are_read` |
 //!
 //! The fuzz targets (`fuzz/`) go further with the same readers.

@@ -7,9 +7,9 @@
 //!
 //! | case | held by |
 //! |---|---|
-//! | 1 tails of the activations | `network::activation::tests::tails_f32`, `tails_f64` |
-//! | 2 GELU'' near sqrt 2, GELU''' near 0 | here; `network::activation::tests::gelu_changes_sign_where_it_should` |
-//! | 3 reflections | here; `network::activation::tests::reflections` |
+//! | 1 tails of the activations | `ops::activation::tests::tails_f32`, `tails_f64` |
+//! | 2 GELU'' near sqrt 2, GELU''' near 0 | here; `ops::activation::tests::gelu_changes_sign_where_it_should` |
+//! | 3 reflections | here; `ops::activation::tests::reflections` |
 //! | 4 kinks | here; `forward::tests::kinks_follow_the_convention` |
 //! | 5 one number that is not finite | here; `training::objective::one_number_that_is_not_finite_is_named_and_never_reaches_the_weights`, `mechanics::relativity::speeds_of_light_are_refused` |
 //! | 6 angles of any size | here; `scalar::primitive::tests::angles_of_any_size`, `scalar::lanes::tests::slices_are_accurate` |
@@ -25,7 +25,7 @@
 //! | 16 tiny and vanishing pivots | here; `linalg::inertia_by_pivots_agrees_with_the_spectrum` |
 //! | 17 eigenvectors | `linalg::eigenvectors_are_orthogonal_and_eigenvalues_right` |
 //! | 18 closed forms | here; `linalg::closed_forms_of_small_eigenvalues` |
-//! | 19 repeated eigenvalues | here; `training::penalties::repeated_negative_eigenvalues_have_a_basis_free_gradient`, `autodiff::program::eigenvalue_penalty_is_right_at_repeated_eigenvalues` |
+//! | 19 repeated eigenvalues | here; `training::penalties::repeated_negative_eigenvalues_have_a_basis_free_gradient` |
 //! | 20 gradient of det at singular M | here; `linalg::gradient_of_the_determinant_is_right_where_it_vanishes` |
 //! | 21 minors out of range | here; `training::penalties::products_of_scales_beyond_the_range_keep_sign_and_size`, `linalg::scale_does_not_matter` |
 //! | 22 singular M | here; `linalg::singular_and_foreign_rows_are_reported_and_the_others_solved`, `training::objective::a_singular_mass_matrix_stops_or_is_left_out_by_choice` |

@@ -1,11 +1,16 @@
 //! Every preset of every system: it trains, to the same bits on any number of threads, on states that its motions go through.
 
 use lnn::analysis::StartBox;
-use lnn::configuration::Config;
-use lnn::lagrangian::{configure, systems};
+use lnn::configuration::{Config, Penalty};
+use lnn::data::sample_all;
+use lnn::experiments::{Scale, experiments};
+use lnn::lagrangian::{Request, Terms, configure, systems};
+use lnn::linalg::{SignatureBuffers, has_signature};
+use lnn::network::Structure;
 use lnn::presets::Preset;
 use lnn::rollout::{Options, rollout};
 use lnn::training::{Hooks, run};
+use std::collections::BTreeMap;
 
 /// The preset with few states, few epochs and narrow layers, everything else as it ships.
 fn shrunk(mut config: Config) -> Config {
@@ -64,5 +69,41 @@ fn exact_motions_of_the_ads_test_stay_among_the_training_states() {
                 assert!((1..n).all(|i| inside(v[i], phase.velocity[i])), "{name}: {v:?}");
             }
         }
+    }
+}
+
+/// Every penalty of the presets and of the experiments, once per system, against the exact mass matrices of its training states.
+#[test]
+fn no_penalty_forbids_the_truth() {
+    let built_in = systems().iter().map(|system| configure::<f64>(&system.name, &[]).unwrap());
+    let presets = built_in.flat_map(|system| [Preset::Quick, Preset::Paper].map(|preset| preset.config(&system)));
+    let runs = experiments().iter().flat_map(|experiment| experiment.runs(Scale::Smoke, 1));
+    let configs = presets.flatten().map(shrunk).chain(runs.map(|run| run.config));
+    let chosen = configs.map(|config| (format!("{}, {:?}", config.system, config.penalty().unwrap()), config));
+    let chosen: BTreeMap<String, Config> = chosen.filter(|(_, config)| config.penalty.lambda() > 0.0).collect();
+    for (name, config) in &chosen {
+        let system = config.system().unwrap();
+        let time = match config.penalty().unwrap() {
+            Penalty::Sylvester { time, .. } => time,
+            _ => None,
+        };
+        let (data, _) = sample_all::<f64>(config, &system).unwrap();
+        let (mut terms, mut buffers, n) = (Terms::default(), SignatureBuffers::default(), system.coordinates);
+        for set in &data.training {
+            system.build().unwrap().terms(set.q(), set.v(), Request::MASS_MATRIX, &mut terms).unwrap();
+            let wrong = |mass: &&[f64]| !has_signature(n, mass, time, &mut buffers);
+            assert_eq!(terms.mass_matrix.chunks(n * n).filter(wrong).count(), 0, "{name}");
+        }
+    }
+    assert!(chosen.len() > 20, "{:?}", chosen.keys());
+}
+
+/// On a mass shell alone a metric is not identifiable by a function of velocities.
+#[test]
+fn black_boxes_beside_black_holes_have_states_off_the_shell() {
+    let holes = experiments().iter().find(|experiment| experiment.reads_holes()).unwrap();
+    for run in holes.runs(Scale::Paper, 1) {
+        let black_box = run.config.network.structure == Structure::BlackBox;
+        assert_eq!(run.config.data.rescaled_fraction, if black_box { 0.75 } else { 0.0 }, "{}", run.name);
     }
 }
