@@ -227,12 +227,12 @@ mod tests {
     #[test]
     fn noise_is_taken_out() {
         // 2 a - b = 0; c is no part of it.
-        let columns = vec![vec![1.0, 2.0, 0.5], vec![2.0, 4.0, 1.0], vec![0.0, 1.0, 3.0]];
+        let columns = [vec![1.0, 2.0, 0.5], vec![2.0, 4.0, 1.0], vec![0.0, 1.0, 3.0]];
         let mut vector = vec![2.0 + 1e-6, -1.0, 1e-6];
         polish(&mut vector, &|k| columns[k].clone(), &[1.0; 3], 1e-6);
         assert!((vector[0] / vector[1] + 2.0).abs() < 1e-14 && vector[2] == 0.0, "{vector:?}");
         // An entry that is needed stays, small as it is.
-        let columns = vec![vec![1.0, 0.0, 0.0], vec![1.0, 0.0, 1e-5], vec![0.0, 0.0, 1.0]];
+        let columns = [vec![1.0, 0.0, 0.0], vec![1.0, 0.0, 1e-5], vec![0.0, 0.0, 1.0]];
         let mut vector = vec![1.0, -1.0, 1e-5];
         polish(&mut vector, &|k| columns[k].clone(), &[1.0; 3], 1e-12);
         assert_eq!(vector, [1.0, -1.0, 1e-5]);
