@@ -280,38 +280,42 @@ impl Basis {
 
     /// Number of functions of [`Basis::new`], counted without making them, at most `usize::MAX`.
     pub(crate) fn count(charts: &[Chart], degrees: Degrees) -> usize {
+        Self::number(charts, degrees) as usize
+    }
+
+    /// The number of functions, rounded where it is beyond all use.
+    fn number(charts: &[Chart], degrees: Degrees) -> f64 {
         let most = degrees.of_families();
         let place = |used: [usize; FAMILIES]| (used[0] * (most[1] + 1) + used[1]) * (most[2] + 1) + used[2];
         let all: Vec<[usize; FAMILIES]> = (0..=most[0])
             .flat_map(|a| (0..=most[1]).flat_map(move |b| (0..=most[2]).map(move |c| [a, b, c])))
             .collect();
         // Products of the factors of the coordinates so far, by their degrees.
-        let mut products = vec![0_usize; all.len()];
-        products[0] = 1;
+        let mut products = vec![0.0; all.len()];
+        products[0] = 1.0;
         for chart in charts {
-            let mut longer = vec![0_usize; all.len()];
+            let mut longer = vec![0.0; all.len()];
             for factor in Factor::all(*chart, degrees) {
                 let family = factor.family();
                 for used in &all {
                     let mut sum = *used;
                     sum[family] += factor.degree();
                     if sum[family] <= most[family] {
-                        let count = &mut longer[place(sum)];
-                        *count = count.saturating_add(products[place(*used)]);
+                        longer[place(sum)] += products[place(*used)];
                     }
                 }
             }
             products = longer;
         }
-        products.into_iter().fold(0, usize::saturating_add)
+        products.iter().sum()
     }
 
     /// [`Degrees::usual`] of these charts, or lower ones as far as the unknown coefficients of a search for symmetries would be too
     /// many: first those of powers, then those of harmonics.
     pub(crate) fn usual(names: &[String], charts: &[Chart]) -> (Self, Degrees) {
-        let count = |degrees: &Degrees| Self::count(charts, *degrees);
+        let count = |degrees: &Degrees| Self::number(charts, *degrees);
         let mut degrees = Degrees::usual(charts);
-        while unknowns(names.len(), count(&degrees)) > USUAL {
+        while unknowns(names.len(), count(&degrees) as usize) > USUAL {
             let lower = [
                 Degrees { polynomial: degrees.polynomial.saturating_sub(1), ..degrees },
                 Degrees { trigonometric: degrees.trigonometric.saturating_sub(1), ..degrees },

@@ -80,11 +80,11 @@ fn fitted(
     Some(solution)
 }
 
-/// Coefficient below so many standard errors of its own are tried without.
-const CERTAIN: f64 = 2.0;
+/// What a column explains below so many standard errors is chance.
+const CERTAIN: f64 = 3.0;
 
-/// Coefficients of the least-squares fit of columns to a target, 0 for those that the fit does not know: such below twice their own
-/// standard error are left out and the others fitted again, as long as the rest grows no more than by chance.
+/// Coefficients of the least-squares fit of columns to a target, 0 for those that the fit does not know: columns that explain no more beside
+/// those before them than chance does are left out and the others fitted again, as long as the rest grows no more than by chance.
 pub(crate) fn significant(columns: &[Vec<f64>], target: &[f64], dependent: f64) -> Vec<f64> {
     let mut support: Vec<usize> = (0..columns.len()).collect();
     let mut found: Option<(Vec<f64>, f64)> = None;
@@ -96,28 +96,20 @@ pub(crate) fn significant(columns: &[Vec<f64>], target: &[f64], dependent: f64) 
         plain.remove(&mut rest);
         let free = target.len().saturating_sub(plain.columns.len()).max(1) as f64;
         let square = dot(&rest, &rest) / free;
-        // What was left out explained no more than as many columns of noise do, within two standard errors.
+        // What was left out explained no more than as many columns of noise do.
         let left_out = (columns.len() - support.len()) as f64;
         if let Some((before, least)) = &found
             && square > least * (1.0 + CERTAIN * (2.0 * left_out).sqrt() / free)
         {
             return before.clone();
         }
-        let mut errors = vec![0.0; support.len()];
-        for mix in &plain.mix {
-            mix.iter().zip(&plain.kept).for_each(|(x, k)| errors[*k] += x * x);
-        }
         let solution = plain.given(&along, support.len());
         let mut all = vec![0.0; columns.len()];
         support.iter().zip(&solution).for_each(|(k, x)| all[*k] = *x);
         let least = found.map_or(square, |(_, least)| least);
         found = Some((all.clone(), least));
-        let kept: Vec<usize> = support
-            .iter()
-            .zip(solution.iter().zip(&errors))
-            .filter(|(_, (x, error))| x.abs() > CERTAIN * (square * **error).sqrt())
-            .map(|(k, _)| *k)
-            .collect();
+        let known = plain.kept.iter().zip(&along).filter(|(_, along)| along.abs() > CERTAIN * square.sqrt());
+        let kept: Vec<usize> = known.map(|(k, _)| support[*k]).collect();
         if kept.len() == support.len() {
             return all;
         }

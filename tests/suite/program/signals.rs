@@ -83,7 +83,7 @@ fn a_motion_ends_with_the_samples_that_it_has() {
 #[test]
 fn a_long_search_says_so_and_ends_at_once() {
     use std::io::{BufRead, BufReader};
-    let mut child = start(&["symmetries", "--system", "triple-pendulum", "--basis", "trigonometric:9"]);
+    let mut child = start(&["symmetries", "--system", "triple-pendulum", "--basis", "trigonometric:8"]);
     let mut note = String::new();
     BufReader::new(child.stderr.as_mut().unwrap()).read_line(&mut note).unwrap();
     assert!(note.starts_with("note: ") && note.contains(" unknown coefficients at "), "{note}");
