@@ -206,7 +206,7 @@ fn make(
     Ok(Some(record))
 }
 
-/// What a store holds of a run.
+/// Record of a run in a store, or the reason why there is none.
 #[derive(Debug)]
 pub(crate) enum KeptRecord {
     /// Nothing: the run is not finished.
@@ -230,7 +230,7 @@ fn finished_record(store: &dyn ExperimentStore, run: &Run) -> Result<Option<Reco
     })
 }
 
-/// What a store holds of a run.
+/// Record of a run in a store, or the reason why there is none.
 ///
 /// # Errors
 /// A configuration that TOML cannot hold.
