@@ -160,10 +160,10 @@ fn configured(settled: &Settled, prepared: &PreparedFit<'_>, precision: Precisio
     config.precision = args.precision().into();
     config.network.dissipation = args.friction.or(config.network.dissipation);
     config.network.time_like = args.timelike.clone().or(config.network.time_like);
-    if let Some(time) = &args.timelike {
-        if config.network.structure == Structure::BlackBox {
-            config.penalty = Regularizer::LorentzianSylvester { lambda: config.penalty.lambda(), time: time.clone() };
-        }
+    if let Some(time) = &args.timelike
+        && config.network.structure == Structure::BlackBox
+    {
+        config.penalty = Regularizer::LorentzianSylvester { lambda: config.penalty.lambda(), time: time.clone() };
     }
     args.changes.apply(&mut config, args.timelike.as_deref(), ", name it by --timelike")?;
     let shooting = (targets == Targets::Motion).then(|| shooting_of(settled));

@@ -355,10 +355,7 @@ impl Config {
         let mut faults = Faults(self.faults_with(system.coordinates, true));
         let coordinates = system.system.coordinates(system.coordinates);
         let time = system.system.time_like.and_then(|index| coordinates.get(index)).map(|time| time.name.as_ref());
-        // One that the network names itself is among the faults already.
-        if self.network.time_like.is_none() {
-            self.penalty.time_faults(time, &mut faults);
-        }
+        self.penalty.time_faults(time, &mut faults);
         faults.0
     }
 
@@ -389,7 +386,10 @@ impl Config {
         let lambda = self.penalty.lambda();
         let expected = format!("a number from 0 to {MOST_LAMBDA:e}");
         faults.number(lambda, "penalty.lambda", (0.0..=MOST_LAMBDA).contains(&lambda), expected);
-        self.penalty.time_faults(self.network.time_like.as_deref(), &mut faults);
+        // That of a system that is known is looked at beside the system.
+        if !drawn {
+            self.penalty.time_faults(self.network.time_like.as_deref(), &mut faults);
+        }
         let optimizer = &self.optimizer;
         faults.count(optimizer.batch, "optimizer.batch", MOST_STATES);
         faults.at_least_zero(optimizer.weight_decay, "optimizer.weight_decay");

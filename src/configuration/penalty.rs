@@ -81,7 +81,7 @@ impl Regularizer {
         }
     }
 
-    /// What is wrong with it beside a time-like coordinate: a metric of space-time has a negative eigenvalue.
+    /// Faults of a penalty beside a time-like coordinate, whose metric has a negative eigenvalue.
     pub(super) fn time_faults(&self, time: Option<&str>, faults: &mut Faults) {
         let Some(time) = time.filter(|_| self.lambda() > 0.0) else { return };
         match self {

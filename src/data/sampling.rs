@@ -27,11 +27,8 @@ pub fn sample(
     states: usize,
     rng: &mut impl Rng,
 ) -> Result<Dataset<f64>, SamplingError> {
-    fill(Drawn::default(), system, field, bounds, &[], states, (rng, &NEVER))
+    fill(Drawn::default(), system, field, bounds, &[], states, (rng, &AtomicBool::new(false)))
 }
-
-/// A flag that nobody raises.
-static NEVER: AtomicBool = AtomicBool::new(false);
 
 /// Draws further states, up to `states`, as [`sample`] does.
 fn fill(
@@ -89,7 +86,7 @@ pub fn sample_all<S: Scalar>(
     config: &Config,
     system: &SystemInstance<f64>,
 ) -> Result<(Datasets<S>, Vec<f64>), SamplingError> {
-    sample_all_until(config, system, &NEVER)
+    sample_all_until(config, system, &AtomicBool::new(false))
 }
 
 /// The same, ended by a flag.

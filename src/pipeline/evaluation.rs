@@ -46,7 +46,7 @@ pub struct Evaluation {
     pub(crate) trajectories: Vec<Motion>,
     /// Curvature, symmetries, charges and signature.
     pub(crate) physics: Physics,
-    /// What it is of, in words, if the flag ended it: starts whose motions came to their end, of all; pictures and physics may be missing.
+    /// Starts whose motions came to their end, of all, in words, if the flag ended the evaluation; pictures and physics may be missing then.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub interrupted: Option<String>,
     /// Names of the accelerations' coordinates, with the accelerations' units.

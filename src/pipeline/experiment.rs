@@ -177,7 +177,7 @@ fn make(
     Ok(Some(record))
 }
 
-/// What a directory holds of a run.
+/// Record of a run in a directory, or the reason why there is none.
 #[derive(Debug)]
 pub(crate) enum KeptRecord {
     /// Nothing: the run is not finished.
@@ -201,7 +201,7 @@ fn finished_record(store: &ExperimentDirectory, run: &Run) -> Result<Option<Reco
     })
 }
 
-/// What a directory holds of a run.
+/// Record of a run in a directory, or the reason why there is none.
 ///
 /// # Errors
 /// A configuration that TOML cannot hold.

@@ -173,7 +173,10 @@ fn fit_in<S: Scalar>(
         motion: None,
         threads,
     };
-    let physics = Physics::new(&subject, &|| Ok(()))?;
+    // The flag that ended the training does not end the judgement of its model.
+    let before = watch.is_interrupted();
+    let check = || if watch.is_interrupted() && !before { Err(PipelineError::Interrupted) } else { Ok(()) };
+    let physics = Physics::new(&subject, &check)?;
     let determined = Determined::new(&network, (measured, *targets), &hold_out, threads)?;
     determined.suggestion().iter().for_each(|text| watch.say(Event::Note(text)));
     let found = Found {

@@ -1,19 +1,19 @@
 //! A training from its configuration to files: model, history, summary, pictures, report.
 
 use crate::analysis::{stretches, training_instability};
-use crate::configuration::{Config, Penalty, Phase, Precision};
+use crate::configuration::{Config, Phase, Precision};
 use crate::data::{Datasets, sample_all_until};
 use crate::experiments::{Learned, Outcome, Record};
+use crate::lagrangian::SystemInstance;
 use crate::lagrangian::system::TrajectoryTest;
-use crate::lagrangian::{Request, SystemInstance, Terms};
-use crate::names::{counted, number, percent};
+use crate::names::{counted, number};
 use crate::network::file::{Header, ModelFile};
 use crate::network::{Architecture, Layout, NetworkLagrangian};
 use crate::pipeline::checkpoints::Checkpoints;
 use crate::pipeline::evaluation::{Evaluation, EvaluationOptions, RTOL, STARTS, evaluate};
 use crate::pipeline::model::{all_parameters, trained_on};
 use crate::pipeline::report_files::{ended, history, parameter_table, training_pictures, write_report_and_figures};
-use crate::pipeline::{Event, MODEL, Output, PipelineError, Watch, memory, start};
+use crate::pipeline::{MODEL, Output, PipelineError, Watch, memory, start};
 use crate::report::Report;
 use crate::scalar::Scalar;
 use crate::training::{Epoch, ResumeOptions, Snapshot, StopReason, resume, training_memory};
@@ -133,7 +133,6 @@ fn train_in<S: Scalar>(
     let unscaled = config.architecture(system, vec![1.0; system.coordinates])?;
     memory::require("training", training_memory(config, &unscaled))?;
     let (data, scale) = sample_all_until::<S>(config, system, &watch.interrupt)?;
-    remark_on_penalty(config, system, &data, watch)?;
     let penalty = config.penalty()?;
     let (architecture, before) = begin_shape::<S>(config, system, scale)?;
     let imposed = imposed_velocities(system, &data);
@@ -203,34 +202,6 @@ fn train_in<S: Scalar>(
     let title = system.system.title.to_string();
     let (stop, history, header) = (trained.stop, trained.history, model.header);
     Ok(TrainReport { stop, header, network, history, evaluation, json, record, headline, title })
-}
-
-/// States that are looked at for a remark on the penalty.
-const LOOKED_AT: usize = 512;
-
-/// Says so if the penalty forbids what the exact metric is like at states of the training.
-fn remark_on_penalty<S: Scalar>(
-    config: &Config,
-    system: &SystemInstance<f64>,
-    data: &Datasets<S>,
-    watch: &Watch,
-) -> Result<(), PipelineError> {
-    let Penalty::Sylvester { time: Some(time), .. } = config.penalty()? else { return Ok(()) };
-    let (set, n) = (data.training[0].cast::<f64>(), system.coordinates);
-    let states = set.len().min(LOOKED_AT);
-    let mut terms = Terms::default();
-    // Of a state that fails nothing is known.
-    let _ = system.build()?.terms(&set.q()[..states * n], &set.v()[..states * n], Request::MASS_MATRIX, &mut terms);
-    let wrong = terms.mass_matrix.chunks_exact(n * n).filter(|g| g[time * n + time] > 0.0).count();
-    if wrong > 0 {
-        let name = &system.system.coordinates(n)[time].name;
-        watch.say(Event::Note(&format!(
-            "lorentzian-sylvester penalises g_{name}{name} > 0, as the exact metric has it at {} of the states, inside of a horizon or of \
-             an ergosphere: choose no penalty, or other bounds",
-            percent(wrong as f64 / states as f64)
-        )));
-    }
-    Ok(())
 }
 
 /// A number that a record can hold.

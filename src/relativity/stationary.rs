@@ -31,8 +31,8 @@ pub(crate) fn depends_on_time(
         }
         let (now, then) = terms.mass_matrix.split_at(n * n);
         let most = now.iter().fold(0.0_f64, |most, g| most.max(g.abs()));
-        // What is not finite is no difference, but at a finite place it is.
-        if most.is_finite()
+        // Where the metric is none there is nothing to compare; where it is one, it must be one at all times.
+        if now.iter().all(|g| g.is_finite())
             && then.chunks_exact(n * n).flat_map(|g| g.iter().zip(now)).any(|(g, now)| {
                 let difference = (g - now).abs();
                 difference.is_nan() || difference > ROUNDING * most

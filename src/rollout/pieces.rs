@@ -213,7 +213,7 @@ mod tests {
     #[test]
     fn a_receiver_that_takes_no_more_ends_the_motion() {
         for method in [Method::Dopri5, Method::Gauss4] {
-            let options = Options { method, ..Options::new(1e4, 0.001) };
+            let options = Options { method, ..Options::new(1e3, 0.001) };
             let (trajectory, pieces, ending) = joined(&*oscillator(), &options, 2);
             assert_eq!((trajectory.len(), pieces, ending.samples), (2 * CHUNK, 2, 2 * CHUNK));
             assert!(matches!(ending.stop, Some(RolloutError::Stopped { t }) if t < 5.0), "{:?}", ending.stop);

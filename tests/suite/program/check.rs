@@ -220,7 +220,7 @@ fn contradicting_arguments_are_refused() {
     refused(&["--coords", "x", "--periodic", "z"], "unknown coordinate \"z\"");
     refused(&["--coords", "x", "--units", "x=parsec"], "unknown unit \"parsec\"");
     refused(&["--coords", "x", "--units", "xdeg"], "COLUMN=UNIT");
-    refused(&["--coords", "x", "--rate", "0"], "above 0");
+    refused(&["--coords", "x", "--rate", "0"], "--rate");
     refused(&["--coords", "x", "--rate", "5", "--time", "t"], "--rate");
 }
 

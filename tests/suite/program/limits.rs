@@ -14,10 +14,14 @@ fn bounded(arguments: &[&str]) -> Run {
     Run::of(Command::new("sh").args(["-c", script, env!("CARGO_BIN_EXE_lnn")]).args(arguments).env_remove("LNN_LOG"))
 }
 
+/// Values of a physical parameter: large ones that are physical make a motion fast, which takes the steps that are allowed.
+const PARAMETERS: [&str; 5] = ["0", "-1", "1e308", "1e-308", "nan"];
+
 /// Runs an option with every value, in place of its own where `base` has it; a result, a refusal of the argument or a failure of the data
 /// are the ends that are allowed.
 fn every_value(base: &[&str], option: &str, form: &dyn Fn(&str) -> String) {
-    for value in VALUES.map(form) {
+    let values = if option == "--param" { &PARAMETERS[..] } else { &VALUES };
+    for value in values.iter().map(|value| form(value)) {
         let given = base.iter().position(|word| *word == option);
         let (before, after) = given.map_or((base, &[][..]), |at| (&base[..at], &base[at + 2..]));
         let joined = format!("{option}={value}");
@@ -273,11 +277,12 @@ fn numbers_of_system_files_are_bounded() {
     let folder = Folder::new();
     let out = text(&folder.path("out"));
     let small = folder.file("small.toml", "[data]\ntraining = 64\nvalidation = 16\ntest = 16\n");
-    let usual = [("k", "1"), ("high", "1"), ("fast", "1"), ("t_end", "2"), ("dt", "0.1")];
+    let usual: [(&str, &str); 5] = [("k", "1"), ("high", "1"), ("fast", "1"), ("t_end", "2"), ("dt", "0.1")];
     for (changed, _) in usual {
-        for value in VALUES {
+        let values = if changed == "k" { &PARAMETERS[..] } else { &VALUES };
+        for value in values {
             let of = |key: &str| {
-                usual.iter().find(|(k, _)| *k == key).map_or("", |(_, v)| if key == changed { value } else { v })
+                usual.iter().find(|(k, _)| *k == key).map_or("", |(_, v)| if key == changed { *value } else { *v })
             };
             let system = format!(
                 "name = \"own\"\nlagrangian = \"x_dot^2/2 - k*x^2/2\"\n[parameters]\nk = \"{}\"\n[[coordinates]]\nname = \"x\"\n\

@@ -110,7 +110,7 @@ fn every_loop_ends_soon_by_every_signal() {
         ["rollout", "--system", "n-pendulum", "--param", "n=20", "--state", &state, "--out", &csv, "--overwrite"];
     let fixed = ["--method", "gauss6", "--t-end", "1", "--dt", "1", "--step", "1e-6"];
     let adaptive = ["--t-end", "1e6", "--dt", "1e6", "--rtol", "1e-13"];
-    let shadow = ["shadow", "--system", "kerr-cartesian", "--width", "3000", "--threads", "1", "--out", &png];
+    let shadow = ["shadow", "--system", "kerr-cartesian", "--width", "1200", "--threads", "1", "--out", &png];
     let certify = ["certify", "--system", "n-pendulum", "--seconds", "1000", "--boxes", "100000000", "--threads", "1"];
     for (signal, code) in [("-INT", 130), ("-TERM", 143), ("-HUP", 129)] {
         for (arguments, words) in [
@@ -128,7 +128,7 @@ fn every_loop_ends_soon_by_every_signal() {
     assert!(samples.lines().count() == 2 && !samples.contains("NaN"), "{samples}");
     let (code, stderr, took) = ended(start(&shadow), "-TERM");
     assert!(code == Some(143) && took < Duration::from_secs(3), "{took:?}: {stderr}");
-    assert!(stderr.contains("of 9000000 rays") && folder.path("s.png").is_file(), "{stderr}");
+    assert!(stderr.contains("of 1440000 rays") && folder.path("s.png").is_file(), "{stderr}");
 }
 
 /// What a parent ignores stays ignored: nohup.
