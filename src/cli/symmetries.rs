@@ -200,7 +200,7 @@ const MOST: usize = 1300;
 const BEYOND: usize = 5;
 
 /// Unknown coefficients squared times states from which a search takes some seconds.
-const LONG: f64 = 1e10;
+const LONG: f64 = 3e9;
 
 /// Says so before a long search, which is silent.
 fn announce(unknowns: usize, points: usize, quadratic: bool) {

@@ -86,11 +86,11 @@ impl FromStr for Degrees {
     }
 }
 
-/// Unknown coefficients of a search, at most: a minute or two.
+/// Unknown coefficients of a search, at most.
 pub(crate) const MOST_UNKNOWNS: usize = 4000;
 /// Unknown coefficients of a search over a basis that nobody asked for, at most: seconds.
 const USUAL: usize = 1300;
-/// Unknown coefficients times states, at most; a search holds about eight times as many numbers, two gigabytes.
+/// Unknown coefficients times states, at most; a search holds up to about eight times as many numbers, two gigabytes.
 const MOST_NUMBERS: usize = MOST_UNKNOWNS * 2 * MOST_UNKNOWNS;
 /// Highest degree of a family.
 const MOST: usize = 12;
