@@ -165,7 +165,7 @@ fn pendulum<S: Scalar>(c: &mut Criterion) {
 
 /// Lagrangian of the double pendulum with unit masses and lengths.
 fn lagrangian<R: Real>(q: [R; 2], v: [R; 2]) -> R {
-    let g = R::from_f64(9.81);
+    let g = R::of(9.81);
     v[0].sqr() + R::half() * v[1].sqr() + v[0] * v[1] * (q[0] - q[1]).cos() + g * (R::two() * q[0].cos() + q[1].cos())
 }
 

@@ -3,12 +3,12 @@
 //! A batch is row-major, `(batch, n)`; a nalgebra matrix is column-major. A matrix with one state per column therefore is
 //! a batch as it lies in memory, and a symmetric mass matrix is the same in both orders: nothing is transposed.
 
-use lnn::lagrangian::{EulerLagrange, HandWritten, Request, Terms, systems::double_pendulum::DoublePendulum};
+use lnn::lagrangian::{EulerLagrange, Mechanics, Request, Terms, systems::double_pendulum::DoublePendulum};
 use nalgebra::{DMatrix, DMatrixView, SMatrix, SVector};
 
 pub fn main() -> Result<(), Box<dyn std::error::Error>> {
     let (m1, m2, l1, l2) = (1.2, 0.7, 0.9, 1.1);
-    let model = HandWritten::new(DoublePendulum, vec![m1, m2, l1, l2, 9.81]);
+    let model = Mechanics::new(DoublePendulum, vec![m1, m2, l1, l2, 9.81]);
     let mut terms = Terms::default();
 
     // One state of fixed size: M, and the acceleration by nalgebra's own solver.

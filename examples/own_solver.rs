@@ -2,7 +2,7 @@
 //!
 //! Energy and horizontal momentum are conserved; both are compared with their values at the start.
 
-use lnn::lagrangian::{EulerLagrange, HandWritten, Lagrangian, MechanicsError, Request, Terms};
+use lnn::lagrangian::{EulerLagrange, Mechanics, Lagrangian, MechanicsError, Request, Terms};
 use lnn::scalar::Real;
 use nalgebra::SVector;
 use ode_solvers::{Dopri5, System};
@@ -45,7 +45,7 @@ impl System<f64, SVector<f64, 4>> for Motion<'_> {
 }
 
 pub fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let model = HandWritten::new(CartAndPendulum, vec![1.5, 0.6, 0.9, 9.81]);
+    let model = Mechanics::new(CartAndPendulum, vec![1.5, 0.6, 0.9, 9.81]);
     let failure = RefCell::new(None);
     let motion = Motion { model: &model, terms: RefCell::default(), failure: &failure };
     let start = SVector::from([0.0, 2.5, 0.3, 0.0]);

@@ -7,7 +7,7 @@
 //! measured motion  recording::Recording ─┐
 //! states with a    data::Dataset  ───┼─► training::train ─► network::NetworkLagrangian ◄─► network::file::ModelFile
 //! closed form      data::sample   ───┘                               │
-//! L written down   lagrangian::Lagrangian ─► lagrangian::HandWritten ────┤
+//! L written down   lagrangian::Lagrangian ─► lagrangian::Mechanics ────┤
 //!                                                                        ▼
 //!                                                       lagrangian::EulerLagrange: L, p, M, a, E of a batch
 //!                                                                        │
@@ -55,7 +55,7 @@
 //! # Terms of a Lagrangian
 //!
 //! ```
-//! use lnn::lagrangian::{EulerLagrange, HandWritten, Lagrangian, Request, Terms};
+//! use lnn::lagrangian::{EulerLagrange, Mechanics, Lagrangian, Request, Terms};
 //! use lnn::scalar::Real;
 //!
 //! struct SpringPendulum; // q = (length in m, angle in rad); m, k, rest length, g
@@ -67,7 +67,7 @@
 //!     }
 //! }
 //!
-//! let model = HandWritten::new(SpringPendulum, vec![0.5, 20.0, 1.0, 9.81]);
+//! let model = Mechanics::new(SpringPendulum, vec![0.5, 20.0, 1.0, 9.81]);
 //! let mut terms = Terms::default(); // reused: later calls allocate nothing
 //! let (q, v) = ([1.2, 0.0, 1.5, 0.3], [0.0, 2.0, 1.0, 0.0]); // two states
 //! model.terms(&q, &v, Request::MASS_MATRIX | Request::ACCELERATION, &mut terms)?;
@@ -141,79 +141,46 @@
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 
-pub(crate) mod names;
-
 pub mod prelude;
 
-pub mod scalar;
-
-#[doc(hidden)]
-pub mod storage;
-
-pub mod random;
-
-#[doc(hidden)]
-pub mod ops;
-
-pub mod forward;
-
-pub mod linalg;
-
-pub mod tape;
-
+mod numerics;
+mod support;
+mod mechanics;
 #[cfg(feature = "data")]
-pub mod recording;
+mod learning;
+mod physics;
+#[cfg(feature = "training")]
+mod app;
 
-pub mod lagrangian;
-
-pub mod geometry;
-
-pub mod network;
-
-pub mod certificate;
+// Users need not know the floors.
+pub use numerics::{forward, linalg, random, scalar, tape};
+#[doc(hidden)]
+pub use numerics::ops;
+pub(crate) use support::names;
+#[doc(hidden)]
+pub use support::storage;
+pub use mechanics::{lagrangian, network};
 #[cfg(feature = "rollout")]
-pub mod symmetry;
-
+pub use mechanics::rollout;
+#[cfg(feature = "data")]
+pub use learning::recording;
+#[cfg(feature = "training")]
+pub use learning::{configuration, data, optimizers, presets, shooting, training};
+pub use physics::{certificate, geometry};
 #[cfg(feature = "rollout")]
-pub mod relativity;
-
+pub use physics::{relativity, symmetry};
 #[cfg(feature = "training")]
-pub mod optimizers;
-
+pub use physics::analysis;
 #[cfg(feature = "training")]
-pub mod configuration;
-
-#[cfg(feature = "training")]
-pub mod data;
-
-#[cfg(feature = "training")]
-pub mod training;
-
-#[cfg(feature = "training")]
-pub mod shooting;
-
-#[cfg(feature = "training")]
-pub mod presets;
-
-#[cfg(feature = "rollout")]
-pub mod rollout;
-
-#[cfg(feature = "training")]
-pub mod analysis;
-
-#[cfg(feature = "training")]
-pub mod experiments;
-
+pub use app::experiments;
 #[cfg(feature = "plot")]
 #[doc(hidden)]
-pub mod report;
-
+pub use app::report;
 #[cfg(feature = "pipeline")]
-pub mod pipeline;
-
+pub use app::pipeline;
 #[cfg(feature = "cli")]
 #[doc(hidden)]
-pub mod cli;
+pub use app::cli;
 
 #[cfg(all(any(doc, doctest), feature = "cli"))]
 #[cfg(any(doc, doctest))]

@@ -8,7 +8,7 @@ use super::Scale;
 use lnn::analysis::{Determination, Estimate, Observed, constants, determination};
 use lnn::configuration::{Config, Known, Penalty};
 use lnn::data::{PrepareOptions, RecordingSplit};
-use lnn::lagrangian::{EulerLagrange, HandWritten, Lagrangian, MechanicsError, Request, Terms};
+use lnn::lagrangian::{EulerLagrange, Mechanics, Lagrangian, MechanicsError, Request, Terms};
 use lnn::linalg::Workspace;
 use lnn::network::{Initialization, NetworkLagrangian};
 use lnn::random::{RandomGenerator, RngStream};
@@ -90,7 +90,7 @@ pub struct Case {
 }
 
 fn cart_pendulum() -> Box<dyn EulerLagrange<f64>> {
-    Box::new(HandWritten::new(CartPendulum, vec![1.0, 0.3, 0.5, 9.81]))
+    Box::new(Mechanics::new(CartPendulum, vec![1.0, 0.3, 0.5, 9.81]))
 }
 
 fn cart_start(rng: &mut RandomGenerator) -> [Vec<f64>; 2] {
@@ -122,7 +122,7 @@ pub const CASES: [Case; 5] = [
     },
     Case {
         name: "pendulum with a known force",
-        exact: || Box::new(HandWritten::new(Pendulum, vec![0.5, 9.81])),
+        exact: || Box::new(Mechanics::new(Pendulum, vec![0.5, 9.81])),
         periodic: &[true],
         friction: &[0.05],
         forced: true,
@@ -132,7 +132,7 @@ pub const CASES: [Case; 5] = [
     },
     Case {
         name: "planet",
-        exact: || Box::new(HandWritten::new(Planet, vec![])),
+        exact: || Box::new(Mechanics::new(Planet, vec![])),
         periodic: &[false, true],
         friction: &[],
         forced: false,
@@ -145,7 +145,7 @@ pub const CASES: [Case; 5] = [
     },
     Case {
         name: "two pendula",
-        exact: || Box::new(HandWritten::new(TwoPendula, vec![9.81])),
+        exact: || Box::new(Mechanics::new(TwoPendula, vec![9.81])),
         periodic: &[true, true],
         friction: &[0.2, 0.1],
         forced: false,

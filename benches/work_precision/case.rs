@@ -87,9 +87,9 @@ impl ScalarFunction for OfWeights<'_> {
         let total = states.fold(R::zero(), |total, ((q, v), target)| {
             let terms = reference(&case.architecture, weights, &constant(q), &constant(v));
             let force: Vec<R> = terms.g.iter().zip(&terms.c).map(|(&g, &c)| g - c).collect();
-            let scaled = constant(target).into_iter().map(|t| t / R::from_f64(REACH));
+            let scaled = constant(target).into_iter().map(|t| t / R::of(REACH));
             solve(n, &terms.m, &force).into_iter().zip(scaled).fold(total, |sum, (a, t)| sum + (a - t).abs())
         });
-        total / R::from_f64((2 * n * case.batch) as f64)
+        total / R::of((2 * n * case.batch) as f64)
     }
 }

@@ -6,7 +6,7 @@ use super::differences::{Differences, Displaced, Order};
 use super::options::Options;
 use super::timing::{Stopwatch, Timing};
 use lnn::configuration::Penalty;
-use lnn::lagrangian::{EulerLagrange, HandWritten, Request, Terms};
+use lnn::lagrangian::{EulerLagrange, Mechanics, Request, Terms};
 use lnn::linalg::Workspace;
 use lnn::scalar::{Dd, Real, Scalar};
 use lnn::tape::{gradient, hessian};
@@ -90,7 +90,7 @@ impl Bench<'_> {
 
     pub fn nested<S: Scalar>(&mut self) -> Result<(), String> {
         let weights = cast(&self.case.weights);
-        self.motion::<S>("nested", &HandWritten::new(self.case.architecture.clone(), weights));
+        self.motion::<S>("nested", &Mechanics::new(self.case.architecture.clone(), weights));
         Ok(())
     }
 

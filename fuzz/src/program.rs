@@ -64,7 +64,7 @@ impl Expression {
 }
 
 fn apply<T: Real>(operation: &Operation, a: T, b: T, c: T) -> T {
-    let number = T::from_f64(operation.number);
+    let number = T::of(operation.number);
     match operation.code % 40 {
         0 | 1 => a + b,
         2 | 3 => a - b,

@@ -6,7 +6,7 @@
 mod autodiff;
 mod common;
 mod geometry;
-mod house;
+mod repo;
 mod linalg;
 mod mechanics;
 mod network;

@@ -46,10 +46,10 @@ impl Lagrangian for Expression {
             let (a, b) = (all[node.a % all.len()], all[node.b % all.len()]);
             let above = |x: R| x.sqr() + R::one();
             // Away from 1, where the logarithm would tell the rounding of the sum.
-            let around = |x: R| x.tanh() + R::from_f64(2.5);
+            let around = |x: R| x.tanh() + R::of(2.5);
             let next = match node.kind % KINDS {
                 0 => a + b,
-                1 => a - b * R::from_f64(0.7),
+                1 => a - b * R::of(0.7),
                 2 | 3 => a * b,
                 4 => a / above(b),
                 5 => a.sin() + b.cos(),
@@ -64,7 +64,7 @@ impl Lagrangian for Expression {
                 14 => a.gelu() - b.softplus(),
                 15 => a.x_tanh() + b.ln_cosh(),
                 16 => a.tanh().powi(3),
-                17 => -a.min(R::from_f64(0.4)),
+                17 => -a.min(R::of(0.4)),
                 _ => {
                     let from = LOOSE + number % 2 * LAYER;
                     let x = [a.sin(), b, all[(node.a + 1) % all.len()]];
@@ -74,7 +74,7 @@ impl Lagrangian for Expression {
                 }
             };
             // Large numbers would make every comparison one of the largest.
-            all.push(next.tanh() + next * R::from_f64(0.01));
+            all.push(next.tanh() + next * R::of(0.01));
         }
         let kinetic = v.iter().fold(R::zero(), |sum, &v| sum + v * v);
         all[all.len() - self.nodes.len().min(3)..].iter().fold(kinetic, |sum, &x| sum + x)
@@ -104,7 +104,7 @@ impl<L: Lagrangian> ScalarFunction for Coefficients<'_, L> {
         let mut sum = R::zero();
         for state in 0..q.len() / n {
             let physical = |x: &[R]| -> Vec<R> {
-                x[state * n..][..n].iter().zip(self.scale).map(|(&x, &s)| x * R::from_f64(s)).collect()
+                x[state * n..][..n].iter().zip(self.scale).map(|(&x, &s)| x * R::of(s)).collect()
             };
             let r = reference_of(self.system, self.scale, parameters, &physical(q), &physical(v));
             for i in 0..n {

@@ -289,7 +289,7 @@ fn dead_branch_gives_no_nan() {
 fn constants_are_not_recorded() {
     let tape = Tape::<f64>::new();
     let x = tape.variable(2.0);
-    let c = Var::from_f64(3.0);
+    let c = Var::of(3.0);
     let _ = (c * c + c).sin().sqrt().powf(c).atan2(c).select(c, c);
     assert_eq!(tape.statistics().nodes, 1);
     let y = x + c - c;
@@ -297,7 +297,7 @@ fn constants_are_not_recorded() {
     let zero = x * Var::zero();
     assert_eq!((zero.id(), tape.statistics().nodes), (0, 1));
     // 0 * inf is not a constant: NaN must not vanish.
-    let infinite = x * Var::from_f64(f64::INFINITY);
+    let infinite = x * Var::of(f64::INFINITY);
     assert!((infinite * Var::zero()).value().is_nan());
     let mut adjoints = Adjoints::new();
     tape.reverse(zero, &mut adjoints).unwrap();
@@ -309,8 +309,8 @@ fn functions_of_one_variable_are_not_recorded() {
     let tape = Tape::<f64>::new();
     let mut adjoints = Adjoints::new();
     let x = tape.variable(0.5);
-    let scaled = Var::from_f64(3.0) - x * Var::from_f64(4.0);
-    let y = -(scaled.sqr() / Var::from_f64(2.0)).exp();
+    let scaled = Var::of(3.0) - x * Var::of(4.0);
+    let y = -(scaled.sqr() / Var::of(2.0)).exp();
     assert_eq!((y.id(), tape.statistics().nodes), (x.id(), 1));
     // d/dx -exp((3 - 4x)^2 / 2) = 4 (3 - 4x) exp((3 - 4x)^2 / 2).
     tape.reverse(y, &mut adjoints).unwrap();

@@ -23,7 +23,7 @@ pub fn reference<T: Real>(architecture: &Architecture, weights: &[T], q: &[T], v
 pub fn reference_of<T: Real>(system: &impl Lagrangian, scale: &[f64], weights: &[T], q: &[T], v: &[T]) -> Reference<T> {
     let n = scale.len();
     let weights: Vec<HyperDual<T>> = weights.iter().map(|&w| HyperDual::lift(w)).collect();
-    let scale = |i: usize| T::from_f64(scale[i]);
+    let scale = |i: usize| T::of(scale[i]);
     // Second derivative along two scaled directions, each a list of (index in (q, v), component).
     let jet = |s: &[(usize, T)], t: &[(usize, T)]| -> HyperDual<T> {
         let part = |direction: &[(usize, T)], k: usize| {

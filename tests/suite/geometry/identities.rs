@@ -5,7 +5,7 @@ use super::spaces::dd;
 use crate::common::properties;
 use lnn::forward::HyperDual;
 use lnn::geometry::{Geometry, geometries};
-use lnn::lagrangian::{EulerLagrange, HandWritten, Lagrangian, MechanicsError, Request, Terms};
+use lnn::lagrangian::{EulerLagrange, Mechanics, Lagrangian, MechanicsError, Request, Terms};
 use lnn::scalar::{Dd, Real, Scalar};
 use lnn::tape::VectorFunction;
 use proptest::prelude::*;
@@ -21,12 +21,12 @@ struct Random {
 
 impl Random {
     fn wave<R: Real>(&self, k: usize, q: &[R]) -> R {
-        let weight = |i: usize| R::from_f64((self.seed + 1.7 * (k * self.n + i) as f64).sin());
-        q.iter().enumerate().fold(R::from_f64(0.3 * k as f64), |sum, (i, &q)| sum + weight(i) * q)
+        let weight = |i: usize| R::of((self.seed + 1.7 * (k * self.n + i) as f64).sin());
+        q.iter().enumerate().fold(R::of(0.3 * k as f64), |sum, (i, &q)| sum + weight(i) * q)
     }
     /// The coordinates `q` and their velocities.
     fn unbent<R: Real>(&self, y: &[R], v: &[R]) -> (Vec<R>, Vec<R>) {
-        let bend = R::from_f64(self.bend / 4.0);
+        let bend = R::of(self.bend / 4.0);
         let next = |i: usize| (i + 1) % self.n;
         let q = (0..self.n).map(|i| y[i] + bend * y[next(i)].sin()).collect();
         (q, (0..self.n).map(|i| v[i] + bend * y[next(i)].cos() * v[next(i)]).collect())
@@ -42,7 +42,7 @@ impl Lagrangian for Random {
         let mut sum = -self.wave(n * n, &q).cos();
         for k in 0..n {
             let along = (0..n).fold(R::zero(), |sum, i| {
-                let small = R::from_f64(0.4 / n as f64) * self.wave(i * n + k, &q).sin();
+                let small = R::of(0.4 / n as f64) * self.wave(i * n + k, &q).sin();
                 sum + v[i] * if i == k { R::one() + small } else { small }
             });
             let square = along * along * R::half();
@@ -57,7 +57,7 @@ fn point<S: Scalar>(n: usize, seed: f64) -> Vec<S> {
 }
 
 fn at(random: &Random, q: &[Dd]) -> Geometry<Dd> {
-    let model = HandWritten::new(random.clone(), Vec::new());
+    let model = Mechanics::new(random.clone(), Vec::new());
     geometries(&model, q, &vec![dd(0.0); q.len()]).unwrap().remove(0).unwrap()
 }
 
@@ -93,7 +93,7 @@ proptest! {
         let n = random.n;
         let q: Vec<f64> = point(n, random.seed);
         let v: Vec<f64> = point(n, random.seed + 1.0);
-        let model = HandWritten::new(random.clone(), Vec::new());
+        let model = Mechanics::new(random.clone(), Vec::new());
         let jet = &model.metric_jets(&q, &v).unwrap()[0];
         let zero = HyperDual::lift(0.0);
         let unit = |on: bool| if on { 1.0 } else { 0.0 };
@@ -221,7 +221,7 @@ fn a_constant_field_has_no_covariant_derivative() {
         }
     }
     let q = [1.5, 0.7];
-    let found = geometries(&HandWritten::new(Plane, Vec::new()), &q, &[0.0; 2]).unwrap().remove(0).unwrap();
+    let found = geometries(&Mechanics::new(Plane, Vec::new()), &q, &[0.0; 2]).unwrap().remove(0).unwrap();
     let derivative = found.connection.covariant_derivative_of(&Eastward, &q).unwrap();
     assert!(derivative.iter().all(|x: &f64| x.abs() < 1e-15), "{derivative:?}");
     // Along the angle the plain components do change.
@@ -234,14 +234,14 @@ fn a_constant_field_has_no_covariant_derivative() {
 fn many_coordinates_are_taken_in_groups() {
     let random = Random { n: 11, lorentzian: true, bend: 1.0, seed: 0.3 };
     let (n, q) = (random.n, point::<f64>(11, 0.4));
-    let model = HandWritten::new(random.clone(), Vec::new());
+    let model = Mechanics::new(random.clone(), Vec::new());
     let jet = &model.metric_jets(&q, &vec![0.0; n]).unwrap()[0];
     let mut terms = Terms::default();
     model.terms(&q, &vec![0.0; n], Request::MASS_MATRIX, &mut terms).unwrap();
     let close = |a: f64, b: f64| (a - b).abs() < 1e-13;
     assert!(jet.metric.iter().zip(&terms.mass_matrix).all(|(&a, &b)| close(a, b)));
     let wide: Vec<Dd> = q.iter().map(|&x| dd(x)).collect();
-    let judge = HandWritten::new(random, Vec::new());
+    let judge = Mechanics::new(random, Vec::new());
     let slope = difference(&wide, 9, |q| judge.metric_jets(q, &vec![dd(0.0); n]).unwrap().remove(0).first);
     for (k, slope) in slope.iter().enumerate() {
         assert!(close(jet.second[9 * n.pow(3) + k], slope.to_f64()), "{k}");
@@ -261,7 +261,7 @@ fn velocities_and_branches() {
             -(R::one() - v[0].sqr()).sqrt()
         }
     }
-    let free = HandWritten::new(Free, Vec::new());
+    let free = Mechanics::new(Free, Vec::new());
     for (v, exact) in [(0.0, 1.0), (0.6, 0.8f64.powi(-3))] {
         let found = geometries(&free, &[0.0], &[v]).unwrap().remove(0).unwrap();
         assert!((found.metric.components[0] - exact).abs() < 1e-15);
@@ -275,6 +275,6 @@ fn velocities_and_branches() {
             if q[0].primal() > R::Scalar::of_f64(0.0) { v[0].sqr() } else { v[0].sqr() * R::half() }
         }
     }
-    let refused = HandWritten::new(Branch, Vec::new()).metric_jets(&[1.0f64], &[0.0]);
+    let refused = Mechanics::new(Branch, Vec::new()).metric_jets(&[1.0f64], &[0.0]);
     assert!(matches!(refused, Err(MechanicsError::Derivatives { .. })));
 }

@@ -147,7 +147,7 @@ fn a_formula_alone_is_a_lagrangian() {
     let error = ExpressionLagrangian::new(&["x"], &["k"], "x_dot^2/2 - K*x^2/2").unwrap_err();
     assert_eq!(error.to_string(), "column 13: unknown name \"K\", did you mean \"k\"?");
     let oscillator = ExpressionLagrangian::new(&["x"], &["k"], "x_dot^2/2 - k*x^2/2").unwrap();
-    let oscillator = lnn::lagrangian::HandWritten::new(oscillator, vec![3.0]);
+    let oscillator = lnn::lagrangian::Mechanics::new(oscillator, vec![3.0]);
     let mut terms = Terms::default();
     oscillator.terms(&[2.0], &[0.5], Request::ALL, &mut terms).unwrap();
     assert_eq!((terms.acceleration[0], terms.energy[0]), (-6.0, 6.125));

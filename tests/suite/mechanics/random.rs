@@ -2,7 +2,7 @@
 
 use crate::common::properties;
 use lnn::forward::{Dual, HyperDual};
-use lnn::lagrangian::{EulerLagrange, HandWritten, Lagrangian, Request, Terms};
+use lnn::lagrangian::{EulerLagrange, Mechanics, Lagrangian, Request, Terms};
 use lnn::linalg::{self, Inertia, Workspace};
 use lnn::scalar::{Dd, Real, Scalar};
 use proptest::prelude::*;
@@ -30,7 +30,7 @@ impl Smooth {
     /// Phase of wave `k`.
     fn phase<R: Real>(&self, k: usize, q: &[R]) -> R {
         let wave = &self.waves[k * (self.n + 1)..];
-        q.iter().zip(wave).fold(R::from_f64(wave[self.n]), |sum, (&q, &w)| sum + R::from_f64(w) * q)
+        q.iter().zip(wave).fold(R::of(wave[self.n]), |sum, (&q, &w)| sum + R::of(w) * q)
     }
     fn eta<R: Real>(&self, k: usize) -> R {
         if self.lorentzian && k == 0 { -R::one() } else { R::one() }
@@ -39,7 +39,7 @@ impl Smooth {
         let n = self.n;
         (0..n * n)
             .map(|k| {
-                let small = R::from_f64(0.3 / n as f64) * self.phase(k, q).sin();
+                let small = R::of(0.3 / n as f64) * self.phase(k, q).sin();
                 if k % (n + 1) == 0 { R::one() + small } else { small }
             })
             .collect()
@@ -49,7 +49,7 @@ impl Smooth {
         let n = self.n;
         let b = self.frame(q);
         let db = |k: usize, i: usize, j: usize| {
-            let wave = R::from_f64(0.3 / n as f64 * self.waves[(i * n + j) * (n + 1) + k]);
+            let wave = R::of(0.3 / n as f64 * self.waves[(i * n + j) * (n + 1) + k]);
             wave * self.phase(i * n + j, q).cos()
         };
         let (mut g, mut dg) = (vec![R::zero(); n * n], vec![R::zero(); n * n * n]);
@@ -70,10 +70,10 @@ impl Smooth {
     fn closed<R: Real>(&self, q: &[R], v: &[R]) -> (Vec<R>, Vec<R>, Vec<R>) {
         let n = self.n;
         let (mut m, dg) = self.metric(q);
-        let wave = |k: usize, i: usize| R::from_f64(self.waves[k * (n + 1) + i]);
+        let wave = |k: usize, i: usize| R::of(self.waves[k * (n + 1) + i]);
         let (mut force, mut momentum_drift) = (vec![R::zero(); n], vec![R::zero(); n]);
         for k in 0..n {
-            m[k * n + k] += R::from_f64(12.0 * self.quartic) * v[k].sqr();
+            m[k * n + k] += R::of(12.0 * self.quartic) * v[k].sqr();
             force[k] += wave(n * n + n, k) * self.phase(n * n + n, q).sin();
             for i in 0..n {
                 let slope = wave(n * n + i, k) * self.phase(n * n + i, q).cos();
@@ -101,12 +101,12 @@ impl Lagrangian for Smooth {
         for l in 0..n {
             let speed = (0..n).fold(R::zero(), |s, i| s + b[i * n + l] * v[i]);
             sum += R::half() * self.eta::<R>(l) * speed.sqr();
-            sum += self.phase(n * n + l, q).sin() * v[l] + R::from_f64(self.quartic) * v[l].sqr().sqr();
+            sum += self.phase(n * n + l, q).sin() * v[l] + R::of(self.quartic) * v[l].sqr().sqr();
         }
-        sum = R::from_f64(self.scale) * sum;
+        sum = R::of(self.scale) * sum;
         if self.gauge {
             let wave = &self.waves[(n * n + n + 1) * (n + 1)..];
-            let rate = v.iter().zip(wave).fold(R::zero(), |s, (&v, &w)| s + R::from_f64(w) * v);
+            let rate = v.iter().zip(wave).fold(R::zero(), |s, (&v, &w)| s + R::of(w) * v);
             sum += self.phase(n * n + n + 1, q).cos() * rate;
         }
         sum
@@ -121,7 +121,7 @@ fn state(n: usize, seed: u64) -> (Vec<f64>, Vec<f64>) {
 
 fn terms<S: Scalar>(system: &Smooth, q: &[S], v: &[S]) -> Terms<S> {
     let mut terms = Terms::default();
-    HandWritten::new(system.clone(), Vec::new()).terms(q, v, Request::ALL, &mut terms).unwrap();
+    Mechanics::new(system.clone(), Vec::new()).terms(q, v, Request::ALL, &mut terms).unwrap();
     terms
 }
 

@@ -2,7 +2,7 @@
 
 use crate::common::accuracy::{cast, configure, input_conditions, outputs, random_state, recast};
 use lnn::lagrangian::system::{Bounds, System};
-use lnn::lagrangian::{self, EulerLagrange, HandWritten, Lagrangian, MechanicsError, Request, SystemInstance, Terms};
+use lnn::lagrangian::{self, EulerLagrange, Mechanics, Lagrangian, MechanicsError, Request, SystemInstance, Terms};
 use lnn::linalg::{self, Inertia};
 use lnn::rollout::{Options, rollout};
 use lnn::scalar::{Dd, Real, Scalar};
@@ -280,7 +280,7 @@ impl Lagrangian for Polar {
 #[test]
 fn kepler_moves_alike_in_both_charts() {
     let mut rng = ChaCha8Rng::seed_from_u64(23);
-    let polar = HandWritten::new(Polar, vec![2.5]);
+    let polar = Mechanics::new(Polar, vec![2.5]);
     let cartesian = configure::<f64>("kepler", &[("mu", "2.5")]).build().unwrap();
     for _ in 0..200 {
         let mut draw = |low: f64, high: f64| rng.random_range(low..high);

@@ -3,7 +3,7 @@
 use lnn::configuration::Penalty;
 use lnn::data::Dataset;
 use lnn::lagrangian::systems::double_pendulum::DoublePendulum;
-use lnn::lagrangian::{EulerLagrange, HandWritten, Request, Terms, configure};
+use lnn::lagrangian::{EulerLagrange, Mechanics, Request, Terms, configure};
 use lnn::network::{
     ActivationChoice, Architecture, Form, Initialization, InputLayer, NetworkLagrangian, initial_weights,
 };
@@ -28,8 +28,8 @@ fn floats<S: Scalar>(x: &[S]) -> Vec<f64> {
     x.iter().map(|x| x.to_f64()).collect()
 }
 
-fn double_pendulum<S: Scalar>() -> HandWritten<DoublePendulum, S> {
-    HandWritten::new(DoublePendulum, configure("double-pendulum", &[]).unwrap().parameters)
+fn double_pendulum<S: Scalar>() -> Mechanics<DoublePendulum, S> {
+    Mechanics::new(DoublePendulum, configure("double-pendulum", &[]).unwrap().parameters)
 }
 
 /// Accelerations of any model.

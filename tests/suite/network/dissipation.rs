@@ -133,7 +133,7 @@ struct Along<'a, S> {
 impl<S: Scalar> ScalarFunction for Along<'_, S> {
     fn eval<R: Real>(&self, x: &[R]) -> R {
         let n = self.architecture.coordinates;
-        let scale = |k: usize| R::from_f64(self.architecture.scale[k % n]);
+        let scale = |k: usize| R::of(self.architecture.scale[k % n]);
         let (weights, states) = x.split_at(self.weights);
         let (q, v) = states.split_at(self.u.len());
         let weights: Vec<HyperDual<R>> = weights.iter().map(|&w| HyperDual::lift(w)).collect();

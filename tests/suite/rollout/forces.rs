@@ -3,7 +3,7 @@
 use crate::common::damped;
 use lnn::lagrangian::systems::double_pendulum::DoublePendulum;
 use lnn::lagrangian::systems::harmonic_oscillator::HarmonicOscillator;
-use lnn::lagrangian::{EulerLagrange, HandWritten, Lagrangian, Request, Terms, inverse_dynamics};
+use lnn::lagrangian::{EulerLagrange, Mechanics, Lagrangian, Request, Terms, inverse_dynamics};
 use lnn::rollout::{
     Driven, Force, Integrable, Method, Options, Rollout, RolloutError, SampledForce, Start, rollout, rollout_each,
 };
@@ -23,18 +23,18 @@ impl Lagrangian for Mass {
     }
 }
 
-fn mass<S: Scalar>() -> HandWritten<Mass, S> {
-    HandWritten::new(Mass, Vec::new())
+fn mass<S: Scalar>() -> Mechanics<Mass, S> {
+    Mechanics::new(Mass, Vec::new())
 }
 
 /// `q'' = -q`.
-fn oscillator<S: Scalar>() -> HandWritten<HarmonicOscillator, S> {
-    HandWritten::new(HarmonicOscillator, vec![S::of_f64(1.0); 2])
+fn oscillator<S: Scalar>() -> Mechanics<HarmonicOscillator, S> {
+    Mechanics::new(HarmonicOscillator, vec![S::of_f64(1.0); 2])
 }
 
 /// Two rods of 1 m and 1 kg.
-fn pendulum<S: Scalar>(gravity: f64) -> HandWritten<DoublePendulum, S> {
-    HandWritten::new(DoublePendulum, [1.0, 1.0, 1.0, 1.0, gravity].map(S::of_f64).to_vec())
+fn pendulum<S: Scalar>(gravity: f64) -> Mechanics<DoublePendulum, S> {
+    Mechanics::new(DoublePendulum, [1.0, 1.0, 1.0, 1.0, gravity].map(S::of_f64).to_vec())
 }
 
 /// Their weight as torques.
@@ -224,7 +224,7 @@ fn ensembles_take_a_force_each() {
     let start = |k: usize| Start { q: &q, v: &v, force: (k > 0).then(|| &forces[k] as &dyn Force<f64>) };
     let starts: Vec<Start<'_, f64>> = (0..11).map(start).collect();
     let options = Options::new(1.0, 0.1);
-    struct Wide(HandWritten<DoublePendulum, f64>);
+    struct Wide(Mechanics<DoublePendulum, f64>);
     impl EulerLagrange<f64> for Wide {
         fn coordinates(&self) -> usize {
             2

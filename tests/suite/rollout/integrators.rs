@@ -5,7 +5,7 @@
 
 use lnn::lagrangian::systems::double_pendulum::DoublePendulum;
 use lnn::lagrangian::systems::spring_pendulum::SpringPendulum;
-use lnn::lagrangian::{EulerLagrange, HandWritten, Lagrangian, Request, Terms, configure};
+use lnn::lagrangian::{EulerLagrange, Mechanics, Lagrangian, Request, Terms, configure};
 use lnn::rollout::{Domain, Method, Options, Rollout, RolloutError, rollout, rollout_fixed};
 use lnn::scalar::{Dd, Real, Scalar};
 use std::time::Instant;
@@ -56,7 +56,7 @@ impl Lagrangian for Pair {
     }
     fn lagrangian<R: Real>(&self, _: &[R], q: &[R], v: &[R]) -> R {
         let d = (q[0] - q[1]).sqr();
-        R::half() * (v[0].sqr() + R::from_f64(3.0) * v[1].sqr()) - R::half() * d - R::ratio(1, 4) * d.sqr()
+        R::half() * (v[0].sqr() + R::of(3.0) * v[1].sqr()) - R::half() * d - R::ratio(1, 4) * d.sqr()
     }
 }
 
@@ -73,16 +73,16 @@ impl Lagrangian for Magnetic {
     }
 }
 
-fn plain<S: Scalar, L: Lagrangian>(system: L) -> HandWritten<L, S> {
-    HandWritten::new(system, Vec::new())
+fn plain<S: Scalar, L: Lagrangian>(system: L) -> Mechanics<L, S> {
+    Mechanics::new(system, Vec::new())
 }
 
-fn double_pendulum<S: Scalar>() -> HandWritten<DoublePendulum, S> {
-    HandWritten::new(DoublePendulum, configure("double-pendulum", &[]).unwrap().parameters)
+fn double_pendulum<S: Scalar>() -> Mechanics<DoublePendulum, S> {
+    Mechanics::new(DoublePendulum, configure("double-pendulum", &[]).unwrap().parameters)
 }
 
-fn spring_pendulum<S: Scalar>() -> HandWritten<SpringPendulum, S> {
-    HandWritten::new(SpringPendulum, configure("spring-pendulum", &[]).unwrap().parameters)
+fn spring_pendulum<S: Scalar>() -> Mechanics<SpringPendulum, S> {
+    Mechanics::new(SpringPendulum, configure("spring-pendulum", &[]).unwrap().parameters)
 }
 
 fn fixed<S: Scalar>(method: Method, t_end: f64, dt: f64, step: f64) -> Options<S> {

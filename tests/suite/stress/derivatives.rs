@@ -107,7 +107,7 @@ impl VectorFunction for Layers {
     }
     fn eval<R: Real>(&self, x: &[R], out: &mut [R]) {
         let (first, second) = self.weights.split_at(HIDDEN * self.n);
-        let times = |row: &[f64], x: &[R]| row.iter().zip(x).fold(R::zero(), |s, (&w, &x)| s + R::from_f64(w) * x);
+        let times = |row: &[f64], x: &[R]| row.iter().zip(x).fold(R::zero(), |s, (&w, &x)| s + R::of(w) * x);
         let hidden: Vec<R> = first.chunks(self.n).map(|row| times(row, x).tanh()).collect();
         out.iter_mut().zip(second.chunks(HIDDEN)).for_each(|(y, row)| *y = times(row, &hidden));
     }

@@ -9,7 +9,7 @@ use lnn::lagrangian::systems::{
     double_pendulum::DoublePendulum, henon_heiles::HenonHeiles, kepler::Kepler, spring_pendulum::SpringPendulum,
     triple_pendulum::TriplePendulum,
 };
-use lnn::lagrangian::{self, EulerLagrange, HandWritten, Lagrangian, Request, Terms};
+use lnn::lagrangian::{self, EulerLagrange, Mechanics, Lagrangian, Request, Terms};
 use lnn::linalg::{self, Workspace};
 use lnn::network::{ActivationChoice, NetworkLagrangian};
 use lnn::scalar::{Dd, Real, Scalar};
@@ -115,8 +115,8 @@ impl<L: Lagrangian> Lagrangian for Gauged<L> {
         self.system.coordinates()
     }
     fn lagrangian<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> R {
-        let along = |x: &[R]| x.iter().zip(&self.wave).fold(R::zero(), |s, (&x, &w)| s + R::from_f64(w) * x);
-        R::from_f64(self.factor) * self.system.lagrangian(parameters, q, v) + along(q).cos() * along(v)
+        let along = |x: &[R]| x.iter().zip(&self.wave).fold(R::zero(), |s, (&x, &w)| s + R::of(w) * x);
+        R::of(self.factor) * self.system.lagrangian(parameters, q, v) + along(q).cos() * along(v)
     }
 }
 
@@ -124,14 +124,14 @@ fn gauge_changes_nothing<S: Scalar, L: Lagrangian + Copy>(name: &'static str, sy
     let mut rng = ChaCha8Rng::seed_from_u64(30);
     let configured = configure::<S>(name, &[]);
     let n = configured.coordinates;
-    let plain = HandWritten::new(system, configured.parameters.clone());
+    let plain = Mechanics::new(system, configured.parameters.clone());
     for _ in 0..50 {
         // The same numbers in every precision.
         let mut single = || f64::from(rng.random_range(-1.0_f32..1.0));
         let wave = (0..n).map(|_| single()).collect();
         let factor = 10f64.powf(single()) as f32;
         let gauged = Gauged { system, factor: f64::from(factor), wave };
-        let gauged = HandWritten::new(gauged, configured.parameters.clone());
+        let gauged = Mechanics::new(gauged, configured.parameters.clone());
         let (q, v) = random_state(&configured, &configured.system.validation(n), &mut rng);
         let (a, b) = (terms(&plain, &q, &v), terms(&gauged, &q, &v));
         // Terms that nearly cancel in g - c cost their size times |M^-1|.

@@ -4,7 +4,7 @@ use super::{Coordinate, PHI, Subject, THETA, line, radius};
 use crate::common::accuracy::{configure, random_state};
 use crate::common::properties;
 use lnn::geometry::geometries;
-use lnn::lagrangian::{EulerLagrange, ExpressionLagrangian, HandWritten, MechanicsError, Request, Terms};
+use lnn::lagrangian::{EulerLagrange, ExpressionLagrangian, Mechanics, MechanicsError, Request, Terms};
 use lnn::scalar::{Dd, Scalar};
 use lnn::symmetry::{Canonical, CanonicalForm, SymmetryError};
 use proptest::prelude::*;
@@ -114,11 +114,11 @@ fn the_sign_keeps_the_majority() {
 fn a_lagrangian_in_canonical_form_is_a_lagrangian() {
     let formula = "(theta_dot^2 + sin(theta)^2*phi_dot^2) + 0.3*cos(theta)*phi_dot - theta";
     let expression = || ExpressionLagrangian::new(&["theta", "phi"], &[], formula).unwrap();
-    let plain = HandWritten::<_, f64>::new(expression(), vec![]);
+    let plain = Mechanics::<_, f64>::new(expression(), vec![]);
     let (q0, v0) = ([1.0, 0.2], [0.4, -0.3]);
     let form = CanonicalForm::at(&plain, &q0, &v0).unwrap();
     let outside = Canonical::new(plain, form.clone());
-    let inside = HandWritten::new(Canonical::new(expression(), form), vec![]);
+    let inside = Mechanics::new(Canonical::new(expression(), form), vec![]);
     let (q, v) = Subject::formula(&[THETA, PHI], formula).states(40);
     let (a, b) = (terms(&outside, &q, &v), terms(&inside, &q, &v));
     for (x, y) in [

@@ -7,7 +7,7 @@ mod exact;
 mod quadratic;
 mod random;
 
-use lnn::lagrangian::{EulerLagrange, ExpressionLagrangian, HandWritten, build};
+use lnn::lagrangian::{EulerLagrange, ExpressionLagrangian, Mechanics, build};
 use lnn::symmetry::{Basis, Chart, Degrees, EXACT, Region, Symmetries, symmetries};
 
 /// A Lagrangian with names, charts and bounds of its coordinates; velocities are within `[-1, 1]` unless said otherwise.
@@ -51,7 +51,7 @@ impl Subject {
     pub fn formula(coordinates: &[Coordinate], formula: &str) -> Self {
         let names: Vec<&str> = coordinates.iter().map(|c| c.0).collect();
         let lagrangian = ExpressionLagrangian::new(&names, &[], formula).unwrap();
-        Self::new(Box::new(HandWritten::new(lagrangian, Vec::new())), coordinates)
+        Self::new(Box::new(Mechanics::new(lagrangian, Vec::new())), coordinates)
     }
 
     /// A system of the catalogue.

@@ -71,13 +71,13 @@ impl<S: Scalar> Judge<S> {
                 for u in &negative[row] {
                     for k in 0..n * n {
                         // First-order change of an eigenvalue: u^T dM u.
-                        sum -= T::from_f64(u[k / n] * u[k % n]) * m[k];
+                        sum -= T::of(u[k / n] * u[k % n]) * m[k];
                     }
                 }
             }
             Self::Sylvester(scales, time) => {
                 let scale = |i: usize| of_scalar::<T>(scales[i]);
-                let eps = T::from_f64(1e-8);
+                let eps = T::of(1e-8);
                 if let Some(t) = *time {
                     sum += m[t * n + t].relu() / (scale(t) + eps);
                 }
@@ -121,15 +121,15 @@ fn whole_loss<T: Real>(
     };
     let own = |i: usize| jet(&unit(i), &unit(i)).s - jet(&unit(n + i), &moving).st;
     let force: Vec<T> = (0..n).map(|i| own(i) - friction(i) + external[i]).collect();
-    let scale = |i: usize| T::from_f64(architecture.scale[i]);
+    let scale = |i: usize| T::of(architecture.scale[i]);
     let predicted = solve(n, &mass, &force);
     let mut loss = T::zero();
     for i in 0..n {
         loss += ((predicted[i] - a[i]) / scale(i)).abs();
     }
-    loss /= T::from_f64(2.0 * n as f64);
+    loss /= T::of(2.0 * n as f64);
     let scaled: Vec<T> = (0..n * n).map(|k| mass[k] * scale(k / n) * scale(k % n)).collect();
-    loss += T::from_f64(lambda) * judge.penalty(row, n, &scaled);
+    loss += T::of(lambda) * judge.penalty(row, n, &scaled);
     loss
 }
 
@@ -151,7 +151,7 @@ impl<S: Scalar> ScalarFunction for MeanLoss<'_, S> {
             let force = if self.data.force().is_empty() { vec![R::zero(); n] } else { part(self.data.force()) };
             total += whole_loss(self.architecture, weights, [&q, &v, &a, &force], (self.judge, row, self.lambda));
         }
-        total / R::from_f64(self.data.len() as f64)
+        total / R::of(self.data.len() as f64)
     }
 }
 

@@ -1,0 +1,17 @@
+//! Whole runs: experiments, pages, pipelines from configuration to report, and the command line.
+//!
+//! | module | contents |
+//! |---|---|
+//! | [`experiments`] | the paper's tables and our own as data |
+//! | [`report`] | plots in SVG, tables, HTML |
+//! | [`pipeline`] | trainings, fits, evaluations and experiments from configuration to report |
+//! | [`cli`] | arguments to calls of the library |
+
+#[cfg(feature = "training")]
+pub mod experiments;
+#[cfg(feature = "plot")]
+pub mod report;
+#[cfg(feature = "pipeline")]
+pub mod pipeline;
+#[cfg(feature = "cli")]
+pub mod cli;

@@ -1,0 +1,71 @@
+//! Lagrangian mechanics: one trait for a Lagrangian, one place for the Euler-Lagrange terms.
+//!
+//! State `x = (q, v)`, `v = dq/dt`, both in `R^n`. `p = dL/dv`, `g = dL/dq`, `M = d2L/dv dv`, `c = (d2L/dv dq) v`,
+//! `a = M^-1 (g - c + Q)`, `E = p.v - L`; `Q` are forces that do not follow from `L`, such as friction. Batches are row-major: `(batch, n)` and `(batch, n, n)`.
+
+mod catalogue;
+mod configure;
+mod derivatives;
+mod description;
+mod error;
+mod euler_lagrange;
+mod expression;
+mod expression_lagrangian;
+mod failures;
+mod mechanics;
+mod interruptible;
+mod inverse;
+mod metric;
+mod range;
+mod shell_advice;
+pub mod system;
+#[doc(hidden)]
+pub mod systems;
+mod taylor;
+mod terms;
+mod with_forces;
+
+pub(crate) use catalogue::LagrangianVisitor;
+pub use catalogue::{SystemError, SystemInstance, find, systems};
+pub use configure::{build, configure, configure_system, configure_values};
+pub(crate) use description::pair;
+pub use description::{Description, DescriptionError};
+pub use error::MechanicsError;
+pub use expression::{Expression, ExpressionError};
+pub use expression_lagrangian::ExpressionLagrangian;
+pub use mechanics::Mechanics;
+pub(crate) use interruptible::Interruptible;
+#[cfg(feature = "cli")]
+pub(crate) use inverse::inverse_dynamics_by_rows;
+pub use inverse::{InverseDynamics, inverse_dynamics};
+pub use metric::MetricJet;
+pub(crate) use metric::metric_jets;
+pub(crate) use taylor::Taylor;
+pub use terms::{EulerLagrange, Request, Terms};
+pub use with_forces::{Dissipation, GeneralizedForce, Rayleigh, WithForces};
+
+use crate::scalar::Real;
+
+/// A Lagrangian `L(q, v; parameters)` written once over [`Real`].
+///
+/// The same code then gives values, first and second derivatives with respect to `q`, `v` and the parameters
+/// (masses, lengths, ...), in every precision, for one state or a recorded batch.
+pub trait Lagrangian: Send + Sync {
+    /// The number that [`Lagrangian::coordinates`] returns, where it is known when the code is compiled: derivatives of single
+    /// states are then compiled for this number alone.
+    const COORDINATES: Option<usize> = None;
+
+    /// Number of coordinates `n`.
+    fn coordinates(&self) -> usize;
+
+    /// Number of parameters that [`Lagrangian::lagrangian`] takes; whoever says it has any other number of values refused by an
+    /// error, [`MechanicsError::Shape`].
+    fn parameter_count(&self) -> Option<usize> {
+        None
+    }
+
+    /// `L(q, v)` in joules (or the unit of action per unit of the evolution parameter).
+    ///
+    /// `parameters` in the order the system declares, `q` and `v` of length `n`.
+    fn lagrangian<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> R;
+}

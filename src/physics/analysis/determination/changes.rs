@@ -1,0 +1,261 @@
+//! Ways in which `L` and the friction beside it could be otherwise.
+//!
+//! A change of `L` is `f(q)` times a product of velocities: none (a potential), two (a mass matrix) or four; a change of
+//! the dissipation `D` is `f(q) v_i^2/2` (viscous) or `w_i^2 ln cosh(v_i/w_i)` (dry beyond `w_i`). What the equations of
+//! motion get from one of them is linear in it.
+
+use super::functions::{Functions, Values};
+
+/// The factor of a function of the coordinates.
+#[derive(Clone, Debug, PartialEq)]
+enum Kind {
+    /// The velocities of these coordinates, repeated ones to their power: part of `L`.
+    Product(Vec<usize>),
+    /// `v_i^2/2`: part of `D`.
+    Viscous(usize),
+    /// `w^2 ln cosh(v_i/w)`: part of `D`.
+    Dry(usize, f64),
+}
+
+/// One way.
+#[derive(Clone, Debug)]
+struct Change {
+    kind: Kind,
+    function: usize,
+    /// Its usual size before the data are looked at.
+    size: f64,
+}
+
+/// Usual sizes: those of the learned model itself, so that a change of size 1 makes another model of it.
+#[derive(Clone, Debug)]
+pub struct Usual {
+    /// `|M_ii|`, mean over the states.
+    pub mass: Vec<f64>,
+    /// Root mean square of every velocity.
+    pub velocity: Vec<f64>,
+    /// Root mean square of every acceleration.
+    pub acceleration: Vec<f64>,
+}
+
+/// All ways that are considered.
+#[derive(Clone, Debug)]
+pub struct Changes {
+    n: usize,
+    functions: Functions,
+    all: Vec<Change>,
+}
+
+/// Values of all changes at one state.
+#[derive(Clone, Debug, Default)]
+pub struct Row {
+    values: Values,
+    /// `d/dt dL/dv - dL/dq + dD/dv`, `(n, changes)`.
+    pub equation: Vec<f64>,
+    /// `M`, `(n, n, changes)`, symmetric.
+    pub mass: Vec<f64>,
+    /// `dD/dv`, `(n, changes)`.
+    pub friction: Vec<f64>,
+    /// `E`, `(changes)`.
+    pub energy: Vec<f64>,
+}
+
+/// Most changes that are considered.
+const MOST: usize = 260;
+/// Highest degree of functions of the coordinates.
+const DEGREE: usize = 4;
+/// A potential is believed to be that many kinetic energies at most, a friction that many inertial forces.
+const GENEROUS: f64 = 3.0;
+
+impl Changes {
+    /// Changes for coordinates that are angles or range over `range`; those of the friction if `friction`. The degree of
+    /// the functions is as high as their number allows; `None` if even constants are too many.
+    pub fn new(periodic: &[bool], range: &[[f64; 2]], usual: &Usual, friction: bool) -> Option<Self> {
+        (0..=DEGREE).rev().find_map(|degree| Self::of_degree(periodic, range, usual, friction, degree))
+    }
+
+    fn of_degree(periodic: &[bool], range: &[[f64; 2]], usual: &Usual, friction: bool, degree: usize) -> Option<Self> {
+        let n = periodic.len();
+        let pairs: Vec<[usize; 2]> = (0..n).flat_map(|i| (i..n).map(move |j| [i, j])).collect();
+        // What constants come to; lists of higher degree grow with the power of `n` and are not made to be counted.
+        if pairs.len() + 2 * n > MOST || (degree > 0 && n > 8) {
+            return None;
+        }
+        let changes = Self::listed(periodic, range, usual, friction, (degree, &pairs));
+        (changes.len() <= MOST).then_some(changes)
+    }
+
+    fn listed(
+        periodic: &[bool],
+        range: &[[f64; 2]],
+        usual: &Usual,
+        friction: bool,
+        (degree, pairs): (usize, &[[usize; 2]]),
+    ) -> Self {
+        let n = periodic.len();
+        let functions = Functions::new(periodic, range, degree);
+        let Usual { mass, velocity, acceleration } = usual;
+        let inertia = |[i, j]: [usize; 2]| (mass[i] * mass[j]).sqrt();
+        let kinetic: f64 = (0..n).map(|i| mass[i] * velocity[i] * velocity[i]).sum();
+        let mut all = Vec::new();
+        let mut add = |kind: Kind, function: usize, size: f64| all.push(Change { kind, function, size });
+        for function in 0..functions.len() {
+            for &[i, j] in pairs {
+                // v_i^2 is twice what the kinetic energy has.
+                let size = if i == j { 0.5 } else { 1.0 } * inertia([i, j]);
+                add(Kind::Product(vec![i, j]), function, size);
+            }
+            if function > 0 {
+                add(Kind::Product(Vec::new()), function, GENEROUS * kinetic);
+            }
+        }
+        if n <= 3 {
+            for (k, &[i, j]) in pairs.iter().enumerate() {
+                for &[a, b] in &pairs[k..] {
+                    let size = 0.25 * inertia([i, j]) / (velocity[a] * velocity[b]);
+                    let mut product = vec![i, j, a, b];
+                    product.sort_unstable();
+                    if size.is_finite() && !all_has(&all, &product) {
+                        all.push(Change { kind: Kind::Product(product), function: 0, size });
+                    }
+                }
+            }
+        }
+        if friction {
+            for i in 0..n {
+                let size = GENEROUS * mass[i] * acceleration[i] / velocity[i];
+                let all_of = (0..functions.up_to(1)).map(|function| (Kind::Viscous(i), function));
+                let knee = 0.2 * velocity[i];
+                let all_of = all_of.chain([(Kind::Dry(i, knee), 0)]);
+                let sized = all_of.map(|(kind, function)| Change { kind, function, size });
+                all.extend(sized.filter(|change| change.size.is_finite()));
+            }
+        }
+        Self { n, functions, all }
+    }
+
+    /// Number of changes.
+    pub fn len(&self) -> usize {
+        self.all.len()
+    }
+
+    /// Values of all changes, each of its usual size, at a state with this acceleration.
+    pub fn evaluate(&self, q: &[f64], v: &[f64], a: &[f64], row: &mut Row) {
+        let (n, count) = (self.n, self.all.len());
+        for (values, size) in [
+            (&mut row.equation, n * count),
+            (&mut row.mass, n * n * count),
+            (&mut row.friction, n * count),
+            (&mut row.energy, count),
+        ] {
+            values.clear();
+            values.resize(size, 0.0);
+        }
+        self.functions.evaluate(q, &mut row.values);
+        for (k, Change { kind, function, size }) in self.all.iter().enumerate() {
+            let f = size * row.values.value[*function];
+            match kind {
+                Kind::Product(product) => {
+                    let gradient = &row.values.gradient[function * n..(function + 1) * n];
+                    let along = size * gradient.iter().zip(v).map(|(g, v)| g * v).sum::<f64>();
+                    let whole: f64 = product.iter().map(|&i| v[i]).product();
+                    row.energy[k] = (product.len() as f64 - 1.0) * f * whole;
+                    for i in 0..n {
+                        row.equation[i * count + k] -= size * gradient[i] * whole;
+                    }
+                    // Derivatives of the product by one and by two of its factors.
+                    for (at, &i) in product.iter().enumerate() {
+                        let rest = |without: usize| -> f64 {
+                            let others = product.iter().enumerate().filter(|(j, _)| *j != at && *j != without);
+                            others.map(|(_, &i)| v[i]).product()
+                        };
+                        row.equation[i * count + k] += along * rest(at);
+                        for (other, &j) in product.iter().enumerate().filter(|(other, _)| *other != at) {
+                            let element = f * rest(other);
+                            row.mass[(i * n + j) * count + k] += element;
+                            row.equation[i * count + k] += element * a[j];
+                        }
+                    }
+                }
+                Kind::Viscous(i) => row.friction[i * count + k] = f * v[*i],
+                Kind::Dry(i, knee) => row.friction[i * count + k] = f * knee * (v[*i] / knee).tanh(),
+            }
+        }
+        row.equation.iter_mut().zip(&row.friction).for_each(|(sum, friction)| *sum += friction);
+    }
+}
+
+fn all_has(all: &[Change], product: &[usize]) -> bool {
+    all.iter().any(|change| change.function == 0 && matches!(&change.kind, Kind::Product(p) if p == product))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lagrangian::{EulerLagrange, Mechanics, Lagrangian, Request, Terms};
+    use crate::scalar::Real;
+
+    /// `cos(q0) v0 v1 + sin(2 q0) q1 v1^2 + v0^2 v1^2 - cos(q0) q1`.
+    struct Mixed;
+
+    impl Lagrangian for Mixed {
+        fn coordinates(&self) -> usize {
+            2
+        }
+        fn lagrangian<R: Real>(&self, _: &[R], q: &[R], v: &[R]) -> R {
+            let twice = q[0] + q[0];
+            q[0].cos() * v[0] * v[1] + twice.sin() * q[1] * v[1].sqr() + (v[0] * v[1]).sqr() - q[0].cos() * q[1]
+        }
+    }
+
+    #[test]
+    fn changes_are_what_the_engine_says() {
+        let usual = Usual { mass: vec![1.0; 2], velocity: vec![1.0; 2], acceleration: vec![1.0; 2] };
+        let changes = Changes::new(&[true, false], &[[0.0, 1.0], [-1.0, 1.0]], &usual, false).unwrap();
+        let (q, v, a) = ([0.4, 0.7], [1.3, -0.6], [0.9, 2.1]);
+        let mut values = Values::default();
+        changes.functions.evaluate(&q, &mut values);
+        let function = |value: f64| values.value.iter().position(|x| (x - value).abs() < 1e-12).unwrap();
+        let find = |product: &[usize], function: usize| {
+            let is = |c: &Change| c.function == function && c.kind == Kind::Product(product.to_vec());
+            let k = changes.all.iter().position(is).unwrap();
+            (k, 1.0 / changes.all[k].size)
+        };
+        let (cos, sin) = (q[0].cos(), (2.0 * q[0]).sin());
+        let parts = [
+            (find(&[0, 1], function(cos)), 1.0),
+            (find(&[1, 1], function(sin * q[1])), 1.0),
+            (find(&[0, 0, 1, 1], 0), 1.0),
+            (find(&[], function(cos * q[1])), -1.0),
+        ];
+        let mut row = Row::default();
+        changes.evaluate(&q, &v, &a, &mut row);
+        let count = changes.len();
+        let sum =
+            |of: &[f64], at: usize| parts.iter().map(|((k, unit), sign)| sign * unit * of[at * count + k]).sum::<f64>();
+        let mut terms = Terms::default();
+        // Its mass matrix may be anything: accelerations are not asked for.
+        let wanted = Request::MASS_MATRIX | Request::MOMENTUM_DRIFT | Request::DL_DQ | Request::ENERGY;
+        Mechanics::new(Mixed, vec![]).terms(&q, &v, wanted, &mut terms).unwrap();
+        for i in 0..2 {
+            let inertia: f64 = (0..2).map(|j| terms.mass_matrix[i * 2 + j] * a[j]).sum();
+            let expected = inertia + terms.momentum_drift[i] - terms.dl_dq[i];
+            assert!((sum(&row.equation, i) - expected).abs() < 1e-12, "{i}");
+            for j in 0..2 {
+                assert!((sum(&row.mass, i * 2 + j) - terms.mass_matrix[i * 2 + j]).abs() < 1e-12, "{i} {j}");
+            }
+        }
+        assert!((sum(&row.energy, 0) - terms.energy[0]).abs() < 1e-12);
+    }
+
+    #[test]
+    fn many_coordinates_have_few_functions() {
+        let count = |n: usize| {
+            let usual = Usual { mass: vec![1.0; n], velocity: vec![1.0; n], acceleration: vec![1.0; n] };
+            Changes::new(&vec![true; n], &vec![[0.0, 1.0]; n], &usual, true).map(|changes| changes.len())
+        };
+        for n in 1..=20 {
+            assert!(count(n).is_some_and(|count| count <= MOST), "{n}");
+        }
+        assert_eq!(count(60), None);
+    }
+}

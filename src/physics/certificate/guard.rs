@@ -1,0 +1,106 @@
+//! A model that moves only where its mass matrix is certified.
+
+use super::{Certificate, Verdict};
+use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Terms};
+use crate::scalar::Scalar;
+
+/// A model with a [`Certificate`] that is asked at every state: `dL/dq`, mass matrix and acceleration of a state that is not certified fail
+/// with [`MechanicsError::Uncertified`].
+///
+/// An integrator stops where the certified region ends, as at the bound of a domain, and says so (`RolloutError::Uncertified`): at every
+/// state that moved it the mass matrix is proven to have its signature. `L`, momenta and the energy are given everywhere.
+#[derive(Clone, Debug)]
+pub struct Guarded<'a, M> {
+    model: M,
+    certificate: &'a Certificate,
+}
+
+impl<'a, M> Guarded<'a, M> {
+    /// A model and a certificate of its mass matrix.
+    pub fn new(model: M, certificate: &'a Certificate) -> Self {
+        Self { model, certificate }
+    }
+
+    /// The model without its guard.
+    pub fn model(&self) -> &M {
+        &self.model
+    }
+}
+
+impl<S: Scalar, M: EulerLagrange<S>> EulerLagrange<S> for Guarded<'_, M> {
+    fn coordinates(&self) -> usize {
+        self.model.coordinates()
+    }
+
+    fn terms(&self, q: &[S], v: &[S], request: Request, terms: &mut Terms<S>) -> Result<(), MechanicsError> {
+        let outcome = self.model.terms(q, v, request, terms);
+        if !request.includes(Request::MASS_MATRIX) && !request.includes(Request::DL_DQ) {
+            return outcome;
+        }
+        let n = self.coordinates().max(1);
+        let found = terms.take_failures(outcome)?;
+        for (row, (q, v)) in q.chunks_exact(n).zip(v.chunks_exact(n)).enumerate() {
+            if !matches!(self.certificate.verdict(q, v), Verdict::Certified { .. }) {
+                terms.failures.push(MechanicsError::Uncertified { row });
+                if let Some(acceleration) = terms.acceleration.get_mut(row * n..(row + 1) * n) {
+                    acceleration.fill(S::nan());
+                }
+            }
+        }
+        terms.put_before(found);
+        terms.outcome()
+    }
+
+    fn inner(&self) -> Option<&dyn EulerLagrange<S>> {
+        Some(&self.model)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::certificate::tests::{formula, limited};
+    use crate::certificate::{Bounds, Signature, certify, certify_system};
+    use crate::lagrangian::{Mechanics, configure};
+
+    #[test]
+    fn a_guarded_model_fails_where_nothing_is_certified() {
+        // M = diag(1 - q_0^2/4, 1) is certified within |q_0| < 2, and the region ends at 3.
+        let system = formula("(1 - x^2/4)*x_dot^2/2 + y_dot^2/2 - x*y");
+        let region = Bounds { positions: vec![(-3.0, 3.0), (-1.0, 1.0)], velocities: vec![(-1.0, 1.0); 2] };
+        let found = certify(&system, &[] as &[f64], &region, &limited(Signature::of(2, false), 4000)).unwrap();
+        let guarded = Guarded::new(Mechanics::<_, f64>::new(system, vec![]), &found);
+        let (q, v) = ([0.5, 0.0, 2.5, 0.0, 0.5, 1.5], [0.1, 0.2, 0.1, 0.2, 0.0, 0.0]);
+        let [mut plain, mut terms] = [Terms::default(), Terms::default()];
+        guarded.model().terms(&q, &v, Request::ALL, &mut plain).unwrap();
+        let refused = guarded.terms(&q, &v, Request::ACCELERATION, &mut terms);
+        assert_eq!(refused, Err(MechanicsError::Uncertified { row: 1 }));
+        assert_eq!(terms.failures, [1, 2].map(|row| MechanicsError::Uncertified { row }));
+        assert!(
+            terms.acceleration[..2] == plain.acceleration[..2] && terms.acceleration[2..].iter().all(|a| a.is_nan())
+        );
+        guarded.terms(&q, &v, Request::ENERGY, &mut terms).unwrap();
+        assert_eq!(terms.energy, plain.energy);
+        guarded.terms(&q[..2], &v[..2], Request::ALL, &mut terms).unwrap();
+        assert_eq!(terms.acceleration, plain.acceleration[..2]);
+    }
+
+    #[cfg(feature = "rollout")]
+    #[test]
+    fn integrators_stop_where_the_certificate_ends() {
+        use crate::rollout::{self, Method, RolloutError, rollout};
+        let pendulum = configure::<f64>("double-pendulum", &[]).unwrap();
+        let region = Bounds::uniform(2, (-3.2, 3.2), (-2.0, 2.0));
+        let found = certify_system(&pendulum, &region, &limited(Signature::of(2, false), 1000)).unwrap();
+        assert_eq!(found.certified, 1.0);
+        let guarded = Guarded::new(pendulum.build().unwrap(), &found);
+        for (method, slack) in [(Method::Dopri5, 1e-3), (Method::Dop853, 1e-3), (Method::Gauss4, 0.2)] {
+            let options = rollout::Options { method, ..rollout::Options::new(5.0, 0.01) };
+            let motion = rollout(&guarded, &[1.5, 1.0], &[0.0, 0.0], &options);
+            let Some(RolloutError::Uncertified { t, state }) = motion.stop else { panic!("{:?}", motion.stop) };
+            let fastest = state[2..].iter().fold(0.0f64, |m, v| m.max(v.abs()));
+            assert!(t > 0.05 && t < 5.0 && fastest <= 2.0 && fastest > 2.0 - slack, "{method:?} {t} {state:?}");
+            assert!(motion.trajectory.v.iter().all(|v| v.abs() <= 2.0 + 1e-6));
+        }
+    }
+}

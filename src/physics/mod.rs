@@ -1,0 +1,18 @@
+//! What is read off a Lagrangian, learned or written down.
+//!
+//! | module | contents |
+//! |---|---|
+//! | [`geometry`] | metric, connection, curvature, surfaces where a metric changes its character |
+//! | [`symmetry`] | symmetries and conserved quantities, charges along motion, comparison of two Lagrangians |
+//! | [`certificate`] | proofs of the signature of mass matrices over boxes |
+//! | [`analysis`] | errors of accelerations, energy and trajectories, Lyapunov times, what data determine |
+//! | [`relativity`] | black holes, light in a metric |
+
+pub mod geometry;
+#[cfg(feature = "rollout")]
+pub mod symmetry;
+pub mod certificate;
+#[cfg(feature = "training")]
+pub mod analysis;
+#[cfg(feature = "rollout")]
+pub mod relativity;

@@ -1,0 +1,269 @@
+//! Rays, shadows and pictures against closed forms.
+
+use super::rays::{Fate, trace};
+use super::tetrad::Tetrad;
+use super::vector::{norm, product, times};
+use super::*;
+use crate::lagrangian::{EulerLagrange, Mechanics, Interruptible, Lagrangian, MechanicsError, build};
+use crate::scalar::Real;
+use std::f64::consts::{FRAC_PI_2, PI};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Flat space-time with a sign of every square.
+struct Flat([i8; 4]);
+
+impl Lagrangian for Flat {
+    fn coordinates(&self) -> usize {
+        4
+    }
+    fn lagrangian<R: Real>(&self, _: &[R], _: &[R], v: &[R]) -> R {
+        let signed = |sum: R, (v, sign): (&R, &i8)| if *sign > 0 { sum + v.sqr() } else { sum - v.sqr() };
+        v.iter().zip(&self.0).fold(R::zero(), signed) * R::half()
+    }
+}
+
+fn flat(signs: [i8; 4]) -> Mechanics<Flat, f64> {
+    Mechanics::new(Flat(signs), Vec::new())
+}
+
+fn hole(name: &str, parameters: &[(&str, &str)]) -> Box<dyn EulerLagrange<f64>> {
+    let given: Vec<_> = parameters.iter().map(|(s, x)| (s.to_string(), x.to_string())).collect();
+    build(name, &given).unwrap()
+}
+
+fn small(distance: f64, inclination: f64) -> Camera {
+    Camera { width: 30, height: 20, ..Camera::new(distance, inclination) }
+}
+
+#[test]
+fn rays_of_flat_space_are_straight() {
+    // Another order of the coordinates and the other convention of signs give the same picture.
+    let camera = Camera { azimuth: 0.4, ..small(7.0, 1.0) };
+    let other = Camera { chart: Chart { time: 3, space: [1, 2, 0] }, ..camera };
+    let [right, up, forward] = camera.axes();
+    for (model, camera) in [(flat([-1, 1, 1, 1]), camera), (flat([-1, -1, -1, 1]), other)] {
+        let seen = shadow(&model, &camera, &Tracing::of(&camera), &|_| ()).unwrap();
+        for (pixel, ray) in seen.rays.iter().enumerate() {
+            let part = camera.direction((pixel % 30) as f64 + 0.5, (pixel / 30) as f64 + 0.5);
+            let Fate::Escaped(found) = ray.fate else { panic!("{ray:?}") };
+            for i in 0..3 {
+                let exact = part[0] * right[i] + part[1] * up[i] + part[2] * forward[i];
+                assert!((found[i] - exact).abs() < 1e-12);
+            }
+            // Few steps, as nothing bends the ray.
+            assert!(ray.steps < 20 && ray.drift < 1e-14, "{ray:?}");
+        }
+        assert_eq!((seen.share(), seen.unfinished()), (0.0, 0));
+        assert_eq!(outline(&model, &camera, &Tracing::of(&camera), 4), Ok(None));
+        let tetrad = Tetrad::new(&model, &camera).unwrap();
+        let [x, y] = tetrad.celestial(tetrad.ray(camera.direction(30.0, 0.0)));
+        let exact = camera.direction(30.0, 0.0);
+        assert!((x - 7.0 * exact[0]).abs() + (y - 7.0 * exact[1]).abs() < 1e-14);
+    }
+}
+
+#[test]
+fn frames_are_orthonormal() {
+    let kerr = hole("kerr-cartesian", &[("a", "0.9")]);
+    for (observer, distance, inclination) in [
+        (Observer::Rest, 3.0, 1.2),
+        (Observer::Normal, 3.0, 0.0),
+        (Observer::Normal, 1.2, 2.5),
+        (Observer::Rest, 50.0, PI),
+    ] {
+        let camera = Camera { observer, azimuth: 1.0, ..small(distance, inclination) };
+        let Tetrad { event, legs, .. } = Tetrad::new(&*kerr, &camera).unwrap();
+        let mut terms = crate::lagrangian::Terms::default();
+        kerr.terms(&event, &[0.0; 4], crate::lagrangian::Request::MASS_MATRIX, &mut terms).unwrap();
+        for (i, a) in legs.iter().enumerate() {
+            for (j, b) in legs.iter().enumerate() {
+                let exact = if i != j {
+                    0.0
+                } else if i == 0 {
+                    -1.0
+                } else {
+                    1.0
+                };
+                assert!((product(&terms.mass_matrix, *a, *b) - exact).abs() < 1e-12, "{observer:?} {i} {j}");
+            }
+        }
+    }
+}
+
+/// Synge, Mon. Not. R. Astron. Soc. 131, 463 (1966): `sin(angle) = sqrt(27) M/r sqrt(1 - 2 M/r)` for a camera at rest.
+#[test]
+fn the_shadow_of_schwarzschild_has_its_angle() {
+    let model = hole("schwarzschild-cartesian", &[]);
+    for (distance, inclination) in [(20.0, 1.2), (5.0, 0.0), (2.5, FRAC_PI_2)] {
+        let camera = small(distance, inclination);
+        let tracing = Tracing { far: 60.0, ..Tracing::of(&camera) };
+        let found = outline(&*model, &camera, &tracing, 12).unwrap().unwrap();
+        let sine = 27f64.sqrt() / distance * (1.0 - 2.0 / distance).sqrt();
+        // Within the orbit of light the shadow fills more than half of the sky.
+        let exact = if distance < 3.0 { PI - sine.asin() } else { sine.asin() };
+        for edge in &found.edges {
+            assert!((edge.angle - exact).abs() < 1e-6, "{distance}: {} for {exact}", edge.angle);
+            assert!((norm(edge.celestial) - 27f64.sqrt()).abs() < 2e-6, "{distance}: {:?}", edge.celestial);
+        }
+        assert!((found.area - 27.0 * PI).abs() < 1e-4, "{}", found.area);
+    }
+    // A camera that falls sees the same rays at other angles.
+    let falling = Camera { observer: Observer::Normal, ..small(5.0, 1.0) };
+    let tracing = Tracing { far: 60.0, ..Tracing::of(&falling) };
+    let found = outline(&*model, &falling, &tracing, 4).unwrap().unwrap();
+    for edge in &found.edges {
+        assert!((norm(edge.celestial) - 27f64.sqrt()).abs() < 2e-6);
+        assert!(edge.angle < (27f64.sqrt() / 5.0 * 0.6f64.sqrt()).asin() - 0.05);
+    }
+}
+
+/// Bardeen 1973: on the equator the edges are the orbits of light with and against the spin, `|L/E|` of Bardeen, Press and Teukolsky 1972.
+#[test]
+fn the_shadow_of_kerr_has_its_edges() {
+    for spin in [0.9, 0.5] {
+        let model = hole("kerr-cartesian", &[("a", &spin.to_string())]);
+        let camera = small(20.0, FRAC_PI_2);
+        let found = outline(&*model, &camera, &Tracing::of(&camera), 16).unwrap().unwrap();
+        let impact = |a: f64| {
+            let light: f64 = 2.0 * (1.0 + (2.0 / 3.0 * (-a).acos()).cos());
+            a + light.powf(1.5)
+        };
+        // What comes from the left comes with the spin.
+        let (left, right) = (found.left().celestial, found.right().celestial);
+        assert!((left[0] + impact(spin)).abs() < 1e-5, "{left:?} for {}", impact(spin));
+        assert!((right[0] - impact(-spin)).abs() < 1e-5, "{right:?} for {}", impact(-spin));
+        assert!(found.left().angle < found.right().angle);
+        // Above and below alike.
+        let (top, bottom) = (found.top().celestial, found.bottom().celestial);
+        assert!((top[1] + bottom[1]).abs() < 1e-6 && (top[0] - bottom[0]).abs() < 1e-6, "{top:?} {bottom:?}");
+    }
+}
+
+#[test]
+fn no_result_depends_on_the_number_of_threads() {
+    let model = hole("kerr-cartesian", &[("a", "0.9")]);
+    let camera = Camera { width: 48, height: 36, ..Camera::new(15.0, 1.4) };
+    let of = |threads: usize| {
+        let done = std::sync::atomic::AtomicUsize::new(0);
+        let count = |pixels: usize| _ = done.fetch_add(pixels, std::sync::atomic::Ordering::Relaxed);
+        let seen = shadow(&*model, &camera, &Tracing { threads, ..Tracing::of(&camera) }, &count).unwrap();
+        assert_eq!(done.into_inner(), 48 * 36);
+        seen
+    };
+    let one = of(1);
+    assert_eq!(one, of(3));
+    assert_eq!(one.unfinished(), 0);
+    // About that of a disc of the angle without spin, 18.8 degrees, in a picture of 70.
+    assert!((one.share() - 0.24).abs() < 0.02, "{}", one.share());
+    let difference = one.difference(&one).unwrap();
+    assert_eq!((difference.shadow, difference.median, difference.most), (0.0, 0.0, 0.0));
+}
+
+#[test]
+fn light_stays_light() {
+    let model = hole("kerr-cartesian", &[("a", "0.9")]);
+    let camera = small(20.0, 1.4);
+    for (tolerance, most) in [(1e-6, 1e-3), (1e-8, 1e-5), (1e-10, 1e-7)] {
+        let seen = shadow(&*model, &camera, &Tracing { tolerance, ..Tracing::of(&camera) }, &|_| ()).unwrap();
+        assert!(seen.drift() < most, "{tolerance}: {}", seen.drift());
+    }
+}
+
+/// A sky at twice the distance of the camera is that at infinity but for hundredths of a degree.
+#[test]
+fn the_sky_is_far_enough() {
+    let model = hole("kerr-cartesian", &[("a", "0.9")]);
+    let camera = small(20.0, 1.4);
+    let [near, far] = [40.0, 1e5].map(|far| {
+        let tracing = Tracing { far, tolerance: 1e-9, ..Tracing::of(&camera) };
+        shadow(&*model, &camera, &tracing, &|_| ()).unwrap()
+    });
+    let difference = near.difference(&far).unwrap();
+    assert_eq!(difference.shadow, 0.0);
+    assert!(difference.median.to_degrees() < 0.03 && difference.most.to_degrees() < 0.06);
+}
+
+/// The deflection of light that passes far away is `4 M/b`, with the second order `15 pi M^2/(4 b^2)` (Epstein and Shapiro 1980).
+#[test]
+fn light_far_from_the_hole_is_deflected_as_it_should_be() {
+    let model = hole("schwarzschild-cartesian", &[]);
+    let (impact, far) = (200.0, 2e5);
+    let camera = small(far, FRAC_PI_2);
+    let tetrad = Tetrad::new(&*model, &camera).unwrap();
+    let sine = impact / far * (1.0 - 2.0 / far).sqrt();
+    let direction = [sine, 0.0, (1.0 - sine * sine).sqrt()];
+    let tracing = Tracing { tolerance: 1e-11, far, ..Tracing::of(&camera) };
+    let ray = trace(&*model, &camera.chart, &[(tetrad.event, tetrad.ray(direction))], &tracing, &|_| ()).unwrap()[0];
+    let Fate::Escaped(found) = ray.fate else { panic!("{ray:?}") };
+    let [right, _, forward] = camera.axes();
+    let start: [f64; 3] = std::array::from_fn(|i| direction[0] * right[i] + direction[2] * forward[i]);
+    let bent = (start[0] * found[1] - start[1] * found[0]).asin().abs();
+    let exact = 4.0 / impact + 15.0 * PI / (4.0 * impact * impact) + 128.0 / (3.0 * impact.powi(3));
+    assert!((bent / exact - 1.0).abs() < 2e-4, "{bent} for {exact}");
+}
+
+#[test]
+fn mistakes_are_named() {
+    let camera = small(10.0, 1.0);
+    let traced = |model: &dyn EulerLagrange<f64>, camera: Camera, tracing: Tracing| {
+        shadow(model, &camera, &tracing, &|_| ()).unwrap_err().to_string()
+    };
+    let model = hole("schwarzschild-cartesian", &[]);
+    let usual = Tracing::of(&camera);
+    let near = Camera { distance: 1.9, ..camera };
+    assert!(traced(&*model, near, usual).contains("no camera rests"));
+    assert!(traced(&flat([1; 4]), camera, usual).contains("0 negative and 4 positive"));
+    assert!(traced(&*hole("kepler", &[]), camera, usual).contains("found 2 coordinates"));
+    let twice = Chart { time: 1, ..Chart::default() };
+    assert!(traced(&*model, Camera { chart: twice, ..camera }, usual).contains("four different coordinates"));
+    assert!(traced(&*model, Camera { field_of_view: 4.0, ..camera }, usual).starts_with("field of view"));
+    assert!(traced(&*model, camera, Tracing { tolerance: 0.0, ..usual }).starts_with("tolerance"));
+    assert!(traced(&*model, camera, Tracing { growth: 1.0, ..usual }).starts_with("growth"));
+    assert!(outline(&*model, &camera, &usual, 0).unwrap_err().to_string().starts_with("directions"));
+}
+
+#[test]
+fn rays_that_do_not_end_are_unfinished() {
+    let model = hole("schwarzschild-cartesian", &[]);
+    let camera = small(10.0, 1.0);
+    let seen = shadow(&*model, &camera, &Tracing { most_steps: 2, ..Tracing::of(&camera) }, &|_| ()).unwrap();
+    assert_eq!((seen.unfinished(), seen.share()), (600, 0.0));
+    // The centre of the coordinates itself: the metric is none.
+    let start = ([0.0; 4], times(2.0, [0.0, 1.0, 0.0, 0.0]));
+    let tracing = Tracing::of(&camera);
+    let rays =
+        trace(&*model, &camera.chart, &[start, ([0.0, 30.0, 0.0, 0.0], [-1.0, 1.0, 0.0, 0.0])], &tracing, &|_| ());
+    let rays = rays.unwrap();
+    assert_eq!((rays[0].fate, rays[1].fate), (Fate::Unfinished, Fate::Escaped([1.0, 0.0, 0.0])));
+}
+
+/// The rays of blocks that were followed before a flag was raised have their ends, the others none.
+#[test]
+fn an_interrupted_picture_has_the_rays_that_were_followed() {
+    let model = build::<f64>("schwarzschild-cartesian", &[]).unwrap();
+    let flag = AtomicBool::new(false);
+    let hole = Interruptible::new(&*model, &flag);
+    let camera = Camera { width: 20, height: 20, ..Camera::new(20.0, 1.4) };
+    let tracing = Tracing::of(&camera);
+    let whole = shadow(&hole, &camera, &tracing, &|_| ()).unwrap();
+    let part = shadow(&hole, &camera, &tracing, &|_| flag.store(true, Ordering::Relaxed)).unwrap();
+    assert_eq!((whole.finished(), part.rays.len()), (400, 400));
+    assert!((1..400).contains(&part.finished()), "{}", part.finished());
+    for (a, b) in part.rays.iter().zip(&whole.rays).filter(|(a, _)| a.fate != Fate::Unfinished) {
+        assert_eq!((a.fate, a.steps), (b.fate, b.steps));
+    }
+    assert_eq!(outline(&hole, &camera, &tracing, 4), Err(RelativityError::Mechanics(MechanicsError::Interrupted)));
+}
+
+/// At both ends of the tolerances every ray comes to an end; beyond them nothing is traced.
+#[test]
+fn tolerances_have_ends() {
+    let model = build::<f64>("schwarzschild-cartesian", &[]).unwrap();
+    let camera = Camera { width: 6, height: 6, ..Camera::new(20.0, 1.4) };
+    let of = |tolerance: f64| shadow(&*model, &camera, &Tracing { tolerance, ..Tracing::of(&camera) }, &|_| ());
+    let (fine, coarse) = (of(TOLERANCES.0).unwrap(), of(TOLERANCES.1).unwrap());
+    assert_eq!((fine.unfinished(), coarse.unfinished(), fine.share()), (0, 0, coarse.share()));
+    for wrong in [1e-30, 1e-13, 0.02, 1.0, f64::NAN] {
+        assert!(matches!(of(wrong), Err(RelativityError::Invalid { what: "tolerance", .. })), "{wrong}");
+    }
+}

@@ -1,0 +1,128 @@
+//! The crate inside another program: global state, errors, dependencies.
+
+use lnn::data::Dataset;
+use lnn::lagrangian::{EulerLagrange, Mechanics, Terms, systems::double_pendulum::DoublePendulum};
+use lnn::network::{NetworkLagrangian, file::ModelFile};
+use lnn::rollout::Options;
+use lnn::training::Objective;
+use lnn::{analysis, linalg, network, recording, rollout as motion, scalar, storage, tape, training};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+const fn shared<T: Send + Sync + 'static>() {}
+const fn error<T: std::error::Error + Send + Sync + 'static>() {}
+
+/// What embedders hold goes to any thread and may be used by several.
+const _: () = {
+    shared::<NetworkLagrangian<f32>>();
+    shared::<Mechanics<DoublePendulum, f64>>();
+    shared::<Box<dyn EulerLagrange<scalar::Dd>>>();
+    shared::<tape::Program<f64>>();
+    shared::<tape::Replay<f64>>();
+    shared::<Terms<f64>>();
+    shared::<Dataset<f32>>();
+    shared::<Objective<f32>>();
+    shared::<lnn::configuration::Config>();
+    shared::<training::Trained<f32>>();
+    shared::<training::Hooks>();
+    shared::<ModelFile<f32>>();
+    shared::<motion::Trajectory<f64>>();
+    shared::<motion::Rollout<f64>>();
+    shared::<Options<f64>>();
+    shared::<recording::Recording>();
+    shared::<linalg::Workspace<f64>>();
+    shared::<network::Dynamics<f32>>();
+    shared::<lnn::tape::Evaluation<f32>>();
+
+    error::<lnn::lagrangian::MechanicsError>();
+    error::<lnn::lagrangian::SystemError>();
+    error::<linalg::LinalgError>();
+    error::<motion::RolloutError>();
+    error::<motion::UnderflowCause>();
+    error::<network::NetworkError>();
+    error::<network::UnknownActivation>();
+    error::<network::file::ModelFileError>();
+    error::<recording::TrajectoryError>();
+    error::<scalar::UnreadableNumber>();
+    error::<storage::ReadError>();
+    error::<tape::TapeError>();
+    error::<analysis::GridError>();
+    error::<training::CheckpointError>();
+    error::<lnn::configuration::ConfigError>();
+    error::<lnn::data::DatasetError>();
+    error::<training::RecipeError>();
+    error::<lnn::data::SamplingError>();
+    error::<training::StepError>();
+    error::<training::TrainingError>();
+    error::<training::ThreadsError>();
+    error::<lnn::pipeline::PipelineError>();
+    error::<lnn::relativity::RelativityError>();
+};
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// Source files of the library, without the program.
+fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        match path.is_dir() {
+            true if !path.ends_with("cli") => sources(&path, found),
+            false if path.extension().is_some_and(|e| e == "rs") && !path.ends_with("main.rs") => found.push(path),
+            _ => {}
+        }
+    }
+}
+
+#[test]
+fn nothing_is_global() {
+    let mut files = Vec::new();
+    sources(&root().join("src"), &mut files);
+    assert!(files.len() > 100);
+    let mut found = Vec::new();
+    for file in files {
+        let text = std::fs::read_to_string(&file).unwrap();
+        let cells = ["Atomic", "Mutex", "Lock", "OnceCell", "RefCell", "Cell<"];
+        let changes = |line: &str| line.contains("thread_local!") || cells.iter().any(|cell| line.contains(cell));
+        let statics = text.lines().filter(|line| {
+            let code = line.trim_start();
+            let item = ["static ", "pub static ", "pub(crate) static ", "pub(super) static ", "thread_local!"];
+            item.iter().any(|start| code.starts_with(start)) && changes(code)
+        });
+        found.extend(statics.map(|line| (file.strip_prefix(root()).unwrap().to_path_buf(), line.trim().to_string())));
+    }
+    // Names of temporary files must differ within a process; nothing else is remembered between calls.
+    let expected = "static COUNTER: AtomicUsize = AtomicUsize::new(0);".to_string();
+    assert_eq!(found, [(PathBuf::from("src/support/storage/write.rs"), expected)]);
+}
+
+/// Crates that a build with these features links.
+fn dependencies(features: &[&str]) -> Vec<String> {
+    let mut command = Command::new(env!("CARGO"));
+    command.args(["tree", "--edges", "normal", "--prefix", "none", "--offline", "--locked", "--manifest-path"]);
+    let output = command.arg(root().join("Cargo.toml")).args(features).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let text = String::from_utf8(output.stdout).unwrap();
+    let mut names: Vec<String> = text.lines().filter_map(|l| l.split(' ').next()).map(String::from).collect();
+    names.sort();
+    names.dedup();
+    names
+}
+
+#[test]
+fn the_library_leaves_the_program_out() {
+    let program = ["clap", "clap_complete", "clap_mangen", "indicatif", "signal-hook", "toml", "tracing-subscriber"];
+    let learning = ["argmin", "nalgebra", "ode_solvers", "rayon", "safetensors", "serde_json", "tracing", "zip"];
+    let (all, library) = (dependencies(&[]), dependencies(&["--no-default-features"]));
+    for name in program.into_iter().chain(learning) {
+        assert!(all.iter().any(|d| d == name), "the program uses {name}");
+        assert!(!library.iter().any(|d| d == name), "the library does not need {name}");
+    }
+    assert!(
+        library.iter().any(|d| d == "faer") && library.len() + 30 < all.len(),
+        "{} of {}",
+        library.len(),
+        all.len()
+    );
+}

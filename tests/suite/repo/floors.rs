@@ -1,0 +1,94 @@
+//! The order of the modules: a file imports from its own module and from those before it, and foreign crates stay in their adapters.
+
+use std::fs;
+use std::path::Path;
+
+/// Floors from the bottom to the top, with their modules in order.
+const FLOORS: [(&str, &[&str]); 6] = [
+    ("numerics", &["scalar", "random", "ops", "forward", "linalg", "tape"]),
+    ("support", &["names", "storage"]),
+    ("mechanics", &["lagrangian", "rollout", "network"]),
+    ("learning", &["recording", "optimizers", "configuration", "data", "training", "shooting", "presets"]),
+    ("physics", &["geometry", "symmetry", "certificate", "analysis", "relativity"]),
+    ("app", &["experiments", "report", "pipeline", "cli"]),
+];
+
+/// Crates with the only places that name them.
+const ADAPTERS: [(&str, &[&str]); 13] = [
+    ("pulp", &["numerics/scalar/"]),
+    ("xprec", &["numerics/scalar/"]),
+    ("libm", &["numerics/scalar/"]),
+    ("faer", &["numerics/linalg/"]),
+    ("nalgebra", &["mechanics/rollout/"]),
+    ("ode_solvers", &["mechanics/rollout/"]),
+    ("argmin", &["learning/training/", "learning/shooting/"]),
+    ("safetensors", &["support/storage/container/"]),
+    ("crc32fast", &["support/storage/container/"]),
+    ("zip", &["learning/recording/read/npz.rs"]),
+    ("flate2", &["app/report/plot/png.rs"]),
+    ("clap", &["app/cli/"]),
+    ("signal_hook", &["app/cli/interrupt.rs"]),
+];
+
+/// Position of a module in the order.
+fn position(module: &str) -> Option<usize> {
+    FLOORS.iter().flat_map(|(_, modules)| *modules).position(|known| *known == module)
+}
+
+/// Source files below `src` that are not tests, by their path there, without comments and tests.
+fn sources() -> Vec<(String, String)> {
+    fn gather(folder: &Path, root: &Path, found: &mut Vec<(String, String)>) {
+        for entry in fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            let name = path.file_name().unwrap().to_str().unwrap();
+            if path.is_dir() {
+                gather(&path, root, found);
+            } else if name.ends_with(".rs") && !name.ends_with("tests.rs") {
+                let text = fs::read_to_string(&path).unwrap();
+                let code = text.split("#[cfg(test)]\nmod tests {").next().unwrap();
+                let code: Vec<&str> = code.lines().filter(|line| !line.trim_start().starts_with("//")).collect();
+                let inside = path.strip_prefix(root).unwrap().to_str().unwrap().replace('\\', "/");
+                found.push((inside, code.join("\n")));
+            }
+        }
+    }
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let mut found = Vec::new();
+    gather(&root, &root, &mut found);
+    found
+}
+
+/// Names behind `crate::` in a source.
+fn named(code: &str) -> impl Iterator<Item = &str> {
+    code.split("crate::").skip(1).map(|rest| rest.split(|c: char| !c.is_alphanumeric() && c != '_').next().unwrap())
+}
+
+#[test]
+fn no_file_imports_from_a_later_module() {
+    let mut faults = Vec::new();
+    let mut files = 0;
+    for (path, code) in sources() {
+        let [floor, module, ..] = path.split('/').collect::<Vec<_>>()[..] else { continue };
+        if module == "mod.rs" {
+            continue;
+        }
+        files += 1;
+        let at_home = FLOORS.iter().any(|(name, modules)| *name == floor && modules.contains(&module.trim_end_matches(".rs")));
+        assert!(at_home, "{path}: no module of the list");
+        assert!(!code.contains("use crate::{"), "{path}: one line per module, so that the order can be read off");
+        let own = position(module.trim_end_matches(".rs"));
+        faults.extend(named(&code).filter(|name| position(name) > own).map(|name| format!("{path} imports {name}")));
+    }
+    assert!(files > 300 && faults.is_empty(), "{files} files\n{}", faults.join("\n"));
+}
+
+#[test]
+fn foreign_crates_stay_in_their_adapters() {
+    for (path, code) in sources() {
+        for (name, places) in ADAPTERS {
+            let named = [format!("use {name}::"), format!(" {name}::"), format!("({name}::"), format!("<{name}::")];
+            let leaks = named.iter().any(|text| code.contains(text)) && !places.iter().any(|at| path.starts_with(at));
+            assert!(!leaks, "{path} names {name}");
+        }
+    }
+}

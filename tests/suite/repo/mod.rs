@@ -1,0 +1,8 @@
+//! The repository itself: order of modules, examples, use by other programs, seeds of the fuzz targets, pages.
+
+mod docs;
+mod embedding;
+mod examples;
+mod floors;
+mod fuzz_seeds;
+mod model_format;
