@@ -18,7 +18,7 @@ struct Joints([f64; 2]);
 
 impl Dissipation for Joints {
     fn dissipation<R: Real>(&self, _q: &[R], v: &[R]) -> R {
-        let [base, between] = self.0.map(|c| R::constant(Scalar::of_f64(c)));
+        let [base, between] = self.0.map(R::of);
         (base * v[0].sqr() + between * (v[1] - v[0]).sqr()) * R::half()
     }
 }

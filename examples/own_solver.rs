@@ -2,7 +2,7 @@
 //!
 //! Energy and horizontal momentum are conserved; both are compared with their values at the start.
 
-use lnn::lagrangian::{EulerLagrange, Mechanics, Lagrangian, MechanicsError, Request, Terms};
+use lnn::lagrangian::{EulerLagrange, Lagrangian, Mechanics, MechanicsError, Request, Terms};
 use lnn::scalar::Real;
 use nalgebra::SVector;
 use ode_solvers::{Dopri5, System};

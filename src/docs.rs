@@ -18,7 +18,7 @@
 //! | [`results`] | five systems by seeds, limits, time to accuracy, what made training exact, the paper's tables |
 //! | [`accuracy`] | errors of the numerics, run time against error |
 //! | [`performance`] | training steps, evaluations, small matrices, beside PyTorch and JAX |
-//! | [`architecture`] | rooms, flow of data, how to add a system, an operation, an integrator |
+//! | [`architecture`] | floors, flow of data, how to add a system, an operation, an integrator |
 //! | [`building`] | test programs, fuzzing, benchmarks |
 
 /// A page behind the definitions of its links: the first definition of a label counts, so that these, to modules, stand

@@ -23,7 +23,8 @@
 //! | get `L`, `p`, `M`, `a`, `E` of states | [`lagrangian::EulerLagrange::terms`] |
 //! | know metric, connection and curvature at a point | [`geometry::geometries`] |
 //! | integrate, with error control or symplectically | [`rollout::rollout`], [`rollout::rollout_many`] |
-//! | learn from accelerations | [`training::run`] (a configuration), [`training::train`] (your own [`data::Dataset`]) |
+//! | learn from accelerations | [`presets::Trainer`] (your own [`data::Dataset`]), [`training::run`] (a configuration) |
+//! | learn from recorded motion | `pipeline::Fit` (feature `pipeline`) |
 //! | know every key of a configuration | the page [`docs::configuration`] |
 //! | minimise your own loss of a network | [`training::Objective`], or [`tape::Recorded`] and [`tape::Evaluation`] below it |
 //! | store and load models | [`network::file::ModelFile`] |
@@ -35,11 +36,8 @@
 //! | judge a model: energy, coordinates, Lyapunov exponents | [`analysis`] |
 //! | train, fit, evaluate, run an experiment, with all files and reports | `pipeline` (feature `pipeline`) |
 //!
-//! Rooms, each importing only from those above it: `names`, [`scalar`], `storage`, [`random`], `ops`, [`forward`], [`linalg`],
-//! [`tape`], [`recording`], [`lagrangian`], [`geometry`], [`rollout`], [`network`], [`symmetry`], [`certificate`],
-//! [`optimizers`], [`configuration`], [`data`], [`training`], [`shooting`], [`presets`], [`analysis`], [`relativity`], [`experiments`], `report` (feature `plot`),
-//! `pipeline` (feature `pipeline`), `cli` (feature `cli`, the default; a library user leaves it out by
-//! `default-features = false`).
+//! [`prelude`] holds the names that most programs need. Inside, the modules stand on six floors, `numerics`, `support`, `mechanics`,
+//! `learning`, `physics` and `app`, each of which imports only from those before it.
 //!
 //! # Shapes, units, numbers
 //!
@@ -55,26 +53,28 @@
 //! # Terms of a Lagrangian
 //!
 //! ```
-//! use lnn::lagrangian::{EulerLagrange, Mechanics, Lagrangian, Request, Terms};
-//! use lnn::scalar::Real;
+//! use lnn::prelude::*;
 //!
 //! struct SpringPendulum; // q = (length in m, angle in rad); m, k, rest length, g
 //! impl Lagrangian for SpringPendulum {
 //!     fn coordinates(&self) -> usize { 2 }
 //!     fn lagrangian<R: Real>(&self, p: &[R], q: &[R], v: &[R]) -> R {
-//!         let kinetic = p[0] * (v[0].sqr() + (q[0] * v[1]).sqr()) * R::half();
-//!         kinetic - p[1] * (q[0] - p[2]).sqr() * R::half() + p[0] * p[3] * q[0] * q[1].cos()
+//!         let kinetic = p[0] * (v[0].sqr() + (q[0] * v[1]).sqr()) * R::of(0.5);
+//!         kinetic - p[1] * (q[0] - p[2]).sqr() * R::of(0.5) + p[0] * p[3] * q[0] * q[1].cos()
 //!     }
 //! }
 //!
-//! let model = Mechanics::new(SpringPendulum, vec![0.5, 20.0, 1.0, 9.81]);
-//! let mut terms = Terms::default(); // reused: later calls allocate nothing
+//! let model = Mechanics::new(SpringPendulum, [0.5, 20.0, 1.0, 9.81]);
 //! let (q, v) = ([1.2, 0.0, 1.5, 0.3], [0.0, 2.0, 1.0, 0.0]); // two states
-//! model.terms(&q, &v, Request::MASS_MATRIX | Request::ACCELERATION, &mut terms)?;
-//! assert_eq!(terms.mass_matrix[..4], [0.5, 0.0, 0.0, 0.5 * 1.2 * 1.2]);
+//! assert_eq!(model.mass_matrix(&q, &v)?[..4], [0.5, 0.0, 0.0, 0.5 * 1.2 * 1.2]);
 //! // r'' = r w^2 - k (r - r0)/m + g cos(angle)
 //! let expected: f64 = 1.2 * 4.0 - 20.0 * 0.2 / 0.5 + 9.81;
-//! assert!((terms.acceleration[0] - expected).abs() < 1e-13);
+//! assert!((model.acceleration(&q, &v)?[0] - expected).abs() < 1e-13);
+//!
+//! // Several terms in one pass, into buffers that are used again: later calls allocate nothing.
+//! let mut terms = Terms::default();
+//! model.terms(&q, &v, Request::MASS_MATRIX | Request::ENERGY, &mut terms)?;
+//! assert_eq!(terms.energy.len(), 2);
 //! # Ok::<(), lnn::lagrangian::MechanicsError>(())
 //! ```
 //!
@@ -82,13 +82,16 @@
 //!
 //! ```
 //! use lnn::lagrangian::build;
-//! use lnn::rollout::{Method, Options, rollout};
+//! use lnn::prelude::*;
+//! use lnn::rollout::Method;
 //!
 //! let model = build::<f64>("double-pendulum", &[("m2".to_string(), "0.5".to_string())])?;
-//! let options = Options { method: Method::Gauss6, step: Some(0.01), ..Options::new(5.0, 0.1) };
-//! let motion = rollout(&*model, &[2.0, 1.0], &[0.0, 0.0], &options).complete()?;
-//! let energy = motion.energy.unwrap(); // J, at every sample
+//! let motion = model.rollout(&[2.0, 1.0], &[0.0, 0.0], 5.0, 0.1)?; // 5 s, a sample every 0.1 s
 //! assert_eq!(motion.t.len(), 51);
+//!
+//! // By a method that keeps the energy.
+//! let options = Options { method: Method::Gauss6, step: Some(0.01), ..Options::new(5.0, 0.1) };
+//! let energy = rollout(&*model, &[2.0, 1.0], &[0.0, 0.0], &options).complete()?.energy.unwrap(); // J, at every sample
 //! assert!(energy.iter().all(|e| (e - energy[0]).abs() < 1e-7));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
@@ -112,8 +115,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! With states of your own, make a [`data::Dataset`] for each of training, validation and test, and call
-//! [`training::train`] with the same configuration.
+//! States of your own go to [`presets::Trainer`], recordings to `pipeline::Fit`.
 //!
 //! # Derivatives by the tape
 //!
@@ -124,7 +126,7 @@
 //! struct Rosenbrock;
 //! impl ScalarFunction for Rosenbrock {
 //!     fn eval<R: Real>(&self, x: &[R]) -> R {
-//!         (R::one() - x[0]).sqr() + (x[1] - x[0].sqr()).sqr() * (R::two() * R::two() * R::two())
+//!         (R::one() - x[0]).sqr() + (x[1] - x[0].sqr()).sqr() * R::of(8.0)
 //!     }
 //! }
 //!
@@ -136,51 +138,51 @@
 //! Guides and reference stand in [`docs`]: the command line, configurations, recorded motion, the method, figures with their
 //! commands. Programs that use the crate stand in `examples/`: solvers of other crates, parameter identification by argmin, nalgebra
 //! matrices, batches without allocation, a filmed pendulum, and a reader of model files in Python.
-// What only higher rooms use is dead without them; the default features tell what is dead for everybody.
+// What only higher floors use is dead without them; the default features tell what is dead for everybody.
 #![cfg_attr(not(feature = "cli"), allow(dead_code, unused_imports))]
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 
 pub mod prelude;
 
-mod numerics;
-mod support;
-mod mechanics;
-#[cfg(feature = "data")]
-mod learning;
-mod physics;
 #[cfg(feature = "training")]
 mod app;
+#[cfg(feature = "data")]
+mod learning;
+mod mechanics;
+mod numerics;
+mod physics;
+mod support;
 
 // Users need not know the floors.
-pub use numerics::{forward, linalg, random, scalar, tape};
+#[cfg(feature = "cli")]
 #[doc(hidden)]
-pub use numerics::ops;
-pub(crate) use support::names;
+pub use app::cli;
+#[cfg(feature = "training")]
+pub use app::experiments;
+#[cfg(feature = "pipeline")]
+pub use app::pipeline;
+#[cfg(feature = "plot")]
 #[doc(hidden)]
-pub use support::storage;
-pub use mechanics::{lagrangian, network};
-#[cfg(feature = "rollout")]
-pub use mechanics::rollout;
+pub use app::report;
 #[cfg(feature = "data")]
 pub use learning::recording;
 #[cfg(feature = "training")]
 pub use learning::{configuration, data, optimizers, presets, shooting, training};
+#[cfg(feature = "rollout")]
+pub use mechanics::rollout;
+pub use mechanics::{lagrangian, network};
+#[doc(hidden)]
+pub use numerics::ops;
+pub use numerics::{forward, linalg, random, scalar, tape};
+#[cfg(feature = "training")]
+pub use physics::analysis;
 pub use physics::{certificate, geometry};
 #[cfg(feature = "rollout")]
 pub use physics::{relativity, symmetry};
-#[cfg(feature = "training")]
-pub use physics::analysis;
-#[cfg(feature = "training")]
-pub use app::experiments;
-#[cfg(feature = "plot")]
+pub(crate) use support::names;
 #[doc(hidden)]
-pub use app::report;
-#[cfg(feature = "pipeline")]
-pub use app::pipeline;
-#[cfg(feature = "cli")]
-#[doc(hidden)]
-pub use app::cli;
+pub use support::storage;
 
 #[cfg(all(any(doc, doctest), feature = "cli"))]
 #[cfg(any(doc, doctest))]

@@ -8,7 +8,7 @@ use super::Scale;
 use lnn::analysis::{Determination, Estimate, Observed, constants, determination};
 use lnn::configuration::{Config, Known, Penalty};
 use lnn::data::{PrepareOptions, RecordingSplit};
-use lnn::lagrangian::{EulerLagrange, Mechanics, Lagrangian, MechanicsError, Request, Terms};
+use lnn::lagrangian::{EulerLagrange, Lagrangian, Mechanics, MechanicsError, Request, Terms};
 use lnn::linalg::Workspace;
 use lnn::network::{Initialization, NetworkLagrangian};
 use lnn::random::{RandomGenerator, RngStream};

@@ -7,11 +7,11 @@
 //! | [`pipeline`] | trainings, fits, evaluations and experiments from configuration to report |
 //! | [`cli`] | arguments to calls of the library |
 
-#[cfg(feature = "training")]
-pub mod experiments;
-#[cfg(feature = "plot")]
-pub mod report;
-#[cfg(feature = "pipeline")]
-pub mod pipeline;
 #[cfg(feature = "cli")]
 pub mod cli;
+#[cfg(feature = "training")]
+pub mod experiments;
+#[cfg(feature = "pipeline")]
+pub mod pipeline;
+#[cfg(feature = "plot")]
+pub mod report;

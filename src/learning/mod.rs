@@ -10,17 +10,17 @@
 //! | [`shooting`] | multiple shooting: learning through the motion |
 //! | [`presets`] | configurations that ship with the crate, trainings on arrays |
 
-#[cfg(feature = "data")]
-pub mod recording;
-#[cfg(feature = "training")]
-pub mod optimizers;
 #[cfg(feature = "training")]
 pub mod configuration;
 #[cfg(feature = "training")]
 pub mod data;
 #[cfg(feature = "training")]
-pub mod training;
+pub mod optimizers;
+#[cfg(feature = "training")]
+pub mod presets;
+#[cfg(feature = "data")]
+pub mod recording;
 #[cfg(feature = "training")]
 pub mod shooting;
 #[cfg(feature = "training")]
-pub mod presets;
+pub mod training;

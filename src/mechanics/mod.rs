@@ -7,6 +7,6 @@
 //! | [`network`] | network Lagrangians, their structures, model files |
 
 pub mod lagrangian;
+pub mod network;
 #[cfg(feature = "rollout")]
 pub mod rollout;
-pub mod network;

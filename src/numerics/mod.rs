@@ -9,9 +9,9 @@
 //! | [`linalg`] | small symmetric systems in batches: solve, eigenvalues, inertia, minors, signatures |
 //! | [`tape`] | reverse mode: eager, recorded programs, and the engine of all second derivatives of a Lagrangian |
 
-pub mod scalar;
-pub mod random;
-pub mod ops;
 pub mod forward;
 pub mod linalg;
+pub mod ops;
+pub mod random;
+pub mod scalar;
 pub mod tape;

@@ -8,11 +8,11 @@
 //! | [`analysis`] | errors of accelerations, energy and trajectories, Lyapunov times, what data determine |
 //! | [`relativity`] | black holes, light in a metric |
 
-pub mod geometry;
-#[cfg(feature = "rollout")]
-pub mod symmetry;
-pub mod certificate;
 #[cfg(feature = "training")]
 pub mod analysis;
+pub mod certificate;
+pub mod geometry;
 #[cfg(feature = "rollout")]
 pub mod relativity;
+#[cfg(feature = "rollout")]
+pub mod symmetry;

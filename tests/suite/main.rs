@@ -6,12 +6,12 @@
 mod autodiff;
 mod common;
 mod geometry;
-mod repo;
 mod linalg;
 mod mechanics;
 mod network;
 mod program;
 mod recording;
+mod repo;
 mod rollout;
 mod stress;
 mod symmetry;

@@ -2,7 +2,7 @@
 
 use super::derivatives::{RequestedTerms, State, evaluate};
 use super::system::{ClosedForm, System};
-use super::{EulerLagrange, ExpressionLagrangian, Mechanics, Lagrangian, Request, Terms};
+use super::{EulerLagrange, ExpressionLagrangian, Lagrangian, Mechanics, Request, Terms};
 use crate::linalg::Workspace;
 use crate::names::unknown;
 use crate::scalar::{Dd, Scalar};

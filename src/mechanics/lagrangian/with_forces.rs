@@ -52,8 +52,7 @@ impl<S: Scalar, D: Dissipation> GeneralizedForce<S> for Rayleigh<D> {
 /// struct Joints; // D = (c1 v1^2 + c2 (v2 - v1)^2) / 2, c in N m s
 /// impl Dissipation for Joints {
 ///     fn dissipation<R: Real>(&self, _q: &[R], v: &[R]) -> R {
-///         let c = |x: f64| R::constant(lnn::scalar::Scalar::of_f64(x));
-///         (c(0.08) * v[0].sqr() + c(0.05) * (v[1] - v[0]).sqr()) * R::half()
+///         (R::of(0.08) * v[0].sqr() + R::of(0.05) * (v[1] - v[0]).sqr()) * R::of(0.5)
 ///     }
 /// }
 ///

@@ -135,7 +135,7 @@ pub(crate) fn metric_components(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lagrangian::{Mechanics, Lagrangian, configure};
+    use crate::lagrangian::{Lagrangian, Mechanics, configure};
     use crate::scalar::Real;
 
     /// Sphere of radius `a`, `L = a^2 (v_0^2 + sin^2 q_0 v_1^2)/2 - b q_0`.

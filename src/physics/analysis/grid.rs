@@ -197,7 +197,7 @@ mod tests {
 
     #[test]
     fn velocities_are_imposed_point_by_point() {
-        use crate::lagrangian::{Mechanics, Lagrangian};
+        use crate::lagrangian::{Lagrangian, Mechanics};
         use crate::scalar::Real;
         /// `L = v_0^4 / 12 + v_1^2 / 2`: `det M = v_0^2`.
         struct Quartic;

@@ -69,7 +69,7 @@ pub fn mass_matrix_error<S: Scalar>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lagrangian::{Mechanics, Lagrangian};
+    use crate::lagrangian::{Lagrangian, Mechanics};
 
     /// `L = a |v|^2 / 2 + b q_0 v_0^2 / 2 + c |v|^4`.
     struct Masses([f64; 3]);

@@ -40,7 +40,7 @@ fn inertias<S: Scalar>(model: &dyn EulerLagrange<S>, q: &[S], v: &[S]) -> Vec<Op
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lagrangian::{Mechanics, Lagrangian};
+    use crate::lagrangian::{Lagrangian, Mechanics};
 
     /// `L = sum_i m_i v_i^2 / 2`, the first mass of the sign of `q_0`.
     struct Masses([f64; 2]);

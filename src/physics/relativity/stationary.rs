@@ -47,7 +47,7 @@ pub(crate) fn depends_on_time(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lagrangian::{Mechanics, Lagrangian, build};
+    use crate::lagrangian::{Lagrangian, Mechanics, build};
     use crate::scalar::Real;
 
     /// `a(t)^2 dx^2 - dt^2`, `a = 1 + rate sin t`.

@@ -4,7 +4,7 @@ use super::rays::{Fate, trace};
 use super::tetrad::Tetrad;
 use super::vector::{norm, product, times};
 use super::*;
-use crate::lagrangian::{EulerLagrange, Mechanics, Interruptible, Lagrangian, MechanicsError, build};
+use crate::lagrangian::{EulerLagrange, Interruptible, Lagrangian, Mechanics, MechanicsError, build};
 use crate::scalar::Real;
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::sync::atomic::{AtomicBool, Ordering};

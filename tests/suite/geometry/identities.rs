@@ -5,7 +5,7 @@ use super::spaces::dd;
 use crate::common::properties;
 use lnn::forward::HyperDual;
 use lnn::geometry::{Geometry, geometries};
-use lnn::lagrangian::{EulerLagrange, Mechanics, Lagrangian, MechanicsError, Request, Terms};
+use lnn::lagrangian::{EulerLagrange, Lagrangian, Mechanics, MechanicsError, Request, Terms};
 use lnn::scalar::{Dd, Real, Scalar};
 use lnn::tape::VectorFunction;
 use proptest::prelude::*;

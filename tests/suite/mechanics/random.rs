@@ -2,7 +2,7 @@
 
 use crate::common::properties;
 use lnn::forward::{Dual, HyperDual};
-use lnn::lagrangian::{EulerLagrange, Mechanics, Lagrangian, Request, Terms};
+use lnn::lagrangian::{EulerLagrange, Lagrangian, Mechanics, Request, Terms};
 use lnn::linalg::{self, Inertia, Workspace};
 use lnn::scalar::{Dd, Real, Scalar};
 use proptest::prelude::*;

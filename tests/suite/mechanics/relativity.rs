@@ -2,7 +2,7 @@
 
 use crate::common::accuracy::{cast, configure, input_conditions, outputs, random_state, recast};
 use lnn::lagrangian::system::{Bounds, System};
-use lnn::lagrangian::{self, EulerLagrange, Mechanics, Lagrangian, MechanicsError, Request, SystemInstance, Terms};
+use lnn::lagrangian::{self, EulerLagrange, Lagrangian, Mechanics, MechanicsError, Request, SystemInstance, Terms};
 use lnn::linalg::{self, Inertia};
 use lnn::rollout::{Options, rollout};
 use lnn::scalar::{Dd, Real, Scalar};

@@ -73,7 +73,8 @@ fn no_file_imports_from_a_later_module() {
             continue;
         }
         files += 1;
-        let at_home = FLOORS.iter().any(|(name, modules)| *name == floor && modules.contains(&module.trim_end_matches(".rs")));
+        let at_home =
+            FLOORS.iter().any(|(name, modules)| *name == floor && modules.contains(&module.trim_end_matches(".rs")));
         assert!(at_home, "{path}: no module of the list");
         assert!(!code.contains("use crate::{"), "{path}: one line per module, so that the order can be read off");
         let own = position(module.trim_end_matches(".rs"));

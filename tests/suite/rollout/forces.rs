@@ -3,7 +3,7 @@
 use crate::common::damped;
 use lnn::lagrangian::systems::double_pendulum::DoublePendulum;
 use lnn::lagrangian::systems::harmonic_oscillator::HarmonicOscillator;
-use lnn::lagrangian::{EulerLagrange, Mechanics, Lagrangian, Request, Terms, inverse_dynamics};
+use lnn::lagrangian::{EulerLagrange, Lagrangian, Mechanics, Request, Terms, inverse_dynamics};
 use lnn::rollout::{
     Driven, Force, Integrable, Method, Options, Rollout, RolloutError, SampledForce, Start, rollout, rollout_each,
 };

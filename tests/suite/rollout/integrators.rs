@@ -5,7 +5,7 @@
 
 use lnn::lagrangian::systems::double_pendulum::DoublePendulum;
 use lnn::lagrangian::systems::spring_pendulum::SpringPendulum;
-use lnn::lagrangian::{EulerLagrange, Mechanics, Lagrangian, Request, Terms, configure};
+use lnn::lagrangian::{EulerLagrange, Lagrangian, Mechanics, Request, Terms, configure};
 use lnn::rollout::{Domain, Method, Options, Rollout, RolloutError, rollout, rollout_fixed};
 use lnn::scalar::{Dd, Real, Scalar};
 use std::time::Instant;

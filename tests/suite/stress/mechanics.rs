@@ -9,7 +9,7 @@ use lnn::lagrangian::systems::{
     double_pendulum::DoublePendulum, henon_heiles::HenonHeiles, kepler::Kepler, spring_pendulum::SpringPendulum,
     triple_pendulum::TriplePendulum,
 };
-use lnn::lagrangian::{self, EulerLagrange, Mechanics, Lagrangian, Request, Terms};
+use lnn::lagrangian::{self, EulerLagrange, Lagrangian, Mechanics, Request, Terms};
 use lnn::linalg::{self, Workspace};
 use lnn::network::{ActivationChoice, NetworkLagrangian};
 use lnn::scalar::{Dd, Real, Scalar};

@@ -191,7 +191,7 @@ fn all_has(all: &[Change], product: &[usize]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lagrangian::{EulerLagrange, Mechanics, Lagrangian, Request, Terms};
+    use crate::lagrangian::{EulerLagrange, Lagrangian, Mechanics, Request, Terms};
     use crate::scalar::Real;
 
     /// `cos(q0) v0 v1 + sin(2 q0) q1 v1^2 + v0^2 v1^2 - cos(q0) q1`.

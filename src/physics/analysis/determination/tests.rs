@@ -1,7 +1,7 @@
 //! Ranges of small systems that are written down, without a training.
 
 use super::{Observed, determination, misfit};
-use crate::lagrangian::{Mechanics, Lagrangian};
+use crate::lagrangian::{Lagrangian, Mechanics};
 use crate::random::RngStream;
 use crate::scalar::Real;
 use rand::Rng;
