@@ -14,6 +14,7 @@ use lnn::configuration::Penalty;
 use lnn::data::Dataset;
 use lnn::lagrangian::{EulerLagrange, Request, Terms};
 use lnn::network::{Architecture, Initialization, NetworkLagrangian, initial_weights};
+use lnn::optimizers::{Method, Moments, Update};
 use lnn::rollout::{rollout_many, rollout_together};
 use lnn::scalar::Scalar;
 use lnn::tape::{Depth, Evaluation, STATES};
@@ -66,6 +67,21 @@ impl<S: Scalar> Setup<S> {
         let mut gradient = self.weights.clone();
         Work::new(name, move || {
             black_box(objective.step(&self.weights, &self.data, &self.rows, &mut gradient));
+        })
+    }
+
+    /// The update of all weights by their gradient.
+    fn update(&self, method: Method) -> Work<'_> {
+        let matrices = self.architecture.model::<S>().matrices();
+        let mut moments = Moments::for_method(method, self.weights.len(), matrices);
+        let (mut weights, mut gradient) = (self.weights.clone(), self.weights.clone());
+        let mut objective = Objective::new(&self.architecture, Penalty::None, 1).expect("threads");
+        objective.step(&self.weights, &self.data, &self.rows, &mut gradient);
+        let mut used = gradient.clone();
+        let update = Update { method, rate: 1e-9, weight_decay: 0.0, decaying: usize::MAX, clip: 1.0 };
+        Work::new(method.name(), move || {
+            used.copy_from_slice(&gradient);
+            black_box(moments.update(&mut weights, &mut used, &update));
         })
     }
 
@@ -158,6 +174,21 @@ fn requests(options: &Options) {
     );
 }
 
+fn updates(options: &Options) {
+    println!("\n### Updates: n = 2, batch {BATCH}, f32, one thread\n");
+    println!("| width | rule | us | of gradient and update |\n|---|---|---|---|");
+    for width in if options.smoke { vec![32] } else { vec![128, 192, 500] } {
+        let setup = Setup::<f32>::new(2, width, 1.0);
+        let mut work = vec![setup.step("gradient", Penalty::None, 1)];
+        work.extend([Method::Radam, Method::Soap].map(|method| setup.update(method)));
+        in_turns(&mut work, options.rounds(), TURN);
+        for w in &work[1..] {
+            let share = w.times_of(&work[0]);
+            println!("| {width} | {} | {:.0} | {:.3} |", w.name, w.median() * 1e6, share / (1.0 + share));
+        }
+    }
+}
+
 fn coordinates(options: &Options) {
     let width = options.width();
     let counts = [1, 2, 4, 8, 12, 20];
@@ -229,6 +260,7 @@ fn main() {
 pub fn run(smoke: bool) {
     let options = Options { smoke };
     requests(&options);
+    updates(&options);
     coordinates(&options);
     latency::<f32>(&options);
     latency::<f64>(&options);

@@ -1,6 +1,8 @@
 //! Adam, RAdam and SOAP with L2 weight decay and gradient clipping, one step at a time.
 
+mod eigenvectors;
 mod orthonormal;
+mod part;
 mod schedule;
 mod soap;
 
@@ -8,8 +10,9 @@ pub use schedule::Schedule;
 pub(crate) use soap::Block;
 
 use crate::scalar::{Real, Scalar, vectorized};
+use part::Part;
 use serde::{Deserialize, Serialize};
-use soap::Eigenbasis;
+use soap::{Eigenbasis, Step};
 
 /// Which update rule.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -21,7 +24,7 @@ pub enum Method {
     /// RAdam (Liu et al. 2020): no second moment until its variance is tractable, then rectified.
     Radam,
     /// RAdam in the eigenbases of Shampoo's preconditioner (Vyas et al. 2024): fewer steps to the same loss, each of them
-    /// dearer by six products of the size of each weight matrix.
+    /// dearer by four products of the size of each weight matrix and two squares of it.
     Soap,
 }
 
@@ -73,8 +76,6 @@ pub struct Update {
     pub clip: f64,
 }
 
-const EPSILON: f64 = 1e-8;
-
 /// The matrices that have eigenbases, out of offset, rows and columns of each.
 fn blocks(method: Method, matrices: impl IntoIterator<Item = (usize, usize, usize)>) -> Vec<Block> {
     if method != Method::Soap {
@@ -91,8 +92,8 @@ pub(crate) fn eigenbasis_numbers(
 ) -> Option<(usize, usize)> {
     let blocks = blocks(method, matrices);
     let kept = Block::numbers(&blocks)?;
-    let turned = blocks.iter().try_fold(0_usize, |sum, b| sum.checked_add(b.rows.checked_mul(b.cols)?))?;
-    Some((kept, kept.checked_add(turned)?.checked_mul(2)?))
+    let matrices = blocks.iter().try_fold(0_usize, |sum, b| sum.checked_add(b.rows.checked_mul(b.cols)?))?;
+    Some((kept, kept.checked_mul(2)?.checked_add(matrices)?))
 }
 
 /// First and second moments of the gradient, and the eigenbases they are taken in.
@@ -166,7 +167,6 @@ impl<S: Scalar> Moments<S> {
         self.step += 1;
         let clip = S::of_f64(if norm > update.clip { update.clip / norm } else { 1.0 });
         let decay = S::of_f64(update.weight_decay);
-        let advance = self.rule(update);
         let decaying = update.decaying.min(weights.len());
         vectorized(
             #[inline(always)]
@@ -176,60 +176,27 @@ impl<S: Scalar> Moments<S> {
                 constants.iter_mut().for_each(|g| *g *= clip);
             },
         );
-        let moments = self.first.iter_mut().zip(self.second.iter_mut());
-        if self.bases.is_empty() {
-            vectorized(
-                #[inline(always)]
-                move || {
-                    for ((w, &g), (m, v)) in weights.iter_mut().zip(&*gradient).zip(moments) {
-                        *w -= advance(m, v, g);
-                    }
-                },
-            );
-            return norm;
+        let step = Step::new(update, self.step);
+        let (bases, first, second) = (&mut self.bases[..], &mut self.first[..], &mut self.second[..]);
+        let part = Part { start: 0, weights, gradient, first, second };
+        match pool {
+            Some(pool) if !bases.is_empty() => pool.install(|| step.take(part, bases, true)),
+            _ => step.take(part, bases, false),
         }
-        soap::enter(&mut self.bases, gradient, self.step == 1, pool);
-        vectorized(
-            #[inline(always)]
-            || {
-                for (g, (m, v)) in gradient.iter_mut().zip(moments) {
-                    *g = advance(m, v, *g);
-                }
-            },
-        );
-        soap::leave(&mut self.bases, gradient, pool);
-        for (w, &step) in weights.iter_mut().zip(&*gradient) {
-            *w -= step;
-        }
-        soap::follow(&mut self.bases, &mut self.first, self.step, pool);
         norm
     }
+}
 
-    /// Adam's rule for one number: both moments move on, the step comes back.
-    fn rule(&self, update: &Update) -> impl Fn(&mut S, &mut S, S) -> S + use<S> {
-        let (step, scale) = self.step_size(update);
-        let decay = update.method.decay();
-        let [b1, b2] = decay.map(S::of_f64);
-        let [c1, c2] = decay.map(|b| S::of_f64(1.0 - b));
-        let (step, epsilon) = (S::of_f64(step), S::of_f64(EPSILON));
-        move |m, v, g| {
-            *m = b1 * *m + c1 * g;
-            *v = b2 * *v + c2 * g * g;
-            step * match scale {
-                Some(scale) => *m / (v.sqrt() * S::of_f64(scale) + epsilon),
-                None => *m,
-            }
-        }
-    }
-
-    /// Step length and the factor of the second moment's root; no factor where RAdam does without the second moment.
-    fn step_size(&self, update: &Update) -> (f64, Option<f64>) {
-        let t = f64::from(self.step);
-        let [b1, b2] = update.method.decay();
+impl Update {
+    /// Length of step `step`, counted from 1, and the factor of the second moment's root; no factor where RAdam does
+    /// without the second moment.
+    fn step_size(&self, step: u32) -> (f64, Option<f64>) {
+        let t = f64::from(step);
+        let [b1, b2] = self.method.decay();
         let (correction1, correction2) = (1.0 - b1.powf(t), 1.0 - b2.powf(t));
-        let adam = update.rate / correction1;
+        let adam = self.rate / correction1;
         let second = Some(1.0 / correction2.sqrt());
-        match update.method {
+        match self.method {
             Method::Adam => (adam, second),
             Method::Radam | Method::Soap => {
                 let limit = 2.0 / (1.0 - b2) - 1.0;

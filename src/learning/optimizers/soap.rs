@@ -4,16 +4,15 @@
 //! rows); Adam works on `U G V^T`, where the curvature is closer to diagonal, and its step is turned back. The
 //! eigenvectors follow by a step of subspace iteration every [`EVERY`] steps.
 
-use crate::linalg::{MatMut, MatRef, Workspace, eigh, gemm};
-use crate::optimizers::orthonormal::orthonormalize;
+use crate::linalg::{MatMut, MatRef, gemm};
+use crate::optimizers::Update;
+use crate::optimizers::eigenvectors::Side;
+use crate::optimizers::part::{Part, Rule};
 use crate::scalar::{Real, Scalar};
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// Steps between two looks at the eigenvectors.
 const EVERY: u32 = 10;
-/// Running means after a step.
-const KEEP: f64 = 0.95;
 /// Sides longer than this are not turned.
 const LONGEST: usize = 1024;
 
@@ -55,112 +54,27 @@ impl Block {
     }
 }
 
-/// Running mean of `G G^T` or `G^T G` and its eigenvectors as rows, `(size, size)`; empty if this side is not turned.
-#[derive(Clone, Debug)]
-struct Side<S> {
-    size: usize,
-    covariance: Vec<S>,
-    vectors: Vec<S>,
-    /// The next eigenvectors, then how they are turned against the last.
-    next: Vec<S>,
-    turn: Vec<S>,
-}
-
-/// Equal in what a step leaves behind.
-impl<S: PartialEq> PartialEq for Side<S> {
-    fn eq(&self, other: &Self) -> bool {
-        (&self.covariance, &self.vectors) == (&other.covariance, &other.vectors)
-    }
-}
-
-impl<S: Scalar> Side<S> {
-    fn new(size: usize) -> Self {
-        let zeros = || vec![<S as Real>::zero(); size * size];
-        Self { size, covariance: zeros(), vectors: zeros(), next: zeros(), turn: zeros() }
-    }
-
-    fn matrix<'a>(&self, data: &'a [S]) -> MatRef<'a, S> {
-        MatRef::new(data, self.size, self.size)
-    }
-
-    /// Adds `g g^T` to the running mean.
-    fn observe(&mut self, g: MatRef<'_, S>, first: bool) {
-        if self.size == 0 {
-            return;
-        }
-        let (keep, take) = if first { (0.0, 1.0) } else { (KEEP, 1.0 - KEEP) };
-        let keep = S::of_f64(keep);
-        self.covariance.iter_mut().for_each(|c| *c *= keep);
-        let size = self.size;
-        gemm(MatMut::new(&mut self.covariance, size, size), true, S::of_f64(take), g, g.t());
-    }
-
-    /// Eigenvectors of the first running mean, those of large eigenvalues first.
-    fn begin(&mut self) {
-        let size = self.size;
-        if size == 0 {
-            return;
-        }
-        let mut values = vec![<S as Real>::zero(); size];
-        let done = eigh(size, &self.covariance, &mut values, &mut self.next, &mut Workspace::new());
-        for (k, vector) in self.vectors.chunks_exact_mut(size).enumerate() {
-            match done {
-                Ok(()) => vector.copy_from_slice(&self.next[(size - 1 - k) * size..][..size]),
-                Err(_) => (0..size).for_each(|i| vector[i] = S::of_f64(f64::from(u8::from(i == k)))),
-            }
-        }
-    }
-
-    /// One step of subspace iteration; `turn` becomes new vectors times old ones transposed. Nothing changes where the
-    /// mean is not finite.
-    fn follow(&mut self) {
-        let size = self.size;
-        if size == 0 {
-            return;
-        }
-        let trace = self.covariance.iter().step_by(size + 1).fold(<S as Real>::zero(), |sum, &c| sum + c);
-        // Vectors of eigenvalues that are lost in rounding stay where they are.
-        let shift = S::epsilon() * trace + S::min_positive();
-        product(size, &mut self.next, &self.vectors, MatRef::new(&self.covariance, size, size));
-        for (next, &vector) in self.next.iter_mut().zip(&self.vectors) {
-            *next += shift * vector;
-        }
-        if !orthonormalize(size, &mut self.next, &mut self.turn) {
-            self.next.copy_from_slice(&self.vectors);
-        }
-        product(size, &mut self.turn, &self.next, MatRef::new(&self.vectors, size, size).t());
-        std::mem::swap(&mut self.vectors, &mut self.next);
-    }
-}
-
-/// `out = a b` of square matrices.
-fn product<S: Scalar>(size: usize, out: &mut [S], a: &[S], b: MatRef<'_, S>) {
-    gemm(MatMut::new(out, size, size), false, <S as Real>::one(), MatRef::new(a, size, size), b);
-}
-
 /// The eigenbases of one weight matrix.
 #[derive(Clone, Debug)]
 pub(crate) struct Eigenbasis<S> {
     block: Block,
-    left: Side<S>,
-    right: Side<S>,
-    /// The matrix that was turned, and half of the way.
-    turned: Vec<S>,
+    /// Of the rows, and of the columns.
+    sides: [Side<S>; 2],
+    /// Half of the way of a turn.
     half: Vec<S>,
 }
 
 /// Equal in what a step leaves behind.
 impl<S: PartialEq> PartialEq for Eigenbasis<S> {
     fn eq(&self, other: &Self) -> bool {
-        (self.block, &self.left, &self.right) == (other.block, &other.left, &other.right)
+        (self.block, &self.sides) == (other.block, &other.sides)
     }
 }
 
 impl<S: Scalar> Eigenbasis<S> {
     pub fn new(block: Block) -> Self {
-        let [rows, cols] = block.sides();
-        let zeros = || vec![<S as Real>::zero(); block.rows * block.cols];
-        Self { block, left: Side::new(rows), right: Side::new(cols), turned: zeros(), half: zeros() }
+        let half = vec![<S as Real>::zero(); block.rows * block.cols];
+        Self { block, sides: block.sides().map(Side::new), half }
     }
 
     pub fn block(&self) -> Block {
@@ -169,7 +83,7 @@ impl<S: Scalar> Eigenbasis<S> {
 
     /// Appends what a step leaves behind, both running means and eigenvectors.
     pub fn store(&self, out: &mut Vec<S>) {
-        for side in [&self.left, &self.right] {
+        for side in &self.sides {
             out.extend_from_slice(&side.covariance);
             out.extend_from_slice(&side.vectors);
         }
@@ -177,7 +91,7 @@ impl<S: Scalar> Eigenbasis<S> {
 
     /// Takes what [`Eigenbasis::store`] appended; returns the rest.
     pub fn load<'a>(&mut self, mut numbers: &'a [S]) -> &'a [S] {
-        for side in [&mut self.left, &mut self.right] {
+        for side in &mut self.sides {
             for target in [&mut side.covariance, &mut side.vectors] {
                 let (mine, rest) = numbers.split_at(target.len());
                 target.copy_from_slice(mine);
@@ -187,54 +101,25 @@ impl<S: Scalar> Eigenbasis<S> {
         numbers
     }
 
-    /// `turned = left X right^T` with square matrices, where a side is turned.
-    fn apply(&mut self, matrix: Option<&[S]>, left: Choice, right: Choice) {
-        let Block { rows, cols, .. } = self.block;
-        let one = <S as Real>::one();
-        if let Some(matrix) = matrix {
-            self.turned.copy_from_slice(matrix);
+    /// Advances the matrix, its moments and its eigenbases.
+    fn advance(&mut self, mut part: Part<'_, S>, step: &Step<S>, parallel: bool) {
+        let Self { block, sides, half } = self;
+        let [left, right] = &mut *sides;
+        let (g, first) = (MatRef::new(part.gradient, block.rows, block.cols), step.number == 1);
+        both(parallel, || left.observe(g, first), || right.observe(g.t(), first));
+        rotate(*block, sides, Choice::Vectors, part.gradient, half);
+        part.advance(&step.rule);
+        rotate(*block, sides, Choice::Inverse, part.gradient, half);
+        if step.number.is_multiple_of(EVERY) {
+            let [left, right] = &mut *sides;
+            both(parallel, || left.follow(), || right.follow());
+            rotate(*block, sides, Choice::Turn, part.first, half);
         }
-        if self.left.size > 0 {
-            let by = left.of(&self.left);
-            gemm(MatMut::new(&mut self.half, rows, cols), false, one, by, MatRef::new(&self.turned, rows, cols));
-        } else {
-            self.half.copy_from_slice(&self.turned);
-        }
-        if self.right.size > 0 {
-            let by = right.of(&self.right);
-            gemm(MatMut::new(&mut self.turned, rows, cols), false, one, MatRef::new(&self.half, rows, cols), by.t());
-        } else {
-            std::mem::swap(&mut self.turned, &mut self.half);
-        }
-    }
-
-    /// Takes note of a gradient and turns it into the eigenbasis.
-    fn enter(&mut self, gradient: &[S], first: bool) {
-        let Block { rows, cols, .. } = self.block;
-        let g = MatRef::new(&gradient[self.block.range()], rows, cols);
-        self.left.observe(g, first);
-        self.right.observe(g.t(), first);
-        if first {
-            self.left.begin();
-            self.right.begin();
-        }
-        self.apply(Some(&gradient[self.block.range()]), Choice::Vectors, Choice::Vectors);
-    }
-
-    /// Turns a direction back.
-    fn leave(&mut self, direction: &[S]) {
-        self.apply(Some(&direction[self.block.range()]), Choice::Inverse, Choice::Inverse);
-    }
-
-    /// Follows the eigenvectors and turns the first moment along.
-    fn follow(&mut self, first_moment: &[S]) {
-        self.left.follow();
-        self.right.follow();
-        self.apply(Some(&first_moment[self.block.range()]), Choice::Turn, Choice::Turn);
+        part.apply();
     }
 }
 
-/// By which matrix of a side to turn.
+/// By which matrices to turn.
 #[derive(Clone, Copy)]
 enum Choice {
     Vectors,
@@ -252,63 +137,141 @@ impl Choice {
     }
 }
 
-/// Turns the matrices of a gradient into their eigenbases, in place.
-pub(crate) fn enter<S: Scalar>(bases: &mut [Eigenbasis<S>], gradient: &mut [S], first: bool, pool: Threads<'_>) {
-    turn(bases, gradient, pool, |basis, gradient| basis.enter(gradient, first));
-}
-
-/// Turns the matrices of a direction back, in place.
-pub(crate) fn leave<S: Scalar>(bases: &mut [Eigenbasis<S>], direction: &mut [S], pool: Threads<'_>) {
-    turn(bases, direction, pool, Eigenbasis::leave);
-}
-
-/// Follows the eigenbases where it is time, the first moments with them.
-pub(crate) fn follow<S: Scalar>(bases: &mut [Eigenbasis<S>], first_moments: &mut [S], step: u32, pool: Threads<'_>) {
-    if step.is_multiple_of(EVERY) {
-        turn(bases, first_moments, pool, Eigenbasis::follow);
+/// `X = L X R^T` with a square matrix for each side that is turned; `half` has room for as many numbers as `X`.
+fn rotate<S: Scalar>(block: Block, [left, right]: &[Side<S>; 2], choice: Choice, x: &mut [S], half: &mut [S]) {
+    let Block { rows, cols, .. } = block;
+    let one = <S as Real>::one();
+    if left.size > 0 {
+        gemm(MatMut::new(half, rows, cols), false, one, choice.of(left), MatRef::new(x, rows, cols));
+    } else {
+        half.copy_from_slice(x);
+    }
+    if right.size > 0 {
+        gemm(MatMut::new(x, rows, cols), false, one, MatRef::new(half, rows, cols), choice.of(right).t());
+    } else {
+        x.copy_from_slice(half);
     }
 }
 
 /// The threads to work on: a pool, or the caller's own. Never rayon's global pool, which belongs to the application.
 pub(crate) type Threads<'a> = Option<&'a rayon::ThreadPool>;
 
-fn turn<S: Scalar>(
-    bases: &mut [Eigenbasis<S>],
-    numbers: &mut [S],
-    pool: Threads<'_>,
-    work: impl Fn(&mut Eigenbasis<S>, &[S]) + Sync,
-) {
-    let shared = &*numbers;
-    match pool {
-        Some(pool) => pool.install(|| bases.par_iter_mut().for_each(|basis| work(basis, shared))),
-        None => bases.iter_mut().for_each(|basis| work(basis, shared)),
+/// Does both, side by side if the caller is a thread of a pool.
+fn both(parallel: bool, a: impl FnOnce() + Send, b: impl FnOnce() + Send) {
+    if parallel {
+        rayon::join(a, b);
+    } else {
+        a();
+        b();
     }
-    for basis in bases {
-        numbers[basis.block.range()].copy_from_slice(&basis.turned);
+}
+
+/// One step of all parameters.
+pub(super) struct Step<S> {
+    /// Counted from 1.
+    number: u32,
+    rule: Rule<S>,
+}
+
+impl<S: Scalar> Step<S> {
+    pub fn new(update: &Update, number: u32) -> Self {
+        Self { number, rule: Rule::new(update, number) }
+    }
+
+    /// Advances all parameters: matrices in their `bases`, all others one by one.
+    ///
+    /// No number depends on which thread makes it.
+    pub fn take(&self, mut part: Part<'_, S>, bases: &mut [Eigenbasis<S>], parallel: bool) {
+        match bases {
+            [] => {
+                part.advance(&self.rule);
+                part.apply();
+            }
+            [basis] => {
+                let range = basis.block.range();
+                let (before, rest) = part.split(range.start);
+                let (matrix, after) = rest.split(range.end);
+                self.take(before, &mut [], parallel);
+                basis.advance(matrix, self, parallel);
+                self.take(after, &mut [], parallel);
+            }
+            _ => {
+                let (bases, more) = bases.split_at_mut(bases.len() / 2);
+                let (part, rest) = part.split(more[0].block.start);
+                both(parallel, || self.take(part, bases, parallel), || self.take(rest, more, parallel));
+            }
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::optimizers::orthonormal::orthonormalize;
     use crate::optimizers::orthonormal::tests::{defect, random};
     use crate::optimizers::{Method, Moments, Update};
 
+    const PLAIN: Update =
+        Update { method: Method::Soap, rate: 0.1, weight_decay: 0.0, decaying: usize::MAX, clip: f64::INFINITY };
+
+    /// The only matrix of parameters that have one, where it has the basis `choice`.
+    fn rotated(moments: &Moments<f64>, choice: Choice, x: &[f64]) -> Vec<f64> {
+        let basis = &moments.bases[0];
+        let (mut x, mut half) = (x.to_vec(), vec![0.0; x.len()]);
+        rotate(basis.block, &basis.sides, choice, &mut x, &mut half);
+        x
+    }
+
+    fn near(a: &[f64], b: &[f64], error: f64) -> bool {
+        a.iter().zip(b).all(|(a, b)| (a - b).abs() < error)
+    }
+
     #[test]
     fn a_matrix_that_is_turned_comes_back_and_eigenvectors_stay_orthonormal() {
-        let block = Block { start: 3, rows: 6, cols: 4 };
-        let mut bases = [Eigenbasis::new(block)];
-        for step in 0..40 {
-            let original = random(30, step);
-            let mut gradient = original.clone();
-            enter(&mut bases, &mut gradient, step == 0, None);
-            assert_ne!(gradient[3..27], original[3..27]);
-            leave(&mut bases, &mut gradient, None);
-            for (x, y) in gradient.iter().zip(&original) {
-                assert!((x - y).abs() < 1e-14, "step {step}");
+        let mut moments = Moments::for_method(Method::Soap, 30, [(3, 6, 4)]);
+        let mut weights = random(30, 99);
+        for step in 0..60 {
+            moments.update(&mut weights, &mut random(30, step), &PLAIN);
+            let original = random(24, 100 + step);
+            let there = rotated(&moments, Choice::Vectors, &original);
+            assert!(!near(&there, &original, 0.1));
+            assert!(near(&rotated(&moments, Choice::Inverse, &there), &original, 1e-14), "step {step}");
+            let [left, right] = &moments.bases[0].sides;
+            assert!(defect(6, &left.vectors) < 1e-14 && defect(4, &right.vectors) < 1e-14);
+        }
+    }
+
+    /// The first moment, turned back, is the running mean of the gradients.
+    #[test]
+    fn moments_follow_their_eigenbasis() {
+        let mut moments = Moments::for_method(Method::Soap, 30, [(3, 6, 4)]);
+        let (mut weights, mut mean) = (random(30, 99), vec![0.0; 30]);
+        for step in 1..=41 {
+            let gradient = random(30, step);
+            mean.iter_mut().zip(&gradient).for_each(|(m, g)| *m = 0.95 * *m + 0.05 * g);
+            moments.update(&mut weights, &mut gradient.clone(), &PLAIN);
+            let first = rotated(&moments, Choice::Inverse, &moments.first[3..27]);
+            assert!(near(&first, &mean[3..27], 1e-13), "step {step}");
+            assert!(near(&moments.first[..3], &mean[..3], 1e-14) && near(&moments.first[27..], &mean[27..], 1e-14));
+        }
+    }
+
+    #[test]
+    fn any_number_of_threads_takes_the_same_steps() {
+        let matrices = [(5, 40, 3), (130, 40, 40), (1735, 33, 40), (3060, 1, 33)];
+        let run = |pool: Threads<'_>| {
+            let mut moments = Moments::for_method(Method::Soap, 3100, matrices);
+            let mut weights: Vec<f32> = random(3100, 99).into_iter().map(|x| x as f32).collect();
+            for step in 0..25 {
+                let mut gradient: Vec<f32> = random(3100, step).into_iter().map(|x| x as f32).collect();
+                moments.update_on(pool, &mut weights, &mut gradient, &PLAIN);
             }
-            follow(&mut bases, &mut gradient, 10, None);
-            assert!(defect(6, &bases[0].left.vectors) < 1e-14 && defect(4, &bases[0].right.vectors) < 1e-14);
+            (weights, moments)
+        };
+        let alone = run(None);
+        for threads in 1..=3 {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            assert!(run(Some(&pool)) == alone, "{threads} threads");
         }
     }
 

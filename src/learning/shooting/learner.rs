@@ -9,6 +9,7 @@ use crate::training::BatchReport;
 use crate::training::checkpoint::Shot;
 use crate::training::learner::{Judgement, Learner};
 use argmin::core::KV;
+use std::sync::Arc;
 
 /// At most one in this many validation segments may be left out of a loss that counts.
 const LEFT_OUT: usize = 20;
@@ -93,8 +94,8 @@ impl<S: Scalar> Learner<S> for ShootingLearner<S> {
         problem.shots.model().weights()
     }
 
-    fn pool<'p>(&self, problem: &'p mut Self::Problem) -> &'p rayon::ThreadPool {
-        problem.shots.pool()
+    fn pool(&self, problem: &mut Self::Problem) -> Arc<rayon::ThreadPool> {
+        Arc::clone(problem.shots.pool())
     }
 
     fn begin(&mut self, problem: &mut Self::Problem, weights: &[S]) -> Option<f64> {

@@ -253,7 +253,7 @@ impl<S: Scalar> ShootingObjective<S> {
     }
 
     /// The threads.
-    pub(super) fn pool(&self) -> &rayon::ThreadPool {
+    pub(super) fn pool(&self) -> &Arc<rayon::ThreadPool> {
         &self.pool
     }
 

@@ -7,6 +7,7 @@ use crate::training::objective::BatchReport;
 use crate::training::problem::TrainingProblem;
 use argmin::core::KV;
 use std::marker::PhantomData;
+use std::sync::Arc;
 
 /// At most one in this many validation states may be left out of a loss that counts.
 const LEFT_OUT: usize = 100;
@@ -31,7 +32,7 @@ pub(crate) trait Learner<S: Scalar> {
     fn decaying(&self, problem: &mut Self::Problem) -> usize;
 
     /// Threads of the run.
-    fn pool<'p>(&self, problem: &'p mut Self::Problem) -> &'p rayon::ThreadPool;
+    fn pool(&self, problem: &mut Self::Problem) -> Arc<rayon::ThreadPool>;
 
     /// Before the first epoch; the cost of the weights given, where the epochs have to beat it.
     fn begin(&mut self, problem: &mut Self::Problem, weights: &[S]) -> Option<f64> {
@@ -94,8 +95,8 @@ impl<'a, S: Scalar> Learner<S> for States<'a> {
         problem.objective().model().weights()
     }
 
-    fn pool<'p>(&self, problem: &'p mut Self::Problem) -> &'p rayon::ThreadPool {
-        problem.objective().pool()
+    fn pool(&self, problem: &mut Self::Problem) -> Arc<rayon::ThreadPool> {
+        Arc::clone(problem.objective().pool())
     }
 
     fn step(&mut self, problem: &mut Self::Problem, weights: &[S], rows: &[u32], gradient: &mut [S]) -> BatchReport<S> {

@@ -25,7 +25,7 @@ const LBFGS: u64 = 14;
 ///   length, then converted; `3 n s (N + V)` for the phase under way; `8 n T` for the evaluation afterwards, five times;
 ///   `4 (6 N + V)` for the order of states and its copies in a checkpoint;
 /// - weights: `(12 + 24) s P`, the second for writing a checkpoint;
-/// - eigenbases of SOAP: `s (4 r + 2 m)` with `r` numbers in the squares over the sides of all weight matrices and `m` in the
+/// - eigenbases of SOAP: `s (4 r + m)` with `r` numbers in the squares over the sides of all weight matrices and `m` in the
 ///   matrices, and `8 s r` for writing a checkpoint;
 /// - shards: `s (P + 64 j (w (2 c + 21) + 4 f c + 10 n^2 + 20 n + 6 K))` for each of the up to 8 parts of a batch, `c = n + 2`
 ///   channels and `j` evaluations side by side, 1 without penalty and 2 with one, the latter with `n^2` more numbers per state;

@@ -352,7 +352,7 @@ impl<S: Scalar> Objective<S> {
     }
 
     /// The threads.
-    pub(crate) fn pool(&self) -> &rayon::ThreadPool {
+    pub(crate) fn pool(&self) -> &Arc<rayon::ThreadPool> {
         &self.pool
     }
 

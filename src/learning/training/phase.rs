@@ -49,13 +49,14 @@ impl<I: State> Observe<I> for Log {
     }
 }
 
-/// Runs all epochs of a solver from `weights`, or those that are left of the run `underway`.
+/// Runs all epochs of a solver from `weights`, or those that are left of the run `underway`, on a thread of its pool: to
+/// hand work from there to the pool wakes nobody up.
 ///
 /// # Errors
 /// The words of argmin.
-pub(crate) fn run_epochs<S: Scalar, L: Learner<S>>(
+pub(crate) fn run_epochs<S: Scalar, L: Learner<S, Problem: Send> + Send>(
     mut solver: EpochSolver<S, L>,
-    problem: L::Problem,
+    mut problem: L::Problem,
     weights: Vec<S>,
     underway: Option<PhaseState<S>>,
 ) -> Result<Epochs<S, L>, String> {
@@ -67,12 +68,16 @@ pub(crate) fn run_epochs<S: Scalar, L: Learner<S>>(
         solver = solver.restored(course, history);
     }
     let epochs = solver.epochs() as u64;
-    let result = Executor::new(problem, solver)
-        .add_observer(Log, ObserverMode::Always)
-        .configure(|_| state.max_iters(epochs))
-        .timer(false)
-        .run()
-        .map_err(|error| error.to_string())?;
+    let pool = solver.pool(&mut problem);
+    let run = || {
+        Executor::new(problem, solver)
+            .add_observer(Log, ObserverMode::Always)
+            .configure(|_| state.max_iters(epochs))
+            .timer(false)
+            .run()
+            .map_err(|error| error.to_string())
+    };
+    let result = pool.install(run)?;
     let (steps, seconds) = (result.solver.step(), result.solver.seconds());
     let (history, stopped, learner) = result.solver.finish();
     let stop = match (stopped, result.state.get_termination_status()) {

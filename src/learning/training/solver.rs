@@ -194,6 +194,11 @@ impl<S: Scalar, L: Learner<S>> EpochSolver<S, L> {
         Self { course, history, restored: true, ..self }
     }
 
+    /// Threads of the run.
+    pub(crate) fn pool(&self, problem: &mut L::Problem) -> Arc<rayon::ThreadPool> {
+        self.learner.pool(problem)
+    }
+
     /// Epochs of this phase.
     pub(crate) fn epochs(&self) -> usize {
         self.rates.epochs
@@ -251,7 +256,8 @@ impl<S: Scalar, L: Learner<S>> EpochSolver<S, L> {
             clip: self.optimizer.clip,
         };
         let gradient = &mut self.gradient;
-        let norm = moments.update_on(Some(self.learner.pool(problem)), weights, gradient, &update);
+        let pool = self.learner.pool(problem);
+        let norm = moments.update_on(Some(&pool), weights, gradient, &update);
         if !norm.is_finite() {
             if self.optimizer.on_failure == OnFailure::Stop {
                 return Err(StepError::Gradient { step, norm });

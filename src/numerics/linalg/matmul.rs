@@ -51,6 +51,20 @@ impl<'a, S> MatRef<'a, S> {
     pub fn t(self) -> Self {
         Self { transposed: !self.transposed, ..self }
     }
+    /// The rows `from..to` as seen.
+    ///
+    /// # Panics
+    /// If there are fewer.
+    #[must_use]
+    pub(crate) fn row_range(self, from: usize, to: usize) -> Self {
+        assert!(from <= to && to <= self.rows(), "rows past the end of a matrix view");
+        let Self { data, stride, .. } = self;
+        if self.transposed {
+            Self { data: &data[from.min(data.len())..], cols: to - from, ..self }
+        } else {
+            Self { data: &data[(from * stride).min(data.len())..], rows: to - from, ..self }
+        }
+    }
     /// Number of rows as seen.
     pub fn rows(&self) -> usize {
         if self.transposed { self.cols } else { self.rows }
@@ -205,6 +219,22 @@ mod tests {
                         }
                     }
                 }
+            }
+        }
+    }
+
+    #[test]
+    fn rows_of_a_view_are_those_that_are_seen() {
+        let a = numbers::<f64>(5 * 7, 1);
+        let one = numbers::<f64>(7, 2);
+        for (view, rows) in [(MatRef::new(&a, 5, 7), 5), (MatRef::new(&a, 7, 5).t(), 5)] {
+            let product = |view: MatRef<'_, f64>| {
+                let mut out = vec![0.0; view.rows()];
+                gemm(MatMut::new(&mut out, view.rows(), 1), false, 1.0, view, MatRef::new(&one, 7, 1));
+                out
+            };
+            for (from, to) in [(0, rows), (1, 4), (4, rows), (2, 2), (rows, rows)] {
+                assert_eq!(product(view.row_range(from, to)), product(view)[from..to]);
             }
         }
     }
