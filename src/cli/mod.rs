@@ -167,8 +167,12 @@ pub fn check_arguments(arguments: impl IntoIterator<Item = OsString>) -> Result<
 
 /// Runs a command; `words` are its arguments as they were typed.
 fn run(command: Command, words: &[OsString]) -> Result<(), CliError> {
-    // Trainings, fits, roll-outs and experiments keep what they have when they are interrupted; the others have nothing to keep.
-    if !matches!(command, Command::Train(_) | Command::Fit(_) | Command::Rollout(_) | Command::Experiment(_)) {
+    // Trainings, fits, roll-outs and experiments keep what they have when they are interrupted, a certificate says it; the others have nothing
+    // to keep.
+    if !matches!(
+        command,
+        Command::Train(_) | Command::Fit(_) | Command::Rollout(_) | Command::Experiment(_) | Command::Certify(_)
+    ) {
         interrupt::end_at_once().map_err(CliError::signals)?;
     }
     match command {
