@@ -22,7 +22,7 @@ pub struct Place {
 
 /// Memory of all numbers of one evaluation, up to [`LANES`] of them in a pack: units of a layer lie side by side.
 ///
-/// A number has [`Arena::parts`] forms of [`Basis::stride`] coefficients: the value, `n` first derivatives, and of the second ones those with
+/// A number has `1 + n + n (n + 1)/2` forms of [`Basis::stride`] coefficients: the value, `n` first derivatives, and of the second ones those with
 /// `j <= i`, row by row.
 pub struct Arena {
     pub basis: Arc<Basis>,
@@ -83,10 +83,6 @@ impl Arena {
         let dependent = (1..self.basis.count()).filter(|&k| form[k][lane] != 0.0);
         let axes = dependent.flat_map(|k| self.basis.factors(k));
         self.blamed.set(axes.fold(self.blamed.get(), |bits, axis| bits | 1 << (axis % 64)));
-    }
-    /// Forms of a number.
-    pub fn parts(&self) -> usize {
-        self.parts
     }
     /// Coefficients of a number.
     pub fn block(&self) -> usize {

@@ -121,7 +121,7 @@ pub fn search(source: &dyn Enclose, regions: Vec<(Vec<(f64, f64)>, f64)>, option
         let room = CHUNK.min(options.boxes - found.boxes);
         let chunk: Vec<Waiting> = std::iter::from_fn(|| queue.pop()).take(room).collect();
         let spectra = evaluate(source, &chunk, options.threads, &goes_on);
-        let ended = spectra.iter().any(Option::is_none);
+        let ended = !goes_on();
         for (waiting, spectrum) in chunk.iter().zip(&spectra) {
             let Some(spectrum) = spectrum else { continue };
             found.boxes += 1;
@@ -175,6 +175,9 @@ fn evaluate(
     let run = || {
         while let Some((boxes, spectra)) = next() {
             work(boxes, spectra);
+            if !goes_on() {
+                break;
+            }
         }
     };
     std::thread::scope(|scope| {
