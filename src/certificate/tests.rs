@@ -246,7 +246,7 @@ fn no_certified_box_of_a_network_holds_a_violation() {
         match found.verdict(&q, &v) {
             Verdict::Certified { condition } => {
                 let (mut values, mut workspace) = ([0.0; 2], crate::linalg::Workspace::new());
-                let matrix: Vec<f64> = matrix.iter().map(Dd::to_f64).collect();
+                let matrix: Vec<f64> = matrix.iter().map(|x| x.to_f64()).collect();
                 crate::linalg::eigenvalues(2, &matrix, &mut values, &mut workspace).unwrap();
                 assert!(positive == 2 && values[1] / values[0] <= condition * (1.0 + 1e-9), "{q:?} {v:?} {values:?}");
                 certified += 1;
