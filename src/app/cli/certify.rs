@@ -5,7 +5,7 @@ use crate::cli::chosen::{self, learned_system};
 use crate::cli::learned::Learned;
 use crate::cli::number::{finite, seconds, thread_count, threads, whole};
 use crate::cli::source::parameter;
-use crate::cli::{CliError, output};
+use crate::cli::{CliError, interrupt, output};
 use crate::lagrangian::configure_system;
 use crate::lagrangian::system::Bounds;
 use crate::names::{counted, unknown};
@@ -13,6 +13,7 @@ use crate::network::file::Header;
 use serde_json::{Map, Value, json};
 use std::f64::consts::TAU;
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
@@ -87,14 +88,17 @@ fn signature(text: &str) -> Result<Signature, String> {
 /// Searches and prints what was proven.
 ///
 /// # Errors
-/// A usage error for an unknown system, a wrong parameter or a region that does not fit, a data error for a bad model.
+/// A usage error for an unknown system, a wrong parameter or a region that does not fit, a data error for a bad model, the code of a signal that
+/// ended the search, after what was proven by then is printed.
 pub fn run(args: &Args) -> Result<(), CliError> {
+    let stop = interrupt::flag().map_err(CliError::signals)?;
     let refused = |error: CertificateError| CliError::usage(error);
     let (name, columns, options, found) = match &args.model {
         Some(path) => {
             let Learned { header, network } = Learned::<f64>::load(path)?;
             let time = learned_system(&header).ok().and_then(|system| system.time_like);
-            let options = args.options(header.columns.len() / 2, header.architecture.time_like.or(time).is_some());
+            let options =
+                args.options(header.columns.len() / 2, header.architecture.time_like.or(time).is_some(), &stop);
             let region = args.region(&header.columns, trained(&header))?;
             let found = certify_network(&network, &region, &options).map_err(refused)?;
             (header.system, header.columns, options, found)
@@ -104,16 +108,24 @@ pub fn run(args: &Args) -> Result<(), CliError> {
             let configured = configure_system::<f64>(system, &args.param).map_err(CliError::usage)?;
             let n = configured.coordinates;
             let columns = configured.system.columns(n);
-            let options = args.options(n, configured.system.time_like.is_some());
+            let options = args.options(n, configured.system.time_like.is_some(), &stop);
             let region = args.region(&columns, configured.system.validation(n))?;
             let found = certify_system(&configured, &region, &options).map_err(refused)?;
             (configured.system.name.to_string(), columns, options, found)
         }
     };
     if args.json || args.format == Format::Json {
-        return output::print(&format!("{}\n", object(&name, &columns, &options, &found)));
+        output::print(&format!("{}\n", object(&name, &columns, &options, &found)))?;
+    } else {
+        output::print(&table(&columns, &options, &found))?;
     }
-    output::print(&table(&columns, &options, &found))
+    if stop.load(Ordering::Relaxed) {
+        return Err(CliError::interrupted(format_args!(
+            "interrupted, {:.4} % of the region is open",
+            100.0 * found.open
+        )));
+    }
+    Ok(())
 }
 
 /// The states a model was trained on; all of one turn of an angle.
@@ -127,13 +139,14 @@ fn trained(header: &Header) -> Bounds {
 }
 
 impl Args {
-    fn options(&self, n: usize, time_like: bool) -> Options {
+    fn options<'a>(&self, n: usize, time_like: bool, stop: &'a AtomicBool) -> Options<'a> {
         Options {
             signature: self.signature.unwrap_or(Signature::of(n, time_like)),
             condition: self.condition,
             seconds: self.seconds,
             boxes: self.boxes,
             threads: threads(self.threads),
+            stop: Some(stop),
         }
     }
 
@@ -156,7 +169,7 @@ impl Args {
     }
 }
 
-fn object(name: &str, columns: &[String], options: &Options, found: &Certificate) -> Value {
+fn object(name: &str, columns: &[String], options: &Options<'_>, found: &Certificate) -> Value {
     let witness = found.witness.as_ref().map(|witness| {
         let state = columns.iter().zip(witness.q.iter().chain(&witness.v));
         let state: Map<String, Value> = state.map(|(column, x)| (column.clone(), json!(x))).collect();
@@ -177,7 +190,7 @@ fn object(name: &str, columns: &[String], options: &Options, found: &Certificate
     })
 }
 
-fn table(columns: &[String], options: &Options, found: &Certificate) -> String {
+fn table(columns: &[String], options: &Options<'_>, found: &Certificate) -> String {
     let Signature { positive, negative } = options.signature;
     let limit = options.condition.map_or(String::new(), |k| format!(" and a condition number of at most {k}"));
     let boxes = counted(found.boxes, "box", "boxes");

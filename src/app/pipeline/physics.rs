@@ -397,6 +397,11 @@ impl Physics {
         let pairs = |ranges: &[[f64; 2]]| ranges.iter().map(|&[low, high]| (low, high)).collect();
         let bounds = Bounds { positions: pairs(&region.position), velocities: pairs(&region.velocity) };
         match certify_network(network, &bounds, &options) {
+            Ok(proven) if proven.certified == 0.0 && proven.refuted == 0.0 => self.left_out.push(format!(
+                "certificate of the signature: {} boxes prove nothing of a network of {} weights; `lnn certify` takes more",
+                proven.boxes,
+                network.weights().len()
+            )),
             Ok(proven) => {
                 self.signature = Some(ProvenSignature {
                     positive: signature.positive,

@@ -1,28 +1,33 @@
 //! `W x + b` for a matrix of constants: one product of matrices over all parts of the numbers.
 
+use super::arena::{Arena, LANES, Place};
+use super::form::TINY;
 use super::interval::Interval;
-use super::number::{Arena, Number};
+use super::number::Number;
+use crate::linalg::{MatMut, MatRef, gemm};
 use crate::scalar::vectorized;
 
 /// `W x + b`, `(outputs)`; `weights` is `W`, `(outputs, inputs)` row-major, `bias` is `b` or empty.
 ///
-/// The plane of an output is the product of `W` with the planes of the inputs, summed in order in `f64`; its distance is the product of
-/// `|W|` with the distances of the inputs and with what the rounding of a sum of so many products can lose,
-/// `|error| <= gamma sum_j |W_ij| |x_j|`, `gamma = inputs EPSILON / 2` to first order (Higham 2002, section 3.1), charged twice.
+/// The polynomial of an output is the product of `W` with those of the inputs; its distance is the product of `|W|` with the distances of the
+/// inputs and with what the rounding of a sum of so many products can lose in any order, `|error| <= gamma sum_j |W_ij| |x_j|`,
+/// `gamma = inputs EPSILON / 2` to first order (Higham 2002, section 3.1), charged twice.
 pub fn map<'a>(weights: &[Number<'a>], bias: &[Number<'a>], x: &[Number<'a>]) -> Vec<Number<'a>> {
     let arena = x.iter().find_map(|x| if let Number::Variable(arena, _) = x { Some(*arena) } else { None });
     let exact: Option<Vec<f64>> = weights.iter().map(exact).collect();
-    match (arena, exact) {
-        (Some(arena), Some(weights)) => product(arena, &weights, bias, x),
+    let constants: Option<Vec<Interval>> = bias.iter().map(constant).collect();
+    match (arena, exact, constants) {
+        (Some(arena), Some(weights), Some(bias)) => product(arena, &weights, &bias, x),
         _ => termwise(weights, bias, x),
     }
 }
 
+fn constant(x: &Number<'_>) -> Option<Interval> {
+    if let Number::Constant(x) = x { Some(*x) } else { None }
+}
+
 fn exact(x: &Number<'_>) -> Option<f64> {
-    match x {
-        Number::Constant(x) if x.is_point() => Some(x.low),
-        _ => None,
-    }
+    constant(x).filter(|x| x.is_point()).map(|x| x.low)
 }
 
 /// Sums of products, one after the other.
@@ -32,59 +37,90 @@ fn termwise<'a>(weights: &[Number<'a>], bias: &[Number<'a>], x: &[Number<'a>]) -
     rows.map(|(i, row)| row.iter().zip(x).fold(start(i), |sum, (&w, &x)| sum + w * x)).collect()
 }
 
-fn product<'a>(arena: &'a Arena, weights: &[f64], bias: &[Number<'a>], x: &[Number<'a>]) -> Vec<Number<'a>> {
-    let (parts, stride, inputs) = (arena.parts(), arena.stride(), x.len());
-    let (plane, outputs) = (stride - 1, weights.len() / inputs);
-    let columns = parts * plane;
-    // Relative loss of a sum of `inputs` products with room for the sums of distances.
-    let loss = (inputs + 8) as f64 * f64::EPSILON;
-    // Planes (inputs, parts x plane) and distances (inputs, parts).
-    let (mut planes, mut distances) = (vec![0.0; inputs * columns], vec![0.0; inputs * parts]);
-    for ((x, planes), distances) in
-        x.iter().zip(planes.chunks_exact_mut(columns)).zip(distances.chunks_exact_mut(parts))
-    {
-        let mut take = |forms: &[f64]| {
-            let rows = forms.chunks_exact(stride).zip(planes.chunks_exact_mut(plane)).zip(distances.iter_mut());
-            for ((form, to), distance) in rows {
-                to.copy_from_slice(&form[..plane]);
-                let size: f64 = to.iter().map(|x| x.abs()).sum();
-                *distance = (form[plane] + loss * size) * (1.0 + loss);
+fn product<'a>(arena: &'a Arena, weights: &[f64], bias: &[Interval], x: &[Number<'a>]) -> Vec<Number<'a>> {
+    let (rows, inputs, stride) = (arena.block(), x.len(), arena.basis.stride());
+    let outputs = weights.len() / inputs;
+    // Relative loss of a sum of `inputs` products, with room for the sums of distances.
+    let loss = (inputs + stride + 16) as f64 * f64::EPSILON;
+    let columns = gathered(arena, x);
+    let distances = distances(&columns, (inputs, stride), loss);
+    let absolute: Vec<f64> = weights.iter().map(|w| w.abs()).collect();
+    let times = |a: &[f64], w: &[f64]| {
+        let rows = a.len() / inputs;
+        let mut c = vec![0.0; rows * outputs];
+        let (a, w) = (MatRef::new(a, rows, inputs), MatRef::new(w, outputs, inputs));
+        gemm(MatMut::new(&mut c, rows, outputs), false, 1.0, a, w.t());
+        c
+    };
+    let (sums, spreads) = (times(&columns, weights), times(&distances, &absolute));
+    let lanes: Vec<usize> = (0..outputs).step_by(LANES).map(|first| LANES.min(outputs - first)).collect();
+    let pack = arena.make(&lanes, |_, new| {
+        for ((pack, &lanes), first) in new.chunks_exact_mut(rows).zip(&lanes).zip((0..).step_by(LANES)) {
+            let parts = pack.chunks_exact_mut(stride).zip(sums.chunks_exact(stride * outputs));
+            for (part, (form, sums)) in parts.enumerate() {
+                // The function 0 stays so.
+                if distances[part * inputs..(part + 1) * inputs].iter().all(|x| *x == 0.0) {
+                    continue;
+                }
+                for (form, sums) in form.iter_mut().zip(sums.chunks_exact(outputs)) {
+                    form[..lanes].copy_from_slice(&sums[first..first + lanes]);
+                }
+                for (lane, spread) in spreads[part * outputs + first..][..lanes].iter().enumerate() {
+                    form[stride - 1][lane] = spread * (1.0 + loss) + TINY;
+                }
             }
-        };
-        match *x {
-            Number::Variable(arena, index) => arena.look(index, &mut take),
-            Number::Constant(value) => {
-                planes[0] = value.middle();
-                distances[0] = (value.radius() + loss * planes[0].abs()) * (1.0 + loss);
+            for (lane, bias) in bias.iter().skip(first).take(lanes).enumerate() {
+                let sum = pack[0][lane] + bias.middle();
+                let distance = pack[stride - 1][lane] + bias.radius() + f64::EPSILON * sum.abs();
+                (pack[0][lane], pack[stride - 1][lane]) = (sum, distance * (1.0 + loss));
             }
         }
+    });
+    let place = |i: usize| Place { pack: pack + (i / LANES) as u32, lane: (i % LANES) as u32 };
+    (0..outputs).map(|i| Number::Variable(arena, place(i))).collect()
+}
+
+/// The coefficients of numbers, `(parts x stride, numbers)`.
+fn gathered(arena: &Arena, x: &[Number<'_>]) -> Vec<f64> {
+    let (rows, inputs) = (arena.block(), x.len());
+    let mut columns = vec![0.0; rows * inputs];
+    let mut i = 0;
+    while i < inputs {
+        i += match x[i] {
+            Number::Constant(value) => {
+                (columns[i], columns[(arena.basis.stride() - 1) * inputs + i]) = (value.middle(), value.radius());
+                1
+            }
+            Number::Variable(_, Place { pack, lane }) => {
+                // Neighbours go together.
+                let next = |(x, lane): (&Number<'_>, u32)| matches!(x, Number::Variable(_, place) if *place == Place { pack, lane });
+                let run = x[i..].iter().zip(lane..).take_while(|pair| next(*pair)).count();
+                arena.look(pack, |forms| {
+                    for (row, form) in columns.chunks_exact_mut(inputs).zip(forms) {
+                        row[i..i + run].copy_from_slice(&form[lane as usize..lane as usize + run]);
+                    }
+                });
+                run
+            }
+        };
     }
-    let mut sums = vec![0.0; outputs * columns];
-    let mut spreads = vec![0.0; outputs * parts];
+    columns
+}
+
+/// Distances of the inputs and what rounding may lose of their coefficients, `(parts, inputs)`.
+fn distances(columns: &[f64], (inputs, stride): (usize, usize), loss: f64) -> Vec<f64> {
+    let mut found = vec![0.0; columns.len() / stride];
     vectorized(
         #[inline(always)]
         || {
-            let rows = sums.chunks_exact_mut(columns).zip(spreads.chunks_exact_mut(parts));
-            for ((sums, spreads), row) in rows.zip(weights.chunks_exact(inputs)) {
-                let terms = row.iter().zip(planes.chunks_exact(columns)).zip(distances.chunks_exact(parts));
-                for ((&w, planes), distances) in terms {
-                    sums.iter_mut().zip(planes).for_each(|(sum, x)| *sum += w * x);
-                    let w = w.abs();
-                    spreads.iter_mut().zip(distances).for_each(|(sum, x)| *sum += w * x);
+            for (found, part) in found.chunks_exact_mut(inputs).zip(columns.chunks_exact(stride * inputs)) {
+                let (coefficients, distances) = part.split_at((stride - 1) * inputs);
+                for row in coefficients.chunks_exact(inputs) {
+                    found.iter_mut().zip(row).for_each(|(sum, x)| *sum += x.abs());
                 }
+                found.iter_mut().zip(distances).for_each(|(sum, r)| *sum = (r + loss * *sum) * (1.0 + loss));
             }
         },
     );
-    let first = arena.make(outputs, |_, new| {
-        let rows = sums.chunks_exact(plane).zip(&spreads);
-        for (form, (sums, &spread)) in new.chunks_exact_mut(stride).zip(rows) {
-            form[..plane].copy_from_slice(sums);
-            // The smallest numbers cover underflow; the function 0 stays so.
-            let empty = spread == 0.0 && sums.iter().all(|x| *x == 0.0);
-            form[plane] = if empty { 0.0 } else { spread * (1.0 + loss) + 1e-290 };
-        }
-    });
-    let rows = (first..).take(outputs).map(|index| Number::Variable(arena, index));
-    let biased = |(i, row): (usize, Number<'a>)| bias.get(i).map_or(row, |&b| row + b);
-    rows.enumerate().map(biased).collect()
+    found
 }

@@ -1,16 +1,21 @@
 //! Enclosure of the mass matrices of a box of states.
 
+use super::arena::Arena;
+use super::basis::Basis;
 use super::interval::Interval;
-use super::number::{Arena, Number};
+use super::number::Number;
 use super::spectrum::MatrixForms;
 use crate::lagrangian::Lagrangian;
 use crate::scalar::Scalar;
+use std::sync::Arc;
 
 /// A Lagrangian with its parameters, ready to be evaluated over boxes by any thread.
 pub struct Source<'l, L> {
     pub lagrangian: &'l L,
     /// Intervals that hold the parameters.
     pub parameters: Vec<Interval>,
+    /// Monomials of the polynomials that enclose what it computes.
+    pub basis: Arc<Basis>,
 }
 
 /// Questions of the search to a Lagrangian.
@@ -21,14 +26,15 @@ pub trait Enclose: Sync {
     fn each(&self, boxes: &[&[(f64, f64)]], take: &mut dyn FnMut(usize, MatrixForms) -> bool);
 }
 
-impl<'l, L> Source<'l, L> {
+impl<'l, L: Lagrangian> Source<'l, L> {
     /// Numbers of any precision; those that no `f64` is equal to are enclosed.
     pub fn new<S: Scalar>(lagrangian: &'l L, parameters: &[S]) -> Self {
         let enclosed = |x: &S| match x.parts() {
             (high, 0.0) => Interval::point(high),
             (high, low) => Interval::point(high) + Interval::point(low),
         };
-        Self { lagrangian, parameters: parameters.iter().map(enclosed).collect() }
+        let basis = Arc::new(Basis::for_axes(2 * lagrangian.coordinates()));
+        Self { lagrangian, parameters: parameters.iter().map(enclosed).collect(), basis }
     }
 }
 
@@ -39,7 +45,7 @@ impl<L: Lagrangian> Enclose for Source<'_, L> {
 
     fn each(&self, boxes: &[&[(f64, f64)]], take: &mut dyn FnMut(usize, MatrixForms) -> bool) {
         let n = self.lagrangian.coordinates();
-        let arena = Arena::new(n, 2 * n);
+        let arena = Arena::new(n, &self.basis);
         let parameters: Vec<Number<'_>> = self.parameters.iter().map(|x| Number::Constant(*x)).collect();
         for (index, bounds) in boxes.iter().enumerate() {
             arena.clear();
@@ -57,32 +63,27 @@ fn mass_matrix<'a, L: Lagrangian>(
     parameters: &[Number<'a>],
     bounds: &[(f64, f64)],
 ) -> MatrixForms {
-    let (n, stride) = (bounds.len() / 2, arena.stride());
-    let state: Vec<Number<'a>> = bounds
-        .iter()
-        .enumerate()
-        .map(|(axis, &(low, high))| {
-            let range = Interval::new(low, high);
-            let mut value = vec![0.0; stride];
-            (value[0], value[1 + axis]) = (range.middle(), range.radius());
-            arena.variable(&value, axis.checked_sub(n))
-        })
-        .collect();
+    let (n, stride) = (bounds.len() / 2, arena.basis.stride());
+    let side = |(axis, &(low, high)): (usize, &(f64, f64))| {
+        Number::Variable(arena, arena.variable(axis, Interval::new(low, high), axis.checked_sub(n)))
+    };
+    let state: Vec<Number<'a>> = bounds.iter().enumerate().map(side).collect();
     let found = lagrangian.lagrangian(parameters, &state[..n], &state[n..]);
-    let mut forms = vec![0.0; n * n * stride];
+    let mut forms = vec![[0.0]; n * n * stride];
     // A Lagrangian that may not be defined, or that read a value.
     let known = found.range().is_bounded() && !arena.was_read();
     for (k, out) in forms.chunks_exact_mut(stride).enumerate() {
         match found {
-            Number::Variable(arena, index) if known => arena.look(index, |number| {
+            Number::Variable(arena, place) if known => arena.look(place.pack, |number| {
                 let part = arena.second(k / n, k % n);
-                out.copy_from_slice(&number[part * stride..(part + 1) * stride]);
+                let form = &number[part * stride..(part + 1) * stride];
+                out.iter_mut().zip(form).for_each(|(out, x)| *out = [x[place.lane as usize]]);
             }),
             Number::Constant(_) if known => {}
-            _ => out.fill(f64::NAN),
+            _ => out.fill([f64::NAN]),
         }
     }
-    MatrixForms { n, stride, forms, blamed: arena.blamed() }
+    MatrixForms { n, basis: Arc::clone(&arena.basis), forms, blamed: arena.blamed() }
 }
 
 /// Intervals `(n, n)` that hold the elements of the mass matrix `d2L/dv dv` of every state of a box, `(low, high)` of every coordinate and
@@ -104,7 +105,8 @@ pub(crate) fn mass_matrix_enclosure<L: Lagrangian, S: Scalar>(
     let bounds = [positions, velocities].concat();
     let mut found = Vec::new();
     Source::new(lagrangian, parameters).each(&[&bounds], &mut |_, matrix| {
-        found = matrix.forms.chunks_exact(matrix.stride).map(super::form::range).collect();
+        let forms = matrix.forms.chunks_exact(matrix.basis.stride());
+        found = forms.map(|form| super::form::range(&matrix.basis, form, 0)).collect();
         true
     });
     found

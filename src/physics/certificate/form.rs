@@ -1,142 +1,223 @@
-//! First-order forms: functions on a box as a plane and a distance from it.
+//! Forms: functions on a box as a polynomial and a distance from it (Taylor models, Makino and Berz 2003).
 //!
-//! A form over a box with the axes `e_k` from -1 to 1 is a slice `[c, s_1, .., s_m, r]`: everywhere on the box the function lies within
-//! `r` of `c + sum_k s_k e_k`. Numbers are rounded to nearest, and what that may have lost is added to `r`: a sum or product `x` is off by
-//! at most `EPSILON |x| / 2`, and `r` is charged twice that, which also covers the rounding of the charge itself.
+//! A form over a box with the axes `e_k` from -1 to 1 is a slice `[c_0, .., c_m, r]`, one coefficient per monomial of a [`Basis`]: everywhere
+//! on the box the function lies within `r` of the polynomial. Numbers are rounded to nearest, and what that may have lost is added to `r`: a
+//! sum or product `x` is off by at most `EPSILON |x| / 2`, and `r` is charged twice that at least, which also covers the rounding of the charge
+//! itself.
+//!
+//! The forms of `W` functions lie side by side, so that vector instructions work on all of them.
 
+use super::basis::{Basis, MOST_DEGREE};
 use super::function::Derivatives;
 use super::interval::Interval;
 
 const EPSILON: f64 = f64::EPSILON;
-/// Largest share of the radius of a range that the distance from a plane may have.
+/// Largest share of the radius of a range that the distance from a polynomial may have.
 const WORTHWHILE: f64 = 0.7;
 /// Covers what underflow loses.
-const TINY: f64 = 1e-290;
+pub const TINY: f64 = 1e-290;
 
-/// A sum of a few numbers that are not negative, moved above whatever its own rounding lost.
+/// A sum of numbers that are not negative, moved above whatever its own rounding lost.
 #[inline(always)]
 fn raised(x: f64) -> f64 {
-    x * (1.0 + 64.0 * EPSILON) + TINY
+    x * (1.0 + 256.0 * EPSILON) + TINY
 }
 
-/// `true` for the function 0.
-#[inline]
-pub fn is_zero(a: &[f64]) -> bool {
-    a.iter().all(|x| *x == 0.0)
+/// Sums of the absolute values, side by side.
+#[inline(always)]
+fn size<const W: usize>(a: &[[f64; W]]) -> [f64; W] {
+    let mut sum = [0.0; W];
+    for a in a {
+        for l in 0..W {
+            sum[l] += a[l].abs();
+        }
+    }
+    sum
 }
 
-/// Largest distance from the centre, rounded up.
-#[inline]
-pub fn deviation(a: &[f64]) -> f64 {
-    let sum: f64 = a[1..].iter().map(|x| x.abs()).sum();
-    sum * (1.0 + (a.len() as f64 + 2.0) * EPSILON)
+/// `true` for functions that are all 0.
+#[inline(always)]
+pub fn is_zero<const W: usize>(a: &[[f64; W]]) -> bool {
+    a.iter().all(|a| a.iter().all(|x| *x == 0.0))
 }
 
-/// Every value on the box.
-#[inline]
-pub fn range(a: &[f64]) -> Interval {
-    let deviation = deviation(a);
-    Interval::outward(a[0] - deviation, a[0] + deviation)
+/// Largest distances from the values in the middle of the box, rounded up.
+#[inline(always)]
+pub fn deviation<const W: usize>(a: &[[f64; W]]) -> [f64; W] {
+    size(&a[1..]).map(|sum| sum * (1.0 + (a.len() as f64 + 2.0) * EPSILON))
 }
 
-/// The constant function with a value of the interval.
+/// Every value of one of the functions on the box.
 #[inline]
-pub fn set_constant(out: &mut [f64], value: Interval) {
-    out.fill(0.0);
-    out[0] = value.middle();
-    out[out.len() - 1] = value.radius();
+pub fn range<const W: usize>(basis: &Basis, a: &[[f64; W]], lane: usize) -> Interval {
+    let distance = a[a.len() - 1][lane];
+    let (mut below, mut above) = (distance, distance);
+    for (k, c) in (1..basis.count()).map(|k| (k, a[k][lane])) {
+        // Not a number goes to `above`, and no order of the ends is found.
+        if !basis.is_square(k) {
+            below += c.abs();
+            above += c.abs();
+        } else if c < 0.0 {
+            below -= c;
+        } else {
+            above += c;
+        }
+    }
+    let grown = |x: f64| x * (1.0 + (a.len() as f64 + 2.0) * EPSILON);
+    Interval::outward(a[0][lane] - grown(below), a[0][lane] + grown(above))
+}
+
+/// One of the functions becomes a constant with a value of the interval.
+#[inline]
+pub fn set_constant<const W: usize>(out: &mut [[f64; W]], lane: usize, value: Interval) {
+    out.iter_mut().for_each(|c| c[lane] = 0.0);
+    out[0][lane] = value.middle();
+    out[out.len() - 1][lane] = value.radius();
 }
 
 /// `out += s a`.
-#[inline]
-pub fn add_scaled(out: &mut [f64], s: f64, a: &[f64]) {
+#[inline(always)]
+pub fn add_scaled<const W: usize>(out: &mut [[f64; W]], s: f64, a: &[[f64; W]]) {
     if is_zero(a) {
         return;
     }
     let m = a.len() - 1;
-    let mut charge = 0.0;
+    let mut charge = [0.0; W];
     for (out, a) in out[..m].iter_mut().zip(&a[..m]) {
-        let term = s * a;
-        *out += term;
-        charge += term.abs() + out.abs();
+        for l in 0..W {
+            let term = s * a[l];
+            out[l] += term;
+            charge[l] += term.abs() + out[l].abs();
+        }
     }
-    out[m] = raised(out[m] + s.abs() * a[m] + EPSILON * charge);
+    for l in 0..W {
+        out[m][l] = raised(out[m][l] + s.abs() * a[m][l] + EPSILON * charge[l]);
+    }
 }
 
 /// `out += s a` for a factor that is known to lie in an interval.
-#[inline]
-pub fn add_multiple(out: &mut [f64], s: Interval, a: &[f64]) {
+#[inline(always)]
+pub fn add_multiple<const W: usize>(out: &mut [[f64; W]], s: Interval, a: &[[f64; W]]) {
     add_scaled(out, s.middle(), a);
     let spread = s.radius();
     if spread != 0.0 && !is_zero(a) {
-        let m = a.len() - 1;
-        out[m] = raised(out[m] + spread * (a[0].abs() + deviation(a)));
+        let (m, distance) = (a.len() - 1, deviation(a));
+        for l in 0..W {
+            out[m][l] = raised(out[m][l] + spread * (a[0][l].abs() + distance[l]));
+        }
     }
 }
 
-/// `out += a b`. Of the products `e_k e_l` squares lie between 0 and 1, the others between -1 and 1.
-pub fn add_product(out: &mut [f64], a: &[f64], b: &[f64]) {
+/// `out += a b`; the products of monomials above the degree, each at most 1, are added to the distance.
+///
+/// A coefficient is a sum of at most as many products as there are monomials, which charges for all of them together.
+#[inline(always)]
+pub fn add_product<const W: usize>(basis: &Basis, out: &mut [[f64; W]], a: &[[f64; W]], b: &[[f64; W]]) {
     if is_zero(a) || is_zero(b) {
         return;
     }
-    let m = a.len() - 1;
-    let ([a0, b0], [ra, rb]) = ([a[0], b[0]], [a[m], b[m]]);
-    let (sa, sb) = (&a[1..m], &b[1..m]);
-    let (mut square, mut squares, mut along_a, mut along_b, mut charge) = (0.0, 0.0, 0.0, 0.0, 0.0);
-    for ((out, &x), &y) in out[1..m].iter_mut().zip(sa).zip(sb) {
-        let (first, second) = (a0 * y, b0 * x);
-        let sum = first + second;
-        *out += sum;
-        charge += first.abs() + second.abs() + sum.abs() + out.abs();
-        let product = x * y;
-        square += product;
-        squares += product.abs();
-        along_a += x.abs();
-        along_b += y.abs();
+    let (m, degree) = (basis.count(), basis.degree());
+    let (mut of_a, mut of_b) = ([[0.0; W]; MOST_DEGREE + 1], [[0.0; W]; MOST_DEGREE + 1]);
+    for p in 0..=degree {
+        of_a[p] = size(&a[basis.of_degree(p)]);
+        of_b[p] = size(&b[basis.of_degree(p)]);
     }
-    // Pairs of different axes, sign by sign where they are few.
-    let mixed = if m <= 9 {
-        let mut mixed = 0.0;
-        for k in 1..sa.len() {
-            for l in 0..k {
-                let (first, second) = (sa[k] * sb[l], sa[l] * sb[k]);
-                mixed += (first + second).abs();
-                charge += first.abs() + second.abs();
+    let before = size(&out[..m]);
+    for &[i, j, k] in basis.products() {
+        let (a, b, out) = (&a[usize::from(i)], &b[usize::from(j)], &mut out[usize::from(k)]);
+        for l in 0..W {
+            out[l] += a[l] * b[l];
+        }
+    }
+    let share = (m as f64 + 8.0) * EPSILON;
+    for l in 0..W {
+        let mut above = 0.0;
+        let (mut all_a, mut all_b) = (0.0, 0.0);
+        for p in 0..=degree {
+            all_a += of_a[p][l];
+            all_b += of_b[p][l];
+            // Degrees of `b` that make more than the degree of the basis with `p`.
+            for q in degree + 1 - p..=degree {
+                above += of_a[p][l] * of_b[q][l];
             }
         }
-        mixed
-    } else {
-        charge += along_a * along_b * m as f64;
-        (along_a * along_b - squares).abs()
-    };
-    let product = a0 * b0;
-    let centre = product + 0.5 * square;
-    out[0] += centre;
-    charge += product.abs() + centre.abs() + out[0].abs() + squares * m as f64;
-    let spread = a0.abs() * rb + b0.abs() * ra + ra * rb + ra * along_b + rb * along_a;
-    out[m] = raised(out[m] + spread + 0.5 * squares + mixed + EPSILON * charge);
+        let (ra, rb) = (a[m][l], b[m][l]);
+        let spread = above + all_a * rb + ra * all_b + ra * rb;
+        out[m][l] = raised(out[m][l] + spread + share * (before[l] + all_a * all_b));
+    }
 }
 
-/// `f(z)` or one of its first two derivatives, the `order`-th, by Taylor's formula about the centre of `z`; `at` are the derivatives of
-/// `f` there and `over` those over the range of `z`. Where the range is not much wider than the distance from the plane, the range.
-pub fn set_function(out: &mut [f64], z: &[f64], at: &Derivatives, over: &Derivatives, order: usize) {
-    let m = z.len() - 1;
-    let distance = deviation(z);
-    let squares = Interval::new(0.0, Interval::point(distance).square().high);
-    let bent = over[order + 2] * squares * Interval::point(0.5);
-    let start = at[order] + bent;
-    let (slope, spread) = (at[order + 1].middle(), at[order + 1].radius());
-    out[0] = start.middle();
-    let mut charge = 0.0;
-    for (out, z) in out[1..m].iter_mut().zip(&z[1..m]) {
-        *out = slope * z;
-        charge += out.abs();
+/// Taylor's formula for functions side by side: `sum_p c_p w^p`, `w` what the argument differs from its value in the middle.
+pub struct Expansion<const W: usize> {
+    /// Coefficients.
+    value: [[f64; W]; MOST_DEGREE + 1],
+    /// What they may be off.
+    spread: [[f64; W]; MOST_DEGREE + 1],
+    /// Everything that the functions can be on the box.
+    whole: [Interval; W],
+}
+
+impl<const W: usize> Expansion<W> {
+    /// Functions that are 0.
+    pub const ZERO: Self =
+        Self { value: [[0.0; W]; MOST_DEGREE + 1], spread: [[0.0; W]; MOST_DEGREE + 1], whole: [Interval::ZERO; W] };
+
+    /// The `order`-th derivative of a function for one of the arguments: `at` are the derivatives in the middle, `over` those over the range of
+    /// the argument, which is at most `distance` away from there.
+    pub fn set(
+        &mut self,
+        lane: usize,
+        (at, over): (&Derivatives, &Derivatives),
+        distance: f64,
+        (order, degree): (usize, usize),
+    ) {
+        let power = Interval::point(distance).power(degree as i32 + 1).high;
+        // Of an even degree the rest has the sign of an odd power.
+        let power = if degree % 2 == 0 { Interval::symmetric(power) } else { Interval::new(0.0, power) };
+        let mut factorial = 1.0;
+        for p in 0..=degree {
+            factorial *= p.max(1) as f64;
+            let mut coefficient = at[order + p] / Interval::point(factorial);
+            if p == 0 {
+                let below: f64 = (1..=degree + 1).map(|p| p as f64).product();
+                coefficient = at[order] + over[order + degree + 1] * power / Interval::point(below);
+            }
+            (self.value[p][lane], self.spread[p][lane]) = (coefficient.middle(), coefficient.radius());
+        }
+        self.whole[lane] = over[order];
     }
-    out[m] = raised(start.radius() + slope.abs() * z[m] + spread * distance + EPSILON * charge);
-    let whole = over[order];
-    // A plane keeps what functions have in common, as long as the distance from it is small beside the range; not a number is not.
-    let worthwhile = out[m] <= WORTHWHILE * whole.radius();
-    if whole.is_bounded() && !worthwhile {
-        set_constant(out, whole);
+
+    /// Writes the forms, given those of the powers `w`, `w^2`, .. of the argument. Where the range of a function is not much wider than the
+    /// distance from the polynomial, the range.
+    #[inline(always)]
+    pub fn write(&self, basis: &Basis, out: &mut [[f64; W]], powers: &[[f64; W]]) {
+        let m = basis.count();
+        let (mut spread, mut charge) = (self.spread[0], [0.0; W]);
+        out[0] = self.value[0];
+        for (p, power) in (1..).zip(powers.chunks_exact(m + 1)) {
+            let (c, off) = (&self.value[p], &self.spread[p]);
+            // The power has no monomials of a lower degree.
+            let first = basis.of_degree(p).start;
+            for (out, power) in out[first..m].iter_mut().zip(&power[first..m]) {
+                for l in 0..W {
+                    out[l] += c[l] * power[l];
+                }
+            }
+            let sizes = size(&power[first..m]);
+            for l in 0..W {
+                spread[l] += c[l].abs() * power[m][l] + off[l] * (sizes[l] + power[m][l]);
+                charge[l] += c[l].abs() * sizes[l];
+            }
+        }
+        for l in 0..W {
+            out[m][l] = raised(spread[l] + 8.0 * EPSILON * charge[l]);
+            // A polynomial keeps what functions have in common, as long as the distance from it is small beside the range; not a number
+            // is not.
+            let whole = self.whole[l];
+            let worthwhile = out[m][l] <= WORTHWHILE * whole.radius();
+            if whole.is_bounded() && !worthwhile {
+                set_constant(out, l, whole);
+            }
+        }
     }
 }

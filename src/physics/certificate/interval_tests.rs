@@ -1,6 +1,6 @@
 //! Enclosures of numbers, functions and derivatives against exact values.
 
-use super::function::{derivatives, smooth_bounds};
+use super::function::{Derivatives, Function, smooth_bounds};
 use super::interval::Interval;
 use crate::forward::HyperDual;
 use crate::ops::Unary;
@@ -40,12 +40,20 @@ pub(super) fn holds(interval: Interval, x: Dd) -> bool {
     Dd::of_f64(interval.low) <= x && x <= Dd::of_f64(interval.high)
 }
 
-/// Value and four derivatives by the table of operations in double-double numbers.
-fn exact(f: Unary, x: f64) -> [Dd; 5] {
+/// Derivatives over all numbers of an interval.
+fn derivatives(f: Unary, x: Interval) -> Derivatives {
+    let (centre, distance) = (x.middle(), x.radius());
+    Function::Table(f).about(centre, distance).1
+}
+
+/// Value and six derivatives by the table of operations in double-double numbers.
+fn exact(f: Unary, x: f64) -> [Dd; 7] {
     let (one, zero) = (<Dd as Real>::one(), <Dd as Real>::zero());
-    let at = HyperDual::new(Dd::of_f64(x), one, one, zero);
-    let (value, first, second) = f.jet(at);
-    [value.value, first.value, second.value, second.s, second.st]
+    let inner = HyperDual::new(Dd::of_f64(x), one, one, zero);
+    let (unit, none) = (HyperDual::lift(one), HyperDual::lift(zero));
+    let (value, first, second) = f.jet(HyperDual::new(inner, unit, unit, none));
+    let [second, third, fourth] = [second.value, second.s, second.st];
+    [value.value.value, first.value.value, second.value, third.value, fourth.value, fourth.s, fourth.st]
 }
 
 /// Derivatives of the table lose some digits of double-double numbers, but far fewer than half of them.
@@ -116,29 +124,29 @@ fn arithmetic_is_rounded_outward() {
     assert_eq!(Interval::new(f64::NAN, 1.0), Interval::ENTIRE);
 }
 
-/// The fifth derivative of functions with suprema, in intervals.
-fn fifth(f: Unary, x: Interval) -> Interval {
+/// The seventh derivative of functions with suprema, in intervals.
+fn seventh(f: Unary, x: Interval) -> Interval {
     let number = Interval::point;
-    let square = x.square();
+    let u = x.square();
     // With p = s(x) s(-x), s the logistic function.
     let logistic = |x: Interval| {
         let p = x.logistic() * (-x).logistic();
-        p * (number(1.0) - p * (number(30.0) - number(120.0) * p))
+        p * (number(1.0) - p * (number(126.0) - p * (number(1680.0) - p * number(5040.0))))
     };
-    let fourth = |f: Unary, x: Interval| derivatives(f, x)[4];
+    let sixth = |f: Unary, x: Interval| derivatives(f, x)[6];
     match f {
         Unary::Logistic => logistic(x),
-        Unary::Softplus => fourth(Unary::Logistic, x),
-        Unary::Tanh => number(64.0) * logistic(number(2.0) * x),
-        Unary::LnCosh => fourth(Unary::Tanh, x),
-        Unary::XTanh => number(2.0) * x * logistic(x) + number(10.0) * fourth(Unary::Logistic, x),
+        Unary::Softplus => sixth(Unary::Logistic, x),
+        Unary::Tanh => number(256.0) * logistic(number(2.0) * x),
+        Unary::LnCosh => sixth(Unary::Tanh, x),
+        Unary::XTanh => number(2.0) * x * logistic(x) + number(14.0) * sixth(Unary::Logistic, x),
         Unary::Gelu => {
-            let density = (-(square * number(0.5))).exp() / (number(2.0) * Interval::pi()).sqrt();
-            density * x * (number(18.0) + square * (square - number(11.0)))
+            let density = (-(u * number(0.5))).exp() / (number(2.0) * Interval::pi()).sqrt();
+            density * x * (number(-120.0) + u * (number(115.0) + u * (u - number(22.0))))
         }
         _ => {
-            let density = number(2.0) / Interval::pi().sqrt() * (-square).exp();
-            density * (number(12.0) + number(16.0) * square * (square - number(3.0)))
+            let density = number(2.0) / Interval::pi().sqrt() * (-u).exp();
+            density * (number(120.0) - u * (number(720.0) - u * (number(480.0) - number(64.0) * u)))
         }
     }
 }
@@ -153,7 +161,7 @@ fn suprema_hold() {
                 (-640..640).map(|k| Interval::new(f64::from(k) / 16.0, f64::from(k + 1) / 16.0)).collect();
             let mut largest = 0.0_f64;
             while let Some(piece) = pieces.pop() {
-                let at = |x: Interval| if order == 5 { fifth(f, x) } else { super::function::formulas(f, x)[order] };
+                let at = |x: Interval| if order == 7 { seventh(f, x) } else { super::function::formulas(f, x)[order] };
                 let middle = piece.middle();
                 largest = largest.max(at(Interval::point(middle)).mignitude());
                 if at(piece).magnitude() <= bound {

@@ -2,14 +2,14 @@
 //! bound.
 //!
 //! A Lagrangian, learned or written down, is evaluated once per box of states with numbers that carry its value and its first and second
-//! derivatives along the velocities, each as a plane over the box and a bound of the distance from it (a first-order Taylor model). What
-//! comes out encloses the mass matrix of every state of the box; Gershgorin's and Sylvester's theorems prove the signs of its eigenvalues
+//! derivatives along the velocities, each as a polynomial over the box and a bound of the distance from it (a Taylor model, of the third
+//! order for two coordinates). What comes out encloses the mass matrix of every state of the box; Gershgorin's and Sylvester's theorems prove the signs of its eigenvalues
 //! and bound its condition number. Boxes that are not decided are cut in two.
 //!
 //! # What is proven
 //!
 //! Every statement is about the Lagrangian as a function of real numbers whose weights, parameters and constants are those of the program.
-//! The rounding of the proof itself is covered everywhere: `Interval`s are rounded outward, first-order forms charge to their distance
+//! The rounding of the proof itself is covered everywhere: `Interval`s are rounded outward, forms charge to their distance
 //! what a sum or a product may have lost, and the functions of the standard library are granted 8 units in the last place. What a program
 //! rounds when it evaluates the same mass matrix at one state is not part of the statement; it moves eigenvalues by about the condition
 //! number times `1e-16`, relative to the smallest.
@@ -36,6 +36,8 @@
 //! ```
 
 mod affine;
+mod arena;
+mod basis;
 mod elementary;
 mod enclosure;
 mod form;
@@ -60,6 +62,7 @@ use crate::lagrangian::{Lagrangian, LagrangianVisitor, SystemInstance};
 use crate::scalar::Scalar;
 use enclosure::{Enclose, Source};
 use search::{Tree, search};
+use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 use thiserror::Error;
 
@@ -84,8 +87,8 @@ impl Signature {
 }
 
 /// Aim and limits of a search.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Options {
+#[derive(Clone, Copy, Debug)]
+pub struct Options<'a> {
     /// Signature to be proven.
     pub signature: Signature,
     /// Largest condition number allowed, `max |eigenvalue| / min |eigenvalue|` of the matrix in the units of the coordinates, at least 1;
@@ -96,14 +99,16 @@ pub struct Options {
     /// Boxes after which no further one is evaluated: a search that ends by it, not by time, is the same every time, on any number of
     /// threads.
     pub boxes: usize,
-    /// Threads.
+    /// Threads, at most; where fewer can be started, a search takes longer and finds the same.
     pub threads: usize,
+    /// A flag that ends the search when it is raised, with what is proven by then.
+    pub stop: Option<&'a AtomicBool>,
 }
 
-impl Options {
+impl Options<'_> {
     /// Ten seconds on one thread, any condition number, at most 10 million boxes.
     pub fn new(signature: Signature) -> Self {
-        Self { signature, condition: None, seconds: 10.0, boxes: 10_000_000, threads: 1 }
+        Self { signature, condition: None, seconds: 10.0, boxes: 10_000_000, threads: 1, stop: None }
     }
 }
 
@@ -215,7 +220,7 @@ pub fn certify<L: Lagrangian, S: Scalar>(
     lagrangian: &L,
     parameters: &[S],
     region: &Bounds,
-    options: &Options,
+    options: &Options<'_>,
 ) -> Result<Certificate, CertificateError> {
     let bounds = checked(lagrangian.coordinates(), region, options)?;
     Ok(certificate(&Source::new(lagrangian, parameters), vec![(bounds, 1.0)], options))
@@ -228,9 +233,9 @@ pub fn certify<L: Lagrangian, S: Scalar>(
 pub fn certify_system<S: Scalar>(
     configured: &SystemInstance<S>,
     region: &Bounds,
-    options: &Options,
+    options: &Options<'_>,
 ) -> Result<Certificate, CertificateError> {
-    struct Certify<'a, S>(&'a [S], &'a Bounds, &'a Options);
+    struct Certify<'a, S>(&'a [S], &'a Bounds, &'a Options<'a>);
     impl<S: Scalar> LagrangianVisitor for Certify<'_, S> {
         type Output = Result<Certificate, CertificateError>;
         fn visit<L: Lagrangian>(self, lagrangian: &L) -> Self::Output {
@@ -241,7 +246,7 @@ pub fn certify_system<S: Scalar>(
 }
 
 /// The bounds of positions and velocities, one after the other, if everything fits together.
-fn checked(n: usize, region: &Bounds, options: &Options) -> Result<Vec<(f64, f64)>, CertificateError> {
+fn checked(n: usize, region: &Bounds, options: &Options<'_>) -> Result<Vec<(f64, f64)>, CertificateError> {
     if n > MOST_COORDINATES {
         return Err(CertificateError::Coordinates(n));
     }
@@ -268,7 +273,7 @@ fn checked(n: usize, region: &Bounds, options: &Options) -> Result<Vec<(f64, f64
 }
 
 /// A search over regions with their shares.
-fn certificate(source: &dyn Enclose, regions: Vec<(Vec<(f64, f64)>, f64)>, options: &Options) -> Certificate {
+fn certificate(source: &dyn Enclose, regions: Vec<(Vec<(f64, f64)>, f64)>, options: &Options<'_>) -> Certificate {
     let start = Instant::now();
     let roots = regions.iter().map(|(bounds, _)| bounds.clone()).collect();
     let found = search(source, regions, options);

@@ -25,7 +25,7 @@ use std::time::Duration;
 pub fn certify_network<S: Scalar>(
     network: &NetworkLagrangian<S>,
     region: &Bounds,
-    options: &Options,
+    options: &Options<'_>,
 ) -> Result<Certificate, CertificateError> {
     let architecture = network.architecture();
     let bounds = checked(architecture.coordinates, region, options)?;

@@ -1,117 +1,20 @@
 //! The number that a Lagrangian is evaluated with: its value, its first and its second derivatives along the velocities, each as a
-//! first-order form over a box of states.
+//! form over a box of states.
 
 use super::affine;
-use super::form;
-use super::function::{Derivatives, derivatives, real_power};
+use super::arena::{Arena, Place};
+use super::function::Function;
 use super::interval::Interval;
 use crate::ops::Unary;
 use crate::scalar::Real;
-use std::cell::{Cell, RefCell};
 use std::fmt::{Debug, Formatter};
 use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
-
-/// Memory of all numbers of one evaluation.
-///
-/// A number is a block of [`Arena::parts`] forms of [`Arena::stride`] numbers: the value, `n` first derivatives, and of the second ones
-/// those with `j <= i`, row by row.
-pub struct Arena {
-    /// Directions of the derivatives.
-    n: usize,
-    stride: usize,
-    parts: usize,
-    forms: RefCell<Vec<f64>>,
-    /// Set when a value was read, on which the Lagrangian may then branch unseen.
-    read: Cell<bool>,
-    /// Bits of the axes that a function depended on where it is not known.
-    blamed: Cell<u64>,
-}
-
-impl Arena {
-    /// For `n` coordinates and `axes` axes of the box.
-    pub fn new(n: usize, axes: usize) -> Self {
-        let parts = 1 + n + n * (n + 1) / 2;
-        Self { n, stride: axes + 2, parts, forms: RefCell::default(), read: Cell::new(false), blamed: Cell::new(0) }
-    }
-    /// Forgets all numbers.
-    pub fn clear(&self) {
-        self.forms.borrow_mut().clear();
-        self.read.set(false);
-        self.blamed.set(0);
-    }
-    /// `true` if a value was read since.
-    pub fn was_read(&self) -> bool {
-        self.read.get()
-    }
-    /// Bits of the axes along which a box has to be cut for what is not known to become so.
-    pub fn blamed(&self) -> u64 {
-        self.blamed.get()
-    }
-    /// Notes the axes on which a form depends.
-    fn blame(&self, form: &[f64]) {
-        if !form::deviation(form).is_finite() {
-            // Those to blame for it have been noted where it came from.
-            return;
-        }
-        let slopes = form[1..form.len() - 1].iter().enumerate().filter(|(_, slope)| **slope != 0.0);
-        self.blamed.set(slopes.fold(self.blamed.get(), |bits, (axis, _)| bits | 1 << (axis % 64)));
-    }
-    /// Forms of a number.
-    pub fn parts(&self) -> usize {
-        self.parts
-    }
-    /// Numbers of a form.
-    pub fn stride(&self) -> usize {
-        self.stride
-    }
-    /// Number of doubles of a number.
-    fn block(&self) -> usize {
-        self.parts * self.stride
-    }
-    /// Makes `count` numbers; `fill` is given all earlier blocks and the new ones, zeros.
-    pub fn make(&self, count: usize, fill: impl FnOnce(&[f64], &mut [f64])) -> u32 {
-        let mut forms = self.forms.borrow_mut();
-        let (start, block) = (forms.len(), self.block());
-        forms.resize(start + count * block, 0.0);
-        let (earlier, new) = forms.split_at_mut(start);
-        fill(earlier, new);
-        (start / block) as u32
-    }
-    /// Reads the forms of a number, one after the other.
-    pub fn look<T>(&self, index: u32, read: impl FnOnce(&[f64]) -> T) -> T {
-        read(of(&self.forms.borrow(), index, self.block()))
-    }
-    /// Place of the second derivative along `i` and `j`.
-    pub fn second(&self, i: usize, j: usize) -> usize {
-        let (i, j) = (i.max(j), i.min(j));
-        1 + self.n + i * (i + 1) / 2 + j
-    }
-    /// A number with a given form as its value, whose derivative along `direction` is 1.
-    pub fn variable(&self, value: &[f64], direction: Option<usize>) -> Number<'_> {
-        let index = self.make(1, |_, new| {
-            new[..self.stride].copy_from_slice(value);
-            if let Some(i) = direction {
-                new[(1 + i) * self.stride] = 1.0;
-            }
-        });
-        Number::Variable(self, index)
-    }
-    /// A number of which nothing is known.
-    fn unknown(&self) -> Number<'_> {
-        Number::Variable(self, self.make(1, |_, new| new.fill(f64::NAN)))
-    }
-}
-
-/// The block of a number.
-fn of(forms: &[f64], index: u32, block: usize) -> &[f64] {
-    &forms[index as usize * block..(index as usize + 1) * block]
-}
 
 /// A constant that lies in an interval, or a number of an [`Arena`].
 #[derive(Clone, Copy)]
 pub enum Number<'a> {
     Constant(Interval),
-    Variable(&'a Arena, u32),
+    Variable(&'a Arena, Place),
 }
 use Number::{Constant, Variable};
 
@@ -126,64 +29,21 @@ impl<'a> Number<'a> {
     pub fn range(self) -> Interval {
         match self {
             Constant(x) => x,
-            Variable(arena, index) => arena.look(index, |forms| form::range(&forms[..arena.stride])),
+            Variable(arena, place) => arena.range(place),
         }
     }
 
-    /// A function of one number by its derivatives.
-    fn chain(self, derivatives: impl Fn(Interval) -> Derivatives) -> Self {
-        let (arena, index) = match self {
-            Constant(x) => return Constant(derivatives(x)[0]),
-            Variable(arena, index) => (arena, index),
-        };
-        let (n, stride, block) = (arena.n, arena.stride, arena.block());
-        let made = arena.make(1, |earlier, new| {
-            let old = of(earlier, index, block);
-            let part = |k: usize| &old[k * stride..(k + 1) * stride];
-            let z = part(0);
-            let (at, over) = (derivatives(Interval::point(z[0])), derivatives(form::range(z)));
-            form::set_function(&mut new[..stride], z, &at, &over, 0);
-            if !over.iter().all(|x| x.is_bounded()) {
-                arena.blame(z);
-            }
-            if (1..=n).all(|i| form::is_zero(part(i))) && (1 + n..arena.parts).all(|k| form::is_zero(part(k))) {
-                return;
-            }
-            let mut slopes = vec![0.0; (2 + n) * stride];
-            let (first, rest) = slopes.split_at_mut(stride);
-            let (second, bent) = rest.split_at_mut(stride);
-            form::set_function(first, z, &at, &over, 1);
-            form::set_function(second, z, &at, &over, 2);
-            for (i, bent) in bent.chunks_exact_mut(stride).enumerate() {
-                form::add_product(bent, second, part(1 + i));
-            }
-            for k in 1..arena.parts {
-                form::add_product(&mut new[k * stride..(k + 1) * stride], first, part(k));
-            }
-            for i in 0..n {
-                for j in 0..=i {
-                    let k = arena.second(i, j);
-                    let bent = &bent[i * stride..(i + 1) * stride];
-                    form::add_product(&mut new[k * stride..(k + 1) * stride], bent, part(1 + j));
-                }
-            }
-        });
-        Variable(arena, made)
+    /// A function of one number.
+    fn apply(self, f: Function) -> Self {
+        match self {
+            Constant(x) => Constant(f.value(x)),
+            Variable(arena, place) => Variable(arena, arena.function(f, place)),
+        }
     }
 
-    /// `sum_k s_k x_k` of a few numbers of an arena.
-    fn combine(arena: &'a Arena, terms: &[(Interval, u32)], constant: Interval) -> Self {
-        let (stride, block) = (arena.stride, arena.block());
-        let made = arena.make(1, |earlier, new| {
-            if constant != Interval::ZERO {
-                form::set_constant(&mut new[..stride], constant);
-            }
-            for &(factor, index) in terms {
-                let forms = of(earlier, index, block).chunks_exact(stride);
-                new.chunks_exact_mut(stride).zip(forms).for_each(|(new, old)| form::add_multiple(new, factor, old));
-            }
-        });
-        Variable(arena, made)
+    /// `constant + sum_k s_k x_k` of a few numbers of an arena.
+    fn combine(arena: &'a Arena, terms: &[(Interval, Place)], constant: Interval) -> Self {
+        Variable(arena, arena.combine(terms, constant))
     }
 
     /// The sign, if it is the same on the whole box: `Some(true)` above 0, `Some(false)` at or below.
@@ -202,9 +62,9 @@ impl<'a> Number<'a> {
     fn undecided(by: &[Self]) -> Self {
         let mut found = Constant(Interval::ENTIRE);
         for x in by {
-            if let Variable(arena, index) = x {
-                arena.look(*index, |forms| arena.blame(&forms[..arena.stride]));
-                found = arena.unknown();
+            if let Variable(arena, place) = x {
+                arena.blame(*place);
+                found = Variable(arena, arena.unknown());
             }
         }
         found
@@ -266,28 +126,9 @@ impl Mul for Number<'_> {
             (Constant(c), Variable(arena, x)) | (Variable(arena, x), Constant(c)) => {
                 Self::combine(arena, &[(c, x)], Interval::ZERO)
             }
-            (Variable(arena, a), Variable(_, b)) => {
-                let (n, stride, block) = (arena.n, arena.stride, arena.block());
-                let made = arena.make(1, |earlier, new| {
-                    let (a, b) = (of(earlier, a, block), of(earlier, b, block));
-                    let part = |of_b: bool, k: usize| &(if of_b { b } else { a })[k * stride..(k + 1) * stride];
-                    for (k, out) in new.chunks_exact_mut(stride).enumerate() {
-                        form::add_product(out, part(false, 0), part(true, k));
-                        if k > 0 {
-                            form::add_product(out, part(false, k), part(true, 0));
-                        }
-                    }
-                    for i in 0..n {
-                        for j in 0..=i {
-                            let k = arena.second(i, j);
-                            let out = &mut new[k * stride..(k + 1) * stride];
-                            form::add_product(out, part(false, 1 + i), part(true, 1 + j));
-                            form::add_product(out, part(false, 1 + j), part(true, 1 + i));
-                        }
-                    }
-                });
-                Variable(arena, made)
-            }
+            // The square of a unit is found with those of its neighbours.
+            (Variable(_, a), Variable(_, b)) if a == b => self.powi(2),
+            (Variable(arena, a), Variable(_, b)) => Variable(arena, arena.product(a, b)),
         }
     }
 }
@@ -315,7 +156,7 @@ assign! { AddAssign add_assign + SubAssign sub_assign - MulAssign mul_assign * D
 macro_rules! methods {
     ($($name:ident $method:ident)*) => {$(
         fn $method(self) -> Self {
-            self.chain(|x| derivatives(Unary::$name, x))
+            self.apply(Function::Table(Unary::$name))
         }
     )*};
 }
@@ -329,14 +170,14 @@ impl Real for Number<'_> {
     /// A value of the box; that it was read is remembered, for nothing is proven of a Lagrangian that may branch on it.
     fn primal(self) -> f64 {
         if let Variable(arena, _) = self {
-            arena.read.set(true);
+            arena.note_read();
         }
         self.range().middle()
     }
     fn is_exact_zero(self) -> bool {
         match self {
             Constant(x) => x == Interval::ZERO,
-            Variable(arena, index) => arena.look(index, form::is_zero),
+            Variable(arena, place) => arena.is_zero(place),
         }
     }
     fn ratio(numerator: i32, denominator: i32) -> Self {
@@ -344,12 +185,12 @@ impl Real for Number<'_> {
     }
     crate::ops::unary_methods! { methods }
     fn powi(self, exponent: i32) -> Self {
-        self.chain(|x| derivatives(Unary::Powi(exponent), x))
+        self.apply(Function::Table(Unary::Powi(exponent)))
     }
     fn powf(self, exponent: Self) -> Self {
         match exponent {
             Constant(p) if p.is_point() && p.low.fract() == 0.0 && p.low.abs() < 1e9 => self.powi(p.low as i32),
-            Constant(p) if p.is_point() => self.chain(|x| real_power(x, p.low)),
+            Constant(p) if p.is_point() => self.apply(Function::Power(p.low)),
             _ => (exponent * self.ln()).exp(),
         }
     }

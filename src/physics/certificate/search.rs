@@ -4,7 +4,10 @@ use super::enclosure::Enclose;
 use super::spectrum::Spectrum;
 use super::{Options, Signature, Witness};
 use crate::storage::in_order;
+use std::cmp::{Ordering, Reverse};
+use std::collections::BinaryHeap;
 use std::fmt::{Debug, Formatter};
+use std::sync::atomic;
 use std::time::{Duration, Instant};
 
 /// Knowledge of a box.
@@ -48,6 +51,35 @@ struct Waiting {
     bounds: Vec<(f64, f64)>,
     /// Share of the whole region.
     share: f64,
+    /// How often it probably has to be halved until its parts are decided, by what was found of the box that it was cut from.
+    halvings: f64,
+}
+
+impl Waiting {
+    /// Boxes with a larger rank come first: at the beginning large ones, which show where the matrix is not as it should be; then those of which
+    /// most will be decided per box that has to be evaluated, of these small ones, whose neighbours were decided last.
+    fn rank(&self) -> (bool, i64, Reverse<i64>, Reverse<usize>) {
+        let size = self.share.log2();
+        let large = size > LARGE;
+        let rate = if large || !self.halvings.is_finite() { size } else { size - self.halvings };
+        (large, rate.floor() as i64, Reverse(size.floor() as i64), Reverse(self.node))
+    }
+}
+impl PartialEq for Waiting {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other) == Ordering::Equal
+    }
+}
+impl Eq for Waiting {}
+impl PartialOrd for Waiting {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+impl Ord for Waiting {
+    fn cmp(&self, other: &Self) -> Ordering {
+        self.rank().cmp(&other.rank())
+    }
 }
 
 /// Findings of a search.
@@ -64,72 +96,86 @@ pub struct Found {
 
 /// Boxes that are taken from the queue at a time.
 const CHUNK: usize = 128;
+/// Binary logarithm of the share of the region above which boxes are evaluated in the order of their size.
+const LARGE: f64 = -9.5;
+/// A box is cut at once into parts that are halved so much less often than it probably has to be.
+const CAUTION: f64 = 0.5;
+/// Halvings at once, at most.
+const MOST_HALVINGS: usize = 6;
 
-/// Cuts boxes, the largest first, whose shares of the region are given with them.
-pub fn search(source: &dyn Enclose, regions: Vec<(Vec<(f64, f64)>, f64)>, options: &Options) -> Found {
+/// Cuts boxes whose shares of the region are given with them, until each is decided, or time, the number of boxes or a flag ends the search.
+pub fn search(source: &dyn Enclose, regions: Vec<(Vec<(f64, f64)>, f64)>, options: &Options<'_>) -> Found {
     let deadline = Instant::now().checked_add(Duration::try_from_secs_f64(options.seconds).unwrap_or(Duration::MAX));
+    let goes_on = || {
+        let stopped = options.stop.is_some_and(|stop| stop.load(atomic::Ordering::Relaxed));
+        !stopped && deadline.is_none_or(|deadline| Instant::now() < deadline)
+    };
     let n = source.coordinates();
     let scale: Vec<f64> = regions.first().map_or(Vec::new(), |(bounds, _)| bounds.iter().map(|b| b.1 - b.0).collect());
     let active = active_axes(source, &regions);
     let mut found = Found::default();
-    let mut queue: Vec<Waiting> = Vec::new();
+    let mut queue: BinaryHeap<Waiting> = BinaryHeap::new();
     for (bounds, share) in regions {
-        queue.push(Waiting { node: found.tree.add(), bounds, share });
+        queue.push(Waiting { node: found.tree.add(), bounds, share, halvings: f64::INFINITY });
     }
-    let mut next = Vec::new();
-    while !queue.is_empty() {
-        for chunk in queue.chunks(CHUNK) {
-            let chunk = &chunk[..chunk.len().min(options.boxes - found.boxes)];
-            let spectra = judge(source, chunk, options.threads, deadline);
-            let out_of_time = spectra.iter().any(Option::is_none);
-            for (waiting, spectrum) in chunk.iter().zip(&spectra) {
-                let Some(spectrum) = spectrum else { continue };
-                found.boxes += 1;
-                let verdict = options.verdict(spectrum);
-                found.tree.nodes[waiting.node].verdict = verdict;
-                match verdict {
-                    Verdict::Certified { condition } => {
-                        found.certified += waiting.share;
-                        found.condition = found.condition.max(condition);
-                        continue;
-                    }
-                    Verdict::Refuted => {
-                        found.refuted += waiting.share;
-                        found.look_for_witness(source, waiting, spectrum, options);
-                        continue;
-                    }
-                    Verdict::Open if found.witness.is_none() && options.suspects(&spectrum.middle, n) => {
-                        found.look_for_witness(source, waiting, spectrum, options);
-                    }
-                    Verdict::Open => {}
+    while !queue.is_empty() && found.boxes < options.boxes {
+        let room = CHUNK.min(options.boxes - found.boxes);
+        let chunk: Vec<Waiting> = std::iter::from_fn(|| queue.pop()).take(room).collect();
+        let spectra = evaluate(source, &chunk, options.threads, &goes_on);
+        let ended = !goes_on();
+        for (waiting, spectrum) in chunk.iter().zip(&spectra) {
+            let Some(spectrum) = spectrum else { continue };
+            found.boxes += 1;
+            let verdict = options.verdict(spectrum);
+            found.tree.nodes[waiting.node].verdict = verdict;
+            match verdict {
+                Verdict::Certified { condition } => {
+                    found.certified += waiting.share;
+                    found.condition = found.condition.max(condition);
+                    continue;
                 }
-                if let Some(parts) = cut(waiting, spectrum, &scale, &active) {
-                    found.tree.cut(waiting, parts, &mut next);
+                Verdict::Refuted => {
+                    found.refuted += waiting.share;
+                    found.look_for_witness(source, waiting, spectrum, options);
+                    continue;
                 }
+                Verdict::Open if found.witness.is_none() && options.suspects(&spectrum.middle, n) => {
+                    found.look_for_witness(source, waiting, spectrum, options);
+                }
+                Verdict::Open => {}
             }
-            if out_of_time || found.boxes >= options.boxes {
-                return found;
-            }
+            found.tree.cut(waiting, &mut Cut::new(spectrum, &scale, &active), &mut queue);
         }
-        queue = std::mem::take(&mut next);
+        if ended {
+            break;
+        }
     }
     found
 }
 
-/// The spectra of boxes, `None` for those that time did not suffice for.
-fn judge(source: &dyn Enclose, chunk: &[Waiting], threads: usize, deadline: Option<Instant>) -> Vec<Option<Spectrum>> {
-    let share = chunk.len().div_ceil(threads.max(1)).max(1);
+/// The spectra of boxes, `None` for those that were not evaluated before `goes_on` said no.
+fn evaluate(
+    source: &dyn Enclose,
+    chunk: &[Waiting],
+    threads: usize,
+    goes_on: &(dyn Fn() -> bool + Sync),
+) -> Vec<Option<Spectrum>> {
+    // A few parts per thread: some are slower than others.
+    let share = chunk.len().div_ceil(threads.clamp(1, CHUNK) * 4).max(1);
     let parts: Vec<&[Waiting]> = chunk.chunks(share).collect();
-    let judged = in_order(&parts, threads, |boxes| {
+    let evaluated = in_order(&parts, threads, |boxes| {
         let mut spectra: Vec<Option<Spectrum>> = boxes.iter().map(|_| None).collect();
+        if !goes_on() {
+            return spectra;
+        }
         let bounds: Vec<&[(f64, f64)]> = boxes.iter().map(|waiting| waiting.bounds.as_slice()).collect();
         source.each(&bounds, &mut |index, matrix| {
             spectra[index] = Some(matrix.spectrum());
-            deadline.is_none_or(|deadline| Instant::now() < deadline)
+            goes_on()
         });
         spectra
     });
-    judged.into_iter().flatten().collect()
+    evaluated.into_iter().flatten().collect()
 }
 
 /// Axes along which the mass matrix changes at some of a few places; all if it is not known to change at any.
@@ -152,9 +198,9 @@ fn active_axes(source: &dyn Enclose, regions: &[(Vec<(f64, f64)>, f64)]) -> Vec<
     let mut active = vec![false; axes];
     let places: Vec<&[(f64, f64)]> = places.iter().map(Vec::as_slice).collect();
     source.each(&places, &mut |_, matrix| {
-        for form in matrix.forms.chunks_exact(matrix.stride) {
+        for form in matrix.forms.chunks_exact(matrix.basis.stride()) {
             let slopes = active.iter_mut().zip(&form[1..]);
-            slopes.for_each(|(active, slope)| *active |= slope.is_finite() && *slope != 0.0);
+            slopes.for_each(|(active, [slope])| *active |= slope.is_finite() && *slope != 0.0);
         }
         true
     });
@@ -164,26 +210,53 @@ fn active_axes(source: &dyn Enclose, regions: &[(Vec<(f64, f64)>, f64)]) -> Vec<
     active
 }
 
-/// The axis to cut and its middle: where the matrix changes most, by its plane and, for a share as large as the side, by the distance from
-/// it. Of a matrix that is not known, the longest side of those to blame.
-fn cut(waiting: &Waiting, spectrum: &Spectrum, scale: &[f64], active: &[bool]) -> Option<(usize, f64)> {
-    let relative = |axis: usize| {
-        let (low, high) = waiting.bounds[axis];
-        if scale[axis] > 0.0 { (high - low) / scale[axis] } else { 0.0 }
-    };
-    let known = spectrum.remainder.is_finite();
-    let blamed = |axis: usize| spectrum.blamed >> (axis % 64) & 1 == 1;
-    let any = known || spectrum.blamed == 0;
-    let axes = || (0..waiting.bounds.len()).filter(|&axis| if any { active[axis] } else { blamed(axis) });
-    let sides: f64 = axes().map(relative).sum();
-    let score = |axis: usize| {
-        let side = relative(axis) / sides.max(f64::MIN_POSITIVE);
-        if known { spectrum.influence[axis] + spectrum.remainder * side } else { side }
-    };
-    let best = axes().max_by(|&a, &b| score(a).total_cmp(&score(b)).then(b.cmp(&a)))?;
-    let (low, high) = waiting.bounds[best];
-    let middle = 0.5 * low + 0.5 * high;
-    (low < middle && middle < high).then_some((best, middle))
+/// Where and how often a box is to be cut.
+struct Cut<'a> {
+    /// For every axis how much the matrix changes along it in the part that is cut next.
+    influence: Vec<f64>,
+    spectrum: &'a Spectrum,
+    /// Sides of the region.
+    scale: &'a [f64],
+    active: &'a [bool],
+}
+
+impl<'a> Cut<'a> {
+    fn new(spectrum: &'a Spectrum, scale: &'a [f64], active: &'a [bool]) -> Self {
+        Self { influence: spectrum.influence.clone(), spectrum, scale, active }
+    }
+
+    /// The axis to cut and its middle: where the matrix changes most, by its polynomial and, for a share as large as the side, by the distance
+    /// from it. Of a matrix that is not known, the longest side of those to blame.
+    fn place(&self, bounds: &[(f64, f64)]) -> Option<(usize, f64)> {
+        let relative = |axis: usize| {
+            let (low, high) = bounds[axis];
+            if self.scale[axis] > 0.0 { (high - low) / self.scale[axis] } else { 0.0 }
+        };
+        let Spectrum { remainder, blamed, .. } = *self.spectrum;
+        let known = remainder.is_finite();
+        let to_blame = |axis: usize| blamed >> (axis % 64) & 1 == 1;
+        let any = known || blamed == 0;
+        let axes = || (0..bounds.len()).filter(|&axis| if any { self.active[axis] } else { to_blame(axis) });
+        let sides: f64 = axes().map(relative).sum();
+        let score = |axis: usize| {
+            let side = relative(axis) / sides.max(f64::MIN_POSITIVE);
+            if known { self.influence[axis] + remainder * side } else { side }
+        };
+        let best = axes().max_by(|&a, &b| score(a).total_cmp(&score(b)).then(b.cmp(&a)))?;
+        let (low, high) = bounds[best];
+        let middle = 0.5 * low + 0.5 * high;
+        (low < middle && middle < high).then_some((best, middle))
+    }
+
+    /// How often the box is to be halved before a part of it is evaluated.
+    fn times(&self, share: f64) -> usize {
+        let halvings = self.spectrum.halvings;
+        if share.log2() > LARGE || !halvings.is_finite() {
+            1
+        } else {
+            ((CAUTION * halvings) as usize).clamp(1, MOST_HALVINGS)
+        }
+    }
 }
 
 impl Tree {
@@ -192,18 +265,34 @@ impl Tree {
         self.nodes.len() - 1
     }
 
-    fn cut(&mut self, waiting: &Waiting, (axis, place): (usize, f64), queue: &mut Vec<Waiting>) {
-        let first = self.nodes.len();
-        self.nodes[waiting.node].cut = Some((axis, place, first));
-        for lower in [true, false] {
-            let mut bounds = waiting.bounds.clone();
-            if lower {
-                bounds[axis].1 = place;
-            } else {
-                bounds[axis].0 = place;
-            }
-            queue.push(Waiting { node: self.add(), bounds, share: 0.5 * waiting.share });
+    /// Cuts a box and puts its parts into the queue; a box that cannot be cut stays open.
+    fn cut(&mut self, waiting: &Waiting, cut: &mut Cut<'_>, queue: &mut BinaryHeap<Waiting>) {
+        let halvings = cut.spectrum.halvings;
+        let mut parts = vec![Waiting { bounds: waiting.bounds.clone(), halvings, ..*waiting }];
+        for round in 0..cut.times(waiting.share) {
+            // Parts differ in their places alone.
+            let Some((axis, _)) = cut.place(&parts[0].bounds) else {
+                if round > 0 {
+                    break;
+                }
+                return;
+            };
+            parts = parts.into_iter().flat_map(|part| self.halve(part, axis)).collect();
+            cut.influence[axis] *= 0.5;
         }
+        queue.extend(parts);
+    }
+
+    /// The two parts of a box.
+    fn halve(&mut self, Waiting { node, bounds, share, halvings }: Waiting, axis: usize) -> [Waiting; 2] {
+        let (low, high) = bounds[axis];
+        let place = 0.5 * low + 0.5 * high;
+        self.nodes[node].cut = Some((axis, place, self.nodes.len()));
+        [(low, place), (place, high)].map(|side| {
+            let mut bounds = bounds.clone();
+            bounds[axis] = side;
+            Waiting { node: self.add(), bounds, share: 0.5 * share, halvings: (halvings - 1.0).max(0.0) }
+        })
     }
 
     /// The verdict of the smallest box that holds a state of the `root`-th region.
@@ -224,7 +313,13 @@ impl Found {
     }
 
     /// Proves that the middle of a box is a state without the signature or with a larger condition number.
-    fn look_for_witness(&mut self, source: &dyn Enclose, waiting: &Waiting, spectrum: &Spectrum, options: &Options) {
+    fn look_for_witness(
+        &mut self,
+        source: &dyn Enclose,
+        waiting: &Waiting,
+        spectrum: &Spectrum,
+        options: &Options<'_>,
+    ) {
         if self.witness.is_some() {
             return;
         }
@@ -245,7 +340,7 @@ impl Found {
     }
 }
 
-impl Options {
+impl Options<'_> {
     fn verdict(&self, spectrum: &Spectrum) -> Verdict {
         let Some((positive, negative)) = spectrum.inertia else { return Verdict::Open };
         let (least, most) = spectrum.condition;

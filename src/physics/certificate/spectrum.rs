@@ -1,15 +1,16 @@
 //! Proofs about the eigenvalues of all matrices of an enclosure.
 
+use super::basis::{Basis, MOST_DEGREE};
 use super::form;
 use super::interval::Interval;
 use crate::linalg::{Workspace, eigh};
+use std::sync::Arc;
 
-/// A symmetric matrix `(n, n)` whose elements are first-order forms over a box.
+/// A symmetric matrix `(n, n)` whose elements are forms over a box.
 pub struct MatrixForms {
     pub n: usize,
-    /// Numbers of a form.
-    pub stride: usize,
-    pub forms: Vec<f64>,
+    pub basis: Arc<Basis>,
+    pub forms: Vec<[f64; 1]>,
     /// Bits of the axes along which a box has to be cut for what is not known to become so.
     pub blamed: u64,
 }
@@ -26,16 +27,20 @@ pub struct Spectrum {
     pub middle: Vec<f64>,
     /// For every axis of the box how much the matrix changes along it, relative to its eigenvalues.
     pub influence: Vec<f64>,
-    /// The same for the distance from the plane; infinite if the matrix is not known.
+    /// The same for the distance from the polynomial; infinite if the matrix is not known.
     pub remainder: f64,
+    /// How often the box has to be halved until the signs of the eigenvalues are proven in every part, as far as its polynomial can say; 0 if
+    /// they are proven, infinite if the matrix is not known.
+    pub halvings: f64,
     /// The axes to blame for that, see [`MatrixForms::blamed`].
     pub blamed: u64,
 }
 
 impl MatrixForms {
     /// The form of an element.
-    pub fn element(&self, i: usize, j: usize) -> &[f64] {
-        &self.forms[(i * self.n + j) * self.stride..(i * self.n + j + 1) * self.stride]
+    pub fn element(&self, i: usize, j: usize) -> &[[f64; 1]] {
+        let stride = self.basis.stride();
+        &self.forms[(i * self.n + j) * stride..(i * self.n + j + 1) * stride]
     }
 
     /// Proves what it can.
@@ -46,16 +51,17 @@ impl MatrixForms {
     /// those of `M`. The rounding of `U` is no matter there; for the condition number Ostrowski's theorem bounds it: with
     /// `|U U^T - 1| <= delta` every eigenvalue of `B` is one of `M` times a factor from `1 - delta` to `1 + delta`.
     pub fn spectrum(&self) -> Spectrum {
-        let (n, stride) = (self.n, self.stride);
-        let axes = stride - 2;
+        let (n, stride, basis) = (self.n, self.basis.stride(), &*self.basis);
+        let axes = basis.of_degree(1).len();
         let nothing = || Spectrum {
             condition: (1.0, f64::INFINITY),
             influence: vec![0.0; axes],
             remainder: f64::INFINITY,
+            halvings: f64::INFINITY,
             blamed: self.blamed,
             ..Spectrum::default()
         };
-        let centre: Vec<f64> = self.forms.iter().step_by(stride).copied().collect();
+        let centre: Vec<f64> = self.forms.iter().step_by(stride).map(|x| x[0]).collect();
         let (mut values, mut vectors) = (vec![0.0; n], vec![0.0; n * n]);
         let found = eigh(n, &centre, &mut values, &mut vectors, &mut Workspace::new());
         if found.is_err() || values.iter().chain(&vectors).any(|x| !x.is_finite()) {
@@ -70,43 +76,57 @@ impl MatrixForms {
         let largest = values.iter().fold(0.0, |a: f64, x| a.max(x.abs()));
         let weight = |k: usize| values[k].abs().max(1e-14 * largest).max(f64::MIN_POSITIVE).sqrt().recip();
         let weights: Vec<f64> = (0..n).map(weight).collect();
-        let (planes, distance) = self.split();
+        let (polynomials, distance) = self.split();
         let whole = self.rotated(&vectors);
+        // Growth with the sides, by degrees, of the row in which it is largest.
+        let mut growth = [0.0; MOST_DEGREE + 2];
         for k in 0..n {
+            let mut row = [0.0; MOST_DEGREE + 2];
             for l in 0..n {
                 let (element, scale) = (whole.element(k, l), weights[k] * weights[l]);
-                let slopes = spectrum.influence.iter_mut().zip(&element[1..]);
-                slopes.for_each(|(sum, slope)| *sum += scale * slope.abs());
-                spectrum.remainder += scale * element[stride - 1];
+                for monomial in 1..basis.count() {
+                    let (size, factors) = (scale * element[monomial][0].abs(), basis.factors(monomial));
+                    row[factors.len()] += size;
+                    factors.chunk_by(|a, b| a == b).for_each(|same| spectrum.influence[same[0]] += size);
+                }
+                let size = scale * element[stride - 1][0];
+                row[basis.degree() + 1] += size;
+                spectrum.remainder += size;
+            }
+            if row.iter().sum::<f64>() > growth.iter().sum::<f64>() {
+                growth = row;
             }
         }
-        let ranges =
-            |rotated: &Self| -> Vec<Interval> { rotated.forms.chunks_exact(stride).map(form::range).collect() };
         // The distances element by element, or all together by their norm, which a rotation does not change.
         let turned = Interval::point(distance) * (Interval::point(1.0) + Interval::point(defect));
+        let ranges = |rotated: &Self| {
+            rotated.forms.chunks_exact(stride).map(|form| form::range(basis, form, 0)).collect::<Vec<_>>()
+        };
         spectrum.conclude(n, &ranges(&whole), &weights, 0.0, defect);
-        spectrum.conclude(n, &ranges(&planes.rotated(&vectors)), &weights, turned.high, defect);
+        spectrum.conclude(n, &ranges(&polynomials.rotated(&vectors)), &weights, turned.high, defect);
+        let active = spectrum.influence.iter().filter(|x| **x > 0.0).count();
+        spectrum.halvings = if spectrum.inertia.is_some() { 0.0 } else { active.max(1) as f64 * halvings(&growth) };
         spectrum
     }
 
-    /// The planes alone, and a bound of the norm of all matrices that remain: the largest sum of a row of distances.
+    /// The polynomials alone, and a bound of the norm of all matrices that remain: the largest sum of a row of distances.
     fn split(&self) -> (Self, f64) {
-        let (n, stride) = (self.n, self.stride);
-        let mut planes = Self { n, stride, forms: self.forms.clone(), blamed: 0 };
+        let (n, stride) = (self.n, self.basis.stride());
+        let mut polynomials = Self { n, basis: Arc::clone(&self.basis), forms: self.forms.clone(), blamed: 0 };
         let mut norm = 0.0;
-        for row in planes.forms.chunks_exact_mut(n * stride) {
+        for row in polynomials.forms.chunks_exact_mut(n * stride) {
             let distances = row.iter_mut().skip(stride - 1).step_by(stride).map(std::mem::take);
-            let sum = distances.fold(Interval::ZERO, |sum, r| sum + Interval::point(r)).high;
+            let sum = distances.fold(Interval::ZERO, |sum, [r]| sum + Interval::point(r)).high;
             // Not a number is above everything.
             norm = if sum <= norm { norm } else { sum };
         }
-        (planes, norm)
+        (polynomials, norm)
     }
 
     /// `U M U^T`.
     fn rotated(&self, u: &[f64]) -> Self {
-        let (n, stride) = (self.n, self.stride);
-        let empty = || Self { n, stride, forms: vec![0.0; n * n * stride], blamed: 0 };
+        let (n, stride) = (self.n, self.basis.stride());
+        let empty = || Self { n, basis: Arc::clone(&self.basis), forms: vec![[0.0]; n * n * stride], blamed: 0 };
         let (mut half, mut whole) = (empty(), empty());
         for k in 0..n {
             for j in 0..n {
@@ -122,6 +142,23 @@ impl MatrixForms {
         }
         whole
     }
+}
+
+/// How often every side of a box has to be halved until what is `sum_p growth_p` in it is below 1, if the summands shrink with their powers of the
+/// sides.
+fn halvings(growth: &[f64]) -> f64 {
+    let at = |side: f64| growth.iter().rev().fold(0.0, |sum, x| sum * side + x);
+    // Not a number is not below.
+    let below = |side: f64| at(side) < 1.0;
+    let (mut small, mut large) = (0.0_f64, 64.0_f64);
+    if !below((-large).exp2()) {
+        return f64::INFINITY;
+    }
+    while large - small > 0.01 {
+        let middle = 0.5 * (small + large);
+        *if below((-middle).exp2()) { &mut large } else { &mut small } = middle;
+    }
+    large
 }
 
 /// A bound of `|U U^T - 1|`, rows of `U` one after the other.
@@ -179,7 +216,8 @@ mod tests {
     /// Constant matrices, with a distance on every element.
     fn matrix(elements: &[f64], distance: f64) -> MatrixForms {
         let n = elements.len().isqrt();
-        MatrixForms { n, stride: 2, forms: elements.iter().flat_map(|&x| [x, distance]).collect(), blamed: 0 }
+        let basis = Arc::new(Basis::new(0, 1));
+        MatrixForms { n, basis, forms: elements.iter().flat_map(|&x| [[x], [distance]]).collect(), blamed: 0 }
     }
 
     #[test]

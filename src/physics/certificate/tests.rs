@@ -1,6 +1,6 @@
 //! Enclosures of mass matrices against exact ones, certificates against systems whose signature is known.
 
-use super::enclosure::mass_matrix_enclosure;
+use super::enclosure::{Enclose, Source, mass_matrix_enclosure};
 use super::interval::Interval;
 use super::interval_tests::holds;
 use super::*;
@@ -142,7 +142,7 @@ pub(super) fn formula(text: &str) -> crate::lagrangian::ExpressionLagrangian {
     crate::lagrangian::ExpressionLagrangian::new(&["x", "y"], &[], text).unwrap()
 }
 
-pub(super) fn limited(signature: Signature, boxes: usize) -> Options {
+pub(super) fn limited(signature: Signature, boxes: usize) -> Options<'static> {
     Options { boxes, seconds: 1e9, ..Options::new(signature) }
 }
 
@@ -236,17 +236,18 @@ fn no_certified_box_of_a_network_holds_a_violation() {
     assert!((found.certified + found.refuted + found.open - 1.0).abs() < 1e-12);
     let mut random = ChaCha8Rng::seed_from_u64(5);
     let (mut certified, mut refuted) = (0, 0);
+    let exact = model.cast::<Dd>();
     for _ in 0..4000 {
         let mut draw =
             |bounds: &[(f64, f64)]| bounds.iter().map(|b| random.random_range(b.0..b.1)).collect::<Vec<f64>>();
         let (q, v) = (draw(&region.positions), draw(&region.velocities));
-        let mut terms = Terms::default();
-        model.terms(&q, &v, Request::MASS_MATRIX, &mut terms).unwrap();
-        let Inertia { positive, .. } = inertia(2, &terms.mass_matrix, &mut [0.0; 4]).unwrap();
+        let matrix = exact_matrix(&exact, &q, &v);
+        let Inertia { positive, .. } = inertia(2, &matrix, &mut [<Dd as Real>::zero(); 4]).unwrap();
         match found.verdict(&q, &v) {
             Verdict::Certified { condition } => {
                 let (mut values, mut workspace) = ([0.0; 2], crate::linalg::Workspace::new());
-                crate::linalg::eigenvalues(2, &terms.mass_matrix, &mut values, &mut workspace).unwrap();
+                let matrix: Vec<f64> = matrix.iter().map(|x| x.to_f64()).collect();
+                crate::linalg::eigenvalues(2, &matrix, &mut values, &mut workspace).unwrap();
                 assert!(positive == 2 && values[1] / values[0] <= condition * (1.0 + 1e-9), "{q:?} {v:?} {values:?}");
                 certified += 1;
             }
@@ -260,8 +261,46 @@ fn no_certified_box_of_a_network_holds_a_violation() {
     assert!((f64::from(certified) / 4000.0 - found.certified).abs() < 0.05);
     assert!((f64::from(refuted) / 4000.0 - found.refuted).abs() < 0.05);
     let witness = found.witness.unwrap();
-    let matrix = exact_matrix(&model.cast::<Dd>(), &witness.q, &witness.v);
+    let matrix = exact_matrix(&exact, &witness.q, &witness.v);
     assert!(inertia(2, &matrix, &mut [<Dd as Real>::zero(); 4]).unwrap().positive < 2);
+}
+
+/// Largest distance from a polynomial of an element of the mass matrix, over a cube about a state.
+fn distance(model: &NetworkLagrangian<f64>, state: &[f64], side: f64) -> f64 {
+    let place: Vec<(f64, f64)> = state.iter().map(|x| (x - 0.5 * side, x + 0.5 * side)).collect();
+    let mut found = 0.0_f64;
+    Source::new(model.architecture(), model.weights()).each(&[&place], &mut |_, matrix| {
+        let distances = matrix.forms.iter().skip(matrix.basis.count()).step_by(matrix.basis.stride());
+        found = distances.fold(0.0, |largest, [r]| largest.max(*r));
+        true
+    });
+    found
+}
+
+#[test]
+fn distances_shrink_with_a_high_power_of_the_sides() {
+    // Two coordinates have polynomials of the third degree, four of the second.
+    let two = network(architecture(ActivationChoice::Gelu, Structure::BlackBox), 20);
+    let mut shape = architecture(ActivationChoice::Gelu, Structure::BlackBox);
+    (shape.coordinates, shape.scale, shape.periodic) = (4, vec![1.0; 4], vec![false; 4]);
+    let four = network(shape, 20);
+    for (model, power) in [(&two, 4), (&four, 3)] {
+        let state: Vec<f64> = (0..2 * model.coordinates()).map(|k| 0.3 * (k as f64 + 1.0).sin()).collect();
+        let halved = distance(model, &state, 0.04) / distance(model, &state, 0.02);
+        let expected = 2f64.powi(power);
+        assert!((0.9 * expected..1.3 * expected).contains(&halved), "{halved} for a power of {power}");
+    }
+}
+
+#[test]
+fn a_raised_flag_ends_a_search_with_what_it_has() {
+    let model = network(architecture(ActivationChoice::Gelu, Structure::BlackBox), 17);
+    let region = Bounds::uniform(2, (0.0, 6.2), (-2.0, 2.0));
+    let stop = AtomicBool::new(true);
+    let options = Options { stop: Some(&stop), threads: 2, ..limited(DEFINITE, usize::MAX) };
+    let found = certify_network(&model, &region, &options).unwrap();
+    assert!(found.boxes <= 2 && found.open > 0.0, "{found:?}");
+    assert!((found.certified + found.refuted + found.open - 1.0).abs() < 1e-12);
 }
 
 #[test]
@@ -299,7 +338,10 @@ fn threads_and_turns_change_nothing() {
         let region = Bounds { positions: vec![positions, (-0.2, 0.2)], velocities: vec![(-0.2, 0.2); 2] };
         certify_network(&model, &region, &Options { threads, ..limited(DEFINITE, 3000) }).unwrap()
     };
+    // More threads than there are boxes are not started.
+    let many = certified((1.0, 2.0), usize::MAX);
     let (one, three) = (certified((1.0, 2.0), 1), certified((1.0, 2.0), 3));
+    assert_eq!((one.certified, one.refuted, one.boxes), (many.certified, many.refuted, many.boxes));
     assert_eq!((one.certified, one.refuted, one.boxes), (three.certified, three.refuted, three.boxes));
     assert_eq!((one.witness, one.condition), (three.witness, three.condition));
     // The network knows an angle up to turns; a region over the end of a turn has two parts.

@@ -168,3 +168,36 @@ fn on_a_full_disk_pictures_are_lost_first() {
     assert_eq!((resumed.code, resumed.stderr.as_str()), (Some(0), ""));
     assert!(out.join("report.html").is_file() && out.join("lagrangian.svg").is_file() && !out.join(LATEST).exists());
 }
+
+/// A certificate that is interrupted is what is proven by then.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_certificate_ends_with_what_is_proven() {
+    let model = "examples/data/double_pendulum.safetensors";
+    let child = start(&[
+        "certify",
+        "--model",
+        model,
+        "--seconds",
+        "100000",
+        "--boxes",
+        "100000000",
+        "--condition",
+        "3",
+        "--json",
+    ]);
+    let caught = || {
+        let status = std::fs::read_to_string(format!("/proc/{}/status", child.id())).unwrap_or_default();
+        let mask = status.lines().find_map(|line| line.strip_prefix("SigCgt:"));
+        mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).is_some_and(|mask| mask >> 14 & 1 == 1)
+    };
+    wait_until("a handler of the signal", caught);
+    send("-TERM", &child);
+    let output = child.wait_with_output().unwrap();
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(143), "{stderr}");
+    let found: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let shares = ["certified", "refuted", "open"].map(|name| found[name].as_f64().unwrap());
+    assert!((shares.iter().sum::<f64>() - 1.0).abs() < 1e-12 && shares[2] > 0.0, "{found}");
+    assert_eq!(stderr.lines().count(), 1, "{stderr}");
+}
