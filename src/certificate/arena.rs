@@ -37,7 +37,7 @@ pub struct Arena {
     blamed: Cell<u64>,
 }
 
-/// What is known of a pack.
+/// Numbers side by side, with the functions of them that were asked for.
 struct Pack {
     layout: Layout,
     /// Functions of all its numbers that were asked for.

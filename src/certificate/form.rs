@@ -151,7 +151,7 @@ pub fn add_product<const W: usize>(basis: &Basis, out: &mut [[f64; W]], a: &[[f6
 pub struct Expansion<const W: usize> {
     /// Coefficients.
     value: [[f64; W]; MOST_DEGREE + 1],
-    /// What they may be off.
+    /// Errors of the coefficients, at most.
     spread: [[f64; W]; MOST_DEGREE + 1],
     /// Everything that the functions can be on the box.
     whole: [Interval; W],
