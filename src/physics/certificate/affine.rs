@@ -1,6 +1,6 @@
 //! `W x + b` for a matrix of constants: one product of matrices over all parts of the numbers.
 
-use super::arena::{Arena, LANES, Place};
+use super::arena::{Arena, LANES, Place, width};
 use super::form::TINY;
 use super::interval::Interval;
 use super::number::Number;
@@ -55,24 +55,29 @@ fn product<'a>(arena: &'a Arena, weights: &[f64], bias: &[Interval], x: &[Number
     let (sums, spreads) = (times(&columns, weights), times(&distances, &absolute));
     let lanes: Vec<usize> = (0..outputs).step_by(LANES).map(|first| LANES.min(outputs - first)).collect();
     let pack = arena.make(&lanes, |_, new| {
-        for ((pack, &lanes), first) in new.chunks_exact_mut(rows).zip(&lanes).zip((0..).step_by(LANES)) {
-            let parts = pack.chunks_exact_mut(stride).zip(sums.chunks_exact(stride * outputs));
+        let mut rest = new;
+        for (&lanes, first) in lanes.iter().zip((0..).step_by(LANES)) {
+            let width = width(lanes);
+            let (pack, others) = rest.split_at_mut(rows * width);
+            rest = others;
+            let parts = pack.chunks_exact_mut(stride * width).zip(sums.chunks_exact(stride * outputs));
             for (part, (form, sums)) in parts.enumerate() {
                 // The function 0 stays so.
                 if distances[part * inputs..(part + 1) * inputs].iter().all(|x| *x == 0.0) {
                     continue;
                 }
-                for (form, sums) in form.iter_mut().zip(sums.chunks_exact(outputs)) {
+                for (form, sums) in form.chunks_exact_mut(width).zip(sums.chunks_exact(outputs)) {
                     form[..lanes].copy_from_slice(&sums[first..first + lanes]);
                 }
                 for (lane, spread) in spreads[part * outputs + first..][..lanes].iter().enumerate() {
-                    form[stride - 1][lane] = spread * (1.0 + loss) + TINY;
+                    form[(stride - 1) * width + lane] = spread * (1.0 + loss) + TINY;
                 }
             }
             for (lane, bias) in bias.iter().skip(first).take(lanes).enumerate() {
-                let sum = pack[0][lane] + bias.middle();
-                let distance = pack[stride - 1][lane] + bias.radius() + f64::EPSILON * sum.abs();
-                (pack[0][lane], pack[stride - 1][lane]) = (sum, distance * (1.0 + loss));
+                let last = (stride - 1) * width + lane;
+                let sum = pack[lane] + bias.middle();
+                let distance = pack[last] + bias.radius() + f64::EPSILON * sum.abs();
+                (pack[lane], pack[last]) = (sum, distance * (1.0 + loss));
             }
         }
     });
@@ -95,8 +100,8 @@ fn gathered(arena: &Arena, x: &[Number<'_>]) -> Vec<f64> {
                 // Neighbours go together.
                 let next = |(x, lane): (&Number<'_>, u32)| matches!(x, Number::Variable(_, place) if *place == Place { pack, lane });
                 let run = x[i..].iter().zip(lane..).take_while(|pair| next(*pair)).count();
-                arena.look(pack, |forms| {
-                    for (row, form) in columns.chunks_exact_mut(inputs).zip(forms) {
+                arena.look(pack, |forms, width| {
+                    for (row, form) in columns.chunks_exact_mut(inputs).zip(forms.chunks_exact(width)) {
                         row[i..i + run].copy_from_slice(&form[lane as usize..lane as usize + run]);
                     }
                 });

@@ -4,14 +4,13 @@ use super::basis::Basis;
 use super::form::{self, Expansion};
 use super::function::Function;
 use super::interval::Interval;
+use crate::ops::Unary;
 use crate::scalar::vectorized;
 use std::cell::{Cell, RefCell};
 use std::sync::Arc;
 
-/// Numbers that lie side by side, so that one vector instruction works on all.
+/// Numbers of a layer that lie side by side, so that one vector instruction works on all.
 pub const LANES: usize = 8;
-/// The same coefficient of numbers side by side.
-pub type Lanes = [f64; LANES];
 
 /// A number of an [`Arena`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,7 +28,8 @@ pub struct Arena {
     /// Directions of the derivatives.
     n: usize,
     parts: usize,
-    forms: RefCell<Vec<Lanes>>,
+    /// Coefficients of all packs, one pack after the other; in a pack the same coefficient of all its numbers lies side by side.
+    forms: RefCell<Vec<f64>>,
     packs: RefCell<Vec<Pack>>,
     /// Set when a value was read, on which the Lagrangian may then branch unseen.
     read: Cell<bool>,
@@ -37,12 +37,27 @@ pub struct Arena {
     blamed: Cell<u64>,
 }
 
-/// What is known of a pack.
+/// Numbers side by side, with the functions of them that were asked for.
 struct Pack {
-    /// Numbers in it, from the first lane on.
-    lanes: usize,
+    layout: Layout,
     /// Functions of all its numbers that were asked for.
     functions: Vec<(Function, u32)>,
+}
+
+/// Where the coefficients of a pack are.
+#[derive(Clone, Copy)]
+struct Layout {
+    /// The first one.
+    start: usize,
+    /// Places side by side: one for a number that is alone, [`LANES`] for others.
+    width: usize,
+    /// Numbers in them.
+    lanes: usize,
+}
+
+/// Places side by side for so many numbers.
+pub fn width(lanes: usize) -> usize {
+    if lanes == 1 { 1 } else { LANES }
 }
 
 impl Arena {
@@ -73,9 +88,9 @@ impl Arena {
     }
     /// Notes the axes on which the value of a number depends.
     pub fn blame(&self, place: Place) {
-        self.look(place.pack, |forms| self.blame_form(&forms[..self.basis.stride()], place.lane as usize));
+        self.blame_form(&self.form(place, 0), 0);
     }
-    fn blame_form(&self, form: &[Lanes], lane: usize) {
+    fn blame_form<const W: usize>(&self, form: &[[f64; W]], lane: usize) {
         if !form::deviation(form)[lane].is_finite() {
             // Those to blame for it have been noted where it came from.
             return;
@@ -94,32 +109,53 @@ impl Arena {
         1 + self.n + i * (i + 1) / 2 + j
     }
 
-    /// Makes packs of so many numbers each; `fill` is given the forms of all earlier packs and of the new ones, zeros.
-    pub fn make(&self, lanes: &[usize], fill: impl FnOnce(&[Lanes], &mut [Lanes])) -> u32 {
+    fn layout(&self, pack: u32) -> Layout {
+        self.packs.borrow()[pack as usize].layout
+    }
+    /// The coefficients of a pack.
+    fn of<'f>(&self, forms: &'f [f64], Layout { start, width, .. }: Layout) -> &'f [f64] {
+        &forms[start..start + self.block() * width]
+    }
+
+    /// Makes packs of so many numbers each; `fill` is given the coefficients of all earlier packs and of the new ones, zeros.
+    pub fn make(&self, lanes: &[usize], fill: impl FnOnce(&[f64], &mut [f64])) -> u32 {
         let (mut forms, mut packs) = (self.forms.borrow_mut(), self.packs.borrow_mut());
-        let (start, first) = (forms.len(), packs.len());
-        forms.resize(start + lanes.len() * self.block(), [0.0; LANES]);
-        packs.extend(lanes.iter().map(|&lanes| Pack { lanes, functions: Vec::new() }));
-        let (earlier, new) = forms.split_at_mut(start);
+        let (first, before) = (packs.len(), forms.len());
+        let mut start = before;
+        for &lanes in lanes {
+            let layout = Layout { start, width: width(lanes), lanes };
+            packs.push(Pack { layout, functions: Vec::new() });
+            start += self.block() * layout.width;
+        }
+        forms.resize(start, 0.0);
+        let (earlier, new) = forms.split_at_mut(before);
         fill(earlier, new);
         first as u32
     }
-    /// Makes one number, in the first lane of a pack.
-    pub fn single(&self, fill: impl FnOnce(&[Lanes], &mut [Lanes])) -> Place {
-        Place { pack: self.make(&[1], fill), lane: 0 }
+    /// Makes one number.
+    fn single(&self, fill: impl FnOnce(&[f64], &mut [[f64; 1]])) -> Place {
+        Place { pack: self.make(&[1], |earlier, new| fill(earlier, new.as_chunks_mut().0)), lane: 0 }
     }
-    /// Reads the forms of a pack, one after the other.
-    pub fn look<T>(&self, pack: u32, read: impl FnOnce(&[Lanes]) -> T) -> T {
-        read(of(&self.forms.borrow(), pack, self.block()))
+    /// Reads the coefficients of a pack, so many side by side.
+    pub fn look<T>(&self, pack: u32, read: impl FnOnce(&[f64], usize) -> T) -> T {
+        let layout = self.layout(pack);
+        read(self.of(&self.forms.borrow(), layout), layout.width)
+    }
+    /// A form of a number.
+    pub fn form(&self, place: Place, part: usize) -> Vec<[f64; 1]> {
+        let stride = self.basis.stride();
+        let lane = place.lane as usize;
+        self.look(place.pack, |forms, width| {
+            (part * stride..(part + 1) * stride).map(|k| [forms[k * width + lane]]).collect()
+        })
     }
     /// Every value of a number on the box.
     pub fn range(&self, place: Place) -> Interval {
-        let value = |forms: &[Lanes]| form::range(&self.basis, &forms[..self.basis.stride()], place.lane as usize);
-        self.look(place.pack, value)
+        form::range(&self.basis, &self.form(place, 0), 0)
     }
     /// `true` for the function 0.
     pub fn is_zero(&self, place: Place) -> bool {
-        self.look(place.pack, |forms| forms.iter().all(|x| x[place.lane as usize] == 0.0))
+        self.look(place.pack, |forms, width| forms.iter().skip(place.lane as usize).step_by(width).all(|x| *x == 0.0))
     }
 
     /// A number that is equal to axis `axis` of the box, whose ends are those of `range`, and whose derivative along `direction` is 1.
@@ -133,19 +169,20 @@ impl Arena {
     }
     /// A number of which nothing is known.
     pub fn unknown(&self) -> Place {
-        self.single(|_, new| new.fill([f64::NAN; LANES]))
+        self.single(|_, new| new.fill([f64::NAN]))
     }
 
     /// The pack of a number that is alone in it, a copy if it has neighbours.
-    fn alone(&self, place: Place) -> u32 {
-        if self.packs.borrow()[place.pack as usize].lanes == 1 {
-            return place.pack;
+    fn alone(&self, place: Place) -> Layout {
+        let layout = self.layout(place.pack);
+        if layout.width == 1 {
+            return layout;
         }
         let copy = self.single(|earlier, new| {
-            let old = of(earlier, place.pack, new.len());
-            new.iter_mut().zip(old).for_each(|(new, old)| new[0] = old[place.lane as usize]);
+            let old = self.of(earlier, layout).iter().skip(place.lane as usize).step_by(layout.width);
+            new.iter_mut().zip(old).for_each(|(new, old)| *new = [*old]);
         });
-        copy.pack
+        self.layout(copy.pack)
     }
 
     /// A function of a number; its neighbours' are found with it and remembered.
@@ -159,69 +196,78 @@ impl Arena {
     }
 
     fn function_of_pack(&self, f: Function, pack: u32) -> u32 {
-        let (basis, n, parts, stride) = (&*self.basis, self.n, self.parts, self.basis.stride());
-        let lanes = self.packs.borrow()[pack as usize].lanes;
-        let made = self.make(&[lanes], |earlier, new| {
-            let old = of(earlier, pack, parts * stride);
-            let part = |k: usize| &old[k * stride..(k + 1) * stride];
-            let z = part(0);
-            let flat = (1..parts).all(|k| form::is_zero(part(k)));
-            let orders = if flat { 1 } else { 3 };
-            let mut expansions = [Expansion::<LANES>::ZERO; 3];
-            let distance = form::deviation(z);
-            for lane in 0..lanes {
-                let (at, over) = f.about(z[0][lane], distance[lane]);
-                for (order, expansion) in expansions[..orders].iter_mut().enumerate() {
-                    expansion.set(lane, (&at, &over), distance[lane], (order, basis.degree()));
-                }
-                if !over.iter().all(|x| x.is_bounded()) {
-                    self.blame_form(z, lane);
-                }
+        let layout = self.layout(pack);
+        let made = self.make(&[layout.lanes], |earlier, new| {
+            let old = self.of(earlier, layout);
+            if layout.width == 1 {
+                self.write_function::<1>(f, layout.lanes, old.as_chunks().0, new.as_chunks_mut().0);
+            } else {
+                self.write_function::<LANES>(f, layout.lanes, old.as_chunks().0, new.as_chunks_mut().0);
             }
-            // The powers of what differs from the middle, the derivatives of the function, and what makes second derivatives of first ones.
-            let mut scratch = vec![[0.0; LANES]; (basis.degree() + 2 + n) * stride];
-            let (powers, rest) = scratch.split_at_mut(basis.degree() * stride);
-            let (first, rest) = rest.split_at_mut(stride);
-            let (second, bent) = rest.split_at_mut(stride);
-            vectorized(
-                #[inline(always)]
-                || {
-                    powers[..stride].copy_from_slice(z);
-                    powers[0] = [0.0; LANES];
-                    for p in 1..basis.degree() {
-                        let (lower, power) = powers.split_at_mut(p * stride);
-                        form::add_product(basis, &mut power[..stride], &lower[(p - 1) * stride..], &lower[..stride]);
-                    }
-                    expansions[0].write(basis, &mut new[..stride], powers);
-                    if flat {
-                        return;
-                    }
-                    expansions[1].write(basis, first, powers);
-                    expansions[2].write(basis, second, powers);
-                    for (i, bent) in bent.chunks_exact_mut(stride).enumerate() {
-                        form::add_product(basis, bent, second, part(1 + i));
-                    }
-                    for (k, new) in new.chunks_exact_mut(stride).enumerate().skip(1) {
-                        form::add_product(basis, new, first, part(k));
-                    }
-                    for i in 0..n {
-                        for j in 0..=i {
-                            let k = self.second(i, j);
-                            let bent = &bent[i * stride..(i + 1) * stride];
-                            form::add_product(basis, &mut new[k * stride..(k + 1) * stride], bent, part(1 + j));
-                        }
-                    }
-                },
-            );
         });
         self.packs.borrow_mut()[pack as usize].functions.push((f, made));
         made
     }
 
+    /// A function of numbers side by side.
+    fn write_function<const W: usize>(&self, f: Function, lanes: usize, old: &[[f64; W]], new: &mut [[f64; W]]) {
+        let (basis, n, parts, stride) = (&*self.basis, self.n, self.parts, self.basis.stride());
+        let part = |k: usize| &old[k * stride..(k + 1) * stride];
+        let z = part(0);
+        let flat = (1..parts).all(|k| form::is_zero(part(k)));
+        let orders = if flat { 1 } else { 3 };
+        let mut expansions = [Expansion::<W>::ZERO; 3];
+        let distance = form::deviation(z);
+        for lane in 0..lanes {
+            let (at, over) = f.about(z[0][lane], distance[lane]);
+            for (order, expansion) in expansions[..orders].iter_mut().enumerate() {
+                expansion.set(lane, (&at, &over), distance[lane], (order, basis.degree()));
+            }
+            if !over.iter().all(|x| x.is_bounded()) {
+                self.blame_form(z, lane);
+            }
+        }
+        // The powers of what differs from the middle, the derivatives of the function, and what makes second derivatives of first ones.
+        let mut scratch = vec![[0.0; W]; (basis.degree() + 2 + n) * stride];
+        let (powers, rest) = scratch.split_at_mut(basis.degree() * stride);
+        let (first, rest) = rest.split_at_mut(stride);
+        let (second, bent) = rest.split_at_mut(stride);
+        vectorized(
+            #[inline(always)]
+            || {
+                powers[..stride].copy_from_slice(z);
+                powers[0] = [0.0; W];
+                for p in 1..basis.degree() {
+                    let (lower, power) = powers.split_at_mut(p * stride);
+                    form::add_product(basis, &mut power[..stride], &lower[(p - 1) * stride..], &lower[..stride]);
+                }
+                expansions[0].write(basis, &mut new[..stride], powers);
+                if flat {
+                    return;
+                }
+                expansions[1].write(basis, first, powers);
+                expansions[2].write(basis, second, powers);
+                for (i, bent) in bent.chunks_exact_mut(stride).enumerate() {
+                    form::add_product(basis, bent, second, part(1 + i));
+                }
+                for (k, new) in new.chunks_exact_mut(stride).enumerate().skip(1) {
+                    form::add_product(basis, new, first, part(k));
+                }
+                for i in 0..n {
+                    for j in 0..=i {
+                        let k = self.second(i, j);
+                        let bent = &bent[i * stride..(i + 1) * stride];
+                        form::add_product(basis, &mut new[k * stride..(k + 1) * stride], bent, part(1 + j));
+                    }
+                }
+            },
+        );
+    }
+
     /// `constant + sum_k s_k x_k` of a few numbers.
     pub fn combine(&self, terms: &[(Interval, Place)], constant: Interval) -> Place {
         let stride = self.basis.stride();
-        let terms: Vec<(Interval, u32)> = terms.iter().map(|&(factor, place)| (factor, self.alone(place))).collect();
+        let terms: Vec<(Interval, Layout)> = terms.iter().map(|&(factor, place)| (factor, self.alone(place))).collect();
         self.single(|earlier, new| {
             if constant != Interval::ZERO {
                 form::set_constant(&mut new[..stride], 0, constant);
@@ -229,8 +275,8 @@ impl Arena {
             vectorized(
                 #[inline(always)]
                 || {
-                    for &(factor, pack) in &terms {
-                        let old = of(earlier, pack, new.len());
+                    for &(factor, layout) in &terms {
+                        let (old, _) = self.of(earlier, layout).as_chunks::<1>();
                         let forms = new.chunks_exact_mut(stride).zip(old.chunks_exact(stride));
                         forms.for_each(|(new, old)| form::add_multiple(new, factor, old));
                     }
@@ -241,10 +287,14 @@ impl Arena {
 
     /// The product of two numbers.
     pub fn product(&self, a: Place, b: Place) -> Place {
+        if a == b && self.layout(a.pack).width > 1 {
+            // The square of a unit of a layer is found with those of its neighbours.
+            return self.function(Function::Table(Unary::Powi(2)), a);
+        }
         let (basis, n, stride) = (&*self.basis, self.n, self.basis.stride());
         let (a, b) = (self.alone(a), self.alone(b));
         self.single(|earlier, new| {
-            let (a, b) = (of(earlier, a, new.len()), of(earlier, b, new.len()));
+            let (a, b) = (self.of(earlier, a).as_chunks::<1>().0, self.of(earlier, b).as_chunks::<1>().0);
             let part_a = |k: usize| &a[k * stride..(k + 1) * stride];
             let part_b = |k: usize| &b[k * stride..(k + 1) * stride];
             vectorized(
@@ -268,9 +318,4 @@ impl Arena {
             );
         })
     }
-}
-
-/// The forms of a pack.
-pub fn of(forms: &[Lanes], pack: u32, block: usize) -> &[Lanes] {
-    &forms[pack as usize * block..(pack as usize + 1) * block]
 }

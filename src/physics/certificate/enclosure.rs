@@ -74,11 +74,9 @@ fn mass_matrix<'a, L: Lagrangian>(
     let known = found.range().is_bounded() && !arena.was_read();
     for (k, out) in forms.chunks_exact_mut(stride).enumerate() {
         match found {
-            Number::Variable(arena, place) if known => arena.look(place.pack, |number| {
-                let part = arena.second(k / n, k % n);
-                let form = &number[part * stride..(part + 1) * stride];
-                out.iter_mut().zip(form).for_each(|(out, x)| *out = [x[place.lane as usize]]);
-            }),
+            Number::Variable(arena, place) if known => {
+                out.copy_from_slice(&arena.form(place, arena.second(k / n, k % n)));
+            }
             Number::Constant(_) if known => {}
             _ => out.fill([f64::NAN]),
         }

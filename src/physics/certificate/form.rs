@@ -151,7 +151,7 @@ pub fn add_product<const W: usize>(basis: &Basis, out: &mut [[f64; W]], a: &[[f6
 pub struct Expansion<const W: usize> {
     /// Coefficients.
     value: [[f64; W]; MOST_DEGREE + 1],
-    /// What they may be off.
+    /// Errors of the coefficients, at most.
     spread: [[f64; W]; MOST_DEGREE + 1],
     /// Everything that the functions can be on the box.
     whole: [Interval; W],
@@ -174,13 +174,16 @@ impl<const W: usize> Expansion<W> {
         let power = Interval::point(distance).power(degree as i32 + 1).high;
         // Of an even degree the rest has the sign of an odd power.
         let power = if degree % 2 == 0 { Interval::symmetric(power) } else { Interval::new(0.0, power) };
+        // Exact where nothing is to be rounded.
+        let divided = |x: Interval, by: f64| if by == 1.0 || x == Interval::ZERO { x } else { x / Interval::point(by) };
         let mut factorial = 1.0;
         for p in 0..=degree {
             factorial *= p.max(1) as f64;
-            let mut coefficient = at[order + p] / Interval::point(factorial);
+            let mut coefficient = divided(at[order + p], factorial);
             if p == 0 {
                 let below: f64 = (1..=degree + 1).map(|p| p as f64).product();
-                coefficient = at[order] + over[order + degree + 1] * power / Interval::point(below);
+                let rest = divided(over[order + degree + 1] * power, below);
+                coefficient = if rest == Interval::ZERO { at[order] } else { at[order] + rest };
             }
             (self.value[p][lane], self.spread[p][lane]) = (coefficient.middle(), coefficient.radius());
         }

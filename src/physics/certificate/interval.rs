@@ -148,6 +148,12 @@ fn product(a: f64, b: f64) -> f64 {
     if a == 0.0 || b == 0.0 { 0.0 } else { a * b }
 }
 
+/// From the smallest to the largest of four numbers.
+#[inline]
+fn spanned([a, b, c, d]: [f64; 4]) -> Interval {
+    Interval { low: a.min(b).min(c.min(d)), high: a.max(b).max(c.max(d)) }
+}
+
 impl Mul for Interval {
     type Output = Self;
     #[inline]
@@ -158,14 +164,10 @@ impl Mul for Interval {
             product(self.high, other.low),
             product(self.high, other.high),
         ];
-        if ends == [0.0; 4] {
-            // Exact, unless a product underflowed.
-            let exact = self == Self::ZERO || other == Self::ZERO;
-            return if exact { Self::ZERO } else { Self::outward(0.0, 0.0) };
-        }
-        let low = ends.iter().copied().fold(f64::INFINITY, f64::min);
-        let high = ends.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        Self::outward(low, high)
+        let found = spanned(ends);
+        // Exact, unless a product underflowed.
+        let exact = found == Self::ZERO && (self == Self::ZERO || other == Self::ZERO);
+        if exact { Self::ZERO } else { Self::outward(found.low, found.high) }
     }
 }
 impl Div for Interval {
@@ -183,8 +185,7 @@ impl Div for Interval {
         if ends.iter().any(|x| x.is_nan()) {
             return Self::ENTIRE;
         }
-        let low = ends.iter().copied().fold(f64::INFINITY, f64::min);
-        let high = ends.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let Self { low, high } = spanned(ends);
         Self::outward(low, high)
     }
 }

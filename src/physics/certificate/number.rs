@@ -126,8 +126,6 @@ impl Mul for Number<'_> {
             (Constant(c), Variable(arena, x)) | (Variable(arena, x), Constant(c)) => {
                 Self::combine(arena, &[(c, x)], Interval::ZERO)
             }
-            // The square of a unit is found with those of its neighbours.
-            (Variable(_, a), Variable(_, b)) if a == b => self.powi(2),
             (Variable(arena, a), Variable(_, b)) => Variable(arena, arena.product(a, b)),
         }
     }

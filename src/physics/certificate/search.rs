@@ -51,7 +51,7 @@ struct Waiting {
     bounds: Vec<(f64, f64)>,
     /// Share of the whole region.
     share: f64,
-    /// How often it probably has to be halved until its parts are decided, by what was found of the box that it was cut from.
+    /// Number of halvings until its parts are probably decided, by what was found of the box that it was cut from.
     halvings: f64,
 }
 
@@ -248,7 +248,7 @@ impl<'a> Cut<'a> {
         (low < middle && middle < high).then_some((best, middle))
     }
 
-    /// How often the box is to be halved before a part of it is evaluated.
+    /// Number of halvings before a part of the box is evaluated.
     fn times(&self, share: f64) -> usize {
         let halvings = self.spectrum.halvings;
         if share.log2() > LARGE || !halvings.is_finite() {

@@ -29,8 +29,8 @@ pub struct Spectrum {
     pub influence: Vec<f64>,
     /// The same for the distance from the polynomial; infinite if the matrix is not known.
     pub remainder: f64,
-    /// How often the box has to be halved until the signs of the eigenvalues are proven in every part, as far as its polynomial can say; 0 if
-    /// they are proven, infinite if the matrix is not known.
+    /// Number of halvings of the box until the signs of the eigenvalues are proven in every part, as far as its polynomial can say; 0 if they
+    /// are proven, infinite if the matrix is not known.
     pub halvings: f64,
     /// The axes to blame for that, see [`MatrixForms::blamed`].
     pub blamed: u64,
@@ -144,8 +144,7 @@ impl MatrixForms {
     }
 }
 
-/// How often every side of a box has to be halved until what is `sum_p growth_p` in it is below 1, if the summands shrink with their powers of the
-/// sides.
+/// H/// Number of halvings of every side of a box until `sum_p growth_p` is below 1, if the summands shrink with their powers of the sides.
 fn halvings(growth: &[f64]) -> f64 {
     let at = |side: f64| growth.iter().rev().fold(0.0, |sum, x| sum * side + x);
     // Not a number is not below.
