@@ -20,7 +20,9 @@ type Torques = [[[f64; 3]; 3]; 2];
 /// `(v, a)` of an arm with point masses of 1.5 and 0.4 kg at the ends of links of 0.5 and 0.3 m, and some friction.
 fn derivative(torques: &Torques, t: f64, [_, q2, v1, v2]: [f64; 4]) -> [f64; 4] {
     let (a, b, c) = (1.9 * 0.25, 0.4 * 0.09, 0.4 * 0.15);
-    let torque = |joint: usize| torques[joint].iter().map(|[size, f, phase]| size * (TAU * f * t + phase).sin()).sum();
+    let torque = |joint: usize| -> f64 {
+        torques[joint].iter().map(|[size, f, phase]| size * (TAU * f * t + phase).sin()).sum()
+    };
     let (m11, m12, m22) = (a + b + 2.0 * c * q2.cos(), b + c * q2.cos(), b);
     let coupling = c * q2.sin();
     let r1: f64 = torque(0) + coupling * (2.0 * v1 * v2 + v2 * v2) - 0.05 * v1;
