@@ -79,7 +79,7 @@ fn dropped_frames_leave_takes_whole() {
     let missing: usize = missing.map(|kept| kept.filter(|kept| !**kept).count()).sum();
     assert_eq!((gaps.recording.tracks.len(), gaps.cuts.len(), gaps.dropped.len()), (TAKES, 0, 0));
     assert_eq!((gaps.bridged.rows, even.bridged.gaps), (missing, 0));
-    for window in [None, Some(9), Some(31)] {
+    for window in [None, Some(9), Some(19), Some(25), Some(31), Some(41)] {
         let options = SmoothOptions { window, ..SmoothOptions::default() };
         let [whole, found] = [&even, &gaps].map(|reading| judge(reading, &takes, &options));
         println!("{window:?}: share, v, a: {whole:?} without gaps, {found:?} with");
