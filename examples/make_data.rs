@@ -6,7 +6,7 @@
 use lnn::lagrangian::{Dissipation, Rayleigh, WithForces, configure};
 use lnn::random::RngStream;
 use lnn::rollout::{Options, rollout};
-use lnn::scalar::{Real, Scalar};
+use lnn::scalar::Real;
 use rand_distr::{Distribution, StandardNormal};
 use std::fmt::Write;
 

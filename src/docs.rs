@@ -35,6 +35,8 @@ macro_rules! page {
             "[recorded-motion]: crate::docs::recorded_motion\n",
             "[recorded]: crate::docs::recorded_motion#three-ways-to-learn\n",
             "[structures]: crate::docs::structures\n",
+            "[grey-boxes]: crate::docs::structures#grey-boxes\n",
+            "[ranges]: crate::docs::recorded_motion#how-well-the-data-determine-the-model\n",
             "[geometry]: crate::docs::geometry\n",
             "[horizons]: crate::docs::geometry#horizons-and-ergosurfaces\n",
             "[black-holes]: crate::docs::black_holes\n",

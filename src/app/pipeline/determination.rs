@@ -157,8 +157,8 @@ impl Determined {
             unit => format!("Relative to the {unit}: without known forces (--force) L has no unit."),
         };
         format!(
-            "How well the data determine the model, in the mean over the learned states: ranges hold the truth in 19 cases of \
-             20.\n{unit}"
+            "How well the data determine the model, in the mean over the learned states: ranges hold the truth in about 9 \
+             cases of 10.\n{unit}"
         )
     }
 

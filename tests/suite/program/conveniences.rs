@@ -31,7 +31,7 @@ fn a_training_starts_from_a_model() {
     };
     let first = train("first", &["spring-pendulum", "--hidden", "16,16", "--epochs", "12"]);
     // System, network and parameters are the model's; the states are of other parameters.
-    let tuned = ["--from", &out("first"), "--param", "k=12", "--epochs", "1", "--rate", "1e-6"];
+    let tuned = ["--from", &out("first"), "--param", "k=12", "--epochs", "1", "--learning-rate", "1e-6"];
     let second = train("second", &tuned);
     assert_eq!(second.header.system, "spring-pendulum");
     assert_eq!(second.header.architecture, first.header.architecture);

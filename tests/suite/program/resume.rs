@@ -187,7 +187,7 @@ fn a_directory_has_one_run_and_outlives_a_dead_one() {
     let process = child.id();
     wait_for(&folder.path("out").join(LATEST));
     let second = folder.train("out", &[]).wait_with_output().unwrap();
-    refused(&second, 1, &["another run", &format!("process {process} on "), " since 20", " UTC"]);
+    refused(&second, 1, &["another run", &format!("process {process} on ")]);
     child.kill().unwrap();
     child.wait().unwrap();
     assert!(folder.path("out/.lnn.lock").exists());

@@ -99,8 +99,9 @@ fn lines_fit_headers_have_units_and_numbers_are_plain() {
         (format!("check swings.csv {swings}"), 3),
         ("train double-pendulum --config double_pendulum.toml --epochs 1 --out trained".into(), 3),
         ("train ads4-geodesic --config ads.toml --out ads".into(), 3),
-        (format!("fit {long} {pendulum} {small} --friction --out fitted"), 3),
-        (format!("fit swings.csv {swings} {small} --targets smoothed --hold-out 0 --out all"), 2),
+        // Models this small state no ranges.
+        (format!("fit {long} {pendulum} {small} --friction --out fitted"), 2),
+        (format!("fit swings.csv {swings} {small} --targets smoothed --hold-out 0 --out all"), 1),
         ("evaluate double_pendulum.safetensors --until 3 --out evaluation".into(), 3),
         ("experiment".into(), 1),
         ("experiment quick --scale smoke --only triple --out experiments".into(), 2),

@@ -61,7 +61,7 @@ pub struct Estimate {
     pub high: f64,
 }
 
-/// Standard deviations on either side that a range has: it holds the truth in 19 cases of 20.
+/// Standard deviations on either side that a range has.
 pub const RANGE: f64 = 2.0;
 
 impl Estimate {
