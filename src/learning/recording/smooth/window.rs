@@ -7,7 +7,7 @@ use serde::Serialize;
 /// Longest window that is tried, in samples.
 const LONGEST: usize = 2001;
 /// Standard deviations by which an estimated squared bias lies above 0 that noise does not explain.
-const SURE: f64 = 2.0;
+const SURE: f64 = 3.0;
 /// Squared error of the usual window up to which a trajectory keeps it, over its least.
 const TOLERATED: f64 = 2.0;
 
