@@ -58,7 +58,7 @@ impl<'a> Number<'a> {
         }
     }
 
-    /// A number of which nothing is known: what is left of a branch that the box does not decide by these numbers.
+    /// The unbounded value (top): a branch that the box does not decide.
     fn undecided(by: &[Self]) -> Self {
         let mut found = Constant(Interval::ENTIRE);
         for x in by {

@@ -94,7 +94,7 @@ const BEYOND: f64 = 1e-3;
 
 /// Follows rays from events with tangents `k`, `(4)` each, along which the affine parameter grows; the order is kept.
 ///
-/// `progress` is told the number of rays of every block that is done, from any thread. The rays that a model had not ended when it was
+/// `progress` receives the number of rays of every block that is done, from any thread. The rays that a model had not ended when it was
 /// interrupted are unfinished.
 ///
 /// # Errors

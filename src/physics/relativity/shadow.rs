@@ -31,7 +31,7 @@ pub struct Difference {
 
 /// Follows the ray of the middle of every pixel of a camera.
 ///
-/// `progress` is told the number of pixels of every block that is done, from any thread. Pixels that a model had not reached when it was
+/// `progress` receives the number of pixels of every block that is done, from any thread. Pixels that a model had not reached when it was
 /// interrupted are unfinished. The result does not depend on the number of threads.
 ///
 /// # Errors
