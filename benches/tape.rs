@@ -101,13 +101,7 @@ fn ratios<S: Scalar>(_: &mut Criterion) {
         ratio::compare(&name("floats, eager gradient"), count, "at most 5", value, &mut eager);
         let program = Program::<S>::record(6, 5, |x, p| vec![error(p, &x[..4], &x[4..])]).unwrap();
         let mut replay = Replay::new(Arc::new(program));
-        let (mut y, w, mut dp) = (vec![S::of_f64(0.0); count], vec![S::of_f64(1.0); count], [S::of_f64(0.0); 5]);
-        let lanes = || {
-            replay.forward(count, &data, black_box(&parameters), &mut y).unwrap();
-            replay.reverse_parameters(&w, &mut dp).unwrap();
-            black_box(dp);
-        };
-        ratio::compare(&name("gradient by lanes, eager gradient"), count, "at least 3", lanes, &mut eager);
+        let mut y = vec![S::of_f64(0.0); count];
         let lanes = || {
             replay.evaluate(count, &[&data], black_box(&parameters), &mut [&mut y]).unwrap();
             black_box(&y);
@@ -140,24 +134,9 @@ fn pendulum<S: Scalar>(c: &mut Criterion) {
         });
         let program = Program::<S>::record(6, 5, |x, p| vec![error(p, &x[..4], &x[4..])]).unwrap();
         let mut replay = Replay::new(Arc::new(program));
-        let (mut y, w) = (vec![S::of_f64(0.0); count], vec![S::of_f64(1.0); count]);
-        let (mut dx, mut dp) = (vec![S::of_f64(0.0); 6 * count], [S::of_f64(0.0); 5]);
+        let mut y = vec![S::of_f64(0.0); count];
         group.bench_function(BenchmarkId::new("value, lanes", count), |b| {
             b.iter(|| replay.evaluate(count, &[&data], black_box(&parameters), &mut [&mut y]).unwrap());
-        });
-        group.bench_function(BenchmarkId::new("gradient, lanes", count), |b| {
-            b.iter(|| {
-                replay.forward(count, &data, black_box(&parameters), &mut y).unwrap();
-                replay.reverse(&w, &mut dx, &mut dp).unwrap();
-                dp
-            });
-        });
-        group.bench_function(BenchmarkId::new("gradient by parameters only, lanes", count), |b| {
-            b.iter(|| {
-                replay.forward(count, &data, black_box(&parameters), &mut y).unwrap();
-                replay.reverse_parameters(&w, &mut dp).unwrap();
-                dp
-            });
         });
     }
     group.finish();
@@ -196,7 +175,7 @@ fn second_order(c: &mut Criterion) {
     let mut replay = Replay::new(Arc::new(program));
     let (data, mut out) = (states::<f64>(1024)[..4096].to_vec(), vec![0.0; 14 * 1024]);
     group.bench_function("all four, 1024 states in lanes", |b| {
-        b.iter(|| replay.forward(1024, black_box(&data), &[], &mut out).unwrap());
+        b.iter(|| replay.evaluate(1024, &[black_box(&data)], &[], &mut [&mut out]).unwrap());
     });
     group.finish();
 }

@@ -7,7 +7,7 @@
 
 use super::accuracy::cast;
 use super::bytes::{Bytes, Random};
-use lnn::forward::{Dual, HyperDual};
+use lnn::forward::HyperDual;
 use lnn::scalar::{Dd, Real, Scalar};
 use lnn::tape::{Program, Replay, ScalarFunction, gradient};
 use std::sync::Arc;
@@ -137,31 +137,28 @@ fn nested<S: Scalar>(
     answer
 }
 
-/// By programs: the value's, and that of its derivative along `u`, replayed and swept on `lanes` equal states.
+/// By programs on `lanes` equal states: the value's, and one for each derivative by forward numbers.
 fn replayed<S: Scalar>(f: &Expression, x: &[S], u: &[S], lanes: usize) -> Answer<S> {
-    let value = Program::record(INPUTS, VARIABLES - INPUTS, |x, p| vec![f.eval(&[x, p].concat(), |x| x)]);
-    let slope = Program::record(INPUTS, VARIABLES - INPUTS, |x, p| {
-        let point: Vec<Dual<_>> = x.iter().chain(p).zip(u).map(|(&x, &u)| Dual::new(x, Real::constant(u))).collect();
-        vec![f.eval(&point, |x| x).tangent]
-    });
-    let zero = <S as Real>::zero();
-    let mut answer = [zero; 1 + 2 * VARIABLES];
-    for (k, program) in [value, slope].into_iter().enumerate() {
-        let program = program.expect("an expression without branches can be recorded");
-        let mut replay = Replay::new(Arc::new(program));
-        let (mut y, mut dx, mut dp) = (vec![zero; lanes], vec![zero; lanes * INPUTS], vec![zero; VARIABLES - INPUTS]);
-        replay.forward(lanes, &x[..INPUTS].repeat(lanes), &x[INPUTS..], &mut y).expect("shapes fit");
-        // The adjoint of one lane alone: sums over lanes are not in question here.
-        let mut seed = vec![zero; lanes];
-        seed[lanes - 1] = <S as Real>::one();
-        replay.reverse(&seed, &mut dx, &mut dp).expect("shapes fit");
-        if k == 0 {
-            answer[0] = y[lanes - 1];
+    let (zero, one) = (<S as Real>::zero(), <S as Real>::one());
+    let program = Program::record(INPUTS, VARIABLES - INPUTS, |x, p| {
+        let z = [x, p].concat();
+        let mut outputs = Vec::new();
+        for i in 0..VARIABLES {
+            let seed = |k: usize| {
+                let along = if k == i { one } else { zero };
+                HyperDual::new(z[k], Real::constant(along), Real::constant(u[k]), Real::zero())
+            };
+            let y = f.eval(&std::array::from_fn::<_, VARIABLES, _>(seed), |x| x);
+            outputs.push((y.value, y.s, y.st));
         }
-        let place = 1 + k * VARIABLES;
-        answer[place..place + INPUTS].copy_from_slice(&dx[(lanes - 1) * INPUTS..]);
-        answer[place + INPUTS..place + VARIABLES].copy_from_slice(&dp);
-    }
+        let value = outputs[..1].iter().map(|y| y.0);
+        value.chain(outputs.iter().map(|y| y.1)).chain(outputs.iter().map(|y| y.2)).collect()
+    });
+    let mut replay = Replay::new(Arc::new(program.expect("an expression without branches can be recorded")));
+    let mut y = vec![zero; lanes * (1 + 2 * VARIABLES)];
+    replay.evaluate(lanes, &[&x[..INPUTS].repeat(lanes)], &x[INPUTS..], &mut [&mut y]).expect("shapes fit");
+    let mut answer = [zero; 1 + 2 * VARIABLES];
+    answer.copy_from_slice(&y[(lanes - 1) * (1 + 2 * VARIABLES)..]);
     answer
 }
 

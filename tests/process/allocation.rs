@@ -25,17 +25,14 @@ fn replay_and_reused_tape_allocate_nothing() {
     let lanes = 100;
     let inputs: Vec<f64> = (0..3 * lanes).map(|i| (i as f64 * 0.37).sin()).collect();
     let parameters: Vec<f64> = (0..12).map(|i| 0.5 + 0.1 * f64::from(i)).collect();
-    let (mut outputs, weights) = (vec![0.0; 3 * lanes], vec![1.0; 3 * lanes]);
-    let (mut by_input, mut by_parameter) = (vec![0.0; 3 * lanes], vec![0.0; 12]);
+    let mut outputs = vec![0.0; 3 * lanes];
     let mut replay = Replay::new(Arc::new(program));
     let mut round = |inputs: &[f64]| {
-        replay.forward(lanes, inputs, &parameters, &mut outputs).unwrap();
-        replay.reverse(&weights, &mut by_input, &mut by_parameter).unwrap();
+        replay.evaluate(lanes, &[inputs], &parameters, &mut [&mut outputs]).unwrap();
     };
     round(&inputs);
     assert_eq!(allocations(|| (0..10).for_each(|_| round(&inputs))), 0);
-    assert!(outputs.iter().chain(&by_input).chain(&by_parameter).all(|x| x.is_finite()));
-    assert!(by_parameter[0] != 0.0 && by_parameter[1] != 0.0 && by_parameter[11] != 0.0, "{by_parameter:?}");
+    assert!(outputs.iter().all(|x| x.is_finite()));
 
     let (mut tape, mut adjoints) = (Tape::<f64>::new(), Adjoints::new());
     let mut round = || {

@@ -1,6 +1,6 @@
 //! The hand-written systems by name: description, Euler-Lagrange terms, closed-form acceleration.
 
-use super::derivatives::{RequestedTerms, State, evaluate};
+use super::derivatives::{State, evaluate};
 use super::system::{ClosedForm, System};
 use super::{EulerLagrange, ExpressionLagrangian, Lagrangian, Mechanics, Request, Terms};
 use crate::linalg::Workspace;
@@ -277,7 +277,7 @@ impl<S: Scalar> SystemInstance<S> {
 /// The acceleration of one state by the Euler-Lagrange equations of a Lagrangian.
 fn differentiated<S: Scalar>(lagrangian: &ExpressionLagrangian, parameters: &[S], q: &[S], v: &[S]) -> Vec<S> {
     let mut terms = Terms::default();
-    let (n, need) = (q.len(), RequestedTerms::of(Request::ACCELERATION));
+    let (n, need) = (q.len(), Request::ACCELERATION);
     let Terms { lagrangian: value, momentum, dl_dq, mass_matrix, momentum_drift, .. } = &mut terms;
     for (field, size) in [(&mut *dl_dq, n), (&mut *mass_matrix, n * n), (&mut *momentum_drift, n)] {
         field.resize(size, S::nan());

@@ -5,48 +5,6 @@ use crate::forward::{Dual, HyperDual, Jet, array};
 use crate::scalar::Real;
 use crate::tape::Depth;
 
-/// Which derivatives a request needs.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct RequestedTerms {
-    pub lagrangian: bool,
-    pub momentum: bool,
-    pub dl_dq: bool,
-    pub mass_matrix: bool,
-    pub momentum_drift: bool,
-}
-
-impl RequestedTerms {
-    pub fn of(request: Request) -> Self {
-        Self {
-            lagrangian: request.includes(Request::LAGRANGIAN),
-            momentum: request.includes(Request::MOMENTUM),
-            dl_dq: request.includes(Request::DL_DQ),
-            mass_matrix: request.includes(Request::MASS_MATRIX),
-            momentum_drift: request.includes(Request::MOMENTUM_DRIFT),
-        }
-    }
-    /// A number below 32 that names the combination.
-    pub fn index(self) -> usize {
-        [self.lagrangian, self.momentum, self.dl_dq, self.mass_matrix, self.momentum_drift]
-            .into_iter()
-            .enumerate()
-            .map(|(bit, needed)| usize::from(needed) << bit)
-            .sum()
-    }
-    /// The least depth of an evaluation that fills what is needed.
-    pub fn depth(self) -> Depth {
-        match self {
-            Self { momentum_drift: true, .. } => Depth::Motion,
-            Self { mass_matrix: true, .. } => Depth::MassMatrix,
-            Self { momentum, dl_dq, .. } if momentum || dl_dq => Depth::Gradient,
-            _ => Depth::Value,
-        }
-    }
-    fn second_order(self) -> bool {
-        self.mass_matrix || self.momentum_drift
-    }
-}
-
 /// Where the numbers of one state go; slices that are not needed may be empty.
 pub(super) struct State<'a, R> {
     pub lagrangian: &'a mut [R],
@@ -62,10 +20,10 @@ pub(super) fn evaluate<L: Lagrangian, R: Real>(
     parameters: &[R],
     q: &[R],
     v: &[R],
-    need: RequestedTerms,
+    need: Request,
     out: &mut State<'_, R>,
 ) {
-    if !need.second_order() {
+    if need.depth() <= Depth::Gradient {
         return first_order(system, parameters, q, v, need, out);
     }
     // Conditions that the compiler decides: code for other numbers of coordinates is not generated.
@@ -126,22 +84,22 @@ fn first_order<L: Lagrangian, R: Real>(
     parameters: &[R],
     q: &[R],
     v: &[R],
-    need: RequestedTerms,
+    need: Request,
     out: &mut State<'_, R>,
 ) {
-    if need.lagrangian {
+    if need.includes(Request::LAGRANGIAN) {
         out.lagrangian[0] = system.lagrangian(parameters, q, v);
     }
     let mut lifted = Few::new(parameters, Dual::lift);
     let (mut dq, mut dv) = (Few::new(q, Dual::lift), Few::new(v, Dual::lift));
     let (parameters, dq, dv) = (lifted.get(), dq.get(), dv.get());
     for i in 0..q.len() {
-        if need.dl_dq {
+        if need.includes(Request::DL_DQ) {
             dq[i].tangent = R::one();
             out.dl_dq[i] = system.lagrangian(parameters, dq, dv).tangent;
             dq[i].tangent = R::zero();
         }
-        if need.momentum {
+        if need.includes(Request::MOMENTUM) {
             dv[i].tangent = R::one();
             out.momentum[i] = system.lagrangian(parameters, dq, dv).tangent;
             dv[i].tangent = R::zero();
@@ -155,7 +113,7 @@ fn jets<L: Lagrangian, R: Real, const H: usize, const N: usize>(
     parameters: &[R],
     q: &[R],
     v: &[R],
-    need: RequestedTerms,
+    need: Request,
     out: &mut State<'_, R>,
 ) {
     let mut lifted = Few::new(parameters, Jet::<R, N, H>::lift);
@@ -168,22 +126,22 @@ fn jets<L: Lagrangian, R: Real, const H: usize, const N: usize>(
         jet_q[i].gradient[H] = v[i];
     }
     let found = system.lagrangian(lifted.get(), &jet_q, &jet_v);
-    if need.lagrangian {
+    if need.includes(Request::LAGRANGIAN) {
         out.lagrangian[0] = found.value;
     }
     for i in 0..H {
-        if need.dl_dq {
+        if need.includes(Request::DL_DQ) {
             out.dl_dq[i] = found.linear[i];
         }
-        if need.momentum {
+        if need.includes(Request::MOMENTUM) {
             out.momentum[i] = found.gradient[i];
         }
-        if need.mass_matrix {
+        if need.includes(Request::MASS_MATRIX) {
             for j in 0..H {
                 out.mass_matrix[i * H + j] = found.second(i, j);
             }
         }
-        if need.momentum_drift {
+        if need.includes(Request::MOMENTUM_DRIFT) {
             out.momentum_drift[i] = found.second(H, i);
         }
     }
@@ -195,7 +153,7 @@ fn directions<L: Lagrangian, R: Real>(
     parameters: &[R],
     q: &[R],
     v: &[R],
-    need: RequestedTerms,
+    need: Request,
     out: &mut State<'_, R>,
 ) {
     first_order(system, parameters, q, v, need, out);
@@ -205,7 +163,7 @@ fn directions<L: Lagrangian, R: Real>(
     let (parameters, hq, hv) = (lifted.get(), hq.get(), hv.get());
     for i in 0..n {
         hv[i].s = R::one();
-        if need.mass_matrix {
+        if need.includes(Request::MASS_MATRIX) {
             for j in 0..=i {
                 hv[j].t = R::one();
                 let mixed = system.lagrangian(parameters, hq, hv).st;
@@ -214,7 +172,7 @@ fn directions<L: Lagrangian, R: Real>(
                 out.mass_matrix[j * n + i] = mixed;
             }
         }
-        if need.momentum_drift {
+        if need.includes(Request::MOMENTUM_DRIFT) {
             for (number, &speed) in hq.iter_mut().zip(v) {
                 number.t = speed;
             }

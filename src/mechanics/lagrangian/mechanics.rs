@@ -1,6 +1,6 @@
 //! A Lagrangian written by hand, with values for its parameters, as a source of Euler-Lagrange terms.
 
-use super::derivatives::{RequestedTerms, State, evaluate};
+use super::derivatives::{State, evaluate};
 use super::taylor::Taylor;
 use super::{EulerLagrange, Lagrangian, MechanicsError, MetricJet, Request, Terms, metric_jets};
 use crate::linalg::Workspace;
@@ -32,7 +32,7 @@ trait Form<S>: Send + Sync {
     /// Number of parameters, if the Lagrangian says so.
     fn parameter_count(&self) -> Option<usize>;
     /// Fills the needed fields of a batch, which have their sizes.
-    fn states(&self, parameters: &[S], q: &[S], v: &[S], need: RequestedTerms, terms: &mut Terms<S>);
+    fn states(&self, parameters: &[S], q: &[S], v: &[S], need: Request, terms: &mut Terms<S>);
     /// The program whose one output is the value.
     fn value(&self, parameters: usize) -> Result<Program<S>, TapeError>;
 }
@@ -44,17 +44,17 @@ impl<L: Lagrangian, S: Scalar> Form<S> for L {
     fn parameter_count(&self) -> Option<usize> {
         Lagrangian::parameter_count(self)
     }
-    fn states(&self, parameters: &[S], q: &[S], v: &[S], need: RequestedTerms, terms: &mut Terms<S>) {
+    fn states(&self, parameters: &[S], q: &[S], v: &[S], need: Request, terms: &mut Terms<S>) {
         let n = Lagrangian::coordinates(self).max(1);
         for row in 0..q.len() / n {
             let (q, v) = (&q[row * n..][..n], &v[row * n..][..n]);
             let part = |needed: bool, width: usize| if needed { row * width..(row + 1) * width } else { 0..0 };
             let mut state = State {
-                lagrangian: &mut terms.lagrangian[part(need.lagrangian, 1)],
-                momentum: &mut terms.momentum[part(need.momentum, n)],
-                dl_dq: &mut terms.dl_dq[part(need.dl_dq, n)],
-                mass_matrix: &mut terms.mass_matrix[part(need.mass_matrix, n * n)],
-                momentum_drift: &mut terms.momentum_drift[part(need.momentum_drift, n)],
+                lagrangian: &mut terms.lagrangian[part(need.includes(Request::LAGRANGIAN), 1)],
+                momentum: &mut terms.momentum[part(need.includes(Request::MOMENTUM), n)],
+                dl_dq: &mut terms.dl_dq[part(need.includes(Request::DL_DQ), n)],
+                mass_matrix: &mut terms.mass_matrix[part(need.includes(Request::MASS_MATRIX), n * n)],
+                momentum_drift: &mut terms.momentum_drift[part(need.includes(Request::MOMENTUM_DRIFT), n)],
             };
             evaluate(self, parameters, q, v, need, &mut state);
         }
@@ -153,7 +153,7 @@ impl<S: Scalar> Evaluator<S> {
     }
 
     /// The program that computes what is needed, recorded on first use.
-    fn program(&self, form: &dyn Form<S>, need: RequestedTerms) -> Option<Arc<Program<S>>> {
+    fn program(&self, form: &dyn Form<S>, need: Request) -> Option<Arc<Program<S>>> {
         let (value, count) = (self.value(form)?, self.parameters.len());
         let recorded = self.programs[need.index()].get_or_init(|| {
             let n = Lagrangian::coordinates(value);
@@ -170,7 +170,7 @@ impl<S: Scalar> Evaluator<S> {
         &self,
         form: &dyn Form<S>,
         (q, v): (&[S], &[S]),
-        need: RequestedTerms,
+        need: Request,
         terms: &mut Terms<S>,
         scratch: &mut Scratch<S>,
     ) -> bool {
@@ -186,11 +186,11 @@ impl<S: Scalar> Evaluator<S> {
         for (chunk, (q, v)) in q.chunks(STATES * n).zip(v.chunks(STATES * n)).enumerate() {
             evaluation.evaluate(&self.parameters, q, v, need.depth());
             let fields = [
-                (need.lagrangian, &mut terms.lagrangian, &evaluation.lagrangian, 1),
-                (need.momentum, &mut terms.momentum, &evaluation.momentum, n),
-                (need.dl_dq, &mut terms.dl_dq, &evaluation.dl_dq, n),
-                (need.mass_matrix, &mut terms.mass_matrix, &evaluation.mass_matrix, n * n),
-                (need.momentum_drift, &mut terms.momentum_drift, &evaluation.momentum_drift, n),
+                (need.includes(Request::LAGRANGIAN), &mut terms.lagrangian, &evaluation.lagrangian, 1),
+                (need.includes(Request::MOMENTUM), &mut terms.momentum, &evaluation.momentum, n),
+                (need.includes(Request::DL_DQ), &mut terms.dl_dq, &evaluation.dl_dq, n),
+                (need.includes(Request::MASS_MATRIX), &mut terms.mass_matrix, &evaluation.mass_matrix, n * n),
+                (need.includes(Request::MOMENTUM_DRIFT), &mut terms.momentum_drift, &evaluation.momentum_drift, n),
             ];
             for (_, to, from, width) in fields.into_iter().filter(|(needed, ..)| *needed) {
                 to[chunk * STATES * width..][..from.len()].copy_from_slice(from);
@@ -204,7 +204,7 @@ impl<S: Scalar> Evaluator<S> {
         &self,
         form: &dyn Form<S>,
         (q, v): (&[S], &[S]),
-        need: RequestedTerms,
+        need: Request,
         terms: &mut Terms<S>,
         scratch: &mut Scratch<S>,
     ) -> bool {
@@ -239,23 +239,22 @@ impl<S: Scalar> Evaluator<S> {
         if v.len() != q.len() {
             return Err(shape("velocities", v.len()));
         }
-        let need = RequestedTerms::of(request);
         for field in [&mut terms.force, &mut terms.dissipation, &mut terms.acceleration, &mut terms.energy] {
             field.clear();
         }
         // Whatever is needed is overwritten below.
         let size = |needed: bool, width: usize| if needed { batch * width } else { 0 };
-        terms.lagrangian.resize(size(need.lagrangian, 1), S::nan());
-        terms.momentum.resize(size(need.momentum, n), S::nan());
-        terms.dl_dq.resize(size(need.dl_dq, n), S::nan());
-        terms.mass_matrix.resize(size(need.mass_matrix, n * n), S::nan());
-        terms.momentum_drift.resize(size(need.momentum_drift, n), S::nan());
+        terms.lagrangian.resize(size(request.includes(Request::LAGRANGIAN), 1), S::nan());
+        terms.momentum.resize(size(request.includes(Request::MOMENTUM), n), S::nan());
+        terms.dl_dq.resize(size(request.includes(Request::DL_DQ), n), S::nan());
+        terms.mass_matrix.resize(size(request.includes(Request::MASS_MATRIX), n * n), S::nan());
+        terms.momentum_drift.resize(size(request.includes(Request::MOMENTUM_DRIFT), n), S::nan());
         let done = match (n > REPLAY_COORDINATES, batch >= REPLAY_FROM) {
-            (true, _) => self.sweep(form, (q, v), need, terms, scratch),
-            (false, large) => large && self.replay(form, (q, v), need, terms, scratch),
+            (true, _) => self.sweep(form, (q, v), request, terms, scratch),
+            (false, large) => large && self.replay(form, (q, v), request, terms, scratch),
         };
         if !done {
-            form.states(&self.parameters, q, v, need, terms);
+            form.states(&self.parameters, q, v, request, terms);
         }
         terms.complete(n, v, request, &mut scratch.workspace)
     }
@@ -282,16 +281,16 @@ fn record<'t, S: Scalar>(
     parameters: &[Tracer<'t, S>],
     q: &[Tracer<'t, S>],
     v: &[Tracer<'t, S>],
-    need: RequestedTerms,
+    need: Request,
 ) -> Vec<Tracer<'t, S>> {
     let n = q.len();
     let field = |needed: bool, width: usize| vec![Tracer::zero(); if needed { width } else { 0 }];
     let mut fields = [
-        field(need.lagrangian, 1),
-        field(need.momentum, n),
-        field(need.dl_dq, n),
-        field(need.mass_matrix, n * n),
-        field(need.momentum_drift, n),
+        field(need.includes(Request::LAGRANGIAN), 1),
+        field(need.includes(Request::MOMENTUM), n),
+        field(need.includes(Request::DL_DQ), n),
+        field(need.includes(Request::MASS_MATRIX), n * n),
+        field(need.includes(Request::MOMENTUM_DRIFT), n),
     ];
     let [lagrangian, momentum, dl_dq, mass_matrix, momentum_drift] = &mut fields;
     evaluate(system, parameters, q, v, need, &mut State { lagrangian, momentum, dl_dq, mass_matrix, momentum_drift });

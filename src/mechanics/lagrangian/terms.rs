@@ -3,6 +3,7 @@
 use super::error::MechanicsError;
 use super::metric::MetricJet;
 use crate::scalar::{Dd, Scalar};
+use crate::tape::Depth;
 use std::ops::BitOr;
 
 /// Which terms a caller needs; nothing else is computed.
@@ -35,6 +36,24 @@ impl Request {
     /// The same without the solution for the acceleration; what it is made of stays.
     pub(crate) const fn without_solution(self) -> Self {
         Self(self.0 & !32)
+    }
+
+    /// A number below 32 that names the combination of `L`, `p`, `g`, `M`, `c`.
+    pub(crate) const fn index(self) -> usize {
+        (self.0 & 31) as usize
+    }
+
+    /// The least depth of an evaluation that fills `L`, `p`, `g`, `M`, `c` as requested.
+    pub(crate) const fn depth(self) -> Depth {
+        if self.includes(Self::MOMENTUM_DRIFT) {
+            Depth::Motion
+        } else if self.includes(Self::MASS_MATRIX) {
+            Depth::MassMatrix
+        } else if self.includes(Self::MOMENTUM) || self.includes(Self::DL_DQ) {
+            Depth::Gradient
+        } else {
+            Depth::Value
+        }
     }
 
     /// `true` if all of `other` is asked for.

@@ -154,18 +154,6 @@ impl<S: Scalar> NetworkLagrangian<S> {
         let model = self.architecture.model();
         NetworkLagrangian { architecture: self.architecture.clone(), weights, model, idle: Mutex::new(Vec::new()) }
     }
-
-    fn depth(request: Request) -> Depth {
-        if request.includes(Request::MOMENTUM_DRIFT) {
-            Depth::Motion
-        } else if request.includes(Request::MASS_MATRIX) {
-            Depth::MassMatrix
-        } else if request.includes(Request::MOMENTUM) || request.includes(Request::DL_DQ) {
-            Depth::Gradient
-        } else {
-            Depth::Value
-        }
-    }
 }
 
 impl<S: Scalar> Workspace<S> {
@@ -236,7 +224,7 @@ impl<S: Scalar> EulerLagrange<S> for NetworkLagrangian<S> {
             .unwrap_or_else(PoisonError::into_inner)
             .pop()
             .unwrap_or_else(|| Workspace::new(&self.model));
-        let depth = Self::depth(request);
+        let depth = request.depth();
         for states in q.chunks(STATES * n).zip(v.chunks(STATES * n)) {
             workspace.append(self, states, (request, depth), terms);
         }

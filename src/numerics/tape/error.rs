@@ -32,9 +32,6 @@ pub enum TapeError {
         /// Numbers found.
         found: usize,
     },
-    /// A reverse replay was asked for before a forward one.
-    #[error("reverse replay without a forward replay before it")]
-    NoForward,
 }
 
 /// `Ok` if a slice has the expected length.

@@ -1,13 +1,13 @@
-//! The tape: record, replay, reverse sweep.
+//! The tape: reverse mode, and recorded programs.
 //!
-//! Three ways to a derivative in reverse mode, all generic over the number:
+//! Three ways to derivatives, all generic over the number:
 //!
 //! - [`Tape`] records while it computes; one reverse sweep gives the gradient at those very numbers. The code under
 //!   it may branch on values. Elements are any [`Real`](crate::scalar::Real): a tape over forward numbers gives
 //!   Hessians.
 //! - [`Program`] records once, without numbers, and is replayed on many states side by side (lanes) by a [`Replay`],
-//!   forward and backward, without allocating. A branch on a value cannot be recorded and is refused;
-//!   [`Real::select`](crate::scalar::Real::select) can.
+//!   without allocating; recorded over forward numbers, it computes their derivatives. A branch on a value cannot be recorded
+//!   and is refused; [`Real::select`](crate::scalar::Real::select) can.
 //! - [`Recorded`] holds a function `L(q, v)` of numbers and dense layers ([`Real::affine`](crate::scalar::Real::affine)), and
 //!   an [`Evaluation`] gives everything a Lagrangian is asked for: `p`, `g`, `M`, `c`, and gradients of losses of the
 //!   accelerations by parameters and state.
@@ -16,10 +16,9 @@
 //! variable and one per operation on two variables; functions of one variable, constant factors and constant summands
 //! need none. The sweep holds `s` bytes per node besides, in [`Adjoints`]. A reset keeps the memory and costs nothing per
 //! node (the one after a recording that outgrew the room allocates room for it); the next sweep clears one adjoint per
-//! node recorded, not per node held. A [`Replay`] holds `s` bytes per row, lane and chunk of 64 states for the
-//! values, those of one chunk for the adjoints; [`Replay::evaluate`] those of one chunk alone.
+//! node recorded, not per node held. A [`Replay`] holds `s` bytes per row and lane of one chunk of 64 states.
 //!
-//! In all of them constants are never recorded and variables of two recordings never mix silently. In the first two a zero
+//! In all of them constants are never recorded and variables of two recordings never mix silently. On the [`Tape`] a zero
 //! adjoint times an infinite partial derivative contributes 0, so that a branch not taken leaves no `NaN`; a [`Recorded`]
 //! Lagrangian needs finite slopes in both branches.
 //!

@@ -18,22 +18,6 @@ pub(super) fn value<S: Scalar>(f: Unary, x: &Row<S>, out: &mut Row<S>) {
     }
 }
 
-/// `d = f'(x)`, given `y = f(x)`.
-///
-/// Where the derivative is a function of the same kind, the row of the table is applied to whole slices.
-#[inline(never)]
-pub(super) fn first<S: Scalar>(f: Unary, x: &Row<S>, y: &Row<S>, d: &mut Row<S>) {
-    match f {
-        Unary::ExpM1 => exp_lanes(x, d),
-        Unary::Sin => cos_lanes(x, d),
-        Unary::Cos => {
-            sin_lanes(x, d);
-            d.iter_mut().for_each(|d| *d = -*d);
-        }
-        _ => (0..LANES).for_each(|l| d[l] = f.first(x[l], y[l])),
-    }
-}
-
 /// Sine and cosine.
 #[inline(never)]
 pub(super) fn sin_cos<S: Scalar>(x: &Row<S>, sin: &mut Row<S>, cos: &mut Row<S>) {
@@ -44,10 +28,4 @@ pub(super) fn sin_cos<S: Scalar>(x: &Row<S>, sin: &mut Row<S>, cos: &mut Row<S>)
 #[inline(never)]
 pub(super) fn value_of_two<S: Scalar>(f: Binary, a: &Row<S>, b: &Row<S>, out: &mut Row<S>) {
     (0..LANES).for_each(|l| out[l] = f.value(a[l], b[l]));
-}
-
-/// Replaces the arguments by the partial derivatives, given `y = f(a, b)`.
-#[inline(never)]
-pub(super) fn first_of_two<S: Scalar>(f: Binary, a: &mut Row<S>, b: &mut Row<S>, y: &Row<S>) {
-    (0..LANES).for_each(|l| (a[l], b[l]) = f.first(a[l], b[l], y[l]));
 }

@@ -5,7 +5,6 @@
 //! its cost per operation is shared by the lanes and the loops are SIMD. The chunk does not depend on the number of
 //! threads: the same batch gives the same bytes.
 
-mod backward;
 mod elementary;
 mod forward;
 mod interpret;
@@ -16,8 +15,6 @@ mod tracer;
 pub use replay::Replay;
 pub use tracer::Tracer;
 
-use backward::INPUTS;
-use backward::PARAMETERS;
 pub(super) use recorder::{Graph, Node, Recorder};
 
 use super::error::TapeError;
@@ -41,8 +38,6 @@ pub(super) struct Instruction<S> {
 /// Only what the outputs need is kept, equal expressions are computed once, constants are folded.
 #[derive(Clone, Debug)]
 pub struct Program<S> {
-    /// Dependence of each row, see [`Sweep::reach`].
-    pub(super) reach: Vec<u8>,
     /// Rows below are uniform over the lanes.
     pub(super) uniform_rows: usize,
     pub(super) lane_rows: usize,
@@ -89,23 +84,14 @@ impl<S: Scalar> Program<S> {
                 graph.nodes[index].operands(|row| needed[node_of(row)] = true);
             }
         }
-        let mut reach = vec![0u8; count];
         for (index, node) in graph.nodes.iter().enumerate() {
-            let (mut bits, mut all) = (0, true);
-            node.operands(|row| {
-                bits |= reach[node_of(row)];
-                all &= uniform[node_of(row)];
-            });
-            (uniform[index], reach[index]) = match node {
-                Node::Input(_) => (false, INPUTS),
-                Node::Parameter(_) => (true, PARAMETERS),
-                _ => (all, bits),
-            };
+            let mut all = !matches!(node, Node::Input(_));
+            node.operands(|row| all &= uniform[node_of(row)]);
+            uniform[index] = all;
         }
         let mut place = vec![0u32; count];
         let mut rows = 0u32;
         let mut boundaries = [0usize; 3];
-        let mut reach_of_row = Vec::new();
         for (section, boundary) in boundaries.iter_mut().enumerate() {
             for (index, node) in graph.nodes.iter().enumerate() {
                 let home = match node {
@@ -116,7 +102,6 @@ impl<S: Scalar> Program<S> {
                 if needed[index] && home == section {
                     place[index] = rows;
                     rows += node.rows() as u32;
-                    reach_of_row.resize(rows as usize, reach[index]);
                 }
             }
             *boundary = rows as usize;
@@ -124,7 +109,6 @@ impl<S: Scalar> Program<S> {
         let [_, uniform_rows, all_rows] = boundaries;
         let moved = |row: u32| place[node_of(row)] + (row - graph.first[node_of(row)]);
         let mut program = Self {
-            reach: reach_of_row,
             uniform_rows,
             lane_rows: all_rows - uniform_rows,
             uniform: Vec::new(),
