@@ -101,13 +101,17 @@ class Surface:
             else:
                 self.show(origin)
 
+    def room(self, module):
+        """Floor and module of a file."""
+        return "::".join(module.split("::")[:2])
+
     def methods(self):
         """Public methods of the types shown, by room; a type's methods stand in its own room."""
         kinds = ("struct", "enum", "type", "trait")
-        types = {(module.split("::")[0], name) for module, name in self.items if self.own[module][name] in kinds}
+        types = {(self.room(module), name) for module, name in self.items if self.own[module][name] in kinds}
         count = collections.Counter()
         for module, text in self.files.items():
-            room = module.split("::")[0]
+            room = self.room(module)
             for found in IMPL.finditer(text):
                 if (room, found.group(1)) in types:
                     depth, end = 0, found.end() - 1
@@ -126,7 +130,7 @@ def main():
     modules, items, methods = len(surface.modules) - 1, len(surface.items), surface.methods()
     count = methods.total()
     print(f"{modules + items + count} public: {modules} modules, {items} items, {count} methods")
-    rooms = collections.Counter(module.split("::")[0] for module, _ in surface.items)
+    rooms = collections.Counter(surface.room(module) for module, _ in surface.items)
     print(", ".join(f"{room or 'crate'} {count} + {methods[room]}" for room, count in rooms.most_common()))
     if "--list" in sys.argv:
         print("\n".join(f"{module}::{name}" for module, name in sorted(surface.items)))

@@ -16,7 +16,11 @@ pub(crate) use bounds::boxes;
 pub use dataset::{Dataset, DatasetError};
 pub use datasets::Datasets;
 pub use draw::SamplingError;
+#[doc(hidden)]
 pub use estimated::{Noise, StateEstimate};
+#[doc(hidden)]
 pub use recording_split::{PrepareOptions, RecordingSplit, RecordingSplitError, Split};
+pub use sampling::sample;
+#[doc(hidden)]
+pub use sampling::sample_all;
 pub(crate) use sampling::sample_all_until;
-pub use sampling::{sample, sample_all};

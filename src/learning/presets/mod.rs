@@ -14,6 +14,7 @@ mod preset;
 mod reference;
 mod trainer;
 
+#[doc(hidden)]
 pub use measured::suggested;
 pub use preset::Preset;
 #[doc(hidden)]

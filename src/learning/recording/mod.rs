@@ -34,12 +34,18 @@ mod track;
 mod units;
 
 pub(crate) use clock::Clock;
-pub use columns::{Columns, ColumnsError};
+pub use columns::Columns;
+#[doc(hidden)]
+pub use columns::ColumnsError;
 pub(crate) use hermite::hermite;
 pub(crate) use hold_out::HeldOut;
+#[doc(hidden)]
 pub use hold_out::HoldOutError;
-pub use reading::{Bridged, Cut, Dropped, LoadedRecording, Rows};
+pub use reading::LoadedRecording;
+#[doc(hidden)]
+pub use reading::{Bridged, Cut, Dropped, Rows};
 pub(crate) use targets::LARGE_ERROR;
+#[doc(hidden)]
 pub use targets::Targets;
 pub use track::{RecordedTrajectory, Recording, TrajectoryError};
 pub(crate) use units::factor;

@@ -22,11 +22,17 @@ pub use checkpoint::{
 pub use epoch::Epoch;
 #[doc(hidden)]
 pub use memory::training_memory;
-pub use objective::{BatchReport, Objective, ThreadsError};
+pub use objective::Objective;
+#[doc(hidden)]
+pub use objective::{BatchReport, ThreadsError};
 pub use phase::StopReason;
 pub use problem::TrainingProblem;
-pub use recipe::{RecipeError, TrainingResult, run};
-pub use solver::{Hooks, Progress, StepError, Watcher};
+#[doc(hidden)]
+pub use recipe::RecipeError;
+pub use recipe::{TrainingResult, run};
+pub use solver::Hooks;
+#[doc(hidden)]
+pub use solver::{Progress, StepError, Watcher};
 #[doc(hidden)]
 pub use trainer::{ResumeOptions, resume};
 pub use trainer::{Trained, TrainingError, train};

@@ -27,10 +27,13 @@ mod with_forces;
 
 pub(crate) use catalogue::LagrangianVisitor;
 pub use catalogue::{SystemError, SystemInstance, find, systems};
-pub use configure::{build, configure, configure_system, configure_values};
+pub use configure::configure;
+#[doc(hidden)]
+pub use configure::{build, configure_system, configure_values};
 pub(crate) use description::pair;
 pub use description::{Description, DescriptionError};
 pub use error::MechanicsError;
+#[doc(hidden)]
 pub use expression::{Expression, ExpressionError};
 pub use expression_lagrangian::ExpressionLagrangian;
 pub(crate) use interruptible::Interruptible;
@@ -38,6 +41,7 @@ pub(crate) use interruptible::Interruptible;
 pub(crate) use inverse::inverse_dynamics_by_rows;
 pub use inverse::{InverseDynamics, inverse_dynamics};
 pub use mechanics::Mechanics;
+#[doc(hidden)]
 pub use metric::MetricJet;
 pub(crate) use metric::metric_jets;
 pub(crate) use taylor::Taylor;

@@ -32,13 +32,19 @@ mod recorded;
 mod structure;
 
 pub use crate::ops::Activation;
-pub use activation_choice::{ActivationChoice, UnknownActivation};
+pub use activation_choice::ActivationChoice;
+#[doc(hidden)]
+pub use activation_choice::UnknownActivation;
 pub use config::{Architecture, Initialization, InputLayer};
 #[doc(hidden)]
 pub use dynamics::{Dynamics, Model};
+#[doc(hidden)]
 pub use factor::Factor;
+#[doc(hidden)]
 pub use init::initial_weights;
 #[doc(hidden)]
 pub use layout::{Branch, DissipationLayout, Layer, Layout, LinearMap};
 pub use model::{NetworkError, NetworkLagrangian};
-pub use structure::{Form, Radial, Structure};
+pub use structure::Structure;
+#[doc(hidden)]
+pub use structure::{Form, Radial};

@@ -35,18 +35,28 @@ mod simplified_newton;
 mod trajectory;
 mod variational;
 
+#[doc(hidden)]
 pub use balance::EnergyBalance;
 pub use driven::Driven;
-pub use ensemble::{Start, rollout_each, rollout_many, rollout_together};
-pub use error::{RolloutError, UnderflowCause};
+pub use ensemble::{Start, rollout_many};
+#[doc(hidden)]
+pub use ensemble::{rollout_each, rollout_together};
+pub use error::RolloutError;
+#[doc(hidden)]
+pub use error::UnderflowCause;
 pub use force::{Force, SampledForce};
 use keep::StepFailure;
+#[doc(hidden)]
 pub use ode::Integrable;
 pub use options::{Domain, Method, Options};
 #[doc(hidden)]
 pub use pieces::{Balances, Ending, rollout_in_pieces};
-pub use run::{Motion, Rollout, rollout, rollout_fixed};
-pub use trajectory::{Statistics, Trajectory};
+#[doc(hidden)]
+pub use run::rollout_fixed;
+pub use run::{Motion, Rollout, rollout};
+#[doc(hidden)]
+pub use trajectory::Statistics;
+pub use trajectory::Trajectory;
 
 #[cfg(test)]
 pub(crate) mod models;

@@ -26,9 +26,12 @@ mod simd;
 mod slices;
 mod sum;
 
-pub use dd::{Dd, UnreadableNumber};
+pub use dd::Dd;
+#[doc(hidden)]
+pub use dd::UnreadableNumber;
 #[doc(hidden)]
 pub use dots::Dots;
+#[doc(hidden)]
 pub use float::AnyFloat;
 #[doc(hidden)]
 pub use lanes::{Exponential, Lanes, cos_lanes, exp_lanes, ln_lanes, sin_cos_lanes, sin_lanes, sqrt_lanes, tanh_lanes};

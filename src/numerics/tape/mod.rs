@@ -46,11 +46,16 @@ mod error;
 mod program;
 mod var;
 
-pub use driver::{
-    ScalarFunction, VectorFunction, derivative, gradient, gradient_on, hessian, hessian_vector, jacobian,
-};
-pub use eager::{Adjoints, Statistics, Tape};
-pub use engine::{Depth, Evaluation, MixedDirections, Recorded, STATES};
+#[doc(hidden)]
+pub use driver::gradient_on;
+pub use driver::{ScalarFunction, VectorFunction, derivative, gradient, hessian, hessian_vector, jacobian};
+#[doc(hidden)]
+pub use eager::Statistics;
+pub use eager::{Adjoints, Tape};
+pub use engine::{Depth, Evaluation, Recorded};
+#[doc(hidden)]
+pub use engine::{MixedDirections, STATES};
 pub use error::TapeError;
+#[doc(hidden)]
 pub use program::{Program, Replay, Tracer};
 pub use var::Var;

@@ -49,6 +49,7 @@ pub(crate) use curvature::{MetricComponent, Spread};
 pub(crate) use curvature::{curvature_grid, curvature_scalars, is_metric, metric_components, metric_grids};
 #[doc(hidden)]
 pub use determination::{Decay, Determination, Estimate, Observed, RANGE, constants, decay, determination, misfit};
+#[doc(hidden)]
 pub use dissipation::{EnergyLoss, energy_loss};
 #[doc(hidden)]
 pub use energy::energy_drift;
@@ -65,11 +66,13 @@ pub use mass_matrix::{MassMatrixError, mass_matrix_error};
 pub(crate) use mass_matrix::{matrices_at_rest, nearest_factor};
 #[doc(hidden)]
 pub use portrait::Portrait;
+#[doc(hidden)]
 pub use prediction::PredictionError;
 pub(crate) use prediction::window_valid_times;
 #[doc(hidden)]
 pub use prediction::{Predictions, Window, follow, predict_by_constant_velocity, predict_by_motion, prediction_error};
 pub use signature::wrong_signatures;
+#[doc(hidden)]
 pub use summary::{ErrorDistribution, Statistics, statistics};
 #[doc(hidden)]
 pub use trajectories::{StartBox, TrajectoryRun, TrajectorySummary, TrajectoryTest};

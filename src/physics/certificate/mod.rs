@@ -53,8 +53,10 @@ mod spectrum;
 #[cfg(test)]
 mod tests;
 
+#[doc(hidden)]
 pub use guard::Guarded;
 pub use network::certify_network;
+#[doc(hidden)]
 pub use search::Verdict;
 
 use crate::lagrangian::system::Bounds;

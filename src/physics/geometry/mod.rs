@@ -38,13 +38,18 @@ mod orbits;
 mod surfaces;
 mod tensor;
 
+#[doc(hidden)]
 pub use bound::TurningPoint;
 pub use connection::Connection;
 pub use curvature::Curvature;
 pub use error::GeometryError;
 pub use metric::Metric;
-pub use orbits::{CircularOrbit, Equator, Sense, Symmetric, Turn};
-pub use surfaces::{Change, Character, Surface, characters, grid, surfaces};
+pub use orbits::CircularOrbit;
+#[doc(hidden)]
+pub use orbits::{Equator, Sense, Symmetric, Turn};
+#[doc(hidden)]
+pub use surfaces::{Change, grid};
+pub use surfaces::{Character, Surface, characters, surfaces};
 
 use crate::lagrangian::{EulerLagrange, MetricJet};
 use crate::scalar::Scalar;

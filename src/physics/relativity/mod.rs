@@ -49,7 +49,10 @@ mod stationary;
 mod tetrad;
 mod vector;
 
-pub use camera::{Camera, MOST_PIXELS, Observer};
+#[doc(hidden)]
+pub use camera::MOST_PIXELS;
+pub use camera::{Camera, Observer};
+#[doc(hidden)]
 pub use central_coordinates::CentralCoordinates;
 pub use chart::Chart;
 #[cfg(feature = "training")]
@@ -58,16 +61,25 @@ pub use error::RelativityError;
 pub use image::Image;
 pub use infall::{Infall, infall};
 pub use orbits::{Orbit, orbits};
+#[doc(hidden)]
 pub use outline::{Edge, Outline, outline};
 #[cfg(feature = "training")]
+#[doc(hidden)]
 pub use parameters::nearest_parameters;
 pub use periastron::{RadialPeriod, radial_period};
-pub use rays::{Fate, Ray, TOLERANCES, Tracing, trace};
+pub use rays::{Fate, Ray, trace};
+#[doc(hidden)]
+pub use rays::{TOLERANCES, Tracing};
 #[cfg(feature = "training")]
+#[doc(hidden)]
 pub use readings::{LearnedHole, Reading};
-pub use shadow::{Difference, Shadow, shadow};
+#[doc(hidden)]
+pub use shadow::Difference;
+pub use shadow::{Shadow, shadow};
+#[doc(hidden)]
 pub use sky::{Sky, difference_image};
 pub(crate) use stationary::depends_on_time;
+#[doc(hidden)]
 pub use tetrad::Tetrad;
 
 #[cfg(test)]

@@ -57,6 +57,7 @@ pub(crate) use algebra::MOST_FIELDS;
 pub(crate) use bases::{bases, enough, most_symmetries};
 pub use basis::{Basis, Chart, Degrees};
 pub(crate) use basis::{MOST_UNKNOWNS, most_states, unknowns};
+#[doc(hidden)]
 pub use canonical::{Canonical, CanonicalForm};
 pub(crate) use charges::drifts;
 pub use charges::{Charge, charges};
@@ -65,8 +66,11 @@ pub(crate) use conserved::quadratic_unknowns;
 pub use conserved::{Conserved, Quadratic, quadratic};
 pub use error::SymmetryError;
 pub use field::Field;
-pub use find::{EXACT, Symmetries, symmetries};
+#[doc(hidden)]
+pub use find::EXACT;
+pub use find::{Symmetries, symmetries};
 pub use region::Region;
 pub(crate) use region::middle;
+#[doc(hidden)]
 pub use separation::Separation;
 pub(crate) use separation::TOLERANCES;
