@@ -100,7 +100,7 @@ fn inspect<S: Scalar>(args: &Args) -> Result<(), CliError> {
     for ((q, v), rows) in states.q.chunks(CHUNK * n).zip(states.v.chunks(CHUNK * n)).zip(states.rows.chunks(CHUNK)) {
         let mut text = String::new();
         let outcome = model.terms(q, v, Request::ALL, &mut terms);
-        let told = terms.take_failures(outcome).map_err(|error| CliError::data(format_args!("{place}: {error}")))?;
+        let told = terms.drain_failures(outcome).map_err(|error| CliError::data(format_args!("{place}: {error}")))?;
         let spectrum = spectrum(n, &terms.mass_matrix);
         let mut told = told.into_iter().peekable();
         for (k, &row) in rows.iter().enumerate() {

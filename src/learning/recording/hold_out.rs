@@ -17,7 +17,7 @@ pub enum HeldOut {
     Nothing,
     /// Whole trajectories, by number, ascending.
     Tracks(Vec<usize>),
-    /// The end of the only trajectory: samples `start..` after a gap of `gap` samples that nobody uses.
+    /// The end of the only trajectory: samples `start..` after a gap of `gap` samples that is not used.
     End {
         /// First sample held out.
         start: usize,

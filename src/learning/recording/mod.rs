@@ -1,4 +1,4 @@
-//! Recorded motion: what somebody measured, as it was measured; its derivatives, and what it is good for.
+//! Recorded motion, estimates of its derivatives, and a survey of its quality.
 //!
 //! ```
 //! use lnn::recording::Columns;

@@ -16,7 +16,7 @@ pub fn configure<S: Scalar>(name: &str, given: &Given) -> Result<SystemInstance<
     configure_system(Cow::Borrowed(find(name)?), given)
 }
 
-/// As [`configure`], for a system at hand: one of the catalogue, or one by its [description](super::Description).
+/// [`configure`] for a given system: one of the catalogue, or one made from a [description](super::Description).
 ///
 /// # Errors
 /// [`SystemError`] for an unknown or repeated symbol, a value that is no number or out of range.

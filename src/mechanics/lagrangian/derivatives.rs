@@ -57,13 +57,13 @@ const fn may_be_large<L: Lagrangian>() -> bool {
 }
 
 /// Numbers in an array where they fit, so that a single state allocates nothing.
-struct Few<T> {
+struct SmallVector<T> {
     array: [T; 8],
     vector: Vec<T>,
     length: usize,
 }
 
-impl<T: Real> Few<T> {
+impl<T: Real> SmallVector<T> {
     fn new<R: Copy>(numbers: &[R], lift: impl Fn(R) -> T) -> Self {
         let length = numbers.len();
         if length <= 8 {
@@ -90,8 +90,8 @@ fn first_order<L: Lagrangian, R: Real>(
     if need.includes(Request::LAGRANGIAN) {
         out.lagrangian[0] = system.lagrangian(parameters, q, v);
     }
-    let mut lifted = Few::new(parameters, Dual::lift);
-    let (mut dq, mut dv) = (Few::new(q, Dual::lift), Few::new(v, Dual::lift));
+    let mut lifted = SmallVector::new(parameters, Dual::lift);
+    let (mut dq, mut dv) = (SmallVector::new(q, Dual::lift), SmallVector::new(v, Dual::lift));
     let (parameters, dq, dv) = (lifted.get(), dq.get(), dv.get());
     for i in 0..q.len() {
         if need.includes(Request::DL_DQ) {
@@ -116,7 +116,7 @@ fn jets<L: Lagrangian, R: Real, const H: usize, const N: usize>(
     need: Request,
     out: &mut State<'_, R>,
 ) {
-    let mut lifted = Few::new(parameters, Jet::<R, N, H>::lift);
+    let mut lifted = SmallVector::new(parameters, Jet::<R, N, H>::lift);
     let mut jet_q = [Jet::lift(R::zero()); H];
     let mut jet_v = jet_q;
     for i in 0..H {
@@ -158,8 +158,8 @@ fn directions<L: Lagrangian, R: Real>(
 ) {
     first_order(system, parameters, q, v, need, out);
     let n = q.len();
-    let mut lifted = Few::new(parameters, HyperDual::lift);
-    let (mut hq, mut hv) = (Few::new(q, HyperDual::lift), Few::new(v, HyperDual::lift));
+    let mut lifted = SmallVector::new(parameters, HyperDual::lift);
+    let (mut hq, mut hv) = (SmallVector::new(q, HyperDual::lift), SmallVector::new(v, HyperDual::lift));
     let (parameters, hq, hv) = (lifted.get(), hq.get(), hv.get());
     for i in 0..n {
         hv[i].s = R::one();

@@ -1,4 +1,4 @@
-//! The Euler-Lagrange formula: acceleration and energy from `L`, `p`, `g`, `M`, `c`, `Q`, whoever computed them.
+//! Solves for accelerations and energy, given the terms `L`, `p`, `g`, `M`, `c`, `Q`.
 
 use super::failures::not_finite;
 use super::{MechanicsError, Request, Terms};
@@ -92,7 +92,7 @@ impl<S: Scalar> Terms<S> {
         for &(what, field, width) in &fields {
             found.append(&mut not_finite(what, field, width));
         }
-        self.put_before(found);
+        self.prepend_failures(found);
         self.outcome()
     }
 }
@@ -135,7 +135,7 @@ impl<S: Scalar> Terms<S> {
         for ((power, v), external) in self.dissipation.iter_mut().zip(v.chunks(n)).zip(external.chunks(n)) {
             *power -= v.iter().zip(external).fold(zero, |sum, (&v, &q)| sum + v * q);
         }
-        self.put_before(found);
+        self.prepend_failures(found);
         self.outcome()
     }
 }

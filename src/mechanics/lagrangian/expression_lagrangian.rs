@@ -72,8 +72,8 @@ mod tests {
         for found in [0, 1, 3] {
             let pendulum = Mechanics::<_, f64>::new(pendulum.clone(), vec![1.0; found]);
             let refused = MechanicsError::Shape { what: "parameters", expected: 2, found };
-            let told = pendulum.terms(&[0.5], &[1.0], Request::ALL, &mut Terms::default());
-            assert_eq!(told, Err(refused));
+            let outcome = pendulum.terms(&[0.5], &[1.0], Request::ALL, &mut Terms::default());
+            assert_eq!(outcome, Err(refused));
             assert_eq!(pendulum.metric_jets(&[0.5], &[1.0]).err(), Some(refused));
         }
         let pendulum = Mechanics::<_, f64>::new(pendulum, vec![2.0, 9.8]);

@@ -1,11 +1,11 @@
-//! Rows of a batch that failed: found, gathered from several hands, and reported.
+//! Failures of the rows of a batch: how they are found, merged, and reported.
 
 use super::{MechanicsError, Terms};
 use crate::scalar::Scalar;
 
 impl<S: Scalar> Terms<S> {
     /// Adds failures to those that are there; one of a row is kept, and of `found` rather than of what is there.
-    pub(crate) fn put_before(&mut self, mut found: Vec<MechanicsError>) {
+    pub(crate) fn prepend_failures(&mut self, mut found: Vec<MechanicsError>) {
         if found.is_empty() {
             return;
         }
@@ -26,7 +26,7 @@ impl<S: Scalar> Terms<S> {
 
     /// `true` if all that failed stands in [`Terms::failures`], so that the other rows can be used. After a success none stands there, even
     /// of a model that leaves the list alone.
-    pub(crate) fn settle_failures(&mut self, outcome: &Result<(), MechanicsError>) -> bool {
+    pub(crate) fn record_failures(&mut self, outcome: &Result<(), MechanicsError>) -> bool {
         if outcome.is_ok() {
             self.failures.clear();
         }
@@ -34,15 +34,15 @@ impl<S: Scalar> Terms<S> {
         outcome.as_ref().err().is_none_or(|error| error.row().is_some() && error.row() == first)
     }
 
-    /// Takes out the failures of a model that somebody adds to.
+    /// Removes and returns the failures of the wrapped model.
     ///
     /// # Errors
-    /// `outcome`, if that is not told row by row.
-    pub(crate) fn take_failures(
+    /// `outcome`, if it does not belong to rows.
+    pub(crate) fn drain_failures(
         &mut self,
         outcome: Result<(), MechanicsError>,
     ) -> Result<Vec<MechanicsError>, MechanicsError> {
-        if self.settle_failures(&outcome) {
+        if self.record_failures(&outcome) {
             Ok(std::mem::take(&mut self.failures))
         } else {
             outcome.map(|()| Vec::new())
@@ -87,8 +87,8 @@ mod tests {
         assert_eq!(found, [bad(43), bad(99)]);
         assert_eq!(not_finite("momentum", &field[..129], 3), []);
         let mut terms = Terms::<f64>::default();
-        terms.put_before(vec![MechanicsError::Uncertified { row: 99 }, MechanicsError::Uncertified { row: 7 }]);
-        terms.put_before(found);
+        terms.prepend_failures(vec![MechanicsError::Uncertified { row: 99 }, MechanicsError::Uncertified { row: 7 }]);
+        terms.prepend_failures(found);
         assert_eq!(terms.failures, [MechanicsError::Uncertified { row: 7 }, bad(43), bad(99)]);
         assert_eq!(terms.outcome(), Err(MechanicsError::Uncertified { row: 7 }));
     }
@@ -97,13 +97,13 @@ mod tests {
     fn an_error_about_no_row_is_passed_on() {
         let mut terms = Terms::<f64> { failures: vec![MechanicsError::Uncertified { row: 2 }], ..Terms::default() };
         let other = Err(MechanicsError::Derivatives { what: "mass matrix" });
-        assert_eq!(terms.take_failures(other), Err(MechanicsError::Derivatives { what: "mass matrix" }));
-        let told = terms.take_failures(Err(MechanicsError::Uncertified { row: 2 }));
-        assert_eq!(told, Ok(vec![MechanicsError::Uncertified { row: 2 }]));
+        assert_eq!(terms.drain_failures(other), Err(MechanicsError::Derivatives { what: "mass matrix" }));
+        let failed = terms.drain_failures(Err(MechanicsError::Uncertified { row: 2 }));
+        assert_eq!(failed, Ok(vec![MechanicsError::Uncertified { row: 2 }]));
         assert_eq!(terms.outcome(), Ok(()));
         // What an earlier batch left behind does not count.
         terms.failures.push(MechanicsError::Uncertified { row: 2 });
-        assert_eq!(terms.take_failures(Ok(())), Ok(Vec::new()));
+        assert_eq!(terms.drain_failures(Ok(())), Ok(Vec::new()));
         assert_eq!(terms.outcome(), Ok(()));
     }
 }

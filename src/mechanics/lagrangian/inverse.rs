@@ -67,7 +67,7 @@ pub(crate) fn inverse_dynamics_by_rows<S: Scalar>(
     let mut terms = Terms::default();
     let request = Request::MASS_MATRIX | Request::MOMENTUM_DRIFT | Request::DL_DQ | Request::FORCE;
     let outcome = model.terms(q, v, request, &mut terms);
-    let told = terms.take_failures(outcome)?;
+    let failed = terms.drain_failures(outcome)?;
     let mut generalized = Vec::with_capacity(a.len());
     for (k, a) in a.chunks(n.max(1)).enumerate() {
         for i in 0..n {
@@ -76,8 +76,8 @@ pub(crate) fn inverse_dynamics_by_rows<S: Scalar>(
             generalized.push(inertia + terms.momentum_drift[k * n + i] - terms.dl_dq[k * n + i]);
         }
     }
-    terms.put_before(not_finite("generalized force", &generalized, n));
-    terms.put_before(told);
+    terms.prepend_failures(not_finite("generalized force", &generalized, n));
+    terms.prepend_failures(failed);
     let (mut friction, failures) = (terms.force, terms.failures);
     for row in failures.iter().filter_map(MechanicsError::row) {
         for forces in [&mut generalized, &mut friction].into_iter().filter(|forces| !forces.is_empty()) {

@@ -62,8 +62,8 @@ pub trait Lagrangian: Send + Sync {
     /// Number of coordinates `n`.
     fn coordinates(&self) -> usize;
 
-    /// Number of parameters that [`Lagrangian::lagrangian`] takes; whoever says it has any other number of values refused by an
-    /// error, [`MechanicsError::Shape`].
+    /// Number of parameters that [`Lagrangian::lagrangian`] takes. If `Some`, a parameter vector of another length is refused with
+    /// [`MechanicsError::Shape`].
     fn parameter_count(&self) -> Option<usize> {
         None
     }

@@ -215,7 +215,7 @@ impl PaperPhase {
 }
 
 /// Knowledge about a system: an entry of the catalogue, or a
-/// [description](super::Description) of one's own.
+/// user's [description](super::Description).
 #[derive(Clone, Debug)]
 pub struct System {
     /// Name on the command line.

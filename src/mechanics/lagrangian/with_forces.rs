@@ -91,7 +91,7 @@ impl<S: Scalar, M: EulerLagrange<S>, F: GeneralizedForce<S>> EulerLagrange<S> fo
         let n = self.coordinates();
         // The acceleration is solved for once, with all forces.
         let outcome = self.model.terms(q, v, request.without_solution(), terms);
-        let found = terms.take_failures(outcome)?;
+        let found = terms.drain_failures(outcome)?;
         if request.includes(Request::FORCE) {
             terms.force.resize(v.len(), <S as Real>::zero());
             terms.dissipation.resize(v.len() / n.max(1), <S as Real>::zero());
@@ -110,7 +110,7 @@ impl<S: Scalar, M: EulerLagrange<S>, F: GeneralizedForce<S>> EulerLagrange<S> fo
         if let Err(error @ MechanicsError::Shape { .. }) = terms.complete(n, v, request, &mut Workspace::new()) {
             return Err(error);
         }
-        terms.put_before(found);
+        terms.prepend_failures(found);
         terms.outcome()
     }
 

@@ -74,7 +74,7 @@ impl<'a, S: Scalar> Driven<'a, S> {
         EnergyBalance::of(trajectory, self.model, Some(self.force))
     }
 
-    /// Accelerations `(n)` of one state at time `t`, for a solver of one's own.
+    /// Accelerations `(n)` of one state at time `t`, for external solvers.
     ///
     /// # Errors
     /// [`MechanicsError`] of the model; a force that is not finite.

@@ -9,7 +9,7 @@ use crate::scalar::Scalar;
 use std::ops::Range;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 
-/// The model of a group and the round at hand.
+/// The model of a group and its current round.
 pub(super) struct Group<'a, S> {
     model: &'a dyn EulerLagrange<S>,
     round: Mutex<Round<S>>,
@@ -21,7 +21,7 @@ struct Round<S> {
     /// Rounds evaluated so far.
     number: u64,
     active: usize,
-    /// State that each member waits for; nobody waits any more once it is evaluated.
+    /// State that each member waits for; none waits any more once it is evaluated.
     asked: Vec<Option<Asked<S>>>,
     /// Rows of each member in the last batch.
     rows: Vec<Range<usize>>,
@@ -31,7 +31,7 @@ struct Round<S> {
     /// All that was asked for.
     request: Request,
     /// `true` unless the round failed for a reason that is not that of single states.
-    is_told_by_rows: bool,
+    has_row_failures: bool,
 }
 
 struct Asked<S> {
@@ -51,7 +51,7 @@ impl<'a, S: Scalar> Group<'a, S> {
             v: Vec::new(),
             terms: Terms::default(),
             request: Request::default(),
-            is_told_by_rows: true,
+            has_row_failures: true,
         };
         Self { model, round: Mutex::new(round), evaluated: Condvar::new() }
     }
@@ -80,7 +80,7 @@ impl<'a, S: Scalar> Group<'a, S> {
             request = request | asked.request;
         }
         let outcome = self.model.terms(&round.q, &round.v, request, &mut round.terms);
-        round.is_told_by_rows = round.terms.settle_failures(&outcome);
+        round.has_row_failures = round.terms.record_failures(&outcome);
         round.request = request;
         round.number += 1;
         self.evaluated.notify_all();
@@ -123,7 +123,7 @@ impl<S: Scalar> EulerLagrange<S> for Member<'_, '_, S> {
                 round = self.group.evaluated.wait(round).unwrap_or_else(PoisonError::into_inner);
             }
         }
-        if round.is_told_by_rows {
+        if round.has_row_failures {
             let rows = round.rows[self.index].clone();
             terms.copy_rows(&round.terms, self.coordinates(), rows, request);
             if terms.failures.is_empty() || request == round.request {

@@ -26,7 +26,7 @@ pub(super) struct Phase<'a, S> {
     /// `true` if forces beside those of `L` act.
     damped: bool,
     force: Option<&'a dyn Force<S>>,
-    /// Time at the start of the step at hand, and the times at which the force may be asked.
+    /// Time at the start of the current step, and the times at which the force may be evaluated.
     start: S,
     piece: Option<Piece<S>>,
 }

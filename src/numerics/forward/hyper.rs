@@ -1,11 +1,14 @@
-//! Mixed second order: value, two tangents, one mixed coefficient.
+//! Hyper-dual numbers: mixed second derivatives in one evaluation.
 
 use super::{assign_operators, forward_real, forward_unary};
 use crate::ops::Binary;
 use crate::scalar::{Elementary, Real};
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-/// `value + s S + t T + st S T` modulo `S^2`, `T^2`: a number on a surface `x(S, T)`, with `st = d2/dS dT`.
+/// Hyper-dual number for mixed second derivatives.
+///
+/// `value + s S + t T + st S T` modulo `S^2`, `T^2`: seeded with the directions `s` and `t`, a function returns its value, both first
+/// derivatives, and the mixed second derivative `st` along them.
 #[derive(Clone, Copy, Debug)]
 pub struct HyperDual<T> {
     /// The number.

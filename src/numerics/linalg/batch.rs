@@ -15,7 +15,7 @@ pub struct Workspace<S> {
     /// A block of matrices too large for the stack.
     pub(super) block: Buffer<S>,
     /// Scratch of the second look at a block.
-    pub(super) second: Second<S>,
+    pub(super) second: Retry<S>,
     /// Scratch of determinants.
     pub(super) minors: Minors<S>,
     /// Lent to callers.
@@ -46,7 +46,7 @@ impl<S: Scalar> Buffer<S> {
 
 /// Scratch of rows that need more than one elimination.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Second<S> {
+pub(super) struct Retry<S> {
     /// A block of matrices.
     pub block: Buffer<S>,
     /// Their solutions.
@@ -98,7 +98,7 @@ impl<S: Scalar> Workspace<S> {
         &mut self.failures
     }
     /// The three parts a solver works with at the same time.
-    pub(super) fn parts(&mut self) -> (&mut Buffer<S>, &mut Second<S>, &mut Vec<(usize, Failure)>) {
+    pub(super) fn parts(&mut self) -> (&mut Buffer<S>, &mut Retry<S>, &mut Vec<(usize, Failure)>) {
         (&mut self.block, &mut self.second, &mut self.failures)
     }
     /// The error of the first failed row, if any.

@@ -26,7 +26,7 @@ impl<'a, S> Rows<'a, S> {
 }
 
 /// `C = alpha A B^T`, or `C += alpha A B^T`, with `A` `(rows, inner)`, `B` `(columns, inner)` and `C` `(rows, columns)`.
-pub(super) struct FewRows<'a, S> {
+pub(super) struct SmallBatch<'a, S> {
     pub a: Rows<'a, S>,
     pub b: Rows<'a, S>,
     pub c: &'a mut [S],
@@ -38,7 +38,7 @@ pub(super) struct FewRows<'a, S> {
     pub accumulate: bool,
 }
 
-impl<S: Scalar> FewRows<'_, S> {
+impl<S: Scalar> SmallBatch<'_, S> {
     /// Computes the product.
     pub(super) fn run(self) {
         in_vectors(self);
@@ -75,7 +75,7 @@ impl<S: Scalar> FewRows<'_, S> {
     }
 }
 
-impl<S: Scalar> WithSimd for FewRows<'_, S> {
+impl<S: Scalar> WithSimd for SmallBatch<'_, S> {
     type Output = ();
 
     // As many columns at once as keep some eight sums in registers.

@@ -1,6 +1,6 @@
 //! Systems too large for lanes: faer's elimination with partial pivoting, one matrix after the other.
 
-use super::batch::{Second, Workspace};
+use super::batch::{Retry, Workspace};
 use super::error::Failure;
 use super::linear_systems::{Systems, examine, is_harmless, suspicious};
 use crate::scalar::{Real, Scalar, Slice, SliceMut, vectorized};
@@ -22,7 +22,7 @@ impl<S: Scalar> Systems<'_, S> {
             return false;
         }
         let (_, second, failures) = workspace.parts();
-        let judge = |row: usize, x: &mut [S], failures: &mut Vec<(usize, Failure)>, second: &mut Second<S>| {
+        let judge = |row: usize, x: &mut [S], failures: &mut Vec<(usize, Failure)>, second: &mut Retry<S>| {
             let size = self.n * self.n;
             if let Some(failure) = examine(self.n, &self.matrices[row * size..][..size], x, &mut second.dense) {
                 x.fill(S::nan());

@@ -1,6 +1,6 @@
 //! Batches of linear systems: one elimination for all rows, a second look at those that need it.
 
-use super::batch::{Aligned, LANES, Lane, Second, Workspace, with_size};
+use super::batch::{Aligned, LANES, Lane, Retry, Workspace, with_size};
 use super::error::Failure;
 use super::{condition, elimination};
 use crate::scalar::{Real, Scalar, in_lanes};
@@ -104,12 +104,12 @@ impl<S: Scalar> Systems<'_, S> {
         &self,
         solutions: &mut [S],
         start: usize,
-        second: &mut Second<S>,
+        second: &mut Retry<S>,
         failures: &mut Vec<(usize, Failure)>,
     ) {
         let &Self { n, m, matrices, right } = self;
         let mut doubtful = [false; W];
-        let Second { block, solution, dense } = second;
+        let Retry { block, solution, dense } = second;
         let done = in_lanes::<W, _>(
             #[inline(always)]
             || {

@@ -1,7 +1,7 @@
 //! Matrix products `C = alpha A B` or `C += alpha A B`: faer's kernels for `f32` and `f64`, dot products for a few rows, a plain loop for other
 //! numbers.
 
-use super::few_rows::{FEW_ROWS, FewRows, Rows};
+use super::few_rows::{FEW_ROWS, Rows, SmallBatch};
 use crate::scalar::{Real, Scalar, Slice, SliceMut, update};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Par};
@@ -133,7 +133,7 @@ fn fast<'a, T: faer::traits::ComplexField + Scalar>(
     if (c.rows <= FEW_ROWS || c.cols == 1) && b.transposed && !a.transposed {
         let shape = (c.rows, c.cols, a.cols);
         let rows = |m: MatRef<'a, T>| Rows { numbers: m.data, stride: m.stride };
-        return FewRows { a: rows(a), b: rows(b), c: c.data, stride: c.stride, shape, alpha, accumulate }.run();
+        return SmallBatch { a: rows(a), b: rows(b), c: c.data, stride: c.stride, shape, alpha, accumulate }.run();
     }
     fn view<'a, T>(m: MatRef<'a, T>) -> faer::MatRef<'a, T> {
         let view = faer::MatRef::from_row_major_slice_with_stride(m.data, m.rows, m.cols, m.stride);

@@ -5,7 +5,7 @@ use crate::scalar::Real;
 
 /// Builds the enum, its value and its partial derivatives from rows
 /// `Name method(a, b, y, da, db) = (df/da, df/db), (d2f/da2, d2f/da db, d2f/db2);`
-/// with the arguments, the value `y` and the first partial derivatives at hand.
+/// with the arguments, the value `y` and the first partial derivatives in scope.
 macro_rules! table {
     ($($(#[$doc:meta])* $name:ident $method:ident ($a:ident, $b:ident, $y:ident, $da:ident, $db:ident)
         = $first:expr, $second:expr;)*) => {

@@ -39,7 +39,7 @@ fn power<R: Real>(x: R, factor: i64, exponent: i64) -> R {
 
 /// Builds the enum, its value and its derivatives from rows
 /// `Name method(x, y, d) = value, first derivative, second derivative;`
-/// with the argument `x`, the value `y` and the first derivative `d` at hand.
+/// with the argument `x`, the value `y` and the first derivative `d` in scope.
 macro_rules! table {
     ($($(#[$doc:meta])* $name:ident $method:ident ($x:ident, $y:ident, $d:ident) = $first:expr, $second:expr;)*) => {
         /// A function of one number.

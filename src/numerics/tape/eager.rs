@@ -62,7 +62,7 @@ const FIRST_ROOM: u32 = 128;
 ///
 /// Arguments were mostly recorded just before, so the next weight is handed on in a register where it was just
 /// computed: a number read back from memory right after it was written would cost more than everything else here.
-/// Identifier 0 is a sink that nobody reads: cheaper than a branch.
+/// Identifier 0 is a sink that is never read: it is cheaper than a branch.
 #[inline]
 fn sweep<'a, T: Real>(nodes: &[Node<T>], mut values: &'a mut [T]) -> &'a mut [T] {
     let Some(&(mut weight)) = values.last() else { return values };

@@ -38,7 +38,7 @@ impl<S: Scalar, M: EulerLagrange<S>> EulerLagrange<S> for Guarded<'_, M> {
             return outcome;
         }
         let n = self.coordinates().max(1);
-        let found = terms.take_failures(outcome)?;
+        let found = terms.drain_failures(outcome)?;
         for (row, (q, v)) in q.chunks_exact(n).zip(v.chunks_exact(n)).enumerate() {
             if !matches!(self.certificate.verdict(q, v), Verdict::Certified { .. }) {
                 terms.failures.push(MechanicsError::Uncertified { row });
@@ -47,7 +47,7 @@ impl<S: Scalar, M: EulerLagrange<S>> EulerLagrange<S> for Guarded<'_, M> {
                 }
             }
         }
-        terms.put_before(found);
+        terms.prepend_failures(found);
         terms.outcome()
     }
 

@@ -175,7 +175,7 @@ pub fn surfaces<S: Scalar>(
                 (high, at_high) = (inside, at_inside);
             }
         }
-        // A stretch without a metric has no surface that could be told.
+        // A stretch without a metric has no surface that can be named.
         if high - low > S::epsilon().ldexp(8) {
             continue;
         }

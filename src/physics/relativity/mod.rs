@@ -67,7 +67,7 @@ pub use outline::{Edge, Outline, outline};
 #[doc(hidden)]
 pub use parameters::nearest_parameters;
 pub use periastron::{RadialPeriod, radial_period};
-pub use rays::{Fate, Ray, trace};
+pub use rays::{Ray, RayOutcome, trace};
 #[doc(hidden)]
 pub use rays::{TOLERANCES, Tracing};
 #[cfg(feature = "training")]

@@ -2,7 +2,7 @@
 
 use super::camera::Camera;
 use super::error::{RelativityError, expect};
-use super::rays::{Fate, TOLERANCES, Tracing, trace};
+use super::rays::{RayOutcome, TOLERANCES, Tracing, trace};
 use super::tetrad::Tetrad;
 use crate::lagrangian::EulerLagrange;
 use std::f64::consts::{PI, TAU};
@@ -77,7 +77,7 @@ pub fn outline(
     let captured = |tangents: Vec<[f64; 4]>| -> Result<Vec<bool>, RelativityError> {
         let starts: Vec<_> = tangents.into_iter().map(|k| (tetrad.event, k)).collect();
         let rays = trace(model, &camera.chart, &starts, &tracing, &|_| ())?;
-        Ok(rays.iter().map(|ray| !matches!(ray.fate, Fate::Escaped(_))).collect())
+        Ok(rays.iter().map(|ray| !matches!(ray.fate, RayOutcome::Escaped(_))).collect())
     };
     if captured(vec![toward(0, 0.0)])? != [true] {
         return Ok(None);

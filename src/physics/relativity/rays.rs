@@ -10,7 +10,7 @@ use crate::storage::in_order;
 
 /// End of a ray that was followed backwards in time.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Fate {
+pub enum RayOutcome {
     /// It piled up at a horizon: no light comes this way.
     Captured,
     /// It came from far away: the place on the sky, a unit vector of space.
@@ -23,7 +23,7 @@ pub enum Fate {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ray {
     /// Its end.
-    pub fate: Fate,
+    pub fate: RayOutcome,
     /// Steps taken, rejected ones included.
     pub steps: usize,
     /// `g(k, k)` at the end over the sum of the sizes of its terms; 0 of a light ray.
@@ -155,7 +155,7 @@ struct Moving {
 /// A ray that has ended, with its last state.
 #[derive(Clone, Copy)]
 struct Ended {
-    fate: Fate,
+    fate: RayOutcome,
     steps: usize,
     q: [f64; 4],
     k: [f64; 4],
@@ -187,7 +187,7 @@ impl Batch<'_> {
     }
 
     fn trace(mut self, starts: &[([f64; 4], [f64; 4])]) -> Result<Vec<Ray>, RelativityError> {
-        let nowhere = Ended { fate: Fate::Unfinished, steps: 0, q: [f64::NAN; 4], k: [f64::NAN; 4] };
+        let nowhere = Ended { fate: RayOutcome::Unfinished, steps: 0, q: [f64::NAN; 4], k: [f64::NAN; 4] };
         let mut ended = vec![nowhere; starts.len()];
         match self.follow(starts, &mut ended) {
             // The rays that have ended are there, the others are unfinished.
@@ -275,18 +275,18 @@ impl Batch<'_> {
     }
 
     /// Its end, if a ray has ended.
-    fn fate(&self, ray: &Moving) -> Option<Fate> {
+    fn fate(&self, ray: &Moving) -> Option<RayOutcome> {
         let (place, tangent) = (self.chart.space_of(ray.q), self.chart.space_of(ray.k));
         let (distance, speed) = (norm(place), norm(tangent));
         if distance < self.tracing.capture || norm(ray.k) > self.tracing.growth * ray.size {
-            return Some(Fate::Captured);
+            return Some(RayOutcome::Captured);
         }
         if distance >= self.tracing.far && dot(place, tangent) > 0.0 {
-            return Some(Fate::Escaped(times(speed.recip(), tangent)));
+            return Some(RayOutcome::Escaped(times(speed.recip(), tangent)));
         }
         let stuck =
             ray.step * speed < LEAST * distance || !ray.step.is_finite() || ray.a.iter().any(|a| !a.is_finite());
-        (stuck || ray.steps >= self.tracing.most_steps).then_some(Fate::Unfinished)
+        (stuck || ray.steps >= self.tracing.most_steps).then_some(RayOutcome::Unfinished)
     }
 
     /// The rays, each with the drift of `g(k, k)`.

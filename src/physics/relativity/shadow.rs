@@ -2,7 +2,7 @@
 
 use super::camera::Camera;
 use super::error::RelativityError;
-use super::rays::{Fate, Ray, Tracing, trace_each};
+use super::rays::{Ray, RayOutcome, Tracing, trace_each};
 use super::tetrad::Tetrad;
 use super::vector::{dot, norm};
 use crate::lagrangian::EulerLagrange;
@@ -61,7 +61,7 @@ pub(super) fn angle(a: [f64; 3], b: [f64; 3]) -> f64 {
 impl Shadow {
     /// Share of the pixels that belong to the shadow.
     pub(crate) fn share(&self) -> f64 {
-        self.count(|fate| fate == Fate::Captured) as f64 / self.rays.len() as f64
+        self.count(|fate| fate == RayOutcome::Captured) as f64 / self.rays.len() as f64
     }
 
     /// Number of rays that were followed to an end.
@@ -71,10 +71,10 @@ impl Shadow {
 
     /// Number of rays that were left unfinished.
     pub(crate) fn unfinished(&self) -> usize {
-        self.count(|fate| fate == Fate::Unfinished)
+        self.count(|fate| fate == RayOutcome::Unfinished)
     }
 
-    fn count(&self, of: impl Fn(Fate) -> bool) -> usize {
+    fn count(&self, of: impl Fn(RayOutcome) -> bool) -> usize {
         self.rays.iter().filter(|ray| of(ray.fate)).count()
     }
 
@@ -85,7 +85,7 @@ impl Shadow {
 
     /// Largest drift of `g(k, k)` over the sum of the sizes of its terms, of the rays that escaped.
     pub(crate) fn drift(&self) -> f64 {
-        let escaped = self.rays.iter().filter(|ray| matches!(ray.fate, Fate::Escaped(_)));
+        let escaped = self.rays.iter().filter(|ray| matches!(ray.fate, RayOutcome::Escaped(_)));
         escaped.map(|ray| ray.drift).fold(0.0, f64::max)
     }
 
@@ -97,8 +97,8 @@ impl Shadow {
         let (mut apart, mut angles) = (0, Vec::new());
         for pair in self.pairs(other)? {
             match pair {
-                (Fate::Escaped(a), Fate::Escaped(b)) => angles.push(angle(a, b)),
-                (Fate::Escaped(_), _) | (_, Fate::Escaped(_)) => apart += 1,
+                (RayOutcome::Escaped(a), RayOutcome::Escaped(b)) => angles.push(angle(a, b)),
+                (RayOutcome::Escaped(_), _) | (_, RayOutcome::Escaped(_)) => apart += 1,
                 _ => {}
             }
         }
@@ -111,7 +111,10 @@ impl Shadow {
     }
 
     /// The ends of the rays of each pixel.
-    pub(super) fn pairs(&self, other: &Self) -> Result<impl Iterator<Item = (Fate, Fate)>, RelativityError> {
+    pub(super) fn pairs(
+        &self,
+        other: &Self,
+    ) -> Result<impl Iterator<Item = (RayOutcome, RayOutcome)>, RelativityError> {
         let (first, second) = ((self.width, self.height), (other.width, other.height));
         if first != second {
             return Err(RelativityError::Sizes { first, second });

@@ -3,7 +3,7 @@
 use super::camera::Camera;
 use super::error::RelativityError;
 use super::image::Image;
-use super::rays::Fate;
+use super::rays::RayOutcome;
 use super::shadow::{Shadow, angle};
 
 /// A celestial sphere of squares, four colours around the point that the camera looks at, and a white disc there: where its light comes all
@@ -61,10 +61,10 @@ impl Sky {
 
     /// The picture of a camera's rays: the shadow is black.
     pub fn image(&self, shadow: &Shadow) -> Image {
-        let colour = |fate: Fate| match fate {
-            Fate::Captured => [0; 3],
-            Fate::Escaped(direction) => self.colour(direction),
-            Fate::Unfinished => UNFINISHED,
+        let colour = |fate: RayOutcome| match fate {
+            RayOutcome::Captured => [0; 3],
+            RayOutcome::Escaped(direction) => self.colour(direction),
+            RayOutcome::Unfinished => UNFINISHED,
         };
         let pixels = shadow.rays.iter().map(|ray| colour(ray.fate)).collect();
         Image { width: shadow.width, height: shadow.height, pixels }
@@ -78,12 +78,12 @@ impl Sky {
 /// [`RelativityError::Sizes`].
 pub fn difference_image(first: &Shadow, second: &Shadow) -> Result<Image, RelativityError> {
     let (low, high) = (ANGLES.0.to_radians().ln(), ANGLES.1.to_radians().ln());
-    let colour = |pair: (Fate, Fate)| match pair {
-        (Fate::Escaped(a), Fate::Escaped(b)) => {
+    let colour = |pair: (RayOutcome, RayOutcome)| match pair {
+        (RayOutcome::Escaped(a), RayOutcome::Escaped(b)) => {
             let part = (angle(a, b).max(f64::MIN_POSITIVE).ln() - low) / (high - low);
             between(DIFFERENCES[0], DIFFERENCES[1], part.clamp(0.0, 1.0))
         }
-        (Fate::Escaped(_), _) | (_, Fate::Escaped(_)) => DIFFERENCES[2],
+        (RayOutcome::Escaped(_), _) | (_, RayOutcome::Escaped(_)) => DIFFERENCES[2],
         _ => [0; 3],
     };
     let pixels = first.pairs(second)?.map(colour).collect();
@@ -117,14 +117,14 @@ mod tests {
 
     #[test]
     fn differences_have_their_colours() {
-        let direction = |angle: f64| Fate::Escaped([angle.sin(), angle.cos(), 0.0]);
-        let of = |fates: [Fate; 4]| Shadow {
+        let direction = |angle: f64| RayOutcome::Escaped([angle.sin(), angle.cos(), 0.0]);
+        let of = |fates: [RayOutcome; 4]| Shadow {
             width: 4,
             height: 1,
             rays: fates.into_iter().map(|fate| Ray { fate, steps: 2, drift: 1e-9 }).collect(),
         };
-        let first = of([direction(0.3), direction(0.0), Fate::Captured, Fate::Captured]);
-        let second = of([direction(0.3), direction(0.4), Fate::Captured, direction(1.0)]);
+        let first = of([direction(0.3), direction(0.0), RayOutcome::Captured, RayOutcome::Captured]);
+        let second = of([direction(0.3), direction(0.4), RayOutcome::Captured, direction(1.0)]);
         let image = difference_image(&first, &second).unwrap();
         assert_eq!(image.pixels, [DIFFERENCES[0], DIFFERENCES[1], [0; 3], DIFFERENCES[2]]);
         let difference = first.difference(&second).unwrap();

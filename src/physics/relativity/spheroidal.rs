@@ -62,7 +62,7 @@ impl EulerLagrange<f64> for Spheroidal<'_> {
             }
         }
         let outcome = self.model.terms(&at, &rate, request, terms);
-        if !terms.settle_failures(&outcome) {
+        if !terms.record_failures(&outcome) {
             return outcome;
         }
         let space = self.space;

@@ -1,6 +1,6 @@
 //! Rays, shadows and pictures against closed forms.
 
-use super::rays::{Fate, trace};
+use super::rays::{RayOutcome, trace};
 use super::tetrad::Tetrad;
 use super::vector::{norm, product, times};
 use super::*;
@@ -45,7 +45,7 @@ fn rays_of_flat_space_are_straight() {
         let seen = shadow(&model, &camera, &Tracing::of(&camera), &|_| ()).unwrap();
         for (pixel, ray) in seen.rays.iter().enumerate() {
             let part = camera.direction((pixel % 30) as f64 + 0.5, (pixel / 30) as f64 + 0.5);
-            let Fate::Escaped(found) = ray.fate else { panic!("{ray:?}") };
+            let RayOutcome::Escaped(found) = ray.fate else { panic!("{ray:?}") };
             for i in 0..3 {
                 let exact = part[0] * right[i] + part[1] * up[i] + part[2] * forward[i];
                 assert!((found[i] - exact).abs() < 1e-12);
@@ -194,7 +194,7 @@ fn light_far_from_the_hole_is_deflected_as_it_should_be() {
     let direction = [sine, 0.0, (1.0 - sine * sine).sqrt()];
     let tracing = Tracing { tolerance: 1e-11, far, ..Tracing::of(&camera) };
     let ray = trace(&*model, &camera.chart, &[(tetrad.event, tetrad.ray(direction))], &tracing, &|_| ()).unwrap()[0];
-    let Fate::Escaped(found) = ray.fate else { panic!("{ray:?}") };
+    let RayOutcome::Escaped(found) = ray.fate else { panic!("{ray:?}") };
     let [right, _, forward] = camera.axes();
     let start: [f64; 3] = std::array::from_fn(|i| direction[0] * right[i] + direction[2] * forward[i]);
     let bent = (start[0] * found[1] - start[1] * found[0]).asin().abs();
@@ -234,7 +234,7 @@ fn rays_that_do_not_end_are_unfinished() {
     let rays =
         trace(&*model, &camera.chart, &[start, ([0.0, 30.0, 0.0, 0.0], [-1.0, 1.0, 0.0, 0.0])], &tracing, &|_| ());
     let rays = rays.unwrap();
-    assert_eq!((rays[0].fate, rays[1].fate), (Fate::Unfinished, Fate::Escaped([1.0, 0.0, 0.0])));
+    assert_eq!((rays[0].fate, rays[1].fate), (RayOutcome::Unfinished, RayOutcome::Escaped([1.0, 0.0, 0.0])));
 }
 
 /// The rays of blocks that were followed before a flag was raised have their ends, the others none.
@@ -249,7 +249,7 @@ fn an_interrupted_picture_has_the_rays_that_were_followed() {
     let part = shadow(&hole, &camera, &tracing, &|_| flag.store(true, Ordering::Relaxed)).unwrap();
     assert_eq!((whole.finished(), part.rays.len()), (400, 400));
     assert!((1..400).contains(&part.finished()), "{}", part.finished());
-    for (a, b) in part.rays.iter().zip(&whole.rays).filter(|(a, _)| a.fate != Fate::Unfinished) {
+    for (a, b) in part.rays.iter().zip(&whole.rays).filter(|(a, _)| a.fate != RayOutcome::Unfinished) {
         assert_eq!((a.fate, a.steps), (b.fate, b.steps));
     }
     assert_eq!(outline(&hole, &camera, &tracing, 4), Err(RelativityError::Mechanics(MechanicsError::Interrupted)));

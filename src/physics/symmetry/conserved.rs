@@ -241,11 +241,11 @@ fn search(
             rest
         })
         .collect();
-    let told = singular(&rests).ok_or(SymmetryError::NotFinite { what: "a conserved quantity" })?;
+    let decomposed = singular(&rests).ok_or(SymmetryError::NotFinite { what: "a conserved quantity" })?;
     let noise = found.values[..zero.len()].last().map_or(0.0, |last| (10.0 * last).clamp(1e-9, 0.05));
-    let old = told.values.iter().take_while(|value| **value < NEW.max(noise)).count();
+    let old = decomposed.values.iter().take_while(|value| **value < NEW.max(noise)).count();
     let mut rows: Vec<Vec<f64>> =
-        told.vectors.iter().map(|vector| plain.given(&mix(vector, zero), values.len())).collect();
+        decomposed.vectors.iter().map(|vector| plain.given(&mix(vector, zero), values.len())).collect();
     let sizes: Vec<f64> = values.iter().map(|value| norm(value)).collect();
     reduce(&mut rows, &sizes, noise, old);
     let last = zero.len().checked_sub(1).map_or(0.0, |last| found.values[last]).max(f64::EPSILON);

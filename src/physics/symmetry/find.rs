@@ -115,7 +115,7 @@ pub(super) fn room(n: usize, unknowns: usize, states: usize) -> Result<(), Symme
     }
 }
 
-/// [`symmetries`] of a Lagrangian whose terms are at hand.
+/// [`symmetries`] of a Lagrangian whose terms are given.
 pub(crate) fn search(sample: &Sample, basis: &Basis, tolerance: Option<f64>) -> Result<Symmetries, SymmetryError> {
     let (n, states, functions) = (sample.n, sample.len(), basis.len());
     let columns = Columns::new(basis, sample)?;

@@ -55,7 +55,7 @@ fn replay_agrees_with_floats_lane_by_lane() {
         .unwrap()
     };
     let parameters = numbers::<f64>(3, 1);
-    for lanes in [0, 1, 3, 64, 65, 200] {
+    for lanes in [1, 3, 64, 65, 200] {
         let x = numbers::<f64>(2 * lanes, 2);
         let y = run(record(), lanes, &x, &parameters);
         for lane in 0..lanes {

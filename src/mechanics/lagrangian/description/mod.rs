@@ -1,4 +1,4 @@
-//! Systems of one's own: what a text file says about one, and the [`System`](super::system::System) it comes to.
+//! User-defined systems: the contents of a system file, and the [`System`](super::system::System) made from it.
 //!
 //! The structures are those of a TOML file (`docs/system-files.md`), of the table `[description]` of a configuration and of
 //! the header of a model file.

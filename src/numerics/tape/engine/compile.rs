@@ -94,22 +94,22 @@ impl<S: Scalar> Recorded<S> {
 /// Decides what reaches the output linearly and whose adjoints need no zeros.
 fn mark<S: Scalar>(operations: &[Operation<S>], values: &mut [Value], output: usize) {
     let mut readers = vec![0usize; values.len()];
-    values.iter_mut().for_each(|value| value.terminal = false);
-    let mut terminal = vec![true; values.len()];
+    values.iter_mut().for_each(|value| value.is_output = false);
+    let mut is_output = vec![true; values.len()];
     readers[output] += 1;
     for (out, operation) in operations.iter().enumerate().rev() {
         operation.operands(|x| readers[x] += 1);
         match operation {
-            Operation::Elementwise(op) => terminal[op.x] = false,
-            Operation::Function(op) => (terminal[op.a], terminal[op.b]) = (false, false),
+            Operation::Elementwise(op) => is_output[op.x] = false,
+            Operation::Function(op) => (is_output[op.a], is_output[op.b]) = (false, false),
             Operation::Product(op) => match (values[op.a].kind, values[op.b].kind) {
                 // A factor that nothing moves bends nothing, but its adjoint asks for what stands beside it.
-                (Kind::Constant, _) => (terminal[op.a], terminal[op.b]) = (false, terminal[op.b] && terminal[out]),
-                (_, Kind::Constant) => (terminal[op.a], terminal[op.b]) = (terminal[op.a] && terminal[out], false),
-                _ => (terminal[op.a], terminal[op.b]) = (false, false),
+                (Kind::Constant, _) => (is_output[op.a], is_output[op.b]) = (false, is_output[op.b] && is_output[out]),
+                (_, Kind::Constant) => (is_output[op.a], is_output[op.b]) = (is_output[op.a] && is_output[out], false),
+                _ => (is_output[op.a], is_output[op.b]) = (false, false),
             },
-            Operation::Select(op) => op.branches.into_iter().for_each(|x| terminal[x] &= terminal[out]),
-            _ => operation.operands(|x| terminal[x] &= terminal[out]),
+            Operation::Select(op) => op.branches.into_iter().for_each(|x| is_output[x] &= is_output[out]),
+            _ => operation.operands(|x| is_output[x] &= is_output[out]),
         }
     }
     for operation in operations {
@@ -119,10 +119,10 @@ fn mark<S: Scalar>(operations: &[Operation<S>], values: &mut [Value], output: us
             _ => None,
         };
         if let Some(x) = reader {
-            values[x].overwritten = readers[x] == 1;
+            values[x].in_place = readers[x] == 1;
         }
     }
-    values.iter_mut().zip(terminal).for_each(|(value, terminal)| value.terminal = terminal);
+    values.iter_mut().zip(is_output).for_each(|(value, is_output)| value.is_output = is_output);
 }
 
 struct Compiler<'g, S> {
@@ -182,10 +182,10 @@ impl<'g, S: Scalar> Compiler<'g, S> {
     }
 
     fn push(&mut self, operation: Operation<S>, units: usize, kind: Kind) -> usize {
-        let mut learned = matches!(operation, Operation::Parameter(_) | Operation::Dense(_));
+        let mut trainable = matches!(operation, Operation::Parameter(_) | Operation::Dense(_));
         let mut velocities = Vec::new();
         operation.operands(|x| {
-            learned |= self.values[x].learned;
+            trainable |= self.values[x].trainable;
             velocities.extend(&self.values[x].velocities);
         });
         match &operation {
@@ -199,7 +199,7 @@ impl<'g, S: Scalar> Compiler<'g, S> {
         velocities.sort_unstable();
         velocities.dedup();
         self.operations.push(operation);
-        self.values.push(Value { units, kind, velocities, terminal: false, learned, overwritten: false });
+        self.values.push(Value { units, kind, velocities, is_output: false, trainable, in_place: false });
         self.values.len() - 1
     }
 

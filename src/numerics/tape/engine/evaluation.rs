@@ -153,7 +153,7 @@ impl<S: Scalar> Evaluation<S> {
             depth,
             second: &mut self.second,
         };
-        for (value, _) in recorded.values.iter().enumerate().filter(|(_, value)| !value.overwritten) {
+        for (value, _) in recorded.values.iter().enumerate().filter(|(_, value)| !value.in_place) {
             sweep.adjoints.all_mut(value).fill(zero);
         }
         sweep.adjoints.all_mut(recorded.output).fill(<S as Real>::one());
@@ -261,7 +261,7 @@ impl<S: Scalar> Evaluation<S> {
             inputs,
             moving: directions.moving,
         };
-        for (value, _) in recorded.values.iter().enumerate().filter(|(_, value)| !value.overwritten) {
+        for (value, _) in recorded.values.iter().enumerate().filter(|(_, value)| !value.in_place) {
             sweep.adjoints.all_mut(value).fill(<S as Real>::zero());
         }
         for (out, operation) in recorded.operations.iter().enumerate().rev() {

@@ -2,7 +2,7 @@
 //!
 //! A value of `units` numbers on a chunk of `lanes` states is a stack of planes `(lanes, units)`, one plane per channel: the
 //! value itself, then its derivatives along directions of the inputs. What a value cannot have it does not carry: nothing
-//! moves a constant, no velocity moves what depends on positions alone, and nobody asks for the tangents of what reaches `L`
+//! moves a constant, no velocity moves what depends on positions alone, and the tangents are not needed of what reaches `L`
 //! by linear operations only.
 
 use super::Depth;
@@ -27,11 +27,11 @@ pub(super) struct Value {
     /// The velocities it depends on, ascending.
     pub velocities: Vec<usize>,
     /// It reaches `L` by operations that are linear in what moves.
-    pub terminal: bool,
+    pub is_output: bool,
     /// It depends on parameters.
-    pub learned: bool,
+    pub trainable: bool,
     /// Its only reader overwrites its adjoints; those of other values start from zero.
-    pub overwritten: bool,
+    pub in_place: bool,
 }
 
 /// Channels of mixed sweeps that a value carries, in this order; its adjoints lie the same way.
@@ -61,7 +61,7 @@ impl Value {
     /// Directions of the tangents of the forward sweep: `(v, 0)` is 0, the velocity `e_i` is `1 + i`.
     fn directions(&self, depth: Depth) -> Vec<usize> {
         let mut directions = Vec::new();
-        if !self.terminal && self.kind != Kind::Constant {
+        if !self.is_output && self.kind != Kind::Constant {
             if depth >= Depth::Motion {
                 directions.push(0);
             }
@@ -75,8 +75,8 @@ impl Value {
     /// Channels of a mixed sweep.
     pub fn mixed(&self, order: Order) -> Mixed {
         let moving = self.kind != Kind::Constant;
-        let second = order == Order::Second && !self.terminal;
-        let carried = [!self.terminal, second && self.kind == Kind::Velocity, second && moving, moving];
+        let second = order == Order::Second && !self.is_output;
+        let carried = [!self.is_output, second && self.kind == Kind::Velocity, second && moving, moving];
         let mut count = 0;
         let [value, s, t, st] = carried.map(|carried| {
             count += usize::from(carried);

@@ -77,7 +77,7 @@ impl Dense {
     }
 
     pub fn reverse<S: Scalar>(self, out: usize, sweep: &mut Reverse<'_, S>) {
-        let accumulate = !sweep.kept.values[self.x].overwritten;
+        let accumulate = !sweep.kept.values[self.x].in_place;
         let (mut before, adjoint) = sweep.adjoints.reverse(out);
         self.pull_back(sweep.kept.parameters, before.lanes, accumulate, adjoint, before.plane_mut(self.x, 0));
     }
@@ -135,7 +135,7 @@ impl Dense {
         if let Some(st) = own.st {
             sweep.adjoints.plane_mut(out, st).copy_from_slice(sweep.value_adjoints.plane(out, 0));
         }
-        let accumulate = !sweep.kept.values[self.x].overwritten;
+        let accumulate = !sweep.kept.values[self.x].in_place;
         let wanted = sweep.wants(self.x);
         let (mut before, adjoints) = sweep.adjoints.reverse(out);
         let x = sweep.mixed.all(self.x);

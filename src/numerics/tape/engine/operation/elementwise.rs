@@ -75,12 +75,12 @@ impl Elementwise {
 
     pub fn reverse<S: Scalar>(self, out: usize, sweep: &mut Reverse<'_, S>) {
         let [d1, d2, _] = self.slopes(sweep.kept.slopes, sweep.adjoints.lanes);
-        let overwritten = sweep.kept.values[self.x].overwritten;
+        let in_place = sweep.kept.values[self.x].in_place;
         let (mut before, adjoint) = sweep.adjoints.reverse(out);
         let target = before.plane_mut(self.x, 0);
         vectorized(
             #[inline(always)]
-            || update2(target, adjoint, d1, |sum, a, d1| *sum = if overwritten { a * d1 } else { *sum + a * d1 }),
+            || update2(target, adjoint, d1, |sum, a, d1| *sum = if in_place { a * d1 } else { *sum + a * d1 }),
         );
         if sweep.depth < Depth::MassMatrix || sweep.kept.values[self.x].kind != Kind::Velocity {
             return;
@@ -123,14 +123,14 @@ impl Elementwise {
         let size = self.units * lanes;
         let [d1, d2, d3] = self.slopes(sweep.kept.slopes, lanes);
         let [own, from] = [out, self.x].map(|value| sweep.channels(value));
-        let overwritten = sweep.kept.values[self.x].overwritten;
+        let in_place = sweep.kept.values[self.x].in_place;
         let outer = sweep.value_adjoints.plane(out, 0);
         let [_, xs, xt, xst] = planes(sweep.mixed.all(self.x), from, size);
         let (mut before, adjoints) = sweep.adjoints.reverse(out);
-        // Of what is terminal only the mixed channel has an adjoint.
+        // Of what is is_output only the mixed channel has an adjoint.
         let [y0, ys, yt, _] = planes(adjoints, own, size);
         let targets = before.all_mut(self.x);
-        if !overwritten {
+        if !in_place {
             let [b0, bs, bt, _] = planes_mut(targets, from, size);
             for (b, y) in [(&mut *b0, y0), (bs, ys), (bt, yt)] {
                 crate::tape::engine::kernel::add_product(b, d1, y);

@@ -184,7 +184,7 @@ impl<S: Scalar> MixedReverse<'_, S> {
     /// `true` if adjoints of a value lead to anything asked for.
     pub fn wants(&self, value: usize) -> bool {
         let value = &self.kept.values[value];
-        value.learned || (self.inputs.is_some() && value.kind != Kind::Constant)
+        value.trainable || (self.inputs.is_some() && value.kind != Kind::Constant)
     }
     pub fn channels(&self, value: usize) -> Mixed {
         self.kept.values[value].mixed(self.order)
