@@ -1,6 +1,7 @@
 //! States with their accelerations: what a network learns from.
 
 use crate::network::file::StoredPrecision;
+use crate::recording::RecordedTrajectory;
 use crate::scalar::{Real, Scalar};
 use crate::storage::container::checksum;
 use thiserror::Error;
@@ -197,6 +198,47 @@ impl<S: Scalar> Dataset<S> {
             force: cast(&self.force),
             weight: cast(&self.weight),
         }
+    }
+}
+
+/// A recorded trajectory with the states that were estimated from it, by smoothing for instance.
+#[derive(Clone, Copy, Debug)]
+pub struct StateEstimate<'a> {
+    /// Measured values.
+    pub track: &'a RecordedTrajectory,
+    /// Estimated positions, `(samples, n)` in physical units, unwrapped as in the track.
+    pub q: &'a [f64],
+    /// Estimated velocities, `(samples, n)`.
+    pub v: &'a [f64],
+}
+
+/// Standard deviations of the noise of what was measured, in physical units.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Noise {
+    /// Of each position, `(n)`, positive.
+    pub q: Vec<f64>,
+    /// Of each velocity, `(n)`, positive; empty if velocities were not measured or shall not be used.
+    pub v: Vec<f64>,
+}
+
+/// Datasets of a run, in the precision of training.
+#[derive(Clone, Debug)]
+pub struct Datasets<S> {
+    /// Training states of each phase.
+    pub training: Vec<Dataset<S>>,
+    /// Validation states.
+    pub validation: Dataset<S>,
+    /// Fresh states for the final figure.
+    pub test: Dataset<S>,
+}
+
+impl<S: Scalar> Datasets<S> {
+    /// Name and checksum of each set: training of every phase, validation, test.
+    pub fn checksums(&self) -> Vec<(String, u32)> {
+        let training =
+            self.training.iter().enumerate().map(|(k, set)| (format!("training states of phase {}", k + 1), set));
+        let others = [("validation states".to_string(), &self.validation), ("test states".to_string(), &self.test)];
+        training.chain(others).map(|(name, set)| (name, set.checksum())).collect()
     }
 }
 

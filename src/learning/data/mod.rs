@@ -1,10 +1,7 @@
 //! Data: states with their accelerations, sampled from known systems or taken from recorded motion.
 
-mod bounds;
 mod dataset;
-mod datasets;
 mod draw;
-mod estimated;
 mod motions;
 mod of_config;
 mod recording_split;
@@ -12,12 +9,12 @@ mod sampling;
 mod shell;
 mod weights;
 
-pub(crate) use bounds::boxes;
+pub use dataset::Datasets;
 pub use dataset::{Dataset, DatasetError};
-pub use datasets::Datasets;
-pub use draw::SamplingError;
 #[doc(hidden)]
-pub use estimated::{Noise, StateEstimate};
+pub use dataset::{Noise, StateEstimate};
+pub use draw::SamplingError;
+pub(crate) use draw::boxes;
 #[doc(hidden)]
 pub use recording_split::{PrepareOptions, RecordingSplit, RecordingSplitError, Split};
 pub use sampling::sample;

@@ -1,6 +1,6 @@
 //! Training states along exact motions.
 
-use crate::data::bounds::boxes;
+use crate::data::draw::boxes;
 use crate::data::draw::{Drawn, SamplingError, draw};
 use crate::lagrangian::system::Coordinate;
 use crate::lagrangian::{Interruptible, SystemInstance};

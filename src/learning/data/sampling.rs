@@ -1,8 +1,8 @@
 //! Training data of hand-written systems: uniform states with exact accelerations.
 
 use crate::configuration::Config;
+use crate::data::dataset::Datasets;
 use crate::data::dataset::{Dataset, DatasetError};
-use crate::data::datasets::Datasets;
 use crate::data::draw::{Drawn, SamplingError, draw};
 use crate::data::motions::along_motions;
 use crate::data::shell::{in_shell, weigh_by_distance};

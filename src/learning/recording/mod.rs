@@ -19,8 +19,6 @@
 
 mod clock;
 mod columns;
-#[cfg(feature = "rollout")]
-mod force;
 mod hermite;
 mod hold_out;
 #[cfg(feature = "data")]
@@ -29,7 +27,6 @@ mod reading;
 pub mod smooth;
 mod statistics;
 pub mod survey;
-mod targets;
 mod track;
 mod units;
 
@@ -41,11 +38,11 @@ pub(crate) use hermite::hermite;
 pub(crate) use hold_out::HeldOut;
 #[doc(hidden)]
 pub use hold_out::HoldOutError;
+pub(crate) use reading::LARGE_ERROR;
 pub use reading::LoadedRecording;
 #[doc(hidden)]
-pub use reading::{Bridged, Cut, Dropped, Rows};
-pub(crate) use targets::LARGE_ERROR;
+pub use reading::Targets;
 #[doc(hidden)]
-pub use targets::Targets;
+pub use reading::{Bridged, Cut, Dropped, Rows};
 pub use track::{RecordedTrajectory, Recording, TrajectoryError};
 pub(crate) use units::factor;

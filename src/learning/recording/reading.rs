@@ -1,7 +1,7 @@
 //! Where recorded samples stand in the files they come from, and what was left out.
 
 use crate::recording::Recording;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Line of the file of every sample, run-length: from sample `.0` on, sample `k` stands on line `k - .0 + .1`.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -103,6 +103,36 @@ impl From<Recording> for LoadedRecording {
         let takes = (0..recording.tracks.len()).collect();
         let (cuts, dropped, bridged) = (Vec::new(), Vec::new(), Bridged::default());
         Self { recording, rows, files: 0, time: None, duplicates: 0, cuts, dropped, bridged, takes }
+    }
+}
+
+/// Relative error of accelerations by smoothing above which the motion itself is the better teacher.
+pub const LARGE_ERROR: f64 = 0.1;
+
+/// Quantity that a network learns from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum Targets {
+    /// Accelerations that were measured.
+    Measured,
+    /// Accelerations by local polynomials.
+    Smoothed,
+    /// The motion itself, from the network that smoothed or measured accelerations give.
+    Motion,
+}
+
+impl Targets {
+    /// The way that suits the data: measured accelerations if there are any, smoothed ones if they are good to
+    /// `LARGE_ERROR`, the motion itself if not. `error` is that of smoothed accelerations over their size.
+    pub(crate) fn advised(has_accelerations: bool, error: f64) -> Self {
+        if has_accelerations {
+            Self::Measured
+        } else if error <= LARGE_ERROR {
+            Self::Smoothed
+        } else {
+            Self::Motion
+        }
     }
 }
 

@@ -1,5 +1,6 @@
 //! Recorded trajectories in memory.
 
+use crate::rollout::SampledForce;
 use thiserror::Error;
 
 /// One recorded trajectory of `n` coordinates: positions at increasing times, and what else was measured.
@@ -126,6 +127,14 @@ impl Recording {
     /// Samples of all trajectories.
     pub fn samples(&self) -> usize {
         self.tracks.iter().map(RecordedTrajectory::len).sum()
+    }
+}
+
+impl RecordedTrajectory {
+    /// The known external forces, linear between the samples; `None` if there are none.
+    pub(crate) fn sampled_force(&self) -> Option<SampledForce<f64>> {
+        let n = self.force.len().checked_div(self.len()).filter(|n| *n > 0)?;
+        SampledForce::new(n, self.times.clone(), self.force.clone()).ok()
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::EulerLagrange;
 use super::catalogue::{Given, SystemError, SystemInstance, find};
-use super::range::Range;
+use super::system::Range;
 use super::system::{Size, System};
 use crate::scalar::Scalar;
 use std::borrow::Cow;

@@ -16,7 +16,6 @@ mod interruptible;
 mod inverse;
 mod mechanics;
 mod metric;
-mod range;
 mod shell_advice;
 pub mod system;
 #[doc(hidden)]

@@ -2,11 +2,12 @@
 
 use super::Lagrangian;
 use super::description::{Described, Description};
-pub use super::range::Range;
-pub(crate) use super::shell_advice::ShellAdvice;
 use crate::scalar::Real;
+use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::sync::Arc;
+
+pub(crate) use super::shell_advice::ShellAdvice;
 
 /// A coordinate of a system.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -306,5 +307,32 @@ pub trait ClosedForm: Lagrangian {
     /// future; whatever `v` holds in its place is not read. `None` for a system without constraint.
     fn constrained_velocity<R: Real>(&self, _parameters: &[R], _q: &[R], _v: &[R]) -> Option<R> {
         None
+    }
+}
+
+/// Values a parameter may take, besides being finite.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub enum Range {
+    /// Any finite number.
+    #[default]
+    #[serde(rename = "any")]
+    Any,
+    /// Zero or more.
+    #[serde(rename = "at least 0")]
+    AtLeastZero,
+    /// More than zero.
+    #[serde(rename = "positive")]
+    Positive,
+}
+
+impl Range {
+    /// The condition in words.
+    pub(crate) const fn text(self) -> &'static str {
+        match self {
+            Self::Any => "finite",
+            Self::AtLeastZero => "finite and at least 0",
+            Self::Positive => "finite and above 0",
+        }
     }
 }

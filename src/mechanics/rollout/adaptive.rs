@@ -1,8 +1,8 @@
 //! Steps under error control, piece by piece where a force from outside is not smooth.
 
 use super::force::{Piece, pieces};
-use super::keep::{Keep, into_error};
 use super::ode::{Adaptive, Ended, Ran, Task};
+use super::run::{Keep, into_error};
 use super::samples::{Part, Samples, Times};
 use super::{Domain, Force, Integrable, Options, RolloutError, Statistics, StepFailure, UnderflowCause};
 use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Terms};

@@ -3,8 +3,8 @@
 use super::compensated::{Compensated, State};
 use super::force::{Piece, pieces};
 use super::gauss::Gauss;
-use super::keep::{Keep, into_error};
 use super::phase::Phase;
+use super::run::{Keep, into_error};
 use super::samples::{Samples, Times};
 use super::variational::Variational;
 use super::{Force, Method, Options, RolloutError, Statistics, StepFailure};

@@ -17,14 +17,12 @@ mod adaptive;
 mod balance;
 mod compensated;
 mod dense;
-mod driven;
 mod ensemble;
 mod error;
 mod fixed;
 mod force;
 mod gauss;
 mod group;
-mod keep;
 mod ode;
 mod options;
 mod phase;
@@ -37,20 +35,20 @@ mod variational;
 
 #[doc(hidden)]
 pub use balance::EnergyBalance;
-pub use driven::Driven;
 pub use ensemble::{Start, rollout_many};
 #[doc(hidden)]
 pub use ensemble::{rollout_each, rollout_together};
 pub use error::RolloutError;
 #[doc(hidden)]
 pub use error::UnderflowCause;
+pub use force::Driven;
 pub use force::{Force, SampledForce};
-use keep::StepFailure;
 #[doc(hidden)]
 pub use ode::Integrable;
 pub use options::{Domain, Method, Options};
 #[doc(hidden)]
 pub use pieces::{Balances, Ending, rollout_in_pieces};
+use run::StepFailure;
 #[doc(hidden)]
 pub use run::rollout_fixed;
 pub use run::{Motion, Rollout, rollout};

@@ -2,7 +2,7 @@
 
 use super::batch::{Dense, LANES};
 use super::error::{LinalgError, expect_length};
-use super::{Workspace, elimination, jacobi, large};
+use super::{Workspace, elimination, jacobi, large_systems};
 use crate::scalar::{Real, Scalar, vectorized};
 
 /// 2-norm condition number `max |w| / min |w|` of one symmetric `(n, n)` matrix; infinite if exactly singular.
@@ -136,8 +136,8 @@ impl<S: Scalar> Dense<S> {
     /// Smallest and largest absolute eigenvalue of the loaded matrix.
     fn extreme_eigenvalues(&mut self, n: usize) -> (S, S) {
         let mut values = vec![S::nan(); n];
-        if large::serves::<S>(n) {
-            large::eigh(n, &self.matrix, &mut values, &mut []);
+        if large_systems::serves::<S>(n) {
+            large_systems::eigh(n, &self.matrix, &mut values, &mut []);
         } else {
             jacobi::decompose::<S, 1>(n, &self.matrix, &mut values, &mut [], (0, 1), &mut self.lanes);
         }

@@ -2,7 +2,7 @@
 
 use super::batch::{Buffer, LANES, Workspace};
 use super::error::{Failure, LinalgError, expect_length};
-use super::{jacobi, large};
+use super::{jacobi, large_systems};
 use crate::scalar::Scalar;
 
 /// Eigenvalues, ascending, and eigenvectors of a batch of symmetric matrices: `M = sum_k w_k u_k u_k^T`.
@@ -53,10 +53,10 @@ fn run<S: Scalar>(
     if batch == 0 {
         return Ok(());
     }
-    let finite = if large::serves::<S>(n) {
+    let finite = if large_systems::serves::<S>(n) {
         for (row, (m, w)) in matrices.chunks_exact(size).zip(values.chunks_exact_mut(n)).enumerate() {
             let u = if vectors.is_empty() { &mut [][..] } else { &mut vectors[row * size..(row + 1) * size] };
-            large::eigh(n, m, w, u);
+            large_systems::eigh(n, m, w, u);
         }
         false
     } else if const { size_of::<S>() < size_of::<f64>() } {

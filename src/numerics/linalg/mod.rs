@@ -25,9 +25,7 @@ mod elimination;
 mod error;
 mod few_rows;
 mod inertia;
-mod inverse;
 mod jacobi;
-mod large;
 mod large_systems;
 mod linear_systems;
 mod matmul;
@@ -45,7 +43,6 @@ pub use condition::condition_number;
 pub use eigh::{eigenvalues, eigh};
 pub use error::{Failure, LinalgError};
 pub use inertia::{Inertia, inertia, is_positive_definite};
-pub use inverse::inverse;
 #[doc(hidden)]
 pub use matmul::{MatMut, MatRef, gemm};
 #[doc(hidden)]
@@ -58,4 +55,5 @@ pub use signature::{
 };
 #[cfg(feature = "rollout")]
 pub(crate) use singular::singular;
+pub use solve::inverse;
 pub use solve::solve;

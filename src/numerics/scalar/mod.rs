@@ -23,7 +23,6 @@ mod lanes;
 mod loops;
 mod primitive;
 mod simd;
-mod slices;
 mod sum;
 
 pub use dd::Dd;
@@ -37,10 +36,10 @@ pub use float::AnyFloat;
 pub use lanes::{Exponential, Lanes, cos_lanes, exp_lanes, ln_lanes, sin_cos_lanes, sin_lanes, sqrt_lanes, tanh_lanes};
 pub(crate) use loops::{Column, copy_column, update, update_column, update2, update3};
 #[doc(hidden)]
+pub use loops::{Slice, SliceMut};
+#[doc(hidden)]
 pub use simd::vectorized;
 pub(crate) use simd::{Simd, WithSimd, in_lanes, in_vectors};
-#[doc(hidden)]
-pub use slices::{Slice, SliceMut};
 #[doc(hidden)]
 pub use sum::Sum;
 

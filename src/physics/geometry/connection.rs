@@ -1,6 +1,6 @@
 //! The Levi-Civita connection at a point.
 
-use super::tensor::{dot, move_first, rounded};
+use super::curvature::{dot, move_first, rounded};
 use super::{GeometryError, Metric};
 use crate::lagrangian::MetricJet;
 use crate::scalar::{Real, Scalar};

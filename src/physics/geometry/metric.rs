@@ -1,7 +1,7 @@
 //! The metric at a point: inverse, determinant, signature.
 
 use super::GeometryError;
-use super::tensor::{dot, rounded};
+use super::curvature::{dot, rounded};
 use crate::linalg::{Inertia, LinalgError, Workspace, inertia, inverse, leading_minors};
 use crate::scalar::{Real, Scalar};
 

@@ -36,7 +36,6 @@ mod error;
 mod metric;
 mod orbits;
 mod surfaces;
-mod tensor;
 
 #[doc(hidden)]
 pub use bound::TurningPoint;

@@ -25,11 +25,7 @@
 
 mod camera;
 mod central_coordinates;
-mod chart;
-mod directions;
 mod dormand_prince;
-#[cfg(feature = "training")]
-mod drift;
 mod error;
 mod event;
 mod image;
@@ -46,17 +42,15 @@ mod shadow;
 mod sky;
 mod spheroidal;
 mod stationary;
-mod tetrad;
-mod vector;
 
 #[doc(hidden)]
 pub use camera::MOST_PIXELS;
+#[doc(hidden)]
+pub use camera::Tetrad;
 pub use camera::{Camera, Observer};
 #[doc(hidden)]
 pub use central_coordinates::CentralCoordinates;
-pub use chart::Chart;
-#[cfg(feature = "training")]
-pub(crate) use drift::conserved_drift;
+pub use central_coordinates::Chart;
 pub use error::RelativityError;
 pub use image::Image;
 pub use infall::{Infall, infall};
@@ -78,9 +72,9 @@ pub use shadow::Difference;
 pub use shadow::{Shadow, shadow};
 #[doc(hidden)]
 pub use sky::{Sky, difference_image};
+#[cfg(feature = "training")]
+pub(crate) use stationary::conserved_drift;
 pub(crate) use stationary::depends_on_time;
-#[doc(hidden)]
-pub use tetrad::Tetrad;
 
 #[cfg(test)]
 mod tests;

@@ -1,9 +1,9 @@
 //! The edge of a shadow, by bisection between rays that are captured and rays that escape.
 
 use super::camera::Camera;
+use super::camera::Tetrad;
 use super::error::{RelativityError, expect};
 use super::rays::{RayOutcome, TOLERANCES, Tracing, trace};
-use super::tetrad::Tetrad;
 use crate::lagrangian::EulerLagrange;
 use std::f64::consts::{PI, TAU};
 

@@ -1,10 +1,10 @@
 //! Null geodesics, batches of them: each ray has steps of its own, and all rays of a batch are evaluated by one call per stage.
 
 use super::camera::Camera;
-use super::chart::Chart;
+use super::central_coordinates::Chart;
 use super::dormand_prince::{A, ERROR, STAGES};
 use super::error::{RelativityError, expect};
-use super::vector::{along, dot, norm, times};
+use super::event::{along, dot, norm, times};
 use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Terms};
 use crate::storage::in_order;
 

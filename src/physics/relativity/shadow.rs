@@ -1,10 +1,10 @@
 //! A picture's rays: one for every pixel.
 
 use super::camera::Camera;
+use super::camera::Tetrad;
 use super::error::RelativityError;
+use super::event::{dot, norm};
 use super::rays::{Ray, RayOutcome, Tracing, trace_each};
-use super::tetrad::Tetrad;
-use super::vector::{dot, norm};
 use crate::lagrangian::EulerLagrange;
 
 /// Ends of the rays of a picture.

@@ -1,8 +1,8 @@
 //! Rays, shadows and pictures against closed forms.
 
+use super::camera::Tetrad;
+use super::event::{norm, product, times};
 use super::rays::{RayOutcome, trace};
-use super::tetrad::Tetrad;
-use super::vector::{norm, product, times};
 use super::*;
 use crate::lagrangian::{EulerLagrange, Interruptible, Lagrangian, Mechanics, MechanicsError, build};
 use crate::scalar::Real;

@@ -1,6 +1,6 @@
 //! Names of Lie algebras by their structure constants.
 
-use super::killing::{killing_form, signature};
+use super::algebra::{killing_form, signature};
 use super::orthonormal::{Orthonormal, dot, orthonormal};
 use crate::linalg::singular;
 

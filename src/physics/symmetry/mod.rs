@@ -34,7 +34,6 @@
 //! `f64`: a search is a fit over samples, whose errors are those of the model or of roundings.
 
 mod algebra;
-mod bases;
 mod basis;
 mod canonical;
 mod charges;
@@ -45,16 +44,13 @@ mod echelon;
 mod error;
 mod field;
 mod find;
-mod killing;
 mod orthonormal;
-mod region;
 mod sample;
 mod separation;
 mod sparse;
 
 pub use algebra::Algebra;
 pub(crate) use algebra::MOST_FIELDS;
-pub(crate) use bases::{bases, enough, most_symmetries};
 pub use basis::{Basis, Chart, Degrees};
 pub(crate) use basis::{MOST_UNKNOWNS, most_states, unknowns};
 #[doc(hidden)]
@@ -69,8 +65,9 @@ pub use field::Field;
 #[doc(hidden)]
 pub use find::EXACT;
 pub use find::{Symmetries, symmetries};
-pub use region::Region;
-pub(crate) use region::middle;
+pub use sample::Region;
+pub(crate) use sample::middle;
 #[doc(hidden)]
 pub use separation::Separation;
 pub(crate) use separation::TOLERANCES;
+pub(crate) use separation::{bases, enough, most_symmetries};

@@ -5,13 +5,12 @@ pub mod container;
 mod files;
 mod lock;
 mod memory;
-mod read;
 mod threads;
 mod write;
 
 pub use files::{Disk, Files};
+pub use files::{ReadError, open_regular, read_regular};
 pub use lock::{Acquired, DirectoryLock, LockOwner};
 pub use memory::available_memory;
-pub use read::{ReadError, open_regular, read_regular};
 pub(crate) use threads::{MOST_THREADS, in_order};
 pub use write::{Growing, check_target, remove_leftovers, replace, write_atomically, write_whole};

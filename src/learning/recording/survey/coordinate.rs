@@ -1,6 +1,6 @@
 //! Survey of one coordinate.
 
-use super::consistency::{Consistency, compare};
+use super::warnings::{Consistency, compare};
 use crate::recording::Recording;
 use crate::recording::smooth::{Chosen, Smoothing};
 use serde::Serialize;

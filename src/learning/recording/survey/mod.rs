@@ -1,6 +1,5 @@
 //! Survey of recorded motion, before anything is learned from it.
 
-mod consistency;
 mod coordinate;
 mod motionless;
 mod suspicious;
@@ -14,8 +13,8 @@ pub(crate) use suspicious::{Kind, Suspicion};
 use crate::recording::clock::Clock;
 use crate::recording::smooth::{SmoothError, SmoothOptions, Smoothing};
 use crate::recording::{Bridged, Cut, Dropped, HeldOut, LoadedRecording, Recording, Targets};
-use consistency::compare;
 use serde::Serialize;
+use warnings::compare;
 
 /// Samples per period of the fast motion below which sampling is called coarse.
 pub(crate) const FEW_SAMPLES: f64 = 20.0;

@@ -9,8 +9,8 @@ mod system;
 
 use super::ExpressionLagrangian;
 use super::expression::{ExpressionError, Formula};
-use super::range::Range;
 use super::shell_advice::ShellAdvice;
+use super::system::Range;
 use crate::scalar::Real;
 use quantity::{Decimal, Quantity};
 use serde::{Deserialize, Serialize};

@@ -2,7 +2,7 @@
 
 use super::ParameterDescription;
 use crate::lagrangian::expression::{Compiler, Expression};
-use crate::lagrangian::range::Range;
+use crate::lagrangian::system::Range;
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{Deserializer, Error, MapAccess, Visitor};
 use serde::{Deserialize, Serialize};

@@ -2,8 +2,8 @@
 
 use super::error::ExpressionError;
 use super::formula::{Formula, Instruction, Operand, Operation};
-use super::functions::PI;
-use super::number::Number;
+use super::token::Number;
+use super::tree::PI;
 use super::tree::{Expression, Node};
 use crate::names::unknown;
 use crate::ops::{Binary, Unary};

@@ -1,6 +1,6 @@
 //! A compiled formula, evaluated over numbers of any kind.
 
-use super::number::Number;
+use super::token::Number;
 use crate::ops::{Binary, Unary};
 use crate::scalar::{Real, Scalar};
 

@@ -15,8 +15,6 @@
 mod compile;
 mod error;
 mod formula;
-mod functions;
-mod number;
 mod parse;
 #[cfg(test)]
 mod tests;
@@ -26,6 +24,6 @@ mod tree;
 pub(super) use compile::{Compiler, Meaning, Value};
 pub use error::ExpressionError;
 pub(super) use formula::Formula;
-pub(super) use functions::is_reserved;
 pub(super) use token::is_name;
 pub use tree::Expression;
+pub(super) use tree::is_reserved;

@@ -1,10 +1,10 @@
 //! The grammar: recursive descent that writes operands before what is made of them.
 
 use super::error::ExpressionError;
-use super::functions::{FUNCTIONS, Function, PI, function};
-use super::number::Number;
+use super::token::Number;
 use super::token::{Kind, Token, tokens};
 use super::tree::{Expression, Node};
+use super::tree::{FUNCTIONS, Function, PI, function};
 use crate::names::nearest;
 use crate::ops::{Binary, Unary};
 use std::str::FromStr;

@@ -5,7 +5,6 @@
 //! positions, and what is linear in the velocities no squares of them. With `n` positions and velocities the largest numbers
 //! have `((n + 1)(n + 2)/2)^2` coefficients, and all of them come out of one evaluation.
 
-mod layer;
 mod number;
 mod polynomials;
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use super::kernel::resize;
 use super::operation::{Forward, Kept, MixedForward, MixedReverse, PARTIALS, Reverse, Second};
 use super::value::{Kind, Order, Store, View};
-use super::{Depth, Recorded, STATES};
+use super::{Recorded, STATES};
 use crate::scalar::{Column, Real, Scalar, update_column};
 use std::sync::Arc;
 
@@ -270,4 +270,19 @@ impl<S: Scalar> Evaluation<S> {
             }
         }
     }
+}
+
+/// Depth of an evaluation of a Lagrangian; each step includes those before it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Depth {
+    /// `L`: one pass.
+    Value,
+    /// `p`, `g`: two passes.
+    Gradient,
+    /// `M`: `n + 2` passes.
+    MassMatrix,
+    /// `c`: `n + 3` passes.
+    Motion,
+    /// As `Motion`, keeping what gradients of losses need.
+    Training,
 }

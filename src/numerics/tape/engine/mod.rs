@@ -25,7 +25,6 @@
 //! Derivatives are taken by scaled states `q_i/s_i`, `v_i/s_i`: all results are in scaled coordinates.
 
 mod compile;
-mod depth;
 mod evaluation;
 mod jets;
 mod kernel;
@@ -33,7 +32,7 @@ mod operation;
 mod value;
 
 pub use compile::Recorded;
-pub use depth::Depth;
+pub use evaluation::Depth;
 pub use evaluation::{Evaluation, MixedDirections};
 
 /// States evaluated together at most.

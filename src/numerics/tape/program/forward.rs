@@ -1,8 +1,11 @@
 //! Forward replay of one chunk: each operation over all lanes.
 
-use super::{Instruction, LANES, Node, Row, elementary};
+use super::{Instruction, LANES, Node, Row};
 use crate::ops::{Binary, Unary};
-use crate::scalar::{Column, Scalar, copy_column, vectorized};
+use crate::scalar::{
+    Column, Scalar, copy_column, cos_lanes, exp_lanes, ln_lanes, sin_cos_lanes, sin_lanes, sqrt_lanes, tanh_lanes,
+    vectorized,
+};
 
 /// Data that an instruction may read besides the rows of its own section.
 pub(super) struct Environment<'a, S> {
@@ -39,7 +42,7 @@ pub(super) fn forward<S: Scalar>(program: &[Instruction<S>], environment: &Envir
                     Node::Unary(f, a) => unary(*f, get(*a), out),
                     Node::SinCos(a) => {
                         if let Some(cos) = rest.first_mut() {
-                            elementary::sin_cos(get(*a), out, cos);
+                            sin_cos(get(*a), out, cos);
                         }
                     }
                     Node::Binary(f, a, b) => binary(*f, get(*a), get(*b), out),
@@ -99,7 +102,7 @@ fn unary<S: Scalar>(f: Unary, x: &Row<S>, out: &mut Row<S>) {
         Unary::Sqrt => map(x, out, S::sqrt),
         Unary::Abs => map(x, out, S::abs),
         Unary::Powi(2) => map(x, out, |x| x * x),
-        _ => elementary::value(f, x, out),
+        _ => value(f, x, out),
     }
 }
 
@@ -118,6 +121,32 @@ fn binary<S: Scalar>(f: Binary, a: &Row<S>, b: &Row<S>, out: &mut Row<S>) {
         Binary::Div => zip(a, b, out, |a, b| a / b),
         Binary::Max => zip(a, b, out, |a, b| Binary::Max.value(a, b)),
         Binary::Min => zip(a, b, out, |a, b| Binary::Min.value(a, b)),
-        Binary::Powf | Binary::Atan2 => elementary::value_of_two(f, a, b, out),
+        Binary::Powf | Binary::Atan2 => value_of_two(f, a, b, out),
     }
+}
+
+/// `out = f(x)`.
+#[inline(never)]
+pub(super) fn value<S: Scalar>(f: Unary, x: &Row<S>, out: &mut Row<S>) {
+    match f {
+        Unary::Exp => exp_lanes(x, out),
+        Unary::Ln => ln_lanes(x, out),
+        Unary::Sqrt => sqrt_lanes(x, out),
+        Unary::Sin => sin_lanes(x, out),
+        Unary::Cos => cos_lanes(x, out),
+        Unary::Tanh => tanh_lanes(x, out),
+        _ => (0..LANES).for_each(|l| out[l] = f.value(x[l])),
+    }
+}
+
+/// Sine and cosine.
+#[inline(never)]
+pub(super) fn sin_cos<S: Scalar>(x: &Row<S>, sin: &mut Row<S>, cos: &mut Row<S>) {
+    sin_cos_lanes(x, sin, cos);
+}
+
+/// `out = f(a, b)`.
+#[inline(never)]
+pub(super) fn value_of_two<S: Scalar>(f: Binary, a: &Row<S>, b: &Row<S>, out: &mut Row<S>) {
+    (0..LANES).for_each(|l| out[l] = f.value(a[l], b[l]));
 }

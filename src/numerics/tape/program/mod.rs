@@ -5,7 +5,6 @@
 //! its cost per operation is shared by the lanes and the loops are SIMD. The chunk does not depend on the number of
 //! threads: the same batch gives the same bytes.
 
-mod elementary;
 mod forward;
 mod interpret;
 mod recorder;

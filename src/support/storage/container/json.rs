@@ -1,6 +1,7 @@
 //! JSON without duplicate keys: one text, one meaning for every reader.
 
-use serde::de::{self, Deserialize, Deserializer, MapAccess, SeqAccess, Visitor};
+use serde::de::{Deserializer, MapAccess, SeqAccess, Visitor};
+use serde::{Deserialize, Serialize};
 use std::collections::HashSet;
 use std::fmt;
 
@@ -28,7 +29,7 @@ impl<'de> Visitor<'de> for Unambiguous {
         let mut seen = HashSet::new();
         while let Some(key) = map.next_key::<String>()? {
             if seen.contains(&key) {
-                return Err(de::Error::custom(format_args!("duplicate key {key:?}")));
+                return Err(serde::de::Error::custom(format_args!("duplicate key {key:?}")));
             }
             map.next_value::<Unambiguous>()?;
             seen.insert(key);
@@ -56,6 +57,26 @@ impl<'de> Visitor<'de> for Unambiguous {
     }
     fn visit_unit<E>(self) -> Result<Self, E> {
         Ok(self)
+    }
+}
+
+/// Number type of stored numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum StoredPrecision {
+    /// Single precision.
+    F32,
+    /// Double precision.
+    F64,
+}
+
+impl StoredPrecision {
+    /// `"f32"` or `"f64"`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::F32 => "f32",
+            Self::F64 => "f64",
+        }
     }
 }
 

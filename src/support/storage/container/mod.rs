@@ -6,10 +6,9 @@
 
 mod error;
 mod json;
-mod precision;
 
 pub use error::ContainerError;
-pub use precision::StoredPrecision;
+pub use json::StoredPrecision;
 
 use crate::names::{one_line, plain};
 use crate::scalar::Scalar;

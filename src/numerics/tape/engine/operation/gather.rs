@@ -1,8 +1,9 @@
 //! Numbers of several values put side by side, and single numbers taken out of a value.
 
+use super::linear::Linear;
 use super::{Forward, MixedForward, MixedReverse, Reverse};
-use crate::scalar::{Column, Real, Scalar, update_column};
-use crate::tape::engine::value::Mixed;
+use crate::scalar::{Column, Real, Scalar, update_column, update2};
+use crate::tape::engine::value::{Mixed, View};
 
 /// Unit by unit: the value and its unit that each comes from.
 #[derive(Clone, Debug)]
@@ -85,5 +86,37 @@ impl Gather {
                 }
             }
         }
+    }
+}
+
+/// The first branch where the condition is positive, the second where it is not; `NaN` where it is `NaN`.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Select {
+    pub condition: usize,
+    pub branches: [usize; 2],
+}
+
+impl Select {
+    #[allow(clippy::type_complexity)]
+    fn linear<S: Scalar>(&self) -> Linear<'_, impl Fn(&mut [S], View<'_, S>, &[S], usize)> {
+        let add = |target: &mut [S], forward: View<'_, S>, source: &[S], branch: usize| {
+            let (condition, zero) = (forward.plane(self.condition, 0), <S as Real>::zero());
+            update2(target, condition, source, |out, c, w| {
+                *out += if branch == 0 { c.select(w, zero) } else { c.select(zero, w) };
+            });
+        };
+        Linear { operands: &self.branches, add }
+    }
+    pub fn forward<S: Scalar>(&self, out: usize, sweep: &mut Forward<'_, S>) {
+        self.linear().forward(out, sweep);
+    }
+    pub fn reverse<S: Scalar>(&self, out: usize, sweep: &mut Reverse<'_, S>) {
+        self.linear().reverse(out, sweep);
+    }
+    pub fn mixed<S: Scalar>(&self, out: usize, sweep: &mut MixedForward<'_, S>) {
+        self.linear().mixed(out, sweep);
+    }
+    pub fn mixed_reverse<S: Scalar>(&self, out: usize, sweep: &mut MixedReverse<'_, S>) {
+        self.linear().mixed_reverse(out, sweep);
     }
 }

@@ -11,7 +11,6 @@
 //! | mixed channel | `y[st] = phi' x[st] + phi''[x[s], x[t]]` |
 //! | its reverse | `Bs += phi' Bs + A phi''[., x[t]]`, `Bt += phi' Bt + A phi''[x[s], .]`, `B0 += phi' B0 + phi''[x[s]] Bs + phi''[x[t]] Bt + A (phi''[x[st]] + phi'''[x[s], x[t]])` |
 
-mod combination;
 mod contraction;
 mod dense;
 mod elementwise;
@@ -20,17 +19,16 @@ mod gather;
 mod input;
 mod linear;
 mod product;
-mod select;
 
-pub(super) use combination::Combination;
 use contraction::{Contraction, ROWS};
 pub(super) use dense::Dense;
 pub(super) use elementwise::Elementwise;
 pub(super) use function::{Function, PARTIALS};
 pub(super) use gather::Gather;
+pub(super) use gather::Select;
 pub(super) use input::Input;
+pub(super) use linear::Combination;
 pub(super) use product::Product;
-pub(super) use select::Select;
 
 use super::kernel::{add_product, add_product3};
 use super::value::{Kind, Mixed, Order, Store, Value, View};
