@@ -41,7 +41,7 @@ pub(super) struct Place<S> {
     pub step: usize,
     /// Factors of `q`, `v` at the start and `q`, `v` at the end of the step in the position.
     pub position: [S; 4],
-    /// The same of the velocity.
+    /// Velocity counterpart of `position`.
     pub velocity: [S; 4],
 }
 

@@ -58,7 +58,7 @@ impl MechanicsError {
         }
     }
 
-    /// The same of the state in another row.
+    /// The failure of the state, moved to another row.
     pub(crate) fn at_row(mut self, to: usize) -> Self {
         if let Self::Singular { row, .. } | Self::NotFinite { row, .. } | Self::Uncertified { row } = &mut self {
             *row = to;

@@ -5,7 +5,7 @@ use super::eigh::eigh;
 use super::error::{LinalgError, expect_length};
 use crate::scalar::{Real, Scalar};
 
-/// Solution of a symmetric system that may be singular, and what was decided about the matrix.
+/// Solution of a symmetric system that may be singular, and the numerical rank used.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MinimumNorm<S> {
     /// `x`, `(n)`, in units of the right-hand side over those of the matrix.

@@ -167,7 +167,7 @@ impl Arena {
             }
         })
     }
-    /// A number of which nothing is known.
+    /// The unbounded value (top).
     pub fn unknown(&self) -> Place {
         self.single(|_, new| new.fill([f64::NAN]))
     }

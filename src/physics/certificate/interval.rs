@@ -16,7 +16,7 @@ pub struct Interval {
 }
 
 impl Interval {
-    /// The whole line: nothing is known.
+    /// The unbounded interval (top).
     pub const ENTIRE: Self = Self { low: f64::NEG_INFINITY, high: f64::INFINITY };
     /// 0 alone.
     pub const ZERO: Self = Self::point(0.0);

@@ -59,7 +59,7 @@ impl<S: Scalar> Connection<S> {
         Ok(partial.iter().zip(turned).map(|(&partial, turned)| partial + turned).collect())
     }
 
-    /// The same of a field that is written as a function of the coordinates, differentiated at `q`, `(n)`.
+    /// Covariant derivative of a field given as a function of the coordinates, differentiated at `q`, `(n)`.
     ///
     /// # Errors
     /// [`GeometryError::Shape`] if the field has not `n` components or `q` not `n` numbers; [`GeometryError::NotFinite`] if it

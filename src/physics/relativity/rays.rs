@@ -109,7 +109,7 @@ pub fn trace(
     trace_each(model, chart, starts.len(), &|k| starts[k], tracing, progress)
 }
 
-/// The same of so many starts that are made when they are needed.
+/// [`trace`] of starts that are made when they are needed.
 pub(super) fn trace_each(
     model: &dyn EulerLagrange<f64>,
     chart: &Chart,

@@ -45,7 +45,7 @@ pub struct Description {
     /// Bounds of training states by the names of their columns; the coordinates' own where left out.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty", deserialize_with = "pair::by_name")]
     pub training: BTreeMap<String, [Quantity; 2]>,
-    /// The same of the states on which errors are stated.
+    /// Bounds of the states on which errors are stated.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty", deserialize_with = "pair::by_name")]
     pub validation: BTreeMap<String, [Quantity; 2]>,
     /// Motions on which a model is tried.
@@ -88,7 +88,7 @@ pub struct CoordinateDescription {
     /// Lowest and highest value of interest; one turn for a periodic coordinate if left out.
     #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "pair::optional")]
     pub bounds: Option<[Quantity; 2]>,
-    /// The same of the velocity; without them the velocity of the time-like coordinate of a metric follows from
+    /// Lowest and highest velocity of interest; without them the velocity of the time-like coordinate of a metric follows from
     /// `g(v, v) = -1`.
     #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "pair::optional")]
     pub velocity_bounds: Option<[Quantity; 2]>,

@@ -210,7 +210,7 @@ impl<S: Scalar> Evaluation<S> {
         self.add_mixed(Order::Second, parameters, directions, gradient, inputs);
     }
 
-    /// The same of `u . dL/d(v/s)` with `u` the directions' `s`: a first derivative.
+    /// Gradient of the first derivative `u . dL/d(v/s)`, with `u` the directions' `s`.
     pub fn add_momentum_gradient(
         &mut self,
         parameters: &[S],
