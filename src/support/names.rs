@@ -1,13 +1,10 @@
-//! Names and numbers in messages: the known name nearest to a mistyped one, texts on one line or in short ones, counts, digits,
-//! foreign words translated.
+//! Names and numbers in messages: the known name nearest to a mistyped one, texts on one line or in short ones, counts, digits.
 
 mod columns;
-mod foreign;
 mod number;
 mod wrap;
 
 pub use columns::taken_column;
-pub use foreign::plain;
 pub use number::{hundredths, number, percent, rounded};
 pub use wrap::{WIDTH, cut, cut_hard, width, wrapped};
 

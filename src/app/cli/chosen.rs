@@ -1,7 +1,5 @@
 //! The system that a command is about: one of the catalogue by its name, or one of one's own by its file.
 
-use crate::cli::config_file::ConfigFile;
-use crate::cli::mistake::Mistake;
 use crate::cli::{CliError, config};
 use crate::lagrangian::system::System;
 use crate::lagrangian::{Description, find};
@@ -20,7 +18,9 @@ pub fn is_file(system: &str) -> bool {
 /// A usage error for an unknown name and for a mistake in a file, a data error for a file that cannot be read.
 pub fn system(system: &str) -> Result<Cow<'static, System>, CliError> {
     if is_file(system) {
-        return ConfigFile::read_with(Path::new(system), parse_system).map(Cow::Owned);
+        let (name, text) = config::read_text(Path::new(system))?;
+        let refused = |(line, problem)| CliError::usage(format_args!("{name}:{line}: {problem}"));
+        return parse_system(&text).map(Cow::Owned).map_err(refused);
     }
     find(system).map(Cow::Borrowed).map_err(|error| {
         let file = if Path::new(system).is_file() { "; a file of a system ends in .toml" } else { "" };
@@ -34,11 +34,9 @@ pub fn system(system: &str) -> Result<Cow<'static, System>, CliError> {
 /// Line, from 1, and what is wrong there.
 pub fn parse_system(text: &str) -> Result<System, (usize, String)> {
     let description: Description = config::parse(text)?;
-    description.system().map_err(|error| {
-        let lines = config::lines(text).unwrap_or_default();
-        let mistake = Mistake::new(error.key, error.problem);
-        (mistake.line(&lines).unwrap_or(1), mistake.text())
-    })
+    description
+        .system()
+        .map_err(|error| (config::line_of(&config::lines(text), &error.key).unwrap_or(1), error.to_string()))
 }
 
 /// The system that a model learned, if it is known: of one that was only recorded there is nothing to know.

@@ -1,10 +1,11 @@
 //! The order of `lnn fit`: the command given, or that of the checkpoint that `--resume DIR` names.
 
 use crate::cli::CliError;
-use crate::cli::fit_args::Args;
+use crate::cli::fit_config::Args;
 use crate::cli::folder::Folder;
 use crate::cli::input::is_standard;
 use crate::cli::resume::{Found, Learner, find, say_finished};
+use crate::cli::run_args::RunArgs;
 use crate::cli::said::Said;
 use crate::training::LATEST;
 use clap::parser::ValueSource;
@@ -39,7 +40,7 @@ impl Order {
     /// # Errors
     /// A data error for a directory without a fit to go on with, a usage error for arguments that contradict it.
     pub fn of(args: &Args, words: &[OsString]) -> Result<Option<Self>, CliError> {
-        let Some(path) = &args.resume else {
+        let Some(path) = &args.run.resume else {
             return Ok(Some(Self { args: args.clone(), said: Said::now(words), resumed: None }));
         };
         // Looked for before anything is created, and again when nobody else can write.
@@ -47,7 +48,7 @@ impl Order {
         let folder = Folder::open(path)?;
         let said = match find(path, Learner::Fit)? {
             Found::Finished(_, json) => {
-                say_finished(path, args.json.then_some(&json))?;
+                say_finished(path, args.run.json.then_some(&json))?;
                 return Ok(None);
             }
             Found::Unfinished(text) => Said::parse(&text)
@@ -58,17 +59,17 @@ impl Order {
         })?;
         require_same(path, &saved, words)?;
         let mut saved = Words::from_arg_matches_mut(&mut saved).map_err(|e| CliError::file(path, e))?.args;
-        let (threads, checkpoint_every, json) = (args.threads, args.checkpoint_every, args.json);
+        let RunArgs { threads, checkpoint_every, json, .. } = args.run;
         // What comes from standard input has to come again.
         let found = |file: &PathBuf| if is_standard(file) { file.clone() } else { said.path(file) };
-        saved.config = saved.config.as_ref().map(found);
+        let config = saved.run.config.as_ref().map(found);
+        saved.run = RunArgs { threads, checkpoint_every, json, config, ..saved.run };
         saved.recording.data = if args.recording.data.is_empty() {
             saved.recording.data.iter().map(found).collect()
         } else {
             args.recording.data.clone()
         };
-        let args = Args { threads, checkpoint_every, json, ..saved };
-        Ok(Some(Self { args, said, resumed: Some(folder) }))
+        Ok(Some(Self { args: saved, said, resumed: Some(folder) }))
     }
 }
 

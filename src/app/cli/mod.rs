@@ -5,13 +5,11 @@
 //! of a configuration all mistakes are found, a line for each.
 
 mod certify;
-mod changes;
 mod charges;
 mod check;
 mod chosen;
 mod compare;
 mod config;
-mod config_file;
 mod differences;
 mod error;
 mod evaluate;
@@ -19,9 +17,9 @@ mod experiment;
 mod experiment_list;
 mod files;
 mod fit;
-mod fit_args;
 mod fit_config;
 mod fit_resume;
+mod flags;
 mod folder;
 mod forces;
 mod geometry;
@@ -30,9 +28,9 @@ mod inspect;
 mod interrupt;
 mod inverse;
 mod json;
+mod layers;
 mod learned;
 mod manual;
-mod mistake;
 mod misunderstood;
 mod motion;
 mod number;
@@ -46,6 +44,7 @@ mod recording_args;
 mod results;
 mod resume;
 mod rollout;
+mod run_args;
 mod said;
 mod shadow;
 mod shadow_facts;
@@ -104,7 +103,7 @@ enum Command {
     /// Learn the Lagrangian of a system and write model, history, pictures and a report.
     Train(train_config::Args),
     /// Learn the Lagrangian of recorded motion, judge it by motion that was held out.
-    Fit(Box<fit_args::Args>),
+    Fit(Box<fit_config::Args>),
     /// Integrate the motion of a model.
     Rollout(rollout::Args),
     /// Compare a model with the system it learned.
@@ -134,7 +133,7 @@ pub fn main(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     let arguments: Vec<OsString> = arguments.into_iter().collect();
     let cli = match Cli::try_parse_from(&arguments) {
         Ok(cli) => cli,
-        Err(error) => return answer(&error, &arguments),
+        Err(error) => return answer(&error),
     };
     // Behind the names of the program and of the command.
     let words = arguments.get(2..).unwrap_or_default();
@@ -154,9 +153,8 @@ pub fn main(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
 /// # Errors
 /// The usage error that the program ends with. Asking for help or for the version is none.
 pub fn check_arguments(arguments: impl IntoIterator<Item = OsString>) -> Result<(), CliError> {
-    let arguments: Vec<OsString> = arguments.into_iter().collect();
-    match Cli::try_parse_from(&arguments) {
-        Err(error) if error.exit_code() != 0 => Err(misunderstood(&error, &arguments)),
+    match Cli::try_parse_from(arguments) {
+        Err(error) if error.exit_code() != 0 => Err(misunderstood(&error)),
         _ => Ok(()),
     }
 }
@@ -185,7 +183,7 @@ fn run(command: Command, words: &[OsString]) -> Result<(), CliError> {
 }
 
 /// Help and version go where they are asked for; a wrong argument is one line like any other error.
-fn answer(error: &clap::Error, arguments: &[OsString]) -> ExitCode {
+fn answer(error: &clap::Error) -> ExitCode {
     use clap::error::ErrorKind::{DisplayHelp, DisplayHelpOnMissingArgumentOrSubcommand, DisplayVersion};
     match error.kind() {
         DisplayHelp | DisplayVersion => match output::print(&wrapped(&error.to_string(), WIDTH)) {
@@ -201,7 +199,7 @@ fn answer(error: &clap::Error, arguments: &[OsString]) -> ExitCode {
             ExitCode::from(2)
         }
         _ => {
-            let failed = misunderstood(error, arguments);
+            let failed = misunderstood(error);
             report(&failed);
             failed.exit_code()
         }

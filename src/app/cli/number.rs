@@ -71,9 +71,10 @@ pub fn rate(text: &str) -> Result<f64, String> {
     number(1e-9, 1e12)(text)
 }
 
-/// A seed.
+/// A seed: a configuration holds none that is larger.
 pub fn seed(text: &str) -> Result<u64, String> {
-    text.trim().parse().map_err(|_| format!("expected a whole number from 0 to {}", u64::MAX))
+    let refused = || format!("expected a whole number from 0 to {}", i64::MAX);
+    text.trim().parse().ok().filter(|seed| i64::try_from(*seed).is_ok()).ok_or_else(refused)
 }
 
 /// Two finite decimal numbers, the lower first: `LOW:HIGH`.
@@ -130,7 +131,7 @@ mod tests {
         assert!(weight("-1").is_err() && weight("nan").is_err());
         assert!(count("1.0").is_err() && count("99999999999999999999").is_err());
         assert_eq!((positive("1e-3"), count("7")), (Ok(1e-3), Ok(7)));
-        assert_eq!((tolerance("2e-15"), seed("18446744073709551615")), (Ok(2e-15), Ok(u64::MAX)));
+        assert_eq!((tolerance("2e-15"), seed("9223372036854775807")), (Ok(2e-15), Ok(i64::MAX as u64)));
         assert!(["nan", "0", "-1e-6", "1e-30", "1.1", "1e308"].iter().all(|bad| tolerance(bad).is_err()));
         assert!(tolerance("1e-30").unwrap_err().contains("2e-15"), "the bound is said");
         assert_eq!((whole(2, 5)("5"), number(-1.0, 2.5)("-1"), seconds("86400")), (Ok(5), Ok(-1.0), Ok(86_400.0)));
@@ -140,7 +141,7 @@ mod tests {
         assert_eq!((thread_count("256"), rate("100")), (Ok(256), Ok(100.0)));
         assert!(["0", "257", "4294967296"].iter().all(|bad| thread_count(bad).is_err()));
         assert!(threads(None) >= 1 && threads(Some(7)) == 7);
-        assert!(["-1", "1.5", "", "18446744073709551616"].iter().all(|bad| seed(bad).is_err()));
+        assert!(["-1", "1.5", "", "9223372036854775808"].iter().all(|bad| seed(bad).is_err()));
         assert_eq!((bounds("-0.5:1e3"), bounds(" 2 : 2 ")), (Ok((-0.5, 1000.0)), Ok((2.0, 2.0))));
         for bad in ["", "1", "1:", ":1", "2:1", "0:inf", "nan:nan", "0:1:2", "-1e308:1e308"] {
             assert!(bounds(bad).is_err(), "{bad}");

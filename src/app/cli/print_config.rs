@@ -1,6 +1,12 @@
-//! Commented configurations: every key with what it means, its allowed values and the value it has.
+//! Commented configurations and the reference of all keys: what a key means, its allowed values and the value it has.
 
-use crate::presets::{Key, Section};
+use crate::configuration::table::Below;
+use crate::configuration::{Config, Key, join};
+use crate::lagrangian::configure;
+use crate::pipeline::FitConfig;
+use crate::presets::Preset;
+use crate::shooting::Shooting;
+use serde_json::{Value as Json, json};
 use toml::{Table, Value};
 
 /// Longest line of a comment.
@@ -15,75 +21,115 @@ pub enum PrintFormat {
     Markdown,
 }
 
-/// A configuration file with the values of `root` and a comment for every key of `sections`.
-///
-/// `remarks` say what the keys of a section mean that lists none.
-pub fn commented(sections: &[Section<'_>], root: &Table, remarks: &dyn Fn(&str) -> Option<String>) -> String {
+/// A configuration file with the values of `root` and a comment for every one of `keys`; `remark` says what the names of an open
+/// table mean.
+pub fn commented(keys: &[Key], root: &Table, remark: &dyn Fn(&str) -> Option<String>) -> String {
     let mut text = String::new();
-    for section in sections {
-        let path: Vec<&str> = section.name.split('.').filter(|name| !name.is_empty()).collect();
-        let found = path.iter().try_fold(Value::Table(root.clone()), |value, name| value.get(*name).cloned());
-        // Of what has no keys of its own there is nothing to take in.
-        if found.is_none() && section.keys.is_empty() {
-            continue;
-        }
-        if !section.name.is_empty() {
-            text += &format!("\n{}", comment(section.purpose));
-        }
-        match found {
-            Some(Value::Array(tables)) => {
-                for (k, table) in tables.iter().filter_map(Value::as_table).enumerate() {
-                    // What the keys mean is said once.
-                    text += &format!("{}[[{}]]\n", if k > 0 { "\n" } else { "" }, section.name);
-                    text += &entries(section.keys, Some(table), k == 0);
-                }
-            }
-            Some(Value::Table(table)) if section.keys.is_empty() && table.values().any(has_tables) => {
-                let whole = Table::from_iter([(section.name.to_string(), Value::Table(table))]);
-                text += &toml::to_string(&whole).unwrap_or_default();
-            }
-            Some(Value::Table(table)) => {
-                if !section.name.is_empty() {
-                    text += &format!("[{}]\n", section.name);
-                }
-                text += &entries(section.keys, Some(&table), true);
-                if section.keys.is_empty() {
-                    for (name, value) in &table {
-                        text += &remarks(name).map_or(String::new(), |remark| comment(&remark));
-                        text += &format!("{} = {value}\n", quoted(name));
-                    }
-                }
-            }
-            _ => {
-                text += &format!("# [{}]\n", section.name);
-                text += &entries(section.keys, None, true);
-            }
-        }
-    }
+    write_table(keys, Some(root), "", true, remark, &mut text);
     text
 }
 
-/// `true` if a value is a table, or a list of tables.
-fn has_tables(value: &Value) -> bool {
-    value.is_table() || value.as_array().is_some_and(|items| items.iter().any(Value::is_table))
-}
-
-/// A configuration that was printed with the seed 0, with another one: a seed may be larger than the integers of a table.
-pub fn with_seed(text: &str, seed: u64) -> String {
-    text.replacen("\nseed = 0\n", &format!("\nseed = {seed}\n"), 1)
-}
-
-/// The lines of keys; those without a value are shown by their example, commented out.
-fn entries(keys: &[Key], table: Option<&Table>, said: bool) -> String {
-    let entry = |key: &Key| {
+/// Writes the keys of a table at `path`, then the tables within; what the keys mean is said once.
+fn write_table(
+    keys: &[Key],
+    table: Option<&Table>,
+    path: &str,
+    said: bool,
+    remark: &dyn Fn(&str) -> Option<String>,
+    text: &mut String,
+) {
+    let is_value = |key: &&Key| matches!(key.below, Below::Value);
+    for key in keys.iter().filter(is_value) {
         let line = match table.and_then(|table| table.get(key.name)) {
             Some(value) => format!("{} = {value}\n", key.name),
-            None if key.example.is_empty() => return String::new(),
+            None if key.example.is_empty() => continue,
             None => format!("# {} = {}\n", key.name, key.example),
         };
-        if said { format!("{}{line}", comment(&format!("{} ({})", key.purpose, key.values))) } else { line }
-    };
-    keys.iter().map(entry).collect()
+        if said {
+            *text += &comment(&format!("{} ({})", key.purpose(), key.values));
+        }
+        *text += &line;
+    }
+    for key in keys.iter().filter(|key| !is_value(key)) {
+        let path = join(path, key.name);
+        let found = table.and_then(|table| table.get(key.name));
+        let head = format!("\n{}", comment(&key.purpose()));
+        match (found, key.below) {
+            (Some(Value::Array(tables)), Below::Keys(keys)) => {
+                *text += &head;
+                for (k, table) in tables.iter().enumerate() {
+                    *text += &format!("{}[[{path}]]\n", if k > 0 { "\n" } else { "" });
+                    write_table(keys, table.as_table(), &path, k == 0, remark, text);
+                }
+            }
+            (Some(Value::Table(table)), Below::Keys(keys)) => {
+                *text += &format!("{head}[{path}]\n");
+                write_table(keys, Some(table), &path, said, remark, text);
+            }
+            (None, Below::Keys(keys)) => {
+                *text += &format!("{head}# [{path}]\n");
+                write_table(keys, None, &path, said, remark, text);
+            }
+            (Some(Value::Table(table)), Below::Open) if !table.is_empty() => {
+                *text += &format!("{head}[{path}]\n");
+                for (name, value) in table {
+                    *text += &remark(name).map_or(String::new(), |remark| comment(&remark));
+                    *text += &format!("{} = {value}\n", quoted(name));
+                }
+            }
+            (Some(value), Below::Whole) => {
+                let whole = Table::from_iter([(key.name.to_string(), value.clone())]);
+                *text += &(head + &toml::to_string(&whole).unwrap_or_default());
+            }
+            _ => {}
+        }
+    }
+}
+
+/// The keys of a training as a page of Markdown: a table for every table of the file, with the values of the quick preset for the
+/// double pendulum.
+pub fn training_reference() -> String {
+    let quick = configure::<f64>("double-pendulum", &[]).ok().and_then(|system| Preset::Quick.config(&system));
+    let mut page = String::new();
+    let is_shooting = |key: &&Key| key.name == "shooting";
+    let shooting: Vec<Key> = FitConfig::KEYS.iter().filter(is_shooting).copied().collect();
+    describe(Config::KEYS, &serde_json::to_value(quick).unwrap_or_default(), "quick preset", &mut page);
+    describe(&shooting, &json!({ "shooting": Shooting::default() }), "default", &mut page);
+    page
+}
+
+/// The keys that a fit has beside those of a training.
+pub fn fit_reference() -> String {
+    let mut page = String::new();
+    let is_own = |key: &&Key| !["shooting", "training"].contains(&key.name);
+    let own: Vec<Key> = FitConfig::KEYS.iter().filter(is_own).copied().collect();
+    describe(&own, &Json::Null, "default", &mut page);
+    page
+}
+
+/// Writes the reference of keys and of the tables within; `values` are shown, and `whose` says whose they are.
+fn describe(keys: &[Key], values: &Json, whose: &str, page: &mut String) {
+    // Brackets outside of code would be links.
+    let cell = |text: &str| text.replace('|', "\\|").replace('[', "\\[");
+    let (own, tables): (Vec<&Key>, Vec<&Key>) = keys.iter().partition(|key| matches!(key.below, Below::Value));
+    if !own.is_empty() {
+        *page += &format!("| key | values | {whose} | what it is |\n|---|---|---|---|\n");
+    }
+    for key in &own {
+        let value = if values[key.name].is_null() { "-".to_string() } else { format!("`{}`", values[key.name]) };
+        *page += &format!("| `{}` | {} | {value} | {} |\n", key.name, cell(key.values), cell(&key.purpose()));
+    }
+    if !own.is_empty() {
+        *page += "\n";
+    }
+    for key in tables {
+        let name = if values[key.name].is_array() { format!("[[{}]]", key.name) } else { format!("[{}]", key.name) };
+        *page += &format!("### `{name}`\n\n{}\n\n", key.purpose());
+        if let Below::Keys(keys) = key.below {
+            let first = values[key.name].get(0).unwrap_or(&values[key.name]);
+            describe(keys, first, whose, page);
+        }
+    }
 }
 
 /// A key as TOML writes it.
@@ -109,12 +155,14 @@ fn comment(text: &str) -> String {
 mod tests {
     use super::*;
     use crate::cli::parse_config;
-    use crate::configuration::{Config, Lbfgs};
-    use crate::lagrangian::{configure, systems};
-    use crate::presets::{Preset, TRAINING_SECTIONS};
+    use crate::configuration::table::find_key;
+    use crate::configuration::{Known, Lbfgs, Regularizer};
+    use crate::lagrangian::systems;
+    use crate::recording::Targets;
+    use std::collections::BTreeSet;
 
     fn print(config: &Config) -> String {
-        commented(&TRAINING_SECTIONS, &Table::try_from(config).unwrap(), &|name| Some(format!("about {name}")))
+        commented(Config::KEYS, &Table::try_from(config).unwrap(), &|name| Some(format!("about {name}")))
     }
 
     #[test]
@@ -133,25 +181,87 @@ mod tests {
                 assert_eq!(parse_config::<Config>(&print(&config)).unwrap(), config);
             }
         }
+        let mut fit = FitConfig { shooting: Some(Shooting::default()), ..FitConfig::default() };
+        (fit.targets, fit.window, fit.noise) = (Some(Targets::Motion), Some(21), Some(vec![0.1, 0.2]));
+        fit.recording.files = vec!["a b.csv".to_string()];
+        (fit.recording.units, fit.recording.rate) = (vec!["x=deg".to_string()], Some(10.0));
+        let text = commented(FitConfig::KEYS, &Table::try_from(&fit).unwrap(), &|_| None);
+        assert_eq!(parse_config::<FitConfig>(&text).unwrap(), fit, "{text}");
     }
 
     #[test]
     fn every_key_is_commented_and_those_left_out_can_be_taken_in() {
         let config = Preset::Paper.config(&configure("double-pendulum", &[]).unwrap()).unwrap();
         let text = print(&config);
-        for section in &TRAINING_SECTIONS {
-            for key in section.keys {
-                let line =
-                    text.lines().position(|l| l.trim_start_matches("# ").starts_with(&format!("{} = ", key.name)));
-                let line = line.unwrap_or_else(|| panic!("{} is not in\n{text}", key.name));
-                assert!(text.lines().nth(line - 1).unwrap().starts_with("# "), "{}", key.name);
-            }
-        }
         assert!(text.lines().all(|line| !line.starts_with('#') || line.chars().count() <= WIDTH));
         assert_eq!(text.matches("\n[[phase]]").count(), 3);
         let taken_in = text.replace("# [lbfgs]", "[lbfgs]").replace("# iterations", "iterations");
         let taken_in = taken_in.replace("# memory", "memory").replace("# dissipation =", "dissipation =");
         let config: Config = parse_config(&taken_in).unwrap();
         assert_eq!((config.lbfgs, config.network.dissipation), (Some(Lbfgs::default()), Some(16)));
+    }
+
+    /// Examples and lists of names are values of their keys.
+    #[test]
+    fn examples_and_names_are_values() {
+        fn visit(keys: &'static [Key], path: &str, tried: &mut usize) {
+            for key in keys {
+                let path = join(path, key.name);
+                if let Below::Keys(keys) = key.below {
+                    visit(keys, &path, tried);
+                    continue;
+                }
+                assert!(find_key(FitConfig::KEYS, &path).is_some_and(|key| !key.purpose().is_empty()), "{path}");
+                let names: Vec<String> = key.values.split(", ").map(|name| format!("{name:?}")).collect();
+                let is_name = |name: &String| name.chars().all(|c| c.is_alphanumeric() || "-\"".contains(c));
+                let listed = names.len() > 1 && names.iter().all(is_name) && key.values != "true, false";
+                let texts = if listed { names } else { vec![key.example.to_string()] };
+                for text in texts.iter().filter(|text| !text.is_empty() && !path.ends_with("penalty.time")) {
+                    // A penalty has further keys by its kind.
+                    let beside = match text.as_str() {
+                        "\"lorentzian-sylvester\"" => "lambda = 1\ntime = \"t\"\n",
+                        _ if path.ends_with("penalty.kind") && text != "\"none\"" => "lambda = 1\n",
+                        _ if path.ends_with("penalty.lambda") => "kind = \"eigenvalue\"\n",
+                        _ => "",
+                    };
+                    let (table, name) = path.rsplit_once('.').unwrap_or(("", &path));
+                    let table = match table {
+                        "" => String::new(),
+                        "training.phase" => "[[training.phase]]\n".to_string(),
+                        table => format!("[{table}]\n"),
+                    };
+                    let file = format!("{table}{name} = {text}\n{beside}");
+                    assert!(parse_config::<FitConfig>(&file).is_ok(), "{file}: {:?}", parse_config::<FitConfig>(&file));
+                    *tried += 1;
+                }
+            }
+        }
+        let mut tried = 0;
+        visit(FitConfig::KEYS, "", &mut tried);
+        assert!(tried > 60, "{tried}");
+    }
+
+    /// Every key is declared in the order of its table, and none is missing.
+    #[test]
+    fn the_declared_keys_are_those_that_are_written() {
+        let mut config = Preset::Quick.config(&configure("ads4-geodesic", &[]).unwrap()).unwrap();
+        config.network.known = Some(Known::File("a.toml".to_string()));
+        config.penalty = Regularizer::LorentzianSylvester { lambda: 1.0, time: "t".to_string() };
+        let table = Table::try_from(&config).unwrap();
+        let written: BTreeSet<&str> = table.keys().map(String::as_str).collect();
+        let declared: BTreeSet<&str> = Config::KEYS.iter().map(|key| key.name).collect();
+        assert!(written.is_subset(&declared), "{written:?}");
+        for key in Config::KEYS {
+            let (Below::Keys(keys), Some(Value::Table(table))) = (key.below, table.get(key.name)) else { continue };
+            assert!(table.keys().all(|name| keys.iter().any(|key| key.name == name)), "{table:?}");
+        }
+    }
+
+    #[test]
+    fn the_reference_is_a_page_of_tables() {
+        let page = training_reference();
+        assert!(page.contains("| `hidden` | 1 to 64 widths of 1 to 65536 | `[128,128,128]` |"), "{page}");
+        assert!(page.contains("### `[[phase]]`") && page.contains("### `[shooting]`") && page.contains("\\|v\\|^2"));
+        assert!(fit_reference().contains("| `held_out` |"));
     }
 }

@@ -52,12 +52,7 @@ fn option(problem: &str) -> &'static str {
 
 /// `column=unit`.
 pub fn unit(text: &str) -> Result<(String, String), String> {
-    match text.split_once('=') {
-        Some((column, unit)) if !column.trim().is_empty() && !unit.trim().is_empty() => {
-            Ok((column.trim().to_string(), unit.trim().to_string()))
-        }
-        _ => Err("expected COLUMN=UNIT".to_string()),
-    }
+    crate::pipeline::unit(text).ok_or_else(|| "expected COLUMN=UNIT".to_string())
 }
 
 impl RecordingArgs {
@@ -80,27 +75,35 @@ impl RecordingArgs {
     /// Reads the files.
     ///
     /// # Errors
-    /// A usage error for arguments that contradict each other, a data error for the first file that is not as said.
+    /// As of [`read`].
     pub fn read(&self) -> Result<LoadedRecording, CliError> {
-        read_spooled(&self.data, |files| read_recording(files, &self.meaning())).map_err(|error| match &error {
-            DataError::File { problem, .. } => CliError::data(format_args!("{error}{}", self.help(problem))),
-            _ => CliError::usage(format_args!("{}{error}", option(&error.to_string()))),
-        })
+        read(&self.data, &self.meaning())
     }
+}
 
-    /// The option that helps, with a colon before it.
-    fn help(&self, problem: &Problem) -> &'static str {
-        match problem {
-            Problem::NoTime { .. } => ": --time COLUMN or --rate HZ",
-            Problem::Missing { what: "time", .. } => ": --time COLUMN names it",
-            Problem::Missing { what: "trajectory", .. } => ": --trajectory COLUMN names it",
-            Problem::Missing { what: "coordinate", .. } => ": --coords names it",
-            Problem::Missing { what: "velocity", .. } => ": --velocity names it",
-            Problem::Missing { what: "acceleration", .. } => ": --acceleration names it",
-            Problem::Missing { what: "force", .. } => ": --force names it",
-            Problem::Width { .. } | Problem::Header { .. } => ": see --columns",
-            Problem::Order { .. } if self.trajectory.is_none() => ": --trajectory COLUMN",
-            _ => "",
-        }
+/// Reads files whose columns mean this.
+///
+/// # Errors
+/// A usage error for columns that contradict each other, a data error for the first file that is not as said.
+pub fn read(files: &[PathBuf], columns: &Columns) -> Result<LoadedRecording, CliError> {
+    read_spooled(files, |files| read_recording(files, columns)).map_err(|error| match &error {
+        DataError::File { problem, .. } => CliError::data(format_args!("{error}{}", help(columns, problem))),
+        _ => CliError::usage(format_args!("{}{error}", option(&error.to_string()))),
+    })
+}
+
+/// The option that helps, with a colon before it.
+fn help(columns: &Columns, problem: &Problem) -> &'static str {
+    match problem {
+        Problem::NoTime { .. } => ": --time COLUMN or --rate HZ",
+        Problem::Missing { what: "time", .. } => ": --time COLUMN names it",
+        Problem::Missing { what: "trajectory", .. } => ": --trajectory COLUMN names it",
+        Problem::Missing { what: "coordinate", .. } => ": --coords names it",
+        Problem::Missing { what: "velocity", .. } => ": --velocity names it",
+        Problem::Missing { what: "acceleration", .. } => ": --acceleration names it",
+        Problem::Missing { what: "force", .. } => ": --force names it",
+        Problem::Width { .. } | Problem::Header { .. } => ": see --columns",
+        Problem::Order { .. } if columns.trajectory.is_none() => ": --trajectory COLUMN",
+        _ => "",
     }
 }

@@ -24,7 +24,7 @@ use std::sync::atomic::Ordering;
 /// A usage error for arguments and configuration, a data error for files and a training that fails, an interruption;
 /// after the last two the best model so far is written, if there is one.
 pub fn run(args: &Args) -> Result<(), CliError> {
-    if let Some(format) = args.print_config {
+    if let Some(format) = args.run.print_config {
         return args.print(format);
     }
     let Some(Task { config, system, folder, start }) = Task::of(args)? else { return Ok(()) };
@@ -35,9 +35,9 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         output::note(&format!("the penalty is against g_{time}{time} > 0, which {share} of the states have, {place}"));
     }
     let stop = interrupt::flag().map_err(CliError::signals)?;
-    let checkpoints = Checkpoints::new(folder.path(), args.checkpoint_every).beginning(start);
+    let checkpoints = Checkpoints::new(folder.path(), args.run.checkpoint_every).beginning(start);
     let options =
-        RunOptions { threads: threads(args.threads), checkpoints: Some(checkpoints), ..RunOptions::default() };
+        RunOptions { threads: threads(args.run.threads), checkpoints: Some(checkpoints), ..RunOptions::default() };
     let trained = match train(&config, &system, &options, &folder, &watch(&stop)) {
         Ok(trained) => trained,
         Err(
@@ -56,7 +56,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     if trained.stop != StopReason::Interrupted {
         forget(folder.path())?;
     }
-    if args.json {
+    if args.run.json {
         output::print(&trained.json)?;
     } else {
         output::print(&format!("{}report: {}\n", trained.text(), folder.file("report.html").display()))?;
@@ -91,15 +91,15 @@ struct Task {
 impl Task {
     /// The task that the arguments set; `None` if it has been done before.
     fn of(args: &Args) -> Result<Option<Self>, CliError> {
-        let Some(path) = &args.resume else {
-            let (config, system) = args.resolve()?;
+        let Some(path) = &args.run.resume else {
+            let (config, system) = args.resolve(None)?;
             let usual = PathBuf::from("runs").join(&config.system);
             let start = config.from.as_deref().map(|from| model_file(Path::new(from))).transpose()?;
             let inputs: Vec<&Path> = args.inputs().chain(start.as_deref()).collect();
             let wanted = Wanted {
-                out: args.out.as_deref(),
+                out: args.run.out.as_deref(),
                 usual: &usual,
-                overwrite: args.overwrite,
+                overwrite: args.run.overwrite,
                 inputs: &inputs,
                 writer: Writer::Learner,
             };
@@ -111,13 +111,13 @@ impl Task {
         match find(path, Learner::Train)? {
             Found::Finished(text, json) => {
                 let saved = configuration(path, "config.toml", &text)?;
-                require_same(path, &saved, &args.resolve_beside(&saved)?)?;
-                say_finished(path, args.json.then_some(&json))?;
+                require_same(path, &saved, &args.resolve(Some(&saved))?.0)?;
+                say_finished(path, args.run.json.then_some(&json))?;
                 Ok(None)
             }
             Found::Unfinished(text) => {
                 let saved = configuration(path, LATEST, &text)?;
-                require_same(path, &saved, &args.resolve_beside(&saved)?)?;
+                require_same(path, &saved, &args.resolve(Some(&saved))?.0)?;
                 let system = args.check(&saved)?;
                 Ok(Some(Self { config: *saved, system, folder, start: Begin::Resume }))
             }

@@ -1,23 +1,18 @@
 //! Arguments of `lnn train` and the configuration they come to.
 
-use crate::cli::changes::Changes;
-use crate::cli::config_file::ConfigFile;
-use crate::cli::mistake::Mistake;
-use crate::cli::number::{finite, seconds, seed, thread_count, whole};
-use crate::cli::print_config::{PrintFormat, commented, with_seed};
+use crate::cli::flags::Flags;
+use crate::cli::layers::{Entry, Layers, Mistake};
+use crate::cli::number::finite;
+use crate::cli::print_config::{PrintFormat, commented, training_reference};
+use crate::cli::run_args::{RunArgs, fill_periods, imply, structure};
 use crate::cli::{CliError, chosen, output, source};
-use crate::configuration::{Config, MOST_EPOCHS, Precision};
+use crate::configuration::Config;
 use crate::data::SamplingError;
 use crate::lagrangian::system::System;
-use crate::lagrangian::{
-    Description, DescriptionError, SystemError, SystemInstance, configure_system, configure_values, find,
-};
-use crate::names::plain;
-use crate::network::Structure;
-use crate::optimizers::Schedule;
+use crate::lagrangian::{Description, DescriptionError, SystemError, SystemInstance, configure_values, find};
+use crate::network::Initialization;
 use crate::pipeline::{StartModel as Start, all_parameters};
-use crate::presets::{Preset, TRAINING_SECTIONS, configuration_reference};
-use crate::training::CheckpointInterval;
+use crate::presets::Preset;
 use serde::Deserialize;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -28,56 +23,18 @@ use std::path::{Path, PathBuf};
 pub struct Args {
     /// A system by name (`lnn systems` lists them), or by the file that describes it, FILE.toml [default: that of the
     /// configuration or of the model].
-    #[arg(required_unless_present_any = ["config", "resume", "from", "named"])]
+    #[arg(required_unless_present_any = ["config", "resume", "from"])]
     system: Option<String>,
-    /// The same as SYSTEM.
-    #[arg(id = "named", long = "system", value_name = "NAME|FILE.toml", conflicts_with = "system")]
-    named: Option<String>,
     /// A configuration that ships with the program [default: quick].
     #[arg(long, value_enum, value_name = "NAME")]
     preset: Option<PresetName>,
-    /// A configuration, such as the config.toml beside a model, or - for standard input; keys that are not in it have the
-    /// preset's values.
-    #[arg(long, value_name = "FILE")]
-    config: Option<PathBuf>,
-    /// Print the configuration with comments, as it would be used, and train nothing; markdown prints a table of all keys.
-    #[arg(long, value_enum, value_name = "FORMAT", num_args = 0..=1, require_equals = true, default_missing_value = "toml",
-        conflicts_with = "resume")]
-    pub print_config: Option<PrintFormat>,
-    /// Start from the weights of a model, a file or the directory of a run: system, parameters, network and precision are the
-    /// model's unless said otherwise, states are new; another network is refused.
-    #[arg(long, value_name = "MODEL")]
-    from: Option<String>,
     /// A parameter of the system; may be repeated.
     #[arg(long, value_name = "SYMBOL=VALUE", value_parser = source::parameter)]
     param: Vec<(String, String)>,
-    /// Seed of states, weights and the order of the data [default: the configuration's, 0 in all presets].
-    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = seed)]
-    seed: Option<u64>,
     #[command(flatten)]
-    changes: Changes,
-    /// Threads; the result does not depend on them [default: all].
-    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = thread_count)]
-    pub threads: Option<usize>,
-    /// Precision of weights and arithmetic [default: the configuration's, f32 in all presets].
-    #[arg(long, value_enum, value_name = "TYPE")]
-    precision: Option<PrecisionName>,
-    /// Directory for everything the run writes; one that holds a run is refused [default: runs/SYSTEM, or the first free
-    /// of runs/SYSTEM-2, runs/SYSTEM-3, ..].
-    #[arg(long, value_name = "DIR")]
-    pub out: Option<PathBuf>,
-    /// Replace the run in the directory, pictures and evaluations of its model included, once the new model is there.
-    #[arg(long, conflicts_with = "resume")]
-    pub overwrite: bool,
-    /// Go on with the training in a directory that was stopped; everything else comes from its checkpoint.
-    #[arg(long, value_name = "DIR", conflicts_with = "out")]
-    pub resume: Option<PathBuf>,
-    /// Write a checkpoint every N epochs, or every Ts seconds with an s behind the number.
-    #[arg(long, value_name = "N|Ts", default_value = "60s", allow_hyphen_values = true, value_parser = every)]
-    pub checkpoint_every: CheckpointInterval,
-    /// Print summary.json instead of tables.
-    #[arg(long)]
-    pub json: bool,
+    flags: Flags<Config>,
+    #[command(flatten)]
+    pub run: RunArgs,
 }
 
 #[derive(Clone, Copy, Debug, clap::ValueEnum)]
@@ -90,74 +47,109 @@ enum PresetName {
     Paper,
 }
 
-#[derive(Clone, Copy, Debug, clap::ValueEnum)]
-pub enum PrecisionName {
-    /// Single.
-    F32,
-    /// Double.
-    F64,
-}
-
-impl From<PrecisionName> for Precision {
-    fn from(name: PrecisionName) -> Self {
-        match name {
-            PrecisionName::F32 => Self::F32,
-            PrecisionName::F64 => Self::F64,
-        }
-    }
-}
-
-impl From<Precision> for PrecisionName {
-    fn from(precision: Precision) -> Self {
-        match precision {
-            Precision::F32 => Self::F32,
-            Precision::F64 => Self::F64,
-        }
-    }
-}
-
 impl Args {
-    /// The configuration: the file's, the model's or the preset's, in this order, changed by the arguments, every value in
-    /// range.
+    /// The configuration: the preset's or the model's, the file's and the options' over it, every value in range. Beside a
+    /// `saved` one of a checkpoint this is the base where the arguments name no other.
     ///
     /// # Errors
     /// Usage errors naming everything that is wrong, or a data error for a file that cannot be read.
-    pub fn resolve(&self) -> Result<(Config, SystemInstance<f64>), CliError> {
-        self.settle(None)
+    pub fn resolve(&self, saved: Option<&Config>) -> Result<(Config, SystemInstance<f64>), CliError> {
+        let mut options = self.flags.entries.clone();
+        for (symbol, text) in &self.param {
+            let value = finite(text).map_or_else(|_| text.as_str().into(), toml::Value::from);
+            options.push(Entry::option(format!("--param {symbol}"), &format!("parameters.{symbol}"), value));
+        }
+        let mut layers = Layers::new(Config::KEYS, self.run.config.as_deref(), options)?;
+        let start = layers.text("from").map(Start::read).transpose()?;
+        let goes_on = saved.filter(|_| self.run.config.is_none() && self.preset.is_none() && start.is_none());
+        let Named { name, description } = self.named(&layers, start.as_ref(), saved)?;
+        if let Some(saved) = goes_on.filter(|saved| saved.system != name) {
+            return Ok((Config { system: name, ..saved.clone() }, self.check(saved)?));
+        }
+        let system = match &description {
+            Some(description) => description.system().map(Cow::Owned).map_err(Unusable::Description),
+            None => find(&name).map(Cow::Borrowed).map_err(Unusable::System),
+        };
+        let mut parameters = match (&start, goes_on) {
+            (_, Some(saved)) => saved.parameters.clone(),
+            (Some(start), _) if start.header.system == name => start.header.parameters.clone(),
+            _ => BTreeMap::new(),
+        };
+        parameters.extend(layers.numbers("parameters"));
+        let mut mistakes: Vec<Mistake> = system.as_ref().err().map(Unusable::mistake).into_iter().collect();
+        // Of a system that is not known the other keys are looked at beside one that is.
+        let usable = match system {
+            Ok(system) => system,
+            Err(_) if layers.has_file() => Cow::Borrowed(find("double-pendulum").map_err(CliError::usage)?),
+            Err(error) => return Err(CliError::usage(error)),
+        };
+        let configured = if mistakes.is_empty() { &parameters } else { &BTreeMap::new() };
+        let configured = configure_values::<f64>(usable.clone(), configured).or_else(|error| {
+            mistakes.extend(wrong_parameters(&usable, &parameters, &error));
+            configure_values::<f64>(usable.clone(), &BTreeMap::new())
+        });
+        let (system, known) = (configured.map_err(CliError::usage)?, mistakes.is_empty());
+        let base = match goes_on {
+            Some(saved) => saved.clone(),
+            None => self.base(&system, &layers, start.as_ref())?,
+        };
+        let timed = layers.has("network.time_like") || base.network.time_like.is_some();
+        imply(&mut layers, "", timed);
+        let (mut config, wrong) = layers.over(&base)?;
+        (config.system, config.description) = (name, description);
+        fill_periods(&mut config, &layers, "");
+        mistakes.extend(wrong);
+        if known {
+            mistakes.extend(config.sampling_faults(&system).into_iter().map(Mistake::from));
+            mistakes.extend(config.penalty().err().map(|error| match error {
+                SamplingError::Config(fault) => Mistake::from(fault),
+                other => Mistake::new("", other),
+            }));
+        }
+        layers.check(mistakes)?;
+        self.run.finish(&mut config)?;
+        let system = self.check(&config)?;
+        if let Some(start) = &start {
+            let coordinates = system.system.coordinates(system.coordinates);
+            start.require(&config, coordinates.iter().map(|c| c.periodic).collect())?;
+        }
+        Ok((config, system))
     }
 
-    /// The configuration that the arguments ask for beside `--resume`: that of the checkpoint where they say nothing.
-    ///
-    /// # Errors
-    /// As [`Args::resolve`].
-    pub fn resolve_beside(&self, saved: &Config) -> Result<Config, CliError> {
-        if self.config.is_some() || self.preset.is_some() || self.from.is_some() {
-            return Ok(self.settle(Some(saved))?.0);
+    /// The configuration below all layers: the preset's, in the shape of a model to start from.
+    fn base(&self, system: &SystemInstance<f64>, layers: &Layers, start: Option<&Start>) -> Result<Config, CliError> {
+        let (preset, known) = match self.preset.unwrap_or(PresetName::Quick) {
+            PresetName::Quick => (Preset::Quick, "quick"),
+            PresetName::Best => (Preset::Best, "best"),
+            PresetName::Paper => (Preset::Paper, "paper"),
+        };
+        let config = match structure(layers, "") {
+            Some(structure) => preset.config_of(system, structure),
+            None => preset.config(system),
+        };
+        let mut config = config.ok_or_else(|| {
+            let name = &system.system.name;
+            CliError::usage(format_args!("--preset {known}: there is none for {name}, use quick or --config"))
+        })?;
+        config.parameters = all_parameters(system);
+        if layers.has("network.known") {
+            (config.network.alpha, config.network.initialization) = (0.0, Initialization::NearZero);
         }
-        let asked = self.asked()?;
-        let mut config = saved.clone();
-        if let Some(asked) = asked {
-            config.system = asked.name;
-            if asked.description.is_some() {
-                config.description = asked.description;
-            }
+        if let Some(start) = start {
+            start.shape(&mut config);
         }
-        self.changed(config)
+        Ok(config)
     }
 
     /// Files that are read.
     pub fn inputs(&self) -> impl Iterator<Item = &Path> {
-        let system = self.system_argument().filter(|system| chosen::is_file(system)).map(Path::new);
-        self.config.iter().map(PathBuf::as_path).chain(system)
-    }
-
-    fn system_argument(&self) -> Option<&str> {
-        self.system.as_deref().or(self.named.as_deref())
+        let system = self.system.as_deref().filter(|system| chosen::is_file(system)).map(Path::new);
+        self.run.config.iter().map(PathBuf::as_path).chain(system)
     }
 
     /// The system that the arguments name; whether there is one of this name is found out later.
-    fn asked(&self) -> Result<Option<Named>, CliError> {
-        let Some(argument) = self.system_argument() else { return Ok(None) };
+    fn requested(&self) -> Result<Option<Named>, CliError> {
+        let Some(argument) = self.system.as_deref() else { return Ok(None) };
         if !chosen::is_file(argument) {
             return Ok(Some(Named { name: argument.to_string(), description: None }));
         }
@@ -181,9 +173,9 @@ impl Args {
     /// # Errors
     /// As [`Args::resolve`]; standard output that cannot be written.
     pub fn print(&self, format: PrintFormat) -> Result<(), CliError> {
-        let (config, system) = self.resolve()?;
+        let (config, system) = self.resolve(None)?;
         if format == PrintFormat::Markdown {
-            return output::print(&configuration_reference());
+            return output::print(&training_reference());
         }
         let described = crate::cli::systems::parameters(&system.system);
         let remark = |name: &str| {
@@ -191,105 +183,23 @@ impl Args {
             let unit = if unit == "1" { String::new() } else { format!(", in {unit}") };
             Some(format!("{range}{unit}; {default} unless set"))
         };
-        let table = toml::Table::try_from(&Config { seed: 0, ..config.clone() }).map_err(CliError::data)?;
-        output::print(&with_seed(&commented(&TRAINING_SECTIONS, &table, &remark), config.seed))
+        let table = toml::Table::try_from(&config).map_err(CliError::data)?;
+        output::print(&commented(Config::KEYS, &table, &remark))
     }
 
-    /// The configuration that files and arguments come to; `saved` has a system where they name none.
-    fn settle(&self, saved: Option<&Config>) -> Result<(Config, SystemInstance<f64>), CliError> {
-        let mut file = self.config.as_deref().map(ConfigFile::read).transpose()?;
-        let from = self.from.clone().or_else(|| file.as_ref()?.text(&["from"]));
-        let start = from.as_deref().map(Start::read).transpose()?;
-        let (Named { name, description }, wrong) = self.named(file.as_mut(), start.as_ref(), saved)?;
-        let system = match &description {
-            Some(description) => description.system().map(Cow::Owned).map_err(Unusable::Description),
-            None => find(&name).map(Cow::Borrowed).map_err(Unusable::System),
-        };
-        let system = wrong.map_or(system, |problem| Err(Unusable::Text(problem)));
-        // Something to tell the types of the other keys by.
-        let usable = match &system {
-            Ok(system) => system.clone(),
-            Err(_) => Cow::Borrowed(find("double-pendulum").map_err(CliError::usage)?),
-        };
-        let mut parameters = match &start {
-            Some(start) if start.header.system == name => start.header.parameters.clone(),
-            _ => BTreeMap::new(),
-        };
-        let mut mistakes: Vec<Mistake> = system.as_ref().err().map(Unusable::mistake).into_iter().collect();
-        parameters.extend(file.as_ref().map(file_parameters).unwrap_or_default());
-        // What is wrong in the arguments is not the file's.
-        match &system {
-            Ok(system) => drop(configure_system::<f64>(system.clone(), &self.param).map_err(CliError::usage)?),
-            Err(_) if file.is_some() && self.system_argument().is_none() => {}
-            Err(error) => return Err(CliError::usage(error)),
-        }
-        let given = self.param.iter().filter_map(|(symbol, text)| Some((symbol.clone(), finite(text).ok()?)));
-        parameters.extend(given);
-        let (system, known) = match (system, configure_values::<f64>(usable.clone(), &parameters)) {
-            (Ok(_), Ok(system)) => (system, true),
-            (Ok(_), Err(error)) => {
-                mistakes.extend(wrong_parameters(&usable, &parameters, &error));
-                (configure_system(usable, &self.param).map_err(CliError::usage)?, false)
+    /// The system: the argument's, the file's, the model's or the checkpoint's.
+    fn named(&self, layers: &Layers, start: Option<&Start>, saved: Option<&Config>) -> Result<Named, CliError> {
+        let place = || self.run.config.as_deref().map(crate::cli::input::name).unwrap_or_default();
+        let requested = self.requested()?;
+        let in_file = layers.text("system");
+        // A description that is wrong is one of the mistakes of the file.
+        let written = layers.get("description").and_then(|value| Description::deserialize(value.clone()).ok());
+        let name = match (&requested, in_file) {
+            (Some(requested), Some(found)) if requested.name != found => {
+                return Err(CliError::usage(format_args!("{} is about {found:?}, not {:?}", place(), requested.name)));
             }
-            (Err(_), _) => (configure_system(usable, &[]).map_err(CliError::usage)?, false),
-        };
-        let mut config = self.preset_config(&system)?;
-        config.parameters = all_parameters(&system);
-        if let Some(start) = &start {
-            start.shape(&mut config);
-        }
-        if let Some(file) = &file {
-            // A file with a structure means what the argument means, and does not write zeros down.
-            if file.text(&["network", "structure"]).is_some_and(|structure| structure != Structure::BlackBox.name()) {
-                config.data.rescaled_fraction = 0.0;
-            }
-            let (filled, wrong) = file.over(&config)?;
-            config = with_periods(file, filled);
-            config.seed = file.large(&["seed"]).unwrap_or(config.seed);
-            mistakes.extend(wrong);
-            if known {
-                mistakes.extend(config.sampling_faults(&system).into_iter().map(Mistake::from));
-                mistakes.extend(config.penalty().err().map(|error| match error {
-                    SamplingError::Config(fault) => Mistake::from(fault),
-                    other => Mistake::new("", other),
-                }));
-            }
-            file.check(mistakes)?;
-        }
-        config.system = name;
-        config.description = description;
-        config.from = from;
-        let config = self.changed(config)?;
-        let system = self.check(&config)?;
-        if let Some(start) = &start {
-            let coordinates = system.system.coordinates(system.coordinates);
-            start.require(&config, coordinates.iter().map(|c| c.periodic).collect())?;
-        }
-        Ok((config, system))
-    }
-
-    /// The system: the argument's, the file's, the model's or the checkpoint's; and what is wrong with the file's description.
-    fn named(
-        &self,
-        file: Option<&mut ConfigFile>,
-        start: Option<&Start>,
-        saved: Option<&Config>,
-    ) -> Result<(Named, Option<String>), CliError> {
-        let place = || self.config.as_deref().map(crate::cli::input::name).unwrap_or_default();
-        let asked = self.asked()?;
-        let in_file = file.as_ref().and_then(|file| file.text(&["system"]));
-        // A system is taken as a whole, not key by key.
-        let written = file.and_then(|file| file.take("description")).map(Description::deserialize).transpose();
-        let (written, wrong) = match written {
-            Ok(written) => (written, None),
-            Err(error) => (None, Some(plain(error.message()))),
-        };
-        let name = match (&asked, in_file) {
-            (Some(asked), Some(found)) if asked.name != found => {
-                return Err(CliError::usage(format_args!("{} is about {found:?}, not {:?}", place(), asked.name)));
-            }
-            (Some(asked), _) => asked.name.clone(),
-            (None, Some(name)) => name,
+            (Some(requested), _) => requested.name.clone(),
+            (None, Some(name)) => name.to_string(),
             (None, None) => {
                 let known = start.map(|start| &start.header.system).or(saved.map(|saved| &saved.system));
                 known.cloned().ok_or_else(|| {
@@ -298,66 +208,20 @@ impl Args {
                 })?
             }
         };
-        let asked = asked.and_then(|asked| asked.description);
-        if let (Some(asked), Some(written)) = (&asked, &written)
-            && asked != written
+        let requested = requested.and_then(|requested| requested.description);
+        if let (Some(requested), Some(written)) = (&requested, &written)
+            && requested != written
         {
-            let file = self.system_argument().unwrap_or_default();
+            let file = self.system.as_deref().unwrap_or_default();
             let problem =
                 format!("{} has another description of {name} than {file}: leave one of the two out", place());
             return Err(CliError::usage(problem));
         }
         let known = start.and_then(|start| start.header.description.clone());
         let candidates = [written, known, saved.and_then(|saved| saved.description.clone())];
-        let description = asked.or(candidates.into_iter().flatten().find(|description| description.name == name));
-        Ok((Named { name, description }, wrong))
+        let description = requested.or(candidates.into_iter().flatten().find(|description| description.name == name));
+        Ok(Named { name, description })
     }
-
-    /// A configuration with the values that arguments name.
-    fn changed(&self, mut config: Config) -> Result<Config, CliError> {
-        for (symbol, value) in &self.param {
-            let value = finite(value).map_err(|e| CliError::usage(format_args!("--param {symbol}={value}: {e}")))?;
-            config.parameters.insert(symbol.clone(), value);
-        }
-        if let Some(seed) = self.seed {
-            config.seed = seed;
-        }
-        if let Some(precision) = self.precision {
-            config.precision = precision.into();
-        }
-        // Whoever takes the configuration finds out what is wrong with its system.
-        let time = config.system().ok().and_then(|system| {
-            let coordinates = system.system.coordinates(system.coordinates);
-            coordinates.into_iter().nth(system.system.time_like?).map(|coordinate| coordinate.name)
-        });
-        self.changes.apply(&mut config, time.as_deref(), "")?;
-        Ok(config)
-    }
-
-    /// The preset's configuration of the system.
-    fn preset_config(&self, system: &SystemInstance<f64>) -> Result<Config, CliError> {
-        let (preset, known) = match self.preset.unwrap_or(PresetName::Quick) {
-            PresetName::Quick => (Preset::Quick, "quick"),
-            PresetName::Best => (Preset::Best, "best"),
-            PresetName::Paper => (Preset::Paper, "paper"),
-        };
-        let config = match self.changes.structure {
-            Some(structure) => preset.config_of(system, structure),
-            None => preset.config(system),
-        };
-        config.ok_or_else(|| {
-            let name = &system.system.name;
-            CliError::usage(format_args!("--preset {known}: there is none for {name}, use quick or --config"))
-        })
-    }
-}
-
-/// The numbers of a file's `[parameters]`.
-fn file_parameters(file: &ConfigFile) -> BTreeMap<String, f64> {
-    let table = file.get(&["parameters"]).and_then(toml::Value::as_table);
-    let number = |value: &toml::Value| value.as_float().or_else(|| value.as_integer().map(|x| x as f64));
-    let entries = table.into_iter().flatten();
-    entries.filter_map(|(symbol, value)| Some((symbol.clone(), number(value)?))).collect()
 }
 
 /// The system that is asked for, by name or with its description.
@@ -374,8 +238,6 @@ enum Unusable {
     System(SystemError),
     #[error("description.{0}")]
     Description(DescriptionError),
-    #[error("{0}")]
-    Text(String),
 }
 
 impl Unusable {
@@ -384,7 +246,6 @@ impl Unusable {
         match self {
             Self::System(error) => Mistake::new("system", error),
             Self::Description(error) => Mistake::new(format!("description.{}", error.key), &error.problem),
-            Self::Text(problem) => Mistake::new("description", problem),
         }
     }
 }
@@ -398,24 +259,4 @@ fn wrong_parameters(system: &System, parameters: &BTreeMap<String, f64>, error: 
     });
     let found: Vec<Mistake> = alone.collect();
     if found.is_empty() { vec![Mistake::new("parameters", error)] } else { found }
-}
-
-/// The configuration with a `t_max` of all epochs where the file changes these alone and the schedule has no periods.
-fn with_periods(file: &ConfigFile, mut config: Config) -> Config {
-    for (k, phase) in config.phases.iter_mut().enumerate() {
-        let has = |key: &str| file.has(&format!("phase[{k}].{key}"));
-        if has("epochs") && !has("t_max") && phase.schedule != Schedule::CosineAnnealing {
-            phase.t_max = phase.epochs as f64;
-        }
-    }
-    config
-}
-
-/// Interval of checkpoints: `10` epochs, `90s`.
-pub fn every(text: &str) -> Result<CheckpointInterval, String> {
-    match text.trim().strip_suffix('s') {
-        Some(text) => seconds(text).map(CheckpointInterval::Seconds),
-        None => whole(1, MOST_EPOCHS)(text).map(CheckpointInterval::Epochs),
-    }
-    .map_err(|problem| format!("{problem}, of epochs, such as 10, or of seconds with an s, such as 90s"))
 }

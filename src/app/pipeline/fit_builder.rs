@@ -1,6 +1,6 @@
 //! A fit of recorded motion in one expression: files and columns, the choices that matter, the result.
 
-use crate::configuration::Precision;
+use crate::configuration::{FRICTION_UNITS, Precision};
 use crate::network::Structure;
 use crate::pipeline::fit::{FitReport, fit};
 use crate::pipeline::fit_config::{FitColumns, FitConfig, FitOptions};
@@ -10,9 +10,6 @@ use crate::pipeline::{Directory, InMemory, Output, PipelineError, Watch};
 use crate::recording::read::read_recording;
 use crate::recording::{Columns, LoadedRecording, Recording, Targets};
 use std::path::PathBuf;
-
-/// Units of a learned dissipation.
-const FRICTION_UNITS: usize = 16;
 
 /// A fit of recorded motion.
 ///

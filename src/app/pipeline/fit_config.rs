@@ -1,80 +1,123 @@
 //! The configuration of a fit, as `config.toml` holds it.
 
-use crate::configuration::{Config, ConfigError};
+use crate::configuration::table::{Below, count, table};
+use crate::configuration::{Config, ConfigError, Faults, Ranges as _};
 use crate::data::PrepareOptions;
-use crate::presets::{Key, Section};
 use crate::recording::smooth::SmoothOptions;
 use crate::recording::{Columns, Targets};
 use crate::shooting::Shooting;
-use serde::{Deserialize, Serialize};
 
-/// Share of the samples that is held out unless told otherwise.
+/// Share of the samples that is held out by default.
 pub const HELD_OUT: f64 = 0.2;
 
-/// Everything that determines a fit.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct FitConfig {
-    /// Targets to learn from; as the data advise if they are not given.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub targets: Option<Targets>,
-    /// Share of the samples that is held out; 0: none.
-    pub held_out: f64,
-    /// Length of the smoothing windows in samples; chosen if it is not given.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub window: Option<usize>,
-    /// Noise of the coordinates in SI units; estimated if it is not given.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub noise: Option<Vec<f64>>,
-    /// Time over which held-out motion is predicted, in s; chosen if it is not given.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub horizon: Option<f64>,
-    /// The files and what their columns mean.
-    #[serde(default)]
-    pub recording: FitColumns,
-    /// Multiple shooting, of a fit to the motion itself.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub shooting: Option<Shooting>,
-    /// The supervised training.
-    pub training: Config,
+/// Samples of a smoothing window at most.
+const MOST_WINDOW: usize = 1_000_001;
+
+table! {
+    /// Everything that determines a fit.
+    pub struct FitConfig {
+        /// What is learned from: measured accelerations, smoothed ones, or the motion itself; as the data advise unless set.
+        #[key("measured, smoothed, motion", example = "\"smoothed\"", flag = "targets")]
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub targets: Option<Targets> = None,
+        /// Share of the samples held out to judge the model; 0: none.
+        #[key("0 to below 1", example = "0.2", flag = "hold-out", check = |x| (0.0..1.0).contains(x))]
+        pub held_out: f64 = HELD_OUT,
+        /// Length of the smoothing windows; chosen unless set.
+        #[key("an odd number of samples", example = "21", flag = "window", check = count(MOST_WINDOW))]
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub window: Option<usize> = None,
+        /// Noise of every coordinate; estimated unless set.
+        #[key("in SI units", example = "[0.01, 0.01]", flag = "noise", check = positive)]
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub noise: Option<Vec<f64>> = None,
+        /// How far ahead held-out motion is predicted; chosen unless set.
+        #[key("above 0, in s", example = "0.5", flag = "horizon", check = positive)]
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub horizon: Option<f64> = None,
+        /// The files and what their columns mean, as the options of the same names say it.
+        #[table("recording", Below::Keys(FitColumns::KEYS))]
+        pub recording: FitColumns = FitColumns::default(),
+        /// Multiple shooting, of a fit to the motion itself.
+        #[table("shooting", Below::Keys(Shooting::KEYS))]
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub shooting: Option<Shooting> = None,
+        /// The supervised training.
+        #[table("training", Below::Keys(Config::KEYS))]
+        pub training: Config = Config { system: "measured".to_string(), ..Config::default() },
+    }
 }
 
-/// The files of recorded motion and what their columns mean. A fit in memory needs none of it but names of its forces, if they
-/// are to have any.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct FitColumns {
-    /// Files: CSV, NPY or NPZ.
-    pub files: Vec<String>,
-    /// Columns of the coordinates.
-    pub coords: Vec<String>,
-    /// Columns of measured velocities.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub velocity: Vec<String>,
-    /// Columns of measured accelerations.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub acceleration: Vec<String>,
-    /// Columns of known external generalized forces.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub force: Vec<String>,
-    /// Column of time.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub time: Option<String>,
-    /// Samples per second, if no column holds the time.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub rate: Option<f64>,
-    /// Column whose value tells the trajectories of a file apart.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub trajectory: Option<String>,
-    /// Coordinates that are angles.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub periodic: Vec<String>,
-    /// Units of columns that are not SI: `COLUMN=UNIT`.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub units: Vec<String>,
-    /// Names of all columns of files without a header.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub columns: Vec<String>,
+table! {
+    /// The files of recorded motion and what their columns mean. A fit in memory needs none of it but names of its forces, if they
+    /// are to have any.
+    pub struct FitColumns {
+        /// Files of recorded motion: CSV, NPY or NPZ.
+        #[key("paths", example = "[\"data.csv\"]")]
+        pub files: Vec<String> = Vec::new(),
+        /// Columns of the coordinates, by name or by number from 1.
+        #[key("columns", example = "[\"q1\", \"q2\"]")]
+        pub coords: Vec<String> = Vec::new(),
+        /// Columns of measured velocities.
+        #[key("columns", example = "[\"v1\", \"v2\"]")]
+        #[serde(skip_serializing_if = "Vec::is_empty")]
+        pub velocity: Vec<String> = Vec::new(),
+        /// Columns of measured accelerations.
+        #[key("columns", example = "[\"a1\", \"a2\"]")]
+        #[serde(skip_serializing_if = "Vec::is_empty")]
+        pub acceleration: Vec<String> = Vec::new(),
+        /// Columns of known external generalized forces.
+        #[key("columns", example = "[\"f1\", \"f2\"]")]
+        #[serde(skip_serializing_if = "Vec::is_empty")]
+        pub force: Vec<String> = Vec::new(),
+        /// Column of time.
+        #[key("a column", example = "\"t\"")]
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub time: Option<String> = None,
+        /// Rate, if no column holds the time.
+        #[key("above 0, in samples per second", example = "100.0", check = positive)]
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub rate: Option<f64> = None,
+        /// Column whose value tells the trajectories of a file apart.
+        #[key("a column", example = "\"run\"")]
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub trajectory: Option<String> = None,
+        /// Coordinates that are angles.
+        #[key("coordinates", example = "[\"q1\"]")]
+        #[serde(skip_serializing_if = "Vec::is_empty")]
+        pub periodic: Vec<String> = Vec::new(),
+        /// Units of columns that are not SI, or factors to SI.
+        #[key("COLUMN=UNIT", example = "[\"q1=deg\"]", check = |text| unit(text).is_some())]
+        #[serde(skip_serializing_if = "Vec::is_empty")]
+        pub units: Vec<String> = Vec::new(),
+        /// Names of all columns of files without a header.
+        #[key("names", example = "[\"t\", \"q1\"]")]
+        #[serde(skip_serializing_if = "Vec::is_empty")]
+        pub columns: Vec<String> = Vec::new(),
+    }
+}
+
+/// A finite number above 0.
+fn positive(x: &f64) -> bool {
+    x.is_finite() && *x > 0.0
+}
+
+/// Column and unit of `column=unit`.
+pub(crate) fn unit(text: &str) -> Option<(String, String)> {
+    let (column, unit) = text.split_once('=')?;
+    let (column, unit) = (column.trim(), unit.trim());
+    (!column.is_empty() && !unit.is_empty()).then(|| (column.to_string(), unit.to_string()))
+}
+
+impl FitColumns {
+    /// The meaning of the columns.
+    pub(crate) fn meaning(&self) -> Columns {
+        let Self { coords, velocity, acceleration, force, time, rate, trajectory, periodic, units, columns, .. } =
+            self.clone();
+        let units = units.iter().filter_map(|text| unit(text)).collect();
+        let names = (!columns.is_empty()).then_some(columns);
+        Columns { coords, velocity, acceleration, force, time, rate, trajectory, periodic, units, names }
+    }
 }
 
 impl From<&Columns> for FitColumns {
@@ -105,33 +148,23 @@ impl FitConfig {
         other
     }
 
-    /// Every value out of range, for `n` coordinates, in the order of the keys. What the data alone decide is not looked at.
+    /// Every value out of range, for `n` coordinates. What the data alone decide is not looked at.
     pub(crate) fn faults(&self, n: usize) -> Vec<ConfigError> {
-        let fault = |field: &str, expected: &'static str, found: String| ConfigError {
-            field: field.to_string(),
-            expected: expected.into(),
-            found,
-        };
-        let mut found = Vec::new();
-        if !(0.0..1.0).contains(&self.held_out) {
-            found.push(fault("held_out", "0 or a share below 1", self.held_out.to_string()));
+        let mut faults = Faults::default();
+        // The training's own come with what its keys decide together.
+        Self { training: Config::default(), ..self.clone() }.ranges("", &mut faults);
+        let (time, rate) = (&self.recording.time, self.recording.rate);
+        if let (Some(_), Some(rate)) = (time, rate) {
+            faults.check(false, "recording.rate", "no rate beside a column of times", rate.to_string());
         }
-        if let Some(window) = self.window.filter(|window| *window == 0) {
-            found.push(fault("window", "a whole number above 0", window.to_string()));
-        }
-        let numbers =
-            self.noise.iter().flatten().map(|x| ("noise", x)).chain(self.horizon.iter().map(|x| ("horizon", x)));
-        for (key, x) in numbers.filter(|(_, x)| !(x.is_finite() && **x > 0.0)) {
-            found.push(fault(key, "a finite number above 0", x.to_string()));
-        }
-        let training = self.training.faults(n).into_iter().map(|mut fault| {
-            fault.field.insert_str(0, "training.");
-            fault
-        });
         let decided = ["training.data.", "position", "velocity", "log_uniform"];
-        let training = training.filter(|fault| !decided.iter().any(|part| fault.field.contains(part)));
-        found.extend(training.chain(self.shooting.iter().flat_map(Shooting::faults)));
-        found
+        for mut fault in self.training.faults(n) {
+            fault.field.insert_str(0, "training.");
+            if !decided.iter().any(|part| fault.field.contains(part)) {
+                faults.0.push(fault);
+            }
+        }
+        faults.0
     }
 }
 
@@ -163,55 +196,3 @@ impl FitOptions {
         PrepareOptions { smoothing, held_out: self.held_out, seed: self.seed, ..PrepareOptions::default() }
     }
 }
-
-const fn optional(name: &'static str, example: &'static str, values: &'static str, purpose: &'static str) -> Key {
-    Key { name, values, purpose, example }
-}
-
-/// The tables of a fit beside multiple shooting and those of a training.
-pub const FIT_SECTIONS: [Section<'static>; 2] = [
-    Section {
-        name: "",
-        purpose: "",
-        keys: &[
-            optional(
-                "targets",
-                "\"smoothed\"",
-                "measured, smoothed, motion",
-                "What is learned from: measured accelerations, smoothed ones, or the motion itself; as the data advise unless \
-                 set.",
-            ),
-            optional("held_out", "0.2", "0 to below 1", "Share of the samples held out to judge the model; 0: none."),
-            optional("window", "21", "an odd number of samples", "Length of the smoothing windows; chosen unless set."),
-            optional("noise", "[0.01, 0.01]", "in SI units", "Noise of every coordinate; estimated unless set."),
-            optional(
-                "horizon",
-                "0.5",
-                "above 0, in s",
-                "How far ahead held-out motion is predicted; chosen unless set.",
-            ),
-        ],
-    },
-    Section {
-        name: "recording",
-        purpose: "The files and what their columns mean, as the options of the same names say it.",
-        keys: &[
-            optional("files", "[\"data.csv\"]", "paths", "Files of recorded motion: CSV, NPY or NPZ."),
-            optional(
-                "coords",
-                "[\"q1\", \"q2\"]",
-                "columns",
-                "Columns of the coordinates, by name or by number from 1.",
-            ),
-            optional("velocity", "[\"v1\", \"v2\"]", "columns", "Columns of measured velocities."),
-            optional("acceleration", "[\"a1\", \"a2\"]", "columns", "Columns of measured accelerations."),
-            optional("force", "[\"f1\", \"f2\"]", "columns", "Columns of known external generalized forces."),
-            optional("time", "\"t\"", "a column", "Column of time."),
-            optional("rate", "100.0", "above 0, in samples per second", "Rate, if no column holds the time."),
-            optional("trajectory", "\"run\"", "a column", "Column whose value tells the trajectories of a file apart."),
-            optional("periodic", "[\"q1\"]", "coordinates", "Coordinates that are angles."),
-            optional("units", "[\"q1=deg\"]", "COLUMN=UNIT", "Units of columns that are not SI, or factors to SI."),
-            optional("columns", "[\"t\", \"q1\"]", "names", "Names of all columns of files without a header."),
-        ],
-    },
-];

@@ -98,7 +98,7 @@ pub use file_names::MODEL;
 pub(crate) use file_names::{CAPTIONS, RECORD};
 pub use fit::{FitReport, fit};
 pub use fit_builder::Fit;
-pub(crate) use fit_config::FIT_SECTIONS;
+pub(crate) use fit_config::unit;
 pub use fit_config::{FitColumns, FitConfig, FitOptions, HELD_OUT};
 pub use hold_out::{HoldOut, HoldOutOptions, evaluate_hold_out};
 pub use model::{model_file, trained_on};

@@ -2,6 +2,7 @@
 
 use crate::configuration::error::{ConfigError, Faults, place};
 use crate::configuration::penalty::Regularizer;
+use crate::configuration::table::{Below, Key, Ranges as _, count, from_zero, table};
 use crate::lagrangian::{Description, SystemInstance, pair};
 use crate::network::file::MAX_WIDTH;
 use crate::network::{ActivationChoice, Factor, Form, Initialization, InputLayer, Radial, Structure};
@@ -47,61 +48,89 @@ pub(crate) const MOST_EPOCHS: usize = 1 << 24;
 /// States of a set, or of a step, at most; their memory is looked at beside.
 const MOST_STATES: usize = 1 << 30;
 /// Largest weight of a penalty: beside it single precision has no digit of the loss left.
-pub(crate) const MOST_LAMBDA: f64 = 1e12;
+const MOST_LAMBDA: f64 = 1e12;
+/// Weight of a penalty, if no other one is chosen.
+pub(crate) const PENALTY: f64 = 100.0;
 /// Highest learning rate.
 pub(crate) const MOST_RATE: f64 = 1000.0;
+/// Largest seed: TOML has no larger whole number.
+const MOST_SEED: u64 = i64::MAX as u64;
 
-/// A complete training run. Keys that are not listed are refused.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Config {
-    /// Name of the system.
-    pub system: String,
-    /// Seed of everything random: states, weights, order of the data.
-    pub seed: u64,
-    /// Precision of weights and arithmetic.
-    pub precision: Precision,
-    /// Model whose weights the training starts from, instead of random ones: a file, or the directory of a run.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub from: Option<String>,
-    /// Parameters of the system; those that are not given have its defaults.
-    #[serde(default)]
-    pub parameters: BTreeMap<String, f64>,
-    /// The system itself, if it is none of the catalogue's; its name is `system`.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub description: Option<Description>,
-    /// Sampled states.
-    pub data: Data,
-    /// Shape of the network.
-    pub network: Network,
-    /// Penalty on the mass matrix.
-    #[serde(default)]
-    pub penalty: Regularizer,
-    /// Update rule.
-    pub optimizer: Optimizer,
-    /// Phases in order, each from the best weights of the one before.
-    #[serde(rename = "phase")]
-    pub phases: Vec<Phase>,
-    /// Full-batch L-BFGS after the last phase.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub lbfgs: Option<Lbfgs>,
+table! {
+    /// A complete training run. Keys that are left out have the values of a black box by the preset `quick`; others are refused.
+    pub struct Config {
+        /// Name of the system.
+        #[key("a name, see `lnn systems`", example = "\"double-pendulum\"", flag = "name")]
+        pub system: String = String::new(),
+        /// Seed of everything random: states, weights, order of the data.
+        #[key("0 to 2^63 - 1", flag = "seed", check = |x| *x <= MOST_SEED)]
+        pub seed: u64 = 0,
+        /// Precision of weights and arithmetic.
+        #[key("f32, f64", flag = "precision")]
+        pub precision: Precision = Precision::F32,
+        /// Model whose weights the training starts from, instead of random ones; the network must be the model's.
+        #[key("a model file or the directory of a run", example = "\"runs/other\"", flag = "from")]
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub from: Option<String> = None,
+        /// Parameters of the system, in its units (`lnn systems` lists them).
+        ///
+        /// Those that are not given have its defaults.
+        #[table("parameters", Below::Open)]
+        pub parameters: BTreeMap<String, f64> = BTreeMap::new(),
+        /// A system that is none of the program's own: what its file says, see the page on system files.
+        ///
+        /// Its name is `system`.
+        #[table("description", Below::Whole)]
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub description: Option<Description> = None,
+        /// States that are drawn, uniformly within bounds unless said otherwise.
+        #[table("data", Below::Keys(Data::KEYS))]
+        pub data: Data = Data::default(),
+        /// Shape of the network.
+        #[table("network", Below::Keys(Network::KEYS))]
+        pub network: Network = Network::default(),
+        /// Penalty on a wrong signature of the mass matrix.
+        #[table("penalty", Below::Keys(PENALTY_KEYS))]
+        pub penalty: Regularizer = Regularizer::Eigenvalue { lambda: PENALTY },
+        /// How weights are updated.
+        #[table("optimizer", Below::Keys(Optimizer::KEYS))]
+        pub optimizer: Optimizer = Optimizer::default(),
+        /// A stretch of training; may stand several times, each from the best weights of the one before.
+        #[table("phase", Below::Keys(Phase::KEYS))]
+        #[serde(rename = "phase")]
+        pub phases: Vec<Phase> = vec![Phase::default()],
+        /// Full-batch L-BFGS in double precision after the last phase; without this table there is none.
+        #[table("lbfgs", Below::Keys(Lbfgs::KEYS))]
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub lbfgs: Option<Lbfgs> = None,
+    }
 }
 
-/// Full-batch L-BFGS in double precision on the states of the last phase, from the best weights so far.
-///
-/// Keys that are not given have their defaults: 100 iterations, 20 pairs.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Lbfgs {
-    /// Iterations at most.
-    pub iterations: usize,
-    /// Pairs of steps and gradient differences that are kept.
-    pub memory: usize,
-}
+/// The keys of [`Regularizer`].
+const PENALTY_KEYS: &[Key] = &[
+    Key::new(
+        "kind",
+        "What is penalised. Beside a time-like coordinate none or lorentzian-sylvester, which wants a negative element of \
+         the time: not for metrics inside of a horizon or of an ergosphere, where it is positive.",
+    )
+    .values("none, eigenvalue, sylvester, lorentzian-sylvester")
+    .flag("penalty"),
+    Key::new("lambda", "Weight beside the loss; not with kind none.")
+        .values("0 to 10^12")
+        .example("100.0")
+        .flag("lambda"),
+    Key::new("time", "The time-like coordinate; with lorentzian-sylvester only.").values("a coordinate").example("\"t\""),
+];
 
-impl Default for Lbfgs {
-    fn default() -> Self {
-        Self { iterations: 100, memory: 20 }
+table! {
+    /// Full-batch L-BFGS in double precision on the states of the last phase, from the best weights so far.
+    pub struct Lbfgs {
+        /// Iterations at most.
+        #[key("1 to 2^24", example = "100", check = count(MOST_EPOCHS))]
+        pub iterations: usize = 100,
+        /// Pairs of steps and gradient differences that are kept.
+        #[key("1 to 1000", example = "20", check = count(1000))]
+        pub memory: usize = 20,
     }
 }
 
@@ -109,51 +138,66 @@ fn is_zero(x: &f64) -> bool {
     *x == 0.0
 }
 
-/// States that are sampled uniformly within bounds.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Data {
-    /// Number of training states.
-    pub training: usize,
-    /// Number of validation states; the best epoch is chosen on them.
-    pub validation: usize,
-    /// Fraction of the training states of a system with a mass shell that are drawn off it: their velocity is `u` times one on
-    /// the shell, `|u|` from 0.03 to 1 and uniform in its logarithm, of either sign, their acceleration `u^2` times as
-    /// large, as for every geodesic, and their residuals weigh `1/u^2` in the training loss. On the shell alone the metric
-    /// is not identifiable.
-    #[serde(default, skip_serializing_if = "is_zero")]
-    pub rescaled_fraction: f64,
-    /// Fraction of the training states that lie on exact motions from the starts of the system's trajectory test, at any
-    /// time with equal chance, as long as these stay within the bounds of the phase. A [`Phase::log_uniform`] coordinate is so
-    /// in half of the starts as well; `rescaled_fraction` and `acceleration_weighting` treat these states like all others.
-    #[serde(default, skip_serializing_if = "is_zero")]
-    pub trajectory_fraction: f64,
-    /// With a number `f` above 0 a training state weighs `f m / (f m + |a|)`, `|a|` the mean size of its scaled accelerations
-    /// and `m` the mean over all states: errors count relative to accelerations above `f m`, and a few large ones do not
-    /// outweigh the others.
-    ///
-    /// A fit adds the error to expect of a smoothed acceleration to `|a|`; with [radial coordinates](Network::radial) a state weighs
-    /// `1/(|a| + f m)`, `m` the median about as far from the centre. The same weights choose its best epoch.
-    #[serde(default, skip_serializing_if = "is_zero")]
-    pub acceleration_weighting: f64,
-    /// Names of Cartesian coordinates around a centre: all states are drawn in a [`Shell`] around it, training, validation and test,
-    /// instead of the boxes of these coordinates and of the velocities; empty for none.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub shell: Vec<String>,
-    /// Lowest and highest distance of the shell from its centre, in the unit of the coordinates.
-    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "pair::optional")]
-    pub shell_radius: Option<[f64; 2]>,
-    /// Largest rapidity of states in a shell; 1 if left out.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub rapidity: Option<f64>,
-    /// Number of fresh states on which the final model is judged.
-    pub test: usize,
-    /// Validation and test bounds of each coordinate; states of one's own, recorded ones, need none.
-    #[serde(default, skip_serializing_if = "Vec::is_empty", deserialize_with = "pair::list")]
-    pub validation_position: Vec<[f64; 2]>,
-    /// Validation and test bounds of each velocity; those of a velocity that a mass shell fixes mean nothing.
-    #[serde(default, skip_serializing_if = "Vec::is_empty", deserialize_with = "pair::list")]
-    pub validation_velocity: Vec<[f64; 2]>,
+table! {
+    /// States that are sampled uniformly within bounds.
+    pub struct Data {
+        /// Number of training states of every phase.
+        #[key("1 to 2^30", check = count(MOST_STATES))]
+        pub training: usize = 60_000,
+        /// Number of validation states; the best epoch is chosen on them.
+        #[key("1 to 2^30", check = count(MOST_STATES))]
+        pub validation: usize = 12_000,
+        /// Fraction of the training states of a geodesic that are slowed down or reversed, off the mass shell: on the shell
+        /// alone the metric is not identifiable.
+        ///
+        /// Their velocity is `u` times one on the shell, `|u|` from 0.03 to 1 and uniform in its logarithm, of either sign, their
+        /// acceleration `u^2` times as large, as for every geodesic, and their residuals weigh `1/u^2` in the training loss.
+        #[key("0 to 1; 0 unless set", example = "0.75", check = |x| (0.0..=1.0).contains(x))]
+        #[serde(skip_serializing_if = "is_zero")]
+        pub rescaled_fraction: f64 = 0.0,
+        /// Fraction of the training states that lie on exact motions from the starts of the trajectory test.
+        ///
+        /// They lie at any time with equal chance, as long as the motions stay within the bounds of the phase. A
+        /// [`Phase::log_uniform`] coordinate is so in half of the starts as well; `rescaled_fraction` and `acceleration_weighting`
+        /// treat these states like all others.
+        #[key("0 to 1; 0 unless set", example = "0.3", check = |x| (0.0..=1.0).contains(x))]
+        #[serde(skip_serializing_if = "is_zero")]
+        pub trajectory_fraction: f64 = 0.0,
+        /// With f above 0 a state weighs f m / (f m + |a|), |a| its scaled acceleration and m the mean of all: a few huge
+        /// accelerations do not outweigh the others. A fit adds the error to expect to |a|.
+        ///
+        /// With [radial coordinates](Network::radial) a state of a fit weighs `1/(|a| + f m)`, `m` the median about as far from the
+        /// centre. The same weights choose the best epoch of a fit.
+        #[key("from 0; 0 unless set", example = "0.1", check = from_zero)]
+        #[serde(skip_serializing_if = "is_zero")]
+        pub acceleration_weighting: f64 = 0.0,
+        /// All states lie in a shell around the centre, instead of their bounds: directions uniform, distances uniform in their
+        /// logarithm, velocities time-like; acceleration_weighting then compares with states about as far from the centre.
+        ///
+        /// See [`Shell`]; empty for none.
+        #[key("names of Cartesian coordinates around a centre", example = "[\"x\", \"y\", \"z\"]")]
+        #[serde(skip_serializing_if = "Vec::is_empty")]
+        pub shell: Vec<String> = Vec::new(),
+        /// Lowest and highest distance of the shell from its centre.
+        #[key("[low, high] above 0, in the unit of the coordinates", example = "[1.2, 40]")]
+        #[serde(skip_serializing_if = "Option::is_none", deserialize_with = "pair::optional")]
+        pub shell_radius: Option<[f64; 2]> = None,
+        /// Largest rapidity of states in a shell, in the frame of an observer at rest in the surface of equal time.
+        #[key("from 0; 1 unless set", example = "1.2", check = from_zero)]
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub rapidity: Option<f64> = None,
+        /// Number of fresh states on which the final model is judged.
+        #[key("1 to 2^30", check = count(MOST_STATES))]
+        pub test: usize = 12_000,
+        /// Bounds of the coordinates of validation and test states; recorded states need none of the four bounds.
+        #[key("[low, high] for each coordinate, in its unit")]
+        #[serde(skip_serializing_if = "Vec::is_empty", deserialize_with = "pair::list")]
+        pub validation_position: Vec<[f64; 2]> = Vec::new(),
+        /// Bounds of their velocities; those of a velocity that a mass shell fixes mean nothing.
+        #[key("[low, high] for each coordinate, in its unit per unit of time")]
+        #[serde(skip_serializing_if = "Vec::is_empty", deserialize_with = "pair::list")]
+        pub validation_velocity: Vec<[f64; 2]> = Vec::new(),
+    }
 }
 
 /// States in a shell around a centre: directions uniform over the sphere, distances uniform in their logarithm.
@@ -189,57 +233,75 @@ impl Data {
     }
 }
 
-/// Shape of the network.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Network {
-    /// Widths of the hidden layers; the branches of a hybrid share them equally.
-    pub hidden: Vec<usize>,
-    /// Activation of the hidden layers.
-    pub activation: ActivationChoice,
-    /// Factor of the added `|v|^2` of scaled velocities.
-    pub alpha: f64,
-    /// Name of the coordinate whose square counts negative in the added term, `alpha (-t'^2 + x'^2 + ..)`; without it all
-    /// squares are added.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub time_like: Option<String>,
-    /// Scaling of the coordinates.
-    pub scaling: Scaling,
-    /// Feed sine and cosine of periodic coordinates.
-    pub embed_periodic: bool,
-    /// Layer before the first dense one.
-    #[serde(default)]
-    pub input_layer: InputLayer,
-    /// Units of a learned Rayleigh dissipation; without it the motion keeps its energy.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub dissipation: Option<usize>,
-    /// Structure of the Lagrangian: how it is made of the network's outputs.
-    #[serde(default)]
-    pub structure: Structure,
-    /// Factor of the kinetic energy or the metric of a structure.
-    #[serde(default)]
-    pub factor: Factor,
-    /// Names of the coordinates that the Lagrangian does not depend on.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub cyclic: Vec<String>,
-    /// Names of groups of Cartesian coordinates around a centre that enter by direction and distance, see [`Radial`].
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub radial: Vec<Vec<String>>,
-    /// Distance that counts as 1 for them, in the unit of the coordinates; 1 if left out.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub radial_unit: Option<f64>,
-    /// `true` if the Lagrangian is even in the velocities.
-    #[serde(default)]
-    pub even_in_v: bool,
-    /// `true` if `alpha` is learned.
-    #[serde(default)]
-    pub learn_alpha: bool,
-    /// A Lagrangian that is known and added: a grey box.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub known: Option<Known>,
-    /// Distribution of the initial weights.
-    pub initialization: Initialization,
+table! {
+    /// Shape of the network.
+    pub struct Network {
+        /// Widths of the hidden layers; a hybrid's branches share them.
+        #[key("1 to 64 widths of 1 to 65536", example = "[128, 128, 128]", flag = "hidden", check = count(MAX_WIDTH))]
+        pub hidden: Vec<usize> = vec![128; 3],
+        /// Activation of the hidden layers; quadratic-softplus is two networks of half the widths.
+        #[key("gelu, softplus, x-tanh, tanh, quadratic, quadratic-softplus", flag = "activation")]
+        pub activation: ActivationChoice = ActivationChoice::Gelu,
+        /// How the Lagrangian is made of the network's outputs; see structures.
+        #[key("black-box, mechanical, metric", flag = "structure")]
+        pub structure: Structure = Structure::BlackBox,
+        /// How kinetic energy or metric of a structure are factored: a triangle, or a rectangle of three squares a coordinate, which
+        /// is smooth where a triangle has a root.
+        #[key("triangle, rectangle")]
+        pub factor: Factor = Factor::Triangle,
+        /// Coordinates that the Lagrangian does not depend on.
+        #[key("names of coordinates", example = "[\"t\"]", flag = "cyclic")]
+        #[serde(skip_serializing_if = "Vec::is_empty")]
+        pub cyclic: Vec<String> = Vec::new(),
+        /// Coordinates that enter by direction and distance R from a centre, as (x_i/R) ln(R/u) and (x_i/R) (u/R): for fields
+        /// that reach from near to far.
+        ///
+        /// See [`Radial`].
+        #[key("lists of names of Cartesian coordinates", example = "[[\"x\", \"y\", \"z\"]]")]
+        #[serde(skip_serializing_if = "Vec::is_empty")]
+        pub radial: Vec<Vec<String>> = Vec::new(),
+        /// The distance u of radial coordinates.
+        #[key("a positive number; 1 unless set", example = "1.2", check = |x| x.is_finite() && *x > 0.0)]
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub radial_unit: Option<f64> = None,
+        /// Make the Lagrangian even in the velocities.
+        #[key("true, false", flag = "even-in-v")]
+        pub even_in_v: bool = false,
+        /// Factor of the added |v|^2 of scaled velocities, of a black box.
+        #[key("a finite number", check = |x| x.is_finite())]
+        pub alpha: f64 = 1.0,
+        /// Learn alpha too; a black box only.
+        #[key("true, false", flag = "learn-alpha")]
+        pub learn_alpha: bool = false,
+        /// A Lagrangian that is known and added; its parameters marked learn are learned beside the weights.
+        #[key("a system file, or its tables", example = "\"pendulum.toml\"", flag = "known")]
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub known: Option<Known> = None,
+        /// Its square counts negative in the added term, alpha (-t'^2 + x'^2 + ..); without it all squares are added.
+        #[key("a coordinate", example = "\"t\"", flag = "timelike")]
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub time_like: Option<String> = None,
+        /// physical divides q, v and a of a coordinate by the largest of |q| and |v| over the training states.
+        #[key("physical, none")]
+        pub scaling: Scaling = Scaling::Physical,
+        /// Feed sine and cosine of angles instead of the angles.
+        #[key("true, false")]
+        pub embed_periodic: bool = true,
+        /// What stands before the first dense layer: nothing or a dynamic tanh.
+        #[key("none, dyt")]
+        pub input_layer: InputLayer = InputLayer::None,
+        /// Units of a learned friction, a Rayleigh dissipation; without it the motion keeps its energy.
+        #[key("1 to 65536 units", example = "16", flag = "friction?", check = count(MAX_WIDTH))]
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub dissipation: Option<usize> = None,
+        /// Distribution of the initial weights.
+        #[key("default, variance-preserving, cranmer, cranmer-paper, near-zero")]
+        pub initialization: Initialization = Initialization::Default,
+    }
 }
+
+/// Units of a learned friction, if no other number is chosen: the example of its key.
+pub(crate) const FRICTION_UNITS: usize = 16;
 
 /// The known part of a grey box: a file, as a user writes it, or what it says, as a run keeps it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -251,48 +313,61 @@ pub enum Known {
     Description(Box<Description>),
 }
 
-/// Update rule.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Optimizer {
+table! {
     /// Update rule.
-    pub method: Method,
-    /// States per step.
-    pub batch: usize,
-    /// L2 weight decay, added to the gradient.
-    pub weight_decay: f64,
-    /// The gradient's norm is cut to this.
-    pub clip: f64,
-    /// Weights are averaged over about `1/(1 - averaging)` steps for validation and the final model; 0: not averaged.
-    pub averaging: f64,
-    /// Reaction to a step that fails.
-    pub on_failure: OnFailure,
+    pub struct Optimizer {
+        /// Update rule.
+        #[key("soap, radam, adam")]
+        pub method: Method = Method::Soap,
+        /// States per step.
+        #[key("1 to 2^30 states", check = count(MOST_STATES))]
+        pub batch: usize = 128,
+        /// L2 weight decay, added to the gradient.
+        #[key("from 0", check = from_zero)]
+        pub weight_decay: f64 = 1e-6,
+        /// The gradient's norm is cut to this.
+        #[key("above 0, inf for none", check = |x| *x > 0.0)]
+        pub clip: f64 = 1.0,
+        /// Weights are averaged over about 1/(1 - averaging) steps for validation and the final model.
+        #[key("0 to below 1", check = |x| (0.0..1.0).contains(x))]
+        pub averaging: f64 = 0.0,
+        /// What happens to a state or a step that is not finite: it is left out, or training stops.
+        #[key("skip, stop")]
+        pub on_failure: OnFailure = OnFailure::Skip,
+    }
 }
 
-/// A stretch of training with its own states and learning rates.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Phase {
-    /// Passes through the training states.
-    pub epochs: usize,
-    /// Initial learning rate.
-    pub rate: f64,
-    /// Lowest learning rate.
-    pub eta_min: f64,
-    /// Course of the rate.
-    pub schedule: Schedule,
-    /// Epochs from highest to lowest rate of `cosine-annealing`.
-    pub t_max: f64,
-    /// Training bounds of each coordinate; states of one's own, recorded ones, need none.
-    #[serde(default, skip_serializing_if = "Vec::is_empty", deserialize_with = "pair::list")]
-    pub position: Vec<[f64; 2]>,
-    /// Training bounds of each velocity; those of a velocity that a mass shell fixes mean nothing.
-    #[serde(default, skip_serializing_if = "Vec::is_empty", deserialize_with = "pair::list")]
-    pub velocity: Vec<[f64; 2]>,
-    /// For which coordinates half of the training states are uniform in the logarithm, where the low end of the bounds needs more
-    /// of them than its length; none if empty.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub log_uniform: Vec<bool>,
+table! {
+    /// A stretch of training with its own states and learning rates.
+    pub struct Phase {
+        /// Passes through the training states.
+        #[key("1 to 2^24", check = count(MOST_EPOCHS))]
+        pub epochs: usize = 40,
+        /// Learning rate at the start.
+        #[key("above 0 to 1000", check = |x| *x > 0.0 && *x <= MOST_RATE)]
+        pub rate: f64 = 5e-3,
+        /// Lowest learning rate.
+        #[key("0 to the rate")]
+        pub eta_min: f64 = 0.0,
+        /// How the rate moves: not at all, by half a cosine over the phase, falling and rising again every 2 t_max.
+        #[key("constant, cosine, cosine-annealing")]
+        pub schedule: Schedule = Schedule::Cosine,
+        /// Epochs from highest to lowest rate of cosine-annealing.
+        #[key("above 0, in epochs", check = |x| x.is_finite() && *x > 0.0)]
+        pub t_max: f64 = 40.0,
+        /// Bounds of the training states' coordinates.
+        #[key("[low, high] for each coordinate, in its unit")]
+        #[serde(skip_serializing_if = "Vec::is_empty", deserialize_with = "pair::list")]
+        pub position: Vec<[f64; 2]> = Vec::new(),
+        /// Bounds of their velocities; those of a velocity that a mass shell fixes mean nothing.
+        #[key("[low, high] for each coordinate, in its unit per unit of time")]
+        #[serde(skip_serializing_if = "Vec::is_empty", deserialize_with = "pair::list")]
+        pub velocity: Vec<[f64; 2]> = Vec::new(),
+        /// For which coordinates half of the states are uniform in the logarithm.
+        #[key("true or false for each coordinate", example = "[true, false]")]
+        #[serde(skip_serializing_if = "Vec::is_empty")]
+        pub log_uniform: Vec<bool> = Vec::new(),
+    }
 }
 
 impl Network {
@@ -306,9 +381,7 @@ impl Network {
     ) -> Result<Option<usize>, ConfigError> {
         self.time_like.as_ref().map(|name| place("network.time_like", name, coordinates)).transpose()
     }
-}
 
-impl Network {
     /// Knowledge of the Lagrangian beforehand, for coordinates with these names.
     ///
     /// # Errors
@@ -329,7 +402,7 @@ impl Network {
             learn_alpha: self.learn_alpha,
             known: match &self.known {
                 Some(Known::Description(description)) => Some(description.clone()),
-                // Whoever reads a configuration reads the file too.
+                // The file is read with the configuration.
                 Some(Known::File(_)) | None => None,
             },
         })
@@ -337,7 +410,7 @@ impl Network {
 }
 
 impl Config {
-    /// Checks every range, for `n` coordinates; bounds of states may be left out, for who has states needs none.
+    /// Checks every range, for `n` coordinates; bounds of states may be left out, since a training on given states needs none.
     ///
     /// # Errors
     /// The first value out of range.
@@ -345,103 +418,65 @@ impl Config {
         self.faults(n).into_iter().next().map_or(Ok(()), Err)
     }
 
-    /// Every value out of range, for a training on states of `n` coordinates, in the order of the keys.
+    /// Every value out of range, for a training on states of `n` coordinates.
     pub(crate) fn faults(&self, n: usize) -> Vec<ConfigError> {
-        self.faults_with(n, false)
+        let mut faults = Faults::default();
+        self.ranges("", &mut faults);
+        self.common_faults(n, false, &mut faults);
+        // With a known system its own time counts.
+        self.penalty.time_faults(self.network.time_like.as_deref(), &mut faults);
+        faults.0
     }
 
     /// Every value out of range, bounds that are missing among them, for a training on states drawn of a system.
     pub(crate) fn sampling_faults(&self, system: &SystemInstance<f64>) -> Vec<ConfigError> {
-        let mut faults = Faults(self.faults_with(system.coordinates, true));
+        let mut faults = Faults::default();
+        self.ranges("", &mut faults);
+        self.common_faults(system.coordinates, true, &mut faults);
         let coordinates = system.system.coordinates(system.coordinates);
         let time = system.system.time_like.and_then(|index| coordinates.get(index)).map(|time| time.name.as_ref());
         self.penalty.time_faults(time, &mut faults);
         faults.0
     }
 
-    fn faults_with(&self, n: usize, drawn: bool) -> Vec<ConfigError> {
-        let mut faults = Faults::default();
-        let data = &self.data;
-        faults.count(data.training, "data.training", MOST_STATES);
-        faults.count(data.validation, "data.validation", MOST_STATES);
-        faults.count(data.test, "data.test", MOST_STATES);
-        for (value, field) in
-            [(data.rescaled_fraction, "data.rescaled_fraction"), (data.trajectory_fraction, "data.trajectory_fraction")]
-        {
-            faults.number(value, field, (0.0..=1.0).contains(&value), "a number from 0 to 1");
-        }
-        faults.at_least_zero(data.acceleration_weighting, "data.acceleration_weighting");
+    /// What several keys decide together.
+    fn common_faults(&self, n: usize, drawn: bool, faults: &mut Faults) {
+        let (data, network) = (&self.data, &self.network);
         match data.shell() {
-            Ok(Some(Shell { radius: [low, high], rapidity, .. })) => {
+            Ok(Some(Shell { radius: [low, high], .. })) => {
                 let ok = low > 0.0 && low < high && high.is_finite();
                 faults.check(ok, "data.shell_radius", "[low, high], 0 < low < high", format!("[{low}, {high}]"));
-                faults.at_least_zero(rapidity, "data.rapidity");
             }
             Ok(None) => {}
             Err(fault) => faults.0.push(fault),
         }
         faults.bounds("data.validation_position", &data.validation_position, drawn, n);
         faults.bounds("data.validation_velocity", &data.validation_velocity, drawn, n);
-        self.network_faults(&mut faults);
-        let lambda = self.penalty.lambda();
-        let expected = format!("a number from 0 to {MOST_LAMBDA:e}");
-        faults.number(lambda, "penalty.lambda", (0.0..=MOST_LAMBDA).contains(&lambda), expected);
-        // That of a system that is known is looked at beside the system.
-        if !drawn {
-            self.penalty.time_faults(self.network.time_like.as_deref(), &mut faults);
-        }
-        let optimizer = &self.optimizer;
-        faults.count(optimizer.batch, "optimizer.batch", MOST_STATES);
-        faults.at_least_zero(optimizer.weight_decay, "optimizer.weight_decay");
-        faults.number(optimizer.clip, "optimizer.clip", optimizer.clip > 0.0, "a positive number");
-        let averaging = optimizer.averaging;
-        let ok = (0.0..1.0).contains(&averaging);
-        faults.number(averaging, "optimizer.averaging", ok, "a number from 0 to below 1");
-        faults.check(!self.phases.is_empty(), "phase", "at least one phase", "none".to_string());
-        for (k, phase) in self.phases.iter().enumerate() {
-            phase.faults(k, n, drawn, &mut faults);
-        }
-        if let Some(lbfgs) = &self.lbfgs {
-            faults.count(lbfgs.iterations, "lbfgs.iterations", MOST_EPOCHS);
-            faults.count(lbfgs.memory, "lbfgs.memory", 1000);
-        }
-        faults.0
-    }
-
-    fn network_faults(&self, faults: &mut Faults) {
-        let network = &self.network;
         let hidden = &network.hidden;
         let ok = !hidden.is_empty() && hidden.len() <= 64;
         faults.check(ok, "network.hidden", "1 to 64 widths", hidden.len().to_string());
-        for (k, &width) in hidden.iter().enumerate() {
-            let field = format!("network.hidden[{k}]");
+        for (k, width) in hidden.iter().enumerate() {
             let even = "an even width, for quadratic-softplus is two networks of half the width";
             let ok = width.is_multiple_of(network.activation.branches().len());
-            if faults.count(width, &field, MAX_WIDTH) {
-                faults.check(ok, &field, even, width.to_string());
-            }
+            faults.check(ok, &format!("network.hidden[{k}]"), even, width.to_string());
         }
-        faults.number(network.alpha, "network.alpha", network.alpha.is_finite(), "a finite number");
-        let unit = network.radial_unit.unwrap_or(1.0);
-        faults.number(unit, "network.radial_unit", unit.is_finite() && unit > 0.0, "a positive number");
-        if let Some(units) = network.dissipation {
-            faults.count(units, "network.dissipation", MAX_WIDTH);
+        let lambda = self.penalty.lambda();
+        let ok = (0.0..=MOST_LAMBDA).contains(&lambda);
+        faults.check(ok, "penalty.lambda", "0 to 10^12", lambda.to_string());
+        faults.check(!self.phases.is_empty(), "phase", "at least one phase", "none".to_string());
+        for (k, phase) in self.phases.iter().enumerate() {
+            phase.faults(k, n, drawn, faults);
         }
     }
 }
 
 impl Phase {
-    /// Every value of phase `k` that is out of range, for `n` coordinates.
+    /// What several keys of phase `k` decide together, for `n` coordinates.
     fn faults(&self, k: usize, n: usize, drawn: bool, faults: &mut Faults) {
         let field = |name: &str| format!("phase[{k}].{name}");
-        faults.count(self.epochs, &field("epochs"), MOST_EPOCHS);
-        let positive = |x: f64| x.is_finite() && x > 0.0;
-        let expected = format!("a number above 0, at most {MOST_RATE}");
-        if faults.number(self.rate, &field("rate"), self.rate > 0.0 && self.rate <= MOST_RATE, expected) {
-            let ok = (0.0..=self.rate).contains(&self.eta_min);
-            faults.number(self.eta_min, &field("eta_min"), ok, "a number from 0 to the rate");
-        }
-        faults.number(self.t_max, &field("t_max"), positive(self.t_max), "a positive number of epochs");
+        // Beside a rate that is wrong itself nothing is known.
+        let ok = (0.0..=self.rate).contains(&self.eta_min) || self.rate.is_nan() || self.rate <= 0.0;
+        faults.check(ok, &field("eta_min"), "0 to the rate", self.eta_min.to_string());
         faults.bounds(&field("position"), &self.position, drawn, n);
         faults.bounds(&field("velocity"), &self.velocity, drawn, n);
         let log_uniform = &self.log_uniform;

@@ -44,19 +44,6 @@ impl Faults {
         }
         ok
     }
-    /// A number that is as expected or not.
-    pub fn number(&mut self, value: f64, field: &str, ok: bool, expected: impl Into<Cow<'static, str>>) -> bool {
-        self.check(ok, field, expected, format!("{value}"))
-    }
-    /// A finite number of at least 0.
-    pub fn at_least_zero(&mut self, value: f64, field: &str) -> bool {
-        self.number(value, field, value.is_finite() && value >= 0.0, "a finite number of at least 0")
-    }
-    /// A whole number from 1 to `most`.
-    pub fn count(&mut self, value: usize, field: &str, most: usize) -> bool {
-        let expected = format!("a whole number from 1 to {most}");
-        self.check((1..=most).contains(&value), field, expected, value.to_string())
-    }
     /// A finite `[low, high]` for each of `n` coordinates.
     pub fn bounds(&mut self, field: &str, bounds: &[[f64; 2]], required: bool, n: usize) {
         if bounds.is_empty() && !required {

@@ -3,9 +3,11 @@
 mod config;
 mod error;
 mod penalty;
+pub(crate) mod table;
 
 pub use config::{Config, Data, Known, Lbfgs, Network, OnFailure, Optimizer, Phase, Precision, Scaling, Shell};
-pub(crate) use config::{MOST_EPOCHS, MOST_LAMBDA, MOST_RATE};
+pub(crate) use config::{FRICTION_UNITS, MOST_EPOCHS, MOST_RATE, PENALTY};
 pub use error::ConfigError;
 pub(crate) use error::{Faults, place};
 pub use penalty::{Penalty, Regularizer};
+pub(crate) use table::{Key, Ranges, join};

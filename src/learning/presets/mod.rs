@@ -1,4 +1,4 @@
-//! Presets: configurations that ship with the crate, trainings on arrays of states by them ([`Trainer`]), and the reference of all keys.
+//! Presets: configurations that ship with the crate, and trainings on arrays of states by them ([`Trainer`]).
 //!
 //! ```
 //! use lnn::lagrangian::configure;
@@ -11,12 +11,9 @@
 
 mod measured;
 mod preset;
-mod reference;
 mod trainer;
 
 #[doc(hidden)]
 pub use measured::suggested;
 pub use preset::Preset;
-#[doc(hidden)]
-pub use reference::{Key, SHOOTING_SECTION, Section, TRAINING_SECTIONS, configuration_reference, section_reference};
 pub use trainer::{Learned, Trainer, TrainerError};

@@ -1,11 +1,10 @@
 //! Configurations that ship with the program.
 
-use crate::configuration::Regularizer;
-use crate::configuration::{Config, Data, Network, OnFailure, Optimizer, Phase, Precision, Scaling};
+use crate::configuration::{Config, Data, Network, Optimizer, PENALTY, Phase, Regularizer, Scaling};
 use crate::data::boxes;
 use crate::lagrangian::SystemInstance;
 use crate::lagrangian::system::{Bounds, PaperBudget, PaperPhase, ShellAdvice, StateAdvice};
-use crate::network::{ActivationChoice, Factor, Initialization, InputLayer, Structure};
+use crate::network::{Factor, Structure};
 use crate::optimizers::Method;
 use crate::optimizers::Schedule;
 use std::f64::consts::PI;
@@ -26,7 +25,7 @@ impl Preset {
     /// The configuration of a system; `None` if the preset has none for it.
     pub fn config(self, system: &SystemInstance<f64>) -> Option<Config> {
         match self {
-            Self::Quick => Some(ours(system, QUICK)),
+            Self::Quick => Some(ours(system, quick())),
             Self::Best => Some(ours(system, BEST)),
             Self::Paper => paper(system),
         }
@@ -57,7 +56,7 @@ pub(crate) fn take_structure(config: &mut Config, structure: Structure, rate: Op
     }
     let rate = rate.unwrap_or(match config.network.factor {
         Factor::Triangle => TRIANGLE_RATE,
-        Factor::Rectangle => RATE,
+        Factor::Rectangle => Phase::default().rate,
     });
     config.phases.iter_mut().for_each(|phase| phase.rate = rate);
     if config.data.shell.is_empty() {
@@ -99,38 +98,24 @@ fn base(system: &SystemInstance<f64>, states: usize, network: Network) -> Config
     let validation: Bounds = system.system.validation(system.coordinates);
     Config {
         system: system.system.name.to_string(),
-        seed: 0,
-        precision: Precision::F32,
-        from: None,
         description: system.system.described.as_ref().map(|described| described.description.clone()),
-        parameters: Default::default(),
         data: Data {
             training: states,
             validation: states / 5,
-            rescaled_fraction: 0.0,
-            trajectory_fraction: 0.0,
-            acceleration_weighting: 0.0,
-            shell: Vec::new(),
-            shell_radius: None,
-            rapidity: None,
             test: states / 5,
             validation_position: boxes(&validation.positions),
             validation_velocity: boxes(&validation.velocities),
+            ..Data::default()
         },
         network: Network { time_like: time_like(system), ..network },
         penalty: regularizer(system, 5.0),
-        optimizer: optimizer(Method::Radam),
+        optimizer: Optimizer { method: Method::Radam, ..Optimizer::default() },
         phases: Vec::new(),
-        lbfgs: None,
+        ..Config::default()
     }
 }
 
-fn optimizer(method: Method) -> Optimizer {
-    Optimizer { method, batch: 128, weight_decay: WEIGHT_DECAY, clip: 1.0, averaging: 0.0, on_failure: OnFailure::Skip }
-}
-
-/// Learning rates of a black box or a rectangle, and of a triangle.
-const RATE: f64 = 5e-3;
+/// Learning rate of a triangle; a black box and a rectangle have the default.
 const TRIANGLE_RATE: f64 = 1e-2;
 
 /// Largest norm of a structure's gradient: above those of ordinary steps.
@@ -144,60 +129,26 @@ struct Size {
     weight_decay: f64,
 }
 
-const QUICK: Size = Size { width: 128, epochs: 40, weight_decay: WEIGHT_DECAY };
-
 const BEST: Size = Size { width: 192, epochs: 100, weight_decay: 0.0 };
-
-/// The paper's.
-const WEIGHT_DECAY: f64 = 1e-6;
 
 /// Part of the states off a mass shell in the presets of our own.
 const OFF_SHELL: f64 = 0.75;
 
-/// Weight of the penalty of the presets of our own.
-const PENALTY: f64 = 100.0;
-
-fn network(width: usize) -> Network {
-    Network {
-        hidden: vec![width; 3],
-        activation: ActivationChoice::Gelu,
-        alpha: 1.0,
-        time_like: None,
-        scaling: Scaling::Physical,
-        embed_periodic: true,
-        input_layer: InputLayer::None,
-        structure: Structure::BlackBox,
-        factor: Factor::Triangle,
-        cyclic: Vec::new(),
-        radial: Vec::new(),
-        radial_unit: None,
-        even_in_v: false,
-        learn_alpha: false,
-        known: None,
-        initialization: Initialization::Default,
-        dissipation: None,
-    }
+/// The choices of the preset `quick`: the defaults of the configuration.
+fn quick() -> Size {
+    Size { width: 128, epochs: Phase::default().epochs, weight_decay: Optimizer::default().weight_decay }
 }
 
 /// One fall of the rate to zero.
-fn phase(epochs: usize, rate: f64, position: Vec<[f64; 2]>, velocity: Vec<[f64; 2]>) -> Phase {
-    Phase {
-        epochs,
-        rate,
-        eta_min: 0.0,
-        schedule: Schedule::Cosine,
-        t_max: epochs as f64,
-        position,
-        velocity,
-        log_uniform: vec![],
-    }
+fn phase(epochs: usize) -> Phase {
+    Phase { epochs, t_max: epochs as f64, ..Phase::default() }
 }
 
 /// The paper's box with a single turn of every angle, wider where the motions of the trajectory test soon leave it.
 fn training_states(system: &SystemInstance<f64>) -> (Bounds, StateAdvice) {
     let n = system.coordinates;
     let mut bounds: Bounds = system.system.training(n);
-    // Embedded angles repeat: one turn is all there is, unless somebody wants less.
+    // Embedded angles repeat: they are sampled over one turn, but for a described system, whose file says its bounds.
     let whole = system.system.described.is_none();
     for (bound, coordinate) in bounds.positions.iter_mut().zip(system.system.coordinates(n)) {
         if coordinate.periodic && whole {
@@ -214,14 +165,15 @@ fn training_states(system: &SystemInstance<f64>) -> (Bounds, StateAdvice) {
 fn ours(system: &SystemInstance<f64>, size: Size) -> Config {
     let (bounds, StateAdvice { log_uniform, acceleration_weighting, trajectory_fraction, shell }) =
         training_states(system);
-    let phase = phase(size.epochs, RATE, boxes(&bounds.positions), boxes(&bounds.velocities));
-    let base = base(system, 60_000, network(size.width));
+    let (position, velocity) = (boxes(&bounds.positions), boxes(&bounds.velocities));
+    let network = Network { hidden: vec![size.width; 3], ..Network::default() };
+    let base = base(system, Data::default().training, network);
     let rescaled_fraction = off_shell(system);
     let config = Config {
         data: Data { rescaled_fraction, acceleration_weighting, trajectory_fraction, ..base.data },
         penalty: regularizer(system, PENALTY),
-        optimizer: Optimizer { weight_decay: size.weight_decay, ..optimizer(Method::Soap) },
-        phases: vec![Phase { log_uniform, ..phase }],
+        optimizer: Optimizer { weight_decay: size.weight_decay, ..Optimizer::default() },
+        phases: vec![Phase { position, velocity, log_uniform, ..phase(size.epochs) }],
         ..base
     };
     match shell {
@@ -263,40 +215,20 @@ fn around_a_centre(mut config: Config, system: &SystemInstance<f64>, shell: Shel
 /// The quick preset for recorded states: numbers of training, validation and test states, and how many steps to take, in whole
 /// epochs.
 pub(crate) fn recorded(name: &str, [training, validation, test]: [usize; 3], steps: usize) -> Config {
-    let optimizer = optimizer(Method::Radam);
+    let optimizer = Optimizer { method: Method::Radam, ..Optimizer::default() };
     let epochs = steps.div_ceil(training.div_ceil(optimizer.batch));
     Config {
         system: name.to_string(),
-        seed: 0,
-        precision: Precision::F32,
-        from: None,
-        description: None,
-        parameters: Default::default(),
-        data: Data {
-            training,
-            validation,
-            test,
-            rescaled_fraction: 0.0,
-            trajectory_fraction: 0.0,
-            acceleration_weighting: 0.0,
-            shell: Vec::new(),
-            shell_radius: None,
-            rapidity: None,
-            validation_position: Vec::new(),
-            validation_velocity: Vec::new(),
-        },
-        network: network(QUICK.width),
-        penalty: Regularizer::Eigenvalue { lambda: PENALTY },
+        data: Data { training, validation, test, ..Data::default() },
         optimizer,
-        phases: vec![phase(epochs, 3e-3, Vec::new(), Vec::new())],
-        lbfgs: None,
+        phases: vec![Phase { rate: 3e-3, ..phase(epochs) }],
+        ..Config::default()
     }
 }
 
 /// The quick preset for exact states of a system without a name; the numbers of states are theirs.
 pub(crate) fn of_states() -> Config {
-    let phases = vec![phase(QUICK.epochs, RATE, Vec::new(), Vec::new())];
-    Config { optimizer: optimizer(Method::Soap), phases, ..recorded("states", [1; 3], 1) }
+    Config { system: "states".to_string(), ..Config::default() }
 }
 
 /// Appendix "Training details" of Hamzaogullari and Ozakin. Its table for AdS4 lists the eigenvalue penalty, which no
@@ -304,22 +236,14 @@ pub(crate) fn of_states() -> Config {
 fn paper(system: &SystemInstance<f64>) -> Option<Config> {
     let n = system.coordinates;
     let PaperBudget { states, hidden, phases } = system.system.learning.paper?;
-    let network = Network { hidden: hidden.to_vec(), embed_periodic: false, ..network(0) };
+    let network = Network { hidden: hidden.to_vec(), embed_periodic: false, ..Network::default() };
     let bounds: Bounds = system.system.training(n);
     let phase = |phase: &PaperPhase| {
         let PaperPhase { epochs, rate, lowest_rate: eta_min, positions } = *phase;
         let position = positions.map_or_else(|| boxes(&bounds.positions), |all| boxes(&vec![all; n]));
         let velocity = boxes(&bounds.velocities);
-        Phase {
-            epochs,
-            rate,
-            eta_min,
-            schedule: Schedule::CosineAnnealing,
-            t_max: 30.0,
-            position,
-            velocity,
-            log_uniform: vec![],
-        }
+        let (schedule, t_max) = (Schedule::CosineAnnealing, 30.0);
+        Phase { epochs, rate, eta_min, schedule, t_max, position, velocity, ..Phase::default() }
     };
     let phases = phases.iter().map(phase).collect();
     Some(Config { phases, ..base(system, states, network) })

@@ -35,7 +35,6 @@ pub use fit::{Fitted, ShootingError, Task, fit};
 pub use objective::{ShootingObjective, ShootingReport};
 #[doc(hidden)]
 pub use segments::Segments;
-pub(crate) use settings::MOST_STEPS;
 pub use settings::Shooting;
 #[doc(hidden)]
 pub use starts::Curvature;

@@ -77,7 +77,7 @@ fn all_mistakes_of_a_file_are_listed_at_once() {
     let file = folder.file("wrong.toml", wrong);
     let run = lnn(&["train", "--config", &file]);
     let expected = [
-        ("2: sede", "unknown key"),
+        ("2: sede", "seed"),
         ("3: precision", "f16"),
         ("5: parameters.m1", "above 0"),
         ("6: parameters.m9", "m9"),
@@ -143,12 +143,21 @@ fn what_is_changed_most_has_options() {
     let refused = |system: &str, more: &[&str], parts: &[&str]| {
         lnn(&[&["train", system, "--print-config"], more].concat()).refused(2, parts);
     };
-    refused("kepler", &["--penalty", "lorentzian-sylvester"], &["kepler has no time-like coordinate"]);
+    refused("kepler", &["--penalty", "lorentzian-sylvester"], &["--penalty", "time"]);
     refused("kepler", &["--penalty", "none", "--lambda", "1"], &["--lambda"]);
-    refused("kepler", &["--activation", "gleu"], &["--activation", "did you mean \"gelu\"?"]);
+    refused("kepler", &["--activation", "gleu"], &["--activation: network.activation", "gelu"]);
     refused("double-pendulum", &["--preset", "paper", "--epochs", "2"], &["--epochs 2", "3 phases"]);
-    refused("kepler", &["--hidden", "15", "--activation", "quadratic-softplus"], &["network.hidden[0]", "even"]);
+    refused(
+        "kepler",
+        &["--hidden", "15", "--activation", "quadratic-softplus"],
+        &["--hidden: network.hidden[0]", "even"],
+    );
     refused("kepler", &["--lambda", "-1"], &["--lambda"]);
+    // Every other key, with all mistakes at once.
+    let config = changed("kepler", &["--set", "optimizer.batch=64", "--set", "phase[0].schedule=constant"]);
+    assert_eq!((config.optimizer.batch, config.phases[0].epochs), (64, 40));
+    let more = ["--set", "optimizer.bacth=64", "--set=phase[3].rate=1", "--seed", "-1", "--param", "mu=-1"];
+    refused("kepler", &more, &["--seed: seed", "--set optimizer.bacth", "--set phase[3].rate", "--param mu"]);
 }
 
 /// A swing of a harmonic oscillator in four runs.

@@ -41,7 +41,7 @@ fn every_value(base: &[&str], option: &str, form: &dyn Fn(&str) -> String) {
 }
 
 /// Options of the commands below that take no number.
-const WORDS: [&str; 47] = [
+const WORDS: [&str; 48] = [
     "acceleration",
     "activation",
     "beside",
@@ -71,6 +71,7 @@ const WORDS: [&str; 47] = [
     "preset",
     "print-config",
     "resume",
+    "set",
     "scale",
     "shard",
     "signature",

@@ -17,15 +17,7 @@ fn a_file_is_a_system_of_every_command_and_goes_with_its_model() {
     let (file, small) = (folder.file("my.toml", PENDULUM), folder.file("small.toml", SMALL));
     let run = text(&folder.path("run"));
     let train = |more: &[&str]| lnn(&[&["train", "--config", &small, "--threads", "1"], more].concat());
-    train(&["--system", &file, "--param", "l=0.5", "--out", &run]).succeeded();
-    // As an argument, and where two are one too many.
-    let other = text(&folder.path("other"));
-    train(&[&file, "--param", "l=0.5", "--out", &other]).succeeded();
-    assert_eq!(
-        fs::read(folder.path("run/model.safetensors")).unwrap(),
-        fs::read(folder.path("other/model.safetensors")).unwrap()
-    );
-    train(&[&file, "--system", &file]).refused(2, &["--system"]);
+    train(&[&file, "--param", "l=0.5", "--out", &run]).succeeded();
     // Everything else without the file.
     fs::remove_file(&file).unwrap();
     lnn(&["evaluate", &run, "--starts", "1"]).succeeded();
@@ -62,8 +54,8 @@ fn a_run_goes_on_with_its_own_system_alone() {
     let folder = Folder::new();
     let (file, small) = (folder.file("my.toml", PENDULUM), folder.file("small.toml", SMALL));
     let run = text(&folder.path("run"));
-    lnn(&["train", "--system", &file, "--config", &small, "--threads", "1", "--out", &run]).succeeded();
-    let resume = |file: &str| lnn(&["train", "--resume", &run, "--system", file]);
+    lnn(&["train", &file, "--config", &small, "--threads", "1", "--out", &run]).succeeded();
+    let resume = |file: &str| lnn(&["train", "--resume", &run, file]);
     resume(&file).succeeded();
     let changed = folder.file("my.toml", PENDULUM.replace("cos(theta)", "sin(theta)"));
     resume(&changed).refused(2, &["--resume", "description.lagrangian", "asked for"]);
@@ -71,7 +63,7 @@ fn a_run_goes_on_with_its_own_system_alone() {
     resume(&folder.file("same.toml", format!("# the same\n{PENDULUM}"))).succeeded();
     // Its configuration with another file.
     let config = text(&folder.path("run/config.toml"));
-    lnn(&["train", "--config", &config, "--system", &changed]).refused(2, &["another description of pendulum"]);
+    lnn(&["train", "--config", &config, &changed]).refused(2, &["another description of pendulum"]);
 }
 
 #[test]
@@ -109,15 +101,14 @@ fn mistakes_name_file_line_key_and_column() {
     let folder = Folder::new();
     let file = folder.file("my.toml", PENDULUM.replace("cos(theta)", "cos(thta)"));
     let expected = format!("{file}:5: lagrangian: column 33: unknown name \"thta\", did you mean \"theta\"?");
-    for command in [&["train"][..], &["train", "--system"], &["systems", "--system"]] {
+    for command in [&["train"][..], &["systems", "--system"]] {
         lnn(&[command, &[file.as_str()]].concat()).refused(2, &[&expected]);
     }
-    lnn(&["train", "--system", &text(&folder.path("none.toml"))]).refused(1, &["none.toml"]);
+    lnn(&["train", &text(&folder.path("none.toml"))]).refused(1, &["none.toml"]);
     lnn(&["train", "pendulum"]).refused(2, &["unknown system \"pendulum\""]);
-    lnn(&["train", "--system", &folder.file("p.toml", PENDULUM), "--preset", "paper"])
-        .refused(2, &["there is none for pendulum"]);
+    lnn(&["train", &folder.file("p.toml", PENDULUM), "--preset", "paper"]).refused(2, &["there is none for pendulum"]);
     // A configuration with a broken description.
-    let printed = lnn(&["train", "--system", &folder.file("p.toml", PENDULUM), "--print-config"]);
+    let printed = lnn(&["train", &folder.file("p.toml", PENDULUM), "--print-config"]);
     printed.succeeded();
     let config = folder.file("c.toml", printed.stdout.replace("cos(theta)", "cos(thta)"));
     lnn(&["train", "--config", &config]).refused(2, &["c.toml:", "description.lagrangian: column 33: unknown name"]);

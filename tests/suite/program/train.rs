@@ -263,13 +263,9 @@ fn wrong_trainings_are_refused_before_anything_is_written() {
         fs::write(&path, good.replacen(old, new, 1)).unwrap();
         refused(&train(&["--config", &text(&path)]), 2, &[&["bad.toml"], parts].concat());
     };
-    with("epochs = 3", "epcohs = 3", &["epcohs", "did you mean \"epochs\"?"]);
+    with("epochs = 3", "epcohs = 3", &["epcohs", "epochs"]);
     with("epochs = 3", "epochs = 0", &["phase[0].epochs"]);
-    with(
-        "epochs = 3",
-        "epochs = \"many\"",
-        &["phase[0].epochs", "expected a whole number of at least 0, found \"many\""],
-    );
+    with("epochs = 3", "epochs = \"many\"", &["phase[0].epochs", "found \"many\""]);
     with("seed = 0", "seed = 0\nseed = 1", &["duplicate"]);
     with("rate = 0.005", "rate = nan", &["phase[0].rate", "NaN"]);
     with("rate = 0.005", "rate = 0.0", &["phase[0].rate"]);
@@ -277,7 +273,7 @@ fn wrong_trainings_are_refused_before_anything_is_written() {
     with("hidden = [16, 16]", "hidden = []", &["network.hidden"]);
     with("activation = \"gelu\"", "activation = \"gelo\"", &["gelo", "gelu"]);
     with("activation = \"gelu\"", "activation = \"identity\"", &["network.activation", "identity"]);
-    with("input_layer = \"none\"", "input_layer = \"dty\"", &["dty", "did you mean \"dyt\"?"]);
+    with("input_layer = \"none\"", "input_layer = \"dty\"", &["dty", "dyt"]);
     let odd = "hidden = [16, 15]\nactivation = \"quadratic-softplus\"";
     with("hidden = [16, 16]\nactivation = \"gelu\"", odd, &["network.hidden[1]", "even", "15"]);
     // A mistake that concerns many keys is a line for each of them.

@@ -581,7 +581,7 @@ fn a_batch_of_nothing_and_missing_training_states_are_named() {
     let refused = |config: &Config, data| run(config, data, 1, &Hooks::default()).unwrap_err().to_string();
     let mut empty = config(2);
     empty.optimizer.batch = 0;
-    let expected = "optimizer.batch: expected a whole number from 1 to 1073741824, found 0";
+    let expected = "optimizer.batch: expected 1 to 2^30 states, found 0";
     assert_eq!(refused(&empty, datasets()), expected);
     let mut data = datasets();
     data.training.truncate(1);

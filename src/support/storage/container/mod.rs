@@ -10,7 +10,7 @@ mod json;
 pub use error::ContainerError;
 pub use json::StoredPrecision;
 
-use crate::names::{one_line, plain};
+use crate::names::one_line;
 use crate::scalar::Scalar;
 use json::check_unambiguous;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
@@ -202,9 +202,7 @@ fn check_container(bytes: &[u8]) -> Result<(), ContainerError> {
     }
     match bytes[8..].get(..length as usize) {
         None => refuse("cut off"),
-        Some(text) => {
-            check_unambiguous(text).map_err(|e| ContainerError::NotSafetensors(one_line(&plain(&e.to_string()))))
-        }
+        Some(text) => check_unambiguous(text).map_err(|e| ContainerError::NotSafetensors(one_line(&e.to_string()))),
     }
 }
 
@@ -216,7 +214,7 @@ fn read_header<H: DeserializeOwned>(kind: &Kind, text: &str, payload: &[u8]) -> 
         format: u32,
         crate_version: String,
     }
-    let malformed = |e: serde_json::Error| ContainerError::Header(one_line(&plain(&e.to_string())));
+    let malformed = |e: serde_json::Error| ContainerError::Header(one_line(&e.to_string()));
     let version: Version = serde_json::from_str(text).map_err(malformed)?;
     check_version(kind.format, version.format, &version.crate_version)?;
 
