@@ -2,9 +2,12 @@
 
 use crate::cli::number::{number, positive, whole};
 use crate::cli::{CliError, chosen};
-use crate::configuration::{Config, Known, MOST_EPOCHS, MOST_LAMBDA, MOST_RATE, Regularizer};
+use crate::configuration::{
+    BESIDE_A_TIME, Config, Known, MOST_EPOCHS, MOST_LAMBDA, MOST_RATE, PenaltyKind, Regularizer,
+};
 use crate::network::file::MAX_WIDTH;
 use crate::network::{ActivationChoice, Initialization, Structure};
+use clap::builder::{PossibleValue, PossibleValuesParser};
 
 /// Changes of a configuration.
 #[derive(Clone, Debug, Default, clap::Args)]
@@ -12,9 +15,10 @@ pub struct Changes {
     /// Widths of the hidden layers [default: the configuration's; 128,128,128 in the preset quick and in fits].
     #[arg(long, value_name = "W1,W2,..", value_delimiter = ',', allow_hyphen_values = true, value_parser = whole(1, MAX_WIDTH))]
     pub hidden: Vec<usize>,
-    /// Activation of the hidden layers: gelu, softplus, x-tanh, tanh, quadratic, or quadratic-softplus, which is two networks of
-    /// half the widths [default: the configuration's, gelu in all presets].
-    #[arg(long, value_name = "NAME", value_parser = activation)]
+    #[arg(long, value_name = "NAME", value_parser = activation, help = format!(
+        "Activation of the hidden layers: {}; the last is two networks of half the widths [default: the configuration's, gelu in all presets]",
+        ActivationChoice::NAMES
+    ))]
     pub activation: Option<ActivationChoice>,
     /// Way in which the Lagrangian is made of the network's outputs: black-box, mechanical (a positive mass matrix, potentials) or metric (of
     /// geodesics, with its signature); the last two need no penalty and have none unless one is chosen [default: the
@@ -35,8 +39,8 @@ pub struct Changes {
     #[arg(long, value_name = "FILE.toml")]
     pub known: Option<String>,
     /// Penalty that keeps the signature of the mass matrix.
-    #[arg(long, value_enum, value_name = "KIND")]
-    pub penalty: Option<PenaltyName>,
+    #[arg(long, value_name = "KIND", value_parser = penalties())]
+    pub penalty: Option<String>,
     /// Weight of the penalty beside the loss.
     #[arg(long, value_name = "L", allow_hyphen_values = true, value_parser = number(0.0, MOST_LAMBDA))]
     pub lambda: Option<f64>,
@@ -48,18 +52,11 @@ pub struct Changes {
     pub epochs: Option<usize>,
 }
 
-/// Kinds of [`Regularizer`] by name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub enum PenaltyName {
-    /// Nothing does.
-    None,
-    /// Negative eigenvalues are penalised.
-    Eigenvalue,
-    /// Negative leading minors are penalised.
-    Sylvester,
-    /// The same beside a time-like coordinate, whose own element must be negative: not for metrics inside of a horizon or of an
-    /// ergosphere, where it is positive.
-    LorentzianSylvester,
+/// The kinds of penalty by name.
+fn penalties() -> PossibleValuesParser {
+    let value =
+        |kind: &PenaltyKind| PossibleValue::new(kind.name).help(kind.purpose.trim_start().trim_end_matches('.'));
+    PossibleValuesParser::new(Regularizer::KINDS.iter().map(value))
 }
 
 /// A learning rate.
@@ -137,40 +134,27 @@ impl Changes {
             Regularizer::None => 100.0,
             _ => config.penalty.lambda(),
         });
-        let kind = match (self.penalty, &config.penalty) {
-            (Some(kind), _) => kind,
+        let kind = match (&self.penalty, &config.penalty) {
+            (Some(kind), _) => kind.clone(),
             (None, _) if self.lambda.is_none() => return Ok(()),
             (None, Regularizer::None) => {
                 return Err(CliError::usage("--lambda: there is no penalty to weigh, choose one by --penalty"));
             }
-            (None, Regularizer::Eigenvalue { .. }) => PenaltyName::Eigenvalue,
-            (None, Regularizer::Sylvester { .. }) => PenaltyName::Sylvester,
-            (None, Regularizer::LorentzianSylvester { .. }) => PenaltyName::LorentzianSylvester,
+            (None, penalty) => penalty.kind().to_string(),
         };
+        if kind == Regularizer::None.kind() && self.lambda.is_some() {
+            return Err(CliError::usage("--lambda: --penalty none has no weight"));
+        }
         let time = config.network.time_like.as_deref().or(time);
-        if let (Some(time), PenaltyName::Eigenvalue | PenaltyName::Sylvester) = (time, kind) {
-            let problem = format!("the coordinate {time} is a time, expected lorentzian-sylvester or none");
+        let Some(penalty) = Regularizer::of_kind(&kind, lambda, config.penalty.time().or(time)) else {
+            let problem = format!("{} has no time-like coordinate{how}", config.system);
+            return Err(CliError::usage(format_args!("--penalty {kind}: {problem}")));
+        };
+        if let Some(time) = time.filter(|_| penalty.is_classical()) {
+            let problem = format!("the coordinate {time} is a time, expected {BESIDE_A_TIME}");
             return Err(CliError::usage(format_args!("--penalty: {problem}")));
         }
-        config.penalty = match kind {
-            PenaltyName::None if self.lambda.is_some() => {
-                return Err(CliError::usage("--lambda: --penalty none has no weight"));
-            }
-            PenaltyName::None => Regularizer::None,
-            PenaltyName::Eigenvalue => Regularizer::Eigenvalue { lambda },
-            PenaltyName::Sylvester => Regularizer::Sylvester { lambda },
-            PenaltyName::LorentzianSylvester => {
-                let named = match &config.penalty {
-                    Regularizer::LorentzianSylvester { time, .. } => Some(time.as_str()),
-                    _ => None,
-                };
-                let Some(time) = named.or(time) else {
-                    let problem = format!("{} has no time-like coordinate{how}", config.system);
-                    return Err(CliError::usage(format_args!("--penalty lorentzian-sylvester: {problem}")));
-                };
-                Regularizer::LorentzianSylvester { lambda, time: time.to_string() }
-            }
-        };
+        config.penalty = penalty;
         Ok(())
     }
 }
@@ -227,23 +211,23 @@ mod tests {
 
     #[test]
     fn penalties_are_named_and_weighed() {
-        let of = |system: &str, penalty, lambda| {
+        let of = |system: &str, penalty: Option<&str>, lambda| {
+            let penalty = penalty.map(str::to_string);
             changed(Preset::Quick, system, Changes { penalty, lambda, ..Changes::default() }).map(|c| c.penalty)
         };
-        use PenaltyName as Name;
         assert_eq!(of("kepler", None, Some(3.0)), Ok(Regularizer::Eigenvalue { lambda: 3.0 }));
-        assert_eq!(of("kepler", Some(Name::Sylvester), None), Ok(Regularizer::Sylvester { lambda: 100.0 }));
-        assert_eq!(of("kepler", Some(Name::None), None), Ok(Regularizer::None));
-        assert!(of("kepler", Some(Name::None), Some(1.0)).unwrap_err().contains("no weight"));
-        assert!(of("kepler", Some(Name::LorentzianSylvester), None).unwrap_err().contains("no time-like coordinate"));
-        for classical in [Name::Eigenvalue, Name::Sylvester] {
+        assert_eq!(of("kepler", Some("sylvester"), None), Ok(Regularizer::Sylvester { lambda: 100.0 }));
+        assert_eq!(of("kepler", Some("none"), None), Ok(Regularizer::None));
+        assert!(of("kepler", Some("none"), Some(1.0)).unwrap_err().contains("no weight"));
+        assert!(of("kepler", Some("lorentzian-sylvester"), None).unwrap_err().contains("no time-like coordinate"));
+        for classical in ["eigenvalue", "sylvester"] {
             let refused = of("ads4-geodesic", Some(classical), None).unwrap_err();
-            assert!(
-                refused.starts_with("--penalty: ") && refused.contains("lorentzian-sylvester or none"),
-                "{refused}"
-            );
+            assert!(refused.starts_with("--penalty: ") && refused.contains(BESIDE_A_TIME), "{refused}");
         }
-        assert_eq!(of("ads4-geodesic", Some(Name::None), None), Ok(Regularizer::None));
+        assert_eq!(of("ads4-geodesic", Some("none"), None), Ok(Regularizer::None));
+        for system in ["ads4-geodesic", "kepler"] {
+            assert_eq!(of(system, Some("signature"), Some(4.0)), Ok(Regularizer::Signature { lambda: 4.0 }));
+        }
         let time = "t".to_string();
         let lorentzian = Regularizer::LorentzianSylvester { lambda: 2.0, time };
         assert_eq!(of("ads4-geodesic", None, Some(2.0)), Ok(lorentzian));

@@ -8,4 +8,5 @@ pub use config::{Config, Data, Known, Lbfgs, Network, OnFailure, Optimizer, Phas
 pub(crate) use config::{MOST_EPOCHS, MOST_LAMBDA, MOST_RATE};
 pub use error::ConfigError;
 pub(crate) use error::{Faults, place};
-pub use penalty::{Penalty, Regularizer};
+pub(crate) use penalty::BESIDE_A_TIME;
+pub use penalty::{Penalty, PenaltyKind, Regularizer};

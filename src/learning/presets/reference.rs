@@ -1,7 +1,9 @@
 //! The keys of configuration files: one table, from which commented configurations and the reference page are made.
 
-use crate::configuration::Config;
+use crate::configuration::{Config, Regularizer};
 use crate::lagrangian::configure;
+use crate::network::ActivationChoice;
+use crate::optimizers::Method;
 use crate::presets::Preset;
 use crate::shooting::Shooting;
 use serde_json::Value;
@@ -134,7 +136,7 @@ pub const TRAINING_SECTIONS: [Section<'static>; 9] = [
             ),
             key(
                 "activation",
-                "gelu, softplus, x-tanh, tanh, quadratic, quadratic-softplus",
+                ActivationChoice::NAMES,
                 "Activation of the hidden layers; quadratic-softplus is two networks of half the widths.",
             ),
             key(
@@ -203,9 +205,10 @@ pub const TRAINING_SECTIONS: [Section<'static>; 9] = [
         keys: &[
             key(
                 "kind",
-                "none, eigenvalue, sylvester, lorentzian-sylvester",
-                "What is penalised. Beside a time-like coordinate none or lorentzian-sylvester, which wants a negative element of \
-                 the time: not for metrics inside of a horizon or of an ergosphere, where it is positive.",
+                Regularizer::NAMES,
+                "What is penalised. Beside a time-like coordinate signature, which wants one negative eigenvalue and names no time, or \
+                 lorentzian-sylvester, which wants a negative element of the time: not for metrics inside of a horizon or of an \
+                 ergosphere, where it is positive.",
             ),
             optional("lambda", "100.0", "0 to 10^12", "Weight beside the loss; not with kind none."),
             optional("time", "\"t\"", "a coordinate", "The time-like coordinate; with lorentzian-sylvester only."),
@@ -215,9 +218,13 @@ pub const TRAINING_SECTIONS: [Section<'static>; 9] = [
         name: "optimizer",
         purpose: "How weights are updated.",
         keys: &[
-            key("method", "soap, radam, adam", "Update rule."),
+            key("method", Method::NAMES, "Update rule."),
             key("batch", "1 to 2^30 states", "States per step."),
-            key("weight_decay", "from 0", "L2 weight decay, added to the gradient."),
+            key(
+                "weight_decay",
+                "from 0",
+                "Weight decay: added to the gradient (L2), or, by adamw, a shrinking by the rate times it.",
+            ),
             key("clip", "above 0, inf for none", "The gradient's norm is cut to this."),
             key(
                 "averaging",
@@ -281,9 +288,13 @@ pub const SHOOTING_SECTION: Section<'static> = Section {
         optional("steps", "8", "1 to 65536", "Integration steps per segment; without it as many as the noise demands."),
         key("epochs", "1 to 2^24", "Passes through all segments."),
         key("batch", "1 to 2^30", "Segments per update of the weights."),
-        key("method", "soap, radam, adam", "Update rule of the weights."),
+        key("method", Method::NAMES, "Update rule of the weights."),
         key("rate", "above 0 to 1000", "Learning rate at the start, falling to 0 by half a cosine."),
-        key("weight_decay", "from 0", "L2 weight decay, added to the gradient."),
+        key(
+            "weight_decay",
+            "from 0",
+            "Weight decay: added to the gradient (L2), or, by adamw, a shrinking by the rate times it.",
+        ),
         key("clip", "above 0, inf for none", "The gradient's norm is cut to this."),
         key("continuity", "from 0", "Weight of the gap of a joint, in units of noise, beside one observation."),
         key("huber", "above 0, inf for plain squares", "Residuals beyond so many standard deviations count linearly."),

@@ -223,16 +223,17 @@ pub fn resume<S: Scalar>(
     let epochs_before = saver.as_ref().map_or(0, |saver| saver.ended.history.len());
     let others = || estimate("checkpoint".to_string(), format!("{} segments", segments.0), "others");
     let mut learner = ShootingLearner::new(&problem, settings.start_share, settings.curvature_every);
-    let mut underway = underway.filter(|underway| underway.shooting.is_some());
+    let mut underway = underway.filter(|underway| underway.learner.is_some());
     let mut clock = Clock::after(0.0);
-    if let Some(PhaseState { course, shooting, .. }) = &mut underway
-        && let Some(shot) = shooting.take()
+    if let Some(PhaseState { course, learner: state, .. }) = &mut underway
+        && let Some(state) = state.take()
     {
         if course.order.len() != segments.0 {
             return Err(others());
         }
-        clock = Clock::after(shot.seconds);
-        learner = learner.restored(&problem, shot).ok_or_else(others)?;
+        let seconds;
+        (learner, seconds) = learner.restored(&problem, &state).ok_or_else(others)?;
+        clock = Clock::after(seconds);
     }
     let run = Run {
         phase_number: 1,

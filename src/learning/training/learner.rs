@@ -2,7 +2,6 @@
 
 use crate::optimizers::{Method, Moments};
 use crate::scalar::Scalar;
-use crate::training::checkpoint::Shot;
 use crate::training::objective::BatchReport;
 use crate::training::problem::TrainingProblem;
 use argmin::core::KV;
@@ -67,8 +66,8 @@ pub(crate) trait Learner<S: Scalar> {
     /// Loss of the validation samples.
     fn judge(&mut self, problem: &mut Self::Problem, weights: &[S]) -> Judgement;
 
-    /// Part of a checkpoint beside the weights, after `seconds` of this phase.
-    fn stored(&self, seconds: f64) -> Option<Shot<S>> {
+    /// What moves beside the weights, after `seconds` of this phase, in bytes for a checkpoint; `None` if nothing does.
+    fn stored(&self, seconds: f64) -> Option<Vec<u8>> {
         let _ = seconds;
         None
     }

@@ -316,7 +316,7 @@ impl<S: Scalar, L: Learner<S>> EpochSolver<S, L> {
             best: best.unwrap_or(&ended.weights).clone(),
             best_loss: state.get_best_cost(),
             best_epoch: state.get_last_best_iter(),
-            shooting: self.learner.stored(self.seconds()),
+            learner: self.learner.stored(self.seconds()),
         };
         keeper.save(seconds.unwrap_or_else(|| self.seconds()), ended, Some(&underway));
     }

@@ -143,7 +143,7 @@ pub fn resume<S: Scalar>(
     let clock = Clock::after(seconds);
     let mut stop = StopReason::Finished;
     // Then this training is over, and its checkpoint is that of what came after it.
-    let shooting = underway.as_ref().is_some_and(|underway| underway.shooting.is_some());
+    let shooting = underway.as_ref().is_some_and(|underway| underway.learner.is_some());
     for (number, (phase, training)) in pairs().enumerate().skip(ended.phases) {
         let problem = TrainingProblem::new(objective(), training, &data.validation, config.optimizer.weight_decay);
         let rng = RngStream::Order(number).generator(config.seed);

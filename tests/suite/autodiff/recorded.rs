@@ -6,7 +6,8 @@ use crate::common::nested::{Reference, reference_of};
 use crate::common::properties;
 use lnn::lagrangian::Lagrangian;
 use lnn::network::{
-    ActivationChoice, Architecture, Factor, Form, Initialization, InputLayer, Layout, Structure, initial_weights,
+    Activation, ActivationChoice, Architecture, Factor, Form, Initialization, InputLayer, Layout, Structure,
+    initial_weights,
 };
 use lnn::scalar::{Dd, Real, Scalar};
 use lnn::tape::{Depth, Evaluation, MixedDirections, Recorded, ScalarFunction, gradient};
@@ -61,8 +62,8 @@ impl Lagrangian for Expression {
                 11 => around(a).powf(b.tanh()),
                 12 => a.max(b),
                 13 => (a - b).select(a.sqr(), b * a),
-                14 => a.gelu() - b.softplus(),
-                15 => a.x_tanh() + b.ln_cosh(),
+                14 => Activation::Gelu.apply(a) - Activation::Silu.apply(b) - b.softplus(),
+                15 => Activation::XTanh.apply(a) + b.ln_cosh(),
                 16 => a.tanh().powi(3),
                 17 => -a.min(R::of(0.4)),
                 _ => {

@@ -3,7 +3,7 @@
 use super::{Place, Taylor};
 use crate::forward::{HyperDual, assign_operators};
 use crate::ops::{Binary, Unary};
-use crate::scalar::{Real, Scalar};
+use crate::scalar::{Elementary, Real, Scalar};
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 impl<'a, S: Scalar> Taylor<'a, S> {
@@ -85,7 +85,7 @@ impl<'a, S: Scalar> Taylor<'a, S> {
     }
 
     /// A function of the table; its third and fourth derivatives are those of its second.
-    fn chain(self, f: Unary) -> Self {
+    fn chain(self, f: impl Elementary) -> Self {
         let zero = <S as Real>::zero();
         match self.place {
             None => Self::constant(f.value(self.value)),
@@ -185,6 +185,9 @@ impl<S: Scalar> Real for Taylor<'_, S> {
     }
     fn is_exact_zero(self) -> bool {
         self.place.is_none() && self.value == <S as Real>::zero()
+    }
+    fn elementary<F: Elementary>(self, f: F) -> Self {
+        self.chain(f)
     }
     crate::ops::unary_methods! { taylor_unary }
     fn powi(self, exponent: i32) -> Self {

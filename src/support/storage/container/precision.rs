@@ -1,5 +1,6 @@
 //! Number types of files.
 
+use crate::scalar::Scalar;
 use serde::{Deserialize, Serialize};
 
 /// Number type of stored numbers.
@@ -13,6 +14,10 @@ pub enum StoredPrecision {
 }
 
 impl StoredPrecision {
+    /// That of a number type, if files know it.
+    pub(crate) fn of<S: Scalar>() -> Option<Self> {
+        [Self::F32, Self::F64].into_iter().find(|precision| precision.name() == S::NAME)
+    }
     /// `"f32"` or `"f64"`.
     pub fn name(self) -> &'static str {
         match self {
