@@ -2,7 +2,7 @@
 
 use crate::configuration::{Config, Regularizer};
 use crate::lagrangian::configure;
-use crate::network::ActivationChoice;
+use crate::network::{ActivationChoice, Structure};
 use crate::optimizers::Method;
 use crate::presets::Preset;
 use crate::shooting::Shooting;
@@ -139,11 +139,7 @@ pub const TRAINING_SECTIONS: [Section<'static>; 9] = [
                 ActivationChoice::NAMES,
                 "Activation of the hidden layers; quadratic-softplus is two networks of half the widths.",
             ),
-            key(
-                "structure",
-                "black-box, mechanical, metric",
-                "How the Lagrangian is made of the network's outputs; see structures.",
-            ),
+            key("structure", Structure::NAMES, "How the Lagrangian is made of the network's outputs; see structures."),
             key(
                 "factor",
                 "triangle, rectangle",

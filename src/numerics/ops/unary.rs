@@ -65,7 +65,13 @@ macro_rules! table {
             pub fn value<R: Real>(self, x: R) -> R {
                 match self {
                     $(Self::$name => x.$method(),)*
-                    $(Self::$made => { let $mx = x; $value })*
+                    $(Self::$made => {
+                        #[inline]
+                        fn made<R: Real>($mx: R) -> R {
+                            $value
+                        }
+                        made(x)
+                    })*
                     Self::Neg => -x,
                     Self::Powi(n) => x.powi(n),
                 }
@@ -76,7 +82,13 @@ macro_rules! table {
             pub fn first<R: Real>(self, x: R, y: R) -> R {
                 match self {
                     $(Self::$name => { let ($x, $y) = (x, y); $first })*
-                    $(Self::$made => { let ($mx, $my) = (x, y); $made_first })*
+                    $(Self::$made => {
+                        #[inline]
+                        fn made<R: Real>($mx: R, $my: R) -> R {
+                            $made_first
+                        }
+                        made(x, y)
+                    })*
                     Self::Neg => -R::one(),
                     Self::Powi(n) => power(x, i64::from(n), i64::from(n) - 1),
                 }
@@ -87,7 +99,13 @@ macro_rules! table {
             pub fn second<R: Real>(self, x: R, y: R, d: R) -> R {
                 match self {
                     $(Self::$name => { let ($x, $y, $d) = (x, y, d); $second })*
-                    $(Self::$made => { let ($mx, $my, $md) = (x, y, d); $made_second })*
+                    $(Self::$made => {
+                        #[inline]
+                        fn made<R: Real>($mx: R, $my: R, $md: R) -> R {
+                            $made_second
+                        }
+                        made(x, y, d)
+                    })*
                     Self::Neg => R::zero(),
                     Self::Powi(n) => {
                         let n = i64::from(n);

@@ -5,7 +5,7 @@ use lnn::data::Dataset;
 use lnn::lagrangian::systems::double_pendulum::DoublePendulum;
 use lnn::lagrangian::{EulerLagrange, Mechanics, Request, Terms, configure};
 use lnn::network::{
-    ActivationChoice, Architecture, Form, Initialization, InputLayer, NetworkLagrangian, initial_weights,
+    Activation, ActivationChoice, Architecture, Form, Initialization, InputLayer, NetworkLagrangian, initial_weights,
 };
 use lnn::rollout::{Method, Options, rollout_fixed};
 use lnn::scalar::{AnyFloat, Real, Scalar};
