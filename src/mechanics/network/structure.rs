@@ -4,11 +4,12 @@
 //! |---|---|---|
 //! | black box | `N(q, v) + alpha v.eta.v`, `eta = diag(1, .., 1)`, -1 for a time-like coordinate | |
 //! | mechanical | `v.M(q) v/2 + A(q).v - V(q)`, `M = F F^T` | `M` positive definite |
+//! | constant mass | `v.M v/2 + A(q).v - V(q)`, `M = F F^T` the same everywhere | `M` positive definite and constant, as in Cartesian coordinates |
 //! | metric | `g(q)(v, v)/2`, `g = F diag(1, .., 1, -1) F^T`, space first, time last; without a time `g = F F^T` | the signature of `g` |
 //!
 //! The factor `F` is a triangle or a rectangle, see [`Factor`]. With the time last a triangle is the 3 + 1 split: spatial metric
-//! positive definite, lapse positive, shift free. All velocities are scaled, `v_i/s_i`; the network of a mechanical Lagrangian or a
-//! metric sees positions alone.
+//! positive definite, lapse positive, shift free. All velocities are scaled, `v_i/s_i`; the network of every
+//! structure but the black box sees positions alone.
 
 use super::factor::{Factor, time_last};
 use crate::lagrangian::Description;
@@ -49,6 +50,7 @@ macro_rules! structures {
 structures! {
     BlackBox "black-box" "The paper's: one output, a function of positions and velocities.";
     Mechanical "mechanical" "Kinetic energy, vector potential and potential, functions of the positions.";
+    ConstantMass "constant-mass" "A constant mass matrix, as in Cartesian coordinates; vector potential and potential are functions of the positions.";
     Metric "metric" "The metric of geodesics, a function of the positions.";
 }
 
@@ -57,7 +59,7 @@ impl Structure {
     pub(super) fn sees_velocities(self) -> bool {
         match self {
             Self::BlackBox => true,
-            Self::Mechanical | Self::Metric => false,
+            Self::Mechanical | Self::ConstantMass | Self::Metric => false,
         }
     }
 
@@ -65,7 +67,7 @@ impl Structure {
     fn takes_a_time(self) -> bool {
         match self {
             Self::BlackBox | Self::Metric => true,
-            Self::Mechanical => false,
+            Self::Mechanical | Self::ConstantMass => false,
         }
     }
 
@@ -73,10 +75,13 @@ impl Structure {
     pub(crate) fn has_signature(self) -> bool {
         match self {
             Self::BlackBox => false,
-            Self::Mechanical | Self::Metric => true,
+            Self::Mechanical | Self::ConstantMass | Self::Metric => true,
         }
     }
 }
+
+/// Initial factor of a constant mass matrix beside a known Lagrangian.
+const BESIDE_KNOWN: f64 = 0.01;
 
 /// Knowledge of a Lagrangian beforehand.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -147,6 +152,7 @@ impl Form {
         match self.structure {
             Structure::BlackBox => 1,
             Structure::Mechanical => self.factor.numbers(n, false) + potentials,
+            Structure::ConstantMass => potentials,
             Structure::Metric => self.factor.numbers(n, lorentzian),
         }
     }
@@ -154,7 +160,7 @@ impl Form {
     /// Initial biases of the outputs, those other than 0 with their indices.
     pub(super) fn initial_biases(&self, n: usize, lorentzian: bool) -> Vec<(usize, f64)> {
         match self.structure {
-            Structure::BlackBox => Vec::new(),
+            Structure::BlackBox | Structure::ConstantMass => Vec::new(),
             Structure::Mechanical => self.factor.initial_biases(n, false),
             Structure::Metric => self.factor.initial_biases(n, lorentzian),
         }
@@ -162,9 +168,15 @@ impl Form {
 
     /// Name and initial values of the parameters that stand beside the network; `alpha` is the factor of the added term.
     pub(super) fn constants(&self, n: usize, alpha: f64) -> Option<(&'static str, Vec<f64>)> {
-        let _ = n;
         match self.structure {
             Structure::BlackBox => self.learn_alpha.then(|| ("alpha", vec![alpha])),
+            Structure::ConstantMass => {
+                let mut numbers = vec![0.0; self.factor.numbers(n, false)];
+                // Beside a known part a small mass, though none at all would have no gradient.
+                let size = if self.known.is_some() { BESIDE_KNOWN } else { 1.0 };
+                self.factor.initial_biases(n, false).iter().for_each(|&(k, number)| numbers[k] = size * number);
+                Some(("mass", numbers))
+            }
             Structure::Mechanical | Structure::Metric => None,
         }
     }
@@ -193,6 +205,10 @@ impl Form {
                 let (numbers, potentials) = outputs.split_at(factor.numbers(n, false));
                 with_potentials(factor.half_form(numbers, velocities, &time_last(n, None), false), potentials)
             }
+            Structure::ConstantMass => with_potentials(
+                factor.half_form(constants, velocities, &time_last(n, None), false),
+                &network(positions),
+            ),
             Structure::Metric => {
                 factor.half_form(&network(positions), velocities, &time_last(n, time_like), time_like.is_some())
             }

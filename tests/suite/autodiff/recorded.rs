@@ -227,6 +227,8 @@ fn every_structure_agrees_with_nested_forward_numbers() {
         (Structure::BlackBox, None, vec![1], false, true),
         (Structure::Mechanical, None, vec![], false, false),
         (Structure::Mechanical, None, vec![0], true, false),
+        (Structure::ConstantMass, None, vec![], false, false),
+        (Structure::ConstantMass, None, vec![1], true, false),
         (Structure::Metric, Some(0), vec![0], false, false),
         (Structure::Metric, Some(2), vec![], false, false),
         (Structure::Metric, None, vec![], false, false),
@@ -270,6 +272,11 @@ fn every_structure_agrees_with_nested_forward_numbers() {
                 let negative = values.iter().filter(|x| **x < 0.0).count();
                 assert_eq!(negative, usize::from(time_like.is_some() && structure == Structure::Metric));
             }
+        }
+        if structure == Structure::ConstantMass {
+            let first = &evaluation.mass_matrix[..9];
+            let same = |m: &[f64]| m.iter().zip(first).all(|(a, b)| (a - b).abs() < 1e-13);
+            assert!(evaluation.mass_matrix.chunks_exact(9).all(same));
         }
         for &i in &cyclic {
             assert!(evaluation.dl_dq.chunks_exact(3).all(|g| g[i] == 0.0));
