@@ -7,7 +7,7 @@ use crate::shooting::segments::Segments;
 use crate::shooting::starts::Curvature;
 use crate::storage::container::state::{self, numbers};
 use crate::training::BatchReport;
-use crate::training::learner::{Judgement, Learner};
+use crate::training::learner::{Learner, Validation};
 use argmin::core::KV;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -127,7 +127,7 @@ impl<S: Scalar> Learner<S> for ShootingLearner<S> {
             self.starts.refine(&mut problem.shots, weights, &problem.training);
             self.validation_starts.refine(&mut problem.shots, weights, &problem.validation);
         }
-        self.start_loss = self.judge(problem, weights).cost;
+        self.start_loss = self.validate(problem, weights).cost;
         Some(self.start_loss)
     }
 
@@ -166,7 +166,7 @@ impl<S: Scalar> Learner<S> for ShootingLearner<S> {
     }
 
     /// From starts that fit the weights; infinite if too many segments are left out.
-    fn judge(&mut self, problem: &mut Self::Problem, weights: &[S]) -> Judgement {
+    fn validate(&mut self, problem: &mut Self::Problem, weights: &[S]) -> Validation {
         let ShootingProblem { shots, validation, .. } = problem;
         self.validation_starts.refine(shots, weights, validation);
         let rows: Vec<u32> = (0..validation.len() as u32).collect();
@@ -174,7 +174,7 @@ impl<S: Scalar> Learner<S> for ShootingLearner<S> {
         let loss = report.loss.to_f64();
         let counts = loss.is_finite() && LEFT_OUT * report.left_out <= validation.len();
         let loss = if counts { loss } else { f64::INFINITY };
-        Judgement { loss, cost: loss }
+        Validation { loss, cost: loss }
     }
 
     fn stored(&self, seconds: f64) -> Option<Vec<u8>> {

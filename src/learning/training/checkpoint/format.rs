@@ -1,7 +1,7 @@
 //! The bytes of a checkpoint.
 
 use super::fingerprint::{Fingerprint, Saved};
-use super::{Ended, OptimizerState, PhaseState, Snapshot};
+use super::{OptimizerState, Outcome, PhaseState, Snapshot};
 use crate::network::file::{ModelFileError, StoredPrecision};
 use crate::scalar::Scalar;
 use crate::storage::container::{Kind, Tensor, pack, state, unpack};
@@ -38,8 +38,8 @@ impl Header {
 pub(crate) fn encode<S: Scalar>(
     identity: &Fingerprint,
     seconds: f64,
-    ended: &Ended<S>,
-    underway: Option<&PhaseState<S>>,
+    outcome: &Outcome<S>,
+    in_progress: Option<&PhaseState<S>>,
 ) -> Result<Vec<u8>, ModelFileError> {
     let precision = StoredPrecision::of::<S>()
         .ok_or_else(|| ModelFileError::Header(format!("no checkpoint can hold {} numbers", S::NAME)))?;
@@ -48,10 +48,10 @@ pub(crate) fn encode<S: Scalar>(
         crate_version: env!("CARGO_PKG_VERSION").to_string(),
         precision,
         identity: identity.clone(),
-        epochs: ended.history.len() + underway.map_or(0, |underway| underway.history.len()),
-        steps: underway.map_or(ended.steps, |underway| underway.course.step),
+        epochs: outcome.history.len() + in_progress.map_or(0, |in_progress| in_progress.history.len()),
+        steps: in_progress.map_or(outcome.steps, |in_progress| in_progress.optimizer_state.step),
     };
-    let state = state::to_bytes(&(seconds, ended, underway))?;
+    let state = state::to_bytes(&(seconds, outcome, in_progress))?;
     pack(&CHECKPOINT, &header, vec![Tensor::bytes(STATE.to_string(), state)])
 }
 
@@ -64,11 +64,12 @@ pub(crate) fn decode_header(bytes: &[u8]) -> Result<Header, ModelFileError> {
 pub(crate) fn decode<S: Scalar>(bytes: &[u8]) -> Result<(Header, Snapshot<S>), ModelFileError> {
     let (header, file) = unpack::<Header>(&CHECKPOINT, bytes)?;
     file.check_names(|name| name == STATE)?;
-    let (seconds, ended, underway): (f64, Ended<S>, Option<PhaseState<S>>) = state::from_bytes(file.bytes(STATE)?)?;
+    let (seconds, outcome, in_progress): (f64, Outcome<S>, Option<PhaseState<S>>) =
+        state::from_bytes(file.bytes(STATE)?)?;
     let refused = |problem: &str| ModelFileError::Header(problem.to_string());
-    ended.check().map_err(refused)?;
-    underway.as_ref().map_or(Ok(()), |underway| underway.check(ended.weights.len())).map_err(refused)?;
-    Ok((header, Snapshot { seconds: seconds.max(0.0), ended, underway }))
+    outcome.check().map_err(refused)?;
+    in_progress.as_ref().map_or(Ok(()), |in_progress| in_progress.check(outcome.weights.len())).map_err(refused)?;
+    Ok((header, Snapshot { seconds: seconds.max(0.0), outcome, in_progress }))
 }
 
 /// Checks that no count is beyond any training.
@@ -76,7 +77,7 @@ fn check_counts(counts: impl IntoIterator<Item = u64>) -> Result<(), &'static st
     if counts.into_iter().any(|count| count > MOST) { Err("a count is beyond any training") } else { Ok(()) }
 }
 
-impl<S> Ended<S> {
+impl<S> Outcome<S> {
     fn check(&self) -> Result<(), &'static str> {
         check_counts([self.phases, self.steps, self.states].map(|count| count as u64))
     }
@@ -85,8 +86,13 @@ impl<S> Ended<S> {
 impl<S: Scalar> PhaseState<S> {
     /// Checks that the parts fit each other and a network of so many `parameters`.
     fn check(&self, parameters: usize) -> Result<(), &'static str> {
-        let OptimizerState { order, weights, moments, average, iteration, means, .. } = &self.course;
-        let counts = [self.course.averaged_steps, self.course.epoch, self.course.step, self.course.batch];
+        let OptimizerState { order, weights, moments, average, iteration, means, .. } = &self.optimizer_state;
+        let counts = [
+            self.optimizer_state.averaged_steps,
+            self.optimizer_state.epoch,
+            self.optimizer_state.step,
+            self.optimizer_state.batch,
+        ];
         check_counts(counts.into_iter().chain(means.counts()).map(|count| count as u64).chain([*iteration]))?;
         // A learner with a state of its own averages nothing.
         let averaged = if self.learner.is_some() { 0 } else { parameters };
@@ -133,8 +139,8 @@ mod tests {
         for _ in 0..11 {
             moments.update(&mut draw(5), &mut draw(5), &update);
         }
-        let mut ended = Ended::none(draw(5));
-        ended.history = vec![row(1, 0.25)];
+        let mut outcome = Outcome::none(draw(5));
+        outcome.history = vec![row(1, 0.25)];
         let means = Means {
             loss: 0.1,
             penalty: f64::INFINITY,
@@ -145,7 +151,7 @@ mod tests {
             taken: 4,
             last_failure: Some(MechanicsError::Singular { row: 3, condition: f64::INFINITY }),
         };
-        let course = OptimizerState {
+        let optimizer_state = OptimizerState {
             rng,
             order: vec![2, 0, 1, 3],
             weights,
@@ -158,8 +164,8 @@ mod tests {
             batch: 3,
             means,
         };
-        let underway = PhaseState {
-            course,
+        let in_progress = PhaseState {
+            optimizer_state,
             history: vec![row(2, 0.5)],
             best,
             best_loss: f64::INFINITY,
@@ -167,29 +173,29 @@ mod tests {
             learner: None,
         };
         let identity = Fingerprint { config: "a = \"b\"\n".to_string(), data: vec![("test".to_string(), 5)] };
-        (identity, Snapshot { seconds: 0.1 + 0.2, ended, underway: Some(underway) })
+        (identity, Snapshot { seconds: 0.1 + 0.2, outcome, in_progress: Some(in_progress) })
     }
 
     #[test]
     fn everything_comes_back() {
         let (identity, snapshot) = snapshot();
-        let bytes = |s: &Snapshot<f32>| encode(&identity, s.seconds, &s.ended, s.underway.as_ref()).unwrap();
+        let bytes = |s: &Snapshot<f32>| encode(&identity, s.seconds, &s.outcome, s.in_progress.as_ref()).unwrap();
         let (header, mut back) = decode::<f32>(&bytes(&snapshot)).unwrap();
         assert_eq!((&header.identity, &back), (&identity, &snapshot));
-        let draws = |s: &mut Snapshot<f32>| s.underway.as_mut().unwrap().course.rng.random::<u64>();
+        let draws = |s: &mut Snapshot<f32>| s.in_progress.as_mut().unwrap().optimizer_state.rng.random::<u64>();
         assert_eq!(draws(&mut back), draws(&mut snapshot.clone()));
         assert_eq!((snapshot.epochs(), snapshot.steps()), (2, 11));
-        let between = Snapshot { underway: None, ..snapshot };
+        let between = Snapshot { in_progress: None, ..snapshot };
         assert_eq!(decode::<f32>(&bytes(&between)).unwrap().1, between);
     }
 
     #[test]
     fn the_state_of_a_learner_comes_back() {
         let (identity, mut snapshot) = snapshot();
-        let underway = snapshot.underway.as_mut().unwrap();
-        underway.course.average.clear();
-        underway.learner = Some(vec![1, 2, 255]);
-        let bytes = encode(&identity, snapshot.seconds, &snapshot.ended, snapshot.underway.as_ref()).unwrap();
+        let in_progress = snapshot.in_progress.as_mut().unwrap();
+        in_progress.optimizer_state.average.clear();
+        in_progress.learner = Some(vec![1, 2, 255]);
+        let bytes = encode(&identity, snapshot.seconds, &snapshot.outcome, snapshot.in_progress.as_ref()).unwrap();
         let back = decode::<f32>(&bytes).unwrap().1;
         assert!(back == snapshot && back.is_shooting());
     }
@@ -200,27 +206,27 @@ mod tests {
         let refused = |change: fn(&mut Snapshot<f32>)| {
             let (identity, mut snapshot) = snapshot();
             change(&mut snapshot);
-            let bytes = encode(&identity, 0.0, &snapshot.ended, snapshot.underway.as_ref()).unwrap();
+            let bytes = encode(&identity, 0.0, &snapshot.outcome, snapshot.in_progress.as_ref()).unwrap();
             assert!(matches!(decode::<f32>(&bytes), Err(ModelFileError::Header(_))));
         };
-        fn course(snapshot: &mut Snapshot<f32>) -> &mut OptimizerState<f32> {
-            &mut snapshot.underway.as_mut().unwrap().course
+        fn optimizer_state(snapshot: &mut Snapshot<f32>) -> &mut OptimizerState<f32> {
+            &mut snapshot.in_progress.as_mut().unwrap().optimizer_state
         }
-        refused(|s| course(s).order = vec![0, 0, 1, 2]);
-        refused(|s| course(s).order = vec![0, 1, 2, 4]);
-        refused(|s| course(s).weights.truncate(4));
-        refused(|s| course(s).average.truncate(4));
-        refused(|s| course(s).moments = Moments::new(4));
-        refused(|s| course(s).step = usize::MAX);
-        refused(|s| course(s).means.taken = usize::MAX);
-        refused(|s| s.ended.weights.truncate(4));
-        refused(|s| s.ended.states = usize::MAX);
+        refused(|s| optimizer_state(s).order = vec![0, 0, 1, 2]);
+        refused(|s| optimizer_state(s).order = vec![0, 1, 2, 4]);
+        refused(|s| optimizer_state(s).weights.truncate(4));
+        refused(|s| optimizer_state(s).average.truncate(4));
+        refused(|s| optimizer_state(s).moments = Moments::new(4));
+        refused(|s| optimizer_state(s).step = usize::MAX);
+        refused(|s| optimizer_state(s).means.taken = usize::MAX);
+        refused(|s| s.outcome.weights.truncate(4));
+        refused(|s| s.outcome.states = usize::MAX);
     }
 
     #[test]
     fn damage_is_refused() {
         let (identity, snapshot) = snapshot();
-        let bytes = encode(&identity, 0.0, &snapshot.ended, snapshot.underway.as_ref()).unwrap();
+        let bytes = encode(&identity, 0.0, &snapshot.outcome, snapshot.in_progress.as_ref()).unwrap();
         for length in 0..bytes.len() {
             assert!(decode::<f32>(&bytes[..length]).is_err(), "cut at {length}");
         }

@@ -11,10 +11,10 @@
 
 mod fingerprint;
 mod format;
-mod keeper;
+mod manager;
 
 pub use fingerprint::{Fingerprint, Saved};
-pub use keeper::{
+pub use manager::{
     CheckpointError, CheckpointInterval, CheckpointManager, LATEST, PREVIOUS, Restored, remove_checkpoints, saved,
 };
 
@@ -31,8 +31,8 @@ use std::time::Instant;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Snapshot<S> {
     pub(crate) seconds: f64,
-    pub(crate) ended: Ended<S>,
-    pub(crate) underway: Option<PhaseState<S>>,
+    pub(crate) outcome: Outcome<S>,
+    pub(crate) in_progress: Option<PhaseState<S>>,
 }
 
 impl<S: Scalar> Snapshot<S> {
@@ -41,7 +41,7 @@ impl<S: Scalar> Snapshot<S> {
     /// # Errors
     /// A number type that files do not know.
     pub fn to_bytes(&self, identity: &Fingerprint) -> Result<Vec<u8>, ModelFileError> {
-        format::encode(identity, self.seconds, &self.ended, self.underway.as_ref())
+        format::encode(identity, self.seconds, &self.outcome, self.in_progress.as_ref())
     }
 
     /// Reads any bytes as a checkpoint; its numbers are converted to the precision of `S`.
@@ -56,30 +56,30 @@ impl<S: Scalar> Snapshot<S> {
 impl<S> Snapshot<S> {
     /// The beginning of a training from these weights, such as those of a model that learns on.
     pub fn beginning_with(weights: Vec<S>) -> Self {
-        Self { seconds: 0.0, ended: Ended::none(weights), underway: None }
+        Self { seconds: 0.0, outcome: Outcome::none(weights), in_progress: None }
     }
     /// Steps taken so far; those of multiple shooting, while that is under way.
     pub fn steps(&self) -> usize {
-        self.underway.as_ref().map_or(self.ended.steps, |underway| underway.course.step)
+        self.in_progress.as_ref().map_or(self.outcome.steps, |in_progress| in_progress.optimizer_state.step)
     }
     /// `true` if multiple shooting is under way, the training before it being over.
     pub fn is_shooting(&self) -> bool {
-        self.underway.as_ref().is_some_and(|underway| underway.learner.is_some())
+        self.in_progress.as_ref().is_some_and(|in_progress| in_progress.learner.is_some())
     }
-    /// Epochs completed so far, polishing included.
+    /// Epochs completed so far, those of L-BFGS included.
     pub fn epochs(&self) -> usize {
-        self.ended.history.len() + self.underway.as_ref().map_or(0, |underway| underway.history.len())
+        self.outcome.history.len() + self.in_progress.as_ref().map_or(0, |in_progress| in_progress.history.len())
     }
 }
 
 /// Result of the phases that have ended.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(bound = "S: Scalar")]
-pub(crate) struct Ended<S> {
+pub(crate) struct Outcome<S> {
     /// Number of phases that have ended.
     pub phases: usize,
-    /// `true` if polishing has ended too.
-    pub polished: bool,
+    /// `true` if L-BFGS has ended too.
+    pub refined: bool,
     /// Parameters of the best epoch; the initial ones if there is none.
     #[serde(with = "numbers")]
     pub weights: Vec<S>,
@@ -93,12 +93,12 @@ pub(crate) struct Ended<S> {
     pub states: usize,
 }
 
-impl<S> Ended<S> {
+impl<S> Outcome<S> {
     /// Before the first phase.
     pub fn none(weights: Vec<S>) -> Self {
         let (phases, steps, states) = (0, 0, 0);
         let (validation_loss, history) = (f64::INFINITY, Vec::new());
-        Self { phases, polished: false, weights, validation_loss, history, steps, states }
+        Self { phases, refined: false, weights, validation_loss, history, steps, states }
     }
 }
 
@@ -106,7 +106,7 @@ impl<S> Ended<S> {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(bound = "S: Scalar")]
 pub(crate) struct PhaseState<S> {
-    pub course: OptimizerState<S>,
+    pub optimizer_state: OptimizerState<S>,
     /// One row per epoch of the phase.
     pub history: Vec<Epoch>,
     /// Parameters of the phase's best epoch; those it started with if there is none.
