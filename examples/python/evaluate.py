@@ -22,11 +22,12 @@ ACTIVATIONS = {
     "x-tanh": lambda x: x * np.tanh(x / 2),
     "tanh": np.tanh,
     "quadratic": np.square,
+    "silu": lambda x: x * np.exp(-np.logaddexp(0, -x)),
 }
 
 # Every key of a header that is read, or that changes neither L nor p; a list holds the values that are read, None stands for any.
 FORM = {
-    "structure": ["black-box", "mechanical", "metric"],
+    "structure": ["black-box", "mechanical", "constant-mass", "metric"],
     "factor": ["triangle", "rectangle"],
     "cyclic": None,
     "even_in_v": None,
@@ -126,8 +127,11 @@ def lagrangian(header, tensors, q, v):
     positions, scaled = position_features(net, q), v / np.array(net["scale"])
     if form["structure"] == "metric":
         return half_form(form["factor"], network(net, tensors, positions), scaled, time)
-    if form["structure"] == "mechanical":
+    if form["structure"] in ("mechanical", "constant-mass"):
         outputs, n = network(net, tensors, positions), v.shape[1]
+        if form["structure"] == "constant-mass":
+            # The numbers of the factor are parameters beside the network, the same for every state.
+            outputs = np.concatenate([np.tile(tensors["mass"].astype(float), (len(v), 1)), outputs], axis=1)
         count = n * (n + 1) // 2 if form["factor"] == "triangle" else 3 * n**2
         numbers, potential, vector = np.split(outputs, [count, count + 1], axis=1)
         # An even Lagrangian has no vector potential.

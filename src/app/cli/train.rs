@@ -30,7 +30,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let Some(Task { config, system, folder, start }) = Task::of(args)? else { return Ok(()) };
     let forbidden = forbidden_share(&config, &system).filter(|share| *share > 0.0);
     if let (Some(share), Regularizer::LorentzianSylvester { time, .. }) = (forbidden, &config.penalty) {
-        let place = "as inside of a horizon or of an ergosphere: choose no penalty, or other bounds";
+        let place = "as inside of a horizon or of an ergosphere: choose --penalty signature, or other bounds";
         let share = percent(share);
         output::note(&format!("the penalty is against g_{time}{time} > 0, which {share} of the states have, {place}"));
     }

@@ -146,7 +146,7 @@ fn train_in<S: Scalar>(
         .map(|checkpoints| checkpoints.open::<S>(&toml, data.checksums(), (parameters, config.data.training), watch));
     let (keeper, restored) = opened.transpose()?.map_or((None, None), |(keeper, start)| (Some(keeper), start));
     let start = restored.or_else(|| before.map(Snapshot::beginning_with));
-    let sitting = ResumeOptions { keeper, start };
+    let sitting = ResumeOptions { checkpoints: keeper, start };
     let trained = resume(config, &architecture, penalty, data, options.threads, &watch.hooks(), sitting)?;
 
     // The model first, then what is small, pictures last: on a full disk nothing that comes after can lose them.

@@ -110,10 +110,11 @@ table! {
 const PENALTY_KEYS: &[Key] = &[
     Key::new(
         "kind",
-        "What is penalised. Beside a time-like coordinate none or lorentzian-sylvester, which wants a negative element of \
-         the time: not for metrics inside of a horizon or of an ergosphere, where it is positive.",
+        "What is penalised. Beside a time-like coordinate signature, which wants one negative eigenvalue and names no time, or \
+         lorentzian-sylvester, which wants a negative element of the time: not for metrics inside of a horizon or of an \
+         ergosphere, where it is positive.",
     )
-    .values("none, eigenvalue, sylvester, lorentzian-sylvester")
+    .values(Regularizer::NAMES)
     .flag("penalty"),
     Key::new("lambda", "Weight beside the loss; not with kind none.")
         .values("0 to 10^12")
@@ -240,10 +241,10 @@ table! {
         #[key("1 to 64 widths of 1 to 65536", example = "[128, 128, 128]", flag = "hidden", check = count(MAX_WIDTH))]
         pub hidden: Vec<usize> = vec![128; 3],
         /// Activation of the hidden layers; quadratic-softplus is two networks of half the widths.
-        #[key("gelu, softplus, x-tanh, tanh, quadratic, quadratic-softplus", flag = "activation")]
+        #[key(ActivationChoice::NAMES, flag = "activation")]
         pub activation: ActivationChoice = ActivationChoice::Gelu,
         /// How the Lagrangian is made of the network's outputs; see structures.
-        #[key("black-box, mechanical, metric", flag = "structure")]
+        #[key(Structure::NAMES, flag = "structure")]
         pub structure: Structure = Structure::BlackBox,
         /// How kinetic energy or metric of a structure are factored: a triangle, or a rectangle of three squares a coordinate, which
         /// is smooth where a triangle has a root.
@@ -317,12 +318,12 @@ table! {
     /// Update rule.
     pub struct Optimizer {
         /// Update rule.
-        #[key("soap, radam, adam")]
+        #[key(Method::NAMES)]
         pub method: Method = Method::Soap,
         /// States per step.
         #[key("1 to 2^30 states", check = count(MOST_STATES))]
         pub batch: usize = 128,
-        /// L2 weight decay, added to the gradient.
+        /// Weight decay: added to the gradient (L2), or, by adamw, a shrinking by the rate times it.
         #[key("from 0", check = from_zero)]
         pub weight_decay: f64 = 1e-6,
         /// The gradient's norm is cut to this.

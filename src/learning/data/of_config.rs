@@ -1,6 +1,6 @@
 //! System, penalty, shape of the network and header of the model file that a configuration asks for.
 
-use crate::configuration::{Config, ConfigError, Penalty, Precision, Regularizer, Scaling};
+use crate::configuration::{Config, ConfigError, Penalty, Precision, Scaling};
 use crate::data::draw::SamplingError;
 use crate::lagrangian::system::System;
 use crate::lagrangian::{SystemInstance, configure_values, find};
@@ -39,12 +39,11 @@ impl Config {
     /// # Errors
     /// Unknown system or parameter, or a name that is no coordinate of it.
     pub fn penalty(&self) -> Result<Penalty, SamplingError> {
-        let coordinates = match self.penalty {
-            Regularizer::LorentzianSylvester { .. } => {
-                let system = self.system()?;
-                system.system.coordinates(system.coordinates)
-            }
-            _ => Vec::new(),
+        let coordinates = if self.penalty.time().is_some() {
+            let system = self.system()?;
+            system.system.coordinates(system.coordinates)
+        } else {
+            Vec::new()
         };
         Ok(self.penalty.resolve(coordinates.iter().map(|c| c.name.as_ref()))?)
     }

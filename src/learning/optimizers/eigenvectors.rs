@@ -3,6 +3,8 @@
 use crate::linalg::{MatMut, MatRef, Workspace, eigh, gemm};
 use crate::optimizers::orthonormal::orthonormalize;
 use crate::scalar::{Real, Scalar};
+use crate::storage::container::state::numbers;
+use serde::{Deserialize, Serialize};
 
 /// Running means after a step.
 const KEEP: f64 = 0.95;
@@ -10,14 +12,19 @@ const KEEP: f64 = 0.95;
 const ROWS: usize = 32;
 
 /// Running mean of `G G^T` or `G^T G` and its eigenvectors as rows, `(size, size)`; empty if this side is not turned.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(bound = "S: Scalar")]
 pub(super) struct Side<S> {
     pub size: usize,
     /// Up to its diagonal; beyond it lie numbers of the last look at the eigenvectors.
+    #[serde(with = "numbers")]
     pub covariance: Vec<S>,
+    #[serde(with = "numbers")]
     pub vectors: Vec<S>,
-    /// The next eigenvectors, then how they are turned against the last.
+    /// The next eigenvectors, then how they are turned against the last; empty until they are looked for.
+    #[serde(skip)]
     next: Vec<S>,
+    #[serde(skip)]
     pub turn: Vec<S>,
 }
 
@@ -31,7 +38,12 @@ impl<S: PartialEq> PartialEq for Side<S> {
 impl<S: Scalar> Side<S> {
     pub fn new(size: usize) -> Self {
         let zeros = || vec![<S as Real>::zero(); size * size];
-        Self { size, covariance: zeros(), vectors: zeros(), next: zeros(), turn: zeros() }
+        Self { size, covariance: zeros(), vectors: zeros(), next: Vec::new(), turn: Vec::new() }
+    }
+
+    /// `true` if this is a side of `size`, with all its numbers.
+    pub fn is_of(&self, size: usize) -> bool {
+        self.size == size && [&self.covariance, &self.vectors].iter().all(|numbers| numbers.len() == size * size)
     }
 
     pub fn matrix<'a>(&self, data: &'a [S]) -> MatRef<'a, S> {
@@ -72,6 +84,7 @@ impl<S: Scalar> Side<S> {
         let size = self.size;
         self.complete();
         let mut values = vec![<S as Real>::zero(); size];
+        self.next.resize(size * size, <S as Real>::zero());
         let done = eigh(size, &self.covariance, &mut values, &mut self.next, &mut Workspace::new());
         for (k, vector) in self.vectors.chunks_exact_mut(size).enumerate() {
             match done {
@@ -83,11 +96,13 @@ impl<S: Scalar> Side<S> {
 
     /// One step of subspace iteration; `turn` becomes new vectors times old ones transposed. Nothing changes where the
     /// mean is not finite.
-    pub fn follow(&mut self) {
+    pub fn update_basis(&mut self) {
         let size = self.size;
         if size == 0 {
             return;
         }
+        self.next.resize(size * size, <S as Real>::zero());
+        self.turn.resize(size * size, <S as Real>::zero());
         self.complete();
         let trace = self.covariance.iter().step_by(size + 1).fold(<S as Real>::zero(), |sum, &c| sum + c);
         // Vectors of eigenvalues that are lost in rounding stay where they are.

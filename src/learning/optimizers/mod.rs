@@ -1,4 +1,4 @@
-//! Adam, RAdam and SOAP with L2 weight decay and gradient clipping, one step at a time.
+//! Update rules of the weights, from Adam to SOAP, with weight decay and gradient clipping, one step at a time.
 
 mod eigenvectors;
 mod orthonormal;
@@ -10,55 +10,71 @@ pub use schedule::Schedule;
 pub(crate) use soap::Block;
 
 use crate::scalar::{Real, Scalar, vectorized};
+use crate::storage::container::state::numbers;
 use part::Part;
 use serde::{Deserialize, Serialize};
 use soap::{Eigenbasis, Step};
 
-/// Which update rule.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-#[non_exhaustive]
-pub enum Method {
-    /// Adam (Kingma, Ba 2015) with bias correction.
-    Adam,
-    /// RAdam (Liu et al. 2020): no second moment until its variance is tractable, then rectified.
-    Radam,
+/// What tells one update rule from another; all keep running means of gradient and squared gradient.
+#[derive(Clone, Copy)]
+struct Traits {
+    /// Decay of the two means.
+    decay: [f64; 2],
+    /// `true` without second moment until its variance is tractable, then rectified (Liu et al. 2020).
+    rectified: bool,
+    /// `true` if the moments of weight matrices are taken in the eigenbases of Shampoo's preconditioner.
+    eigenbases: bool,
+    /// `true` if weights decay beside the step, by rate times decay, instead of through the gradient.
+    decoupled: bool,
+}
+
+/// Adam's.
+const ADAM: Traits = Traits { decay: [0.9, 0.999], rectified: false, eigenbases: false, decoupled: false };
+
+/// Builds the choice of update rules from rows `Name "name in configurations" "name in the literature" traits;`.
+macro_rules! methods {
+    ($($(#[$doc:meta])* $name:ident $text:literal $title:literal $traits:expr;)*) => {
+        /// Which update rule.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+        #[non_exhaustive]
+        pub enum Method {
+            $($(#[$doc])* #[serde(rename = $text)] $name,)*
+        }
+
+        impl Method {
+            /// Every update rule.
+            pub const ALL: [Self; [$($text),*].len()] = [$(Self::$name),*];
+            /// The names in configurations, separated by commas.
+            pub const NAMES: &'static str = methods!(@names $($text)*);
+
+            /// Its name in the literature.
+            pub fn name(self) -> &'static str {
+                match self {
+                    $(Self::$name => $title,)*
+                }
+            }
+
+            fn traits(self) -> Traits {
+                match self {
+                    $(Self::$name => $traits,)*
+                }
+            }
+        }
+    };
+    (@names $first:literal $($text:literal)*) => { concat!($first $(, ", ", $text)*) };
+}
+
+methods! {
     /// RAdam in the eigenbases of Shampoo's preconditioner (Vyas et al. 2024): fewer steps to the same loss, each of them
     /// dearer by four products of the size of each weight matrix and two squares of it.
-    Soap,
-}
-
-impl Method {
-    /// Its name in the literature.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Adam => "Adam",
-            Self::Radam => "RAdam",
-            Self::Soap => "SOAP",
-        }
-    }
-
-    /// Decay of the running means of gradient and squared gradient.
-    fn decay(self) -> [f64; 2] {
-        match self {
-            Self::Adam | Self::Radam => [0.9, 0.999],
-            Self::Soap => [0.95, 0.99],
-        }
-    }
-}
-
-/// Moments as a checkpoint keeps them.
-pub(crate) struct Stored<'a, S> {
-    /// First moments.
-    pub first: &'a [S],
-    /// Second moments.
-    pub second: &'a [S],
-    /// Steps they are made of.
-    pub step: u32,
-    /// Weight matrices that have eigenbases.
-    pub blocks: Vec<Block>,
-    /// Their eigenbases, one after the other.
-    pub bases: Vec<S>,
+    Soap "soap" "SOAP" Traits { decay: [0.95, 0.99], rectified: true, eigenbases: true, ..ADAM };
+    /// RAdam (Liu et al. 2020): no second moment until its variance is tractable, then rectified.
+    Radam "radam" "RAdam" Traits { rectified: true, ..ADAM };
+    /// Adam (Kingma, Ba 2015) with bias correction.
+    Adam "adam" "Adam" ADAM;
+    /// AdamW (Loshchilov, Hutter 2019): Adam whose weights shrink by the learning rate times the weight decay at every step, whatever
+    /// the size of their gradients.
+    AdamW "adamw" "AdamW" Traits { decoupled: true, ..ADAM };
 }
 
 /// Hyper-parameters of an update.
@@ -68,7 +84,7 @@ pub struct Update {
     pub method: Method,
     /// Learning rate.
     pub rate: f64,
-    /// L2 weight decay, added to the gradient.
+    /// Weight decay: added to the gradient (L2), or beside the step if the method decouples it.
     pub weight_decay: f64,
     /// Parameters that decay, the first ones: constants of nature behind the weights do not.
     pub decaying: usize,
@@ -78,7 +94,7 @@ pub struct Update {
 
 /// The matrices that have eigenbases, out of offset, rows and columns of each.
 fn blocks(method: Method, matrices: impl IntoIterator<Item = (usize, usize, usize)>) -> Vec<Block> {
-    if method != Method::Soap {
+    if !method.traits().eigenbases {
         return Vec::new();
     }
     matrices.into_iter().map(|(start, rows, cols)| Block { start, rows, cols }).collect()
@@ -97,9 +113,12 @@ pub(crate) fn eigenbasis_numbers(
 }
 
 /// First and second moments of the gradient, and the eigenbases they are taken in.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(bound = "S: Scalar")]
 pub struct Moments<S> {
+    #[serde(with = "numbers")]
     first: Vec<S>,
+    #[serde(with = "numbers")]
     second: Vec<S>,
     step: u32,
     bases: Vec<Eigenbasis<S>>,
@@ -126,22 +145,12 @@ impl<S: Scalar> Moments<S> {
         Self { bases: blocks.into_iter().map(Eigenbasis::new).collect(), ..Self::new(parameters) }
     }
 
-    /// State of the optimiser as a checkpoint keeps it.
-    pub(crate) fn stored(&self) -> Stored<'_, S> {
-        let mut bases = Vec::new();
-        self.bases.iter().for_each(|basis| basis.store(&mut bases));
-        let blocks = self.bases.iter().map(Eigenbasis::block).collect();
-        Stored { first: &self.first, second: &self.second, step: self.step, blocks, bases }
-    }
-
-    /// Moments from what [`Moments::stored`] gave: `None` if `blocks` and `bases` do not fit.
-    pub(crate) fn restore(first: Vec<S>, second: Vec<S>, step: u32, blocks: &[Block], bases: &[S]) -> Option<Self> {
-        if !Block::fit(blocks, first.len()) || Block::numbers(blocks)? != bases.len() {
-            return None;
-        }
-        let mut eigenbases: Vec<_> = blocks.iter().map(|&block| Eigenbasis::new(block)).collect();
-        eigenbases.iter_mut().fold(bases, |numbers, basis| basis.load(numbers));
-        Some(Self { first, second, step, bases: eigenbases })
+    /// `true` if these are moments of so many parameters, with all the numbers of their eigenbases.
+    pub(crate) fn fit(&self, parameters: usize) -> bool {
+        let blocks: Vec<Block> = self.bases.iter().map(Eigenbasis::block).collect();
+        [&self.first, &self.second].iter().all(|moments| moments.len() == parameters)
+            && Block::fit(&blocks, parameters)
+            && self.bases.iter().all(Eigenbasis::is_whole)
     }
 
     /// Updates `weights` in place and uses `gradient` up; returns its norm before clipping.
@@ -166,8 +175,16 @@ impl<S: Scalar> Moments<S> {
         }
         self.step += 1;
         let clip = S::of_f64(if norm > update.clip { update.clip / norm } else { 1.0 });
-        let decay = S::of_f64(update.weight_decay);
         let decaying = update.decaying.min(weights.len());
+        let (decay, shrink) = match update.method.traits().decoupled {
+            true => (0.0, update.rate * update.weight_decay),
+            false => (update.weight_decay, 0.0),
+        };
+        if shrink != 0.0 {
+            let keep = S::of_f64(1.0 - shrink);
+            weights[..decaying].iter_mut().for_each(|w| *w *= keep);
+        }
+        let decay = S::of_f64(decay);
         vectorized(
             #[inline(always)]
             || {
@@ -192,23 +209,21 @@ impl Update {
     /// without the second moment.
     fn step_size(&self, step: u32) -> (f64, Option<f64>) {
         let t = f64::from(step);
-        let [b1, b2] = self.method.decay();
+        let Traits { decay: [b1, b2], rectified, .. } = self.method.traits();
         let (correction1, correction2) = (1.0 - b1.powf(t), 1.0 - b2.powf(t));
         let adam = self.rate / correction1;
         let second = Some(1.0 / correction2.sqrt());
-        match self.method {
-            Method::Adam => (adam, second),
-            Method::Radam | Method::Soap => {
-                let limit = 2.0 / (1.0 - b2) - 1.0;
-                let length = limit - 2.0 * t * b2.powf(t) / correction2;
-                if length <= 5.0 {
-                    return (adam, None);
-                }
-                let numerator = (length - 4.0) * (length - 2.0) * limit;
-                let denominator = (limit - 4.0) * (limit - 2.0) * length;
-                (adam * (numerator / denominator).sqrt(), second)
-            }
+        if !rectified {
+            return (adam, second);
         }
+        let limit = 2.0 / (1.0 - b2) - 1.0;
+        let length = limit - 2.0 * t * b2.powf(t) / correction2;
+        if length <= 5.0 {
+            return (adam, None);
+        }
+        let numerator = (length - 4.0) * (length - 2.0) * limit;
+        let denominator = (limit - 4.0) * (limit - 2.0) * length;
+        (adam * (numerator / denominator).sqrt(), second)
     }
 }
 
@@ -272,6 +287,31 @@ mod tests {
         let norm = moments.update(&mut weights, &mut [30.0, 40.0], &update);
         assert_eq!(norm, 50.0);
         assert!((weights[0] - (1.0 - 0.6 - 0.5)).abs() < 1e-12 && (weights[1] - (1.0 - 0.8 - 0.5)).abs() < 1e-12);
+    }
+
+    /// Beside a decay through the gradient, which the second moment divides out, AdamW's shrinks every weight alike.
+    #[test]
+    fn a_decoupled_decay_does_not_depend_on_the_gradient() {
+        let update = Update { weight_decay: 0.5, decaying: 2, ..plain(Method::AdamW, 0.1) };
+        let mut weights = [1.0_f64, -2.0, 3.0];
+        Moments::new(3).update(&mut weights, &mut [100.0, -1e-3, 1.0], &update);
+        for (found, expected) in weights.iter().zip([0.95 - 0.1, -1.9 + 0.1, 3.0 - 0.1]) {
+            assert!((found - expected).abs() < 1e-5, "{weights:?}");
+        }
+        let run = |method, weight_decay| {
+            let mut weights = [1.0_f64, -2.0];
+            let update = Update { weight_decay, ..plain(method, 0.1) };
+            Moments::new(2).update(&mut weights, &mut [0.3, -4.0], &update);
+            weights
+        };
+        assert_eq!(run(Method::AdamW, 0.0), run(Method::Adam, 0.0));
+        assert_ne!(run(Method::AdamW, 0.5), run(Method::Adam, 0.5));
+    }
+
+    #[test]
+    fn names_agree_with_serde() {
+        let names = Method::ALL.map(|method| serde_json::to_value(method).unwrap().as_str().unwrap().to_string());
+        assert_eq!(names.join(", "), Method::NAMES);
     }
 
     #[test]

@@ -22,7 +22,7 @@ impl<S: Scalar> Rule<S> {
     /// The rule at step `step`, counted from 1.
     pub fn new(update: &Update, step: u32) -> Self {
         let (length, scale) = update.step_size(step);
-        let decay = update.method.decay();
+        let decay = update.method.traits().decay;
         Self {
             keep: decay.map(S::of_f64),
             take: decay.map(|b| S::of_f64(1.0 - b)),

@@ -55,12 +55,14 @@ impl Block {
 }
 
 /// The eigenbases of one weight matrix.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(bound = "S: Scalar")]
 pub(crate) struct Eigenbasis<S> {
     block: Block,
     /// Of the rows, and of the columns.
     sides: [Side<S>; 2],
-    /// Half of the way of a turn.
+    /// Half of the way of a turn; empty before the first.
+    #[serde(skip)]
     half: Vec<S>,
 }
 
@@ -73,37 +75,22 @@ impl<S: PartialEq> PartialEq for Eigenbasis<S> {
 
 impl<S: Scalar> Eigenbasis<S> {
     pub fn new(block: Block) -> Self {
-        let half = vec![<S as Real>::zero(); block.rows * block.cols];
-        Self { block, sides: block.sides().map(Side::new), half }
+        Self { block, sides: block.sides().map(Side::new), half: Vec::new() }
     }
 
     pub fn block(&self) -> Block {
         self.block
     }
 
-    /// Appends what a step leaves behind, both running means and eigenvectors.
-    pub fn store(&self, out: &mut Vec<S>) {
-        for side in &self.sides {
-            out.extend_from_slice(&side.covariance);
-            out.extend_from_slice(&side.vectors);
-        }
-    }
-
-    /// Takes what [`Eigenbasis::store`] appended; returns the rest.
-    pub fn load<'a>(&mut self, mut numbers: &'a [S]) -> &'a [S] {
-        for side in &mut self.sides {
-            for target in [&mut side.covariance, &mut side.vectors] {
-                let (mine, rest) = numbers.split_at(target.len());
-                target.copy_from_slice(mine);
-                numbers = rest;
-            }
-        }
-        numbers
+    /// `true` if the sides are those of the matrix, with all their numbers.
+    pub fn is_whole(&self) -> bool {
+        self.sides.iter().zip(self.block.sides()).all(|(side, size)| side.is_of(size))
     }
 
     /// Advances the matrix, its moments and its eigenbases.
     fn advance(&mut self, mut part: Part<'_, S>, step: &Step<S>, parallel: bool) {
         let Self { block, sides, half } = self;
+        half.resize(block.rows * block.cols, <S as Real>::zero());
         let [left, right] = &mut *sides;
         let (g, first) = (MatRef::new(part.gradient, block.rows, block.cols), step.number == 1);
         both(parallel, || left.observe(g, first), || right.observe(g.t(), first));
@@ -112,7 +99,7 @@ impl<S: Scalar> Eigenbasis<S> {
         rotate(*block, sides, Choice::Inverse, part.gradient, half);
         if step.number.is_multiple_of(EVERY) {
             let [left, right] = &mut *sides;
-            both(parallel, || left.follow(), || right.follow());
+            both(parallel, || left.update_basis(), || right.update_basis());
             rotate(*block, sides, Choice::Turn, part.first, half);
         }
         part.apply();
@@ -210,6 +197,7 @@ mod tests {
     use crate::optimizers::orthonormal::orthonormalize;
     use crate::optimizers::orthonormal::tests::{defect, random};
     use crate::optimizers::{Method, Moments, Update};
+    use crate::storage::container::state::{from_bytes, to_bytes};
 
     const PLAIN: Update =
         Update { method: Method::Soap, rate: 0.1, weight_decay: 0.0, decaying: usize::MAX, clip: f64::INFINITY };
@@ -284,16 +272,17 @@ mod tests {
         for step in 0..25 {
             moments.update(&mut weights, &mut random(12, step), &update);
         }
-        let stored = moments.stored();
-        let (first, second, step) = (stored.first.to_vec(), stored.second.to_vec(), stored.step);
-        let mut other = Moments::restore(first, second, step, &stored.blocks, &stored.bases).unwrap();
-        assert_eq!(moments, other);
+        let mut other: Moments<f64> = from_bytes(&to_bytes(&moments).unwrap()).unwrap();
+        assert!(other == moments && other.fit(12) && !other.fit(13));
         let mut same = weights.clone();
         moments.update(&mut weights, &mut random(12, 99), &update);
         other.update(&mut same, &mut random(12, 99), &update);
-        assert_eq!((weights, moments), (same, other));
-        let far = [Block { start: 10, rows: 2, cols: 2 }];
-        assert_eq!(Moments::restore(vec![0.0; 12], vec![0.0; 12], 1, &far, &[0.0; 16]), None);
+        assert!(weights == same && moments == other);
+        moments.bases[0].block.start = 10;
+        assert!(!moments.fit(12));
+        moments.bases[0] = Eigenbasis::new(Block { start: 1, rows: 3, cols: 2 });
+        moments.bases[0].sides[0].vectors.pop();
+        assert!(!moments.fit(12));
     }
 
     /// Least squares `|A W B - C|^2 / 2` with singular values from 1 to 1e-3 on both sides, in directions that are not the

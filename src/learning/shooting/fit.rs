@@ -178,12 +178,12 @@ pub fn fit<S: Scalar>(
     threads: usize,
     hooks: &Hooks,
 ) -> Result<Fitted<S>, ShootingError> {
-    resume(settings, task, threads, hooks, ResumeOptions { keeper: None, start: None })
+    resume(settings, task, threads, hooks, ResumeOptions { checkpoints: None, start: None })
 }
 
 /// [`fit`] with checkpoints, and from one: the result is that of a fit that was never stopped, but for the times.
 ///
-/// `sitting.start` is the training that gave the task its weights ([`Trained::snapshot`]), or what
+/// `session.start` is the training that gave the task its weights ([`Trained::snapshot`]), or what
 /// `CheckpointManager::restore` found of the same training, task and settings; without it no
 /// checkpoint is written.
 ///
@@ -196,7 +196,7 @@ pub fn resume<S: Scalar>(
     task: Task<'_, S>,
     threads: usize,
     hooks: &Hooks,
-    sitting: ResumeOptions<S>,
+    session: ResumeOptions<S>,
 ) -> Result<Fitted<S>, ShootingError> {
     settings.validate()?;
     task.check()?;
@@ -212,27 +212,28 @@ pub fn resume<S: Scalar>(
     let validation = task.cut(VALIDATION, per_segment, steps)?;
     let segments = (training.len(), training.samples());
     let problem = ShootingProblem { shots, training, validation };
-    let ResumeOptions { keeper, start } = sitting;
-    let (saver, underway) = match start {
-        Some(Snapshot { seconds, ended, underway }) => {
-            (keeper.map(|keeper| Saver { keeper, ended, seconds: Some(seconds) }), underway)
+    let ResumeOptions { checkpoints, start } = session;
+    let (saver, in_progress) = match start {
+        Some(Snapshot { seconds, outcome, in_progress }) => {
+            (checkpoints.map(|checkpoints| Saver { checkpoints, outcome, seconds: Some(seconds) }), in_progress)
         }
         None => (None, None),
     };
     // Checkpoints count them with those of the training that gave the weights, the history of the fit does not.
-    let epochs_before = saver.as_ref().map_or(0, |saver| saver.ended.history.len());
+    let epochs_before = saver.as_ref().map_or(0, |saver| saver.outcome.history.len());
     let others = || estimate("checkpoint".to_string(), format!("{} segments", segments.0), "others");
     let mut learner = ShootingLearner::new(&problem, settings.start_share, settings.curvature_every);
-    let mut underway = underway.filter(|underway| underway.shooting.is_some());
+    let mut in_progress = in_progress.filter(|in_progress| in_progress.learner.is_some());
     let mut clock = Clock::after(0.0);
-    if let Some(PhaseState { course, shooting, .. }) = &mut underway
-        && let Some(shot) = shooting.take()
+    if let Some(PhaseState { optimizer_state, learner: state, .. }) = &mut in_progress
+        && let Some(state) = state.take()
     {
-        if course.order.len() != segments.0 {
+        if optimizer_state.order.len() != segments.0 {
             return Err(others());
         }
-        clock = Clock::after(shot.seconds);
-        learner = learner.restored(&problem, shot).ok_or_else(others)?;
+        let seconds;
+        (learner, seconds) = learner.restored(&problem, &state).ok_or_else(others)?;
+        clock = Clock::after(seconds);
     }
     let run = Run {
         phase_number: 1,
@@ -246,7 +247,7 @@ pub fn resume<S: Scalar>(
     };
     let rng = RngStream::Segments.generator(task.seed);
     let solver = EpochSolver::new(learner, settings.optimizer(), settings.rates(), rng, segments.0).within(run);
-    let epochs = run_epochs(solver, problem, task.weights.clone(), underway).map_err(TrainingError::Optimizer)?;
+    let epochs = run_epochs(solver, problem, task.weights.clone(), in_progress).map_err(TrainingError::Optimizer)?;
     let Epochs { problem, learner, history, best, cost: validation_loss, seconds, stop, .. } = epochs;
     let weights = best.filter(|_| validation_loss.is_finite()).ok_or(TrainingError::NothingLearned(None))?;
     let integration_error = match problem {

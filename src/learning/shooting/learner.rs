@@ -5,10 +5,11 @@ use crate::scalar::{Real, Scalar};
 use crate::shooting::objective::{ShootingObjective, ShootingReport};
 use crate::shooting::segments::Segments;
 use crate::shooting::starts::Curvature;
+use crate::storage::container::state::{self, numbers};
 use crate::training::BatchReport;
-use crate::training::checkpoint::Shot;
-use crate::training::learner::{Judgement, Learner};
+use crate::training::learner::{Learner, Validation};
 use argmin::core::KV;
+use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 /// At most one in this many validation segments may be left out of a loss that counts.
@@ -70,17 +71,40 @@ impl<S: Scalar> ShootingLearner<S> {
         }
     }
 
-    /// Goes on from a checkpoint; `None` if that is of other segments.
-    pub fn restored(mut self, problem: &ShootingProblem<S>, shot: Shot<S>) -> Option<Self> {
+    /// Resumes from what [`stored`](Learner::stored) gave; returns its seconds too, and `None` if that is of other segments.
+    pub fn restored(mut self, problem: &ShootingProblem<S>, bytes: &[u8]) -> Option<(Self, f64)> {
+        let state: ShootingState<S> = state::from_bytes(bytes).ok()?;
         let lengths = [self.starts.at.len(), self.validation_starts.at.len()];
-        if [shot.starts.len(), shot.validation_starts.len()] != lengths {
+        if [state.starts.len(), state.validation_starts.len()] != lengths {
             return None;
         }
-        self.starts.curvature = Curvature::restore(&problem.training, &shot.matrices, &shot.jacobian)?;
-        (self.starts.at, self.validation_starts.at) = (shot.starts, shot.validation_starts);
-        (self.gap, self.start_loss) = (shot.gap, shot.start_loss);
-        Some(self)
+        self.starts.curvature = Curvature::restore(&problem.training, &state.matrices, &state.jacobian)?;
+        (self.starts.at, self.validation_starts.at) = (state.starts, state.validation_starts);
+        (self.gap, self.start_loss) = (state.gap, state.start_loss);
+        Some((self, state.seconds.max(0.0)))
     }
+}
+
+/// What moves beside the weights, between two steps, as a checkpoint keeps it.
+#[derive(Serialize, Deserialize)]
+#[serde(bound = "S: Scalar")]
+struct ShootingState<S> {
+    /// Seconds of multiple shooting.
+    seconds: f64,
+    /// Validation loss of the weights it began with.
+    start_loss: f64,
+    /// Sum of the gaps over the batches of the epoch.
+    gap: f64,
+    /// Starts of the training segments and of the validation segments, `(segments, 2, n)`.
+    #[serde(with = "numbers")]
+    starts: Vec<S>,
+    #[serde(with = "numbers")]
+    validation_starts: Vec<S>,
+    /// Curvature and derivatives of the last linearisation, as [`Curvature`] keeps them.
+    #[serde(with = "numbers")]
+    matrices: Vec<S>,
+    #[serde(with = "numbers")]
+    jacobian: Vec<S>,
 }
 
 impl<S: Scalar> Learner<S> for ShootingLearner<S> {
@@ -103,7 +127,7 @@ impl<S: Scalar> Learner<S> for ShootingLearner<S> {
             self.starts.refine(&mut problem.shots, weights, &problem.training);
             self.validation_starts.refine(&mut problem.shots, weights, &problem.validation);
         }
-        self.start_loss = self.judge(problem, weights).cost;
+        self.start_loss = self.validate(problem, weights).cost;
         Some(self.start_loss)
     }
 
@@ -142,7 +166,7 @@ impl<S: Scalar> Learner<S> for ShootingLearner<S> {
     }
 
     /// From starts that fit the weights; infinite if too many segments are left out.
-    fn judge(&mut self, problem: &mut Self::Problem, weights: &[S]) -> Judgement {
+    fn validate(&mut self, problem: &mut Self::Problem, weights: &[S]) -> Validation {
         let ShootingProblem { shots, validation, .. } = problem;
         self.validation_starts.refine(shots, weights, validation);
         let rows: Vec<u32> = (0..validation.len() as u32).collect();
@@ -150,12 +174,12 @@ impl<S: Scalar> Learner<S> for ShootingLearner<S> {
         let loss = report.loss.to_f64();
         let counts = loss.is_finite() && LEFT_OUT * report.left_out <= validation.len();
         let loss = if counts { loss } else { f64::INFINITY };
-        Judgement { loss, cost: loss }
+        Validation { loss, cost: loss }
     }
 
-    fn stored(&self, seconds: f64) -> Option<Shot<S>> {
+    fn stored(&self, seconds: f64) -> Option<Vec<u8>> {
         let (matrices, jacobian) = self.starts.curvature.stored();
-        Some(Shot {
+        let state = ShootingState {
             seconds,
             start_loss: self.start_loss,
             gap: self.gap,
@@ -163,6 +187,8 @@ impl<S: Scalar> Learner<S> for ShootingLearner<S> {
             validation_starts: self.validation_starts.at.clone(),
             matrices: matrices.to_vec(),
             jacobian: jacobian.to_vec(),
-        })
+        };
+        // Numbers that no file can hold are refused with the weights, which are of the same type.
+        state::to_bytes(&state).ok()
     }
 }

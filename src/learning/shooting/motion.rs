@@ -5,9 +5,7 @@
 //! through what `D` depends on.
 
 use crate::configuration::Penalty;
-use crate::linalg::{
-    SignatureBuffers as Buffers, Violation, characteristic_scales, eigenvalue_violation, sylvester_violation,
-};
+use crate::linalg::{SignatureBuffers as Buffers, Violation, characteristic_scales};
 use crate::linalg::{Workspace, solve};
 use crate::network::{Dynamics, Model};
 use crate::scalar::{Real, Scalar};
@@ -115,7 +113,7 @@ impl<S: Scalar> Motion<S> {
 
     /// Value of `lambda` times the sum of the states' violations and how many violate; adds its gradient by the weights.
     ///
-    /// The states are taken as given: the data decide them, not the penalty. Sylvester's scales are those of this chunk.
+    /// The states are taken as given: the data decide them, not the penalty. Characteristic scales are those of this chunk.
     pub fn add_penalty(
         &mut self,
         weights: &[S],
@@ -125,23 +123,19 @@ impl<S: Scalar> Motion<S> {
     ) -> (S, usize) {
         let n = self.scale.len();
         let matrices = &self.dynamics.lagrangian().mass_matrix;
-        let scales = match penalty {
-            Penalty::None => return (<S as Real>::zero(), 0),
-            Penalty::Eigenvalue { .. } => Vec::new(),
-            Penalty::Sylvester { .. } => {
-                let chosen = matrices.chunks_exact(n * n).zip(alive).filter(|(_, alive)| **alive);
-                let diagonals: Vec<S> = chosen.flat_map(|(m, _)| m.iter().step_by(n + 1).copied()).collect();
-                characteristic_scales(n, &diagonals)
-            }
+        if penalty == Penalty::None {
+            return (<S as Real>::zero(), 0);
+        }
+        let scales = if penalty.needs_scales() {
+            let chosen = matrices.chunks_exact(n * n).zip(alive).filter(|(_, alive)| **alive);
+            let diagonals: Vec<S> = chosen.flat_map(|(m, _)| m.iter().step_by(n + 1).copied()).collect();
+            characteristic_scales(n, &diagonals)
+        } else {
+            Vec::new()
         };
         self.violations.reset();
         for (state, matrix) in matrices.chunks_exact(n * n).enumerate().filter(|(state, _)| alive[*state]) {
-            let (signature, found) = (&mut self.signature, &mut self.violation);
-            let outcome = match penalty {
-                Penalty::Sylvester { time, .. } => sylvester_violation(n, matrix, &scales, time, signature, found),
-                _ => eigenvalue_violation(n, matrix, signature, found),
-            };
-            if outcome.is_ok() {
+            if penalty.violation(n, matrix, &scales, &mut self.signature, &mut self.violation).is_ok() {
                 let range = state * n..(state + 1) * n;
                 self.violations.push((&self.q[range.clone()], &self.v[range]), &self.violation, lambda);
             }

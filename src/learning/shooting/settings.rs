@@ -33,12 +33,12 @@ table! {
         #[key("1 to 2^30", check = count(1 << 30))]
         pub batch: usize = 16,
         /// Update rule of the weights.
-        #[key("soap, radam, adam")]
+        #[key(Method::NAMES)]
         pub method: Method = Method::Radam,
         /// Learning rate at the start, falling to 0 by half a cosine.
         #[key("above 0 to 1000", check = |x| *x > 0.0 && *x <= MOST_RATE)]
         pub rate: f64 = 2e-3,
-        /// L2 weight decay, added to the gradient.
+        /// Weight decay: added to the gradient (L2), or, by adamw, a shrinking by the rate times it.
         #[key("from 0", check = from_zero)]
         pub weight_decay: f64 = 1e-6,
         /// The gradient's norm is cut to this.

@@ -1,10 +1,11 @@
 //! Rows of a history, and the sums they come from.
 
 use crate::lagrangian::MechanicsError;
-use serde::Serialize;
+use crate::linalg::Failure;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 /// One row of the history.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Epoch {
     /// Counted from 1 over all phases.
     pub epoch: usize,
@@ -31,7 +32,7 @@ pub struct Epoch {
 }
 
 /// Running means over the steps of an epoch.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Means {
     pub(crate) loss: f64,
     pub(crate) penalty: f64,
@@ -40,5 +41,31 @@ pub(crate) struct Means {
     pub(crate) left_out: usize,
     pub(crate) skipped: usize,
     pub(crate) taken: usize,
+    #[serde(with = "failure")]
     pub(crate) last_failure: Option<MechanicsError>,
+}
+
+impl Means {
+    /// All its counts.
+    pub(crate) fn counts(&self) -> [usize; 4] {
+        [self.penalised, self.left_out, self.skipped, self.taken]
+    }
+}
+
+/// The failure of a state as its row and why there is no acceleration.
+mod failure {
+    use super::*;
+
+    pub(super) fn serialize<W: Serializer>(failure: &Option<MechanicsError>, serializer: W) -> Result<W::Ok, W::Error> {
+        let parts = failure.and_then(|failure| match failure {
+            MechanicsError::Singular { row, condition } => Some((row, Failure::Singular { condition })),
+            other => other.row().map(|row| (row, Failure::NotFinite)),
+        });
+        parts.serialize(serializer)
+    }
+
+    pub(super) fn deserialize<'de, R: Deserializer<'de>>(deserializer: R) -> Result<Option<MechanicsError>, R::Error> {
+        let parts: Option<(usize, Failure)> = Option::deserialize(deserializer)?;
+        Ok(parts.map(|(row, failure)| MechanicsError::unsolved(row, failure)))
+    }
 }

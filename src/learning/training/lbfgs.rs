@@ -1,4 +1,4 @@
-//! Full-batch polishing by limited-memory BFGS (Liu and Nocedal 1989) in double precision, hosted by argmin.
+//! Full-batch refinement by limited-memory BFGS (Liu and Nocedal 1989) in double precision, hosted by argmin.
 //!
 //! Minimises loss plus penalty plus `weight_decay |w|^2 / 2` over all training states of the last phase. The loss is an
 //! absolute value, whose kinks end the line search sooner or later; what stands then is the iterate of the lowest
@@ -17,7 +17,7 @@ use std::sync::atomic::Ordering;
 /// Evaluations an iteration may take on average; argmin's line searches know no limit.
 const EVALUATIONS: usize = 20;
 
-/// Start of a polishing, the same for every iteration.
+/// Start of a refinement, the same for every iteration.
 pub(crate) struct Start {
     /// Parameters to begin with.
     pub weights: Vec<f64>,
@@ -31,8 +31,8 @@ pub(crate) struct Start {
     pub hooks: Hooks,
 }
 
-/// Result of a polishing.
-pub(crate) struct Polished {
+/// Result of a refinement.
+pub(crate) struct Refined {
     /// Parameters of the lowest validation loss, if lower than at the start.
     pub weights: Option<Vec<f64>>,
     /// Lowest validation loss.
@@ -90,24 +90,24 @@ struct Record<'p, 'a> {
     hooks: &'p Hooks,
     last: (usize, usize),
     clock: Clock,
-    polished: Polished,
+    refined: Refined,
 }
 
 impl Record<'_, '_> {
     /// Judges an iterate on the validation states and writes its row.
     fn note(&mut self, weights: &[f64]) {
         let validation_loss = self.problem.validation_loss(weights).loss;
-        let polished = &mut self.polished;
-        if validation_loss < polished.validation_loss {
-            polished.validation_loss = validation_loss;
-            polished.weights = Some(weights.to_vec());
+        let refined = &mut self.refined;
+        if validation_loss < refined.validation_loss {
+            refined.validation_loss = validation_loss;
+            refined.weights = Some(weights.to_vec());
         }
         let found = |last: &crate::training::problem::Evaluated<f64>| {
             Some((last.report?, last.gradient.iter().map(|g| g * g).sum::<f64>().sqrt()))
         };
         let Some((report, gradient_norm)) = self.problem.last(found) else { return };
         let row = Epoch {
-            epoch: self.last.0 + polished.history.len() + 1,
+            epoch: self.last.0 + refined.history.len() + 1,
             phase: self.last.1 + 1,
             rate: 0.0,
             training_loss: report.loss,
@@ -122,7 +122,7 @@ impl Record<'_, '_> {
         if let Some(watcher) = &self.hooks.watcher {
             watcher(Progress::Epoch(&row));
         }
-        polished.history.push(row);
+        refined.history.push(row);
     }
 }
 
@@ -170,11 +170,11 @@ impl<'p, 'a, L: Solver<Bounded<'p, 'a>, Iteration>> Solver<Bounded<'p, 'a>, Iter
 ///
 /// # Errors
 /// The words of argmin if not even the start could be evaluated.
-pub(crate) fn lbfgs(settings: &Lbfgs, problem: &TrainingProblem<'_, f64>, start: Start) -> Result<Polished, String> {
+pub(crate) fn lbfgs(settings: &Lbfgs, problem: &TrainingProblem<'_, f64>, start: Start) -> Result<Refined, String> {
     let Start { weights, validation_loss, last, clock, hooks } = start;
     let bounded = Bounded { problem, hooks: &hooks, budget: settings.iterations.saturating_mul(EVALUATIONS) };
-    let polished = Polished { weights: None, validation_loss, history: Vec::new() };
-    let mut record = Record { problem, hooks: &hooks, last, clock, polished };
+    let refined = Refined { weights: None, validation_loss, history: Vec::new() };
+    let mut record = Record { problem, hooks: &hooks, last, clock, refined };
     let search = MoreThuenteLineSearch::new().with_bounds(1e-10, 10.0).map_err(|e| e.to_string())?;
     let solver = Recorded { solver: LBFGS::new(search, settings.memory), record: &mut record };
     let outcome = Executor::new(bounded, solver)
@@ -183,9 +183,9 @@ pub(crate) fn lbfgs(settings: &Lbfgs, problem: &TrainingProblem<'_, f64>, start:
         .run()
         .map(|result| result.state.get_termination_status().to_string());
     match outcome {
-        Err(error) if record.polished.history.is_empty() => return Err(error.to_string()),
-        Err(error) => tracing::info!(%error, "polishing ended"),
-        Ok(status) => tracing::info!(%status, "polishing ended"),
+        Err(error) if record.refined.history.is_empty() => return Err(error.to_string()),
+        Err(error) => tracing::info!(%error, "refinement ended"),
+        Ok(status) => tracing::info!(%status, "refinement ended"),
     }
-    Ok(record.polished)
+    Ok(record.refined)
 }

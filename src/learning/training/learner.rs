@@ -2,7 +2,6 @@
 
 use crate::optimizers::{Method, Moments};
 use crate::scalar::Scalar;
-use crate::training::checkpoint::Shot;
 use crate::training::objective::BatchReport;
 use crate::training::problem::TrainingProblem;
 use argmin::core::KV;
@@ -13,7 +12,7 @@ use std::sync::Arc;
 const LEFT_OUT: usize = 100;
 
 /// Loss of the validation samples.
-pub(crate) struct Judgement {
+pub(crate) struct Validation {
     /// As the history shows it.
     pub loss: f64,
     /// As parameters are compared by it, infinite if it means nothing.
@@ -65,10 +64,10 @@ pub(crate) trait Learner<S: Scalar> {
     }
 
     /// Loss of the validation samples.
-    fn judge(&mut self, problem: &mut Self::Problem, weights: &[S]) -> Judgement;
+    fn validate(&mut self, problem: &mut Self::Problem, weights: &[S]) -> Validation;
 
-    /// Part of a checkpoint beside the weights, after `seconds` of this phase.
-    fn stored(&self, seconds: f64) -> Option<Shot<S>> {
+    /// What moves beside the weights, after `seconds` of this phase, in bytes for a checkpoint; `None` if nothing does.
+    fn stored(&self, seconds: f64) -> Option<Vec<u8>> {
         let _ = seconds;
         None
     }
@@ -104,10 +103,10 @@ impl<'a, S: Scalar> Learner<S> for States<'a> {
     }
 
     /// A loss that is not finite, or that passes over more than a few of the states, is never the best.
-    fn judge(&mut self, problem: &mut Self::Problem, weights: &[S]) -> Judgement {
+    fn validate(&mut self, problem: &mut Self::Problem, weights: &[S]) -> Validation {
         let report = problem.validation_loss(weights);
         let loss = report.loss.to_f64();
         let counts = loss.is_finite() && LEFT_OUT * report.left_out <= problem.validation().len();
-        Judgement { loss, cost: if counts { loss } else { f64::INFINITY } }
+        Validation { loss, cost: if counts { loss } else { f64::INFINITY } }
     }
 }

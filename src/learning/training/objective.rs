@@ -14,11 +14,7 @@
 use crate::configuration::Penalty;
 use crate::data::Dataset;
 use crate::lagrangian::MechanicsError;
-use crate::linalg::{
-    SignatureBuffers as Buffers, Violation, characteristic_scales, eigenvalue_violation, has_signature,
-    sylvester_violation,
-};
-use crate::linalg::{Workspace, solve};
+use crate::linalg::{SignatureBuffers as Buffers, Violation, Workspace, characteristic_scales, solve};
 use crate::network::{Architecture, Dynamics, Model};
 use crate::scalar::{Real, Scalar, Sum};
 use crate::tape::{Depth, MixedDirections, STATES};
@@ -152,7 +148,7 @@ impl<S: Scalar> Shard<S> {
         }
     }
 
-    /// Loss and gradient of one chunk, with an eigenvalue penalty; leaves what Sylvester's needs of all states.
+    /// Loss and gradient of one chunk, with its penalty; leaves what a penalty that needs scales needs of all states.
     ///
     /// `weight` is `1/(2 n counted)`, with the states of the batch that count; the penalty comes with its weight over the batch.
     fn add_chunk(&mut self, weights: &[S], data: &Dataset<S>, rows: &[u32], weight: S, penalty: (Penalty, S)) {
@@ -163,8 +159,8 @@ impl<S: Scalar> Shard<S> {
         let (penalty, lambda) = penalty;
         match penalty {
             Penalty::None => {}
-            Penalty::Eigenvalue { .. } => self.add_eigenvalue(lambda),
-            Penalty::Sylvester { time, .. } => self.note_suspects(time),
+            _ if penalty.needs_scales() => self.note_suspects(penalty),
+            _ => self.add_violations(penalty, lambda),
         }
         // Zero directions on finite numbers leave the failed states out.
         if self.add_directions() || self.replace_failed(weights) {
@@ -190,10 +186,10 @@ impl<S: Scalar> Shard<S> {
     }
 
     /// Keeps the diagonals of the chunk's mass matrices and whatever has not plainly the right signature.
-    fn note_suspects(&mut self, time: Option<usize>) {
+    fn note_suspects(&mut self, penalty: Penalty) {
         let n = self.scale.len();
         for matrix in self.dynamics.lagrangian().mass_matrix.chunks_exact(n * n) {
-            if !has_signature(n, matrix, time, &mut self.signature) {
+            if !penalty.allows(n, matrix, &mut self.signature) {
                 self.suspects.push(self.diagonal.len() / n);
                 self.suspect_matrices.extend_from_slice(matrix);
             }
@@ -201,18 +197,18 @@ impl<S: Scalar> Shard<S> {
         }
     }
 
-    /// Sylvester's penalty and its gradient of the states in doubt, by the scales of the whole batch.
-    fn add_sylvester(
+    /// The penalty and its gradient of the states in doubt, by the scales of the whole batch.
+    fn add_suspects(
         &mut self,
         weights: &[S],
         data: &Dataset<S>,
         rows: &[u32],
         scales: &[S],
-        (lambda, time): (S, Option<usize>),
+        (penalty, lambda): (Penalty, S),
     ) {
         let n = self.scale.len();
         for (&state, matrix) in self.suspects.iter().zip(self.suspect_matrices.chunks_exact(n * n)) {
-            let outcome = sylvester_violation(n, matrix, scales, time, &mut self.signature, &mut self.violation);
+            let outcome = penalty.violation(n, matrix, scales, &mut self.signature, &mut self.violation);
             if outcome.is_ok() {
                 let range = rows[state] as usize * n..(rows[state] as usize + 1) * n;
                 self.violations.push((&data.q()[range.clone()], &data.v()[range]), &self.violation, lambda);
@@ -312,11 +308,11 @@ impl<S: Scalar> Shard<S> {
         all
     }
 
-    /// Counts the eigenvalue penalties of the chunk.
-    fn add_eigenvalue(&mut self, lambda: S) {
+    /// Counts the violations of the chunk under a penalty without scales.
+    fn add_violations(&mut self, penalty: Penalty, lambda: S) {
         let n = self.scale.len();
         for (state, matrix) in self.dynamics.lagrangian().mass_matrix.chunks_exact(n * n).enumerate() {
-            if eigenvalue_violation(n, matrix, &mut self.signature, &mut self.violation).is_ok() {
+            if penalty.violation(n, matrix, &[], &mut self.signature, &mut self.violation).is_ok() {
                 let range = state * n..(state + 1) * n;
                 self.violations.push((&self.q[range.clone()], &self.v[range]), &self.violation, lambda);
             }
@@ -385,19 +381,17 @@ impl<S: Scalar> Objective<S> {
             // the gradients of loss and penalty apart in all.
             shards = self.evaluate(weights, data, rows, counted, lambda);
         }
-        if let Penalty::Sylvester { time, .. } = penalty
-            && self.shards[..shards].iter().any(|shard| !shard.suspects.is_empty())
-        {
+        if self.shards[..shards].iter().any(|shard| !shard.suspects.is_empty()) {
             let scales = self.scales(shards, data.coordinates());
-            self.run(rows, |shard, rows| shard.add_sylvester(weights, data, rows, &scales, (lambda, time)));
+            self.run(rows, |shard, rows| shard.add_suspects(weights, data, rows, &scales, (penalty, lambda)));
         }
         let shards = &self.shards[..shards];
         sum_gradients(&self.pool, shards, |shard| &shard.gradient, gradient);
         self.report(shards.len(), rows.len(), data.coordinates())
     }
 
-    /// Sums of loss, penalty and gradient over the batch, of which `counted` states are not left out; Sylvester's penalty
-    /// apart. Returns the number of shards.
+    /// Sums of loss, penalty and gradient over the batch, of which `counted` states are not left out; a penalty that needs
+    /// scales apart. Returns the number of shards.
     fn evaluate(&mut self, weights: &[S], data: &Dataset<S>, rows: &[u32], counted: usize, lambda: S) -> usize {
         let weight = (S::of_f64(2.0 * data.coordinates() as f64) * S::of_f64(counted as f64)).recip();
         let penalty = self.penalty;

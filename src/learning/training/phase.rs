@@ -58,14 +58,14 @@ pub(crate) fn run_epochs<S: Scalar, L: Learner<S, Problem: Send> + Send>(
     mut solver: EpochSolver<S, L>,
     mut problem: L::Problem,
     weights: Vec<S>,
-    underway: Option<PhaseState<S>>,
+    in_progress: Option<PhaseState<S>>,
 ) -> Result<Epochs<S, L>, String> {
     let mut state = TrainingState::<S>::new().param(weights);
-    if let Some(PhaseState { course, history, best, best_loss, best_epoch, .. }) = underway {
-        (state.iter, state.last_best_iter) = (course.iteration, best_epoch);
+    if let Some(PhaseState { optimizer_state, history, best, best_loss, best_epoch, .. }) = in_progress {
+        (state.iter, state.last_best_iter) = (optimizer_state.iteration, best_epoch);
         (state.cost, state.best_cost) = (best_loss, best_loss);
         (state.param, state.best_param) = (Some(best.clone()), Some(best));
-        solver = solver.restored(course, history);
+        solver = solver.restored(optimizer_state, history);
     }
     let epochs = solver.epochs() as u64;
     let pool = solver.pool(&mut problem);

@@ -1,8 +1,7 @@
 //! Learning by batches as an argmin solver: one iteration is one epoch, the cost is the validation loss.
 //!
 //! The parameters argmin sees are those that are validated (averaged, if averaging is on); the solver keeps the weights
-//! that move, their moments, the order of the data and the random state: its course, which a checkpoint can hold between
-//! any two steps.
+//! that move, their moments, the order of the data and the random state, which a checkpoint can hold between any two steps.
 
 use crate::configuration::{OnFailure, Optimizer, Phase};
 use crate::lagrangian::MechanicsError;
@@ -10,9 +9,9 @@ use crate::optimizers::Schedule;
 use crate::optimizers::Update;
 use crate::random::RandomGenerator;
 use crate::scalar::{Real, Scalar};
-use crate::training::checkpoint::{CheckpointManager, Clock, Ended, OptimizerState, PhaseState};
+use crate::training::checkpoint::{CheckpointManager, Clock, OptimizerState, Outcome, PhaseState};
 use crate::training::epoch::{Epoch, Means};
-use crate::training::learner::{Judgement, Learner};
+use crate::training::learner::{Learner, Validation};
 use argmin::core::{Error, IterState, KV, Problem, Solver, State, TerminationReason, TerminationStatus};
 use argmin::kv;
 use rand::seq::SliceRandom;
@@ -105,7 +104,7 @@ impl From<&Phase> for RateCourse {
     }
 }
 
-/// Adam, RAdam or SOAP over mini-batches of a [`Learner`]'s samples.
+/// An update rule over mini-batches of a [`Learner`]'s samples.
 pub(crate) struct EpochSolver<S, L> {
     learner: L,
     optimizer: Optimizer,
@@ -113,8 +112,8 @@ pub(crate) struct EpochSolver<S, L> {
     phase_number: usize,
     /// Epochs before those of its history.
     epochs_before: usize,
-    course: OptimizerState<S>,
-    /// `true` if the course began in an earlier sitting.
+    optimizer_state: OptimizerState<S>,
+    /// `true` if this run was resumed.
     restored: bool,
     gradient: Vec<S>,
     steps: usize,
@@ -125,10 +124,10 @@ pub(crate) struct EpochSolver<S, L> {
     saver: Option<Saver<S>>,
 }
 
-/// Who keeps the checkpoints, and what went before this phase.
+/// The checkpoint writer, and what went before this phase.
 pub(crate) struct Saver<S> {
-    pub(crate) keeper: Arc<CheckpointManager>,
-    pub(crate) ended: Ended<S>,
+    pub(crate) checkpoints: Arc<CheckpointManager>,
+    pub(crate) outcome: Outcome<S>,
     /// Seconds of what went before, where this run's clock does not count them.
     pub(crate) seconds: Option<f64>,
 }
@@ -149,7 +148,7 @@ pub(crate) struct Run<S> {
     pub clock: Clock,
     /// Who watches.
     pub hooks: Hooks,
-    /// Who keeps the checkpoints, if anybody does.
+    /// Checkpoint writer, if enabled.
     pub saver: Option<Saver<S>>,
 }
 
@@ -169,7 +168,7 @@ impl<S: Scalar, L: Learner<S>> EpochSolver<S, L> {
             rates,
             phase_number: 1,
             epochs_before: 0,
-            course: OptimizerState::new(rng, samples),
+            optimizer_state: OptimizerState::new(rng, samples),
             restored: false,
             gradient: Vec::new(),
             steps,
@@ -184,14 +183,14 @@ impl<S: Scalar, L: Learner<S>> EpochSolver<S, L> {
     /// Makes this phase a part of a longer run.
     pub(crate) fn within(self, run: Run<S>) -> Self {
         let Run { phase_number, epoch, epochs_before, step, steps, clock, hooks, saver } = run;
-        let course = OptimizerState { epoch, step, ..self.course };
+        let optimizer_state = OptimizerState { epoch, step, ..self.optimizer_state };
         let steps = steps.unwrap_or(self.steps);
-        Self { phase_number, epochs_before, steps, clock, hooks, saver, course, ..self }
+        Self { phase_number, epochs_before, steps, clock, hooks, saver, optimizer_state, ..self }
     }
 
-    /// Goes on from where an earlier sitting was.
-    pub(crate) fn restored(self, course: OptimizerState<S>, history: Vec<Epoch>) -> Self {
-        Self { course, history, restored: true, ..self }
+    /// Resumes from a checkpoint.
+    pub(crate) fn restored(self, optimizer_state: OptimizerState<S>, history: Vec<Epoch>) -> Self {
+        Self { optimizer_state, history, restored: true, ..self }
     }
 
     /// Threads of the run.
@@ -206,7 +205,7 @@ impl<S: Scalar, L: Learner<S>> EpochSolver<S, L> {
 
     /// Steps of the whole run so far.
     pub(crate) fn step(&self) -> usize {
-        self.course.step
+        self.optimizer_state.step
     }
 
     /// Seconds by the clock of the run.
@@ -231,7 +230,7 @@ impl<S: Scalar, L: Learner<S>> EpochSolver<S, L> {
         rows: std::ops::Range<usize>,
         rate: f64,
     ) -> Result<(), StepError> {
-        let OptimizerState { order, weights, moments, means, step, .. } = &mut self.course;
+        let OptimizerState { order, weights, moments, means, step, .. } = &mut self.optimizer_state;
         *step += 1;
         let step = *step;
         let rows = &order[rows];
@@ -267,7 +266,7 @@ impl<S: Scalar, L: Learner<S>> EpochSolver<S, L> {
         }
         self.learner.follow(problem);
         let loss = report.loss.to_f64();
-        let means = &mut self.course.means;
+        let means = &mut self.optimizer_state.means;
         means.taken += 1;
         means.loss += loss;
         means.penalty += report.penalty.to_f64();
@@ -285,7 +284,7 @@ impl<S: Scalar, L: Learner<S>> EpochSolver<S, L> {
         if self.optimizer.averaging == 0.0 {
             return;
         }
-        let OptimizerState { weights, average, averaged_steps, .. } = &mut self.course;
+        let OptimizerState { weights, average, averaged_steps, .. } = &mut self.optimizer_state;
         *averaged_steps += 1;
         let keep = self.optimizer.averaging.min(1.0 - 1.0 / *averaged_steps as f64);
         let take = S::of_f64(1.0 - keep);
@@ -301,24 +300,26 @@ impl<S: Scalar, L: Learner<S>> EpochSolver<S, L> {
 
     /// The weights that are validated and kept.
     fn validated(&self) -> &[S] {
-        if self.optimizer.averaging == 0.0 { &self.course.weights } else { &self.course.average }
+        if self.optimizer.averaging == 0.0 { &self.optimizer_state.weights } else { &self.optimizer_state.average }
     }
 
-    /// Writes a checkpoint, if somebody keeps them and one is due.
+    /// Writes a checkpoint, if checkpoints are enabled and one is due.
     fn save_if(&self, state: &TrainingState<S>, is_due: impl Fn(&CheckpointManager) -> bool) {
-        let Some(Saver { keeper, ended, seconds }) = self.saver.as_ref().filter(|saver| is_due(&saver.keeper)) else {
+        let Some(Saver { checkpoints, outcome, seconds }) =
+            self.saver.as_ref().filter(|saver| is_due(&saver.checkpoints))
+        else {
             return;
         };
         let best = state.get_best_param().or(state.get_param());
-        let underway = PhaseState {
-            course: self.course.clone(),
+        let in_progress = PhaseState {
+            optimizer_state: self.optimizer_state.clone(),
             history: self.history.clone(),
-            best: best.unwrap_or(&ended.weights).clone(),
+            best: best.unwrap_or(&outcome.weights).clone(),
             best_loss: state.get_best_cost(),
             best_epoch: state.get_last_best_iter(),
-            shooting: self.learner.stored(self.seconds()),
+            learner: self.learner.stored(self.seconds()),
         };
-        keeper.save(seconds.unwrap_or_else(|| self.seconds()), ended, Some(&underway));
+        checkpoints.save(seconds.unwrap_or_else(|| self.seconds()), outcome, Some(&in_progress));
     }
 }
 
@@ -335,15 +336,15 @@ impl<S: Scalar, L: Learner<S>> Solver<L::Problem, TrainingState<S>> for EpochSol
         if self.restored {
             return Ok((state, None));
         }
-        let course = &mut self.course;
+        let optimizer_state = &mut self.optimizer_state;
         if let Some(param) = state.get_param() {
-            course.weights.clone_from(param);
+            optimizer_state.weights.clone_from(param);
         }
-        course.average.clone_from(&course.weights);
-        course.averaged_steps = 0;
+        optimizer_state.average.clone_from(&optimizer_state.weights);
+        optimizer_state.averaged_steps = 0;
         let problem = problem.problem.as_mut().ok_or_else(|| Error::msg("the training problem is missing"))?;
-        course.moments = self.learner.moments(problem, self.optimizer.method, course.weights.len());
-        let cost = self.learner.begin(problem, &course.weights);
+        optimizer_state.moments = self.learner.moments(problem, self.optimizer.method, optimizer_state.weights.len());
+        let cost = self.learner.begin(problem, &optimizer_state.weights);
         Ok((if let Some(cost) = cost { state.cost(cost) } else { state }, None))
     }
 
@@ -353,19 +354,19 @@ impl<S: Scalar, L: Learner<S>> Solver<L::Problem, TrainingState<S>> for EpochSol
         state: TrainingState<S>,
     ) -> Result<(TrainingState<S>, Option<KV>), Error> {
         let problem = problem.problem.as_mut().ok_or_else(|| Error::msg("the training problem is missing"))?;
-        self.gradient.resize(self.course.weights.len(), <S as Real>::zero());
-        let begun: f64 = self.course.iteration as f64;
-        if self.course.batch == 0 {
-            let OptimizerState { order, rng, means, weights, iteration, .. } = &mut self.course;
+        self.gradient.resize(self.optimizer_state.weights.len(), <S as Real>::zero());
+        let begun: f64 = self.optimizer_state.iteration as f64;
+        if self.optimizer_state.batch == 0 {
+            let OptimizerState { order, rng, means, weights, iteration, .. } = &mut self.optimizer_state;
             self.learner.begin_epoch(problem, weights, *iteration);
             order.shuffle(rng);
             *means = Means::default();
         }
-        let samples = self.course.order.len();
+        let samples = self.optimizer_state.order.len();
         let batch = batch(&self.optimizer, samples);
         let steps = samples.div_ceil(batch);
-        while self.course.batch < steps {
-            let k = self.course.batch;
+        while self.optimizer_state.batch < steps {
+            let k = self.optimizer_state.batch;
             let within = match self.rates.schedule {
                 Schedule::Cosine => k as f64 / steps as f64,
                 _ => 0.0,
@@ -376,25 +377,25 @@ impl<S: Scalar, L: Learner<S>> Solver<L::Problem, TrainingState<S>> for EpochSol
                 self.stopped = Some(error);
                 return Ok((state, None));
             }
-            self.course.batch += 1;
+            self.optimizer_state.batch += 1;
             if self.hooks.interrupt.load(Ordering::Relaxed) {
                 return Ok((state, None));
             }
             self.save_if(&state, CheckpointManager::is_due);
         }
-        let means = std::mem::take(&mut self.course.means);
-        self.course.batch = 0;
-        self.course.iteration += 1;
-        self.course.epoch += 1;
+        let means = std::mem::take(&mut self.optimizer_state.means);
+        self.optimizer_state.batch = 0;
+        self.optimizer_state.iteration += 1;
+        self.optimizer_state.epoch += 1;
         if let (0, Some(failure)) = (means.taken, means.last_failure) {
-            self.stopped = Some(StepError::NoProgress { epoch: self.course.epoch, failure });
+            self.stopped = Some(StepError::NoProgress { epoch: self.optimizer_state.epoch, failure });
             return Ok((state, None));
         }
         let param = self.validated().to_vec();
-        let Judgement { loss, cost } = self.learner.judge(problem, &param);
+        let Validation { loss, cost } = self.learner.validate(problem, &param);
         let taken = means.taken.max(1) as f64;
         let epoch = Epoch {
-            epoch: self.course.epoch - self.epochs_before,
+            epoch: self.optimizer_state.epoch - self.epochs_before,
             phase: self.phase_number,
             rate: self.rate(begun),
             training_loss: means.loss / taken,
@@ -420,7 +421,7 @@ impl<S: Scalar, L: Learner<S>> Solver<L::Problem, TrainingState<S>> for EpochSol
             return TerminationStatus::Terminated(TerminationReason::SolverExit(error.to_string()));
         }
         let interrupted = self.hooks.interrupt.load(Ordering::Relaxed);
-        self.save_if(state, |keeper| interrupted || keeper.is_due_after(self.course.epoch));
+        self.save_if(state, |checkpoints| interrupted || checkpoints.is_due_after(self.optimizer_state.epoch));
         if interrupted {
             return TerminationStatus::Terminated(TerminationReason::Interrupt);
         }

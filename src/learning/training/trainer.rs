@@ -6,7 +6,7 @@ use crate::data::{Dataset, Datasets};
 use crate::network::{Architecture, initial_weights};
 use crate::random::RngStream;
 use crate::scalar::Scalar;
-use crate::training::checkpoint::{CheckpointManager, Clock, Ended, PhaseState, Snapshot};
+use crate::training::checkpoint::{CheckpointManager, Clock, Outcome, PhaseState, Snapshot};
 use crate::training::epoch::Epoch;
 use crate::training::lbfgs::{Start, lbfgs};
 use crate::training::learner::States;
@@ -44,16 +44,16 @@ impl<S: Scalar> Trained<S> {
     /// The end of this training as a checkpoint holds it, for what goes on from there, such as
     /// [`shooting::resume`](crate::shooting::resume).
     pub fn snapshot(&self, config: &Config) -> Snapshot<S> {
-        let ended = Ended {
+        let outcome = Outcome {
             phases: config.phases.len(),
-            polished: config.lbfgs.is_some(),
+            refined: config.lbfgs.is_some(),
             weights: self.weights.clone(),
             validation_loss: self.validation_loss,
             history: self.history.clone(),
             steps: self.steps,
             states: self.states,
         };
-        Snapshot { seconds: self.seconds, ended, underway: None }
+        Snapshot { seconds: self.seconds, outcome, in_progress: None }
     }
 }
 
@@ -85,8 +85,8 @@ pub enum TrainingError {
 
 /// Where a training keeps its checkpoints and what it goes on from.
 pub struct ResumeOptions<S> {
-    /// Keeps checkpoints, if anybody does.
-    pub keeper: Option<Arc<CheckpointManager>>,
+    /// Checkpoint writer, if enabled.
+    pub checkpoints: Option<Arc<CheckpointManager>>,
     /// The checkpoint that [`CheckpointManager::restore`] found, or nothing for a training from its beginning.
     pub start: Option<Snapshot<S>>,
 }
@@ -105,7 +105,7 @@ pub fn train<S: Scalar>(
     threads: usize,
     hooks: &Hooks,
 ) -> Result<Trained<S>, TrainingError> {
-    resume(config, architecture, penalty, data, threads, hooks, ResumeOptions { keeper: None, start: None })
+    resume(config, architecture, penalty, data, threads, hooks, ResumeOptions { checkpoints: None, start: None })
 }
 
 /// [`train`] with checkpoints, and from one: the result is that of a training that was never stopped, but for the times.
@@ -121,7 +121,7 @@ pub fn resume<S: Scalar>(
     data: Datasets<S>,
     threads: usize,
     hooks: &Hooks,
-    sitting: ResumeOptions<S>,
+    session: ResumeOptions<S>,
 ) -> Result<Trained<S>, TrainingError> {
     config.validate(architecture.coordinates)?;
     let (phases, found) = (config.phases.len(), data.training.len());
@@ -134,78 +134,82 @@ pub fn resume<S: Scalar>(
     let batches = |states: usize| states.div_ceil(config.optimizer.batch.min(states));
     let pairs = || config.phases.iter().zip(&data.training);
     let steps = pairs().map(|(phase, data)| phase.epochs * batches(data.len())).sum();
-    let ResumeOptions { keeper, start } = sitting;
-    let Snapshot { seconds, mut ended, mut underway } = start.unwrap_or_else(|| {
+    let ResumeOptions { checkpoints, start } = session;
+    let Snapshot { seconds, mut outcome, mut in_progress } = start.unwrap_or_else(|| {
         let mut rng = RngStream::Weights.generator(config.seed);
         let weights = initial_weights(architecture, config.network.initialization, &mut rng);
-        Snapshot { seconds: 0.0, ended: Ended::none(weights), underway: None }
+        Snapshot { seconds: 0.0, outcome: Outcome::none(weights), in_progress: None }
     });
     let clock = Clock::after(seconds);
     let mut stop = StopReason::Finished;
     // Then this training is over, and its checkpoint is that of what came after it.
-    let shooting = underway.as_ref().is_some_and(|underway| underway.shooting.is_some());
-    for (number, (phase, training)) in pairs().enumerate().skip(ended.phases) {
+    let shooting = in_progress.as_ref().is_some_and(|in_progress| in_progress.learner.is_some());
+    for (number, (phase, training)) in pairs().enumerate().skip(outcome.phases) {
         let problem = TrainingProblem::new(objective(), training, &data.validation, config.optimizer.weight_decay);
         let rng = RngStream::Order(number).generator(config.seed);
         let run = Run {
             phase_number: number + 1,
-            epoch: ended.history.len(),
+            epoch: outcome.history.len(),
             epochs_before: 0,
-            step: ended.steps,
+            step: outcome.steps,
             steps: Some(steps),
             clock,
             hooks: hooks.clone(),
-            saver: keeper.clone().map(|keeper| Saver { keeper, ended: ended.clone(), seconds: None }),
+            saver: checkpoints.clone().map(|checkpoints| Saver {
+                checkpoints,
+                outcome: outcome.clone(),
+                seconds: None,
+            }),
         };
         let (states, optimizer) = (States::new(), config.optimizer.clone());
         let solver = EpochSolver::new(states, optimizer, phase.into(), rng, training.len()).within(run);
-        stop = run_phase(problem, solver, config.optimizer.batch, &mut ended, underway.take())?;
+        stop = run_phase(problem, solver, config.optimizer.batch, &mut outcome, in_progress.take())?;
         if stop != StopReason::Finished {
             break;
         }
     }
-    let keep = |ended: &Ended<S>| {
-        if let Some(keeper) = &keeper {
-            keeper.save(clock.seconds(), ended, None);
+    let keep = |outcome: &Outcome<S>| {
+        if let Some(checkpoints) = &checkpoints {
+            checkpoints.save(clock.seconds(), outcome, None);
         }
     };
     if let (Some(settings), Some(training), StopReason::Finished) = (&config.lbfgs, data.training.last(), &stop)
-        && ended.validation_loss.is_finite()
-        && !ended.polished
+        && outcome.validation_loss.is_finite()
+        && !outcome.refined
     {
-        keep(&ended);
+        keep(&outcome);
         let start = Start {
-            weights: ended.weights.iter().map(|w| w.to_f64()).collect(),
-            validation_loss: ended.validation_loss,
-            last: (ended.history.len(), config.phases.len()),
+            weights: outcome.weights.iter().map(|w| w.to_f64()).collect(),
+            validation_loss: outcome.validation_loss,
+            last: (outcome.history.len(), config.phases.len()),
             clock,
             hooks: hooks.clone(),
         };
-        let (learned, judged) = (in_double(training), in_double(&data.validation));
+        let (learned, validation) = (in_double(training), in_double(&data.validation));
         let objective = Objective::on(Arc::clone(&pool), architecture.model(), penalty);
-        let problem = TrainingProblem::new(objective, &learned, &judged, config.optimizer.weight_decay);
-        let polished = lbfgs(settings, &problem, start).map_err(TrainingError::Optimizer)?;
-        if let Some(best) = polished.weights {
-            ended.weights = best.iter().map(|&w| S::of_f64(w)).collect();
+        let problem = TrainingProblem::new(objective, &learned, &validation, config.optimizer.weight_decay);
+        let refined = lbfgs(settings, &problem, start).map_err(TrainingError::Optimizer)?;
+        if let Some(best) = refined.weights {
+            outcome.weights = best.iter().map(|&w| S::of_f64(w)).collect();
         }
-        ended.validation_loss = polished.validation_loss;
-        ended.states += problem.evaluations().saturating_mul(training.len());
-        ended.history.extend(polished.history);
-        ended.polished = true;
+        outcome.validation_loss = refined.validation_loss;
+        outcome.states += problem.evaluations().saturating_mul(training.len());
+        outcome.history.extend(refined.history);
+        outcome.refined = true;
         if hooks.interrupt.load(std::sync::atomic::Ordering::Relaxed) {
             stop = StopReason::Interrupted;
         }
     }
-    if ended.validation_loss.is_infinite() {
+    if outcome.validation_loss.is_infinite() {
         let error = if let StopReason::Failed(error) = stop { Some(error) } else { None };
         return Err(TrainingError::NothingLearned(error));
     }
     if stop == StopReason::Finished && !shooting {
-        keep(&ended);
+        keep(&outcome);
     }
     let seconds = clock.seconds();
-    let test = objective().loss(&ended.weights, &data.test);
-    let Ended { weights, history, validation_loss, steps, states, .. } = ended;
+    let test = objective().loss(&outcome.weights, &data.test);
+    let Outcome { weights, history, validation_loss, steps, states, .. } = outcome;
     Ok(Trained { weights, history, validation_loss, test, stop, steps, states, seconds })
 }
 
@@ -221,19 +225,19 @@ fn run_phase<'a, S: Scalar>(
     problem: TrainingProblem<'a, S>,
     solver: EpochSolver<S, States<'a>>,
     batch: usize,
-    ended: &mut Ended<S>,
-    underway: Option<PhaseState<S>>,
+    outcome: &mut Outcome<S>,
+    in_progress: Option<PhaseState<S>>,
 ) -> Result<StopReason, TrainingError> {
     let batch = batch.min(problem.training().len());
-    let epochs = run_epochs(solver, problem, ended.weights.clone(), underway).map_err(TrainingError::Optimizer)?;
-    ended.phases += 1;
-    ended.states += epochs.steps.saturating_sub(ended.steps).saturating_mul(batch);
-    ended.steps = epochs.steps;
-    ended.history.extend(epochs.history);
+    let epochs = run_epochs(solver, problem, outcome.weights.clone(), in_progress).map_err(TrainingError::Optimizer)?;
+    outcome.phases += 1;
+    outcome.states += epochs.steps.saturating_sub(outcome.steps).saturating_mul(batch);
+    outcome.steps = epochs.steps;
+    outcome.history.extend(epochs.history);
     if let Some(best) = epochs.best
-        && epochs.cost < ended.validation_loss
+        && epochs.cost < outcome.validation_loss
     {
-        (ended.validation_loss, ended.weights) = (epochs.cost, best);
+        (outcome.validation_loss, outcome.weights) = (epochs.cost, best);
     }
     Ok(epochs.stop)
 }

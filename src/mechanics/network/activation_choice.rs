@@ -3,42 +3,39 @@
 use crate::network::Activation;
 use serde::{Deserialize, Serialize};
 
-/// Activation of the hidden layers, as a configuration chooses it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-#[non_exhaustive]
-pub enum ActivationChoice {
-    /// `x Phi(x)`, exact (error function).
-    Gelu,
-    /// `ln(1 + e^x)`.
-    Softplus,
-    /// `x tanh(x / 2)`.
-    XTanh,
-    /// `tanh(x)`.
-    Tanh,
-    /// `x^2`.
-    Quadratic,
-    /// Two networks of half the widths added up, one with `ln(1 + e^x)`, one with `x^2` (Liu et al. 2021).
-    QuadraticSoftplus,
+/// Builds the choice from the rows of the table of activations.
+macro_rules! choices {
+    ($($(#[$($doc:tt)*])* $name:ident $text:literal;)*) => {
+        /// Activation of the hidden layers, as a configuration chooses it.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+        #[non_exhaustive]
+        pub enum ActivationChoice {
+            $($(#[$($doc)*])* #[serde(rename = $text)] $name,)*
+            /// Two networks of half the widths added up, one with `ln(1 + e^x)`, one with `x^2` (Liu et al. 2021).
+            #[serde(rename = "quadratic-softplus")]
+            QuadraticSoftplus,
+        }
+
+        impl ActivationChoice {
+            /// Every choice.
+            pub const ALL: [Self; [$($text),*].len() + 1] = [$(Self::$name,)* Self::QuadraticSoftplus];
+            /// The names of all choices, separated by commas.
+            pub const NAMES: &'static str = concat!($($text, ", ",)* "quadratic-softplus");
+
+            /// Activation of each branch; the branches share the widths equally.
+            pub fn branches(self) -> &'static [Activation] {
+                match self {
+                    $(Self::$name => &[Activation::$name],)*
+                    Self::QuadraticSoftplus => &[Activation::Softplus, Activation::Quadratic],
+                }
+            }
+        }
+    };
 }
 
+crate::ops::activations! { choices }
+
 impl ActivationChoice {
-    /// Every choice.
-    pub const ALL: [Self; 6] =
-        [Self::Gelu, Self::Softplus, Self::XTanh, Self::Tanh, Self::Quadratic, Self::QuadraticSoftplus];
-
-    /// Activation of each branch; the branches share the widths equally.
-    pub fn branches(self) -> &'static [Activation] {
-        match self {
-            Self::Gelu => &[Activation::Gelu],
-            Self::Softplus => &[Activation::Softplus],
-            Self::XTanh => &[Activation::XTanh],
-            Self::Tanh => &[Activation::Tanh],
-            Self::Quadratic => &[Activation::Quadratic],
-            Self::QuadraticSoftplus => &[Activation::Softplus, Activation::Quadratic],
-        }
-    }
-
     /// The name in configuration files.
     pub fn name(self) -> &'static str {
         match self.branches() {
@@ -56,7 +53,7 @@ impl std::fmt::Display for ActivationChoice {
 
 /// A text that names no activation.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("unknown activation `{0}`; known are {known}", known = ActivationChoice::ALL.map(ActivationChoice::name).join(", "))]
+#[error("unknown activation `{0}`; known are {known}", known = ActivationChoice::NAMES)]
 pub struct UnknownActivation(pub String);
 
 impl std::str::FromStr for ActivationChoice {
@@ -76,10 +73,11 @@ mod tests {
         for choice in ActivationChoice::ALL {
             assert_eq!(serde_json::to_string(&choice).unwrap(), format!("\"{choice}\""));
             assert_eq!(choice.to_string().parse::<ActivationChoice>(), Ok(choice));
+            assert!(ActivationChoice::NAMES.split(", ").any(|name| name == choice.name()));
         }
         for unknown in ["relu", "identity"] {
             let error = unknown.parse::<ActivationChoice>().unwrap_err().to_string();
-            assert!(error.contains(unknown) && error.ends_with("quadratic, quadratic-softplus"), "{error}");
+            assert!(error.contains(unknown) && error.ends_with(ActivationChoice::NAMES), "{error}");
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Initial weights.
 
-use crate::network::{Architecture, Initialization, Layer, Layout, LinearMap, Structure};
+use crate::network::{Architecture, Initialization, Layer, Layout, LinearMap};
 use crate::scalar::{Real, Scalar};
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -42,11 +42,12 @@ pub fn initial_weights<S: Scalar>(architecture: &Architecture, kind: Initializat
             }
         }
     }
-    if architecture.form.structure != Structure::BlackBox && kind != Initialization::NearZero {
+    if architecture.form.structure.has_signature() && kind != Initialization::NearZero {
         settle(&layout, &architecture.initial_biases(), architecture.form.factor.variation(), &mut weights);
     }
-    if let Some(alpha) = layout.alpha {
-        weights[alpha] = S::of_f64(architecture.alpha);
+    let constants = architecture.own_constants().map_or(Vec::new(), |(_, initial)| initial);
+    for (place, initial) in layout.constants.clone().zip(constants) {
+        weights[place] = S::of_f64(initial);
     }
     if let Some(dissipation) = layout.dissipation {
         weights[dissipation.gamma_range()].fill(S::of_f64(FRICTION));
@@ -119,7 +120,7 @@ fn draw<S: Scalar>(layer: &Layer, place: Place, kind: Initialization, rng: &mut 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::network::{Activation, ActivationChoice, Factor, Form, InputLayer};
+    use crate::network::{Activation, ActivationChoice, Factor, Form, InputLayer, Structure};
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
 

@@ -1,7 +1,7 @@
 //! Where the parameters of a network sit in its flat vector: a sum of branches, each a chain of layers.
 
 use crate::lagrangian::Description;
-use crate::network::{Activation, Architecture, InputLayer, Structure};
+use crate::network::{Activation, Architecture, InputLayer};
 use std::ops::Range;
 
 /// Action of a layer's weights `W` on its inputs `x`.
@@ -83,8 +83,8 @@ pub struct Layout {
     pub features: usize,
     /// Parameters of the dissipation, behind those of all branches.
     pub dissipation: Option<DissipationLayout>,
-    /// The parameter `alpha` of a black box that learns it.
-    pub alpha: Option<usize>,
+    /// Parameters of the structure that stand beside the network, as `alpha` of a black box that learns it.
+    pub constants: Range<usize>,
     /// Parameters of the learned constants of a known part, the last ones.
     pub known: Range<usize>,
 }
@@ -130,8 +130,8 @@ impl Layout {
     pub fn new(architecture: &Architecture) -> Self {
         let position_features = architecture.position_features();
         let (n, form) = (architecture.coordinates, &architecture.form);
-        let black_box = form.structure == Structure::BlackBox;
-        let features = position_features + if black_box { n } else { 0 };
+        let sees_velocities = form.structure.sees_velocities();
+        let features = position_features + if sees_velocities { n } else { 0 };
         let activations = architecture.activation.branches();
         let mut parameters = 0;
         let mut branches = Vec::with_capacity(activations.len());
@@ -147,8 +147,7 @@ impl Layout {
             for &width in &architecture.hidden {
                 chain.push(LinearMap::Dense, activation, width / activations.len(), true);
             }
-            // A constant in the L of a black box moves nothing.
-            chain.push(LinearMap::Dense, Activation::Identity, architecture.outputs(), !black_box);
+            chain.push(LinearMap::Dense, Activation::Identity, architecture.outputs(), !sees_velocities);
             parameters = chain.offset;
             branches.push(Branch { layers: chain.layers });
         }
@@ -159,11 +158,12 @@ impl Layout {
             offset: parameters,
         });
         let parameters = dissipation.map_or(parameters, |dissipation| dissipation.direction_range().end);
-        let alpha = (form.learn_alpha && black_box).then_some(parameters);
-        let parameters = parameters + usize::from(alpha.is_some());
+        let constants = architecture.own_constants().map_or(0, |(_, initial)| initial.len());
+        let constants = parameters..parameters + constants;
+        let parameters = constants.end;
         let learned = form.known.as_ref().map_or(0, |known| learned(known));
         let known = parameters..parameters + learned;
-        Self { branches, parameters: known.end, position_features, features, dissipation, alpha, known }
+        Self { branches, parameters: known.end, position_features, features, dissipation, constants, known }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::lagrangian::{EulerLagrange, Lagrangian, MechanicsError, MetricJet, Request, Taylor, Terms, metric_jets};
 use crate::linalg;
-use crate::network::{Architecture, Dynamics, Form, Layout, Model, Structure};
+use crate::network::{Architecture, Dynamics, Form, Layout, Model};
 use crate::scalar::{Real, Scalar};
 use crate::tape::{Depth, STATES};
 use std::sync::{Mutex, PoisonError};
@@ -81,16 +81,9 @@ impl Architecture {
         if let Some(time) = self.time_like.filter(|&time| time >= n) {
             return fault(format!("expected a time-like coordinate below {n}, found {time}"));
         }
-        let Form { structure, cyclic, learn_alpha, .. } = &self.form;
+        let Form { cyclic, .. } = &self.form;
         if let Some(i) = cyclic.iter().find(|&&i| i >= n) {
             return fault(format!("expected cyclic coordinates below {n}, found {i}"));
-        }
-        let name = structure.name();
-        if *structure == Structure::Mechanical && self.time_like.is_some() {
-            return fault("expected no time-like coordinate for `mechanical`; `metric` has one".to_string());
-        }
-        if *structure != Structure::BlackBox && (0..n).all(|i| cyclic.contains(&i)) {
-            return fault(format!("expected a coordinate that is not cyclic for `{name}`"));
         }
         let mut grouped: Vec<usize> = self.form.radial.iter().flat_map(|group| group.coordinates.clone()).collect();
         grouped.sort_unstable();
@@ -107,9 +100,7 @@ impl Architecture {
             let described = crate::network::known::system(known, n);
             described.map_err(|problem| NetworkError::Architecture(format!("known: {problem}")))?;
         }
-        if *structure != Structure::BlackBox && *learn_alpha {
-            return fault(format!("expected no learned alpha for `{name}`, which has no such term"));
-        }
+        self.form.check(n, self.time_like).map_err(NetworkError::Architecture)?;
         Ok(())
     }
 }
@@ -119,9 +110,13 @@ impl Architecture {
     pub(crate) fn outputs(&self) -> usize {
         self.form.outputs(self.coordinates, self.time_like.is_some())
     }
+    /// Name and initial values of the parameters beside the network.
+    pub(crate) fn own_constants(&self) -> Option<(&'static str, Vec<f64>)> {
+        self.form.constants(self.coordinates, self.alpha)
+    }
     /// Initial biases of a structure, those other than 0 with their indices.
     pub(crate) fn initial_biases(&self) -> Vec<(usize, f64)> {
-        self.form.factor.initial_biases(self.coordinates, self.time_like.is_some())
+        self.form.initial_biases(self.coordinates, self.time_like.is_some())
     }
 }
 

@@ -2,8 +2,8 @@
 //! as blocks on the tape.
 
 use crate::lagrangian::Lagrangian;
-use crate::network::factor::time_last;
-use crate::network::{Architecture, Layer, Layout, LinearMap, Structure};
+use crate::network::structure::State;
+use crate::network::{Architecture, Layer, Layout, LinearMap};
 use crate::scalar::Real;
 
 impl Lagrangian for Architecture {
@@ -23,33 +23,14 @@ impl Lagrangian for Architecture {
             let first = branches.next().unwrap_or_default();
             branches.fold(first, |sum, more| sum.iter().zip(&more).map(|(&a, &b)| a + b).collect())
         };
-        let n = self.coordinates;
-        let (factor, lorentzian) = (self.form.factor, self.time_like.is_some());
-        let learned = match self.form.structure {
-            Structure::BlackBox => {
-                let at = |sign: R| {
-                    let moved = velocities.iter().map(|&v| sign * v);
-                    outputs(&positions.iter().copied().chain(moved).collect::<Vec<_>>())[0]
-                };
-                let network =
-                    if self.form.even_in_v { (at(R::one()) + at(-R::one())) * R::half() } else { at(R::one()) };
-                let signed = |(i, &v): (usize, &R)| if self.time_like == Some(i) { -(v * v) } else { v * v };
-                let squares = velocities.iter().enumerate().map(signed).fold(R::zero(), |sum, square| sum + square);
-                network + layout.alpha.map_or(R::of(self.alpha), |alpha| parameters[alpha]) * squares
-            }
-            Structure::Mechanical => {
-                let outputs = outputs(&positions);
-                let order = time_last(n, None);
-                let (numbers, potentials) = outputs.split_at(factor.numbers(n, false));
-                let kinetic = factor.half_form(numbers, &velocities, &order, false);
-                let linear = potentials[1..].iter().zip(&velocities);
-                linear.fold(kinetic - potentials[0], |sum, (&a, &v)| sum + a * v)
-            }
-            Structure::Metric => {
-                let outputs = outputs(&positions);
-                factor.half_form(&outputs, &velocities, &time_last(n, self.time_like), lorentzian)
-            }
+        let state = State {
+            positions: &positions,
+            velocities: &velocities,
+            constants: &parameters[layout.constants.clone()],
+            alpha: self.alpha,
+            time_like: self.time_like,
         };
+        let learned = self.form.lagrangian(outputs, state);
         if self.form.known.is_some() { learned + self.known_lagrangian(parameters, q, v) } else { learned }
     }
 }

@@ -1,7 +1,9 @@
 //! Errors of a batch of matrices, and the failure of a row.
 
+use serde::{Deserialize, Serialize};
+
 /// Why one matrix of a batch gave no answer.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Failure {
     /// Singular to working precision; the 2-norm condition number is infinite if exactly singular.
     Singular {

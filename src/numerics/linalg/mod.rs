@@ -51,7 +51,8 @@ pub use minimum_norm::{MinimumNorm, minimum_norm};
 pub use minors::{Scaled, adjugate, leading_minors};
 #[doc(hidden)]
 pub use signature::{
-    SignatureBuffers, Violation, characteristic_scales, eigenvalue_violation, has_signature, sylvester_violation,
+    SignatureBuffers, Violation, characteristic_scales, eigenvalue_violation, has_one_negative, has_signature,
+    one_negative_violation, sylvester_violation,
 };
 #[cfg(feature = "rollout")]
 pub(crate) use singular::singular;

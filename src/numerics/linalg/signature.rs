@@ -3,7 +3,7 @@
 //! A gradient by the elements of `M` is given as `G = sum_k gamma_k u_k u_k^T`: each term is one symmetric jet of the
 //! adjoint identity. A matrix of the right signature has no term and costs no spectrum: its pivots tell.
 
-use crate::linalg::{LinalgError, Scaled, Workspace, adjugate, eigh, is_positive_definite, leading_minors};
+use crate::linalg::{LinalgError, Scaled, Workspace, adjugate, eigh, inertia, is_positive_definite, leading_minors};
 use crate::scalar::{Real, Scalar};
 
 /// Keeps the paper's denominators away from zero.
@@ -126,6 +126,53 @@ pub fn eigenvalue_violation<S: Scalar>(
         found.value -= w;
         found.gamma.push(-one);
         found.vectors.extend_from_slice(u);
+    }
+    Ok(())
+}
+
+/// `true` if `M`, `(n, n)`, has one negative eigenvalue and no other that is not positive; `false` also where rounding leaves it open.
+pub fn has_one_negative<S: Scalar>(n: usize, matrix: &[S], buffers: &mut SignatureBuffers<S>) -> bool {
+    buffers.gradient.resize(n * n, <S as Real>::zero());
+    inertia(n, matrix, &mut buffers.gradient).is_ok_and(|found| found.negative == 1 && found.zero == 0)
+}
+
+/// `relu(w_1) + sum_(k > 1) relu(-w_k)` over the eigenvalues `w_1 <= w_2 <= ..` of `D M D`, `M` of shape `(n, n)`, `D` diagonal with
+/// `(c_i + eps)^(-1/2)` of the characteristic scales `c`, `(n)`.
+///
+/// Eigenvalues of `D M D` have the signs of those of `M` (Sylvester's law of inertia), and sizes near 1 whatever the units of the
+/// coordinates and the factor of `M` are. With the eigenvectors `u_k` the gradient is `G = sum_k +-(D u_k)(D u_k)^T`. The value is 0 for
+/// one negative eigenvalue and `n - 1` positive ones, and above 0 for every other regular matrix.
+///
+/// # Errors
+/// A matrix that is not finite.
+pub fn one_negative_violation<S: Scalar>(
+    n: usize,
+    matrix: &[S],
+    scales: &[S],
+    buffers: &mut SignatureBuffers<S>,
+    found: &mut Violation<S>,
+) -> Result<(), LinalgError> {
+    found.clear();
+    if has_one_negative(n, matrix, buffers) {
+        return Ok(());
+    }
+    let (zero, one) = (<S as Real>::zero(), <S as Real>::one());
+    let SignatureBuffers { block, scaling, values, vectors, workspace, .. } = buffers;
+    scaling.clear();
+    scaling.extend(scales.iter().map(|&c| (c + S::of_f64(EPSILON)).sqrt().recip()));
+    block.clear();
+    // Scaled on one side first: two scales may lie at opposite ends of the range.
+    block.extend(matrix.iter().enumerate().map(|(k, &m)| (m * scaling[k / n]) * scaling[k % n]));
+    values.resize(n, zero);
+    vectors.resize(n * n, zero);
+    eigh(n, block, values, vectors, workspace)?;
+    for (k, (&w, u)) in values.iter().zip(vectors.chunks_exact(n)).enumerate() {
+        if (w > zero) == (k > 0) || w == zero {
+            continue;
+        }
+        found.value += w.abs();
+        found.gamma.push(if k == 0 { one } else { -one });
+        found.vectors.extend(u.iter().zip(scaling.iter()).map(|(&u, &d)| u * d));
     }
     Ok(())
 }

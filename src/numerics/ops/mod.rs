@@ -13,6 +13,7 @@ mod binary;
 mod unary;
 
 pub use activation::Activation;
+pub(crate) use activation::activations;
 pub use binary::Binary;
 pub use unary::Unary;
 pub(crate) use unary::unary_methods;

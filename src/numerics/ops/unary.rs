@@ -37,15 +37,22 @@ fn power<R: Real>(x: R, factor: i64, exponent: i64) -> R {
     x.powi(exponent) * R::of(factor as f64)
 }
 
-/// Builds the enum, its value and its derivatives from rows
-/// `Name method(x, y, d) = value, first derivative, second derivative;`
-/// with the argument `x`, the value `y` and the first derivative `d` in scope.
+/// Builds the enum, its value and its derivatives from rows of two kinds: functions that are a method of [`Real`],
+/// `Name method(x, y, d) = first derivative, second derivative;`, then functions made of these,
+/// `Name(x, y, d) = value, first derivative, second derivative;`, with the argument `x`, the value `y` and the first derivative `d`.
+///
+/// A function of the second kind is one operation on a tape if it is called by [`Real::elementary`].
 macro_rules! table {
-    ($($(#[$doc:meta])* $name:ident $method:ident ($x:ident, $y:ident, $d:ident) = $first:expr, $second:expr;)*) => {
+    (
+        $($(#[$doc:meta])* $name:ident $method:ident ($x:ident, $y:ident, $d:ident) = $first:expr, $second:expr;)*
+        @ made of these:
+        $($(#[$made_doc:meta])* $made:ident ($mx:ident, $my:ident, $md:ident) = $value:expr, $made_first:expr, $made_second:expr;)*
+    ) => {
         /// A function of one number.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
         pub enum Unary {
             $($(#[$doc])* $name,)*
+            $($(#[$made_doc])* $made,)*
             /// `-x`.
             Neg,
             /// `x^n` for an integer `n`.
@@ -58,6 +65,13 @@ macro_rules! table {
             pub fn value<R: Real>(self, x: R) -> R {
                 match self {
                     $(Self::$name => x.$method(),)*
+                    $(Self::$made => {
+                        #[inline]
+                        fn made<R: Real>($mx: R) -> R {
+                            $value
+                        }
+                        made(x)
+                    })*
                     Self::Neg => -x,
                     Self::Powi(n) => x.powi(n),
                 }
@@ -68,6 +82,13 @@ macro_rules! table {
             pub fn first<R: Real>(self, x: R, y: R) -> R {
                 match self {
                     $(Self::$name => { let ($x, $y) = (x, y); $first })*
+                    $(Self::$made => {
+                        #[inline]
+                        fn made<R: Real>($mx: R, $my: R) -> R {
+                            $made_first
+                        }
+                        made(x, y)
+                    })*
                     Self::Neg => -R::one(),
                     Self::Powi(n) => power(x, i64::from(n), i64::from(n) - 1),
                 }
@@ -78,6 +99,13 @@ macro_rules! table {
             pub fn second<R: Real>(self, x: R, y: R, d: R) -> R {
                 match self {
                     $(Self::$name => { let ($x, $y, $d) = (x, y, d); $second })*
+                    $(Self::$made => {
+                        #[inline]
+                        fn made<R: Real>($mx: R, $my: R, $md: R) -> R {
+                            $made_second
+                        }
+                        made(x, y, d)
+                    })*
                     Self::Neg => R::zero(),
                     Self::Powi(n) => {
                         let n = i64::from(n);
@@ -87,7 +115,12 @@ macro_rules! table {
             }
         }
 
-        /// Calls back with the name and the method of every row, to generate the methods of [`Real`].
+        impl Unary {
+            /// The functions that are made of others.
+            pub(crate) const MADE: &[Self] = &[$(Self::$made),*];
+        }
+
+        /// Calls back with the name and the method of every row that has one, to generate the methods of [`Real`].
         macro_rules! unary_methods {
             ($callback:ident) => { $callback! { $($name $method)* } };
         }
@@ -132,20 +165,32 @@ table! {
     Logistic logistic(x, y, d) = y * (-x).logistic(), -d * (R::half() * x).tanh();
     /// `ln(1 + e^x)`.
     Softplus softplus(x, y, d) = x.logistic(), d * (-x).logistic();
-    /// `x Phi(x)`, `Phi` the normal distribution function with the density `phi`: `Phi + x phi`, `phi (2 - x^2)`.
-    Gelu gelu(x, y, d) = distribution(x) + x * density(x), density(x) * (R::two() - x * x);
-    /// `x tanh(x/2)`: `tanh(x/2) + (x/2) / cosh^2(x/2)`, `(1 - (x/2) tanh(x/2)) / cosh^2(x/2)`.
-    XTanh x_tanh(x, y, d) = { let h = x * R::half(); h.tanh() + h * h.cosh().recip().sqr() }, {
-        let h = x * R::half();
-        h.cosh().recip().sqr() * (R::one() - h * h.tanh())
-    };
     /// `ln cosh(x)`.
     LnCosh ln_cosh(x, y, d) = x.tanh(), x.cosh().recip().sqr();
     /// Absolute value; 0 at 0 for the derivative, `NaN` passed on.
     Abs abs(x, y, d) = sign(x), d * R::zero();
+
+    @ made of these:
+    /// `x Phi(x)`, `Phi` the normal distribution function with the density `phi`: `Phi + x phi`, `phi (2 - x^2)`.
+    Gelu(x, y, d) = x * distribution(x), distribution(x) + x * density(x), density(x) * (R::two() - x * x);
+    /// `x tanh(x/2)`: `tanh(x/2) + (x/2) / cosh^2(x/2)`, `(1 - (x/2) tanh(x/2)) / cosh^2(x/2)`.
+    XTanh(x, y, d) = x * (x * R::half()).tanh(), { let h = x * R::half(); h.tanh() + h * h.cosh().recip().sqr() }, {
+        let h = x * R::half();
+        h.cosh().recip().sqr() * (R::one() - h * h.tanh())
+    };
+    /// `x s(x)`, `s` the logistic function: `s + x s'`, `s' (2 - x tanh(x/2))`.
+    Silu(x, y, d) = x * x.logistic(), { let s = x.logistic(); s + y * (-x).logistic() }, {
+        let slope = x.logistic() * (-x).logistic();
+        slope * (R::two() - x * (x * R::half()).tanh())
+    };
 }
 
 impl Unary {
+    /// The row of the table that an elementary function is, if it is made of others and therefore no method of a number.
+    pub(crate) fn made<F: Elementary>(f: F) -> Option<Self> {
+        let row: Option<&Self> = (&f as &dyn std::any::Any).downcast_ref();
+        row.copied().filter(|f| Self::MADE.contains(f))
+    }
     /// `f(x)`, compiled once for a kind of number: for interpreters, which choose `f` at run time.
     #[inline(never)]
     pub fn evaluate<R: Real>(self, x: R) -> R {

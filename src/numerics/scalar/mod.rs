@@ -48,7 +48,7 @@ use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssi
 
 /// An elementary function of one number with its derivatives.
 #[doc(hidden)]
-pub trait Elementary: Copy {
+pub trait Elementary: Copy + 'static {
     /// `f(x)`.
     fn value<R: Real>(self, x: R) -> R;
     /// `(f(x), f'(x))`.
@@ -158,17 +158,6 @@ pub trait Real:
     fn logistic(self) -> Self;
     /// `ln(1 + e^self)`, relatively accurate in both tails.
     fn softplus(self) -> Self;
-    /// `self Phi(self)`, `Phi` the normal distribution function.
-    #[inline]
-    fn gelu(self) -> Self {
-        let inverse_sqrt_two = Self::constant(Real::sqrt(<Self::Scalar as Real>::half()));
-        self * (-self * inverse_sqrt_two).erfc() * Self::half()
-    }
-    /// `self tanh(self / 2)`.
-    #[inline]
-    fn x_tanh(self) -> Self {
-        self * (self * Self::half()).tanh()
-    }
     /// `ln cosh(self) = ln(1 + 2 sinh^2(self/2))`, relatively accurate everywhere: beyond 40 it grows by `|self|`, to `e^-80`.
     #[inline]
     fn ln_cosh(self) -> Self {

@@ -4,7 +4,7 @@ use super::eager::Tape;
 use super::error::TapeError;
 use crate::forward::assign_operators;
 use crate::ops::{Binary, Unary};
-use crate::scalar::{Real, Scalar};
+use crate::scalar::{Elementary, Real, Scalar};
 use std::fmt;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
@@ -90,7 +90,7 @@ impl<'t, T: Real> Var<'t, T> {
         if factor.is_exact_zero() && value.is_exact_zero() { Self::lift(value) } else { self.unary(value, factor) }
     }
     #[inline(always)]
-    fn table1(self, f: Unary) -> Self {
+    fn table1(self, f: impl Elementary) -> Self {
         if self.tape.is_none() {
             return Self::lift(f.value(self.value));
         }
@@ -212,6 +212,10 @@ impl<T: Real> Real for Var<'_, T> {
     #[inline(always)]
     fn is_exact_zero(self) -> bool {
         self.id == 0 && self.value.is_exact_zero()
+    }
+    #[inline]
+    fn elementary<F: Elementary>(self, f: F) -> Self {
+        self.table1(f)
     }
     crate::ops::unary_methods! { var_unary }
     #[inline]

@@ -5,7 +5,7 @@ use super::interval::Interval;
 use super::search::Found;
 use super::{Certificate, CertificateError, Options, Signature, certificate, checked};
 use crate::lagrangian::system::Bounds;
-use crate::network::{Architecture, NetworkLagrangian, Structure};
+use crate::network::{Architecture, NetworkLagrangian};
 use crate::scalar::Scalar;
 use std::f64::consts::TAU;
 use std::time::Duration;
@@ -41,12 +41,8 @@ pub fn certify_network<S: Scalar>(
 
 /// The signature that the structure proves.
 fn signature_by_construction(architecture: &Architecture) -> Option<Signature> {
-    let time = match architecture.form.structure {
-        Structure::BlackBox => return None,
-        Structure::Mechanical => false,
-        Structure::Metric => architecture.time_like.is_some(),
-    };
-    architecture.form.known.is_none().then(|| Signature::of(architecture.coordinates, time))
+    let proven = architecture.form.structure.has_signature() && architecture.form.known.is_none();
+    proven.then(|| Signature::of(architecture.coordinates, architecture.time_like.is_some()))
 }
 
 /// A region that is certified without a box.

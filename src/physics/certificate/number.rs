@@ -6,7 +6,7 @@ use super::arena::{Arena, Place};
 use super::function::Function;
 use super::interval::Interval;
 use crate::ops::Unary;
-use crate::scalar::Real;
+use crate::scalar::{Elementary, Real};
 use std::fmt::{Debug, Formatter};
 use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
 
@@ -180,6 +180,12 @@ impl Real for Number<'_> {
     }
     fn ratio(numerator: i32, denominator: i32) -> Self {
         Self::of(f64::from(numerator)) / Self::of(f64::from(denominator))
+    }
+    fn elementary<F: Elementary>(self, f: F) -> Self {
+        match Unary::made(f) {
+            Some(f @ (Unary::Gelu | Unary::XTanh)) => self.apply(Function::Table(f)),
+            _ => f.value(self),
+        }
     }
     crate::ops::unary_methods! { methods }
     fn powi(self, exponent: i32) -> Self {

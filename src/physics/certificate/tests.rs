@@ -126,7 +126,7 @@ fn networks_are_enclosed() {
             let mut shape = architecture(activation, structure);
             match structure {
                 Structure::BlackBox => shape.form.even_in_v = seed % 2 == 0,
-                Structure::Mechanical => shape.input_layer = InputLayer::Dyt,
+                Structure::Mechanical | Structure::ConstantMass => shape.input_layer = InputLayer::Dyt,
                 Structure::Metric => (shape.time_like, shape.embed_periodic) = (Some(1), false),
             }
             let model = network(shape, seed);
@@ -309,6 +309,7 @@ fn structures_are_certified_by_construction() {
     let indefinite = Signature { positive: 1, negative: 1 };
     for (structure, time_like, signature) in [
         (Structure::Mechanical, None, DEFINITE),
+        (Structure::ConstantMass, None, DEFINITE),
         (Structure::Metric, None, DEFINITE),
         (Structure::Metric, Some(0), indefinite),
     ] {

@@ -6,7 +6,8 @@ use crate::common::nested::{Reference, reference_of};
 use crate::common::properties;
 use lnn::lagrangian::Lagrangian;
 use lnn::network::{
-    ActivationChoice, Architecture, Factor, Form, Initialization, InputLayer, Layout, Structure, initial_weights,
+    Activation, ActivationChoice, Architecture, Factor, Form, Initialization, InputLayer, Layout, Structure,
+    initial_weights,
 };
 use lnn::scalar::{Dd, Real, Scalar};
 use lnn::tape::{Depth, Evaluation, MixedDirections, Recorded, ScalarFunction, gradient};
@@ -61,8 +62,8 @@ impl Lagrangian for Expression {
                 11 => around(a).powf(b.tanh()),
                 12 => a.max(b),
                 13 => (a - b).select(a.sqr(), b * a),
-                14 => a.gelu() - b.softplus(),
-                15 => a.x_tanh() + b.ln_cosh(),
+                14 => Activation::Gelu.apply(a) - Activation::Silu.apply(b) - b.softplus(),
+                15 => Activation::XTanh.apply(a) + b.ln_cosh(),
                 16 => a.tanh().powi(3),
                 17 => -a.min(R::of(0.4)),
                 _ => {
@@ -226,6 +227,8 @@ fn every_structure_agrees_with_nested_forward_numbers() {
         (Structure::BlackBox, None, vec![1], false, true),
         (Structure::Mechanical, None, vec![], false, false),
         (Structure::Mechanical, None, vec![0], true, false),
+        (Structure::ConstantMass, None, vec![], false, false),
+        (Structure::ConstantMass, None, vec![1], true, false),
         (Structure::Metric, Some(0), vec![0], false, false),
         (Structure::Metric, Some(2), vec![], false, false),
         (Structure::Metric, None, vec![], false, false),
@@ -269,6 +272,11 @@ fn every_structure_agrees_with_nested_forward_numbers() {
                 let negative = values.iter().filter(|x| **x < 0.0).count();
                 assert_eq!(negative, usize::from(time_like.is_some() && structure == Structure::Metric));
             }
+        }
+        if structure == Structure::ConstantMass {
+            let first = &evaluation.mass_matrix[..9];
+            let same = |m: &[f64]| m.iter().zip(first).all(|(a, b)| (a - b).abs() < 1e-13);
+            assert!(evaluation.mass_matrix.chunks_exact(9).all(same));
         }
         for &i in &cyclic {
             assert!(evaluation.dl_dq.chunks_exact(3).all(|g| g[i] == 0.0));

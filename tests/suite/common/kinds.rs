@@ -100,6 +100,8 @@ pub fn kinds() -> Vec<(String, ModelFile<f64>)> {
         ("black box with a time", Structure::BlackBox, Factor::Triangle, Some(1)),
         ("mechanical triangle", Structure::Mechanical, Factor::Triangle, None),
         ("mechanical rectangle", Structure::Mechanical, Factor::Rectangle, None),
+        ("triangle of a constant mass", Structure::ConstantMass, Factor::Triangle, None),
+        ("rectangle of a constant mass", Structure::ConstantMass, Factor::Rectangle, None),
         ("triangle of a metric", Structure::Metric, Factor::Triangle, None),
         ("rectangle of a metric", Structure::Metric, Factor::Rectangle, None),
         ("triangle of a spacetime", Structure::Metric, Factor::Triangle, Some(1)),

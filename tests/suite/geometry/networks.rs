@@ -7,7 +7,7 @@ use lnn::network::{ActivationChoice, Architecture, Form, InputLayer, Layout, Net
 use lnn::scalar::{Dd, Real, Scalar};
 
 fn network(activation: ActivationChoice, structure: Structure, even: bool) -> NetworkLagrangian<f64> {
-    let time_like = (structure != Structure::Mechanical).then_some(0);
+    let time_like = matches!(structure, Structure::BlackBox | Structure::Metric).then_some(0);
     let architecture = Architecture {
         coordinates: 3,
         hidden: vec![8, 8],

@@ -5,7 +5,7 @@ use lnn::data::Dataset;
 use lnn::lagrangian::systems::double_pendulum::DoublePendulum;
 use lnn::lagrangian::{EulerLagrange, Mechanics, Request, Terms, configure};
 use lnn::network::{
-    ActivationChoice, Architecture, Form, Initialization, InputLayer, NetworkLagrangian, initial_weights,
+    Activation, ActivationChoice, Architecture, Form, Initialization, InputLayer, NetworkLagrangian, initial_weights,
 };
 use lnn::rollout::{Method, Options, rollout_fixed};
 use lnn::scalar::{AnyFloat, Real, Scalar};
@@ -98,7 +98,9 @@ fn network<S: Scalar>(activation: ActivationChoice) -> Results {
 struct Special;
 impl ScalarFunction for Special {
     fn eval<R: Real>(&self, x: &[R]) -> R {
-        let sum = |a: R, &x: &R| a + x.erfc() * x.gelu() + x.logistic() * x.softplus() + (x.ln_cosh() + x.relu()).sin();
+        let sum = |a: R, &x: &R| {
+            a + x.erfc() * Activation::Gelu.apply(x) + x.logistic() * x.softplus() + (x.ln_cosh() + x.relu()).sin()
+        };
         x.iter().fold(R::zero(), sum)
     }
 }

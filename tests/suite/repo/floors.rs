@@ -14,7 +14,7 @@ const FLOORS: [(&str, &[&str]); 6] = [
 ];
 
 /// Crates with the only places that name them.
-const ADAPTERS: [(&str, &[&str]); 13] = [
+const ADAPTERS: [(&str, &[&str]); 14] = [
     ("pulp", &["numerics/scalar/"]),
     ("xprec", &["numerics/scalar/"]),
     ("libm", &["numerics/scalar/"]),
@@ -24,6 +24,7 @@ const ADAPTERS: [(&str, &[&str]); 13] = [
     ("argmin", &["learning/training/", "learning/shooting/"]),
     ("safetensors", &["support/storage/container/"]),
     ("crc32fast", &["support/storage/container/"]),
+    ("postcard", &["support/storage/container/"]),
     ("zip", &["learning/recording/read/npz.rs"]),
     ("flate2", &["app/report/plot/png.rs"]),
     ("clap", &["app/cli/"]),

@@ -195,9 +195,12 @@ fn massless<S: Scalar>() {
         (0..5).for_each(|unit| blind[unit * inputs + inputs - 1] = S::of_f64(0.0));
         for (theta, batch) in [(&nothing, 3), (&nothing, 70), (&blind, 3), (&blind, 70)] {
             let data = states::<S>(n, batch, 6);
-            for penalty in
-                [Penalty::None, Penalty::Eigenvalue { lambda: 1.0 }, Penalty::Sylvester { lambda: 1.0, time: None }]
-            {
+            for penalty in [
+                Penalty::None,
+                Penalty::Eigenvalue { lambda: 1.0 },
+                Penalty::Sylvester { lambda: 1.0, time: None },
+                Penalty::Signature { lambda: 1.0 },
+            ] {
                 let (report, gradient) = step(&shape, (penalty, 2), theta, &data, &all_rows(batch));
                 assert_eq!(report.left_out, batch, "n = {n}");
                 assert!(

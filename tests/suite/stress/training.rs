@@ -92,9 +92,12 @@ fn loss_gradients<S: Scalar>() {
                 see(&mut rows[1], (unit * kappa, eps), (error, largest(&exact.acceleration)), of_a, place);
 
                 let lambda = 100.0;
-                for penalty in
-                    [Penalty::None, Penalty::Eigenvalue { lambda }, Penalty::Sylvester { lambda, time: None }]
-                {
+                for penalty in [
+                    Penalty::None,
+                    Penalty::Eigenvalue { lambda },
+                    Penalty::Sylvester { lambda, time: None },
+                    Penalty::Signature { lambda },
+                ] {
                     let (report, gradient) = step(&shape, (penalty, 2), &theta, &data, &all_rows(24));
                     let (judge, exact) = step(&shape, (penalty, 1), &wide, &wide_data, &all_rows(24));
                     assert_eq!((report.failure, report.penalised), (None, judge.penalised));

@@ -154,7 +154,7 @@ fn sit(directory: &Path, files: Arc<dyn Files>, steps: usize) -> usize {
         }
     };
     let hooks = Hooks { watcher: Some(Arc::new(watcher)), interrupt };
-    let sitting = ResumeOptions { keeper: Some(keeper(files)), start };
+    let sitting = ResumeOptions { checkpoints: Some(keeper(files)), start };
     let penalty = config.penalty().unwrap();
     // In the first epoch nothing has been learned yet.
     if let Ok(trained) = resume(&config, &architecture, penalty, data, 1, &hooks, sitting) {

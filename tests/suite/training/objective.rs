@@ -44,8 +44,8 @@ fn random_data<S: Scalar>(n: usize, states: usize, seed: u64) -> Dataset<S> {
 
 /// Penalties written down a second time, with what is constant for the gradient.
 enum Judge<S> {
-    /// Eigenvectors of negative eigenvalues of every state's scaled mass matrix.
-    Eigenvectors(Vec<Vec<Vec<f64>>>),
+    /// Eigenvectors of the wrong eigenvalues of every state's scaled mass matrix, with the sign by which these are penalised.
+    Eigenvectors(Vec<Vec<(f64, Vec<f64>)>>),
     /// Characteristic scales and the time-like coordinate.
     Sylvester(Vec<S>, Option<usize>),
 }
@@ -67,11 +67,11 @@ impl<S: Scalar> Judge<S> {
     fn penalty<T: Real>(&self, row: usize, n: usize, m: &[T]) -> T {
         let mut sum = T::zero();
         match self {
-            Self::Eigenvectors(negative) => {
-                for u in &negative[row] {
+            Self::Eigenvectors(active) => {
+                for (sign, u) in &active[row] {
                     for k in 0..n * n {
                         // First-order change of an eigenvalue: u^T dM u.
-                        sum -= T::of(u[k / n] * u[k % n]) * m[k];
+                        sum += T::of(sign * u[k / n] * u[k % n]) * m[k];
                     }
                 }
             }
@@ -194,28 +194,39 @@ fn gradient_agrees<S: Scalar>(
     let mut chunk = lnn::tape::Evaluation::new(architecture.model().lagrangian().clone());
     chunk.evaluate(&weights, data.q(), data.v(), lnn::tape::Depth::MassMatrix);
     let matrices = || chunk.mass_matrix.chunks_exact(n * n);
+    let scale = |i: usize| {
+        let mut column: Vec<S> = matrices().map(|m| Real::abs(m[i * n + i])).collect();
+        column.sort_by(|a, b| a.partial_cmp(b).unwrap());
+        column[(column.len() - 1) / 2]
+    };
     let (judge, active) = match penalty {
         Penalty::Sylvester { time, .. } => {
-            let scale = |i: usize| {
-                let mut column: Vec<S> = matrices().map(|m| Real::abs(m[i * n + i])).collect();
-                column.sort_by(|a, b| a.partial_cmp(b).unwrap());
-                column[(column.len() - 1) / 2]
-            };
             let judge = Judge::Sylvester((0..n).map(scale).collect(), time);
             let active = (0..data.len()).filter(|&k| judge.penalty(k, n, matrices().nth(k).unwrap()).to_f64() > 0.0);
             let active = active.count();
             (judge, active)
         }
         _ => {
-            let negative: Vec<Vec<Vec<f64>>> = matrices()
+            let one_negative = matches!(penalty, Penalty::Signature { .. });
+            let factor = |i: usize| if one_negative { (scale(i).to_f64() + 1e-8).sqrt().recip() } else { 1.0 };
+            let factor: Vec<f64> = (0..n).map(factor).collect();
+            let active: Vec<Vec<(f64, Vec<f64>)>> = matrices()
                 .map(|m| {
-                    let eigen = nalgebra::DMatrix::from_fn(n, n, |i, j| m[i * n + j].to_f64()).symmetric_eigen();
-                    let active = (0..n).filter(|&k| penalty.lambda() > 0.0 && eigen.eigenvalues[k] < 0.0);
-                    active.map(|k| eigen.eigenvectors.column(k).iter().copied().collect()).collect()
+                    let element = |i: usize, j: usize| m[i * n + j].to_f64() * factor[i] * factor[j];
+                    let eigen = nalgebra::DMatrix::from_fn(n, n, element).symmetric_eigen();
+                    let lowest = eigen.eigenvalues.imin();
+                    let sign = |k: usize| match eigen.eigenvalues[k] {
+                        _ if penalty == Penalty::None => 0.0,
+                        w if one_negative && k == lowest => f64::from(u8::from(w > 0.0)),
+                        w => -f64::from(u8::from(w < 0.0)),
+                    };
+                    let along =
+                        |k: usize| eigen.eigenvectors.column(k).iter().zip(&factor).map(|(u, d)| u * d).collect();
+                    (0..n).filter(|&k| sign(k) != 0.0).map(|k| (sign(k), along(k))).collect()
                 })
                 .collect();
-            let active = negative.iter().filter(|u| !u.is_empty()).count();
-            (Judge::Eigenvectors(negative), active)
+            let count = active.iter().filter(|u| !u.is_empty()).count();
+            (Judge::Eigenvectors(active), count)
         }
     };
     assert_eq!(report.penalised, active);
@@ -247,6 +258,18 @@ fn the_gradient_of_an_active_penalty_is_right() {
         for n in 1..=4 {
             // A negative quadratic term makes every mass matrix negative; eigenvectors of the reference are f64.
             gradient_agrees::<f64>(model, n, -0.4, Penalty::Eigenvalue { lambda: 3.0 }, 1e-11);
+        }
+    }
+}
+
+#[test]
+fn the_gradient_of_the_penalty_on_the_signature_is_right() {
+    for model in MODELS {
+        for n in 1..=4 {
+            // All eigenvalues positive, then all negative: the first one is wrong, then all others are.
+            for alpha in [0.6, -0.4].into_iter().filter(|alpha| n > 1 || *alpha > 0.0) {
+                gradient_agrees::<f64>(model, n, alpha, Penalty::Signature { lambda: 3.0 }, 1e-10);
+            }
         }
     }
 }

@@ -2,7 +2,8 @@
 
 use crate::common::properties;
 use lnn::linalg::{
-    SignatureBuffers, Violation, characteristic_scales, eigenvalue_violation, has_signature, sylvester_violation,
+    SignatureBuffers, Violation, characteristic_scales, eigenvalue_violation, has_one_negative, has_signature,
+    one_negative_violation, sylvester_violation,
 };
 use lnn::scalar::{Dd, Scalar};
 use proptest::prelude::*;
@@ -49,6 +50,21 @@ fn sylvester<S: Scalar>(n: usize, m: &[S], scales: &[S], time: Option<usize>) ->
     let mut found = Violation::default();
     sylvester_violation(n, m, scales, time, &mut SignatureBuffers::default(), &mut found).unwrap();
     found
+}
+
+fn one_negative<S: Scalar>(n: usize, m: &[S], scales: &[S]) -> Violation<S> {
+    let mut found = Violation::default();
+    one_negative_violation(n, m, scales, &mut SignatureBuffers::default(), &mut found).unwrap();
+    found
+}
+
+/// `B diag(signs) B^T` with `B` far from singular.
+fn of_signs(signs: &[f64], rng: &mut ChaCha8Rng) -> Matrix {
+    let n = signs.len();
+    let b: Vec<f64> =
+        (0..n * n).map(|k| rng.random_range(-0.3..0.3) / n as f64 + if k / n == k % n { 1.0 } else { 0.0 }).collect();
+    let element = |k: usize| (0..n).map(|l| b[k / n * n + l] * signs[l] * b[k % n * n + l]).sum();
+    (0..n * n).map(element).collect()
 }
 
 /// `|M_ii|`: the scales of a batch of one.
@@ -129,6 +145,46 @@ proptest! {
         prop_assert!((other - one).abs() <= slack * one + 1e-14, "{} {} {}", one, other, slack);
     }
 
+    /// Zero for one negative eigenvalue in any direction, whatever the sign of any diagonal element; above zero for every other
+    /// number of them, the reversed signature of a spacetime among them.
+    #[test]
+    fn one_negative_eigenvalue_costs_nothing_and_any_other_number_does(
+        n in 1_usize..=6,
+        negative in 0_usize..=6,
+        seed in any::<u64>(),
+        factor in 1e-3_f64..1e3,
+    ) {
+        let negative = negative.min(n);
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let signs: Vec<f64> = (0..n).map(|k| if k < negative { -1.0 } else { 1.0 }).collect();
+        let m = of_signs(&signs, &mut rng);
+        let scales = own_scales(n, &m);
+        let found = one_negative(n, &m, &scales);
+        prop_assert_eq!(found.value == 0.0, negative == 1, "{}", found.value);
+        prop_assert_eq!(found.gamma.is_empty(), negative == 1);
+        prop_assert_eq!(has_one_negative(n, &m, &mut SignatureBuffers::default()), negative == 1);
+        prop_assert_eq!(found.gamma.len(), if negative == 0 { 1 } else { negative - 1 });
+        // A new unit of every coordinate, and of the Lagrangian, changes nothing.
+        let units: Vec<f64> = (0..n).map(|_| 10_f64.powf(rng.random_range(-1.0..1.0))).collect();
+        let other: Matrix = m.iter().enumerate().map(|(k, m)| m * units[k / n] * units[k % n] * factor).collect();
+        let moved = one_negative(n, &other, &own_scales(n, &other)).value;
+        let least = scales.iter().chain(&own_scales(n, &other)).copied().fold(f64::INFINITY, f64::min);
+        prop_assert!((moved - found.value).abs() <= (3e-8 / least + 1e-12) * found.value.max(1.0), "{} {}", moved, found.value);
+    }
+
+    /// Inside of a horizon the element of the time is positive, and a space-like coordinate's is negative.
+    #[test]
+    fn the_inside_of_a_horizon_is_right(r in 0.1_f64..8.0, theta in 0.3_f64..2.8) {
+        let (f, sine) = (1.0 - 2.0 / r, theta.sin());
+        let mut m = vec![0.0; 16];
+        (m[0], m[5], m[10], m[15]) = (-f, 1.0 / f, r * r, (r * sine).powi(2));
+        let scales = own_scales(4, &m);
+        prop_assert_eq!(one_negative(4, &m, &scales).value, 0.0);
+        prop_assert_eq!(sylvester(4, &m, &scales, Some(0)).value > 0.0, r < 2.0);
+        let minus: Matrix = m.iter().map(|m| -m).collect();
+        prop_assert!(one_negative(4, &minus, &scales).value > 0.0);
+    }
+
     /// Eigenvalues know no order; the minors of a definite violation do, yet being zero or not does not depend on it.
     #[test]
     fn relabelling_spatial_coordinates(n in 2_usize..=5, seed in any::<u64>()) {
@@ -168,6 +224,7 @@ proptest! {
         for (at, slope) in [
             (eigenvalue(n, &wide), eigenvalue(n, &moved)),
             (sylvester(n, &wide, &scales, time), sylvester(n, &moved, &scales, time)),
+            (one_negative(n, &wide, &scales), one_negative(n, &moved, &scales)),
         ] {
             let found: f64 = gradient(n, &at).iter().zip(&e).map(|(g, e)| g.to_f64() * e).sum();
             let expected = ((slope.value - at.value) / h).to_f64();
@@ -273,6 +330,7 @@ fn matrices_that_are_not_finite_are_refused() {
         let (mut buffers, mut found) = (SignatureBuffers::default(), Violation::default());
         assert!(eigenvalue_violation(2, &m, &mut buffers, &mut found).is_err());
         assert!(sylvester_violation(2, &m, &[1.0, 1.0], None, &mut buffers, &mut found).is_err());
+        assert!(one_negative_violation(2, &m, &[1.0, 1.0], &mut buffers, &mut found).is_err());
         assert!(found.gamma.is_empty() && found.value == 0.0);
     }
 }

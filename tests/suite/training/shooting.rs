@@ -613,7 +613,7 @@ fn stopping_after_any_step_changes_nothing() {
         let keeper = Arc::new(CheckpointManager::new(Arc::new(Disk), directory, every, identity));
         let start = keeper.restore::<f64>(Layout::new(&architecture).parameters, 8).ok().map(|found| found.content);
         let shots = start.clone().filter(|snapshot| snapshot.is_shooting());
-        let sitting = ResumeOptions { keeper: Some(Arc::clone(&keeper)), start };
+        let sitting = ResumeOptions { checkpoints: Some(Arc::clone(&keeper)), start };
         let trained =
             resume(&config, &architecture, Penalty::None, data.clone(), threads, &Hooks::default(), sitting).unwrap();
         let (training, validation) = (&tracks[..], &tracks[..]);
@@ -621,7 +621,7 @@ fn stopping_after_any_step_changes_nothing() {
         let penalty = Penalty::None;
         let task = Task { architecture: &architecture, penalty, weights, training, validation, noise: &noise, seed: 1 };
         let start = Some(shots.unwrap_or_else(|| trained.snapshot(&config)));
-        shooting::resume(&settings, task, threads, hooks, ResumeOptions { keeper: Some(keeper), start }).unwrap()
+        shooting::resume(&settings, task, threads, hooks, ResumeOptions { checkpoints: Some(keeper), start }).unwrap()
     };
     let stop_after = |steps: usize| {
         let interrupt = Arc::new(AtomicBool::new(false));

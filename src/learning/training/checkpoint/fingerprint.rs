@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Fingerprint {
-    /// The configuration, in the words of whoever trains.
+    /// The configuration as text.
     pub config: String,
     /// Name and checksum of each set of states.
     pub data: Vec<(String, u32)>,
@@ -17,7 +17,7 @@ pub struct Fingerprint {
 pub struct Saved {
     /// Configuration of the training.
     pub config: String,
-    /// Epochs completed, polishing included.
+    /// Epochs completed, those of L-BFGS included.
     pub epochs: usize,
     /// Steps taken.
     pub steps: usize,

@@ -1,42 +1,38 @@
 //! Checkpoints: everything a training needs to go on as if it had never stopped.
 //!
-//! A checkpoint is a safetensors file of the same make as a model file
-//! ([`container`](crate::storage::container)), metadata key `lnn-checkpoint`. Its description holds the
-//! configuration in the words of whoever trains, checksums of the data, and the numbers that are no tensors, floating
-//! point ones as the bits of `f64`. Tensors, in the precision of the training unless said otherwise:
+//! A checkpoint is a safetensors file of the same make as a model file ([`container`](crate::storage::container)), metadata key
+//! `lnn-checkpoint`. Its description holds the configuration as text, checksums of the data, and the epochs and steps that are done. Its
+//! only tensor `state` is the [`Snapshot`] as serde writes it, numbers to the last bit in the precision of the training: the same state
+//! gives the same bytes.
 //!
-//! - `best`: parameters of the best epoch of the phases that ended; `history`, `f64` of shape `(epochs, 11)`: their rows;
-//! - while a phase is under way `weights`, `moments.first`, `moments.second` and `average` of its last step, `order` of
-//!   the states in its epoch (`u32`), `phase.best` and `phase.history`;
-//! - while [multiple shooting](crate::shooting) is under way behind the last phase the same of segments, without
-//!   an average, and `shooting.starts`, `shooting.validation_starts`, `shooting.matrices` and `shooting.jacobian`, the
-//!   starts of all segments and the curvature of the loss by them.
-//!
-//! A phase is held to the step: the next batch of the epoch and the sums over its batches so far are in the description,
-//! with the state of the random generator. Polishing has no state of its own: it begins again from the phases' end.
+//! A phase is held to the step: the next batch of the epoch, the sums over its batches so far and the random generator are part of the
+//! state. What a learner moves beside the weights, as [multiple shooting](crate::shooting) the starts of its segments, it writes and
+//! reads itself. L-BFGS behind the phases has no state of its own: it begins again from their end.
 
 mod fingerprint;
 mod format;
-mod keeper;
+mod manager;
 
 pub use fingerprint::{Fingerprint, Saved};
-pub use keeper::{
+pub use manager::{
     CheckpointError, CheckpointInterval, CheckpointManager, LATEST, PREVIOUS, Restored, remove_checkpoints, saved,
 };
 
-use crate::network::file::{ModelFileError, StoredPrecision};
+use crate::network::file::ModelFileError;
 use crate::optimizers::Moments;
 use crate::random::RandomGenerator;
 use crate::scalar::Scalar;
+use crate::storage::container::state::numbers;
 use crate::training::epoch::{Epoch, Means};
+use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
 /// A training at some step.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Snapshot<S> {
     pub(crate) seconds: f64,
-    pub(crate) ended: Ended<S>,
-    pub(crate) underway: Option<PhaseState<S>>,
+    pub(crate) outcome: Outcome<S>,
+    pub(crate) in_progress: Option<PhaseState<S>>,
 }
 
 impl<S: Scalar> Snapshot<S> {
@@ -45,7 +41,7 @@ impl<S: Scalar> Snapshot<S> {
     /// # Errors
     /// A number type that files do not know.
     pub fn to_bytes(&self, identity: &Fingerprint) -> Result<Vec<u8>, ModelFileError> {
-        format::encode(identity, self.seconds, &self.ended, self.underway.as_ref())
+        format::encode(identity, self.seconds, &self.outcome, self.in_progress.as_ref())
     }
 
     /// Reads any bytes as a checkpoint; its numbers are converted to the precision of `S`.
@@ -60,30 +56,32 @@ impl<S: Scalar> Snapshot<S> {
 impl<S> Snapshot<S> {
     /// The beginning of a training from these weights, such as those of a model that learns on.
     pub fn beginning_with(weights: Vec<S>) -> Self {
-        Self { seconds: 0.0, ended: Ended::none(weights), underway: None }
+        Self { seconds: 0.0, outcome: Outcome::none(weights), in_progress: None }
     }
     /// Steps taken so far; those of multiple shooting, while that is under way.
     pub fn steps(&self) -> usize {
-        self.underway.as_ref().map_or(self.ended.steps, |underway| underway.course.step)
+        self.in_progress.as_ref().map_or(self.outcome.steps, |in_progress| in_progress.optimizer_state.step)
     }
     /// `true` if multiple shooting is under way, the training before it being over.
     pub fn is_shooting(&self) -> bool {
-        self.underway.as_ref().is_some_and(|underway| underway.shooting.is_some())
+        self.in_progress.as_ref().is_some_and(|in_progress| in_progress.learner.is_some())
     }
-    /// Epochs completed so far, polishing included.
+    /// Epochs completed so far, those of L-BFGS included.
     pub fn epochs(&self) -> usize {
-        self.ended.history.len() + self.underway.as_ref().map_or(0, |underway| underway.history.len())
+        self.outcome.history.len() + self.in_progress.as_ref().map_or(0, |in_progress| in_progress.history.len())
     }
 }
 
 /// Result of the phases that have ended.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Ended<S> {
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(bound = "S: Scalar")]
+pub(crate) struct Outcome<S> {
     /// Number of phases that have ended.
     pub phases: usize,
-    /// `true` if polishing has ended too.
-    pub polished: bool,
+    /// `true` if L-BFGS has ended too.
+    pub refined: bool,
     /// Parameters of the best epoch; the initial ones if there is none.
+    #[serde(with = "numbers")]
     pub weights: Vec<S>,
     /// Its validation loss, infinite if there is none.
     pub validation_loss: f64,
@@ -95,61 +93,48 @@ pub(crate) struct Ended<S> {
     pub states: usize,
 }
 
-impl<S> Ended<S> {
+impl<S> Outcome<S> {
     /// Before the first phase.
     pub fn none(weights: Vec<S>) -> Self {
         let (phases, steps, states) = (0, 0, 0);
         let (validation_loss, history) = (f64::INFINITY, Vec::new());
-        Self { phases, polished: false, weights, validation_loss, history, steps, states }
+        Self { phases, refined: false, weights, validation_loss, history, steps, states }
     }
 }
 
 /// A phase, or multiple shooting, between two of its steps.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(bound = "S: Scalar")]
 pub(crate) struct PhaseState<S> {
-    pub course: OptimizerState<S>,
+    pub optimizer_state: OptimizerState<S>,
     /// One row per epoch of the phase.
     pub history: Vec<Epoch>,
     /// Parameters of the phase's best epoch; those it started with if there is none.
+    #[serde(with = "numbers")]
     pub best: Vec<S>,
     /// Their validation loss, infinite if there is none.
     pub best_loss: f64,
     /// The best epoch of the phase, counted from 0.
     pub best_epoch: u64,
-    /// State of multiple shooting beside that; `None` for a phase.
-    pub shooting: Option<Shot<S>>,
-}
-
-/// The starts of segments between two steps of multiple shooting.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Shot<S> {
-    /// Seconds of multiple shooting.
-    pub seconds: f64,
-    /// Validation loss of the weights it began with.
-    pub start_loss: f64,
-    /// Sum of the gaps over the batches of the epoch.
-    pub gap: f64,
-    /// Starts of the training segments and of the validation segments, `(segments, 2, n)`.
-    pub starts: Vec<S>,
-    pub validation_starts: Vec<S>,
-    /// Curvature and derivatives of the last linearisation, as
-    /// [`Curvature`](crate::shooting::Curvature) keeps them.
-    pub matrices: Vec<S>,
-    pub jacobian: Vec<S>,
+    /// State of the learner beside the weights, in its own bytes; `None` of a phase, where nothing moves beside them.
+    pub learner: Option<Vec<u8>>,
 }
 
 /// State that moves from step to step within a phase; the states of multiple shooting are segments.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(bound = "S: Scalar")]
 pub(crate) struct OptimizerState<S> {
     /// Draws the order of every epoch.
     pub rng: RandomGenerator,
     /// States in the order of the epoch.
     pub order: Vec<u32>,
     /// The weights that move.
+    #[serde(with = "numbers")]
     pub weights: Vec<S>,
     /// Moments of their gradients.
     pub moments: Moments<S>,
     /// Running average of the weights.
+    #[serde(with = "numbers")]
     pub average: Vec<S>,
     /// Steps in it.
     pub averaged_steps: usize,
@@ -184,7 +169,7 @@ impl<S: Scalar> OptimizerState<S> {
     }
 }
 
-/// Seconds of training, all sittings together.
+/// Seconds of training, including those before it was resumed.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Clock {
     since: Instant,
@@ -192,16 +177,11 @@ pub(crate) struct Clock {
 }
 
 impl Clock {
-    /// Starts now, after so many seconds of earlier sittings.
+    /// Starts now, after so many seconds before it was resumed.
     pub fn after(before: f64) -> Self {
         Self { since: Instant::now(), before }
     }
     pub fn seconds(&self) -> f64 {
         self.before + self.since.elapsed().as_secs_f64()
     }
-}
-
-/// The number type of a training, if files know it.
-fn precision<S: Scalar>() -> Option<StoredPrecision> {
-    [StoredPrecision::F32, StoredPrecision::F64].into_iter().find(|precision| precision.name() == S::NAME)
 }

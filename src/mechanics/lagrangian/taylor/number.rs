@@ -4,7 +4,7 @@ use super::{Degrees, Place, Space, Taylor};
 use crate::forward::{HyperDual, assign_operators};
 use crate::linalg::{MatMut, MatRef, gemm};
 use crate::ops::{Binary, Unary};
-use crate::scalar::{Real, Scalar};
+use crate::scalar::{Elementary, Real, Scalar};
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 impl<'a, S: Scalar> Taylor<'a, S> {
@@ -86,7 +86,7 @@ impl<'a, S: Scalar> Taylor<'a, S> {
     }
 
     /// A function of the table; its third and fourth derivatives are those of its second.
-    fn chain(self, f: Unary) -> Self {
+    fn chain(self, f: impl Elementary) -> Self {
         let zero = <S as Real>::zero();
         match self.place {
             None => Self::constant(f.value(self.value)),
@@ -186,6 +186,9 @@ impl<S: Scalar> Real for Taylor<'_, S> {
     }
     fn is_exact_zero(self) -> bool {
         self.place.is_none() && self.value == <S as Real>::zero()
+    }
+    fn elementary<F: Elementary>(self, f: F) -> Self {
+        self.chain(f)
     }
     crate::ops::unary_methods! { taylor_unary }
     fn powi(self, exponent: i32) -> Self {

@@ -89,7 +89,7 @@ macro_rules! rows {
 
 #[test]
 fn functions_of_the_table_have_their_fourth_derivatives() {
-    for f in crate::ops::unary_methods!(rows) {
+    for f in crate::ops::unary_methods!(rows).into_iter().chain(Unary::MADE.iter().copied()) {
         check(&format!("{f:?}"), &One(f, 0.25));
     }
     for n in [-3, -1, 0, 1, 2, 3, 5] {

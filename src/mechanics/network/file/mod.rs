@@ -170,8 +170,8 @@ fn slots(architecture: &Architecture) -> Result<Vec<Slot>, ModelFileError> {
         push("weight", vec![units, features], dissipation.weight_range());
         push("direction", vec![units, coordinates], dissipation.direction_range());
     }
-    if let Some(alpha) = layout.alpha {
-        slots.push(Slot { name: "alpha".to_string(), shape: vec![1], range: alpha..alpha + 1 });
+    if let Some((name, initial)) = architecture.own_constants() {
+        slots.push(Slot { name: name.to_string(), shape: vec![initial.len()], range: layout.constants });
     }
     if !layout.known.is_empty() {
         slots.push(Slot { name: "known".to_string(), shape: vec![layout.known.len()], range: layout.known });

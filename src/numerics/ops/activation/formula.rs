@@ -125,6 +125,27 @@ pub(super) fn x_tanh<S: Scalar>(x: S) -> Jet<S> {
     ]
 }
 
+/// `x s(x)`, `s` the logistic function: `f' = s(x) (1 + x s(-x))`; from the second on half the derivatives of `x tanh(x/2)`, for
+/// `f = (x + x tanh(x/2)) / 2`.
+///
+/// With `e = exp(-|x|)`, `r = 1/(1 + e)`: `f' = e r^2 (1 + e - |x|)` where `x < 0`, with the digits of its zero.
+#[inline(always)]
+pub(super) fn silu<S: Scalar>(x: S) -> Jet<S> {
+    let (one, half) = (constant::<S>(1.0), constant::<S>(0.5));
+    let a = bounded(x, 1600.0);
+    let decay = (-a).lane_exp();
+    let e = decay.value();
+    let r = one / (one + e);
+    let tail = decay.mantissa * r;
+    let (value, first) = if x < constant(0.0) {
+        (-decay.scale(a * tail), decay.scale(tail * r * (one + e - a)))
+    } else {
+        (x * r, r + decay.scale(a * tail * r))
+    };
+    let [_, _, second, third, fourth] = x_tanh(x);
+    [value, first, half * second, half * third, half * fourth]
+}
+
 /// `x^2`.
 #[inline(always)]
 pub(super) fn quadratic<S: Scalar>(x: S) -> Jet<S> {

@@ -1,29 +1,8 @@
 //! Activation jets over slices: the hot loops.
 
-use super::{Activation, formula};
+use super::{Activation, each_activation, formula};
 use crate::scalar::{Scalar, vectorized};
 use formula::Jet;
-
-/// Runs one loop per activation; the formula is inlined into each.
-macro_rules! each_activation {
-    ($activation:expr, $formula:ident => $body:expr) => {
-        match $activation {
-            Activation::Gelu => each_activation!(@one gelu, $formula => $body),
-            Activation::Softplus => each_activation!(@one softplus, $formula => $body),
-            Activation::XTanh => each_activation!(@one x_tanh, $formula => $body),
-            Activation::Tanh => each_activation!(@one tanh, $formula => $body),
-            Activation::Quadratic => each_activation!(@one quadratic, $formula => $body),
-            Activation::Identity => each_activation!(@one identity, $formula => $body),
-        }
-    };
-    (@one $name:ident, $formula:ident => $body:expr) => {{
-        use formula::$name as $formula;
-        vectorized(
-            #[inline(always)]
-            || $body,
-        )
-    }};
-}
 
 impl Activation {
     /// Value and four derivatives at `x`: `[f, f', f'', f''', f'''']`.

@@ -4,52 +4,96 @@ mod formula;
 mod gain;
 mod jets;
 
+use crate::ops::Unary;
 use crate::scalar::Real;
 
-/// Elementwise function that ends a layer.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-#[non_exhaustive]
-pub enum Activation {
+/// Builds the enum and all that belongs to an activation from rows `Name "name" formula (operation);`: the name in configurations and
+/// files, the closed forms of [`formula`], and the row of the table of operations that it is.
+macro_rules! table {
+    ($($(#[$($doc:tt)*])* $name:ident $text:literal $formula:ident ($($operation:tt)*);)*) => {
+        /// Elementwise function that ends a layer.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+        #[non_exhaustive]
+        pub enum Activation {
+            $($(#[$($doc)*])* $name,)*
+            /// `x`, of linear layers.
+            Identity,
+        }
+
+        impl Activation {
+            /// Every activation.
+            pub const ALL: [Self; [$($text),*].len() + 1] = [$(Self::$name,)* Self::Identity];
+
+            /// The operation of this activation; `None` for the identity.
+            fn operation(self) -> Option<Unary> {
+                match self {
+                    $(Self::$name => Some($($operation)*),)*
+                    Self::Identity => None,
+                }
+            }
+
+            /// The activation whose vectorised closed forms serve an operation.
+            pub(crate) fn of(operation: Unary) -> Option<Self> {
+                match operation {
+                    $($($operation)* => Some(Self::$name),)*
+                    _ => None,
+                }
+            }
+
+            /// The name, as in configuration files.
+            pub fn name(self) -> &'static str {
+                match self {
+                    $(Self::$name => $text,)*
+                    Self::Identity => "identity",
+                }
+            }
+        }
+
+        /// Runs one loop per activation; the formula is inlined into each.
+        macro_rules! each_activation {
+            ($activation:expr, $jet:ident => $body:expr) => {
+                match $activation {
+                    $(Activation::$name => each_activation!(@one $formula, $jet => $body),)*
+                    Activation::Identity => each_activation!(@one identity, $jet => $body),
+                }
+            };
+            (@one $one:ident, $jet:ident => $body:expr) => {{
+                use formula::$one as $jet;
+                vectorized(
+                    #[inline(always)]
+                    || $body,
+                )
+            }};
+        }
+        use each_activation;
+
+        /// Calls back with documentation and name of every row.
+        macro_rules! activations {
+            ($callback:ident) => { $callback! { $($(#[$($doc)*])* $name $text;)* } };
+        }
+        pub(crate) use activations;
+    };
+}
+
+table! {
     /// `x Phi(x)`, exact (error function).
-    Gelu,
+    Gelu "gelu" gelu (Unary::Gelu);
     /// `ln(1 + e^x)`.
-    Softplus,
+    Softplus "softplus" softplus (Unary::Softplus);
     /// `x tanh(x / 2)`.
-    XTanh,
+    XTanh "x-tanh" x_tanh (Unary::XTanh);
     /// `tanh(x)`.
-    Tanh,
+    Tanh "tanh" tanh (Unary::Tanh);
     /// `x^2`.
-    Quadratic,
-    /// `x`, of linear layers.
-    Identity,
+    Quadratic "quadratic" quadratic (Unary::Powi(2));
+    /// `x / (1 + e^-x)`, also called swish.
+    Silu "silu" silu (Unary::Silu);
 }
 
 impl Activation {
-    /// Every activation.
-    pub const ALL: [Self; 6] = [Self::Gelu, Self::Softplus, Self::XTanh, Self::Tanh, Self::Quadratic, Self::Identity];
-
     /// The activation of any kind of real number.
     pub fn apply<R: Real>(self, x: R) -> R {
-        match self {
-            Self::Gelu => x.gelu(),
-            Self::Softplus => x.softplus(),
-            Self::XTanh => x.x_tanh(),
-            Self::Tanh => x.tanh(),
-            Self::Quadratic => x.sqr(),
-            Self::Identity => x,
-        }
-    }
-
-    /// The name, as in configuration files.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Gelu => "gelu",
-            Self::Softplus => "softplus",
-            Self::XTanh => "x-tanh",
-            Self::Tanh => "tanh",
-            Self::Quadratic => "quadratic",
-            Self::Identity => "identity",
-        }
+        self.operation().map_or(x, |operation| operation.evaluate(x))
     }
 }
 

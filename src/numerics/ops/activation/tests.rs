@@ -123,7 +123,7 @@ fn gelu_changes_sign_where_it_should() {
 fn identities<S: Scalar>() {
     let two = <S as Real>::two();
     for x in cloud::<S>().into_iter().chain([1e-30, 7.5, 1e20].map(S::of_f64)) {
-        for activation in [Activation::Gelu, Activation::Softplus] {
+        for activation in [Activation::Gelu, Activation::Softplus, Activation::Silu] {
             // The two values are rounded themselves: softplus is ln 2 where x is 0.
             let size = Real::abs(x) + activation.derivatives(-Real::abs(x))[0];
             let tolerance = two * S::epsilon() * Real::abs(size);
@@ -155,6 +155,8 @@ fn limits_at_infinity() {
         assert_eq!(Activation::Softplus.derivatives(down), [zero; 5]);
         assert_eq!(Activation::XTanh.derivatives(up), [up, one, zero, zero, zero]);
         assert_eq!(Activation::XTanh.derivatives(down), [up, -one, zero, zero, zero]);
+        assert_eq!(Activation::Silu.derivatives(up), [up, one, zero, zero, zero]);
+        assert_eq!(Activation::Silu.derivatives(down), [zero; 5]);
         assert_eq!(Activation::Tanh.derivatives(down), [-one, zero, zero, zero, zero]);
         for activation in Activation::ALL {
             let jet = activation.derivatives(S::nan());
@@ -216,6 +218,7 @@ fn variance_gains_agree_with_quadrature() {
         (Activation::Softplus, 1.8462285453386054),
         (Activation::XTanh, 1.3895197216166868),
         (Activation::Tanh, 1.467413591630795),
+        (Activation::Silu, 1.6233202579524975),
     ];
     for (activation, gain) in table {
         assert!((activation.variance_gain() - gain).abs() < 1e-12, "{activation}: {}", activation.variance_gain());

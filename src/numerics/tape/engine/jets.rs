@@ -4,21 +4,9 @@ use crate::forward::Dual;
 use crate::ops::{Activation, Binary, Unary};
 use crate::scalar::{Real, Scalar, exp_lanes, sin_cos_lanes, update, vectorized};
 
-/// The activation whose vectorised closed forms serve a function of the table.
-fn activation(f: Unary) -> Option<Activation> {
-    match f {
-        Unary::Gelu => Some(Activation::Gelu),
-        Unary::Softplus => Some(Activation::Softplus),
-        Unary::XTanh => Some(Activation::XTanh),
-        Unary::Tanh => Some(Activation::Tanh),
-        Unary::Powi(2) => Some(Activation::Quadratic),
-        _ => None,
-    }
-}
-
 /// `y = f(x)` and its first `order` derivatives, up to three. All slices that are written have the length of `x`.
 pub(super) fn jets<S: Scalar>(f: Unary, order: usize, x: &[S], y: &mut [S], [d1, d2, d3]: [&mut [S]; 3]) {
-    if let Some(activation) = activation(f) {
+    if let Some(activation) = Activation::of(f) {
         return match order {
             0 => activation.value(x, y),
             1 => activation.jet1(x, y, d1),

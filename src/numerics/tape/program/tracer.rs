@@ -3,7 +3,7 @@
 use super::recorder::{Node, Recorder};
 use crate::forward::assign_operators;
 use crate::ops::{Binary, Unary};
-use crate::scalar::{Real, Scalar};
+use crate::scalar::{Elementary, Real, Scalar};
 use crate::tape::error::TapeError;
 use std::fmt;
 use std::ops::{Add, Div, Mul, Neg, Sub};
@@ -166,6 +166,12 @@ impl<S: Scalar> Real for Tracer<'_, S> {
     #[inline(always)]
     fn is_exact_zero(self) -> bool {
         self.is(0.0)
+    }
+    fn elementary<F: Elementary>(self, f: F) -> Self {
+        match Unary::made(f) {
+            Some(f) => self.table1(f),
+            None => f.value(self),
+        }
     }
     crate::ops::unary_methods! { tracer_unary }
     fn powi(self, exponent: i32) -> Self {

@@ -6,6 +6,8 @@
 
 mod error;
 mod json;
+#[cfg(feature = "training")]
+pub(crate) mod state;
 
 pub use error::ContainerError;
 pub use json::StoredPrecision;
@@ -51,10 +53,9 @@ impl Tensor {
         Self { name, shape, dtype: stored_dtype(precision), bytes }
     }
 
-    /// A list of whole numbers.
-    pub fn indices(name: String, numbers: &[u32]) -> Self {
-        let bytes = numbers.iter().flat_map(|x| x.to_le_bytes()).collect();
-        Self { name, shape: vec![numbers.len()], dtype: Dtype::U32, bytes }
+    /// Bytes as they are.
+    pub fn bytes(name: String, bytes: Vec<u8>) -> Self {
+        Self { name, shape: vec![bytes.len()], dtype: Dtype::U8, bytes }
     }
 }
 
@@ -155,13 +156,13 @@ impl Tensors<'_> {
         })
     }
 
-    /// A list of `length` whole numbers.
+    /// Bytes as they are.
     ///
     /// # Errors
-    /// It is missing, or its type or shape is another.
-    pub fn indices(&self, name: &str, length: usize) -> Result<Vec<u32>, ContainerError> {
-        let data = self.data(name, &[length], Dtype::U32, "u32")?;
-        Ok(data.as_chunks().0.iter().map(|b| u32::from_le_bytes(*b)).collect())
+    /// They are missing, or of another type.
+    pub fn bytes(&self, name: &str) -> Result<&[u8], ContainerError> {
+        let length = self.0.tensor(name).map_or(0, |tensor| tensor.data().len());
+        self.data(name, &[length], Dtype::U8, "u8")
     }
 
     fn data(&self, name: &str, shape: &[usize], dtype: Dtype, expected: &'static str) -> Result<&[u8], ContainerError> {

@@ -2,7 +2,7 @@
 
 use super::fingerprint::{Fingerprint, Saved};
 use super::format::{Header, decode, decode_header, encode};
-use super::{Ended, PhaseState, Snapshot};
+use super::{Outcome, PhaseState, Snapshot};
 use crate::network::file::ModelFileError;
 use crate::scalar::Scalar;
 use crate::storage::{Files, ReadError, replace};
@@ -118,18 +118,18 @@ impl CheckpointManager {
 
     /// Writes a checkpoint; if that fails the one before stands, training goes on, and a
     /// warning in the log tells.
-    pub(crate) fn save<S: Scalar>(&self, seconds: f64, ended: &Ended<S>, underway: Option<&PhaseState<S>>) {
+    pub(crate) fn save<S: Scalar>(&self, seconds: f64, outcome: &Outcome<S>, in_progress: Option<&PhaseState<S>>) {
         let began = Instant::now();
         let mut state = self.state();
         let (newest, previous) = (self.directory.join(LATEST), self.directory.join(PREVIOUS));
-        let written = encode(&self.identity, seconds, ended, underway).and_then(|bytes| {
+        let written = encode(&self.identity, seconds, outcome, in_progress).and_then(|bytes| {
             replace(self.files.as_ref(), &newest, &previous, &bytes, state.keep).map_err(ModelFileError::Write)
         });
         match written {
             Ok(()) => state.keep = true,
             Err(problem) => tracing::warn!(checkpoint = %newest.display(), %problem),
         }
-        let epochs = underway.map_or(ended.history.len(), |underway| underway.course.epoch);
+        let epochs = in_progress.map_or(outcome.history.len(), |in_progress| in_progress.optimizer_state.epoch);
         (state.last, state.cost) = (Some((Instant::now(), epochs)), began.elapsed());
         tracing::info!(epochs, cost = state.cost.as_secs_f64(), "checkpoint");
     }
@@ -155,12 +155,12 @@ impl CheckpointManager {
         if header.identity.config != self.identity.config {
             return Err(CheckpointError::Config { saved: header.identity.config });
         }
-        if snapshot.ended.weights.len() != parameters {
-            let problem = format!("{} weights, the network has {parameters}", snapshot.ended.weights.len());
+        if snapshot.outcome.weights.len() != parameters {
+            let problem = format!("{} weights, the network has {parameters}", snapshot.outcome.weights.len());
             return Err(CheckpointError::Data(problem));
         }
         // The segments of multiple shooting are counted where they are cut.
-        if let Some(order) = snapshot.underway.as_ref().map(|underway| underway.course.order.len())
+        if let Some(order) = snapshot.in_progress.as_ref().map(|in_progress| in_progress.optimizer_state.order.len())
             && order != states
             && !snapshot.is_shooting()
         {
