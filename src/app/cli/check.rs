@@ -3,7 +3,7 @@
 use crate::cli::recording_args::RecordingArgs;
 use crate::cli::{CliError, output};
 use crate::configuration::Precision;
-use crate::names::{WIDTH, counted, hundredths, percent, rounded, wrapped};
+use crate::names::{WIDTH, counted, percent, percentage, rounded, wrapped};
 use crate::pipeline::{FitOptions, PreparedFit};
 use crate::recording::survey::{FEW_SAMPLES, Kind, Survey, SurveyOptions, Suspicion, survey};
 use crate::recording::{LARGE_ERROR, Targets};
@@ -74,7 +74,7 @@ fn describe(Found { survey: found, obstacle }: &Found) -> String {
         .map(|c| {
             let bound = if c.noise_resolved { "" } else { "at most " };
             let noise = format!("{bound}{}", short(c.noise));
-            let range = [short(c.min), short(c.max), noise, hundredths(c.noise_relative)];
+            let range = [short(c.min), short(c.max), noise, percentage(c.noise_relative)];
             let motion = [c.velocity, c.acceleration, c.period, c.samples_per_period].map(short);
             [vec![c.name.clone(), unit(c.periodic).to_string()], range.to_vec(), motion.to_vec()].concat()
         })
@@ -98,7 +98,7 @@ fn describe(Found { survey: found, obstacle }: &Found) -> String {
         .iter()
         .map(|c| {
             let numbers = [c.window_seconds, c.velocity_error, c.acceleration_error].map(short);
-            let ends = [hundredths(c.acceleration_error_relative)];
+            let ends = [percentage(c.acceleration_error_relative)];
             let names = [c.name.clone(), unit(c.periodic).to_string(), c.window.to_string()];
             [names.to_vec(), numbers.to_vec(), ends.to_vec()].concat()
         })
@@ -176,7 +176,7 @@ fn header(found: &Survey) -> String {
             [
                 vec![t.name.clone(), rows, t.samples.to_string()],
                 times.to_vec(),
-                vec![hundredths(if t.jitter < ROUNDING { 0.0 } else { t.jitter })],
+                vec![percentage(if t.jitter < ROUNDING { 0.0 } else { t.jitter })],
             ]
             .concat()
         })

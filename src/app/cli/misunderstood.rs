@@ -23,6 +23,9 @@ pub fn misunderstood(error: &clap::Error, arguments: &[OsString]) -> CliError {
             let known: Vec<&str> = commands.get_subcommands().map(clap::Command::get_name).collect();
             unknown("command", &name, known)
         }
+        (ErrorKind::UnknownArgument, Some(option), _) if !option.starts_with("--") && option.starts_with('-') => {
+            dashed(&option, arguments)
+        }
         (ErrorKind::UnknownArgument, Some(option), _) if option.starts_with('-') => {
             let known = options(arguments);
             unknown("option", &option, known.iter().map(String::as_str).collect::<Vec<_>>())
@@ -50,6 +53,26 @@ pub fn misunderstood(error: &clap::Error, arguments: &[OsString]) -> CliError {
     CliError::usage(problem)
 }
 
+/// The problem of an argument with one dash, of which clap names the first letter: a value that looks like an option, or a mistyped one.
+fn dashed(option: &str, arguments: &[OsString]) -> String {
+    let typed = arguments.iter().filter_map(|argument| argument.to_str()).enumerate().skip(1);
+    let found = typed.clone().find(|(_, argument)| argument.starts_with(option) && !argument.starts_with("--"));
+    let (place, found) = found.unwrap_or((0, option));
+    let before = typed.take_while(|(k, _)| *k < place).last().map_or("", |(_, argument)| argument);
+    let takes_a_value = command(arguments).get_arguments().any(|argument| {
+        argument.get_action().takes_values()
+            && before.strip_prefix("--").is_some_and(|name| argument.get_long() == Some(name))
+    });
+    if takes_a_value {
+        return format!("{before}: expected a value, found {found:?}");
+    }
+    if found[1..].starts_with(|c: char| c.is_ascii_digit() || c == '.') {
+        return format!("expected no further argument, found {found:?}");
+    }
+    let known = options(arguments);
+    unknown("option", found, known.iter().map(String::as_str).collect::<Vec<_>>())
+}
+
 /// clap's own words, without usage and hints.
 fn first_paragraph(error: &clap::Error) -> String {
     let text = error.to_string();
@@ -58,12 +81,17 @@ fn first_paragraph(error: &clap::Error) -> String {
     problem.strip_prefix("error: ").unwrap_or(problem).to_string()
 }
 
-/// The options of the command that the arguments name.
-fn options(arguments: &[OsString]) -> Vec<String> {
+/// The command that the arguments name.
+fn command(arguments: &[OsString]) -> clap::Command {
     let mut program = Cli::command();
     program.build();
     let named = arguments.iter().skip(1).filter_map(|argument| argument.to_str());
-    let command = named.fold(&program, |command, name| command.find_subcommand(name).unwrap_or(command));
+    named.fold(&program, |command, name| command.find_subcommand(name).unwrap_or(command)).clone()
+}
+
+/// The options of the command that the arguments name.
+fn options(arguments: &[OsString]) -> Vec<String> {
+    let command = command(arguments);
     let mut known: Vec<String> =
         command.get_arguments().filter_map(|a| a.get_long()).map(|l| format!("--{l}")).collect();
     known.sort();
@@ -86,6 +114,10 @@ mod tests {
             ("lnn rolout", "unknown command \"rolout\", did you mean \"rollout\"?"),
             ("lnn systems --jsn", "unknown option \"--jsn\", did you mean \"--json\"?"),
             ("lnn systems --zebra", "unknown option \"--zebra\", expected one of --"),
+            ("lnn inspect -5", "expected no further argument, found \"-5\""),
+            ("lnn check d --coords -theta", "--coords: expected a value, found \"-theta\""),
+            ("lnn check d --coords x --rate -5", "--rate: expected a value, found \"-5\""),
+            ("lnn systems --json -jsn", "unknown option \"-jsn\", did you mean \"--json\"?"),
             ("lnn systems more", "expected no further argument, found \"more\""),
             ("lnn train x --preset qick", "--preset: unknown value \"qick\", did you mean \"quick\"?"),
             ("lnn train x --preset gone", "--preset: unknown value \"gone\", expected one of quick, best, paper"),

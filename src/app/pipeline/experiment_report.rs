@@ -73,15 +73,14 @@ pub(crate) fn conclude(
         .paragraph(&format!("Regenerates: {}.", experiment.paper))
         .paragraph(&format!("The paper: {}", experiment.finding))
         .paragraph(&format!("{budget}."))
-        .table(&header, &view)
-        .paragraph(CONVENTIONS);
+        .section("Pictures of all runs", &figures);
+    let holes = rows_of_holes(experiment, &results, store, &output, watch)?;
+    let report = holes.iter().fold(within(taken, report), |report, row| row.add_to(report));
+    let report = report.heading("Losses and errors").table(&header, &view).paragraph(CONVENTIONS);
     let remarks = experiment.remarks(&results.iter().map(|(run, _)| run).collect::<Vec<_>>());
     let reductions = reduction_table(&experiment.reductions(&results));
     let report = remarks.iter().fold(report, |report, remark| report.paragraph(remark));
     let report = if reductions.is_empty() { report } else { report.table(&REDUCTION_HEADER, &reductions) };
-    let holes = rows_of_holes(experiment, &results, store, &output, watch)?;
-    let report = holes.iter().fold(report, |report, row| row.add_to(report));
-    let report = within(taken, report.figures(&figures));
     output.write("report.html", report.to_html().as_bytes())?;
     figures.iter().try_for_each(|figure| output.write(&figure.file, figure.picture.to_svg().as_bytes()))?;
     drop(output);

@@ -51,9 +51,9 @@
 
 mod attention;
 mod checkpoints;
-mod common_ground;
 mod determination;
 mod energy;
+mod equivalence;
 mod error;
 mod evaluation;
 mod evaluation_tables;
@@ -68,6 +68,7 @@ mod fit_summary;
 mod headline;
 mod hold_out;
 mod hole_pictures;
+mod learned_functions;
 mod losses;
 pub(crate) mod memory;
 mod model;
@@ -85,9 +86,9 @@ mod train;
 mod watch;
 
 pub use checkpoints::{Begin, Checkpoints};
-pub use common_ground::CommonGround;
 pub use determination::Determined;
 pub use energy::Balance;
+pub use equivalence::Equivalence;
 pub use error::PipelineError;
 pub use evaluation::{Evaluation, EvaluationOptions, Motion, RTOL, evaluate};
 pub(crate) use experiment::{KeptRecord, kept_record};
@@ -100,7 +101,7 @@ pub use fit::{FitReport, fit};
 pub use fit_builder::Fit;
 pub(crate) use fit_config::FIT_SECTIONS;
 pub use fit_config::{FitColumns, FitConfig, FitOptions, HELD_OUT};
-pub use hold_out::{HoldOut, HoldOutOptions, evaluate_hold_out};
+pub use hold_out::{CoordinatePredictions, HoldOut, HoldOutOptions, UsefulTime, evaluate_hold_out};
 pub use model::{model_file, trained_on};
 pub use output::{Directory, InMemory, Output};
 pub use physics::{ChargeDrift, CurvatureScalar, FoundSymmetries, Physics, ProvenSignature};

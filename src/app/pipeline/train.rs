@@ -308,8 +308,9 @@ fn write_report(
     let training = training_pictures(epochs);
     let report = Report::new(&format!("{}: learned", system.system.title));
     let report = summary.evaluation.summarise(report, &system.system.title).paragraph(&headline(summary));
-    let report = summary.evaluation.report(parameter_table(report, system)).heading("Training");
-    let report = report.figures(&training).heading("Configuration").preformatted(toml);
+    let report = summary.evaluation.pictures(report);
+    let report = summary.evaluation.report(parameter_table(report, system)).section("Training", &training);
+    let report = report.heading("Configuration").preformatted(toml);
     write_report_and_figures(output, &report, {
         let Evaluation { figures, physics, .. } = summary.evaluation;
         training.iter().chain(figures).chain(&physics.figures)

@@ -1,6 +1,6 @@
 //! Tables and pictures of an experiment: the paper's figures beside ours.
 
-use super::{Figure, LinePlot, Series, kept, line_plot};
+use super::{Figure, LinePlot, Series, figure, line_plot};
 use crate::experiments::{Experiment, Outcome, Picture, Record, Reduction, Row, Run, Spread};
 use crate::names::rounded;
 
@@ -160,12 +160,13 @@ fn reached(curves: &[Curve]) -> Vec<Series> {
 /// Pictures of an experiment from its finished runs, and `curves` where time matters; what has nothing to show is left out.
 pub fn experiment_figures(experiment: &Experiment, results: &[(Run, Option<Record>)], curves: &[Curve]) -> Vec<Figure> {
     let mut figures = Vec::new();
-    let mut add = |file: &str, caption: String, plot: LinePlot| {
-        figures.extend(kept(&format!("{file}.svg"), line_plot(&plot), caption));
+    let mut add = |file: &str, heading: &str, caption: String, plot: LinePlot| {
+        figures.extend(figure(&format!("{file}.svg"), heading, line_plot(&plot), caption));
     };
     for (part, word) in [(0, "training"), (1, "validation")] {
         add(
             &format!("{word}_loss"),
+            &format!("How the {word} loss falls from epoch to epoch"),
             format!("Geometric mean of the {word} losses of each group of runs, paper convention."),
             LinePlot {
                 title: format!("{}: {word} loss", experiment.title),
@@ -182,6 +183,7 @@ pub fn experiment_figures(experiment: &Experiment, results: &[(Run, Option<Recor
         match picture {
             Picture::Scan { abscissa } => add(
                 "scan",
+                &format!("Which {abscissa} gives the lowest loss"),
                 format!(
                     "Lowest validation loss of each run against {abscissa}; runs without {abscissa} as a level line."
                 ),
@@ -197,6 +199,7 @@ pub fn experiment_figures(experiment: &Experiment, results: &[(Run, Option<Recor
             ),
             Picture::TradeOff => add(
                 "trade_off",
+                "Accuracy against stability of the training",
                 "Lowest validation loss against training instability, one point per run; lower left is better.".into(),
                 LinePlot {
                     title: format!("{}: loss against instability", experiment.title),
@@ -210,6 +213,7 @@ pub fn experiment_figures(experiment: &Experiment, results: &[(Run, Option<Recor
             ),
             Picture::Clock => add(
                 "time_to_accuracy",
+                "Which accuracy is reached after which time",
                 "Lowest validation loss so far against seconds of training, paper convention.".into(),
                 LinePlot {
                     title: experiment.title.into(),

@@ -322,7 +322,7 @@ mod tests {
             {
                 let exact = without(plain);
                 assert_eq!((set.q(), set.a()), (plain.q(), plain.a()));
-                // Errors are some hundredths of the accelerations.
+                // Errors are some percentage of the accelerations.
                 let ratio = |k: usize| set.weight(k) / exact.weight(k);
                 assert!((0..set.len()).all(|k| ratio(k) < 1.0 && ratio(k) > 0.5), "{around:?}");
             }

@@ -23,7 +23,8 @@ const ANYWAY: u64 = 1 << 26;
 fn broken(error: ZipError) -> Problem {
     match error {
         ZipError::Io(error) => Problem::Io(error),
-        other => Problem::Array(format!("not a whole archive of arrays: {other}")),
+        ZipError::UnsupportedArchive(what) => Problem::Array(format!("an archive that is not read: {what}")),
+        _ => Problem::Array("not a whole archive of arrays".to_string()),
     }
 }
 
