@@ -56,6 +56,7 @@ mod spool;
 mod states;
 mod subject;
 mod surfaces;
+mod sweep;
 mod symmetries;
 mod systems;
 mod tensors;
@@ -114,6 +115,8 @@ enum Command {
     Evaluate(evaluate::Args),
     /// Regenerate a table or figure of the paper, or list them.
     Experiment(experiment::Args),
+    /// Train over the values of some keys of a configuration, and gather the runs in tables.
+    Sweep(sweep::Args),
     /// Print the Euler-Lagrange terms of states, every digit of them.
     Inspect(inspect::Args),
     /// Print metric, Christoffel symbols and curvature of points, every digit of them.
@@ -176,6 +179,7 @@ fn run(command: Command, words: &[OsString]) -> Result<(), CliError> {
         Command::Rollout(args) => rollout::run(&args),
         Command::Evaluate(args) => evaluate::run(&args),
         Command::Experiment(args) => experiment::run(&args),
+        Command::Sweep(args) => sweep::run(&args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Geometry(args) => geometry::run(&args),
         Command::Shadow(args) => shadow::run(&args),

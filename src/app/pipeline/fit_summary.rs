@@ -8,7 +8,7 @@ use crate::pipeline::physics::Physics;
 use crate::pipeline::prepared_fit::PreparedFit;
 use crate::pipeline::report_files::{ended, training_pictures, write_report_and_figures};
 use crate::pipeline::time_steps::TimeSteps;
-use crate::pipeline::{Output, PipelineError, headline};
+use crate::pipeline::{Output, PipelineError, SUMMARY, headline};
 use crate::recording::{HeldOut, Recording, Targets};
 use crate::report::{Report, text_table};
 use crate::scalar::Scalar;
@@ -110,7 +110,7 @@ impl<'a, S: Scalar> Found<'a, S> {
         let (recording, name) = (&self.prepared.reading.recording, self.config.system.as_str());
         let summary = self.summary();
         let json = serde_json::to_string_pretty(&summary).map_err(PipelineError::format)? + "\n";
-        output.write("summary.json", json.as_bytes())?;
+        output.write(SUMMARY, json.as_bytes())?;
         let headline = headline::of_hold_out(name, self.hold_out);
         let opening = summary.opening(recording);
         let mut figures = training_pictures(&self.trained.history);

@@ -12,6 +12,8 @@ use crate::report::Report;
 const MOST_WRONG: f64 = 0.01;
 /// Lyapunov times from which on predictions of chaotic motion are good: errors grew e^3 = 20 times.
 const MANY_TIMES: f64 = 3.0;
+/// Share of the time that was tested below which predictions of motion that is not chaotic are bad.
+const FEW: f64 = 0.01;
 
 /// A headline.
 #[derive(Clone, Debug, PartialEq)]
@@ -104,7 +106,7 @@ pub(crate) fn of_evaluation(title: &str, found: &Evaluation) -> Headline {
 /// Predictions beside the exact motion over a test of `tested`, in words.
 fn predicted(valid: &ValidTimes, tested: f64, unit: &str) -> String {
     let time = valid_time(valid, unit);
-    let tested = format!("{} {unit}", number(tested));
+    let (until, tested) = (tested, format!("{} {unit}", number(tested)));
     if valid.at_least {
         return format!("good: the learned Lagrangian predicts the motion for all of the {tested} that were tested");
     }
@@ -112,8 +114,8 @@ fn predicted(valid: &ValidTimes, tested: f64, unit: &str) -> String {
         Some(times) if times >= MANY_TIMES => {
             format!("good: the learned Lagrangian predicts the chaotic motion for {time}, of {tested} that were tested")
         }
-        _ if valid.median == 0.0 => {
-            format!("bad: the predictions are wrong from the start, of {tested} that were tested")
+        times if times.map_or(valid.median < FEW * until, |times| times < 1.0) => {
+            format!("bad: predictions are useful for no more than {time}; {tested} were tested")
         }
         _ => format!("limited: useful for {time} of prediction, and wrong beyond; {tested} were tested"),
     }
@@ -129,7 +131,7 @@ pub(crate) fn of_hold_out(name: &str, found: &HoldOut) -> Headline {
         let sentence = format!("{name}: a Lagrangian was learned; no held-out motion judges its predictions.");
         return Headline { sentence, rows: signature().into_iter().collect() };
     };
-    let of = |x: f64| if x.is_finite() { format!("{} {}", number(x), found.unit) } else { "-".to_string() };
+    let of = |x: f64| if x.is_finite() { format!("{} {}", number(x), found.error_unit) } else { "-".to_string() };
     let mut rows: Vec<[String; 2]> = Vec::new();
     if let Some(valid) = &found.valid_time {
         rows.push([valid_name(valid, ["held-out window", "held-out windows"]), valid_time(valid, "s")]);
@@ -139,8 +141,8 @@ pub(crate) fn of_hold_out(name: &str, found: &HoldOut) -> Headline {
         ["The same at constant velocity".to_string(), of(straight.median)],
     ]);
     // Of one coordinate it is the same.
-    let several = found.coordinates.len() > 1;
-    let apart = found.coordinates.iter().filter(|_| several).filter_map(|c| {
+    let several = found.by_coordinate.len() > 1;
+    let apart = found.by_coordinate.iter().filter(|_| several).filter_map(|c| {
         let errors = [c.model.last()?, c.constant_velocity.last()?].map(|x| number(*x));
         Some([
             format!("Of {}", c.name),
@@ -165,7 +167,7 @@ fn judged(found: &HoldOut, model: &PredictionError, straight: &PredictionError) 
         "{} s ahead it is off by {} {} (median), going on at constant velocity by {}{compared}.",
         number(model.seconds),
         number(model.median),
-        found.unit,
+        found.error_unit,
         number(straight.median)
     );
     let verdict = match useful.seconds {
@@ -208,15 +210,17 @@ pub(crate) fn of_experiment(rows: &[Row]) -> Headline {
         Some(own) => format!("Lowest loss {}{below}.", of(own)),
         None => "No run learned anything.".to_string(),
     };
-    let or_none = |found: Option<String>| found.unwrap_or_else(|| "-".to_string());
     let share = |of: fn(&Row) -> Option<Spread>| percent(own.and_then(|(row, _)| of(row)).map_or(f64::NAN, |s| s.mean));
+    let stated = paper.map(|paper| ("Lowest loss in the paper", of(paper)));
     let table = [
-        ("Lowest loss in the paper", or_none(paper.map(of))),
         ("Runs", if failed == 0 { runs.to_string() } else { format!("{runs}, {failed} learned nothing") }),
         ("States of wrong signature (best row)", share(|row| row.wrong_signature)),
         ("Energy error of predicted motion (best row)", share(|row| row.energy)),
     ];
-    Headline { sentence, rows: table.map(|(what, value)| [what.to_string(), value]).to_vec() }
+    Headline {
+        sentence,
+        rows: stated.into_iter().chain(table).map(|(what, value)| [what.to_string(), value]).collect(),
+    }
 }
 
 #[cfg(test)]
@@ -240,12 +244,12 @@ mod tests {
         };
         let said = |model: f64, seconds: f64, at_least: bool, (until, open): (f64, bool)| {
             let found = HoldOut {
-                unit: "rad",
+                error_unit: "rad",
                 model: vec![error(model)],
                 constant_velocity: vec![error(1.0)],
                 valid_time: Some(valid(until, open)),
                 useful_time: Some(UsefulTime { seconds, at_least }),
-                coordinates: Vec::new(),
+                by_coordinate: Vec::new(),
                 given_up: String::new(),
                 wrong_signature: 0.0,
                 energy: None,
@@ -298,7 +302,7 @@ mod tests {
 
     #[test]
     fn experiments_stand_beside_the_paper() {
-        let spread = |x: f64| Some(Spread { mean: x, low: x, high: x });
+        let spread = |x: f64| Some(Spread { mean: x, median: x, low: x, high: x });
         let row = |label: &str, loss, paper, failed| Row {
             label: label.into(),
             runs: 2,

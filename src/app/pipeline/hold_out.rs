@@ -68,7 +68,7 @@ pub struct CoordinatePredictions {
 pub struct HoldOut {
     /// Unit of the errors of all coordinates together: `rad` of angles, `SI` of others; of both kinds each error is taken over the spread
     /// of its coordinate's motion.
-    pub unit: &'static str,
+    pub error_unit: &'static str,
     /// Errors of the model's motion, by time ahead.
     pub model: Vec<PredictionError>,
     /// Time for which the model's motion predicts the measured one, median over the windows; at least to their end where the
@@ -77,7 +77,7 @@ pub struct HoldOut {
     /// Time for which its motion is of use. None without windows.
     pub useful_time: Option<UsefulTime>,
     /// Errors of every coordinate at the same times ahead.
-    pub coordinates: Vec<CoordinatePredictions>,
+    pub by_coordinate: Vec<CoordinatePredictions>,
     /// Which predictions were given up and why, in words; empty if none was.
     pub given_up: String,
     /// Errors of going on at the velocity of the start.
@@ -170,14 +170,13 @@ pub fn evaluate_hold_out(
         let (name, model, constant_velocity) = (name.clone(), column(&by_model, i), column(&by_velocity, i));
         CoordinatePredictions { name, unit, model, constant_velocity }
     });
-    let coordinates = coordinates.collect();
     let given_up = foretold.remarks();
     Ok(HoldOut {
-        unit,
+        error_unit: unit,
         model,
         valid_time,
         useful_time,
-        coordinates,
+        by_coordinate: coordinates.collect(),
         constant_velocity,
         given_up,
         wrong_signature,
@@ -330,7 +329,7 @@ fn short(unit: &str) -> &str {
 
 impl HoldOut {
     fn headers(&self) -> [String; 7] {
-        let unit = short(self.unit);
+        let unit = short(self.error_unit);
         [
             "time ahead [s]".to_string(),
             format!("median error [{unit}]"),
@@ -343,17 +342,17 @@ impl HoldOut {
     }
 
     /// Table of the errors by coordinate, if there are several.
-    fn by_coordinate(&self) -> Option<(Vec<String>, Vec<Vec<String>>)> {
-        if self.coordinates.len() < 2 || self.model.is_empty() {
+    fn table_by_coordinate(&self) -> Option<(Vec<String>, Vec<Vec<String>>)> {
+        if self.by_coordinate.len() < 2 || self.model.is_empty() {
             return None;
         }
         let header = |c: &CoordinatePredictions| {
             [format!("{} [{}]", c.name, c.unit), format!("{}, constant velocity [{}]", c.name, c.unit)]
         };
-        let headers = self.coordinates.iter().flat_map(header);
+        let headers = self.by_coordinate.iter().flat_map(header);
         let headers = ["median error, time ahead [s]".to_string()].into_iter().chain(headers).collect();
         let row = |(k, error): (usize, &PredictionError)| {
-            let numbers = self.coordinates.iter().flat_map(|c| [c.model[k], c.constant_velocity[k]]);
+            let numbers = self.by_coordinate.iter().flat_map(|c| [c.model[k], c.constant_velocity[k]]);
             [error.seconds].into_iter().chain(numbers).map(number).collect()
         };
         Some((headers, self.model.iter().enumerate().map(row).collect()))
@@ -373,12 +372,12 @@ impl HoldOut {
     /// That of a model that no motion was held out to judge: its numbers are not there.
     fn nothing() -> Self {
         Self {
-            unit: "SI",
+            error_unit: "SI",
             model: Vec::new(),
             constant_velocity: Vec::new(),
             valid_time: None,
             useful_time: None,
-            coordinates: Vec::new(),
+            by_coordinate: Vec::new(),
             given_up: String::new(),
             wrong_signature: f64::NAN,
             energy: None,
@@ -418,7 +417,7 @@ impl HoldOut {
             let none = "no window of held-out motion is as long as the horizon: nothing was predicted\n";
             return format!("{none}{}", self.remarks());
         }
-        let apart = self.by_coordinate();
+        let apart = self.table_by_coordinate();
         let apart = apart.map(|(headers, rows)| format!("\n{}\n", text_table(&headers, &rows))).unwrap_or_default();
         format!("{}{apart}{}", text_table(&self.headers(), &self.rows()), self.remarks())
     }
@@ -430,7 +429,7 @@ impl HoldOut {
             return report.paragraph(self.remarks().trim_end());
         }
         let report = report.table(&self.headers(), &self.rows());
-        let report = match self.by_coordinate() {
+        let report = match self.table_by_coordinate() {
             Some((headers, rows)) => report.table(&headers, &rows),
             None => report,
         };

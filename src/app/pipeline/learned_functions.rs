@@ -180,10 +180,11 @@ impl Picturing {
         for (component, learned) in components.iter().zip(learned) {
             let exact = exact.as_mut().and_then(Iterator::next);
             if matters(component) {
-                let name = component.indices.map(|i| self.names[i].as_str()).join("_");
+                let [a, b] = component.indices.map(|i| self.names[i].as_str());
                 let what = if symbol == "g" { "metric" } else { "mass matrix" };
-                let about = format!("Component {symbol}_{name} of the {what} over the coordinates");
-                let texts = [format!("{symbol}_{name}"), about, format!("{file}_{name}")];
+                let quantity = format!("{symbol}[{a},{b}]");
+                let about = format!("Component {quantity} of the {what} over the coordinates");
+                let texts = [quantity, about, format!("{file}_{a}_{b}")];
                 maps.push((texts, learned.map(|m| pair.factor * m), exact));
             }
         }
@@ -203,9 +204,10 @@ impl Picturing {
             if vanishes(&learned) && exact.as_ref().is_none_or(vanishes) {
                 return None;
             }
-            let name = [i, j].map(|i| self.names[i].as_str()).join("_");
-            let about = format!("The gyroscopic (magnetic) field F_{name} over the coordinates");
-            self.map([format!("F_{name}"), about, format!("gyroscopic_{name}")], learned, exact)
+            let [a, b] = [i, j].map(|i| self.names[i].as_str());
+            let quantity = format!("F[{a},{b}]");
+            let about = format!("The gyroscopic (magnetic) field {quantity} over the coordinates");
+            self.map([quantity, about, format!("gyroscopic_{a}_{b}")], learned, exact)
         });
         drawn.collect()
     }

@@ -35,7 +35,7 @@ impl Physics {
             .map(|component| {
                 let [i, j] = component.indices.map(|i| self.coordinates[i].as_str());
                 let numbers = [Some(component.learned), component.exact, component.error].map(shown);
-                [vec![format!("g_{i}_{j}")], numbers.to_vec()].concat()
+                [vec![format!("g[{i},{j}]")], numbers.to_vec()].concat()
             })
             .collect();
         report.table(&["metric at rest, root mean square", "learned", "exact", "difference"], &rows)

@@ -1,6 +1,7 @@
 //! Plots, tables and the HTML report.
 
 mod base64;
+mod data_table;
 mod escape;
 mod evaluation;
 mod experiment;
@@ -15,8 +16,9 @@ mod test_pictures;
 mod training;
 mod turn;
 
+pub use data_table::DataTable;
 pub(crate) use evaluation::{evaluation_figures, units};
-pub use experiment::{Curve, EXPERIMENT_HEADER};
+pub use experiment::Curve;
 pub(crate) use experiment::{
     REDUCTION_HEADER, experiment_curves, experiment_figures, experiment_table, experiment_view, reduction_table,
 };

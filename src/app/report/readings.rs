@@ -20,9 +20,10 @@ fn line(reading: &Reading, runs: &[Vec<Reading>]) -> Vec<String> {
     let all: Vec<Reading> = runs.iter().filter_map(same).collect();
     let dash = || "-".to_string();
     let digits = |x: f64| rounded(x, 5);
-    let learned = Spread::of(all.iter().filter_map(|r| r.learned)).map_or_else(dash, |Spread { mean, low, high }| {
-        if low == high { digits(mean) } else { format!("{} [{}, {}]", digits(mean), digits(low), digits(high)) }
-    });
+    let learned =
+        Spread::of(all.iter().filter_map(|r| r.learned)).map_or_else(dash, |Spread { mean, low, high, .. }| {
+            if low == high { digits(mean) } else { format!("{} [{}, {}]", digits(mean), digits(low), digits(high)) }
+        });
     let mut errors: Vec<f64> = all.iter().filter_map(|r| r.error).filter(|e| e.is_finite()).collect();
     errors.sort_by(f64::total_cmp);
     let (median, largest) = (errors.get(errors.len() / 2).copied(), errors.last().copied());
