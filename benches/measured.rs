@@ -165,7 +165,7 @@ fn lines(
         let start = Instant::now();
         let predictions = predict();
         let seconds = start.elapsed().as_secs_f64();
-        let at = |t: f64| prediction_error(&windows, &predictions, &recording.periodic, t);
+        let at = |t: f64| prediction_error(&windows, &predictions, (&recording.periodic, &[1.0; 2]), t);
         let errors: Vec<_> = AHEAD.map(at).to_vec();
         let medians: Vec<String> = errors.iter().map(|e| format!("{:.4}", e.median)).collect();
         let (medians, missing) = (medians.join("  "), errors[AHEAD.len() - 1].missing);

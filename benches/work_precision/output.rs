@@ -80,7 +80,8 @@ impl Section {
         };
         match line_plot(&plot) {
             Ok(picture) => {
-                self.figures.push(Figure { file: format!("{}_{file}.svg", self.name), picture, caption: title.into() })
+                let (file, heading) = (format!("{}_{file}.svg", self.name), title.to_string());
+                self.figures.push(Figure { file, heading, picture, caption: String::new() });
             }
             Err(error) => self.failed(file, error.to_string()),
         }

@@ -5,7 +5,7 @@ mod number;
 mod wrap;
 
 pub use columns::taken_column;
-pub use number::{hundredths, number, percent, rounded};
+pub use number::{number, percent, percentage, rounded};
 pub use wrap::{WIDTH, cut, cut_hard, width, wrapped};
 
 /// The candidate that fewest edits (insert, delete, replace, swap neighbours) turn `name` into; none if every one takes more
@@ -59,10 +59,11 @@ fn edits(a: &[char], b: &[char]) -> usize {
     above[b.len()]
 }
 
-/// Lines joined by a space, control characters written out: an error is one line whatever a file name contains.
+/// Lines joined by a space, control characters written out: an error is one line whatever a file name contains. The numbers of
+/// the system's errors are left out, and numbers of many digits have an exponent.
 pub fn one_line(text: &str) -> String {
     let joined = text.lines().map(str::trim).filter(|line| !line.is_empty()).collect::<Vec<_>>().join(" ");
-    joined.chars().fold(String::with_capacity(joined.len()), |mut line, c| {
+    short_numbers(&without_error_numbers(&joined)).chars().fold(String::with_capacity(joined.len()), |mut line, c| {
         if c.is_control() {
             line.extend(c.escape_default())
         } else {
@@ -70,6 +71,41 @@ pub fn one_line(text: &str) -> String {
         }
         line
     })
+}
+
+/// A text without the ` (os error 28)` that Rust adds to the words of the system.
+fn without_error_numbers(text: &str) -> String {
+    let mut parts = text.split(" (os error ");
+    let first = parts.next().unwrap_or_default().to_string();
+    parts.fold(first, |whole, part| match part.split_once(')') {
+        Some((number, rest)) if number.parse::<i32>().is_ok() => whole + rest,
+        _ => whole + " (os error " + part,
+    })
+}
+
+/// Digits from which on a number is written with an exponent; the largest whole number of 64 bits has one fewer.
+const MOST_DIGITS: usize = 21;
+
+/// A text whose long decimal numbers have exponents; digits inside words and paths stay.
+fn short_numbers(text: &str) -> String {
+    let is_part = |c: char| c.is_ascii_digit() || c == '.';
+    let mut whole = String::with_capacity(text.len());
+    let mut rest = text;
+    while let Some(start) = rest.find(is_part) {
+        let length = rest[start..].find(|c| !is_part(c)).unwrap_or(rest.len() - start);
+        let (before, number, after) = (&rest[..start], &rest[start..start + length], &rest[start + length..]);
+        let inside = |c: Option<char>| c.is_some_and(|c| c.is_alphanumeric() || "_/\\-".contains(c));
+        // A sign is no part of a word if none stands before it.
+        let left = before.strip_suffix('-').filter(|left| !inside(left.chars().last())).unwrap_or(before);
+        let apart = length > MOST_DIGITS && !inside(left.chars().last()) && !inside(after.chars().next());
+        whole.push_str(before);
+        match number.parse::<f64>() {
+            Ok(x) if apart && x.is_finite() => whole.push_str(&format!("{x:e}")),
+            _ => whole.push_str(number),
+        }
+        rest = after;
+    }
+    whole + rest
 }
 
 #[cfg(test)]
@@ -88,6 +124,22 @@ mod tests {
     #[test]
     fn one_is_singular() {
         assert_eq!([0, 1, 2].map(|n| counted(n, "row", "rows")), ["0 rows", "1 row", "2 rows"]);
+    }
+
+    #[test]
+    fn messages_hold_no_numbers_of_machines() {
+        let full = std::io::Error::from_raw_os_error(28);
+        assert!(
+            full.to_string().contains("os error") && !one_line(&format!("a: {full}; b: {full}")).contains("os error")
+        );
+        assert_eq!(one_line("x (os error 5), y (os error five)"), "x, y (os error five)");
+        let (huge, tiny) = (1e300, 1.5e-300);
+        assert_eq!(one_line(&format!("found {huge}, {tiny} and -{huge}")), "found 1e300, 1.5e-300 and -1e300");
+        for same in
+            [&format!("at most {}", u64::MAX), "runs/20261124130000000000001/x.csv", "a-0000000000000000000000001"]
+        {
+            assert_eq!(one_line(same), *same);
+        }
     }
 
     #[test]

@@ -2,10 +2,13 @@
 
 use crate::cli::recording_args::RecordingArgs;
 use crate::cli::{CliError, output};
-use crate::names::{WIDTH, counted, hundredths, percent, rounded, wrapped};
+use crate::configuration::Precision;
+use crate::names::{WIDTH, counted, percent, percentage, rounded, wrapped};
+use crate::pipeline::{FitOptions, PreparedFit};
 use crate::recording::survey::{FEW_SAMPLES, Kind, Survey, SurveyOptions, Suspicion, survey};
 use crate::recording::{LARGE_ERROR, Targets};
 use crate::report::text_table;
+use serde::Serialize;
 use std::fmt::Write;
 
 /// Jitter that is rounding of the times.
@@ -29,12 +32,24 @@ pub struct Args {
 /// A usage error for contradicting arguments, a data error for files that cannot be used.
 pub fn run(args: &Args) -> Result<(), CliError> {
     let reading = args.recording.read()?;
-    let found = survey(&reading, &SurveyOptions::default()).map_err(CliError::data)?;
+    let survey = survey(&reading, &SurveyOptions::default()).map_err(CliError::data)?;
+    // What a fit would begin with says whether it can begin.
+    let prepared = PreparedFit::new(&reading, &FitOptions::default());
+    let obstacle = prepared.and_then(|prepared| prepared.suggest("", Precision::F64)).err();
+    let found = Found { survey, obstacle: obstacle.map(|error| error.to_string()) };
     if args.json {
         let text = serde_json::to_string_pretty(&found).map_err(CliError::data)?;
         return output::print(&format!("{text}\n"));
     }
     output::print(&describe(&found))
+}
+
+/// A survey, and why no fit can learn from the data, if none can.
+#[derive(Serialize)]
+struct Found {
+    #[serde(flatten)]
+    survey: Survey,
+    obstacle: Option<String>,
 }
 
 /// A number with four digits.
@@ -48,15 +63,18 @@ fn unit(periodic: bool) -> &'static str {
 }
 
 /// The survey for people.
-fn describe(found: &Survey) -> String {
-    let mut text = headline(found) + &header(found);
+fn describe(Found { survey: found, obstacle }: &Found) -> String {
+    let mut text = match obstacle {
+        Some(obstacle) => format!("A fit cannot learn from these data: {obstacle}.\n\n"),
+        None => headline(found),
+    } + &header(found);
     let rows: Vec<Vec<String>> = found
         .coordinates
         .iter()
         .map(|c| {
             let bound = if c.noise_resolved { "" } else { "at most " };
             let noise = format!("{bound}{}", short(c.noise));
-            let range = [short(c.min), short(c.max), noise, hundredths(c.noise_relative)];
+            let range = [short(c.min), short(c.max), noise, percentage(c.noise_relative)];
             let motion = [c.velocity, c.acceleration, c.period, c.samples_per_period].map(short);
             [vec![c.name.clone(), unit(c.periodic).to_string()], range.to_vec(), motion.to_vec()].concat()
         })
@@ -80,7 +98,7 @@ fn describe(found: &Survey) -> String {
         .iter()
         .map(|c| {
             let numbers = [c.window_seconds, c.velocity_error, c.acceleration_error].map(short);
-            let ends = [hundredths(c.acceleration_error_relative)];
+            let ends = [percentage(c.acceleration_error_relative)];
             let names = [c.name.clone(), unit(c.periodic).to_string(), c.window.to_string()];
             [names.to_vec(), numbers.to_vec(), ends.to_vec()].concat()
         })
@@ -101,7 +119,10 @@ fn describe(found: &Survey) -> String {
         text += &section(&text_table(&["suspicious", "row", "coordinate", "value [its unit]", "what"], &rows));
         let _ = more(&mut text, found.suspicious_count, ("place", "places"));
     }
-    let _ = advice(&mut text, found);
+    match obstacle {
+        Some(_) => text += "\n",
+        None => advice(&mut text, found).unwrap_or_default(),
+    }
     for warning in &found.warnings {
         let _ = writeln!(text, "warning: {warning}");
     }
@@ -113,7 +134,7 @@ fn section(table: &str) -> String {
     format!("\n{table}")
 }
 
-/// A sentence that says if a fit can begin.
+/// A sentence that says how well a fit can learn.
 fn headline(found: &Survey) -> String {
     let worst = found.coordinates.iter().map(|c| c.acceleration_error_relative).fold(0.0, f64::max);
     let looked = match (found.warnings.len(), found.suspicious_count) {
@@ -122,9 +143,6 @@ fn headline(found: &Survey) -> String {
         (warnings, _) => format!("read {} at the end first", counted(warnings, "warning", "warnings")),
     };
     let good = match found.targets {
-        _ if !found.motionless.is_empty() => {
-            return "A fit cannot learn from these data: something stands still.\n\n".into();
-        }
         Targets::Measured => "the accelerations are measured".to_string(),
         Targets::Smoothed | Targets::Motion if worst.is_finite() => {
             format!("smoothing gives the accelerations to {}", percent(worst))
@@ -158,7 +176,7 @@ fn header(found: &Survey) -> String {
             [
                 vec![t.name.clone(), rows, t.samples.to_string()],
                 times.to_vec(),
-                vec![hundredths(if t.jitter < ROUNDING { 0.0 } else { t.jitter })],
+                vec![percentage(if t.jitter < ROUNDING { 0.0 } else { t.jitter })],
             ]
             .concat()
         })
@@ -226,10 +244,6 @@ fn advice(text: &mut String, found: &Survey) -> std::fmt::Result {
     let worst = found.coordinates.iter().map(|c| c.acceleration_error_relative).fold(0.0, f64::max);
     let limit = percent(LARGE_ERROR);
     writeln!(text)?;
-    if !found.motionless.is_empty() {
-        let names = found.motionless.join(", ");
-        return writeln!(text, "advice: nothing can be learned while {names} stands still: leave it out of --coords");
-    }
     match found.targets {
         Targets::Measured => writeln!(
             text,

@@ -1,6 +1,6 @@
 //! `lnn experiment`: the paper's tables and figures, one command each, whole or in shares; finished runs are not run again.
 
-use crate::cli::experiment_list::{Listed, list};
+use crate::cli::experiment_list::list;
 use crate::cli::files::require_free;
 use crate::cli::number::{thread_count, threads, whole};
 use crate::cli::shard::Shard;
@@ -16,7 +16,7 @@ use crate::pipeline::{
 use crate::recording::Columns;
 use crate::recording::read::read_recording;
 use crate::relativity::depends_on_time;
-use crate::report::{Curve, EXPERIMENT_HEADER, text_table};
+use crate::report::{Curve, text_table};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -118,9 +118,18 @@ impl Chosen {
         Ok(Some((configured, given)))
     }
 
-    /// Directory of an experiment.
-    fn directory(&self, experiment: &Experiment) -> PathBuf {
-        self.out.join(format!("{}-{}", experiment.name, self.scale().name()))
+    /// The runs of experiments in their directories, numbered on from one to the next.
+    fn work(&self, name: &str) -> Result<Vec<Work>, CliError> {
+        let mut numbers = 0..;
+        let work = |(experiment, runs): (&'static Experiment, Vec<Run>)| {
+            let path = self.out.join(format!("{}-{}", experiment.name, self.scale().name()));
+            let words = self.words(experiment);
+            let merge = format!("lnn experiment merge {words}");
+            let list = format!("lnn experiment {words} --list");
+            let runs = numbers.by_ref().zip(runs).collect();
+            Work { experiment, scale: self.scale(), path, runs, merge, list }
+        };
+        Ok(chosen_runs(self, name)?.into_iter().map(work).collect())
     }
 
     /// Words of a command about the same runs, behind a verb.
@@ -169,17 +178,65 @@ fn require_stationary(system: &SystemInstance<f64>) -> Result<(), CliError> {
 /// records that are missing, an interruption; runs that are finished stay finished.
 pub fn run(args: &Args) -> Result<(), CliError> {
     if let Some(Action::Merge { name, chosen }) = &args.action {
-        return merge(name, chosen);
+        return merge(chosen.work(name)?, &chosen.beside, chosen.json);
     }
     let chosen = &args.chosen;
     let Some(name) = &args.name else {
         return output::print(&listing(chosen.json));
     };
-    let all = numbered(chosen_runs(chosen, name)?);
+    let all = chosen.work(name)?;
     if args.list {
-        return listed(chosen, share(all, args.shard));
+        return print_list(share(all, args.shard), chosen.json);
     }
-    let shard = match args.shard {
+    let Args { threads, shard, overwrite, .. } = *args;
+    perform(all, &Orders { threads, shard, overwrite, beside: &chosen.beside, json: chosen.json })
+}
+
+/// Runs of an experiment in their directory.
+pub struct Work {
+    pub experiment: &'static Experiment,
+    pub scale: Scale,
+    /// Directory.
+    pub path: PathBuf,
+    /// Runs with their numbers.
+    pub runs: Vec<(usize, Run)>,
+    /// Commands that make the tables of all shares, and that list the runs.
+    pub merge: String,
+    pub list: String,
+}
+
+/// How runs are performed.
+pub struct Orders<'a> {
+    pub threads: Option<usize>,
+    pub shard: Option<Shard>,
+    pub overwrite: bool,
+    pub beside: &'a [(String, PathBuf)],
+    pub json: bool,
+}
+
+impl Work {
+    fn runs(&self) -> impl Iterator<Item = &Run> {
+        self.runs.iter().map(|(_, run)| run)
+    }
+
+    /// Name of the scale; none of a sweep, whose configurations stand as they are.
+    fn scale_name(&self) -> Option<&'static str> {
+        (!self.experiment.is_sweep()).then(|| self.scale.name())
+    }
+
+    /// Refuses tables that cannot be written, or that the command reads.
+    fn require_writable(&self, beside: &[(String, PathBuf)]) -> Result<(), CliError> {
+        let inputs: Vec<&Path> = beside.iter().map(|(_, file)| file.as_path()).collect();
+        WRITTEN.iter().try_for_each(|name| require_free(&self.path.join(name), &inputs, true))
+    }
+}
+
+/// Runs experiments, or a share of them.
+///
+/// # Errors
+/// As of [`run`].
+pub fn perform(all: Vec<Work>, orders: &Orders<'_>) -> Result<(), CliError> {
+    let shard = match orders.shard {
         Some(shard) => Some(shard),
         None => Shard::of_slurm(|name| std::env::var(name).ok()).map_err(CliError::usage)?.inspect(|shard| {
             output::note(&format!("share {shard} of the runs, by SLURM_ARRAY_TASK_ID; --shard 1/1 takes all of them"));
@@ -187,29 +244,30 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     };
     let shard = shard.filter(|shard| shard.is_part());
     let shares = share(all, shard);
-    for (experiment, runs) in &shares {
-        require_writable(chosen, experiment)?;
-        let path = chosen.directory(experiment);
-        if !args.overwrite {
-            if let Some(problem) = damaged(&path, runs.iter().map(|(_, run)| run))?.first() {
+    for work in &shares {
+        work.require_writable(orders.beside)?;
+        if !orders.overwrite {
+            if let Some(problem) = damaged(work)?.first() {
                 return Err(CliError::data(format_args!("{problem}; --overwrite makes its run again")));
             }
-            let replace = "--overwrite replaces it, or choose another --out";
-            require_same(&path, runs.iter().map(|(_, run)| run), replace)?;
+            require_same(work, "--overwrite replaces it, or choose another --out")?;
         }
     }
-    let curves = curves(chosen)?;
+    let curves = curves(orders.beside)?;
     let stop = interrupt::flag().map_err(CliError::signals)?;
-    for (experiment, runs) in shares {
-        let folder = ExperimentDirectory::new(&chosen.directory(experiment));
-        let (threads, watch) = (threads(args.threads), watch(&stop));
-        let runs: Vec<Run> = runs.into_iter().map(|(_, run)| run).collect();
-        let of = (experiment, chosen.scale());
+    for work in shares {
+        let folder = ExperimentDirectory::new(&work.path);
+        let (threads, watch) = (threads(orders.threads), watch(&stop));
+        let runs: Vec<Run> = work.runs().cloned().collect();
+        let of = (work.experiment, work.scale);
         match shard {
-            None => told(chosen, experiment, &run_experiment(of, runs, threads, &curves, &folder, &watch)?)?,
+            None => {
+                let done = run_experiment(of, runs, threads, &curves, &folder, &watch)?;
+                print_results(&work, &done, orders.json)?;
+            }
             Some(shard) => {
                 let results = finish_runs(of, runs, threads, &folder, &watch)?;
-                told_of_share(chosen, experiment, shard, results.len())?;
+                print_share(&work, shard, results.len(), orders.json)?;
             }
         }
     }
@@ -217,31 +275,30 @@ pub fn run(args: &Args) -> Result<(), CliError> {
 }
 
 /// Makes table, pictures and report of the records that are there.
-fn merge(name: &str, chosen: &Chosen) -> Result<(), CliError> {
-    let all = chosen_runs(chosen, name)?;
-    for (experiment, runs) in &all {
-        require_writable(chosen, experiment)?;
-        let same = "give the --scale and --seeds that the runs were made with";
-        require_same(&chosen.directory(experiment), runs.iter(), same)?;
+///
+/// # Errors
+/// As of [`run`].
+pub fn merge(all: Vec<Work>, beside: &[(String, PathBuf)], json: bool) -> Result<(), CliError> {
+    for work in &all {
+        work.require_writable(beside)?;
+        require_same(work, "give the options that the runs were made with, --scale and --seeds among them")?;
     }
-    let curves = curves(chosen)?;
+    let curves = curves(beside)?;
     let stop = interrupt::flag().map_err(CliError::signals)?;
     let mut left_out = Vec::new();
-    for (experiment, runs) in all {
-        let path = chosen.directory(experiment);
-        let folder = ExperimentDirectory::new(&path);
-        let of = (experiment, chosen.scale());
-        let damaged = damaged(&path, runs.iter())?;
+    for work in all {
+        let folder = ExperimentDirectory::new(&work.path);
+        let damaged = damaged(&work)?;
         damaged.iter().for_each(|problem| output::note(&format!("{problem}; its run is left out")));
         left_out.extend(damaged);
-        let done = merge_experiment(of, runs, &curves, &folder, &watch(&stop))
-            .map_err(|error| CliError::file(&path, error))?;
+        let runs = work.runs().cloned().collect();
+        let done = merge_experiment((work.experiment, work.scale), runs, &curves, &folder, &watch(&stop))
+            .map_err(|error| CliError::file(&work.path, error))?;
         if done.finished < done.results.len() {
             let open = counted(done.results.len() - done.finished, "run is", "runs are");
-            let words = chosen.words(experiment);
-            output::note(&format!("{open} not finished; `lnn experiment {words} --list` says which"));
+            output::note(&format!("{open} not finished; `{}` says which", work.list));
         }
-        told(chosen, experiment, &done)?;
+        print_results(&work, &done, json)?;
     }
     match left_out.split_first() {
         None => Ok(()),
@@ -252,30 +309,14 @@ fn merge(name: &str, chosen: &Chosen) -> Result<(), CliError> {
     }
 }
 
-/// Runs with their numbers, which count on from one experiment to the next.
-type Numbered = Vec<(&'static Experiment, Vec<(usize, Run)>)>;
-
-/// Gives every run its number, from 0.
-fn numbered(all: Vec<(&'static Experiment, Vec<Run>)>) -> Numbered {
-    let mut numbers = 0..;
-    all.into_iter().map(|(experiment, runs)| (experiment, numbers.by_ref().zip(runs).collect())).collect()
-}
-
 /// The runs of a share, of those experiments that have any in it.
-fn share(all: Numbered, shard: Option<Shard>) -> Numbered {
+pub fn share(all: Vec<Work>, shard: Option<Shard>) -> Vec<Work> {
     let Some(shard) = shard else { return all };
-    let of = |(experiment, mut runs): (&'static Experiment, Vec<(usize, Run)>)| {
-        runs.retain(|(number, _)| shard.holds(*number));
-        (experiment, runs)
+    let of = |mut work: Work| {
+        work.runs.retain(|(number, _)| shard.holds(*number));
+        work
     };
-    all.into_iter().map(of).filter(|(_, runs)| !runs.is_empty()).collect()
-}
-
-/// Refuses tables that cannot be written, or that the command reads.
-fn require_writable(chosen: &Chosen, experiment: &Experiment) -> Result<(), CliError> {
-    let inputs: Vec<&Path> = chosen.beside.iter().map(|(_, file)| file.as_path()).collect();
-    let path = chosen.directory(experiment);
-    WRITTEN.iter().try_for_each(|name| require_free(&path.join(name), &inputs, true))
+    all.into_iter().map(of).filter(|work| !work.runs.is_empty()).collect()
 }
 
 /// The experiments of a name, or all, with those of their runs that were asked for, if there are any.
@@ -313,13 +354,13 @@ fn chosen_runs(chosen: &Chosen, name: &str) -> Result<Vec<(&'static Experiment, 
 const MOST_SEEDS: usize = 10_000;
 
 /// Tables of an experiment, made anew of the records of its runs.
-const WRITTEN: [&str; 3] = ["table.csv", "curves.csv", "readings.csv"];
+const WRITTEN: [&str; 4] = ["table.csv", "runs.csv", "curves.csv", "readings.csv"];
 
 /// Refuses a directory with finished runs of other configurations than those asked for; `hint` says what to do then.
-fn require_same<'a>(path: &Path, runs: impl Iterator<Item = &'a Run>, hint: &str) -> Result<(), CliError> {
-    let store = ExperimentDirectory::new(path);
+fn require_same(work: &Work, hint: &str) -> Result<(), CliError> {
+    let store = ExperimentDirectory::new(&work.path);
     let mut others = Vec::new();
-    for run in runs {
+    for run in work.runs() {
         if matches!(kept_record(&store, run)?, KeptRecord::OtherConfiguration) {
             others.push(run.name.as_str());
         }
@@ -327,16 +368,16 @@ fn require_same<'a>(path: &Path, runs: impl Iterator<Item = &'a Run>, hint: &str
     let Some((first, more)) = others.split_first() else { return Ok(()) };
     let more = if more.is_empty() { String::new() } else { format!(" (and {} more)", more.len()) };
     let problem = format!("a finished run of another configuration is there{more}; {hint}");
-    Err(CliError::file(&path.join(first), problem))
+    Err(CliError::file(&work.path.join(first), problem))
 }
 
 /// Runs with files that cannot be read: each file and what is wrong with it.
-fn damaged<'a>(path: &Path, runs: impl Iterator<Item = &'a Run>) -> Result<Vec<String>, CliError> {
-    let store = ExperimentDirectory::new(path);
+fn damaged(work: &Work) -> Result<Vec<String>, CliError> {
+    let store = ExperimentDirectory::new(&work.path);
     let mut found = Vec::new();
-    for run in runs {
+    for run in work.runs() {
         if let KeptRecord::Damaged(file, problem) = kept_record(&store, run)? {
-            found.push(format!("{}: {problem}", path.join(&run.name).join(file).display()));
+            found.push(format!("{}: {problem}", work.path.join(&run.name).join(file).display()));
         }
     }
     Ok(found)
@@ -353,8 +394,8 @@ fn beside(text: &str) -> Result<(String, PathBuf), String> {
 }
 
 /// The curves from elsewhere.
-fn curves(chosen: &Chosen) -> Result<Vec<Curve>, CliError> {
-    chosen.beside.iter().map(curve).collect()
+fn curves(beside: &[(String, PathBuf)]) -> Result<Vec<Curve>, CliError> {
+    beside.iter().map(curve).collect()
 }
 
 /// A curve of loss against time from a file.
@@ -382,35 +423,32 @@ fn listing(json: bool) -> String {
 }
 
 /// Prints the runs with their states.
-fn listed(chosen: &Chosen, runs: Numbered) -> Result<(), CliError> {
-    let mut all = Vec::new();
-    for (experiment, runs) in runs {
-        all.extend(list(&chosen.directory(experiment), experiment.name, runs)?);
+///
+/// # Errors
+/// Standard output that cannot be written.
+pub fn print_list(works: Vec<Work>, json: bool) -> Result<(), CliError> {
+    let (mut rows, mut objects) = (Vec::new(), String::new());
+    for work in works {
+        let named = work.scale_name();
+        for run in list(&work.path, work.experiment.name, work.runs)? {
+            objects += &format!("{}\n", run.json(named));
+            rows.push(run.row());
+        }
     }
-    if chosen.json {
-        return output::print(
-            &all.iter().map(|run| format!("{}\n", run.json(chosen.scale().name()))).collect::<String>(),
-        );
-    }
-    let rows: Vec<Vec<String>> = all.iter().map(Listed::row).collect();
-    output::print(&text_table(&["number", "experiment", "run", "state"], &rows))
+    output::print(&if json { objects } else { text_table(&["number", "experiment", "run", "state"], &rows) })
 }
 
 /// Prints the table of an experiment.
-fn told(chosen: &Chosen, experiment: &Experiment, done: &ExperimentReport) -> Result<(), CliError> {
-    let report = chosen.directory(experiment).join("report.html");
-    if chosen.json {
-        let row = |cells: &Vec<String>| {
-            let named = EXPERIMENT_HEADER.iter().zip(cells);
-            named.map(|(name, cell)| (name.to_string(), cell.as_str().into())).collect::<serde_json::Map<_, _>>()
-        };
+fn print_results(work: &Work, done: &ExperimentReport, json: bool) -> Result<(), CliError> {
+    let report = work.path.join("report.html");
+    if json {
         let object = serde_json::json!({
-            "experiment": experiment.name,
-            "scale": chosen.scale().name(),
+            "experiment": work.experiment.name,
+            "scale": work.scale_name(),
             "runs": done.results.len(),
             "finished": done.finished,
             "training_seconds": done.training_seconds,
-            "rows": done.table.iter().map(row).collect::<Vec<_>>(),
+            "rows": done.table.objects(),
             "report": report.display().to_string(),
         });
         return output::print(&format!("{object}\n"));
@@ -419,17 +457,17 @@ fn told(chosen: &Chosen, experiment: &Experiment, done: &ExperimentReport) -> Re
 }
 
 /// Prints what became of a share of an experiment.
-fn told_of_share(chosen: &Chosen, experiment: &Experiment, shard: Shard, runs: usize) -> Result<(), CliError> {
-    if chosen.json {
-        let (name, scale) = (experiment.name, chosen.scale().name());
+fn print_share(work: &Work, shard: Shard, runs: usize, json: bool) -> Result<(), CliError> {
+    let (name, scale) = (work.experiment.name, work.scale_name());
+    if json {
         let object = serde_json::json!({
             "experiment": name, "scale": scale, "shard": shard.to_string(), "runs": runs, "finished": runs,
         });
         return output::print(&format!("{object}\n"));
     }
-    let (name, words) = (experiment.name, chosen.words(experiment));
     output::print(&format!(
-        "{name}: share {shard} is finished, {}; table and report of all shares by\nlnn experiment merge {words}\n",
-        counted(runs, "run", "runs")
+        "{name}: share {shard} is finished, {}; table and report of all shares by\n{}\n",
+        counted(runs, "run", "runs"),
+        work.merge
     ))
 }

@@ -74,7 +74,7 @@ impl Listed {
     }
 
     /// The same as an object.
-    pub fn json(&self, scale: &str) -> Value {
+    pub fn json(&self, scale: Option<&str>) -> Value {
         let (state, owner) = match &self.state {
             State::Finished => ("finished", None),
             State::OtherConfiguration => ("other-configuration", None),

@@ -2,6 +2,7 @@
 
 use crate::cli::CliError;
 use crate::cli::chosen::{self, learned_system};
+use crate::cli::input::is_standard;
 use crate::lagrangian::{SystemInstance, configure_system, configure_values, find};
 use crate::network::NetworkLagrangian;
 use crate::network::file::{Header, ModelFile};
@@ -21,8 +22,11 @@ pub struct Learned<S> {
 /// The file of a model that is given by its file or by the directory of its run.
 ///
 /// # Errors
-/// A data error for a directory without a model.
+/// A data error for a directory without a model, a usage error for standard input.
 pub fn model_file(path: &Path) -> Result<PathBuf, CliError> {
+    if is_standard(path) {
+        return Err(CliError::usage("-: expected a model's file or the directory of a run, not standard input"));
+    }
     Ok(pipeline::model_file(path)?)
 }
 

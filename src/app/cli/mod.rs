@@ -55,6 +55,7 @@ mod spool;
 mod states;
 mod subject;
 mod surfaces;
+mod sweep;
 mod symmetries;
 mod systems;
 mod tensors;
@@ -67,12 +68,15 @@ pub use config::parse as parse_config;
 pub use error::{CliError, Kind};
 pub use states::{States, StatesError, parse_states};
 
-use crate::names::{WIDTH, wrapped};
+use crate::names::{WIDTH, one_line, wrapped};
 use clap::{CommandFactory, Parser, Subcommand};
 use misunderstood::misunderstood;
 use std::ffi::OsString;
 use std::io::Write;
 use std::process::ExitCode;
+use tracing_subscriber::fmt::FmtContext;
+use tracing_subscriber::fmt::format::{FormatEvent, FormatFields, Writer};
+use tracing_subscriber::registry::LookupSpan;
 
 /// Beginnings: the three things most people want to do, with a line each to copy.
 const BEGINNINGS: &str = "\
@@ -110,6 +114,8 @@ enum Command {
     Evaluate(evaluate::Args),
     /// Regenerate a table or figure of the paper, or list them.
     Experiment(experiment::Args),
+    /// Train over the values of some keys of a configuration, and gather the runs in tables.
+    Sweep(sweep::Args),
     /// Print the Euler-Lagrange terms of states, every digit of them.
     Inspect(inspect::Args),
     /// Print metric, Christoffel symbols and curvature of points, every digit of them.
@@ -171,6 +177,7 @@ fn run(command: Command, words: &[OsString]) -> Result<(), CliError> {
         Command::Rollout(args) => rollout::run(&args),
         Command::Evaluate(args) => evaluate::run(&args),
         Command::Experiment(args) => experiment::run(&args),
+        Command::Sweep(args) => sweep::run(&args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Geometry(args) => geometry::run(&args),
         Command::Shadow(args) => shadow::run(&args),
@@ -211,21 +218,48 @@ fn report(error: &CliError) {
     let _ = writeln!(std::io::stderr(), "error: {error}");
 }
 
-/// Diagnostics go to standard error, chosen by the environment variable `LNN_LOG` (such as `debug`).
+/// Warnings of this program go to standard error as lines like its errors; the environment variable `LNN_LOG` (such as `debug`) chooses
+/// more, with times and modules.
 fn watch_log() -> Result<(), CliError> {
     use tracing_subscriber::Layer as _;
     use tracing_subscriber::filter::{LevelFilter, Targets};
     use tracing_subscriber::layer::SubscriberExt as _;
     use tracing_subscriber::util::SubscriberInitExt as _;
-    let filter = match std::env::var("LNN_LOG") {
-        Ok(text) => text.parse::<Targets>().map_err(|e| CliError::usage(format_args!("LNN_LOG: {e}")))?,
-        Err(std::env::VarError::NotPresent) => Targets::new().with_default(LevelFilter::WARN),
+    let lines = tracing_subscriber::fmt::layer().with_writer(std::io::stderr);
+    let lines = match std::env::var("LNN_LOG") {
+        Ok(text) => {
+            let filter = text.parse::<Targets>().map_err(|e| CliError::usage(format_args!("LNN_LOG: {e}")))?;
+            lines.with_filter(filter).boxed()
+        }
+        Err(std::env::VarError::NotPresent) => {
+            let own = Targets::new().with_target(env!("CARGO_CRATE_NAME"), LevelFilter::WARN);
+            lines.event_format(PlainWarning).with_filter(own).boxed()
+        }
         Err(error) => return Err(CliError::usage(format_args!("LNN_LOG: {error}"))),
     };
-    let lines = tracing_subscriber::fmt::layer().with_writer(std::io::stderr).with_filter(filter);
     // Already installed when several commands run in one process (tests): keep the first.
     let _ = tracing_subscriber::registry().with(lines).try_init();
     Ok(())
+}
+
+/// A warning as one line for a person: `warning: ...`.
+struct PlainWarning;
+
+impl<S, N> FormatEvent<S, N> for PlainWarning
+where
+    S: tracing::Subscriber + for<'a> LookupSpan<'a>,
+    N: for<'a> FormatFields<'a> + 'static,
+{
+    fn format_event(
+        &self,
+        context: &FmtContext<'_, S, N>,
+        mut writer: Writer<'_>,
+        event: &tracing::Event<'_>,
+    ) -> std::fmt::Result {
+        let mut text = String::new();
+        context.field_format().format_fields(Writer::new(&mut text), event)?;
+        writeln!(writer, "warning: {}", one_line(&text))
+    }
 }
 
 #[cfg(test)]

@@ -105,8 +105,8 @@ impl Watch {
             ];
             for (what, names, values) in parts {
                 let picture = self.picture(what, names, values, time_unit)?;
-                let caption = format!("{what} against time.");
-                report = report.figures(&[Figure { file: String::new(), picture, caption }]);
+                let heading = format!("{what} against time");
+                report = report.figures(&[Figure { file: String::new(), heading, picture, caption: String::new() }]);
             }
             report.to_html().into_bytes()
         } else {

@@ -1,6 +1,6 @@
 //! Facts of `lnn shadow`, as text or as a JSON object.
 
-use crate::names::{counted, hundredths, rounded};
+use crate::names::{counted, percentage, rounded};
 use crate::relativity::{Camera, Difference, Image, Outline, RelativityError, Shadow, Tracing};
 use crate::report::text_table;
 use serde_json::{Map, Value, json};
@@ -142,8 +142,8 @@ impl Facts<'_> {
             text += &format!(
                 "\n{} % of the pixels have another colour, {} % are in the shadow of one alone; places on the sky differ by {} degrees in the \
                  median, 99 % by less than {}.\n",
-                hundredths(pixels),
-                hundredths(difference.shadow),
+                percentage(pixels),
+                percentage(difference.shadow),
                 rounded(difference.median.to_degrees(), 2),
                 rounded(difference.most.to_degrees(), 2)
             );

@@ -1,7 +1,7 @@
 //! States from CSV files.
 
 use crate::names::{counted, nearest, unknown};
-use crate::recording::read::{Separator, comment, names_in, split};
+use crate::recording::read::{Separator, comment, line_end, names_in, split};
 use crate::scalar::Scalar;
 use thiserror::Error;
 
@@ -93,7 +93,7 @@ pub enum StatesError {
 /// then velocities) in any order; the last comment above numbers may do so too. What stands in other columns, such as the time
 /// and the energy of a roll-out, is left out. Fields are separated by commas, semicolons, tabs, bars or blanks, as in that line;
 /// spaces around them, double quotes, a byte order mark, blank lines and
-/// Windows line ends are accepted. Numbers are read in the precision of `S`: a double-double sees the decimal text, not
+/// the line ends of Windows and of old Macs are accepted. Numbers are read in the precision of `S`: a double-double sees the decimal text, not
 /// its nearest `f64`.
 ///
 /// # Errors
@@ -134,7 +134,9 @@ fn opened<'a>(bytes: &'a [u8], asked: &str) -> Result<Columns<'a>, StatesError> 
         let row = 1 + bytes[..e.valid_up_to()].iter().filter(|b| **b == b'\n').count();
         StatesError::NotText(row)
     })?;
-    let rows = || text.lines().enumerate().map(|(k, line)| (k + 1, line)).filter(|(_, line)| !line.trim().is_empty());
+    let end = char::from(line_end(bytes));
+    let rows =
+        move || text.split(end).enumerate().map(|(k, line)| (k + 1, line)).filter(|(_, line)| !line.trim().is_empty());
     let remark = |line: &str| comment(line.trim().as_bytes()).is_some();
     let mut lines = rows().filter(move |(_, line)| !remark(line)).peekable();
     let above = rows().take_while(|(_, line)| remark(line)).last();
@@ -250,6 +252,8 @@ mod tests {
             "theta1 | theta2 | theta1_dot | theta2_dot\n1|-2|3|4.5\n",
             "  theta1  theta2 theta1_dot theta2_dot\n   1 -2   3 4.5\n",
             "# theta1 theta2 theta1_dot theta2_dot\n1 -2 3 4.5\n",
+            "theta1,theta2,theta1_dot,theta2_dot\r1,-2,3,4.5\r",
+            "theta1,theta2,theta1_dot,theta2_dot\r\n1,-2,3,4.5\r\n",
         ] {
             let states = parse_states::<f64>(text.as_bytes(), &columns()).unwrap();
             assert_eq!((states.q, states.v, states.rows), (expected.q.clone(), expected.v.clone(), vec![2]), "{text}");

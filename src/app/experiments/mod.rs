@@ -11,10 +11,12 @@ mod physical;
 mod presets;
 mod record;
 mod remarks;
+mod sweep;
 
 pub use budget::Scale;
 pub use record::{Learned, Outcome, Record, Row, Spread};
 pub use remarks::{Quantity, Reduction};
+pub use sweep::{SWEEP, Variation, combinations, sweep_runs};
 
 use crate::configuration::Config;
 use crate::lagrangian::SystemInstance;
@@ -138,6 +140,11 @@ impl Experiment {
     /// `true` if black holes are read off its models.
     pub fn reads_holes(&self) -> bool {
         self.pictures.contains(&Picture::BlackHole)
+    }
+
+    /// `true` for runs over configurations of the user's, which no paper has.
+    pub fn is_sweep(&self) -> bool {
+        self.name == SWEEP.name
     }
 
     /// The runs at a scale, each for `seeds` seeds from 0; runs that the paper itself repeats keep their own seeds apart.

@@ -63,11 +63,13 @@ pub struct Record {
     pub seconds: f64,
 }
 
-/// Mean and range of a quantity over the runs of a row.
+/// Mean, median and range of a quantity over the runs of a row.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spread {
     /// Mean.
     pub mean: f64,
+    /// Median.
+    pub median: f64,
     /// Lowest.
     pub low: f64,
     /// Highest.
@@ -77,13 +79,12 @@ pub struct Spread {
 impl Spread {
     /// Of some values; `None` of none.
     pub fn of(values: impl IntoIterator<Item = f64>) -> Option<Self> {
-        let values: Vec<f64> = values.into_iter().collect();
-        let (first, rest) = values.split_first()?;
-        Some(Self {
-            mean: values.iter().sum::<f64>() / values.len() as f64,
-            low: rest.iter().fold(*first, |m, &x| m.min(x)),
-            high: rest.iter().fold(*first, |m, &x| m.max(x)),
-        })
+        let mut values: Vec<f64> = values.into_iter().collect();
+        let mean = values.iter().sum::<f64>() / values.len() as f64;
+        values.sort_by(f64::total_cmp);
+        let (low, high) = (*values.first()?, *values.last()?);
+        let median = 0.5 * (values[(values.len() - 1) / 2] + values[values.len() / 2]);
+        Some(Self { mean, median, low, high })
     }
 }
 
@@ -198,11 +199,11 @@ mod tests {
         assert_eq!(rows.iter().map(|r| r.label.as_str()).collect::<Vec<_>>()[..2], ["GELU", "x tanh(kx)"]);
         let gelu = &rows[0];
         assert_eq!((gelu.runs, gelu.failed, gelu.integrated), (2, 0, (3, 4)));
-        assert_eq!(gelu.loss, Some(Spread { mean: 0.2, low: 0.1, high: 0.3 }));
+        assert_eq!(gelu.loss, Some(Spread { mean: 0.2, median: 0.2, low: 0.1, high: 0.3 }));
         let energy = gelu.energy.unwrap();
         assert!((energy.mean - 0.4).abs() < 1e-15 && (energy.low, energy.high) == (0.1, 0.6));
-        assert_eq!(gelu.regular_energy, Some(Spread { mean: 0.3, low: 0.1, high: 0.5 }));
-        assert_eq!(gelu.chaotic_energy, Some(Spread { mean: 0.6, low: 0.6, high: 0.6 }));
+        assert_eq!(gelu.regular_energy, Some(Spread { mean: 0.3, median: 0.3, low: 0.1, high: 0.5 }));
+        assert_eq!(gelu.chaotic_energy, Some(Spread { mean: 0.6, median: 0.6, low: 0.6, high: 0.6 }));
         assert!((gelu.normalised_instability.unwrap().mean - 0.2).abs() < 1e-15);
         assert_eq!(gelu.reported.loss, Some(0.00738));
         assert_eq!((rows[1].runs, rows[1].failed, rows[1].loss), (1, 1, None));

@@ -14,7 +14,7 @@ use crate::pipeline::attention::Attention;
 use crate::pipeline::physics::{Physics, Subject};
 use crate::pipeline::{PipelineError, Watch, memory};
 use crate::random::RngStream;
-use crate::report::{Figure, Fit, GridComparison, evaluation_figures, grid_figures};
+use crate::report::{Figure, Fit, GridComparison, evaluation_figures, grid_figures, units};
 use crate::rollout::{Domain, Trajectory};
 use serde::Serialize;
 
@@ -52,9 +52,12 @@ pub struct Evaluation {
     /// Names of the accelerations' coordinates, with the accelerations' units.
     #[serde(skip)]
     pub(crate) coordinates: Vec<String>,
-    /// Unit of all coordinates together.
+    /// Units of the coordinates, each with the coordinates that have it.
     #[serde(skip)]
-    pub(crate) unit: String,
+    pub(crate) units: Vec<(String, Vec<usize>)>,
+    /// Time for which predictions were tested.
+    #[serde(skip)]
+    pub(crate) tested: f64,
     /// Unit of times.
     #[serde(skip)]
     pub(crate) time_unit: String,
@@ -189,6 +192,7 @@ pub fn evaluate(
         columns: system.system.columns(n),
         labels: system.system.labels(n),
         motion: portraits.first().map(|portrait| &portrait.learned),
+        recorded: None,
         threads: plan.threads,
     };
     let mut physics = Physics::nothing(&subject);
@@ -213,10 +217,8 @@ pub fn evaluate(
             .iter()
             .map(|c| format!("{} [{}/{}^2]", c.name, c.unit, system.system.time_unit))
             .collect(),
-        unit: match coordinates.iter().find(|c| c.unit != coordinates[0].unit) {
-            None => coordinates[0].unit.to_string(),
-            Some(_) => "its unit".to_string(),
-        },
+        units: units(system),
+        tested: t_end,
         time_unit: system.system.time_unit.to_string(),
         conserved: system.system.conserved.map(|conserved| conserved.name),
         figures,
@@ -260,11 +262,15 @@ fn grids(
     let impose = |q: &[f64], v: &mut [f64]| system.impose_constraint(q, v).unwrap_or_else(|_| v.fill(f64::NAN));
     let lagrangian = |model: &dyn EulerLagrange<f64>| lagrangian_grid(model, &rest, axes);
     let determinant = |model: &dyn EulerLagrange<f64>, state: &[f64]| determinant_grid(model, state, axes, impose);
+    let heading = if n > 1 {
+        "The Lagrangian at rest, \u{2212}V: learned beside exact"
+    } else {
+        "The Lagrangian: learned beside exact"
+    };
     let mut pairs = vec![
-        ("L", "lagrangian", fixed(system, &rest, axes, false), lagrangian(exact), lagrangian(learned)),
+        (["L", "lagrangian", heading], fixed(system, &rest, axes, false), lagrangian(exact), lagrangian(learned)),
         (
-            "det M",
-            "det_mass_matrix",
+            ["det M", "det_mass_matrix", "The determinant of the mass matrix: learned beside exact"],
             fixed(system, &rest, axes, true),
             determinant(exact, &rest),
             determinant(learned, &rest),
@@ -272,17 +278,17 @@ fn grids(
     ];
     if n > 1 {
         pairs.push((
-            "Fast det M",
-            "det_mass_matrix_fast",
+            ["Fast det M", "det_mass_matrix_fast", "The determinant of the mass matrix at high velocities"],
             fixed(system, &fast, axes, true),
             determinant(exact, &fast),
             determinant(learned, &fast),
         ));
     }
     let mut figures = Vec::new();
-    for (quantity, file, fixed, exact, learned) in pairs {
+    for ([quantity, file, heading], fixed, exact, learned) in pairs {
         let comparison = GridComparison {
             quantity: quantity.to_string(),
+            heading: heading.to_string(),
             file: file.to_string(),
             x_label: labels[shown[0]].clone(),
             y_label: labels[shown[1]].clone(),

@@ -1,12 +1,12 @@
 //! Tables, report and `evaluation.json` of an evaluation.
 
-use crate::analysis::MassMatrixError;
+use crate::analysis::{MassMatrixError, Statistics};
 use crate::lagrangian::SystemInstance;
-use crate::names::{WIDTH, hundredths, number, rounded, wrapped};
+use crate::names::{WIDTH, number, percentage, rounded, wrapped};
 use crate::pipeline::evaluation::Evaluation;
 use crate::pipeline::report_files::{parameter_table, write_report_and_figures};
 use crate::pipeline::{Output, PipelineError, headline};
-use crate::report::{Report, text_table};
+use crate::report::{Figure, Report, text_table};
 use serde::Serialize;
 use std::fmt::Write as _;
 
@@ -50,7 +50,7 @@ impl Evaluation {
         let report = self
             .summarise(Report::new(&title), &system.system.title)
             .paragraph(&format!("Model {model}, starts of seed {seed}."));
-        let report = self.report(parameter_table(report, system));
+        let report = self.report(parameter_table(self.pictures(report), system));
         write_report_and_figures(output, &report, self.figures.iter().chain(&self.physics.figures))?;
         Ok(json)
     }
@@ -67,12 +67,19 @@ impl Evaluation {
         let of_unit = |measure: &str| format!("{measure} [{}]", unit.unwrap_or(&"its unit"));
         let trajectories = self.trajectories.iter().enumerate().map(|(k, motion)| {
             let t = &motion.summary;
-            let fastest = t.velocity_error.iter().fold(f64::NAN, |m, v| m.max(v.max));
             let valid = format!("{}{}", number(t.valid.time), if t.valid.at_least { "+" } else { "" });
             let mut row = vec![(k + 1).to_string(), format!("{:.1}", t.compared_until), valid];
-            row.extend([t.coordinate_error.mean, t.coordinate_error.max, fastest].map(number));
-            row.extend([t.energy_error.mean, t.energy_error.max].map(hundredths));
-            row.extend(motion.conserved_error.map(|conserved| hundredths(conserved.max)));
+            // Of coordinates of one unit the worst.
+            for (_, members) in &self.units {
+                let worst = |errors: &[Statistics], part: fn(&Statistics) -> f64| {
+                    members.iter().filter_map(|&i| errors.get(i)).map(part).fold(f64::NAN, f64::max)
+                };
+                let coordinates =
+                    [|s: &Statistics| s.mean, |s: &Statistics| s.max].map(|part| worst(&t.coordinate_error, part));
+                row.extend(coordinates.into_iter().chain([worst(&t.velocity_error, |s| s.max)]).map(number));
+            }
+            row.extend([t.energy_error.mean, t.energy_error.max].map(percentage));
+            row.extend(motion.conserved_error.map(|conserved| percentage(conserved.max)));
             let time = t.lyapunov_exponent.filter(|exponent| *exponent > 0.0).map(f64::recip);
             row.push(time.map_or(NONE.to_string(), |time| rounded(time, 2)));
             let exact = t.reference_stopped.as_ref().map(|stop| format!("exact motion: {stop}"));
@@ -82,16 +89,23 @@ impl Evaluation {
         });
         let t_end = self.trajectories.iter().fold(0.0, |m: f64, motion| m.max(motion.summary.compared_until));
         let MassMatrixError { factor, error: m } = &self.mass_matrix;
-        let matrix = [m.mean, m.median, m.p99, m.max].map(hundredths);
+        let matrix = [m.mean, m.median, m.p99, m.max].map(percentage);
         let matrix = [vec![number(*factor)], matrix.to_vec(), vec![m.failed.to_string()]].concat();
         let header = |names: &[&str]| names.iter().map(ToString::to_string).collect();
         let until = format!("until [{}]", self.time_unit);
         let lyapunov = format!("Lyapunov time [{}]", self.time_unit);
         let conserved = self.conserved.map(|_| "conserved, max [%]");
-        let [mean, most] = ["mean", "max"].map(|which| format!("coordinates, {which} [{}]", self.unit));
-        let fastest = format!("velocities, max [{}/{}]", self.unit, self.time_unit);
         let valid = format!("valid [{}]", self.time_unit);
-        let mut motions = vec!["start", &until, &valid, &mean, &most, &fastest, "energy, mean [%]", "energy, max [%]"];
+        let errors: Vec<String> = self
+            .units
+            .iter()
+            .flat_map(|(unit, _)| {
+                let [mean, most] = ["mean", "max"].map(|which| format!("coordinates, {which} [{unit}]"));
+                [mean, most, format!("velocities, max [{unit}/{}]", self.time_unit)]
+            })
+            .collect();
+        let mut motions = vec!["start", &until, &valid];
+        motions.extend(errors.iter().map(String::as_str).chain(["energy, mean [%]", "energy, max [%]"]));
         motions.extend(conserved.into_iter().chain([lyapunov.as_str(), "remarks"]));
         let mut about = String::from("Trajectories from random starts against exact motion");
         if let Some(name) = self.conserved {
@@ -101,14 +115,15 @@ impl Evaluation {
             let (time, unit) = (t_end / t_end.ln(), &self.time_unit);
             let _ = write!(about, "; motion without chaos has a Lyapunov time of about {time:.0} {unit}");
         }
-        let common = self.physics.common_ground.as_ref().map(|common| {
-            let powers: Vec<String> = common.factors.iter().map(|factor| number(*factor)).collect();
-            let distances = common.left().map(|(_, distance)| hundredths(distance));
-            let left = common.left().map(|(name, _)| format!("{name} [%]"));
+        let equivalence = self.physics.equivalence.as_ref().map(|found| {
+            let powers: Vec<String> = found.factors.iter().map(|factor| number(*factor)).collect();
+            let differences = found.differences().map(|(_, difference)| percentage(difference));
+            let names = found.differences().map(|(name, _)| format!("{name} [%]"));
             Table {
-                title: "What is left of the learned Lagrangian beside factor and gauge of the exact one".into(),
-                header: [vec!["factor [1]".to_string()], left.to_vec(), vec!["states [1]".into()]].concat(),
-                rows: vec![[vec![powers.join("; ")], distances.to_vec(), vec![common.states.to_string()]].concat()],
+                title: "Difference of the learned Lagrangian from the exact one, after the best factor and gauge term"
+                    .into(),
+                header: [vec!["factor [1]".to_string()], names.to_vec(), vec!["states [1]".into()]].concat(),
+                rows: vec![[vec![powers.join("; ")], differences.to_vec(), vec![found.states.to_string()]].concat()],
             }
         });
         let tables = [
@@ -125,7 +140,7 @@ impl Evaluation {
             },
             Table { title: about, header: header(&motions), rows: trajectories.collect() },
         ];
-        common.into_iter().chain(tables).collect()
+        equivalence.into_iter().chain(tables).collect()
     }
 
     /// Headline and tables for a terminal, of a model of the system called `title`.
@@ -154,7 +169,16 @@ impl Evaluation {
         headline::of_evaluation(title, self).begin(report)
     }
 
-    /// Tables and pictures for a report.
+    /// Pictures for a report, of the motion first.
+    pub(crate) fn pictures(&self, report: Report) -> Report {
+        let of_motion = |figure: &&Figure| !["lagrangian", "det_"].iter().any(|word| figure.file.starts_with(word));
+        let (motion, functions): (Vec<&Figure>, Vec<&Figure>) = self.figures.iter().partition(of_motion);
+        let report = report.section("Predicted motion beside the exact one", motion);
+        report
+            .section("The learned functions beside the exact ones", functions.into_iter().chain(&self.physics.figures))
+    }
+
+    /// Tables for a report.
     pub(crate) fn report(&self, mut report: Report) -> Report {
         for Table { title, header, rows } in self.tables() {
             report = report.heading(&title).table(&header, &rows);
@@ -163,6 +187,6 @@ impl Evaluation {
         if !note.is_empty() {
             report = report.paragraph(note.trim());
         }
-        self.physics.report(report.heading("Learned against exact").figures(&self.figures))
+        self.physics.report(report)
     }
 }

@@ -155,7 +155,7 @@ fn make(
         _ if judged_or_empty && watch.is_interrupted() => return Ok(None),
         Ok(trained) => {
             if let StopReason::Failed(error) = &trained.stop {
-                tracing::warn!(run = run.name, %error, "training stopped early");
+                tracing::warn!("{}: training stopped early: {error}", run.name);
             }
             if experiment.reads_holes() {
                 read_hole(run, &trained.network, (scale, threads), output, &watch)?;

@@ -5,9 +5,10 @@ use crate::names::{WIDTH, counted, wrapped};
 use crate::pipeline::experiment_directory::ExperimentDirectory;
 use crate::pipeline::readings::{RowOfHoles, rows_of_holes};
 use crate::pipeline::run_figures::{pictures_of_runs, within};
+use crate::pipeline::run_table::run_table;
 use crate::pipeline::{Output, PipelineError, Watch, headline};
 use crate::report::{
-    Curve, EXPERIMENT_HEADER, READING_HEADER, REDUCTION_HEADER, Report, experiment_curves, experiment_figures,
+    Curve, DataTable, READING_HEADER, REDUCTION_HEADER, Report, experiment_curves, experiment_figures,
     experiment_table, experiment_view, reduction_table, text_table,
 };
 use std::fmt::Write as _;
@@ -21,8 +22,8 @@ pub type Results = Vec<(Run, Option<Record>)>;
 pub struct ExperimentReport {
     /// Runs with their records.
     pub results: Results,
-    /// Cells of `table.csv`, under [`EXPERIMENT_HEADER`].
-    pub table: Vec<Vec<String>>,
+    /// The table of `table.csv`.
+    pub table: DataTable,
     /// Runs that are finished.
     pub finished: usize,
     /// Seconds of training of all runs.
@@ -57,7 +58,8 @@ pub(crate) fn conclude(
     let mut curves = experiment_curves(&results);
     curves.extend_from_slice(beside);
     let output = store.open_tables()?;
-    output.write("table.csv", csv(&table).as_bytes())?;
+    output.write("table.csv", table.to_csv().as_bytes())?;
+    output.write("runs.csv", run_table(&results, store)?.to_csv().as_bytes())?;
     if experiment.is_timed() {
         output.write("curves.csv", curves_csv(&curves).as_bytes())?;
     }
@@ -66,22 +68,28 @@ pub(crate) fn conclude(
     let training: f64 = results.iter().filter_map(|(_, record)| record.as_ref()).map(|record| record.seconds).sum();
     let finished = results.iter().filter(|(_, record)| record.is_some()).count();
     let of_all = if finished == results.len() { String::new() } else { format!(", {finished} of them finished") };
-    let budget = format!("Scale {}, {}{of_all}", scale.name(), counted(results.len(), "run", "runs"));
+    let runs = counted(results.len(), "run", "runs");
+    let budget = if experiment.is_sweep() {
+        format!("{runs}{of_all}")
+    } else {
+        format!("Scale {}, {runs}{of_all}", scale.name())
+    };
     let headline = headline::of_experiment(&rows);
-    let report = headline
-        .begin(Report::new(experiment.title))
-        .paragraph(&format!("Regenerates: {}.", experiment.paper))
-        .paragraph(&format!("The paper: {}", experiment.finding))
-        .paragraph(&format!("{budget}."))
-        .table(&header, &view)
-        .paragraph(CONVENTIONS);
+    let report = headline.begin(Report::new(experiment.title));
+    let report = if experiment.is_sweep() {
+        report
+    } else {
+        let report = report.paragraph(&format!("Regenerates: {}.", experiment.paper));
+        report.paragraph(&format!("The paper: {}", experiment.finding))
+    };
+    let report = report.paragraph(&format!("{budget}.")).section("Pictures of all runs", &figures);
+    let holes = rows_of_holes(experiment, &results, store, &output, watch)?;
+    let report = holes.iter().fold(within(taken, report), |report, row| row.add_to(report));
+    let report = report.heading("Losses and errors").table(&header, &view).paragraph(CONVENTIONS);
     let remarks = experiment.remarks(&results.iter().map(|(run, _)| run).collect::<Vec<_>>());
     let reductions = reduction_table(&experiment.reductions(&results));
     let report = remarks.iter().fold(report, |report, remark| report.paragraph(remark));
     let report = if reductions.is_empty() { report } else { report.table(&REDUCTION_HEADER, &reductions) };
-    let holes = rows_of_holes(experiment, &results, store, &output, watch)?;
-    let report = holes.iter().fold(report, |report, row| row.add_to(report));
-    let report = within(taken, report.figures(&figures));
     output.write("report.html", report.to_html().as_bytes())?;
     figures.iter().try_for_each(|figure| output.write(&figure.file, figure.picture.to_svg().as_bytes()))?;
     drop(output);
@@ -121,13 +129,4 @@ fn curves_csv(curves: &[Curve]) -> String {
         }
     }
     csv
-}
-
-/// Comma-separated values; cells hold brackets and words, so all are quoted.
-fn csv(table: &[Vec<String>]) -> String {
-    let line = |cells: &mut dyn Iterator<Item = &str>| {
-        cells.map(|cell| format!("\"{}\"", cell.replace('"', "\"\""))).collect::<Vec<_>>().join(",") + "\n"
-    };
-    let rows = table.iter().map(|row| line(&mut row.iter().map(String::as_str)));
-    line(&mut EXPERIMENT_HEADER.into_iter()) + &rows.collect::<String>()
 }

@@ -6,3 +6,5 @@ pub const MODEL: &str = "model.safetensors";
 pub const CAPTIONS: &str = "captions.json";
 /// Name of the file that a finished run of an experiment has.
 pub const RECORD: &str = "record.json";
+/// Name of the file with the figures of a run.
+pub const SUMMARY: &str = "summary.json";

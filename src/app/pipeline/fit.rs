@@ -16,7 +16,7 @@ use crate::pipeline::report_files::history;
 use crate::pipeline::start::{StartModel, weights};
 use crate::pipeline::train::{RunOptions, write_model};
 use crate::pipeline::{Event, Output, PipelineError, Watch, memory};
-use crate::recording::Targets;
+use crate::recording::{Recording, Targets};
 use crate::scalar::Scalar;
 use crate::shooting::{self, Task};
 use crate::storage::container::checksum;
@@ -169,8 +169,9 @@ fn fit_in<S: Scalar>(
         trained: &trained_on(&model.header),
         system: None,
         columns: model.header.columns.clone(),
-        labels: names.clone(),
+        labels: labels(recording),
         motion: None,
+        recorded: Some(&measured.training.recording),
         threads,
     };
     // The flag that ended the training does not end the judgement of its model.
@@ -202,6 +203,20 @@ fn checksums<S: Scalar>(measured: &RecordingSplit, data: &Datasets<S>) -> Vec<(S
     let numbers = tracks.flat_map(|track| [&track.times, &track.q, &track.v, &track.a, &track.force]).flatten();
     let recorded = ("recorded motion".to_string(), checksum(numbers, StoredPrecision::F64));
     data.checksums().into_iter().chain([recorded]).collect()
+}
+
+/// Labels of axes for coordinates and velocities.
+fn labels(recording: &Recording) -> Vec<String> {
+    let units = |per: &'static str| {
+        let pairs = recording.coordinates.iter().zip(&recording.periodic);
+        pairs.map(move |(name, angle)| match (*angle, per) {
+            (true, "") => format!("{name} [rad]"),
+            (true, _) => format!("{name}_dot [rad/s]"),
+            (false, "") => format!("{name} [SI]"),
+            (false, _) => format!("{name}_dot [SI]"),
+        })
+    };
+    units("").chain(units("/s")).collect()
 }
 
 /// Columns of recorded forces as a model remembers them; numbers of columns are no names.

@@ -1,14 +1,14 @@
 //! Results of `lnn fit`: `summary.json`, tables for a terminal, report.
 
 use crate::configuration::Config;
-use crate::names::{WIDTH, counted, hundredths, number, wrapped};
+use crate::names::{WIDTH, counted, number, percentage, wrapped};
 use crate::pipeline::determination::Determined;
 use crate::pipeline::hold_out::HoldOut;
 use crate::pipeline::physics::Physics;
 use crate::pipeline::prepared_fit::PreparedFit;
 use crate::pipeline::report_files::{ended, training_pictures, write_report_and_figures};
 use crate::pipeline::time_steps::TimeSteps;
-use crate::pipeline::{Output, PipelineError, headline};
+use crate::pipeline::{Output, PipelineError, SUMMARY, headline};
 use crate::recording::{HeldOut, Recording, Targets};
 use crate::report::{Report, text_table};
 use crate::scalar::Scalar;
@@ -110,10 +110,8 @@ impl<'a, S: Scalar> Found<'a, S> {
         let (recording, name) = (&self.prepared.reading.recording, self.config.system.as_str());
         let summary = self.summary();
         let json = serde_json::to_string_pretty(&summary).map_err(PipelineError::format)? + "\n";
-        output.write("summary.json", json.as_bytes())?;
-        let periodic = &recording.periodic;
-        let unit = if periodic.iter().all(|periodic| *periodic) { "rad" } else { "SI units" };
-        let headline = headline::of_hold_out(name, self.hold_out, unit);
+        output.write(SUMMARY, json.as_bytes())?;
+        let headline = headline::of_hold_out(name, self.hold_out);
         let opening = summary.opening(recording);
         let mut figures = training_pictures(&self.trained.history);
         if let Some(shot) = self.shot {
@@ -122,10 +120,12 @@ impl<'a, S: Scalar> Found<'a, S> {
             figures.extend(later);
         }
         let report = headline.begin(Report::new(&format!("{name}: learned from recorded motion")));
-        let report = report.preformatted(&wrapped(opening.trim_end(), WIDTH));
+        let report = report.section("Predictions of motion that the model has not seen", &self.hold_out.figures);
+        let report = report.section("The functions that were learned", &self.physics.figures);
         let report = self.determined.report(self.hold_out.report(report));
-        let report = self.physics.report(report).heading("Training");
-        let report = report.figures(&figures).heading("Configuration").preformatted(toml);
+        let report = self.physics.report(report).heading("Data");
+        let report = report.preformatted(&wrapped(opening.trim_end(), WIDTH)).section("Training", &figures);
+        let report = report.heading("Configuration").preformatted(toml);
         write_report_and_figures(
             output,
             &report,
@@ -222,7 +222,7 @@ impl Summary<'_> {
                 number(c.window_seconds),
                 c.window_samples.to_string(),
                 number(c.acceleration_error),
-                if error.is_finite() { hundredths(error) } else { lost },
+                if error.is_finite() { percentage(error) } else { lost },
             ]
         };
         text += &text_table(&SMOOTHING, &self.coordinates.iter().map(row).collect::<Vec<_>>());

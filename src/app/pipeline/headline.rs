@@ -8,6 +8,13 @@ use crate::pipeline::evaluation::Evaluation;
 use crate::pipeline::hold_out::{HoldOut, factor};
 use crate::report::Report;
 
+/// Share of states of wrong signature from which on it is worth a word.
+const MOST_WRONG: f64 = 0.01;
+/// Lyapunov times from which on predictions of chaotic motion are good: errors grew e^3 = 20 times.
+const MANY_TIMES: f64 = 3.0;
+/// Share of the time that was tested below which predictions of motion that is not chaotic are bad.
+const FEW: f64 = 0.01;
+
 /// A headline.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Headline {
@@ -57,15 +64,22 @@ fn valid_name(valid: &ValidTimes, [one, many]: [&str; 2]) -> String {
 /// A model of a system that is known: `title` names it.
 pub(crate) fn of_evaluation(title: &str, found: &Evaluation) -> Headline {
     let mass = found.mass_matrix.error.median;
-    let common = found.physics.common_ground.as_ref();
-    let matrix = match common.map(|common| common.mass_matrix).filter(|x| x.is_finite()) {
-        Some(left) => format!("gives the mass matrix to {} up to one factor", percent(left)),
-        None if mass.is_finite() => format!("gives the mass matrix to {} up to one factor", percent(mass)),
-        None => "gives no mass matrix that can be compared".to_string(),
+    let equivalence = found.physics.equivalence.as_ref();
+    let matrix = match equivalence.map(|found| found.mass_matrix).filter(|x| x.is_finite()) {
+        Some(difference) => format!("it gives the mass matrix to {} up to one factor", percent(difference)),
+        None if mass.is_finite() => format!("it gives the mass matrix to {} up to one factor", percent(mass)),
+        None => "it gives no mass matrix that can be compared".to_string(),
     };
-    let predicts = match &found.valid_time {
-        Some(valid) => format!(", and predicts the motion for {}", valid_time(valid, &found.time_unit)),
-        None => String::new(),
+    let predicts = found.valid_time.as_ref().map(|valid| predicted(valid, found.tested, &found.time_unit));
+    let wrong = match found.wrong_signature {
+        share if share > MOST_WRONG => {
+            format!(" At {} of the states its mass matrix has the wrong signature.", percent(share))
+        }
+        _ => String::new(),
+    };
+    let sentence = match predicts {
+        Some(predicts) => format!("{title}: {predicts}; {matrix}.{wrong}"),
+        None => format!("{title}: no motion was predicted; {matrix}.{wrong}"),
     };
     let mut rows: Vec<[String; 2]> = Vec::new();
     let mut add = |what: &str, value: String| rows.push([what.to_string(), value]);
@@ -77,8 +91,8 @@ pub(crate) fn of_evaluation(title: &str, found: &Evaluation) -> Headline {
         format!("{name} {} {unit}", number(error.median))
     });
     add("Accelerations of fresh states, median error", errors.collect::<Vec<_>>().join(", "));
-    if let Some(common) = common {
-        add("Left of the learned Lagrangian beside factor and gauge", common.text());
+    if let Some(found) = equivalence {
+        add("Difference from the exact Lagrangian, up to a factor and a gauge term", found.text());
     }
     add("Mass matrix at rest, median error", percent(mass));
     let mut energies: Vec<f64> = found.trajectories.iter().map(|t| t.summary.energy_error.mean).collect();
@@ -86,11 +100,29 @@ pub(crate) fn of_evaluation(title: &str, found: &Evaluation) -> Headline {
     let energy = energies.iter().sum::<f64>() / energies.len() as f64;
     add("Exact energy along the predicted motions, mean error", percent(energy));
     add("Fresh states whose mass matrix has the wrong signature", percent(found.wrong_signature));
-    Headline { sentence: format!("{title}: the learned Lagrangian {matrix}{predicts}."), rows }
+    Headline { sentence, rows }
 }
 
-/// A model of recorded motion called `name`, whose coordinates are in `unit`.
-pub(crate) fn of_hold_out(name: &str, found: &HoldOut, unit: &str) -> Headline {
+/// Predictions beside the exact motion over a test of `tested`, in words.
+fn predicted(valid: &ValidTimes, tested: f64, unit: &str) -> String {
+    let time = valid_time(valid, unit);
+    let (until, tested) = (tested, format!("{} {unit}", number(tested)));
+    if valid.at_least {
+        return format!("good: the learned Lagrangian predicts the motion for all of the {tested} that were tested");
+    }
+    match valid.lyapunov_times {
+        Some(times) if times >= MANY_TIMES => {
+            format!("good: the learned Lagrangian predicts the chaotic motion for {time}, of {tested} that were tested")
+        }
+        times if times.map_or(valid.median < FEW * until, |times| times < 1.0) => {
+            format!("bad: predictions are useful for no more than {time}; {tested} were tested")
+        }
+        _ => format!("limited: useful for {time} of prediction, and wrong beyond; {tested} were tested"),
+    }
+}
+
+/// A model of recorded motion called `name`.
+pub(crate) fn of_hold_out(name: &str, found: &HoldOut) -> Headline {
     let signature = || {
         let what = "Held-out states whose mass matrix has the wrong signature".to_string();
         found.wrong_signature.is_finite().then(|| [what, percent(found.wrong_signature)])
@@ -99,37 +131,58 @@ pub(crate) fn of_hold_out(name: &str, found: &HoldOut, unit: &str) -> Headline {
         let sentence = format!("{name}: a Lagrangian was learned; no held-out motion judges its predictions.");
         return Headline { sentence, rows: signature().into_iter().collect() };
     };
-    let valid = found.valid_time.as_ref().map(|valid| (valid, valid_time(valid, "s")));
-    let of = |x: f64| if x.is_finite() { format!("{} {unit}", number(x)) } else { "-".to_string() };
+    let of = |x: f64| if x.is_finite() { format!("{} {}", number(x), found.error_unit) } else { "-".to_string() };
     let mut rows: Vec<[String; 2]> = Vec::new();
-    if let Some((valid, time)) = &valid {
-        rows.push([valid_name(valid, ["held-out window", "held-out windows"]), time.clone()]);
+    if let Some(valid) = &found.valid_time {
+        rows.push([valid_name(valid, ["held-out window", "held-out windows"]), valid_time(valid, "s")]);
     }
     rows.extend([
         [format!("Median error {} s ahead", number(model.seconds)), of(model.median)],
         ["The same at constant velocity".to_string(), of(straight.median)],
     ]);
+    // Of one coordinate it is the same.
+    let several = found.by_coordinate.len() > 1;
+    let apart = found.by_coordinate.iter().filter(|_| several).filter_map(|c| {
+        let errors = [c.model.last()?, c.constant_velocity.last()?].map(|x| number(*x));
+        Some([
+            format!("Of {}", c.name),
+            format!("{} {}, at constant velocity {} {}", errors[0], c.unit, errors[1], c.unit),
+        ])
+    });
+    rows.extend(apart);
     rows.extend(signature());
-    let time = valid.map(|(_, time)| time);
-    Headline { sentence: format!("{name}: {}", predicted(model, straight, time.as_deref(), unit)), rows }
+    Headline { sentence: format!("{name}: {}", judged(found, model, straight)), rows }
 }
 
-/// Prediction of held-out motion beside going on at constant velocity, in a sentence; `valid` is the time of valid prediction.
-fn predicted(model: &PredictionError, straight: &PredictionError, valid: Option<&str>, unit: &str) -> String {
-    let (Some(valid), true) = (valid, model.median.is_finite()) else {
-        return "the learned Lagrangian fails to predict most of the motion that it has not seen.".to_string();
+/// Prediction of held-out motion beside going on at constant velocity, in a sentence that says good or bad.
+fn judged(found: &HoldOut, model: &PredictionError, straight: &PredictionError) -> String {
+    let (Some(useful), true) = (&found.useful_time, model.median.is_finite()) else {
+        return "bad: the learned Lagrangian fails to predict most of the motion that it has not seen.".to_string();
     };
     let compared = match factor(model, straight) {
         Some(factor) => format!(", {} times more", number(factor)),
-        None => ": the model is no better".to_string(),
+        None => String::new(),
     };
-    format!(
-        "the learned Lagrangian predicts motion that it has not seen for {valid}; {} s ahead it is off by {} {unit} (median), \
-         going on at constant velocity by {}{compared}.",
+    let errors = format!(
+        "{} s ahead it is off by {} {} (median), going on at constant velocity by {}{compared}.",
         number(model.seconds),
         number(model.median),
+        found.error_unit,
         number(straight.median)
-    )
+    );
+    let verdict = match useful.seconds {
+        _ if useful.at_least => {
+            "good: the learned Lagrangian is useful for all of the time ahead that was tested".to_string()
+        }
+        0.0 => "bad: the learned Lagrangian predicts motion that it has not seen no better than constant velocity"
+            .to_string(),
+        seconds => {
+            let valid = found.valid_time.as_ref().map_or(0.0, |valid| valid.median);
+            let beyond = if seconds < valid { "no better than constant velocity beyond" } else { "and wrong beyond" };
+            format!("limited: useful for {} s of prediction, {beyond}", number(seconds))
+        }
+    };
+    format!("{verdict}; {errors}")
 }
 
 /// An experiment: its best row beside the paper's best, and in how many rows it is below the paper.
@@ -146,22 +199,28 @@ pub(crate) fn of_experiment(rows: &[Row]) -> Headline {
         0 => String::new(),
         all => {
             let below = compared.iter().filter(|below| **below).count();
-            format!("; below the paper's in {below} of {all} rows for which it states one")
+            match below {
+                _ if below == all => format!(": good, below the paper's in all {all} rows for which it states one"),
+                0 => format!(": bad, above the paper's in all {all} rows for which it states one"),
+                _ => format!(": below the paper's in {below} of {all} rows for which it states one"),
+            }
         }
     };
     let sentence = match own {
         Some(own) => format!("Lowest loss {}{below}.", of(own)),
         None => "No run learned anything.".to_string(),
     };
-    let or_none = |found: Option<String>| found.unwrap_or_else(|| "-".to_string());
     let share = |of: fn(&Row) -> Option<Spread>| percent(own.and_then(|(row, _)| of(row)).map_or(f64::NAN, |s| s.mean));
+    let stated = paper.map(|paper| ("Lowest loss in the paper", of(paper)));
     let table = [
-        ("Lowest loss in the paper", or_none(paper.map(of))),
         ("Runs", if failed == 0 { runs.to_string() } else { format!("{runs}, {failed} learned nothing") }),
         ("States of wrong signature (best row)", share(|row| row.wrong_signature)),
         ("Energy error of predicted motion (best row)", share(|row| row.energy)),
     ];
-    Headline { sentence, rows: table.map(|(what, value)| [what.to_string(), value]).to_vec() }
+    Headline {
+        sentence,
+        rows: stated.into_iter().chain(table).map(|(what, value)| [what.to_string(), value]).collect(),
+    }
 }
 
 #[cfg(test)]
@@ -169,19 +228,55 @@ mod tests {
     use super::*;
     use crate::analysis::VALID;
     use crate::experiments::Reported;
+    use crate::pipeline::hold_out::UsefulTime;
 
     #[test]
-    fn predictions_are_compared_with_constant_velocity() {
+    fn headlines_of_predictions_say_good_or_bad() {
         let error = |median: f64| PredictionError { seconds: 0.5, rms: 1.0, median, p90: 2.0, windows: 9, missing: 0 };
-        let said = |model, straight| predicted(&error(model), &error(straight), Some("1.20 s"), "rad");
-        assert_eq!(
-            said(0.0196, 1.96),
-            "the learned Lagrangian predicts motion that it has not seen for 1.20 s; 0.500 s ahead it is off by 0.0196 rad \
-             (median), going on at constant velocity by 1.96, 100 times more."
+        let valid = |median, at_least| ValidTimes {
+            threshold: VALID,
+            median,
+            at_least,
+            starts: 4,
+            lyapunov_times: None,
+            lyapunov_at_least: false,
+            chaotic: 0,
+        };
+        let said = |model: f64, seconds: f64, at_least: bool, (until, open): (f64, bool)| {
+            let found = HoldOut {
+                error_unit: "rad",
+                model: vec![error(model)],
+                constant_velocity: vec![error(1.0)],
+                valid_time: Some(valid(until, open)),
+                useful_time: Some(UsefulTime { seconds, at_least }),
+                by_coordinate: Vec::new(),
+                given_up: String::new(),
+                wrong_signature: 0.0,
+                energy: None,
+                figures: Vec::new(),
+            };
+            of_hold_out("swing", &found).sentence
+        };
+        let good = said(0.01, 0.5, true, (0.5, true));
+        assert!(
+            good.starts_with("swing: good: ") && good.contains("0.0100 rad") && good.contains("100 times"),
+            "{good}"
         );
-        assert!(said(2.0, 1.0).ends_with("by 1.00: the model is no better."));
-        assert!(said(f64::INFINITY, 1.0).contains("fails to predict"));
-        assert!(predicted(&error(1.0), &error(1.0), None, "rad").contains("fails to predict"));
+        let limited = said(2.0, 0.29, false, (0.5, true));
+        assert!(
+            limited.starts_with("swing: limited: useful for 0.290 s") && limited.contains("no better than"),
+            "{limited}"
+        );
+        let wrong = said(0.9, 0.29, false, (0.29, false));
+        assert!(wrong.starts_with("swing: limited: useful for 0.290 s") && wrong.contains("wrong beyond"), "{wrong}");
+        assert!(said(2.0, 0.0, false, (0.5, true)).starts_with("swing: bad: "));
+        assert!(said(f64::INFINITY, 0.0, false, (0.1, false)).starts_with("swing: bad: "));
+
+        assert!(predicted(&valid(100.0, true), 100.0, "s").starts_with("good: "));
+        assert!(predicted(&valid(7.0, false), 100.0, "s").starts_with("limited: useful for 7.00 s"));
+        let chaotic = ValidTimes { lyapunov_times: Some(8.0), ..valid(7.0, false) };
+        assert!(predicted(&chaotic, 100.0, "s").starts_with("good: "));
+        assert!(predicted(&valid(0.0, false), 100.0, "s").starts_with("bad: "));
     }
 
     #[test]
@@ -207,7 +302,7 @@ mod tests {
 
     #[test]
     fn experiments_stand_beside_the_paper() {
-        let spread = |x: f64| Some(Spread { mean: x, low: x, high: x });
+        let spread = |x: f64| Some(Spread { mean: x, median: x, low: x, high: x });
         let row = |label: &str, loss, paper, failed| Row {
             label: label.into(),
             runs: 2,
@@ -234,7 +329,7 @@ mod tests {
         let found = of_experiment(&rows);
         assert_eq!(
             found.text(),
-            "Lowest loss 0.125 (b); below the paper's in 1 of 2 rows for which it states one.\n\
+            "Lowest loss 0.125 (b): below the paper's in 1 of 2 rows for which it states one.\n\
              Lowest loss in the paper: 0.250 (a)\n\
              Runs: 6, 1 learned nothing\n\
              States of wrong signature (best row): 1.00 %\n\

@@ -1,18 +1,18 @@
 //! Judgement of a model of recorded motion: predictions of motion that was held out, and the balance of its energy.
 
 use crate::analysis::{
-    PredictionError, Predictions, ValidTimes, Window, predict_by_constant_velocity, prediction_error, spread,
-    window_valid_times,
+    PredictionError, Predictions, ValidTimes, Window, coordinate_errors, predict_by_constant_velocity,
+    prediction_error, spread, window_valid_times,
 };
 use crate::data::Split;
 use crate::lagrangian::{EulerLagrange, Request, Terms};
 use crate::linalg::{SignatureBuffers, has_signature};
 use crate::names::number;
 use crate::pipeline::attention::Attention;
-use crate::pipeline::energy::{Balance, balance};
+use crate::pipeline::energy::{Balance, balance, energy_figure};
 use crate::pipeline::prediction::HeldOutPredictions;
 use crate::pipeline::{PipelineError, Watch};
-use crate::report::{Figure, LinePlot, Report, Series, Turn, kept, line_plot, text_table};
+use crate::report::{Figure, LinePlot, Report, Series, Turn, figure, line_plot, text_table};
 use crate::rollout::SampledForce;
 use serde::Serialize;
 
@@ -22,6 +22,8 @@ const WINDOWS: usize = 500;
 const AHEAD: f64 = 200.0;
 /// Points of a curve of prediction errors.
 const POINTS: usize = 40;
+/// Times ahead of a table of them.
+const TIMES: usize = 4;
 
 /// Motion that judges a model, and how.
 #[derive(Clone, Copy, Debug)]
@@ -39,14 +41,43 @@ pub struct HoldOutOptions<'a> {
     pub threads: usize,
 }
 
-/// Predictions of motion that was held out, beside going on at constant velocity, in SI units.
+/// Time ahead up to which a prediction is of use: valid, and better than going on at constant velocity.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct UsefulTime {
+    /// The time in s; 0 for a prediction that is never of use.
+    pub seconds: f64,
+    /// `true` if it is of use to the end of the windows: the true time is longer.
+    pub at_least: bool,
+}
+
+/// Errors of one coordinate by time ahead, medians over the windows, in its own unit.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct CoordinatePredictions {
+    /// Name of the coordinate.
+    pub name: String,
+    /// Its unit: `rad` of an angle, else `SI`.
+    pub unit: &'static str,
+    /// Errors of the model's motion.
+    pub model: Vec<f64>,
+    /// Errors of going on at constant velocity.
+    pub constant_velocity: Vec<f64>,
+}
+
+/// Predictions of motion that was held out, beside going on at constant velocity.
 #[derive(Clone, Debug, Serialize)]
 pub struct HoldOut {
+    /// Unit of the errors of all coordinates together: `rad` of angles, `SI` of others; of both kinds each error is taken over the spread
+    /// of its coordinate's motion.
+    pub error_unit: &'static str,
     /// Errors of the model's motion, by time ahead.
     pub model: Vec<PredictionError>,
     /// Time for which the model's motion predicts the measured one, median over the windows; at least to their end where the
     /// error stays small. None without windows.
     pub(crate) valid_time: Option<ValidTimes>,
+    /// Time for which its motion is of use. None without windows.
+    pub useful_time: Option<UsefulTime>,
+    /// Errors of every coordinate at the same times ahead.
+    pub by_coordinate: Vec<CoordinatePredictions>,
     /// Which predictions were given up and why, in words; empty if none was.
     pub given_up: String,
     /// Errors of going on at the velocity of the start.
@@ -74,6 +105,13 @@ pub fn evaluate_hold_out(
     if recording.tracks.is_empty() {
         return Ok(HoldOut::nothing());
     }
+    let periodic = &recording.periodic;
+    let positions: Vec<f64> = recording.tracks.iter().flat_map(|track| track.q.iter().copied()).collect();
+    let spread = spread(&positions, periodic);
+    let units = periodic.iter().map(|angle| if *angle { "rad" } else { "SI" }).collect::<Vec<_>>();
+    let unlike = units.iter().any(|unit| *unit != units[0]);
+    let (unit, scales) =
+        if unlike { ("of the spread of the motion", spread.clone()) } else { (units[0], vec![1.0; n]) };
     let horizon = plan.horizon.unwrap_or_else(|| horizon(plan.part));
     let mut windows: Vec<Window> = plan
         .part
@@ -91,47 +129,65 @@ pub fn evaluate_hold_out(
     let straight = predict_by_constant_velocity(windows);
     let errors = |predictions: &Predictions, count: usize| -> Vec<PredictionError> {
         let times = (1..=count).map(|k| horizon * k as f64 / count as f64);
-        times.map(|t| prediction_error(windows, predictions, &recording.periodic, t)).collect()
+        times.map(|t| prediction_error(windows, predictions, (periodic, &scales), t)).collect()
     };
+    let valid = window_valid_times(windows, motion, periodic, &spread);
+    let valid_time = ValidTimes::of(&valid.into_iter().map(|valid| (valid, None)).collect::<Vec<_>>());
     let mut figures = Vec::new();
+    let mut useful_time = None;
     if !windows.is_empty() {
-        let curves = [("model", errors(motion, POINTS)), ("constant velocity", errors(&straight, POINTS))];
-        figures.extend(drawn(error_plot(&curves), "prediction_error.svg", ERROR_CAPTION));
         for (i, name) in recording.coordinates.iter().enumerate() {
-            let file = format!("prediction_{}.svg", i + 1);
-            figures.extend(drawn(
-                example(&windows[0], &motion[0], &recording.periodic, i, name),
-                &file,
-                EXAMPLE_CAPTION,
-            ));
+            let drawn = line_plot(&example(&windows[0], &motion[0], periodic, i, name));
+            let heading = format!("{name} over time: predicted beside measured");
+            figures.extend(figure(&format!("prediction_{}.svg", i + 1), heading, drawn, EXAMPLE_CAPTION));
         }
+        let curves = [("model", errors(motion, POINTS)), ("constant velocity", errors(&straight, POINTS))];
+        useful_time = valid_time.as_ref().map(|valid| UsefulTime::new(valid, [&curves[0].1, &curves[1].1]));
+        let heading = "How the error of the prediction grows";
+        figures.extend(figure("prediction_error.svg", heading, line_plot(&error_plot(&curves, unit)), ERROR_CAPTION));
         if let Some(force) = &windows[0].force {
             let times: Vec<f64> = [0.0].iter().chain(&windows[0].times).copied().collect();
-            figures.extend(drawn(force_plot(force, &times, plan.forces), "prediction_forces.svg", FORCE_CAPTION));
+            let drawn = line_plot(&force_plot(force, &times, plan.forces));
+            figures.extend(figure(
+                "prediction_forces.svg",
+                "The known forces that drove the motion",
+                drawn,
+                FORCE_CAPTION,
+            ));
         }
     }
-    let tabled = |predictions: &Predictions| if windows.is_empty() { Vec::new() } else { errors(predictions, 4) };
+    figures.extend(energy_figure(model, plan.part));
+    let tabled = |predictions: &Predictions| if windows.is_empty() { Vec::new() } else { errors(predictions, TIMES) };
     let (wrong_signature, energy) = (wrong_signature(model, plan.part, plan.time), balance(model, plan.part));
     attention.check()?;
-    let spread = spread(
-        &recording.tracks.iter().flat_map(|track| track.q.iter().copied()).collect::<Vec<_>>(),
-        &recording.periodic,
-    );
-    let valid = window_valid_times(windows, motion, &recording.periodic, &spread);
+    let (model, constant_velocity) = (tabled(motion), tabled(&straight));
+    let apart = |predictions: &Predictions| -> Vec<Vec<f64>> {
+        model.iter().map(|error| coordinate_errors(windows, predictions, periodic, error.seconds)).collect()
+    };
+    let (by_model, by_velocity) = (apart(motion), apart(&straight));
+    let column = |errors: &[Vec<f64>], i: usize| errors.iter().map(|row| row[i]).collect();
+    let coordinates = recording.coordinates.iter().zip(units).enumerate().map(|(i, (name, unit))| {
+        let (name, model, constant_velocity) = (name.clone(), column(&by_model, i), column(&by_velocity, i));
+        CoordinatePredictions { name, unit, model, constant_velocity }
+    });
+    let given_up = foretold.remarks();
     Ok(HoldOut {
-        model: tabled(motion),
-        valid_time: ValidTimes::of(&valid.into_iter().map(|valid| (valid, None)).collect::<Vec<_>>()),
-        constant_velocity: tabled(&straight),
-        given_up: foretold.remarks(),
+        error_unit: unit,
+        model,
+        valid_time,
+        useful_time,
+        by_coordinate: coordinates.collect(),
+        constant_velocity,
+        given_up,
         wrong_signature,
         energy,
         figures,
     })
 }
 
-const ERROR_CAPTION: &str = "Median over held-out windows of the error of predicted coordinates (root mean square over the coordinates) against the time since \
-                             the state that the prediction starts from.";
-const EXAMPLE_CAPTION: &str = "The first held-out window: measured, and predicted from the state at its start under the known forces, if there are any.";
+const ERROR_CAPTION: &str = "Median over the held-out windows of the error of the predicted coordinates (root mean square over the coordinates), by \
+                             time since the state that the prediction starts from, beside going on at constant velocity.";
+const EXAMPLE_CAPTION: &str = "The first held-out window, which the model has not seen: measured (wide), and predicted from the state at its start.";
 const FORCE_CAPTION: &str =
     "Known forces in the first held-out window; the prediction takes them as linear between the samples.";
 
@@ -162,12 +218,7 @@ fn horizon(part: &Split) -> f64 {
     horizons.fold(f64::INFINITY, f64::min)
 }
 
-/// The picture, unless there is nothing to show.
-fn drawn(plot: LinePlot, file: &str, caption: &str) -> Option<Figure> {
-    kept(file, line_plot(&plot), caption.to_string())
-}
-
-fn error_plot(curves: &[(&str, Vec<PredictionError>)]) -> LinePlot {
+fn error_plot(curves: &[(&str, Vec<PredictionError>)], unit: &str) -> LinePlot {
     let series = |(name, errors): &(&str, Vec<PredictionError>)| {
         let (x, y): (Vec<f64>, Vec<f64>) = errors.iter().map(|e| (e.seconds, e.median)).unzip();
         Series::new(name, &x, &y)
@@ -175,7 +226,7 @@ fn error_plot(curves: &[(&str, Vec<PredictionError>)]) -> LinePlot {
     LinePlot {
         title: "Prediction of held-out motion".into(),
         x_label: "time ahead [s]".into(),
-        y_label: "median error [SI]".into(),
+        y_label: format!("median error [{}]", short(unit)),
         log_y: true,
         series: curves.iter().map(series).collect(),
         turn: None,
@@ -260,16 +311,52 @@ pub(crate) fn factor(model: &PredictionError, straight: &PredictionError) -> Opt
     Some(straight.median / model.median).filter(|factor| *factor >= 1.05)
 }
 
+impl UsefulTime {
+    /// From the time of valid prediction and the errors of model and constant velocity at the same times.
+    fn new(valid: &ValidTimes, [model, straight]: [&[PredictionError]; 2]) -> Self {
+        let mut pairs = model.iter().zip(straight).rev();
+        let last = pairs.next().filter(|(model, straight)| factor(model, straight).is_some());
+        let better = last.or_else(|| pairs.find(|(model, straight)| factor(model, straight).is_some()));
+        let better = better.map_or(0.0, |(model, _)| model.seconds);
+        Self { seconds: better.min(valid.median), at_least: last.is_some() && valid.at_least }
+    }
+}
+
+/// A unit in the brackets of a header.
+fn short(unit: &str) -> &str {
+    if unit.starts_with("of ") { "spread" } else { unit }
+}
+
 impl HoldOut {
-    const HEADERS: [&'static str; 7] = [
-        "time ahead [s]",
-        "median error [SI]",
-        "9 of 10 below [SI]",
-        "rms error [SI]",
-        "constant velocity, median [SI]",
-        "windows",
-        "given up",
-    ];
+    fn headers(&self) -> [String; 7] {
+        let unit = short(self.error_unit);
+        [
+            "time ahead [s]".to_string(),
+            format!("median error [{unit}]"),
+            format!("9 of 10 below [{unit}]"),
+            format!("rms error [{unit}]"),
+            format!("constant velocity, median [{unit}]"),
+            "windows".to_string(),
+            "given up".to_string(),
+        ]
+    }
+
+    /// Table of the errors by coordinate, if there are several.
+    fn table_by_coordinate(&self) -> Option<(Vec<String>, Vec<Vec<String>>)> {
+        if self.by_coordinate.len() < 2 || self.model.is_empty() {
+            return None;
+        }
+        let header = |c: &CoordinatePredictions| {
+            [format!("{} [{}]", c.name, c.unit), format!("{}, constant velocity [{}]", c.name, c.unit)]
+        };
+        let headers = self.by_coordinate.iter().flat_map(header);
+        let headers = ["median error, time ahead [s]".to_string()].into_iter().chain(headers).collect();
+        let row = |(k, error): (usize, &PredictionError)| {
+            let numbers = self.by_coordinate.iter().flat_map(|c| [c.model[k], c.constant_velocity[k]]);
+            [error.seconds].into_iter().chain(numbers).map(number).collect()
+        };
+        Some((headers, self.model.iter().enumerate().map(row).collect()))
+    }
 
     fn rows(&self) -> Vec<Vec<String>> {
         let pairs = self.model.iter().zip(&self.constant_velocity);
@@ -285,9 +372,12 @@ impl HoldOut {
     /// That of a model that no motion was held out to judge: its numbers are not there.
     fn nothing() -> Self {
         Self {
+            error_unit: "SI",
             model: Vec::new(),
             constant_velocity: Vec::new(),
             valid_time: None,
+            useful_time: None,
+            by_coordinate: Vec::new(),
             given_up: String::new(),
             wrong_signature: f64::NAN,
             energy: None,
@@ -327,16 +417,61 @@ impl HoldOut {
             let none = "no window of held-out motion is as long as the horizon: nothing was predicted\n";
             return format!("{none}{}", self.remarks());
         }
-        format!("{}{}", text_table(&Self::HEADERS, &self.rows()), self.remarks())
+        let apart = self.table_by_coordinate();
+        let apart = apart.map(|(headers, rows)| format!("\n{}\n", text_table(&headers, &rows))).unwrap_or_default();
+        format!("{}{apart}{}", text_table(&self.headers(), &self.rows()), self.remarks())
     }
 
-    /// Adds tables and pictures to a report.
+    /// Adds the tables to a report; the pictures stand above all tables of a page.
     pub(crate) fn report(&self, report: Report) -> Report {
+        let report = report.heading("Errors of the predictions of held-out motion");
         if self.is_of_nothing() {
-            return report.heading("Predictions of held-out motion").paragraph(self.remarks().trim_end());
+            return report.paragraph(self.remarks().trim_end());
         }
-        let report = report.heading("Predictions of held-out motion").table(&Self::HEADERS, &self.rows());
-        let report = self.remarks().lines().fold(report, |report, line| report.paragraph(line));
-        report.figures(&self.figures)
+        let report = report.table(&self.headers(), &self.rows());
+        let report = match self.table_by_coordinate() {
+            Some((headers, rows)) => report.table(&headers, &rows),
+            None => report,
+        };
+        self.remarks().lines().fold(report, |report, line| report.paragraph(line))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_prediction_is_of_use_while_it_is_valid_and_better_than_constant_velocity() {
+        let errors = |medians: [f64; 4]| -> Vec<PredictionError> {
+            let error = |(k, median)| PredictionError {
+                seconds: 1.0 + k as f64,
+                rms: median,
+                median,
+                p90: median,
+                windows: 9,
+                missing: 0,
+            };
+            medians.into_iter().enumerate().map(error).collect()
+        };
+        let useful = |model, straight, median, at_least| {
+            let valid = ValidTimes {
+                threshold: crate::analysis::VALID,
+                median,
+                at_least,
+                starts: 9,
+                lyapunov_times: None,
+                lyapunov_at_least: false,
+                chaotic: 0,
+            };
+            UsefulTime::new(&valid, [&errors(model), &errors(straight)])
+        };
+        let straight = [1.0, 2.0, 3.0, 4.0];
+        let of = |seconds, at_least| UsefulTime { seconds, at_least };
+        assert_eq!(useful([0.1, 0.2, 0.3, 0.4], straight, 4.0, true), of(4.0, true));
+        // Better to the end, but wrong before; right to the end, but no better; never better.
+        assert_eq!(useful([0.1, 0.2, 0.3, 0.4], straight, 2.5, false), of(2.5, false));
+        assert_eq!(useful([1.0, 0.2, 0.3, 4.0], straight, 4.0, true), of(3.0, false));
+        assert_eq!(useful([1.0, 2.0, f64::INFINITY, 4.0], straight, 4.0, true), of(0.0, false));
     }
 }

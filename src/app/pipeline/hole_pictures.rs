@@ -3,7 +3,7 @@
 use crate::relativity::{
     Camera, CentralCoordinates, Image, LearnedHole, Sky, Tracing, difference_image, orbits, shadow,
 };
-use crate::report::{Figure, OrbitPlot, Series, kept, orbit_picture, png};
+use crate::report::{OrbitPlot, Picture, Series, orbit_picture, png};
 
 /// Distance of the camera over the mass, and its angle from the axis.
 const CAMERA: (f64, f64) = (20.0, 1.4);
@@ -11,7 +11,7 @@ const CAMERA: (f64, f64) = (20.0, 1.4);
 const GAP: usize = 8;
 
 /// Orbits of the exact metric, wide, and of the learned one over them; none where there is nothing to show.
-pub(crate) fn orbit_figure(pair: &LearnedHole<'_>, mass: f64) -> Option<Figure> {
+pub(crate) fn orbit_figure(pair: &LearnedHole<'_>, mass: f64) -> Option<Picture> {
     let origin = pair.around.origin();
     let range = (1.2 * mass, 20.0 * mass);
     let hole = pair.around.equator(pair.exact, &origin).horizon(range).ok().flatten();
@@ -30,11 +30,7 @@ pub(crate) fn orbit_figure(pair: &LearnedHole<'_>, mass: f64) -> Option<Figure> 
     let unit = distance.map_or_else(String::new, |(_, coordinate)| format!(" [{}]", coordinate.unit));
     let [x_label, y_label] = ["x", "y"].map(|axis| format!("{axis}{unit}"));
     let plot = OrbitPlot { x_label, y_label, hole, panels: found.iter().map(panel).collect() };
-    kept(
-        "orbits.svg",
-        orbit_picture(&plot),
-        "Orbits in the equator from the same states: exact and learned.".to_string(),
-    )
+    orbit_picture(&plot).ok()
 }
 
 /// Shadow and sky through the exact metric, through the learned one, and their difference, as PNG of so many pixels along

@@ -1,11 +1,10 @@
-//! Physics of a model: metric, curvature, symmetries, charges, signature, beside those of the system it learned, and what it has in
-//! common with it.
+//! Physics of a model: its functions, metric, curvature, symmetries, charges, signature, beside those of the system it learned.
 //!
 //! All of it is bounded by work, not by time: what depends on the clock would not be the same in every run.
 
 use crate::analysis::{
-    Axis, Grid, MetricComponent, Spread, curvature_grid, curvature_scalars, is_metric, mass_matrix_error,
-    metric_components, metric_grids,
+    MetricComponent, Spread, curvature_grid, curvature_scalars, is_metric, mass_matrix_error, matrices_at_rest,
+    metric_components,
 };
 use crate::certificate::{Options, Signature, certify_network};
 use crate::geometry::MOST_COORDINATES;
@@ -13,8 +12,10 @@ use crate::lagrangian::system::Bounds;
 use crate::lagrangian::{EulerLagrange, SystemInstance};
 use crate::network::{NetworkLagrangian, Structure};
 use crate::pipeline::PipelineError;
-use crate::pipeline::common_ground::{CommonGround, gauge_functions};
-use crate::report::{Figure, QuantityMap, quantity_figure};
+use crate::pipeline::equivalence::{Equivalence, gauge_functions};
+use crate::pipeline::learned_functions::{MAPS, Pair, Picturing};
+use crate::recording::Recording;
+use crate::report::Figure;
 use crate::rollout::{Domain, Trajectory};
 use crate::symmetry::{Chart, Degrees, Region, Symmetries, bases, drifts, enough, middle, most_symmetries, unknowns};
 use serde::Serialize;
@@ -26,10 +27,6 @@ const POINTS: (usize, usize) = (100, 21);
 const METRIC_POINTS: usize = 41;
 /// Points of a map along each axis that are worth a picture.
 const WORTH: usize = 8;
-/// Components of a metric that have a map, at most.
-const MAPS: usize = 10;
-/// Components off the diagonal that have a map exceed this part of those on it, root mean squares.
-const SHOWN: f64 = 0.02;
 /// Weights times `n` times points of the maps of a metric, at most: a second or so.
 const METRIC_WORK: usize = 150_000_000;
 /// Weights times `n^3` times points of the curvature, at most: a second or so.
@@ -118,8 +115,8 @@ pub struct ProvenSignature {
 pub struct Physics {
     /// Bounds of the states that were looked at, by column.
     pub region: BTreeMap<String, [f64; 2]>,
-    /// Common ground with the exact Lagrangian, if the system is known: factor and gauge, and what is left.
-    pub common_ground: Option<CommonGround>,
+    /// Best factor and gauge term beside the exact Lagrangian, if the system is known, and the differences that remain.
+    pub equivalence: Option<Equivalence>,
     /// Components of the metric, of geodesics alone.
     pub metric: Vec<MetricComponent>,
     /// Curvature scalar, of geodesics in two dimensions at least.
@@ -154,6 +151,8 @@ pub(crate) struct Subject<'a> {
     /// Names of coordinates and velocities, with units as labels of axes.
     pub columns: Vec<String>,
     pub labels: Vec<String>,
+    /// The recorded motion it was learned from, if it was.
+    pub recorded: Option<&'a Recording>,
     /// Learned motion along which charges are followed.
     pub motion: Option<&'a Trajectory<f64>>,
     pub threads: usize,
@@ -179,7 +178,7 @@ impl Physics {
         let ranges = region.position.iter().chain(&region.velocity).copied();
         Self {
             region: subject.columns.iter().cloned().zip(ranges).collect(),
-            common_ground: None,
+            equivalence: None,
             metric: Vec::new(),
             curvature_scalar: None,
             symmetries: None,
@@ -204,7 +203,7 @@ impl Physics {
     ) -> Result<(), PipelineError> {
         let (region, exact) = (subject.region(), subject.system.map(SystemInstance::build).transpose()?);
         check()?;
-        self.find_common_ground(subject, &region, exact.as_deref());
+        self.find_equivalence(subject, &region, exact.as_deref());
         check()?;
         self.find_geometry(subject, &region, exact.as_deref());
         check()?;
@@ -214,112 +213,101 @@ impl Physics {
         check()
     }
 
-    fn find_common_ground(&mut self, subject: &Subject<'_>, region: &Region, exact: Option<&dyn EulerLagrange<f64>>) {
+    fn find_equivalence(&mut self, subject: &Subject<'_>, region: &Region, exact: Option<&dyn EulerLagrange<f64>>) {
         let Some(exact) = exact else { return };
         let (basis, states) = gauge_functions(&self.coordinates, &subject.charts(region));
         let (q, v) = subject.states(region, states);
-        match CommonGround::new(subject.network, exact, &basis, (&q, &v)) {
-            Ok(found) => self.common_ground = Some(found),
-            Err(problem) => self.left_out.push(format!("common ground with the system: {problem}")),
+        match Equivalence::new(subject.network, exact, &basis, (&q, &v)) {
+            Ok(found) => self.equivalence = Some(found),
+            Err(problem) => self.left_out.push(format!("comparison with the exact Lagrangian: {problem}")),
         }
     }
 
-    /// Metric and curvature, of geodesics.
+    /// Functions of the Lagrangian, of geodesics the metric and its curvature.
     fn find_geometry(&mut self, subject: &Subject<'_>, region: &Region, exact: Option<&dyn EulerLagrange<f64>>) {
         let (network, n) = (subject.network, subject.network.coordinates());
         let (q, v) = subject.states(region, POINTS.0);
+        if q.is_empty() {
+            return;
+        }
         let form = &network.architecture().form;
         let metric = match exact {
             Some(exact) => is_metric(exact, &q, &v),
             None => form.structure == Structure::Metric && form.known.is_none(),
         };
-        if !metric || q.is_empty() {
-            return;
-        }
-        let found = self.common_ground.as_ref().and_then(|common| common.factor);
-        // Of a black box on a mass shell only a comparison at rest knows the factor there.
-        let at_rest = |exact: &dyn EulerLagrange<f64>| mass_matrix_error(exact, network, &q).factor;
-        let factor = found.or_else(|| exact.map(at_rest)).unwrap_or(1.0);
         let most = (CURVATURE_WORK / (network.weights().len() * n.pow(3)).max(1)).max(1);
-        self.metric = metric_components(exact, network, &q[..n * most.min(q.len() / n)], factor);
-        if !(2..=MOST_COORDINATES).contains(&n) {
-            return;
-        }
-        let plane = self.plane(subject, region);
-        self.map_metric(network, exact, factor, &plane);
-        self.find_curvature((network, exact), &q, (factor, most), &plane);
-    }
-
-    /// The two coordinates over which maps are drawn, those of space if there are two.
-    fn plane(&self, subject: &Subject<'_>, region: &Region) -> Plane {
-        let n = self.coordinates.len();
-        let time = subject.system.and_then(|system| system.system.time_like);
-        let time = time.or(subject.network.architecture().time_like);
-        let shown = if n > 2 && time == Some(0) { [1, n - 1] } else { [0, 1] };
-        let middle: Vec<f64> = region.position.iter().map(|[low, high]| 0.5 * (low + high)).collect();
-        let fixed: Vec<String> = (0..n)
-            .filter(|i| !shown.contains(i))
-            .map(|i| format!("{} = {}", self.coordinates[i], (1e4 * middle[i]).round() / 1e4 + 0.0))
-            .collect();
-        Plane {
-            shown: shown.map(|i| (i, region.position[i])),
-            labels: shown.map(|i| subject.labels[i].clone()),
-            middle,
-            fixed: fixed.join(", "),
-        }
-    }
-
-    fn map_metric(
-        &mut self,
-        network: &NetworkLagrangian<f64>,
-        exact: Option<&dyn EulerLagrange<f64>>,
-        factor: f64,
-        plane: &Plane,
-    ) {
-        let points = METRIC_WORK / (network.weights().len() * self.coordinates.len()).max(1);
-        let side = points.isqrt().min(METRIC_POINTS);
-        if side < WORTH {
-            return self.left_out.push("maps of the metric: too many weights for pictures in a second".into());
-        }
-        let size = |component: &MetricComponent| component.exact.unwrap_or(0.0).max(component.learned);
-        let diagonal = |i: usize| self.metric.iter().find(|c| c.indices == [i; 2]).map_or(0.0, size);
-        let worth = |component: &MetricComponent| {
-            let [i, j] = component.indices;
-            i == j || size(component) > SHOWN * (diagonal(i) * diagonal(j)).sqrt()
+        let looked_at = &q[..n * most.min(q.len() / n)];
+        let found = self.equivalence.as_ref().and_then(|found| found.factor);
+        let mean_mass = || {
+            let masses = matrices_at_rest(network, looked_at);
+            masses.iter().step_by(n * n).sum::<f64>() * n as f64 / looked_at.len() as f64
         };
-        let grids = |model: &dyn EulerLagrange<f64>| metric_grids(model, &plane.middle, plane.axes(side));
-        let (learned, mut beside) = (grids(network), exact.map(|exact| grids(exact).into_iter()));
-        let mut maps = Vec::new();
-        for (component, learned) in self.metric.iter().zip(learned) {
-            let exact = beside.as_mut().and_then(Iterator::next);
-            if worth(component) {
-                let name = component.indices.map(|i| self.coordinates[i].as_str()).join("_");
-                let about = format!("Component g_{name} of the metric at rest");
-                let quantity = format!("g_{name}");
-                maps.push(plane.map([quantity, about, format!("metric_{name}")], learned.map(|g| factor * g), exact));
+        let (factor, unit) = match exact {
+            // Of a black box on a mass shell only a comparison at rest knows the factor there.
+            Some(exact) => (found.unwrap_or_else(|| mass_matrix_error(exact, network, &q).factor), String::new()),
+            None if metric => (1.0, String::new()),
+            None if subject.is_forced() => (1.0, "In SI units, which the known forces fix.".to_string()),
+            None => {
+                let name = &self.coordinates[0];
+                let unit = format!("Over the mean M[{name},{name}]: without known forces L has no unit.");
+                (Some(mean_mass().recip()).filter(|factor| factor.is_finite()).unwrap_or(1.0), unit)
+            }
+        };
+        let components = metric_components(exact, network, looked_at, factor);
+        let picturing = self.picturing(subject, region, unit);
+        let pair = Pair { learned: network, exact, factor };
+        let points = METRIC_WORK / (network.weights().len() * n).max(1);
+        let side = points.isqrt().min(METRIC_POINTS);
+        let time = subject.time_like();
+        if side < WORTH {
+            self.left_out.push("maps of the learned functions: too many weights for pictures in a second".into());
+        } else {
+            // The Lagrangian at rest of a known system has a map of its own.
+            if !metric && time.is_none() && (exact.is_none() || n == 1) {
+                self.figures.extend(picturing.potential(pair, side));
+            }
+            let names = if metric { ("g", "metric") } else { ("M", "mass_matrix") };
+            let (maps, more) = picturing.mass_matrix(pair, &components, names, side);
+            self.figures.extend(maps);
+            if more > 0 {
+                let what = if metric { "metric" } else { "mass matrix" };
+                self.left_out.push(format!("maps of {more} components of the {what} beyond the first {MAPS}"));
+            }
+            if !metric && time.is_none() {
+                self.figures.extend(picturing.gyroscopic(pair, (side / 2).max(WORTH)));
+            }
+            self.figures.extend(picturing.friction(pair, &region.velocity));
+        }
+        if metric {
+            self.metric = components;
+            if (2..=MOST_COORDINATES).contains(&n) {
+                self.find_curvature(pair, &q, most, &picturing);
             }
         }
-        if maps.len() > MAPS {
-            self.left_out
-                .push(format!("maps of {} components of the metric beyond the first {MAPS}", maps.len() - MAPS));
-        }
-        self.figures.extend(maps.iter().take(MAPS).filter_map(quantity_figure));
     }
 
-    fn find_curvature(
-        &mut self,
-        (network, exact): (&NetworkLagrangian<f64>, Option<&dyn EulerLagrange<f64>>),
-        q: &[f64],
-        (factor, most): (f64, usize),
-        plane: &Plane,
-    ) {
+    /// Where pictures are drawn: over the recorded motion, or over the region; maps over the first two coordinates, those of space if there
+    /// are two.
+    fn picturing(&self, subject: &Subject<'_>, region: &Region, unit: String) -> Picturing {
+        let n = self.coordinates.len();
+        let shown = if n > 2 && subject.time_like() == Some(0) { [1, n - 1] } else { [0, (n - 1).min(1)] };
+        let (names, labels) = (self.coordinates.clone(), subject.labels.clone());
+        let of_region = Picturing { names, labels, ranges: region.position.clone(), shown, marks: Vec::new(), unit };
+        match subject.recorded {
+            Some(recording) => of_region.of_recording(recording),
+            None => of_region,
+        }
+    }
+
+    fn find_curvature(&mut self, pair: Pair<'_>, q: &[f64], most: usize, picturing: &Picturing) {
         let n = self.coordinates.len();
         let q = &q[..n * most.min(q.len() / n)];
+        let Pair { learned, exact, factor } = pair;
         // R of `s g` is `R/s`.
         let scaled = |values: Vec<f64>| values.iter().map(|r| r / factor).collect::<Vec<f64>>();
         self.curvature_scalar = Some(CurvatureScalar {
             factor,
-            learned: Spread::of(&scaled(curvature_scalars(network, q))),
+            learned: Spread::of(&scaled(curvature_scalars(learned, q))),
             exact: exact.map(|exact| Spread::of(&curvature_scalars(exact, q))),
         });
         let side = most.saturating_sub(q.len() / n).isqrt().min(POINTS.1);
@@ -327,10 +315,10 @@ impl Physics {
             self.left_out.push("map of the curvature scalar: too many weights for a picture in a second".into());
             return;
         }
-        let grid = |model: &dyn EulerLagrange<f64>| curvature_grid(model, &plane.middle, plane.axes(side));
-        let names = ["R", "Curvature scalar R of the metric", "curvature_scalar"].map(String::from);
-        let map = plane.map(names, grid(network).map(|r| r / factor), exact.map(grid));
-        self.figures.extend(quantity_figure(&map));
+        let grid = |model: &dyn EulerLagrange<f64>| curvature_grid(model, &picturing.middle(), picturing.axes(side));
+        let texts =
+            ["R", "Curvature scalar R of the metric over the coordinates", "curvature_scalar"].map(String::from);
+        self.figures.extend(picturing.map(texts, grid(learned).map(|r| r / factor), exact.map(grid)));
     }
 
     fn find_symmetries(&mut self, subject: &Subject<'_>, region: &Region, exact: Option<&dyn EulerLagrange<f64>>) {
@@ -385,8 +373,7 @@ impl Physics {
     fn find_certificate(&mut self, subject: &Subject<'_>, region: &Region) {
         let network = subject.network;
         let n = network.coordinates();
-        let time = subject.system.and_then(|system| system.system.time_like).or(network.architecture().time_like);
-        let signature = Signature::of(n, time.is_some());
+        let signature = Signature::of(n, subject.time_like().is_some());
         let boxes = BOXES_WORK / (network.weights().len() * n.pow(2)).max(1);
         let options = Options {
             seconds: f64::INFINITY,
@@ -418,26 +405,16 @@ impl Physics {
     }
 }
 
-/// Two coordinates with their ranges, and where the others are fixed.
-struct Plane {
-    shown: [(usize, [f64; 2]); 2],
-    labels: [String; 2],
-    middle: Vec<f64>,
-    fixed: String,
-}
-
-impl Plane {
-    fn axes(&self, points: usize) -> [Axis; 2] {
-        self.shown.map(|(component, [from, to])| Axis { component, from, to, points })
-    }
-
-    fn map(&self, [quantity, about, file]: [String; 3], learned: Grid, exact: Option<Grid>) -> QuantityMap {
-        let (labels, fixed) = (self.labels.clone(), self.fixed.clone());
-        QuantityMap { quantity, about, file, labels, learned, exact, fixed }
-    }
-}
-
 impl Subject<'_> {
+    fn time_like(&self) -> Option<usize> {
+        self.system.and_then(|system| system.system.time_like).or(self.network.architecture().time_like)
+    }
+
+    /// `true` if known forces drove the motion: they fix the unit of `L`.
+    fn is_forced(&self) -> bool {
+        self.recorded.is_some_and(|recording| recording.tracks.iter().any(|track| !track.force.is_empty()))
+    }
+
     /// The middle of the states that the model was trained on, of a known system of those on which errors are stated as well;
     /// angles go round.
     fn region(&self) -> Region {

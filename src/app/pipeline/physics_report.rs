@@ -13,18 +13,16 @@ fn shown(x: Option<f64>) -> String {
 }
 
 impl Physics {
-    /// Tables, pictures, and what is missing.
+    /// Tables, and what is missing; the pictures stand above all tables of a page.
     pub(crate) fn report(&self, report: Report) -> Report {
-        let about =
-            "Metric, curvature, symmetries and signature over the middle of the states that the model was trained on.";
+        let about = "Symmetries, charges and signature, of geodesics metric and curvature, over the middle of the states that the \
+                     model was trained on.";
         let report = self.curvature(self.metric(report.heading("Physics").paragraph(about)));
         let report = self.certificate(self.charges(self.symmetries(report)));
-        let report = if self.left_out.is_empty() {
-            report
-        } else {
-            report.paragraph(&format!("Left out: {}.", self.left_out.join("; ")))
-        };
-        if self.figures.is_empty() { report } else { report.figures(&self.figures) }
+        if self.left_out.is_empty() {
+            return report;
+        }
+        report.paragraph(&format!("Left out: {}.", self.left_out.join("; ")))
     }
 
     fn metric(&self, report: Report) -> Report {
@@ -37,7 +35,7 @@ impl Physics {
             .map(|component| {
                 let [i, j] = component.indices.map(|i| self.coordinates[i].as_str());
                 let numbers = [Some(component.learned), component.exact, component.error].map(shown);
-                [vec![format!("g_{i}_{j}")], numbers.to_vec()].concat()
+                [vec![format!("g[{i},{j}]")], numbers.to_vec()].concat()
             })
             .collect();
         report.table(&["metric at rest, root mean square", "learned", "exact", "difference"], &rows)

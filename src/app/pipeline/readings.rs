@@ -20,9 +20,15 @@ const SKY: &str = "sky.png";
 /// Pixels along the edge of a picture of the sky.
 const PIXELS: usize = 160;
 
-/// Captions of the pictures.
-const ORBITS_CAPTION: &str = "Orbits in the equator from the same states, exact and learned; the disc is the horizon.";
-const SKY_CAPTION: &str = "Shadow and sky of a checkerboard from 20 M: through the exact metric, through the learned one, and their difference.";
+/// Headings and captions of the pictures.
+const ORBITS_TEXTS: [&str; 2] = [
+    "Orbits around the hole: learned beside exact",
+    "Orbits in the equator from the same states, exact and learned; the disc is the horizon.",
+];
+const SKY_TEXTS: [&str; 2] = [
+    "The shadow of the hole, as the learned metric shows it",
+    "Shadow and sky of a checkerboard from 20 M: through the exact metric, through the learned one, and their difference.",
+];
 
 /// A row of an experiment: what its runs read, and the pictures of its first run.
 pub(crate) struct RowOfHoles {
@@ -39,15 +45,16 @@ pub(crate) struct RowOfHoles {
 impl RowOfHoles {
     /// The report with this row.
     pub fn add_to(&self, report: Report) -> Report {
-        let report = report.heading(&self.label).table(&READING_HEADER, &self.table);
+        let report = report.heading(&self.label);
         let report = match &self.orbits {
-            Some(svg) => report.image(svg, ORBITS_CAPTION),
+            Some(svg) => report.image(svg, ORBITS_TEXTS),
             None => report,
         };
-        match &self.sky {
-            Some(png) => report.pixels(png, SKY_CAPTION),
+        let report = match &self.sky {
+            Some(png) => report.pixels(png, SKY_TEXTS),
             None => report,
-        }
+        };
+        report.table(&READING_HEADER, &self.table)
     }
 }
 
@@ -102,7 +109,7 @@ pub(crate) fn read_hole(
     })?;
     output
         .write(READINGS, (serde_json::to_string_pretty(&readings).map_err(PipelineError::format)? + "\n").as_bytes())?;
-    orbits.map_or(Ok(()), |figure| output.write(ORBITS, figure.picture.to_svg().as_bytes()))?;
+    orbits.map_or(Ok(()), |picture| output.write(ORBITS, picture.to_svg().as_bytes()))?;
     sky.map_or(Ok(()), |png| output.write(SKY, &png))
 }
 

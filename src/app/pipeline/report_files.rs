@@ -6,8 +6,16 @@ use crate::pipeline::model::all_parameters;
 use crate::pipeline::{CAPTIONS, Output, PipelineError};
 use crate::report::{Figure, HistoryRow, Report, training_figures};
 use crate::training::{Epoch, StopReason};
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
+
+/// The texts of a picture, as [`CAPTIONS`] has them.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub(crate) struct Caption {
+    pub heading: String,
+    pub caption: String,
+}
 
 /// Writes [`CAPTIONS`], which name the pictures and tell what they show, the report, and the pictures.
 ///
@@ -18,7 +26,8 @@ pub(crate) fn write_report_and_figures<'a>(
     report: &Report,
     figures: impl Iterator<Item = &'a Figure> + Clone,
 ) -> Result<(), PipelineError> {
-    let captions: BTreeMap<&str, &str> = figures.clone().map(|f| (f.file.as_str(), f.caption.as_str())).collect();
+    let caption = |f: &Figure| Caption { heading: f.heading.clone(), caption: f.caption.clone() };
+    let captions: BTreeMap<&str, Caption> = figures.clone().map(|f| (f.file.as_str(), caption(f))).collect();
     output.write(CAPTIONS, serde_json::to_string_pretty(&captions).map_err(PipelineError::format)?.as_bytes())?;
     output.write("report.html", report.to_html().as_bytes())?;
     figures.into_iter().try_for_each(|figure| output.write(&figure.file, figure.picture.to_svg().as_bytes()))

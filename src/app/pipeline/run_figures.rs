@@ -4,6 +4,7 @@ use crate::experiments::{Experiment, Picture, Record, Run};
 use crate::names::counted;
 use crate::pipeline::CAPTIONS;
 use crate::pipeline::experiment_directory::ExperimentDirectory;
+use crate::pipeline::report_files::Caption;
 use crate::report::Report;
 use std::collections::BTreeMap;
 
@@ -29,19 +30,20 @@ fn place_in_report(file: &str) -> usize {
 const TAKEN: usize = 1 << 20;
 
 /// A picture that a run drew.
-pub(crate) struct Taken {
+pub(crate) struct RunPicture {
     svg: Vec<u8>,
+    heading: String,
     caption: String,
 }
 
 /// The report with as many pictures of runs as [`TAKEN`] allows, and where the others are.
-pub(crate) fn within(taken: Vec<Taken>, report: Report) -> Report {
+pub(crate) fn within(taken: Vec<RunPicture>, report: Report) -> Report {
     let (mut room, mut left) = (TAKEN, 0);
     let mut report = report;
-    for Taken { svg, caption, .. } in taken {
+    for RunPicture { svg, heading, caption } in taken {
         if svg.len() <= room {
             room -= svg.len();
-            report = report.image(&svg, &caption);
+            report = report.image(&svg, [&heading, &caption]);
         } else {
             left += 1;
         }
@@ -67,7 +69,7 @@ pub(crate) fn pictures_of_runs(
     experiment: &Experiment,
     results: &[(Run, Option<Record>)],
     store: &ExperimentDirectory,
-) -> Vec<Taken> {
+) -> Vec<RunPicture> {
     let mut figures = Vec::new();
     for prefix in experiment.pictures.iter().flat_map(|picture| match picture {
         Picture::Evaluation(prefixes) => *prefixes,
@@ -75,15 +77,13 @@ pub(crate) fn pictures_of_runs(
     }) {
         for (run, _) in results.iter().filter(|(_, record)| record.is_some()) {
             let read = |file: &str| store.read(&run.name, file);
-            let captions: BTreeMap<String, String> =
+            let captions: BTreeMap<String, Caption> =
                 read(CAPTIONS).and_then(|json| serde_json::from_slice(&json).ok()).unwrap_or_default();
             for file in pictures_of(store, &run.name, prefix) {
                 let Some(svg) = read(&file) else { continue };
-                let caption = match captions.get(&file) {
-                    Some(caption) => format!("{}: {caption}", run.label),
-                    None => run.label.clone(),
-                };
-                figures.push(Taken { svg, caption });
+                let Caption { heading, caption } = captions.get(&file).cloned().unwrap_or_default();
+                let heading = if heading.is_empty() { run.label.clone() } else { format!("{}: {heading}", run.label) };
+                figures.push(RunPicture { svg, heading, caption });
             }
         }
     }
@@ -121,7 +121,11 @@ mod tests {
         for file in ordered {
             std::fs::write(folder.join(file), b"x").unwrap();
         }
-        std::fs::write(folder.join(CAPTIONS), r#"{"det_mass_matrix.svg": "at rest"}"#).unwrap();
+        std::fs::write(
+            folder.join(CAPTIONS),
+            r#"{"det_mass_matrix.svg": {"heading": "at rest", "caption": "or not"}}"#,
+        )
+        .unwrap();
         let record = Record {
             outcome: Outcome::Nothing { reason: String::new() },
             losses: Vec::new(),
@@ -141,11 +145,13 @@ mod tests {
         };
         assert_eq!(found("double-pendulum"), ordered);
         let figures = pictures_of_runs(find("training-range").unwrap(), &results, &store);
-        assert_eq!(figures[0].caption, "Double pendulum: at rest");
-        assert_eq!(figures[1].caption, "Double pendulum");
+        assert_eq!((figures[0].heading.as_str(), figures[0].caption.as_str()), ("Double pendulum: at rest", "or not"));
+        assert_eq!((figures[1].heading.as_str(), figures[1].caption.as_str()), ("Double pendulum", ""));
         assert_eq!(found("training-range"), ["det_mass_matrix.svg", "det_mass_matrix_fast.svg"]);
         // A report stays small, and says what it leaves out.
-        let taken = |count| (0..count).map(|_| Taken { svg: vec![b'x'; 300_000], caption: "a".into() });
+        let taken = |count| {
+            (0..count).map(|_| RunPicture { svg: vec![b'x'; 300_000], heading: String::new(), caption: "a".into() })
+        };
         let page = |count| within(taken(count).collect(), Report::new("b")).to_html();
         assert!(page(3).matches("<img").count() == 3 && !page(3).contains("more in"));
         assert!(page(9).matches("<img").count() == 3 && page(9).contains("6 pictures more in the directories"));

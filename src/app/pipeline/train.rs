@@ -13,7 +13,7 @@ use crate::pipeline::checkpoints::Checkpoints;
 use crate::pipeline::evaluation::{Evaluation, EvaluationOptions, RTOL, STARTS, evaluate};
 use crate::pipeline::model::{all_parameters, trained_on};
 use crate::pipeline::report_files::{ended, history, parameter_table, training_pictures, write_report_and_figures};
-use crate::pipeline::{MODEL, Output, PipelineError, Watch, memory, start};
+use crate::pipeline::{MODEL, Output, PipelineError, SUMMARY, Watch, memory, start};
 use crate::report::Report;
 use crate::scalar::Scalar;
 use crate::training::{Epoch, ResumeOptions, Snapshot, StopReason, resume, training_memory};
@@ -194,7 +194,7 @@ fn train_in<S: Scalar>(
         evaluation: &evaluation,
     };
     let json = serde_json::to_string_pretty(&summary).map_err(PipelineError::format)? + "\n";
-    output.write("summary.json", json.as_bytes())?;
+    output.write(SUMMARY, json.as_bytes())?;
     write_report(output, system, &summary, &trained.history, &toml)?;
     let headline = headline(&summary);
     let learned = learned(&evaluation, (trained.validation_loss, instability), scale, (full, options.span));
@@ -308,8 +308,9 @@ fn write_report(
     let training = training_pictures(epochs);
     let report = Report::new(&format!("{}: learned", system.system.title));
     let report = summary.evaluation.summarise(report, &system.system.title).paragraph(&headline(summary));
-    let report = summary.evaluation.report(parameter_table(report, system)).heading("Training");
-    let report = report.figures(&training).heading("Configuration").preformatted(toml);
+    let report = summary.evaluation.pictures(report);
+    let report = summary.evaluation.report(parameter_table(report, system)).section("Training", &training);
+    let report = report.heading("Configuration").preformatted(toml);
     write_report_and_figures(output, &report, {
         let Evaluation { figures, physics, .. } = summary.evaluation;
         training.iter().chain(figures).chain(&physics.figures)

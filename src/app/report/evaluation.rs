@@ -1,6 +1,6 @@
 //! Pictures of the motions of an evaluation.
 
-use super::{Figure, Level, LinePlot, Series, Trace, Turn, file_part, kept, line_plot, trace_plot};
+use super::{Figure, Level, LinePlot, Series, Trace, Turn, figure, file_part, line_plot, trace_plot};
 use crate::analysis::{Portrait, TrajectoryRun, VALID, ValidTimes};
 use crate::lagrangian::SystemInstance;
 use crate::rollout::Trajectory;
@@ -14,7 +14,7 @@ const COORDINATES: usize = 8;
 const BEYOND_VALID: f64 = 4.0;
 
 /// Times and values of one quantity of a run.
-type Part<S> = fn(&TrajectoryRun<S>) -> (&[f64], &[f64]);
+type Part<'a, S> = &'a dyn Fn(&TrajectoryRun<S>) -> (&[f64], Vec<f64>);
 
 /// Pictures of trajectory tests, in the order of a report: coordinates of the first start over time, and velocities if the
 /// system has a time-like coordinate; every portrayed start in the plane of the system; the first start in the planes of
@@ -55,61 +55,64 @@ fn over_time<S>(system: &SystemInstance<S>, title: &str, y_label: &str, log_y: b
 }
 
 fn errors_over_time<S: Scalar>(figures: &mut Vec<Figure>, runs: &[TrajectoryRun<S>], system: &SystemInstance<S>) {
-    let mut units = system.system.units(system.coordinates);
-    units.truncate(system.coordinates);
-    units.sort();
-    units.dedup();
-    let coordinate_label = format!("largest error [{}]", units.join(", "));
-    let energy_label = "|E(t) \u{2212} E(0)| / |E(0)|";
-    let pictures: [(&str, &str, &str, Part<S>, &str); 4] = [
-        (
-            "prediction_error.svg",
-            "Prediction error",
-            "error / spread of the motion",
-            |run| (&run.coordinates.t, &run.relative),
-            "Error of the learned coordinates relative to the spread of the exact motion. The prediction is valid until it \
-             exceeds the level.",
-        ),
-        (
-            "coordinate_error.svg",
-            "Coordinate error",
-            &coordinate_label,
-            |run| (&run.coordinates.t, &run.coordinates.max),
-            "Largest coordinate error |q learned \u{2212} q exact| over the whole test, angles modulo 2\u{3c0}.",
-        ),
-        (
-            "energy_error.svg",
-            "Energy error",
-            energy_label,
-            |run| (&run.energy.t, &run.energy.error),
-            "Relative error of the exact energy along the learned motion.",
-        ),
-        (
-            "energy_drift.svg",
-            "Drift of the learned energy",
-            energy_label,
-            |run| (&run.drift.t, &run.drift.error),
-            "Relative drift of the learned energy along the learned motion: what the integrator loses.",
-        ),
-    ];
     let some = match runs.len() {
         count if count > LINES => format!(" The first {LINES} of {count} starts."),
         _ => String::new(),
     };
     let valid = ValidTimes::of(&runs.iter().map(|run| (run.valid, None)).collect::<Vec<_>>());
     let valid = valid.map_or(0.0, |valid| valid.median);
-    for (file, title, label, part, caption) in pictures {
-        let relative = file == "prediction_error.svg";
+    let mut add = |file: &str, [title, label, heading, caption]: [&str; 4], until: Option<f64>, part: Part<'_, S>| {
         let line = |(k, run): (usize, &TrajectoryRun<S>)| {
             let (t, y) = part(run);
-            let shown = if relative { t.partition_point(|t| *t <= BEYOND_VALID * valid) } else { t.len() };
+            let shown = until.map_or(t.len(), |until| t.partition_point(|t| *t <= until));
             Series::new(&format!("start {}", k + 1), &t[..shown], &y[..shown.min(y.len())])
         };
         let lines = runs.iter().take(LINES).enumerate().map(line).collect();
-        let level = relative.then(|| Level { value: VALID, name: format!("valid up to {VALID}") });
+        let level = until.map(|_| Level { value: VALID, name: format!("valid up to {VALID}") });
         let plot = LinePlot { level, ..over_time(system, title, label, true, lines) };
-        figures.extend(kept(file, line_plot(&plot), format!("{caption}{some}")));
+        figures.extend(figure(file, heading, line_plot(&plot), format!("{caption}{some}")));
+    };
+    let texts = [
+        "Prediction error",
+        "error / spread of the motion",
+        "How long the prediction holds",
+        "Error of the learned coordinates relative to the spread of the exact motion, one line per start. The prediction is \
+         valid until it exceeds the level.",
+    ];
+    let until = BEYOND_VALID * valid;
+    add("prediction_error.svg", texts, Some(until), &|run| (&run.coordinates.t, run.relative.clone()));
+    let groups = units(system);
+    for (unit, coordinates) in &groups {
+        let file = match groups.len() {
+            1 => "coordinate_error.svg".to_string(),
+            _ => format!("coordinate_error_{}.svg", file_part(unit)),
+        };
+        let label = format!("largest error [{unit}]");
+        let heading = format!("Error of the predicted coordinates in {unit}");
+        let caption =
+            "Largest |q learned \u{2212} q exact| of these coordinates over the whole test, angles modulo 2\u{3c0}.";
+        let texts = ["Coordinate error", &label, &heading, caption];
+        add(&file, texts, None, &|run| (&run.coordinates.t, run.coordinates.largest(coordinates)));
     }
+    let label = "|E(t) \u{2212} E(0)| / |E(0)|";
+    let caption = "Relative error of the exact energy along the learned motion.";
+    let texts = ["Energy error", label, "Whether the predicted motion keeps the true energy", caption];
+    add("energy_error.svg", texts, None, &|run| (&run.energy.t, run.energy.error.clone()));
+    let caption = "Relative drift of the learned energy along the learned motion: what the integrator loses.";
+    let texts = ["Drift of the learned energy", label, "Whether the integrator keeps the learned energy", caption];
+    add("energy_drift.svg", texts, None, &|run| (&run.drift.t, run.drift.error.clone()));
+}
+
+/// Units of the coordinates, each with the coordinates that have it, in their order.
+pub(crate) fn units<S>(system: &SystemInstance<S>) -> Vec<(String, Vec<usize>)> {
+    let mut groups: Vec<(String, Vec<usize>)> = Vec::new();
+    for (i, coordinate) in system.system.coordinates(system.coordinates).iter().enumerate() {
+        match groups.iter_mut().find(|(unit, _)| *unit == coordinate.unit) {
+            Some((_, members)) => members.push(i),
+            None => groups.push((coordinate.unit.to_string(), vec![i])),
+        }
+    }
+    groups
 }
 
 /// Coordinates of the first start, and velocities if there is a time-like coordinate: rates of clocks.
@@ -134,8 +137,9 @@ fn first_over_time<S: Scalar>(figures: &mut Vec<Figure>, pair: Pair<'_, S>, syst
         let kind = if k < n { "trajectory" } else { "velocity" };
         let file = format!("{kind}_{}.svg", file_part(&coordinate.name));
         let folded = if turn.is_some() { ", folded into one turn" } else { "" };
-        let caption = format!("{column} of start 1 over time, exact and learned{folded}.");
-        figures.extend(kept(&file, line_plot(&LinePlot { turn, ..plot }), caption));
+        let heading = format!("{column} over time: predicted beside exact");
+        let caption = format!("{column} of start 1, exact (wide) and learned{folded}.");
+        figures.extend(figure(&file, heading, line_plot(&LinePlot { turn, ..plot }), caption));
     }
 }
 
@@ -156,10 +160,11 @@ fn traces<S: Scalar>(figures: &mut Vec<Figure>, portraits: &[Portrait<S>], syste
         let start = k + 1;
         let [x_label, y_label] = plane.labels.map(String::from);
         let time = from_dark_to_bright(exact, &system.system.time_unit);
-        let caption = format!("Path of start {start} in the plane, exact and learned, {time}.");
+        let heading = format!("The path of start {start}: predicted beside exact");
+        let caption = format!("Path in the plane, exact and learned, {time}.");
         let paths = vec![path("exact", exact), path("learned", learned)];
         let trace = Trace { title: format!("Start {start}"), x_label, y_label, paths, equal: true, turn: None };
-        figures.extend(kept(&format!("trace_start{start}.svg"), trace_plot(&trace), caption));
+        figures.extend(figure(&format!("trace_start{start}.svg"), heading, trace_plot(&trace), caption));
     }
 }
 
@@ -185,8 +190,9 @@ fn phases<S: Scalar>(figures: &mut Vec<Figure>, pair: Pair<'_, S>, system: &Syst
         };
         let (q, v) = (&columns[i], &columns[n + i]);
         let time = from_dark_to_bright(pair[0].1, &system.system.time_unit);
+        let heading = format!("Phase space of {q}: predicted beside exact");
         let caption = format!("Start 1 in the plane of {q} and {v}, exact and learned, {time}.");
-        figures.extend(kept(&format!("phase_{}.svg", file_part(q)), trace_plot(&trace), caption));
+        figures.extend(figure(&format!("phase_{}.svg", file_part(q)), heading, trace_plot(&trace), caption));
     }
 }
 
@@ -239,6 +245,24 @@ mod tests {
     }
 
     #[test]
+    fn errors_of_unlike_units_have_pictures_of_their_own() {
+        let system = configure::<f64>("spring-pendulum", &[]).unwrap();
+        let exact = system.build().unwrap();
+        let groups = units(&system);
+        assert_eq!(
+            groups.iter().map(|(unit, members)| (unit.as_str(), members.len())).collect::<Vec<_>>(),
+            [("m", 1), ("rad", 1)]
+        );
+        let start = system.system.trajectory(2).start;
+        let bounds = StartBox { q: start.positions, v: start.velocities };
+        let test = TrajectoryTest { starts: 1, t_end: 1.0, dt: 0.05, ..TrajectoryTest::new(bounds, vec![false, true]) };
+        let runs = test.run(exact.as_ref(), exact.as_ref());
+        let figures = evaluation_figures(&runs, &[], &system);
+        let expected = ["coordinate_error_m.svg", "coordinate_error_rad.svg"];
+        assert!(expected.iter().all(|file| files(&figures).contains(file)), "{:?}", files(&figures));
+    }
+
+    #[test]
     fn rates_of_clocks_are_shown_where_there_is_a_time() {
         let system = configure::<f64>("ads2-geodesic", &[]).unwrap();
         let exact = system.build().unwrap();
@@ -251,6 +275,7 @@ mod tests {
         let motions = ["trajectory_t.svg", "trajectory_z.svg", "velocity_t.svg", "velocity_z.svg", "trace_start1.svg"];
         assert_eq!(files(&figures)[..5], motions);
         assert!(figures[2].caption.starts_with("t_dot of start 1"));
+        assert!(figures.iter().all(|figure| !figure.heading.is_empty()));
         let states = &runs[0].exact.trajectory;
         assert_eq!((component(states, 1)[3], component(states, 2)[3]), (states.state(3).0[1], states.state(3).1[0]));
     }

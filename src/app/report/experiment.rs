@@ -1,30 +1,47 @@
 //! Tables and pictures of an experiment: the paper's figures beside ours.
 
-use super::{Figure, LinePlot, Series, kept, line_plot};
+use super::{DataTable, Figure, LinePlot, Series, figure, line_plot};
 use crate::experiments::{Experiment, Outcome, Picture, Record, Reduction, Row, Run, Spread};
 use crate::names::rounded;
+use serde_json::json;
 
-/// Header of the table of an experiment: names of columns in files, of our figures and of the paper's beside them.
-pub const EXPERIMENT_HEADER: [&str; 16] = [
-    "run",
-    "runs",
-    "loss",
-    "loss paper",
-    "instability",
-    "instability paper",
-    "energy error",
-    "energy error paper",
-    "of regular motions",
-    "of regular motions paper",
-    "of chaotic motions",
-    "of chaotic motions paper",
-    "integrated",
-    "wrong signature",
-    "physical loss",
-    "physical instability",
+/// A quantity of a row, and the paper's figure beside it if it states one.
+type Quantity = (&'static str, fn(&Row) -> Option<Spread>, Option<fn(&Row) -> Option<f64>>);
+
+/// Quantities of the table of an experiment, in the order of its columns.
+const QUANTITIES: [Quantity; 8] = [
+    ("loss", |row| row.loss, Some(|row| row.reported.loss)),
+    ("instability", |row| row.instability, Some(|row| row.reported.instability)),
+    ("energy_error", |row| row.energy, Some(|row| row.reported.energy)),
+    ("regular_energy_error", |row| row.regular_energy, Some(|row| row.reported.regular_energy)),
+    ("chaotic_energy_error", |row| row.chaotic_energy, Some(|row| row.reported.chaotic_energy)),
+    ("wrong_signature", |row| row.wrong_signature, None),
+    ("physical_loss", |row| row.normalised_loss, None),
+    ("physical_instability", |row| row.normalised_instability, None),
 ];
 
-/// The same for people, with units.
+/// Rows of an experiment as numbers: of every quantity median, lowest and highest over the runs, and the paper's figure where it may state
+/// one; losses and instabilities in the paper's convention, errors and wrong signatures as fractions.
+pub fn experiment_table(rows: &[Row]) -> DataTable {
+    let mut header = ["row", "runs", "failed", "integrated", "starts"].map(String::from).to_vec();
+    for (name, _, paper) in QUANTITIES {
+        header.extend(["median", "low", "high"].map(|which| format!("{name}_{which}")));
+        header.extend(paper.map(|_| format!("{name}_paper")));
+    }
+    let cells = |row: &Row| {
+        let mut cells = vec![json!(row.label), json!(row.runs), json!(row.failed)];
+        cells.extend([json!(row.integrated.0), json!(row.integrated.1)]);
+        for (_, of, paper) in QUANTITIES {
+            let spread = of(row);
+            cells.extend([spread.map(|s| s.median), spread.map(|s| s.low), spread.map(|s| s.high)].map(|x| json!(x)));
+            cells.extend(paper.map(|paper| json!(paper(row))));
+        }
+        cells
+    };
+    DataTable { header, rows: rows.iter().map(cells).collect() }
+}
+
+/// Header of the table for people, with units.
 const VIEW_HEADER: [&str; 16] = [
     "run",
     "runs",
@@ -62,64 +79,48 @@ pub fn reduction_table(reductions: &[(Reduction, Option<f64>)]) -> Vec<Vec<Strin
 /// Stands where there is no figure.
 const NONE: &str = "-";
 
-/// A figure of a table: so many times as large, with so many digits.
-#[derive(Clone, Copy)]
-struct Figures {
-    /// Of a fraction.
-    fraction: f64,
-    /// Significant digits.
-    digits: usize,
+/// A number with three digits, so many times as large.
+fn one(x: Option<f64>, factor: f64) -> String {
+    x.map_or_else(|| NONE.to_string(), |x| rounded(factor * x, 3))
 }
 
-impl Figures {
-    fn one(self, x: Option<f64>, factor: f64) -> String {
-        x.map_or_else(|| NONE.to_string(), |x| rounded(factor * x, self.digits))
-    }
-
-    /// A spread as `mean [low, high]`, or the value alone where there is no spread.
-    fn spread(self, value: Option<Spread>, factor: f64) -> String {
-        let Some(Spread { mean, low, high }) = value else { return NONE.to_string() };
-        let [mean, low, high] = [mean, low, high].map(|x| (x, self.one(Some(x), factor)));
-        if low.0 == high.0 { mean.1 } else { format!("{} [{}, {}]", mean.1, low.1, high.1) }
-    }
-
-    fn row(self, row: &Row) -> Vec<String> {
-        let runs = if row.failed == 0 { row.runs.to_string() } else { format!("{} ({} failed)", row.runs, row.failed) };
-        let reported = row.reported;
-        vec![
-            row.label.clone(),
-            runs,
-            self.spread(row.loss, 1.0),
-            self.one(reported.loss, 1.0),
-            self.spread(row.instability, 1.0),
-            self.one(reported.instability, 1.0),
-            self.spread(row.energy, self.fraction),
-            self.one(reported.energy, self.fraction),
-            self.spread(row.regular_energy, self.fraction),
-            self.one(reported.regular_energy, self.fraction),
-            self.spread(row.chaotic_energy, self.fraction),
-            self.one(reported.chaotic_energy, self.fraction),
-            format!("{}/{}", row.integrated.0, row.integrated.1),
-            self.spread(row.wrong_signature, self.fraction),
-            self.spread(row.normalised_loss, 1.0),
-            self.spread(row.normalised_instability, 1.0),
-        ]
-    }
+/// A spread as `mean [low, high]`, or the value alone where there is no spread.
+fn spread(value: Option<Spread>, factor: f64) -> String {
+    let Some(Spread { mean, low, high, .. }) = value else { return NONE.to_string() };
+    let [mean, least, most] = [mean, low, high].map(|x| one(Some(x), factor));
+    if low == high { mean } else { format!("{mean} [{least}, {most}]") }
 }
 
-/// Rows of the paper's table beside ours, below [`EXPERIMENT_HEADER`]; losses and instabilities in the paper's convention,
-/// errors and wrong signatures as fractions, the mean over the runs with the lowest and the highest.
-pub fn experiment_table(rows: &[Row]) -> Vec<Vec<String>> {
-    rows.iter().map(|row| Figures { fraction: 1.0, digits: 4 }.row(row)).collect()
+fn view(row: &Row) -> Vec<String> {
+    let runs = if row.failed == 0 { row.runs.to_string() } else { format!("{} ({} failed)", row.runs, row.failed) };
+    let reported = row.reported;
+    vec![
+        row.label.clone(),
+        runs,
+        spread(row.loss, 1.0),
+        one(reported.loss, 1.0),
+        spread(row.instability, 1.0),
+        one(reported.instability, 1.0),
+        spread(row.energy, 100.0),
+        one(reported.energy, 100.0),
+        spread(row.regular_energy, 100.0),
+        one(reported.regular_energy, 100.0),
+        spread(row.chaotic_energy, 100.0),
+        one(reported.chaotic_energy, 100.0),
+        format!("{}/{}", row.integrated.0, row.integrated.1),
+        spread(row.wrong_signature, 100.0),
+        spread(row.normalised_loss, 1.0),
+        spread(row.normalised_instability, 1.0),
+    ]
 }
 
-/// The same for people, with its header: fractions in per cent, three digits; no column without a figure, neither of ours nor
-/// of the paper's beside it.
+/// Rows for people, with their header: the mean over the runs with the lowest and the highest, fractions in per cent, three digits; no
+/// column without a figure, neither of ours nor of the paper's beside it, and none of the paper's without any.
 pub fn experiment_view(rows: &[Row]) -> (Vec<&'static str>, Vec<Vec<String>>) {
-    let all: Vec<Vec<String>> = rows.iter().map(|row| Figures { fraction: 100.0, digits: 3 }.row(row)).collect();
-    let told = |k: usize| all.iter().any(|row| row[k] != NONE);
-    let beside = |k: usize| VIEW_HEADER[k].contains(" here ") && told(k + 1);
-    let shown: Vec<usize> = (0..VIEW_HEADER.len()).filter(|&k| told(k) || beside(k)).collect();
+    let all: Vec<Vec<String>> = rows.iter().map(view).collect();
+    let known = |k: usize| all.iter().any(|row| row[k] != NONE);
+    let beside = |k: usize| VIEW_HEADER[k].contains(" here ") && known(k + 1);
+    let shown: Vec<usize> = (0..VIEW_HEADER.len()).filter(|&k| known(k) || beside(k)).collect();
     let pick = |row: &Vec<String>| shown.iter().map(|&k| row[k].clone()).collect();
     (shown.iter().map(|&k| VIEW_HEADER[k]).collect(), all.iter().map(pick).collect())
 }
@@ -160,12 +161,13 @@ fn reached(curves: &[Curve]) -> Vec<Series> {
 /// Pictures of an experiment from its finished runs, and `curves` where time matters; what has nothing to show is left out.
 pub fn experiment_figures(experiment: &Experiment, results: &[(Run, Option<Record>)], curves: &[Curve]) -> Vec<Figure> {
     let mut figures = Vec::new();
-    let mut add = |file: &str, caption: String, plot: LinePlot| {
-        figures.extend(kept(&format!("{file}.svg"), line_plot(&plot), caption));
+    let mut add = |file: &str, heading: &str, caption: String, plot: LinePlot| {
+        figures.extend(figure(&format!("{file}.svg"), heading, line_plot(&plot), caption));
     };
     for (part, word) in [(0, "training"), (1, "validation")] {
         add(
             &format!("{word}_loss"),
+            &format!("How the {word} loss falls from epoch to epoch"),
             format!("Geometric mean of the {word} losses of each group of runs, paper convention."),
             LinePlot {
                 title: format!("{}: {word} loss", experiment.title),
@@ -182,6 +184,7 @@ pub fn experiment_figures(experiment: &Experiment, results: &[(Run, Option<Recor
         match picture {
             Picture::Scan { abscissa } => add(
                 "scan",
+                &format!("Which {abscissa} gives the lowest loss"),
                 format!(
                     "Lowest validation loss of each run against {abscissa}; runs without {abscissa} as a level line."
                 ),
@@ -197,6 +200,7 @@ pub fn experiment_figures(experiment: &Experiment, results: &[(Run, Option<Recor
             ),
             Picture::TradeOff => add(
                 "trade_off",
+                "Accuracy against stability of the training",
                 "Lowest validation loss against training instability, one point per run; lower left is better.".into(),
                 LinePlot {
                     title: format!("{}: loss against instability", experiment.title),
@@ -210,6 +214,7 @@ pub fn experiment_figures(experiment: &Experiment, results: &[(Run, Option<Recor
             ),
             Picture::Clock => add(
                 "time_to_accuracy",
+                "Which accuracy is reached after which time",
                 "Lowest validation loss so far against seconds of training, paper convention.".into(),
                 LinePlot {
                     title: experiment.title.into(),
@@ -314,7 +319,7 @@ mod tests {
 
     #[test]
     fn our_figures_and_the_papers_stand_side_by_side() {
-        let spread = |mean: f64, by: f64| Some(Spread { mean, low: mean - by, high: mean + by });
+        let spread = |mean: f64, by: f64| Some(Spread { mean, median: mean, low: mean - by, high: mean + by });
         let row = Row {
             label: "triple-pendulum".into(),
             runs: 3,
@@ -343,7 +348,14 @@ mod tests {
         assert_eq!((at("chaotic motions here [%]"), at("chaotic motions paper [%]")), ("0.290", "19.0"));
         // Columns of nothing are left out, for people only.
         assert!(!header.iter().any(|name| name.contains("instability") || *name == "energy error paper [%]"));
-        let file = experiment_table(&[row]);
-        assert_eq!((file[0].len(), file[0][8].as_str(), file[0][9].as_str()), (16, "0.0004600", "0.005800"));
+        let file = experiment_table(&[row]).objects().remove(0);
+        let number = |name: &str| file[name].as_f64();
+        let loss = ["loss_median", "loss_low", "loss_high", "loss_paper"].map(number);
+        assert_eq!(loss, [Some(0.0123456), Some(0.0113456), Some(0.0133456), Some(0.01972)]);
+        assert_eq!(
+            (number("regular_energy_error_median"), number("regular_energy_error_paper")),
+            (Some(4.6e-4), Some(0.0058))
+        );
+        assert!(file["instability_median"].is_null() && file["failed"] == 0 && file["starts"] == 12);
     }
 }

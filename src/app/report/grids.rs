@@ -20,6 +20,8 @@ pub enum Fit {
 pub struct GridComparison {
     /// Name of the quantity, such as `L` or `det M`.
     pub quantity: String,
+    /// What the picture shows, above it.
+    pub heading: String,
     /// Beginning of the file name.
     pub file: String,
     /// Label of the horizontal axis, with unit.
@@ -98,7 +100,8 @@ pub fn grid_figures(comparison: &GridComparison) -> Result<(Figure, Option<Affin
         (None, _) => String::new(),
     };
     let caption = format!("{quantity}{fixed}: exact, {learned}, and the difference.{signs}");
-    Ok((Figure { file: format!("{}.svg", comparison.file), picture, caption }, fit))
+    let (file, heading) = (format!("{}.svg", comparison.file), comparison.heading.clone());
+    Ok((Figure { file, heading, picture, caption }, fit))
 }
 
 #[cfg(test)]
@@ -118,6 +121,7 @@ mod tests {
         let exact = grid(&PENDULUM);
         let mut comparison = GridComparison {
             quantity: "L".into(),
+            heading: "The Lagrangian".into(),
             file: "lagrangian".into(),
             x_label: "theta [rad]".into(),
             y_label: "theta_dot [rad/s]".into(),

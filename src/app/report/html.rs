@@ -12,6 +12,7 @@ const STYLE: &str = "\
 body{margin:0 auto;padding:2.5rem 1.25rem 4rem;max-width:67rem;background:var(--page);color:var(--text);\
 font:16px/1.55 system-ui,-apple-system,\"Segoe UI\",Roboto,sans-serif}
 h1{font-size:1.9rem;line-height:1.2;margin:0 0 1rem}
+h3{font-size:1.02rem;line-height:1.35;margin:0 0 .45rem}
 h2{font-size:1.3rem;margin:2.5rem 0 .75rem;padding-bottom:.3rem;border-bottom:1px solid var(--line)}
 p{margin:.75rem 0}
 .scroll{overflow-x:auto;margin:1rem 0}
@@ -96,42 +97,50 @@ impl Report {
         self
     }
 
+    /// Adds a heading and pictures; nothing if there are none.
+    #[must_use]
+    pub fn section<'a>(self, heading: &str, figures: impl IntoIterator<Item = &'a Figure>) -> Self {
+        let mut figures = figures.into_iter().peekable();
+        if figures.peek().is_none() { self } else { self.heading(heading).figures(figures) }
+    }
+
     /// Adds pictures, beside each other where there is room; those of several panels have a row of their own.
     #[must_use]
     pub fn figures<'a>(mut self, figures: impl IntoIterator<Item = &'a Figure>) -> Self {
         self.body.push_str("<div class=\"figures\">\n");
-        for Figure { picture, caption, .. } in figures {
+        for Figure { heading, picture, caption, .. } in figures {
             let class = if picture.panels() > 1 { " class=\"wide\"" } else { "" };
-            let (panels, caption) = (picture.to_html(caption), escape(caption));
+            let panels = picture.to_html(if caption.is_empty() { heading } else { caption });
+            let (heading, caption) = (above(heading), escape(caption));
             let _ = writeln!(
                 self.body,
-                "<figure{class}><div class=\"panels\">{panels}</div><figcaption>{caption}</figcaption></figure>"
+                "<figure{class}>{heading}<div class=\"panels\">{panels}</div><figcaption>{caption}</figcaption></figure>"
             );
         }
         self.body.push_str("</div>\n");
         self
     }
 
-    /// Adds a picture from the bytes of a PNG file.
+    /// Adds a picture from the bytes of a PNG file, with its heading and its caption.
     #[must_use]
-    pub fn pixels(self, png: &[u8], caption: &str) -> Self {
-        self.figure(("image/png", png), "", caption)
+    pub fn pixels(self, png: &[u8], texts: [&str; 2]) -> Self {
+        self.figure(("image/png", png), "", texts)
     }
 
-    /// Adds a picture from the bytes of an SVG file, which can do nothing but be seen.
+    /// Adds a picture from the bytes of an SVG file, with its heading and its caption, which can do nothing but be seen.
     #[must_use]
-    pub fn image(self, svg: &[u8], caption: &str) -> Self {
+    pub fn image(self, svg: &[u8], texts: [&str; 2]) -> Self {
         // Panels that cannot wrap are scrolled where there is no room for them.
         let panels = svg.windows(8).filter(|bytes| bytes == b"\n<svg x=").count();
-        self.figure(("image/svg+xml", svg), if panels > 1 { " class=\"panels\"" } else { "" }, caption)
+        self.figure(("image/svg+xml", svg), if panels > 1 { " class=\"panels\"" } else { "" }, texts)
     }
 
-    /// A picture of a media type, with attributes, over its caption.
-    fn figure(mut self, (media, bytes): (&str, &[u8]), attributes: &str, caption: &str) -> Self {
-        let (data, caption) = (base64(bytes), escape(caption));
+    /// A picture of a media type, with attributes, between its heading and its caption.
+    fn figure(mut self, (media, bytes): (&str, &[u8]), attributes: &str, [heading, caption]: [&str; 2]) -> Self {
+        let (data, heading, caption) = (base64(bytes), above(heading), escape(caption));
         let _ = writeln!(
             self.body,
-            "<figure><div class=\"scroll\"><img{attributes} alt=\"{caption}\" src=\"data:{media};base64,{data}\"></div>\
+            "<figure>{heading}<div class=\"scroll\"><img{attributes} alt=\"{caption}\" src=\"data:{media};base64,{data}\"></div>\
              <figcaption>{caption}</figcaption></figure>"
         );
         self
@@ -161,6 +170,11 @@ impl Report {
     }
 }
 
+/// The heading of a picture; nothing of an empty one.
+fn above(heading: &str) -> String {
+    if heading.is_empty() { String::new() } else { format!("<h3>{}</h3>", escape(heading)) }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -178,22 +192,26 @@ mod tests {
             turn: None,
             level: None,
         };
-        let figure = Figure { file: String::new(), picture: line_plot(&plot).unwrap(), caption: evil.into() };
+        let (file, picture) = (String::new(), line_plot(&plot).unwrap());
+        let figure = Figure { file, heading: evil.into(), picture, caption: evil.into() };
         let html = Report::new(evil)
             .heading(evil)
             .paragraph(evil)
             .preformatted(evil)
             .table(&[evil], &[vec![evil, "1.5e-3"]])
             .summary(evil, &[[evil.to_string(), evil.to_string()]])
-            .image(&[1, 2, 3], evil)
+            .image(&[1, 2, 3], [evil; 2])
             .figures(&[figure])
             .to_html();
         assert!(!html.contains("<script") && !html.contains("http") && !html.contains('\u{0}'));
-        // Title, header of the page, heading, paragraph, preformatted, two cells; sentence and two cells; two of the image; the
-        // figure: description, caption, title, two labels.
-        assert_eq!(html.matches("&lt;script&gt;alert(&#39;1&#39; &amp; &quot;2&quot;)&lt;/script&gt;").count(), 17);
+        // Title, header of the page, heading, paragraph, preformatted, two cells; sentence and two cells; three of the image; the
+        // figure: heading, description, caption, title, two labels.
+        assert_eq!(html.matches("&lt;script&gt;alert(&#39;1&#39; &amp; &quot;2&quot;)&lt;/script&gt;").count(), 19);
         assert!(html.contains("data:image/svg+xml;base64,AQID\""));
         assert!(html.contains("<td class=\"number\">1.5e-3</td>"));
         assert!(html.contains("prefers-color-scheme:dark"));
+        // A picture stands under what it shows.
+        let place = |part: &str| html.rfind(part).unwrap();
+        assert!(place("<h3>") < place("class=\"panels\"") && place("class=\"panels\"") < place("<figcaption>"));
     }
 }

@@ -1,6 +1,7 @@
 //! Plots, tables and the HTML report.
 
 mod base64;
+mod data_table;
 mod escape;
 mod evaluation;
 mod experiment;
@@ -15,8 +16,9 @@ mod test_pictures;
 mod training;
 mod turn;
 
-pub(crate) use evaluation::evaluation_figures;
-pub use experiment::{Curve, EXPERIMENT_HEADER};
+pub use data_table::DataTable;
+pub(crate) use evaluation::{evaluation_figures, units};
+pub use experiment::Curve;
 pub(crate) use experiment::{
     REDUCTION_HEADER, experiment_curves, experiment_figures, experiment_table, experiment_view, reduction_table,
 };
@@ -37,19 +39,26 @@ pub(crate) use turn::Turn;
 pub struct Figure {
     /// File name without directory, with `.svg`.
     pub file: String,
+    /// What the picture shows, in a few words above it; may be empty.
+    pub heading: String,
     /// The drawing.
     pub picture: Picture,
-    /// Description of what the picture shows.
+    /// How to read it, in sentences below it.
     pub caption: String,
 }
 
-/// A figure of what was drawn; none where there was nothing to show.
-pub fn kept(file: &str, drawn: Result<Picture, PlotError>, caption: String) -> Option<Figure> {
+/// A figure of what was drawn, under a heading; none where there was nothing to show.
+pub(crate) fn figure(
+    file: &str,
+    heading: impl Into<String>,
+    drawn: Result<Picture, PlotError>,
+    caption: impl Into<String>,
+) -> Option<Figure> {
     let picture = drawn.ok()?;
-    Some(Figure { file: file.to_string(), picture, caption })
+    Some(Figure { file: file.to_string(), heading: heading.into(), picture, caption: caption.into() })
 }
 
 /// A name as part of a file name.
-fn file_part(name: &str) -> String {
+pub(crate) fn file_part(name: &str) -> String {
     name.chars().map(|c| if c.is_ascii_alphanumeric() || c == '_' { c } else { '_' }).collect()
 }

@@ -1,6 +1,6 @@
 //! Map of one quantity of a model over two coordinates, beside the exact one if that is known.
 
-use super::{Figure, HeatMap, file_part, heat_maps, kept};
+use super::{Figure, HeatMap, figure, file_part, heat_maps};
 use crate::analysis::{Grid, Spread};
 use crate::names::rounded;
 
@@ -9,7 +9,7 @@ use crate::names::rounded;
 pub(crate) struct QuantityMap {
     /// Symbol, such as `R`.
     pub quantity: String,
-    /// Beginning of the caption, such as `Curvature scalar R of the metric`.
+    /// Heading of the picture, such as `Curvature scalar R of the metric`.
     pub about: String,
     /// Beginning of the file name, made fit for one.
     pub file: String,
@@ -21,6 +21,10 @@ pub(crate) struct QuantityMap {
     pub exact: Option<Grid>,
     /// Coordinates that are fixed, in words; may be empty.
     pub fixed: String,
+    /// Further sentences of the caption; may be empty.
+    pub remark: String,
+    /// Points to mark in the learned map.
+    pub marks: Vec<(f64, f64)>,
 }
 
 /// One panel of a picture, without marks and with the colours of its own extremes.
@@ -55,7 +59,7 @@ pub(crate) fn quantity_figure(map: &QuantityMap) -> Option<Figure> {
         range: Some((low, high)),
         ..panel(format!("{} {what}", map.quantity), &map.labels, grid)
     };
-    let mut panels = vec![same("learned", &map.learned)];
+    let mut panels = vec![HeatMap { marks: map.marks.clone(), ..same("learned", &map.learned) }];
     if let Some(exact) = &map.exact {
         if constant.is_none() {
             panels.insert(0, same("exact", exact));
@@ -64,14 +68,15 @@ pub(crate) fn quantity_figure(map: &QuantityMap) -> Option<Figure> {
         let Spread { low, high, .. } = all(&difference);
         panels.push(HeatMap { range: Some((low, high)), ..difference_panel(&map.labels, &difference) });
     }
-    let fixed = if map.fixed.is_empty() { String::new() } else { format!(" at {}", map.fixed) };
+    let fixed = if map.fixed.is_empty() { String::new() } else { format!("At {}.", map.fixed) };
     let beside = match (constant, &map.exact) {
-        (Some(exact), _) => format!("; the exact one is {} everywhere", rounded(exact.median, 6)),
-        (None, Some(_)) => ", exact and learned".to_string(),
+        (Some(exact), _) => format!("The exact one is {} everywhere.", rounded(exact.median, 6)),
+        (None, Some(_)) => "Exact, learned, and the difference.".to_string(),
         (None, None) => String::new(),
     };
-    let caption = format!("{}{fixed}{beside}.", map.about);
-    kept(&format!("{}.svg", file_part(&map.file)), heat_maps(&panels), caption)
+    let sentences = [&beside, &fixed, &map.remark].into_iter().filter(|text| !text.is_empty()).cloned();
+    let caption = sentences.collect::<Vec<_>>().join(" ");
+    figure(&format!("{}.svg", file_part(&map.file)), map.about.as_str(), heat_maps(&panels), caption)
 }
 
 #[cfg(test)]
@@ -92,6 +97,8 @@ mod tests {
             learned: grid(&|k| 2.0 + 0.01 * k),
             exact,
             fixed: "r = 4".into(),
+            remark: String::new(),
+            marks: Vec::new(),
         };
         let panels = |exact| {
             let figure = quantity_figure(&map(exact)).unwrap();
@@ -100,9 +107,9 @@ mod tests {
             save(&[figure]);
             found
         };
-        let alone = "Curvature scalar R of the metric at r = 4.".to_string();
+        let alone = "At r = 4.".to_string();
         assert_eq!(panels(None), (1, alone));
-        let constant = "Curvature scalar R of the metric at r = 4; the exact one is 2.00000 everywhere.".to_string();
+        let constant = "The exact one is 2.00000 everywhere. At r = 4.".to_string();
         assert_eq!(panels(Some(grid(&|_| 2.0))), (2, constant));
         assert_eq!(panels(Some(grid(&|k| k))).0, 3);
         let nothing = QuantityMap { learned: grid(&|_| f64::NAN), ..map(None) };

@@ -1,7 +1,7 @@
 //! Tables of what learned metrics say of black holes.
 
 use crate::experiments::Spread;
-use crate::names::{hundredths, rounded};
+use crate::names::{percentage, rounded};
 use crate::relativity::Reading;
 
 /// Header of [`reading_table`].
@@ -20,13 +20,14 @@ fn line(reading: &Reading, runs: &[Vec<Reading>]) -> Vec<String> {
     let all: Vec<Reading> = runs.iter().filter_map(same).collect();
     let dash = || "-".to_string();
     let digits = |x: f64| rounded(x, 5);
-    let learned = Spread::of(all.iter().filter_map(|r| r.learned)).map_or_else(dash, |Spread { mean, low, high }| {
-        if low == high { digits(mean) } else { format!("{} [{}, {}]", digits(mean), digits(low), digits(high)) }
-    });
+    let learned =
+        Spread::of(all.iter().filter_map(|r| r.learned)).map_or_else(dash, |Spread { mean, low, high, .. }| {
+            if low == high { digits(mean) } else { format!("{} [{}, {}]", digits(mean), digits(low), digits(high)) }
+        });
     let mut errors: Vec<f64> = all.iter().filter_map(|r| r.error).filter(|e| e.is_finite()).collect();
     errors.sort_by(f64::total_cmp);
     let (median, largest) = (errors.get(errors.len() / 2).copied(), errors.last().copied());
-    let largest = largest.map_or_else(dash, hundredths);
+    let largest = largest.map_or_else(dash, percentage);
     let largest = match (errors.len(), runs.len()) {
         (found, runs) if found < runs => format!("{largest} ({found} of {runs} runs)"),
         _ => largest,
@@ -35,9 +36,9 @@ fn line(reading: &Reading, runs: &[Vec<Reading>]) -> Vec<String> {
         reading.quantity.clone(),
         reading.exact.map_or_else(dash, digits),
         learned,
-        median.map_or_else(dash, hundredths),
+        median.map_or_else(dash, percentage),
         largest,
-        hundredths(reading.aim),
+        percentage(reading.aim),
     ]
 }
 

@@ -1,6 +1,7 @@
 //! Pictures of a training.
 
-use super::{Figure, LinePlot, Series, kept, line_plot};
+use super::{Figure, LinePlot, Series, figure, line_plot};
+use crate::names::rounded;
 
 /// One epoch. Quantities that a training does not have are `NaN`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,13 +33,14 @@ pub fn training_figures(rows: &[HistoryRow]) -> Vec<Figure> {
         .min_by(|a, b| a.validation_loss.total_cmp(&b.validation_loss));
     let loss = match best {
         Some(best) => {
-            format!("Loss per epoch; lowest validation loss {:.6} in epoch {}.", best.validation_loss, best.epoch)
+            format!("Lowest validation loss {} in epoch {}.", rounded(best.validation_loss, 6), best.epoch)
         }
-        None => "Loss per epoch.".into(),
+        None => String::new(),
     };
     let pictures = [
         (
             "training_loss.svg",
+            "How the loss falls from epoch to epoch",
             "Training",
             "loss",
             vec![series("training", |r| r.training_loss), series("validation", |r| r.validation_loss)],
@@ -46,32 +48,35 @@ pub fn training_figures(rows: &[HistoryRow]) -> Vec<Figure> {
         ),
         (
             "learning_rate.svg",
+            "The learning rate",
             "Learning rate",
             "learning rate",
             vec![series("", |r| r.learning_rate)],
-            "Learning rate per epoch.".into(),
+            String::new(),
         ),
         (
             "gradient_norm.svg",
+            "The size of the gradient",
             "Gradient norm",
             "gradient norm",
             vec![series("", |r| r.gradient_norm)],
-            "Norm of the gradient before clipping, mean per epoch.".into(),
+            "Norm before clipping, mean per epoch.".into(),
         ),
         (
             "penalty.svg",
+            "How much the mass matrix violates its signature",
             "Stability penalty",
             "penalty",
             vec![series("", |r| r.penalty)],
             "Penalty on the mass matrix, mean per epoch; epochs without a violation leave gaps.".into(),
         ),
     ];
-    let figure = |(file, title, y_label, series, caption): (&str, &str, &str, Vec<Series>, String)| {
+    let drawn = |(file, heading, title, y_label, series, caption): (&str, &str, &str, &str, Vec<Series>, String)| {
         let (title, y_label) = (title.to_string(), y_label.to_string());
         let plot = LinePlot { title, x_label: "epoch".into(), y_label, log_y: true, series, turn: None, level: None };
-        kept(file, line_plot(&plot), caption)
+        figure(file, heading, line_plot(&plot), caption)
     };
-    pictures.into_iter().filter_map(figure).collect()
+    pictures.into_iter().filter_map(drawn).collect()
 }
 
 #[cfg(test)]

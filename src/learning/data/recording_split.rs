@@ -44,8 +44,8 @@ pub enum RecordingSplitError {
     /// No derivatives.
     #[error(transparent)]
     Smooth(#[from] SmoothError),
-    /// A coordinate that stands still.
-    #[error("{coordinate} {how}; leave it out of the coordinates, or record it moving")]
+    /// A coordinate that stands still, or follows from others.
+    #[error("{coordinate} {how}; leave it out of the coordinates, or record it moving by itself")]
     Motionless {
         /// Its name.
         coordinate: String,
@@ -190,11 +190,11 @@ impl RecordingSplit {
     ) -> Result<Self, RecordingSplitError> {
         let PrepareOptions { smoothing: options, held_out: share, most_states, seed } = preparation;
         let (alone, smoothing) = plan(recording, options)?;
-        if let Some((i, how)) = (0..recording.n()).find_map(|i| Some((i, stillness(recording, i, &alone)?))) {
+        if let Some((i, how)) = stillness(recording, &alone).into_iter().next() {
             return Err(RecordingSplitError::Motionless { coordinate: recording.coordinates[i].clone(), how });
         }
         let divide = |recording: &Recording, takes: &[usize], share: f64| {
-            let held_out = HeldOut::choose(recording, takes, share, smoothing.window(), *seed)?;
+            let held_out = HeldOut::choose(recording, takes, share, smoothing.apart(recording), *seed)?;
             let (rest, held) = held_out.divide(recording);
             Ok::<_, HoldOutError>((held_out, rest, held))
         };
@@ -322,7 +322,7 @@ mod tests {
             {
                 let exact = without(plain);
                 assert_eq!((set.q(), set.a()), (plain.q(), plain.a()));
-                // Errors are some hundredths of the accelerations.
+                // Errors are some percentage of the accelerations.
                 let ratio = |k: usize| set.weight(k) / exact.weight(k);
                 assert!((0..set.len()).all(|k| ratio(k) < 1.0 && ratio(k) > 0.5), "{around:?}");
             }

@@ -34,7 +34,7 @@ pub enum HoldOutError {
     #[error("share of the data held out: expected 0, or a number between 0 and 1, found {0}")]
     Fraction(f64),
     /// One trajectory that is too short to be divided.
-    #[error("{} too few to hold out {fraction} of them after a gap of {gap}", counted(*samples, "sample is", "samples are"))]
+    #[error("{} too few to hold out {fraction} of them after a gap of {gap}: both parts need {least}", counted(*samples, "sample is", "samples are"))]
     Short {
         /// Samples of the trajectory.
         samples: usize,
@@ -42,13 +42,15 @@ pub enum HoldOutError {
         fraction: f64,
         /// The gap in samples.
         gap: usize,
+        /// Samples that each part needs.
+        least: usize,
     },
 }
 
 impl HeldOut {
     /// Chooses what is held out: takes in random order until they hold `fraction` of all samples, none that would
     /// make it more than twice as many, one at least and not all; of a single trajectory its last part, after a gap of `gap` samples, so that no window of
-    /// smoothing reaches from one side to the other. Of a share of 0 nothing.
+    /// smoothing reaches from one side to the other, and with `least` samples on both sides. Of a share of 0 nothing.
     ///
     /// `takes` has the number of the take of every trajectory; those of one are held out together, unless there is no other take.
     ///
@@ -58,7 +60,7 @@ impl HeldOut {
         recording: &Recording,
         takes: &[usize],
         fraction: f64,
-        gap: usize,
+        (gap, least): (usize, usize),
         seed: u64,
     ) -> Result<Self, HoldOutError> {
         if fraction == 0.0 {
@@ -71,8 +73,8 @@ impl HeldOut {
         let wanted = ((fraction * samples as f64).round() as usize).max(1);
         if recording.tracks.len() < 2 {
             let start = samples.saturating_sub(wanted);
-            if wanted < 2 || start < gap + 2 {
-                return Err(HoldOutError::Short { samples, fraction, gap });
+            if wanted < least || start < gap + least {
+                return Err(HoldOutError::Short { samples, fraction, gap, least });
             }
             return Ok(Self::End { start, gap });
         }
@@ -163,7 +165,7 @@ pub fn hold_out(
     seed: u64,
 ) -> Result<(Recording, Recording), HoldOutError> {
     let takes: Vec<usize> = (0..recording.tracks.len()).collect();
-    Ok(HeldOut::choose(recording, &takes, fraction, gap, seed)?.divide(recording))
+    Ok(HeldOut::choose(recording, &takes, fraction, (gap, 2), seed)?.divide(recording))
 }
 
 /// The same coordinates without trajectories.
@@ -228,20 +230,20 @@ mod tests {
     fn takes_stay_whole() {
         let all = recording(&[20, 30, 40, 20, 30, 25]);
         for seed in 0..20 {
-            let HeldOut::Tracks(held) = HeldOut::choose(&all, &[0, 0, 1, 1, 2, 3], 0.2, 5, seed).unwrap() else {
+            let HeldOut::Tracks(held) = HeldOut::choose(&all, &[0, 0, 1, 1, 2, 3], 0.2, (5, 2), seed).unwrap() else {
                 panic!("several trajectories")
             };
             assert!([&[0, 1][..], &[2, 3], &[4], &[5], &[4, 5]].contains(&held.as_slice()), "{held:?}");
         }
         // Of a single take some of its parts are.
-        let held = HeldOut::choose(&all, &[7; 6], 0.2, 5, 0).unwrap();
+        let held = HeldOut::choose(&all, &[7; 6], 0.2, (5, 2), 0).unwrap();
         assert!(matches!(held, HeldOut::Tracks(held) if !held.is_empty() && held.len() < 6));
     }
 
     #[test]
     fn the_end_of_a_single_one() {
         let one = recording(&[100]);
-        let held = HeldOut::choose(&one, &[0], 0.2, 10, 0).unwrap();
+        let held = HeldOut::choose(&one, &[0], 0.2, (10, 2), 0).unwrap();
         assert_eq!(held, HeldOut::End { start: 80, gap: 10 });
         let (training, validation) = held.divide(&one);
         assert_eq!((training.samples(), validation.samples()), (70, 20));
@@ -249,6 +251,10 @@ mod tests {
         assert!(validation.tracks[0].v.is_empty() && validation.tracks[0].validate(2).is_ok());
         assert!(held.describe(&one).contains("last 20 samples"));
         assert!(matches!(hold_out(&one, 0.5, 60, 0), Err(HoldOutError::Short { .. })));
+        // Both parts are long enough to be smoothed, or nothing is held out.
+        let choose = |least| HeldOut::choose(&one, &[0], 0.2, (10, least), 0);
+        assert_eq!(choose(20), Ok(HeldOut::End { start: 80, gap: 10 }));
+        assert!(matches!(choose(21), Err(HoldOutError::Short { least: 21, .. })));
         let (all, nothing) = hold_out(&one, 0.0, 0, 0).unwrap();
         assert_eq!((all, nothing.tracks.len()), (one.clone(), 0));
         for bad in [1.0, f64::NAN, -0.1] {

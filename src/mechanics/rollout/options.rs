@@ -180,7 +180,10 @@ impl<S: Scalar> Options<S> {
         if samples.is_nan() || samples.to_f64() > MAX_SAMPLES {
             return invalid(
                 "dt",
-                format!("asks for {:.3e} samples, at most {MAX_SAMPLES:.0e} are allowed", samples.to_f64()),
+                format!(
+                    "asks for {:.3e} samples, at most {MAX_SAMPLES:.0e} are allowed",
+                    samples.to_f64().min(f64::MAX)
+                ),
             );
         }
         if blur(self).to_f64() >= 0.5 {

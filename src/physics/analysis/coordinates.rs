@@ -12,15 +12,17 @@ pub struct CoordinateError {
     pub t: Vec<f64>,
     /// `|q_learned - q_exact|` per coordinate, `(len, n)`; angles modulo `2 pi`, at most `pi`.
     pub per_coordinate: Vec<f64>,
-    /// Largest over the coordinates, `(len)`.
-    pub max: Vec<f64>,
 }
 
 impl CoordinateError {
-    /// First time at which the largest error exceeds `threshold`.
-    #[cfg(test)]
-    pub fn time_above(&self, threshold: f64) -> Option<f64> {
-        self.t.iter().zip(&self.max).find(|&(_, &error)| error.is_nan() || error > threshold).map(|(&t, _)| t)
+    /// Largest error over some coordinates, which have one unit, at every time; `NaN` where one is.
+    pub fn largest(&self, coordinates: &[usize]) -> Vec<f64> {
+        let rows = self.per_coordinate.chunks_exact(self.coordinates.max(1));
+        let worst = |row: &[f64]| {
+            let errors = coordinates.iter().filter_map(|&i| row.get(i).copied());
+            errors.fold(0.0, |worst: f64, error| if error <= worst { worst } else { error })
+        };
+        rows.map(worst).collect()
     }
 }
 
@@ -46,19 +48,14 @@ pub fn coordinate_error<S: Scalar>(
         coordinates: n,
         t: exact.t[..len].iter().map(|t| t.to_f64()).collect(),
         per_coordinate: Vec::with_capacity(len * n),
-        max: Vec::with_capacity(len),
     };
     for k in 0..len {
         let (a, b) = (exact.state(k).0, learned.state(k).0);
-        let mut largest = 0.0;
         for i in 0..n {
             let angle = periodic.get(i).copied().unwrap_or(false);
             let error = if angle { angle_difference(a[i], b[i]) } else { (a[i] - b[i]).abs() }.to_f64();
             result.per_coordinate.push(error);
-            // NaN wins.
-            largest = if error <= largest { largest } else { error };
         }
-        result.max.push(largest);
     }
     result
 }
@@ -91,9 +88,10 @@ mod tests {
         assert!((error.per_coordinate[0] - 0.2).abs() < 1e-14);
         assert_eq!(error.per_coordinate[1], 0.5);
         assert!(error.per_coordinate[2] < 1e-14);
-        assert_eq!(error.max, [0.5, 7.0]);
-        assert_eq!(error.time_above(1.0), Some(1.0));
-        assert_eq!(error.time_above(10.0), None);
+        assert_eq!((error.largest(&[0, 1]), error.largest(&[1])), (vec![0.5, 7.0], vec![0.5, 7.0]));
+        assert!(error.largest(&[0])[1] < 1e-14);
+        let lost = CoordinateError { per_coordinate: vec![f64::NAN, 1.0, 2.0, 1.0], ..error };
+        assert!(lost.largest(&[0, 1])[0].is_nan() && lost.largest(&[0, 1])[1] == 2.0);
         assert!((angle_difference(0.0_f64, PI) - PI).abs() < 1e-15);
         assert_eq!(angle_difference(3.0_f64, 3.0), 0.0);
     }
@@ -104,6 +102,6 @@ mod tests {
         short.t.pop();
         short.q.truncate(2);
         short.v.truncate(2);
-        assert_eq!(coordinate_error(&trajectory(&[1.0; 4]), &short, &[]).max, [1.0]);
+        assert_eq!(coordinate_error(&trajectory(&[1.0; 4]), &short, &[]).per_coordinate, [1.0; 2]);
     }
 }

@@ -58,7 +58,7 @@ pub(crate) fn curvature_scalars(model: &dyn EulerLagrange<f64>, q: &[f64]) -> Ve
 }
 
 /// Values of the axes and points `(points, n)` over them, the other coordinates as at `point`.
-fn plane(point: &[f64], axes: [Axis; 2]) -> ([Vec<f64>; 2], Vec<f64>) {
+pub(crate) fn grid_points(point: &[f64], axes: [Axis; 2]) -> ([Vec<f64>; 2], Vec<f64>) {
     let [x, y] = axes.map(|axis| axis.values());
     let mut q = Vec::with_capacity(x.len() * y.len() * point.len());
     let mut moved = point.to_vec();
@@ -73,13 +73,13 @@ fn plane(point: &[f64], axes: [Axis; 2]) -> ([Vec<f64>; 2], Vec<f64>) {
 
 /// The curvature scalar over two coordinates, the others as at `point`.
 pub(crate) fn curvature_grid(model: &dyn EulerLagrange<f64>, point: &[f64], axes: [Axis; 2]) -> Grid {
-    let ([x, y], q) = plane(point, axes);
+    let ([x, y], q) = grid_points(point, axes);
     Grid { x, y, values: curvature_scalars(model, &q) }
 }
 
 /// Components of the mass matrix at rest over two coordinates, the others as at `point`, in the order of [`indices`].
 pub(crate) fn metric_grids(model: &dyn EulerLagrange<f64>, point: &[f64], axes: [Axis; 2]) -> Vec<Grid> {
-    let ([x, y], q) = plane(point, axes);
+    let ([x, y], q) = grid_points(point, axes);
     let (n, matrices) = (point.len(), matrices_at_rest(model, &q));
     let grid = |[i, j]: [usize; 2]| Grid { x: x.clone(), y: y.clone(), values: component(n, &matrices, [i, j]) };
     indices(n).map(grid).collect()

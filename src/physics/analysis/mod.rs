@@ -46,7 +46,9 @@ pub(crate) use coordinates::angle_difference;
 #[doc(hidden)]
 pub use coordinates::{CoordinateError, coordinate_error, velocity_error};
 pub(crate) use curvature::{MetricComponent, Spread};
-pub(crate) use curvature::{curvature_grid, curvature_scalars, is_metric, metric_components, metric_grids};
+pub(crate) use curvature::{
+    curvature_grid, curvature_scalars, grid_points, is_metric, metric_components, metric_grids,
+};
 #[doc(hidden)]
 pub use determination::{Decay, Determination, Estimate, Observed, RANGE, constants, decay, determination, misfit};
 #[doc(hidden)]
@@ -68,9 +70,9 @@ pub(crate) use mass_matrix::{matrices_at_rest, nearest_factor};
 pub use portrait::Portrait;
 #[doc(hidden)]
 pub use prediction::PredictionError;
-pub(crate) use prediction::window_valid_times;
 #[doc(hidden)]
 pub use prediction::{Predictions, Window, follow, predict_by_constant_velocity, predict_by_motion, prediction_error};
+pub(crate) use prediction::{coordinate_errors, window_valid_times};
 pub use signature::wrong_signatures;
 #[doc(hidden)]
 pub use summary::{ErrorDistribution, Statistics, statistics};

@@ -139,7 +139,7 @@ pub fn predict_by_constant_velocity(windows: &[Window]) -> Predictions {
 pub struct PredictionError {
     /// Time after the start in s.
     pub seconds: f64,
-    /// Root mean square over windows and coordinates, in the coordinates' unit; `NaN` if a prediction is missing.
+    /// Root mean square over windows and coordinates, over the scales of the coordinates; `NaN` if a prediction is missing.
     pub rms: f64,
     /// Median over the windows of the root mean square over the coordinates; a missing prediction counts as infinite.
     pub median: f64,
@@ -151,33 +151,62 @@ pub struct PredictionError {
     pub missing: usize,
 }
 
-/// Errors `seconds` after the start, at the sample nearest to it; angles, marked by `periodic`, count modulo a turn.
-pub fn prediction_error(
+/// Distances of predicted and measured coordinates `seconds` after the start, at the sample nearest to it, `(n)` for every window;
+/// angles, marked by `periodic`, count modulo a turn.
+fn distances(
     windows: &[Window],
     predictions: &Predictions,
     periodic: &[bool],
     seconds: f64,
-) -> PredictionError {
+) -> impl Iterator<Item = Vec<f64>> {
     let n = periodic.len();
-    let mut errors: Vec<f64> = windows
-        .iter()
-        .zip(predictions)
-        .filter_map(|(window, predicted)| {
-            let near = |k: &usize| (window.times[*k] - seconds).abs();
-            let at = (0..window.times.len()).min_by(|a, b| near(a).total_cmp(&near(b)))?;
-            let row = at * n..(at + 1) * n;
-            let pairs = window.measured.get(row.clone())?.iter().zip(predicted.get(row)?).zip(periodic);
-            let squares = pairs.map(|((&m, &p), &angle)| if angle { angle_difference(m, p) } else { m - p }.powi(2));
-            Some((squares.sum::<f64>() / n as f64).sqrt())
-        })
-        .collect();
+    windows.iter().zip(predictions).filter_map(move |(window, predicted)| {
+        let near = |k: &usize| (window.times[*k] - seconds).abs();
+        let at = (0..window.times.len()).min_by(|a, b| near(a).total_cmp(&near(b)))?;
+        let row = at * n..(at + 1) * n;
+        let pairs = window.measured.get(row.clone())?.iter().zip(predicted.get(row)?).zip(periodic);
+        Some(pairs.map(|((&m, &p), &angle)| if angle { angle_difference(m, p) } else { (m - p).abs() }).collect())
+    })
+}
+
+/// Errors `seconds` after the start of all coordinates together, each over its scale: 1 where they have one unit, else the spread of
+/// its motion; one without a spread is left out.
+pub fn prediction_error(
+    windows: &[Window],
+    predictions: &Predictions,
+    (periodic, scales): (&[bool], &[f64]),
+    seconds: f64,
+) -> PredictionError {
+    let moving = scales.iter().filter(|scale| **scale > 0.0).count() as f64;
+    let together = |distances: Vec<f64>| {
+        let scaled = distances.iter().zip(scales).filter(|(_, scale)| **scale > 0.0);
+        (scaled.map(|(distance, scale)| (distance / scale).powi(2)).sum::<f64>() / moving).sqrt()
+    };
+    let mut errors: Vec<f64> = distances(windows, predictions, periodic, seconds).map(together).collect();
     let missing = errors.iter().filter(|error| !error.is_finite()).count();
     let rms = (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt();
+    let rms = if missing > 0 { f64::NAN } else { rms };
+    let [median, p90] = quantiles(&mut errors, [0.5, 0.9]);
+    PredictionError { seconds, rms, median, p90, windows: errors.len(), missing }
+}
+
+/// Median over the windows of the error of every coordinate `seconds` after the start, in its own unit.
+pub(crate) fn coordinate_errors(
+    windows: &[Window],
+    predictions: &Predictions,
+    periodic: &[bool],
+    seconds: f64,
+) -> Vec<f64> {
+    let all: Vec<Vec<f64>> = distances(windows, predictions, periodic, seconds).collect();
+    let of = |i: usize| quantiles(&mut all.iter().map(|distances| distances[i]).collect::<Vec<_>>(), [0.5])[0];
+    (0..periodic.len()).map(of).collect()
+}
+
+/// Quantiles of errors; a missing one counts as infinite.
+fn quantiles<const N: usize>(errors: &mut [f64], shares: [f64; N]) -> [f64; N] {
     errors.iter_mut().filter(|error| !error.is_finite()).for_each(|error| *error = f64::INFINITY);
     errors.sort_by(f64::total_cmp);
-    let rms = if missing > 0 { f64::NAN } else { rms };
-    let (median, p90) = (quantile(&errors, 0.5), quantile(&errors, 0.9));
-    PredictionError { seconds, rms, median, p90, windows: errors.len(), missing }
+    shares.map(|share| quantile(errors, share))
 }
 
 /// Time for which the prediction of each window was valid ([`valid_time`]), errors relative to the `spread` of the motion; at least to
@@ -225,7 +254,7 @@ mod tests {
     fn the_right_model_predicts_and_a_straight_line_does_not() {
         let (track, v) = swing(60);
         let windows = Window::cut(&track, (&track.q, &v), 0..60, 1, 1.0);
-        let error = |predictions: &Predictions| prediction_error(&windows, predictions, &[false], 1.0);
+        let error = |predictions: &Predictions| prediction_error(&windows, predictions, (&[false], &[1.0]), 1.0);
         let motion = error(&predict_by_motion(&OSCILLATOR, &windows, 2));
         // Tolerances of the roll-out, and interpolation over a tenth of a radian.
         assert!(motion.rms < 1e-5 && motion.windows == 5 && motion.missing == 0, "{motion:?}");
@@ -249,9 +278,9 @@ mod tests {
         track.q.fill(0.0);
         v.fill(-1.0);
         let windows = Window::cut(&track, (&track.q, &v), 0..30, 1, 1.4);
-        let error = prediction_error(&windows, &predict_by_motion(&SINGULAR, &windows, 1), &[false], 1.4);
+        let error = prediction_error(&windows, &predict_by_motion(&SINGULAR, &windows, 1), (&[false], &[1.0]), 1.4);
         assert!(error.missing == error.windows && error.rms.is_nan() && error.median == f64::INFINITY, "{error:?}");
-        let early = prediction_error(&windows, &predict_by_motion(&SINGULAR, &windows, 1), &[false], 0.1);
+        let early = prediction_error(&windows, &predict_by_motion(&SINGULAR, &windows, 1), (&[false], &[1.0]), 0.1);
         // Measured is 0, predicted -t - t^2/2.
         assert!(early.missing == 0 && (early.rms - 0.105).abs() < 1e-6, "{early:?}");
     }
@@ -259,8 +288,23 @@ mod tests {
     #[test]
     fn angles_count_modulo_a_turn() {
         let window = Window { q: vec![0.0], v: vec![0.0], times: vec![1.0], measured: vec![7.0], force: None };
-        let error = |periodic| prediction_error(std::slice::from_ref(&window), &vec![vec![0.5]], &[periodic], 1.0).rms;
+        let error = |periodic| {
+            prediction_error(std::slice::from_ref(&window), &vec![vec![0.5]], (&[periodic], &[1.0]), 1.0).rms
+        };
         assert!((error(true) - (6.5 - std::f64::consts::TAU)).abs() < 1e-12);
         assert_eq!(error(false), 6.5);
+    }
+
+    #[test]
+    fn unlike_units_are_pooled_over_their_scales_and_stated_apart() {
+        let window = |error: f64| {
+            let (measured, predicted) = (vec![1.0, 5.0, 0.0], vec![1.0 + error, 5.0 - 100.0 * error, 7.0]);
+            (Window { q: vec![0.0; 3], v: vec![0.0; 3], times: vec![1.0], measured, force: None }, predicted)
+        };
+        let (windows, predictions): (Vec<Window>, Predictions) = [0.1, 0.2, 0.3].map(window).into_iter().unzip();
+        let pooled = prediction_error(&windows, &predictions, (&[false; 3], &[1.0, 100.0, 0.0]), 1.0);
+        assert!((pooled.median - 0.2).abs() < 1e-12 && (pooled.p90 - 0.28).abs() < 1e-12, "{pooled:?}");
+        let apart = coordinate_errors(&windows, &predictions, &[false; 3], 1.0);
+        assert!((apart[0] - 0.2).abs() < 1e-12 && (apart[1] - 20.0).abs() < 1e-12 && apart[2] == 7.0, "{apart:?}");
     }
 }

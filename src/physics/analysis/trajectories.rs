@@ -105,8 +105,8 @@ pub struct TrajectorySummary {
     pub v: Vec<f64>,
     /// Time up to which learned and exact motion could be compared.
     pub compared_until: f64,
-    /// Largest coordinate error over time.
-    pub coordinate_error: Statistics,
+    /// Errors of each coordinate.
+    pub coordinate_error: Vec<Statistics>,
     /// Errors of each velocity.
     pub velocity_error: Vec<Statistics>,
     /// Normalised error of the exact energy along the learned motion.
@@ -254,6 +254,7 @@ impl<S: Scalar> TrajectoryRun<S> {
     /// Numbers of the run.
     pub fn summary(&self) -> TrajectorySummary {
         let n = self.exact.trajectory.coordinates;
+        let each = |errors: &[f64]| (0..n).map(|i| statistics(errors.iter().skip(i).step_by(n).copied())).collect();
         let start = |values: &[S]| values.iter().map(|x| x.to_f64()).collect::<Vec<_>>();
         let (q, v) = match (self.exact.trajectory.is_empty(), self.learned.trajectory.is_empty()) {
             (false, _) => self.exact.trajectory.state(0),
@@ -264,8 +265,8 @@ impl<S: Scalar> TrajectoryRun<S> {
             q: start(q),
             v: start(v),
             compared_until: self.coordinates.t.last().copied().unwrap_or(0.0),
-            coordinate_error: statistics(self.coordinates.max.iter().copied()),
-            velocity_error: (0..n).map(|i| statistics(self.velocities.iter().skip(i).step_by(n).copied())).collect(),
+            coordinate_error: each(&self.coordinates.per_coordinate),
+            velocity_error: each(&self.velocities),
             energy_error: self.energy.statistics(),
             energy_drift: self.drift.statistics(),
             lyapunov_exponent: self.lyapunov.map(|l| l.exponent),
@@ -295,7 +296,7 @@ mod tests {
         assert_eq!(same.len(), 4);
         for run in &same {
             let summary = run.summary();
-            assert!(summary.coordinate_error.max < 1e-5 && summary.energy_error.max < 1e-4, "{summary:?}");
+            assert!(summary.coordinate_error[0].max < 1e-5 && summary.energy_error.max < 1e-4, "{summary:?}");
             assert_eq!((summary.compared_until, summary.stopped.clone()), (10.0, None));
             assert!(run.reference_energy.statistics().max < 1e-8);
         }
@@ -304,7 +305,7 @@ mod tests {
             assert!(run.relative.iter().all(|e| *e < 1e-3));
         }
         let other = test().run(&PENDULUM, &OSCILLATOR);
-        assert!(other.iter().any(|run| run.summary().coordinate_error.max > 1e-5));
+        assert!(other.iter().any(|run| run.summary().coordinate_error[0].max > 1e-5));
         let threaded = TrajectoryTest { threads: 3, lyapunov: true, ..test() }.run(&PENDULUM, &OSCILLATOR);
         for (a, b) in other.iter().zip(&threaded) {
             assert_eq!(a.learned, b.learned);

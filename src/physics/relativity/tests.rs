@@ -169,7 +169,7 @@ fn light_stays_light() {
     }
 }
 
-/// A sky at twice the distance of the camera is that at infinity but for hundredths of a degree.
+/// A sky at twice the distance of the camera is that at infinity but for percentage of a degree.
 #[test]
 fn the_sky_is_far_enough() {
     let model = hole("kerr-cartesian", &[("a", "0.9")]);

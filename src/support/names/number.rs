@@ -27,13 +27,13 @@ pub fn rounded(x: f64, digits: usize) -> String {
 }
 
 /// A fraction in per cent, three significant digits, without the sign of per cent.
-pub fn hundredths(fraction: f64) -> String {
+pub fn percentage(fraction: f64) -> String {
     number(100.0 * fraction)
 }
 
 /// A fraction in per cent, three significant digits: `1.23 %`.
 pub fn percent(fraction: f64) -> String {
-    if fraction.is_finite() { format!("{} %", hundredths(fraction)) } else { "-".to_string() }
+    if fraction.is_finite() { format!("{} %", percentage(fraction)) } else { "-".to_string() }
 }
 
 #[cfg(test)]
@@ -61,6 +61,6 @@ mod tests {
     #[test]
     fn fractions_are_per_cent() {
         assert_eq!([0.0123, 0.0, 1.0, f64::NAN].map(percent), ["1.23 %", "0 %", "100 %", "-"]);
-        assert_eq!(hundredths(4.3e-7), "4.30e-5");
+        assert_eq!(percentage(4.3e-7), "4.30e-5");
     }
 }

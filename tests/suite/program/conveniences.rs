@@ -152,6 +152,10 @@ fn samples_flow_from_one_command_into_the_next() {
         assert!((terms["energy"].as_f64().unwrap() - energy).abs() <= 1e-12 * energy.abs().max(1.0));
     }
     assert_eq!(looked.objects().len(), 6);
+    // A model is no text that comes through a pipe.
+    for command in [&["inspect", "--model", "-", "--states", &csv][..], &["evaluate", "-"]] {
+        piped(command, b"").refused(2, &["-: expected a model's file or the directory of a run"]);
+    }
     piped(&["inspect", "--model", &run, "--states", "-"], b"").refused(1, &["standard input: the file is empty"]);
 
     // Recorded motion through a pipe is the motion of the file.

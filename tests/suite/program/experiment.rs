@@ -134,7 +134,15 @@ fn more_seeds_are_more_runs_of_the_same_rows() {
     let folder = out.path().join("scaling-smoke");
     let table = fs::read_to_string(folder.join("table.csv")).unwrap();
     assert_eq!(table.lines().count(), 4);
-    assert!(table.lines().skip(1).all(|line| line.split("\",\"").nth(1) == Some("2")), "{table}");
+    assert!(table.lines().skip(1).all(|line| line.split("\",").nth(1).unwrap().starts_with("2,0,")), "{table}");
+    // Numbers are numbers, and every run has a line with its choices.
+    let place = table.lines().next().unwrap().split(',').position(|name| name == "loss_median").unwrap();
+    let first = table.lines().nth(1).unwrap().split(',').collect::<Vec<_>>();
+    let [median, low, high] = [0, 1, 2].map(|k| first[place + k].parse::<f64>().unwrap());
+    assert!(low < median && median < high && (low + high - 2.0 * median).abs() < 1e-12);
+    let runs = fs::read_to_string(folder.join("runs.csv")).unwrap();
+    let header: Vec<&str> = runs.lines().next().unwrap().split(',').collect();
+    assert!(runs.lines().count() == 7 && header.contains(&"network.scaling") && header.contains(&"loss"), "{runs}");
     let models = ["physical-scaling-seed0", "physical-scaling-seed1"]
         .map(|run| fs::read(folder.join(run).join("model.safetensors")).unwrap());
     assert_ne!(models[0], models[1]);

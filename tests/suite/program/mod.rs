@@ -23,6 +23,8 @@ mod screen;
 mod shadow;
 mod signals;
 mod still;
+mod summary;
+mod sweep;
 mod symmetries;
 mod system_files;
 mod train;

@@ -34,10 +34,49 @@ fn what_does_not_move_is_refused_in_plain_words() {
             "{}",
             run.stdout
         );
-        assert!(run.stdout.contains("nothing can be learned while y stands still"), "{}", run.stdout);
+        assert!(run.stdout.starts_with("A fit cannot learn from these data"), "{}", run.stdout);
         assert!(!run.stdout.contains("multiple shooting"), "{}", run.stdout);
     }
     assert_eq!(folder.names(), ["constant.csv", "noisy.csv"]);
+}
+
+#[test]
+fn copies_are_named_and_refused() {
+    let folder = Folder::new();
+    let copy = folder.file("copy.csv", csv(|t| [(3.0 * t).sin(), 2.0 * (3.0 * t).sin() + 1.0]));
+    lnn(&["fit", &copy, "--coords", "x,y"]).refused(1, &["y follows", "2.00 x"]);
+    let found = lnn(&["check", &copy, "--coords", "x,y", "--json"]);
+    let found: serde_json::Value = serde_json::from_str(&found.stdout).unwrap();
+    assert_eq!((&found["copies"][0], found["motionless"].as_array().map(Vec::len)), (&"y".into(), Some(0)));
+    assert!(found["obstacle"].as_str().is_some_and(|text| text.contains("2.00 x")), "{found}");
+}
+
+/// `check` and `fit` have one rule for what can be learned from.
+#[test]
+fn a_fit_begins_where_the_check_says_so() {
+    let folder = Folder::new();
+    let out = folder.path("out");
+    let all = csv(|t| [(3.0 * t).sin(), 0.5 * (5.0 * t).cos()]);
+    for (rows, good) in [(20, false), (38, false), (50, true), (80, true)] {
+        let part: String = all.lines().take(rows + 1).map(|line| format!("{line}\n")).collect();
+        let data = folder.file(&format!("{rows}.csv"), part);
+        let found = lnn(&["check", &data, "--coords", "x,y", "--json"]);
+        let found: serde_json::Value = serde_json::from_str(&found.stdout).unwrap();
+        let fit = lnn(&[
+            "fit",
+            &data,
+            "--coords",
+            "x,y",
+            "--hidden",
+            "4",
+            "--epochs",
+            "1",
+            "--out",
+            out.to_str().unwrap(),
+            "--overwrite",
+        ]);
+        assert_eq!((found["obstacle"].is_null(), fit.code == Some(0)), (good, good), "{rows}: {found} {}", fit.stderr);
+    }
 }
 
 #[test]

@@ -184,7 +184,7 @@ fn work_and_friction_make_the_change_of_energy() {
     };
     let driven = Driven::new(&chain, &motor);
     for (t0, t_end) in [(0.0, 2.0), (2.0, 1.0)] {
-        // Dry friction is felt within hundredths of a second.
+        // Dry friction is felt within percentage of a second.
         let options = Options { t0, ..Options::reference(t_end, 0.002) };
         let motion = driven.rollout(&[0.4, -0.2], &[1.0, 0.5], &options).complete().unwrap();
         let balance = driven.energy_balance(&motion).unwrap();

@@ -3,7 +3,7 @@
 use super::Problem;
 use super::builder::Builder;
 use super::select::Selection;
-use super::text::{Separator, comment, names_in, split, unquoted};
+use super::text::{Separator, comment, line_end, names_in, split, unquoted};
 use crate::recording::Columns;
 use std::io::{BufRead, Read};
 
@@ -14,15 +14,16 @@ const LONGEST: u64 = 1 << 20;
 ///
 /// The first line that is neither blank nor a comment, which begins with `#`, is a header if none of its fields is a number,
 /// and says how fields are separated: by commas, semicolons, tabs, bars or blanks. Without a header the last comment above
-/// names the columns if it has as many names. Spaces around fields, double quotes, a byte order mark, blank lines and Windows
-/// line ends are accepted.
+/// names the columns if it has as many names. Spaces around fields, double quotes, a byte order mark, blank lines and the line
+/// ends of Windows and of old Macs are accepted.
 pub fn read<'a>(mut input: impl BufRead, columns: &'a Columns) -> Result<Builder<'a>, Problem> {
     let (mut line, mut row, mut values) = (Vec::new(), 0, Vec::new());
     let mut begun: Option<(Builder<'a>, Vec<Option<usize>>, Separator)> = None;
     let mut remark = None;
+    let end = line_end(input.fill_buf()?);
     loop {
         line.clear();
-        if input.by_ref().take(LONGEST).read_until(b'\n', &mut line)? == 0 {
+        if input.by_ref().take(LONGEST).read_until(end, &mut line)? == 0 {
             break;
         }
         row += 1;

@@ -15,8 +15,7 @@ mod text;
 pub use error::{DataError, Problem};
 pub(crate) use pieces::LEAST;
 #[cfg(feature = "cli")]
-#[cfg(feature = "cli")]
-pub(crate) use text::{Separator, comment, names_in, split};
+pub(crate) use text::{Separator, comment, line_end, names_in, split};
 
 use crate::recording::reading::LoadedRecording;
 use crate::recording::{Columns, Recording};
@@ -35,7 +34,7 @@ const MAX_BYTES: u64 = 1 << 36;
 /// Every file holds one trajectory, or several told apart by a column; long gaps in time cut them further. The format is recognised
 /// by the first bytes: arrays of NumPy (`.npy`, `.npz`; floats of 4 or 8 bytes and integers, either order and byte order),
 /// anything else is text of numbers, separated by commas, semicolons, tabs, bars or blanks, with or without a header and with
-/// comments behind a `#`. Numbers are converted to SI; angles are
+/// comments behind a `#`; lines end with LF, CR LF, or CR in all of the file. Numbers are converted to SI; angles are
 /// unwrapped by the nearest turn; rows that repeat the row before digit by digit are left out and counted.
 ///
 /// # Errors
@@ -80,7 +79,7 @@ fn parse(mut file: File, size: u64, columns: &Columns) -> Result<Builder<'_>, Pr
     file.rewind()?;
     if start.starts_with(npy::MAGIC) {
         npy::read(Shared::new(file, size), size, columns)
-    } else if start.starts_with(npz::MAGIC) {
+    } else if npz::MAGIC.iter().any(|magic| start.starts_with(magic)) {
         npz::read(Shared::new(file, size), columns)
     } else {
         csv::read(BufReader::with_capacity(1 << 20, file.take(size)), columns)

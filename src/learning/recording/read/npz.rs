@@ -11,8 +11,8 @@ use std::io::{BufReader, Read};
 use zip::ZipArchive;
 use zip::result::ZipError;
 
-/// First bytes of such a file.
-pub const MAGIC: &[u8] = b"PK\x03\x04";
+/// First bytes of such a file, and of one without a single array.
+pub const MAGIC: [&[u8]; 2] = [b"PK\x03\x04", b"PK\x05\x06"];
 /// Most arrays of an archive.
 const MOST: usize = 10_000;
 /// Most bytes that the used arrays may have for every byte that they take in the file, and bytes that they may have however
@@ -23,7 +23,8 @@ const ANYWAY: u64 = 1 << 26;
 fn broken(error: ZipError) -> Problem {
     match error {
         ZipError::Io(error) => Problem::Io(error),
-        other => Problem::Array(format!("not a whole archive of arrays: {other}")),
+        ZipError::UnsupportedArchive(what) => Problem::Array(format!("an archive that is not read: {what}")),
+        _ => Problem::Array("not a whole archive of arrays".to_string()),
     }
 }
 
@@ -34,7 +35,7 @@ fn broken(error: ZipError) -> Problem {
 pub fn read(file: Shared, columns: &Columns) -> Result<Builder<'_>, Problem> {
     let mut archive = ZipArchive::new(file).map_err(broken)?;
     if archive.is_empty() {
-        return Err(Problem::Empty);
+        return Err(Problem::Array("the archive holds no arrays".to_string()));
     }
     if archive.len() > MOST {
         return Err(Problem::Array(format!("{} arrays, expected at most {MOST}", archive.len())));

@@ -51,6 +51,10 @@ fn columns_are_found_by_name_and_number() {
     assert_eq!((all.rows[0].row(3), all.time.as_deref(), track.validate(2)), (5, Some("t"), Ok(())));
     let dressed = format!("\u{feff}\r\n#t , q1,\"q2\"\r\n{}", &text[8..]).replace('\n', "\r\n\r\n");
     assert_eq!(read(&dressed, &coordinates("q2,q1")).unwrap().recording.tracks[0].q, track.q);
+    // An old Mac's, of many lines or of one.
+    let old = read(text.replace('\n', "\r"), &coordinates("q2,q1")).unwrap();
+    assert_eq!((&old.recording.tracks[0].q, old.rows[0].row(3)), (&track.q, 5));
+    assert_eq!(refusal("t,q1,q2\r", &coordinates("q2,q1")), "no rows of numbers");
     let bare = &text[8..];
     let numbered = Columns { time: Some("1".into()), ..coordinates("3,2") };
     assert_eq!(read(bare, &numbered).unwrap().recording.tracks[0].q, track.q);

@@ -52,6 +52,11 @@ impl Separator {
     }
 }
 
+/// The byte that ends the lines of a text that begins so: LF (with a CR before it or not), or CR alone where there is no LF.
+pub(crate) fn line_end(beginning: &[u8]) -> u8 {
+    if beginning.contains(&b'\r') && !beginning.contains(&b'\n') { b'\r' } else { b'\n' }
+}
+
 /// Fields of a line, from left to right.
 pub(crate) struct Fields<'a> {
     rest: Option<&'a [u8]>,

@@ -222,6 +222,14 @@ impl Smoothing {
         self.coordinates.iter().map(|chosen| chosen.quality.window).max().unwrap_or(0)
     }
 
+    /// Samples between two parts of a trajectory that no window reaches from one to the other, and samples that each part
+    /// needs: a full window and one more, or what a polynomial takes where nothing has to be derived.
+    pub(crate) fn apart(&self, recording: &Recording) -> (usize, usize) {
+        let window = self.window();
+        let derived = !(recording.has_velocities() && recording.has_accelerations());
+        (window, if derived { window + 1 } else { (self.degree + 3) | 1 })
+    }
+
     /// Window of coordinate `i` in samples of a trajectory: as many seconds as chosen, at most all of the trajectory.
     fn samples(&self, i: usize, track: &RecordedTrajectory, clock: &Clock) -> usize {
         let least = (self.degree + 3) | 1;

@@ -96,6 +96,8 @@ pub struct Survey {
     pub held_out_text: String,
     /// Names of coordinates that stand still: nothing can be learned from them.
     pub motionless: Vec<String>,
+    /// Names of coordinates that follow from those before them: nothing can be learned of both.
+    pub copies: Vec<String>,
     /// Facts to know before learning.
     pub warnings: Vec<String>,
 }
@@ -146,8 +148,8 @@ pub fn survey(reading: &LoadedRecording, options: &SurveyOptions) -> Result<Surv
             jitter: spread / step,
         }
     });
-    let (share, gap, seed) = (options.validation, planned.window(), options.seed);
-    let held_out = HeldOut::choose(recording, &reading.takes, share, gap, seed).ok();
+    let (share, apart, seed) = (options.validation, planned.apart(recording), options.seed);
+    let held_out = HeldOut::choose(recording, &reading.takes, share, apart, seed).ok();
     let mut survey = Survey {
         files: reading.files,
         time: reading.time.clone(),
@@ -166,10 +168,15 @@ pub fn survey(reading: &LoadedRecording, options: &SurveyOptions) -> Result<Surv
         held_out_text: held_out.as_ref().map(|held| held.describe(recording)).unwrap_or_default(),
         held_out,
         motionless: Vec::new(),
+        copies: Vec::new(),
         warnings: Vec::new(),
     };
-    let still: Vec<_> = (0..n).filter_map(|i| Some((i, stillness(recording, i, &alone)?))).collect();
-    survey.motionless = still.iter().map(|(i, _)| recording.coordinates[*i].clone()).collect();
+    let still = stillness(recording, &alone);
+    let names = |copies: bool| {
+        let of = still.iter().filter(move |(_, how)| matches!(how, Stillness::Copy(_)) == copies);
+        of.map(|(i, _)| recording.coordinates[*i].clone()).collect()
+    };
+    (survey.motionless, survey.copies) = (names(false), names(true));
     survey.warnings = warnings::warnings(&survey, &still);
     Ok(survey)
 }

@@ -1,34 +1,52 @@
-//! Coordinates that stand still.
+//! Coordinates that stand still, by themselves or beside others.
 
 use crate::names::number;
-use crate::recording::Recording;
 use crate::recording::smooth::Smoothing;
+use crate::recording::{RecordedTrajectory, Recording};
 
 /// Samples scatter by so many standard deviations of the noise at least where something moves.
 const MOVES: f64 = 1.2;
 
 /// Way in which a coordinate stands still.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Stillness {
     /// It keeps one value in every trajectory.
     Constant(f64),
     /// It does not scatter more than its noise, of this standard deviation.
     Noise(f64),
+    /// It is this sum of other coordinates and a constant, to within the noise.
+    Copy(String),
 }
 
 impl std::fmt::Display for Stillness {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::Constant(value) => write!(f, "does not move: it is {value} in every sample"),
+            Self::Copy(sum) => write!(f, "follows from the other coordinates: it is {sum} plus a constant"),
             Self::Noise(sigma) => write!(f, "does not move beyond its noise of {}", number(*sigma)),
         }
     }
 }
 
+/// Samples that are looked at for copies, about; of more, evenly spaced ones.
+const SAMPLES: usize = 1 << 16;
+/// Part of a coordinate's motion below which what others leave of it is rounding.
+const ROUNDING: f64 = 1e-9;
+
+/// Coordinates that stand still, and those that are copies of others, in their order, each with the way it is so.
+pub fn stillness(recording: &Recording, smoothing: &Smoothing) -> Vec<(usize, Stillness)> {
+    let alone = |i: usize| standing(recording, i, smoothing);
+    let mut found: Vec<_> = (0..recording.n()).filter_map(|i| Some((i, alone(i)?))).collect();
+    let moving: Vec<usize> = (0..recording.n()).filter(|i| found.iter().all(|(still, _)| still != i)).collect();
+    found.extend(copies(recording, &moving, smoothing));
+    found.sort_by_key(|(i, _)| *i);
+    found
+}
+
 /// Stillness of coordinate `i` in all trajectories; none if it moves. Motion sampled too coarsely to be told from noise may
 /// move.
-pub fn stillness(recording: &Recording, i: usize, smoothing: &Smoothing) -> Option<Stillness> {
+fn standing(recording: &Recording, i: usize, smoothing: &Smoothing) -> Option<Stillness> {
     let n = recording.n();
     let values = |track: usize| recording.tracks[track].q.iter().skip(i).step_by(n);
     let tracks = 0..recording.tracks.len();
@@ -49,10 +67,58 @@ pub fn stillness(recording: &Recording, i: usize, smoothing: &Smoothing) -> Opti
     still.then_some(Stillness::Noise(noise.sigma))
 }
 
+/// Those of the coordinates `moving` that are linear functions of the ones before them, the same in every trajectory but for a
+/// constant, to within the noise: the modified Gram-Schmidt process leaves nothing of them.
+fn copies(recording: &Recording, moving: &[usize], smoothing: &Smoothing) -> Vec<(usize, Stillness)> {
+    let n = recording.n();
+    let stride = recording.samples().div_ceil(SAMPLES).max(1);
+    let column = |i: usize| -> Vec<f64> {
+        let centred = |track: &RecordedTrajectory| {
+            let values: Vec<f64> = track.q.iter().skip(i).step_by(n * stride).copied().collect();
+            let mean = values.iter().map(|x| x / values.len() as f64).sum::<f64>();
+            values.into_iter().map(move |x| x - mean)
+        };
+        recording.tracks.iter().flat_map(centred).collect()
+    };
+    // By its size, so that no square overflows.
+    let size = |values: &[f64]| {
+        let most = values.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+        let mean = values.iter().map(|x| (x / most).powi(2)).sum::<f64>() / values.len() as f64;
+        if most > 0.0 { most * mean.sqrt() } else { 0.0 }
+    };
+    // What is left of a coordinate, over its size, and the coefficients of all coordinates in it.
+    let mut kept: Vec<(Vec<f64>, Vec<f64>)> = Vec::new();
+    let mut found = Vec::new();
+    for &i in moving {
+        let (mut rest, mut coefficients) = (column(i), vec![0.0; n]);
+        coefficients[i] = 1.0;
+        let whole = size(&rest);
+        for (other, combination) in &kept {
+            let part = rest.iter().zip(other).map(|(x, y)| x * y).sum::<f64>() / rest.len() as f64;
+            rest.iter_mut().zip(other).for_each(|(x, y)| *x -= part * y);
+            coefficients.iter_mut().zip(combination).for_each(|(c, k)| *c -= part * k);
+        }
+        let noises = coefficients.iter().zip(&smoothing.coordinates).filter(|(c, _)| **c != 0.0);
+        let resolved = noises.clone().all(|(_, chosen)| chosen.noise.resolved);
+        let noise = noises.map(|(c, chosen)| (c * chosen.noise.sigma).powi(2)).sum::<f64>().sqrt();
+        let left = size(&rest);
+        if left <= ROUNDING * whole || (resolved && left <= MOVES * noise) {
+            let terms =
+                moving.iter().filter(|k| **k != i && (coefficients[**k] * size(&column(**k))).abs() > 1e-3 * whole);
+            let terms: Vec<String> =
+                terms.map(|k| format!("{} {}", number(-coefficients[*k]), recording.coordinates[*k])).collect();
+            found.push((i, Stillness::Copy(terms.join(" + "))));
+            continue;
+        }
+        rest.iter_mut().chain(&mut coefficients).for_each(|x| *x /= left);
+        kept.push((rest, coefficients));
+    }
+    found
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::recording::RecordedTrajectory;
     use crate::recording::smooth::SmoothOptions;
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
@@ -66,7 +132,42 @@ mod tests {
         let track = RecordedTrajectory { name: "t".into(), times, q, v: vec![], a: vec![], force: vec![] };
         let recording = Recording { coordinates: vec!["x".into()], periodic: vec![false], tracks: vec![track] };
         let smoothing = Smoothing::choose(&recording, &SmoothOptions::default()).unwrap();
-        stillness(&recording, 0, &smoothing)
+        stillness(&recording, &smoothing).pop().map(|(_, how)| how)
+    }
+
+    #[test]
+    fn copies_are_found_in_any_combination_and_nothing_else_is() {
+        let mut rng = ChaCha8Rng::seed_from_u64(3);
+        let mut noise = |sigma: f64| sigma * Distribution::<f64>::sample(&StandardNormal, &mut rng);
+        let mut found = |sigma: f64, of: &dyn Fn(f64, usize) -> [f64; 4]| -> Vec<String> {
+            let track = |k: usize| {
+                let times: Vec<f64> = (0..600).map(|j| 0.01 * f64::from(j)).collect();
+                let q = times.iter().flat_map(|t| of(*t, k)).map(|q| q + noise(sigma)).collect();
+                RecordedTrajectory { name: k.to_string(), times, q, v: vec![], a: vec![], force: vec![] }
+            };
+            let tracks = (0..2).map(track).collect();
+            let coordinates: Vec<String> = ["x", "y", "z", "w"].map(String::from).to_vec();
+            let recording = Recording { coordinates, periodic: vec![false; 4], tracks };
+            let smoothing = Smoothing::choose(&recording, &SmoothOptions::default()).unwrap();
+            let still = stillness(&recording, &smoothing).into_iter();
+            still.map(|(i, how)| format!("{}: {how}", recording.coordinates[i])).collect()
+        };
+        let wave = |t: f64, k: f64| (k * t).sin() + 0.3 * (1.7 * k * t).cos();
+        for sigma in [0.0, 1e-3] {
+            let [one] = &found(sigma, &|t, _| [wave(t, 3.0), 2.0 * wave(t, 3.0) + 1.0, wave(t, 2.0), wave(t, 4.0)])[..]
+            else {
+                panic!("one copy")
+            };
+            assert!(one.starts_with("y: ") && one.contains("2.00 x"), "{one}");
+            // The sum of two others, with another constant in every trajectory.
+            let sum =
+                |t: f64, k: usize| [wave(t, 3.0), wave(t, 2.0), wave(t, 3.0) - wave(t, 2.0) + k as f64, wave(t, 4.0)];
+            let [one] = &found(sigma, &sum)[..] else { panic!("one copy") };
+            assert!(one.starts_with("z: ") && one.contains("1.00 x") && one.contains("-1.00 y"), "{one}");
+            // Lines of other slopes in the other trajectory, and motion that comes from another by a curve.
+            let free = |t: f64, k: usize| [t, (1.0 + k as f64) * t, wave(t, 3.0), wave(t, 3.0).sin()];
+            assert_eq!(found(sigma, &free), [""; 0], "{sigma}");
+        }
     }
 
     #[test]

@@ -127,7 +127,7 @@ impl CheckpointManager {
         });
         match written {
             Ok(()) => state.keep = true,
-            Err(problem) => tracing::warn!(checkpoint = %newest.display(), %problem),
+            Err(problem) => tracing::warn!("{}: the checkpoint is not written: {problem}", newest.display()),
         }
         let epochs = in_progress.map_or(outcome.history.len(), |in_progress| in_progress.optimizer_state.epoch);
         (state.last, state.cost) = (Some((Instant::now(), epochs)), began.elapsed());

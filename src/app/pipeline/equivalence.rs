@@ -1,25 +1,25 @@
-//! Common ground of a learned Lagrangian and the exact one: factor and gauge, and what is left beside them.
+//! How nearly a learned Lagrangian is equivalent to the exact one: the best factor and gauge, and the difference that they leave.
 
 use crate::lagrangian::EulerLagrange;
 use crate::names::percent;
 use crate::symmetry::{Basis, Chart, SymmetryError, compare};
 use serde::Serialize;
 
-/// Best `learned = f(exact) + dF/dt + constant`, and what is left of the learned Lagrangian, relative.
+/// Best `learned = f(exact) + dF/dt + constant`, and the relative differences that remain.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct CommonGround {
-    /// Factor by which the learned Lagrangian, gauge taken out, becomes the exact one, of geodesics at rest; none where the states, all on
-    /// a mass shell, do not tell.
+pub struct Equivalence {
+    /// Factor by which the learned Lagrangian, gauge taken out, becomes the exact one, of geodesics at rest; none where it is
+    /// undetermined, for all states are on a mass shell.
     pub factor: Option<f64>,
     /// Coefficients of `f`, from the first power: one, or of geodesics several.
     pub factors: Vec<f64>,
-    /// Rest of momenta and values.
+    /// Difference of momenta and values.
     pub lagrangian: f64,
     /// Difference of the accelerations.
     pub motion: f64,
-    /// Rest of the mass matrix.
+    /// Difference of the mass matrices.
     pub mass_matrix: f64,
-    /// Rest of the energy.
+    /// Difference of the energies.
     pub energy: f64,
     /// States compared.
     pub states: usize,
@@ -35,7 +35,7 @@ pub(crate) fn gauge_functions(names: &[String], charts: &[Chart]) -> (Basis, usi
     (basis, states)
 }
 
-impl CommonGround {
+impl Equivalence {
     /// Compares at states `(states, n)`; gauge functions are over `basis`.
     ///
     /// # Errors
@@ -59,8 +59,8 @@ impl CommonGround {
         })
     }
 
-    /// Rests by quantity.
-    pub(crate) fn left(&self) -> [(&'static str, f64); 4] {
+    /// Differences by quantity.
+    pub(crate) fn differences(&self) -> [(&'static str, f64); 4] {
         [
             ("Lagrangian", self.lagrangian),
             ("motion", self.motion),
@@ -69,8 +69,8 @@ impl CommonGround {
         ]
     }
 
-    /// The distances in a line.
+    /// The differences in a line.
     pub(crate) fn text(&self) -> String {
-        self.left().map(|(name, distance)| format!("{name} {}", percent(distance))).join(", ")
+        self.differences().map(|(name, distance)| format!("{name} {}", percent(distance))).join(", ")
     }
 }

@@ -1,0 +1,300 @@
+//! Pictures of the functions in a Lagrangian: the potential `V(q) = -L(q, 0)`, the mass matrix `M(q)` at rest, the gyroscopic field
+//! `F_ij = dA_j/dq_i - dA_i/dq_j` of the momenta `A = p(q, 0)`, and the friction force over the velocity. All but the last do not
+//! depend on the gauge; together they are the whole of a Lagrangian that is quadratic in the velocities.
+
+use crate::analysis::{Axis, Grid, MetricComponent, grid_points, metric_grids};
+use crate::lagrangian::{EulerLagrange, Request, Terms};
+use crate::recording::Recording;
+use crate::report::{Figure, LinePlot, QuantityMap, Series, figure, file_part, line_plot, quantity_figure};
+use std::f64::consts::{PI, TAU};
+
+/// Points of a curve.
+const CURVE: usize = 161;
+/// Step of the differences of momenta over the range of a coordinate.
+const STEP: f64 = 1e-4;
+/// Components of a matrix that have a picture, at most.
+pub(super) const MAPS: usize = 10;
+/// Components off the diagonal that have a picture exceed this part of those on it, root mean squares.
+const SHOWN: f64 = 0.02;
+/// Share of a turn from which on an angle is shown over all of it.
+const WHOLE_TURN: f64 = 0.9;
+/// Recorded positions that are marked in a map, at most.
+const MARKS: usize = 400;
+
+/// A learned model, with the exact one beside it if that is known.
+#[derive(Clone, Copy)]
+pub(super) struct Pair<'a> {
+    pub learned: &'a dyn EulerLagrange<f64>,
+    pub exact: Option<&'a dyn EulerLagrange<f64>>,
+    /// Factor by which the learned Lagrangian is taken.
+    pub factor: f64,
+}
+
+/// Coordinates over which pictures are drawn.
+pub(super) struct Picturing {
+    /// Names of the coordinates, and labels of axes for coordinates and velocities.
+    pub names: Vec<String>,
+    pub labels: Vec<String>,
+    /// Range of every coordinate.
+    pub ranges: Vec<[f64; 2]>,
+    /// The coordinates of the axes of maps.
+    pub shown: [usize; 2],
+    /// Recorded positions in the plane of the axes.
+    pub marks: Vec<(f64, f64)>,
+    /// Sentence about the unit of the pictures; may be empty.
+    pub unit: String,
+}
+
+/// The range of a coordinate over recorded motion, an angle folded into the turn about its mean.
+pub(super) fn recorded_range(recording: &Recording, i: usize) -> ([f64; 2], impl Fn(f64) -> f64 + use<>) {
+    let n = recording.n();
+    let values = || recording.tracks.iter().flat_map(move |track| track.q.iter().skip(i).step_by(n).copied());
+    let periodic = recording.periodic[i];
+    let (sine, cosine) = values().fold((0.0, 0.0), |(s, c), x: f64| (s + x.sin(), c + x.cos()));
+    let middle = f64::atan2(sine, cosine);
+    let folded = move |x: f64| if periodic { x - TAU * ((x - middle) / TAU).round() } else { x };
+    let (low, high) = values().map(folded).fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)));
+    let range = if periodic && high - low > WHOLE_TURN * TAU { [middle - PI, middle + PI] } else { [low, high] };
+    (range, folded)
+}
+
+impl Picturing {
+    /// The plane of recorded motion.
+    pub fn of_recording(self, recording: &Recording) -> Self {
+        let n = recording.n();
+        let (ranges, folds): (Vec<_>, Vec<_>) = (0..n).map(|i| recorded_range(recording, i)).unzip();
+        let [x, y] = self.shown;
+        if x == y {
+            return Self { ranges, ..self };
+        }
+        let stride = recording.samples().div_ceil(MARKS).max(1);
+        let places = recording.tracks.iter().flat_map(|track| track.q.chunks_exact(n).step_by(stride));
+        let marks = places.map(|q| (folds[x](q[x]), folds[y](q[y]))).collect();
+        Self { ranges, marks, ..self }
+    }
+
+    /// The middle of the ranges.
+    pub fn middle(&self) -> Vec<f64> {
+        self.ranges.iter().map(|[low, high]| 0.5 * (low + high)).collect()
+    }
+
+    /// Axes of a map with so many points along each.
+    pub fn axes(&self, points: usize) -> [Axis; 2] {
+        self.shown.map(|component| {
+            let [from, to] = self.ranges[component];
+            Axis { component, from, to, points }
+        })
+    }
+
+    /// Coordinates but those of the axes, and where they are.
+    fn fixed(&self, free: &[usize]) -> String {
+        let middle = self.middle();
+        let others = (0..self.names.len()).filter(|i| !free.contains(i));
+        // Adding 0 turns -0 into 0.
+        let one = |i: usize| format!("{} = {}", self.names[i], (1e4 * middle[i]).round() / 1e4 + 0.0);
+        others.map(one).collect::<Vec<_>>().join(", ")
+    }
+
+    /// A map of a quantity; `file` is the beginning of the file's name.
+    pub fn map(&self, [quantity, about, file]: [String; 3], learned: Grid, exact: Option<Grid>) -> Option<Figure> {
+        let (labels, fixed) = (self.shown.map(|i| self.labels[i].clone()), self.fixed(&self.shown));
+        let dots = if self.marks.is_empty() { "" } else { "Dots: recorded positions." };
+        let remark = [dots, &self.unit].into_iter().filter(|text| !text.is_empty()).collect::<Vec<_>>().join(" ");
+        let marks = self.marks.clone();
+        quantity_figure(&QuantityMap { quantity, about, file, labels, learned, exact, fixed, remark, marks })
+    }
+
+    /// Grid over the plane of the values that `of` gives for points `(points, n)`.
+    fn grid(&self, points: usize, of: impl Fn(&[f64]) -> Vec<f64>) -> Grid {
+        let ([x, y], q) = grid_points(&self.middle(), self.axes(points));
+        Grid { x, y, values: of(&q) }
+    }
+
+    /// A curve of a quantity over coordinate `i`, the others in the middle of their ranges.
+    fn curve(&self, i: usize, [quantity, about, file]: [&str; 3], pair: Pair<'_>, of: Value<'_>) -> Option<Figure> {
+        let [from, to] = self.ranges[i];
+        let x = Axis { component: i, from, to, points: CURVE }.values();
+        let middle = self.middle();
+        let q: Vec<f64> =
+            x.iter().flat_map(|x| middle.iter().enumerate().map(move |(k, m)| if k == i { *x } else { *m })).collect();
+        let learned: Vec<f64> = of(pair.learned, &q).iter().map(|y| pair.factor * y).collect();
+        let exact = pair.exact.map(|exact| of(exact, &q));
+        let (learned, exact) = if quantity == "V" { aligned(learned, exact) } else { (learned, exact) };
+        let lines = match &exact {
+            Some(exact) => vec![Series::new("exact", &x, exact), Series::new("learned", &x, &learned).over()],
+            None => vec![Series::new("", &x, &learned)],
+        };
+        let fixed = self.fixed(&[i]);
+        let fixed = if fixed.is_empty() { fixed } else { format!("At {fixed}.") };
+        let caption = [fixed.as_str(), &self.unit].into_iter().filter(|text| !text.is_empty()).collect::<Vec<_>>();
+        let plot = lines_over(quantity, &self.labels[i], quantity, lines);
+        figure(&format!("{}.svg", file_part(file)), about, line_plot(&plot), caption.join(" "))
+    }
+
+    /// The potential; none for a model that is constant at rest.
+    pub fn potential(&self, pair: Pair<'_>, side: usize) -> Vec<Figure> {
+        let n = self.names.len();
+        let mut figures = Vec::new();
+        if n > 1 {
+            let learned = self.grid(side, |q| potential(pair.learned, q)).map(|v| pair.factor * v);
+            let exact = pair.exact.map(|exact| self.grid(side, |q| potential(exact, q)).values);
+            let (values, exact) = aligned(learned.values.clone(), exact);
+            if is_flat(&values) && exact.as_deref().is_none_or(is_flat) {
+                return figures;
+            }
+            let exact = exact.map(|values| Grid { values, ..learned.clone() });
+            let texts = ["V", "The potential V over the coordinates", "potential"].map(String::from);
+            figures.extend(self.map(texts, Grid { values, ..learned }, exact));
+        }
+        for i in (0..n).filter(|i| n == 1 || !self.shown.contains(i)) {
+            let name = &self.names[i];
+            let file = if n == 1 { "potential".to_string() } else { format!("potential_{name}") };
+            figures.extend(self.curve(i, ["V", &format!("The potential V over {name}"), &file], pair, &potential));
+        }
+        figures
+    }
+
+    /// The mass matrix at rest, those of its `components` that matter; `symbol` is `M`, or `g` of a metric. The second part is the number of
+    /// components without a picture.
+    pub fn mass_matrix(
+        &self,
+        pair: Pair<'_>,
+        components: &[MetricComponent],
+        (symbol, file): (&str, &str),
+        side: usize,
+    ) -> (Vec<Figure>, usize) {
+        if let [name] = &self.names[..] {
+            let of = |model: &dyn EulerLagrange<f64>, q: &[f64]| at_rest(model, q, Request::MASS_MATRIX).mass_matrix;
+            let texts = [symbol, &format!("The mass M over {name}"), file];
+            return (self.curve(0, texts, pair, &of).into_iter().collect(), 0);
+        }
+        let size = |component: &MetricComponent| component.exact.unwrap_or(0.0).max(component.learned);
+        let diagonal = |i: usize| components.iter().find(|c| c.indices == [i; 2]).map_or(0.0, size);
+        let matters = |component: &MetricComponent| {
+            let [i, j] = component.indices;
+            i == j || size(component) > SHOWN * (diagonal(i) * diagonal(j)).sqrt()
+        };
+        let grids = |model: &dyn EulerLagrange<f64>| metric_grids(model, &self.middle(), self.axes(side)).into_iter();
+        let (learned, mut exact) = (grids(pair.learned), pair.exact.map(grids));
+        let mut maps = Vec::new();
+        for (component, learned) in components.iter().zip(learned) {
+            let exact = exact.as_mut().and_then(Iterator::next);
+            if matters(component) {
+                let [a, b] = component.indices.map(|i| self.names[i].as_str());
+                let what = if symbol == "g" { "metric" } else { "mass matrix" };
+                let quantity = format!("{symbol}[{a},{b}]");
+                let about = format!("Component {quantity} of the {what} over the coordinates");
+                let texts = [quantity, about, format!("{file}_{a}_{b}")];
+                maps.push((texts, learned.map(|m| pair.factor * m), exact));
+            }
+        }
+        let more = maps.len().saturating_sub(MAPS);
+        let drawn = maps.into_iter().take(MAPS).filter_map(|(texts, learned, exact)| self.map(texts, learned, exact));
+        (drawn.collect(), more)
+    }
+
+    /// The gyroscopic field, that of a magnet or of a turning frame; none for a model whose momenta vanish at rest.
+    pub fn gyroscopic(&self, pair: Pair<'_>, side: usize) -> Vec<Figure> {
+        let n = self.names.len();
+        let pairs = (0..n).flat_map(|i| (i + 1..n).map(move |j| [i, j])).take(MAPS);
+        let drawn = pairs.filter_map(|[i, j]| {
+            let grid = |model| self.grid(side, |q| self.field(model, q, [i, j]));
+            let (learned, exact) = (grid(pair.learned).map(|f| pair.factor * f), pair.exact.map(grid));
+            let vanishes = |grid: &Grid| grid.values.iter().all(|f| *f == 0.0 || !f.is_finite());
+            if vanishes(&learned) && exact.as_ref().is_none_or(vanishes) {
+                return None;
+            }
+            let [a, b] = [i, j].map(|i| self.names[i].as_str());
+            let quantity = format!("F[{a},{b}]");
+            let about = format!("The gyroscopic (magnetic) field {quantity} over the coordinates");
+            self.map([quantity, about, format!("gyroscopic_{a}_{b}")], learned, exact)
+        });
+        drawn.collect()
+    }
+
+    /// `F_ij` at points `(points, n)` by central differences of the momenta at rest.
+    fn field(&self, model: &dyn EulerLagrange<f64>, q: &[f64], [i, j]: [usize; 2]) -> Vec<f64> {
+        let n = self.names.len();
+        let difference = |along: usize, of: usize| -> Vec<f64> {
+            let [low, high] = self.ranges[along];
+            let step = STEP * (high - low);
+            let [before, after] = [-step, step].map(|step| {
+                let mut moved = q.to_vec();
+                moved.iter_mut().skip(along).step_by(n).for_each(|x| *x += step);
+                at_rest(model, &moved, Request::MOMENTUM).momentum
+            });
+            let column = |p: &[f64]| p.iter().skip(of).step_by(n).copied().collect::<Vec<_>>();
+            column(&after).iter().zip(column(&before)).map(|(a, b)| (a - b) / (2.0 * step)).collect()
+        };
+        difference(i, j).iter().zip(difference(j, i)).map(|(a, b)| a - b).collect()
+    }
+
+    /// Friction of every coordinate over its velocity, the others at rest, in the middle of the coordinates; none for a model without.
+    pub fn friction(&self, pair: Pair<'_>, velocities: &[[f64; 2]]) -> Vec<Figure> {
+        let (n, middle) = (self.names.len(), self.middle());
+        let of = |model: &dyn EulerLagrange<f64>, i: usize, v: &[f64]| -> Vec<f64> {
+            let q = middle.repeat(v.len());
+            let v: Vec<f64> = v.iter().flat_map(|v| (0..n).map(move |k| if k == i { *v } else { 0.0 })).collect();
+            let mut terms = Terms::default();
+            let _ = model.terms(&q, &v, Request::FORCE, &mut terms);
+            terms.force.iter().skip(i).step_by(n).copied().collect()
+        };
+        let drawn = (0..n).filter_map(|i| {
+            let [from, to] = velocities[i];
+            let x = Axis { component: i, from, to, points: CURVE }.values();
+            let learned: Vec<f64> = of(pair.learned, i, &x).iter().map(|f| pair.factor * f).collect();
+            let exact = pair.exact.map(|exact| of(exact, i, &x)).filter(|exact| !exact.is_empty());
+            if learned.is_empty() && exact.is_none() {
+                return None;
+            }
+            let learned = if learned.is_empty() { vec![0.0; x.len()] } else { learned };
+            let lines = match &exact {
+                Some(exact) => vec![Series::new("exact", &x, exact), Series::new("learned", &x, &learned).over()],
+                None => vec![Series::new("", &x, &learned)],
+            };
+            let name = &self.names[i];
+            let about = format!("The friction of {name}: force \u{2212}dD/dv over the velocity");
+            let caption = ["The other velocities are 0, the coordinates in the middle.", self.unit.as_str()].join(" ");
+            let plot = lines_over(&format!("Friction of {name}"), &self.labels[n + i], "force", lines);
+            figure(&format!("friction_{}.svg", file_part(name)), about, line_plot(&plot), caption.trim_end())
+        });
+        drawn.collect()
+    }
+}
+
+/// Values of a quantity of a model at points `(points, n)`.
+type Value<'a> = &'a dyn Fn(&dyn EulerLagrange<f64>, &[f64]) -> Vec<f64>;
+
+fn lines_over(title: &str, x_label: &str, y_label: &str, series: Vec<Series>) -> LinePlot {
+    let (title, x_label, y_label) = (title.to_string(), x_label.to_string(), y_label.to_string());
+    LinePlot { title, x_label, y_label, log_y: false, series, turn: None, level: None }
+}
+
+/// Terms at rest at points `(points, n)`.
+fn at_rest(model: &dyn EulerLagrange<f64>, q: &[f64], request: Request) -> Terms<f64> {
+    let mut terms = Terms::default();
+    // Failures of single states leave numbers that are not finite.
+    let _ = model.terms(q, &vec![0.0; q.len()], request, &mut terms);
+    terms
+}
+
+fn potential(model: &dyn EulerLagrange<f64>, q: &[f64]) -> Vec<f64> {
+    at_rest(model, q, Request::LAGRANGIAN).lagrangian.iter().map(|l| -l).collect()
+}
+
+/// A learned potential brought to the mean of the exact one, or to the minimum 0: its constant has no meaning.
+fn aligned(learned: Vec<f64>, exact: Option<Vec<f64>>) -> (Vec<f64>, Option<Vec<f64>>) {
+    let finite = |values: &[f64]| values.iter().copied().filter(|x| x.is_finite()).collect::<Vec<_>>();
+    let lowest = |values: &[f64]| finite(values).into_iter().fold(f64::INFINITY, f64::min);
+    let shifted = |values: &[f64], by: f64| values.iter().map(|x| x - by).collect::<Vec<_>>();
+    let Some(exact) = exact else { return (shifted(&learned, lowest(&learned)), None) };
+    let exact = shifted(&exact, lowest(&exact));
+    let apart: Vec<f64> = finite(&learned.iter().zip(&exact).map(|(a, b)| a - b).collect::<Vec<_>>());
+    let mean = apart.iter().sum::<f64>() / apart.len() as f64;
+    (shifted(&learned, mean), Some(exact))
+}
+
+/// `true` for values that are one number but for rounding.
+fn is_flat(values: &[f64]) -> bool {
+    values.iter().filter(|x| x.is_finite()).all(|x| x.abs() <= 1e-12)
+}
