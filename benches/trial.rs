@@ -2,6 +2,7 @@
 #![allow(dead_code, unused_imports, reason = "the mains of the benchmarks are not called")]
 #![allow(clippy::duplicate_mod, clippy::module_inception, reason = "each benchmark is a program of its own too")]
 
+mod formula;
 mod linalg;
 mod measured;
 mod network;
@@ -26,5 +27,6 @@ fn main() {
     peers::smoke().expect("every request is answered");
     soak::soak(0.0);
     measured::trial();
+    formula::trial();
     work_precision::trial();
 }

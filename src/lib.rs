@@ -31,6 +31,7 @@
 //! | differentiate a function of yours | [`tape::gradient`], [`tape::hessian`]; over many states [`tape::Program`] |
 //! | solve small symmetric systems in batches | [`linalg`] |
 //! | find what a Lagrangian conserves, compare two Lagrangians | [`symmetry::symmetries`], [`symmetry::quadratic`], [`symmetry::compare`] |
+//! | read a Lagrangian as a formula, from motion or from a model | [`formula`] |
 //! | see the shadow of a black hole and the sky around it | [`relativity::shadow()`], [`relativity::outline`] |
 //! | prove where a mass matrix has its signature | [`certificate`] |
 //! | judge a model: energy, coordinates, Lyapunov exponents | [`analysis`] |
@@ -176,7 +177,7 @@ pub use mechanics::{lagrangian, network};
 pub use numerics::ops;
 pub use numerics::{forward, linalg, random, scalar, tape};
 #[cfg(feature = "training")]
-pub use physics::analysis;
+pub use physics::{analysis, formula};
 pub use physics::{certificate, geometry};
 #[cfg(feature = "rollout")]
 pub use physics::{relativity, symmetry};

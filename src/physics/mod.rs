@@ -7,10 +7,13 @@
 //! | [`certificate`] | proofs of the signature of mass matrices over boxes |
 //! | [`analysis`] | errors of accelerations, energy and trajectories, Lyapunov times, what data determine |
 //! | [`relativity`] | black holes, light in a metric |
+//! | [`formula`] | a Lagrangian as a formula, from motion or from a model |
 
 #[cfg(feature = "training")]
 pub mod analysis;
 pub mod certificate;
+#[cfg(feature = "training")]
+pub mod formula;
 pub mod geometry;
 #[cfg(feature = "rollout")]
 pub mod relativity;

@@ -1,0 +1,45 @@
+//! A Lagrangian as a formula: from recorded motion, or from a model that was learned.
+//!
+//! The equations of Euler and Lagrange are linear in the coefficients of a library of terms: products of velocities with functions of the
+//! coordinates. Terms that are total derivatives, or that identities such as `sin^2 + cos^2 = 1` make of others, are found and left out by
+//! the rank of the stacked equations at random states, never by hand. Of recorded motion [`formula_of_motion`] takes the weak form of the
+//! equations along smoothed positions, gives up terms one after the other with refits, and then follows the motion itself by the survivors:
+//! multiple shooting with Gauss and Newton's method, in which every term of the library is tried again, and which noise in the positions does
+//! not bias. Held-out trajectories say whether what is left is noise.
+//!
+//! ```
+//! use lnn::formula::{FormulaOptions, Verdict, formula_of_motion};
+//! use lnn::recording::{RecordedTrajectory, Recording};
+//!
+//! // Swings of a pendulum with g / l = 4, as angles alone: cos(2 t) for small ones is what the formula must not take them for.
+//! let model = lnn::lagrangian::ExpressionLagrangian::new(&["a"], &[], "a_dot^2/2 + 4*cos(a)")?;
+//! let model = lnn::lagrangian::Mechanics::new(model, vec![]);
+//! let tracks = (0..8).map(|k| {
+//!     use lnn::rollout::Rollout;
+//!     let motion = model.rollout(&[0.5 + 0.3 * k as f64], &[0.0], 5.0, 0.05).unwrap();
+//!     RecordedTrajectory { name: format!("{k}"), times: motion.t, q: motion.q, v: vec![], a: vec![], force: vec![] }
+//! });
+//! let recording = Recording { coordinates: vec!["a".into()], periodic: vec![true], tracks: tracks.collect() };
+//! let found = formula_of_motion(&recording, &FormulaOptions::default())?;
+//! assert_eq!(found.verdict, Verdict::Found);
+//! let terms: Vec<&str> = found.terms.iter().map(|t| t.term.as_str()).collect();
+//! assert_eq!(terms, ["a_dot^2", "cos(a)"]);
+//! assert!((found.terms[1].coefficient - 4.0).abs() < 1e-3);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod error;
+mod find;
+mod found;
+mod function;
+mod library;
+mod linear;
+mod motion;
+mod select;
+mod wald;
+mod weak;
+
+pub use error::FormulaError;
+pub use find::{FormulaOptions, formula_of_motion};
+pub use found::{FoundFormula, FoundTerm, Left, Verdict};
+pub use library::Families;

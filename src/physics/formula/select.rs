@@ -1,0 +1,260 @@
+//! Backward elimination by the weak form, with refits and exchanges.
+
+use super::linear::{dot, inverse, part, times};
+use super::weak::{Normal, Windows};
+use std::collections::BTreeMap;
+
+/// Terms up to which every drop is judged by the errors of accelerations, and refitted.
+const FEW: usize = 40;
+/// Terms up to which terms are exchanged as well.
+const EXCHANGED: usize = 10;
+/// Drops, and additions, that are looked at each time.
+const TRIED: usize = 6;
+
+/// A choice of terms.
+#[derive(Clone, Debug)]
+pub(super) struct Choice {
+    /// Places of the terms.
+    pub set: Vec<usize>,
+    /// Coefficients of all terms, 0 outside the set.
+    pub coefficients: Vec<f64>,
+    /// Mean squared error of accelerations on what was learned from.
+    pub error: f64,
+    /// The same on what was held out.
+    pub held_out: f64,
+}
+
+/// Choices of terms by their number.
+pub(super) struct Path {
+    /// The best choice of every size.
+    pub best: BTreeMap<usize, Choice>,
+    /// All terms in the order in which they were given up, the last ones first.
+    pub order: Vec<usize>,
+}
+
+struct Search<'a> {
+    windows: &'a Windows,
+    sigma: &'a [f64],
+    complexity: &'a [f64],
+    learned: Vec<bool>,
+    held_out: Vec<bool>,
+}
+
+/// Coefficients that solve normal equations: those of known forces, or those of the smallest error with a mass matrix of the size that it
+/// had. With the inverse matrix, and what is multiplied by it.
+fn solve(normal: &Normal, driven: bool) -> Option<(Vec<f64>, Vec<f64>)> {
+    let m = normal.size.len();
+    let inverse = inverse(m, &normal.matrix)?;
+    let right = if driven { &normal.right } else { &normal.size };
+    let mut x = times(m, &inverse, right);
+    if !driven {
+        let length = dot(&normal.size, &x);
+        x.iter_mut().for_each(|x| *x /= length);
+    }
+    x.iter().all(|x| x.is_finite()).then_some((x, inverse))
+}
+
+impl Normal {
+    fn of(&self, places: &[usize]) -> Self {
+        let m = self.size.len();
+        let pick = |list: &[f64]| places.iter().map(|&k| list[k]).collect();
+        Self { matrix: part(m, &self.matrix, places), right: pick(&self.right), size: pick(&self.size) }
+    }
+
+    /// What giving up each term costs to first order.
+    fn costs(&self, driven: bool) -> Option<Vec<f64>> {
+        let m = self.size.len();
+        let inverse = inverse(m, &self.matrix)?;
+        if driven {
+            let x = times(m, &inverse, &self.right);
+            return Some((0..m).map(|k| x[k] * x[k] / inverse[k * m + k]).collect());
+        }
+        let x = times(m, &inverse, &self.size);
+        let total = dot(&self.size, &x);
+        let without = |k: usize| (total - x[k] * x[k] / inverse[k * m + k]).max(1e-300 + 1e-14 * total);
+        Some((0..m).map(|k| 1.0 / without(k) - 1.0 / total).collect())
+    }
+}
+
+impl Search<'_> {
+    fn spread(&self, set: &[usize], x: &[f64]) -> Vec<f64> {
+        let mut coefficients = vec![0.0; self.windows.terms];
+        set.iter().zip(x).for_each(|(&k, x)| coefficients[k] = *x);
+        coefficients
+    }
+
+    fn mean(&self, errors: &[f64], used: &[bool]) -> f64 {
+        let mut of: Vec<f64> = errors.iter().zip(used).filter(|(_, used)| **used).map(|(e, _)| *e).collect();
+        if of.is_empty() {
+            return f64::NAN;
+        }
+        of.sort_by(f64::total_cmp);
+        // A single window next to a pole of the accelerations must not decide.
+        let most = 300.0 * of[of.len() / 2];
+        of.iter().map(|e| e.min(most)).sum::<f64>() / of.len() as f64
+    }
+
+    /// The choice of a set, refitted from coefficients before it; `None` if it moves not all coordinates.
+    fn choice(&self, set: &[usize], start: &[f64], refits: usize) -> Option<Choice> {
+        if !self.windows.moves_all(set) {
+            return None;
+        }
+        let mut coefficients = start.to_vec();
+        for _ in 0..refits {
+            let normal = self.windows.normal(&coefficients, set, self.sigma, &self.learned);
+            let (x, _) = solve(&normal, self.windows.driven())?;
+            coefficients = self.spread(set, &x);
+        }
+        self.judged(set.to_vec(), coefficients)
+    }
+
+    fn judged(&self, set: Vec<usize>, coefficients: Vec<f64>) -> Option<Choice> {
+        let errors = self.windows.errors(&coefficients, self.sigma);
+        let (error, held_out) = (self.mean(&errors, &self.learned), self.mean(&errors, &self.held_out));
+        error.is_finite().then_some(Choice { set, coefficients, error, held_out })
+    }
+
+    /// The best choice with a term less.
+    fn shorter(&self, from: &Choice) -> Option<Choice> {
+        let normal = self.windows.normal(&from.coefficients, &from.set, self.sigma, &self.learned);
+        let costs = normal.costs(self.windows.driven())?;
+        let mut order: Vec<usize> = (0..costs.len()).collect();
+        order.sort_by(|&a, &b| costs[a].total_cmp(&costs[b]));
+        let refits = if from.set.len() <= 12 { 2 } else { 0 };
+        let tries = order.iter().take(TRIED).filter_map(|&gone| {
+            let places: Vec<usize> = (0..from.set.len()).filter(|&k| k != gone).collect();
+            let set: Vec<usize> = places.iter().map(|&k| from.set[k]).collect();
+            if !self.windows.moves_all(&set) {
+                return None;
+            }
+            let (x, _) = solve(&normal.of(&places), self.windows.driven())?;
+            self.choice(&set, &self.spread(&set, &x), refits).map(|choice| (gone, choice))
+        });
+        let tries: Vec<(usize, Choice)> = tries.collect();
+        let least = tries.iter().map(|(_, choice)| choice.error).fold(f64::INFINITY, f64::min);
+        // Of equally good ones the most involved term goes.
+        let equal = tries.into_iter().filter(|(_, choice)| choice.error <= least * (1.0 + 1e-3));
+        let involved = |gone: usize| self.complexity[from.set[gone]];
+        equal.max_by(|a, b| involved(a.0).total_cmp(&involved(b.0))).map(|(_, choice)| choice)
+    }
+
+    /// Choices with a term more, of the terms that promise most.
+    fn longer(&self, from: &Choice, all: &[usize]) -> Vec<Choice> {
+        let normal = self.windows.normal(&from.coefficients, all, self.sigma, &self.learned);
+        let driven = self.windows.driven();
+        let own: Vec<usize> = (0..all.len()).filter(|&k| from.set.contains(&all[k])).collect();
+        let objective = |normal: &Normal| {
+            let m = normal.size.len();
+            let inverse = inverse(m, &normal.matrix)?;
+            let right = if driven { &normal.right } else { &normal.size };
+            let gain = dot(right, &times(m, &inverse, right));
+            Some(if driven { -gain } else { 1.0 / gain })
+        };
+        let mut gains: Vec<(f64, usize)> = (0..all.len())
+            .filter(|k| !own.contains(k))
+            .filter_map(|k| {
+                let mut places = own.clone();
+                places.push(k);
+                objective(&normal.of(&places)).map(|value| (value, k))
+            })
+            .collect();
+        gains.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let longer = gains.iter().take(TRIED).filter_map(|&(_, k)| {
+            let mut set = from.set.clone();
+            set.push(all[k]);
+            set.sort_unstable();
+            self.choice(&set, &from.coefficients, 2)
+        });
+        longer.collect()
+    }
+}
+
+/// Eliminates terms from all of them down to one per coordinate or fewer, then exchanges some as long as that makes them better.
+///
+/// `start` are coefficients that give a regular mass matrix, `sigma` the errors of accelerations that count as one, `held_out` the blocks
+/// that judge alone.
+pub(super) fn eliminate_backward(
+    windows: &Windows,
+    start: &[f64],
+    sigma: &[f64],
+    complexity: &[f64],
+    held_out: &dyn Fn(usize) -> bool,
+) -> Path {
+    let held_out: Vec<bool> = windows.blocks.iter().map(|&block| held_out(block)).collect();
+    let learned: Vec<bool> = held_out.iter().map(|held| !held).collect();
+    let search = Search { windows, sigma, complexity, learned, held_out };
+    let driven = windows.driven();
+    let all: Vec<usize> = (0..windows.terms).collect();
+    let mut set = all.clone();
+    let mut coefficients = start.to_vec();
+    for _ in 0..3 {
+        let normal = windows.normal(&coefficients, &set, sigma, &search.learned);
+        if let Some((x, _)) = solve(&normal, driven) {
+            coefficients = search.spread(&set, &x);
+        }
+    }
+    let mut order = Vec::new();
+    // Many at once while there are many.
+    while set.len() > FEW {
+        let normal = windows.normal(&coefficients, &set, sigma, &search.learned);
+        let mut places: Vec<usize> = (0..set.len()).collect();
+        let goal = (set.len() * 9 / 10).max(FEW);
+        while places.len() > goal {
+            let Some(costs) = normal.of(&places).costs(driven) else { break };
+            let gone = (0..costs.len()).min_by(|&a, &b| costs[a].total_cmp(&costs[b])).unwrap_or(0);
+            let kept: Vec<usize> = (0..places.len()).filter(|&k| k != gone).map(|k| set[places[k]]).collect();
+            if !windows.moves_all(&kept) {
+                break;
+            }
+            order.push(set[places.remove(gone)]);
+        }
+        if places.len() == set.len() {
+            break;
+        }
+        if let Some((x, _)) = solve(&normal.of(&places), driven) {
+            set = places.iter().map(|&k| set[k]).collect();
+            coefficients = search.spread(&set, &x);
+        } else {
+            break;
+        }
+    }
+    let mut best: BTreeMap<usize, Choice> = BTreeMap::new();
+    let mut choice = search.judged(set, coefficients);
+    while let Some(found) = choice {
+        choice = if found.set.len() > 1 { search.shorter(&found) } else { None };
+        if let Some(next) = &choice {
+            order.extend(found.set.iter().filter(|k| !next.set.contains(k)));
+        } else {
+            order.extend(&found.set);
+        }
+        best.insert(found.set.len(), found);
+    }
+    order.reverse();
+    for _ in 0..3 {
+        let mut changed = false;
+        let sizes: Vec<usize> = best.keys().copied().filter(|size| *size <= EXCHANGED).collect();
+        for size in sizes {
+            let Some(from) = best.get(&size).cloned() else { continue };
+            for longer in search.longer(&from, &all) {
+                if let Some(shorter) = search.shorter(&longer) {
+                    changed |= improve(&mut best, shorter);
+                }
+                changed |= improve(&mut best, longer);
+            }
+        }
+        if !changed {
+            break;
+        }
+    }
+    Path { best, order }
+}
+
+/// Takes a choice in if it is better than the one of its size.
+fn improve(best: &mut BTreeMap<usize, Choice>, choice: Choice) -> bool {
+    let known = best.get(&choice.set.len()).map_or(f64::INFINITY, |known| known.error);
+    let better = choice.error < known * (1.0 - 1e-3);
+    if better {
+        best.insert(choice.set.len(), choice);
+    }
+    better
+}

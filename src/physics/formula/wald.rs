@@ -1,0 +1,94 @@
+//! Which terms a fit through the motion needs, from its normal equations alone.
+
+use super::linear::{inverse_with, times};
+
+/// Normal equations at a model.
+pub(super) struct Equations<'a> {
+    /// `(m, m)`, the common factor fixed.
+    pub matrix: &'a [f64],
+    /// Gradient at the coefficients.
+    pub right: &'a [f64],
+    /// Coefficients of the model over the same terms.
+    pub coefficients: &'a [f64],
+    pub complexity: &'a [f64],
+}
+
+/// What is left of the terms.
+#[derive(Clone, Debug)]
+pub(super) struct Survivors {
+    /// Places of the terms.
+    pub set: Vec<usize>,
+    /// Coefficients of all terms, 0 outside the set.
+    pub coefficients: Vec<f64>,
+    /// What giving up the cheapest survivor would cost.
+    pub next: f64,
+}
+
+/// Part of the diagonal that stands for what the motion does not show.
+pub(super) const RIDGE: f64 = 1e-10;
+
+/// Gives up terms as long as one costs less than `threshold` in the sum of squares; `allowed` says whether coefficients still make a
+/// mechanical system.
+pub(super) fn survivors(
+    equations: &Equations<'_>,
+    threshold: f64,
+    allowed: &dyn Fn(&[f64]) -> bool,
+) -> Option<Survivors> {
+    let Equations { matrix, right, coefficients, complexity } = *equations;
+    let m = right.len();
+    let mut inverse = inverse_with(m, matrix, RIDGE)?;
+    let aim: Vec<f64> = times(m, matrix, coefficients).iter().zip(right).map(|(a, b)| a + b).collect();
+    let mut x = times(m, &inverse, &aim);
+    let mut set: Vec<usize> = (0..m).collect();
+    let mut refused: Vec<usize> = Vec::new();
+    loop {
+        let cost = |k: usize| x[k] * x[k] / inverse[k * m + k];
+        let mut order: Vec<usize> = set.iter().copied().filter(|k| !refused.contains(k)).collect();
+        order.sort_by(|&a, &b| cost(a).total_cmp(&cost(b)));
+        let Some(&least) = order.first() else {
+            return Some(Survivors { set, coefficients: x, next: f64::INFINITY });
+        };
+        if cost(least) >= threshold || set.len() == 1 {
+            return Some(Survivors { next: cost(least), set, coefficients: x });
+        }
+        // Of terms that cost next to nothing the most involved goes first.
+        let nothing = threshold / 10.0;
+        let free = order.iter().copied().filter(|&k| cost(k) < nothing);
+        let gone = free.max_by(|&a, &b| complexity[a].total_cmp(&complexity[b])).unwrap_or(least);
+        let (factor, pivot) = (x[gone], inverse[gone * m + gone]);
+        let column: Vec<f64> = set.iter().map(|&k| inverse[k * m + gone]).collect();
+        let mut tried = x.clone();
+        set.iter().zip(&column).for_each(|(&k, c)| tried[k] -= c * factor / pivot);
+        tried[gone] = 0.0;
+        if !allowed(&tried) {
+            refused.push(gone);
+            continue;
+        }
+        refused.clear();
+        x = tried;
+        for (a, &i) in set.iter().enumerate() {
+            for (b, &j) in set.iter().enumerate() {
+                inverse[i * m + j] -= column[a] * column[b] / pivot;
+            }
+        }
+        set.retain(|k| *k != gone);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn terms_without_weight_go_and_others_are_refitted() {
+        // y = 2 a + 0 b + 3 c, a and b alike.
+        let matrix = [100.0, 90.0, 0.0, 90.0, 100.0, 0.0, 0.0, 0.0, 50.0];
+        let right = times(3, &matrix, &[2.0, 0.01, 3.0]);
+        let equations = Equations { matrix: &matrix, right: &right, coefficients: &[0.0; 3], complexity: &[1.0; 3] };
+        let found = survivors(&equations, 10.0, &|_| true).unwrap();
+        assert_eq!(found.set, [0, 2]);
+        assert!((found.coefficients[0] - 2.009).abs() < 1e-6 && found.next > 70.0, "{found:?}");
+        let kept = survivors(&equations, 10.0, &|x| x[1] != 0.0).unwrap();
+        assert_eq!(kept.set, [0, 1, 2]);
+    }
+}

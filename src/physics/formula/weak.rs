@@ -1,0 +1,270 @@
+//! The Euler-Lagrange equations in their weak form: no accelerations are needed.
+//!
+//! For a function `phi` of compact support `int (phi (dD/dv - dL/dq - F) - phi' dL/dv) dt = 0` along every motion. It is linear in the
+//! coefficients of the terms.
+
+use super::library::{Kind, Library, Term, Values};
+use super::linear::eliminate;
+
+/// Positions and velocities of a stretch of motion without gap, with known forces if there are any: `(samples, n)`.
+pub(super) struct Stretch<'a> {
+    pub times: &'a [f64],
+    pub q: &'a [f64],
+    pub v: &'a [f64],
+    pub force: &'a [f64],
+    /// Block of the data that is held out, or drawn again, as a whole.
+    pub block: usize,
+}
+
+/// The weak form of all terms over many test functions.
+pub(super) struct Windows {
+    pub n: usize,
+    /// Number of terms.
+    pub terms: usize,
+    /// `(windows, n, terms)`.
+    equations: Vec<f64>,
+    /// Integrals of `phi f`, `(windows, functions)`.
+    functions: Vec<f64>,
+    /// Integrals of `phi F`, `(windows, n)`; empty without forces.
+    forces: Vec<f64>,
+    /// Block of every window.
+    pub blocks: Vec<usize>,
+    /// Number of functions.
+    width: usize,
+    /// What the terms do to the mass matrix: `(i, j, function)`.
+    kinetic: Vec<Option<(usize, usize, usize)>>,
+}
+
+/// Windows at most.
+const MOST_WINDOWS: f64 = 4000.0;
+
+impl Windows {
+    /// Test functions `(1 - x^2)^4` of `width` seconds along stretches of motion, a quarter of their width or more apart.
+    pub fn new(library: &Library, terms: &[usize], stretches: &[Stretch<'_>], width: f64) -> Self {
+        let n = library.n();
+        let seconds: f64 = stretches.iter().map(|s| s.times[s.times.len() - 1] - s.times[0]).sum();
+        let apart = (width / 6.0).max(seconds / MOST_WINDOWS);
+        let which = library.functions_of(terms);
+        let mut place = vec![0; library.functions.len()];
+        which.iter().enumerate().for_each(|(at, &f)| place[f] = at);
+        let kinetic = terms.iter().map(|&k| library.kinetic(k).map(|(i, j)| (i, j, place[library.terms[k].function])));
+        let mut windows = Self {
+            n,
+            terms: terms.len(),
+            equations: Vec::new(),
+            functions: Vec::new(),
+            forces: Vec::new(),
+            blocks: Vec::new(),
+            width: which.len(),
+            kinetic: kinetic.collect(),
+        };
+        for stretch in stretches {
+            windows.add(library, (terms, &which), stretch, (width, apart));
+        }
+        windows
+    }
+
+    fn add(
+        &mut self,
+        library: &Library,
+        (terms, which): (&[usize], &[usize]),
+        stretch: &Stretch<'_>,
+        (width, apart): (f64, f64),
+    ) {
+        let (n, count) = (self.n, self.terms);
+        let times = stretch.times;
+        let samples = times.len();
+        // Momenta and forces of all terms at every sample.
+        let (mut momenta, mut pulls) = (vec![0.0; samples * n * count], vec![0.0; samples * n * count]);
+        let mut functions = vec![0.0; samples * self.width];
+        let mut values = Values::new();
+        for s in 0..samples {
+            let (q, v) = (&stretch.q[s * n..(s + 1) * n], &stretch.v[s * n..(s + 1) * n]);
+            library.evaluate(which, q, &mut values);
+            which.iter().enumerate().for_each(|(at, &f)| functions[s * self.width + at] = values[f].value);
+            let range = s * n * count..(s + 1) * n * count;
+            let (momenta, pulls) = (&mut momenta[range.clone()], &mut pulls[range]);
+            for (at, &k) in terms.iter().enumerate() {
+                let Term { kind, function } = library.terms[k];
+                let f = &values[function];
+                let mut slope = |factor: f64| (0..n).for_each(|i| pulls[i * count + at] -= factor * f.gradient[i]);
+                match kind {
+                    Kind::Kinetic(i, j) => {
+                        momenta[i * count + at] += f.value * v[j];
+                        momenta[j * count + at] += f.value * v[i];
+                        slope(v[i] * v[j]);
+                    }
+                    Kind::Gyroscopic(i) => {
+                        momenta[i * count + at] += f.value;
+                        slope(v[i]);
+                    }
+                    Kind::Potential => slope(1.0),
+                    Kind::Dissipation(i, j) => {
+                        pulls[i * count + at] += f.value * v[j];
+                        pulls[j * count + at] += f.value * v[i];
+                    }
+                }
+            }
+        }
+        let half = width / 2.0;
+        let mut centre = times[0] + half;
+        while centre + half <= times[samples - 1] + 1e-9 * width {
+            let from = times.partition_point(|t| *t < centre - half);
+            let to = times.partition_point(|t| *t <= centre + half);
+            let start = self.equations.len();
+            self.equations.resize(start + n * count, 0.0);
+            let first = self.functions.len();
+            self.functions.resize(first + self.width, 0.0);
+            let mut force = vec![0.0; n];
+            for s in from..to {
+                let step = (times[(s + 1).min(samples - 1)] - times[s.saturating_sub(1)]) / 2.0;
+                let x = (times[s] - centre) / half;
+                let inside = (1.0 - x * x).max(0.0);
+                let phi = inside.powi(4) * step;
+                let slope = -8.0 * x * inside.powi(3) / half * step;
+                let range = s * n * count..(s + 1) * n * count;
+                let both = momenta[range.clone()].iter().zip(&pulls[range]);
+                let row = &mut self.equations[start..];
+                row.iter_mut().zip(both).for_each(|(e, (p, r))| *e += phi * r - slope * p);
+                let values = &functions[s * self.width..(s + 1) * self.width];
+                self.functions[first..].iter_mut().zip(values).for_each(|(i, f)| *i += phi * f);
+                if !stretch.force.is_empty() {
+                    (0..n).for_each(|i| force[i] += phi * stretch.force[s * n + i]);
+                }
+            }
+            if !stretch.force.is_empty() {
+                self.forces.extend(&force);
+            }
+            self.blocks.push(stretch.block);
+            centre += apart;
+        }
+    }
+
+    /// Number of windows.
+    pub fn len(&self) -> usize {
+        self.blocks.len()
+    }
+
+    /// `true` if there are known forces.
+    pub fn driven(&self) -> bool {
+        !self.forces.is_empty()
+    }
+
+    /// The mean mass matrix over a window under the test function, `(n, n)`.
+    fn mass(&self, window: usize, coefficients: &[f64], mass: &mut [f64]) {
+        let n = self.n;
+        mass.fill(0.0);
+        let functions = &self.functions[window * self.width..(window + 1) * self.width];
+        for (kinetic, c) in self.kinetic.iter().zip(coefficients).filter(|(_, c)| **c != 0.0) {
+            if let Some((i, j, f)) = *kinetic {
+                mass[i * n + j] += c * functions[f];
+                mass[j * n + i] += c * functions[f];
+            }
+        }
+    }
+
+    /// Squared errors of the mean accelerations that some coefficients give, by window, in units of `sigma`; infinite where the mass
+    /// matrix is singular.
+    pub fn errors(&self, coefficients: &[f64], sigma: &[f64]) -> Vec<f64> {
+        let (n, count) = (self.n, self.terms);
+        let used: Vec<usize> = (0..count).filter(|&k| coefficients[k] != 0.0).collect();
+        let (mut mass, mut rest) = (vec![0.0; n * n], vec![0.0; n]);
+        let error = |window: usize| {
+            self.mass(window, coefficients, &mut mass);
+            for (i, rest) in rest.iter_mut().enumerate() {
+                let row = &self.equations[(window * n + i) * count..(window * n + i + 1) * count];
+                let force = if self.driven() { self.forces[window * n + i] } else { 0.0 };
+                *rest = used.iter().map(|&k| row[k] * coefficients[k]).sum::<f64>() - force;
+            }
+            if !eliminate(n, &mut mass, 1, &mut rest) {
+                return f64::INFINITY;
+            }
+            rest.iter().zip(sigma).map(|(r, s)| (r / s).powi(2)).sum::<f64>()
+        };
+        (0..self.len()).map(error).collect()
+    }
+
+    /// Normal equations of the errors of accelerations, the mass matrix being that of `coefficients`: matrix of the terms `set`, what the
+    /// known forces give on the right, and how the terms change the size of the mass matrix. Windows for which `used` is false are left out.
+    pub fn normal(&self, coefficients: &[f64], set: &[usize], sigma: &[f64], used: &[bool]) -> Normal {
+        let (n, count, m) = (self.n, self.terms, set.len());
+        let mut weights = vec![0.0; self.len() * n * n];
+        let mut sizes = Vec::with_capacity(self.len());
+        let mut mass = vec![0.0; n * n];
+        for (window, weight) in weights.chunks_exact_mut(n * n).enumerate() {
+            self.mass(window, coefficients, &mut mass);
+            (0..n).for_each(|i| weight[i * n + i] = 1.0);
+            if !eliminate(n, &mut mass, n, weight) {
+                weight.fill(0.0);
+            }
+            (0..n * n).for_each(|e| weight[e] /= sigma[e / n]);
+            sizes.push(weight.iter().map(|w| w * w).sum::<f64>().sqrt());
+        }
+        // Where the mass matrix is nearly singular an error would count without bound.
+        let mut sorted: Vec<f64> = sizes.iter().copied().filter(|s| *s > 0.0).collect();
+        sorted.sort_by(f64::total_cmp);
+        let most = 5.0 * sorted.get(sorted.len() / 2).copied().unwrap_or(1.0);
+        let mut normal = Normal { matrix: vec![0.0; m * m], right: vec![0.0; m], size: vec![0.0; m] };
+        let mut row = vec![0.0; m];
+        for window in (0..self.len()).filter(|&w| used[w]) {
+            let weight = &mut weights[window * n * n..(window + 1) * n * n];
+            let cut = if sizes[window] > most { most / sizes[window] } else { 1.0 };
+            weight.iter_mut().for_each(|w| *w *= cut);
+            for i in 0..n {
+                row.fill(0.0);
+                let mut force = 0.0;
+                for j in 0..n {
+                    let w = weight[i * n + j];
+                    let equation = &self.equations[(window * n + j) * count..(window * n + j + 1) * count];
+                    row.iter_mut().zip(set).for_each(|(r, &k)| *r += w * equation[k]);
+                    if self.driven() {
+                        force += w * self.forces[window * n + j];
+                    }
+                }
+                for (a, &x) in row.iter().enumerate() {
+                    if x != 0.0 {
+                        let line = &mut normal.matrix[a * m..a * m + a + 1];
+                        line.iter_mut().zip(&row).for_each(|(sum, y)| *sum += x * y);
+                        normal.right[a] += x * force;
+                    }
+                }
+            }
+            let functions = &self.functions[window * self.width..(window + 1) * self.width];
+            for (size, &k) in normal.size.iter_mut().zip(set) {
+                if let Some((i, j, f)) = self.kinetic[k] {
+                    *size += functions[f] * (weight[i * n + j] * sigma[i] + weight[j * n + i] * sigma[j]);
+                }
+            }
+        }
+        // 1 for the coefficients that gave the mass matrix.
+        let count = n as f64 * used.iter().filter(|used| **used).count().max(1) as f64;
+        normal.size.iter_mut().for_each(|size| *size /= count);
+        for a in 0..m {
+            for b in 0..a {
+                normal.matrix[b * m + a] = normal.matrix[a * m + b];
+            }
+        }
+        normal
+    }
+
+    /// `true` if a term of the mass matrix holds every coordinate's velocity.
+    pub fn moves_all(&self, set: &[usize]) -> bool {
+        (0..self.n).all(|i| set.iter().any(|&k| self.kinetic[k].is_some_and(|(a, b, _)| a == i || b == i)))
+    }
+
+    /// Coefficients of a unit mass of every coordinate, each weighted by `1 / scale^2`.
+    pub fn unit_mass(&self, library: &Library, terms: &[usize], scales: &[f64]) -> Vec<f64> {
+        let of = |&k: &usize| match library.kinetic(k) {
+            Some((i, j)) if i == j && library.functions[library.terms[k].function].is_one() => 0.5 / scales[i].powi(2),
+            _ => 0.0,
+        };
+        terms.iter().map(of).collect()
+    }
+}
+
+/// Normal equations of some terms.
+pub(super) struct Normal {
+    pub matrix: Vec<f64>,
+    pub right: Vec<f64>,
+    pub size: Vec<f64>,
+}
