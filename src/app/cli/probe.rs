@@ -11,6 +11,7 @@ use crate::symmetry::{
     Basis, Chart, Degrees, MOST_UNKNOWNS, Region, Symmetries, TOLERANCES, bases, enough, middle, most_states,
     most_symmetries, unknowns,
 };
+use std::collections::BTreeMap;
 use std::path::Path;
 
 /// A Lagrangian with what is known of its coordinates.
@@ -69,6 +70,19 @@ impl Probe {
     /// # Errors
     /// A usage error for an unknown name, a mistake in a file or a wrong parameter.
     pub fn system(name: &str, given: &[(String, String)]) -> Result<Self, CliError> {
+        let probe = Self::system_with_constraints(name, given)?;
+        if probe.model.manifold().is_some() {
+            let problem = "its motion is held by constraints, which this command does not know; see `lnn constraints`";
+            return Err(CliError::usage(format_args!("{name}: {problem}")));
+        }
+        Ok(probe)
+    }
+
+    /// The same, of a system with constraints as well.
+    ///
+    /// # Errors
+    /// As [`Probe::system`].
+    pub fn system_with_constraints(name: &str, given: &[(String, String)]) -> Result<Self, CliError> {
         let system = chosen::system(name)?;
         let Source { model, columns, .. } = Source::configured(system.clone(), given)?;
         let configured = configure_system::<f64>(system, given).map_err(CliError::usage)?;
@@ -114,6 +128,12 @@ impl Probe {
             units,
             system,
         })
+    }
+
+    /// The formulas of the constraints of the system, by name.
+    pub fn constraints(&self) -> BTreeMap<String, String> {
+        let description = self.system.as_ref().and_then(|system| system.system.description());
+        description.map(|description| description.constraints.clone()).unwrap_or_default()
     }
 
     /// One of the two: a file that ends in `.toml` and a name of the catalogue are systems, any other file or directory is a model.

@@ -5,6 +5,8 @@
 
 mod catalogue;
 mod configure;
+mod constrained_systems;
+mod constraints;
 mod derivatives;
 mod description;
 mod error;
@@ -28,6 +30,11 @@ mod with_forces;
 pub(crate) use catalogue::LagrangianVisitor;
 pub use catalogue::{SystemError, SystemInstance, find, systems};
 pub use configure::{build, configure, configure_system, configure_values};
+pub use constrained_systems::constrained_systems;
+pub use constraints::{
+    Constrained, ConstraintError, Constraints, ExpressionConstraints, LeastNorm, LeastNormMotion, Manifold,
+    ManifoldRows, OffManifold, ReducedMass, project,
+};
 pub(crate) use description::pair;
 pub use description::{Description, DescriptionError};
 pub use error::MechanicsError;

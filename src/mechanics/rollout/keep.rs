@@ -7,10 +7,20 @@ use crate::scalar::Scalar;
 /// Why the derivative of a state, or a step, cannot be had.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum StepFailure {
-    Domain { component: usize, value: f64, lower: f64, upper: f64 },
+    Domain {
+        component: usize,
+        value: f64,
+        lower: f64,
+        upper: f64,
+    },
     State,
     Model(MechanicsError),
-    NotConverged { iterations: usize, residual: f64 },
+    NotConverged {
+        iterations: usize,
+        residual: f64,
+    },
+    /// No state of the constraints is near.
+    OffConstraints,
 }
 
 impl StepFailure {
@@ -42,6 +52,10 @@ pub(super) fn into_error(failure: StepFailure, t: f64, state: Vec<f64>, step: f6
         StepFailure::Model(MechanicsError::Singular { condition, .. }) => {
             RolloutError::SingularMass { t, state, condition }
         }
+        StepFailure::Model(MechanicsError::Dependent { constraint, .. }) => {
+            RolloutError::DependentConstraint { t, state, constraint }
+        }
+        StepFailure::OffConstraints => RolloutError::NotFinite { t, state, what: "way back to the constraints" },
         StepFailure::Model(MechanicsError::Interrupted) => RolloutError::Stopped { t },
         StepFailure::Model(MechanicsError::Uncertified { .. }) => RolloutError::Uncertified { t, state },
         StepFailure::Model(MechanicsError::NotFinite { what, .. }) => RolloutError::NotFinite { t, state, what },
