@@ -370,8 +370,8 @@ fn cost(rounds: usize, count: usize) {
     let mut rng = ChaCha8Rng::seed_from_u64(0);
     let weights: Vec<f64> = initial_weights(&architecture, Initialization::Default, &mut rng);
     let mut gradient = vec![0.0; weights.len()];
-    let free = time(rounds, || drop(objective.step(&weights, &data, &rows, &mut gradient)));
-    let constrained = time(rounds, || drop(objective.step(&weights, &under, &rows, &mut gradient)));
+    let free = time(rounds, || _ = objective.step(&weights, &data, &rows, &mut gradient));
+    let constrained = time(rounds, || _ = objective.step(&weights, &under, &rows, &mut gradient));
     println!("{:<28} {free:>9.0} {constrained:>12.0}  ({:.2})", "training step, n = 4, m = 2", constrained / free);
 }
 

@@ -29,17 +29,10 @@ const MOST_DEGREE: usize = 8;
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
-#[command(mut_args(unless_model))]
+#[command(mut_args(optional))]
 pub struct Args {
     #[command(flatten)]
     recording: RecordingArgs,
-    /// A system instead of data, by name or by the file that describes it: its constraints, which of them follow from others, and the
-    /// directions that its Lagrangian leaves open.
-    #[arg(long, value_name = "NAME|FILE.toml", conflicts_with_all = ["model", "data"])]
-    system: Option<String>,
-    /// A trained model instead of data, a file or the directory of a run.
-    #[arg(long, value_name = "MODEL", conflicts_with = "data")]
-    model: Option<PathBuf>,
     /// Largest total degree of the functions of the coordinates that are tried; angles take part by sine and cosine.
     #[arg(long, value_name = "N", default_value = "2", value_parser = whole(1, MOST_DEGREE))]
     degree: usize,
@@ -57,13 +50,20 @@ pub struct Args {
     json: bool,
 }
 
-/// Columns are those of data.
-fn unless_model(argument: clap::Arg) -> clap::Arg {
+/// Columns are those of data; a Lagrangian has none.
+fn optional(argument: clap::Arg) -> clap::Arg {
     match argument.get_id().as_str() {
-        "data" | "coords" => argument.required(false).required_unless_present_any(["model", "system"]),
+        "data" => argument.value_name("DATA|MODEL|SYSTEM").help(
+            "Files of recorded motion, with --coords as of lnn check; or without it one trained model, or a system by name or file, \
+             whose constraints and open directions are named",
+        ),
+        "coords" => argument.required(false),
         _ => argument,
     }
 }
+
+/// Ends of names of files of recorded motion.
+const DATA: [&str; 3] = ["csv", "npy", "npz"];
 
 /// The table of a file.
 #[derive(Serialize, Deserialize)]
@@ -104,8 +104,13 @@ struct Known {
 /// # Errors
 /// A usage error for arguments, a data error for data or a model that cannot be used, or a file that cannot be written.
 pub fn run(args: &Args) -> Result<(), CliError> {
-    if args.model.is_some() || args.system.is_some() {
-        return examine(args);
+    if let ([one], []) = (args.recording.data.as_slice(), args.recording.coords.as_slice())
+        && !one.extension().is_some_and(|end| DATA.iter().any(|known| end.eq_ignore_ascii_case(known)))
+    {
+        return examine(&one.to_string_lossy(), args);
+    }
+    if args.recording.coords.is_empty() {
+        return Err(CliError::usage("--coords: expected the columns of the coordinates of recorded motion"));
     }
     if let Some(out) = &args.out {
         let inputs: Vec<&Path> = args.recording.data.iter().map(PathBuf::as_path).collect();
@@ -181,11 +186,13 @@ fn text(found: &FoundConstraints, coordinates: &[String]) -> String {
 }
 
 /// What a system or a model says of its constraints and of its degeneracy.
-fn examine(args: &Args) -> Result<(), CliError> {
-    let probe = match &args.model {
-        Some(path) => Probe::model(path)?,
-        None => Probe::system_with_constraints(args.system.as_deref().unwrap_or_default(), &[])?,
-    };
+fn examine(name: &str, args: &Args) -> Result<(), CliError> {
+    if args.out.is_some() {
+        return Err(CliError::usage(
+            "--out: the constraints of a system stand in its own file; expected recorded motion",
+        ));
+    }
+    let probe = Probe::with_constraints(name)?;
     let model = probe.model.as_ref();
     let (q, v) = probe.states(STATES, 0)?;
     let n = model.coordinates();

@@ -64,7 +64,20 @@ pub fn tolerance(text: &str) -> Result<f64, String> {
     value.ok_or_else(|| format!("expected a number from {least:.1e} (rounding) to {most} (no symmetry any more)"))
 }
 
+/// `true` for a file or directory that is none of a system.
+fn is_model(text: &str) -> bool {
+    Path::new(text).exists() && !chosen::is_file(text)
+}
+
 impl Probe {
+    /// A model or a system, with constraints as well.
+    ///
+    /// # Errors
+    /// As [`Probe::system`] and [`Probe::model`].
+    pub fn with_constraints(text: &str) -> Result<Self, CliError> {
+        if is_model(text) { Self::model(Path::new(text)) } else { Self::system_with_constraints(text, &[]) }
+    }
+
     /// A system by name or by file.
     ///
     /// # Errors
@@ -82,7 +95,7 @@ impl Probe {
     ///
     /// # Errors
     /// As [`Probe::system`].
-    pub fn system_with_constraints(name: &str, given: &[(String, String)]) -> Result<Self, CliError> {
+    fn system_with_constraints(name: &str, given: &[(String, String)]) -> Result<Self, CliError> {
         let system = chosen::system(name)?;
         let Source { model, columns, .. } = Source::configured(system.clone(), given)?;
         let configured = configure_system::<f64>(system, given).map_err(CliError::usage)?;
@@ -142,8 +155,7 @@ impl Probe {
     /// As [`Probe::system`] and [`Probe::model`].
     pub fn either(text: &str, given: &[(String, String)]) -> Result<Self, CliError> {
         let path = Path::new(text);
-        let model = path.exists() && !chosen::is_file(text);
-        match (model, given.is_empty()) {
+        match (is_model(text), given.is_empty()) {
             (true, true) => Self::model(path),
             (true, false) => Err(CliError::usage(format_args!("{text}: a model has no parameters to choose"))),
             _ => Self::system(text, given),
