@@ -2,6 +2,7 @@
 #![allow(dead_code, unused_imports, reason = "the mains of the benchmarks are not called")]
 #![allow(clippy::duplicate_mod, clippy::module_inception, reason = "each benchmark is a program of its own too")]
 
+mod constraints;
 mod formula;
 mod linalg;
 mod measured;
@@ -29,4 +30,5 @@ fn main() {
     measured::trial();
     formula::trial();
     work_precision::trial();
+    constraints::trial();
 }

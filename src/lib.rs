@@ -30,6 +30,7 @@
 //! | store and load models | [`network::file::ModelFile`] |
 //! | differentiate a function of yours | [`tape::gradient`], [`tape::hessian`]; over many states [`tape::Program`] |
 //! | solve small symmetric systems in batches | [`linalg`] |
+//! | put constraints beside a Lagrangian, find those that recorded motion obeys | [`lagrangian::Constrained`], [`constraints`] |
 //! | find what a Lagrangian conserves, compare two Lagrangians | [`symmetry::symmetries`], [`symmetry::quadratic`], [`symmetry::compare`] |
 //! | read a Lagrangian as a formula, from motion or from a model | [`formula`] |
 //! | see the shadow of a black hole and the sky around it | [`relativity::shadow()`], [`relativity::outline`] |
@@ -176,6 +177,8 @@ pub use mechanics::{lagrangian, network};
 #[doc(hidden)]
 pub use numerics::ops;
 pub use numerics::{forward, linalg, random, scalar, tape};
+#[cfg(feature = "data")]
+pub use physics::constraints;
 #[cfg(feature = "training")]
 pub use physics::{analysis, formula};
 pub use physics::{certificate, geometry};

@@ -10,6 +10,7 @@ mod check;
 mod chosen;
 mod compare;
 mod config;
+mod constraints;
 mod differences;
 mod error;
 mod evaluate;
@@ -122,6 +123,8 @@ enum Command {
     Geometry(geometry::Args),
     /// Follow light through a metric, learned or exact: the shadow of a black hole and the sky around it.
     Shadow(shadow::Args),
+    /// Find the constraints that recorded motion obeys, or what a Lagrangian leaves open.
+    Constraints(Box<constraints::Args>),
     /// Find the symmetries of a Lagrangian and what its motion conserves.
     Symmetries(symmetries::Args),
     /// Say what two Lagrangians have in common beyond factor and gauge.
@@ -179,6 +182,7 @@ fn run(command: Command, words: &[OsString]) -> Result<(), CliError> {
         Command::Experiment(args) => experiment::run(&args),
         Command::Sweep(args) => sweep::run(&args),
         Command::Inspect(args) => inspect::run(&args),
+        Command::Constraints(args) => constraints::run(&args),
         Command::Geometry(args) => geometry::run(&args),
         Command::Shadow(args) => shadow::run(&args),
         Command::Symmetries(args) => symmetries::run(&args),
