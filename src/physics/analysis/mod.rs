@@ -48,7 +48,9 @@ pub use coordinates::{CoordinateError, coordinate_error, velocity_error};
 pub(crate) use curvature::{MetricComponent, Spread};
 pub(crate) use curvature::{curvature_grid, curvature_scalars, is_metric, metric_components, metric_grids};
 #[doc(hidden)]
-pub use determination::{Decay, Determination, Estimate, Observed, RANGE, constants, decay, determination, misfit};
+pub use determination::{
+    Decay, Determination, Estimate, MOST_MISFIT, Observed, RANGE, constants, decay, determination, misfit,
+};
 #[doc(hidden)]
 pub use dissipation::{EnergyLoss, energy_loss};
 #[doc(hidden)]
