@@ -1,7 +1,8 @@
 //! Tables of the ranges in which the data determine mass matrix, friction and energy of the model of `lnn fit`.
 
 use crate::analysis::{
-    Decay, Determination, EnergyLoss, Estimate, Observed, constants, decay, determination, energy_loss, misfit,
+    Decay, Determination, EnergyLoss, Estimate, MOST_MISFIT, Observed, constants, decay, determination, energy_loss,
+    misfit,
 };
 use crate::data::RecordingSplit;
 use crate::lagrangian::EulerLagrange;
@@ -52,8 +53,7 @@ pub struct Determined {
     decay: Option<Decay>,
 }
 
-/// Largest misfit of a model whose ranges are stated, and of one whose loss of energy says anything of the motion.
-const MOST_MISFIT: f64 = 0.3;
+/// Largest misfit of a model whose loss of energy says anything of the motion.
 const MISFIT_OF_ENERGY: f64 = 0.5;
 /// Share of held-out states outside of the learned ones that is worth a word.
 const OUTSIDE: f64 = 0.1;

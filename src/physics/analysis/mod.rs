@@ -50,7 +50,9 @@ pub(crate) use curvature::{
     curvature_grid, curvature_scalars, grid_points, is_metric, metric_components, metric_grids,
 };
 #[doc(hidden)]
-pub use determination::{Decay, Determination, Estimate, Observed, RANGE, constants, decay, determination, misfit};
+pub use determination::{
+    Decay, Determination, Estimate, MOST_MISFIT, Observed, RANGE, constants, decay, determination, misfit,
+};
 #[doc(hidden)]
 pub use dissipation::{EnergyLoss, energy_loss};
 #[doc(hidden)]

@@ -8,6 +8,13 @@ use serde::Serialize;
 const LONGEST: usize = 2001;
 /// Standard deviations by which an estimated squared bias lies above 0 that noise does not explain.
 const SURE: f64 = 3.0;
+
+/// The part of an estimated squared bias that is no chance: `square` is the mean over so many independent places of a number's square less
+/// the variance that noise gives it.
+fn sure(square: f64, variance: f64, independent: f64) -> f64 {
+    (square - SURE * variance * (2.0 / independent.max(1.0)).sqrt()).max(0.0)
+}
+
 /// Squared error of the usual window up to which a trajectory keeps it, over its least.
 const TOLERATED: f64 = 2.0;
 
@@ -50,16 +57,45 @@ impl Quality {
 pub struct Missed(f64);
 
 impl Missed {
-    /// Squared bias of the next longer window from its estimate: `square`, the mean over so many independent places of the change's square
-    /// less the variance that noise gives it.
+    /// Squared bias of the next longer window from its estimate by the change, see [`sure`].
     pub fn bias(&mut self, square: f64, variance: f64, independent: f64) -> f64 {
-        self.0 = self.sure(square, variance, independent);
+        self.at_least(sure(square, variance, independent));
         square.max(self.0)
     }
 
-    /// The part of it that is no chance.
-    fn sure(&self, square: f64, variance: f64, independent: f64) -> f64 {
-        self.0.max(square - SURE * variance * (2.0 / independent.max(1.0)).sqrt())
+    /// This window and all longer ones have at least this squared bias.
+    fn at_least(&mut self, square: f64) {
+        self.0 = self.0.max(square);
+    }
+}
+
+/// Accelerations of one trajectory by one window.
+#[derive(Clone, Debug, Default)]
+struct Accelerations {
+    /// Samples, ascending, and the accelerations there.
+    values: Vec<(usize, f64)>,
+    /// Their mean variance by noise.
+    variance: f64,
+    /// Number of independent errors.
+    independent: f64,
+}
+
+impl Accelerations {
+    /// Squared bias that a longer window surely has beside this one: the mean square of their difference at the same samples. Its variance
+    /// is the difference of the two, because the longer window has the least variance of all that its samples allow (Hausman, Econometrica
+    /// 46 (1978) 1251). Over several periods of the motion, where changes of degree say nothing, the difference is all that is missed (a
+    /// comparison as that of Lepski, Theory of Probability and its Applications 35 (1991) 454).
+    fn missed_by(&self, longer: &Self) -> f64 {
+        let same = longer.values.iter().filter_map(|(at, a)| {
+            let k = self.values.binary_search_by_key(at, |(at, _)| *at).ok()?;
+            Some((a - self.values[k].1).powi(2))
+        });
+        let (sum, count) = same.fold((0.0, 0.0), |(sum, count), square| (sum + square, count + 1.0));
+        if count == 0.0 {
+            return 0.0;
+        }
+        let variance = (self.variance - longer.variance).max(0.0);
+        sure(sum / count - variance, variance, self.independent * count / self.values.len() as f64)
     }
 }
 
@@ -72,6 +108,8 @@ struct Course {
     sure: Vec<f64>,
     /// Number of the window with the least error, up to where the error is plainly larger again.
     best: usize,
+    /// The accelerations by it.
+    finest: Accelerations,
     past: bool,
     missed: Missed,
 }
@@ -80,13 +118,16 @@ struct Course {
 const PAST: f64 = 4.0;
 
 impl Course {
-    fn push(&mut self, variance: f64, square: f64, change: f64, independent: f64) {
-        self.sure.push(variance + self.missed.sure(square, change, independent));
+    /// Adds the accelerations by the next longer window, their squared bias estimated by the change of degree, and the variance of that change.
+    fn push(&mut self, found: Accelerations, square: f64, change: f64) {
+        let Accelerations { variance, independent, .. } = found;
+        self.missed.at_least(self.finest.missed_by(&found));
         self.squares.push(variance + self.missed.bias(square, change, independent));
+        self.sure.push(variance + self.missed.0);
         let (last, least) = (self.squares[self.squares.len() - 1], self.squares[self.best]);
         self.past |= last > PAST * least;
-        if !self.past && last < least {
-            self.best = self.squares.len() - 1;
+        if !self.past && last <= least {
+            (self.best, self.finest) = (self.squares.len() - 1, found);
         }
     }
 
@@ -105,8 +146,9 @@ impl Course {
 }
 
 /// Sums over the places of one trajectory.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 struct Sums {
+    values: Vec<(usize, f64)>,
     count: f64,
     variance: f64,
     square: f64,
@@ -184,8 +226,12 @@ impl Signal<'_> {
         let mut sums = vec![Sums::default(); courses.len()];
         let share = self.visit(
             |_| window,
-            |estimate, fit, track, _| {
+            |estimate, fit, track, at| {
                 let sums = &mut sums[track];
+                // Windows that would reach over an end are all the one at the end.
+                if sums.values.last().is_none_or(|(last, _)| *last != at) {
+                    sums.values.push((at, estimate.values[2]));
+                }
                 sums.count += 1.0;
                 sums.variance += noise * fit.variance[2];
                 sums.square += estimate.changes[2] * estimate.changes[2];
@@ -195,11 +241,13 @@ impl Signal<'_> {
         if share < 0.5 {
             return false;
         }
-        for ((sums, course), track) in sums.iter().zip(courses).zip(self.tracks).filter(|((s, _), _)| s.count > 0.0) {
+        for ((sums, course), track) in
+            sums.into_iter().zip(courses).zip(self.tracks).filter(|((s, _), _)| s.count > 0.0)
+        {
             let [variance, square, change] = [sums.variance, sums.square, sums.change_variance].map(|x| x / sums.count);
             // Neighbours within half a window have the same errors.
             let independent = sums.count.min(2.0 * track.len() as f64 / window as f64);
-            course.push(variance, square - change, change, independent);
+            course.push(Accelerations { values: sums.values, variance, independent }, square - change, change);
         }
         true
     }

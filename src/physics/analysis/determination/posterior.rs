@@ -7,12 +7,13 @@ use super::{Estimate, Linear};
 use crate::lagrangian::{EulerLagrange, Request, Terms};
 use crate::linalg::{Workspace, inverse};
 
-/// States on which a model is finite, with its own accelerations and what they miss.
+/// States on which a model is finite, with what its accelerations miss.
 pub(super) struct Data {
     n: usize,
     pub q: Vec<f64>,
     pub v: Vec<f64>,
-    a: Vec<f64>,
+    /// The model's accelerations, by known forces too.
+    pub a: Vec<f64>,
     missed: Vec<f64>,
     /// Accelerations of less bias less the observed ones, or zeros.
     finer: Vec<f64>,
@@ -212,7 +213,7 @@ impl Posterior {
     pub fn estimate(&self, linear: &Linear, floor: f64) -> Estimate {
         let before = dot(&linear.slopes, &linear.slopes);
         if self.believed(&linear.slopes) > OPEN * OPEN * before {
-            return Estimate { value: linear.value, low: f64::NEG_INFINITY, high: f64::INFINITY };
+            return Estimate::open(linear.value);
         }
         let (middle, variance) = self.middle(&linear.slopes);
         Estimate::about(linear.value, middle, variance.sqrt().hypot(floor))

@@ -1,7 +1,7 @@
 //! Ranges of small systems that are written down, without a training.
 
 use super::{Observed, determination, misfit};
-use crate::lagrangian::{Lagrangian, Mechanics};
+use crate::lagrangian::{EulerLagrange, Lagrangian, Mechanics, Request, Terms};
 use crate::random::RngStream;
 use crate::scalar::Real;
 use rand::Rng;
@@ -48,6 +48,45 @@ fn a_mass_that_is_a_little_off_is_held_by_its_range() {
         widest = widest.max(mass.high - mass.low);
     }
     assert!(inside >= 34 && widest < 0.15, "{inside} {widest}");
+}
+
+/// Motion in a plane about a centre, and a pull `p` along one direction.
+struct Orbit;
+
+impl Lagrangian for Orbit {
+    fn coordinates(&self) -> usize {
+        2
+    }
+    fn lagrangian<R: Real>(&self, p: &[R], q: &[R], v: &[R]) -> R {
+        R::half() * (v[0].sqr() + (q[0] * v[1]).sqr()) + R::one() / q[0] + p[0] * q[0] * q[1].cos()
+    }
+}
+
+#[test]
+fn mass_along_a_conserved_momentum_is_left_open() {
+    // Without a pull, and without a known torque, the momentum of the angle is conserved.
+    for (pull, torque) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)] {
+        let model = Mechanics::new(Orbit, vec![pull]);
+        let mut rng = RngStream::Test.generator(3);
+        let (error, independent) = (vec![0.01; 2], vec![1000.0; 2]);
+        let (mut observed, mut terms) = (Observed { error, independent, ..Observed::default() }, Terms::default());
+        for _ in 0..1000 {
+            let [r, angle, out, around] =
+                [[0.6, 1.4], [-3.0, 3.0], [-0.3, 0.3], [0.8, 1.2]].map(|[a, b]: [f64; 2]| rng.random_range(a..b));
+            model.terms(&[r, angle], &[out, around], Request::ACCELERATION, &mut terms).unwrap();
+            let known = torque * rng.random_range(-1.0..1.0);
+            let exact = [terms.acceleration[0], terms.acceleration[1] + known / (r * r)];
+            observed.q.extend([r, angle]);
+            observed.v.extend([out, around]);
+            observed.a.extend(exact.map(|a| a + 0.01 * rng.sample::<f64, _>(StandardNormal)));
+            if torque > 0.0 {
+                observed.force.extend([0.0, known]);
+            }
+        }
+        let mass = determination(&model, &[false, true], &observed).unwrap().mass_matrix;
+        let open = pull == 0.0 && torque == 0.0;
+        assert!(mass[2].is_open() == open && !mass[0].is_open() && !mass[1].is_open(), "{pull} {torque}: {mass:?}");
+    }
 }
 
 #[test]
