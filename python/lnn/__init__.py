@@ -1,0 +1,1 @@
+"""Stabilized Lagrangian neural networks."""
