@@ -32,6 +32,8 @@ class Terms:
         a with M a = dL/dq - c + force.
     energy : (...)
         E = v.p - L.
+    failures : tuple of (int, str)
+        States, counted over the batch, whose acceleration is not determined, and why; of compiled code alone.
     """
 
     lagrangian: object
@@ -42,6 +44,7 @@ class Terms:
     force: object
     acceleration: object
     energy: object
+    failures: tuple = ()
 
 
 class Functions:

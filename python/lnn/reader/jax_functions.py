@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import math
+from dataclasses import fields
 from types import SimpleNamespace
 
 import jax
 import jax.numpy as jnp
 from jax.scipy.special import erfc
 
-from .functions import Differentiated, Functions
+from .functions import Differentiated, Functions, Terms
 from .lagrangian import TURN, NetworkModel
+
+_names = [field.name for field in fields(Terms)]
+jax.tree_util.register_dataclass(Terms, data_fields=_names[:-1], meta_fields=_names[-1:])
 
 JAX = SimpleNamespace(
     grad=jax.grad,

@@ -37,6 +37,7 @@ mod misunderstood;
 mod motion;
 mod number;
 mod output;
+mod page;
 mod place;
 mod plain_name;
 mod print_config;
@@ -117,6 +118,8 @@ enum Command {
     Geometry(geometry::Args),
     /// Follow light through a metric, learned or exact: the shadow of a black hole and the sky around it.
     Shadow(shadow::Args),
+    /// Write a model as a page to play with: one HTML file that computes its motion.
+    Page(page::Args),
     /// Find the symmetries of a Lagrangian and what its motion conserves.
     Symmetries(symmetries::Args),
     /// Say what two Lagrangians have in common beyond factor and gauge.
@@ -176,6 +179,7 @@ fn run(command: Command, words: &[OsString]) -> Result<(), CliError> {
         Command::Inspect(args) => inspect::run(&args),
         Command::Geometry(args) => geometry::run(&args),
         Command::Shadow(args) => shadow::run(&args),
+        Command::Page(args) => page::run(&args),
         Command::Symmetries(args) => symmetries::run(&args),
         Command::Compare(args) => compare::run(&args),
         Command::Certify(args) => certify::run(&args),

@@ -29,7 +29,7 @@ impl Description {
     ///
     /// # Errors
     /// The first key that is wrong, and how.
-    pub(crate) fn system(&self) -> Outcome<System> {
+    pub fn system(&self) -> Outcome<System> {
         self.check_texts()?;
         let n = self.coordinates.len();
         let mut compiler = Compiler::default();
