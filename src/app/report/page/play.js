@@ -204,10 +204,14 @@ function play(data) {
   function read(q, where) {
     const text = kinds.map(([name, motion]) => {
       const { determinant, mass } = motion.terms(q, start.v);
-      const diagonal = mass.map((row, i) => `${data.columns[i]}${data.columns[i]} ${digits(row[i])}`).join(", ");
-      return `<span class="${name}">${name}: det M = ${digits(determinant)}; M: ${diagonal}</span>`;
+      const diagonal = mass.map((row, i) => digits(row[i])).join(", ");
+      const line = document.createElement("span");
+      line.className = name;
+      line.textContent = `${name}: det M = ${digits(determinant)}, diagonal of M ${diagonal}`;
+      return line;
     });
-    $("reading").innerHTML = `${where}, ${q.map((x, i) => `${data.columns[i]} = ${digits(x)}`).join(", ")}<br>${text.join("<br>")}`;
+    const place = q.map((x, i) => `${data.columns[i]} = ${digits(x)}`).join(", ");
+    $("reading").replaceChildren(`${where}, ${place}; M is learned up to one factor`, ...text);
   }
 
   const sliders = [];
