@@ -6,9 +6,13 @@ import os
 
 import numpy as np
 
+DOUBLE = np.dtype(np.float64)
+
 
 def doubles(what: str, x) -> np.ndarray:
     """Anything that is an array, or says by DLPack that it is, as doubles."""
+    if type(x) is np.ndarray and x.dtype is DOUBLE:
+        return x
     if not isinstance(x, np.ndarray):
         if hasattr(x, "__dlpack__") and not hasattr(x, "__array__"):
             x = np.from_dlpack(x)
@@ -23,6 +27,9 @@ def doubles(what: str, x) -> np.ndarray:
 def states(q, v, n: int) -> tuple[np.ndarray, np.ndarray, tuple[int, ...]]:
     """States ``(..., n)`` as two arrays ``(b, n)``, and the shape before the last axis."""
     q, v = doubles("q", q), doubles("v", v)
+    shape = q.shape
+    if len(shape) == 2 and shape[1] == n and shape == v.shape and q.flags.c_contiguous and v.flags.c_contiguous:
+        return q, v, shape[:1]
     if n == 1 and q.ndim == 0 and v.ndim == 0:
         return q.reshape(1, 1), v.reshape(1, 1), ()
     for what, x in ("q", q), ("v", v):

@@ -2,7 +2,7 @@
 
 use crate::attend::attended;
 use crate::errors::{pipeline, runtime, value};
-use crate::subject::{Subject, slice};
+use crate::subject::{Subject, slice, values};
 use lnn::configuration::{Config, Precision};
 use lnn::data::Dataset;
 use lnn::network::Structure;
@@ -83,8 +83,7 @@ pub fn configuration(
     if let Some(epochs) = epochs {
         set_epochs(&mut config, epochs);
     }
-    let names = instance.system.parameters.iter().map(|parameter| parameter.symbol.to_string());
-    config.parameters = names.zip(instance.parameters.iter().copied()).collect();
+    config.parameters = values(&instance);
     let config = changed(&config, changes).map_err(value)?;
     serde_json::to_string(&config).map_err(runtime)
 }

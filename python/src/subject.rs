@@ -20,6 +20,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList};
 use serde_json::{Value, json};
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 use std::sync::atomic::Ordering;
 
@@ -45,6 +46,17 @@ pub fn systems() -> PyResult<String> {
     let all: PyResult<Vec<Value>> =
         lnn::lagrangian::systems().iter().map(|system| Ok(Subject::of(Cow::Borrowed(system), &[])?.said())).collect();
     Ok(Value::from(all?).to_string())
+}
+
+/// Values of all parameters of a system, its size among them.
+pub fn values(configured: &SystemInstance<f64>) -> BTreeMap<String, f64> {
+    let SystemInstance { system, coordinates, parameters } = configured;
+    let named = system.parameters.iter().map(|parameter| parameter.symbol.to_string());
+    let mut values: BTreeMap<String, f64> = named.zip(parameters.iter().copied()).collect();
+    if let Size::Chosen { symbol, .. } = system.size {
+        values.insert(symbol.to_string(), *coordinates as f64);
+    }
+    values
 }
 
 impl Subject {
@@ -130,19 +142,11 @@ impl Subject {
             "time_like": self.time_like(), "position": position, "velocity": velocity,
         });
         let more = match &self.kind {
-            Kind::System(SystemInstance { system, coordinates, parameters }, _) => {
-                let mut named: serde_json::Map<String, Value> = system
-                    .parameters
-                    .iter()
-                    .zip(parameters)
-                    .map(|(parameter, value)| (parameter.symbol.to_string(), json!(value)))
-                    .collect();
-                if let Size::Chosen { symbol, .. } = system.size {
-                    named.insert(symbol.to_string(), json!(coordinates));
-                }
+            Kind::System(configured, _) => {
+                let system = &configured.system;
                 json!({
-                    "name": system.name, "title": system.title, "time_unit": system.time_unit, "parameters": named,
-                    "description": system.description(),
+                    "name": system.name, "title": system.title, "time_unit": system.time_unit,
+                    "parameters": values(configured), "description": system.description(),
                 })
             }
             Kind::Model(header, _) => json!({ "name": header.system, "header": header }),
@@ -408,7 +412,7 @@ impl Subject {
         seed: u64,
         tolerance: Option<f64>,
     ) -> PyResult<String> {
-        let (n, exact) = (self.n(), matches!(self.kind, Kind::System(..)));
+        let (n, exact, units) = (self.n(), matches!(self.kind, Kind::System(..)), self.units());
         let (mut position, mut velocity) = self.bounds();
         let periodic = self.periodic();
         if !exact {
@@ -417,7 +421,7 @@ impl Subject {
             velocity = velocity.into_iter().map(middle).collect();
         }
         let (position, velocity) = self.region((position, velocity), region)?;
-        let charts: Vec<Chart> = (0..n).map(|i| Chart::of(periodic[i], &self.units()[i], position[i])).collect();
+        let charts: Vec<Chart> = (0..n).map(|i| Chart::of(periodic[i], &units[i], position[i])).collect();
         let degrees: Option<Degrees> = degrees.map(|text| text.parse().map_err(value)).transpose()?;
         let names = &self.columns[..n];
         let tried = bases(names, &charts, degrees, exact);

@@ -46,9 +46,12 @@ fn numbers(value: &Value) -> Vec<f64> {
 
 /// The terms of both are the same to `tolerance` of their size.
 fn agree(theirs: &Value, ours: &[Value], tolerance: f64, what: &str) {
-    for (their, our) in
-        [("lagrangian", "lagrangian"), ("momentum", "momentum"), ("mass", "mass_matrix"), ("acceleration", "acceleration")]
-    {
+    for (their, our) in [
+        ("lagrangian", "lagrangian"),
+        ("momentum", "momentum"),
+        ("mass", "mass_matrix"),
+        ("acceleration", "acceleration"),
+    ] {
         let theirs: Vec<f64> = theirs.as_array().unwrap().iter().flat_map(|row| numbers(&row[their])).collect();
         let ours: Vec<f64> = ours.iter().flat_map(|row| numbers(&row[our])).collect();
         let size = ours.iter().copied().filter(|x| x.is_finite()).map(f64::abs).fold(0.0, f64::max);
@@ -110,7 +113,9 @@ fn the_exact_motion_runs_beside_the_learned_one() {
     let csv = "theta1,theta2,theta1_dot,theta2_dot\n0.6,0.9,0,0\n-2,5,1,-3\n";
     let table = folder.file("states.csv", csv);
     let told = said(&page, &states(csv, &["theta1", "theta2", "theta1_dot", "theta2_dot"]));
-    for (kind, whose, tolerance) in [("learned", ["--model", &model], 1e-5), ("exact", ["--system", "double-pendulum"], 1e-12)] {
+    for (kind, whose, tolerance) in
+        [("learned", ["--model", &model], 1e-5), ("exact", ["--system", "double-pendulum"], 1e-12)]
+    {
         let ours = lnn(&[&["inspect"], &whose[..], &["--states", &table]].concat());
         agree(&told[kind], &ours.objects(), tolerance, kind);
     }
