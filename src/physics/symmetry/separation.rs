@@ -71,12 +71,7 @@ impl Separation {
 
 /// The bases in which symmetries are sought: the one of these degrees, or the usual one; of a model, whose errors hide symmetries
 /// among many functions, also those of lower powers.
-pub fn bases(
-    names: &[String],
-    charts: &[Chart],
-    degrees: Option<Degrees>,
-    exact: bool,
-) -> Vec<(Basis, Degrees)> {
+pub fn bases(names: &[String], charts: &[Chart], degrees: Option<Degrees>, exact: bool) -> Vec<(Basis, Degrees)> {
     if let Some(degrees) = degrees {
         return vec![(Basis::new(names, charts, degrees), degrees)];
     }
