@@ -32,6 +32,7 @@ def train(
     *,
     preset: str = "quick",
     structure: str | None = None,
+    known: System | None = None,
     hidden: Sequence[int] | None = None,
     epochs: int | None = None,
     precision: str | None = None,
@@ -52,6 +53,8 @@ def train(
         ``"quick"`` (a minute on two cores), ``"best"``, or ``"paper"``.
     structure : str, optional
         ``"black-box"``, ``"mechanical"`` or ``"metric"``.
+    known : System, optional
+        A formula that is added to what the network learns; its parameters marked ``learn`` are found, see `Model.constants`.
     hidden : sequence of int, optional
         Widths of the hidden layers.
     epochs : int, optional
@@ -68,7 +71,7 @@ def train(
         Any other choice by its path in the configuration: ``{"optimizer.batch": 64, "phase.0.rate": 1e-3}``.
     """
     system = System(system) if isinstance(system, str) else system
-    changes: dict[str, Any] = {"seed": seed}
+    changes: dict[str, Any] = {"seed": seed, **_known(known)}
     if hidden is not None:
         changes["network.hidden"] = [int(width) for width in hidden]
     if precision is not None:
@@ -77,6 +80,16 @@ def train(
     whole = _lnn.configuration(system._subject, preset, structure, epochs, json.dumps(changes))
     directory = None if out is None else os.fspath(out)
     return _learned(_lnn.train(system._subject, whole, (starts, thread_count(threads)), directory, teller(progress)))
+
+
+def _known(known: System | None, prefix: str = "") -> dict[str, Any]:
+    """Choices of a known part: it has a kinetic energy of its own, and the network begins with next to nothing beside it."""
+    if known is None:
+        return {}
+    if known.description is None:
+        raise ValueError("known: expected a system with a formula of its own")
+    choices = {"known": known.description, "alpha": 0.0, "initialization": "near-zero"}
+    return {f"{prefix}network.{key}": choice for key, choice in choices.items()}
 
 
 def learn(
@@ -154,6 +167,7 @@ def fit(
     columns: Mapping[str, Any] | None = None,
     friction: bool = False,
     structure: str | None = None,
+    known: System | None = None,
     hidden: Sequence[int] | None = None,
     epochs: int | None = None,
     precision: str = "f32",
@@ -184,6 +198,8 @@ def fit(
         More about the columns of files: ``time``, ``rate``, ``velocities``, ``accelerations``, ``forces``, ``units``.
     friction : bool
         Whether a friction is learned beside the Lagrangian.
+    known : System, optional
+        A formula that is added to what the network learns; its parameters marked ``learn`` are found, see `Model.constants`.
     config : dict, optional
         Any other choice by its path in the configuration of a fit: ``{"training.optimizer.batch": 64}``.
     """
@@ -206,6 +222,7 @@ def fit(
     unknown = [name for name in angles if name not in coordinates]
     if unknown:
         raise ValueError(f"angles: {unknown[0]!r} is none of the coordinates {list(coordinates)}")
+    config = {**_known(known, "training."), **(config or {})}
     choices = _choices(coordinates, angles, structure, hidden, epochs, precision, seed, threads, config)
     choices = json.dumps({**choices, "friction": friction, "columns": columns})
     directory = None if out is None else os.fspath(out)

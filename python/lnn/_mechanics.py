@@ -410,6 +410,18 @@ class Model(Mechanics):
         """Header and tensors."""
         return ModelFile.from_bytes(self.to_bytes())
 
+    @property
+    def constants(self) -> dict[str, float]:
+        """Values of the constants of the known part, those that were learned included; empty without a known part."""
+        from .reader.formula import Described
+        from .reader.functions import NUMPY
+
+        known = self.header["architecture"].get("form", {}).get("known")
+        if known is None:
+            return {}
+        learned = self.file.tensors.get("known", np.empty(0)).astype(float)
+        return {name: float(x) for name, x in Described(known).constants(NUMPY, learned).items()}
+
     def to_numpy(self) -> Functions:
         """The model as functions of NumPy arrays, without compiled code."""
         return self.file.to_numpy()

@@ -47,6 +47,20 @@ def test_a_system_of_ones_own_is_learned():
     assert learned.model.header["description"]["parameters"]
 
 
+def test_constants_of_a_known_part_are_found():
+    kinetic = lnn.System(
+        "known",
+        lagrangian="m*q_dot^2/2 - k*q^2/2",
+        coordinates=["q"],
+        parameters={"m": 1, "k": {"default": 0.7, "range": "positive", "learn": True}},
+    )
+    learned = lnn.train("harmonic-oscillator", known=kinetic, **{**SMALL, "epochs": 30}, starts=1, config=STATES)
+    assert learned.model.constants["m"] == 1.0 and learned.model.constants["k"] != 0.7
+    assert lnn.Model.from_bytes(learned.model.to_bytes()).constants == learned.model.constants
+    with pytest.raises(ValueError, match="known"):
+        lnn.train("harmonic-oscillator", known=lnn.System("kepler"), **SMALL)
+
+
 def test_wrong_choices_are_refused():
     for wrong in [
         {"preset": "quickest"},
