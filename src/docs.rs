@@ -15,6 +15,7 @@
 //! | [`certificates`] | proofs that a mass matrix has its signature |
 //! | [`method`] | equations, penalties, identities, units and conventions |
 //! | [`library`] | features, a Lagrangian of your own, states of your own, examples |
+//! | [`python`] | the Python package; models in JAX, PyTorch and numpy |
 //! | [`model_format`] | `model.safetensors`, readable without this crate |
 //! | [`results`] | five systems by seeds, limits, time to accuracy, what made training exact, the paper's tables |
 //! | [`accuracy`] | errors of the numerics, run time against error |
@@ -54,6 +55,7 @@ macro_rules! page {
             "[off-shell]: crate::docs::method#metrics-from-geodesics\n",
             "[derivatives]: crate::docs::method#derivatives-of-the-network\n",
             "[library]: crate::docs::library\n",
+            "[python]: crate::docs::python\n",
             "[model-format]: crate::docs::model_format\n",
             "[results]: crate::docs::results\n",
             "[experiments]: crate::docs::results#experiments\n",
@@ -89,6 +91,7 @@ pages! {
     certificates "certificates.md";
     method "method.md";
     library "library.md";
+    python "python.md";
     model_format "model-format.md";
     results "results.md";
     accuracy "accuracy.md";

@@ -139,7 +139,7 @@
 //!
 //! Guides and reference stand in [`docs`]: the command line, configurations, recorded motion, the method, figures with their
 //! commands. Programs that use the crate stand in `examples/`: solvers of other crates, parameter identification by argmin, nalgebra
-//! matrices, batches without allocation, a filmed pendulum, and a reader of model files in Python.
+//! matrices, batches without allocation, a filmed pendulum.
 // What only higher floors use is dead without them; the default features tell what is dead for everybody.
 #![cfg_attr(not(feature = "cli"), allow(dead_code, unused_imports))]
 #![forbid(unsafe_code)]

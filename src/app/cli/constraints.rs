@@ -291,8 +291,8 @@ pub fn constrained<S: Scalar>(
 ) -> Result<Box<dyn EulerLagrange<S>>, CliError> {
     let wrong = |problem: &dyn std::fmt::Display| CliError::usage(format_args!("{}: {problem}", file.display()));
     let (name, text) = config::read_text(file)?;
-    let table: toml::Table = config::parse(&text)
-        .map_err(|(line, problem)| CliError::usage(format_args!("{name}:{line}: {problem}")))?;
+    let table: toml::Table =
+        config::parse(&text).map_err(|(line, problem)| CliError::usage(format_args!("{name}:{line}: {problem}")))?;
     let found = table.get("constraints").cloned().unwrap_or_else(|| toml::Value::Table(toml::Table::new()));
     let formulas: BTreeMap<String, String> =
         found.try_into().map_err(|_| wrong(&"constraints: expected formulas by name"))?;

@@ -36,6 +36,7 @@ mod misunderstood;
 mod motion;
 mod number;
 mod output;
+mod page;
 mod place;
 mod plain_name;
 mod print_config;
@@ -125,6 +126,8 @@ enum Command {
     Shadow(shadow::Args),
     /// Find the constraints that recorded motion obeys, or what a Lagrangian leaves open.
     Constraints(Box<constraints::Args>),
+    /// Write a model as a page to play with: one HTML file that computes its motion.
+    Page(page::Args),
     /// Find the symmetries of a Lagrangian and what its motion conserves.
     Symmetries(symmetries::Args),
     /// Say what two Lagrangians have in common beyond factor and gauge.
@@ -185,6 +188,7 @@ fn run(command: Command, words: &[OsString]) -> Result<(), CliError> {
         Command::Constraints(args) => constraints::run(&args),
         Command::Geometry(args) => geometry::run(&args),
         Command::Shadow(args) => shadow::run(&args),
+        Command::Page(args) => page::run(&args),
         Command::Symmetries(args) => symmetries::run(&args),
         Command::Compare(args) => compare::run(&args),
         Command::Certify(args) => certify::run(&args),

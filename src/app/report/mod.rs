@@ -7,6 +7,7 @@ mod evaluation;
 mod experiment;
 mod grids;
 mod html;
+mod page;
 mod plot;
 mod quantity_map;
 mod readings;
@@ -24,6 +25,7 @@ pub(crate) use experiment::{
 };
 pub use grids::{Fit, GridComparison, grid_figures};
 pub use html::Report;
+pub use page::{PageError, page};
 pub use plot::{
     HeatMap, Level, LinePlot, OrbitPlot, Picture, PlotError, Series, Trace, heat_maps, line_plot, orbit_picture, png,
     trace_plot,

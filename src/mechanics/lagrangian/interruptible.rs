@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 /// The same model; once the flag was raised it fails everywhere with [`MechanicsError::Interrupted`], which ends whatever follows its
 /// motion at the next evaluation. The energy of states that are there is still to be had.
-pub(crate) struct Interruptible<'a, S> {
+pub struct Interruptible<'a, S> {
     model: &'a dyn EulerLagrange<S>,
     flag: &'a AtomicBool,
 }

@@ -42,7 +42,8 @@ pub use error::MechanicsError;
 #[doc(hidden)]
 pub use expression::{Expression, ExpressionError};
 pub use expression_lagrangian::ExpressionLagrangian;
-pub(crate) use interruptible::Interruptible;
+#[doc(hidden)]
+pub use interruptible::Interruptible;
 #[cfg(feature = "cli")]
 pub(crate) use inverse::inverse_dynamics_by_rows;
 pub use inverse::{InverseDynamics, inverse_dynamics};

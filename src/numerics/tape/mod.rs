@@ -57,5 +57,5 @@ pub use engine::{Depth, Evaluation, Recorded};
 pub use engine::{MixedDirections, STATES};
 pub use error::TapeError;
 #[doc(hidden)]
-pub use program::{Program, Replay, Tracer};
+pub use program::{Listing, Operation, Program, Replay, Tracer};
 pub use var::Var;

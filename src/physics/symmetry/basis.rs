@@ -23,7 +23,7 @@ pub enum Chart {
 impl Chart {
     /// The chart of a coordinate of this unit over this range: an angle that is not periodic and stays between two poles, any
     /// other angle, a number of one sign, any number. A number of unit 1 between 0 and `pi` may be a polar angle.
-    pub(crate) fn of(periodic: bool, unit: &str, [low, high]: [f64; 2]) -> Self {
+    pub fn of(periodic: bool, unit: &str, [low, high]: [f64; 2]) -> Self {
         let between_poles = low > 0.0 && high < PI;
         match (periodic, unit) {
             (true, _) => Self::Circle,
@@ -396,7 +396,7 @@ pub fn unknowns(n: usize, functions: usize) -> usize {
 }
 
 /// States that a search for so many unknown coefficients of `n` coordinates takes at most.
-pub(crate) fn most_states(n: usize, unknowns: usize) -> usize {
+pub fn most_states(n: usize, unknowns: usize) -> usize {
     MOST_NUMBERS / unknowns.max(n * n).max(1)
 }
 

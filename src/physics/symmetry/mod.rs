@@ -51,8 +51,10 @@ mod sparse;
 
 pub use algebra::Algebra;
 pub(crate) use algebra::MOST_FIELDS;
+pub(crate) use basis::MOST_UNKNOWNS;
 pub use basis::{Basis, Chart, Degrees};
-pub(crate) use basis::{MOST_UNKNOWNS, most_states, unknowns};
+#[doc(hidden)]
+pub use basis::{most_states, unknowns};
 #[doc(hidden)]
 pub use canonical::{Canonical, CanonicalForm};
 pub(crate) use charges::drifts;
@@ -66,8 +68,10 @@ pub use field::Field;
 pub use find::EXACT;
 pub use find::{Symmetries, symmetries};
 pub use sample::Region;
-pub(crate) use sample::middle;
+#[doc(hidden)]
+pub use sample::middle;
 #[doc(hidden)]
 pub use separation::Separation;
 pub(crate) use separation::TOLERANCES;
-pub(crate) use separation::{bases, enough, most_symmetries};
+#[doc(hidden)]
+pub use separation::{bases, enough, most_symmetries};

@@ -71,12 +71,7 @@ impl Separation {
 
 /// The bases in which symmetries are sought: the one of these degrees, or the usual one; of a model, whose errors hide symmetries
 /// among many functions, also those of lower powers.
-pub(crate) fn bases(
-    names: &[String],
-    charts: &[Chart],
-    degrees: Option<Degrees>,
-    exact: bool,
-) -> Vec<(Basis, Degrees)> {
+pub fn bases(names: &[String], charts: &[Chart], degrees: Option<Degrees>, exact: bool) -> Vec<(Basis, Degrees)> {
     if let Some(degrees) = degrees {
         return vec![(Basis::new(names, charts, degrees), degrees)];
     }
@@ -95,7 +90,7 @@ pub(crate) fn bases(
 }
 
 /// States that are looked at for so many unknown coefficients, of a Lagrangian that is written down or of a model.
-pub(crate) fn enough(unknowns: usize, exact: bool) -> usize {
+pub fn enough(unknowns: usize, exact: bool) -> usize {
     (2 * unknowns).max(if exact { 400 } else { 1000 })
 }
 
@@ -104,7 +99,7 @@ pub(crate) fn enough(unknowns: usize, exact: bool) -> usize {
 ///
 /// # Errors
 /// [`SymmetryError`].
-pub(crate) fn most_symmetries(
+pub fn most_symmetries(
     model: &dyn EulerLagrange<f64>,
     bases: Vec<(Basis, Degrees)>,
     (q, v): (&[f64], &[f64]),

@@ -16,6 +16,7 @@ mod inspect;
 mod limits;
 mod motion;
 mod overwrite;
+mod page;
 mod physics;
 mod pipes;
 mod ranges;

@@ -276,7 +276,7 @@ fn the_commands_of_the_readme_run() {
         for word in &mut words {
             if word.ends_with("model.safetensors") {
                 *word = place("model.safetensors");
-            } else if word.ends_with(".csv") && !word.starts_with("examples/") {
+            } else if [".csv", ".html"].iter().any(|end| word.ends_with(end)) && !word.starts_with("examples/") {
                 *word = place(word);
             }
         }
@@ -290,7 +290,7 @@ fn the_commands_of_the_readme_run() {
         assert_eq!(result.code, Some(0), "{line}: {}", result.stderr);
         run.push(words[0].clone());
     }
-    assert_eq!(run, ["train", "rollout", "evaluate", "check", "fit"]);
+    assert_eq!(run, ["train", "rollout", "evaluate", "page", "check", "fit"]);
     for file in ["trained/report.html", "motion.csv", "evaluation/report.html", "fitted/report.html"] {
         assert!(folder.path(file).exists(), "no {file}: {:?}", folder.names());
     }

@@ -1,4 +1,5 @@
-//! The repository itself: order of modules, examples, use by other programs, seeds of the fuzz targets, pages.
+//! The repository itself: order of modules, examples, use by other programs, seeds of the fuzz targets, pages,
+//! the reader of model files in Python.
 
 mod docs;
 mod embedding;
@@ -6,3 +7,5 @@ mod examples;
 mod floors;
 mod fuzz_seeds;
 mod model_format;
+#[cfg(feature = "cli")]
+mod python;

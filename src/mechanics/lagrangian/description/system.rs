@@ -30,7 +30,7 @@ impl Description {
     ///
     /// # Errors
     /// The first key that is wrong, and how.
-    pub(crate) fn system(&self) -> Outcome<System> {
+    pub fn system(&self) -> Outcome<System> {
         let taken = constrained_systems().iter().find(|system| system.name == self.name);
         if systems().iter().any(|system| system.name == self.name)
             || taken.is_some_and(|system| system.description() != Some(self))

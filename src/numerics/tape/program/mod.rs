@@ -7,10 +7,12 @@
 
 mod forward;
 mod interpret;
+mod listing;
 mod recorder;
 mod replay;
 mod tracer;
 
+pub use listing::{Listing, Operation};
 pub use replay::Replay;
 pub use tracer::Tracer;
 

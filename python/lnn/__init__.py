@@ -1,0 +1,47 @@
+"""Stabilized Lagrangian neural networks: learn ``L(q, dq/dt)`` from motion, predict it, read physics off it.
+
+>>> import lnn
+>>> pendulum = lnn.System("double-pendulum", m2=0.5)
+>>> pendulum.acceleration([0.3, 0.1], [0.0, 0.0]).shape
+(2,)
+
+States are ``(q, v)`` with ``v = dq/dt``, arrays ``(..., n)`` of one state or any batch, in SI units and radians. Systems, models and
+results can be pickled, and be used from any thread. `lnn.reader` is the part that needs no compiled code.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+__version__ = "0.1.0"
+
+# Imported when it is asked for: `lnn.reader` needs none of it.
+_WHERE = {
+    **dict.fromkeys(["Model", "System", "systems"], "_mechanics"),
+    **dict.fromkeys(["fit", "learn", "train"], "_learning"),
+    **dict.fromkeys(["Certificate", "Geometry", "Learned", "Symmetries", "Trajectory"], "_results"),
+    "Terms": "reader",
+    "LagrangianRegressor": "_regressor",
+}
+__all__ = [*_WHERE]
+
+if TYPE_CHECKING:
+    from ._learning import fit, learn, train
+    from ._mechanics import Model, System, systems
+    from ._regressor import LagrangianRegressor
+    from ._results import Certificate, Geometry, Learned, Symmetries, Trajectory
+    from .reader import Terms
+
+
+def __getattr__(name: str):
+    if name not in _WHERE:
+        raise AttributeError(f"module 'lnn' has no attribute {name!r}")
+    from importlib import import_module
+
+    found = getattr(import_module(f".{_WHERE[name]}", __name__), name)
+    globals()[name] = found
+    return found
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *_WHERE])

@@ -1,0 +1,463 @@
+"""Systems and models."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from . import _lnn
+from ._arrays import bounds_of, doubles, states, thread_count
+from ._results import Certificate, Geometry, Symmetries, Trajectory
+from .reader.functions import DescribedModel, Functions, Terms
+from .reader.model_file import ModelFile
+
+TENSORS = {"metric": 2, "inverse": 2, "christoffel": 3, "riemann": 4, "ricci": 2, "einstein": 2, "weyl": 4}
+
+
+class Mechanics:
+    """What systems and models have in common: a Lagrangian, its terms, its motion, its geometry."""
+
+    def __init__(self, subject: _lnn.Subject):
+        self._subject = subject
+        self._facts: dict[str, Any] = json.loads(subject.facts())
+        self._n = len(self._facts["columns"]) // 2
+
+    @property
+    def name(self) -> str:
+        """Name of the system."""
+        return self._facts["name"]
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of the coordinates, then of the velocities."""
+        return tuple(self._facts["columns"])
+
+    @property
+    def coordinates(self) -> tuple[str, ...]:
+        """Names of the coordinates."""
+        return self.columns[: self._n]
+
+    @property
+    def angles(self) -> tuple[str, ...]:
+        """Names of the coordinates that are angles in rad."""
+        return tuple(name for name, angle in zip(self.coordinates, self._facts["periodic"]) if angle)
+
+    @property
+    def bounds(self) -> dict[str, tuple[float, float]]:
+        """Bounds of the states of interest by column: those that a model learned from, or that a system is judged by."""
+        return dict(zip(self.columns, map(tuple, self._facts["position"] + self._facts["velocity"])))
+
+    def terms(self, q, v, *, threads: int = 1) -> Terms:
+        """All terms of states.
+
+        Parameters
+        ----------
+        q, v : array_like (..., n)
+            Coordinates and velocities in SI units and rad.
+        threads : int
+            Threads; results do not depend on them.
+
+        Returns
+        -------
+        Terms
+            L ``(...)``, p ``(..., n)``, dL/dq, M ``(..., n, n)``, c, -dD/dv, a, E. Where a mass matrix is singular or a number is not
+            finite, accelerations are NaN and `Terms.failures` says why.
+        """
+        n = self._n
+        q, v, shape = states(q, v, n)
+        found, failures = self._subject.terms(q, v, threads)
+        vector, matrix = (*shape, n), (*shape, n, n)
+        lagrangian, momentum, dl_dq, mass_matrix, coriolis, acceleration, energy, *friction = found
+        return Terms(
+            lagrangian.reshape(shape),
+            momentum.reshape(vector),
+            dl_dq.reshape(vector),
+            mass_matrix.reshape(matrix),
+            coriolis.reshape(vector),
+            friction[0].reshape(vector) if friction else np.zeros(vector),
+            acceleration.reshape(vector),
+            energy.reshape(shape),
+            tuple(failures),
+        )
+
+    def _term(self, name, width, q, v, threads):
+        q, v, shape = states(q, v, self._n)
+        return self._subject.term(name, q, v, threads).reshape(shape + width)
+
+    def lagrangian(self, q, v, *, threads: int = 1) -> np.ndarray:
+        """L, ``(...)``, of states ``(..., n)``."""
+        return self._term("lagrangian", (), q, v, threads)
+
+    def momentum(self, q, v, *, threads: int = 1) -> np.ndarray:
+        """p = dL/dv, ``(..., n)``."""
+        return self._term("momentum", (self._n,), q, v, threads)
+
+    def mass_matrix(self, q, v, *, threads: int = 1) -> np.ndarray:
+        """M = d2L/dv2, ``(..., n, n)``."""
+        return self._term("mass_matrix", (self._n, self._n), q, v, threads)
+
+    def acceleration(self, q, v, *, threads: int = 1) -> np.ndarray:
+        """a, ``(..., n)``, friction included; NaN where it is not determined."""
+        return self._term("acceleration", (self._n,), q, v, threads)
+
+    def energy(self, q, v, *, threads: int = 1) -> np.ndarray:
+        """E = v.p - L, ``(...)``."""
+        return self._term("energy", (), q, v, threads)
+
+    def rollout(
+        self,
+        q,
+        v,
+        t_end: float,
+        dt: float,
+        *,
+        t0: float = 0.0,
+        method: str = "dopri5",
+        rtol: float = 1e-6,
+        atol: float = 1e-8,
+        step: float | None = None,
+        bounded: bool = True,
+        threads: int | None = None,
+    ) -> Trajectory:
+        """Motion from one start, or from a batch of them.
+
+        Parameters
+        ----------
+        q, v : array_like (..., n)
+            Starts.
+        t_end, dt : float
+            Time of the last sample, and between samples; a time before `t0` runs backwards.
+        method : str
+            ``"dopri5"`` or ``"dop853"`` with error control by `rtol` and `atol`; ``"midpoint"``, ``"gauss4"``, ``"gauss6"`` or
+            ``"variational"``, symplectic, with fixed steps of at most `step`.
+        bounded : bool
+            Whether a motion ends where it leaves the states that a model learned from.
+        """
+        n = self._n
+        q, v, shape = states(q, v, n)
+        times, accuracy = (float(t0), float(t_end), float(dt)), (float(rtol), float(atol), step)
+        found = self._subject.rollout(q, v, times, method, accuracy, bounded, thread_count(threads))
+        # The longest motion has all times that any has.
+        t = max((motion[0] for motion in found), key=len, default=np.empty(0))
+        parts = [np.full((len(found), len(t), n), np.nan) for _ in range(2)] + [np.full((len(found), len(t)), np.nan)]
+        for k, (times, q, v, energy, _, _) in enumerate(found):
+            parts[0][k, : len(times)], parts[1][k, : len(times)] = q.reshape(-1, n), v.reshape(-1, n)
+            parts[2][k, : len(energy)] = energy
+        q, v, energy = (part.reshape(shape + part.shape[1:]) for part in parts)
+        stop = found[0][4] if shape == () else np.array([motion[4] for motion in found], dtype=object).reshape(shape)
+        return Trajectory(t, q, v, energy, stop, self.columns)
+
+    def geometry(self, q, *, velocity=None) -> Geometry:
+        """Metric, connection and curvature at points.
+
+        Parameters
+        ----------
+        q : array_like (..., n)
+            Points.
+        velocity : array_like (n,), optional
+            Where the mass matrix of a Lagrangian that is more than quadratic in the velocities is taken; zeros by default.
+        """
+        n = self._n
+        points, _, shape = states(q, q, n)
+        velocity = [0.0] * n if velocity is None else doubles("velocity", velocity).ravel().tolist()
+        found = self._subject.geometry(points, velocity)
+        fields: dict[str, Any] = {}
+        good = [point if isinstance(point, dict) else {} for point in found]
+        for name, rank in TENSORS.items():
+            rows = [np.asarray(point.get(name, np.full(n**rank, np.nan))) for point in good]
+            fields[name] = np.array(rows).reshape(*shape, *[n] * rank)
+        for name in "determinant", "scalar", "kretschmann":
+            fields[name] = np.array([point.get(name, np.nan) for point in good]).reshape(shape)
+        fields["signature"] = np.array([point.get("signature", (0, 0)) for point in good], int).reshape(*shape, 2)
+        failures = tuple((k, point) for k, point in enumerate(found) if isinstance(point, str))
+        return Geometry(**fields, failures=failures)
+
+    def symmetries(
+        self,
+        *,
+        region: Mapping[str, tuple[float, float]] | None = None,
+        basis: str | None = None,
+        points: int | None = None,
+        seed: int = 0,
+        tolerance: float | None = None,
+    ) -> Symmetries:
+        """Point symmetries: what the Lagrangian conserves.
+
+        Parameters
+        ----------
+        region : dict of str to (low, high), optional
+            Bounds of the states that are looked at, by column.
+        basis : str, optional
+            Functions that fields are made of, such as ``"polynomial:2,trigonometric:1"``.
+        """
+        found = self._subject.symmetries(bounds_of(region), basis, points, seed, tolerance)
+        fields = json.loads(found)
+        for name in "structure_constants", "singular_values":
+            fields[name] = np.array(fields[name], float)
+        return Symmetries(**fields)
+
+    def certify(
+        self,
+        *,
+        region: Mapping[str, tuple[float, float]] | None = None,
+        signature: tuple[int, int] | None = None,
+        condition: float | None = None,
+        seconds: float = 10.0,
+        boxes: int = 10_000_000,
+        threads: int | None = None,
+    ) -> Certificate:
+        """Where in a region the mass matrix is proven to have its signature.
+
+        Parameters
+        ----------
+        region : dict of str to (low, high), optional
+            Bounds by column; those of the states that a model learned from, all of one turn of an angle, by default.
+        signature : (int, int), optional
+            Positive and negative eigenvalues; all positive but one for a time by default.
+        condition : float, optional
+            Largest condition number that is allowed.
+        seconds, boxes
+            Where the search ends.
+        """
+        given = bounds_of(region), signature, condition, float(seconds), boxes, thread_count(threads)
+        fields = json.loads(self._subject.certify(*given))
+        return Certificate(**{**fields, "signature": tuple(fields["signature"])})
+
+
+class System(Mechanics):
+    """A system whose Lagrangian is written down.
+
+    Parameters
+    ----------
+    name : str, optional
+        A system of the catalogue, see `systems`; with `lagrangian` or `metric` the name of the new one.
+    lagrangian : str, optional
+        L as a formula of coordinates ``x``, velocities ``x_dot``, parameters and definitions.
+    coordinates : sequence of str, or dict of str to dict
+        Names; or names with ``bounds``, ``velocity_bounds``, ``periodic``, ``unit``, ``time_like``. Bounds are (-1, 1) where none are given.
+    parameters : dict
+        Values, or dicts of ``default``, ``unit``, ``range``, ``learn``.
+    **more
+        Values of the parameters of a system of the catalogue; other keys of a system file, such as ``definitions`` or ``metric``.
+
+    Examples
+    --------
+    >>> System("double-pendulum", m2=0.5).mass_matrix([0.0, 0.0], [0.0, 0.0]).tolist()
+    [[1.5, 0.5], [0.5, 0.5]]
+    >>> spring = System(lagrangian="m*x_dot^2/2 - k*x^2/2", coordinates=["x"], parameters={"m": 1, "k": 4})
+    >>> spring.acceleration([0.5], [0.0]).tolist()
+    [-2.0]
+    """
+
+    def __init__(
+        self,
+        name: str | None = None,
+        *,
+        lagrangian: str | None = None,
+        coordinates: Sequence[str] | Mapping[str, Mapping] | None = None,
+        parameters: Mapping[str, Any] | None = None,
+        **more: Any,
+    ):
+        if lagrangian is None and "metric" not in more:
+            if name is None or coordinates is not None:
+                raise TypeError("expected the name of a system, or a `lagrangian` or `metric` with its `coordinates`")
+            given = _texts({**(parameters or {}), **more})
+            super().__init__(_lnn.Subject.system(name, given))
+            self._made: tuple = ("system", name, given)
+            return
+        if coordinates is None:
+            raise TypeError("expected the names of the coordinates")
+        if not isinstance(coordinates, Mapping):
+            coordinates = {name: {} for name in coordinates}
+        description: dict[str, Any] = {"name": name or "own"}
+        if lagrangian is not None:
+            description["lagrangian"] = lagrangian
+        description["coordinates"] = []
+        for coordinate, said in coordinates.items():
+            whole = {"name": coordinate, **said}
+            for key in ["velocity_bounds"] if whole.get("periodic") else ["bounds", "velocity_bounds"]:
+                whole.setdefault(key, [-1.0, 1.0])
+            whole = {key: list(x) if isinstance(x, tuple) else x for key, x in whole.items() if x is not None}
+            description["coordinates"].append(whole)
+        self._describe(json.dumps({**description, "parameters": dict(parameters or {}), **more}), True, [])
+
+    def _describe(self, text: str, is_json: bool, given: list):
+        Mechanics.__init__(self, _lnn.Subject.described(text, is_json, given))
+        self._made = ("described", text, is_json, given)
+
+    @classmethod
+    def from_toml(cls, text: str, **parameters: Any) -> System:
+        """A system by the text of its file, or by the file's path."""
+        if isinstance(text, os.PathLike) or ("\n" not in text and text.endswith(".toml")):
+            text = Path(text).read_text()
+        system = cls.__new__(cls)
+        system._describe(text, False, _texts(parameters))
+        return system
+
+    def __reduce__(self):
+        return _system, self._made
+
+    def __repr__(self) -> str:
+        values = "".join(f", {name}={value:g}" for name, value in self.parameters.items())
+        return f"System({self.name!r}{values})"
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Values of the parameters."""
+        return dict(self._facts["parameters"])
+
+    @property
+    def description(self) -> dict | None:
+        """What the system's file says; None for one of the catalogue."""
+        return self._facts["description"]
+
+    def _functions(self, xp, kind) -> Functions:
+        from .reader.formula import Described
+
+        if self.description is None:
+            raise ValueError("only a system with a formula of its own is a function of other libraries")
+        model = DescribedModel(Described(self.description), self.parameters)
+        return kind(xp, model, {})
+
+    def to_numpy(self) -> Functions:
+        """The formula as functions of NumPy arrays."""
+        from .reader.functions import NUMPY, NumpyFunctions
+
+        return self._functions(NUMPY, NumpyFunctions)
+
+    def to_jax(self) -> Functions:
+        """The formula as functions of JAX arrays."""
+        from .reader.jax_functions import JAX, Differentiated
+
+        return self._functions(JAX, Differentiated)
+
+    def to_torch(self, dtype=None) -> Functions:
+        """The formula as functions of PyTorch tensors."""
+        import torch
+
+        from .reader.torch_functions import Differentiated, backend
+
+        return self._functions(backend(dtype or torch.float64), Differentiated)
+
+
+def _system(kind: str, *made):
+    """A pickled system."""
+    if kind == "system":
+        return System(made[0], **dict(made[1]))
+    system = System.__new__(System)
+    system._describe(*made)
+    return system
+
+
+def _texts(parameters: Mapping[str, Any]) -> list[tuple[str, str]]:
+    return [(name, x if isinstance(x, str) else repr(_plain(name, x))) for name, x in parameters.items()]
+
+
+def _plain(name: str, x):
+    try:
+        return int(x) if int(x) == x else float(x)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise TypeError(f"{name}: expected a number, found {x!r}") from error
+
+
+def systems() -> dict[str, dict]:
+    """The systems of the catalogue by name: title, columns, units, parameters, bounds."""
+    return {system["name"]: system for system in json.loads(_lnn.systems())}
+
+
+class Model(Mechanics):
+    """A learned Lagrangian."""
+
+    @classmethod
+    def load(cls, path: str | os.PathLike) -> Model:
+        """Reads a model file, or that of the directory of a run."""
+        path = Path(path)
+        return cls.from_bytes((path / "model.safetensors" if path.is_dir() else path).read_bytes())
+
+    @classmethod
+    def from_bytes(cls, data: bytes) -> Model:
+        """A model from the bytes of its file."""
+        return cls(_lnn.Subject.model(data))
+
+    def to_bytes(self) -> bytes:
+        """The bytes of the file."""
+        return self._subject.to_bytes()
+
+    def save(self, path: str | os.PathLike) -> None:
+        """Writes the file that the program and `load` read."""
+        Path(path).write_bytes(self.to_bytes())
+
+    def __reduce__(self):
+        return Model.from_bytes, (self.to_bytes(),)
+
+    def __repr__(self) -> str:
+        net = self.header["architecture"]
+        structure = net.get("form", {}).get("structure", "black-box")
+        return f"Model({self.name!r}, {structure}, coordinates {list(self.coordinates)}, hidden {net['hidden']})"
+
+    @property
+    def header(self) -> dict:
+        """Everything but the weights, by the keys of the model format."""
+        return self._facts["header"]
+
+    @property
+    def file(self) -> ModelFile:
+        """Header and tensors."""
+        return ModelFile.from_bytes(self.to_bytes())
+
+    @property
+    def constants(self) -> dict[str, float]:
+        """Values of the constants of the known part, those that were learned included; empty without a known part."""
+        from .reader.formula import Described
+        from .reader.functions import NUMPY
+
+        known = self.header["architecture"].get("form", {}).get("known")
+        if known is None:
+            return {}
+        learned = self.file.tensors.get("known", np.empty(0)).astype(float)
+        return {name: float(x) for name, x in Described(known).constants(NUMPY, learned).items()}
+
+    def to_numpy(self) -> Functions:
+        """The model as functions of NumPy arrays, without compiled code."""
+        return self.file.to_numpy()
+
+    def to_jax(self) -> Functions:
+        """The model as functions of JAX arrays; see `ModelFile.to_jax`."""
+        return self.file.to_jax()
+
+    def to_torch(self, dtype=None) -> Functions:
+        """The model as functions of PyTorch tensors; see `ModelFile.to_torch`."""
+        return self.file.to_torch(dtype)
+
+    def page(self, path: str | os.PathLike) -> None:
+        """Writes a page to play with: one HTML file that computes the motion, the exact one beside if it is known."""
+        Path(path).write_text(self._subject.page(), encoding="utf-8")
+
+    def evaluate(
+        self,
+        system: System | None = None,
+        *,
+        starts: int = 4,
+        seed: int = 0,
+        threads: int | None = None,
+        progress: Any = None,
+    ) -> dict:
+        """The model beside the exact system: errors of accelerations, mass matrix and motion, and what is read off both.
+
+        Parameters
+        ----------
+        system : System, optional
+            The system to compare with; the one that the model learned by default.
+        starts : int
+            Motions that are compared.
+        """
+        from ._progress import teller
+
+        exact = None if system is None else system._subject
+        plan = starts, seed, thread_count(threads)
+        return json.loads(self._subject.evaluate(exact, plan, teller(progress)))

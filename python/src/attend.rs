@@ -1,0 +1,121 @@
+//! Long work beside a Python that stays alive: the work has a thread of its own, this one waits without the lock of the interpreter, hands
+//! events on and looks for signals.
+
+use crate::errors::runtime;
+use lnn::pipeline::{Event, Watch};
+use pyo3::prelude::*;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::thread::Builder;
+use std::time::{Duration, Instant};
+
+/// Time between two looks for signals.
+const LOOK: Duration = Duration::from_millis(50);
+/// Stack of the work, that of a main thread.
+const STACK: usize = 8 << 20;
+
+/// An event as Python is told: kind, two numbers, a text.
+type Said = (&'static str, f64, f64, String);
+
+enum Message {
+    Said(Said),
+    Done,
+}
+
+/// Runs `work` under a watch whose flag a signal raises, and tells `progress` what happens meanwhile.
+///
+/// # Errors
+/// A second signal, what `progress` raises, and a panic of the work.
+pub fn attended<T: Send>(
+    py: Python<'_>,
+    progress: Option<&Py<PyAny>>,
+    work: impl FnOnce(Watch) -> T + Send,
+) -> PyResult<T> {
+    let (sender, receiver) = channel();
+    let flag = Arc::new(AtomicBool::new(false));
+    let mut watch = Watch { events: None, interrupt: Arc::clone(&flag) };
+    if progress.is_some() {
+        let teller = Teller { sender: sender.clone(), last: std::sync::Mutex::new(None) };
+        watch = Watch { interrupt: Arc::clone(&flag), ..Watch::new(move |event| teller.tell(event)) };
+    }
+    // The receiver moves into this call, which stays on this thread.
+    py.detach(move || {
+        std::thread::scope(|scope| {
+            let running = Builder::new().stack_size(STACK).spawn_scoped(scope, move || {
+                // Told also when the work panics.
+                let _end = End(sender);
+                work(watch)
+            });
+            let running = running.map_err(|error| runtime(format_args!("no thread can be started: {error}")))?;
+            let looked = look(&receiver, &flag, progress);
+            let done = running.join();
+            looked?;
+            done.map_err(|panic| {
+                let text = panic.downcast_ref::<String>().cloned();
+                let text = text.or_else(|| panic.downcast_ref::<&str>().map(|text| text.to_string()));
+                runtime(format_args!("a mistake in lnn itself: {}", text.unwrap_or_default()))
+            })
+        })
+    })
+}
+
+/// Waits for the end of the work.
+fn look(receiver: &Receiver<Message>, flag: &AtomicBool, progress: Option<&Py<PyAny>>) -> PyResult<()> {
+    let mut failed = Ok(());
+    loop {
+        let message = receiver.recv_timeout(LOOK);
+        if let Ok(Message::Done) | Err(RecvTimeoutError::Disconnected) = message {
+            return failed;
+        }
+        let attended = Python::attach(|py| {
+            if let (Ok(Message::Said(said)), Some(progress), true) = (message, progress, failed.is_ok()) {
+                progress.call1(py, said)?;
+            }
+            // The first signal ends the work with what it has, as the program does.
+            match py.check_signals() {
+                Err(_) if !flag.swap(true, Ordering::SeqCst) => Ok(()),
+                outcome => outcome,
+            }
+        });
+        if let Err(error) = attended {
+            flag.store(true, Ordering::SeqCst);
+            failed = failed.and(Err(error));
+        }
+    }
+}
+
+struct End(Sender<Message>);
+
+impl Drop for End {
+    fn drop(&mut self) {
+        let _ = self.0.send(Message::Done);
+    }
+}
+
+/// Sends events, of steps no more than there is time to look at.
+struct Teller {
+    sender: Sender<Message>,
+    last: std::sync::Mutex<Option<Instant>>,
+}
+
+impl Teller {
+    fn tell(&self, event: Event<'_>) {
+        let pair = |kind, done: usize, total: usize| (kind, done as f64, total as f64, String::new());
+        let said = match event {
+            Event::Step { done, total } => {
+                let Ok(mut last) = self.last.lock() else { return };
+                if done < total && last.is_some_and(|last| last.elapsed() < LOOK) {
+                    return;
+                }
+                *last = Some(Instant::now());
+                pair("step", done, total)
+            }
+            Event::Epoch(epoch) => ("epoch", epoch.epoch as f64, epoch.validation_loss, String::new()),
+            Event::Judged { done, total } => pair("judged", done, total),
+            Event::Note(text) => ("note", 0.0, 0.0, text.to_string()),
+            _ => return,
+        };
+        let _ = self.sender.send(Message::Said(said));
+    }
+}

@@ -1,0 +1,21 @@
+//! The compiled part of the Python package `lnn`: arrays in, calls of the library, arrays and JSON out. It has no logic of its own; names,
+//! defaults and documentation are those of the Python side.
+
+mod attend;
+mod errors;
+mod learn;
+mod subject;
+
+use pyo3::prelude::*;
+
+/// The extension module.
+#[pymodule]
+fn _lnn(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<subject::Subject>()?;
+    module.add_function(wrap_pyfunction!(subject::systems, module)?)?;
+    module.add_function(wrap_pyfunction!(learn::configuration, module)?)?;
+    module.add_function(wrap_pyfunction!(learn::train, module)?)?;
+    module.add_function(wrap_pyfunction!(learn::learn, module)?)?;
+    module.add_function(wrap_pyfunction!(learn::fit, module)?)?;
+    Ok(())
+}

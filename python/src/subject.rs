@@ -1,0 +1,557 @@
+//! Something that moves by a Lagrangian: a system or a model.
+
+use crate::attend::attended;
+use crate::errors::{pipeline, runtime, value};
+use lnn::certificate::{self, Certificate, Signature, certify_network, certify_system};
+use lnn::geometry::geometries;
+use lnn::lagrangian::system::{Bounds, Size, System};
+use lnn::lagrangian::{
+    Description, EulerLagrange, Interruptible, Request, SystemInstance, Terms, configure_system, configure_values, find,
+};
+use lnn::network::NetworkLagrangian;
+use lnn::network::file::{Header, ModelFile};
+use lnn::pipeline::{EvaluationOptions, evaluate, trained_on};
+use lnn::report::page;
+use lnn::rollout::{Method, Options, Rollout, RolloutError, rollout_many};
+use lnn::symmetry::{Chart, Degrees, Region, bases, enough, middle, most_states, most_symmetries, unknowns};
+use numpy::{IntoPyArray, PyArray1, PyReadonlyArray2};
+use pyo3::exceptions::PyKeyboardInterrupt;
+use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyDict, PyList};
+use serde_json::{Value, json};
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::f64::consts::TAU;
+use std::sync::atomic::Ordering;
+
+/// States whose terms are computed at a time.
+const CHUNK: usize = 4096;
+
+/// Origin of a Lagrangian.
+enum Kind {
+    System(SystemInstance<f64>, Box<dyn EulerLagrange<f64>>),
+    Model(Box<Header>, NetworkLagrangian<f64>),
+}
+
+/// A system or a model.
+#[pyclass(frozen, module = "lnn._lnn")]
+pub struct Subject {
+    kind: Kind,
+    columns: Vec<String>,
+}
+
+/// All systems of the catalogue, as JSON.
+#[pyfunction]
+pub fn systems() -> PyResult<String> {
+    let all: PyResult<Vec<Value>> =
+        lnn::lagrangian::systems().iter().map(|system| Ok(Subject::of(Cow::Borrowed(system), &[])?.said())).collect();
+    Ok(Value::from(all?).to_string())
+}
+
+/// Values of all parameters of a system, its size among them.
+pub fn values(configured: &SystemInstance<f64>) -> BTreeMap<String, f64> {
+    let SystemInstance { system, coordinates, parameters } = configured;
+    let named = system.parameters.iter().map(|parameter| parameter.symbol.to_string());
+    let mut values: BTreeMap<String, f64> = named.zip(parameters.iter().copied()).collect();
+    if let Size::Chosen { symbol, .. } = system.size {
+        values.insert(symbol.to_string(), *coordinates as f64);
+    }
+    values
+}
+
+impl Subject {
+    fn of(system: Cow<'static, System>, parameters: &[(String, String)]) -> PyResult<Self> {
+        let configured = configure_system::<f64>(system, parameters).map_err(value)?;
+        let columns = configured.system.columns(configured.coordinates);
+        let built = configured.build().map_err(value)?;
+        Ok(Self { kind: Kind::System(configured, built), columns })
+    }
+
+    /// A model, from a header and weights.
+    pub fn learned(header: Header, network: NetworkLagrangian<f64>) -> Self {
+        let columns = header.columns.clone();
+        Self { kind: Kind::Model(Box::new(header), network), columns }
+    }
+
+    fn n(&self) -> usize {
+        self.columns.len() / 2
+    }
+
+    fn moving(&self) -> &dyn EulerLagrange<f64> {
+        match &self.kind {
+            Kind::System(_, built) => built.as_ref(),
+            Kind::Model(_, network) => network,
+        }
+    }
+
+    /// The system, or the one that the model learned.
+    pub fn system_instance(&self) -> PyResult<SystemInstance<f64>> {
+        let header = match &self.kind {
+            Kind::System(configured, _) => return Ok(configured.clone()),
+            Kind::Model(header, _) => header,
+        };
+        let system = match &header.description {
+            Some(description) => description.system().map(Cow::Owned).map_err(value)?,
+            None => Cow::Borrowed(find(&header.system).map_err(|_| {
+                let problem = "is no system of the catalogue: give the system to compare with";
+                value(format_args!("{:?}, which the model learned, {problem}", header.system))
+            })?),
+        };
+        configure_values(system, &header.parameters).map_err(value)
+    }
+
+    fn time_like(&self) -> Option<usize> {
+        match &self.kind {
+            Kind::System(configured, _) => configured.system.time_like,
+            Kind::Model(header, _) => header.architecture.time_like,
+        }
+    }
+
+    /// Bounds of interest, `(low, high)` of every coordinate and velocity: those of validation, or of training.
+    fn bounds(&self) -> (Vec<[f64; 2]>, Vec<[f64; 2]>) {
+        match &self.kind {
+            Kind::System(configured, _) => {
+                let Bounds { positions, velocities } = configured.system.validation(configured.coordinates);
+                let pairs = |bounds: Vec<(f64, f64)>| bounds.into_iter().map(|(low, high)| [low, high]).collect();
+                (pairs(positions), pairs(velocities))
+            }
+            Kind::Model(header, _) => (header.position.clone(), header.velocity.clone()),
+        }
+    }
+
+    fn periodic(&self) -> Vec<bool> {
+        match &self.kind {
+            Kind::System(configured, _) => {
+                configured.system.coordinates(configured.coordinates).iter().map(|c| c.periodic).collect()
+            }
+            Kind::Model(header, _) => header.architecture.periodic.clone(),
+        }
+    }
+
+    fn units(&self) -> Vec<String> {
+        self.system_instance().map_or_else(
+            |_| vec![String::new(); self.n()],
+            |system| system.system.coordinates(system.coordinates).iter().map(|c| c.unit.to_string()).collect(),
+        )
+    }
+
+    fn said(&self) -> Value {
+        let (position, velocity) = self.bounds();
+        let mut said = json!({
+            "columns": self.columns, "periodic": self.periodic(), "units": self.units(),
+            "time_like": self.time_like(), "position": position, "velocity": velocity,
+        });
+        let more = match &self.kind {
+            Kind::System(configured, _) => {
+                let system = &configured.system;
+                json!({
+                    "name": system.name, "title": system.title, "time_unit": system.time_unit,
+                    "parameters": values(configured), "description": system.description(),
+                })
+            }
+            Kind::Model(header, _) => json!({ "name": header.system, "header": header }),
+        };
+        if let (Some(said), Value::Object(more)) = (said.as_object_mut(), more) {
+            said.extend(more);
+        }
+        said
+    }
+
+    /// The bounds with those of the named columns replaced.
+    fn region(
+        &self,
+        (mut position, mut velocity): (Vec<[f64; 2]>, Vec<[f64; 2]>),
+        given: Vec<(String, f64, f64)>,
+    ) -> PyResult<(Vec<[f64; 2]>, Vec<[f64; 2]>)> {
+        for (name, low, high) in given {
+            let place = self.columns.iter().position(|column| *column == name);
+            let place =
+                place.ok_or_else(|| value(format_args!("region: no column {name:?} among {:?}", self.columns)))?;
+            let side = if place < self.n() { &mut position[place] } else { &mut velocity[place - self.n()] };
+            *side = [low, high];
+        }
+        Ok((position, velocity))
+    }
+
+    fn fits(&self, what: &str, columns: usize) -> PyResult<()> {
+        if columns == self.n() {
+            return Ok(());
+        }
+        Err(value(format_args!("{what}: expected {} numbers per state, found {columns}", self.n())))
+    }
+
+    /// Terms of states, chunk by chunk, parts of them side by side.
+    fn computed(&self, q: &[f64], v: &[f64], request: Request, threads: usize) -> Vec<(Terms<f64>, usize)> {
+        let (n, model) = (self.n(), self.moving());
+        let part = |q: &[f64], v: &[f64]| {
+            let chunks = q.chunks(CHUNK * n).zip(v.chunks(CHUNK * n));
+            let terms = chunks.map(|(q, v)| {
+                let mut terms = Terms::default();
+                // Every row that fails is among the failures, its accelerations are NaN.
+                let _ = model.terms(q, v, request, &mut terms);
+                (terms, q.len() / n)
+            });
+            terms.collect::<Vec<_>>()
+        };
+        let states = q.len() / n;
+        let threads = threads.clamp(1, 256).min(states.div_ceil(CHUNK)).max(1);
+        if threads == 1 {
+            return part(q, v);
+        }
+        let share = states.div_ceil(threads).next_multiple_of(CHUNK) * n;
+        std::thread::scope(|scope| {
+            let parts = q.chunks(share).zip(v.chunks(share));
+            let running: Vec<_> = parts.map(|(q, v)| scope.spawn(move || part(q, v))).collect();
+            running.into_iter().flat_map(|part| part.join().unwrap_or_default()).collect()
+        })
+    }
+}
+
+type Numbers<'py> = Bound<'py, PyArray1<f64>>;
+
+/// One field of all chunks; `NaN` where a chunk has none of it.
+fn field<'py>(
+    py: Python<'py>,
+    parts: &mut [(Terms<f64>, usize)],
+    width: usize,
+    take: fn(&mut Terms<f64>) -> &mut Vec<f64>,
+) -> Numbers<'py> {
+    let whole = |numbers: Vec<f64>, states: usize| {
+        if numbers.len() == states * width { numbers } else { vec![f64::NAN; states * width] }
+    };
+    if let [(terms, states)] = parts {
+        return whole(std::mem::take(take(terms)), *states).into_pyarray(py);
+    }
+    let mut all = Vec::with_capacity(parts.iter().map(|part| part.1 * width).sum());
+    for (terms, states) in parts {
+        all.append(&mut whole(std::mem::take(take(terms)), *states));
+    }
+    all.into_pyarray(py)
+}
+
+#[pymethods]
+impl Subject {
+    /// A system of the catalogue.
+    #[staticmethod]
+    fn system(name: &str, parameters: Vec<(String, String)>) -> PyResult<Self> {
+        Self::of(Cow::Borrowed(find(name).map_err(value)?), &parameters)
+    }
+
+    /// A system by its description: TOML, or JSON.
+    #[staticmethod]
+    fn described(text: &str, json: bool, parameters: Vec<(String, String)>) -> PyResult<Self> {
+        let description: Description =
+            if json { serde_json::from_str(text).map_err(value)? } else { toml::from_str(text).map_err(value)? };
+        Self::of(Cow::Owned(description.system().map_err(value)?), &parameters)
+    }
+
+    /// A model from the bytes of its file.
+    #[staticmethod]
+    fn model(bytes: &[u8]) -> PyResult<Self> {
+        let ModelFile { header, weights } = ModelFile::<f64>::from_bytes(bytes).map_err(value)?;
+        let network = NetworkLagrangian::new(header.architecture.clone(), weights).map_err(value)?;
+        Ok(Self::learned(header, network))
+    }
+
+    /// The bytes of a model's file.
+    fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        let Kind::Model(header, network) = &self.kind else { return Err(value("a system has no model file")) };
+        let file = ModelFile { header: (**header).clone(), weights: network.weights().to_vec() };
+        Ok(PyBytes::new(py, &file.to_bytes().map_err(value)?))
+    }
+
+    /// Everything but numbers, as JSON.
+    fn facts(&self) -> String {
+        self.said().to_string()
+    }
+
+    /// All terms of states `(b, n)`, flat, and the rows that fail with what is wrong.
+    #[allow(clippy::type_complexity)]
+    fn terms<'py>(
+        &self,
+        py: Python<'py>,
+        q: PyReadonlyArray2<'py, f64>,
+        v: PyReadonlyArray2<'py, f64>,
+        threads: usize,
+    ) -> PyResult<(Vec<Numbers<'py>>, Vec<(usize, String)>)> {
+        let (q, v) = self.states(&q, &v)?;
+        let mut parts = py.detach(|| self.computed(q, v, Request::ALL, threads));
+        let mut failures = Vec::new();
+        let mut before = 0;
+        for (terms, states) in &parts {
+            failures.extend(terms.failures.iter().map(|e| (before + e.row().unwrap_or(0), e.to_string())));
+            before += states;
+        }
+        let n = self.n();
+        let mut taken = |width, take| field(py, &mut parts, width, take);
+        let found = vec![
+            taken(1, |t| &mut t.lagrangian),
+            taken(n, |t| &mut t.momentum),
+            taken(n, |t| &mut t.dl_dq),
+            taken(n * n, |t| &mut t.mass_matrix),
+            taken(n, |t| &mut t.momentum_drift),
+            taken(n, |t| &mut t.acceleration),
+            taken(1, |t| &mut t.energy),
+        ];
+        let (mut found, conserves) = (found, self.moving().conserves_energy());
+        if !conserves {
+            found.push(taken(n, |t| &mut t.force));
+            found.push(taken(1, |t| &mut t.dissipation));
+        }
+        Ok((found, failures))
+    }
+
+    /// One term of states `(b, n)`, flat.
+    fn term<'py>(
+        &self,
+        py: Python<'py>,
+        name: &str,
+        q: PyReadonlyArray2<'py, f64>,
+        v: PyReadonlyArray2<'py, f64>,
+        threads: usize,
+    ) -> PyResult<Numbers<'py>> {
+        let (q, v) = self.states(&q, &v)?;
+        let n = self.n();
+        let (request, width, take): (_, _, fn(&mut Terms<f64>) -> &mut Vec<f64>) = match name {
+            "lagrangian" => (Request::LAGRANGIAN, 1, |t| &mut t.lagrangian),
+            "momentum" => (Request::MOMENTUM, n, |t| &mut t.momentum),
+            "mass_matrix" => (Request::MASS_MATRIX, n * n, |t| &mut t.mass_matrix),
+            "energy" => (Request::ENERGY, 1, |t| &mut t.energy),
+            _ => (Request::ACCELERATION, n, |t| &mut t.acceleration),
+        };
+        let mut parts = py.detach(|| self.computed(q, v, request, threads));
+        Ok(field(py, &mut parts, width, take))
+    }
+
+    /// Motions from starts `(b, n)`.
+    #[allow(clippy::too_many_arguments)]
+    fn rollout<'py>(
+        &self,
+        py: Python<'py>,
+        q: PyReadonlyArray2<'py, f64>,
+        v: PyReadonlyArray2<'py, f64>,
+        times: (f64, f64, f64),
+        method: &str,
+        accuracy: (f64, f64, Option<f64>),
+        bounded: bool,
+        threads: usize,
+    ) -> PyResult<Bound<'py, PyList>> {
+        let (q, v) = self.states(&q, &v)?;
+        let n = self.n();
+        let ((t0, t_end, dt), (rtol, atol, step)) = (times, accuracy);
+        let method: Method = serde_json::from_value(method.into()).map_err(value)?;
+        let domain = match &self.kind {
+            Kind::Model(header, _) if bounded => Some(trained_on(header)),
+            _ => None,
+        };
+        let options = Options { t0, method, rtol, atol, step, domain, ..Options::new(t_end, dt) };
+        let starts: Vec<_> = q.chunks(n).zip(v.chunks(n)).map(|(q, v)| (q.to_vec(), v.to_vec())).collect();
+        let model = self.moving();
+        let (motions, interrupted) = attended(py, None, |watch| {
+            let motions = rollout_many(&Interruptible::new(model, &watch.interrupt), &starts, &options, threads);
+            (motions, watch.interrupt.load(Ordering::SeqCst))
+        })?;
+        if interrupted {
+            return Err(PyKeyboardInterrupt::new_err("interrupted"));
+        }
+        let told = PyList::empty(py);
+        for Rollout { trajectory, statistics, stop } in motions {
+            if let Some(error @ RolloutError::Invalid { .. }) = &stop {
+                return Err(value(error));
+            }
+            let energy = trajectory.energy.unwrap_or_default().into_pyarray(py);
+            let [t, q, v] = [trajectory.t, trajectory.q, trajectory.v].map(|numbers| numbers.into_pyarray(py));
+            told.append((t, q, v, energy, stop.map(|stop| stop.to_string()), statistics.evaluations))?;
+        }
+        Ok(told)
+    }
+
+    /// Metric, connection and curvature at points `(b, n)`: a dictionary of flat arrays of each, or what is wrong.
+    fn geometry<'py>(
+        &self,
+        py: Python<'py>,
+        points: PyReadonlyArray2<'py, f64>,
+        velocity: Vec<f64>,
+    ) -> PyResult<Vec<Bound<'py, PyAny>>> {
+        let points = slice(&points)?;
+        let model = self.moving();
+        let found = py.detach(|| geometries(model, points, &velocity)).map_err(value)?;
+        let told = found.into_iter().map(|geometry| match geometry {
+            Err(error) => Ok(error.to_string().into_pyobject(py)?.into_any()),
+            Ok(geometry) => {
+                let told = PyDict::new(py);
+                let (metric, curvature) = (geometry.metric, geometry.curvature);
+                told.set_item("signature", (metric.signature.positive, metric.signature.negative))?;
+                told.set_item("determinant", metric.determinant)?;
+                told.set_item("scalar", curvature.scalar)?;
+                told.set_item("kretschmann", curvature.kretschmann)?;
+                for (name, numbers) in [
+                    ("metric", metric.components),
+                    ("inverse", metric.inverse),
+                    ("christoffel", geometry.connection.symbols),
+                    ("riemann", curvature.riemann),
+                    ("ricci", curvature.ricci),
+                    ("einstein", curvature.einstein),
+                    ("weyl", curvature.weyl),
+                ] {
+                    told.set_item(name, numbers.into_pyarray(py))?;
+                }
+                Ok(told.into_any())
+            }
+        });
+        told.collect()
+    }
+
+    /// Point symmetries, as JSON.
+    fn symmetries(
+        &self,
+        py: Python<'_>,
+        region: Vec<(String, f64, f64)>,
+        degrees: Option<&str>,
+        points: Option<usize>,
+        seed: u64,
+        tolerance: Option<f64>,
+    ) -> PyResult<String> {
+        let (n, exact, units) = (self.n(), matches!(self.kind, Kind::System(..)), self.units());
+        let (mut position, mut velocity) = self.bounds();
+        let periodic = self.periodic();
+        if !exact {
+            // The middle of what the model knows.
+            position = position.into_iter().zip(&periodic).map(|(b, p)| if *p { b } else { middle(b) }).collect();
+            velocity = velocity.into_iter().map(middle).collect();
+        }
+        let (position, velocity) = self.region((position, velocity), region)?;
+        let charts: Vec<Chart> = (0..n).map(|i| Chart::of(periodic[i], &units[i], position[i])).collect();
+        let degrees: Option<Degrees> = degrees.map(|text| text.parse().map_err(value)).transpose()?;
+        let names = &self.columns[..n];
+        let tried = bases(names, &charts, degrees, exact);
+        let most = tried.iter().map(|(basis, _)| unknowns(n, basis.len())).max().unwrap_or(0);
+        let points = points.unwrap_or(enough(most, exact)).min(most_states(n, most));
+        let system = self.system_instance().ok();
+        let model = self.moving();
+        let (found, degrees) = py
+            .detach(|| {
+                let accept = |q: &[f64], v: &mut [f64]| {
+                    system.iter().all(|s| s.check_domain(q).is_ok() && s.impose_constraint(q, v).is_ok())
+                };
+                let (q, v) = Region { position, velocity }.states(points, seed, accept);
+                most_symmetries(model, tried, (&q, &v), (tolerance, exact))
+            })
+            .map_err(runtime)?;
+        let closed = found.algebra.as_ref().filter(|algebra| algebra.closes);
+        Ok(json!({
+            "count": found.separation.count,
+            "gap": found.separation.gap,
+            "name": closed.and_then(|algebra| algebra.name.clone()),
+            "fields": found.fields.iter().map(|field| field.text(&found.basis)).collect::<Vec<_>>(),
+            "gauge_functions": found.fields.iter().map(|field| field.gauge_text(&found.basis)).collect::<Vec<_>>(),
+            "structure_constants": closed.map_or(Vec::new(), |algebra| algebra.structure_constants.clone()),
+            "time_translation": model.conserves_energy(),
+            "singular_values": found.singular_values,
+            "basis": degrees.to_string(),
+            "points": found.states,
+        })
+        .to_string())
+    }
+
+    /// Where the mass matrix is proven to have its signature, as JSON.
+    #[allow(clippy::too_many_arguments)]
+    fn certify(
+        &self,
+        py: Python<'_>,
+        region: Vec<(String, f64, f64)>,
+        signature: Option<(usize, usize)>,
+        condition: Option<f64>,
+        seconds: f64,
+        boxes: usize,
+        threads: usize,
+    ) -> PyResult<String> {
+        let (mut position, velocity) = self.bounds();
+        if matches!(self.kind, Kind::Model(..)) {
+            for (bounds, _) in position.iter_mut().zip(self.periodic()).filter(|(_, periodic)| *periodic) {
+                *bounds = [0.0, TAU];
+            }
+        }
+        let (position, velocity) = self.region((position, velocity), region)?;
+        let pairs = |bounds: Vec<[f64; 2]>| bounds.into_iter().map(|[low, high]| (low, high)).collect();
+        let region = Bounds { positions: pairs(position), velocities: pairs(velocity) };
+        let usual = Signature::of(self.n(), self.time_like().is_some());
+        let signature = signature.map_or(usual, |(positive, negative)| Signature { positive, negative });
+        let found: Certificate = attended(py, None, |watch| {
+            let stop = Some(watch.interrupt.as_ref());
+            let options = certificate::Options {
+                condition,
+                seconds,
+                boxes,
+                threads,
+                stop,
+                ..certificate::Options::new(signature)
+            };
+            match &self.kind {
+                Kind::System(configured, _) => certify_system(configured, &region, &options),
+                Kind::Model(_, network) => certify_network(network, &region, &options),
+            }
+        })?
+        .map_err(value)?;
+        Ok(json!({
+            "signature": [signature.positive, signature.negative],
+            "certified": found.certified, "refuted": found.refuted, "open": found.open, "boxes": found.boxes,
+            "witness": found.witness.map(|w| json!({ "q": w.q, "v": w.v, "eigenvalues": w.eigenvalues })),
+            "condition": found.condition, "by_construction": found.by_construction,
+            "seconds": found.elapsed.as_secs_f64(),
+        })
+        .to_string())
+    }
+
+    /// The page of a model, HTML.
+    fn page(&self) -> PyResult<String> {
+        let Kind::Model(header, network) = &self.kind else { return Err(value("a system has no page")) };
+        page(header, network, self.system_instance().ok().as_ref()).map_err(value)
+    }
+
+    /// A model beside a system, the one that it learned if none is given, as JSON.
+    fn evaluate(
+        &self,
+        py: Python<'_>,
+        system: Option<&Self>,
+        plan: (usize, u64, usize),
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<String> {
+        let Kind::Model(header, network) = &self.kind else { return Err(value("a system is exact already")) };
+        let (starts, seed, threads) = plan;
+        let system = system.unwrap_or(self).system_instance()?;
+        if system.system.columns(system.coordinates) != self.columns {
+            return Err(value(format_args!("expected a system with the columns {:?}", self.columns)));
+        }
+        let options = EvaluationOptions::new(&system, trained_on(header), seed).map_err(pipeline)?;
+        let options = EvaluationOptions { starts, threads, ..options };
+        let found = attended(py, progress.as_ref(), |watch| evaluate(&system, network, options, &watch))?;
+        serde_json::to_string(&found.map_err(pipeline)?).map_err(runtime)
+    }
+}
+
+impl Subject {
+    /// Both arrays of states as slices.
+    fn states<'a>(
+        &self,
+        q: &'a PyReadonlyArray2<'_, f64>,
+        v: &'a PyReadonlyArray2<'_, f64>,
+    ) -> PyResult<(&'a [f64], &'a [f64])> {
+        use numpy::PyUntypedArrayMethods;
+        self.fits("q", q.shape()[1])?;
+        self.fits("v", v.shape()[1])?;
+        if q.shape() != v.shape() {
+            return Err(value(format_args!(
+                "expected as many velocities as coordinates, found {} and {}",
+                v.shape()[0],
+                q.shape()[0]
+            )));
+        }
+        Ok((slice(q)?, slice(v)?))
+    }
+}
+
+/// The numbers of an array, row by row.
+pub fn slice<'a>(array: &'a PyReadonlyArray2<'_, f64>) -> PyResult<&'a [f64]> {
+    array.as_slice().map_err(value)
+}

@@ -1,0 +1,162 @@
+"""Trainings and fits, as small as can be."""
+
+import os
+import signal
+import threading
+import time
+
+import numpy as np
+import pytest
+
+import lnn
+
+SMALL = {"hidden": [8], "epochs": 2, "threads": 1}
+STATES = {"data.training": 256, "data.validation": 64, "data.test": 64, "optimizer.batch": 32}
+
+
+def swing(amplitude, samples=400):
+    return amplitude * np.sin(0.06 * np.arange(samples))[:, None]
+
+
+def test_a_system_is_learned(tmp_path):
+    told = []
+    learned = lnn.train(
+        "harmonic-oscillator",
+        **{**SMALL, "epochs": 20},
+        starts=1,
+        config=STATES,
+        out=tmp_path / "run",
+        progress=lambda *event: told.append(event),
+    )
+    losses = learned.history["validation_loss"]
+    assert losses.shape == (20,) and losses[-1] < losses[0] and learned.stop is None
+    assert learned.summary["validation_loss"] == losses.min() and "loss" in learned.text
+    assert {kind for kind, *_ in told} >= {"step", "epoch"}
+    same = lnn.Model.load(tmp_path / "run")
+    assert same.to_bytes() == learned.model.to_bytes() and (tmp_path / "run/report.html").exists()
+    again = lnn.train("harmonic-oscillator", **{**SMALL, "epochs": 20, "threads": 2}, starts=1, config=STATES)
+    assert again.model.to_bytes() == learned.model.to_bytes()
+    other = lnn.train("harmonic-oscillator", **SMALL, seed=1, starts=1, config=STATES)
+    assert other.model.to_bytes() != learned.model.to_bytes()
+
+
+def test_a_system_of_ones_own_is_learned():
+    system = lnn.System(lagrangian="m*x_dot^2/2 - k*x^2/2", coordinates=["x"], parameters={"m": 1, "k": 4})
+    learned = lnn.train(system, structure="mechanical", **SMALL, starts=1, config=STATES)
+    assert learned.model.header["architecture"]["form"]["structure"] == "mechanical"
+    assert learned.model.header["description"]["parameters"]
+
+
+def test_constants_of_a_known_part_are_found():
+    kinetic = lnn.System(
+        "known",
+        lagrangian="m*q_dot^2/2 - k*q^2/2",
+        coordinates=["q"],
+        parameters={"m": 1, "k": {"default": 0.7, "range": "positive", "learn": True}},
+    )
+    learned = lnn.train("harmonic-oscillator", known=kinetic, **{**SMALL, "epochs": 30}, starts=1, config=STATES)
+    assert learned.model.constants["m"] == 1.0 and learned.model.constants["k"] != 0.7
+    assert lnn.Model.from_bytes(learned.model.to_bytes()).constants == learned.model.constants
+    with pytest.raises(ValueError, match="known"):
+        lnn.train("harmonic-oscillator", known=lnn.System("kepler"), **SMALL)
+
+
+def test_wrong_choices_are_refused():
+    for wrong in [
+        {"preset": "quickest"},
+        {"structure": "round"},
+        {"config": {"network.novelty": 1}},
+        {"config": {"phase.9.rate": 1}},
+        {"config": {"seed.x": 1}},
+        {"config": {"optimizer.batch": -1}},
+        {"hidden": []},
+        {"epochs": 0},
+    ]:
+        with pytest.raises(ValueError):
+            lnn.train("harmonic-oscillator", **{**SMALL, **wrong})
+
+
+def test_an_exception_of_the_receiver_ends_the_training():
+    def fail(*event):
+        raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        lnn.train("harmonic-oscillator", **{**SMALL, "epochs": 10_000}, config=STATES, progress=fail)
+
+
+def test_ctrl_c_ends_a_training_with_the_best_model():
+    def press():
+        time.sleep(1.0)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    pressing = threading.Thread(target=press)
+    pressing.start()
+    began = time.monotonic()
+    learned = lnn.train("harmonic-oscillator", **{**SMALL, "epochs": 1_000_000}, starts=1, config=STATES)
+    pressing.join()
+    assert learned.stop == "interrupted" and time.monotonic() - began < 30
+    assert 0 < len(learned.history["epoch"]) < 1_000_000 and np.isfinite(learned.model.acceleration([0.5], [0.0])).all()
+
+
+def test_states_are_learned():
+    rng = np.random.default_rng(0)
+    q, v = rng.uniform(0, 2 * np.pi, (600, 1)), rng.uniform(-3, 3, (600, 1))
+    learned = lnn.learn(q, v, -9.81 * np.sin(q), coordinates=["theta"], angles=["theta"], structure="mechanical", **SMALL)
+    assert learned.model.columns == ("theta", "theta_dot") and len(learned.history["epoch"]) == 2
+    assert np.isfinite(learned.summary["test_loss"])
+    for wrong in [(q[:, 0], v, q), (q[:10], v, q), (q, v, q[:10])]:
+        with pytest.raises(ValueError):
+            lnn.learn(*wrong)
+    with pytest.raises(ValueError):
+        lnn.learn(q[:2], v[:2], q[:2])
+    with pytest.raises(ValueError):
+        lnn.learn(np.full_like(q, np.nan), v, q)
+
+
+def test_recorded_motion_is_fitted():
+    tracks = [swing(0.3), swing(0.2, 300), swing(0.25)]
+    fitted = lnn.fit(tracks, coordinates=["angle"], angles=["angle"], dt=0.02, **SMALL)
+    assert fitted.model.columns == ("angle", "angle_dot") and "hold_out" in str(fitted.summary.keys())
+    times = [0.02 * np.arange(len(track)) for track in tracks]
+    again = lnn.fit(tracks, coordinates=["angle"], angles=["angle"], t=times, **SMALL)
+    assert again.model.to_bytes() == fitted.model.to_bytes()
+    assert lnn.fit(swing(0.3, 900), dt=0.02, friction=True, **SMALL).model.header["architecture"]["dissipation"] == 16
+
+
+def test_tables_and_files_are_fitted(tmp_path):
+    pandas = pytest.importorskip("pandas")
+    frames = [
+        pandas.DataFrame({"t": 0.02 * np.arange(400), "angle": swing(a)[:, 0], "run": run})
+        for run, a in enumerate([0.3, 0.2, 0.25])
+    ]
+    frame = pandas.concat(frames)
+    choices = {"coordinates": ["angle"], "angles": ["angle"], "trajectory": "run", **SMALL}
+    fitted = lnn.fit(frame, **choices)
+    frame.to_csv(tmp_path / "swing.csv", index=False)
+    of_file = lnn.fit(tmp_path / "swing.csv", **choices)
+    states = np.array([[0.1], [0.2]]), np.zeros((2, 1))
+    assert np.allclose(of_file.model.acceleration(*states), fitted.model.acceleration(*states), rtol=1e-6)
+    with pytest.raises(ValueError):
+        lnn.fit(tmp_path / "swing.csv", **{**choices, "coordinates": ["angel"], "angles": []})
+    with pytest.raises(OSError):
+        lnn.fit(tmp_path / "nothing.csv", **choices)
+
+
+@pytest.mark.parametrize(
+    "data, more",
+    [
+        (swing(0.3), {}),
+        (swing(0.3), {"dt": 0.0}),
+        ([swing(0.3), np.zeros((400, 2))], {"dt": 0.02}),
+        (swing(0.3), {"dt": 0.02, "angles": ["none"]}),
+        (np.full((400, 1), np.nan), {"dt": 0.02}),
+        (np.zeros((0, 1)), {"dt": 0.02}),
+        (np.zeros((2, 2, 2)), {"dt": 0.02}),
+        (swing(0.3), {"dt": 0.02, "v": swing(0.3)[:10]}),
+        (swing(0.3), {"dt": 0.02, "config": {"training.novelty": 1}}),
+        (swing(0.3), {"t": np.zeros(400)}),
+    ],
+)
+def test_motion_that_cannot_be_fitted_is_refused(data, more):
+    with pytest.raises(ValueError):
+        lnn.fit(data, **{**SMALL, **more})

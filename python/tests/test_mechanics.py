@@ -1,0 +1,266 @@
+"""Systems and models: terms, motion, geometry, symmetries, certificates; shapes, types, errors, pickles."""
+
+import json
+import multiprocessing
+import pickle
+import subprocess
+import sys
+import threading
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+
+import numpy as np
+import pytest
+
+import lnn
+
+SPRING = {"lagrangian": "m*x_dot^2/2 - k*x^2/2", "coordinates": ["x"], "parameters": {"m": 1, "k": 4}}
+PENDULUM = """
+name = "pendulum"
+lagrangian = "m*l^2*theta_dot^2/2 + m*g*l*cos(theta)"
+parameters = { m = 1, l = 2, g = 9.8 }
+[[coordinates]]
+name = "theta"
+unit = "rad"
+periodic = true
+velocity_bounds = [-10, 10]
+"""
+
+
+@pytest.fixture(scope="module")
+def arm():
+    return lnn.System("double-pendulum", m2=0.5)
+
+
+def test_systems_by_name_formula_and_file(arm, tmp_path):
+    assert {"double-pendulum", "kepler", "kerr-geodesic"} <= lnn.systems().keys()
+    assert arm.parameters["m2"] == 0.5 and arm.columns == ("theta1", "theta2", "theta1_dot", "theta2_dot")
+    assert arm.angles == ("theta1", "theta2") and arm.bounds["theta1_dot"] == (-10.0, 10.0)
+    spring = lnn.System(**SPRING)
+    assert spring.acceleration([0.5], [0.0]).tolist() == [-2.0]
+    pendulum = lnn.System.from_toml(PENDULUM, l=1.0)
+    assert pendulum.parameters["l"] == 1.0
+    assert np.allclose(pendulum.acceleration([0.5], [1.0]), -9.8 * np.sin(0.5), rtol=1e-15)
+    (tmp_path / "pendulum.toml").write_text(PENDULUM)
+    assert lnn.System.from_toml(tmp_path / "pendulum.toml").parameters["l"] == 2.0
+    chain = lnn.System("n-pendulum", n=4)
+    assert len(chain.coordinates) == 4
+
+
+def test_terms_have_the_shapes_of_the_states(arm):
+    rng = np.random.default_rng(0)
+    q, v = rng.normal(size=(2, 3, 5, 2))
+    terms = arm.terms(q, v)
+    assert terms.lagrangian.shape == (3, 5) and terms.mass_matrix.shape == (3, 5, 2, 2) and terms.failures == ()
+    one = arm.terms(q[1, 2], v[1, 2])
+    assert one.lagrangian.shape == () and np.array_equal(one.acceleration, terms.acceleration[1, 2])
+    assert np.array_equal(arm.acceleration(q, v), terms.acceleration)
+    assert np.array_equal(arm.mass_matrix(q, v), terms.mass_matrix)
+    assert np.allclose(arm.energy(q, v), np.sum(v * arm.momentum(q, v), -1) - arm.lagrangian(q, v))
+    left = np.einsum("...ij,...j->...i", terms.mass_matrix, terms.acceleration)
+    assert np.allclose(left, terms.dl_dq - terms.coriolis + terms.force)
+    many = rng.normal(size=(2, 10_000, 2))
+    assert np.array_equal(arm.acceleration(*many, threads=3), arm.acceleration(*many))
+    # A velocity for all states.
+    assert np.array_equal(arm.acceleration(q, v[0, 0]), arm.acceleration(q, np.broadcast_to(v[0, 0], q.shape)))
+
+
+def test_arrays_of_any_kind_are_taken(arm):
+    q, v = np.random.default_rng(1).normal(size=(2, 6, 2))
+    expected = arm.acceleration(q, v)
+    locked = q.copy()
+    locked.flags.writeable = False
+    wide = np.zeros((6, 4))
+    wide[:, ::2] = q
+    for other in [q.tolist(), np.asfortranarray(q), wide[:, ::2], locked, q[::-1][::-1], q.astype(">f8")]:
+        assert np.array_equal(arm.acceleration(other, v), expected)
+    assert np.allclose(arm.acceleration(q.astype(np.float32), v), expected, rtol=1e-4)
+    assert arm.acceleration([1, 2], [0, 0]).shape == (2,) and arm.acceleration([True, False], [0, 0]).shape == (2,)
+
+    class Other:
+        def __dlpack__(self, **options):
+            return q.__dlpack__(**options)
+
+        def __dlpack_device__(self):
+            return q.__dlpack_device__()
+
+    assert np.array_equal(arm.acceleration(Other(), v), expected)
+    assert arm.acceleration(np.empty((0, 2)), np.empty((0, 2))).shape == (0, 2)
+    assert arm.terms(np.empty((3, 0, 2)), np.empty((3, 0, 2))).mass_matrix.shape == (3, 0, 2, 2)
+    spring = lnn.System(**SPRING)
+    assert spring.acceleration(0.5, 0.0) == -2.0 and spring.terms(np.float64(0.5), 0).mass_matrix.shape == (1, 1)
+
+
+@pytest.mark.parametrize(
+    "q, v, error",
+    [
+        ([0.0], [0.0], ValueError),
+        (0.0, 0.0, ValueError),
+        ([[0.0, 1.0, 2.0]], [[0.0, 1.0, 2.0]], ValueError),
+        (np.zeros((3, 2)), np.zeros((4, 2)), ValueError),
+        ([1j, 0], [0, 0], TypeError),
+        (["a", "b"], [0, 0], TypeError),
+        (None, [0, 0], TypeError),
+        ([None, 1], [0, 0], TypeError),
+        (np.array(["2020-01-01"] * 2, "M8[D]"), [0, 0], TypeError),
+    ],
+)
+def test_arrays_that_are_no_states_are_refused(arm, q, v, error):
+    for call in (arm.terms, arm.acceleration, lambda q, v: arm.rollout(q, v, 1, 0.1), lambda q, v: arm.geometry(q)):
+        if call is not arm.terms and v != [0, 0] and isinstance(v, np.ndarray):
+            continue
+        with pytest.raises(error):
+            call(q, v)
+
+
+def test_what_is_not_finite_is_named_and_the_rest_is_right(arm):
+    q = np.array([[0.3, 0.1], [np.nan, 0.0], [0.2, np.inf]])
+    terms = arm.terms(q, np.zeros((3, 2)))
+    assert {row for row, _ in terms.failures} == {1, 2} and np.isnan(terms.acceleration[1:]).all()
+    assert np.array_equal(terms.acceleration[0], arm.acceleration([0.3, 0.1], [0, 0]))
+    flat = lnn.System(lagrangian="(x_dot + y_dot)^2", coordinates=["x", "y"])
+    terms = flat.terms([1.0, 2.0], [0.5, 0.5])
+    assert np.isnan(terms.acceleration).all() and "singular" in terms.failures[0][1]
+    assert np.array_equal(terms.mass_matrix, [[2, 2], [2, 2]])
+
+
+def test_mistakes_are_values_and_types():
+    for wrong in [
+        lambda: lnn.System("double-pendlum"),
+        lambda: lnn.System("double-pendulum", m3=1),
+        lambda: lnn.System("double-pendulum", m2=-1),
+        lambda: lnn.System(lagrangian="x_dot^2 +", coordinates=["x"]),
+        lambda: lnn.System(lagrangian="x_dot^2", coordinates=["x"], novelty=1),
+        lambda: lnn.System.from_toml("name = "),
+        lambda: lnn.Model.from_bytes(b"nothing"),
+        lambda: lnn.System("double-pendulum").rollout([0, 0], [0, 0], 1, -0.0),
+        lambda: lnn.System("double-pendulum").rollout([0, 0], [0, 0], 1, 0.1, method="euler"),
+        lambda: lnn.System("double-pendulum").certify(region={"thta1": (0, 1)}),
+        lambda: lnn.System("double-pendulum").acceleration([0, 0], [0, 0], threads=-1) and 1 / 0,
+    ][:-1]:
+        with pytest.raises(ValueError):
+            wrong()
+    with pytest.raises(TypeError):
+        lnn.System()
+    with pytest.raises(TypeError):
+        lnn.System("double-pendulum", m2=object())
+    with pytest.raises(OSError):
+        lnn.Model.load("no such file")
+
+
+def test_motion_keeps_its_energy(arm):
+    motion = arm.rollout([2.0, 1.0], [0.0, 0.0], 5.0, 0.1, method="gauss6", step=0.01)
+    assert motion.q.shape == (51, 2) and motion.complete and motion.t[-1] == 5.0
+    assert np.ptp(motion.energy) < 1e-7 * abs(motion.energy[0])
+    starts = np.array([[[2.0, 1.0], [0.5, 0.1]], [[0.2, 0.0], [1.0, 1.0]]])
+    batch = arm.rollout(starts, np.zeros_like(starts), 1.0, 0.1, threads=2)
+    assert batch.q.shape == (2, 2, 11, 2) and batch.energy.shape == (2, 2, 11) and batch.complete
+    alone = arm.rollout(starts[1, 0], [0, 0], 1.0, 0.1)
+    assert np.allclose(batch.q[1, 0], alone.q, atol=1e-12)
+
+
+def test_a_motion_that_stops_says_why():
+    polar = lnn.System("spring-pendulum")
+    motion = polar.rollout([[1.0, 0.3], [0.0, 0.3]], [[0.1, 0.2], [0.1, 0.2]], 1.0, 0.1)
+    assert motion.stop[0] is None and "t = 0" in motion.stop[1] and not motion.complete
+    assert not np.isnan(motion.q[0]).any() and np.isnan(motion.q[1, 1:]).all()
+
+
+def test_tables_of_motion(arm):
+    pytest.importorskip("pandas")
+    motion = arm.rollout([0.3, 0.1], [0.0, 0.0], 1.0, 0.5)
+    frame = motion.to_pandas()
+    assert list(frame.columns) == [*arm.columns, "energy"] and frame.loc[0.0, "theta1"] == 0.3
+    batch = arm.rollout([[0.3, 0.1]] * 3, [[0.0, 0.0]] * 3, 1.0, 0.5).to_pandas()
+    assert batch.shape == (9, 5) and batch.loc[(2, 0.0), "theta2"] == 0.1
+
+
+def test_geometry_symmetries_and_certificate(arm):
+    space = lnn.System("ads4-geodesic")
+    geometry = space.geometry([[0.0, 0.3, -0.2, 1.5], [0.0, 0.0, 0.0, 0.0]])
+    assert np.isclose(geometry.scalar[0], -12) and geometry.signature[0].tolist() == [3, 1]
+    assert geometry.riemann.shape == (2, 4, 4, 4, 4) and np.isclose(geometry.christoffel[0, 0, 0, 3], -1 / 1.5)
+    assert np.isnan(geometry.scalar[1]) and geometry.failures[0][0] == 1
+    sphere = lnn.System("sphere-geodesic").symmetries(seed=1)
+    assert sphere.count == 3 and sphere.name == "so(3)" and "d_phi" in sphere.fields
+    assert sphere.structure_constants.shape == (3, 3, 3) and sphere.time_translation
+    proof = arm.certify(region={"theta1_dot": (-1, 1)}, boxes=20_000, threads=1)
+    assert proof.certified == 1.0 and proof.signature == (2, 0)
+
+
+def test_models_are_files_and_pickles(shipped, tmp_path):
+    model = lnn.Model.load(shipped)
+    model.save(tmp_path / "copy.safetensors")
+    assert (tmp_path / "copy.safetensors").read_bytes() == shipped.read_bytes() == model.to_bytes()
+    states = np.random.default_rng(2).normal(size=(2, 7, 2))
+    for other in [pickle.loads(pickle.dumps(model)), lnn.Model.load(tmp_path / "copy.safetensors")]:
+        assert np.array_equal(other.acceleration(*states), model.acceleration(*states))
+    assert "double-pendulum" in repr(model) and model.header["system"] == "double-pendulum"
+    for system in [lnn.System("double-pendulum", m2="0.5"), lnn.System(**SPRING), lnn.System.from_toml(PENDULUM, l=3)]:
+        again = pickle.loads(pickle.dumps(system))
+        assert again.parameters == system.parameters and repr(again) == repr(system)
+    motion = model.rollout([0.3, 0.1], [0, 0], 1, 0.5)
+    again = pickle.loads(pickle.dumps(motion))
+    assert np.array_equal(again.q, motion.q) and again.columns == motion.columns
+
+
+def energy_of(model_and_start):
+    model, start = model_and_start
+    return float(model.rollout(start, [0.0, 0.0], 0.5, 0.1).energy[-1])
+
+
+@pytest.mark.parametrize("method", ["spawn", "fork"])
+def test_models_work_in_other_processes(shipped, method):
+    model = lnn.Model.load(shipped)
+    model.acceleration([0.1, 0.2], [0.0, 0.0])
+    tasks = [(model, [0.1 * k, 0.2]) for k in range(3)]
+    with ProcessPoolExecutor(2, mp_context=multiprocessing.get_context(method)) as pool:
+        assert list(pool.map(energy_of, tasks)) == [energy_of(task) for task in tasks]
+
+
+def test_models_work_in_threads_and_let_others_run(shipped):
+    model = lnn.Model.load(shipped)
+    states = np.random.default_rng(3).normal(size=(2, 20_000, 2))
+    expected = model.acceleration(*states)
+    counted, stop = [0], threading.Event()
+
+    def count():
+        while not stop.is_set():
+            counted[0] += 1
+
+    counter = threading.Thread(target=count)
+    counter.start()
+    with ThreadPoolExecutor(3) as pool:
+        found = list(pool.map(lambda _: model.acceleration(*states), range(3)))
+    stop.set()
+    counter.join()
+    assert all(np.array_equal(a, expected) for a in found) and counted[0] > 1000
+
+
+def test_the_package_is_imported_without_what_it_does_not_need():
+    code = "import lnn, sys; print([m for m in ('numpy', 'jax', 'torch', 'pandas', 'sklearn', 'lnn._lnn') if m in sys.modules])"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout.strip() == "[]"
+    assert set(dir(lnn)) >= set(lnn.__all__)
+    with pytest.raises(AttributeError):
+        lnn.nothing
+
+
+def test_a_model_is_judged(shipped):
+    judged = lnn.Model.load(shipped).evaluate(starts=1, threads=2)
+    assert judged["wrong_signature"] == 0.0 and len(judged["accelerations"]) == 2
+    json.dumps(judged)
+    with pytest.raises(ValueError):
+        lnn.Model.load(shipped).evaluate(lnn.System("kepler"))
+
+
+def test_stubs_have_what_the_extension_has():
+    import ast
+    from pathlib import Path
+
+    from lnn import _lnn
+
+    tree = ast.parse((Path(lnn.__file__).parent / "_lnn.pyi").read_text())
+    functions = {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
+    (subject,) = (node for node in tree.body if isinstance(node, ast.ClassDef))
+    methods = {node.name for node in subject.body if isinstance(node, ast.FunctionDef)}
+    public = lambda thing: {name for name in dir(thing) if not name.startswith("_")}
+    assert functions | {"Subject"} == public(_lnn) and methods == public(_lnn.Subject)

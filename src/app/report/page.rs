@@ -1,0 +1,142 @@
+//! A model as a page to play with: one HTML file that holds its recorded functions and its weights, and the JavaScript that evaluates them.
+
+use super::base64::base64;
+use super::escape::escape;
+use crate::lagrangian::system::Bounds;
+use crate::lagrangian::{Lagrangian, LagrangianVisitor, SystemInstance};
+use crate::network::NetworkLagrangian;
+use crate::network::file::Header;
+use crate::tape::{Listing, Operation, TapeError};
+use serde_json::{Value, json};
+use thiserror::Error;
+
+const PAGE: &str = include_str!("page/page.html");
+const STYLE: &str = include_str!("page/play.css");
+const ENGINE: &str = include_str!("page/engine.js");
+const PLAY: &str = include_str!("page/play.js");
+
+/// Largest page, in bytes.
+const MOST_BYTES: usize = 500_000;
+/// Seconds in which the longest motion of interest of a system without seconds is played.
+const SECONDS: f64 = 20.0;
+
+/// Why a model has no page.
+#[derive(Debug, Error)]
+pub enum PageError {
+    /// Functions that cannot be written as a list of operations.
+    #[error(transparent)]
+    Tape(#[from] TapeError),
+    /// More weights than a page holds.
+    #[error("the page would have {found} bytes, {MOST_BYTES} at most are written: a smaller network has a page")]
+    Large {
+        /// Bytes.
+        found: usize,
+    },
+}
+
+/// The page of a model, beside the system that it learned if that is known.
+///
+/// # Errors
+/// [`PageError`].
+pub fn page(
+    header: &Header,
+    network: &NetworkLagrangian<f64>,
+    system: Option<&SystemInstance<f64>>,
+) -> Result<String, PageError> {
+    let (architecture, n, weights) = (network.architecture(), header.columns.len() / 2, network.weights());
+    let lagrangian =
+        Listing::record::<f64, _>(2 * n, weights.len(), |x, p| architecture.lagrangian(p, &x[..n], &x[n..]))?;
+    let dissipation = match architecture.dissipation {
+        None => Value::Null,
+        Some(_) => operations(&Listing::record::<f64, _>(2 * n, weights.len(), |x, p| {
+            architecture.rayleigh_dissipation(p, &x[..n], &x[n..])
+        })?),
+    };
+    let single: Vec<u8> = weights.iter().flat_map(|weight| (*weight as f32).to_le_bytes()).collect();
+    let exact = system.map(exact).transpose()?.flatten();
+    let units = system.map_or_else(
+        || vec![String::new(); n],
+        |system| system.system.coordinates(n).into_iter().map(|c| c.unit.into_owned()).collect(),
+    );
+    let time_unit = system.map_or("s", |system| &system.system.time_unit);
+    let t_end = system.map_or(SECONDS, |system| system.system.trajectory(n).t_end);
+    let rate = if time_unit == "s" { 1.0 } else { t_end / SECONDS };
+    let title = system.map_or(header.system.as_str(), |system| &system.system.title);
+    let data = json!({
+        "columns": header.columns,
+        "units": units,
+        "periodic": architecture.periodic,
+        "time_like": architecture.time_like.or(system.and_then(|system| system.system.time_like)),
+        "time_unit": time_unit,
+        "span": t_end.min(SECONDS * rate),
+        "rate": rate,
+        "start": start(header, system),
+        "ranges": { "position": header.position, "velocity": header.velocity },
+        "learned": {
+            "lagrangian": operations(&lagrangian), "dissipation": dissipation, "weights": base64(&single),
+        },
+        "exact": exact,
+    });
+    let known = if data["exact"].is_null() { "." } else { ", <b class=\"exact\">exact</b>." };
+    // Nothing inside of the data may end the element that holds it.
+    let data = data.to_string().replace('<', "\\u003c");
+    let text = PAGE.replace("{TITLE}", &escape(&format!("{title}: learned")));
+    let text = text.replace("{STYLE}", STYLE).replace("{EXACT}", known).replace("{ENGINE}", ENGINE);
+    let text = text.replace("{PLAY}", PLAY).replace("{DATA}", &data);
+    if text.len() > MOST_BYTES {
+        return Err(PageError::Large { found: text.len() });
+    }
+    Ok(text)
+}
+
+/// The exact Lagrangian with its parameters; none of a system that has no Lagrangian to be shown.
+fn exact(system: &SystemInstance<f64>) -> Result<Option<Value>, TapeError> {
+    struct List {
+        n: usize,
+        parameters: usize,
+    }
+    impl LagrangianVisitor for List {
+        type Output = Result<Listing, TapeError>;
+        fn visit<L: Lagrangian>(self, lagrangian: &L) -> Self::Output {
+            let Self { n, parameters } = self;
+            Listing::record::<f64, _>(2 * n, parameters, |x, p| lagrangian.lagrangian(p, &x[..n], &x[n..]))
+        }
+    }
+    let list = List { n: system.coordinates, parameters: system.parameters.len() };
+    let Some(listing) = system.visit(list).transpose()? else { return Ok(None) };
+    let named = system.system.parameters.iter().zip(&system.parameters);
+    let parameters: Vec<Value> =
+        named.map(|(p, value)| json!({ "symbol": p.symbol, "unit": p.unit, "value": value })).collect();
+    Ok(Some(json!({ "lagrangian": operations(&listing), "parameters": parameters })))
+}
+
+/// A start within what the model knows, of a system among those of its trajectory test and on its mass shell.
+fn start(header: &Header, system: Option<&SystemInstance<f64>>) -> Value {
+    let at = |share: f64| move |&(low, high): &(f64, f64)| low + share * (high - low);
+    let pairs = |ranges: &[[f64; 2]]| ranges.iter().map(|&[low, high]| (low, high)).collect();
+    let Bounds { positions, velocities } = match system {
+        Some(system) => system.system.trajectory(system.coordinates).start,
+        None => Bounds { positions: pairs(&header.position), velocities: pairs(&header.velocity) },
+    };
+    let q: Vec<f64> = positions.iter().map(at(0.3)).collect();
+    let mut v: Vec<f64> = velocities.iter().map(at(0.5)).collect();
+    if let Some(system) = system {
+        // Off the shell there is a motion as well.
+        let _ = system.impose_constraint(&q, &mut v);
+    }
+    json!({ "q": q, "v": v })
+}
+
+/// The operations as JSON: kind or name, then operands.
+fn operations(listing: &Listing) -> Value {
+    let one = |operation: &Operation| match operation {
+        Operation::Input(index) => json!(["i", index]),
+        Operation::Parameter(index) => json!(["p", index]),
+        Operation::Constant(value) => json!(["c", value]),
+        Operation::Function(name, operands) => {
+            [json!(name)].into_iter().chain(operands.iter().map(|row| json!(row))).collect()
+        }
+        Operation::Dense(inputs, outputs, weights, bias) => json!(["d", inputs, outputs, weights, bias]),
+    };
+    json!({ "operations": listing.operations.iter().map(one).collect::<Vec<_>>(), "result": listing.result })
+}
