@@ -160,7 +160,7 @@ fn make(
             if experiment.reads_holes() {
                 read_hole(run, &trained.network, (scale, threads), output, &watch)?;
             }
-            trained.record
+            trained.record(system.system.trajectory(system.coordinates).t_end * span)
         }
         Err(PipelineError::Training(error @ TrainingError::NothingLearned(_))) => Record {
             outcome: Outcome::Nothing { reason: error.to_string() },

@@ -35,12 +35,15 @@ pub struct FitReport {
     pub history: Vec<Epoch>,
     /// Predictions of motion that was held out.
     pub hold_out: HoldOut,
-    /// Text of `summary.json`.
-    pub json: String,
-    pub(crate) text: String,
+    json: String,
+    text: String,
 }
 
 impl FitReport {
+    /// Text of `summary.json`.
+    pub fn json(&self) -> &str {
+        &self.json
+    }
     /// Headline and tables for a terminal.
     pub fn text(&self) -> &str {
         &self.text

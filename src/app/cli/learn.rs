@@ -1,0 +1,100 @@
+//! What `lnn train` and `lnn fit` do around their learning: a directory, checkpoints, the result on standard output, the end.
+
+use crate::cli::folder::Folder;
+use crate::cli::learned::model_file;
+use crate::cli::number::threads;
+use crate::cli::place::{self, Wanted};
+use crate::cli::results::Writer;
+use crate::cli::resume::{forget, how_to_go_on, keeping};
+use crate::cli::run_args::RunArgs;
+use crate::cli::watch::watch;
+use crate::cli::{CliError, interrupt, output};
+use crate::configuration::Config;
+use crate::data::SamplingError;
+use crate::names::counted;
+use crate::pipeline::{Begin, Checkpoints, PipelineError, RunOptions, Watch};
+use crate::shooting::ShootingError;
+use crate::training::{StopReason, TrainingError};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::Ordering;
+
+/// A result, as the command prints it.
+pub struct Learned {
+    /// Text of `summary.json`.
+    pub json: String,
+    /// Headline and tables.
+    pub text: String,
+    /// Reason for which learning ended.
+    pub stop: StopReason,
+    /// Epochs that were run.
+    pub epochs: usize,
+}
+
+/// Opens the directory of a run that begins; `inputs` are the files that it reads beside the model it starts from.
+///
+/// # Errors
+/// As of [`place::open`].
+pub fn open<'a>(args: &RunArgs, config: &Config, inputs: impl Iterator<Item = &'a Path>) -> Result<Folder, CliError> {
+    let usual = PathBuf::from("runs").join(&config.system);
+    let start = config.from.as_deref().map(|from| model_file(Path::new(from))).transpose()?;
+    let inputs: Vec<&Path> = inputs.chain(start.as_deref()).collect();
+    let (out, overwrite, writer) = (args.out.as_deref(), args.overwrite, Writer::Learner);
+    place::open(&Wanted { out, usual: &usual, overwrite, inputs: &inputs, writer })
+}
+
+/// Learns in a directory, prints the result, and says how it ended; `identity` is kept in the checkpoints instead of the configuration.
+///
+/// # Errors
+/// An interruption, after which the best model so far is written, if there is one; a data error for a training that fails.
+pub fn learn(
+    args: &RunArgs,
+    folder: &Folder,
+    begin: Begin,
+    identity: Option<String>,
+    learn: impl FnOnce(&RunOptions, &Watch) -> Result<Learned, PipelineError>,
+) -> Result<(), CliError> {
+    let stop = interrupt::flag().map_err(CliError::signals)?;
+    let checkpoints = Checkpoints::new(folder.path(), args.checkpoint_every).beginning(begin);
+    let checkpoints = Some(match identity {
+        Some(identity) => checkpoints.identified_by(identity),
+        None => checkpoints,
+    });
+    let options = RunOptions { threads: threads(args.threads), checkpoints, ..RunOptions::default() };
+    let on = || how_to_go_on(folder.path());
+    let Learned { json, text, stop, epochs } = match learn(&options, &watch(&stop)) {
+        Ok(learned) => learned,
+        Err(error) if is_empty(&error) && stop.load(Ordering::SeqCst) => {
+            return Err(CliError::interrupted(format_args!("interrupted before the first epoch ended{}", on())));
+        }
+        // There is no model, and nothing to go on from.
+        Err(error @ (PipelineError::Training(_) | PipelineError::Shooting(_))) if is_empty(&error) => {
+            forget(folder.path())?;
+            return Err(error.into());
+        }
+        Err(error) => return Err(keeping(folder.path())(error.into())),
+    };
+    if stop != StopReason::Interrupted {
+        forget(folder.path())?;
+    }
+    if args.json {
+        output::print(&json)?;
+    } else {
+        output::print(&format!("{text}report: {}\n", folder.file("report.html").display()))?;
+    }
+    let kept = format!("the best of {} is in {}", counted(epochs, "epoch", "epochs"), folder.path().display());
+    match stop {
+        StopReason::Finished => Ok(()),
+        StopReason::Interrupted => Err(CliError::interrupted(format_args!("interrupted, {kept}{}", on()))),
+        StopReason::Failed(error) => Err(CliError::data(format_args!("training stopped: {error}; {kept}"))),
+    }
+}
+
+/// `true` if learning ended before there was a model.
+fn is_empty(error: &PipelineError) -> bool {
+    matches!(
+        error,
+        PipelineError::Sampling(SamplingError::Interrupted)
+            | PipelineError::Training(TrainingError::NothingLearned(_))
+            | PipelineError::Shooting(ShootingError::Training(TrainingError::NothingLearned(_)))
+    )
+}
