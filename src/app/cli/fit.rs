@@ -4,7 +4,7 @@ use crate::cli::fit_config::{Args, Plan, Saved};
 use crate::cli::learn::{Learned, learn, open};
 use crate::cli::print_config::{PrintFormat, commented, fit_reference, training_reference};
 use crate::cli::recording_args::read;
-use crate::cli::resume::{Learner, reopen};
+use crate::cli::resume::{Learner, Text, reopen};
 use crate::cli::{CliError, output};
 use crate::pipeline::{Begin, FitConfig, PipelineError, PreparedFit, fit};
 use std::time::Instant;
@@ -22,7 +22,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let (plan, resumed) = match &args.run.resume {
         None => (Plan::new(args, None)?, None),
         Some(path) => {
-            let read = |text| Plan::new(args, Some(Saved::read(path, text)?));
+            let read = |text: Text<'_>| Plan::new(args, Some(Saved::read(path, text)?));
             let Some((folder, plan)) = reopen(path, Learner::Fit, args.run.json, read)? else { return Ok(()) };
             (plan, Some(folder))
         }
@@ -50,7 +50,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     }
     let (folder, begin) = match resumed {
         Some(folder) => (folder, Begin::Resume),
-        None => (open(&args.run, &config.training, args.inputs())?, Begin::Anew),
+        None => (open(&args.run, &config.training, &args.inputs())?, Begin::Anew),
     };
     let identity = plan.identity(&config)?;
     learn(&args.run, &folder, begin, Some(identity), |options, watch| {

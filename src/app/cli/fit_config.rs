@@ -39,8 +39,8 @@ fn unless_known(argument: clap::Arg) -> clap::Arg {
 
 impl Args {
     /// Files that are read.
-    pub fn inputs(&self) -> impl Iterator<Item = &Path> {
-        self.recording.data.iter().chain(&self.run.config).map(PathBuf::as_path)
+    pub fn inputs(&self) -> Vec<&Path> {
+        self.recording.data.iter().chain(&self.run.config).map(PathBuf::as_path).collect()
     }
 }
 
@@ -95,7 +95,11 @@ impl Saved {
     fn files(&self) -> Vec<String> {
         let here = std::env::current_dir().is_ok_and(|here| here == self.directory);
         let found = |file: &String| {
-            if here || is_standard(Path::new(file)) { file.clone() } else { self.directory.join(file).display().to_string() }
+            if here || is_standard(Path::new(file)) {
+                file.clone()
+            } else {
+                self.directory.join(file).display().to_string()
+            }
         };
         self.fit.recording.files.iter().map(found).collect()
     }

@@ -34,10 +34,10 @@ pub struct Learned {
 ///
 /// # Errors
 /// As of [`place::open`].
-pub fn open<'a>(args: &RunArgs, config: &Config, inputs: impl Iterator<Item = &'a Path>) -> Result<Folder, CliError> {
+pub fn open(args: &RunArgs, config: &Config, inputs: &[&Path]) -> Result<Folder, CliError> {
     let usual = PathBuf::from("runs").join(&config.system);
     let start = config.from.as_deref().map(|from| model_file(Path::new(from))).transpose()?;
-    let inputs: Vec<&Path> = inputs.chain(start.as_deref()).collect();
+    let inputs: Vec<&Path> = inputs.iter().copied().chain(start.as_deref()).collect();
     let (out, overwrite, writer) = (args.out.as_deref(), args.overwrite, Writer::Learner);
     place::open(&Wanted { out, usual: &usual, overwrite, inputs: &inputs, writer })
 }

@@ -23,7 +23,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let (config, system, folder, begin) = match &args.run.resume {
         None => {
             let (config, system) = args.resolve(None)?;
-            let folder = open(&args.run, &config, args.inputs())?;
+            let folder = open(&args.run, &config, &args.inputs())?;
             (config, system, folder, Begin::Anew)
         }
         Some(path) => {
