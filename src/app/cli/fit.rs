@@ -1,7 +1,7 @@
 //! `lnn fit`: learns from recorded motion, judges by motion that was held out, writes.
 
 use crate::cli::fit_config::{Args, Plan, Saved};
-use crate::cli::learn::{Learned, learn, open};
+use crate::cli::learn::{Learned, Session, open};
 use crate::cli::print_config::{PrintFormat, commented, fit_reference, training_reference};
 use crate::cli::recording_args::read;
 use crate::cli::resume::{Learner, Text, reopen};
@@ -53,9 +53,10 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         None => (open(&args.run, &config.training, &args.inputs())?, Begin::Anew),
     };
     let identity = plan.identity(&config)?;
-    learn(&args.run, &folder, begin, Some(identity), |options, watch| {
-        let report = fit(&prepared, &config, options, &folder, watch)?;
+    let session = Session::new(&args.run, folder, begin, Some(identity))?;
+    let report = fit(&prepared, &config, &session.options, &session.folder, &session.watch());
+    session.conclude(report.map(|report| {
         let (json, text, epochs) = (report.json().to_string(), format!("{}\n", report.text()), report.history.len());
-        Ok(Learned { json, text, stop: report.stop, epochs })
-    })
+        Learned { json, text, stop: report.stop, epochs }
+    }))
 }

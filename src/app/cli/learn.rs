@@ -16,7 +16,8 @@ use crate::pipeline::{Begin, Checkpoints, PipelineError, RunOptions, Watch};
 use crate::shooting::ShootingError;
 use crate::training::{StopReason, TrainingError};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::Ordering;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// A result, as the command prints it.
 pub struct Learned {
@@ -42,50 +43,69 @@ pub fn open(args: &RunArgs, config: &Config, inputs: &[&Path]) -> Result<Folder,
     place::open(&Wanted { out, usual: &usual, overwrite, inputs: &inputs, writer })
 }
 
-/// Learns in a directory, prints the result, and says how it ended; `identity` is kept in the checkpoints instead of the configuration.
-///
-/// # Errors
-/// An interruption, after which the best model so far is written, if there is one; a data error for a training that fails.
-pub fn learn(
-    args: &RunArgs,
-    folder: &Folder,
-    begin: Begin,
-    identity: Option<String>,
-    learn: impl FnOnce(&RunOptions, &Watch) -> Result<Learned, PipelineError>,
-) -> Result<(), CliError> {
-    let stop = interrupt::flag().map_err(CliError::signals)?;
-    let checkpoints = Checkpoints::new(folder.path(), args.checkpoint_every).beginning(begin);
-    let checkpoints = Some(match identity {
-        Some(identity) => checkpoints.identified_by(identity),
-        None => checkpoints,
-    });
-    let options = RunOptions { threads: threads(args.threads), checkpoints, ..RunOptions::default() };
-    let on = || how_to_go_on(folder.path());
-    let Learned { json, text, stop, epochs } = match learn(&options, &watch(&stop)) {
-        Ok(learned) => learned,
-        Err(error) if is_empty(&error) && stop.load(Ordering::SeqCst) => {
-            return Err(CliError::interrupted(format_args!("interrupted before the first epoch ended{}", on())));
-        }
-        // There is no model, and nothing to go on from.
-        Err(error @ (PipelineError::Training(_) | PipelineError::Shooting(_))) if is_empty(&error) => {
-            forget(folder.path())?;
-            return Err(error.into());
-        }
-        Err(error) => return Err(keeping(folder.path())(error.into())),
-    };
-    if stop != StopReason::Interrupted {
-        forget(folder.path())?;
+/// A run that learns in a directory.
+pub struct Session<'a> {
+    args: &'a RunArgs,
+    stop: Arc<AtomicBool>,
+    /// The directory.
+    pub folder: Folder,
+    /// Threads and checkpoints.
+    pub options: RunOptions,
+}
+
+impl<'a> Session<'a> {
+    /// Watches for signals and keeps checkpoints, with `identity` in them instead of the configuration.
+    ///
+    /// # Errors
+    /// Signals that cannot be watched for.
+    pub fn new(args: &'a RunArgs, folder: Folder, begin: Begin, identity: Option<String>) -> Result<Self, CliError> {
+        let stop = interrupt::flag().map_err(CliError::signals)?;
+        let checkpoints = Checkpoints::new(folder.path(), args.checkpoint_every).beginning(begin);
+        let checkpoints = Some(match identity {
+            Some(identity) => checkpoints.identified_by(identity),
+            None => checkpoints,
+        });
+        let options = RunOptions { threads: threads(args.threads), checkpoints, ..RunOptions::default() };
+        Ok(Self { args, stop, folder, options })
     }
-    if args.json {
-        output::print(&json)?;
-    } else {
-        output::print(&format!("{text}report: {}\n", folder.file("report.html").display()))?;
+
+    /// Receiver of progress, with the flag of the signals.
+    pub fn watch(&self) -> Watch {
+        watch(&self.stop)
     }
-    let kept = format!("the best of {} is in {}", counted(epochs, "epoch", "epochs"), folder.path().display());
-    match stop {
-        StopReason::Finished => Ok(()),
-        StopReason::Interrupted => Err(CliError::interrupted(format_args!("interrupted, {kept}{}", on()))),
-        StopReason::Failed(error) => Err(CliError::data(format_args!("training stopped: {error}; {kept}"))),
+
+    /// Prints what was learned, removes the checkpoints of a run that is over, and says how it ended.
+    ///
+    /// # Errors
+    /// An interruption, after which the best model so far is written, if there is one; a data error for a training that failed.
+    pub fn conclude(self, learned: Result<Learned, PipelineError>) -> Result<(), CliError> {
+        let path = self.folder.path();
+        let Learned { json, text, stop, epochs } = match learned {
+            Ok(learned) => learned,
+            Err(error) if is_empty(&error) && self.stop.load(Ordering::SeqCst) => {
+                let on = how_to_go_on(path);
+                return Err(CliError::interrupted(format_args!("interrupted before the first epoch ended{on}")));
+            }
+            // There is no model, and nothing to go on from.
+            Err(error) if is_empty(&error) => return Err(forget(path).err().unwrap_or_else(|| error.into())),
+            Err(error) => return Err(keeping(path)(error.into())),
+        };
+        if stop != StopReason::Interrupted {
+            forget(path)?;
+        }
+        if self.args.json {
+            output::print(&json)?;
+        } else {
+            output::print(&format!("{text}report: {}\n", self.folder.file("report.html").display()))?;
+        }
+        let kept = format!("the best of {} is in {}", counted(epochs, "epoch", "epochs"), path.display());
+        match stop {
+            StopReason::Finished => Ok(()),
+            StopReason::Interrupted => {
+                Err(CliError::interrupted(format_args!("interrupted, {kept}{}", how_to_go_on(path))))
+            }
+            StopReason::Failed(error) => Err(CliError::data(format_args!("training stopped: {error}; {kept}"))),
+        }
     }
 }
 

@@ -1,6 +1,6 @@
 //! `lnn train`: learns, judges, writes.
 
-use crate::cli::learn::{Learned, learn, open};
+use crate::cli::learn::{Learned, Session, open};
 use crate::cli::resume::{Learner, Text, parse, reopen, require_same};
 use crate::cli::train_config::Args;
 use crate::cli::{CliError, output};
@@ -46,11 +46,12 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         let share = percent(share);
         output::note(&format!("the penalty is against g_{time}{time} > 0, which {share} of the states have, {place}"));
     }
-    learn(&args.run, &folder, begin, None, |options, watch| {
-        let report = train(&config, &system, options, &folder, watch)?;
+    let session = Session::new(&args.run, folder, begin, None)?;
+    let report = train(&config, &system, &session.options, &session.folder, &session.watch());
+    session.conclude(report.and_then(|report| {
         let (json, text, epochs) = (report.json()?, report.text(), report.history.len());
         Ok(Learned { json, text, stop: report.stop, epochs })
-    })
+    }))
 }
 
 /// States that are looked at for a remark on the penalty.

@@ -136,7 +136,6 @@ fn make(
     output.remove(RECORD)?;
     output.remove(READINGS)?;
     let system = run.config.system()?;
-    run.config.validate(system.coordinates)?;
     let (starts, span) = scale.trajectories();
     let began = Instant::now();
     // A run that was stopped goes on from its checkpoint.

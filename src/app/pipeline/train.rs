@@ -189,18 +189,6 @@ pub fn train(
     }
 }
 
-/// The network's shape, and the weights of the model that the training starts from, if it does: then the scales are the
-/// model's.
-fn begin_shape<S: Scalar>(
-    config: &Config,
-    system: &SystemInstance<f64>,
-    scale: Vec<f64>,
-) -> Result<(Architecture, Option<Vec<S>>), PipelineError> {
-    let Some(from) = &config.from else { return Ok((config.architecture(system, scale)?, None)) };
-    let (weights, architecture) = start::weights(from, |scale| config.architecture(system, scale))?;
-    Ok((architecture, Some(weights)))
-}
-
 fn train_in<S: Scalar>(
     config: &Config,
     system: &SystemInstance<f64>,
@@ -209,11 +197,15 @@ fn train_in<S: Scalar>(
     watch: &Watch,
 ) -> Result<TrainReport, PipelineError> {
     let started = Instant::now();
-    let unscaled = config.architecture(system, vec![1.0; system.coordinates])?;
-    memory::require("training", training_memory(config, &unscaled))?;
+    let shape = config.architecture(system, vec![1.0; system.coordinates])?;
+    memory::require("training", training_memory(config, &shape))?;
     let (data, scale) = sample_all_until::<S>(config, system, &watch.interrupt)?;
     let penalty = config.penalty()?;
-    let (architecture, before) = begin_shape::<S>(config, system, scale)?;
+    let shaped = |scale| Architecture { scale: config.network.scaling.of(scale), ..shape };
+    let (architecture, before) = match &config.from {
+        Some(from) => start::weights(from, shaped).map(|(weights, shape)| (shape, Some(weights)))?,
+        None => (shaped(scale), None),
+    };
     let imposed = imposed_velocities(system, &data);
     let fresh = data.test.cast::<f64>();
     let fresh = (fresh.q().to_vec(), fresh.v().to_vec());
