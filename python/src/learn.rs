@@ -134,7 +134,8 @@ pub fn train(
     })?
     .map_err(pipeline)?;
     let (text, told, stop) = (report.text(), history(&report.history)?, ended(&report.stop));
-    Ok((Subject::learned(report.header, report.network), told, report.json, text, stop))
+    let json = report.json().map_err(pipeline)?;
+    Ok((Subject::learned(report.header, report.network), told, json, text, stop))
 }
 
 /// Choices of [`learn`] and [`fit`], as JSON.
@@ -232,7 +233,8 @@ pub fn fit(
     }
     let report = report.map_err(pipeline)?;
     let (text, told, stop) = (report.text().to_string(), history(&report.history)?, ended(&report.stop));
-    Ok((Subject::learned(report.header, report.network), told, report.json, text, stop))
+    let json = report.json().to_string();
+    Ok((Subject::learned(report.header, report.network), told, json, text, stop))
 }
 
 /// Origin of recorded motion.

@@ -2,15 +2,19 @@
 
 use crate::cli::CliError;
 use crate::cli::flags::Flags;
+use crate::cli::input::is_standard;
 use crate::cli::layers::{Entry, Layers, Mistake};
 use crate::cli::plain_name::plain_name;
 use crate::cli::recording_args::RecordingArgs;
+use crate::cli::resume::{Text, parse, require_same};
 use crate::cli::run_args::{RunArgs, fill_periods, imply, structure};
 use crate::configuration::{Config, Data, Regularizer};
 use crate::network::{Initialization, Structure};
 use crate::pipeline::{FitColumns, FitConfig, FitOptions, PreparedFit, StartModel, shorten};
 use crate::recording::Targets;
 use crate::shooting::Shooting;
+use crate::training::LATEST;
+use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
 /// Arguments.
@@ -35,8 +39,8 @@ fn unless_known(argument: clap::Arg) -> clap::Arg {
 
 impl Args {
     /// Files that are read.
-    pub fn inputs(&self) -> impl Iterator<Item = &Path> {
-        self.recording.data.iter().chain(&self.run.config).map(PathBuf::as_path)
+    pub fn inputs(&self) -> Vec<&Path> {
+        self.recording.data.iter().chain(&self.run.config).map(PathBuf::as_path).collect()
     }
 }
 
@@ -55,14 +59,59 @@ pub struct Plan<'a> {
     /// The configuration, as far as it is known without the data.
     pub config: FitConfig,
     layers: Layers,
+    /// The fit that goes on.
+    saved: Option<Saved>,
+}
+
+/// A fit that goes on: its configuration, and the directory in which it was started.
+#[derive(Debug, Serialize, Deserialize)]
+pub struct Saved {
+    directory: PathBuf,
+    fit: FitConfig,
+    /// Text of its checkpoint.
+    #[serde(skip)]
+    text: String,
+}
+
+impl Saved {
+    /// Reads the text of a run in a directory.
+    ///
+    /// # Errors
+    /// A data error naming the file.
+    pub fn read(path: &Path, text: Text<'_>) -> Result<Self, CliError> {
+        match text {
+            Text::Checkpoint(text) => Ok(Self { text: text.to_string(), ..parse(path, LATEST, text)? }),
+            Text::Configuration(text) => Ok(Self::begin(parse(path, "config.toml", text)?)),
+        }
+    }
+
+    /// A fit that begins here.
+    fn begin(fit: FitConfig) -> Self {
+        Self { directory: std::env::current_dir().unwrap_or_default(), fit, text: String::new() }
+    }
+
+    /// Its files, as seen from here; in the directory in which it was started they are what was given there. What comes from
+    /// standard input has to come again.
+    fn files(&self) -> Vec<String> {
+        let here = std::env::current_dir().is_ok_and(|here| here == self.directory);
+        let found = |file: &String| {
+            if here || is_standard(Path::new(file)) {
+                file.clone()
+            } else {
+                self.directory.join(file).display().to_string()
+            }
+        };
+        self.fit.recording.files.iter().map(found).collect()
+    }
 }
 
 impl<'a> Plan<'a> {
-    /// Reads the file that the arguments name, if they do, and looks for everything that is wrong.
+    /// Reads the file that the arguments name, if they do, and looks for everything that is wrong; beside a fit that goes on the
+    /// arguments may say nothing else than it does, but for the files.
     ///
     /// # Errors
     /// A data error for a file that cannot be read, usage errors naming everything that is wrong.
-    pub fn new(args: &'a Args) -> Result<Self, CliError> {
+    pub fn new(args: &'a Args, saved: Option<Saved>) -> Result<Self, CliError> {
         let mut options = columns(&args.recording)?;
         options.extend(args.flags.entries.iter().cloned());
         let mut layers = Layers::new(FitConfig::KEYS, args.run.config.as_deref(), options)?;
@@ -82,7 +131,11 @@ impl<'a> Plan<'a> {
                 vec![kind, ("training.penalty.time".to_string(), time.clone())]
             });
         }
-        let plan = Self { args, config: FitConfig::default(), layers };
+        let plan = Self { args, config: FitConfig::default(), layers, saved };
+        if let Some(saved) = &plan.saved {
+            let config = plan.beside(saved)?;
+            return Ok(Self { config, ..plan });
+        }
         let (config, mut mistakes) = plan.over(Config { system: "measured".to_string(), ..Config::default() })?;
         mistakes.extend(config.faults(config.recording.coords.len()).into_iter().map(Mistake::from));
         mistakes.extend(plain_name(&config.training.system).err().map(|e| Mistake::new("training.system", e)));
@@ -94,6 +147,45 @@ impl<'a> Plan<'a> {
             }
         }
         Ok(Self { config, ..plan })
+    }
+
+    /// The configuration of a fit that goes on, with the files of the arguments.
+    fn beside(&self, saved: &Saved) -> Result<FitConfig, CliError> {
+        let (mut config, mistakes) = self.layers.over(&saved.fit)?;
+        self.layers.check(mistakes)?;
+        self.finish(&mut config.training, &saved.fit.training.data)?;
+        if saved.fit.shooting.is_none() {
+            config.shooting = None;
+        }
+        let directory = self.args.run.resume.as_deref().unwrap_or(Path::new(""));
+        require_same(directory, &saved.fit.without_files(), &config.without_files())?;
+        if self.args.recording.data.is_empty() {
+            config.recording.files = saved.files();
+        }
+        Ok(config)
+    }
+
+    /// Finishes a training of merged layers for recorded states, whose numbers and bounds the `data` alone decide.
+    fn finish(&self, training: &mut Config, data: &Data) -> Result<(), CliError> {
+        let acceleration_weighting = training.data.acceleration_weighting;
+        training.data = Data { acceleration_weighting, ..data.clone() };
+        for phase in &mut training.phases {
+            [&mut phase.position, &mut phase.velocity].into_iter().for_each(Vec::clear);
+            phase.log_uniform.clear();
+        }
+        fill_periods(training, &self.layers, TRAINING);
+        self.args.run.finish(training)
+    }
+
+    /// The text that is kept in the checkpoints of a fit.
+    ///
+    /// # Errors
+    /// A configuration that TOML cannot hold.
+    pub fn identity(&self, config: &FitConfig) -> Result<String, CliError> {
+        match &self.saved {
+            Some(saved) => Ok(saved.text.clone()),
+            None => toml::to_string(&Saved::begin(config.clone())).map_err(CliError::data),
+        }
     }
 
     /// The files of the recorded motion.
@@ -126,6 +218,9 @@ impl<'a> Plan<'a> {
     /// # Errors
     /// A model to start from that cannot be read, a schedule that cannot be scaled, a file of a known part that is wrong.
     pub fn configure(&self, prepared: &PreparedFit<'_>) -> Result<FitConfig, CliError> {
+        if self.saved.is_some() {
+            return Ok(self.config.clone());
+        }
         let targets = prepared.targets();
         let Config { system, precision, .. } = &self.config.training;
         let mut suggested = prepared.suggest_training(system, *precision)?;
@@ -134,17 +229,10 @@ impl<'a> Plan<'a> {
             shorten(&mut suggested);
         }
         let data = suggested.data.clone();
-        let (config, _) = self.over(suggested)?;
-        let FitConfig { mut training, horizon, recording, shooting, .. } = config;
-        // The data alone decide numbers and bounds of states.
-        let acceleration_weighting = training.data.acceleration_weighting;
-        training.data = Data { acceleration_weighting, ..data };
-        for phase in &mut training.phases {
-            [&mut phase.position, &mut phase.velocity].into_iter().for_each(Vec::clear);
-            phase.log_uniform.clear();
-        }
-        fill_periods(&mut training, &self.layers, TRAINING);
-        self.args.run.finish(&mut training)?;
+        let FitConfig { mut training, horizon, recording, shooting, .. } = self.over(suggested)?.0;
+        self.finish(&mut training, &data)?;
+        // A printed configuration shows the keys of multiple shooting in any case.
+        let shooting = shooting.filter(|_| targets == Targets::Motion || self.args.run.print_config.is_some());
         Ok(prepared.config(training, horizon, recording, shooting))
     }
 
@@ -210,7 +298,7 @@ mod tests {
         let plan = |more: &[&str]| {
             let line = [&["--config", file.to_str().unwrap()], more].concat();
             let args = Words::try_parse_from(line).unwrap().args;
-            Plan::new(&args).map(|plan| plan.config)
+            Plan::new(&args, None).map(|plan| plan.config)
         };
         let config = plan(&[]).unwrap();
         assert_eq!((config.held_out, config.recording.rate), (0.1, Some(5.0)));

@@ -12,6 +12,9 @@ use std::fmt;
 use std::path::Path;
 use toml::{Table, Value};
 
+/// Wrong values that are listed at most: each is looked for in the whole configuration.
+const MOST_MISTAKES: usize = 100;
+
 /// The key that says of which kind a table is.
 const KIND: &str = "kind";
 
@@ -240,6 +243,9 @@ impl Layers {
             let entry = entries.remove(culprit);
             let key = if path.len() > entry.key().len() { path } else { entry.key() };
             mistakes.push(Mistake::new(key, self.problem(&entry.key(), &entry.value, &message)));
+            if mistakes.len() >= MOST_MISTAKES {
+                entries.clear();
+            }
         }
     }
 
@@ -511,6 +517,12 @@ mod tests {
         assert_placed(&mistakes, &beginnings);
         // What is right is taken.
         assert_eq!(config.lbfgs.unwrap().memory, 3);
+    }
+
+    #[test]
+    fn not_every_one_of_many_mistakes_is_looked_for() {
+        let (_, mistakes) = file("double-pendulum", &"[[phase]]\nrate = true\n".repeat(5000));
+        assert_eq!(mistakes.len(), MOST_MISTAKES);
     }
 
     #[test]

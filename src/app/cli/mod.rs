@@ -19,7 +19,6 @@ mod experiment_list;
 mod files;
 mod fit;
 mod fit_config;
-mod fit_resume;
 mod flags;
 mod folder;
 mod forces;
@@ -30,6 +29,7 @@ mod interrupt;
 mod inverse;
 mod json;
 mod layers;
+mod learn;
 mod learned;
 mod manual;
 mod misunderstood;
@@ -47,7 +47,6 @@ mod results;
 mod resume;
 mod rollout;
 mod run_args;
-mod said;
 mod shadow;
 mod shadow_facts;
 mod shard;
@@ -142,14 +141,11 @@ enum Command {
 
 /// Runs the program with its arguments, the first being its own name.
 pub fn main(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
-    let arguments: Vec<OsString> = arguments.into_iter().collect();
-    let cli = match Cli::try_parse_from(&arguments) {
+    let cli = match Cli::try_parse_from(arguments) {
         Ok(cli) => cli,
         Err(error) => return answer(&error),
     };
-    // Behind the names of the program and of the command.
-    let words = arguments.get(2..).unwrap_or_default();
-    match watch_log().and_then(|()| run(cli.command, words)) {
+    match watch_log().and_then(|()| run(cli.command)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             if error.kind() != Kind::ClosedPipe {
@@ -171,15 +167,15 @@ pub fn check_arguments(arguments: impl IntoIterator<Item = OsString>) -> Result<
     }
 }
 
-/// Runs a command; `words` are its arguments as they were typed.
-fn run(command: Command, words: &[OsString]) -> Result<(), CliError> {
+/// Runs a command.
+fn run(command: Command) -> Result<(), CliError> {
     // A command that has something to keep asks for the flag before it begins its work.
     interrupt::watch().map_err(CliError::signals)?;
     match command {
         Command::Systems(args) => systems::run(&args),
         Command::Check(args) => check::run(&args),
         Command::Train(args) => train::run(&args),
-        Command::Fit(args) => fit::run(&args, words),
+        Command::Fit(args) => fit::run(&args),
         Command::Rollout(args) => rollout::run(&args),
         Command::Evaluate(args) => evaluate::run(&args),
         Command::Experiment(args) => experiment::run(&args),

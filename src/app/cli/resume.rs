@@ -1,12 +1,12 @@
 //! Runs that `--resume DIR` of `lnn train` and `lnn fit` finds in the directory.
 
 use crate::cli::differences::differences;
-use crate::cli::said::Said;
+use crate::cli::folder::Folder;
 use crate::cli::{CliError, Kind, config, output};
-use crate::configuration::Config;
 use crate::storage::{Disk, read_regular};
 use crate::training::{CheckpointError, LATEST, PREVIOUS, remove_checkpoints, saved};
-use serde::Deserialize;
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
 use std::path::Path;
 
 /// Command that learns.
@@ -29,11 +29,46 @@ impl Learner {
 }
 
 /// A directory of a training or a fit.
-pub enum Found {
+enum Found {
     /// It can go on; what its checkpoint says.
     Unfinished(String),
     /// It has finished; `config.toml` and `summary.json`.
     Finished(String, String),
+}
+
+/// The text of a run that is there.
+#[derive(Clone, Copy, Debug)]
+pub enum Text<'a> {
+    /// That of its checkpoint.
+    Checkpoint(&'a str),
+    /// Its `config.toml`.
+    Configuration(&'a str),
+}
+
+/// Opens the directory of a run to go on with, and what `read` makes of its text; `None` if there is nothing left to do, which is
+/// said then.
+///
+/// # Errors
+/// A data error if there is no such run, if it ended with an error, if it is of the other kind, or if what is there is damaged; as
+/// of `read`.
+pub fn reopen<T>(
+    directory: &Path,
+    learner: Learner,
+    json: bool,
+    read: impl FnOnce(Text<'_>) -> Result<T, CliError>,
+) -> Result<Option<(Folder, T)>, CliError> {
+    // Looked for before anything is created, and again when nobody else can write.
+    find(directory, learner)?;
+    let folder = Folder::open(directory)?;
+    match find(directory, learner)? {
+        Found::Unfinished(text) => Ok(Some((folder, read(Text::Checkpoint(&text))?))),
+        Found::Finished(text, summary) => {
+            read(Text::Configuration(&text))?;
+            let said = format!("{}: this training has finished, nothing is left to do\n", directory.display());
+            output::print(if json { &summary } else { &said })?;
+            Ok(None)
+        }
+    }
 }
 
 /// `true` if a directory holds a training that can go on.
@@ -45,7 +80,7 @@ pub fn has_checkpoint(directory: &Path) -> bool {
 ///
 /// # Errors
 /// A data error if there is none, if it ended with an error, if it is of the other kind, or if what is there is damaged.
-pub fn find(directory: &Path, learner: Learner) -> Result<Found, CliError> {
+fn find(directory: &Path, learner: Learner) -> Result<Found, CliError> {
     if !directory.is_dir() {
         return Err(CliError::file(directory, "no such directory"));
     }
@@ -64,9 +99,10 @@ pub fn find(directory: &Path, learner: Learner) -> Result<Found, CliError> {
     Ok(found)
 }
 
-/// Who wrote the text of a checkpoint.
+/// Command that wrote the text of a checkpoint: that of a fit has a table of this name.
 fn kind_of(text: &str) -> Learner {
-    if Said::parse(text).is_some() { Learner::Fit } else { Learner::Train }
+    let is_fit = text.parse::<toml::Table>().is_ok_and(|table| table.contains_key("fit"));
+    if is_fit { Learner::Fit } else { Learner::Train }
 }
 
 /// The run that left its summary and no checkpoint.
@@ -92,23 +128,22 @@ fn finished(directory: &Path) -> Result<(Found, Learner), CliError> {
     }
 }
 
-/// The configuration of a training, as its checkpoint or `config.toml` has it.
+/// What the text of a run says.
 ///
 /// # Errors
 /// A data error naming the file.
-pub fn configuration(directory: &Path, name: &str, text: &str) -> Result<Box<Config>, CliError> {
-    let config = config::parse(text).map_err(|(line, problem)| {
+pub fn parse<T: DeserializeOwned>(directory: &Path, name: &str, text: &str) -> Result<T, CliError> {
+    config::parse(text).map_err(|(line, problem)| {
         CliError::file(&directory.join(name), format_args!("configuration, line {line}: {problem}"))
-    })?;
-    Ok(Box::new(config))
+    })
 }
 
 /// Refuses to go on with another configuration than that of the directory.
 ///
 /// # Errors
 /// A usage error naming what differs.
-pub fn require_same(directory: &Path, saved: &Config, asked: &Config) -> Result<(), CliError> {
-    let text = |config| toml::to_string(config).map_err(CliError::data);
+pub fn require_same<T: Serialize>(directory: &Path, saved: &T, asked: &T) -> Result<(), CliError> {
+    let text = |config: &T| toml::to_string(config).map_err(CliError::data);
     match differences(&text(saved)?, &text(asked)?) {
         none if none.is_empty() => Ok(()),
         found => Err(CliError::usage(format_args!("--resume {}: {found}", directory.display()))),
@@ -156,17 +191,6 @@ pub fn keeping(directory: &Path) -> impl Fn(CliError) -> CliError {
 pub fn forget(directory: &Path) -> Result<(), CliError> {
     let cannot = |e| CliError::file(directory, format_args!("cannot remove checkpoints: {e}"));
     remove_checkpoints(&Disk, directory).map_err(cannot)
-}
-
-/// Says that there is nothing left to do.
-///
-/// # Errors
-/// Standard output that cannot be written.
-pub fn say_finished(directory: &Path, json: Option<&str>) -> Result<(), CliError> {
-    match json {
-        Some(json) => output::print(json),
-        None => output::print(&format!("{}: this training has finished, nothing is left to do\n", directory.display())),
-    }
 }
 
 #[cfg(test)]

@@ -142,9 +142,9 @@ impl Args {
     }
 
     /// Files that are read.
-    pub fn inputs(&self) -> impl Iterator<Item = &Path> {
+    pub fn inputs(&self) -> Vec<&Path> {
         let system = self.system.as_deref().filter(|system| chosen::is_file(system)).map(Path::new);
-        self.run.config.iter().map(PathBuf::as_path).chain(system)
+        self.run.config.iter().map(PathBuf::as_path).chain(system).collect()
     }
 
     /// The system that the arguments name; whether there is one of this name is found out later.

@@ -136,7 +136,6 @@ fn make(
     output.remove(RECORD)?;
     output.remove(READINGS)?;
     let system = run.config.system()?;
-    run.config.validate(system.coordinates)?;
     let (starts, span) = scale.trajectories();
     let began = Instant::now();
     // A run that was stopped goes on from its checkpoint.
@@ -160,7 +159,7 @@ fn make(
             if experiment.reads_holes() {
                 read_hole(run, &trained.network, (scale, threads), output, &watch)?;
             }
-            trained.record
+            trained.record(system.system.trajectory(system.coordinates).t_end * span)
         }
         Err(PipelineError::Training(error @ TrainingError::NothingLearned(_))) => Record {
             outcome: Outcome::Nothing { reason: error.to_string() },

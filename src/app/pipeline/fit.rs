@@ -3,7 +3,7 @@
 use crate::configuration::Precision;
 use crate::data::{Datasets, RecordingSplit};
 use crate::network::file::{Header, ModelFile, StoredPrecision};
-use crate::network::{Layout, NetworkLagrangian};
+use crate::network::{Architecture, Layout, NetworkLagrangian};
 use crate::pipeline::determination::Determined;
 use crate::pipeline::fit_config::FitConfig;
 use crate::pipeline::fit_summary::Found;
@@ -35,12 +35,15 @@ pub struct FitReport {
     pub history: Vec<Epoch>,
     /// Predictions of motion that was held out.
     pub hold_out: HoldOut,
-    /// Text of `summary.json`.
-    pub json: String,
-    pub(crate) text: String,
+    json: String,
+    text: String,
 }
 
 impl FitReport {
+    /// Text of `summary.json`.
+    pub fn json(&self) -> &str {
+        &self.json
+    }
     /// Headline and tables for a terminal.
     pub fn text(&self) -> &str {
         &self.text
@@ -89,14 +92,15 @@ fn fit_in<S: Scalar>(
         return Err(PipelineError::Config(faults));
     }
     let periodic = recording.periodic.clone();
-    let shaped = |scale| config.architecture_with(names.iter().map(String::as_str), periodic.clone(), scale);
+    let unscaled = vec![1.0; names.len()];
+    let shape = config.architecture_with(names.iter().map(String::as_str), periodic.clone(), unscaled)?;
+    let shaped = |scale| Architecture { scale: config.network.scaling.of(scale), ..shape };
     let (architecture, weights) = match &config.from {
         Some(from) => {
-            StartModel::read(from)?.require(config, periodic.clone())?;
-            let (weights, shape) = weights(from, shaped)?;
-            (shape, Some(weights))
+            StartModel::read(from)?.require(config, periodic)?;
+            weights(from, shaped).map(|(weights, shape)| (shape, Some(weights)))?
         }
-        None => (shaped(data.training[0].physical_scale())?, None),
+        None => (shaped(data.training[0].physical_scale()), None),
     };
     architecture.validate()?;
     let floor = config.data.acceleration_weighting;

@@ -108,7 +108,7 @@ pub use output::{Directory, InMemory, Output};
 pub use physics::{ChargeDrift, CurvatureScalar, FoundSymmetries, Physics, ProvenSignature};
 pub use prepared_fit::PreparedFit;
 pub use start::StartModel;
-pub use train::{RunOptions, TrainReport, train};
+pub use train::{RunOptions, TrainFigures, TrainReport, train};
 pub use watch::{Event, EventSink, Watch};
 
 pub(crate) use fit::usual_force;

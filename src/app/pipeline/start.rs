@@ -1,6 +1,6 @@
 //! Training that starts from a model: the configuration takes the model's shape, and another shape is refused.
 
-use crate::configuration::{Config, ConfigError, Known, Precision, Scaling};
+use crate::configuration::{Config, Known, Precision, Scaling};
 use crate::network::Architecture;
 use crate::network::file::{Header, ModelFile, StoredPrecision};
 use crate::pipeline::{PipelineError, model_file};
@@ -74,15 +74,15 @@ impl StartModel {
 /// Weights and scales of a model that a training starts from; the architecture must have been found to fit.
 ///
 /// # Errors
-/// A model that cannot be read, or that is of another shape by now; a name that is no coordinate.
+/// A model that cannot be read, or that is of another shape by now.
 pub(crate) fn weights<S: Scalar>(
     from: &str,
-    asked: impl FnOnce(Vec<f64>) -> Result<Architecture, ConfigError>,
+    asked: impl FnOnce(Vec<f64>) -> Architecture,
 ) -> Result<(Vec<S>, Architecture), PipelineError> {
     let path = model_file(Path::new(from))?;
     let loaded = ModelFile::load(&path);
     let ModelFile { header, weights } = loaded.map_err(|source| PipelineError::Model { path: path.clone(), source })?;
-    let asked = asked(header.architecture.scale.clone())?;
+    let asked = asked(header.architecture.scale.clone());
     let differences = differences(&asked, &header.architecture);
     if differences.is_empty() {
         return Ok((weights, asked));

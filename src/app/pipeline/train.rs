@@ -20,24 +20,46 @@ use crate::training::{Epoch, ResumeOptions, Snapshot, StopReason, resume, traini
 use serde::Serialize;
 use std::time::Instant;
 
-/// Contents of `summary.json`; losses in the paper's convention, errors in physical units.
+/// Figures of a training; losses in the paper's convention, errors in physical units.
+#[derive(Clone, Debug, Serialize)]
+pub struct TrainFigures {
+    /// Name of the system.
+    pub system: String,
+    /// Version of this crate.
+    pub crate_version: &'static str,
+    /// The seed.
+    pub seed: u64,
+    /// Precision of weights and arithmetic in training.
+    pub precision: &'static str,
+    /// Threads.
+    pub threads: usize,
+    /// Epochs that were run.
+    pub epochs: usize,
+    /// Weights of the network.
+    pub weights: usize,
+    /// Best loss on the states that chose the epoch.
+    pub validation_loss: f64,
+    /// Loss on fresh states.
+    pub test_loss: f64,
+    /// Fresh states without a finite acceleration.
+    pub test_states_left_out: usize,
+    /// Instability of the training losses, if there are enough of them.
+    pub instability: Option<f64>,
+    /// Time of everything but pictures and report.
+    pub wall_seconds: f64,
+    /// Time of the training.
+    pub training_seconds: f64,
+    /// Training states that were looked at, over that time.
+    pub states_per_second: f64,
+    /// Reason for which training ended.
+    pub ended: String,
+}
+
+/// Contents of `summary.json`.
 #[derive(Serialize)]
 struct Summary<'a> {
-    system: &'a str,
-    crate_version: &'static str,
-    seed: u64,
-    precision: &'static str,
-    threads: usize,
-    epochs: usize,
-    weights: usize,
-    validation_loss: f64,
-    test_loss: f64,
-    test_states_left_out: usize,
-    instability: Option<f64>,
-    wall_seconds: f64,
-    training_seconds: f64,
-    states_per_second: f64,
-    ended: String,
+    #[serde(flatten)]
+    figures: &'a TrainFigures,
     #[serde(flatten)]
     evaluation: &'a Evaluation,
 }
@@ -75,19 +97,76 @@ pub struct TrainReport {
     pub history: Vec<Epoch>,
     /// The model beside the system it learned.
     pub evaluation: Evaluation,
-    /// Text of `summary.json`.
-    pub json: String,
-    /// The record that an experiment keeps of it.
-    pub(crate) record: Record,
-    /// The losses in one line.
-    headline: String,
+    /// Losses, times and sizes.
+    pub figures: TrainFigures,
+    /// Name of the system in titles.
     title: String,
 }
 
 impl TrainReport {
+    /// Text of `summary.json`.
+    ///
+    /// # Errors
+    /// [`PipelineError::Format`].
+    pub fn json(&self) -> Result<String, PipelineError> {
+        let summary = Summary { figures: &self.figures, evaluation: &self.evaluation };
+        Ok(serde_json::to_string_pretty(&summary).map_err(PipelineError::format)? + "\n")
+    }
+
     /// Headline and tables for a terminal.
     pub fn text(&self) -> String {
-        format!("{}\n{}\n", self.evaluation.text(&self.title), self.headline)
+        format!("{}\n{}\n", self.evaluation.text(&self.title), self.headline())
+    }
+
+    /// The losses in one line.
+    fn headline(&self) -> String {
+        let TrainFigures { validation_loss, test_loss, epochs, weights, .. } = self.figures;
+        let fresh = match test_loss {
+            loss if loss.is_finite() => number(loss),
+            _ => format!("not finite ({} states left out)", self.figures.test_states_left_out),
+        };
+        format!(
+            "loss (paper): validation {}, fresh states {fresh}; {} in {:.1} s, {:.0} states/s, {}, seed {}\n",
+            number(validation_loss),
+            counted(epochs, "epoch", "epochs"),
+            self.figures.training_seconds,
+            self.figures.states_per_second,
+            counted(weights, "weight", "weights"),
+            self.figures.seed
+        )
+    }
+
+    /// The record that an experiment keeps of it, whose trajectory test went to `t_end`.
+    pub(crate) fn record(&self, t_end: f64) -> Record {
+        let motions = || self.evaluation.trajectories.iter().map(|motion| &motion.summary);
+        let scale = &self.network.architecture().scale;
+        let learned = Learned {
+            validation_loss: self.figures.validation_loss,
+            instability: self.figures.instability,
+            scale: scale.iter().sum::<f64>() / scale.len() as f64,
+            wrong_signature: self.evaluation.wrong_signature,
+            energy_errors: motions().map(|motion| finite(motion.energy_error.mean)).collect(),
+            stretching: motions().map(|motion| finite(motion.lyapunov_exponent? * t_end)).collect(),
+            integrated: motions().filter(|motion| motion.stopped.is_none()).count(),
+        };
+        Record {
+            outcome: Outcome::Learned(learned),
+            losses: self.history.iter().map(|e| [finite(e.training_loss), finite(e.validation_loss)]).collect(),
+            times: self.history.iter().map(|e| e.seconds).collect(),
+            seconds: self.figures.training_seconds,
+        }
+    }
+
+    fn write(&self, output: &dyn Output, system: &SystemInstance<f64>, toml: &str) -> Result<(), PipelineError> {
+        output.write(SUMMARY, self.json()?.as_bytes())?;
+        let training = training_pictures(&self.history);
+        let report = Report::new(&format!("{}: learned", self.title));
+        let report = self.evaluation.summarise(report, &self.title).paragraph(&self.headline());
+        let report = self.evaluation.pictures(report);
+        let report = self.evaluation.report(parameter_table(report, system)).section("Training", &training);
+        let report = report.heading("Configuration").preformatted(toml);
+        let Evaluation { figures, physics, .. } = &self.evaluation;
+        write_report_and_figures(output, &report, training.iter().chain(figures).chain(&physics.figures))
     }
 }
 
@@ -110,18 +189,6 @@ pub fn train(
     }
 }
 
-/// The network's shape, and the weights of the model that the training starts from, if it does: then the scales are the
-/// model's.
-fn begin_shape<S: Scalar>(
-    config: &Config,
-    system: &SystemInstance<f64>,
-    scale: Vec<f64>,
-) -> Result<(Architecture, Option<Vec<S>>), PipelineError> {
-    let Some(from) = &config.from else { return Ok((config.architecture(system, scale)?, None)) };
-    let (weights, architecture) = start::weights(from, |scale| config.architecture(system, scale))?;
-    Ok((architecture, Some(weights)))
-}
-
 fn train_in<S: Scalar>(
     config: &Config,
     system: &SystemInstance<f64>,
@@ -130,11 +197,15 @@ fn train_in<S: Scalar>(
     watch: &Watch,
 ) -> Result<TrainReport, PipelineError> {
     let started = Instant::now();
-    let unscaled = config.architecture(system, vec![1.0; system.coordinates])?;
-    memory::require("training", training_memory(config, &unscaled))?;
+    let shape = config.architecture(system, vec![1.0; system.coordinates])?;
+    memory::require("training", training_memory(config, &shape))?;
     let (data, scale) = sample_all_until::<S>(config, system, &watch.interrupt)?;
     let penalty = config.penalty()?;
-    let (architecture, before) = begin_shape::<S>(config, system, scale)?;
+    let shaped = |scale| Architecture { scale: config.network.scaling.of(scale), ..shape };
+    let (architecture, before) = match &config.from {
+        Some(from) => start::weights(from, shaped).map(|(weights, shape)| (shape, Some(weights)))?,
+        None => (shaped(scale), None),
+    };
     let imposed = imposed_velocities(system, &data);
     let fresh = data.test.cast::<f64>();
     let fresh = (fresh.q().to_vec(), fresh.v().to_vec());
@@ -156,14 +227,12 @@ fn train_in<S: Scalar>(
     output.write("config.toml", toml.as_bytes())?;
     output.write("history.csv", history(&trained.history).as_bytes())?;
 
-    let scale = architecture.scale.iter().sum::<f64>() / architecture.scale.len() as f64;
     let network = NetworkLagrangian::new(architecture, model.weights)?.cast::<f64>();
     let test = system.system.trajectory(system.coordinates);
-    let full = test.t_end;
     let judging = EvaluationOptions {
         states: fresh,
         starts: options.starts,
-        span: TrajectoryTest { t_end: full * options.span, ..test },
+        span: TrajectoryTest { t_end: test.t_end * options.span, ..test },
         rtol: RTOL,
         trained: trained_on(&model.header),
         seed: config.seed,
@@ -175,8 +244,8 @@ fn train_in<S: Scalar>(
     }
     let training_losses: Vec<f64> = trained.history.iter().map(|e| e.training_loss).collect();
     let instability = training_instability(&training_losses, &stretches(config));
-    let summary = Summary {
-        system: &config.system,
+    let figures = TrainFigures {
+        system: config.system.clone(),
         crate_version: env!("CARGO_PKG_VERSION"),
         seed: config.seed,
         precision: S::NAME,
@@ -191,50 +260,17 @@ fn train_in<S: Scalar>(
         training_seconds: trained.seconds,
         states_per_second: trained.states as f64 / trained.seconds,
         ended: ended(&trained.stop),
-        evaluation: &evaluation,
     };
-    let json = serde_json::to_string_pretty(&summary).map_err(PipelineError::format)? + "\n";
-    output.write(SUMMARY, json.as_bytes())?;
-    write_report(output, system, &summary, &trained.history, &toml)?;
-    let headline = headline(&summary);
-    let learned = learned(&evaluation, (trained.validation_loss, instability), scale, (full, options.span));
-    let record = record(learned, &trained.history, trained.seconds);
     let title = system.system.title.to_string();
     let (stop, history, header) = (trained.stop, trained.history, model.header);
-    Ok(TrainReport { stop, header, network, history, evaluation, json, record, headline, title })
+    let report = TrainReport { stop, header, network, history, evaluation, figures, title };
+    report.write(output, system, &toml)?;
+    Ok(report)
 }
 
 /// A number that a record can hold.
 fn finite(x: f64) -> Option<f64> {
     x.is_finite().then_some(x)
-}
-
-/// Figures of a learned model for an experiment.
-fn learned(
-    evaluation: &Evaluation,
-    (validation_loss, instability): (f64, Option<f64>),
-    scale: f64,
-    (t_end, share): (f64, f64),
-) -> Learned {
-    let motions = || evaluation.trajectories.iter().map(|motion| &motion.summary);
-    Learned {
-        validation_loss,
-        instability,
-        scale,
-        wrong_signature: evaluation.wrong_signature,
-        energy_errors: motions().map(|motion| finite(motion.energy_error.mean)).collect(),
-        stretching: motions().map(|motion| finite(motion.lyapunov_exponent? * t_end * share)).collect(),
-        integrated: motions().filter(|motion| motion.stopped.is_none()).count(),
-    }
-}
-
-fn record(learned: Learned, epochs: &[Epoch], seconds: f64) -> Record {
-    Record {
-        outcome: Outcome::Learned(learned),
-        losses: epochs.iter().map(|e| [finite(e.training_loss), finite(e.validation_loss)]).collect(),
-        times: epochs.iter().map(|e| e.seconds).collect(),
-        seconds,
-    }
 }
 
 /// The velocity that the mass shell fixes and its range over the training states, which no bounds of the configuration
@@ -279,40 +315,4 @@ fn header(
 pub(crate) fn write_model<S: Scalar>(output: &dyn Output, model: &ModelFile<S>) -> Result<(), PipelineError> {
     let bytes = model.to_bytes().map_err(|source| PipelineError::Model { path: MODEL.into(), source })?;
     output.write(MODEL, &bytes)
-}
-
-/// The figures of a run in one line.
-fn headline(summary: &Summary<'_>) -> String {
-    let fresh = match summary.test_loss {
-        loss if loss.is_finite() => number(loss),
-        _ => format!("not finite ({} states left out)", summary.test_states_left_out),
-    };
-    format!(
-        "loss (paper): validation {}, fresh states {fresh}; {} in {:.1} s, {:.0} states/s, {}, seed {}\n",
-        number(summary.validation_loss),
-        counted(summary.epochs, "epoch", "epochs"),
-        summary.training_seconds,
-        summary.states_per_second,
-        counted(summary.weights, "weight", "weights"),
-        summary.seed
-    )
-}
-
-fn write_report(
-    output: &dyn Output,
-    system: &SystemInstance<f64>,
-    summary: &Summary<'_>,
-    epochs: &[Epoch],
-    toml: &str,
-) -> Result<(), PipelineError> {
-    let training = training_pictures(epochs);
-    let report = Report::new(&format!("{}: learned", system.system.title));
-    let report = summary.evaluation.summarise(report, &system.system.title).paragraph(&headline(summary));
-    let report = summary.evaluation.pictures(report);
-    let report = summary.evaluation.report(parameter_table(report, system)).section("Training", &training);
-    let report = report.heading("Configuration").preformatted(toml);
-    write_report_and_figures(output, &report, {
-        let Evaluation { figures, physics, .. } = summary.evaluation;
-        training.iter().chain(figures).chain(&physics.figures)
-    })
 }

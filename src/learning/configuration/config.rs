@@ -43,6 +43,16 @@ pub enum Scaling {
     None,
 }
 
+impl Scaling {
+    /// The scales of coordinates whose physical ones are these.
+    pub(crate) fn of(self, physical: Vec<f64>) -> Vec<f64> {
+        match self {
+            Self::Physical => physical,
+            Self::None => vec![1.0; physical.len()],
+        }
+    }
+}
+
 /// Epochs of a phase or of multiple shooting at most, and iterations of L-BFGS: years.
 pub(crate) const MOST_EPOCHS: usize = 1 << 24;
 /// States of a set, or of a step, at most; their memory is looked at beside.

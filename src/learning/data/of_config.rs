@@ -1,6 +1,6 @@
 //! System, penalty, shape of the network and header of the model file that a configuration asks for.
 
-use crate::configuration::{Config, ConfigError, Penalty, Precision, Scaling};
+use crate::configuration::{Config, ConfigError, Penalty, Precision};
 use crate::data::draw::SamplingError;
 use crate::lagrangian::system::System;
 use crate::lagrangian::{SystemInstance, configure_values, find};
@@ -76,10 +76,7 @@ impl Config {
             activation: self.network.activation,
             alpha: self.network.alpha,
             time_like: self.network.time_like_index(names.clone())?,
-            scale: match self.network.scaling {
-                Scaling::Physical => scale,
-                Scaling::None => vec![1.0; n],
-            },
+            scale: self.network.scaling.of(scale),
             periodic,
             embed_periodic: self.network.embed_periodic,
             input_layer: self.network.input_layer,

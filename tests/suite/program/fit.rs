@@ -231,8 +231,8 @@ fn what_cannot_be_learned_from_is_named() {
     let data = folder.file("swings.csv", pendulum(2, false, 0.0));
     let refused = |more: &[&str], code, parts: &[&str]| fit(&folder, &data, "out", more).refused(code, parts);
     refused(&["--targets", "measured"], 2, &["no accelerations were given", "--acceleration"]);
-    refused(&["--timelike", "time"], 2, &["--timelike time", "angle"]);
-    refused(&["--hold-out", "1"], 2, &["--hold-out", "between 0 and 1"]);
+    refused(&["--timelike", "time"], 2, &["--timelike", "angle"]);
+    refused(&["--hold-out", "1"], 2, &["--hold-out: held_out"]);
     refused(&["--window", "8"], 1, &["window: expected an odd number"]);
     refused(&["--noise", "0.1,0.2"], 1, &["noise: expected 1 number, one per coordinate"]);
     refused(&["--hidden", "0"], 2, &["--hidden"]);

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 
 /// Lines around what is generated from the table of configuration keys.
 const GENERATED: [&str; 2] =
-    ["<!-- generated from src/learning/presets/reference.rs -->\n\n", "<!-- end of the generated part -->\n"];
+    ["<!-- generated from src/learning/configuration/config.rs -->\n\n", "<!-- end of the generated part -->\n"];
 
 /// The same around the keys of a fit.
 const OF_A_FIT: [&str; 2] =

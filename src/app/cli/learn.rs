@@ -1,0 +1,120 @@
+//! What `lnn train` and `lnn fit` do around their learning: a directory, checkpoints, the result on standard output, the end.
+
+use crate::cli::folder::Folder;
+use crate::cli::learned::model_file;
+use crate::cli::number::threads;
+use crate::cli::place::{self, Wanted};
+use crate::cli::results::Writer;
+use crate::cli::resume::{forget, how_to_go_on, keeping};
+use crate::cli::run_args::RunArgs;
+use crate::cli::watch::watch;
+use crate::cli::{CliError, interrupt, output};
+use crate::configuration::Config;
+use crate::data::SamplingError;
+use crate::names::counted;
+use crate::pipeline::{Begin, Checkpoints, PipelineError, RunOptions, Watch};
+use crate::shooting::ShootingError;
+use crate::training::{StopReason, TrainingError};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// A result, as the command prints it.
+pub struct Learned {
+    /// Text of `summary.json`.
+    pub json: String,
+    /// Headline and tables.
+    pub text: String,
+    /// Reason for which learning ended.
+    pub stop: StopReason,
+    /// Epochs that were run.
+    pub epochs: usize,
+}
+
+/// Opens the directory of a run that begins; `inputs` are the files that it reads beside the model it starts from.
+///
+/// # Errors
+/// As of [`place::open`].
+pub fn open(args: &RunArgs, config: &Config, inputs: &[&Path]) -> Result<Folder, CliError> {
+    let usual = PathBuf::from("runs").join(&config.system);
+    let start = config.from.as_deref().map(|from| model_file(Path::new(from))).transpose()?;
+    let inputs: Vec<&Path> = inputs.iter().copied().chain(start.as_deref()).collect();
+    let (out, overwrite, writer) = (args.out.as_deref(), args.overwrite, Writer::Learner);
+    place::open(&Wanted { out, usual: &usual, overwrite, inputs: &inputs, writer })
+}
+
+/// A run that learns in a directory.
+pub struct Session<'a> {
+    args: &'a RunArgs,
+    stop: Arc<AtomicBool>,
+    /// The directory.
+    pub folder: Folder,
+    /// Threads and checkpoints.
+    pub options: RunOptions,
+}
+
+impl<'a> Session<'a> {
+    /// Watches for signals and keeps checkpoints, with `identity` in them instead of the configuration.
+    ///
+    /// # Errors
+    /// Signals that cannot be watched for.
+    pub fn new(args: &'a RunArgs, folder: Folder, begin: Begin, identity: Option<String>) -> Result<Self, CliError> {
+        let stop = interrupt::flag().map_err(CliError::signals)?;
+        let checkpoints = Checkpoints::new(folder.path(), args.checkpoint_every).beginning(begin);
+        let checkpoints = Some(match identity {
+            Some(identity) => checkpoints.identified_by(identity),
+            None => checkpoints,
+        });
+        let options = RunOptions { threads: threads(args.threads), checkpoints, ..RunOptions::default() };
+        Ok(Self { args, stop, folder, options })
+    }
+
+    /// Receiver of progress, with the flag of the signals.
+    pub fn watch(&self) -> Watch {
+        watch(&self.stop)
+    }
+
+    /// Prints what was learned, removes the checkpoints of a run that is over, and says how it ended.
+    ///
+    /// # Errors
+    /// An interruption, after which the best model so far is written, if there is one; a data error for a training that failed.
+    pub fn conclude(self, learned: Result<Learned, PipelineError>) -> Result<(), CliError> {
+        let path = self.folder.path();
+        let Learned { json, text, stop, epochs } = match learned {
+            Ok(learned) => learned,
+            Err(error) if is_empty(&error) && self.stop.load(Ordering::SeqCst) => {
+                let on = how_to_go_on(path);
+                return Err(CliError::interrupted(format_args!("interrupted before the first epoch ended{on}")));
+            }
+            // There is no model, and nothing to go on from.
+            Err(error) if is_empty(&error) => return Err(forget(path).err().unwrap_or_else(|| error.into())),
+            Err(error) => return Err(keeping(path)(error.into())),
+        };
+        if stop != StopReason::Interrupted {
+            forget(path)?;
+        }
+        if self.args.json {
+            output::print(&json)?;
+        } else {
+            output::print(&format!("{text}report: {}\n", self.folder.file("report.html").display()))?;
+        }
+        let kept = format!("the best of {} is in {}", counted(epochs, "epoch", "epochs"), path.display());
+        match stop {
+            StopReason::Finished => Ok(()),
+            StopReason::Interrupted => {
+                Err(CliError::interrupted(format_args!("interrupted, {kept}{}", how_to_go_on(path))))
+            }
+            StopReason::Failed(error) => Err(CliError::data(format_args!("training stopped: {error}; {kept}"))),
+        }
+    }
+}
+
+/// `true` if learning ended before there was a model.
+fn is_empty(error: &PipelineError) -> bool {
+    matches!(
+        error,
+        PipelineError::Sampling(SamplingError::Interrupted)
+            | PipelineError::Training(TrainingError::NothingLearned(_))
+            | PipelineError::Shooting(ShootingError::Training(TrainingError::NothingLearned(_)))
+    )
+}
