@@ -137,11 +137,9 @@ pub(super) fn silu<S: Scalar>(x: S) -> Jet<S> {
     let e = decay.value();
     let r = one / (one + e);
     let tail = decay.mantissa * r;
-    let (value, first) = if x < constant(0.0) {
-        (-decay.scale(a * tail), decay.scale(tail * r * (one + e - a)))
-    } else {
-        (x * r, r + decay.scale(a * tail * r))
-    };
+    let value = positive_part(x) - decay.scale(a * tail);
+    let below = decay.scale(tail * r * (one + e - a));
+    let first = if x < constant(0.0) { below } else { r + decay.scale(a * tail * r) };
     let [_, _, second, third, fourth] = x_tanh(x);
     [value, first, half * second, half * third, half * fourth]
 }

@@ -42,7 +42,7 @@ pub(crate) mod numbers {
 
     pub(crate) fn serialize<S: Scalar, W: Serializer>(numbers: &[S], serializer: W) -> Result<W::Ok, W::Error> {
         let stored = match StoredPrecision::of::<S>() {
-            Some(StoredPrecision::F32) => Stored::F32(numbers.iter().map(|x| x.cast()).collect()),
+            Some(StoredPrecision::F32) => Stored::F32(numbers.iter().map(|x| x.to_f64() as f32).collect()),
             Some(StoredPrecision::F64) => Stored::F64(numbers.iter().map(|x| x.to_f64()).collect()),
             None => return Err(serde::ser::Error::custom(format_args!("no file can hold {} numbers", S::NAME))),
         };
@@ -51,8 +51,8 @@ pub(crate) mod numbers {
 
     pub(crate) fn deserialize<'de, S: Scalar, R: Deserializer<'de>>(deserializer: R) -> Result<Vec<S>, R::Error> {
         Ok(match Stored::deserialize(deserializer)? {
-            Stored::F32(numbers) => numbers.iter().map(|x| x.cast()).collect(),
-            Stored::F64(numbers) => numbers.iter().map(|x| x.cast()).collect(),
+            Stored::F32(numbers) => numbers.into_iter().map(|x| S::of_f64(x.into())).collect(),
+            Stored::F64(numbers) => numbers.into_iter().map(S::of_f64).collect(),
         })
     }
 }
