@@ -281,7 +281,7 @@ pub(crate) fn write_model<S: Scalar>(output: &dyn Output, model: &ModelFile<S>) 
     output.write(MODEL, &bytes)
 }
 
-/// The figures of a run in one line.
+/// One-line summary of a run.
 fn headline(summary: &Summary<'_>) -> String {
     let fresh = match summary.test_loss {
         loss if loss.is_finite() => number(loss),
