@@ -13,6 +13,7 @@
 //! | [`symmetries`] | what is conserved: symmetries, charges, what two Lagrangians have in common |
 //! | [`constraints`] | constraints beside a Lagrangian, found in data, kept in roll-outs; degenerate Lagrangians |
 //! | [`certificates`] | proofs that a mass matrix has its signature |
+//! | [`summary`] | `summary.json` and `evaluation.json`, key by key |
 //! | [`method`] | equations, penalties, identities, units and conventions |
 //! | [`library`] | features, a Lagrangian of your own, states of your own, examples |
 //! | [`python`] | the Python package; models in JAX, PyTorch and numpy |
@@ -33,6 +34,7 @@ macro_rules! page {
             "[rollout]: crate::docs::commands#lnn-rollout\n",
             "[configuration]: crate::docs::configuration\n",
             "[system-files]: crate::docs::system_files\n",
+            "[summary]: crate::docs::summary\n",
             "[presets]: crate::docs::configuration#presets\n",
             "[recorded-motion]: crate::docs::recorded_motion\n",
             "[recorded]: crate::docs::recorded_motion#three-ways-to-learn\n",
@@ -89,6 +91,7 @@ pages! {
     symmetries "symmetries.md";
     constraints "constraints.md";
     certificates "certificates.md";
+    summary "summary.md";
     method "method.md";
     library "library.md";
     python "python.md";

@@ -18,7 +18,7 @@ pub enum Kind {
     Data,
     /// Ctrl-C, exit code 130, SIGTERM, exit code 143, or SIGHUP, exit code 129.
     Interrupted,
-    /// Whoever read our output has gone: no message, exit code 0.
+    /// Broken pipe: the program ends silently with code 0.
     ClosedPipe,
 }
 

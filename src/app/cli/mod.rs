@@ -79,8 +79,8 @@ use tracing_subscriber::fmt::FmtContext;
 use tracing_subscriber::fmt::format::{FormatEvent, FormatFields, Writer};
 use tracing_subscriber::registry::LookupSpan;
 
-/// Beginnings: the three things most people want to do, with a line each to copy.
-const BEGINNINGS: &str = "\
+/// The three things most people want to do, with a line each to copy.
+const EXAMPLES: &str = "\
 To learn a listed system, and see in report.html how good the result is:
   lnn train double-pendulum
 To look at a recording of your own, then to learn from it:
@@ -93,7 +93,7 @@ const TEMPLATE: &str = "{about}\n\n{before-help}{usage-heading} {usage}\n\n{all-
 
 /// Learn a Lagrangian from motion, predict motion that keeps its energy, read physics off the learned function.
 #[derive(Debug, Parser)]
-#[command(name = "lnn", version, arg_required_else_help = true, before_help = BEGINNINGS, help_template = TEMPLATE)]
+#[command(name = "lnn", version, arg_required_else_help = true, before_help = EXAMPLES, help_template = TEMPLATE)]
 struct Cli {
     #[command(subcommand)]
     command: Command,
@@ -156,7 +156,7 @@ pub fn main(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     }
 }
 
-/// Test of arguments, the first being the program's own name; nothing is run.
+/// Checks the arguments, the first being the program's own name, without running them.
 ///
 /// # Errors
 /// The usage error that the program ends with. Asking for help or for the version is none.
@@ -217,7 +217,7 @@ fn answer(error: &clap::Error) -> ExitCode {
     }
 }
 
-/// One line on standard error; if that is closed too, there is nobody to tell.
+/// Writes one line to standard error; if that is closed too, nothing more can be done.
 fn report(error: &CliError) {
     let _ = writeln!(std::io::stderr(), "error: {error}");
 }

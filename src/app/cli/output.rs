@@ -12,7 +12,7 @@ pub fn print(text: &str) -> Result<(), CliError> {
     out.write_all(text.as_bytes()).and_then(|()| out.flush()).map_err(|e| CliError::output(&e))
 }
 
-/// A remark on standard error, one line; if that is closed, there is nobody to tell.
+/// Writes a remark to standard error, one line; if that is closed, nothing more can be done.
 pub fn note(text: &str) {
     let _ = writeln!(std::io::stderr(), "note: {}", crate::names::one_line(text));
 }

@@ -96,6 +96,6 @@ mod tests {
         let refusal = open(&Wanted { overwrite: true, inputs: &[&input], ..asked }).unwrap_err().to_string();
         assert!(refusal.contains("this command reads it"), "{refusal}");
         let evaluator = Wanted { overwrite: true, writer: Writer::Evaluator, ..asked };
-        assert!(open(&evaluator).unwrap_err().to_string().contains("no place for an evaluation"));
+        assert!(open(&evaluator).unwrap_err().to_string().contains("an evaluation would replace"));
     }
 }

@@ -115,7 +115,7 @@ pub fn require_room(directory: &Path, writer: Writer, overwrite: bool) -> Result
     match (writer, overwrite) {
         (Writer::Evaluator, _) if learned => Err(CliError::file(
             directory,
-            format_args!("there is {what}, and a model is no place for an evaluation: {other}"),
+            format_args!("there is {what}, where an evaluation would replace the report of the model: {other}"),
         )),
         (_, true) => Ok(()),
         (_, false) => {

@@ -14,7 +14,7 @@ mod remarks;
 mod sweep;
 
 pub use budget::Scale;
-pub use record::{Learned, Outcome, Record, Row, Spread};
+pub use record::{Learned, Outcome, Record, Row, RunSpread};
 pub use remarks::{Quantity, Reduction};
 pub use sweep::{SWEEP, Variation, combinations, sweep_runs};
 

@@ -65,7 +65,7 @@ pub struct Record {
 
 /// Mean, median and range of a quantity over the runs of a row.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Spread {
+pub struct RunSpread {
     /// Mean.
     pub mean: f64,
     /// Median.
@@ -76,7 +76,7 @@ pub struct Spread {
     pub high: f64,
 }
 
-impl Spread {
+impl RunSpread {
     /// Of some values; `None` of none.
     pub fn of(values: impl IntoIterator<Item = f64>) -> Option<Self> {
         let mut values: Vec<f64> = values.into_iter().collect();
@@ -98,21 +98,21 @@ pub struct Row {
     /// Runs that learned nothing.
     pub failed: usize,
     /// Validation loss, paper convention.
-    pub loss: Option<Spread>,
+    pub loss: Option<RunSpread>,
     /// Training instability, paper convention.
-    pub instability: Option<Spread>,
+    pub instability: Option<RunSpread>,
     /// Loss in physical units.
-    pub normalised_loss: Option<Spread>,
+    pub normalised_loss: Option<RunSpread>,
     /// Instability in physical units.
-    pub normalised_instability: Option<Spread>,
+    pub normalised_instability: Option<RunSpread>,
     /// Fraction of states of wrong signature.
-    pub wrong_signature: Option<Spread>,
+    pub wrong_signature: Option<RunSpread>,
     /// Mean energy error over all starts.
-    pub energy: Option<Spread>,
+    pub energy: Option<RunSpread>,
     /// That over the starts whose exact motion is regular.
-    pub regular_energy: Option<Spread>,
+    pub regular_energy: Option<RunSpread>,
     /// That over the starts whose exact motion is chaotic.
-    pub chaotic_energy: Option<Spread>,
+    pub chaotic_energy: Option<RunSpread>,
     /// Starts integrated to the end, of all.
     pub integrated: (usize, usize),
     /// The paper's figures.
@@ -143,7 +143,7 @@ fn row(label: &str, results: &[(Run, Option<Record>)]) -> Row {
             Outcome::Nothing { .. } => None,
         })
         .collect();
-    let of = |part: fn(&Learned) -> Option<f64>| Spread::of(learned.iter().filter_map(|l| part(l)));
+    let of = |part: fn(&Learned) -> Option<f64>| RunSpread::of(learned.iter().filter_map(|l| part(l)));
     Row {
         label: label.to_string(),
         runs: records.len(),
@@ -153,9 +153,9 @@ fn row(label: &str, results: &[(Run, Option<Record>)]) -> Row {
         normalised_loss: of(|l| Some(l.validation_loss * l.scale)),
         normalised_instability: of(|l| l.instability.map(|i| i * l.scale)),
         wrong_signature: of(|l| Some(l.wrong_signature)),
-        energy: Spread::of(learned.iter().flat_map(|l| l.energy_errors.iter().copied().flatten())),
-        regular_energy: Spread::of(learned.iter().flat_map(|l| l.energy_of(true))),
-        chaotic_energy: Spread::of(learned.iter().flat_map(|l| l.energy_of(false))),
+        energy: RunSpread::of(learned.iter().flat_map(|l| l.energy_errors.iter().copied().flatten())),
+        regular_energy: RunSpread::of(learned.iter().flat_map(|l| l.energy_of(true))),
+        chaotic_energy: RunSpread::of(learned.iter().flat_map(|l| l.energy_of(false))),
         integrated: (learned.iter().map(|l| l.integrated).sum(), learned.iter().map(|l| l.energy_errors.len()).sum()),
         reported,
     }
@@ -199,11 +199,11 @@ mod tests {
         assert_eq!(rows.iter().map(|r| r.label.as_str()).collect::<Vec<_>>()[..2], ["GELU", "x tanh(kx)"]);
         let gelu = &rows[0];
         assert_eq!((gelu.runs, gelu.failed, gelu.integrated), (2, 0, (3, 4)));
-        assert_eq!(gelu.loss, Some(Spread { mean: 0.2, median: 0.2, low: 0.1, high: 0.3 }));
+        assert_eq!(gelu.loss, Some(RunSpread { mean: 0.2, median: 0.2, low: 0.1, high: 0.3 }));
         let energy = gelu.energy.unwrap();
         assert!((energy.mean - 0.4).abs() < 1e-15 && (energy.low, energy.high) == (0.1, 0.6));
-        assert_eq!(gelu.regular_energy, Some(Spread { mean: 0.3, median: 0.3, low: 0.1, high: 0.5 }));
-        assert_eq!(gelu.chaotic_energy, Some(Spread { mean: 0.6, median: 0.6, low: 0.6, high: 0.6 }));
+        assert_eq!(gelu.regular_energy, Some(RunSpread { mean: 0.3, median: 0.3, low: 0.1, high: 0.5 }));
+        assert_eq!(gelu.chaotic_energy, Some(RunSpread { mean: 0.6, median: 0.6, low: 0.6, high: 0.6 }));
         assert!((gelu.normalised_instability.unwrap().mean - 0.2).abs() < 1e-15);
         assert_eq!(gelu.reported.loss, Some(0.00738));
         assert_eq!((rows[1].runs, rows[1].failed, rows[1].loss), (1, 1, None));

@@ -76,7 +76,7 @@ pub enum PipelineError {
         /// The problem.
         source: CheckpointError,
     },
-    /// A system of which no black hole can be read.
+    /// The system is not a black-hole metric.
     #[error(
         "{0}: expected a metric of t, x, y, z or t, r, theta, phi around a centre, learned over a range of distances"
     )]

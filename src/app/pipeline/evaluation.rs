@@ -10,7 +10,7 @@ use crate::lagrangian::system::TrajectoryTest as Span;
 use crate::lagrangian::{EulerLagrange, SystemInstance};
 use crate::names::counted;
 use crate::network::NetworkLagrangian;
-use crate::pipeline::attention::Attention;
+use crate::pipeline::cancellation::Cancellation;
 use crate::pipeline::physics::{Physics, Subject};
 use crate::pipeline::{PipelineError, Watch, memory};
 use crate::random::RngStream;
@@ -130,11 +130,11 @@ pub fn evaluate(
     options: EvaluationOptions,
     watch: &Watch,
 ) -> Result<Evaluation, PipelineError> {
-    let (plan, attention) = (options, &Attention::new(watch, PIECES));
+    let (plan, cancellation) = (options, &Cancellation::new(watch, PIECES));
     let (q, v) = (plan.states.0.as_slice(), plan.states.1.as_slice());
     let n = system.coordinates;
     let exact = system.build()?;
-    let (exact, learned) = (attention.watched(exact.as_ref()), attention.watched(network));
+    let (exact, learned) = (cancellation.watched(exact.as_ref()), cancellation.watched(network));
     let (exact, learned): (&dyn EulerLagrange<f64>, &dyn EulerLagrange<f64>) = (&exact, &learned);
     let coordinates = system.system.coordinates(n);
     let periodic: Vec<bool> = coordinates.iter().map(|c| c.periodic).collect();
@@ -144,8 +144,8 @@ pub fn evaluate(
     let accelerations = acceleration_errors(exact, learned, q, v);
     let wrong_signature = wrong_signatures(exact, learned, q, v);
     let mass_matrix = mass_matrix_error(exact, learned, q);
-    attention.check()?;
-    attention.advance(1);
+    cancellation.check()?;
+    cancellation.advance(1);
 
     let defaults = TrajectoryTest::new(StartBox { q: start.positions, v: start.velocities }, periodic);
     // Steps grow with the time, and with the fifth root of the accuracy.
@@ -164,7 +164,7 @@ pub fn evaluate(
     };
     let mut runs = test.run_constrained(system, exact, learned)?;
     runs.retain(|run| !run.is_interrupted());
-    attention.advance(1);
+    cancellation.advance(1);
     let motion = |run: &TrajectoryRun<f64>| Motion {
         summary: run.summary(),
         conserved_error: conserved_error(system, &run.learned.trajectory).map(statistics),
@@ -172,19 +172,19 @@ pub fn evaluate(
     };
 
     let (mut portraits, mut figures) = (Vec::new(), Vec::new());
-    if !attention.is_interrupted() {
+    if !cancellation.is_interrupted() {
         portraits = test.portraits(exact, learned, &runs[..runs.len().min(DRAWN)]);
         figures = evaluation_figures(&runs, &portraits, system);
         match grids(system, exact, learned) {
-            Err(_) if attention.is_interrupted() => {}
+            Err(_) if cancellation.is_interrupted() => {}
             drawn => figures.extend(drawn?),
         }
     }
-    if attention.is_interrupted() {
+    if cancellation.is_interrupted() {
         // They would show where the models were ended.
         (portraits, figures) = (Vec::new(), Vec::new());
     }
-    attention.advance(1);
+    cancellation.advance(1);
     let subject = Subject {
         network,
         trained: &plan.trained,
@@ -196,7 +196,7 @@ pub fn evaluate(
         threads: plan.threads,
     };
     let mut physics = Physics::nothing(&subject);
-    let interrupted = match physics.find(&subject, &|| attention.check()) {
+    let interrupted = match physics.find(&subject, &|| cancellation.check()) {
         Ok(()) => None,
         Err(PipelineError::Interrupted) => {
             physics.left_out.push("whatever is not here: interrupted".to_string());
@@ -204,7 +204,7 @@ pub fn evaluate(
         }
         Err(error) => return Err(error),
     };
-    attention.advance(1);
+    cancellation.advance(1);
     Ok(Evaluation {
         accelerations,
         wrong_signature,

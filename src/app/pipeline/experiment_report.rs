@@ -43,8 +43,8 @@ const CONVENTIONS: &str = "Losses are the paper's: half the mean absolute error 
                            they are physical. Several runs: mean [lowest, highest]. Wrong signature: share of the fresh \
                            states. Integrated: starts of the trajectory test whose learned motion reached its end.";
 
-/// Writes table, pictures and report. They depend on the records alone: what the clock told, but for curves of loss against time,
-/// is said in words for a terminal, where `started` is the beginning of this process's work.
+/// Writes table, pictures and report. They depend on the records alone. Times, but for the curves of loss against time, stand only
+/// in the text for a terminal, where `started` is the beginning of this process's work.
 pub(crate) fn conclude(
     (experiment, scale): (&Experiment, Scale),
     results: Results,

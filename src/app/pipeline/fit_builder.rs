@@ -105,7 +105,7 @@ impl Fit {
         self
     }
 
-    /// Changes what else is said of the columns: times, units, measured velocities.
+    /// Changes the other meanings of columns: times, units, measured velocities.
     pub fn columns(mut self, change: impl FnOnce(&mut Columns)) -> Self {
         change(&mut self.columns);
         self
@@ -161,7 +161,7 @@ impl Fit {
     /// Reads, learns, and judges by held-out motion.
     ///
     /// # Errors
-    /// [`PipelineError::Data`] for files that are not as said; as of [`PreparedFit::new`] and [`fit`].
+    /// [`PipelineError::Data`] for files that do not fit their description; as of [`PreparedFit::new`] and [`fit`].
     pub fn run(self) -> Result<FitReport, PipelineError> {
         let Self { source, columns, options, change, friction, structure, precision, threads, out, watch } = self;
         let (loaded, files) = match source {

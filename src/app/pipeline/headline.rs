@@ -2,7 +2,7 @@
 //! terminal and at the beginning of a report.
 
 use crate::analysis::{PredictionError, ValidTimes};
-use crate::experiments::{Row, Spread};
+use crate::experiments::{Row, RunSpread};
 use crate::names::{counted, number, percent};
 use crate::pipeline::evaluation::Evaluation;
 use crate::pipeline::hold_out::{HoldOut, factor};
@@ -210,7 +210,8 @@ pub(crate) fn of_experiment(rows: &[Row]) -> Headline {
         Some(own) => format!("Lowest loss {}{below}.", of(own)),
         None => "No run learned anything.".to_string(),
     };
-    let share = |of: fn(&Row) -> Option<Spread>| percent(own.and_then(|(row, _)| of(row)).map_or(f64::NAN, |s| s.mean));
+    let share =
+        |of: fn(&Row) -> Option<RunSpread>| percent(own.and_then(|(row, _)| of(row)).map_or(f64::NAN, |s| s.mean));
     let stated = paper.map(|paper| ("Lowest loss in the paper", of(paper)));
     let table = [
         ("Runs", if failed == 0 { runs.to_string() } else { format!("{runs}, {failed} learned nothing") }),
@@ -302,7 +303,7 @@ mod tests {
 
     #[test]
     fn experiments_stand_beside_the_paper() {
-        let spread = |x: f64| Some(Spread { mean: x, median: x, low: x, high: x });
+        let spread = |x: f64| Some(RunSpread { mean: x, median: x, low: x, high: x });
         let row = |label: &str, loss, paper, failed| Row {
             label: label.into(),
             runs: 2,

@@ -8,7 +8,7 @@ use crate::data::Split;
 use crate::lagrangian::{EulerLagrange, Request, Terms};
 use crate::linalg::{SignatureBuffers, has_signature};
 use crate::names::number;
-use crate::pipeline::attention::Attention;
+use crate::pipeline::cancellation::Cancellation;
 use crate::pipeline::energy::{Balance, balance, energy_figure};
 use crate::pipeline::prediction::HeldOutPredictions;
 use crate::pipeline::{PipelineError, Watch};
@@ -18,7 +18,7 @@ use serde::Serialize;
 
 /// Windows that are predicted at most; of more, evenly spaced ones.
 const WINDOWS: usize = 500;
-/// Samples ahead that are predicted unless told otherwise.
+/// Samples ahead that are predicted by default.
 const AHEAD: f64 = 200.0;
 /// Points of a curve of prediction errors.
 const POINTS: usize = 40;
@@ -84,7 +84,7 @@ pub struct HoldOut {
     pub constant_velocity: Vec<PredictionError>,
     /// Fraction of the held-out states whose mass matrix has not the right signature; `NaN` where nothing was held out.
     pub wrong_signature: f64,
-    /// Energy along the held-out trajectories; none if there is none of it to be told.
+    /// Energy along the held-out trajectories; none if the model gives no finite energy.
     pub(crate) energy: Option<Balance>,
     /// Pictures.
     #[serde(skip)]
@@ -100,7 +100,7 @@ pub fn evaluate_hold_out(
     options: &HoldOutOptions<'_>,
     watch: &Watch,
 ) -> Result<HoldOut, PipelineError> {
-    let (attention, plan) = (&Attention::new(watch, WINDOWS), options);
+    let (cancellation, plan) = (&Cancellation::new(watch, WINDOWS), options);
     let (n, recording) = (model.coordinates(), &plan.part.recording);
     if recording.tracks.is_empty() {
         return Ok(HoldOut::nothing());
@@ -122,9 +122,9 @@ pub fn evaluate_hold_out(
         .collect();
     let stride = windows.len().div_ceil(WINDOWS).max(1);
     windows = windows.into_iter().step_by(stride).collect();
-    let watched = attention.watched(model);
+    let watched = cancellation.watched(model);
     let model: &dyn EulerLagrange<f64> = &watched;
-    let foretold = HeldOutPredictions::new(model, windows, plan.threads, attention)?;
+    let foretold = HeldOutPredictions::new(model, windows, plan.threads, cancellation)?;
     let (windows, motion) = (&foretold.windows, &foretold.predictions);
     let straight = predict_by_constant_velocity(windows);
     let errors = |predictions: &Predictions, count: usize| -> Vec<PredictionError> {
@@ -159,7 +159,7 @@ pub fn evaluate_hold_out(
     figures.extend(energy_figure(model, plan.part));
     let tabled = |predictions: &Predictions| if windows.is_empty() { Vec::new() } else { errors(predictions, TIMES) };
     let (wrong_signature, energy) = (wrong_signature(model, plan.part, plan.time), balance(model, plan.part));
-    attention.check()?;
+    cancellation.check()?;
     let (model, constant_velocity) = (tabled(motion), tabled(&straight));
     let apart = |predictions: &Predictions| -> Vec<Vec<f64>> {
         model.iter().map(|error| coordinate_errors(windows, predictions, periodic, error.seconds)).collect()

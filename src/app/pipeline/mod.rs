@@ -49,7 +49,7 @@
 //! # Ok::<(), lnn::pipeline::PipelineError>(())
 //! ```
 
-mod attention;
+mod cancellation;
 mod checkpoints;
 mod determination;
 mod energy;

@@ -120,6 +120,6 @@ mod tests {
         );
         assert!(second["weights"].is_null() && second["loss"].is_null());
         assert!(table.header.iter().any(|key| key == "network.initialization"), "{:?}", table.header);
-        assert!(!table.header.iter().any(|key| key == "network.activation" || key == "system"), "{:?}", table.header);
+        assert!(!table.header.iter().any(|key| key == "precision" || key == "system"), "{:?}", table.header);
     }
 }

@@ -10,7 +10,7 @@ use std::path::Path;
 
 /// The model to start from, as far as the shape of a training is concerned.
 pub struct StartModel {
-    /// Where it is, as the user said it.
+    /// Where it is, as the user gave it.
     pub from: String,
     /// Header of its file.
     pub header: Header,

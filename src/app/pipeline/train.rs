@@ -118,7 +118,7 @@ impl TrainReport {
         format!("{}\n{}\n", self.evaluation.text(&self.title), self.headline())
     }
 
-    /// The losses in one line.
+    /// One-line summary of the run.
     fn headline(&self) -> String {
         let TrainFigures { validation_loss, test_loss, epochs, weights, .. } = self.figures;
         let fresh = match test_loss {
@@ -217,8 +217,8 @@ fn train_in<S: Scalar>(
         .map(|checkpoints| checkpoints.open::<S>(&toml, data.checksums(), (parameters, config.data.training), watch));
     let (keeper, restored) = opened.transpose()?.map_or((None, None), |(keeper, start)| (Some(keeper), start));
     let start = restored.or_else(|| before.map(Snapshot::beginning_with));
-    let sitting = ResumeOptions { checkpoints: keeper, start };
-    let trained = resume(config, &architecture, penalty, data, options.threads, &watch.hooks(), sitting)?;
+    let resumed = ResumeOptions { checkpoints: keeper, start };
+    let trained = resume(config, &architecture, penalty, data, options.threads, &watch.hooks(), resumed)?;
 
     // The model first, then what is small, pictures last: on a full disk nothing that comes after can lose them.
     let header = header(config, system, architecture.clone(), imposed, trained.validation_loss);

@@ -1,12 +1,12 @@
 //! Tables and pictures of an experiment: the paper's figures beside ours.
 
 use super::{DataTable, Figure, LinePlot, Series, figure, line_plot};
-use crate::experiments::{Experiment, Outcome, Picture, Record, Reduction, Row, Run, Spread};
+use crate::experiments::{Experiment, Outcome, Picture, Record, Reduction, Row, Run, RunSpread};
 use crate::names::rounded;
 use serde_json::json;
 
 /// A quantity of a row, and the paper's figure beside it if it states one.
-type Quantity = (&'static str, fn(&Row) -> Option<Spread>, Option<fn(&Row) -> Option<f64>>);
+type Quantity = (&'static str, fn(&Row) -> Option<RunSpread>, Option<fn(&Row) -> Option<f64>>);
 
 /// Quantities of the table of an experiment, in the order of its columns.
 const QUANTITIES: [Quantity; 8] = [
@@ -85,8 +85,8 @@ fn one(x: Option<f64>, factor: f64) -> String {
 }
 
 /// A spread as `mean [low, high]`, or the value alone where there is no spread.
-fn spread(value: Option<Spread>, factor: f64) -> String {
-    let Some(Spread { mean, low, high, .. }) = value else { return NONE.to_string() };
+fn spread(value: Option<RunSpread>, factor: f64) -> String {
+    let Some(RunSpread { mean, low, high, .. }) = value else { return NONE.to_string() };
     let [mean, least, most] = [mean, low, high].map(|x| one(Some(x), factor));
     if low == high { mean } else { format!("{mean} [{least}, {most}]") }
 }
@@ -319,7 +319,7 @@ mod tests {
 
     #[test]
     fn our_figures_and_the_papers_stand_side_by_side() {
-        let spread = |mean: f64, by: f64| Some(Spread { mean, median: mean, low: mean - by, high: mean + by });
+        let spread = |mean: f64, by: f64| Some(RunSpread { mean, median: mean, low: mean - by, high: mean + by });
         let row = Row {
             label: "triple-pendulum".into(),
             runs: 3,
@@ -351,7 +351,7 @@ mod tests {
         let file = experiment_table(&[row]).objects().remove(0);
         let number = |name: &str| file[name].as_f64();
         let loss = ["loss_median", "loss_low", "loss_high", "loss_paper"].map(number);
-        assert_eq!(loss, [Some(0.0123456), Some(0.0113456), Some(0.0133456), Some(0.01972)]);
+        assert_eq!(loss, [0.0123456, 0.0123456 - 0.001, 0.0123456 + 0.001, 0.01972].map(Some));
         assert_eq!(
             (number("regular_energy_error_median"), number("regular_energy_error_paper")),
             (Some(4.6e-4), Some(0.0058))

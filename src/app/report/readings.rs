@@ -1,6 +1,6 @@
 //! Tables of what learned metrics say of black holes.
 
-use crate::experiments::Spread;
+use crate::experiments::RunSpread;
 use crate::names::{percentage, rounded};
 use crate::relativity::Reading;
 
@@ -20,10 +20,12 @@ fn line(reading: &Reading, runs: &[Vec<Reading>]) -> Vec<String> {
     let all: Vec<Reading> = runs.iter().filter_map(same).collect();
     let dash = || "-".to_string();
     let digits = |x: f64| rounded(x, 5);
-    let learned =
-        Spread::of(all.iter().filter_map(|r| r.learned)).map_or_else(dash, |Spread { mean, low, high, .. }| {
+    let learned = RunSpread::of(all.iter().filter_map(|r| r.learned)).map_or_else(
+        dash,
+        |RunSpread { mean, low, high, .. }| {
             if low == high { digits(mean) } else { format!("{} [{}, {}]", digits(mean), digits(low), digits(high)) }
-        });
+        },
+    );
     let mut errors: Vec<f64> = all.iter().filter_map(|r| r.error).filter(|e| e.is_finite()).collect();
     errors.sort_by(f64::total_cmp);
     let (median, largest) = (errors.get(errors.len() / 2).copied(), errors.last().copied());

@@ -10,7 +10,7 @@ const LEAST: usize = 24;
 /// Text of a table with aligned columns: numbers to the right, words to the left, no trailing blanks, lines of at most
 /// `WIDTH` characters.
 ///
-/// A table that is wider has its headers cut at blanks, then its longest words, and at last it is cut into several tables below
+/// Of a table that is wider the headers are wrapped at spaces, then the longest words; finally it is split into several tables below
 /// each other, which begin with the same column. Rows may be shorter than the header. A cell counts as a number if it begins
 /// with a digit, a sign or a point.
 pub fn text_table<H: AsRef<str>, C: AsRef<str>>(headers: &[H], rows: &[Vec<C>]) -> String {

@@ -20,7 +20,7 @@ impl CoordinateError {
         let rows = self.per_coordinate.chunks_exact(self.coordinates.max(1));
         let worst = |row: &[f64]| {
             let errors = coordinates.iter().filter_map(|&i| row.get(i).copied());
-            errors.fold(0.0, |worst: f64, error| if error <= worst { worst } else { error })
+            errors.fold(0.0, |worst: f64, error| if error <= worst || worst.is_nan() { worst } else { error })
         };
         rows.map(worst).collect()
     }

@@ -101,7 +101,7 @@ fn without_a_directory_a_number_is_found() {
     into("runs/double-pendulum/evaluation-2")
         .refused(1, &["an evaluation of double-pendulum", "--overwrite replaces it"]);
     let over = here(&[&evaluate[..], &["--out", "runs/double-pendulum-2", "--overwrite"]].concat());
-    over.refused(1, &["runs/double-pendulum-2: there is a finished training", "no place for an evaluation"]);
+    over.refused(1, &["runs/double-pendulum-2: there is a finished training", "an evaluation would replace"]);
     assert!(folder.path("runs/double-pendulum-2/summary.json").is_file());
 }
 

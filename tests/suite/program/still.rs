@@ -57,7 +57,7 @@ fn a_fit_begins_where_the_check_says_so() {
     let folder = Folder::new();
     let out = folder.path("out");
     let all = csv(|t| [(3.0 * t).sin(), 0.5 * (5.0 * t).cos()]);
-    for (rows, good) in [(20, false), (38, false), (50, true), (80, true)] {
+    for (rows, good) in [(20, false), (36, false), (50, true), (80, true)] {
         let part: String = all.lines().take(rows + 1).map(|line| format!("{line}\n")).collect();
         let data = folder.file(&format!("{rows}.csv"), part);
         let found = lnn(&["check", &data, "--coords", "x,y", "--json"]);

@@ -7,7 +7,7 @@ use std::fs;
 
 /// A training of a moment.
 const SMALL: &str =
-    "system = \"double-pendulum\"\n[data]\ntraining = 128\nvalidation = 64\ntest = 64\n[network]\nhidden = [4]\n";
+    "system = \"harmonic-oscillator\"\n[data]\ntraining = 128\nvalidation = 64\ntest = 64\n[network]\nhidden = [4]\n";
 
 fn sweep(file: &str, out: &str, more: &[&str]) -> Run {
     let vary = ["--vary", "penalty.lambda=0.5,2", "--vary", "network.hidden=[4],[3,3]"];

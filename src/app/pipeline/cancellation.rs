@@ -1,4 +1,4 @@
-//! Work on a finished model: it says how far it is, and the flag of its [`Watch`] ends it.
+//! Progress and cancellation of the work on a finished model: it reports how far it is, and the flag of its [`Watch`] ends it.
 
 use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Terms};
 use crate::pipeline::{Event, PipelineError, Watch};
@@ -7,9 +7,9 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// Evaluations between two reports.
 const OFTEN: u64 = 1024;
 
-/// Watch over such work.
+/// Reports progress and honours the flag.
 #[derive(Debug)]
-pub(crate) struct Attention<'a> {
+pub(crate) struct Cancellation<'a> {
     watch: &'a Watch,
     /// `true` if the flag counts.
     counts: bool,
@@ -18,8 +18,8 @@ pub(crate) struct Attention<'a> {
     evaluations: AtomicU64,
 }
 
-impl<'a> Attention<'a> {
-    /// Attention to so many pieces of work. A flag that was raised before does not count: it ended the training.
+impl<'a> Cancellation<'a> {
+    /// Cancellation of so many pieces of work. A flag that was raised before does not count: it ended the training.
     pub fn new(watch: &'a Watch, pieces: usize) -> Self {
         let counts = !watch.is_interrupted();
         watch.say(Event::Judged { done: 0, total: pieces });
@@ -47,14 +47,14 @@ impl<'a> Attention<'a> {
 
     /// The same model; once the flag was raised it fails everywhere, which ends whatever integrates it.
     pub fn watched<'b>(&'b self, model: &'b dyn EulerLagrange<f64>) -> Watched<'b> {
-        Watched { model, attention: self }
+        Watched { model, cancellation: self }
     }
 }
 
-/// A model under [`Attention`].
+/// A model under [`Cancellation`].
 pub(crate) struct Watched<'a> {
     model: &'a dyn EulerLagrange<f64>,
-    attention: &'a Attention<'a>,
+    cancellation: &'a Cancellation<'a>,
 }
 
 impl EulerLagrange<f64> for Watched<'_> {
@@ -63,12 +63,12 @@ impl EulerLagrange<f64> for Watched<'_> {
     }
 
     fn terms(&self, q: &[f64], v: &[f64], request: Request, terms: &mut Terms<f64>) -> Result<(), MechanicsError> {
-        let Attention { watch, evaluations, .. } = self.attention;
+        let Cancellation { watch, evaluations, .. } = self.cancellation;
         let before = evaluations.fetch_add(1, Ordering::Relaxed);
         if before % OFTEN == 0 {
             watch.say(Event::Evaluations(before));
         }
-        if self.attention.is_interrupted() {
+        if self.cancellation.is_interrupted() {
             terms.clear();
             return Err(MechanicsError::Interrupted);
         }
