@@ -60,10 +60,8 @@ class LagrangianRegressor(RegressorMixin, BaseEstimator):
         X, y = validate_data(self, X, y, dtype=np.float64, y_numeric=True, multi_output=True)
         a = y[:, None] if y.ndim == 1 else y
         if X.shape[1] != 2 * a.shape[1]:
-            raise ValueError(
-                f"X has {X.shape[1]} features and y {a.shape[1]} targets: expected coordinates and velocities, two features for each "
-                "acceleration"
-            )
+            found = f"n_samples = {X.shape[0]}, n_features = {X.shape[1]}, targets = {a.shape[1]}"
+            raise ValueError(f"expected two features for each acceleration, coordinates before velocities, found {found}")
         names = [f"q{i + 1}" for i in range(a.shape[1])]
         learned = learn(
             *np.hsplit(X, 2),
