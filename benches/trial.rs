@@ -2,6 +2,7 @@
 #![allow(dead_code, unused_imports, reason = "the mains of the benchmarks are not called")]
 #![allow(clippy::duplicate_mod, clippy::module_inception, reason = "each benchmark is a program of its own too")]
 
+mod constraints;
 mod linalg;
 mod measured;
 mod network;
@@ -27,4 +28,5 @@ fn main() {
     soak::soak(0.0);
     measured::trial();
     work_precision::trial();
+    constraints::trial();
 }

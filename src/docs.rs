@@ -11,6 +11,7 @@
 //! | [`geometry`] | metric, connection, curvature of a Lagrangian, learned or written down |
 //! | [`black_holes`] | the metric of a black hole learned from free fall, and what is read off it |
 //! | [`symmetries`] | what is conserved: symmetries, charges, what two Lagrangians have in common |
+//! | [`constraints`] | constraints beside a Lagrangian, found in data, kept in roll-outs; degenerate Lagrangians |
 //! | [`certificates`] | proofs that a mass matrix has its signature |
 //! | [`method`] | equations, penalties, identities, units and conventions |
 //! | [`library`] | features, a Lagrangian of your own, states of your own, examples |
@@ -43,6 +44,7 @@ macro_rules! page {
             "[orbits]: crate::docs::black_holes#recorded-orbits\n",
             "[symmetries]: crate::docs::symmetries\n",
             "[canonical]: crate::docs::symmetries#canonical-form\n",
+            "[constraints]: crate::docs::constraints\n",
             "[certificates]: crate::docs::certificates\n",
             "[method]: crate::docs::method\n",
             "[conventions]: crate::docs::method#units-and-conventions\n",
@@ -83,6 +85,7 @@ pages! {
     geometry "geometry.md";
     black_holes "black-holes.md";
     symmetries "symmetries.md";
+    constraints "constraints.md";
     certificates "certificates.md";
     method "method.md";
     library "library.md";

@@ -30,6 +30,7 @@
 //! | store and load models | [`network::file::ModelFile`] |
 //! | differentiate a function of yours | [`tape::gradient`], [`tape::hessian`]; over many states [`tape::Program`] |
 //! | solve small symmetric systems in batches | [`linalg`] |
+//! | put constraints beside a Lagrangian, find those that recorded motion obeys | [`lagrangian::Constrained`], [`constraints`] |
 //! | find what a Lagrangian conserves, compare two Lagrangians | [`symmetry::symmetries`], [`symmetry::quadratic`], [`symmetry::compare`] |
 //! | see the shadow of a black hole and the sky around it | [`relativity::shadow()`], [`relativity::outline`] |
 //! | prove where a mass matrix has its signature | [`certificate`] |
@@ -177,6 +178,8 @@ pub use numerics::ops;
 pub use numerics::{forward, linalg, random, scalar, tape};
 #[cfg(feature = "training")]
 pub use physics::analysis;
+#[cfg(feature = "data")]
+pub use physics::constraints;
 pub use physics::{certificate, geometry};
 #[cfg(feature = "rollout")]
 pub use physics::{relativity, symmetry};

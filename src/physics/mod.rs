@@ -3,6 +3,7 @@
 //! | module | contents |
 //! |---|---|
 //! | [`geometry`] | metric, connection, curvature, surfaces where a metric changes its character |
+//! | [`constraints`] | constraints found in recorded motion |
 //! | [`symmetry`] | symmetries and conserved quantities, charges along motion, comparison of two Lagrangians |
 //! | [`certificate`] | proofs of the signature of mass matrices over boxes |
 //! | [`analysis`] | errors of accelerations, energy and trajectories, Lyapunov times, what data determine |
@@ -11,6 +12,8 @@
 #[cfg(feature = "training")]
 pub mod analysis;
 pub mod certificate;
+#[cfg(feature = "data")]
+pub mod constraints;
 pub mod geometry;
 #[cfg(feature = "rollout")]
 pub mod relativity;

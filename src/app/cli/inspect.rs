@@ -1,11 +1,12 @@
 //! `lnn inspect`: the Euler-Lagrange terms of states, full digits.
 
+use crate::cli::constraints::constrained;
 use crate::cli::inverse::inverse;
 use crate::cli::number::{Precision, list};
 use crate::cli::shown::{CHUNK, Field, Format, Shape, explain, report_failures, show};
 use crate::cli::source::{Source, parameter};
 use crate::cli::{CliError, States, input, output, parse_states, states};
-use crate::lagrangian::{EulerLagrange, Request, Terms};
+use crate::lagrangian::{EulerLagrange, LeastNorm, ManifoldRows, ReducedMass, Request, Terms};
 use crate::linalg::{Workspace, eigenvalues};
 use crate::scalar::{Dd, Scalar};
 use crate::symmetry::{Canonical, CanonicalForm, SymmetryError};
@@ -44,6 +45,13 @@ pub struct Args {
         conflicts_with = "inverse"
     )]
     canonical: Option<String>,
+    /// Constraints that hold the motion, a file with a table [constraints] as `lnn constraints --out` writes it.
+    #[arg(long, value_name = "FILE.toml", conflicts_with = "inverse")]
+    constraints: Option<PathBuf>,
+    /// Take the acceleration of least norm where the mass matrix is singular; the directions that this chose are printed as
+    /// null_directions.
+    #[arg(long, conflicts_with = "inverse")]
+    least_norm: bool,
     /// Precision of everything, the reading of the states included.
     #[arg(long, value_enum, value_name = "TYPE", default_value = "f64")]
     precision: Precision,
@@ -88,6 +96,11 @@ fn inspect<S: Scalar>(args: &Args) -> Result<(), CliError> {
 
     let n = source.columns.len() / 2;
     let Source { model, columns, .. } = source;
+    let few = (STATES * n).min(states.q.len());
+    let model = match &args.constraints {
+        Some(file) => constrained(model, &columns, file, (&states.q[..few], &states.v[..few]))?,
+        None => model,
+    };
     let (model, factor) = match &args.canonical {
         None => (model, None),
         Some(text) => {
@@ -95,6 +108,7 @@ fn inspect<S: Scalar>(args: &Args) -> Result<(), CliError> {
             (model, Some(form.factor))
         }
     };
+    let model: Model<S> = if args.least_norm { Box::new(LeastNorm(model)) } else { model };
     let mut failures: Vec<(usize, String)> = Vec::new();
     let mut terms = Terms::default();
     for ((q, v), rows) in states.q.chunks(CHUNK * n).zip(states.v.chunks(CHUNK * n)).zip(states.rows.chunks(CHUNK)) {
@@ -102,10 +116,16 @@ fn inspect<S: Scalar>(args: &Args) -> Result<(), CliError> {
         let outcome = model.terms(q, v, Request::ALL, &mut terms);
         let told = terms.drain_failures(outcome).map_err(|error| CliError::data(format_args!("{place}: {error}")))?;
         let spectrum = spectrum(n, &terms.mass_matrix);
+        let held = Held::of(model.as_ref(), q, v, &terms);
         let mut told = told.into_iter().peekable();
         for (k, &row) in rows.iter().enumerate() {
             let problem = told.next_if(|failure| failure.row() == Some(k)).map(explain);
-            text += &show(args.format, row, &fields(n, k, &terms, &spectrum, factor.as_ref()), problem.as_deref());
+            text += &show(
+                args.format,
+                row,
+                &fields(n, k, &terms, &spectrum, &held[k], factor.as_ref()),
+                problem.as_deref(),
+            );
             failures.extend(problem.map(|text| (row, text)));
         }
         output::print(&text)?;
@@ -146,29 +166,87 @@ fn spectrum<S: Scalar>(n: usize, matrices: &[S]) -> Vec<S> {
     values
 }
 
+/// What constraints say of a state, and where its Lagrangian is degenerate.
+#[derive(Default)]
+struct Held<S> {
+    /// `phi(q)`, and `A v - b`.
+    values: Vec<S>,
+    rates: Vec<S>,
+    /// Eigenvalues of the mass matrix within the constraints.
+    eigenvalues: Vec<S>,
+    /// Directions within the constraints along which the mass matrix vanishes, row by row.
+    open: Vec<S>,
+}
+
+/// States of the file at which constraints are examined.
+const STATES: usize = 24;
+/// An eigenvalue below so many roundings of the largest counts as zero.
+const ROUNDINGS: f64 = 1024.0;
+
+impl<S: Scalar> Held<S> {
+    /// Of every state of a batch.
+    fn of(model: &dyn EulerLagrange<S>, q: &[S], v: &[S], terms: &Terms<S>) -> Vec<Self> {
+        let (n, m) = (model.coordinates(), terms.constraints);
+        let states = q.chunks_exact(n).zip(v.chunks_exact(n)).enumerate();
+        states
+            .map(|(k, (q, v))| {
+                let mut rows = ManifoldRows::default();
+                if let Some(manifold) = model.manifold() {
+                    manifold.rows(q, v, &mut rows);
+                }
+                let (mass, matrix) = (&terms.mass_matrix[k * n * n..(k + 1) * n * n], &terms.constraint_matrix);
+                let reduced = ReducedMass::of(n, mass, &matrix[k * m * n..(k + 1) * m * n]).ok();
+                let open = reduced.iter().flat_map(|reduced| reduced.null_directions(ROUNDINGS)).flatten().copied();
+                let open = open.collect();
+                Self {
+                    values: rows.values,
+                    rates: rows.rates,
+                    open,
+                    eigenvalues: reduced.map(|reduced| reduced.eigenvalues).unwrap_or_default(),
+                }
+            })
+            .collect()
+    }
+}
+
 /// Everything there is to say about state `k` of a batch; `factor` is that of a canonical form.
 fn fields<'a, S>(
     n: usize,
     k: usize,
     terms: &'a Terms<S>,
     spectrum: &'a [S],
+    held: &'a Held<S>,
     factor: Option<&'a S>,
 ) -> Vec<Field<'a, S>> {
     let part = |values: &'a [S], size: usize| values.get(k * size..(k + 1) * size).unwrap_or(&[]);
     let number = |name, values| Field { name, values: part(values, 1), shape: Shape::Number };
-    let vector = |name, values| Field { name, values: part(values, n), shape: Shape::Vector };
+    let vector = |name, values, size| Field { name, values: part(values, size), shape: Shape::Vector };
+    let whole = |name, values, shape| Field { name, values, shape };
+    let m = terms.constraints;
     let mut fields = vec![
         number("lagrangian", &terms.lagrangian),
-        vector("momentum", &terms.momentum),
-        vector("dl_dq", &terms.dl_dq),
+        vector("momentum", &terms.momentum, n),
+        vector("dl_dq", &terms.dl_dq, n),
         Field { name: "mass_matrix", values: part(&terms.mass_matrix, n * n), shape: Shape::Matrix },
-        vector("eigenvalues", spectrum),
-        vector("coriolis", &terms.momentum_drift),
-        vector("acceleration", &terms.acceleration),
+        vector("eigenvalues", spectrum, n),
+        vector("coriolis", &terms.momentum_drift, n),
+        vector("acceleration", &terms.acceleration, n),
         number("energy", &terms.energy),
     ];
     if !terms.force.is_empty() {
-        fields.extend([vector("force", &terms.force), number("dissipation", &terms.dissipation)]);
+        fields.extend([vector("force", &terms.force, n), number("dissipation", &terms.dissipation)]);
+    }
+    if m > 0 {
+        fields.extend([
+            vector("multipliers", &terms.multipliers, m),
+            vector("constraint_force", &terms.constraint_force, n),
+            whole("constraint_values", &held.values, Shape::Vector),
+            whole("constraint_rates", &held.rates, Shape::Vector),
+            whole("reduced_eigenvalues", &held.eigenvalues, Shape::Vector),
+        ]);
+    }
+    if !held.open.is_empty() {
+        fields.push(whole("null_directions", &held.open, Shape::Matrix));
     }
     let factor = factor.map(|factor| std::slice::from_ref(factor));
     fields.extend(factor.map(|values| Field { name: "canonical_factor", values, shape: Shape::Number }));

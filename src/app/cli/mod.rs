@@ -12,6 +12,7 @@ mod chosen;
 mod compare;
 mod config;
 mod config_file;
+mod constraints;
 mod differences;
 mod error;
 mod evaluate;
@@ -117,6 +118,8 @@ enum Command {
     Geometry(geometry::Args),
     /// Follow light through a metric, learned or exact: the shadow of a black hole and the sky around it.
     Shadow(shadow::Args),
+    /// Find the constraints that recorded motion obeys, or what a Lagrangian leaves open.
+    Constraints(Box<constraints::Args>),
     /// Find the symmetries of a Lagrangian and what its motion conserves.
     Symmetries(symmetries::Args),
     /// Say what two Lagrangians have in common beyond factor and gauge.
@@ -174,6 +177,7 @@ fn run(command: Command, words: &[OsString]) -> Result<(), CliError> {
         Command::Evaluate(args) => evaluate::run(&args),
         Command::Experiment(args) => experiment::run(&args),
         Command::Inspect(args) => inspect::run(&args),
+        Command::Constraints(args) => constraints::run(&args),
         Command::Geometry(args) => geometry::run(&args),
         Command::Shadow(args) => shadow::run(&args),
         Command::Symmetries(args) => symmetries::run(&args),

@@ -11,6 +11,7 @@ use crate::symmetry::{
     Basis, Chart, Degrees, MOST_UNKNOWNS, Region, Symmetries, TOLERANCES, bases, enough, middle, most_states,
     most_symmetries, unknowns,
 };
+use std::collections::BTreeMap;
 use std::path::Path;
 
 /// A Lagrangian with what is known of its coordinates.
@@ -63,12 +64,38 @@ pub fn tolerance(text: &str) -> Result<f64, String> {
     value.ok_or_else(|| format!("expected a number from {least:.1e} (rounding) to {most} (no symmetry any more)"))
 }
 
+/// `true` for a file or directory that is none of a system.
+fn is_model(text: &str) -> bool {
+    Path::new(text).exists() && !chosen::is_file(text)
+}
+
 impl Probe {
+    /// A model or a system, with constraints as well.
+    ///
+    /// # Errors
+    /// As [`Probe::system`] and [`Probe::model`].
+    pub fn with_constraints(text: &str) -> Result<Self, CliError> {
+        if is_model(text) { Self::model(Path::new(text)) } else { Self::system_with_constraints(text, &[]) }
+    }
+
     /// A system by name or by file.
     ///
     /// # Errors
     /// A usage error for an unknown name, a mistake in a file or a wrong parameter.
     pub fn system(name: &str, given: &[(String, String)]) -> Result<Self, CliError> {
+        let probe = Self::system_with_constraints(name, given)?;
+        if probe.model.manifold().is_some() {
+            let problem = "its motion is held by constraints, which this command does not know; see `lnn constraints`";
+            return Err(CliError::usage(format_args!("{name}: {problem}")));
+        }
+        Ok(probe)
+    }
+
+    /// The same, of a system with constraints as well.
+    ///
+    /// # Errors
+    /// As [`Probe::system`].
+    fn system_with_constraints(name: &str, given: &[(String, String)]) -> Result<Self, CliError> {
         let system = chosen::system(name)?;
         let Source { model, columns, .. } = Source::configured(system.clone(), given)?;
         let configured = configure_system::<f64>(system, given).map_err(CliError::usage)?;
@@ -116,14 +143,19 @@ impl Probe {
         })
     }
 
+    /// The formulas of the constraints of the system, by name.
+    pub fn constraints(&self) -> BTreeMap<String, String> {
+        let description = self.system.as_ref().and_then(|system| system.system.description());
+        description.map(|description| description.constraints.clone()).unwrap_or_default()
+    }
+
     /// One of the two: a file that ends in `.toml` and a name of the catalogue are systems, any other file or directory is a model.
     ///
     /// # Errors
     /// As [`Probe::system`] and [`Probe::model`].
     pub fn either(text: &str, given: &[(String, String)]) -> Result<Self, CliError> {
         let path = Path::new(text);
-        let model = path.exists() && !chosen::is_file(text);
-        match (model, given.is_empty()) {
+        match (is_model(text), given.is_empty()) {
             (true, true) => Self::model(path),
             (true, false) => Err(CliError::usage(format_args!("{text}: a model has no parameters to choose"))),
             _ => Self::system(text, given),

@@ -1,6 +1,7 @@
 //! `lnn rollout`: the motion of a model from one state.
 
 use crate::cli::charges::Charges;
+use crate::cli::constraints::constrained;
 use crate::cli::files::require_free;
 use crate::cli::forces::ForceArgs;
 use crate::cli::motion::{Facts, Target, Watch, picture_file, place};
@@ -9,7 +10,7 @@ use crate::cli::probe::Probe;
 use crate::cli::source::parameter;
 use crate::cli::subject::Subject;
 use crate::cli::{CliError, input, interrupt, output};
-use crate::lagrangian::Interruptible;
+use crate::lagrangian::{EulerLagrange, Interruptible, LeastNorm, ReducedMass, Request, Terms};
 use crate::names::{counted, rounded};
 use crate::rollout::{Balances, Driven, Method, Options, RolloutError, Trajectory, rollout_in_pieces};
 use crate::storage::check_target;
@@ -29,7 +30,8 @@ pub struct Args {
     /// A parameter of the system; may be repeated.
     #[arg(long, value_name = "SYMBOL=VALUE", conflicts_with = "model", value_parser = parameter)]
     param: Vec<(String, String)>,
-    /// Start: coordinates, then velocities, separated by commas; taken as it is, on a mass shell or off it.
+    /// Start: coordinates, then velocities, separated by commas; taken as it is, on a mass shell or off it. Under constraints it is
+    /// brought to them if it is off by less than a thousandth of its size, and refused with its distance otherwise.
     #[arg(long, value_name = "q1,..,v1,..", required = true, value_delimiter = ',', allow_hyphen_values = true, value_parser = finite)]
     state: Vec<f64>,
     /// Time of the last sample, in seconds (relativistic systems: proper time in metres); a time before the start runs
@@ -62,6 +64,12 @@ pub struct Args {
     /// turn anyway.
     #[arg(long)]
     beyond_range: bool,
+    /// Constraints that hold the motion, a file with a table [constraints] as `lnn constraints --out` writes it.
+    #[arg(long, value_name = "FILE.toml")]
+    constraints: Option<PathBuf>,
+    /// Move by the acceleration of least norm where the mass matrix is singular, and say along how many directions that was chosen.
+    #[arg(long)]
+    least_norm: bool,
     /// CSV of the trajectory: t, the columns of a state, energy; - for standard output. A file that
     /// holds something is refused, the model always.
     #[arg(long, value_name = "FILE.csv")]
@@ -120,7 +128,9 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         Some(path) => Subject::model(path)?,
         None => Subject::system(args.system.as_deref().unwrap_or_default(), &args.param)?,
     };
-    let columns = &subject.columns;
+    let mut subject = subject;
+    let columns = subject.columns.clone();
+    let columns = &columns;
     if args.state.len() != columns.len() {
         let (expected, found) = (columns.len(), args.state.len());
         let names = columns.join(",");
@@ -131,6 +141,9 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         return Err(CliError::usage("--json: the trajectory takes standard output (--out -)"));
     }
     let (q, v) = args.state.split_at(columns.len() / 2);
+    if let Some(file) = &args.constraints {
+        subject.model = constrained(subject.model, columns, file, (q, v))?;
+    }
     let method = Method::from(args.method);
     if args.step.is_some() && !method.is_structure_preserving() {
         return Err(CliError::usage("--step: dopri5 and dop853 choose their own steps; see --rtol"));
@@ -148,7 +161,8 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     if let Some(step) = args.step.filter(|step| *step > args.dt) {
         output::note(&format!("--step {step} is longer than --dt {}: one step per sample", args.dt));
     }
-    let inputs: Vec<_> = args.forces.files().chain(subject.file.as_deref()).collect();
+    let inputs: Vec<_> =
+        args.forces.files().chain(subject.file.as_deref()).chain(args.constraints.as_deref()).collect();
     if !standard {
         require_free(&args.out, &inputs, args.overwrite)?;
     }
@@ -166,7 +180,11 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let mut target = Target::create(&args.out, standard)?;
     let header = Trajectory { energy: Some(vec![]), ..Trajectory::<f64>::empty(q.len()) };
     target.append(&header.csv_header(columns).map_err(CliError::data)?)?;
-    let network = subject.model.as_ref();
+    let chosen = LeastNorm(subject.model.as_ref());
+    let network: &dyn EulerLagrange<f64> = if args.least_norm { &chosen } else { subject.model.as_ref() };
+    if args.least_norm {
+        note_open_directions(subject.model.as_ref(), q, v);
+    }
     let (stop, mut failed) = (interrupt::flag().map_err(CliError::signals)?, None);
     let moving = Interruptible::new(network, &stop);
     let driven = force.as_ref().map(|force| Driven::new(&moving, force));
@@ -202,7 +220,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     if let Some(error) = failed {
         return Err(error);
     }
-    if let Some(error @ RolloutError::Invalid { .. }) = &result.stop {
+    if let Some(error @ (RolloutError::Invalid { .. } | RolloutError::OffConstraints { .. })) = &result.stop {
         return Err(refused(error));
     }
     target.finish()?;
@@ -215,7 +233,8 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     }
     if let Some(stop) = result.stop {
         let kept = counted(result.samples, "sample is", "samples are");
-        let problem = format!("{} ({kept} in {})", ended(&stop, columns, method), place(&args.out));
+        let names = network.manifold().map_or(&[][..], |manifold| manifold.names());
+        let problem = format!("{} ({kept} in {})", ended(&stop, (columns, names), method), place(&args.out));
         return Err(match stop {
             RolloutError::Stopped { .. } => CliError::interrupted(problem),
             _ => CliError::data(problem),
@@ -260,8 +279,27 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     output::print(&text)
 }
 
+/// Says how much of the motion is a choice.
+fn note_open_directions(model: &dyn EulerLagrange<f64>, q: &[f64], v: &[f64]) {
+    let mut terms = Terms::default();
+    // What fails is said by the motion itself.
+    let _ = model.terms(q, v, Request::MASS_MATRIX | Request::CONSTRAINTS, &mut terms);
+    let open = ReducedMass::of(q.len(), &terms.mass_matrix, &terms.constraint_matrix);
+    let open = open.map_or(0, |reduced| reduced.null_directions(1024.0).len());
+    let directions = counted(open, "direction", "directions");
+    output::note(&format!(
+        "least norm: the mass matrix is singular along {directions} at the start, and the motion moves none of them"
+    ));
+}
+
 /// A motion that is refused before it begins, with the option that was wrong.
 fn refused(error: &RolloutError) -> CliError {
+    if let RolloutError::OffConstraints { nearest, .. } = error {
+        let nearest: Vec<String> = nearest.iter().map(f64::to_string).collect();
+        let help =
+            if nearest.is_empty() { String::new() } else { format!("; the nearest state is {}", nearest.join(",")) };
+        return CliError::usage(format_args!("--state: {error}{help}"));
+    }
     let RolloutError::Invalid { what, problem } = error else { return CliError::usage(error) };
     let option = match *what {
         "t_end" => "--t-end",
@@ -277,13 +315,17 @@ fn refused(error: &RolloutError) -> CliError {
 }
 
 /// Why a motion ended early, and the option that helps.
-fn ended(stop: &RolloutError, columns: &[String], method: Method) -> String {
+fn ended(stop: &RolloutError, (columns, constraints): (&[String], &[String]), method: Method) -> String {
     let fixed = method.is_structure_preserving();
     match stop {
         RolloutError::LeftDomain { t, component, value, lower, upper, .. } => format!(
             "left the training range at t = {t}: {} reached {}, trained on [{lower}, {upper}]; --beyond-range goes on",
             columns.get(*component).map_or("a component", String::as_str),
             rounded(*value, 6)
+        ),
+        RolloutError::DependentConstraint { t, constraint, .. } => format!(
+            "the constraint `{}` depends on the others at t = {t}: nothing tells which of them carries the load",
+            constraints.get(*constraint).map_or("?", String::as_str)
         ),
         RolloutError::Stopped { t } => format!("interrupted at t = {t}"),
         RolloutError::NotConverged { .. } => format!("{stop}: a shorter --step may help"),

@@ -1,7 +1,7 @@
 //! Where Euler-Lagrange terms come from: a hand-written system or a trained model.
 
 use crate::cli::learned::Learned;
-use crate::cli::{CliError, chosen, forces};
+use crate::cli::{CliError, chosen, forces, output};
 use crate::lagrangian::system::System;
 use crate::lagrangian::{EulerLagrange, configure_system};
 use crate::pipeline::usual_force;
@@ -35,6 +35,9 @@ impl<S: Scalar> Source<S> {
     pub fn configured(system: Cow<'static, System>, given: &[(String, String)]) -> Result<Self, CliError> {
         let configured = configure_system::<S>(system, given).map_err(CliError::usage)?;
         let model = configured.build().map_err(CliError::usage)?;
+        for name in model.manifold().map_or(&[][..], |manifold| manifold.redundant()) {
+            output::note(&format!("the constraint `{name}` follows from the others and is left out"));
+        }
         let columns = configured.system.columns(configured.coordinates);
         let forces = columns[..configured.coordinates].iter().map(|name| usual_force(name)).collect();
         Ok(Self { model, columns, forces })

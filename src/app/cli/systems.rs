@@ -2,7 +2,7 @@
 
 use crate::cli::{CliError, chosen, output};
 use crate::lagrangian::system::{Bounds, Coordinate, Parameter, Size, System};
-use crate::lagrangian::systems;
+use crate::lagrangian::{constrained_systems, systems};
 use serde_json::{Value, json};
 
 /// Arguments.
@@ -19,11 +19,14 @@ pub struct Args {
 /// Prints the catalogue.
 pub fn run(args: &Args) -> Result<(), CliError> {
     let one = args.system.as_deref().map(chosen::system).transpose()?;
-    let all = one.as_deref().map_or(systems(), std::slice::from_ref);
+    let all: Vec<&System> = match one.as_deref() {
+        Some(system) => vec![system],
+        None => systems().iter().chain(constrained_systems()).collect(),
+    };
     if args.json {
-        return output::print(&all.iter().map(|system| format!("{}\n", describe(system))).collect::<String>());
+        return output::print(&all.into_iter().map(|system| format!("{}\n", describe(system))).collect::<String>());
     }
-    output::print(&all.iter().map(table).collect::<Vec<_>>().join("\n"))
+    output::print(&all.into_iter().map(table).collect::<Vec<_>>().join("\n"))
 }
 
 /// Symbol, default, unit and allowed values of every parameter.
@@ -58,6 +61,7 @@ fn describe(system: &System) -> Value {
         "time_unit": system.time_unit,
         "time_like": system.time_like.map(|i| coordinates[i].name.as_ref()),
         "constraint": system.constraint,
+        "constraints": system.description().map(|description| &description.constraints),
         "parameters": parameters,
         "bounds": { "training": box_of(system.training(n)), "validation": box_of(system.validation(n)) },
     })
@@ -81,6 +85,9 @@ fn table(system: &System) -> String {
             Some(constraint) => text += &format!("  {column:<12} {unit:<6} {constraint}\n"),
             None => text += &format!("  {column:<12} {unit:<6} {low:>7.3} .. {high:<7.3}{remark}\n"),
         }
+    }
+    for (name, formula) in system.description().into_iter().flat_map(|description| &description.constraints) {
+        text += &format!("  {name:<12} {formula} = 0\n");
     }
     for [symbol, default, unit, range] in parameters(system) {
         text += &format!("  --param {:<12} {unit:<6} {range}\n", format!("{symbol}={default}"));

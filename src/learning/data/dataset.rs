@@ -1,5 +1,6 @@
 //! States with their accelerations: what a network learns from.
 
+use crate::lagrangian::{Manifold, ManifoldRows};
 use crate::network::file::StoredPrecision;
 use crate::recording::RecordedTrajectory;
 use crate::scalar::{Real, Scalar};
@@ -17,6 +18,9 @@ pub struct Dataset<S> {
     force: Vec<S>,
     /// Empty if all are 1.
     weight: Vec<S>,
+    /// Rows `A` of constraints, `(states, m, n)`, and their drift `gamma`, `(states, m)`; empty if there are none.
+    rows: Vec<S>,
+    drift: Vec<S>,
 }
 
 /// Why numbers do not make a dataset.
@@ -72,7 +76,7 @@ impl<S: Scalar> Dataset<S> {
         for (what, values) in [("coordinate", &q), ("velocity", &v), ("acceleration", &a)] {
             check(what, values, expected, coordinates)?;
         }
-        Ok(Self { coordinates, q, v, a, force: Vec::new(), weight: Vec::new() })
+        Ok(Self { coordinates, q, v, a, force: Vec::new(), weight: Vec::new(), rows: Vec::new(), drift: Vec::new() })
     }
 
     /// The same states under known external generalized forces `Q`, `(states, n)` in physical units (N, N m), conjugate to
@@ -87,6 +91,32 @@ impl<S: Scalar> Dataset<S> {
     pub fn with_forces(self, force: Vec<S>) -> Result<Self, DatasetError> {
         check("force", &force, self.q.len(), self.coordinates)?;
         Ok(Self { force, ..self })
+    }
+
+    /// The same states under constraints `A a = -gamma`, rows `A` `(states, m, n)` and `gamma` `(states, m)` in physical units: what is
+    /// learned of them is the motion `M a = g - c + Q + A^T lambda`.
+    ///
+    /// # Errors
+    /// [`DatasetError`] naming the first offending row.
+    pub fn with_constraints(self, rows: Vec<S>, drift: Vec<S>) -> Result<Self, DatasetError> {
+        let m = drift.len() / self.len();
+        check("constraint drift", &drift, self.len() * m, m.max(1))?;
+        check("constraint row", &rows, self.q.len() * m, self.coordinates)?;
+        Ok(Self { rows, drift, ..self })
+    }
+
+    /// The same states under the constraints of a manifold.
+    ///
+    /// # Errors
+    /// As [`Dataset::with_constraints`], where a constraint is not finite.
+    pub fn on(self, manifold: &dyn Manifold<S>) -> Result<Self, DatasetError> {
+        let (mut rows, mut matrix, mut drift) = (ManifoldRows::default(), Vec::new(), Vec::new());
+        for (q, v) in self.q.chunks_exact(self.coordinates).zip(self.v.chunks_exact(self.coordinates)) {
+            manifold.rows(q, v, &mut rows);
+            matrix.extend_from_slice(&rows.matrix);
+            drift.extend_from_slice(&rows.drift);
+        }
+        self.with_constraints(matrix, drift)
     }
 
     /// The same states, their residuals multiplied by these weights in the loss, `(states)`.
@@ -128,6 +158,18 @@ impl<S: Scalar> Dataset<S> {
         &self.force
     }
 
+    /// Number of constraints `m` of every state.
+    pub fn constraints(&self) -> usize {
+        self.drift.len() / self.len()
+    }
+
+    /// Rows `A`, `(m, n)`, and drift `gamma`, `(m)`, of the constraints of a state.
+    pub fn constraint(&self, state: usize) -> (&[S], &[S]) {
+        let m = self.constraints();
+        let rows = state * m * self.coordinates..(state + 1) * m * self.coordinates;
+        (&self.rows[rows], &self.drift[state * m..(state + 1) * m])
+    }
+
     /// Weight of a state's residuals in the loss.
     pub fn weight(&self, state: usize) -> S {
         self.weight.get(state).copied().unwrap_or(<S as Real>::one())
@@ -139,7 +181,7 @@ impl<S: Scalar> Dataset<S> {
             let row = |&row: &usize| values.get(row * width..(row + 1) * width).unwrap_or_default();
             rows.iter().flat_map(row).copied().collect()
         };
-        let n = self.coordinates;
+        let (n, m) = (self.coordinates, self.constraints());
         Self {
             coordinates: n,
             q: pick(&self.q, n),
@@ -147,6 +189,8 @@ impl<S: Scalar> Dataset<S> {
             a: pick(&self.a, n),
             force: pick(&self.force, n),
             weight: pick(&self.weight, 1),
+            rows: pick(&self.rows, m * n),
+            drift: pick(&self.drift, m),
         }
     }
 
@@ -155,6 +199,8 @@ impl<S: Scalar> Dataset<S> {
         let range = state * self.coordinates..(state + 1) * self.coordinates;
         self.v[range.clone()].iter_mut().for_each(|v| *v = u * *v);
         self.a[range].iter_mut().for_each(|a| *a = u * u * *a);
+        let m = self.constraints();
+        self.drift[state * m..(state + 1) * m].iter_mut().for_each(|drift| *drift = u * u * *drift);
     }
 
     /// One scale per coordinate: the largest of `|q_i|` and `|v_i|` over all states, 1 where both vanish.
@@ -181,10 +227,10 @@ impl<S: Scalar> Dataset<S> {
         })
     }
 
-    /// CRC-32 of coordinates, velocities, accelerations, forces and weights in double precision.
+    /// CRC-32 of coordinates, velocities, accelerations, forces, weights and constraints in double precision.
     pub fn checksum(&self) -> u32 {
         let all = self.q.iter().chain(&self.v).chain(&self.a).chain(&self.force).chain(&self.weight);
-        checksum(all, StoredPrecision::F64)
+        checksum(all.chain(&self.rows).chain(&self.drift), StoredPrecision::F64)
     }
 
     /// The same states in another precision.
@@ -197,6 +243,8 @@ impl<S: Scalar> Dataset<S> {
             a: cast(&self.a),
             force: cast(&self.force),
             weight: cast(&self.weight),
+            rows: cast(&self.rows),
+            drift: cast(&self.drift),
         }
     }
 }

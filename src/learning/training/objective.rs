@@ -8,12 +8,17 @@
 //! are any. A loss `l(a)` depends on the parameters of `D` by `dl = -lam.d(dD/dv)`, `lam = M^-1 dl/da`; those of `L` enter as
 //! without friction, at the `a` that has it.
 //!
+//! Under constraints, rows `A` of the data, they solve `[M A^T; A 0] [a; -lambda] = [g - c + Q; -gamma]`. With the same matrix and
+//! `[lam; nu]` for `[dl/da; 0]` the gradient is that without constraints, at this `lam` and this `a`: `A lam = 0`. Penalties act on
+//! the eigenvalues of `Z^T M Z`, `Z` a basis of the directions that the constraints leave, whichever penalty it is: across them no
+//! motion tells the mass matrix.
+//!
 //! A batch is cut into shards and chunks whose sizes do not depend on the number of threads, and every sum is taken in
 //! their order: the same numbers on any number of threads.
 
 use crate::configuration::Penalty;
 use crate::data::Dataset;
-use crate::lagrangian::MechanicsError;
+use crate::lagrangian::{MechanicsError, ReducedMass};
 use crate::linalg::{
     SignatureBuffers as Buffers, Violation, characteristic_scales, eigenvalue_violation, has_signature,
     sylvester_violation,
@@ -94,6 +99,10 @@ struct Shard<S> {
     workspace: Workspace<S>,
     signature: Buffers<S>,
     violation: Violation<S>,
+    /// Matrices, right-hand sides and solutions under constraints, `(states, n + m, ..)`.
+    bordered: Vec<S>,
+    bordered_right: Vec<S>,
+    bordered_solution: Vec<S>,
     /// `|M_ii|` of every state, `(states, n)`, and the states whose signature is in doubt with their matrices.
     diagonal: Vec<S>,
     suspects: Vec<usize>,
@@ -119,6 +128,9 @@ impl<S: Scalar> Shard<S> {
             workspace: Workspace::new(),
             signature: Buffers::default(),
             violation: Violation::default(),
+            bordered: Vec::new(),
+            bordered_right: Vec::new(),
+            bordered_solution: Vec::new(),
             diagonal: Vec::new(),
             suspects: Vec::new(),
             suspect_matrices: Vec::new(),
@@ -163,11 +175,12 @@ impl<S: Scalar> Shard<S> {
         let (penalty, lambda) = penalty;
         match penalty {
             Penalty::None => {}
+            _ if data.constraints() > 0 => self.add_reduced_eigenvalue(data, rows, lambda),
             Penalty::Eigenvalue { .. } => self.add_eigenvalue(lambda),
             Penalty::Sylvester { time, .. } => self.note_suspects(time),
         }
         // Zero directions on finite numbers leave the failed states out.
-        if self.add_directions() || self.replace_failed(weights) {
+        if self.add_directions(data.constraints()) || self.replace_failed(weights) {
             self.dynamics.add_gradient(weights, &self.directions, &mut self.gradient, None);
         }
         self.violations.add_gradient(weights, false, &mut self.gradient);
@@ -237,8 +250,10 @@ impl<S: Scalar> Shard<S> {
             self.add_forces(data, rows);
         }
         self.acceleration.resize(self.right.len(), <S as Real>::zero());
-        let (matrices, solution) = (&self.dynamics.lagrangian().mass_matrix, &mut self.acceleration);
-        if solve(n, matrices, &self.right, solution, &mut self.workspace).is_ok() {
+        if data.constraints() > 0 {
+            self.border(data, rows);
+        }
+        if self.solve_motion(n, data.constraints(), true) {
             return;
         }
         for &(state, failure) in self.workspace.failures() {
@@ -246,6 +261,59 @@ impl<S: Scalar> Shard<S> {
             self.left_out += 1;
             self.failure.get_or_insert(MechanicsError::unsolved(row, failure));
         }
+    }
+
+    /// The matrices `[M A^T; A 0]` of the chunk and what `A a` has to be, in scaled coordinates and with rows of unit length.
+    fn border(&mut self, data: &Dataset<S>, rows: &[u32]) {
+        let (n, m, zero) = (data.coordinates(), data.constraints(), <S as Real>::zero());
+        let k = n + m;
+        let masses = &self.dynamics.lagrangian().mass_matrix;
+        self.bordered.clear();
+        self.bordered.resize(rows.len() * k * k, zero);
+        self.bordered_right.clear();
+        self.bordered_right.resize(rows.len() * k, zero);
+        let blocks = self.bordered.chunks_exact_mut(k * k).zip(self.bordered_right.chunks_exact_mut(k));
+        for ((&row, mass), (block, right)) in rows.iter().zip(masses.chunks_exact(n * n)).zip(blocks) {
+            for i in 0..n {
+                block[i * k..i * k + n].copy_from_slice(&mass[i * n..(i + 1) * n]);
+            }
+            let (matrix, drift) = data.constraint(row as usize);
+            for (c, (gradient, &drift)) in matrix.chunks_exact(n).zip(drift).enumerate() {
+                let scaled = gradient.iter().zip(&self.scale).map(|(&a, &s)| a * s);
+                let square = scaled.clone().fold(zero, |sum, a| sum + a * a);
+                // A row that vanishes is left to the solve, which finds it singular.
+                let unit = if square > zero { Real::sqrt(square).recip() } else { <S as Real>::one() };
+                for (i, a) in scaled.enumerate() {
+                    block[i * k + n + c] = a * unit;
+                    block[(n + c) * k + i] = a * unit;
+                }
+                right[n + c] = -drift * unit;
+            }
+        }
+    }
+
+    /// Solves for `right`, into the accelerations if it is what moves the states, or with `A x = 0` into the multipliers of the loss; `true`
+    /// if no state failed.
+    fn solve_motion(&mut self, n: usize, m: usize, motion: bool) -> bool {
+        let solution = if motion { &mut self.acceleration } else { &mut self.multiplier };
+        if m == 0 {
+            let matrices = &self.dynamics.lagrangian().mass_matrix;
+            return solve(n, matrices, &self.right, solution, &mut self.workspace).is_ok();
+        }
+        let (k, zero) = (n + m, <S as Real>::zero());
+        for (to, from) in self.bordered_right.chunks_exact_mut(k).zip(self.right.chunks_exact(n)) {
+            to[..n].copy_from_slice(from);
+            if !motion {
+                to[n..].fill(zero);
+            }
+        }
+        self.bordered_solution.resize(self.bordered_right.len(), zero);
+        let Self { bordered, bordered_right, bordered_solution, workspace, .. } = self;
+        let solved = solve(k, bordered, bordered_right, bordered_solution, workspace).is_ok();
+        for (to, from) in solution.chunks_exact_mut(n).zip(bordered_solution.chunks_exact(k)) {
+            to.copy_from_slice(&from[..n]);
+        }
+        solved
     }
 
     /// Adds the known forces, in scaled coordinates `s_i Q_i`, to the right-hand sides.
@@ -291,13 +359,12 @@ impl<S: Scalar> Shard<S> {
 
     /// Directions of the loss: `s = -lam = -M^-1 dl/da`, `t = a`, zeros for states that have no acceleration; whether all have
     /// one.
-    fn add_directions(&mut self) -> bool {
+    fn add_directions(&mut self, constraints: usize) -> bool {
         let n = self.scale.len();
         self.directions.clear(true);
         self.multiplier.resize(self.right.len(), <S as Real>::zero());
         // The same matrices failed before, and their rows are passed over.
-        let matrices = &self.dynamics.lagrangian().mass_matrix;
-        let _ = solve(n, matrices, &self.right, &mut self.multiplier, &mut self.workspace);
+        self.solve_motion(n, constraints, false);
         self.directions.s.extend_from_slice(&self.multiplier);
         self.directions.t.extend_from_slice(&self.acceleration);
         let mut all = true;
@@ -310,6 +377,26 @@ impl<S: Scalar> Shard<S> {
             }
         }
         all
+    }
+
+    /// Counts the eigenvalue penalties of the chunk within its constraints.
+    fn add_reduced_eigenvalue(&mut self, data: &Dataset<S>, rows: &[u32], lambda: S) {
+        let n = self.scale.len();
+        let masses = self.dynamics.lagrangian().mass_matrix.chunks_exact(n * n);
+        for (state, (mass, &row)) in masses.zip(rows).enumerate() {
+            let (matrix, _) = data.constraint(row as usize);
+            let scaled: Vec<S> = matrix.iter().enumerate().map(|(at, &a)| a * self.scale[at % n]).collect();
+            let Ok(reduced) = ReducedMass::of(n, mass, &scaled) else { continue };
+            let negative = reduced.eigenvalues.iter().zip(reduced.directions.chunks_exact(n));
+            self.violation = Violation::default();
+            for (&w, direction) in negative.take_while(|(w, _)| **w < <S as Real>::zero()) {
+                self.violation.value -= w;
+                self.violation.gamma.push(-<S as Real>::one());
+                self.violation.vectors.extend_from_slice(direction);
+            }
+            let range = state * n..(state + 1) * n;
+            self.violations.push((&self.q[range.clone()], &self.v[range]), &self.violation, lambda);
+        }
     }
 
     /// Counts the eigenvalue penalties of the chunk.

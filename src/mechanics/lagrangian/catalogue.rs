@@ -2,10 +2,15 @@
 
 use super::derivatives::{State, evaluate};
 use super::system::{ClosedForm, System};
-use super::{EulerLagrange, ExpressionLagrangian, Lagrangian, Mechanics, Request, Terms};
+use super::{
+    Constrained, ConstraintError, EulerLagrange, ExpressionConstraints, ExpressionLagrangian, Lagrangian, Mechanics,
+    Request, Terms, constrained_systems,
+};
 use crate::linalg::Workspace;
 use crate::names::unknown;
+use crate::random::RngStream;
 use crate::scalar::{Dd, Scalar};
+use rand::Rng;
 use std::any::Any;
 use std::borrow::Cow;
 
@@ -48,6 +53,14 @@ pub enum SystemError {
         demand: String,
         /// The text given.
         found: String,
+    },
+    /// Constraints that contradict each other or leave no motion.
+    #[error("{system}: {problem}")]
+    Constraints {
+        /// The system.
+        system: String,
+        /// What is wrong with them.
+        problem: String,
     },
     /// A state of the wrong length.
     #[error("{system}: expected {expected} coordinates and velocities, found {found}")]
@@ -186,7 +199,7 @@ fn construct_once<S: Scalar>(configured: &SystemInstance<S>) -> Option<Box<dyn E
     *built.downcast().ok()?
 }
 
-/// All systems.
+/// All systems whose coordinates are free; [`constrained_systems`] are the others.
 pub fn systems() -> &'static [System] {
     SYSTEMS
 }
@@ -196,7 +209,8 @@ pub fn systems() -> &'static [System] {
 /// # Errors
 /// [`SystemError::UnknownSystem`] with the nearest name.
 pub fn find(name: &str) -> Result<&'static System, SystemError> {
-    SYSTEMS.iter().find(|system| system.name == name).ok_or_else(|| unknown_system(name))
+    let mut all = SYSTEMS.iter().chain(constrained_systems());
+    all.find(|system| system.name == name).ok_or_else(|| unknown_system(name))
 }
 
 impl<S: Scalar> SystemInstance<S> {
@@ -206,11 +220,38 @@ impl<S: Scalar> SystemInstance<S> {
     /// [`SystemError::UnknownSystem`] if the description is not of the catalogue or the scalar is none of `f32`, `f64` and
     /// [`Dd`].
     pub fn build(&self) -> Result<Box<dyn EulerLagrange<S>>, SystemError> {
-        construct_once(self).ok_or_else(|| unknown_system(&self.system.name))
+        let free = construct_once(self).ok_or_else(|| unknown_system(&self.system.name))?;
+        match self.constraints() {
+            None => Ok(free),
+            Some(constraints) => {
+                let wrong = |error: ConstraintError| SystemError::Constraints {
+                    system: self.system.name.to_string(),
+                    problem: error.to_string(),
+                };
+                let model = Constrained::new(free, constraints.clone(), self.parameters.clone()).map_err(wrong)?;
+                let (q, v) = self.anywhere();
+                Ok(Box::new(model.independent(&q, &v).map_err(wrong)?))
+            }
+        }
     }
-    /// Shows the Lagrangian to a visitor; `None` if the description is not of the catalogue.
+    /// The constraints of a system by its description.
+    pub fn constraints(&self) -> Option<&ExpressionConstraints> {
+        self.system.described.as_ref()?.constraints.as_ref()
+    }
+    /// States within the bounds of the validation, at which constraints are examined.
+    fn anywhere(&self) -> (Vec<S>, Vec<S>) {
+        const STATES: usize = 24;
+        let (bounds, mut rng) = (self.system.validation(self.coordinates), RngStream::Region.generator(0));
+        let mut draw = |sides: &[(f64, f64)]| -> Vec<S> {
+            let all = (0..STATES).flat_map(|_| sides.iter());
+            all.map(|&(low, high)| S::of_f64(low + (high - low) * rng.random::<f64>())).collect()
+        };
+        (draw(&bounds.positions), draw(&bounds.velocities))
+    }
+    /// Shows the Lagrangian to a visitor; `None` if the description is not of the catalogue, and of a system with constraints, whose
+    /// Lagrangian alone does not tell its motion.
     pub(crate) fn visit<V: LagrangianVisitor>(&self, visitor: V) -> Option<V::Output> {
-        shown(self, visitor)
+        if self.constraints().is_some() { None } else { shown(self, visitor) }
     }
     /// Acceleration of one state by the closed form, which shares nothing with the Lagrangian but the parameters; of a system by its
     /// description, for which no closed form is known, by differentiating its Lagrangian. `NaN` where the mass matrix is singular.
@@ -219,6 +260,11 @@ impl<S: Scalar> SystemInstance<S> {
     /// [`SystemError::State`] for a state of the wrong length.
     pub fn exact_acceleration(&self, q: &[S], v: &[S]) -> Result<Vec<S>, SystemError> {
         self.check_lengths(q, v)?;
+        if self.constraints().is_some() {
+            let problem = "states of a system with constraints are not drawn; its motion is what `lnn rollout` gives";
+            let system = self.system.name.to_string();
+            return Err(SystemError::Constraints { system, problem: problem.to_string() });
+        }
         Ok(match &self.system.described {
             Some(described) => differentiated(&described.lagrangian, &self.parameters, q, v),
             None => closed(self, q, v),
@@ -302,7 +348,7 @@ fn leading<S: Scalar>(x: &[S]) -> Vec<f64> {
 fn unknown_system(name: &str) -> SystemError {
     SystemError::UnknownSystem {
         name: name.into(),
-        known: SYSTEMS.iter().map(|system| system.name.to_string()).collect(),
+        known: SYSTEMS.iter().chain(constrained_systems()).map(|system| system.name.to_string()).collect(),
     }
 }
 

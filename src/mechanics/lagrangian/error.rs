@@ -24,6 +24,14 @@ pub enum MechanicsError {
         /// Estimated 2-norm condition number (infinite if exactly singular).
         condition: f64,
     },
+    /// A constraint that depends on the others at a state, although it does not elsewhere: they leave open what carries the load.
+    #[error("constraint {constraint} depends on the others at state {row}")]
+    Dependent {
+        /// Row of the batch.
+        row: usize,
+        /// Which constraint, from 0.
+        constraint: usize,
+    },
     /// A term is not finite.
     #[error("{what} of state {row} is not finite")]
     NotFinite {
@@ -53,14 +61,21 @@ impl MechanicsError {
     /// Row of the state that failed; `None` of an error that is not about one state.
     pub fn row(&self) -> Option<usize> {
         match *self {
-            Self::Singular { row, .. } | Self::NotFinite { row, .. } | Self::Uncertified { row } => Some(row),
+            Self::Singular { row, .. }
+            | Self::Dependent { row, .. }
+            | Self::NotFinite { row, .. }
+            | Self::Uncertified { row } => Some(row),
             Self::Shape { .. } | Self::Interrupted | Self::Derivatives { .. } => None,
         }
     }
 
     /// The same of the state in another row.
     pub(crate) fn at_row(mut self, to: usize) -> Self {
-        if let Self::Singular { row, .. } | Self::NotFinite { row, .. } | Self::Uncertified { row } = &mut self {
+        if let Self::Singular { row, .. }
+        | Self::Dependent { row, .. }
+        | Self::NotFinite { row, .. }
+        | Self::Uncertified { row } = &mut self
+        {
             *row = to;
         }
         self

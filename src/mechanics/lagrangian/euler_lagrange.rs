@@ -1,8 +1,9 @@
 //! Solves for accelerations and energy, given the terms `L`, `p`, `g`, `M`, `c`, `Q`.
 
+use super::constraints::{Motion, accelerate};
 use super::failures::not_finite;
 use super::{MechanicsError, Request, Terms};
-use crate::linalg::{self, Failure, Workspace};
+use crate::linalg::Workspace;
 use crate::scalar::{Real, Scalar, update};
 
 impl<S: Scalar> Terms<S> {
@@ -19,6 +20,7 @@ impl<S: Scalar> Terms<S> {
             acceleration,
             energy,
             failures,
+            ..
         } = self;
         failures.clear();
         for field in
@@ -26,9 +28,54 @@ impl<S: Scalar> Terms<S> {
         {
             field.clear();
         }
+        self.clear_constraints();
     }
 
-    /// Adds `a = M^-1 (g - c + Q)` and `E = p.v - L` if requested, then checks every filled field.
+    /// Empties the fields of constraints: of a model that has none.
+    pub(super) fn clear_constraints(&mut self) {
+        self.constraints = 0;
+        let Self { constraint_matrix, constraint_drift, multipliers, constraint_force, .. } = self;
+        for field in [constraint_matrix, constraint_drift, multipliers, constraint_force] {
+            field.clear();
+        }
+    }
+
+    /// The forces of constraint from their multipliers.
+    pub(super) fn sum_constraint_forces(&mut self, n: usize) {
+        let m = self.constraints;
+        self.constraint_force.clear();
+        if m == 0 {
+            return;
+        }
+        self.constraint_force.resize(self.multipliers.len() / m * n, <S as Real>::zero());
+        let rows = self.constraint_matrix.chunks_exact(m * n).zip(self.multipliers.chunks_exact(m));
+        for (force, (matrix, multipliers)) in self.constraint_force.chunks_exact_mut(n).zip(rows) {
+            for (row, &multiplier) in matrix.chunks_exact(n).zip(multipliers) {
+                force.iter_mut().zip(row).for_each(|(force, &a)| *force += multiplier * a);
+            }
+        }
+    }
+
+    /// Accelerations and multipliers under forces; rows that fail are `NaN` and added to the failures.
+    fn accelerate(
+        &mut self,
+        n: usize,
+        force: &[S],
+        drift: &[S],
+        (acceleration, multipliers): (&mut [S], &mut [S]),
+        workspace: &mut Workspace<S>,
+    ) {
+        let motion = Motion {
+            size: (n, self.constraints),
+            mass: &self.mass_matrix,
+            constraints: &self.constraint_matrix,
+            drift,
+        };
+        accelerate(motion, force, (acceleration, multipliers), workspace, &mut self.failures);
+    }
+
+    /// Adds `a = M^-1 (g - c + Q)` and `E = p.v - L` if requested, then checks every filled field; with constraints in the terms,
+    /// accelerations, multipliers and forces of constraint.
     ///
     /// `v` is `(batch, n)`; `L`, `p`, `g`, `M`, `c` must be filled as far as the request needs them, `Q` if there are forces
     /// beside those of `L`. One coordinate is divided, not factored.
@@ -64,8 +111,18 @@ impl<S: Scalar> Terms<S> {
             expect("mass matrices", batch * n * n, self.mass_matrix.len())?;
             expect("dL/dq", batch * n, self.dl_dq.len())?;
             expect("momentum drifts", batch * n, self.momentum_drift.len())?;
-            self.acceleration.clear();
-            self.acceleration.resize(batch * n, S::nan());
+            let m = self.constraints;
+            expect("constraint rows", batch * m * n, self.constraint_matrix.len())?;
+            expect("constraint drifts", batch * m, self.constraint_drift.len())?;
+            let (mut acceleration, mut multipliers, drift) = (
+                std::mem::take(&mut self.acceleration),
+                std::mem::take(&mut self.multipliers),
+                std::mem::take(&mut self.constraint_drift),
+            );
+            for (field, size) in [(&mut acceleration, batch * n), (&mut multipliers, batch * m)] {
+                field.clear();
+                field.resize(size, S::nan());
+            }
             let mut right = workspace.take_vector();
             right.clear();
             right.extend_from_slice(&self.dl_dq);
@@ -74,11 +131,14 @@ impl<S: Scalar> Terms<S> {
                 expect("generalized forces", batch * n, self.force.len())?;
                 update(&mut right, &self.force, |right, force| *right += force);
             }
-            accelerate(n, &self.mass_matrix, &right, &mut self.acceleration, workspace, &mut self.failures);
+            self.accelerate(n, &right, &drift, (&mut acceleration, &mut multipliers), workspace);
+            (self.acceleration, self.multipliers, self.constraint_drift) = (acceleration, multipliers, drift);
+            self.sum_constraint_forces(n);
             workspace.give_vector(right);
         }
         // What was not finite before the solve is named rather than the solve.
-        let fields: [(&'static str, &[S], usize); 8] = [
+        let m = self.constraints;
+        let fields: [(&'static str, &[S], usize); 10] = [
             ("Lagrangian", &self.lagrangian, 1),
             ("momentum", &self.momentum, n),
             ("dL/dq", &self.dl_dq, n),
@@ -86,6 +146,8 @@ impl<S: Scalar> Terms<S> {
             ("momentum drift", &self.momentum_drift, n),
             ("generalized force", &self.force, n),
             ("dissipated power", &self.dissipation, 1),
+            ("constraint matrix", &self.constraint_matrix, m * n),
+            ("constraint drift", &self.constraint_drift, m),
             ("energy", &self.energy, 1),
         ];
         let mut found = Vec::new();
@@ -126,8 +188,11 @@ impl<S: Scalar> Terms<S> {
         let mut change = workspace.take_vector();
         change.clear();
         change.resize(size, S::nan());
-        accelerate(n, &self.mass_matrix, external, &mut change, workspace, &mut self.failures);
+        let mut pull = vec![zero; self.multipliers.len()];
+        self.accelerate(n, external, &[], (&mut change, &mut pull), workspace);
         update(&mut self.acceleration, &change, |a, change| *a += change);
+        update(&mut self.multipliers, &pull, |multiplier, change| *multiplier += change);
+        self.sum_constraint_forces(n);
         workspace.give_vector(change);
         self.force.resize(size, zero);
         update(&mut self.force, external, |force, external| *force += external);
@@ -137,35 +202,6 @@ impl<S: Scalar> Terms<S> {
         }
         self.prepend_failures(found);
         self.outcome()
-    }
-}
-
-/// `M^-1 f` of a batch; rows that fail are added to `failures`.
-fn accelerate<S: Scalar>(
-    n: usize,
-    mass: &[S],
-    force: &[S],
-    acceleration: &mut [S],
-    workspace: &mut Workspace<S>,
-    failures: &mut Vec<MechanicsError>,
-) {
-    if n == 1 {
-        divide(mass, force, acceleration, failures);
-    } else if linalg::solve(n, mass, force, acceleration, workspace).is_err() {
-        failures.extend(workspace.failures().iter().map(|&(row, failure)| MechanicsError::unsolved(row, failure)));
-    }
-}
-
-/// One coordinate: `a = f / M`.
-fn divide<S: Scalar>(mass: &[S], force: &[S], acceleration: &mut [S], failures: &mut Vec<MechanicsError>) {
-    for (row, ((a, &f), &m)) in acceleration.iter_mut().zip(force).zip(mass).enumerate() {
-        *a = f / m;
-        if !a.is_finite() {
-            *a = S::nan();
-            let singular = m == <S as Real>::zero();
-            let failure = if singular { Failure::Singular { condition: f64::INFINITY } } else { Failure::NotFinite };
-            failures.push(MechanicsError::unsolved(row, failure));
-        }
     }
 }
 

@@ -1,6 +1,6 @@
 //! Models that a flag ends.
 
-use super::{EulerLagrange, MechanicsError, MetricJet, Request, Terms};
+use super::{EulerLagrange, Manifold, MechanicsError, MetricJet, Request, Terms};
 use crate::scalar::{Dd, Scalar};
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -37,6 +37,10 @@ impl<S: Scalar> EulerLagrange<S> for Interruptible<'_, S> {
 
     fn wide_metric_jets(&self, q: &[S], v: &[S]) -> Result<Option<Vec<MetricJet<Dd>>>, MechanicsError> {
         self.model.wide_metric_jets(q, v)
+    }
+
+    fn manifold(&self) -> Option<&dyn Manifold<S>> {
+        self.model.manifold()
     }
 
     fn conserves_energy(&self) -> bool {

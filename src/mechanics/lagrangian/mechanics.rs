@@ -242,6 +242,7 @@ impl<S: Scalar> Evaluator<S> {
         for field in [&mut terms.force, &mut terms.dissipation, &mut terms.acceleration, &mut terms.energy] {
             field.clear();
         }
+        terms.clear_constraints();
         // Whatever is needed is overwritten below.
         let size = |needed: bool, width: usize| if needed { batch * width } else { 0 };
         terms.lagrangian.resize(size(request.includes(Request::LAGRANGIAN), 1), S::nan());

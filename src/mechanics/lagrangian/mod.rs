@@ -5,6 +5,8 @@
 
 mod catalogue;
 mod configure;
+mod constrained_systems;
+mod constraints;
 mod derivatives;
 mod description;
 mod error;
@@ -29,6 +31,11 @@ pub use catalogue::{SystemError, SystemInstance, find, systems};
 pub use configure::configure;
 #[doc(hidden)]
 pub use configure::{build, configure_system, configure_values};
+pub use constrained_systems::constrained_systems;
+pub use constraints::{
+    Constrained, ConstraintError, Constraints, ExpressionConstraints, LeastNorm, LeastNormMotion, Manifold,
+    ManifoldRows, OffManifold, ReducedMass, project,
+};
 pub(crate) use description::pair;
 pub use description::{Description, DescriptionError};
 pub use error::MechanicsError;

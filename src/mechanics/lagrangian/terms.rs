@@ -1,5 +1,6 @@
 //! Euler-Lagrange terms of a batch of states: what may be asked for, where it is stored, how the rest follows.
 
+use super::constraints::Manifold;
 use super::error::MechanicsError;
 use super::metric::MetricJet;
 use crate::scalar::{Dd, Scalar};
@@ -11,7 +12,7 @@ use std::ops::BitOr;
 /// Requests combine with `|`. Asking for [`Request::ACCELERATION`] computes `M`, `c`, `g` and `Q` on the way and stores
 /// them, [`Request::ENERGY`] stores `L` and `p`. The default asks for nothing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Request(u8);
+pub struct Request(u16);
 
 impl Request {
     /// `L`.
@@ -24,14 +25,16 @@ impl Request {
     pub const MASS_MATRIX: Self = Self(8);
     /// `c = (d2L/dv dq) v`.
     pub const MOMENTUM_DRIFT: Self = Self(16);
-    /// `a = M^-1 (g - c + Q)`, with `M`, `c`, `g`, `Q`.
-    pub const ACCELERATION: Self = Self(128 | 32 | 16 | 8 | 4);
+    /// `a = M^-1 (g - c + Q)`, with `M`, `c`, `g`, `Q`; under constraints with `A`, `gamma`, multipliers and their force.
+    pub const ACCELERATION: Self = Self(256 | 128 | 32 | 16 | 8 | 4);
     /// `E = p.v - L`, with `L`, `p`.
     pub const ENERGY: Self = Self(64 | 2 | 1);
     /// Forces `Q` that do not follow from `L`, such as friction, and the power they take; nothing for a model without.
     pub const FORCE: Self = Self(128);
+    /// The rows `A` of constraints and their drift `gamma`; nothing for a model without.
+    pub const CONSTRAINTS: Self = Self(256);
     /// Everything.
-    pub const ALL: Self = Self(255);
+    pub const ALL: Self = Self(511);
 
     /// The same without the solution for the acceleration; what it is made of stays.
     pub(crate) const fn without_solution(self) -> Self {
@@ -88,10 +91,20 @@ pub struct Terms<S> {
     pub force: Vec<S>,
     /// Power that `Q` takes away, `-v.Q = v.dD/dv`, `(batch)`, in the unit of `L` per unit of time; empty as `force`.
     pub dissipation: Vec<S>,
-    /// `a = M^-1 (g - c + Q)`, `(batch, n)`.
+    /// `a = M^-1 (g - c + Q + A^T lambda)`, `(batch, n)`.
     pub acceleration: Vec<S>,
     /// `E = p.v - L`, `(batch)`.
     pub energy: Vec<S>,
+    /// Number of constraints `m` of each state; 0 for a model without, whose fields of constraints are empty.
+    pub constraints: usize,
+    /// `A`, `(batch, m, n)`.
+    pub constraint_matrix: Vec<S>,
+    /// `gamma = (dA/dt) v - db/dt`, `(batch, m)`.
+    pub constraint_drift: Vec<S>,
+    /// Multipliers `lambda`, `(batch, m)`, with the acceleration.
+    pub multipliers: Vec<S>,
+    /// Forces of constraint `A^T lambda`, `(batch, n)`, with the acceleration.
+    pub constraint_force: Vec<S>,
     /// One error for every row that failed, in the order of the rows; [`EulerLagrange::terms`] returns the first.
     pub failures: Vec<MechanicsError>,
 }
@@ -116,6 +129,12 @@ impl<S: Scalar> Terms<S> {
         copy(&mut self.dissipation, &batch.dissipation, 1, Request::FORCE);
         copy(&mut self.acceleration, &batch.acceleration, n, Request::ACCELERATION);
         copy(&mut self.energy, &batch.energy, 1, Request::ENERGY);
+        let m = batch.constraints;
+        self.constraints = m;
+        copy(&mut self.constraint_matrix, &batch.constraint_matrix, m * n, Request::CONSTRAINTS);
+        copy(&mut self.constraint_drift, &batch.constraint_drift, m, Request::CONSTRAINTS);
+        copy(&mut self.multipliers, &batch.multipliers, m, Request::ACCELERATION);
+        copy(&mut self.constraint_force, &batch.constraint_force, n, Request::ACCELERATION);
         self.failures.clear();
         let failed = batch.failures.iter().filter_map(|error| error.row().map(|row| (row, error)));
         let here = failed.filter(|(row, _)| rows.contains(row));
@@ -221,6 +240,11 @@ pub trait EulerLagrange<S: Scalar>: Send + Sync {
         self.inner().map_or(Ok(None), |inner| inner.wide_metric_jets(q, v))
     }
 
+    /// The states that the constraints of the model allow; none for a model without constraints.
+    fn manifold(&self) -> Option<&dyn Manifold<S>> {
+        self.inner().and_then(|inner| inner.manifold())
+    }
+
     /// `true` if the motion keeps the energy `E = p.v - L`: no friction, no other force beside those of `L`.
     fn conserves_energy(&self) -> bool {
         self.inner().is_none_or(|inner| inner.conserves_energy())
@@ -243,6 +267,20 @@ impl<S: Scalar> EulerLagrange<S> for Box<dyn EulerLagrange<S> + '_> {
 
     fn inner(&self) -> Option<&dyn EulerLagrange<S>> {
         Some(&**self)
+    }
+}
+
+impl<S: Scalar> EulerLagrange<S> for &(dyn EulerLagrange<S> + '_) {
+    fn coordinates(&self) -> usize {
+        (**self).coordinates()
+    }
+
+    fn terms(&self, q: &[S], v: &[S], request: Request, terms: &mut Terms<S>) -> Result<(), MechanicsError> {
+        (**self).terms(q, v, request, terms)
+    }
+
+    fn inner(&self) -> Option<&dyn EulerLagrange<S>> {
+        Some(*self)
     }
 }
 

@@ -1,11 +1,11 @@
 //! Steps under error control, piece by piece where a force from outside is not smooth.
 
 use super::force::{Piece, pieces};
-use super::ode::{Adaptive, Ended, Ran, Task};
+use super::ode::{Adaptive, Ended, Project, Ran, Task};
 use super::run::{Keep, into_error};
 use super::samples::{Part, Samples, Times};
 use super::{Domain, Force, Integrable, Options, RolloutError, Statistics, StepFailure, UnderflowCause};
-use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Terms};
+use crate::lagrangian::{EulerLagrange, Manifold, MechanicsError, Request, Terms, project};
 use crate::linalg::Workspace;
 use crate::scalar::{Real, Scalar};
 
@@ -72,7 +72,7 @@ pub(super) fn run<S: Integrable>(
     let (terms, external, workspace) = (Terms::default(), vec![zero; n], Workspace::new());
     let mut motion = Motion { model, force, options, n, terms, external, workspace };
     let all = Samples::new(options);
-    let domain = options.domain.as_ref();
+    let (domain, manifold) = (options.domain.as_ref(), model.manifold());
     let mut state: Vec<S> = q.iter().chain(v).copied().collect();
     let (mut start, mut first, mut first_step) = (zero, 0, zero);
     for piece in pieces(force.map_or(&[], |force| force.breaks()), options.t0, options.t_end) {
@@ -93,15 +93,26 @@ pub(super) fn run<S: Integrable>(
             samples: &samples,
         };
         let mut valid = true;
+        let mut on = Vec::with_capacity(2 * n);
         let mut sample = |k: usize, y: &[S]| {
+            on.clear();
+            on.extend_from_slice(y);
+            // Between two states it is off by the error of the interpolation.
+            if let Some(manifold) = manifold {
+                let (q, v) = on.split_at_mut(n);
+                valid &= project(manifold, q, v).is_ok();
+            }
+            let y = on.as_slice();
             // An interpolated state may still cross a bound by less than the tolerance.
             valid &= y.iter().all(|x| x.is_finite()) && domain.is_none_or(|domain| domain.violation(y).is_none());
             // The samples behind an invalid one are not taken, the motion goes on to its end.
             !valid || first + k >= after || keep(all.time(first + k), &y[..n], &y[n..])
         };
         let mut derivative = |e: S, y: &[S], dy: &mut [S]| motion.derivative(&piece, start + e, y, dy);
+        let mut back = |y: &mut [S]| returned(manifold, options, n, y);
+        let back = manifold.is_some().then_some(&mut back as &mut Project<'_, S, StepFailure>);
         let Ran { statistics, elapsed: reached, state: reached_state, step, ended } =
-            S::integrate(&task, &mut derivative, &mut sample);
+            S::integrate(&task, &mut derivative, back, &mut sample);
         total += statistics;
         let stop = stopped(&mut motion, &piece, ended, valid, (start + reached, &reached_state, step));
         if stop.is_some() {
@@ -111,6 +122,22 @@ pub(super) fn run<S: Integrable>(
         (start, first, state) = (piece.end, after, reached_state);
     }
     (total, None)
+}
+
+/// Brings a state back to the constraints; returns how far that was, in the norm and the unit of the error of a step.
+fn returned<S: Scalar>(
+    manifold: Option<&dyn Manifold<S>>,
+    options: &Options<S>,
+    n: usize,
+    y: &mut [S],
+) -> Result<S, StepFailure> {
+    let (before, zero) = (y.to_vec(), <S as Real>::zero());
+    let (q, v) = y.split_at_mut(n);
+    manifold.map_or(Ok([0.0; 2]), |manifold| project(manifold, q, v)).map_err(|_| StepFailure::OffConstraints)?;
+    let squares = before.iter().zip(&*y).fold(zero, |sum, (&a, &b)| {
+        sum + Real::sqr((a - b) / (options.atol + options.rtol * a.abs() + S::min_positive()))
+    });
+    Ok(Real::sqrt(squares / S::of_f64(2.0 * n as f64)))
 }
 
 /// Why a piece ended before its time, if it did.

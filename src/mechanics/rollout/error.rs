@@ -58,6 +58,26 @@ pub enum RolloutError {
         /// Condition number just ahead.
         condition: f64,
     },
+    /// A start that the constraints do not allow.
+    #[error("{distance:.3e} away from the constraints, which `{constraint}` misses most")]
+    OffConstraints {
+        /// The constraint that is missed most.
+        constraint: String,
+        /// Distance of the start in units of coordinates, or of velocities.
+        distance: f64,
+        /// The nearest state `(q, v)` that they allow; empty if none was found.
+        nearest: Vec<f64>,
+    },
+    /// A constraint has come to depend on the others, so that nothing tells which of them carries the load.
+    #[error("constraint {constraint} depends on the others just after t = {t}")]
+    DependentConstraint {
+        /// Last time at which it did not.
+        t: f64,
+        /// State `(q, v)` at `t`.
+        state: Vec<f64>,
+        /// Which constraint, from 0.
+        constraint: usize,
+    },
     /// The trajectory leaves the states at which the mass matrix is certified.
     #[error("the mass matrix is not certified just after t = {t}")]
     Uncertified {
@@ -120,9 +140,10 @@ impl RolloutError {
     /// Time at which the motion stopped, if it had begun.
     pub fn time(&self) -> Option<f64> {
         match self {
-            Self::Invalid { .. } => None,
+            Self::Invalid { .. } | Self::OffConstraints { .. } => None,
             Self::LeftDomain { t, .. }
             | Self::SingularMass { t, .. }
+            | Self::DependentConstraint { t, .. }
             | Self::Uncertified { t, .. }
             | Self::NotFinite { t, .. }
             | Self::StepUnderflow { t, .. }

@@ -6,6 +6,7 @@ use super::gauss::Gauss;
 use super::phase::Phase;
 use super::run::{Keep, into_error};
 use super::samples::{Samples, Times};
+use super::spark::Spark;
 use super::variational::Variational;
 use super::{Force, Method, Options, RolloutError, Statistics, StepFailure};
 use crate::lagrangian::EulerLagrange;
@@ -15,11 +16,22 @@ use crate::scalar::{Real, Scalar};
 pub(super) enum Stepper<S> {
     Gauss(Gauss<S>),
     Variational(Variational<S>),
+    Constrained(Spark<S>),
 }
 
 impl<S: Scalar> Stepper<S> {
-    /// The stepper of a method for `n` coordinates, if it has a fixed step.
-    pub(super) fn new(method: Method, n: usize) -> Option<Self> {
+    /// The stepper of a method for the coordinates of a model, if it has a fixed step.
+    pub(super) fn new(method: Method, model: &dyn EulerLagrange<S>) -> Option<Self> {
+        let n = model.coordinates();
+        if let Some(manifold) = model.manifold() {
+            let stages = match method {
+                Method::Dopri5 | Method::Dop853 => return None,
+                Method::Midpoint | Method::Variational => 1,
+                Method::Gauss4 => 2,
+                Method::Gauss6 => 3,
+            };
+            return Some(Self::Constrained(Spark::new(stages, manifold)));
+        }
         match method {
             Method::Dopri5 | Method::Dop853 => None,
             Method::Midpoint => Some(Self::Gauss(Gauss::new(1, n))),
@@ -33,6 +45,10 @@ impl<S: Scalar> Stepper<S> {
         match self {
             Self::Gauss(gauss) => gauss.step(phase, state, v, h),
             Self::Variational(variational) => variational.step(phase, state, v, h),
+            Self::Constrained(spark) => match phase.manifold() {
+                Some(manifold) => spark.step(phase, manifold, state, v, h),
+                None => Err(StepFailure::State),
+            },
         }
     }
 
@@ -41,6 +57,7 @@ impl<S: Scalar> Stepper<S> {
         match self {
             Self::Gauss(gauss) => gauss.stages(),
             Self::Variational(variational) => variational.stages(),
+            Self::Constrained(spark) => spark.stages(),
         }
     }
 }
@@ -197,8 +214,11 @@ fn inside<S: Scalar>(stepper: &Stepper<S>, n: usize, options: &Options<S>) -> Re
 impl<S: Scalar> Position<S> {
     fn velocity(&self, phase: &mut Phase<'_, S>) -> Result<Vec<S>, StepFailure> {
         let mut v = self.near.clone();
-        phase.velocity(&self.state.q.high, &self.state.p.high, &mut v)?;
-        Ok(v)
+        let (q, p) = (&self.state.q.high, &self.state.p.high);
+        match phase.manifold() {
+            Some(manifold) => phase.land(manifold, q, p, &mut v).map(|_| v),
+            None => phase.velocity(q, p, &mut v).map(|()| v),
+        }
     }
 
     fn time(&self, options: &Options<S>, backwards: bool) -> S {

@@ -27,7 +27,7 @@ use crate::scalar::{Real, Scalar};
 pub(super) struct Tableau<S> {
     pub(super) nodes: Vec<S>,
     pub(super) weights: Vec<S>,
-    ratios: Vec<S>,
+    pub(super) ratios: Vec<S>,
 }
 
 impl<S: Scalar> Tableau<S> {

@@ -8,6 +8,9 @@
 //! [`Force`] `Q(t, q, v)` from outside: a motor, a controller, or what was recorded ([`SampledForce`]). Angles stay continuous (never wrapped) in the output;
 //! a model that needs them wrapped wraps them itself.
 //!
+//! Of a model under constraints the motion stays on them: the adaptive methods project their states and samples, the symplectic ones have
+//! their constrained forms. A start is brought to the constraints if it lies within a thousandth of its size, and refused otherwise.
+//!
 //! [`rollout_in_pieces`] hands the samples over instead of keeping them, for motions longer than the memory.
 //!
 //! Adaptive integration is offered in the precisions the solver knows, [`Integrable`]: `f32` and `f64`; fixed steps in
@@ -30,6 +33,7 @@ mod pieces;
 mod run;
 mod samples;
 mod simplified_newton;
+mod spark;
 mod trajectory;
 mod variational;
 

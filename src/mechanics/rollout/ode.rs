@@ -23,6 +23,9 @@ use std::cell::RefCell;
 /// Receives sample `k` with its state, and says whether to go on.
 pub(super) type Output<'a, S> = dyn FnMut(usize, &[S]) -> bool + 'a;
 
+/// Brings a state to where it belongs and says how far that is, in units of the tolerance.
+pub(super) type Project<'a, S, E> = dyn FnMut(&mut [S]) -> Result<S, E> + 'a;
+
 /// The methods offered here.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Adaptive {
@@ -75,7 +78,12 @@ pub struct Ran<S, E> {
 /// The scalars that roll-outs work in: `f32` and `f64`.
 pub trait Integrable: Scalar {
     #[doc(hidden)]
-    fn integrate<E>(task: &Task<'_, Self>, f: &mut Rhs<'_, Self, E>, output: &mut Output<'_, Self>) -> Ran<Self, E>;
+    fn integrate<E>(
+        task: &Task<'_, Self>,
+        f: &mut Rhs<'_, Self, E>,
+        project: Option<&mut Project<'_, Self, E>>,
+        output: &mut Output<'_, Self>,
+    ) -> Ran<Self, E>;
 }
 
 macro_rules! integrable {
@@ -85,14 +93,15 @@ macro_rules! integrable {
                 fn integrate<E>(
                     task: &Task<'_, Self>,
                     f: &mut Rhs<'_, Self, E>,
+                    project: Option<&mut Project<'_, Self, E>>,
                     output: &mut Output<'_, Self>,
                 ) -> Ran<Self, E> {
                     // Small states live on the stack.
                     match task.start.len() {
-                        2 => integrate(task, |y| SVector::<Self, 2>::from_column_slice(y), f, output),
-                        4 => integrate(task, |y| SVector::<Self, 4>::from_column_slice(y), f, output),
-                        6 => integrate(task, |y| SVector::<Self, 6>::from_column_slice(y), f, output),
-                        _ => integrate(task, DVector::<Self>::from_column_slice, f, output),
+                        2 => integrate(task, |y| SVector::<Self, 2>::from_column_slice(y), f, project, output),
+                        4 => integrate(task, |y| SVector::<Self, 4>::from_column_slice(y), f, project, output),
+                        6 => integrate(task, |y| SVector::<Self, 6>::from_column_slice(y), f, project, output),
+                        _ => integrate(task, DVector::<Self>::from_column_slice, f, project, output),
                     }
                 }
             }
@@ -121,6 +130,7 @@ const fn closing_calls(method: Adaptive) -> usize {
 struct Watch<'a, 'f, S, E> {
     task: &'a Task<'a, S>,
     f: &'a mut Rhs<'f, S, E>,
+    project: Option<&'a mut Project<'f, S, E>>,
     output: &'a mut Output<'f, S>,
     /// Stages of the last calls, the newest at `calls - 1`, in a ring of `ring` rows.
     recent: Vec<S>,
@@ -141,6 +151,8 @@ struct Watch<'a, 'f, S, E> {
     earlier: Option<E>,
     /// An accepted step failed at its end: try again with this size.
     retry: Option<S>,
+    /// The state was projected: go on from it, beginning with this size.
+    restart: Option<S>,
     /// The time does not advance any more.
     stuck: bool,
     /// The receiver of the samples takes no more.
@@ -225,7 +237,31 @@ impl<S: Scalar, E> Watch<'_, '_, S, E> {
         self.step = h;
         self.state.copy_from_slice(y);
         self.slope.copy_from_slice(slope);
-        self.stopped
+        self.stopped || self.leaves(x, h)
+    }
+
+    /// Projects a state that has drifted by more than the tolerance; `true` stops the solver, which does not know of it.
+    fn leaves(&mut self, x: S, h: S) -> bool {
+        let Some(project) = &mut self.project else { return false };
+        let mut moved = self.state.clone();
+        let drifted = match project(&mut moved) {
+            Ok(drift) => drift > <S as Real>::one() && self.next < self.task.samples.len(),
+            Err(error) => {
+                (self.failure, self.stuck) = (Some(error), true);
+                return true;
+            }
+        };
+        if !drifted {
+            return false;
+        }
+        self.statistics.evaluations += 1;
+        if let Err(error) = (self.f)(x, &moved, &mut self.slope) {
+            (self.failure, self.stuck) = (Some(error), true);
+            return true;
+        }
+        self.state = moved;
+        self.restart = Some(h);
+        true
     }
 
     /// Prepares the interpolant of the step to `y`; `false` if an evaluation it needs fails.
@@ -279,6 +315,7 @@ fn integrate<S, D, E>(
     task: &Task<'_, S>,
     vector: impl Fn(&[S]) -> OVector<S, D>,
     f: &mut Rhs<'_, S, E>,
+    project: Option<&mut Project<'_, S, E>>,
     output: &mut Output<'_, S>,
 ) -> Ran<S, E>
 where
@@ -315,6 +352,7 @@ where
     let watch = RefCell::new(Watch {
         task,
         f,
+        project: project.map(|project| project as &mut Project<'_, S, E>),
         output,
         recent: vec![zero; ring * dim],
         calls: 0,
@@ -329,6 +367,7 @@ where
         failure: None,
         earlier: None,
         retry: None,
+        restart: None,
         stuck: false,
         stopped: false,
         interpolant: Interpolant::default(),
@@ -358,6 +397,12 @@ where
         let attempts = (watch.calls - opening - accepted * closing_calls(task.method)) / stages(task.method);
         watch.statistics.rejected += attempts - accepted;
         next = watch.next;
+        if let Some(step) = watch.restart.take() {
+            first_step = Real::min(step, end - watch.elapsed);
+            if first_step > <S as Scalar>::epsilon().ldexp(2) * end {
+                continue;
+            }
+        }
         if let Some(failed) = watch.retry.take() {
             // The step counted as accepted was not taken.
             watch.statistics.accepted -= 1;

@@ -3,7 +3,7 @@
 
 use super::force::Piece;
 use super::{Force, StepFailure};
-use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Terms};
+use crate::lagrangian::{EulerLagrange, Manifold, ManifoldRows, MechanicsError, Request, Terms};
 use crate::linalg::{self, LinalgError, Workspace};
 use crate::scalar::{Real, Scalar};
 
@@ -89,6 +89,11 @@ impl<S: Scalar> Defect<S> {
     /// let an iteration hop between two roundings for ever.
     pub(super) fn improves(self, best: Self) -> bool {
         self.relative < best.relative * S::half() || self.overall < best.overall * S::half()
+    }
+
+    /// The worse of both in each measure.
+    pub(super) fn worst(self, other: Self) -> Self {
+        Self { relative: S::max(self.relative, other.relative), overall: S::max(self.overall, other.overall) }
     }
 
     /// The better of both in each measure.
@@ -273,6 +278,62 @@ impl<'a, S: Scalar> Phase<'a, S> {
             v.iter_mut().zip(&change).for_each(|(v, &c)| *v -= c);
         }
         Ok(())
+    }
+}
+
+impl<'a, S: Scalar> Phase<'a, S> {
+    /// The states that the constraints of the model allow.
+    pub(super) fn manifold(&self) -> Option<&'a dyn Manifold<S>> {
+        self.model.manifold()
+    }
+
+    /// Solves `dL/dv(q, v) = p + A^T mu` and `A v = b` for `v` by Newton's method from the guess in `v`; returns the impulse `A^T mu`.
+    pub(super) fn land(
+        &mut self,
+        manifold: &dyn Manifold<S>,
+        q: &[S],
+        p: &[S],
+        v: &mut [S],
+    ) -> Result<Vec<S>, StepFailure> {
+        let (n, m, zero) = (self.n, manifold.names().len(), <S as Real>::zero());
+        let k = n + m;
+        let (mut rows, mut push) = (ManifoldRows::default(), vec![zero; n]);
+        let (mut matrix, mut right, mut change) = (vec![zero; k * k], vec![zero; k], vec![zero; k]);
+        let mut best = Defect::unknown();
+        for sweep in 1..=MAX_SWEEPS {
+            self.evaluate(q, v, Request::MOMENTUM | Request::MASS_MATRIX, &[])?;
+            self.iterations += 1;
+            manifold.rows(q, v, &mut rows);
+            for i in 0..n {
+                right[i] = (self.terms.momentum[i] - p[i]) - push[i];
+                matrix[i * k..i * k + n].copy_from_slice(&self.terms.mass_matrix[i * n..(i + 1) * n]);
+                for c in 0..m {
+                    matrix[i * k + n + c] = rows.matrix[c * n + i];
+                    matrix[(n + c) * k + i] = rows.matrix[c * n + i];
+                }
+            }
+            right[n..].copy_from_slice(&rows.rates);
+            let momentum = &self.terms.momentum;
+            let of_momenta = Defect::of(n, &right[..n], |i| p[i].abs() + momentum[i].abs() + push[i].abs());
+            let size = |c: usize| {
+                let terms = rows.matrix[c * n..(c + 1) * n].iter().zip(&*v);
+                terms.fold(zero, |sum, (&a, &v)| sum + (a * v).abs()) + rows.rates[c].abs()
+            };
+            let defect = of_momenta.worst(Defect::of(m, &rows.rates, size));
+            linalg::solve(k, &matrix, &right, &mut change, &mut self.workspace).map_err(singular)?;
+            if defect.is_rounding() || (!defect.improves(best) && defect.is_small()) {
+                return Ok(push);
+            }
+            if sweep == MAX_SWEEPS {
+                return Err(StepFailure::NotConverged { iterations: sweep, residual: defect.overall.to_f64() });
+            }
+            best = best.best(defect);
+            v.iter_mut().zip(&change).for_each(|(v, &c)| *v -= c);
+            for (row, &weight) in rows.matrix.chunks_exact(n).zip(&change[n..]) {
+                push.iter_mut().zip(row).for_each(|(push, &a)| *push += weight * a);
+            }
+        }
+        Ok(push)
     }
 }
 

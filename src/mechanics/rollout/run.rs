@@ -4,7 +4,7 @@ use super::error::UnderflowCause;
 use super::fixed::Stepper;
 use super::ode::Adaptive;
 use super::{Force, Integrable, Method, Options, RolloutError, Statistics, Trajectory, adaptive, fixed};
-use crate::lagrangian::{EulerLagrange, MechanicsError};
+use crate::lagrangian::{EulerLagrange, ManifoldRows, MechanicsError, OffManifold, project};
 use crate::scalar::Scalar;
 
 /// Result of a roll-out.
@@ -111,7 +111,7 @@ fn collected<S: Scalar>(
         trajectory.push(t, q, v);
         true
     });
-    if options.energy && !matches!(stop, Some(RolloutError::Invalid { .. })) {
+    if options.energy && !matches!(stop, Some(RolloutError::Invalid { .. } | RolloutError::OffConstraints { .. })) {
         trajectory.energy = Some(trajectory.energy_by(model));
     }
     Rollout { trajectory, statistics, stop }
@@ -132,9 +132,10 @@ pub(super) fn integrate<S: Integrable>(
             return integrate_fixed(model, force, (q, v), options, keep);
         }
     };
-    match check(model.coordinates(), q, v, options).and_then(|()| reachable(q, v, options)) {
+    let checked = check(model.coordinates(), q, v, options).and_then(|()| reachable(q, v, options));
+    match checked.and_then(|()| allowed(model, q, v)) {
         Err(error) => (Statistics::default(), Some(error)),
-        Ok(()) => adaptive::run(model, force, method, (q, v), options, keep),
+        Ok((q, v)) => adaptive::run(model, force, method, (&q, &v), options, keep),
     }
 }
 
@@ -151,7 +152,11 @@ fn integrate_fixed<S: Scalar>(
     if let Err(error) = check(n, q, v, options) {
         return refused(error);
     }
-    let Some(mut stepper) = Stepper::new(options.method, n) else {
+    let (q, v) = match allowed(model, q, v) {
+        Ok(start) => start,
+        Err(error) => return refused(error),
+    };
+    let Some(mut stepper) = Stepper::new(options.method, model) else {
         let problem = format!("{} adapts its steps; {} offers fixed steps only", options.method.name(), S::NAME);
         return refused(RolloutError::Invalid { what: "method", problem });
     };
@@ -160,7 +165,36 @@ fn integrate_fixed<S: Scalar>(
                        dopri5, dop853, midpoint, gauss4 and gauss6 integrate it";
         return refused(RolloutError::Invalid { what: "method", problem: problem.to_string() });
     }
-    fixed::run(model, force, &mut stepper, (q, v), options, keep)
+    fixed::run(model, force, &mut stepper, (&q, &v), options, keep)
+}
+
+/// A start nearer to the constraints than this share of its size is brought to them.
+const NEAR: f64 = 1e-3;
+
+/// The start on the constraints of the model.
+///
+/// # Errors
+/// [`RolloutError::OffConstraints`] of one that is not near to them.
+fn allowed<S: Scalar>(model: &dyn EulerLagrange<S>, q: &[S], v: &[S]) -> Result<(Vec<S>, Vec<S>), RolloutError> {
+    let (mut on_q, mut on_v) = (q.to_vec(), v.to_vec());
+    let Some(manifold) = model.manifold() else { return Ok((on_q, on_v)) };
+    let name = |row: usize| manifold.names().get(row).cloned().unwrap_or_default();
+    let [moved, turned] = match project(manifold, &mut on_q, &mut on_v) {
+        Ok(distances) => distances,
+        Err(OffManifold { row, defect }) => {
+            return Err(RolloutError::OffConstraints { constraint: name(row), distance: defect, nearest: Vec::new() });
+        }
+    };
+    let size = |x: &[S]| x.iter().map(|x| x.to_f64().powi(2)).sum::<f64>().sqrt();
+    let far = [(moved, size(q)), (turned, size(v))].into_iter().find(|(moved, size)| *moved > NEAR * size);
+    let Some((distance, _)) = far else { return Ok((on_q, on_v)) };
+    let mut rows = ManifoldRows::default();
+    manifold.rows(q, v, &mut rows);
+    let missed = if moved > NEAR * size(q) { &rows.values } else { &rows.rates };
+    let most = missed.iter().enumerate().max_by(|(_, a), (_, b)| a.abs().to_f64().total_cmp(&b.abs().to_f64()));
+    let nearest = on_q.iter().chain(&on_v).map(|x| x.to_f64()).collect();
+    let constraint = most.map_or_else(String::new, |(row, _)| name(row));
+    Err(RolloutError::OffConstraints { constraint, distance, nearest })
 }
 
 fn check<S: Scalar>(n: usize, q: &[S], v: &[S], options: &Options<S>) -> Result<(), RolloutError> {
@@ -198,10 +232,20 @@ fn reachable<S: Scalar>(q: &[S], v: &[S], options: &Options<S>) -> Result<(), Ro
 /// Why the derivative of a state, or a step, cannot be had.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum StepFailure {
-    Domain { component: usize, value: f64, lower: f64, upper: f64 },
+    Domain {
+        component: usize,
+        value: f64,
+        lower: f64,
+        upper: f64,
+    },
     State,
     Model(MechanicsError),
-    NotConverged { iterations: usize, residual: f64 },
+    NotConverged {
+        iterations: usize,
+        residual: f64,
+    },
+    /// No state of the constraints is near.
+    OffConstraints,
 }
 
 impl StepFailure {
@@ -233,6 +277,10 @@ pub(super) fn into_error(failure: StepFailure, t: f64, state: Vec<f64>, step: f6
         StepFailure::Model(MechanicsError::Singular { condition, .. }) => {
             RolloutError::SingularMass { t, state, condition }
         }
+        StepFailure::Model(MechanicsError::Dependent { constraint, .. }) => {
+            RolloutError::DependentConstraint { t, state, constraint }
+        }
+        StepFailure::OffConstraints => RolloutError::NotFinite { t, state, what: "way back to the constraints" },
         StepFailure::Model(MechanicsError::Interrupted) => RolloutError::Stopped { t },
         StepFailure::Model(MechanicsError::Uncertified { .. }) => RolloutError::Uncertified { t, state },
         StepFailure::Model(MechanicsError::NotFinite { what, .. }) => RolloutError::NotFinite { t, state, what },

@@ -3,6 +3,7 @@
 mod certify;
 mod check;
 mod configuration;
+mod constraints;
 mod conveniences;
 mod dissipation;
 mod experiment;

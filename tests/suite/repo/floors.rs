@@ -9,7 +9,7 @@ const FLOORS: [(&str, &[&str]); 6] = [
     ("support", &["names", "storage"]),
     ("mechanics", &["lagrangian", "rollout", "network"]),
     ("learning", &["recording", "optimizers", "configuration", "data", "training", "shooting", "presets"]),
-    ("physics", &["geometry", "symmetry", "certificate", "analysis", "relativity"]),
+    ("physics", &["geometry", "constraints", "symmetry", "certificate", "analysis", "relativity"]),
     ("app", &["experiments", "report", "pipeline", "cli"]),
 ];
 

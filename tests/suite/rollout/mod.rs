@@ -1,4 +1,5 @@
 //! Integrators.
 
+mod constraints;
 mod forces;
 mod integrators;

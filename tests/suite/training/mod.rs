@@ -1,6 +1,7 @@
 //! Losses, penalties, optimisers, checkpoints.
 
 mod checkpoints;
+mod constraints;
 mod faults;
 mod faulty;
 mod left_out;

@@ -8,6 +8,7 @@ mod quantity;
 mod system;
 
 use super::ExpressionLagrangian;
+use super::constraints::ExpressionConstraints;
 use super::expression::{ExpressionError, Formula};
 use super::shell_advice::ShellAdvice;
 use super::system::Range;
@@ -39,6 +40,9 @@ pub struct Description {
     /// Names for formulas; they may use each other in any order.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub definitions: BTreeMap<String, String>,
+    /// Formulas that vanish, by the names of the constraints: of coordinates, or linear in velocities.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub constraints: BTreeMap<String, String>,
     /// Components of `g` in `L = g_ij q_i_dot q_j_dot / 2` by pairs of coordinates, `"t,r"`; symmetric, those left out are 0.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub metric: Option<BTreeMap<String, String>>,
@@ -129,6 +133,47 @@ impl TrajectoryDescription {
     }
 }
 
+impl Description {
+    /// A system of a Lagrangian and constraints; coordinates with units, bounds and those of their velocities, parameters with
+    /// defaults, units and ranges.
+    pub(super) fn of_parts<'a>(
+        (name, title, time_unit): (&str, &str, &str),
+        lagrangian: String,
+        coordinates: impl Iterator<Item = (&'a str, &'a str, (f64, f64), (f64, f64))>,
+        parameters: impl Iterator<Item = (&'a str, &'a str, &'a str, Range)>,
+        constraints: BTreeMap<String, String>,
+    ) -> Self {
+        let pair = |(low, high): (f64, f64)| Some([Quantity(low), Quantity(high)]);
+        let coordinate = |(name, unit, bounds, speeds): (&str, &str, _, _)| CoordinateDescription {
+            name: name.to_string(),
+            unit: unit.to_string(),
+            periodic: unit == "rad",
+            time_like: false,
+            bounds: pair(bounds),
+            velocity_bounds: pair(speeds),
+        };
+        let parameter = |(symbol, default, unit, range): (&str, &str, &str, Range)| {
+            let (default, unit) = (Decimal(default.to_string()), unit.to_string());
+            (symbol.to_string(), ParameterDescription { default, unit, range, learn: false })
+        };
+        Self {
+            name: name.to_string(),
+            title: Some(title.to_string()),
+            time_unit: time_unit.to_string(),
+            lagrangian: Some(lagrangian),
+            coordinates: coordinates.map(coordinate).collect(),
+            parameters: parameters.map(parameter).collect(),
+            definitions: BTreeMap::new(),
+            constraints,
+            metric: None,
+            training: BTreeMap::new(),
+            validation: BTreeMap::new(),
+            trajectory: TrajectoryDescription::default(),
+            shell: None,
+        }
+    }
+}
+
 /// Mistake in a description.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{key}: {problem}")]
@@ -155,6 +200,8 @@ pub struct Described {
     pub description: Description,
     /// Its Lagrangian; parameters in the order of their names.
     pub lagrangian: ExpressionLagrangian,
+    /// Its constraints, if there are any; parameters as the Lagrangian's.
+    pub constraints: Option<ExpressionConstraints>,
     /// The velocity of the time-like coordinate on the mass shell.
     shell: Option<Formula>,
     /// Where training states lie, if not within their bounds.

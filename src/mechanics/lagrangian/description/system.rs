@@ -1,11 +1,12 @@
 //! From a description to a system: every name and formula checked, the Lagrangian compiled.
 
 use super::{Described, Description, DescriptionError, Quantity};
+use crate::lagrangian::constraints::ExpressionConstraints;
 use crate::lagrangian::expression::{Compiler, Expression, Meaning, Value, is_name, is_reserved};
 use crate::lagrangian::system::{
     Bounds, Coordinate, LearningAdvice, Parameter, PerSize, Range, ShellAdvice, Size, System, TrajectoryTest,
 };
-use crate::lagrangian::{ExpressionLagrangian, systems};
+use crate::lagrangian::{ExpressionLagrangian, constrained_systems, systems};
 use crate::names::{taken_column, unknown};
 use crate::ops::{Binary, Unary};
 use crate::scalar::{Dd, Scalar};
@@ -16,7 +17,7 @@ use std::sync::Arc;
 
 /// Most coordinates of a system.
 const MAX_COORDINATES: usize = 64;
-/// Most parameters, and most definitions.
+/// Most parameters, most definitions, and most constraints.
 const MAX_NAMES: usize = 256;
 
 type Outcome<T> = Result<T, DescriptionError>;
@@ -30,6 +31,21 @@ impl Description {
     /// # Errors
     /// The first key that is wrong, and how.
     pub(crate) fn system(&self) -> Outcome<System> {
+        let taken = constrained_systems().iter().find(|system| system.name == self.name);
+        if systems().iter().any(|system| system.name == self.name)
+            || taken.is_some_and(|system| system.description() != Some(self))
+        {
+            let problem = format!("{} is a system of the catalogue, expected another name", self.name);
+            return Err(DescriptionError::new("name", problem));
+        }
+        self.compile()
+    }
+
+    /// The same, whatever its name.
+    ///
+    /// # Errors
+    /// The first key that is wrong, and how.
+    pub(in crate::mechanics::lagrangian) fn compile(&self) -> Outcome<System> {
         self.check_texts()?;
         let n = self.coordinates.len();
         let mut compiler = Compiler::default();
@@ -53,6 +69,7 @@ impl Description {
                 return Err(DescriptionError::new("", problem));
             }
         };
+        let constraints = self.constraints(&mut compiler, &scope)?;
         let base = self.base_bounds(shell.and(time_like))?;
         let training = self.bounds("training", &self.training, base.clone())?;
         let validation = self.bounds("validation", &self.validation, base)?;
@@ -77,6 +94,7 @@ impl Description {
             described: Some(Arc::new(Described {
                 description: self.clone(),
                 lagrangian: ExpressionLagrangian::compiled((n, self.parameters.len()), compiler.formula(value)),
+                constraints,
                 shell: shell.map(|shell| compiler.formula(shell)),
                 around_centre,
             })),
@@ -90,12 +108,6 @@ impl Description {
         if name.is_empty() || name.len() > 64 || !name.chars().all(plain) || name.starts_with('-') {
             let problem = "expected a name of 1 to 64 letters, digits, `-` and `_`";
             return Err(DescriptionError::new("name", problem));
-        }
-        if systems().iter().any(|system| system.name == *name) {
-            return Err(DescriptionError::new(
-                "name",
-                format!("{name} is a system of the catalogue, expected another name"),
-            ));
         }
         let units = self.coordinates.iter().enumerate().map(|(i, c)| (format!("coordinates[{i}].unit"), &c.unit));
         let parameters = self.parameters.iter().map(|(name, p)| (format!("parameters.{name}.unit"), &p.unit));
@@ -111,7 +123,12 @@ impl Description {
             let problem = format!("expected 1 to {MAX_COORDINATES} tables [[coordinates]], found {n}");
             return Err(DescriptionError::new("coordinates", problem));
         }
-        for (key, count) in [("parameters", self.parameters.len()), ("definitions", self.definitions.len())] {
+        let counts = [
+            ("parameters", self.parameters.len()),
+            ("definitions", self.definitions.len()),
+            ("constraints", self.constraints.len()),
+        ];
+        for (key, count) in counts {
             if count > MAX_NAMES {
                 return Err(DescriptionError::new(key, format!("expected at most {MAX_NAMES} names, found {count}")));
             }
@@ -191,7 +208,8 @@ impl Description {
         let expression: Expression = text.parse().map_err(DescriptionError::formula("lagrangian"))?;
         let value = compiler.add(&expression, scope, false).map_err(DescriptionError::formula("lagrangian"))?;
         let velocities = compiler.velocities(value);
-        for (i, coordinate) in self.coordinates.iter().enumerate() {
+        // What constraints move needs no inertia.
+        for (i, coordinate) in self.coordinates.iter().enumerate().filter(|_| self.constraints.is_empty()) {
             if !velocities.contains(&i) {
                 let name = &coordinate.name;
                 let problem = format!("expected {name}_dot in it: without it {name} has no equation of motion");
@@ -199,6 +217,27 @@ impl Description {
             }
         }
         Ok(value)
+    }
+
+    /// The formulas that vanish.
+    fn constraints(
+        &self,
+        compiler: &mut Compiler,
+        scope: &BTreeMap<String, Meaning>,
+    ) -> Outcome<Option<ExpressionConstraints>> {
+        if self.constraints.is_empty() {
+            return Ok(None);
+        }
+        for name in self.constraints.keys() {
+            if name.is_empty() || name.chars().count() > 100 || name.chars().any(char::is_control) {
+                return Err(DescriptionError::new("constraints", "expected names of 1 to 100 characters on one line"));
+            }
+        }
+        let size = (self.coordinates.len(), self.parameters.len());
+        let formulas = self.constraints.iter().map(|(name, text)| (name.as_str(), text.as_str()));
+        let compiled = ExpressionConstraints::compiled(size, formulas, compiler, scope);
+        let told = |(name, error)| DescriptionError::new(format!("constraints.{name}"), error);
+        compiled.map(Some).map_err(told)
     }
 
     /// The entries `(i, j)`, `i <= j`, of the metric.

@@ -183,6 +183,33 @@ impl Compiler {
         value
     }
 
+    /// `true` if a value depends on neither coordinates nor velocities.
+    pub fn is_constant(&self, value: Value) -> bool {
+        let entries = self.entries.iter().zip(self.needed(value)).filter(|(_, needed)| *needed);
+        entries.into_iter().all(|(entry, _)| !matches!(entry, Entry::Position(_) | Entry::Velocity(_)))
+    }
+
+    /// Degree of a value in the velocities, 0 or 1, as its operations show it; `None` if it is not linear in them.
+    pub fn velocity_degree(&self, value: Value) -> Option<u8> {
+        let mut degrees: Vec<Option<u8>> = Vec::with_capacity(value.0 as usize + 1);
+        for entry in &self.entries[..=value.0 as usize] {
+            let degree = |value: Value| degrees[value.0 as usize];
+            let found = match *entry {
+                Entry::Velocity(_) => Some(1),
+                Entry::Parameter(_) | Entry::Position(_) | Entry::Number(_) | Entry::Pi => Some(0),
+                Entry::Unary(Unary::Neg, a) => degree(a),
+                Entry::Binary(Binary::Add | Binary::Sub, a, b) => degree(a).zip(degree(b)).map(|(a, b)| a.max(b)),
+                Entry::Binary(Binary::Mul, a, b) => {
+                    degree(a).zip(degree(b)).map(|(a, b)| a + b).filter(|degree| *degree <= 1)
+                }
+                Entry::Binary(Binary::Div, a, b) if degree(b) == Some(0) => degree(a),
+                _ => operands(*entry).into_iter().flatten().all(|a| degree(a) == Some(0)).then_some(0),
+            };
+            degrees.push(found);
+        }
+        degrees[value.0 as usize]
+    }
+
     /// The velocities that a value depends on, by their coordinate.
     pub fn velocities(&self, value: Value) -> Vec<usize> {
         let needed = self.needed(value);

@@ -11,7 +11,7 @@ pub struct ExpressionError {
 }
 
 impl ExpressionError {
-    pub(super) fn new(column: usize, problem: impl Into<String>) -> Self {
+    pub(in crate::mechanics::lagrangian) fn new(column: usize, problem: impl Into<String>) -> Self {
         Self { column, problem: problem.into() }
     }
 }

@@ -21,6 +21,7 @@ fn decay(method: Adaptive, tolerance: f64, first_step: f64, samples: &Vec<f64>) 
             dy[0] = -y[0];
             Ok(())
         },
+        None,
         &mut |k, y| {
             assert_eq!(k, got.len());
             got.push(y[0]);

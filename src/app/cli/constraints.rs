@@ -1,0 +1,310 @@
+//! `lnn constraints`: what the coordinates of recorded motion obey, and what a Lagrangian leaves open.
+
+use crate::cli::config_file::ConfigFile;
+use crate::cli::files::require_free;
+use crate::cli::number::whole;
+use crate::cli::probe::Probe;
+use crate::cli::recording_args::RecordingArgs;
+use crate::cli::{CliError, config, output};
+use crate::constraints::{
+    ConstraintKind, ConstraintSearch, FoundConstraint, FoundConstraints, MotionSamples, find_constraints,
+};
+use crate::lagrangian::{Constrained, EulerLagrange, ExpressionConstraints, ReducedMass, Request, Terms};
+use crate::names::{counted, percent, rounded};
+use crate::recording::smooth::SmoothOptions;
+use crate::report::text_table;
+use crate::scalar::Scalar;
+use crate::storage::write_atomically;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+/// States at which a Lagrangian is examined.
+const STATES: usize = 64;
+/// An eigenvalue of a mass matrix within its constraints below so many roundings of the largest counts as zero.
+const ROUNDINGS: f64 = 1024.0;
+/// Largest degree of the terms.
+const MOST_DEGREE: usize = 8;
+
+/// Arguments.
+#[derive(Debug, clap::Args)]
+#[command(mut_args(optional))]
+pub struct Args {
+    #[command(flatten)]
+    recording: RecordingArgs,
+    /// Largest total degree of the functions of the coordinates that are tried; angles take part by sine and cosine.
+    #[arg(long, value_name = "N", default_value = "2", value_parser = whole(1, MOST_DEGREE))]
+    degree: usize,
+    /// The same of the factors of velocities.
+    #[arg(long, value_name = "N", default_value = "1", value_parser = whole(0, MOST_DEGREE))]
+    velocity_degree: usize,
+    /// A file for the table [constraints], which a system file takes as it is and `lnn rollout --constraints` reads.
+    #[arg(long, value_name = "FILE.toml")]
+    out: Option<PathBuf>,
+    /// Replace the file.
+    #[arg(long, requires = "out")]
+    overwrite: bool,
+    /// One JSON object instead of text.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Columns are those of data; a Lagrangian has none.
+fn optional(argument: clap::Arg) -> clap::Arg {
+    match argument.get_id().as_str() {
+        "data" => argument.value_name("DATA|MODEL|SYSTEM").help(
+            "Files of recorded motion, with --coords as of lnn check; or without it one trained model, or a system by name or file, \
+             whose constraints and open directions are named",
+        ),
+        "coords" => argument.required(false),
+        _ => argument,
+    }
+}
+
+/// Ends of names of files of recorded motion.
+const DATA: [&str; 3] = ["csv", "npy", "npz"];
+
+/// The table of a file.
+#[derive(Serialize, Deserialize)]
+struct Table {
+    #[serde(default)]
+    constraints: BTreeMap<String, String>,
+}
+
+/// What there is to say of a Lagrangian.
+#[derive(Serialize)]
+struct Examined {
+    system: String,
+    count: usize,
+    constraints: Vec<Known>,
+    gap: Option<f64>,
+    /// Constraints that follow from the others.
+    redundant: Vec<String>,
+    /// Directions that no equation moves, at the most states.
+    open: usize,
+    /// States that were looked at, and those among them with open directions.
+    states: usize,
+    open_states: usize,
+    /// These directions at the first such state.
+    null_directions: Vec<Vec<f64>>,
+    signature: Option<[usize; 2]>,
+}
+
+/// A constraint of a system.
+#[derive(Serialize)]
+struct Known {
+    kind: ConstraintKind,
+    name: String,
+    formula: String,
+}
+
+/// Looks and says what it found.
+///
+/// # Errors
+/// A usage error for arguments, a data error for data or a model that cannot be used, or a file that cannot be written.
+pub fn run(args: &Args) -> Result<(), CliError> {
+    if let ([one], []) = (args.recording.data.as_slice(), args.recording.coords.as_slice())
+        && !one.extension().is_some_and(|end| DATA.iter().any(|known| end.eq_ignore_ascii_case(known)))
+    {
+        return examine(&one.to_string_lossy(), args);
+    }
+    if args.recording.coords.is_empty() {
+        return Err(CliError::usage("--coords: expected the columns of the coordinates of recorded motion"));
+    }
+    if let Some(out) = &args.out {
+        let inputs: Vec<&Path> = args.recording.data.iter().map(PathBuf::as_path).collect();
+        require_free(out, &inputs, args.overwrite)?;
+    }
+    let recording = args.recording.read()?.recording;
+    let samples = MotionSamples::of(&recording, &SmoothOptions::default()).map_err(CliError::data)?;
+    let search = ConstraintSearch { degree: args.degree, velocity_degree: args.velocity_degree };
+    let found = find_constraints(&samples, search).map_err(CliError::data)?;
+    if let Some(out) = &args.out {
+        write_table(out, &found)?;
+    }
+    if args.json {
+        let text = serde_json::to_string(&found).map_err(CliError::data)?;
+        return output::print(&format!("{text}\n"));
+    }
+    output::print(&text(&found, &recording.coordinates))
+}
+
+/// Writes the constraints of the system as the table that a system file takes.
+fn write_table(out: &Path, found: &FoundConstraints) -> Result<(), CliError> {
+    let of_system = found.constraints.iter().filter(|found| found.kind != ConstraintKind::PerTrajectory);
+    let constraints: BTreeMap<String, String> =
+        of_system.enumerate().map(|(k, found)| (format!("found {}", k + 1), found.formula.clone())).collect();
+    if constraints.is_empty() {
+        return Err(CliError::file(out, "no constraints were found: there is nothing to write"));
+    }
+    let text = toml::to_string(&Table { constraints }).map_err(CliError::data)?;
+    write_atomically(out, text.as_bytes()).map_err(|e| CliError::file(out, format_args!("cannot write: {e}")))
+}
+
+/// The findings as text.
+fn text(found: &FoundConstraints, coordinates: &[String]) -> String {
+    let mut text = String::new();
+    let kinds = |kind: ConstraintKind| match kind {
+        ConstraintKind::Holonomic => "holonomic",
+        ConstraintKind::Nonholonomic => "nonholonomic",
+        ConstraintKind::PerTrajectory => "per trajectory",
+    };
+    let on = counted(found.trajectories, "trajectory", "trajectories");
+    let _ = match found.count {
+        0 => writeln!(text, "no constraints found on {on}"),
+        count => writeln!(text, "{} found on {on}", counted(count, "constraint", "constraints")),
+    };
+    let row = |found: &FoundConstraint| {
+        let sign = if found.kind == ConstraintKind::PerTrajectory { "const" } else { "0" };
+        vec![kinds(found.kind).to_string(), format!("{} = {sign}", found.formula), rounded(found.defect, 3)]
+    };
+    if !found.constraints.is_empty() {
+        let rows: Vec<Vec<String>> = found.constraints.iter().map(row).collect();
+        let _ = writeln!(text, "\n{}", text_table(&["kind", "formula", "defect"], &rows).trim_end());
+    }
+    let noise: Vec<String> = coordinates
+        .iter()
+        .zip(&found.noise)
+        .map(|(name, &noise)| format!("{name} {}", percent(noise.max(1e-6))))
+        .collect();
+    let _ = writeln!(text, "\nsmaller deviations are not seen than the noise: {}", noise.join(", "));
+    if let Some(gap) = found.gap {
+        let _ = writeln!(text, "the next combination of coordinates varies by {} times as much", rounded(gap, 3));
+    }
+    if found.refuted > 0 {
+        let what = counted(found.refuted, "candidate does", "candidates do");
+        let _ = writeln!(text, "{what} not hold on trajectories that were left out, and are not listed");
+    }
+    if found.trajectories == 1 && !found.constraints.is_empty() {
+        let _ = writeln!(
+            text,
+            "one trajectory does not tell what is imposed from what its motion conserves: record others"
+        );
+    }
+    text
+}
+
+/// What a system or a model says of its constraints and of its degeneracy.
+fn examine(name: &str, args: &Args) -> Result<(), CliError> {
+    if args.out.is_some() {
+        return Err(CliError::usage(
+            "--out: the constraints of a system stand in its own file; expected recorded motion",
+        ));
+    }
+    let probe = Probe::with_constraints(name)?;
+    let model = probe.model.as_ref();
+    let (q, v) = probe.states(STATES, 0)?;
+    let n = model.coordinates();
+    let formulas = probe.constraints();
+    let mut terms = Terms::default();
+    let mut examined = Examined {
+        system: probe.name.clone(),
+        count: 0,
+        constraints: Vec::new(),
+        gap: None,
+        redundant: model.manifold().map_or(Vec::new(), |manifold| manifold.redundant().to_vec()),
+        open: 0,
+        states: 0,
+        open_states: 0,
+        null_directions: Vec::new(),
+        signature: None,
+    };
+    if let Some(manifold) = model.manifold() {
+        examined.constraints = (0..manifold.names().len())
+            .map(|row| {
+                let (name, holonomic) = (manifold.names()[row].clone(), manifold.is_holonomic(row));
+                let kind = if holonomic { ConstraintKind::Holonomic } else { ConstraintKind::Nonholonomic };
+                let formula = formulas.get(&name).cloned().unwrap_or_default();
+                Known { kind, name, formula }
+            })
+            .collect();
+        examined.count = examined.constraints.len();
+    }
+    for (q, v) in q.chunks_exact(n).zip(v.chunks_exact(n)) {
+        let (mut q, mut v) = (q.to_vec(), v.to_vec());
+        if model.manifold().is_some_and(|manifold| crate::lagrangian::project(manifold, &mut q, &mut v).is_err()) {
+            continue;
+        }
+        if model.terms(&q, &v, Request::MASS_MATRIX | Request::CONSTRAINTS, &mut terms).is_err() {
+            continue;
+        }
+        let Ok(reduced) = ReducedMass::of(n, &terms.mass_matrix, &terms.constraint_matrix) else { continue };
+        examined.states += 1;
+        let open = reduced.null_directions(ROUNDINGS);
+        examined.open_states += usize::from(!open.is_empty());
+        if open.len() > examined.open {
+            examined.open = open.len();
+            examined.null_directions = open.into_iter().map(<[f64]>::to_vec).collect();
+        }
+        let negative = reduced.eigenvalues.iter().filter(|w| **w < 0.0).count();
+        examined.signature.get_or_insert([reduced.eigenvalues.len() - negative, negative]);
+    }
+    if examined.states == 0 {
+        return Err(CliError::data(format_args!(
+            "{}: the mass matrix is finite at none of the states of interest",
+            probe.name
+        )));
+    }
+    if args.json {
+        let text = serde_json::to_string(&examined).map_err(CliError::data)?;
+        return output::print(&format!("{text}\n"));
+    }
+    let mut text = format!("{}: {}\n", examined.system, counted(examined.count, "constraint", "constraints"));
+    for Known { name, formula, .. } in &examined.constraints {
+        let _ = writeln!(text, "  {name:<12} {formula} = 0");
+    }
+    for name in &examined.redundant {
+        let _ = writeln!(text, "  {name:<12} follows from the others");
+    }
+    let _ = match examined.open {
+        0 => writeln!(
+            text,
+            "the motion is determined: the mass matrix has full rank within the constraints at {} states",
+            examined.states
+        ),
+        open => writeln!(
+            text,
+            "the Lagrangian is degenerate along {} at {} of {} states:",
+            counted(open, "direction", "directions"),
+            examined.open_states,
+            examined.states
+        ),
+    };
+    for direction in &examined.null_directions {
+        let parts: Vec<String> =
+            probe.columns.iter().zip(direction).map(|(name, x)| format!("{name} {}", rounded(*x, 4))).collect();
+        let _ = writeln!(text, "  {}", parts.join(", "));
+    }
+    output::print(&text)
+}
+
+/// The model under the constraints of a file's table, as far as these are independent at some states.
+///
+/// # Errors
+/// A usage error for a file without such a table or a mistake in a formula, constraints that contradict each other, or a model that has
+/// constraints of its own.
+pub fn constrained<S: Scalar>(
+    model: Box<dyn EulerLagrange<S>>,
+    columns: &[String],
+    file: &Path,
+    (q, v): (&[S], &[S]),
+) -> Result<Box<dyn EulerLagrange<S>>, CliError> {
+    let wrong = |problem: &dyn std::fmt::Display| CliError::usage(format_args!("{}: {problem}", file.display()));
+    let table: toml::Table = ConfigFile::read_with(file, config::parse)?;
+    let found = table.get("constraints").cloned().unwrap_or_else(|| toml::Value::Table(toml::Table::new()));
+    let formulas: BTreeMap<String, String> =
+        found.try_into().map_err(|_| wrong(&"constraints: expected formulas by name"))?;
+    if formulas.is_empty() {
+        return Err(wrong(&"expected a table [constraints]"));
+    }
+    if model.manifold().is_some() {
+        return Err(wrong(&"the system has constraints of its own"));
+    }
+    let names: Vec<&str> = columns[..columns.len() / 2].iter().map(String::as_str).collect();
+    let rows: Vec<(&str, &str)> = formulas.iter().map(|(name, formula)| (name.as_str(), formula.as_str())).collect();
+    let constraints = ExpressionConstraints::new(&names, &[], &rows)
+        .map_err(|(name, error)| wrong(&format_args!("constraints.{name}: {error}")))?;
+    let model = Constrained::new(model, constraints, []).map_err(|error| wrong(&error))?;
+    Ok(Box::new(model.independent(q, v).map_err(|error| wrong(&error))?))
+}

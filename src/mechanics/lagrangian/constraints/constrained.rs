@@ -1,0 +1,256 @@
+//! A model under constraints.
+
+use super::projection::project;
+use super::rows::independent;
+use super::{Constraints, Manifold, ManifoldRows};
+use crate::forward::{Dual, HyperDual};
+use crate::lagrangian::{EulerLagrange, MechanicsError, MetricJet, Request, Terms};
+use crate::linalg::Workspace;
+use crate::scalar::{Dd, Real, Scalar};
+
+/// A row at unit length whose part beside the rows before it is below this at every state follows from them.
+const REDUNDANT: f64 = 1e-6;
+
+/// Why constraints leave no motion.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ConstraintError {
+    /// No state was found that satisfies all of them.
+    #[error("constraint `{name}` contradicts the others: the nearest states miss it by {defect:.3e}")]
+    Contradiction {
+        /// The constraint that is missed most.
+        name: String,
+        /// By how much, in units of the coordinates.
+        defect: f64,
+    },
+    /// As many independent rows as coordinates.
+    #[error("{independent} independent constraints leave no motion to {coordinates} coordinates, expected fewer")]
+    TooMany {
+        /// Rows.
+        independent: usize,
+        /// Coordinates.
+        coordinates: usize,
+    },
+    /// Constraints of another number of coordinates or parameters.
+    #[error("{what}: expected {expected}, found {found}")]
+    Shape {
+        /// What there is of them.
+        what: &'static str,
+        /// Number expected.
+        expected: usize,
+        /// Number found.
+        found: usize,
+    },
+}
+
+/// A model under constraints: `M a = g - c + Q + A^T lambda`, `A a = -gamma`, of any Lagrangian, written or learned.
+///
+/// [`Terms::multipliers`] and [`Terms::constraint_force`] say what the constraints do. `M` may be singular along directions
+/// that the constraints take away. Energy, momenta and mass matrix are those of the model.
+///
+/// ```
+/// use lnn::lagrangian::{Constrained, Constraints, EulerLagrange, ExpressionLagrangian, Mechanics, Request, Terms};
+/// use lnn::scalar::Real;
+///
+/// struct Rod; // of length parameters[0]
+/// impl Constraints for Rod {
+///     fn coordinates(&self) -> usize { 2 }
+///     fn names(&self) -> Vec<String> { vec!["rod".into()] }
+///     fn is_holonomic(&self, _: usize) -> bool { true }
+///     fn values<R: Real>(&self, p: &[R], q: &[R], _: &[R], values: &mut [R]) {
+///         values[0] = (q[0].sqr() + q[1].sqr() - p[0].sqr()) * R::half();
+///     }
+/// }
+///
+/// let bob = ExpressionLagrangian::new(&["x", "y"], &["m", "g"], "m*(x_dot^2 + y_dot^2)/2 - m*g*y")?;
+/// let pendulum = Constrained::new(Mechanics::new(bob, [2.0, 9.81]), Rod, [1.0])?;
+/// let mut terms = Terms::default();
+/// pendulum.terms(&[0.0, -1.0], &[3.0, 0.0], Request::ACCELERATION, &mut terms)?; // at the lowest point, 3 m/s
+/// assert!((terms.acceleration[1] - 9.0).abs() < 1e-12); // v^2/l upwards
+/// assert!((terms.constraint_force[1] - 2.0 * (9.81 + 9.0)).abs() < 1e-12); // the rod carries weight and centrifugal force
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct Constrained<M, C, S> {
+    model: M,
+    constraints: C,
+    parameters: Vec<S>,
+    /// Rows of `constraints`, and which of them act.
+    rows: usize,
+    kept: Vec<usize>,
+    names: Vec<String>,
+    redundant: Vec<String>,
+}
+
+impl<M: EulerLagrange<S>, C: Constraints, S: Scalar> Constrained<M, C, S> {
+    /// The model under all of the constraints, which have parameters of their own.
+    ///
+    /// # Errors
+    /// [`ConstraintError::Shape`] for another number of coordinates or parameters, [`ConstraintError::TooMany`].
+    pub fn new(model: M, constraints: C, parameters: impl IntoIterator<Item = S>) -> Result<Self, ConstraintError> {
+        let (parameters, names): (Vec<S>, _) = (parameters.into_iter().collect(), constraints.names());
+        let n = model.coordinates();
+        let expected = constraints.parameter_count().unwrap_or(parameters.len());
+        for (what, expected, found) in [
+            ("coordinates of the constraints", n, constraints.coordinates()),
+            ("parameters of the constraints", expected, parameters.len()),
+        ] {
+            if expected != found {
+                return Err(ConstraintError::Shape { what, expected, found });
+            }
+        }
+        let rows = names.len();
+        Ok(Self { model, constraints, parameters, rows, kept: (0..rows).collect(), names, redundant: Vec::new() })
+    }
+
+    /// The same without the constraints that follow from those before them at all of some states, `(batch, n)` each, which are
+    /// brought to the constraints first.
+    ///
+    /// # Errors
+    /// [`ConstraintError::Contradiction`] if none of the states can be, [`ConstraintError::TooMany`] if no motion is left.
+    pub fn independent(mut self, q: &[S], v: &[S]) -> Result<Self, ConstraintError> {
+        let n = self.model.coordinates().max(1);
+        let (mut needed, mut nearest): (Vec<usize>, Option<super::OffManifold>) = (Vec::new(), None);
+        let (mut found, mut rows) = (false, ManifoldRows::default());
+        for (q, v) in q.chunks_exact(n).zip(v.chunks_exact(n)) {
+            let (mut q, mut v) = (q.to_vec(), v.to_vec());
+            match project(&self, &mut q, &mut v) {
+                Ok(_) => {
+                    found = true;
+                    self.rows(&q, &v, &mut rows);
+                    needed.extend(independent(n, &rows.matrix, REDUNDANT).0);
+                }
+                Err(off) => {
+                    if nearest.is_none_or(|best| off.defect < best.defect) {
+                        nearest = Some(off);
+                    }
+                }
+            }
+        }
+        if let (false, Some(off)) = (found, nearest) {
+            let name = self.names[off.row].clone();
+            return Err(ConstraintError::Contradiction { name, defect: off.defect });
+        }
+        needed.sort_unstable();
+        needed.dedup();
+        if needed.len() >= n {
+            return Err(ConstraintError::TooMany { independent: needed.len(), coordinates: n });
+        }
+        if found {
+            let all = std::mem::take(&mut self.names);
+            for (row, name) in all.into_iter().enumerate() {
+                if needed.contains(&row) { &mut self.names } else { &mut self.redundant }.push(name);
+            }
+            self.kept = needed;
+        }
+        Ok(self)
+    }
+
+    /// The model without its constraints.
+    pub fn model(&self) -> &M {
+        &self.model
+    }
+}
+
+impl<M: EulerLagrange<S>, C: Constraints, S: Scalar> Manifold<S> for Constrained<M, C, S> {
+    fn coordinates(&self) -> usize {
+        self.model.coordinates()
+    }
+    fn names(&self) -> &[String] {
+        &self.names
+    }
+    fn redundant(&self) -> &[String] {
+        &self.redundant
+    }
+    fn is_holonomic(&self, row: usize) -> bool {
+        self.constraints.is_holonomic(self.kept[row])
+    }
+
+    fn rows(&self, q: &[S], v: &[S], rows: &mut ManifoldRows<S>) {
+        let (n, m, zero, one) = (q.len(), self.kept.len(), <S as Real>::zero(), <S as Real>::one());
+        let holonomic: Vec<bool> = self.kept.iter().map(|&row| self.constraints.is_holonomic(row)).collect();
+        rows.matrix.clear();
+        rows.matrix.resize(m * n, zero);
+        let lift = |x: &[S]| x.iter().map(|&x| Dual::lift(x)).collect::<Vec<_>>();
+        let (parameters, mut state) = (lift(&self.parameters), [lift(q), lift(v)]);
+        let mut values = vec![Dual::lift(zero); self.rows];
+        // A function of coordinates has its gradient by them, a row that is linear in the velocities by those.
+        for (by, kind) in [(0, true), (1, false)] {
+            if !holonomic.contains(&kind) {
+                continue;
+            }
+            for i in 0..n {
+                state[by][i].tangent = one;
+                self.constraints.values(&parameters, &state[0], &state[1], &mut values);
+                state[by][i].tangent = zero;
+                for (k, &row) in self.kept.iter().enumerate().filter(|(k, _)| holonomic[*k] == kind) {
+                    rows.matrix[k * n + i] = values[row].tangent;
+                }
+            }
+        }
+        // Along the motion: value, rate and second derivative of a function; value and rate of a row.
+        let parameters: Vec<HyperDual<S>> = self.parameters.iter().map(|&x| HyperDual::lift(x)).collect();
+        let q: Vec<HyperDual<S>> = q.iter().zip(v).map(|(&q, &v)| HyperDual::new(q, v, v, zero)).collect();
+        let v: Vec<HyperDual<S>> = v.iter().map(|&v| HyperDual::lift(v)).collect();
+        let mut values = vec![HyperDual::lift(zero); self.rows];
+        self.constraints.values(&parameters, &q, &v, &mut values);
+        for field in [&mut rows.values, &mut rows.rates, &mut rows.drift] {
+            field.clear();
+        }
+        for (&row, &holonomic) in self.kept.iter().zip(&holonomic) {
+            let found = values[row];
+            let (value, rate, drift) =
+                if holonomic { (found.value, found.s, found.st) } else { (zero, found.value, found.s) };
+            rows.values.push(value);
+            rows.rates.push(rate);
+            rows.drift.push(drift);
+        }
+    }
+}
+
+impl<M: EulerLagrange<S>, C: Constraints, S: Scalar> EulerLagrange<S> for Constrained<M, C, S> {
+    fn coordinates(&self) -> usize {
+        self.model.coordinates()
+    }
+
+    fn terms(&self, q: &[S], v: &[S], request: Request, terms: &mut Terms<S>) -> Result<(), MechanicsError> {
+        let n = self.model.coordinates();
+        let outcome = self.model.terms(q, v, request.without_solution(), terms);
+        let found = terms.drain_failures(outcome)?;
+        if terms.constraints > 0 {
+            let (what, expected) = ("constraints of the model beneath", 0);
+            return Err(MechanicsError::Shape { what, expected, found: terms.constraints });
+        }
+        if request.includes(Request::CONSTRAINTS) {
+            let mut rows = ManifoldRows::default();
+            terms.constraints = self.kept.len();
+            for (q, v) in q.chunks_exact(n).zip(v.chunks_exact(n)) {
+                self.rows(q, v, &mut rows);
+                terms.constraint_matrix.extend_from_slice(&rows.matrix);
+                terms.constraint_drift.extend_from_slice(&rows.drift);
+            }
+        }
+        if let Err(error @ MechanicsError::Shape { .. }) = terms.complete(n, v, request, &mut Workspace::new()) {
+            return Err(error);
+        }
+        terms.prepend_failures(found);
+        terms.outcome()
+    }
+
+    fn inner(&self) -> Option<&dyn EulerLagrange<S>> {
+        Some(&self.model)
+    }
+
+    fn manifold(&self) -> Option<&dyn Manifold<S>> {
+        Some(self)
+    }
+
+    /// None: across the constraints a mass matrix means nothing.
+    fn metric_jets(&self, _: &[S], _: &[S]) -> Result<Vec<MetricJet<S>>, MechanicsError> {
+        Err(MechanicsError::Derivatives { what: "mass matrix under constraints" })
+    }
+
+    fn wide_metric_jets(&self, _: &[S], _: &[S]) -> Result<Option<Vec<MetricJet<Dd>>>, MechanicsError> {
+        Ok(None)
+    }
+}

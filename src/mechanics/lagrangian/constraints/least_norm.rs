@@ -1,0 +1,97 @@
+//! Motion that a degenerate Lagrangian leaves open, chosen to be the shortest.
+
+use super::ReducedMass;
+use super::rows::dot;
+use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Terms};
+use crate::linalg::{Workspace, minimum_norm};
+use crate::scalar::{Real, Scalar};
+
+/// A model whose accelerations of least norm are taken where its mass matrix is singular within its constraints: along the null
+/// directions nothing is determined, and they are 0 there.
+///
+/// A state whose equations contradict each other, a force along a null direction, still fails.
+#[derive(Clone, Debug)]
+pub struct LeastNorm<M>(
+    /// The model.
+    pub M,
+);
+
+/// What was chosen at one state.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LeastNormMotion<S> {
+    /// `a`, `(n)`.
+    pub acceleration: Vec<S>,
+    /// Multipliers of the constraints, `(m)`.
+    pub multipliers: Vec<S>,
+    /// Dimension of the directions along which it was chosen.
+    pub open: usize,
+    /// Size of the force along them, which nothing can balance: 0 but for rounding where there is a motion.
+    pub unbalanced: S,
+}
+
+impl<S: Scalar> LeastNormMotion<S> {
+    /// The shortest `a` with `A a = -gamma` that satisfies `M a = f` within the constraints.
+    fn of(n: usize, mass: &[S], rows: &[S], drift: &[S], force: &[S]) -> Option<Self> {
+        let reduced = ReducedMass::of(n, mass, rows).ok()?;
+        let zero = <S as Real>::zero();
+        let (mut a, m) = (vec![zero; n], drift.len());
+        let gram: Vec<S> = (0..m * m).map(|k| dot(&rows[k / m * n..][..n], &rows[k % m * n..][..n])).collect();
+        let by_rows = |right: &[S]| Some(minimum_norm(m, &gram, right, &mut Workspace::new()).ok()?.solution);
+        for (row, weight) in rows.chunks_exact(n).zip(by_rows(drift)?) {
+            a.iter_mut().zip(row).for_each(|(a, &x)| *a -= weight * x);
+        }
+        let rest =
+            |a: &[S]| -> Vec<S> { force.iter().zip(mass.chunks_exact(n)).map(|(&f, row)| f - dot(row, a)).collect() };
+        let start = rest(&a);
+        let right: Vec<S> = reduced.basis.chunks_exact(n).map(|z| dot(z, &start)).collect();
+        let found = minimum_norm(right.len(), &reduced.matrix, &right, &mut Workspace::new()).ok()?;
+        for (z, &u) in reduced.basis.chunks_exact(n).zip(&found.solution) {
+            a.iter_mut().zip(z).for_each(|(a, &z)| *a += u * z);
+        }
+        // A^T lambda = M a - f.
+        let balance = rest(&a);
+        let right_of_rows: Vec<S> = rows.chunks_exact(n).map(|row| -dot(row, &balance)).collect();
+        let multipliers = by_rows(&right_of_rows)?;
+        Some(Self { acceleration: a, multipliers, open: right.len() - found.rank, unbalanced: found.outside })
+    }
+}
+
+impl<M: EulerLagrange<S>, S: Scalar> EulerLagrange<S> for LeastNorm<M> {
+    fn coordinates(&self) -> usize {
+        self.0.coordinates()
+    }
+
+    fn terms(&self, q: &[S], v: &[S], request: Request, terms: &mut Terms<S>) -> Result<(), MechanicsError> {
+        let outcome = self.0.terms(q, v, request, terms);
+        if outcome.is_ok() || !request.includes(Request::ACCELERATION) {
+            return outcome;
+        }
+        let (n, m) = (self.coordinates(), terms.constraints);
+        let found = terms.drain_failures(outcome)?;
+        for error in found {
+            let MechanicsError::Singular { row, .. } = error else {
+                terms.failures.push(error);
+                continue;
+            };
+            let at = row * n..(row + 1) * n;
+            let force = |i: usize| terms.force.get(i).copied().unwrap_or_else(<S as Real>::zero);
+            let right: Vec<S> = at.clone().map(|i| terms.dl_dq[i] - terms.momentum_drift[i] + force(i)).collect();
+            let rows = &terms.constraint_matrix[row * m * n..(row + 1) * m * n];
+            let drift = &terms.constraint_drift[row * m..(row + 1) * m];
+            let size = super::rows::length(&right);
+            match LeastNormMotion::of(n, &terms.mass_matrix[row * n * n..(row + 1) * n * n], rows, drift, &right) {
+                Some(motion) if motion.unbalanced <= Real::sqrt(S::epsilon()) * size => {
+                    terms.acceleration[at].copy_from_slice(&motion.acceleration);
+                    terms.multipliers[row * m..(row + 1) * m].copy_from_slice(&motion.multipliers);
+                }
+                _ => terms.failures.push(error),
+            }
+        }
+        terms.sum_constraint_forces(n);
+        terms.outcome()
+    }
+
+    fn inner(&self) -> Option<&dyn EulerLagrange<S>> {
+        Some(&self.0)
+    }
+}

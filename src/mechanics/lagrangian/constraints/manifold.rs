@@ -1,0 +1,34 @@
+//! The states that constraints allow.
+
+use crate::scalar::Scalar;
+
+/// Constraints at one state, `m` rows of `n` coordinates.
+#[derive(Clone, Debug, Default)]
+pub struct ManifoldRows<S> {
+    /// `phi(q)`, `(m)`; 0 of a row that is linear in the velocities.
+    pub values: Vec<S>,
+    /// `A`, `(m, n)`.
+    pub matrix: Vec<S>,
+    /// `A v - b`, `(m)`.
+    pub rates: Vec<S>,
+    /// `gamma = (dA/dt) v - db/dt`, `(m)`: motion has `A a = -gamma`.
+    pub drift: Vec<S>,
+}
+
+/// The states that the constraints of a model allow: `phi(q) = 0` and `A v = b`.
+pub trait Manifold<S: Scalar>: Send + Sync {
+    /// Number of coordinates `n`.
+    fn coordinates(&self) -> usize;
+
+    /// Names of the `m` constraints that act.
+    fn names(&self) -> &[String];
+
+    /// Names of constraints that were left out since they follow from the others.
+    fn redundant(&self) -> &[String];
+
+    /// `true` if a row is a function `phi(q)` of the coordinates alone.
+    fn is_holonomic(&self, row: usize) -> bool;
+
+    /// Evaluates the rows at one state; the buffers are reused.
+    fn rows(&self, q: &[S], v: &[S], rows: &mut ManifoldRows<S>);
+}

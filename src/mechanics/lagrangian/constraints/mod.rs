@@ -1,0 +1,53 @@
+//! Constraints beside a Lagrangian: `phi(q) = 0`, and rows `A(q) v = b(q)` linear in the velocities.
+//!
+//! A holonomic constraint enters the motion by `A = dphi/dq`, `b = 0`. With `gamma = (dA/dt) v - db/dt` along the motion and
+//! multipliers `lambda`
+//!
+//! ```text
+//! [ M  A^T ] [    a    ]   [ g - c + Q ]
+//! [ A   0  ] [ -lambda ] = [  -gamma   ]
+//! ```
+//!
+//! which has one solution where the rows of `A` are independent and no direction that they allow has `M z = 0` within
+//! them: `M` itself may be singular. `A^T lambda` is the force of constraint, such as the tension of a rod.
+
+mod constrained;
+mod described;
+mod kkt;
+mod least_norm;
+mod manifold;
+mod projection;
+mod reduced;
+mod rows;
+#[cfg(test)]
+mod tests;
+
+pub use constrained::{Constrained, ConstraintError};
+pub use described::ExpressionConstraints;
+pub(super) use kkt::{Motion, accelerate};
+pub use least_norm::{LeastNorm, LeastNormMotion};
+pub use manifold::{Manifold, ManifoldRows};
+pub use projection::{OffManifold, project};
+pub use reduced::ReducedMass;
+
+use crate::scalar::Real;
+
+/// Constraints written once over [`Real`], as a [`Lagrangian`](super::Lagrangian) is: derivatives follow.
+pub trait Constraints: Send + Sync {
+    /// Number of coordinates `n`.
+    fn coordinates(&self) -> usize;
+
+    /// Names of the rows, for messages; their number is that of the constraints.
+    fn names(&self) -> Vec<String>;
+
+    /// `true` if a row is a function `phi(q)` of the coordinates alone, `false` if it is `A(q) v - b(q)`.
+    fn is_holonomic(&self, row: usize) -> bool;
+
+    /// Number of parameters that [`Constraints::values`] takes.
+    fn parameter_count(&self) -> Option<usize> {
+        None
+    }
+
+    /// Writes what vanishes, one number for every row: `phi(q)`, or `A(q) v - b(q)`, linear in `v`.
+    fn values<R: Real>(&self, parameters: &[R], q: &[R], v: &[R], values: &mut [R]);
+}

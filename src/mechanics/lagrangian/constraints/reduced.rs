@@ -1,0 +1,58 @@
+//! The mass matrix within the constraints.
+
+use super::rows::{complement, dot, independent};
+use crate::linalg::{LinalgError, Workspace, eigh};
+use crate::scalar::{Real, Scalar};
+
+/// `Z^T M Z` of one state, `Z` an orthonormal basis of the directions that the constraints allow: what motion determines of `M`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ReducedMass<S> {
+    /// `Z`, rows `(d, n)`.
+    pub basis: Vec<S>,
+    /// `Z^T M Z`, `(d, d)`.
+    pub matrix: Vec<S>,
+    /// Its eigenvalues, ascending, `(d)`.
+    pub eigenvalues: Vec<S>,
+    /// Directions of velocities, `(d, n)`, of these eigenvalues.
+    pub directions: Vec<S>,
+}
+
+impl<S: Scalar> ReducedMass<S> {
+    /// Of a mass matrix `(n, n)` and the rows `A`, `(m, n)`, of constraints; without rows, of the mass matrix itself.
+    ///
+    /// # Errors
+    /// [`LinalgError::NotFinite`].
+    pub fn of(n: usize, mass: &[S], rows: &[S]) -> Result<Self, LinalgError> {
+        let (_, spanned) = independent(n, rows, 16.0 * S::epsilon().to_f64().sqrt());
+        let basis = complement(n, &spanned);
+        let d = basis.len() / n.max(1);
+        let mut matrix = Vec::with_capacity(d * d);
+        for z in basis.chunks_exact(n) {
+            let image: Vec<S> = mass.chunks_exact(n).map(|row| dot(row, z)).collect();
+            matrix.extend(basis.chunks_exact(n).map(|other| dot(other, &image)));
+        }
+        let (mut eigenvalues, mut vectors) = (vec![<S as Real>::zero(); d], vec![<S as Real>::zero(); d * d]);
+        eigh(d, &matrix, &mut eigenvalues, &mut vectors, &mut Workspace::new())?;
+        let mut directions = Vec::with_capacity(d * n);
+        for u in vectors.chunks_exact(d.max(1)) {
+            directions.extend(
+                (0..n).map(|i| {
+                    u.iter().zip(basis.chunks_exact(n)).fold(<S as Real>::zero(), |sum, (&u, z)| sum + u * z[i])
+                }),
+            );
+        }
+        Ok(Self { basis, matrix, eigenvalues, directions })
+    }
+
+    /// Directions `z` with `M z = 0` within the constraints, which no equation moves: the Lagrangian is degenerate along them.
+    ///
+    /// An eigenvalue counts as zero below so many roundings of the largest.
+    pub fn null_directions(&self, roundings: f64) -> Vec<&[S]> {
+        let d = self.eigenvalues.len();
+        let n = self.directions.len() / d.max(1);
+        let most = self.eigenvalues.iter().fold(<S as Real>::zero(), |most, w| Real::max(most, w.abs()));
+        let floor = S::of_f64(roundings) * S::epsilon() * most;
+        let pairs = self.eigenvalues.iter().zip(self.directions.chunks_exact(n.max(1)));
+        pairs.filter(|(w, _)| w.abs() <= floor).map(|(_, direction)| direction).collect()
+    }
+}

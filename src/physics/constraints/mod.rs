@@ -1,0 +1,281 @@
+//! Constraints found in recorded motion: functions of the coordinates that vanish, and rows linear in the velocities.
+//!
+//! Combinations `c` of monomials of the coordinates are judged by the pencil of what they are, `G = mean D D^T`, and what noise alone makes of
+//! them, `N = mean sum_i sigma_i^2 dD/dq_i dD/dq_i^T`: `c.G c / c.N c` is near 1 where a combination vanishes but for the noise. Its minima are
+//! the fit by errors in all variables (Taubin 1991). Of what vanishes as many combinations are taken as their gradients are independent, the
+//! simplest first, each reduced to the terms that it needs. The same with `monomials(q) v_i`, beside what follows from the former, gives the
+//! rows that are linear in the velocities; Frobenius' condition tells those that a function of the coordinates stands behind.
+
+mod features;
+mod generators;
+mod pencil;
+mod samples;
+#[cfg(test)]
+mod tests;
+
+pub use samples::MotionSamples;
+
+use crate::lagrangian::ReducedMass;
+use features::Features;
+use generators::{Generator, Search};
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// Most terms that are looked at together.
+pub const MOST_TERMS: usize = 1000;
+/// A row beside others whose part outside of them is, root mean square, below this share follows from them.
+const OUTSIDE: f64 = 0.15;
+/// States at which gradients are compared.
+const PLACES: usize = 64;
+/// Below this share of its derivatives the curl of a row within its kernel is noise.
+const CURL: f64 = 0.03;
+
+/// What to look for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ConstraintSearch {
+    /// Largest total degree of functions of the coordinates.
+    pub degree: usize,
+    /// The same of the coefficients of velocities.
+    pub velocity_degree: usize,
+}
+
+impl Default for ConstraintSearch {
+    fn default() -> Self {
+        Self { degree: 2, velocity_degree: 1 }
+    }
+}
+
+/// Kind of a constraint.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ConstraintKind {
+    /// A function of the coordinates that vanishes.
+    Holonomic,
+    /// Linear in the velocities, and no function of the coordinates stands behind it.
+    Nonholonomic,
+    /// A function of the coordinates that is constant along each trajectory, with a constant of its own: conserved, not imposed.
+    PerTrajectory,
+}
+
+/// A constraint that was found.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FoundConstraint {
+    /// Its kind.
+    pub kind: ConstraintKind,
+    /// What vanishes, or is constant.
+    pub formula: String,
+    /// Factors of its terms; the leading one of the formula is 1.
+    pub coefficients: BTreeMap<String, f64>,
+    /// Ranges of 95 % of the factors.
+    pub range: BTreeMap<String, [f64; 2]>,
+    /// Root of the mean square defect over what noise makes.
+    pub defect: f64,
+}
+
+/// Everything that was found.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FoundConstraints {
+    /// Constraints of the system: holonomic and nonholonomic ones.
+    pub count: usize,
+    /// All that was found.
+    pub constraints: Vec<FoundConstraint>,
+    /// Smallest combination of the coordinates that does not count as vanishing over the largest that does, both relative to noise; over
+    /// noise itself if none does.
+    pub gap: Option<f64>,
+    /// Trajectories it was found on.
+    pub trajectories: usize,
+    /// Candidates that did not hold on trajectories that were left out.
+    pub refuted: usize,
+    /// Noise of each coordinate over its size: smaller deviations are not seen.
+    pub noise: Vec<f64>,
+}
+
+/// Why nothing can be looked for.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ConstraintSearchError {
+    /// More terms than are looked at.
+    #[error("{what} makes {found} terms, at most {MOST_TERMS} are looked at together")]
+    Terms {
+        /// What makes them.
+        what: &'static str,
+        /// Their number.
+        found: usize,
+    },
+    /// Fewer samples than terms need.
+    #[error("{found} samples are too few for {terms} terms, expected {needed} at least")]
+    Samples {
+        /// Terms.
+        terms: usize,
+        /// Samples found.
+        found: usize,
+        /// Samples needed.
+        needed: usize,
+    },
+}
+
+/// Finds the constraints of recorded motion.
+///
+/// # Errors
+/// [`ConstraintSearchError`] for too many terms or too few samples.
+pub fn find_constraints(
+    samples: &MotionSamples,
+    search: ConstraintSearch,
+) -> Result<FoundConstraints, ConstraintSearchError> {
+    let of_positions = Features::of_positions(samples, search.degree);
+    // Of many coordinates as many as there is room for.
+    let of_velocities = (0..=search.velocity_degree).rev().map(|degree| Features::of_velocities(samples, degree));
+    let of_velocities = of_velocities.into_iter().find(|features| features.len() <= MOST_TERMS);
+    let of_velocities = of_velocities.unwrap_or_else(|| Features::of_velocities(samples, 0));
+    for (what, features) in [("the degree", &of_positions), ("the degree of velocities", &of_velocities)] {
+        let found = features.len();
+        if found > MOST_TERMS {
+            return Err(ConstraintSearchError::Terms { what, found });
+        }
+        let needed = 4 * found;
+        if samples.len() < needed {
+            return Err(ConstraintSearchError::Samples { terms: found, found: samples.len(), needed });
+        }
+    }
+    let mut held = Held::at(samples, PLACES);
+    let Search { generators, gap } = generators::search(samples, &of_positions, false, 1.0);
+    let functions = held.take(samples, &of_positions, generators, false);
+    let conserved = if samples.trajectories() > 1 {
+        let Search { generators, .. } = generators::search(samples, &of_positions, true, 1.0);
+        held.take(samples, &of_positions, generators, false)
+    } else {
+        Vec::new()
+    };
+    let Search { generators, .. } = generators::search(samples, &of_velocities, false, samples.shared());
+    let moving = held.take(samples, &of_velocities, generators, true);
+    let mut constraints = Vec::new();
+    for (kind, found) in [(ConstraintKind::Holonomic, &functions), (ConstraintKind::PerTrajectory, &conserved)] {
+        constraints.extend(found.iter().map(|generator| generator.described(&of_positions, kind)));
+    }
+    for generator in &moving {
+        let places = held.places.iter().zip(&held.bases);
+        let turns: Vec<f64> =
+            places.map(|(&at, rows)| curl(&of_velocities, samples, at, &generator.weights, rows)).collect();
+        let turn = (turns.iter().map(|x| x * x).sum::<f64>() / turns.len() as f64).sqrt();
+        let integrable = turn < CURL && !of_velocities.has_rate(&generator.weights);
+        let kind = if integrable { ConstraintKind::PerTrajectory } else { ConstraintKind::Nonholonomic };
+        constraints.push(generator.described(&of_velocities, kind));
+    }
+    let count = constraints.iter().filter(|found| found.kind != ConstraintKind::PerTrajectory).count();
+    Ok(FoundConstraints {
+        count,
+        constraints,
+        gap,
+        trajectories: samples.trajectories(),
+        refuted: held.refuted,
+        noise: samples.relative_noise(),
+    })
+}
+
+/// What holds the motion at some samples.
+struct Held {
+    places: Vec<usize>,
+    /// Orthonormal rows at each place.
+    bases: Vec<Vec<f64>>,
+    /// Candidates that do not hold on data that were left out.
+    refuted: usize,
+}
+
+impl Held {
+    /// Nothing yet.
+    fn at(samples: &MotionSamples, places: usize) -> Self {
+        let places = samples.places(places);
+        Self { bases: vec![Vec::new(); places.len()], places, refuted: 0 }
+    }
+
+    /// Takes generators as long as one has a part outside of what holds the motion already: of those that have at least half of the
+    /// largest such part the simplest, which come first.
+    fn take(
+        &mut self,
+        samples: &MotionSamples,
+        features: &Features,
+        generators: Vec<Generator>,
+        velocities: bool,
+    ) -> Vec<Generator> {
+        let row = |generator: &Generator, at: usize| match velocities {
+            true => features.velocity_row(samples, at, &generator.weights),
+            false => features.gradient(samples, at, &generator.weights),
+        };
+        let rows = |generator: Generator| {
+            let rows: Vec<Vec<f64>> = self.places.iter().map(|&at| row(&generator, at)).collect();
+            (generator, rows)
+        };
+        let mut left: Vec<(Generator, Vec<Vec<f64>>)> = generators.into_iter().map(rows).collect();
+        let mut taken = Vec::new();
+        loop {
+            let parts: Vec<f64> = left.iter().map(|(_, rows)| self.outside(rows)).collect();
+            let most = parts.iter().fold(0.0, |most: f64, part| most.max(*part));
+            let Some(next) = parts.iter().position(|part| *part >= 0.5 * most).filter(|_| most >= OUTSIDE) else {
+                break;
+            };
+            let (generator, rows) = left.remove(next);
+            if !generator.holds {
+                self.refuted += 1;
+                continue;
+            }
+            for (basis, row) in self.bases.iter_mut().zip(&rows) {
+                let rest = beside(basis, row);
+                let size = dot(&rest, &rest).sqrt();
+                if size > 0.0 {
+                    basis.extend(rest.iter().map(|x| x / size));
+                }
+            }
+            taken.push(generator);
+        }
+        taken
+    }
+
+    /// Root mean square part of vectors at unit length outside of what holds the motion; 0 where a vector vanishes.
+    fn outside(&self, vectors: &[Vec<f64>]) -> f64 {
+        let parts = self.bases.iter().zip(vectors).map(|(basis, vector)| {
+            let (rest, size) = (beside(basis, vector), dot(vector, vector));
+            if size > 0.0 { dot(&rest, &rest) / size } else { 0.0 }
+        });
+        (parts.sum::<f64>() / self.bases.len().max(1) as f64).sqrt()
+    }
+}
+
+/// What a vector is beside orthonormal rows, taken out twice, since once leaves rounding.
+fn beside(basis: &[f64], vector: &[f64]) -> Vec<f64> {
+    let mut rest = vector.to_vec();
+    for _ in 0..2 {
+        for row in basis.chunks_exact(vector.len()) {
+            let along = dot(row, &rest);
+            rest.iter_mut().zip(row).for_each(|(x, a)| *x -= along * a);
+        }
+    }
+    rest
+}
+
+/// Scalar product.
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// An orthonormal basis of the directions that rows leave.
+fn kernel(n: usize, rows: &[f64]) -> Vec<f64> {
+    ReducedMass::of(n, &vec![0.0; n * n], rows).map(|reduced| reduced.basis).unwrap_or_default()
+}
+
+/// Size of the curl of a row within the directions that the rows leave, over that of its derivatives: 0 where a function stands behind it
+/// (Frobenius).
+fn curl(features: &Features, samples: &MotionSamples, at: usize, weights: &[f64], rows: &[f64]) -> f64 {
+    let n = samples.n();
+    let derivatives = features.row_derivatives(samples, at, weights);
+    let size = derivatives.iter().fold(0.0, |size: f64, x| size.max(x.abs()));
+    let basis = kernel(n, rows);
+    let mut most: f64 = 0.0;
+    for z in basis.chunks_exact(n) {
+        for y in basis.chunks_exact(n) {
+            let along =
+                |z: &[f64], y: &[f64]| (0..n).map(|i| z[i] * dot(&derivatives[i * n..(i + 1) * n], y)).sum::<f64>();
+            most = most.max((along(z, y) - along(y, z)).abs());
+        }
+    }
+    if size > 0.0 { most / size } else { 0.0 }
+}

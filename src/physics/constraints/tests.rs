@@ -1,0 +1,142 @@
+//! Constraints found in states whose constraints are known.
+
+use super::*;
+use crate::recording::smooth::SmoothOptions;
+use crate::recording::{RecordedTrajectory, Recording};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+/// A recording of motions `t -> (q, v)`, with noise of a share of the size of all positions.
+fn recorded(
+    names: &[&str],
+    periodic: &[bool],
+    noise: f64,
+    velocities: bool,
+    motions: &mut dyn FnMut(&mut ChaCha8Rng) -> Box<dyn Fn(f64) -> (Vec<f64>, Vec<f64>)>,
+) -> Recording {
+    let mut rng = ChaCha8Rng::seed_from_u64(3);
+    let mut normal = ChaCha8Rng::seed_from_u64(4);
+    let mut gauss = move || {
+        let (a, b): (f64, f64) = (normal.random(), normal.random());
+        (-2.0 * (1.0 - a).ln()).sqrt() * (std::f64::consts::TAU * b).cos()
+    };
+    let tracks = (0..24).map(|k| {
+        let motion = motions(&mut rng);
+        let times: Vec<f64> = (0..120).map(|i| 0.02 * f64::from(i)).collect();
+        let states: Vec<_> = times.iter().map(|&t| motion(t)).collect();
+        let mut noisy = |x: f64| x + noise * gauss();
+        let q = states.iter().flat_map(|(q, _)| q.clone()).map(&mut noisy).collect();
+        let v = states.iter().flat_map(|(_, v)| v.clone()).map(&mut noisy).collect();
+        let v = if velocities { v } else { Vec::new() };
+        RecordedTrajectory { name: format!("run {k}"), times, q, v, a: vec![], force: vec![] }
+    });
+    Recording {
+        coordinates: names.iter().map(|name| name.to_string()).collect(),
+        periodic: periodic.to_vec(),
+        tracks: tracks.collect(),
+    }
+}
+
+fn found(recording: &Recording) -> FoundConstraints {
+    let samples = MotionSamples::of(recording, &SmoothOptions::default()).unwrap();
+    find_constraints(&samples, ConstraintSearch::default()).unwrap()
+}
+
+/// Two rods, of 1 and 0.8: angles that turn evenly.
+fn two_rods(rng: &mut ChaCha8Rng) -> Box<dyn Fn(f64) -> (Vec<f64>, Vec<f64>)> {
+    let [a, b, da, db]: [f64; 4] = [0; 4].map(|_| 3.0 * rng.random::<f64>() - 1.5);
+    Box::new(move |t| {
+        let ((s, c), (u, w)) = ((a + da * t).sin_cos(), (b + db * t * t).sin_cos());
+        let db = 2.0 * db * t;
+        let q = vec![s, -c, s + 0.8 * u, -c - 0.8 * w];
+        (q, vec![c * da, s * da, c * da + 0.8 * w * db, s * da + 0.8 * u * db])
+    })
+}
+
+#[test]
+fn rods_are_found_at_any_noise_with_their_lengths() {
+    for noise in [0.0, 0.001, 0.01] {
+        let names = ["x1", "y1", "x2", "y2"];
+        let recording = recorded(&names, &[false; 4], noise, false, &mut |rng| two_rods(rng));
+        let found = found(&recording);
+        let kinds: Vec<ConstraintKind> = found.constraints.iter().map(|c| c.kind).collect();
+        assert_eq!((found.count, kinds), (2, vec![ConstraintKind::Holonomic; 2]), "{noise}: {found:?}");
+        assert!(found.gap.unwrap() > 5.0 && found.trajectories == 24 && found.refuted == 0);
+        let first = &found.constraints[0];
+        assert_eq!(first.coefficients.keys().collect::<Vec<_>>(), ["1", "x1^2", "y1^2"], "{noise}: {first:?}");
+        for (term, exact) in [("x1^2", 1.0), ("y1^2", 1.0), ("1", -1.0)] {
+            assert!((first.coefficients[term] - exact).abs() < 0.01, "{noise}: {first:?}");
+            let [low, high] = first.range[term];
+            assert!(low <= exact + 1e-9 && exact - 1e-9 <= high, "{noise} {term}: {low} {high}");
+        }
+    }
+}
+
+#[test]
+fn rolling_is_nonholonomic_and_what_it_conserves_is_not_imposed() {
+    // A disk of radius 0.5 that turns and rolls at rates of its own.
+    let mut roll = |rng: &mut ChaCha8Rng| -> Box<dyn Fn(f64) -> (Vec<f64>, Vec<f64>)> {
+        let [x, y, heading, turn, speed]: [f64; 5] = [0; 5].map(|_| 4.0 * rng.random::<f64>() - 2.0);
+        let turn = turn + 0.3 * turn.signum();
+        Box::new(move |t| {
+            let theta = heading + turn * t;
+            let (s, c) = theta.sin_cos();
+            let (s0, c0) = heading.sin_cos();
+            let path = 0.5 * speed / turn;
+            let q = vec![x + path * (s - s0), y - path * (c - c0), theta, speed * t];
+            (q, vec![0.5 * speed * c, 0.5 * speed * s, turn, speed])
+        })
+    };
+    for noise in [0.0, 0.001] {
+        let names = ["x", "y", "theta", "phi"];
+        let recording = recorded(&names, &[false, false, true, true], noise, true, &mut roll);
+        let found = found(&recording);
+        let kinds: Vec<ConstraintKind> = found.constraints.iter().map(|c| c.kind).collect();
+        assert_eq!((found.count, kinds), (2, vec![ConstraintKind::Nonholonomic; 2]), "{noise}: {found:?}");
+        for row in &found.constraints {
+            let rolled = row.coefficients.iter().find(|(term, _)| term.ends_with("*phi_dot")).unwrap();
+            assert!((rolled.1.abs() - 0.5).abs() < 0.005, "{row:?}");
+        }
+    }
+    // Points on circles of radii of their own.
+    let mut circle = |rng: &mut ChaCha8Rng| -> Box<dyn Fn(f64) -> (Vec<f64>, Vec<f64>)> {
+        let [r, turn]: [f64; 2] = [0; 2].map(|_| 1.0 + rng.random::<f64>());
+        let phase: f64 = 6.0 * rng.random::<f64>();
+        Box::new(move |t| {
+            let (s, c) = (phase + turn * t).sin_cos();
+            (vec![r * c, r * s], vec![-r * turn * s, r * turn * c])
+        })
+    };
+    let found = found(&recorded(&["x", "y"], &[false; 2], 0.001, true, &mut circle));
+    assert_eq!((found.count, found.constraints.len()), (0, 1), "{found:?}");
+    assert_eq!(found.constraints[0].kind, ConstraintKind::PerTrajectory);
+    let radius = &found.constraints[0].coefficients;
+    assert!(radius.len() == 2 && (radius["x^2"] / radius["y^2"] - 1.0).abs() < 1e-3, "{found:?}");
+}
+
+#[test]
+fn nothing_is_found_where_nothing_is() {
+    let mut free = |rng: &mut ChaCha8Rng| -> Box<dyn Fn(f64) -> (Vec<f64>, Vec<f64>)> {
+        let [a, b, c, d]: [f64; 4] = [0; 4].map(|_| 2.0 * rng.random::<f64>() - 1.0);
+        Box::new(move |t| {
+            let (s, w) = ((1.3 * t + 3.0 * a).sin(), (2.1 * t + 3.0 * b).cos());
+            (vec![c * s, d * w], vec![1.3 * c * (1.3 * t + 3.0 * a).cos(), -2.1 * d * (2.1 * t + 3.0 * b).sin()])
+        })
+    };
+    for noise in [0.0, 0.001, 0.01] {
+        let found = found(&recorded(&["x", "y"], &[false; 2], noise, false, &mut free));
+        assert_eq!((found.count, found.constraints.len()), (0, 0), "{noise}: {found:?}");
+    }
+}
+
+#[test]
+fn too_few_samples_and_too_many_terms_are_refused() {
+    let mut recording = recorded(&["x1", "y1", "x2", "y2"], &[false; 4], 0.0, false, &mut |rng| two_rods(rng));
+    let samples = MotionSamples::of(&recording, &SmoothOptions::default()).unwrap();
+    let search = |degree| find_constraints(&samples, ConstraintSearch { degree, velocity_degree: 1 });
+    assert!(matches!(search(12), Err(ConstraintSearchError::Terms { .. })));
+    recording.tracks.truncate(1);
+    let samples = MotionSamples::of(&recording, &SmoothOptions::default()).unwrap();
+    let few = find_constraints(&samples, ConstraintSearch { degree: 4, velocity_degree: 1 });
+    assert!(matches!(few, Err(ConstraintSearchError::Samples { terms: 70, .. })), "{few:?}");
+}

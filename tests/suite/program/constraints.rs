@@ -1,0 +1,166 @@
+//! Constraints from outside: in system files, in roll-outs, found in data.
+#![cfg(all(feature = "cli", unix))]
+
+use crate::common::program::{Folder, lnn, text};
+use serde_json::Value;
+use std::fmt::Write;
+use std::fs;
+
+const PENDULUM: &str = include_str!("../../../examples/systems/cartesian_pendulum.toml");
+
+fn json(text: &str) -> Value {
+    serde_json::from_str(text).unwrap()
+}
+
+/// Columns of a CSV without its header.
+fn columns(text: &str) -> Vec<Vec<f64>> {
+    text.lines().skip(1).map(|line| line.split(',').map(|x| x.parse().unwrap()).collect()).collect()
+}
+
+#[test]
+fn a_file_with_constraints_moves_on_them() {
+    let folder = Folder::new();
+    let file = folder.file("my.toml", PENDULUM);
+    let motion = text(&folder.path("motion.csv"));
+    let roll = |state: &str, more: &[&str]| {
+        let start = ["rollout", "--system", &file, "--state", state, "--t-end", "5", "--dt", "0.05"];
+        lnn(&[&start, ["--out", &motion, "--overwrite"].as_slice(), more].concat())
+    };
+    for method in ["dopri5", "variational", "gauss4"] {
+        roll("0.6,-0.8,0,0", &["--method", method]).succeeded();
+        let rows = columns(&fs::read_to_string(&motion).unwrap());
+        assert_eq!(rows.len(), 101);
+        for row in &rows {
+            assert!(
+                (row[1].hypot(row[2]) - 1.0).abs() < 1e-12 && (row[5] - rows[0][5]).abs() < 5e-2,
+                "{method}: {row:?}"
+            );
+        }
+    }
+    // Off the rod, with the nearest state to copy; a longer rod takes it.
+    roll("0.66,-0.88,0,0", &[]).refused(2, &["--state", "1.000e-1 away", "rod", "0.6,-0.8"]);
+    roll("0.66,-0.88,0,0", &["--param", "l=1.1"]).succeeded();
+    // At the lowest point the rod carries weight and centrifugal force.
+    let states = folder.file("states.csv", "x,y,x_dot,y_dot\n0,-1,3,0\n");
+    let found = lnn(&["inspect", "--system", &file, "--states", &states]);
+    found.succeeded();
+    let found = json(&found.stdout);
+    assert!((found["constraint_force"][1].as_f64().unwrap() - 18.81).abs() < 1e-12);
+    assert_eq!(
+        (found["multipliers"].as_array().unwrap().len(), &found["constraint_values"][0]),
+        (1, &Value::from(0.0))
+    );
+    assert_eq!(found["reduced_eigenvalues"].as_array().unwrap().len(), 1);
+    // What knows free coordinates only says so.
+    lnn(&["symmetries", "--system", &file]).refused(2, &["constraints"]);
+    let listed = lnn(&["systems", "--system", &file, "--json"]);
+    assert_eq!(json(&listed.stdout)["constraints"]["rod"], "x^2 + y^2 - l^2");
+    let learned = lnn(&["train", "--system", &file, "--out", &text(&folder.path("run"))]);
+    assert!(learned.stderr.contains("constraints") && !folder.path("run/model.safetensors").exists());
+}
+
+#[test]
+fn mistakes_in_constraints_have_their_line() {
+    let folder = Folder::new();
+    let with = |formula: &str| folder.file("my.toml", &PENDULUM.replace("x^2 + y^2 - l^2", formula));
+    for (formula, parts) in [
+        ("x^2 + z", ["constraints.rod", "z"]),
+        ("x_dot*y_dot", ["constraints.rod", "linear in the velocities"]),
+        ("l - 1", ["constraints.rod", "a coordinate or a velocity"]),
+    ] {
+        lnn(&["systems", "--system", &with(formula)]).refused(2, &parts);
+    }
+    let twice = PENDULUM.replace("rod = ", "line = \"x - 3*l\"\nrod = ");
+    let file = folder.file("my.toml", &twice);
+    let out = text(&folder.path("motion.csv"));
+    let roll = ["rollout", "--system", &file, "--state", "1,0,0,0", "--t-end", "1", "--dt", "0.1", "--out", &out];
+    lnn(&roll).refused(2, &["contradicts"]);
+    // The same rod twice is one rod.
+    let twice = PENDULUM.replace("rod = ", "again = \"(x^2 + y^2)/l - l\"\nrod = ");
+    let file = folder.file("my.toml", &twice);
+    let roll = ["rollout", "--system", &file, "--state", "1,0,0,0", "--t-end", "1", "--dt", "0.1", "--out", &out];
+    let done = lnn(&roll);
+    done.succeeded();
+    assert!(done.stderr.contains("`rod` follows from the others"), "{}", done.stderr);
+}
+
+#[test]
+fn what_is_found_in_data_holds_another_motion() {
+    let folder = Folder::new();
+    let mut data = String::from("run,t,x,y\n");
+    for run in 0..12 {
+        let (phase, rate) = (0.5 * f64::from(run), 1.0 + 0.2 * f64::from(run));
+        for k in 0..80 {
+            let t = 0.01 * f64::from(k);
+            let (s, c) = (phase + rate * t).sin_cos();
+            writeln!(data, "{run},{t},{:.12},{:.12}", 0.5 * s, -0.5 * c).unwrap();
+        }
+    }
+    let (file, out) = (folder.file("data.csv", &data), text(&folder.path("found.toml")));
+    let args = ["constraints", &file, "--coords", "x,y", "--trajectory", "run"];
+    let found = lnn(&[&args[..], &["--json", "--out", &out]].concat());
+    found.succeeded();
+    let found = json(&found.stdout);
+    assert_eq!((&found["count"], &found["trajectories"]), (&Value::from(1), &Value::from(12)));
+    let one = &found["constraints"][0];
+    assert_eq!(one["kind"], "holonomic");
+    assert!((one["coefficients"]["1"].as_f64().unwrap() + 0.25).abs() < 1e-6);
+    assert!(one["range"]["y^2"][0].as_f64().unwrap() <= one["range"]["y^2"][1].as_f64().unwrap());
+    assert!(found["gap"].as_f64().unwrap() > 100.0 && one["formula"].as_str().unwrap().contains("x^2 + "));
+    // A file that is there is kept; text says the same.
+    lnn(&[&args[..], &["--out", &out]].concat()).refused(1, &["--overwrite"]);
+    let said = lnn(&args);
+    said.succeeded();
+    assert!(said.stdout.starts_with("1 constraint found on 12 trajectories"), "{}", said.stdout);
+    // Under the table of the file a free mass is a pendulum of half a metre.
+    let free = folder.file(
+        "free.toml",
+        &PENDULUM.replace("[constraints]\nrod = \"x^2 + y^2 - l^2\"\n", "").replace("l = {", "unused = {"),
+    );
+    let motion = text(&folder.path("motion.csv"));
+    let roll =
+        ["rollout", "--system", &free, "--state", "0.3,-0.4,0,0", "--t-end", "1", "--dt", "0.1", "--out", &motion];
+    lnn(&[&roll[..], &["--constraints", &out]].concat()).succeeded();
+    let rows = columns(&fs::read_to_string(&motion).unwrap());
+    assert!(rows.iter().all(|row| (row[1].hypot(row[2]) - 0.5).abs() < 1e-6));
+    // And falls without it.
+    lnn(&[&roll[..], &["--overwrite"]].concat()).succeeded();
+    assert!(columns(&fs::read_to_string(&motion).unwrap())[10][2] < -4.0);
+    lnn(&[&roll[..], &["--overwrite", "--constraints", &free]].concat()).refused(2, &["[constraints]"]);
+    lnn(&["constraints", &file, "--coords", "x,y", "--trajectory", "run", "--degree", "9"]).refused(2, &["--degree"]);
+    lnn(&["constraints", &file]).refused(2, &["--coords"]);
+    lnn(&["constraints", "heavy-top", "--out", &out]).refused(2, &["--out"]);
+}
+
+#[test]
+fn degenerate_lagrangians_are_named_with_their_directions() {
+    let folder = Folder::new();
+    let file = PENDULUM.replace("m*(x_dot^2 + y_dot^2)/2 - m*g*y", "m*(x_dot - y_dot)^2/2 - m*g*(x - y)");
+    let file = file.replace("[constraints]\nrod = \"x^2 + y^2 - l^2\"\n", "").replace("l = {", "unused = {");
+    let file = folder.file("my.toml", &file);
+    let found = lnn(&["constraints", &file, "--json"]);
+    found.succeeded();
+    let found = json(&found.stdout);
+    assert_eq!((&found["count"], &found["open"]), (&Value::from(0), &Value::from(1)));
+    assert_eq!(found["states"], found["open_states"]);
+    let direction = &found["null_directions"][0];
+    assert!((direction[0].as_f64().unwrap() - direction[1].as_f64().unwrap()).abs() < 1e-12);
+    let states = folder.file("states.csv", "x,y,x_dot,y_dot\n0,-1,3,0\n");
+    let args = ["inspect", "--system", &file, "--states", &states];
+    let failed = lnn(&args);
+    assert!(failed.code == Some(1) && failed.stderr.contains("singular"));
+    let least = lnn(&[&args[..], &["--least-norm"]].concat());
+    least.succeeded();
+    let least = json(&least.stdout);
+    for (i, exact) in [-4.905, 4.905].into_iter().enumerate() {
+        assert!((least["acceleration"][i].as_f64().unwrap() - exact).abs() < 1e-12);
+    }
+    let out = text(&folder.path("motion.csv"));
+    let roll = ["rollout", "--system", &file, "--state", "0,1,0,0", "--t-end", "1", "--dt", "0.1", "--out", &out];
+    lnn(&roll).refused(1, &["singular"]);
+    let least = lnn(&[&roll[..], &["--least-norm", "--overwrite"]].concat());
+    least.succeeded();
+    assert!(least.stderr.contains("along 1 direction"), "{}", least.stderr);
+    let end = columns(&fs::read_to_string(&out).unwrap())[10][1..3].to_vec();
+    assert!((end[0] + 4.905 / 2.0).abs() < 1e-6 && (end[1] - 1.0 - 4.905 / 2.0).abs() < 1e-6, "{end:?}");
+}
