@@ -6,8 +6,11 @@
 
 mod error;
 mod json;
+<<<<<<< HEAD
 #[cfg(feature = "training")]
 pub(crate) mod state;
+=======
+>>>>>>> e9e76fc
 
 pub use error::ContainerError;
 pub use json::StoredPrecision;
