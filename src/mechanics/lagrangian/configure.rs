@@ -1,11 +1,7 @@
 //! Systems with the values of their parameters, as text or as numbers.
 
 use super::EulerLagrange;
-<<<<<<< HEAD
-use super::catalogue::{Given, SystemError, SystemInstance, find};
-=======
 use super::catalogue::{Given, SystemError, SystemInstance, resolve};
->>>>>>> e9e76fc
 use super::system::Range;
 use super::system::{Size, System};
 use crate::scalar::Scalar;

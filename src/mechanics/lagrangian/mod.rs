@@ -32,10 +32,7 @@ pub use catalogue::{SystemError, SystemInstance, find, systems};
 pub use configure::configure;
 #[doc(hidden)]
 pub use configure::{build, configure_system, configure_values};
-<<<<<<< HEAD
-=======
 use constrained_systems::constrained_descriptions;
->>>>>>> e9e76fc
 pub use constrained_systems::constrained_systems;
 pub use constraints::{
     Constrained, ConstraintError, Constraints, ExpressionConstraints, LeastNorm, LeastNormMotion, Manifold,

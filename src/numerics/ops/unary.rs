@@ -37,17 +37,11 @@ fn power<R: Real>(x: R, factor: i64, exponent: i64) -> R {
     x.powi(exponent) * R::of(factor as f64)
 }
 
-<<<<<<< HEAD
 /// Builds the enum, its value and its derivatives from rows of two kinds: functions that are a method of [`Real`],
 /// `Name method(x, y, d) = first derivative, second derivative;`, then functions made of these,
 /// `Name(x, y, d) = value, first derivative, second derivative;`, with the argument `x`, the value `y` and the first derivative `d`.
 ///
 /// A function of the second kind is one operation on a tape if it is called by [`Real::elementary`].
-=======
-/// Builds the enum, its value and its derivatives from rows
-/// `Name method(x, y, d) = value, first derivative, second derivative;`
-/// with the argument `x`, the value `y` and the first derivative `d` in scope.
->>>>>>> e9e76fc
 macro_rules! table {
     (
         $($(#[$doc:meta])* $name:ident $method:ident ($x:ident, $y:ident, $d:ident) = $first:expr, $second:expr;)*

@@ -57,9 +57,5 @@ pub use engine::{Depth, Evaluation, Recorded};
 pub use engine::{MixedDirections, STATES};
 pub use error::TapeError;
 #[doc(hidden)]
-<<<<<<< HEAD
 pub use program::{Listing, Operation, Program, Replay, Tracer};
-=======
-pub use program::{Program, Replay, Tracer};
->>>>>>> e9e76fc
 pub use var::Var;

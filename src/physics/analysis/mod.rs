@@ -54,11 +54,6 @@ pub use determination::{
     Decay, Determination, Estimate, MOST_MISFIT, Observed, RANGE, constants, decay, determination, misfit,
 };
 #[doc(hidden)]
-<<<<<<< HEAD
-=======
-pub use determination::{Decay, Determination, Estimate, Observed, RANGE, constants, decay, determination, misfit};
-#[doc(hidden)]
->>>>>>> e9e76fc
 pub use dissipation::{EnergyLoss, energy_loss};
 #[doc(hidden)]
 pub use energy::energy_drift;

@@ -51,15 +51,10 @@ mod sparse;
 
 pub use algebra::Algebra;
 pub(crate) use algebra::MOST_FIELDS;
-<<<<<<< HEAD
 pub(crate) use basis::MOST_UNKNOWNS;
 pub use basis::{Basis, Chart, Degrees};
 #[doc(hidden)]
 pub use basis::{most_states, unknowns};
-=======
-pub use basis::{Basis, Chart, Degrees};
-pub(crate) use basis::{MOST_UNKNOWNS, most_states, unknowns};
->>>>>>> e9e76fc
 #[doc(hidden)]
 pub use canonical::{Canonical, CanonicalForm};
 pub(crate) use charges::drifts;
@@ -73,7 +68,6 @@ pub use field::Field;
 pub use find::EXACT;
 pub use find::{Symmetries, symmetries};
 pub use sample::Region;
-<<<<<<< HEAD
 #[doc(hidden)]
 pub use sample::middle;
 #[doc(hidden)]
@@ -81,10 +75,3 @@ pub use separation::Separation;
 pub(crate) use separation::TOLERANCES;
 #[doc(hidden)]
 pub use separation::{bases, enough, most_symmetries};
-=======
-pub(crate) use sample::middle;
-#[doc(hidden)]
-pub use separation::Separation;
-pub(crate) use separation::TOLERANCES;
-pub(crate) use separation::{bases, enough, most_symmetries};
->>>>>>> e9e76fc

@@ -219,11 +219,7 @@ impl Region {
 const INNER: f64 = 0.8;
 
 /// The middle of a range.
-<<<<<<< HEAD
 pub fn middle([low, high]: [f64; 2]) -> [f64; 2] {
-=======
-pub(crate) fn middle([low, high]: [f64; 2]) -> [f64; 2] {
->>>>>>> e9e76fc
     let (middle, half) = (0.5 * (low + high), 0.5 * INNER * (high - low));
     [middle - half, middle + half]
 }

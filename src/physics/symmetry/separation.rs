@@ -71,16 +71,7 @@ impl Separation {
 
 /// The bases in which symmetries are sought: the one of these degrees, or the usual one; of a model, whose errors hide symmetries
 /// among many functions, also those of lower powers.
-<<<<<<< HEAD
 pub fn bases(names: &[String], charts: &[Chart], degrees: Option<Degrees>, exact: bool) -> Vec<(Basis, Degrees)> {
-=======
-pub(crate) fn bases(
-    names: &[String],
-    charts: &[Chart],
-    degrees: Option<Degrees>,
-    exact: bool,
-) -> Vec<(Basis, Degrees)> {
->>>>>>> e9e76fc
     if let Some(degrees) = degrees {
         return vec![(Basis::new(names, charts, degrees), degrees)];
     }
@@ -99,11 +90,7 @@ pub(crate) fn bases(
 }
 
 /// States that are looked at for so many unknown coefficients, of a Lagrangian that is written down or of a model.
-<<<<<<< HEAD
 pub fn enough(unknowns: usize, exact: bool) -> usize {
-=======
-pub(crate) fn enough(unknowns: usize, exact: bool) -> usize {
->>>>>>> e9e76fc
     (2 * unknowns).max(if exact { 400 } else { 1000 })
 }
 
@@ -112,11 +99,7 @@ pub(crate) fn enough(unknowns: usize, exact: bool) -> usize {
 ///
 /// # Errors
 /// [`SymmetryError`].
-<<<<<<< HEAD
 pub fn most_symmetries(
-=======
-pub(crate) fn most_symmetries(
->>>>>>> e9e76fc
     model: &dyn EulerLagrange<f64>,
     bases: Vec<(Basis, Degrees)>,
     (q, v): (&[f64], &[f64]),

@@ -30,13 +30,8 @@ impl Description {
     ///
     /// # Errors
     /// The first key that is wrong, and how.
-<<<<<<< HEAD
     pub fn system(&self) -> Outcome<System> {
-        let taken = constrained_systems().iter().find(|system| system.name == self.name);
-=======
-    pub(crate) fn system(&self) -> Outcome<System> {
         let taken = constrained_descriptions().find(|description| description.name == self.name);
->>>>>>> e9e76fc
         if systems().iter().any(|system| system.name == self.name)
             || taken.is_some_and(|description| description != *self)
         {

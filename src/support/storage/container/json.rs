@@ -1,9 +1,6 @@
 //! JSON without duplicate keys: one text, one meaning for every reader.
 
-<<<<<<< HEAD
 use crate::scalar::Scalar;
-=======
->>>>>>> e9e76fc
 use serde::de::{Deserializer, MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Serialize};
 use std::collections::HashSet;
@@ -75,13 +72,10 @@ pub enum StoredPrecision {
 }
 
 impl StoredPrecision {
-<<<<<<< HEAD
     /// That of a number type, if files know it.
     pub(crate) fn of<S: Scalar>() -> Option<Self> {
         [Self::F32, Self::F64].into_iter().find(|precision| precision.name() == S::NAME)
     }
-=======
->>>>>>> e9e76fc
     /// `"f32"` or `"f64"`.
     pub fn name(self) -> &'static str {
         match self {

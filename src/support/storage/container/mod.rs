@@ -6,11 +6,8 @@
 
 mod error;
 mod json;
-<<<<<<< HEAD
 #[cfg(feature = "training")]
 pub(crate) mod state;
-=======
->>>>>>> e9e76fc
 
 pub use error::ContainerError;
 pub use json::StoredPrecision;
