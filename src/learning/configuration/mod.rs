@@ -9,5 +9,5 @@ pub use config::{Config, Data, Known, Lbfgs, Network, OnFailure, Optimizer, Phas
 pub(crate) use config::{FRICTION_UNITS, MOST_EPOCHS, MOST_RATE, PENALTY};
 pub use error::ConfigError;
 pub(crate) use error::{Faults, place};
-pub use penalty::{Penalty, PenaltyKind, Regularizer};
+pub use penalty::{Penalty, Regularizer};
 pub(crate) use table::{Key, Ranges, join};

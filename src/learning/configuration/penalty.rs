@@ -9,19 +9,9 @@ use crate::linalg::{
 use crate::scalar::Scalar;
 use serde::{Deserialize, Serialize};
 
-/// A kind of penalty, as configurations and arguments name it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct PenaltyKind {
-    /// Its name.
-    pub name: &'static str,
-    /// What is penalised, a sentence behind a space.
-    pub purpose: &'static str,
-}
-
 /// Builds the configuration's penalties from rows `Name "name" { further fields };`, all of which have a weight.
 macro_rules! penalties {
     ($(
-        #[doc = $purpose:literal]
         $(#[$($doc:tt)*])*
         $name:ident $text:literal { $($(#[$($field_doc:tt)*])* $field:ident: $type:ty)? };
     )*) => {
@@ -35,7 +25,6 @@ macro_rules! penalties {
             #[serde(rename = "none")]
             None,
             $(
-                #[doc = $purpose]
                 $(#[$($doc)*])*
                 #[serde(rename = $text)]
                 $name {
@@ -47,11 +36,6 @@ macro_rules! penalties {
         }
 
         impl Regularizer {
-            /// Every kind.
-            pub const KINDS: &'static [PenaltyKind] = &[
-                PenaltyKind { name: "none", purpose: " Nothing is penalised." },
-                $(PenaltyKind { name: $text, purpose: $purpose },)*
-            ];
             /// The names of all kinds, separated by commas.
             pub const NAMES: &'static str = concat!("none" $(, ", ", $text)*);
 
@@ -251,13 +235,12 @@ mod tests {
             text["kind"] = kind.into();
             serde_json::from_value::<Regularizer>(text)
         };
-        for kind in Regularizer::KINDS {
+        for kind in Regularizer::NAMES.split(", ") {
             let shapes = [json!({}), json!({"lambda": 2.0}), json!({"lambda": 2.0, "time": "t"})];
-            let found: Vec<Regularizer> = shapes.into_iter().filter_map(|rest| of(kind.name, rest).ok()).collect();
-            let [penalty] = &found[..] else { panic!("{}: {found:?}", kind.name) };
-            assert_eq!(penalty.kind(), kind.name);
-            assert_eq!(serde_json::to_value(penalty).unwrap()["kind"], kind.name);
-            assert!(Regularizer::NAMES.split(", ").any(|name| name == kind.name));
+            let found: Vec<Regularizer> = shapes.into_iter().filter_map(|rest| of(kind, rest).ok()).collect();
+            let [penalty] = &found[..] else { panic!("{kind}: {found:?}") };
+            assert_eq!(penalty.kind(), kind);
+            assert_eq!(serde_json::to_value(penalty).unwrap()["kind"], kind);
         }
         assert!(of("sylvster", json!({"lambda": 2.0})).is_err());
     }
