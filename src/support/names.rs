@@ -6,7 +6,7 @@ mod wrap;
 
 pub use columns::taken_column;
 pub use number::{number, percent, percentage, rounded};
-pub use wrap::{WIDTH, cut, cut_hard, width, wrapped};
+pub use wrap::{WIDTH, cut, cut_hard, width, wrap_text};
 
 /// The candidate that fewest edits (insert, delete, replace, swap neighbours) turn `name` into; none if every one takes more
 /// than a third of the letters: `y` is not near `x`, nor `m3` near `m1`.
@@ -21,7 +21,7 @@ pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) ->
 }
 
 /// `1 row`, `2 rows`: a count with its noun in the singular or the plural.
-pub fn counted(count: usize, singular: &str, plural: &str) -> String {
+pub fn pluralize(count: usize, singular: &str, plural: &str) -> String {
     format!("{count} {}", if count == 1 { singular } else { plural })
 }
 
@@ -123,7 +123,7 @@ mod tests {
 
     #[test]
     fn one_is_singular() {
-        assert_eq!([0, 1, 2].map(|n| counted(n, "row", "rows")), ["0 rows", "1 row", "2 rows"]);
+        assert_eq!([0, 1, 2].map(|n| pluralize(n, "row", "rows")), ["0 rows", "1 row", "2 rows"]);
     }
 
     #[test]

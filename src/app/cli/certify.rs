@@ -8,7 +8,7 @@ use crate::cli::source::parameter;
 use crate::cli::{CliError, interrupt, output};
 use crate::lagrangian::configure_system;
 use crate::lagrangian::system::Bounds;
-use crate::names::{counted, unknown};
+use crate::names::{pluralize, unknown};
 use crate::network::file::Header;
 use serde_json::{Map, Value, json};
 use std::f64::consts::TAU;
@@ -193,7 +193,7 @@ fn object(name: &str, columns: &[String], options: &Options<'_>, found: &Certifi
 fn table(columns: &[String], options: &Options<'_>, found: &Certificate) -> String {
     let Signature { positive, negative } = options.signature;
     let limit = options.condition.map_or(String::new(), |k| format!(" and a condition number of at most {k}"));
-    let boxes = counted(found.boxes, "box", "boxes");
+    let boxes = pluralize(found.boxes, "box", "boxes");
     let mut text = format!(
         "Share of the region where the mass matrix is proven to have {positive} positive and {negative} negative eigenvalues{limit}:\n"
     );

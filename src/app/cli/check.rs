@@ -3,7 +3,7 @@
 use crate::cli::recording_args::RecordingArgs;
 use crate::cli::{CliError, output};
 use crate::configuration::Precision;
-use crate::names::{WIDTH, counted, percent, percentage, rounded, wrapped};
+use crate::names::{WIDTH, percent, percentage, pluralize, rounded, wrap_text};
 use crate::pipeline::{FitOptions, PreparedFit};
 use crate::recording::survey::{FEW_SAMPLES, Kind, Survey, SurveyOptions, Suspicion, survey};
 use crate::recording::{LARGE_ERROR, Targets};
@@ -126,7 +126,7 @@ fn describe(Found { survey: found, obstacle }: &Found) -> String {
     for warning in &found.warnings {
         let _ = writeln!(text, "warning: {warning}");
     }
-    wrapped(&text, WIDTH)
+    wrap_text(&text, WIDTH)
 }
 
 /// A blank line before a table.
@@ -139,8 +139,8 @@ fn headline(found: &Survey) -> String {
     let worst = found.coordinates.iter().map(|c| c.acceleration_error_relative).fold(0.0, f64::max);
     let looked = match (found.warnings.len(), found.suspicious_count) {
         (0, 0) => "nothing looks wrong".to_string(),
-        (0, places) => format!("look at {} first", counted(places, "suspicious place", "suspicious places")),
-        (warnings, _) => format!("read {} at the end first", counted(warnings, "warning", "warnings")),
+        (0, places) => format!("look at {} first", pluralize(places, "suspicious place", "suspicious places")),
+        (warnings, _) => format!("read {} at the end first", pluralize(warnings, "warning", "warnings")),
     };
     let good = match found.targets {
         Targets::Measured => "the accelerations are measured".to_string(),
@@ -161,9 +161,9 @@ fn header(found: &Survey) -> String {
     };
     let mut text = format!(
         "{}, {}, {}, {} s; {times}\n",
-        counted(found.files, "file", "files"),
-        counted(found.tracks.len(), "trajectory", "trajectories"),
-        counted(found.samples, "sample", "samples"),
+        pluralize(found.files, "file", "files"),
+        pluralize(found.tracks.len(), "trajectory", "trajectories"),
+        pluralize(found.samples, "sample", "samples"),
         short(seconds)
     );
     let rows: Vec<Vec<String>> = found
@@ -191,12 +191,12 @@ fn header(found: &Survey) -> String {
 /// Gaps and what was left out.
 fn left_out(text: &mut String, found: &Survey) -> std::fmt::Result {
     if found.duplicates > 0 {
-        let rows = counted(found.duplicates, "row that repeats", "rows that repeat");
+        let rows = pluralize(found.duplicates, "row that repeats", "rows that repeat");
         writeln!(text, "left out: {rows} the row before")?;
     }
     if found.bridged.gaps > 0 {
-        let gaps = counted(found.bridged.gaps, "short gap", "short gaps");
-        let rows = counted(found.bridged.rows, "row is", "rows are");
+        let gaps = pluralize(found.bridged.gaps, "short gap", "short gaps");
+        let rows = pluralize(found.bridged.rows, "row is", "rows are");
         let most = found.bridged.longest;
         writeln!(text, "{gaps}: {rows} missing, at most {most} in one; trajectories go on across them")?;
     }
@@ -211,7 +211,7 @@ fn left_out(text: &mut String, found: &Survey) -> std::fmt::Result {
     more(text, found.cuts.len(), ("gap", "gaps"))?;
     for part in found.dropped.iter().take(LINES) {
         let (first, last) = (part.first, part.last);
-        let samples = counted(part.samples, "sample", "samples");
+        let samples = pluralize(part.samples, "sample", "samples");
         writeln!(text, "left out: {samples} between gaps, rows {first}-{last} of {}", part.file)?;
     }
     more(text, found.dropped.len(), ("stretch between gaps", "stretches between gaps"))
@@ -221,7 +221,7 @@ fn left_out(text: &mut String, found: &Survey) -> std::fmt::Result {
 fn more(text: &mut String, all: usize, (one, many): (&str, &str)) -> std::fmt::Result {
     match all.checked_sub(LINES) {
         Some(rest) if rest > 0 => {
-            writeln!(text, "and {}", counted(rest, &format!("more {one}"), &format!("more {many}")))
+            writeln!(text, "and {}", pluralize(rest, &format!("more {one}"), &format!("more {many}")))
         }
         _ => Ok(()),
     }

@@ -4,7 +4,7 @@ use crate::cli::probe::{Bound, Probe, bound};
 use crate::cli::source::parameter;
 use crate::cli::symmetries::{Format, degrees};
 use crate::cli::{CliError, number, output};
-use crate::names::{WIDTH, number as digits, rounded, wrapped};
+use crate::names::{WIDTH, number as digits, rounded, wrap_text};
 use crate::report::text_table;
 use crate::symmetry::{Comparison, Degrees, compare, unknowns};
 use serde::Serialize;
@@ -116,6 +116,6 @@ impl Compared<'_> {
         ];
         let distance = |x: f64| if x.is_nan() { "unknown".to_string() } else { digits(x) };
         let rows: Vec<Vec<String>> = rows.iter().map(|(name, x)| vec![name.to_string(), distance(*x)]).collect();
-        format!("{}{}", wrapped(&text, WIDTH), text_table(&["quantity", "relative distance"], &rows))
+        format!("{}{}", wrap_text(&text, WIDTH), text_table(&["quantity", "relative distance"], &rows))
     }
 }

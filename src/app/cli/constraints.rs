@@ -9,7 +9,7 @@ use crate::constraints::{
     ConstraintKind, ConstraintSearch, FoundConstraint, FoundConstraints, MotionSamples, find_constraints,
 };
 use crate::lagrangian::{Constrained, EulerLagrange, ExpressionConstraints, ReducedMass, Request, Terms};
-use crate::names::{counted, percent, rounded};
+use crate::names::{percent, pluralize, rounded};
 use crate::recording::smooth::SmoothOptions;
 use crate::report::text_table;
 use crate::scalar::Scalar;
@@ -149,10 +149,10 @@ fn text(found: &FoundConstraints, coordinates: &[String]) -> String {
         ConstraintKind::Nonholonomic => "nonholonomic",
         ConstraintKind::PerTrajectory => "per trajectory",
     };
-    let on = counted(found.trajectories, "trajectory", "trajectories");
+    let on = pluralize(found.trajectories, "trajectory", "trajectories");
     let _ = match found.count {
         0 => writeln!(text, "no constraints found on {on}"),
-        count => writeln!(text, "{} found on {on}", counted(count, "constraint", "constraints")),
+        count => writeln!(text, "{} found on {on}", pluralize(count, "constraint", "constraints")),
     };
     let row = |found: &FoundConstraint| {
         let sign = if found.kind == ConstraintKind::PerTrajectory { "const" } else { "0" };
@@ -172,7 +172,7 @@ fn text(found: &FoundConstraints, coordinates: &[String]) -> String {
         let _ = writeln!(text, "the next combination of coordinates varies by {} times as much", rounded(gap, 3));
     }
     if found.refuted > 0 {
-        let what = counted(found.refuted, "candidate does", "candidates do");
+        let what = pluralize(found.refuted, "candidate does", "candidates do");
         let _ = writeln!(text, "{what} not hold on trajectories that were left out, and are not listed");
     }
     if found.trajectories == 1 && !found.constraints.is_empty() {
@@ -249,7 +249,7 @@ fn examine(name: &str, args: &Args) -> Result<(), CliError> {
         let text = serde_json::to_string(&examined).map_err(CliError::data)?;
         return output::print(&format!("{text}\n"));
     }
-    let mut text = format!("{}: {}\n", examined.system, counted(examined.count, "constraint", "constraints"));
+    let mut text = format!("{}: {}\n", examined.system, pluralize(examined.count, "constraint", "constraints"));
     for Known { name, formula, .. } in &examined.constraints {
         let _ = writeln!(text, "  {name:<12} {formula} = 0");
     }
@@ -265,7 +265,7 @@ fn examine(name: &str, args: &Args) -> Result<(), CliError> {
         open => writeln!(
             text,
             "the Lagrangian is degenerate along {} at {} of {} states:",
-            counted(open, "direction", "directions"),
+            pluralize(open, "direction", "directions"),
             examined.open_states,
             examined.states
         ),

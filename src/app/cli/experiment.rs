@@ -9,7 +9,7 @@ use crate::cli::watch::watch;
 use crate::cli::{CliError, chosen, interrupt, output};
 use crate::experiments::{Experiment, Run, Scale, experiments, find};
 use crate::lagrangian::{SystemInstance, configure_system};
-use crate::names::{WIDTH, counted, wrapped};
+use crate::names::{WIDTH, pluralize, wrap_text};
 use crate::pipeline::{
     ExperimentDirectory, ExperimentReport, KeptRecord, finish_runs, kept_record, merge_experiment, run_experiment,
 };
@@ -295,7 +295,7 @@ pub fn merge(all: Vec<Work>, beside: &[(String, PathBuf)], json: bool) -> Result
         let done = merge_experiment((work.experiment, work.scale), runs, &curves, &folder, &watch(&stop))
             .map_err(|error| CliError::file(&work.path, error))?;
         if done.finished < done.results.len() {
-            let open = counted(done.results.len() - done.finished, "run is", "runs are");
+            let open = pluralize(done.results.len() - done.finished, "run is", "runs are");
             output::note(&format!("{open} not finished; `{}` says which", work.list));
         }
         print_results(&work, &done, json)?;
@@ -453,7 +453,7 @@ fn print_results(work: &Work, done: &ExperimentReport, json: bool) -> Result<(),
         });
         return output::print(&format!("{object}\n"));
     }
-    output::print(&(done.text().to_string() + &wrapped(&format!("report: {}\n\n", report.display()), WIDTH)))
+    output::print(&(done.text().to_string() + &wrap_text(&format!("report: {}\n\n", report.display()), WIDTH)))
 }
 
 /// Prints what became of a share of an experiment.
@@ -467,7 +467,7 @@ fn print_share(work: &Work, shard: Shard, runs: usize, json: bool) -> Result<(),
     }
     output::print(&format!(
         "{name}: share {shard} is finished, {}; table and report of all shares by\n{}\n",
-        counted(runs, "run", "runs"),
+        pluralize(runs, "run", "runs"),
         work.merge
     ))
 }

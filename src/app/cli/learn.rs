@@ -11,7 +11,7 @@ use crate::cli::watch::watch;
 use crate::cli::{CliError, interrupt, output};
 use crate::configuration::Config;
 use crate::data::SamplingError;
-use crate::names::counted;
+use crate::names::pluralize;
 use crate::pipeline::{Begin, Checkpoints, PipelineError, RunOptions, Watch};
 use crate::shooting::ShootingError;
 use crate::training::{StopReason, TrainingError};
@@ -98,7 +98,7 @@ impl<'a> Session<'a> {
         } else {
             output::print(&format!("{text}report: {}\n", self.folder.file("report.html").display()))?;
         }
-        let kept = format!("the best of {} is in {}", counted(epochs, "epoch", "epochs"), path.display());
+        let kept = format!("the best of {} is in {}", pluralize(epochs, "epoch", "epochs"), path.display());
         match stop {
             StopReason::Finished => Ok(()),
             StopReason::Interrupted => {

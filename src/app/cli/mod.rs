@@ -69,7 +69,7 @@ pub use config::parse as parse_config;
 pub use error::{CliError, Kind};
 pub use states::{States, StatesError, parse_states};
 
-use crate::names::{WIDTH, one_line, wrapped};
+use crate::names::{WIDTH, one_line, wrap_text};
 use clap::{CommandFactory, Parser, Subcommand};
 use misunderstood::misunderstood;
 use std::ffi::OsString;
@@ -197,7 +197,7 @@ fn run(command: Command) -> Result<(), CliError> {
 fn answer(error: &clap::Error) -> ExitCode {
     use clap::error::ErrorKind::{DisplayHelp, DisplayHelpOnMissingArgumentOrSubcommand, DisplayVersion};
     match error.kind() {
-        DisplayHelp | DisplayVersion => match output::print(&wrapped(&error.to_string(), WIDTH)) {
+        DisplayHelp | DisplayVersion => match output::print(&wrap_text(&error.to_string(), WIDTH)) {
             Err(failed) if failed.kind() != Kind::ClosedPipe => {
                 report(&failed);
                 failed.exit_code()
@@ -206,7 +206,7 @@ fn answer(error: &clap::Error) -> ExitCode {
         },
         DisplayHelpOnMissingArgumentOrSubcommand => {
             // Nothing more can be done if even this cannot be shown.
-            let _ = write!(std::io::stderr(), "{}", wrapped(&error.to_string(), WIDTH));
+            let _ = write!(std::io::stderr(), "{}", wrap_text(&error.to_string(), WIDTH));
             ExitCode::from(2)
         }
         _ => {

@@ -2,7 +2,7 @@
 
 use crate::cli::charges::Charges;
 use crate::cli::{CliError, input, output};
-use crate::names::{counted, rounded};
+use crate::names::{pluralize, rounded};
 use crate::report::{Figure, LinePlot, Picture, Report, Series, line_plot};
 use crate::rollout::{Domain, Trajectory};
 use crate::storage::{Disk, Growing, remove_leftovers, write_atomically};
@@ -236,8 +236,9 @@ impl Facts<'_> {
     /// In words, a line each for the motion and its energy.
     pub fn text(&self) -> String {
         let unit = self.time_unit.map_or(String::new(), |unit| format!(" {unit}"));
-        let iterations =
-            self.iterations.map_or(String::new(), |count| format!(" in {}", counted(count, "iteration", "iterations")));
+        let iterations = self
+            .iterations
+            .map_or(String::new(), |count| format!(" in {}", pluralize(count, "iteration", "iterations")));
         let work = self.work.map_or(String::new(), |work| format!("forces gave {}, ", rounded(work, 10)));
         let balance = match (self.energy_change, self.dissipated, self.energy_defect) {
             (Some(change), Some(dissipated), Some(defect)) => format!(
@@ -251,10 +252,10 @@ impl Facts<'_> {
         let charges = self.charges.map_or(String::new(), Charges::text);
         format!(
             "{} to t = {}{unit}, {}, {}{iterations}, in {}\n{balance}{charges}",
-            counted(self.samples, "sample", "samples"),
+            pluralize(self.samples, "sample", "samples"),
             self.t_end,
-            counted(self.steps, "step", "steps"),
-            counted(self.evaluations, "evaluation", "evaluations"),
+            pluralize(self.steps, "step", "steps"),
+            pluralize(self.evaluations, "evaluation", "evaluations"),
             self.out
         )
     }

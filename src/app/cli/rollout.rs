@@ -11,7 +11,7 @@ use crate::cli::source::parameter;
 use crate::cli::subject::Subject;
 use crate::cli::{CliError, input, interrupt, output};
 use crate::lagrangian::{EulerLagrange, Interruptible, LeastNorm, ReducedMass, Request, Terms};
-use crate::names::{counted, rounded};
+use crate::names::{pluralize, rounded};
 use crate::rollout::{Balances, Driven, Method, Options, RolloutError, Trajectory, rollout_in_pieces};
 use crate::storage::check_target;
 use std::ops::ControlFlow;
@@ -232,7 +232,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         output::note(&format!("{}; what comes after is a guess", leaving.text()));
     }
     if let Some(stop) = result.stop {
-        let kept = counted(result.samples, "sample is", "samples are");
+        let kept = pluralize(result.samples, "sample is", "samples are");
         let names = network.manifold().map_or(&[][..], |manifold| manifold.names());
         let problem = format!("{} ({kept} in {})", ended(&stop, (columns, names), method), place(&args.out));
         return Err(match stop {
@@ -286,7 +286,7 @@ fn note_open_directions(model: &dyn EulerLagrange<f64>, q: &[f64], v: &[f64]) {
     let _ = model.terms(q, v, Request::MASS_MATRIX | Request::CONSTRAINTS, &mut terms);
     let open = ReducedMass::of(q.len(), &terms.mass_matrix, &terms.constraint_matrix);
     let open = open.map_or(0, |reduced| reduced.null_directions(1024.0).len());
-    let directions = counted(open, "direction", "directions");
+    let directions = pluralize(open, "direction", "directions");
     output::note(&format!(
         "least norm: the mass matrix is singular along {directions} at the start, and the motion moves none of them"
     ));

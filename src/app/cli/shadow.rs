@@ -8,7 +8,7 @@ use crate::cli::shadow_facts::{Facts, View};
 use crate::cli::source::{Source, parameter};
 use crate::cli::{CliError, chosen, interrupt, output};
 use crate::lagrangian::{EulerLagrange, Interruptible, MechanicsError};
-use crate::names::{counted, unknown};
+use crate::names::{pluralize, unknown};
 use crate::pipeline::memory;
 use crate::relativity::{
     Camera, Chart, Image, MOST_PIXELS, Observer, RelativityError, Sky, TOLERANCES, Tracing, difference_image, outline,
@@ -240,7 +240,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     output::print(&told.map_err(refused)?)?;
     if interrupted {
         let done: usize = views.iter().map(|view| view.shadow.finished()).sum();
-        let (rays, place) = (counted(pixels, "ray", "rays"), args.out.display());
+        let (rays, place) = (pluralize(pixels, "ray", "rays"), args.out.display());
         return Err(CliError::interrupted(format_args!(
             "interrupted, {done} of {rays} followed to an end are in {place}"
         )));

@@ -1,6 +1,6 @@
 //! Facts of `lnn shadow`, as text or as a JSON object.
 
-use crate::names::{counted, percentage, rounded};
+use crate::names::{percentage, pluralize, rounded};
 use crate::relativity::{Camera, Difference, Image, Outline, RelativityError, Shadow, Tracing};
 use crate::report::text_table;
 use serde_json::{Map, Value, json};
@@ -147,13 +147,13 @@ impl Facts<'_> {
                 rounded(difference.median.to_degrees(), 2),
                 rounded(difference.most.to_degrees(), 2)
             );
-            text = crate::names::wrapped(&text, crate::names::WIDTH);
+            text = crate::names::wrap_text(&text, crate::names::WIDTH);
         }
         let unfinished: usize = views.iter().map(|view| view.shadow.unfinished()).sum();
         if unfinished > 0 {
             text += &format!(
                 "{} neither captured nor from the sky, in magenta\n",
-                counted(unfinished, "ray is", "rays are")
+                pluralize(unfinished, "ray is", "rays are")
             );
         }
         Ok(text)

@@ -2,7 +2,7 @@
 
 use crate::cli::{CliError, json};
 use crate::lagrangian::MechanicsError;
-use crate::names::counted;
+use crate::names::pluralize;
 use crate::scalar::Scalar;
 
 /// States evaluated together; bounds the memory whatever the length of the file.
@@ -28,7 +28,7 @@ pub fn report_failures(place: &str, failures: &[(usize, String)]) -> Result<(), 
         [] => Ok(()),
         [(row, problem)] => Err(CliError::data(format_args!("{place}: row {row}: {problem}"))),
         [(row, problem), rest @ ..] => {
-            let more = counted(rest.len(), "more row", "more rows");
+            let more = pluralize(rest.len(), "more row", "more rows");
             Err(CliError::data(format_args!("{place}: row {row}: {problem} (and {more})")))
         }
     }

@@ -1,6 +1,6 @@
 //! States from CSV files.
 
-use crate::names::{counted, nearest, unknown};
+use crate::names::{nearest, pluralize, unknown};
 use crate::recording::read::{Separator, comment, line_end, names_in, split};
 use crate::scalar::Scalar;
 use thiserror::Error;
@@ -61,7 +61,7 @@ pub enum StatesError {
         names: String,
     },
     /// A row with too few or too many fields.
-    #[error("row {row}: expected {}{separated}, found {found}", counted(*expected, "field", "fields"))]
+    #[error("row {row}: expected {}{separated}, found {found}", pluralize(*expected, "field", "fields"))]
     Ragged {
         /// The row.
         row: usize,

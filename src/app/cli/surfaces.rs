@@ -3,7 +3,7 @@
 use crate::cli::source::Source;
 use crate::cli::{CliError, json, output};
 use crate::geometry::{Change, Surface, surfaces};
-use crate::names::{counted, unknown};
+use crate::names::{pluralize, unknown};
 use crate::report::text_table;
 use crate::scalar::Scalar;
 
@@ -55,7 +55,7 @@ impl<S: Scalar> Line<'_, S> {
 
     fn table(&self, names: &[String], found: &[Surface<S>]) -> String {
         let block = self.block.join(",");
-        let changes = counted(found.len(), "change", "changes");
+        let changes = pluralize(found.len(), "change", "changes");
         let title = format!("determinant of the metric's block {block}: {changes} of sign on the line\n");
         if found.is_empty() {
             return title;

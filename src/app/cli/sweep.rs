@@ -6,7 +6,7 @@ use crate::cli::number::{thread_count, whole};
 use crate::cli::shard::Shard;
 use crate::cli::{CliError, train_config};
 use crate::experiments::{SWEEP, Scale, Variation, combinations, sweep_runs};
-use crate::names::counted;
+use crate::names::pluralize;
 use clap::Parser;
 use std::path::PathBuf;
 
@@ -85,7 +85,7 @@ impl Args {
         let counts = self.vary.iter().map(|one| one.values.len());
         let count = counts.fold(self.seeds, usize::saturating_mul);
         if count > MOST_RUNS {
-            let runs = counted(count, "run", "runs");
+            let runs = pluralize(count, "run", "runs");
             return Err(CliError::usage(format_args!("--vary: {runs}, expected at most {MOST_RUNS}")));
         }
         let configured = |choice: Vec<(String, String)>| {

@@ -3,7 +3,7 @@
 use crate::cli::probe::{Bound, Probe, bound, tolerance};
 use crate::cli::source::parameter;
 use crate::cli::{CliError, number, output};
-use crate::names::{WIDTH, counted, number as digits, wrapped};
+use crate::names::{WIDTH, number as digits, pluralize, wrap_text};
 use crate::report::text_table;
 use crate::symmetry::{
     Degrees, EXACT, MOST_FIELDS, MOST_UNKNOWNS, Quadratic, Symmetries, quadratic, quadratic_unknowns, unknowns,
@@ -233,12 +233,12 @@ impl Found {
             None => format!("{}: no gap between singular values, so no number of symmetries; {time}\n", self.system),
             Some(0) => format!("{}: no point symmetry in space; {time}\n", self.system),
             Some(count) => {
-                let count = counted(count, "point symmetry", "point symmetries");
+                let count = pluralize(count, "point symmetry", "point symmetries");
                 format!("{}: {count}, {}; {time}\n", self.system, self.algebra())
             }
         };
         if self.singular_states > 0 {
-            text += &wrapped(
+            text += &wrap_text(
                 &format!(
                     "L is degenerate: its mass matrix is singular at {} of {} states and determines no motion there; a null \
                      direction of it times any function may be a symmetry, so that the number depends on the functions\n",
@@ -250,7 +250,7 @@ impl Found {
         let last = self.count.unwrap_or(0) + BEYOND;
         let shown: Vec<String> = self.singular_values.iter().take(last.min(20)).map(|x| digits(*x)).collect();
         let more = if self.singular_values.len() > shown.len() { ", .." } else { "" };
-        text += &wrapped(&format!("singular values {}{more}\n", shown.join(", ")), WIDTH);
+        text += &wrap_text(&format!("singular values {}{more}\n", shown.join(", ")), WIDTH);
         if let Some(gap) = self.gap {
             text += &format!("gap {}", digits(gap));
         }
@@ -319,11 +319,11 @@ impl Second {
                 "\nno conserved quantity quadratic in the momenta beyond the energy and products of charges\n".into()
             }
             Some(count) => {
-                let count = counted(count, "conserved quantity", "conserved quantities");
+                let count = pluralize(count, "conserved quantity", "conserved quantities");
                 let list: String = self.conserved.iter().map(|quantity| format!("  {quantity}\n")).collect();
                 let text =
                     format!("\n{count} quadratic in the momenta beyond the energy and products of charges:\n{list}");
-                wrapped(&text, WIDTH)
+                wrap_text(&text, WIDTH)
             }
         }
     }

@@ -120,13 +120,13 @@ pub enum PipelineError {
     #[error("interrupted while the model was judged: the model is written, tables and report are not")]
     Interrupted,
     /// Tables of an experiment none of whose runs is finished.
-    #[error("none of {} is finished: there are no records to make tables of", crate::names::counted(*total, "run", "runs"))]
+    #[error("none of {} is finished: there are no records to make tables of", crate::names::pluralize(*total, "run", "runs"))]
     NothingFinished {
         /// Runs asked for.
         total: usize,
     },
     /// Runs of an experiment that another process works on.
-    #[error("{} left to other processes, the first to {owner}; start again when they have ended", crate::names::counted(*held, "run is", "runs are"))]
+    #[error("{} left to other processes, the first to {owner}; start again when they have ended", crate::names::pluralize(*held, "run is", "runs are"))]
     HeldRuns {
         /// Runs that other processes work on.
         held: usize,
@@ -134,7 +134,7 @@ pub enum PipelineError {
         owner: String,
     },
     /// The flag of the watch was raised while an experiment ran.
-    #[error("interrupted with {finished} of {} finished", crate::names::counted(*total, "run", "runs"))]
+    #[error("interrupted with {finished} of {} finished", crate::names::pluralize(*total, "run", "runs"))]
     InterruptedRuns {
         /// Runs that are finished.
         finished: usize,

@@ -8,7 +8,7 @@ use crate::analysis::{
 use crate::data::sample;
 use crate::lagrangian::system::TrajectoryTest as Span;
 use crate::lagrangian::{EulerLagrange, SystemInstance};
-use crate::names::counted;
+use crate::names::pluralize;
 use crate::network::NetworkLagrangian;
 use crate::pipeline::cancellation::Cancellation;
 use crate::pipeline::physics::{Physics, Subject};
@@ -200,7 +200,7 @@ pub fn evaluate(
         Ok(()) => None,
         Err(PipelineError::Interrupted) => {
             physics.left_out.push("whatever is not here: interrupted".to_string());
-            Some(format!("{} of {}", runs.len(), counted(plan.starts, "start", "starts")))
+            Some(format!("{} of {}", runs.len(), pluralize(plan.starts, "start", "starts")))
         }
         Err(error) => return Err(error),
     };

@@ -2,7 +2,7 @@
 
 use crate::analysis::{MassMatrixError, Statistics};
 use crate::lagrangian::SystemInstance;
-use crate::names::{WIDTH, number, percentage, rounded, wrapped};
+use crate::names::{WIDTH, number, percentage, rounded, wrap_text};
 use crate::pipeline::evaluation::Evaluation;
 use crate::pipeline::report_files::{parameter_table, write_report_and_figures};
 use crate::pipeline::{Output, PipelineError, headline};
@@ -148,7 +148,7 @@ impl Evaluation {
         let tables = self.tables();
         let text = tables.iter().map(|t| format!("{}\n{}", t.title, text_table(&t.header, &t.rows)));
         let first = headline::of_evaluation(title, self).text();
-        wrapped(&format!("{first}\n{}{}", text.collect::<Vec<_>>().join("\n"), self.note()), WIDTH)
+        wrap_text(&format!("{first}\n{}{}", text.collect::<Vec<_>>().join("\n"), self.note()), WIDTH)
     }
 
     /// Meaning of [`NONE`], if there is one in the tables.

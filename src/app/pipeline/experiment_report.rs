@@ -1,7 +1,7 @@
 //! The report of an experiment: table, pictures, page, words.
 
 use crate::experiments::{Experiment, Record, Run, Scale};
-use crate::names::{WIDTH, counted, wrapped};
+use crate::names::{WIDTH, pluralize, wrap_text};
 use crate::pipeline::experiment_directory::ExperimentDirectory;
 use crate::pipeline::readings::{RowOfHoles, rows_of_holes};
 use crate::pipeline::run_figures::{pictures_of_runs, within};
@@ -68,7 +68,7 @@ pub(crate) fn conclude(
     let training: f64 = results.iter().filter_map(|(_, record)| record.as_ref()).map(|record| record.seconds).sum();
     let finished = results.iter().filter(|(_, record)| record.is_some()).count();
     let of_all = if finished == results.len() { String::new() } else { format!(", {finished} of them finished") };
-    let runs = counted(results.len(), "run", "runs");
+    let runs = pluralize(results.len(), "run", "runs");
     let budget = if experiment.is_sweep() {
         format!("{runs}{of_all}")
     } else {
@@ -115,7 +115,7 @@ pub(crate) fn conclude(
     let note = format!("{budget}, {training:.0} s of training{}.", clock.unwrap_or_default());
     let (title, paper) = (experiment.title, experiment.paper);
     let place = if paper == "-" { String::new() } else { format!(" (of the paper: {paper})") };
-    let text = wrapped(&format!("{title}{place}\n{text}\n{note}\n"), WIDTH);
+    let text = wrap_text(&format!("{title}{place}\n{text}\n{note}\n"), WIDTH);
     Ok(ExperimentReport { results, table, finished, training_seconds: training, text })
 }
 

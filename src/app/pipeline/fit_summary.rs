@@ -1,7 +1,7 @@
 //! Results of `lnn fit`: `summary.json`, tables for a terminal, report.
 
 use crate::configuration::Config;
-use crate::names::{WIDTH, counted, number, percentage, wrapped};
+use crate::names::{WIDTH, number, percentage, pluralize, wrap_text};
 use crate::pipeline::determination::Determined;
 use crate::pipeline::hold_out::HoldOut;
 use crate::pipeline::physics::Physics;
@@ -124,7 +124,7 @@ impl<'a, S: Scalar> Found<'a, S> {
         let report = report.section("The functions that were learned", &self.physics.figures);
         let report = self.determined.report(self.hold_out.report(report));
         let report = self.physics.report(report).heading("Data");
-        let report = report.preformatted(&wrapped(opening.trim_end(), WIDTH)).section("Training", &figures);
+        let report = report.preformatted(&wrap_text(opening.trim_end(), WIDTH)).section("Training", &figures);
         let report = report.heading("Configuration").preformatted(toml);
         write_report_and_figures(
             output,
@@ -132,7 +132,7 @@ impl<'a, S: Scalar> Found<'a, S> {
             figures.iter().chain(&self.hold_out.figures).chain(&self.physics.figures),
         )?;
         let tables = self.hold_out.text() + &self.determined.text();
-        let text = wrapped(&format!("{}\n{opening}{tables}", headline.text()), WIDTH);
+        let text = wrap_text(&format!("{}\n{opening}{tables}", headline.text()), WIDTH);
         Ok((json, text))
     }
 
@@ -208,8 +208,8 @@ impl Summary<'_> {
         };
         let mut text = format!(
             "learned from {way}: {} of {}\n{}{judged}\n\n",
-            counted(training, "sample", "samples"),
-            counted(self.trajectories[0], "trajectory", "trajectories"),
+            pluralize(training, "sample", "samples"),
+            pluralize(self.trajectories[0], "trajectory", "trajectories"),
             self.time_steps.text()
         );
         // Writing to a string cannot fail.
@@ -234,8 +234,8 @@ impl Summary<'_> {
                 x if x.is_finite() => format!(", held out {}", number(x)),
                 _ => ", held out not finite".to_string(),
             }),
-            counted(self.epochs, "epoch", "epochs"),
-            counted(self.weights, "weight", "weights"),
+            pluralize(self.epochs, "epoch", "epochs"),
+            pluralize(self.weights, "weight", "weights"),
             self.seed
         );
         if let Some(shooting) = &self.shooting {
@@ -244,8 +244,8 @@ impl Summary<'_> {
                 "mean squared residual of predictions, in units of the noise: {} before, {} after {} over {} (1 is noise alone)",
                 number(shooting.start_loss),
                 number(shooting.validation_loss),
-                counted(shooting.epochs, "epoch", "epochs"),
-                counted(shooting.segments, "segment", "segments")
+                pluralize(shooting.epochs, "epoch", "epochs"),
+                pluralize(shooting.segments, "segment", "segments")
             );
         }
         if !self.constants.is_empty() {

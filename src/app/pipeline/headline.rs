@@ -3,7 +3,7 @@
 
 use crate::analysis::{PredictionError, ValidTimes};
 use crate::experiments::{Row, RunSpread};
-use crate::names::{counted, number, percent};
+use crate::names::{number, percent, pluralize};
 use crate::pipeline::evaluation::Evaluation;
 use crate::pipeline::hold_out::{HoldOut, factor};
 use crate::report::Report;
@@ -57,7 +57,7 @@ fn valid_name(valid: &ValidTimes, [one, many]: [&str; 2]) -> String {
     format!(
         "Prediction valid (error below {} of the spread of the motion), median of {}",
         valid.threshold,
-        counted(valid.starts, one, many)
+        pluralize(valid.starts, one, many)
     )
 }
 

@@ -1,7 +1,7 @@
 //! Pictures that the report of an experiment takes over from its runs.
 
 use crate::experiments::{Experiment, Picture, Record, Run};
-use crate::names::counted;
+use crate::names::pluralize;
 use crate::pipeline::CAPTIONS;
 use crate::pipeline::experiment_directory::ExperimentDirectory;
 use crate::pipeline::report_files::Caption;
@@ -50,9 +50,8 @@ pub(crate) fn within(taken: Vec<RunPicture>, report: Report) -> Report {
     }
     match left {
         0 => report,
-        _ => {
-            report.paragraph(&format!("{} more in the directories of the runs.", counted(left, "picture", "pictures")))
-        }
+        _ => report
+            .paragraph(&format!("{} more in the directories of the runs.", pluralize(left, "picture", "pictures"))),
     }
 }
 

@@ -1,7 +1,7 @@
 //! Steps of time of recorded motion: gaps, uneven clocks, and the rows that a fit leaves out because of them.
 
 use crate::data::Split;
-use crate::names::{counted, percent};
+use crate::names::{percent, pluralize};
 use crate::recording::{Bridged, Clock, LoadedRecording, Targets};
 use serde::Serialize;
 
@@ -43,11 +43,11 @@ impl TimeSteps {
         let mut parts = Vec::new();
         let Bridged { gaps, rows, longest } = self.bridged;
         if gaps > 0 {
-            let (gaps, rows) = (counted(gaps, "short gap", "short gaps"), counted(rows, "row", "rows"));
+            let (gaps, rows) = (pluralize(gaps, "short gap", "short gaps"), pluralize(rows, "row", "rows"));
             parts.push(format!("trajectories go on across {gaps} ({rows} missing, at most {longest} in one)"));
         }
         if self.cuts > 0 {
-            parts.push(format!("{} trajectories", counted(self.cuts, "long gap cuts", "long gaps cut")));
+            parts.push(format!("{} trajectories", pluralize(self.cuts, "long gap cuts", "long gaps cut")));
         }
         if self.jitter > ROUNDING {
             parts.push(format!("steps of time vary by {}", percent(self.jitter)));
@@ -56,8 +56,8 @@ impl TimeSteps {
             return String::new();
         }
         let LeftOut { between_gaps, at_ends, near_gaps } = self.left_out;
-        let rows = counted(between_gaps, "row", "rows");
-        let samples = counted(at_ends, "training sample", "training samples");
+        let rows = pluralize(between_gaps, "row", "rows");
+        let samples = pluralize(at_ends, "training sample", "training samples");
         format!(
             "{}\nnot learned from: {rows} between gaps, {samples} at ends and {near_gaps} near gaps, without full windows\n",
             parts.join("; ")

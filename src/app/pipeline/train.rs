@@ -6,7 +6,7 @@ use crate::data::{Datasets, sample_all_until};
 use crate::experiments::{Learned, Outcome, Record};
 use crate::lagrangian::SystemInstance;
 use crate::lagrangian::system::TrajectoryTest;
-use crate::names::{counted, number};
+use crate::names::{number, pluralize};
 use crate::network::file::{Header, ModelFile};
 use crate::network::{Architecture, Layout, NetworkLagrangian};
 use crate::pipeline::checkpoints::Checkpoints;
@@ -128,10 +128,10 @@ impl TrainReport {
         format!(
             "loss (paper): validation {}, fresh states {fresh}; {} in {:.1} s, {:.0} states/s, {}, seed {}\n",
             number(validation_loss),
-            counted(epochs, "epoch", "epochs"),
+            pluralize(epochs, "epoch", "epochs"),
             self.figures.training_seconds,
             self.figures.states_per_second,
-            counted(weights, "weight", "weights"),
+            pluralize(weights, "weight", "weights"),
             self.figures.seed
         )
     }

@@ -1,6 +1,6 @@
 //! Meaning of the columns of recorded files.
 
-use crate::names::counted;
+use crate::names::pluralize;
 use crate::names::{taken_column, unknown};
 use crate::recording::units::factor;
 use thiserror::Error;
@@ -78,7 +78,7 @@ impl Columns {
                 let (n, found) = (self.coords.len(), names.len());
                 return wrong(format!(
                     "{what}: expected {}, one per coordinate, found {found}",
-                    counted(n, "column", "columns")
+                    pluralize(n, "column", "columns")
                 ));
             }
         }

@@ -1,6 +1,6 @@
 //! Training and validation, apart by whole trajectories.
 
-use crate::names::counted;
+use crate::names::pluralize;
 use crate::random::RngStream;
 use crate::recording::{RecordedTrajectory, Recording};
 use rand::seq::SliceRandom;
@@ -34,7 +34,7 @@ pub enum HoldOutError {
     #[error("share of the data held out: expected 0, or a number between 0 and 1, found {0}")]
     Fraction(f64),
     /// One trajectory that is too short to be divided.
-    #[error("{} too few to hold out {fraction} of them after a gap of {gap}: both parts need {least}", counted(*samples, "sample is", "samples are"))]
+    #[error("{} too few to hold out {fraction} of them after a gap of {gap}: both parts need {least}", pluralize(*samples, "sample is", "samples are"))]
     Short {
         /// Samples of the trajectory.
         samples: usize,
@@ -147,7 +147,7 @@ impl HeldOut {
                 .join(", "),
             Self::End { start, gap } => format!(
                 "the last {} of the only trajectory, after a gap of {gap}",
-                counted(recording.samples().saturating_sub(*start), "sample", "samples")
+                pluralize(recording.samples().saturating_sub(*start), "sample", "samples")
             ),
         }
     }

@@ -36,7 +36,7 @@ pub struct Recording {
 #[non_exhaustive]
 pub enum TrajectoryError {
     /// Lengths disagree.
-    #[error("{track}: {what}: expected {}, found {found}", crate::names::counted(*expected, "number", "numbers"))]
+    #[error("{track}: {what}: expected {}, found {found}", crate::names::pluralize(*expected, "number", "numbers"))]
     Shape {
         /// Name of the trajectory.
         track: String,

@@ -46,7 +46,7 @@ pub fn cut_hard(text: &str, most: usize) -> Vec<String> {
 
 /// A text with every line that is longer than `most` cut at blanks; what follows stands below the text of that line: behind
 /// its indentation and, of two columns, behind the first one.
-pub fn wrapped(text: &str, most: usize) -> String {
+pub fn wrap_text(text: &str, most: usize) -> String {
     let mut whole = String::with_capacity(text.len());
     for line in text.split_inclusive('\n') {
         let (body, end) = line.strip_suffix('\n').map_or((line, ""), |body| (body, "\n"));
@@ -89,12 +89,12 @@ mod tests {
 
     #[test]
     fn only_long_lines_are_wrapped() {
-        assert_eq!(wrapped("short\n\n  a line of words\nend", 10), "short\n\n  a line\n  of words\nend");
+        assert_eq!(wrap_text("short\n\n  a line of words\nend", 10), "short\n\n  a line\n  of words\nend");
         let two = "  --seed <N>  seed of the states and of the weights\n";
         assert_eq!(
-            wrapped(two, 30),
+            wrap_text(two, 30),
             "  --seed <N>  seed of the\n              states and of\n              the weights\n"
         );
-        assert!(wrapped(&"word ".repeat(100), WIDTH).lines().all(|line| width(line) <= WIDTH));
+        assert!(wrap_text(&"word ".repeat(100), WIDTH).lines().all(|line| width(line) <= WIDTH));
     }
 }

@@ -1,6 +1,6 @@
 //! Mistakes in files of recorded motion.
 
-use crate::names::{counted, one_line};
+use crate::names::{one_line, pluralize};
 use crate::recording::ColumnsError;
 use crate::storage::ReadError;
 use thiserror::Error;
@@ -77,7 +77,7 @@ pub enum Problem {
         names: Vec<String>,
     },
     /// Names for another number of columns.
-    #[error("row {row}: expected {}, as many as columns are named, found {found}", counted(*expected, "field", "fields"))]
+    #[error("row {row}: expected {}, as many as columns are named, found {found}", pluralize(*expected, "field", "fields"))]
     Width {
         /// The row.
         row: u64,
@@ -95,7 +95,7 @@ pub enum Problem {
         found: String,
     },
     /// A row with too few or too many fields.
-    #[error("row {row}: expected {}{separated}, found {found}", counted(*expected, "field", "fields"))]
+    #[error("row {row}: expected {}{separated}, found {found}", pluralize(*expected, "field", "fields"))]
     Ragged {
         /// The row.
         row: u64,

@@ -6,7 +6,7 @@ use super::element::Element;
 use super::fill::{Source, fill};
 use super::select::Selection;
 use super::shared::Shared;
-use crate::names::counted;
+use crate::names::pluralize;
 use crate::recording::Columns;
 use std::io::{BufReader, Read};
 
@@ -104,7 +104,7 @@ impl Header {
             Some(&[rows, columns]) => Ok(Self { rows, columns, dimensions: 2, element, fortran, start: 0 }),
             Some(other) => Err(Problem::Array(format!(
                 "an array of {}, expected 2 (rows and columns)",
-                counted(other.len(), "dimension", "dimensions")
+                pluralize(other.len(), "dimension", "dimensions")
             ))),
             None => Err(Problem::Array("the array's header has no readable shape".to_string())),
         }

@@ -11,7 +11,7 @@ pub use noise::Noise;
 pub(crate) use noise::{contrast_weights, noise};
 pub use window::Quality;
 
-use crate::names::counted;
+use crate::names::pluralize;
 use crate::recording::clock::Clock;
 use crate::recording::statistics::median;
 use crate::recording::{RecordedTrajectory, Recording};
@@ -56,7 +56,7 @@ pub enum SmoothError {
         found: String,
     },
     /// A trajectory too short for the window.
-    #[error("{track}: {} fewer than the {needed} that a fit of this degree needs", counted(*samples, "sample is", "samples are"))]
+    #[error("{track}: {} fewer than the {needed} that a fit of this degree needs", pluralize(*samples, "sample is", "samples are"))]
     Short {
         /// The trajectory; empty for all of them.
         track: String,
@@ -364,7 +364,7 @@ fn check(options: &SmoothOptions, n: usize) -> Result<(), SmoothError> {
         if noise.len() != n {
             return wrong(
                 "noise",
-                format!("{}, one per coordinate", counted(n, "number", "numbers")),
+                format!("{}, one per coordinate", pluralize(n, "number", "numbers")),
                 noise.len().to_string(),
             );
         }

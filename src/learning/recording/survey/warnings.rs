@@ -2,7 +2,7 @@
 
 use super::suspicious::Kind;
 use super::{FEW_SAMPLES, Stillness, Survey};
-use crate::names::{counted, number, percent};
+use crate::names::{number, percent, pluralize};
 use crate::recording::Recording;
 use crate::recording::smooth::Smoothing;
 use serde::Serialize;
@@ -24,7 +24,7 @@ pub fn warnings(survey: &Survey, still: &[(usize, Stillness)]) -> Vec<String> {
             all.push(format!(
                 "{name} turns by more than 2 rad between samples {}, first at row {row} of {track}: which way is a \
                  guess",
-                counted(c.ambiguous_turns, "time", "times")
+                pluralize(c.ambiguous_turns, "time", "times")
             ));
         }
         if !c.noise_resolved {
@@ -63,18 +63,18 @@ pub fn warnings(survey: &Survey, still: &[(usize, Stillness)]) -> Vec<String> {
         }
     }
     let dropped: usize = survey.dropped.iter().map(|part| part.samples).sum();
-    let (missing, gaps) = (survey.bridged.rows, counted(survey.bridged.gaps, "short gap", "short gaps"));
+    let (missing, gaps) = (survey.bridged.rows, pluralize(survey.bridged.gaps, "short gap", "short gaps"));
     let share = |rows: usize| rows as f64 / (survey.samples + dropped + missing) as f64;
     if share(missing) > MANY {
-        let rows = counted(missing, "row is", "rows are");
+        let rows = pluralize(missing, "row is", "rows are");
         all.push(format!("{rows} missing in {gaps} ({}): smoothing reaches across them", percent(share(missing))));
     }
     if share(dropped) > MANY {
-        let rows = counted(dropped, "row is", "rows are");
+        let rows = pluralize(dropped, "row is", "rows are");
         all.push(format!("{rows} left out ({}): between gaps there are too few to be used", percent(share(dropped))));
     }
     if survey.suspicious_count > 0 {
-        let places = counted(survey.suspicious_count, "place does", "places do");
+        let places = pluralize(survey.suspicious_count, "place does", "places do");
         all.push(format!("{places} not look like smooth motion with noise"));
     }
     if survey.held_out.is_none() {
