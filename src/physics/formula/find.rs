@@ -10,7 +10,7 @@ use super::wald::{Equations, RIDGE, Survivors, survivors};
 use super::weak::{Stretch, Windows};
 use crate::random::RngStream;
 use crate::recording::Recording;
-use crate::recording::smooth::{SmoothOptions, Smoothed, Smoothing};
+use crate::recording::smooth::{SmoothOptions, Smoothed, Smoothing, noise};
 use rand::Rng;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -58,6 +58,8 @@ impl Default for FormulaOptions {
 const LEAST_NOISE: f64 = 1e-6;
 /// Samples in a row that are needed.
 const LEAST_SAMPLES: usize = 20;
+/// Samples from which on a trajectory may have a noise of its own.
+const LEAST_OWN: usize = 200;
 /// Trajectories from which on they are held out as a whole; fewer are cut into pieces.
 const WHOLE: usize = 5;
 /// Pieces of a trajectory otherwise.
@@ -86,6 +88,8 @@ struct Prepared<'a> {
     smoothed: Vec<Option<Smoothed>>,
     sigma: Vec<f64>,
     resolved: bool,
+    /// `false` if the user gave the noise.
+    estimated: bool,
     bounds: Vec<[f64; 2]>,
     speeds: Vec<f64>,
     /// Time in which the motion changes, in s.
@@ -138,7 +142,21 @@ impl<'a> Prepared<'a> {
         let resolved = smoothing.coordinates.iter().all(|c| c.noise.resolved);
         let speeds = speeds.into_iter().map(|s| if s > 0.0 { s } else { 1.0 }).collect();
         let sigma = sigma.collect();
-        Ok(Self { recording, smoothed, sigma, resolved, bounds, speeds, pace, n })
+        let estimated = options.noise.is_none();
+        Ok(Self { recording, smoothed, sigma, resolved, estimated, bounds, speeds, pace, n })
+    }
+
+    /// Noise of a trajectory: its own where it is plainly another than that of all together.
+    fn noise(&self, track: usize) -> Vec<f64> {
+        const OTHER: f64 = 1.25;
+        let track = &self.recording.tracks[track];
+        let own = |i: usize| noise(std::iter::once((track.times.as_slice(), track.q.as_slice())), self.n, i).sigma;
+        let chosen = |i: usize| {
+            let (own, usual) = (own(i), self.sigma[i]);
+            let other = self.estimated && track.len() >= LEAST_OWN && !(usual / OTHER..usual * OTHER).contains(&own);
+            if other { own.max(LEAST_NOISE * (self.bounds[i][1] - self.bounds[i][0])) } else { usual }
+        };
+        (0..self.n).map(chosen).collect()
     }
 
     /// The block of a sample.
@@ -215,6 +233,7 @@ impl<'a> Prepared<'a> {
                         times: track.times[from..to].to_vec(),
                         q: track.q[from * n..to * n].to_vec(),
                         force: if force.is_empty() { vec![] } else { force[from * n..to * n].to_vec() },
+                        sigma: self.noise(index),
                         start: [&smoothed.q[from * n..(from + 1) * n], &smoothed.v[from * n..(from + 1) * n]].concat(),
                     });
                 }
@@ -266,7 +285,7 @@ impl Search<'_> {
         });
         let mut ratios: Vec<f64> = ratios.collect();
         ratios.sort_by(f64::total_cmp);
-        ratios.get(ratios.len() / 4).is_none_or(|ratio| *ratio > 1e-3)
+        ratios.get(ratios.len() / 4).is_none_or(|ratio| *ratio > 0.05)
     }
 
     fn equations(&self, model: &Model, segments: &[Segment], sum: &mut BlockSum) {
@@ -278,9 +297,7 @@ impl Search<'_> {
     fn survivors(&self, model: &Model, sum: &BlockSum, complexity: &[f64]) -> Option<Survivors> {
         let coefficients = self.model_over_candidates(model);
         let equations = Equations { matrix: &sum.matrix, right: &sum.right, coefficients: &coefficients, complexity };
-        // What the model cannot explain counts as noise.
-        let inflation = (sum.square / sum.count.max(1.0)).max(1.0);
-        survivors(&equations, THRESHOLD * inflation, &|x| self.regular(model, x))
+        survivors(&equations, THRESHOLD * sum.inflation, &|x| self.regular(model, x))
     }
 
     /// Refits and chooses terms anew until they stay the same; the normal equations at the end, by block.
@@ -369,7 +386,7 @@ pub fn formula_of_motion(recording: &Recording, options: &FormulaOptions) -> Res
     let mut candidates: Vec<usize> = path.order.iter().take(MOST_CANDIDATES).map(|&k| kept[k]).collect();
     candidates.extend(model.terms.iter().filter(|k| !candidates.contains(k)).copied().collect::<Vec<_>>());
     candidates.sort_unstable();
-    let motion = Motion { library: &library, sigma: data.sigma.clone(), substeps: 1, threads: options.threads };
+    let motion = Motion { library: &library, substeps: 1, threads: options.threads };
     let short = data.segments(2.5 * data.pace);
     let (mut judges, mut learned): (Vec<Segment>, Vec<Segment>) =
         short.into_iter().partition(|s| held.contains(&s.block));
@@ -407,10 +424,11 @@ pub fn formula_of_motion(recording: &Recording, options: &FormulaOptions) -> Res
         Some(replaced) => replaced.iter().map(|r| probabilities.get(r).copied().unwrap_or(0.0)).fold(1.0, f64::min),
         None => probabilities.get(&k).copied().unwrap_or(1.0),
     };
-    let probability: Vec<(String, f64)> = model.terms.iter().map(|&k| (library.text(k), probability(k))).collect();
-    let mut found = FoundFormula::new(&library, &recording.periodic, &model, covariance);
-    found.set_probabilities(&probability);
-    found.verdict = if residual <= MOST_RESIDUAL { Verdict::Found } else { Verdict::NotInLibrary };
+    let probability: Vec<f64> = model.terms.iter().map(|&k| probability(k)).collect();
+    let mut found = FoundFormula::new(&library, &recording.periodic, &model, (&covariance, &probability));
+    // Few residuals scatter by themselves.
+    let most = MOST_RESIDUAL + 3.0 / (2.0 * count.max(1.0)).sqrt();
+    found.verdict = if residual <= most { Verdict::Found } else { Verdict::NotInLibrary };
     found.residual = residual;
     found.noise = data.sigma.clone();
     found.noise_resolved = data.resolved;
@@ -514,7 +532,7 @@ fn shorten(
         let m = model.terms.len();
         let blocks = search.motion.blocks(model, &model.terms, segments);
         let mut sum = total(&blocks, &|_| 1.0);
-        let inflation = (sum.square / sum.count.max(1.0)).max(1.0);
+        let inflation = sum.inflation;
         if !search.driven {
             search.motion.pin(model, &model.terms, segments, &mut sum);
         }
@@ -568,7 +586,7 @@ fn covariance(search: &Search<'_>, model: &Model, segments: &[Segment]) -> Vec<f
     if !search.driven {
         search.motion.pin(model, &model.terms, segments, &mut sum);
     }
-    let inflation = sum.square / sum.count.max(1.0);
+    let inflation = sum.inflation;
     let all: Vec<usize> = (0..m).collect();
     let inverse = inverse_with(m, &part(m, &sum.matrix, &all), RIDGE).unwrap_or(vec![f64::NAN; m * m]);
     inverse.into_iter().map(|x| x * inflation).collect()

@@ -79,7 +79,13 @@ pub struct FoundFormula {
 }
 
 impl FoundFormula {
-    pub(super) fn new(library: &Library, periodic: &[bool], model: &Model, covariance: Vec<f64>) -> Self {
+    /// The formula of a model of a library, with the covariance of its coefficients and the probabilities of its terms.
+    pub(super) fn new(
+        library: &Library,
+        periodic: &[bool],
+        model: &Model,
+        (covariance, probabilities): (&[f64], &[f64]),
+    ) -> Self {
         let m = model.terms.len();
         let terms = model.terms.iter().zip(&model.coefficients).enumerate();
         let mut order: Vec<(usize, FoundTerm)> = terms
@@ -88,7 +94,7 @@ impl FoundFormula {
                     term: library.text(k),
                     coefficient,
                     standard_error: covariance[at * m + at].max(0.0).sqrt(),
-                    probability: 1.0,
+                    probability: probabilities[at].clamp(0.0, 1.0),
                     dissipation: library.is_dissipation(k),
                     near: None,
                     latex: library.latex(k),
@@ -99,7 +105,7 @@ impl FoundFormula {
             .collect();
         // Kinetic terms first, then potential ones, then the dissipation.
         let rank = |at: usize| (library.is_dissipation(model.terms[at]), library.kinetic(model.terms[at]).is_none());
-        order.sort_by_key(|(at, term)| (rank(*at), term.term.len()));
+        order.sort_by_key(|(at, term)| (rank(*at), term.term.len(), term.term.clone()));
         let covariance = order
             .iter()
             .flat_map(|(i, _)| order.iter().map(|(j, _)| covariance[i * m + j]).collect::<Vec<_>>())
@@ -122,15 +128,6 @@ impl FoundFormula {
         found
     }
 
-    /// Gives terms their probabilities.
-    pub(super) fn set_probabilities(&mut self, by_term: &[(String, f64)]) {
-        for term in &mut self.terms {
-            if let Some((_, probability)) = by_term.iter().find(|(text, _)| *text == term.term) {
-                term.probability = *probability;
-            }
-        }
-    }
-
     /// Fixes the common factor: a term gets the coefficient that is given, or the first square of a velocity 1/2.
     pub(super) fn rescale(&mut self, scale: Option<&(String, f64)>) -> Result<(), FormulaError> {
         let plain = |text: &str| text.chars().filter(|c| !c.is_whitespace()).collect::<String>();
@@ -141,8 +138,9 @@ impl FoundFormula {
                 (at.ok_or_else(|| FormulaError::Scale { term: term.clone(), known: known() })?, *value)
             }
             None => {
-                let square = |t: &FoundTerm| self.coordinates.iter().any(|name| t.term == format!("{name}_dot^2"));
-                let first = self.terms.iter().position(square);
+                let square =
+                    |name: &String| self.terms.iter().position(|t| !t.dissipation && t.term == format!("{name}_dot^2"));
+                let first = self.coordinates.iter().find_map(square);
                 (first.or(self.terms.iter().position(|t| !t.dissipation)).unwrap_or(0), 0.5)
             }
         };

@@ -5,17 +5,17 @@
 //! the rank of the stacked equations at random states, never by hand. Of recorded motion [`formula_of_motion`] takes the weak form of the
 //! equations along smoothed positions, gives up terms one after the other with refits, and then follows the motion itself by the survivors:
 //! multiple shooting with Gauss and Newton's method, in which every term of the library is tried again, and which noise in the positions does
-//! not bias. Held-out trajectories say whether what is left is noise.
+//! not bias. Held-out trajectories say whether what is left is noise. Of models [`formula_of_model`] takes the equations at sampled states.
 //!
 //! ```
 //! use lnn::formula::{FormulaOptions, Verdict, formula_of_motion};
+//! use lnn::prelude::*;
 //! use lnn::recording::{RecordedTrajectory, Recording};
 //!
-//! // Swings of a pendulum with g / l = 4, as angles alone: cos(2 t) for small ones is what the formula must not take them for.
+//! // Swings of a pendulum with g / l = 4, as angles alone.
 //! let model = lnn::lagrangian::ExpressionLagrangian::new(&["a"], &[], "a_dot^2/2 + 4*cos(a)")?;
 //! let model = lnn::lagrangian::Mechanics::new(model, vec![]);
 //! let tracks = (0..8).map(|k| {
-//!     use lnn::rollout::Rollout;
 //!     let motion = model.rollout(&[0.5 + 0.3 * k as f64], &[0.0], 5.0, 0.05).unwrap();
 //!     RecordedTrajectory { name: format!("{k}"), times: motion.t, q: motion.q, v: vec![], a: vec![], force: vec![] }
 //! });
@@ -35,6 +35,7 @@ mod function;
 mod library;
 mod linear;
 mod motion;
+mod regress;
 mod select;
 mod wald;
 mod weak;
@@ -43,3 +44,4 @@ pub use error::FormulaError;
 pub use find::{FormulaOptions, formula_of_motion};
 pub use found::{FoundFormula, FoundTerm, Left, Verdict};
 pub use library::Families;
+pub use regress::formula_of_model;
