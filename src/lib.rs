@@ -161,6 +161,7 @@ mod support;
 #[doc(hidden)]
 pub use app::cli;
 #[cfg(feature = "training")]
+#[doc(hidden)]
 pub use app::experiments;
 #[cfg(feature = "pipeline")]
 pub use app::pipeline;
@@ -176,7 +177,9 @@ pub use mechanics::rollout;
 pub use mechanics::{lagrangian, network};
 #[doc(hidden)]
 pub use numerics::ops;
-pub use numerics::{forward, linalg, random, scalar, tape};
+#[doc(hidden)]
+pub use numerics::random;
+pub use numerics::{forward, linalg, scalar, tape};
 #[cfg(feature = "data")]
 pub use physics::constraints;
 #[cfg(feature = "training")]

@@ -86,30 +86,53 @@ mod time_steps;
 mod train;
 mod watch;
 
-pub use checkpoints::{Begin, Checkpoints};
+#[doc(hidden)]
+pub use checkpoints::Begin;
+pub use checkpoints::Checkpoints;
+#[doc(hidden)]
 pub use determination::Determined;
+#[doc(hidden)]
 pub use energy::Balance;
+#[doc(hidden)]
 pub use equivalence::Equivalence;
 pub use error::PipelineError;
-pub use evaluation::{Evaluation, EvaluationOptions, Motion, RTOL, evaluate};
+pub use evaluation::{Evaluation, EvaluationOptions, evaluate};
+#[doc(hidden)]
+pub use evaluation::{Motion, RTOL};
 pub(crate) use experiment::{KeptRecord, kept_record};
+#[doc(hidden)]
 pub use experiment::{finish_runs, merge_experiment, run_experiment};
+#[doc(hidden)]
 pub use experiment_directory::ExperimentDirectory;
+#[doc(hidden)]
 pub use experiment_report::{ExperimentReport, Results};
+#[doc(hidden)]
 pub use file_names::MODEL;
 pub(crate) use file_names::{CAPTIONS, RECORD, SUMMARY};
-pub use fit::{FitReport, fit};
+pub use fit::FitReport;
+#[doc(hidden)]
+pub use fit::fit;
 pub use fit_builder::Fit;
+pub use fit_config::FitOptions;
 pub(crate) use fit_config::unit;
-pub use fit_config::{FitColumns, FitConfig, FitOptions, HELD_OUT};
-pub use hold_out::{CoordinatePredictions, HoldOut, HoldOutOptions, UsefulTime, evaluate_hold_out};
+#[doc(hidden)]
+pub use fit_config::{FitColumns, FitConfig, HELD_OUT};
+pub use hold_out::HoldOut;
+#[doc(hidden)]
+pub use hold_out::{CoordinatePredictions, HoldOutOptions, UsefulTime, evaluate_hold_out};
+#[doc(hidden)]
 pub use model::{model_file, trained_on};
 pub use output::{Directory, InMemory, Output};
+#[doc(hidden)]
 pub use physics::{ChargeDrift, CurvatureScalar, FoundSymmetries, Physics, ProvenSignature};
+#[doc(hidden)]
 pub use prepared_fit::PreparedFit;
+#[doc(hidden)]
 pub use start::StartModel;
 pub use train::{RunOptions, TrainFigures, TrainReport, train};
-pub use watch::{Event, EventSink, Watch};
+pub use watch::Watch;
+#[doc(hidden)]
+pub use watch::{Event, EventSink};
 
 pub(crate) use fit::usual_force;
 pub(crate) use model::all_parameters;

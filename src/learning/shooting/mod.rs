@@ -30,7 +30,9 @@ mod starts;
 
 #[doc(hidden)]
 pub use fit::resume;
-pub use fit::{Fitted, ShootingError, Task, fit};
+#[doc(hidden)]
+pub use fit::{Fitted, Task};
+pub use fit::{ShootingError, fit};
 #[doc(hidden)]
 pub use objective::{ShootingObjective, ShootingReport};
 #[doc(hidden)]

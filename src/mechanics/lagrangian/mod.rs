@@ -33,11 +33,11 @@ pub use configure::configure;
 #[doc(hidden)]
 pub use configure::{build, configure_system, configure_values};
 use constrained_systems::constrained_descriptions;
+#[doc(hidden)]
 pub use constrained_systems::constrained_systems;
-pub use constraints::{
-    Constrained, ConstraintError, Constraints, ExpressionConstraints, LeastNorm, LeastNormMotion, Manifold,
-    ManifoldRows, OffManifold, ReducedMass, project,
-};
+pub use constraints::{Constrained, ConstraintError, Constraints, ExpressionConstraints};
+#[doc(hidden)]
+pub use constraints::{LeastNorm, LeastNormMotion, Manifold, ManifoldRows, OffManifold, ReducedMass, project};
 pub(crate) use description::pair;
 pub use description::{Description, DescriptionError};
 pub use error::MechanicsError;
@@ -48,6 +48,7 @@ pub use expression_lagrangian::ExpressionLagrangian;
 pub use interruptible::Interruptible;
 #[cfg(feature = "cli")]
 pub(crate) use inverse::inverse_dynamics_by_rows;
+#[doc(hidden)]
 pub use inverse::{InverseDynamics, inverse_dynamics};
 pub use mechanics::Mechanics;
 #[doc(hidden)]
