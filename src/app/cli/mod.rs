@@ -22,6 +22,7 @@ mod fit_config;
 mod flags;
 mod folder;
 mod forces;
+mod formula;
 mod geometry;
 mod input;
 mod inspect;
@@ -129,6 +130,8 @@ enum Command {
     Page(page::Args),
     /// Find the symmetries of a Lagrangian and what its motion conserves.
     Symmetries(symmetries::Args),
+    /// Print the Lagrangian of recorded motion, or of a model, as a formula.
+    Formula(Box<formula::Args>),
     /// Say what two Lagrangians have in common beyond factor and gauge.
     Compare(compare::Args),
     /// Prove where the mass matrix has its signature, and a condition number below a bound.
@@ -186,6 +189,7 @@ fn run(command: Command) -> Result<(), CliError> {
         Command::Shadow(args) => shadow::run(&args),
         Command::Page(args) => page::run(&args),
         Command::Symmetries(args) => symmetries::run(&args),
+        Command::Formula(args) => formula::run(&args),
         Command::Compare(args) => compare::run(&args),
         Command::Certify(args) => certify::run(&args),
         Command::Completions(args) => manual::completions(&args, Cli::command()),

@@ -213,6 +213,11 @@ impl Probe {
         &self.columns[..self.model.coordinates()]
     }
 
+    /// Which coordinates are angles.
+    pub fn periodic(&self) -> &[bool] {
+        &self.periodic
+    }
+
     fn charts(&self) -> Vec<Chart> {
         let parts = self.periodic.iter().zip(&self.units).zip(&self.region.position);
         parts.map(|((periodic, unit), range)| Chart::of(*periodic, unit, *range)).collect()

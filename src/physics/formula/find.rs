@@ -10,7 +10,7 @@ use super::wald::{Equations, RIDGE, Survivors, survivors};
 use super::weak::{Stretch, Windows};
 use crate::random::RngStream;
 use crate::recording::Recording;
-use crate::recording::smooth::{SmoothOptions, Smoothed, Smoothing};
+use crate::recording::smooth::{SmoothOptions, Smoothed, Smoothing, noise};
 use rand::Rng;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -58,6 +58,8 @@ impl Default for FormulaOptions {
 const LEAST_NOISE: f64 = 1e-6;
 /// Samples in a row that are needed.
 const LEAST_SAMPLES: usize = 20;
+/// Samples from which on a trajectory may have a noise of its own.
+const LEAST_OWN: usize = 200;
 /// Trajectories from which on they are held out as a whole; fewer are cut into pieces.
 const WHOLE: usize = 5;
 /// Pieces of a trajectory otherwise.
@@ -72,6 +74,8 @@ const MOST_START: usize = 15;
 const START_ERROR: f64 = 1.3;
 /// Sum of squares in units of noise that a term must explain.
 const THRESHOLD: f64 = 30.0;
+/// Mean squared residual from which on it is more than noise.
+const MISFIT: f64 = 2.0;
 /// Held-out residual over noise up to which a formula is found.
 const MOST_RESIDUAL: f64 = 1.1;
 /// Samples that are followed at most.
@@ -86,6 +90,8 @@ struct Prepared<'a> {
     smoothed: Vec<Option<Smoothed>>,
     sigma: Vec<f64>,
     resolved: bool,
+    /// `false` if the user gave the noise.
+    estimated: bool,
     bounds: Vec<[f64; 2]>,
     speeds: Vec<f64>,
     /// Time in which the motion changes, in s.
@@ -138,7 +144,21 @@ impl<'a> Prepared<'a> {
         let resolved = smoothing.coordinates.iter().all(|c| c.noise.resolved);
         let speeds = speeds.into_iter().map(|s| if s > 0.0 { s } else { 1.0 }).collect();
         let sigma = sigma.collect();
-        Ok(Self { recording, smoothed, sigma, resolved, bounds, speeds, pace, n })
+        let estimated = options.noise.is_none();
+        Ok(Self { recording, smoothed, sigma, resolved, estimated, bounds, speeds, pace, n })
+    }
+
+    /// Noise of a trajectory: its own where it is plainly another than that of all together.
+    fn noise(&self, track: usize) -> Vec<f64> {
+        const OTHER: f64 = 1.25;
+        let track = &self.recording.tracks[track];
+        let own = |i: usize| noise(std::iter::once((track.times.as_slice(), track.q.as_slice())), self.n, i).sigma;
+        let chosen = |i: usize| {
+            let (own, usual) = (own(i), self.sigma[i]);
+            let other = self.estimated && track.len() >= LEAST_OWN && !(usual / OTHER..usual * OTHER).contains(&own);
+            if other { own.max(LEAST_NOISE * (self.bounds[i][1] - self.bounds[i][0])) } else { usual }
+        };
+        (0..self.n).map(chosen).collect()
     }
 
     /// The block of a sample.
@@ -215,6 +235,7 @@ impl<'a> Prepared<'a> {
                         times: track.times[from..to].to_vec(),
                         q: track.q[from * n..to * n].to_vec(),
                         force: if force.is_empty() { vec![] } else { force[from * n..to * n].to_vec() },
+                        sigma: self.noise(index),
                         start: [&smoothed.q[from * n..(from + 1) * n], &smoothed.v[from * n..(from + 1) * n]].concat(),
                     });
                 }
@@ -232,6 +253,8 @@ struct Search<'a> {
     motion: Motion<'a>,
     candidates: Vec<usize>,
     driven: bool,
+    /// Segments that are learned from.
+    segments: usize,
     /// States at which a mass matrix must be regular.
     states: Vec<Values>,
 }
@@ -266,7 +289,7 @@ impl Search<'_> {
         });
         let mut ratios: Vec<f64> = ratios.collect();
         ratios.sort_by(f64::total_cmp);
-        ratios.get(ratios.len() / 4).is_none_or(|ratio| *ratio > 1e-3)
+        ratios.get(ratios.len() / 4).is_none_or(|ratio| *ratio > 0.05)
     }
 
     fn equations(&self, model: &Model, segments: &[Segment], sum: &mut BlockSum) {
@@ -279,7 +302,11 @@ impl Search<'_> {
         let coefficients = self.model_over_candidates(model);
         let equations = Equations { matrix: &sum.matrix, right: &sum.right, coefficients: &coefficients, complexity };
         // What the model cannot explain counts as noise.
-        let inflation = (sum.square / sum.count.max(1.0)).max(1.0);
+        let mut inflation = (sum.square / sum.count.max(1.0)).max(1.0);
+        if inflation > MISFIT {
+            // It is alike all along a segment, where noise is another at every sample.
+            inflation *= (sum.count / (self.segments * self.library.n()) as f64).max(1.0);
+        }
         survivors(&equations, THRESHOLD * inflation, &|x| self.regular(model, x))
     }
 
@@ -369,7 +396,7 @@ pub fn formula_of_motion(recording: &Recording, options: &FormulaOptions) -> Res
     let mut candidates: Vec<usize> = path.order.iter().take(MOST_CANDIDATES).map(|&k| kept[k]).collect();
     candidates.extend(model.terms.iter().filter(|k| !candidates.contains(k)).copied().collect::<Vec<_>>());
     candidates.sort_unstable();
-    let motion = Motion { library: &library, sigma: data.sigma.clone(), substeps: 1, threads: options.threads };
+    let motion = Motion { library: &library, substeps: 1, threads: options.threads };
     let short = data.segments(2.5 * data.pace);
     let (mut judges, mut learned): (Vec<Segment>, Vec<Segment>) =
         short.into_iter().partition(|s| held.contains(&s.block));
@@ -379,7 +406,8 @@ pub fn formula_of_motion(recording: &Recording, options: &FormulaOptions) -> Res
         library.evaluate(&all, &s.start[..data.n], &mut values);
         values
     });
-    let mut search = Search { library: &library, motion, candidates, driven, states: states.collect() };
+    let mut search =
+        Search { library: &library, motion, candidates, driven, segments: learned.len(), states: states.collect() };
     search.motion.settle(&model, &mut learned, 4);
     search.motion.choose_steps(&model, &learned);
     search.converge(&mut model, &mut learned, ROUNDS);
@@ -387,6 +415,7 @@ pub fn formula_of_motion(recording: &Recording, options: &FormulaOptions) -> Res
     let before = (model.clone(), learned.clone());
     let short = search.motion.settle(&model, &mut learned, 1);
     let mut learned = joined(learned);
+    search.segments = learned.len();
     search.motion.choose_steps(&model, &learned);
     let mut blocks = search.converge(&mut model, &mut learned, 3);
     let long = search.motion.settle(&model, &mut learned, 1);
@@ -407,9 +436,8 @@ pub fn formula_of_motion(recording: &Recording, options: &FormulaOptions) -> Res
         Some(replaced) => replaced.iter().map(|r| probabilities.get(r).copied().unwrap_or(0.0)).fold(1.0, f64::min),
         None => probabilities.get(&k).copied().unwrap_or(1.0),
     };
-    let probability: Vec<(String, f64)> = model.terms.iter().map(|&k| (library.text(k), probability(k))).collect();
-    let mut found = FoundFormula::new(&library, &recording.periodic, &model, covariance);
-    found.set_probabilities(&probability);
+    let probability: Vec<f64> = model.terms.iter().map(|&k| probability(k)).collect();
+    let mut found = FoundFormula::new(&library, &recording.periodic, &model, (&covariance, &probability));
     found.verdict = if residual <= MOST_RESIDUAL { Verdict::Found } else { Verdict::NotInLibrary };
     found.residual = residual;
     found.noise = data.sigma.clone();

@@ -79,7 +79,13 @@ pub struct FoundFormula {
 }
 
 impl FoundFormula {
-    pub(super) fn new(library: &Library, periodic: &[bool], model: &Model, covariance: Vec<f64>) -> Self {
+    /// The formula of a model of a library, with the covariance of its coefficients and the probabilities of its terms.
+    pub(super) fn new(
+        library: &Library,
+        periodic: &[bool],
+        model: &Model,
+        (covariance, probabilities): (&[f64], &[f64]),
+    ) -> Self {
         let m = model.terms.len();
         let terms = model.terms.iter().zip(&model.coefficients).enumerate();
         let mut order: Vec<(usize, FoundTerm)> = terms
@@ -88,7 +94,7 @@ impl FoundFormula {
                     term: library.text(k),
                     coefficient,
                     standard_error: covariance[at * m + at].max(0.0).sqrt(),
-                    probability: 1.0,
+                    probability: probabilities[at].clamp(0.0, 1.0),
                     dissipation: library.is_dissipation(k),
                     near: None,
                     latex: library.latex(k),
@@ -120,15 +126,6 @@ impl FoundFormula {
         };
         found.name_fractions();
         found
-    }
-
-    /// Gives terms their probabilities.
-    pub(super) fn set_probabilities(&mut self, by_term: &[(String, f64)]) {
-        for term in &mut self.terms {
-            if let Some((_, probability)) = by_term.iter().find(|(text, _)| *text == term.term) {
-                term.probability = *probability;
-            }
-        }
     }
 
     /// Fixes the common factor: a term gets the coefficient that is given, or the first square of a velocity 1/2.

@@ -5,7 +5,7 @@
 //! the rank of the stacked equations at random states, never by hand. Of recorded motion [`formula_of_motion`] takes the weak form of the
 //! equations along smoothed positions, gives up terms one after the other with refits, and then follows the motion itself by the survivors:
 //! multiple shooting with Gauss and Newton's method, in which every term of the library is tried again, and which noise in the positions does
-//! not bias. Held-out trajectories say whether what is left is noise.
+//! not bias. Held-out trajectories say whether what is left is noise. Of models [`formula_of_model`] takes the equations at sampled states.
 //!
 //! ```
 //! use lnn::formula::{FormulaOptions, Verdict, formula_of_motion};
@@ -35,6 +35,7 @@ mod function;
 mod library;
 mod linear;
 mod motion;
+mod regress;
 mod select;
 mod wald;
 mod weak;
@@ -43,3 +44,4 @@ pub use error::FormulaError;
 pub use find::{FormulaOptions, formula_of_motion};
 pub use found::{FoundFormula, FoundTerm, Left, Verdict};
 pub use library::Families;
+pub use regress::formula_of_model;

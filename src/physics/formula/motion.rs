@@ -20,6 +20,8 @@ pub(super) struct Segment {
     pub q: Vec<f64>,
     /// Known forces, `(samples, n)`, or empty.
     pub force: Vec<f64>,
+    /// Standard deviation of every coordinate's noise.
+    pub sigma: Vec<f64>,
     /// Positions and velocities at the first sample.
     pub start: Vec<f64>,
 }
@@ -35,8 +37,6 @@ pub(super) struct Model {
 #[derive(Clone, Debug)]
 pub(super) struct Motion<'a> {
     pub library: &'a Library,
-    /// Standard deviation of every coordinate's noise.
-    pub sigma: Vec<f64>,
     /// Integration steps from sample to sample.
     pub substeps: usize,
     pub threads: usize,
@@ -345,13 +345,14 @@ impl Motion<'_> {
         let mut lost = false;
         let fine = self.follow(follower, segment, |sample, q, derivatives| {
             for i in 0..n {
-                let residual = (segment.q[sample * n + i] - q[i]) / self.sigma[i];
+                let sigma = segment.sigma[i];
+                let residual = (segment.q[sample * n + i] - q[i]) / sigma;
                 lost |= !residual.is_finite();
                 let weight = (HUBER / residual.abs()).min(1.0);
                 square += weight * residual * residual;
                 let row = &derivatives[i * columns..(i + 1) * columns];
-                let scale = 1.0 / (self.sigma[i] * self.sigma[i]) * weight;
-                let pull = weight * residual / self.sigma[i];
+                let scale = weight / (sigma * sigma);
+                let pull = weight * residual / sigma;
                 for a in 0..columns {
                     let x = scale * row[a];
                     right[a] += pull * row[a];
@@ -421,7 +422,7 @@ impl Motion<'_> {
             for (segment, found) in part.iter().zip(self.all(model, wanted, part)) {
                 let sum = blocks.entry(segment.block).or_insert_with(|| BlockSum::empty(m));
                 let Some(linear) = found else {
-                    let count = (segment.times.len() * self.sigma.len()) as f64;
+                    let count = (segment.times.len() * self.library.n()) as f64;
                     sum.failed += 1;
                     sum.square += FAILED * count;
                     sum.count += count;
@@ -438,7 +439,57 @@ impl Motion<'_> {
 
     /// Moves the starts alone, so that a model meets the data as well as it can; the sum of squares and the count of residuals.
     pub fn settle(&self, model: &Model, segments: &mut [Segment], iterations: usize) -> (f64, f64) {
-        self.improve(&mut model.clone(), segments, iterations, Freedom::Starts)
+        self.improve(&mut model.clone(), segments, iterations, Freedom::Starts);
+        self.rescue(model, segments);
+        let squares = self.squares(model, segments);
+        squares.iter().fold((0.0, 0.0), |(square, count), (s, c)| (square + s, count + c))
+    }
+
+    /// Sum of squares and count of residuals of every segment.
+    fn squares(&self, model: &Model, segments: &[Segment]) -> Vec<(f64, f64)> {
+        let found = self.all(model, &[], segments);
+        let of = |(found, segment): (&Option<Linear>, &Segment)| {
+            let size = (segment.times.len() * self.library.n()) as f64;
+            found.as_ref().map_or((FAILED * size, size), |linear| (linear.square, linear.count))
+        };
+        found.iter().zip(segments).map(of).collect()
+    }
+
+    /// Settles segments anew that are met badly: their first part, then more and more of them, as long as that meets them better.
+    fn rescue(&self, model: &Model, segments: &mut [Segment]) {
+        const BAD: f64 = 3.0;
+        let before = self.squares(model, segments);
+        let mut means: Vec<f64> = before.iter().map(|(s, c)| s / c.max(1.0)).collect();
+        means.sort_by(f64::total_cmp);
+        let usual = means.get(means.len() / 2).copied().unwrap_or(1.0);
+        let bad: Vec<usize> =
+            (0..segments.len()).filter(|&k| before[k].0 > BAD * usual.max(1.0) * before[k].1.max(1.0)).collect();
+        if bad.is_empty() || bad.len() > segments.len() / 3 {
+            return;
+        }
+        let mut tried: Vec<Segment> = bad.iter().map(|&k| segments[k].clone()).collect();
+        let n = self.library.n();
+        for share in [0.35, 0.65, 1.0] {
+            let mut parts: Vec<Segment> = tried
+                .iter()
+                .map(|whole| {
+                    let samples = ((whole.times.len() as f64 * share) as usize).max(2 * n + 2).min(whole.times.len());
+                    let mut part = whole.clone();
+                    part.times.truncate(samples);
+                    part.q.truncate(samples * n);
+                    part.force.truncate(samples * n);
+                    part
+                })
+                .collect();
+            self.improve(&mut model.clone(), &mut parts, 6, Freedom::Starts);
+            tried.iter_mut().zip(parts).for_each(|(whole, part)| whole.start = part.start);
+        }
+        let after = self.squares(model, &tried);
+        for ((&k, segment), (square, _)) in bad.iter().zip(tried).zip(after) {
+            if square < before[k].0 {
+                segments[k].start = segment.start;
+            }
+        }
     }
 
     /// Fits the coefficients and the starts; the sum of squares and the count of residuals.
@@ -448,7 +499,7 @@ impl Motion<'_> {
     }
 
     fn improve(&self, model: &mut Model, segments: &mut [Segment], iterations: usize, freedom: Freedom) -> (f64, f64) {
-        let n = self.sigma.len();
+        let n = self.library.n();
         let wanted = if freedom == Freedom::Starts { vec![] } else { model.terms.clone() };
         let m = wanted.len();
         let mut best: Option<Best> = None;
@@ -532,7 +583,7 @@ impl Motion<'_> {
 
     /// Mean size of the mass matrix of wanted terms relative to the model's, over the starts of segments: 1 for the model itself.
     pub fn sizes(&self, model: &Model, wanted: &[usize], segments: &[Segment]) -> Vec<f64> {
-        let n = self.sigma.len();
+        let n = self.library.n();
         let mut sizes = vec![0.0; wanted.len()];
         let mut follower = Follower::new(self.library, model, wanted);
         let mut a = vec![0.0; n];
@@ -584,12 +635,12 @@ impl Motion<'_> {
 
     /// Residuals of every sample in units of noise, `(samples, n)`; `None` for segments that cannot be followed.
     pub fn residuals(&self, model: &Model, segments: &[Segment]) -> Vec<Option<Vec<f64>>> {
-        let n = self.sigma.len();
+        let n = self.library.n();
         let mut follower = Follower::new(self.library, model, &[]);
         let of = |segment: &Segment| {
             let mut all = Vec::with_capacity(segment.q.len());
             let fine = self.follow(&mut follower, segment, |sample, q, _| {
-                all.extend((0..n).map(|i| (segment.q[sample * n + i] - q[i]) / self.sigma[i]));
+                all.extend((0..n).map(|i| (segment.q[sample * n + i] - q[i]) / segment.sigma[i]));
             });
             (fine && all.iter().all(|r| r.is_finite())).then_some(all)
         };
@@ -603,9 +654,9 @@ impl Motion<'_> {
         let ends = |motion: &Self| {
             let mut follower = Follower::new(motion.library, model, &[]);
             let of = |segment: &&Segment| {
-                let mut end = vec![f64::NAN; motion.sigma.len()];
+                let mut end = vec![f64::NAN; motion.library.n()];
                 let fine = motion.follow(&mut follower, segment, |_, q, _| end.copy_from_slice(q));
-                if fine { end } else { vec![f64::NAN; motion.sigma.len()] }
+                if fine { end } else { vec![f64::NAN; motion.library.n()] }
             };
             probes.iter().map(of).collect::<Vec<_>>()
         };
@@ -613,10 +664,9 @@ impl Motion<'_> {
         while self.substeps < 16 {
             let finer = Self { substeps: 2 * self.substeps, ..self.clone() };
             let fine = ends(&finer);
-            let mut errors: Vec<f64> = coarse
-                .iter()
-                .zip(&fine)
-                .flat_map(|(a, b)| a.iter().zip(b).zip(&self.sigma).map(|((a, b), s)| ((a - b) / s).abs()))
+            let pairs = coarse.iter().zip(&fine).zip(&probes);
+            let mut errors: Vec<f64> = pairs
+                .flat_map(|((a, b), probe)| a.iter().zip(b).zip(&probe.sigma).map(|((a, b), s)| ((a - b) / s).abs()))
                 .filter(|e| e.is_finite())
                 .collect();
             errors.sort_by(f64::total_cmp);

@@ -55,14 +55,14 @@ fn solve(normal: &Normal, driven: bool) -> Option<(Vec<f64>, Vec<f64>)> {
 }
 
 impl Normal {
-    fn of(&self, places: &[usize]) -> Self {
+    pub fn of(&self, places: &[usize]) -> Self {
         let m = self.size.len();
         let pick = |list: &[f64]| places.iter().map(|&k| list[k]).collect();
         Self { matrix: part(m, &self.matrix, places), right: pick(&self.right), size: pick(&self.size) }
     }
 
     /// What giving up each term costs to first order.
-    fn costs(&self, driven: bool) -> Option<Vec<f64>> {
+    pub fn costs(&self, driven: bool) -> Option<Vec<f64>> {
         let m = self.size.len();
         let inverse = inverse(m, &self.matrix)?;
         if driven {

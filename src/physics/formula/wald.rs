@@ -37,7 +37,11 @@ pub(super) fn survivors(
     let Equations { matrix, right, coefficients, complexity } = *equations;
     let m = right.len();
     let mut inverse = inverse_with(m, matrix, RIDGE)?;
-    let aim: Vec<f64> = times(m, matrix, coefficients).iter().zip(right).map(|(a, b)| a + b).collect();
+    // Where the motion shows nothing the coefficients stay what they are.
+    let mut aim = times(m, matrix, coefficients);
+    for k in 0..m {
+        aim[k] += right[k] + RIDGE * matrix[k * m + k] * coefficients[k];
+    }
     let mut x = times(m, &inverse, &aim);
     let mut set: Vec<usize> = (0..m).collect();
     let mut refused: Vec<usize> = Vec::new();

@@ -16,6 +16,14 @@ pub(super) struct Stretch<'a> {
     pub block: usize,
 }
 
+/// A state with an acceleration, and what the equations of motion come to there: `(n)` each.
+pub(super) struct State {
+    pub q: Vec<f64>,
+    pub v: Vec<f64>,
+    pub a: Vec<f64>,
+    pub equation: Vec<f64>,
+}
+
 /// The weak form of all terms over many test functions.
 pub(super) struct Windows {
     pub n: usize,
@@ -138,6 +146,29 @@ impl Windows {
             self.blocks.push(stretch.block);
             centre += apart;
         }
+    }
+
+    /// The equations themselves at single states, in the place of windows; each state is a block.
+    pub fn of_states(library: &Library, terms: &[usize], states: &[State]) -> Self {
+        let mut windows = Self::new(library, terms, &[], 1.0);
+        let (n, count) = (windows.n, windows.terms);
+        let which = library.functions_of(terms);
+        let mut values = Values::new();
+        let mut single = vec![0.0; n];
+        for (block, State { q, v, a, equation }) in states.iter().enumerate() {
+            library.evaluate(&which, q, &mut values);
+            let start = windows.equations.len();
+            windows.equations.resize(start + n * count, 0.0);
+            for (at, &k) in terms.iter().enumerate() {
+                single.fill(0.0);
+                library.add_equation(k, 1.0, &values, (v, a), &mut single);
+                (0..n).for_each(|i| windows.equations[start + i * count + at] = single[i]);
+            }
+            windows.functions.extend(which.iter().map(|&f| values[f].value));
+            windows.forces.extend(equation);
+            windows.blocks.push(block);
+        }
+        windows
     }
 
     /// Number of windows.

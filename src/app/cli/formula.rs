@@ -1,0 +1,270 @@
+//! `lnn formula`: the Lagrangian of recorded motion, or of a model, as a formula.
+
+use crate::cli::number::{finite, positive, seed, thread_count, threads, whole};
+use crate::cli::probe::Probe;
+use crate::cli::recording_args::RecordingArgs;
+use crate::cli::{CliError, output};
+use crate::formula::{
+    Families, FormulaError, FormulaOptions, FoundFormula, Verdict, formula_of_model, formula_of_motion,
+};
+use crate::names::rounded;
+use crate::report::text_table;
+use crate::storage::{check_target, write_atomically};
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+
+/// Resamplings at most.
+const MOST_BOOTSTRAPS: usize = 10_000;
+/// States at which a model is asked.
+const STATES: usize = 1500;
+
+/// Arguments.
+#[derive(Clone, Debug, clap::Args)]
+#[command(mut_args(motion_or_model))]
+pub struct Args {
+    #[command(flatten)]
+    recording: RecordingArgs,
+    /// Functions that terms are made of, by family and total degree: polynomial, trigonometric (of sums and differences of
+    /// angles too), radial, reciprocal.
+    #[arg(long, value_name = "FAMILY:DEGREE,..", default_value = "polynomial:2,trigonometric:2", value_parser = families)]
+    basis: Families,
+    /// A function of the coordinates beside them, such as exp(-x); may be repeated.
+    #[arg(long, value_name = "FORMULA", allow_hyphen_values = true)]
+    function: Vec<String>,
+    /// Leave terms out that are linear in the velocities, those of magnetic fields and turning frames.
+    #[arg(long)]
+    no_gyroscopic: bool,
+    /// Look for a Rayleigh dissipation function of the velocities beside L.
+    #[arg(long)]
+    friction: bool,
+    /// Standard deviation of the noise of every coordinate, in SI units [default: estimated].
+    #[arg(long, value_name = "S1,S2,..", value_delimiter = ',', allow_hyphen_values = true, value_parser = positive)]
+    noise: Option<Vec<f64>>,
+    /// Term and coefficient that fix the common factor, such as "x_dot^2=0.5" [default: the first square of a velocity, 1/2;
+    /// the forces where they are known].
+    #[arg(long, value_name = "TERM=VALUE", value_parser = scale)]
+    scale: Option<(String, f64)>,
+    /// Resamplings of the trajectories that give every term a probability, 10000 at most.
+    #[arg(long, value_name = "N", default_value = "40", value_parser = whole(1, MOST_BOOTSTRAPS))]
+    bootstraps: usize,
+    /// Seed of held-out trajectories, resamplings and states.
+    #[arg(long, value_name = "N", default_value = "0", value_parser = seed)]
+    seed: u64,
+    /// Threads; the result does not depend on them [default: all].
+    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = thread_count)]
+    threads: Option<usize>,
+    /// Form of the formula on standard output.
+    #[arg(long, value_enum, value_name = "FORMAT", default_value = "text")]
+    format: Format,
+    /// One JSON object instead.
+    #[arg(long, conflicts_with = "format")]
+    json: bool,
+    /// Write the formula as a system file that trains, rolls out and certifies, its constants as parameters.
+    #[arg(long, value_name = "FILE.toml")]
+    out: Option<PathBuf>,
+    /// Name of the system in the file.
+    #[arg(long, value_name = "NAME", default_value = "formula", value_parser = system_name)]
+    name: String,
+}
+
+/// Form of a formula.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Format {
+    /// The formula, and a table of its terms.
+    Text,
+    /// A system file.
+    Toml,
+    /// LaTeX.
+    Latex,
+    /// A Rust type with this Lagrangian.
+    Rust,
+}
+
+/// Columns are those of motion: a model has its own.
+fn motion_or_model(argument: clap::Arg) -> clap::Arg {
+    match argument.get_id().as_str() {
+        "data" => argument.value_name("DATA|MODEL").help(
+            "Files of recorded motion: CSV, NPY or NPZ, one of them - for standard input; or one model, a file or the directory of a run",
+        ),
+        "coords" => argument.required(false),
+        _ => argument,
+    }
+}
+
+fn families(text: &str) -> Result<Families, String> {
+    text.parse()
+}
+
+fn scale(text: &str) -> Result<(String, f64), String> {
+    let wrong = || "expected TERM=VALUE, such as x_dot^2=0.5".to_string();
+    let (term, value) = text.rsplit_once('=').ok_or_else(wrong)?;
+    let value = finite(value).ok().filter(|value| *value != 0.0).ok_or_else(wrong)?;
+    Ok((term.trim().to_string(), value))
+}
+
+fn system_name(text: &str) -> Result<String, String> {
+    let known = |c: char| c.is_ascii_alphanumeric() || "-_".contains(c);
+    if !text.is_empty() && text.len() <= 64 && text.chars().all(known) {
+        Ok(text.to_string())
+    } else {
+        Err("expected 1 to 64 letters, digits, - and _".to_string())
+    }
+}
+
+/// The formula as JSON.
+#[derive(Serialize)]
+struct Json<'a> {
+    verdict: Verdict,
+    lagrangian: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    dissipation: Option<String>,
+    terms: &'a [crate::formula::FoundTerm],
+    residual: f64,
+    noise: &'a [f64],
+    noise_resolved: bool,
+    searched: usize,
+    removed: usize,
+    left: &'a [crate::formula::Left],
+    seed: u64,
+}
+
+impl Args {
+    fn options(&self) -> FormulaOptions {
+        FormulaOptions {
+            families: self.basis,
+            functions: self.function.clone(),
+            gyroscopic: !self.no_gyroscopic,
+            friction: self.friction,
+            noise: self.noise.clone(),
+            scale: self.scale.clone(),
+            bootstraps: self.bootstraps,
+            seed: self.seed,
+            threads: threads(self.threads),
+        }
+    }
+}
+
+/// Finds a formula and prints it.
+///
+/// # Errors
+/// A usage error for contradicting arguments, a data error for files that cannot be used.
+pub fn run(args: &Args) -> Result<(), CliError> {
+    if let Some(out) = &args.out {
+        if !out.extension().is_some_and(|end| end == "toml") {
+            return Err(CliError::usage(format_args!("--out {}: expected a name that ends in .toml", out.display())));
+        }
+        check_target(out).map_err(|e| CliError::file(out, format_args!("cannot write: {e}")))?;
+    }
+    let (found, of_model) = match args.recording.data.as_slice() {
+        [path] if is_model(path) => (of_model(args, path)?, true),
+        _ => (of_motion(args)?, false),
+    };
+    if let Some(out) = &args.out {
+        let text = found.system_file(&args.name);
+        write_atomically(out, text.as_bytes()).map_err(|e| CliError::file(out, e))?;
+    }
+    if args.json {
+        let json = Json {
+            verdict: found.verdict,
+            lagrangian: found.text(false),
+            dissipation: args.friction.then(|| found.text(true)),
+            terms: &found.terms,
+            residual: found.residual,
+            noise: &found.noise,
+            noise_resolved: found.noise_resolved,
+            searched: found.searched.0,
+            removed: found.searched.1,
+            left: &found.left,
+            seed: args.seed,
+        };
+        return output::print(&(serde_json::to_string(&json).map_err(CliError::data)? + "\n"));
+    }
+    output::print(&match args.format {
+        Format::Text => text(&found, args.friction, of_model),
+        Format::Toml => found.system_file(&args.name),
+        Format::Latex => {
+            let friction = if args.friction { format!("D = {}\n", found.latex(true)) } else { String::new() };
+            format!("L = {}\n{friction}", found.latex(false))
+        }
+        Format::Rust => found.rust(),
+    })
+}
+
+/// `true` for a directory, and for a file of a model.
+fn is_model(path: &Path) -> bool {
+    path.is_dir() || path.extension().is_some_and(|end| end == "safetensors")
+}
+
+fn of_motion(args: &Args) -> Result<FoundFormula, CliError> {
+    if args.recording.coords.is_empty() {
+        return Err(CliError::usage("--coords: expected the columns of the coordinates of recorded motion"));
+    }
+    let reading = args.recording.read()?;
+    let n = reading.recording.coordinates.len();
+    if let Some(noise) = args.noise.as_ref().filter(|noise| noise.len() != n) {
+        return Err(CliError::usage(format_args!("--noise: expected {n} numbers, found {}", noise.len())));
+    }
+    formula_of_motion(&reading.recording, &args.options()).map_err(refused)
+}
+
+fn of_model(args: &Args, path: &Path) -> Result<FoundFormula, CliError> {
+    let columns = [
+        ("--coords", args.recording.coords.is_empty()),
+        ("--noise", args.noise.is_none()),
+        ("--trajectory", args.recording.trajectory.is_none()),
+    ];
+    if let Some((option, _)) = columns.iter().find(|(_, unused)| !unused) {
+        return Err(CliError::usage(format_args!("{option} is about recorded motion, {} is a model", path.display())));
+    }
+    let probe = Probe::model(path)?;
+    let (q, v) = probe.states(STATES, args.seed)?;
+    let chart = (probe.coordinates(), probe.periodic());
+    formula_of_model(probe.model.as_ref(), chart, (&q, &v), &args.options()).map_err(refused)
+}
+
+/// What the user chose, or what the data are.
+fn refused(error: FormulaError) -> CliError {
+    match &error {
+        FormulaError::Terms { .. } => CliError::usage(format_args!("--basis: {error}")),
+        FormulaError::Function { .. } => CliError::usage(format_args!("--function: {error}")),
+        FormulaError::Scale { .. } => CliError::usage(format_args!("--{error}")),
+        _ => CliError::data(error),
+    }
+}
+
+fn text(found: &FoundFormula, friction: bool, of_model: bool) -> String {
+    let verdict = match found.verdict {
+        Verdict::Found => "found",
+        Verdict::NotInLibrary => "not in the library",
+    };
+    let (searched, removed) = found.searched;
+    let residual = rounded(found.residual, 4);
+    let mut text = if of_model {
+        format!("{verdict}: accelerations differ from the model's by {residual} of their size\n")
+    } else {
+        let bound = if found.noise_resolved { "" } else { ", which is at most what was assumed" };
+        format!("{verdict}: the residual of held-out motion is {residual} times its noise{bound}\n")
+    };
+    text += &format!("{searched} terms searched, {removed} of them total derivatives or sums of others\n\n");
+    text += &format!("L = {}\n", found.text(false));
+    if friction {
+        text += &format!("D = {}\n", found.text(true));
+    }
+    let rows = found.terms.iter().map(|t| {
+        let range = [-1.96, 1.96].map(|k| rounded(t.coefficient + k * t.standard_error, 6)).join(" .. ");
+        let name = if t.dissipation { format!("D: {}", t.term) } else { t.term.clone() };
+        let numbers = [rounded(t.coefficient, 6), rounded(t.standard_error, 2), range, format!("{:.2}", t.probability)];
+        [vec![name], numbers.to_vec(), vec![t.near.clone().unwrap_or_default()]].concat()
+    });
+    let headers = ["term", "coefficient", "error", "95 % range", "probability", "near"];
+    text += &format!("\n{}", text_table(&headers, &rows.collect::<Vec<_>>()));
+    if found.verdict == Verdict::NotInLibrary && !found.left.is_empty() {
+        let rows = found.left.iter().map(|left| {
+            let name = found.coordinates[left.coordinate].clone();
+            vec![name, rounded(left.low, 4), rounded(left.high, 4), rounded(left.residual, 4), left.samples.to_string()]
+        });
+        let headers = ["coordinate", "from", "to", "residual over noise", "samples"];
+        text += &format!("\nwhat is left:\n{}", text_table(&headers, &rows.collect::<Vec<_>>()));
+    }
+    text
+}

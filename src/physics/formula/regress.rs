@@ -1,0 +1,161 @@
+//! From a Lagrangian that can be evaluated, learned or written down, to a formula.
+
+use super::error::FormulaError;
+use super::find::FormulaOptions;
+use super::found::{FoundFormula, Verdict};
+use super::library::{Extent, Library};
+use super::linear::{inverse_with, times};
+use super::motion::Model;
+use super::select::{Choice, Path, eliminate_backward};
+use super::wald::RIDGE;
+use super::weak::{State, Windows};
+use crate::lagrangian::{EulerLagrange, Request, Terms};
+use crate::random::RngStream;
+use rand::Rng;
+
+/// Relative error of accelerations up to which a formula is that of a model.
+const MOST_RESIDUAL: f64 = 0.02;
+/// States at which a model is asked, at most.
+const MOST_STATES: usize = 3000;
+/// One state of so many judges alone.
+const HELD_OUT: usize = 5;
+/// Mean squared error over the least one up to which a choice of terms may be the formula.
+const NEAR: f64 = 100.0;
+
+/// Looks for a formula of a model by its equations of motion at states `(states, n)`: `M (a - a(q, v))` at drawn accelerations `a`.
+///
+/// Everything that moves by a Lagrangian is asked in the same way: models of a structure, black boxes, systems. Total derivatives do
+/// nothing to the equations, so that neither model nor formula needs a gauge.
+///
+/// # Errors
+/// [`FormulaError`] for a model whose terms are not finite, for a library that is too large, and for functions and terms that are none.
+pub fn formula_of_model(
+    model: &dyn EulerLagrange<f64>,
+    (names, periodic): (&[String], &[bool]),
+    (q, v): (&[f64], &[f64]),
+    options: &FormulaOptions,
+) -> Result<FoundFormula, FormulaError> {
+    let extent = Extent { families: options.families, gyroscopic: options.gyroscopic, friction: options.friction };
+    let library = Library::new(names, periodic, extent, &options.functions)?;
+    let n = library.n();
+    let mut rng = RngStream::Region.generator(options.seed);
+    let mut terms = Terms::default();
+    let mut known: Vec<(Vec<f64>, Vec<f64>, Vec<f64>, Vec<f64>)> = Vec::new();
+    let rows = || q.chunks_exact(n).zip(v.chunks_exact(n)).take(MOST_STATES);
+    for (q, v) in rows() {
+        let fine = model.terms(q, v, Request::MASS_MATRIX | Request::ACCELERATION, &mut terms).is_ok();
+        if fine && terms.acceleration.iter().chain(&terms.mass_matrix).all(|x| x.is_finite()) {
+            known.push((q.to_vec(), v.to_vec(), terms.mass_matrix.clone(), terms.acceleration.clone()));
+        }
+    }
+    let (states, failed) = (rows().count(), rows().count() - known.len());
+    if known.len() < 20 || 2 * failed > states {
+        return Err(FormulaError::NotFinite { failed, states });
+    }
+    let scale = |of: &dyn Fn(usize) -> f64| (known.len() as f64 / (0..known.len()).map(of).sum::<f64>()).sqrt().recip();
+    let sigma: Vec<f64> = (0..n).map(|i| scale(&|s| known[s].3[i].powi(2)).max(1e-9)).collect();
+    let speeds: Vec<f64> = (0..n).map(|i| scale(&|s| known[s].1[i].powi(2)).max(1e-9)).collect();
+    let mut bounds = vec![[f64::INFINITY, f64::NEG_INFINITY]; n];
+    for (q, ..) in &known {
+        bounds.iter_mut().zip(q).for_each(|(b, &x)| *b = [b[0].min(x), b[1].max(x)]);
+    }
+    let (kept, quotient) = library.independent(&bounds, options.seed);
+    let asked: Vec<State> = known
+        .into_iter()
+        .map(|(q, v, mass, own)| {
+            let a: Vec<f64> = (0..n).map(|i| own[i] + 2.0 * sigma[i] * (rng.random::<f64>() - 0.5)).collect();
+            let difference: Vec<f64> = a.iter().zip(&own).map(|(a, own)| a - own).collect();
+            State { equation: times(n, &mass, &difference), q, v, a }
+        })
+        .collect();
+    let windows = Windows::of_states(&library, &kept, &asked);
+    let complexity: Vec<f64> = kept.iter().map(|&k| library.complexity(k)).collect();
+    // The size of the model's mass matrix, for a start.
+    let start = windows.unit_mass(&library, &kept, &vec![1.0; n]);
+    let path = eliminate_backward(&windows, &start, &sigma, &complexity, &|block| block % HELD_OUT == 0);
+    let Some(choice) = elbow(&path) else { return Err(FormulaError::NotFinite { failed, states }) };
+    let used = vec![true; windows.len()];
+    let normal = windows.normal(&choice.coefficients, &choice.set, &sigma, &used);
+    let m = choice.set.len();
+    let rest = choice.error * windows.len() as f64 / (windows.len() * n - m).max(1) as f64;
+    let covariance = inverse_with(m, &normal.matrix, RIDGE).unwrap_or(vec![f64::NAN; m * m]);
+    let covariance: Vec<f64> = covariance.into_iter().map(|x| x * rest).collect();
+    let of = Model {
+        terms: choice.set.iter().map(|&k| kept[k]).collect(),
+        coefficients: choice.set.iter().map(|&k| choice.coefficients[k]).collect(),
+    };
+    let residual = (choice.held_out / n as f64).sqrt();
+    let probability = probabilities(&windows, choice, &path, &sigma, options);
+    let mut found = FoundFormula::new(&library, periodic, &of, (&covariance, &probability));
+    found.verdict = if residual <= MOST_RESIDUAL { Verdict::Found } else { Verdict::NotInLibrary };
+    found.residual = residual;
+    found.noise = sigma;
+    found.searched = (library.searched, quotient.removed);
+    (found.bounds, found.speeds) = (bounds, speeds);
+    found.rescale(options.scale.as_ref())?;
+    Ok(found)
+}
+
+/// The choice of terms of which none can be given up: the error of the next shorter one is the most times as large.
+fn elbow(path: &Path) -> Option<&Choice> {
+    let least = path.best.values().map(|choice| choice.held_out).fold(f64::INFINITY, f64::min);
+    // Below rounding nothing is told apart.
+    let floor = least.max(1e-20);
+    let near = || path.best.values().filter(|choice| choice.held_out <= NEAR * floor);
+    let rise = |choice: &Choice| {
+        let shorter = path.best.range(..choice.set.len()).next_back();
+        shorter.map_or(f64::INFINITY, |(_, shorter)| shorter.held_out / choice.held_out.max(floor))
+    };
+    near().max_by(|a, b| rise(a).total_cmp(&rise(b)).then(b.set.len().cmp(&a.set.len())))
+}
+
+/// The share of half samples of the states in which each term is among the last ones left.
+fn probabilities(windows: &Windows, choice: &Choice, path: &Path, sigma: &[f64], options: &FormulaOptions) -> Vec<f64> {
+    let mut rng = RngStream::Segments.generator(options.seed);
+    let mut counts = vec![0.0; windows.terms];
+    let mut all: Vec<usize> = path.order.iter().take(2 * choice.set.len() + 6).copied().collect();
+    all.extend(choice.set.iter().filter(|k| !path.order.iter().take(2 * choice.set.len() + 6).any(|o| o == *k)));
+    for _ in 0..options.bootstraps {
+        let used: Vec<bool> = (0..windows.len()).map(|_| rng.random()).collect();
+        let normal = windows.normal(&choice.coefficients, &all, sigma, &used);
+        let mut places: Vec<usize> = (0..all.len()).collect();
+        while places.len() > choice.set.len() {
+            let Some(costs) = normal.of(&places).costs(true) else { break };
+            let gone = (0..costs.len()).min_by(|&a, &b| costs[a].total_cmp(&costs[b])).unwrap_or(0);
+            places.remove(gone);
+        }
+        places.iter().for_each(|&k| counts[all[k]] += 1.0 / options.bootstraps as f64);
+    }
+    choice.set.iter().map(|&k| counts[k]).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lagrangian::build;
+
+    #[test]
+    fn a_system_is_found_again() {
+        let model = build::<f64>("double-pendulum", &[("m2".to_string(), "0.5".to_string())]).unwrap();
+        let names = ["theta1", "theta2"].map(String::from);
+        let mut rng = RngStream::Region.generator(3);
+        let mut draw = |size: f64| (0..400).map(|_| size * (rng.random::<f64>() - 0.5)).collect::<Vec<f64>>();
+        let (q, v) = (draw(6.0), draw(8.0));
+        let found = formula_of_model(&*model, (&names, &[true, true]), (&q, &v), &FormulaOptions::default()).unwrap();
+        assert_eq!(found.verdict, Verdict::Found);
+        let texts: Vec<&str> = found.terms.iter().map(|t| t.term.as_str()).collect();
+        assert_eq!(
+            texts,
+            [
+                "theta1_dot^2",
+                "theta2_dot^2",
+                "theta1_dot*theta2_dot*cos(theta1 - theta2)",
+                "cos(theta1)",
+                "cos(theta2)"
+            ]
+        );
+        // m1 + m2 = 1.5, m2 = 0.5: a third of theta1's.
+        assert!((found.terms[1].coefficient - 0.5 / 3.0).abs() < 1e-8, "{:?}", found.terms);
+        assert_eq!(found.terms[1].near.as_deref(), Some("1/6"));
+    }
+}
