@@ -4,15 +4,18 @@
 //! noise, and looks for their formulas, for ten seeds each; a formula is right if it has these terms and no other. `--part half` is the same
 //! at half the noise, `--part tenth` with 10 runs at a third of the noise, `--part friction` with friction in the joints at half the noise,
 //! `--part forces` under known forces at 0.06, `--part clean` other systems without noise and with 1e-3, `--part cart-poles` a damped
-//! double cart-pole, `--part outside` systems that the library does not hold, `--part arms DIRECTORY` recorded pendula. `--seeds 3` takes fewer seeds, `--only NAME` one system,
-//! `--show` prints the formulas. Everything is written to `target/formula/PART.csv` as well.
+//! double cart-pole, `--part outside` systems that the library does not hold, `--part arms` recorded pendula of one, two and three arms (DynamicsLab, University
+//! of Washington), if `--arms DIRECTORY` or `../shared/data/multi-arm-pendulum` has their files. `--seeds 3` takes fewer seeds, `--only NAME`
+//! one system, `--show` prints the formulas. Everything is written to `target/formula/PART.csv` as well.
 
 #[path = "formula/cases.rs"]
 mod cases;
 
 use cases::{CART_POLES, CLEAN, Case, FRICTION, OUTSIDE, POSITIONS, Recorded};
 use lnn::formula::{FormulaOptions, FoundFormula, Verdict, formula_of_motion};
-use std::path::Path;
+use lnn::recording::Columns;
+use lnn::recording::read::read_recording;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// Outcome of one search.
@@ -134,8 +137,69 @@ fn run(part: &str, seeds: u64, only: &str, show: bool) -> String {
     csv
 }
 
-/// What can be measured.
+/// What can be measured on made motion.
 const PARTS: [&str; 8] = ["positions", "half", "tenth", "friction", "forces", "clean", "cart-poles", "outside"];
+
+/// Accuracy that is asked for of the arms' angles, in rad: what the textbook's equations reach.
+const ARMS_NOISE: f64 = 5e-4;
+/// One sample of so many of the recordings at 1 kHz.
+const ARMS_EVERY: usize = 5;
+/// Terms of the triple arm with its authors' constants, the coefficient of the first square of a velocity being 1/2.
+const TRIPLE: [(&str, f64); 9] = [
+    ("theta1_dot^2", 0.5),
+    ("theta2_dot^2", 0.4846),
+    ("theta3_dot^2", 0.1122),
+    ("theta1_dot*theta2_dot*cos(theta1 - theta2)", 0.7789),
+    ("theta1_dot*theta3_dot*cos(theta1 - theta3)", 0.2025),
+    ("theta2_dot*theta3_dot*cos(theta2 - theta3)", 0.2680),
+    ("cos(theta1)", -58.07),
+    ("cos(theta2)", -44.21),
+    ("cos(theta3)", -11.49),
+];
+
+/// Formulas of recorded pendula, where their files are.
+fn arms(folder: &Path) {
+    for (name, n) in [("single", 1), ("double", 2), ("triple", 3)] {
+        let path = folder.join(format!("{name}.csv"));
+        if !path.exists() {
+            println!("{}: not there", path.display());
+            continue;
+        }
+        let coords: Vec<String> = (1..=n).map(|i| format!("theta{i}")).collect();
+        let columns =
+            Columns { periodic: coords.clone(), coords, trajectory: Some("run".into()), ..Columns::default() };
+        let mut recording = read_recording(&[&path], &columns).expect("the columns of the authors").recording;
+        for track in &mut recording.tracks {
+            let rows = track.q.chunks_exact(n).step_by(ARMS_EVERY);
+            track.q = rows.flatten().copied().collect();
+            track.times = track.times.iter().step_by(ARMS_EVERY).copied().collect();
+        }
+        recording.tracks.retain(|track| track.times.len() > 30);
+        let started = Instant::now();
+        let noise = Some(vec![ARMS_NOISE; n]);
+        let options =
+            FormulaOptions { friction: true, gyroscopic: false, noise, threads: 2, ..FormulaOptions::default() };
+        let found = formula_of_motion(&recording, &options).expect("motion long enough");
+        let seconds = started.elapsed().as_secs_f64();
+        println!(
+            "{name} arm, {} runs: {:?}, residual {:.3}, {seconds:.1} s",
+            recording.tracks.len(),
+            found.verdict,
+            found.residual
+        );
+        for t in &found.terms {
+            let kind = if t.dissipation { "D" } else { "L" };
+            let published = TRIPLE.iter().find(|(term, _)| n == 3 && !t.dissipation && *term == t.term);
+            let beside = published.map_or(String::new(), |(_, c)| {
+                format!(", published {c}, {:+.1} %", 100.0 * (t.coefficient / c - 1.0))
+            });
+            println!(
+                "  {kind} {} {:.5} +- {:.1e}, probability {:.2}{beside}",
+                t.term, t.coefficient, t.standard_error, t.probability
+            );
+        }
+    }
+}
 
 /// Everything once, at its smallest.
 pub fn trial() {
@@ -151,16 +215,19 @@ pub fn trial() {
 fn main() {
     let mut arguments = std::env::args().skip(1);
     let (mut parts, mut seeds, mut only, mut show) = (PARTS.map(String::from).to_vec(), 10, String::new(), false);
+    let mut folder_of_arms = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/data/multi-arm-pendulum");
+    parts.push("arms".into());
     while let Some(argument) = arguments.next() {
         match argument.as_str() {
             "--bench" => {}
             "--show" => show = true,
             "--part" => {
-                let part = arguments.next().filter(|part| PARTS.contains(&part.as_str()));
-                parts = vec![part.unwrap_or_else(|| panic!("--part: expected one of {}", PARTS.join(", ")))];
+                let part = arguments.next().filter(|part| PARTS.contains(&part.as_str()) || part == "arms");
+                parts = vec![part.unwrap_or_else(|| panic!("--part: expected one of {}, arms", PARTS.join(", ")))];
             }
             "--seeds" => seeds = arguments.next().and_then(|n| n.parse().ok()).expect("--seeds: expected a number"),
             "--only" => only = arguments.next().expect("--only: expected a name"),
+            "--arms" => folder_of_arms = arguments.next().map(PathBuf::from).expect("--arms: expected a folder"),
             other => panic!("{other}: unknown argument"),
         }
     }
@@ -168,6 +235,10 @@ fn main() {
     std::fs::create_dir_all(&folder).expect("a folder for the results");
     for part in parts {
         println!("{part}");
+        if part == "arms" {
+            arms(&folder_of_arms);
+            continue;
+        }
         let csv = run(&part, seeds, &only, show);
         std::fs::write(folder.join(format!("{part}.csv")), csv).expect("room for the results");
     }

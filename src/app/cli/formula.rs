@@ -150,7 +150,7 @@ impl Args {
 /// A usage error for contradicting arguments, a data error for files that cannot be used.
 pub fn run(args: &Args) -> Result<(), CliError> {
     if let Some(out) = &args.out {
-        if !out.extension().is_some_and(|end| end == "toml") {
+        if out.extension().is_none_or(|end| end != "toml") {
             return Err(CliError::usage(format_args!("--out {}: expected a name that ends in .toml", out.display())));
         }
         check_target(out).map_err(|e| CliError::file(out, format_args!("cannot write: {e}")))?;

@@ -74,8 +74,6 @@ const MOST_START: usize = 15;
 const START_ERROR: f64 = 1.3;
 /// Sum of squares in units of noise that a term must explain.
 const THRESHOLD: f64 = 30.0;
-/// Mean squared residual from which on it is more than noise.
-const MISFIT: f64 = 2.0;
 /// Held-out residual over noise up to which a formula is found.
 const MOST_RESIDUAL: f64 = 1.1;
 /// Samples that are followed at most.
@@ -253,8 +251,6 @@ struct Search<'a> {
     motion: Motion<'a>,
     candidates: Vec<usize>,
     driven: bool,
-    /// Segments that are learned from.
-    segments: usize,
     /// States at which a mass matrix must be regular.
     states: Vec<Values>,
 }
@@ -301,13 +297,7 @@ impl Search<'_> {
     fn survivors(&self, model: &Model, sum: &BlockSum, complexity: &[f64]) -> Option<Survivors> {
         let coefficients = self.model_over_candidates(model);
         let equations = Equations { matrix: &sum.matrix, right: &sum.right, coefficients: &coefficients, complexity };
-        // What the model cannot explain counts as noise.
-        let mut inflation = (sum.square / sum.count.max(1.0)).max(1.0);
-        if inflation > MISFIT {
-            // It is alike all along a segment, where noise is another at every sample.
-            inflation *= (sum.count / (self.segments * self.library.n()) as f64).max(1.0);
-        }
-        survivors(&equations, THRESHOLD * inflation, &|x| self.regular(model, x))
+        survivors(&equations, THRESHOLD * sum.inflation, &|x| self.regular(model, x))
     }
 
     /// Refits and chooses terms anew until they stay the same; the normal equations at the end, by block.
@@ -406,8 +396,7 @@ pub fn formula_of_motion(recording: &Recording, options: &FormulaOptions) -> Res
         library.evaluate(&all, &s.start[..data.n], &mut values);
         values
     });
-    let mut search =
-        Search { library: &library, motion, candidates, driven, segments: learned.len(), states: states.collect() };
+    let mut search = Search { library: &library, motion, candidates, driven, states: states.collect() };
     search.motion.settle(&model, &mut learned, 4);
     search.motion.choose_steps(&model, &learned);
     search.converge(&mut model, &mut learned, ROUNDS);
@@ -415,7 +404,6 @@ pub fn formula_of_motion(recording: &Recording, options: &FormulaOptions) -> Res
     let before = (model.clone(), learned.clone());
     let short = search.motion.settle(&model, &mut learned, 1);
     let mut learned = joined(learned);
-    search.segments = learned.len();
     search.motion.choose_steps(&model, &learned);
     let mut blocks = search.converge(&mut model, &mut learned, 3);
     let long = search.motion.settle(&model, &mut learned, 1);
@@ -542,7 +530,7 @@ fn shorten(
         let m = model.terms.len();
         let blocks = search.motion.blocks(model, &model.terms, segments);
         let mut sum = total(&blocks, &|_| 1.0);
-        let inflation = (sum.square / sum.count.max(1.0)).max(1.0);
+        let inflation = sum.inflation;
         if !search.driven {
             search.motion.pin(model, &model.terms, segments, &mut sum);
         }
@@ -596,7 +584,7 @@ fn covariance(search: &Search<'_>, model: &Model, segments: &[Segment]) -> Vec<f
     if !search.driven {
         search.motion.pin(model, &model.terms, segments, &mut sum);
     }
-    let inflation = sum.square / sum.count.max(1.0);
+    let inflation = sum.inflation;
     let all: Vec<usize> = (0..m).collect();
     let inverse = inverse_with(m, &part(m, &sum.matrix, &all), RIDGE).unwrap_or(vec![f64::NAN; m * m]);
     inverse.into_iter().map(|x| x * inflation).collect()

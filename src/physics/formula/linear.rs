@@ -84,7 +84,7 @@ pub(super) fn eliminate(n: usize, matrix: &mut [f64], m: usize, right: &mut [f64
             }
         }
         let size = matrix[pivot * n + k].abs();
-        if !(size > 1e-13 * largest) {
+        if size.is_nan() || size <= 1e-13 * largest {
             return false;
         }
         if pivot != k {

@@ -53,6 +53,9 @@ pub(super) struct BlockSum {
     pub count: f64,
     /// Segments that the model cannot follow.
     pub failed: usize,
+    /// Variance of what coefficients are pulled by, over that of independent noise: residuals that are alike all along a motion, those of
+    /// a model that is not quite right, say less than their number. At least 1.
+    pub inflation: f64,
 }
 
 /// What moves a start.
@@ -91,12 +94,31 @@ pub(super) fn total(blocks: &BTreeMap<usize, BlockSum>, weight: &dyn Fn(usize) -
             sum.failed += part.failed;
         }
     }
-    sum.unwrap_or_else(|| BlockSum::empty(0))
+    let mut sum = sum.unwrap_or_else(|| BlockSum::empty(0));
+    sum.inflation = inflation(blocks, weight, &sum);
+    sum
+}
+
+/// The median over the coefficients of the scatter of what blocks pull them by, over the scatter of noise.
+fn inflation(blocks: &BTreeMap<usize, BlockSum>, weight: &dyn Fn(usize) -> f64, sum: &BlockSum) -> f64 {
+    let m = sum.right.len();
+    let whole: f64 = blocks.keys().map(|&block| weight(block)).sum();
+    if whole < 3.0 {
+        return (sum.square / sum.count.max(1.0)).max(1.0);
+    }
+    let ratio = |k: usize| {
+        let mean = sum.right[k] / whole;
+        let scatter: f64 = blocks.iter().map(|(&block, part)| weight(block) * (part.right[k] - mean).powi(2)).sum();
+        scatter * whole / (whole - 1.0) / sum.matrix[k * m + k]
+    };
+    let mut ratios: Vec<f64> = (0..m).map(ratio).filter(|ratio| ratio.is_finite()).collect();
+    ratios.sort_by(f64::total_cmp);
+    ratios.get(ratios.len() / 2).copied().unwrap_or(1.0).max(sum.square / sum.count.max(1.0)).max(1.0)
 }
 
 impl BlockSum {
     fn empty(m: usize) -> Self {
-        Self { matrix: vec![0.0; m * m], right: vec![0.0; m], square: 0.0, count: 0.0, failed: 0 }
+        Self { matrix: vec![0.0; m * m], right: vec![0.0; m], square: 0.0, count: 0.0, failed: 0, inflation: 1.0 }
     }
 }
 

@@ -22,6 +22,14 @@ const HELD_OUT: usize = 5;
 /// Mean squared error over the least one up to which a choice of terms may be the formula.
 const NEAR: f64 = 100.0;
 
+/// A state with the mass matrix and the acceleration of a model.
+struct Asked {
+    q: Vec<f64>,
+    v: Vec<f64>,
+    mass: Vec<f64>,
+    own: Vec<f64>,
+}
+
 /// Looks for a formula of a model by its equations of motion at states `(states, n)`: `M (a - a(q, v))` at drawn accelerations `a`.
 ///
 /// Everything that moves by a Lagrangian is asked in the same way: models of a structure, black boxes, systems. Total derivatives do
@@ -40,12 +48,13 @@ pub fn formula_of_model(
     let n = library.n();
     let mut rng = RngStream::Region.generator(options.seed);
     let mut terms = Terms::default();
-    let mut known: Vec<(Vec<f64>, Vec<f64>, Vec<f64>, Vec<f64>)> = Vec::new();
+    let mut known: Vec<Asked> = Vec::new();
     let rows = || q.chunks_exact(n).zip(v.chunks_exact(n)).take(MOST_STATES);
     for (q, v) in rows() {
         let fine = model.terms(q, v, Request::MASS_MATRIX | Request::ACCELERATION, &mut terms).is_ok();
         if fine && terms.acceleration.iter().chain(&terms.mass_matrix).all(|x| x.is_finite()) {
-            known.push((q.to_vec(), v.to_vec(), terms.mass_matrix.clone(), terms.acceleration.clone()));
+            let (mass, own) = (terms.mass_matrix.clone(), terms.acceleration.clone());
+            known.push(Asked { q: q.to_vec(), v: v.to_vec(), mass, own });
         }
     }
     let (states, failed) = (rows().count(), rows().count() - known.len());
@@ -53,16 +62,16 @@ pub fn formula_of_model(
         return Err(FormulaError::NotFinite { failed, states });
     }
     let scale = |of: &dyn Fn(usize) -> f64| (known.len() as f64 / (0..known.len()).map(of).sum::<f64>()).sqrt().recip();
-    let sigma: Vec<f64> = (0..n).map(|i| scale(&|s| known[s].3[i].powi(2)).max(1e-9)).collect();
-    let speeds: Vec<f64> = (0..n).map(|i| scale(&|s| known[s].1[i].powi(2)).max(1e-9)).collect();
+    let sigma: Vec<f64> = (0..n).map(|i| scale(&|s| known[s].own[i].powi(2)).max(1e-9)).collect();
+    let speeds: Vec<f64> = (0..n).map(|i| scale(&|s| known[s].v[i].powi(2)).max(1e-9)).collect();
     let mut bounds = vec![[f64::INFINITY, f64::NEG_INFINITY]; n];
-    for (q, ..) in &known {
+    for Asked { q, .. } in &known {
         bounds.iter_mut().zip(q).for_each(|(b, &x)| *b = [b[0].min(x), b[1].max(x)]);
     }
     let (kept, quotient) = library.independent(&bounds, options.seed);
     let asked: Vec<State> = known
         .into_iter()
-        .map(|(q, v, mass, own)| {
+        .map(|Asked { q, v, mass, own }| {
             let a: Vec<f64> = (0..n).map(|i| own[i] + 2.0 * sigma[i] * (rng.random::<f64>() - 0.5)).collect();
             let difference: Vec<f64> = a.iter().zip(&own).map(|(a, own)| a - own).collect();
             State { equation: times(n, &mass, &difference), q, v, a }

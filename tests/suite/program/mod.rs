@@ -10,6 +10,7 @@ mod experiment;
 mod fit;
 mod fit_resume;
 mod forces;
+mod formula;
 mod geometry;
 mod hostile;
 mod inspect;

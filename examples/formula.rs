@@ -1,0 +1,24 @@
+//! Reads the Lagrangian of a recorded double pendulum off its angles alone.
+
+use lnn::formula::{FormulaOptions, formula_of_motion};
+use lnn::recording::Columns;
+use lnn::recording::read::read_recording;
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let angles = ["theta1", "theta2"].map(String::from).to_vec();
+    let columns =
+        Columns { periodic: angles.clone(), coords: angles, trajectory: Some("run".into()), ..Columns::default() };
+    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/data/pendulum.csv");
+    let recording = read_recording(&[file], &columns)?.recording;
+    let options = FormulaOptions { friction: true, threads: 2, ..FormulaOptions::default() };
+    let found = formula_of_motion(&recording, &options)?;
+    println!("{:?}, residual {:.3} times the noise", found.verdict, found.residual);
+    println!("L = {}\nD = {}", found.text(false), found.text(true));
+    for term in &found.terms {
+        println!(
+            "{:45} {:9.5} +- {:.5}, probability {:.2}",
+            term.term, term.coefficient, term.standard_error, term.probability
+        );
+    }
+    Ok(())
+}

@@ -1,0 +1,87 @@
+//! `lnn formula`: a Lagrangian as a formula, from motion and from a model.
+
+use crate::common::program::lnn;
+use lnn::lagrangian::{ExpressionLagrangian, Mechanics};
+use lnn::prelude::*;
+use std::fmt::Write;
+use std::fs;
+
+/// Swings of a system of one coordinate `a` from rest, as a CSV with a small alternating error.
+fn swings(formula: &str, starts: &[f64]) -> String {
+    let model = Mechanics::new(ExpressionLagrangian::new(&["a"], &[], formula).unwrap(), Vec::<f64>::new());
+    let mut csv = "run,t,a\n".to_string();
+    for (run, start) in starts.iter().enumerate() {
+        let motion = model.rollout(&[*start], &[0.0], 3.0, 0.05).unwrap();
+        for (k, (t, a)) in motion.t.iter().zip(&motion.q).enumerate() {
+            let error = 1e-4 * ((k * 7919 + run * 104_729) % 1000) as f64 / 500.0 - 1e-4;
+            writeln!(csv, "{run},{t},{}", a + error).unwrap();
+        }
+    }
+    csv
+}
+
+const STARTS: [f64; 6] = [0.4, -0.9, 1.3, 1.9, -2.4, 2.8];
+
+#[test]
+fn a_pendulum_is_read_off_its_swings_and_the_file_is_a_system() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_string();
+    fs::write(at("swings.csv"), swings("a_dot^2/2 + 4*cos(a)", &STARTS)).unwrap();
+    let data =
+        ["formula", &at("swings.csv"), "--coords", "a", "--periodic", "a", "--trajectory", "run"].map(String::from);
+    let with = |more: &[&str]| {
+        let words: Vec<String> = data.iter().cloned().chain(more.iter().map(ToString::to_string)).collect();
+        lnn(&words.iter().map(String::as_str).collect::<Vec<_>>())
+    };
+    let found = with(&["--json", "--out", &at("found.toml"), "--name", "swing"]);
+    assert_eq!(found.code, Some(0), "{}", found.stderr);
+    let found: serde_json::Value = serde_json::from_str(&found.stdout).unwrap();
+    assert_eq!(found["verdict"], "found");
+    let terms = found["terms"].as_array().unwrap();
+    let texts: Vec<&str> = terms.iter().map(|t| t["term"].as_str().unwrap()).collect();
+    assert_eq!(texts, ["a_dot^2", "cos(a)"]);
+    let [value, error] = ["coefficient", "standard_error"].map(|key| terms[1][key].as_f64().unwrap());
+    assert!((value - 4.0).abs() < 4e-3 && error > 0.0 && error < 4e-3, "{value} {error}");
+    assert_eq!(terms[1]["probability"].as_f64(), Some(1.0));
+    let system = lnn(&["systems", "--system", &at("found.toml")]);
+    assert!(system.code == Some(0) && system.stdout.contains("swing"), "{}", system.stderr);
+    let rolled = lnn(&["rollout", "--system", &at("found.toml"), "--state", "1,0", "--t-end", "1", "--dt", "0.5"]);
+    assert_eq!(rolled.code, Some(0), "{}", rolled.stderr);
+    // The common factor is what the user says.
+    let scaled = with(&["--format", "latex", "--scale", "a_dot^2=1"]);
+    assert!(
+        scaled.stdout.starts_with("L = 1\\,\\dot{a}^2 + 8") || scaled.stdout.starts_with("L = 1\\,\\dot{a}^2 + 7.9"),
+        "{}",
+        scaled.stdout
+    );
+    assert_eq!(with(&["--scale", "a_dot^3=1"]).code, Some(2));
+    assert_eq!(with(&["--function", "a_dot"]).code, Some(2));
+    assert_eq!(with(&["--out", &at("found.txt")]).code, Some(2));
+}
+
+#[test]
+fn what_the_library_lacks_is_said_and_a_function_of_the_user_helps() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("swings.csv").to_str().unwrap().to_string();
+    fs::write(&path, swings("a_dot^2/2 - cosh(a)", &[0.5, 1.0, 1.5, -2.0, 2.5, -3.0])).unwrap();
+    let data = ["formula", &path, "--coords", "a", "--trajectory", "run", "--json", "--basis", "polynomial:2"];
+    let verdict = |more: &[&str]| {
+        let run = lnn(&[&data[..], more].concat());
+        assert_eq!(run.code, Some(0), "{}", run.stderr);
+        serde_json::from_str::<serde_json::Value>(&run.stdout).unwrap()
+    };
+    let without = verdict(&[]);
+    assert_eq!(without["verdict"], "not in the library");
+    assert!(without["left"].as_array().unwrap().iter().any(|l| l["residual"].as_f64() > Some(2.0)));
+    let with = verdict(&["--function", "cosh(a)"]);
+    assert_eq!(with["verdict"], "found");
+    assert_eq!(with["terms"].as_array().unwrap().len(), 2);
+    assert_eq!(with["terms"][1]["term"], "(cosh(a))");
+}
+
+#[test]
+fn a_model_has_its_own_columns() {
+    let run = lnn(&["formula", "examples/data/double_pendulum.safetensors", "--coords", "a"]);
+    assert!(run.code == Some(2) && run.stderr.contains("--coords"), "{}", run.stderr);
+    assert_eq!(lnn(&["formula", "examples/data/pendulum.csv"]).code, Some(2));
+}
