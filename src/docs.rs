@@ -12,6 +12,7 @@
 //! | [`black_holes`] | the metric of a black hole learned from free fall, and what is read off it |
 //! | [`symmetries`] | what is conserved: symmetries, charges, what two Lagrangians have in common |
 //! | [`constraints`] | constraints beside a Lagrangian, found in data, kept in roll-outs; degenerate Lagrangians |
+//! | [`formula`] | a Lagrangian as a formula, from recorded motion or from a model |
 //! | [`certificates`] | proofs that a mass matrix has its signature |
 //! | [`summary`] | `summary.json` and `evaluation.json`, key by key |
 //! | [`method`] | equations, penalties, identities, units and conventions |
@@ -48,6 +49,7 @@ macro_rules! page {
             "[symmetries]: crate::docs::symmetries\n",
             "[canonical]: crate::docs::symmetries#canonical-form\n",
             "[constraints]: crate::docs::constraints\n",
+            "[formula]: crate::docs::formula\n",
             "[certificates]: crate::docs::certificates\n",
             "[method]: crate::docs::method\n",
             "[conventions]: crate::docs::method#units-and-conventions\n",
@@ -90,6 +92,7 @@ pages! {
     black_holes "black-holes.md";
     symmetries "symmetries.md";
     constraints "constraints.md";
+    formula "formula.md";
     certificates "certificates.md";
     summary "summary.md";
     method "method.md";

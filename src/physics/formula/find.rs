@@ -426,7 +426,9 @@ pub fn formula_of_motion(recording: &Recording, options: &FormulaOptions) -> Res
     };
     let probability: Vec<f64> = model.terms.iter().map(|&k| probability(k)).collect();
     let mut found = FoundFormula::new(&library, &recording.periodic, &model, (&covariance, &probability));
-    found.verdict = if residual <= MOST_RESIDUAL { Verdict::Found } else { Verdict::NotInLibrary };
+    // Few residuals scatter by themselves.
+    let most = MOST_RESIDUAL + 3.0 / (2.0 * count.max(1.0)).sqrt();
+    found.verdict = if residual <= most { Verdict::Found } else { Verdict::NotInLibrary };
     found.residual = residual;
     found.noise = data.sigma.clone();
     found.noise_resolved = data.resolved;

@@ -105,7 +105,7 @@ impl FoundFormula {
             .collect();
         // Kinetic terms first, then potential ones, then the dissipation.
         let rank = |at: usize| (library.is_dissipation(model.terms[at]), library.kinetic(model.terms[at]).is_none());
-        order.sort_by_key(|(at, term)| (rank(*at), term.term.len()));
+        order.sort_by_key(|(at, term)| (rank(*at), term.term.len(), term.term.clone()));
         let covariance = order
             .iter()
             .flat_map(|(i, _)| order.iter().map(|(j, _)| covariance[i * m + j]).collect::<Vec<_>>())
@@ -138,8 +138,9 @@ impl FoundFormula {
                 (at.ok_or_else(|| FormulaError::Scale { term: term.clone(), known: known() })?, *value)
             }
             None => {
-                let square = |t: &FoundTerm| self.coordinates.iter().any(|name| t.term == format!("{name}_dot^2"));
-                let first = self.terms.iter().position(square);
+                let square =
+                    |name: &String| self.terms.iter().position(|t| !t.dissipation && t.term == format!("{name}_dot^2"));
+                let first = self.coordinates.iter().find_map(square);
                 (first.or(self.terms.iter().position(|t| !t.dissipation)).unwrap_or(0), 0.5)
             }
         };

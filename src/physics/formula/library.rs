@@ -478,7 +478,7 @@ mod tests {
             assert!(!kept.contains(&find(nothing)), "{nothing}");
             assert!(quotient.over_kept[find(nothing)].as_ref().unwrap().iter().all(|x| x.abs() < 1e-9));
         }
-        // Of q2 q1_dot and q1-free partners one is left: d(q1 q2)/dt is no function of the chart, d(sin q1 q2)/dt is.
+        // Of two terms whose sum is a total derivative one is left.
         let pair = ["q1_dot*q2*cos(q1)", "q2_dot*sin(q1)"].map(find);
         assert_eq!(pair.iter().filter(|k| kept.contains(k)).count(), 1);
         // sin^2 over cos 2x.

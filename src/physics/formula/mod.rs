@@ -9,13 +9,13 @@
 //!
 //! ```
 //! use lnn::formula::{FormulaOptions, Verdict, formula_of_motion};
+//! use lnn::prelude::*;
 //! use lnn::recording::{RecordedTrajectory, Recording};
 //!
-//! // Swings of a pendulum with g / l = 4, as angles alone: cos(2 t) for small ones is what the formula must not take them for.
+//! // Swings of a pendulum with g / l = 4, as angles alone.
 //! let model = lnn::lagrangian::ExpressionLagrangian::new(&["a"], &[], "a_dot^2/2 + 4*cos(a)")?;
 //! let model = lnn::lagrangian::Mechanics::new(model, vec![]);
 //! let tracks = (0..8).map(|k| {
-//!     use lnn::rollout::Rollout;
 //!     let motion = model.rollout(&[0.5 + 0.3 * k as f64], &[0.0], 5.0, 0.05).unwrap();
 //!     RecordedTrajectory { name: format!("{k}"), times: motion.t, q: motion.q, v: vec![], a: vec![], force: vec![] }
 //! });

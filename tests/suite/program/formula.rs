@@ -3,18 +3,21 @@
 use crate::common::program::lnn;
 use lnn::lagrangian::{ExpressionLagrangian, Mechanics};
 use lnn::prelude::*;
+use lnn::random::RngStream;
+use rand_distr::{Distribution, StandardNormal};
 use std::fmt::Write;
 use std::fs;
 
-/// Swings of a system of one coordinate `a` from rest, as a CSV with a small alternating error.
+/// Swings of a system of one coordinate `a` from rest, as a CSV, with a noise of 1e-4.
 fn swings(formula: &str, starts: &[f64]) -> String {
     let model = Mechanics::new(ExpressionLagrangian::new(&["a"], &[], formula).unwrap(), Vec::<f64>::new());
+    let mut rng = RngStream::Trajectories.generator(1);
     let mut csv = "run,t,a\n".to_string();
     for (run, start) in starts.iter().enumerate() {
         let motion = model.rollout(&[*start], &[0.0], 3.0, 0.05).unwrap();
-        for (k, (t, a)) in motion.t.iter().zip(&motion.q).enumerate() {
-            let error = 1e-4 * ((k * 7919 + run * 104_729) % 1000) as f64 / 500.0 - 1e-4;
-            writeln!(csv, "{run},{t},{}", a + error).unwrap();
+        for (t, a) in motion.t.iter().zip(&motion.q) {
+            let noise: f64 = StandardNormal.sample(&mut rng);
+            writeln!(csv, "{run},{t},{}", a + 1e-4 * noise).unwrap();
         }
     }
     csv
