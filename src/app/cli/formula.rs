@@ -3,7 +3,7 @@
 use crate::cli::number::{finite, positive, seed, thread_count, threads, whole};
 use crate::cli::probe::Probe;
 use crate::cli::recording_args::RecordingArgs;
-use crate::cli::{CliError, output};
+use crate::cli::{CliError, output, parse_system};
 use crate::formula::{
     Families, FormulaError, FormulaOptions, FoundFormula, Verdict, formula_of_model, formula_of_motion,
 };
@@ -161,6 +161,8 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     };
     if let Some(out) = &args.out {
         let text = found.system_file(&args.name);
+        parse_system(&text)
+            .map_err(|(_, problem)| CliError::usage(format_args!("--out: no system file: {problem}")))?;
         write_atomically(out, text.as_bytes()).map_err(|e| CliError::file(out, e))?;
     }
     if args.json {

@@ -72,6 +72,8 @@ const MOST_CANDIDATES: usize = 60;
 const MOST_START: usize = 15;
 /// Error of accelerations over the least of all choices that a shorter choice may have to start with.
 const START_ERROR: f64 = 1.3;
+/// Least determinant of a mass matrix over that of the model before it.
+const LEAST_REGULAR: f64 = 0.05;
 /// Sum of squares in units of noise that a term must explain.
 const THRESHOLD: f64 = 30.0;
 /// Held-out residual over noise up to which a formula is found.
@@ -214,14 +216,15 @@ impl<'a> Prepared<'a> {
         let mut segments = Vec::new();
         for (index, track) in self.recording.tracks.iter().enumerate() {
             let Some(smoothed) = &self.smoothed[index] else { continue };
+            let sigma = self.noise(index);
             for (block, range) in self.pieces(index) {
                 let times = &track.times[range.clone()];
                 if times.len() < 2 * self.n + 2 {
                     continue;
                 }
                 let whole = times[times.len() - 1] - times[0];
-                let count =
-                    ((whole / seconds).round() as usize).clamp(1, times.len() / (2 * n + 2).max(8).min(times.len()));
+                let most = (times.len() / (2 * n + 2).max(8)).max(1);
+                let count = ((whole / seconds).round() as usize).clamp(1, most);
                 for k in 0..count {
                     let [from, to] = [k, k + 1].map(|k| range.start + k * range.len() / count);
                     // The last sample of a segment is the first of the next.
@@ -233,7 +236,7 @@ impl<'a> Prepared<'a> {
                         times: track.times[from..to].to_vec(),
                         q: track.q[from * n..to * n].to_vec(),
                         force: if force.is_empty() { vec![] } else { force[from * n..to * n].to_vec() },
-                        sigma: self.noise(index),
+                        sigma: sigma.clone(),
                         start: [&smoothed.q[from * n..(from + 1) * n], &smoothed.v[from * n..(from + 1) * n]].concat(),
                     });
                 }
@@ -285,7 +288,7 @@ impl Search<'_> {
         });
         let mut ratios: Vec<f64> = ratios.collect();
         ratios.sort_by(f64::total_cmp);
-        ratios.get(ratios.len() / 4).is_none_or(|ratio| *ratio > 0.05)
+        ratios.get(ratios.len() / 4).is_none_or(|ratio| *ratio > LEAST_REGULAR)
     }
 
     fn equations(&self, model: &Model, segments: &[Segment], sum: &mut BlockSum) {
@@ -365,10 +368,18 @@ pub fn formula_of_motion(recording: &Recording, options: &FormulaOptions) -> Res
     let data = Prepared::new(recording, options)?;
     let (kept, quotient) = library.independent(&data.bounds, options.seed);
     let width = 3.0 * data.pace;
-    let longest = recording.tracks.iter().map(|t| t.times[t.len() - 1] - t.times[0]).fold(0.0, f64::max);
-    let pieces = if recording.tracks.len() >= WHOLE { 1.0 } else { PIECES as f64 };
-    let width = width.min(longest / pieces / 2.5);
+    let span = |times: &[f64]| times.last().zip(times.first()).map_or(0.0, |(last, first)| last - first);
+    let longest = recording.tracks.iter().map(|track| span(&track.times)).fold(0.0, f64::max);
+    let pieces = if recording.tracks.len() >= WHOLE { 1 } else { PIECES };
+    let width = width.min(longest / pieces as f64 / 2.5);
     let stretches = data.stretches(width);
+    let short = FormulaError::Short {
+        found: recording.tracks.iter().map(|track| track.len()).max().unwrap_or(0),
+        needed: 2 * LEAST_SAMPLES * pieces,
+    };
+    if stretches.len() < 2 {
+        return Err(short);
+    }
     let windows = Windows::new(&library, &kept, &stretches, width);
     let driven = windows.driven();
     let held = held_out(&data, options.seed);
@@ -376,9 +387,7 @@ pub fn formula_of_motion(recording: &Recording, options: &FormulaOptions) -> Res
     let start = windows.unit_mass(&library, &kept, &data.speeds);
     let path = eliminate_backward(&windows, &start, &data.sigma, &complexity, &|block| held.contains(&block));
     log(&library, &kept, &path);
-    let Some(choice) = beginning(&path) else {
-        return Err(FormulaError::Short { found: windows.len(), needed: LEAST_SAMPLES });
-    };
+    let Some(choice) = beginning(&path) else { return Err(short) };
     let mut model = Model {
         terms: choice.iter().map(|&(k, _)| kept[k]).collect(),
         coefficients: choice.iter().map(|&(_, c)| c).collect(),

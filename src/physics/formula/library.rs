@@ -143,6 +143,9 @@ impl Library {
         for text in own {
             functions.push(own_function(names, text)?);
         }
+        if functions.len() > MOST_TERMS {
+            return Err(FormulaError::Terms { found: functions.len(), most: MOST_TERMS });
+        }
         let mut library = Self { names: names.to_vec(), functions, terms: Vec::new(), searched: 0 };
         for function in 0..library.functions.len() {
             let pairs = (0..n).flat_map(|i| (i..n).map(move |j| (i, j)));
@@ -265,7 +268,7 @@ impl Library {
     pub fn independent(&self, bounds: &[[f64; 2]], seed: u64) -> (Vec<usize>, Quotient) {
         let (n, count) = (self.n(), self.terms.len());
         let mut rng = RngStream::Region.generator(seed);
-        let states = (2 * count / n + 40).max(60);
+        let states = 2 * self.searched / n + 60;
         let all: Vec<usize> = (0..self.functions.len()).collect();
         let mut values = Values::new();
         let mut columns = vec![vec![0.0; states * n]; count];

@@ -1,5 +1,7 @@
 //! Examples: each asserts its own result; those that need arguments are given them.
 
+#[path = "../../../examples/formula.rs"]
+mod formula;
 #[allow(dead_code, reason = "its functions are called")]
 #[path = "../../../examples/load_model.rs"]
 mod load_model;
@@ -42,6 +44,11 @@ fn a_solver_of_ones_own_trains_a_network() {
 #[test]
 fn argmin_identifies_a_system() {
     system_identification::main().unwrap();
+}
+
+#[test]
+fn a_recorded_arm_is_read_as_a_formula() {
+    formula::main().unwrap();
 }
 
 #[test]
