@@ -160,7 +160,7 @@ fn text(found: &FoundConstraints, coordinates: &[String]) -> String {
     };
     if !found.constraints.is_empty() {
         let rows: Vec<Vec<String>> = found.constraints.iter().map(row).collect();
-        let _ = writeln!(text, "\n{}", text_table(&["kind", "formula", "defect over noise"], &rows).trim_end());
+        let _ = writeln!(text, "\n{}", text_table(&["kind", "formula", "defect"], &rows).trim_end());
     }
     let noise: Vec<String> = coordinates
         .iter()

@@ -131,6 +131,10 @@ impl Features {
     pub fn is_constant(&self, term: usize) -> bool {
         self.terms[term].powers.is_empty() && self.terms[term].velocity.is_none()
     }
+    /// `true` for a term with a velocity.
+    pub fn moves(&self, term: usize) -> bool {
+        self.terms[term].velocity.is_some()
+    }
     /// `true` for terms of velocities one of whose weights belongs to a term without.
     pub fn has_rate(&self, weights: &[f64]) -> bool {
         self.terms.iter().zip(weights).any(|(term, &weight)| term.velocity.is_none() && weight != 0.0)

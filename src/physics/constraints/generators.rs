@@ -23,8 +23,9 @@ const STUDENT: f64 = 2.365;
 /// A combination that vanishes.
 #[derive(Clone, Debug)]
 pub struct Generator {
-    /// Factors of all terms; the first term has 1.
+    /// Factors of all terms; the leading term has 1.
     pub weights: Vec<f64>,
+    lead: usize,
     /// Half widths of their ranges.
     spread: Vec<f64>,
     /// `c.G c / c.N c`.
@@ -42,8 +43,9 @@ pub struct Search {
     pub gap: Option<f64>,
 }
 
-/// Looks for combinations that vanish, or `centred`, that are constant along each trajectory.
-pub fn search(samples: &MotionSamples, features: &Features, centred: bool) -> Search {
+/// Looks for combinations that vanish, or `centred`, that are constant along each trajectory; of `shared` samples the errors are as
+/// one.
+pub fn search(samples: &MotionSamples, features: &Features, centred: bool, shared: f64) -> Search {
     let p = features.len();
     let moments = Moments::of(samples, features, if p > 300 { 4 } else { 8 });
     // Every constant is constant.
@@ -58,7 +60,7 @@ pub fn search(samples: &MotionSamples, features: &Features, centred: bool) -> Se
     }
     let mut rows: Vec<Vec<f64>> = combinations.chunks_exact(terms.len()).take(count).map(<[f64]>::to_vec).collect();
     let pivots = reduce(&mut rows);
-    let independent = samples.len() as f64 / samples.shared();
+    let independent = samples.len() as f64 / shared;
     let mut found: Vec<Generator> = rows
         .iter()
         .zip(&pivots)
@@ -148,25 +150,28 @@ fn needed(pencil: &Pencil, mut support: Vec<(usize, f64)>, independent: f64) -> 
 /// Factors of the needed terms with their ranges, by leaving parts of the data out (jackknife).
 fn fitted(moments: &Moments, features: &Features, support: &[usize], centred: bool) -> Generator {
     let folds = moments.folds();
-    let lead = support.iter().position(|&term| !features.is_constant(term)).unwrap_or(0);
     let fit = |pencil: &Pencil| {
         let (ratio, scaled) = smallest(pencil, support)?;
         let raw: Vec<f64> = scaled.iter().zip(support).map(|(c, &term)| c / moments.scale[term]).collect();
-        let weights: Vec<f64> = raw.iter().map(|c| c / raw[lead]).collect();
-        Some((ratio, scaled, weights))
+        Some((ratio, scaled, raw))
     };
+    let over = |raw: Vec<f64>, lead: usize| -> Vec<f64> { raw.iter().map(|c| c / raw[lead]).collect() };
     let mut generator = Generator {
         weights: vec![0.0; features.len()],
+        lead: 0,
         spread: vec![0.0; features.len()],
         ratio: f64::INFINITY,
         holds: true,
     };
-    let Some((ratio, _, weights)) = fit(&moments.pencil(centred, |_| true)) else { return generator };
-    generator.ratio = ratio;
+    let Some((ratio, _, raw)) = fit(&moments.pencil(centred, |_| true)) else { return generator };
+    let lead = leading(features, support, &raw);
+    let weights = over(raw, lead);
+    (generator.ratio, generator.lead) = (ratio, support[lead]);
     let mut squares = vec![0.0; support.len()];
     for part in 0..folds {
-        let Some((_, scaled, others)) = fit(&moments.pencil(centred, |other| other != part)) else { continue };
+        let Some((_, scaled, raw)) = fit(&moments.pencil(centred, |other| other != part)) else { continue };
         let left_out = moments.pencil(centred, |other| other == part).on(support);
+        let others = over(raw, lead);
         generator.holds &= left_out.ratio(&scaled) <= HOLDS;
         squares.iter_mut().zip(others.iter().zip(&weights)).for_each(|(sum, (a, b))| *sum += (a - b) * (a - b));
     }
@@ -177,11 +182,22 @@ fn fitted(moments: &Moments, features: &Features, support: &[usize], centred: bo
     generator
 }
 
+/// The term that has the factor 1: the first of the highest degree, unless another of that degree weighs more than three times as much.
+fn leading(features: &Features, support: &[usize], raw: &[f64]) -> usize {
+    let first = (0..support.len()).find(|&k| !features.is_constant(support[k])).unwrap_or(0);
+    let same = (0..support.len()).filter(|&k| features.degree(support[k]) == features.degree(support[first]));
+    let same = same.filter(|&k| features.moves(support[k]) == features.moves(support[first]));
+    let heaviest = same.max_by(|&a, &b| raw[a].abs().total_cmp(&raw[b].abs())).unwrap_or(first);
+    if raw[heaviest].abs() > 3.0 * raw[first].abs() { heaviest } else { first }
+}
+
 impl Generator {
     /// In words.
     pub fn described(&self, features: &Features, kind: ConstraintKind) -> FoundConstraint {
         let (mut formula, mut coefficients, mut range) = (String::new(), BTreeMap::new(), BTreeMap::new());
-        for (term, &weight) in self.weights.iter().enumerate().filter(|(_, weight)| **weight != 0.0) {
+        let others = (0..self.weights.len()).filter(|term| *term != self.lead && self.weights[*term] != 0.0);
+        for term in [self.lead].into_iter().chain(others) {
+            let weight = self.weights[term];
             let (text, spread) = (features.text(term).to_string(), self.spread[term]);
             coefficients.insert(text.clone(), weight);
             range.insert(text.clone(), [weight - spread, weight + spread]);
@@ -205,6 +221,8 @@ impl Generator {
 
 /// A positive number with the digits that its spread leaves.
 fn digits(value: f64, spread: f64) -> String {
+    // Beyond this the data say nothing, whatever their scatter.
+    let spread = spread.max(1e-11 * value);
     if spread == 0.0 {
         return value.to_string();
     }

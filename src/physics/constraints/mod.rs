@@ -24,7 +24,7 @@ use std::collections::BTreeMap;
 /// Most terms that are looked at together.
 pub const MOST_TERMS: usize = 1000;
 /// A row beside others whose part outside of them is, root mean square, below this share follows from them.
-const OUTSIDE: f64 = 0.1;
+const OUTSIDE: f64 = 0.15;
 /// States at which gradients are compared.
 const PLACES: usize = 64;
 /// Below this share of its derivatives the curl of a row within its kernel is noise.
@@ -64,7 +64,7 @@ pub struct FoundConstraint {
     pub kind: ConstraintKind,
     /// What vanishes, or is constant.
     pub formula: String,
-    /// Factors of its terms, the first term having 1.
+    /// Factors of its terms; the leading one of the formula is 1.
     pub coefficients: BTreeMap<String, f64>,
     /// Ranges of 95 % of the factors.
     pub range: BTreeMap<String, [f64; 2]>,
@@ -122,7 +122,6 @@ pub fn find_constraints(
     samples: &MotionSamples,
     search: ConstraintSearch,
 ) -> Result<FoundConstraints, ConstraintSearchError> {
-    let n = samples.n();
     let of_positions = Features::of_positions(samples, search.degree);
     // Of many coordinates as many as there is room for.
     let of_velocities = (0..=search.velocity_degree).rev().map(|degree| Features::of_velocities(samples, degree));
@@ -138,48 +137,25 @@ pub fn find_constraints(
             return Err(ConstraintSearchError::Samples { terms: found, found: samples.len(), needed });
         }
     }
-    let places = samples.places(PLACES);
-    let mut refuted = 0;
-    // The rows that motion is held by at each place.
-    let mut rows: Vec<Vec<f64>> = vec![Vec::new(); places.len()];
-    let mut take = |features: &Features, generators: Vec<Generator>, rows: &mut Vec<Vec<f64>>, velocities: bool| {
-        let mut taken = Vec::new();
-        for generator in generators {
-            let at_place = |&at: &usize| match velocities {
-                true => features.velocity_row(samples, at, &generator.weights),
-                false => features.gradient(samples, at, &generator.weights),
-            };
-            let gradients: Vec<Vec<f64>> = places.iter().map(at_place).collect();
-            if outside(n, rows, &gradients) < OUTSIDE {
-                continue;
-            }
-            if !generator.holds {
-                refuted += 1;
-                continue;
-            }
-            rows.iter_mut().zip(&gradients).for_each(|(rows, gradient)| rows.extend(gradient));
-            taken.push(generator);
-        }
-        taken
-    };
-    let Search { generators, gap } = generators::search(samples, &of_positions, false);
-    let functions = take(&of_positions, generators, &mut rows, false);
+    let mut held = Held::at(samples, PLACES);
+    let Search { generators, gap } = generators::search(samples, &of_positions, false, 1.0);
+    let functions = held.take(samples, &of_positions, generators, false);
     let conserved = if samples.trajectories() > 1 {
-        let Search { generators, .. } = generators::search(samples, &of_positions, true);
-        take(&of_positions, generators, &mut rows, false)
+        let Search { generators, .. } = generators::search(samples, &of_positions, true, 1.0);
+        held.take(samples, &of_positions, generators, false)
     } else {
         Vec::new()
     };
-    let Search { generators, .. } = generators::search(samples, &of_velocities, false);
-    let moving = take(&of_velocities, generators, &mut rows, true);
+    let Search { generators, .. } = generators::search(samples, &of_velocities, false, samples.shared());
+    let moving = held.take(samples, &of_velocities, generators, true);
     let mut constraints = Vec::new();
     for (kind, found) in [(ConstraintKind::Holonomic, &functions), (ConstraintKind::PerTrajectory, &conserved)] {
         constraints.extend(found.iter().map(|generator| generator.described(&of_positions, kind)));
     }
     for generator in &moving {
-        let turns =
-            places.iter().zip(&rows).map(|(&at, rows)| curl(&of_velocities, samples, at, &generator.weights, rows));
-        let turns: Vec<f64> = turns.collect();
+        let places = held.places.iter().zip(&held.bases);
+        let turns: Vec<f64> =
+            places.map(|(&at, rows)| curl(&of_velocities, samples, at, &generator.weights, rows)).collect();
         let turn = (turns.iter().map(|x| x * x).sum::<f64>() / turns.len() as f64).sqrt();
         let integrable = turn < CURL && !of_velocities.has_rate(&generator.weights);
         let kind = if integrable { ConstraintKind::PerTrajectory } else { ConstraintKind::Nonholonomic };
@@ -191,20 +167,89 @@ pub fn find_constraints(
         constraints,
         gap,
         trajectories: samples.trajectories(),
-        refuted,
+        refuted: held.refuted,
         noise: samples.relative_noise(),
     })
 }
 
-/// Root mean square part of unit vectors outside of the span of rows, over all places; 0 where a vector vanishes.
-fn outside(n: usize, rows: &[Vec<f64>], vectors: &[Vec<f64>]) -> f64 {
-    let parts = rows.iter().zip(vectors).map(|(rows, vector)| {
-        let size = vector.iter().map(|x| x * x).sum::<f64>();
-        let basis = kernel(n, rows);
-        let part: f64 = basis.chunks_exact(n).map(|z| dot(z, vector).powi(2)).sum();
-        if size > 0.0 { part / size } else { 0.0 }
-    });
-    (parts.sum::<f64>() / rows.len().max(1) as f64).sqrt()
+/// What holds the motion at some samples.
+struct Held {
+    places: Vec<usize>,
+    /// Orthonormal rows at each place.
+    bases: Vec<Vec<f64>>,
+    /// Candidates that do not hold on data that were left out.
+    refuted: usize,
+}
+
+impl Held {
+    /// Nothing yet.
+    fn at(samples: &MotionSamples, places: usize) -> Self {
+        let places = samples.places(places);
+        Self { bases: vec![Vec::new(); places.len()], places, refuted: 0 }
+    }
+
+    /// Takes generators as long as one has a part outside of what holds the motion already: of those that have at least half of the
+    /// largest such part the simplest, which come first.
+    fn take(
+        &mut self,
+        samples: &MotionSamples,
+        features: &Features,
+        generators: Vec<Generator>,
+        velocities: bool,
+    ) -> Vec<Generator> {
+        let row = |generator: &Generator, at: usize| match velocities {
+            true => features.velocity_row(samples, at, &generator.weights),
+            false => features.gradient(samples, at, &generator.weights),
+        };
+        let rows = |generator: Generator| {
+            let rows: Vec<Vec<f64>> = self.places.iter().map(|&at| row(&generator, at)).collect();
+            (generator, rows)
+        };
+        let mut left: Vec<(Generator, Vec<Vec<f64>>)> = generators.into_iter().map(rows).collect();
+        let mut taken = Vec::new();
+        loop {
+            let parts: Vec<f64> = left.iter().map(|(_, rows)| self.outside(rows)).collect();
+            let most = parts.iter().fold(0.0, |most: f64, part| most.max(*part));
+            let Some(next) = parts.iter().position(|part| *part >= 0.5 * most).filter(|_| most >= OUTSIDE) else {
+                break;
+            };
+            let (generator, rows) = left.remove(next);
+            if !generator.holds {
+                self.refuted += 1;
+                continue;
+            }
+            for (basis, row) in self.bases.iter_mut().zip(&rows) {
+                let rest = beside(basis, row);
+                let size = dot(&rest, &rest).sqrt();
+                if size > 0.0 {
+                    basis.extend(rest.iter().map(|x| x / size));
+                }
+            }
+            taken.push(generator);
+        }
+        taken
+    }
+
+    /// Root mean square part of vectors at unit length outside of what holds the motion; 0 where a vector vanishes.
+    fn outside(&self, vectors: &[Vec<f64>]) -> f64 {
+        let parts = self.bases.iter().zip(vectors).map(|(basis, vector)| {
+            let (rest, size) = (beside(basis, vector), dot(vector, vector));
+            if size > 0.0 { dot(&rest, &rest) / size } else { 0.0 }
+        });
+        (parts.sum::<f64>() / self.bases.len().max(1) as f64).sqrt()
+    }
+}
+
+/// What a vector is beside orthonormal rows, taken out twice, since once leaves rounding.
+fn beside(basis: &[f64], vector: &[f64]) -> Vec<f64> {
+    let mut rest = vector.to_vec();
+    for _ in 0..2 {
+        for row in basis.chunks_exact(vector.len()) {
+            let along = dot(row, &rest);
+            rest.iter_mut().zip(row).for_each(|(x, a)| *x -= along * a);
+        }
+    }
+    rest
 }
 
 /// Scalar product.

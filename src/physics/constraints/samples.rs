@@ -4,7 +4,7 @@ use crate::recording::Recording;
 use crate::recording::smooth::{SmoothError, SmoothOptions, Smoothing};
 
 /// Most samples that are looked at, evenly spaced.
-const MOST_SAMPLES: usize = 20_000;
+const MOST_SAMPLES: usize = 60_000;
 
 /// Positions and velocities of trajectories, with standard deviations of their noise.
 #[derive(Clone, Debug, Default, PartialEq)]

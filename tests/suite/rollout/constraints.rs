@@ -37,7 +37,7 @@ fn distance(a: &[f64], b: &[f64]) -> f64 {
 fn starts() -> [(&'static str, Vec<f64>, Vec<f64>); 4] {
     let (s, c) = 0.8f64.sin_cos();
     [
-        ("cartesian-chain-2", vec![s, -c, s + c, -c - s], vec![c, s, c + 0.5 * s, s - 0.5 * c]),
+        ("cartesian-chain-2", vec![s, -c, s + c, -c - s], vec![c, s, c + 0.5 * s, s + 0.5 * c]),
         ("heavy-top", vec![1.0, 0.0, 0.0, 0.0, c, -s, 0.0, s, c], {
             // Columns turn with the angular velocity (0.2, -0.3, 4) in space.
             let w = [0.2, -0.3, 4.0];
@@ -94,17 +94,17 @@ fn adaptive_steps_stay_on_the_constraints_with_their_tolerance() {
     }
 }
 
-/// Over a thousand swings the symplectic forms keep the energy within a band and the rod to rounding; in double-double as well.
+/// Over two hundred swings the symplectic forms keep the energy within a band and the rod to rounding; in double-double as well.
 #[test]
 fn energy_stays_in_its_band() {
     let pendulum = model("cartesian-chain-1");
     let (q, v) = ([0.6, -0.8], [0.0, 0.0]);
     for (method, bound) in [(Method::Midpoint, 2e-2), (Method::Gauss4, 2e-5)] {
-        let options = Options { method, step: Some(0.05), ..Options::new(2000.0, 0.5) };
+        let options = Options { method, step: Some(0.05), ..Options::new(400.0, 0.5) };
         let motion = rollout(&*pendulum, &q, &v, &options).complete().unwrap();
         let energy = motion.energy.as_ref().unwrap();
         let worst = |part: &[f64]| part.iter().map(|e| (e - energy[0]).abs()).fold(0.0, f64::max);
-        let (first, end) = (worst(&energy[..400]), worst(&energy[energy.len() - 400..]));
+        let (first, end) = (worst(&energy[..200]), worst(&energy[energy.len() - 200..]));
         assert!(first < bound && end < 1.5 * first, "{method:?}: {first:e} {end:e}");
         assert!(defect(&*pendulum, &motion) < 1e-12);
     }

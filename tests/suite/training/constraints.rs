@@ -79,7 +79,7 @@ fn a_particle_on_a_sphere_is_learned_in_cartesian_coordinates() {
     let manifold = sphere.manifold().unwrap();
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     let (mut q, mut v) = (Vec::new(), Vec::new());
-    while q.len() < 3 * 600 {
+    while q.len() < 3 * 1500 {
         let mut draw = || -> Vec<f64> { (0..3).map(|_| rng.random_range(-1.0..1.0)).collect() };
         let (mut place, mut speed) = (draw(), draw());
         if project(manifold, &mut place, &mut speed).is_ok() {
@@ -93,13 +93,13 @@ fn a_particle_on_a_sphere_is_learned_in_cartesian_coordinates() {
     assert_eq!((data.constraints(), free.constraints()), (1, 0));
     assert!(data.checksum() != free.checksum());
     let learn = |data: &Dataset<f64>| {
-        let trainer = Trainer::new(data).structure(Structure::Mechanical).hidden(&[8]).batch(32).epochs(12);
+        let trainer = Trainer::new(data).structure(Structure::Mechanical).hidden(&[16]).batch(32).epochs(30);
         trainer.train().unwrap()
     };
     let learned = learn(&data);
-    assert!(learned.test_loss < 0.1, "{}", learned.test_loss);
+    assert!(learned.test_loss < 0.2, "{}", learned.test_loss);
     // Without the rows the same budget learns less.
-    assert!(learned.test_loss < 0.5 * learn(&free).test_loss);
+    assert!(learned.test_loss < 0.2 * learn(&free).test_loss);
 }
 
 #[test]
