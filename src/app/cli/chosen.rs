@@ -2,7 +2,7 @@
 
 use crate::cli::{CliError, config};
 use crate::lagrangian::system::System;
-use crate::lagrangian::{Description, find};
+use crate::lagrangian::{Description, find, resolve};
 use crate::network::file::Header;
 use std::borrow::Cow;
 use std::path::Path;
@@ -22,7 +22,7 @@ pub fn system(system: &str) -> Result<Cow<'static, System>, CliError> {
         let refused = |(line, problem)| CliError::usage(format_args!("{name}:{line}: {problem}"));
         return parse_system(&text).map(Cow::Owned).map_err(refused);
     }
-    find(system).map(Cow::Borrowed).map_err(|error| {
+    resolve(system).map_err(|error| {
         let file = if Path::new(system).is_file() { "; a file of a system ends in .toml" } else { "" };
         CliError::usage(format_args!("{error}{file}"))
     })

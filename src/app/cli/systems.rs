@@ -4,6 +4,7 @@ use crate::cli::{CliError, chosen, output};
 use crate::lagrangian::system::{Bounds, Coordinate, Parameter, Size, System};
 use crate::lagrangian::{constrained_systems, systems};
 use serde_json::{Value, json};
+use std::borrow::Cow;
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
@@ -19,14 +20,17 @@ pub struct Args {
 /// Prints the catalogue.
 pub fn run(args: &Args) -> Result<(), CliError> {
     let one = args.system.as_deref().map(chosen::system).transpose()?;
-    let all: Vec<&System> = match one.as_deref() {
+    let all: Vec<Cow<'static, System>> = match one {
         Some(system) => vec![system],
-        None => systems().iter().chain(constrained_systems()).collect(),
+        None => {
+            let constrained = constrained_systems().into_iter().map(Cow::Owned);
+            systems().iter().map(Cow::Borrowed).chain(constrained).collect()
+        }
     };
     if args.json {
-        return output::print(&all.into_iter().map(|system| format!("{}\n", describe(system))).collect::<String>());
+        return output::print(&all.iter().map(|system| format!("{}\n", describe(system))).collect::<String>());
     }
-    output::print(&all.into_iter().map(table).collect::<Vec<_>>().join("\n"))
+    output::print(&all.iter().map(|system| table(system)).collect::<Vec<_>>().join("\n"))
 }
 
 /// Symbol, default, unit and allowed values of every parameter.

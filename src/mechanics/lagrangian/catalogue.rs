@@ -4,7 +4,7 @@ use super::derivatives::{State, evaluate};
 use super::system::{ClosedForm, System};
 use super::{
     Constrained, ConstraintError, EulerLagrange, ExpressionConstraints, ExpressionLagrangian, Lagrangian, Mechanics,
-    Request, Terms, constrained_systems,
+    Request, Terms, constrained_descriptions,
 };
 use crate::linalg::Workspace;
 use crate::names::unknown;
@@ -209,8 +209,19 @@ pub fn systems() -> &'static [System] {
 /// # Errors
 /// [`SystemError::UnknownSystem`] with the nearest name.
 pub fn find(name: &str) -> Result<&'static System, SystemError> {
-    let mut all = SYSTEMS.iter().chain(constrained_systems());
-    all.find(|system| system.name == name).ok_or_else(|| unknown_system(name))
+    SYSTEMS.iter().find(|system| system.name == name).ok_or_else(|| unknown_system(name))
+}
+
+/// The system of a name, one under constraints as well.
+///
+/// # Errors
+/// As [`find`].
+pub(crate) fn resolve(name: &str) -> Result<Cow<'static, System>, SystemError> {
+    let constrained = || constrained_descriptions().find(|description| description.name == name)?.compile().ok();
+    match find(name) {
+        Ok(system) => Ok(Cow::Borrowed(system)),
+        Err(unknown) => constrained().map(Cow::Owned).ok_or(unknown),
+    }
 }
 
 impl<S: Scalar> SystemInstance<S> {
@@ -348,7 +359,10 @@ fn leading<S: Scalar>(x: &[S]) -> Vec<f64> {
 fn unknown_system(name: &str) -> SystemError {
     SystemError::UnknownSystem {
         name: name.into(),
-        known: SYSTEMS.iter().chain(constrained_systems()).map(|system| system.name.to_string()).collect(),
+        known: {
+            let constrained = constrained_descriptions().map(|description| description.name);
+            SYSTEMS.iter().map(|system| system.name.to_string()).chain(constrained).collect()
+        },
     }
 }
 

@@ -1,7 +1,7 @@
 //! Systems with the values of their parameters, as text or as numbers.
 
 use super::EulerLagrange;
-use super::catalogue::{Given, SystemError, SystemInstance, find};
+use super::catalogue::{Given, SystemError, SystemInstance, resolve};
 use super::system::Range;
 use super::system::{Size, System};
 use crate::scalar::Scalar;
@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 /// # Errors
 /// [`SystemError`] for an unknown name or symbol, a repeated symbol, a value that is no number or out of range.
 pub fn configure<S: Scalar>(name: &str, given: &Given) -> Result<SystemInstance<S>, SystemError> {
-    configure_system(Cow::Borrowed(find(name)?), given)
+    configure_system(resolve(name)?, given)
 }
 
 /// [`configure`] for a given system: one of the catalogue, or one made from a [description](super::Description).
@@ -120,6 +120,7 @@ fn assemble<S: Scalar>(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::lagrangian::find;
 
     #[test]
     fn numbers_and_their_texts_configure_the_same() {

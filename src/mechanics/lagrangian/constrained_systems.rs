@@ -5,12 +5,13 @@ use super::description::Description;
 use super::system::Range;
 use super::system::System;
 use std::collections::BTreeMap;
-use std::sync::LazyLock;
+use std::f64::consts::TAU;
 
 /// Most bobs of a chain.
 const MOST_BOBS: usize = 20;
 
-static SYSTEMS: LazyLock<Vec<System>> = LazyLock::new(|| {
+/// What the systems are.
+pub(super) fn constrained_descriptions() -> impl Iterator<Item = Description> {
     let single = [
         on_surface("particle-on-sphere", "Heavy particle on a sphere", &["R"], "x^2 + y^2 + z^2 - R^2", 1.0),
         on_surface(
@@ -39,7 +40,7 @@ static SYSTEMS: LazyLock<Vec<System>> = LazyLock::new(|| {
             &[
                 ("r", (4.0, 12.0), (-0.3, 0.3)),
                 ("theta", (0.7, 2.4), (-0.05, 0.05)),
-                ("phi", (0.0, 6.28), (-0.05, 0.05)),
+                ("phi", (0.0, TAU), (-0.05, 0.05)),
             ],
             "M",
             "-(1 - 2*M/r)*t_dot^2 + r_dot^2/(1 - 2*M/r) + r^2*(theta_dot^2 + sin(theta)^2*phi_dot^2)",
@@ -52,14 +53,13 @@ static SYSTEMS: LazyLock<Vec<System>> = LazyLock::new(|| {
             "(L/z)^2*(-t_dot^2 + x_dot^2 + y_dot^2 + z_dot^2)",
         ),
     ];
-    let all = single.into_iter().chain((1..=MOST_BOBS).map(chain));
-    // Formulas of this file, which a test compiles.
-    all.filter_map(|description| description.compile().ok()).collect()
-});
+    single.into_iter().chain((1..=MOST_BOBS).map(chain))
+}
 
-/// The systems under constraints.
-pub fn constrained_systems() -> &'static [System] {
-    &SYSTEMS
+/// The systems under constraints, made anew.
+pub fn constrained_systems() -> Vec<System> {
+    // Formulas of this file, which a test compiles.
+    constrained_descriptions().filter_map(|description| description.compile().ok()).collect()
 }
 
 /// A coordinate with its bounds and those of its velocity.
@@ -211,7 +211,7 @@ fn four_bar() -> Description {
 /// Chaplygin's sleigh: a blade at `(x, y)` along `theta`, the centre of mass `a` before it.
 fn sleigh() -> Description {
     let coordinates =
-        [("x", (-2.0, 2.0), (-2.0, 2.0)), ("y", (-2.0, 2.0), (-2.0, 2.0)), ("theta", (0.0, 6.28), (-2.0, 2.0))];
+        [("x", (-2.0, 2.0), (-2.0, 2.0)), ("y", (-2.0, 2.0), (-2.0, 2.0)), ("theta", (0.0, TAU), (-2.0, 2.0))];
     let parameters = [("a", "0.3", "m"), ("m", "1", "kg"), ("I", "0.2", "kg m^2")];
     let lagrangian =
         "m*((x_dot - a*theta_dot*sin(theta))^2 + (y_dot + a*theta_dot*cos(theta))^2)/2 + I*theta_dot^2/2".to_string();
@@ -223,7 +223,7 @@ fn sleigh() -> Description {
 fn disk() -> Description {
     let place = (-2.0, 2.0);
     let coordinates =
-        [("x", place, place), ("y", place, place), ("theta", (0.0, 6.28), place), ("phi", (0.0, 6.28), (-3.0, 3.0))];
+        [("x", place, place), ("y", place, place), ("theta", (0.0, TAU), place), ("phi", (0.0, TAU), (-3.0, 3.0))];
     let parameters = [("R", "0.5", "m"), ("m", "1", "kg"), ("I", "0.1", "kg m^2"), ("J", "0.15", "kg m^2")];
     let constraints = [("rolling x", "x_dot - R*phi_dot*cos(theta)"), ("rolling y", "y_dot - R*phi_dot*sin(theta)")];
     let constraints = constraints.map(|(name, formula)| (name.to_string(), formula.to_string())).to_vec();

@@ -27,10 +27,12 @@ mod terms;
 mod with_forces;
 
 pub(crate) use catalogue::LagrangianVisitor;
+pub(crate) use catalogue::resolve;
 pub use catalogue::{SystemError, SystemInstance, find, systems};
 pub use configure::configure;
 #[doc(hidden)]
 pub use configure::{build, configure_system, configure_values};
+use constrained_systems::constrained_descriptions;
 pub use constrained_systems::constrained_systems;
 pub use constraints::{
     Constrained, ConstraintError, Constraints, ExpressionConstraints, LeastNorm, LeastNormMotion, Manifold,

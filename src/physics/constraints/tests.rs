@@ -6,13 +6,16 @@ use crate::recording::{RecordedTrajectory, Recording};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
+/// Coordinates and velocities at a time.
+type Path = Box<dyn Fn(f64) -> (Vec<f64>, Vec<f64>)>;
+
 /// A recording of motions `t -> (q, v)`, with noise of a share of the size of all positions.
 fn recorded(
     names: &[&str],
     periodic: &[bool],
     noise: f64,
     velocities: bool,
-    motions: &mut dyn FnMut(&mut ChaCha8Rng) -> Box<dyn Fn(f64) -> (Vec<f64>, Vec<f64>)>,
+    motions: &mut dyn FnMut(&mut ChaCha8Rng) -> Path,
 ) -> Recording {
     let mut rng = ChaCha8Rng::seed_from_u64(3);
     let mut normal = ChaCha8Rng::seed_from_u64(4);
@@ -43,7 +46,7 @@ fn found(recording: &Recording) -> FoundConstraints {
 }
 
 /// Two rods, of 1 and 0.8: angles that turn evenly.
-fn two_rods(rng: &mut ChaCha8Rng) -> Box<dyn Fn(f64) -> (Vec<f64>, Vec<f64>)> {
+fn two_rods(rng: &mut ChaCha8Rng) -> Path {
     let [a, b, da, db]: [f64; 4] = [0; 4].map(|_| 3.0 * rng.random::<f64>() - 1.5);
     Box::new(move |t| {
         let ((s, c), (u, w)) = ((a + da * t).sin_cos(), (b + db * t * t).sin_cos());
@@ -75,7 +78,7 @@ fn rods_are_found_at_any_noise_with_their_lengths() {
 #[test]
 fn rolling_is_nonholonomic_and_what_it_conserves_is_not_imposed() {
     // A disk of radius 0.5 that turns and rolls at rates of its own.
-    let mut roll = |rng: &mut ChaCha8Rng| -> Box<dyn Fn(f64) -> (Vec<f64>, Vec<f64>)> {
+    let mut roll = |rng: &mut ChaCha8Rng| -> Path {
         let [x, y, heading, turn, speed]: [f64; 5] = [0; 5].map(|_| 4.0 * rng.random::<f64>() - 2.0);
         let turn = turn + 0.3 * turn.signum();
         Box::new(move |t| {
@@ -99,7 +102,7 @@ fn rolling_is_nonholonomic_and_what_it_conserves_is_not_imposed() {
         }
     }
     // Points on circles of radii of their own.
-    let mut circle = |rng: &mut ChaCha8Rng| -> Box<dyn Fn(f64) -> (Vec<f64>, Vec<f64>)> {
+    let mut circle = |rng: &mut ChaCha8Rng| -> Path {
         let [r, turn]: [f64; 2] = [0; 2].map(|_| 1.0 + rng.random::<f64>());
         let phase: f64 = 6.0 * rng.random::<f64>();
         Box::new(move |t| {
@@ -116,7 +119,7 @@ fn rolling_is_nonholonomic_and_what_it_conserves_is_not_imposed() {
 
 #[test]
 fn nothing_is_found_where_nothing_is() {
-    let mut free = |rng: &mut ChaCha8Rng| -> Box<dyn Fn(f64) -> (Vec<f64>, Vec<f64>)> {
+    let mut free = |rng: &mut ChaCha8Rng| -> Path {
         let [a, b, c, d]: [f64; 4] = [0; 4].map(|_| 2.0 * rng.random::<f64>() - 1.0);
         Box::new(move |t| {
             let (s, w) = ((1.3 * t + 3.0 * a).sin(), (2.1 * t + 3.0 * b).cos());

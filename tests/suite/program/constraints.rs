@@ -62,7 +62,7 @@ fn a_file_with_constraints_moves_on_them() {
 #[test]
 fn mistakes_in_constraints_have_their_line() {
     let folder = Folder::new();
-    let with = |formula: &str| folder.file("my.toml", &PENDULUM.replace("x^2 + y^2 - l^2", formula));
+    let with = |formula: &str| folder.file("my.toml", PENDULUM.replace("x^2 + y^2 - l^2", formula));
     for (formula, parts) in [
         ("x^2 + z", ["constraints.rod", "z"]),
         ("x_dot*y_dot", ["constraints.rod", "linear in the velocities"]),
@@ -115,7 +115,7 @@ fn what_is_found_in_data_holds_another_motion() {
     // Under the table of the file a free mass is a pendulum of half a metre.
     let free = folder.file(
         "free.toml",
-        &PENDULUM.replace("[constraints]\nrod = \"x^2 + y^2 - l^2\"\n", "").replace("l = {", "unused = {"),
+        PENDULUM.replace("[constraints]\nrod = \"x^2 + y^2 - l^2\"\n", "").replace("l = {", "unused = {"),
     );
     let motion = text(&folder.path("motion.csv"));
     let roll =

@@ -95,13 +95,13 @@ fn check<S: Scalar>(rows: &ManifoldRows<S>, of: &[usize], defects: &[S], size: S
     for &row in of {
         let gradient = length(&rows.matrix[row * n..(row + 1) * n]);
         let defect = if gradient > <S as Real>::zero() { defects[row].abs() / gradient } else { defects[row].abs() };
-        if worst.is_none_or(|(_, most)| !(defect <= most)) {
+        if worst.is_none_or(|(_, most)| defect.is_nan() || defect > most) {
             worst = Some((row, defect));
         }
     }
     let allowed = S::of_f64(ROUNDINGS) * S::epsilon() * Real::max(size, S::min_positive());
     match worst {
-        Some((row, defect)) if !(defect <= allowed) => Err(OffManifold { row, defect: defect.to_f64() }),
+        Some((row, defect)) if defect.is_nan() || defect > allowed => Err(OffManifold { row, defect: defect.to_f64() }),
         _ => Ok(()),
     }
 }

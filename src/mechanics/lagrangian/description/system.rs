@@ -6,7 +6,7 @@ use crate::lagrangian::expression::{Compiler, Expression, Meaning, Value, is_nam
 use crate::lagrangian::system::{
     Bounds, Coordinate, LearningAdvice, Parameter, PerSize, Range, ShellAdvice, Size, System, TrajectoryTest,
 };
-use crate::lagrangian::{ExpressionLagrangian, constrained_systems, systems};
+use crate::lagrangian::{ExpressionLagrangian, constrained_descriptions, systems};
 use crate::names::{taken_column, unknown};
 use crate::ops::{Binary, Unary};
 use crate::scalar::{Dd, Scalar};
@@ -31,9 +31,9 @@ impl Description {
     /// # Errors
     /// The first key that is wrong, and how.
     pub fn system(&self) -> Outcome<System> {
-        let taken = constrained_systems().iter().find(|system| system.name == self.name);
+        let taken = constrained_descriptions().find(|description| description.name == self.name);
         if systems().iter().any(|system| system.name == self.name)
-            || taken.is_some_and(|system| system.description() != Some(self))
+            || taken.is_some_and(|description| description != *self)
         {
             let problem = format!("{} is a system of the catalogue, expected another name", self.name);
             return Err(DescriptionError::new("name", problem));
