@@ -38,7 +38,7 @@ pub struct Args {
     /// The same of the factors of velocities.
     #[arg(long, value_name = "N", default_value = "1", value_parser = whole(0, MOST_DEGREE))]
     velocity_degree: usize,
-    /// A file for the table [constraints], which a system file takes as it is and `lnn rollout --constraints` reads.
+    /// A file for the table [constraints], which a system file takes as it is, and the option of this name of `lnn rollout`.
     #[arg(long, value_name = "FILE.toml")]
     out: Option<PathBuf>,
     /// Replace the file.

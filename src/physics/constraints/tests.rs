@@ -96,10 +96,10 @@ fn rolling_is_nonholonomic_and_what_it_conserves_is_not_imposed() {
         let found = found(&recording);
         let kinds: Vec<ConstraintKind> = found.constraints.iter().map(|c| c.kind).collect();
         assert_eq!((found.count, kinds), (2, vec![ConstraintKind::Nonholonomic; 2]), "{noise}: {found:?}");
-        for row in &found.constraints {
-            let rolled = row.coefficients.iter().find(|(term, _)| term.ends_with("*phi_dot")).unwrap();
-            assert!((rolled.1.abs() - 0.5).abs() < 0.005, "{row:?}");
-        }
+        // A row may do without the rolling: the centre moves along the heading.
+        let rows = found.constraints.iter().flat_map(|row| &row.coefficients);
+        let rolled: Vec<f64> = rows.filter(|(term, _)| term.ends_with("phi_dot")).map(|(_, c)| c.abs()).collect();
+        assert!(!rolled.is_empty() && rolled.iter().all(|c| (c - 0.5).abs() < 0.005), "{found:?}");
     }
     // Points on circles of radii of their own.
     let mut circle = |rng: &mut ChaCha8Rng| -> Path {
