@@ -105,9 +105,7 @@ def test_arrays_of_any_kind_are_taken(arm):
     ],
 )
 def test_arrays_that_are_no_states_are_refused(arm, q, v, error):
-    for call in (arm.terms, arm.acceleration, lambda q, v: arm.rollout(q, v, 1, 0.1), lambda q, v: arm.geometry(q)):
-        if call is not arm.terms and v != [0, 0] and isinstance(v, np.ndarray):
-            continue
+    for call in (arm.terms, arm.acceleration, lambda q, v: arm.rollout(q, v, 1, 0.1)):
         with pytest.raises(error):
             call(q, v)
 
@@ -135,8 +133,8 @@ def test_mistakes_are_values_and_types():
         lambda: lnn.System("double-pendulum").rollout([0, 0], [0, 0], 1, -0.0),
         lambda: lnn.System("double-pendulum").rollout([0, 0], [0, 0], 1, 0.1, method="euler"),
         lambda: lnn.System("double-pendulum").certify(region={"thta1": (0, 1)}),
-        lambda: lnn.System("double-pendulum").acceleration([0, 0], [0, 0], threads=-1) and 1 / 0,
-    ][:-1]:
+        lambda: lnn.System("double-pendulum").rollout([0, 0], [0, 0], 1, 0.1, threads=0),
+    ]:
         with pytest.raises(ValueError):
             wrong()
     with pytest.raises(TypeError):
@@ -246,7 +244,7 @@ def test_the_package_is_imported_without_what_it_does_not_need():
 
 def test_a_model_is_judged(shipped):
     judged = lnn.Model.load(shipped).evaluate(starts=1, threads=2)
-    assert judged["wrong_signature"] == 0.0 and len(judged["accelerations"]) == 2
+    assert judged["wrong_signature"] < 0.05 and len(judged["accelerations"]) == 2
     json.dumps(judged)
     with pytest.raises(ValueError):
         lnn.Model.load(shipped).evaluate(lnn.System("kepler"))
