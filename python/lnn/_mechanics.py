@@ -278,8 +278,8 @@ class System(Mechanics):
         if lagrangian is not None:
             description["lagrangian"] = lagrangian
         description["coordinates"] = []
-        for coordinate, said in coordinates.items():
-            whole = {"name": coordinate, **said}
+        for coordinate, keys in coordinates.items():
+            whole = {"name": coordinate, **keys}
             for key in ["velocity_bounds"] if whole.get("periodic") else ["bounds", "velocity_bounds"]:
                 whole.setdefault(key, [-1.0, 1.0])
             whole = {key: list(x) if isinstance(x, tuple) else x for key, x in whole.items() if x is not None}
@@ -456,8 +456,8 @@ class Model(Mechanics):
         starts : int
             Motions that are compared.
         """
-        from ._progress import teller
+        from ._progress import receiver
 
         exact = None if system is None else system._subject
         plan = starts, seed, thread_count(threads)
-        return json.loads(self._subject.evaluate(exact, plan, teller(progress)))
+        return json.loads(self._subject.evaluate(exact, plan, receiver(progress)))

@@ -43,8 +43,10 @@ pub struct Subject {
 /// All systems of the catalogue, as JSON.
 #[pyfunction]
 pub fn systems() -> PyResult<String> {
-    let all: PyResult<Vec<Value>> =
-        lnn::lagrangian::systems().iter().map(|system| Ok(Subject::of(Cow::Borrowed(system), &[])?.said())).collect();
+    let all: PyResult<Vec<Value>> = lnn::lagrangian::systems()
+        .iter()
+        .map(|system| Ok(Subject::of(Cow::Borrowed(system), &[])?.summary()))
+        .collect();
     Ok(Value::from(all?).to_string())
 }
 
@@ -135,9 +137,9 @@ impl Subject {
         )
     }
 
-    fn said(&self) -> Value {
+    fn summary(&self) -> Value {
         let Region { position, velocity } = self.bounds();
-        let mut said = json!({
+        let mut summary = json!({
             "columns": self.columns, "periodic": self.periodic(), "units": self.units(),
             "time_like": self.time_like(), "position": position, "velocity": velocity,
         });
@@ -151,10 +153,10 @@ impl Subject {
             }
             Kind::Model(header, _) => json!({ "name": header.system, "header": header }),
         };
-        if let (Some(said), Value::Object(more)) = (said.as_object_mut(), more) {
-            said.extend(more);
+        if let (Some(summary), Value::Object(more)) = (summary.as_object_mut(), more) {
+            summary.extend(more);
         }
-        said
+        summary
     }
 
     /// A region with the bounds of the named columns replaced.
@@ -258,7 +260,7 @@ impl Subject {
 
     /// Everything but numbers, as JSON.
     fn facts(&self) -> String {
-        self.said().to_string()
+        self.summary().to_string()
     }
 
     /// All terms of states `(b, n)`, flat, and the rows that fail with what is wrong.
@@ -350,16 +352,16 @@ impl Subject {
         if interrupted {
             return Err(PyKeyboardInterrupt::new_err("interrupted"));
         }
-        let told = PyList::empty(py);
+        let result = PyList::empty(py);
         for Rollout { trajectory, statistics, stop } in motions {
             if let Some(error @ RolloutError::Invalid { .. }) = &stop {
                 return Err(value(error));
             }
             let energy = trajectory.energy.unwrap_or_default().into_pyarray(py);
             let [t, q, v] = [trajectory.t, trajectory.q, trajectory.v].map(|numbers| numbers.into_pyarray(py));
-            told.append((t, q, v, energy, stop.map(|stop| stop.to_string()), statistics.evaluations))?;
+            result.append((t, q, v, energy, stop.map(|stop| stop.to_string()), statistics.evaluations))?;
         }
-        Ok(told)
+        Ok(result)
     }
 
     /// Metric, connection and curvature at points `(b, n)`: a dictionary of flat arrays of each, or what is wrong.
@@ -372,15 +374,15 @@ impl Subject {
         let points = slice(&points)?;
         let model = self.moving();
         let found = py.detach(|| geometries(model, points, &velocity)).map_err(value)?;
-        let told = found.into_iter().map(|geometry| match geometry {
+        let result = found.into_iter().map(|geometry| match geometry {
             Err(error) => Ok(error.to_string().into_pyobject(py)?.into_any()),
             Ok(geometry) => {
-                let told = PyDict::new(py);
+                let result = PyDict::new(py);
                 let (metric, curvature) = (geometry.metric, geometry.curvature);
-                told.set_item("signature", (metric.signature.positive, metric.signature.negative))?;
-                told.set_item("determinant", metric.determinant)?;
-                told.set_item("scalar", curvature.scalar)?;
-                told.set_item("kretschmann", curvature.kretschmann)?;
+                result.set_item("signature", (metric.signature.positive, metric.signature.negative))?;
+                result.set_item("determinant", metric.determinant)?;
+                result.set_item("scalar", curvature.scalar)?;
+                result.set_item("kretschmann", curvature.kretschmann)?;
                 for (name, numbers) in [
                     ("metric", metric.components),
                     ("inverse", metric.inverse),
@@ -390,12 +392,12 @@ impl Subject {
                     ("einstein", curvature.einstein),
                     ("weyl", curvature.weyl),
                 ] {
-                    told.set_item(name, numbers.into_pyarray(py))?;
+                    result.set_item(name, numbers.into_pyarray(py))?;
                 }
-                Ok(told.into_any())
+                Ok(result.into_any())
             }
         });
-        told.collect()
+        result.collect()
     }
 
     /// Point symmetries, as JSON.

@@ -19,19 +19,19 @@ def swing(amplitude, samples=400):
 
 
 def test_a_system_is_learned(tmp_path):
-    told = []
+    result = []
     learned = lnn.train(
         "harmonic-oscillator",
         **{**SMALL, "epochs": 20},
         starts=1,
         config=STATES,
         out=tmp_path / "run",
-        progress=lambda *event: told.append(event),
+        progress=lambda *event: result.append(event),
     )
     losses = learned.history["validation_loss"]
     assert losses.shape == (20,) and losses[-1] < losses[0] and learned.stop is None
     assert learned.summary["validation_loss"] == losses.min() and "loss" in learned.text
-    assert {kind for kind, *_ in told} >= {"step", "epoch"}
+    assert {kind for kind, *_ in result} >= {"step", "epoch"}
     same = lnn.Model.load(tmp_path / "run")
     assert same.to_bytes() == learned.model.to_bytes() and (tmp_path / "run/report.html").exists()
     again = lnn.train("harmonic-oscillator", **{**SMALL, "epochs": 20, "threads": 2}, starts=1, config=STATES)

@@ -32,8 +32,8 @@ def test_the_checks_that_do_not_pass_have_one_reason():
         found = check_estimator(lnn.LagrangianRegressor(hidden=(4,), epochs=1, threads=1), on_fail=None)
     failed = [check for check in found if check["status"] == "failed"]
     for check in failed:
-        error, said = check["exception"], ""
+        error, message = check["exception"], ""
         while error is not None:
-            said, error = said + str(error), error.__cause__ or error.__context__
-        assert "two features for each acceleration" in said, (check["check_name"], said)
+            message, error = message + str(error), error.__cause__ or error.__context__
+        assert "two features for each acceleration" in message, (check["check_name"], message)
     assert sum(check["status"] == "passed" for check in found) >= 30 and len(failed) <= 22
