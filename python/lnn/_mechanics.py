@@ -243,7 +243,8 @@ class System(Mechanics):
     parameters : dict
         Values, or dicts of ``default``, ``unit``, ``range``, ``learn``.
     **more
-        Values of the parameters of a system of the catalogue; other keys of a system file, such as ``definitions`` or ``metric``.
+        Values of the parameters of a system of the catalogue; other keys of a system file, such as ``definitions``, ``constraints`` or
+        ``metric``.
 
     Examples
     --------
@@ -321,6 +322,8 @@ class System(Mechanics):
 
         if self.description is None:
             raise ValueError("only a system with a formula of its own is a function of other libraries")
+        if self.description.get("constraints"):
+            raise ValueError("the motion under constraints does not follow from the formula alone: other libraries have no such functions")
         model = DescribedModel(Described(self.description), self.parameters)
         return kind(xp, model, {})
 

@@ -46,6 +46,17 @@ def test_systems_by_name_formula_and_file(arm, tmp_path):
     assert len(chain.coordinates) == 4
 
 
+def test_a_system_under_constraints_moves_on_them():
+    rod = {"lagrangian": "m*(x_dot^2 + y_dot^2)/2 - m*g*y", "constraints": {"rod": "x^2 + y^2 - 1"}}
+    system = lnn.System("rod", coordinates=["x", "y"], parameters={"m": 1, "g": 9.8}, **rod)
+    a = system.acceleration([1.0, 0.0], [0.0, 2.0])
+    assert np.allclose(a, [-4.0, -9.8])
+    again = pickle.loads(pickle.dumps(system))
+    assert np.array_equal(again.acceleration([1.0, 0.0], [0.0, 2.0]), a)
+    with pytest.raises(ValueError, match="constraints"):
+        system.to_numpy()
+
+
 def test_terms_have_the_shapes_of_the_states(arm):
     rng = np.random.default_rng(0)
     q, v = rng.normal(size=(2, 3, 5, 2))
