@@ -12,7 +12,7 @@ import numpy as np
 from . import _lnn
 from ._arrays import doubles, states, thread_count
 from ._mechanics import Model, System
-from ._progress import Progress, teller
+from ._progress import Progress, receiver
 from ._results import Learned
 
 
@@ -79,7 +79,7 @@ def train(
     changes |= dict(config or {})
     whole = _lnn.configuration(system._subject, preset, structure, epochs, json.dumps(changes))
     directory = None if out is None else os.fspath(out)
-    return _learned(_lnn.train(system._subject, whole, (starts, thread_count(threads)), directory, teller(progress)))
+    return _learned(_lnn.train(system._subject, whole, (starts, thread_count(threads)), directory, receiver(progress)))
 
 
 def _known(known: System | None, prefix: str = "") -> dict[str, Any]:
@@ -193,7 +193,7 @@ def fit(
         Times, and measured velocities, accelerations and known forces of the trajectories, as far as they are known. Of a DataFrame, names of
         columns.
     trajectory : str, optional
-        Column whose value tells the trajectories of a file or a DataFrame apart.
+        Column whose value distinguishes the trajectories of a file or a DataFrame.
     columns : dict, optional
         More about the columns of files: ``time``, ``rate``, ``velocities``, ``accelerations``, ``forces``, ``units``.
     friction : bool
@@ -226,7 +226,7 @@ def fit(
     choices = _choices(coordinates, angles, structure, hidden, epochs, precision, seed, threads, config)
     choices = json.dumps({**choices, "friction": friction, "columns": columns})
     directory = None if out is None else os.fspath(out)
-    return _learned(_lnn.fit(files, tracks, choices, directory, teller(progress)))
+    return _learned(_lnn.fit(files, tracks, choices, directory, receiver(progress)))
 
 
 def _is_path(x) -> bool:

@@ -243,7 +243,8 @@ class System(Mechanics):
     parameters : dict
         Values, or dicts of ``default``, ``unit``, ``range``, ``learn``.
     **more
-        Values of the parameters of a system of the catalogue; other keys of a system file, such as ``definitions`` or ``metric``.
+        Values of the parameters of a system of the catalogue; other keys of a system file, such as ``definitions``, ``constraints`` or
+        ``metric``.
 
     Examples
     --------
@@ -278,8 +279,8 @@ class System(Mechanics):
         if lagrangian is not None:
             description["lagrangian"] = lagrangian
         description["coordinates"] = []
-        for coordinate, said in coordinates.items():
-            whole = {"name": coordinate, **said}
+        for coordinate, keys in coordinates.items():
+            whole = {"name": coordinate, **keys}
             for key in ["velocity_bounds"] if whole.get("periodic") else ["bounds", "velocity_bounds"]:
                 whole.setdefault(key, [-1.0, 1.0])
             whole = {key: list(x) if isinstance(x, tuple) else x for key, x in whole.items() if x is not None}
@@ -321,6 +322,8 @@ class System(Mechanics):
 
         if self.description is None:
             raise ValueError("only a system with a formula of its own is a function of other libraries")
+        if self.description.get("constraints"):
+            raise ValueError("the motion under constraints does not follow from the formula alone: other libraries have no such functions")
         model = DescribedModel(Described(self.description), self.parameters)
         return kind(xp, model, {})
 
@@ -456,8 +459,8 @@ class Model(Mechanics):
         starts : int
             Motions that are compared.
         """
-        from ._progress import teller
+        from ._progress import receiver
 
         exact = None if system is None else system._subject
         plan = starts, seed, thread_count(threads)
-        return json.loads(self._subject.evaluate(exact, plan, teller(progress)))
+        return json.loads(self._subject.evaluate(exact, plan, receiver(progress)))

@@ -8,8 +8,8 @@ from collections.abc import Callable
 Progress = bool | Callable[[str, float, float, str], None] | None
 
 
-def teller(progress: Progress):
-    """A receiver of events: the one that is given, a line at the terminal or in a notebook for True, nobody for None."""
+def receiver(progress: Progress):
+    """A receiver of events: the one that is given, a line at the terminal or in a notebook for True, none for None."""
     return Line() if progress is True else progress or None
 
 

@@ -39,7 +39,7 @@ class Trajectory:
     @property
     def complete(self) -> bool:
         """Whether every motion reached its end."""
-        return all(stop is None for stop in np.atleast_1d(np.asarray(self.stop, dtype=object)))
+        return all(stop is None for stop in np.asarray(self.stop, dtype=object).ravel())
 
     def to_pandas(self):
         """A DataFrame of the samples of one motion, or of a batch under an index ``start``."""

@@ -15,15 +15,15 @@ const LOOK: Duration = Duration::from_millis(50);
 /// Stack of the work, that of a main thread.
 const STACK: usize = 8 << 20;
 
-/// An event as Python is told: kind, two numbers, a text.
-type Said = (&'static str, f64, f64, String);
+/// An event as Python receives it: kind, two numbers, a text.
+type News = (&'static str, f64, f64, String);
 
 enum Message {
-    Said(Said),
+    News(News),
     Done,
 }
 
-/// Runs `work` under a watch whose flag a signal raises, and tells `progress` what happens meanwhile.
+/// Runs `work` under a watch whose flag a signal raises, and reports to `progress` what happens meanwhile.
 ///
 /// # Errors
 /// A second signal, what `progress` raises, and a panic of the work.
@@ -36,14 +36,14 @@ pub fn attended<T: Send>(
     let flag = Arc::new(AtomicBool::new(false));
     let mut watch = Watch { events: None, interrupt: Arc::clone(&flag) };
     if progress.is_some() {
-        let teller = Teller { sender: sender.clone(), last: std::sync::Mutex::new(None) };
-        watch = Watch { interrupt: Arc::clone(&flag), ..Watch::new(move |event| teller.tell(event)) };
+        let reporter = Reporter { sender: sender.clone(), last: std::sync::Mutex::new(None) };
+        watch = Watch { interrupt: Arc::clone(&flag), ..Watch::new(move |event| reporter.report(event)) };
     }
     // The receiver moves into this call, which stays on this thread.
     py.detach(move || {
         std::thread::scope(|scope| {
             let running = Builder::new().stack_size(STACK).spawn_scoped(scope, move || {
-                // Told also when the work panics.
+                // Sent also when the work panics.
                 let _end = End(sender);
                 work(watch)
             });
@@ -69,8 +69,8 @@ fn look(receiver: &Receiver<Message>, flag: &AtomicBool, progress: Option<&Py<Py
             return failed;
         }
         let attended = Python::attach(|py| {
-            if let (Ok(Message::Said(said)), Some(progress), true) = (message, progress, failed.is_ok()) {
-                progress.call1(py, said)?;
+            if let (Ok(Message::News(news)), Some(progress), true) = (message, progress, failed.is_ok()) {
+                progress.call1(py, news)?;
             }
             // The first signal ends the work with what it has, as the program does.
             match py.check_signals() {
@@ -94,15 +94,15 @@ impl Drop for End {
 }
 
 /// Sends events, of steps no more than there is time to look at.
-struct Teller {
+struct Reporter {
     sender: Sender<Message>,
     last: std::sync::Mutex<Option<Instant>>,
 }
 
-impl Teller {
-    fn tell(&self, event: Event<'_>) {
+impl Reporter {
+    fn report(&self, event: Event<'_>) {
         let pair = |kind, done: usize, total: usize| (kind, done as f64, total as f64, String::new());
-        let said = match event {
+        let news = match event {
             Event::Step { done, total } => {
                 let Ok(mut last) = self.last.lock() else { return };
                 if done < total && last.is_some_and(|last| last.elapsed() < LOOK) {
@@ -116,6 +116,6 @@ impl Teller {
             Event::Note(text) => ("note", 0.0, 0.0, text.to_string()),
             _ => return,
         };
-        let _ = self.sender.send(Message::Said(said));
+        let _ = self.sender.send(Message::News(news));
     }
 }

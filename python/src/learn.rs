@@ -133,9 +133,9 @@ pub fn train(
         lnn::pipeline::train(&config, &instance, &options, output(out)?.as_ref(), &watch)
     })?
     .map_err(pipeline)?;
-    let (text, told, stop) = (report.text(), history(&report.history)?, ended(&report.stop));
+    let (text, result, stop) = (report.text(), history(&report.history)?, ended(&report.stop));
     let json = report.json().map_err(pipeline)?;
-    Ok((Subject::learned(report.header, report.network), told, json, text, stop))
+    Ok((Subject::learned(report.header, report.network), result, json, text, stop))
 }
 
 /// Choices of [`learn`] and [`fit`], as JSON.
@@ -206,8 +206,8 @@ pub fn learn(
     let loaded = learned.save(&place).and_then(|()| ModelFile::<f64>::load(&place));
     let _ = std::fs::remove_file(&place);
     let header = loaded.map_err(runtime)?.header;
-    let told = history(&learned.history)?;
-    Ok((Subject::learned(header, learned.model), told, learned.validation_loss, learned.test_loss))
+    let result = history(&learned.history)?;
+    Ok((Subject::learned(header, learned.model), result, learned.validation_loss, learned.test_loss))
 }
 
 /// One trajectory as Python gives it: name, times, positions, and velocities, accelerations and forces, empty if there are none.
@@ -226,15 +226,15 @@ pub fn fit(
     let choices: Choices = serde_json::from_str(choices).map_err(value)?;
     let source = source(files, tracks, &choices)?;
     let refused: Arc<Mutex<Option<String>>> = Arc::default();
-    let told = Arc::clone(&refused);
-    let report = attended(py, progress.as_ref(), move |watch| task(source, choices, told, out).watch(watch).run())?;
-    if let Some(problem) = refused.lock().ok().and_then(|mut told| told.take()) {
+    let result = Arc::clone(&refused);
+    let report = attended(py, progress.as_ref(), move |watch| task(source, choices, result, out).watch(watch).run())?;
+    if let Some(problem) = refused.lock().ok().and_then(|mut result| result.take()) {
         return Err(value(problem));
     }
     let report = report.map_err(pipeline)?;
-    let (text, told, stop) = (report.text().to_string(), history(&report.history)?, ended(&report.stop));
+    let (text, result, stop) = (report.text().to_string(), history(&report.history)?, ended(&report.stop));
     let json = report.json().to_string();
-    Ok((Subject::learned(report.header, report.network), told, json, text, stop))
+    Ok((Subject::learned(report.header, report.network), result, json, text, stop))
 }
 
 /// Origin of recorded motion.

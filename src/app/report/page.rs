@@ -110,7 +110,7 @@ fn exact(system: &SystemInstance<f64>) -> Result<Option<Value>, TapeError> {
     Ok(Some(json!({ "lagrangian": operations(&listing), "parameters": parameters })))
 }
 
-/// A start within what the model knows, of a system among those of its trajectory test and on its mass shell.
+/// A moving start within what the model knows, of a system among those of its trajectory test and on its mass shell.
 fn start(header: &Header, system: Option<&SystemInstance<f64>>) -> Value {
     let at = |share: f64| move |&(low, high): &(f64, f64)| low + share * (high - low);
     let pairs = |ranges: &[[f64; 2]]| ranges.iter().map(|&[low, high]| (low, high)).collect();
@@ -119,7 +119,7 @@ fn start(header: &Header, system: Option<&SystemInstance<f64>>) -> Value {
         None => Bounds { positions: pairs(&header.position), velocities: pairs(&header.velocity) },
     };
     let q: Vec<f64> = positions.iter().map(at(0.3)).collect();
-    let mut v: Vec<f64> = velocities.iter().map(at(0.5)).collect();
+    let mut v: Vec<f64> = velocities.iter().map(at(0.75)).collect();
     if let Some(system) = system {
         // Off the shell there is a motion as well.
         let _ = system.impose_constraint(&q, &mut v);

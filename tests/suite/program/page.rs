@@ -31,7 +31,7 @@ fn node() -> bool {
 }
 
 /// What the script of a page says of states.
-fn said(page: &str, states: &Value) -> Value {
+fn evaluated(page: &str, states: &Value) -> Value {
     let output = Command::new("node").args(["-e", SCRIPT, page, &states.to_string()]).output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     serde_json::from_slice(&output.stdout).unwrap()
@@ -89,7 +89,7 @@ fn a_page_computes_what_the_program_computes_for_every_kind_of_model() {
         if node {
             let ours = lnn(&["inspect", "--model", &file, "--states", &table]);
             let ours: Vec<Value> = ours.stdout.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
-            agree(&said(&page, &states)["learned"], &ours, 1e-5, &kind);
+            agree(&evaluated(&page, &states)["learned"], &ours, 1e-5, &kind);
         }
     }
 }
@@ -112,20 +112,20 @@ fn the_exact_motion_runs_beside_the_learned_one() {
     }
     let csv = "theta1,theta2,theta1_dot,theta2_dot\n0.6,0.9,0,0\n-2,5,1,-3\n";
     let table = folder.file("states.csv", csv);
-    let told = said(&page, &states(csv, &["theta1", "theta2", "theta1_dot", "theta2_dot"]));
+    let result = evaluated(&page, &states(csv, &["theta1", "theta2", "theta1_dot", "theta2_dot"]));
     for (kind, whose, tolerance) in
         [("learned", ["--model", &model], 1e-5), ("exact", ["--system", "double-pendulum"], 1e-12)]
     {
         let ours = lnn(&[&["inspect"], &whose[..], &["--states", &table]].concat());
-        agree(&told[kind], &ours.objects(), tolerance, kind);
+        agree(&result[kind], &ours.objects(), tolerance, kind);
     }
     let motion = folder.path("motion.csv");
     let exact = ["rollout", "--system", "double-pendulum", "--state", "0.6,0.9,0,0", "--t-end", "1", "--dt", "0.5"];
     lnn(&[&exact[..], &["--method", "dop853", "--rtol", "1e-12", "--out", &text(&motion)]].concat()).succeeded();
     let last = fs::read_to_string(&motion).unwrap().lines().last().unwrap().to_string();
     let last: Vec<f64> = last.split(',').skip(1).take(4).map(|x| x.parse().unwrap()).collect();
-    for (theirs, ours) in numbers(&told["motion"]).iter().zip(&last) {
-        assert!((theirs - ours).abs() < 1e-5, "{told} {last:?}");
+    for (theirs, ours) in numbers(&result["motion"]).iter().zip(&last) {
+        assert!((theirs - ours).abs() < 1e-5, "{result} {last:?}");
     }
 }
 

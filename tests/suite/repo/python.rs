@@ -80,10 +80,10 @@ fn python_evaluates_every_kind_of_model() {
     }
     let each = "import sys; from lnn.reader.__main__ import main; [main(model, sys.argv[1]) for model in sys.argv[2:]]";
     let paths: Vec<&str> = paths.iter().map(String::as_str).collect();
-    let said = lines(&run(&python, &[&["-c", each, &states], &paths[..]].concat()));
-    assert_eq!(said.len(), 4 * kinds.len());
-    for (said, path) in said.chunks(4).zip(paths) {
-        agree(said, path, &states);
+    let rows = lines(&run(&python, &[&["-c", each, &states], &paths[..]].concat()));
+    assert_eq!(rows.len(), 4 * kinds.len());
+    for (rows, path) in rows.chunks(4).zip(paths) {
+        agree(rows, path, &states);
     }
 }
 
