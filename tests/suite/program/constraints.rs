@@ -55,7 +55,7 @@ fn a_file_with_constraints_moves_on_them() {
     lnn(&["symmetries", "--system", &file]).refused(2, &["constraints"]);
     let listed = lnn(&["systems", "--system", &file, "--json"]);
     assert_eq!(json(&listed.stdout)["constraints"]["rod"], "x^2 + y^2 - l^2");
-    let learned = lnn(&["train", "--system", &file, "--out", &text(&folder.path("run"))]);
+    let learned = lnn(&["train", &file, "--out", &text(&folder.path("run"))]);
     assert!(learned.stderr.contains("constraints") && !folder.path("run/model.safetensors").exists());
 }
 
