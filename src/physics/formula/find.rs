@@ -3,8 +3,8 @@
 use super::error::FormulaError;
 use super::found::{FoundFormula, Left, Verdict};
 use super::library::{Extent, Families, Library, Quotient, Values};
-use super::linear::{eliminate, inverse_with, part};
-use super::motion::{BlockSum, Model, Motion, Segment, total};
+use super::linear::{eliminate, inverse_with, part, times};
+use super::motion::{BlockSum, Model, Motion, Segment, inflation, total};
 use super::select::{Path, eliminate_backward};
 use super::wald::{Equations, RIDGE, Survivors, survivors};
 use super::weak::{Stretch, Windows};
@@ -291,21 +291,31 @@ impl Search<'_> {
         ratios.get(ratios.len() / 4).is_none_or(|ratio| *ratio > LEAST_REGULAR)
     }
 
-    fn equations(&self, model: &Model, segments: &[Segment], sum: &mut BlockSum) {
+    /// The terms that blocks of some weights need.
+    fn survivors(
+        &self,
+        model: &Model,
+        segments: &[Segment],
+        blocks: &BTreeMap<usize, BlockSum>,
+        weight: &dyn Fn(usize) -> f64,
+    ) -> Option<Survivors> {
+        let mut sum = total(blocks, weight);
         if !self.driven {
-            self.motion.pin(model, &self.candidates, segments, sum);
+            self.motion.pin(model, &self.candidates, segments, &mut sum);
         }
-    }
-
-    fn survivors(&self, model: &Model, sum: &BlockSum, complexity: &[f64]) -> Option<Survivors> {
         let coefficients = self.model_over_candidates(model);
-        let equations = Equations { matrix: &sum.matrix, right: &sum.right, coefficients: &coefficients, complexity };
-        survivors(&equations, THRESHOLD * sum.inflation, &|x| self.regular(model, x))
+        let complexity: Vec<f64> = self.candidates.iter().map(|&k| self.library.complexity(k)).collect();
+        let equations =
+            Equations { matrix: &sum.matrix, right: &sum.right, coefficients: &coefficients, complexity: &complexity };
+        // What is left once all terms are there is what counts as noise.
+        let m = self.candidates.len();
+        let change = times(m, &inverse_with(m, &sum.matrix, RIDGE)?, &sum.right);
+        let noise = inflation(blocks, weight, &sum, &change);
+        survivors(&equations, THRESHOLD * noise, &|x| self.regular(model, x))
     }
 
     /// Refits and chooses terms anew until they stay the same; the normal equations at the end, by block.
     fn converge(&self, model: &mut Model, segments: &mut [Segment], rounds: usize) -> BTreeMap<usize, BlockSum> {
-        let complexity: Vec<f64> = self.candidates.iter().map(|&k| self.library.complexity(k)).collect();
         let mut seen: Vec<Vec<usize>> = Vec::new();
         for round in 0.. {
             self.motion.settle(model, segments, 4);
@@ -314,13 +324,10 @@ impl Search<'_> {
             if round >= rounds {
                 return blocks;
             }
-            let mut sum = total(&blocks, &|_| 1.0);
-            self.equations(model, segments, &mut sum);
-            let Some(found) = self.survivors(model, &sum, &complexity) else { return blocks };
+            let Some(found) = self.survivors(model, segments, &blocks, &|_| 1.0) else { return blocks };
             let terms: Vec<usize> = found.set.iter().map(|&k| self.candidates[k]).collect();
             tracing::debug!(
                 round,
-                residual = (sum.square / sum.count).sqrt(),
                 next = found.next,
                 terms = terms.iter().map(|&k| self.library.text(k)).collect::<Vec<_>>().join(" "),
                 "formula"
@@ -512,16 +519,14 @@ fn probabilities(
 ) -> BTreeMap<usize, f64> {
     let mut rng = RngStream::Segments.generator(options.seed);
     let names: Vec<usize> = blocks.keys().copied().collect();
-    let complexity: Vec<f64> = search.candidates.iter().map(|&k| search.library.complexity(k)).collect();
     let mut counts: BTreeMap<usize, f64> = BTreeMap::new();
     for _ in 0..options.bootstraps {
         let mut weights: BTreeMap<usize, f64> = BTreeMap::new();
         for _ in &names {
             *weights.entry(names[rng.random_range(0..names.len())]).or_default() += 1.0;
         }
-        let mut sum = total(blocks, &|block| weights.get(&block).copied().unwrap_or(0.0));
-        search.equations(model, segments, &mut sum);
-        let Some(found) = search.survivors(model, &sum, &complexity) else { continue };
+        let weight = |block: usize| weights.get(&block).copied().unwrap_or(0.0);
+        let Some(found) = search.survivors(model, segments, blocks, &weight) else { continue };
         for k in found.set {
             *counts.entry(search.candidates[k]).or_default() += 1.0 / options.bootstraps as f64;
         }

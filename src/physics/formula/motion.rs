@@ -95,25 +95,39 @@ pub(super) fn total(blocks: &BTreeMap<usize, BlockSum>, weight: &dyn Fn(usize) -
         }
     }
     let mut sum = sum.unwrap_or_else(|| BlockSum::empty(0));
-    sum.inflation = inflation(blocks, weight, &sum);
+    sum.inflation = inflation(blocks, weight, &sum, &vec![0.0; sum.right.len()]);
     sum
 }
 
-/// The median over the coefficients of the scatter of what blocks pull them by, over the scatter of noise.
-fn inflation(blocks: &BTreeMap<usize, BlockSum>, weight: &dyn Fn(usize) -> f64, sum: &BlockSum) -> f64 {
+/// The median over the coefficients of the scatter of what blocks pull them by once they are changed, over the scatter of noise; at
+/// least the mean squared residual that is left, and 1.
+pub(super) fn inflation(
+    blocks: &BTreeMap<usize, BlockSum>,
+    weight: &dyn Fn(usize) -> f64,
+    sum: &BlockSum,
+    change: &[f64],
+) -> f64 {
     let m = sum.right.len();
+    let square = ((sum.square - dot(&sum.right, change)) / sum.count.max(1.0)).max(1.0);
     let whole: f64 = blocks.keys().map(|&block| weight(block)).sum();
     if whole < 3.0 {
-        return (sum.square / sum.count.max(1.0)).max(1.0);
+        return square;
     }
+    let pulls: Vec<(f64, Vec<f64>)> = blocks
+        .iter()
+        .map(|(&block, part)| {
+            let taken = times(m, &part.matrix, change);
+            (weight(block), part.right.iter().zip(taken).map(|(pull, taken)| pull - taken).collect())
+        })
+        .collect();
     let ratio = |k: usize| {
-        let mean = sum.right[k] / whole;
-        let scatter: f64 = blocks.iter().map(|(&block, part)| weight(block) * (part.right[k] - mean).powi(2)).sum();
+        let mean = pulls.iter().map(|(weight, pull)| weight * pull[k]).sum::<f64>() / whole;
+        let scatter: f64 = pulls.iter().map(|(weight, pull)| weight * (pull[k] - mean).powi(2)).sum();
         scatter * whole / (whole - 1.0) / sum.matrix[k * m + k]
     };
     let mut ratios: Vec<f64> = (0..m).map(ratio).filter(|ratio| ratio.is_finite()).collect();
     ratios.sort_by(f64::total_cmp);
-    ratios.get(ratios.len() / 2).copied().unwrap_or(1.0).max(sum.square / sum.count.max(1.0)).max(1.0)
+    ratios.get(ratios.len() / 2).copied().unwrap_or(1.0).max(square)
 }
 
 impl BlockSum {
