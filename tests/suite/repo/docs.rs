@@ -186,12 +186,6 @@ fn test_sources(folder: &Path, found: &mut String) {
 }
 
 #[test]
-fn the_readme_is_short() {
-    let count = read("README.md").lines().count();
-    assert!(count <= 150, "{count} lines");
-}
-
-#[test]
 fn no_link_is_dead() {
     let pages = pages();
     let (mut faults, mut count) = (Vec::new(), 0);
