@@ -4,8 +4,10 @@ use crate::cli::layers::Entry;
 use crate::configuration::table::Below;
 use crate::configuration::{Config, Key, join};
 use crate::pipeline::FitConfig;
+use clap::builder::{PossibleValue, StringValueParser, TypedValueParser};
 use clap::parser::ValueSource;
 use clap::{Arg, ArgAction, ArgMatches, Command};
+use std::ffi::OsStr;
 use std::marker::PhantomData;
 use toml::{Table, Value};
 
@@ -67,6 +69,10 @@ impl Flag {
             _ => "N",
         };
         let argument = argument.value_name(form).allow_negative_numbers(true);
+        let argument = match key.names() {
+            Some(names) => argument.value_parser(Names(names)).hide_possible_values(true),
+            None => argument,
+        };
         if key.flag.ends_with('?') { argument.num_args(0..=1).default_missing_value(key.example) } else { argument }
     }
 
@@ -76,14 +82,35 @@ impl Flag {
             text if quoted => Value::from(text),
             text => text
                 .parse::<i64>()
+                .ok()
                 .map(Value::from)
-                .or_else(|_| text.parse::<f64>().map(Value::from))
-                .unwrap_or_else(|_| text.into()),
+                // A whole number beyond those of TOML stays as it is written.
+                .or_else(|| text.parse::<f64>().ok().filter(|_| !is_whole(text)).map(Value::from))
+                .unwrap_or_else(|| text.into()),
         };
         match self.key.example.strip_prefix('[') {
             Some(item) => text.split(',').map(|text| scalar(text, item.starts_with('"'))).collect::<Vec<_>>().into(),
             None => scalar(text, self.key.example.starts_with('"')),
         }
+    }
+}
+
+fn is_whole(text: &str) -> bool {
+    text.bytes().all(|byte| byte.is_ascii_digit())
+}
+
+/// Any text; shells are offered the names.
+#[derive(Clone)]
+struct Names(Vec<&'static str>);
+
+impl TypedValueParser for Names {
+    type Value = String;
+
+    fn parse_ref(&self, command: &Command, argument: Option<&Arg>, value: &OsStr) -> Result<String, clap::Error> {
+        StringValueParser::new().parse_ref(command, argument, value)
+    }
+    fn possible_values(&self) -> Option<Box<dyn Iterator<Item = PossibleValue> + '_>> {
+        Some(Box::new(self.0.iter().map(PossibleValue::new)))
     }
 }
 

