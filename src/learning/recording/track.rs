@@ -1,6 +1,5 @@
 //! Recorded trajectories in memory.
 
-use crate::rollout::SampledForce;
 use thiserror::Error;
 
 /// One recorded trajectory of `n` coordinates: positions at increasing times, and what else was measured.
@@ -130,11 +129,12 @@ impl Recording {
     }
 }
 
+#[cfg(feature = "rollout")]
 impl RecordedTrajectory {
     /// The known external forces, linear between the samples; `None` if there are none.
-    pub(crate) fn sampled_force(&self) -> Option<SampledForce<f64>> {
+    pub(crate) fn sampled_force(&self) -> Option<crate::rollout::SampledForce<f64>> {
         let n = self.force.len().checked_div(self.len()).filter(|n| *n > 0)?;
-        SampledForce::new(n, self.times.clone(), self.force.clone()).ok()
+        crate::rollout::SampledForce::new(n, self.times.clone(), self.force.clone()).ok()
     }
 }
 

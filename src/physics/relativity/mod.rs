@@ -26,6 +26,8 @@
 mod camera;
 mod central_coordinates;
 mod dormand_prince;
+#[cfg(feature = "training")]
+mod drift;
 mod error;
 mod event;
 mod image;
@@ -51,6 +53,8 @@ pub use camera::{Camera, Observer};
 #[doc(hidden)]
 pub use central_coordinates::CentralCoordinates;
 pub use central_coordinates::Chart;
+#[cfg(feature = "training")]
+pub(crate) use drift::conserved_drift;
 pub use error::RelativityError;
 pub use image::Image;
 pub use infall::{Infall, infall};
@@ -72,8 +76,6 @@ pub use shadow::Difference;
 pub use shadow::{Shadow, shadow};
 #[doc(hidden)]
 pub use sky::{Sky, difference_image};
-#[cfg(feature = "training")]
-pub(crate) use stationary::conserved_drift;
 pub(crate) use stationary::depends_on_time;
 
 #[cfg(test)]
