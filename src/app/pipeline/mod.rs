@@ -110,7 +110,6 @@ pub use experiment_report::{ExperimentReport, Results};
 pub use file_names::MODEL;
 pub(crate) use file_names::{CAPTIONS, RECORD, SUMMARY};
 pub use fit::FitReport;
-#[doc(hidden)]
 pub use fit::fit;
 pub use fit_builder::Fit;
 pub use fit_config::FitOptions;

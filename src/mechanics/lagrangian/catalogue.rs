@@ -199,7 +199,7 @@ fn construct_once<S: Scalar>(configured: &SystemInstance<S>) -> Option<Box<dyn E
     *built.downcast().ok()?
 }
 
-/// All systems whose coordinates are free; [`constrained_systems`] are the others.
+/// All systems whose coordinates are free; [`constrained_systems`](super::constrained_systems) are the others.
 pub fn systems() -> &'static [System] {
     SYSTEMS
 }

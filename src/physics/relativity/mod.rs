@@ -59,7 +59,6 @@ pub use error::RelativityError;
 pub use image::Image;
 pub use infall::{Infall, infall};
 pub use orbits::{Orbit, orbits};
-#[doc(hidden)]
 pub use outline::{Edge, Outline, outline};
 #[cfg(feature = "training")]
 #[doc(hidden)]
