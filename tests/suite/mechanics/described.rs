@@ -310,7 +310,7 @@ fn metrics_and_definitions_are_checked() {
         BLACK_HOLE,
         "\"0.1*pi\"",
         "\"0.1*pie\"",
-        "22: coordinates[2].bounds: column 5: unknown name \"pie\", did you mean \"pi\"?",
+        "22: coordinates[2].bounds[0]: column 5: unknown name \"pie\", did you mean \"pi\"?",
     );
     refused(BLACK_HOLE, "t_end = 5", "t_end = -5", "41: trajectory.t_end: expected a finite number above 0, found -5");
     refused(BLACK_HOLE, "dt = 0.05", "dt = 1e-9", "42: trajectory.dt: expected at least a millionth of t_end = 5");

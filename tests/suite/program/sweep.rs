@@ -62,7 +62,7 @@ fn what_cannot_be_varied_is_named() {
         |vary: &[&str], parts: &[&str]| lnn(&[&["sweep", &file, "--out", &out], vary].concat()).refused(2, parts);
     refused(&["--vary", "penalty.lamda=1,2"], &["penalty.lamda"]);
     refused(&["--vary", "penalty.lambda=1,-2"], &["penalty.lambda", "-2"]);
-    refused(&["--vary", "penalty.lambda"], &["--vary: expected KEY=VALUE,VALUE,.."]);
+    refused(&["--vary", "penalty.lambda"], &["--vary", "expected KEY=VALUE,VALUE,.."]);
     refused(&["--vary", "seed=1,2", "--vary", "seed=3,4"], &["--vary seed: the key is given twice"]);
     refused(&["--vary", "penalty.lambda=1,2", "--seeds", "9999"], &["19998 runs"]);
     assert_eq!(folder.names(), ["small.toml"]);
