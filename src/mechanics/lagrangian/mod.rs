@@ -33,7 +33,6 @@ pub use configure::configure;
 #[doc(hidden)]
 pub use configure::{build, configure_system, configure_values};
 use constrained_systems::constrained_descriptions;
-#[doc(hidden)]
 pub use constrained_systems::constrained_systems;
 pub use constraints::{Constrained, ConstraintError, Constraints, ExpressionConstraints};
 #[doc(hidden)]
