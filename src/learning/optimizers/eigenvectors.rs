@@ -21,7 +21,7 @@ pub(super) struct Side<S> {
     pub covariance: Vec<S>,
     #[serde(with = "numbers")]
     pub vectors: Vec<S>,
-    /// The next eigenvectors, then how they are turned against the last; empty until they are looked for.
+    /// The next eigenvectors, then how they are turned against the last; empty after they were read, until they are looked for.
     #[serde(skip)]
     next: Vec<S>,
     #[serde(skip)]
@@ -38,7 +38,7 @@ impl<S: PartialEq> PartialEq for Side<S> {
 impl<S: Scalar> Side<S> {
     pub fn new(size: usize) -> Self {
         let zeros = || vec![<S as Real>::zero(); size * size];
-        Self { size, covariance: zeros(), vectors: zeros(), next: Vec::new(), turn: Vec::new() }
+        Self { size, covariance: zeros(), vectors: zeros(), next: zeros(), turn: zeros() }
     }
 
     /// `true` if this is a side of `size`, with all its numbers.

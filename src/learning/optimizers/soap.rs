@@ -61,7 +61,7 @@ pub(crate) struct Eigenbasis<S> {
     block: Block,
     /// Of the rows, and of the columns.
     sides: [Side<S>; 2],
-    /// Half of the way of a turn; empty before the first.
+    /// Half of the way of a turn; empty after it was read, until the first.
     #[serde(skip)]
     half: Vec<S>,
 }
@@ -75,7 +75,8 @@ impl<S: PartialEq> PartialEq for Eigenbasis<S> {
 
 impl<S: Scalar> Eigenbasis<S> {
     pub fn new(block: Block) -> Self {
-        Self { block, sides: block.sides().map(Side::new), half: Vec::new() }
+        let half = vec![<S as Real>::zero(); block.rows * block.cols];
+        Self { block, sides: block.sides().map(Side::new), half }
     }
 
     pub fn block(&self) -> Block {
