@@ -106,9 +106,9 @@ fn geometry<S: Scalar>(args: &Args) -> Result<(), CliError> {
     }
     let Some(points) = &args.points else { return Err(CliError::usage("--points: expected a file")) };
     let place = input::name(points);
-    let told = |e: &dyn std::fmt::Display| CliError::data(format_args!("{place}: {e}"));
-    let bytes = input::read(points, states::MAX_BYTES).map_err(|e| told(&e))?;
-    let table = parse_table::<S>(&bytes, names).map_err(|e| told(&e))?;
+    let refused = |e: &dyn std::fmt::Display| CliError::data(format_args!("{place}: {e}"));
+    let bytes = input::read(points, states::MAX_BYTES).map_err(|e| refused(&e))?;
+    let table = parse_table::<S>(&bytes, names).map_err(|e| refused(&e))?;
     drop(bytes);
     note_velocity(&*source.model, &table.values[..n], &velocity);
 

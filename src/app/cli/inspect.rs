@@ -114,12 +114,12 @@ fn inspect<S: Scalar>(args: &Args) -> Result<(), CliError> {
     for ((q, v), rows) in states.q.chunks(CHUNK * n).zip(states.v.chunks(CHUNK * n)).zip(states.rows.chunks(CHUNK)) {
         let mut text = String::new();
         let outcome = model.terms(q, v, Request::ALL, &mut terms);
-        let told = terms.drain_failures(outcome).map_err(|error| CliError::data(format_args!("{place}: {error}")))?;
+        let failed = terms.drain_failures(outcome).map_err(|error| CliError::data(format_args!("{place}: {error}")))?;
         let spectrum = spectrum(n, &terms.mass_matrix);
         let held = Held::of(model.as_ref(), q, v, &terms);
-        let mut told = told.into_iter().peekable();
+        let mut failed = failed.into_iter().peekable();
         for (k, &row) in rows.iter().enumerate() {
-            let problem = told.next_if(|failure| failure.row() == Some(k)).map(explain);
+            let problem = failed.next_if(|failure| failure.row() == Some(k)).map(explain);
             text += &show(
                 args.format,
                 row,

@@ -17,15 +17,15 @@ pub fn inverse<S: Scalar>(path: &Path, format: Format, source: &Source<S>) -> Re
     let accelerations = source.columns[..n].iter().map(|name| format!("{name}_ddot"));
     let mut columns: Vec<String> = source.columns.iter().cloned().chain(accelerations).collect();
     let place = input::name(path);
-    let told = |e: &dyn std::fmt::Display| CliError::data(format_args!("{place}: {e}"));
-    let bytes = input::read(path, states::MAX_BYTES).map_err(|e| told(&e))?;
-    let header = column_names(&bytes).map_err(|e| told(&e))?;
+    let refused = |e: &dyn std::fmt::Display| CliError::data(format_args!("{place}: {e}"));
+    let bytes = input::read(path, states::MAX_BYTES).map_err(|e| refused(&e))?;
+    let header = column_names(&bytes).map_err(|e| refused(&e))?;
     // The time of a row is passed on, unless t is a coordinate.
     let timed = format == Format::Csv && !columns.iter().any(|name| name == "t") && header.iter().any(|c| c == "t");
     if timed {
         columns.push("t".to_string());
     }
-    let table = parse_table::<S>(&bytes, &columns).map_err(|e| told(&e))?;
+    let table = parse_table::<S>(&bytes, &columns).map_err(|e| refused(&e))?;
     drop(bytes);
     if format == Format::Csv {
         let time = if timed { "t," } else { "" };
@@ -39,7 +39,7 @@ pub fn inverse<S: Scalar>(path: &Path, format: Format, source: &Source<S>) -> Re
         };
         let (q, v, a) = (part(0..n), part(n..2 * n), part(2 * n..3 * n));
         let times: Vec<S> = if timed { part(3 * n..3 * n + 1) } else { Vec::new() };
-        let (forces, failed) = inverse_dynamics_by_rows(source.model.as_ref(), &q, &v, &a).map_err(|e| told(&e))?;
+        let (forces, failed) = inverse_dynamics_by_rows(source.model.as_ref(), &q, &v, &a).map_err(|e| refused(&e))?;
         let mut failed = failed.into_iter().peekable();
         let mut text = String::new();
         for (k, &row) in rows.iter().enumerate() {

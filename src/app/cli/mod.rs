@@ -286,10 +286,10 @@ mod tests {
                 let place = format!("{name} {}", argument.get_id());
                 assert!(argument.get_help().is_some_and(|help| !help.to_string().is_empty()), "{place}");
                 for value in argument.get_possible_values() {
-                    let told =
+                    let documented =
                         value.get_help().is_some() || name == "completions" || argument.is_hide_possible_values_set();
                     let flag = !argument.get_action().takes_values();
-                    assert!(told || flag, "{place}: {}", value.get_name());
+                    assert!(documented || flag, "{place}: {}", value.get_name());
                 }
             }
         }

@@ -236,8 +236,8 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let picture = png(&Image::beside(&images, GAP));
     write_atomically(&args.out, &picture).map_err(|e| CliError::file(&args.out, format_args!("cannot write: {e}")))?;
     let facts = Facts { system: &system, unit: unit.as_deref(), camera: &camera, tracing: &tracing, views: &views };
-    let told = if args.json { facts.json(&images) } else { facts.text(&images, &args.out) };
-    output::print(&told.map_err(refused)?)?;
+    let text = if args.json { facts.json(&images) } else { facts.text(&images, &args.out) };
+    output::print(&text.map_err(refused)?)?;
     if interrupted {
         let done: usize = views.iter().map(|view| view.shadow.finished()).sum();
         let (rays, place) = (pluralize(pixels, "ray", "rays"), args.out.display());

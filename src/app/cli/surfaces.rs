@@ -48,7 +48,7 @@ impl<S: Scalar> Line<'_, S> {
         };
         let surfaces: Vec<String> = found
             .iter()
-            .map(|surface| format!("{{\"point\":{{{}}},\"change\":\"{}\"}}", point(&surface.point), told(surface)))
+            .map(|surface| format!("{{\"point\":{{{}}},\"change\":\"{}\"}}", point(&surface.point), change(surface)))
             .collect();
         format!("{{\"block\":[{}],\"surfaces\":[{}]}}\n", block.join(","), surfaces.join(","))
     }
@@ -63,14 +63,14 @@ impl<S: Scalar> Line<'_, S> {
         let header: Vec<&str> = names.iter().map(String::as_str).chain(["determinant"]).collect();
         let row = |surface: &Surface<S>| {
             let point = surface.point.iter().map(|x| json::number(*x));
-            point.chain([told(surface).to_string()]).collect::<Vec<String>>()
+            point.chain([change(surface).to_string()]).collect::<Vec<String>>()
         };
         title + &text_table(&header, &found.iter().map(row).collect::<Vec<_>>())
     }
 }
 
 /// The determinant at a surface in a word.
-fn told<S>(surface: &Surface<S>) -> &'static str {
+fn change<S>(surface: &Surface<S>) -> &'static str {
     match surface.change {
         Change::Zero => "zero",
         Change::Pole => "pole",

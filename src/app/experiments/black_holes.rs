@@ -27,10 +27,10 @@ fn learned(preset: Preset, name: &str, hole: &SystemInstance<f64>) -> Run {
 
 /// A hole with these parameters, the others being the system's, by both presets.
 pub(super) fn runs_of(hole: &SystemInstance<f64>, parameters: &BTreeMap<String, f64>) -> Vec<Run> {
-    let told: String = parameters.iter().map(|(symbol, value)| format!(", {symbol} = {value}")).collect();
+    let suffix: String = parameters.iter().map(|(symbol, value)| format!(", {symbol} = {value}")).collect();
     let of = |(preset, name)| {
         let run = learned(preset, name, hole);
-        let (name, label) = (slug(&format!("{}{told}", run.name)), format!("{}{told}", run.label));
+        let (name, label) = (slug(&format!("{}{suffix}", run.name)), format!("{}{suffix}", run.label));
         Run { name, label, config: Config { parameters: parameters.clone(), ..run.config }, ..run }
     };
     [(Preset::Quick, "quick"), (Preset::Best, "best")].map(of).to_vec()

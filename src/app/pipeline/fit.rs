@@ -122,8 +122,8 @@ fn fit_in<S: Scalar>(
     let (keeper, restored) = opened.transpose()?.map_or((None, None), |(keeper, start)| (Some(keeper), start));
     let shots = restored.clone().filter(Snapshot::is_shooting);
     let start = restored.or_else(|| weights.map(Snapshot::beginning_with));
-    let sitting = ResumeOptions { checkpoints: keeper.clone(), start };
-    let mut trained = train(config, &architecture, penalty, data, threads, &watch.hooks(), sitting)?;
+    let resumed = ResumeOptions { checkpoints: keeper.clone(), start };
+    let mut trained = train(config, &architecture, penalty, data, threads, &watch.hooks(), resumed)?;
     let mut shot = None;
     if let (Targets::Motion, StopReason::Finished) = (targets, &trained.stop) {
         let settings = fit_config.shooting.clone().unwrap_or_default();
@@ -139,8 +139,8 @@ fn fit_in<S: Scalar>(
             seed: config.seed,
         };
         let start = Some(shots.unwrap_or_else(|| trained.snapshot(config)));
-        let sitting = ResumeOptions { checkpoints: keeper, start };
-        let fitted = shooting::resume(&settings, task, threads, &watch.hooks(), sitting)?;
+        let resumed = ResumeOptions { checkpoints: keeper, start };
+        let fitted = shooting::resume(&settings, task, threads, &watch.hooks(), resumed)?;
         trained.weights.clone_from(&fitted.weights);
         trained.stop.clone_from(&fitted.stop);
         judges.judge(&architecture, penalty, threads, &mut trained)?;

@@ -1,6 +1,7 @@
 //! Failures of the rows of a batch: how they are found, merged, and reported.
 
-use super::{MechanicsError, Terms};
+use super::{MechanicsError, Request, Terms};
+use crate::linalg::Workspace;
 use crate::scalar::Scalar;
 
 impl<S: Scalar> Terms<S> {
@@ -47,6 +48,26 @@ impl<S: Scalar> Terms<S> {
         } else {
             outcome.map(|()| Vec::new())
         }
+    }
+}
+
+impl<S: Scalar> Terms<S> {
+    /// [`Terms::complete`] for a wrapper, which has drained the failures of the model inside before.
+    ///
+    /// # Errors
+    /// The first failure, of either.
+    pub(crate) fn complete_beside(
+        &mut self,
+        failures: Vec<MechanicsError>,
+        n: usize,
+        v: &[S],
+        request: Request,
+    ) -> Result<(), MechanicsError> {
+        if let Err(error @ MechanicsError::Shape { .. }) = self.complete(n, v, request, &mut Workspace::new()) {
+            return Err(error);
+        }
+        self.prepend_failures(failures);
+        self.outcome()
     }
 }
 

@@ -2,7 +2,6 @@
 
 use super::{EulerLagrange, MechanicsError, Request, Terms};
 use crate::forward::Dual;
-use crate::linalg::Workspace;
 use crate::scalar::{Real, Scalar};
 
 /// Generalized forces that do not follow from a Lagrangian; closures `Fn(&[S], &[S], &mut [S])` of coordinates, velocities and
@@ -107,11 +106,7 @@ impl<S: Scalar, M: EulerLagrange<S>, F: GeneralizedForce<S>> EulerLagrange<S> fo
                 }
             }
         }
-        if let Err(error @ MechanicsError::Shape { .. }) = terms.complete(n, v, request, &mut Workspace::new()) {
-            return Err(error);
-        }
-        terms.prepend_failures(found);
-        terms.outcome()
+        terms.complete_beside(found, n, v, request)
     }
 
     fn inner(&self) -> Option<&dyn EulerLagrange<S>> {

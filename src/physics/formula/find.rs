@@ -2,12 +2,14 @@
 
 use super::error::FormulaError;
 use super::found::{FoundFormula, Left, Verdict};
+use super::function::Notation;
 use super::library::{Extent, Families, Library, Quotient, Values};
-use super::linear::{eliminate, inverse_with, part, times};
+use super::linear::{dot, inverse_with, part, times};
 use super::motion::{BlockSum, Model, Motion, Segment, inflation, total};
 use super::select::{Path, eliminate_backward};
 use super::wald::{Equations, RIDGE, Survivors, survivors};
 use super::weak::{Stretch, Windows};
+use crate::linalg::{self, Workspace};
 use crate::random::RngStream;
 use crate::recording::Recording;
 use crate::recording::smooth::{SmoothOptions, Smoothed, Smoothing, noise};
@@ -267,25 +269,20 @@ impl Search<'_> {
     /// `true` if coefficients of the candidates give a mass matrix that is not nearly singular beside the one of a model.
     fn regular(&self, model: &Model, coefficients: &[f64]) -> bool {
         let n = self.library.n();
-        let mass = |terms: &[usize], coefficients: &[f64], values: &Values| {
-            let mut mass = vec![0.0; n * n];
-            for (&k, &c) in terms.iter().zip(coefficients) {
-                if let Some((i, j)) = self.library.kinetic(k) {
-                    let value = c * values[self.library.terms[k].function].value;
-                    mass[i * n + j] += value;
-                    mass[j * n + i] += value;
-                }
+        // Determinants at all states, as products of eigenvalues.
+        let determinants = |terms: &[usize], coefficients: &[f64]| -> Vec<f64> {
+            let mut mass = vec![0.0; self.states.len() * n * n];
+            for (values, mass) in self.states.iter().zip(mass.chunks_exact_mut(n * n)) {
+                self.library.mass_matrix(terms, coefficients, values, mass);
             }
-            mass
+            let mut eigenvalues = vec![0.0; self.states.len() * n];
+            // States that fail have the determinant NaN.
+            let _ = linalg::eigenvalues(n, &mass, &mut eigenvalues, &mut Workspace::new());
+            eigenvalues.chunks_exact(n).map(|values| values.iter().product()).collect()
         };
-        let ratios = self.states.iter().filter_map(|values| {
-            let mut own = mass(&model.terms, &model.coefficients, values);
-            let mut other = mass(&self.candidates, coefficients, values);
-            if !eliminate(n, &mut own, n, &mut other) {
-                return None;
-            }
-            Some(determinant(n, other).abs())
-        });
+        let own = determinants(&model.terms, &model.coefficients);
+        let other = determinants(&self.candidates, coefficients);
+        let ratios = own.iter().zip(&other).filter(|(own, _)| own.abs() > 0.0).map(|(own, other)| (other / own).abs());
         let mut ratios: Vec<f64> = ratios.collect();
         ratios.sort_by(f64::total_cmp);
         ratios.get(ratios.len() / 4).is_none_or(|ratio| *ratio > LEAST_REGULAR)
@@ -329,7 +326,7 @@ impl Search<'_> {
             tracing::debug!(
                 round,
                 next = found.next,
-                terms = terms.iter().map(|&k| self.library.text(k)).collect::<Vec<_>>().join(" "),
+                terms = terms.iter().map(|&k| self.library.written(k, Notation::System)).collect::<Vec<_>>().join(" "),
                 "formula"
             );
             if terms == model.terms || seen.contains(&terms) {
@@ -341,27 +338,6 @@ impl Search<'_> {
         }
         BTreeMap::new()
     }
-}
-
-/// Determinant of a small matrix.
-pub(super) fn determinant(n: usize, mut matrix: Vec<f64>) -> f64 {
-    let mut product = 1.0;
-    for k in 0..n {
-        let pivot = (k..n).max_by(|&a, &b| matrix[a * n + k].abs().total_cmp(&matrix[b * n + k].abs())).unwrap_or(k);
-        if matrix[pivot * n + k] == 0.0 {
-            return 0.0;
-        }
-        if pivot != k {
-            (0..n).for_each(|j| matrix.swap(k * n + j, pivot * n + j));
-            product = -product;
-        }
-        product *= matrix[k * n + k];
-        for i in k + 1..n {
-            let factor = matrix[i * n + k] / matrix[k * n + k];
-            (k..n).for_each(|j| matrix[i * n + j] -= factor * matrix[k * n + j]);
-        }
-    }
-    product
 }
 
 /// Looks for a formula of the Lagrangian of recorded motion.
@@ -503,7 +479,7 @@ fn beginning(path: &Path) -> Option<Vec<(usize, f64)>> {
 
 fn log(library: &Library, kept: &[usize], path: &Path) {
     for (size, choice) in path.best.iter().take(12) {
-        let terms: Vec<String> = choice.set.iter().map(|&k| library.text(kept[k])).collect();
+        let terms: Vec<String> = choice.set.iter().map(|&k| library.written(kept[k], Notation::System)).collect();
         let terms = terms.join(" ");
         tracing::debug!(size, error = choice.error, held_out = choice.held_out, terms, "weak form");
     }
@@ -568,15 +544,13 @@ fn shorten(
                 rest.iter().map(|&k| (0..m).map(|i| f64::from(u8::from(i == k))).collect()).collect();
             directions.push(column);
             let size = directions.len();
-            let images: Vec<Vec<f64>> = directions.iter().map(|d| super::linear::times(m, &sum.matrix, d)).collect();
-            let normal: Vec<f64> =
-                (0..size * size).map(|e| super::linear::dot(&directions[e / size], &images[e % size])).collect();
-            let right: Vec<f64> = images.iter().map(|i| super::linear::dot(i, &model.coefficients)).collect();
+            let images: Vec<Vec<f64>> = directions.iter().map(|d| times(m, &sum.matrix, d)).collect();
+            let normal: Vec<f64> = (0..size * size).map(|e| dot(&directions[e / size], &images[e % size])).collect();
+            let right: Vec<f64> = images.iter().map(|i| dot(i, &model.coefficients)).collect();
             let Some(inverse) = inverse_with(size, &normal, RIDGE) else { continue };
-            let x = super::linear::times(size, &inverse, &right);
-            let whole =
-                super::linear::dot(&model.coefficients, &super::linear::times(m, &sum.matrix, &model.coefficients));
-            let cost = whole - super::linear::dot(&x, &right);
+            let x = times(size, &inverse, &right);
+            let whole = dot(&model.coefficients, &times(m, &sum.matrix, &model.coefficients));
+            let cost = whole - dot(&x, &right);
             if cost < THRESHOLD * inflation && best.as_ref().is_none_or(|(least, ..)| cost < *least) {
                 best = Some((cost, term, gone, x));
             }

@@ -1,6 +1,7 @@
 //! A formula that was found, and its ways to be written.
 
 use super::error::FormulaError;
+use super::function::Notation;
 use super::library::Library;
 use super::motion::Model;
 use serde::Serialize;
@@ -91,14 +92,14 @@ impl FoundFormula {
         let mut order: Vec<(usize, FoundTerm)> = terms
             .map(|(at, (&k, &coefficient))| {
                 let term = FoundTerm {
-                    term: library.text(k),
+                    term: library.written(k, Notation::System),
                     coefficient,
                     standard_error: covariance[at * m + at].max(0.0).sqrt(),
                     probability: probabilities[at].clamp(0.0, 1.0),
                     dissipation: library.is_dissipation(k),
                     near: None,
-                    latex: library.latex(k),
-                    rust: library.rust(k),
+                    latex: library.written(k, Notation::Latex),
+                    rust: library.written(k, Notation::Rust),
                 };
                 (at, term)
             })

@@ -104,54 +104,18 @@ impl Factor {
         }
     }
 
-    fn text(&self, names: &[String], exponent: i32) -> String {
-        let power = |base: String, k: i32| if k == 1 { base } else { format!("{base}^{}", signed(k)) };
+    fn written(&self, names: &[String], exponent: i32, notation: Notation) -> String {
         match self {
-            Self::Power(i, k) => power(names[*i].clone(), k * exponent),
+            Self::Power(i, k) => notation.power(&names[*i], k * exponent),
             Self::Radius(list, k) => {
-                let sum = list.iter().map(|&i| format!("{}^2", names[i])).collect::<Vec<_>>().join(" + ");
+                let sum = list.iter().map(|&i| notation.power(&names[i], 2)).collect::<Vec<_>>().join(" + ");
                 match k * exponent {
-                    k if k % 2 == 0 => power(format!("({sum})"), k / 2),
-                    k => power(format!("sqrt({sum})"), k),
+                    k if k % 2 == 0 => notation.power(&format!("({sum})"), k / 2),
+                    k => notation.root(&sum, k),
                 }
             }
-            Self::Sine(m) => power(format!("sin({})", angle(m, names, "*")), exponent),
-            Self::Cosine(m) => power(format!("cos({})", angle(m, names, "*")), exponent),
-        }
-    }
-
-    fn latex(&self, names: &[String], exponent: i32) -> String {
-        let power = |base: String, k: i32| if k == 1 { base } else { format!("{base}^{{{k}}}") };
-        match self {
-            Self::Power(i, k) => power(names[*i].clone(), k * exponent),
-            Self::Radius(list, k) => {
-                let sum = list.iter().map(|&i| format!("{}^2", names[i])).collect::<Vec<_>>().join(" + ");
-                match k * exponent {
-                    k if k % 2 == 0 => power(format!("({sum})"), k / 2),
-                    1 => format!("\\sqrt{{{sum}}}"),
-                    k => format!("({sum})^{{{k}/2}}"),
-                }
-            }
-            Self::Sine(m) if exponent == 1 => format!("\\sin({})", angle(m, names, "")),
-            Self::Sine(m) => format!("\\sin^{{{exponent}}}({})", angle(m, names, "")),
-            Self::Cosine(m) if exponent == 1 => format!("\\cos({})", angle(m, names, "")),
-            Self::Cosine(m) => format!("\\cos^{{{exponent}}}({})", angle(m, names, "")),
-        }
-    }
-
-    fn rust(&self, names: &[String], exponent: i32) -> String {
-        let power = |base: String, k: i32| if k == 1 { base } else { format!("{base}.powi({k})") };
-        match self {
-            Self::Power(i, k) => power(names[*i].clone(), k * exponent),
-            Self::Radius(list, k) => {
-                let sum = list.iter().map(|&i| format!("{}.sqr()", names[i])).collect::<Vec<_>>().join(" + ");
-                match k * exponent {
-                    k if k % 2 == 0 => power(format!("({sum})"), k / 2),
-                    k => power(format!("({sum}).sqrt()"), k),
-                }
-            }
-            Self::Sine(m) => power(format!("({}).sin()", rust_angle(m, names)), exponent),
-            Self::Cosine(m) => power(format!("({}).cos()", rust_angle(m, names)), exponent),
+            Self::Sine(m) => notation.call("sin", m, names, exponent),
+            Self::Cosine(m) => notation.call("cos", m, names, exponent),
         }
     }
 
@@ -163,10 +127,6 @@ impl Factor {
             Self::Sine(m) | Self::Cosine(m) => 0.5 + f64::from(m.iter().map(|m| m.abs()).sum::<i32>()),
         }
     }
-}
-
-fn signed(k: i32) -> String {
-    if k < 0 { format!("({k})") } else { k.to_string() }
 }
 
 fn phase(harmonics: &[i32], q: &[f64]) -> f64 {
@@ -189,10 +149,65 @@ fn angle(harmonics: &[i32], names: &[String], product: &str) -> String {
     text
 }
 
-fn rust_angle(harmonics: &[i32], names: &[String]) -> String {
-    let parts = harmonics.iter().zip(names).filter(|(m, _)| **m != 0);
-    let parts = parts.map(|(m, name)| if *m == 1 { name.clone() } else { format!("{name} * R::of({m}.0)") });
-    parts.collect::<Vec<_>>().join(" + ")
+/// A way to write formulas.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Notation {
+    /// The grammar of system files.
+    System,
+    /// LaTeX.
+    Latex,
+    /// Rust over `Real`.
+    Rust,
+}
+
+impl Notation {
+    /// `base^k`.
+    pub fn power(self, base: &str, k: i32) -> String {
+        match (self, k) {
+            (_, 1) => base.to_string(),
+            (Self::System, 0..) => format!("{base}^{k}"),
+            (Self::System, _) => format!("{base}^({k})"),
+            (Self::Latex, _) => format!("{base}^{{{k}}}"),
+            (Self::Rust, 2) => format!("{base}.sqr()"),
+            (Self::Rust, _) => format!("{base}.powi({k})"),
+        }
+    }
+
+    /// `sqrt(sum)^k`, `k` odd.
+    fn root(self, sum: &str, k: i32) -> String {
+        match (self, k) {
+            (Self::System, _) => self.power(&format!("sqrt({sum})"), k),
+            (Self::Latex, 1) => format!("\\sqrt{{{sum}}}"),
+            (Self::Latex, _) => format!("({sum})^{{{k}/2}}"),
+            (Self::Rust, _) => self.power(&format!("({sum}).sqrt()"), k),
+        }
+    }
+
+    /// `f(m.q)^k`.
+    fn call(self, f: &str, harmonics: &[i32], names: &[String], k: i32) -> String {
+        match self {
+            Self::System => self.power(&format!("{f}({})", angle(harmonics, names, "*")), k),
+            Self::Latex => self.power(&format!("\\{f}"), k) + &format!("({})", angle(harmonics, names, "")),
+            Self::Rust => {
+                let parts = harmonics.iter().zip(names).filter(|(m, _)| **m != 0);
+                let part = |(m, name): (&i32, &String)| match m {
+                    1 => name.clone(),
+                    m => format!("{name} * R::of({m}.0)"),
+                };
+                let sum = parts.map(part).collect::<Vec<_>>().join(" + ");
+                self.power(&format!("({sum}).{f}()"), k)
+            }
+        }
+    }
+
+    /// The product of factors.
+    pub fn product(self, factors: &[String]) -> String {
+        factors.join(match self {
+            Self::System => "*",
+            Self::Latex => "\\,",
+            Self::Rust => " * ",
+        })
+    }
 }
 
 impl Function {
@@ -263,35 +278,24 @@ impl Function {
         }
     }
 
-    fn written(&self, write: impl Fn(&Factor, i32) -> String, formula: impl Fn(&str) -> String) -> Vec<String> {
+    /// Its factors.
+    pub fn written(&self, names: &[String], notation: Notation) -> Vec<String> {
         match self {
             Self::Product(factors) => {
-                let mut counted: Vec<(&Factor, i32)> = Vec::new();
+                let mut powers: Vec<(&Factor, i32)> = Vec::new();
                 for factor in factors {
-                    match counted.iter_mut().find(|(known, _)| *known == factor) {
-                        Some((_, count)) => *count += 1,
-                        None => counted.push((factor, 1)),
+                    match powers.iter_mut().find(|(known, _)| *known == factor) {
+                        Some((_, power)) => *power += 1,
+                        None => powers.push((factor, 1)),
                     }
                 }
-                counted.into_iter().map(|(factor, count)| write(factor, count)).collect()
+                powers.into_iter().map(|(factor, power)| factor.written(names, power, notation)).collect()
             }
-            Self::Formula(text, _) => vec![formula(text)],
+            Self::Formula(text, _) => vec![match notation {
+                Notation::Latex => format!("\\left(\\mathtt{{{text}}}\\right)"),
+                Notation::System | Notation::Rust => format!("({text})"),
+            }],
         }
-    }
-
-    /// Its factors in the grammar of system files.
-    pub fn text(&self, names: &[String]) -> Vec<String> {
-        self.written(|factor, k| factor.text(names, k), |text| format!("({text})"))
-    }
-
-    /// Its factors in LaTeX.
-    pub fn latex(&self, names: &[String]) -> Vec<String> {
-        self.written(|factor, k| factor.latex(names, k), |text| format!("\\left(\\mathtt{{{text}}}\\right)"))
-    }
-
-    /// Its factors in Rust over `Real`.
-    pub fn rust(&self, names: &[String]) -> Vec<String> {
-        self.written(|factor, k| factor.rust(names, k), |text| format!("({text})"))
     }
 }
 
@@ -338,10 +342,10 @@ mod tests {
             Factor::Sine(vec![0, 0, 2]),
             Factor::Sine(vec![0, 0, 2]),
         ]);
-        let text = function.text(&names()).join("*");
+        let text = function.written(&names(), Notation::System).join("*");
         let again = Function::formula(&names(), &text).unwrap();
         let q = [0.7, -1.1, 0.4];
         assert!((function.taylor(&q).value - again.taylor(&q).value).abs() < 1e-14, "{text}");
-        assert_eq!(function.latex(&names())[2], "\\sin^{2}(2a)");
+        assert_eq!(function.written(&names(), Notation::Latex)[2], "\\sin^{2}(2a)");
     }
 }

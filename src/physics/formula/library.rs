@@ -1,7 +1,7 @@
 //! Terms that a Lagrangian may have: functions of the coordinates times velocities.
 
 use super::error::FormulaError;
-use super::function::{Factor, Function, MOST_COORDINATES, Taylor};
+use super::function::{Factor, Function, MOST_COORDINATES, Notation, Taylor};
 use super::linear::dot;
 use crate::random::RngStream;
 use rand::Rng;
@@ -285,48 +285,48 @@ impl Library {
         Quotient::new(self, &columns)
     }
 
-    /// Velocities of a term in L or in D, and its function, as factors of a product.
-    fn factors(&self, k: usize, velocity: impl Fn(usize, i32) -> String, function: Vec<String>) -> Vec<String> {
+    /// A term of L or of D.
+    pub fn written(&self, k: usize, notation: Notation) -> String {
+        let name = |i: usize| match notation {
+            Notation::System => self.names[i].clone(),
+            Notation::Latex => latex_name(&self.names[i]),
+            Notation::Rust => format!("q[{i}]"),
+        };
+        let velocity = |i: usize, k: i32| {
+            let velocity = match notation {
+                Notation::System => format!("{}_dot", self.names[i]),
+                Notation::Latex => format!("\\dot{{{}}}", name(i)),
+                Notation::Rust => format!("v[{i}]"),
+            };
+            notation.power(&velocity, k)
+        };
         let mut factors = match self.terms[k].kind {
             Kind::Kinetic(i, j) | Kind::Dissipation(i, j) if i == j => vec![velocity(i, 2)],
             Kind::Kinetic(i, j) | Kind::Dissipation(i, j) => vec![velocity(i, 1), velocity(j, 1)],
             Kind::Gyroscopic(i) => vec![velocity(i, 1)],
             Kind::Potential => vec![],
         };
-        factors.extend(function);
-        if factors.is_empty() { vec!["1".to_string()] } else { factors }
-    }
-
-    /// A term in the grammar of system files.
-    pub fn text(&self, k: usize) -> String {
-        let velocity = |i: usize, power: i32| {
-            let name = &self.names[i];
-            if power == 1 { format!("{name}_dot") } else { format!("{name}_dot^{power}") }
-        };
-        self.factors(k, velocity, self.functions[self.terms[k].function].text(&self.names)).join("*")
-    }
-
-    /// A term in LaTeX.
-    pub fn latex(&self, k: usize) -> String {
-        let names: Vec<String> = self.names.iter().map(|name| latex_name(name)).collect();
-        let velocity = |i: usize, power: i32| {
-            let name = format!("\\dot{{{}}}", names[i]);
-            if power == 1 { name } else { format!("{name}^{power}") }
-        };
-        self.factors(k, velocity, self.functions[self.terms[k].function].latex(&names)).join("\\,")
-    }
-
-    /// A term in Rust, over `q` and `v` of `Real`.
-    pub fn rust(&self, k: usize) -> String {
-        let names: Vec<String> = (0..self.n()).map(|i| format!("q[{i}]")).collect();
-        let velocity =
-            |i: usize, power: i32| if power == 1 { format!("v[{i}]") } else { format!("v[{i}].powi({power})") };
-        self.factors(k, velocity, self.functions[self.terms[k].function].rust(&names)).join(" * ")
+        let names: Vec<String> = (0..self.n()).map(name).collect();
+        factors.extend(self.functions[self.terms[k].function].written(&names, notation));
+        if factors.is_empty() { "1".to_string() } else { notation.product(&factors) }
     }
 
     /// `true` if the term belongs to the dissipation function.
     pub fn is_dissipation(&self, k: usize) -> bool {
         matches!(self.terms[k].kind, Kind::Dissipation(..))
+    }
+
+    /// The mass matrix `(n, n)` that terms with these coefficients have where their functions have these values.
+    pub fn mass_matrix(&self, terms: &[usize], coefficients: &[f64], values: &Values, mass: &mut [f64]) {
+        let n = self.n();
+        mass.fill(0.0);
+        for (&k, &c) in terms.iter().zip(coefficients) {
+            if let Some((i, j)) = self.kinetic(k) {
+                let value = c * values[self.terms[k].function].value;
+                mass[i * n + j] += value;
+                mass[j * n + i] += value;
+            }
+        }
     }
 
     /// The mass matrix' part of a term: `(i, j)` of an element and its mirror image.
@@ -475,7 +475,8 @@ mod tests {
         let library = library(&[true, false], true);
         let bounds = [[-3.0, 3.0], [-1.0, 2.0]];
         let (kept, quotient) = library.independent(&bounds, 0);
-        let find = |text: &str| (0..library.terms.len()).find(|&k| library.text(k) == text).unwrap();
+        let find =
+            |text: &str| (0..library.terms.len()).find(|&k| library.written(k, Notation::System) == text).unwrap();
         // The constant, and q1_dot as the derivative of q1, do nothing.
         for nothing in ["1", "q1_dot", "q1_dot*cos(q1)"] {
             assert!(!kept.contains(&find(nothing)), "{nothing}");

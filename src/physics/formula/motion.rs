@@ -5,7 +5,8 @@
 //! segment by segment. Noise enters positions alone, so that nothing is biased by it.
 
 use super::library::{Kind, Library, Term, Values};
-use super::linear::{dot, eliminate, inverse_with, times};
+use super::linear::{dot, inverse_with, times};
+use crate::linalg::{self, Workspace};
 use std::collections::BTreeMap;
 
 /// Samples that are followed from one start.
@@ -146,7 +147,10 @@ struct Follower<'a> {
     n: usize,
     columns: usize,
     mass: Vec<f64>,
+    inverse: Vec<f64>,
     rest: Vec<f64>,
+    right: Vec<f64>,
+    workspace: Workspace<f64>,
     by_q: Vec<f64>,
     by_v: Vec<f64>,
     effect: Vec<f64>,
@@ -165,7 +169,10 @@ impl<'a> Follower<'a> {
             n,
             columns: 2 * n + wanted.len(),
             mass: vec![0.0; n * n],
+            inverse: vec![0.0; n * n],
             rest: vec![0.0; n],
+            right: vec![0.0; n * (2 * n + wanted.len())],
+            workspace: Workspace::new(),
             by_q: vec![0.0; n * n],
             by_v: vec![0.0; n * n],
             effect: vec![0.0; n * wanted.len()],
@@ -176,21 +183,16 @@ impl<'a> Follower<'a> {
     fn acceleration(&mut self, (q, v): (&[f64], &[f64]), force: &[f64], a: &mut [f64]) -> bool {
         let n = self.n;
         self.library.evaluate(&self.functions, q, &mut self.values);
-        self.mass.fill(0.0);
+        self.library.mass_matrix(&self.model.terms, &self.model.coefficients, &self.values, &mut self.mass);
         self.rest.fill(0.0);
         let still = [0.0; super::function::MOST_COORDINATES];
         for (&k, &c) in self.model.terms.iter().zip(&self.model.coefficients) {
             self.library.add_equation(k, c, &self.values, (v, &still[..n]), &mut self.rest);
-            if let Some((i, j)) = self.library.kinetic(k) {
-                let value = c * self.values[self.library.terms[k].function].value;
-                self.mass[i * n + j] += value;
-                self.mass[j * n + i] += value;
-            }
         }
-        for i in 0..n {
-            a[i] = force.get(i).copied().unwrap_or(0.0) - self.rest[i];
+        for (i, rest) in self.rest.iter_mut().enumerate() {
+            *rest = force.get(i).copied().unwrap_or(0.0) - *rest;
         }
-        eliminate(n, &mut self.mass, 1, a) && a.iter().all(|a| a.is_finite())
+        linalg::solve(n, &self.mass, &self.rest, a, &mut self.workspace).is_ok()
     }
 
     /// The acceleration with its derivatives: `d` is `(n, columns)`, given those of position and velocity.
@@ -205,7 +207,6 @@ impl<'a> Follower<'a> {
         if !self.acceleration((q, v), force, a) {
             return false;
         }
-        self.mass.fill(0.0);
         self.by_q.fill(0.0);
         self.by_v.fill(0.0);
         for (&k, &c) in self.model.terms.iter().zip(&self.model.coefficients) {
@@ -215,8 +216,6 @@ impl<'a> Follower<'a> {
             let bend = |l: usize| dot(&f.hessian[l][..n], v);
             match kind {
                 Kind::Kinetic(i, j) => {
-                    self.mass[i * n + j] += c * f.value;
-                    self.mass[j * n + i] += c * f.value;
                     let rate = dot(&f.gradient[..n], v);
                     for l in 0..n {
                         let (g, h) = (c * f.gradient[l], c * bend(l));
@@ -260,9 +259,10 @@ impl<'a> Follower<'a> {
                 }
             }
         }
-        d.fill(0.0);
+        let right = &mut self.right;
+        right.fill(0.0);
         for i in 0..n {
-            let row = &mut d[i * columns..(i + 1) * columns];
+            let row = &mut right[i * columns..(i + 1) * columns];
             for j in 0..n {
                 let (x, y) = (self.by_q[i * n + j], self.by_v[i * n + j]);
                 let pairs = sq[j * columns..(j + 1) * columns].iter().zip(&sv[j * columns..(j + 1) * columns]);
@@ -277,10 +277,19 @@ impl<'a> Follower<'a> {
             (0..n).for_each(|i| self.effect[i * count + at] = single[i]);
         }
         for i in 0..n {
-            let row = &mut d[i * columns + 2 * n..(i + 1) * columns];
+            let row = &mut right[i * columns + 2 * n..(i + 1) * columns];
             row.iter_mut().zip(&self.effect[i * count..(i + 1) * count]).for_each(|(r, e)| *r -= e);
         }
-        eliminate(n, &mut self.mass, columns, d)
+        if linalg::inverse(n, &self.mass, &mut self.inverse, &mut self.workspace).is_err() {
+            return false;
+        }
+        d.fill(0.0);
+        for (inverse, d) in self.inverse.chunks_exact(n).zip(d.chunks_exact_mut(columns)) {
+            for (factor, right) in inverse.iter().zip(right.chunks_exact(columns)) {
+                d.iter_mut().zip(right).for_each(|(d, x)| *d += factor * x);
+            }
+        }
+        true
     }
 }
 
@@ -622,7 +631,7 @@ impl Motion<'_> {
         let n = self.library.n();
         let mut sizes = vec![0.0; wanted.len()];
         let mut follower = Follower::new(self.library, model, wanted);
-        let mut a = vec![0.0; n];
+        let (mut a, mut inverse) = (vec![0.0; n], vec![0.0; n * n]);
         let mut count = 0.0;
         let stride = segments.len().div_ceil(200).max(1);
         for segment in segments.iter().step_by(stride) {
@@ -630,17 +639,7 @@ impl Motion<'_> {
             if !follower.acceleration((q, v), &[], &mut a) {
                 continue;
             }
-            let mut mass = vec![0.0; n * n];
-            for (&k, &c) in model.terms.iter().zip(&model.coefficients) {
-                if let Some((i, j)) = self.library.kinetic(k) {
-                    let value = c * follower.values[self.library.terms[k].function].value;
-                    mass[i * n + j] += value;
-                    mass[j * n + i] += value;
-                }
-            }
-            let mut inverse = vec![0.0; n * n];
-            (0..n).for_each(|i| inverse[i * n + i] = 1.0);
-            if !eliminate(n, &mut mass, n, &mut inverse) {
+            if linalg::inverse(n, &follower.mass, &mut inverse, &mut follower.workspace).is_err() {
                 continue;
             }
             count += n as f64;

@@ -108,7 +108,7 @@ pub fn formula_of_model(
 /// The choice of terms of which none can be given up: the error of the next shorter one is the most times as large.
 fn elbow(path: &Path) -> Option<&Choice> {
     let least = path.best.values().map(|choice| choice.held_out).fold(f64::INFINITY, f64::min);
-    // Below rounding nothing is told apart.
+    // Differences below rounding are not significant.
     let floor = least.max(1e-20);
     let near = || path.best.values().filter(|choice| choice.held_out <= NEAR * floor);
     let rise = |choice: &Choice| {

@@ -4,7 +4,7 @@
 //! coefficients of the terms.
 
 use super::library::{Kind, Library, Term, Values};
-use super::linear::eliminate;
+use crate::linalg::{self, Workspace};
 
 /// Positions and velocities of a stretch of motion without gap, with known forces if there are any: `(samples, n)`.
 pub(super) struct Stretch<'a> {
@@ -181,17 +181,19 @@ impl Windows {
         !self.forces.is_empty()
     }
 
-    /// The mean mass matrix over a window under the test function, `(n, n)`.
-    fn mass(&self, window: usize, coefficients: &[f64], mass: &mut [f64]) {
+    /// The mean mass matrices over all windows under the test function, `(windows, n, n)`.
+    fn masses(&self, coefficients: &[f64]) -> Vec<f64> {
         let n = self.n;
-        mass.fill(0.0);
-        let functions = &self.functions[window * self.width..(window + 1) * self.width];
-        for (kinetic, c) in self.kinetic.iter().zip(coefficients).filter(|(_, c)| **c != 0.0) {
-            if let Some((i, j, f)) = *kinetic {
-                mass[i * n + j] += c * functions[f];
-                mass[j * n + i] += c * functions[f];
+        let mut masses = vec![0.0; self.len() * n * n];
+        for (mass, functions) in masses.chunks_exact_mut(n * n).zip(self.functions.chunks_exact(self.width)) {
+            for (kinetic, c) in self.kinetic.iter().zip(coefficients).filter(|(_, c)| **c != 0.0) {
+                if let Some((i, j, f)) = *kinetic {
+                    mass[i * n + j] += c * functions[f];
+                    mass[j * n + i] += c * functions[f];
+                }
             }
         }
+        masses
     }
 
     /// Squared errors of the mean accelerations that some coefficients give, by window, in units of `sigma`; infinite where the mass
@@ -199,20 +201,17 @@ impl Windows {
     pub fn errors(&self, coefficients: &[f64], sigma: &[f64]) -> Vec<f64> {
         let (n, count) = (self.n, self.terms);
         let used: Vec<usize> = (0..count).filter(|&k| coefficients[k] != 0.0).collect();
-        let (mut mass, mut rest) = (vec![0.0; n * n], vec![0.0; n]);
-        let error = |window: usize| {
-            self.mass(window, coefficients, &mut mass);
-            for (i, rest) in rest.iter_mut().enumerate() {
-                let row = &self.equations[(window * n + i) * count..(window * n + i + 1) * count];
-                let force = if self.driven() { self.forces[window * n + i] } else { 0.0 };
-                *rest = used.iter().map(|&k| row[k] * coefficients[k]).sum::<f64>() - force;
-            }
-            if !eliminate(n, &mut mass, 1, &mut rest) {
-                return f64::INFINITY;
-            }
-            rest.iter().zip(sigma).map(|(r, s)| (r / s).powi(2)).sum::<f64>()
-        };
-        (0..self.len()).map(error).collect()
+        let mut rest = Vec::with_capacity(self.len() * n);
+        for at in 0..self.len() * n {
+            let row = &self.equations[at * count..(at + 1) * count];
+            let force = if self.driven() { self.forces[at] } else { 0.0 };
+            rest.push(used.iter().map(|&k| row[k] * coefficients[k]).sum::<f64>() - force);
+        }
+        let mut a = vec![0.0; rest.len()];
+        // Windows that fail are NaN.
+        let _ = linalg::solve(n, &self.masses(coefficients), &rest, &mut a, &mut Workspace::new());
+        let error = |a: &[f64]| a.iter().zip(sigma).map(|(a, s)| (a / s).powi(2)).sum::<f64>();
+        a.chunks_exact(n).map(error).map(|square| if square.is_nan() { f64::INFINITY } else { square }).collect()
     }
 
     /// Normal equations of the errors of accelerations, the mass matrix being that of `coefficients`: matrix of the terms `set`, what the
@@ -221,11 +220,10 @@ impl Windows {
         let (n, count, m) = (self.n, self.terms, set.len());
         let mut weights = vec![0.0; self.len() * n * n];
         let mut sizes = Vec::with_capacity(self.len());
-        let mut mass = vec![0.0; n * n];
-        for (window, weight) in weights.chunks_exact_mut(n * n).enumerate() {
-            self.mass(window, coefficients, &mut mass);
-            (0..n).for_each(|i| weight[i * n + i] = 1.0);
-            if !eliminate(n, &mut mass, n, weight) {
+        // Windows that fail are NaN.
+        let _ = linalg::inverse(n, &self.masses(coefficients), &mut weights, &mut Workspace::new());
+        for weight in weights.chunks_exact_mut(n * n) {
+            if weight.iter().any(|w| w.is_nan()) {
                 weight.fill(0.0);
             }
             (0..n * n).for_each(|e| weight[e] /= sigma[e / n]);

@@ -5,7 +5,6 @@ use super::rows::independent;
 use super::{Constraints, Manifold, ManifoldRows};
 use crate::forward::{Dual, HyperDual};
 use crate::lagrangian::{EulerLagrange, MechanicsError, MetricJet, Request, Terms};
-use crate::linalg::Workspace;
 use crate::scalar::{Dd, Real, Scalar};
 
 /// A row at unit length whose part beside the rows before it is below this at every state follows from them.
@@ -230,11 +229,7 @@ impl<M: EulerLagrange<S>, C: Constraints, S: Scalar> EulerLagrange<S> for Constr
                 terms.constraint_drift.extend_from_slice(&rows.drift);
             }
         }
-        if let Err(error @ MechanicsError::Shape { .. }) = terms.complete(n, v, request, &mut Workspace::new()) {
-            return Err(error);
-        }
-        terms.prepend_failures(found);
-        terms.outcome()
+        terms.complete_beside(found, n, v, request)
     }
 
     fn inner(&self) -> Option<&dyn EulerLagrange<S>> {

@@ -236,8 +236,8 @@ impl Description {
         let size = (self.coordinates.len(), self.parameters.len());
         let formulas = self.constraints.iter().map(|(name, text)| (name.as_str(), text.as_str()));
         let compiled = ExpressionConstraints::compiled(size, formulas, compiler, scope);
-        let told = |(name, error)| DescriptionError::new(format!("constraints.{name}"), error);
-        compiled.map(Some).map_err(told)
+        let place = |(name, error)| DescriptionError::new(format!("constraints.{name}"), error);
+        compiled.map(Some).map_err(place)
     }
 
     /// The entries `(i, j)`, `i <= j`, of the metric.
