@@ -32,9 +32,9 @@ fn measured(config: &Config) -> u64 {
         let identity = Fingerprint { config: String::new(), data: data.checksums() };
         let keeper =
             Arc::new(CheckpointManager::new(Arc::new(Disk), directory.path(), CheckpointInterval::Epochs(1), identity));
-        let sitting = ResumeOptions { checkpoints: Some(keeper), start: None };
+        let resumed = ResumeOptions { checkpoints: Some(keeper), start: None };
         let penalty = config.penalty().unwrap();
-        resume(config, &architecture, penalty, data, 2, &Hooks::default(), sitting).unwrap();
+        resume(config, &architecture, penalty, data, 2, &Hooks::default(), resumed).unwrap();
     });
     assert_eq!(config.precision, Precision::F32);
     taken as u64

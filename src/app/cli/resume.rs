@@ -57,7 +57,7 @@ pub fn reopen<T>(
     json: bool,
     read: impl FnOnce(Text<'_>) -> Result<T, CliError>,
 ) -> Result<Option<(Folder, T)>, CliError> {
-    // Looked for before anything is created, and again when nobody else can write.
+    // Looked for before anything is created, and again when no other process can write.
     find(directory, learner)?;
     let folder = Folder::open(directory)?;
     match find(directory, learner)? {

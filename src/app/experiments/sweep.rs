@@ -126,7 +126,7 @@ mod tests {
         let runs = sweep_runs(pairs(choices), 2);
         assert_eq!((runs.len(), runs[0].label.as_str(), runs[0].name.as_str()), (12, "a = 1, b = x", "a-1-b-x-seed0"));
         assert_eq!((runs[6].label.as_str(), runs[6].config.seed), ("a = 1, b = x", 1));
-        // Names that would be the same are told apart.
+        // Equal names get a number.
         let signs = sweep_runs(pairs(combinations(&["a=-1,1".parse().unwrap()])), 1);
         assert_ne!(signs[0].name, signs[1].name);
     }

@@ -58,3 +58,8 @@ pub use signature::{
 pub(crate) use singular::singular;
 pub use solve::inverse;
 pub use solve::solve;
+
+/// Sum of products.
+pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}

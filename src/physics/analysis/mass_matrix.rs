@@ -2,6 +2,7 @@
 
 use super::summary::ErrorDistribution;
 use crate::lagrangian::{EulerLagrange, Request, Terms};
+use crate::linalg::dot;
 use crate::scalar::{Real, Scalar};
 use serde::{Deserialize, Serialize};
 
@@ -24,10 +25,6 @@ pub(crate) fn matrices_at_rest<S: Scalar>(model: &dyn EulerLagrange<S>, q: &[S])
     // Failures of single states leave matrices that are not finite.
     let _ = model.terms(q, &vec![<S as Real>::zero(); q.len()], Request::MASS_MATRIX, &mut terms);
     terms.mass_matrix.iter().map(|x| x.to_f64()).collect()
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 /// Matrices of `size` numbers that are finite in both lists, the first of each pair not zero.

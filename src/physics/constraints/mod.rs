@@ -16,6 +16,7 @@ mod tests;
 pub use samples::MotionSamples;
 
 use crate::lagrangian::ReducedMass;
+use crate::linalg::dot;
 use features::Features;
 use generators::{Generator, Search};
 use serde::Serialize;
@@ -250,11 +251,6 @@ fn beside(basis: &[f64], vector: &[f64]) -> Vec<f64> {
         }
     }
     rest
-}
-
-/// Scalar product.
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 /// An orthonormal basis of the directions that rows leave.

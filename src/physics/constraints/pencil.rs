@@ -2,7 +2,7 @@
 
 use super::MotionSamples;
 use super::features::Features;
-use crate::linalg::{Workspace, eigh};
+use crate::linalg::{Workspace, dot, eigh};
 
 /// Deviations below this share of a term are not told from rounding.
 pub const FLOOR: f64 = 1e-6;
@@ -138,9 +138,8 @@ impl Pencil {
 
     /// `c.G c / c.N c` of a combination.
     pub fn ratio(&self, c: &[f64]) -> f64 {
-        let form = |matrix: &[f64]| -> f64 {
-            matrix.chunks_exact(self.terms).zip(c).map(|(row, ci)| ci * super::dot(row, c)).sum()
-        };
+        let form =
+            |matrix: &[f64]| -> f64 { matrix.chunks_exact(self.terms).zip(c).map(|(row, ci)| ci * dot(row, c)).sum() };
         form(&self.gram) / form(&self.noise)
     }
 
@@ -161,9 +160,9 @@ impl Pencil {
         let white = vectors;
         let mut inside = vec![0.0; p * p];
         for (i, a) in white.chunks_exact(p).enumerate() {
-            let image: Vec<f64> = self.noise.chunks_exact(p).map(|row| super::dot(row, a)).collect();
+            let image: Vec<f64> = self.noise.chunks_exact(p).map(|row| dot(row, a)).collect();
             for (j, b) in white.chunks_exact(p).enumerate() {
-                inside[i * p + j] = super::dot(&image, b);
+                inside[i * p + j] = dot(&image, b);
             }
         }
         let mut turned = vec![0.0; p * p];

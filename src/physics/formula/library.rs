@@ -2,7 +2,7 @@
 
 use super::error::FormulaError;
 use super::function::{Factor, Function, MOST_COORDINATES, Notation, Taylor};
-use super::linear::dot;
+use crate::linalg::dot;
 use crate::random::RngStream;
 use rand::Rng;
 

@@ -1,6 +1,6 @@
 //! Small dense linear algebra of normal equations and mass matrices: symmetric matrices `(n, n)`, row-major.
 
-use crate::linalg::{self, Workspace};
+use crate::linalg::{self, Workspace, dot};
 
 /// Part of the diagonal that is added to it: directions that the data say nothing of get the smallest solution.
 const RIDGE: f64 = 1e-11;
@@ -26,10 +26,6 @@ pub(super) fn inverse_with(n: usize, matrix: &[f64], ridge: f64) -> Option<Vec<f
 /// `A x`.
 pub(super) fn times(n: usize, matrix: &[f64], x: &[f64]) -> Vec<f64> {
     (0..n).map(|i| dot(&matrix[i * n..(i + 1) * n], x)).collect()
-}
-
-pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 /// Rows and columns of some indices.

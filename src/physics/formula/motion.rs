@@ -5,8 +5,8 @@
 //! segment by segment. Noise enters positions alone, so that nothing is biased by it.
 
 use super::library::{Kind, Library, Term, Values};
-use super::linear::{dot, inverse_with, times};
-use crate::linalg::{self, Workspace};
+use super::linear::{inverse_with, times};
+use crate::linalg::{self, Workspace, dot};
 use std::collections::BTreeMap;
 
 /// Samples that are followed from one start.

@@ -1,7 +1,8 @@
 //! Backward elimination by the weak form, with refits and exchanges.
 
-use super::linear::{dot, inverse, part, times};
+use super::linear::{inverse, part, times};
 use super::weak::{Normal, Windows};
+use crate::linalg::dot;
 use std::collections::BTreeMap;
 
 /// Terms up to which every drop is judged by the errors of accelerations, and refitted.

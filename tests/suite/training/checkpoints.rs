@@ -68,9 +68,9 @@ impl<S: Scalar> Case<S> {
             Err(CheckpointError::Missing) => None,
             Err(error) => panic!("{error}"),
         };
-        let sitting = ResumeOptions { checkpoints: Some(keeper), start };
+        let resumed = ResumeOptions { checkpoints: Some(keeper), start };
         let penalty = self.config.penalty().unwrap();
-        resume(&self.config, &self.architecture, penalty, self.data.clone(), threads, hooks, sitting)
+        resume(&self.config, &self.architecture, penalty, self.data.clone(), threads, hooks, resumed)
     }
 }
 

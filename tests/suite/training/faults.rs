@@ -154,10 +154,10 @@ fn sit(directory: &Path, files: Arc<dyn Files>, steps: usize) -> usize {
         }
     };
     let hooks = Hooks { watcher: Some(Arc::new(watcher)), interrupt };
-    let sitting = ResumeOptions { checkpoints: Some(keeper(files)), start };
+    let resumed = ResumeOptions { checkpoints: Some(keeper(files)), start };
     let penalty = config.penalty().unwrap();
     // In the first epoch nothing has been learned yet.
-    if let Ok(trained) = resume(&config, &architecture, penalty, data, 1, &hooks, sitting) {
+    if let Ok(trained) = resume(&config, &architecture, penalty, data, 1, &hooks, resumed) {
         assert_eq!(trained.stop, StopReason::Interrupted);
     }
     began
@@ -165,7 +165,7 @@ fn sit(directory: &Path, files: Arc<dyn Files>, steps: usize) -> usize {
 
 #[test]
 fn a_checkpoint_is_the_old_one_or_the_new_one() {
-    // One checkpoint at the beginning of a sitting, one at its end.
+    // One checkpoint at the beginning of a resumed, one at its end.
     let kept = tempfile::tempdir().unwrap();
     assert_eq!(sit(kept.path(), Arc::new(Disk), 2), 0);
     assert_eq!(names(kept.path()), [PREVIOUS, LATEST]);

@@ -613,9 +613,9 @@ fn stopping_after_any_step_changes_nothing() {
         let keeper = Arc::new(CheckpointManager::new(Arc::new(Disk), directory, every, identity));
         let start = keeper.restore::<f64>(Layout::new(&architecture).parameters, 8).ok().map(|found| found.content);
         let shots = start.clone().filter(|snapshot| snapshot.is_shooting());
-        let sitting = ResumeOptions { checkpoints: Some(Arc::clone(&keeper)), start };
+        let resumed = ResumeOptions { checkpoints: Some(Arc::clone(&keeper)), start };
         let trained =
-            resume(&config, &architecture, Penalty::None, data.clone(), threads, &Hooks::default(), sitting).unwrap();
+            resume(&config, &architecture, Penalty::None, data.clone(), threads, &Hooks::default(), resumed).unwrap();
         let (training, validation) = (&tracks[..], &tracks[..]);
         let weights = trained.weights.clone();
         let penalty = Penalty::None;

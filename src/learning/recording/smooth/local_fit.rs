@@ -5,6 +5,8 @@
 //! derivative of the same polynomial), weighted by the ratio of the noises. The least-squares problem is solved by
 //! orthogonalisation (Gram-Schmidt, twice), with times scaled to `[-1, 1]`.
 
+use crate::linalg::dot;
+
 /// Weights of one window for one degree `d`, and what two more degrees would change.
 #[derive(Clone, Debug, Default)]
 pub struct LocalFit {
@@ -130,10 +132,6 @@ impl LocalFit {
 
 /// Largest degree of the polynomials.
 pub const MOST_DEGREE: usize = 10;
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
-}
 
 #[cfg(test)]
 mod tests {

@@ -6,9 +6,10 @@
 //! much as the weights of its kind are large. The error of the step is that of all ranges, see the [module](super).
 
 use super::Estimate;
-use super::regression::{Sums, dot, groups, jackknife};
+use super::regression::{Sums, groups, jackknife};
 use crate::configuration::Penalty;
 use crate::data::{RecordingSplit, StateEstimate};
+use crate::linalg::dot;
 use crate::network::{Architecture, Layout, NetworkLagrangian};
 use crate::recording::RecordedTrajectory;
 use crate::shooting::{Curvature, Segments, ShootingObjective};

@@ -2,10 +2,10 @@
 
 use super::changes::{Changes, Row, Usual};
 use super::observed::Observed;
-use super::regression::{Sums, dot, groups, jackknife};
+use super::regression::{Sums, groups, jackknife};
 use super::{Estimate, Linear};
 use crate::lagrangian::{EulerLagrange, Request, Terms};
-use crate::linalg::{Workspace, inverse};
+use crate::linalg::{Workspace, dot, inverse};
 
 /// States on which a model is finite, with what its accelerations miss.
 pub(super) struct Data {

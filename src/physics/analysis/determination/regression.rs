@@ -1,6 +1,6 @@
 //! Regularised least squares over groups of consecutive states, and the scatter of what it gives without each of them.
 
-use crate::linalg::{MatMut, MatRef, Workspace, gemm, inverse, solve};
+use crate::linalg::{MatMut, MatRef, Workspace, dot, gemm, inverse, solve};
 use std::ops::Range;
 
 /// Groups that states are cut into, each long enough to be independent of the others.
@@ -19,11 +19,6 @@ pub fn groups(states: usize, least: usize) -> Option<Vec<Range<usize>>> {
 pub fn jackknife(whole: f64, without: impl ExactSizeIterator<Item = f64>) -> f64 {
     let groups = without.len() as f64;
     without.map(|x| (x - whole).powi(2)).sum::<f64>() * (groups - 1.0) / groups
-}
-
-/// Sum of products.
-pub fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 /// Normal equations of some states: `A^T A`, `A^T e`, `e^T e`.
