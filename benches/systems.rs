@@ -42,7 +42,7 @@ fn ratios<S: Scalar>(one: fn(&[S], &[S])) {
     let (q, v) = (numbers(0.1), numbers(0.7));
     let mut terms = Terms::default();
     for (name, request) in [
-        ("mass matrix and coriolis term", Request::MASS_MATRIX | Request::MOMENTUM_DRIFT),
+        ("mass matrix and coriolis term", Request::MASS_MATRIX | Request::CORIOLIS),
         ("acceleration", Request::ACCELERATION),
     ] {
         let batched = || built.terms(black_box(&q), &v, request, &mut terms).expect("regular states");

@@ -15,7 +15,7 @@ pub fn main() -> Result<(), Box<dyn std::error::Error>> {
     let (q, v) = (SVector::from([0.4, -1.3]), SVector::from([2.0, 0.5]));
     model.terms(q.as_slice(), v.as_slice(), Request::ALL, &mut terms)?;
     let mass = SMatrix::<f64, 2, 2>::from_column_slice(&terms.mass_matrix);
-    let force = SVector::<f64, 2>::from_column_slice(&terms.dl_dq) - SVector::from_column_slice(&terms.momentum_drift);
+    let force = SVector::<f64, 2>::from_column_slice(&terms.dl_dq) - SVector::from_column_slice(&terms.coriolis);
     let acceleration = mass.cholesky().ok_or("M is not positive definite")?.solve(&force);
     let difference = (acceleration - SVector::<f64, 2>::from_column_slice(&terms.acceleration)).norm();
     println!("a = {:.6?}, by nalgebra within {difference:.1e}", terms.acceleration);

@@ -26,7 +26,7 @@ impl Misfit {
         for lanes in self.lanes.chunks(STATES) {
             let part = |k: usize| -> Vec<f64> { lanes.iter().flat_map(|lane| lane[k..k + 2].to_vec()).collect() };
             evaluation.evaluate(&parameters, &part(0), &part(2), Depth::Training);
-            let forces = evaluation.dl_dq.iter().zip(&evaluation.momentum_drift).map(|(g, c)| g - c);
+            let forces = evaluation.dl_dq.iter().zip(&evaluation.coriolis).map(|(g, c)| g - c);
             let mut a = vec![0.0; 2 * lanes.len()];
             solve(2, &evaluation.mass_matrix, &forces.collect::<Vec<_>>(), &mut a, &mut workspace)?;
             let errors: Vec<f64> = a.iter().zip(part(4)).map(|(a, target)| a - target).collect();

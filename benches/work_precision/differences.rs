@@ -115,7 +115,7 @@ impl Differences<'_> {
             terms.dl_dq.push(self.order.first(h, |d| value(&unit(i, d), &still)) / scale[i]);
             let along = move |d: f64| move |k: usize| d * v[k] / speed;
             let mixed = self.order.mixed(h, |d, e| value(&along(e), &unit(i, d)));
-            terms.momentum_drift.push(mixed * speed / scale[i]);
+            terms.coriolis.push(mixed * speed / scale[i]);
             for j in 0..=i {
                 let both = move |d: f64, e: f64| move |k: usize| unit(i, d)(k) + unit(j, e)(k);
                 let mixed = self.order.mixed(h, |d, e| value(&still, &both(d, e))) / (scale[i] * scale[j]);

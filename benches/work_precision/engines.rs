@@ -63,7 +63,7 @@ fn errors<S: Scalar>(n: usize, found: &Terms<S>, exact: &Terms<Dd>) -> Vec<f64> 
     };
     vec![
         worst(&found.mass_matrix, &exact.mass_matrix, n * n),
-        worst(&found.momentum_drift, &exact.momentum_drift, n),
+        worst(&found.coriolis, &exact.coriolis, n),
         worst(&found.acceleration, &exact.acceleration, n),
     ]
 }
@@ -113,12 +113,12 @@ impl Bench<'_> {
         let model = case.network::<f32>()?;
         let (v, mut terms, mut workspace) = (cast(&case.v), Terms::default(), Workspace::new());
         let mut run = || -> Result<Terms<f64>, String> {
-            let products = Request::MASS_MATRIX | Request::MOMENTUM_DRIFT | Request::DL_DQ;
+            let products = Request::MASS_MATRIX | Request::CORIOLIS | Request::DL_DQ;
             model.terms(black_box(&case.q), &case.v, products, &mut terms).map_err(|e| e.to_string())?;
             let mut wide = Terms {
                 dl_dq: cast(&terms.dl_dq),
                 mass_matrix: cast(&terms.mass_matrix),
-                momentum_drift: cast(&terms.momentum_drift),
+                coriolis: cast(&terms.coriolis),
                 ..Terms::default()
             };
             wide.complete(case.n, &v, Request::ACCELERATION, &mut workspace).map_err(|e| e.to_string())?;
@@ -146,7 +146,7 @@ impl Bench<'_> {
             let mut terms = Terms {
                 dl_dq: first[..n].to_vec(),
                 mass_matrix: (0..n).flat_map(|i| block(i, n)).collect(),
-                momentum_drift: (0..n).map(along).collect(),
+                coriolis: (0..n).map(along).collect(),
                 ..Terms::default()
             };
             terms.complete(n, &v, Request::ACCELERATION, &mut workspace).map_err(|e| e.to_string())?;

@@ -62,7 +62,7 @@ fn contract(architecture: &Architecture, weights: &[f64], q: &[f64], v: &[f64]) 
     let network = NetworkLagrangian::new(architecture.clone(), weights.to_vec()).expect("the weights fit");
     let mut terms = Terms::default();
     if network.terms(q, v, Request::ALL, &mut terms).is_ok() {
-        for field in [&terms.momentum, &terms.dl_dq, &terms.mass_matrix, &terms.momentum_drift, &terms.acceleration] {
+        for field in [&terms.momentum, &terms.dl_dq, &terms.mass_matrix, &terms.coriolis, &terms.acceleration] {
             assert!(finite(field), "{terms:?} of {architecture:?} {weights:?} {q:?} {v:?}");
         }
         assert!(finite(&terms.lagrangian) && finite(&terms.energy), "{terms:?}");
@@ -97,7 +97,7 @@ fn derivatives(architecture: &Architecture, weights: &[f64], q: &[f64], v: &[f64
             &chunk.momentum[row.clone()],
             &chunk.dl_dq[row.clone()],
             &chunk.mass_matrix[state * n * n..(state + 1) * n * n],
-            &chunk.momentum_drift[row],
+            &chunk.coriolis[row],
         ];
         for (k, name) in ["L", "p", "g", "M", "c"].into_iter().enumerate() {
             let error = apart(&cast(found[k]), &exact[k]);

@@ -287,7 +287,7 @@ impl Subject {
             taken(n, |t| &mut t.momentum),
             taken(n, |t| &mut t.dl_dq),
             taken(n * n, |t| &mut t.mass_matrix),
-            taken(n, |t| &mut t.momentum_drift),
+            taken(n, |t| &mut t.coriolis),
             taken(n, |t| &mut t.acceleration),
             taken(1, |t| &mut t.energy),
         ];

@@ -229,7 +229,7 @@ fn fields<'a, S>(
         vector("dl_dq", &terms.dl_dq, n),
         Field { name: "mass_matrix", values: part(&terms.mass_matrix, n * n), shape: Shape::Matrix },
         vector("eigenvalues", spectrum, n),
-        vector("coriolis", &terms.momentum_drift, n),
+        vector("coriolis", &terms.coriolis, n),
         vector("acceleration", &terms.acceleration, n),
         number("energy", &terms.energy),
     ];

@@ -335,8 +335,8 @@ impl<S: Scalar> SystemInstance<S> {
 fn differentiated<S: Scalar>(lagrangian: &ExpressionLagrangian, parameters: &[S], q: &[S], v: &[S]) -> Vec<S> {
     let mut terms = Terms::default();
     let (n, need) = (q.len(), Request::ACCELERATION);
-    let Terms { lagrangian: value, momentum, dl_dq, mass_matrix, momentum_drift, .. } = &mut terms;
-    for (field, size) in [(&mut *dl_dq, n), (&mut *mass_matrix, n * n), (&mut *momentum_drift, n)] {
+    let Terms { lagrangian: value, momentum, dl_dq, mass_matrix, coriolis, .. } = &mut terms;
+    for (field, size) in [(&mut *dl_dq, n), (&mut *mass_matrix, n * n), (&mut *coriolis, n)] {
         field.resize(size, S::nan());
     }
     evaluate(
@@ -345,7 +345,7 @@ fn differentiated<S: Scalar>(lagrangian: &ExpressionLagrangian, parameters: &[S]
         q,
         v,
         need,
-        &mut State { lagrangian: value, momentum, dl_dq, mass_matrix, momentum_drift },
+        &mut State { lagrangian: value, momentum, dl_dq, mass_matrix, coriolis },
     );
     // A row that fails has the acceleration NaN, which is what there is to say of one state.
     let _ = terms.complete(q.len(), v, Request::ACCELERATION, &mut Workspace::new());

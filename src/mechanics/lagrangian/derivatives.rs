@@ -11,7 +11,7 @@ pub(super) struct State<'a, R> {
     pub momentum: &'a mut [R],
     pub dl_dq: &'a mut [R],
     pub mass_matrix: &'a mut [R],
-    pub momentum_drift: &'a mut [R],
+    pub coriolis: &'a mut [R],
 }
 
 /// Fills what is needed.
@@ -141,8 +141,8 @@ fn jets<L: Lagrangian, R: Real, const H: usize, const N: usize>(
                 out.mass_matrix[i * H + j] = found.second(i, j);
             }
         }
-        if need.includes(Request::MOMENTUM_DRIFT) {
-            out.momentum_drift[i] = found.second(H, i);
+        if need.includes(Request::CORIOLIS) {
+            out.coriolis[i] = found.second(H, i);
         }
     }
 }
@@ -172,11 +172,11 @@ fn directions<L: Lagrangian, R: Real>(
                 out.mass_matrix[j * n + i] = mixed;
             }
         }
-        if need.includes(Request::MOMENTUM_DRIFT) {
+        if need.includes(Request::CORIOLIS) {
             for (number, &speed) in hq.iter_mut().zip(v) {
                 number.t = speed;
             }
-            out.momentum_drift[i] = system.lagrangian(parameters, hq, hv).st;
+            out.coriolis[i] = system.lagrangian(parameters, hq, hv).st;
             for number in hq.iter_mut() {
                 number.t = R::zero();
             }

@@ -14,7 +14,7 @@ impl<S: Scalar> Terms<S> {
             momentum,
             dl_dq,
             mass_matrix,
-            momentum_drift,
+            coriolis,
             force,
             dissipation,
             acceleration,
@@ -23,9 +23,7 @@ impl<S: Scalar> Terms<S> {
             ..
         } = self;
         failures.clear();
-        for field in
-            [lagrangian, momentum, dl_dq, mass_matrix, momentum_drift, force, dissipation, acceleration, energy]
-        {
+        for field in [lagrangian, momentum, dl_dq, mass_matrix, coriolis, force, dissipation, acceleration, energy] {
             field.clear();
         }
         self.clear_constraints();
@@ -110,7 +108,7 @@ impl<S: Scalar> Terms<S> {
         if request.includes(Request::ACCELERATION) {
             expect("mass matrices", batch * n * n, self.mass_matrix.len())?;
             expect("dL/dq", batch * n, self.dl_dq.len())?;
-            expect("momentum drifts", batch * n, self.momentum_drift.len())?;
+            expect("Coriolis terms", batch * n, self.coriolis.len())?;
             let m = self.constraints;
             expect("constraint rows", batch * m * n, self.constraint_matrix.len())?;
             expect("constraint drifts", batch * m, self.constraint_drift.len())?;
@@ -126,7 +124,7 @@ impl<S: Scalar> Terms<S> {
             let mut right = workspace.take_vector();
             right.clear();
             right.extend_from_slice(&self.dl_dq);
-            update(&mut right, &self.momentum_drift, |right, c| *right -= c);
+            update(&mut right, &self.coriolis, |right, c| *right -= c);
             if !self.force.is_empty() {
                 expect("generalized forces", batch * n, self.force.len())?;
                 update(&mut right, &self.force, |right, force| *right += force);
@@ -143,7 +141,7 @@ impl<S: Scalar> Terms<S> {
             ("momentum", &self.momentum, n),
             ("dL/dq", &self.dl_dq, n),
             ("mass matrix", &self.mass_matrix, n * n),
-            ("momentum drift", &self.momentum_drift, n),
+            ("Coriolis term", &self.coriolis, n),
             ("generalized force", &self.force, n),
             ("dissipated power", &self.dissipation, 1),
             ("constraint matrix", &self.constraint_matrix, m * n),
@@ -215,7 +213,7 @@ mod tests {
             lagrangian: vec![1.0, 2.0, 3.0],
             momentum: vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0],
             dl_dq: vec![3.0, 4.0, 1.0, 1.0, 1.0, 1.0],
-            momentum_drift: vec![1.0; 6],
+            coriolis: vec![1.0; 6],
             mass_matrix: vec![1.0, 0.0, 0.0, -1.0, 1.0, 1.0, 1.0, 1.0, 2.0, 0.0, 0.0, 2.0],
             ..Terms::default()
         };
@@ -240,7 +238,7 @@ mod tests {
     fn forces_beside_those_of_the_lagrangian_accelerate() {
         let mut terms = Terms {
             dl_dq: vec![3.0, 4.0],
-            momentum_drift: vec![1.0; 2],
+            coriolis: vec![1.0; 2],
             force: vec![-1.0, 2.0],
             mass_matrix: vec![2.0, 0.0, 0.0, 4.0],
             ..Terms::default()
@@ -259,7 +257,7 @@ mod tests {
     fn forces_from_outside_are_added() {
         let mut terms = Terms {
             dl_dq: vec![3.0, 4.0, 0.0, 0.0],
-            momentum_drift: vec![1.0, 1.0, 0.0, 0.0],
+            coriolis: vec![1.0, 1.0, 0.0, 0.0],
             mass_matrix: vec![2.0, 0.0, 0.0, 4.0, 1.0, 0.0, 0.0, 1.0],
             ..Terms::default()
         };
@@ -291,7 +289,7 @@ mod tests {
     fn one_coordinate_is_divided() {
         let mut terms = Terms {
             dl_dq: vec![6.0, 1.0, 1e300],
-            momentum_drift: vec![0.0; 3],
+            coriolis: vec![0.0; 3],
             mass_matrix: vec![-2.0, 0.0, 1e-300],
             ..Terms::default()
         };

@@ -65,7 +65,7 @@ pub(crate) fn inverse_dynamics_by_rows<S: Scalar>(
         return Err(MechanicsError::Shape { what: "accelerations", expected: v.len(), found: a.len() });
     }
     let mut terms = Terms::default();
-    let request = Request::MASS_MATRIX | Request::MOMENTUM_DRIFT | Request::DL_DQ | Request::FORCE;
+    let request = Request::MASS_MATRIX | Request::CORIOLIS | Request::DL_DQ | Request::FORCE;
     let outcome = model.terms(q, v, request, &mut terms);
     let failed = terms.drain_failures(outcome)?;
     let mut generalized = Vec::with_capacity(a.len());
@@ -73,7 +73,7 @@ pub(crate) fn inverse_dynamics_by_rows<S: Scalar>(
         for i in 0..n {
             let row = &terms.mass_matrix[(k * n + i) * n..(k * n + i + 1) * n];
             let inertia = row.iter().zip(a).fold(<S as Real>::zero(), |sum, (&m, &a)| sum + m * a);
-            generalized.push(inertia + terms.momentum_drift[k * n + i] - terms.dl_dq[k * n + i]);
+            generalized.push(inertia + terms.coriolis[k * n + i] - terms.dl_dq[k * n + i]);
         }
     }
     terms.prepend_failures(not_finite("generalized force", &generalized, n));

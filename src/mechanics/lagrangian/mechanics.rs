@@ -54,7 +54,7 @@ impl<L: Lagrangian, S: Scalar> Form<S> for L {
                 momentum: &mut terms.momentum[part(need.includes(Request::MOMENTUM), n)],
                 dl_dq: &mut terms.dl_dq[part(need.includes(Request::DL_DQ), n)],
                 mass_matrix: &mut terms.mass_matrix[part(need.includes(Request::MASS_MATRIX), n * n)],
-                momentum_drift: &mut terms.momentum_drift[part(need.includes(Request::MOMENTUM_DRIFT), n)],
+                coriolis: &mut terms.coriolis[part(need.includes(Request::CORIOLIS), n)],
             };
             evaluate(self, parameters, q, v, need, &mut state);
         }
@@ -190,7 +190,7 @@ impl<S: Scalar> Evaluator<S> {
                 (need.includes(Request::MOMENTUM), &mut terms.momentum, &evaluation.momentum, n),
                 (need.includes(Request::DL_DQ), &mut terms.dl_dq, &evaluation.dl_dq, n),
                 (need.includes(Request::MASS_MATRIX), &mut terms.mass_matrix, &evaluation.mass_matrix, n * n),
-                (need.includes(Request::MOMENTUM_DRIFT), &mut terms.momentum_drift, &evaluation.momentum_drift, n),
+                (need.includes(Request::CORIOLIS), &mut terms.coriolis, &evaluation.coriolis, n),
             ];
             for (_, to, from, width) in fields.into_iter().filter(|(needed, ..)| *needed) {
                 to[chunk * STATES * width..][..from.len()].copy_from_slice(from);
@@ -215,8 +215,8 @@ impl<S: Scalar> Evaluator<S> {
             replays.len() - 1
         });
         // The order of the recording; what is not needed is empty.
-        let Terms { lagrangian, momentum, dl_dq, mass_matrix, momentum_drift, .. } = terms;
-        let outputs: &mut [&mut [S]] = &mut [lagrangian, momentum, dl_dq, mass_matrix, momentum_drift];
+        let Terms { lagrangian, momentum, dl_dq, mass_matrix, coriolis, .. } = terms;
+        let outputs: &mut [&mut [S]] = &mut [lagrangian, momentum, dl_dq, mass_matrix, coriolis];
         replays[at].1.evaluate(q.len() / form.coordinates(), &[q, v], &self.parameters, outputs).is_ok()
     }
 
@@ -249,7 +249,7 @@ impl<S: Scalar> Evaluator<S> {
         terms.momentum.resize(size(request.includes(Request::MOMENTUM), n), S::nan());
         terms.dl_dq.resize(size(request.includes(Request::DL_DQ), n), S::nan());
         terms.mass_matrix.resize(size(request.includes(Request::MASS_MATRIX), n * n), S::nan());
-        terms.momentum_drift.resize(size(request.includes(Request::MOMENTUM_DRIFT), n), S::nan());
+        terms.coriolis.resize(size(request.includes(Request::CORIOLIS), n), S::nan());
         let done = match (n > REPLAY_COORDINATES, batch >= REPLAY_FROM) {
             (true, _) => self.sweep(form, (q, v), request, terms, scratch),
             (false, large) => large && self.replay(form, (q, v), request, terms, scratch),
@@ -291,10 +291,10 @@ fn record<'t, S: Scalar>(
         field(need.includes(Request::MOMENTUM), n),
         field(need.includes(Request::DL_DQ), n),
         field(need.includes(Request::MASS_MATRIX), n * n),
-        field(need.includes(Request::MOMENTUM_DRIFT), n),
+        field(need.includes(Request::CORIOLIS), n),
     ];
-    let [lagrangian, momentum, dl_dq, mass_matrix, momentum_drift] = &mut fields;
-    evaluate(system, parameters, q, v, need, &mut State { lagrangian, momentum, dl_dq, mass_matrix, momentum_drift });
+    let [lagrangian, momentum, dl_dq, mass_matrix, coriolis] = &mut fields;
+    evaluate(system, parameters, q, v, need, &mut State { lagrangian, momentum, dl_dq, mass_matrix, coriolis });
     fields.concat()
 }
 

@@ -24,7 +24,7 @@ impl Request {
     /// `M = d2L/dv dv`.
     pub const MASS_MATRIX: Self = Self(8);
     /// `c = (d2L/dv dq) v`.
-    pub const MOMENTUM_DRIFT: Self = Self(16);
+    pub const CORIOLIS: Self = Self(16);
     /// `a = M^-1 (g - c + Q)`, with `M`, `c`, `g`, `Q`; under constraints with `A`, `gamma`, multipliers and their force.
     pub const ACCELERATION: Self = Self(256 | 128 | 32 | 16 | 8 | 4);
     /// `E = p.v - L`, with `L`, `p`.
@@ -48,7 +48,7 @@ impl Request {
 
     /// The least depth of an evaluation that fills `L`, `p`, `g`, `M`, `c` as requested.
     pub(crate) const fn depth(self) -> Depth {
-        if self.includes(Self::MOMENTUM_DRIFT) {
+        if self.includes(Self::CORIOLIS) {
             Depth::Motion
         } else if self.includes(Self::MASS_MATRIX) {
             Depth::MassMatrix
@@ -85,7 +85,7 @@ pub struct Terms<S> {
     /// `M = d2L/dv dv`, `(batch, n, n)`, symmetric.
     pub mass_matrix: Vec<S>,
     /// `c = (d2L/dv dq) v`, `(batch, n)`.
-    pub momentum_drift: Vec<S>,
+    pub coriolis: Vec<S>,
     /// Generalized force `Q` beside those of `L`, friction `-dD/dv` for a dissipation `D`, `(batch, n)`; empty for a model that
     /// [conserves its energy](EulerLagrange::conserves_energy).
     pub force: Vec<S>,
@@ -124,7 +124,7 @@ impl<S: Scalar> Terms<S> {
         copy(&mut self.momentum, &batch.momentum, n, Request::MOMENTUM);
         copy(&mut self.dl_dq, &batch.dl_dq, n, Request::DL_DQ);
         copy(&mut self.mass_matrix, &batch.mass_matrix, n * n, Request::MASS_MATRIX);
-        copy(&mut self.momentum_drift, &batch.momentum_drift, n, Request::MOMENTUM_DRIFT);
+        copy(&mut self.coriolis, &batch.coriolis, n, Request::CORIOLIS);
         copy(&mut self.force, &batch.force, n, Request::FORCE);
         copy(&mut self.dissipation, &batch.dissipation, 1, Request::FORCE);
         copy(&mut self.acceleration, &batch.acceleration, n, Request::ACCELERATION);

@@ -141,7 +141,7 @@ impl<S: Scalar> Dynamics<S> {
     /// Right-hand sides `g - c - dD/d(v/s)` of `M a = ..`, `(batch, n)`, into `right`.
     pub fn right_hand_sides(&self, right: &mut Vec<S>) {
         right.clear();
-        right.extend(self.lagrangian.dl_dq.iter().zip(&self.lagrangian.momentum_drift).map(|(&g, &c)| g - c));
+        right.extend(self.lagrangian.dl_dq.iter().zip(&self.lagrangian.coriolis).map(|(&g, &c)| g - c));
         if let Some(friction) = self.friction() {
             right.iter_mut().zip(friction).for_each(|(right, &friction)| *right -= friction);
         }

@@ -182,8 +182,8 @@ impl<S: Scalar> Workspace<S> {
         if request.includes(Request::DL_DQ) {
             unscale(&evaluation.dl_dq, &mut terms.dl_dq);
         }
-        if request.includes(Request::MOMENTUM_DRIFT) {
-            unscale(&evaluation.momentum_drift, &mut terms.momentum_drift);
+        if request.includes(Request::CORIOLIS) {
+            unscale(&evaluation.coriolis, &mut terms.coriolis);
         }
         if request.includes(Request::MASS_MATRIX) {
             let element = |(k, &m): (usize, &S)| m * (scale[k / n % n].recip() * scale[k % n].recip());

@@ -71,8 +71,8 @@ impl<S: Scalar> CanonicalForm<S> {
             momentum.iter_mut().zip(&self.momentum).for_each(|(p, &p0)| *p = s * (*p - p0));
         }
         terms.energy.iter_mut().for_each(|e| *e = s * (*e - energy));
-        let Terms { dl_dq, mass_matrix, momentum_drift, force, dissipation, .. } = terms;
-        [dl_dq, mass_matrix, momentum_drift, force, dissipation].into_iter().flatten().for_each(|x| *x *= s);
+        let Terms { dl_dq, mass_matrix, coriolis, force, dissipation, .. } = terms;
+        [dl_dq, mass_matrix, coriolis, force, dissipation].into_iter().flatten().for_each(|x| *x *= s);
     }
 }
 

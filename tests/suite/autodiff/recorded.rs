@@ -165,7 +165,7 @@ fn check<L: Lagrangian, S: Scalar>(system: &L, scale: &[f64], parameters: &[f64]
         &evaluation.momentum,
         &evaluation.dl_dq,
         &evaluation.mass_matrix,
-        &evaluation.momentum_drift,
+        &evaluation.coriolis,
     ]
     .map(|x| cast::<S, Dd>(x));
     let perturbed: Vec<_> = (0..4).map(|_| given.each_ref().map(|x| moved(x, &mut rng))).collect();

@@ -45,7 +45,7 @@ pub fn outputs<S: Scalar>(system: &dyn EulerLagrange<S>, q: &[S], v: &[S]) -> Ve
         ("dl_dq", terms.dl_dq),
         ("mass_matrix", terms.mass_matrix),
         ("eigenvalues", eigenvalues),
-        ("coriolis", terms.momentum_drift),
+        ("coriolis", terms.coriolis),
         ("acceleration", terms.acceleration),
         ("energy", terms.energy),
     ]

@@ -66,7 +66,7 @@ fn both<S: Scalar, E: Embedding>(name: &str, embedding: E, q: &[f64], v: &[f64])
     let n = x.len();
     for i in 0..n {
         let inertia = (0..n).fold(zero, |sum, j| sum + terms.mass_matrix[i * n + j] * terms.acceleration[j]);
-        let force = terms.dl_dq[i] - terms.momentum_drift[i] + terms.constraint_force[i];
+        let force = terms.dl_dq[i] - terms.coriolis[i] + terms.constraint_force[i];
         let size = largest(&terms.constraint_force) + largest(&terms.dl_dq);
         assert!((inertia - force).abs() <= S::epsilon() * S::of_f64(1e4) * size, "{name}: {inertia} {force}");
     }

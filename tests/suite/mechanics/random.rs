@@ -71,22 +71,22 @@ impl Smooth {
         let n = self.n;
         let (mut m, dg) = self.metric(q);
         let wave = |k: usize, i: usize| R::of(self.waves[k * (n + 1) + i]);
-        let (mut force, mut momentum_drift) = (vec![R::zero(); n], vec![R::zero(); n]);
+        let (mut force, mut coriolis) = (vec![R::zero(); n], vec![R::zero(); n]);
         for k in 0..n {
             m[k * n + k] += R::of(12.0 * self.quartic) * v[k].sqr();
             force[k] += wave(n * n + n, k) * self.phase(n * n + n, q).sin();
             for i in 0..n {
                 let slope = wave(n * n + i, k) * self.phase(n * n + i, q).cos();
                 force[k] += slope * v[i];
-                momentum_drift[i] += slope * v[k];
+                coriolis[i] += slope * v[k];
                 for j in 0..n {
                     let term = dg[(k * n + i) * n + j] * v[j];
                     force[k] += R::half() * term * v[i];
-                    momentum_drift[i] += term * v[k];
+                    coriolis[i] += term * v[k];
                 }
             }
         }
-        (m, force, momentum_drift)
+        (m, force, coriolis)
     }
 }
 
@@ -153,7 +153,7 @@ proptest! {
         for (name, x, y, unit) in [
             ("M", &found.mass_matrix, &narrow(&m), unit),
             ("g", &found.dl_dq, &narrow(&g), unit),
-            ("c", &found.momentum_drift, &narrow(&c), unit),
+            ("c", &found.coriolis, &narrow(&c), unit),
             ("a", &found.acceleration, &narrow(&a), unit * condition * (1.0 + largest(&narrow(&a)))),
         ] {
             for (x, y) in x.iter().zip(y) {
@@ -193,7 +193,7 @@ proptest! {
         let (q, v) = state(n, seed);
         let plain = terms(&system, &q, &v);
         let changed = terms(&Smooth { scale, gauge: true, ..system }, &q, &v);
-        let parts = largest(&changed.dl_dq) + largest(&changed.momentum_drift);
+        let parts = largest(&changed.dl_dq) + largest(&changed.coriolis);
         let inverse = kappa(n, &changed.mass_matrix) / largest(&changed.mass_matrix);
         let unit = f64::EPSILON * kappa(n, &plain.mass_matrix) * (largest(&plain.acceleration) + parts * inverse);
         for (a, b) in plain.acceleration.iter().zip(&changed.acceleration) {

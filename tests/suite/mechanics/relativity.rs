@@ -239,14 +239,12 @@ fn energy_and_mass_shell_are_kept_along_the_motion() {
                 let part = |x: &[f64]| x[k * n..(k + 1) * n].to_vec();
                 let (q, v, p, g) = (part(&path.q), part(&path.v), part(&terms.momentum), part(&terms.dl_dq));
                 let mass = &terms.mass_matrix[k * n * n..(k + 1) * n * n];
-                let momentum_drift = part(&terms.momentum_drift);
+                let coriolis = part(&terms.coriolis);
                 // dE/dv = M v, dE/dq = (d2L/dq dv) v - g, of the size of c and g.
                 let slope: f64 = (0..n)
                     .map(|i| {
                         let row: f64 = (0..n).map(|j| (mass[i * n + j] * v[j]).abs()).sum();
-                        row * (1.0 + v[i].abs())
-                            + (g[i].abs() + momentum_drift[i].abs()) * (1.0 + q[i].abs())
-                            + p[i].abs()
+                        row * (1.0 + v[i].abs()) + (g[i].abs() + coriolis[i].abs()) * (1.0 + q[i].abs()) + p[i].abs()
                     })
                     .sum();
                 steps * options.rtol * slope

@@ -195,7 +195,7 @@ fn batches_replayed_agree_with_single_states_and_requests_with_each_other() {
             close("mass", &one.mass_matrix, &all.mass_matrix[row * n * n..][..n * n]);
             close("momentum", &one.momentum, &all.momentum[row * n..][..n]);
             close("dl_dq", &one.dl_dq, &all.dl_dq[row * n..][..n]);
-            close("coriolis", &one.momentum_drift, &all.momentum_drift[row * n..][..n]);
+            close("coriolis", &one.coriolis, &all.coriolis[row * n..][..n]);
             close("acceleration", &one.acceleration, &all.acceleration[row * n..][..n]);
             close("energy", &one.energy, &all.energy[row..=row]);
         }
@@ -204,7 +204,7 @@ fn batches_replayed_agree_with_single_states_and_requests_with_each_other() {
             let mut some = Terms::default();
             built.terms(&q[..rows * n], &v[..rows * n], request, &mut some).unwrap();
             close("momentum", &some.momentum, &all.momentum[..rows * n]);
-            assert!(some.mass_matrix.is_empty() && some.acceleration.is_empty() && some.momentum_drift.is_empty());
+            assert!(some.mass_matrix.is_empty() && some.acceleration.is_empty() && some.coriolis.is_empty());
             if request == Request::ENERGY {
                 close("energy", &some.energy, &all.energy[..rows]);
                 assert!(some.dl_dq.is_empty());

@@ -79,7 +79,7 @@ fn network<S: Scalar>(activation: ActivationChoice) -> Results {
         ("Lagrangian", floats(&chunk.lagrangian)),
         ("momentum", floats(&chunk.momentum)),
         ("dL/dq", floats(&chunk.dl_dq)),
-        ("Coriolis", floats(&chunk.momentum_drift)),
+        ("Coriolis", floats(&chunk.coriolis)),
         ("gradient", floats(&slope)),
     ];
 

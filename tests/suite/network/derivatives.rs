@@ -124,7 +124,7 @@ fn forward_identity<S: Scalar>(case: &Case) {
             &chunk.momentum[row.clone()],
             &chunk.dl_dq[row.clone()],
             &chunk.mass_matrix[state * n * n..(state + 1) * n * n],
-            &chunk.momentum_drift[row],
+            &chunk.coriolis[row],
         ];
         for (k, found) in found.into_iter().enumerate() {
             let (what, expected) = &expected[k];
@@ -260,7 +260,7 @@ fn a_hybrid_is_the_sum_of_its_branches() {
         let (weights, q, v) = draw::<f64>(&case, 3);
         let evaluate = |architecture: &Architecture, weights: &[f64]| {
             let chunk = evaluated(architecture, weights, [&q, &v], Depth::Motion);
-            [&chunk.lagrangian[..], &chunk.momentum, &chunk.dl_dq, &chunk.mass_matrix, &chunk.momentum_drift].concat()
+            [&chunk.lagrangian[..], &chunk.momentum, &chunk.dl_dq, &chunk.mass_matrix, &chunk.coriolis].concat()
         };
         let half = |activation, alpha| {
             let hidden = case.architecture.hidden.iter().map(|w| w / 2).collect();
@@ -348,8 +348,8 @@ fn shallower_evaluations_give_the_same_numbers() {
     same(&gradient.momentum, &whole.momentum);
     same(&gradient.dl_dq, &whole.dl_dq);
     same(&run(Depth::MassMatrix).mass_matrix, &whole.mass_matrix);
-    assert!(run(Depth::MassMatrix).momentum_drift.is_empty());
-    assert_eq!(run(Depth::Motion).momentum_drift, whole.momentum_drift);
+    assert!(run(Depth::MassMatrix).coriolis.is_empty());
+    assert_eq!(run(Depth::Motion).coriolis, whole.coriolis);
     assert_eq!(Layout::new(&case.architecture).parameters, weights.len());
 }
 

@@ -235,7 +235,7 @@ fn friction_adds_to_the_forces_of_the_same_lagrangian() {
         NetworkLagrangian::new(case.architecture, weights).unwrap().terms(&q, &v, Request::ALL, &mut with).unwrap();
         assert!(plain.conserves_energy() && without.force.is_empty() && without.dissipation.is_empty());
         let same = |t: &Terms<f64>| {
-            [&t.lagrangian, &t.momentum, &t.dl_dq, &t.momentum_drift, &t.mass_matrix, &t.energy].map(Vec::clone)
+            [&t.lagrangian, &t.momentum, &t.dl_dq, &t.coriolis, &t.mass_matrix, &t.energy].map(Vec::clone)
         };
         assert_eq!(same(&with), same(&without));
         for state in 0..70 {
@@ -243,7 +243,7 @@ fn friction_adds_to_the_forces_of_the_same_lagrangian() {
             for i in 0..n {
                 let k = state * n + i;
                 let terms = (0..n).map(|j| mass[i * n + j] * with.acceleration[state * n + j]);
-                let right = with.dl_dq[k] - with.momentum_drift[k] + with.force[k];
+                let right = with.dl_dq[k] - with.coriolis[k] + with.force[k];
                 let size: f64 = terms.clone().map(f64::abs).sum::<f64>() + right.abs();
                 // Residual of a backward stable solve.
                 assert!((terms.sum::<f64>() - right).abs() <= 64.0 * f64::EPSILON * size);

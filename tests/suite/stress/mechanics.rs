@@ -137,7 +137,7 @@ fn gauge_changes_nothing<S: Scalar, L: Lagrangian + Copy>(name: &'static str, sy
         // Terms that nearly cancel in g - c cost their size times |M^-1|.
         let unit = |t: &Terms<S>| {
             let kappa = condition(n, &t.mass_matrix);
-            kappa * (big(&t.acceleration) + (big(&t.dl_dq) + big(&t.momentum_drift)) / big(&t.mass_matrix))
+            kappa * (big(&t.acceleration) + (big(&t.dl_dq) + big(&t.coriolis)) / big(&t.mass_matrix))
         };
         let unit = S::epsilon().to_f64() * (unit(&a) + unit(&b));
         for (&x, &y) in a.acceleration.iter().zip(&b.acceleration) {

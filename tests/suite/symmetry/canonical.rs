@@ -64,9 +64,7 @@ fn is_canonical<S: Scalar>(name: &str, seed: u64) {
     let (old, new) = (terms(canonical.model().as_ref(), &q, &v), terms(&canonical, &q, &v));
     assert!(old.acceleration == new.acceleration, "{name}");
     let s = form.factor;
-    for (old, new) in
-        [(&old.mass_matrix, &new.mass_matrix), (&old.dl_dq, &new.dl_dq), (&old.momentum_drift, &new.momentum_drift)]
-    {
+    for (old, new) in [(&old.mass_matrix, &new.mass_matrix), (&old.dl_dq, &new.dl_dq), (&old.coriolis, &new.coriolis)] {
         assert!(old.iter().zip(new).all(|(&a, &b)| a * s == b), "{name}");
     }
     let action: S = new.momentum.iter().zip(&v).fold(-new.lagrangian[0], |sum, (&p, &v)| sum + p * v);
@@ -126,7 +124,7 @@ fn a_lagrangian_in_canonical_form_is_a_lagrangian() {
         (&a.momentum, &b.momentum),
         (&a.dl_dq, &b.dl_dq),
         (&a.mass_matrix, &b.mass_matrix),
-        (&a.momentum_drift, &b.momentum_drift),
+        (&a.coriolis, &b.coriolis),
         (&a.acceleration, &b.acceleration),
         (&a.energy, &b.energy),
     ] {

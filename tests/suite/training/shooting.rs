@@ -572,7 +572,7 @@ fn exact_positions_teach_exact_accelerations() {
     let mut chunk = Evaluation::new(architecture.model().lagrangian().clone());
     chunk.evaluate(&fitted.weights, &q, &v, Depth::Motion);
     let error = (0..q.len())
-        .map(|k| (2.0 * (chunk.dl_dq[k] - chunk.momentum_drift[k]) / chunk.mass_matrix[k] + 4.0 * q[k]).abs())
+        .map(|k| (2.0 * (chunk.dl_dq[k] - chunk.coriolis[k]) / chunk.mass_matrix[k] + 4.0 * q[k]).abs())
         .sum::<f64>()
         / q.iter().map(|q| 4.0 * q.abs()).sum::<f64>();
     println!("loss {} -> {}, acceleration error {error:.4}", fitted.start_loss, fitted.validation_loss);

@@ -75,7 +75,7 @@ impl<M: EulerLagrange<S>, S: Scalar> EulerLagrange<S> for LeastNorm<M> {
             };
             let at = row * n..(row + 1) * n;
             let force = |i: usize| terms.force.get(i).copied().unwrap_or_else(<S as Real>::zero);
-            let right: Vec<S> = at.clone().map(|i| terms.dl_dq[i] - terms.momentum_drift[i] + force(i)).collect();
+            let right: Vec<S> = at.clone().map(|i| terms.dl_dq[i] - terms.coriolis[i] + force(i)).collect();
             let rows = &terms.constraint_matrix[row * m * n..(row + 1) * m * n];
             let drift = &terms.constraint_drift[row * m..(row + 1) * m];
             let size = super::rows::length(&right);

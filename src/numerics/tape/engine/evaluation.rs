@@ -51,7 +51,7 @@ pub struct Evaluation<S> {
     /// `d2L/d(v/s)2`, `(batch, n, n)`.
     pub mass_matrix: Vec<S>,
     /// `(d2L/d(v/s)d(q/s)) v/s`, `(batch, n)`.
-    pub momentum_drift: Vec<S>,
+    pub coriolis: Vec<S>,
 }
 
 impl<S: Scalar> Clone for Evaluation<S> {
@@ -79,7 +79,7 @@ impl<S: Scalar> Evaluation<S> {
             momentum: Vec::new(),
             dl_dq: Vec::new(),
             mass_matrix: Vec::new(),
-            momentum_drift: Vec::new(),
+            coriolis: Vec::new(),
         }
     }
 
@@ -128,7 +128,7 @@ impl<S: Scalar> Evaluation<S> {
             operation.forward(out, &mut sweep);
         }
         let fields = [&mut self.lagrangian, &mut self.momentum, &mut self.dl_dq, &mut self.mass_matrix];
-        fields.into_iter().chain([&mut self.momentum_drift]).for_each(Vec::clear);
+        fields.into_iter().chain([&mut self.coriolis]).for_each(Vec::clear);
         self.lagrangian.extend_from_slice(sweep.store.view().plane(recorded.output, 0));
         if depth >= Depth::Gradient {
             self.reverse(&recorded, parameters, depth);
@@ -186,9 +186,9 @@ impl<S: Scalar> Evaluation<S> {
             }
         }
         if depth >= Depth::Motion {
-            self.momentum_drift.resize(lanes * n, zero);
+            self.coriolis.resize(lanes * n, zero);
             for (i, plane) in self.second.drift.chunks_exact(lanes).enumerate() {
-                let column = Column::new(&mut self.momentum_drift[..], i, n);
+                let column = Column::new(&mut self.coriolis[..], i, n);
                 update_column(lanes, column, Column::all(plane), |to, c| *to = c);
             }
         }

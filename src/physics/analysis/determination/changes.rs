@@ -234,11 +234,11 @@ mod tests {
             |of: &[f64], at: usize| parts.iter().map(|((k, unit), sign)| sign * unit * of[at * count + k]).sum::<f64>();
         let mut terms = Terms::default();
         // Its mass matrix may be anything: accelerations are not asked for.
-        let wanted = Request::MASS_MATRIX | Request::MOMENTUM_DRIFT | Request::DL_DQ | Request::ENERGY;
+        let wanted = Request::MASS_MATRIX | Request::CORIOLIS | Request::DL_DQ | Request::ENERGY;
         Mechanics::new(Mixed, vec![]).terms(&q, &v, wanted, &mut terms).unwrap();
         for i in 0..2 {
             let inertia: f64 = (0..2).map(|j| terms.mass_matrix[i * 2 + j] * a[j]).sum();
-            let expected = inertia + terms.momentum_drift[i] - terms.dl_dq[i];
+            let expected = inertia + terms.coriolis[i] - terms.dl_dq[i];
             assert!((sum(&row.equation, i) - expected).abs() < 1e-12, "{i}");
             for j in 0..2 {
                 assert!((sum(&row.mass, i * 2 + j) - terms.mass_matrix[i * 2 + j]).abs() < 1e-12, "{i} {j}");

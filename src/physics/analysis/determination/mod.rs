@@ -150,12 +150,12 @@ const CONSERVED: f64 = 1.0 / 3.0;
 fn conserved(model: &dyn EulerLagrange<f64>, data: &Data) -> Option<Vec<bool>> {
     let n = model.coordinates();
     let mut terms = Terms::default();
-    let request = Request::MASS_MATRIX | Request::MOMENTUM_DRIFT;
+    let request = Request::MASS_MATRIX | Request::CORIOLIS;
     let mut squares = vec![[0.0; 2]; n];
     let states = data.q.chunks_exact(n).zip(data.v.chunks_exact(n)).zip(data.a.chunks_exact(n));
     for ((q, v), a) in states {
         model.terms(q, v, request, &mut terms).ok()?;
-        let rows = terms.mass_matrix.chunks_exact(n).zip(&terms.momentum_drift);
+        let rows = terms.mass_matrix.chunks_exact(n).zip(&terms.coriolis);
         for ([rate, parts], (row, drift)) in squares.iter_mut().zip(rows) {
             let inertia: f64 = row.iter().zip(a).map(|(m, a)| m * a).sum();
             *rate += (inertia + drift).powi(2);
