@@ -209,7 +209,7 @@ fn table(columns: &[String], options: &Options<'_>, found: &Certificate) -> Stri
     }
     if let Some(witness) = &found.witness {
         let state = columns.iter().zip(witness.q.iter().chain(&witness.v));
-        text += "A state where it is proven not to be so:\n";
+        text += "A state where the opposite is proven:\n";
         text += &state.map(|(column, x)| format!("  {column:<12} {x:>24.16e}\n")).collect::<String>();
         let values = witness.eigenvalues.iter().map(|x| format!("  {:<12} {x:>24.16e}\n", "eigenvalue"));
         text += &values.collect::<String>();

@@ -138,7 +138,7 @@ fn section(table: &str) -> String {
 fn headline(found: &Survey) -> String {
     let worst = found.coordinates.iter().map(|c| c.acceleration_error_relative).fold(0.0, f64::max);
     let looked = match (found.warnings.len(), found.suspicious_count) {
-        (0, 0) => "nothing looks wrong".to_string(),
+        (0, 0) => "no problem was found".to_string(),
         (0, places) => format!("look at {} first", pluralize(places, "suspicious place", "suspicious places")),
         (warnings, _) => format!("read {} at the end first", pluralize(warnings, "warning", "warnings")),
     };
@@ -198,7 +198,7 @@ fn left_out(text: &mut String, found: &Survey) -> std::fmt::Result {
         let gaps = pluralize(found.bridged.gaps, "short gap", "short gaps");
         let rows = pluralize(found.bridged.rows, "row is", "rows are");
         let most = found.bridged.longest;
-        writeln!(text, "{gaps}: {rows} missing, at most {most} in one; trajectories go on across them")?;
+        writeln!(text, "{gaps}: {rows} missing, at most {most} in one; trajectories continue across them")?;
     }
     for cut in found.cuts.iter().take(LINES) {
         let (seconds, steps) = (short(cut.seconds), short(cut.steps));

@@ -95,12 +95,13 @@ impl Compared<'_> {
         };
         let sign = if found.constant < 0.0 { "-" } else { "+" };
         let text = format!(
-            "A = {}{gauge} {sign} {}{function}, as near as can be at {} states\n",
+            "A = {}{gauge} {sign} {}{function}, the best fit at {} states\n",
             powers.collect::<Vec<_>>().join(" + "),
             rounded(found.constant.abs(), 6),
             self.points
         );
-        let shell = "B is the same at all states: f is known at this one value, mass matrices up to a part h p p^T\n";
+        let shell =
+            "B is the same at all states: f is determined at this one value, mass matrices up to a part h p p^T\n";
         let mut text = text + if found.on_shell { shell } else { "" };
         if found.motionless_states > 0 {
             text += &format!(
@@ -109,10 +110,10 @@ impl Compared<'_> {
             );
         }
         let rows = [
-            ("Lagrangian, what is left", found.lagrangian),
+            ("Lagrangian, after the fit", found.lagrangian),
             ("motion, accelerations", found.motion),
-            ("mass matrix, what is left", found.mass_matrix),
-            ("energy, what is left", found.energy),
+            ("mass matrix, after the fit", found.mass_matrix),
+            ("energy, after the fit", found.energy),
         ];
         let distance = |x: f64| if x.is_nan() { "unknown".to_string() } else { digits(x) };
         let rows: Vec<Vec<String>> = rows.iter().map(|(name, x)| vec![name.to_string(), distance(*x)]).collect();

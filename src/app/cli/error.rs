@@ -88,7 +88,7 @@ impl From<PipelineError> for CliError {
             }
             PipelineError::Interrupted => Self::interrupted(error),
             PipelineError::InterruptedRuns { .. } => {
-                Self::interrupted(format_args!("{error}; the same command goes on from there"))
+                Self::interrupted(format_args!("{error}; the same command continues from there"))
             }
             _ if error.is_configuration() => Self::usage(error),
             _ => Self::data(error),

@@ -16,27 +16,27 @@ use std::path::{Path, PathBuf};
 pub struct Args {
     /// Model, a file or the directory of a run.
     model: PathBuf,
-    /// Compare with this system, by name or by the file that describes it, instead of the one that was learned: with a model of
-    /// recorded motion, such as one of lnn fit.
+    /// System to compare with, by name or by its file, instead of the learned one. Use it with a model of recorded motion,
+    /// such as one of lnn fit.
     #[arg(long, value_name = "NAME|FILE.toml")]
     system: Option<String>,
     /// A parameter of that system; may be repeated.
     #[arg(long, value_name = "SYMBOL=VALUE", requires = "system", value_parser = source::parameter)]
     param: Vec<(String, String)>,
-    /// Random starts of the trajectory test.
+    /// Random initial conditions of the trajectory test.
     #[arg(long, value_name = "N", default_value = "4", allow_hyphen_values = true, value_parser = whole(1, 1_000_000))]
     starts: usize,
-    /// Seed of the states and starts [default: the model's].
+    /// Seed of the states and initial conditions [default: the model's].
     #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = seed)]
     seed: Option<u64>,
-    /// Where the starts lie instead: bounds of the coordinates, one pair for all of them or one for each, in the system's
-    /// units.
+    /// Bounds of the initial coordinates, one pair for all of them or one for each, in the system's units [default: the
+    /// paper's].
     #[arg(long, value_name = "LOW:HIGH,..", value_delimiter = ',', allow_hyphen_values = true, value_parser = bounds)]
     positions: Vec<(f64, f64)>,
-    /// The same for the velocities; the one that a mass shell gives is not read.
+    /// The same for the velocities; a velocity that a mass shell determines is not used.
     #[arg(long, value_name = "LOW:HIGH,..", value_delimiter = ',', allow_hyphen_values = true, value_parser = bounds)]
     velocities: Vec<(f64, f64)>,
-    /// Time span of the motions instead of the paper's, in seconds (relativistic systems: proper time in metres).
+    /// Time span of the motions, in seconds (relativistic systems: proper time in metres) [default: the paper's].
     #[arg(long, value_name = "T", allow_hyphen_values = true, value_parser = positive)]
     until: Option<f64>,
     /// Relative tolerance of a step of the learned motion, at least 2e-15; the absolute one is a hundredth of it.
@@ -45,7 +45,7 @@ pub struct Args {
     /// Threads [default: all].
     #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = thread_count)]
     threads: Option<usize>,
-    /// Directory for evaluation.json, report.html and pictures; one that holds an evaluation is refused [default:
+    /// Directory for evaluation.json, report.html and plots; one that holds an evaluation is refused [default:
     /// evaluation beside the model, or the first free of evaluation-2, evaluation-3, ..].
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,

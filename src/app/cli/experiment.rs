@@ -26,11 +26,11 @@ use std::path::{Path, PathBuf};
 pub struct Args {
     #[command(subcommand)]
     action: Option<Action>,
-    /// An experiment by name, or `all`; without a name they are listed with the tables and figures they regenerate.
+    /// An experiment by name, or `all`. Without a name, all experiments are listed with the tables and figures that they regenerate.
     name: Option<String>,
     #[command(flatten)]
     chosen: Chosen,
-    /// Threads; as many runs go side by side, and the results do not depend on them [default: all].
+    /// Threads; as many runs are trained in parallel, and the results do not depend on the number [default: all].
     #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = thread_count)]
     threads: Option<usize>,
     /// Only the I-th of N shares of the runs, I from 1 to N; no tables are written [default: that of a Slurm array, or all].
@@ -39,7 +39,7 @@ pub struct Args {
     /// List the runs: finished, in progress, or open.
     #[arg(long, requires = "name", conflicts_with_all = ["beside", "overwrite"])]
     list: bool,
-    /// Replace finished runs that are of other configurations.
+    /// Replace finished runs of other configurations.
     #[arg(long)]
     overwrite: bool,
 }
@@ -47,7 +47,7 @@ pub struct Args {
 /// Work on an experiment beside running it.
 #[derive(Debug, clap::Subcommand)]
 enum Action {
-    /// Write table, pictures and report from the records of finished runs, whichever machines they ran on; nothing is run.
+    /// Write tables, plots and report from the records of the finished runs, without running any.
     Merge {
         /// An experiment by name, or `all`.
         name: String,
@@ -65,21 +65,21 @@ struct Chosen {
     /// Seeds of every run.
     #[arg(long, value_name = "N", default_value = "1", allow_hyphen_values = true, value_parser = whole(1, MOST_SEEDS))]
     seeds: usize,
-    /// Only the runs whose row of the table begins with this text; a later command without it goes on from there.
+    /// Only the runs whose row of the table begins with this text; a later command without it completes the table.
     #[arg(long, value_name = "TEXT")]
     only: Option<String>,
-    /// Another system than those of the experiment, by name or by the file that describes it: of black-holes, whose coordinates
-    /// are t, x, y, z or t, r, theta, phi.
+    /// A system other than those of the experiment, by name or by its file; for black-holes only. Its coordinates are t, x, y, z
+    /// or t, r, theta, phi.
     #[arg(long, value_name = "NAME|FILE.toml", requires = "name")]
     system: Option<String>,
     /// A parameter of that system; may be repeated.
     #[arg(long, value_name = "SYMBOL=VALUE", num_args = 1.., value_parser = parameter, requires = "system")]
     param: Vec<(String, String)>,
-    /// A curve from elsewhere for the picture of time-to-accuracy: a CSV with the columns seconds and validation_loss; may be
+    /// The curve of another program for the plot of time-to-accuracy: a CSV with the columns seconds and validation_loss; may be
     /// repeated.
     #[arg(long, value_name = "LABEL=FILE.csv", value_parser = beside)]
     beside: Vec<(String, PathBuf)>,
-    /// Directory; an experiment goes into NAME-SCALE in it, where it goes on with what is there.
+    /// Directory; an experiment is written into NAME-SCALE in it and continues with the runs that are there.
     #[arg(long, value_name = "DIR", default_value = "runs/experiments")]
     out: PathBuf,
     /// One JSON object per line instead of tables.
@@ -89,9 +89,9 @@ struct Chosen {
 
 #[derive(Clone, Copy, Debug, clap::ValueEnum)]
 enum ScaleName {
-    /// All experiments in minutes; shows that they run.
+    /// All experiments in minutes; a test that they run.
     Smoke,
-    /// Minutes each; gives a ranking.
+    /// Minutes each; enough for a ranking.
     Short,
     /// The paper's own.
     Paper,
@@ -165,8 +165,8 @@ fn require_stationary(system: &SystemInstance<f64>) -> Result<(), CliError> {
     let model = system.build().map_err(CliError::usage)?;
     if depends_on_time(model.as_ref(), time, &points, span).map_err(CliError::data)? {
         let name = &system.system.coordinates(n)[time].name;
-        let problem = "expected a metric that is the same at all times";
-        return Err(CliError::usage(format_args!("--system: the metric depends on its time {name}, {problem}")));
+        let problem = "expected a metric that is constant in time";
+        return Err(CliError::usage(format_args!("--system: the metric depends on its time {name}; {problem}")));
     }
     Ok(())
 }
@@ -248,7 +248,7 @@ pub fn perform(all: Vec<Work>, orders: &Orders<'_>) -> Result<(), CliError> {
         work.require_writable(orders.beside)?;
         if !orders.overwrite {
             if let Some(problem) = damaged(work)?.first() {
-                return Err(CliError::data(format_args!("{problem}; --overwrite makes its run again")));
+                return Err(CliError::data(format_args!("{problem}; --overwrite repeats its run")));
             }
             require_same(work, "--overwrite replaces it, or choose another --out")?;
         }
@@ -281,7 +281,7 @@ pub fn perform(all: Vec<Work>, orders: &Orders<'_>) -> Result<(), CliError> {
 pub fn merge(all: Vec<Work>, beside: &[(String, PathBuf)], json: bool) -> Result<(), CliError> {
     for work in &all {
         work.require_writable(beside)?;
-        require_same(work, "give the options that the runs were made with, --scale and --seeds among them")?;
+        require_same(work, "give the options of the runs, including --scale and --seeds")?;
     }
     let curves = curves(beside)?;
     let stop = interrupt::flag().map_err(CliError::signals)?;
@@ -296,7 +296,7 @@ pub fn merge(all: Vec<Work>, beside: &[(String, PathBuf)], json: bool) -> Result
             .map_err(|error| CliError::file(&work.path, error))?;
         if done.finished < done.results.len() {
             let open = pluralize(done.results.len() - done.finished, "run is", "runs are");
-            output::note(&format!("{open} not finished; `{}` says which", work.list));
+            output::note(&format!("{open} not finished; `{}` lists them", work.list));
         }
         print_results(&work, &done, json)?;
     }
@@ -304,7 +304,7 @@ pub fn merge(all: Vec<Work>, beside: &[(String, PathBuf)], json: bool) -> Result
         None => Ok(()),
         Some((first, more)) => {
             let more = if more.is_empty() { String::new() } else { format!(" (and {} more)", more.len()) };
-            Err(CliError::data(format_args!("{first}{more}; the tables are without what is damaged")))
+            Err(CliError::data(format_args!("{first}{more}; the tables leave out the damaged runs")))
         }
     }
 }
@@ -329,7 +329,7 @@ fn chosen_runs(chosen: &Chosen, name: &str) -> Result<Vec<(&'static Experiment, 
         Some((system, parameters)) => {
             experiment.runs_of((system, parameters), chosen.scale(), chosen.seeds).ok_or_else(|| {
                 let name = experiment.name;
-                CliError::usage(format_args!("--system: {name} is about systems of its own; black-holes takes another"))
+                CliError::usage(format_args!("--system: {name} has fixed systems; only black-holes takes another"))
             })
         }
     };
@@ -345,7 +345,9 @@ fn chosen_runs(chosen: &Chosen, name: &str) -> Result<Vec<(&'static Experiment, 
         let mut rows: Vec<String> = all().flat_map(|(_, runs)| runs).map(|run| format!("`{}`", run.label)).collect();
         rows.dedup();
         let rows = rows.join(", ");
-        return Err(CliError::usage(format_args!("--only {text:?}: no row begins so; there are {rows}")));
+        return Err(CliError::usage(format_args!(
+            "--only {text:?}: no row begins with this text; the rows are {rows}"
+        )));
     }
     Ok(kept)
 }
@@ -367,7 +369,7 @@ fn require_same(work: &Work, hint: &str) -> Result<(), CliError> {
     }
     let Some((first, more)) = others.split_first() else { return Ok(()) };
     let more = if more.is_empty() { String::new() } else { format!(" (and {} more)", more.len()) };
-    let problem = format!("a finished run of another configuration is there{more}; {hint}");
+    let problem = format!("this is a finished run of another configuration{more}; {hint}");
     Err(CliError::file(&work.path.join(first), problem))
 }
 
@@ -466,7 +468,7 @@ fn print_share(work: &Work, shard: Shard, runs: usize, json: bool) -> Result<(),
         return output::print(&format!("{object}\n"));
     }
     output::print(&format!(
-        "{name}: share {shard} is finished, {}; table and report of all shares by\n{}\n",
+        "{name}: share {shard} is finished, {}; to write tables and report of all shares:\n{}\n",
         pluralize(runs, "run", "runs"),
         work.merge
     ))

@@ -44,14 +44,14 @@ impl Folder {
     pub fn attempt(path: &Path) -> Result<Attempt, CliError> {
         fs::create_dir_all(path).map_err(|e| CliError::file(path, format_args!("cannot create the directory: {e}")))?;
         let acquired = DirectoryLock::acquire(path).map_err(|error| match error.kind() {
-            ErrorKind::ResourceBusy => CliError::file(path, "other processes keep taking the directory; try again"),
+            ErrorKind::ResourceBusy => CliError::file(path, "other processes keep locking the directory; try again"),
             _ => CliError::file(path, format_args!("cannot write into the directory: {error}")),
         })?;
         Ok(match acquired {
             Acquired::Lock(lock, before) => {
                 remove_leftovers(&Disk, path);
                 if let Some(owner) = before {
-                    output::note(&format!("{}: taken over from {owner}, which is gone", path.display()));
+                    output::note(&format!("{}: taken over from {owner}, which has ended", path.display()));
                 }
                 Attempt::Open(Self { path: path.to_path_buf(), _lock: lock })
             }

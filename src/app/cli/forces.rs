@@ -89,7 +89,7 @@ impl ForceArgs {
         match file {
             Some(path) => self.with_columns(&path, (coordinates, known), &constants, (from, to)).map(Some),
             None if self.force_time.is_some() || !self.force_units.is_empty() => {
-                Err(CliError::usage("--force-time and --force-units are about a CSV of forces, there is none"))
+                Err(CliError::usage("--force-time and --force-units need a CSV of forces"))
             }
             None => {
                 let values = constants.iter().map(|force| force.unwrap_or(0.0)).collect();

@@ -23,12 +23,12 @@ pub struct Args {
     /// A parameter of the system, decimal text read in the working precision; may be repeated.
     #[arg(long, value_name = "SYMBOL=VALUE", num_args = 1.., value_parser = parameter, conflicts_with = "model")]
     param: Vec<(String, String)>,
-    /// CSV of points, or - for standard input: the coordinates as header, in any order; other columns are left out.
+    /// CSV of points, or - for standard input. Its header has the coordinates, in any order; other columns are ignored.
     #[arg(long, value_name = "FILE.csv", required_unless_present = "surface", conflicts_with = "surface")]
     points: Option<PathBuf>,
-    /// Coordinates of a block of the metric: the points of a line are printed where its determinant changes its sign, instead of the
-    /// geometry of points. The time finds ergosurfaces and static horizons, the time with the angle about the axis the horizons of
-    /// rotating black holes, all coordinates changes of signature.
+    /// Instead of the geometry at points, print the points of a line where the determinant of a block of the metric changes its sign, by
+    /// the coordinates of the block. The time finds ergosurfaces and static horizons, the time with the angle about the axis the horizons
+    /// of rotating black holes, all coordinates changes of signature.
     #[arg(long, value_name = "NAME,..", value_delimiter = ',', requires_all = ["from", "to"])]
     surface: Vec<String>,
     /// Start of the line, in the order of the coordinates.
@@ -37,17 +37,17 @@ pub struct Args {
     /// End of the line.
     #[arg(long, value_name = "Q1,Q2,..", requires = "surface", allow_hyphen_values = true)]
     to: Option<String>,
-    /// Pieces of the line, 1000000 at most: of two changes of sign in one nothing is seen.
+    /// Pieces of the line, at most 1000000; two changes of sign in one piece are missed.
     #[arg(long, value_name = "N", default_value = "200", requires = "surface", value_parser = pieces)]
     steps: usize,
-    /// The velocity at which the mass matrix is taken, in the order of the coordinates; it matters to Lagrangians that are not
-    /// quadratic in the velocities alone [default: zeros].
+    /// Velocity at which the mass matrix is taken, in the order of the coordinates. It matters only to Lagrangians that are not
+    /// quadratic in the velocities [default: zeros].
     #[arg(long, value_name = "V1,V2,..", allow_hyphen_values = true)]
     velocity: Option<String>,
     /// Precision of everything, the reading of the points included.
     #[arg(long, value_enum, value_name = "TYPE", default_value = "f64")]
     precision: Precision,
-    /// One JSON object per line, or text: the components that are not zero, each of those that are equal by symmetry once.
+    /// One JSON object per line, or text: the nonzero components, without repeating those equal by symmetry.
     #[arg(long, value_enum, value_name = "FORMAT", default_value = "json")]
     format: Format,
     /// The same as --format json.
@@ -145,9 +145,7 @@ fn metric<S: Scalar>(model: &dyn EulerLagrange<S>, q: &[S], v: &[S]) -> Vec<S> {
 /// Says so if the velocity matters to the metric.
 fn note_velocity<S: Scalar>(model: &dyn EulerLagrange<S>, q: &[S], v: &[S]) {
     if varies(model, q, v) {
-        output::note(
-            "the mass matrix depends on the velocity; --velocity chooses where it is taken, here at rest or as given",
-        );
+        output::note("the mass matrix depends on the velocity; it is taken at --velocity, by default at rest");
     }
 }
 

@@ -24,18 +24,18 @@ pub struct Args {
     /// A parameter of the system, decimal text read in the working precision; may be repeated.
     #[arg(long, value_name = "SYMBOL=VALUE", num_args = 1.., value_parser = parameter, conflicts_with = "model")]
     param: Vec<(String, String)>,
-    /// CSV of states, or - for standard input: the system's columns as header, in any order; other columns, such as t and
-    /// energy of a roll-out, are left out.
+    /// CSV of states, or - for standard input. Its header has the columns of the system, in any order; other columns, such as t
+    /// and energy of a roll-out, are ignored.
     #[arg(long, value_name = "FILE.csv")]
     states: PathBuf,
-    /// The inverse question: the CSV also has the accelerations (COORDINATE_ddot), and the forces that make them are printed.
-    /// generalized_force is M a + c - g, all force beside that of L, friction included; friction is the model's own,
-    /// -dD/dv; external_force is the difference of the two, what has to be applied from outside. Other columns are left
-    /// aside.
+    /// Print the forces that cause given accelerations; the CSV also has the accelerations (COORDINATE_ddot).
+    /// generalized_force is M a + c - g, the total force besides that of L, including friction. friction is that of the model,
+    /// -dD/dv. external_force is the difference of the two, the force that must be applied from outside. Other columns are
+    /// ignored.
     #[arg(long)]
     inverse: bool,
-    /// Factor and gauge, up to which motion determines L, fixed at a base state, coordinates before velocities [default: the first state
-    /// of the file]: what is printed is s (L - L0 - p0.(v - v0)) with |det M0| |s|^n = 1, which has L = 0 and p = 0 there.
+    /// Fix factor and gauge of L, which motion does not determine, at a base state, coordinates before velocities [default: the first state
+    /// of the file]. The terms are those of s (L - L0 - p0.(v - v0)) with |det M0| |s|^n = 1, for which L = 0 and p = 0 there.
     #[arg(
         long,
         value_name = "Q1,..,V1,..",
@@ -48,14 +48,13 @@ pub struct Args {
     /// Constraints that hold the motion, a file with a table [constraints] as `lnn constraints --out` writes it.
     #[arg(long, value_name = "FILE.toml", conflicts_with = "inverse")]
     constraints: Option<PathBuf>,
-    /// Take the acceleration of least norm where the mass matrix is singular; the directions that this chose are printed as
-    /// null_directions.
+    /// Take the acceleration of least norm where the mass matrix is singular; null_directions are the free directions.
     #[arg(long, conflicts_with = "inverse")]
     least_norm: bool,
     /// Precision of everything, the reading of the states included.
     #[arg(long, value_enum, value_name = "TYPE", default_value = "f64")]
     precision: Precision,
-    /// One JSON object per line, or text; csv is for --inverse: the external forces, after the time if there is a column t.
+    /// One JSON object per line, or text. csv is for --inverse: the external forces, after the time if there is a column t.
     #[arg(long, value_enum, value_name = "FORMAT", default_value = "json")]
     format: Format,
     /// The same as --format json.

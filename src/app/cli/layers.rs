@@ -255,7 +255,7 @@ impl Layers {
     fn problem(&self, path: &str, value: &Value, message: &str) -> String {
         let key = find_key(self.keys, path);
         if let Some(name) = message.strip_prefix("missing field `").and_then(|rest| rest.split('`').next()) {
-            return format!("{value} needs the key {name} beside it");
+            return format!("{value} also needs the key {name}");
         }
         let Some(key) = key else { return message.to_string() };
         match key.below {

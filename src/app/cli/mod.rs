@@ -80,19 +80,19 @@ use tracing_subscriber::fmt::FmtContext;
 use tracing_subscriber::fmt::format::{FormatEvent, FormatFields, Writer};
 use tracing_subscriber::registry::LookupSpan;
 
-/// The three things most people want to do, with a line each to copy.
+/// The three most common tasks, with a line to copy for each.
 const EXAMPLES: &str = "\
-To learn a listed system, and see in report.html how good the result is:
+To learn a listed system and see in report.html how good the model is:
   lnn train double-pendulum
-To look at a recording of your own, then to learn from it:
+To look at your own recording, then to learn from it:
   lnn check motion.csv --coords q1,q2 && lnn fit motion.csv --coords q1,q2 --name mine
-To predict motion by what was learned:
+To predict motion with the learned model:
   lnn rollout runs/double-pendulum --state 0.6,0.9,0,0 --t-end 10 --dt 0.05 --out motion.csv";
 
 /// Order of the parts of the help.
 const TEMPLATE: &str = "{about}\n\n{before-help}{usage-heading} {usage}\n\n{all-args}{after-help}";
 
-/// Learn a Lagrangian from motion, predict motion that keeps its energy, read physics off the learned function.
+/// Learn a Lagrangian from motion, predict motion that conserves its energy, and read physics off the learned function.
 #[derive(Debug, Parser)]
 #[command(name = "lnn", version, arg_required_else_help = true, before_help = EXAMPLES, help_template = TEMPLATE)]
 struct Cli {
@@ -104,11 +104,11 @@ struct Cli {
 enum Command {
     /// List the systems that can be learned.
     Systems(systems::Args),
-    /// Say what recorded motion is good for, before anything is learned from it.
+    /// Survey recorded motion before learning from it.
     Check(check::Args),
-    /// Learn the Lagrangian of a system and write model, history, pictures and a report.
+    /// Learn the Lagrangian of a system and write the model, its history, plots and a report.
     Train(train_config::Args),
-    /// Learn the Lagrangian of recorded motion, judge it by motion that was held out.
+    /// Learn the Lagrangian of recorded motion and test it on held-out motion.
     Fit(Box<fit_config::Args>),
     /// Integrate the motion of a model.
     Rollout(rollout::Args),
@@ -116,25 +116,25 @@ enum Command {
     Evaluate(evaluate::Args),
     /// Regenerate a table or figure of the paper, or list them.
     Experiment(experiment::Args),
-    /// Train over the values of some keys of a configuration, and gather the runs in tables.
+    /// Train with several values of some keys of a configuration and collect the runs in tables.
     Sweep(sweep::Args),
-    /// Print the Euler-Lagrange terms of states, every digit of them.
+    /// Print the Euler-Lagrange terms of states in full precision.
     Inspect(inspect::Args),
-    /// Print metric, Christoffel symbols and curvature of points, every digit of them.
+    /// Print the metric, the Christoffel symbols and the curvature at points in full precision.
     Geometry(geometry::Args),
     /// Follow light through a metric, learned or exact: the shadow of a black hole and the sky around it.
     Shadow(shadow::Args),
-    /// Find the constraints that recorded motion obeys, or what a Lagrangian leaves open.
+    /// Find the constraints that recorded motion obeys, or the directions in which a Lagrangian is degenerate.
     Constraints(Box<constraints::Args>),
-    /// Write a model as a page to play with: one HTML file that computes its motion.
+    /// Write a model as an interactive page: one HTML file that computes its motion.
     Page(page::Args),
     /// Find the symmetries of a Lagrangian and what its motion conserves.
     Symmetries(symmetries::Args),
     /// Print the Lagrangian of recorded motion, or of a model, as a formula.
     Formula(Box<formula::Args>),
-    /// Say what two Lagrangians have in common beyond factor and gauge.
+    /// Compare two Lagrangians up to factor and gauge.
     Compare(compare::Args),
-    /// Prove where the mass matrix has its signature, and a condition number below a bound.
+    /// Prove where the mass matrix has its signature, and a bound of its condition number.
     Certify(certify::Args),
     /// Print a script that completes commands and options in a shell.
     Completions(manual::CompletionsArgs),

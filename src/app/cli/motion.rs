@@ -239,10 +239,10 @@ impl Facts<'_> {
         let iterations = self
             .iterations
             .map_or(String::new(), |count| format!(" in {}", pluralize(count, "iteration", "iterations")));
-        let work = self.work.map_or(String::new(), |work| format!("forces gave {}, ", rounded(work, 10)));
+        let work = self.work.map_or(String::new(), |work| format!("forces added {}, ", rounded(work, 10)));
         let balance = match (self.energy_change, self.dissipated, self.energy_defect) {
             (Some(change), Some(dissipated), Some(defect)) => format!(
-                "energy changed by {}, {work}friction took {}, not accounted for {}\n",
+                "energy changed by {}, {work}friction removed {}, defect {}\n",
                 rounded(change, 10),
                 rounded(dissipated, 10),
                 rounded(defect, 2)

@@ -12,7 +12,7 @@ use std::path::PathBuf;
 pub struct Args {
     /// Model, a file or the directory of a run.
     model: PathBuf,
-    /// Page: one HTML file that needs no network.
+    /// Page: one HTML file that needs no internet.
     #[arg(long, value_name = "FILE.html")]
     out: PathBuf,
     /// Replace the file.

@@ -55,10 +55,10 @@ pub fn open(wanted: &Wanted<'_>) -> Result<Folder, CliError> {
                 }
                 Some(what) => taken = Some((path, what)),
             },
-            Attempt::Held(holder) => taken = Some((path, format!("a run under way{holder}"))),
+            Attempt::Held(holder) => taken = Some((path, format!("a run in progress{holder}"))),
         }
     }
-    Err(CliError::file(usual, "no number is left for another directory beside it"))
+    Err(CliError::file(usual, "there are no free numbers for another directory"))
 }
 
 /// `NAME-2`.

@@ -61,7 +61,7 @@ pub fn bound(text: &str) -> Result<Bound, String> {
 pub fn tolerance(text: &str) -> Result<f64, String> {
     let [least, most] = TOLERANCES;
     let value = positive(text).ok().filter(|x| (least..=most).contains(x));
-    value.ok_or_else(|| format!("expected a number from {least:.1e} (rounding) to {most} (no symmetry any more)"))
+    value.ok_or_else(|| format!("expected a number from {least:.1e} (rounding) to {most} (no longer a symmetry)"))
 }
 
 /// `true` for a file or directory that is none of a system.
@@ -85,7 +85,7 @@ impl Probe {
     pub fn system(name: &str, given: &[(String, String)]) -> Result<Self, CliError> {
         let probe = Self::system_with_constraints(name, given)?;
         if probe.model.manifold().is_some() {
-            let problem = "its motion is held by constraints, which this command does not know; see `lnn constraints`";
+            let problem = "the system has constraints, which this command does not support; see `lnn constraints`";
             return Err(CliError::usage(format_args!("{name}: {problem}")));
         }
         Ok(probe)
@@ -157,7 +157,7 @@ impl Probe {
         let path = Path::new(text);
         match (is_model(text), given.is_empty()) {
             (true, true) => Self::model(path),
-            (true, false) => Err(CliError::usage(format_args!("{text}: a model has no parameters to choose"))),
+            (true, false) => Err(CliError::usage(format_args!("{text}: the parameters of a model are fixed"))),
             _ => Self::system(text, given),
         }
     }

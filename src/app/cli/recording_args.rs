@@ -9,7 +9,7 @@ use std::path::PathBuf;
 /// Recorded motion.
 #[derive(Clone, Debug, clap::Args)]
 pub struct RecordingArgs {
-    /// Files of recorded motion: CSV, NPY or NPZ, one of them - for standard input; each holds a trajectory, or several told apart by a column.
+    /// Files of recorded motion: CSV, NPY or NPZ; - is standard input. Each holds a trajectory, or several distinguished by a column.
     #[arg(required = true, value_name = "DATA")]
     pub data: Vec<PathBuf>,
     /// Columns of the coordinates, by name or by number from 1.
@@ -24,13 +24,13 @@ pub struct RecordingArgs {
     /// Columns of known external generalized forces, one per coordinate.
     #[arg(long, value_name = "f1,f2", value_delimiter = ',')]
     pub force: Vec<String>,
-    /// Column of time; without it and without a rate, the one called t or time.
+    /// Column of the time [default: the one called t or time, unless there is a rate].
     #[arg(long, value_name = "COLUMN", conflicts_with = "rate")]
     pub time: Option<String>,
     /// Samples per second, if no column holds the time.
     #[arg(long, value_name = "HZ", value_parser = number::rate)]
     pub rate: Option<f64>,
-    /// Column whose value tells the trajectories of a file apart.
+    /// Column whose value distinguishes the trajectories of a file.
     #[arg(long, value_name = "COLUMN")]
     pub trajectory: Option<String>,
     /// Coordinates that are angles, in rad or with a unit; they are unwrapped.

@@ -29,7 +29,7 @@ pub enum Writer {
 /// Contents of a directory, in words; `None` if a run can be written there and nothing is lost.
 pub fn found(directory: &Path) -> Option<String> {
     if has_checkpoint(directory) {
-        return Some(format!("an unfinished run (go on with it by: {})", command(directory)));
+        return Some(format!("an unfinished run (continue it by: {})", command(directory)));
     }
     let names: Vec<String> = LEARNED
         .into_iter()
@@ -95,7 +95,7 @@ pub fn require_no_input(directory: &Path, inputs: &[&Path]) -> Result<(), CliErr
         let path = directory.join(name);
         if inputs.iter().any(|input| same_file(&path, input)) {
             let problem = format!(
-                "this command reads it and would write it: choose another directory (--out) than {}",
+                "this command reads it and must not overwrite it: choose a directory (--out) other than {}",
                 directory.display()
             );
             return Err(CliError::file(&path, problem));
@@ -160,7 +160,7 @@ fn remove(directory: &Path, names: &[&str]) -> Result<(), PipelineError> {
     for path in captions.into_iter().chain(names.iter().map(|name| directory.join(name))) {
         // A device behind a link holds nothing of an earlier run.
         if path.is_file() || path.is_symlink() && !path.exists() {
-            let cannot = |e| PipelineError::output(&path, format_args!("cannot remove what was there: {e}"));
+            let cannot = |e| PipelineError::output(&path, format_args!("cannot remove the previous results: {e}"));
             Disk.remove(&path).map_err(cannot)?;
         }
     }

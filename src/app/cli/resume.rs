@@ -64,7 +64,7 @@ pub fn reopen<T>(
         Found::Unfinished(text) => Ok(Some((folder, read(Text::Checkpoint(&text))?))),
         Found::Finished(text, summary) => {
             read(Text::Configuration(&text))?;
-            let said = format!("{}: this training has finished, nothing is left to do\n", directory.display());
+            let said = format!("{}: this training has finished\n", directory.display());
             output::print(if json { &summary } else { &said })?;
             Ok(None)
         }
@@ -124,7 +124,7 @@ fn finished(directory: &Path) -> Result<(Found, Learner), CliError> {
         (Some((Summary { ended, .. }, _)), _) if ended != "interrupted" => {
             Err(CliError::file(directory, format_args!("this training has ended: {ended}")))
         }
-        _ => Err(CliError::file(directory, format_args!("there is no checkpoint ({LATEST}) to go on from"))),
+        _ => Err(CliError::file(directory, format_args!("there is no checkpoint ({LATEST}) to continue from"))),
     }
 }
 
@@ -165,7 +165,7 @@ pub fn command(directory: &Path) -> String {
 /// The end of a message about a run that was stopped.
 pub fn how_to_go_on(directory: &Path) -> String {
     if has_checkpoint(directory) {
-        format!("; go on with: {}", command(directory))
+        format!("; continue with: {}", command(directory))
     } else {
         "; there is no checkpoint".to_string()
     }
@@ -176,8 +176,8 @@ pub fn how_to_go_on(directory: &Path) -> String {
 pub fn keeping(directory: &Path) -> impl Fn(CliError) -> CliError {
     |error| {
         if error.kind() == Kind::Data && has_checkpoint(directory) {
-            let learned = "what was learned is kept; when that is mended";
-            CliError::data(format_args!("{error} ({learned}, go on with: {})", command(directory)))
+            let learned = "the model so far is kept; when the cause is removed";
+            CliError::data(format_args!("{error} ({learned}, continue with: {})", command(directory)))
         } else {
             error
         }

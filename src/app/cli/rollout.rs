@@ -24,21 +24,21 @@ pub struct Args {
     /// Model, a file or the directory of a run.
     #[arg(required_unless_present = "system")]
     model: Option<PathBuf>,
-    /// A system instead of a model, by name (`lnn systems` lists them) or by the file that describes it: its exact motion.
+    /// Predict the exact motion of a system instead of a model, by name (`lnn systems` lists them) or by its file.
     #[arg(long, value_name = "NAME|FILE.toml", conflicts_with = "model")]
     system: Option<String>,
     /// A parameter of the system; may be repeated.
     #[arg(long, value_name = "SYMBOL=VALUE", conflicts_with = "model", value_parser = parameter)]
     param: Vec<(String, String)>,
-    /// Start: coordinates, then velocities, separated by commas; taken as it is, on a mass shell or off it. Under constraints it is
-    /// brought to them if it is off by less than a thousandth of its size, and refused with its distance otherwise.
+    /// Initial state: coordinates, then velocities, separated by commas. It is taken as it is, on a mass shell or off it. Under
+    /// constraints it is moved onto them if it is off by less than a thousandth of its size, and refused otherwise.
     #[arg(long, value_name = "q1,..,v1,..", required = true, value_delimiter = ',', allow_hyphen_values = true, value_parser = finite)]
     state: Vec<f64>,
-    /// Time of the last sample, in seconds (relativistic systems: proper time in metres); a time before the start runs
-    /// backwards.
+    /// Time of the last sample, in seconds (relativistic systems: proper time in metres). For a time before the start the
+    /// motion runs backwards.
     #[arg(long, value_name = "T", allow_hyphen_values = true, value_parser = finite)]
     t_end: f64,
-    /// Time of the start, in the same unit; it matters to recorded forces alone.
+    /// Time of the start, in the same unit; it matters only with recorded forces.
     #[arg(long, value_name = "T", default_value = "0", allow_hyphen_values = true, value_parser = finite)]
     t_start: f64,
     /// Time between samples, in the same unit.
@@ -46,8 +46,7 @@ pub struct Args {
     dt: f64,
     #[command(flatten)]
     forces: ForceArgs,
-    /// Integrator: two with error control, four symplectic ones of fixed step for long times; variational refuses models
-    /// with friction.
+    /// Integrator. If unsure, keep the default; take gauss6 for long times. variational refuses models with friction.
     #[arg(long, value_enum, value_name = "NAME", default_value = "dopri5")]
     method: MethodName,
     /// Relative tolerance of a step, at least 2e-15.
@@ -56,35 +55,35 @@ pub struct Args {
     /// Absolute tolerance of a step.
     #[arg(long, value_name = "A", default_value = "1e-8", allow_hyphen_values = true, value_parser = positive)]
     atol: f64,
-    /// Longest step of midpoint, gauss4, gauss6 and variational, cut to the time between samples; one per sample if not
-    /// given.
+    /// Longest step of midpoint, gauss4, gauss6 and variational, cut to the time between samples [default: one step per
+    /// sample].
     #[arg(long, value_name = "H", allow_hyphen_values = true, value_parser = positive)]
     step: Option<f64>,
-    /// Go on where the motion leaves the states that the model was trained on, and say where that was; angles are free to
-    /// turn anyway.
+    /// Continue where the motion leaves the training range of the model, and report the place. Angles may always turn
+    /// freely.
     #[arg(long)]
     beyond_range: bool,
     /// Constraints that hold the motion, a file with a table [constraints] as `lnn constraints --out` writes it.
     #[arg(long, value_name = "FILE.toml")]
     constraints: Option<PathBuf>,
-    /// Move by the acceleration of least norm where the mass matrix is singular, and say along how many directions that was chosen.
+    /// Take the acceleration of least norm where the mass matrix is singular, and report the number of free directions.
     #[arg(long)]
     least_norm: bool,
-    /// CSV of the trajectory: t, the columns of a state, energy; - for standard output. A file that
-    /// holds something is refused, the model always.
+    /// CSV of the trajectory: t, the columns of a state, energy; - for standard output. A file with content is refused
+    /// unless --overwrite is given, the model always.
     #[arg(long, value_name = "FILE.csv")]
     out: PathBuf,
-    /// Picture of the coordinates against time, or a page with velocities and energy as well.
+    /// Plot of the coordinates against time, or a page that also shows velocities and energy.
     #[arg(long, value_name = "FILE.svg|FILE.html", value_parser = picture_file)]
     plot: Option<PathBuf>,
-    /// Say what the model's symmetries conserve along the motion, and what part of its drift is the model's, what the
-    /// integrator's.
+    /// Report the charges of the model's symmetries along the motion, with the parts of their drift due to the model and to
+    /// the integrator.
     #[arg(long)]
     charges: bool,
     /// Replace the files.
     #[arg(long)]
     overwrite: bool,
-    /// Print what there is to say as a JSON object instead of text.
+    /// Print a JSON object instead of text.
     #[arg(long)]
     json: bool,
 }

@@ -14,18 +14,18 @@ use toml::Value;
 /// Options of a run.
 #[derive(Clone, Debug, clap::Args)]
 pub struct RunArgs {
-    /// A configuration, such as the config.toml beside a model, or - for standard input; keys that are not in it have their
-    /// usual values, and options stand above it.
+    /// A configuration, such as the config.toml beside a model, or - for standard input. Missing keys have their default
+    /// values, and options override it.
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
-    /// Print the configuration with comments, as it would be used, and learn nothing; markdown prints a table of all keys.
+    /// Print the resulting configuration with comments, without learning; markdown prints a table of all keys.
     #[arg(long, value_enum, value_name = "FORMAT", num_args = 0..=1, require_equals = true, default_missing_value = "toml",
         conflicts_with = "resume")]
     pub print_config: Option<PrintFormat>,
-    /// Learning rate of the first phase; the rates of later phases and all lowest rates are scaled with it.
+    /// Learning rate of the first phase; the rates of later phases and all lowest rates are scaled in proportion.
     #[arg(long, value_name = "R", allow_hyphen_values = true, value_parser = learning_rate)]
     pub learning_rate: Option<f64>,
-    /// Epochs of all phases together; the whole schedule is scaled, with the periods of its rates.
+    /// Epochs of all phases together; the schedule is scaled, including the periods of its rates.
     #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = whole(1, MOST_EPOCHS))]
     pub epochs: Option<usize>,
     /// Threads; the result does not depend on them [default: all].
@@ -35,14 +35,14 @@ pub struct RunArgs {
     /// first free of runs/NAME-2, runs/NAME-3, ..].
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Replace the run in the directory, pictures and evaluations of its model included, once the new model is there.
+    /// Replace the run in the directory, including plots and evaluations of its model, once the new model is written.
     #[arg(long, conflicts_with = "resume")]
     pub overwrite: bool,
-    /// Go on with the run in a directory that was stopped; everything else comes from its checkpoint, recorded data as well
-    /// unless given anew.
+    /// Continue the interrupted run in this directory. Everything else comes from its checkpoint, including recorded data
+    /// unless they are given again.
     #[arg(long, value_name = "DIR", conflicts_with = "out")]
     pub resume: Option<PathBuf>,
-    /// Write a checkpoint every N epochs, or every Ts seconds with an s behind the number.
+    /// Write a checkpoint every N epochs, or every T seconds if the number ends in s.
     #[arg(long, value_name = "N|Ts", default_value = "60s", allow_hyphen_values = true, value_parser = every)]
     pub checkpoint_every: CheckpointInterval,
     /// Print summary.json instead of tables.

@@ -38,10 +38,10 @@ pub struct Args {
     /// A parameter of the system; may be repeated.
     #[arg(long, value_name = "SYMBOL=VALUE", num_args = 1.., value_parser = parameter, requires = "system")]
     param: Vec<(String, String)>,
-    /// The coordinate that is the time; a metric that depends on it is refused.
+    /// Time coordinate; a metric that depends on it is refused.
     #[arg(long, value_name = "NAME", default_value = "t")]
     time: String,
-    /// The coordinates that are the places, Cartesian ones around the centre; the last is the axis.
+    /// Spatial coordinates, Cartesian around the centre; the last is the axis.
     #[arg(long, value_name = "X,Y,Z", default_value = "x,y,z", value_delimiter = ',')]
     space: Vec<String>,
     /// Distance of the camera from the centre, in the unit of the coordinates.
@@ -65,26 +65,26 @@ pub struct Args {
     /// Rows [default: as many as pixels of a row].
     #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = whole(1, MOST_PIXELS))]
     height: Option<usize>,
-    /// Distance from which on a ray that leaves has come from the sky [default: 100 times the distance of the camera, twice with a
-    /// learned metric, which is known as far as it was trained].
+    /// Distance beyond which an outgoing ray comes from the sky; keep it within the training range of a learned metric [default: 100
+    /// times the distance of the camera, with a learned metric twice the distance].
     #[arg(long, value_name = "R", allow_hyphen_values = true, value_parser = number(NEAREST, FARTHEST))]
     far: Option<f64>,
     /// Relative error of a step of a ray, 1e-12 to 0.01; the edge of the shadow is found with a hundredth of it, 1e-12 at least.
     #[arg(long, value_name = "T", default_value = "1e-6", allow_hyphen_values = true, value_parser = number(TOLERANCES.0, TOLERANCES.1))]
     tolerance: f64,
-    /// Directions in which the edge of the shadow is found by bisection, a multiple of four; 0 leaves it out.
+    /// Directions in which the edge of the shadow is found by bisection, a multiple of four; 0 omits the edge.
     #[arg(long, value_name = "N", default_value = "64", allow_hyphen_values = true, value_parser = edges)]
     edges: usize,
     /// Threads; the picture does not depend on them [default: all].
     #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = thread_count)]
     threads: Option<usize>,
-    /// Picture: of two metrics the exact one, the learned one, and their difference.
+    /// Picture; with two metrics it shows the exact one, the learned one, and their difference.
     #[arg(long, value_name = "FILE.png", value_parser = image_file)]
     out: PathBuf,
     /// Replace the file.
     #[arg(long)]
     overwrite: bool,
-    /// Print what there is to say as a JSON object instead of text.
+    /// Print a JSON object instead of text.
     #[arg(long)]
     json: bool,
 }

@@ -31,13 +31,12 @@ impl Shard {
         let number = |part: &str| {
             let name = format!("SLURM_ARRAY_TASK_{part}");
             let Some(text) = variable(&name) else { return Ok(None) };
-            let problem =
-                || format!("{name}: expected a whole number, found {text:?}; --shard I/N says which share it is");
+            let problem = || format!("{name}: expected a whole number, found {text:?}; --shard I/N chooses the share");
             text.trim().parse::<usize>().map(Some).map_err(|_| problem())
         };
         let Some(id) = number("ID")? else { return Ok(None) };
         let [count, least, most, step] = [number("COUNT")?, number("MIN")?, number("MAX")?, number("STEP")?];
-        let unknown = |what: &str| format!("SLURM_ARRAY_TASK_ID={id}: {what}; --shard I/N says which share it is");
+        let unknown = |what: &str| format!("SLURM_ARRAY_TASK_ID={id}: {what}; --shard I/N chooses the share");
         let count = count.filter(|count| *count > 0).ok_or_else(|| unknown("no SLURM_ARRAY_TASK_COUNT beside it"))?;
         let (least, step) = (least.unwrap_or(0), step.unwrap_or(1).max(1));
         let position = |id: usize| {

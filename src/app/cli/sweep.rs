@@ -16,20 +16,20 @@ const MOST_RUNS: usize = 10_000;
 /// Arguments.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// A configuration of `lnn train`, FILE.toml; keys that are not in it have the values of the preset quick.
+    /// A configuration of `lnn train`, FILE.toml; missing keys have the values of the preset quick.
     #[arg(value_name = "FILE")]
     file: PathBuf,
-    /// A key and the values that it takes, such as penalty.lambda=0.1,1 or network.hidden=[64],[128,128]; may be repeated, and all combinations
-    /// are run.
+    /// A key and its values, such as penalty.lambda=0.1,1 or network.hidden=[64],[128,128]; may be repeated, and all combinations
+    /// are trained.
     #[arg(long, value_name = "KEY=A,B,C", allow_hyphen_values = true)]
     vary: Vec<Variation>,
     /// Seeds of every combination, from that of the configuration on.
     #[arg(long, value_name = "N", default_value = "1", allow_hyphen_values = true, value_parser = whole(1, MOST_RUNS))]
     seeds: usize,
-    /// Directory, where a sweep goes on with what is there.
+    /// Directory; a sweep continues with the runs that are there.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Threads; as many runs go side by side, and the results do not depend on them [default: all].
+    /// Threads; as many runs are trained in parallel, and the results do not depend on the number [default: all].
     #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = thread_count)]
     threads: Option<usize>,
     /// Only the I-th of N shares of the runs, I from 1 to N; no tables are written [default: that of a Slurm array, or all].
@@ -38,10 +38,10 @@ pub struct Args {
     /// List the runs: finished, in progress, or open.
     #[arg(long)]
     list: bool,
-    /// Write tables, pictures and report from the runs that are finished; nothing is run.
+    /// Write tables, plots and report from the finished runs, without running any.
     #[arg(long, conflicts_with_all = ["list", "shard", "overwrite"])]
     merge: bool,
-    /// Replace finished runs that are of other configurations.
+    /// Replace finished runs of other configurations.
     #[arg(long, conflicts_with = "list")]
     overwrite: bool,
     /// One JSON object per line instead of tables.

@@ -207,7 +207,7 @@ fn announce(unknowns: usize, points: usize, quadratic: bool) {
     if (unknowns as f64).powi(2) * points as f64 > LONG {
         let more = if quadratic { ", and more for quadratic quantities" } else { "" };
         output::note(&format!(
-            "{unknowns} unknown coefficients at {points} states{more}: this takes a while, less with a smaller --basis"
+            "{unknowns} unknown coefficients at {points} states{more}: this takes a while; a smaller --basis is faster"
         ));
     }
 }
@@ -217,9 +217,9 @@ impl Found {
     fn algebra(&self) -> String {
         match (self.closes, self.closure, self.name.as_deref()) {
             (Some(true), _, Some(name)) => format!("algebra {name}"),
-            (Some(true), ..) => "algebra of no name known here".to_string(),
-            (_, Some(closure), _) => format!("which are no algebra (closure {})", digits(closure)),
-            _ => format!("more than the {MOST_FIELDS} whose algebra is looked at"),
+            (Some(true), ..) => "an algebra without a name".to_string(),
+            (_, Some(closure), _) => format!("which do not form an algebra (closure {})", digits(closure)),
+            _ => format!("too many for an algebra (at most {MOST_FIELDS})"),
         }
     }
 
@@ -227,10 +227,13 @@ impl Found {
         let time = if self.time_translation {
             "time translation (the energy is conserved)"
         } else {
-            "no time translation (friction takes energy)"
+            "no time translation (friction removes energy)"
         };
         let mut text = match self.count {
-            None => format!("{}: no gap between singular values, so no number of symmetries; {time}\n", self.system),
+            None => format!(
+                "{}: no gap between singular values, so that the number of symmetries is unknown; {time}\n",
+                self.system
+            ),
             Some(0) => format!("{}: no point symmetry in space; {time}\n", self.system),
             Some(count) => {
                 let count = pluralize(count, "point symmetry", "point symmetries");
@@ -314,7 +317,7 @@ fn factor(x: f64) -> String {
 impl Second {
     fn text(&self) -> String {
         match self.count {
-            None => "\nquantities quadratic in the momenta: no gap, so no number\n".to_string(),
+            None => "\nquantities quadratic in the momenta: no gap, so that their number is unknown\n".to_string(),
             Some(0) => {
                 "\nno conserved quantity quadratic in the momenta beyond the energy and products of charges\n".into()
             }

@@ -9,7 +9,7 @@ use std::borrow::Cow;
 /// Arguments.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// This one alone, by name or by the file that describes it.
+    /// List only this system, by name or by its file.
     #[arg(long, value_name = "NAME|FILE.toml")]
     system: Option<String>,
     /// One JSON object per line instead of a table.

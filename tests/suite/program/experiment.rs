@@ -70,7 +70,7 @@ fn a_hole_of_ones_own_is_read_like_those_of_the_experiment() {
     assert!(readings.contains("parameter Q") && !readings.contains("kerr"), "{readings}");
     let refused = lnn(&[&["old-tricks"], &hole[..4], &out_dir].concat());
     let told = String::from_utf8_lossy(&refused.stderr);
-    assert!(refused.status.code() == Some(2) && told.contains("old-tricks is about systems of its own"), "{told}");
+    assert!(refused.status.code() == Some(2) && told.contains("--system: old-tricks "), "{told}");
 }
 
 #[test]
@@ -97,7 +97,7 @@ fn finished_runs_are_kept_and_missing_ones_made_again() {
     let refused = lnn(&again);
     let stderr = String::from_utf8_lossy(&refused.stderr);
     assert_eq!(refused.status.code(), Some(1), "{stderr}");
-    assert!(stderr.contains("paper-s-model-seed0: a finished run of another configuration is there"), "{stderr}");
+    assert!(stderr.contains("paper-s-model-seed0: ") && stderr.contains("another configuration"), "{stderr}");
     let curves = format!("x={}", folder.join("curves.csv").display());
     fs::write(folder.join("curves.csv"), "seconds,validation_loss\n0,1\n1,0.5\n").unwrap();
     let refused = lnn(&[&again[..], &["--overwrite", "--beside", &curves]].concat());
@@ -171,7 +171,7 @@ fn single_rows_can_be_run_and_tables_say_what_they_compare() {
     let refused = only("dyt");
     let stderr = String::from_utf8_lossy(&refused.stderr);
     assert_eq!((refused.status.code(), stderr.lines().count()), (Some(2), 1), "{stderr}");
-    assert!(stderr.contains("no row begins so; there are `physical scaling`, `no scaling`, `DyT`"), "{stderr}");
+    assert!(stderr.contains("--only") && stderr.contains("`physical scaling`, `no scaling`, `DyT`"), "{stderr}");
 }
 
 #[test]
@@ -282,7 +282,7 @@ fn arrays_of_slurm_are_shares() {
     let gap = [("ID", "7"), ("COUNT", "2"), ("MIN", "3"), ("MAX", "7")];
     let refused = task(&gap, &[]);
     let stderr = String::from_utf8_lossy(&refused.stderr);
-    assert!(refused.status.code() == Some(2) && stderr.contains("--shard I/N says which share it is"), "{stderr}");
+    assert!(refused.status.code() == Some(2) && stderr.contains("--shard I/N"), "{stderr}");
     let output = task(&gap, &["--shard", "1/3"]);
     assert!(output.status.success() && output.stderr.is_empty());
     assert_eq!(["physical-scaling-seed0", "no-scaling-seed0", "dyt-seed0"].map(made), [true, false, true]);

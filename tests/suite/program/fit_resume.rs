@@ -55,7 +55,7 @@ fn a_fit_stopped_in_the_middle_comes_to_the_same_end() {
     // Once in the training on accelerations, once in multiple shooting.
     let epochs = |log: &str| log.matches(" epoch=").count();
     let last = stopped(&[&base[..], &["--out", &out]].concat(), |log| epochs(log) >= 5, &folder);
-    let on = format!("go on with: lnn fit --resume {out}");
+    let on = format!("continue with: lnn fit --resume {out}");
     assert!(last.contains("interrupted") && last.ends_with(&on), "{last}");
     assert!(folder.path("out/model.safetensors").is_file());
     lnn(&["train", "--resume", &out]).refused(1, &["this is a run of lnn fit, not of lnn train"]);

@@ -114,7 +114,7 @@ fn a_training_stopped_in_the_middle_comes_to_the_same_end() {
     succeeded(&folder.train("whole", &[]).wait_with_output().unwrap());
     let stopped = folder.stopped("stopped");
     let out = folder.text("stopped");
-    refused(&stopped, 130, &["interrupted", &format!("go on with: lnn train --resume {out}")]);
+    refused(&stopped, 130, &["interrupted", &format!("continue with: lnn train --resume {out}")]);
     assert!(folder.path("stopped").join(LATEST).exists());
 
     // Another configuration is refused, and so is beginning anew on top of what is there.
