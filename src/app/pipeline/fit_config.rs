@@ -38,7 +38,7 @@ table! {
         /// The files and what their columns mean, as the options of the same names say it.
         #[table("recording", Below::Keys(FitColumns::KEYS))]
         pub recording: FitColumns = FitColumns::default(),
-        /// Multiple shooting, of a fit to the motion itself.
+        /// Multiple shooting, for a fit to the motion itself.
         #[table("shooting", Below::Keys(Shooting::KEYS))]
         #[serde(skip_serializing_if = "Option::is_none")]
         pub shooting: Option<Shooting> = None,

@@ -72,13 +72,13 @@ table! {
         /// Name of the system.
         #[key("a name, see `lnn systems`", example = "\"double-pendulum\"", flag = "name")]
         pub system: String = String::new(),
-        /// Seed of everything random: states, weights, order of the data.
+        /// Seed of all random numbers: states, weights, order of the data.
         #[key("0 to 2^63 - 1", flag = "seed", check = |x| *x <= MOST_SEED)]
         pub seed: u64 = 0,
         /// Precision of weights and arithmetic.
         #[key("f32, f64", flag = "precision")]
         pub precision: Precision = Precision::F32,
-        /// Model whose weights the training starts from, instead of random ones; the network must be the model's.
+        /// Model whose weights the training starts from; the network must be that of the model.
         #[key("a model file or the directory of a run", example = "\"runs/other\"", flag = "from")]
         #[serde(skip_serializing_if = "Option::is_none")]
         pub from: Option<String> = None,
@@ -87,13 +87,13 @@ table! {
         /// Those that are not given have its defaults.
         #[table("parameters", Below::Open)]
         pub parameters: BTreeMap<String, f64> = BTreeMap::new(),
-        /// A system that is none of the program's own: what its file says, see the page on system files.
+        /// A system that is not in the catalogue: the content of its file, see the page on system files.
         ///
         /// Its name is `system`.
         #[table("description", Below::Whole)]
         #[serde(skip_serializing_if = "Option::is_none")]
         pub description: Option<Description> = None,
-        /// States that are drawn, uniformly within bounds unless said otherwise.
+        /// The states, drawn uniformly within bounds unless a key chooses otherwise.
         #[table("data", Below::Keys(Data::KEYS))]
         pub data: Data = Data::default(),
         /// Shape of the network.
@@ -102,14 +102,14 @@ table! {
         /// Penalty on a wrong signature of the mass matrix.
         #[table("penalty", Below::Keys(PENALTY_KEYS))]
         pub penalty: Regularizer = Regularizer::Eigenvalue { lambda: PENALTY },
-        /// How weights are updated.
+        /// The update of the weights.
         #[table("optimizer", Below::Keys(Optimizer::KEYS))]
         pub optimizer: Optimizer = Optimizer::default(),
-        /// A stretch of training; may stand several times, each from the best weights of the one before.
+        /// A stretch of training. The table may be repeated; each phase starts from the best weights of the previous one.
         #[table("phase", Below::Keys(Phase::KEYS))]
         #[serde(rename = "phase")]
         pub phases: Vec<Phase> = vec![Phase::default()],
-        /// Full-batch L-BFGS in double precision after the last phase; without this table there is none.
+        /// Full-batch L-BFGS in double precision after the last phase; left out without this table.
         #[table("lbfgs", Below::Keys(Lbfgs::KEYS))]
         #[serde(skip_serializing_if = "Option::is_none")]
         pub lbfgs: Option<Lbfgs> = None,
@@ -136,7 +136,7 @@ const PENALTY_KEYS: &[Key] = &[
 table! {
     /// Full-batch L-BFGS in double precision on the states of the last phase, from the best weights so far.
     pub struct Lbfgs {
-        /// Iterations at most.
+        /// Largest number of iterations.
         #[key("1 to 2^24", example = "100", check = count(MOST_EPOCHS))]
         pub iterations: usize = 100,
         /// Pairs of steps and gradient differences that are kept.
@@ -155,18 +155,18 @@ table! {
         /// Number of training states of every phase.
         #[key("1 to 2^30", check = count(MOST_STATES))]
         pub training: usize = 60_000,
-        /// Number of validation states; the best epoch is chosen on them.
+        /// Number of validation states, which choose the best epoch.
         #[key("1 to 2^30", check = count(MOST_STATES))]
         pub validation: usize = 12_000,
-        /// Fraction of the training states of a geodesic that are slowed down or reversed, off the mass shell: on the shell
-        /// alone the metric is not identifiable.
+        /// Fraction of the training states of a geodesic that are slowed down or reversed, off the mass shell; on the shell alone
+        /// the metric is not identifiable.
         ///
         /// Their velocity is `u` times one on the shell, `|u|` from 0.03 to 1 and uniform in its logarithm, of either sign, their
         /// acceleration `u^2` times as large, as for every geodesic, and their residuals weigh `1/u^2` in the training loss.
         #[key("0 to 1; 0 unless set", example = "0.75", check = |x| (0.0..=1.0).contains(x))]
         #[serde(skip_serializing_if = "is_zero")]
         pub rescaled_fraction: f64 = 0.0,
-        /// Fraction of the training states that lie on exact motions from the starts of the trajectory test.
+        /// Fraction of the training states that lie on exact trajectories with the initial conditions of the trajectory test.
         ///
         /// They lie at any time with equal chance, as long as the motions stay within the bounds of the phase. A
         /// [`Phase::log_uniform`] coordinate is so in half of the starts as well; `rescaled_fraction` and `acceleration_weighting`
@@ -174,16 +174,17 @@ table! {
         #[key("0 to 1; 0 unless set", example = "0.3", check = |x| (0.0..=1.0).contains(x))]
         #[serde(skip_serializing_if = "is_zero")]
         pub trajectory_fraction: f64 = 0.0,
-        /// With f above 0 a state weighs f m / (f m + |a|), |a| its scaled acceleration and m the mean of all: a few huge
-        /// accelerations do not outweigh the others. A fit adds the error to expect to |a|.
+        /// If f is above 0, a state has the weight f m / (f m + |a|), with its scaled acceleration |a| and the mean m of all, so
+        /// that a few huge accelerations do not outweigh the others. A fit adds the expected error to |a|.
         ///
         /// With [radial coordinates](Network::radial) a state of a fit weighs `1/(|a| + f m)`, `m` the median about as far from the
         /// centre. The same weights choose the best epoch of a fit.
         #[key("from 0; 0 unless set", example = "0.1", check = from_zero)]
         #[serde(skip_serializing_if = "is_zero")]
         pub acceleration_weighting: f64 = 0.0,
-        /// All states lie in a shell around the centre, instead of their bounds: directions uniform, distances uniform in their
-        /// logarithm, velocities time-like; acceleration_weighting then compares with states about as far from the centre.
+        /// Draw all states in a shell around the centre instead of their bounds, with uniform directions, distances uniform in
+        /// their logarithm, and time-like velocities. acceleration_weighting then compares with states at about the same
+        /// distance.
         ///
         /// See [`Shell`]; empty for none.
         #[key("names of Cartesian coordinates around a centre", example = "[\"x\", \"y\", \"z\"]")]
@@ -197,14 +198,14 @@ table! {
         #[key("from 0; 1 unless set", example = "1.2", check = from_zero)]
         #[serde(skip_serializing_if = "Option::is_none")]
         pub rapidity: Option<f64> = None,
-        /// Number of fresh states on which the final model is judged.
+        /// Number of fresh states that test the final model.
         #[key("1 to 2^30", check = count(MOST_STATES))]
         pub test: usize = 12_000,
         /// Bounds of the coordinates of validation and test states; recorded states need none of the four bounds.
         #[key("[low, high] for each coordinate, in its unit")]
         #[serde(skip_serializing_if = "Vec::is_empty", deserialize_with = "pair::list")]
         pub validation_position: Vec<[f64; 2]> = Vec::new(),
-        /// Bounds of their velocities; those of a velocity that a mass shell fixes mean nothing.
+        /// Bounds of their velocities; not used for a velocity that a mass shell determines.
         #[key("[low, high] for each coordinate, in its unit per unit of time")]
         #[serde(skip_serializing_if = "Vec::is_empty", deserialize_with = "pair::list")]
         pub validation_velocity: Vec<[f64; 2]> = Vec::new(),
@@ -250,22 +251,22 @@ table! {
         /// Widths of the hidden layers; a hybrid's branches share them.
         #[key("1 to 64 widths of 1 to 65536", example = "[128, 128, 128]", flag = "hidden", check = count(MAX_WIDTH))]
         pub hidden: Vec<usize> = vec![128; 3],
-        /// Activation of the hidden layers; quadratic-softplus is two networks of half the widths.
+        /// Activation of the hidden layers; quadratic-softplus is the sum of two networks of half the widths.
         #[key(ActivationChoice::NAMES, flag = "activation")]
         pub activation: ActivationChoice = ActivationChoice::Gelu,
-        /// How the Lagrangian is made of the network's outputs; see structures.
+        /// How the Lagrangian is composed from the outputs of the network; see the page on structures.
         #[key(Structure::NAMES, flag = "structure")]
         pub structure: Structure = Structure::BlackBox,
-        /// How kinetic energy or metric of a structure are factored: a triangle, or a rectangle of three squares a coordinate, which
-        /// is smooth where a triangle has a root.
+        /// How the kinetic energy or metric of a structure is factored: by a triangle, or by a rectangle of three squares per
+        /// coordinate, which is smooth where a triangle has a root.
         #[key("triangle, rectangle")]
         pub factor: Factor = Factor::Triangle,
         /// Coordinates that the Lagrangian does not depend on.
         #[key("names of coordinates", example = "[\"t\"]", flag = "cyclic")]
         #[serde(skip_serializing_if = "Vec::is_empty")]
         pub cyclic: Vec<String> = Vec::new(),
-        /// Coordinates that enter by direction and distance R from a centre, as (x_i/R) ln(R/u) and (x_i/R) (u/R): for fields
-        /// that reach from near to far.
+        /// Coordinates that enter by direction and distance R from a centre, as (x_i/R) ln(R/u) and (x_i/R) (u/R), for fields
+        /// over a wide range of distances.
         ///
         /// See [`Radial`].
         #[key("lists of names of Cartesian coordinates", example = "[[\"x\", \"y\", \"z\"]]")]
@@ -278,30 +279,30 @@ table! {
         /// Make the Lagrangian even in the velocities.
         #[key("true, false", flag = "even-in-v")]
         pub even_in_v: bool = false,
-        /// Factor of the added |v|^2 of scaled velocities, of a black box.
+        /// Factor of the added |v|^2 of scaled velocities; for a black box.
         #[key("a finite number", check = |x| x.is_finite())]
         pub alpha: f64 = 1.0,
-        /// Learn alpha too; a black box only.
+        /// Learn alpha as well; for a black box only.
         #[key("true, false", flag = "learn-alpha")]
         pub learn_alpha: bool = false,
-        /// A Lagrangian that is known and added; its parameters marked learn are learned beside the weights.
+        /// A known Lagrangian that is added; its parameters marked learn are learned beside the weights.
         #[key("a system file, or its tables", example = "\"pendulum.toml\"", flag = "known")]
         #[serde(skip_serializing_if = "Option::is_none")]
         pub known: Option<Known> = None,
-        /// Its square counts negative in the added term, alpha (-t'^2 + x'^2 + ..); without it all squares are added.
+        /// The coordinate that is a time. Its square counts negative in the added term, alpha (-t'^2 + x'^2 + ..).
         #[key("a coordinate", example = "\"t\"", flag = "timelike")]
         #[serde(skip_serializing_if = "Option::is_none")]
         pub time_like: Option<String> = None,
         /// physical divides q, v and a of a coordinate by the largest of |q| and |v| over the training states.
         #[key("physical, none")]
         pub scaling: Scaling = Scaling::Physical,
-        /// Feed sine and cosine of angles instead of the angles.
+        /// Give the network the sine and cosine of angles instead of the angles.
         #[key("true, false")]
         pub embed_periodic: bool = true,
-        /// What stands before the first dense layer: nothing or a dynamic tanh.
+        /// Layer before the first dense layer: none, or a dynamic tanh.
         #[key("none, dyt")]
         pub input_layer: InputLayer = InputLayer::None,
-        /// Units of a learned friction, a Rayleigh dissipation; without it the motion keeps its energy.
+        /// Number of units of a learned friction, a Rayleigh dissipation; without it the motion conserves its energy.
         #[key("1 to 65536 units", example = "16", flag = "friction?", check = count(MAX_WIDTH))]
         #[serde(skip_serializing_if = "Option::is_none")]
         pub dissipation: Option<usize> = None,
@@ -333,16 +334,16 @@ table! {
         /// States per step.
         #[key("1 to 2^30 states", check = count(MOST_STATES))]
         pub batch: usize = 128,
-        /// Weight decay: added to the gradient (L2), or, by adamw, a shrinking by the rate times it.
+        /// Weight decay: added to the gradient (L2); with adamw, weights shrink by the rate times it.
         #[key("from 0", check = from_zero)]
         pub weight_decay: f64 = 1e-6,
-        /// The gradient's norm is cut to this.
+        /// Largest norm of the gradient; longer gradients are cut to it.
         #[key("above 0, inf for none", check = |x| *x > 0.0)]
         pub clip: f64 = 1.0,
-        /// Weights are averaged over about 1/(1 - averaging) steps for validation and the final model.
+        /// For validation and the final model, weights are averaged over about 1/(1 - averaging) steps.
         #[key("0 to below 1", check = |x| (0.0..1.0).contains(x))]
         pub averaging: f64 = 0.0,
-        /// What happens to a state or a step that is not finite: it is left out, or training stops.
+        /// What to do about a state or a step that is not finite: leave it out, or stop the training.
         #[key("skip, stop")]
         pub on_failure: OnFailure = OnFailure::Skip,
     }
@@ -360,7 +361,7 @@ table! {
         /// Lowest learning rate.
         #[key("0 to the rate")]
         pub eta_min: f64 = 0.0,
-        /// How the rate moves: not at all, by half a cosine over the phase, falling and rising again every 2 t_max.
+        /// How the rate changes: not at all, by half a cosine over the phase, or falling and rising every 2 t_max.
         #[key("constant, cosine, cosine-annealing")]
         pub schedule: Schedule = Schedule::Cosine,
         /// Epochs from highest to lowest rate of cosine-annealing.
@@ -370,11 +371,11 @@ table! {
         #[key("[low, high] for each coordinate, in its unit")]
         #[serde(skip_serializing_if = "Vec::is_empty", deserialize_with = "pair::list")]
         pub position: Vec<[f64; 2]> = Vec::new(),
-        /// Bounds of their velocities; those of a velocity that a mass shell fixes mean nothing.
+        /// Bounds of their velocities; not used for a velocity that a mass shell determines.
         #[key("[low, high] for each coordinate, in its unit per unit of time")]
         #[serde(skip_serializing_if = "Vec::is_empty", deserialize_with = "pair::list")]
         pub velocity: Vec<[f64; 2]> = Vec::new(),
-        /// For which coordinates half of the states are uniform in the logarithm.
+        /// Coordinates for which half of the states are uniform in the logarithm.
         #[key("true or false for each coordinate", example = "[true, false]")]
         #[serde(skip_serializing_if = "Vec::is_empty")]
         pub log_uniform: Vec<bool> = Vec::new(),

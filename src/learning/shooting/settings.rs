@@ -15,12 +15,12 @@ table! {
     /// tenth of its slow period. Much longer ones follow its chaos rather than its law, a much larger weight of the gaps joins
     /// them into longer ones.
     pub struct Shooting {
-        /// Samples predicted from one start, about.
+        /// Approximate number of samples predicted from one initial condition.
         ///
         /// Every trajectory is cut into segments of equal length.
         #[key("2 to 65536", flag = "segment", check = |x| (2..=MOST_STEPS).contains(x))]
         pub samples_per_segment: usize = 20,
-        /// Integration steps per segment; without it as many as the noise demands.
+        /// Integration steps per segment; by default as many as the noise requires.
         ///
         /// As many as keep the integrator's error below a twentieth of the noise.
         #[key("1 to 65536", example = "8", check = count(MOST_STEPS))]
@@ -38,22 +38,22 @@ table! {
         /// Learning rate at the start, falling to 0 by half a cosine.
         #[key("above 0 to 1000", check = |x| *x > 0.0 && *x <= MOST_RATE)]
         pub rate: f64 = 2e-3,
-        /// Weight decay: added to the gradient (L2), or, by adamw, a shrinking by the rate times it.
+        /// Weight decay: added to the gradient (L2); with adamw, weights shrink by the rate times it.
         #[key("from 0", check = from_zero)]
         pub weight_decay: f64 = 1e-6,
-        /// The gradient's norm is cut to this.
+        /// Largest norm of the gradient; longer gradients are cut to it.
         #[key("above 0, inf for none", check = |x| *x > 0.0)]
         pub clip: f64 = 1.0,
-        /// Weight of the gap of a joint, in units of noise, beside one observation.
+        /// Weight of the gap between two segments, in units of noise, relative to one observation.
         #[key("from 0", check = from_zero)]
         pub continuity: f64 = 0.1,
-        /// Residuals beyond so many standard deviations count linearly.
+        /// Number of standard deviations beyond which residuals count linearly.
         #[key("above 0, inf for plain squares", check = |x| *x > 0.0)]
         pub huber: f64 = 3.0,
-        /// Part of a Gauss-Newton step that a start takes when it is visited.
+        /// Part of a Gauss-Newton step that an initial condition takes when it is visited.
         #[key("above 0 to 1", check = |x| *x > 0.0 && *x <= 1.0)]
         pub start_share: f64 = 1.0,
-        /// Epochs between two linearisations of the motion by the starts.
+        /// Epochs between two linearisations of the motion by the initial conditions.
         #[key("1 to 2^24", check = count(MOST_EPOCHS))]
         pub curvature_every: usize = 5,
     }
