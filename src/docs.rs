@@ -1,28 +1,28 @@
-//! Pages of the folder `docs`: guides, reference, figures. Their code is tested with the library's.
+//! Pages of the folder `docs`: guides, references, figures. Their code is tested with that of the library.
 //!
 //! | page | for |
 //! |---|---|
 //! | [`commands`] | every command and option of the program, exit codes, files |
-//! | [`many_machines`] | an experiment on a cluster or by many processes: shares, one table |
-//! | [`system_files`] | a system of your own as a text file: Lagrangian or metric, formulas |
+//! | [`many_machines`] | running an experiment on a cluster or in many processes |
+//! | [`system_files`] | describing your own system in a text file, by a Lagrangian or a metric |
 //! | [`configuration`] | every key of `config.toml`, presets |
-//! | [`recorded_motion`] | data of your own: formats, noise, friction, films |
-//! | [`structures`] | black box, mechanical, metric; what is known beforehand; hybrids in Rust |
-//! | [`geometry`] | metric, connection, curvature of a Lagrangian, learned or written down |
-//! | [`black_holes`] | the metric of a black hole learned from free fall, and what is read off it |
-//! | [`symmetries`] | what is conserved: symmetries, charges, what two Lagrangians have in common |
+//! | [`recorded_motion`] | learning from your own data: formats, noise, friction, films |
+//! | [`structures`] | mass matrices and metrics whose signature is built in, cyclic coordinates, known terms |
+//! | [`geometry`] | metric, connection and curvature of a Lagrangian, learned or written down |
+//! | [`black_holes`] | the metric of a black hole learned from free fall, its orbits and its shadow |
+//! | [`symmetries`] | symmetries of a Lagrangian, charges along motion, comparison of two Lagrangians |
 //! | [`constraints`] | constraints beside a Lagrangian, found in data, kept in roll-outs; degenerate Lagrangians |
 //! | [`formula`] | a Lagrangian as a formula, from recorded motion or from a model |
 //! | [`certificates`] | proofs that a mass matrix has its signature |
 //! | [`summary`] | `summary.json` and `evaluation.json`, key by key |
 //! | [`method`] | equations, penalties, identities, units and conventions |
-//! | [`library`] | features, a Lagrangian of your own, states of your own, examples |
+//! | [`library`] | using the Rust crate: features, your own Lagrangian, your own states, examples |
 //! | [`python`] | the Python package; models in JAX, PyTorch and numpy |
 //! | [`model_format`] | `model.safetensors`, readable without this crate |
-//! | [`results`] | five systems by seeds, limits, time to accuracy, what made training exact, the paper's tables |
+//! | [`results`] | accuracy on five systems, limits, time to accuracy, what made training exact, the paper's tables |
 //! | [`accuracy`] | errors of the numerics, run time against error |
-//! | [`performance`] | training steps, evaluations, small matrices, beside PyTorch and JAX |
-//! | [`architecture`] | floors, flow of data, how to add a system, an operation, an integrator |
+//! | [`performance`] | times of training steps, evaluations and small matrices, beside PyTorch and JAX |
+//! | [`architecture`] | flow of data, modules, how to add a system, an operation, an integrator |
 //! | [`building`] | test programs, fuzzing, benchmarks |
 
 /// A page behind the definitions of its links: the first definition of a label counts, so that these, to modules, stand

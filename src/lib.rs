@@ -1,7 +1,7 @@
-//! Stabilized Lagrangian neural networks: learn `L(q, dq/dt)` from motion, predict motion that keeps its energy, read
+//! Stabilized Lagrangian neural networks: learn `L(q, dq/dt)` from motion, predict motion that conserves its energy, and read
 //! physics off the learned function.
 //!
-//! # The way of the data
+//! # Flow of data
 //!
 //! ```text
 //! measured motion  recording::Recording ─┐
@@ -14,43 +14,43 @@
 //!                                rollout (motion) ◄──────────────────────┼──► analysis (errors, exponents), your solver
 //! ```
 //!
-//! Everything that moves by a Lagrangian, learned or written down, is an [`EulerLagrange`](lagrangian::EulerLagrange):
-//! one call gives the terms of a batch of states, and nothing that was not asked for is computed.
+//! Every Lagrangian, learned or written down, is an [`EulerLagrange`](lagrangian::EulerLagrange). One call evaluates the requested
+//! terms of a batch of states, and only those.
 //!
 //! | to | use |
 //! |---|---|
 //! | write a Lagrangian, or take one of the catalogue | [`lagrangian::Lagrangian`], [`lagrangian::systems()`] |
 //! | get `L`, `p`, `M`, `a`, `E` of states | [`lagrangian::EulerLagrange::terms`] |
-//! | know metric, connection and curvature at a point | [`geometry::geometries`] |
+//! | compute the metric, connection and curvature at a point | [`geometry::geometries`] |
 //! | integrate, with error control or symplectically | [`rollout::rollout`], [`rollout::rollout_many`] |
 //! | learn from accelerations | [`presets::Trainer`] (your own [`data::Dataset`]), [`training::run`] (a configuration) |
 //! | learn from recorded motion | `pipeline::Fit` (feature `pipeline`) |
-//! | know every key of a configuration | the page [`docs::configuration`] |
+//! | look up a key of a configuration | the page [`docs::configuration`] |
 //! | minimise your own loss of a network | [`training::Objective`], or [`tape::Recorded`] and [`tape::Evaluation`] below it |
 //! | store and load models | [`network::file::ModelFile`] |
-//! | differentiate a function of yours | [`tape::gradient`], [`tape::hessian`]; over many states [`tape::Program`] |
+//! | differentiate your own function | [`tape::gradient`], [`tape::hessian`]; over many states [`tape::Program`] |
 //! | solve small symmetric systems in batches | [`linalg`] |
 //! | put constraints beside a Lagrangian, find those that recorded motion obeys | [`lagrangian::Constrained`], [`constraints`] |
 //! | find what a Lagrangian conserves, compare two Lagrangians | [`symmetry::symmetries`], [`symmetry::quadratic`], [`symmetry::compare`] |
 //! | read a Lagrangian as a formula, from motion or from a model | [`formula`] |
 //! | see the shadow of a black hole and the sky around it | [`relativity::shadow()`], [`relativity::outline`] |
 //! | prove where a mass matrix has its signature | [`certificate`] |
-//! | judge a model: energy, coordinates, Lyapunov exponents | [`analysis`] |
+//! | test a model: energy, coordinates, Lyapunov exponents | [`analysis`] |
 //! | train, fit, evaluate, run an experiment, with all files and reports | `pipeline` (feature `pipeline`) |
 //!
-//! [`prelude`] holds the names that most programs need. Inside, the modules stand on six floors, `numerics`, `support`, `mechanics`,
-//! `learning`, `physics` and `app`, each of which imports only from those before it.
+//! [`prelude`] holds the names that most programs need. Internally, the modules are arranged on six floors, `numerics`, `support`,
+//! `mechanics`, `learning`, `physics` and `app`, each of which imports only from those before it.
 //!
 //! # Shapes, units, numbers
 //!
-//! A state is `(q, v)`, `v = dq/dt`. A batch of `b` states of `n` coordinates is two slices `(b, n)`, row-major: one
-//! state after the other. Matrices are `(b, n, n)`. Units are SI: m, rad, s, kg, J; angles may be any number of turns. What
-//! a network has learned it returns in the same physical units, `L` up to a factor and a total time derivative, neither of
-//! which moves anything. The number is a parameter of every type: [`f32`], [`f64`] or the double-double [`scalar::Dd`].
+//! A state is `(q, v)`, with `v = dq/dt`. A batch of `b` states of `n` coordinates is two row-major slices `(b, n)`. Matrices are
+//! `(b, n, n)`. Units are SI: m, rad, s, kg, J. Angles may have any number of turns. A learned network returns its results in the
+//! same physical units. Its `L` is determined up to a factor and a total time derivative, neither of which changes the motion. The
+//! number type is a parameter of every type: [`f32`], [`f64`] or the double-double [`scalar::Dd`].
 //!
-//! Nothing here is global: a model, an objective or a roll-out may be used from any thread, several at a time. Threads
-//! are started only where a number of threads is an argument; results do not depend on that number. Errors are
-//! typed, `Send + Sync`, and say which row and which argument; library code does not print and does not end the process.
+//! There is no global state: a model, an objective or a roll-out may be used from several threads at the same time. The library
+//! starts threads only where the number of threads is an argument, and results do not depend on that number. Errors are typed and
+//! `Send + Sync`, and they name the row and the argument. Library code neither prints nor ends the process.
 //!
 //! # Terms of a Lagrangian
 //!
@@ -73,7 +73,7 @@
 //! let expected: f64 = 1.2 * 4.0 - 20.0 * 0.2 / 0.5 + 9.81;
 //! assert!((model.acceleration(&q, &v)?[0] - expected).abs() < 1e-13);
 //!
-//! // Several terms in one pass, into buffers that are used again: later calls allocate nothing.
+//! // Several terms in one pass, into buffers that are reused: later calls allocate nothing.
 //! let mut terms = Terms::default();
 //! model.terms(&q, &v, Request::MASS_MATRIX | Request::ENERGY, &mut terms)?;
 //! assert_eq!(terms.energy.len(), 2);
@@ -91,7 +91,7 @@
 //! let motion = model.rollout(&[2.0, 1.0], &[0.0, 0.0], 5.0, 0.1)?; // 5 s, a sample every 0.1 s
 //! assert_eq!(motion.t.len(), 51);
 //!
-//! // By a method that keeps the energy.
+//! // With a method that conserves the energy.
 //! let options = Options { method: Method::Gauss6, step: Some(0.01), ..Options::new(5.0, 0.1) };
 //! let energy = rollout(&*model, &[2.0, 1.0], &[0.0, 0.0], &options).complete()?.energy.unwrap(); // J, at every sample
 //! assert!(energy.iter().all(|e| (e - energy[0]).abs() < 1e-7));
@@ -117,7 +117,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! States of your own go to [`presets::Trainer`], recordings to `pipeline::Fit`.
+//! To learn from your own states, use [`presets::Trainer`]; to learn from recordings, `pipeline::Fit`.
 //!
 //! # Derivatives by the tape
 //!
@@ -137,9 +137,9 @@
 //! # Ok::<(), lnn::tape::TapeError>(())
 //! ```
 //!
-//! Guides and reference stand in [`docs`]: the command line, configurations, recorded motion, the method, figures with their
-//! commands. Programs that use the crate stand in `examples/`: solvers of other crates, parameter identification by argmin, nalgebra
-//! matrices, batches without allocation, a filmed pendulum.
+//! The module [`docs`] holds guides and references: the command line, configurations, recorded motion, the method, and figures with
+//! their commands. The folder `examples/` holds programs that use the crate: solvers of other crates, parameter identification by
+//! argmin, nalgebra matrices, batches without allocation, a filmed pendulum.
 // What only higher floors use is dead without them; the default features tell what is dead for everybody.
 #![cfg_attr(not(feature = "cli"), allow(dead_code, unused_imports))]
 #![forbid(unsafe_code)]

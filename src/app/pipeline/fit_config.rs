@@ -16,18 +16,18 @@ const MOST_WINDOW: usize = 1_000_001;
 table! {
     /// Everything that determines a fit.
     pub struct FitConfig {
-        /// What is learned from: measured accelerations, smoothed ones, or the motion itself; as the data advise unless set.
+        /// What the fit learns from: measured accelerations, smoothed ones, or the motion itself; chosen by the data unless set.
         #[key("measured, smoothed, motion", example = "\"smoothed\"", flag = "targets")]
         #[serde(skip_serializing_if = "Option::is_none")]
         pub targets: Option<Targets> = None,
-        /// Share of the samples held out to judge the model; 0: none.
+        /// Share of the samples that is held out to test the model; 0 for none.
         #[key("0 to below 1", example = "0.2", flag = "hold-out", check = |x| (0.0..1.0).contains(x))]
         pub held_out: f64 = HELD_OUT,
         /// Length of the smoothing windows; chosen unless set.
         #[key("an odd number of samples", example = "21", flag = "window", check = count(MOST_WINDOW))]
         #[serde(skip_serializing_if = "Option::is_none")]
         pub window: Option<usize> = None,
-        /// Noise of every coordinate; estimated unless set.
+        /// Standard deviation of the noise of every coordinate; estimated unless set.
         #[key("in SI units", example = "[0.01, 0.01]", flag = "noise", check = positive)]
         #[serde(skip_serializing_if = "Option::is_none")]
         pub noise: Option<Vec<f64>> = None,
@@ -35,7 +35,7 @@ table! {
         #[key("above 0, in s", example = "0.5", flag = "horizon", check = positive)]
         #[serde(skip_serializing_if = "Option::is_none")]
         pub horizon: Option<f64> = None,
-        /// The files and what their columns mean, as the options of the same names say it.
+        /// The files and the meaning of their columns, as in the options of the same names.
         #[table("recording", Below::Keys(FitColumns::KEYS))]
         pub recording: FitColumns = FitColumns::default(),
         /// Multiple shooting, for a fit to the motion itself.
@@ -70,7 +70,7 @@ table! {
         #[key("columns", example = "[\"f1\", \"f2\"]")]
         #[serde(skip_serializing_if = "Vec::is_empty")]
         pub force: Vec<String> = Vec::new(),
-        /// Column of time.
+        /// Column of the time.
         #[key("a column", example = "\"t\"")]
         #[serde(skip_serializing_if = "Option::is_none")]
         pub time: Option<String> = None,
@@ -78,7 +78,7 @@ table! {
         #[key("above 0, in samples per second", example = "100.0", check = positive)]
         #[serde(skip_serializing_if = "Option::is_none")]
         pub rate: Option<f64> = None,
-        /// Column whose value tells the trajectories of a file apart.
+        /// Column whose value distinguishes the trajectories of a file.
         #[key("a column", example = "\"run\"")]
         #[serde(skip_serializing_if = "Option::is_none")]
         pub trajectory: Option<String> = None,
