@@ -13,6 +13,8 @@ mod tape;
 
 #[path = "cost/main.rs"]
 mod cost;
+#[path = "open_tables/main.rs"]
+mod open_tables;
 #[path = "peers/main.rs"]
 mod peers;
 #[path = "work_precision.rs"]
@@ -31,4 +33,5 @@ fn main() {
     formula::trial();
     work_precision::trial();
     constraints::trial();
+    open_tables::trial();
 }

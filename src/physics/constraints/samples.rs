@@ -66,6 +66,32 @@ impl MotionSamples {
         Ok(samples)
     }
 
+    /// Of a recording of exact states, positions and velocities, whose trajectories may be of any length.
+    ///
+    /// # Errors
+    /// [`SmoothError::Shape`] of a trajectory without velocities.
+    pub fn exact(recording: &Recording) -> Result<Self, SmoothError> {
+        let n = recording.n();
+        let mut samples = Self {
+            names: recording.coordinates.clone(),
+            periodic: recording.periodic.clone(),
+            position_noise: vec![0.0; n],
+            shared: 1.0,
+            ..Self::default()
+        };
+        for track in recording.tracks.iter().filter(|track| !track.is_empty()) {
+            if [track.q.len(), track.v.len()] != [track.len() * n; 2] {
+                return Err(SmoothError::Shape { track: track.name.clone(), n });
+            }
+            samples.starts.push(samples.len());
+            for (q, v) in track.q.chunks_exact(n).zip(track.v.chunks_exact(n)) {
+                samples.states.extend(q.iter().chain(v));
+                samples.velocity_noise.extend(vec![0.0; n]);
+            }
+        }
+        Ok(samples)
+    }
+
     /// Number of coordinates.
     pub fn n(&self) -> usize {
         self.names.len()
