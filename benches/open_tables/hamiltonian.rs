@@ -6,7 +6,7 @@
 use lnn::data::Dataset;
 use lnn::lagrangian::{EulerLagrange, Lagrangian, Mechanics};
 use lnn::network::Structure;
-use lnn::pipeline::Fit;
+use lnn::pipeline::{Fit, FitReport};
 use lnn::presets::Trainer;
 use lnn::recording::{RecordedTrajectory, Recording};
 use lnn::rollout::{Options, rollout_many};
@@ -203,13 +203,19 @@ fn run(row: &Row, seed: u64, share: f64, steps: usize) -> (f64, f64) {
             (track.name, track.a) = (format!("motion {k}"), vec![]);
         }
         let recording = Recording { coordinates: vec!["q".into()], periodic: vec![false], tracks };
-        let fit = Fit::recording(recording).structure(Structure::Mechanical).seed(seed).threads(threads);
-        let fitted = fit.configure(move |config| {
-            if share < 1.0 {
-                config.training.phases[0].epochs = 2;
-            }
-        });
-        Box::new(fitted.run().expect("enough motion").network)
+        let fitted = |structure| {
+            let fit = Fit::recording(recording.clone()).structure(structure).seed(seed).threads(threads);
+            let fit = fit.configure(move |config| {
+                if share < 1.0 {
+                    config.training.phases[0].epochs = 2;
+                }
+            });
+            fit.run().expect("enough motion")
+        };
+        // Held-out motion decides whether the mass is a constant.
+        let both = [Structure::ConstantMass, Structure::Mechanical].map(fitted).into_iter();
+        let off = |fit: &FitReport| fit.hold_out.model.iter().map(|spread| spread.median).sum::<f64>();
+        Box::new(both.min_by(|a, b| off(a).total_cmp(&off(b))).expect("two").network)
     } else {
         let part = |of: fn(&RecordedTrajectory) -> &[f64]| tracks.iter().flat_map(|t| of(t).iter().copied()).collect();
         let (q, v, a): (Vec<f64>, Vec<f64>, Vec<f64>) = (part(|t| &t.q), part(|t| &t.v), part(|t| &t.a));
