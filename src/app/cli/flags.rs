@@ -22,7 +22,7 @@ pub trait Flagged {
 impl Flagged for Config {
     const KEYS: &'static [Key] = Self::KEYS;
     // The system is an argument, and knows its time and whether it has friction.
-    const WITHOUT: &'static [&'static str] = &["name", "timelike", "friction"];
+    const WITHOUT: &'static [&'static str] = &["name", "timelike", "friction", "joint-friction"];
 }
 
 impl Flagged for FitConfig {

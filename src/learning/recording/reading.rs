@@ -118,18 +118,28 @@ pub enum Targets {
     Measured,
     /// Accelerations by local polynomials.
     Smoothed,
+    /// Known forces: what they are for measured accelerations, or for those by local polynomials.
+    Forces,
     /// The motion itself, from the network that smoothed or measured accelerations give.
     Motion,
 }
 
 impl Targets {
-    /// The way that suits the data: measured accelerations if there are any, smoothed ones if they are good to
-    /// `LARGE_ERROR`, the motion itself if not. `error` is that of smoothed accelerations over their size.
-    pub(crate) fn advised(has_accelerations: bool, error: f64) -> Self {
-        if has_accelerations {
+    /// `true` if measured accelerations are taken where there are any.
+    pub(crate) fn takes_measured(self) -> bool {
+        matches!(self, Self::Measured | Self::Forces)
+    }
+
+    /// The way that suits the data: measured accelerations if there are any, smoothed ones if they are good to `LARGE_ERROR`; if not,
+    /// known forces where every coordinate has one, and else the motion itself. `error` is that of smoothed accelerations over their
+    /// size.
+    pub(crate) fn advised(recording: &Recording, error: f64) -> Self {
+        if recording.has_accelerations() {
             Self::Measured
         } else if error <= LARGE_ERROR {
             Self::Smoothed
+        } else if recording.is_driven() {
+            Self::Forces
         } else {
             Self::Motion
         }
