@@ -8,7 +8,7 @@ use serde::Serialize;
 
 /// Mean squared error of a force over its variance up to which it is well learned, and above which it is not learned.
 const WELL: f64 = 0.05;
-pub(crate) const FAILED: f64 = 0.3;
+const FAILED: f64 = 0.3;
 
 /// Error of the force of one coordinate.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -35,8 +35,7 @@ impl ForceError {
 
     /// `true` for a force that the model does not give.
     pub(crate) fn is_lost(&self) -> bool {
-        // NaN is lost.
-        !(self.nmse <= FAILED)
+        self.nmse.is_nan() || self.nmse > FAILED
     }
 }
 

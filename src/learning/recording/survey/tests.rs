@@ -56,6 +56,19 @@ fn loud_noise_calls_for_shooting() {
 }
 
 #[test]
+fn loud_noise_under_known_forces_calls_for_these() {
+    let driven = |force: fn(usize) -> f64| {
+        let mut recording = swing(0.3, 100.0, None);
+        let track = &mut recording.tracks[0];
+        track.force = (0..track.q.len()).map(force).collect();
+        look(recording).targets
+    };
+    assert_eq!(driven(|k| (0.01 * k as f64).sin()), Targets::Forces);
+    // A force that never changes could as well be part of L.
+    assert_eq!(driven(|_| 1.0), Targets::Motion);
+}
+
+#[test]
 fn coarse_sampling_is_told() {
     let found = look(swing(1e-4, 8.0, None));
     assert!(found.warnings.iter().any(|w| w.contains("samples per period")), "{:?}", found.warnings);
