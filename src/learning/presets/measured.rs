@@ -16,6 +16,14 @@ const STEPS_BY_FORCES: usize = 10_000;
 /// of many coordinates, and what is learned of them has to be smooth.
 const BY_FORCES: ([usize; 3], f64) = ([64; 3], 0.3);
 
+/// Changes the structure of a configuration that suits recorded motion: a black box in place of another one has its usual penalty.
+pub(crate) fn restructure(config: &mut Config, structure: Structure) {
+    if structure == Structure::BlackBox && config.network.structure != Structure::BlackBox {
+        config.penalty = Config::default().penalty;
+    }
+    config.take_structure(structure);
+}
+
 /// Configuration of a training from these states: the network and the rates of the quick preset, 30,000 steps in whole epochs.
 ///
 /// From known forces another one is learned: kinetic energy and potential with the friction of every coordinate, smaller and with

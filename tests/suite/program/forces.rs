@@ -242,6 +242,8 @@ fn the_torques_of_a_motion_are_asked_for() {
     assert!(
         (row["external_force"][0].as_f64().unwrap() - 2.0 * row["external_force"][1].as_f64().unwrap()).abs() < 1e-12
     );
+    assert_eq!(row["gravity_force"], row["external_force"]);
+    assert!(["inertial_force", "coriolis_force"].iter().all(|part| row[part][0].as_f64() == Some(0.0)), "{row:?}");
     // Rows that fail say why, the others are as they are alone.
     let mixed = std::fs::read_to_string(&level).unwrap() + "0,1,1e200,0,0,0\n" + "1,1,0,0,0,0\n" + "0,1,0,1e200,0,0\n";
     let run =
