@@ -38,7 +38,7 @@ macro_rules! page {
             "[summary]: crate::docs::summary\n",
             "[presets]: crate::docs::configuration#presets\n",
             "[recorded-motion]: crate::docs::recorded_motion\n",
-            "[recorded]: crate::docs::recorded_motion#three-ways-to-learn\n",
+            "[recorded]: crate::docs::recorded_motion#ways-to-learn\n",
             "[structures]: crate::docs::structures\n",
             "[grey-boxes]: crate::docs::structures#grey-boxes\n",
             "[ranges]: crate::docs::recorded_motion#how-well-the-data-determine-the-model\n",

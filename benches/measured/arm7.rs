@@ -82,7 +82,7 @@ pub fn compare(
         std::fs::write(&file, log(seconds, Faults::USUAL, seed)).expect("room for a log");
         let truth = held_out(seed, seconds);
         for targets in [Targets::Forces, Targets::Smoothed] {
-            let [joints, torques] = ["q", "tau"].map(|prefix| names(prefix));
+            let [joints, torques] = ["q", "tau"].map(names);
             let fit = Fit::new(&file).targets(targets).threads(threads).columns(|columns| {
                 columns.coords = joints.clone();
                 (columns.periodic, columns.force, columns.time) = (joints, torques, Some("t".to_string()));
