@@ -347,7 +347,8 @@ fn noisy_motion_under_known_torques_is_learned_by_its_forces() {
     assert!(!fs::read_to_string(folder.path("other/config.toml")).unwrap().contains("joint_friction"));
     // Accelerations can be had, too: then no force judges.
     let smoothed = text(&folder.path("smoothed"));
-    assert_eq!(fit(&["--out", &smoothed, "--targets", "smoothed"]).code, Some(0));
+    assert_eq!(fit(&["--out", &smoothed, "--targets", "smoothed", "--joint-friction"]).code, Some(0));
+    assert!(fs::read_to_string(folder.path("smoothed/config.toml")).unwrap().contains("joint_friction = \"dry\""));
     let summary: Value = serde_json::from_slice(&fs::read(folder.path("smoothed/summary.json")).unwrap()).unwrap();
     assert!(summary["targets"] == "smoothed" && summary.get("force_errors").is_none());
 
