@@ -259,7 +259,7 @@ fn advice(text: &mut String, found: &Survey) -> std::fmt::Result {
         )?,
         Targets::Forces => writeln!(
             text,
-            "advice: learn from the known forces: accelerations by smoothing are good to {}, no better than {limit}",
+            "advice: learn from the known forces, which are noisier than the accelerations by smoothing, good to {}",
             percent(worst)
         )?,
         Targets::Motion => writeln!(

@@ -2,12 +2,11 @@
 
 use crate::data::dataset::{Dataset, DatasetError};
 use crate::network::Sizes;
+use crate::recording::INERTIAL;
 use crate::scalar::Scalar;
 
 /// Share of the spread of a force that counts as its error beside all noise: no model follows it closer.
 const MISSED: f64 = 0.1;
-/// Share of the spread of a force that accelerates, when the size of an inertia is looked for.
-const INERTIAL: f64 = 0.5;
 
 /// Mean, standard deviation and root mean square of column `i` of `(states, n)` numbers.
 fn moments<S: Scalar>(values: &[S], n: usize, i: usize) -> [f64; 3] {

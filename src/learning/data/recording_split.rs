@@ -214,7 +214,7 @@ impl RecordingSplit {
 
     /// The way that suits the data.
     pub(crate) fn advice(&self) -> Targets {
-        Targets::advised(&self.training.recording, self.smoothing.acceleration_error())
+        Targets::advised(&self.training.recording, &self.smoothing)
     }
 
     /// States and accelerations for a supervised training, validation and test; where nothing is held out, the test is the

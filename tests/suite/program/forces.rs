@@ -298,15 +298,16 @@ fn a_model_fitted_through_its_motion_has_its_own_losses() {
     assert!(before.fold(f64::INFINITY, f64::min) != validation);
 }
 
-/// A few runs with noisy positions alone, whose smoothed accelerations are worse than a tenth: the torques are what is learned from.
+/// A few runs with noisy torques, noisier than the accelerations: the torques are what is learned from.
 #[test]
-fn noisy_motion_under_known_torques_is_learned_by_its_forces() {
+fn motion_under_noisy_torques_is_learned_by_its_forces() {
     let folder = Folder::new();
     let mut rng = ChaCha8Rng::seed_from_u64(5);
     let mut noisy = |line: &String| {
         let numbers: Vec<f64> = line.split(',').map(|x| x.parse().unwrap()).collect();
-        let [upper, lower] = [numbers[2], numbers[3]].map(|q| q + rng.random_range(-0.08..0.08));
-        format!("{},{},{upper},{lower},{},{}", numbers[0], numbers[1], numbers[8], numbers[9])
+        let [upper, lower] = [numbers[2], numbers[3]].map(|q| q + rng.random_range(-0.002..0.002));
+        let [shoulder, elbow] = [numbers[8], numbers[9]].map(|torque| torque + rng.random_range(-1.0..1.0));
+        format!("{},{},{upper},{lower},{shoulder},{elbow}", numbers[0], numbers[1])
     };
     let lines: Vec<String> = runs(12).iter().flatten().map(&mut noisy).collect();
     let data = folder.file("noisy.csv", format!("run,t,upper,lower,shoulder,elbow\n{}\n", lines.join("\n")));

@@ -56,16 +56,20 @@ fn loud_noise_calls_for_shooting() {
 }
 
 #[test]
-fn loud_noise_under_known_forces_calls_for_these() {
-    let driven = |force: fn(usize) -> f64| {
-        let mut recording = swing(0.3, 100.0, None);
+fn noisy_forces_are_learned_from_and_exact_ones_are_not() {
+    let driven = |sigma: f64, force: fn(usize) -> f64| {
+        let mut recording = swing(sigma, 100.0, None);
         let track = &mut recording.tracks[0];
         track.force = (0..track.q.len()).map(force).collect();
         look(recording).targets
     };
-    assert_eq!(driven(|k| (0.01 * k as f64).sin()), Targets::Forces);
+    let smooth = |k: usize| (0.01 * k as f64).sin();
+    let noisy = |k: usize| (0.01 * k as f64).sin() + 0.3 * (1e4 * (k as f64).sin()).sin();
+    assert_eq!(driven(1e-3, noisy), Targets::Forces);
+    assert_eq!(driven(1e-3, smooth), Targets::Smoothed);
+    assert_eq!(driven(0.3, smooth), Targets::Motion);
     // A force that never changes could as well be part of L.
-    assert_eq!(driven(|_| 1.0), Targets::Motion);
+    assert_eq!(driven(1e-3, |_| 1.0), Targets::Smoothed);
 }
 
 #[test]
