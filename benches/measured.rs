@@ -9,13 +9,20 @@
 //!
 //! And made orbits around a black hole with noise, of which the hole is read.
 //!
+//! And a made log of a seven-joint arm, learned by its torques.
+//!
 //! `cargo bench --bench measured -- --part films FILM.csv...` takes films as `examples/pendulum_video.rs` does, 400 frames a second;
 //! without files those of Asseman, Kornuta and Ozcan ("Learning beyond simulated physics", 2018) if they stand in
 //! `../shared/data/ibm-double-pendulum`; gravity pulls along the x axis of these pictures. Every film is a recording of its own: the first four fifths are learned from, the
 //! rest is predicted, 0.5 s at a time. `-- --part noise` is the made motion, `-- --part rows` reads and surveys ten million
 //! rows and says what that took, `-- --part textbook` the films without what has to be trained, `-- --part determination` the
-//! small systems, some minutes, `-- --part orbits` orbits around a hole, a quarter of an hour; without `--part` all. Writes `films.csv`, `noise.csv`, `determination.csv` and `orbits.csv` into `target/measured`.
+//! small systems, some minutes, `-- --part orbits` orbits around a hole, a quarter of an hour, `-- --part arm7` the arm, some minutes; without `--part` all. Writes `films.csv`, `noise.csv`, `determination.csv`, `orbits.csv` and `arm7.csv` into `target/measured`.
 
+#[allow(dead_code)]
+#[path = "shared/arm.rs"]
+pub mod arm;
+#[path = "measured/arm7.rs"]
+mod arm7;
 #[path = "measured/determination.rs"]
 mod determination;
 #[path = "measured/noise.rs"]
@@ -60,7 +67,7 @@ const AHEAD: [f64; 4] = [0.125, 0.25, 0.375, HORIZON];
 const THREADS: usize = 2;
 
 /// What can be measured.
-const PARTS: &[&str] = &["rows", "noise", "films", "textbook", "determination", "orbits"];
+const PARTS: &[&str] = &["rows", "noise", "films", "textbook", "determination", "orbits", "arm7"];
 
 /// Seeds of the small systems: those before them served to choose.
 const SEEDS: std::ops::Range<u64> = 20..40;
@@ -214,6 +221,7 @@ pub fn trial() {
     assert_eq!(determination::compare(0..1, (4, 3.0), scale).len(), 5 + 6 + 3 + 3 + 5 + 3);
     assert_eq!(orbits::compare(&[(6, 0.001)], true, (Some(1), 1)).len(), 15);
     let place = tempfile::tempdir().expect("a folder");
+    assert_eq!(arm7::compare(0..1, 4.0, place.path(), (Some(1), 1)).len(), 2 * 7);
     let found = rows::time(&place.path().join("rows.csv"), 2000);
     assert_eq!((found.samples, found.cuts.len(), found.warnings.len()), (2000, 0, 0));
 }
@@ -256,6 +264,11 @@ fn main() {
         let rows = orbits::compare(&cases, true, (None, THREADS));
         let csv = format!("learned_by,orbits,noise,quantity,error,seconds\n{}\n", rows.join("\n"));
         std::fs::write(folder.join("orbits.csv"), csv).expect("room for the results");
+    }
+    if parts.iter().any(|part| part == "arm7") {
+        let rows = arm7::compare(0..3, 20.0, &folder, (None, THREADS));
+        let csv = format!("seed,learned_from,joint,nmse,inertia\n{}\n", rows.join("\n"));
+        std::fs::write(folder.join("arm7.csv"), csv).expect("room for the results");
     }
     if parts.iter().any(|part| part == "films") {
         std::fs::write(folder.join("films.csv"), filmed(films, Some(scale))).expect("room for the results");

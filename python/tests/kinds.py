@@ -71,6 +71,8 @@ def shapes(net):
     if units := net.get("dissipation"):
         found |= {"dissipation.gamma": (units,), "dissipation.weight": (units, features)}
         found["dissipation.direction"] = (units, n)
+    if form.get("joint_friction", "none") != "none":
+        found["joint_friction"] = ({"dry": 3, "stribeck": 5}[form["joint_friction"]], n)
     if form.get("learn_alpha"):
         found["alpha"] = (1,)
     if form["structure"] == "constant-mass":
@@ -106,6 +108,9 @@ def kinds():
     add("input layer", net(input_layer="dyt"))
     add("input layers of a hybrid", net(input_layer="dyt", activation="quadratic-softplus"))
     add("friction", net(dissipation=3))
+    add("joint friction", form(joint_friction="dry"))
+    sizes = {"velocity": [1.5, 0.25, 3.0], "potential": 7.0, "friction": [0.5, 2.0, 1.25]}
+    add("joint friction beside friction", net(dissipation=3), form(joint_friction="stribeck", sizes=sizes))
     add("forces", lambda header: header.update(forces=["f_theta", "f_x", "f_y"]))
     for structure, factor, time in [
         ("black-box", "triangle", None),
@@ -122,6 +127,7 @@ def kinds():
         shape = [form(structure=structure, factor=factor)] + ([] if time is None else [net(time_like=time)])
         kind = f"{structure}, {factor}, time {time}"
         add(kind, *shape)
+        add(f"{kind}, sizes", *shape, form(sizes=sizes))
         add(f"{kind}, even", *shape, form(even_in_v=True))
         add(f"{kind}, cyclic", *shape, form(cyclic=[0, 2]))
         add(f"{kind}, radial", *shape, form(radial=[{"coordinates": [2, 1], "unit": 1.25}]))

@@ -21,6 +21,8 @@ FORM = {
     "learn_alpha": None,
     "radial": {"coordinates": None, "unit": None},
     "known": KNOWN,
+    "joint_friction": ["none", "dry", "stribeck"],
+    "sizes": {"velocity": None, "potential": None, "friction": None},
 }
 ARCHITECTURE = {
     **dict.fromkeys(["coordinates", "hidden", "alpha", "time_like", "scale", "periodic", "embed_periodic", "dissipation"]),

@@ -24,6 +24,8 @@ class NetworkModel:
         self.form |= architecture.get("form", {})
         known = self.form.get("known")
         self.known = None if known is None else Described(known)
+        ones = [1.0] * self.n
+        self.sizes = self.form.get("sizes") or {"velocity": ones, "potential": 1.0, "friction": ones}
 
     def wrap(self, xp, q):
         """Angles reduced to [0, 2 pi)."""
@@ -94,35 +96,48 @@ class NetworkModel:
         """L, ``(...)``, in the unit of the network."""
         form, q = self.form, self.wrap(xp, q)
         features, w = self.features(xp, q), v / xp.constant(np.array(self.net["scale"]))
+        moving, potential = w * xp.constant(np.array(self.sizes["velocity"])), self.sizes["potential"]
         if form["structure"] == "metric":
-            value = self.half_form(xp, self.outputs(xp, weights, features), w, self.time)
+            value = self.half_form(xp, self.outputs(xp, weights, features), moving, self.time)
         elif form["structure"] in ("mechanical", "constant-mass"):
             outputs, n = self.outputs(xp, weights, features), self.n
             # The numbers of a constant factor are parameters beside the network.
             constant = form["structure"] == "constant-mass"
             count = 0 if constant else n * (n + 1) // 2 if form["factor"] == "triangle" else 3 * n**2
             numbers = weights["mass"] if constant else outputs[..., :count]
-            value = self.half_form(xp, numbers, w, None) - outputs[..., count]
+            value = self.half_form(xp, numbers, moving, None) - potential * outputs[..., count]
             # An even Lagrangian has no vector potential.
             if not form.get("even_in_v"):
-                value = value + xp.sum(outputs[..., count + 1 :] * w, -1)
+                value = value + xp.sum(outputs[..., count + 1 :] * moving, -1)
         else:
             output = lambda w: self.outputs(xp, weights, xp.concatenate([features, w]))[..., 0]
             value = 0.5 * (output(w) + output(-w)) if form.get("even_in_v") else output(w)
             alpha = weights["alpha"][0] if form.get("learn_alpha") else self.net["alpha"]
-            value = value + alpha * xp.sum(w * w * xp.constant(signs(self.n, self.time)), -1)
+            value = potential * value + alpha * xp.sum(moving * moving * xp.constant(signs(self.n, self.time)), -1)
         if self.known is None:
             return value
         return value + self.known.evaluate(xp, self.known.constants(xp, weights.get("known", ())), q, v)
 
     def dissipation(self, xp, weights, q, v):
         """D, ``(...)``, whose force is -dD/dv; None for a model without."""
+        total, w = None, v / xp.constant(np.array(self.net["scale"]))
+        if self.form.get("joint_friction", "none") != "none":
+            total = self.joint_friction(xp, weights["joint_friction"], w)
         if not self.net.get("dissipation"):
-            return None
-        features = self.features(xp, self.wrap(xp, q))
-        along = (v / xp.constant(np.array(self.net["scale"]))) @ weights["dissipation.direction"].T
+            return total
+        features, along = self.features(xp, self.wrap(xp, q)), w @ weights["dissipation.direction"].T
         strength = xp.softplus(weights["dissipation.gamma"] + features @ weights["dissipation.weight"].T)
-        return xp.sum(strength * xp.log_cosh(along), -1)
+        value = xp.sum(strength * xp.log_cosh(along), -1)
+        return value if total is None else total + value
+
+    def joint_friction(self, xp, rows, w):
+        """The dissipation that every coordinate has by itself."""
+        knee = xp.exp(rows[2])
+        value = xp.softplus(rows[0]) * w * w / 2 + xp.softplus(rows[1]) * knee * xp.log_cosh(w / knee)
+        if self.form["joint_friction"] == "stribeck":
+            fall = xp.exp(rows[4])
+            value = value + xp.softplus(rows[3]) * fall * (1 - xp.exp(-((w / fall) * (w / fall))))
+        return xp.sum(value * xp.constant(np.array(self.sizes["friction"])), -1)
 
 
 def positive(xp, x):

@@ -144,10 +144,10 @@ fn headline(found: &Survey) -> String {
     };
     let good = match found.targets {
         Targets::Measured => "the accelerations are measured".to_string(),
-        Targets::Smoothed | Targets::Motion if worst.is_finite() => {
+        Targets::Smoothed | Targets::Forces | Targets::Motion if worst.is_finite() => {
             format!("smoothing gives the accelerations to {}", percent(worst))
         }
-        Targets::Smoothed | Targets::Motion => "smoothing gives no accelerations".to_string(),
+        Targets::Smoothed | Targets::Forces | Targets::Motion => "smoothing gives no accelerations".to_string(),
     };
     format!("A fit can learn from these data: {good}, {looked}.\n\n")
 }
@@ -255,6 +255,11 @@ fn advice(text: &mut String, found: &Survey) -> std::fmt::Result {
             "advice: learn from smoothed derivatives (polynomials of degree {}): their accelerations are good to {}, \
              better than {limit}",
             found.degree,
+            percent(worst)
+        )?,
+        Targets::Forces => writeln!(
+            text,
+            "advice: learn from the known forces, which are noisier than the accelerations by smoothing, good to {}",
             percent(worst)
         )?,
         Targets::Motion => writeln!(

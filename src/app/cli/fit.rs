@@ -33,6 +33,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         PipelineError::NoAccelerations => {
             CliError::usage(format_args!("--targets measured: {error}, see --acceleration"))
         }
+        PipelineError::NoForces => CliError::usage(format_args!("--targets forces: {error}, see --force")),
         _ => error.into(),
     })?;
     prepared.check_horizon(plan.config.horizon).map_err(|fault| CliError::usage(format_args!("--{fault}")))?;

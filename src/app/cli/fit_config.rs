@@ -11,6 +11,7 @@ use crate::cli::run_args::{RunArgs, fill_periods, imply, structure};
 use crate::configuration::{Config, Data, Regularizer};
 use crate::network::{Initialization, Structure};
 use crate::pipeline::{FitColumns, FitConfig, FitOptions, PreparedFit, StartModel, shorten};
+use crate::presets::restructure;
 use crate::recording::Targets;
 use crate::shooting::Shooting;
 use crate::training::LATEST;
@@ -251,7 +252,7 @@ impl<'a> Plan<'a> {
                 Regularizer::LorentzianSylvester { lambda: training.penalty.lambda(), time: time.clone() };
         }
         if let Some(structure) = structure(&self.layers, TRAINING) {
-            training.take_structure(structure);
+            restructure(&mut training, structure);
         }
         if let Some(from) = self.layers.text("training.from") {
             StartModel::read(from)?.shape(&mut training);

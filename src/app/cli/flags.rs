@@ -22,7 +22,7 @@ pub trait Flagged {
 impl Flagged for Config {
     const KEYS: &'static [Key] = Self::KEYS;
     // The system is an argument, and knows its time and whether it has friction.
-    const WITHOUT: &'static [&'static str] = &["name", "timelike", "friction"];
+    const WITHOUT: &'static [&'static str] = &["name", "timelike", "friction", "joint-friction"];
 }
 
 impl Flagged for FitConfig {
@@ -73,7 +73,9 @@ impl Flag {
             Some(names) => argument.value_parser(Names(names)).hide_possible_values(true),
             None => argument,
         };
-        if key.flag.ends_with('?') { argument.num_args(0..=1).default_missing_value(key.example) } else { argument }
+        // The example is TOML, the text of an option has no quotes.
+        let usual = key.example.trim_matches('"');
+        if key.flag.ends_with('?') { argument.num_args(0..=1).default_missing_value(usual) } else { argument }
     }
 
     /// The value of its text.

@@ -4,7 +4,7 @@ use crate::cli::shown::{CHUNK, Field, Format, Shape, explain, report_failures, s
 use crate::cli::source::Source;
 use crate::cli::states::{column_names, parse_table};
 use crate::cli::{CliError, input, json, output, states};
-use crate::lagrangian::{InverseDynamics, inverse_dynamics_by_rows};
+use crate::lagrangian::{ForceParts, InverseDynamics, force_parts_by_rows, inverse_dynamics_by_rows};
 use crate::scalar::Scalar;
 use std::path::Path;
 
@@ -40,11 +40,15 @@ pub fn inverse<S: Scalar>(path: &Path, format: Format, source: &Source<S>) -> Re
         let (q, v, a) = (part(0..n), part(n..2 * n), part(2 * n..3 * n));
         let times: Vec<S> = if timed { part(3 * n..3 * n + 1) } else { Vec::new() };
         let (forces, failed) = inverse_dynamics_by_rows(source.model.as_ref(), &q, &v, &a).map_err(|e| refused(&e))?;
+        let parts = match format {
+            Format::Csv => None,
+            _ => Some(force_parts_by_rows(source.model.as_ref(), &q, &v, &a).map_err(|e| refused(&e))?.0),
+        };
         let mut failed = failed.into_iter().peekable();
         let mut text = String::new();
         for (k, &row) in rows.iter().enumerate() {
             let problem = failed.next_if(|failure| failure.row() == Some(k)).map(explain);
-            text += &line(format, row, n, k, &forces, times.get(k), problem.as_deref());
+            text += &line(format, row, n, k, (&forces, parts.as_ref()), times.get(k), problem.as_deref());
             failures.extend(problem.map(|problem| (row, problem)));
         }
         output::print(&text)?;
@@ -58,7 +62,7 @@ fn line<S: Scalar>(
     row: usize,
     n: usize,
     k: usize,
-    forces: &InverseDynamics<S>,
+    (forces, parts): (&InverseDynamics<S>, Option<&ForceParts<S>>),
     time: Option<&S>,
     problem: Option<&str>,
 ) -> String {
@@ -73,6 +77,11 @@ fn line<S: Scalar>(
     let mut fields = vec![vector("generalized_force", &all[..]), vector("external_force", &external)];
     if !friction.is_empty() {
         fields.insert(1, vector("friction", &friction));
+    }
+    let split = parts.map(|parts| [&parts.inertial, &parts.coriolis, &parts.gravity].map(|values| part(values)));
+    if let Some([inertial, coriolis, gravity]) = &split {
+        let split = [("inertial_force", inertial), ("coriolis_force", coriolis), ("gravity_force", gravity)];
+        fields.extend(split.map(|(name, values)| vector(name, values)));
     }
     show(format, row, &fields, problem)
 }

@@ -214,6 +214,10 @@ fn withheld(misfit: &BTreeMap<String, f64>, hold_out: &HoldOut, held_out: bool) 
              only where what is missed is noise"
         ));
     }
+    let lost: Vec<&str> = hold_out.force_errors.iter().filter(|e| e.is_lost()).map(|e| e.name.as_str()).collect();
+    if !lost.is_empty() {
+        return Some(format!("on {motion} the model does not give the force of {}", lost.join(", ")));
+    }
     let fails = hold_out.is_better() == Some(false);
     fails.then(|| format!("the model predicts {motion} no better than constant velocity"))
 }

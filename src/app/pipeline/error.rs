@@ -38,6 +38,9 @@ pub enum PipelineError {
     /// Measured accelerations asked for where none were given.
     #[error("no accelerations were given")]
     NoAccelerations,
+    /// Forces asked for where a coordinate has none.
+    #[error("not every coordinate has a known force that changes")]
+    NoForces,
     /// A shape of the network that contradicts itself.
     #[error(transparent)]
     Network(#[from] NetworkError),
@@ -152,7 +155,7 @@ impl PipelineError {
     /// `true` if the configuration is at fault, and not data, files or the machine.
     pub(crate) fn is_configuration(&self) -> bool {
         match self {
-            Self::Config(_) | Self::System(_) | Self::Network(_) | Self::NoAccelerations => true,
+            Self::Config(_) | Self::System(_) | Self::Network(_) | Self::NoAccelerations | Self::NoForces => true,
             Self::Sampling(error) => !matches!(error, SamplingError::Dataset(_) | SamplingError::Interrupted),
             Self::OtherShape { configuration, .. } => *configuration,
             _ => false,

@@ -1,12 +1,13 @@
 //! A fit of recorded motion: learning, judgement by motion that was held out, files.
 
 use crate::configuration::Precision;
-use crate::data::{Datasets, RecordingSplit};
+use crate::data::{Datasets, RecordingSplit, sizes};
 use crate::network::file::{Header, ModelFile, StoredPrecision};
-use crate::network::{Architecture, Layout, NetworkLagrangian};
+use crate::network::{Architecture, Form, Layout, NetworkLagrangian};
 use crate::pipeline::determination::Determined;
 use crate::pipeline::fit_config::FitConfig;
 use crate::pipeline::fit_summary::Found;
+use crate::pipeline::force_errors::force_errors;
 use crate::pipeline::hold_out::{HoldOut, HoldOutOptions, evaluate_hold_out};
 use crate::pipeline::losses::LossStates;
 use crate::pipeline::model::trained_on;
@@ -102,6 +103,13 @@ fn fit_in<S: Scalar>(
         }
         None => (shaped(data.training[0].physical_scale()), None),
     };
+    let architecture = match (targets, &config.from) {
+        (Targets::Forces, None) => {
+            let sizes = sizes(&data.training[0], &architecture.scale);
+            Architecture { form: Form { sizes: Some(sizes), ..architecture.form }, ..architecture }
+        }
+        _ => architecture,
+    };
     architecture.validate()?;
     let floor = config.data.acceleration_weighting;
     if floor > 0.0 {
@@ -167,7 +175,11 @@ fn fit_in<S: Scalar>(
     };
     let (part, horizon) = (&measured.test, fit_config.horizon);
     let held_out = HoldOutOptions { part, horizon, time, forces: &forces, threads };
-    let hold_out = evaluate_hold_out(&network, &held_out, watch)?;
+    let mut hold_out = evaluate_hold_out(&network, &held_out, watch)?;
+    if *targets == Targets::Forces && !part.states.is_empty() {
+        let test = measured.datasets::<f64>(*targets)?.test;
+        hold_out.force_errors = force_errors(&network, &test, names).unwrap_or_default();
+    }
     let subject = Subject {
         network: &network,
         trained: &trained_on(&model.header),

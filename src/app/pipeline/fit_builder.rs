@@ -7,6 +7,7 @@ use crate::pipeline::fit_config::{FitColumns, FitConfig, FitOptions};
 use crate::pipeline::prepared_fit::PreparedFit;
 use crate::pipeline::train::RunOptions;
 use crate::pipeline::{Directory, InMemory, Output, PipelineError, Watch};
+use crate::presets::restructure;
 use crate::recording::read::read_recording;
 use crate::recording::{Columns, LoadedRecording, Recording, Targets};
 use std::path::PathBuf;
@@ -178,7 +179,7 @@ impl Fit {
         };
         config.training.network.dissipation = friction.then_some(FRICTION_UNITS);
         if let Some(structure) = structure {
-            config.training.take_structure(structure);
+            restructure(&mut config.training, structure);
         }
         change(&mut config);
         let options = RunOptions { threads, ..RunOptions::default() };

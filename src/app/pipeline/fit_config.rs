@@ -16,8 +16,8 @@ const MOST_WINDOW: usize = 1_000_001;
 table! {
     /// Everything that determines a fit.
     pub struct FitConfig {
-        /// What the fit learns from: measured accelerations, smoothed ones, or the motion itself; chosen by the data unless set.
-        #[key("measured, smoothed, motion", example = "\"smoothed\"", flag = "targets")]
+        /// What the fit learns from: measured accelerations, smoothed ones, known forces, or the motion itself; chosen by the data unless set.
+        #[key("measured, smoothed, forces, motion", example = "\"smoothed\"", flag = "targets")]
         #[serde(skip_serializing_if = "Option::is_none")]
         pub targets: Option<Targets> = None,
         /// Share of the samples that is held out to test the model; 0 for none.

@@ -197,6 +197,7 @@ impl Summary<'_> {
         let way = match self.targets {
             Targets::Measured => "measured accelerations",
             Targets::Smoothed => "smoothed accelerations",
+            Targets::Forces => "known forces",
             Targets::Motion => "the motion itself (multiple shooting)",
         };
         let judged = match self.held_out {
@@ -228,7 +229,12 @@ impl Summary<'_> {
         text += &text_table(&SMOOTHING, &self.coordinates.iter().map(row).collect::<Vec<_>>());
         let _ = writeln!(
             text,
-            "\nloss (paper) against those accelerations: validation {}{}; {}, {}, seed {}",
+            "\nloss (paper) against those {}: validation {}{}; {}, {}, seed {}",
+            if self.targets == Targets::Forces {
+                "forces, each over the error to expect of it"
+            } else {
+                "accelerations"
+            },
             number(self.validation_loss),
             self.test_loss.map_or(String::new(), |loss| match loss {
                 x if x.is_finite() => format!(", held out {}", number(x)),

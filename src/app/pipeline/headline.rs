@@ -5,6 +5,7 @@ use crate::analysis::{PredictionError, ValidTimes};
 use crate::experiments::{Row, RunSpread};
 use crate::names::{number, percent, pluralize};
 use crate::pipeline::evaluation::Evaluation;
+use crate::pipeline::force_errors::{ForceError, judged as judged_by_forces};
 use crate::pipeline::hold_out::{HoldOut, factor};
 use crate::report::Report;
 
@@ -127,6 +128,13 @@ pub(crate) fn of_hold_out(name: &str, found: &HoldOut) -> Headline {
         let what = "Held-out states whose mass matrix has the wrong signature".to_string();
         found.wrong_signature.is_finite().then(|| [what, percent(found.wrong_signature)])
     };
+    let forces = |error: &ForceError| {
+        [format!("Squared error of the force of {} over its variance", error.name), percent(error.nmse)]
+    };
+    if !found.force_errors.is_empty() {
+        let rows = found.force_errors.iter().map(forces).chain(signature()).collect();
+        return Headline { sentence: format!("{name}: {}", judged_by_forces(&found.force_errors)), rows };
+    }
     let Some((model, straight)) = found.model.last().zip(found.constant_velocity.last()) else {
         let sentence = format!("{name}: a Lagrangian was learned; no held-out motion judges its predictions.");
         return Headline { sentence, rows: signature().into_iter().collect() };
@@ -254,6 +262,7 @@ mod tests {
                 given_up: String::new(),
                 wrong_signature: 0.0,
                 energy: None,
+                force_errors: Vec::new(),
                 figures: Vec::new(),
             };
             of_hold_out("swing", &found).sentence

@@ -10,6 +10,7 @@ use crate::linalg::{SignatureBuffers, has_signature};
 use crate::names::number;
 use crate::pipeline::cancellation::Cancellation;
 use crate::pipeline::energy::{Balance, balance, energy_figure};
+use crate::pipeline::force_errors::ForceError;
 use crate::pipeline::prediction::HeldOutPredictions;
 use crate::pipeline::{PipelineError, Watch};
 use crate::report::{Figure, LinePlot, Report, Series, Turn, figure, line_plot, text_table};
@@ -86,6 +87,9 @@ pub struct HoldOut {
     pub wrong_signature: f64,
     /// Energy along the held-out trajectories; none if the model gives no finite energy.
     pub(crate) energy: Option<Balance>,
+    /// Errors of the known forces of a model that was learned from them.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub force_errors: Vec<ForceError>,
     /// Pictures.
     #[serde(skip)]
     pub figures: Vec<Figure>,
@@ -181,6 +185,7 @@ pub fn evaluate_hold_out(
         given_up,
         wrong_signature,
         energy,
+        force_errors: Vec::new(),
         figures,
     })
 }
@@ -381,6 +386,7 @@ impl HoldOut {
             given_up: String::new(),
             wrong_signature: f64::NAN,
             energy: None,
+            force_errors: Vec::new(),
             figures: Vec::new(),
         }
     }
@@ -394,6 +400,11 @@ impl HoldOut {
     /// `true` if there was nothing to judge by.
     fn is_of_nothing(&self) -> bool {
         self.wrong_signature.is_nan()
+    }
+
+    /// Table of the errors of the forces, if the model was learned from them.
+    fn force_table(&self) -> Option<Vec<Vec<String>>> {
+        (!self.force_errors.is_empty()).then(|| self.force_errors.iter().map(ForceError::row).collect())
     }
 
     /// Remarks below the table of predictions, in words.
@@ -413,17 +424,25 @@ impl HoldOut {
         if self.is_of_nothing() {
             return self.remarks();
         }
+        let forces = self.force_table().map(|rows| format!("{}\n", text_table(&ForceError::HEADERS, &rows)));
+        let forces = forces.unwrap_or_default();
         if self.model.is_empty() {
             let none = "no window of held-out motion is as long as the horizon: nothing was predicted\n";
-            return format!("{none}{}", self.remarks());
+            return format!("{forces}{none}{}", self.remarks());
         }
         let apart = self.table_by_coordinate();
         let apart = apart.map(|(headers, rows)| format!("\n{}\n", text_table(&headers, &rows))).unwrap_or_default();
-        format!("{}{apart}{}", text_table(&self.headers(), &self.rows()), self.remarks())
+        format!("{forces}{}{apart}{}", text_table(&self.headers(), &self.rows()), self.remarks())
     }
 
     /// Adds the tables to a report; the pictures stand above all tables of a page.
     pub(crate) fn report(&self, report: Report) -> Report {
+        let report = match self.force_table() {
+            Some(rows) => report
+                .heading("Errors of the forces of held-out motion")
+                .table(&ForceError::HEADERS.map(str::to_string), &rows),
+            None => report,
+        };
         let report = report.heading("Errors of the predictions of held-out motion");
         if self.is_of_nothing() {
             return report.paragraph(self.remarks().trim_end());

@@ -65,6 +65,7 @@ mod fit;
 mod fit_builder;
 mod fit_config;
 mod fit_summary;
+mod force_errors;
 mod headline;
 mod hold_out;
 mod hole_pictures;
@@ -116,6 +117,8 @@ pub use fit_config::FitOptions;
 pub(crate) use fit_config::unit;
 #[doc(hidden)]
 pub use fit_config::{FitColumns, FitConfig, HELD_OUT};
+#[doc(hidden)]
+pub use force_errors::ForceError;
 pub use hold_out::HoldOut;
 #[doc(hidden)]
 pub use hold_out::{CoordinatePredictions, HoldOutOptions, UsefulTime, evaluate_hold_out};

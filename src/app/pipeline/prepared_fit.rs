@@ -29,13 +29,16 @@ impl<'a> PreparedFit<'a> {
     ///
     /// # Errors
     /// [`PipelineError::Recording`] for motion that cannot be learned from, [`PipelineError::NoAccelerations`] if measured
-    /// ones are asked for and there are none.
+    /// ones are asked for and there are none, [`PipelineError::NoForces`] for forces that not every coordinate has.
     pub fn new(reading: &'a LoadedRecording, options: &FitOptions) -> Result<Self, PipelineError> {
         let started = Instant::now();
         let measured = RecordingSplit::of_takes(&reading.recording, &reading.takes, &options.preparation())?;
         let targets = options.targets.unwrap_or_else(|| measured.advice());
         if targets == Targets::Measured && !measured.training.recording.has_accelerations() {
             return Err(PipelineError::NoAccelerations);
+        }
+        if targets == Targets::Forces && !reading.recording.is_driven() {
+            return Err(PipelineError::NoForces);
         }
         Ok(Self { reading, options: options.clone(), measured, targets, started })
     }

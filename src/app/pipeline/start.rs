@@ -41,6 +41,7 @@ impl StartModel {
         (network.structure, network.cyclic) =
             (model.form.structure, model.form.cyclic.iter().filter_map(name).collect());
         network.factor = model.form.factor;
+        network.joint_friction = model.form.joint_friction;
         network.radial =
             model.form.radial.iter().map(|group| group.coordinates.iter().filter_map(name).collect()).collect();
         network.radial_unit = model.form.radial.first().map(|group| group.unit);
@@ -61,7 +62,8 @@ impl StartModel {
     /// [`PipelineError::OtherShape`] naming everything that differs.
     pub(crate) fn require(&self, config: &Config, periodic: Vec<bool>) -> Result<(), PipelineError> {
         let columns = self.header.columns.iter().take(periodic.len()).map(String::as_str);
-        let asked = config.architecture_with(columns, periodic, self.header.architecture.scale.clone())?;
+        let mut asked = config.architecture_with(columns, periodic, self.header.architecture.scale.clone())?;
+        asked.form.sizes.clone_from(&self.header.architecture.form.sizes);
         let found = differences(&asked, &self.header.architecture);
         if found.is_empty() {
             return Ok(());
@@ -82,7 +84,8 @@ pub(crate) fn weights<S: Scalar>(
     let path = model_file(Path::new(from))?;
     let loaded = ModelFile::load(&path);
     let ModelFile { header, weights } = loaded.map_err(|source| PipelineError::Model { path: path.clone(), source })?;
-    let asked = asked(header.architecture.scale.clone());
+    let mut asked = asked(header.architecture.scale.clone());
+    asked.form.sizes.clone_from(&header.architecture.form.sizes);
     let differences = differences(&asked, &header.architecture);
     if differences.is_empty() {
         return Ok((weights, asked));

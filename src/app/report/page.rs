@@ -46,9 +46,9 @@ pub fn page(
     let (architecture, n, weights) = (network.architecture(), header.columns.len() / 2, network.weights());
     let lagrangian =
         Listing::record::<f64, _>(2 * n, weights.len(), |x, p| architecture.lagrangian(p, &x[..n], &x[n..]))?;
-    let dissipation = match architecture.dissipation {
-        None => Value::Null,
-        Some(_) => operations(&Listing::record::<f64, _>(2 * n, weights.len(), |x, p| {
+    let dissipation = match architecture.has_friction() {
+        false => Value::Null,
+        true => operations(&Listing::record::<f64, _>(2 * n, weights.len(), |x, p| {
             architecture.rayleigh_dissipation(p, &x[..n], &x[n..])
         })?),
     };

@@ -5,7 +5,7 @@ use crate::configuration::penalty::Regularizer;
 use crate::configuration::table::{Below, Key, Ranges as _, count, from_zero, table};
 use crate::lagrangian::{Description, SystemInstance, pair};
 use crate::network::file::MAX_WIDTH;
-use crate::network::{ActivationChoice, Factor, Form, Initialization, InputLayer, Radial, Structure};
+use crate::network::{ActivationChoice, Factor, Form, Initialization, InputLayer, JointFriction, Radial, Structure};
 use crate::optimizers::Method;
 use crate::optimizers::Schedule;
 use serde::{Deserialize, Serialize};
@@ -143,6 +143,10 @@ table! {
         #[key("1 to 1000", example = "20", check = count(1000))]
         pub memory: usize = 20,
     }
+}
+
+fn is_frictionless(friction: &JointFriction) -> bool {
+    *friction == JointFriction::None
 }
 
 fn is_zero(x: &f64) -> bool {
@@ -306,6 +310,13 @@ table! {
         #[key("1 to 65536 units", example = "16", flag = "friction?", check = count(MAX_WIDTH))]
         #[serde(skip_serializing_if = "Option::is_none")]
         pub dissipation: Option<usize> = None,
+        /// Friction that every coordinate has by itself, as the joints of a machine: dry is viscous and dry friction, stribeck also a
+        /// larger one at low speeds.
+        ///
+        /// See [`JointFriction`]; beside `dissipation` or alone.
+        #[key("none, dry, stribeck", example = "\"dry\"", flag = "joint-friction?")]
+        #[serde(skip_serializing_if = "is_frictionless")]
+        pub joint_friction: JointFriction = JointFriction::None,
         /// Distribution of the initial weights.
         #[key("default, variance-preserving, cranmer, cranmer-paper, near-zero")]
         pub initialization: Initialization = Initialization::Default,
@@ -417,6 +428,8 @@ impl Network {
                 // The file is read with the configuration.
                 Some(Known::File(_)) | None => None,
             },
+            joint_friction: self.joint_friction,
+            sizes: None,
         })
     }
 }

@@ -21,6 +21,8 @@ pub struct Dataset<S> {
     /// Rows `A` of constraints, `(states, m, n)`, and their drift `gamma`, `(states, m)`; empty if there are none.
     rows: Vec<S>,
     drift: Vec<S>,
+    /// Sizes of the residuals of force, `(n)`; empty if residuals are those of accelerations.
+    force_scale: Vec<S>,
 }
 
 /// Why numbers do not make a dataset.
@@ -44,6 +46,14 @@ pub enum DatasetError {
         what: &'static str,
         /// State, from 0.
         row: usize,
+        /// Coordinate, from 0.
+        column: usize,
+    },
+    /// A scale that is not above 0.
+    #[error("{what} {column} is not above 0")]
+    NotPositive {
+        /// Which array.
+        what: &'static str,
         /// Coordinate, from 0.
         column: usize,
     },
@@ -76,7 +86,9 @@ impl<S: Scalar> Dataset<S> {
         for (what, values) in [("coordinate", &q), ("velocity", &v), ("acceleration", &a)] {
             check(what, values, expected, coordinates)?;
         }
-        Ok(Self { coordinates, q, v, a, force: Vec::new(), weight: Vec::new(), rows: Vec::new(), drift: Vec::new() })
+        let none = Vec::new;
+        let (force, weight, rows, drift, force_scale) = (none(), none(), none(), none(), none());
+        Ok(Self { coordinates, q, v, a, force, weight, rows, drift, force_scale })
     }
 
     /// The same states under known external generalized forces `Q`, `(states, n)` in physical units (N, N m), conjugate to
@@ -91,6 +103,22 @@ impl<S: Scalar> Dataset<S> {
     pub fn with_forces(self, force: Vec<S>) -> Result<Self, DatasetError> {
         check("force", &force, self.q.len(), self.coordinates)?;
         Ok(Self { force, ..self })
+    }
+
+    /// The same states, learned from by the residuals of force `M a + c - g + dD/dv - Q`, each over its `scale`, `(n)` in physical units,
+    /// in place of those of the accelerations: nothing is solved for, and the mass matrix may be singular.
+    ///
+    /// # Errors
+    /// [`DatasetError`] for a scale that is not a positive number, and for states without forces or under constraints, whose forces are
+    /// not known.
+    pub fn with_force_residuals(self, scale: Vec<S>) -> Result<Self, DatasetError> {
+        check("scale of a force", &scale, self.coordinates, self.coordinates)?;
+        check("force", &self.force, self.q.len(), self.coordinates)?;
+        check("constraint row", &self.rows, 0, self.coordinates)?;
+        match scale.iter().position(|scale| *scale <= <S as Real>::zero()) {
+            Some(column) => Err(DatasetError::NotPositive { what: "scale of a force", column }),
+            None => Ok(Self { force_scale: scale, ..self }),
+        }
     }
 
     /// The same states under constraints `A a = -gamma`, rows `A` `(states, m, n)` and `gamma` `(states, m)` in physical units: what is
@@ -158,6 +186,11 @@ impl<S: Scalar> Dataset<S> {
         &self.force
     }
 
+    /// Sizes of the residuals of force, `(n)` in physical units; empty if residuals are those of accelerations.
+    pub fn force_scale(&self) -> &[S] {
+        &self.force_scale
+    }
+
     /// Number of constraints `m` of every state.
     pub fn constraints(&self) -> usize {
         self.drift.len() / self.len()
@@ -191,6 +224,7 @@ impl<S: Scalar> Dataset<S> {
             weight: pick(&self.weight, 1),
             rows: pick(&self.rows, m * n),
             drift: pick(&self.drift, m),
+            force_scale: self.force_scale.clone(),
         }
     }
 
@@ -227,10 +261,10 @@ impl<S: Scalar> Dataset<S> {
         })
     }
 
-    /// CRC-32 of coordinates, velocities, accelerations, forces, weights and constraints in double precision.
+    /// CRC-32 of coordinates, velocities, accelerations, forces, weights, constraints and scales of forces in double precision.
     pub fn checksum(&self) -> u32 {
         let all = self.q.iter().chain(&self.v).chain(&self.a).chain(&self.force).chain(&self.weight);
-        checksum(all.chain(&self.rows).chain(&self.drift), StoredPrecision::F64)
+        checksum(all.chain(&self.rows).chain(&self.drift).chain(&self.force_scale), StoredPrecision::F64)
     }
 
     /// The same states in another precision.
@@ -245,6 +279,7 @@ impl<S: Scalar> Dataset<S> {
             weight: cast(&self.weight),
             rows: cast(&self.rows),
             drift: cast(&self.drift),
+            force_scale: cast(&self.force_scale),
         }
     }
 }

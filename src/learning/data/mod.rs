@@ -2,6 +2,7 @@
 
 mod dataset;
 mod draw;
+mod force_sizes;
 mod motions;
 mod of_config;
 mod recording_split;
@@ -15,6 +16,7 @@ pub use dataset::{Dataset, DatasetError};
 pub use dataset::{Noise, StateEstimate};
 pub use draw::SamplingError;
 pub(crate) use draw::boxes;
+pub(crate) use force_sizes::{force_spreads, sizes};
 #[doc(hidden)]
 pub use recording_split::{PrepareOptions, RecordingSplit, RecordingSplitError, Split};
 pub use sampling::sample;

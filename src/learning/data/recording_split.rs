@@ -7,8 +7,9 @@
 use crate::data::dataset::Datasets;
 use crate::data::dataset::{Dataset, DatasetError};
 use crate::data::dataset::{Noise, StateEstimate};
+use crate::data::force_sizes::by_forces;
 use crate::data::weights::Weighting;
-use crate::recording::smooth::{SmoothError, SmoothOptions, Smoothed, Smoothing};
+use crate::recording::smooth::{SmoothError, SmoothOptions, Smoothed, Smoothing, noise};
 use crate::recording::survey::{Stillness, plan, stillness};
 use crate::recording::{HeldOut, HoldOutError, RecordedTrajectory, Recording, Targets};
 use crate::scalar::Scalar;
@@ -97,7 +98,7 @@ impl Split {
     fn rows(&self, targets: Targets, most: usize) -> impl Iterator<Item = Row<'_>> {
         let stride = self.recording.samples().div_ceil(most.max(1)).max(1);
         self.recording.tracks.iter().zip(&self.states).flat_map(move |(track, states)| {
-            let measured = targets == Targets::Measured && !track.a.is_empty();
+            let measured = targets.takes_measured() && !track.a.is_empty();
             let complete = is_complete(track, targets);
             let rows = if complete { 0..track.len() } else { states.interior() };
             let rows = rows.step_by(stride).filter(move |row| complete || states.is_full(*row));
@@ -147,7 +148,7 @@ impl Split {
 
 /// `true` if nothing has to be derived: positions and velocities as measured belong to accelerations as measured.
 fn is_complete(track: &RecordedTrajectory, targets: Targets) -> bool {
-    targets == Targets::Measured && !track.a.is_empty() && !track.v.is_empty()
+    targets.takes_measured() && !track.a.is_empty() && !track.v.is_empty()
 }
 
 /// Recorded motion, ready to learn from.
@@ -213,7 +214,7 @@ impl RecordingSplit {
 
     /// The way that suits the data.
     pub(crate) fn advice(&self) -> Targets {
-        Targets::advised(self.training.recording.has_accelerations(), self.smoothing.acceleration_error())
+        Targets::advised(&self.training.recording, &self.smoothing)
     }
 
     /// States and accelerations for a supervised training, validation and test; where nothing is held out, the test is the
@@ -231,7 +232,26 @@ impl RecordingSplit {
             HeldOut::Nothing => validation.clone(),
             _ => dataset("test states", &self.test, most / 5)?,
         };
-        Ok(Datasets { training: vec![dataset("training states", &self.training, most)?], validation, test })
+        let all = Datasets { training: vec![dataset("training states", &self.training, most)?], validation, test };
+        if targets == Targets::Forces { self.by_forces(all) } else { Ok(all) }
+    }
+
+    /// The datasets with residuals of force.
+    fn by_forces<S: Scalar>(&self, data: Datasets<S>) -> Result<Datasets<S>, RecordingSplitError> {
+        let (recording, like) = (&self.training.recording, data.training[0].clone());
+        let n = recording.n();
+        let tracks = || recording.tracks.iter().map(|track| (track.times.as_slice(), track.force.as_slice()));
+        let forced = recording.tracks.iter().all(|track| !track.force.is_empty());
+        let force: Vec<f64> = (0..n).map(|i| if forced { noise(tracks(), n, i).sigma } else { 0.0 }).collect();
+        let measured = recording.has_accelerations();
+        let qualities = self.smoothing.coordinates.iter().map(|chosen| chosen.quality.total(2));
+        let acceleration: Vec<f64> = qualities.map(|error| if measured { 0.0 } else { error }).collect();
+        let errors = [force.as_slice(), acceleration.as_slice()];
+        let of =
+            |which, set| by_forces(set, &like, errors).map_err(|source| RecordingSplitError::Dataset { which, source });
+        let Datasets { training, validation, test } = data;
+        let training = training.into_iter().map(|set| of("training states", set)).collect::<Result<_, _>>()?;
+        Ok(Datasets { training, validation: of("validation states", validation)?, test: of("test states", test)? })
     }
 
     /// The smoothed accelerations of the training states by polynomials of two more degrees: less bias, more noise. `None` where

@@ -2,15 +2,44 @@
 
 use crate::configuration::Config;
 use crate::data::Datasets;
-use crate::presets::preset::recorded;
+use crate::network::{Factor, JointFriction, Structure};
+use crate::optimizers::Method;
+use crate::presets::preset::{recorded, take_structure};
 use crate::scalar::Scalar;
 
 /// Steps of a supervised training.
 const STEPS: usize = 30_000;
 
+/// Steps of a training from known forces.
+const STEPS_BY_FORCES: usize = 10_000;
+/// Widths of the layers of a training from known forces, and its weight decay, by the rate times it: such recordings are few states
+/// of many coordinates, and what is learned of them has to be smooth.
+const BY_FORCES: ([usize; 3], f64) = ([64; 3], 0.3);
+
+/// Changes the structure of a configuration that suits recorded motion: a black box in place of another one has its usual penalty.
+pub(crate) fn restructure(config: &mut Config, structure: Structure) {
+    if structure == Structure::BlackBox && config.network.structure != Structure::BlackBox {
+        config.penalty = Config::default().penalty;
+    }
+    config.take_structure(structure);
+}
+
 /// Configuration of a training from these states: the network and the rates of the quick preset, 30,000 steps in whole epochs.
+///
+/// From known forces another one is learned: kinetic energy and potential with the friction of every coordinate, smaller and with
+/// more weight decay, in 10,000 steps.
 pub fn suggested<S: Scalar>(name: &str, data: &Datasets<S>) -> Config {
     let [training, validation, test] = [&data.training[0], &data.validation, &data.test];
     let sizes = [training.len(), validation.len(), test.len()];
-    recorded(name, sizes, STEPS)
+    if data.training[0].force_scale().is_empty() {
+        return recorded(name, sizes, STEPS);
+    }
+    let mut config = recorded(name, sizes, STEPS_BY_FORCES);
+    let rate = config.phases[0].rate;
+    take_structure(&mut config, Structure::Mechanical, Some(rate));
+    let (hidden, weight_decay) = BY_FORCES;
+    (config.network.hidden, config.network.factor) = (hidden.to_vec(), Factor::Triangle);
+    config.network.joint_friction = JointFriction::Dry;
+    (config.optimizer.method, config.optimizer.weight_decay) = (Method::AdamW, weight_decay);
+    config
 }

@@ -14,6 +14,7 @@ mod preset;
 mod trainer;
 
 #[doc(hidden)]
+pub(crate) use measured::restructure;
 pub use measured::suggested;
 pub use preset::Preset;
 pub use trainer::{Learned, Trainer, TrainerError};

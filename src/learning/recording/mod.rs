@@ -38,11 +38,11 @@ pub(crate) use hermite::hermite;
 pub(crate) use hold_out::HeldOut;
 #[doc(hidden)]
 pub use hold_out::HoldOutError;
-pub(crate) use reading::LARGE_ERROR;
 pub use reading::LoadedRecording;
 #[doc(hidden)]
 pub use reading::Targets;
 #[doc(hidden)]
 pub use reading::{Bridged, Cut, Dropped, Rows};
+pub(crate) use reading::{INERTIAL, LARGE_ERROR};
 pub use track::{RecordedTrajectory, Recording, TrajectoryError};
 pub(crate) use units::factor;

@@ -1,6 +1,8 @@
 //! Where recorded samples stand in the files they come from, and what was left out.
 
 use crate::recording::Recording;
+use crate::recording::smooth::{Chosen, Smoothing, noise};
+use crate::recording::statistics::deviation;
 use serde::{Deserialize, Serialize};
 
 /// Line of the file of every sample, run-length: from sample `.0` on, sample `k` stands on line `k - .0 + .1`.
@@ -109,6 +111,9 @@ impl From<Recording> for LoadedRecording {
 /// Relative error of accelerations by smoothing above which the motion itself is the better teacher.
 pub const LARGE_ERROR: f64 = 0.1;
 
+/// Share of the spread of a known force that is taken to accelerate, where the size of an inertia is looked for.
+pub(crate) const INERTIAL: f64 = 0.5;
+
 /// Quantity that a network learns from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -118,22 +123,43 @@ pub enum Targets {
     Measured,
     /// Accelerations by local polynomials.
     Smoothed,
+    /// Known forces: what they are for measured accelerations, or for those by local polynomials.
+    Forces,
     /// The motion itself, from the network that smoothed or measured accelerations give.
     Motion,
 }
 
 impl Targets {
-    /// The way that suits the data: measured accelerations if there are any, smoothed ones if they are good to
-    /// `LARGE_ERROR`, the motion itself if not. `error` is that of smoothed accelerations over their size.
-    pub(crate) fn advised(has_accelerations: bool, error: f64) -> Self {
-        if has_accelerations {
+    /// `true` if measured accelerations are taken where there are any.
+    pub(crate) fn takes_measured(self) -> bool {
+        matches!(self, Self::Measured | Self::Forces)
+    }
+
+    /// The way that suits the data: measured accelerations if there are any; known forces if these are noisier than the accelerations;
+    /// smoothed accelerations if they are good to `LARGE_ERROR`, the motion itself if not.
+    pub(crate) fn advised(recording: &Recording, smoothing: &Smoothing) -> Self {
+        if recording.has_accelerations() {
             Self::Measured
-        } else if error <= LARGE_ERROR {
+        } else if recording.is_driven() && forces_are_noisier(recording, smoothing) {
+            Self::Forces
+        } else if smoothing.acceleration_error() <= LARGE_ERROR {
             Self::Smoothed
         } else {
             Self::Motion
         }
     }
+}
+
+/// `true` if the noise of a known force is larger than what the error of the acceleration along its coordinate amounts to as a force,
+/// of any coordinate: a residual is best taken of what is noisier.
+fn forces_are_noisier(recording: &Recording, smoothing: &Smoothing) -> bool {
+    let n = recording.n();
+    let tracks = || recording.tracks.iter().map(|track| (track.times.as_slice(), track.force.as_slice()));
+    let noisier = |(i, chosen): (usize, &Chosen)| {
+        let spread = deviation(recording.tracks.iter().flat_map(|track| track.force.iter().skip(i).step_by(n)));
+        noise(tracks(), n, i).sigma > INERTIAL * chosen.quality.relative() * spread
+    };
+    smoothing.coordinates.iter().enumerate().any(noisier)
 }
 
 #[cfg(test)]

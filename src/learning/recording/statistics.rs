@@ -31,6 +31,13 @@ pub fn rms(values: impl IntoIterator<Item = f64>) -> f64 {
     if count == 0 { 0.0 } else { (sum / count as f64).sqrt() }
 }
 
+/// Standard deviation about the mean; 0 of none.
+pub fn deviation<'a>(values: impl Iterator<Item = &'a f64> + Clone) -> f64 {
+    let count = values.clone().count().max(1) as f64;
+    let mean = values.clone().sum::<f64>() / count;
+    rms(values.map(|x| x - mean))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -41,6 +48,7 @@ mod tests {
         assert_eq!(quantile(&mut [4.0, 3.0, 1.0, 2.0, 5.0], 1.0), 5.0);
         assert!(median(&mut []).is_nan());
         assert_eq!(rms([3.0, -4.0, 0.0, 0.0]), 2.5);
+        assert_eq!((deviation([1.0, 3.0, 5.0, 7.0].iter()), deviation([].iter())), (5.0_f64.sqrt(), 0.0));
         // A quarter of outliers moves the deviation little: the median of |x| is that of the others.
         assert!((robust_deviation(&mut [1.0, -1.0, 1.0, 1e9]) - 1.0 / NORMAL_MEDIAN).abs() < 1e-15);
     }

@@ -123,6 +123,17 @@ impl Recording {
         !self.tracks.is_empty() && self.tracks.iter().all(|track| !track.a.is_empty())
     }
 
+    /// `true` if every coordinate has known forces in every trajectory, and none stays what it is.
+    pub(crate) fn is_driven(&self) -> bool {
+        let n = self.n();
+        let moves = |i: usize| {
+            let mut column = self.tracks.iter().flat_map(|track| track.force.iter().skip(i).step_by(n));
+            let first = column.next();
+            column.any(|force| Some(force) != first)
+        };
+        self.tracks.iter().all(|track| !track.force.is_empty()) && (0..n).all(moves)
+    }
+
     /// Samples of all trajectories.
     pub fn samples(&self) -> usize {
         self.tracks.iter().map(RecordedTrajectory::len).sum()

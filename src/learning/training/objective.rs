@@ -8,6 +8,10 @@
 //! are any. A loss `l(a)` depends on the parameters of `D` by `dl = -lam.d(dD/dv)`, `lam = M^-1 dl/da`; those of `L` enter as
 //! without friction, at the `a` that has it.
 //!
+//! States may be learned from by their [residuals of force](Dataset::with_force_residuals) `r = M a + c - g + dD/dv - Q` instead, at the
+//! accelerations of the data: a loss `l(r)` has the gradient of one on accelerations with `lam = -dl/dr` and this `a`, and nothing is
+//! solved for.
+//!
 //! Under constraints, rows `A` of the data, they solve `[M A^T; A 0] [a; -lambda] = [g - c + Q; -gamma]`. With the same matrix and
 //! `[lam; nu]` for `[dl/da; 0]` the gradient is that without constraints, at this `lam` and this `a`: `A lam = 0`. Penalties act on
 //! the eigenvalues of `Z^T M Z`, `Z` a basis of the directions that the constraints leave, whichever penalty it is: across them no
@@ -42,7 +46,7 @@ pub struct BatchReport<S> {
     pub penalty: S,
     /// States whose penalty is active.
     pub penalised: usize,
-    /// States left out because they give no finite acceleration.
+    /// States left out because they give no finite acceleration, or force if forces are learned from.
     pub left_out: usize,
     /// First state, by its row in the dataset, that failed, and why.
     pub failure: Option<MechanicsError>,
@@ -166,7 +170,6 @@ impl<S: Scalar> Shard<S> {
     fn add_chunk(&mut self, weights: &[S], data: &Dataset<S>, rows: &[u32], weight: S, penalty: (Penalty, S)) {
         self.gather(data, rows);
         self.dynamics.evaluate(weights, &self.q, &self.v, Depth::Training, true);
-        self.solve(data, rows);
         self.add_residuals(data, rows, weight);
         let (penalty, lambda) = penalty;
         match penalty {
@@ -176,7 +179,7 @@ impl<S: Scalar> Shard<S> {
             _ => self.add_violations(penalty, lambda),
         }
         // Zero directions on finite numbers leave the failed states out.
-        if self.add_directions(data.constraints()) || self.replace_failed(weights) {
+        if self.add_directions(data) || self.replace_failed(weights) {
             self.dynamics.add_gradient(weights, &self.directions, &mut self.gradient, None);
         }
         self.violations.add_gradient(weights, false, &mut self.gradient);
@@ -234,7 +237,6 @@ impl<S: Scalar> Shard<S> {
     fn add_losses(&mut self, weights: &[S], data: &Dataset<S>, rows: &[u32]) {
         self.gather(data, rows);
         self.dynamics.evaluate(weights, &self.q, &self.v, Depth::Motion, true);
-        self.solve(data, rows);
         self.add_residuals(data, rows, <S as Real>::one());
     }
 
@@ -323,8 +325,51 @@ impl<S: Scalar> Shard<S> {
         }
     }
 
-    /// Absolute residuals of the states; leaves `-dl/da`, with `l` weighted by `weight`, in `right`.
+    /// Absolute residuals of the states; leaves what [`add_directions`](Self::add_directions) takes.
     fn add_residuals(&mut self, data: &Dataset<S>, rows: &[u32], weight: S) {
+        if data.force_scale().is_empty() {
+            self.solve(data, rows);
+            self.add_acceleration_residuals(data, rows, weight);
+        } else {
+            self.add_force_residuals(data, rows, weight);
+        }
+    }
+
+    /// Absolute residuals of the forces, each over its scale; leaves `dl/dr`, with `l` weighted by `weight`, in `right`, and the
+    /// accelerations of the data, scaled, `NaN` where a residual is not finite.
+    fn add_force_residuals(&mut self, data: &Dataset<S>, rows: &[u32], weight: S) {
+        let (n, zero) = (data.coordinates(), <S as Real>::zero());
+        self.dynamics.right_hand_sides(&mut self.right);
+        self.add_forces(data, rows);
+        self.acceleration.clear();
+        for &row in rows {
+            let a = &data.a()[row as usize * n..][..n];
+            self.acceleration.extend(a.iter().zip(&self.scale).map(|(&a, &s)| a / s));
+        }
+        let masses = self.dynamics.lagrangian().mass_matrix.chunks_exact(n * n);
+        let states = self.acceleration.chunks_exact_mut(n).zip(self.right.chunks_exact_mut(n));
+        for ((&row, mass), (a, right)) in rows.iter().zip(masses).zip(states) {
+            for (right, mass) in right.iter_mut().zip(mass.chunks_exact(n)) {
+                *right = mass.iter().zip(&*a).fold(-*right, |sum, (&m, &a)| sum + m * a);
+            }
+            if right.iter().any(|r| !r.is_finite()) {
+                self.left_out += 1;
+                self.failure.get_or_insert(MechanicsError::NotFinite { row: row as usize, what: "force" });
+                a.fill(S::nan());
+                right.fill(zero);
+                continue;
+            }
+            let own = data.weight(row as usize);
+            for ((right, &size), &s) in right.iter_mut().zip(data.force_scale()).zip(&self.scale) {
+                let unit = (size * s).recip();
+                self.residual.add(own * (*right * unit).abs());
+                *right = sign(*right) * own * weight * unit;
+            }
+        }
+    }
+
+    /// Absolute residuals of the accelerations; leaves `-dl/da`, with `l` weighted by `weight`, in `right`.
+    fn add_acceleration_residuals(&mut self, data: &Dataset<S>, rows: &[u32], weight: S) {
         let n = data.coordinates();
         let zero = <S as Real>::zero();
         for (state, &row) in rows.iter().enumerate() {
@@ -341,27 +386,24 @@ impl<S: Scalar> Shard<S> {
             for i in 0..n {
                 let residual = a[i] - target[i] / self.scale[i];
                 self.residual.add(own * residual.abs());
-                // The sign of zero is zero.
-                right[i] = if residual > zero {
-                    -weight
-                } else if residual < zero {
-                    weight
-                } else {
-                    zero
-                };
+                right[i] = sign(-residual) * weight;
             }
         }
     }
 
-    /// Directions of the loss: `s = -lam = -M^-1 dl/da`, `t = a`, zeros for states that have no acceleration; whether all have
-    /// one.
-    fn add_directions(&mut self, constraints: usize) -> bool {
+    /// Directions of the loss: `s = -lam`, which is `-M^-1 dl/da` or `dl/dr`, `t = a`, zeros for states that have no acceleration;
+    /// whether all have one.
+    fn add_directions(&mut self, data: &Dataset<S>) -> bool {
         let n = self.scale.len();
         self.directions.clear(true);
-        self.multiplier.resize(self.right.len(), <S as Real>::zero());
-        // The same matrices failed before, and their rows are passed over.
-        self.solve_motion(n, constraints, false);
-        self.directions.s.extend_from_slice(&self.multiplier);
+        if data.force_scale().is_empty() {
+            self.multiplier.resize(self.right.len(), <S as Real>::zero());
+            // The same matrices failed before, and their rows are passed over.
+            self.solve_motion(n, data.constraints(), false);
+            self.directions.s.extend_from_slice(&self.multiplier);
+        } else {
+            self.directions.s.extend_from_slice(&self.right);
+        }
         self.directions.t.extend_from_slice(&self.acceleration);
         let mut all = true;
         let MixedDirections { s, t, .. } = &mut self.directions;
@@ -404,6 +446,18 @@ impl<S: Scalar> Shard<S> {
                 self.violations.push((&self.q[range.clone()], &self.v[range]), &self.violation, lambda);
             }
         }
+    }
+}
+
+/// The sign of a number; that of zero is zero.
+fn sign<S: Scalar>(x: S) -> S {
+    let zero = <S as Real>::zero();
+    if x > zero {
+        <S as Real>::one()
+    } else if x < zero {
+        -<S as Real>::one()
+    } else {
+        zero
     }
 }
 

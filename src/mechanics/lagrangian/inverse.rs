@@ -50,6 +50,53 @@ pub fn inverse_dynamics<S: Scalar>(
     failures.first().map_or(Ok(forces), |&error| Err(error))
 }
 
+/// Parts of the external force of known states and accelerations, `(batch, n)` each: what the motion asks for is
+/// `inertial + coriolis + gravity - friction`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ForceParts<S> {
+    /// `M a`.
+    pub inertial: Vec<S>,
+    /// What the velocities add: the Coriolis and centrifugal forces.
+    pub coriolis: Vec<S>,
+    /// `-dL/dq` at rest: what holds the state where it is, against gravity and springs.
+    pub gravity: Vec<S>,
+    /// `-dD/dv`; empty for a model that [conserves its energy](EulerLagrange::conserves_energy).
+    pub friction: Vec<S>,
+}
+
+/// The parts of [`inverse_dynamics`].
+///
+/// # Errors
+/// As [`inverse_dynamics`].
+pub fn force_parts<S: Scalar>(
+    model: &dyn EulerLagrange<S>,
+    q: &[S],
+    v: &[S],
+    a: &[S],
+) -> Result<ForceParts<S>, MechanicsError> {
+    let (parts, failures) = force_parts_by_rows(model, q, v, a)?;
+    failures.first().map_or(Ok(parts), |&error| Err(error))
+}
+
+/// [`force_parts`] with an error for every row that fails, whose inertial part is `NaN`.
+///
+/// # Errors
+/// [`MechanicsError`] that is about no row.
+pub(crate) fn force_parts_by_rows<S: Scalar>(
+    model: &dyn EulerLagrange<S>,
+    q: &[S],
+    v: &[S],
+    a: &[S],
+) -> Result<(ForceParts<S>, Vec<MechanicsError>), MechanicsError> {
+    let still = vec![<S as Real>::zero(); v.len()];
+    let (moving, failures) = inverse_dynamics_by_rows(model, q, v, a)?;
+    let coasting = inverse_dynamics_by_rows(model, q, v, &still)?.0.generalized;
+    let gravity = inverse_dynamics_by_rows(model, q, &still, &still)?.0.generalized;
+    let less = |from: &[S], what: &[S]| from.iter().zip(what).map(|(&from, &what)| from - what).collect::<Vec<S>>();
+    let (inertial, coriolis) = (less(&moving.generalized, &coasting), less(&coasting, &gravity));
+    Ok((ForceParts { inertial, coriolis, gravity, friction: moving.friction }, failures))
+}
+
 /// [`inverse_dynamics`] with an error for every row that fails, whose forces are `NaN`.
 ///
 /// # Errors

@@ -45,10 +45,10 @@ pub use expression::{Expression, ExpressionError};
 pub use expression_lagrangian::ExpressionLagrangian;
 #[doc(hidden)]
 pub use interruptible::Interruptible;
-#[cfg(feature = "cli")]
-pub(crate) use inverse::inverse_dynamics_by_rows;
 #[doc(hidden)]
-pub use inverse::{InverseDynamics, inverse_dynamics};
+pub use inverse::{ForceParts, InverseDynamics, force_parts, inverse_dynamics};
+#[cfg(feature = "cli")]
+pub(crate) use inverse::{force_parts_by_rows, inverse_dynamics_by_rows};
 pub use mechanics::Mechanics;
 #[doc(hidden)]
 pub use metric::MetricJet;

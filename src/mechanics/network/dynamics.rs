@@ -79,11 +79,11 @@ impl Architecture {
         let parameters = layout.parameters;
         let record = Recorded::new(scale(), parameters, |p, q, v| self.lagrangian(p, q, v));
         let lagrangian = Arc::new(record.expect("networks read no values"));
-        let dissipation = self.dissipation.map(|_| {
+        let dissipation = self.has_friction().then(|| {
             let record = Recorded::new(scale(), parameters, |p, q, v| self.rayleigh_dissipation(p, q, v));
             Arc::new(record.expect("dissipations read no values"))
         });
-        Model::new(lagrangian, dissipation, self.periodic.clone()).with_weights(layout.known.start)
+        Model::new(lagrangian, dissipation, self.periodic.clone()).with_weights(layout.joint_friction.start)
     }
 }
 
@@ -120,7 +120,7 @@ impl<S: Scalar> Dynamics<S> {
         self.power.extend(rows.map(|(gradient, v)| {
             let terms = gradient.iter().zip(v).zip(scale);
             let power = terms.fold(zero, |sum, ((&d, &v), &s)| sum + d * (v / s));
-            // D is convex and even in v: what is below zero is rounding.
+            // Friction is against the velocity: what is below zero is rounding.
             if power < zero { zero } else { power }
         }));
     }

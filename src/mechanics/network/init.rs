@@ -49,6 +49,10 @@ pub fn initial_weights<S: Scalar>(architecture: &Architecture, kind: Initializat
     for (place, initial) in layout.constants.clone().zip(constants) {
         weights[place] = S::of_f64(initial);
     }
+    let joints = architecture.form.joint_friction.initial(architecture.coordinates);
+    for (place, initial) in layout.joint_friction.clone().zip(joints) {
+        weights[place] = S::of_f64(initial);
+    }
     if let Some(dissipation) = layout.dissipation {
         weights[dissipation.gamma_range()].fill(S::of_f64(FRICTION));
         for row in weights[dissipation.direction_range()].chunks_exact_mut(dissipation.coordinates) {

@@ -67,8 +67,8 @@ impl Branch {
     }
 }
 
-/// The branches of a network, whose outputs add up, one after the other in the flat parameter vector; the dissipation
-/// comes last.
+/// The branches of a network, whose outputs add up, one after the other in the flat parameter vector; behind them the dissipation,
+/// then what stands beside the network.
 ///
 /// Every layer holds its weights, then its biases.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -85,6 +85,8 @@ pub struct Layout {
     pub dissipation: Option<DissipationLayout>,
     /// Parameters of the structure that stand beside the network, as `alpha` of a black box that learns it.
     pub constants: Range<usize>,
+    /// Parameters of the joint friction, `(rows, n)`.
+    pub joint_friction: Range<usize>,
     /// Parameters of the learned constants of a known part, the last ones.
     pub known: Range<usize>,
 }
@@ -160,10 +162,13 @@ impl Layout {
         let parameters = dissipation.map_or(parameters, |dissipation| dissipation.direction_range().end);
         let constants = architecture.own_constants().map_or(0, |(_, initial)| initial.len());
         let constants = parameters..parameters + constants;
-        let parameters = constants.end;
+        let friction = form.joint_friction.rows() * n;
+        let joint_friction = constants.end..constants.end + friction;
+        let parameters = joint_friction.end;
         let learned = form.known.as_ref().map_or(0, |known| learned(known));
         let known = parameters..parameters + learned;
-        Self { branches, parameters: known.end, position_features, features, dissipation, constants, known }
+        let parameters = known.end;
+        Self { branches, parameters, position_features, features, dissipation, constants, joint_friction, known }
     }
 }
 

@@ -1,4 +1,4 @@
-//! The network Lagrangian: a sum of multilayer perceptrons as `L(q, v)`, and a Rayleigh dissipation beside it, evaluated
+//! The network Lagrangian: a sum of multilayer perceptrons as `L(q, v)`, and friction beside it, evaluated
 //! in batches.
 //!
 //! ```
@@ -25,6 +25,7 @@ mod features;
 #[cfg(feature = "model-files")]
 pub mod file;
 mod init;
+mod joint_friction;
 mod known;
 mod layout;
 mod model;
@@ -42,9 +43,10 @@ pub use dynamics::{Dynamics, Model};
 pub use factor::Factor;
 #[doc(hidden)]
 pub use init::initial_weights;
+pub use joint_friction::JointFriction;
 #[doc(hidden)]
 pub use layout::{Branch, DissipationLayout, Layer, Layout, LinearMap};
 pub use model::{NetworkError, NetworkLagrangian};
 pub use structure::Structure;
 #[doc(hidden)]
-pub use structure::{Form, Radial};
+pub use structure::{Form, Radial, Sizes};

@@ -106,6 +106,10 @@ impl Architecture {
 }
 
 impl Architecture {
+    /// `true` if there is any friction.
+    pub(crate) fn has_friction(&self) -> bool {
+        self.dissipation.is_some() || !self.form.joint_friction.is_none()
+    }
     /// Outputs of the network.
     pub(crate) fn outputs(&self) -> usize {
         self.form.outputs(self.coordinates, self.time_like.is_some())
@@ -237,7 +241,7 @@ impl<S: Scalar> EulerLagrange<S> for NetworkLagrangian<S> {
     }
 
     fn conserves_energy(&self) -> bool {
-        self.architecture.dissipation.is_none()
+        !self.architecture.has_friction()
     }
 
     /// From about 200,000 weights on: a single state then waits for them longer than threads take to meet.

@@ -36,21 +36,28 @@ impl Lagrangian for Architecture {
 }
 
 impl Architecture {
-    /// The Rayleigh dissipation `D = sum_k softplus(gamma_k + w_k.f(q)) ln cosh(b_k.(v/s))` of states in physical units, 0 for
-    /// a network without one; friction is the generalized force `-dD/dv`.
+    /// The Rayleigh dissipation `D = sum_k softplus(gamma_k + w_k.f(q)) ln cosh(b_k.(v/s))` of states in physical units, with the
+    /// [joint friction](super::JointFriction) beside it; 0 for a network without friction. Friction is the generalized force `-dD/dv`.
     ///
     /// `f(q)` are the input features made of coordinates, `parameters` the flat weights. The unit of `D` is that of `L` per
     /// unit of time. Angles are taken as they are, not wrapped.
     pub fn rayleigh_dissipation<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> R {
         let layout = Layout::new(self);
-        let Some(dissipation) = layout.dissipation else { return R::zero() };
         let (positions, velocities) = (self.position_features_of(q), self.scaled_velocities(v));
+        let joints = &parameters[layout.joint_friction.clone()];
+        let sizes = self.form.sizes.as_ref();
+        let size = |i: usize| sizes.map_or(1.0, |sizes| sizes.friction[i]);
+        let joint = (!joints.is_empty()).then(|| self.form.joint_friction.dissipation(joints, &velocities, size));
+        let Some(dissipation) = layout.dissipation else { return joint.unwrap_or(R::zero()) };
         let gamma = &parameters[dissipation.gamma_range()];
         let strength = R::affine(&parameters[dissipation.weight_range()], gamma, &positions);
         let along = R::affine(&parameters[dissipation.direction_range()], &[], &velocities);
         let (strength, along) = (strength.into_iter().map(R::softplus), along.into_iter().map(R::ln_cosh));
         let (strength, along): (Vec<R>, Vec<R>) = (strength.collect(), along.collect());
-        strength.into_iter().zip(along).fold(R::zero(), |sum, (strength, along)| sum + strength * along)
+        strength
+            .into_iter()
+            .zip(along)
+            .fold(joint.unwrap_or(R::zero()), |sum, (strength, along)| sum + strength * along)
     }
 }
 

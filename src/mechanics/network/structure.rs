@@ -12,6 +12,7 @@
 //! structure but the black box sees positions alone.
 
 use super::factor::{Factor, time_last};
+use super::joint_friction::JointFriction;
 use crate::lagrangian::Description;
 use crate::scalar::Real;
 use serde::{Deserialize, Serialize};
@@ -104,6 +105,34 @@ pub struct Form {
     /// A Lagrangian that is known, in physical units, and added; its constants marked `learn` are learned.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub known: Option<Box<Description>>,
+    /// Friction of every coordinate by itself; files without this key have none.
+    #[serde(skip_serializing_if = "JointFriction::is_none")]
+    pub joint_friction: JointFriction,
+    /// Sizes of the parts; files without this key have all of size 1.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sizes: Option<Sizes>,
+}
+
+/// Usual sizes of the parts of a model, in scaled coordinates, so that a network learns numbers near 1: in an arm gravity is far above
+/// inertia, and the inertia of the first joint far above that of the last one.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Sizes {
+    /// Factor of every scaled velocity in the kinetic energy, `(n)`: its square is the size of `M_ii`.
+    pub velocity: Vec<f64>,
+    /// Factor of the potential.
+    pub potential: f64,
+    /// Factor of the joint friction of every coordinate, `(n)`.
+    pub friction: Vec<f64>,
+}
+
+impl Sizes {
+    /// `true` for `n` positive numbers of each kind.
+    fn are_valid(&self, n: usize) -> bool {
+        let all = || self.velocity.iter().chain(&self.friction).chain([&self.potential]);
+        let lengths = [self.velocity.len(), self.friction.len()];
+        lengths == [n, n] && all().all(|size| size.is_finite() && *size > 0.0)
+    }
 }
 
 /// Cartesian coordinates `x` around a centre, seen near and far alike: each enters as `(x_i/R) ln(R/u)` and as `(x_i/R) (u/R)`, `R` the
@@ -142,6 +171,9 @@ impl Form {
         }
         if self.learn_alpha && structure != Structure::BlackBox {
             return Err(format!("expected no learned alpha for `{name}`, which has no such term"));
+        }
+        if self.sizes.as_ref().is_some_and(|sizes| !sizes.are_valid(n)) {
+            return Err(format!("expected {n} positive sizes of each kind"));
         }
         Ok(())
     }
@@ -185,9 +217,18 @@ impl Form {
     pub(super) fn lagrangian<R: Real>(&self, network: impl Fn(&[R]) -> Vec<R>, state: State<'_, R>) -> R {
         let State { positions, velocities, constants, alpha, time_like } = state;
         let (n, factor) = (velocities.len(), self.factor);
+        let sized: Vec<R>;
+        let (moving, potential) = match &self.sizes {
+            Some(sizes) => {
+                sized = velocities.iter().zip(&sizes.velocity).map(|(&v, &size)| v * R::of(size)).collect();
+                (&sized[..], R::of(sizes.potential))
+            }
+            None => (velocities, R::one()),
+        };
         let with_potentials = |kinetic: R, potentials: &[R]| {
-            let linear = potentials[1..].iter().zip(velocities);
-            linear.fold(kinetic - potentials[0], |sum, (&a, &v)| sum + a * v)
+            let height = if self.sizes.is_some() { potential * potentials[0] } else { potentials[0] };
+            let linear = potentials[1..].iter().zip(moving);
+            linear.fold(kinetic - height, |sum, (&a, &v)| sum + a * v)
         };
         match self.structure {
             Structure::BlackBox => {
@@ -197,20 +238,20 @@ impl Form {
                 };
                 let learned = if self.even_in_v { (at(R::one()) + at(-R::one())) * R::half() } else { at(R::one()) };
                 let signed = |(i, &v): (usize, &R)| if time_like == Some(i) { -(v * v) } else { v * v };
-                let squares = velocities.iter().enumerate().map(signed).fold(R::zero(), |sum, square| sum + square);
+                let squares = moving.iter().enumerate().map(signed).fold(R::zero(), |sum, square| sum + square);
+                let learned = if self.sizes.is_some() { potential * learned } else { learned };
                 learned + constants.first().map_or(R::of(alpha), |&alpha| alpha) * squares
             }
             Structure::Mechanical => {
                 let outputs = network(positions);
                 let (numbers, potentials) = outputs.split_at(factor.numbers(n, false));
-                with_potentials(factor.half_form(numbers, velocities, &time_last(n, None), false), potentials)
+                with_potentials(factor.half_form(numbers, moving, &time_last(n, None), false), potentials)
             }
-            Structure::ConstantMass => with_potentials(
-                factor.half_form(constants, velocities, &time_last(n, None), false),
-                &network(positions),
-            ),
+            Structure::ConstantMass => {
+                with_potentials(factor.half_form(constants, moving, &time_last(n, None), false), &network(positions))
+            }
             Structure::Metric => {
-                factor.half_form(&network(positions), velocities, &time_last(n, time_like), time_like.is_some())
+                factor.half_form(&network(positions), moving, &time_last(n, time_like), time_like.is_some())
             }
         }
     }

@@ -2,7 +2,9 @@
 
 use lnn::lagrangian::Description;
 use lnn::network::file::{FORMAT, Header, ModelFile, StoredPrecision};
-use lnn::network::{ActivationChoice, Architecture, Factor, Form, InputLayer, Layout, Radial, Structure};
+use lnn::network::{
+    ActivationChoice, Architecture, Factor, Form, InputLayer, JointFriction, Layout, Radial, Sizes, Structure,
+};
 use serde_json::json;
 use std::collections::BTreeMap;
 
@@ -37,6 +39,8 @@ fn black_box() -> Header {
         learn_alpha: false,
         radial: Vec::new(),
         known: None,
+        joint_friction: JointFriction::None,
+        sizes: None,
     };
     let architecture = Architecture {
         coordinates: 3,
@@ -68,6 +72,10 @@ fn black_box() -> Header {
     }
 }
 
+fn sizes() -> Sizes {
+    Sizes { velocity: vec![1.5, 0.25, 3.0], potential: 7.0, friction: vec![0.5, 2.0, 1.25] }
+}
+
 /// A model of every kind, by name.
 pub fn kinds() -> Vec<(String, ModelFile<f64>)> {
     let mut kinds = Vec::new();
@@ -89,6 +97,12 @@ pub fn kinds() -> Vec<(String, ModelFile<f64>)> {
         h.architecture.input_layer = InputLayer::Dyt;
     });
     add("friction", &|h| h.architecture.dissipation = Some(3));
+    add("joint friction", &|h| h.architecture.form.joint_friction = JointFriction::Dry);
+    add("joint friction beside friction", &|h| {
+        h.architecture.dissipation = Some(3);
+        h.architecture.form.joint_friction = JointFriction::Stribeck;
+        h.architecture.form.sizes = Some(sizes());
+    });
     add("forces", &|h| h.forces = ["f_theta", "f_x", "f_y"].map(String::from).to_vec());
     add("a described system", &|h| {
         h.description = Some(description(&h.system));
@@ -118,6 +132,7 @@ pub fn kinds() -> Vec<(String, ModelFile<f64>)> {
                 change(&mut h.architecture.form);
             });
         };
+        with("sizes", &|form| form.sizes = Some(sizes()));
         with("even", &|form| form.even_in_v = true);
         with("cyclic", &|form| form.cyclic = vec![0, 2]);
         with("radial", &|form| form.radial = radial());

@@ -10,8 +10,8 @@ use lnn::forward::HyperDual;
 use lnn::lagrangian::{EulerLagrange, Request, Terms};
 use lnn::linalg::Workspace;
 use lnn::network::{
-    ActivationChoice, Architecture, Factor, Form, Initialization, InputLayer, Layout, NetworkLagrangian, Structure,
-    initial_weights,
+    ActivationChoice, Architecture, Factor, Form, Initialization, InputLayer, JointFriction, Layout, NetworkLagrangian,
+    Structure, initial_weights,
 };
 use lnn::optimizers::{Method as Update, Schedule};
 use lnn::rollout::{Method, Options, RolloutError, rollout, rollout_fixed, rollout_together};
@@ -352,6 +352,7 @@ fn config(units: Option<usize>, epochs: usize) -> Config {
             embed_periodic: true,
             input_layer: InputLayer::None,
             dissipation: units,
+            joint_friction: JointFriction::None,
             structure: Structure::BlackBox,
             factor: Factor::Triangle,
             cyclic: Vec::new(),

@@ -242,6 +242,8 @@ fn the_torques_of_a_motion_are_asked_for() {
     assert!(
         (row["external_force"][0].as_f64().unwrap() - 2.0 * row["external_force"][1].as_f64().unwrap()).abs() < 1e-12
     );
+    assert_eq!(row["gravity_force"], row["external_force"]);
+    assert!(["inertial_force", "coriolis_force"].iter().all(|part| row[part][0].as_f64() == Some(0.0)), "{row:?}");
     // Rows that fail say why, the others are as they are alone.
     let mixed = std::fs::read_to_string(&level).unwrap() + "0,1,1e200,0,0,0\n" + "1,1,0,0,0,0\n" + "0,1,0,1e200,0,0\n";
     let run =
@@ -294,4 +296,65 @@ fn a_model_fitted_through_its_motion_has_its_own_losses() {
     let at = history.lines().next().unwrap().split(',').position(|name| name == "validation_loss").unwrap();
     let before = history.lines().skip(1).map(|line| line.split(',').nth(at).unwrap().parse::<f64>().unwrap());
     assert!(before.fold(f64::INFINITY, f64::min) != validation);
+}
+
+/// A few runs with noisy torques, noisier than the accelerations: the torques are what is learned from.
+#[test]
+fn motion_under_noisy_torques_is_learned_by_its_forces() {
+    let folder = Folder::new();
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    let mut noisy = |line: &String| {
+        let numbers: Vec<f64> = line.split(',').map(|x| x.parse().unwrap()).collect();
+        let [upper, lower] = [numbers[2], numbers[3]].map(|q| q + rng.random_range(-0.002..0.002));
+        let [shoulder, elbow] = [numbers[8], numbers[9]].map(|torque| torque + rng.random_range(-1.0..1.0));
+        format!("{},{},{upper},{lower},{shoulder},{elbow}", numbers[0], numbers[1])
+    };
+    let lines: Vec<String> = runs(12).iter().flatten().map(&mut noisy).collect();
+    let data = folder.file("noisy.csv", format!("run,t,upper,lower,shoulder,elbow\n{}\n", lines.join("\n")));
+    let columns =
+        ["--coords", "upper,lower", "--force", "shoulder,elbow", "--trajectory", "run", "--periodic", "upper,lower"];
+    let survey = lnn(&[&["check", &data, "--json"], &columns[..]].concat());
+    let advised: Value = serde_json::from_str(&survey.stdout).unwrap();
+    assert_eq!(advised["targets"], "forces");
+
+    let out = text(&folder.path("out"));
+    let fit = |more: &[&str]| lnn(&[&["fit", &data], &columns[..], &["--hidden", "8", "--epochs", "2"], more].concat());
+    let run = fit(&["--out", &out]);
+    assert_eq!(run.code, Some(0), "{}", run.stderr);
+    let summary: Value = serde_json::from_slice(&fs::read(folder.path("out/summary.json")).unwrap()).unwrap();
+    assert_eq!(summary["targets"], "forces");
+    let errors = summary["force_errors"].as_array().unwrap();
+    assert_eq!(errors.iter().map(|e| e["name"].as_str().unwrap()).collect::<Vec<_>>(), ["upper", "lower"]);
+    let number = |e: &Value, key: &str| e[key].as_f64().unwrap();
+    for e in errors {
+        let (nmse, ratio) = (number(e, "nmse"), number(e, "rms") / number(e, "spread"));
+        assert!((nmse - ratio * ratio).abs() < 1e-9 * nmse, "{e}");
+    }
+    // Two epochs learn nothing: no range is stated, and both forces are named for it.
+    assert!(errors.iter().all(|e| number(e, "nmse") > 0.3) && summary.get("withheld").is_some(), "{errors:?}");
+    assert!(summary["determination"].as_array().unwrap().is_empty());
+    let config: toml::Table = fs::read_to_string(folder.path("out/config.toml")).unwrap().parse().unwrap();
+    assert_eq!(config["targets"].as_str(), Some("forces"));
+    let network = &config["training"]["network"];
+    assert_eq!((network["structure"].as_str(), network["joint_friction"].as_str()), (Some("mechanical"), Some("dry")));
+    let header = ModelFile::<f64>::load(folder.path("out/model.safetensors").as_path()).unwrap().header;
+    assert!(header.architecture.form.sizes.is_some());
+
+    // The model is gone on with, sizes and all, and friction by joint can be had otherwise.
+    let (again, other) = (text(&folder.path("again")), text(&folder.path("other")));
+    assert_eq!(fit(&["--from", &out, "--out", &again]).code, Some(0));
+    let run = fit(&["--out", &other, "--joint-friction", "none", "--structure", "black-box", "--seed", "1"]);
+    assert_eq!(run.code, Some(0), "{}", run.stderr);
+    assert!(!fs::read_to_string(folder.path("other/config.toml")).unwrap().contains("joint_friction"));
+    // Accelerations can be had, too: then no force judges.
+    let smoothed = text(&folder.path("smoothed"));
+    assert_eq!(fit(&["--out", &smoothed, "--targets", "smoothed", "--joint-friction"]).code, Some(0));
+    assert!(fs::read_to_string(folder.path("smoothed/config.toml")).unwrap().contains("joint_friction = \"dry\""));
+    let summary: Value = serde_json::from_slice(&fs::read(folder.path("smoothed/summary.json")).unwrap()).unwrap();
+    assert!(summary["targets"] == "smoothed" && summary.get("force_errors").is_none());
+
+    let refused = |more: &[&str], parts: &[&str]| lnn(&[&["fit", &data], more].concat()).refused(2, parts);
+    let unforced = ["--coords", "upper,lower", "--trajectory", "run", "--targets", "forces"];
+    refused(&unforced, &["--targets forces", "--force"]);
+    refused(&[&columns[..], &["--joint-friction", "wet"]].concat(), &["--joint-friction", "stribeck", "wet"]);
 }

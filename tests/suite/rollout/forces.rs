@@ -3,7 +3,7 @@
 use crate::common::damped;
 use lnn::lagrangian::systems::double_pendulum::DoublePendulum;
 use lnn::lagrangian::systems::harmonic_oscillator::HarmonicOscillator;
-use lnn::lagrangian::{EulerLagrange, Lagrangian, Mechanics, Request, Terms, inverse_dynamics};
+use lnn::lagrangian::{EulerLagrange, Lagrangian, Mechanics, Request, Terms, force_parts, inverse_dynamics};
 use lnn::rollout::{
     Driven, Force, Integrable, Method, Options, Rollout, RolloutError, SampledForce, Start, rollout, rollout_each,
 };
@@ -272,6 +272,12 @@ fn a_force_that_fails_is_named() {
     assert!(driven.acceleration(0.6, &[0.0], &[0.0]).is_err());
 }
 
+fn terms_of(model: &dyn EulerLagrange<f64>, q: &[f64], v: &[f64]) -> Terms<f64> {
+    let mut terms = Terms::default();
+    model.terms(q, v, Request::MASS_MATRIX, &mut terms).unwrap();
+    terms
+}
+
 /// The inverse question gives back what drove.
 #[test]
 fn the_forces_of_a_motion_are_found_again() {
@@ -298,6 +304,19 @@ fn the_forces_of_a_motion_are_found_again() {
     let found = inverse_dynamics(&free, &q, &v, &terms.acceleration).unwrap();
     assert!(found.friction.is_empty() && found.generalized == found.external);
     assert!(found.external.iter().all(|f| f.abs() < 1e-12), "{found:?}");
+    // Twice the speed at the same acceleration has four times the Coriolis force, and the same of the others.
+    let twice: Vec<f64> = v.iter().map(|v| 2.0 * v).collect();
+    let [slow, fast] = [&v[..], &twice].map(|v| force_parts(&free, &q, v, &a).unwrap());
+    let close = |x: f64, y: f64| (x - y).abs() < 1e-11;
+    let found = inverse_dynamics(&free, &q, &v, &a).unwrap().external;
+    for k in 0..4 {
+        assert!(close(fast.coriolis[k], 4.0 * slow.coriolis[k]) && slow.coriolis[k].abs() > 1e-3, "{slow:?} {fast:?}");
+        assert!(close(fast.inertial[k], slow.inertial[k]) && close(fast.gravity[k], slow.gravity[k]));
+        assert!(close(slow.inertial[k] + slow.coriolis[k] + slow.gravity[k], found[k]), "{slow:?} {found:?}");
+        let mass = |j: usize| terms_of(&free, &q, &v).mass_matrix[k / 2 * 4 + k % 2 * 2 + j];
+        assert!(close(slow.inertial[k], mass(0) * a[k / 2 * 2] + mass(1) * a[k / 2 * 2 + 1]));
+    }
+    assert!(slow.friction.is_empty() && force_parts(&free, &q, &v, &a[..2]).is_err());
     assert!(inverse_dynamics(&free, &q, &v, &a[..2]).is_err());
     assert!(inverse_dynamics(&free, &q, &v, &[f64::NAN; 4]).is_err());
 }

@@ -4,6 +4,7 @@ mod checkpoints;
 mod constraints;
 mod faults;
 mod faulty;
+mod force_residuals;
 mod left_out;
 mod objective;
 mod penalties;

@@ -8,7 +8,8 @@ use lnn::data::{Dataset, Datasets};
 use lnn::forward::HyperDual;
 use lnn::lagrangian::{Lagrangian, MechanicsError};
 use lnn::network::{
-    ActivationChoice, Architecture, Factor, Form, Initialization, InputLayer, Layout, Structure, initial_weights,
+    ActivationChoice, Architecture, Factor, Form, Initialization, InputLayer, JointFriction, Layout, Structure,
+    initial_weights,
 };
 use lnn::optimizers::{Method, Schedule};
 use lnn::scalar::{Dd, Real, Scalar};
@@ -455,6 +456,7 @@ fn config(epochs: usize) -> Config {
             embed_periodic: true,
             input_layer: InputLayer::None,
             dissipation: None,
+            joint_friction: JointFriction::None,
             structure: Structure::BlackBox,
             factor: Factor::Triangle,
             cyclic: Vec::new(),

@@ -164,7 +164,7 @@ pub fn survey(reading: &LoadedRecording, options: &SurveyOptions) -> Result<Surv
         suspicious,
         suspicious_count,
         degree: planned.degree,
-        targets: Targets::advised(recording.has_accelerations(), planned.acceleration_error()),
+        targets: Targets::advised(recording, &planned),
         held_out_text: held_out.as_ref().map(|held| held.describe(recording)).unwrap_or_default(),
         held_out,
         motionless: Vec::new(),

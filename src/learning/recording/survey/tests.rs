@@ -56,6 +56,23 @@ fn loud_noise_calls_for_shooting() {
 }
 
 #[test]
+fn noisy_forces_are_learned_from_and_exact_ones_are_not() {
+    let driven = |sigma: f64, force: fn(usize) -> f64| {
+        let mut recording = swing(sigma, 100.0, None);
+        let track = &mut recording.tracks[0];
+        track.force = (0..track.q.len()).map(force).collect();
+        look(recording).targets
+    };
+    let smooth = |k: usize| (0.01 * k as f64).sin();
+    let noisy = |k: usize| (0.01 * k as f64).sin() + 0.3 * (1e4 * (k as f64).sin()).sin();
+    assert_eq!(driven(1e-3, noisy), Targets::Forces);
+    assert_eq!(driven(1e-3, smooth), Targets::Smoothed);
+    assert_eq!(driven(0.3, smooth), Targets::Motion);
+    // A force that never changes could as well be part of L.
+    assert_eq!(driven(1e-3, |_| 1.0), Targets::Smoothed);
+}
+
+#[test]
 fn coarse_sampling_is_told() {
     let found = look(swing(1e-4, 8.0, None));
     assert!(found.warnings.iter().any(|w| w.contains("samples per period")), "{:?}", found.warnings);

@@ -173,6 +173,10 @@ fn slots(architecture: &Architecture) -> Result<Vec<Slot>, ModelFileError> {
     if let Some((name, initial)) = architecture.own_constants() {
         slots.push(Slot { name: name.to_string(), shape: vec![initial.len()], range: layout.constants });
     }
+    if !layout.joint_friction.is_empty() {
+        let shape = vec![architecture.form.joint_friction.rows(), architecture.coordinates];
+        slots.push(Slot { name: "joint_friction".to_string(), shape, range: layout.joint_friction });
+    }
     if !layout.known.is_empty() {
         slots.push(Slot { name: "known".to_string(), shape: vec![layout.known.len()], range: layout.known });
     }

@@ -79,7 +79,8 @@ fn columns(layout: &Layout, weights: &[f64]) -> Vec<(usize, f64)> {
     let outputs = layout.branches.iter().filter_map(|branch| branch.layers.last());
     let outputs = outputs.map(|layer| layer.weight_range().chain(layer.bias_range()).collect::<Vec<_>>());
     let friction = layout.dissipation.iter().map(|dissipation| dissipation.gamma_range().collect());
-    for kind in outputs.chain(friction) {
+    let joints = (!layout.joint_friction.is_empty()).then(|| layout.joint_friction.clone().collect());
+    for kind in outputs.chain(friction).chain(joints) {
         let size = (kind.iter().map(|&k| weights[k] * weights[k]).sum::<f64>() / kind.len() as f64).sqrt();
         let stride = kind.len().div_ceil(WEIGHTS).max(1);
         columns.extend(kind.into_iter().step_by(stride).filter(|_| size > 0.0).map(|k| (k, size)));

@@ -32,7 +32,7 @@ impl Observed {
     /// As [`RecordingSplit::datasets`].
     pub fn new(measured: &RecordingSplit, targets: Targets) -> Result<Self, RecordingSplitError> {
         let data = measured.datasets::<f64>(targets)?.training.remove(0);
-        let finer = if targets == Targets::Measured { None } else { measured.finer_accelerations() };
+        let finer = if is_derived(measured, targets) { measured.finer_accelerations() } else { None };
         let finer = finer.filter(|finer| finer.len() == data.a().len()).map(|finer| some(data.coordinates(), &finer));
         Ok(Self { finer: finer.unwrap_or_default(), ..Self::of(&data, measured, targets) })
     }
@@ -54,7 +54,7 @@ impl Observed {
         let n = data.coordinates();
         let some = |values: &[f64]| some(n, values);
         let quality = || measured.smoothing.coordinates.iter().map(|c| &c.quality);
-        let derived = targets != Targets::Measured;
+        let derived = is_derived(measured, targets);
         let samples = measured.training.recording.samples() as f64;
         let independent = quality().map(|quality| {
             let half = std::f64::consts::PI * quality.velocity / quality.acceleration / measured.smoothing.step;
@@ -97,6 +97,11 @@ impl Observed {
         };
         (0..count).filter(outside).count() as f64 / f64::max(1.0, count as f64)
     }
+}
+
+/// `true` if accelerations were taken by smoothing.
+fn is_derived(measured: &RecordingSplit, targets: Targets) -> bool {
+    !(targets.takes_measured() && measured.training.recording.has_accelerations())
 }
 
 /// Evenly spaced rows of `n` numbers, at most about [`STATES`].

@@ -1,0 +1,74 @@
+//! Friction of every coordinate by itself, as the joints of a machine have it: beside a Rayleigh dissipation, or alone.
+//!
+//! With the scaled velocity `w` of a coordinate and the size `F` of its friction, [`Sizes::friction`](super::Sizes), it is the dissipation
+//!
+//! ```text
+//! F (softplus(a) w^2/2 + softplus(b) k ln cosh(w/k) + softplus(c) u (1 - exp(-(w/u)^2)))
+//! ```
+//!
+//! of a viscous force, a dry one that is fully there beyond the speed `k = exp(knee)`, and, for [`JointFriction::Stribeck`], one that
+//! stands above these near the speed `u = exp(fall)` and falls off beyond. All three forces are against the velocity.
+
+use crate::scalar::Real;
+use serde::{Deserialize, Serialize};
+
+/// Friction that every coordinate has by itself.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum JointFriction {
+    /// None.
+    #[default]
+    None,
+    /// Viscous and dry friction.
+    Dry,
+    /// Viscous and dry friction, and a larger one at low speeds.
+    Stribeck,
+}
+
+/// Initial strengths: `softplus(-3) = 0.049` of the size.
+const STRENGTH: f64 = -3.0;
+/// Initial knee and fall: 0.05 of the scale of the velocities.
+const SPEED: f64 = 0.05;
+
+impl JointFriction {
+    /// `true` if there is none.
+    pub(crate) fn is_none(&self) -> bool {
+        *self == Self::None
+    }
+
+    /// Initial parameters of `n` coordinates, row by row: `a`, `b`, the knee, then `c` and the fall.
+    pub(super) fn initial(self, n: usize) -> Vec<f64> {
+        let rows = [STRENGTH, STRENGTH, SPEED.ln(), STRENGTH, SPEED.ln()];
+        rows.into_iter().take(self.rows()).flat_map(|row| vec![row; n]).collect()
+    }
+
+    /// Parameters of one coordinate.
+    pub(crate) fn rows(self) -> usize {
+        match self {
+            Self::None => 0,
+            Self::Dry => 3,
+            Self::Stribeck => 5,
+        }
+    }
+
+    /// The dissipation at scaled velocities, from the parameters; `size` is that of every coordinate.
+    pub(super) fn dissipation<R: Real>(self, parameters: &[R], velocities: &[R], size: impl Fn(usize) -> f64) -> R {
+        let n = velocities.len();
+        let rows: Vec<&[R]> = parameters.chunks_exact(n).collect();
+        let one = |(i, &w): (usize, &R)| {
+            let [viscous, dry, knee] = [0, 1, 2].map(|row: usize| rows[row][i]);
+            let knee = knee.exp();
+            let both = viscous.softplus() * w.sqr() * R::half() + dry.softplus() * knee * (w / knee).ln_cosh();
+            let all = match rows[3..] {
+                [rise, fall] => {
+                    let fall = fall[i].exp();
+                    both + rise[i].softplus() * fall * (R::one() - (-(w / fall).sqr()).exp())
+                }
+                _ => both,
+            };
+            all * R::of(size(i))
+        };
+        velocities.iter().enumerate().map(one).fold(R::zero(), |sum, one| sum + one)
+    }
+}
