@@ -26,6 +26,8 @@ const INTEGRATOR: f64 = 0.05;
 const MOST_SUBSTEPS: usize = 64;
 /// Longer segments may be met worse by this factor of the mean square.
 const WORSE: f64 = 1.5;
+/// Decrease of the mean logarithm of the errors that longer segments must bring.
+const GAIN: f64 = 0.01;
 /// Segments from which on their scatter tells how far errors are to be widened.
 const MANY: usize = 8;
 /// Root mean square of residuals over the noise up to which a form explains the motion.
@@ -381,7 +383,7 @@ fn grown(problem: &mut Problem<'_>, mut fitted: Fitted, wanted: Option<f64>) -> 
         refit(problem, &mut longer);
         log(&longer, "longer");
         let met = longer.normal.failed == 0 && longer.mean_square() < WORSE * fitted.mean_square();
-        if wanted.is_none() && !(met && longer.spread() < fitted.spread()) {
+        if wanted.is_none() && !(met && longer.spread() < fitted.spread() - GAIN) {
             problem.course.substeps = fitted.substeps;
             break;
         }
