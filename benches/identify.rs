@@ -108,7 +108,9 @@ fn duffing(samples: usize) -> Outcome<()> {
     let learned = samples * 4 / 5;
     let mut part = recording.clone();
     let track = &mut part.tracks[0];
-    (track.times.truncate(learned), track.q.truncate(learned), track.force.truncate(learned));
+    for column in [&mut track.times, &mut track.q, &mut track.force] {
+        column.truncate(learned);
+    }
     for between in [None, Some(Between::Held), Some(Between::Linear), Some(Between::BandLimited)] {
         let started = Instant::now();
         let found = identify(&system("duffing.toml", &[])?, &part, &IdentifyOptions { between, ..options(&[]) })?;
