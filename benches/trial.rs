@@ -4,6 +4,7 @@
 
 mod constraints;
 mod formula;
+mod identify;
 mod linalg;
 mod measured;
 mod network;
@@ -31,6 +32,7 @@ fn main() {
     soak::soak(0.0);
     measured::trial();
     formula::trial();
+    identify::trial();
     work_precision::trial();
     constraints::trial();
     open_tables::trial();

@@ -13,6 +13,7 @@
 //! | [`symmetries`] | symmetries of a Lagrangian, charges along motion, comparison of two Lagrangians |
 //! | [`constraints`] | constraints beside a Lagrangian, found in data, kept in roll-outs; degenerate Lagrangians |
 //! | [`formula`] | a Lagrangian as a formula, from recorded motion or from a model |
+//! | [`identify`] | the constants of a Lagrangian whose form is known, from recorded motion |
 //! | [`certificates`] | proofs that a mass matrix has its signature |
 //! | [`summary`] | `summary.json` and `evaluation.json`, key by key |
 //! | [`method`] | equations, penalties, identities, units and conventions |
@@ -51,6 +52,7 @@ macro_rules! page {
             "[canonical]: crate::docs::symmetries#canonical-form\n",
             "[constraints]: crate::docs::constraints\n",
             "[formula]: crate::docs::formula\n",
+            "[identify]: crate::docs::identify\n",
             "[certificates]: crate::docs::certificates\n",
             "[method]: crate::docs::method\n",
             "[conventions]: crate::docs::method#units-and-conventions\n",
@@ -95,6 +97,7 @@ pages! {
     symmetries "symmetries.md";
     constraints "constraints.md";
     formula "formula.md";
+    identify "identify.md";
     certificates "certificates.md";
     summary "summary.md";
     method "method.md";

@@ -33,6 +33,7 @@
 //! | put constraints beside a Lagrangian, find those that recorded motion obeys | [`lagrangian::Constrained`], [`constraints`] |
 //! | find what a Lagrangian conserves, compare two Lagrangians | [`symmetry::symmetries`], [`symmetry::quadratic`], [`symmetry::compare`] |
 //! | read a Lagrangian as a formula, from motion or from a model | [`formula`] |
+//! | find the constants of a Lagrangian whose form is known | [`identification`] |
 //! | see the shadow of a black hole and the sky around it | [`relativity::shadow()`], [`relativity::outline`] |
 //! | prove where a mass matrix has its signature | [`certificate`] |
 //! | test a model: energy, coordinates, Lyapunov exponents | [`analysis`] |
@@ -183,7 +184,7 @@ pub use numerics::{forward, linalg, scalar, tape};
 #[cfg(feature = "data")]
 pub use physics::constraints;
 #[cfg(feature = "training")]
-pub use physics::{analysis, formula};
+pub use physics::{analysis, formula, identification};
 pub use physics::{certificate, geometry};
 #[cfg(feature = "rollout")]
 pub use physics::{relativity, symmetry};

@@ -9,6 +9,7 @@
 //! | [`analysis`] | errors of accelerations, energy and trajectories, Lyapunov times, what data determine |
 //! | [`relativity`] | black holes, light in a metric |
 //! | [`formula`] | a Lagrangian as a formula, from motion or from a model |
+//! | [`identification`] | the constants of a Lagrangian whose form is known, from motion |
 
 #[cfg(feature = "training")]
 pub mod analysis;
@@ -18,6 +19,8 @@ pub mod constraints;
 #[cfg(feature = "training")]
 pub mod formula;
 pub mod geometry;
+#[cfg(feature = "training")]
+pub mod identification;
 #[cfg(feature = "rollout")]
 pub mod relativity;
 #[cfg(feature = "rollout")]

@@ -24,6 +24,7 @@ mod folder;
 mod forces;
 mod formula;
 mod geometry;
+mod identify;
 mod input;
 mod inspect;
 mod interrupt;
@@ -132,6 +133,8 @@ enum Command {
     Symmetries(symmetries::Args),
     /// Print the Lagrangian of recorded motion, or of a model, as a formula.
     Formula(Box<formula::Args>),
+    /// Find the constants of a Lagrangian whose form is known, from recorded motion.
+    Identify(Box<identify::Args>),
     /// Compare two Lagrangians up to factor and gauge.
     Compare(compare::Args),
     /// Prove where the mass matrix has its signature, and a bound of its condition number.
@@ -190,6 +193,7 @@ fn run(command: Command) -> Result<(), CliError> {
         Command::Page(args) => page::run(&args),
         Command::Symmetries(args) => symmetries::run(&args),
         Command::Formula(args) => formula::run(&args),
+        Command::Identify(args) => identify::run(&args),
         Command::Compare(args) => compare::run(&args),
         Command::Certify(args) => certify::run(&args),
         Command::Completions(args) => manual::completions(&args, Cli::command()),

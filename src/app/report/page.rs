@@ -89,7 +89,7 @@ pub fn page(
     Ok(text)
 }
 
-/// The exact Lagrangian with its parameters; none of a system that has no Lagrangian to be shown.
+/// The exact Lagrangian with its parameters; none of a system whose Lagrangian alone does not tell its motion.
 fn exact(system: &SystemInstance<f64>) -> Result<Option<Value>, TapeError> {
     struct List {
         n: usize,
@@ -101,6 +101,9 @@ fn exact(system: &SystemInstance<f64>) -> Result<Option<Value>, TapeError> {
             let Self { n, parameters } = self;
             Listing::record::<f64, _>(2 * n, parameters, |x, p| lagrangian.lagrangian(p, &x[..n], &x[n..]))
         }
+    }
+    if system.dissipation().is_some() {
+        return Ok(None);
     }
     let list = List { n: system.coordinates, parameters: system.parameters.len() };
     let Some(listing) = system.visit(list).transpose()? else { return Ok(None) };

@@ -1,10 +1,11 @@
 //! The hand-written systems by name: description, Euler-Lagrange terms, closed-form acceleration.
 
 use super::derivatives::{State, evaluate};
+use super::equations::Friction;
 use super::system::{ClosedForm, System};
 use super::{
-    Constrained, ConstraintError, EulerLagrange, ExpressionConstraints, ExpressionLagrangian, Lagrangian, Mechanics,
-    Request, Terms, constrained_descriptions,
+    Constrained, ConstraintError, EulerLagrange, ExpressionConstraints, ExpressionLagrangian, GeneralizedForce,
+    Lagrangian, Mechanics, Rayleigh, Request, Terms, WithForces, constrained_descriptions,
 };
 use crate::linalg::Workspace;
 use crate::names::unknown;
@@ -232,6 +233,10 @@ impl<S: Scalar> SystemInstance<S> {
     /// [`Dd`].
     pub fn build(&self) -> Result<Box<dyn EulerLagrange<S>>, SystemError> {
         let free = construct_once(self).ok_or_else(|| unknown_system(&self.system.name))?;
+        let free: Box<dyn EulerLagrange<S>> = match self.friction() {
+            None => free,
+            Some(friction) => Box::new(WithForces::new(free, Rayleigh(friction))),
+        };
         match self.constraints() {
             None => Ok(free),
             Some(constraints) => {
@@ -248,6 +253,15 @@ impl<S: Scalar> SystemInstance<S> {
     /// The constraints of a system by its description.
     pub fn constraints(&self) -> Option<&ExpressionConstraints> {
         self.system.described.as_ref()?.constraints.as_ref()
+    }
+    /// The dissipation function of a system by its description; its parameters are the Lagrangian's.
+    pub fn dissipation(&self) -> Option<&ExpressionLagrangian> {
+        self.system.described.as_ref()?.dissipation.as_ref()
+    }
+    /// The same with the values of the parameters.
+    fn friction(&self) -> Option<Friction<S>> {
+        let function = self.dissipation()?.clone();
+        Some(Friction { function, parameters: self.parameters.clone() })
     }
     /// States within the bounds of the validation, at which constraints are examined.
     fn anywhere(&self) -> (Vec<S>, Vec<S>) {
@@ -277,7 +291,7 @@ impl<S: Scalar> SystemInstance<S> {
             return Err(SystemError::Constraints { system, problem: problem.to_string() });
         }
         Ok(match &self.system.described {
-            Some(described) => differentiated(&described.lagrangian, &self.parameters, q, v),
+            Some(described) => differentiated(&described.lagrangian, self.friction(), &self.parameters, q, v),
             None => closed(self, q, v),
         })
     }
@@ -332,7 +346,13 @@ impl<S: Scalar> SystemInstance<S> {
 }
 
 /// The acceleration of one state by the Euler-Lagrange equations of a Lagrangian.
-fn differentiated<S: Scalar>(lagrangian: &ExpressionLagrangian, parameters: &[S], q: &[S], v: &[S]) -> Vec<S> {
+fn differentiated<S: Scalar>(
+    lagrangian: &ExpressionLagrangian,
+    friction: Option<Friction<S>>,
+    parameters: &[S],
+    q: &[S],
+    v: &[S],
+) -> Vec<S> {
     let mut terms = Terms::default();
     let (n, need) = (q.len(), Request::ACCELERATION);
     let Terms { lagrangian: value, momentum, dl_dq, mass_matrix, coriolis, .. } = &mut terms;
@@ -347,6 +367,10 @@ fn differentiated<S: Scalar>(lagrangian: &ExpressionLagrangian, parameters: &[S]
         need,
         &mut State { lagrangian: value, momentum, dl_dq, mass_matrix, coriolis },
     );
+    if let Some(friction) = friction {
+        terms.force.resize(n, S::nan());
+        Rayleigh(friction).force(q, v, &mut terms.force);
+    }
     // A row that fails has the acceleration NaN, which is what there is to say of one state.
     let _ = terms.complete(q.len(), v, Request::ACCELERATION, &mut Workspace::new());
     terms.acceleration

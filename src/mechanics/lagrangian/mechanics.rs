@@ -67,8 +67,8 @@ impl<L: Lagrangian, S: Scalar> Form<S> for L {
 
 /// A recorded Lagrangian: its one output is the value.
 #[derive(Debug)]
-struct Recorded<S> {
-    value: Program<S>,
+pub(super) struct Recorded<S> {
+    pub(super) value: Program<S>,
 }
 
 impl<S: Scalar> Lagrangian for Recorded<S> {

@@ -9,6 +9,7 @@ mod constrained_systems;
 mod constraints;
 mod derivatives;
 mod description;
+mod equations;
 mod error;
 mod euler_lagrange;
 mod expression;
@@ -39,6 +40,8 @@ pub use constraints::{Constrained, ConstraintError, Constraints, ExpressionConst
 pub use constraints::{LeastNorm, LeastNormMotion, Manifold, ManifoldRows, OffManifold, ReducedMass, project};
 pub(crate) use description::pair;
 pub use description::{Description, DescriptionError};
+#[cfg(feature = "training")]
+pub(crate) use equations::Equations;
 pub use error::MechanicsError;
 #[doc(hidden)]
 pub use expression::{Expression, ExpressionError};

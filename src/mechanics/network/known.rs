@@ -12,6 +12,11 @@ use std::collections::BTreeMap;
 /// The system that a known part describes.
 pub(super) fn system(description: &Description, n: usize) -> Result<System, String> {
     let system = description.system().map_err(|error| error.to_string())?;
+    if description.dissipation.is_some() {
+        return Err(
+            "dissipation: a grey box knows a Lagrangian alone; leave the key out, and learn friction beside it".into(),
+        );
+    }
     match description.coordinates.len() {
         found if found == n => Ok(system),
         found => Err(format!("expected {n} coordinates, found {found}")),

@@ -229,7 +229,7 @@ impl FoundFormula {
         let sum: Vec<String> = own.iter().enumerate().map(|(k, t)| format!("c{}*{}", k + 1, t.term)).collect();
         text += &format!("lagrangian = {:?}\n", sum.join(" + "));
         if self.terms.iter().any(|t| t.dissipation) {
-            text += &format!("# Dissipation, which is no part of a system: D = {}\n", self.text(true));
+            text += &format!("# With friction (a grey box learns its own): dissipation = \"{}\"\n", self.text(true));
         }
         for (i, name) in self.coordinates.iter().enumerate() {
             text += &format!("\n[[coordinates]]\nname = {name:?}\n");

@@ -11,7 +11,7 @@ pub(super) fn inverse(n: usize, matrix: &[f64]) -> Option<Vec<f64>> {
 }
 
 /// [`inverse`] with so much added to the diagonal, relative to it.
-pub(super) fn inverse_with(n: usize, matrix: &[f64], ridge: f64) -> Option<Vec<f64>> {
+pub(crate) fn inverse_with(n: usize, matrix: &[f64], ridge: f64) -> Option<Vec<f64>> {
     let diagonal = |i: usize| matrix[i * n + i];
     let scale: Vec<f64> = (0..n).map(|i| if diagonal(i) > 0.0 { diagonal(i).sqrt().recip() } else { 1.0 }).collect();
     let scaled =
@@ -24,7 +24,7 @@ pub(super) fn inverse_with(n: usize, matrix: &[f64], ridge: f64) -> Option<Vec<f
 }
 
 /// `A x`.
-pub(super) fn times(n: usize, matrix: &[f64], x: &[f64]) -> Vec<f64> {
+pub(crate) fn times(n: usize, matrix: &[f64], x: &[f64]) -> Vec<f64> {
     (0..n).map(|i| dot(&matrix[i * n..(i + 1) * n], x)).collect()
 }
 

@@ -33,7 +33,7 @@ mod find;
 mod found;
 mod function;
 mod library;
-mod linear;
+pub(crate) mod linear;
 mod motion;
 mod regress;
 mod select;

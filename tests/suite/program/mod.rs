@@ -13,6 +13,7 @@ mod forces;
 mod formula;
 mod geometry;
 mod hostile;
+mod identify;
 mod inspect;
 mod limits;
 mod motion;

@@ -3,6 +3,9 @@
 #[path = "../../../examples/formula.rs"]
 mod formula;
 #[allow(dead_code, reason = "its functions are called")]
+#[path = "../../../examples/gps.rs"]
+mod gps;
+#[allow(dead_code, reason = "its functions are called")]
 #[path = "../../../examples/load_model.rs"]
 mod load_model;
 #[allow(dead_code, reason = "its functions are called")]
@@ -49,6 +52,21 @@ fn argmin_identifies_a_system() {
 #[test]
 fn a_recorded_arm_is_read_as_a_formula() {
     formula::main().unwrap();
+}
+
+#[test]
+fn orbits_that_are_read_from_text_weigh_the_earth() {
+    let text = "#cP2010\n*  2010  6 30 23 45  0.00000000\nPG01  18392.619117   7490.690408 -17846.346485 999999.999999\n\
+        *  2010  7  1  0  0  0.00000000\nPG01  18392.619118   7490.690408 -17846.346485\nPG02      0.000000      0.000000      0.000000\n";
+    let tracks = gps::read(text).unwrap();
+    assert_eq!((tracks.len(), &tracks[0].times[..]), (1, &[85_500.0, 86_400.0][..]));
+    assert_eq!(tracks[0].q[..3], [18_392_619.117, 7_490_690.408, -17_846_346.485]);
+    // Sun and Moon pull a satellite by some millionths of its acceleration of 0.56 m/s^2.
+    let pull = tracks[0].force[..3].iter().map(|f| f * f).sum::<f64>().sqrt();
+    assert!((1e-7..1e-5).contains(&pull), "{pull}");
+    let wrong = text.replace("7490.690408 -17846.346485\n", "7490.690408 -17846.34x485\n");
+    assert!(gps::read(&wrong).unwrap_err().to_string().contains("row 5"));
+    gps::made().unwrap();
 }
 
 #[test]

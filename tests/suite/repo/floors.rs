@@ -9,7 +9,10 @@ const FLOORS: [(&str, &[&str]); 6] = [
     ("support", &["names", "storage"]),
     ("mechanics", &["lagrangian", "rollout", "network"]),
     ("learning", &["recording", "optimizers", "configuration", "data", "training", "shooting", "presets"]),
-    ("physics", &["geometry", "constraints", "symmetry", "certificate", "analysis", "relativity", "formula"]),
+    (
+        "physics",
+        &["geometry", "constraints", "symmetry", "certificate", "analysis", "relativity", "formula", "identification"],
+    ),
     ("app", &["experiments", "report", "pipeline", "cli"]),
 ];
 

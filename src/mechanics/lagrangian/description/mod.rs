@@ -32,6 +32,9 @@ pub struct Description {
     /// `L` of coordinates, velocities `NAME_dot`, parameters and definitions; either this or a metric.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub lagrangian: Option<String>,
+    /// Rayleigh's dissipation function `D` of the same names, of which the force is `-dD/dv`; none if left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub dissipation: Option<String>,
     /// Coordinates, in order.
     pub(crate) coordinates: Vec<CoordinateDescription>,
     /// Constants by name.
@@ -134,6 +137,17 @@ impl TrajectoryDescription {
 }
 
 impl Description {
+    /// The same with other values of parameters, by name.
+    pub fn with_defaults(&self, values: &[(&str, f64)]) -> Self {
+        let mut changed = self.clone();
+        for (name, value) in values {
+            if let Some(parameter) = changed.parameters.get_mut(*name) {
+                parameter.default = Decimal(format!("{value:?}"));
+            }
+        }
+        changed
+    }
+
     /// A system of a Lagrangian and constraints; coordinates with units, bounds and those of their velocities, parameters with
     /// defaults, units and ranges.
     pub(super) fn of_parts<'a>(
@@ -161,6 +175,7 @@ impl Description {
             title: Some(title.to_string()),
             time_unit: time_unit.to_string(),
             lagrangian: Some(lagrangian),
+            dissipation: None,
             coordinates: coordinates.map(coordinate).collect(),
             parameters: parameters.map(parameter).collect(),
             definitions: BTreeMap::new(),
@@ -200,6 +215,8 @@ pub struct Described {
     pub description: Description,
     /// Its Lagrangian; parameters in the order of their names.
     pub lagrangian: ExpressionLagrangian,
+    /// Its dissipation function, if it has one; parameters as the Lagrangian's.
+    pub dissipation: Option<ExpressionLagrangian>,
     /// Its constraints, if there are any; parameters as the Lagrangian's.
     pub constraints: Option<ExpressionConstraints>,
     /// The velocity of the time-like coordinate on the mass shell.

@@ -69,6 +69,7 @@ impl Description {
                 return Err(DescriptionError::new("", problem));
             }
         };
+        let dissipation = self.friction(&mut compiler, &scope)?;
         let constraints = self.constraints(&mut compiler, &scope)?;
         let base = self.base_bounds(shell.and(time_like))?;
         let training = self.bounds("training", &self.training, base.clone())?;
@@ -94,6 +95,8 @@ impl Description {
             described: Some(Arc::new(Described {
                 description: self.clone(),
                 lagrangian: ExpressionLagrangian::compiled((n, self.parameters.len()), compiler.formula(value)),
+                dissipation: dissipation
+                    .map(|value| ExpressionLagrangian::compiled((n, self.parameters.len()), compiler.formula(value))),
                 constraints,
                 shell: shell.map(|shell| compiler.formula(shell)),
                 around_centre,
@@ -217,6 +220,17 @@ impl Description {
             }
         }
         Ok(value)
+    }
+
+    /// The dissipation function, which moves nothing unless it depends on a velocity.
+    fn friction(&self, compiler: &mut Compiler, scope: &BTreeMap<String, Meaning>) -> Outcome<Option<Value>> {
+        let Some(text) = &self.dissipation else { return Ok(None) };
+        let expression: Expression = text.parse().map_err(DescriptionError::formula("dissipation"))?;
+        let value = compiler.add(&expression, scope, false).map_err(DescriptionError::formula("dissipation"))?;
+        if compiler.velocities(value).is_empty() {
+            return Err(DescriptionError::new("dissipation", "expected a velocity in it, such as theta_dot"));
+        }
+        Ok(Some(value))
     }
 
     /// The formulas that vanish.

@@ -1,0 +1,334 @@
+//! `lnn identify`: the constants of a system whose form is known, from recorded motion.
+
+use crate::cli::number::{positive, seconds, thread_count, threads};
+use crate::cli::recording_args::RecordingArgs;
+use crate::cli::source::parameter;
+use crate::cli::{CliError, chosen, output, parse_system};
+use crate::identification::{Between, Identified, IdentifyError, IdentifyOptions, Undetermined, identify};
+use crate::lagrangian::{SystemInstance, configure_system};
+use crate::names::{number, pluralize, rounded};
+use crate::recording::LoadedRecording;
+use crate::report::text_table;
+use crate::storage::{check_target, write_atomically};
+use serde_json::{Map, Value, json};
+use std::path::{Path, PathBuf};
+
+/// Outliers that are printed.
+const SHOWN: usize = 10;
+
+/// Arguments.
+#[derive(Clone, Debug, clap::Args)]
+#[command(mut_args(of_the_system))]
+pub struct Args {
+    #[command(flatten)]
+    recording: RecordingArgs,
+    /// The system whose constants are unknown, by name or by the file that describes it.
+    #[arg(long, value_name = "NAME|FILE.toml")]
+    system: String,
+    /// The unknown constants, by symbol [default: those with learn = true in the file; all if there are none].
+    #[arg(long, value_name = "SYMBOL,..", value_delimiter = ',')]
+    constants: Vec<String>,
+    /// Value of a parameter: of an unknown constant where the search starts; may be repeated.
+    #[arg(long, value_name = "SYMBOL=VALUE", value_parser = parameter)]
+    param: Vec<(String, String)>,
+    /// Coordinates whose sensor has an unknown offset.
+    #[arg(long, value_name = "q1,q2", value_delimiter = ',')]
+    offset: Vec<String>,
+    /// Coordinates whose sensor has an unknown gain.
+    #[arg(long, value_name = "q1,q2", value_delimiter = ',')]
+    gain: Vec<String>,
+    /// Coordinates whose sensor is late by an unknown time.
+    #[arg(long, value_name = "q1,q2", value_delimiter = ',')]
+    delay: Vec<String>,
+    /// Standard deviation of the noise of every coordinate [default: estimated].
+    #[arg(long, value_name = "S1,S2,..", value_delimiter = ',', allow_hyphen_values = true, value_parser = positive)]
+    noise: Option<Vec<f64>>,
+    /// Known forces between the samples [default: what meets the motion best].
+    #[arg(long, value_enum, value_name = "WAY")]
+    between: Option<Way>,
+    /// Length of the segments that are followed, in s [default: what makes the constants best known].
+    #[arg(long, value_name = "SECONDS", allow_hyphen_values = true, value_parser = seconds)]
+    segment: Option<f64>,
+    /// Let residuals beyond three standard deviations count linearly, so that outliers move little.
+    #[arg(long)]
+    robust: bool,
+    /// Threads; the result does not depend on them [default: all].
+    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = thread_count)]
+    threads: Option<usize>,
+    /// One JSON object instead of tables.
+    #[arg(long)]
+    json: bool,
+    /// Write the system with the constants that were found, as a file that rolls out, trains and is known to a grey box.
+    #[arg(long, value_name = "FILE.toml")]
+    out: Option<PathBuf>,
+}
+
+/// Known forces between the samples.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Way {
+    /// As they were at the sample before.
+    Held,
+    /// On straight lines.
+    Linear,
+    /// Without frequencies above half the rate of the samples.
+    BandLimited,
+}
+
+impl From<Way> for Between {
+    fn from(way: Way) -> Self {
+        match way {
+            Way::Held => Self::Held,
+            Way::Linear => Self::Linear,
+            Way::BandLimited => Self::BandLimited,
+        }
+    }
+}
+
+/// Columns are those of the system unless others are named.
+fn of_the_system(argument: clap::Arg) -> clap::Arg {
+    match argument.get_id().as_str() {
+        "coords" => {
+            argument.required(false).help("Columns of the coordinates, in the order of the system [default: its names]")
+        }
+        "periodic" => argument.help("Coordinates that are angles, which are unwrapped [default: those of the system]"),
+        _ => argument,
+    }
+}
+
+/// Identifies constants and prints them.
+///
+/// # Errors
+/// A usage error for contradicting arguments, a data error for files that cannot be used.
+pub fn run(args: &Args) -> Result<(), CliError> {
+    let system = chosen::system(&args.system)?;
+    if let Some(out) = &args.out {
+        if out.extension().is_none_or(|end| end != "toml") {
+            return Err(CliError::usage(format_args!("--out {}: expected a name that ends in .toml", out.display())));
+        }
+        if system.description().is_none() {
+            let problem = "the Lagrangian of a listed system is no formula; give its constants by --param";
+            return Err(CliError::usage(format_args!("--out: {problem}")));
+        }
+        check_target(out).map_err(|e| CliError::file(out, format_args!("cannot write: {e}")))?;
+    }
+    let instance =
+        configure_system::<f64>(system, &args.param).map_err(|e| CliError::usage(format_args!("--param: {e}")))?;
+    let reading = read(args, &instance)?;
+    let options = IdentifyOptions {
+        constants: args.constants.clone(),
+        offsets: args.offset.clone(),
+        gains: args.gain.clone(),
+        delays: args.delay.clone(),
+        noise: args.noise.clone(),
+        between: args.between.map(Between::from),
+        segment: args.segment,
+        robust: args.robust,
+        threads: threads(args.threads),
+    };
+    let found = identify(&instance, &reading.recording, &options).map_err(refused)?;
+    if let Some(out) = &args.out {
+        write(out, &instance, &found)?;
+    }
+    let text = if args.json { json_text(&found, &reading)? } else { text(&found, &reading, args) };
+    output::print(&text)
+}
+
+/// The recording, its columns by the names of the system unless others are given.
+fn read(args: &Args, instance: &SystemInstance<f64>) -> Result<LoadedRecording, CliError> {
+    let coordinates = instance.system.coordinates(instance.coordinates);
+    let mut recording = args.recording.clone();
+    if recording.coords.is_empty() {
+        recording.coords = coordinates.iter().map(|c| c.name.to_string()).collect();
+    }
+    if recording.coords.len() != coordinates.len() {
+        let (expected, found) = (coordinates.len(), recording.coords.len());
+        let columns = pluralize(expected, "column", "columns");
+        return Err(CliError::usage(format_args!(
+            "--coords: expected {columns}, as many as {} has coordinates, found {found}",
+            instance.system.name
+        )));
+    }
+    if recording.periodic.is_empty() {
+        let angles = recording.coords.iter().zip(&coordinates).filter(|(_, coordinate)| coordinate.periodic);
+        recording.periodic = angles.map(|(column, _)| column.clone()).collect();
+    }
+    recording.read()
+}
+
+/// What the user chose, or what the data are.
+fn refused(error: IdentifyError) -> CliError {
+    match &error {
+        IdentifyError::Constant { .. } | IdentifyError::Repeated { what: "constants", .. } => {
+            CliError::usage(format_args!("--{error}"))
+        }
+        IdentifyError::Sensor { what, .. } | IdentifyError::Repeated { what, .. } => {
+            // Options are in the singular.
+            let text = error.to_string();
+            CliError::usage(format_args!("--{}{}", what.trim_end_matches('s'), &text[what.len()..]))
+        }
+        IdentifyError::Smooth(problem) if problem.to_string().starts_with("noise") => {
+            CliError::usage(format_args!("--{error}"))
+        }
+        IdentifyError::Constrained { .. } | IdentifyError::Nothing { .. } => {
+            CliError::usage(format_args!("--system: {error}"))
+        }
+        _ => CliError::data(error),
+    }
+}
+
+/// Writes the description with the values that were found.
+fn write(out: &Path, instance: &SystemInstance<f64>, found: &Identified) -> Result<(), CliError> {
+    let Some(description) = instance.system.description() else { return Ok(()) };
+    let given = instance.system.parameters.iter().zip(&instance.parameters);
+    let mut values: Vec<(&str, f64)> = given.map(|(parameter, value)| (parameter.symbol.as_ref(), *value)).collect();
+    for constant in &found.constants {
+        values.iter_mut().filter(|(name, _)| *name == constant.symbol).for_each(|(_, x)| *x = constant.value);
+    }
+    let text = toml::to_string(&description.with_defaults(&values)).map_err(CliError::data)?;
+    parse_system(&text).map_err(|(_, problem)| CliError::data(format_args!("--out: no system file: {problem}")))?;
+    write_atomically(out, text.as_bytes()).map_err(|e| CliError::file(out, e))
+}
+
+/// Name of the file and the row of a sample.
+fn place(reading: &LoadedRecording, track: usize, sample: usize) -> (String, u64) {
+    (reading.recording.tracks[track].name.clone(), reading.rows[track].row(sample))
+}
+
+fn json_text(found: &Identified, reading: &LoadedRecording) -> Result<String, CliError> {
+    let constants: Map<String, Value> = found
+        .constants
+        .iter()
+        .map(|c| {
+            let value =
+                json!({ "value": c.value, "standard_error": c.standard_error, "unit": c.unit, "start": c.start });
+            (c.symbol.clone(), value)
+        })
+        .collect();
+    let names: Vec<String> =
+        found.constants.iter().map(|c| c.symbol.clone()).chain(found.sensors.iter().map(sensor)).collect();
+    let m = names.len();
+    let matrix: Vec<&[f64]> = found.correlations.chunks(m.max(1)).collect();
+    let outliers: Vec<Value> = found
+        .outliers
+        .iter()
+        .map(|o| {
+            let (trajectory, row) = place(reading, o.track, o.sample);
+            json!({ "trajectory": trajectory, "row": row, "t": o.time, "coordinate": o.coordinate, "size": o.size })
+        })
+        .collect();
+    let undetermined: Vec<Value> = found
+        .undetermined
+        .iter()
+        .map(|u| {
+            let known: Map<String, Value> = u.known.iter().map(|(text, value)| (text.clone(), json!(value))).collect();
+            json!({ "constants": u.constants, "direction": u.direction, "known": known,
+                "relative_error": u.relative_error, "text": u.text, "cure": u.cure })
+        })
+        .collect();
+    let whole = json!({
+        "constants": constants,
+        "sensors": found.sensors,
+        "undetermined": undetermined,
+        "correlations": { "names": names, "matrix": matrix },
+        "residual": {
+            "coordinates": found.residuals,
+            "over_noise": found.over_noise,
+            "explained": found.explained,
+            "inflation": found.inflation,
+        },
+        "outliers": outliers,
+        "outlier_count": found.outlier_count,
+        "samples": found.samples,
+        "segments": found.segments,
+        "segment_seconds": found.segment_seconds,
+        "steps_between_samples": found.substeps,
+        "forces_between_samples": found.between,
+    });
+    Ok(serde_json::to_string(&whole).map_err(CliError::data)? + "\n")
+}
+
+fn sensor(sensor: &crate::identification::SensorConstant) -> String {
+    format!("{} of {}", sensor.kind, sensor.coordinate)
+}
+
+/// A value with the digits that its error leaves it, and the error.
+fn with_error(value: f64, error: Option<f64>) -> [String; 2] {
+    let Some(error) = error.filter(|error| error.is_finite() && *error > 0.0) else {
+        return [rounded(value, 4), "-".to_string()];
+    };
+    let exponent = |x: f64| x.abs().log10().floor() as i32;
+    let digits = if value == 0.0 { 2 } else { exponent(value) - exponent(error) + 2 };
+    [rounded(value, digits.clamp(1, 17) as usize), rounded(error, 2)]
+}
+
+fn text(found: &Identified, reading: &LoadedRecording, args: &Args) -> String {
+    let row = |name: String, (value, error): (f64, Option<f64>), unit: &str, start: f64| {
+        let [value, error] = with_error(value, error);
+        vec![name, value, error, unit.to_string(), rounded(start, 4)]
+    };
+    let rows = found.constants.iter().map(|c| row(c.symbol.clone(), (c.value, c.standard_error), &c.unit, c.start));
+    let perfect = |kind: &str| if kind == "gain" { 1.0 } else { 0.0 };
+    let sensors = found.sensors.iter().map(|s| {
+        let unit = if s.kind == "delay" { "s" } else { "" };
+        row(sensor(s), (s.value, s.standard_error), unit, perfect(s.kind))
+    });
+    let headers = ["constant", "value", "standard error", "unit", "start"];
+    let mut text = text_table(&headers, &rows.chain(sensors).collect::<Vec<_>>());
+    for Undetermined { text: open, cure, known, .. } in &found.undetermined {
+        text += &format!("\n{open}\n");
+        for (combination, value) in known {
+            text += &format!("  {combination} = {}\n", rounded(*value, 6));
+        }
+        text += &format!("  it takes {cure}\n");
+    }
+    let m = found.constants.len() + found.sensors.len();
+    let names: Vec<String> =
+        found.constants.iter().map(|c| c.symbol.clone()).chain(found.sensors.iter().map(sensor)).collect();
+    let mut pairs: Vec<(usize, usize, f64)> =
+        (0..m).flat_map(|i| (0..i).map(move |j| (i, j))).map(|(i, j)| (i, j, found.correlations[i * m + j])).collect();
+    pairs.retain(|(_, _, c)| c.abs() > 0.9);
+    pairs.sort_by(|a, b| b.2.abs().total_cmp(&a.2.abs()));
+    if !pairs.is_empty() {
+        let listed = pairs.iter().take(SHOWN).map(|(i, j, c)| format!("{} and {} {c:.3}", names[*j], names[*i]));
+        text += &format!("\ncorrelations of errors beyond 0.9: {}\n", listed.collect::<Vec<_>>().join(", "));
+    }
+    let rows = found.residuals.iter().map(|r| {
+        let white = if r.white { "as noise" } else { "not noise" };
+        vec![
+            r.coordinate.clone(),
+            number(r.rms),
+            number(r.noise),
+            format!("{:.2}", r.autocorrelation),
+            white.to_string(),
+        ]
+    });
+    let headers = ["coordinate", "residual", "noise", "of neighbours", ""];
+    text += &format!("\n{}", text_table(&headers, &rows.collect::<Vec<_>>()));
+    text += match found.explained {
+        true => "the form explains the motion\n",
+        false => "the form does not explain the motion: something is missing, and errors are those of a wrong form\n",
+    };
+    let segments = pluralize(found.segments, "segment", "segments");
+    text += &format!("{} samples in {segments} of {} s", found.samples, number(found.segment_seconds));
+    if let Some(between) = found.between {
+        let way = match between {
+            Between::Held => "held",
+            Between::Linear => "linear",
+            Between::BandLimited => "band-limited",
+        };
+        text += &format!(", forces {way} between the samples");
+    }
+    text += "\n";
+    if found.outlier_count > 0 {
+        let rows = found.outliers.iter().take(SHOWN).map(|o| {
+            let (trajectory, row) = place(reading, o.track, o.sample);
+            vec![trajectory, row.to_string(), rounded(o.time, 6), o.coordinate.clone(), rounded(o.size, 3)]
+        });
+        let headers = ["trajectory", "row", "t", "coordinate", "over usual"];
+        let advice = if args.robust { "" } else { "; --robust lets them move little" };
+        let samples = pluralize(found.outlier_count, "sample", "samples");
+        text +=
+            &format!("\n{samples} far from the motion{advice}\n{}", text_table(&headers, &rows.collect::<Vec<_>>()));
+    }
+    text
+}

@@ -1,0 +1,95 @@
+//! Why nothing is identified.
+
+use crate::names::unknown;
+use crate::recording::TrajectoryError;
+use crate::recording::smooth::SmoothError;
+use crate::tape::TapeError;
+
+/// Why constants cannot be identified.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum IdentifyError {
+    /// Arrays that do not make a trajectory.
+    #[error(transparent)]
+    Trajectory(#[from] TrajectoryError),
+    /// Motion that cannot be smoothed.
+    #[error(transparent)]
+    Smooth(#[from] SmoothError),
+    /// A Lagrangian that cannot be recorded.
+    #[error(transparent)]
+    Lagrangian(#[from] TapeError),
+    /// A system under constraints.
+    #[error("{system} is under constraints; a system without them, in coordinates that are free, can be identified")]
+    Constrained {
+        /// The system.
+        system: String,
+    },
+    /// Another number of coordinates than the system has.
+    #[error("expected {expected} coordinates, found {found}")]
+    Coordinates {
+        /// Coordinates of the system.
+        expected: usize,
+        /// Those of the recording.
+        found: usize,
+    },
+    /// A symbol that the system does not have.
+    #[error("constants: {}", unknown("constant", symbol, known.iter().map(String::as_str)))]
+    Constant {
+        /// The symbol.
+        symbol: String,
+        /// Symbols there are.
+        known: Vec<String>,
+    },
+    /// A symbol or coordinate that is given twice.
+    #[error("{what}: {name} is given twice")]
+    Repeated {
+        /// Which option.
+        what: &'static str,
+        /// The name.
+        name: String,
+    },
+    /// A coordinate that the recording does not have.
+    #[error("{what}: {}", unknown("coordinate", name, known.iter().map(String::as_str)))]
+    Sensor {
+        /// Which constants.
+        what: &'static str,
+        /// The name.
+        name: String,
+        /// Coordinates there are.
+        known: Vec<String>,
+    },
+    /// Nothing is unknown.
+    #[error("{system} has no constants")]
+    Nothing {
+        /// The system.
+        system: String,
+    },
+    /// A number that is out of range.
+    #[error("{what}: expected {expected}, found {found}")]
+    Option {
+        /// Which option.
+        what: &'static str,
+        /// What is allowed.
+        expected: String,
+        /// What was given.
+        found: String,
+    },
+    /// Too few samples.
+    #[error("the longest trajectory has {found} samples, {needed} at least are needed")]
+    Short {
+        /// Samples of the longest trajectory.
+        found: usize,
+        /// Samples needed.
+        needed: usize,
+    },
+    /// The equations of motion cannot be solved at the starting values.
+    #[error(
+        "the equations of motion cannot be solved at any recorded state with the given constants: the mass matrix is singular, or a term is not finite"
+    )]
+    Singular,
+    /// The motion cannot be followed.
+    #[error(
+        "no part of the recorded motion can be followed with the constants found so far: are the columns those of the coordinates?"
+    )]
+    Lost,
+}

@@ -1,0 +1,293 @@
+//! Motion from its starts, side by side, with its derivatives by starts and constants.
+
+use super::Between;
+use crate::lagrangian::Equations;
+use crate::linalg::{self, Workspace};
+use crate::recording::{RecordedTrajectory, Recording};
+use crate::tape::Replay;
+use std::f64::consts::PI;
+use std::sync::Arc;
+
+/// Segments that are followed side by side.
+pub(super) const LANES: usize = 64;
+/// Samples to either side that a band-limited force is made of.
+const REACH: isize = 8;
+
+/// Samples that are followed from one start.
+#[derive(Clone, Debug)]
+pub(super) struct Segment {
+    pub track: usize,
+    /// First sample, and number of samples.
+    pub first: usize,
+    pub samples: usize,
+    /// Position and velocity at the first sample, `(2, n)`.
+    pub start: Vec<f64>,
+}
+
+/// What is followed: recorded times and forces, and the equations.
+#[derive(Clone, Debug)]
+pub(super) struct Course<'a> {
+    pub recording: &'a Recording,
+    pub equations: &'a Equations,
+    /// Constants that derivatives are taken by.
+    pub chosen: usize,
+    pub between: Between,
+    /// Usual step between samples in s, and integration steps in it.
+    pub step: f64,
+    pub substeps: usize,
+}
+
+/// States of all lanes with derivatives: `(lanes, n)` and `(lanes, n, columns)`.
+#[derive(Clone, Debug, Default)]
+pub(super) struct State {
+    pub q: Vec<f64>,
+    pub v: Vec<f64>,
+    pub q_slopes: Vec<f64>,
+    pub v_slopes: Vec<f64>,
+}
+
+impl State {
+    fn sized(lanes: usize, n: usize, columns: usize) -> Self {
+        let [state, slopes] = [lanes * n, lanes * n * columns].map(|size| vec![0.0; size]);
+        Self { q: state.clone(), v: state, q_slopes: slopes.clone(), v_slopes: slopes }
+    }
+
+    /// `from` moved by `h` of each lane along slopes; `widths` are the numbers of a lane in states and derivatives.
+    fn moved(&mut self, from: &Self, (h, widths): (&[f64], [usize; 2]), along: &Self) {
+        let [n, columns] = widths;
+        add(&mut self.q, &from.q, (h, n), &along.q);
+        add(&mut self.v, &from.v, (h, n), &along.v);
+        add(&mut self.q_slopes, &from.q_slopes, (h, columns), &along.q_slopes);
+        add(&mut self.v_slopes, &from.v_slopes, (h, columns), &along.v_slopes);
+    }
+}
+
+fn add(to: &mut [f64], from: &[f64], (h, width): (&[f64], usize), slope: &[f64]) {
+    if width == 0 {
+        return;
+    }
+    let lanes = to.chunks_exact_mut(width).zip(from.chunks_exact(width)).zip(slope.chunks_exact(width));
+    for (((to, from), slope), h) in lanes.zip(h) {
+        to.iter_mut().zip(from.iter().zip(slope)).for_each(|(t, (f, s))| *t = f + h * s);
+    }
+}
+
+/// Buffers of one thread.
+pub(super) struct Follower<'a> {
+    course: &'a Course<'a>,
+    motion: Replay<f64>,
+    slopes: Replay<f64>,
+    workspace: Workspace<f64>,
+    mass: Vec<f64>,
+    inverse: Vec<f64>,
+    rest: Vec<f64>,
+    by_state: Vec<f64>,
+    force: Vec<f64>,
+    row: Vec<f64>,
+}
+
+impl<'a> Follower<'a> {
+    pub fn new(course: &'a Course<'a>) -> Self {
+        let equations = course.equations;
+        Self {
+            course,
+            motion: Replay::new(Arc::clone(&equations.motion)),
+            slopes: Replay::new(Arc::clone(&equations.slopes)),
+            workspace: Workspace::new(),
+            mass: Vec::new(),
+            inverse: Vec::new(),
+            rest: Vec::new(),
+            by_state: Vec::new(),
+            force: Vec::new(),
+            row: Vec::new(),
+        }
+    }
+
+    /// Mass matrices of the states evaluated last, `(lanes, n, n)`.
+    pub fn mass(&self) -> &[f64] {
+        &self.mass
+    }
+
+    /// Accelerations of states under forces, `(lanes, n)` each, forces empty for none; `NaN` where they cannot be solved for.
+    pub fn accelerate(&mut self, values: &[f64], (q, v): (&[f64], &[f64]), force: &[f64], a: &mut [f64]) {
+        let n = self.course.equations.n;
+        let lanes = q.len() / n;
+        self.mass.resize(lanes * n * n, 0.0);
+        self.rest.resize(lanes * n, 0.0);
+        // Shapes are those of the recorded program.
+        let _ = self.motion.evaluate(lanes, &[q, v], values, &mut [&mut self.mass, &mut self.rest]);
+        if !force.is_empty() {
+            self.rest.iter_mut().zip(force).for_each(|(rest, force)| *rest += force);
+        }
+        if n == 1 {
+            a.iter_mut().zip(self.rest.iter().zip(&self.mass)).for_each(|(a, (rest, mass))| *a = rest / mass);
+        } else {
+            // Lanes that fail are NaN.
+            let _ = linalg::solve(n, &self.mass, &self.rest, a, &mut self.workspace);
+        }
+    }
+
+    /// Slopes of the accelerations found last by positions, velocities and constants: `(lanes, n, 2n + chosen)`.
+    pub fn slopes(&mut self, values: &[f64], (q, v, a): (&[f64], &[f64], &[f64])) -> &[f64] {
+        let n = self.course.equations.n;
+        let (lanes, width) = (q.len() / n, 2 * n + self.course.chosen);
+        self.by_state.resize(lanes * n * width, 0.0);
+        let _ = self.slopes.evaluate(lanes, &[q, v, a], values, &mut [&mut self.by_state]);
+        self.inverse.resize(lanes * n * n, 0.0);
+        if n == 1 {
+            self.inverse.iter_mut().zip(&self.mass).for_each(|(inverse, mass)| *inverse = mass.recip());
+        } else {
+            let _ = linalg::inverse(n, &self.mass, &mut self.inverse, &mut self.workspace);
+        }
+        self.row.resize(n * width, 0.0);
+        for (block, inverse) in self.by_state.chunks_exact_mut(n * width).zip(self.inverse.chunks_exact(n * n)) {
+            self.row.fill(0.0);
+            for i in 0..n {
+                let row = &mut self.row[i * width..(i + 1) * width];
+                for (x, from) in inverse[i * n..(i + 1) * n].iter().zip(block.chunks_exact(width)) {
+                    row.iter_mut().zip(from).for_each(|(r, f)| *r -= x * f);
+                }
+            }
+            block.copy_from_slice(&self.row);
+        }
+        &self.by_state
+    }
+
+    /// The rate of change of a state: velocities and accelerations, with those of the derivatives.
+    fn rate(&mut self, values: &[f64], at: &State, columns: usize, rate: &mut State) {
+        let n = self.course.equations.n;
+        let force = std::mem::take(&mut self.force);
+        self.accelerate(values, (&at.q, &at.v), &force, &mut rate.v);
+        self.force = force;
+        rate.q.copy_from_slice(&at.v);
+        if columns == 0 {
+            return;
+        }
+        rate.q_slopes.copy_from_slice(&at.v_slopes);
+        let width = 2 * n + self.course.chosen;
+        let a = std::mem::take(&mut rate.v);
+        let slopes = self.slopes(values, (&at.q, &at.v, &a));
+        rate.v_slopes.fill(0.0);
+        let lanes = slopes.chunks_exact(n * width).zip(rate.v_slopes.chunks_exact_mut(n * columns));
+        let states = at.q_slopes.chunks_exact(n * columns).zip(at.v_slopes.chunks_exact(n * columns));
+        for ((slopes, out), (sq, sv)) in lanes.zip(states) {
+            for (row, out) in slopes.chunks_exact(width).zip(out.chunks_exact_mut(columns)) {
+                for j in 0..n {
+                    let (x, y) = (row[j], row[n + j]);
+                    let pairs = sq[j * columns..(j + 1) * columns].iter().zip(&sv[j * columns..(j + 1) * columns]);
+                    out.iter_mut().zip(pairs).for_each(|(o, (q, v))| *o += x * q + y * v);
+                }
+                out[2 * n..].iter_mut().zip(&row[2 * n..]).for_each(|(o, p)| *o += p);
+            }
+        }
+        rate.v = a;
+    }
+
+    /// Follows segments, longest first, and calls `visit` with every sample, counted from the segments' first, and the states of all
+    /// lanes; those of segments that are over are to be ignored. With `derivatives` by starts and constants, `2n + chosen` columns.
+    pub fn follow(
+        &mut self,
+        values: &[f64],
+        segments: &[&Segment],
+        derivatives: bool,
+        mut visit: impl FnMut(&mut Self, usize, &State),
+    ) {
+        let course = self.course;
+        let (n, lanes) = (course.equations.n, segments.len());
+        let columns = if derivatives { 2 * n + course.chosen } else { 0 };
+        let mut now = State::sized(lanes, n, columns);
+        for (lane, segment) in segments.iter().enumerate() {
+            now.q[lane * n..(lane + 1) * n].copy_from_slice(&segment.start[..n]);
+            now.v[lane * n..(lane + 1) * n].copy_from_slice(&segment.start[n..]);
+            for i in (0..n).filter(|_| derivatives) {
+                now.q_slopes[(lane * n + i) * columns + i] = 1.0;
+                now.v_slopes[(lane * n + i) * columns + n + i] = 1.0;
+            }
+        }
+        let widths = [n, n * columns];
+        let mut stage = now.clone();
+        let mut rates: [State; 4] = std::array::from_fn(|_| now.clone());
+        let longest = segments.iter().map(|segment| segment.samples).max().unwrap_or(0);
+        let track = |segment: &Segment| -> &RecordedTrajectory { &course.recording.tracks[segment.track] };
+        let forced = segments.iter().any(|segment| !track(segment).force.is_empty());
+        self.force = vec![0.0; if forced { lanes * n } else { 0 }];
+        visit(self, 0, &now);
+        for sample in 1..longest {
+            let interval = |segment: &&Segment| {
+                let at = segment.first + sample;
+                let times = &track(segment).times;
+                if sample < segment.samples { times[at] - times[at - 1] } else { 0.0 }
+            };
+            let intervals: Vec<f64> = segments.iter().map(interval).collect();
+            let most = intervals.iter().copied().fold(0.0, f64::max);
+            // Across a gap there are as many steps as its length asks for.
+            let steps = ((course.substeps as f64 * most / course.step - 0.5).ceil() as usize).max(course.substeps);
+            let h: Vec<f64> = intervals.iter().map(|interval| interval / steps as f64).collect();
+            let half: Vec<f64> = h.iter().map(|h| h / 2.0).collect();
+            let parts: [Vec<f64>; 4] =
+                [1.0, 2.0, 2.0, 1.0].map(|part| h.iter().map(|h| h * part / 6.0).collect::<Vec<f64>>());
+            for step in 0..steps {
+                for k in 0..4 {
+                    if forced {
+                        let share = [0.0, 0.5, 0.5, 1.0][k];
+                        let x = (step as f64 + share) / steps as f64;
+                        for (lane, segment) in segments.iter().enumerate() {
+                            let into = &mut self.force[lane * n..(lane + 1) * n];
+                            let at = segment.first + sample.min(segment.samples - 1);
+                            forces(track(segment), course.between, (at, x), into);
+                        }
+                    }
+                    let (before, rest) = rates.split_at_mut(k);
+                    match k {
+                        0 => self.rate(values, &now, columns, &mut rest[0]),
+                        _ => {
+                            let h = if k == 3 { &h } else { &half };
+                            stage.moved(&now, (h, widths), &before[k - 1]);
+                            self.rate(values, &stage, columns, &mut rest[0]);
+                        }
+                    }
+                }
+                for (rate, part) in rates.iter().zip(&parts) {
+                    std::mem::swap(&mut stage, &mut now);
+                    now.moved(&stage, (part, widths), rate);
+                }
+            }
+            visit(self, sample, &now);
+        }
+    }
+}
+
+/// Known forces `(n)` at the share `x` of the interval that ends at a sample; zeros for a trajectory without.
+pub(super) fn forces(track: &RecordedTrajectory, between: Between, (sample, x): (usize, f64), into: &mut [f64]) {
+    let n = into.len();
+    into.fill(0.0);
+    if track.force.is_empty() {
+        return;
+    }
+    let before = sample.saturating_sub(1);
+    let last = track.len() as isize - 1;
+    let mut take = |at: isize, weight: f64| {
+        let row = &track.force[at.clamp(0, last) as usize * n..][..n];
+        into.iter_mut().zip(row).for_each(|(f, r)| *f += weight * r);
+    };
+    match between {
+        Between::Held => take(before as isize, 1.0),
+        Between::Linear => {
+            take(before as isize, 1.0 - x);
+            take(sample as isize, x);
+        }
+        Between::BandLimited => {
+            let weight = |k: isize| {
+                let t = x - k as f64;
+                if t.abs() < 1e-12 {
+                    return 1.0;
+                }
+                let width = REACH as f64;
+                if t.abs() >= width { 0.0 } else { width * (PI * t).sin() * (PI * t / width).sin() / (PI * t).powi(2) }
+            };
+            let weights = || (1 - REACH..=REACH).map(|k| (k, weight(k)));
+            let whole: f64 = weights().map(|(_, w)| w).sum();
+            weights().for_each(|(k, w)| take(before as isize + k, w / whole));
+        }
+    }
+}

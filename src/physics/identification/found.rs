@@ -1,0 +1,114 @@
+//! What was identified.
+
+use super::Between;
+use serde::Serialize;
+
+/// A constant of the system.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Constant {
+    /// Its symbol.
+    pub symbol: String,
+    /// Its value.
+    pub value: f64,
+    /// Its standard error; none where the motion says nothing of it, whose value is then the one it started with.
+    pub standard_error: Option<f64>,
+    /// Its unit.
+    pub unit: String,
+    /// The value it started with.
+    pub start: f64,
+}
+
+/// A constant of the sensor of a coordinate: measured positions are `gain (q(t - delay)) + offset`.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SensorConstant {
+    /// `"offset"`, `"gain"` or `"delay"`.
+    pub kind: &'static str,
+    /// The coordinate.
+    pub coordinate: String,
+    /// Its value.
+    pub value: f64,
+    /// Its standard error; none where the motion says nothing of it.
+    pub standard_error: Option<f64>,
+}
+
+/// Constants that the motion leaves open, alone or together.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Undetermined {
+    /// The constants.
+    pub constants: Vec<String>,
+    /// Relative change of each along the direction that is open, the largest 1.
+    pub direction: Vec<f64>,
+    /// The combinations that are known nevertheless, with their values.
+    pub known: Vec<(String, f64)>,
+    /// Standard error along the direction, relative to the values; none where the motion does not depend on it at all.
+    pub relative_error: Option<f64>,
+    /// What is open, in words.
+    pub text: String,
+    /// What would determine it, in words.
+    pub cure: String,
+}
+
+/// What is left of the motion of one coordinate.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Residual {
+    /// The coordinate.
+    pub coordinate: String,
+    /// Root mean square.
+    pub rms: f64,
+    /// Standard deviation of the noise, as given or as estimated before the fit.
+    pub noise: f64,
+    /// Correlation of residuals that follow each other; that of noise is 0.
+    pub autocorrelation: f64,
+    /// `true` if they follow each other as noise does.
+    pub white: bool,
+}
+
+/// A sample far from the motion.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Outlier {
+    /// Index of the trajectory.
+    pub track: usize,
+    /// Its sample, from 0.
+    pub sample: usize,
+    /// Its time in s.
+    pub time: f64,
+    /// The coordinate.
+    pub coordinate: String,
+    /// Residual over the usual one.
+    pub size: f64,
+}
+
+/// Constants with their errors, and how far they can be trusted.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Identified {
+    /// The constants that were unknown, in the order of the system.
+    pub constants: Vec<Constant>,
+    /// Constants of sensors.
+    pub sensors: Vec<SensorConstant>,
+    /// Correlations of the errors of constants, then sensors, `(m, m)`; 0 beside those without error.
+    pub correlations: Vec<f64>,
+    /// What the motion leaves open.
+    pub undetermined: Vec<Undetermined>,
+    /// What is left, by coordinate.
+    pub residuals: Vec<Residual>,
+    /// Root mean square of the residuals over the noise as it was known before the fit, all coordinates together.
+    pub over_noise: f64,
+    /// `true` if what is left is as large as the noise and white: the form explains the motion.
+    pub explained: bool,
+    /// Samples far from the motion, the farthest first, 100 at most.
+    pub outliers: Vec<Outlier>,
+    /// Number of all of them.
+    pub outlier_count: usize,
+    /// Factor of the standard errors for residuals that are alike all along a segment; 1 for white ones.
+    pub inflation: f64,
+    /// Samples that were followed, segments, and the length of the usual segment in s.
+    pub samples: usize,
+    /// Number of segments.
+    pub segments: usize,
+    /// Length of the usual segment in s.
+    pub segment_seconds: f64,
+    /// Integration steps from sample to sample.
+    pub substeps: usize,
+    /// How known forces were taken between the samples; none without forces.
+    pub between: Option<Between>,
+}

@@ -1,0 +1,76 @@
+//! The constants of a Lagrangian whose form is known, from recorded motion.
+//!
+//! Least squares on smoothed accelerations come first. From there Levenberg and Marquardt's method goes through the motion, by multiple
+//! shooting: segments of the recording, each with a start of its own, are followed by the equations of motion, and constants, starts and
+//! constants of sensors are moved to where the measured positions are met best. Segments grow as long as that makes the constants better
+//! known. Noise enters positions alone, so that nothing is biased by it.
+//!
+//! ```
+//! use lnn::identification::{IdentifyOptions, identify};
+//! use lnn::lagrangian::configure;
+//! use lnn::prelude::*;
+//! use lnn::recording::{RecordedTrajectory, Recording};
+//!
+//! // A pendulum of 0.7 m, from positions alone.
+//! let truth = configure::<f64>("n-pendulum", &[("n".into(), "1".into()), ("l".into(), "0.7".into())])?.build()?;
+//! let motion = truth.rollout(&[1.0], &[0.0], 6.0, 0.02)?;
+//! let track = RecordedTrajectory { name: "swing".into(), times: motion.t, q: motion.q, v: vec![], a: vec![], force: vec![] };
+//! let recording = Recording { coordinates: vec!["theta".into()], periodic: vec![true], tracks: vec![track] };
+//! let form = configure::<f64>("n-pendulum", &[("n".into(), "1".into())])?;
+//! let found = identify(&form, &recording, &IdentifyOptions { constants: vec!["l".into()], ..Default::default() })?;
+//! assert!((found.constants[0].value - 0.7).abs() < 1e-6);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod determined;
+mod error;
+mod follow;
+mod found;
+mod quality;
+mod smoothed;
+mod solve;
+mod stages;
+#[cfg(test)]
+mod tests;
+
+pub use error::IdentifyError;
+pub use found::{Constant, Identified, Outlier, Residual, SensorConstant, Undetermined};
+pub use stages::identify;
+
+use serde::Serialize;
+
+/// Known forces between the samples.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum Between {
+    /// Each as it was at the sample before: zero-order hold, what a converter or a controller does.
+    Held,
+    /// On straight lines.
+    Linear,
+    /// By the smooth curve without frequencies above half the rate of the samples: a windowed sum of `sin(x)/x`.
+    BandLimited,
+}
+
+/// What is identified, and how.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct IdentifyOptions {
+    /// Symbols of the unknown constants; empty for those that the system marks to be learned, or for all if it marks none.
+    pub constants: Vec<String>,
+    /// Coordinates whose sensor has an unknown offset.
+    pub offsets: Vec<String>,
+    /// Coordinates whose sensor has an unknown gain.
+    pub gains: Vec<String>,
+    /// Coordinates whose sensor is late by an unknown time.
+    pub delays: Vec<String>,
+    /// Standard deviation of every coordinate's noise; estimated if not given.
+    pub noise: Option<Vec<f64>>,
+    /// Known forces between the samples; what meets the motion best if not given.
+    pub between: Option<Between>,
+    /// Length of the segments in s; chosen by the data if not given.
+    pub segment: Option<f64>,
+    /// Residuals beyond three standard deviations count linearly, so that outliers move little.
+    pub robust: bool,
+    /// Threads; 0 for one. The result does not depend on their number.
+    pub threads: usize,
+}

@@ -1,0 +1,505 @@
+//! From smoothed accelerations to longer and longer segments of motion.
+
+use super::determined::{Determined, Examiner};
+use super::follow::{Course, Segment};
+use super::found::{Constant, Identified, Outlier, Residual, SensorConstant};
+use super::quality::{outliers, whiteness};
+use super::smoothed::States;
+use super::solve::{Normal, Problem, Sensor, SensorKind};
+use super::{Between, IdentifyError, IdentifyOptions};
+use crate::lagrangian::{Equations, SystemInstance};
+use crate::recording::Recording;
+use crate::recording::smooth::{SmoothOptions, Smoothed, Smoothing};
+
+/// Samples in a row that are needed.
+const LEAST_SAMPLES: usize = 12;
+/// Samples of the first, short segments at least.
+const LEAST_SEGMENT: usize = 6;
+/// Times in which the motion changes that a first segment lasts.
+const PACES: f64 = 2.5;
+/// Samples that are followed at most.
+const MOST_SAMPLES: usize = 60_000;
+/// Noise over the spread of a coordinate that is taken at least: the equations are integrated so well.
+const LEAST_NOISE: f64 = 1e-9;
+/// Error of the integrator over the noise.
+const INTEGRATOR: f64 = 0.05;
+const MOST_SUBSTEPS: usize = 64;
+/// Longer segments may be met worse by this factor of the mean square.
+const WORSE: f64 = 1.5;
+/// Decrease of the mean logarithm of the errors that longer segments must bring.
+const GAIN: f64 = 0.01;
+/// Segments from which on their scatter tells how far errors are to be widened.
+const MANY: usize = 8;
+/// Root mean square of residuals over the noise up to which a form explains the motion.
+const EXPLAINED: f64 = 1.3;
+const ITERATIONS: usize = 40;
+
+/// Constants, sensors and starts with the normal equations there.
+#[derive(Clone)]
+struct Fitted {
+    x: Vec<f64>,
+    segments: Vec<Segment>,
+    normal: Normal,
+    substeps: usize,
+}
+
+impl Fitted {
+    /// Mean square of the residuals.
+    fn mean_square(&self) -> f64 {
+        self.normal.square / self.normal.count.max(1.0)
+    }
+
+    /// Variance of the unknowns over that of independent noise of the given size: the mean square of the residuals, or what the
+    /// scatter of the segments' pulls says if they are alike all along a segment. The second number is the part of the latter.
+    fn inflation(&self) -> (f64, f64) {
+        let square = self.mean_square();
+        let (m, count) = (self.x.len(), self.normal.parts.len());
+        if count < MANY {
+            return (square, 1.0);
+        }
+        let ratio = |k: usize| {
+            let scatter: f64 = self.normal.parts.iter().map(|part| part[k] * part[k]).sum();
+            scatter / self.normal.matrix[k * m + k]
+        };
+        let mut ratios: Vec<f64> = (0..m).map(ratio).filter(|ratio| ratio.is_finite()).collect();
+        ratios.sort_by(f64::total_cmp);
+        let scatter = ratios.get(ratios.len() / 2).copied().unwrap_or(square) / square;
+        // Scatter of noise itself is not exactly one.
+        let plain = scatter <= 1.0 + 2.0 * (2.0 / count as f64).sqrt();
+        if plain { (square, 1.0) } else { (square * scatter, scatter) }
+    }
+
+    /// Mean logarithm of the errors of the unknowns, each with the others fixed.
+    fn spread(&self) -> f64 {
+        let m = self.x.len();
+        let logarithms = (0..m).map(|k| self.normal.matrix[k * m + k]).filter(|x| *x > 0.0).map(f64::ln);
+        let (sum, count) = logarithms.fold((0.0, 0.0), |(sum, count), x| (sum + x, count + 1.0));
+        (self.inflation().0.ln() - sum / f64::max(count, 1.0)) / 2.0
+    }
+}
+
+/// Identifies the constants of a system from recorded motion; angles are unwrapped, numbers are in the units of the system.
+///
+/// # Errors
+/// [`IdentifyError`] for options and recordings that do not fit the system, motion that is too short, and systems under constraints.
+/// Constants that the motion leaves open are no error, nor is a form that does not explain the motion: the result says so.
+pub fn identify(
+    instance: &SystemInstance<f64>,
+    recording: &Recording,
+    options: &IdentifyOptions,
+) -> Result<Identified, IdentifyError> {
+    let n = instance.coordinates;
+    if recording.n() != n {
+        return Err(IdentifyError::Coordinates { expected: n, found: recording.n() });
+    }
+    recording.tracks.iter().try_for_each(|track| track.validate(n))?;
+    let chosen = chosen(instance, options)?;
+    let sensors = sensors(recording, options)?;
+    if let Some(segment) = options.segment.filter(|s| !(s.is_finite() && *s > 0.0)) {
+        let (expected, found) = ("a time above 0".to_string(), segment.to_string());
+        return Err(IdentifyError::Option { what: "segment", expected, found });
+    }
+    let constrained = || IdentifyError::Constrained { system: instance.system.name.to_string() };
+    let equations = Equations::record(instance, &chosen)?.ok_or_else(constrained)?;
+    let longest = recording.tracks.iter().map(|track| track.len()).max().unwrap_or(0);
+    if longest < LEAST_SAMPLES {
+        return Err(IdentifyError::Short { found: longest, needed: LEAST_SAMPLES });
+    }
+    let smoothing =
+        Smoothing::choose(recording, &SmoothOptions { noise: options.noise.clone(), ..SmoothOptions::default() })?;
+    let smooth = |track: &crate::recording::RecordedTrajectory| {
+        (track.len() >= LEAST_SAMPLES).then(|| smoothing.apply(track)).transpose()
+    };
+    let smoothed = recording.tracks.iter().map(smooth).collect::<Result<Vec<_>, _>>()?;
+    let spread: Vec<f64> = (0..n).map(|i| spread_of(recording, i)).collect();
+    let noise: Vec<f64> = (0..n).map(|i| smoothing.coordinates[i].noise.sigma.max(LEAST_NOISE * spread[i])).collect();
+    let forced = recording.tracks.iter().any(|track| !track.force.is_empty());
+    let course = Course {
+        recording,
+        equations: &equations,
+        chosen: chosen.len(),
+        between: options.between.unwrap_or(Between::Linear),
+        step: smoothing.step,
+        substeps: 1,
+    };
+    let start: Vec<f64> = chosen.iter().map(|&k| instance.parameters[k]).collect();
+    let mut x: Vec<f64> = start.iter().copied().chain(sensors.iter().map(|sensor| sensor.perfect())).collect();
+    let mut problem = Problem {
+        course,
+        values: instance.parameters.clone(),
+        ranges: instance.system.parameters.iter().map(|parameter| parameter.range).collect(),
+        chosen,
+        sensors,
+        sigma: noise.clone(),
+        spread,
+        robust: options.robust,
+        threads: options.threads.max(1),
+    };
+    let states = States::new(&problem, &smoothed);
+    if states.len(n) > 0 && !states.fit(&problem, &mut x) {
+        return Err(IdentifyError::Singular);
+    }
+    tracing::debug!(?x, states = states.len(n), "smoothed accelerations");
+    let samples = first_samples(&states, n, smoothing.step);
+    let segments = cut(recording, &smoothed, samples, n);
+    let mut fitted = first(&mut problem, x, segments)?;
+    if forced && options.between.is_none() {
+        fitted = best_between(&mut problem, fitted);
+    }
+    if options.noise.is_none() {
+        weigh(&mut problem, &fitted);
+        choose_steps(&mut problem, &fitted.x, &fitted.segments);
+        refit(&problem, &mut fitted);
+    }
+    fitted = grown(&mut problem, fitted, options.segment);
+    if options.noise.is_none() {
+        weigh(&mut problem, &fitted);
+        choose_steps(&mut problem, &fitted.x, &fitted.segments);
+    }
+    refit(&problem, &mut fitted);
+    Ok(result(instance, &problem, &fitted, (&start, &noise), options))
+}
+
+/// Parameters that are unknown.
+fn chosen(instance: &SystemInstance<f64>, options: &IdentifyOptions) -> Result<Vec<usize>, IdentifyError> {
+    let parameters = &instance.system.parameters;
+    let mut chosen = Vec::new();
+    for symbol in &options.constants {
+        let known = || parameters.iter().map(|parameter| parameter.symbol.to_string()).collect();
+        let found = parameters.iter().position(|parameter| parameter.symbol == *symbol);
+        let at = found.ok_or_else(|| IdentifyError::Constant { symbol: symbol.clone(), known: known() })?;
+        if chosen.contains(&at) {
+            return Err(IdentifyError::Repeated { what: "constants", name: symbol.clone() });
+        }
+        chosen.push(at);
+    }
+    if chosen.is_empty() {
+        let learned: Vec<usize> = (0..parameters.len()).filter(|&k| parameters[k].learn).collect();
+        chosen = if learned.is_empty() { (0..parameters.len()).collect() } else { learned };
+    }
+    chosen.sort_unstable();
+    match chosen.is_empty() {
+        true => Err(IdentifyError::Nothing { system: instance.system.name.to_string() }),
+        false => Ok(chosen),
+    }
+}
+
+/// Sensors with unknown constants.
+fn sensors(recording: &Recording, options: &IdentifyOptions) -> Result<Vec<Sensor>, IdentifyError> {
+    let mut sensors = Vec::new();
+    let all = [
+        ("offsets", SensorKind::Offset, &options.offsets),
+        ("gains", SensorKind::Gain, &options.gains),
+        ("delays", SensorKind::Delay, &options.delays),
+    ];
+    for (what, kind, names) in all {
+        for name in names {
+            let missing = || IdentifyError::Sensor { what, name: name.clone(), known: recording.coordinates.clone() };
+            let coordinate = recording.coordinates.iter().position(|known| known == name).ok_or_else(missing)?;
+            let sensor = Sensor { kind, coordinate };
+            if sensors.contains(&sensor) {
+                return Err(IdentifyError::Repeated { what, name: name.clone() });
+            }
+            sensors.push(sensor);
+        }
+    }
+    Ok(sensors)
+}
+
+/// Standard deviation of a coordinate over all samples; 1 for one that rests.
+fn spread_of(recording: &Recording, i: usize) -> f64 {
+    let n = recording.n();
+    let all = || recording.tracks.iter().flat_map(|track| track.q.iter().skip(i).step_by(n));
+    let count = recording.samples().max(1) as f64;
+    let mean = all().sum::<f64>() / count;
+    let square = all().map(|x| (x - mean).powi(2)).sum::<f64>() / count;
+    if square > 0.0 { square.sqrt() } else { 1.0 }
+}
+
+/// Samples of the first segments: some of the times in which the fastest coordinate changes.
+fn first_samples(states: &States, n: usize, step: f64) -> usize {
+    let size = |values: &[f64], i: usize| {
+        let own = || values.iter().skip(i).step_by(n);
+        let count = own().count().max(1) as f64;
+        let mean = own().sum::<f64>() / count;
+        (own().map(|x| (x - mean).powi(2)).sum::<f64>() / count).sqrt()
+    };
+    let paces = (0..n).map(|i| size(&states.v, i) / size(&states.a, i)).filter(|pace| pace.is_finite() && *pace > 0.0);
+    let pace = paces.fold(f64::INFINITY, f64::min);
+    let samples = if pace.is_finite() { PACES * pace / step } else { 20.0 };
+    (samples.clamp(LEAST_SEGMENT as f64, 400.0)) as usize
+}
+
+/// Segments of about so many samples that start where smoothing says.
+fn cut(recording: &Recording, smoothed: &[Option<Smoothed>], samples: usize, n: usize) -> Vec<Segment> {
+    let mut segments = Vec::new();
+    for (track, (recorded, smoothed)) in recording.tracks.iter().zip(smoothed).enumerate() {
+        let Some(smoothed) = smoothed else { continue };
+        let length = recorded.len();
+        let count = ((length + samples / 2) / samples).max(1);
+        for k in 0..count {
+            let (first, end) = (k * length / count, (k + 1) * length / count);
+            let [q, v] = [&smoothed.q, &smoothed.v].map(|values| &values[first * n..(first + 1) * n]);
+            segments.push(Segment { track, first, samples: end - first, start: [q, v].concat() });
+        }
+    }
+    let all: usize = segments.iter().map(|segment| segment.samples).sum();
+    if all > MOST_SAMPLES {
+        // Runs of segments that follow each other, so that they can be joined later.
+        const RUN: usize = 16;
+        let runs = segments.len().div_ceil(RUN);
+        let kept = (runs * MOST_SAMPLES / all).max(1);
+        let keep = |at: usize| (at / RUN + 1) * kept / runs > at / RUN * kept / runs;
+        segments = segments.into_iter().enumerate().filter(|(at, _)| keep(*at)).map(|(_, segment)| segment).collect();
+    }
+    segments
+}
+
+/// The fit of the first segments; those that cannot be followed are left out.
+fn first(problem: &mut Problem<'_>, x: Vec<f64>, mut segments: Vec<Segment>) -> Result<Fitted, IdentifyError> {
+    choose_steps(problem, &x, &segments);
+    let followed = problem.all(&x, &segments);
+    let mut kept = followed.iter().map(Option::is_some);
+    segments.retain(|_| kept.next().unwrap_or(false));
+    if segments.is_empty() {
+        return Err(IdentifyError::Lost);
+    }
+    problem.settle(&x, &mut segments, 6);
+    let mut x = x;
+    let normal = problem.fit(&mut x, &mut segments, ITERATIONS);
+    let mut fitted = Fitted { x, segments, normal, substeps: problem.course.substeps };
+    if choose_steps(problem, &fitted.x, &fitted.segments) {
+        refit(problem, &mut fitted);
+    }
+    log(&fitted, "first");
+    Ok(fitted)
+}
+
+fn refit(problem: &Problem<'_>, fitted: &mut Fitted) {
+    fitted.substeps = problem.course.substeps;
+    fitted.normal = problem.fit(&mut fitted.x, &mut fitted.segments, ITERATIONS);
+}
+
+fn log(fitted: &Fitted, what: &str) {
+    let (x, samples) = (&fitted.x, fitted.segments.first().map_or(0, |segment| segment.samples));
+    let (square, spread) = (fitted.mean_square(), fitted.spread());
+    let (segments, substeps) = (fitted.segments.len(), fitted.substeps);
+    tracing::debug!(?x, samples, segments, substeps, square, spread, failed = fitted.normal.failed, "{what}");
+}
+
+/// As many integration steps from sample to sample as keep the integrator's error below a part of the noise; `true` if that changes
+/// their number.
+fn choose_steps(problem: &mut Problem<'_>, x: &[f64], segments: &[Segment]) -> bool {
+    let before = problem.course.substeps;
+    let stride = segments.len().div_ceil(32).max(1);
+    let mut probes: Vec<&Segment> = segments.iter().step_by(stride).collect();
+    probes.sort_by_key(|segment| std::cmp::Reverse(segment.samples));
+    let n = problem.sigma.len();
+    let mut coarse = problem.ends(x, &probes);
+    while problem.course.substeps < MOST_SUBSTEPS {
+        let mut finer = problem.clone();
+        finer.course.substeps *= 2;
+        let fine = finer.ends(x, &probes);
+        let errors = coarse.iter().zip(&fine).flat_map(|(a, b)| {
+            (0..n).map(|i| ((a[i] - b[i]) / problem.sigma[i]).abs()).filter(|e| e.is_finite()).collect::<Vec<_>>()
+        });
+        let mut errors: Vec<f64> = errors.collect();
+        errors.sort_by(f64::total_cmp);
+        if errors.get(errors.len() * 9 / 10).is_none_or(|worst| *worst < INTEGRATOR) {
+            break;
+        }
+        (problem.course.substeps, coarse) = (finer.course.substeps, fine);
+    }
+    problem.course.substeps != before
+}
+
+/// The way between the samples of known forces that meets the motion best.
+fn best_between(problem: &mut Problem<'_>, fitted: Fitted) -> Fitted {
+    let mut best = (problem.course.between, fitted);
+    for between in [Between::Held, Between::BandLimited] {
+        problem.course.between = between;
+        let mut tried = best.1.clone();
+        problem.settle(&tried.x, &mut tried.segments, 3);
+        refit(problem, &mut tried);
+        tracing::debug!(?between, square = tried.mean_square(), "forces");
+        if tried.normal.square < best.1.normal.square {
+            best = (between, tried);
+        }
+    }
+    problem.course.between = best.0;
+    best.1
+}
+
+/// Weighs coordinates by the residuals that are left.
+fn weigh(problem: &mut Problem<'_>, fitted: &Fitted) {
+    let n = problem.sigma.len();
+    let residuals = problem.all_residuals(&fitted.x, &fitted.segments);
+    let taken = fitted.normal.count / residuals.iter().map(|r| r.len() as f64).sum::<f64>();
+    for i in 0..n {
+        let own = || residuals.iter().flat_map(|segment| segment.iter().skip(i).step_by(n)).filter(|r| r.is_finite());
+        let square = own().map(|r| r * r).sum::<f64>() / own().count().max(1) as f64 / taken;
+        if problem.robust {
+            // The median of the size of normal numbers is 0.6745 of their deviation.
+            let mut sizes: Vec<f64> = own().map(|r| r.abs()).collect();
+            sizes.sort_by(f64::total_cmp);
+            let usual = sizes.get(sizes.len() / 2).copied().unwrap_or(0.0) / 0.6745;
+            problem.sigma[i] *= f64::max(usual / taken.sqrt(), 1e-3);
+        } else {
+            problem.sigma[i] *= f64::max(square.sqrt(), 1e-3);
+        }
+        problem.sigma[i] = problem.sigma[i].max(LEAST_NOISE * problem.spread[i]);
+    }
+}
+
+/// Pairs of segments that follow each other as one.
+fn joined(segments: &[Segment]) -> Vec<Segment> {
+    let mut joined: Vec<(Segment, bool)> = Vec::new();
+    for segment in segments {
+        match joined.last_mut() {
+            Some((last, double))
+                if !*double && last.track == segment.track && last.first + last.samples == segment.first =>
+            {
+                last.samples += segment.samples;
+                *double = true;
+            }
+            _ => joined.push((segment.clone(), false)),
+        }
+    }
+    joined.into_iter().map(|(segment, _)| segment).collect()
+}
+
+/// Longer and longer segments, as long as constants become better known by them.
+fn grown(problem: &mut Problem<'_>, mut fitted: Fitted, wanted: Option<f64>) -> Fitted {
+    let seconds = |segments: &[Segment]| usual_samples(segments) as f64 * problem.course.step;
+    let mut wanted_more = wanted.map(|wanted| seconds(&fitted.segments) * 1.5 < wanted);
+    while wanted_more != Some(false) {
+        let segments = joined(&fitted.segments);
+        if segments.len() == fitted.segments.len() {
+            break;
+        }
+        let mut longer = Fitted { segments, ..fitted.clone() };
+        choose_steps(problem, &longer.x, &longer.segments);
+        problem.settle(&longer.x, &mut longer.segments, 6);
+        refit(problem, &mut longer);
+        log(&longer, "longer");
+        let met = longer.normal.failed == 0 && longer.mean_square() < WORSE * fitted.mean_square();
+        if wanted.is_none() && !(met && longer.spread() < fitted.spread() - GAIN) {
+            problem.course.substeps = fitted.substeps;
+            break;
+        }
+        fitted = longer;
+        let seconds = usual_samples(&fitted.segments) as f64 * problem.course.step;
+        wanted_more = wanted.map(|wanted| seconds * 1.5 < wanted);
+    }
+    fitted
+}
+
+/// Samples of the usual segment.
+fn usual_samples(segments: &[Segment]) -> usize {
+    let mut samples: Vec<usize> = segments.iter().map(|segment| segment.samples).collect();
+    samples.sort_unstable();
+    samples.get(samples.len() / 2).copied().unwrap_or(0)
+}
+
+fn result(
+    instance: &SystemInstance<f64>,
+    problem: &Problem<'_>,
+    fitted: &Fitted,
+    (start, noise): (&[f64], &[f64]),
+    options: &IdentifyOptions,
+) -> Identified {
+    let (n, m) = (problem.sigma.len(), fitted.x.len());
+    let recording = problem.course.recording;
+    let (mut inflation, widened) = fitted.inflation();
+    if options.noise.is_some() {
+        inflation = inflation.max(1.0);
+    }
+    let determined = Determined::new(problem, &fitted.x, &fitted.normal, inflation);
+    let parameter = |k: usize| &instance.system.parameters[problem.chosen[k]];
+    let sensor_name = |sensor: &Sensor| {
+        let kind = kind(sensor.kind);
+        format!("{kind} of {}", recording.coordinates[sensor.coordinate])
+    };
+    let names: Vec<String> = (0..problem.chosen.len())
+        .map(|k| parameter(k).symbol.to_string())
+        .chain(problem.sensors.iter().map(sensor_name))
+        .collect();
+    let names: Vec<&str> = names.iter().map(String::as_str).collect();
+    let examiner = Examiner {
+        problem,
+        x: &fitted.x,
+        segments: &fitted.segments,
+        coordinates: &recording.coordinates,
+        bounds: instance.system.validation(n),
+        names: &names,
+    };
+    let undetermined = determined.open.iter().map(|(direction, error)| examiner.describe(direction, *error)).collect();
+    let constants = start.iter().enumerate().map(|(k, &start)| Constant {
+        symbol: parameter(k).symbol.to_string(),
+        value: fitted.x[k],
+        standard_error: determined.errors[k],
+        unit: parameter(k).unit.to_string(),
+        start,
+    });
+    let sensors = problem.sensors.iter().zip(start.len()..).map(|(sensor, k)| SensorConstant {
+        kind: kind(sensor.kind),
+        coordinate: recording.coordinates[sensor.coordinate].clone(),
+        value: fitted.x[k],
+        standard_error: determined.errors[k],
+    });
+    let correlation = |at: usize| {
+        let (i, j) = (at / m, at % m);
+        let root = |k: usize| determined.covariance[k * m + k].sqrt();
+        match (determined.errors[i], determined.errors[j]) {
+            _ if i == j => 1.0,
+            (Some(_), Some(_)) if root(i) * root(j) > 0.0 => determined.covariance[at] / (root(i) * root(j)),
+            _ => 0.0,
+        }
+    };
+    let residuals = problem.all_residuals(&fitted.x, &fitted.segments);
+    let numbers: f64 = residuals.iter().map(|r| r.len() as f64).sum();
+    let taken = (fitted.normal.count - m as f64).max(1.0) / numbers;
+    let of = |i: usize| {
+        let own = || residuals.iter().flat_map(|segment| segment.iter().skip(i).step_by(n)).filter(|r| r.is_finite());
+        let square = own().map(|r| r * r).sum::<f64>() / own().count().max(1) as f64 / taken;
+        let (autocorrelation, white) = whiteness(&residuals, n, i);
+        let rms = square.sqrt() * problem.sigma[i];
+        Residual { coordinate: recording.coordinates[i].clone(), rms, noise: noise[i], autocorrelation, white }
+    };
+    let by_coordinate: Vec<Residual> = (0..n).map(of).collect();
+    let square = by_coordinate.iter().map(|r| (r.rms / r.noise).powi(2)).sum::<f64>() / n as f64;
+    let over_noise = square.sqrt();
+    let far = |track: usize, sample: usize, i: usize, size: f64| Outlier {
+        track,
+        sample,
+        time: recording.tracks[track].times[sample],
+        coordinate: recording.coordinates[i].clone(),
+        size,
+    };
+    let (outliers, outlier_count) = outliers((&fitted.segments, &residuals), n, far);
+    Identified {
+        constants: constants.collect(),
+        sensors: sensors.collect(),
+        correlations: (0..m * m).map(correlation).collect(),
+        undetermined,
+        explained: by_coordinate.iter().all(|r| r.white) && (over_noise < EXPLAINED || outlier_count > 0),
+        residuals: by_coordinate,
+        over_noise,
+        outliers,
+        outlier_count,
+        inflation: widened,
+        samples: fitted.segments.iter().map(|segment| segment.samples).sum(),
+        segments: fitted.segments.len(),
+        segment_seconds: usual_samples(&fitted.segments) as f64 * problem.course.step,
+        substeps: fitted.substeps,
+        between: recording.tracks.iter().any(|track| !track.force.is_empty()).then_some(problem.course.between),
+    }
+}
+
+fn kind(kind: SensorKind) -> &'static str {
+    match kind {
+        SensorKind::Offset => "offset",
+        SensorKind::Gain => "gain",
+        SensorKind::Delay => "delay",
+    }
+}

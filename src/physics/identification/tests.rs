@@ -1,0 +1,270 @@
+//! Constants of simulated motion, of which the truth is known.
+
+use super::*;
+use crate::lagrangian::{Description, SystemInstance, configure, configure_system};
+use crate::random::RngStream;
+use crate::recording::{RecordedTrajectory, Recording};
+use crate::rollout::{Driven, Motion, Options, SampledForce};
+use rand_distr::{Distribution, StandardNormal};
+use std::borrow::Cow;
+
+type Pairs<'a> = [(&'a str, f64)];
+
+fn given(pairs: &Pairs<'_>) -> Vec<(String, String)> {
+    pairs.iter().map(|(name, x)| (name.to_string(), x.to_string())).collect()
+}
+
+/// Motion of a model from some starts, `(2, n)` each, with noise of every coordinate.
+fn recorded(
+    instance: &SystemInstance<f64>,
+    starts: &[&[f64]],
+    (t_end, dt): (f64, f64),
+    noise: &[f64],
+    seed: u64,
+) -> Recording {
+    let n = instance.coordinates;
+    let model = instance.build().unwrap();
+    let mut rng = RngStream::Trajectories.generator(seed);
+    let track = |start: &&[f64]| {
+        let motion = model.rollout(&start[..n], &start[n..], t_end, dt).unwrap();
+        let mut q = motion.q;
+        for (k, q) in q.iter_mut().enumerate() {
+            let draw: f64 = StandardNormal.sample(&mut rng);
+            *q += noise[k % n] * draw;
+        }
+        RecordedTrajectory { name: "run".into(), times: motion.t, q, v: vec![], a: vec![], force: vec![] }
+    };
+    let coordinates = instance.system.coordinates(n);
+    Recording {
+        coordinates: coordinates.iter().map(|c| c.name.to_string()).collect(),
+        periodic: coordinates.iter().map(|c| c.periodic).collect(),
+        tracks: starts.iter().map(track).collect(),
+    }
+}
+
+fn described(text: &str, pairs: &Pairs<'_>) -> SystemInstance<f64> {
+    let description: Description = serde_json::from_str(text).unwrap();
+    configure_system(Cow::Owned(description.system().unwrap()), &given(pairs)).unwrap()
+}
+
+const STARTS: [&[f64]; 4] =
+    [&[1.2, 1.9, 0.0, 0.0], &[-0.8, 0.4, 1.0, -2.0], &[2.0, -0.5, 0.0, 1.0], &[0.3, -1.4, -2.0, 0.0]];
+
+#[test]
+fn constants_of_a_double_pendulum_lie_within_their_errors() {
+    let truth = [("m2", 0.6), ("l1", 0.8), ("l2", 1.3)];
+    let instance = configure::<f64>("double-pendulum", &given(&truth)).unwrap();
+    let form = configure::<f64>("double-pendulum", &[]).unwrap();
+    let options = IdentifyOptions { constants: ["m2", "l1", "l2"].map(String::from).to_vec(), ..Default::default() };
+    let mut squares = Vec::new();
+    for seed in 0..4 {
+        let recording = recorded(&instance, &STARTS, (3.0, 0.02), &[2e-3, 3e-3], seed);
+        let found = identify(&form, &recording, &options).unwrap();
+        assert!(found.explained && found.undetermined.is_empty(), "{found:?}");
+        // Order of the system, not of the options.
+        let symbols: Vec<&str> = found.constants.iter().map(|c| c.symbol.as_str()).collect();
+        assert_eq!(symbols, ["m2", "l1", "l2"]);
+        for (constant, (_, truth)) in found.constants.iter().zip(truth) {
+            let error = constant.standard_error.unwrap();
+            assert!(error < 2e-3 * truth, "{constant:?}");
+            squares.push(((constant.value - truth) / error).powi(2));
+        }
+        for (residual, noise) in found.residuals.iter().zip([2e-3, 3e-3]) {
+            assert!((residual.rms / noise - 1.0).abs() < 0.12, "{residual:?}");
+        }
+    }
+    let mean = squares.iter().sum::<f64>() / squares.len() as f64;
+    assert!((0.2..2.2).contains(&mean) && squares.iter().all(|s| *s < 16.0), "{squares:?}");
+}
+
+#[test]
+fn what_free_motion_leaves_open_is_named_with_its_cure() {
+    let pendulum = |pairs: &Pairs<'_>| {
+        let text = r#"{"name": "swing", "lagrangian": "m*l^2*a_dot^2/2 + m*g*l*cos(a)",
+            "coordinates": [{"name": "a", "periodic": true, "velocity_bounds": [-3, 3]}],
+            "parameters": {"m": {"default": 2, "unit": "kg", "range": "positive"}, "l": 1, "g": 9}}"#;
+        described(text, pairs)
+    };
+    let recording = recorded(&pendulum(&[("g", 9.8)]), &[&[1.0, 0.0]], (6.0, 0.02), &[1e-3], 1);
+    let found = identify(&pendulum(&[]), &recording, &IdentifyOptions::default()).unwrap();
+    assert!(found.explained && found.constants.iter().all(|c| c.standard_error.is_none()), "{found:?}");
+    let sets: Vec<Vec<&str>> =
+        found.undetermined.iter().map(|u| u.constants.iter().map(String::as_str).collect()).collect();
+    assert_eq!(sets.len(), 2, "{:?}", found.undetermined);
+    let of = |constants: &[&str]| &found.undetermined[sets.iter().position(|set| set == constants).unwrap()];
+    let mass = of(&["m"]);
+    assert!(mass.cure.contains("--force") && mass.known.is_empty(), "{mass:?}");
+    let pair = of(&["g", "l"]);
+    assert_eq!(pair.known[0].0, "l/g");
+    assert!((pair.known[0].1 * 9.8 - 1.0).abs() < 1e-3, "{pair:?}");
+    // The mass stays where it started.
+    assert_eq!(found.constants.iter().find(|c| c.symbol == "m").unwrap().value, 2.0);
+    // With one of them known the other is determined.
+    let options = IdentifyOptions { constants: vec!["g".into()], ..Default::default() };
+    let found = identify(&pendulum(&[]), &recording, &options).unwrap();
+    let g = &found.constants[0];
+    assert!(found.undetermined.is_empty() && (g.value - 9.8).abs() < 4.0 * g.standard_error.unwrap(), "{g:?}");
+}
+
+#[test]
+fn what_a_larger_motion_would_tell_is_said() {
+    let spring = |pairs: &Pairs<'_>| {
+        let text = r#"{"name": "spring", "lagrangian": "x_dot^2/2 - k*x^2/2 - c*x^4/4",
+            "coordinates": [{"name": "x", "bounds": [-1, 1], "velocity_bounds": [-2, 2]}],
+            "parameters": {"k": 1, "c": 0.5}}"#;
+        described(text, pairs)
+    };
+    let recording = recorded(&spring(&[]), &[&[0.01, 0.0]], (20.0, 0.05), &[1e-4], 2);
+    let found = identify(&spring(&[]), &recording, &IdentifyOptions::default()).unwrap();
+    let open = &found.undetermined[0];
+    assert!(open.constants.contains(&"c".to_string()) && open.relative_error.is_some(), "{open:?}");
+    assert!(open.cure.contains("x goes farther"), "{open:?}");
+    let k = found.constants.iter().find(|c| c.symbol == "k").unwrap();
+    assert!((k.value - 1.0).abs() < 4.0 * k.standard_error.unwrap(), "{k:?}");
+    let large = recorded(&spring(&[]), &[&[1.5, 0.0]], (20.0, 0.05), &[1e-4], 2);
+    let found = identify(&spring(&[]), &large, &IdentifyOptions::default()).unwrap();
+    assert!(found.undetermined.is_empty(), "{found:?}");
+}
+
+#[test]
+fn a_wrong_form_leaves_what_is_no_noise() {
+    let form = |friction: &str| {
+        let text = format!(
+            r#"{{"name": "swing", "lagrangian": "a_dot^2/2 + w*cos(a)", {friction}
+            "coordinates": [{{"name": "a", "periodic": true, "velocity_bounds": [-3, 3]}}],
+            "parameters": {{"w": 9, "c": 0.1}}}}"#
+        );
+        described(&text, &[])
+    };
+    let damped = form(r#""dissipation": "c*a_dot^2/2","#);
+    let recording = recorded(&damped, &[&[1.5, 0.0], &[2.5, 0.0]], (6.0, 0.02), &[1e-3], 3);
+    let wrong = identify(&form(""), &recording, &IdentifyOptions { constants: vec!["w".into()], ..Default::default() });
+    let wrong = wrong.unwrap();
+    assert!(!wrong.explained, "{wrong:?}");
+    let right = identify(&damped, &recording, &IdentifyOptions::default()).unwrap();
+    assert!(right.explained && right.residuals[0].white, "{right:?}");
+    for (constant, truth) in right.constants.iter().zip([0.1, 9.0]) {
+        assert!((constant.value - truth).abs() < 4.0 * constant.standard_error.unwrap(), "{constant:?}");
+    }
+    assert!(wrong.over_noise > 1.5 * right.over_noise);
+}
+
+#[test]
+fn outliers_are_named_and_a_robust_fit_is_not_moved() {
+    let instance = configure::<f64>("n-pendulum", &given(&[("n", 1.0), ("l", 0.7)])).unwrap();
+    let mut recording = recorded(&instance, &[&[1.0, 0.0]], (6.0, 0.02), &[1e-3], 4);
+    let wrong = [37, 120, 200];
+    wrong.iter().for_each(|&at| recording.tracks[0].q[at] += 0.1);
+    let form = configure::<f64>("n-pendulum", &given(&[("n", 1.0)])).unwrap();
+    let options = IdentifyOptions { constants: vec!["l".into()], robust: true, ..Default::default() };
+    let found = identify(&form, &recording, &options).unwrap();
+    let mut samples: Vec<usize> = found.outliers.iter().map(|o| o.sample).collect();
+    samples.sort_unstable();
+    assert_eq!(samples, wrong, "{:?}", found.outliers);
+    assert_eq!(found.outliers[0].time, recording.tracks[0].times[found.outliers[0].sample]);
+    let l = &found.constants[0];
+    assert!((l.value - 0.7).abs() < 4.0 * l.standard_error.unwrap() && l.standard_error.unwrap() < 1e-3, "{l:?}");
+    let plain = identify(&form, &recording, &IdentifyOptions { robust: false, ..options }).unwrap();
+    assert!(plain.outlier_count >= 3 && plain.constants[0].standard_error > l.standard_error, "{plain:?}");
+}
+
+#[test]
+fn sensors_have_constants_too() {
+    let instance = configure::<f64>("n-pendulum", &given(&[("n", 1.0), ("l", 0.7)])).unwrap();
+    let mut recording = recorded(&instance, &[&[2.0, 0.0], &[1.0, 3.0]], (6.0, 0.02), &[0.0], 5);
+    let mut rng = RngStream::Trajectories.generator(6);
+    for q in recording.tracks.iter_mut().flat_map(|track| &mut track.q) {
+        let draw: f64 = StandardNormal.sample(&mut rng);
+        *q = 1.05 * *q + 0.03 + 1e-3 * draw;
+    }
+    let form = configure::<f64>("n-pendulum", &given(&[("n", 1.0)])).unwrap();
+    let theta = || vec![recording.coordinates[0].clone()];
+    let options =
+        IdentifyOptions { constants: vec!["l".into()], offsets: theta(), gains: theta(), ..Default::default() };
+    let found = identify(&form, &recording, &options).unwrap();
+    assert!(found.explained, "{found:?}");
+    assert_eq!(found.sensors.iter().map(|s| s.kind).collect::<Vec<_>>(), ["offset", "gain"]);
+    for (sensor, truth) in found.sensors.iter().zip([0.03, 1.05]) {
+        assert!((sensor.value - truth).abs() < 4.0 * sensor.standard_error.unwrap(), "{sensor:?}");
+    }
+    let l = &found.constants[0];
+    assert!((l.value - 0.7).abs() < 4.0 * l.standard_error.unwrap(), "{l:?}");
+    // A late sensor of motion without forces sees another start: nothing tells it.
+    let late = IdentifyOptions { delays: theta(), gains: vec![], ..options };
+    let late = identify(&form, &recording, &late).unwrap();
+    assert!(late.undetermined.iter().any(|u| u.constants.iter().any(|c| c.starts_with("delay"))), "{late:?}");
+}
+
+/// An oscillator under a force that is held between the samples, eight of them per turn of its own.
+#[test]
+fn a_driven_oscillator_is_known_from_coarse_samples_and_the_hold_is_seen() {
+    let oscillator = |pairs: &Pairs<'_>| {
+        let text = r#"{"name": "duffing", "lagrangian": "m*x_dot^2/2 - k*x^2/2 - b*x^4/4", "dissipation": "c*x_dot^2/2",
+            "coordinates": [{"name": "x", "bounds": [-2, 2], "velocity_bounds": [-2, 2]}],
+            "parameters": {"m": 1.5, "k": 1, "b": 0.1, "c": 0.3}}"#;
+        described(text, pairs)
+    };
+    let truth = [("m", 1.0), ("k", 1.2), ("b", 0.4), ("c", 0.2)];
+    let instance = oscillator(&truth);
+    let model = instance.build().unwrap();
+    let (step, samples) = (0.7, 1200);
+    let mut rng = RngStream::Trajectories.generator(7);
+    let force: Vec<f64> = (0..samples).map(|_| StandardNormal.sample(&mut rng)).collect();
+    let (mut q, mut state) = (Vec::new(), (0.0, 0.0));
+    for f in &force {
+        let draw: f64 = StandardNormal.sample(&mut rng);
+        q.push(state.0 + 0.01 * draw);
+        let held = SampledForce::constant(vec![*f]).unwrap();
+        let motion = Driven::new(&*model, &held).rollout(&[state.0], &[state.1], &Options::new(step, step));
+        let motion = motion.complete().unwrap();
+        state = (motion.q[1], motion.v[1]);
+    }
+    let times = (0..samples).map(|k| k as f64 * step).collect();
+    let track = RecordedTrajectory { name: "circuit".into(), times, q, v: vec![], a: vec![], force };
+    let recording = Recording { coordinates: vec!["x".into()], periodic: vec![false], tracks: vec![track] };
+    let found = identify(&oscillator(&[]), &recording, &IdentifyOptions::default()).unwrap();
+    assert_eq!(found.between, Some(Between::Held));
+    assert!(found.undetermined.is_empty(), "{found:?}");
+    for constant in &found.constants {
+        let truth = truth.iter().find(|(name, _)| *name == constant.symbol).unwrap().1;
+        let error = constant.standard_error.unwrap();
+        assert!((constant.value - truth).abs() < 4.0 * error && error < 0.01, "{constant:?}");
+    }
+}
+
+#[test]
+fn what_does_not_fit_together_is_refused() {
+    let form = configure::<f64>("n-pendulum", &given(&[("n", 1.0)])).unwrap();
+    let recording = recorded(&form, &[&[1.0, 0.0]], (1.0, 0.02), &[1e-3], 8);
+    let refused = |options: IdentifyOptions| identify(&form, &recording, &options).unwrap_err();
+    let names = |name: &str| vec![name.to_string()];
+    let error = refused(IdentifyOptions { constants: names("mass"), ..Default::default() });
+    assert!(matches!(error, IdentifyError::Constant { .. }));
+    let twice = vec!["l".to_string(), "l".to_string()];
+    assert!(matches!(
+        refused(IdentifyOptions { constants: twice, ..Default::default() }),
+        IdentifyError::Repeated { .. }
+    ));
+    let error = refused(IdentifyOptions { gains: names("phi"), ..Default::default() });
+    assert!(matches!(error, IdentifyError::Sensor { what: "gains", .. }));
+    assert!(matches!(
+        refused(IdentifyOptions { segment: Some(f64::NAN), ..Default::default() }),
+        IdentifyError::Option { what: "segment", .. }
+    ));
+    let short = recorded(&form, &[&[1.0, 0.0]], (0.1, 0.02), &[1e-3], 8);
+    assert!(matches!(identify(&form, &short, &Default::default()), Err(IdentifyError::Short { found: 6, .. })));
+    let double = configure::<f64>("double-pendulum", &[]).unwrap();
+    let error = identify(&double, &recording, &Default::default()).unwrap_err();
+    assert_eq!(error, IdentifyError::Coordinates { expected: 2, found: 1 });
+    let constrained = configure::<f64>("particle-on-ellipse", &[]).unwrap();
+    let plane = Recording {
+        coordinates: vec!["x".into(), "y".into()],
+        periodic: vec![false; 2],
+        tracks: vec![RecordedTrajectory {
+            q: [recording.tracks[0].q.clone(), recording.tracks[0].q.clone()].concat(),
+            ..recording.tracks[0].clone()
+        }],
+    };
+    let error = identify(&constrained, &plane, &Default::default()).unwrap_err();
+    assert!(matches!(error, IdentifyError::Constrained { .. }), "{error}");
+}

@@ -1,0 +1,92 @@
+//! `lnn identify`: constants of systems in files, from recorded motion.
+
+use crate::common::program::{Folder, lnn, text};
+use serde_json::Value;
+use std::fs;
+
+const DATA: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/data/pendulum.csv");
+const SYSTEM: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/systems/damped_pendula.toml");
+
+#[test]
+fn constants_and_friction_of_the_example_are_found_and_written() {
+    let folder = Folder::new();
+    let out = text(&folder.path("found.toml"));
+    let run = lnn(&["identify", DATA, "--system", SYSTEM, "--trajectory", "run", "--json", "--out", &out]);
+    assert_eq!(run.code, Some(0), "{}", run.stderr);
+    let found: Value = serde_json::from_str(&run.stdout).unwrap();
+    for (name, truth) in [("m2", 1.0), ("l1", 1.0), ("l2", 1.0), ("c1", 0.08), ("c2", 0.05)] {
+        let [value, error] = ["value", "standard_error"].map(|key| found["constants"][name][key].as_f64().unwrap());
+        assert!((value - truth).abs() < 4.0 * error && error < 0.02 * truth, "{name} {value} {error}");
+    }
+    assert_eq!(found["constants"]["m2"]["unit"], "kg");
+    assert_eq!(
+        (found["undetermined"].as_array().unwrap().len(), &found["residual"]["explained"]),
+        (0, &Value::Bool(true))
+    );
+    // The file has friction: after ten minutes the arms hang.
+    let rolled = ["rollout", "--system", &out, "--state", "1,1,0,0", "--t-end", "600", "--dt", "600", "--out", "-"];
+    let rolled = lnn(&rolled);
+    assert_eq!(rolled.code, Some(0), "{}", rolled.stderr);
+    let last: Vec<f64> = rolled.stdout.lines().last().unwrap().split(',').map(|x| x.parse().unwrap()).collect();
+    assert!(last[0] == 600.0 && last[1..5].iter().all(|x| x.abs() < 0.05), "{last:?}");
+    let shown = lnn(&["systems", "--system", &out]);
+    assert!(shown.code == Some(0) && shown.stdout.contains("--param m2="), "{}", shown.stdout);
+    let learned = lnn(&["train", &out, "--out", &text(&folder.path("run")), "--epochs", "1", "--hidden", "4"]);
+    assert_eq!(learned.code, Some(0), "{}", learned.stderr);
+    // A grey box knows Lagrangians alone, and says so.
+    let known = ["fit", DATA, "--coords", "theta1,theta2", "--trajectory", "run", "--known", &out, "--out"];
+    let known = lnn(&[&known[..], &[&text(&folder.path("fit"))]].concat());
+    assert!(known.code == Some(2) && known.stderr.contains("dissipation"), "{}", known.stderr);
+}
+
+#[test]
+fn rows_and_open_directions_are_named() {
+    let folder = Folder::new();
+    let mut lines: Vec<String> = fs::read_to_string(DATA).unwrap().lines().map(String::from).collect();
+    // Row 301 of the file, the header being the first.
+    let mut fields: Vec<String> = lines[300].split(',').map(String::from).collect();
+    fields[2] = format!("{}", fields[2].parse::<f64>().unwrap() + 0.4);
+    lines[300] = fields.join(",");
+    let path = folder.path("outlier.csv");
+    fs::write(&path, lines.join("\n")).unwrap();
+    let path = text(&path);
+    let all = ["identify", &path, "--system", SYSTEM, "--trajectory", "run", "--robust"];
+    let run = lnn(&[&all[..], &["--constants", "m1,m2,l1,l2,g,c1,c2", "--json"]].concat());
+    assert_eq!(run.code, Some(0), "{}", run.stderr);
+    let found: Value = serde_json::from_str(&run.stdout).unwrap();
+    let outlier = &found["outliers"][0];
+    assert_eq!((&outlier["row"], &outlier["coordinate"]), (&Value::from(301), &Value::from("theta1")), "{outlier}");
+    let open = found["undetermined"].as_array().unwrap();
+    assert_eq!(open.len(), 2, "{open:?}");
+    assert!(open.iter().all(|u| u["cure"].as_str().unwrap().contains("--force")), "{open:?}");
+    let shown = lnn(&all);
+    assert!(shown.code == Some(0) && shown.stdout.contains("301"), "{}", shown.stdout);
+}
+
+#[test]
+fn a_listed_system_serves_and_what_is_wrong_is_named() {
+    let base = ["identify", DATA, "--trajectory", "run", "--system"];
+    let with = |more: &[&str]| lnn(&[&base[..], more].concat());
+    let listed = with(&["double-pendulum", "--constants", "l2", "--param", "g=9.81", "--json"]);
+    assert_eq!(listed.code, Some(0), "{}", listed.stderr);
+    // The catalogue's pendulum has no friction.
+    let found: Value = serde_json::from_str(&listed.stdout).unwrap();
+    assert_eq!(found["residual"]["explained"], Value::Bool(false));
+    for (wrong, code, named) in [
+        (&["double-pendulum", "--out", "found.toml"][..], 2, "--out"),
+        (&[SYSTEM, "--out", "found.txt"], 2, "--out"),
+        (&[SYSTEM, "--constants", "m3"], 2, "--constants"),
+        (&[SYSTEM, "--gain", "theta3"], 2, "--gain"),
+        (&[SYSTEM, "--coords", "theta1"], 2, "--coords"),
+        (&[SYSTEM, "--noise", "0.1"], 2, "--noise"),
+        (&[SYSTEM, "--param", "m9=1"], 2, "--param"),
+        (&[SYSTEM, "--segment", "0"], 2, "--segment"),
+        (&["particle-on-ellipse", "--coords", "theta1,theta2"], 2, "--system"),
+        (&[SYSTEM, "--coords", "theta1,theta9"], 1, "theta9"),
+        (&[SYSTEM, "--force", "tau1"], 2, "--force"),
+    ] {
+        let run = with(wrong);
+        assert_eq!(run.code, Some(code), "{wrong:?}: {}", run.stderr);
+        assert!(run.stderr.contains(named) && run.stderr.lines().count() == 1, "{wrong:?}: {}", run.stderr);
+    }
+}
