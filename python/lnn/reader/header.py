@@ -29,8 +29,10 @@ ARCHITECTURE = {
     "form": FORM,
 }
 HEADER = {
-    **dict.fromkeys(["crate_version", "system", "description", "parameters", "columns", "forces", "precision"]),
+    **dict.fromkeys(["crate_version", "system", "parameters", "columns", "forces", "precision"]),
     **dict.fromkeys(["position", "velocity", "seed", "validation_loss"]),
+    # Constraints are not among its keys: they change the motion.
+    "description": KNOWN,
     "format": [FORMAT],
     "architecture": ARCHITECTURE,
 }

@@ -38,6 +38,14 @@ pub enum PipelineError {
     /// Measured accelerations asked for where none were given.
     #[error("no accelerations were given")]
     NoAccelerations,
+    /// Constraints with a mistake, that contradict each other or leave no motion, or that recorded motion does not obey.
+    #[error("{0}")]
+    Constraints(String),
+    /// Multiple shooting asked for where constraints hold the motion.
+    #[error(
+        "targets: multiple shooting does not know constraints, expected smoothed or measured accelerations beside them"
+    )]
+    ShootingUnderConstraints,
     /// A shape of the network that contradicts itself.
     #[error(transparent)]
     Network(#[from] NetworkError),
@@ -153,10 +161,15 @@ impl PipelineError {
     pub(crate) fn is_configuration(&self) -> bool {
         match self {
             Self::Config(_) | Self::System(_) | Self::Network(_) | Self::NoAccelerations => true,
+            Self::Constraints(_) | Self::ShootingUnderConstraints => true,
             Self::Sampling(error) => !matches!(error, SamplingError::Dataset(_) | SamplingError::Interrupted),
             Self::OtherShape { configuration, .. } => *configuration,
             _ => false,
         }
+    }
+
+    pub(crate) fn constraints(error: impl fmt::Display) -> Self {
+        Self::Constraints(error.to_string())
     }
 
     pub(crate) fn format(error: impl fmt::Display) -> Self {

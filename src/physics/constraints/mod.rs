@@ -91,6 +91,15 @@ pub struct FoundConstraints {
     pub noise: Vec<f64>,
 }
 
+impl FoundConstraints {
+    /// Formulas of the constraints of the system by name, as a table `[constraints]` has them; what each trajectory conserves by itself
+    /// is none.
+    pub fn formulas(&self) -> BTreeMap<String, String> {
+        let of_system = self.constraints.iter().filter(|found| found.kind != ConstraintKind::PerTrajectory);
+        of_system.enumerate().map(|(k, found)| (format!("found {}", k + 1), found.formula.clone())).collect()
+    }
+}
+
 /// Why nothing can be looked for.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]

@@ -60,6 +60,7 @@ fn black_box() -> Header {
         parameters: BTreeMap::new(),
         columns: ["theta", "x", "y", "theta_dot", "x_dot", "y_dot"].map(String::from).to_vec(),
         forces: Vec::new(),
+        constraints: BTreeMap::new(),
         precision: StoredPrecision::F64,
         position: vec![[-10.0, 10.0]; 3],
         velocity: vec![[-10.0, 10.0]; 3],
@@ -94,6 +95,7 @@ pub fn kinds() -> Vec<(String, ModelFile<f64>)> {
         h.description = Some(description(&h.system));
         h.parameters = BTreeMap::from([("mass".to_string(), 2.0)]);
     });
+    add("constraints", &|h| h.constraints = [("rod".to_string(), "x^2 + y^2 - 1".to_string())].into());
     let radial = || vec![Radial { coordinates: vec![2, 1], unit: 1.25 }];
     for (kind, structure, factor, time_like) in [
         ("black box", Structure::BlackBox, Factor::Triangle, None),
