@@ -332,8 +332,7 @@ const LEARNED: [(&str, &str, Option<&str>, Structure); 9] = [
 /// Learns Lagrangians in redundant coordinates under the constraints that their own motions obey, which are found first.
 fn learned(seeds: u64, count: usize, epochs: usize, only: &dyn Fn(&str) -> bool) {
     println!(
-        "what                   structure     seed    found  validation       test   M off by (max)   roll-outs: {}",
-        "what, median and largest"
+        "what                   structure     seed  found  validation       test   M off by     at most   roll-outs"
     );
     for (what, name, pendulum, structure) in LEARNED.into_iter().filter(|(_, name, ..)| only(name)) {
         for seed in 0..seeds {

@@ -147,6 +147,7 @@ mod tests {
     use super::*;
     use crate::lagrangian::{Request, Terms, configure};
     use crate::presets::Preset;
+    use std::borrow::Cow;
 
     #[test]
     fn every_state_of_a_relativistic_system_is_on_the_mass_shell() {
@@ -181,6 +182,34 @@ mod tests {
             seen += 1;
         }
         assert_eq!(seen, 8);
+    }
+
+    #[test]
+    fn states_under_constraints_lie_on_them() {
+        let system = configure::<f64>("cartesian-chain-2", &[]).unwrap();
+        let mut config = Preset::Quick.config(&system).unwrap();
+        (config.data.training, config.data.validation, config.data.test) = (200, 50, 50);
+        for fraction in [0.0, 0.5] {
+            config.data.trajectory_fraction = fraction;
+            let (data, _) = sample_all::<f64>(&config, &system).unwrap();
+            for set in data.training.iter().chain([&data.validation, &data.test]) {
+                assert_eq!(set.constraints(), 2);
+                for (k, ((q, v), a)) in set.q().chunks(4).zip(set.v().chunks(4)).zip(set.a().chunks(4)).enumerate() {
+                    assert!((q[0].hypot(q[1]) - 1.0).abs() < 1e-12 && (q[2] - q[0]).hypot(q[3] - q[1]) < 1.0 + 1e-12);
+                    let (rows, drift) = set.constraint(k);
+                    for (row, drift) in rows.chunks(4).zip(drift) {
+                        let along = |x: &[f64]| row.iter().zip(x).map(|(a, x)| a * x).sum::<f64>();
+                        assert!(along(v).abs() < 1e-12 && (along(a) + drift).abs() < 1e-9, "{q:?} {v:?}");
+                    }
+                }
+            }
+        }
+        // Constraints that no state of the bounds comes to.
+        let mut description = system.system.description().unwrap().clone();
+        description.name = "unreachable".to_string();
+        description.constraints.insert("far".to_string(), "x1 + 5*l".to_string());
+        let far = crate::lagrangian::configure_system::<f64>(Cow::Owned(description.system().unwrap()), &[]);
+        assert!(sample_all::<f64>(&config, &far.unwrap()).is_err());
     }
 
     #[test]

@@ -95,7 +95,17 @@ pub fn kinds() -> Vec<(String, ModelFile<f64>)> {
         h.description = Some(description(&h.system));
         h.parameters = BTreeMap::from([("mass".to_string(), 2.0)]);
     });
-    add("constraints", &|h| h.constraints = [("rod".to_string(), "x^2 + y^2 - 1".to_string())].into());
+    let formulas = |all: &[(&str, &str)]| -> BTreeMap<String, String> {
+        all.iter().map(|(name, formula)| (name.to_string(), formula.to_string())).collect()
+    };
+    add("constraints", &|h| {
+        h.constraints = formulas(&[("rod", "x^2 + x*y - 1"), ("rolling", "x_dot - 0.5*theta_dot*cos(theta) - 1")]);
+    });
+    add("constraints of a described system", &|h| {
+        let constraints = formulas(&[("rod", "(x^2 + y^2)/mass - 1")]);
+        h.description = Some(Description { constraints, ..description(&h.system) });
+        h.parameters = BTreeMap::from([("mass".to_string(), 2.5)]);
+    });
     let radial = || vec![Radial { coordinates: vec![2, 1], unit: 1.25 }];
     for (kind, structure, factor, time_like) in [
         ("black box", Structure::BlackBox, Factor::Triangle, None),
