@@ -103,7 +103,9 @@ pub fn kinds() -> Vec<(String, ModelFile<f64>)> {
     });
     add("constraints of a described system", &|h| {
         let constraints = formulas(&[("rod", "(x^2 + y^2)/mass - 1")]);
-        h.description = Some(Description { constraints, ..description(&h.system) });
+        let mut system = description(&h.system);
+        system.constraints = constraints;
+        h.description = Some(system);
         h.parameters = BTreeMap::from([("mass".to_string(), 2.5)]);
     });
     let radial = || vec![Radial { coordinates: vec![2, 1], unit: 1.25 }];
