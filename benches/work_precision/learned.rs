@@ -47,6 +47,7 @@ fn train(epochs: usize, states: usize, path: &Path) -> Result<(), String> {
         parameters: symbols.zip(system.parameters.iter().copied()).collect(),
         columns: system.system.columns(system.coordinates),
         forces: Vec::new(),
+        constraints: [].into(),
         description: None,
         precision: match config.precision {
             Precision::F32 => StoredPrecision::F32,

@@ -135,7 +135,7 @@ pub fn train(
     .map_err(pipeline)?;
     let (text, result, stop) = (report.text(), history(&report.history)?, ended(&report.stop));
     let json = report.json().map_err(pipeline)?;
-    Ok((Subject::learned(report.header, report.network), result, json, text, stop))
+    Ok((Subject::learned(report.header, report.network)?, result, json, text, stop))
 }
 
 /// Choices of [`learn`] and [`fit`], as JSON.
@@ -207,7 +207,7 @@ pub fn learn(
     let _ = std::fs::remove_file(&place);
     let header = loaded.map_err(runtime)?.header;
     let result = history(&learned.history)?;
-    Ok((Subject::learned(header, learned.model), result, learned.validation_loss, learned.test_loss))
+    Ok((Subject::learned(header, learned.model)?, result, learned.validation_loss, learned.test_loss))
 }
 
 /// One trajectory as Python gives it: name, times, positions, and velocities, accelerations and forces, empty if there are none.
@@ -234,7 +234,7 @@ pub fn fit(
     let report = report.map_err(pipeline)?;
     let (text, result, stop) = (report.text().to_string(), history(&report.history)?, ended(&report.stop));
     let json = report.json().to_string();
-    Ok((Subject::learned(report.header, report.network), result, json, text, stop))
+    Ok((Subject::learned(report.header, report.network)?, result, json, text, stop))
 }
 
 /// Origin of recorded motion.

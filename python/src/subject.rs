@@ -30,7 +30,7 @@ const CHUNK: usize = 4096;
 /// Origin of a Lagrangian.
 enum Kind {
     System(Box<SystemInstance<f64>>, Box<dyn EulerLagrange<f64>>),
-    Model(Box<Header>, Box<NetworkLagrangian<f64>>),
+    Model(Box<Header>, Box<NetworkLagrangian<f64>>, Box<dyn EulerLagrange<f64>>),
 }
 
 /// A system or a model.
@@ -69,10 +69,19 @@ impl Subject {
         Ok(Self { kind: Kind::System(Box::new(configured), built), columns })
     }
 
-    /// A model, from a header and weights.
-    pub fn learned(header: Header, network: NetworkLagrangian<f64>) -> Self {
+    /// A model, from a header and weights, under the constraints that it was learned under.
+    pub fn learned(header: Header, network: NetworkLagrangian<f64>) -> PyResult<Self> {
         let columns = header.columns.clone();
-        Self { kind: Kind::Model(Box::new(header), Box::new(network)), columns }
+        let motion = header.constrain(Box::new(network.cast::<f64>())).map_err(value)?;
+        Ok(Self { kind: Kind::Model(Box::new(header), Box::new(network), motion), columns })
+    }
+
+    /// Refuses what knows free coordinates alone.
+    fn require_free(&self) -> PyResult<()> {
+        match self.moving().manifold() {
+            None => Ok(()),
+            Some(_) => Err(value("the motion is held by constraints, which this function does not know")),
+        }
     }
 
     fn n(&self) -> usize {
@@ -82,7 +91,7 @@ impl Subject {
     fn moving(&self) -> &dyn EulerLagrange<f64> {
         match &self.kind {
             Kind::System(_, built) => built.as_ref(),
-            Kind::Model(_, network) => network.as_ref(),
+            Kind::Model(_, _, motion) => motion.as_ref(),
         }
     }
 
@@ -90,7 +99,7 @@ impl Subject {
     pub fn system_instance(&self) -> PyResult<SystemInstance<f64>> {
         let header = match &self.kind {
             Kind::System(configured, _) => return Ok((**configured).clone()),
-            Kind::Model(header, _) => header,
+            Kind::Model(header, ..) => header,
         };
         let system = match &header.description {
             Some(description) => description.system().map(Cow::Owned).map_err(value)?,
@@ -105,7 +114,7 @@ impl Subject {
     fn time_like(&self) -> Option<usize> {
         match &self.kind {
             Kind::System(configured, _) => configured.system.time_like,
-            Kind::Model(header, _) => header.architecture.time_like,
+            Kind::Model(header, ..) => header.architecture.time_like,
         }
     }
 
@@ -117,7 +126,7 @@ impl Subject {
                 let pairs = |bounds: Vec<(f64, f64)>| bounds.into_iter().map(|(low, high)| [low, high]).collect();
                 Region { position: pairs(positions), velocity: pairs(velocities) }
             }
-            Kind::Model(header, _) => Region { position: header.position.clone(), velocity: header.velocity.clone() },
+            Kind::Model(header, ..) => Region { position: header.position.clone(), velocity: header.velocity.clone() },
         }
     }
 
@@ -126,7 +135,7 @@ impl Subject {
             Kind::System(configured, _) => {
                 configured.system.coordinates(configured.coordinates).iter().map(|c| c.periodic).collect()
             }
-            Kind::Model(header, _) => header.architecture.periodic.clone(),
+            Kind::Model(header, ..) => header.architecture.periodic.clone(),
         }
     }
 
@@ -151,7 +160,7 @@ impl Subject {
                     "parameters": values(configured), "description": system.description(),
                 })
             }
-            Kind::Model(header, _) => json!({ "name": header.system, "header": header }),
+            Kind::Model(header, ..) => json!({ "name": header.system, "header": header }),
         };
         if let (Some(summary), Value::Object(more)) = (summary.as_object_mut(), more) {
             summary.extend(more);
@@ -248,12 +257,12 @@ impl Subject {
     fn model(bytes: &[u8]) -> PyResult<Self> {
         let ModelFile { header, weights } = ModelFile::<f64>::from_bytes(bytes).map_err(value)?;
         let network = NetworkLagrangian::new(header.architecture.clone(), weights).map_err(value)?;
-        Ok(Self::learned(header, network))
+        Self::learned(header, network)
     }
 
     /// The bytes of a model's file.
     fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
-        let Kind::Model(header, network) = &self.kind else { return Err(value("a system has no model file")) };
+        let Kind::Model(header, network, _) = &self.kind else { return Err(value("a system has no model file")) };
         let file = ModelFile { header: (**header).clone(), weights: network.weights().to_vec() };
         Ok(PyBytes::new(py, &file.to_bytes().map_err(value)?))
     }
@@ -339,7 +348,7 @@ impl Subject {
         let ((t0, t_end, dt), (rtol, atol, step)) = (times, accuracy);
         let method: Method = serde_json::from_value(method.into()).map_err(value)?;
         let domain = match &self.kind {
-            Kind::Model(header, _) if bounded => Some(trained_on(header)),
+            Kind::Model(header, ..) if bounded => Some(trained_on(header)),
             _ => None,
         };
         let options = Options { t0, method, rtol, atol, step, domain, ..Options::new(t_end, dt) };
@@ -475,6 +484,7 @@ impl Subject {
         let region = Bounds { positions: pairs(position), velocities: pairs(velocity) };
         let usual = Signature::of(self.n(), self.time_like().is_some());
         let signature = signature.map_or(usual, |(positive, negative)| Signature { positive, negative });
+        self.require_free()?;
         let found: Certificate = attended(py, None, |watch| {
             let stop = Some(watch.interrupt.as_ref());
             let options = certificate::Options {
@@ -487,7 +497,7 @@ impl Subject {
             };
             match &self.kind {
                 Kind::System(configured, _) => certify_system(configured, &region, &options),
-                Kind::Model(_, network) => certify_network(network, &region, &options),
+                Kind::Model(_, network, _) => certify_network(network, &region, &options),
             }
         })?
         .map_err(value)?;
@@ -503,7 +513,8 @@ impl Subject {
 
     /// The page of a model, HTML.
     fn page(&self) -> PyResult<String> {
-        let Kind::Model(header, network) = &self.kind else { return Err(value("a system has no page")) };
+        let Kind::Model(header, network, _) = &self.kind else { return Err(value("a system has no page")) };
+        self.require_free()?;
         page(header, network, self.system_instance().ok().as_ref()).map_err(value)
     }
 
@@ -515,14 +526,16 @@ impl Subject {
         plan: (usize, u64, usize),
         progress: Option<Py<PyAny>>,
     ) -> PyResult<String> {
-        let Kind::Model(header, network) = &self.kind else { return Err(value("a system is exact already")) };
+        let Kind::Model(header, network, _) = &self.kind else { return Err(value("a system is exact already")) };
         let (starts, seed, threads) = plan;
         let system = system.unwrap_or(self).system_instance()?;
         if system.system.columns(system.coordinates) != self.columns {
             return Err(value(format_args!("expected a system with the columns {:?}", self.columns)));
         }
         let options = EvaluationOptions::new(&system, trained_on(header), seed).map_err(pipeline)?;
-        let options = EvaluationOptions { starts, threads, ..options };
+        // A system that is described in the model's file is the one whose constraints it was learned under.
+        let constraints = header.description.is_none().then(|| header.constraints.clone());
+        let options = EvaluationOptions { starts, constraints, threads, ..options };
         let found = attended(py, progress.as_ref(), |watch| evaluate(&system, network, options, &watch))?;
         serde_json::to_string(&found.map_err(pipeline)?).map_err(runtime)
     }

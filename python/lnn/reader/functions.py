@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .constraints import Constraints, bordered
 from .jets import NUMPY, Jet
 from .lagrangian import NetworkModel
 
@@ -29,7 +30,7 @@ class Terms:
     force : (..., n)
         -dD/dv, zero for a model without dissipation.
     acceleration : (..., n)
-        a with M a = dL/dq - c + force.
+        a with M a = dL/dq - c + force; of a model under constraints with their force beside it.
     energy : (...)
         E = v.p - L.
     failures : tuple of (int, str)
@@ -58,8 +59,9 @@ class Functions:
         The weights by the names of the model format, arrays of the library.
     """
 
-    def __init__(self, xp, model, weights: dict):
+    def __init__(self, xp, model, weights: dict, constraints: Constraints | None = None):
         self._xp, self._model, self.weights = xp, model, weights
+        self._constraints = constraints if constraints and constraints.nodes else None
 
     def __call__(self, q, v, weights: dict | None = None):
         """L, ``(...)``."""
@@ -97,8 +99,8 @@ class Functions:
 class Differentiated(Functions):
     """Functions of a library that has ``grad``."""
 
-    def __init__(self, xp, model, weights: dict):
-        super().__init__(xp, model, weights)
+    def __init__(self, xp, model, weights: dict, constraints: Constraints | None = None):
+        super().__init__(xp, model, weights, constraints)
         self._grad, self._solve = xp.grad, xp.solve
 
     def momentum(self, q, v, weights=None):
@@ -124,7 +126,11 @@ class Differentiated(Functions):
         dl_dq = self._grad(lambda q: self(q, v, weights).sum())(q)
         mass_matrix, drift = self._second(q, v, weights)
         force = -self._grad(lambda v: self.dissipation(q, v, weights).sum())(v)
-        acceleration = self._solve(mass_matrix, (dl_dq - drift + force)[..., None])[..., 0]
+        matrix, right = mass_matrix, dl_dq - drift + force
+        if self._constraints:
+            rows, drifts = self._constraints.of_gradients(self._xp, q, v)
+            matrix, right = bordered(self._xp, matrix, rows, right, drifts)
+        acceleration = self._solve(matrix, right[..., None])[..., : q.shape[-1], 0]
         energy = (v * p).sum(-1) - value
         return Terms(value, p, dl_dq, mass_matrix, drift, force, acceleration, energy)
 
@@ -162,11 +168,15 @@ class NumpyFunctions(Functions):
         dl_dq, p, mass_matrix = gradient[:, :n], gradient[:, n:], hessian[:, n:, n:]
         drift = np.einsum("bij,bj->bi", hessian[:, n:, :n], v)
         force = np.zeros_like(v) if friction is None else -np.moveaxis(friction.gradient, 0, -1)[:, n:]
-        right = dl_dq - drift + force
+        matrix, right = mass_matrix, dl_dq - drift + force
+        if self._constraints:
+            rows, drifts = self._constraints.of_jets(self._xp, x, n)
+            matrix = np.block([[matrix, np.swapaxes(rows, -1, -2)], [rows, np.zeros((*drifts.shape, drifts.shape[-1]))]])
+            right = np.concatenate([right, -drifts], -1)
         try:
-            acceleration = np.linalg.solve(mass_matrix, right[..., None])[..., 0]
+            acceleration = np.linalg.solve(matrix, right[..., None])[..., :n, 0]
         except np.linalg.LinAlgError:
-            acceleration = np.stack([_solve(m, r) for m, r in zip(mass_matrix, right)])
+            acceleration = np.stack([_solve(m, r) for m, r in zip(matrix, right)])[..., :n]
         return value.value, p, dl_dq, mass_matrix, drift, force, acceleration, np.sum(v * p, -1) - value.value
 
 
@@ -195,4 +205,4 @@ class DescribedModel:
 def numpy_functions(header: dict, tensors: dict) -> Functions:
     """A model as functions of NumPy arrays."""
     weights = {name: np.asarray(tensor, float) for name, tensor in tensors.items()}
-    return NumpyFunctions(NUMPY, NetworkModel(header["architecture"]), weights)
+    return NumpyFunctions(NUMPY, NetworkModel(header["architecture"]), weights, Constraints(header))

@@ -31,8 +31,10 @@ ARCHITECTURE = {
     "form": FORM,
 }
 HEADER = {
-    **dict.fromkeys(["crate_version", "system", "description", "parameters", "columns", "forces", "precision"]),
+    **dict.fromkeys(["crate_version", "system", "parameters", "columns", "forces", "constraints", "precision"]),
     **dict.fromkeys(["position", "velocity", "seed", "validation_loss"]),
+    # Constraints of a system hold the motion; those of a known part would hold nothing.
+    "description": {**KNOWN, "constraints": None},
     "format": [FORMAT],
     "architecture": ARCHITECTURE,
 }

@@ -10,6 +10,7 @@ import jax
 import jax.numpy as jnp
 from jax.scipy.special import erfc
 
+from .constraints import Constraints
 from .functions import Differentiated, Functions, Terms
 from .lagrangian import TURN, NetworkModel
 
@@ -41,4 +42,4 @@ JAX = SimpleNamespace(
 def jax_functions(header: dict, tensors: dict) -> Functions:
     """A model as functions of JAX arrays."""
     weights = {name: jnp.asarray(tensor, float) for name, tensor in tensors.items()}
-    return Differentiated(JAX, NetworkModel(header["architecture"]), weights)
+    return Differentiated(JAX, NetworkModel(header["architecture"]), weights, Constraints(header))

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import torch
 
+from .constraints import Constraints
 from .functions import Differentiated, Functions
 from .lagrangian import TURN, NetworkModel
 
@@ -38,4 +39,4 @@ def torch_functions(header: dict, tensors: dict, dtype=None) -> Functions:
     """A model as functions of PyTorch tensors."""
     xp = backend(torch.float64 if dtype is None else dtype)
     weights = {name: xp.constant(tensor) for name, tensor in tensors.items()}
-    return Differentiated(xp, NetworkModel(header["architecture"]), weights)
+    return Differentiated(xp, NetworkModel(header["architecture"]), weights, Constraints(header))

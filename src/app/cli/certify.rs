@@ -95,7 +95,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let refused = |error: CertificateError| CliError::usage(error);
     let (name, columns, options, found) = match &args.model {
         Some(path) => {
-            let Learned { header, network } = Learned::<f64>::load(path)?;
+            let Learned { header, network } = Learned::<f64>::load_free(path)?;
             let time = learned_system(&header).ok().and_then(|system| system.time_like);
             let options =
                 args.options(header.columns.len() / 2, header.architecture.time_like.or(time).is_some(), &stop);

@@ -8,7 +8,7 @@ use crate::cli::{CliError, config, output};
 use crate::constraints::{
     ConstraintKind, ConstraintSearch, FoundConstraint, FoundConstraints, MotionSamples, find_constraints,
 };
-use crate::lagrangian::{Constrained, EulerLagrange, ExpressionConstraints, ReducedMass, Request, Terms};
+use crate::lagrangian::{EulerLagrange, FormulaConstraints, ReducedMass, Request, Terms};
 use crate::names::{percent, pluralize, rounded};
 use crate::recording::smooth::SmoothOptions;
 use crate::report::text_table;
@@ -131,9 +131,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
 
 /// Writes the constraints of the system as the table that a system file takes.
 fn write_table(out: &Path, found: &FoundConstraints) -> Result<(), CliError> {
-    let of_system = found.constraints.iter().filter(|found| found.kind != ConstraintKind::PerTrajectory);
-    let constraints: BTreeMap<String, String> =
-        of_system.enumerate().map(|(k, found)| (format!("found {}", k + 1), found.formula.clone())).collect();
+    let constraints = found.formulas();
     if constraints.is_empty() {
         return Err(CliError::file(out, "no constraints were found: there is nothing to write"));
     }
@@ -195,7 +193,7 @@ fn examine(name: &str, args: &Args) -> Result<(), CliError> {
     let model = probe.model.as_ref();
     let (q, v) = probe.states(STATES, 0)?;
     let n = model.coordinates();
-    let formulas = probe.constraints();
+    let formulas = &probe.constraints;
     let mut terms = Terms::default();
     let mut examined = Examined {
         system: probe.name.clone(),
@@ -278,6 +276,21 @@ fn examine(name: &str, args: &Args) -> Result<(), CliError> {
     output::print(&text)
 }
 
+/// The table [constraints] of a file.
+///
+/// # Errors
+/// A usage error for a file without such a table, a data error for one that cannot be read.
+pub fn formulas(file: &Path) -> Result<BTreeMap<String, String>, CliError> {
+    let (name, text) = config::read_text(file)?;
+    let wrong = |problem: &str| CliError::usage(format_args!("{name}: {problem}"));
+    let table: toml::Table =
+        config::parse(&text).map_err(|(line, problem)| CliError::usage(format_args!("{name}:{line}: {problem}")))?;
+    let Some(found) = table.get("constraints").cloned() else { return Err(wrong("expected a table [constraints]")) };
+    let formulas: BTreeMap<String, String> =
+        found.try_into().map_err(|_| wrong("constraints: expected formulas by name"))?;
+    if formulas.is_empty() { Err(wrong("expected formulas in the table [constraints]")) } else { Ok(formulas) }
+}
+
 /// The model under the constraints of a file's table, as far as these are independent at some states.
 ///
 /// # Errors
@@ -290,22 +303,13 @@ pub fn constrained<S: Scalar>(
     (q, v): (&[S], &[S]),
 ) -> Result<Box<dyn EulerLagrange<S>>, CliError> {
     let wrong = |problem: &dyn std::fmt::Display| CliError::usage(format_args!("{}: {problem}", file.display()));
-    let (name, text) = config::read_text(file)?;
-    let table: toml::Table =
-        config::parse(&text).map_err(|(line, problem)| CliError::usage(format_args!("{name}:{line}: {problem}")))?;
-    let found = table.get("constraints").cloned().unwrap_or_else(|| toml::Value::Table(toml::Table::new()));
-    let formulas: BTreeMap<String, String> =
-        found.try_into().map_err(|_| wrong(&"constraints: expected formulas by name"))?;
-    if formulas.is_empty() {
-        return Err(wrong(&"expected a table [constraints]"));
-    }
+    let formulas = formulas(file)?;
     if model.manifold().is_some() {
-        return Err(wrong(&"the system has constraints of its own"));
+        return Err(wrong(&"the motion has constraints of its own"));
     }
-    let names: Vec<&str> = columns[..columns.len() / 2].iter().map(String::as_str).collect();
-    let rows: Vec<(&str, &str)> = formulas.iter().map(|(name, formula)| (name.as_str(), formula.as_str())).collect();
-    let constraints = ExpressionConstraints::new(&names, &[], &rows)
-        .map_err(|(name, error)| wrong(&format_args!("constraints.{name}: {error}")))?;
-    let model = Constrained::new(model, constraints, []).map_err(|error| wrong(&error))?;
-    Ok(Box::new(model.independent(q, v).map_err(|error| wrong(&error))?))
+    let plain = |values: &[S]| values.iter().map(|x| x.to_f64()).collect::<Vec<f64>>();
+    let constraints =
+        FormulaConstraints::new(&columns[..columns.len() / 2], formulas).map_err(|error| wrong(&error))?;
+    let (constraints, _) = constraints.independent(&plain(q), &plain(v)).map_err(|error| wrong(&error))?;
+    constraints.constrain(model).map_err(|error| wrong(&error))
 }

@@ -94,7 +94,9 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let seed = args.seed.unwrap_or(learned.header.seed);
     let usual = EvaluationOptions::new(&system, learned.domain(), seed)?;
     let (span, threads) = (span(args, &system)?, threads(args.threads));
-    let options = EvaluationOptions { starts: args.starts, span, rtol: args.rtol, threads, ..usual };
+    // A system that is described in the model's file is the one whose constraints it was learned under.
+    let constraints = learned.header.description.is_none().then(|| learned.header.constraints.clone());
+    let options = EvaluationOptions { starts: args.starts, span, rtol: args.rtol, constraints, threads, ..usual };
     let stop = interrupt::flag().map_err(CliError::signals)?;
     let evaluation = match evaluate(&system, &learned.network, options, &watch(&stop)) {
         Err(PipelineError::Interrupted) => {

@@ -1,6 +1,7 @@
 //! Arguments of `lnn fit` and the configuration they come to.
 
 use crate::cli::CliError;
+use crate::cli::constraints::formulas;
 use crate::cli::flags::Flags;
 use crate::cli::input::is_standard;
 use crate::cli::layers::{Entry, Layers, Mistake};
@@ -114,7 +115,15 @@ impl<'a> Plan<'a> {
     /// A data error for a file that cannot be read, usage errors naming everything that is wrong.
     pub fn new(args: &'a Args, saved: Option<Saved>) -> Result<Self, CliError> {
         let mut options = columns(&args.recording)?;
-        options.extend(args.flags.entries.iter().cloned());
+        for entry in &args.flags.entries {
+            options.push(match entry.text("constraints").filter(|text| !["none", "find"].contains(text)) {
+                None => entry.clone(),
+                Some(file) => {
+                    let table = toml::Table::try_from(formulas(Path::new(file))?).map_err(CliError::data)?;
+                    entry.clone().with(table)
+                }
+            });
+        }
         let mut layers = Layers::new(FitConfig::KEYS, args.run.config.as_deref(), options)?;
         // A rate and a column of times exclude each other.
         for (given, other) in
@@ -197,8 +206,8 @@ impl<'a> Plan<'a> {
 
     /// Choices that come before the configuration.
     pub fn options(&self) -> FitOptions {
-        let FitConfig { targets, held_out, window, noise, training, .. } = self.config.clone();
-        FitOptions { targets, held_out, window, noise, seed: training.seed }
+        let FitConfig { targets, held_out, window, noise, constraints, training, .. } = self.config.clone();
+        FitOptions { targets, held_out, window, noise, constraints, seed: training.seed }
     }
 
     /// Refuses a time-like coordinate that is none of these.

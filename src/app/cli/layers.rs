@@ -87,6 +87,16 @@ impl Entry {
     fn key(&self) -> String {
         text_of(&self.path)
     }
+
+    /// The text of this option, if it gives a key.
+    pub fn text(&self, key: &str) -> Option<&str> {
+        self.value.as_str().filter(|_| self.option.is_some() && self.key() == key)
+    }
+
+    /// The same option with another value.
+    pub fn with(self, value: impl Into<Value>) -> Self {
+        Self { value: value.into(), ..self }
+    }
 }
 
 /// The layers over a base.

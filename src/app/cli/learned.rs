@@ -3,7 +3,7 @@
 use crate::cli::CliError;
 use crate::cli::chosen::{self, learned_system};
 use crate::cli::input::is_standard;
-use crate::lagrangian::{SystemInstance, configure_system, configure_values, find};
+use crate::lagrangian::{EulerLagrange, SystemInstance, configure_system, configure_values, find};
 use crate::network::NetworkLagrangian;
 use crate::network::file::{Header, ModelFile};
 use crate::pipeline::{self, trained_on};
@@ -30,6 +30,12 @@ pub fn model_file(path: &Path) -> Result<PathBuf, CliError> {
     Ok(pipeline::model_file(path)?)
 }
 
+/// What a command that knows no constraints says of a motion that is held by some.
+pub fn held(name: &dyn std::fmt::Display) -> CliError {
+    let problem = "the motion has constraints, which this command does not support; see `lnn constraints`";
+    CliError::usage(format_args!("{name}: {problem}"))
+}
+
 impl<S: Scalar> Learned<S> {
     /// Reads a model, by its file or by the directory of its run; weights are converted to the precision of `S`.
     ///
@@ -41,6 +47,27 @@ impl<S: Scalar> Learned<S> {
         let network =
             NetworkLagrangian::new(header.architecture.clone(), weights).map_err(|e| CliError::file(path, e))?;
         Ok(Self { header, network })
+    }
+
+    /// The same of a command that knows no constraints.
+    ///
+    /// # Errors
+    /// As [`Learned::load`]; a usage error for a model whose motion is held by constraints.
+    pub fn load_free(path: &Path) -> Result<Self, CliError> {
+        let learned = Self::load(path)?;
+        if learned.header.is_constrained() {
+            return Err(held(&path.display()));
+        }
+        Ok(learned)
+    }
+
+    /// The motion of the model: that of its network, under the constraints that it was learned under; and its header.
+    ///
+    /// # Errors
+    /// A data error for constraints that leave no motion.
+    pub fn motion(self, path: &Path) -> Result<(Header, Box<dyn EulerLagrange<S>>), CliError> {
+        let motion = self.header.constrain(Box::new(self.network)).map_err(|e| CliError::file(path, e))?;
+        Ok((self.header, motion))
     }
 
     /// The system that the model learned, of the catalogue or by its description.

@@ -2,7 +2,7 @@
 
 use crate::cli::CliError;
 use crate::cli::chosen::{self, learned_system};
-use crate::cli::learned::Learned;
+use crate::cli::learned::{Learned, held};
 use crate::cli::number::{bounds, positive};
 use crate::cli::source::Source;
 use crate::lagrangian::{EulerLagrange, SystemInstance, configure_system};
@@ -26,6 +26,8 @@ pub struct Probe {
     pub region: Region,
     /// `true` for a system, whose terms are exact.
     pub exact: bool,
+    /// The formulas of its constraints, by name.
+    pub constraints: BTreeMap<String, String>,
     periodic: Vec<bool>,
     units: Vec<String>,
     /// The system, or the one that a model learned: its mass shell and its domain.
@@ -75,7 +77,10 @@ impl Probe {
     /// # Errors
     /// As [`Probe::system`] and [`Probe::model`].
     pub fn with_constraints(text: &str) -> Result<Self, CliError> {
-        if is_model(text) { Self::model(Path::new(text)) } else { Self::system_with_constraints(text, &[]) }
+        match is_model(text) {
+            true => Self::model_with_constraints(Path::new(text)),
+            false => Self::system_with_constraints(text, &[]),
+        }
     }
 
     /// A system by name or by file.
@@ -84,11 +89,7 @@ impl Probe {
     /// A usage error for an unknown name, a mistake in a file or a wrong parameter.
     pub fn system(name: &str, given: &[(String, String)]) -> Result<Self, CliError> {
         let probe = Self::system_with_constraints(name, given)?;
-        if probe.model.manifold().is_some() {
-            let problem = "the system has constraints, which this command does not support; see `lnn constraints`";
-            return Err(CliError::usage(format_args!("{name}: {problem}")));
-        }
-        Ok(probe)
+        if probe.model.manifold().is_some() { Err(held(&name)) } else { Ok(probe) }
     }
 
     /// The same, of a system with constraints as well.
@@ -110,6 +111,7 @@ impl Probe {
             exact: true,
             periodic: coordinates.iter().map(|c| c.periodic).collect(),
             units: coordinates.iter().map(|c| c.unit.to_string()).collect(),
+            constraints: configured.system.description().map(|own| own.constraints.clone()).unwrap_or_default(),
             system: Some(configured),
         })
     }
@@ -117,36 +119,41 @@ impl Probe {
     /// A trained model, by its file or by the directory of its run.
     ///
     /// # Errors
-    /// A data error for anything but a whole model file.
+    /// A data error for anything but a whole model file, a usage error for one whose motion is held by constraints.
     pub fn model(path: &Path) -> Result<Self, CliError> {
+        let probe = Self::model_with_constraints(path)?;
+        if probe.model.manifold().is_some() { Err(held(&path.display())) } else { Ok(probe) }
+    }
+
+    /// The same, of a model under constraints as well.
+    ///
+    /// # Errors
+    /// A data error for anything but a whole model file.
+    fn model_with_constraints(path: &Path) -> Result<Self, CliError> {
         let learned = Learned::<f64>::load(path)?;
         // A model of recorded motion has no system; its coordinates have no units then.
         let known = learned_system(&learned.header).is_ok();
         let system = if known { Some(learned.system(path)?) } else { None };
-        let Learned { header, network } = learned;
+        let constraints = learned.header.held_by().clone();
+        let (header, model) = learned.motion(path)?;
         let periodic = header.architecture.periodic.iter().copied();
         let position = header.position.into_iter().zip(periodic);
         let position = position.map(|(range, periodic)| if periodic { range } else { middle(range) }).collect();
         let units = match &system {
             Some(system) => system.system.coordinates(system.coordinates).iter().map(|c| c.unit.to_string()).collect(),
-            None => vec![String::new(); network.coordinates()],
+            None => vec![String::new(); model.coordinates()],
         };
         Ok(Self {
             name: header.system,
-            model: Box::new(network),
+            model,
             columns: header.columns,
             region: Region { position, velocity: header.velocity.into_iter().map(middle).collect() },
             exact: false,
             periodic: header.architecture.periodic,
             units,
+            constraints,
             system,
         })
-    }
-
-    /// The formulas of the constraints of the system, by name.
-    pub fn constraints(&self) -> BTreeMap<String, String> {
-        let description = self.system.as_ref().and_then(|system| system.system.description());
-        description.map(|description| description.constraints.clone()).unwrap_or_default()
     }
 
     /// One of the two: a file that ends in `.toml` and a name of the catalogue are systems, any other file or directory is a model.

@@ -124,7 +124,7 @@ impl Args {
     /// Reads what there is to look through.
     fn metrics(&self) -> Result<Metrics, CliError> {
         let (mut system, mut columns, mut unit, mut models) = (String::new(), Vec::new(), None, Vec::new());
-        let learned = self.model.as_deref().map(Learned::<f64>::load).transpose()?;
+        let learned = self.model.as_deref().map(Learned::<f64>::load_free).transpose()?;
         if let Some(name) = &self.system {
             let configured = match &learned {
                 Some(learned) => learned.beside(name, &self.param)?,

@@ -46,11 +46,11 @@ impl<S: Scalar> Source<S> {
     /// A trained model; its weights are converted to the precision of `S`.
     ///
     /// # Errors
-    /// A data error for a file that is not a whole model file.
+    /// A data error for a file that is not a whole model file, or whose constraints leave no motion.
     pub fn model(path: &Path) -> Result<Self, CliError> {
-        let Learned { header, network } = Learned::load(path)?;
+        let (header, model) = Learned::load(path)?.motion(path)?;
         let forces = forces::names(&header);
-        Ok(Self { model: Box::new(network), columns: header.columns, forces })
+        Ok(Self { model, columns: header.columns, forces })
     }
 }
 

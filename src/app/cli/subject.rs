@@ -35,9 +35,9 @@ impl Subject {
         let learned = Learned::<f64>::load(path)?;
         let (domain, forces) = (Some(learned.domain()), forces::names(&learned.header));
         let time_unit = learned_system(&learned.header).ok().map(|system| system.time_unit.to_string());
-        let Learned { header, network } = learned;
+        let (header, model) = learned.motion(path)?;
         let (name, columns, file) = (header.system, header.columns, Some(model_file(path)?));
-        Ok(Self { name, model: Box::new(network), columns, forces, domain, time_unit, file })
+        Ok(Self { name, model, columns, forces, domain, time_unit, file })
     }
 
     /// A system by name or by file.

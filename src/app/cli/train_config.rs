@@ -9,7 +9,7 @@ use crate::cli::{CliError, chosen, output, source};
 use crate::configuration::Config;
 use crate::data::SamplingError;
 use crate::lagrangian::system::System;
-use crate::lagrangian::{Description, DescriptionError, SystemError, SystemInstance, configure_values, find};
+use crate::lagrangian::{Description, DescriptionError, SystemError, SystemInstance, configure_values, find, resolve};
 use crate::network::Initialization;
 use crate::pipeline::{StartModel as Start, all_parameters};
 use crate::presets::Preset;
@@ -68,8 +68,10 @@ impl Args {
         }
         let system = match &description {
             Some(description) => description.system().map(Cow::Owned).map_err(Unusable::Description),
-            None => find(&name).map(Cow::Borrowed).map_err(Unusable::System),
+            None => resolve(&name).map_err(Unusable::System),
         };
+        // A system of the catalogue that is formulas itself, such as one under constraints, keeps them with what was learned.
+        let description = description.or_else(|| system.as_ref().ok()?.description().cloned());
         let mut parameters = match (&start, goes_on) {
             (_, Some(saved)) => saved.parameters.clone(),
             (Some(start), _) if start.header.system == name => start.header.parameters.clone(),

@@ -110,6 +110,20 @@ impl Determined {
         })
     }
 
+    /// That of a model under constraints: changes of its mass matrix across them move nothing, and are no error.
+    pub(crate) fn under_constraints() -> Self {
+        Self {
+            determination: Vec::new(),
+            unit: String::new(),
+            misfit: BTreeMap::new(),
+            outside: None,
+            withheld: Some("across the constraints no motion tells the mass matrix".to_string()),
+            constant_ranges: BTreeMap::new(),
+            energy_loss: None,
+            decay: None,
+        }
+    }
+
     /// A remark on standard error, if the data ask for friction.
     pub fn suggestion(&self) -> Option<String> {
         if let Some(decay) = self.decay.filter(Decay::is_certain) {

@@ -41,6 +41,14 @@ pub enum PipelineError {
     /// Forces asked for where a coordinate has none.
     #[error("not every coordinate has a known force that changes")]
     NoForces,
+    /// Constraints with a mistake, that contradict each other or leave no motion, or that recorded motion does not obey.
+    #[error("{0}")]
+    Constraints(String),
+    /// Multiple shooting, or forces, as targets asked for where constraints hold the motion.
+    #[error(
+        "targets: neither multiple shooting nor forces know constraints, expected smoothed or measured accelerations beside them"
+    )]
+    TargetsUnderConstraints,
     /// A shape of the network that contradicts itself.
     #[error(transparent)]
     Network(#[from] NetworkError),
@@ -156,10 +164,15 @@ impl PipelineError {
     pub(crate) fn is_configuration(&self) -> bool {
         match self {
             Self::Config(_) | Self::System(_) | Self::Network(_) | Self::NoAccelerations | Self::NoForces => true,
+            Self::Constraints(_) | Self::TargetsUnderConstraints => true,
             Self::Sampling(error) => !matches!(error, SamplingError::Dataset(_) | SamplingError::Interrupted),
             Self::OtherShape { configuration, .. } => *configuration,
             _ => false,
         }
+    }
+
+    pub(crate) fn constraints(error: impl fmt::Display) -> Self {
+        Self::Constraints(error.to_string())
     }
 
     pub(crate) fn format(error: impl fmt::Display) -> Self {

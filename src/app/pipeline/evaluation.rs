@@ -2,21 +2,23 @@
 
 use crate::analysis::{
     Axis, ErrorDistribution, MassMatrixError, StartBox, Statistics, TrajectoryRun, TrajectorySummary, TrajectoryTest,
-    ValidTimes, acceleration_errors, conserved_error, determinant_grid, lagrangian_grid, mass_matrix_error, statistics,
-    wrong_signatures,
+    ValidTimes, acceleration_errors, conserved_error, determinant_grid, lagrangian_grid, mass_matrix_error,
+    mass_matrix_error_within, statistics, wrong_signatures,
 };
 use crate::data::sample;
 use crate::lagrangian::system::TrajectoryTest as Span;
-use crate::lagrangian::{EulerLagrange, SystemInstance};
+use crate::lagrangian::{EulerLagrange, FormulaConstraints, SystemInstance};
 use crate::names::pluralize;
 use crate::network::NetworkLagrangian;
 use crate::pipeline::cancellation::Cancellation;
+use crate::pipeline::constraint_figures::constraint_figures;
 use crate::pipeline::physics::{Physics, Subject};
 use crate::pipeline::{PipelineError, Watch, memory};
 use crate::random::RngStream;
 use crate::report::{Figure, Fit, GridComparison, evaluation_figures, grid_figures, units};
 use crate::rollout::{Domain, Trajectory};
 use serde::Serialize;
+use std::collections::BTreeMap;
 
 /// Points of a grid along each axis.
 const GRID: usize = 81;
@@ -38,7 +40,8 @@ pub struct Evaluation {
     pub accelerations: Vec<ErrorDistribution>,
     /// Fraction of the fresh states whose mass matrix has not the signature of the exact one.
     pub wrong_signature: f64,
-    /// Error of the mass matrix, of a geodesic the metric, at rest at the positions of the fresh states.
+    /// Error of the mass matrix, of a geodesic the metric, at rest at the positions of the fresh states; under constraints at the fresh
+    /// states themselves, within the directions that the constraints leave.
     pub mass_matrix: MassMatrixError,
     /// Time for which the learned motion predicts the exact one, median over the starts.
     pub(crate) valid_time: Option<ValidTimes>,
@@ -94,6 +97,8 @@ pub struct EvaluationOptions {
     pub rtol: f64,
     /// The states the model was trained on.
     pub trained: Domain<f64>,
+    /// Constraints that hold the learned motion, formulas by name; none for those of the system, if it has some.
+    pub constraints: Option<BTreeMap<String, String>>,
     /// Seed of the starts.
     pub seed: u64,
     /// Threads.
@@ -113,7 +118,7 @@ impl EvaluationOptions {
         let states = sample(system, "validation bounds", (&bounds.0, &bounds.1), STATES, &mut random)?;
         let states = (states.q().to_vec(), states.v().to_vec());
         let span = system.system.trajectory(system.coordinates);
-        Ok(Self { states, starts: STARTS, span, rtol: RTOL, trained, seed, threads: 1 })
+        Ok(Self { states, starts: STARTS, span, rtol: RTOL, trained, constraints: None, seed, threads: 1 })
     }
 }
 
@@ -134,7 +139,8 @@ pub fn evaluate(
     let (q, v) = (plan.states.0.as_slice(), plan.states.1.as_slice());
     let n = system.coordinates;
     let exact = system.build()?;
-    let (exact, learned) = (cancellation.watched(exact.as_ref()), cancellation.watched(network));
+    let learned = held(system, network, plan.constraints.as_ref())?;
+    let (exact, learned) = (cancellation.watched(exact.as_ref()), cancellation.watched(learned.as_ref()));
     let (exact, learned): (&dyn EulerLagrange<f64>, &dyn EulerLagrange<f64>) = (&exact, &learned);
     let coordinates = system.system.coordinates(n);
     let periodic: Vec<bool> = coordinates.iter().map(|c| c.periodic).collect();
@@ -143,7 +149,10 @@ pub fn evaluate(
     memory::require("the evaluation", memory::motions((plan.starts as u64).saturating_mul(2), t_end / dt, n, 0))?;
     let accelerations = acceleration_errors(exact, learned, q, v);
     let wrong_signature = wrong_signatures(exact, learned, q, v);
-    let mass_matrix = mass_matrix_error(exact, learned, q);
+    let mass_matrix = match exact.manifold() {
+        None => mass_matrix_error(exact, learned, q),
+        Some(manifold) => mass_matrix_error_within(manifold, (exact, learned), (q, v)),
+    };
     cancellation.check()?;
     cancellation.advance(1);
 
@@ -175,9 +184,18 @@ pub fn evaluate(
     if !cancellation.is_interrupted() {
         portraits = test.portraits(exact, learned, &runs[..runs.len().min(DRAWN)]);
         figures = evaluation_figures(&runs, &portraits, system);
-        match grids(system, exact, learned) {
-            Err(_) if cancellation.is_interrupted() => {}
-            drawn => figures.extend(drawn?),
+        if learned.manifold().is_some() {
+            // Off the constraints, where a grid over coordinates lies, a Lagrangian means nothing.
+            let start = runs.iter().find(|run| !run.exact.trajectory.is_empty());
+            let names = system.system.columns(n);
+            let (names, unit) = (&names[..n], system.system.time_unit.as_ref());
+            let motion = start.map(|run| run.exact.trajectory.state(0));
+            figures.extend(motion.into_iter().flat_map(|at| constraint_figures(learned, at, t_end, (names, unit))));
+        } else {
+            match grids(system, exact, learned) {
+                Err(_) if cancellation.is_interrupted() => {}
+                drawn => figures.extend(drawn?),
+            }
         }
     }
     if cancellation.is_interrupted() {
@@ -195,8 +213,10 @@ pub fn evaluate(
         recorded: None,
         threads: plan.threads,
     };
-    let mut physics = Physics::nothing(&subject);
-    let interrupted = match physics.find(&subject, &|| cancellation.check()) {
+    let free = exact.manifold().or(learned.manifold()).is_none();
+    let mut physics = if free { Physics::nothing(&subject) } else { Physics::under_constraints(&subject) };
+    let found = if free { physics.find(&subject, &|| cancellation.check()) } else { cancellation.check() };
+    let interrupted = match found {
         Ok(()) => None,
         Err(PipelineError::Interrupted) => {
             physics.left_out.push("whatever is not here: interrupted".to_string());
@@ -223,6 +243,24 @@ pub fn evaluate(
         conserved: system.system.conserved.map(|conserved| conserved.name),
         figures,
     })
+}
+
+/// The learned motion under its constraints: these formulas, or those of the system.
+fn held<'a>(
+    system: &SystemInstance<f64>,
+    network: &'a NetworkLagrangian<f64>,
+    constraints: Option<&BTreeMap<String, String>>,
+) -> Result<Box<dyn EulerLagrange<f64> + 'a>, PipelineError> {
+    let motion: Box<dyn EulerLagrange<f64> + 'a> = Box::new(network as &dyn EulerLagrange<f64>);
+    match constraints {
+        None => Ok(system.constrain(motion)?),
+        Some(formulas) if formulas.is_empty() => Ok(motion),
+        Some(formulas) => {
+            let columns = system.system.columns(system.coordinates);
+            let held = FormulaConstraints::new(&columns[..system.coordinates], formulas.clone());
+            held.map_err(PipelineError::constraints)?.constrain(motion).map_err(PipelineError::constraints)
+        }
+    }
 }
 
 /// The first sample outside the states a model was trained on.

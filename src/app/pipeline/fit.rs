@@ -2,6 +2,7 @@
 
 use crate::configuration::Precision;
 use crate::data::{Datasets, RecordingSplit, sizes};
+use crate::lagrangian::EulerLagrange;
 use crate::network::file::{Header, ModelFile, StoredPrecision};
 use crate::network::{Architecture, Form, Layout, NetworkLagrangian};
 use crate::pipeline::determination::Determined;
@@ -16,7 +17,7 @@ use crate::pipeline::prepared_fit::PreparedFit;
 use crate::pipeline::report_files::history;
 use crate::pipeline::start::{StartModel, weights};
 use crate::pipeline::train::{RunOptions, write_model};
-use crate::pipeline::{Event, Output, PipelineError, Watch, memory};
+use crate::pipeline::{Event, MODEL, Output, PipelineError, Watch, memory};
 use crate::recording::{Recording, Targets};
 use crate::scalar::Scalar;
 use crate::shooting::{self, Task};
@@ -41,6 +42,14 @@ pub struct FitReport {
 }
 
 impl FitReport {
+    /// The motion that was learned: that of the network under the constraints that were found or given, if there are any.
+    ///
+    /// # Errors
+    /// [`PipelineError::Model`]; none of a model that was just learned.
+    pub fn motion(&self) -> Result<Box<dyn EulerLagrange<f64> + '_>, PipelineError> {
+        let wrong = |source| PipelineError::Model { path: MODEL.into(), source };
+        self.header.constrain(Box::new(&self.network as &dyn EulerLagrange<f64>)).map_err(wrong)
+    }
     /// Text of `summary.json`.
     pub fn json(&self) -> &str {
         &self.json
@@ -87,7 +96,8 @@ fn fit_in<S: Scalar>(
     prepared.check_horizon(fit_config.horizon)?;
     let (recording, config, threads) = (&prepared.reading.recording, &fit_config.training, options.threads);
     let names = &recording.coordinates;
-    let mut data = measured.datasets::<S>(*targets)?;
+    prepared.remarks.iter().for_each(|text| watch.say(Event::Note(text)));
+    let mut data = prepared.datasets::<S>()?;
     let faults = config.faults(names.len());
     if !faults.is_empty() {
         return Err(PipelineError::Config(faults));
@@ -158,7 +168,8 @@ fn fit_in<S: Scalar>(
     // The model first, then what is small, pictures last: on a full disk nothing that comes after can lose them.
     let columns = names.iter().cloned().chain(names.iter().map(|name| format!("{name}_dot"))).collect();
     let header = config.header(architecture.clone(), columns, ranges, trained.validation_loss);
-    let header = Header { forces: named_forces(&fit_config.recording.force), ..header };
+    let constraints = prepared.constraints().map(|held| held.formulas().clone()).unwrap_or_default();
+    let header = Header { forces: named_forces(&fit_config.recording.force), constraints, ..header };
     let model = ModelFile { header, weights: trained.weights.clone() };
     write_model(output, &model)?;
     output.write("config.toml", toml.as_bytes())?;
@@ -175,7 +186,10 @@ fn fit_in<S: Scalar>(
     };
     let (part, horizon) = (&measured.test, fit_config.horizon);
     let held_out = HoldOutOptions { part, horizon, time, forces: &forces, threads };
-    let mut hold_out = evaluate_hold_out(&network, &held_out, watch)?;
+    let wrong = |source| PipelineError::Model { path: MODEL.into(), source };
+    let motion = model.header.constrain(Box::new(&network as &dyn EulerLagrange<f64>)).map_err(wrong)?;
+    let mut hold_out = evaluate_hold_out(motion.as_ref(), &held_out, watch)?;
+    drop(motion);
     if *targets == Targets::Forces && !part.states.is_empty() {
         let test = measured.datasets::<f64>(*targets)?.test;
         hold_out.force_errors = force_errors(&network, &test, names).unwrap_or_default();
@@ -193,8 +207,13 @@ fn fit_in<S: Scalar>(
     // The flag that ended the training does not end the judgement of its model.
     let before = watch.is_interrupted();
     let check = || if watch.is_interrupted() && !before { Err(PipelineError::Interrupted) } else { Ok(()) };
-    let physics = Physics::new(&subject, &check)?;
-    let determined = Determined::new(&network, (measured, *targets), &hold_out, threads)?;
+    let (physics, determined) = match prepared.constraints() {
+        None => {
+            let physics = Physics::new(&subject, &check)?;
+            (physics, Determined::new(&network, (measured, *targets), &hold_out, threads)?)
+        }
+        Some(_) => (Physics::under_constraints(&subject), Determined::under_constraints()),
+    };
     determined.suggestion().iter().for_each(|text| watch.say(Event::Note(text)));
     let found = Found {
         prepared,

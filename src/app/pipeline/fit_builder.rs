@@ -3,7 +3,7 @@
 use crate::configuration::{FRICTION_UNITS, Precision};
 use crate::network::Structure;
 use crate::pipeline::fit::{FitReport, fit};
-use crate::pipeline::fit_config::{FitColumns, FitConfig, FitOptions};
+use crate::pipeline::fit_config::{FitColumns, FitConfig, FitConstraints, FitOptions};
 use crate::pipeline::prepared_fit::PreparedFit;
 use crate::pipeline::train::RunOptions;
 use crate::pipeline::{Directory, InMemory, Output, PipelineError, Watch};
@@ -125,6 +125,12 @@ impl Fit {
     /// Seed of the weights and of held-out trajectories.
     pub fn seed(mut self, seed: u64) -> Self {
         self.options.seed = seed;
+        self
+    }
+
+    /// Constraints between the coordinates: found in the motion, or given as formulas; they are kept in the model's file.
+    pub fn constraints(mut self, constraints: FitConstraints) -> Self {
+        self.options.constraints = constraints;
         self
     }
 

@@ -6,6 +6,8 @@ use crate::data::PrepareOptions;
 use crate::recording::smooth::SmoothOptions;
 use crate::recording::{Columns, Targets};
 use crate::shooting::Shooting;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// Share of the samples that is held out by default.
 pub const HELD_OUT: f64 = 0.2;
@@ -35,6 +37,10 @@ table! {
         #[key("above 0, in s", example = "0.5", flag = "horizon", check = positive)]
         #[serde(skip_serializing_if = "Option::is_none")]
         pub horizon: Option<f64> = None,
+        /// Constraints between the coordinates: none, those that find reads off the motion, or formulas by name that vanish, from the
+        /// table [constraints] of a file.
+        #[key("none, find, or a file", example = "\"find\"", flag = "constraints")]
+        pub constraints: FitConstraints = FitConstraints::None,
         /// The files and the meaning of their columns, as in the options of the same names.
         #[table("recording", Below::Keys(FitColumns::KEYS))]
         pub recording: FitColumns = FitColumns::default(),
@@ -94,6 +100,50 @@ table! {
         #[key("names", example = "[\"t\", \"q1\"]")]
         #[serde(skip_serializing_if = "Vec::is_empty")]
         pub columns: Vec<String> = Vec::new(),
+    }
+}
+
+/// Constraints of a fit: what holds the coordinates of its motion together.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Written", into = "Written")]
+pub enum FitConstraints {
+    /// None: every coordinate moves by itself.
+    #[default]
+    None,
+    /// Those that are found in the motion that is learned from, if there are any.
+    Find,
+    /// Formulas by name, over coordinates and their velocities `NAME_dot`, that vanish.
+    Formulas(BTreeMap<String, String>),
+}
+
+/// Constraints as a file holds them.
+#[derive(Clone, Serialize, Deserialize)]
+#[serde(untagged)]
+enum Written {
+    Name(String),
+    Formulas(BTreeMap<String, String>),
+}
+
+impl TryFrom<Written> for FitConstraints {
+    type Error = String;
+
+    fn try_from(written: Written) -> Result<Self, String> {
+        match written {
+            Written::Formulas(formulas) => Ok(Self::Formulas(formulas)),
+            Written::Name(name) if name == "none" => Ok(Self::None),
+            Written::Name(name) if name == "find" => Ok(Self::Find),
+            Written::Name(name) => Err(format!("expected none, find, or a table of formulas, found {name:?}")),
+        }
+    }
+}
+
+impl From<FitConstraints> for Written {
+    fn from(constraints: FitConstraints) -> Self {
+        match constraints {
+            FitConstraints::None => Self::Name("none".to_string()),
+            FitConstraints::Find => Self::Name("find".to_string()),
+            FitConstraints::Formulas(formulas) => Self::Formulas(formulas),
+        }
     }
 }
 
@@ -179,13 +229,16 @@ pub struct FitOptions {
     pub window: Option<usize>,
     /// Standard deviation of the noise of every coordinate, in SI units; none to estimate it.
     pub noise: Option<Vec<f64>>,
+    /// Constraints between the coordinates.
+    pub constraints: FitConstraints,
     /// Seed of held-out trajectories.
     pub seed: u64,
 }
 
 impl Default for FitOptions {
     fn default() -> Self {
-        Self { targets: None, held_out: HELD_OUT, window: None, noise: None, seed: 0 }
+        let constraints = FitConstraints::None;
+        Self { targets: None, held_out: HELD_OUT, window: None, noise: None, constraints, seed: 0 }
     }
 }
 

@@ -51,6 +51,9 @@ struct Summary<'a> {
     test_loss: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     shooting: Option<ShootingSummary>,
+    /// Constraints that hold the motion.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    constraints: Option<ConstraintsSummary<'a>>,
     /// Constants of the known part of a grey box.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     constants: BTreeMap<String, f64>,
@@ -62,6 +65,17 @@ struct Summary<'a> {
     #[serde(flatten)]
     determined: &'a Determined,
     physics: &'a Physics,
+}
+
+/// Constraints in `summary.json`.
+#[derive(Serialize)]
+struct ConstraintsSummary<'a> {
+    /// `true` if they were found in the motion, `false` if they were given.
+    found: bool,
+    /// What vanishes, by name.
+    formulas: &'a BTreeMap<String, String>,
+    /// Distance of the smoothed positions that are learned from, root mean square: they were brought to the constraints.
+    distance: f64,
 }
 
 /// Multiple shooting in `summary.json`; losses are mean squared residuals in units of noise.
@@ -164,6 +178,11 @@ impl<'a, S: Scalar> Found<'a, S> {
                 validation_loss: fitted.validation_loss,
                 integration_error: fitted.integration_error,
             }),
+            constraints: prepared.held.as_ref().map(|held| ConstraintsSummary {
+                found: held.found,
+                formulas: held.constraints.formulas(),
+                distance: held.distance,
+            }),
             constants: self.constants.clone(),
             ended: ended(&trained.stop),
             training_seconds: trained.seconds + shot.map_or(0.0, |fitted| fitted.seconds),
@@ -252,6 +271,16 @@ impl Summary<'_> {
                 number(shooting.validation_loss),
                 pluralize(shooting.epochs, "epoch", "epochs"),
                 pluralize(shooting.segments, "segment", "segments")
+            );
+        }
+        if let Some(ConstraintsSummary { found, formulas, distance }) = &self.constraints {
+            let how = if *found { "found in the motion" } else { "given" };
+            let all: Vec<String> = formulas.values().map(|formula| format!("{formula} = 0")).collect();
+            let _ = writeln!(
+                text,
+                "under constraints, {how}: {}; smoothed positions were {} away from them, root mean square",
+                all.join("; "),
+                number(*distance)
             );
         }
         if !self.constants.is_empty() {

@@ -5,10 +5,11 @@ use crate::analysis::{
     prediction_error, spread, window_valid_times,
 };
 use crate::data::Split;
-use crate::lagrangian::{EulerLagrange, Request, Terms};
+use crate::lagrangian::{EulerLagrange, ReducedMass, Request, Terms, project};
 use crate::linalg::{SignatureBuffers, has_signature};
 use crate::names::number;
 use crate::pipeline::cancellation::Cancellation;
+use crate::pipeline::constraint_figures::constraint_figures;
 use crate::pipeline::energy::{Balance, balance, energy_figure};
 use crate::pipeline::force_errors::ForceError;
 use crate::pipeline::prediction::HeldOutPredictions;
@@ -126,6 +127,12 @@ pub fn evaluate_hold_out(
         .collect();
     let stride = windows.len().div_ceil(WINDOWS).max(1);
     windows = windows.into_iter().step_by(stride).collect();
+    if let Some(manifold) = model.manifold() {
+        // A start without a way to the constraints is one whose prediction is given up.
+        for Window { q, v, .. } in &mut windows {
+            let _ = project(manifold, q, v);
+        }
+    }
     let watched = cancellation.watched(model);
     let model: &dyn EulerLagrange<f64> = &watched;
     let foretold = HeldOutPredictions::new(model, windows, plan.threads, cancellation)?;
@@ -161,6 +168,9 @@ pub fn evaluate_hold_out(
         }
     }
     figures.extend(energy_figure(model, plan.part));
+    if let Some(window) = windows.first() {
+        figures.extend(constraint_figures(model, (&window.q, &window.v), horizon, (&recording.coordinates, "s")));
+    }
     let tabled = |predictions: &Predictions| if windows.is_empty() { Vec::new() } else { errors(predictions, TIMES) };
     let (wrong_signature, energy) = (wrong_signature(model, plan.part, plan.time), balance(model, plan.part));
     cancellation.check()?;
@@ -301,11 +311,17 @@ fn wrong_signature(model: &dyn EulerLagrange<f64>, part: &Split, time: Option<us
         let (q, v) = (some(&states.q), some(&states.v));
         for (q, v) in q.chunks(CHUNK * n).zip(v.chunks(CHUNK * n)) {
             // Failures of single states leave matrices that are not finite.
-            let _ = model.terms(q, v, Request::MASS_MATRIX, &mut terms);
+            let _ = model.terms(q, v, Request::MASS_MATRIX | Request::CONSTRAINTS, &mut terms);
             count += q.len() / n;
-            let right =
-                |matrix: &&[f64]| matrix.iter().all(|m| m.is_finite()) && has_signature(n, matrix, time, &mut buffers);
-            wrong += q.len() / n - terms.mass_matrix.chunks_exact(n * n).filter(right).count();
+            let m = terms.constraints;
+            let mut right = |(k, matrix): &(usize, &[f64])| match m {
+                0 => matrix.iter().all(|m| m.is_finite()) && has_signature(n, matrix, time, &mut buffers),
+                _ => {
+                    let rows = terms.constraint_matrix.get(k * m * n..(k + 1) * m * n).unwrap_or_default();
+                    ReducedMass::of(n, matrix, rows).is_ok_and(|reduced| reduced.eigenvalues.iter().all(|w| *w > 0.0))
+                }
+            };
+            wrong += q.len() / n - terms.mass_matrix.chunks_exact(n * n).enumerate().filter(|pair| right(pair)).count();
         }
     }
     wrong as f64 / f64::max(1.0, count as f64)

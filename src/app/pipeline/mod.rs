@@ -51,6 +51,7 @@
 
 mod cancellation;
 mod checkpoints;
+mod constraint_figures;
 mod determination;
 mod energy;
 mod equivalence;
@@ -64,6 +65,7 @@ mod file_names;
 mod fit;
 mod fit_builder;
 mod fit_config;
+mod fit_constraints;
 mod fit_summary;
 mod force_errors;
 mod headline;
@@ -113,10 +115,10 @@ pub(crate) use file_names::{CAPTIONS, RECORD, SUMMARY};
 pub use fit::FitReport;
 pub use fit::fit;
 pub use fit_builder::Fit;
-pub use fit_config::FitOptions;
 pub(crate) use fit_config::unit;
 #[doc(hidden)]
 pub use fit_config::{FitColumns, FitConfig, HELD_OUT};
+pub use fit_config::{FitConstraints, FitOptions};
 #[doc(hidden)]
 pub use force_errors::ForceError;
 pub use hold_out::HoldOut;

@@ -172,6 +172,13 @@ impl Physics {
         Ok(found)
     }
 
+    /// That of a model under constraints, off which its Lagrangian means nothing.
+    pub(crate) fn under_constraints(subject: &Subject<'_>) -> Self {
+        let problem = "maps of the learned functions, curvature, symmetries, certificate of the signature: off the constraints the \
+                       Lagrangian means nothing";
+        Self { left_out: vec![problem.to_string()], ..Self::nothing(subject) }
+    }
+
     /// No part of it yet.
     pub(crate) fn nothing(subject: &Subject<'_>) -> Self {
         let region = subject.region();

@@ -1,10 +1,12 @@
 //! Recorded motion made ready for a fit: derivatives, division, the configuration that suits it.
 
 use crate::configuration::{Config, ConfigError, Precision};
-use crate::data::RecordingSplit;
+use crate::data::{Dataset, Datasets, RecordingSplit};
+use crate::lagrangian::FormulaConstraints;
 use crate::names::rounded;
 use crate::pipeline::PipelineError;
 use crate::pipeline::fit_config::{FitColumns, FitConfig, FitOptions};
+use crate::pipeline::fit_constraints::FitHeld;
 use crate::pipeline::hold_out::horizons;
 use crate::presets::suggested;
 use crate::recording::survey::{Survey, SurveyOptions, survey};
@@ -19,6 +21,10 @@ pub struct PreparedFit<'a> {
     pub(crate) options: FitOptions,
     pub(crate) measured: RecordingSplit,
     pub(crate) targets: Targets,
+    /// Constraints that hold the motion.
+    pub(crate) held: Option<FitHeld>,
+    /// What is to be said of them.
+    pub(crate) remarks: Vec<String>,
     /// Time at which the work began, for the time that the summary states.
     pub started: Instant,
 }
@@ -29,18 +35,48 @@ impl<'a> PreparedFit<'a> {
     ///
     /// # Errors
     /// [`PipelineError::Recording`] for motion that cannot be learned from, [`PipelineError::NoAccelerations`] if measured
-    /// ones are asked for and there are none, [`PipelineError::NoForces`] for forces that not every coordinate has.
+    /// ones are asked for and there are none, [`PipelineError::NoForces`] for forces that not every coordinate has;
+    /// [`PipelineError::Constraints`] for constraints with a mistake, that contradict each other, or that the motion does not obey;
+    /// [`PipelineError::TargetsUnderConstraints`].
     pub fn new(reading: &'a LoadedRecording, options: &FitOptions) -> Result<Self, PipelineError> {
         let started = Instant::now();
         let measured = RecordingSplit::of_takes(&reading.recording, &reading.takes, &options.preparation())?;
-        let targets = options.targets.unwrap_or_else(|| measured.advice());
+        let mut targets = options.targets.unwrap_or_else(|| measured.advice());
         if targets == Targets::Measured && !measured.training.recording.has_accelerations() {
             return Err(PipelineError::NoAccelerations);
         }
         if targets == Targets::Forces && !reading.recording.is_driven() {
             return Err(PipelineError::NoForces);
         }
-        Ok(Self { reading, options: options.clone(), measured, targets, started })
+        let (mut held, remarks) = FitHeld::new(options, &measured)?;
+        if held.is_some() && matches!(targets, Targets::Motion | Targets::Forces) {
+            if options.targets.is_some() {
+                return Err(PipelineError::TargetsUnderConstraints);
+            }
+            targets = Targets::Smoothed;
+        }
+        if let Some(held) = &mut held {
+            let set = measured.datasets::<f64>(targets)?.training.swap_remove(0);
+            held.require_obedience(set, &measured.noise().q)?;
+        }
+        Ok(Self { reading, options: options.clone(), measured, targets, held, remarks, started })
+    }
+
+    /// The constraints that hold the motion.
+    pub(crate) fn constraints(&self) -> Option<&FormulaConstraints> {
+        self.held.as_ref().map(|held| &held.constraints)
+    }
+
+    /// States that are learned from, that choose the best epoch and that judge; brought to the constraints if there are any.
+    ///
+    /// # Errors
+    /// As of [`RecordingSplit::datasets`]; [`PipelineError::Constraints`] for a state from which no way leads to the constraints.
+    pub(crate) fn datasets<S: Scalar>(&self) -> Result<Datasets<S>, PipelineError> {
+        let Some(held) = &self.held else { return Ok(self.measured.datasets(self.targets)?) };
+        let Datasets { training, validation, test } = self.measured.datasets::<f64>(self.targets)?;
+        let bring = |set| held.bring(set).map(|(set, _)| set.cast());
+        let training = training.into_iter().map(bring).collect::<Result<Vec<Dataset<S>>, _>>()?;
+        Ok(Datasets { training, validation: bring(validation)?, test: bring(test)? })
     }
 
     /// Targets that are learned from.
@@ -94,8 +130,9 @@ impl<'a> PreparedFit<'a> {
         recording: FitColumns,
         shooting: Option<crate::shooting::Shooting>,
     ) -> FitConfig {
-        let FitOptions { held_out, window, noise, .. } = self.options.clone();
-        FitConfig { targets: Some(self.targets), held_out, window, noise, horizon, recording, shooting, training }
+        let FitOptions { held_out, window, noise, constraints, .. } = self.options.clone();
+        let targets = Some(self.targets);
+        FitConfig { targets, held_out, window, noise, horizon, constraints, recording, shooting, training }
     }
 
     /// The supervised training that suits the data.
@@ -107,8 +144,7 @@ impl<'a> PreparedFit<'a> {
     }
 
     fn suggest_in<S: Scalar>(&self, name: &str) -> Result<Config, PipelineError> {
-        let data = self.measured.datasets::<S>(self.targets)?;
-        Ok(suggested(name, &data))
+        Ok(suggested(name, &self.datasets::<S>()?))
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::analysis::{stretches, training_instability};
 use crate::configuration::{Config, Phase, Precision};
-use crate::data::{Datasets, sample_all_until};
+use crate::data::{Dataset, Datasets, sample_all_until};
 use crate::experiments::{Learned, Outcome, Record};
 use crate::lagrangian::SystemInstance;
 use crate::lagrangian::system::TrajectoryTest;
@@ -206,7 +206,7 @@ fn train_in<S: Scalar>(
         Some(from) => start::weights(from, shaped).map(|(weights, shape)| (shape, Some(weights)))?,
         None => (shaped(scale), None),
     };
-    let imposed = imposed_velocities(system, &data);
+    let ranges = ranges(config, system, &data);
     let fresh = data.test.cast::<f64>();
     let fresh = (fresh.q().to_vec(), fresh.v().to_vec());
     let toml = toml::to_string(config).map_err(PipelineError::format)?;
@@ -221,7 +221,7 @@ fn train_in<S: Scalar>(
     let trained = resume(config, &architecture, penalty, data, options.threads, &watch.hooks(), resumed)?;
 
     // The model first, then what is small, pictures last: on a full disk nothing that comes after can lose them.
-    let header = header(config, system, architecture.clone(), imposed, trained.validation_loss);
+    let header = header(config, system, architecture.clone(), ranges, trained.validation_loss);
     let model = ModelFile { header, weights: trained.weights.clone() };
     write_model(output, &model)?;
     output.write("config.toml", toml.as_bytes())?;
@@ -235,6 +235,7 @@ fn train_in<S: Scalar>(
         span: TrajectoryTest { t_end: test.t_end * options.span, ..test },
         rtol: RTOL,
         trained: trained_on(&model.header),
+        constraints: None,
         seed: config.seed,
         threads: options.threads,
     };
@@ -273,12 +274,21 @@ fn finite(x: f64) -> Option<f64> {
     x.is_finite().then_some(x)
 }
 
-/// The velocity that the mass shell fixes and its range over the training states, which no bounds of the configuration
-/// tell.
-fn imposed_velocities<S: Scalar>(system: &SystemInstance<f64>, data: &Datasets<S>) -> Option<(usize, [f64; 2])> {
-    let i = system.constrained_coordinate()?;
-    let ranges = data.training.iter().map(|set| set.ranges()[1][i]);
-    ranges.reduce(|[low, high], [l, h]| [low.min(l), high.max(h)]).map(|range| (i, range))
+/// Ranges of the coordinates and velocities of the training states: the bounds of the configuration, which do not tell the velocity that a
+/// mass shell fixes, nor anything of states that were brought to constraints.
+fn ranges<S: Scalar>(config: &Config, system: &SystemInstance<f64>, data: &Datasets<S>) -> [Vec<[f64; 2]>; 2] {
+    let join = |[low, high]: [f64; 2], [l, h]: [f64; 2]| [low.min(l), high.max(h)];
+    let all: Vec<_> = data.training.iter().map(Dataset::ranges).collect();
+    let found = |part: usize, i: usize| all.iter().map(|ranges| ranges[part][i]).reduce(join).unwrap_or_default();
+    let chosen = |part: usize, i: usize| {
+        let bounds = |phase: &Phase| [&phase.position, &phase.velocity][part].get(i).copied();
+        config.phases.iter().filter_map(bounds).fold([f64::INFINITY, f64::NEG_INFINITY], join)
+    };
+    let shell = system.constrained_coordinate();
+    let drawn = |part: usize, i: usize| system.constraints().is_none() && (part == 0 || shell != Some(i));
+    [0, 1].map(|part| {
+        (0..system.coordinates).map(|i| if drawn(part, i) { chosen(part, i) } else { found(part, i) }).collect()
+    })
 }
 
 /// Header of the model file of this run.
@@ -286,23 +296,12 @@ fn header(
     config: &Config,
     system: &SystemInstance<f64>,
     architecture: Architecture,
-    imposed: Option<(usize, [f64; 2])>,
+    ranges: [Vec<[f64; 2]>; 2],
     validation_loss: f64,
 ) -> Header {
     // Defaults that change in a later version must not change this model.
     let mut parameters = all_parameters(system);
     parameters.extend(config.parameters.clone());
-    let hull = |bounds: fn(&Phase) -> &Vec<[f64; 2]>| {
-        let range = |i: usize| {
-            let all = config.phases.iter().filter_map(|phase| bounds(phase).get(i));
-            all.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], b| [low.min(b[0]), high.max(b[1])])
-        };
-        (0..system.coordinates).map(range).collect()
-    };
-    let mut ranges: [Vec<[f64; 2]>; 2] = [hull(|phase| &phase.position), hull(|phase| &phase.velocity)];
-    if let Some((i, range)) = imposed {
-        ranges[1][i] = range;
-    }
     let columns = system.system.columns(system.coordinates);
     let header = config.header(architecture, columns, ranges, validation_loss);
     Header { parameters, description: config.description.clone(), ..header }

@@ -1,6 +1,6 @@
 //! States with their accelerations: what a network learns from.
 
-use crate::lagrangian::{Manifold, ManifoldRows};
+use crate::lagrangian::{Manifold, ManifoldRows, project, project_acceleration};
 use crate::network::file::StoredPrecision;
 use crate::recording::RecordedTrajectory;
 use crate::scalar::{Real, Scalar};
@@ -60,6 +60,14 @@ pub enum DatasetError {
     /// No states.
     #[error("a dataset needs at least one state")]
     Empty,
+    /// A state from which there is no way to a constraint.
+    #[error("from state {row} no way leads to the constraint `{constraint}`")]
+    Unreachable {
+        /// State, from 0.
+        row: usize,
+        /// Name of the constraint that is missed most.
+        constraint: String,
+    },
 }
 
 /// Checks the length of an array and that it is finite.
@@ -145,6 +153,27 @@ impl<S: Scalar> Dataset<S> {
             drift.extend_from_slice(&rows.drift);
         }
         self.with_constraints(matrix, drift)
+    }
+
+    /// The same states brought to a manifold by the least changes, positions, velocities and accelerations one after the other, under its
+    /// constraints; and how far the positions were away, root mean square.
+    ///
+    /// # Errors
+    /// [`DatasetError::Unreachable`] where there is no way; as [`Dataset::on`].
+    pub fn brought_to(mut self, manifold: &dyn Manifold<S>) -> Result<(Self, f64), DatasetError> {
+        let n = self.coordinates;
+        let mut square = 0.0;
+        let states = self.q.chunks_exact_mut(n).zip(self.v.chunks_exact_mut(n)).zip(self.a.chunks_exact_mut(n));
+        for (row, ((q, v), a)) in states.enumerate() {
+            let [distance, _] = project(manifold, q, v).map_err(|off| DatasetError::Unreachable {
+                row,
+                constraint: manifold.names().get(off.row).cloned().unwrap_or_default(),
+            })?;
+            project_acceleration(manifold, q, v, a);
+            square += distance * distance;
+        }
+        let states = self.len() as f64;
+        Ok((self.on(manifold)?, (square / states).sqrt()))
     }
 
     /// The same states, their residuals multiplied by these weights in the loss, `(states)`.
@@ -249,13 +278,18 @@ impl<S: Scalar> Dataset<S> {
             .collect()
     }
 
-    /// Smallest and largest value of every coordinate, and of every velocity.
+    /// Smallest and largest value of every coordinate, and of every velocity; a little more under constraints, which leave some of them
+    /// no width but rounding.
     pub(crate) fn ranges(&self) -> [Vec<[f64; 2]>; 2] {
-        let n = self.coordinates;
+        const MORE: f64 = 1e-3;
+        let (n, more) = (self.coordinates, if self.constraints() > 0 { MORE } else { 0.0 });
         [&self.q, &self.v].map(|values| {
             let range = |i: usize| {
                 let all = values.iter().skip(i).step_by(n).map(|x| x.to_f64());
-                all.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)])
+                let [low, high] =
+                    all.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)]);
+                let more = more * low.abs().max(high.abs());
+                [low - more, high + more]
             };
             (0..n).map(range).collect()
         })

@@ -1,8 +1,8 @@
 //! Draws of single states.
 
 use crate::configuration::ConfigError;
-use crate::data::dataset::DatasetError;
-use crate::lagrangian::{DescriptionError, SystemError, SystemInstance};
+use crate::data::dataset::{Dataset, DatasetError};
+use crate::lagrangian::{DescriptionError, EulerLagrange, SystemError, SystemInstance, project};
 use rand::Rng;
 use std::sync::atomic::{AtomicBool, Ordering};
 use thiserror::Error;
@@ -44,15 +44,30 @@ pub enum SamplingError {
     Dataset(#[from] DatasetError),
 }
 
-/// States as they are drawn, with their exact accelerations.
-#[derive(Default)]
-pub(crate) struct Drawn {
+/// States of a system as they are drawn, with their exact accelerations.
+pub(crate) struct Drawn<'a> {
+    system: &'a SystemInstance<f64>,
+    /// The motion of a system under constraints.
+    constrained: Option<Box<dyn EulerLagrange<f64>>>,
     pub q: Vec<f64>,
     pub v: Vec<f64>,
-    pub a: Vec<f64>,
+    a: Vec<f64>,
 }
 
-impl Drawn {
+/// Where a state is not finite, or cannot be brought.
+const FINITE: &str = "a finite acceleration";
+const CONSTRAINTS: &str = "some constraint";
+
+impl<'a> Drawn<'a> {
+    /// None yet.
+    ///
+    /// # Errors
+    /// [`SamplingError::System`] for constraints that contradict each other or leave no motion.
+    pub fn new(system: &'a SystemInstance<f64>) -> Result<Self, SamplingError> {
+        let constrained = system.constraints().map(|_| system.build()).transpose()?;
+        Ok(Self { system, constrained, q: Vec::new(), v: Vec::new(), a: Vec::new() })
+    }
+
     /// Goes on unless a flag was raised.
     ///
     /// # Errors
@@ -61,22 +76,39 @@ impl Drawn {
         if interrupt.load(Ordering::Relaxed) { Err(SamplingError::Interrupted) } else { Ok(()) }
     }
 
+    /// Brings a state to the mass shell of the system, or the shortest way to its constraints; what is demanded where there is no way.
+    pub fn impose(&self, q: &mut [f64], v: &mut [f64]) -> Result<Option<&'static str>, SamplingError> {
+        self.system.impose_constraint(q, v)?;
+        let manifold = self.constrained.as_ref().and_then(|model| model.manifold());
+        Ok(manifold.and_then(|manifold| project(manifold, q, v).err()).map(|_| CONSTRAINTS))
+    }
+
     /// Takes a state, unless it lies outside the system's domain or has no finite acceleration: then what is demanded.
-    pub fn take(
-        &mut self,
-        system: &SystemInstance<f64>,
-        q: &[f64],
-        v: &[f64],
-    ) -> Result<Option<&'static str>, SamplingError> {
-        let a = system.exact_acceleration(q, v)?;
-        let finite = a.iter().all(|a| a.is_finite());
-        let demand = system.check_domain(q).err().or((!finite).then_some("a finite acceleration"));
+    pub fn take(&mut self, q: &[f64], v: &[f64]) -> Result<Option<&'static str>, SamplingError> {
+        let a = match &self.constrained {
+            Some(model) => model.acceleration(q, v).unwrap_or_default(),
+            None => self.system.exact_acceleration(q, v)?,
+        };
+        let finite = a.len() == q.len() && a.iter().all(|a| a.is_finite());
+        let demand = self.system.check_domain(q).err().or((!finite).then_some(FINITE));
         if demand.is_none() {
             self.q.extend(q);
             self.v.extend(v);
             self.a.extend(a);
         }
         Ok(demand)
+    }
+
+    /// The states, with the rows of the constraints if there are any.
+    ///
+    /// # Errors
+    /// [`SamplingError::Dataset`] without any state, or where a constraint is not finite.
+    pub fn finish(self) -> Result<Dataset<f64>, SamplingError> {
+        let set = Dataset::new(self.system.coordinates, self.q, self.v, self.a)?;
+        match self.constrained.as_ref().and_then(|model| model.manifold()) {
+            Some(manifold) => Ok(set.on(manifold)?),
+            None => Ok(set),
+        }
     }
 }
 

@@ -18,14 +18,14 @@ const PER_MOTION: f64 = 10.0;
 ///
 /// # Errors
 /// [`SamplingError::Motions`] if hardly any motion stays within the bounds for a while.
-pub(crate) fn along_motions(
-    system: &SystemInstance<f64>,
+pub(crate) fn along_motions<'a>(
+    system: &'a SystemInstance<f64>,
     field: &str,
     (position, velocity): (&[[f64; 2]], &[[f64; 2]]),
     log_uniform: &[bool],
     states: usize,
     (rng, interrupt): (&mut impl Rng, &AtomicBool),
-) -> Result<Drawn, SamplingError> {
+) -> Result<Drawn<'a>, SamplingError> {
     let n = system.coordinates;
     let test = system.system.trajectory(n);
     let [places, speeds] = [&test.start.positions, &test.start.velocities].map(|bounds| boxes(bounds));
@@ -44,7 +44,7 @@ pub(crate) fn along_motions(
         ..Options::new(test.t_end, test.dt)
     };
     let chance = PER_MOTION * test.dt / test.t_end;
-    let mut drawn = Drawn::default();
+    let mut drawn = Drawn::new(system)?;
     let mut motions = 0;
     while drawn.q.len() < states * n {
         Drawn::go_on(interrupt)?;
@@ -52,8 +52,10 @@ pub(crate) fn along_motions(
             return Err(SamplingError::Motions { field: field.to_string() });
         }
         motions += 1;
-        let (start, mut speed) = draw((&places, &speeds), log_uniform, rng);
-        system.impose_constraint(&start, &mut speed)?;
+        let (mut start, mut speed) = draw((&places, &speeds), log_uniform, rng);
+        if drawn.impose(&mut start, &mut speed)?.is_some() {
+            continue;
+        }
         let motion = rollout(&exact, &start, &speed, &options).trajectory;
         for (q, v) in motion.q.chunks_exact(n).zip(motion.v.chunks_exact(n)) {
             if drawn.q.len() == states * n || rng.random::<f64>() >= chance {
@@ -62,8 +64,9 @@ pub(crate) fn along_motions(
             let (mut q, mut v) = (q.to_vec(), v.to_vec());
             if turn_back(&mut q, &coordinates, position, rng) {
                 // Integration left the mass shell by its tolerance.
-                system.impose_constraint(&q, &mut v)?;
-                drawn.take(system, &q, &v)?;
+                if drawn.impose(&mut q, &mut v)?.is_none() {
+                    drawn.take(&q, &v)?;
+                }
             }
         }
     }

@@ -3,7 +3,7 @@
 use crate::configuration::{Config, ConfigError, Penalty, Precision};
 use crate::data::draw::SamplingError;
 use crate::lagrangian::system::System;
-use crate::lagrangian::{SystemInstance, configure_values, find};
+use crate::lagrangian::{SystemInstance, configure_values, resolve};
 use crate::network::Architecture;
 use crate::network::file::{FORMAT, Header, StoredPrecision};
 use std::borrow::Cow;
@@ -24,7 +24,7 @@ impl Config {
     /// Unknown system, or a description that is wrong or of another name.
     pub fn system_entry(&self) -> Result<Cow<'static, System>, SamplingError> {
         match &self.description {
-            None => Ok(Cow::Borrowed(find(&self.system)?)),
+            None => Ok(resolve(&self.system)?),
             Some(description) if description.name != self.system => Err(SamplingError::Config(ConfigError {
                 field: "description.name".to_string(),
                 expected: "the name of the system".into(),
@@ -86,7 +86,7 @@ impl Config {
     }
 
     /// Header of the file of a model that was learned by this configuration from states within `ranges`, of coordinates and of
-    /// velocities. It has no parameters of a system, no known forces and no description.
+    /// velocities. It has no parameters of a system, no known forces, no constraints and no description.
     pub(crate) fn header(
         &self,
         architecture: Architecture,
@@ -102,6 +102,7 @@ impl Config {
             parameters: BTreeMap::new(),
             columns,
             forces: Vec::new(),
+            constraints: BTreeMap::new(),
             description: None,
             precision: match self.precision {
                 Precision::F32 => StoredPrecision::F32,

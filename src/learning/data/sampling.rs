@@ -16,7 +16,8 @@ use std::sync::atomic::AtomicBool;
 /// Draws `states` states uniformly from a box, with their exact accelerations, all in double precision.
 ///
 /// A system with a mass shell is put on it: the velocity of its time-like coordinate follows from the other numbers, its
-/// bounds mean nothing. States outside the system's domain, or with an acceleration that is not finite, are drawn again.
+/// bounds mean nothing. A state of a system under constraints is brought to them by the shortest way, wherever that leads. States
+/// outside the system's domain, or with an acceleration that is not finite, are drawn again.
 ///
 /// # Errors
 /// [`SamplingError::Domain`] if more than nine in ten draws are refused.
@@ -27,33 +28,35 @@ pub fn sample(
     states: usize,
     rng: &mut impl Rng,
 ) -> Result<Dataset<f64>, SamplingError> {
-    fill(Drawn::default(), system, field, bounds, &[], states, (rng, &AtomicBool::new(false)))
+    fill(Drawn::new(system)?, field, bounds, &[], states, (rng, &AtomicBool::new(false)))
 }
 
 /// Draws further states, up to `states`, as [`sample`] does.
 fn fill(
-    mut drawn: Drawn,
-    system: &SystemInstance<f64>,
+    mut drawn: Drawn<'_>,
     field: &str,
     bounds: (&[[f64; 2]], &[[f64; 2]]),
     log_uniform: &[bool],
     states: usize,
     (rng, interrupt): (&mut impl Rng, &AtomicBool),
 ) -> Result<Dataset<f64>, SamplingError> {
-    let n = system.coordinates;
+    let n = bounds.0.len();
     let mut refused = 0_usize;
     while drawn.q.len() < states * n {
         Drawn::go_on(interrupt)?;
-        let (q, mut v) = draw(bounds, log_uniform, rng);
-        system.impose_constraint(&q, &mut v)?;
-        if let Some(demand) = drawn.take(system, &q, &v)? {
+        let (mut q, mut v) = draw(bounds, log_uniform, rng);
+        let demand = match drawn.impose(&mut q, &mut v)? {
+            None => drawn.take(&q, &v)?,
+            demand => demand,
+        };
+        if let Some(demand) = demand {
             refused += 1;
             if refused > 1000 && refused > 9 * (drawn.q.len() / n) {
                 return Err(SamplingError::Domain { field: field.to_string(), demand });
             }
         }
     }
-    Ok(Dataset::new(n, drawn.q, drawn.v, drawn.a)?)
+    drawn.finish()
 }
 
 /// Slowest velocity off a mass shell, as a part of one on it.
@@ -115,7 +118,7 @@ pub(crate) fn sample_all_until<S: Scalar>(
         } else {
             let moving = (config.data.trajectory_fraction * states as f64).round() as usize;
             let drawn = along_motions(system, &field, bounds, &phase.log_uniform, moving, (&mut rng, interrupt))?;
-            let set = fill(drawn, system, &field, bounds, &phase.log_uniform, states, (&mut rng, interrupt))?;
+            let set = fill(drawn, &field, bounds, &phase.log_uniform, states, (&mut rng, interrupt))?;
             let scale = set.physical_scale();
             if floor > 0.0 { Weighting { floor, scale: &scale, errors: &[] }.relative(set)? } else { set }
         };
@@ -131,7 +134,7 @@ pub(crate) fn sample_all_until<S: Scalar>(
         let mut rng = stream.generator(seed);
         match data.shell()? {
             Some(shell) => in_shell(system, &shell, (field, bounds.0), states, (&mut rng, interrupt)),
-            None => fill(Drawn::default(), system, field, bounds, &[], states, (&mut rng, interrupt)),
+            None => fill(Drawn::new(system)?, field, bounds, &[], states, (&mut rng, interrupt)),
         }
     };
     let (validation, test) = (judged(data.validation, RngStream::Validation)?, judged(data.test, RngStream::Test)?);
@@ -144,6 +147,7 @@ mod tests {
     use super::*;
     use crate::lagrangian::{Request, Terms, configure};
     use crate::presets::Preset;
+    use std::borrow::Cow;
 
     #[test]
     fn every_state_of_a_relativistic_system_is_on_the_mass_shell() {
@@ -178,6 +182,34 @@ mod tests {
             seen += 1;
         }
         assert_eq!(seen, 8);
+    }
+
+    #[test]
+    fn states_under_constraints_lie_on_them() {
+        let system = configure::<f64>("cartesian-chain-2", &[]).unwrap();
+        let mut config = Preset::Quick.config(&system).unwrap();
+        (config.data.training, config.data.validation, config.data.test) = (200, 50, 50);
+        for fraction in [0.0, 0.5] {
+            config.data.trajectory_fraction = fraction;
+            let (data, _) = sample_all::<f64>(&config, &system).unwrap();
+            for set in data.training.iter().chain([&data.validation, &data.test]) {
+                assert_eq!(set.constraints(), 2);
+                for (k, ((q, v), a)) in set.q().chunks(4).zip(set.v().chunks(4)).zip(set.a().chunks(4)).enumerate() {
+                    assert!((q[0].hypot(q[1]) - 1.0).abs() < 1e-12 && (q[2] - q[0]).hypot(q[3] - q[1]) < 1.0 + 1e-12);
+                    let (rows, drift) = set.constraint(k);
+                    for (row, drift) in rows.chunks(4).zip(drift) {
+                        let along = |x: &[f64]| row.iter().zip(x).map(|(a, x)| a * x).sum::<f64>();
+                        assert!(along(v).abs() < 1e-12 && (along(a) + drift).abs() < 1e-9, "{q:?} {v:?}");
+                    }
+                }
+            }
+        }
+        // Constraints that no state of the bounds comes to.
+        let mut description = system.system.description().unwrap().clone();
+        description.name = "unreachable".to_string();
+        description.constraints.insert("far".to_string(), "x1 + 5*l".to_string());
+        let far = crate::lagrangian::configure_system::<f64>(Cow::Owned(description.system().unwrap()), &[]);
+        assert!(sample_all::<f64>(&config, &far.unwrap()).is_err());
     }
 
     #[test]

@@ -33,7 +33,7 @@ pub(crate) fn in_shell(
     };
     let metric = system.build()?;
     let [low, high] = shell.radius;
-    let (mut drawn, mut refused) = (Drawn::default(), 0_usize);
+    let (mut drawn, mut refused) = (Drawn::new(system)?, 0_usize);
     while drawn.q.len() < states * n {
         Drawn::go_on(interrupt)?;
         let (mut q, _) = draw((position, &[]), &[], rng);
@@ -43,7 +43,7 @@ pub(crate) fn in_shell(
         }
         let rapidity = shell.rapidity * rng.random::<f64>();
         let demand = match moving(metric.as_ref(), time, &q, rapidity, &direction(n - 1, rng)) {
-            Some(v) => drawn.take(system, &q, &v)?,
+            Some(v) => drawn.take(&q, &v)?,
             None => Some("a space-like surface of equal time"),
         };
         if let Some(demand) = demand {
@@ -53,7 +53,7 @@ pub(crate) fn in_shell(
             }
         }
     }
-    Ok(Dataset::new(n, drawn.q, drawn.v, drawn.a)?)
+    drawn.finish()
 }
 
 /// Indices of the coordinates of a shell.

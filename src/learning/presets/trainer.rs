@@ -1,7 +1,8 @@
 //! Learning from arrays of states: the quick preset's choices, changed by a builder.
 
 use crate::configuration::{Config, ConfigError, Precision, Regularizer};
-use crate::data::{Dataset, Datasets};
+use crate::data::{Dataset, DatasetError, Datasets};
+use crate::lagrangian::{EulerLagrange, FormulaConstraints, FormulaError};
 use crate::network::file::{Header, ModelFile, ModelFileError};
 use crate::network::{NetworkError, NetworkLagrangian, Structure};
 use crate::presets::preset::{of_states, take_structure};
@@ -9,6 +10,7 @@ use crate::random::RngStream;
 use crate::scalar::Scalar;
 use crate::training::{Epoch, Hooks, TrainingError, train};
 use rand::seq::SliceRandom;
+use std::collections::BTreeMap;
 use std::path::Path;
 use thiserror::Error;
 
@@ -27,6 +29,7 @@ const HELD_OUT: f64 = 0.1;
 /// | [`epochs`](Self::epochs) | 40 |
 /// | [`precision`](Self::precision) | `f32` |
 /// | [`seed`](Self::seed), [`threads`](Self::threads) | 0, 1; results do not depend on threads |
+/// | [`constraints`](Self::constraints) | none |
 ///
 /// ```
 /// use lnn::prelude::*;
@@ -51,6 +54,7 @@ pub struct Trainer<'a> {
     data: &'a Dataset<f64>,
     names: Vec<String>,
     angles: Vec<usize>,
+    constraints: BTreeMap<String, String>,
     config: Config,
     threads: usize,
 }
@@ -88,13 +92,19 @@ pub enum TrainerError {
     /// Training failed.
     #[error(transparent)]
     Training(#[from] TrainingError),
+    /// Constraints with a mistake, or that contradict each other or leave no motion.
+    #[error(transparent)]
+    Constraints(#[from] FormulaError),
+    /// A constraint that is not finite at a state, or states that are under rows already.
+    #[error(transparent)]
+    Dataset(#[from] DatasetError),
 }
 
 impl<'a> Trainer<'a> {
     /// A training on these states, whose coordinates are called `q1`, `q2`, ...
     pub fn new(data: &'a Dataset<f64>) -> Self {
         let names = (1..=data.coordinates()).map(|i| format!("q{i}")).collect();
-        Self { data, names, angles: Vec::new(), config: of_states(), threads: 1 }
+        Self { data, names, angles: Vec::new(), constraints: BTreeMap::new(), config: of_states(), threads: 1 }
     }
 
     /// Names the coordinates, as messages and the model file shall call them.
@@ -105,6 +115,13 @@ impl<'a> Trainer<'a> {
     /// Marks coordinates, by index from 0, as angles in rad: the Lagrangian has their period.
     pub fn angles(self, indices: &[usize]) -> Self {
         Self { angles: indices.to_vec(), ..self }
+    }
+
+    /// Constraints that hold the states, by name: formulas over the names of the coordinates and `NAME_dot` that vanish, such as
+    /// `("rod", "x^2 + y^2 - 1")`. They are kept in the model's file; those that follow from others are left out.
+    pub fn constraints(self, formulas: &[(&str, &str)]) -> Self {
+        let constraints = formulas.iter().map(|(name, formula)| (name.to_string(), formula.to_string())).collect();
+        Self { constraints, ..self }
     }
 
     /// Builds the signature of the mass matrix in; the penalty of a black box goes.
@@ -180,7 +197,7 @@ impl<'a> Trainer<'a> {
     }
 
     fn train_in<S: Scalar>(self) -> Result<Learned, TrainerError> {
-        let Self { data, names, angles, mut config, threads } = self;
+        let Self { data, names, angles, constraints, mut config, threads } = self;
         let (n, found) = (data.coordinates(), data.len());
         let fault = |field: &str, expected: &'static str, found| ConfigError {
             field: field.to_string(),
@@ -197,6 +214,18 @@ impl<'a> Trainer<'a> {
         if found < 3 {
             return Err(TrainerError::TooFew { found });
         }
+        let constraints = match constraints.is_empty() {
+            true => None,
+            false => Some(FormulaConstraints::new(&names, constraints)?.independent(data.q(), data.v())?.0),
+        };
+        let held;
+        let data = match &constraints {
+            None => data,
+            Some(constraints) => {
+                held = data.clone().on(&constraints.manifold().map_err(FormulaError::from)?)?;
+                &held
+            }
+        };
         let mut order: Vec<usize> = (0..found).collect();
         order.shuffle(&mut RngStream::HeldOut.generator(config.seed));
         let part = ((HELD_OUT * found as f64) as usize).max(1);
@@ -214,7 +243,8 @@ impl<'a> Trainer<'a> {
         let data = Datasets { training: vec![training; config.phases.len()], validation, test };
         let trained = train(&config, &architecture, penalty, data, threads, &Hooks::default())?;
         let columns = names.iter().cloned().chain(names.iter().map(|name| format!("{name}_dot"))).collect();
-        let header = config.header(architecture.clone(), columns, ranges, trained.validation_loss);
+        let mut header = config.header(architecture.clone(), columns, ranges, trained.validation_loss);
+        header.constraints = constraints.map(|constraints| constraints.formulas().clone()).unwrap_or_default();
         let model = NetworkLagrangian::new(architecture, trained.weights)?.cast::<f64>();
         let (history, validation_loss) = (trained.history, trained.validation_loss);
         Ok(Learned { model, history, validation_loss, test_loss: trained.test.loss.to_f64(), header })
@@ -222,6 +252,14 @@ impl<'a> Trainer<'a> {
 }
 
 impl Learned {
+    /// The motion that was learned: that of the model under the constraints that it was learned under, if there are any.
+    ///
+    /// # Errors
+    /// None of a model that was just learned.
+    pub fn motion(&self) -> Result<Box<dyn EulerLagrange<f64> + '_>, ModelFileError> {
+        self.header.constrain(Box::new(&self.model as &dyn EulerLagrange<f64>))
+    }
+
     /// Writes the model's file, whole or not at all.
     ///
     /// # Errors

@@ -233,22 +233,27 @@ impl<S: Scalar> SystemInstance<S> {
     /// [`Dd`].
     pub fn build(&self) -> Result<Box<dyn EulerLagrange<S>>, SystemError> {
         let free = construct_once(self).ok_or_else(|| unknown_system(&self.system.name))?;
-        let free: Box<dyn EulerLagrange<S>> = match self.friction() {
+        self.constrain(match self.friction() {
             None => free,
             Some(friction) => Box::new(WithForces::new(free, Rayleigh(friction))),
+        })
+    }
+    /// A model of the same coordinates, learned for instance, under the constraints of the system; without any, as it is.
+    ///
+    /// # Errors
+    /// [`SystemError::Constraints`] for constraints that contradict each other or leave no motion, or a model of other coordinates.
+    pub fn constrain<'a>(
+        &self,
+        model: Box<dyn EulerLagrange<S> + 'a>,
+    ) -> Result<Box<dyn EulerLagrange<S> + 'a>, SystemError> {
+        let Some(constraints) = self.constraints() else { return Ok(model) };
+        let wrong = |error: ConstraintError| SystemError::Constraints {
+            system: self.system.name.to_string(),
+            problem: error.to_string(),
         };
-        match self.constraints() {
-            None => Ok(free),
-            Some(constraints) => {
-                let wrong = |error: ConstraintError| SystemError::Constraints {
-                    system: self.system.name.to_string(),
-                    problem: error.to_string(),
-                };
-                let model = Constrained::new(free, constraints.clone(), self.parameters.clone()).map_err(wrong)?;
-                let (q, v) = self.anywhere();
-                Ok(Box::new(model.independent(&q, &v).map_err(wrong)?))
-            }
-        }
+        let model = Constrained::new(model, constraints.clone(), self.parameters.clone()).map_err(wrong)?;
+        let (q, v) = self.anywhere();
+        Ok(Box::new(model.independent(&q, &v).map_err(wrong)?))
     }
     /// The constraints of a system by its description.
     pub fn constraints(&self) -> Option<&ExpressionConstraints> {
@@ -282,12 +287,13 @@ impl<S: Scalar> SystemInstance<S> {
     /// description, for which no closed form is known, by differentiating its Lagrangian. `NaN` where the mass matrix is singular.
     ///
     /// # Errors
-    /// [`SystemError::State`] for a state of the wrong length.
+    /// [`SystemError::State`] for a state of the wrong length; [`SystemError::Constraints`] for a system that has some, whose motion
+    /// [`SystemInstance::build`] gives.
     pub fn exact_acceleration(&self, q: &[S], v: &[S]) -> Result<Vec<S>, SystemError> {
         self.check_lengths(q, v)?;
         if self.constraints().is_some() {
-            let problem = "states of a system with constraints are not drawn; its motion is what `lnn rollout` gives";
-            let system = self.system.name.to_string();
+            let (system, problem) =
+                (self.system.name.to_string(), "under constraints no acceleration has a closed form");
             return Err(SystemError::Constraints { system, problem: problem.to_string() });
         }
         Ok(match &self.system.described {

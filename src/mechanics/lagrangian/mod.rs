@@ -35,9 +35,13 @@ pub use configure::configure;
 pub use configure::{build, configure_system, configure_values};
 use constrained_systems::constrained_descriptions;
 pub use constrained_systems::constrained_systems;
-pub use constraints::{Constrained, ConstraintError, Constraints, ExpressionConstraints};
+pub use constraints::{
+    Constrained, ConstraintError, Constraints, ExpressionConstraints, FormulaConstraints, FormulaError,
+};
 #[doc(hidden)]
-pub use constraints::{LeastNorm, LeastNormMotion, Manifold, ManifoldRows, OffManifold, ReducedMass, project};
+pub use constraints::{
+    LeastNorm, LeastNormMotion, Manifold, ManifoldRows, OffManifold, ReducedMass, project, project_acceleration,
+};
 pub(crate) use description::pair;
 pub use description::{Description, DescriptionError};
 #[cfg(feature = "training")]

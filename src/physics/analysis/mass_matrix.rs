@@ -1,7 +1,7 @@
 //! The learned mass matrix, or metric, against the exact one.
 
 use super::summary::ErrorDistribution;
-use crate::lagrangian::{EulerLagrange, Request, Terms};
+use crate::lagrangian::{EulerLagrange, Manifold, ManifoldRows, ReducedMass, Request, Terms};
 use crate::linalg::dot;
 use crate::scalar::{Real, Scalar};
 use serde::{Deserialize, Serialize};
@@ -51,14 +51,49 @@ pub fn mass_matrix_error<S: Scalar>(
     q: &[S],
 ) -> MassMatrixError {
     let size = exact.coordinates() * exact.coordinates();
-    let (exact, learned) = (matrices_at_rest(exact, q), matrices_at_rest(learned, q));
+    compare(size, &matrices_at_rest(exact, q), &matrices_at_rest(learned, q))
+}
+
+/// Compares the matrices within the directions that the constraints leave, at states `q`, `v`, `(states, n)`.
+pub fn mass_matrix_error_within(
+    manifold: &dyn Manifold<f64>,
+    (exact, learned): (&dyn EulerLagrange<f64>, &dyn EulerLagrange<f64>),
+    (q, v): (&[f64], &[f64]),
+) -> MassMatrixError {
+    let n = exact.coordinates();
+    let matrices = |model: &dyn EulerLagrange<f64>| {
+        let mut terms = Terms::default();
+        // Failures of single states leave matrices that are not finite.
+        let _ = model.terms(q, v, Request::MASS_MATRIX, &mut terms);
+        terms.mass_matrix
+    };
+    let (exact, learned) = (matrices(exact), matrices(learned));
+    let (mut rows, mut size) = (ManifoldRows::default(), 0);
+    let mut within: [Vec<f64>; 2] = Default::default();
+    let states = q.chunks_exact(n).zip(v.chunks_exact(n));
+    for ((q, v), (a, b)) in states.zip(exact.chunks_exact(n * n).zip(learned.chunks_exact(n * n))) {
+        manifold.rows(q, v, &mut rows);
+        // One basis for both.
+        let [a, b] = [a, b].map(|matrix| ReducedMass::of(n, matrix, &rows.matrix).map(|reduced| reduced.matrix));
+        let most = a.as_ref().map_or(0, Vec::len);
+        size = size.max(most);
+        for (matrices, found) in within.iter_mut().zip([a, b]) {
+            let found = found.ok().filter(|found| found.len() == size);
+            matrices.extend(found.unwrap_or_else(|| vec![f64::NAN; size]));
+        }
+    }
+    compare(size.max(1), &within[0], &within[1])
+}
+
+/// Compares matrices of `size` numbers.
+fn compare(size: usize, exact: &[f64], learned: &[f64]) -> MassMatrixError {
     let states = exact.len().max(learned.len()) / size;
-    let factor = nearest_factor(size, &exact, &learned);
+    let factor = nearest_factor(size, exact, learned);
     let error = |(a, b): (&[f64], &[f64])| {
         let difference: Vec<f64> = a.iter().zip(b).map(|(a, b)| factor * b - a).collect();
         (dot(&difference, &difference) / dot(a, a)).sqrt()
     };
-    let errors: Vec<f64> = pairs(size, &exact, &learned).map(error).collect();
+    let errors: Vec<f64> = pairs(size, exact, learned).map(error).collect();
     let failed = states - errors.len();
     MassMatrixError { factor, error: ErrorDistribution::of(errors, failed) }
 }

@@ -66,7 +66,7 @@ pub(crate) use instability::training_instability;
 #[doc(hidden)]
 pub use lyapunov::REGULAR;
 pub use lyapunov::{Lyapunov, lyapunov};
-pub use mass_matrix::{MassMatrixError, mass_matrix_error};
+pub use mass_matrix::{MassMatrixError, mass_matrix_error, mass_matrix_error_within};
 pub(crate) use mass_matrix::{matrices_at_rest, nearest_factor};
 #[doc(hidden)]
 pub use portrait::Portrait;

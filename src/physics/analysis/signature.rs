@@ -1,11 +1,12 @@
 //! Signs of mass matrices: learned against exact.
 
-use crate::lagrangian::{EulerLagrange, Request, Terms};
+use crate::lagrangian::{EulerLagrange, ReducedMass, Request, Terms};
 use crate::linalg::{Inertia, inertia};
 use crate::scalar::{Real, Scalar};
 
 /// Fraction of the states `q`, `v`, both `(states, n)`, whose learned mass matrix has not the inertia (numbers of
-/// positive, zero and negative eigenvalues) of the exact one; matrices that are not finite count as wrong.
+/// positive, zero and negative eigenvalues) of the exact one; matrices that are not finite count as wrong. Under constraints those count
+/// within the directions that are left.
 ///
 /// A learned Lagrangian is free up to a factor, also a negative one: the sign of all matrices together is chosen so that
 /// fewer are wrong. 0 for no states.
@@ -32,9 +33,17 @@ fn inertias<S: Scalar>(model: &dyn EulerLagrange<S>, q: &[S], v: &[S]) -> Vec<Op
     let n = model.coordinates();
     let mut terms = Terms::default();
     // Failures of single states leave matrices that are not finite.
-    let _ = model.terms(q, v, Request::MASS_MATRIX, &mut terms);
-    let mut scratch = vec![<S as Real>::zero(); n * n];
-    terms.mass_matrix.chunks_exact(n * n).map(|matrix| inertia(n, matrix, &mut scratch).ok()).collect()
+    let _ = model.terms(q, v, Request::MASS_MATRIX | Request::CONSTRAINTS, &mut terms);
+    let (mut scratch, m) = (vec![<S as Real>::zero(); n * n], terms.constraints);
+    let of_state = |(k, matrix): (usize, &[S])| match m {
+        0 => inertia(n, matrix, &mut scratch).ok(),
+        _ => {
+            let rows = terms.constraint_matrix.get(k * m * n..(k + 1) * m * n)?;
+            let within = ReducedMass::of(n, matrix, rows).ok()?.matrix;
+            inertia(within.len().isqrt(), &within, &mut scratch).ok()
+        }
+    };
+    terms.mass_matrix.chunks_exact(n * n).enumerate().map(of_state).collect()
 }
 
 #[cfg(test)]

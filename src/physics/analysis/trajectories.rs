@@ -4,7 +4,7 @@ use super::{
     CoordinateError, EnergyError, Lyapunov, Statistics, ValidTime, coordinate_error, energy_drift, energy_error,
     lyapunov, relative_error, spread, statistics, valid_time, velocity_error,
 };
-use crate::lagrangian::{EulerLagrange, SystemError, SystemInstance};
+use crate::lagrangian::{EulerLagrange, SystemError, SystemInstance, project};
 use crate::random::RngStream;
 use crate::rollout::{Domain, Integrable, Method, Options, Rollout, RolloutError, Trajectory, rollout_many};
 use crate::scalar::Scalar;
@@ -157,7 +157,8 @@ impl<S: Integrable> TrajectoryTest<S> {
         self.run_from(&self.bounds.starts::<S>(self.starts, self.seed), exact, learned)
     }
 
-    /// The same from the random starts of the box put on the mass shell of `system`, if it has one.
+    /// The same from the random starts of the box put on the mass shell of `system`, or brought to the constraints of its exact motion;
+    /// a start without a way there has motions that say so.
     ///
     /// # Errors
     /// [`SystemError::State`] if box and system differ in the number of coordinates.
@@ -170,6 +171,9 @@ impl<S: Integrable> TrajectoryTest<S> {
         let mut starts = self.bounds.starts::<S>(self.starts, self.seed);
         for (q, v) in &mut starts {
             system.impose_constraint(q, v)?;
+            if let Some(manifold) = exact.manifold() {
+                let _ = project(manifold, q, v);
+            }
         }
         Ok(self.run_from(&starts, exact, learned))
     }

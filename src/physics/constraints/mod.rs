@@ -91,6 +91,15 @@ pub struct FoundConstraints {
     pub noise: Vec<f64>,
 }
 
+impl FoundConstraints {
+    /// Formulas of the constraints of the system by name, as a table `[constraints]` has them; what each trajectory conserves by itself
+    /// is none.
+    pub fn formulas(&self) -> BTreeMap<String, String> {
+        let of_system = self.constraints.iter().filter(|found| found.kind != ConstraintKind::PerTrajectory);
+        of_system.enumerate().map(|(k, found)| (format!("found {}", k + 1), found.formula.clone())).collect()
+    }
+}
+
 /// Why nothing can be looked for.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
@@ -148,17 +157,15 @@ pub fn find_constraints(
         Vec::new()
     };
     let Search { generators, .. } = generators::search(samples, &of_velocities, false, samples.shared());
+    let by_functions = held.bases.clone();
     let moving = held.take(samples, &of_velocities, generators, true);
+    let rows: Vec<&[f64]> = moving.iter().map(|generator| generator.weights.as_slice()).collect();
+    let integrable = integrable(&of_velocities, samples, &rows, (&held, by_functions));
     let mut constraints = Vec::new();
     for (kind, found) in [(ConstraintKind::Holonomic, &functions), (ConstraintKind::PerTrajectory, &conserved)] {
         constraints.extend(found.iter().map(|generator| generator.described(&of_positions, kind)));
     }
-    for generator in &moving {
-        let places = held.places.iter().zip(&held.bases);
-        let turns: Vec<f64> =
-            places.map(|(&at, rows)| curl(&of_velocities, samples, at, &generator.weights, rows)).collect();
-        let turn = (turns.iter().map(|x| x * x).sum::<f64>() / turns.len() as f64).sqrt();
-        let integrable = turn < CURL && !of_velocities.has_rate(&generator.weights);
+    for (generator, integrable) in moving.iter().zip(integrable) {
         let kind = if integrable { ConstraintKind::PerTrajectory } else { ConstraintKind::Nonholonomic };
         constraints.push(generator.described(&of_velocities, kind));
     }
@@ -219,13 +226,7 @@ impl Held {
                 self.refuted += 1;
                 continue;
             }
-            for (basis, row) in self.bases.iter_mut().zip(&rows) {
-                let rest = beside(basis, row);
-                let size = dot(&rest, &rest).sqrt();
-                if size > 0.0 {
-                    basis.extend(rest.iter().map(|x| x / size));
-                }
-            }
+            self.bases.iter_mut().zip(&rows).for_each(|(basis, row)| extend(basis, row));
             taken.push(generator);
         }
         taken
@@ -256,6 +257,47 @@ fn beside(basis: &[f64], vector: &[f64]) -> Vec<f64> {
 /// An orthonormal basis of the directions that rows leave.
 fn kernel(n: usize, rows: &[f64]) -> Vec<f64> {
     ReducedMass::of(n, &vec![0.0; n * n], rows).map(|reduced| reduced.basis).unwrap_or_default()
+}
+
+/// Which of the rows have functions behind them, beside those that hold the motion by `by_functions`: of the rows whose curl vanishes in
+/// the directions that all of them leave those whose curl vanishes in the directions that they alone leave, and so on. A disk that rolls has
+/// a row of the first kind, its way along its heading, and none of the second.
+fn integrable(
+    features: &Features,
+    samples: &MotionSamples,
+    rows: &[&[f64]],
+    (held, by_functions): (&Held, Vec<Vec<f64>>),
+) -> Vec<bool> {
+    let (mut left, mut bases) = (vec![true; rows.len()], held.bases.clone());
+    loop {
+        let mut lost = false;
+        for (weights, left) in rows.iter().zip(&mut left).filter(|(_, left)| **left) {
+            let places = held.places.iter().zip(&bases);
+            let turns: Vec<f64> = places.map(|(&at, rows)| curl(features, samples, at, weights, rows)).collect();
+            let turn = (turns.iter().map(|x| x * x).sum::<f64>() / turns.len() as f64).sqrt();
+            if turn >= CURL || features.has_rate(weights) {
+                (*left, lost) = (false, true);
+            }
+        }
+        if !lost {
+            return left;
+        }
+        bases.clone_from(&by_functions);
+        for (weights, _) in rows.iter().zip(&left).filter(|(_, left)| **left) {
+            for (&at, basis) in held.places.iter().zip(&mut bases) {
+                extend(basis, &features.velocity_row(samples, at, weights));
+            }
+        }
+    }
+}
+
+/// Adds what a vector is beside orthonormal rows to them.
+fn extend(basis: &mut Vec<f64>, vector: &[f64]) {
+    let rest = beside(basis, vector);
+    let size = dot(&rest, &rest).sqrt();
+    if size > 0.0 {
+        basis.extend(rest.iter().map(|x| x / size));
+    }
 }
 
 /// Size of the curl of a row within the directions that the rows leave, over that of its derivatives: 0 where a function stands behind it

@@ -75,24 +75,25 @@ fn rods_are_found_at_any_noise_with_their_lengths() {
     }
 }
 
+/// A disk of radius 0.5 that turns and rolls at rates of its own.
+fn rolling_disk(rng: &mut ChaCha8Rng) -> Path {
+    let [x, y, heading, turn, speed]: [f64; 5] = [0; 5].map(|_| 4.0 * rng.random::<f64>() - 2.0);
+    let turn = turn + 0.3 * turn.signum();
+    Box::new(move |t| {
+        let theta = heading + turn * t;
+        let (s, c) = theta.sin_cos();
+        let (s0, c0) = heading.sin_cos();
+        let path = 0.5 * speed / turn;
+        let q = vec![x + path * (s - s0), y - path * (c - c0), theta, speed * t];
+        (q, vec![0.5 * speed * c, 0.5 * speed * s, turn, speed])
+    })
+}
+
 #[test]
 fn rolling_is_nonholonomic_and_what_it_conserves_is_not_imposed() {
-    // A disk of radius 0.5 that turns and rolls at rates of its own.
-    let mut roll = |rng: &mut ChaCha8Rng| -> Path {
-        let [x, y, heading, turn, speed]: [f64; 5] = [0; 5].map(|_| 4.0 * rng.random::<f64>() - 2.0);
-        let turn = turn + 0.3 * turn.signum();
-        Box::new(move |t| {
-            let theta = heading + turn * t;
-            let (s, c) = theta.sin_cos();
-            let (s0, c0) = heading.sin_cos();
-            let path = 0.5 * speed / turn;
-            let q = vec![x + path * (s - s0), y - path * (c - c0), theta, speed * t];
-            (q, vec![0.5 * speed * c, 0.5 * speed * s, turn, speed])
-        })
-    };
     for noise in [0.0, 0.001] {
         let names = ["x", "y", "theta", "phi"];
-        let recording = recorded(&names, &[false, false, true, true], noise, true, &mut roll);
+        let recording = recorded(&names, &[false, false, true, true], noise, true, &mut |rng| rolling_disk(rng));
         let found = found(&recording);
         let kinds: Vec<ConstraintKind> = found.constraints.iter().map(|c| c.kind).collect();
         assert_eq!((found.count, kinds), (2, vec![ConstraintKind::Nonholonomic; 2]), "{noise}: {found:?}");
@@ -115,6 +116,30 @@ fn rolling_is_nonholonomic_and_what_it_conserves_is_not_imposed() {
     assert_eq!(found.constraints[0].kind, ConstraintKind::PerTrajectory);
     let radius = &found.constraints[0].coefficients;
     assert!(radius.len() == 2 && (radius["x^2"] / radius["y^2"] - 1.0).abs() < 1e-3, "{found:?}");
+}
+
+/// The way of a rolling disk along its heading has no curl in the directions that both rows leave, and is no function all the same.
+#[test]
+fn a_row_beside_others_is_integrable_by_itself_or_not_at_all() {
+    let names = ["x", "y", "theta", "phi"];
+    let recording = recorded(&names, &[false, false, true, true], 0.0, true, &mut |rng| rolling_disk(rng));
+    let samples = MotionSamples::of(&recording, &SmoothOptions::default()).unwrap();
+    let features = Features::of_velocities(&samples, 1);
+    let row = |terms: &[(&str, f64)]| {
+        let weight = |name: &str| terms.iter().find(|(term, _)| *term == name).map_or(0.0, |(_, weight)| *weight);
+        (0..features.len()).map(|term| weight(features.text(term))).collect::<Vec<f64>>()
+    };
+    let along = row(&[("cos(theta)*x_dot", 1.0), ("sin(theta)*y_dot", 1.0), ("phi_dot", -0.5)]);
+    let across = row(&[("sin(theta)*x_dot", 1.0), ("cos(theta)*y_dot", -1.0)]);
+    let mut held = Held::at(&samples, PLACES);
+    let none = held.bases.clone();
+    for weights in [&along, &across] {
+        assert_eq!(weights.iter().filter(|weight| **weight != 0.0).count(), if weights == &along { 3 } else { 2 });
+        for (&at, basis) in held.places.iter().zip(&mut held.bases) {
+            extend(basis, &features.velocity_row(&samples, at, weights));
+        }
+    }
+    assert_eq!(integrable(&features, &samples, &[along.as_slice(), across.as_slice()], (&held, none)), [false; 2]);
 }
 
 #[test]

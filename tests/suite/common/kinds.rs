@@ -64,6 +64,7 @@ fn black_box() -> Header {
         parameters: BTreeMap::new(),
         columns: ["theta", "x", "y", "theta_dot", "x_dot", "y_dot"].map(String::from).to_vec(),
         forces: Vec::new(),
+        constraints: BTreeMap::new(),
         precision: StoredPrecision::F64,
         position: vec![[-10.0, 10.0]; 3],
         velocity: vec![[-10.0, 10.0]; 3],
@@ -107,6 +108,19 @@ pub fn kinds() -> Vec<(String, ModelFile<f64>)> {
     add("a described system", &|h| {
         h.description = Some(description(&h.system));
         h.parameters = BTreeMap::from([("mass".to_string(), 2.0)]);
+    });
+    let formulas = |all: &[(&str, &str)]| -> BTreeMap<String, String> {
+        all.iter().map(|(name, formula)| (name.to_string(), formula.to_string())).collect()
+    };
+    add("constraints", &|h| {
+        h.constraints = formulas(&[("rod", "x^2 + x*y - 1"), ("rolling", "x_dot - 0.5*theta_dot*cos(theta) - 1")]);
+    });
+    add("constraints of a described system", &|h| {
+        let constraints = formulas(&[("rod", "(x^2 + y^2)/mass - 1")]);
+        let mut system = description(&h.system);
+        system.constraints = constraints;
+        h.description = Some(system);
+        h.parameters = BTreeMap::from([("mass".to_string(), 2.5)]);
     });
     let radial = || vec![Radial { coordinates: vec![2, 1], unit: 1.25 }];
     for (kind, structure, factor, time_like) in [

@@ -153,6 +153,7 @@ pub fn model() -> ModelFile<f32> {
         parameters: ["m1", "m2", "l1", "l2"].map(|s| (s.to_string(), 1.0)).into_iter().collect::<BTreeMap<_, _>>(),
         columns: ["theta1", "theta2", "theta1_dot", "theta2_dot"].map(String::from).to_vec(),
         forces: Vec::new(),
+        constraints: BTreeMap::new(),
         description: None,
         precision: StoredPrecision::F32,
         position: vec![[0.0, 6.0]; 2],

@@ -55,8 +55,140 @@ fn a_file_with_constraints_moves_on_them() {
     lnn(&["symmetries", "--system", &file]).refused(2, &["constraints"]);
     let listed = lnn(&["systems", "--system", &file, "--json"]);
     assert_eq!(json(&listed.stdout)["constraints"]["rod"], "x^2 + y^2 - l^2");
-    let learned = lnn(&["train", &file, "--out", &text(&folder.path("run"))]);
-    assert!(learned.stderr.contains("constraints") && !folder.path("run/model.safetensors").exists());
+}
+
+/// Choices of a training that takes a moment.
+const SMALL: [&str; 6] = ["--hidden", "6", "--epochs", "2", "--threads", "2"];
+
+/// States of a model's file that are off the rod of 1 m, by a roll-out from one that is on it.
+fn off_the_rod(folder: &Folder, model: &str) -> f64 {
+    let out = text(&folder.path("learned.csv"));
+    let roll = ["rollout", model, "--state", "0.6,-0.8,0,0", "--t-end", "0.2", "--dt", "0.02", "--beyond-range"];
+    lnn(&[&roll[..], &["--out", &out, "--overwrite"]].concat()).succeeded();
+    let rows = columns(&fs::read_to_string(&out).unwrap());
+    assert_eq!(rows.len(), 11);
+    rows.iter().map(|row| (row[1].hypot(row[2]) - 1.0).abs()).fold(0.0, f64::max)
+}
+
+#[test]
+fn a_system_with_constraints_is_learned_on_them() {
+    let folder = Folder::new();
+    let file = folder.file("my.toml", PENDULUM);
+    let run = text(&folder.path("run"));
+    let few = ["--set", "data.training=256", "--set", "data.validation=64", "--set", "data.test=64"];
+    let train = |system: &str, run: &str, more: &[&str]| {
+        lnn(&[&["train", system, "--out", run, "--overwrite"], &SMALL[..], &few, more].concat())
+    };
+    train(&file, &run, &["--param", "l=1"]).succeeded();
+    assert!(off_the_rod(&folder, &run) < 1e-12);
+    let summary = json(&fs::read_to_string(folder.path("run/summary.json")).unwrap());
+    // All states are on the constraints, where the mass matrix of one degree of freedom has one sign, and every one has an acceleration.
+    assert_eq!(
+        (&summary["test_states_left_out"], summary["accelerations"].as_array().unwrap().len()),
+        (&Value::from(0), 2)
+    );
+    for picture in ["constraint_forces.svg", "constraint_drift.svg", "constrained_motion_x_y.svg"] {
+        assert!(folder.path("run").join(picture).exists(), "{picture}");
+    }
+    // Terms of the learned model have forces of constraint, and the same command says what holds it.
+    let states = folder.file("states.csv", "x,y,x_dot,y_dot\n0,-1,3,0\n");
+    let terms = lnn(&["inspect", "--model", &run, "--states", &states]);
+    terms.succeeded();
+    assert_eq!(json(&terms.stdout)["constraint_force"].as_array().unwrap().len(), 2);
+    let said = lnn(&["constraints", &run, "--json"]);
+    said.succeeded();
+    assert_eq!(json(&said.stdout)["constraints"][0]["formula"], "x^2 + y^2 - l^2");
+    lnn(&["evaluate", &run, "--starts", "1", "--until", "0.5"]).succeeded();
+    // What knows free coordinates only says so, and so does a second set of constraints.
+    lnn(&["symmetries", &run]).refused(2, &["constraints"]);
+    lnn(&["certify", &run]).refused(2, &["constraints"]);
+    lnn(&["page", &run, "--out", &text(&folder.path("page.html"))]).refused(2, &["constraints"]);
+    let roll = ["rollout", &run, "--state", "0.6,-0.8,0,0", "--t-end", "1", "--dt", "0.1", "--constraints", &file];
+    lnn(&[&roll[..], &["--out", &text(&folder.path("two.csv"))]].concat()).refused(2, &["constraints of its own"]);
+    // One of the catalogue: formulas are kept with the model.
+    let top = text(&folder.path("top"));
+    train("rigid-body", &top, &["--structure", "mechanical"]).succeeded();
+    let said = lnn(&["constraints", &top, "--json"]);
+    assert_eq!(json(&said.stdout)["count"], 6);
+    // Bounds of which no state comes to the constraint.
+    let far = PENDULUM.replace("rod = \"x^2 + y^2 - l^2\"", "rod = \"x^2 + y^2 + l^2\"");
+    train(&folder.file("far.toml", far), &run, &[]).refused(2, &["contradicts"]);
+}
+
+#[test]
+fn recorded_motion_is_learned_under_constraints_that_were_found_or_given() {
+    let folder = Folder::new();
+    let file = folder.file("my.toml", PENDULUM);
+    // Eight swings and turns of a pendulum of 1 m.
+    let tracks: Vec<String> = (0..8)
+        .map(|k| {
+            let (sin, cos) = (0.8 * f64::from(k)).sin_cos();
+            let rate = 0.7 * f64::from(k) - 2.0;
+            let state = format!("{sin},{},{},{}", -cos, rate * cos, rate * sin);
+            let out = text(&folder.path(&format!("track{k}.csv")));
+            let roll =
+                ["rollout", "--system", &file, "--state", &state, "--t-end", "1.5", "--dt", "0.01", "--out", &out];
+            lnn(&roll).succeeded();
+            out
+        })
+        .collect();
+    let tracks: Vec<&str> = tracks.iter().map(String::as_str).collect();
+    let run = text(&folder.path("run"));
+    let fit = |more: &[&str]| {
+        let columns = ["--coords", "x,y", "--time", "t", "--structure", "mechanical", "--out", &run, "--overwrite"];
+        lnn(&[&["fit"], &tracks[..], &columns, &SMALL, more].concat())
+    };
+    let found = fit(&["--constraints", "find"]);
+    found.succeeded();
+    let summary = json(&fs::read_to_string(folder.path("run/summary.json")).unwrap());
+    let constraints = &summary["constraints"];
+    assert_eq!((&constraints["found"], constraints["formulas"].as_object().unwrap().len()), (&Value::from(true), 1));
+    assert!(constraints["distance"].as_f64().unwrap() < 1e-5, "{constraints}");
+    assert!(summary["validation_loss"].as_f64().unwrap().is_finite());
+    // Predictions of held-out motion were made on the rod, none was given up.
+    assert_eq!(summary["model"][0]["missing"], 0);
+    assert!(off_the_rod(&folder, &run) < 1e-6);
+    for picture in ["constraint_forces.svg", "constraint_drift.svg", "constrained_motion_x_y.svg"] {
+        assert!(folder.path("run").join(picture).exists(), "{picture}");
+    }
+    let said = lnn(&["constraints", &run, "--json"]);
+    said.succeeded();
+    let formula = json(&said.stdout)["constraints"][0]["formula"].as_str().unwrap().to_string();
+    assert!(formula.contains("x^2") && formula.contains("y^2"), "{formula}");
+    // Beside a system with constraints of its own, each keeps its own.
+    lnn(&["evaluate", &run, "--system", &file, "--starts", "1", "--until", "0.5"]).succeeded();
+    // A fit that goes on has the same constraints: its configuration says how they came.
+    let config = fs::read_to_string(folder.path("run/config.toml")).unwrap();
+    assert!(config.contains("constraints = \"find\""), "{config}");
+
+    // Given by a file, of which a run keeps the formulas; one of two that say the same is left out.
+    let rods = folder.file("rods.toml", "[constraints]\nrod = \"x^2 + y^2 - 1\"\nsame = \"sqrt(x^2 + y^2) - 1\"\n");
+    let given = fit(&["--constraints", &rods]);
+    given.succeeded();
+    assert!(given.stderr.contains("`same` follows from the others"), "{}", given.stderr);
+    let summary = json(&fs::read_to_string(folder.path("run/summary.json")).unwrap());
+    assert_eq!(summary["constraints"]["formulas"]["rod"], "x^2 + y^2 - 1");
+    assert_eq!(summary["constraints"]["found"], false);
+    assert!(off_the_rod(&folder, &run) < 1e-12);
+    let config = fs::read_to_string(folder.path("run/config.toml")).unwrap();
+    assert!(config.contains("[constraints]") && config.contains("rod = \"x^2 + y^2 - 1\""), "{config}");
+    // Without constraints nothing is said of them.
+    fit(&["--constraints", "none"]).succeeded();
+    let summary = json(&fs::read_to_string(folder.path("run/summary.json")).unwrap());
+    assert!(summary.get("constraints").is_none());
+
+    // What the motion does not obey, mistakes, contradictions, no motion left, and shooting are refused.
+    let table = |formulas: &str| folder.file("wrong.toml", format!("[constraints]\n{formulas}\n"));
+    for (formulas, parts) in [
+        ("rod = \"x^2 + y^2 - 2\"", "does not obey"),
+        ("rod = \"x^2 + z\"", "constraints.rod"),
+        ("rod = \"x^2 + y^2 - 1\"\nline = \"x - 3\"", "contradicts"),
+        ("rod = \"x^2 + y^2 - 1\"\nline = \"y - 2*x\"", "leave no motion"),
+    ] {
+        fit(&["--constraints", &table(formulas)]).refused(2, &[parts]);
+    }
+    fit(&["--constraints", "find", "--targets", "motion"]).refused(2, &["multiple shooting"]);
+    fit(&["--constraints", "nowhere.toml"]).refused(1, &["nowhere.toml"]);
 }
 
 #[test]

@@ -34,6 +34,7 @@ fn flat_network(folder: &Folder) -> String {
         parameters: [("M".to_string(), 1.0)].into(),
         columns,
         forces: Vec::new(),
+        constraints: [].into(),
         description: None,
         precision: StoredPrecision::F64,
         position: vec![[-40.0, 40.0]; 4],

@@ -2,11 +2,12 @@
 
 use lnn::configuration::Penalty;
 use lnn::data::{Dataset, DatasetError};
-use lnn::lagrangian::{EulerLagrange, configure, project};
+use lnn::lagrangian::{EulerLagrange, FormulaConstraints, configure, project};
+use lnn::network::file::ModelFile;
 use lnn::network::{
     ActivationChoice, Architecture, Form, Initialization, InputLayer, NetworkLagrangian, Structure, initial_weights,
 };
-use lnn::presets::Trainer;
+use lnn::presets::{Trainer, TrainerError};
 use lnn::scalar::{Dd, Real, Scalar};
 use lnn::training::Objective;
 use rand::{Rng, SeedableRng};
@@ -41,11 +42,18 @@ fn random_data<S: Scalar>(n: usize, m: usize, states: usize) -> Dataset<S> {
 /// within the constraints.
 #[test]
 fn the_gradient_goes_through_the_multipliers() {
-    for (n, m, alpha, penalty) in
-        [(3, 1, 0.4, Penalty::None), (4, 2, 0.4, Penalty::None), (3, 1, -0.3, Penalty::Eigenvalue { lambda: 0.7 })]
-    {
-        let architecture = architecture(n, alpha);
-        let data = random_data::<Dd>(n, m, 7);
+    for (n, m, alpha, penalty, driven) in [
+        (3, 1, 0.4, Penalty::None, false),
+        (4, 2, 0.4, Penalty::None, false),
+        (3, 1, -0.3, Penalty::Eigenvalue { lambda: 0.7 }, false),
+        // With friction and known forces.
+        (3, 1, 0.4, Penalty::None, true),
+    ] {
+        let architecture = Architecture { dissipation: driven.then_some(2), ..architecture(n, alpha) };
+        let mut data = random_data::<Dd>(n, m, 7);
+        if driven {
+            data = data.with_forces((0..7 * n).map(|k| Dd::of((k as f64).sin())).collect()).unwrap();
+        }
         let rows: Vec<u32> = (0..7).collect();
         let mut rng = ChaCha8Rng::seed_from_u64(2);
         let weights: Vec<Dd> = initial_weights(&architecture, Initialization::Default, &mut rng);
@@ -120,4 +128,51 @@ fn rows_of_another_shape_are_refused() {
     let report = objective.step(&weights, &data, &[0, 1], &mut gradient);
     assert!(report.left_out == 1 && report.loss.is_finite() && gradient.iter().all(|x| x.is_finite()));
     let _ = NetworkLagrangian::new(architecture, weights).unwrap().coordinates();
+}
+
+/// States, velocities and accelerations that noise took off their constraints come back to them.
+#[test]
+fn recorded_states_are_brought_to_their_constraints() {
+    let formulas = [("rod".to_string(), "x^2 + y^2 - 1".to_string())].into();
+    let rod = FormulaConstraints::new(&["x", "y"], formulas).unwrap();
+    let data = Dataset::new(2, vec![1.1, 0.0, 0.0, -0.9], vec![0.1, 2.0, 1.0, 0.0], vec![-3.0, 1.0, 0.0, 0.5]).unwrap();
+    let (data, distance) = data.brought_to(&rod.manifold::<f64>().unwrap()).unwrap();
+    assert!((distance - 0.1).abs() < 1e-12 && data.constraints() == 1);
+    for (k, exact) in [[1.0, 0.0, 0.0, 2.0, -4.0, 1.0], [0.0, -1.0, 1.0, 0.0, 0.0, 1.0]].into_iter().enumerate() {
+        let at = 2 * k..2 * k + 2;
+        let found = [&data.q()[at.clone()], &data.v()[at.clone()], &data.a()[at]].concat();
+        assert!(found.iter().zip(exact).all(|(a, b)| (a - b).abs() < 1e-12), "{found:?}");
+    }
+    let nowhere = [("rod".to_string(), "x^2 + y^2 + 1".to_string())].into();
+    let nowhere = FormulaConstraints::new(&["x", "y"], nowhere).unwrap();
+    let refused = data.brought_to(&nowhere.manifold::<f64>().unwrap());
+    assert!(matches!(refused, Err(DatasetError::Unreachable { row: 0, constraint }) if constraint == "rod"));
+}
+
+#[test]
+fn a_trainer_keeps_the_constraints_with_its_model() {
+    let chain = configure::<f64>("cartesian-chain-1", &[]).unwrap().build().unwrap();
+    let (mut q, mut v) = (Vec::new(), Vec::new());
+    for k in 0..200 {
+        let (sin, cos) = (0.37 * f64::from(k)).sin_cos();
+        let rate = 4.0 * (0.61 * f64::from(k)).sin();
+        q.extend([sin, -cos]);
+        v.extend([rate * cos, rate * sin]);
+    }
+    let a = chain.acceleration(&q, &v).unwrap();
+    let data = Dataset::new(2, q, v, a).unwrap();
+    let trainer =
+        || Trainer::new(&data).coordinates(&["x", "y"]).structure(Structure::Mechanical).hidden(&[6]).epochs(2);
+    let learned = trainer().constraints(&[("rod", "x^2 + y^2 - 1"), ("same", "2*x^2 + 2*y^2 - 2")]).train().unwrap();
+    let motion = learned.motion().unwrap();
+    assert_eq!(motion.manifold().unwrap().names(), ["rod"]);
+    let a = motion.acceleration(&[0.6, -0.8], &[0.8, 0.6]).unwrap();
+    // On a circle of radius 1 at speed 1.
+    assert!((0.6 * a[0] - 0.8 * a[1] + 1.0).abs() < 1e-12, "{a:?}");
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("model.safetensors");
+    learned.save(&path).unwrap();
+    let header = ModelFile::<f64>::load(&path).unwrap().header;
+    assert_eq!(header.constraints["rod"], "x^2 + y^2 - 1");
+    assert!(matches!(trainer().constraints(&[("rod", "x^2 + z")]).train(), Err(TrainerError::Constraints(_))));
 }

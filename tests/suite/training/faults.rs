@@ -40,6 +40,7 @@ fn model(value: f64) -> ModelFile<f64> {
         parameters: [("m".to_string(), 1.0)].into(),
         columns: vec!["x".to_string(), "x_dot".to_string()],
         forces: Vec::new(),
+        constraints: [].into(),
         description: None,
         precision: StoredPrecision::F64,
         position: vec![[-1.0, 1.0]],

@@ -42,6 +42,12 @@ impl ExpressionConstraints {
         Self::compiled((coordinates.len(), parameters.len()), formulas.iter().copied(), &mut compiler, &scope)
     }
 
+    /// The same without the constraints of these names.
+    pub(super) fn without(&self, names: &[String]) -> Self {
+        let rows = self.rows.iter().filter(|row| !names.contains(&row.name)).cloned().collect();
+        Self { rows: Arc::new(rows), ..self.clone() }
+    }
+
     /// Formulas whose names mean what `scope` says.
     pub(in crate::mechanics::lagrangian) fn compiled<'a>(
         (coordinates, parameters): (usize, usize),

@@ -13,6 +13,7 @@
 
 mod constrained;
 mod described;
+mod formulas;
 mod kkt;
 mod least_norm;
 mod manifold;
@@ -24,10 +25,11 @@ mod tests;
 
 pub use constrained::{Constrained, ConstraintError};
 pub use described::ExpressionConstraints;
+pub use formulas::{FormulaConstraints, FormulaError};
 pub(super) use kkt::{Motion, accelerate};
 pub use least_norm::{LeastNorm, LeastNormMotion};
 pub use manifold::{Manifold, ManifoldRows};
-pub use projection::{OffManifold, project};
+pub use projection::{OffManifold, project, project_acceleration};
 pub use reduced::ReducedMass;
 
 use crate::scalar::Real;

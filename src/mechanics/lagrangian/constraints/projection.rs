@@ -61,6 +61,17 @@ pub fn project<S: Scalar>(manifold: &dyn Manifold<S>, q: &mut [S], v: &mut [S]) 
     Ok([moved(&before[0], q), moved(&before[1], v)])
 }
 
+/// Brings an acceleration at a state on the constraints to `A a = -gamma` by the least change.
+pub fn project_acceleration<S: Scalar>(manifold: &dyn Manifold<S>, q: &[S], v: &[S], a: &mut [S]) {
+    let mut rows = ManifoldRows::default();
+    manifold.rows(q, v, &mut rows);
+    let along = rows.matrix.chunks_exact(q.len()).map(|row| dot(row, a));
+    let defects: Vec<S> = along.zip(&rows.drift).map(|(along, &drift)| along + drift).collect();
+    let all: Vec<usize> = (0..defects.len()).collect();
+    let change = least_change(q.len(), &rows, &all, &defects);
+    a.iter_mut().zip(&change).for_each(|(a, &change)| *a -= change);
+}
+
 /// The shortest `x` with `A x = defects` for some of the rows, as near to it as can be where they depend on each other.
 fn least_change<S: Scalar>(n: usize, rows: &ManifoldRows<S>, of: &[usize], defects: &[S]) -> Vec<S> {
     let unit: Vec<(Vec<S>, S)> = of.iter().map(|&row| at_unit_length(n, rows, row, defects)).collect();

@@ -2,7 +2,8 @@
 
 use super::header::MAX_COORDINATES;
 use super::*;
-use crate::network::{ActivationChoice, Form, InputLayer};
+use crate::lagrangian::EulerLagrange;
+use crate::network::{ActivationChoice, Form, InputLayer, NetworkLagrangian};
 use crate::storage::container::{MAX_HEADER, checksum_field};
 use proptest::prelude::*;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
@@ -29,6 +30,7 @@ fn header(hidden: Vec<usize>, embed_periodic: bool, precision: StoredPrecision) 
         parameters: BTreeMap::from([("m".to_string(), 1.0), ("g".to_string(), 9.81)]),
         columns: ["theta", "r", "theta_dot", "r_dot"].map(String::from).to_vec(),
         forces: Vec::new(),
+        constraints: BTreeMap::new(),
         description: None,
         precision,
         position: vec![[0.0, std::f64::consts::TAU], [0.5, 1.5]],
@@ -380,4 +382,23 @@ fn names_of_forces_are_kept_and_counted() {
     assert!(driven.validate().is_ok());
     let one = Header { forces: vec!["tau1".to_string()], ..plain };
     assert!(one.validate().unwrap_err().to_string().contains("forces: expected one name per coordinate"));
+}
+
+#[test]
+fn constraints_of_a_header_hold_its_motion() {
+    let mut plain = header(vec![3], true, StoredPrecision::F64);
+    plain.constraints = BTreeMap::from([("rod".to_string(), "r - 1".to_string())]);
+    let weights: Vec<f64> = (0..Layout::new(&plain.architecture).parameters).map(|k| (k as f64).sin()).collect();
+    let file = ModelFile { header: plain.clone(), weights };
+    let back = ModelFile::<f64>::from_bytes(&file.to_bytes().unwrap()).unwrap();
+    assert_eq!((&back.header, back.header.is_constrained()), (&file.header, true));
+    let network = NetworkLagrangian::new(back.header.architecture.clone(), back.weights).unwrap();
+    let motion = back.header.constrain::<f64>(Box::new(network)).unwrap();
+    let a = motion.acceleration(&[0.3, 1.0], &[0.2, 0.0]).unwrap();
+    assert!(a[0] != 0.0 && a[1].abs() < 1e-14, "{a:?}");
+    for (name, formula) in [("rod", "r - x"), ("rod", "r_dot^2"), ("", "r - 1")] {
+        let constraints = BTreeMap::from([(name.to_string(), formula.to_string())]);
+        let wrong = Header { constraints, ..plain.clone() };
+        assert!(matches!(wrong.validate(), Err(ModelFileError::Header(text)) if text.starts_with("constraints")));
+    }
 }

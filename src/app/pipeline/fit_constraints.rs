@@ -1,0 +1,108 @@
+//! Constraints of a fit: found in the motion that is learned from, or given.
+
+use crate::constraints::{ConstraintSearch, MotionSamples, find_constraints};
+use crate::data::{Dataset, RecordingSplit};
+use crate::lagrangian::FormulaConstraints;
+use crate::names::{pluralize, rounded};
+use crate::pipeline::PipelineError;
+use crate::pipeline::fit_config::{FitConstraints, FitOptions};
+use crate::recording::smooth::Smoothed;
+
+/// Distance of smoothed positions from their constraints, root mean square, in standard deviations of the noise and over the size of the
+/// positions, up to which the motion is said to obey them.
+const OBEDIENCE: (f64, f64) = (5.0, 0.01);
+
+/// Constraints that hold recorded motion.
+#[derive(Debug)]
+pub(crate) struct FitHeld {
+    pub constraints: FormulaConstraints,
+    /// `true` if they were found.
+    pub found: bool,
+    /// Distance of the smoothed positions that are learned from, root mean square.
+    pub distance: f64,
+}
+
+impl FitHeld {
+    /// The constraints that the options ask for, those of them that are independent, if there are any; and remarks.
+    ///
+    /// # Errors
+    /// [`PipelineError::Constraints`].
+    pub fn new(options: &FitOptions, measured: &RecordingSplit) -> Result<(Option<Self>, Vec<String>), PipelineError> {
+        let recording = &measured.training.recording;
+        let mut remarks = Vec::new();
+        let (formulas, found) = match &options.constraints {
+            FitConstraints::None => return Ok((None, remarks)),
+            FitConstraints::Formulas(formulas) => (formulas.clone(), false),
+            FitConstraints::Find => {
+                let samples = MotionSamples::of(recording, &options.preparation().smoothing)?;
+                let found =
+                    find_constraints(&samples, ConstraintSearch::default()).map_err(PipelineError::constraints)?;
+                let on = pluralize(found.trajectories, "trajectory", "trajectories");
+                let formulas = found.formulas();
+                remarks.push(match formulas.len() {
+                    0 => format!("no constraints were found on {on}: every coordinate is learned as free"),
+                    count => {
+                        let all: Vec<String> = formulas.values().map(|formula| format!("{formula} = 0")).collect();
+                        format!("{} found on {on}: {}", pluralize(count, "constraint", "constraints"), all.join("; "))
+                    }
+                });
+                if found.trajectories == 1 && !formulas.is_empty() {
+                    remarks.push(
+                        "one trajectory does not tell what is imposed from what its motion conserves".to_string(),
+                    );
+                }
+                if formulas.is_empty() {
+                    return Ok((None, remarks));
+                }
+                (formulas, true)
+            }
+        };
+        let constraints =
+            FormulaConstraints::new(&recording.coordinates, formulas).map_err(PipelineError::constraints)?;
+        let every =
+            measured.training.states.iter().map(|states| states.times.len()).sum::<usize>().div_ceil(STATES).max(1);
+        let n = recording.n();
+        let some = |of: fn(&Smoothed) -> &Vec<f64>| -> Vec<f64> {
+            let rows = measured.training.states.iter().flat_map(|states| of(states).chunks_exact(n));
+            rows.step_by(every).flatten().copied().collect()
+        };
+        let (q, v) = (some(|states| &states.q), some(|states| &states.v));
+        let (constraints, redundant) = constraints.independent(&q, &v).map_err(PipelineError::constraints)?;
+        remarks.extend(
+            redundant.iter().map(|name| format!("the constraint `{name}` follows from the others and is left out")),
+        );
+        Ok((Some(Self { constraints, found, distance: f64::NAN }), remarks))
+    }
+
+    /// States brought to the constraints, and how far their positions were away, root mean square.
+    ///
+    /// # Errors
+    /// [`PipelineError::Constraints`] for a state from which no way leads there.
+    pub fn bring(&self, set: Dataset<f64>) -> Result<(Dataset<f64>, f64), PipelineError> {
+        let manifold = self.constraints.manifold().map_err(PipelineError::constraints)?;
+        set.brought_to(&manifold).map_err(PipelineError::constraints)
+    }
+
+    /// Takes the distance of recorded states, and refuses constraints from which they are further away than by their noise, `(n)`.
+    ///
+    /// # Errors
+    /// [`PipelineError::Constraints`].
+    pub fn require_obedience(&mut self, set: Dataset<f64>, noise: &[f64]) -> Result<(), PipelineError> {
+        let square = |values: &[f64]| values.iter().map(|x| x * x).sum::<f64>();
+        let size = (square(set.q()) / set.len() as f64).sqrt();
+        let (_, distance) = self.bring(set)?;
+        self.distance = distance;
+        let allowed = f64::max(OBEDIENCE.0 * square(noise).sqrt(), OBEDIENCE.1 * size);
+        if distance <= allowed {
+            return Ok(());
+        }
+        let [distance, size] = [distance, size].map(|x| rounded(x, 3));
+        let problem = "the recorded motion does not obey them: its positions are";
+        Err(PipelineError::constraints(format_args!(
+            "constraints: {problem} {distance} away, root mean square, at a size of {size}"
+        )))
+    }
+}
+
+/// States at which constraints are compared with each other.
+const STATES: usize = 24;
