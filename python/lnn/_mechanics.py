@@ -477,7 +477,7 @@ class Model(Mechanics):
         return self.file.to_torch(dtype)
 
     def page(self, path: str | os.PathLike) -> None:
-        """Writes a page to play with: one HTML file that computes the motion, the exact one beside if it is known."""
+        """Writes an interactive page: one HTML file that computes the motion, the exact one beside if it is known."""
         Path(path).write_text(self._subject.page(), encoding="utf-8")
 
     def evaluate(

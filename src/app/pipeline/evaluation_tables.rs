@@ -33,7 +33,7 @@ struct Summary<'a> {
 }
 
 impl Evaluation {
-    /// Writes `evaluation.json`, `report.html`, a page to play with and pictures, and returns the first; `name` is that of the model's file,
+    /// Writes `evaluation.json`, `report.html`, an interactive page and pictures, and returns the first; `name` is that of the model's file,
     /// `seed` that of the starts.
     ///
     /// # Errors

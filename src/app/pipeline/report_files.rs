@@ -35,7 +35,7 @@ pub(crate) fn write_report_and_figures<'a>(
     figures.into_iter().try_for_each(|figure| output.write(&figure.file, figure.picture.to_svg().as_bytes()))
 }
 
-/// Writes the page on which a model is played with, and adds a link to it; of a model that has none the report says why.
+/// Writes the interactive page of a model, and adds a link to it; of a model that has none the report says why.
 ///
 /// # Errors
 /// [`PipelineError::Output`].
@@ -51,7 +51,7 @@ pub(crate) fn write_page(
             let beside = if system.is_some() { ", beside the exact system" } else { "" };
             Ok(report.link(PLAY, &format!("Play with the model: drag it and let it go{beside}")))
         }
-        Err(problem) => Ok(report.paragraph(&format!("This model has no page to play with: {problem}."))),
+        Err(problem) => Ok(report.paragraph(&format!("This model has no interactive page: {problem}."))),
     }
 }
 
@@ -119,5 +119,29 @@ pub(crate) fn ended(stop: &StopReason) -> String {
         StopReason::Finished => "finished".to_string(),
         StopReason::Interrupted => "interrupted".to_string(),
         StopReason::Failed(error) => error.to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::network::Layout;
+    use crate::network::file::ModelFile;
+    use crate::pipeline::InMemory;
+
+    #[test]
+    fn a_report_links_to_the_page_of_a_model_or_says_why_there_is_none() {
+        let bytes = include_bytes!("../../../examples/data/double_pendulum.safetensors");
+        let shipped = ModelFile::<f64>::from_bytes(bytes).unwrap().header;
+        for (hidden, linked) in [(shipped.architecture.hidden.clone(), true), (vec![400, 400], false)] {
+            let mut header = shipped.clone();
+            header.architecture.hidden = hidden;
+            let weights = vec![0.01; Layout::new(&header.architecture).parameters];
+            let network = NetworkLagrangian::new(header.architecture.clone(), weights).unwrap();
+            let files = InMemory::default();
+            let report = write_page(&files, Report::new("a"), (&header, &network), None).unwrap().to_html();
+            assert_eq!((report.contains("href=\"play.html\""), files.get(PLAY).is_some()), (linked, linked));
+            assert_eq!(report.contains("500000"), !linked);
+        }
     }
 }

@@ -151,3 +151,18 @@ fn operations(listing: &Listing) -> Value {
     };
     json!({ "operations": listing.operations.iter().map(one).collect::<Vec<_>>(), "result": listing.result })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::network::file::ModelFile;
+
+    #[test]
+    fn a_start_crosses_what_the_model_knows_in_the_time_of_its_fastest_coordinate() {
+        let bytes = include_bytes!("../../../examples/data/double_pendulum.safetensors");
+        let mut header = ModelFile::<f64>::from_bytes(bytes).unwrap().header;
+        header.position = vec![[0.0, 2.0], [0.0, 3.0]];
+        let time = |v: [f64; 2], time_like| crossing(&header, &(Vec::new(), v.to_vec()), time_like);
+        assert_eq!([time([0.5, -3.0], None), time([0.5, -3.0], Some(1)), time([0.0, 0.0], None)], [1.0, 4.0, 0.0]);
+    }
+}
