@@ -19,7 +19,9 @@ __version__ = "0.1.0"
 _WHERE = {
     **dict.fromkeys(["Model", "System", "systems"], "_mechanics"),
     **dict.fromkeys(["fit", "learn", "train"], "_learning"),
-    **dict.fromkeys(["Certificate", "Geometry", "Learned", "Symmetries", "Trajectory"], "_results"),
+    **dict.fromkeys(["find_constraints", "formula"], "_readings"),
+    **dict.fromkeys(["Certificate", "Constraint", "Constraints", "Formula", "Geometry"], "_results"),
+    **dict.fromkeys(["Learned", "OwnConstraints", "Symmetries", "Trajectory"], "_results"),
     "Terms": "reader",
     "LagrangianRegressor": "_regressor",
 }
@@ -28,8 +30,10 @@ __all__ = [*_WHERE]
 if TYPE_CHECKING:
     from ._learning import fit, learn, train
     from ._mechanics import Model, System, systems
+    from ._readings import find_constraints, formula
     from ._regressor import LagrangianRegressor
-    from ._results import Certificate, Geometry, Learned, Symmetries, Trajectory
+    from ._results import Certificate, Constraint, Constraints, Formula, Geometry, Learned, OwnConstraints, Symmetries
+    from ._results import Trajectory
     from .reader import Terms
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -50,6 +51,6 @@ def thread_count(given: int | None) -> int:
     return given
 
 
-def bounds_of(given: dict | None) -> list[tuple[str, float, float]]:
+def bounds_of(given: Mapping | None) -> list[tuple[str, float, float]]:
     """Bounds by column."""
     return [(name, float(low), float(high)) for name, (low, high) in (given or {}).items()]

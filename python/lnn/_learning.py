@@ -13,6 +13,7 @@ from . import _lnn
 from ._arrays import doubles, states, thread_count
 from ._mechanics import Model, System
 from ._progress import Progress, receiver
+from ._recorded import recorded
 from ._results import Learned
 
 
@@ -131,18 +132,16 @@ def learn(
     names = [f"q{i + 1}" for i in range(n)] if coordinates is None else list(coordinates)
     if len(names) != n:
         raise ValueError(f"coordinates: expected {n} names, found {len(names)}")
-    choices = _choices(names, angles, structure, hidden, epochs, precision, seed, threads, config)
-    choices = json.dumps({**choices, "dissipation": dissipation})
-    subject, history, validation, test = _lnn.learn(q, v, np.ascontiguousarray(a), choices)
+    choices = _choices(structure, hidden, epochs, precision, seed, threads, config) | {"dissipation": dissipation}
+    found = _lnn.learn(q, v, np.ascontiguousarray(a), (names, list(angles)), json.dumps(choices))
+    subject, history, validation, test = found
     summary = {"validation_loss": validation, "test_loss": test}
     text = f"loss (paper): validation {validation:.4g}, fresh states {test:.4g}\n"
     return Learned(Model(subject), _history(history), summary, text)
 
 
-def _choices(names, angles, structure, hidden, epochs, precision, seed, threads, config) -> dict:
+def _choices(structure, hidden, epochs, precision, seed, threads, config) -> dict:
     return {
-        "coordinates": list(names),
-        "angles": list(angles),
         "structure": structure,
         "hidden": None if hidden is None else [int(width) for width in hidden],
         "epochs": epochs,
@@ -203,69 +202,9 @@ def fit(
     config : dict, optional
         Any other choice by its path in the configuration of a fit: ``{"training.optimizer.batch": 64}``.
     """
-    files, tracks, columns = [], [], dict(columns or {})
-    if _is_path(data) or (isinstance(data, (list, tuple)) and data and all(map(_is_path, data))):
-        if coordinates is None:
-            raise TypeError("coordinates: expected the columns of the files")
-        files = [os.fspath(path) for path in ([data] if _is_path(data) else data)]
-        if trajectory is not None:
-            columns["trajectory"] = trajectory
-    else:
-        if hasattr(data, "columns") and hasattr(data, "loc"):
-            if coordinates is None:
-                raise TypeError("coordinates: expected the columns of the coordinates")
-            data, t, v, a, force = _of_frame(data, coordinates, trajectory, (t, v, a, force))
-        tracks, n = _tracks(data, t, dt, v, a, force)
-        coordinates = [f"q{i + 1}" for i in range(n)] if coordinates is None else list(coordinates)
-        if len(coordinates) != n:
-            raise ValueError(f"coordinates: expected {n} names, found {len(coordinates)}")
-    unknown = [name for name in angles if name not in coordinates]
-    if unknown:
-        raise ValueError(f"angles: {unknown[0]!r} is none of the coordinates {list(coordinates)}")
+    more = {"dt": dt, "t": t, "v": v, "a": a, "force": force, "trajectory": trajectory, "columns": columns}
+    motion = recorded(data, coordinates, angles, **more)
     config = {**_known(known, "training."), **(config or {})}
-    choices = _choices(coordinates, angles, structure, hidden, epochs, precision, seed, threads, config)
-    choices = json.dumps({**choices, "friction": friction, "columns": columns})
+    choices = _choices(structure, hidden, epochs, precision, seed, threads, config)
     directory = None if out is None else os.fspath(out)
-    return _learned(_lnn.fit(files, tracks, choices, directory, receiver(progress)))
-
-
-def _is_path(x) -> bool:
-    return isinstance(x, (str, os.PathLike))
-
-
-def _of_frame(frame, coordinates, trajectory, others):
-    """Lists of arrays, one per trajectory, of a DataFrame."""
-    time, *others = others
-    time = next((name for name in ("t", "time") if name in frame.columns), None) if time is None else time
-    if time is None:
-        raise ValueError("t: expected the column of the times, found none called t or time")
-    groups = [frame] if trajectory is None else [group for _, group in frame.groupby(trajectory, sort=False)]
-    of = lambda names: None if names is None else [group[list(names)].to_numpy(float) for group in groups]
-    return of(coordinates), [group[time].to_numpy(float) for group in groups], *map(of, others)
-
-
-def _tracks(data, t, dt, v, a, force):
-    """Trajectories as the library takes them, and the number of coordinates."""
-    several = isinstance(data, (list, tuple)) and len(data) > 0 and np.ndim(data[0]) == 2
-    arrays = list(data) if several else [data]
-    arrays = [doubles("data", x) for x in arrays]
-    for x in arrays:
-        if x.ndim not in (1, 2) or (x.ndim == 1 and several):
-            raise ValueError(f"data: expected arrays (samples, n), found the shape {x.shape}")
-    arrays = [x[:, None] if x.ndim == 1 else x for x in arrays]
-    n = arrays[0].shape[1]
-    if any(x.shape[1] != n for x in arrays):
-        raise ValueError("data: the trajectories have different numbers of coordinates")
-    beside = {"t": t, "v": v, "a": a, "force": force}
-    for name, given in beside.items():
-        given = given if several or given is None else [given]
-        if given is not None and len(given) != len(arrays):
-            raise ValueError(f"{name}: expected one array for each of {len(arrays)} trajectories, found {len(given)}")
-        beside[name] = [np.empty(0)] * len(arrays) if given is None else [doubles(name, x) for x in given]
-    if t is None:
-        if dt is None or not dt > 0:
-            raise ValueError("dt: expected the time between samples, or times `t`")
-        beside["t"] = [dt * np.arange(len(x)) for x in arrays]
-    flat = lambda x: np.ravel(x).tolist()
-    rows = zip(beside["t"], arrays, beside["v"], beside["a"], beside["force"])
-    return [(f"trajectory {k + 1}", *map(flat, row)) for k, row in enumerate(rows)], n
+    return _learned(_lnn.fit(motion, json.dumps({**choices, "friction": friction}), directory, receiver(progress)))

@@ -12,7 +12,7 @@ import numpy as np
 
 from . import _lnn
 from ._arrays import bounds_of, doubles, states, thread_count
-from ._results import Certificate, Geometry, Symmetries, Trajectory
+from ._results import Certificate, Formula, Geometry, OwnConstraints, Symmetries, Trajectory
 from .reader.functions import DescribedModel, Functions, Terms
 from .reader.model_file import ModelFile
 
@@ -200,6 +200,45 @@ class Mechanics:
         for name in "structure_constants", "singular_values":
             fields[name] = np.array(fields[name], float)
         return Symmetries(**fields)
+
+    def constraints(self, *, seed: int = 0) -> OwnConstraints:
+        """The constraints, and the directions that no equation moves.
+
+        Parameters
+        ----------
+        seed : int
+            Of the states at which the mass matrix is looked at.
+        """
+        found = json.loads(self._subject.constraints(seed))
+        of = lambda key: {constraint["name"]: constraint[key] for constraint in found["constraints"]}
+        return OwnConstraints(
+            formulas=of("formula"),
+            kinds=of("kind"),
+            redundant=tuple(found["redundant"]),
+            null_directions=np.array(found["null_directions"], float).reshape(-1, self._n),
+            signature=found["signature"] and tuple(found["signature"]),
+            states=found["states"],
+            open_states=found["open_states"],
+        )
+
+    def formula(
+        self,
+        *,
+        friction: bool = False,
+        basis: str | None = None,
+        functions: Sequence[str] = (),
+        gyroscopic: bool = True,
+        scale: tuple[str, float] | None = None,
+        seed: int = 0,
+        threads: int | None = None,
+        name: str = "formula",
+    ) -> Formula:
+        """The Lagrangian as a formula; arguments are those of `lnn.formula`."""
+        from ._readings import formula_choices, read_formula
+
+        # A model is asked, not resampled.
+        choices = formula_choices(basis, functions, gyroscopic, friction, None, scale, 1, seed, threads, name)
+        return read_formula(self._subject.formula(choices))
 
     def certify(
         self,
@@ -438,7 +477,7 @@ class Model(Mechanics):
         return self.file.to_torch(dtype)
 
     def page(self, path: str | os.PathLike) -> None:
-        """Writes a page to play with: one HTML file that computes the motion, the exact one beside if it is known."""
+        """Writes an interactive page: one HTML file that computes the motion, the exact one beside if it is known."""
         Path(path).write_text(self._subject.page(), encoding="utf-8")
 
     def evaluate(

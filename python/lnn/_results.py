@@ -8,7 +8,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
-    from ._mechanics import Model
+    from ._mechanics import Model, System
+
+
+def _axes(ax):
+    """The axes that are given, or new ones."""
+    if ax is not None:
+        return ax
+    import matplotlib.pyplot as plt
+
+    return plt.subplots()[1]
 
 
 @dataclass(frozen=True)
@@ -64,6 +73,21 @@ class Trajectory:
         state = state if state.ndim == 2 else state.reshape(-1, m, 2 * n + 1)
         names = [*self.columns, "energy"]
         return xr.Dataset({name: (dims, state[..., k]) for k, name in enumerate(names)}, {"t": self.t})
+
+    def plot(self, column: str | None = None, *, ax=None, **style):
+        """Draws one column over time, ``"energy"`` or by default the first coordinate, into `ax` or new axes of matplotlib, and returns these.
+
+        `style` goes to ``Axes.plot``.
+        """
+        column = column or self.columns[0]
+        names = [*self.columns, "energy"]
+        if column not in names:
+            raise ValueError(f"expected one of the columns {names}, found {column!r}")
+        state = np.concatenate([self.q, self.v, self.energy[..., None]], -1)[..., names.index(column)]
+        ax = _axes(ax)
+        ax.plot(self.t, state.reshape(-1, len(self.t)).T, **style)
+        ax.set(xlabel="t", ylabel=column)
+        return ax
 
 
 @dataclass(frozen=True)
@@ -135,6 +159,175 @@ class Symmetries:
     basis: str
     points: int
 
+    def plot(self, *, ax=None, **style):
+        """Draws the singular values, those of symmetries before the gap, into `ax` or new axes of matplotlib, and returns these."""
+        ax = _axes(ax)
+        ax.semilogy(np.arange(1, len(self.singular_values) + 1), np.sort(self.singular_values), "o", **style)
+        if self.count is not None:
+            ax.axvline(self.count + 0.5, color="gray", linestyle=":")
+        ax.set(xlabel="field", ylabel="singular value")
+        return ax
+
+
+@dataclass(frozen=True)
+class Constraint:
+    """A constraint that was found in motion.
+
+    Attributes
+    ----------
+    kind : str
+        ``"holonomic"``, ``"nonholonomic"``, or ``"per-trajectory"``: constant along each trajectory, conserved and not imposed.
+    formula : str
+        What vanishes, or is constant.
+    coefficients, range : dict of str to float, and to (low, high)
+        Factors of the terms, the leading one of the formula 1, and ranges of 95 % of them.
+    defect : float
+        Root of the mean square defect over what noise makes.
+    """
+
+    kind: str
+    formula: str
+    coefficients: dict[str, float]
+    range: dict[str, tuple[float, float]]
+    defect: float
+
+
+@dataclass(frozen=True)
+class Constraints:
+    """Constraints that were found in motion.
+
+    Attributes
+    ----------
+    count : int
+        Constraints of the system: holonomic and nonholonomic ones.
+    constraints : tuple of Constraint
+        All that was found.
+    gap : float or None
+        The next combination of coordinates varies by so many times as much.
+    trajectories, refuted : int
+        Trajectories, and candidates that did not hold on those that were left out.
+    noise : (n,)
+        Of each coordinate over its size: smaller deviations are not seen.
+    """
+
+    count: int
+    constraints: tuple[Constraint, ...]
+    gap: float | None
+    trajectories: int
+    refuted: int
+    noise: np.ndarray
+
+    @property
+    def formulas(self) -> dict[str, str]:
+        """Formulas of the constraints of the system, as `System` takes them under ``constraints``."""
+        of_system = [found.formula for found in self.constraints if found.kind != "per-trajectory"]
+        return {f"found {k + 1}": text for k, text in enumerate(of_system)}
+
+
+@dataclass(frozen=True)
+class OwnConstraints:
+    """Constraints of a system, and the directions that no equation moves.
+
+    Attributes
+    ----------
+    formulas : dict of str to str
+        Formulas of the constraints by name; empty texts where none is known.
+    kinds : dict of str to str
+        ``"holonomic"`` or ``"nonholonomic"``.
+    redundant : tuple of str
+        Constraints that follow from the others.
+    null_directions : (k, n)
+        Directions that no equation moves, at a state that has the most of them.
+    signature : (int, int) or None
+        Positive and negative eigenvalues of the mass matrix within the constraints.
+    states, open_states : int
+        States that were looked at, and those among them with such directions.
+    """
+
+    formulas: dict[str, str]
+    kinds: dict[str, str]
+    redundant: tuple[str, ...]
+    null_directions: np.ndarray
+    signature: tuple[int, int] | None
+    states: int
+    open_states: int
+
+
+@dataclass(frozen=True)
+class Formula:
+    """A Lagrangian as a formula, and a dissipation function if there is one; arrays have an entry for each term.
+
+    Attributes
+    ----------
+    verdict : str
+        ``"found"``, or ``"not in the library"``.
+    lagrangian, dissipation : str
+        L, and Rayleigh's function D, in the grammar of system files.
+    terms : tuple of str
+    coefficients, standard_errors, probabilities : (k,)
+        Probabilities are the shares of resamplings in which terms were chosen.
+    dissipative : (k,)
+        Which terms are those of D.
+    near : tuple of str or None
+        Simple fractions within the errors of the coefficients.
+    residual : float
+        What is left of held-out motion over its noise, or of the accelerations of a model over their size.
+    noise : (n,)
+        Of every coordinate; an upper bound if it is not `noise_resolved`.
+    left : tuple of (coordinate, low, high, residual, samples)
+        What is left over in parts of the ranges of coordinates.
+    searched, removed : int
+        Terms, and those among them that are total derivatives or sums of others.
+    coordinates : tuple of str
+    toml, rust : str
+        A system file, and a type of Rust, with this Lagrangian.
+    """
+
+    verdict: str
+    lagrangian: str
+    dissipation: str
+    terms: tuple[str, ...]
+    coefficients: np.ndarray
+    standard_errors: np.ndarray
+    probabilities: np.ndarray
+    dissipative: np.ndarray
+    near: tuple[str | None, ...]
+    residual: float
+    noise: np.ndarray
+    noise_resolved: bool
+    left: tuple[tuple[str, float, float, float, int], ...]
+    searched: int
+    removed: int
+    coordinates: tuple[str, ...]
+    toml: str = field(repr=False)
+    rust: str = field(repr=False)
+    _latex: tuple[str, str] = field(repr=False)
+
+    def latex(self, dissipation: bool = False) -> str:
+        """L, or D, in LaTeX."""
+        return self._latex[dissipation]
+
+    def sympy(self, dissipation: bool = False):
+        """L, or D, as an expression of SymPy in real symbols: ``x`` for a coordinate, ``x_dot`` for its velocity."""
+        from .reader.sympy_functions import expression
+
+        chosen = self.dissipative == dissipation
+        terms = zip(np.array(self.terms, object)[chosen], self.coefficients[chosen])
+        return expression([(float(coefficient), term) for term, coefficient in terms])
+
+    def system(self) -> System:
+        """The system with this Lagrangian, without the dissipation; its coefficients are parameters that a training may learn."""
+        from ._mechanics import System
+
+        return System.from_toml(self.toml)
+
+    def to_pandas(self):
+        """A DataFrame of the terms."""
+        import pandas as pd
+
+        names = ["coefficients", "standard_errors", "probabilities", "dissipative", "near"]
+        return pd.DataFrame({name: getattr(self, name) for name in names}, pd.Index(self.terms, name="term"))
+
 
 @dataclass(frozen=True)
 class Certificate:
@@ -191,3 +384,12 @@ class Learned:
     summary: dict
     text: str = field(repr=False)
     stop: str | None = None
+
+    def plot(self, *, ax=None, **style):
+        """Draws the losses over the epochs into `ax` or new axes of matplotlib, and returns these."""
+        ax = _axes(ax)
+        for name in "training_loss", "validation_loss":
+            ax.semilogy(self.history["epoch"], self.history[name], label=name.replace("_", " "), **style)
+        ax.set(xlabel="epoch", ylabel="loss")
+        ax.legend()
+        return ax

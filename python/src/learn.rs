@@ -2,6 +2,7 @@
 
 use crate::attend::attended;
 use crate::errors::{pipeline, runtime, value};
+use crate::recorded::{Motion, Source};
 use crate::subject::{Subject, slice, values};
 use lnn::configuration::{Config, Precision};
 use lnn::data::Dataset;
@@ -9,14 +10,12 @@ use lnn::network::Structure;
 use lnn::network::file::ModelFile;
 use lnn::pipeline::{Directory, Fit, FitConfig, InMemory, Output, PipelineError, RunOptions};
 use lnn::presets::{Preset, Trainer};
-use lnn::recording::{Columns, RecordedTrajectory, Recording};
 use lnn::training::{Epoch, StopReason};
 use numpy::PyReadonlyArray2;
 use pyo3::prelude::*;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
-use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
 
@@ -142,8 +141,6 @@ pub fn train(
 #[derive(serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Choices {
-    coordinates: Vec<String>,
-    angles: Vec<String>,
     structure: Option<Structure>,
     hidden: Option<Vec<usize>>,
     epochs: Option<usize>,
@@ -154,8 +151,6 @@ struct Choices {
     dissipation: Option<usize>,
     #[serde(default)]
     friction: bool,
-    #[serde(default)]
-    columns: BTreeMap<String, Value>,
     changes: Value,
 }
 
@@ -166,14 +161,15 @@ pub fn learn(
     q: PyReadonlyArray2<'_, f64>,
     v: PyReadonlyArray2<'_, f64>,
     a: PyReadonlyArray2<'_, f64>,
+    columns: (Vec<String>, Vec<String>),
     choices: &str,
 ) -> PyResult<(Subject, String, f64, f64)> {
     let choices: Choices = serde_json::from_str(choices).map_err(value)?;
+    let (names, angles) = columns;
     let owned = |array| slice(array).map(<[f64]>::to_vec);
-    let data = Dataset::new(choices.coordinates.len(), owned(&q)?, owned(&v)?, owned(&a)?).map_err(value)?;
-    let names: Vec<&str> = choices.coordinates.iter().map(String::as_str).collect();
-    let places: Option<Vec<usize>> =
-        choices.angles.iter().map(|angle| names.iter().position(|name| name == angle)).collect();
+    let data = Dataset::new(names.len(), owned(&q)?, owned(&v)?, owned(&a)?).map_err(value)?;
+    let names: Vec<&str> = names.iter().map(String::as_str).collect();
+    let places: Option<Vec<usize>> = angles.iter().map(|angle| names.iter().position(|name| name == angle)).collect();
     let places = places.ok_or_else(|| value("angles: expected names of coordinates"))?;
     let mut trainer = Trainer::new(&data).coordinates(&names).angles(&places);
     trainer = trainer.precision(choices.precision).seed(choices.seed).threads(choices.threads);
@@ -210,21 +206,17 @@ pub fn learn(
     Ok((Subject::learned(header, learned.model)?, result, learned.validation_loss, learned.test_loss))
 }
 
-/// One trajectory as Python gives it: name, times, positions, and velocities, accelerations and forces, empty if there are none.
-type Track = (String, Vec<f64>, Vec<f64>, Vec<f64>, Vec<f64>, Vec<f64>);
-
 /// Learns from recorded motion: files, or trajectories in memory.
 #[pyfunction]
 pub fn fit(
     py: Python<'_>,
-    files: Vec<PathBuf>,
-    tracks: Vec<Track>,
+    motion: Motion,
     choices: &str,
     out: Option<PathBuf>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Learned> {
     let choices: Choices = serde_json::from_str(choices).map_err(value)?;
-    let source = source(files, tracks, &choices)?;
+    let source = Source::of(motion)?;
     let refused: Arc<Mutex<Option<String>>> = Arc::default();
     let result = Arc::clone(&refused);
     let report = attended(py, progress.as_ref(), move |watch| task(source, choices, result, out).watch(watch).run())?;
@@ -235,44 +227,6 @@ pub fn fit(
     let (text, result, stop) = (report.text().to_string(), history(&report.history)?, ended(&report.stop));
     let json = report.json().to_string();
     Ok((Subject::learned(report.header, report.network)?, result, json, text, stop))
-}
-
-/// Origin of recorded motion.
-enum Source {
-    Files(Vec<PathBuf>, Columns),
-    Memory(Recording),
-}
-
-fn source(files: Vec<PathBuf>, tracks: Vec<Track>, choices: &Choices) -> PyResult<Source> {
-    if files.is_empty() {
-        let periodic = choices.coordinates.iter().map(|name| choices.angles.contains(name)).collect();
-        let track = |(name, times, q, v, a, force)| RecordedTrajectory { name, times, q, v, a, force };
-        let tracks: Vec<_> = tracks.into_iter().map(track).collect();
-        for track in &tracks {
-            track.validate(choices.coordinates.len()).map_err(value)?;
-        }
-        return Ok(Source::Memory(Recording { coordinates: choices.coordinates.clone(), periodic, tracks }));
-    }
-    let (coords, periodic) = (choices.coordinates.clone(), choices.angles.clone());
-    let mut columns = Columns { coords, periodic, ..Columns::default() };
-    for (key, given) in &choices.columns {
-        let bad = |_| value(format_args!("{key}: expected another value, found {given}"));
-        let given = given.clone();
-        match key.as_str() {
-            "velocities" => columns.velocity = serde_json::from_value(given).map_err(bad)?,
-            "accelerations" => columns.acceleration = serde_json::from_value(given).map_err(bad)?,
-            "forces" => columns.force = serde_json::from_value(given).map_err(bad)?,
-            "time" => columns.time = serde_json::from_value(given).map_err(bad)?,
-            "trajectory" => columns.trajectory = serde_json::from_value(given).map_err(bad)?,
-            "rate" => columns.rate = serde_json::from_value(given).map_err(bad)?,
-            "units" => {
-                let units: BTreeMap<String, String> = serde_json::from_value(given).map_err(bad)?;
-                columns.units = units.into_iter().collect();
-            }
-            _ => return Err(value(format_args!("columns: no such key, {key:?}"))),
-        }
-    }
-    Ok(Source::Files(files, columns))
 }
 
 /// The fit with its choices; a change that the configuration refuses is put into `refused`.

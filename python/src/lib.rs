@@ -4,6 +4,8 @@
 mod attend;
 mod errors;
 mod learn;
+mod readings;
+mod recorded;
 mod subject;
 
 use pyo3::prelude::*;
@@ -17,5 +19,7 @@ fn _lnn(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(learn::train, module)?)?;
     module.add_function(wrap_pyfunction!(learn::learn, module)?)?;
     module.add_function(wrap_pyfunction!(learn::fit, module)?)?;
+    module.add_function(wrap_pyfunction!(readings::constraints_of_motion, module)?)?;
+    module.add_function(wrap_pyfunction!(readings::formula, module)?)?;
     Ok(())
 }

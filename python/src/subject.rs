@@ -2,7 +2,10 @@
 
 use crate::attend::attended;
 use crate::errors::{pipeline, runtime, value};
+use crate::readings::{FormulaChoices, described};
 use lnn::certificate::{self, Certificate, Signature, certify_network, certify_system};
+use lnn::constraints::{EXAMINED_STATES, examine};
+use lnn::formula::{MODEL_STATES, formula_of_model};
 use lnn::geometry::geometries;
 use lnn::lagrangian::system::{Bounds, Size, System};
 use lnn::lagrangian::{
@@ -128,6 +131,33 @@ impl Subject {
             }
             Kind::Model(header, ..) => Region { position: header.position.clone(), velocity: header.velocity.clone() },
         }
+    }
+
+    /// The states of interest: those of a system on which errors are stated, the middle of those that a model learned from, all of one turn of an
+    /// angle.
+    fn interest(&self) -> Region {
+        let Region { position, velocity } = self.bounds();
+        if matches!(self.kind, Kind::System(..)) {
+            return Region { position, velocity };
+        }
+        let position = position.into_iter().zip(self.periodic());
+        Region {
+            position: position.map(|(range, angle)| if angle { range } else { middle(range) }).collect(),
+            velocity: velocity.into_iter().map(middle).collect(),
+        }
+    }
+
+    /// States of a region, on the mass shell and inside the domain of the system.
+    fn sampled(&self, region: &Region, count: usize, seed: u64) -> PyResult<(Vec<f64>, Vec<f64>)> {
+        let system = self.system_instance().ok();
+        let accept = |q: &[f64], v: &mut [f64]| {
+            system.iter().all(|s| s.check_domain(q).is_ok() && s.impose_constraint(q, v).is_ok())
+        };
+        let (q, v) = region.states(count, seed, accept);
+        if q.len() < count * self.n() {
+            return Err(value("region: nearly all of its states are outside the domain of the system"));
+        }
+        Ok((q, v))
     }
 
     fn periodic(&self) -> Vec<bool> {
@@ -420,31 +450,19 @@ impl Subject {
         tolerance: Option<f64>,
     ) -> PyResult<String> {
         let (n, exact, units) = (self.n(), matches!(self.kind, Kind::System(..)), self.units());
-        let (mut usual, periodic) = (self.bounds(), self.periodic());
-        if !exact {
-            // The middle of what the model knows.
-            let position = usual.position.into_iter().zip(&periodic);
-            usual.position = position.map(|(range, angle)| if *angle { range } else { middle(range) }).collect();
-            usual.velocity = usual.velocity.into_iter().map(middle).collect();
-        }
-        let region = self.region(usual, region)?;
+        let periodic = self.periodic();
+        let region = self.region(self.interest(), region)?;
         let charts: Vec<Chart> = (0..n).map(|i| Chart::of(periodic[i], &units[i], region.position[i])).collect();
         let degrees: Option<Degrees> = degrees.map(|text| text.parse().map_err(value)).transpose()?;
         let names = &self.columns[..n];
         let tried = bases(names, &charts, degrees, exact);
         let most = tried.iter().map(|(basis, _)| unknowns(n, basis.len())).max().unwrap_or(0);
         let points = points.unwrap_or(enough(most, exact)).min(most_states(n, most));
-        let system = self.system_instance().ok();
         let model = self.moving();
-        let (found, degrees) = py
-            .detach(|| {
-                let accept = |q: &[f64], v: &mut [f64]| {
-                    system.iter().all(|s| s.check_domain(q).is_ok() && s.impose_constraint(q, v).is_ok())
-                };
-                let (q, v) = region.states(points, seed, accept);
-                most_symmetries(model, tried, (&q, &v), (tolerance, exact))
-            })
-            .map_err(runtime)?;
+        let (found, degrees) = py.detach(|| {
+            let (q, v) = self.sampled(&region, points, seed)?;
+            most_symmetries(model, tried, (&q, &v), (tolerance, exact)).map_err(runtime)
+        })?;
         let closed = found.algebra.as_ref().filter(|algebra| algebra.closes);
         Ok(json!({
             "count": found.separation.count,
@@ -459,6 +477,29 @@ impl Subject {
             "points": found.states,
         })
         .to_string())
+    }
+
+    /// Its constraints, and the directions that no equation moves, as JSON.
+    fn constraints(&self, py: Python<'_>, seed: u64) -> PyResult<String> {
+        let system = self.system_instance().ok();
+        let description = system.as_ref().and_then(|system| system.system.description());
+        let formulas = description.map(|description| description.constraints.clone()).unwrap_or_default();
+        let found = py.detach(|| {
+            let (q, v) = self.sampled(&self.interest(), EXAMINED_STATES, seed)?;
+            Ok::<_, PyErr>(examine(self.moving(), &formulas, (&q, &v)))
+        })?;
+        serde_json::to_string(&found).map_err(runtime)
+    }
+
+    /// The Lagrangian as a formula, as JSON.
+    fn formula(&self, py: Python<'_>, choices: &str) -> PyResult<String> {
+        let (options, name) = FormulaChoices::read(choices)?;
+        let (names, periodic) = (&self.columns[..self.n()], self.periodic());
+        py.detach(|| {
+            let (q, v) = self.sampled(&self.interest(), MODEL_STATES, options.seed)?;
+            let found = formula_of_model(self.moving(), (names, &periodic), (&q, &v), &options).map_err(value)?;
+            Ok(described(&found, &name))
+        })
     }
 
     /// Where the mass matrix is proven to have its signature, as JSON.

@@ -1,9 +1,13 @@
 """Trainings and fits, as small as can be."""
 
+import importlib.util
+import multiprocessing
 import os
+import re
 import signal
 import threading
 import time
+from concurrent.futures import ProcessPoolExecutor
 
 import numpy as np
 import pytest
@@ -33,11 +37,36 @@ def test_a_system_is_learned(tmp_path):
     assert learned.summary["validation_loss"] == losses.min() and "loss" in learned.text
     assert {kind for kind, *_ in result} >= {"step", "epoch"}
     same = lnn.Model.load(tmp_path / "run")
-    assert same.to_bytes() == learned.model.to_bytes() and (tmp_path / "run/report.html").exists()
+    assert same.to_bytes() == learned.model.to_bytes()
+    report, page = (tmp_path / "run/report.html").read_text(), (tmp_path / "run/play.html").read_text()
+    assert re.search('<a href="play.html">', report) and "<canvas" in page and len(page) < 500_000
     again = lnn.train("harmonic-oscillator", **{**SMALL, "epochs": 20, "threads": 2}, starts=1, config=STATES)
     assert again.model.to_bytes() == learned.model.to_bytes()
     other = lnn.train("harmonic-oscillator", **SMALL, seed=1, starts=1, config=STATES)
     assert other.model.to_bytes() != learned.model.to_bytes()
+
+
+def test_seeds_are_swept_in_other_processes():
+    """Under `spawn`, joblib and Dask: systems go there, results come back, and they are those of this process."""
+    system, choices = lnn.System("harmonic-oscillator"), {**SMALL, "starts": 1, "config": STATES}
+    here = [lnn.train(system, seed=seed, **choices) for seed in range(2)]
+    same = lambda there: all(
+        a.model.to_bytes() == b.model.to_bytes()
+        and a.history.keys() == b.history.keys()
+        and a.summary["accelerations"] == b.summary["accelerations"]
+        for a, b in zip(here, there, strict=True)
+    )
+    with ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("spawn")) as pool:
+        assert same([run.result() for run in [pool.submit(lnn.train, system, seed=seed, **choices) for seed in range(2)]])
+    if importlib.util.find_spec("joblib"):
+        from joblib import Parallel, delayed
+
+        assert same(Parallel(n_jobs=2)(delayed(lnn.train)(system, seed=seed, **choices) for seed in range(2)))
+    if importlib.util.find_spec("dask"):
+        import dask
+
+        tasks = [dask.delayed(lnn.train)(system, seed=seed, **choices) for seed in range(2)]
+        assert same(dask.compute(*tasks, scheduler="processes", num_workers=2))
 
 
 def test_a_system_of_ones_own_is_learned():
@@ -121,6 +150,14 @@ def test_recorded_motion_is_fitted():
     again = lnn.fit(tracks, coordinates=["angle"], angles=["angle"], t=times, **SMALL)
     assert again.model.to_bytes() == fitted.model.to_bytes()
     assert lnn.fit(swing(0.3, 900), dt=0.02, friction=True, **SMALL).model.header["architecture"]["dissipation"] == 16
+
+
+def test_angles_that_jump_by_a_turn_are_fitted_as_they_go_on():
+    turning = 0.05 * np.arange(400)[:, None] + swing(0.3)
+    choices = {"coordinates": ["angle"], "angles": ["angle"], "dt": 0.02, **SMALL}
+    states = np.array([[0.1], [0.2]]), np.ones((2, 1))
+    found = [lnn.fit([q, q[:300]], **choices).model.acceleration(*states) for q in (turning, turning % (2 * np.pi))]
+    assert np.allclose(*found, rtol=1e-4, atol=1e-6)
 
 
 def test_tables_and_files_are_fitted(tmp_path):

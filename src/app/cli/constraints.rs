@@ -6,9 +6,10 @@ use crate::cli::probe::Probe;
 use crate::cli::recording_args::RecordingArgs;
 use crate::cli::{CliError, config, output};
 use crate::constraints::{
-    ConstraintKind, ConstraintSearch, FoundConstraint, FoundConstraints, MotionSamples, find_constraints,
+    ConstraintKind, ConstraintSearch, EXAMINED_STATES, ExaminedLagrangian, FoundConstraint, FoundConstraints,
+    MOST_DEGREE, MotionSamples, OwnConstraint, examine, find_constraints,
 };
-use crate::lagrangian::{EulerLagrange, FormulaConstraints, ReducedMass, Request, Terms};
+use crate::lagrangian::{EulerLagrange, FormulaConstraints};
 use crate::names::{percent, pluralize, rounded};
 use crate::recording::smooth::SmoothOptions;
 use crate::report::text_table;
@@ -18,13 +19,6 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
-
-/// States at which a Lagrangian is examined.
-const STATES: usize = 64;
-/// An eigenvalue of a mass matrix within its constraints below so many roundings of the largest counts as zero.
-const ROUNDINGS: f64 = 1024.0;
-/// Largest degree of the terms.
-const MOST_DEGREE: usize = 8;
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
@@ -71,31 +65,13 @@ struct Table {
     constraints: BTreeMap<String, String>,
 }
 
-/// What there is to say of a Lagrangian.
+/// What there is to say of a system or a model, as JSON.
 #[derive(Serialize)]
-struct Examined {
-    system: String,
-    count: usize,
-    constraints: Vec<Known>,
+struct Examined<'a> {
+    system: &'a str,
     gap: Option<f64>,
-    /// Constraints that follow from the others.
-    redundant: Vec<String>,
-    /// Directions that no equation moves, at the most states.
-    open: usize,
-    /// States that were looked at, and those among them with open directions.
-    states: usize,
-    open_states: usize,
-    /// These directions at the first such state.
-    null_directions: Vec<Vec<f64>>,
-    signature: Option<[usize; 2]>,
-}
-
-/// A constraint of a system.
-#[derive(Serialize)]
-struct Known {
-    kind: ConstraintKind,
-    name: String,
-    formula: String,
+    #[serde(flatten)]
+    examined: &'a ExaminedLagrangian,
 }
 
 /// Looks and says what it found.
@@ -106,7 +82,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     if let ([one], []) = (args.recording.data.as_slice(), args.recording.coords.as_slice())
         && !one.extension().is_some_and(|end| DATA.iter().any(|known| end.eq_ignore_ascii_case(known)))
     {
-        return examine(&one.to_string_lossy(), args);
+        return examined(&one.to_string_lossy(), args);
     }
     if args.recording.coords.is_empty() {
         return Err(CliError::usage("--coords: expected the columns of the coordinates of recorded motion"));
@@ -183,60 +159,15 @@ fn text(found: &FoundConstraints, coordinates: &[String]) -> String {
 }
 
 /// What a system or a model says of its constraints and of its degeneracy.
-fn examine(name: &str, args: &Args) -> Result<(), CliError> {
+fn examined(name: &str, args: &Args) -> Result<(), CliError> {
     if args.out.is_some() {
         return Err(CliError::usage(
             "--out: the constraints of a system stand in its own file; expected recorded motion",
         ));
     }
     let probe = Probe::with_constraints(name)?;
-    let model = probe.model.as_ref();
-    let (q, v) = probe.states(STATES, 0)?;
-    let n = model.coordinates();
-    let formulas = &probe.constraints;
-    let mut terms = Terms::default();
-    let mut examined = Examined {
-        system: probe.name.clone(),
-        count: 0,
-        constraints: Vec::new(),
-        gap: None,
-        redundant: model.manifold().map_or(Vec::new(), |manifold| manifold.redundant().to_vec()),
-        open: 0,
-        states: 0,
-        open_states: 0,
-        null_directions: Vec::new(),
-        signature: None,
-    };
-    if let Some(manifold) = model.manifold() {
-        examined.constraints = (0..manifold.names().len())
-            .map(|row| {
-                let (name, holonomic) = (manifold.names()[row].clone(), manifold.is_holonomic(row));
-                let kind = if holonomic { ConstraintKind::Holonomic } else { ConstraintKind::Nonholonomic };
-                let formula = formulas.get(&name).cloned().unwrap_or_default();
-                Known { kind, name, formula }
-            })
-            .collect();
-        examined.count = examined.constraints.len();
-    }
-    for (q, v) in q.chunks_exact(n).zip(v.chunks_exact(n)) {
-        let (mut q, mut v) = (q.to_vec(), v.to_vec());
-        if model.manifold().is_some_and(|manifold| crate::lagrangian::project(manifold, &mut q, &mut v).is_err()) {
-            continue;
-        }
-        if model.terms(&q, &v, Request::MASS_MATRIX | Request::CONSTRAINTS, &mut terms).is_err() {
-            continue;
-        }
-        let Ok(reduced) = ReducedMass::of(n, &terms.mass_matrix, &terms.constraint_matrix) else { continue };
-        examined.states += 1;
-        let open = reduced.null_directions(ROUNDINGS);
-        examined.open_states += usize::from(!open.is_empty());
-        if open.len() > examined.open {
-            examined.open = open.len();
-            examined.null_directions = open.into_iter().map(<[f64]>::to_vec).collect();
-        }
-        let negative = reduced.eigenvalues.iter().filter(|w| **w < 0.0).count();
-        examined.signature.get_or_insert([reduced.eigenvalues.len() - negative, negative]);
-    }
+    let (q, v) = probe.states(EXAMINED_STATES, 0)?;
+    let examined = examine(probe.model.as_ref(), &probe.constraints, (&q, &v));
     if examined.states == 0 {
         return Err(CliError::data(format_args!(
             "{}: the mass matrix is finite at none of the states of interest",
@@ -244,11 +175,12 @@ fn examine(name: &str, args: &Args) -> Result<(), CliError> {
         )));
     }
     if args.json {
-        let text = serde_json::to_string(&examined).map_err(CliError::data)?;
+        let json = Examined { system: &probe.name, gap: None, examined: &examined };
+        let text = serde_json::to_string(&json).map_err(CliError::data)?;
         return output::print(&format!("{text}\n"));
     }
-    let mut text = format!("{}: {}\n", examined.system, pluralize(examined.count, "constraint", "constraints"));
-    for Known { name, formula, .. } in &examined.constraints {
+    let mut text = format!("{}: {}\n", probe.name, pluralize(examined.count, "constraint", "constraints"));
+    for OwnConstraint { name, formula, .. } in &examined.constraints {
         let _ = writeln!(text, "  {name:<12} {formula} = 0");
     }
     for name in &examined.redundant {

@@ -105,7 +105,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         evaluation => evaluation?,
     };
     let model = args.model.display().to_string();
-    let json = evaluation.write(&system, (&model, learned.header.validation_loss), seed, &folder)?;
+    let json = evaluation.write(&system, (&model, &learned.header, &learned.network), seed, &folder)?;
     if args.json {
         output::print(&json)?;
     } else {

@@ -5,18 +5,14 @@ use crate::cli::probe::Probe;
 use crate::cli::recording_args::RecordingArgs;
 use crate::cli::{CliError, output, parse_system};
 use crate::formula::{
-    Families, FormulaError, FormulaOptions, FoundFormula, Verdict, formula_of_model, formula_of_motion,
+    Families, FormulaError, FormulaOptions, FoundFormula, MODEL_STATES, MOST_BOOTSTRAPS, Verdict, formula_of_model,
+    formula_of_motion,
 };
 use crate::names::rounded;
 use crate::report::text_table;
 use crate::storage::{check_target, write_atomically};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
-
-/// Resamplings at most.
-const MOST_BOOTSTRAPS: usize = 10_000;
-/// States at which a model is asked.
-const STATES: usize = 1500;
 
 /// Arguments.
 #[derive(Clone, Debug, clap::Args)]
@@ -219,7 +215,7 @@ fn of_model(args: &Args, path: &Path) -> Result<FoundFormula, CliError> {
         return Err(CliError::usage(format_args!("{option} is about recorded motion, {} is a model", path.display())));
     }
     let probe = Probe::model(path)?;
-    let (q, v) = probe.states(STATES, args.seed)?;
+    let (q, v) = probe.states(MODEL_STATES, args.seed)?;
     let chart = (probe.coordinates(), probe.periodic());
     formula_of_model(probe.model.as_ref(), chart, (&q, &v), &args.options()).map_err(refused)
 }

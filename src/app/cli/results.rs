@@ -3,7 +3,7 @@
 use crate::cli::CliError;
 use crate::cli::files::{holds_something, same_file};
 use crate::cli::resume::{command, has_checkpoint};
-use crate::pipeline::{CAPTIONS, MODEL, PipelineError};
+use crate::pipeline::{CAPTIONS, MODEL, PLAY, PipelineError};
 use crate::storage::{Disk, Files, read_regular};
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -12,8 +12,8 @@ use std::path::{Path, PathBuf};
 
 /// Files that only trainings and fits write.
 const LEARNED: [&str; 5] = [MODEL, "config.toml", "history.csv", "shooting.csv", "summary.json"];
-/// Files that evaluations write; trainings and fits have the last two as well.
-const EVALUATED: [&str; 3] = ["evaluation.json", "report.html", CAPTIONS];
+/// Files that evaluations write; trainings and fits have the last three as well.
+const EVALUATED: [&str; 4] = ["evaluation.json", "report.html", CAPTIONS, PLAY];
 /// Longest file that is read to say what is there, in bytes.
 const MAX_BYTES: u64 = 1 << 26;
 
@@ -195,7 +195,7 @@ mod tests {
     fn stale_files_go_and_others_stay() {
         let directory = tempfile::tempdir().unwrap();
         let folder = Folder::open(directory.path()).unwrap();
-        let run = [MODEL, "config.toml", "history.csv", "summary.json", "report.html", "old.svg", "notes.txt"];
+        let run = [MODEL, "config.toml", "history.csv", "summary.json", "report.html", PLAY, "old.svg", "notes.txt"];
         run.iter().for_each(|name| fs::write(folder.file(name), "{}").unwrap());
         fs::write(folder.file(CAPTIONS), r#"{"old.svg": "x"}"#).unwrap();
         for name in ["evaluation", "evaluation-2", "evaluation-x"] {

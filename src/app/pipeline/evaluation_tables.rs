@@ -3,8 +3,10 @@
 use crate::analysis::{MassMatrixError, Statistics};
 use crate::lagrangian::SystemInstance;
 use crate::names::{WIDTH, number, percentage, rounded, wrap_text};
+use crate::network::NetworkLagrangian;
+use crate::network::file::Header;
 use crate::pipeline::evaluation::Evaluation;
-use crate::pipeline::report_files::{parameter_table, write_report_and_figures};
+use crate::pipeline::report_files::{parameter_table, write_page, write_report_and_figures};
 use crate::pipeline::{Output, PipelineError, headline};
 use crate::report::{Figure, Report, text_table};
 use serde::Serialize;
@@ -31,25 +33,27 @@ struct Summary<'a> {
 }
 
 impl Evaluation {
-    /// Writes `evaluation.json`, `report.html` and pictures, and returns the first; `model` and `validation_loss` are those
-    /// of the model's file, `seed` that of the starts.
+    /// Writes `evaluation.json`, `report.html`, an interactive page and pictures, and returns the first; `name` is that of the model's file,
+    /// `seed` that of the starts.
     ///
     /// # Errors
     /// [`PipelineError::Output`].
     pub(crate) fn write(
         &self,
         system: &SystemInstance<f64>,
-        (model, validation_loss): (&str, f64),
+        (name, header, network): (&str, &Header, &NetworkLagrangian<f64>),
         seed: u64,
         output: &dyn Output,
     ) -> Result<String, PipelineError> {
-        let summary = Summary { system: &system.system.name, seed, validation_loss, evaluation: self };
+        let summary =
+            Summary { system: &system.system.name, seed, validation_loss: header.validation_loss, evaluation: self };
         let json = serde_json::to_string_pretty(&summary).map_err(PipelineError::format)? + "\n";
         output.write("evaluation.json", json.as_bytes())?;
         let title = format!("{}: learned against exact", system.system.title);
         let report = self
             .summarise(Report::new(&title), &system.system.title)
-            .paragraph(&format!("Model {model}, starts of seed {seed}."));
+            .paragraph(&format!("Model {name}, starts of seed {seed}."));
+        let report = write_page(output, report, (header, network), Some(system))?;
         let report = self.report(parameter_table(self.pictures(report), system));
         write_report_and_figures(output, &report, self.figures.iter().chain(&self.physics.figures))?;
         Ok(json)

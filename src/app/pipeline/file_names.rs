@@ -4,6 +4,8 @@
 pub const MODEL: &str = "model.safetensors";
 /// Name of the file with the captions of a run's pictures, by file name; written before them, so that each is known.
 pub const CAPTIONS: &str = "captions.json";
+/// Name of the interactive page of a model.
+pub const PLAY: &str = "play.html";
 /// Name of the file that a finished run of an experiment has.
 pub const RECORD: &str = "record.json";
 /// Name of the file with the figures of a run.

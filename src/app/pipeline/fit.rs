@@ -225,6 +225,7 @@ fn fit_in<S: Scalar>(
         hold_out: &hold_out,
         determined: &determined,
         physics: &physics,
+        model: (&model.header, &network),
     };
     let (json, text) = found.write(output, &toml)?;
     let (stop, history, header) = (trained.stop, trained.history, model.header);

@@ -2,11 +2,13 @@
 
 use crate::configuration::Config;
 use crate::names::{WIDTH, number, percentage, pluralize, wrap_text};
+use crate::network::NetworkLagrangian;
+use crate::network::file::Header;
 use crate::pipeline::determination::Determined;
 use crate::pipeline::hold_out::HoldOut;
 use crate::pipeline::physics::Physics;
 use crate::pipeline::prepared_fit::PreparedFit;
-use crate::pipeline::report_files::{ended, training_pictures, write_report_and_figures};
+use crate::pipeline::report_files::{ended, training_pictures, write_page, write_report_and_figures};
 use crate::pipeline::time_steps::TimeSteps;
 use crate::pipeline::{Output, PipelineError, SUMMARY, headline};
 use crate::recording::{HeldOut, Recording, Targets};
@@ -113,6 +115,8 @@ pub(crate) struct Found<'a, S> {
     pub determined: &'a Determined,
     /// Curvature, symmetries and signature.
     pub physics: &'a Physics,
+    /// Header and network of the model.
+    pub model: (&'a Header, &'a NetworkLagrangian<f64>),
 }
 
 impl<'a, S: Scalar> Found<'a, S> {
@@ -134,6 +138,7 @@ impl<'a, S: Scalar> Found<'a, S> {
             figures.extend(later);
         }
         let report = headline.begin(Report::new(&format!("{name}: learned from recorded motion")));
+        let report = write_page(output, report, self.model, None)?;
         let report = report.section("Predictions of motion that the model has not seen", &self.hold_out.figures);
         let report = report.section("The functions that were learned", &self.physics.figures);
         let report = self.determined.report(self.hold_out.report(report));

@@ -111,7 +111,7 @@ pub use experiment_directory::ExperimentDirectory;
 pub use experiment_report::{ExperimentReport, Results};
 #[doc(hidden)]
 pub use file_names::MODEL;
-pub(crate) use file_names::{CAPTIONS, RECORD, SUMMARY};
+pub(crate) use file_names::{CAPTIONS, PLAY, RECORD, SUMMARY};
 pub use fit::FitReport;
 pub use fit::fit;
 pub use fit_builder::Fit;

@@ -2,9 +2,11 @@
 
 use crate::lagrangian::SystemInstance;
 use crate::lagrangian::system::Size;
+use crate::network::NetworkLagrangian;
+use crate::network::file::Header;
 use crate::pipeline::model::all_parameters;
-use crate::pipeline::{CAPTIONS, Output, PipelineError};
-use crate::report::{Figure, HistoryRow, Report, training_figures};
+use crate::pipeline::{CAPTIONS, Output, PLAY, PipelineError};
+use crate::report::{Figure, HistoryRow, Report, page, training_figures};
 use crate::training::{Epoch, StopReason};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -31,6 +33,26 @@ pub(crate) fn write_report_and_figures<'a>(
     output.write(CAPTIONS, serde_json::to_string_pretty(&captions).map_err(PipelineError::format)?.as_bytes())?;
     output.write("report.html", report.to_html().as_bytes())?;
     figures.into_iter().try_for_each(|figure| output.write(&figure.file, figure.picture.to_svg().as_bytes()))
+}
+
+/// Writes the interactive page of a model, and adds a link to it; of a model that has none the report says why.
+///
+/// # Errors
+/// [`PipelineError::Output`].
+pub(crate) fn write_page(
+    output: &dyn Output,
+    report: Report,
+    (header, network): (&Header, &NetworkLagrangian<f64>),
+    system: Option<&SystemInstance<f64>>,
+) -> Result<Report, PipelineError> {
+    match page(header, network, system) {
+        Ok(text) => {
+            output.write(PLAY, text.as_bytes())?;
+            let beside = if system.is_some() { ", beside the exact system" } else { "" };
+            Ok(report.link(PLAY, &format!("Play with the model: drag it and let it go{beside}")))
+        }
+        Err(problem) => Ok(report.paragraph(&format!("This model has no interactive page: {problem}."))),
+    }
 }
 
 /// Adds the system's parameters to a report.
@@ -97,5 +119,29 @@ pub(crate) fn ended(stop: &StopReason) -> String {
         StopReason::Finished => "finished".to_string(),
         StopReason::Interrupted => "interrupted".to_string(),
         StopReason::Failed(error) => error.to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::network::Layout;
+    use crate::network::file::ModelFile;
+    use crate::pipeline::InMemory;
+
+    #[test]
+    fn a_report_links_to_the_page_of_a_model_or_says_why_there_is_none() {
+        let bytes = include_bytes!("../../../examples/data/double_pendulum.safetensors");
+        let shipped = ModelFile::<f64>::from_bytes(bytes).unwrap().header;
+        for (hidden, linked) in [(shipped.architecture.hidden.clone(), true), (vec![400, 400], false)] {
+            let mut header = shipped.clone();
+            header.architecture.hidden = hidden;
+            let weights = vec![0.01; Layout::new(&header.architecture).parameters];
+            let network = NetworkLagrangian::new(header.architecture.clone(), weights).unwrap();
+            let files = InMemory::default();
+            let report = write_page(&files, Report::new("a"), (&header, &network), None).unwrap().to_html();
+            assert_eq!((report.contains("href=\"play.html\""), files.get(PLAY).is_some()), (linked, linked));
+            assert_eq!(report.contains("500000"), !linked);
+        }
     }
 }

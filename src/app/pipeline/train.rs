@@ -12,7 +12,9 @@ use crate::network::{Architecture, Layout, NetworkLagrangian};
 use crate::pipeline::checkpoints::Checkpoints;
 use crate::pipeline::evaluation::{Evaluation, EvaluationOptions, RTOL, STARTS, evaluate};
 use crate::pipeline::model::{all_parameters, trained_on};
-use crate::pipeline::report_files::{ended, history, parameter_table, training_pictures, write_report_and_figures};
+use crate::pipeline::report_files::{
+    ended, history, parameter_table, training_pictures, write_page, write_report_and_figures,
+};
 use crate::pipeline::{MODEL, Output, PipelineError, SUMMARY, Watch, memory, start};
 use crate::report::Report;
 use crate::scalar::Scalar;
@@ -162,6 +164,7 @@ impl TrainReport {
         let training = training_pictures(&self.history);
         let report = Report::new(&format!("{}: learned", self.title));
         let report = self.evaluation.summarise(report, &self.title).paragraph(&self.headline());
+        let report = write_page(output, report, (&self.header, &self.network), Some(system))?;
         let report = self.evaluation.pictures(report);
         let report = self.evaluation.report(parameter_table(report, system)).section("Training", &training);
         let report = report.heading("Configuration").preformatted(toml);

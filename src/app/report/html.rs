@@ -65,6 +65,13 @@ impl Report {
         self
     }
 
+    /// Adds a link to a file that stands beside the report.
+    #[must_use]
+    pub fn link(mut self, file: &str, text: &str) -> Self {
+        let _ = writeln!(self.body, "<p><a href=\"{}\">{}</a></p>", escape(file), escape(text));
+        self
+    }
+
     /// Adds text whose line breaks and blanks stay, such as a configuration.
     #[must_use]
     pub fn preformatted(mut self, text: &str) -> Self {
@@ -197,6 +204,7 @@ mod tests {
         let html = Report::new(evil)
             .heading(evil)
             .paragraph(evil)
+            .link(evil, evil)
             .preformatted(evil)
             .table(&[evil], &[vec![evil, "1.5e-3"]])
             .summary(evil, &[[evil.to_string(), evil.to_string()]])
@@ -204,9 +212,9 @@ mod tests {
             .figures(&[figure])
             .to_html();
         assert!(!html.contains("<script") && !html.contains("http") && !html.contains('\u{0}'));
-        // Title, header of the page, heading, paragraph, preformatted, two cells; sentence and two cells; three of the image; the
+        // Title, header of the page, heading, paragraph, link and its text, preformatted, two cells; sentence and two cells; three of the image; the
         // figure: heading, description, caption, title, two labels.
-        assert_eq!(html.matches("&lt;script&gt;alert(&#39;1&#39; &amp; &quot;2&quot;)&lt;/script&gt;").count(), 19);
+        assert_eq!(html.matches("&lt;script&gt;alert(&#39;1&#39; &amp; &quot;2&quot;)&lt;/script&gt;").count(), 21);
         assert!(html.contains("data:image/svg+xml;base64,AQID\""));
         assert!(html.contains("<td class=\"number\">1.5e-3</td>"));
         assert!(html.contains("prefers-color-scheme:dark"));

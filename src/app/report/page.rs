@@ -17,7 +17,7 @@ const PLAY: &str = include_str!("page/play.js");
 
 /// Largest page, in bytes.
 const MOST_BYTES: usize = 500_000;
-/// Seconds in which the longest motion of interest of a system without seconds is played.
+/// Seconds in which a system without seconds crosses what the model knows of it.
 const SECONDS: f64 = 20.0;
 
 /// Why a model has no page.
@@ -59,18 +59,21 @@ pub fn page(
         |system| system.system.coordinates(n).into_iter().map(|c| c.unit.into_owned()).collect(),
     );
     let time_unit = system.map_or("s", |system| &system.system.time_unit);
+    let start = start(header, system);
+    let time_like = architecture.time_like.or(system.and_then(|system| system.system.time_like));
     let t_end = system.map_or(SECONDS, |system| system.system.trajectory(n).t_end);
+    let t_end = if time_unit == "s" { t_end } else { t_end.max(crossing(header, &start, time_like)) };
     let rate = if time_unit == "s" { 1.0 } else { t_end / SECONDS };
     let title = system.map_or(header.system.as_str(), |system| &system.system.title);
     let data = json!({
         "columns": header.columns,
         "units": units,
         "periodic": architecture.periodic,
-        "time_like": architecture.time_like.or(system.and_then(|system| system.system.time_like)),
+        "time_like": time_like,
         "time_unit": time_unit,
         "span": t_end.min(SECONDS * rate),
         "rate": rate,
-        "start": start(header, system),
+        "start": { "q": start.0, "v": start.1 },
         "ranges": { "position": header.position, "velocity": header.velocity },
         "learned": {
             "lagrangian": operations(&lagrangian), "dissipation": dissipation, "weights": base64(&single),
@@ -114,7 +117,7 @@ fn exact(system: &SystemInstance<f64>) -> Result<Option<Value>, TapeError> {
 }
 
 /// A moving start within what the model knows, of a system among those of its trajectory test and on its mass shell.
-fn start(header: &Header, system: Option<&SystemInstance<f64>>) -> Value {
+fn start(header: &Header, system: Option<&SystemInstance<f64>>) -> (Vec<f64>, Vec<f64>) {
     let at = |share: f64| move |&(low, high): &(f64, f64)| low + share * (high - low);
     let pairs = |ranges: &[[f64; 2]]| ranges.iter().map(|&[low, high]| (low, high)).collect();
     let Bounds { positions, velocities } = match system {
@@ -127,7 +130,15 @@ fn start(header: &Header, system: Option<&SystemInstance<f64>>) -> Value {
         // Off the shell there is a motion as well.
         let _ = system.impose_constraint(&q, &mut v);
     }
-    json!({ "q": q, "v": v })
+    (q, v)
+}
+
+/// The least time in which a motion from a start crosses what the model knows of a coordinate, 0 if it crosses nothing.
+fn crossing(header: &Header, (_, v): &(Vec<f64>, Vec<f64>), time_like: Option<usize>) -> f64 {
+    let widths = header.position.iter().map(|[low, high]| high - low).zip(v).enumerate();
+    let times = widths.filter(|(i, _)| Some(*i) != time_like).map(|(_, (width, v))| width / v.abs());
+    let least = times.filter(|time| time.is_finite() && *time > 0.0).fold(f64::INFINITY, f64::min);
+    if least.is_finite() { least } else { 0.0 }
 }
 
 /// The operations as JSON: kind or name, then operands.
@@ -142,4 +153,19 @@ fn operations(listing: &Listing) -> Value {
         Operation::Dense(inputs, outputs, weights, bias) => json!(["d", inputs, outputs, weights, bias]),
     };
     json!({ "operations": listing.operations.iter().map(one).collect::<Vec<_>>(), "result": listing.result })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::network::file::ModelFile;
+
+    #[test]
+    fn a_start_crosses_what_the_model_knows_in_the_time_of_its_fastest_coordinate() {
+        let bytes = include_bytes!("../../../examples/data/double_pendulum.safetensors");
+        let mut header = ModelFile::<f64>::from_bytes(bytes).unwrap().header;
+        header.position = vec![[0.0, 2.0], [0.0, 3.0]];
+        let time = |v: [f64; 2], time_like| crossing(&header, &(Vec::new(), v.to_vec()), time_like);
+        assert_eq!([time([0.5, -3.0], None), time([0.5, -3.0], Some(1)), time([0.0, 0.0], None)], [1.0, 4.0, 0.0]);
+    }
 }

@@ -6,6 +6,7 @@
 //! simplest first, each reduced to the terms that it needs. The same with `monomials(q) v_i`, beside what follows from the former, gives the
 //! rows that are linear in the velocities; Frobenius' condition tells those that a function of the coordinates stands behind.
 
+mod examine;
 mod features;
 mod generators;
 mod pencil;
@@ -13,6 +14,7 @@ mod samples;
 #[cfg(test)]
 mod tests;
 
+pub use examine::{ExaminedLagrangian, OwnConstraint, examine};
 pub use samples::MotionSamples;
 
 use crate::lagrangian::ReducedMass;
@@ -24,6 +26,10 @@ use std::collections::BTreeMap;
 
 /// Most terms that are looked at together.
 pub const MOST_TERMS: usize = 1000;
+/// Largest degree of terms that is looked at.
+pub const MOST_DEGREE: usize = 8;
+/// States at which a Lagrangian is examined, usually.
+pub const EXAMINED_STATES: usize = 64;
 /// A row beside others whose part outside of them is, root mean square, below this share follows from them.
 const OUTSIDE: f64 = 0.15;
 /// States at which gradients are compared.

@@ -56,6 +56,8 @@ impl Default for FormulaOptions {
     }
 }
 
+/// Resamplings at most.
+pub const MOST_BOOTSTRAPS: usize = 10_000;
 /// Least noise relative to the range of a coordinate: what is exact to more digits is taken as exact to these.
 const LEAST_NOISE: f64 = 1e-6;
 /// Samples in a row that are needed.

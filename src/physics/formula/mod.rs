@@ -41,7 +41,7 @@ mod wald;
 mod weak;
 
 pub use error::FormulaError;
-pub use find::{FormulaOptions, formula_of_motion};
+pub use find::{FormulaOptions, MOST_BOOTSTRAPS, formula_of_motion};
 pub use found::{FoundFormula, FoundTerm, Left, Verdict};
 pub use library::Families;
-pub use regress::formula_of_model;
+pub use regress::{MODEL_STATES, formula_of_model};

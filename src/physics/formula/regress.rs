@@ -15,7 +15,9 @@ use rand::Rng;
 
 /// Relative error of accelerations up to which a formula is that of a model.
 const MOST_RESIDUAL: f64 = 0.02;
-/// States at which a model is asked, at most.
+/// States at which a model is asked, usually.
+pub const MODEL_STATES: usize = 1500;
+/// The same, at most.
 const MOST_STATES: usize = 3000;
 /// One state of so many judges alone.
 const HELD_OUT: usize = 5;

@@ -125,6 +125,7 @@ fn models_are_named_by_the_directory_of_their_run() {
     let judged = lnn(&["evaluate", &run, "--starts", "1", "--until", "0.1", "--json"]);
     assert_eq!(judged.code, Some(0), "{}", judged.stderr);
     assert!(folder.path("run/evaluation/evaluation.json").is_file());
+    assert!(folder.path("run/evaluation/play.html").is_file());
     let empty = folder.path("empty");
     fs::create_dir(&empty).unwrap();
     for command in ["rollout", "evaluate"] {

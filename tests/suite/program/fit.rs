@@ -104,6 +104,9 @@ fn recorded_positions_become_a_model_that_predicts() {
     assert_eq!(report.matches("time ahead [s]</th>").count(), 1);
     assert!(report.contains("learned from smoothed accelerations"));
     assert!(report.len() < 2_000_000, "{}", report.len());
+    // Nothing exact is known.
+    let page = fs::read_to_string(folder.path("out/play.html")).unwrap();
+    assert!(report.contains("href=\"play.html\"") && !page.contains("class=\"exact\"") && page.len() < 500_000);
     assert!(run.stdout.contains("learned from smoothed accelerations") && run.stdout.contains("report: "));
     let mut names: Vec<_> =
         fs::read_dir(folder.path("out")).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();

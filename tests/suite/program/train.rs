@@ -68,10 +68,13 @@ fn a_training_leaves_a_complete_and_repeatable_folder() {
     let printed = folder.train("double-pendulum", "one", &["--threads", "1"]);
     assert!(printed.contains("loss (paper): validation") && printed.contains("report.html"));
     let one = folder.path("one");
-    for name in ["model.safetensors", "config.toml", "history.csv", "summary.json", "report.html", "training_loss.svg"]
-    {
+    let files = ["model.safetensors", "config.toml", "history.csv", "summary.json", "report.html", "training_loss.svg"];
+    for name in files {
         assert!(one.join(name).metadata().unwrap().len() > 0, "{name}");
     }
+    // The report links to a page on which the exact system moves beside the model.
+    let [report, page] = ["report.html", "play.html"].map(|name| fs::read_to_string(one.join(name)).unwrap());
+    assert!(report.contains("href=\"play.html\"") && page.contains("class=\"exact\"") && page.len() < 500_000);
     assert!(fs::read_dir(&one).unwrap().all(|e| !e.unwrap().file_name().to_str().unwrap().starts_with('.')));
     let history = fs::read_to_string(one.join("history.csv")).unwrap();
     assert_eq!(history.lines().count(), 4);

@@ -132,11 +132,19 @@ function play(data) {
     const area = sheet($("stage")), { pen, width, height } = area;
     if (!picture) return drawCurves(area, data.columns.slice(0, n).map((name, i) => [name, (point) => point.y[i]]));
     const { to, unit } = toScreen(area);
-    pen.strokeStyle = colour("line");
+    pen.strokeStyle = colour("muted");
     pen.lineWidth = 1;
     if (picture.globe) {
       pen.beginPath();
       pen.arc(width / 2, height / 2, unit, 0, 7);
+      pen.stroke();
+    } else if (!picture.lines) {
+      // The origin.
+      pen.beginPath();
+      for (const [x, y] of [[6, 0], [0, 6]]) {
+        pen.moveTo(width / 2 - x, height / 2 - y);
+        pen.lineTo(width / 2 + x, height / 2 + y);
+      }
       pen.stroke();
     }
     kinds.slice().reverse().forEach(([name]) => {
@@ -244,7 +252,7 @@ function play(data) {
   } else $("parameters").hidden = true;
   slide("pace", "speed", 0.1, 4, () => speed, (x) => (speed = x));
 
-  // Dragging: a bob follows the pointer and starts from rest, or with the velocities that the sliders give.
+  // Dragging: a bob follows the pointer and starts from rest; where nothing moves it from rest, with the velocities that the sliders give.
   const stage = $("stage");
   const pointed = (event) => {
     const box = stage.getBoundingClientRect();
@@ -255,13 +263,17 @@ function play(data) {
     const away = joints.map(([x, y]) => Math.hypot(x - point[0], y - point[1]));
     return 1 + away.indexOf(Math.min(...away));
   };
+  const falls = (q) => {
+    const { acceleration } = kinds[kinds.length - 1][1].terms(q, start.v.map(() => 0));
+    return acceleration.some((a) => Math.abs(a) > 1e-9);
+  };
   if (picture) {
     stage.addEventListener("pointerdown", (event) => {
       stage.setPointerCapture(event.pointerId);
       dragged = nearest(pointed(event));
       running = false;
       start.q = flights[0].y.slice(0, n);
-      if (data.time_like === null) start.v = start.v.map(() => 0);
+      if (data.time_like === null && falls(start.q)) start.v = start.v.map(() => 0);
       move(event);
     });
     const move = (event) => {

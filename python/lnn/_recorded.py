@@ -1,0 +1,82 @@
+"""Recorded motion: arrays of different lengths, a DataFrame, files."""
+
+from __future__ import annotations
+
+import json
+import os
+
+import numpy as np
+
+from ._arrays import doubles
+
+
+def recorded(data, coordinates, angles, *, dt=None, t=None, v=None, a=None, force=None, trajectory=None, columns=None):
+    """Recorded motion as the library takes it: files, trajectories, the meaning of their columns."""
+    files, tracks, columns = [], [], dict(columns or {})
+    if _is_path(data) or (isinstance(data, (list, tuple)) and data and all(map(_is_path, data))):
+        if coordinates is None:
+            raise TypeError("coordinates: expected the columns of the files")
+        files = [os.fspath(path) for path in ([data] if _is_path(data) else data)]
+        if trajectory is not None:
+            columns["trajectory"] = trajectory
+    else:
+        if hasattr(data, "columns") and hasattr(data, "loc"):
+            if coordinates is None:
+                raise TypeError("coordinates: expected the columns of the coordinates")
+            data, t, v, a, force = _of_frame(data, coordinates, trajectory, (t, v, a, force))
+        arrays, beside = _tracks(data, t, dt, v, a, force)
+        n = arrays[0].shape[1]
+        coordinates = [f"q{i + 1}" for i in range(n)] if coordinates is None else list(coordinates)
+        if len(coordinates) != n:
+            raise ValueError(f"coordinates: expected {n} names, found {len(coordinates)}")
+        # Angles go on past a full turn, as those of files do.
+        turning = [i for i, name in enumerate(coordinates) if name in angles]
+        flat = lambda x: np.ravel(x).tolist()
+        for k, (q, times, *others) in enumerate(zip(arrays, *beside)):
+            if turning:
+                q = q.copy()
+                q[:, turning] = np.unwrap(q[:, turning], axis=0)
+            tracks.append((f"trajectory {k + 1}", flat(times), flat(q), *map(flat, others)))
+    unknown = [name for name in angles if name not in coordinates]
+    if unknown:
+        raise ValueError(f"angles: {unknown[0]!r} is none of the coordinates {list(coordinates)}")
+    return files, tracks, json.dumps({"coordinates": list(coordinates), "angles": list(angles), "columns": columns})
+
+
+def _is_path(x) -> bool:
+    return isinstance(x, (str, os.PathLike))
+
+
+def _of_frame(frame, coordinates, trajectory, others):
+    """Lists of arrays, one per trajectory, of a DataFrame."""
+    time, *others = others
+    time = next((name for name in ("t", "time") if name in frame.columns), None) if time is None else time
+    if time is None:
+        raise ValueError("t: expected the column of the times, found none called t or time")
+    groups = [frame] if trajectory is None else [group for _, group in frame.groupby(trajectory, sort=False)]
+    of = lambda names: None if names is None else [group[list(names)].to_numpy(float) for group in groups]
+    return of(coordinates), [group[time].to_numpy(float) for group in groups], *map(of, others)
+
+
+def _tracks(data, t, dt, v, a, force):
+    """Positions of the trajectories, and times, velocities, accelerations and forces beside them."""
+    several = isinstance(data, (list, tuple)) and len(data) > 0 and np.ndim(data[0]) == 2
+    arrays = list(data) if several else [data]
+    arrays = [doubles("data", x) for x in arrays]
+    for x in arrays:
+        if x.ndim not in (1, 2) or (x.ndim == 1 and several):
+            raise ValueError(f"data: expected arrays (samples, n), found the shape {x.shape}")
+    arrays = [x[:, None] if x.ndim == 1 else x for x in arrays]
+    if any(x.shape[1] != arrays[0].shape[1] for x in arrays):
+        raise ValueError("data: the trajectories have different numbers of coordinates")
+    beside = {"t": t, "v": v, "a": a, "force": force}
+    for name, given in beside.items():
+        given = given if several or given is None else [given]
+        if given is not None and len(given) != len(arrays):
+            raise ValueError(f"{name}: expected one array for each of {len(arrays)} trajectories, found {len(given)}")
+        beside[name] = [np.empty(0)] * len(arrays) if given is None else [doubles(name, x) for x in given]
+    if t is None:
+        if dt is None or not dt > 0:
+            raise ValueError("dt: expected the time between samples, or times `t`")
+        beside["t"] = [dt * np.arange(len(x)) for x in arrays]
+    return arrays, beside.values()

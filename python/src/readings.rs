@@ -1,0 +1,101 @@
+//! What is read off recorded motion: its constraints, and its Lagrangian as a formula.
+
+use crate::errors::{runtime, value};
+use crate::recorded::{Motion, Source};
+use lnn::constraints::{ConstraintSearch, MOST_DEGREE, MotionSamples, find_constraints};
+use lnn::formula::{FormulaOptions, FoundFormula, MOST_BOOTSTRAPS, formula_of_motion};
+use lnn::recording::smooth::SmoothOptions;
+use pyo3::prelude::*;
+use serde_json::json;
+
+/// The constraints of recorded motion, as JSON; `degrees` are those of functions of the coordinates and of factors of velocities.
+#[pyfunction(name = "find_constraints")]
+pub fn constraints_of_motion(py: Python<'_>, motion: Motion, degrees: (usize, usize)) -> PyResult<String> {
+    let (degree, velocity_degree) = degrees;
+    for (what, least, given) in [("degree", 1, degree), ("velocity_degree", 0, velocity_degree)] {
+        if !(least..=MOST_DEGREE).contains(&given) {
+            return Err(value(format_args!("{what}: expected {least} to {MOST_DEGREE}, found {given}")));
+        }
+    }
+    let source = Source::of(motion)?;
+    py.detach(|| {
+        let recording = source.read()?;
+        let samples = MotionSamples::of(&recording, &SmoothOptions::default()).map_err(value)?;
+        let found = find_constraints(&samples, ConstraintSearch { degree, velocity_degree }).map_err(value)?;
+        serde_json::to_string(&found).map_err(runtime)
+    })
+}
+
+/// The Lagrangian of recorded motion as a formula, as JSON.
+#[pyfunction]
+pub fn formula(py: Python<'_>, motion: Motion, choices: &str) -> PyResult<String> {
+    let (options, name) = FormulaChoices::read(choices)?;
+    let source = Source::of(motion)?;
+    py.detach(|| {
+        let recording = source.read()?;
+        let n = recording.coordinates.len();
+        if let Some(noise) = options.noise.as_ref().filter(|noise| noise.len() != n) {
+            return Err(value(format_args!("noise: expected {n} numbers, found {}", noise.len())));
+        }
+        Ok(described(&formula_of_motion(&recording, &options).map_err(value)?, &name))
+    })
+}
+
+/// Choices of a search for a formula, as JSON.
+#[derive(serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FormulaChoices {
+    basis: Option<String>,
+    functions: Vec<String>,
+    gyroscopic: bool,
+    friction: bool,
+    noise: Option<Vec<f64>>,
+    scale: Option<(String, f64)>,
+    bootstraps: usize,
+    seed: u64,
+    threads: usize,
+    name: String,
+}
+
+impl FormulaChoices {
+    /// The options, and the name of the system that the formula makes.
+    ///
+    /// # Errors
+    /// `ValueError` for a choice that is none.
+    pub fn read(choices: &str) -> PyResult<(FormulaOptions, String)> {
+        let Self { basis, functions, gyroscopic, friction, noise, scale, bootstraps, seed, threads, name } =
+            serde_json::from_str(choices).map_err(value)?;
+        let families = match basis {
+            Some(text) => text.parse().map_err(|problem| value(format_args!("basis: {problem}")))?,
+            None => FormulaOptions::default().families,
+        };
+        if !(1..=MOST_BOOTSTRAPS).contains(&bootstraps) {
+            return Err(value(format_args!("bootstraps: expected 1 to {MOST_BOOTSTRAPS}, found {bootstraps}")));
+        }
+        if noise.iter().flatten().any(|x| !(x.is_finite() && *x > 0.0)) {
+            return Err(value("noise: expected positive numbers"));
+        }
+        if scale.iter().any(|(_, x)| !x.is_finite() || *x == 0.0) {
+            return Err(value("scale: expected a term and a number that is not 0"));
+        }
+        let options =
+            FormulaOptions { families, functions, gyroscopic, friction, noise, scale, bootstraps, seed, threads };
+        Ok((options, name))
+    }
+}
+
+/// A formula as JSON.
+pub fn described(found: &FoundFormula, name: &str) -> String {
+    json!({
+        "verdict": found.verdict,
+        "lagrangian": found.text(false), "dissipation": found.text(true),
+        "latex": [found.latex(false), found.latex(true)],
+        "rust": found.rust(), "toml": found.system_file(name),
+        "terms": found.terms, "residual": found.residual,
+        "noise": found.noise, "noise_resolved": found.noise_resolved,
+        "searched": found.searched.0, "removed": found.searched.1,
+        "left": found.left.iter().map(|left| json!([found.coordinates[left.coordinate], left.low, left.high, left.residual, left.samples])).collect::<Vec<_>>(),
+        "coordinates": found.coordinates,
+    })
+    .to_string()
+}

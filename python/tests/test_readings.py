@@ -1,0 +1,140 @@
+"""Constraints and formulas, of motion and of models."""
+
+import pickle
+
+import numpy as np
+import pytest
+
+import lnn
+
+ROD = {
+    "lagrangian": "m*(x_dot^2 + y_dot^2)/2 - m*g*y",
+    "coordinates": {"x": {"bounds": (-1, 1)}, "y": {"bounds": (-1, 1)}},
+    "parameters": {"m": 1, "g": 9.8},
+    "constraints": {"rod": "x^2 + y^2 - 1"},
+}
+
+
+def swings(count=6, t_end=3.0):
+    """Motions of a pendulum with g / l = 4, as angles."""
+    system = lnn.System(lagrangian="a_dot^2/2 + 4*cos(a)", coordinates={"a": {"periodic": True}})
+    starts = np.linspace(0.5, 2.5, count)[:, None]
+    return system.rollout(starts, np.zeros_like(starts), t_end, 0.02, rtol=1e-10, atol=1e-12)
+
+
+def test_the_constraint_of_a_rod_is_found_in_its_motion():
+    motion = swings()
+    tracks = [np.hstack([np.sin(q), -np.cos(q)]) for q in motion.q]
+    found = lnn.find_constraints(tracks, coordinates=["x", "y"], dt=0.02)
+    assert found.count == 1 and found.constraints[0].kind == "holonomic" and found.trajectories == len(tracks)
+    # As a system's own.
+    system = lnn.System("rod", **{**ROD, "constraints": found.formulas})
+    a = system.acceleration([1.0, 0.0], [0.0, 2.0])
+    assert np.allclose(a, lnn.System("rod", **ROD).acceleration([1.0, 0.0], [0.0, 2.0]), atol=1e-3)
+    assert pickle.loads(pickle.dumps(found)).formulas == found.formulas
+    for wrong in [{"degree": 0}, {"degree": 9}, {"velocity_degree": 9}, {"dt": None}]:
+        with pytest.raises(ValueError):
+            lnn.find_constraints(tracks, **{"coordinates": ["x", "y"], "dt": 0.02, **wrong})
+
+
+def test_constraints_of_a_system_are_named():
+    own = lnn.System("rod", **ROD).constraints()
+    assert own.formulas == {"rod": "x^2 + y^2 - 1"} and own.kinds == {"rod": "holonomic"} and own.signature == (1, 0)
+    assert own.null_directions.shape == (0, 2) and own.states > 0 == own.open_states
+    flat = lnn.System(lagrangian="(x_dot + y_dot)^2", coordinates=["x", "y"]).constraints()
+    assert flat.formulas == {} and flat.open_states == flat.states
+    assert np.allclose(np.abs(flat.null_directions), np.sqrt(0.5))
+
+
+@pytest.fixture(scope="module")
+def pendulum():
+    motion = swings()
+    return lnn.formula(list(motion.q), coordinates=["a"], angles=["a"], dt=0.02, bootstraps=4, threads=2)
+
+
+def test_the_formula_of_motion(pendulum):
+    assert pendulum.verdict == "found" and pendulum.terms == ("a_dot^2", "cos(a)")
+    assert np.allclose(pendulum.coefficients, [0.5, 4.0], rtol=1e-3) and pendulum.standard_errors[0] == 0
+    assert not pendulum.dissipative.any() and pendulum.probabilities.shape == (2,) and pendulum.dissipation == "0"
+    assert r"\cos" in pendulum.latex() and pendulum.latex(dissipation=True) == "0" and "struct" in pendulum.rust
+    system = pendulum.system()
+    assert np.allclose(system.acceleration([0.3], [0.0]), -4 * np.sin(0.3), rtol=1e-3)
+    assert pickle.loads(pickle.dumps(pendulum)).lagrangian == pendulum.lagrangian
+
+
+def test_angles_that_jump_by_a_turn_are_the_same_motion(pendulum):
+    motion = swings()
+    jumping = [np.remainder(q, 2 * np.pi) for q in motion.q]
+    assert max(np.abs(np.diff(q, axis=0)).max() for q in jumping) > 6
+    choices = {"coordinates": ["a"], "angles": ["a"], "dt": 0.02, "bootstraps": 4}
+    again = lnn.formula(jumping, **choices)
+    assert again.terms == pendulum.terms and np.allclose(again.coefficients, pendulum.coefficients, rtol=1e-5)
+
+
+def test_a_formula_is_an_expression_of_sympy(pendulum):
+    sympy = pytest.importorskip("sympy")
+    a, v = sympy.symbols("a a_dot", real=True)
+    expression = pendulum.sympy()
+    assert expression.free_symbols == {a, v} and pendulum.sympy(dissipation=True) == 0
+    value = expression.subs({a: 0.7, v: -1.1})
+    assert np.isclose(float(value), pendulum.system().lagrangian([0.7], [-1.1]), rtol=1e-6)
+
+
+def test_every_function_of_a_formula_is_one_of_sympy():
+    sympy = pytest.importorskip("sympy")
+    from lnn.reader.sympy_functions import expression
+
+    text = (
+        "sqrt(x) + exp(x) + expm1(x) + ln(x) + ln1p(x) + sin(x) + cos(x) + tan(x) + asin(x) + acos(x) + atan(x) + sinh(x) + cosh(x)"
+        " + tanh(x) + erfc(x) + logistic(x) + softplus(x) + abs(-x) + recip(x) + atan2(x, 2) + max(x, pi) + min(x, 0.5) + x^2.5 + x^-2"
+    )
+    system = lnn.System(lagrangian=f"x_dot^2 + {text}", coordinates=["x"])
+    value = expression([(1.0, text)]).subs({sympy.Symbol("x", real=True): 0.3})
+    assert np.isclose(float(value), system.lagrangian([0.3], [0.0]), rtol=1e-12)
+
+
+def test_the_formula_of_a_system_and_of_a_model(shipped):
+    arm = lnn.System("double-pendulum").formula()
+    assert arm.verdict == "found" and len(arm.terms) == 5 and arm.residual < 1e-6
+    learned = lnn.Model.load(shipped).formula(seed=1)
+    assert set(learned.terms) == set(arm.terms) and learned.residual > arm.residual
+
+
+def test_the_friction_of_recorded_motion_is_found(shipped):
+    columns = {"coordinates": ["theta1", "theta2"], "angles": ["theta1", "theta2"], "trajectory": "run"}
+    found = lnn.formula(shipped.parent / "pendulum.csv", **columns, friction=True, bootstraps=2)
+    assert found.dissipative.sum() == 3 and found.dissipation != "0" and len(found.noise) == 2
+
+
+def test_mistakes_are_values():
+    motion = list(swings(2).q)
+    for wrong in [
+        {"basis": "polynomial"},
+        {"basis": "polynomial:99"},
+        {"functions": ["exp("]},
+        {"noise": [0.0]},
+        {"noise": [0.1, 0.1]},
+        {"scale": ("a_dot^2", 0.0)},
+        {"scale": ("nothing", 1.0)},
+        {"bootstraps": 0},
+        {"threads": 0},
+    ]:
+        with pytest.raises(ValueError):
+            lnn.formula(motion, **{"coordinates": ["a"], "angles": ["a"], "dt": 0.02, "bootstraps": 1, **wrong})
+
+
+def test_pictures_go_into_axes_that_are_given(shipped):
+    matplotlib = pytest.importorskip("matplotlib")
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+
+    _, ax = pyplot.subplots()
+    model = lnn.Model.load(shipped)
+    motion = model.rollout([[0.3, 0.1], [0.2, 0.1]], np.zeros((2, 2)), 1.0, 0.1)
+    assert motion.plot(ax=ax, color="red") is ax and len(ax.lines) == 2 and ax.get_ylabel() == "theta1"
+    assert motion.plot("energy").get_ylabel() == "energy" and len(pyplot.get_fignums()) == 2
+    with pytest.raises(ValueError):
+        motion.plot("nothing", ax=ax)
+    sphere = lnn.System("sphere-geodesic").symmetries(seed=1)
+    assert sphere.plot(ax=pyplot.subplots()[1]).get_yscale() == "log"
+    pyplot.close("all")

@@ -1,0 +1,86 @@
+//! What a Lagrangian says of its own constraints, and which directions no equation moves.
+
+use super::ConstraintKind;
+use crate::lagrangian::{EulerLagrange, ReducedMass, Request, Terms, project};
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// An eigenvalue of a mass matrix within its constraints below so many roundings of the largest counts as zero.
+const ROUNDINGS: f64 = 1024.0;
+
+/// What there is to say of a Lagrangian.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct ExaminedLagrangian {
+    /// Its constraints.
+    pub count: usize,
+    /// Each of them.
+    pub constraints: Vec<OwnConstraint>,
+    /// Constraints that follow from the others.
+    pub redundant: Vec<String>,
+    /// Directions that no equation moves, at the most states.
+    pub open: usize,
+    /// States that were looked at.
+    pub states: usize,
+    /// Those among them with open directions.
+    pub open_states: usize,
+    /// These directions at a state that has the most of them.
+    pub null_directions: Vec<Vec<f64>>,
+    /// Positive and negative eigenvalues of the mass matrix within the constraints, at the first state.
+    pub signature: Option<[usize; 2]>,
+}
+
+/// A constraint of a system.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct OwnConstraint {
+    /// Its kind.
+    pub kind: ConstraintKind,
+    /// Its name.
+    pub name: String,
+    /// What vanishes; empty where no formula is known.
+    pub formula: String,
+}
+
+/// Examines a Lagrangian at states `(states, n)`, each brought to the constraints; `formulas` are those of the constraints by name.
+///
+/// States without a finite mass matrix are left out; all of them are if `states` is 0.
+pub fn examine(
+    model: &dyn EulerLagrange<f64>,
+    formulas: &BTreeMap<String, String>,
+    (q, v): (&[f64], &[f64]),
+) -> ExaminedLagrangian {
+    let n = model.coordinates();
+    let mut examined = ExaminedLagrangian::default();
+    if let Some(manifold) = model.manifold() {
+        examined.redundant = manifold.redundant().to_vec();
+        examined.constraints = (0..manifold.names().len())
+            .map(|row| {
+                let (name, holonomic) = (manifold.names()[row].clone(), manifold.is_holonomic(row));
+                let kind = if holonomic { ConstraintKind::Holonomic } else { ConstraintKind::Nonholonomic };
+                let formula = formulas.get(&name).cloned().unwrap_or_default();
+                OwnConstraint { kind, name, formula }
+            })
+            .collect();
+        examined.count = examined.constraints.len();
+    }
+    let mut terms = Terms::default();
+    for (q, v) in q.chunks_exact(n).zip(v.chunks_exact(n)) {
+        let (mut q, mut v) = (q.to_vec(), v.to_vec());
+        if model.manifold().is_some_and(|manifold| project(manifold, &mut q, &mut v).is_err()) {
+            continue;
+        }
+        if model.terms(&q, &v, Request::MASS_MATRIX | Request::CONSTRAINTS, &mut terms).is_err() {
+            continue;
+        }
+        let Ok(reduced) = ReducedMass::of(n, &terms.mass_matrix, &terms.constraint_matrix) else { continue };
+        examined.states += 1;
+        let open = reduced.null_directions(ROUNDINGS);
+        examined.open_states += usize::from(!open.is_empty());
+        if open.len() > examined.open {
+            examined.open = open.len();
+            examined.null_directions = open.into_iter().map(<[f64]>::to_vec).collect();
+        }
+        let negative = reduced.eigenvalues.iter().filter(|w| **w < 0.0).count();
+        examined.signature.get_or_insert([reduced.eigenvalues.len() - negative, negative]);
+    }
+    examined
+}
