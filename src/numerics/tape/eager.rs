@@ -1,6 +1,6 @@
 //! The eager tape: nodes with their partial derivatives, one reverse sweep.
 
-use super::error::TapeError;
+use super::TapeError;
 use super::var::Var;
 use crate::scalar::{Real, Scalar};
 use std::cell::{Cell, RefCell};

@@ -5,7 +5,7 @@ use super::operation::{Combination, Dense, Elementwise, Function, Gather, Input,
 use super::value::{Kind, Layout, Order, Value};
 use crate::ops::{Binary, Unary};
 use crate::scalar::{Real, Scalar};
-use crate::tape::error::TapeError;
+use crate::tape::TapeError;
 use crate::tape::program::{Graph, Node, Recorder, Tracer};
 use std::collections::HashMap;
 

@@ -26,14 +26,12 @@
 
 mod compile;
 mod evaluation;
-mod jets;
 mod kernel;
 mod operation;
 mod value;
 
 pub use compile::Recorded;
-pub use evaluation::Depth;
-pub use evaluation::{Evaluation, MixedDirections};
+pub use evaluation::{Depth, Evaluation, MixedDirections};
 
 /// States evaluated together at most.
 pub const STATES: usize = 64;

@@ -4,7 +4,7 @@ use super::{Forward, MixedForward, MixedReverse, Reverse};
 use crate::ops::Unary;
 use crate::scalar::{Real, Scalar, update2, update3, vectorized};
 use crate::tape::engine::Depth;
-use crate::tape::engine::jets::jets;
+use crate::tape::engine::kernel::jets;
 use crate::tape::engine::value::{Kind, Mixed};
 
 /// `f(x)`, unit by unit.

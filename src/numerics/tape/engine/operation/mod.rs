@@ -1,4 +1,4 @@
-//! Operations of a recorded Lagrangian: each in one file, with its rules.
+//! Operations of a recorded Lagrangian, each with its rules.
 //!
 //! With `y = phi(x)`, adjoints `A = dL/dy`, mixed channels `y[s]`, `y[t]`, `y[st]` and their adjoints `B`:
 //!
@@ -15,25 +15,18 @@ mod contraction;
 mod dense;
 mod elementwise;
 mod function;
-mod gather;
-mod input;
 mod linear;
-mod product;
 
-use contraction::{Contraction, ROWS};
 pub(super) use dense::Dense;
 pub(super) use elementwise::Elementwise;
-pub(super) use function::{Function, PARTIALS};
-pub(super) use gather::Gather;
-pub(super) use gather::Select;
-pub(super) use input::Input;
-pub(super) use linear::Combination;
-pub(super) use product::Product;
+pub(super) use function::{Function, PARTIALS, Product};
+pub(super) use linear::{Combination, Gather, Input, Select};
 
 use super::kernel::{add_product, add_product3};
 use super::value::{Kind, Mixed, Order, Store, Value, View};
 use super::{Depth, MixedDirections};
 use crate::scalar::{Real, Scalar, in_vectors};
+use contraction::{Contraction, ROWS};
 
 /// An operation; operands are values before it.
 #[derive(Clone, Debug)]
