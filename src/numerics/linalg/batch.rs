@@ -57,7 +57,7 @@ pub(super) struct Retry<S> {
 
 /// Scratch of determinants and their gradients.
 #[derive(Clone, Debug, Default)]
-struct Minors<S> {
+pub(super) struct Minors<S> {
     pub block: Vec<S>,
     pub values: Vec<S>,
     pub vectors: Vec<S>,

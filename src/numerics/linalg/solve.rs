@@ -141,7 +141,7 @@ impl<S: Scalar> Systems<'_, S> {
     /// which matrices are singular.
     ///
     /// A correction of more than half the solution is not taken (as in LAPACK's `xSYRFS`): the matrix is singular to
-    /// working precision, and what is left after the two cancel has a larger backward error than either.
+    /// working precision, and the remainder after the two cancel has a larger backward error than either.
     #[cold]
     #[inline(never)]
     fn refine<const W: usize>(

@@ -45,7 +45,7 @@ mod program;
 mod var;
 
 #[doc(hidden)]
-pub use eager::Statistics;
+pub use eager::TapeSize;
 pub use eager::{Adjoints, Tape};
 pub use engine::{Depth, Evaluation, Recorded};
 #[doc(hidden)]

@@ -1,4 +1,4 @@
-//! Double-double numbers: the judge of `f32` and `f64`.
+//! Double-double numbers: a precision of about 31 digits, against which results in `f32` and `f64` are checked.
 
 mod arithmetic;
 mod elementary;

@@ -20,7 +20,7 @@ fn alternating_series(z: Dd, first: i32) -> Dd {
 }
 
 impl Dd {
-    /// Quarter turn and the sine and cosine of what is left.
+    /// Quarter turn and the sine and cosine of the rest.
     fn reduced(self) -> (u8, Self, Self) {
         let (quarter, z) = quarter_turns(self);
         let sine = if z.high.abs() < 1e-150 { z } else { z * alternating_series(z, 1) };
@@ -206,7 +206,7 @@ fn quarter_turns(x: Dd) -> (u8, Dd) {
     }
     let signed = |part: f64| if part < 0.0 { negated(turns(part)) } else { turns(part) };
     let sum = add(signed(x.high), signed(x.low));
-    // Round to the nearest quarter; what is left is a signed fraction.
+    // Round to the nearest quarter; the rest is a signed fraction.
     let mut half = [0; WORDS];
     half[0] = 1 << 61;
     let quarter = (add(sum, half)[0] >> 62) as u8;

@@ -1,4 +1,4 @@
-//! The engine of Lagrangians: one recorded function `L(q, v)` of whatever it is made of, and a few rules per operation give all
+//! The engine of Lagrangians: one recorded function `L(q, v)` of any operations, and a few rules per operation give all
 //! its derivatives.
 //!
 //! With `A_k = dL/dy_k` the adjoints of one reverse sweep over the operations `y_k = phi_k(..)`,

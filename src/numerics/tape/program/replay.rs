@@ -92,7 +92,7 @@ struct Environment<'a, S> {
 }
 
 /// Computes the rows of `program` in order.
-pub(super) fn forward<S: Scalar>(program: &[Instruction<S>], environment: &Environment<'_, S>, rows: &mut [Row<S>]) {
+fn forward<S: Scalar>(program: &[Instruction<S>], environment: &Environment<'_, S>, rows: &mut [Row<S>]) {
     let uniform = environment.uniform;
     let base = uniform.len();
     vectorized(

@@ -23,7 +23,7 @@ pub(super) use function::{Function, PARTIALS, Product};
 pub(super) use linear::{Combination, Gather, Input, Select};
 
 use super::kernel::{add_product, add_product3};
-use super::value::{Kind, Mixed, Order, Store, Value, View};
+use super::value::{Dependence, Mixed, Order, Store, Value, View};
 use super::{Depth, MixedDirections};
 use crate::scalar::{Real, Scalar, in_vectors};
 use contraction::{Contraction, ROWS};
@@ -98,7 +98,7 @@ pub(super) struct Reverse<'a, S> {
     /// `dL/dy` of every value.
     pub adjoints: Store<'a, S>,
     pub depth: Depth,
-    pub second: &'a mut Second<S>,
+    pub second: &'a mut SecondOrder<S>,
 }
 
 /// Data of the mixed sweep.
@@ -175,7 +175,7 @@ impl<S: Scalar> MixedReverse<'_, S> {
     /// `true` if adjoints of a value lead to anything asked for.
     pub fn wants(&self, value: usize) -> bool {
         let value = &self.kept.values[value];
-        value.trainable || (self.inputs.is_some() && value.kind != Kind::Constant)
+        value.trainable || (self.inputs.is_some() && value.kind != Dependence::Constant)
     }
     pub fn channels(&self, value: usize) -> Mixed {
         self.kept.values[value].mixed(self.order)
@@ -184,7 +184,7 @@ impl<S: Scalar> MixedReverse<'_, S> {
 
 /// Second derivatives while they are gathered: planes of one number per state.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Second<S> {
+pub(super) struct SecondOrder<S> {
     pub n: usize,
     pub lanes: usize,
     /// `M_ij`, `i <= j`, row after row of the triangle.
@@ -195,7 +195,7 @@ pub(super) struct Second<S> {
     along: Vec<S>,
 }
 
-impl<S: Scalar> Second<S> {
+impl<S: Scalar> SecondOrder<S> {
     /// Empties the sums for a chunk.
     pub fn start(&mut self, n: usize, lanes: usize, drift: bool) {
         (self.n, self.lanes) = (n, lanes);
