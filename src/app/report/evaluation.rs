@@ -289,7 +289,7 @@ mod tests {
     use super::*;
     use crate::analysis::{StartBox, TrajectoryTest};
     use crate::lagrangian::configure;
-    use crate::report::test_pictures::save;
+    use crate::report::save_pictures;
     use crate::rollout::models::{PENDULUM, SINGULAR};
 
     #[test]
@@ -336,7 +336,7 @@ mod tests {
             "energy_drift.svg",
         ];
         assert_eq!(files(&figures), expected);
-        save(&figures);
+        save_pictures(&figures);
         assert!(evaluation_figures(&[], &[], &system).is_empty());
     }
 

@@ -242,7 +242,7 @@ impl Turn {
 mod tests {
     use super::*;
     use crate::analysis::{Axis, determinant_grid, lagrangian_grid};
-    use crate::report::test_pictures::save;
+    use crate::report::save_pictures;
     use crate::rollout::models::{OSCILLATOR, PENDULUM};
 
     #[test]
@@ -270,7 +270,7 @@ mod tests {
         assert!((fit.a - 1.0 / 3.0).abs() < 1e-12 && (fit.b - 7.0 / 3.0).abs() < 1e-12 && fit.r2 > 1.0 - 1e-12);
         comparison.learned = grid(&OSCILLATOR);
         let (figure, _) = grid_figures(&comparison).unwrap();
-        save(&[figure]);
+        save_pictures(&[figure]);
         let det = determinant_grid::<f64>(&PENDULUM, &[0.0, 0.0], axes, |_, _| {}).unwrap();
         comparison = GridComparison {
             quantity: "det M".into(),
@@ -296,7 +296,7 @@ mod tests {
             comparison.fit = fit;
             let (figure, _) = grid_figures(&comparison).unwrap();
             assert!(figure.caption.contains("wrong sign at 24.59 %"), "{}", figure.caption);
-            save(&[figure]);
+            save_pictures(&[figure]);
         }
     }
 
@@ -320,7 +320,7 @@ mod tests {
             let figure = quantity_figure(&map(exact)).unwrap();
             assert_eq!(figure.file, "curvature_scalar.svg");
             let found = (figure.picture.panels(), figure.caption.clone());
-            save(&[figure]);
+            save_pictures(&[figure]);
             found
         };
         let alone = "At r = 4.".to_string();

@@ -53,5 +53,12 @@ pub(crate) fn file_part(name: &str) -> String {
     name.chars().map(|c| if c.is_ascii_alphanumeric() || c == '_' { c } else { '_' }).collect()
 }
 
+/// Keeps pictures to look at in the directory that `LNN_TEST_PICTURES` names.
 #[cfg(test)]
-mod test_pictures;
+pub(crate) fn save_pictures(figures: &[Figure]) {
+    if let Ok(directory) = std::env::var("LNN_TEST_PICTURES") {
+        for figure in figures {
+            std::fs::write(std::path::Path::new(&directory).join(&figure.file), figure.picture.to_svg()).unwrap();
+        }
+    }
+}
