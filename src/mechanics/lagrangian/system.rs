@@ -337,6 +337,7 @@ impl Range {
 
 /// Shell around a centre, and how fast what moves in it is at most.
 #[derive(Clone, Debug, PartialEq)]
+#[doc(hidden)]
 pub struct ShellAdvice {
     /// Cartesian coordinates around the centre.
     pub coordinates: Cow<'static, [usize]>,

@@ -1,6 +1,6 @@
 //! Round trips, damage and foreign files.
 
-use super::{MAX_COORDINATES, *};
+use super::*;
 use crate::network::{ActivationChoice, Form, InputLayer};
 use crate::storage::container::{MAX_HEADER, checksum_field};
 use proptest::prelude::*;
