@@ -3,7 +3,7 @@
 // The tests run `main` in a program that has this allocator already.
 #[cfg(test)]
 use crate::counting;
-use lnn::lagrangian::{EulerLagrange, Mechanics, Request, Terms, systems::double_pendulum::DoublePendulum};
+use lnn::lagrangian::{EulerLagrange, Mechanics, Request, Terms, systems::DoublePendulum};
 use lnn::network::{NetworkLagrangian, file::ModelFile};
 use std::path::Path;
 

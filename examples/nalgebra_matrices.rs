@@ -3,7 +3,7 @@
 //! A batch is row-major, `(batch, n)`; a nalgebra matrix is column-major. A matrix with one state per column therefore is
 //! a batch as it lies in memory, and a symmetric mass matrix is the same in both orders: nothing is transposed.
 
-use lnn::lagrangian::{EulerLagrange, Mechanics, Request, Terms, systems::double_pendulum::DoublePendulum};
+use lnn::lagrangian::{EulerLagrange, Mechanics, Request, Terms, systems::DoublePendulum};
 use nalgebra::{DMatrix, DMatrixView, SMatrix, SVector};
 
 pub fn main() -> Result<(), Box<dyn std::error::Error>> {

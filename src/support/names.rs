@@ -1,12 +1,5 @@
-//! Names and numbers in messages: the known name nearest to a mistyped one, texts on one line or in short ones, counts, digits.
-
-mod columns;
-mod number;
-mod wrap;
-
-pub use columns::taken_column;
-pub use number::{number, percent, percentage, rounded};
-pub use wrap::{WIDTH, cut, cut_hard, width, wrap_text};
+//! Names and numbers in messages: the known name nearest to a mistyped one, texts on one line or in short ones, counts, digits,
+//! columns of results beside those of coordinates.
 
 /// The candidate that fewest edits (insert, delete, replace, swap neighbours) turn `name` into; none if every one takes more
 /// than a third of the letters: `y` is not near `x`, nor `m3` near `m1`.
@@ -108,6 +101,134 @@ fn short_numbers(text: &str) -> String {
     whole + rest
 }
 
+/// The first coordinate that has the name of another column, and what that column is: results have the time as `t`, or as `tau` beside a
+/// coordinate `t`, the energy, and for every coordinate `NAME_dot`, `NAME_ddot` and `NAME_force`.
+pub fn taken_column(coordinates: &[&str]) -> Option<(usize, String)> {
+    coordinates.iter().enumerate().find_map(|(index, name)| {
+        let of_another = |end: &str| name.strip_suffix(end).filter(|other| coordinates.contains(other));
+        let column = match *name {
+            "energy" => "the energy of results".to_string(),
+            "tau" if coordinates.contains(&"t") => "the time of results beside a coordinate t".to_string(),
+            _ => {
+                let ends = [("_dot", "velocity"), ("_ddot", "acceleration"), ("_force", "force")];
+                let (other, what) = ends.iter().find_map(|(end, what)| Some((of_another(end)?, what)))?;
+                format!("the {what} of {other}")
+            }
+        };
+        Some((index, format!("{name} is the column of {column}, expected another name")))
+    })
+}
+
+/// A number with three significant digits: `0.0196`, `12.3`, `4.30e-5`. See [`rounded`].
+pub fn number(x: f64) -> String {
+    rounded(x, 3)
+}
+
+/// A number with so many significant digits, decimal from `0.0001` to a million and with an exponent beyond; digits before
+/// the point are all shown. No finite number is `-`.
+pub fn rounded(x: f64, digits: usize) -> String {
+    let after = digits.max(1) - 1;
+    if !x.is_finite() {
+        return "-".to_string();
+    }
+    if x == 0.0 {
+        return "0".to_string();
+    }
+    let scientific = format!("{x:.after$e}");
+    // The exponent of the rounded number: 9.999 becomes 10.0, which has one decimal fewer.
+    let exponent: i32 = scientific.rsplit('e').next().and_then(|e| e.parse().ok()).unwrap_or(0);
+    if (-4..6).contains(&exponent) {
+        let decimals = usize::try_from(after as i32 - exponent).unwrap_or(0);
+        format!("{x:.decimals$}")
+    } else {
+        scientific
+    }
+}
+
+/// A fraction in per cent, three significant digits, without the sign of per cent.
+pub fn percentage(fraction: f64) -> String {
+    number(100.0 * fraction)
+}
+
+/// A fraction in per cent, three significant digits: `1.23 %`.
+pub fn percent(fraction: f64) -> String {
+    if fraction.is_finite() { format!("{} %", percentage(fraction)) } else { "-".to_string() }
+}
+
+/// Columns of a terminal that texts and tables keep to.
+pub const WIDTH: usize = 120;
+
+/// Width of a text in characters.
+pub fn width(text: &str) -> usize {
+    text.chars().count()
+}
+
+/// Lines of at most `most` characters, cut at blanks, but not between a number and its `%`; a word that is longer has a line of
+/// its own.
+pub fn cut(text: &str, most: usize) -> Vec<String> {
+    let (mut lines, mut words) = (Vec::<String>::new(), Vec::<String>::new());
+    for word in text.split(' ').filter(|word| !word.is_empty()) {
+        match words.last_mut().filter(|_| word.starts_with('%')) {
+            Some(number) => *number += &format!(" {word}"),
+            None => words.push(word.to_string()),
+        }
+    }
+    for word in &words {
+        match lines.last_mut() {
+            Some(line) if width(line) + 1 + width(word) <= most => {
+                line.push(' ');
+                line.push_str(word);
+            }
+            _ => lines.push(word.to_string()),
+        }
+    }
+    if lines.is_empty() {
+        lines.push(String::new());
+    }
+    lines
+}
+
+/// The same with words cut too, where nothing else fits.
+pub fn cut_hard(text: &str, most: usize) -> Vec<String> {
+    let most = most.max(1);
+    let pieces = |line: String| -> Vec<String> {
+        let letters: Vec<char> = line.chars().collect();
+        let chunks = letters.chunks(most).map(|chunk| chunk.iter().collect());
+        if letters.is_empty() { vec![String::new()] } else { chunks.collect() }
+    };
+    cut(text, most).into_iter().flat_map(pieces).collect()
+}
+
+/// A text with every line that is longer than `most` cut at blanks; what follows stands below the text of that line: behind
+/// its indentation and, of two columns, behind the first one.
+pub fn wrap_text(text: &str, most: usize) -> String {
+    let mut whole = String::with_capacity(text.len());
+    for line in text.split_inclusive('\n') {
+        let (body, end) = line.strip_suffix('\n').map_or((line, ""), |body| (body, "\n"));
+        if width(body) <= most {
+            whole.push_str(line);
+            continue;
+        }
+        let indent = hang(body, most);
+        let head: String = body.chars().take(indent).collect();
+        let rest: String = body.chars().skip(indent).collect();
+        let lines = cut(&rest, most - indent);
+        whole.push_str(&head);
+        whole.push_str(&lines.join(&format!("\n{}", " ".repeat(indent))));
+        whole.push_str(end);
+    }
+    whole
+}
+
+/// Where the text of a line begins: behind its indentation, or behind the first column of two that blanks part.
+fn hang(line: &str, most: usize) -> usize {
+    let indent = line.chars().take_while(|c| *c == ' ').count();
+    let letters: Vec<char> = line.chars().collect();
+    let gap = (indent + 1..letters.len().saturating_sub(2)).find(|&k| letters[k..k + 2] == [' ', ' ']);
+    let second = gap.map(|gap| gap + letters[gap..].iter().take_while(|c| **c == ' ').count());
+    second.filter(|second| 2 * second <= most).unwrap_or(if 2 * indent <= most { indent } else { 0 })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -152,5 +273,68 @@ mod tests {
         assert_eq!([nearest("y", ["x", "t", "yy"]), nearest("m3", ["m1", "m2"]), nearest("v", ["rv"])], [None; 3]);
         assert_eq!((nearest("X", ["x"]), nearest("alhpa", ["beta", "alpha"])), (Some("x"), Some("alpha")));
         assert!(unknown("system", "kepler", names).ends_with("double-pendulum, triple-pendulum, sphere-geodesic"));
+    }
+
+    #[test]
+    fn names_of_other_columns_are_found() {
+        let taken = |names: &[&str]| taken_column(names).map(|(index, _)| index);
+        for (names, index) in [
+            (&["x", "energy"][..], Some(1)),
+            (&["energy"], Some(0)),
+            (&["t", "tau"], Some(1)),
+            (&["tau", "t"], Some(0)),
+            (&["x_dot", "x"], Some(0)),
+            (&["x", "x_ddot"], Some(1)),
+            (&["x", "x_force"], Some(1)),
+            (&["tau", "x"], None),
+            (&["t", "x"], None),
+            (&["x", "y_dot", "y_force", "my_energy", "_dot"], None),
+        ] {
+            assert_eq!(taken(names), index, "{names:?}");
+        }
+    }
+
+    #[test]
+    fn numbers_have_three_digits_and_an_exponent_only_where_needed() {
+        let texts = [0.0196, 1.0, -12.345, 0.000_456_7, 123.4, 13_643.2, 999.6].map(number);
+        assert_eq!(texts, ["0.0196", "1.00", "-12.3", "0.000457", "123", "13643", "1000"]);
+        let texts = [0.0, -0.0, 4.3e-5, -1.2345e-7, 999_999.0, 1_234_567.0, 1e300].map(number);
+        assert_eq!(texts, ["0", "0", "4.30e-5", "-1.23e-7", "1.00e6", "1.23e6", "1.00e300"]);
+        // Rounding may add a digit in front of the point.
+        assert_eq!([9.999, 0.999_9, 0.000_099_99].map(number), ["10.0", "1.00", "0.000100"]);
+        assert_eq!([f64::NAN, f64::INFINITY, f64::NEG_INFINITY].map(number), ["-"; 3]);
+    }
+
+    #[test]
+    fn other_counts_of_digits() {
+        let texts = [0.0, 1.0, -0.012_345_6, 98_765.4, 1e-9].map(|x| rounded(x, 4));
+        assert_eq!(texts, ["0", "1.000", "-0.01235", "98765", "1.000e-9"]);
+        assert_eq!([rounded(2.5, 1), rounded(0.36, 1), rounded(7.0, 0)], ["2", "0.4", "7"]);
+    }
+
+    #[test]
+    fn fractions_are_per_cent() {
+        assert_eq!([0.0123, 0.0, 1.0, f64::NAN].map(percent), ["1.23 %", "0 %", "100 %", "-"]);
+        assert_eq!(percentage(4.3e-7), "4.30e-5");
+    }
+
+    #[test]
+    fn lines_are_cut_at_blanks() {
+        assert_eq!(cut("one two  three", 7), ["one two", "three"]);
+        assert_eq!(cut("below 5 %, said", 7), ["below", "5 %,", "said"]);
+        assert_eq!(cut("immeasurable x", 4), ["immeasurable", "x"]);
+        assert_eq!(cut_hard("immeasurable x", 5), ["immea", "surab", "le", "x"]);
+        assert_eq!((cut("", 3), cut_hard("", 3)), (vec![String::new()], vec![String::new()]));
+    }
+
+    #[test]
+    fn only_long_lines_are_wrapped() {
+        assert_eq!(wrap_text("short\n\n  a line of words\nend", 10), "short\n\n  a line\n  of words\nend");
+        let two = "  --seed <N>  seed of the states and of the weights\n";
+        assert_eq!(
+            wrap_text(two, 30),
+            "  --seed <N>  seed of the\n              states and of\n              the weights\n"
+        );
+        assert!(wrap_text(&"word ".repeat(100), WIDTH).lines().all(|line| width(line) <= WIDTH));
     }
 }

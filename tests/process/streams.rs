@@ -7,7 +7,7 @@ use lnn::lagrangian::build;
 use lnn::recording::Columns;
 use lnn::recording::read::read_recording;
 use lnn::rollout::{Options, rollout_in_pieces};
-use lnn::storage::{Disk, Growing};
+use lnn::storage::{AtomicWriter, Disk};
 use std::ffi::OsString;
 use std::io::Write as _;
 use std::ops::ControlFlow;
@@ -29,7 +29,7 @@ fn a_rollout_takes_the_same_memory_however_long_it_is() {
     let taken = |dt: f64| {
         let mut samples = 0;
         let bytes = peak(|| {
-            let mut file = Growing::create(&Disk, &out).unwrap();
+            let mut file = AtomicWriter::create(&Disk, &out).unwrap();
             let options = Options::new(10.0, dt);
             let ending = rollout_in_pieces(&*system, &[0.1, 0.1], &[0.0, 0.0], &options, &mut |piece| {
                 file.append(piece.csv_rows().as_bytes()).unwrap();

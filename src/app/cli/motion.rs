@@ -5,7 +5,7 @@ use crate::cli::{CliError, input, output};
 use crate::names::{pluralize, rounded};
 use crate::report::{Figure, LinePlot, Picture, Report, Series, line_plot};
 use crate::rollout::{Domain, Trajectory};
-use crate::storage::{Disk, Growing, remove_leftovers, write_atomically};
+use crate::storage::{AtomicWriter, Disk, remove_leftovers, write_atomically};
 use serde::Serialize;
 use std::path::Path;
 
@@ -188,7 +188,7 @@ pub enum Target<'a> {
     /// Standard output, as they come.
     Standard,
     /// A file that takes its name when it is whole.
-    File { path: &'a Path, growing: Growing<'a> },
+    File { path: &'a Path, growing: AtomicWriter<'a> },
 }
 
 impl<'a> Target<'a> {
@@ -203,7 +203,7 @@ impl<'a> Target<'a> {
         if let Some(folder) = path.parent() {
             remove_leftovers(&Disk, if folder.as_os_str().is_empty() { Path::new(".") } else { folder });
         }
-        let growing = Growing::create(&Disk, path).map_err(|e| cannot_write(path, e))?;
+        let growing = AtomicWriter::create(&Disk, path).map_err(|e| cannot_write(path, e))?;
         Ok(Self::File { path, growing })
     }
     /// Adds text at the end.

@@ -1,8 +1,9 @@
-//! Pictures of learned and exact functions on a grid.
+//! Pictures of functions on a grid: learned and exact ones, one quantity over two coordinates, angles over one turn.
 
-use super::quantity_map::{difference_panel, panel};
-use super::{Figure, HeatMap, PlotError, heat_maps};
-use crate::analysis::{AffineFit, Grid, affine_fit, factor_fit};
+use super::{Figure, HeatMap, PlotError, figure, file_part, heat_maps};
+use crate::analysis::{AffineFit, Grid, Spread, affine_fit, factor_fit};
+use crate::names::rounded;
+use std::f64::consts::{PI, TAU};
 
 /// Transformation up to which a learned quantity is determined.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -104,11 +105,144 @@ pub fn grid_figures(comparison: &GridComparison) -> Result<(Figure, Option<Affin
     Ok((Figure { file, heading, picture, caption }, fit))
 }
 
+/// A quantity over two coordinates.
+#[derive(Clone, Debug)]
+pub(crate) struct QuantityMap {
+    /// Symbol, such as `R`.
+    pub quantity: String,
+    /// Heading of the picture, such as `Curvature scalar R of the metric`.
+    pub about: String,
+    /// Beginning of the file name, made fit for one.
+    pub file: String,
+    /// Labels of the horizontal and of the vertical axis, with units.
+    pub labels: [String; 2],
+    /// Of the model.
+    pub learned: Grid,
+    /// Of the system, if it is known.
+    pub exact: Option<Grid>,
+    /// Coordinates that are fixed, in words; may be empty.
+    pub fixed: String,
+    /// Further sentences of the caption; may be empty.
+    pub remark: String,
+    /// Points to mark in the learned map.
+    pub marks: Vec<(f64, f64)>,
+}
+
+/// One panel of a picture, without marks and with the colours of its own extremes.
+pub(super) fn panel(title: impl Into<String>, [x_label, y_label]: &[String; 2], grid: &Grid) -> HeatMap {
+    HeatMap {
+        title: title.into(),
+        x_label: x_label.clone(),
+        y_label: y_label.clone(),
+        grid: grid.clone(),
+        range: None,
+        diverging: false,
+        marks: Vec::new(),
+    }
+}
+
+/// The panel of a difference.
+fn difference_panel(labels: &[String; 2], grid: &Grid) -> HeatMap {
+    HeatMap { diverging: true, ..panel("learned \u{2212} exact", labels, grid) }
+}
+
+/// Learned map, the exact one unless it is constant, and the difference; none if there is nothing finite to show. Colours leave
+/// out the lowest and the highest hundredth of the values.
+pub(crate) fn quantity_figure(map: &QuantityMap) -> Option<Figure> {
+    let all = |grid: &Grid| Spread::of(&grid.values);
+    let (learned, exact) = (all(&map.learned), map.exact.as_ref().map(all));
+    let constant = exact.filter(|exact| exact.high - exact.low <= 1e-9 * exact.median.abs());
+    let (mut low, mut high) = (learned.low, learned.high);
+    if let Some(exact) = &exact {
+        (low, high) = (low.min(exact.low), high.max(exact.high));
+    }
+    let same = |what: &str, grid: &Grid| HeatMap {
+        range: Some((low, high)),
+        ..panel(format!("{} {what}", map.quantity), &map.labels, grid)
+    };
+    let mut panels = vec![HeatMap { marks: map.marks.clone(), ..same("learned", &map.learned) }];
+    if let Some(exact) = &map.exact {
+        if constant.is_none() {
+            panels.insert(0, same("exact", exact));
+        }
+        let difference = map.learned.minus(exact)?;
+        let Spread { low, high, .. } = all(&difference);
+        panels.push(HeatMap { range: Some((low, high)), ..difference_panel(&map.labels, &difference) });
+    }
+    let fixed = if map.fixed.is_empty() { String::new() } else { format!("At {}.", map.fixed) };
+    let beside = match (constant, &map.exact) {
+        (Some(exact), _) => format!("The exact one is {} everywhere.", rounded(exact.median, 6)),
+        (None, Some(_)) => "Exact, learned, and the difference.".to_string(),
+        (None, None) => String::new(),
+    };
+    let sentences = [&beside, &fixed, &map.remark].into_iter().filter(|text| !text.is_empty()).cloned();
+    let caption = sentences.collect::<Vec<_>>().join(" ");
+    figure(&format!("{}.svg", file_part(&map.file)), map.about.as_str(), heat_maps(&panels), caption)
+}
+
+/// The turn of an angle that an axis shows: `pi` to both sides of its middle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Turn {
+    middle: f64,
+}
+
+impl Turn {
+    /// The turn about 0 or `pi`, whichever the angles are closer to on average: they cross its ends as rarely as may be.
+    /// `None` if all of them lie within it, where there is nothing to fold.
+    pub fn of(angles: impl Iterator<Item = f64> + Clone) -> Option<Self> {
+        let mean: f64 = angles.clone().filter(|x| x.is_finite()).map(f64::cos).sum();
+        let turn = Self { middle: if mean < 0.0 { PI } else { 0.0 } };
+        let outside = |x: f64| x.is_finite() && turn.number(x) != 0.0;
+        angles.into_iter().any(outside).then_some(turn)
+    }
+
+    /// Its lower end.
+    pub fn low(self) -> f64 {
+        self.middle - PI
+    }
+
+    /// Its upper end.
+    pub fn high(self) -> f64 {
+        self.middle + PI
+    }
+
+    /// Whole turns between an angle and this turn.
+    fn number(self, x: f64) -> f64 {
+        ((x - self.low()) / TAU).floor()
+    }
+
+    /// A path `(angle, other)` with the angle brought into this turn: where it passes an end the path goes up to the end,
+    /// leaves a gap and goes on from the other end.
+    pub fn fold(self, path: &[(f64, f64)]) -> Vec<(f64, f64)> {
+        let mut folded: Vec<(f64, f64)> = Vec::with_capacity(path.len());
+        let mut before: Option<(f64, f64)> = None;
+        for &(x, y) in path {
+            let turn = self.number(x);
+            if let Some((u, w)) = before
+                && (turn - self.number(u)).abs() == 1.0
+            {
+                let up = x > u;
+                let end = if up { self.high() } else { self.low() };
+                let passed = end + TAU * self.number(u);
+                let height = if x == u { y } else { w + (passed - u) / (x - u) * (y - w) };
+                let other = if up { self.low() } else { self.high() };
+                folded.extend([(end, height), (f64::NAN, f64::NAN), (other, height)]);
+            } else if before.is_some_and(|(u, _)| self.number(u) != turn) {
+                // More than a turn between two points, or no number: no line leads there.
+                folded.push((f64::NAN, f64::NAN));
+            }
+            folded.push((x - TAU * turn, y));
+            before = Some((x, y));
+        }
+        folded
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::analysis::{Axis, determinant_grid, lagrangian_grid};
-    use crate::report::test_pictures::save;
+    use crate::report::save_pictures;
     use crate::rollout::models::{OSCILLATOR, PENDULUM};
 
     #[test]
@@ -136,7 +270,7 @@ mod tests {
         assert!((fit.a - 1.0 / 3.0).abs() < 1e-12 && (fit.b - 7.0 / 3.0).abs() < 1e-12 && fit.r2 > 1.0 - 1e-12);
         comparison.learned = grid(&OSCILLATOR);
         let (figure, _) = grid_figures(&comparison).unwrap();
-        save(&[figure]);
+        save_pictures(&[figure]);
         let det = determinant_grid::<f64>(&PENDULUM, &[0.0, 0.0], axes, |_, _| {}).unwrap();
         comparison = GridComparison {
             quantity: "det M".into(),
@@ -162,7 +296,74 @@ mod tests {
             comparison.fit = fit;
             let (figure, _) = grid_figures(&comparison).unwrap();
             assert!(figure.caption.contains("wrong sign at 24.59 %"), "{}", figure.caption);
-            save(&[figure]);
+            save_pictures(&[figure]);
         }
+    }
+
+    #[test]
+    fn a_constant_needs_no_panel() {
+        let axis = |count: u32| (0..count).map(f64::from).collect::<Vec<f64>>();
+        let grid =
+            |f: &dyn Fn(f64) -> f64| Grid { x: axis(5), y: axis(4), values: axis(20).into_iter().map(f).collect() };
+        let map = |exact| QuantityMap {
+            quantity: "R".into(),
+            about: "Curvature scalar R of the metric".into(),
+            file: "curvature scalar".into(),
+            labels: ["theta [rad]", "phi [rad]"].map(String::from),
+            learned: grid(&|k| 2.0 + 0.01 * k),
+            exact,
+            fixed: "r = 4".into(),
+            remark: String::new(),
+            marks: Vec::new(),
+        };
+        let panels = |exact| {
+            let figure = quantity_figure(&map(exact)).unwrap();
+            assert_eq!(figure.file, "curvature_scalar.svg");
+            let found = (figure.picture.panels(), figure.caption.clone());
+            save_pictures(&[figure]);
+            found
+        };
+        let alone = "At r = 4.".to_string();
+        assert_eq!(panels(None), (1, alone));
+        let constant = "The exact one is 2.00000 everywhere. At r = 4.".to_string();
+        assert_eq!(panels(Some(grid(&|_| 2.0))), (2, constant));
+        assert_eq!(panels(Some(grid(&|k| k))).0, 3);
+        let nothing = QuantityMap { learned: grid(&|_| f64::NAN), ..map(None) };
+        assert!(quantity_figure(&nothing).is_none());
+    }
+
+    #[test]
+    fn paths_break_at_the_ends_and_nowhere_else() {
+        // A pendulum that goes over the top, twice forwards and once back.
+        let angle = |k: f64| 4.0 * PI * (0.5 * PI * k / 400.0).sin();
+        let path: Vec<(f64, f64)> = (0..=600).map(|k| (angle(f64::from(k)), f64::from(k))).collect();
+        let turn = Turn::of(path.iter().map(|p| p.0)).unwrap();
+        let folded = turn.fold(&path);
+        assert_eq!((turn.low(), turn.high()), (-PI, PI));
+        let stretches: Vec<_> = folded.split(|p| p.0.is_nan()).collect();
+        assert_eq!(stretches.len(), 4);
+        for stretch in &stretches {
+            assert!(stretch.len() > 1 && stretch.iter().all(|p| (-PI..=PI).contains(&p.0)), "a stub");
+            // No horizontal line across: neighbours are as close as on the path.
+            assert!(stretch.windows(2).all(|p| (p[1].0 - p[0].0).abs() < 0.07 && p[1].1 >= p[0].1));
+        }
+        for pair in stretches.windows(2) {
+            let (end, begin) = (pair[0].last().unwrap(), pair[1][0]);
+            assert!((end.0.abs() - PI).abs() < 1e-12 && end.0 == -begin.0 && end.1 == begin.1);
+        }
+    }
+
+    #[test]
+    fn turns_lie_about_the_motion() {
+        // About the top: from 0 to 2 pi.
+        let up = Turn::of([3.0, 4.0, 2.5, 7.0].into_iter()).unwrap();
+        assert_eq!((up.low(), up.high()), (0.0, TAU));
+        assert_eq!(Turn::of([3.0, 4.0, 2.5].into_iter()), None);
+        assert_eq!(Turn::of([0.1, -3.0, f64::NAN].into_iter()), None);
+        // Jumps leave gaps, and what is no number stays so.
+        let jump =
+            Turn::of([0.0, 20.0].into_iter()).unwrap().fold(&[(0.0, 1.0), (20.0, 2.0), (f64::NAN, 3.0), (0.5, 4.0)]);
+        assert_eq!(jump.iter().filter(|p| p.0.is_finite()).count(), 3);
+        assert!(jump.windows(2).all(|pair| pair[0].0.is_nan() || pair[1].0.is_nan()));
     }
 }

@@ -1,8 +1,6 @@
-//! One self-contained HTML page.
+//! One self-contained HTML page, with its text escaped and its bytes in base64.
 
 use super::Figure;
-use super::base64::base64;
-use super::escape::escape;
 use std::fmt::Write as _;
 
 const STYLE: &str = "\
@@ -182,6 +180,41 @@ fn above(heading: &str) -> String {
     if heading.is_empty() { String::new() } else { format!("<h3>{}</h3>", escape(heading)) }
 }
 
+/// Base64 with padding (RFC 4648, section 4).
+pub(super) fn base64(bytes: &[u8]) -> String {
+    const ALPHABET: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
+    for chunk in bytes.chunks(3) {
+        let byte = |i: usize| u32::from(chunk.get(i).copied().unwrap_or(0));
+        let bits = byte(0) << 16 | byte(1) << 8 | byte(2);
+        for place in 0..4 {
+            if place <= chunk.len() {
+                text.push(char::from(ALPHABET[(bits >> (18 - 6 * place) & 63) as usize]));
+            } else {
+                text.push('=');
+            }
+        }
+    }
+    text
+}
+
+/// Text with the characters that mean something in HTML replaced; control characters that HTML forbids are dropped.
+pub(super) fn escape(text: &str) -> String {
+    let mut escaped = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '&' => escaped.push_str("&amp;"),
+            '<' => escaped.push_str("&lt;"),
+            '>' => escaped.push_str("&gt;"),
+            '"' => escaped.push_str("&quot;"),
+            '\'' => escaped.push_str("&#39;"),
+            c if c.is_control() && !"\n\r\t".contains(c) => {}
+            c => escaped.push(c),
+        }
+    }
+    escaped
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -221,5 +254,13 @@ mod tests {
         // A picture stands under what it shows.
         let place = |part: &str| html.rfind(part).unwrap();
         assert!(place("<h3>") < place("class=\"panels\"") && place("class=\"panels\"") < place("<figcaption>"));
+    }
+
+    #[test]
+    fn base64_of_the_standard() {
+        for (plain, coded) in [("", ""), ("f", "Zg=="), ("fo", "Zm8="), ("foo", "Zm9v"), ("foobar", "Zm9vYmFy")] {
+            assert_eq!(base64(plain.as_bytes()), coded);
+        }
+        assert_eq!(base64(&[0xff, 0xfe, 0xfd]), "//79");
     }
 }

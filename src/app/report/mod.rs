@@ -1,40 +1,28 @@
 //! Plots, tables and the HTML report.
 
-mod base64;
-mod data_table;
-mod escape;
 mod evaluation;
 mod experiment;
 mod grids;
 mod html;
 mod page;
 mod plot;
-mod quantity_map;
-mod readings;
 mod table;
-#[cfg(test)]
-mod test_pictures;
-mod training;
-mod turn;
 
-pub use data_table::DataTable;
-pub(crate) use evaluation::{evaluation_figures, units};
+pub(crate) use evaluation::{HistoryRow, evaluation_figures, training_figures, units};
 pub use experiment::Curve;
 pub(crate) use experiment::{
     REDUCTION_HEADER, experiment_curves, experiment_figures, experiment_table, experiment_view, reduction_table,
 };
 pub use grids::{Fit, GridComparison, grid_figures};
+pub(crate) use grids::{QuantityMap, Turn, quantity_figure};
 pub use html::Report;
 pub use page::{PageError, page};
 pub use plot::{
     HeatMap, Level, LinePlot, OrbitPlot, Picture, PlotError, Series, Trace, heat_maps, line_plot, orbit_picture, png,
     trace_plot,
 };
-pub(crate) use quantity_map::{QuantityMap, quantity_figure};
-pub(crate) use readings::{READING_HEADER, reading_table};
-pub use table::text_table;
-pub(crate) use training::{HistoryRow, training_figures};
-pub(crate) use turn::Turn;
+pub use table::{DataTable, text_table};
+pub(crate) use table::{READING_HEADER, reading_table};
 
 /// One picture of a report.
 #[derive(Clone, Debug, PartialEq)]
@@ -63,4 +51,14 @@ pub(crate) fn figure(
 /// A name as part of a file name.
 pub(crate) fn file_part(name: &str) -> String {
     name.chars().map(|c| if c.is_ascii_alphanumeric() || c == '_' { c } else { '_' }).collect()
+}
+
+/// Keeps pictures to look at in the directory that `LNN_TEST_PICTURES` names.
+#[cfg(test)]
+pub(crate) fn save_pictures(figures: &[Figure]) {
+    if let Ok(directory) = std::env::var("LNN_TEST_PICTURES") {
+        for figure in figures {
+            std::fs::write(std::path::Path::new(&directory).join(&figure.file), figure.picture.to_svg()).unwrap();
+        }
+    }
 }

@@ -1,7 +1,7 @@
-//! A model as a page to play with: one HTML file that holds its recorded functions and its weights, and the JavaScript that evaluates them.
+//! A model as a page to play with: one HTML file that holds its recorded functions and its weights, and the JavaScript that
+//! evaluates them.
 
-use super::base64::base64;
-use super::escape::escape;
+use super::html::{base64, escape};
 use crate::lagrangian::system::Bounds;
 use crate::lagrangian::{Lagrangian, LagrangianVisitor, SystemInstance};
 use crate::network::NetworkLagrangian;

@@ -1,7 +1,7 @@
 //! System, penalty, shape of the network and header of the model file that a configuration asks for.
 
 use crate::configuration::{Config, ConfigError, Penalty, Precision};
-use crate::data::draw::SamplingError;
+use crate::data::sampling::SamplingError;
 use crate::lagrangian::system::System;
 use crate::lagrangian::{SystemInstance, configure_values, resolve};
 use crate::network::Architecture;

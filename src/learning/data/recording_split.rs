@@ -4,11 +4,8 @@
 //! local polynomials ([`Smoothing`]) unless they were measured; accelerations so obtained start a network that may then
 //! be fitted through its motion ([`shooting`](crate::shooting)).
 
-use crate::data::dataset::Datasets;
-use crate::data::dataset::{Dataset, DatasetError};
-use crate::data::dataset::{Noise, StateEstimate};
+use crate::data::dataset::{Dataset, DatasetError, Datasets, Noise, StateEstimate, Weighting};
 use crate::data::force_sizes::by_forces;
-use crate::data::weights::Weighting;
 use crate::recording::smooth::{SmoothError, SmoothOptions, Smoothed, Smoothing, noise};
 use crate::recording::survey::{Stillness, plan, stillness};
 use crate::recording::{HeldOut, HoldOutError, RecordedTrajectory, Recording, Targets};

@@ -1,17 +1,17 @@
-//! Training data of hand-written systems: uniform states with exact accelerations.
+//! Training data of hand-written systems: uniform states, or states along exact motions, with exact accelerations.
 
-use crate::configuration::Config;
-use crate::data::dataset::Datasets;
-use crate::data::dataset::{Dataset, DatasetError};
-use crate::data::draw::{Drawn, SamplingError, draw};
-use crate::data::motions::along_motions;
+use crate::configuration::{Config, ConfigError};
+use crate::data::dataset::{Dataset, DatasetError, Datasets, Weighting};
 use crate::data::shell::{in_shell, weigh_by_distance};
-use crate::data::weights::Weighting;
-use crate::lagrangian::SystemInstance;
+use crate::lagrangian::system::Coordinate;
+use crate::lagrangian::{DescriptionError, EulerLagrange, Interruptible, SystemError, SystemInstance, project};
 use crate::random::RngStream;
+use crate::rollout::{Domain, Method, Options, rollout};
 use crate::scalar::Scalar;
 use rand::Rng;
-use std::sync::atomic::AtomicBool;
+use std::f64::consts::TAU;
+use std::sync::atomic::{AtomicBool, Ordering};
+use thiserror::Error;
 
 /// Draws `states` states uniformly from a box, with their exact accelerations, all in double precision.
 ///
@@ -142,12 +142,230 @@ pub(crate) fn sample_all_until<S: Scalar>(
     Ok((Datasets { training, validation: validation.cast(), test: test.cast() }, scale))
 }
 
+/// Why states could not be sampled.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum SamplingError {
+    /// The system does not exist or has no such parameter.
+    #[error(transparent)]
+    System(#[from] SystemError),
+    /// A wrong description of a system.
+    #[error("description.{0}")]
+    Description(#[from] DescriptionError),
+    /// The configuration is out of range.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// Most of the box lies outside the domain of the system.
+    #[error("{field}: most of these bounds lie where {demand} is violated or accelerations are not finite")]
+    Domain {
+        /// Which bounds.
+        field: String,
+        /// Demand of the system.
+        demand: &'static str,
+    },
+    /// Motions of the trajectory test hardly pass through the box.
+    #[error(
+        "{field}: hardly any motion of the trajectory test stays within these bounds; data.trajectory_fraction asks for such states"
+    )]
+    Motions {
+        /// Which bounds.
+        field: String,
+    },
+    /// A flag ended it.
+    #[error("interrupted while states were drawn")]
+    Interrupted,
+    /// The accelerations do not fit the precision.
+    #[error(transparent)]
+    Dataset(#[from] DatasetError),
+}
+
+/// States of a system as they are drawn, with their exact accelerations.
+pub(crate) struct Drawn<'a> {
+    system: &'a SystemInstance<f64>,
+    /// The motion of a system under constraints.
+    constrained: Option<Box<dyn EulerLagrange<f64>>>,
+    pub q: Vec<f64>,
+    pub v: Vec<f64>,
+    a: Vec<f64>,
+}
+
+/// Where a state is not finite, or cannot be brought.
+const FINITE: &str = "a finite acceleration";
+const CONSTRAINTS: &str = "some constraint";
+
+impl<'a> Drawn<'a> {
+    /// None yet.
+    ///
+    /// # Errors
+    /// [`SamplingError::System`] for constraints that contradict each other or leave no motion.
+    pub fn new(system: &'a SystemInstance<f64>) -> Result<Self, SamplingError> {
+        let constrained = system.constraints().map(|_| system.build()).transpose()?;
+        Ok(Self { system, constrained, q: Vec::new(), v: Vec::new(), a: Vec::new() })
+    }
+
+    /// Goes on unless a flag was raised.
+    ///
+    /// # Errors
+    /// [`SamplingError::Interrupted`].
+    pub fn go_on(interrupt: &AtomicBool) -> Result<(), SamplingError> {
+        if interrupt.load(Ordering::Relaxed) { Err(SamplingError::Interrupted) } else { Ok(()) }
+    }
+
+    /// Brings a state to the mass shell of the system, or the shortest way to its constraints; what is demanded where there is no way.
+    pub fn impose(&self, q: &mut [f64], v: &mut [f64]) -> Result<Option<&'static str>, SamplingError> {
+        self.system.impose_constraint(q, v)?;
+        let manifold = self.constrained.as_ref().and_then(|model| model.manifold());
+        Ok(manifold.and_then(|manifold| project(manifold, q, v).err()).map(|_| CONSTRAINTS))
+    }
+
+    /// Takes a state, unless it lies outside the system's domain or has no finite acceleration: then what is demanded.
+    pub fn take(&mut self, q: &[f64], v: &[f64]) -> Result<Option<&'static str>, SamplingError> {
+        let a = match &self.constrained {
+            Some(model) => model.acceleration(q, v).unwrap_or_default(),
+            None => self.system.exact_acceleration(q, v)?,
+        };
+        let finite = a.len() == q.len() && a.iter().all(|a| a.is_finite());
+        let demand = self.system.check_domain(q).err().or((!finite).then_some(FINITE));
+        if demand.is_none() {
+            self.q.extend(q);
+            self.v.extend(v);
+            self.a.extend(a);
+        }
+        Ok(demand)
+    }
+
+    /// The states, with the rows of the constraints if there are any.
+    ///
+    /// # Errors
+    /// [`SamplingError::Dataset`] without any state, or where a constraint is not finite.
+    pub fn finish(self) -> Result<Dataset<f64>, SamplingError> {
+        let set = Dataset::new(self.system.coordinates, self.q, self.v, self.a)?;
+        match self.constrained.as_ref().and_then(|model| model.manifold()) {
+            Some(manifold) => Ok(set.on(manifold)?),
+            None => Ok(set),
+        }
+    }
+}
+
+/// Coordinates and velocities of a state, uniform within bounds; half of the [`log_uniform`](crate::configuration::Phase::log_uniform)
+/// coordinates uniform in their logarithm.
+pub(crate) fn draw(
+    (position, velocity): (&[[f64; 2]], &[[f64; 2]]),
+    log_uniform: &[bool],
+    rng: &mut impl Rng,
+) -> (Vec<f64>, Vec<f64>) {
+    let mut uniform = |bounds: &[[f64; 2]]| -> Vec<f64> {
+        let one = |&[low, high]: &[f64; 2]| match high - low {
+            length if length.is_infinite() => {
+                let share = rng.random::<f64>();
+                (1.0 - share) * low + share * high
+            }
+            _ if low < high => rng.random_range(low..high),
+            _ => low,
+        };
+        bounds.iter().map(one).collect()
+    };
+    let (mut q, v) = (uniform(position), uniform(velocity));
+    for (i, q) in q.iter_mut().enumerate() {
+        if log_uniform.get(i) == Some(&true) && rng.random::<bool>() {
+            let [low, high] = position[i];
+            *q = low * (high / low).powf(rng.random::<f64>());
+        }
+    }
+    (q, v)
+}
+
+/// Bounds in the form of a configuration.
+pub(crate) fn boxes(bounds: &[(f64, f64)]) -> Vec<[f64; 2]> {
+    bounds.iter().map(|&(low, high)| [low, high]).collect()
+}
+
+/// States that a motion of full length gives on average.
+const PER_MOTION: f64 = 10.0;
+
+/// Draws `states` states of exact motions from the starts of the system's trajectory test, every sample up to its end with
+/// the same chance; a motion ends where it leaves the bounds. An angle is turned back into its bounds, to any turn that lies
+/// within them. Starts are drawn as states are, half of the log-uniform coordinates uniform in their logarithm.
+///
+/// # Errors
+/// [`SamplingError::Motions`] if hardly any motion stays within the bounds for a while.
+fn along_motions<'a>(
+    system: &'a SystemInstance<f64>,
+    field: &str,
+    (position, velocity): (&[[f64; 2]], &[[f64; 2]]),
+    log_uniform: &[bool],
+    states: usize,
+    (rng, interrupt): (&mut impl Rng, &AtomicBool),
+) -> Result<Drawn<'a>, SamplingError> {
+    let n = system.coordinates;
+    let test = system.system.trajectory(n);
+    let [places, speeds] = [&test.start.positions, &test.start.velocities].map(|bounds| boxes(bounds));
+    let coordinates = system.system.coordinates(n);
+    let exact = system.build()?;
+    let exact = Interruptible::new(exact.as_ref(), interrupt);
+    let fixed = system.constrained_coordinate();
+    let chart = position.iter().zip(&coordinates).map(|(b, c)| (!c.periodic).then_some((b[0], b[1])));
+    let pace = velocity.iter().enumerate().map(|(i, b)| (Some(i) != fixed).then_some((b[0], b[1])));
+    let options = Options {
+        method: Method::Dop853,
+        rtol: 1e-9,
+        atol: 1e-9,
+        energy: false,
+        domain: Some(Domain::new(chart.chain(pace).collect())),
+        ..Options::new(test.t_end, test.dt)
+    };
+    let chance = PER_MOTION * test.dt / test.t_end;
+    let mut drawn = Drawn::new(system)?;
+    let mut motions = 0;
+    while drawn.q.len() < states * n {
+        Drawn::go_on(interrupt)?;
+        if motions > 100 && drawn.q.len() < motions * n {
+            return Err(SamplingError::Motions { field: field.to_string() });
+        }
+        motions += 1;
+        let (mut start, mut speed) = draw((&places, &speeds), log_uniform, rng);
+        if drawn.impose(&mut start, &mut speed)?.is_some() {
+            continue;
+        }
+        let motion = rollout(&exact, &start, &speed, &options).trajectory;
+        for (q, v) in motion.q.chunks_exact(n).zip(motion.v.chunks_exact(n)) {
+            if drawn.q.len() == states * n || rng.random::<f64>() >= chance {
+                continue;
+            }
+            let (mut q, mut v) = (q.to_vec(), v.to_vec());
+            if turn_back(&mut q, &coordinates, position, rng) {
+                // Integration left the mass shell by its tolerance.
+                if drawn.impose(&mut q, &mut v)?.is_none() {
+                    drawn.take(&q, &v)?;
+                }
+            }
+        }
+    }
+    Ok(drawn)
+}
+
+/// Turns angles to any turn within their bounds; `false` if there is none.
+fn turn_back(q: &mut [f64], coordinates: &[Coordinate], bounds: &[[f64; 2]], rng: &mut impl Rng) -> bool {
+    let angles = q.iter_mut().zip(coordinates).zip(bounds).filter(|((_, coordinate), _)| coordinate.periodic);
+    for ((q, _), &[low, high]) in angles {
+        let first = low + (*q - low).rem_euclid(TAU);
+        let more = ((high - first) / TAU).floor();
+        if more < 0.0 {
+            return false;
+        }
+        *q = first + TAU * f64::from(rng.random_range(0..=more as u32));
+    }
+    true
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::data::sample_all;
     use crate::lagrangian::{Request, Terms, configure};
     use crate::presets::Preset;
     use std::borrow::Cow;
+    use std::f64::consts::PI;
 
     #[test]
     fn every_state_of_a_relativistic_system_is_on_the_mass_shell() {
@@ -381,5 +599,72 @@ mod tests {
         let set = at(-1.0, 1.0).unwrap();
         assert!(set.v().chunks(3).all(|v| v.iter().map(|v| v * v).sum::<f64>() < 1.0));
         assert!(matches!(at(0.9, 1.0), Err(SamplingError::Domain { demand: "a finite acceleration", .. })));
+    }
+
+    #[test]
+    fn states_keep_what_their_motions_keep() {
+        let system = configure::<f64>("sphere-geodesic", &[]).unwrap();
+        let mut config = Preset::Quick.config(&system).unwrap();
+        (config.data.training, config.data.validation, config.data.test) = (2000, 10, 10);
+        config.phases[0].position = vec![[0.2, PI - 0.2], [0.5, 13.5]];
+        config.phases[0].velocity = vec![[-5.0, 5.0], [-15.0, 15.0]];
+        let mut seen = |fraction: f64| {
+            config.data.trajectory_fraction = fraction;
+            let (data, _) = sample_all::<f64>(&config, &system).unwrap();
+            let set = &data.training[0];
+            assert_eq!(set.len(), 2000);
+            let (mut slow, mut turns, mut away) = (0, [0; 3], 0);
+            for ((q, v), a) in set.q().chunks(2).zip(set.v().chunks(2)).zip(set.a().chunks(2)) {
+                let inside =
+                    |x: &[f64], bounds: &[[f64; 2]]| x.iter().zip(bounds).all(|(x, b)| (b[0]..=b[1]).contains(x));
+                assert!(inside(q, &config.phases[0].position) && inside(v, &config.phases[0].velocity));
+                assert_eq!(system.exact_acceleration(q, v).unwrap(), a);
+                // No start is faster than sqrt(2^2 + 2^2), and speed is kept.
+                slow += usize::from((v[0] * v[0] + (q[0].sin() * v[1]).powi(2)).sqrt() <= 8f64.sqrt() + 1e-6);
+                turns[(q[1] / TAU) as usize] += 1;
+                // Starts lie between pi/4 and 3 pi/4.
+                away += usize::from(q[0].sin() < 0.5f64.sqrt());
+            }
+            assert!(turns.iter().all(|&k| k > 50), "{turns:?}");
+            (slow, away)
+        };
+        let (slow, away) = seen(1.0);
+        assert!(slow == 2000 && away > 300, "{slow} {away}");
+        // Uniform states are as slow now and then, by area not above pi (2.83^2) / (10 * 30 sin theta).
+        assert!((1000..1500).contains(&seen(0.5).0));
+        assert!(seen(0.0).0 < 500);
+    }
+
+    #[test]
+    fn spacetime_motions_are_on_the_shell_and_keep_their_momenta() {
+        let system = configure::<f64>("ads4-geodesic", &[]).unwrap();
+        let bounds = (
+            &[[-5.0, 5.0], [-5.0, 5.0], [-5.0, 5.0], [0.4, 6.0]][..],
+            &[[0.0, 0.0], [-2.0, 2.0], [-2.0, 2.0], [-2.0, 2.0]][..],
+        );
+        let mut rng = crate::random::RngStream::Training(0).generator(3);
+        let drawn =
+            along_motions(&system, "phase[0].position", bounds, &[], 500, (&mut rng, &AtomicBool::new(false))).unwrap();
+        for (q, v) in drawn.q.chunks(4).zip(drawn.v.chunks(4)) {
+            let mut shell = v.to_vec();
+            system.impose_constraint(q, &mut shell).unwrap();
+            assert_eq!(shell, v);
+            // x'/z^2 of the starts is within 0.25/0.5^2.
+            assert!((v[1] / q[3].powi(2)).abs() <= 1.0 + 1e-6 && q[0] >= 0.0);
+        }
+        assert!(drawn.v.chunks(4).any(|v| v[3] > 1.2));
+    }
+
+    #[test]
+    fn bounds_that_no_motion_passes_through_are_refused() {
+        let system = configure::<f64>("ads2-geodesic", &[]).unwrap();
+        let mut config = Preset::Quick.config(&system).unwrap();
+        (config.data.training, config.data.trajectory_fraction) = (500, 0.1);
+        config.phases[0].position[1] = [5.0, 6.0];
+        let refused = sample_all::<f64>(&config, &system).unwrap_err().to_string();
+        assert!(refused.starts_with("phase[0].position: hardly any motion"), "{refused}");
+        config.data.trajectory_fraction = f64::NAN;
+        let refused = sample_all::<f64>(&config, &system).unwrap_err().to_string();
+        assert!(refused.starts_with("data.trajectory_fraction: ") && refused.ends_with("found NaN"), "{refused}");
     }
 }

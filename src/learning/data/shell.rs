@@ -1,9 +1,8 @@
 //! Time-like states in a shell around a centre, and weights by which near and far count alike.
 
 use crate::configuration::{ConfigError, Shell};
-use crate::data::dataset::Dataset;
-use crate::data::draw::{Drawn, SamplingError, draw};
-use crate::data::weights::Weighting;
+use crate::data::dataset::{Dataset, Weighting};
+use crate::data::sampling::{Drawn, SamplingError, draw};
 use crate::lagrangian::{EulerLagrange, Request, SystemInstance, Terms};
 use crate::linalg::{Workspace, inverse};
 use rand::Rng;

@@ -1,17 +1,12 @@
-//! Update rules of the weights, from Adam to SOAP, with weight decay and gradient clipping, one step at a time.
+//! Update rules of the weights, from Adam to SOAP, with weight decay and gradient clipping, one step at a time;
+//! schedules of the learning rate.
 
-mod eigenvectors;
-mod orthonormal;
-mod part;
-mod schedule;
 mod soap;
 
-pub use schedule::Schedule;
 pub(crate) use soap::Block;
 
 use crate::scalar::{Real, Scalar, vectorized};
 use crate::storage::container::state::numbers;
-use part::Part;
 use serde::{Deserialize, Serialize};
 use soap::{Eigenbasis, Step};
 
@@ -245,6 +240,117 @@ fn norm<S: Scalar>(gradient: &[S]) -> f64 {
     sums.iter().sum::<f64>().sqrt()
 }
 
+/// Keeps a step finite where a second moment vanishes.
+const EPSILON: f64 = 1e-8;
+
+/// Adam's rule at one step.
+#[derive(Clone, Copy)]
+struct Rule<S> {
+    /// Factors of both moments, and of the gradient and its square that are added to them.
+    keep: [S; 2],
+    take: [S; 2],
+    /// Step length, and the factor of the second moment's root; no factor where RAdam does without the second moment.
+    length: S,
+    scale: Option<S>,
+    epsilon: S,
+}
+
+impl<S: Scalar> Rule<S> {
+    /// The rule at step `step`, counted from 1.
+    pub fn new(update: &Update, step: u32) -> Self {
+        let (length, scale) = update.step_size(step);
+        let decay = update.method.traits().decay;
+        Self {
+            keep: decay.map(S::of_f64),
+            take: decay.map(|b| S::of_f64(1.0 - b)),
+            length: S::of_f64(length),
+            scale: scale.map(S::of_f64),
+            epsilon: S::of_f64(EPSILON),
+        }
+    }
+
+    /// Moves both moments of a number on and returns its step.
+    #[inline(always)]
+    pub fn advance(&self, m: &mut S, v: &mut S, g: S) -> S {
+        *m = self.keep[0] * *m + self.take[0] * g;
+        *v = self.keep[1] * *v + self.take[1] * g * g;
+        self.length
+            * match self.scale {
+                Some(scale) => *m / (v.sqrt() * scale + self.epsilon),
+                None => *m,
+            }
+    }
+}
+
+/// Some of the parameters, from number `start` on, with their gradients and moments.
+struct Part<'a, S> {
+    pub start: usize,
+    pub weights: &'a mut [S],
+    pub gradient: &'a mut [S],
+    pub first: &'a mut [S],
+    pub second: &'a mut [S],
+}
+
+impl<S: Scalar> Part<'_, S> {
+    /// The parameters before number `at`, and those from there on.
+    pub fn split(self, at: usize) -> (Self, Self) {
+        let k = at - self.start;
+        let (weights, gradient) = (self.weights.split_at_mut(k), self.gradient.split_at_mut(k));
+        let (first, second) = (self.first.split_at_mut(k), self.second.split_at_mut(k));
+        (
+            Self { start: self.start, weights: weights.0, gradient: gradient.0, first: first.0, second: second.0 },
+            Self { start: at, weights: weights.1, gradient: gradient.1, first: first.1, second: second.1 },
+        )
+    }
+
+    /// Turns the gradient into the step, and moves both moments on.
+    pub fn advance(&mut self, rule: &Rule<S>) {
+        vectorized(
+            #[inline(always)]
+            || {
+                let moments = self.first.iter_mut().zip(&mut *self.second);
+                self.gradient.iter_mut().zip(moments).for_each(|(g, (m, v))| *g = rule.advance(m, v, *g));
+            },
+        );
+    }
+
+    /// Takes the step that the gradient was turned into.
+    pub fn apply(self) {
+        vectorized(
+            #[inline(always)]
+            || self.weights.iter_mut().zip(&*self.gradient).for_each(|(w, &step)| *w -= step),
+        );
+    }
+}
+
+/// Course of the learning rate within a phase.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum Schedule {
+    /// The rate stays.
+    Constant,
+    /// Half a cosine from the rate to `eta_min` over the whole phase.
+    Cosine,
+    /// Cosine annealing with period `2 t_max`: falls to `eta_min` in `t_max` epochs, rises again in the next `t_max`
+    /// (the paper's schedule).
+    CosineAnnealing,
+}
+
+impl Schedule {
+    /// Learning rate after a fraction of the phase.
+    ///
+    /// `epoch` counts from 0 and may be fractional; `epochs` is the length of the phase.
+    pub fn rate(self, rate: f64, eta_min: f64, t_max: f64, epoch: f64, epochs: f64) -> f64 {
+        let cosine = |phase: f64| eta_min + 0.5 * (rate - eta_min) * (1.0 + (std::f64::consts::PI * phase).cos());
+        match self {
+            Self::Constant => rate,
+            Self::Cosine => cosine((epoch / epochs).min(1.0)),
+            Self::CosineAnnealing => cosine(epoch / t_max),
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -322,5 +428,23 @@ mod tests {
             assert!(!moments.update(&mut weights, &mut [0.0, bad], &plain(Method::Adam, 0.1)).is_finite());
             assert_eq!((weights, &moments), ([1.0, 2.0], &Moments::new(2)));
         }
+    }
+
+    #[test]
+    fn the_annealed_rate_falls_and_rises_again() {
+        let rate = |epoch| Schedule::CosineAnnealing.rate(1e-3, 1e-6, 30.0, epoch, 300.0);
+        assert_eq!(rate(0.0), 1e-3);
+        assert!((rate(30.0) - 1e-6).abs() < 1e-18);
+        assert!((rate(15.0) - 0.5 * (1e-3 + 1e-6)).abs() < 1e-15);
+        assert!((rate(60.0) - 1e-3).abs() < 1e-15);
+    }
+
+    #[test]
+    fn the_plain_cosine_ends_at_its_minimum() {
+        let rate = |epoch| Schedule::Cosine.rate(3e-3, 0.0, 1.0, epoch, 20.0);
+        assert_eq!(rate(0.0), 3e-3);
+        assert!(rate(20.0).abs() < 1e-18);
+        assert!(rate(25.0).abs() < 1e-18);
+        assert!((rate(10.0) - 1.5e-3).abs() < 1e-15);
     }
 }

@@ -4,11 +4,10 @@
 //! rows); Adam works on `U G V^T`, where the curvature is closer to diagonal, and its step is turned back. The
 //! eigenvectors follow by a step of subspace iteration every [`EVERY`] steps.
 
-use crate::linalg::{MatMut, MatRef, gemm};
-use crate::optimizers::Update;
-use crate::optimizers::eigenvectors::Side;
-use crate::optimizers::part::{Part, Rule};
-use crate::scalar::{Real, Scalar};
+use crate::linalg::{MatMut, MatRef, Workspace, eigh, gemm};
+use crate::optimizers::{Part, Rule, Update};
+use crate::scalar::{Real, Scalar, vectorized};
+use crate::storage::container::state::numbers;
 use serde::{Deserialize, Serialize};
 
 /// Steps between two looks at the eigenvectors.
@@ -192,13 +191,216 @@ impl<S: Scalar> Step<S> {
     }
 }
 
+/// Running means after a step.
+const KEEP: f64 = 0.95;
+/// Rows of a square that are multiplied at once, up to the last column that lies on the diagonal.
+const ROWS: usize = 32;
+
+/// Running mean of `G G^T` or `G^T G` and its eigenvectors as rows, `(size, size)`; empty if this side is not turned.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(bound = "S: Scalar")]
+pub(super) struct Side<S> {
+    pub size: usize,
+    /// Up to its diagonal; beyond it lie numbers of the last look at the eigenvectors.
+    #[serde(with = "numbers")]
+    pub covariance: Vec<S>,
+    #[serde(with = "numbers")]
+    pub vectors: Vec<S>,
+    /// The next eigenvectors, then how they are turned against the last; empty after they were read, until they are looked for.
+    #[serde(skip)]
+    next: Vec<S>,
+    #[serde(skip)]
+    pub turn: Vec<S>,
+}
+
+/// Equal in what a step leaves behind.
+impl<S: PartialEq> PartialEq for Side<S> {
+    fn eq(&self, other: &Self) -> bool {
+        (&self.covariance, &self.vectors) == (&other.covariance, &other.vectors)
+    }
+}
+
+impl<S: Scalar> Side<S> {
+    pub fn new(size: usize) -> Self {
+        let zeros = || vec![<S as Real>::zero(); size * size];
+        Self { size, covariance: zeros(), vectors: zeros(), next: zeros(), turn: zeros() }
+    }
+
+    /// `true` if this is a side of `size`, with all its numbers.
+    pub fn is_of(&self, size: usize) -> bool {
+        self.size == size && [&self.covariance, &self.vectors].iter().all(|numbers| numbers.len() == size * size)
+    }
+
+    pub fn matrix<'a>(&self, data: &'a [S]) -> MatRef<'a, S> {
+        MatRef::new(data, self.size, self.size)
+    }
+
+    /// Adds `g g^T` to the running mean; the first one gives the first eigenvectors.
+    pub fn observe(&mut self, g: MatRef<'_, S>, first: bool) {
+        if self.size == 0 {
+            return;
+        }
+        let (keep, take) = if first { (0.0, 1.0) } else { (KEEP, 1.0 - KEEP) };
+        let keep = S::of_f64(keep);
+        self.covariance.iter_mut().for_each(|c| *c *= keep);
+        let size = self.size;
+        for start in (0..size).step_by(ROWS) {
+            let end = (start + ROWS).min(size);
+            let rows = MatMut::with_stride(&mut self.covariance[start * size..], end - start, end, size);
+            gemm(rows, true, S::of_f64(take), g.row_range(start, end), g.row_range(0, end).t());
+        }
+        if first {
+            self.begin();
+        }
+    }
+
+    /// Completes the running mean beyond its diagonal.
+    fn complete(&mut self) {
+        let size = self.size;
+        for i in 0..size {
+            for j in 0..i {
+                self.covariance[j * size + i] = self.covariance[i * size + j];
+            }
+        }
+    }
+
+    /// Eigenvectors of the first running mean, those of large eigenvalues first.
+    fn begin(&mut self) {
+        let size = self.size;
+        self.complete();
+        let mut values = vec![<S as Real>::zero(); size];
+        self.next.resize(size * size, <S as Real>::zero());
+        let done = eigh(size, &self.covariance, &mut values, &mut self.next, &mut Workspace::new());
+        for (k, vector) in self.vectors.chunks_exact_mut(size).enumerate() {
+            match done {
+                Ok(()) => vector.copy_from_slice(&self.next[(size - 1 - k) * size..][..size]),
+                Err(_) => (0..size).for_each(|i| vector[i] = S::of_f64(f64::from(u8::from(i == k)))),
+            }
+        }
+    }
+
+    /// One step of subspace iteration; `turn` becomes new vectors times old ones transposed. Nothing changes where the
+    /// mean is not finite.
+    pub fn update_basis(&mut self) {
+        let size = self.size;
+        if size == 0 {
+            return;
+        }
+        self.next.resize(size * size, <S as Real>::zero());
+        self.turn.resize(size * size, <S as Real>::zero());
+        self.complete();
+        let trace = self.covariance.iter().step_by(size + 1).fold(<S as Real>::zero(), |sum, &c| sum + c);
+        // Vectors of eigenvalues that are lost in rounding stay where they are.
+        let shift = S::epsilon() * trace + S::min_positive();
+        product(size, &mut self.next, &self.vectors, MatRef::new(&self.covariance, size, size));
+        for (next, &vector) in self.next.iter_mut().zip(&self.vectors) {
+            *next += shift * vector;
+        }
+        if !orthonormalize(size, &mut self.next, &mut self.turn) {
+            self.next.copy_from_slice(&self.vectors);
+        }
+        product(size, &mut self.turn, &self.next, MatRef::new(&self.vectors, size, size).t());
+        std::mem::swap(&mut self.vectors, &mut self.next);
+    }
+}
+
+/// `out = a b` of square matrices.
+fn product<S: Scalar>(size: usize, out: &mut [S], a: &[S], b: MatRef<'_, S>) {
+    gemm(MatMut::new(out, size, size), false, <S as Real>::one(), MatRef::new(a, size, size), b);
+}
+
+/// Rows that are made orthonormal at once.
+const PANEL: usize = 16;
+
+/// Makes the rows orthonormal, one after the other: a block of rows against those before it by matrix products, then within
+/// itself, all of it twice (Giraud, Langou, Rozložník 2005: twice is enough; for blocks Barlow, Smoktunowicz 2013); `false` if
+/// a row vanishes or is not finite.
+///
+/// `scratch` has room for as many numbers as `rows`.
+fn orthonormalize<S: Scalar>(size: usize, rows: &mut [S], scratch: &mut [S]) -> bool {
+    let one = <S as Real>::one();
+    for start in (0..size).step_by(PANEL) {
+        let (before, rest) = rows.split_at_mut(start * size);
+        let count = PANEL.min(size - start);
+        let block = &mut rest[..count * size];
+        if !normalize(size, block) {
+            return false;
+        }
+        for _ in 0..2 {
+            if start > 0 {
+                let (before, along) = (MatRef::new(before, start, size), &mut scratch[..count * start]);
+                let now = MatRef::new(block, count, size);
+                gemm(MatMut::new(along, count, start), false, one, now, before.t());
+                let along = MatRef::new(along, count, start);
+                gemm(MatMut::new(block, count, size), true, -one, along, before);
+            }
+            if !orthonormalize_within(size, block) {
+                return false;
+            }
+        }
+    }
+    true
+}
+
+/// Gives every row the length 1; `false` if one vanishes or is not finite.
+fn normalize<S: Scalar>(size: usize, rows: &mut [S]) -> bool {
+    rows.chunks_exact_mut(size).all(|row| {
+        let scale = norm(row).recip();
+        row.iter_mut().for_each(|x| *x *= scale);
+        scale.is_finite()
+    })
+}
+
+/// Makes a few rows orthonormal, one after the other.
+fn orthonormalize_within<S: Scalar>(size: usize, rows: &mut [S]) -> bool {
+    vectorized(
+        #[inline(always)]
+        || {
+            for i in 0..rows.len() / size {
+                let (before, rest) = rows.split_at_mut(i * size);
+                let row = &mut rest[..size];
+                for other in before.chunks_exact(size) {
+                    let along = dot(row, other);
+                    row.iter_mut().zip(other).for_each(|(x, &y)| *x -= along * y);
+                }
+                let scale = norm(row).recip();
+                if !scale.is_finite() {
+                    return false;
+                }
+                row.iter_mut().for_each(|x| *x *= scale);
+            }
+            true
+        },
+    )
+}
+
+#[inline(always)]
+fn dot<S: Scalar>(a: &[S], b: &[S]) -> S {
+    const LANES: usize = 16;
+    let mut sums = [<S as Real>::zero(); LANES];
+    let (mut left, mut right) = (a.chunks_exact(LANES), b.chunks_exact(LANES));
+    while let (Some(a), Some(b)) = (left.next(), right.next()) {
+        for k in 0..LANES {
+            sums[k] += a[k] * b[k];
+        }
+    }
+    let rest = left.remainder().iter().zip(right.remainder());
+    let rest = rest.fold(<S as Real>::zero(), |sum, (&a, &b)| sum + a * b);
+    sums.iter().fold(rest, |sum, &x| sum + x)
+}
+
+#[inline(always)]
+fn norm<S: Scalar>(a: &[S]) -> S {
+    dot(a, a).sqrt()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::optimizers::orthonormal::orthonormalize;
-    use crate::optimizers::orthonormal::tests::{defect, random};
-    use crate::optimizers::{Method, Moments, Update};
+    use crate::optimizers::{Method, Moments};
     use crate::storage::container::state::{from_bytes, to_bytes};
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
 
     const PLAIN: Update =
         Update { method: Method::Soap, rate: 0.1, weight_decay: 0.0, decaying: usize::MAX, clip: f64::INFINITY };
@@ -336,5 +538,59 @@ mod tests {
         let (adam, soap) = (run(Method::Radam), run(Method::Soap));
         println!("RAdam {adam:e}, SOAP {soap:e}");
         assert!(soap < 0.1 * adam);
+    }
+
+    #[test]
+    fn a_running_mean_of_squares_is_made_by_half() {
+        let (size, other) = (70, 5);
+        let mut side = Side::new(size);
+        let mut mean = vec![0.0; size * size];
+        for step in 0..3 {
+            let numbers = random(size * other, step);
+            let g = MatRef::new(&numbers, size, other);
+            side.observe(g, step == 0);
+            let keep = if step == 0 { 0.0 } else { KEEP };
+            mean.iter_mut().for_each(|c| *c *= keep);
+            gemm(MatMut::new(&mut mean, size, size), true, 1.0 - keep, g, g.t());
+        }
+        // What lies beyond the diagonal is not made at every step.
+        assert_ne!(side.covariance[size - 1], side.covariance[(size - 1) * size]);
+        side.complete();
+        assert!(side.covariance.iter().zip(&mean).all(|(a, b)| (a - b).abs() < 1e-14));
+    }
+
+    fn random(count: usize, seed: u64) -> Vec<f64> {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        (0..count).map(|_| rng.random_range(-1.0..1.0)).collect()
+    }
+
+    /// Largest element of `A A^T - 1`.
+    fn defect(size: usize, rows: &[f64]) -> f64 {
+        let pairs = (0..size).flat_map(|i| (0..size).map(move |j| (i, j)));
+        let of = |(i, j): (usize, usize)| {
+            let product = dot(&rows[i * size..][..size], &rows[j * size..][..size]);
+            (product - f64::from(u8::from(i == j))).abs()
+        };
+        pairs.map(of).fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn rows_become_orthonormal_however_nearly_dependent_they_are() {
+        // Less than a block of rows, and several.
+        for size in [7, 20, 50] {
+            let mut rows = random(size * size, 1);
+            for k in 1..size {
+                for i in 0..size {
+                    rows[k * size + i] = rows[i] + 1e-9 * rows[k * size + i];
+                }
+            }
+            let first = rows[..size].to_vec();
+            assert!(orthonormalize(size, &mut rows, &mut vec![0.0; size * size]));
+            assert!(defect(size, &rows) < 20.0 * f64::EPSILON);
+            let length = norm(&first);
+            assert!(first.iter().zip(&rows).all(|(x, y)| (x / length - y).abs() < 1e-14));
+        }
+        assert!(!orthonormalize(2, &mut [1.0, 0.0, f64::NAN, 1.0], &mut [0.0; 4]));
+        assert!(!orthonormalize(2, &mut [0.0; 4], &mut [0.0; 4]));
     }
 }

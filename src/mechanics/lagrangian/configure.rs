@@ -1,12 +1,300 @@
-//! Systems with the values of their parameters, as text or as numbers.
+//! Systems by name, with the values of their parameters as text or as numbers: description, Euler-Lagrange terms, closed-
+//! form acceleration.
 
-use super::EulerLagrange;
-use super::catalogue::{Given, SystemError, SystemInstance, resolve};
-use super::system::Range;
-use super::system::{Size, System};
+use super::derivatives::{StateTerms, evaluate};
+use super::equations::Friction;
+use super::system::{Range, Size, System};
+use super::systems::{SYSTEMS, closed_acceleration, constrained_velocity, construct_once, visit_lagrangian};
+use super::{
+    Constrained, ConstraintError, EulerLagrange, ExpressionConstraints, ExpressionLagrangian, GeneralizedForce,
+    Lagrangian, Rayleigh, Request, Terms, WithForces, constrained_descriptions,
+};
+use crate::linalg::Workspace;
+use crate::names::unknown;
+use crate::random::RngStream;
 use crate::scalar::Scalar;
+use rand::Rng;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
+
+/// Why a system could not be built.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SystemError {
+    /// No system of this name.
+    #[error("{}", unknown("system", name, known.iter().map(String::as_str)))]
+    UnknownSystem {
+        /// The name asked for.
+        name: String,
+        /// Names there are.
+        known: Vec<String>,
+    },
+    /// No parameter of this symbol.
+    #[error("{system}: {}", unknown("parameter", symbol, known.iter().map(String::as_str)))]
+    UnknownParameter {
+        /// The system.
+        system: String,
+        /// The symbol given.
+        symbol: String,
+        /// Symbols there are.
+        known: Vec<String>,
+    },
+    /// A parameter given twice.
+    #[error("parameter `{symbol}` is given twice")]
+    Repeated {
+        /// The symbol.
+        symbol: String,
+    },
+    /// A value that is not a number or outside the allowed range.
+    #[error("parameter `{symbol}` of {system} must be {demand}, found `{found}`")]
+    Value {
+        /// The system.
+        system: String,
+        /// The symbol.
+        symbol: String,
+        /// The values allowed.
+        demand: String,
+        /// The text given.
+        found: String,
+    },
+    /// Constraints that contradict each other or leave no motion.
+    #[error("{system}: {problem}")]
+    Constraints {
+        /// The system.
+        system: String,
+        /// What is wrong with them.
+        problem: String,
+    },
+    /// A state of the wrong length.
+    #[error("{system}: expected {expected} coordinates and velocities, found {found}")]
+    State {
+        /// The system.
+        system: String,
+        /// Number of coordinates.
+        expected: usize,
+        /// Numbers found.
+        found: usize,
+    },
+}
+
+/// Parameters as given: symbol and decimal text.
+pub type Given = [(String, String)];
+
+/// A system with its size and the values of its parameters.
+#[derive(Clone, Debug)]
+pub struct SystemInstance<S> {
+    /// Description.
+    pub system: Cow<'static, System>,
+    /// Number of coordinates.
+    pub coordinates: usize,
+    /// Values in the order of [`System::parameters`].
+    pub parameters: Vec<S>,
+}
+
+/// A function of the Lagrangian of a system, generic in the type of the Lagrangian.
+pub trait LagrangianVisitor {
+    /// Result of the visit.
+    type Output;
+
+    /// Takes the Lagrangian; its parameters are [`SystemInstance::parameters`].
+    fn visit<L: Lagrangian>(self, lagrangian: &L) -> Self::Output;
+}
+
+/// All systems whose coordinates are free; [`constrained_systems`](super::constrained_systems) are the others.
+pub fn systems() -> &'static [System] {
+    SYSTEMS
+}
+
+/// The system of a name.
+///
+/// # Errors
+/// [`SystemError::UnknownSystem`] with the nearest name.
+pub fn find(name: &str) -> Result<&'static System, SystemError> {
+    SYSTEMS.iter().find(|system| system.name == name).ok_or_else(|| unknown_system(name))
+}
+
+/// The system of a name, one under constraints as well.
+///
+/// # Errors
+/// As [`find`].
+pub(crate) fn resolve(name: &str) -> Result<Cow<'static, System>, SystemError> {
+    let constrained = || constrained_descriptions().find(|description| description.name == name)?.compile().ok();
+    match find(name) {
+        Ok(system) => Ok(Cow::Borrowed(system)),
+        Err(unknown) => constrained().map(Cow::Owned).ok_or(unknown),
+    }
+}
+
+impl<S: Scalar> SystemInstance<S> {
+    /// As [`build`](super::build).
+    ///
+    /// # Errors
+    /// [`SystemError::UnknownSystem`] if the description is not of the catalogue or the scalar is none of `f32`, `f64` and
+    /// [`Dd`].
+    pub fn build(&self) -> Result<Box<dyn EulerLagrange<S>>, SystemError> {
+        let free = construct_once(self).ok_or_else(|| unknown_system(&self.system.name))?;
+        self.constrain(match self.friction() {
+            None => free,
+            Some(friction) => Box::new(WithForces::new(free, Rayleigh(friction))),
+        })
+    }
+    /// A model of the same coordinates, learned for instance, under the constraints of the system; without any, as it is.
+    ///
+    /// # Errors
+    /// [`SystemError::Constraints`] for constraints that contradict each other or leave no motion, or a model of other coordinates.
+    pub fn constrain<'a>(
+        &self,
+        model: Box<dyn EulerLagrange<S> + 'a>,
+    ) -> Result<Box<dyn EulerLagrange<S> + 'a>, SystemError> {
+        let Some(constraints) = self.constraints() else { return Ok(model) };
+        let wrong = |error: ConstraintError| SystemError::Constraints {
+            system: self.system.name.to_string(),
+            problem: error.to_string(),
+        };
+        let model = Constrained::new(model, constraints.clone(), self.parameters.clone()).map_err(wrong)?;
+        let (q, v) = self.anywhere();
+        Ok(Box::new(model.independent(&q, &v).map_err(wrong)?))
+    }
+    /// The constraints of a system by its description.
+    pub fn constraints(&self) -> Option<&ExpressionConstraints> {
+        self.system.described.as_ref()?.constraints.as_ref()
+    }
+    /// The dissipation function of a system by its description; its parameters are the Lagrangian's.
+    pub fn dissipation(&self) -> Option<&ExpressionLagrangian> {
+        self.system.described.as_ref()?.dissipation.as_ref()
+    }
+    /// The same with the values of the parameters.
+    fn friction(&self) -> Option<Friction<S>> {
+        let function = self.dissipation()?.clone();
+        Some(Friction { function, parameters: self.parameters.clone() })
+    }
+    /// States within the bounds of the validation, at which constraints are examined.
+    fn anywhere(&self) -> (Vec<S>, Vec<S>) {
+        const STATES: usize = 24;
+        let (bounds, mut rng) = (self.system.validation(self.coordinates), RngStream::Region.generator(0));
+        let mut draw = |sides: &[(f64, f64)]| -> Vec<S> {
+            let all = (0..STATES).flat_map(|_| sides.iter());
+            all.map(|&(low, high)| S::of_f64(low + (high - low) * rng.random::<f64>())).collect()
+        };
+        (draw(&bounds.positions), draw(&bounds.velocities))
+    }
+    /// Shows the Lagrangian to a visitor; `None` if the description is not of the catalogue, and of a system with constraints, whose
+    /// Lagrangian alone does not tell its motion.
+    pub(crate) fn visit<V: LagrangianVisitor>(&self, visitor: V) -> Option<V::Output> {
+        if self.constraints().is_some() { None } else { visit_lagrangian(self, visitor) }
+    }
+    /// Acceleration of one state by the closed form, which shares nothing with the Lagrangian but the parameters; of a system by its
+    /// description, for which no closed form is known, by differentiating its Lagrangian. `NaN` where the mass matrix is singular.
+    ///
+    /// # Errors
+    /// [`SystemError::State`] for a state of the wrong length; [`SystemError::Constraints`] for a system that has some, whose motion
+    /// [`SystemInstance::build`] gives.
+    pub fn exact_acceleration(&self, q: &[S], v: &[S]) -> Result<Vec<S>, SystemError> {
+        self.check_lengths(q, v)?;
+        if self.constraints().is_some() {
+            let (system, problem) =
+                (self.system.name.to_string(), "under constraints no acceleration has a closed form");
+            return Err(SystemError::Constraints { system, problem: problem.to_string() });
+        }
+        Ok(match &self.system.described {
+            Some(described) => differentiated(&described.lagrangian, self.friction(), &self.parameters, q, v),
+            None => closed_acceleration(self, q, v),
+        })
+    }
+    /// Index of the coordinate whose velocity the mass shell fixes.
+    pub fn constrained_coordinate(&self) -> Option<usize> {
+        self.system.time_like.filter(|_| self.system.constraint.is_some())
+    }
+    /// Puts one state on the mass shell `g(v, v) = -1` by the velocity of its time-like coordinate; systems without a
+    /// constraint leave the state alone.
+    ///
+    /// Outside the domain the velocity becomes `NaN` or infinite.
+    ///
+    /// # Errors
+    /// [`SystemError::State`] for a state of the wrong length.
+    pub fn impose_constraint(&self, q: &[S], v: &mut [S]) -> Result<(), SystemError> {
+        self.check_lengths(q, v)?;
+        let velocity = match &self.system.described {
+            Some(described) => described.constrained_velocity(&self.parameters, q, v),
+            None => constrained_velocity(self, q, v),
+        };
+        if let (Some(i), Some(velocity)) = (self.constrained_coordinate(), velocity) {
+            v[i] = velocity;
+        }
+        Ok(())
+    }
+    fn check_lengths(&self, q: &[S], v: &[S]) -> Result<(), SystemError> {
+        let expected = self.coordinates;
+        match [q, v].into_iter().find(|x| x.len() != expected) {
+            Some(x) => Err(SystemError::State { system: self.system.name.to_string(), expected, found: x.len() }),
+            None => Ok(()),
+        }
+    }
+    /// Refuses coordinates where the system's chart ends (`r <= 0`, a pole, a horizon); the text says what is demanded.
+    ///
+    /// # Errors
+    /// The condition that the coordinates violate.
+    pub fn check_domain(&self, q: &[S]) -> Result<(), &'static str> {
+        self.system.domain.map_or(Ok(()), |domain| domain(&leading(&self.parameters), &leading(q)))
+    }
+    /// `(x, y)` of coordinates in the system's [`Plane`](super::system::Plane); `None` without a plane or for a wrong
+    /// number of coordinates.
+    pub(crate) fn position_in_plane(&self, q: &[S]) -> Option<(f64, f64)> {
+        let plane = self.system.plane.filter(|_| q.len() == self.coordinates)?;
+        Some((plane.point)(&leading(&self.parameters), &leading(q)))
+    }
+    /// The system's [`Conserved`](super::system::Conserved) vector at a state; `None` without one or for a state of the wrong
+    /// length.
+    pub(crate) fn conserved(&self, q: &[S], v: &[S]) -> Option<Vec<f64>> {
+        let conserved = self.system.conserved.filter(|_| self.check_lengths(q, v).is_ok())?;
+        Some((conserved.vector)(&leading(&self.parameters), &leading(q), &leading(v)))
+    }
+}
+
+/// The acceleration of one state by the Euler-Lagrange equations of a Lagrangian.
+fn differentiated<S: Scalar>(
+    lagrangian: &ExpressionLagrangian,
+    friction: Option<Friction<S>>,
+    parameters: &[S],
+    q: &[S],
+    v: &[S],
+) -> Vec<S> {
+    let mut terms = Terms::default();
+    let (n, need) = (q.len(), Request::ACCELERATION);
+    let Terms { lagrangian: value, momentum, dl_dq, mass_matrix, coriolis, .. } = &mut terms;
+    for (field, size) in [(&mut *dl_dq, n), (&mut *mass_matrix, n * n), (&mut *coriolis, n)] {
+        field.resize(size, S::nan());
+    }
+    evaluate(
+        lagrangian,
+        parameters,
+        q,
+        v,
+        need,
+        &mut StateTerms { lagrangian: value, momentum, dl_dq, mass_matrix, coriolis },
+    );
+    if let Some(friction) = friction {
+        terms.force.resize(n, S::nan());
+        Rayleigh(friction).force(q, v, &mut terms.force);
+    }
+    // A row that fails has the acceleration NaN, which is what there is to say of one state.
+    let _ = terms.complete(q.len(), v, Request::ACCELERATION, &mut Workspace::new());
+    terms.acceleration
+}
+
+fn leading<S: Scalar>(x: &[S]) -> Vec<f64> {
+    x.iter().map(|x| x.to_f64()).collect()
+}
+
+fn unknown_system(name: &str) -> SystemError {
+    SystemError::UnknownSystem {
+        name: name.into(),
+        known: {
+            let constrained = constrained_descriptions().map(|description| description.name);
+            SYSTEMS.iter().map(|system| system.name.to_string()).chain(constrained).collect()
+        },
+    }
+}
 
 /// Reads the parameters of a system in the working precision; those not given take their defaults.
 ///
@@ -120,7 +408,144 @@ fn assemble<S: Scalar>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lagrangian::find;
+    use crate::lagrangian::{configure, find};
+    use crate::scalar::Dd;
+
+    fn given(list: &[(&str, &str)]) -> Vec<(String, String)> {
+        list.iter().map(|&(s, t)| (s.into(), t.into())).collect()
+    }
+
+    #[test]
+    fn every_entry_is_complete() {
+        for system in systems() {
+            let n = system.size.default();
+            let configured = configure::<f64>(&system.name, &[]).unwrap();
+            assert_eq!(configured.build().unwrap().coordinates(), n);
+            assert_eq!(system.coordinates(n).len(), n);
+            assert_eq!((system.columns(n).len(), system.units(n).len()), (2 * n, 2 * n));
+            let start = system.trajectory(n).start;
+            assert_eq!((start.positions.len(), start.velocities.len()), (n, n));
+            assert!(start.positions.iter().chain(&start.velocities).all(|b| b.0 <= b.1));
+            let fixed = configured.constrained_coordinate();
+            for bounds in [system.training(n), system.validation(n)] {
+                assert_eq!((bounds.positions.len(), bounds.velocities.len()), (n, n));
+                assert!(bounds.positions.iter().all(|b| b.0 < b.1), "{}", system.name);
+                assert!(bounds.velocities.iter().enumerate().all(|(i, b)| b.0 < b.1 || fixed == Some(i)));
+            }
+            let mut v: Vec<f64> = (0..n).map(|i| 0.1 * i as f64).collect();
+            let q: Vec<f64> = start.positions.iter().map(|b| 0.4 * b.0 + 0.6 * b.1).collect();
+            let before = v.clone();
+            configured.impose_constraint(&q, &mut v).unwrap();
+            match fixed {
+                None => assert_eq!((v, system.constraint), (before, None)),
+                Some(i) => {
+                    assert!(v[i] > 0.0 && (0..n).all(|k| k == i || v[k] == before[k]));
+                    assert!(system.constraint.unwrap().starts_with(&format!("{} = ", system.columns(n)[n + i])));
+                }
+            }
+            let middle: Vec<f64> = system.training(n).positions.iter().map(|b| 0.4 * b.0 + 0.6 * b.1).collect();
+            assert_eq!(configured.check_domain(&middle), Ok(()));
+        }
+        let pendulum = find("double-pendulum").unwrap();
+        assert_eq!(pendulum.columns(2), ["theta1", "theta2", "theta1_dot", "theta2_dot"]);
+        assert_eq!(pendulum.labels(2)[1..3], ["theta2 [rad]", "theta1_dot [rad/s]"]);
+        assert_eq!(find("sphere-geodesic").unwrap().columns(2), ["theta", "phi", "theta_dot", "phi_dot"]);
+        assert!(configure::<f64>("spring-pendulum", &[]).unwrap().check_domain(&[0.0, 1.0]).is_err());
+        assert!(configure::<f64>("sphere-geodesic", &[]).unwrap().check_domain(&[0.0, 1.0]).is_err());
+        assert!(configure::<f64>("kepler", &[]).unwrap().check_domain(&[0.0, 0.0]).is_err());
+        assert!(configure::<f64>("ads2-geodesic", &[]).unwrap().check_domain(&[1.0, -1.0]).is_err());
+        // The horizon moves with the mass.
+        let hole = |mass: &str| configure::<f64>("schwarzschild-geodesic", &given(&[("M", mass)])).unwrap();
+        assert_eq!(hole("1").check_domain(&[0.0, 3.0, 1.0, 0.0]), Ok(()));
+        assert!(hole("1.5").check_domain(&[0.0, 3.0, 1.0, 0.0]).is_err());
+        assert!(hole("1").check_domain(&[0.0, 3.0, 0.0, 0.0]).is_err());
+        assert!(hole("1").impose_constraint(&[0.0, 3.0, 1.0], &mut [0.0; 4]).is_err());
+    }
+
+    #[test]
+    fn systems_are_where_they_should_be() {
+        let place = |name: &str, list: &[(&str, &str)], q: &[f64]| {
+            configure::<f64>(name, &given(list)).unwrap().position_in_plane(q).unwrap()
+        };
+        let near = |(x, y): (f64, f64), (a, b): (f64, f64), size: f64| {
+            // Sine and cosine to half a unit in the last place, angles as near as pi is.
+            assert!((x - a).abs().max((y - b).abs()) <= 4.0 * f64::EPSILON * size, "({x}, {y}) for ({a}, {b})");
+        };
+        use std::f64::consts::{FRAC_PI_2, FRAC_PI_3, FRAC_PI_6, PI};
+        let root = 0.75f64.sqrt();
+        // One rod to the right, one up; then hanging; then three, the last up at an angle.
+        near(place("double-pendulum", &[("l1", "2"), ("l2", "0.5")], &[FRAC_PI_2, PI]), (2.0, 0.5), 2.5);
+        near(place("double-pendulum", &[], &[0.0, 0.0]), (0.0, -2.0), 2.0);
+        let rods = [("l1", "1"), ("l2", "2"), ("l3", "4")];
+        near(place("triple-pendulum", &rods, &[0.0, FRAC_PI_2, PI - FRAC_PI_6]), (4.0, 4.0 * root - 1.0), 7.0);
+        near(place("n-pendulum", &[("n", "5"), ("l", "2")], &[FRAC_PI_6; 5]), (5.0, -10.0 * root), 10.0);
+        near(place("n-pendulum", &[("n", "1")], &[-FRAC_PI_2]), (-1.0, 0.0), 1.0);
+        near(place("spring-pendulum", &[], &[3.0, FRAC_PI_3]), (3.0 * root, -1.5), 3.0);
+        near(place("sphere-geodesic", &[("R", "2")], &[FRAC_PI_3, PI]), (-2.0 * root, 1.0), 2.0);
+        near(place("schwarzschild-geodesic", &[], &[7.0, 4.0, 1.0, FRAC_PI_6]), (4.0 * root, 2.0), 4.0);
+        near(place("kerr-geodesic", &[], &[7.0, 4.0, 1.0, FRAC_PI_6]), (4.0 * root, 2.0), 4.0);
+        assert_eq!(place("kerr-cartesian", &[], &[7.0, 4.0, 1.0, 2.0]), (4.0, 1.0));
+        assert_eq!(place("kepler", &[], &[1.5, -2.0]), (1.5, -2.0));
+        assert_eq!(place("henon-heiles", &[], &[0.25, 0.5]), (0.25, 0.5));
+        assert_eq!(place("charged-particle", &[], &[1.0, 2.0, 3.0]), (1.0, 2.0));
+        assert_eq!(place("ads2-geodesic", &[], &[1.0, 2.0]), (1.0, 2.0));
+        assert_eq!(place("ads3-geodesic", &[], &[1.0, 2.0, 3.0]), (2.0, 3.0));
+        assert_eq!(place("ads4-geodesic", &[], &[1.0, 2.0, 3.0, 4.0]), (2.0, 4.0));
+        assert_eq!(configure::<f64>("kepler", &[]).unwrap().position_in_plane(&[1.0]), None);
+    }
+
+    #[test]
+    fn places_are_finite_and_no_larger_than_the_system() {
+        for system in systems() {
+            let n = system.size.default();
+            let configured = configure::<f64>(&system.name, &[]).unwrap();
+            let bounds = system.training(n).positions;
+            let Some(plane) = system.plane else {
+                assert_eq!((n, configured.position_in_plane(&[0.5])), (1, None), "{}", system.name);
+                continue;
+            };
+            assert!(plane.labels.iter().all(|label| label.ends_with(" [m]")), "{}", system.name);
+            let size = match system.name.as_ref() {
+                "sphere-geodesic" => 1.0,
+                "double-pendulum" | "triple-pendulum" | "n-pendulum" => n as f64,
+                _ => f64::INFINITY,
+            };
+            for k in 0..1000 {
+                // A different fraction of each coordinate's range in every state.
+                let part = |i: usize| (0.618_034 * f64::from(k) * (1.0 + i as f64).sqrt()).fract();
+                let q: Vec<f64> = bounds.iter().enumerate().map(|(i, b)| b.0 + (b.1 - b.0) * part(i)).collect();
+                let (x, y) = configured.position_in_plane(&q).unwrap();
+                assert!(x.is_finite() && y.is_finite() && x.hypot(y) <= size * (1.0 + 1e-15 * n as f64), "{q:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn parameters_are_read_and_refused() {
+        let configured = configure::<Dd>("double-pendulum", &given(&[("l2", " 0.5 "), ("g", "0")])).unwrap();
+        let expected: Vec<Dd> = ["1", "1", "1", "0.5", "0"].iter().map(|t| Dd::parse(t).unwrap()).collect();
+        assert_eq!(configured.parameters, expected);
+        assert_eq!(configure::<f32>("n-pendulum", &given(&[("n", "7")])).unwrap().coordinates, 7);
+        let error = |name: &str, list: &[(&str, &str)]| configure::<f64>(name, &given(list)).unwrap_err();
+        let text = error("duble-pendulum", &[]).to_string();
+        assert_eq!(text, "unknown system \"duble-pendulum\", did you mean \"double-pendulum\"?");
+        let text = error("spring-pendulum", &[("L0", "1")]).to_string();
+        assert_eq!(text, "spring-pendulum: unknown parameter \"L0\", did you mean \"l0\"?");
+        assert!(matches!(error("n-pendulum", &[("N", "3")]), SystemError::UnknownParameter { .. }));
+        assert!(matches!(error("double-pendulum", &[("g", "1"), ("g", "2")]), SystemError::Repeated { .. }));
+        for bad in ["0", "-1", "nan", "inf", "1e999", "one", ""] {
+            assert!(
+                matches!(error("double-pendulum", &[("m1", bad)]), SystemError::Value { symbol, .. } if symbol == "m1")
+            );
+        }
+        for bad in ["0", "21", "-1", "2.5", "18446744073709551616"] {
+            assert!(matches!(error("n-pendulum", &[("n", bad)]), SystemError::Value { symbol, .. } if symbol == "n"));
+        }
+        assert!(matches!(
+            configure::<f64>("double-pendulum", &[]).unwrap().exact_acceleration(&[1.0], &[1.0, 2.0]),
+            Err(SystemError::State { expected: 2, found: 1, .. })
+        ));
+    }
 
     #[test]
     fn numbers_and_their_texts_configure_the_same() {

@@ -3,8 +3,8 @@
 //! With the residual `r = d/dt (dL/dv) - dL/dq + dD/dv - Q = M a - h - Q` a change of anything that it depends on, `a` held fixed,
 //! changes the acceleration by `-M^-1 dr`: one reverse sweep per coordinate gives all slopes, however many parameters there are.
 
-use super::derivatives::{State, evaluate};
-use super::mechanics::Recorded;
+use super::derivatives::{StateTerms, evaluate};
+use super::mechanics::RecordedValue;
 use super::{ExpressionLagrangian, Lagrangian, LagrangianVisitor, Request, SystemInstance};
 use crate::forward::HyperDual;
 use crate::scalar::Real;
@@ -30,16 +30,16 @@ impl Equations {
     pub fn record(instance: &SystemInstance<f64>, chosen: &[usize]) -> Result<Option<Self>, TapeError> {
         let (n, count) = (instance.coordinates, instance.parameters.len());
         let Some(value) = instance.visit(Value { parameters: count }).transpose()? else { return Ok(None) };
-        let lagrangian = Recorded { value };
+        let lagrangian = RecordedValue { value };
         let dissipation = instance.dissipation().map(|d| Value { parameters: count }.visit(d)).transpose()?;
-        let dissipation = dissipation.map(|value| Recorded { value });
+        let dissipation = dissipation.map(|value| RecordedValue { value });
         let motion = Program::record(2 * n, count, |x, p| {
             let (q, v) = x.split_at(n);
             let zero = Tracer::zero();
             let (mut mass_matrix, mut coriolis) = (vec![zero; n * n], vec![zero; n]);
             let mut rest = vec![zero; n];
             let need = Request::MASS_MATRIX | Request::CORIOLIS | Request::DL_DQ;
-            let mut state = State {
+            let mut state = StateTerms {
                 lagrangian: &mut [],
                 momentum: &mut [],
                 dl_dq: &mut rest,
@@ -49,7 +49,7 @@ impl Equations {
             evaluate(&lagrangian, p, q, v, need, &mut state);
             let mut friction = vec![zero; n];
             if let Some(dissipation) = &dissipation {
-                let mut state = State {
+                let mut state = StateTerms {
                     lagrangian: &mut [],
                     momentum: &mut friction,
                     dl_dq: &mut [],
@@ -102,8 +102,8 @@ impl LagrangianVisitor for Value {
 /// The residual `r` without `Q`, a function of `(q, v, a, p)`.
 struct Equation<'a> {
     n: usize,
-    lagrangian: &'a Recorded<f64>,
-    dissipation: Option<&'a Recorded<f64>>,
+    lagrangian: &'a RecordedValue<f64>,
+    dissipation: Option<&'a RecordedValue<f64>>,
 }
 
 impl VectorFunction for Equation<'_> {

@@ -1,6 +1,8 @@
-//! Failures of the terms of a batch.
+//! Failures of the terms of a batch: what they are, how they are found, merged, and reported.
 
-use crate::linalg::Failure;
+use super::{Request, Terms};
+use crate::linalg::{Failure, Workspace};
+use crate::scalar::Scalar;
 
 /// Why terms could not be computed.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -87,5 +89,130 @@ impl MechanicsError {
             Failure::Singular { condition } => Self::Singular { row, condition },
             Failure::NotFinite => Self::NotFinite { row, what: "acceleration" },
         }
+    }
+}
+
+impl<S: Scalar> Terms<S> {
+    /// Adds failures to those that are there; one of a row is kept, and of `found` rather than of what is there.
+    pub(crate) fn prepend_failures(&mut self, mut found: Vec<MechanicsError>) {
+        if found.is_empty() {
+            return;
+        }
+        found.append(&mut self.failures);
+        // The sort is stable, so that the first of a row stays the first.
+        found.sort_by_key(MechanicsError::row);
+        found.dedup_by_key(|error| error.row());
+        self.failures = found;
+    }
+
+    /// The first failure, as the outcome of the batch.
+    ///
+    /// # Errors
+    /// That failure.
+    pub(crate) fn outcome(&self) -> Result<(), MechanicsError> {
+        self.failures.first().map_or(Ok(()), |&error| Err(error))
+    }
+
+    /// `true` if all that failed stands in [`Terms::failures`], so that the other rows can be used. After a success none stands there, even
+    /// of a model that leaves the list alone.
+    pub(crate) fn record_failures(&mut self, outcome: &Result<(), MechanicsError>) -> bool {
+        if outcome.is_ok() {
+            self.failures.clear();
+        }
+        let first = self.failures.first().and_then(MechanicsError::row);
+        outcome.as_ref().err().is_none_or(|error| error.row().is_some() && error.row() == first)
+    }
+
+    /// Removes and returns the failures of the wrapped model.
+    ///
+    /// # Errors
+    /// `outcome`, if it does not belong to rows.
+    pub(crate) fn drain_failures(
+        &mut self,
+        outcome: Result<(), MechanicsError>,
+    ) -> Result<Vec<MechanicsError>, MechanicsError> {
+        if self.record_failures(&outcome) {
+            Ok(std::mem::take(&mut self.failures))
+        } else {
+            outcome.map(|()| Vec::new())
+        }
+    }
+}
+
+impl<S: Scalar> Terms<S> {
+    /// [`Terms::complete`] for a wrapper, which has drained the failures of the model inside before.
+    ///
+    /// # Errors
+    /// The first failure, of either.
+    pub(crate) fn complete_beside(
+        &mut self,
+        failures: Vec<MechanicsError>,
+        n: usize,
+        v: &[S],
+        request: Request,
+    ) -> Result<(), MechanicsError> {
+        if let Err(error @ MechanicsError::Shape { .. }) = self.complete(n, v, request, &mut Workspace::new()) {
+            return Err(error);
+        }
+        self.prepend_failures(failures);
+        self.outcome()
+    }
+}
+
+/// Rows of a field `(batch, width)` that are not finite.
+#[inline]
+pub(super) fn not_finite<S: Scalar>(what: &'static str, field: &[S], width: usize) -> Vec<MechanicsError> {
+    if all_finite(field) { Vec::new() } else { rows_not_finite(what, field, width) }
+}
+
+#[cold]
+fn rows_not_finite<S: Scalar>(what: &'static str, field: &[S], width: usize) -> Vec<MechanicsError> {
+    let rows = field.chunks(width.max(1)).enumerate().filter(|(_, row)| !all_finite(row));
+    rows.map(|(row, _)| MechanicsError::NotFinite { row, what }).collect()
+}
+
+/// `true` if every number is finite; no branch before the end.
+#[inline(always)]
+fn all_finite<S: Scalar>(numbers: &[S]) -> bool {
+    let mut all = true;
+    for x in numbers {
+        all &= x.is_finite();
+    }
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_row_is_found_once_with_its_first_reason() {
+        let mut field = vec![0.0; 300];
+        field[131] = f64::NAN;
+        field[129] = f64::INFINITY;
+        field[299] = f64::NAN;
+        let found = not_finite("momentum", &field, 3);
+        let bad = |row| MechanicsError::NotFinite { row, what: "momentum" };
+        assert_eq!(found, [bad(43), bad(99)]);
+        assert_eq!(not_finite("momentum", &field[..129], 3), []);
+        let mut terms = Terms::<f64>::default();
+        terms.prepend_failures(vec![MechanicsError::Uncertified { row: 99 }, MechanicsError::Uncertified { row: 7 }]);
+        terms.prepend_failures(found);
+        assert_eq!(terms.failures, [MechanicsError::Uncertified { row: 7 }, bad(43), bad(99)]);
+        assert_eq!(terms.outcome(), Err(MechanicsError::Uncertified { row: 7 }));
+    }
+
+    #[test]
+    fn an_error_about_no_row_is_passed_on() {
+        let mut terms = Terms::<f64> { failures: vec![MechanicsError::Uncertified { row: 2 }], ..Terms::default() };
+        let other = Err(MechanicsError::Derivatives { what: "mass matrix" });
+        assert_eq!(terms.drain_failures(other), Err(MechanicsError::Derivatives { what: "mass matrix" }));
+        let failed = terms.drain_failures(Err(MechanicsError::Uncertified { row: 2 }));
+        assert_eq!(failed, Ok(vec![MechanicsError::Uncertified { row: 2 }]));
+        assert_eq!(terms.outcome(), Ok(()));
+        // What an earlier batch left behind does not count.
+        terms.failures.push(MechanicsError::Uncertified { row: 2 });
+        assert_eq!(terms.drain_failures(Ok(())), Ok(Vec::new()));
+        assert_eq!(terms.outcome(), Ok(()));
     }
 }

@@ -1,6 +1,6 @@
 //! A Lagrangian written by hand, with values for its parameters, as a source of Euler-Lagrange terms.
 
-use super::derivatives::{State, evaluate};
+use super::derivatives::{StateTerms, evaluate};
 use super::taylor::Taylor;
 use super::{EulerLagrange, Lagrangian, MechanicsError, MetricJet, Request, Terms, metric_jets};
 use crate::linalg::Workspace;
@@ -49,7 +49,7 @@ impl<L: Lagrangian, S: Scalar> Form<S> for L {
         for row in 0..q.len() / n {
             let (q, v) = (&q[row * n..][..n], &v[row * n..][..n]);
             let part = |needed: bool, width: usize| if needed { row * width..(row + 1) * width } else { 0..0 };
-            let mut state = State {
+            let mut state = StateTerms {
                 lagrangian: &mut terms.lagrangian[part(need.includes(Request::LAGRANGIAN), 1)],
                 momentum: &mut terms.momentum[part(need.includes(Request::MOMENTUM), n)],
                 dl_dq: &mut terms.dl_dq[part(need.includes(Request::DL_DQ), n)],
@@ -67,11 +67,11 @@ impl<L: Lagrangian, S: Scalar> Form<S> for L {
 
 /// A recorded Lagrangian: its one output is the value.
 #[derive(Debug)]
-pub(super) struct Recorded<S> {
+pub(super) struct RecordedValue<S> {
     pub(super) value: Program<S>,
 }
 
-impl<S: Scalar> Lagrangian for Recorded<S> {
+impl<S: Scalar> Lagrangian for RecordedValue<S> {
     fn coordinates(&self) -> usize {
         self.value.inputs() / 2
     }
@@ -86,7 +86,7 @@ impl<S: Scalar> Lagrangian for Recorded<S> {
 struct Evaluator<S> {
     parameters: Vec<S>,
     /// The program of the value, recorded on first use.
-    value: OnceLock<Option<Recorded<S>>>,
+    value: OnceLock<Option<RecordedValue<S>>>,
     /// The value as the engine's sweeps take it.
     engine: OnceLock<Option<Arc<tape::Recorded<S>>>>,
     /// One program per combination of needed terms.
@@ -133,9 +133,9 @@ impl<S: Scalar> Evaluator<S> {
     }
 
     /// The program of the value, recorded on first use.
-    fn value(&self, form: &dyn Form<S>) -> Option<&Recorded<S>> {
+    fn value(&self, form: &dyn Form<S>) -> Option<&RecordedValue<S>> {
         let count = self.parameters.len();
-        self.value.get_or_init(|| form.value(count).ok().map(|value| Recorded { value })).as_ref()
+        self.value.get_or_init(|| form.value(count).ok().map(|value| RecordedValue { value })).as_ref()
     }
 
     /// The metric jets of a batch in numbers that are as precise or more so, by the program of the value.
@@ -278,7 +278,7 @@ impl<S: Scalar> Evaluator<S> {
 
 /// The needed terms of one state, one after the other.
 fn record<'t, S: Scalar>(
-    system: &Recorded<S>,
+    system: &RecordedValue<S>,
     parameters: &[Tracer<'t, S>],
     q: &[Tracer<'t, S>],
     v: &[Tracer<'t, S>],
@@ -294,7 +294,7 @@ fn record<'t, S: Scalar>(
         field(need.includes(Request::CORIOLIS), n),
     ];
     let [lagrangian, momentum, dl_dq, mass_matrix, coriolis] = &mut fields;
-    evaluate(system, parameters, q, v, need, &mut State { lagrangian, momentum, dl_dq, mass_matrix, coriolis });
+    evaluate(system, parameters, q, v, need, &mut StateTerms { lagrangian, momentum, dl_dq, mass_matrix, coriolis });
     fields.concat()
 }
 

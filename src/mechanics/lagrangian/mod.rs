@@ -3,7 +3,6 @@
 //! State `x = (q, v)`, `v = dq/dt`, both in `R^n`. `p = dL/dv`, `g = dL/dq`, `M = d2L/dv dv`, `c = (d2L/dv dq) v`,
 //! `a = M^-1 (g - c + Q)`, `E = p.v - L`; `Q` are forces that do not follow from `L`, such as friction. Batches are row-major: `(batch, n)` and `(batch, n, n)`.
 
-mod catalogue;
 mod configure;
 mod constrained_systems;
 mod constraints;
@@ -13,27 +12,18 @@ mod equations;
 mod error;
 mod euler_lagrange;
 mod expression;
-mod expression_lagrangian;
-mod failures;
-mod interruptible;
-mod inverse;
 mod mechanics;
-mod metric;
-mod shell_advice;
 pub mod system;
 #[doc(hidden)]
 pub mod systems;
 mod taylor;
 mod terms;
-mod with_forces;
+mod wrappers;
 
-pub(crate) use catalogue::LagrangianVisitor;
-pub(crate) use catalogue::resolve;
-pub use catalogue::{SystemError, SystemInstance, find, systems};
-pub use configure::configure;
+pub(crate) use configure::{LagrangianVisitor, resolve};
+pub use configure::{SystemError, SystemInstance, configure, find, systems};
 #[doc(hidden)]
 pub use configure::{build, configure_system, configure_values};
-use constrained_systems::constrained_descriptions;
 pub use constrained_systems::constrained_systems;
 pub use constraints::{
     Constrained, ConstraintError, Constraints, ExpressionConstraints, FormulaConstraints, FormulaError,
@@ -42,29 +32,30 @@ pub use constraints::{
 pub use constraints::{
     LeastNorm, LeastNormMotion, Manifold, ManifoldRows, OffManifold, ReducedMass, project, project_acceleration,
 };
+#[doc(hidden)]
+pub use derivatives::MetricJet;
+pub(crate) use derivatives::metric_jets;
 pub(crate) use description::pair;
 pub use description::{Description, DescriptionError};
 #[cfg(feature = "training")]
 pub(crate) use equations::Equations;
 pub use error::MechanicsError;
 #[doc(hidden)]
-pub use expression::{Expression, ExpressionError};
-pub use expression_lagrangian::ExpressionLagrangian;
-#[doc(hidden)]
-pub use interruptible::Interruptible;
-#[doc(hidden)]
-pub use inverse::{ForceParts, InverseDynamics, force_parts, inverse_dynamics};
+pub use euler_lagrange::{ForceParts, InverseDynamics, force_parts, inverse_dynamics};
 #[cfg(feature = "cli")]
-pub(crate) use inverse::{force_parts_by_rows, inverse_dynamics_by_rows};
-pub use mechanics::Mechanics;
+pub(crate) use euler_lagrange::{force_parts_by_rows, inverse_dynamics_by_rows};
+pub use expression::ExpressionLagrangian;
 #[doc(hidden)]
-pub use metric::MetricJet;
-pub(crate) use metric::metric_jets;
+pub use expression::{Expression, ExpressionError};
+pub use mechanics::Mechanics;
 pub(crate) use taylor::Taylor;
 pub use terms::{EulerLagrange, Request, Terms};
-pub use with_forces::{Dissipation, GeneralizedForce, Rayleigh, WithForces};
+#[doc(hidden)]
+pub use wrappers::Interruptible;
+pub use wrappers::{Dissipation, GeneralizedForce, Rayleigh, WithForces};
 
 use crate::scalar::Real;
+use constrained_systems::constrained_descriptions;
 
 /// A Lagrangian `L(q, v; parameters)` written once over [`Real`].
 ///

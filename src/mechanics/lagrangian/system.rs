@@ -7,8 +7,6 @@ use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::sync::Arc;
 
-pub(crate) use super::shell_advice::ShellAdvice;
-
 /// A coordinate of a system.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Coordinate {
@@ -160,7 +158,7 @@ impl<T: Clone> PerSize<T> {
 pub(crate) struct LearningAdvice {
     /// States to learn from, where the box of the training states alone does not do.
     pub states: Option<fn(bounds: &mut Bounds) -> StateAdvice>,
-    /// The paper's budget, if the system is one of its own.
+    /// The paper's budget, if the system is one of the paper's.
     pub paper: Option<PaperBudget>,
     /// Learning rate of a structure, where that of others is not good.
     pub structure_rate: Option<f64>,
@@ -335,4 +333,16 @@ impl Range {
             Self::Positive => "finite and above 0",
         }
     }
+}
+
+/// Shell around a centre, and how fast what moves in it is at most.
+#[derive(Clone, Debug, PartialEq)]
+#[doc(hidden)]
+pub struct ShellAdvice {
+    /// Cartesian coordinates around the centre.
+    pub coordinates: Cow<'static, [usize]>,
+    /// Lowest and highest distance from it.
+    pub radius: (f64, f64),
+    /// Largest rapidity in a local frame.
+    pub rapidity: f64,
 }

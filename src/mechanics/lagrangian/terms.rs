@@ -1,8 +1,8 @@
 //! Euler-Lagrange terms of a batch of states: what may be asked for, where it is stored, how the rest follows.
 
 use super::constraints::Manifold;
+use super::derivatives::MetricJet;
 use super::error::MechanicsError;
-use super::metric::MetricJet;
 use crate::scalar::{Dd, Scalar};
 use crate::tape::Depth;
 use std::ops::BitOr;

@@ -1,7 +1,10 @@
-//! Where the parameters of a network sit in its flat vector: a sum of branches, each a chain of layers.
+//! Where the parameters of a network stand in its flat vector, a sum of branches, each a chain of layers; initial weights.
 
 use crate::lagrangian::Description;
-use crate::network::{Activation, Architecture, InputLayer};
+use crate::network::{Activation, Architecture, Initialization, InputLayer};
+use crate::scalar::{Real, Scalar};
+use rand::Rng;
+use rand_distr::{Distribution, StandardNormal};
 use std::ops::Range;
 
 /// Action of a layer's weights `W` on its inputs `x`.
@@ -91,7 +94,7 @@ pub struct Layout {
     pub known: Range<usize>,
 }
 
-/// Where the parameters of a Rayleigh dissipation sit: `gamma`, then `w`, then `b`.
+/// Positions of the parameters of a Rayleigh dissipation: `gamma`, then `w`, then `b`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DissipationLayout {
     /// Units `K`.
@@ -197,4 +200,311 @@ impl Chain {
 /// Constants of a known part that are learned.
 fn learned(description: &Description) -> usize {
     description.parameters.values().filter(|parameter| parameter.learn).count()
+}
+
+/// Initial scale of the argument of a dynamic tanh (Zhu et al. 2025).
+const DYT_ALPHA: f64 = 0.5;
+
+/// Factor of the output weights under [`Initialization::NearZero`].
+const NEAR_ZERO: f64 = 0.01;
+
+/// Initial `gamma` of every unit of a dissipation: the friction starts at `ln(1 + e^-5) = 0.0067`.
+const FRICTION: f64 = -5.0;
+
+/// Draws the flat parameters of a network; the same generator state gives the same weights in every precision.
+///
+/// Every branch is drawn by itself, with its own widths and gains; the gain of a linear layer is 1. The parameters of
+/// an input layer are not random: `a = 0.5`, `gamma = 1`, `beta = 0`.
+///
+/// Those of a dissipation come after all others, which are the same without it: `gamma = -5`, `w = 0`, and `b` of length
+/// 1 in random directions.
+///
+/// A structure begins, unless near zero, with a tenth (a rectangle: three tenths) of these output weights and with output biases that are those of 1.7
+/// times the identity.
+pub fn initial_weights<S: Scalar>(architecture: &Architecture, kind: Initialization, rng: &mut impl Rng) -> Vec<S> {
+    let layout = Layout::new(architecture);
+    let mut weights = vec![<S as Real>::zero(); layout.parameters];
+    for branch in &layout.branches {
+        let dense = || branch.layers.iter().filter(|layer| layer.map == LinearMap::Dense);
+        let count = dense().count();
+        for (k, layer) in dense().enumerate() {
+            let place = if k + 1 == count { Place::Output } else { Place::Hidden(k) };
+            draw(layer, place, kind, rng, &mut weights);
+        }
+        for layer in &branch.layers {
+            match layer.map {
+                LinearMap::Dense => {}
+                LinearMap::Diagonal => weights[layer.weight_range()].fill(<S as Real>::one()),
+                LinearMap::Scalar => weights[layer.weight_range()].fill(S::of_f64(DYT_ALPHA)),
+            }
+        }
+    }
+    if architecture.form.structure.has_signature() && kind != Initialization::NearZero {
+        settle(&layout, &architecture.initial_biases(), architecture.form.factor.variation(), &mut weights);
+    }
+    let constants = architecture.own_constants().map_or(Vec::new(), |(_, initial)| initial);
+    for (place, initial) in layout.constants.clone().zip(constants) {
+        weights[place] = S::of_f64(initial);
+    }
+    let joints = architecture.form.joint_friction.initial(architecture.coordinates);
+    for (place, initial) in layout.joint_friction.clone().zip(joints) {
+        weights[place] = S::of_f64(initial);
+    }
+    if let Some(dissipation) = layout.dissipation {
+        weights[dissipation.gamma_range()].fill(S::of_f64(FRICTION));
+        for row in weights[dissipation.direction_range()].chunks_exact_mut(dissipation.coordinates) {
+            draw_direction(rng, row);
+        }
+    }
+    weights
+}
+
+/// Begins a structure with a mass matrix near 1.7 times the identity and next to no forces: a random metric would move by its
+/// curvature, at every velocity, which has to be unlearned first.
+fn settle<S: Scalar>(layout: &Layout, biases: &[(usize, f64)], variation: f64, weights: &mut [S]) {
+    for (k, branch) in layout.branches.iter().enumerate() {
+        let output = &branch.layers[branch.layers.len() - 1];
+        weights[output.weight_range()].iter_mut().for_each(|w| *w *= S::of_f64(variation));
+        let bias = &mut weights[output.bias_range()];
+        bias.fill(<S as Real>::zero());
+        if k == 0 {
+            biases.iter().for_each(|&(index, number)| bias[index] = S::of_f64(number));
+        }
+    }
+}
+
+/// A vector of length 1, its direction uniform.
+fn draw_direction<S: Scalar>(rng: &mut impl Rng, direction: &mut [S]) {
+    let normal: Vec<f64> = direction.iter().map(|_| StandardNormal.sample(rng)).collect();
+    // Never 0 but for a generator that gives nothing else.
+    let length = normal.iter().map(|x: &f64| x * x).sum::<f64>().sqrt().max(f64::MIN_POSITIVE);
+    for (x, normal) in direction.iter_mut().zip(normal) {
+        *x = S::of_f64(normal / length);
+    }
+}
+
+/// Where a dense layer stands in its branch.
+#[derive(Clone, Copy, PartialEq)]
+enum Place {
+    /// Hidden layer, counted from 0.
+    Hidden(usize),
+    /// Linear output.
+    Output,
+}
+
+/// Draws the parameters of a dense layer; `weights` are flat over all parameters, and zero.
+fn draw<S: Scalar>(layer: &Layer, place: Place, kind: Initialization, rng: &mut impl Rng, weights: &mut [S]) {
+    let side = if kind == Initialization::Cranmer { layer.inputs.max(layer.outputs) } else { layer.inputs };
+    let root = (side as f64).sqrt();
+    let deviation = match (kind, place) {
+        (Initialization::Default | Initialization::NearZero, _) => {
+            let bound = root.recip();
+            let near_zero = kind == Initialization::NearZero && place == Place::Output;
+            let factor = if near_zero { NEAR_ZERO } else { 1.0 };
+            for w in layer.weight_range().chain(layer.bias_range()) {
+                weights[w] = S::of_f64(factor * rng.random_range(-bound..=bound));
+            }
+            return;
+        }
+        (Initialization::VariancePreserving, _) => layer.activation.variance_gain() / root,
+        (Initialization::Cranmer | Initialization::CranmerPaper, Place::Hidden(0)) => 2.2 / root,
+        (Initialization::Cranmer, Place::Hidden(k)) => 0.58 * k as f64 / root,
+        (Initialization::CranmerPaper, Place::Hidden(k)) => 0.58 * (k + 1) as f64 / root,
+        (Initialization::Cranmer | Initialization::CranmerPaper, Place::Output) => root,
+    };
+    for w in layer.weight_range() {
+        let normal: f64 = StandardNormal.sample(rng);
+        weights[w] = S::of_f64(deviation * normal);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::network::{ActivationChoice, Factor, Form, Structure};
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+
+    fn architecture(activation: ActivationChoice) -> Architecture {
+        Architecture {
+            coordinates: 2,
+            hidden: vec![300, 200],
+            activation,
+            alpha: 0.0,
+            time_like: None,
+            scale: vec![1.0; 2],
+            periodic: vec![false; 2],
+            embed_periodic: false,
+            input_layer: InputLayer::None,
+            dissipation: None,
+            form: Form::default(),
+        }
+    }
+
+    fn drawn(architecture: &Architecture, kind: Initialization) -> Vec<f64> {
+        initial_weights(architecture, kind, &mut ChaCha8Rng::seed_from_u64(1))
+    }
+
+    fn root_mean_square(numbers: &[f64]) -> f64 {
+        (numbers.iter().map(|w| w * w).sum::<f64>() / numbers.len().max(1) as f64).sqrt()
+    }
+
+    /// Within four standard errors of a sample deviation over `count` weights.
+    fn near(found: f64, expected: f64, count: usize) {
+        assert!((found / expected - 1.0).abs() < 4.0 / (2.0 * count as f64).sqrt(), "{found} for {expected}");
+    }
+
+    /// Deviations of weights and biases of a single network and of both branches of a hybrid, against `expected(widths,
+    /// activation)`: weights and biases of every layer.
+    fn every_branch_follows(kind: Initialization, expected: impl Fn([f64; 3], Activation) -> [[f64; 2]; 3]) {
+        for choice in [ActivationChoice::Softplus, ActivationChoice::XTanh, ActivationChoice::QuadraticSoftplus] {
+            let architecture = architecture(choice);
+            let weights = drawn(&architecture, kind);
+            let branches = Layout::new(&architecture).branches;
+            assert_eq!(branches.len(), choice.branches().len());
+            for (branch, &activation) in branches.iter().zip(choice.branches()) {
+                let share = branches.len() as f64;
+                let expected = expected([4.0, 300.0 / share, 200.0 / share], activation);
+                assert_eq!(branch.layers.len(), 3);
+                for (layer, [weight, bias]) in branch.layers.iter().zip(expected) {
+                    let (range, biases) = (layer.weight_range(), layer.bias_range());
+                    near(root_mean_square(&weights[range.clone()]), weight, range.len());
+                    if bias == 0.0 {
+                        assert!(weights[biases].iter().all(|&b| b == 0.0));
+                    } else {
+                        near(root_mean_square(&weights[biases.clone()]), bias, biases.len());
+                    }
+                }
+            }
+        }
+    }
+
+    /// Deviation of numbers uniform within the inverse root of the fan-in.
+    fn uniform(fan_in: f64) -> f64 {
+        (3.0 * fan_in).sqrt().recip()
+    }
+
+    #[test]
+    fn default_weights_are_uniform_within_the_inverse_root_of_the_fan_in() {
+        every_branch_follows(Initialization::Default, |n, _| {
+            [[uniform(n[0]); 2], [uniform(n[1]); 2], [uniform(n[2]), 0.0]]
+        });
+    }
+
+    #[test]
+    fn variance_preserving_weights_have_the_gain_of_their_own_activation() {
+        every_branch_follows(Initialization::VariancePreserving, |n, activation| {
+            let gain = activation.variance_gain();
+            [[gain / n[0].sqrt(), 0.0], [gain / n[1].sqrt(), 0.0], [n[2].sqrt().recip(), 0.0]]
+        });
+    }
+
+    #[test]
+    fn cranmer_weights_follow_the_code_of_their_author() {
+        every_branch_follows(Initialization::Cranmer, |n, _| {
+            // The larger sides: the first width twice, then the second.
+            [[2.2 / n[1].sqrt(), 0.0], [0.58 / n[1].sqrt(), 0.0], [n[2].sqrt(), 0.0]]
+        });
+        deep_maps_deviate_by(Initialization::Cranmer, [2.2 / 10.0, 0.58 / 10.0, 1.16 / 10.0, 1.74 / 10.0, 10.0]);
+    }
+
+    #[test]
+    fn cranmer_weights_of_the_paper_count_all_maps_and_take_the_fan_in() {
+        every_branch_follows(Initialization::CranmerPaper, |n, _| {
+            [[2.2 / n[0].sqrt(), 0.0], [1.16 / n[1].sqrt(), 0.0], [n[2].sqrt(), 0.0]]
+        });
+        deep_maps_deviate_by(Initialization::CranmerPaper, [1.1, 1.16 / 10.0, 1.74 / 10.0, 2.32 / 10.0, 10.0]);
+    }
+
+    /// Deviations of the maps of four layers of 100.
+    fn deep_maps_deviate_by(kind: Initialization, expected: [f64; 5]) {
+        let deeper = Architecture { hidden: vec![100; 4], ..architecture(ActivationChoice::Gelu) };
+        let weights = drawn(&deeper, kind);
+        let layers = &Layout::new(&deeper).branches[0].layers;
+        assert_eq!(layers.len(), expected.len());
+        for (layer, expected) in layers.iter().zip(expected) {
+            let range = layer.weight_range();
+            near(root_mean_square(&weights[range.clone()]), expected, range.len());
+        }
+    }
+
+    #[test]
+    fn near_zero_weights_are_the_default_ones_with_a_small_output() {
+        for choice in [ActivationChoice::Gelu, ActivationChoice::QuadraticSoftplus] {
+            let architecture = Architecture { input_layer: InputLayer::Dyt, ..architecture(choice) };
+            let mut expected = drawn(&architecture, Initialization::Default);
+            for branch in Layout::new(&architecture).branches {
+                expected[branch.output_range()].iter_mut().for_each(|w| *w *= 0.01);
+            }
+            assert_eq!(drawn(&architecture, Initialization::NearZero), expected);
+        }
+    }
+
+    /// `M` at the start is 1.7 times the identity to a third, a rectangle's to two, whatever the position, where a black box relies
+    /// on its `alpha`.
+    #[test]
+    fn a_structure_begins_with_a_nearly_constant_mass_matrix() {
+        use crate::lagrangian::{EulerLagrange, Request, Terms};
+        for (factor, bound) in [(Factor::Triangle, 1.0 / 3.0), (Factor::Rectangle, 2.0 / 3.0)] {
+            let form = Form { structure: Structure::Mechanical, factor, ..Form::default() };
+            let architecture = Architecture { form, ..architecture(ActivationChoice::Gelu) };
+            let weights = drawn(&architecture, Initialization::Default);
+            let model = crate::network::NetworkLagrangian::new(architecture, weights).unwrap();
+            let mut terms = Terms::default();
+            let q: Vec<f64> = (0..40).map(|k| (1.7 * f64::from(k)).sin() * 3.0).collect();
+            model.terms(&q, &[1.0; 40], Request::ALL, &mut terms).unwrap();
+            let diagonal = (1.0_f64.exp().ln_1p() + 1e-3).powi(2);
+            for m in terms.mass_matrix.chunks_exact(4) {
+                let off = [m[0] - diagonal, m[1], m[2], m[3] - diagonal];
+                assert!(off.iter().all(|x| x.abs() < diagonal * bound), "{m:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_dissipation_is_drawn_after_the_lagrangian_and_starts_small() {
+        for kind in [Initialization::Default, Initialization::Cranmer] {
+            let plain = architecture(ActivationChoice::QuadraticSoftplus);
+            let damped = Architecture { dissipation: Some(40), ..plain.clone() };
+            let (without, with) = (drawn(&plain, kind), drawn(&damped, kind));
+            let (lagrangian, friction) = with.split_at(without.len());
+            assert_eq!(lagrangian, without);
+            let (gamma, rest) = friction.split_at(40);
+            let (weight, direction) = rest.split_at(40 * 2);
+            assert!(gamma.iter().all(|&g| g == -5.0) && weight.iter().all(|&w| w == 0.0));
+            assert_eq!(direction.len(), 40 * 2);
+            assert!(direction.chunks(2).all(|b| (b[0].hypot(b[1]) - 1.0).abs() < 4.0 * f64::EPSILON));
+            // A mean of 40 unit vectors: each component has the standard error sqrt(1/2/40).
+            for i in 0..2 {
+                let mean = direction.iter().skip(i).step_by(2).sum::<f64>() / 40.0;
+                assert!(mean.abs() < 4.0 * (0.5f64 / 40.0).sqrt(), "{mean}");
+            }
+        }
+    }
+
+    #[test]
+    fn an_input_layer_starts_as_stated_and_draws_nothing() {
+        for choice in [ActivationChoice::Gelu, ActivationChoice::QuadraticSoftplus] {
+            let plain = architecture(choice);
+            let dyt = Architecture { input_layer: InputLayer::Dyt, ..plain.clone() };
+            for kind in [
+                Initialization::Default,
+                Initialization::VariancePreserving,
+                Initialization::Cranmer,
+                Initialization::CranmerPaper,
+                Initialization::NearZero,
+            ] {
+                let (with, without) = (drawn(&dyt, kind), drawn(&plain, kind));
+                let mut rest = without.as_slice();
+                for branch in Layout::new(&dyt).branches {
+                    let start = branch.layers[0].weight;
+                    assert_eq!(with[start..start + 9], [0.5, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0]);
+                    let own;
+                    (own, rest) = rest.split_at(branch.output_range().end - start - 9);
+                    assert_eq!(with[start + 9..branch.output_range().end], *own);
+                }
+                assert!(rest.is_empty());
+            }
+        }
+    }
 }

@@ -17,36 +17,27 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-mod activation_choice;
 mod config;
 mod dynamics;
-mod factor;
-mod features;
 #[cfg(feature = "model-files")]
 pub mod file;
-mod init;
 mod joint_friction;
-mod known;
 mod layout;
 mod model;
 mod recorded;
 mod structure;
 
 pub use crate::ops::Activation;
-pub use activation_choice::ActivationChoice;
 #[doc(hidden)]
-pub use activation_choice::UnknownActivation;
-pub use config::{Architecture, Initialization, InputLayer};
+pub use config::UnknownActivation;
+pub use config::{ActivationChoice, Architecture, Initialization, InputLayer};
 #[doc(hidden)]
 pub use dynamics::{Dynamics, Model};
 #[doc(hidden)]
-pub use factor::Factor;
-#[doc(hidden)]
-pub use init::initial_weights;
 pub use joint_friction::JointFriction;
 #[doc(hidden)]
-pub use layout::{Branch, DissipationLayout, Layer, Layout, LinearMap};
+pub use layout::{Branch, DissipationLayout, Layer, Layout, LinearMap, initial_weights};
 pub use model::{NetworkError, NetworkLagrangian};
 pub use structure::Structure;
 #[doc(hidden)]
-pub use structure::{Form, Radial, Sizes};
+pub use structure::{Factor, Form, Radial, Sizes};

@@ -97,7 +97,7 @@ impl Architecture {
             return fault(format!("expected a positive unit of radial coordinates, found {}", group.unit));
         }
         if let Some(known) = &self.form.known {
-            let described = crate::network::known::system(known, n);
+            let described = crate::network::recorded::system(known, n);
             described.map_err(|problem| NetworkError::Architecture(format!("known: {problem}")))?;
         }
         self.form.check(n, self.time_like).map_err(NetworkError::Architecture)?;

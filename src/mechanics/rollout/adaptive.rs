@@ -1,10 +1,10 @@
 //! Steps under error control, piece by piece where a force from outside is not smooth.
 
 use super::force::{Piece, pieces};
-use super::ode::{Adaptive, Ended, Project, Ran, Task};
+use super::ode::{Adaptive, EarlyEnd, Integration, Project, Ran};
 use super::run::{Keep, into_error};
-use super::samples::{Part, Samples, Times};
-use super::{Domain, Force, Integrable, Options, RolloutError, Statistics, StepFailure, UnderflowCause};
+use super::trajectory::{Part, Samples, Times};
+use super::{Domain, Force, Integrable, Options, RolloutError, StepCounts, StepFailure, UnderflowCause};
 use crate::lagrangian::{EulerLagrange, Manifold, MechanicsError, Request, Terms, project};
 use crate::linalg::Workspace;
 use crate::scalar::{Real, Scalar};
@@ -13,7 +13,7 @@ use crate::scalar::{Real, Scalar};
 const GROWTH: f64 = 2.0;
 
 /// The equations of a motion in elapsed time `|t - t0|`.
-struct Motion<'a, S> {
+struct MotionEquations<'a, S> {
     model: &'a dyn EulerLagrange<S>,
     force: Option<&'a dyn Force<S>>,
     options: &'a Options<S>,
@@ -23,7 +23,7 @@ struct Motion<'a, S> {
     workspace: Workspace<S>,
 }
 
-impl<S: Scalar> Motion<'_, S> {
+impl<S: Scalar> MotionEquations<'_, S> {
     fn backwards(&self) -> bool {
         self.options.t_end < self.options.t0
     }
@@ -66,11 +66,11 @@ pub(super) fn run<S: Integrable>(
     (q, v): (&[S], &[S]),
     options: &Options<S>,
     keep: &mut Keep<'_, S>,
-) -> (Statistics, Option<RolloutError>) {
-    let mut total = Statistics::default();
+) -> (StepCounts, Option<RolloutError>) {
+    let mut total = StepCounts::default();
     let (n, zero) = (model.coordinates(), <S as Real>::zero());
     let (terms, external, workspace) = (Terms::default(), vec![zero; n], Workspace::new());
-    let mut motion = Motion { model, force, options, n, terms, external, workspace };
+    let mut motion = MotionEquations { model, force, options, n, terms, external, workspace };
     let all = Samples::new(options);
     let (domain, manifold) = (options.domain.as_ref(), model.manifold());
     let mut state: Vec<S> = q.iter().chain(v).copied().collect();
@@ -82,7 +82,7 @@ pub(super) fn run<S: Integrable>(
         let end = (!last && (after == first || all.elapsed(after - 1) < piece.end)).then_some(piece.end);
         let samples = Part { all, first, after, start, end };
         let attempts = total.accepted + total.rejected;
-        let task = Task {
+        let task = Integration {
             method,
             rtol: options.rtol,
             atol: options.atol,
@@ -142,9 +142,9 @@ fn returned<S: Scalar>(
 
 /// Why a piece ended before its time, if it did.
 fn stopped<S: Integrable>(
-    motion: &mut Motion<'_, S>,
+    motion: &mut MotionEquations<'_, S>,
     piece: &Piece<S>,
-    ended: Option<Ended<StepFailure>>,
+    ended: Option<EarlyEnd<StepFailure>>,
     valid: bool,
     (elapsed, reached, step): (S, &[S], S),
 ) -> Option<RolloutError> {
@@ -154,10 +154,10 @@ fn stopped<S: Integrable>(
     match ended {
         None if valid => None,
         None => left(motion.options.domain.as_ref(), reached, t, state),
-        Some(Ended::Stopped) => Some(RolloutError::Stopped { t }),
-        Some(Ended::TooManySteps) => Some(RolloutError::TooManySteps { t, steps: motion.options.max_steps }),
-        Some(Ended::Failed(failure)) => Some(into_error(failure, t, state, step)),
-        Some(Ended::Underflow) => {
+        Some(EarlyEnd::Stopped) => Some(RolloutError::Stopped { t }),
+        Some(EarlyEnd::TooManySteps) => Some(RolloutError::TooManySteps { t, steps: motion.options.max_steps }),
+        Some(EarlyEnd::Failed(failure)) => Some(into_error(failure, t, state, step)),
+        Some(EarlyEnd::Underflow) => {
             let mut slope = vec![S::nan(); reached.len()];
             let largest_acceleration = match motion.derivative(piece, elapsed, reached, &mut slope) {
                 Ok(()) => slope[motion.n..].iter().map(|a| a.abs().to_f64()).fold(0.0, f64::max),

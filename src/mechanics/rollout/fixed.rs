@@ -1,14 +1,13 @@
 //! Fixed steps from sample to sample in phase space.
 
-use super::compensated::{Compensated, State};
 use super::force::{Piece, pieces};
 use super::gauss::Gauss;
-use super::phase::Phase;
+use super::phase::{Compensated, PhasePoint, PhaseSpace};
 use super::run::{Keep, into_error};
-use super::samples::{Samples, Times};
 use super::spark::Spark;
+use super::trajectory::{Samples, Times};
 use super::variational::Variational;
-use super::{Force, Method, Options, RolloutError, Statistics, StepFailure};
+use super::{Force, Method, Options, RolloutError, StepCounts, StepFailure};
 use crate::lagrangian::EulerLagrange;
 use crate::scalar::{Real, Scalar};
 
@@ -41,7 +40,13 @@ impl<S: Scalar> Stepper<S> {
         }
     }
 
-    fn step(&mut self, phase: &mut Phase<'_, S>, state: &mut State<S>, v: &mut [S], h: S) -> Result<(), StepFailure> {
+    fn step(
+        &mut self,
+        phase: &mut PhaseSpace<'_, S>,
+        state: &mut PhasePoint<S>,
+        v: &mut [S],
+        h: S,
+    ) -> Result<(), StepFailure> {
         match self {
             Self::Gauss(gauss) => gauss.step(phase, state, v, h),
             Self::Variational(variational) => variational.step(phase, state, v, h),
@@ -64,7 +69,7 @@ impl<S: Scalar> Stepper<S> {
 
 /// Where a roll-out stands.
 struct Position<S> {
-    state: State<S>,
+    state: PhasePoint<S>,
     /// A velocity near that of the state.
     near: Vec<S>,
     /// Elapsed time of the sample or break before, and steps of size `h` since.
@@ -81,9 +86,9 @@ pub(super) fn run<S: Scalar>(
     (q, v): (&[S], &[S]),
     options: &Options<S>,
     keep: &mut Keep<'_, S>,
-) -> (Statistics, Option<RolloutError>) {
-    let mut statistics = Statistics::default();
-    let mut phase = Phase::new(model, force);
+) -> (StepCounts, Option<RolloutError>) {
+    let mut statistics = StepCounts::default();
+    let mut phase = PhaseSpace::new(model, force);
     let cuts = pieces(force.map_or(&[], |force| force.breaks()), options.t0, options.t_end);
     let zero = <S as Real>::zero();
     let domain = options.domain.as_ref();
@@ -92,7 +97,7 @@ pub(super) fn run<S: Scalar>(
     let stop = match moving {
         Err(failure) => Some(into_error(failure, options.t0.to_f64(), start.iter().map(|x| x.to_f64()).collect(), 0.0)),
         Ok(p) => {
-            let state = State { q: Compensated::new(q.to_vec()), p: Compensated::new(p) };
+            let state = PhasePoint { q: Compensated::new(q.to_vec()), p: Compensated::new(p) };
             let mut position = Position { state, near: v.to_vec(), since: zero, steps: 0, h: zero };
             if keep(options.t0, q, v) {
                 advance(&mut phase, stepper, &mut position, options, &cuts, (&mut statistics, keep))
@@ -107,12 +112,12 @@ pub(super) fn run<S: Scalar>(
 }
 
 fn advance<S: Scalar>(
-    phase: &mut Phase<'_, S>,
+    phase: &mut PhaseSpace<'_, S>,
     stepper: &mut Stepper<S>,
     position: &mut Position<S>,
     options: &Options<S>,
     cuts: &[Piece<S>],
-    (statistics, keep): (&mut Statistics, &mut Keep<'_, S>),
+    (statistics, keep): (&mut StepCounts, &mut Keep<'_, S>),
 ) -> Option<RolloutError> {
     let samples = Samples::new(options);
     let domain = options.domain.as_ref();
@@ -162,13 +167,13 @@ fn advance<S: Scalar>(
 
 /// Steps over a distance in elapsed time within one piece.
 fn stretch<S: Scalar>(
-    phase: &mut Phase<'_, S>,
+    phase: &mut PhaseSpace<'_, S>,
     stepper: &mut Stepper<S>,
     position: &mut Position<S>,
     options: &Options<S>,
     (from, distance): (S, S),
     piece: &Piece<S>,
-    statistics: &mut Statistics,
+    statistics: &mut StepCounts,
 ) -> Option<RolloutError> {
     let backwards = options.t_end < options.t0;
     let longest = options.step.unwrap_or(distance);
@@ -212,7 +217,7 @@ fn inside<S: Scalar>(stepper: &Stepper<S>, n: usize, options: &Options<S>) -> Re
 }
 
 impl<S: Scalar> Position<S> {
-    fn velocity(&self, phase: &mut Phase<'_, S>) -> Result<Vec<S>, StepFailure> {
+    fn velocity(&self, phase: &mut PhaseSpace<'_, S>) -> Result<Vec<S>, StepFailure> {
         let mut v = self.near.clone();
         let (q, p) = (&self.state.q.high, &self.state.p.high);
         match phase.manifold() {
@@ -229,7 +234,7 @@ impl<S: Scalar> Position<S> {
     /// The error of a failure just ahead; the velocity of the state is the nearest known if it cannot be had.
     fn failed(
         &self,
-        phase: &mut Phase<'_, S>,
+        phase: &mut PhaseSpace<'_, S>,
         failure: StepFailure,
         options: &Options<S>,
         backwards: bool,

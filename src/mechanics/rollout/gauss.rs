@@ -17,8 +17,7 @@
 //! stays, and there is no symplectic form to keep.
 
 use super::StepFailure;
-use super::compensated::State;
-use super::phase::{Defect, Derivatives, Phase};
+use super::phase::{Defect, Derivatives, PhasePoint, PhaseSpace};
 use super::simplified_newton::{Equations, SimplifiedNewton};
 use crate::scalar::{Real, Scalar};
 
@@ -84,7 +83,7 @@ pub(super) fn lagrange<S: Scalar>(nodes: &[S], at: &[S]) -> Vec<S> {
 /// The equations of one step, and what their last evaluation left.
 struct Stages<'a, S> {
     tableau: &'a Tableau<S>,
-    state: &'a State<S>,
+    state: &'a PhasePoint<S>,
     h: S,
     /// `h b_j`; their sum is `h`.
     steps: &'a [S],
@@ -109,7 +108,12 @@ impl<S: Scalar> Stages<'_, S> {
 }
 
 impl<S: Scalar> Equations<S> for Stages<'_, S> {
-    fn residual(&mut self, phase: &mut Phase<'_, S>, x: &[S], residual: &mut [S]) -> Result<Defect<S>, StepFailure> {
+    fn residual(
+        &mut self,
+        phase: &mut PhaseSpace<'_, S>,
+        x: &[S],
+        residual: &mut [S],
+    ) -> Result<Defect<S>, StepFailure> {
         let (n, s) = (phase.n, self.tableau.stages());
         let (q, p) = (&self.state.q, &self.state.p);
         for i in 0..s {
@@ -131,7 +135,7 @@ impl<S: Scalar> Equations<S> for Stages<'_, S> {
 
     /// Block `(i, j)`: `delta_ij M + h a_ij (B - B^T - C) - h^2 (a^2)_ij K`, `B = dp/dq`, `K = dg/dq`, `C = dQ/dv` at the middle
     /// stage.
-    fn jacobian(&mut self, phase: &mut Phase<'_, S>, x: &[S], matrix: &mut [S]) -> Result<(), StepFailure> {
+    fn jacobian(&mut self, phase: &mut PhaseSpace<'_, S>, x: &[S], matrix: &mut [S]) -> Result<(), StepFailure> {
         let (n, s) = (phase.n, self.tableau.stages());
         let middle = s / 2 * n;
         for k in 0..n {
@@ -215,8 +219,8 @@ impl<S: Scalar> Gauss<S> {
     /// One step of size `h`; `velocity` is one near the start before and near the end after it.
     pub(super) fn step(
         &mut self,
-        phase: &mut Phase<'_, S>,
-        state: &mut State<S>,
+        phase: &mut PhaseSpace<'_, S>,
+        state: &mut PhasePoint<S>,
         velocity: &mut [S],
         h: S,
     ) -> Result<(), StepFailure> {
@@ -277,12 +281,17 @@ impl<S: Scalar> Gauss<S> {
         (&self.q, &self.v)
     }
 
-    fn solve_from(&mut self, phase: &mut Phase<'_, S>, state: &State<S>, velocity: &[S]) -> Result<(), StepFailure> {
+    fn solve_from(
+        &mut self,
+        phase: &mut PhaseSpace<'_, S>,
+        state: &PhasePoint<S>,
+        velocity: &[S],
+    ) -> Result<(), StepFailure> {
         self.v.chunks_exact_mut(phase.n).for_each(|v| v.copy_from_slice(velocity));
         self.solve(phase, state)
     }
 
-    fn solve(&mut self, phase: &mut Phase<'_, S>, state: &State<S>) -> Result<(), StepFailure> {
+    fn solve(&mut self, phase: &mut PhaseSpace<'_, S>, state: &PhasePoint<S>) -> Result<(), StepFailure> {
         let Self { tableau, chord, h, steps, after, v, q, p, g, derivatives, .. } = self;
         chord.solve(phase, &mut Stages { tableau, state, h: *h, steps, after, q, p, g, derivatives }, v)
     }

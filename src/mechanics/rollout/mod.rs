@@ -17,48 +17,42 @@
 //! every precision by [`rollout_fixed`].
 
 mod adaptive;
-mod balance;
-mod compensated;
 mod dense;
 mod ensemble;
 mod error;
 mod fixed;
 mod force;
 mod gauss;
-mod group;
 mod ode;
 mod options;
 mod phase;
 mod pieces;
 mod run;
-mod samples;
 mod simplified_newton;
 mod spark;
 mod trajectory;
 mod variational;
 
-#[doc(hidden)]
-pub use balance::EnergyBalance;
 pub use ensemble::{Start, rollout_many};
 #[doc(hidden)]
 pub use ensemble::{rollout_each, rollout_together};
 pub use error::RolloutError;
 #[doc(hidden)]
 pub use error::UnderflowCause;
-pub use force::Driven;
-pub use force::{Force, SampledForce};
+pub use force::{Driven, Force, SampledForce};
 #[doc(hidden)]
 pub use ode::Integrable;
 pub use options::{Domain, Method, Options};
 #[doc(hidden)]
-pub use pieces::{Balances, Ending, rollout_in_pieces};
-use run::StepFailure;
+pub use pieces::{Balances, Ending, EnergyBalance, rollout_in_pieces};
 #[doc(hidden)]
 pub use run::rollout_fixed;
 pub use run::{Motion, Rollout, rollout};
 #[doc(hidden)]
-pub use trajectory::Statistics;
+pub use trajectory::StepCounts;
 pub use trajectory::Trajectory;
+
+use run::StepFailure;
 
 #[cfg(test)]
 pub(crate) mod models;

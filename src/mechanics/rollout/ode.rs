@@ -10,9 +10,9 @@
 //! - Underflow is not noticed in `f32`: a step that does not advance the time ends the integration.
 //! - The node of stage 12 in its order 8 table is wrong (0 for 1): the time of that stage is taken from the one before.
 
-use super::Statistics;
+use super::StepCounts;
 use super::dense::{Interpolant, Rhs, Step};
-use super::samples::Times;
+use super::trajectory::Times;
 use crate::scalar::{Real, Scalar};
 use nalgebra::allocator::Allocator;
 use nalgebra::{DefaultAllocator, Dim, OVector};
@@ -35,7 +35,7 @@ pub(super) enum Adaptive {
 
 /// Problem to integrate.
 #[doc(hidden)]
-pub struct Task<'a, S> {
+pub struct Integration<'a, S> {
     pub(super) method: Adaptive,
     pub(super) rtol: S,
     pub(super) atol: S,
@@ -53,7 +53,7 @@ pub struct Task<'a, S> {
 /// Why an integration ended early.
 #[doc(hidden)]
 #[derive(Debug)]
-pub enum Ended<E> {
+pub enum EarlyEnd<E> {
     /// The right-hand side fails ahead, however short the step.
     Failed(E),
     /// The error estimate asks for steps that do not advance the time.
@@ -67,19 +67,19 @@ pub enum Ended<E> {
 /// Result of an integration.
 #[doc(hidden)]
 pub struct Ran<S, E> {
-    pub(super) statistics: Statistics,
+    pub(super) statistics: StepCounts,
     /// Elapsed time, state and size of the last accepted step.
     pub(super) elapsed: S,
     pub(super) state: Vec<S>,
     pub(super) step: S,
-    pub(super) ended: Option<Ended<E>>,
+    pub(super) ended: Option<EarlyEnd<E>>,
 }
 
 /// The scalars that roll-outs work in: `f32` and `f64`.
 pub trait Integrable: Scalar {
     #[doc(hidden)]
     fn integrate<E>(
-        task: &Task<'_, Self>,
+        task: &Integration<'_, Self>,
         f: &mut Rhs<'_, Self, E>,
         project: Option<&mut Project<'_, Self, E>>,
         output: &mut Output<'_, Self>,
@@ -91,7 +91,7 @@ macro_rules! integrable {
         $(
             impl Integrable for $float {
                 fn integrate<E>(
-                    task: &Task<'_, Self>,
+                    task: &Integration<'_, Self>,
                     f: &mut Rhs<'_, Self, E>,
                     project: Option<&mut Project<'_, Self, E>>,
                     output: &mut Output<'_, Self>,
@@ -127,8 +127,8 @@ const fn closing_calls(method: Adaptive) -> usize {
 }
 
 /// Everything that is observed while a solver runs.
-struct Watch<'a, 'f, S, E> {
-    task: &'a Task<'a, S>,
+struct Observer<'a, 'f, S, E> {
+    task: &'a Integration<'a, S>,
     f: &'a mut Rhs<'f, S, E>,
     project: Option<&'a mut Project<'f, S, E>>,
     output: &'a mut Output<'f, S>,
@@ -138,7 +138,7 @@ struct Watch<'a, 'f, S, E> {
     /// Calls of a run before its first attempt, and the time of the last call.
     opening: usize,
     asked: S,
-    statistics: Statistics,
+    statistics: StepCounts,
     /// Last accepted step.
     elapsed: S,
     state: Vec<S>,
@@ -162,7 +162,7 @@ struct Watch<'a, 'f, S, E> {
     sample: Vec<S>,
 }
 
-impl<S: Scalar, E> Watch<'_, '_, S, E> {
+impl<S: Scalar, E> Observer<'_, '_, S, E> {
     fn evaluate(&mut self, x: S, y: &[S], dy: &mut [S]) {
         let x = self.stage_time(x);
         self.asked = x;
@@ -183,7 +183,7 @@ impl<S: Scalar, E> Watch<'_, '_, S, E> {
         self.calls += 1;
     }
 
-    /// The time of a stage. Stage 12 of the method of order 8 is said to be at the start of the step and is at its end;
+    /// The time of a stage. Stage 12 of the method of order 8 is declared at the start of the step and is at its end;
     /// stage 11, asked just before, is at 6/7 of it.
     fn stage_time(&self, x: S) -> S {
         if self.task.method == Adaptive::Dop853 && self.calls >= self.opening && x == self.elapsed {
@@ -294,7 +294,7 @@ impl<S: Scalar, E> Watch<'_, '_, S, E> {
 }
 
 /// The watch as the solver sees it.
-struct Watched<'w, 'a, 'f, S, E>(&'w RefCell<Watch<'a, 'f, S, E>>);
+struct Watched<'w, 'a, 'f, S, E>(&'w RefCell<Observer<'a, 'f, S, E>>);
 
 impl<S, D, E> System<S, OVector<S, D>> for Watched<'_, '_, '_, S, E>
 where
@@ -312,7 +312,7 @@ where
 }
 
 fn integrate<S, D, E>(
-    task: &Task<'_, S>,
+    task: &Integration<'_, S>,
     vector: impl Fn(&[S]) -> OVector<S, D>,
     f: &mut Rhs<'_, S, E>,
     project: Option<&mut Project<'_, S, E>>,
@@ -330,26 +330,26 @@ where
     let (zero, end) = (<S as Real>::zero(), task.samples.len().checked_sub(1).and_then(|last| task.samples.get(last)));
     let mut slope = vec![zero; dim];
     let mut ran = Ran {
-        statistics: Statistics { evaluations: 1, ..Statistics::default() },
+        statistics: StepCounts { evaluations: 1, ..StepCounts::default() },
         elapsed: zero,
         state: task.start.to_vec(),
         step: zero,
         ended: None,
     };
     if let Err(error) = f(zero, task.start, &mut slope) {
-        ran.ended = Some(Ended::Failed(error));
+        ran.ended = Some(EarlyEnd::Failed(error));
         return ran;
     }
     let Some(end) = end else { return ran };
     let mut next = 0;
     while task.samples.get(next).is_some_and(|t| t <= zero) {
         if !output(next, task.start) {
-            ran.ended = Some(Ended::Stopped);
+            ran.ended = Some(EarlyEnd::Stopped);
             return ran;
         }
         next += 1;
     }
-    let watch = RefCell::new(Watch {
+    let watch = RefCell::new(Observer {
         task,
         f,
         project: project.map(|project| project as &mut Project<'_, S, E>),
@@ -414,8 +414,8 @@ where
             watch.stuck = true;
         }
         ran.ended = match result {
-            _ if watch.stopped => Some(Ended::Stopped),
-            _ if watch.stuck => Some(watch.cause().map_or(Ended::Underflow, Ended::Failed)),
+            _ if watch.stopped => Some(EarlyEnd::Stopped),
+            _ if watch.stuck => Some(watch.cause().map_or(EarlyEnd::Underflow, EarlyEnd::Failed)),
             Ok(()) => {
                 // The last step may end one rounding short of the end.
                 while watch.next < task.samples.len() {
@@ -426,8 +426,8 @@ where
                 next = watch.next;
                 None
             }
-            Err(IntegrationError::MaxNumStepReached { .. }) => Some(Ended::TooManySteps),
-            Err(_) => Some(watch.cause().map_or(Ended::Underflow, Ended::Failed)),
+            Err(IntegrationError::MaxNumStepReached { .. }) => Some(EarlyEnd::TooManySteps),
+            Err(_) => Some(watch.cause().map_or(EarlyEnd::Underflow, EarlyEnd::Failed)),
         };
         if ran.ended.is_some() {
             break;
@@ -441,7 +441,7 @@ where
 /// One run of the solver from `elapsed` to `end`, its own defaults except for stiffness detection (off: the number of
 /// steps is limited instead) and the number of steps.
 fn run<S, D, E>(
-    task: &Task<'_, S>,
+    task: &Integration<'_, S>,
     watched: Watched<'_, '_, '_, S, E>,
     elapsed: S,
     end: S,
@@ -492,4 +492,65 @@ where
 }
 
 #[cfg(test)]
-mod tests;
+mod tests {
+    //! Dense output of single steps; samples at equal times.
+
+    use super::*;
+
+    /// Samples of `y' = -y` from 1.
+    fn decay(method: Adaptive, tolerance: f64, first_step: f64, samples: &Vec<f64>) -> (Vec<f64>, StepCounts) {
+        let task = Integration {
+            method,
+            rtol: tolerance,
+            atol: tolerance,
+            max_steps: 1000,
+            first_step,
+            timed: false,
+            start: &[1.0],
+            samples,
+        };
+        let mut got = Vec::new();
+        let ran = f64::integrate::<()>(
+            &task,
+            &mut |_, y, dy| {
+                dy[0] = -y[0];
+                Ok(())
+            },
+            None,
+            &mut |k, y| {
+                assert_eq!(k, got.len());
+                got.push(y[0]);
+                true
+            },
+        );
+        assert!(ran.ended.is_none());
+        (got, ran.statistics)
+    }
+
+    /// Largest error of the samples of one single step of size `h`.
+    fn single_step(method: Adaptive, h: f64) -> f64 {
+        let samples: Vec<f64> = (0..=20).map(|k| h * f64::from(k) / 20.0).collect();
+        let (got, statistics) = decay(method, 1e6, h, &samples);
+        assert_eq!((statistics.accepted, statistics.rejected), (1, 0));
+        assert_eq!(got.len(), samples.len());
+        samples.iter().zip(got).map(|(t, y)| (y - (-t).exp()).abs()).fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn interpolation_is_right_inside_a_single_step_with_its_order() {
+        for (method, order, bound) in [(Adaptive::Dopri5, 4.0, 2e-4), (Adaptive::Dop853, 7.0, 2e-7)] {
+            assert!(single_step(method, 0.5) < bound, "{method:?}: {:e}", single_step(method, 0.5));
+            // Local error h^(order + 1).
+            let slope = (single_step(method, 0.5) / single_step(method, 0.25)).log2();
+            assert!((slope - order - 1.0).abs() < 0.35, "{method:?}: {slope}");
+        }
+    }
+
+    #[test]
+    fn a_sample_at_zero_and_two_at_one_time() {
+        let (got, _) = decay(Adaptive::Dop853, 1e-10, 0.0, &vec![0.0, 0.0, 1.0, 1.0]);
+        assert_eq!(got[..2], [1.0, 1.0]);
+        assert_eq!(got[2], got[3]);
+        assert!((got[2] - (-1.0_f64).exp()).abs() < 1e-9);
+    }
+}

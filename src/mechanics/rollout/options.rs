@@ -234,7 +234,7 @@ impl<S: Scalar> Options<S> {
 }
 
 /// Rounding of the quotient of time span and `dt`: one this close to a whole number is whole, for the times carry no more
-/// digits. From one half on the samples themselves cannot be told apart.
+/// digits. From one half on the samples themselves cannot be distinguished.
 pub(super) fn blur<S: Scalar>(options: &Options<S>) -> S {
     let span = options.t_end - options.t0;
     S::epsilon().ldexp(2) * (options.t0.abs() + options.t_end.abs() + span.abs()) / options.dt.abs()

@@ -11,7 +11,7 @@ use crate::scalar::{Real, Scalar};
 const MAX_SWEEPS: usize = 50;
 
 /// A model, the buffers of its evaluation, and what was evaluated.
-pub(super) struct Phase<'a, S> {
+pub(super) struct PhaseSpace<'a, S> {
     model: &'a dyn EulerLagrange<S>,
     /// Number of coordinates.
     pub(super) n: usize,
@@ -102,7 +102,7 @@ impl<S: Scalar> Defect<S> {
     }
 }
 
-impl<'a, S: Scalar> Phase<'a, S> {
+impl<'a, S: Scalar> PhaseSpace<'a, S> {
     pub(super) fn new(model: &'a dyn EulerLagrange<S>, force: Option<&'a dyn Force<S>>) -> Self {
         Self {
             model,
@@ -144,7 +144,7 @@ impl<'a, S: Scalar> Phase<'a, S> {
         Ok(())
     }
 
-    /// Evaluates states; `after` says how far behind the start of the step they lie, see [`Phase::add_external`].
+    /// Evaluates states; `after` says how far behind the start of the step they lie, see [`PhaseSpace::add_external`].
     fn evaluate(&mut self, q: &[S], v: &[S], request: Request, after: &[S]) -> Result<(), StepFailure> {
         if q.iter().chain(v).any(|x| !x.is_finite()) {
             return Err(StepFailure::State);
@@ -281,7 +281,7 @@ impl<'a, S: Scalar> Phase<'a, S> {
     }
 }
 
-impl<'a, S: Scalar> Phase<'a, S> {
+impl<'a, S: Scalar> PhaseSpace<'a, S> {
     /// The states that the constraints of the model allow.
     pub(super) fn manifold(&self) -> Option<&'a dyn Manifold<S>> {
         self.model.manifold()
@@ -343,4 +343,55 @@ pub(super) fn singular(error: LinalgError) -> StepFailure {
         LinalgError::Singular { condition, .. } => MechanicsError::Singular { row: 0, condition },
         _ => MechanicsError::NotFinite { row: 0, what: "mass matrix" },
     })
+}
+
+/// A vector that is updated by small increments; what an update rounds away is added to the next one.
+///
+/// The value is `high + low` (Kahan 1965, Moller 1965): rounding errors of the updates do not accumulate, so that what
+/// is left in a long run are the errors of the increments themselves, a factor `h` smaller.
+#[derive(Clone, Debug)]
+pub(super) struct Compensated<S> {
+    /// Rounded value.
+    pub(super) high: Vec<S>,
+    /// Rests that the rounding lost.
+    pub(super) low: Vec<S>,
+}
+
+impl<S: Scalar> Compensated<S> {
+    /// An exact value.
+    pub(super) fn new(high: Vec<S>) -> Self {
+        let low = vec![<S as Real>::zero(); high.len()];
+        Self { high, low }
+    }
+
+    /// Adds an increment to component `i`.
+    #[inline]
+    pub(super) fn add(&mut self, i: usize, increment: S) {
+        let (high, term) = (self.high[i], self.low[i] + increment);
+        let sum = high + term;
+        // Knuth's error of a sum, whichever term is larger.
+        let shifted = sum - high;
+        self.low[i] = (high - (sum - shifted)) + (term - shifted);
+        self.high[i] = sum;
+    }
+}
+
+/// Coordinates and conjugate momenta `p = dL/dv`.
+#[derive(Clone, Debug)]
+pub(super) struct PhasePoint<S> {
+    pub(super) q: Compensated<S>,
+    pub(super) p: Compensated<S>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ten_million_tenths_in_single_precision() {
+        let mut sum = Compensated::new(vec![0.0_f32]);
+        (0..10_000_000).for_each(|_| sum.add(0, 0.1));
+        let exact = f64::from(0.1_f32) * 1e7;
+        assert!((f64::from(sum.high[0]) - exact).abs() <= exact * f64::from(f32::EPSILON));
+    }
 }

@@ -3,7 +3,7 @@
 use super::error::UnderflowCause;
 use super::fixed::Stepper;
 use super::ode::Adaptive;
-use super::{Force, Integrable, Method, Options, RolloutError, Statistics, Trajectory, adaptive, fixed};
+use super::{Force, Integrable, Method, Options, RolloutError, StepCounts, Trajectory, adaptive, fixed};
 use crate::lagrangian::{EulerLagrange, ManifoldRows, MechanicsError, OffManifold, project};
 use crate::scalar::Scalar;
 
@@ -13,7 +13,7 @@ pub struct Rollout<S> {
     /// The samples reached; all valid, whatever `stop` says.
     pub trajectory: Trajectory<S>,
     /// Work done.
-    pub statistics: Statistics,
+    pub statistics: StepCounts,
     /// Why it ended before `t_end`.
     pub stop: Option<RolloutError>,
 }
@@ -104,7 +104,7 @@ pub(super) fn fixed<S: Scalar>(
 fn collected<S: Scalar>(
     model: &dyn EulerLagrange<S>,
     options: &Options<S>,
-    motion: impl FnOnce(&mut Keep<'_, S>) -> (Statistics, Option<RolloutError>),
+    motion: impl FnOnce(&mut Keep<'_, S>) -> (StepCounts, Option<RolloutError>),
 ) -> Rollout<S> {
     let mut trajectory = Trajectory::empty(model.coordinates());
     let (statistics, stop) = motion(&mut |t, q, v| {
@@ -124,7 +124,7 @@ pub(super) fn integrate<S: Integrable>(
     (q, v): (&[S], &[S]),
     options: &Options<S>,
     keep: &mut Keep<'_, S>,
-) -> (Statistics, Option<RolloutError>) {
+) -> (StepCounts, Option<RolloutError>) {
     let method = match options.method {
         Method::Dopri5 => Adaptive::Dopri5,
         Method::Dop853 => Adaptive::Dop853,
@@ -134,7 +134,7 @@ pub(super) fn integrate<S: Integrable>(
     };
     let checked = check(model.coordinates(), q, v, options).and_then(|()| reachable(q, v, options));
     match checked.and_then(|()| allowed(model, q, v)) {
-        Err(error) => (Statistics::default(), Some(error)),
+        Err(error) => (StepCounts::default(), Some(error)),
         Ok((q, v)) => adaptive::run(model, force, method, (&q, &v), options, keep),
     }
 }
@@ -146,9 +146,9 @@ fn integrate_fixed<S: Scalar>(
     (q, v): (&[S], &[S]),
     options: &Options<S>,
     keep: &mut Keep<'_, S>,
-) -> (Statistics, Option<RolloutError>) {
+) -> (StepCounts, Option<RolloutError>) {
     let n = model.coordinates();
-    let refused = |error| (Statistics::default(), Some(error));
+    let refused = |error| (StepCounts::default(), Some(error));
     if let Err(error) = check(n, q, v, options) {
         return refused(error);
     }

@@ -1,16 +1,21 @@
 //! Newton's method with a matrix that is kept as long as it serves, iterated to the rounding floor.
 
 use super::StepFailure;
-use super::phase::{Defect, Phase, singular};
+use super::phase::{Defect, PhaseSpace, singular};
 use crate::linalg::{LANES, solve};
 use crate::scalar::{Real, Scalar};
 
 /// Equations `F(x) = 0` of one step.
 pub(super) trait Equations<S: Scalar> {
     /// `F(x)` into `residual`, and how large it is.
-    fn residual(&mut self, phase: &mut Phase<'_, S>, x: &[S], residual: &mut [S]) -> Result<Defect<S>, StepFailure>;
+    fn residual(
+        &mut self,
+        phase: &mut PhaseSpace<'_, S>,
+        x: &[S],
+        residual: &mut [S],
+    ) -> Result<Defect<S>, StepFailure>;
     /// An approximation of `dF/dx` at `x`, row-major.
-    fn jacobian(&mut self, phase: &mut Phase<'_, S>, x: &[S], matrix: &mut [S]) -> Result<(), StepFailure>;
+    fn jacobian(&mut self, phase: &mut PhaseSpace<'_, S>, x: &[S], matrix: &mut [S]) -> Result<(), StepFailure>;
 }
 
 /// Evaluations of one step.
@@ -60,7 +65,7 @@ impl<S: Scalar> SimplifiedNewton<S> {
     /// Those of the equations; [`StepFailure::NotConverged`]; a singular matrix.
     pub(super) fn solve(
         &mut self,
-        phase: &mut Phase<'_, S>,
+        phase: &mut PhaseSpace<'_, S>,
         equations: &mut impl Equations<S>,
         x: &mut [S],
     ) -> Result<(), StepFailure> {
@@ -101,7 +106,7 @@ impl<S: Scalar> SimplifiedNewton<S> {
     /// A new matrix at `x`, inverted.
     fn refresh(
         &mut self,
-        phase: &mut Phase<'_, S>,
+        phase: &mut PhaseSpace<'_, S>,
         equations: &mut impl Equations<S>,
         x: &[S],
     ) -> Result<(), StepFailure> {

@@ -16,9 +16,8 @@
 //! the (s, s)-Gauss-Lobatto SPARK methods; Andersen, Rattle (1983).
 
 use super::StepFailure;
-use super::compensated::State;
 use super::gauss::{Tableau, lagrange};
-use super::phase::{Defect, Phase};
+use super::phase::{Defect, PhasePoint, PhaseSpace};
 use super::simplified_newton::{Equations, SimplifiedNewton};
 use crate::lagrangian::{Manifold, ManifoldRows};
 use crate::scalar::{Real, Scalar};
@@ -69,7 +68,7 @@ struct Stages<'a, S: Scalar> {
     lobatto: &'a Lobatto<S>,
     manifold: &'a dyn Manifold<S>,
     kinds: &'a Kinds,
-    state: &'a State<S>,
+    state: &'a PhasePoint<S>,
     h: S,
     buffers: &'a mut Buffers<S>,
 }
@@ -115,7 +114,12 @@ impl<S: Scalar> Stages<'_, S> {
 }
 
 impl<S: Scalar> Equations<S> for Stages<'_, S> {
-    fn residual(&mut self, phase: &mut Phase<'_, S>, x: &[S], residual: &mut [S]) -> Result<Defect<S>, StepFailure> {
+    fn residual(
+        &mut self,
+        phase: &mut PhaseSpace<'_, S>,
+        x: &[S],
+        residual: &mut [S],
+    ) -> Result<Defect<S>, StepFailure> {
         let (n, s, zero) = (phase.n, self.tableau.nodes.len(), <S as Real>::zero());
         let (held, slid) = (self.kinds.holonomic.len(), self.kinds.linear.len());
         let (v, multipliers) = x.split_at(s * n);
@@ -196,7 +200,7 @@ impl<S: Scalar> Equations<S> for Stages<'_, S> {
     }
 
     /// By forward differences: enough for an iteration matrix.
-    fn jacobian(&mut self, phase: &mut Phase<'_, S>, x: &[S], matrix: &mut [S]) -> Result<(), StepFailure> {
+    fn jacobian(&mut self, phase: &mut PhaseSpace<'_, S>, x: &[S], matrix: &mut [S]) -> Result<(), StepFailure> {
         let (size, n, s) = (x.len(), phase.n, self.tableau.nodes.len());
         let (zero, one) = (<S as Real>::zero(), <S as Real>::one());
         let mut middle = vec![zero; size];
@@ -258,9 +262,9 @@ impl<S: Scalar> Spark<S> {
     /// One step of size `h`; `velocity` is one near the start before and that of the end after it.
     pub(super) fn step(
         &mut self,
-        phase: &mut Phase<'_, S>,
+        phase: &mut PhaseSpace<'_, S>,
         manifold: &dyn Manifold<S>,
-        state: &mut State<S>,
+        state: &mut PhasePoint<S>,
         velocity: &mut [S],
         h: S,
     ) -> Result<(), StepFailure> {

@@ -15,14 +15,13 @@
 //! Source: Marsden and West, Discrete mechanics and variational integrators (2001), 1.3.1 and 2.3.1.
 
 use super::StepFailure;
-use super::compensated::State;
-use super::phase::{Defect, Derivatives, Phase};
+use super::phase::{Defect, Derivatives, PhasePoint, PhaseSpace};
 use super::simplified_newton::{Equations, SimplifiedNewton};
 use crate::scalar::{Real, Scalar};
 
 /// `p0 + D1 L_d(q0, q0 + h u) = 0` for the mean velocity `u`.
 struct Discrete<'a, S> {
-    state: &'a State<S>,
+    state: &'a PhasePoint<S>,
     half_step: S,
     /// Midpoint, and `dL/dv`, `dL/dq` there.
     q: &'a mut [S],
@@ -41,7 +40,12 @@ impl<S: Scalar> Discrete<'_, S> {
 }
 
 impl<S: Scalar> Equations<S> for Discrete<'_, S> {
-    fn residual(&mut self, phase: &mut Phase<'_, S>, x: &[S], residual: &mut [S]) -> Result<Defect<S>, StepFailure> {
+    fn residual(
+        &mut self,
+        phase: &mut PhaseSpace<'_, S>,
+        x: &[S],
+        residual: &mut [S],
+    ) -> Result<Defect<S>, StepFailure> {
         self.move_to(x);
         phase.momenta_and_forces(self.q, x, &[self.half_step], (self.p, self.g))?;
         let p0 = &self.state.p;
@@ -53,7 +57,7 @@ impl<S: Scalar> Equations<S> for Discrete<'_, S> {
     }
 
     /// `M + h/2 (B - B^T - C) - h^2/4 K`, `B = dp/dq`, `K = dg/dq`, `C = dQ/dv`.
-    fn jacobian(&mut self, phase: &mut Phase<'_, S>, x: &[S], matrix: &mut [S]) -> Result<(), StepFailure> {
+    fn jacobian(&mut self, phase: &mut PhaseSpace<'_, S>, x: &[S], matrix: &mut [S]) -> Result<(), StepFailure> {
         let n = phase.n;
         self.move_to(x);
         phase.derivatives(self.q, x, self.half_step, self.derivatives)?;
@@ -106,8 +110,8 @@ impl<S: Scalar> Variational<S> {
     /// One step of size `h`; `velocity` is one near the start before and near the end after it.
     pub(super) fn step(
         &mut self,
-        phase: &mut Phase<'_, S>,
-        state: &mut State<S>,
+        phase: &mut PhaseSpace<'_, S>,
+        state: &mut PhasePoint<S>,
         velocity: &mut [S],
         h: S,
     ) -> Result<(), StepFailure> {
@@ -147,7 +151,7 @@ impl<S: Scalar> Variational<S> {
         (&self.q, &self.u)
     }
 
-    fn solve(&mut self, phase: &mut Phase<'_, S>, state: &State<S>) -> Result<(), StepFailure> {
+    fn solve(&mut self, phase: &mut PhaseSpace<'_, S>, state: &PhasePoint<S>) -> Result<(), StepFailure> {
         let Self { chord, h, u, q, p, g, derivatives, .. } = self;
         chord.solve(phase, &mut Discrete { state, half_step: *h * S::half(), q, p, g, derivatives }, u)
     }

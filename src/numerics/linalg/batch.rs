@@ -1,6 +1,6 @@
 //! Lanes: blocks of matrices side by side, and the workspace that holds them.
 
-use super::error::{Failure, LinalgError};
+use super::{Failure, LinalgError};
 use crate::scalar::{Real, Scalar};
 
 /// Matrices per block.
@@ -140,7 +140,7 @@ pub(super) fn select<S>(condition: bool, chosen: S, otherwise: S) -> S {
 pub(super) struct Aligned<T>(pub T);
 
 /// `true` if loops of known length gain something: with wider numbers the arithmetic is what takes the time.
-pub(super) const fn constant_sizes<S>() -> bool {
+pub(crate) const fn constant_sizes<S>() -> bool {
     size_of::<S>() <= size_of::<f64>()
 }
 

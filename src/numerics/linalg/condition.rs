@@ -1,8 +1,7 @@
 //! Condition numbers, and when a matrix counts as singular.
 
 use super::batch::{Dense, LANES};
-use super::error::{LinalgError, expect_length};
-use super::{Workspace, elimination, jacobi, large_systems};
+use super::{LinalgError, Workspace, eigen, elimination, expect_length, large_systems};
 use crate::scalar::{Real, Scalar, vectorized};
 
 /// 2-norm condition number `max |w| / min |w|` of one symmetric `(n, n)` matrix; infinite if exactly singular.
@@ -139,7 +138,7 @@ impl<S: Scalar> Dense<S> {
         if large_systems::serves::<S>(n) {
             large_systems::eigh(n, &self.matrix, &mut values, &mut []);
         } else {
-            jacobi::decompose::<S, 1>(n, &self.matrix, &mut values, &mut [], (0, 1), &mut self.lanes);
+            eigen::decompose::<S, 1>(n, &self.matrix, &mut values, &mut [], (0, 1), &mut self.lanes);
         }
         values.iter().fold((S::infinity(), <S as Real>::zero()), |(least, most), w| {
             let w = w.abs();

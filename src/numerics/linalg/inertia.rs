@@ -1,6 +1,6 @@
-//! Signs of the eigenvalues without the eigenvalues.
+//! Signs of the eigenvalues without the eigenvalues; determinants of the leading blocks and their gradients, without overflow.
 
-use super::error::{LinalgError, expect_length};
+use super::{LinalgError, Workspace, eigh, expect_length};
 use crate::scalar::{Real, Scalar};
 
 /// Numbers of positive, zero and negative eigenvalues (Sylvester's law: invariant under congruence).
@@ -176,4 +176,188 @@ fn exchange<S: Scalar>(n: usize, a: &mut [S], i: usize, j: usize) {
     for k in j + 1..n {
         at(k, i, k, j);
     }
+}
+
+/// `mantissa * 2^exponent` with `1 <= |mantissa| < 2`, or zero.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Scaled<S> {
+    /// Sign and leading digits.
+    pub mantissa: S,
+    /// Power of two.
+    pub exponent: i64,
+}
+
+impl<S: Scalar> Scaled<S> {
+    /// 1.
+    pub fn one() -> Self {
+        Self { mantissa: <S as Real>::one(), exponent: 0 }
+    }
+    /// A number in scaled form.
+    pub fn new(value: S) -> Self {
+        Self::one().times(value)
+    }
+    /// The product with a number.
+    pub fn times(self, factor: S) -> Self {
+        let product = |x: S, exponent: i64| {
+            if x == <S as Real>::zero() || !x.is_finite() {
+                return Self { mantissa: x, exponent: 0 };
+            }
+            let shift = x.ilogb();
+            Self { mantissa: x.ldexp(-shift), exponent: exponent + i64::from(shift) }
+        };
+        let factor = product(factor, 0);
+        product(self.mantissa * factor.mantissa, self.exponent + factor.exponent)
+    }
+    /// The quotient by a number.
+    pub fn over(self, divisor: S) -> Self {
+        let divisor = Self::new(divisor);
+        let quotient = Self::new(self.mantissa / divisor.mantissa);
+        Self { exponent: quotient.exponent + self.exponent - divisor.exponent, ..quotient }
+    }
+    /// As a plain number: rounds to infinity or zero outside its range.
+    pub fn value(self) -> S {
+        let exponent = self.exponent.clamp(-8192, 8192) as i32;
+        // In steps, so that no power of two overflows on the way.
+        let step = exponent / 8;
+        let rest = exponent - 7 * step;
+        (0..7).fold(self.mantissa.ldexp(rest), |x, _| x.ldexp(step))
+    }
+}
+
+/// Determinants of the leading `k` by `k` blocks, `k = 1..=n`, of one symmetric matrix, pushed to `minors`.
+///
+/// Signs are exact wherever the determinant is beyond rounding. Cost `O(n^3)` for a positive definite matrix, whose
+/// pivots need no exchanges; from the first pivot that is not comfortably positive, one pivoted factorisation per block.
+///
+/// # Errors
+/// [`LinalgError::Shape`]; [`LinalgError::NotFinite`] (row 0) for an infinity or a `NaN`.
+pub fn leading_minors<S: Scalar>(
+    n: usize,
+    matrix: &[S],
+    minors: &mut Vec<Scaled<S>>,
+    workspace: &mut Workspace<S>,
+) -> Result<(), LinalgError> {
+    expect_length("matrix", n * n, matrix.len())?;
+    if matrix.iter().any(|m| !m.is_finite()) {
+        return Err(LinalgError::NotFinite { row: 0 });
+    }
+    minors.clear();
+    let scratch = &mut workspace.minors.block;
+    scratch.clear();
+    scratch.extend_from_slice(matrix);
+    positive_pivots(n, scratch, minors);
+    for k in minors.len() + 1..=n {
+        scratch.clear();
+        scratch.extend((0..k).flat_map(|i| matrix[i * n..i * n + k].iter().copied()));
+        minors.push(determinant(k, scratch));
+    }
+    Ok(())
+}
+
+/// Pushes the minors up to the last that follows from comfortably positive pivots without exchanges.
+fn positive_pivots<S: Scalar>(n: usize, a: &mut [S], minors: &mut Vec<Scaled<S>>) {
+    let floor = S::epsilon().sqrt();
+    let mut product = Scaled::one();
+    for k in 0..n {
+        let mut pivot = a[k * n + k];
+        let diagonal = pivot;
+        for j in 0..k {
+            // Row k of L D and of L.
+            let mut sum = a[k * n + j];
+            for i in 0..j {
+                sum -= a[k * n + i] * a[j * n + i];
+            }
+            a[k * n + j] = sum;
+        }
+        for j in 0..k {
+            let scaled = a[k * n + j];
+            let unit = scaled / a[j * n + j];
+            pivot -= scaled * unit;
+            a[k * n + j] = unit;
+        }
+        let comfortable = pivot > floor * diagonal;
+        if !comfortable {
+            return;
+        }
+        a[k * n + k] = pivot;
+        product = product.times(pivot);
+        minors.push(product);
+    }
+}
+
+/// Determinant by LU with partial pivoting; the matrix is destroyed.
+fn determinant<S: Scalar>(n: usize, a: &mut [S]) -> Scaled<S> {
+    let zero = <S as Real>::zero();
+    let mut product = Scaled::<S>::one();
+    for k in 0..n {
+        let mut p = k;
+        for i in k + 1..n {
+            if a[i * n + k].abs() > a[p * n + k].abs() {
+                p = i;
+            }
+        }
+        if p != k {
+            for j in k..n {
+                a.swap(k * n + j, p * n + j);
+            }
+            product.mantissa = -product.mantissa;
+        }
+        let pivot = a[k * n + k];
+        product = product.times(pivot);
+        if pivot == zero {
+            return product;
+        }
+        for i in k + 1..n {
+            let factor = a[i * n + k] / pivot;
+            for j in k + 1..n {
+                let update = factor * a[k * n + j];
+                a[i * n + j] -= update;
+            }
+        }
+    }
+    product
+}
+
+/// Gradient of the determinant of one symmetric `(n, n)` matrix: its adjugate, right at singular matrices too.
+///
+/// `d det M / d M_ij = adj(M)_ij = sum_k (prod_{l != k} w_l) u_k u_k^T`. `gradient` receives mantissas, to be
+/// multiplied by 2 to the returned exponent.
+///
+/// # Errors
+/// As [`eigh`].
+pub fn adjugate<S: Scalar>(
+    n: usize,
+    matrix: &[S],
+    gradient: &mut [S],
+    workspace: &mut Workspace<S>,
+) -> Result<i64, LinalgError> {
+    expect_length("matrix", n * n, matrix.len())?;
+    expect_length("gradient", n * n, gradient.len())?;
+    let zero = <S as Real>::zero();
+    let mut scratch = std::mem::take(&mut workspace.minors);
+    scratch.values.resize(n, zero);
+    scratch.vectors.resize(n * n, zero);
+    let (values, vectors) = (&mut scratch.values[..n], &mut scratch.vectors[..n * n]);
+    let outcome = eigh(n, matrix, values, vectors, workspace).map(|()| sum_adjugate(n, values, vectors, gradient));
+    workspace.minors = scratch;
+    outcome
+}
+
+/// [`adjugate`] from eigenvalues and eigenvectors.
+fn sum_adjugate<S: Scalar>(n: usize, values: &[S], vectors: &[S], gradient: &mut [S]) -> i64 {
+    let zero = <S as Real>::zero();
+    let product = |k: usize| (0..n).filter(|&l| l != k).fold(Scaled::one(), |product, l| product.times(values[l]));
+    let exponent = (0..n).map(product).filter(|p| p.mantissa != zero).map(|p| p.exponent).max().unwrap_or(0);
+    gradient.fill(zero);
+    for k in 0..n {
+        let product = product(k);
+        let weight = Scaled { exponent: product.exponent - exponent, ..product }.value();
+        let u = &vectors[k * n..(k + 1) * n];
+        for i in 0..n {
+            for j in 0..n {
+                gradient[i * n + j] += weight * (u[i] * u[j]);
+            }
+        }
+    }
+    exponent
 }

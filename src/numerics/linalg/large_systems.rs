@@ -1,8 +1,8 @@
 //! Systems too large for lanes: faer's elimination with partial pivoting, one matrix after the other.
 
+use super::Failure;
 use super::batch::{Retry, Workspace};
-use super::error::Failure;
-use super::linear_systems::{Systems, examine, is_harmless, suspicious};
+use super::solve::{Systems, examine, is_harmless, suspicious};
 use crate::scalar::{Real, Scalar, Slice, SliceMut, vectorized};
 use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
 use faer::linalg::lu::partial_pivoting::{factor, solve};

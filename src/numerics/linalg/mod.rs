@@ -20,46 +20,94 @@
 
 mod batch;
 mod condition;
-mod eigh;
+mod eigen;
 mod elimination;
-mod error;
-mod few_rows;
 mod inertia;
-mod jacobi;
 mod large_systems;
-mod linear_systems;
 mod matmul;
-mod minimum_norm;
-mod minors;
 mod signature;
-#[cfg(feature = "rollout")]
 mod singular;
 mod solve;
 
-pub(crate) use batch::Buffer;
-pub(crate) use batch::LANES;
 pub use batch::Workspace;
+pub(crate) use batch::{Buffer, LANES};
 pub use condition::condition_number;
-pub use eigh::{eigenvalues, eigh};
-pub use error::{Failure, LinalgError};
+pub use eigen::{eigenvalues, eigh};
 pub use inertia::{Inertia, inertia, is_positive_definite};
 #[doc(hidden)]
+pub use inertia::{Scaled, adjugate, leading_minors};
+#[doc(hidden)]
 pub use matmul::{MatMut, MatRef, gemm};
-#[doc(hidden)]
-pub use minimum_norm::{MinimumNorm, minimum_norm};
-#[doc(hidden)]
-pub use minors::{Scaled, adjugate, leading_minors};
 #[doc(hidden)]
 pub use signature::{
     SignatureBuffers, Violation, characteristic_scales, eigenvalue_violation, has_one_negative, has_signature,
     one_negative_violation, sylvester_violation,
 };
-#[cfg(feature = "rollout")]
 pub(crate) use singular::singular;
-pub use solve::inverse;
-pub use solve::solve;
+#[doc(hidden)]
+pub use singular::{MinimumNorm, minimum_norm};
+pub use solve::{inverse, solve};
+
+use serde::{Deserialize, Serialize};
 
 /// Sum of products.
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// Why one matrix of a batch gave no answer.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Failure {
+    /// Singular to working precision; the 2-norm condition number is infinite if exactly singular.
+    Singular {
+        /// 2-norm condition number of the matrix as given.
+        condition: f64,
+    },
+    /// The input, or the answer, has an infinity or a `NaN`.
+    NotFinite,
+}
+
+/// Error of a batched operation.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum LinalgError {
+    /// A slice has the wrong length.
+    #[error("{what}: expected {expected} numbers, found {found}")]
+    Shape {
+        /// Which argument.
+        what: &'static str,
+        /// Numbers expected.
+        expected: usize,
+        /// Numbers found.
+        found: usize,
+    },
+    /// A matrix is singular to working precision.
+    #[error("matrix {row} is singular (condition number {condition:.3e})")]
+    Singular {
+        /// Row of the batch.
+        row: usize,
+        /// 2-norm condition number.
+        condition: f64,
+    },
+    /// A matrix, a right-hand side or an answer is not finite.
+    #[error("matrix {row} or its answer is not finite")]
+    NotFinite {
+        /// Row of the batch.
+        row: usize,
+    },
+}
+
+impl LinalgError {
+    /// The error of one row.
+    pub(crate) fn of_row(row: usize, failure: Failure) -> Self {
+        match failure {
+            Failure::Singular { condition } => Self::Singular { row, condition },
+            Failure::NotFinite => Self::NotFinite { row },
+        }
+    }
+}
+
+/// Refuses a slice of the wrong length.
+pub(crate) fn expect_length(what: &'static str, expected: usize, found: usize) -> Result<(), LinalgError> {
+    if expected == found { Ok(()) } else { Err(LinalgError::Shape { what, expected, found }) }
 }

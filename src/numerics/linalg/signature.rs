@@ -28,7 +28,7 @@ impl<S: Scalar> Violation<S> {
     }
 }
 
-/// SignatureBuffers of this module.
+/// Scratch memory of the penalties of a mass matrix.
 #[derive(Debug)]
 pub struct SignatureBuffers<S> {
     block: Vec<S>,

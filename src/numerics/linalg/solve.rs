@@ -1,9 +1,8 @@
-//! Batched solution of symmetric, possibly indefinite systems.
+//! Batched solution of symmetric, possibly indefinite systems: one elimination for all rows, a second look at those that need it.
 
-use super::Workspace;
-use super::error::{LinalgError, expect_length};
-use super::linear_systems::Systems;
-use crate::scalar::Scalar;
+use super::batch::{Aligned, LANES, Lane, Retry, with_size};
+use super::{Failure, LinalgError, Workspace, condition, elimination, expect_length};
+use crate::scalar::{Real, Scalar, in_lanes};
 
 /// Solves `M_b x_b = r_b` for a batch of symmetric matrices, definite or not.
 ///
@@ -48,4 +47,270 @@ pub fn inverse<S: Scalar>(
     expect_length("inverses", batch * size, inverses.len())?;
     Systems { n, m: n, matrices, right: None }.solve(inverses, workspace);
     workspace.outcome()
+}
+
+/// A batch of systems `A X = B`.
+#[derive(Clone, Copy)]
+pub(super) struct Systems<'a, S> {
+    /// Size of a matrix.
+    pub n: usize,
+    /// Right-hand sides per matrix.
+    pub m: usize,
+    /// `(batch, n, n)`.
+    pub matrices: &'a [S],
+    /// `(batch, n, m)`; the identity if not given, `m = n`, and `X` is made symmetric.
+    pub right: Option<&'a [S]>,
+}
+
+/// Below this ratio of smallest pivot to largest element a solution is refined.
+const SMALL_PIVOT: f64 = 1.0 / 1024.0;
+/// Above this ratio of the largest element of the triangular factor to that of the matrix as well.
+const GROWTH: f64 = 4.0;
+
+/// Below this ratio of smallest pivot to largest element a matrix may be singular.
+pub(super) fn suspicious<S: Scalar>(n: usize) -> S {
+    S::epsilon() * S::of_f64(1024.0 * (n * n) as f64)
+}
+
+impl<S: Scalar> Systems<'_, S> {
+    /// Solves all; `solutions` is `(batch, n, m)`, `NaN` in the rows that fail.
+    pub fn solve(&self, solutions: &mut [S], workspace: &mut Workspace<S>) {
+        workspace.clear_failures();
+        if self.solve_large(solutions, workspace) {
+            return;
+        }
+        let batch = solutions.len() / (self.n * self.m).max(1);
+        if const { size_of::<S>() < size_of::<f64>() } {
+            self.split::<{ 2 * LANES }>(batch, solutions, workspace);
+        } else {
+            self.split::<LANES>(batch, solutions, workspace);
+        }
+    }
+
+    /// In blocks of `W`, a single row at the end alone.
+    fn split<const W: usize>(&self, batch: usize, solutions: &mut [S], workspace: &mut Workspace<S>) {
+        let together = batch - usize::from(batch % W == 1);
+        let done = if self.blocks::<W>(0, together, solutions, workspace) { together } else { 0 };
+        self.blocks::<1>(done, batch, solutions, workspace);
+    }
+
+    /// The rows `start..end` in blocks of `W`; `false`, with nothing done, where the CPU does not serve so many lanes.
+    fn blocks<const W: usize>(
+        &self,
+        start: usize,
+        end: usize,
+        solutions: &mut [S],
+        workspace: &mut Workspace<S>,
+    ) -> bool {
+        if start == end {
+            return true;
+        }
+        let &Self { n, m, matrices, right } = self;
+        let (buffer, second, failures) = workspace.parts();
+        let single = m == 1 && right.is_some();
+        in_lanes::<W, _>(
+            #[inline(always)]
+            || {
+                if single {
+                    with_size!((S, W) n, buffer, |n| n * (n + 1), |system| {
+                        for start in (start..end).step_by(W) {
+                            let largest = elimination::load((n, 1), matrices, right, start, system);
+                            let pivots = elimination::solve((n, 1), system);
+                            if store((n, 1), system, &pivots, &largest, false, solutions, start) {
+                                self.refine::<W>(solutions, start, second, failures);
+                            }
+                        }
+                    });
+                } else {
+                    with_size!((S, W) n, buffer, |n| n * (n + n), |system| {
+                        for start in (start..end).step_by(W) {
+                            let largest = elimination::load((n, n), matrices, right, start, system);
+                            let pivots = elimination::solve((n, n), system);
+                            if store((n, n), system, &pivots, &largest, right.is_none(), solutions, start) {
+                                self.refine::<W>(solutions, start, second, failures);
+                            }
+                        }
+                    });
+                }
+            },
+        )
+        .is_some()
+    }
+
+    /// Solves rows `start..start + W` once more, with one step of iterative refinement where it is due, and finds out
+    /// which matrices are singular.
+    ///
+    /// A correction of more than half the solution is not taken (as in LAPACK's `xSYRFS`): the matrix is singular to
+    /// working precision, and the remainder after the two cancel has a larger backward error than either.
+    #[cold]
+    #[inline(never)]
+    fn refine<const W: usize>(
+        &self,
+        solutions: &mut [S],
+        start: usize,
+        second: &mut Retry<S>,
+        failures: &mut Vec<(usize, Failure)>,
+    ) {
+        let &Self { n, m, matrices, right } = self;
+        let mut doubtful = [false; W];
+        let Retry { block, solution, dense } = second;
+        let done = in_lanes::<W, _>(
+            #[inline(always)]
+            || {
+                let (system, x) = (block.lanes::<W>(n * (n + m)), solution.lanes::<W>(n * m));
+                let largest = elimination::load((n, m), matrices, right, start, system);
+                let pivots = elimination::solve((n, m), system);
+                for (e, x) in x.iter_mut().enumerate() {
+                    *x = system[e / m * (n + m) + n + e % m];
+                }
+                elimination::load((n, m), matrices, right, start, system);
+                elimination::residual((n, m), system, x);
+                elimination::solve((n, m), system);
+                let due = refinement_due(&pivots, &largest);
+                let floor = suspicious::<S>(n);
+                for c in 0..m {
+                    let (mut size, mut step) = ([<S as Real>::zero(); W], [<S as Real>::zero(); W]);
+                    for i in 0..n {
+                        elimination::larger(&mut size, &x[i * m + c]);
+                        elimination::larger(&mut step, &system[i * (n + m) + n + c]);
+                    }
+                    for i in 0..n {
+                        let (x, out) = (x[i * m + c], &mut system[i * (n + m) + n + c]);
+                        for l in 0..W {
+                            let refined: S = x[l] + out[l];
+                            let shrinks = step[l] <= S::half() * size[l];
+                            out[l] = if due[l] & shrinks { refined } else { x[l] };
+                        }
+                    }
+                }
+                let probe = finish((n, m), system, right.is_none(), solutions, start);
+                for l in 0..W {
+                    let regular = pivots.smallest[l] > floor * largest[l];
+                    doubtful[l] = !(regular && probe[l] == <S as Real>::zero());
+                }
+            },
+        );
+        debug_assert!(done.is_some(), "a first solution by as many lanes was possible");
+        for row in (start..matrices.len() / (n * n)).take(W).filter(|row| doubtful[row - start]) {
+            let x = &mut solutions[row * n * m..(row + 1) * n * m];
+            if let Some(failure) = examine(n, &matrices[row * n * n..(row + 1) * n * n], x, dense) {
+                x.fill(S::nan());
+                failures.push((row, failure));
+            }
+        }
+    }
+}
+
+/// Which lanes have pivots or a growth of elements that cost digits, or no solution.
+#[inline(always)]
+fn refinement_due<S: Scalar, const W: usize>(pivots: &elimination::Pivots<S, W>, largest: &Lane<S, W>) -> [bool; W] {
+    let mut due = [false; W];
+    for l in 0..W {
+        due[l] = !is_harmless(pivots.smallest[l], pivots.growth[l], largest[l]);
+    }
+    due
+}
+
+/// `true` if a solution stands as it is, by the smallest pivot and the largest elements of triangular factor and matrix.
+#[inline(always)]
+pub(super) fn is_harmless<S: Scalar>(smallest: S, growth: S, largest: S) -> bool {
+    (smallest > S::of_f64(SMALL_PIVOT) * largest) & (growth <= S::of_f64(GROWTH) * largest)
+}
+
+/// Writes the solutions out; whether a row needs a second look.
+#[inline(always)]
+fn store<S: Scalar, const W: usize>(
+    shape: (usize, usize),
+    system: &mut [Lane<S, W>],
+    pivots: &elimination::Pivots<S, W>,
+    largest: &Lane<S, W>,
+    symmetric: bool,
+    solutions: &mut [S],
+    start: usize,
+) -> bool {
+    let probe = finish(shape, system, symmetric, solutions, start);
+    let due = refinement_due(pivots, largest);
+    let mut again = false;
+    for l in 0..W {
+        again |= due[l] | (probe[l] != <S as Real>::zero());
+    }
+    again
+}
+
+/// Writes the solutions of a block out; returns zero where all of a solution is finite, `NaN` otherwise.
+#[inline(always)]
+fn finish<S: Scalar, const W: usize>(
+    (n, m): (usize, usize),
+    system: &mut [Lane<S, W>],
+    symmetric: bool,
+    solutions: &mut [S],
+    start: usize,
+) -> Lane<S, W> {
+    let width = n + m;
+    let system = &mut system[..n * width];
+    let zero = <S as Real>::zero();
+    let mut probe = [zero; W];
+    if symmetric {
+        for i in 0..n {
+            for j in 0..i {
+                let (x, mut mean) = (system[i * width + n + j], system[j * width + n + i]);
+                for l in 0..W {
+                    mean[l] = (mean[l] + x[l]) * S::half();
+                }
+                system[i * width + n + j] = mean;
+                system[j * width + n + i] = mean;
+            }
+        }
+    }
+    for i in 0..n {
+        for c in 0..m {
+            let x = system[i * width + n + c];
+            for l in 0..W {
+                probe[l] += x[l] * zero;
+            }
+        }
+    }
+    let rows = &mut solutions[start * n * m..];
+    if rows.len() >= W * n * m {
+        write_rows(W, (n, m), system, rows);
+    } else {
+        write_last_rows((n, m), system, rows);
+    }
+    probe
+}
+
+/// Writes the solutions of the first `count` systems out as rows.
+#[inline(always)]
+fn write_rows<S: Scalar, const W: usize>(count: usize, (n, m): (usize, usize), system: &[Lane<S, W>], rows: &mut [S]) {
+    for l in 0..count {
+        let row = &mut rows[l * n * m..][..n * m];
+        for i in 0..n {
+            for c in 0..m {
+                row[i * m + c] = system[i * (n + m) + n + c][l];
+            }
+        }
+    }
+}
+
+/// The same for the last block of a batch, which need not be full.
+#[cold]
+#[inline(never)]
+fn write_last_rows<S: Scalar, const W: usize>((n, m): (usize, usize), system: &[Lane<S, W>], rows: &mut [S]) {
+    write_rows(rows.len() / (n * m), (n, m), system, rows);
+}
+
+/// The verdict on a matrix with a small pivot or a solution that is not finite.
+pub(super) fn examine<S: Scalar>(
+    n: usize,
+    matrix: &[S],
+    x: &[S],
+    scratch: &mut super::batch::Dense<S>,
+) -> Option<Failure> {
+    if matrix.iter().any(|m| !m.is_finite()) {
+        return Some(Failure::NotFinite);
+    }
+    if condition::is_singular(n, matrix, scratch) {
+        return Some(Failure::Singular { condition: condition::condition_2(n, matrix, scratch) });
+    }
+    x.iter().any(|x| !x.is_finite()).then_some(Failure::NotFinite)
 }

@@ -17,31 +17,26 @@
 //! ```
 
 mod dd;
-mod dots;
 mod float;
 mod lanes;
 mod loops;
 mod primitive;
-mod simd;
 mod sum;
 
 pub use dd::Dd;
 #[doc(hidden)]
 pub use dd::UnreadableNumber;
 #[doc(hidden)]
-pub use dots::Dots;
-#[doc(hidden)]
 pub use float::AnyFloat;
 #[doc(hidden)]
 pub use lanes::{Exponential, Lanes, cos_lanes, exp_lanes, ln_lanes, sin_cos_lanes, sin_lanes, sqrt_lanes, tanh_lanes};
-pub(crate) use loops::{Column, copy_column, update, update_column, update2, update3};
+pub(crate) use loops::{
+    Column, Simd, WithSimd, copy_column, in_lanes, in_vectors, update, update_column, update2, update3,
+};
 #[doc(hidden)]
-pub use loops::{Slice, SliceMut};
+pub use loops::{Slice, SliceMut, vectorized};
 #[doc(hidden)]
-pub use simd::vectorized;
-pub(crate) use simd::{Simd, WithSimd, in_lanes, in_vectors};
-#[doc(hidden)]
-pub use sum::Sum;
+pub use sum::{Dots, Sum};
 
 use std::fmt::{Debug, Display};
 use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};

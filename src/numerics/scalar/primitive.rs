@@ -176,7 +176,7 @@ macro_rules! impl_primitive {
                 let bits = self.abs().to_bits();
                 let biased = (bits >> MANTISSA) as i32;
                 if biased == 0 {
-                    // Subnormal: the exponent sits in the leading zeros of the fraction.
+                    // Subnormal: the exponent follows from the leading zeros of the fraction.
                     let lead = <$bits>::BITS as i32 - 1 - bits.leading_zeros() as i32;
                     1 - BIAS - MANTISSA as i32 + lead
                 } else {

@@ -1,6 +1,6 @@
 //! The eager tape: nodes with their partial derivatives, one reverse sweep.
 
-use super::error::TapeError;
+use super::TapeError;
 use super::var::Var;
 use crate::scalar::{Real, Scalar};
 use std::cell::{Cell, RefCell};
@@ -92,7 +92,7 @@ fn sweep<'a, T: Real>(nodes: &[Node<T>], mut values: &'a mut [T]) -> &'a mut [T]
 
 /// Size of a tape.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Statistics {
+pub struct TapeSize {
     /// Nodes recorded since the last reset, variables included.
     pub nodes: usize,
     /// Most nodes ever recorded between resets.
@@ -224,9 +224,9 @@ impl<T: Real> Tape<T> {
         self.error.set(None);
     }
     /// Size of the tape.
-    pub fn statistics(&self) -> Statistics {
+    pub fn statistics(&self) -> TapeSize {
         let nodes = self.count.get() as usize - 1;
-        Statistics {
+        TapeSize {
             nodes,
             peak: self.peak.max(nodes),
             bytes: (self.room.capacity() + self.overflow.borrow().capacity()) * size_of::<Node<T>>(),

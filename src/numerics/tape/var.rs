@@ -1,7 +1,7 @@
 //! Variables of the eager tape.
 
+use super::TapeError;
 use super::eager::Tape;
-use super::error::TapeError;
 use crate::forward::assign_operators;
 use crate::ops::{Binary, Unary};
 use crate::scalar::{Elementary, Real, Scalar};

@@ -18,68 +18,47 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-mod accelerations;
-mod affine;
-mod conserved;
-mod coordinates;
-mod curvature;
 mod determination;
-mod dissipation;
+mod distance;
 mod energy;
 mod grid;
-mod instability;
 mod lyapunov;
-mod mass_matrix;
-mod portrait;
 mod prediction;
-mod signature;
-mod summary;
+mod statistics;
+mod terms;
 mod trajectories;
-mod valid_time;
 
-pub use accelerations::acceleration_errors;
-pub(crate) use affine::{AffineFit, affine_fit, factor_fit};
-#[doc(hidden)]
-pub(crate) use conserved::conserved_change;
-pub use conserved::conserved_error;
-pub(crate) use coordinates::angle_difference;
-#[doc(hidden)]
-pub use coordinates::{CoordinateError, coordinate_error, velocity_error};
-pub(crate) use curvature::{MetricComponent, Spread};
-pub(crate) use curvature::{
-    curvature_grid, curvature_scalars, grid_points, is_metric, metric_components, metric_grids,
-};
 #[doc(hidden)]
 pub use determination::{
     Decay, Determination, Estimate, MOST_MISFIT, Observed, RANGE, constants, decay, determination, misfit,
 };
 #[doc(hidden)]
-pub use dissipation::{EnergyLoss, energy_loss};
+pub use distance::{
+    CoordinateError, VALID, ValidTime, ValidTimes, coordinate_error, spread, valid_time, velocity_error,
+};
+pub(crate) use distance::{angle_difference, relative_error};
 #[doc(hidden)]
-pub use energy::energy_drift;
-pub use energy::{EnergyError, energy_error};
+pub(crate) use energy::conserved_change;
+pub use energy::{EnergyError, conserved_error, energy_error};
+#[doc(hidden)]
+pub use energy::{EnergyLoss, energy_drift, energy_loss};
 #[doc(hidden)]
 pub use grid::{Axis, Grid, GridError, determinant_grid, lagrangian_grid};
-#[doc(hidden)]
-pub use instability::stretches;
-pub(crate) use instability::training_instability;
+pub(crate) use grid::{
+    MetricComponent, Spread, curvature_grid, curvature_scalars, grid_points, is_metric, metric_components, metric_grids,
+};
 #[doc(hidden)]
 pub use lyapunov::REGULAR;
 pub use lyapunov::{Lyapunov, lyapunov};
-pub use mass_matrix::{MassMatrixError, mass_matrix_error, mass_matrix_error_within};
-pub(crate) use mass_matrix::{matrices_at_rest, nearest_factor};
 #[doc(hidden)]
-pub use portrait::Portrait;
-#[doc(hidden)]
-pub use prediction::PredictionError;
-#[doc(hidden)]
-pub use prediction::{Predictions, Window, follow, predict_by_constant_velocity, predict_by_motion, prediction_error};
+pub use prediction::{
+    PredictionError, Predictions, Window, follow, predict_by_constant_velocity, predict_by_motion, prediction_error,
+};
 pub(crate) use prediction::{coordinate_errors, window_valid_times};
-pub use signature::wrong_signatures;
+pub(crate) use statistics::training_instability;
 #[doc(hidden)]
-pub use summary::{ErrorDistribution, Statistics, statistics};
+pub use statistics::{ErrorDistribution, Statistics, statistics, stretches};
+pub(crate) use terms::{AffineFit, affine_fit, factor_fit, matrices_at_rest, nearest_factor};
+pub use terms::{MassMatrixError, acceleration_errors, mass_matrix_error, mass_matrix_error_within, wrong_signatures};
 #[doc(hidden)]
-pub use trajectories::{StartBox, TrajectoryRun, TrajectorySummary, TrajectoryTest};
-pub(crate) use valid_time::relative_error;
-#[doc(hidden)]
-pub use valid_time::{VALID, ValidTime, ValidTimes, spread, valid_time};
+pub use trajectories::{Portrait, StartBox, TrajectoryRun, TrajectorySummary, TrajectoryTest};

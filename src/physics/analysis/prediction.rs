@@ -3,7 +3,7 @@
 //! A recording is cut into windows; every predictor gets the estimated state at the start of a window and says where the
 //! coordinates will be at the times of the samples that follow. What it says is compared with what was measured.
 
-use super::summary::quantile;
+use super::statistics::quantile;
 use super::{ValidTime, angle_difference, relative_error, valid_time};
 use crate::lagrangian::EulerLagrange;
 use crate::recording::{RecordedTrajectory, hermite};

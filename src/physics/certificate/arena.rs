@@ -1,7 +1,6 @@
 //! Memory and rules of the numbers that a Lagrangian is evaluated with.
 
-use super::basis::Basis;
-use super::form::{self, Expansion};
+use super::form::{self, Basis, Expansion};
 use super::function::Function;
 use super::interval::Interval;
 use crate::ops::Unary;

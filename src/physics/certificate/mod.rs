@@ -1,4 +1,5 @@
-//! Certificates: where in a region of states the mass matrix `M = d2L/dv dv` is proven to have its signature, and a condition number below a
+//! Certificates: where in a region of states the mass matrix `M = d2L/dv dv` is proven to have its signature, and a
+//! condition number below a
 //! bound.
 //!
 //! A Lagrangian, learned or written down, is evaluated once per box of states with numbers that carry its value and its first and second
@@ -35,35 +36,26 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-mod affine;
 mod arena;
-mod basis;
-mod elementary;
-mod enclosure;
 mod form;
 mod function;
-mod guard;
 mod interval;
-#[cfg(test)]
-mod interval_tests;
-mod network;
+mod models;
 mod number;
 mod search;
 mod spectrum;
-#[cfg(test)]
-mod tests;
 
 #[doc(hidden)]
-pub use guard::Guarded;
-pub use network::certify_network;
+pub use models::Guarded;
+pub use models::certify_network;
 #[doc(hidden)]
 pub use search::Verdict;
 
 use crate::lagrangian::system::Bounds;
 use crate::lagrangian::{Lagrangian, LagrangianVisitor, SystemInstance};
 use crate::scalar::Scalar;
-use enclosure::{Enclose, Source};
 use search::{Tree, search};
+use spectrum::{Enclose, Source};
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 use thiserror::Error;
@@ -294,3 +286,8 @@ fn certificate(source: &dyn Enclose, regions: Vec<(Vec<(f64, f64)>, f64)>, optio
         wrapped: vec![false; source.coordinates()],
     }
 }
+
+#[cfg(test)]
+mod interval_tests;
+#[cfg(test)]
+mod tests;

@@ -1,7 +1,6 @@
 //! Branch and bound: a region is cut into boxes until each is decided or time is up.
 
-use super::enclosure::Enclose;
-use super::spectrum::Spectrum;
+use super::spectrum::{Enclose, Spectrum};
 use super::{Options, Signature, Witness};
 use crate::storage::in_order;
 use std::cmp::{Ordering, Reverse};
@@ -153,7 +152,7 @@ pub fn search(source: &dyn Enclose, regions: Vec<(Vec<(f64, f64)>, f64)>, option
     found
 }
 
-/// The spectra of boxes, `None` for those that were not evaluated before `goes_on` said no.
+/// The spectra of boxes, `None` for those that were not evaluated before `goes_on` returned `false`.
 fn evaluate(
     source: &dyn Enclose,
     chunk: &[Waiting],

@@ -1,8 +1,8 @@
 //! Enclosures of mass matrices against exact ones, certificates against systems whose signature is known.
 
-use super::enclosure::{Enclose, Source, mass_matrix_enclosure};
 use super::interval::Interval;
 use super::interval_tests::holds;
+use super::spectrum::{Enclose, Source, mass_matrix_enclosure};
 use super::*;
 use crate::lagrangian::{EulerLagrange, Request, Terms};
 use crate::linalg::{Inertia, inertia};

@@ -29,28 +29,19 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-mod bound;
-mod connection;
-mod curvature;
-mod error;
-mod metric;
 mod orbits;
 mod surfaces;
+mod tensors;
 
-#[doc(hidden)]
-pub use bound::TurningPoint;
-pub use connection::Connection;
-pub use curvature::Curvature;
-pub use error::GeometryError;
-pub use metric::Metric;
 pub use orbits::CircularOrbit;
 #[doc(hidden)]
-pub use orbits::{Equator, Sense, Symmetric, Turn};
+pub use orbits::{Equator, Sense, Symmetric, Turn, TurningPoint};
 #[doc(hidden)]
 pub use surfaces::{Change, grid};
 pub use surfaces::{Character, Surface, characters, surfaces};
+pub use tensors::{Connection, Curvature, Metric};
 
-use crate::lagrangian::{EulerLagrange, MetricJet};
+use crate::lagrangian::{EulerLagrange, MechanicsError, MetricJet};
 use crate::scalar::Scalar;
 
 /// Coordinates of a metric whose curvature is computed, at most: a tensor has `n^4` numbers, a point takes 190 MB.
@@ -82,7 +73,7 @@ impl<S: Scalar> Geometry<S> {
         for (what, rank, found) in
             [("first derivatives", 3, jet.first.len()), ("second derivatives", 4, jet.second.len())]
         {
-            error::expect_length(what, n.pow(rank), found)?;
+            expect_length(what, n.pow(rank), found)?;
         }
         let metric = Metric::new(n, &jet.metric)?;
         if jet.first.iter().chain(&jet.second).any(|x| !x.is_finite()) {
@@ -130,10 +121,54 @@ pub fn geometries<S: Scalar>(
     if n > MOST_COORDINATES {
         return Err(GeometryError::TooMany { found: n, most: MOST_COORDINATES });
     }
-    error::expect_length("velocity", n, velocity.len())?;
+    expect_length("velocity", n, velocity.len())?;
     let velocities = velocity.repeat(points.len() / n.max(1));
     if let Some(jets) = model.wide_metric_jets(points, &velocities)? {
         return Ok(jets.iter().map(|jet| Geometry::new(jet)?.rounded()).collect());
     }
     Ok(model.metric_jets(points, &velocities)?.iter().map(Geometry::new).collect())
+}
+
+/// Why there is no geometry at a point.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum GeometryError {
+    /// The metric has no inverse to working precision.
+    #[error("the metric is degenerate (condition number {condition:.3e})")]
+    Degenerate {
+        /// 2-norm condition number; infinite if exactly singular.
+        condition: f64,
+    },
+    /// The metric, or a derivative of it, is infinite or not a number.
+    #[error("{what} is not finite")]
+    NotFinite {
+        /// Which quantity.
+        what: &'static str,
+    },
+    /// A slice has the wrong length.
+    #[error("{what}: expected {expected} numbers, found {found}")]
+    Shape {
+        /// Which argument.
+        what: &'static str,
+        /// Numbers expected.
+        expected: usize,
+        /// Numbers found.
+        found: usize,
+    },
+    /// Curvature of more coordinates than there is room for.
+    #[error("{found} coordinates are too many, at most {most}: curvature has n^4 components")]
+    TooMany {
+        /// Coordinates of the model.
+        found: usize,
+        /// Coordinates that there may be.
+        most: usize,
+    },
+    /// The model refused.
+    #[error(transparent)]
+    Mechanics(#[from] MechanicsError),
+}
+
+/// Refuses a slice of the wrong length.
+fn expect_length(what: &'static str, expected: usize, found: usize) -> Result<(), GeometryError> {
+    if expected == found { Ok(()) } else { Err(GeometryError::Shape { what, expected, found }) }
 }

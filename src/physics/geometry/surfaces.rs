@@ -1,7 +1,7 @@
 //! Surfaces where a metric changes its character: ergosurfaces, horizons, changes of signature.
 
 use super::GeometryError;
-use super::metric::determinant;
+use super::tensors::determinant;
 use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Terms};
 use crate::linalg::{Inertia, inertia};
 use crate::scalar::{Real, Scalar};
@@ -36,7 +36,7 @@ pub struct Surface<S> {
 /// Metrics of points `(batch, n)` with the same velocity, `(batch, n, n)`.
 fn metrics<S: Scalar>(model: &dyn EulerLagrange<S>, points: &[S], velocity: &[S]) -> Result<Vec<S>, GeometryError> {
     let n = model.coordinates();
-    super::error::expect_length("velocity", n, velocity.len())?;
+    super::expect_length("velocity", n, velocity.len())?;
     let mut terms = Terms::default();
     match model.terms(points, &velocity.repeat(points.len() / n.max(1)), Request::MASS_MATRIX, &mut terms) {
         // Metrics are filled where they are not finite too: on a horizon, at a pole.
@@ -115,7 +115,7 @@ pub fn surfaces<S: Scalar>(
 ) -> Result<Vec<Surface<S>>, GeometryError> {
     let n = model.coordinates();
     for (what, end) in [("start of the line", from), ("end of the line", to)] {
-        super::error::expect_length(what, n, end.len())?;
+        super::expect_length(what, n, end.len())?;
     }
     if let Some(found) = block.iter().copied().find(|&i| i >= n).or(block.is_empty().then_some(0)) {
         return Err(GeometryError::Shape { what: "block of the metric", expected: n, found });

@@ -1,9 +1,8 @@
 //! The camera: where it stands, how it moves, and the direction of every pixel.
 
-use super::central_coordinates::Chart;
-use super::error::{RelativityError, expect};
-use super::event::{along, dot, lower, norm, product, times};
-use super::stationary::depends_on_time;
+use super::coordinates::{Chart, depends_on_time};
+use super::orbits::{along, dot, lower, norm, product, times};
+use super::{RelativityError, expect};
 use crate::geometry::Metric;
 use crate::lagrangian::{EulerLagrange, Request, Terms};
 use std::f64::consts::PI;
@@ -180,7 +179,7 @@ impl Tetrad {
 
 #[cfg(test)]
 mod tests {
-    use super::super::event::dot;
+    use super::super::orbits::dot;
     use super::*;
 
     #[test]

@@ -24,58 +24,102 @@
 //! ```
 
 mod camera;
-mod central_coordinates;
-mod dormand_prince;
-#[cfg(feature = "training")]
-mod drift;
-mod error;
-mod event;
-mod image;
-mod infall;
+mod coordinates;
 mod orbits;
-mod outline;
-#[cfg(feature = "training")]
-mod parameters;
-mod periastron;
 mod rays;
 #[cfg(feature = "training")]
 mod readings;
 mod shadow;
 mod sky;
-mod spheroidal;
-mod stationary;
 
-#[doc(hidden)]
-pub use camera::MOST_PIXELS;
-#[doc(hidden)]
-pub use camera::Tetrad;
 pub use camera::{Camera, Observer};
 #[doc(hidden)]
-pub use central_coordinates::CentralCoordinates;
-pub use central_coordinates::Chart;
-#[cfg(feature = "training")]
-pub(crate) use drift::conserved_drift;
-pub use error::RelativityError;
-pub use image::Image;
-pub use infall::{Infall, infall};
-pub use orbits::{Orbit, orbits};
-pub use outline::{Edge, Outline, outline};
-#[cfg(feature = "training")]
+pub use camera::{MOST_PIXELS, Tetrad};
 #[doc(hidden)]
-pub use parameters::nearest_parameters;
-pub use periastron::{RadialPeriod, radial_period};
+pub use coordinates::CentralCoordinates;
+pub use coordinates::Chart;
+pub(crate) use coordinates::depends_on_time;
+pub use orbits::{Infall, Orbit, RadialPeriod, infall, orbits, radial_period};
 pub use rays::{Ray, RayOutcome, trace};
 #[doc(hidden)]
 pub use rays::{TOLERANCES, Tracing};
 #[cfg(feature = "training")]
 #[doc(hidden)]
-pub use readings::{LearnedHole, Reading};
+pub use readings::{LearnedHole, Reading, nearest_parameters};
 #[doc(hidden)]
 pub use shadow::Difference;
-pub use shadow::{Shadow, shadow};
+pub use shadow::{Edge, Outline, Shadow, outline, shadow};
+pub use sky::Image;
 #[doc(hidden)]
 pub use sky::{Sky, difference_image};
-pub(crate) use stationary::depends_on_time;
+
+use crate::geometry::GeometryError;
+use crate::lagrangian::MechanicsError;
+
+/// Why there is no picture.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum RelativityError {
+    /// The model is not one of space-time.
+    #[error("expected a metric of a time and three places, found {found} coordinates")]
+    Coordinates {
+        /// Coordinates of the model.
+        found: usize,
+    },
+    /// The same coordinate twice, or one that the model does not have.
+    #[error("expected four different coordinates below 4 as time and space, found {time} and {space:?}")]
+    Chart {
+        /// Index of the time.
+        time: usize,
+        /// Indices of the places.
+        space: [usize; 3],
+    },
+    /// The metric at the camera is not that of a space-time.
+    #[error(
+        "expected a metric with one time and three places at the camera, found {negative} negative and {positive} positive eigenvalues"
+    )]
+    Signature {
+        /// Number of negative eigenvalues.
+        negative: usize,
+        /// Number of positive eigenvalues.
+        positive: usize,
+    },
+    /// The camera would have to be faster than light.
+    #[error("no camera rests at this place: it is within the ergosurface, or its time is no time there")]
+    NothingRests,
+    /// A metric that is another one at another time.
+    #[error("the metric depends on its time, expected one that is the same at all times")]
+    DependsOnTime,
+    /// A number that makes no picture.
+    #[error("{what}: expected {expected}, found {found}")]
+    Invalid {
+        /// Name of the number.
+        what: &'static str,
+        /// Numbers that are possible.
+        expected: &'static str,
+        /// The number.
+        found: f64,
+    },
+    /// Two pictures of different sizes.
+    #[error("expected pictures of the same size, found {} x {} and {} x {}", first.0, first.1, second.0, second.1)]
+    Sizes {
+        /// Width and height of the first.
+        first: (usize, usize),
+        /// Width and height of the second.
+        second: (usize, usize),
+    },
+    /// The metric at the camera has no inverse.
+    #[error("at the camera {0}")]
+    Geometry(#[from] GeometryError),
+    /// The model refused.
+    #[error(transparent)]
+    Mechanics(#[from] MechanicsError),
+}
+
+/// Refuses a number that is not as expected.
+fn expect(fine: bool, what: &'static str, expected: &'static str, found: f64) -> Result<(), RelativityError> {
+    if fine { Ok(()) } else { Err(RelativityError::Invalid { what, expected, found }) }
+}
 
 #[cfg(test)]
 mod tests;

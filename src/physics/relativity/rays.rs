@@ -1,10 +1,11 @@
 //! Null geodesics, batches of them: each ray has steps of its own, and all rays of a batch are evaluated by one call per stage.
+//!
+//! The steps are those of the embedded Runge-Kutta method 5(4) of Dormand and Prince. Source: Dormand and Prince, J. Comput. Appl. Math. 6, 19 (1980), table 2; the last stage is the first of the next step.
 
 use super::camera::Camera;
-use super::central_coordinates::Chart;
-use super::dormand_prince::{A, ERROR, STAGES};
-use super::error::{RelativityError, expect};
-use super::event::{along, dot, norm, times};
+use super::coordinates::Chart;
+use super::orbits::{along, dot, norm, times};
+use super::{RelativityError, expect};
 use crate::lagrangian::{EulerLagrange, MechanicsError, Request, Terms};
 use crate::storage::in_order;
 
@@ -154,7 +155,7 @@ struct Moving {
 
 /// A ray that has ended, with its last state.
 #[derive(Clone, Copy)]
-struct Ended {
+struct FinishedRay {
     fate: RayOutcome,
     steps: usize,
     q: [f64; 4],
@@ -187,7 +188,7 @@ impl Batch<'_> {
     }
 
     fn trace(mut self, starts: &[([f64; 4], [f64; 4])]) -> Result<Vec<Ray>, RelativityError> {
-        let nowhere = Ended { fate: RayOutcome::Unfinished, steps: 0, q: [f64::NAN; 4], k: [f64::NAN; 4] };
+        let nowhere = FinishedRay { fate: RayOutcome::Unfinished, steps: 0, q: [f64::NAN; 4], k: [f64::NAN; 4] };
         let mut ended = vec![nowhere; starts.len()];
         match self.follow(starts, &mut ended) {
             // The rays that have ended are there, the others are unfinished.
@@ -196,7 +197,7 @@ impl Batch<'_> {
         }
     }
 
-    fn follow(&mut self, starts: &[([f64; 4], [f64; 4])], ended: &mut [Ended]) -> Result<(), RelativityError> {
+    fn follow(&mut self, starts: &[([f64; 4], [f64; 4])], ended: &mut [FinishedRay]) -> Result<(), RelativityError> {
         let (mut q, mut k): (Vec<_>, Vec<_>) = starts.iter().copied().unzip();
         let (mut places, mut tangents) = (Vec::new(), vec![Vec::new(); STAGES]);
         let mut slopes: Vec<Vec<[f64; 4]>> = vec![Vec::new(); STAGES];
@@ -266,10 +267,10 @@ impl Batch<'_> {
     }
 
     /// Takes the rays that have ended out of those that move.
-    fn sort_out(&self, moving: &mut Vec<Moving>, ended: &mut [Ended]) {
+    fn sort_out(&self, moving: &mut Vec<Moving>, ended: &mut [FinishedRay]) {
         moving.retain(|ray| {
             let Some(fate) = self.fate(ray) else { return true };
-            ended[ray.index] = Ended { fate, steps: ray.steps, q: ray.q, k: ray.k };
+            ended[ray.index] = FinishedRay { fate, steps: ray.steps, q: ray.q, k: ray.k };
             false
         });
     }
@@ -290,7 +291,7 @@ impl Batch<'_> {
     }
 
     /// The rays, each with the drift of `g(k, k)`.
-    fn finish(mut self, ended: &[Ended]) -> Result<Vec<Ray>, RelativityError> {
+    fn finish(mut self, ended: &[FinishedRay]) -> Result<Vec<Ray>, RelativityError> {
         let (q, k): (Vec<_>, Vec<_>) = ended.iter().map(|ray| (ray.q, ray.k)).unzip();
         match self.model.terms(q.as_flattened(), k.as_flattened(), Request::MASS_MATRIX, &mut self.terms) {
             Ok(()) => {}
@@ -302,7 +303,7 @@ impl Batch<'_> {
             let terms = || (0..16).map(|at| metric[at] * k[at / 4] * k[at % 4]);
             terms().sum::<f64>().abs() / terms().map(f64::abs).sum::<f64>()
         };
-        let ray = |(ray, metric): (&Ended, Option<&[f64]>)| Ray {
+        let ray = |(ray, metric): (&FinishedRay, Option<&[f64]>)| Ray {
             fate: ray.fate,
             steps: ray.steps,
             drift: metric.map_or(f64::NAN, |metric| drift(metric, ray.k)),
@@ -316,5 +317,42 @@ fn no_accelerations(outcome: Result<(), MechanicsError>) -> RelativityError {
     match outcome {
         Err(error) => error.into(),
         Ok(()) => MechanicsError::NotFinite { row: 0, what: "acceleration" }.into(),
+    }
+}
+
+/// Number of stages.
+const STAGES: usize = 7;
+
+/// `a_ij`, row by row from the second stage on; the last row has the weights of order 5.
+pub(super) const A: [[f64; STAGES - 1]; STAGES - 1] = [
+    [1.0 / 5.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+    [3.0 / 40.0, 9.0 / 40.0, 0.0, 0.0, 0.0, 0.0],
+    [44.0 / 45.0, -56.0 / 15.0, 32.0 / 9.0, 0.0, 0.0, 0.0],
+    [19372.0 / 6561.0, -25360.0 / 2187.0, 64448.0 / 6561.0, -212.0 / 729.0, 0.0, 0.0],
+    [9017.0 / 3168.0, -355.0 / 33.0, 46732.0 / 5247.0, 49.0 / 176.0, -5103.0 / 18656.0, 0.0],
+    [35.0 / 384.0, 0.0, 500.0 / 1113.0, 125.0 / 192.0, -2187.0 / 6784.0, 11.0 / 84.0],
+];
+
+/// Weights of order 5 less those of order 4.
+const ERROR: [f64; STAGES] =
+    [71.0 / 57600.0, 0.0, -71.0 / 16695.0, 71.0 / 1920.0, -17253.0 / 339200.0, 22.0 / 525.0, -1.0 / 40.0];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Row sums are the nodes, the weights integrate powers up to the fourth, and the error is 0 up to the third, not beyond.
+    #[test]
+    fn the_table_is_of_its_order() {
+        let nodes: Vec<f64> = [0.0].into_iter().chain(A.iter().map(|row| row.iter().sum())).collect();
+        for (found, exact) in nodes.iter().zip([0.0, 0.2, 0.3, 0.8, 8.0 / 9.0, 1.0, 1.0]) {
+            assert!((found - exact).abs() < 1e-14);
+        }
+        for power in 0..5 {
+            let moment = |weights: &[f64]| -> f64 { weights.iter().zip(&nodes).map(|(b, c)| b * c.powi(power)).sum() };
+            assert!((moment(&A[5]) - 1.0 / f64::from(power + 1)).abs() < 1e-14, "{power}");
+            let error = moment(&ERROR);
+            assert!(if power < 4 { error.abs() < 1e-15 } else { error.abs() > 1e-4 }, "{power}: {error}");
+        }
     }
 }

@@ -1,10 +1,40 @@
-//! The sky: a checkerboard in latitude and longitude with a colour for every quadrant.
+//! Pictures of pixels, and the sky: a checkerboard in latitude and longitude with a colour for every quadrant.
 
+use super::RelativityError;
 use super::camera::Camera;
-use super::error::RelativityError;
-use super::image::Image;
 use super::rays::RayOutcome;
 use super::shadow::{Shadow, angle};
+
+/// A picture of red, green and blue.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Image {
+    /// Pixels of a row.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// Pixels, row by row from the upper left corner.
+    pub pixels: Vec<[u8; 3]>,
+}
+
+impl Image {
+    /// Pictures side by side, with white columns between them; what is not as high as the highest is white below.
+    pub(crate) fn beside(images: &[Self], gap: usize) -> Self {
+        let white = [255; 3];
+        let height = images.iter().map(|image| image.height).max().unwrap_or(0);
+        let mut pixels = Vec::new();
+        for row in 0..height {
+            for (k, image) in images.iter().enumerate() {
+                pixels.extend(std::iter::repeat_n(white, if k > 0 { gap } else { 0 }));
+                match image.pixels.chunks_exact(image.width.max(1)).nth(row) {
+                    Some(row) => pixels.extend_from_slice(row),
+                    None => pixels.extend(std::iter::repeat_n(white, image.width)),
+                }
+            }
+        }
+        let width = images.iter().map(|image| image.width).sum::<usize>() + gap * images.len().saturating_sub(1);
+        Self { width, height, pixels }
+    }
+}
 
 /// A celestial sphere of squares, four colours around the point that the camera looks at, and a white disc there: where its light comes all
 /// around the centre it becomes Einstein's ring.
@@ -96,13 +126,25 @@ mod tests {
     use super::*;
 
     #[test]
+    fn pictures_stand_side_by_side() {
+        let one = Image { width: 1, height: 2, pixels: vec![[1; 3], [2; 3]] };
+        let two = Image { width: 2, height: 1, pixels: vec![[3; 3], [4; 3]] };
+        let both = Image::beside(&[one, two], 1);
+        let (white, numbers) = ([255; 3], |k: u8| [k; 3]);
+        assert_eq!((both.width, both.height), (4, 2));
+        assert_eq!(both.pixels[..4], [numbers(1), white, numbers(3), numbers(4)]);
+        assert_eq!(both.pixels[4..], [numbers(2), white, white, white]);
+        assert_eq!(Image::beside(&[], 3), Image { width: 0, height: 0, pixels: Vec::new() });
+    }
+
+    #[test]
     fn quadrants_meet_behind_the_centre() {
         let camera = Camera { azimuth: 2.0, ..Camera::new(10.0, 1.2) };
         let sky = Sky::around(&camera);
         let [right, up, forward] = camera.axes();
         let toward = |u: f64, v: f64| {
             let vector: [f64; 3] = std::array::from_fn(|i| forward[i] + u * right[i] + v * up[i]);
-            super::super::event::times(super::super::event::norm(vector).recip(), vector)
+            super::super::orbits::times(super::super::orbits::norm(vector).recip(), vector)
         };
         assert_eq!(sky.colour(forward), [255; 3]);
         let same = |found: [u8; 3], of: [u8; 3]| found == of || found == between([0; 3], of, DARK);

@@ -1,7 +1,7 @@
 //! Rays, shadows and pictures against closed forms.
 
 use super::camera::Tetrad;
-use super::event::{norm, product, times};
+use super::orbits::{norm, product, times};
 use super::rays::{RayOutcome, trace};
 use super::*;
 use crate::lagrangian::{EulerLagrange, Interruptible, Lagrangian, Mechanics, MechanicsError, build};

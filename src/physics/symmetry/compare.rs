@@ -2,9 +2,9 @@
 
 use super::basis::{Basis, Values, unknowns};
 use super::find::room;
-use super::orthonormal::{add, dot, norm, orthonormal};
+use super::null_space::{add, dot, norm, orthonormal};
 use super::sample::Sample;
-use super::{SymmetryError, field, sparse};
+use super::{SymmetryError, field, null_space};
 use crate::lagrangian::{EulerLagrange, Request, Terms};
 use crate::linalg::{Workspace, eigh};
 use serde::Serialize;
@@ -52,7 +52,7 @@ const ROUNDING: f64 = 1e-9;
 /// The motion determines `L` at best up to a factor and a total derivative, `L -> s L + dF(q)/dt`, and up to a constant; that of
 /// geodesics, along which `L` is the energy, up to a function `f(L)`, where `B` is the metric. The best `s` (or `f`, a
 /// polynomial of degree 3), follows by linear least squares from the mass matrices, which know nothing of a gauge, `F`, over the functions
-/// of a basis, from the momenta, both in the frame of `|M|` of `B`, the constant from the values. They are taken out, and what is left is
+/// of a basis, from the momenta, both in the frame of `|M|` of `B`, the constant from the values. They are taken out, and the residual is
 /// stated by quantity. Of two metrics `f` is a factor. Where `B` is the same on all states, as on a mass shell, motion does not see
 /// `(B - B0)^2 h(q, v)`, `B0` that value: `f` is a factor, and of the mass matrices the part `h p p^T` is left aside at every state.
 ///
@@ -148,7 +148,7 @@ impl Fit {
         add(&mut rest, &at_states(&|k| p(b, k, found.slopes(own[k])[0])), -1.0);
         let plain = orthonormal(&columns, DEPENDENT);
         let mut gauge = plain.given(&plain.along(&rest), columns.len());
-        let mut known_gauge = sparse::significant(&columns, &rest, DEPENDENT);
+        let mut known_gauge = null_space::significant(&columns, &rest, DEPENDENT);
         let whole = norm(&target);
         // Roundings are no terms.
         for (k, column) in columns.iter().enumerate() {

@@ -1,13 +1,11 @@
 //! Conserved quantities that are quadratic in the momenta: Carter's constant, the vector of Runge and Lenz.
 
 use super::basis::{Basis, Values};
-use super::echelon::reduce;
 use super::field::{join, sum};
-use super::find::{Columns, room};
-use super::orthonormal::{dot, norm, orthonormal};
+use super::find::{FunctionColumns, room};
+use super::null_space::{Separation, check, dot, norm, orthonormal, reduce};
 use super::sample::Sample;
-use super::separation::{Separation, check};
-use super::{Field, SymmetryError, sparse};
+use super::{Field, SymmetryError, null_space};
 use crate::lagrangian::EulerLagrange;
 use crate::linalg::singular;
 
@@ -197,7 +195,7 @@ fn search(
         monomials.push(Monomial::One);
     }
     room(n, monomials.len() * basis.len(), states)?;
-    let functions = Columns::new(basis, sample)?;
+    let functions = FunctionColumns::new(basis, sample)?;
     let (mut places, mut values, mut rates) = (Vec::new(), Vec::new(), Vec::new());
     for f in 0..basis.len() {
         for &monomial in &monomials {
@@ -225,7 +223,7 @@ fn search(
     // What of every conserved quantity is no combination of known ones.
     let mix = |share: &[f64], columns: &[Vec<f64>]| {
         let mut total = vec![0.0; columns.first().map_or(0, Vec::len)];
-        share.iter().zip(columns).for_each(|(x, column)| super::orthonormal::add(&mut total, column, *x));
+        share.iter().zip(columns).for_each(|(x, column)| super::null_space::add(&mut total, column, *x));
         total
     };
     let rests: Vec<Vec<f64>> = zero
@@ -235,7 +233,7 @@ fn search(
             for _ in 0..2 {
                 for column in known {
                     let along = dot(column, &rest);
-                    super::orthonormal::add(&mut rest, column, -along);
+                    super::null_space::add(&mut rest, column, -along);
                 }
             }
             rest
@@ -250,7 +248,7 @@ fn search(
     reduce(&mut rows, &sizes, noise, old);
     let last = zero.len().checked_sub(1).map_or(0.0, |last| found.values[last]).max(f64::EPSILON);
     let conserved = rows.split_off(old).into_iter().map(|mut row| {
-        sparse::polish(&mut row, &|k| rates[k].clone(), &sizes, last);
+        null_space::refine(&mut row, &|k| rates[k].clone(), &sizes, last);
         let terms = row.iter().zip(&places).filter(|(c, _)| **c != 0.0).map(|(c, (f, m))| (*c, *f, *m));
         Conserved { terms: terms.collect(), basis: basis.clone() }
     });

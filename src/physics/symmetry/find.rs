@@ -2,11 +2,9 @@
 
 use super::algebra::MOST_FIELDS;
 use super::basis::{Basis, MOST_UNKNOWNS, Values, most_states, unknowns};
-use super::echelon::reduce;
-use super::orthonormal::{Orthonormal, dot, norm, orthonormal};
+use super::null_space::{Orthonormal, Separation, check, dot, norm, orthonormal, reduce};
 use super::sample::Sample;
-use super::separation::{Separation, check};
-use super::{Algebra, Field, SymmetryError, sparse};
+use super::{Algebra, Field, SymmetryError, null_space};
 use crate::lagrangian::EulerLagrange;
 use crate::linalg::{Workspace, eigh, singular};
 
@@ -43,12 +41,12 @@ pub struct Symmetries {
 }
 
 /// Values of functions, and their derivatives along the velocity, at all states: one column per function.
-pub(crate) struct Columns {
+pub(crate) struct FunctionColumns {
     pub values: Vec<Vec<f64>>,
     pub rates: Vec<Vec<f64>>,
 }
 
-impl Columns {
+impl FunctionColumns {
     /// # Errors
     /// [`SymmetryError::NotFinite`] for functions that overflow.
     pub fn new(basis: &Basis, sample: &Sample) -> Result<Self, SymmetryError> {
@@ -118,7 +116,7 @@ pub(super) fn room(n: usize, unknowns: usize, states: usize) -> Result<(), Symme
 /// [`symmetries`] of a Lagrangian whose terms are given.
 pub(crate) fn search(sample: &Sample, basis: &Basis, tolerance: Option<f64>) -> Result<Symmetries, SymmetryError> {
     let (n, states, functions) = (sample.n, sample.len(), basis.len());
-    let columns = Columns::new(basis, sample)?;
+    let columns = FunctionColumns::new(basis, sample)?;
     let plain = orthonormal(&columns.values, DEPENDENT);
     let (values, rates) = (&plain.columns, plain.mixed(&columns.rates));
     if states < unknowns(n, values.len()) {
@@ -158,7 +156,7 @@ pub(crate) fn search(sample: &Sample, basis: &Basis, tolerance: Option<f64>) -> 
     if let Some(last) = last.filter(|_| pivots.len() == zero) {
         let unknowns = Unknowns { sample, columns: &columns, plain: &plain, gauge: &gauge, weight: &weight };
         match tolerance {
-            Some(_) => unknowns.polish(&mut rows, &pivots, &sizes, last.max(f64::EPSILON)),
+            Some(_) => unknowns.refine(&mut rows, &pivots, &sizes, last.max(f64::EPSILON)),
             // A model has the fields nearly: those of few functions among all that are as good.
             None => unknowns.simplify(&mut rows, &pivots, &sizes, last),
         }
@@ -184,7 +182,7 @@ pub(crate) fn search(sample: &Sample, basis: &Basis, tolerance: Option<f64>) -> 
 /// The equation of a symmetry in the coefficients of the functions as they are.
 struct Unknowns<'a> {
     sample: &'a Sample,
-    columns: &'a Columns,
+    columns: &'a FunctionColumns,
     plain: &'a Orthonormal,
     gauge: &'a Orthonormal,
     weight: &'a [f64],
@@ -199,7 +197,7 @@ impl Unknowns<'_> {
     }
 
     /// Takes out of rows of coefficients what is noise of functions that nearly depend on each other.
-    fn polish(&self, rows: &mut [Vec<f64>], pivots: &[usize], sizes: &[f64], noise: f64) {
+    fn refine(&self, rows: &mut [Vec<f64>], pivots: &[usize], sizes: &[f64], noise: f64) {
         let (n, functions) = (self.sample.n, self.columns.values.len());
         let column = |place: usize| match (place / functions, place % functions) {
             (i, f) if i < n => self.change(i, f),
@@ -212,7 +210,7 @@ impl Unknowns<'_> {
         let sizes: Vec<f64> =
             sizes.iter().copied().chain(self.columns.values.iter().map(|value| norm(value) / momentum)).collect();
         for (row, pivot) in rows.iter_mut().zip(pivots) {
-            sparse::polish(row, &column, &sizes, noise);
+            null_space::refine(row, &column, &sizes, noise);
             let unit = row[*pivot];
             if unit != 0.0 {
                 row.iter_mut().for_each(|x| *x /= unit);
@@ -242,7 +240,7 @@ impl Unknowns<'_> {
         let free: Vec<Vec<f64>> = places.iter().map(|at| self.change(at / functions, at % functions)).collect();
         let mut fixed = free.clone();
         fixed.iter_mut().for_each(|column| self.gauge.remove(column));
-        let gram = sparse::gram(&fixed);
+        let gram = null_space::gram(&fixed);
         let weights: Vec<f64> = places.iter().map(|at| sizes[*at]).collect();
         if rows.len() as f64 * (places.len() as f64).powi(3) > SIMPLE {
             return;
@@ -251,7 +249,7 @@ impl Unknowns<'_> {
             let taken: Vec<bool> = places.iter().map(|at| pivots.contains(at) && at != pivot).collect();
             let Some(own) = places.iter().position(|at| at == pivot) else { continue };
             let start: Vec<f64> = places.iter().map(|at| row[*at]).collect();
-            let Some(found) = sparse::sparsest(&gram, &start, &weights, own, &taken, noise) else { continue };
+            let Some(found) = null_space::sparsest(&gram, &start, &weights, own, &taken, noise) else { continue };
             // Large terms that cancel may leave a small field, which changes L by more than its size allows.
             let part = combined(std::slice::from_ref(&found), &fixed).remove(0);
             if norm(&part) > WORSE * noise * self.size(&places, &found) {
@@ -289,7 +287,7 @@ fn unit_fields(sample: &Sample, values: &[Vec<f64>]) -> Result<Vec<Vec<f64>>, Sy
             for a in 0..functions {
                 let weighed: Vec<f64> = values[a].iter().zip(&part).map(|(x, m)| x * m).collect();
                 for b in 0..functions {
-                    let product = super::orthonormal::dot(&weighed, &values[b]);
+                    let product = super::null_space::dot(&weighed, &values[b]);
                     gram[(i * functions + a) * count + j * functions + b] = product;
                     gram[(j * functions + b) * count + i * functions + a] = product;
                 }

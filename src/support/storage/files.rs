@@ -1,8 +1,10 @@
-//! The few operations that writing safely is made of, so that each can be made to fail.
+//! Files written whole or not at all, by a few operations, so that each can be made to fail.
 
+use std::ffi::{OsStr, OsString};
 use std::fs::{File, OpenOptions};
 use std::io::{Read, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::{fs, io};
 use thiserror::Error;
 
@@ -88,7 +90,7 @@ impl Files for Disk {
 const INTERRUPTIONS: usize = 64;
 
 /// Repeats an operation that a signal interrupted.
-pub(super) fn uninterrupted<T>(mut operation: impl FnMut() -> io::Result<T>) -> io::Result<T> {
+fn uninterrupted<T>(mut operation: impl FnMut() -> io::Result<T>) -> io::Result<T> {
     for _ in 0..INTERRUPTIONS {
         match operation() {
             Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
@@ -167,4 +169,356 @@ pub fn read_regular(path: &Path, limit: u64) -> Result<Vec<u8>, ReadError> {
     let mut bytes = Vec::new();
     let read = file.take(limit.saturating_add(1)).read_to_end(&mut bytes)? as u64;
     if read > limit { Err(ReadError::TooLarge { bytes: read, limit }) } else { Ok(bytes) }
+}
+
+/// Writes `bytes` to `path` so that a reader sees the old content or the new, never part of either.
+///
+/// The bytes go to a temporary file in the same directory, reach the disk, and take the name by a rename, which reaches
+/// the disk with the directory. A link is followed; what is not a regular file (`/dev/stdout`, a pipe) is written in
+/// place. On failure the temporary file is removed and the old content stays; only where the last operation fails, that
+/// of the directory, is the new content in place, and a power failure could still undo it.
+///
+/// # Errors
+/// The error of the file system; a directory as target is refused.
+pub fn write_atomically(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    write_whole(&Disk, path, bytes)
+}
+
+/// [`write_atomically`] by the operations of `files`.
+///
+/// # Errors
+/// As there.
+pub fn write_whole(files: &dyn Files, path: &Path, bytes: &[u8]) -> io::Result<()> {
+    let mut file = AtomicWriter::create(files, path)?;
+    file.append(bytes)?;
+    file.finish()
+}
+
+/// A file written piece by piece; readers see the old content until [`AtomicWriter::finish`], as of [`write_atomically`].
+///
+/// Dropped before that, it leaves nothing behind, but for what was already written in place to a pipe or device.
+pub struct AtomicWriter<'a> {
+    files: &'a dyn Files,
+    file: File,
+    /// The temporary file; none if the target is written in place.
+    draft: Option<Draft<'a>>,
+    /// Bytes gathered for the next write.
+    buffer: Vec<u8>,
+}
+
+/// Bytes of one write.
+const BUFFER: usize = 1 << 16;
+
+impl<'a> AtomicWriter<'a> {
+    /// Begins a file that will be `path`.
+    ///
+    /// # Errors
+    /// The error of the file system; a directory as target is refused.
+    pub fn create(files: &'a dyn Files, path: &Path) -> io::Result<Self> {
+        let target = match fs::canonicalize(path) {
+            Ok(existing) => existing,
+            Err(error) if error.kind() == io::ErrorKind::NotFound => path.to_path_buf(),
+            Err(error) => return Err(error),
+        };
+        let (draft, file) = match fs::metadata(&target) {
+            Ok(data) if data.is_dir() => return Err(io::Error::new(io::ErrorKind::IsADirectory, "is a directory")),
+            Ok(data) if !data.is_file() => (None, OpenOptions::new().write(true).open(&target)?),
+            _ => {
+                let (draft, file) = Draft::create(files, &target)?;
+                (Some(draft), file)
+            }
+        };
+        Ok(Self { files, file, draft, buffer: Vec::new() })
+    }
+
+    /// Adds bytes at the end.
+    ///
+    /// # Errors
+    /// The error of the file system, the disk being full for one; nothing can be added after it.
+    pub fn append(&mut self, bytes: &[u8]) -> io::Result<()> {
+        if self.buffer.is_empty() && bytes.len() >= BUFFER {
+            return write_all(self.files, &mut self.file, bytes);
+        }
+        self.buffer.extend_from_slice(bytes);
+        if self.buffer.len() < BUFFER {
+            return Ok(());
+        }
+        self.flush()
+    }
+
+    /// Gives the file its name.
+    ///
+    /// # Errors
+    /// As of [`write_atomically`].
+    pub fn finish(mut self) -> io::Result<()> {
+        self.flush()?;
+        match self.draft {
+            None => Ok(()),
+            Some(draft) => {
+                draft.complete(&self.file)?;
+                draft.take_name()
+            }
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        let written = write_all(self.files, &mut self.file, &self.buffer);
+        self.buffer.clear();
+        written
+    }
+}
+
+/// Test of writing: [`write_atomically`] could write to `path` now, found out before the work whose result it will be.
+///
+/// A temporary file is created beside the target and removed again.
+///
+/// # Errors
+/// As there.
+pub fn check_target(path: &Path) -> io::Result<()> {
+    match fs::metadata(path) {
+        Ok(data) if data.is_dir() => Err(io::Error::new(io::ErrorKind::IsADirectory, "is a directory")),
+        Ok(data) if !data.is_file() => OpenOptions::new().write(true).open(path).map(drop),
+        Ok(_) => Draft::create(&Disk, &fs::canonicalize(path)?).map(drop),
+        Err(_) => Draft::create(&Disk, path).map(drop),
+    }
+}
+
+/// Writes `bytes` to `newest` and keeps its old content as `previous`, until the next call.
+///
+/// The new content is read back before anything is given up. If anything fails, or the program dies at any time, `newest` or
+/// `previous` holds the old content or the new, whole. A content of `newest` that is known to be damaged must not take
+/// the place of `previous`: then `keep` is false.
+///
+/// # Errors
+/// The error of the file system, or `InvalidData` if the bytes read back are others.
+pub fn replace(files: &dyn Files, newest: &Path, previous: &Path, bytes: &[u8], keep: bool) -> io::Result<()> {
+    let draft = Draft::write(files, newest, bytes)?;
+    draft.verify(bytes)?;
+    if keep && newest.exists() {
+        uninterrupted(|| files.rename(newest, previous))?;
+    }
+    draft.take_name()
+}
+
+/// A temporary file beside its target; removed unless it takes the target's name.
+struct Draft<'a> {
+    files: &'a dyn Files,
+    target: PathBuf,
+    directory: PathBuf,
+    path: PathBuf,
+    named: bool,
+}
+
+impl<'a> Draft<'a> {
+    /// Creates the temporary file, empty.
+    fn create(files: &'a dyn Files, target: &Path) -> io::Result<(Self, File)> {
+        let name = target.file_name().ok_or_else(|| io::Error::new(io::ErrorKind::InvalidInput, "names no file"))?;
+        let directory = match target.parent() {
+            Some(parent) if !parent.as_os_str().is_empty() => parent.to_path_buf(),
+            _ => PathBuf::from("."),
+        };
+        let path = directory.join(temporary_name(name));
+        let file = uninterrupted(|| files.create(&path))?;
+        Ok((Self { files, target: target.to_path_buf(), directory, path, named: false }, file))
+    }
+
+    /// Creates the temporary file with these bytes, on the disk.
+    fn write(files: &'a dyn Files, target: &Path, bytes: &[u8]) -> io::Result<Self> {
+        let (draft, mut file) = Self::create(files, target)?;
+        write_all(files, &mut file, bytes)?;
+        draft.complete(&file)?;
+        Ok(draft)
+    }
+
+    /// Gives the file the permissions of the target, if that exists, and brings it to the disk.
+    fn complete(&self, file: &File) -> io::Result<()> {
+        if let Ok(old) = fs::metadata(&self.target) {
+            file.set_permissions(old.permissions())?;
+        }
+        uninterrupted(|| self.files.sync(file))
+    }
+
+    /// Reads the file back.
+    fn verify(&self, bytes: &[u8]) -> io::Result<()> {
+        let read = uninterrupted(|| {
+            self.files.read(&self.path, bytes.len() as u64).map_err(|error| match error {
+                super::ReadError::Io(error) => error,
+                other => io::Error::new(io::ErrorKind::InvalidData, other.to_string()),
+            })
+        })?;
+        if read == bytes {
+            Ok(())
+        } else {
+            Err(io::Error::new(io::ErrorKind::InvalidData, "the bytes read back are not those written"))
+        }
+    }
+
+    fn take_name(mut self) -> io::Result<()> {
+        uninterrupted(|| self.files.rename(&self.path, &self.target))?;
+        self.named = true;
+        uninterrupted(|| self.files.sync_directory(&self.directory))
+    }
+}
+
+impl Drop for Draft<'_> {
+    fn drop(&mut self) {
+        if !self.named {
+            // The first error is the one to report; nothing more can be done if the removal fails too.
+            let _ = uninterrupted(|| self.files.remove(&self.path));
+        }
+    }
+}
+
+/// End of the name of a temporary file.
+const TEMPORARY: &str = ".tmp";
+
+/// A number that no other call in this process gives.
+pub(in crate::support::storage) fn serial() -> usize {
+    static COUNTER: AtomicUsize = AtomicUsize::new(0);
+    COUNTER.fetch_add(1, Ordering::Relaxed)
+}
+
+/// `.NAME.PROCESS.NUMBER.tmp`.
+fn temporary_name(name: &OsStr) -> OsString {
+    let number = serial();
+    let mut temporary = OsString::from(".");
+    temporary.push(name);
+    temporary.push(format!(".{}.{number}{TEMPORARY}", std::process::id()));
+    temporary
+}
+
+/// Removes the temporary files that writers killed in the middle left in a directory.
+///
+/// Those of processes that still run stay; where the system does not tell which processes run (in `/proc`), all stay.
+pub fn remove_leftovers(files: &dyn Files, directory: &Path) {
+    let processes = Path::new("/proc");
+    if !processes.join("self").exists() {
+        return;
+    }
+    for entry in fs::read_dir(directory).into_iter().flatten().flatten() {
+        let name = entry.file_name();
+        let dead = name.to_str().and_then(writer).is_some_and(|process| !processes.join(process.to_string()).exists());
+        if dead {
+            // What cannot be removed does no harm.
+            let _ = files.remove(&entry.path());
+        }
+    }
+}
+
+/// The process that a temporary file's name tells.
+fn writer(name: &str) -> Option<u32> {
+    let mut parts = name.strip_prefix('.')?.strip_suffix(TEMPORARY)?.rsplit('.');
+    parts.next()?.parse::<usize>().ok()?;
+    let process = parts.next()?.parse().ok()?;
+    parts.next().map(|_| process)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::storage::{Disk, ReadError, read_regular};
+
+    fn entries(directory: &Path) -> usize {
+        fs::read_dir(directory).unwrap().count()
+    }
+
+    #[test]
+    fn writes_replaces_and_leaves_nothing_behind() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("a.csv");
+        write_atomically(&path, b"one").unwrap();
+        assert_eq!(read_regular(&path, 3).unwrap(), b"one");
+        write_atomically(&path, b"two").unwrap();
+        assert_eq!(read_regular(&path, 3).unwrap(), b"two");
+        assert_eq!(entries(directory.path()), 1);
+    }
+
+    #[test]
+    fn a_growing_file_is_seen_when_it_is_finished() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("a.csv");
+        write_atomically(&path, b"old").unwrap();
+        for finished in [false, true] {
+            let mut file = AtomicWriter::create(&Disk, &path).unwrap();
+            (0..30_000).for_each(|k| file.append(format!("{k:06}").as_bytes()).unwrap());
+            file.append(&[b'x'; BUFFER]).unwrap();
+            assert_eq!(read_regular(&path, 3).unwrap(), b"old");
+            if finished {
+                file.finish().unwrap();
+            }
+        }
+        let content = fs::read(&path).unwrap();
+        assert_eq!(content.len(), 180_000 + BUFFER);
+        assert!((0..30_000).all(|k| content[6 * k..6 * k + 6] == *format!("{k:06}").as_bytes()));
+        assert_eq!(entries(directory.path()), 1);
+    }
+
+    #[test]
+    fn failures_keep_the_old_content() {
+        let directory = tempfile::tempdir().unwrap();
+        let write = |path: &Path| write_atomically(path, b"x");
+        for attempt in [write, check_target] {
+            assert_eq!(attempt(directory.path()).unwrap_err().kind(), io::ErrorKind::IsADirectory);
+            assert!(attempt(&directory.path().join("missing/a.csv")).is_err());
+            assert!(attempt(Path::new("")).is_err());
+        }
+        check_target(&directory.path().join("a.csv")).unwrap();
+        assert_eq!(entries(directory.path()), 0);
+    }
+
+    #[test]
+    fn the_previous_content_lives_on_unless_it_is_damaged() {
+        let directory = tempfile::tempdir().unwrap();
+        let (newest, previous) = (directory.path().join("a"), directory.path().join("b"));
+        let put = |bytes: &[u8], keep| replace(&Disk, &newest, &previous, bytes, keep).unwrap();
+        let both = || (read_regular(&newest, 9).unwrap(), read_regular(&previous, 9).ok());
+        put(b"1", true);
+        assert_eq!(both(), (b"1".to_vec(), None));
+        put(b"2", true);
+        assert_eq!(both(), (b"2".to_vec(), Some(b"1".to_vec())));
+        put(b"3", false);
+        assert_eq!(both(), (b"3".to_vec(), Some(b"1".to_vec())));
+        assert_eq!(entries(directory.path()), 2);
+    }
+
+    #[test]
+    fn only_temporary_files_of_dead_processes_are_removed() {
+        let directory = tempfile::tempdir().unwrap();
+        let name = |name: &str| directory.path().join(name);
+        // No process has this number: it is above the largest that Linux gives.
+        let dead = name(".model.safetensors.4194999.0.tmp");
+        let living = name(&format!(".a.{}.7.tmp", std::process::id()));
+        let others = [living, name("a.4194999.0.tmp"), name(".4194999.0.tmp"), name(".a.b.0.tmp"), name("tmp")];
+        for file in others.iter().chain([&dead]) {
+            fs::write(file, b"x").unwrap();
+        }
+        remove_leftovers(&Disk, directory.path());
+        assert!(others.iter().all(|file| file.exists()));
+        assert_eq!(dead.exists(), !Path::new("/proc/self").exists());
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_and_devices_stay_what_they_are() {
+        let directory = tempfile::tempdir().unwrap();
+        let (target, link) = (directory.path().join("real"), directory.path().join("link"));
+        fs::write(&target, b"old").unwrap();
+        std::os::unix::fs::symlink(&target, &link).unwrap();
+        write_atomically(&link, b"new").unwrap();
+        assert!(fs::symlink_metadata(&link).unwrap().file_type().is_symlink());
+        assert_eq!(fs::read(&target).unwrap(), b"new");
+        write_atomically(Path::new("/dev/null"), b"gone").unwrap();
+        assert!(!fs::metadata("/dev/null").unwrap().is_file());
+        assert!(matches!(read_regular(Path::new("/dev/zero"), 9), Err(ReadError::NotRegular(_))));
+    }
+
+    #[test]
+    fn reads_are_bounded() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("a");
+        fs::write(&path, b"four").unwrap();
+        assert!(matches!(read_regular(&path, 3), Err(ReadError::TooLarge { bytes: 4, limit: 3 })));
+        assert!(matches!(read_regular(directory.path(), 3), Err(ReadError::NotRegular("a directory"))));
+        assert!(matches!(read_regular(&directory.path().join("b"), 3), Err(ReadError::Missing)));
+    }
 }

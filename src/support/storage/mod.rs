@@ -4,13 +4,12 @@
 pub mod container;
 mod files;
 mod lock;
-mod memory;
-mod threads;
-mod write;
+mod machine;
 
-pub use files::{Disk, Files};
-pub use files::{ReadError, open_regular, read_regular};
+pub use files::{
+    AtomicWriter, Disk, Files, ReadError, check_target, open_regular, read_regular, remove_leftovers, replace,
+    write_atomically, write_whole,
+};
 pub use lock::{Acquired, DirectoryLock, LockOwner};
-pub use memory::available_memory;
-pub(crate) use threads::{MOST_THREADS, in_order};
-pub use write::{Growing, check_target, remove_leftovers, replace, write_atomically, write_whole};
+pub use machine::available_memory;
+pub(crate) use machine::{MOST_THREADS, in_order};

@@ -1,6 +1,6 @@
 //! Black holes in several charts: the same metric, the same constants of motion, Carter's among them.
 
-use lnn::lagrangian::systems::{kerr_geodesic::KerrGeodesic, kerr_schild::KerrSchild};
+use lnn::lagrangian::systems::{KerrGeodesic, KerrSchild};
 use lnn::lagrangian::{Request, Terms, configure};
 use lnn::rollout::{Options, rollout};
 use lnn::scalar::{Dd, Real, Scalar};

@@ -2,7 +2,7 @@
 
 use lnn::configuration::Penalty;
 use lnn::data::Dataset;
-use lnn::lagrangian::systems::double_pendulum::DoublePendulum;
+use lnn::lagrangian::systems::DoublePendulum;
 use lnn::lagrangian::{EulerLagrange, Mechanics, Request, Terms, configure};
 use lnn::network::{
     Activation, ActivationChoice, Architecture, Form, Initialization, InputLayer, NetworkLagrangian, initial_weights,

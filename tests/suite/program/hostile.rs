@@ -7,7 +7,7 @@
 //! |---|---|
 //! | a model cut off anywhere, any flipped bit | `network::file::tests::every_prefix_and_every_flipped_bit_is_refused`; `damaged_models_are_refused` for the program |
 //! | trailing bytes, holes and overlaps of tensors | `containers_that_lie_are_refused` |
-//! | length of the description 2^63, gigabytes, deep JSON | `containers_that_lie_are_refused`, `storage::container::json::tests` |
+//! | length of the description 2^63, gigabytes, deep JSON | `containers_that_lie_are_refused`, `storage::container::tests` |
 //! | tiny file, huge shape | `claims_cost_nothing` |
 //! | duplicate keys, duplicate tensors | `containers_that_lie_are_refused`, `network::file::tests::foreign_newer_and_ambiguous_files_are_named` |
 //! | NaN and infinity in weights | `weights_and_versions_are_checked` |

@@ -1,7 +1,7 @@
 //! The crate inside another program: global state, errors, dependencies.
 
 use lnn::data::Dataset;
-use lnn::lagrangian::{EulerLagrange, Mechanics, Terms, systems::double_pendulum::DoublePendulum};
+use lnn::lagrangian::{EulerLagrange, Mechanics, Terms, systems::DoublePendulum};
 use lnn::network::{NetworkLagrangian, file::ModelFile};
 use lnn::rollout::Options;
 use lnn::training::Objective;
@@ -94,7 +94,7 @@ fn nothing_is_global() {
     }
     // Names of temporary files must differ within a process; nothing else is remembered between calls.
     let expected = "static COUNTER: AtomicUsize = AtomicUsize::new(0);".to_string();
-    assert_eq!(found, [(PathBuf::from("src/support/storage/write.rs"), expected)]);
+    assert_eq!(found, [(PathBuf::from("src/support/storage/files.rs"), expected)]);
 }
 
 /// Crates that a build with these features links.

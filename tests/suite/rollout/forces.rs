@@ -1,8 +1,8 @@
 //! Motions under forces from outside, against closed forms and against Lagrangians that hold the same force.
 
 use crate::common::damped;
-use lnn::lagrangian::systems::double_pendulum::DoublePendulum;
-use lnn::lagrangian::systems::harmonic_oscillator::HarmonicOscillator;
+use lnn::lagrangian::systems::DoublePendulum;
+use lnn::lagrangian::systems::HarmonicOscillator;
 use lnn::lagrangian::{EulerLagrange, Lagrangian, Mechanics, Request, Terms, force_parts, inverse_dynamics};
 use lnn::rollout::{
     Driven, Force, Integrable, Method, Options, Rollout, RolloutError, SampledForce, Start, rollout, rollout_each,

@@ -3,8 +3,7 @@
 //! The ignored tests print tables and take minutes:
 //! `cargo test --test suite integrators -- --ignored --nocapture --test-threads 1`
 
-use lnn::lagrangian::systems::double_pendulum::DoublePendulum;
-use lnn::lagrangian::systems::spring_pendulum::SpringPendulum;
+use lnn::lagrangian::systems::{DoublePendulum, SpringPendulum};
 use lnn::lagrangian::{EulerLagrange, Lagrangian, Mechanics, Request, Terms, configure};
 use lnn::rollout::{Domain, Method, Options, Rollout, RolloutError, rollout, rollout_fixed};
 use lnn::scalar::{Dd, Real, Scalar};

@@ -5,10 +5,7 @@ use super::record::Row;
 use crate::common::accuracy::{cast, configure, input_conditions, largest, outputs, random_state, recast};
 use crate::common::matrices::dd;
 use lnn::forward::HyperDual;
-use lnn::lagrangian::systems::{
-    double_pendulum::DoublePendulum, henon_heiles::HenonHeiles, kepler::Kepler, spring_pendulum::SpringPendulum,
-    triple_pendulum::TriplePendulum,
-};
+use lnn::lagrangian::systems::{DoublePendulum, HenonHeiles, Kepler, SpringPendulum, TriplePendulum};
 use lnn::lagrangian::{self, EulerLagrange, Lagrangian, Mechanics, Request, Terms};
 use lnn::linalg::{self, Workspace};
 use lnn::network::{ActivationChoice, NetworkLagrangian};

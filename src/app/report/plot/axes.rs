@@ -20,7 +20,7 @@ const FEW_DECADES: f64 = 6.0;
 
 /// Scale of an axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(super) enum AxisScale {
     Linear,
     Logarithmic,
     /// Radians, ticks at parts of pi.
@@ -32,7 +32,7 @@ pub(super) enum Kind {
 pub(super) struct Axis {
     pub low: f64,
     pub high: f64,
-    pub kind: Kind,
+    pub kind: AxisScale,
     pub label: String,
 }
 
@@ -44,14 +44,14 @@ pub(super) struct Tick {
 }
 
 impl Axis {
-    pub fn new(low: f64, high: f64, kind: Kind, label: &str) -> Self {
+    pub fn new(low: f64, high: f64, kind: AxisScale, label: &str) -> Self {
         Self { low, high, kind, label: label.to_string() }
     }
 
     /// Where a value lies, 0 at the lower and 1 at the upper end.
     pub fn place(&self, x: f64) -> f64 {
         match self.kind {
-            Kind::Logarithmic => (x.ln() - self.low.ln()) / (self.high.ln() - self.low.ln()),
+            AxisScale::Logarithmic => (x.ln() - self.low.ln()) / (self.high.ln() - self.low.ln()),
             _ => (x - self.low) / (self.high - self.low),
         }
     }
@@ -59,9 +59,9 @@ impl Axis {
     /// About `most` ticks, and the power of ten that their texts leave out.
     pub fn ticks(&self, most: usize) -> (Vec<Tick>, i32) {
         match self.kind {
-            Kind::Linear => self.linear(most),
-            Kind::Logarithmic => (self.decades(most), 0),
-            Kind::Angle => {
+            AxisScale::Linear => self.linear(most),
+            AxisScale::Logarithmic => (self.decades(most), 0),
+            AxisScale::Angle => {
                 let step = [0.25, 0.5, 1.0, 2.0].map(|part| part * PI);
                 let step = step.into_iter().find(|step| (self.high - self.low) / step <= most.min(4) as f64 + 0.5);
                 let Some(step) = step else { return self.linear(most) };
@@ -271,27 +271,33 @@ pub(super) fn number(x: f64) -> String {
 mod tests {
     use super::*;
 
-    fn texts(low: f64, high: f64, kind: Kind, most: usize) -> (Vec<String>, i32) {
+    fn texts(low: f64, high: f64, kind: AxisScale, most: usize) -> (Vec<String>, i32) {
         let (ticks, power) = Axis::new(low, high, kind, "").ticks(most);
         (ticks.into_iter().filter_map(|tick| tick.text).collect(), power)
     }
 
     #[test]
     fn ticks_are_round() {
-        assert_eq!(texts(0.0, 10.0, Kind::Linear, 5), (["0", "2", "4", "6", "8", "10"].map(String::from).to_vec(), 0));
-        assert_eq!(texts(-0.35, 0.31, Kind::Linear, 4), (["\u{2212}0.2", "0.0", "0.2"].map(String::from).to_vec(), 0));
         assert_eq!(
-            texts(0.0, 2.1e6, Kind::Linear, 5),
+            texts(0.0, 10.0, AxisScale::Linear, 5),
+            (["0", "2", "4", "6", "8", "10"].map(String::from).to_vec(), 0)
+        );
+        assert_eq!(
+            texts(-0.35, 0.31, AxisScale::Linear, 4),
+            (["\u{2212}0.2", "0.0", "0.2"].map(String::from).to_vec(), 0)
+        );
+        assert_eq!(
+            texts(0.0, 2.1e6, AxisScale::Linear, 5),
             (["0.0", "0.5", "1.0", "1.5", "2.0"].map(String::from).to_vec(), 6)
         );
-        assert_eq!(texts(0.0, 4e-5, Kind::Linear, 4), (["0", "1", "2", "3", "4"].map(String::from).to_vec(), -5));
-        assert_eq!(texts(1000.0001, 1000.0003, Kind::Linear, 2).0, ["1000.0001", "1000.0002", "1000.0003"]);
+        assert_eq!(texts(0.0, 4e-5, AxisScale::Linear, 4), (["0", "1", "2", "3", "4"].map(String::from).to_vec(), -5));
+        assert_eq!(texts(1000.0001, 1000.0003, AxisScale::Linear, 2).0, ["1000.0001", "1000.0002", "1000.0003"]);
         assert_eq!(
-            texts(-PI, PI, Kind::Angle, 4).0,
+            texts(-PI, PI, AxisScale::Angle, 4).0,
             ["\u{2212}\u{3c0}", "\u{2212}\u{3c0}/2", "0", "\u{3c0}/2", "\u{3c0}"]
         );
-        assert_eq!(texts(1e-6, 1.0, Kind::Logarithmic, 3).0, ["10\u{207b}\u{2076}", "10\u{207b}\u{b3}", "1"]);
-        assert_eq!(texts(0.01, 0.1, Kind::Logarithmic, 5).0, ["0.01", "0.02", "0.05", "0.1"]);
+        assert_eq!(texts(1e-6, 1.0, AxisScale::Logarithmic, 3).0, ["10\u{207b}\u{2076}", "10\u{207b}\u{b3}", "1"]);
+        assert_eq!(texts(0.01, 0.1, AxisScale::Logarithmic, 5).0, ["0.01", "0.02", "0.05", "0.1"]);
         for (x, text) in [(0.0, "0"), (0.1 + 0.2, "0.3"), (-2.5, "\u{2212}2.5"), (1000.0, "1000"), (1e6, "1e6")] {
             assert_eq!(number(x), text);
         }
@@ -300,11 +306,11 @@ mod tests {
     #[test]
     fn no_axis_has_many_ticks() {
         for (low, high) in [(0.0, 1e-300), (-1e150, 1e150), (1.0, 1.0 + 1e-9), (5.0, 5.0), (f64::MIN_POSITIVE, 1.0)] {
-            for kind in [Kind::Linear, Kind::Angle] {
+            for kind in [AxisScale::Linear, AxisScale::Angle] {
                 assert!(Axis::new(low, high, kind, "").ticks(6).0.len() < 60);
             }
         }
-        let decades = Axis::new(1e-300, 1e150, Kind::Logarithmic, "").ticks(5).0;
+        let decades = Axis::new(1e-300, 1e150, AxisScale::Logarithmic, "").ticks(5).0;
         assert!(decades.iter().filter(|tick| tick.text.is_some()).count() <= 6);
     }
 }

@@ -1,9 +1,8 @@
 //! Grids as colours, side by side.
 
-use super::axes::{Area, Axis, BELOW, Kind, TITLE_HEIGHT, number, room_left, ruled};
-use super::colours::{DIVERGING, GAP, MARK, VIRIDIS, at};
+use super::axes::{Area, Axis, AxisScale, BELOW, TITLE_HEIGHT, number, room_left, ruled};
 use super::png::indexed;
-use super::svg::{Anchor, INK, Panel, text_width};
+use super::svg::{Anchor, DIVERGING, GAP, INK, MARK, Panel, VIRIDIS, at, text_width};
 use super::{HeatMap, Picture, PlotError, extremes, fine};
 
 /// Size of a panel.
@@ -38,7 +37,7 @@ fn panel(map: &HeatMap) -> Result<Panel, PlotError> {
         (axis[0] - half, axis[axis.len() - 1] + half)
     };
     let kind = |label: &str, (low, high): (f64, f64)| {
-        if label.ends_with("[rad]") && high - low > 3.0 { Kind::Angle } else { Kind::Linear }
+        if label.ends_with("[rad]") && high - low > 3.0 { AxisScale::Angle } else { AxisScale::Linear }
     };
     let axis = |values: &[f64], label: &str| {
         let ends = edges(values);
@@ -92,6 +91,6 @@ fn panel(map: &HeatMap) -> Result<Panel, PlotError> {
 
 /// Ticks of a colour bar; their texts tell the power of ten.
 fn bar_ticks(from: f64, to: f64) -> Vec<(f64, String)> {
-    let (ticks, _) = Axis::new(from, to, Kind::Linear, "").ticks(5);
+    let (ticks, _) = Axis::new(from, to, AxisScale::Linear, "").ticks(5);
     ticks.into_iter().map(|tick| (tick.at, number(tick.at))).collect()
 }

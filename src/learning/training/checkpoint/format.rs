@@ -4,10 +4,10 @@ use super::fingerprint::{Fingerprint, Saved};
 use super::{OptimizerState, Outcome, PhaseState, Snapshot};
 use crate::network::file::{ModelFileError, StoredPrecision};
 use crate::scalar::Scalar;
-use crate::storage::container::{Kind, Tensor, pack, state, unpack};
+use crate::storage::container::{FileKind, Tensor, pack, state, unpack};
 use serde::{Deserialize, Serialize};
 
-const CHECKPOINT: Kind = Kind { name: "checkpoint", key: "lnn-checkpoint", format: 1 };
+const CHECKPOINT: FileKind = FileKind { name: "checkpoint", key: "lnn-checkpoint", format: 1 };
 /// The only tensor: the state as serde writes it.
 const STATE: &str = "state";
 /// Counts above this are refused: no training reaches it, and adding to what passes cannot overflow.

@@ -70,7 +70,7 @@ impl<'de> Deserialize<'de> for Decimal {
 /// The table of a parameter.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Table {
+struct ParameterTable {
     default: Decimal,
     #[serde(default = "super::one")]
     unit: String,
@@ -101,7 +101,8 @@ impl<'de> Visitor<'de> for NumberOrTable {
         Ok(alone(value.to_string()))
     }
     fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<ParameterDescription, A::Error> {
-        let Table { default, unit, range, learn } = Table::deserialize(MapAccessDeserializer::new(map))?;
+        let ParameterTable { default, unit, range, learn } =
+            ParameterTable::deserialize(MapAccessDeserializer::new(map))?;
         Ok(ParameterDescription { default, unit, range, learn })
     }
 }

@@ -41,7 +41,7 @@ impl Description {
         self.compile()
     }
 
-    /// The same, whatever its name.
+    /// Compiles the description without a look at its name.
     ///
     /// # Errors
     /// The first key that is wrong, and how.

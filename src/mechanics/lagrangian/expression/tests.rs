@@ -1,5 +1,6 @@
-use super::{Compiler, Expression, Meaning};
+use super::{Compiler, Expression, ExpressionLagrangian, Meaning};
 use crate::forward::Jet2;
+use crate::lagrangian::{EulerLagrange, Mechanics, MechanicsError, Request, Terms};
 use crate::scalar::{Dd, Real, Scalar};
 use proptest::prelude::*;
 use std::collections::BTreeMap;
@@ -176,4 +177,18 @@ proptest! {
             prop_assert!(message.starts_with("column ") && !message.contains('\n'), "{}", message);
         }
     }
+}
+
+#[test]
+fn another_number_of_parameters_is_an_error_of_every_call() {
+    let pendulum = ExpressionLagrangian::new(&["x"], &["l", "g"], "l^2*x_dot^2/2 + g*l*cos(x)").unwrap();
+    for found in [0, 1, 3] {
+        let pendulum = Mechanics::<_, f64>::new(pendulum.clone(), vec![1.0; found]);
+        let refused = MechanicsError::Shape { what: "parameters", expected: 2, found };
+        let outcome = pendulum.terms(&[0.5], &[1.0], Request::ALL, &mut Terms::default());
+        assert_eq!(outcome, Err(refused));
+        assert_eq!(pendulum.metric_jets(&[0.5], &[1.0]).err(), Some(refused));
+    }
+    let pendulum = Mechanics::<_, f64>::new(pendulum, vec![2.0, 9.8]);
+    pendulum.terms(&[0.5], &[1.0], Request::ALL, &mut Terms::default()).unwrap();
 }

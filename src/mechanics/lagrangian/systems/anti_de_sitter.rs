@@ -1,10 +1,10 @@
-//! Geodesics of anti-de Sitter space of any dimension in half-space coordinates, shared by `ads2`, `ads3` and `ads4`.
+//! Geodesics of anti-de Sitter space of any dimension in half-space coordinates.
 
 use super::{length, lengths};
 use crate::lagrangian::Lagrangian;
 use crate::lagrangian::system::{
-    Bounds, ClosedForm, Conserved, LearningAdvice, PaperBudget, Parameter, PerSize, Plane, Size, StateAdvice, System,
-    TrajectoryTest,
+    Bounds, ClosedForm, Conserved, LearningAdvice, PaperBudget, PaperPhase, Parameter, PerSize, Plane, Size,
+    StateAdvice, System, TrajectoryTest,
 };
 use crate::scalar::Real;
 use std::borrow::Cow;
@@ -131,3 +131,25 @@ impl ClosedForm for AdsGeodesic {
         Some((squares(&v[1..]) + (q[self.n - 1] / radius).sqr()).sqrt())
     }
 }
+
+/// Catalogue entry.
+pub const ADS2: System =
+    system("ads2-geodesic", "Geodesic of AdS2 in half-space coordinates", 2, "t_dot = sqrt(z_dot^2 + (z/L)^2)", None);
+
+/// Catalogue entry.
+pub const ADS3: System = system(
+    "ads3-geodesic",
+    "Geodesic of AdS3 in half-space coordinates",
+    3,
+    "t_dot = sqrt(x_dot^2 + z_dot^2 + (z/L)^2)",
+    None,
+);
+
+/// Catalogue entry.
+pub const ADS4: System = system(
+    "ads4-geodesic",
+    "Geodesic of AdS4 in half-space coordinates",
+    4,
+    "t_dot = sqrt(x_dot^2 + y_dot^2 + z_dot^2 + (z/L)^2)",
+    Some(PaperBudget { states: 120_000, hidden: &[500; 3], phases: &[PaperPhase::new(300, 1e-3, 1e-7)] }),
+);

@@ -1,4 +1,4 @@
-//! Free fall in the field of a black hole in Cartesian Kerr-Schild coordinates, shared by the holes with and without spin and charge.
+//! Free fall in the field of a black hole, with and without spin and charge, in Cartesian Kerr-Schild coordinates.
 
 use super::{length, lengths};
 use crate::lagrangian::Lagrangian;
@@ -286,3 +286,12 @@ impl ClosedForm for KerrSchild {
         Some(found.select(found, R::constant(Scalar::nan())))
     }
 }
+
+/// Catalogue entry.
+pub const SCHWARZSCHILD_CARTESIAN: crate::lagrangian::system::System = system(KerrSchild::Schwarzschild);
+
+/// Catalogue entry.
+pub const KERR_CARTESIAN: crate::lagrangian::system::System = system(KerrSchild::Kerr);
+
+/// Catalogue entry.
+pub const REISSNER_NORDSTROM_CARTESIAN: crate::lagrangian::system::System = system(KerrSchild::ReissnerNordstrom);

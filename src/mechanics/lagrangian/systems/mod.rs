@@ -1,28 +1,131 @@
-//! Hand-written systems, one file each: Lagrangian, closed-form acceleration, catalogue entry.
+//! Hand-written systems, one file for each family: Lagrangian, closed-form acceleration, catalogue entry; and the catalogue
+//! of them all.
 
-pub mod ads2_geodesic;
-pub mod ads3_geodesic;
-pub mod ads4_geodesic;
 mod anti_de_sitter;
-mod chain;
-pub mod charged_particle;
-pub mod constant_force;
-pub mod double_pendulum;
-pub mod harmonic_oscillator;
-pub mod henon_heiles;
-pub mod kepler;
-pub mod kerr_cartesian;
-pub mod kerr_geodesic;
-pub mod kerr_schild;
-pub mod n_pendulum;
-pub mod reissner_nordstrom_cartesian;
-pub mod schwarzschild_cartesian;
-pub mod schwarzschild_geodesic;
-pub mod sphere_geodesic;
-pub mod spring_pendulum;
-pub mod triple_pendulum;
+mod boyer_lindquist;
+mod kepler;
+mod kerr_schild;
+mod oscillators;
+mod pendula;
+mod sphere_geodesic;
+mod uniform_fields;
 
-use super::system::{Coordinate, Parameter, Plane, Range};
+pub use anti_de_sitter::AdsGeodesic;
+pub use boyer_lindquist::{KerrGeodesic, SchwarzschildGeodesic};
+pub use kepler::Kepler;
+pub use kerr_schild::KerrSchild;
+pub use oscillators::{HarmonicOscillator, HenonHeiles};
+pub use pendula::{DoublePendulum, NPendulum, SpringPendulum, TriplePendulum};
+pub use sphere_geodesic::SphereGeodesic;
+pub use uniform_fields::{ChargedParticle, ConstantForce};
+
+use super::system::{ClosedForm, Coordinate, Parameter, Plane, Range, System};
+use super::{EulerLagrange, LagrangianVisitor, Mechanics, SystemInstance};
+use crate::scalar::{Dd, Scalar};
+use std::any::Any;
+
+/// One line per system: its catalogue entry and how its Lagrangian is made from the number of coordinates.
+macro_rules! catalogue {
+    ($($module:ident::$system:ident: $make:expr;)*) => {
+        /// The catalogue entries of all systems.
+        pub(super) static SYSTEMS: &[System] = &[$($module::$system),*];
+
+        /// Where each of them stands in [`SYSTEMS`].
+        #[allow(non_camel_case_types, clippy::upper_case_acronyms)]
+        enum Place { $($system),* }
+
+        /// The Euler-Lagrange terms of a configured system.
+        fn construct<S: Scalar>(configured: &SystemInstance<S>) -> Option<Box<dyn EulerLagrange<S>>> {
+            let n = configured.coordinates;
+            if let Some(described) = &configured.system.described {
+                let parameters = configured.parameters.clone();
+                return Some(Box::new(Mechanics::new(described.lagrangian.clone(), parameters)));
+            }
+            $(if configured.system.name == SYSTEMS[Place::$system as usize].name {
+                let make: fn(usize) -> _ = $make;
+                return Some(Box::new(Mechanics::new(make(n), configured.parameters.clone())));
+            })*
+            None
+        }
+
+        /// Shows a visitor the Lagrangian of a configured system.
+        pub(super) fn visit_lagrangian<S, V: LagrangianVisitor>(configured: &SystemInstance<S>, visitor: V) -> Option<V::Output> {
+            let n = configured.coordinates;
+            if let Some(described) = &configured.system.described {
+                return Some(visitor.visit(&described.lagrangian));
+            }
+            $(if configured.system.name == SYSTEMS[Place::$system as usize].name {
+                let make: fn(usize) -> _ = $make;
+                return Some(visitor.visit(&make(n)));
+            })*
+            None
+        }
+
+        /// The closed-form acceleration of a configured system.
+        pub(super) fn closed_acceleration<S: Scalar>(configured: &SystemInstance<S>, q: &[S], v: &[S]) -> Vec<S> {
+            let n = configured.coordinates;
+            $(if configured.system.name == SYSTEMS[Place::$system as usize].name {
+                let make: fn(usize) -> _ = $make;
+                return make(n).acceleration(&configured.parameters, q, v);
+            })*
+            vec![S::nan(); n]
+        }
+
+        /// The velocity of the time-like coordinate on the mass shell, if the system has one.
+        pub(super) fn constrained_velocity<S: Scalar>(configured: &SystemInstance<S>, q: &[S], v: &[S]) -> Option<S> {
+            let n = configured.coordinates;
+            $(if configured.system.name == SYSTEMS[Place::$system as usize].name {
+                let make: fn(usize) -> _ = $make;
+                return make(n).constrained_velocity(&configured.parameters, q, v);
+            })*
+            None
+        }
+    };
+}
+
+catalogue! {
+    pendula::DOUBLE_PENDULUM: |_| DoublePendulum;
+    pendula::TRIPLE_PENDULUM: |_| TriplePendulum;
+    pendula::N_PENDULUM: |n| NPendulum { n };
+    pendula::SPRING_PENDULUM: |_| SpringPendulum;
+    sphere_geodesic::SPHERE: |_| SphereGeodesic;
+    uniform_fields::CONSTANT_FORCE: |_| ConstantForce;
+    oscillators::HARMONIC_OSCILLATOR: |_| HarmonicOscillator;
+    kepler::KEPLER: |_| Kepler;
+    oscillators::HENON_HEILES: |_| HenonHeiles;
+    uniform_fields::CHARGED_PARTICLE: |_| ChargedParticle;
+    anti_de_sitter::ADS2: |n| AdsGeodesic { n };
+    anti_de_sitter::ADS3: |n| AdsGeodesic { n };
+    anti_de_sitter::ADS4: |n| AdsGeodesic { n };
+    boyer_lindquist::SCHWARZSCHILD: |_| SchwarzschildGeodesic;
+    kerr_schild::SCHWARZSCHILD_CARTESIAN: |_| KerrSchild::Schwarzschild;
+    kerr_schild::REISSNER_NORDSTROM_CARTESIAN: |_| KerrSchild::ReissnerNordstrom;
+    boyer_lindquist::KERR: |_| KerrGeodesic;
+    kerr_schild::KERR_CARTESIAN: |_| KerrSchild::Kerr;
+}
+
+/// [`construct`], compiled in this crate once for each of its scalars instead of again in every crate that calls it: all
+/// systems under all forward numbers are much code.
+pub(super) fn construct_once<S: Scalar>(configured: &SystemInstance<S>) -> Option<Box<dyn EulerLagrange<S>>> {
+    fn single(configured: &SystemInstance<f32>) -> Option<Box<dyn EulerLagrange<f32>>> {
+        construct(configured)
+    }
+    fn double(configured: &SystemInstance<f64>) -> Option<Box<dyn EulerLagrange<f64>>> {
+        construct(configured)
+    }
+    fn double_double(configured: &SystemInstance<Dd>) -> Option<Box<dyn EulerLagrange<Dd>>> {
+        construct(configured)
+    }
+    let configured: &dyn Any = configured;
+    let built: Box<dyn Any> = if let Some(configured) = configured.downcast_ref() {
+        Box::new(single(configured))
+    } else if let Some(configured) = configured.downcast_ref() {
+        Box::new(double(configured))
+    } else {
+        Box::new(double_double(configured.downcast_ref()?))
+    };
+    *built.downcast().ok()?
+}
 
 /// A mass of 1 kg.
 const fn mass(symbol: &'static str) -> Parameter {

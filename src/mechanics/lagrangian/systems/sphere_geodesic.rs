@@ -17,7 +17,7 @@ pub struct SphereGeodesic;
 static PARAMETERS: [Parameter; 2] = [mass("m"), length("R")];
 
 /// Catalogue entry.
-pub const SYSTEM: System = System {
+pub const SPHERE: System = System {
     name: Cow::Borrowed("sphere-geodesic"),
     title: Cow::Borrowed("Geodesic on a sphere"),
     coordinates: PerSize::Rule(|_| {

@@ -1,6 +1,5 @@
 //! Round trips, damage and foreign files.
 
-use super::header::MAX_COORDINATES;
 use super::*;
 use crate::lagrangian::EulerLagrange;
 use crate::network::{ActivationChoice, Form, InputLayer, NetworkLagrangian};

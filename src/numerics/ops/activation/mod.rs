@@ -1,11 +1,10 @@
 //! Activation functions and their derivatives.
 
 mod formula;
-mod gain;
-mod jets;
 
 use crate::ops::Unary;
-use crate::scalar::Real;
+use crate::scalar::{Real, Scalar, vectorized};
+use formula::Jet;
 
 /// Builds the enum and all that belongs to an activation from rows `Name "name" formula (operation);`: the name in configurations and
 /// files, the closed forms of [`formula`], and the row of the table of operations that it is.
@@ -65,7 +64,6 @@ macro_rules! table {
                 )
             }};
         }
-        use each_activation;
 
         /// Calls back with documentation and name of every row.
         macro_rules! activations {
@@ -105,3 +103,77 @@ impl std::fmt::Display for Activation {
 
 #[cfg(test)]
 mod tests;
+
+impl Activation {
+    /// `1 / sqrt(E[act'(Z)^2])` for a standard normal `Z`: the gain of weights drawn with standard deviation
+    /// `gain / sqrt(fan_in)`, which keep the variance of the gradients between layers of one width.
+    ///
+    /// Trapezoidal rule with step 1/16 on `[-14, 14]`; accurate to `1e-12`, for the integrand is analytic in a strip of
+    /// half-width `pi/2` or wider, where the rule converges like `e^(-2 pi (pi/2) 16)`.
+    pub(crate) fn variance_gain(self) -> f64 {
+        const STEP: f64 = 1.0 / 16.0;
+        let mean: f64 = (-224..=224)
+            .map(|k| {
+                let z = f64::from(k) * STEP;
+                let slope = self.derivatives(z)[1];
+                slope * slope * (-0.5 * z * z).exp()
+            })
+            .sum();
+        let mean = mean * STEP / (2.0 * std::f64::consts::PI).sqrt();
+        mean.sqrt().recip()
+    }
+}
+
+impl Activation {
+    /// Value and four derivatives at `x`: `[f, f', f'', f''', f'''']`.
+    ///
+    /// Closed forms, each accurate to a few units of rounding times its own condition number `1 + |x f^(k+1) / f^(k)|`,
+    /// into the tails until underflow; finite for every finite `x` but the value of the quadratic.
+    pub fn derivatives<S: Scalar>(self, x: S) -> Jet<S> {
+        each_activation!(self, jet => jet(x))
+    }
+
+    /// `f = act(z)` elementwise. All slices have the same length.
+    pub fn value<S: Scalar>(self, z: &[S], f: &mut [S]) {
+        each_activation!(self, jet => {
+            let n = z.len();
+            let f = &mut f[..n];
+            for k in 0..n {
+                f[k] = jet(z[k])[0];
+            }
+        });
+    }
+
+    /// Value and first derivative, elementwise. All slices have the same length.
+    pub fn jet1<S: Scalar>(self, z: &[S], f: &mut [S], d1: &mut [S]) {
+        each_activation!(self, jet => {
+            let n = z.len();
+            let (f, d1) = (&mut f[..n], &mut d1[..n]);
+            for k in 0..n {
+                [f[k], d1[k], ..] = jet(z[k]);
+            }
+        });
+    }
+
+    /// Value and two derivatives, elementwise. All slices have the same length.
+    pub fn jet2<S: Scalar>(self, z: &[S], f: &mut [S], d1: &mut [S], d2: &mut [S]) {
+        each_activation!(self, jet => {
+            let n = z.len();
+            let (f, d1, d2) = (&mut f[..n], &mut d1[..n], &mut d2[..n]);
+            for k in 0..n {
+                [f[k], d1[k], d2[k], ..] = jet(z[k]);
+            }
+        });
+    }
+
+    /// Value and three derivatives, elementwise. All slices have the same length.
+    pub fn jet3<S: Scalar>(self, z: &[S], f: &mut [S], d1: &mut [S], d2: &mut [S], d3: &mut [S]) {
+        each_activation!(self, jet => {
+            let n = z.len();
+            let (f, d1, d2, d3) = (&mut f[..n], &mut d1[..n], &mut d2[..n], &mut d3[..n]);
+            for k in 0..n {
+                [f[k], d1[k], d2[k], d3[k], _] = jet(z[k]);
+            }
+        });
+    }
+}

@@ -1,20 +1,11 @@
-//! Double-double numbers: the judge of `f32` and `f64`.
+//! Double-double numbers: a precision of about 31 digits, against which results in `f32` and `f64` are checked.
 
-mod angle;
 mod arithmetic;
-mod conversion;
 mod elementary;
-mod error_function;
-mod natural;
-mod reduction;
 mod text;
+mod trigonometry;
 
-#[cfg(test)]
-mod table;
-#[cfg(test)]
-mod tests;
-
-pub use conversion::UnreadableNumber;
+pub use arithmetic::UnreadableNumber;
 
 use super::{Real, Scalar};
 use std::cmp::Ordering;
@@ -217,3 +208,6 @@ impl Scalar for Dd {
         self.high().ilogb()
     }
 }
+
+#[cfg(test)]
+mod tests;

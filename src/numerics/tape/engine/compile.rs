@@ -2,10 +2,10 @@
 
 use super::Depth;
 use super::operation::{Combination, Dense, Elementwise, Function, Gather, Input, Operation, Product, Select};
-use super::value::{Kind, Layout, Order, Value};
+use super::value::{Dependence, Layout, Order, Value};
 use crate::ops::{Binary, Unary};
 use crate::scalar::{Real, Scalar};
-use crate::tape::error::TapeError;
+use crate::tape::TapeError;
 use crate::tape::program::{Graph, Node, Recorder, Tracer};
 use std::collections::HashMap;
 
@@ -104,8 +104,12 @@ fn mark<S: Scalar>(operations: &[Operation<S>], values: &mut [Value], output: us
             Operation::Function(op) => (is_output[op.a], is_output[op.b]) = (false, false),
             Operation::Product(op) => match (values[op.a].kind, values[op.b].kind) {
                 // A factor that nothing moves bends nothing, but its adjoint asks for what stands beside it.
-                (Kind::Constant, _) => (is_output[op.a], is_output[op.b]) = (false, is_output[op.b] && is_output[out]),
-                (_, Kind::Constant) => (is_output[op.a], is_output[op.b]) = (is_output[op.a] && is_output[out], false),
+                (Dependence::Constant, _) => {
+                    (is_output[op.a], is_output[op.b]) = (false, is_output[op.b] && is_output[out])
+                }
+                (_, Dependence::Constant) => {
+                    (is_output[op.a], is_output[op.b]) = (is_output[op.a] && is_output[out], false)
+                }
                 _ => (is_output[op.a], is_output[op.b]) = (false, false),
             },
             Operation::Select(op) => op.branches.into_iter().for_each(|x| is_output[x] &= is_output[out]),
@@ -181,7 +185,7 @@ impl<'g, S: Scalar> Compiler<'g, S> {
         self.number(output)
     }
 
-    fn push(&mut self, operation: Operation<S>, units: usize, kind: Kind) -> usize {
+    fn push(&mut self, operation: Operation<S>, units: usize, kind: Dependence) -> usize {
         let mut trainable = matches!(operation, Operation::Parameter(_) | Operation::Dense(_));
         let mut velocities = Vec::new();
         operation.operands(|x| {
@@ -189,7 +193,7 @@ impl<'g, S: Scalar> Compiler<'g, S> {
             velocities.extend(&self.values[x].velocities);
         });
         match &operation {
-            Operation::Input(input) if kind == Kind::Velocity => velocities.push(input.index - self.n),
+            Operation::Input(input) if kind == Dependence::Velocity => velocities.push(input.index - self.n),
             // Nothing moves what a condition depends on.
             Operation::Select(op) => {
                 velocities = op.branches.iter().flat_map(|&x| self.values[x].velocities.clone()).collect();
@@ -203,8 +207,8 @@ impl<'g, S: Scalar> Compiler<'g, S> {
         self.values.len() - 1
     }
 
-    fn kind_of(&self, values: &[usize]) -> Kind {
-        values.iter().map(|&value| self.values[value].kind).max().unwrap_or(Kind::Constant)
+    fn kind_of(&self, values: &[usize]) -> Dependence {
+        values.iter().map(|&value| self.values[value].kind).max().unwrap_or(Dependence::Constant)
     }
 
     /// The value of one unit that a row is.
@@ -278,13 +282,13 @@ impl<'g, S: Scalar> Compiler<'g, S> {
         let value = match node {
             Node::Input(index) => {
                 let index = *index as usize;
-                let kind = if index < self.n { Kind::Position } else { Kind::Velocity };
+                let kind = if index < self.n { Dependence::Position } else { Dependence::Velocity };
                 let value = self.push(Operation::Input(Input { index }), 1, kind);
                 self.inputs[index] = Some(value);
                 value
             }
-            Node::Parameter(index) => self.push(Operation::Parameter(*index as usize), 1, Kind::Constant),
-            Node::Constant(value) => self.push(Operation::Constant(*value), 1, Kind::Constant),
+            Node::Parameter(index) => self.push(Operation::Parameter(*index as usize), 1, Dependence::Constant),
+            Node::Constant(value) => self.push(Operation::Constant(*value), 1, Dependence::Constant),
             Node::Unary(_, a) => self.combine(*a, -one, None),
             Node::SinCos(a) => {
                 let x = self.number(*a);

@@ -1,8 +1,8 @@
 //! Sweeps over a recorded Lagrangian on a chunk of states.
 
 use super::kernel::resize;
-use super::operation::{Forward, Kept, MixedForward, MixedReverse, PARTIALS, Reverse, Second};
-use super::value::{Kind, Order, Store, View};
+use super::operation::{Forward, Kept, MixedForward, MixedReverse, PARTIALS, Reverse, SecondOrder};
+use super::value::{Dependence, Order, Store, View};
 use super::{Recorded, STATES};
 use crate::scalar::{Column, Real, Scalar, update_column};
 use std::sync::Arc;
@@ -41,7 +41,7 @@ pub struct Evaluation<S> {
     partials: Vec<S>,
     mixed: Vec<S>,
     mixed_adjoints: Vec<S>,
-    second: Second<S>,
+    second: SecondOrder<S>,
     /// `L`, `(batch)`.
     pub lagrangian: Vec<S>,
     /// `dL/d(v/s)`, `(batch, n)`.
@@ -74,7 +74,7 @@ impl<S: Scalar> Evaluation<S> {
             partials: Vec::new(),
             mixed: Vec::new(),
             mixed_adjoints: Vec::new(),
-            second: Second::default(),
+            second: SecondOrder::default(),
             lagrangian: Vec::new(),
             momentum: Vec::new(),
             dl_dq: Vec::new(),
@@ -158,7 +158,7 @@ impl<S: Scalar> Evaluation<S> {
         }
         sweep.adjoints.all_mut(recorded.output).fill(<S as Real>::one());
         for (out, operation) in recorded.operations.iter().enumerate().rev() {
-            if recorded.values[out].kind != Kind::Constant {
+            if recorded.values[out].kind != Dependence::Constant {
                 operation.reverse(out, &mut sweep);
             }
         }
@@ -177,7 +177,7 @@ impl<S: Scalar> Evaluation<S> {
             self.mass_matrix.resize(lanes * n * n, zero);
             for i in 0..n {
                 for j in i..n {
-                    let plane = &self.second.mass[Second::<S>::pair(n, i, j) * lanes..][..lanes];
+                    let plane = &self.second.mass[SecondOrder::<S>::pair(n, i, j) * lanes..][..lanes];
                     for place in [i * n + j, j * n + i] {
                         let element = Column::new(&mut self.mass_matrix[..], place, n * n);
                         update_column(lanes, element, Column::all(plane), |to, m| *to = m);

@@ -1,4 +1,4 @@
-//! The engine of Lagrangians: one recorded function `L(q, v)` of whatever it is made of, and a few rules per operation give all
+//! The engine of Lagrangians: one recorded function `L(q, v)` of any operations, and a few rules per operation give all
 //! its derivatives.
 //!
 //! With `A_k = dL/dy_k` the adjoints of one reverse sweep over the operations `y_k = phi_k(..)`,
@@ -26,14 +26,12 @@
 
 mod compile;
 mod evaluation;
-mod jets;
 mod kernel;
 mod operation;
 mod value;
 
 pub use compile::Recorded;
-pub use evaluation::Depth;
-pub use evaluation::{Evaluation, MixedDirections};
+pub use evaluation::{Depth, Evaluation, MixedDirections};
 
 /// States evaluated together at most.
 pub const STATES: usize = 64;

@@ -10,7 +10,7 @@ use std::ops::Range;
 
 /// Dependence of a value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Kind {
+pub(super) enum Dependence {
     /// Parameters and constants alone.
     Constant,
     /// Positions, no velocity.
@@ -23,7 +23,7 @@ pub(super) enum Kind {
 #[derive(Clone, Debug)]
 pub(super) struct Value {
     pub units: usize,
-    pub kind: Kind,
+    pub kind: Dependence,
     /// The velocities it depends on, ascending.
     pub velocities: Vec<usize>,
     /// It reaches `L` by operations that are linear in what moves.
@@ -61,7 +61,7 @@ impl Value {
     /// Directions of the tangents of the forward sweep: `(v, 0)` is 0, the velocity `e_i` is `1 + i`.
     fn directions(&self, depth: Depth) -> Vec<usize> {
         let mut directions = Vec::new();
-        if !self.is_output && self.kind != Kind::Constant {
+        if !self.is_output && self.kind != Dependence::Constant {
             if depth >= Depth::Motion {
                 directions.push(0);
             }
@@ -74,9 +74,9 @@ impl Value {
 
     /// Channels of a mixed sweep.
     pub fn mixed(&self, order: Order) -> Mixed {
-        let moving = self.kind != Kind::Constant;
+        let moving = self.kind != Dependence::Constant;
         let second = order == Order::Second && !self.is_output;
-        let carried = [!self.is_output, second && self.kind == Kind::Velocity, second && moving, moving];
+        let carried = [!self.is_output, second && self.kind == Dependence::Velocity, second && moving, moving];
         let mut count = 0;
         let [value, s, t, st] = carried.map(|carried| {
             count += usize::from(carried);

@@ -3,7 +3,7 @@
 use super::Tracer;
 use crate::ops::{Binary, Unary};
 use crate::scalar::Scalar;
-use crate::tape::error::TapeError;
+use crate::tape::TapeError;
 use std::cell::{Cell, RefCell};
 use std::collections::HashMap;
 

@@ -4,7 +4,7 @@ use super::recorder::{Node, Recorder};
 use crate::forward::assign_operators;
 use crate::ops::{Binary, Unary};
 use crate::scalar::{Elementary, Real, Scalar};
-use crate::tape::error::TapeError;
+use crate::tape::TapeError;
 use std::fmt;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 

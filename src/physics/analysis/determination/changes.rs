@@ -4,11 +4,9 @@
 //! the dissipation `D` is `f(q) v_i^2/2` (viscous) or `w_i^2 ln cosh(v_i/w_i)` (dry beyond `w_i`). What the equations of
 //! motion get from one of them is linear in it.
 
-use super::functions::{Functions, Values};
-
 /// The factor of a function of the coordinates.
 #[derive(Clone, Debug, PartialEq)]
-enum Kind {
+enum VelocityFactor {
     /// The velocities of these coordinates, repeated ones to their power: part of `L`.
     Product(Vec<usize>),
     /// `v_i^2/2`: part of `D`.
@@ -20,7 +18,7 @@ enum Kind {
 /// One way.
 #[derive(Clone, Debug)]
 struct Change {
-    kind: Kind,
+    kind: VelocityFactor,
     function: usize,
     /// Its usual size before the data are looked at.
     size: f64,
@@ -28,7 +26,7 @@ struct Change {
 
 /// Usual sizes: those of the learned model itself, so that a change of size 1 makes another model of it.
 #[derive(Clone, Debug)]
-pub struct Usual {
+pub struct Typical {
     /// `|M_ii|`, mean over the states.
     pub mass: Vec<f64>,
     /// Root mean square of every velocity.
@@ -69,11 +67,17 @@ const GENEROUS: f64 = 3.0;
 impl Changes {
     /// Changes for coordinates that are angles or range over `range`; those of the friction if `friction`. The degree of
     /// the functions is as high as their number allows; `None` if even constants are too many.
-    pub fn new(periodic: &[bool], range: &[[f64; 2]], usual: &Usual, friction: bool) -> Option<Self> {
+    pub fn new(periodic: &[bool], range: &[[f64; 2]], usual: &Typical, friction: bool) -> Option<Self> {
         (0..=DEGREE).rev().find_map(|degree| Self::of_degree(periodic, range, usual, friction, degree))
     }
 
-    fn of_degree(periodic: &[bool], range: &[[f64; 2]], usual: &Usual, friction: bool, degree: usize) -> Option<Self> {
+    fn of_degree(
+        periodic: &[bool],
+        range: &[[f64; 2]],
+        usual: &Typical,
+        friction: bool,
+        degree: usize,
+    ) -> Option<Self> {
         let n = periodic.len();
         let pairs: Vec<[usize; 2]> = (0..n).flat_map(|i| (i..n).map(move |j| [i, j])).collect();
         // What constants come to; lists of higher degree grow with the power of `n` and are not made to be counted.
@@ -87,25 +91,25 @@ impl Changes {
     fn listed(
         periodic: &[bool],
         range: &[[f64; 2]],
-        usual: &Usual,
+        usual: &Typical,
         friction: bool,
         (degree, pairs): (usize, &[[usize; 2]]),
     ) -> Self {
         let n = periodic.len();
         let functions = Functions::new(periodic, range, degree);
-        let Usual { mass, velocity, acceleration } = usual;
+        let Typical { mass, velocity, acceleration } = usual;
         let inertia = |[i, j]: [usize; 2]| (mass[i] * mass[j]).sqrt();
         let kinetic: f64 = (0..n).map(|i| mass[i] * velocity[i] * velocity[i]).sum();
         let mut all = Vec::new();
-        let mut add = |kind: Kind, function: usize, size: f64| all.push(Change { kind, function, size });
+        let mut add = |kind: VelocityFactor, function: usize, size: f64| all.push(Change { kind, function, size });
         for function in 0..functions.len() {
             for &[i, j] in pairs {
                 // v_i^2 is twice what the kinetic energy has.
                 let size = if i == j { 0.5 } else { 1.0 } * inertia([i, j]);
-                add(Kind::Product(vec![i, j]), function, size);
+                add(VelocityFactor::Product(vec![i, j]), function, size);
             }
             if function > 0 {
-                add(Kind::Product(Vec::new()), function, GENEROUS * kinetic);
+                add(VelocityFactor::Product(Vec::new()), function, GENEROUS * kinetic);
             }
         }
         if n <= 3 {
@@ -115,7 +119,7 @@ impl Changes {
                     let mut product = vec![i, j, a, b];
                     product.sort_unstable();
                     if size.is_finite() && !all_has(&all, &product) {
-                        all.push(Change { kind: Kind::Product(product), function: 0, size });
+                        all.push(Change { kind: VelocityFactor::Product(product), function: 0, size });
                     }
                 }
             }
@@ -123,9 +127,9 @@ impl Changes {
         if friction {
             for i in 0..n {
                 let size = GENEROUS * mass[i] * acceleration[i] / velocity[i];
-                let all_of = (0..functions.up_to(1)).map(|function| (Kind::Viscous(i), function));
+                let all_of = (0..functions.up_to(1)).map(|function| (VelocityFactor::Viscous(i), function));
                 let knee = 0.2 * velocity[i];
-                let all_of = all_of.chain([(Kind::Dry(i, knee), 0)]);
+                let all_of = all_of.chain([(VelocityFactor::Dry(i, knee), 0)]);
                 let sized = all_of.map(|(kind, function)| Change { kind, function, size });
                 all.extend(sized.filter(|change| change.size.is_finite()));
             }
@@ -154,7 +158,7 @@ impl Changes {
         for (k, Change { kind, function, size }) in self.all.iter().enumerate() {
             let f = size * row.values.value[*function];
             match kind {
-                Kind::Product(product) => {
+                VelocityFactor::Product(product) => {
                     let gradient = &row.values.gradient[function * n..(function + 1) * n];
                     let along = size * gradient.iter().zip(v).map(|(g, v)| g * v).sum::<f64>();
                     let whole: f64 = product.iter().map(|&i| v[i]).product();
@@ -176,8 +180,8 @@ impl Changes {
                         }
                     }
                 }
-                Kind::Viscous(i) => row.friction[i * count + k] = f * v[*i],
-                Kind::Dry(i, knee) => row.friction[i * count + k] = f * knee * (v[*i] / knee).tanh(),
+                VelocityFactor::Viscous(i) => row.friction[i * count + k] = f * v[*i],
+                VelocityFactor::Dry(i, knee) => row.friction[i * count + k] = f * knee * (v[*i] / knee).tanh(),
             }
         }
         row.equation.iter_mut().zip(&row.friction).for_each(|(sum, friction)| *sum += friction);
@@ -185,7 +189,109 @@ impl Changes {
 }
 
 fn all_has(all: &[Change], product: &[usize]) -> bool {
-    all.iter().any(|change| change.function == 0 && matches!(&change.kind, Kind::Product(p) if p == product))
+    all.iter().any(|change| change.function == 0 && matches!(&change.kind, VelocityFactor::Product(p) if p == product))
+}
+
+/// A product of one factor per coordinate; 0 is the constant. For an angle `2k - 1` and `2k` are `cos k q`, `sin k q`, for
+/// another coordinate `k` is the Chebyshev polynomial of degree `k` over its range.
+type Factors = Vec<usize>;
+
+/// All products up to a degree, on the box of the coordinates.
+#[derive(Clone, Debug)]
+pub struct Functions {
+    periodic: Vec<bool>,
+    range: Vec<[f64; 2]>,
+    all: Vec<Factors>,
+}
+
+/// Values `(functions)` and gradients `(functions, n)` at one place.
+#[derive(Clone, Debug, Default)]
+pub struct Values {
+    pub value: Vec<f64>,
+    pub gradient: Vec<f64>,
+    /// Values and derivatives of the factors of every coordinate.
+    factors: Vec<Vec<[f64; 2]>>,
+}
+
+impl Functions {
+    /// Products of degree `degree` at most, for coordinates that are angles or range over `range`.
+    pub fn new(periodic: &[bool], range: &[[f64; 2]], degree: usize) -> Self {
+        let mut all: Vec<(Factors, usize)> = vec![(Vec::new(), 0)];
+        for &angle in periodic {
+            let longer = all.iter().flat_map(|(factors, used)| {
+                let kinds = if angle { 2 * (degree - used) } else { degree - used };
+                (0..=kinds).map(move |kind| {
+                    let grade = if angle { kind.div_ceil(2) } else { kind };
+                    ([factors.as_slice(), &[kind]].concat(), used + grade)
+                })
+            });
+            all = longer.collect();
+        }
+        all.sort_by_key(|(_, grade)| *grade);
+        let all = all.into_iter().map(|(factors, _)| factors).collect();
+        Self { periodic: periodic.to_vec(), range: range.to_vec(), all }
+    }
+
+    /// Number of functions; the first is the constant 1.
+    pub fn len(&self) -> usize {
+        self.all.len()
+    }
+
+    /// Functions of degree `degree` at most, which come first.
+    pub fn up_to(&self, degree: usize) -> usize {
+        self.all.iter().take_while(|factors| self.degree(factors) <= degree).count()
+    }
+
+    fn degree(&self, factors: &[usize]) -> usize {
+        factors.iter().zip(&self.periodic).map(|(&kind, &angle)| if angle { kind.div_ceil(2) } else { kind }).sum()
+    }
+
+    /// Values and gradients at `q`.
+    pub fn evaluate(&self, q: &[f64], values: &mut Values) {
+        let n = q.len();
+        let most = self.all.iter().flatten().copied().max().unwrap_or(0);
+        values.factors.resize_with(n, Vec::new);
+        for (i, factors) in values.factors.iter_mut().enumerate() {
+            factors.clear();
+            if self.periodic[i] {
+                harmonics(q[i], most, factors);
+            } else {
+                chebyshev(q[i], self.range[i], most, factors);
+            }
+        }
+        values.value.clear();
+        values.gradient.clear();
+        for kinds in &self.all {
+            let factor = |i: usize| values.factors[i][kinds[i]];
+            values.value.push((0..n).map(|i| factor(i)[0]).product());
+            values
+                .gradient
+                .extend((0..n).map(|along| (0..n).map(|i| factor(i)[usize::from(i == along)]).product::<f64>()));
+        }
+    }
+}
+
+/// 1, cos q, sin q, cos 2q, ... with their derivatives.
+fn harmonics(q: f64, most: usize, out: &mut Vec<[f64; 2]>) {
+    out.push([1.0, 0.0]);
+    for k in 1..=most.div_ceil(2) {
+        let frequency = k as f64;
+        let (sin, cos) = (frequency * q).sin_cos();
+        out.extend([[cos, -frequency * sin], [sin, frequency * cos]]);
+    }
+}
+
+/// Chebyshev polynomials over a range with their derivatives by `q`.
+fn chebyshev(q: f64, [low, high]: [f64; 2], most: usize, out: &mut Vec<[f64; 2]>) {
+    let half = (0.5 * (high - low)).max(f64::MIN_POSITIVE);
+    let x = (q - 0.5 * (low + high)) / half;
+    out.push([1.0, 0.0]);
+    out.push([x, 1.0]);
+    for k in 2..=most {
+        let ([a, da], [b, db]) = (out[k - 1], out[k - 2]);
+        out.push([2.0 * x * a - b, 2.0 * (a + x * da) - db]);
+    }
+    out.iter_mut().for_each(|[_, slope]| *slope /= half);
 }
 
 #[cfg(test)]
@@ -209,14 +315,14 @@ mod tests {
 
     #[test]
     fn changes_are_what_the_engine_says() {
-        let usual = Usual { mass: vec![1.0; 2], velocity: vec![1.0; 2], acceleration: vec![1.0; 2] };
+        let usual = Typical { mass: vec![1.0; 2], velocity: vec![1.0; 2], acceleration: vec![1.0; 2] };
         let changes = Changes::new(&[true, false], &[[0.0, 1.0], [-1.0, 1.0]], &usual, false).unwrap();
         let (q, v, a) = ([0.4, 0.7], [1.3, -0.6], [0.9, 2.1]);
         let mut values = Values::default();
         changes.functions.evaluate(&q, &mut values);
         let function = |value: f64| values.value.iter().position(|x| (x - value).abs() < 1e-12).unwrap();
         let find = |product: &[usize], function: usize| {
-            let is = |c: &Change| c.function == function && c.kind == Kind::Product(product.to_vec());
+            let is = |c: &Change| c.function == function && c.kind == VelocityFactor::Product(product.to_vec());
             let k = changes.all.iter().position(is).unwrap();
             (k, 1.0 / changes.all[k].size)
         };
@@ -250,12 +356,33 @@ mod tests {
     #[test]
     fn many_coordinates_have_few_functions() {
         let count = |n: usize| {
-            let usual = Usual { mass: vec![1.0; n], velocity: vec![1.0; n], acceleration: vec![1.0; n] };
+            let usual = Typical { mass: vec![1.0; n], velocity: vec![1.0; n], acceleration: vec![1.0; n] };
             Changes::new(&vec![true; n], &vec![[0.0, 1.0]; n], &usual, true).map(|changes| changes.len())
         };
         for n in 1..=20 {
             assert!(count(n).is_some_and(|count| count <= MOST), "{n}");
         }
         assert_eq!(count(60), None);
+    }
+
+    #[test]
+    fn gradients_are_those_of_the_values() {
+        let functions = Functions::new(&[true, false], &[[0.0, 0.0], [-1.0, 3.0]], 3);
+        // Angle of grade 0 to 3 in 1, 2, 2, 2 kinds, beside 4, 3, 2, 1 polynomials.
+        assert_eq!((functions.len(), functions.up_to(0), functions.up_to(1)), (16, 1, 4));
+        let at = |q: [f64; 2]| {
+            let mut values = Values::default();
+            functions.evaluate(&q, &mut values);
+            values
+        };
+        let (q, h) = ([0.7, 1.9], 1e-5);
+        let here = at(q);
+        assert_eq!(here.value[0], 1.0);
+        for i in 0..2 {
+            let shifted = |h: f64| at(std::array::from_fn(|k| q[k] + if k == i { h } else { 0.0 })).value;
+            for (k, (a, b)) in shifted(h).iter().zip(shifted(-h)).enumerate() {
+                assert!(((a - b) / (2.0 * h) - here.gradient[2 * k + i]).abs() < 1e-8, "{k} {i}");
+            }
+        }
     }
 }

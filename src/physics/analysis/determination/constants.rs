@@ -6,7 +6,7 @@
 //! much as the weights of its kind are large. The error of the step is that of all ranges, see the [module](super).
 
 use super::Estimate;
-use super::regression::{Sums, groups, jackknife};
+use super::posterior::{Sums, groups, jackknife};
 use crate::configuration::Penalty;
 use crate::data::{RecordingSplit, StateEstimate};
 use crate::linalg::dot;
@@ -30,8 +30,8 @@ const WEIGHTS: usize = 128;
 /// Step of a difference by a parameter.
 const DIFFERENCE: f64 = 1e-4;
 
-/// Values of the learned constants of the known part of a network with their ranges, by name; `None` where nothing can be
-/// said, and empty without constants that are learned.
+/// Values of the learned constants of the known part of a network with their ranges, by name; `None` where no range can be
+/// given, and empty without constants that are learned.
 pub fn constants(
     network: &NetworkLagrangian<f64>,
     measured: &RecordingSplit,

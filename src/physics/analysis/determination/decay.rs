@@ -4,10 +4,10 @@
 //! A mechanical one, `M(q) v^2/2 - V(q)`, moves backwards as forwards: `a = f(q) + h(q) v^2`, with a known force over `M`
 //! beside it. Friction adds `-r v`.
 
-use super::functions::{Functions, Values};
+use super::changes::{Functions, Values};
 use super::observed::Observed;
+use super::posterior::{Sums, groups, jackknife};
 use super::ranges;
-use super::regression::{Sums, groups, jackknife};
 use serde::{Deserialize, Serialize};
 
 /// Decay of the motion of one coordinate.

@@ -4,28 +4,25 @@
 //! hexadecimal digits, the CRC-32 (IEEE) of that JSON text up to the comma before `"checksum"`, followed by the bytes of
 //! the tensors in the order of the file. The same content gives the same bytes; a changed bit anywhere is refused.
 
-mod error;
-mod json;
 #[cfg(feature = "training")]
 pub(crate) mod state;
 
-pub use error::ContainerError;
-pub use json::StoredPrecision;
-
 use crate::names::one_line;
 use crate::scalar::Scalar;
-use json::check_unambiguous;
+use crate::storage::ReadError;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
-use serde::de::DeserializeOwned;
+use serde::de::{DeserializeOwned, Deserializer, MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Serialize};
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
+use std::fmt;
+use thiserror::Error;
 
 /// Largest description that is read, in bytes.
 pub(crate) const MAX_HEADER: u64 = 1 << 20;
 
 /// Marks of the files of one kind.
 #[derive(Clone, Copy, Debug)]
-pub struct Kind {
+pub struct FileKind {
     /// In messages: a model, a checkpoint.
     pub name: &'static str,
     /// The only metadata key: with two, the order of bytes would change from run to run.
@@ -86,7 +83,7 @@ pub fn checksum<'a, S: Scalar>(numbers: impl IntoIterator<Item = &'a S>, precisi
 ///
 /// # Errors
 /// [`ContainerError::Header`] or [`ContainerError::NotSafetensors`] for what cannot be written.
-pub fn pack(kind: &Kind, header: &impl Serialize, mut tensors: Vec<Tensor>) -> Result<Vec<u8>, ContainerError> {
+pub fn pack(kind: &FileKind, header: &impl Serialize, mut tensors: Vec<Tensor>) -> Result<Vec<u8>, ContainerError> {
     // The payload in the file is in safetensors' own order.
     tensors.sort_by(|a, b| b.dtype.cmp(&a.dtype).then_with(|| a.name.cmp(&b.name)));
     let text = serde_json::to_string(header).map_err(|e| ContainerError::Header(e.to_string()))?;
@@ -107,7 +104,7 @@ pub fn pack(kind: &Kind, header: &impl Serialize, mut tensors: Vec<Tensor>) -> R
 ///
 /// # Errors
 /// [`ContainerError`] for anything but a whole, undamaged file of this kind and format.
-pub fn unpack<'a, H: DeserializeOwned>(kind: &Kind, bytes: &'a [u8]) -> Result<(H, Tensors<'a>), ContainerError> {
+pub fn unpack<'a, H: DeserializeOwned>(kind: &FileKind, bytes: &'a [u8]) -> Result<(H, Tensors<'a>), ContainerError> {
     check_container(bytes)?;
     let (start, metadata) = SafeTensors::read_metadata(bytes).map_err(damaged)?;
     let foreign = || ContainerError::Foreign { kind: kind.name, key: kind.key };
@@ -208,7 +205,7 @@ fn check_container(bytes: &[u8]) -> Result<(), ContainerError> {
 }
 
 /// The description, its version and checksum tested first.
-fn read_header<H: DeserializeOwned>(kind: &Kind, text: &str, payload: &[u8]) -> Result<H, ContainerError> {
+fn read_header<H: DeserializeOwned>(kind: &FileKind, text: &str, payload: &[u8]) -> Result<H, ContainerError> {
     /// Part that every version of the format has.
     #[derive(Deserialize)]
     struct Version {
@@ -236,4 +233,184 @@ fn read_header<H: DeserializeOwned>(kind: &Kind, text: &str, payload: &[u8]) -> 
     let body = format!("{body}}}");
     check_unambiguous(body.as_bytes()).map_err(malformed)?;
     serde_json::from_str(&body).map_err(malformed)
+}
+
+/// Why a model file, or another file of the same make, could not be written or read.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum ContainerError {
+    /// Missing, not a regular file, too large, or refused by the system.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// The file could not be written; what stood there before still does.
+    #[error("cannot write: {0}")]
+    Write(std::io::Error),
+    /// Not a safetensors file, or one that is cut off or damaged in its structure.
+    #[error("not a whole safetensors file: {0}")]
+    NotSafetensors(String),
+    /// A safetensors file of another program or purpose.
+    #[error("a safetensors file, but not of an lnn {kind} (no {key:?} metadata)")]
+    Foreign {
+        /// Expected kind, such as a model.
+        kind: &'static str,
+        /// Its metadata key.
+        key: &'static str,
+    },
+    /// Written by a later version.
+    #[error("written by lnn {writer} in format {found}; lnn {reader} reads format {supported}")]
+    Version {
+        /// Version of the crate that wrote the file.
+        writer: String,
+        /// Format of the file.
+        found: u32,
+        /// Version of this crate.
+        reader: &'static str,
+        /// Format that this crate reads.
+        supported: u32,
+    },
+    /// Bytes changed since the file was written.
+    #[error("damaged: checksum {found:08x}, expected {expected:08x}")]
+    Checksum {
+        /// Checksum in the file.
+        expected: u32,
+        /// Checksum of its bytes.
+        found: u32,
+    },
+    /// The description makes no sense.
+    #[error("description: {0}")]
+    Header(String),
+    /// A tensor that the architecture asks for is not there.
+    #[error("tensor {0} is missing")]
+    MissingTensor(String),
+    /// A tensor that the architecture does not know.
+    #[error("tensor {0} does not belong to this architecture")]
+    ExtraTensor(String),
+    /// A tensor has another number type than the description says.
+    #[error("tensor {name}: expected {expected}, found {found}")]
+    WrongType {
+        /// Name of the tensor.
+        name: String,
+        /// Type by the description.
+        expected: &'static str,
+        /// Type in the file.
+        found: String,
+    },
+    /// A tensor has another shape than the architecture says.
+    #[error("tensor {name}: expected shape {expected:?}, found {found:?}")]
+    WrongShape {
+        /// Name of the tensor.
+        name: String,
+        /// Shape by the architecture.
+        expected: Vec<usize>,
+        /// Shape in the file.
+        found: Vec<usize>,
+    },
+    /// A weight is infinite or not a number.
+    #[error("tensor {name}: number {index} is not finite")]
+    NotFinite {
+        /// Name of the tensor.
+        name: String,
+        /// Index in the tensor, row-major from 0.
+        index: usize,
+    },
+    /// The number of weights is not that of the architecture.
+    #[error("expected {expected} weights, found {found}")]
+    WrongLength {
+        /// By the architecture.
+        expected: usize,
+        /// Given.
+        found: usize,
+    },
+}
+
+/// Any JSON value in which no object names a key twice.
+struct Unambiguous;
+
+/// Checks that no object in `text` names a key twice, at any depth.
+fn check_unambiguous(text: &[u8]) -> Result<(), serde_json::Error> {
+    serde_json::from_slice::<Unambiguous>(text).map(|_| ())
+}
+
+impl<'de> Deserialize<'de> for Unambiguous {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(Unambiguous)
+    }
+}
+
+impl<'de> Visitor<'de> for Unambiguous {
+    type Value = Self;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("JSON")
+    }
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Self, A::Error> {
+        let mut seen = HashSet::new();
+        while let Some(key) = map.next_key::<String>()? {
+            if seen.contains(&key) {
+                return Err(serde::de::Error::custom(format_args!("duplicate key {key:?}")));
+            }
+            map.next_value::<Unambiguous>()?;
+            seen.insert(key);
+        }
+        Ok(self)
+    }
+    fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<Self, A::Error> {
+        while seq.next_element::<Unambiguous>()?.is_some() {}
+        Ok(self)
+    }
+    fn visit_bool<E>(self, _: bool) -> Result<Self, E> {
+        Ok(self)
+    }
+    fn visit_i64<E>(self, _: i64) -> Result<Self, E> {
+        Ok(self)
+    }
+    fn visit_u64<E>(self, _: u64) -> Result<Self, E> {
+        Ok(self)
+    }
+    fn visit_f64<E>(self, _: f64) -> Result<Self, E> {
+        Ok(self)
+    }
+    fn visit_str<E>(self, _: &str) -> Result<Self, E> {
+        Ok(self)
+    }
+    fn visit_unit<E>(self) -> Result<Self, E> {
+        Ok(self)
+    }
+}
+
+/// Number type of stored numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum StoredPrecision {
+    /// Single precision.
+    F32,
+    /// Double precision.
+    F64,
+}
+
+impl StoredPrecision {
+    /// That of a number type, if files know it.
+    pub(crate) fn of<S: Scalar>() -> Option<Self> {
+        [Self::F32, Self::F64].into_iter().find(|precision| precision.name() == S::NAME)
+    }
+    /// `"f32"` or `"f64"`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::F32 => "f32",
+            Self::F64 => "f64",
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::check_unambiguous;
+
+    #[test]
+    fn duplicates_are_found_at_any_depth() {
+        assert!(check_unambiguous(br#"{"a": [1, -2.5, null, true, "x", {"b": {}}], "b": 1}"#).is_ok());
+        assert!(check_unambiguous(br#"{"a": 1, "a": 2}"#).is_err());
+        assert!(check_unambiguous(br#"{"c": [{"a": 1, "\u0061": 2}]}"#).is_err());
+        assert!(check_unambiguous("[".repeat(100_000).as_bytes()).is_err());
+    }
 }

@@ -1,6 +1,6 @@
 //! The second-order contraction of a block: `M_ij += sum over units of k x_i x_j`, `c_i += sum of k x_i x_drift`, state by state.
 
-use super::Second;
+use super::SecondOrder;
 use crate::scalar::{Scalar, Simd, WithSimd};
 
 /// Tangents that are weighted together.
@@ -86,7 +86,7 @@ impl<S: Scalar> Contraction<'_, S> {
             for r in 0..R {
                 if row + r <= column + o {
                     let (i, j) = (self.velocities[row + r] - 1, self.velocities[column + o] - 1);
-                    self.mass[Second::<S>::pair(self.n, i, j) * self.lanes + lane] += sums[o][r];
+                    self.mass[SecondOrder::<S>::pair(self.n, i, j) * self.lanes + lane] += sums[o][r];
                 }
             }
         }

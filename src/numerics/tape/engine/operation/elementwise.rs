@@ -4,8 +4,8 @@ use super::{Forward, MixedForward, MixedReverse, Reverse};
 use crate::ops::Unary;
 use crate::scalar::{Real, Scalar, update2, update3, vectorized};
 use crate::tape::engine::Depth;
-use crate::tape::engine::jets::jets;
-use crate::tape::engine::value::{Kind, Mixed};
+use crate::tape::engine::kernel::jets;
+use crate::tape::engine::value::{Dependence, Mixed};
 
 /// `f(x)`, unit by unit.
 #[derive(Clone, Copy, Debug)]
@@ -44,7 +44,7 @@ impl Elementwise {
     }
 
     pub fn forward<S: Scalar>(self, out: usize, sweep: &mut Forward<'_, S>) {
-        let (lanes, moves) = (sweep.store.lanes, sweep.values[self.x].kind == Kind::Velocity);
+        let (lanes, moves) = (sweep.store.lanes, sweep.values[self.x].kind == Dependence::Velocity);
         let size = self.units * lanes;
         let order = match sweep.depth {
             Depth::Value => 0,
@@ -82,7 +82,7 @@ impl Elementwise {
             #[inline(always)]
             || update2(target, adjoint, d1, |sum, a, d1| *sum = if in_place { a * d1 } else { *sum + a * d1 }),
         );
-        if sweep.depth < Depth::MassMatrix || sweep.kept.values[self.x].kind != Kind::Velocity {
+        if sweep.depth < Depth::MassMatrix || sweep.kept.values[self.x].kind != Dependence::Velocity {
             return;
         }
         if self.units == 1 {

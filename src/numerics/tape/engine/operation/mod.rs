@@ -1,4 +1,4 @@
-//! Operations of a recorded Lagrangian: each in one file, with its rules.
+//! Operations of a recorded Lagrangian, each with its rules.
 //!
 //! With `y = phi(x)`, adjoints `A = dL/dy`, mixed channels `y[s]`, `y[t]`, `y[st]` and their adjoints `B`:
 //!
@@ -15,25 +15,18 @@ mod contraction;
 mod dense;
 mod elementwise;
 mod function;
-mod gather;
-mod input;
 mod linear;
-mod product;
 
-use contraction::{Contraction, ROWS};
 pub(super) use dense::Dense;
 pub(super) use elementwise::Elementwise;
-pub(super) use function::{Function, PARTIALS};
-pub(super) use gather::Gather;
-pub(super) use gather::Select;
-pub(super) use input::Input;
-pub(super) use linear::Combination;
-pub(super) use product::Product;
+pub(super) use function::{Function, PARTIALS, Product};
+pub(super) use linear::{Combination, Gather, Input, Select};
 
 use super::kernel::{add_product, add_product3};
-use super::value::{Kind, Mixed, Order, Store, Value, View};
+use super::value::{Dependence, Mixed, Order, Store, Value, View};
 use super::{Depth, MixedDirections};
 use crate::scalar::{Real, Scalar, in_vectors};
+use contraction::{Contraction, ROWS};
 
 /// An operation; operands are values before it.
 #[derive(Clone, Debug)]
@@ -105,7 +98,7 @@ pub(super) struct Reverse<'a, S> {
     /// `dL/dy` of every value.
     pub adjoints: Store<'a, S>,
     pub depth: Depth,
-    pub second: &'a mut Second<S>,
+    pub second: &'a mut SecondOrder<S>,
 }
 
 /// Data of the mixed sweep.
@@ -182,7 +175,7 @@ impl<S: Scalar> MixedReverse<'_, S> {
     /// `true` if adjoints of a value lead to anything asked for.
     pub fn wants(&self, value: usize) -> bool {
         let value = &self.kept.values[value];
-        value.trainable || (self.inputs.is_some() && value.kind != Kind::Constant)
+        value.trainable || (self.inputs.is_some() && value.kind != Dependence::Constant)
     }
     pub fn channels(&self, value: usize) -> Mixed {
         self.kept.values[value].mixed(self.order)
@@ -191,7 +184,7 @@ impl<S: Scalar> MixedReverse<'_, S> {
 
 /// Second derivatives while they are gathered: planes of one number per state.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Second<S> {
+pub(super) struct SecondOrder<S> {
     pub n: usize,
     pub lanes: usize,
     /// `M_ij`, `i <= j`, row after row of the triangle.
@@ -202,7 +195,7 @@ pub(super) struct Second<S> {
     along: Vec<S>,
 }
 
-impl<S: Scalar> Second<S> {
+impl<S: Scalar> SecondOrder<S> {
     /// Empties the sums for a chunk.
     pub fn start(&mut self, n: usize, lanes: usize, drift: bool) {
         (self.n, self.lanes) = (n, lanes);

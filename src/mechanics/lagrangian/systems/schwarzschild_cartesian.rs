@@ -1,6 +1,0 @@
-//! Free fall into a black hole without charge and spin, in Cartesian Kerr-Schild coordinates.
-
-pub use super::kerr_schild::KerrSchild;
-
-/// Catalogue entry.
-pub const SYSTEM: crate::lagrangian::system::System = super::kerr_schild::system(KerrSchild::Schwarzschild);

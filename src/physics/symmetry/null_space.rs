@@ -1,0 +1,547 @@
+//! Null vectors of a matrix: how many singular values count as zero, and the simplest vectors that span the space.
+
+use super::{Basis, Chart, Degrees, EXACT, Symmetries, SymmetryError, symmetries};
+use crate::lagrangian::EulerLagrange;
+use crate::linalg::{MatMut, MatRef, Workspace, gemm, solve};
+use serde::Serialize;
+
+/// Singular values cut into those that count as zero and the others.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Separation {
+    /// Number of values that count as zero; `None` if there is no gap.
+    pub count: Option<usize>,
+    /// Ratio of the first value that does not count as zero to the last that does, or to the tolerance if none does; `None` if
+    /// all values are zero.
+    pub gap: Option<f64>,
+}
+
+/// Values below which a function may be meant to be zero, when nothing is known of the noise: a part in ten of what it would
+/// be without a symmetry.
+const SMALL: f64 = 0.1;
+/// Least gap by which values are distinguished when nothing is known of the noise.
+const APART: f64 = 10.0;
+/// Noise that a model has at the least: smaller values are not distinguished.
+const NOISE: f64 = 1e-3;
+/// Least gap above a known noise.
+const ABOVE: f64 = 30.0;
+/// Tolerances by which values can be judged: from the rounding of a number near 1 to the part below which a function may be
+/// meant to be zero.
+pub(crate) const TOLERANCES: [f64; 2] = [f64::EPSILON, SMALL];
+
+/// Refuses a tolerance that is none of [`TOLERANCES`].
+///
+/// # Errors
+/// [`SymmetryError::Tolerance`].
+pub(crate) fn check(tolerance: Option<f64>) -> Result<(), SymmetryError> {
+    let [least, most] = TOLERANCES;
+    match tolerance {
+        Some(found) if !(least..=most).contains(&found) => Err(SymmetryError::Tolerance { found, least, most }),
+        _ => Ok(()),
+    }
+}
+
+impl Separation {
+    /// Cuts ascending values at a tolerance, the noise of exact terms, or, without one, at the largest gap.
+    ///
+    /// With a tolerance the first value above it must exceed the last below it 30 times, and the tolerance itself three
+    /// times. Without one, values above 0.1 are not zero, and the cut is where the ratio of neighbours is largest, 10 at
+    /// least, values below 1e-3 taken as that. Otherwise there is no gap and no count.
+    pub(crate) fn new(values: &[f64], tolerance: Option<f64>) -> Self {
+        // Nothing is smaller than the rounding of a number near 1.
+        let floor = f64::EPSILON;
+        let ratio = |k: usize, below: f64| values.get(k).map(|above| above / below.max(floor));
+        match tolerance {
+            Some(tolerance) => {
+                let count = values.iter().take_while(|value| **value <= tolerance).count();
+                let gap = ratio(count, if count == 0 { tolerance } else { values[count - 1] });
+                let least = if count == 0 { 3.0 } else { ABOVE };
+                let clear = gap.is_none_or(|gap| gap >= least) && ratio(count, tolerance).is_none_or(|r| r >= 3.0);
+                Self { count: clear.then_some(count), gap }
+            }
+            None => {
+                let small = values.iter().take_while(|value| **value < SMALL).count();
+                let cuts = (1..=small).filter_map(|k| Some((k, ratio(k, values[k - 1].max(NOISE))?)));
+                match cuts.max_by(|a, b| a.1.total_cmp(&b.1)) {
+                    None => Self { count: Some(small), gap: ratio(0, SMALL) },
+                    Some((k, apart)) => Self { count: (apart >= APART).then_some(k), gap: ratio(k, values[k - 1]) },
+                }
+            }
+        }
+    }
+}
+
+/// The bases in which symmetries are sought: the one of these degrees, or the usual one; of a model, whose errors hide symmetries
+/// among many functions, also those of lower powers.
+pub fn bases(names: &[String], charts: &[Chart], degrees: Option<Degrees>, exact: bool) -> Vec<(Basis, Degrees)> {
+    if let Some(degrees) = degrees {
+        return vec![(Basis::new(names, charts, degrees), degrees)];
+    }
+    let (basis, highest) = Basis::usual(names, charts);
+    let mut all = vec![(basis, highest)];
+    if !exact {
+        for polynomial in (0..highest.polynomial).rev() {
+            let degrees = Degrees { polynomial, ..highest };
+            let lower = Basis::new(names, charts, degrees);
+            if lower.len() > 1 && all.last().is_some_and(|(last, _)| lower.len() < last.len()) {
+                all.push((lower, degrees));
+            }
+        }
+    }
+    all
+}
+
+/// States that are looked at for so many unknown coefficients, of a Lagrangian that is written down or of a model.
+pub fn enough(unknowns: usize, exact: bool) -> usize {
+    (2 * unknowns).max(if exact { 400 } else { 1000 })
+}
+
+/// Point symmetries: in the basis that shows the most of them, of such in the one with the widest gap; `tolerance` as in
+/// [`symmetries`], [`EXACT`] of exact terms if there is none.
+///
+/// # Errors
+/// [`SymmetryError`].
+pub fn most_symmetries(
+    model: &dyn EulerLagrange<f64>,
+    bases: Vec<(Basis, Degrees)>,
+    (q, v): (&[f64], &[f64]),
+    (tolerance, exact): (Option<f64>, bool),
+) -> Result<(Symmetries, Degrees), SymmetryError> {
+    let tolerance = tolerance.or(exact.then_some(EXACT));
+    let mut best: Option<(Symmetries, Degrees)> = None;
+    for (basis, degrees) in bases {
+        let found = symmetries(model, &basis, (q, v), tolerance)?;
+        let rank = |found: &Symmetries| (found.separation.count, found.separation.gap.unwrap_or(f64::INFINITY));
+        if best.as_ref().is_none_or(|(best, _)| rank(&found) > rank(best)) {
+            best = Some((found, degrees));
+        }
+    }
+    best.ok_or(SymmetryError::Basis { expected: model.coordinates(), found: 0 })
+}
+
+/// Brings `rows` into reduced echelon form, in place: every row has a pivot 1, which the others have 0.
+///
+/// Columns are weighed by `sizes`, those of the functions whose coefficients they are; early columns are preferred as pivots,
+/// as long as their entry is not much smaller than the largest that is left. What is below `noise` of the largest weighed entry of
+/// its row becomes 0. Rows are ordered by their pivots. The first `fixed` rows take part before the others. Entries beyond the
+/// weighed columns are carried along.
+///
+/// Returns the pivot of every row.
+pub(crate) fn reduce(rows: &mut [Vec<f64>], sizes: &[f64], noise: f64, fixed: usize) -> Vec<usize> {
+    let mut pivots: Vec<usize> = Vec::new();
+    for done in 0..rows.len() {
+        let candidates = done..if done < fixed { fixed } else { rows.len() };
+        for row in &mut rows[candidates.clone()] {
+            let largest = row.iter().zip(sizes).fold(0.0, |m: f64, (x, s)| m.max((x * s).abs()));
+            if largest > 0.0 {
+                row.iter_mut().for_each(|x| *x /= largest);
+            }
+        }
+        let best = |column: usize| {
+            let entries = candidates.clone().map(|k| (k, (rows[k][column] * sizes[column]).abs()));
+            entries.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((done, 0.0))
+        };
+        let Some(column) = (0..sizes.len()).find(|&column| best(column).1 > 0.3) else { break };
+        let row = best(column).0;
+        rows.swap(done, row);
+        let pivot = rows[done].clone();
+        for (k, row) in rows.iter_mut().enumerate() {
+            if k == done {
+                let unit = pivot[column];
+                row.iter_mut().for_each(|x| *x /= unit);
+            } else {
+                let share = row[column] / pivot[column];
+                row.iter_mut().zip(&pivot).for_each(|(x, p)| *x -= share * p);
+                row[column] = 0.0;
+            }
+        }
+        pivots.push(column);
+    }
+    for (row, &pivot) in rows.iter_mut().zip(&pivots) {
+        let largest = row.iter().zip(sizes).fold(0.0, |m: f64, (x, s)| m.max((x * s).abs()));
+        for (x, size) in row.iter_mut().zip(sizes) {
+            if (*x * size).abs() < noise * largest {
+                *x = 0.0;
+            }
+        }
+        let unit = row[pivot];
+        if unit != 0.0 {
+            row.iter_mut().for_each(|x| *x /= unit);
+        }
+    }
+    let fixed = fixed.min(rows.len());
+    let order = |row: &Vec<f64>| row.iter().position(|x| *x != 0.0);
+    rows[..fixed].sort_by_key(order);
+    rows[fixed..].sort_by_key(order);
+    let pivot = |k: usize| {
+        let lone = |column: &usize| rows.iter().enumerate().all(|(l, row)| row[*column] == f64::from(u8::from(k == l)));
+        (0..sizes.len()).find(lone)
+    };
+    (0..rows.len()).filter_map(pivot).collect()
+}
+
+/// Orthonormal columns and how they are made of those that were kept.
+#[derive(Clone, Debug)]
+pub(crate) struct Orthonormal {
+    /// The columns, each of length 1.
+    pub columns: Vec<Vec<f64>>,
+    /// Places of the columns that were kept among those given.
+    pub kept: Vec<usize>,
+    /// Orthonormal column `k` is the sum of `mix[k][j]` times the kept column `j`, `j <= k`.
+    pub mix: Vec<Vec<f64>>,
+}
+
+/// Gram-Schmidt, twice for every column. A column counts as dependent if less than `least` of its length is left.
+pub(crate) fn orthonormal(given: &[Vec<f64>], least: f64) -> Orthonormal {
+    let mut result = Orthonormal { columns: Vec::new(), kept: Vec::new(), mix: Vec::new() };
+    for (place, column) in given.iter().enumerate() {
+        let length = norm(column);
+        let (mut rest, mut shares) = (column.clone(), vec![0.0; result.columns.len()]);
+        for _ in 0..2 {
+            for (share, known) in shares.iter_mut().zip(&result.columns) {
+                let along = dot(known, &rest);
+                *share += along;
+                add(&mut rest, known, -along);
+            }
+        }
+        let left = norm(&rest);
+        // A column of zeros has nothing to give.
+        if left <= least * length {
+            continue;
+        }
+        let mut mix = vec![0.0; result.columns.len() + 1];
+        for (share, known) in shares.iter().zip(&result.mix) {
+            mix.iter_mut().zip(known).for_each(|(sum, x)| *sum -= share * x);
+        }
+        mix[result.columns.len()] = 1.0;
+        mix.iter_mut().for_each(|x| *x /= left);
+        rest.iter_mut().for_each(|x| *x /= left);
+        result.columns.push(rest);
+        result.kept.push(place);
+        result.mix.push(mix);
+    }
+    result
+}
+
+impl Orthonormal {
+    /// The columns of the kept `given`, mixed as the orthonormal ones are.
+    pub fn mixed(&self, given: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        let one = |mix: &Vec<f64>| {
+            let mut sum = vec![0.0; given.first().map_or(0, Vec::len)];
+            mix.iter().zip(&self.kept).for_each(|(x, &place)| add(&mut sum, &given[place], *x));
+            sum
+        };
+        self.mix.iter().map(one).collect()
+    }
+
+    /// Coefficients of the columns that were given, `(given)`, from those of the orthonormal ones.
+    pub fn given(&self, coefficients: &[f64], given: usize) -> Vec<f64> {
+        let mut result = vec![0.0; given];
+        for (x, mix) in coefficients.iter().zip(&self.mix) {
+            mix.iter().zip(&self.kept).for_each(|(m, &place)| result[place] += x * m);
+        }
+        result
+    }
+
+    /// Coefficients of the orthonormal columns that come closest to a column.
+    pub fn along(&self, column: &[f64]) -> Vec<f64> {
+        self.columns.iter().map(|known| dot(known, column)).collect()
+    }
+
+    /// Takes what lies along the orthonormal columns out of a column.
+    pub fn remove(&self, column: &mut [f64]) {
+        for _ in 0..2 {
+            for known in &self.columns {
+                let along = dot(known, column);
+                add(column, known, -along);
+            }
+        }
+    }
+}
+
+/// Sum of products.
+pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    // Eight sums, which a compiler makes vectors of.
+    let mut sums = [0.0; 8];
+    let (a8, a1) = a.as_chunks::<8>();
+    let (b8, b1) = b.as_chunks::<8>();
+    for (a, b) in a8.iter().zip(b8) {
+        for l in 0..8 {
+            sums[l] += a[l] * b[l];
+        }
+    }
+    sums.iter().sum::<f64>() + a1.iter().zip(b1).map(|(a, b)| a * b).sum::<f64>()
+}
+
+/// Euclidean length.
+pub(crate) fn norm(a: &[f64]) -> f64 {
+    dot(a, a).sqrt()
+}
+
+/// `a += factor b`.
+pub(crate) fn add(a: &mut [f64], b: &[f64], factor: f64) {
+    a.iter_mut().zip(b).for_each(|(a, b)| *a += factor * b);
+}
+
+/// Parts of the largest entry below which entries are tried without, one after the other.
+const NEGLIGIBLE: [f64; 4] = [1e-4, 1e-5, 1e-6, 1e-7];
+/// Residual of the null vector of few entries, in units of the one it replaces and of `1/NEGLIGIBLE` roundings.
+const WORSE: f64 = 10.0;
+
+/// Replaces a null vector of columns by one without its small entries, if that is one too.
+///
+/// `column` gives the column of an entry of `vector`; `sizes` are those of the functions that they belong to. The largest entry keeps
+/// its value, the other large ones follow by least squares. The new vector is taken if the residual, over that of all entries one by
+/// one, is below ten times `noise` or below 1e-9: whatever it leaves out was noise. Once more, as long as that leaves out more: what was
+/// large before a fit may be small after it.
+pub(crate) fn refine(vector: &mut [f64], column: &dyn Fn(usize) -> Vec<f64>, sizes: &[f64], noise: f64) {
+    let entries = |vector: &[f64]| vector.iter().filter(|x| **x != 0.0).count();
+    loop {
+        let before = entries(vector);
+        refine_once(vector, column, sizes, noise);
+        if entries(vector) == before {
+            return;
+        }
+    }
+}
+
+fn refine_once(vector: &mut [f64], column: &dyn Fn(usize) -> Vec<f64>, sizes: &[f64], noise: f64) {
+    let weighed: Vec<f64> = vector.iter().zip(sizes).map(|(x, s)| (x * s).abs()).collect();
+    let largest = weighed.iter().fold(0.0, |m: f64, x| m.max(*x));
+    let mut before = 0;
+    for small in NEGLIGIBLE {
+        let mut support: Vec<usize> = (0..vector.len()).filter(|k| weighed[*k] > small * largest).collect();
+        let Some(pivot) = support.iter().copied().max_by(|a, b| weighed[*a].total_cmp(&weighed[*b])) else { return };
+        support.retain(|k| *k != pivot);
+        // The same entries would be refused again.
+        if small < NEGLIGIBLE[0] && support.len() == before {
+            continue;
+        }
+        before = support.len();
+        if let Some(solution) = fitted(vector[pivot], &column(pivot), &support, column, noise) {
+            let kept = vector[pivot];
+            vector.fill(0.0);
+            vector[pivot] = kept;
+            support.into_iter().zip(solution).for_each(|(place, x)| vector[place] = x);
+            return;
+        }
+    }
+}
+
+/// Entries of `support` that take `value` times the pivot's column to zero, if they do.
+fn fitted(
+    value: f64,
+    pivot: &[f64],
+    support: &[usize],
+    column: &dyn Fn(usize) -> Vec<f64>,
+    noise: f64,
+) -> Option<Vec<f64>> {
+    let columns: Vec<Vec<f64>> = support.iter().map(|k| column(*k)).collect();
+    let target: Vec<f64> = pivot.iter().map(|x| -value * x).collect();
+    let plain = orthonormal(&columns, 1e-10);
+    let mut solution = plain.given(&plain.along(&target), support.len());
+    let mut rest = target.clone();
+    let mut whole = norm(&target).powi(2);
+    for (x, column) in solution.iter().zip(&columns) {
+        add(&mut rest, column, -x);
+        whole += (x * norm(column)).powi(2);
+    }
+    let whole = whole.sqrt();
+    if whole > 0.0 && norm(&rest) > (WORSE * noise).max(1e-9) * whole {
+        return None;
+    }
+    let parts: Vec<f64> = solution.iter().zip(&columns).map(|(x, column)| (x * norm(column)).abs()).collect();
+    let last = parts.iter().fold(0.0, |m: f64, part| m.max(*part));
+    for (x, part) in solution.iter_mut().zip(&parts) {
+        if *part <= 1e-10 * last {
+            *x = 0.0;
+        }
+    }
+    Some(solution)
+}
+
+/// What a column explains below so many standard errors is chance.
+const CERTAIN: f64 = 3.0;
+
+/// Coefficients of the least-squares fit of columns to a target, 0 for those that the fit does not know: columns that explain no more beside
+/// those before them than chance does are left out and the others fitted again, as long as the rest grows no more than by chance.
+pub(crate) fn significant(columns: &[Vec<f64>], target: &[f64], dependent: f64) -> Vec<f64> {
+    let mut support: Vec<usize> = (0..columns.len()).collect();
+    let mut found: Option<(Vec<f64>, f64)> = None;
+    loop {
+        let own: Vec<Vec<f64>> = support.iter().map(|k| columns[*k].clone()).collect();
+        let plain = orthonormal(&own, dependent);
+        let mut rest = target.to_vec();
+        let along = plain.along(target);
+        plain.remove(&mut rest);
+        let free = target.len().saturating_sub(plain.columns.len()).max(1) as f64;
+        let square = dot(&rest, &rest) / free;
+        // What was left out explained no more than as many columns of noise do.
+        let left_out = (columns.len() - support.len()) as f64;
+        if let Some((before, least)) = &found
+            && square > least * (1.0 + CERTAIN * (2.0 * left_out).sqrt() / free)
+        {
+            return before.clone();
+        }
+        let solution = plain.given(&along, support.len());
+        let mut all = vec![0.0; columns.len()];
+        support.iter().zip(&solution).for_each(|(k, x)| all[*k] = *x);
+        let least = found.map_or(square, |(_, least)| least);
+        found = Some((all.clone(), least));
+        let known = plain.kept.iter().zip(&along).filter(|(_, along)| along.abs() > CERTAIN * square.sqrt());
+        let kept: Vec<usize> = known.map(|(k, _)| support[*k]).collect();
+        if kept.len() == support.len() {
+            return all;
+        }
+        support = kept;
+    }
+}
+
+/// `A^T A` of a matrix `A` that is given by its columns, row-major.
+pub(crate) fn gram(columns: &[Vec<f64>]) -> Vec<f64> {
+    let (count, rows) = (columns.len(), columns.first().map_or(0, Vec::len));
+    let all = columns.concat();
+    let mut product = vec![0.0; count * count];
+    let a = MatRef::new(&all, count, rows);
+    gemm(MatMut::new(&mut product, count, count), false, 1.0, a, a.t());
+    product
+}
+
+/// Steps of [`sparsest`].
+const STEPS: usize = 12;
+/// Part of the largest entry that counts as zero in the end.
+const NOTHING: f64 = 2e-3;
+/// Price of an entry, in units of the squared noise.
+const PRICE: f64 = 0.3;
+/// Growth of the residual that few entries are worth.
+const WORTH: f64 = 2.0;
+
+/// The vector of fewest entries near `start` that solves `A x = 0` to about `noise`, where `gram` is `A^T A`; `None` if it is
+/// solved less well than twice as badly.
+///
+/// `x^T A^T A x` is minimised beside a price for entries `sum of (s x)^2/((s x)^2 + d^2)`, reweighted with `d` falling, `s` being the
+/// `sizes` of the entries; the entry `pivot` is kept, the `taken` ones stay 0 (reweighted least squares, Chartrand and Yin 2008).
+pub(crate) fn sparsest(
+    gram: &[f64],
+    start: &[f64],
+    sizes: &[f64],
+    pivot: usize,
+    taken: &[bool],
+    noise: f64,
+) -> Option<Vec<f64>> {
+    let count = start.len();
+    let residual = |x: &[f64]| -> f64 {
+        let rows = x.iter().enumerate().filter(|(_, x)| **x != 0.0);
+        rows.map(|(i, xi)| xi * dot(&gram[i * count..(i + 1) * count], x)).sum::<f64>().max(0.0)
+    };
+    let mut x = start.to_vec();
+    // A field of unit size changes L by the noise.
+    let size = x.iter().zip(sizes).fold(0.0, |m: f64, (x, s)| m.max((x * s).abs()));
+    let price = PRICE * residual(start).max((noise * size).powi(2) * 1e-2).max(f64::MIN_POSITIVE);
+    let mut active: Vec<usize> = (0..count).filter(|k| *k != pivot && !taken[*k]).collect();
+    let mut workspace = Workspace::new();
+    for step in 0..STEPS {
+        let near = size * 0.5_f64.powi(step as i32);
+        let m = active.len();
+        if m == 0 {
+            break;
+        }
+        let mut matrix = vec![0.0; m * m];
+        for (a, i) in active.iter().enumerate() {
+            active.iter().enumerate().for_each(|(b, j)| matrix[a * m + b] = gram[i * count + j]);
+            matrix[a * m + a] += price * sizes[*i].powi(2) / ((x[*i] * sizes[*i]).powi(2) + near * near);
+        }
+        let side: Vec<f64> = active.iter().map(|i| -gram[i * count + pivot] * x[pivot]).collect();
+        let mut next = vec![0.0; m];
+        solve(m, &matrix, &side, &mut next, &mut workspace).ok()?;
+        let kept = x[pivot];
+        x.fill(0.0);
+        x[pivot] = kept;
+        active.iter().zip(next).for_each(|(i, value)| x[*i] = value);
+        let floor = (NOTHING * size).min(0.1 * near);
+        active.retain(|i| (x[*i] * sizes[*i]).abs() > floor);
+    }
+    for (x, s) in x.iter_mut().zip(sizes) {
+        if (*x * s).abs() <= NOTHING * size {
+            *x = 0.0;
+        }
+    }
+    let before = residual(start).max((noise * size).powi(2) * 1e-2);
+    (residual(&x) <= WORTH * WORTH * before).then_some(x)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn zeros_are_told_by_the_gap() {
+        let at = |values: &[f64], tolerance| Separation::new(values, tolerance);
+        let exact = Some(1e-8);
+        assert_eq!(at(&[1e-13, 1e-12, 0.01, 0.3], exact), Separation { count: Some(2), gap: Some(1e10) });
+        assert_eq!(at(&[0.02, 0.3], exact), Separation { count: Some(0), gap: Some(0.02 / 1e-8) });
+        assert_eq!(at(&[1e-14, 5e-9, 6e-9, 2e-8], exact).count, None);
+        assert_eq!(at(&[1e-16, 1e-17], exact), Separation { count: Some(2), gap: None });
+        assert_eq!(at(&[1e-4, 2e-3, 3e-3, 0.2], None).count, Some(3));
+        // Imposed symmetries beside learned ones.
+        assert_eq!(at(&[0.0, 1e-9, 2e-3, 0.05], None).count, Some(3));
+        // What two exact ones beside stand out from may still be noise.
+        assert_eq!(at(&[1e-6, 2e-6, 4e-3, 0.02], None).count, None);
+        assert_eq!(at(&[1e-3, 5e-3, 2e-2, 0.09], None).count, None);
+        assert_eq!(at(&[0.2, 0.3], None), Separation { count: Some(0), gap: Some(2.0) });
+        assert_eq!(at(&[], None).count, Some(0));
+    }
+
+    #[test]
+    fn rows_become_simple() {
+        // Combinations of (1, 0, 2, 0) and (0, 1, 0, -1), with rounding.
+        let mut rows = vec![vec![0.6, 0.8, 1.2, -0.8], vec![0.8, -0.6, 1.6, 0.6 + 1e-15]];
+        assert_eq!(reduce(&mut rows, &[1.0; 4], 1e-12, 0), [0, 1]);
+        let near = |row: &[f64], other: &[f64]| row.iter().zip(other).all(|(a, b)| (a - b).abs() < 1e-14);
+        assert!(near(&rows[0], &[1.0, 0.0, 2.0, 0.0]) && near(&rows[1], &[0.0, 1.0, 0.0, -1.0]), "{rows:?}");
+        assert_eq!((rows[0][1], rows[1][0], rows[1][2]), (0.0, 0.0, 0.0));
+    }
+
+    #[test]
+    fn few_entries_are_preferred() {
+        // a = b + c nearly, and a = d nearly: of a mixture that is mostly the latter, one entry is enough.
+        let columns = vec![
+            vec![1.0, 1.0, 0.0, 0.0],
+            vec![1.0, 0.0, 0.001, 0.0],
+            vec![0.0, 1.0, 0.001, 0.0],
+            vec![1.0, 1.0, 0.0, 0.001],
+        ];
+        let start = [1.0, -0.1, -0.1, -0.9];
+        let found = sparsest(&gram(&columns), &start, &[1.0; 4], 0, &[false; 4], 1e-3).unwrap();
+        assert!((found[3] + 1.0).abs() < 0.01 && found[1..3] == [0.0; 2], "{found:?}");
+        assert_eq!(found[0], 1.0);
+    }
+
+    #[test]
+    fn coefficients_that_a_fit_does_not_know_are_zero() {
+        // 3 a and noise that neither b, which is nearly a, nor c explains.
+        let wave = |rate: f64| (0..200).map(|k| (rate * f64::from(k)).sin()).collect::<Vec<f64>>();
+        let (a, c, noise) = (wave(0.1), wave(0.37), wave(2.3));
+        let b: Vec<f64> = a.iter().zip(wave(1.7)).map(|(a, x)| a + 1e-3 * x).collect();
+        let target: Vec<f64> = a.iter().zip(&noise).map(|(a, x)| 3.0 * a + 0.1 * x).collect();
+        let found = significant(&[a.clone(), b, c.clone()], &target, 1e-9);
+        assert!((found[0] - 3.0).abs() < 0.05 && found[1..] == [0.0; 2], "{found:?}");
+        // Of two that explain it together neither is left out.
+        let both: Vec<f64> = a.iter().zip(&c).map(|(a, c)| a - 0.5 * c).collect();
+        let found = significant(&[a, c], &both, 1e-9);
+        assert!((found[0] - 1.0).abs() < 1e-12 && (found[1] + 0.5).abs() < 1e-12, "{found:?}");
+    }
+
+    #[test]
+    fn noise_is_taken_out() {
+        // 2 a - b = 0; c is no part of it.
+        let columns = [vec![1.0, 2.0, 0.5], vec![2.0, 4.0, 1.0], vec![0.0, 1.0, 3.0]];
+        let mut vector = vec![2.0 + 1e-6, -1.0, 1e-6];
+        refine(&mut vector, &|k| columns[k].clone(), &[1.0; 3], 1e-6);
+        assert!((vector[0] / vector[1] + 2.0).abs() < 1e-14 && vector[2] == 0.0, "{vector:?}");
+        // An entry that is needed stays, small as it is.
+        let columns = [vec![1.0, 0.0, 0.0], vec![1.0, 0.0, 1e-5], vec![0.0, 0.0, 1.0]];
+        let mut vector = vec![1.0, -1.0, 1e-5];
+        refine(&mut vector, &|k| columns[k].clone(), &[1.0; 3], 1e-12);
+        assert_eq!(vector, [1.0, -1.0, 1e-5]);
+    }
+}
