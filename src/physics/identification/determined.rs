@@ -6,8 +6,9 @@ use super::solve::{Normal, Problem};
 use crate::lagrangian::system::Bounds;
 use crate::linalg::{Workspace, dot, eigh};
 
-/// Eigenvalue of the matrix of correlations below which the motion does not depend on a direction.
-const NULL: f64 = 1e-11;
+/// Eigenvalue of the matrix of correlations below which the motion does not depend on a direction: the ridge under the starts leaves about
+/// this much of one that is none.
+const NULL: f64 = 1e-8;
 /// Relative standard error from which on a direction is open.
 const OPEN: f64 = 1.0;
 /// Share of a direction below which a constant has no part in it.
