@@ -100,8 +100,8 @@ fn a_system_with_constraints_is_learned_on_them() {
     assert_eq!(json(&said.stdout)["constraints"][0]["formula"], "x^2 + y^2 - l^2");
     lnn(&["evaluate", &run, "--starts", "1", "--until", "0.5"]).succeeded();
     // What knows free coordinates only says so, and so does a second set of constraints.
-    lnn(&["symmetries", &run]).refused(2, &["constraints"]);
-    lnn(&["certify", &run]).refused(2, &["constraints"]);
+    lnn(&["symmetries", "--model", &run]).refused(2, &["constraints"]);
+    lnn(&["certify", "--model", &run]).refused(2, &["constraints"]);
     lnn(&["page", &run, "--out", &text(&folder.path("page.html"))]).refused(2, &["constraints"]);
     let roll = ["rollout", &run, "--state", "0.6,-0.8,0,0", "--t-end", "1", "--dt", "0.1", "--constraints", &file];
     lnn(&[&roll[..], &["--out", &text(&folder.path("two.csv"))]].concat()).refused(2, &["constraints of its own"]);
