@@ -20,7 +20,7 @@
 //! | [`library`] | using the Rust crate: features, your own Lagrangian, your own states, examples |
 //! | [`python`] | the Python package; models in JAX, PyTorch and numpy |
 //! | [`model_format`] | `model.safetensors`, readable without this crate |
-//! | [`results`] | accuracy on five systems, limits, time to accuracy, what made training exact, the paper's tables |
+//! | [`results`] | accuracy on five systems, limits, time to accuracy, what made training exact, the paper's tables and those of others |
 //! | [`accuracy`] | errors of the numerics, run time against error |
 //! | [`performance`] | times of training steps, evaluations and small matrices, beside PyTorch and JAX |
 //! | [`architecture`] | flow of data, modules, how to add a system, an operation, an integrator |
