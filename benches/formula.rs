@@ -5,18 +5,24 @@
 //! at half the noise, `--part tenth` with 10 runs at a third of the noise, `--part friction` with friction in the joints at half the noise,
 //! `--part forces` under known forces at 0.06, `--part clean` other systems without noise and with 1e-3, `--part cart-poles` a damped
 //! double cart-pole, `--part outside` systems that the library does not hold, `--part arms` recorded pendula of one, two and three arms (DynamicsLab, University
-//! of Washington), if `--arms DIRECTORY` or `../shared/data/multi-arm-pendulum` has their files. `--seeds 3` takes fewer seeds, `--only NAME`
-//! one system, `--show` prints the formulas. Everything is written to `target/formula/PART.csv` as well.
+//! of Washington), if `--arms DIRECTORY` or `../shared/data/multi-arm-pendulum` has their files, `--part metrics` metrics
+//! of networks that it trains by the preset `quick`. `--seeds 3` takes fewer seeds, `--only NAME`
+//! one system, `--show` prints the formulas. Everything is written to `target/formula/PART.csv` as well. Times are
+//! processor times.
 
 #[path = "formula/cases.rs"]
 mod cases;
 
-use cases::{CART_POLES, CLEAN, Case, FRICTION, OUTSIDE, POSITIONS, Recorded};
-use lnn::formula::{FormulaOptions, FoundFormula, Verdict, formula_of_motion};
+use cases::{CART_POLES, CLEAN, Case, FRICTION, METRICS, Metric, OUTSIDE, POSITIONS, Recorded};
+use lnn::formula::{FormulaOptions, FoundFormula, Verdict, formula_of_model, formula_of_motion};
+use lnn::lagrangian::configure;
+use lnn::presets::Preset;
 use lnn::recording::Columns;
 use lnn::recording::read::read_recording;
+use lnn::training::{Hooks, run as train};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 use std::path::{Path, PathBuf};
-use std::time::Instant;
 
 /// Outcome of one search.
 struct Outcome {
@@ -29,14 +35,13 @@ struct Outcome {
 }
 
 /// What a found formula is beside the truth, up to a common factor unless known forces give it.
-fn judge(case: &Case, found: &FoundFormula, scaled: bool) -> (bool, f64) {
+fn judge(truth: &[(&str, f64)], found: &FoundFormula, scaled: bool) -> (bool, f64) {
     let name = |t: &lnn::formula::FoundTerm| if t.dissipation { format!("D:{}", t.term) } else { t.term.clone() };
-    let pairs: Vec<Option<(f64, f64)>> = case
-        .truth
+    let pairs: Vec<Option<(f64, f64)>> = truth
         .iter()
         .map(|(term, truth)| found.terms.iter().find(|t| name(t) == *term).map(|t| (t.coefficient, *truth)))
         .collect();
-    let right = found.terms.len() == case.truth.len() && pairs.iter().all(Option::is_some);
+    let right = found.terms.len() == truth.len() && pairs.iter().all(Option::is_some);
     if !right {
         return (false, f64::NAN);
     }
@@ -45,15 +50,23 @@ fn judge(case: &Case, found: &FoundFormula, scaled: bool) -> (bool, f64) {
     (true, pairs.iter().map(|(c, truth)| (c * factor / truth - 1.0).abs()).fold(0.0, f64::max))
 }
 
+/// Processor time of this program so far, in s: user and system time of `/proc/self/stat`, in hundredths. 0 where there is none.
+fn processor_time() -> f64 {
+    let text = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
+    // The name, in parentheses, may hold blanks.
+    let fields = text.rsplit(')').next().unwrap_or_default().split_whitespace();
+    fields.skip(11).take(2).filter_map(|ticks| ticks.parse::<f64>().ok()).sum::<f64>() / 100.0
+}
+
 fn search(case: &Case, how: Recorded, show: bool) -> Outcome {
     let recording = case.record(how);
-    let started = Instant::now();
+    let started = processor_time();
     let mut options = case.options(how.seed);
     options.scale = None;
     match formula_of_motion(&recording, &options) {
         Ok(found) => {
-            let seconds = started.elapsed().as_secs_f64();
-            let (right, error) = judge(case, &found, how.force > 0.0);
+            let seconds = processor_time() - started;
+            let (right, error) = judge(case.truth, &found, how.force > 0.0);
             if show || (!right && !case.truth.is_empty()) {
                 println!("    L = {}", found.text(false));
                 if options.friction {
@@ -67,7 +80,7 @@ fn search(case: &Case, how: Recorded, show: bool) -> Outcome {
         }
         Err(error) => {
             println!("    {error}");
-            let seconds = started.elapsed().as_secs_f64();
+            let seconds = processor_time() - started;
             Outcome { right: false, verdict: Verdict::NotInLibrary, error: f64::NAN, residual: f64::NAN, seconds }
         }
     }
@@ -157,9 +170,16 @@ const TRIPLE: [(&str, f64); 9] = [
     ("cos(theta3)", -11.49),
 ];
 
+/// Eccentricity `e` and offset `d` of the encoders of the double arm, in rad, as the formula without them shows them: an arm stands at
+/// `theta - e cos(theta) + d` where they read `theta`. Then `theta1_dot^2/2` makes `e sin(theta1) theta1_dot^2`, and `c cos(theta1)` makes
+/// `c e/2 sin(2 theta1) - c d sin(theta1)`.
+const ENCODERS: [[f64; 2]; 2] = [[3.05e-3, -2.3e-3], [-1.0e-3, 0.0]];
+
 /// Formulas of recorded pendula, where their files are.
-fn arms(folder: &Path) {
-    for (name, n) in [("single", 1), ("double", 2), ("triple", 3)] {
+fn arms(folder: &Path, only: &str) {
+    let all: [(&str, usize, &[[f64; 2]]); 4] =
+        [("single", 1, &[]), ("double", 2, &[]), ("double", 2, &ENCODERS), ("triple", 3, &[])];
+    for (name, n, encoders) in all.into_iter().filter(|(name, ..)| name.contains(only)) {
         let path = folder.join(format!("{name}.csv"));
         if !path.exists() {
             println!("{}: not there", path.display());
@@ -172,17 +192,21 @@ fn arms(folder: &Path) {
         for track in &mut recording.tracks {
             let rows = track.q.chunks_exact(n).step_by(ARMS_EVERY);
             track.q = rows.flatten().copied().collect();
+            for row in track.q.chunks_exact_mut(n) {
+                row.iter_mut().zip(encoders).for_each(|(angle, [e, d])| *angle += d - e * angle.cos());
+            }
             track.times = track.times.iter().step_by(ARMS_EVERY).copied().collect();
         }
         recording.tracks.retain(|track| track.times.len() > 30);
-        let started = Instant::now();
+        let started = processor_time();
         let noise = Some(vec![ARMS_NOISE; n]);
         let options =
             FormulaOptions { friction: true, gyroscopic: false, noise, threads: 2, ..FormulaOptions::default() };
         let found = formula_of_motion(&recording, &options).expect("motion long enough");
-        let seconds = started.elapsed().as_secs_f64();
+        let seconds = processor_time() - started;
         println!(
-            "{name} arm, {} runs: {:?}, residual {:.3}, {seconds:.1} s",
+            "{name} arm{}, {} runs: {:?}, residual {:.3}, {seconds:.1} s",
+            if encoders.is_empty() { "" } else { ", encoders corrected" },
             recording.tracks.len(),
             found.verdict,
             found.residual
@@ -201,6 +225,54 @@ fn arms(folder: &Path) {
     }
 }
 
+/// States at which a model is asked.
+const STATES: usize = 1500;
+
+/// The metric of a network of the preset `quick` as a formula, for one seed.
+fn metric(case: &Metric, seed: u64, show: bool) {
+    let system = configure::<f64>(case.name, &[]).expect("a system of the catalogue");
+    let mut config = Preset::Quick.config(&system).expect("every system has a quick preset");
+    config.seed = seed;
+    let model = train::<f32>(&config, 2, &Hooks::default()).expect("a training").model.cast::<f64>();
+    let n = system.coordinates;
+    let (bounds, mut rng) = (system.system.validation(n), ChaCha8Rng::seed_from_u64(seed));
+    let mut draw = |sides: &[(f64, f64)]| -> Vec<f64> {
+        sides.iter().map(|&(low, high)| low + (high - low) * rng.random::<f64>()).collect()
+    };
+    let (mut q, mut v) = (Vec::new(), Vec::new());
+    while q.len() < STATES * n {
+        let (at, mut speed) = (draw(&bounds.positions), draw(&bounds.velocities));
+        if system.check_domain(&at).is_ok() && system.impose_constraint(&at, &mut speed).is_ok() {
+            q.extend(at);
+            v.extend(speed);
+        }
+    }
+    let coordinates = system.system.coordinates(n);
+    let names: Vec<String> = coordinates.iter().map(|c| c.name.to_string()).collect();
+    let periodic: Vec<bool> = coordinates.iter().map(|c| c.periodic).collect();
+    let options = FormulaOptions {
+        families: case.basis.parse().expect("families"),
+        functions: case.functions.iter().map(ToString::to_string).collect(),
+        gyroscopic: false,
+        seed,
+        ..FormulaOptions::default()
+    };
+    let started = processor_time();
+    let found = formula_of_model(&model, (&names, &periodic), (&q, &v), &options).expect("a library");
+    let (right, error) = judge(case.truth, &found, false);
+    println!(
+        "{:24} seed {seed}: right {right}, {:?}, constants within {:.3} %, residual {:.4}, {:.1} s",
+        case.name,
+        found.verdict,
+        100.0 * error,
+        found.residual,
+        processor_time() - started
+    );
+    if show || !right {
+        println!("    L = {}", found.text(false));
+    }
+}
+
 /// Everything once, at its smallest.
 pub fn trial() {
     let (case, _) = &POSITIONS[0];
@@ -216,14 +288,14 @@ fn main() {
     let mut arguments = std::env::args().skip(1);
     let (mut parts, mut seeds, mut only, mut show) = (PARTS.map(String::from).to_vec(), 10, String::new(), false);
     let mut folder_of_arms = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/data/multi-arm-pendulum");
-    parts.push("arms".into());
+    parts.extend(["arms", "metrics"].map(String::from));
     while let Some(argument) = arguments.next() {
         match argument.as_str() {
             "--bench" => {}
             "--show" => show = true,
             "--part" => {
-                let part = arguments.next().filter(|part| PARTS.contains(&part.as_str()) || part == "arms");
-                parts = vec![part.unwrap_or_else(|| panic!("--part: expected one of {}, arms", PARTS.join(", ")))];
+                let known = arguments.next().filter(|part| parts.contains(part));
+                parts = vec![known.unwrap_or_else(|| panic!("--part: expected one of {}", parts.join(", ")))];
             }
             "--seeds" => seeds = arguments.next().and_then(|n| n.parse().ok()).expect("--seeds: expected a number"),
             "--only" => only = arguments.next().expect("--only: expected a name"),
@@ -236,7 +308,13 @@ fn main() {
     for part in parts {
         println!("{part}");
         if part == "arms" {
-            arms(&folder_of_arms);
+            arms(&folder_of_arms, &only);
+            continue;
+        }
+        if part == "metrics" {
+            for case in METRICS.iter().filter(|case| case.name.contains(&only)) {
+                (0..seeds).for_each(|seed| metric(case, seed, show));
+            }
             continue;
         }
         let csv = run(&part, seeds, &only, show);

@@ -409,3 +409,79 @@ pub const OUTSIDE: [Case; 10] = [
     ),
     outside("quartic velocity", &["x"], &[false], "x_dot^2/2 + x_dot^4/10 - x^2", &[WIDE, REST]),
 ];
+
+/// A metric that is known, and how its formula is looked for.
+pub struct Metric {
+    /// Name of the system.
+    pub name: &'static str,
+    pub basis: &'static str,
+    pub functions: &'static [&'static str],
+    pub truth: &'static [(&'static str, f64)],
+}
+
+/// Metrics of a sphere and of spacetimes; a mass inside a function is given.
+pub const METRICS: [Metric; 4] = [
+    Metric {
+        name: "sphere-geodesic",
+        basis: "trigonometric:2",
+        functions: &["sin(theta)^2"],
+        truth: &[("theta_dot^2", 0.5), ("phi_dot^2*(sin(theta)^2)", 0.5)],
+    },
+    Metric {
+        name: "ads4-geodesic",
+        basis: "polynomial:2",
+        functions: &["1/z", "1/z^2", "1/z^3"],
+        truth: &[
+            ("t_dot^2*(1/z^2)", -0.5),
+            ("x_dot^2*(1/z^2)", 0.5),
+            ("y_dot^2*(1/z^2)", 0.5),
+            ("z_dot^2*(1/z^2)", 0.5),
+        ],
+    },
+    Metric {
+        name: "schwarzschild-geodesic",
+        basis: "polynomial:0",
+        functions: &["1/r", "r", "r^2", "r^2*sin(theta)^2", "r/(r - 2)", "sin(theta)^2"],
+        truth: &[
+            ("t_dot^2", -0.5),
+            ("t_dot^2*(1/r)", 1.0),
+            ("r_dot^2*(r/(r - 2))", 0.5),
+            ("theta_dot^2*(r^2)", 0.5),
+            ("phi_dot^2*(r^2*sin(theta)^2)", 0.5),
+        ],
+    },
+    // Of z^2/r^3 the sum of the squares makes 1/r.
+    Metric {
+        name: "schwarzschild-cartesian",
+        basis: "polynomial:0",
+        functions: &[
+            "1/sqrt(x^2 + y^2 + z^2)",
+            "x/(x^2 + y^2 + z^2)",
+            "y/(x^2 + y^2 + z^2)",
+            "z/(x^2 + y^2 + z^2)",
+            "x^2/sqrt(x^2 + y^2 + z^2)^3",
+            "y^2/sqrt(x^2 + y^2 + z^2)^3",
+            "x*y/sqrt(x^2 + y^2 + z^2)^3",
+            "x*z/sqrt(x^2 + y^2 + z^2)^3",
+            "y*z/sqrt(x^2 + y^2 + z^2)^3",
+        ],
+        truth: &[
+            ("t_dot^2", -0.5),
+            ("x_dot^2", 0.5),
+            ("y_dot^2", 0.5),
+            ("z_dot^2", 0.5),
+            ("t_dot^2*(1/sqrt(x^2 + y^2 + z^2))", 1.0),
+            ("t_dot*x_dot*(x/(x^2 + y^2 + z^2))", 2.0),
+            ("t_dot*y_dot*(y/(x^2 + y^2 + z^2))", 2.0),
+            ("t_dot*z_dot*(z/(x^2 + y^2 + z^2))", 2.0),
+            ("x_dot^2*(x^2/sqrt(x^2 + y^2 + z^2)^3)", 1.0),
+            ("y_dot^2*(y^2/sqrt(x^2 + y^2 + z^2)^3)", 1.0),
+            ("x_dot*y_dot*(x*y/sqrt(x^2 + y^2 + z^2)^3)", 2.0),
+            ("x_dot*z_dot*(x*z/sqrt(x^2 + y^2 + z^2)^3)", 2.0),
+            ("y_dot*z_dot*(y*z/sqrt(x^2 + y^2 + z^2)^3)", 2.0),
+            ("z_dot^2*(1/sqrt(x^2 + y^2 + z^2))", 1.0),
+            ("z_dot^2*(x^2/sqrt(x^2 + y^2 + z^2)^3)", -1.0),
+            ("z_dot^2*(y^2/sqrt(x^2 + y^2 + z^2)^3)", -1.0),
+        ],
+    },
+];

@@ -5,13 +5,11 @@ use crate::cli::probe::Probe;
 use crate::cli::recording_args::RecordingArgs;
 use crate::cli::{CliError, output, parse_system};
 use crate::formula::{
-    Families, FormulaError, FormulaOptions, FoundFormula, MODEL_STATES, MOST_BOOTSTRAPS, Verdict, formula_of_model,
+    Families, FormulaError, FormulaOptions, FoundFormula, MODEL_STATES, MOST_BOOTSTRAPS, formula_of_model,
     formula_of_motion,
 };
-use crate::names::rounded;
-use crate::report::text_table;
+use crate::report::formula_text;
 use crate::storage::{check_target, write_atomically};
-use serde::Serialize;
 use std::path::{Path, PathBuf};
 
 /// Arguments.
@@ -107,23 +105,6 @@ fn system_name(text: &str) -> Result<String, String> {
     }
 }
 
-/// The formula as JSON.
-#[derive(Serialize)]
-struct Json<'a> {
-    verdict: Verdict,
-    lagrangian: String,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    dissipation: Option<String>,
-    terms: &'a [crate::formula::FoundTerm],
-    residual: f64,
-    noise: &'a [f64],
-    noise_resolved: bool,
-    searched: usize,
-    removed: usize,
-    left: &'a [crate::formula::Left],
-    seed: u64,
-}
-
 impl Args {
     fn options(&self) -> FormulaOptions {
         FormulaOptions {
@@ -136,6 +117,7 @@ impl Args {
             bootstraps: self.bootstraps,
             seed: self.seed,
             threads: threads(self.threads),
+            ..FormulaOptions::default()
         }
     }
 }
@@ -162,23 +144,11 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         write_atomically(out, text.as_bytes()).map_err(|e| CliError::file(out, e))?;
     }
     if args.json {
-        let json = Json {
-            verdict: found.verdict,
-            lagrangian: found.text(false),
-            dissipation: args.friction.then(|| found.text(true)),
-            terms: &found.terms,
-            residual: found.residual,
-            noise: &found.noise,
-            noise_resolved: found.noise_resolved,
-            searched: found.searched.0,
-            removed: found.searched.1,
-            left: &found.left,
-            seed: args.seed,
-        };
+        let json = found.summary(args.friction, args.seed);
         return output::print(&(serde_json::to_string(&json).map_err(CliError::data)? + "\n"));
     }
     output::print(&match args.format {
-        Format::Text => text(&found, args.friction, of_model),
+        Format::Text => formula_text(&found, args.friction, of_model),
         Format::Toml => found.system_file(&args.name),
         Format::Latex => {
             let friction = if args.friction { format!("D = {}\n", found.latex(true)) } else { String::new() };
@@ -202,7 +172,8 @@ fn of_motion(args: &Args) -> Result<FoundFormula, CliError> {
     if let Some(noise) = args.noise.as_ref().filter(|noise| noise.len() != n) {
         return Err(CliError::usage(format_args!("--noise: expected {n} numbers, found {}", noise.len())));
     }
-    formula_of_motion(&reading.recording, &args.options()).map_err(refused)
+    let units = args.recording.meaning().coordinate_units();
+    formula_of_motion(&reading.recording, &FormulaOptions { units, ..args.options() }).map_err(refused)
 }
 
 fn of_model(args: &Args, path: &Path) -> Result<FoundFormula, CliError> {
@@ -217,7 +188,9 @@ fn of_model(args: &Args, path: &Path) -> Result<FoundFormula, CliError> {
     let probe = Probe::model(path)?;
     let (q, v) = probe.states(MODEL_STATES, args.seed)?;
     let chart = (probe.coordinates(), probe.periodic());
-    formula_of_model(probe.model.as_ref(), chart, (&q, &v), &args.options()).map_err(refused)
+    let (units, time_unit) = probe.units();
+    let options = FormulaOptions { units, time_unit, ..args.options() };
+    formula_of_model(probe.model.as_ref(), chart, (&q, &v), &options).map_err(refused)
 }
 
 /// What the user chose, or what the data are.
@@ -228,41 +201,4 @@ fn refused(error: FormulaError) -> CliError {
         FormulaError::Scale { .. } => CliError::usage(format_args!("--{error}")),
         _ => CliError::data(error),
     }
-}
-
-fn text(found: &FoundFormula, friction: bool, of_model: bool) -> String {
-    let verdict = match found.verdict {
-        Verdict::Found => "found",
-        Verdict::NotInLibrary => "not in the library",
-    };
-    let (searched, removed) = found.searched;
-    let residual = rounded(found.residual, 4);
-    let mut text = if of_model {
-        format!("{verdict}: accelerations differ from the model's by {residual} of their size\n")
-    } else {
-        let bound = if found.noise_resolved { "" } else { ", which is at most what was assumed" };
-        format!("{verdict}: the residual of held-out motion is {residual} times its noise{bound}\n")
-    };
-    text += &format!("{searched} terms searched, {removed} of them total derivatives or sums of others\n\n");
-    text += &format!("L = {}\n", found.text(false));
-    if friction {
-        text += &format!("D = {}\n", found.text(true));
-    }
-    let rows = found.terms.iter().map(|t| {
-        let range = [-1.96, 1.96].map(|k| rounded(t.coefficient + k * t.standard_error, 6)).join(" .. ");
-        let name = if t.dissipation { format!("D: {}", t.term) } else { t.term.clone() };
-        let numbers = [rounded(t.coefficient, 6), rounded(t.standard_error, 2), range, format!("{:.2}", t.probability)];
-        [vec![name], numbers.to_vec(), vec![t.near.clone().unwrap_or_default()]].concat()
-    });
-    let headers = ["term", "coefficient", "error", "95 % range", "probability", "near"];
-    text += &format!("\n{}", text_table(&headers, &rows.collect::<Vec<_>>()));
-    if found.verdict == Verdict::NotInLibrary && !found.left.is_empty() {
-        let rows = found.left.iter().map(|left| {
-            let name = found.coordinates[left.coordinate].clone();
-            vec![name, rounded(left.low, 4), rounded(left.high, 4), rounded(left.residual, 4), left.samples.to_string()]
-        });
-        let headers = ["coordinate", "from", "to", "residual over noise", "samples"];
-        text += &format!("\nwhat is left:\n{}", text_table(&headers, &rows.collect::<Vec<_>>()));
-    }
-    text
 }

@@ -225,6 +225,12 @@ impl Probe {
         &self.periodic
     }
 
+    /// Units of the coordinates, empty texts where they are not known, and of time.
+    pub fn units(&self) -> (Vec<String>, String) {
+        let time = self.system.as_ref().map_or("s", |system| &system.system.time_unit);
+        (self.units.clone(), time.to_string())
+    }
+
     fn charts(&self) -> Vec<Chart> {
         let parts = self.periodic.iter().zip(&self.units).zip(&self.region.position);
         parts.map(|((periodic, unit), range)| Chart::of(*periodic, unit, *range)).collect()

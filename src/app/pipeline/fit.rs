@@ -2,6 +2,7 @@
 
 use crate::configuration::Precision;
 use crate::data::{Datasets, RecordingSplit, sizes};
+use crate::formula::{FormulaOptions, formula_of_motion};
 use crate::lagrangian::EulerLagrange;
 use crate::network::file::{Header, ModelFile, StoredPrecision};
 use crate::network::{Architecture, Form, Layout, NetworkLagrangian};
@@ -215,7 +216,21 @@ fn fit_in<S: Scalar>(
         Some(_) => (Physics::under_constraints(&subject), Determined::under_constraints()),
     };
     determined.suggestion().iter().for_each(|text| watch.say(Event::Note(text)));
+    let formula = fit_config.formula.then(|| {
+        let options = FormulaOptions {
+            friction: network.architecture().has_friction(),
+            noise: fit_config.noise.clone(),
+            units: fit_config.recording.meaning().coordinate_units(),
+            seed: config.seed,
+            threads,
+            ..FormulaOptions::default()
+        };
+        formula_of_motion(&measured.training.recording, &options)
+            .map_err(|error| watch.say(Event::Note(&format!("no formula was looked for: {error}"))))
+    });
+    let formula = formula.and_then(Result::ok);
     let found = Found {
+        formula: formula.as_ref(),
         prepared,
         config,
         threads,

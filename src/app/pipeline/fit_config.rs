@@ -41,6 +41,9 @@ table! {
         /// table [constraints] of a file.
         #[key("none, find, or a file", example = "\"find\"", flag = "constraints")]
         pub constraints: FitConstraints = FitConstraints::None,
+        /// Whether a formula of the Lagrangian is looked for in the training motion, with friction if the model has it: minutes.
+        #[key("true, false", flag = "formula")]
+        pub formula: bool = false,
         /// The files and the meaning of their columns, as in the options of the same names.
         #[table("recording", Below::Keys(FitColumns::KEYS))]
         pub recording: FitColumns = FitColumns::default(),

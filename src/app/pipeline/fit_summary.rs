@@ -1,6 +1,7 @@
 //! Results of `lnn fit`: `summary.json`, tables for a terminal, report.
 
 use crate::configuration::Config;
+use crate::formula::{FormulaSummary, FoundFormula, Verdict};
 use crate::names::{WIDTH, number, percentage, pluralize, wrap_text};
 use crate::network::NetworkLagrangian;
 use crate::network::file::Header;
@@ -12,7 +13,7 @@ use crate::pipeline::report_files::{ended, training_pictures, write_page, write_
 use crate::pipeline::time_steps::TimeSteps;
 use crate::pipeline::{Output, PipelineError, SUMMARY, headline};
 use crate::recording::{HeldOut, Recording, Targets};
-use crate::report::{Report, text_table};
+use crate::report::{Report, formula_text, text_table};
 use crate::scalar::Scalar;
 use crate::shooting::Fitted;
 use crate::training::Trained;
@@ -66,6 +67,8 @@ struct Summary<'a> {
     judgement: &'a HoldOut,
     #[serde(flatten)]
     determined: &'a Determined,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    formula: Option<FormulaSummary<'a>>,
     physics: &'a Physics,
 }
 
@@ -113,6 +116,8 @@ pub(crate) struct Found<'a, S> {
     pub hold_out: &'a HoldOut,
     /// Ranges in which the data determine the model.
     pub determined: &'a Determined,
+    /// A formula of the Lagrangian, if one was looked for.
+    pub formula: Option<&'a FoundFormula>,
     /// Curvature, symmetries and signature.
     pub physics: &'a Physics,
     /// Header and network of the model.
@@ -142,6 +147,13 @@ impl<'a, S: Scalar> Found<'a, S> {
         let report = report.section("Predictions of motion that the model has not seen", &self.hold_out.figures);
         let report = report.section("The functions that were learned", &self.physics.figures);
         let report = self.determined.report(self.hold_out.report(report));
+        let report = match self.formula.filter(|formula| formula.verdict == Verdict::Found) {
+            Some(formula) => {
+                let text = formula_text(formula, self.friction(), false);
+                report.heading("The Lagrangian as a formula").preformatted(&text)
+            }
+            None => report,
+        };
         let report = self.physics.report(report).heading("Data");
         let report = report.preformatted(&wrap_text(opening.trim_end(), WIDTH)).section("Training", &figures);
         let report = report.heading("Configuration").preformatted(toml);
@@ -194,8 +206,14 @@ impl<'a, S: Scalar> Found<'a, S> {
             wall_seconds: prepared.started.elapsed().as_secs_f64(),
             judgement: self.hold_out,
             determined: self.determined,
+            formula: self.formula.map(|formula| formula.summary(self.friction(), self.config.seed)),
             physics: self.physics,
         }
+    }
+
+    /// `true` if a dissipation was looked for beside the Lagrangian.
+    fn friction(&self) -> bool {
+        self.formula.is_some_and(|formula| formula.terms.iter().any(|term| term.dissipation))
     }
 
     fn coordinates(&self) -> Vec<Coordinate> {

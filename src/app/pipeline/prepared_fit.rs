@@ -131,8 +131,18 @@ impl<'a> PreparedFit<'a> {
         shooting: Option<crate::shooting::Shooting>,
     ) -> FitConfig {
         let FitOptions { held_out, window, noise, constraints, .. } = self.options.clone();
-        let targets = Some(self.targets);
-        FitConfig { targets, held_out, window, noise, horizon, constraints, recording, shooting, training }
+        FitConfig {
+            targets: Some(self.targets),
+            held_out,
+            window,
+            noise,
+            horizon,
+            constraints,
+            formula: false,
+            recording,
+            shooting,
+            training,
+        }
     }
 
     /// The supervised training that suits the data.

@@ -2,6 +2,7 @@
 
 mod evaluation;
 mod experiment;
+mod formula;
 mod grids;
 mod html;
 mod page;
@@ -13,6 +14,7 @@ pub use experiment::Curve;
 pub(crate) use experiment::{
     REDUCTION_HEADER, experiment_curves, experiment_figures, experiment_table, experiment_view, reduction_table,
 };
+pub(crate) use formula::formula_text;
 pub use grids::{Fit, GridComparison, grid_figures};
 pub(crate) use grids::{QuantityMap, Turn, quantity_figure};
 pub use html::Report;

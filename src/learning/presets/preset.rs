@@ -1,6 +1,6 @@
 //! Configurations that ship with the program.
 
-use crate::configuration::{Config, Data, Network, Optimizer, PENALTY, Phase, Regularizer, Scaling};
+use crate::configuration::{Config, Data, FRICTION_UNITS, Network, Optimizer, PENALTY, Phase, Regularizer, Scaling};
 use crate::data::boxes;
 use crate::lagrangian::SystemInstance;
 use crate::lagrangian::system::{Bounds, PaperBudget, PaperPhase, ShellAdvice, StateAdvice};
@@ -107,7 +107,11 @@ fn base(system: &SystemInstance<f64>, states: usize, network: Network) -> Config
             validation_velocity: boxes(&validation.velocities),
             ..Data::default()
         },
-        network: Network { time_like: time_like(system), ..network },
+        network: Network {
+            time_like: time_like(system),
+            dissipation: system.dissipation().is_some().then_some(FRICTION_UNITS),
+            ..network
+        },
         penalty: regularizer(system, 5.0),
         optimizer: Optimizer { method: Method::Radam, ..Optimizer::default() },
         phases: Vec::new(),

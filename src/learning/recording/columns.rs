@@ -2,7 +2,7 @@
 
 use crate::names::pluralize;
 use crate::names::{taken_column, unknown};
-use crate::recording::units::factor;
+use crate::recording::units::{factor, si};
 use thiserror::Error;
 
 /// Which columns hold what. A column is its name in the header, or its number from 1.
@@ -36,6 +36,12 @@ pub struct Columns {
 pub struct ColumnsError(pub String);
 
 impl Columns {
+    /// SI units of the coordinates as far as they are given, empty texts otherwise.
+    pub fn coordinate_units(&self) -> Vec<String> {
+        let unit = |name: &String| self.units.iter().find(|(column, _)| column == name).and_then(|(_, unit)| si(unit));
+        self.coords.iter().map(|name| unit(name).unwrap_or_default()).collect()
+    }
+
     /// Every column named, with its meaning.
     pub(crate) fn used(&self) -> impl Iterator<Item = (&'static str, &String)> {
         [

@@ -51,6 +51,22 @@ pub fn factor(text: &str) -> Result<f64, String> {
     })
 }
 
+/// The SI unit of numbers in a unit once they are read; none of a bare factor.
+pub fn si(text: &str) -> Option<String> {
+    let base = ["/s^2", "/s2", "/s"].iter().find_map(|per| text.trim().strip_suffix(per)).unwrap_or(text.trim());
+    let rate = text.trim()[base.len()..].replace("s2", "s^2");
+    let unit = match base {
+        "rad" | "deg" | "turn" | "mrad" => "rad",
+        "s" | "ms" | "us" | "ns" | "min" | "h" => "s",
+        "m" | "km" | "cm" | "mm" | "um" | "in" | "ft" => "m",
+        "N" | "kN" | "mN" => "N",
+        "rpm" => "rad/s",
+        "g" => "m/s^2",
+        _ => return None,
+    };
+    Some(unit.to_string() + &rate)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -59,6 +75,8 @@ mod tests {
     fn units_and_factors() {
         assert_eq!(factor("deg").unwrap() * 180.0, PI);
         assert_eq!((factor("ms"), factor("mm/s2"), factor(" -0.01 ")), (Ok(1e-3), Ok(1e-3), Ok(-0.01)));
+        assert_eq!([si("deg"), si("mm/s2"), si("0.01")], [Some("rad".into()), Some("m/s^2".into()), None]);
+        assert!(UNITS.iter().all(|(name, _)| si(name).is_some()));
         for bad in ["nan", "0", "inf", "degree", "", "1e999", "/s"] {
             assert!(factor(bad).is_err(), "{bad}");
         }

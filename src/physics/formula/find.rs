@@ -32,6 +32,10 @@ pub struct FormulaOptions {
     /// Term and coefficient that fix the common factor; the first square of a velocity and 1/2 if not given. With known forces the motion
     /// itself gives the factor.
     pub scale: Option<(String, f64)>,
+    /// Units of the coordinates, such as `m`; an empty text, or no list, where they are not known.
+    pub units: Vec<String>,
+    /// Unit of time.
+    pub time_unit: String,
     /// Resamplings of the trajectories that give every term a probability.
     pub bootstraps: usize,
     /// Seed of the resamplings and of the states at which terms are compared.
@@ -49,6 +53,8 @@ impl Default for FormulaOptions {
             friction: false,
             noise: None,
             scale: None,
+            units: Vec::new(),
+            time_unit: "s".to_string(),
             bootstraps: 40,
             seed: 0,
             threads: 1,
@@ -419,7 +425,7 @@ pub fn formula_of_motion(recording: &Recording, options: &FormulaOptions) -> Res
         None => probabilities.get(&k).copied().unwrap_or(1.0),
     };
     let probability: Vec<f64> = model.terms.iter().map(|&k| probability(k)).collect();
-    let mut found = FoundFormula::new(&library, &recording.periodic, &model, (&covariance, &probability));
+    let mut found = FoundFormula::new(&library, &recording.periodic, &model, (&covariance, &probability), options);
     // Few residuals scatter by themselves.
     let most = MOST_RESIDUAL + 3.0 / (2.0 * count.max(1.0)).sqrt();
     found.verdict = if residual <= most { Verdict::Found } else { Verdict::NotInLibrary };
@@ -433,6 +439,7 @@ pub fn formula_of_motion(recording: &Recording, options: &FormulaOptions) -> Res
     if !driven || options.scale.is_some() {
         found.rescale(options.scale.as_ref())?;
     }
+    found.name_constants();
     Ok(found)
 }
 

@@ -1,9 +1,13 @@
 //! A formula that was found, and its ways to be written.
 
 use super::error::FormulaError;
+use super::find::FormulaOptions;
 use super::function::Notation;
 use super::library::Library;
+use super::linear::{inverse, part};
 use super::motion::Model;
+use super::units::{Dimension, Units, of_coefficient};
+use crate::linalg::dot;
 use serde::Serialize;
 
 /// Whether the library holds the Lagrangian.
@@ -17,6 +21,15 @@ pub enum Verdict {
     NotInLibrary,
 }
 
+/// A simple fraction near a coefficient.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Near {
+    /// The fraction, such as `1/6`.
+    pub fraction: String,
+    /// By how much the coefficient is larger, over its standard error; 0 where both are equal.
+    pub standard_errors: f64,
+}
+
 /// A term with its coefficient.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FoundTerm {
@@ -26,12 +39,18 @@ pub struct FoundTerm {
     pub coefficient: f64,
     /// Standard error of the coefficient; 0 for the one that fixes the common factor.
     pub standard_error: f64,
+    /// Name of the constant that the coefficient is, or the negative of: one name for coefficients that are equal.
+    pub constant: String,
+    /// Unit of the coefficient; none where the function of the term hides a constant with a unit.
+    pub unit: Option<String>,
     /// Share of the resampled recordings in which it was chosen.
     pub probability: f64,
     /// `true` for a term of Rayleigh's dissipation function, `false` for one of the Lagrangian.
     pub dissipation: bool,
     /// A simple fraction within the error of the coefficient, if there is one.
-    pub near: Option<String>,
+    pub near: Option<Near>,
+    #[serde(skip)]
+    dimension: Option<Dimension>,
     #[serde(skip)]
     latex: String,
     #[serde(skip)]
@@ -77,6 +96,27 @@ pub struct FoundFormula {
     pub(super) bounds: Vec<[f64; 2]>,
     pub(super) speeds: Vec<f64>,
     covariance: Vec<f64>,
+    /// The term whose coefficient is given.
+    reference: Option<usize>,
+    /// Units of the coordinates, empty if they are not known, and of time.
+    units: (Vec<String>, String),
+}
+
+/// What there is to say of a formula, as JSON.
+#[derive(Clone, Debug, Serialize)]
+pub struct FormulaSummary<'a> {
+    verdict: Verdict,
+    lagrangian: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    dissipation: Option<String>,
+    terms: &'a [FoundTerm],
+    residual: f64,
+    noise: &'a [f64],
+    noise_resolved: bool,
+    searched: usize,
+    removed: usize,
+    left: &'a [Left],
+    seed: u64,
 }
 
 impl FoundFormula {
@@ -86,7 +126,9 @@ impl FoundFormula {
         periodic: &[bool],
         model: &Model,
         (covariance, probabilities): (&[f64], &[f64]),
+        options: &FormulaOptions,
     ) -> Self {
+        let units = Units::new(&options.units, &options.time_unit, periodic);
         let m = model.terms.len();
         let terms = model.terms.iter().zip(&model.coefficients).enumerate();
         let mut order: Vec<(usize, FoundTerm)> = terms
@@ -97,7 +139,10 @@ impl FoundFormula {
                     standard_error: covariance[at * m + at].max(0.0).sqrt(),
                     probability: probabilities[at].clamp(0.0, 1.0),
                     dissipation: library.is_dissipation(k),
+                    constant: String::new(),
+                    unit: None,
                     near: None,
+                    dimension: units.of_term(library, k),
                     latex: library.written(k, Notation::Latex),
                     rust: library.written(k, Notation::Rust),
                 };
@@ -111,7 +156,7 @@ impl FoundFormula {
             .iter()
             .flat_map(|(i, _)| order.iter().map(|(j, _)| covariance[i * m + j]).collect::<Vec<_>>())
             .collect();
-        let mut found = Self {
+        Self {
             coordinates: library.names.clone(),
             periodic: periodic.to_vec(),
             verdict: Verdict::NotInLibrary,
@@ -124,9 +169,9 @@ impl FoundFormula {
             bounds: Vec::new(),
             speeds: Vec::new(),
             covariance,
-        };
-        found.name_fractions();
-        found
+            reference: None,
+            units: (options.units.clone(), options.time_unit.clone()),
+        }
     }
 
     /// Fixes the common factor: a term gets the coefficient that is given, or the first square of a velocity 1/2.
@@ -173,13 +218,83 @@ impl FoundFormula {
             term.standard_error = if k == at { 0.0 } else { variance.max(0.0).sqrt() };
         }
         self.terms[at].coefficient = value;
-        self.name_fractions();
+        self.reference = Some(at);
         Ok(())
     }
 
-    fn name_fractions(&mut self) {
+    /// Gives the coefficients their units, one name to those that are equal, and names the fractions near them.
+    pub(super) fn name_constants(&mut self) {
+        let reference = self.reference.map(|at| self.terms[at].dimension.clone());
         for term in &mut self.terms {
-            term.near = fraction(term.coefficient, term.standard_error);
+            term.unit = match &reference {
+                Some(None) => None,
+                known => of_coefficient(term.dimension.as_ref(), known.as_ref().and_then(Option::as_ref)),
+            };
+        }
+        let mut groups: Vec<Vec<usize>> = Vec::new();
+        for k in 0..self.terms.len() {
+            match groups.iter_mut().find(|group| self.equal(group[0], k)) {
+                Some(group) => group.push(k),
+                None => groups.push(vec![k]),
+            }
+        }
+        // A letter that no coordinate has before a number.
+        let letter =
+            ['c', 'k', 'w'].into_iter().find(|letter| !self.coordinates.iter().any(|q| q.starts_with(*letter)));
+        for (number, group) in groups.iter().enumerate() {
+            let (value, error) = self.common(group);
+            for &k in group {
+                let term = &mut self.terms[k];
+                term.constant = format!("{}{}", letter.unwrap_or('z'), number + 1);
+                (term.coefficient, term.standard_error) = (value.copysign(term.coefficient), error);
+                term.near = near(term.coefficient, error);
+            }
+        }
+    }
+
+    /// `true` if two coefficients are the same constant or its negative: of the same unit, and equal within their errors where that is
+    /// no accident.
+    fn equal(&self, a: usize, b: usize) -> bool {
+        const ACCIDENT: f64 = 5e-3;
+        let (m, [x, y]) = (self.terms.len(), [a, b].map(|k| &self.terms[k]));
+        let sign = x.coefficient.signum() * y.coefficient.signum();
+        let covariance = |i: usize, j: usize| self.covariance[i * m + j];
+        let variance = covariance(a, a) + covariance(b, b) - 2.0 * sign * covariance(a, b);
+        let (size, error) = (x.coefficient.abs(), variance.max(0.0).sqrt() + 1e-9 * x.coefficient.abs());
+        let same = x.unit.is_some() && x.unit == y.unit && x.dissipation == y.dissipation;
+        same && error < ACCIDENT * size && (size - y.coefficient.abs()).abs() <= 2.0 * error
+    }
+
+    /// The best size of a constant and its standard error, of the coefficients that it is.
+    fn common(&self, group: &[usize]) -> (f64, f64) {
+        let own = |k: usize| (self.terms[k].coefficient.abs(), self.terms[k].standard_error);
+        if let Some(&fixed) = group.iter().find(|k| group.len() == 1 || own(**k).1 == 0.0) {
+            return own(fixed);
+        }
+        let (count, m) = (group.len(), self.terms.len());
+        let sign = |at: usize| self.terms[group[at]].coefficient.signum();
+        let mut block = part(m, &self.covariance, group);
+        (0..count * count).for_each(|e| block[e] *= sign(e / count) * sign(e % count));
+        let Some(weights) = inverse(count, &block) else { return own(group[0]) };
+        let sums: Vec<f64> = weights.chunks_exact(count).map(|row| row.iter().sum()).collect();
+        let (whole, sizes): (f64, Vec<f64>) = (sums.iter().sum(), group.iter().map(|&k| own(k).0).collect());
+        (dot(&sums, &sizes) / whole, whole.recip().max(0.0).sqrt())
+    }
+
+    /// What there is to say of it, the dissipation if one was looked for.
+    pub fn summary(&self, friction: bool, seed: u64) -> FormulaSummary<'_> {
+        FormulaSummary {
+            verdict: self.verdict,
+            lagrangian: self.text(false),
+            dissipation: friction.then(|| self.text(true)),
+            terms: &self.terms,
+            residual: self.residual,
+            noise: &self.noise,
+            noise_resolved: self.noise_resolved,
+            searched: self.searched.0,
+            removed: self.searched.1,
+            left: &self.left,
+            seed,
         }
     }
 
@@ -225,16 +340,36 @@ impl FoundFormula {
     /// A system file: its constants are parameters that a training may learn.
     pub fn system_file(&self, name: &str) -> String {
         let mut text = format!("name = {name:?}\n");
-        let own: Vec<&FoundTerm> = self.terms.iter().filter(|t| !t.dissipation).collect();
-        let sum: Vec<String> = own.iter().enumerate().map(|(k, t)| format!("c{}*{}", k + 1, t.term)).collect();
-        text += &format!("lagrangian = {:?}\n", sum.join(" + "));
+        let sum = |dissipation: bool| {
+            let positive = |constant: &String| self.constants().any(|t| t.constant == *constant && t.coefficient > 0.0);
+            let own = self.terms.iter().filter(|t| t.dissipation == dissipation).enumerate();
+            let one = |(k, t): (usize, &FoundTerm)| {
+                let sign = match (k, (t.coefficient > 0.0) == positive(&t.constant)) {
+                    (0, true) => "",
+                    (0, false) => "-",
+                    (_, true) => " + ",
+                    (_, false) => " - ",
+                };
+                format!("{sign}{}*{}", t.constant, t.term)
+            };
+            own.map(one).collect::<String>()
+        };
+        text += &format!("lagrangian = {:?}\n", sum(false));
+        if self.units.1 != "s" {
+            text += &format!("time_unit = {:?}\n", self.units.1);
+        }
         if self.terms.iter().any(|t| t.dissipation) {
-            text += &format!("# With friction (a grey box learns its own): dissipation = \"{}\"\n", self.text(true));
+            text += &format!("dissipation = {:?}\n", sum(true));
         }
         for (i, name) in self.coordinates.iter().enumerate() {
             text += &format!("\n[[coordinates]]\nname = {name:?}\n");
+            match self.units.0.get(i).filter(|unit| !unit.is_empty()) {
+                Some(unit) => text += &format!("unit = {unit:?}\n"),
+                None if self.periodic[i] => text += "unit = \"rad\"\n",
+                None => {}
+            }
             if self.periodic[i] {
-                text += "unit = \"rad\"\nperiodic = true\n";
+                text += "periodic = true\n";
             }
             let [low, high] = self.bounds[i];
             if !self.periodic[i] {
@@ -244,11 +379,19 @@ impl FoundFormula {
             text += &format!("velocity_bounds = [{:?}, {speed:?}]\n", -speed);
         }
         text += "\n[parameters]\n";
-        for (k, term) in own.iter().enumerate() {
-            let error = term.standard_error;
-            text += &format!("c{} = {{ default = {:?}, learn = true }} # +- {error:.2e}\n", k + 1, term.coefficient);
+        for FoundTerm { constant, coefficient, standard_error, unit, .. } in self.constants() {
+            let unit = unit.as_ref().map_or(String::new(), |unit| format!(", unit = {unit:?}"));
+            text += &format!(
+                "{constant} = {{ default = {coefficient:?}{unit}, learn = true }} # +- {standard_error:.2e}\n"
+            );
         }
         text
+    }
+
+    /// The first term of every constant.
+    fn constants(&self) -> impl Iterator<Item = &FoundTerm> {
+        let first = |k: usize| self.terms.iter().position(|t| t.constant == self.terms[k].constant) == Some(k);
+        self.terms.iter().enumerate().filter(move |(k, _)| first(*k)).map(|(_, t)| t)
     }
 }
 
@@ -272,7 +415,7 @@ fn latex_number(x: f64) -> String {
 }
 
 /// A fraction of small whole numbers within two standard errors, if the number is known well enough that this is no accident.
-fn fraction(x: f64, error: f64) -> Option<String> {
+fn near(x: f64, error: f64) -> Option<Near> {
     if !(x.is_finite() && error.is_finite()) {
         return None;
     }
@@ -282,7 +425,9 @@ fn fraction(x: f64, error: f64) -> Option<String> {
         // Fractions of this denominator stand 1 / bottom apart: one within the error by accident is rare.
         let rare = within * f64::from(bottom * bottom) < 0.02;
         if rare && top != 0.0 && top.abs() <= 24.0 && (x - top / f64::from(bottom)).abs() <= within {
-            return Some(if bottom == 1 { format!("{top}") } else { format!("{top}/{bottom}") });
+            let fraction = if bottom == 1 { format!("{top}") } else { format!("{top}/{bottom}") };
+            let off = x - top / f64::from(bottom);
+            return Some(Near { fraction, standard_errors: if error > 0.0 { off / error } else { 0.0 } });
         }
     }
     None
@@ -294,10 +439,10 @@ mod tests {
 
     #[test]
     fn fractions_are_named_where_they_are_no_accident() {
-        assert_eq!(fraction(0.2501, 1e-4), Some("1/4".to_string()));
-        assert_eq!(fraction(-1.5, 0.0), Some("-3/2".to_string()));
-        assert_eq!(fraction(0.2531, 1e-4), None);
-        assert_eq!(fraction(0.26, 0.2), None);
+        let found = near(0.2501, 1e-4).unwrap();
+        assert!(found.fraction == "1/4" && (found.standard_errors - 1.0).abs() < 1e-9, "{found:?}");
+        assert_eq!(near(-1.5, 0.0).map(|found| found.fraction).as_deref(), Some("-3/2"));
+        assert_eq!([near(0.2531, 1e-4), near(0.26, 0.2)], [None, None]);
     }
 
     #[test]

@@ -37,11 +37,12 @@ pub(crate) mod linear;
 mod motion;
 mod regress;
 mod select;
+mod units;
 mod wald;
 mod weak;
 
 pub use error::FormulaError;
 pub use find::{FormulaOptions, MOST_BOOTSTRAPS, formula_of_motion};
-pub use found::{FoundFormula, FoundTerm, Left, Verdict};
+pub use found::{FormulaSummary, FoundFormula, FoundTerm, Left, Near, Verdict};
 pub use library::Families;
 pub use regress::{MODEL_STATES, formula_of_model};

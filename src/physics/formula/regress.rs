@@ -84,7 +84,7 @@ pub fn formula_of_model(
     // The size of the model's mass matrix, for a start.
     let start = windows.unit_mass(&library, &kept, &vec![1.0; n]);
     let path = eliminate_backward(&windows, &start, &sigma, &complexity, &|block| block % HELD_OUT == 0);
-    let Some(choice) = elbow(&path) else { return Err(FormulaError::NotFinite { failed, states }) };
+    let Some(choice) = elbow(&path, n) else { return Err(FormulaError::NotFinite { failed, states }) };
     let used = vec![true; windows.len()];
     let normal = windows.normal(&choice.coefficients, &choice.set, &sigma, &used);
     let m = choice.set.len();
@@ -97,25 +97,27 @@ pub fn formula_of_model(
     };
     let residual = (choice.held_out / n as f64).sqrt();
     let probability = probabilities(&windows, choice, &path, &sigma, options);
-    let mut found = FoundFormula::new(&library, periodic, &of, (&covariance, &probability));
+    let mut found = FoundFormula::new(&library, periodic, &of, (&covariance, &probability), options);
     found.verdict = if residual <= MOST_RESIDUAL { Verdict::Found } else { Verdict::NotInLibrary };
     found.residual = residual;
     found.noise = sigma;
     found.searched = (library.searched, quotient.removed);
     (found.bounds, found.speeds) = (bounds, speeds);
     found.rescale(options.scale.as_ref())?;
+    found.name_constants();
     Ok(found)
 }
 
 /// The choice of terms of which none can be given up: the error of the next shorter one is the most times as large.
-fn elbow(path: &Path) -> Option<&Choice> {
+fn elbow(path: &Path, n: usize) -> Option<&Choice> {
     let least = path.best.values().map(|choice| choice.held_out).fold(f64::INFINITY, f64::min);
     // Differences below rounding are not significant.
     let floor = least.max(1e-20);
     let near = || path.best.values().filter(|choice| choice.held_out <= NEAR * floor);
     let rise = |choice: &Choice| {
         let shorter = path.best.range(..choice.set.len()).next_back();
-        shorter.map_or(f64::INFINITY, |(_, shorter)| shorter.held_out / choice.held_out.max(floor))
+        // Of no terms the error is the size of the accelerations.
+        shorter.map_or(n as f64, |(_, shorter)| shorter.held_out) / choice.held_out.max(floor)
     };
     near().max_by(|a, b| rise(a).total_cmp(&rise(b)).then(b.set.len().cmp(&a.set.len())))
 }
@@ -167,6 +169,33 @@ mod tests {
         );
         // m1 + m2 = 1.5, m2 = 0.5: a third of theta1's.
         assert!((found.terms[1].coefficient - 0.5 / 3.0).abs() < 1e-8, "{:?}", found.terms);
-        assert_eq!(found.terms[1].near.as_deref(), Some("1/6"));
+        assert_eq!(found.terms[1].near.as_ref().map(|near| near.fraction.as_str()), Some("1/6"));
+        let units: Vec<Option<&str>> = found.terms.iter().map(|t| t.unit.as_deref()).collect();
+        assert_eq!(units, [Some("1"), Some("1"), Some("1"), Some("1/s^2"), Some("1/s^2")]);
+    }
+
+    #[test]
+    fn equal_constants_have_one_name_and_a_unit() {
+        let model = build::<f64>("kepler", &[]).unwrap();
+        let names = ["x", "y"].map(String::from);
+        let mut rng = RngStream::Region.generator(4);
+        let mut draw =
+            |low: f64, high: f64| (0..400).map(|_| low + (high - low) * rng.random::<f64>()).collect::<Vec<f64>>();
+        let (q, v) = (draw(0.5, 2.0), draw(-1.0, 1.0));
+        let families = "polynomial:1,radial:2".parse().unwrap();
+        let options = FormulaOptions { families, units: vec!["m".to_string(); 2], ..FormulaOptions::default() };
+        let found = formula_of_model(&*model, (&names, &[false; 2]), (&q, &v), &options).unwrap();
+        let seen: Vec<(&str, &str, Option<&str>)> =
+            found.terms.iter().map(|t| (t.term.as_str(), t.constant.as_str(), t.unit.as_deref())).collect();
+        let kinetic = [("x_dot^2", "c1", Some("1")), ("y_dot^2", "c1", Some("1"))];
+        assert_eq!(seen, [kinetic[0], kinetic[1], ("sqrt(x^2 + y^2)^(-1)", "c2", Some("m^3/s^2"))]);
+        let file = found.system_file("kepler-found");
+        assert!(file.contains("c1*x_dot^2 + c1*y_dot^2") && !file.contains("c3"), "{file}");
+        // Units that differ are never the same constant.
+        let options = FormulaOptions { units: ["m", "A"].map(String::from).to_vec(), ..options };
+        let found = formula_of_model(&*model, (&names, &[false; 2]), (&q, &v), &options).unwrap();
+        assert_eq!([0, 1, 2].map(|k| found.terms[k].constant.as_str()), ["c1", "c2", "c3"]);
+        // The distance of unlike lengths has no unit.
+        assert_eq!(found.terms[2].unit, None);
     }
 }

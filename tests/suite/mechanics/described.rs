@@ -384,3 +384,41 @@ fn a_shell_says_where_training_states_lie_and_is_checked() {
         assert!(problem.to_string().contains(message) && line > 1, "{line}: {problem}");
     }
 }
+
+/// A pendulum with a friction in its joint, its strength a parameter.
+fn damped() -> String {
+    let l = "lagrangian = \"m*l^2*theta_dot^2/2 + m*g*l*cos(theta)\"";
+    let d = format!("{l}\ndissipation = \"b*theta_dot^2/2\"");
+    assert!(PENDULUM.contains(l));
+    PENDULUM.replace(l, &d).replace("[parameters]", "[parameters]\nb = { default = 0.3, range = \"at least 0\" }")
+}
+
+#[test]
+fn a_described_dissipation_is_a_force_of_every_use() {
+    let text = damped();
+    // m = l = 1: a = -g sin(theta) - b v.
+    fn of<S: Scalar>(text: &str) -> ([f64; 2], f64) {
+        let system = described::<S>(text, &[("b", "0.5")]);
+        let (q, v) = ([S::of_f64(0.4)], [S::of_f64(2.0)]);
+        let mut terms = Terms::default();
+        let model = system.build().unwrap();
+        assert!(!model.conserves_energy());
+        model.terms(&q, &v, Request::ALL, &mut terms).unwrap();
+        let single = system.exact_acceleration(&q, &v).unwrap();
+        ([terms.acceleration[0].to_f64(), single[0].to_f64()], terms.dissipation[0].to_f64())
+    }
+    let exact = -9.8 * 0.4f64.sin() - 0.5 * 2.0;
+    for (accelerations, power) in [of::<f32>(&text), of::<f64>(&text), of::<Dd>(&text)] {
+        assert!(accelerations.iter().all(|a| (a - exact).abs() < 1e-5), "{accelerations:?}");
+        assert!((power - 0.5 * 4.0).abs() < 1e-6);
+    }
+    // Networks learn such a system with a friction of their own.
+    let [with, without] =
+        [text.as_str(), PENDULUM].map(|text| Preset::Quick.config(&described::<f64>(text, &[])).unwrap());
+    assert!(with.network.dissipation.is_some() && without.network.dissipation.is_none());
+    // What cannot be a dissipation.
+    for wrong in ["3*theta^2", "b*thta_dot^2"] {
+        let error = parse_system(&text.replace("b*theta_dot^2/2", wrong)).unwrap_err().1;
+        assert!(error.to_string().contains("dissipation"), "{error:?}");
+    }
+}

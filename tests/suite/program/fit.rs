@@ -247,3 +247,18 @@ fn what_cannot_be_learned_from_is_named() {
     lnn(&["fit", &short, "--coords", "angle"]).refused(1, &["short.csv"]);
     assert_eq!(folder.names(), ["short.csv", "swings.csv"]);
 }
+
+#[test]
+fn a_formula_that_is_asked_for_is_in_summary_and_report() {
+    let folder = Folder::new();
+    let data = folder.file("swings.csv", pendulum(8, false, 1e-3));
+    let found = summary(&folder, &fit(&folder, &data, "run", &["--epochs", "1", "--formula"]), "run");
+    assert_eq!(found["formula"]["verdict"], "found");
+    let terms: Vec<&str> =
+        found["formula"]["terms"].as_array().unwrap().iter().map(|t| t["term"].as_str().unwrap()).collect();
+    assert_eq!(terms, ["angle_dot^2", "cos(angle)"]);
+    let report = fs::read_to_string(folder.path("run/report.html")).unwrap();
+    assert!(report.contains("angle_dot^2") && report.contains("cos(angle)"));
+    let without = summary(&folder, &fit(&folder, &data, "plain", &["--epochs", "1"]), "plain");
+    assert!(without.get("formula").is_none());
+}

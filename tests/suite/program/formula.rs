@@ -1,20 +1,24 @@
 //! `lnn formula`: a Lagrangian as a formula, from motion and from a model.
 
 use crate::common::program::lnn;
-use lnn::lagrangian::{ExpressionLagrangian, Mechanics};
-use lnn::prelude::*;
+use lnn::lagrangian::{EulerLagrange, ExpressionLagrangian, Mechanics, configure_system};
 use lnn::random::RngStream;
+use lnn::rollout::{Options, rollout};
 use rand_distr::{Distribution, StandardNormal};
 use std::fmt::Write;
 use std::fs;
 
 /// Swings of a system of one coordinate `a` from rest, as a CSV, with a noise of 1e-4.
 fn swings(formula: &str, starts: &[f64]) -> String {
-    let model = Mechanics::new(ExpressionLagrangian::new(&["a"], &[], formula).unwrap(), Vec::<f64>::new());
+    swings_of(&Mechanics::new(ExpressionLagrangian::new(&["a"], &[], formula).unwrap(), Vec::<f64>::new()), starts)
+}
+
+/// The same of a model.
+fn swings_of(model: &dyn EulerLagrange<f64>, starts: &[f64]) -> String {
     let mut rng = RngStream::Trajectories.generator(1);
     let mut csv = "run,t,a\n".to_string();
     for (run, start) in starts.iter().enumerate() {
-        let motion = model.rollout(&[*start], &[0.0], 3.0, 0.05).unwrap();
+        let motion = rollout(model, &[*start], &[0.0], &Options::new(3.0, 0.05)).complete().unwrap();
         for (t, a) in motion.t.iter().zip(&motion.q) {
             let noise: f64 = StandardNormal.sample(&mut rng);
             writeln!(csv, "{run},{t},{}", a + 1e-4 * noise).unwrap();
@@ -61,6 +65,43 @@ fn a_pendulum_is_read_off_its_swings_and_the_file_is_a_system() {
     assert_eq!(with(&["--scale", "a_dot^3=1"]).code, Some(2));
     assert_eq!(with(&["--function", "a_dot"]).code, Some(2));
     assert_eq!(with(&["--out", &at("found.txt")]).code, Some(2));
+}
+
+#[test]
+fn a_formula_with_friction_is_a_system_that_loses_energy() {
+    const DAMPED: &str = "name = \"damped\"\nlagrangian = \"a_dot^2/2 + 4*cos(a)\"\ndissipation = \"0.1*a_dot^2\"\n\
+        [[coordinates]]\nname = \"a\"\nunit = \"rad\"\nperiodic = true\nvelocity_bounds = [-9, 9]\n";
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_string();
+    let system =
+        configure_system::<f64>(std::borrow::Cow::Owned(lnn::cli::parse_system(DAMPED).unwrap()), &[]).unwrap();
+    fs::write(at("swings.csv"), swings_of(&*system.build().unwrap(), &STARTS)).unwrap();
+    let data = ["formula", &at("swings.csv"), "--coords", "a", "--periodic", "a", "--trajectory", "run", "--friction"];
+    let found = lnn(&[&data[..], &["--json", "--out", &at("found.toml")]].concat());
+    assert_eq!(found.code, Some(0), "{}", found.stderr);
+    let found: serde_json::Value = serde_json::from_str(&found.stdout).unwrap();
+    let terms = found["terms"].as_array().unwrap();
+    let seen: Vec<(bool, &str, &str)> = terms
+        .iter()
+        .map(|t| (t["dissipation"] == true, t["term"].as_str().unwrap(), t["unit"].as_str().unwrap()))
+        .collect();
+    assert_eq!(seen, [(false, "a_dot^2", "1"), (false, "cos(a)", "1/s^2"), (true, "a_dot^2", "1/s")]);
+    assert!((terms[2]["coefficient"].as_f64().unwrap() - 0.1).abs() < 2e-3, "{found}");
+    // The file moves as the system did.
+    fs::write(at("damped.toml"), DAMPED).unwrap();
+    let last = |file: &str| {
+        let roll = ["rollout", "--system", file, "--state", "1,0", "--t-end", "4", "--dt", "1", "--out", "-"];
+        let rolled = lnn(&roll);
+        assert_eq!(rolled.code, Some(0), "{}", rolled.stderr);
+        let row = rolled.stdout.trim_end().lines().last().unwrap().to_string();
+        row.split(',').nth(1).unwrap().parse::<f64>().unwrap()
+    };
+    let [own, exact] = [at("found.toml"), at("damped.toml")].map(|file| last(&file));
+    assert!((own - exact).abs() < 5e-3, "{own} {exact}");
+    // Networks learn it with a friction.
+    let config = lnn(&["train", &at("found.toml"), "--print-config"]);
+    assert!(config.code == Some(0) && config.stdout.contains("\ndissipation = 16"), "{}", config.stdout);
+    assert!(config.stdout.contains("dissipation = \"c3*a_dot^2\""), "{}", config.stdout);
 }
 
 #[test]
