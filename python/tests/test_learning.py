@@ -118,11 +118,16 @@ def test_ctrl_c_ends_a_training_with_the_best_model():
         time.sleep(1.0)
         os.kill(os.getpid(), signal.SIGINT)
 
+    # A shell lets what runs in its background ignore Ctrl-C.
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
     pressing = threading.Thread(target=press)
     pressing.start()
     began = time.monotonic()
-    learned = lnn.train("harmonic-oscillator", **{**SMALL, "epochs": 1_000_000}, starts=1, config=STATES)
-    pressing.join()
+    try:
+        learned = lnn.train("harmonic-oscillator", **{**SMALL, "epochs": 1_000_000}, starts=1, config=STATES)
+        pressing.join()
+    finally:
+        signal.signal(signal.SIGINT, before)
     assert learned.stop == "interrupted" and time.monotonic() - began < 30
     assert 0 < len(learned.history["epoch"]) < 1_000_000 and np.isfinite(learned.model.acceleration([0.5], [0.0])).all()
 
