@@ -130,7 +130,7 @@ impl<S: Scalar> SystemInstance<S> {
     ///
     /// # Errors
     /// [`SystemError::UnknownSystem`] if the description is not of the catalogue or the scalar is none of `f32`, `f64` and
-    /// [`Dd`].
+    /// [`Dd`](crate::scalar::Dd).
     pub fn build(&self) -> Result<Box<dyn EulerLagrange<S>>, SystemError> {
         let free = construct_once(self).ok_or_else(|| unknown_system(&self.system.name))?;
         self.constrain(match self.friction() {
