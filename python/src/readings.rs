@@ -79,7 +79,7 @@ impl FormulaChoices {
             return Err(value("scale: expected a term and a number that is not 0"));
         }
         let options =
-            FormulaOptions { families, functions, gyroscopic, friction, noise, scale, bootstraps, seed, threads };
+            FormulaOptions { families, functions, gyroscopic, friction, noise, scale, bootstraps, seed, threads, ..FormulaOptions::default() };
         Ok((options, name))
     }
 }

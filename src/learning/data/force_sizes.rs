@@ -68,7 +68,7 @@ mod tests {
 
     /// Forces of 4 kg and 1 kg, the second beside a constant weight.
     fn driven() -> Dataset<f64> {
-        let wave = |k: usize, phase: f64| (0.1 * k as f64 + phase).sin();
+        let wave = |k: usize, phase: f64| (std::f64::consts::TAU * k as f64 / 40.0 + phase).sin();
         let rows = || (0..400).map(|k| [wave(k, 0.0), wave(k, 1.0)]);
         let a: Vec<f64> = rows().flatten().collect();
         let force = rows().flat_map(|[a, b]| [4.0 * a, b + 30.0]).collect();

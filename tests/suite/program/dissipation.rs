@@ -71,7 +71,7 @@ fn a_motion_with_friction_comes_with_its_energy_balance() {
     assert!(first.starts_with("51 samples to t = 0.5, "), "{first}");
     let words: Vec<&str> = second.split([' ', ',']).collect();
     let after = |word: &str| -> f64 { words[words.iter().position(|w| *w == word).unwrap() + 1].parse().unwrap() };
-    let (change, taken, defect) = (after("by"), after("took"), after("for"));
+    let (change, taken, defect) = (after("by"), after("removed"), after("defect"));
     assert!(taken > 0.0 && change < 0.0 && defect.abs() < 1e-7 * taken, "{second}");
     let csv = fs::read_to_string(&out).unwrap();
     assert_eq!(csv.lines().next(), Some("t,shoulder,elbow,shoulder_dot,elbow_dot,energy"));

@@ -64,7 +64,9 @@ fn a_fit_stopped_in_the_middle_comes_to_the_same_end() {
     resume(&["--out", &whole]).refused(2, &["--resume"]);
     let anew = lnn(&[&base[..], &["--out", &out]].concat());
     assert!(
-        anew.code == Some(1) && anew.stderr.contains("unfinished") && anew.stderr.contains(&on[12..]),
+        anew.code == Some(1)
+            && anew.stderr.contains("unfinished")
+            && anew.stderr.contains(&on["continue with: ".len()..]),
         "{}",
         anew.stderr
     );

@@ -91,6 +91,7 @@ const WORDS: [&str; 50] = [
     "constraints",
     "set",
     "friction",
+    "joint-friction",
     "checkpoint-every",
 ];
 
