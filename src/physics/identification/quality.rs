@@ -31,6 +31,15 @@ pub(super) fn whiteness(residuals: &[Vec<f64>], n: usize, coordinate: usize) -> 
     (correlation, (correlation - expected).abs() <= (4.0 / pairs.sqrt()).max(NEGLIGIBLE) + taken)
 }
 
+/// Standard deviation of the residuals of a coordinate by the median of their size, which samples that stand out do not move.
+pub(super) fn usual(residuals: &[Vec<f64>], n: usize, coordinate: usize) -> f64 {
+    let own = residuals.iter().flat_map(|segment| segment.iter().skip(coordinate).step_by(n));
+    let mut sizes: Vec<f64> = own.map(|r| r.abs()).collect();
+    sizes.sort_by(f64::total_cmp);
+    // The median of the size of normal numbers is 0.6745 of their deviation.
+    sizes.get(sizes.len() / 2).copied().unwrap_or(0.0) / 0.6745
+}
+
 /// Samples far from the motion, the farthest first, and the number of all of them.
 pub(super) fn outliers(
     (segments, residuals): (&[Segment], &[Vec<f64>]),
@@ -40,10 +49,7 @@ pub(super) fn outliers(
     let mut found = Vec::new();
     for i in 0..n {
         let of = |segment: &Vec<f64>| segment.iter().skip(i).step_by(n).copied().collect::<Vec<_>>();
-        let mut sizes: Vec<f64> = residuals.iter().flat_map(of).map(f64::abs).collect();
-        sizes.sort_by(f64::total_cmp);
-        // The median of the size of normal numbers is 0.6745 of their deviation.
-        let usual = sizes.get(sizes.len() / 2).copied().unwrap_or(0.0) / 0.6745;
+        let usual = usual(residuals, n, i);
         for (segment, residuals) in segments.iter().zip(residuals) {
             for (sample, r) in of(residuals).into_iter().enumerate().filter(|(_, r)| r.abs() > FAR * usual) {
                 found.push((segment.track, segment.first + sample, i, r / usual.max(f64::MIN_POSITIVE)));

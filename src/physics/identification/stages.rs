@@ -3,7 +3,7 @@
 use super::determined::{Determined, Examiner};
 use super::follow::{Course, Segment};
 use super::found::{Constant, Identified, Outlier, Residual, SensorConstant};
-use super::quality::{outliers, whiteness};
+use super::quality::{outliers, usual, whiteness};
 use super::smoothed::States;
 use super::solve::{Normal, Problem, Sensor, SensorKind};
 use super::{Between, IdentifyError, IdentifyOptions};
@@ -469,6 +469,9 @@ fn result(
     let by_coordinate: Vec<Residual> = (0..n).map(of).collect();
     let square = by_coordinate.iter().map(|r| (r.rms / r.noise).powi(2)).sum::<f64>() / n as f64;
     let over_noise = square.sqrt();
+    // Samples that stand out do not excuse the others.
+    let usual = (0..n).map(|i| usual(&residuals, n, i) * problem.sigma[i] / noise[i]).map(|r| r * r / taken);
+    let usual_over_noise = (usual.sum::<f64>() / n as f64).sqrt();
     let far = |track: usize, sample: usize, i: usize, size: f64| Outlier {
         track,
         sample,
@@ -482,7 +485,7 @@ fn result(
         sensors: sensors.collect(),
         correlations: (0..m * m).map(correlation).collect(),
         undetermined,
-        explained: by_coordinate.iter().all(|r| r.white) && (over_noise < EXPLAINED || outlier_count > 0),
+        explained: by_coordinate.iter().all(|r| r.white) && usual_over_noise < EXPLAINED,
         residuals: by_coordinate,
         over_noise,
         outliers,

@@ -41,7 +41,7 @@ fn every_value(base: &[&str], option: &str, form: &dyn Fn(&str) -> String) {
 }
 
 /// Options of the commands below that take no number.
-const WORDS: [&str; 50] = [
+const WORDS: [&str; 51] = [
     "acceleration",
     "activation",
     "beside",
