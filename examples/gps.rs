@@ -11,7 +11,7 @@ use lnn::identification::{Identified, IdentifyOptions, identify};
 use lnn::lagrangian::{SystemInstance, configure_system};
 use lnn::random::RngStream;
 use lnn::recording::{RecordedTrajectory, Recording};
-use lnn::rollout::Motion;
+use lnn::rollout::{Options, rollout};
 use rand_distr::{Distribution, StandardNormal};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -190,7 +190,8 @@ pub fn made() -> Outcome<()> {
         let q = place(radius * phase.cos(), radius * phase.sin());
         let mut v = place(-speed * phase.sin(), speed * phase.cos());
         (v[0], v[1]) = (v[0] + TRUTH[2].1 * q[1], v[1] - TRUTH[2].1 * q[0]);
-        let motion = model.rollout(&q, &v, 85_500.0, 900.0)?;
+        let options = Options { energy: false, ..Options::reference(85_500.0, 900.0) };
+        let motion = rollout(model.as_ref(), &q, &v, &options).complete()?;
         let q = motion.q.iter().map(|q| q + 0.05 * Distribution::<f64>::sample(&StandardNormal, &mut rng)).collect();
         tracks.push(RecordedTrajectory {
             name: format!("G{k:02}"),

@@ -38,7 +38,7 @@ table! {
         #[serde(skip_serializing_if = "Option::is_none")]
         pub horizon: Option<f64> = None,
         /// Constraints between the coordinates: none, those that find reads off the motion, or formulas by name that vanish, from the
-        /// table `[constraints]` of a file.
+        /// table `constraints` of a file.
         #[key("none, find, or a file", example = "\"find\"", flag = "constraints")]
         pub constraints: FitConstraints = FitConstraints::None,
         /// Whether a formula of the Lagrangian is looked for in the training motion, with friction if the model has it: minutes.

@@ -30,8 +30,10 @@ const WORSE: f64 = 1.5;
 const GAIN: f64 = 0.01;
 /// Segments from which on their scatter tells how far errors are to be widened.
 const MANY: usize = 8;
-/// Root mean square of residuals over the noise up to which a form explains the motion.
+/// Size of residuals over the noise up to which a form explains the motion.
 const EXPLAINED: f64 = 1.3;
+/// Standard deviations by which the pulls of segments may scatter more than noise does, if a form explains the motion.
+const ALIKE: f64 = 4.0;
 const ITERATIONS: usize = 40;
 
 /// Constants, sensors and starts with the normal equations there.
@@ -469,6 +471,8 @@ fn result(
     let by_coordinate: Vec<Residual> = (0..n).map(of).collect();
     let square = by_coordinate.iter().map(|r| (r.rms / r.noise).powi(2)).sum::<f64>() / n as f64;
     let over_noise = square.sqrt();
+    // Within short segments a wrong form may pass for right: each then has constants of its own.
+    let alike = widened <= 1.0 + ALIKE * (2.0 / fitted.segments.len() as f64).sqrt();
     // Samples that stand out do not excuse the others.
     let usual = (0..n).map(|i| usual(&residuals, n, i) * problem.sigma[i] / noise[i]).map(|r| r * r / taken);
     let usual_over_noise = (usual.sum::<f64>() / n as f64).sqrt();
@@ -485,7 +489,7 @@ fn result(
         sensors: sensors.collect(),
         correlations: (0..m * m).map(correlation).collect(),
         undetermined,
-        explained: by_coordinate.iter().all(|r| r.white) && usual_over_noise < EXPLAINED,
+        explained: by_coordinate.iter().all(|r| r.white) && usual_over_noise < EXPLAINED && alike,
         residuals: by_coordinate,
         over_noise,
         outliers,
