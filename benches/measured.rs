@@ -221,7 +221,7 @@ pub fn trial() {
     assert_eq!(determination::compare(0..1, (4, 3.0), scale).len(), 5 + 6 + 3 + 3 + 5 + 3);
     assert_eq!(orbits::compare(&[(6, 0.001)], true, (Some(1), 1)).len(), 15);
     let place = tempfile::tempdir().expect("a folder");
-    assert_eq!(arm7::compare(0..1, 6.0, place.path(), (Some(1), 1)).len(), 2 * 7);
+    assert_eq!(arm7::compare(0..1, 8.0, place.path(), (Some(1), 1)).len(), 2 * 7);
     let found = rows::time(&place.path().join("rows.csv"), 2000);
     assert_eq!((found.samples, found.cuts.len(), found.warnings.len()), (2000, 0, 0));
 }
