@@ -44,11 +44,6 @@ pub enum PipelineError {
     /// Constraints with a mistake, that contradict each other or leave no motion, or that recorded motion does not obey.
     #[error("{0}")]
     Constraints(String),
-    /// Multiple shooting, or forces, as targets asked for where constraints hold the motion.
-    #[error(
-        "targets: neither multiple shooting nor forces know constraints, expected smoothed or measured accelerations beside them"
-    )]
-    TargetsUnderConstraints,
     /// A shape of the network that contradicts itself.
     #[error(transparent)]
     Network(#[from] NetworkError),
@@ -164,7 +159,7 @@ impl PipelineError {
     pub(crate) fn is_configuration(&self) -> bool {
         match self {
             Self::Config(_) | Self::System(_) | Self::Network(_) | Self::NoAccelerations | Self::NoForces => true,
-            Self::Constraints(_) | Self::TargetsUnderConstraints => true,
+            Self::Constraints(_) => true,
             Self::Sampling(error) => !matches!(error, SamplingError::Dataset(_) | SamplingError::Interrupted),
             Self::OtherShape { configuration, .. } => *configuration,
             _ => false,

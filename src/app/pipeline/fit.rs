@@ -155,6 +155,7 @@ fn fit_in<S: Scalar>(
             training: &training,
             validation: &validation,
             noise: &noise,
+            constraints: prepared.constraints(),
             seed: config.seed,
         };
         let start = Some(shots.unwrap_or_else(|| trained.snapshot(config)));

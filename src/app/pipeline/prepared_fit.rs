@@ -36,12 +36,11 @@ impl<'a> PreparedFit<'a> {
     /// # Errors
     /// [`PipelineError::Recording`] for motion that cannot be learned from, [`PipelineError::NoAccelerations`] if measured
     /// ones are asked for and there are none, [`PipelineError::NoForces`] for forces that not every coordinate has;
-    /// [`PipelineError::Constraints`] for constraints with a mistake, that contradict each other, or that the motion does not obey;
-    /// [`PipelineError::TargetsUnderConstraints`].
+    /// [`PipelineError::Constraints`] for constraints with a mistake, that contradict each other, or that the motion does not obey.
     pub fn new(reading: &'a LoadedRecording, options: &FitOptions) -> Result<Self, PipelineError> {
         let started = Instant::now();
         let measured = RecordingSplit::of_takes(&reading.recording, &reading.takes, &options.preparation())?;
-        let mut targets = options.targets.unwrap_or_else(|| measured.advice());
+        let targets = options.targets.unwrap_or_else(|| measured.advice());
         if targets == Targets::Measured && !measured.training.recording.has_accelerations() {
             return Err(PipelineError::NoAccelerations);
         }
@@ -49,12 +48,6 @@ impl<'a> PreparedFit<'a> {
             return Err(PipelineError::NoForces);
         }
         let (mut held, remarks) = FitHeld::new(options, &measured)?;
-        if held.is_some() && matches!(targets, Targets::Motion | Targets::Forces) {
-            if options.targets.is_some() {
-                return Err(PipelineError::TargetsUnderConstraints);
-            }
-            targets = Targets::Smoothed;
-        }
         if let Some(held) = &mut held {
             let set = measured.datasets::<f64>(targets)?.training.swap_remove(0);
             held.require_obedience(set, &measured.noise().q)?;

@@ -2,6 +2,7 @@
 
 use crate::configuration::{ConfigError, Penalty};
 use crate::data::{Noise, StateEstimate};
+use crate::lagrangian::{FormulaConstraints, FormulaError, Manifold};
 use crate::network::{Architecture, Layout, NetworkError};
 use crate::random::RngStream;
 use crate::recording::TrajectoryError;
@@ -15,6 +16,7 @@ use crate::training::epoch::Epoch;
 use crate::training::phase::{Epochs, StopReason, run_epochs};
 use crate::training::solver::{EpochSolver, Hooks, Run, Saver};
 use crate::training::trainer::{ResumeOptions, TrainingError};
+use std::sync::Arc;
 use thiserror::Error;
 
 /// A network and the recorded motion it is fitted to.
@@ -32,6 +34,8 @@ pub struct Task<'a, S> {
     pub validation: &'a [StateEstimate<'a>],
     /// Noise of the measurements; where there is none, the accuracy that is asked for.
     pub noise: &'a Noise,
+    /// Constraints that hold the motion.
+    pub constraints: Option<&'a FormulaConstraints>,
     /// Seed of the order of segments.
     pub seed: u64,
 }
@@ -89,6 +93,9 @@ pub enum ShootingError {
         /// Training or validation trajectories.
         what: &'static str,
     },
+    /// Constraints of other coordinates than the network's.
+    #[error(transparent)]
+    Constraints(#[from] FormulaError),
     /// Training failed.
     #[error(transparent)]
     Training(#[from] TrainingError),
@@ -138,7 +145,19 @@ impl<S: Scalar> Task<'_, S> {
     fn cut(&self, which: &'static str, per_segment: usize, steps: usize) -> Result<Segments<S>, ShootingError> {
         let trajectories = if which == TRAINING { self.training } else { self.validation };
         let segments = Segments::new(self.architecture, trajectories, self.noise, per_segment, steps);
-        if segments.is_empty() { Err(ShootingError::TooShort { what: which }) } else { Ok(segments) }
+        if segments.is_empty() {
+            return Err(ShootingError::TooShort { what: which });
+        }
+        Ok(match self.manifold()? {
+            Some(manifold) => segments.under(self.architecture, manifold),
+            None => segments,
+        })
+    }
+
+    /// The states that the constraints allow.
+    fn manifold(&self) -> Result<Option<Arc<dyn Manifold<S>>>, FormulaError> {
+        let manifold = self.constraints.map(FormulaConstraints::manifold).transpose()?;
+        Ok(manifold.map(|manifold| Arc::new(manifold) as _))
     }
 }
 
@@ -204,6 +223,9 @@ pub fn resume<S: Scalar>(
     let mut shots =
         ShootingObjective::new(task.architecture, task.penalty, (settings.continuity, settings.huber), threads)
             .map_err(TrainingError::from)?;
+    if let Some(manifold) = task.manifold()? {
+        shots = shots.under(manifold);
+    }
     let training = match settings.steps {
         Some(steps) => task.cut(TRAINING, per_segment, steps)?,
         None => fine_enough(&mut shots, &task, per_segment)?,

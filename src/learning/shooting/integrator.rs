@@ -12,11 +12,13 @@
 //! with what the adjoint identity needs. Every gradient is that of this map, exactly.
 
 use crate::configuration::Penalty;
+use crate::lagrangian::Manifold;
 use crate::network::Model;
 use crate::scalar::{Real, Scalar};
 use crate::shooting::motion::Motion;
 use crate::shooting::segments::Segments;
 use crate::tape::Depth;
+use std::sync::Arc;
 
 /// Integrates chunks of segments; buffers are reused from chunk to chunk.
 pub(super) struct Integrator<S> {
@@ -30,6 +32,8 @@ pub(super) struct Integrator<S> {
     stage_q: Vec<S>,
     stage_v: Vec<S>,
     stage_a: Vec<S>,
+    /// Multipliers of the constraints of all stages, `(steps, 4, rows, m)`.
+    stage_load: Vec<S>,
     /// States at the starts of steps and at the end, `(steps + 1, rows, n)`.
     pub q: Vec<S>,
     pub v: Vec<S>,
@@ -46,9 +50,9 @@ pub(super) struct Integrator<S> {
 }
 
 impl<S: Scalar> Integrator<S> {
-    pub fn new(model: &Model<S>) -> Self {
+    pub fn new(model: &Model<S>, manifold: Option<Arc<dyn Manifold<S>>>) -> Self {
         Self {
-            motion: Motion::new(model),
+            motion: Motion::new(model, manifold),
             n: model.coordinates(),
             rows: 0,
             steps: 0,
@@ -56,6 +60,7 @@ impl<S: Scalar> Integrator<S> {
             stage_q: Vec::new(),
             stage_v: Vec::new(),
             stage_a: Vec::new(),
+            stage_load: Vec::new(),
             q: Vec::new(),
             v: Vec::new(),
             q_adjoint: Vec::new(),
@@ -97,6 +102,7 @@ impl<S: Scalar> Integrator<S> {
     pub fn forward(&mut self, weights: &[S], segments: &Segments<S>, rows: &[u32]) {
         let (n, size) = (self.n, self.rows * self.n);
         let (half, sixth, third) = (<S as Real>::half(), S::ratio(1, 6), S::ratio(1, 3));
+        self.stage_load.clear();
         for j in 0..self.steps {
             for k in 0..4 {
                 let slot = (4 * j + k) * size;
@@ -115,7 +121,7 @@ impl<S: Scalar> Integrator<S> {
                 }
                 external(segments, rows, n, 2 * j + [0, 1, 1, 2][k], &mut self.external);
                 self.motion.evaluate(weights, stage_q, stage_v, Depth::Motion);
-                self.motion.accelerate(&self.external, &mut self.alive, &mut now[..size]);
+                self.motion.accelerate(&self.external, &mut self.alive, &mut now[..size], &mut self.stage_load);
             }
             let a = &self.stage_a[4 * j * size..][..4 * size];
             let (q, q_next) = self.q[j * size..].split_at_mut(size);
@@ -155,6 +161,7 @@ impl<S: Scalar> Integrator<S> {
         let (half, sixth, third) = (<S as Real>::half(), S::ratio(1, 6), S::ratio(1, 3));
         let zero = <S as Real>::zero();
         let (mut total, mut count) = (zero, 0);
+        let held = self.rows * self.motion.constraints();
         for list in self.a_adjoint.iter_mut().chain([&mut self.dq, &mut self.dv]) {
             list.resize(size, zero);
         }
@@ -183,8 +190,9 @@ impl<S: Scalar> Integrator<S> {
                 self.dq.fill(zero);
                 self.dv.fill(zero);
                 let a = &self.stage_a[slot];
+                let loads = &self.stage_load[(4 * j + k) * held..(4 * j + k + 1) * held];
                 let inputs = (self.dq.as_mut_slice(), self.dv.as_mut_slice());
-                self.motion.pull_back(weights, (a, &self.a_adjoint[k]), &self.alive, gradient, inputs);
+                self.motion.pull_back(weights, (a, &self.a_adjoint[k], loads), &self.alive, gradient, inputs);
                 let [a1, a2, a3, _] = &mut self.a_adjoint;
                 for e in 0..size {
                     let (h, x, y) = (self.h[e / n], self.dq[e], self.dv[e]);

@@ -16,6 +16,9 @@
 //! Bock, H. G. (1981), "Numerical treatment of inverse problems in chemical reaction kinetics" (multiple shooting);
 //! Hager, W. W. (2000), "Runge-Kutta methods in optimal control and the transformed adjoint system" (its discrete adjoint).
 //!
+//! Under constraints the network's motion is that with their multipliers, and starts stay where the constraints allow: each Gauss-Newton
+//! step is taken along them, and brought back to them.
+//!
 //! [`fit`] does it all; [`Segments`] and [`ShootingObjective`] are its parts.
 
 mod fit;
@@ -27,6 +30,7 @@ mod objective;
 mod segments;
 mod settings;
 mod starts;
+mod surface;
 
 #[doc(hidden)]
 pub use fit::resume;

@@ -4,6 +4,7 @@
 //! their order: the same numbers on any number of threads.
 
 use crate::configuration::Penalty;
+use crate::lagrangian::Manifold;
 use crate::network::{Architecture, Model};
 use crate::scalar::{Real, Scalar, Sum};
 use crate::shooting::integrator::Integrator;
@@ -44,6 +45,7 @@ pub struct ShootingObjective<S> {
     penalty: Penalty,
     huber: Huber<S>,
     continuity: S,
+    manifold: Option<Arc<dyn Manifold<S>>>,
     pool: Arc<rayon::ThreadPool>,
     shards: Vec<Shard<S>>,
 }
@@ -78,9 +80,9 @@ pub(super) struct Shard<S> {
 }
 
 impl<S: Scalar> Shard<S> {
-    fn new(model: &Model<S>) -> Self {
+    fn new(model: &Model<S>, manifold: Option<Arc<dyn Manifold<S>>>) -> Self {
         Self {
-            integrator: Integrator::new(model),
+            integrator: Integrator::new(model, manifold),
             gradient: Vec::new(),
             start_gradient: Vec::new(),
             next_gradient: Vec::new(),
@@ -244,7 +246,13 @@ impl<S: Scalar> ShootingObjective<S> {
     ) -> Result<Self, ThreadsError> {
         let pool = start_threads(threads)?;
         let (huber, continuity) = (Huber::new(huber), S::of_f64(continuity));
-        Ok(Self { model: architecture.model(), penalty, huber, continuity, pool, shards: Vec::new() })
+        let model = architecture.model();
+        Ok(Self { model, penalty, huber, continuity, manifold: None, pool, shards: Vec::new() })
+    }
+
+    /// The same under constraints; the segments have to be [under](Segments::under) them too.
+    pub fn under(self, manifold: Arc<dyn Manifold<S>>) -> Self {
+        Self { manifold: Some(manifold), shards: Vec::new(), ..self }
     }
 
     /// The model that is trained.
@@ -262,7 +270,7 @@ impl<S: Scalar> ShootingObjective<S> {
         let size = rows.len().div_ceil(CHUNK).div_ceil(SHARDS).max(1) * CHUNK;
         let count = rows.len().div_ceil(size);
         while self.shards.len() < count {
-            self.shards.push(Shard::new(&self.model));
+            self.shards.push(Shard::new(&self.model, self.manifold.clone()));
         }
         let shards = &mut self.shards[..count];
         self.pool.install(|| {

@@ -6,12 +6,15 @@
 //! from a multiple of `2 pi` near the segment's start, so that a motion of many turns loses no digits.
 
 use crate::data::{Noise, StateEstimate};
+use crate::lagrangian::Manifold;
 use crate::network::Architecture;
 use crate::recording::hermite;
 use crate::rollout::SampledForce;
 use crate::scalar::{Real, Scalar};
+use crate::shooting::surface::Surface;
 use std::f64::consts::TAU;
 use std::ops::Range;
+use std::sync::Arc;
 
 /// A state may leave the range of the data by this factor before its segment is given up.
 const RANGE: f64 = 10.0;
@@ -74,6 +77,8 @@ pub struct Segments<S> {
     pub(super) range: Vec<S>,
     /// Estimated starts, `(segments, 2, n)`.
     starts: Vec<S>,
+    /// The constraints that starts obey.
+    pub(super) surface: Option<Surface<S>>,
 }
 
 /// Samples of one track that one segment owns, and whether it is followed by another.
@@ -129,6 +134,7 @@ impl<S: Scalar> Segments<S> {
             tau: Vec::new(),
             range: Vec::new(),
             starts: Vec::new(),
+            surface: None,
         };
         // Largest excursion within a segment and speed, physical.
         let mut largest = vec![0.0_f64; 2 * n];
@@ -155,6 +161,14 @@ impl<S: Scalar> Segments<S> {
             .map(|k| S::of_f64(RANGE * largest[k] / scale(k % n)).max(S::of_f64(100.0 * RANGE) * all.tau[k]))
             .collect();
         all
+    }
+
+    /// The same under constraints, to which the starts are brought.
+    pub fn under(mut self, architecture: &Architecture, manifold: Arc<dyn Manifold<S>>) -> Self {
+        let surface = Surface::new(architecture, manifold);
+        self.starts.chunks_exact_mut(2 * self.n).for_each(|start| surface.bring(start));
+        self.surface = Some(surface);
+        self
     }
 
     fn push(

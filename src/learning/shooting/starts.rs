@@ -186,14 +186,22 @@ impl<S: Scalar> Curvature<S> {
                 continue;
             }
             // A start whose curvature says nothing stays.
-            if solve(width, h, g, &mut self.correction, &mut self.workspace).is_err() {
-                continue;
-            }
+            let step = match &segments.surface {
+                Some(surface) => surface.step(start, h, g, &mut self.workspace),
+                None => {
+                    let solved = solve(width, h, g, &mut self.correction, &mut self.workspace);
+                    solved.is_ok().then(|| self.correction.clone())
+                }
+            };
+            let Some(step) = step else { continue };
             let limit = |k: usize| S::of_f64(LONGEST) * segments.range[k];
-            let excess = (0..width).map(|k| share * self.correction[k].abs() / limit(k));
+            let excess = (0..width).map(|k| share * step[k].abs() / limit(k));
             let excess = excess.fold(<S as Real>::one(), |most, x| if x > most { x } else { most });
-            for (x, &d) in start.iter_mut().zip(&self.correction) {
+            for (x, &d) in start.iter_mut().zip(&step) {
                 *x -= share / excess * d;
+            }
+            if let Some(surface) = &segments.surface {
+                surface.bring(start);
             }
         }
     }

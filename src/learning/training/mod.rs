@@ -2,6 +2,7 @@
 
 pub(crate) mod checkpoint;
 pub(crate) mod epoch;
+pub(crate) mod held;
 mod lbfgs;
 pub(crate) mod learner;
 mod memory;

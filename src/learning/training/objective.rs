@@ -10,7 +10,7 @@
 //!
 //! States may be learned from by their [residuals of force](Dataset::with_force_residuals) `r = M a + c - g + dD/dv - Q` instead, at the
 //! accelerations of the data: a loss `l(r)` has the gradient of one on accelerations with `lam = -dl/dr` and this `a`, and nothing is
-//! solved for.
+//! solved for. Under constraints only that part of `r` counts which no force `A^T lambda` makes.
 //!
 //! Under constraints, rows `A` of the data, they solve `[M A^T; A 0] [a; -lambda] = [g - c + Q; -gamma]`. With the same matrix and
 //! `[lam; nu]` for `[dl/da; 0]` the gradient is that without constraints, at this `lam` and this `a`: `A lam = 0`. Penalties act on
@@ -22,11 +22,12 @@
 
 use crate::configuration::Penalty;
 use crate::data::Dataset;
-use crate::lagrangian::{MechanicsError, ReducedMass};
+use crate::lagrangian::{MechanicsError, take_out};
 use crate::linalg::{SignatureBuffers as Buffers, Violation, Workspace, characteristic_scales, solve};
 use crate::network::{Architecture, Dynamics, Model};
 use crate::scalar::{Real, Scalar, Sum};
 use crate::tape::{Depth, MixedDirections, STATES};
+use crate::training::held::Held;
 use crate::training::reduction::sum_gradients;
 use crate::training::violations::Violations;
 use rayon::prelude::*;
@@ -99,10 +100,7 @@ struct Shard<S> {
     workspace: Workspace<S>,
     signature: Buffers<S>,
     violation: Violation<S>,
-    /// Matrices, right-hand sides and solutions under constraints, `(states, n + m, ..)`.
-    bordered: Vec<S>,
-    bordered_right: Vec<S>,
-    bordered_solution: Vec<S>,
+    held: Held<S>,
     /// `|M_ii|` of every state, `(states, n)`, and the states whose signature is in doubt with their matrices.
     diagonal: Vec<S>,
     suspects: Vec<usize>,
@@ -128,9 +126,7 @@ impl<S: Scalar> Shard<S> {
             workspace: Workspace::new(),
             signature: Buffers::default(),
             violation: Violation::default(),
-            bordered: Vec::new(),
-            bordered_right: Vec::new(),
-            bordered_solution: Vec::new(),
+            held: Held::default(),
             diagonal: Vec::new(),
             suspects: Vec::new(),
             suspect_matrices: Vec::new(),
@@ -174,7 +170,7 @@ impl<S: Scalar> Shard<S> {
         let (penalty, lambda) = penalty;
         match penalty {
             Penalty::None => {}
-            _ if data.constraints() > 0 => self.add_reduced_eigenvalue(data, rows, lambda),
+            _ if data.constraints() > 0 => self.add_reduced_eigenvalue(lambda),
             _ if penalty.needs_scales() => self.note_suspects(penalty),
             _ => self.add_violations(penalty, lambda),
         }
@@ -249,7 +245,7 @@ impl<S: Scalar> Shard<S> {
         }
         self.acceleration.resize(self.right.len(), <S as Real>::zero());
         if data.constraints() > 0 {
-            self.border(data, rows);
+            self.hold(data, rows);
         }
         if self.solve_motion(n, data.constraints(), true) {
             return;
@@ -261,57 +257,28 @@ impl<S: Scalar> Shard<S> {
         }
     }
 
-    /// The matrices `[M A^T; A 0]` of the chunk and what `A a` has to be, in scaled coordinates and with rows of unit length.
-    fn border(&mut self, data: &Dataset<S>, rows: &[u32]) {
-        let (n, m, zero) = (data.coordinates(), data.constraints(), <S as Real>::zero());
-        let k = n + m;
-        let masses = &self.dynamics.lagrangian().mass_matrix;
-        self.bordered.clear();
-        self.bordered.resize(rows.len() * k * k, zero);
-        self.bordered_right.clear();
-        self.bordered_right.resize(rows.len() * k, zero);
-        let blocks = self.bordered.chunks_exact_mut(k * k).zip(self.bordered_right.chunks_exact_mut(k));
-        for ((&row, mass), (block, right)) in rows.iter().zip(masses.chunks_exact(n * n)).zip(blocks) {
-            for i in 0..n {
-                block[i * k..i * k + n].copy_from_slice(&mass[i * n..(i + 1) * n]);
-            }
-            let (matrix, drift) = data.constraint(row as usize);
-            for (c, (gradient, &drift)) in matrix.chunks_exact(n).zip(drift).enumerate() {
-                let scaled = gradient.iter().zip(&self.scale).map(|(&a, &s)| a * s);
-                let square = scaled.clone().fold(zero, |sum, a| sum + a * a);
-                // A row that vanishes is left to the solve, which finds it singular.
-                let unit = if square > zero { Real::sqrt(square).recip() } else { <S as Real>::one() };
-                for (i, a) in scaled.enumerate() {
-                    block[i * k + n + c] = a * unit;
-                    block[(n + c) * k + i] = a * unit;
-                }
-                right[n + c] = -drift * unit;
-            }
+    /// Takes the constraints of the chunk.
+    fn hold(&mut self, data: &Dataset<S>, rows: &[u32]) {
+        self.held.clear((data.coordinates(), data.constraints()));
+        for &row in rows {
+            self.held.push(&self.scale, data.constraint(row as usize));
         }
     }
 
     /// Solves for `right`, into the accelerations if it is what moves the states, or with `A x = 0` into the multipliers of the loss; `true`
     /// if no state failed.
     fn solve_motion(&mut self, n: usize, m: usize, motion: bool) -> bool {
+        let Self { held, right, workspace, .. } = self;
         let solution = if motion { &mut self.acceleration } else { &mut self.multiplier };
-        if m == 0 {
-            let matrices = &self.dynamics.lagrangian().mass_matrix;
-            return solve(n, matrices, &self.right, solution, &mut self.workspace).is_ok();
-        }
-        let (k, zero) = (n + m, <S as Real>::zero());
-        for (to, from) in self.bordered_right.chunks_exact_mut(k).zip(self.right.chunks_exact(n)) {
-            to[..n].copy_from_slice(from);
-            if !motion {
-                to[n..].fill(zero);
+        let masses = &self.dynamics.lagrangian().mass_matrix;
+        match (m, motion) {
+            (0, _) => solve(n, masses, right, solution, workspace).is_ok(),
+            (_, true) => {
+                held.border(masses);
+                held.motion(right, solution, workspace)
             }
+            (_, false) => held.adjoint(right, solution, workspace),
         }
-        self.bordered_solution.resize(self.bordered_right.len(), zero);
-        let Self { bordered, bordered_right, bordered_solution, workspace, .. } = self;
-        let solved = solve(k, bordered, bordered_right, bordered_solution, workspace).is_ok();
-        for (to, from) in solution.chunks_exact_mut(n).zip(bordered_solution.chunks_exact(k)) {
-            to.copy_from_slice(&from[..n]);
-        }
-        solved
     }
 
     /// Adds the known forces, in scaled coordinates `s_i Q_i`, to the right-hand sides.
@@ -346,9 +313,14 @@ impl<S: Scalar> Shard<S> {
             let a = &data.a()[row as usize * n..][..n];
             self.acceleration.extend(a.iter().zip(&self.scale).map(|(&a, &s)| a / s));
         }
+        let held = data.constraints() > 0;
+        if held {
+            self.hold(data, rows);
+        }
+        let units: Vec<S> = data.force_scale().iter().zip(&self.scale).map(|(&size, &s)| (size * s).recip()).collect();
         let masses = self.dynamics.lagrangian().mass_matrix.chunks_exact(n * n);
         let states = self.acceleration.chunks_exact_mut(n).zip(self.right.chunks_exact_mut(n));
-        for ((&row, mass), (a, right)) in rows.iter().zip(masses).zip(states) {
+        for (state, ((&row, mass), (a, right))) in rows.iter().zip(masses).zip(states).enumerate() {
             for (right, mass) in right.iter_mut().zip(mass.chunks_exact(n)) {
                 *right = mass.iter().zip(&*a).fold(-*right, |sum, (&m, &a)| sum + m * a);
             }
@@ -359,12 +331,17 @@ impl<S: Scalar> Shard<S> {
                 right.fill(zero);
                 continue;
             }
+            // What the constraints can carry is no residual: no motion tells it.
+            let carried = if held { self.held.carried(state, &units) } else { Vec::new() };
+            right.iter_mut().zip(&units).for_each(|(r, &unit)| *r *= unit);
+            take_out(right, &carried);
             let own = data.weight(row as usize);
-            for ((right, &size), &s) in right.iter_mut().zip(data.force_scale()).zip(&self.scale) {
-                let unit = (size * s).recip();
-                self.residual.add(own * (*right * unit).abs());
-                *right = sign(*right) * own * weight * unit;
+            for r in right.iter_mut() {
+                self.residual.add(own * r.abs());
+                *r = sign(*r) * own * weight;
             }
+            take_out(right, &carried);
+            right.iter_mut().zip(&units).for_each(|(r, &unit)| *r *= unit);
         }
     }
 
@@ -418,20 +395,10 @@ impl<S: Scalar> Shard<S> {
     }
 
     /// Counts the eigenvalue penalties of the chunk within its constraints.
-    fn add_reduced_eigenvalue(&mut self, data: &Dataset<S>, rows: &[u32], lambda: S) {
+    fn add_reduced_eigenvalue(&mut self, lambda: S) {
         let n = self.scale.len();
-        let masses = self.dynamics.lagrangian().mass_matrix.chunks_exact(n * n);
-        for (state, (mass, &row)) in masses.zip(rows).enumerate() {
-            let (matrix, _) = data.constraint(row as usize);
-            let scaled: Vec<S> = matrix.iter().enumerate().map(|(at, &a)| a * self.scale[at % n]).collect();
-            let Ok(reduced) = ReducedMass::of(n, mass, &scaled) else { continue };
-            let negative = reduced.eigenvalues.iter().zip(reduced.directions.chunks_exact(n));
-            self.violation = Violation::default();
-            for (&w, direction) in negative.take_while(|(w, _)| **w < <S as Real>::zero()) {
-                self.violation.value -= w;
-                self.violation.gamma.push(-<S as Real>::one());
-                self.violation.vectors.extend_from_slice(direction);
-            }
+        for (state, mass) in self.dynamics.lagrangian().mass_matrix.chunks_exact(n * n).enumerate() {
+            self.held.violation(state, mass, &mut self.violation);
             let range = state * n..(state + 1) * n;
             self.violations.push((&self.q[range.clone()], &self.v[range]), &self.violation, lambda);
         }

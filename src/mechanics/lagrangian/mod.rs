@@ -25,12 +25,15 @@ pub use configure::{SystemError, SystemInstance, configure, find, systems};
 #[doc(hidden)]
 pub use configure::{build, configure_system, configure_values};
 pub use constrained_systems::constrained_systems;
+#[cfg(feature = "training")]
+pub(crate) use constraints::{Bordered, independent_rows, take_out};
 pub use constraints::{
     Constrained, ConstraintError, Constraints, ExpressionConstraints, FormulaConstraints, FormulaError,
 };
 #[doc(hidden)]
 pub use constraints::{
-    LeastNorm, LeastNormMotion, Manifold, ManifoldRows, OffManifold, ReducedMass, project, project_acceleration,
+    LeastNorm, LeastNormMotion, Manifold, ManifoldRows, OffManifold, ReducedMass, RowAdjoint, project,
+    project_acceleration,
 };
 #[doc(hidden)]
 pub use derivatives::MetricJet;

@@ -41,22 +41,37 @@ fn data(seed: u64) -> Dataset<f64> {
     data.with_weights(weights).unwrap().with_force_residuals(SCALE.to_vec()).unwrap()
 }
 
-/// Half the mean of the weighted residuals over their scales.
+/// The same states, each with a constraint of its own.
+fn held(seed: u64) -> Dataset<f64> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed + 100);
+    let mut draw = |count: usize| (0..count).map(|_| rng.random_range(-1.0..1.0)).collect::<Vec<f64>>();
+    data(seed).with_constraints(draw(STATES * N), draw(STATES)).unwrap()
+}
+
+/// Half the mean of the weighted residuals over their scales, without what a force along the constraint of the state makes of them.
 fn expected(architecture: &Architecture, weights: &[f64], data: &Dataset<f64>) -> f64 {
     let network = NetworkLagrangian::new(architecture.clone(), weights.to_vec()).unwrap();
     let found = inverse_dynamics(&network, data.q(), data.v(), data.a()).unwrap().external;
     let pairs = found.iter().zip(data.force()).enumerate();
-    let sum: f64 = pairs.map(|(k, (f, q))| data.weight(k / N) * (f - q).abs() / SCALE[k % N]).sum();
+    let mut residuals: Vec<f64> = pairs.map(|(k, (f, q))| (f - q) / SCALE[k % N]).collect();
+    for (state, r) in residuals.chunks_exact_mut(N).enumerate() {
+        let (row, _) = data.constraint(state);
+        let row: Vec<f64> = row.iter().zip(SCALE).map(|(a, size)| a / size).collect();
+        let square: f64 = row.iter().map(|a| a * a).sum();
+        let along = row.iter().zip(&*r).map(|(a, r)| a * r).sum::<f64>() / square;
+        r.iter_mut().zip(&row).for_each(|(r, a)| *r -= along * a);
+    }
+    let sum: f64 = residuals.iter().enumerate().map(|(k, r)| data.weight(k / N) * r.abs()).sum();
     sum / (2 * N * STATES) as f64
 }
 
 #[test]
 fn the_loss_is_that_of_the_forces_and_has_its_gradient() {
-    for (structure, joints, dissipation) in [
-        (Structure::BlackBox, JointFriction::None, None),
-        (Structure::BlackBox, JointFriction::Stribeck, Some(3)),
-        (Structure::Mechanical, JointFriction::Dry, None),
-        (Structure::Mechanical, JointFriction::Stribeck, Some(2)),
+    for (structure, joints, dissipation, data) in [
+        (Structure::BlackBox, JointFriction::None, None, data(4)),
+        (Structure::BlackBox, JointFriction::Stribeck, Some(3), data(4)),
+        (Structure::Mechanical, JointFriction::Dry, None, held(4)),
+        (Structure::Mechanical, JointFriction::Stribeck, Some(2), data(4)),
     ] {
         let architecture = architecture(structure, joints, dissipation);
         let mut rng = ChaCha8Rng::seed_from_u64(3);
@@ -64,7 +79,6 @@ fn the_loss_is_that_of_the_forces_and_has_its_gradient() {
         // Friction that is felt.
         let layout = Layout::new(&architecture);
         weights[layout.joint_friction].iter_mut().for_each(|w| *w += rng.random_range(1.0..2.0));
-        let data = data(4);
         let rows: Vec<u32> = (0..STATES as u32).collect();
         let mut objective = Objective::new(&architecture, Penalty::None, 2).unwrap();
         let mut gradient = vec![f64::NAN; weights.len()];

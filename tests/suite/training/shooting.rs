@@ -6,7 +6,7 @@ use crate::common::{of_scalar, properties};
 use lnn::configuration::Penalty;
 use lnn::data::{Dataset, Datasets};
 use lnn::data::{Noise, StateEstimate};
-use lnn::lagrangian::configure;
+use lnn::lagrangian::{FormulaConstraints, configure};
 use lnn::network::{
     ActivationChoice, Architecture, Form, Initialization, InputLayer, Layout, LinearMap, initial_weights,
 };
@@ -251,6 +251,21 @@ fn shots<S: Scalar>(architecture: &Architecture, penalty: Penalty, threads: usiz
     ShootingObjective::new(architecture, penalty, (0.5, 2.0), threads).unwrap()
 }
 
+/// Formulas over `q0`, `q1`, .. and their velocities.
+fn formulas(n: usize, formulas: &[&str]) -> Option<FormulaConstraints> {
+    let names: Vec<String> = (0..n).map(|i| format!("q{i}")).collect();
+    let named = formulas.iter().enumerate().map(|(k, formula)| (k.to_string(), formula.to_string())).collect();
+    (!formulas.is_empty()).then(|| FormulaConstraints::new(&names, named).unwrap())
+}
+
+/// Shots under constraints.
+fn held<S: Scalar>(shots: ShootingObjective<S>, n: usize, constraints: &[&str]) -> ShootingObjective<S> {
+    match formulas(n, constraints) {
+        Some(constraints) => shots.under(Arc::new(constraints.manifold().unwrap())),
+        None => shots,
+    }
+}
+
 /// What [`ShootingObjective::step`] differentiates, for `joints` gaps of the `rows`.
 fn objective<S: Scalar>(
     shots: &mut ShootingObjective<S>,
@@ -267,12 +282,21 @@ fn objective<S: Scalar>(
 /// Gradient by weights and starts against central differences in double-double.
 #[test]
 fn the_gradient_through_the_integrator_is_that_of_the_discrete_map() {
-    let kinds = [
-        (1, ActivationChoice::Gelu, InputLayer::None, true, None),
-        (2, ActivationChoice::Softplus, InputLayer::None, true, Some(3)),
-        (2, ActivationChoice::QuadraticSoftplus, InputLayer::Dyt, false, None),
+    let kinds: [(_, _, _, _, _, &[&str]); 5] = [
+        (1, ActivationChoice::Gelu, InputLayer::None, true, None, &[]),
+        (2, ActivationChoice::Softplus, InputLayer::None, true, Some(3), &[]),
+        (2, ActivationChoice::QuadraticSoftplus, InputLayer::Dyt, false, None, &[]),
+        (2, ActivationChoice::Gelu, InputLayer::None, true, Some(3), &["q1^2*cos(q0) + 3*q1 + sin(q0)"]),
+        (
+            3,
+            ActivationChoice::Gelu,
+            InputLayer::None,
+            false,
+            None,
+            &["q0_dot*cos(q2) + q1*q1_dot + q2_dot - sin(q0)", "q0*q1 + q2^2/4"],
+        ),
     ];
-    for (n, activation, input_layer, embed, dissipation) in kinds {
+    for (n, activation, input_layer, embed, dissipation, constraints) in kinds {
         let architecture = Architecture { dissipation, ..small(n, activation, input_layer, embed) };
         let motion = Motion::made_up(n, 8);
         let width = 2 * n;
@@ -286,13 +310,13 @@ fn the_gradient_through_the_integrator_is_that_of_the_discrete_map() {
         let weights: Vec<f64> = draw_weights(&architecture, &mut ChaCha8Rng::seed_from_u64(3));
         let starts = double.starts().to_vec();
         let (mut by_weights, mut by_starts) = (vec![0.0; weights.len()], vec![f64::NAN; starts.len()]);
-        let mut shots_double = shots::<f64>(&architecture, Penalty::None, 1);
+        let mut shots_double = held(shots::<f64>(&architecture, Penalty::None, 1), n, constraints);
         let report = shots_double.step(&weights, &double, &starts, &rows, (&mut by_weights, &mut by_starts));
         let found = [by_weights, by_starts].concat();
 
         let step = Dd::of_f64(2f64.powi(-34));
         let x: Vec<Dd> = [cast::<f64, Dd>(&weights), cast(&starts)].concat();
-        let mut shots_exact = shots::<Dd>(&architecture, Penalty::None, 2);
+        let mut shots_exact = held(shots::<Dd>(&architecture, Penalty::None, 2), n, constraints);
         let mut at = |x: &[Dd]| {
             let (weights, starts) = x.split_at(weights.len());
             objective(&mut shots_exact, &exact, (weights, starts), (&rows, joints), width)
@@ -452,6 +476,99 @@ fn refinement_ends_where_the_gradient_by_the_starts_vanishes() {
     assert!(away(&starts) < 1e-6, "{}", away(&starts));
 }
 
+/// A bob on a circle of radius 1, its angle `sin(2 t)`, seen with errors.
+fn bob(samples: usize, error: f64) -> Motion {
+    let (mut tracks, mut states) = (Vec::new(), Vec::new());
+    let mut rng = ChaCha8Rng::seed_from_u64(21);
+    for k in 0..4 {
+        let times: Vec<f64> = (0..samples).map(|k| 0.04 * k as f64).collect();
+        let mut off = |x: f64| x + error * rng.random_range(-1.0..1.0);
+        let (mut q, mut v) = (Vec::new(), Vec::new());
+        for t in &times {
+            let (angle, rate) = ((2.0 * t + f64::from(k)).sin(), 2.0 * (2.0 * t + f64::from(k)).cos());
+            q.extend([off(angle.sin()), off(-angle.cos())]);
+            v.extend([off(rate * angle.cos()), off(rate * angle.sin())]);
+        }
+        states.push((q.clone(), v));
+        tracks.push(RecordedTrajectory { name: format!("{k}"), times, q, v: vec![], a: vec![], force: vec![] });
+    }
+    Motion { tracks, states }
+}
+
+/// Starts under constraints are the best of those that obey them.
+#[test]
+fn starts_under_constraints_stay_on_them_and_are_the_best_there() {
+    let architecture =
+        Architecture { periodic: vec![false; 2], ..small(2, ActivationChoice::Gelu, InputLayer::None, false) };
+    let circle = formulas(2, &["q0^2 + q1^2 - 1"]).unwrap();
+    let motion = bob(24, 0.02);
+    let weights: Vec<f64> = draw_weights(&architecture, &mut ChaCha8Rng::seed_from_u64(8));
+    let cut = |motion: &Motion| {
+        let bare = Noise { q: vec![0.02; 2], v: Vec::new() };
+        let segments = Segments::<f64>::new(&architecture, &motion.estimated(), &bare, 8, 4);
+        segments.under(&architecture, Arc::new(circle.manifold().unwrap()))
+    };
+    let segments = cut(&motion);
+    let rows: Vec<u32> = (0..segments.len() as u32).collect();
+    let shots = ShootingObjective::<f64>::new(&architecture, Penalty::None, (0.5, f64::INFINITY), 2).unwrap();
+    let mut shots = shots.under(Arc::new(circle.manifold().unwrap()));
+    let (mut starts, mut curvature) = (segments.starts().to_vec(), Curvature::default());
+    let (before, joints) = (segments.starts().to_vec(), segments.len() - 4);
+    for _ in 0..60 {
+        shots.refine(&weights, &segments, &mut starts, &mut curvature, 1.0);
+    }
+    let mut value = |starts: &[f64]| objective(&mut shots, &segments, (&weights, starts), (&rows, joints), 4);
+    let best = value(&starts);
+    assert!(best < 0.9 * value(&before), "{best} {}", value(&before));
+    let scale = &architecture.scale;
+    let physical = |start: &[f64]| [start[0] * scale[0], start[1] * scale[1], start[2] * scale[0], start[3] * scale[1]];
+    for k in 0..segments.len() {
+        let [x, y, u, w] = physical(&starts[4 * k..4 * k + 4]);
+        assert!((x.hypot(y) - 1.0).abs() < 1e-12 && (x * u + y * w).abs() < 1e-12);
+        // Along the circle, and faster or slower.
+        for (turn, faster) in [(1e-4, 0.0), (-1e-4, 0.0), (0.0, 1e-4), (0.0, -1e-4)] {
+            let (sin, cos) = f64::sin_cos(turn);
+            let rotated = [cos * x - sin * y, sin * x + cos * y, cos * u - sin * w, sin * u + cos * w];
+            let moved = [rotated[0], rotated[1], rotated[2] - faster * rotated[1], rotated[3] + faster * rotated[0]];
+            let mut other = starts.clone();
+            (0..4).for_each(|i| other[4 * k + i] = moved[i] / scale[i % 2]);
+            assert!(value(&other) > best - 1e-12, "start {k}: {} below {best}", value(&other));
+        }
+    }
+}
+
+/// A fit through the motion under constraints predicts, from positions alone, what it did not see.
+#[test]
+fn a_network_is_fitted_through_its_motion_under_constraints() {
+    let architecture = Architecture {
+        periodic: vec![false; 2],
+        hidden: vec![16, 16],
+        ..small(2, ActivationChoice::Gelu, InputLayer::None, false)
+    };
+    let circle = formulas(2, &["q0^2 + q1^2 - 1"]).unwrap();
+    let motion = bob(48, 1e-3);
+    let weights: Vec<f64> = initial_weights(&architecture, Initialization::Default, &mut ChaCha8Rng::seed_from_u64(5));
+    let (tracks, noise) = (motion.estimated(), Noise { q: vec![1e-3; 2], v: vec![] });
+    let settings = Shooting { samples_per_segment: 12, epochs: 100, batch: 4, rate: 2e-2, ..Shooting::default() };
+    let run = |threads: usize| {
+        let task = Task {
+            architecture: &architecture,
+            penalty: Penalty::Eigenvalue { lambda: 1.0 },
+            weights: weights.clone(),
+            training: &tracks[..3],
+            validation: &tracks[3..],
+            noise: &noise,
+            constraints: Some(&circle),
+            seed: 3,
+        };
+        fit(&settings, task, threads, &Hooks::default()).unwrap()
+    };
+    let fitted = run(1);
+    println!("loss {} -> {}", fitted.start_loss, fitted.validation_loss);
+    assert!(fitted.validation_loss < 0.01 * fitted.start_loss, "{} -> {}", fitted.start_loss, fitted.validation_loss);
+    assert_eq!(run(2).weights, fitted.weights);
+}
+
 /// Segments without motion are left out and counted, and give no gradient.
 #[test]
 fn singular_mass_matrices_are_left_out() {
@@ -488,7 +605,16 @@ fn fit_motion<S: Scalar>(
 ) -> Result<Fitted<S>, ShootingError> {
     let (tracks, noise) = (motion.estimated(), noise(architecture.coordinates));
     let (training, validation) = (&tracks[..], &tracks[1..]);
-    let task = Task { architecture, penalty: Penalty::None, weights, training, validation, noise: &noise, seed: 1 };
+    let task = Task {
+        architecture,
+        penalty: Penalty::None,
+        weights,
+        training,
+        validation,
+        noise: &noise,
+        constraints: None,
+        seed: 1,
+    };
     fit(settings, task, threads, hooks)
 }
 
@@ -554,6 +680,7 @@ fn exact_positions_teach_exact_accelerations() {
         training: &tracks[..5],
         validation: &tracks[5..],
         noise: &noise,
+        constraints: None,
         seed: 2,
     };
     let settings = Shooting {
@@ -619,7 +746,16 @@ fn stopping_after_any_step_changes_nothing() {
         let (training, validation) = (&tracks[..], &tracks[..]);
         let weights = trained.weights.clone();
         let penalty = Penalty::None;
-        let task = Task { architecture: &architecture, penalty, weights, training, validation, noise: &noise, seed: 1 };
+        let task = Task {
+            architecture: &architecture,
+            penalty,
+            weights,
+            training,
+            validation,
+            noise: &noise,
+            constraints: None,
+            seed: 1,
+        };
         let start = Some(shots.unwrap_or_else(|| trained.snapshot(&config)));
         shooting::resume(&settings, task, threads, hooks, ResumeOptions { checkpoints: Some(keeper), start }).unwrap()
     };
@@ -670,7 +806,16 @@ fn bad_numbers_are_named() {
     let good = noise(2);
     let message = |noise: &Noise, weights: &[f64], training: &[StateEstimate<'_>]| {
         let (architecture, weights, validation) = (&architecture, weights.to_vec(), training);
-        let task = Task { architecture, penalty: Penalty::None, weights, training, validation, noise, seed: 1 };
+        let task = Task {
+            architecture,
+            penalty: Penalty::None,
+            weights,
+            training,
+            validation,
+            noise,
+            constraints: None,
+            seed: 1,
+        };
         fit(&quick(), task, 1, &Hooks::default()).unwrap_err().to_string()
     };
     let short = Noise { q: vec![0.1], v: vec![] };

@@ -2,7 +2,7 @@
 
 use super::projection::project;
 use super::rows::independent;
-use super::{Constraints, Manifold, ManifoldRows};
+use super::{Constraints, Manifold, ManifoldRows, RowAdjoint};
 use crate::forward::{Dual, HyperDual};
 use crate::lagrangian::{EulerLagrange, MechanicsError, MetricJet, Request, Terms};
 use crate::scalar::{Dd, Real, Scalar};
@@ -203,6 +203,74 @@ impl<M: EulerLagrange<S>, C: Constraints, S: Scalar> Manifold<S> for Constrained
             rows.values.push(value);
             rows.rates.push(rate);
             rows.drift.push(drift);
+        }
+    }
+
+    fn rate_gradients(&self, q: &[S], v: &[S], gradients: &mut Vec<S>) {
+        let (n, zero, one) = (q.len(), <S as Real>::zero(), <S as Real>::one());
+        gradients.clear();
+        gradients.resize(self.kept.len() * n, zero);
+        let lift = |x: &S| HyperDual::lift(*x);
+        let parameters: Vec<_> = self.parameters.iter().map(lift).collect();
+        let (mut moved, v): (Vec<_>, Vec<_>) =
+            (q.iter().zip(v).map(|(&q, &v)| HyperDual::new(q, v, zero, zero)).collect(), v.iter().map(lift).collect());
+        let mut values = vec![lift(&zero); self.rows];
+        for i in 0..n {
+            moved[i].t = one;
+            self.constraints.values(&parameters, &moved, &v, &mut values);
+            moved[i].t = zero;
+            for (k, &row) in self.kept.iter().enumerate() {
+                let found = values[row];
+                gradients[k * n + i] = if self.constraints.is_holonomic(row) { found.st } else { found.t };
+            }
+        }
+    }
+
+    fn pull_back(&self, (q, v): (&[S], &[S]), along: RowAdjoint<'_, S>, (dq, dv): (&mut [S], &mut [S])) {
+        let (n, zero, one) = (q.len(), <S as Real>::zero(), <S as Real>::one());
+        let none = Dual::lift(zero);
+        let lift = |x: &S| HyperDual::lift(Dual::lift(*x));
+        let parameters: Vec<_> = self.parameters.iter().map(lift).collect();
+        let mut values = vec![lift(&zero); self.rows];
+        // The direction of the derivative is that of the inner number.
+        let number = |x: &[S], i: usize, at: Option<usize>| Dual {
+            value: x[i],
+            tangent: if at == Some(i) { one } else { zero },
+        };
+        let still = |x: &[S], i: usize| Dual::lift(x[i]);
+        let mut sum = |q: &[HyperDual<Dual<S>>], v: &[HyperDual<Dual<S>>], weights: &[S], rate: bool| {
+            self.constraints.values(&parameters, q, v, &mut values);
+            self.kept.iter().zip(weights).fold(zero, |sum, (&row, &weight)| {
+                let found = values[row];
+                let of = match (self.constraints.is_holonomic(row), rate) {
+                    (true, true) => found.st,
+                    (true, false) | (false, true) => found.s,
+                    (false, false) => found.t,
+                };
+                sum + weight * of.tangent
+            })
+        };
+        for i in 0..2 * n {
+            let (by_q, by_v) = if i < n { (Some(i), None) } else { (None, Some(i - n)) };
+            // A a + gamma: the second derivative along the motion of a function, the first of a row.
+            let motion_q: Vec<_> = (0..n)
+                .map(|k| {
+                    let speed = number(v, k, by_v);
+                    HyperDual::new(number(q, k, by_q), speed, speed, still(along.a, k))
+                })
+                .collect();
+            let motion_v: Vec<_> =
+                (0..n).map(|k| HyperDual::new(number(v, k, by_v), still(along.a, k), none, none)).collect();
+            let by = -sum(&motion_q, &motion_v, along.pull, true);
+            if i >= n {
+                dv[i - n] += by;
+                continue;
+            }
+            // A x: the first derivative along x of a function by the coordinates, of a row by the velocities.
+            let moved_q: Vec<_> =
+                (0..n).map(|k| HyperDual::new(number(q, k, by_q), still(along.x, k), none, none)).collect();
+            let moved_v: Vec<_> = (0..n).map(|k| HyperDual::new(still(v, k), none, still(along.x, k), none)).collect();
+            dq[i] += by + sum(&moved_q, &moved_v, along.load, false);
         }
     }
 }

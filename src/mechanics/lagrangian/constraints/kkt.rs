@@ -1,12 +1,9 @@
 //! The motion of a batch: `M a = f`, under constraints `M a = f + A^T lambda` and `A a = -gamma`.
 
-use super::rows::independent;
+use super::rows::independent_rows;
 use crate::lagrangian::MechanicsError;
 use crate::linalg::{self, Failure, Workspace};
 use crate::scalar::{Real, Scalar};
-
-/// Rows of `A` at unit length whose part beside the others is below this many roots of the rounding have lost their rank.
-const RANK: f64 = 16.0;
 
 /// The matrices of a batch of motions.
 #[derive(Clone, Copy)]
@@ -40,6 +37,64 @@ pub fn accelerate<S: Scalar>(
     }
 }
 
+/// The matrices `[M A^T; A 0]` of a batch and what is solved with them; the buffers are reused.
+#[derive(Clone, Debug)]
+pub struct Bordered<S> {
+    size: (usize, usize),
+    matrices: Vec<S>,
+    right: Vec<S>,
+    solution: Vec<S>,
+}
+
+impl<S> Default for Bordered<S> {
+    fn default() -> Self {
+        Self { size: (0, 0), matrices: Vec::new(), right: Vec::new(), solution: Vec::new() }
+    }
+}
+
+impl<S: Scalar> Bordered<S> {
+    /// Takes `M`, `(batch, n, n)`, and the rows `A`, `(batch, m, n)`.
+    pub fn set(&mut self, (n, m): (usize, usize), mass: &[S], rows: &[S]) {
+        let (k, zero) = (n + m, <S as Real>::zero());
+        self.size = (n, m);
+        self.matrices.clear();
+        self.matrices.resize(mass.len() / (n * n) * k * k, zero);
+        let batch = mass.chunks_exact(n * n).zip(rows.chunks_exact(m * n));
+        for (matrix, (mass, rows)) in self.matrices.chunks_exact_mut(k * k).zip(batch) {
+            for i in 0..n {
+                matrix[i * k..i * k + n].copy_from_slice(&mass[i * n..(i + 1) * n]);
+            }
+            for (at, &element) in rows.iter().enumerate() {
+                let (c, i) = (at / n, at % n);
+                matrix[i * k + n + c] = element;
+                matrix[(n + c) * k + i] = element;
+            }
+        }
+    }
+
+    /// Solves for `[x; y]` with `[upper; lower]` on the right, `(batch, n)` and `(batch, m)`, 0 if `lower` is empty; `true` if no row
+    /// failed. Those that did are `NaN`, and named by the workspace.
+    pub fn solve(&mut self, upper: &[S], lower: &[S], x: &mut [S], y: &mut [S], workspace: &mut Workspace<S>) -> bool {
+        let (n, m) = self.size;
+        let (k, zero) = (n + m, <S as Real>::zero());
+        self.right.clear();
+        for (row, upper) in upper.chunks_exact(n).enumerate() {
+            self.right.extend_from_slice(upper);
+            match lower.get(row * m..(row + 1) * m) {
+                Some(lower) => self.right.extend_from_slice(lower),
+                None => self.right.resize((row + 1) * k, zero),
+            }
+        }
+        self.solution.resize(self.right.len(), zero);
+        let solved = linalg::solve(k, &self.matrices, &self.right, &mut self.solution, workspace).is_ok();
+        for (row, solved) in self.solution.chunks_exact(k).enumerate() {
+            x[row * n..(row + 1) * n].copy_from_slice(&solved[..n]);
+            y[row * m..(row + 1) * m].copy_from_slice(&solved[n..]);
+        }
+        solved
+    }
+}
+
 /// With multipliers.
 fn constrained<S: Scalar>(
     motion: Motion<'_, S>,
@@ -49,37 +104,15 @@ fn constrained<S: Scalar>(
     failures: &mut Vec<MechanicsError>,
 ) {
     let Motion { size: (n, m), mass, constraints, drift } = motion;
-    let (k, zero) = (n + m, <S as Real>::zero());
-    let batch = force.len() / n;
-    let mut matrices = vec![zero; batch * k * k];
-    let mut right = vec![zero; batch * k];
-    let mut solution = right.clone();
-    for row in 0..batch {
-        let matrix = &mut matrices[row * k * k..(row + 1) * k * k];
-        for i in 0..n {
-            matrix[i * k..i * k + n].copy_from_slice(&mass[(row * n + i) * n..(row * n + i + 1) * n]);
-        }
-        for c in 0..m {
-            for i in 0..n {
-                let element = constraints[(row * m + c) * n + i];
-                matrix[i * k + n + c] = element;
-                matrix[(n + c) * k + i] = element;
-            }
-        }
-        right[row * k..row * k + n].copy_from_slice(&force[row * n..(row + 1) * n]);
-        for (right, &drift) in right[row * k + n..(row + 1) * k].iter_mut().zip(drift.iter().skip(row * m)) {
-            *right = -drift;
-        }
-    }
-    if linalg::solve(k, &matrices, &right, &mut solution, workspace).is_err() {
+    let mut bordered = Bordered::default();
+    bordered.set((n, m), mass, constraints);
+    let lower: Vec<S> = drift.iter().map(|&drift| -drift).collect();
+    if !bordered.solve(force, &lower, acceleration, multipliers, workspace) {
         for &(row, failure) in workspace.failures() {
             failures.push(explained((n, m), &constraints[row * m * n..(row + 1) * m * n], row, failure));
         }
     }
-    for (row, solved) in solution.chunks_exact(k).enumerate() {
-        acceleration[row * n..(row + 1) * n].copy_from_slice(&solved[..n]);
-        multipliers[row * m..(row + 1) * m].iter_mut().zip(&solved[n..]).for_each(|(to, &x)| *to = -x);
-    }
+    multipliers.iter_mut().for_each(|multiplier| *multiplier = -*multiplier);
 }
 
 /// Why a state under constraints cannot move: a constraint that depends on others there, or a mass matrix that is singular within
@@ -87,7 +120,7 @@ fn constrained<S: Scalar>(
 #[cold]
 fn explained<S: Scalar>((n, m): (usize, usize), constraints: &[S], row: usize, failure: Failure) -> MechanicsError {
     if matches!(failure, Failure::Singular { .. }) {
-        let (kept, _) = independent(n, constraints, RANK * S::epsilon().to_f64().sqrt());
+        let (kept, _) = independent_rows(n, constraints);
         if let Some(constraint) = (0..m).find(|c| !kept.contains(c)) {
             return MechanicsError::Dependent { row, constraint };
         }

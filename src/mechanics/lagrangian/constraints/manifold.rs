@@ -31,4 +31,24 @@ pub trait Manifold<S: Scalar>: Send + Sync {
 
     /// Evaluates the rows at one state; the buffers are reused.
     fn rows(&self, q: &[S], v: &[S], rows: &mut ManifoldRows<S>);
+
+    /// Writes the derivatives of the rates by the coordinates, `d(A v - b)/dq`, `(m, n)`.
+    fn rate_gradients(&self, q: &[S], v: &[S], gradients: &mut Vec<S>);
+
+    /// Adds the derivatives by `q` and `v` of `load.(A x) - pull.(A a + gamma)`, `x`, `a`, `(n)`, and `load`, `pull`, `(m)`, held: what
+    /// a change of the rows does to a function of the accelerations.
+    fn pull_back(&self, state: (&[S], &[S]), along: RowAdjoint<'_, S>, derivatives: (&mut [S], &mut [S]));
+}
+
+/// What [`Manifold::pull_back`] holds.
+#[derive(Clone, Copy, Debug)]
+pub struct RowAdjoint<'a, S> {
+    /// The direction `x`, `(n)`.
+    pub x: &'a [S],
+    /// The acceleration `a`, `(n)`.
+    pub a: &'a [S],
+    /// Weights of `A x`, `(m)`.
+    pub load: &'a [S],
+    /// Weights of `A a + gamma`, `(m)`.
+    pub pull: &'a [S],
 }

@@ -26,11 +26,15 @@ mod tests;
 pub use constrained::{Constrained, ConstraintError};
 pub use described::ExpressionConstraints;
 pub use formulas::{FormulaConstraints, FormulaError};
+#[cfg(feature = "training")]
+pub(crate) use kkt::Bordered;
 pub(super) use kkt::{Motion, accelerate};
 pub use least_norm::{LeastNorm, LeastNormMotion};
-pub use manifold::{Manifold, ManifoldRows};
+pub use manifold::{Manifold, ManifoldRows, RowAdjoint};
 pub use projection::{OffManifold, project, project_acceleration};
 pub use reduced::ReducedMass;
+#[cfg(feature = "training")]
+pub(crate) use rows::{independent_rows, take_out};
 
 use crate::scalar::Real;
 

@@ -1,6 +1,6 @@
 //! The mass matrix within the constraints.
 
-use super::rows::{complement, dot, independent};
+use super::rows::{complement, dot, independent_rows};
 use crate::linalg::{LinalgError, Workspace, eigh};
 use crate::scalar::{Real, Scalar};
 
@@ -23,7 +23,7 @@ impl<S: Scalar> ReducedMass<S> {
     /// # Errors
     /// [`LinalgError::NotFinite`].
     pub fn of(n: usize, mass: &[S], rows: &[S]) -> Result<Self, LinalgError> {
-        let (_, spanned) = independent(n, rows, 16.0 * S::epsilon().to_f64().sqrt());
+        let (_, spanned) = independent_rows(n, rows);
         let basis = complement(n, &spanned);
         let d = basis.len() / n.max(1);
         let mut matrix = Vec::with_capacity(d * d);

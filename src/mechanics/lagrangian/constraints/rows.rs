@@ -2,8 +2,11 @@
 
 use crate::scalar::{Real, Scalar};
 
+/// Rows at unit length whose part beside the others is below this many roots of the rounding depend on them.
+const RANK: f64 = 16.0;
+
 /// Takes out of `x` what lies along orthonormal rows, `(k, n)`, twice, since once leaves rounding.
-fn take_out<S: Scalar>(x: &mut [S], basis: &[S]) {
+pub(crate) fn take_out<S: Scalar>(x: &mut [S], basis: &[S]) {
     for _ in 0..2 {
         for u in basis.chunks_exact(x.len()) {
             let along = dot(u, x);
@@ -52,6 +55,11 @@ pub(super) fn independent<S: Scalar>(n: usize, matrix: &[S], tolerance: f64) -> 
         }
     }
     (kept, basis)
+}
+
+/// [`independent`] up to rounding.
+pub(crate) fn independent_rows<S: Scalar>(n: usize, matrix: &[S]) -> (Vec<usize>, Vec<S>) {
+    independent(n, matrix, RANK * S::epsilon().to_f64().sqrt())
 }
 
 /// An orthonormal basis, `(n - k, n)`, of what is perpendicular to orthonormal rows, `(k, n)`.

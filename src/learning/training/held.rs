@@ -1,0 +1,94 @@
+//! Motion under constraints in the scaled coordinates of a network: rows, loads and what a loss asks of them.
+//!
+//! Of scaled coordinates `q_i = s_i q'_i` the rows are `A_ci s_i`; each is brought to unit length, since coordinates and constraints may
+//! have any size. [`Held::motion`] solves `[M A^T; A 0] [a; -lambda] = [f; -gamma]`, [`Held::adjoint`] the same matrix for `[lam; nu]` with
+//! `[u; 0]` on the right.
+
+use crate::lagrangian::{Bordered, ReducedMass, independent_rows};
+use crate::linalg::{Violation, Workspace};
+use crate::scalar::{Real, Scalar};
+
+/// Constraints of a chunk of states; buffers are reused from chunk to chunk.
+pub(crate) struct Held<S> {
+    n: usize,
+    m: usize,
+    /// Rows `A` at unit length, `(states, m, n)`, what they were multiplied with for it, and `-gamma` at that length, `(states, m)`.
+    rows: Vec<S>,
+    unit: Vec<S>,
+    drift: Vec<S>,
+    bordered: Bordered<S>,
+    /// Multipliers of rows at unit length, `(states, m)`.
+    load: Vec<S>,
+}
+
+impl<S> Default for Held<S> {
+    fn default() -> Self {
+        let (rows, unit, drift, load) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        Self { n: 0, m: 0, rows, unit, drift, bordered: Bordered::default(), load }
+    }
+}
+
+impl<S: Scalar> Held<S> {
+    /// Forgets all states; those that follow have `n` coordinates and `m` constraints.
+    pub fn clear(&mut self, (n, m): (usize, usize)) {
+        (self.n, self.m) = (n, m);
+        [&mut self.rows, &mut self.unit, &mut self.drift].into_iter().for_each(Vec::clear);
+    }
+
+    /// Adds a state with rows `A`, `(m, n)`, and drift `gamma`, `(m)`, in physical units.
+    pub fn push(&mut self, scale: &[S], (matrix, drift): (&[S], &[S])) {
+        let zero = <S as Real>::zero();
+        for (gradient, &drift) in matrix.chunks_exact(self.n).zip(drift) {
+            let scaled = gradient.iter().zip(scale).map(|(&a, &s)| a * s);
+            let square = scaled.clone().fold(zero, |sum, a| sum + a * a);
+            // A row that vanishes is left to the solve, which finds it singular.
+            let unit = if square > zero { Real::sqrt(square).recip() } else { <S as Real>::one() };
+            self.rows.extend(scaled.map(|a| a * unit));
+            self.unit.push(unit);
+            self.drift.push(-drift * unit);
+        }
+    }
+
+    /// Takes the mass matrices of the states, `(states, n, n)`.
+    pub fn border(&mut self, masses: &[S]) {
+        self.bordered.set((self.n, self.m), masses, &self.rows);
+        self.load.resize(self.drift.len(), <S as Real>::zero());
+    }
+
+    /// Accelerations under forces `f`, both `(states, n)`; `true` if no state failed.
+    pub fn motion(&mut self, force: &[S], acceleration: &mut [S], workspace: &mut Workspace<S>) -> bool {
+        self.bordered.solve(force, &self.drift, acceleration, &mut self.load, workspace)
+    }
+
+    /// `lam` of a loss whose derivative by the accelerations is `u`, both `(states, n)`; `true` if no state failed.
+    pub fn adjoint(&mut self, u: &[S], lam: &mut [S], workspace: &mut Workspace<S>) -> bool {
+        self.bordered.solve(u, &[], lam, &mut self.load, workspace)
+    }
+
+    /// Appends what the last solve found below its accelerations, `-lambda` or `nu`, `(states, m)`, of the rows in physical units.
+    pub fn loads(&self, out: &mut Vec<S>) {
+        out.extend(self.load.iter().zip(&self.unit).map(|(&load, &unit)| load * unit));
+    }
+
+    /// An orthonormal basis of the forces, `(n)` in units of their own, that the constraints of a state can carry, `A^T lambda`.
+    pub fn carried(&self, state: usize, units: &[S]) -> Vec<S> {
+        let size = self.m * self.n;
+        let rows = &self.rows[state * size..(state + 1) * size];
+        let rows: Vec<S> = rows.iter().zip(units.iter().cycle()).map(|(&a, &unit)| a * unit).collect();
+        independent_rows(self.n, &rows).1
+    }
+
+    /// The eigenvalue penalty of a state within its constraints: minus the sum of the negative eigenvalues of `Z^T M Z`, with its
+    /// directions.
+    pub fn violation(&self, state: usize, mass: &[S], violation: &mut Violation<S>) {
+        let (n, m) = (self.n, self.m);
+        *violation = Violation::default();
+        let Ok(reduced) = ReducedMass::of(n, mass, &self.rows[state * m * n..(state + 1) * m * n]) else { return };
+        let negative = reduced.eigenvalues.iter().zip(reduced.directions.chunks_exact(n));
+        for (&w, direction) in negative.take_while(|(w, _)| **w < <S as Real>::zero()) {
+            violation.value -= w;
+            violation.gamma.push(-<S as Real>::one());
+            violation.vectors.extend_from_slice(direction);
+        }
+    }
+}
