@@ -35,6 +35,7 @@ fn shot(architecture: &Architecture, weights: &[f64], threads: usize) -> Vec<f64
         training: &tracks,
         validation: &tracks,
         noise: &noise,
+        constraints: None,
         seed: 0,
     };
     let settings = Shooting { method: Method::Soap, samples_per_segment: 20, epochs: 1, ..Shooting::default() };
