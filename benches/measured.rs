@@ -144,6 +144,7 @@ fn learned(measured: &RecordingSplit, friction: bool, targets: Targets, scale: S
             training: &training,
             validation: &validation,
             noise: &noise,
+            constraints: None,
             seed: 0,
         };
         weights = fit(&settings, task, THREADS, &hooks).expect("a fit").weights;
