@@ -3,6 +3,8 @@
 use super::features::Features;
 use super::pencil::{Moments, Pencil};
 use super::{ConstraintKind, FoundConstraint, MotionSamples};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 use std::collections::BTreeMap;
 
 /// A combination of this many times the variance of its noise still counts as vanishing.
@@ -34,60 +36,71 @@ pub struct Generator {
     pub holds: bool,
 }
 
-/// What was found among some terms.
-#[derive(Clone, Debug)]
-pub struct Search {
-    /// Simple ones first.
-    pub generators: Vec<Generator>,
+/// The combinations of some terms that vanish.
+pub struct Vanishing<'a> {
+    features: &'a Features,
+    moments: Moments,
+    whole: Pencil,
+    centred: bool,
+    /// Samples whose errors are independent.
+    independent: f64,
+    terms: Vec<usize>,
+    /// A basis of them, over the terms.
+    rows: Vec<Vec<f64>>,
     /// Size of the step between what vanishes and what does not.
     pub gap: Option<f64>,
 }
 
-/// Looks for combinations that vanish, or `centred`, that are constant along each trajectory; of `shared` samples the errors are as
-/// one.
-pub fn search(samples: &MotionSamples, features: &Features, centred: bool, shared: f64) -> Search {
-    let p = features.len();
-    let moments = Moments::of(samples, features, if p > 300 { 4 } else { 8 });
-    // Every constant is constant.
-    let terms: Vec<usize> = (0..p).filter(|&term| !(centred && features.is_constant(term))).collect();
-    let whole = moments.pencil(centred, |_| true);
-    let (ratios, combinations) = whole.on(&terms).solve();
-    let count = ratios.iter().filter(|ratio| **ratio <= TAKEN).count();
-    let largest = if count > 0 { ratios[count - 1].max(1.0) } else { 1.0 };
-    let gap = ratios.get(count).map(|next| (next / largest).sqrt());
-    if count == 0 || gap.is_some_and(|gap| gap < LEAST_GAP) {
-        return Search { generators: Vec::new(), gap };
+impl<'a> Vanishing<'a> {
+    /// Looks for combinations that vanish, or `centred`, that are constant along each trajectory; of `shared` samples the errors are as
+    /// one.
+    pub fn of(samples: &MotionSamples, features: &'a Features, centred: bool, shared: f64) -> Self {
+        let p = features.len();
+        let moments = Moments::of(samples, features, if p > 300 { 4 } else { 8 });
+        // Every constant is constant.
+        let terms: Vec<usize> = (0..p).filter(|&term| !(centred && features.is_constant(term))).collect();
+        let whole = moments.pencil(centred, |_| true);
+        let (ratios, combinations) = whole.on(&terms).solve();
+        let count = ratios.iter().filter(|ratio| **ratio <= TAKEN).count();
+        let largest = if count > 0 { ratios[count - 1].max(1.0) } else { 1.0 };
+        let gap = ratios.get(count).map(|next| (next / largest).sqrt());
+        let count = if gap.is_some_and(|gap| gap < LEAST_GAP) { 0 } else { count };
+        let rows = combinations.chunks_exact(terms.len()).take(count).map(<[f64]>::to_vec).collect();
+        Self { features, moments, whole, centred, independent: samples.len() as f64 / shared, terms, rows, gap }
     }
-    let mut rows: Vec<Vec<f64>> = combinations.chunks_exact(terms.len()).take(count).map(<[f64]>::to_vec).collect();
-    let pivots = reduce(&mut rows);
-    let independent = samples.len() as f64 / shared;
-    let mut found: Vec<Generator> = rows
-        .iter()
-        .zip(&pivots)
-        .map(|(row, &own)| {
-            let free = (0..terms.len()).filter(|k| *k == own || !pivots.contains(k));
-            let support: Vec<(usize, f64)> = free.map(|k| (terms[k], row[k])).collect();
-            let support = needed(&whole, support, independent);
-            fitted(&moments, features, &support, centred)
-        })
-        .collect();
-    let size = |generator: &Generator| {
-        let terms = || generator.weights.iter().enumerate().filter(|(_, w)| **w != 0.0);
-        (terms().map(|(term, _)| features.degree(term)).max(), terms().count())
-    };
-    found.sort_by_key(size);
-    Search { generators: found, gap }
+
+    /// As many as there are, none of which follows from the others, simple ones first, each with the terms that it needs. Another `form`
+    /// than 0 prefers other terms.
+    pub fn generators(&self, form: u64) -> Vec<Generator> {
+        let mut rows = self.rows.clone();
+        let mut rng = ChaCha8Rng::seed_from_u64(form);
+        let preference: Vec<f64> =
+            self.terms.iter().map(|_| if form == 0 { 1.0 } else { rng.random_range(-3.0..0.0f64).exp() }).collect();
+        let pivots = reduce(&mut rows, &preference);
+        let mut found: Vec<Generator> = rows
+            .iter()
+            .zip(&pivots)
+            .map(|(row, &own)| {
+                let free = (0..self.terms.len()).filter(|k| *k == own || !pivots.contains(k));
+                let support: Vec<(usize, f64)> = free.map(|k| (self.terms[k], row[k])).collect();
+                let support = needed(&self.whole, support, self.independent);
+                fitted(&self.moments, self.features, &support, self.centred)
+            })
+            .collect();
+        found.sort_by_key(|generator| (generator.degree(self.features), generator.terms().count()));
+        found
+    }
 }
 
-/// Reduced row echelon form with the largest pivots; returns the column of each row's pivot.
-fn reduce(rows: &mut [Vec<f64>]) -> Vec<usize> {
+/// Reduced row echelon form with the largest pivots, times the preference of their columns; returns the column of each row's pivot.
+fn reduce(rows: &mut [Vec<f64>], preference: &[f64]) -> Vec<usize> {
     let mut pivots = vec![usize::MAX; rows.len()];
     for _ in 0..rows.len() {
         let mut best = (0.0, 0, 0);
         for (r, row) in rows.iter().enumerate().filter(|(r, _)| pivots[*r] == usize::MAX) {
-            for (c, x) in row.iter().enumerate() {
-                if x.abs() > best.0 {
-                    best = (x.abs(), r, c);
+            for (c, (x, preference)) in row.iter().zip(preference).enumerate() {
+                if x.abs() * preference > best.0 {
+                    best = (x.abs() * preference, r, c);
                 }
             }
         }
@@ -192,10 +205,20 @@ fn leading(features: &Features, support: &[usize], raw: &[f64]) -> usize {
 }
 
 impl Generator {
+    /// The terms that it has.
+    pub fn terms(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..self.weights.len()).filter(|&term| self.weights[term] != 0.0)
+    }
+
+    /// The highest degree of its terms.
+    pub fn degree(&self, features: &Features) -> i32 {
+        self.terms().map(|term| features.degree(term)).max().unwrap_or(0)
+    }
+
     /// In words.
     pub fn described(&self, features: &Features, kind: ConstraintKind) -> FoundConstraint {
         let (mut formula, mut coefficients, mut range) = (String::new(), BTreeMap::new(), BTreeMap::new());
-        let others = (0..self.weights.len()).filter(|term| *term != self.lead && self.weights[*term] != 0.0);
+        let others = self.terms().filter(|term| *term != self.lead);
         for term in [self.lead].into_iter().chain(others) {
             let weight = self.weights[term];
             let (text, spread) = (features.text(term).to_string(), self.spread[term]);

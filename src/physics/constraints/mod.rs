@@ -18,9 +18,9 @@ pub use examine::{ExaminedLagrangian, OwnConstraint, examine};
 pub use samples::MotionSamples;
 
 use crate::lagrangian::ReducedMass;
-use crate::linalg::dot;
+use crate::linalg::{Workspace, dot, eigh};
 use features::Features;
-use generators::{Generator, Search};
+use generators::{Generator, Vanishing};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -34,6 +34,13 @@ pub const EXAMINED_STATES: usize = 64;
 const OUTSIDE: f64 = 0.15;
 /// States at which gradients are compared.
 const PLACES: usize = 64;
+/// The same for whether they stay independent, for which it takes a state near one where they do not.
+const MANY_PLACES: usize = 256;
+/// A row at unit length beside others whose part outside of them is below this at one of the places nearly follows from them there.
+const NEARLY: f64 = 0.1;
+/// Forms of the same functions, and how many of these at most, that are looked at for it.
+const FORMS: u64 = 4;
+const MOST_CANDIDATES: usize = 96;
 /// Below this share of its derivatives the curl of a row within its kernel is noise.
 const CURL: f64 = 0.03;
 
@@ -154,17 +161,18 @@ pub fn find_constraints(
         }
     }
     let mut held = Held::at(samples, PLACES);
-    let Search { generators, gap } = generators::search(samples, &of_positions, false, 1.0);
-    let functions = held.take(samples, &of_positions, generators, false);
+    let vanishing = Vanishing::of(samples, &of_positions, false, 1.0);
+    let functions = held.take(samples, &of_positions, vanishing.generators(0), false);
+    let functions = exchanged(samples, &of_positions, functions, &vanishing);
     let conserved = if samples.trajectories() > 1 {
-        let Search { generators, .. } = generators::search(samples, &of_positions, true, 1.0);
-        held.take(samples, &of_positions, generators, false)
+        let constant = Vanishing::of(samples, &of_positions, true, 1.0);
+        held.take(samples, &of_positions, constant.generators(0), false)
     } else {
         Vec::new()
     };
-    let Search { generators, .. } = generators::search(samples, &of_velocities, false, samples.shared());
     let by_functions = held.bases.clone();
-    let moving = held.take(samples, &of_velocities, generators, true);
+    let moving = Vanishing::of(samples, &of_velocities, false, samples.shared());
+    let moving = held.take(samples, &of_velocities, moving.generators(0), true);
     let rows: Vec<&[f64]> = moving.iter().map(|generator| generator.weights.as_slice()).collect();
     let integrable = integrable(&of_velocities, samples, &rows, (&held, by_functions));
     let mut constraints = Vec::new();
@@ -179,7 +187,7 @@ pub fn find_constraints(
     Ok(FoundConstraints {
         count,
         constraints,
-        gap,
+        gap: vanishing.gap,
         trajectories: samples.trajectories(),
         refuted: held.refuted,
         noise: samples.relative_noise(),
@@ -220,8 +228,8 @@ impl Held {
             (generator, rows)
         };
         let mut left: Vec<(Generator, Vec<Vec<f64>>)> = generators.into_iter().map(rows).collect();
-        let mut taken = Vec::new();
-        loop {
+        let (rank, mut taken) = (self.rank(samples.n(), &left), Vec::new());
+        while taken.len() < rank {
             let parts: Vec<f64> = left.iter().map(|(_, rows)| self.outside(rows)).collect();
             let most = parts.iter().fold(0.0, |most: f64, part| most.max(*part));
             let Some(next) = parts.iter().position(|part| *part >= 0.5 * most).filter(|_| most >= OUTSIDE) else {
@@ -238,6 +246,27 @@ impl Held {
         taken
     }
 
+    /// How many directions all of the generators that hold have outside of what holds the motion already, at half of the places. Those
+    /// taken one after the other may nearly depend on each other somewhere, and noise would be taken for one more there.
+    fn rank(&self, n: usize, generators: &[(Generator, Vec<Vec<f64>>)]) -> usize {
+        let holding: Vec<_> = generators.iter().filter(|(generator, _)| generator.holds).collect();
+        let at = |place: usize| {
+            let mut sum = vec![0.0; n * n];
+            for (_, rows) in &holding {
+                let (rest, size) = (beside(&self.bases[place], &rows[place]), dot(&rows[place], &rows[place]));
+                for (k, x) in sum.iter_mut().enumerate().filter(|_| size > 0.0) {
+                    *x += rest[k / n] * rest[k % n] / size;
+                }
+            }
+            let (mut squares, mut directions) = (vec![0.0; n], vec![0.0; n * n]);
+            let solved = eigh(n, &sum, &mut squares, &mut directions, &mut Workspace::new());
+            solved.map_or(0, |()| squares.iter().filter(|square| **square >= OUTSIDE * OUTSIDE).count())
+        };
+        let mut ranks: Vec<usize> = (0..self.places.len()).map(at).collect();
+        ranks.sort_unstable();
+        ranks.get(ranks.len() / 2).copied().unwrap_or(0)
+    }
+
     /// Root mean square part of vectors at unit length outside of what holds the motion; 0 where a vector vanishes.
     fn outside(&self, vectors: &[Vec<f64>]) -> f64 {
         let parts = self.bases.iter().zip(vectors).map(|(basis, vector)| {
@@ -246,6 +275,76 @@ impl Held {
         });
         (parts.sum::<f64>() / self.bases.len().max(1) as f64).sqrt()
     }
+}
+
+/// Functions with the same zeros whose gradients are independent wherever the motion was: of a rotation matrix three products of its
+/// columns and three of its rows are, at most states, but not where it turns about an axis.
+///
+/// Where one of those taken nearly follows from the others at some of the states, it is exchanged for a candidate with which the mean of
+/// `log det G` over the states, `G` the products of the gradients at unit length, is largest, and so on. Candidates are all functions with
+/// these zeros that some choice of leading terms makes simple.
+fn exchanged(
+    samples: &MotionSamples,
+    features: &Features,
+    taken: Vec<Generator>,
+    vanishing: &Vanishing<'_>,
+) -> Vec<Generator> {
+    let places = samples.places(MANY_PLACES);
+    let unit = |generator: &Generator| -> Vec<Vec<f64>> {
+        let rows = places.iter().map(|&at| features.gradient(samples, at, &generator.weights));
+        rows.map(|row| row.iter().map(|x| x / dot(&row, &row).sqrt().max(f64::MIN_POSITIVE)).collect()).collect()
+    };
+    let (size, mut pool) = (taken.len(), taken);
+    let mut rows: Vec<Vec<Vec<f64>>> = pool.iter().map(unit).collect();
+    let mut chosen: Vec<usize> = (0..size).collect();
+    let nearly = (0..places.len()).any(|place| least_part(chosen.iter().map(|&k| rows[k][place].as_slice())) < NEARLY);
+    if !nearly {
+        return pool;
+    }
+    let most = pool.iter().map(|generator| generator.degree(features)).max();
+    for other in (0..FORMS).flat_map(|form| vanishing.generators(form)) {
+        let new = pool.iter().all(|known| !known.terms().eq(other.terms()));
+        if pool.len() < MOST_CANDIDATES && other.holds && new && Some(other.degree(features)) <= most {
+            rows.push(unit(&other));
+            pool.push(other);
+        }
+    }
+    // What the logarithm of the volume gains by a row instead of another one, the mean over the places.
+    let gains = |chosen: &[usize], from: usize| -> Vec<f64> {
+        let mut gains = vec![0.0; rows.len()];
+        for place in 0..places.len() {
+            let mut basis = Vec::new();
+            chosen.iter().filter(|&&k| k != chosen[from]).for_each(|&k| extend(&mut basis, &rows[k][place]));
+            let part = |row: &Vec<Vec<f64>>| {
+                let rest = beside(&basis, &row[place]);
+                // A place at which they depend on each other counts, but not beyond all others.
+                dot(&rest, &rest).max(1e-12).ln()
+            };
+            let own = part(&rows[chosen[from]]);
+            gains.iter_mut().zip(&rows).for_each(|(gain, row)| *gain += (part(row) - own) / places.len() as f64);
+        }
+        gains
+    };
+    loop {
+        let of = |from: usize| gains(&chosen, from).into_iter().enumerate().map(move |(to, gain)| (gain, from, to));
+        match (0..size).flat_map(of).max_by(|a, b| a.0.total_cmp(&b.0)) {
+            Some((gain, from, to)) if gain > 1e-6 => chosen[from] = to,
+            _ => break,
+        }
+    }
+    chosen.sort_by_key(|&k| (pool[k].degree(features), pool[k].terms().count()));
+    chosen.into_iter().map(|k| pool[k].clone()).collect()
+}
+
+/// The smallest part of one of some rows outside of those before it.
+fn least_part<'a>(rows: impl Iterator<Item = &'a [f64]>) -> f64 {
+    let (mut basis, mut least): (Vec<f64>, f64) = (Vec::new(), f64::INFINITY);
+    for row in rows {
+        let rest = beside(&basis, row);
+        least = least.min(dot(&rest, &rest).sqrt());
+        extend(&mut basis, row);
+    }
+    least
 }
 
 /// What a vector is beside orthonormal rows, taken out twice, since once leaves rounding.

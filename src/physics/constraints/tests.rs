@@ -75,6 +75,62 @@ fn rods_are_found_at_any_noise_with_their_lengths() {
     }
 }
 
+/// A rotation matrix that turns about axes of its own.
+fn rotation(rng: &mut ChaCha8Rng) -> Path {
+    let [a, b, c, da, db, dc]: [f64; 6] = [0; 6].map(|_| 4.0 * rng.random::<f64>() - 2.0);
+    Box::new(move |t| {
+        let [(sa, ca), (sb, cb), (sc, cc)] = [a + da * t, b + db * t, c + dc * t].map(f64::sin_cos);
+        let q = [
+            [ca * cc - sa * cb * sc, -ca * sc - sa * cb * cc, sa * sb],
+            [sa * cc + ca * cb * sc, -sa * sc + ca * cb * cc, -ca * sb],
+            [sb * sc, sb * cc, cb],
+        ];
+        (q.concat(), vec![0.0; 9])
+    })
+}
+
+/// The products of columns and rows of a rotation matrix hold it at most states, and depend on each other where it turns about an axis.
+#[test]
+fn what_holds_a_rotation_holds_it_about_every_axis() {
+    let names = ["r11", "r12", "r13", "r21", "r22", "r23", "r31", "r32", "r33"];
+    let recording = recorded(&names, &[false; 9], 0.001, false, &mut |rng| rotation(rng));
+    let samples = MotionSamples::of(&recording, &SmoothOptions::default()).unwrap();
+    let features = Features::of_positions(&samples, 2);
+    let vanishing = Vanishing::of(&samples, &features, false, 1.0);
+    let mut held = Held::at(&samples, PLACES);
+    let simplest = held.take(&samples, &features, vanishing.generators(0), false);
+    let taken = exchanged(&samples, &features, simplest.clone(), &vanishing);
+    assert_eq!((simplest.len(), taken.len()), (6, 6));
+    // Orthonormal columns of unit gradients at a turn about the vertical.
+    let least = |generators: &[Generator], angle: f64| {
+        let (s, c) = angle.sin_cos();
+        let turned = MotionSamples::of(
+            &Recording {
+                tracks: vec![RecordedTrajectory {
+                    name: String::new(),
+                    times: (0..120).map(f64::from).collect(),
+                    q: [c, -s, 0.0, s, c, 0.0, 0.0, 0.0, 1.0].repeat(120),
+                    v: vec![],
+                    a: vec![],
+                    force: vec![],
+                }],
+                ..recording.clone()
+            },
+            &SmoothOptions::default(),
+        );
+        let turned = turned.unwrap();
+        let rows: Vec<Vec<f64>> = generators.iter().map(|g| features.gradient(&turned, 60, &g.weights)).collect();
+        let rows = rows.iter().map(|row| {
+            let length = dot(row, row).sqrt();
+            row.iter().map(|x| x / length).collect::<Vec<f64>>()
+        });
+        let rows: Vec<Vec<f64>> = rows.collect();
+        least_part(rows.iter().map(Vec::as_slice))
+    };
+    let worst = |of: &[Generator]| (1..20).map(|k| least(of, 0.31 * f64::from(k))).fold(f64::INFINITY, f64::min);
+    assert!(worst(&taken) > NEARLY && worst(&simplest) < NEARLY, "{} {}", worst(&simplest), worst(&taken));
+}
+
 /// A disk of radius 0.5 that turns and rolls at rates of its own.
 fn rolling_disk(rng: &mut ChaCha8Rng) -> Path {
     let [x, y, heading, turn, speed]: [f64; 5] = [0; 5].map(|_| 4.0 * rng.random::<f64>() - 2.0);
