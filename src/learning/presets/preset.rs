@@ -125,6 +125,10 @@ const TRIANGLE_RATE: f64 = 1e-2;
 /// Largest norm of a structure's gradient: above those of ordinary steps.
 const STRUCTURE_CLIP: f64 = 10.0;
 
+/// Weight decay where accelerations may have any size: it stands beside the loss, and the weights of geodesics by a clock, whose scaled
+/// accelerations are a thousandth, followed the decay alone.
+const ANY_SIZE: f64 = 0.0;
+
 /// Choices in which the presets of our own differ.
 #[derive(Clone, Copy)]
 struct Size {
@@ -176,7 +180,10 @@ fn ours(system: &SystemInstance<f64>, size: Size) -> Config {
     let config = Config {
         data: Data { rescaled_fraction, acceleration_weighting, trajectory_fraction, ..base.data },
         penalty: regularizer(system, PENALTY),
-        optimizer: Optimizer { weight_decay: size.weight_decay, ..Optimizer::default() },
+        optimizer: Optimizer {
+            weight_decay: if system.system.described.is_some() { ANY_SIZE } else { size.weight_decay },
+            ..Optimizer::default()
+        },
         phases: vec![Phase { position, velocity, log_uniform, ..phase(size.epochs) }],
         ..base
     };
@@ -232,7 +239,8 @@ pub(crate) fn recorded(name: &str, [training, validation, test]: [usize; 3], ste
 
 /// The quick preset for exact states of a system without a name; the numbers of states are theirs.
 pub(crate) fn of_states() -> Config {
-    Config { system: "states".to_string(), ..Config::default() }
+    let optimizer = Optimizer { weight_decay: ANY_SIZE, ..Optimizer::default() };
+    Config { system: "states".to_string(), optimizer, ..Config::default() }
 }
 
 /// Appendix "Training details" of Hamzaogullari and Ozakin. Its table for AdS4 lists the eigenvalue penalty, which no
