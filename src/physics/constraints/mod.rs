@@ -246,7 +246,7 @@ impl Held {
         taken
     }
 
-    /// How many directions all of the generators that hold have outside of what holds the motion already, at half of the places. Those
+    /// How many directions all of the generators that hold have outside of what holds the motion already, at a tenth of the places. Those
     /// taken one after the other may nearly depend on each other somewhere, and noise would be taken for one more there.
     fn rank(&self, n: usize, generators: &[(Generator, Vec<Vec<f64>>)]) -> usize {
         let holding: Vec<_> = generators.iter().filter(|(generator, _)| generator.holds).collect();
@@ -260,11 +260,11 @@ impl Held {
             }
             let (mut squares, mut directions) = (vec![0.0; n], vec![0.0; n * n]);
             let solved = eigh(n, &sum, &mut squares, &mut directions, &mut Workspace::new());
-            solved.map_or(0, |()| squares.iter().filter(|square| **square >= OUTSIDE * OUTSIDE).count())
+            solved.map_or(0, |()| squares.iter().filter(|square| **square >= 0.5 * OUTSIDE * OUTSIDE).count())
         };
         let mut ranks: Vec<usize> = (0..self.places.len()).map(at).collect();
         ranks.sort_unstable();
-        ranks.get(ranks.len() / 2).copied().unwrap_or(0)
+        ranks.get(ranks.len() * 9 / 10).copied().unwrap_or(0)
     }
 
     /// Root mean square part of vectors at unit length outside of what holds the motion; 0 where a vector vanishes.
