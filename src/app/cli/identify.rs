@@ -169,6 +169,7 @@ fn refused(error: IdentifyError) -> CliError {
         IdentifyError::Smooth(problem) if problem.to_string().starts_with("noise") => {
             CliError::usage(format_args!("--{error}"))
         }
+        IdentifyError::Option { .. } => CliError::usage(format_args!("--{error}")),
         IdentifyError::Constrained { .. } | IdentifyError::Nothing { .. } => {
             CliError::usage(format_args!("--system: {error}"))
         }

@@ -97,10 +97,6 @@ pub fn identify(
     recording.tracks.iter().try_for_each(|track| track.validate(n))?;
     let chosen = chosen(instance, options)?;
     let sensors = sensors(recording, options)?;
-    if let Some(segment) = options.segment.filter(|s| !(s.is_finite() && *s > 0.0)) {
-        let (expected, found) = ("a time above 0".to_string(), segment.to_string());
-        return Err(IdentifyError::Option { what: "segment", expected, found });
-    }
     let constrained = || IdentifyError::Constrained { system: instance.system.name.to_string() };
     let equations = Equations::record(instance, &chosen)?.ok_or_else(constrained)?;
     let longest = recording.tracks.iter().map(|track| track.len()).max().unwrap_or(0);
@@ -142,9 +138,12 @@ pub fn identify(
         return Err(IdentifyError::Singular);
     }
     tracing::debug!(?x, states = states.len(n), "smoothed accelerations");
-    let samples = first_samples(&states, n, smoothing.step);
+    let samples = first_samples(&states, (n, smoothing.step), options.segment)?;
     let segments = cut(recording, &smoothed, samples, n);
     let mut fitted = first(&mut problem, x, segments)?;
+    if options.segment.is_none() {
+        fitted = shortened(&problem, fitted);
+    }
     if forced && options.between.is_none() {
         fitted = best_between(&mut problem, fitted);
     }
@@ -218,8 +217,8 @@ fn spread_of(recording: &Recording, i: usize) -> f64 {
     if square > 0.0 { square.sqrt() } else { 1.0 }
 }
 
-/// Samples of the first segments: some of the times in which the fastest coordinate changes.
-fn first_samples(states: &States, n: usize, step: f64) -> usize {
+/// Samples of the first segments: some of the times in which the fastest coordinate changes, or as many as are wanted if these are fewer.
+fn first_samples(states: &States, (n, step): (usize, f64), wanted: Option<f64>) -> Result<usize, IdentifyError> {
     let size = |values: &[f64], i: usize| {
         let own = || values.iter().skip(i).step_by(n);
         let count = own().count().max(1) as f64;
@@ -229,7 +228,14 @@ fn first_samples(states: &States, n: usize, step: f64) -> usize {
     let paces = (0..n).map(|i| size(&states.v, i) / size(&states.a, i)).filter(|pace| pace.is_finite() && *pace > 0.0);
     let pace = paces.fold(f64::INFINITY, f64::min);
     let samples = if pace.is_finite() { PACES * pace / step } else { 20.0 };
-    (samples.clamp(LEAST_SEGMENT as f64, 400.0)) as usize
+    let samples = samples.clamp(LEAST_SEGMENT as f64, 400.0) as usize;
+    let Some(seconds) = wanted else { return Ok(samples) };
+    let wanted = (seconds / step).round() as usize;
+    if wanted < LEAST_SEGMENT {
+        let expected = format!("at least {LEAST_SEGMENT} samples, {} s", LEAST_SEGMENT as f64 * step);
+        return Err(IdentifyError::Option { what: "segment", expected, found: format!("{seconds} s") });
+    }
+    Ok(samples.min(wanted))
 }
 
 /// Segments of about so many samples that start where smoothing says.
@@ -368,6 +374,46 @@ fn joined(segments: &[Segment]) -> Vec<Segment> {
         }
     }
     joined.into_iter().map(|(segment, _)| segment).collect()
+}
+
+/// Both halves of every segment that is long enough, each with a start where the motion passes.
+fn halved(problem: &Problem<'_>, fitted: &Fitted) -> Vec<Segment> {
+    let long = |segment: &&Segment| segment.samples >= 2 * LEAST_SEGMENT;
+    let to_middle = |segment: &Segment| Segment { samples: segment.samples / 2 + 1, ..segment.clone() };
+    let first: Vec<Segment> = fitted.segments.iter().filter(long).map(to_middle).collect();
+    let mut middles = problem.ends(&fitted.x, &first.iter().collect::<Vec<_>>()).into_iter();
+    let mut segments = Vec::new();
+    for segment in &fitted.segments {
+        let Some(start) = long(&segment).then(|| middles.next()).flatten() else {
+            segments.push(segment.clone());
+            continue;
+        };
+        let half = segment.samples / 2;
+        let (first, samples) = (segment.first + half, segment.samples - half);
+        segments.push(Segment { samples: half, ..segment.clone() });
+        segments.push(Segment { track: segment.track, first, samples, start });
+    }
+    segments
+}
+
+/// Shorter segments of a form that misses the motion, as long as constants become better known by them: what is missing adds up along a
+/// segment.
+fn shortened(problem: &Problem<'_>, mut fitted: Fitted) -> Fitted {
+    while fitted.mean_square() > EXPLAINED * EXPLAINED {
+        let segments = halved(problem, &fitted);
+        if segments.len() == fitted.segments.len() {
+            break;
+        }
+        let mut shorter = Fitted { segments, ..fitted.clone() };
+        problem.settle(&shorter.x, &mut shorter.segments, 3);
+        refit(problem, &mut shorter);
+        log(&shorter, "shorter");
+        if shorter.normal.failed > 0 || shorter.spread() > fitted.spread() - GAIN {
+            break;
+        }
+        fitted = shorter;
+    }
+    fitted
 }
 
 /// Longer and longer segments, as long as constants become better known by them.

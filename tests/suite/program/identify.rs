@@ -40,6 +40,18 @@ fn constants_and_friction_of_the_example_are_found_and_written() {
 }
 
 #[test]
+fn segments_are_as_short_as_asked_for_and_no_shorter_than_six_samples() {
+    let run = |seconds: &str| {
+        let all = ["identify", DATA, "--system", SYSTEM, "--trajectory", "run", "--json", "--segment", seconds];
+        lnn(&all)
+    };
+    run("0.02").refused(2, &["--segment", "at least 6 samples", "0.02 s"]);
+    let short = run("0.1");
+    let found: Value = serde_json::from_str(&short.stdout).unwrap();
+    assert!((found["segment_seconds"].as_f64().unwrap() - 0.1).abs() < 0.03, "{}", found["segment_seconds"]);
+}
+
+#[test]
 fn rows_and_open_directions_are_named() {
     let folder = Folder::new();
     let mut lines: Vec<String> = fs::read_to_string(DATA).unwrap().lines().map(String::from).collect();
