@@ -75,11 +75,11 @@ impl Lagrangian for TwoPendula {
 
 /// A kind of recordings.
 pub struct Case {
-    name: &'static str,
+    pub name: &'static str,
     exact: fn() -> Box<dyn EulerLagrange<f64>>,
-    periodic: &'static [bool],
+    pub periodic: &'static [bool],
     /// Friction coefficients of the coordinates, nothing for none.
-    friction: &'static [f64],
+    pub friction: &'static [f64],
     /// `true` if a known force pulls the first coordinate to a place.
     forced: bool,
     /// Noise of the positions.
@@ -244,7 +244,7 @@ fn energy_error(model: &[f64], exact: &[f64]) -> f64 {
 }
 
 /// A recording smoothed, and a model of it of the shape that `shape` gives; and the loss and the time of its training.
-fn learn(
+pub fn learn(
     recording: &Recording,
     (seed, epochs): (u64, Option<usize>),
     shape: impl FnOnce(&mut Config),

@@ -206,8 +206,7 @@ impl<'a> Plan<'a> {
 
     /// Choices that come before the configuration.
     pub fn options(&self) -> FitOptions {
-        let FitConfig { targets, held_out, window, noise, constraints, training, .. } = self.config.clone();
-        FitOptions { targets, held_out, window, noise, constraints, seed: training.seed }
+        FitOptions::from(&self.config)
     }
 
     /// Refuses a time-like coordinate that is none of these.

@@ -64,6 +64,7 @@ mod systems;
 mod tensors;
 mod train;
 mod train_config;
+mod tube;
 mod watch;
 
 pub use chosen::parse_system;

@@ -1,6 +1,7 @@
 //! Results of a roll-out beside its samples: where it left the training range, pictures, facts in JSON.
 
 use crate::cli::charges::Charges;
+use crate::cli::tube::{MotionTube, TubeFacts};
 use crate::cli::{CliError, input, output};
 use crate::names::{pluralize, rounded};
 use crate::report::{Figure, LinePlot, Picture, Report, Series, line_plot};
@@ -86,12 +87,17 @@ impl Watch {
     }
 
     /// Draws the coordinates against time in SVG, or a page of coordinates, velocities and energy as HTML, by the end of the
-    /// file's name.
+    /// file's name; with the ends of a tube around the coordinates.
     ///
     /// # Errors
     /// A data error for a motion that has no finite sample, or a file that cannot be written.
-    pub fn plot(&self, path: &Path, title: &str, time_unit: &str) -> Result<(), CliError> {
+    pub fn plot(&self, path: &Path, title: &str, time_unit: &str, tube: Option<&MotionTube>) -> Result<(), CliError> {
         let n = self.columns.len() / 2;
+        let (mut names, mut positions) = (self.columns[..n].to_vec(), self.values[..n].to_vec());
+        if let Some(tube) = tube {
+            names.extend(tube.names());
+            positions.extend(self.ends(tube));
+        }
         let bytes = if is_page(path) {
             let mut report = Report::new(title);
             if let Some(leaving) = &self.leaving {
@@ -99,7 +105,7 @@ impl Watch {
             }
             let energy = ["energy".to_string()];
             let parts = [
-                ("Coordinates", &self.columns[..n], &self.values[..n]),
+                ("Coordinates", &names[..], &positions[..]),
                 ("Velocities", &self.columns[n..], &self.values[n..2 * n]),
                 ("Energy of the model", &energy[..], &self.values[2 * n..]),
             ];
@@ -110,9 +116,20 @@ impl Watch {
             }
             report.to_html().into_bytes()
         } else {
-            self.picture(title, &self.columns[..n], &self.values[..n], time_unit)?.to_svg().into_bytes()
+            self.picture(title, &names, &positions, time_unit)?.to_svg().into_bytes()
         };
         write_atomically(path, &bytes).map_err(|e| CliError::file(path, format_args!("cannot write: {e}")))
+    }
+
+    /// Lower and upper ends of a tube around every coordinate, at the times that are kept.
+    fn ends(&self, tube: &MotionTube) -> Vec<Vec<f64>> {
+        let n = self.columns.len() / 2;
+        let mut ends = vec![Vec::with_capacity(self.times.len()); 2 * n];
+        for (k, t) in self.times.iter().enumerate() {
+            let q: Vec<f64> = self.values[..n].iter().map(|values| values[k]).collect();
+            ends.iter_mut().zip(tube.ends(*t, &q).flatten()).for_each(|(ends, x)| ends.push(x));
+        }
+        ends
     }
 
     fn picture(&self, title: &str, names: &[String], values: &[Vec<f64>], unit: &str) -> Result<Picture, CliError> {
@@ -179,6 +196,9 @@ pub struct Facts<'a> {
     /// Charges of the symmetries along the motion, if asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub charges: Option<&'a Charges>,
+    /// The tube around the coordinates, if asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tube: Option<TubeFacts<'a>>,
     /// The file of the samples.
     pub out: String,
 }
@@ -296,8 +316,8 @@ mod tests {
         assert_eq!((leaving.t, leaving.column.as_str(), leaving.trained_on), (5001.0, "x", [-1.0, 5000.0]));
         let directory = tempfile::tempdir().unwrap();
         let [svg, page] = ["a.svg", "a.html"].map(|name| directory.path().join(name));
-        watch.plot(&svg, "Motion", "s").unwrap();
-        watch.plot(&page, "Motion", "").unwrap();
+        watch.plot(&svg, "Motion", "s", None).unwrap();
+        watch.plot(&page, "Motion", "", None).unwrap();
         assert!(std::fs::read(&svg).unwrap().starts_with(b"<svg"));
         let page = std::fs::read_to_string(&page).unwrap();
         assert!(page.matches("<figure").count() == 3 && page.contains("left the training range at t = 5001"));

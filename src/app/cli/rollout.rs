@@ -9,6 +9,7 @@ use crate::cli::number::{finite, positive, tolerance};
 use crate::cli::probe::Probe;
 use crate::cli::source::parameter;
 use crate::cli::subject::Subject;
+use crate::cli::tube::{MotionTube, TubeArgs};
 use crate::cli::{CliError, input, interrupt, output};
 use crate::lagrangian::{EulerLagrange, Interruptible, LeastNorm, ReducedMass, Request, Terms};
 use crate::names::{pluralize, rounded};
@@ -80,6 +81,8 @@ pub struct Args {
     /// the integrator.
     #[arg(long)]
     charges: bool,
+    #[command(flatten)]
+    tube: TubeArgs,
     /// Replace the files.
     #[arg(long)]
     overwrite: bool,
@@ -160,8 +163,8 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     if let Some(step) = args.step.filter(|step| *step > args.dt) {
         output::note(&format!("--step {step} is longer than --dt {}: one step per sample", args.dt));
     }
-    let inputs: Vec<_> =
-        args.forces.files().chain(subject.file.as_deref()).chain(args.constraints.as_deref()).collect();
+    let files = args.forces.files().chain(args.tube.files());
+    let inputs: Vec<_> = files.chain(subject.file.as_deref()).chain(args.constraints.as_deref()).collect();
     if !standard {
         require_free(&args.out, &inputs, args.overwrite)?;
     }
@@ -176,9 +179,12 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     if args.charges && force.is_some() {
         return Err(CliError::usage("--charges: forces from outside change them; leave the forces out"));
     }
+    let span = (args.t_start, args.t_end);
+    let tube = args.tube.tube((subject.model.as_ref(), args.model.as_deref()), &columns[..q.len()], span)?;
     let mut target = Target::create(&args.out, standard)?;
     let header = Trajectory { energy: Some(vec![]), ..Trajectory::<f64>::empty(q.len()) };
-    target.append(&header.csv_header(columns).map_err(CliError::data)?)?;
+    let header = header.csv_header(columns).map_err(CliError::data)?;
+    target.append(&tube.as_ref().map_or(header.clone(), |tube| tube.header(&header)))?;
     let chosen = LeastNorm(subject.model.as_ref());
     let network: &dyn EulerLagrange<f64> = if args.least_norm { &chosen } else { subject.model.as_ref() };
     if args.least_norm {
@@ -203,7 +209,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
             sampled.q.extend(&piece.q);
             sampled.v.extend(&piece.v);
         }
-        let written = target.append(&piece.csv_rows());
+        let written = target.append(&tube.as_ref().map_or_else(|| piece.csv_rows(), |tube| tube.rows(piece)));
         let balanced = balances.as_mut().map_or(Ok(()), |sum| sum.add(piece)).map_err(CliError::data);
         failed = written.and(balanced).err();
         if failed.is_some() || stop.load(Ordering::Relaxed) {
@@ -225,7 +231,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     target.finish()?;
     let time_unit = subject.time_unit.as_deref();
     if let Some(plot) = &args.plot {
-        watch.plot(plot, &format!("{}: roll-out", subject.name), time_unit.unwrap_or_default())?;
+        watch.plot(plot, &format!("{}: roll-out", subject.name), time_unit.unwrap_or_default(), tube.as_ref())?;
     }
     if let Some(leaving) = watch.leaving.as_ref().filter(|_| args.beyond_range) {
         output::note(&format!("{}; what comes after is a guess", leaving.text()));
@@ -265,12 +271,13 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         energy_defect: balance.map(|balance| balance.defect()),
         left_training_range: watch.leaving.as_ref(),
         charges: charges.as_ref(),
+        tube: tube.as_ref().map(MotionTube::facts),
         out: place(&args.out),
     };
     if args.json {
         return output::print(&facts.json()?);
     }
-    let text = facts.text();
+    let text = facts.text() + &tube.as_ref().map_or_else(String::new, MotionTube::text);
     if standard {
         text.lines().for_each(output::note);
         return Ok(());

@@ -245,6 +245,13 @@ impl Default for FitOptions {
     }
 }
 
+impl From<&FitConfig> for FitOptions {
+    fn from(config: &FitConfig) -> Self {
+        let FitConfig { targets, held_out, window, noise, constraints, training, .. } = config.clone();
+        Self { targets, held_out, window, noise, constraints, seed: training.seed }
+    }
+}
+
 impl FitOptions {
     /// The same for the division of a recording.
     pub(crate) fn preparation(&self) -> PrepareOptions {

@@ -51,6 +51,7 @@ pub use run::{Motion, Rollout, rollout};
 #[doc(hidden)]
 pub use trajectory::StepCounts;
 pub use trajectory::Trajectory;
+pub(crate) use trajectory::quoted;
 
 use run::StepFailure;
 

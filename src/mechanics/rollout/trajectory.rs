@@ -164,7 +164,7 @@ impl<S: Scalar> Trajectory<S> {
 }
 
 /// A CSV field, in quotes where the format demands them.
-fn quoted(field: &str) -> String {
+pub(crate) fn quoted(field: &str) -> String {
     if field.contains([',', '"', '\n', '\r']) { format!("\"{}\"", field.replace('"', "\"\"")) } else { field.into() }
 }
 

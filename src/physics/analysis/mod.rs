@@ -27,6 +27,7 @@ mod prediction;
 mod statistics;
 mod terms;
 mod trajectories;
+mod tube;
 
 #[doc(hidden)]
 pub use determination::{
@@ -62,3 +63,4 @@ pub(crate) use terms::{AffineFit, affine_fit, factor_fit, matrices_at_rest, near
 pub use terms::{MassMatrixError, acceleration_errors, mass_matrix_error, mass_matrix_error_within, wrong_signatures};
 #[doc(hidden)]
 pub use trajectories::{Portrait, StartBox, TrajectoryRun, TrajectorySummary, TrajectoryTest};
+pub use tube::{Tube, TubeError};

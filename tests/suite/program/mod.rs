@@ -32,4 +32,5 @@ mod sweep;
 mod symmetries;
 mod system_files;
 mod train;
+mod tube;
 mod words;
