@@ -27,7 +27,8 @@ fn beginnings(recording: &Recording, ahead: f64) -> Vec<Window> {
     let smoothing = Smoothing::choose(recording, &SmoothOptions::default()).expect("long trajectories");
     let first = |track| {
         let states = smoothing.apply(track).expect("a long trajectory");
-        Window::cut(track, (&states.q, &states.v), states.interior(), recording.n(), ahead).into_iter().next()
+        let samples = states.interior().start..states.times.len();
+        Window::cut(track, (&states.q, &states.v), samples, recording.n(), ahead).into_iter().next()
     };
     recording.tracks.iter().filter_map(first).collect()
 }

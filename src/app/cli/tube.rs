@@ -74,12 +74,13 @@ impl TubeArgs {
         }
         let windows = self.windows(path, coordinates, end - start)?;
         let predictions = predict_by_motion(model, &windows, threads(None));
-        let tube = Tube::new(&windows, &predictions, coordinates.len(), share).map_err(|error| {
-            let help = match error {
-                TubeError::Few { .. } => format!(" and that last {} s; --tube-data names more", end - start),
-                _ => String::new(),
-            };
-            CliError::data(format_args!("--tube {share}: {error}{help}"))
+        let tube = Tube::new(&windows, &predictions, coordinates.len(), share).map_err(|error| match error {
+            TubeError::Few { found, needed } => CliError::data(format_args!(
+                "--tube {share}: expected at least {needed} whole motions of {} s that the model has not learned from, found {found}; \
+                 --tube-data names more",
+                end - start
+            )),
+            error => CliError::data(format_args!("--tube {share}: {error}")),
         })?;
         Ok(Some(MotionTube { tube, start, coordinates: coordinates.to_vec() }))
     }
@@ -114,12 +115,13 @@ impl TubeArgs {
     }
 }
 
-/// The beginning of every motion that lasts this long.
+/// The beginning of every motion that lasts this long, from the first state that is known well.
 fn beginnings(part: &Split, seconds: f64) -> Vec<Window> {
     let n = part.recording.n();
     let tracks = part.recording.tracks.iter().zip(&part.states);
     let first = |(track, states): (_, &crate::recording::smooth::Smoothed)| {
-        Window::cut(track, (&states.q, &states.v), states.interior(), n, seconds).into_iter().next()
+        let samples = states.interior().start..states.times.len();
+        Window::cut(track, (&states.q, &states.v), samples, n, seconds).into_iter().next()
     };
     tracks.filter_map(first).collect()
 }

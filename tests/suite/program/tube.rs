@@ -37,9 +37,9 @@ fn a_tube_comes_from_motion_that_was_held_out_or_from_other_recordings() {
     assert!(fs::read_to_string(&plot).unwrap().contains("angle_high"));
 
     let few = rollout(&["--tube", "0.95"]);
-    few.refused(1, &["--tube 0.95", "at least 38 whole motions", "last 2 s", "--tube-data"]);
+    few.refused(1, &["--tube 0.95", "at least 38 whole motions of 2 s", "--tube-data"]);
     let long = until("30", &["--tube", "0.9"]);
-    long.refused(1, &["at least 18 whole motions", "found 0", "last 28 s"]);
+    long.refused(1, &["at least 18 whole motions of 28 s", "found 0"]);
     // All motions of other recordings count.
     let more = folder.file("more.csv", pendulum(38, true, 0.005));
     rollout(&["--tube", "0.95", "--tube-data", &more]).succeeded();
