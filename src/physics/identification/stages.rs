@@ -8,6 +8,7 @@ use super::smoothed::States;
 use super::solve::{Normal, Problem, Sensor, SensorKind};
 use super::{Between, IdentifyError, IdentifyOptions};
 use crate::lagrangian::{Equations, SystemInstance};
+use crate::names::rounded;
 use crate::recording::Recording;
 use crate::recording::smooth::{SmoothOptions, Smoothed, Smoothing};
 
@@ -232,7 +233,7 @@ fn first_samples(states: &States, (n, step): (usize, f64), wanted: Option<f64>) 
     let Some(seconds) = wanted else { return Ok(samples) };
     let wanted = (seconds / step).round() as usize;
     if wanted < LEAST_SEGMENT {
-        let expected = format!("at least {LEAST_SEGMENT} samples, {} s", LEAST_SEGMENT as f64 * step);
+        let expected = format!("at least {LEAST_SEGMENT} samples, {} s", rounded(LEAST_SEGMENT as f64 * step, 3));
         return Err(IdentifyError::Option { what: "segment", expected, found: format!("{seconds} s") });
     }
     Ok(samples.min(wanted))
