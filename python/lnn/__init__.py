@@ -19,9 +19,10 @@ __version__ = "0.1.0"
 _WHERE = {
     **dict.fromkeys(["Model", "System", "systems"], "_mechanics"),
     **dict.fromkeys(["fit", "learn", "train"], "_learning"),
-    **dict.fromkeys(["find_constraints", "formula"], "_readings"),
+    **dict.fromkeys(["find_constraints", "formula", "identify"], "_readings"),
     **dict.fromkeys(["Certificate", "Constraint", "Constraints", "Formula", "Geometry"], "_results"),
-    **dict.fromkeys(["Learned", "OwnConstraints", "Symmetries", "Trajectory"], "_results"),
+    **dict.fromkeys(["Identified", "IdentifiedConstant", "Learned", "Outlier", "OwnConstraints", "Residual"], "_results"),
+    **dict.fromkeys(["SensorConstant", "Symmetries", "Trajectory", "Undetermined"], "_results"),
     "Terms": "reader",
     "LagrangianRegressor": "_regressor",
 }
@@ -30,14 +31,14 @@ __all__ = [*_WHERE]
 if TYPE_CHECKING:
     from ._learning import fit, learn, train
     from ._mechanics import Model, System, systems
-    from ._readings import find_constraints, formula
+    from ._readings import find_constraints, formula, identify
     from ._regressor import LagrangianRegressor
-    from ._results import Certificate, Constraint, Constraints, Formula, Geometry, Learned, OwnConstraints, Symmetries
-    from ._results import Trajectory
+    from ._results import Certificate, Constraint, Constraints, Formula, Geometry, Identified, IdentifiedConstant, Learned
+    from ._results import Outlier, OwnConstraints, Residual, SensorConstant, Symmetries, Trajectory, Undetermined
     from .reader import Terms
 
 
-def __getattr__(name: str):
+def __getattr__(name: str) -> object:
     if name not in _WHERE:
         raise AttributeError(f"module 'lnn' has no attribute {name!r}")
     from importlib import import_module

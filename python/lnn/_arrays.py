@@ -4,13 +4,24 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    class DLPack(Protocol):
+        """An array of another library."""
+
+        def __dlpack__(self, **options: Any) -> Any: ...
+
+    Numbers = ArrayLike | DLPack
 
 DOUBLE = np.dtype(np.float64)
 
 
-def doubles(what: str, x) -> np.ndarray:
+def doubles(what: str, x: Any) -> np.ndarray:
     """Anything that is an array, or says by DLPack that it is, as doubles."""
     if type(x) is np.ndarray and x.dtype is DOUBLE:
         return x
@@ -25,7 +36,7 @@ def doubles(what: str, x) -> np.ndarray:
     return x.astype(np.float64)
 
 
-def states(q, v, n: int) -> tuple[np.ndarray, np.ndarray, tuple[int, ...]]:
+def states(q: Numbers, v: Numbers, n: int) -> tuple[np.ndarray, np.ndarray, tuple[int, ...]]:
     """States ``(..., n)`` as two arrays ``(b, n)``, and the shape before the last axis."""
     q, v = doubles("q", q), doubles("v", v)
     shape = q.shape

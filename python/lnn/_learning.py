@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,10 +14,13 @@ from ._arrays import doubles, states, thread_count
 from ._mechanics import Model, System
 from ._progress import Progress, receiver
 from ._recorded import recorded
-from ._results import Learned
+from ._results import Constraints, Learned
+
+if TYPE_CHECKING:
+    from ._arrays import Numbers
 
 
-def _learned(found) -> Learned:
+def _learned(found: _lnn._Learned) -> Learned:
     subject, history, summary, text, stop = found
     return Learned(Model(subject), _history(history), json.loads(summary), text, stop)
 
@@ -83,20 +86,32 @@ def train(
     return _learned(_lnn.train(system._subject, whole, (starts, thread_count(threads)), directory, receiver(progress)))
 
 
-def _known(known: System | None, prefix: str = "") -> dict[str, Any]:
+def _known(known: System | None) -> dict[str, Any]:
     """Choices of a known part: it has a kinetic energy of its own, and the network begins with next to nothing beside it."""
     if known is None:
         return {}
+    choices = {"known": _description(known), "alpha": 0.0, "initialization": "near-zero"}
+    return {f"network.{key}": choice for key, choice in choices.items()}
+
+
+def _description(known: System) -> dict:
     if known.description is None:
         raise ValueError("known: expected a system with a formula of its own")
-    choices = {"known": known.description, "alpha": 0.0, "initialization": "near-zero"}
-    return {f"{prefix}network.{key}": choice for key, choice in choices.items()}
+    return known.description
+
+
+def _constraints(given: Any) -> str | dict[str, str]:
+    """Constraints by name as the library takes them: ``"find"``, ``"none"``, or formulas."""
+    given = "none" if given is None else getattr(given, "formulas", given)
+    if isinstance(given, Mapping):
+        return {str(name): str(formula) for name, formula in given.items()} or "none"
+    return given if given in ("find", "none") else _lnn.read_constraints(os.fspath(given))
 
 
 def learn(
-    q,
-    v,
-    a,
+    q: Numbers,
+    v: Numbers,
+    a: Numbers,
     *,
     coordinates: Sequence[str] | None = None,
     angles: Sequence[str] = (),
@@ -104,12 +119,14 @@ def learn(
     hidden: Sequence[int] | None = None,
     epochs: int | None = None,
     dissipation: int | None = None,
+    constraints: Mapping[str, str] | Constraints | None = None,
     precision: str = "f32",
     seed: int = 0,
     threads: int | None = None,
+    progress: Progress = None,
     config: Mapping[str, Any] | None = None,
 ) -> Learned:
-    """Learns from states with their accelerations.
+    """Learns from states with their accelerations; Ctrl-C ends it with the best model so far.
 
     Parameters
     ----------
@@ -121,26 +138,37 @@ def learn(
         Coordinates that are angles in rad.
     dissipation : int, optional
         Units of a friction that is learned beside the Lagrangian.
+    constraints : dict of str to str, optional
+        Formulas by name that vanish at every state; they are kept in the model.
     """
-    a = doubles("a", a)
-    if a.ndim != 2:
-        raise ValueError(f"a: expected an array (b, n), found the shape {a.shape}")
-    n = a.shape[1]
+    rows = doubles("a", a)
+    if rows.ndim != 2:
+        raise ValueError(f"a: expected an array (b, n), found the shape {rows.shape}")
+    n = rows.shape[1]
     q, v, shape = states(q, v, n)
-    if shape != a.shape[:1]:
-        raise ValueError(f"expected as many states as accelerations, found {shape} and {a.shape[:1]}")
+    if shape != rows.shape[:1]:
+        raise ValueError(f"expected as many states as accelerations, found {shape} and {rows.shape[:1]}")
     names = [f"q{i + 1}" for i in range(n)] if coordinates is None else list(coordinates)
     if len(names) != n:
         raise ValueError(f"coordinates: expected {n} names, found {len(names)}")
-    choices = _choices(structure, hidden, epochs, precision, seed, threads, config) | {"dissipation": dissipation}
-    found = _lnn.learn(q, v, np.ascontiguousarray(a), (names, list(angles)), json.dumps(choices))
-    subject, history, validation, test = found
+    choices = _choices(structure, hidden, epochs, precision, seed, threads, config)
+    choices |= {"dissipation": dissipation, "constraints": _constraints(constraints)}
+    found = _lnn.learn(q, v, np.ascontiguousarray(rows), (names, list(angles)), json.dumps(choices), receiver(progress))
+    subject, history, validation, test, stop = found
     summary = {"validation_loss": validation, "test_loss": test}
     text = f"loss (paper): validation {validation:.4g}, fresh states {test:.4g}\n"
-    return Learned(Model(subject), _history(history), summary, text)
+    return Learned(Model(subject), _history(history), summary, text, stop)
 
 
-def _choices(structure, hidden, epochs, precision, seed, threads, config) -> dict:
+def _choices(
+    structure: str | None,
+    hidden: Sequence[int] | None,
+    epochs: int | None,
+    precision: str,
+    seed: int,
+    threads: int | None,
+    config: Mapping[str, Any] | None,
+) -> dict[str, Any]:
     return {
         "structure": structure,
         "hidden": None if hidden is None else [int(width) for width in hidden],
@@ -153,18 +181,19 @@ def _choices(structure, hidden, epochs, precision, seed, threads, config) -> dic
 
 
 def fit(
-    data,
+    data: Any,
     *,
     coordinates: Sequence[str] | None = None,
     angles: Sequence[str] = (),
     dt: float | None = None,
-    t=None,
-    v=None,
-    a=None,
-    force=None,
+    t: Any = None,
+    v: Any = None,
+    a: Any = None,
+    force: Any = None,
     trajectory: str | None = None,
     columns: Mapping[str, Any] | None = None,
     friction: bool = False,
+    constraints: str | os.PathLike | Mapping[str, str] | Constraints | None = None,
     structure: str | None = None,
     known: System | None = None,
     hidden: Sequence[int] | None = None,
@@ -197,14 +226,18 @@ def fit(
         More about the columns of files: ``time``, ``rate``, ``velocities``, ``accelerations``, ``forces``, ``units``.
     friction : bool
         Whether a friction is learned beside the Lagrangian.
+    constraints : str, path or dict, optional
+        What holds the coordinates together: ``"find"`` reads it off the motion, ``"none"`` is the default; or formulas by name that vanish,
+        what `find_constraints` returned, or a file with a table ``constraints``. They are kept in the model.
     known : System, optional
         A formula that is added to what the network learns; its parameters marked ``learn`` are found, see `Model.constants`.
     config : dict, optional
-        Any other choice by its path in the configuration of a fit: ``{"training.optimizer.batch": 64}``.
+        Any other choice by its path in the configuration of a fit: ``{"held_out": 0.3, "training.optimizer.batch": 64}``.
     """
     more = {"dt": dt, "t": t, "v": v, "a": a, "force": force, "trajectory": trajectory, "columns": columns}
     motion = recorded(data, coordinates, angles, **more)
-    config = {**_known(known, "training."), **(config or {})}
     choices = _choices(structure, hidden, epochs, precision, seed, threads, config)
+    choices |= {"friction": friction, "constraints": _constraints(constraints)}
+    choices["known"] = None if known is None else _description(known)
     directory = None if out is None else os.fspath(out)
-    return _learned(_lnn.fit(motion, json.dumps({**choices, "friction": friction}), directory, receiver(progress)))
+    return _learned(_lnn.fit(motion, json.dumps(choices), directory, receiver(progress)))

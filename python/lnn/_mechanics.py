@@ -6,7 +6,7 @@ import json
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,13 +16,18 @@ from ._results import Certificate, Formula, Geometry, OwnConstraints, Symmetries
 from .reader.functions import DescribedModel, Functions, Terms
 from .reader.model_file import ModelFile
 
+if TYPE_CHECKING:
+    import torch
+
+    from ._arrays import Numbers
+
 TENSORS = {"metric": 2, "inverse": 2, "christoffel": 3, "riemann": 4, "ricci": 2, "einstein": 2, "weyl": 4}
 
 
 class Mechanics:
     """What systems and models have in common: a Lagrangian, its terms, its motion, its geometry."""
 
-    def __init__(self, subject: _lnn.Subject):
+    def __init__(self, subject: _lnn.Subject) -> None:
         self._subject = subject
         self._facts: dict[str, Any] = json.loads(subject.facts())
         self._n = len(self._facts["columns"]) // 2
@@ -52,7 +57,7 @@ class Mechanics:
         """Bounds of the states of interest by column: those that a model learned from, or that a system is judged by."""
         return dict(zip(self.columns, map(tuple, self._facts["position"] + self._facts["velocity"])))
 
-    def terms(self, q, v, *, threads: int = 1) -> Terms:
+    def terms(self, q: Numbers, v: Numbers, *, threads: int = 1) -> Terms:
         """All terms of states.
 
         Parameters
@@ -85,34 +90,34 @@ class Mechanics:
             tuple(failures),
         )
 
-    def _term(self, name, width, q, v, threads):
+    def _term(self, name: str, width: tuple[int, ...], q: Numbers, v: Numbers, threads: int) -> np.ndarray:
         q, v, shape = states(q, v, self._n)
         return self._subject.term(name, q, v, threads).reshape(shape + width)
 
-    def lagrangian(self, q, v, *, threads: int = 1) -> np.ndarray:
+    def lagrangian(self, q: Numbers, v: Numbers, *, threads: int = 1) -> np.ndarray:
         """L, ``(...)``, of states ``(..., n)``."""
         return self._term("lagrangian", (), q, v, threads)
 
-    def momentum(self, q, v, *, threads: int = 1) -> np.ndarray:
+    def momentum(self, q: Numbers, v: Numbers, *, threads: int = 1) -> np.ndarray:
         """p = dL/dv, ``(..., n)``."""
         return self._term("momentum", (self._n,), q, v, threads)
 
-    def mass_matrix(self, q, v, *, threads: int = 1) -> np.ndarray:
+    def mass_matrix(self, q: Numbers, v: Numbers, *, threads: int = 1) -> np.ndarray:
         """M = d2L/dv2, ``(..., n, n)``."""
         return self._term("mass_matrix", (self._n, self._n), q, v, threads)
 
-    def acceleration(self, q, v, *, threads: int = 1) -> np.ndarray:
+    def acceleration(self, q: Numbers, v: Numbers, *, threads: int = 1) -> np.ndarray:
         """a, ``(..., n)``, friction included; NaN where it is not determined."""
         return self._term("acceleration", (self._n,), q, v, threads)
 
-    def energy(self, q, v, *, threads: int = 1) -> np.ndarray:
+    def energy(self, q: Numbers, v: Numbers, *, threads: int = 1) -> np.ndarray:
         """E = v.p - L, ``(...)``."""
         return self._term("energy", (), q, v, threads)
 
     def rollout(
         self,
-        q,
-        v,
+        q: Numbers,
+        v: Numbers,
         t_end: float,
         dt: float,
         *,
@@ -139,20 +144,21 @@ class Mechanics:
             Whether a motion ends where it leaves the states that a model learned from.
         """
         n = self._n
-        q, v, shape = states(q, v, n)
+        starts, velocities, shape = states(q, v, n)
         times, accuracy = (float(t0), float(t_end), float(dt)), (float(rtol), float(atol), step)
-        found = self._subject.rollout(q, v, times, method, accuracy, bounded, thread_count(threads))
+        found = self._subject.rollout(starts, velocities, times, method, accuracy, bounded, thread_count(threads))
         # The longest motion has all times that any has.
         t = max((motion[0] for motion in found), key=len, default=np.empty(0))
         parts = [np.full((len(found), len(t), n), np.nan) for _ in range(2)] + [np.full((len(found), len(t)), np.nan)]
-        for k, (times, q, v, energy, _, _) in enumerate(found):
-            parts[0][k, : len(times)], parts[1][k, : len(times)] = q.reshape(-1, n), v.reshape(-1, n)
-            parts[2][k, : len(energy)] = energy
-        q, v, energy = (part.reshape(shape + part.shape[1:]) for part in parts)
+        for k, (_, *motion, _, _) in enumerate(found):
+            for part, numbers in zip(parts, motion):
+                rows = numbers.reshape(-1, *part.shape[2:])
+                part[k, : len(rows)] = rows
+        along = [part.reshape(shape + part.shape[1:]) for part in parts]
         stop = found[0][4] if shape == () else np.array([motion[4] for motion in found], dtype=object).reshape(shape)
-        return Trajectory(t, q, v, energy, stop, self.columns)
+        return Trajectory(t, along[0], along[1], along[2], stop, self.columns)
 
-    def geometry(self, q, *, velocity=None) -> Geometry:
+    def geometry(self, q: Numbers, *, velocity: Numbers | None = None) -> Geometry:
         """Metric, connection and curvature at points.
 
         Parameters
@@ -302,7 +308,7 @@ class System(Mechanics):
         coordinates: Sequence[str] | Mapping[str, Mapping] | None = None,
         parameters: Mapping[str, Any] | None = None,
         **more: Any,
-    ):
+    ) -> None:
         if lagrangian is None and "metric" not in more:
             if name is None or coordinates is not None:
                 raise TypeError("expected the name of a system, or a `lagrangian` or `metric` with its `coordinates`")
@@ -326,7 +332,7 @@ class System(Mechanics):
             description["coordinates"].append(whole)
         self._describe(json.dumps({**description, "parameters": dict(parameters or {}), **more}), True, [])
 
-    def _describe(self, text: str, is_json: bool, given: list):
+    def _describe(self, text: str, is_json: bool, given: list) -> None:
         Mechanics.__init__(self, _lnn.Subject.described(text, is_json, given))
         self._made = ("described", text, is_json, given)
 
@@ -339,7 +345,7 @@ class System(Mechanics):
         system._describe(text, False, _texts(parameters))
         return system
 
-    def __reduce__(self):
+    def __reduce__(self) -> tuple[Any, ...]:
         return _system, self._made
 
     def __repr__(self) -> str:
@@ -356,15 +362,24 @@ class System(Mechanics):
         """What the system's file says; None for one of the catalogue."""
         return self._facts["description"]
 
-    def _functions(self, xp, kind) -> Functions:
+    def with_parameters(self, **parameters: Any) -> System:
+        """The same system with other values of some of its parameters."""
+        kind, *text, given = self._made
+        return _system(kind, *text, list({**dict(given), **dict(_texts(parameters))}.items()))
+
+    def _functions(self, xp: Any, kind: type[Functions]) -> Functions:
+        from .reader.constraints import Constraints
         from .reader.formula import Described
 
         if self.description is None:
             raise ValueError("only a system with a formula of its own is a function of other libraries")
-        if self.description.get("constraints"):
-            raise ValueError("the motion under constraints does not follow from the formula alone: other libraries have no such functions")
+        header = {"columns": list(self.columns), "parameters": self.parameters, "description": self.description}
+        if held := self.description.get("constraints"):
+            # Those that follow from others determine no force of their own.
+            redundant = self.constraints().redundant
+            header["constraints"] = {name: formula for name, formula in held.items() if name not in redundant}
         model = DescribedModel(Described(self.description), self.parameters)
-        return kind(xp, model, {})
+        return kind(xp, model, {}, Constraints(header))
 
     def to_numpy(self) -> Functions:
         """The formula as functions of NumPy arrays."""
@@ -378,7 +393,7 @@ class System(Mechanics):
 
         return self._functions(JAX, Differentiated)
 
-    def to_torch(self, dtype=None) -> Functions:
+    def to_torch(self, dtype: torch.dtype | None = None) -> Functions:
         """The formula as functions of PyTorch tensors."""
         import torch
 
@@ -387,7 +402,7 @@ class System(Mechanics):
         return self._functions(backend(dtype or torch.float64), Differentiated)
 
 
-def _system(kind: str, *made):
+def _system(kind: str, *made: Any) -> System:
     """A pickled system."""
     if kind == "system":
         return System(made[0], **dict(made[1]))
@@ -400,7 +415,7 @@ def _texts(parameters: Mapping[str, Any]) -> list[tuple[str, str]]:
     return [(name, x if isinstance(x, str) else repr(_plain(name, x))) for name, x in parameters.items()]
 
 
-def _plain(name: str, x):
+def _plain(name: str, x: Any) -> int | float:
     try:
         return int(x) if int(x) == x else float(x)
     except (TypeError, ValueError, OverflowError) as error:
@@ -434,7 +449,7 @@ class Model(Mechanics):
         """Writes the file that the program and `load` read."""
         Path(path).write_bytes(self.to_bytes())
 
-    def __reduce__(self):
+    def __reduce__(self) -> tuple[Any, ...]:
         return Model.from_bytes, (self.to_bytes(),)
 
     def __repr__(self) -> str:
@@ -472,7 +487,7 @@ class Model(Mechanics):
         """The model as functions of JAX arrays; see `ModelFile.to_jax`."""
         return self.file.to_jax()
 
-    def to_torch(self, dtype=None) -> Functions:
+    def to_torch(self, dtype: torch.dtype | None = None) -> Functions:
         """The model as functions of PyTorch tensors; see `ModelFile.to_torch`."""
         return self.file.to_torch(dtype)
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable
 
-Progress = bool | Callable[[str, float, float, str], None] | None
+Receiver = Callable[[str, float, float, str], None] | None
+Progress = bool | Receiver
 
 
-def receiver(progress: Progress):
+def receiver(progress: Progress) -> Receiver:
     """A receiver of events: the one that is given, a line at the terminal or in a notebook for True, none for None."""
     return Line() if progress is True else progress or None
 
@@ -16,7 +17,7 @@ def receiver(progress: Progress):
 class Line:
     """One line that is written again and again: steps, the last validation loss."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.loss = ""
 
     def __call__(self, kind: str, done: float, total: float, text: str) -> None:

@@ -1,4 +1,4 @@
-"""What is read off recorded motion: its constraints, and its Lagrangian as a formula."""
+"""What is read off recorded motion: its constraints, its Lagrangian as a formula, the constants of a form that is known."""
 
 from __future__ import annotations
 
@@ -11,17 +11,19 @@ import numpy as np
 from . import _lnn
 from ._arrays import thread_count
 from ._recorded import recorded
-from ._results import Constraint, Constraints, Formula
+from ._mechanics import System
+from ._results import Constraint, Constraints, Formula, Identified, IdentifiedConstant, Outlier, Residual, SensorConstant
+from ._results import Undetermined
 
 
 def find_constraints(
-    data,
+    data: Any,
     *,
     coordinates: Sequence[str] | None = None,
     angles: Sequence[str] = (),
     dt: float | None = None,
-    t=None,
-    v=None,
+    t: Any = None,
+    v: Any = None,
     trajectory: str | None = None,
     columns: Mapping[str, Any] | None = None,
     degree: int = 2,
@@ -47,14 +49,14 @@ def find_constraints(
 
 
 def formula(
-    data,
+    data: Any,
     *,
     coordinates: Sequence[str] | None = None,
     angles: Sequence[str] = (),
     dt: float | None = None,
-    t=None,
-    v=None,
-    force=None,
+    t: Any = None,
+    v: Any = None,
+    force: Any = None,
     trajectory: str | None = None,
     columns: Mapping[str, Any] | None = None,
     friction: bool = False,
@@ -101,9 +103,101 @@ def formula(
     return read_formula(_lnn.formula(motion, choices))
 
 
-def formula_choices(basis, functions, gyroscopic, friction, noise, scale, bootstraps, seed, threads, name) -> str:
+def identify(
+    data: Any,
+    system: System | str,
+    *,
+    constants: Sequence[str] = (),
+    coordinates: Sequence[str] | None = None,
+    angles: Sequence[str] | None = None,
+    dt: float | None = None,
+    t: Any = None,
+    v: Any = None,
+    force: Any = None,
+    trajectory: str | None = None,
+    columns: Mapping[str, Any] | None = None,
+    offsets: Sequence[str] = (),
+    gains: Sequence[str] = (),
+    delays: Sequence[str] = (),
+    noise: Sequence[float] | None = None,
+    between: str | None = None,
+    segment: float | None = None,
+    robust: bool = False,
+    threads: int | None = None,
+) -> Identified:
+    """Finds the constants of a system whose form is known, from recorded motion, without a network.
+
+    Parameters
+    ----------
+    data, dt, t, v, force, trajectory, columns
+        The motion, as in `fit`.
+    system : System or str
+        The form, or its name in the catalogue; the search starts at the values of its parameters.
+    constants : sequence of str
+        Symbols of the unknown constants; those that a file marks ``learn`` by default, all if it marks none.
+    coordinates, angles : sequence of str, optional
+        Columns in the order of the system, and which of them are angles; the names and the angles of the system by default.
+    offsets, gains, delays : sequence of str
+        Coordinates whose sensor has an unknown offset, an unknown gain, or is late by an unknown time.
+    noise : sequence of float, optional
+        Standard deviation of the noise of every coordinate in SI units; estimated by default.
+    between : str, optional
+        Known forces between the samples: ``"held"``, ``"linear"`` or ``"band-limited"``; what meets the motion best by default.
+    segment : float, optional
+        Length of the segments that are followed in s; what makes the constants best known by default.
+    robust : bool
+        Whether residuals beyond three standard deviations count linearly, so that outliers move little.
+    threads : int, optional
+        Threads; the result does not depend on them.
+
+    Examples
+    --------
+    >>> import lnn
+    >>> swing = lnn.System("n-pendulum", n=1, l=0.7).rollout([1.0], [0.0], 6.0, 0.02)
+    >>> found = identify(swing.q, lnn.System("n-pendulum", n=1), constants=["l"], dt=0.02)
+    >>> round(found.constants["l"].value, 4)
+    0.7
+    """
+    system = System(system) if isinstance(system, str) else system
+    coordinates = list(system.coordinates) if coordinates is None else list(coordinates)
+    if angles is None:
+        turning = [name in system.angles for name in system.coordinates]
+        angles = [name for name, angle in zip(coordinates, turning) if angle]
+    more = {"dt": dt, "t": t, "v": v, "force": force, "trajectory": trajectory, "columns": columns}
+    motion = recorded(data, coordinates, angles, **more)
+    named = {"constants": constants, "offsets": offsets, "gains": gains, "delays": delays}
+    choices: dict[str, Any] = {key: [str(name) for name in names] for key, names in named.items()}
+    choices |= {"noise": None if noise is None else [float(x) for x in noise], "between": between, "robust": bool(robust)}
+    choices |= {"segment": None if segment is None else float(segment), "threads": thread_count(threads)}
+    found = json.loads(_lnn.identify(motion, system._subject, json.dumps(choices)))
+    found["constants"] = {constant["symbol"]: IdentifiedConstant(**constant) for constant in found["constants"]}
+    found["sensors"] = tuple(SensorConstant(**sensor) for sensor in found["sensors"])
+    unknowns = len(found["constants"]) + len(found["sensors"])
+    found["correlations"] = np.array(found["correlations"], float).reshape(unknowns, unknowns)
+    found["undetermined"] = tuple(_undetermined(**direction) for direction in found["undetermined"])
+    found["residuals"] = {residual["coordinate"]: Residual(**residual) for residual in found["residuals"]}
+    found["outliers"] = tuple(Outlier(*outlier) for outlier in found["outliers"])
+    return Identified(**found, _form=system)
+
+
+def _undetermined(constants: Any, direction: Any, known: Any, **more: Any) -> Undetermined:
+    return Undetermined(tuple(constants), np.array(direction, float), dict(known), **more)
+
+
+def formula_choices(
+    basis: str | None,
+    functions: Sequence[str],
+    gyroscopic: bool,
+    friction: bool,
+    noise: Sequence[float] | None,
+    scale: tuple[str, float] | None,
+    bootstraps: int,
+    seed: int,
+    threads: int | None,
+    name: str,
+) -> str:
     """Choices of a search as the library takes them."""
-    given = {"basis": basis, "functions": list(functions), "gyroscopic": gyroscopic, "friction": friction, "noise": noise}
+    given: dict[str, Any] = {"basis": basis, "functions": list(functions), "gyroscopic": gyroscopic, "friction": friction, "noise": noise}
     given |= {"scale": scale, "bootstraps": bootstraps, "seed": seed, "threads": thread_count(threads), "name": name}
     return json.dumps(given)
 

@@ -4,21 +4,40 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ._arrays import doubles
 
+if TYPE_CHECKING:
+    from ._lnn import _Motion
 
-def recorded(data, coordinates, angles, *, dt=None, t=None, v=None, a=None, force=None, trajectory=None, columns=None):
+
+def recorded(
+    data: Any,
+    coordinates: Sequence[str] | None,
+    angles: Sequence[str],
+    *,
+    dt: float | None = None,
+    t: Any = None,
+    v: Any = None,
+    a: Any = None,
+    force: Any = None,
+    trajectory: str | None = None,
+    columns: Mapping[str, Any] | None = None,
+) -> _Motion:
     """Recorded motion as the library takes it: files, trajectories, the meaning of their columns."""
-    files, tracks, columns = [], [], dict(columns or {})
+    files: list[str] = []
+    tracks: list[tuple[Any, ...]] = []
+    meaning = dict(columns or {})
     if _is_path(data) or (isinstance(data, (list, tuple)) and data and all(map(_is_path, data))):
         if coordinates is None:
             raise TypeError("coordinates: expected the columns of the files")
         files = [os.fspath(path) for path in ([data] if _is_path(data) else data)]
         if trajectory is not None:
-            columns["trajectory"] = trajectory
+            meaning["trajectory"] = trajectory
     else:
         if hasattr(data, "columns") and hasattr(data, "loc"):
             if coordinates is None:
@@ -40,25 +59,25 @@ def recorded(data, coordinates, angles, *, dt=None, t=None, v=None, a=None, forc
     unknown = [name for name in angles if name not in coordinates]
     if unknown:
         raise ValueError(f"angles: {unknown[0]!r} is none of the coordinates {list(coordinates)}")
-    return files, tracks, json.dumps({"coordinates": list(coordinates), "angles": list(angles), "columns": columns})
+    return files, tracks, json.dumps({"coordinates": list(coordinates), "angles": list(angles), "columns": meaning})
 
 
-def _is_path(x) -> bool:
+def _is_path(x: Any) -> bool:
     return isinstance(x, (str, os.PathLike))
 
 
-def _of_frame(frame, coordinates, trajectory, others):
+def _of_frame(frame: Any, coordinates: Sequence[str], trajectory: str | None, others: tuple[Any, ...]) -> Any:
     """Lists of arrays, one per trajectory, of a DataFrame."""
-    time, *others = others
+    time, *beside = others
     time = next((name for name in ("t", "time") if name in frame.columns), None) if time is None else time
     if time is None:
         raise ValueError("t: expected the column of the times, found none called t or time")
     groups = [frame] if trajectory is None else [group for _, group in frame.groupby(trajectory, sort=False)]
     of = lambda names: None if names is None else [group[list(names)].to_numpy(float) for group in groups]
-    return of(coordinates), [group[time].to_numpy(float) for group in groups], *map(of, others)
+    return of(coordinates), [group[time].to_numpy(float) for group in groups], *map(of, beside)
 
 
-def _tracks(data, t, dt, v, a, force):
+def _tracks(data: Any, t: Any, dt: float | None, v: Any, a: Any, force: Any) -> tuple[list[np.ndarray], Any]:
     """Positions of the trajectories, and times, velocities, accelerations and forces beside them."""
     several = isinstance(data, (list, tuple)) and len(data) > 0 and np.ndim(data[0]) == 2
     arrays = list(data) if several else [data]

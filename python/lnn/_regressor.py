@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils.validation import check_is_fitted, validate_data
@@ -37,8 +40,15 @@ class LagrangianRegressor(RegressorMixin, BaseEstimator):
     """
 
     def __init__(
-        self, angles=(), structure=None, hidden=None, epochs=None, dissipation=None, random_state=0, threads=None
-    ):
+        self,
+        angles: Sequence[int] = (),
+        structure: str | None = None,
+        hidden: Sequence[int] | None = None,
+        epochs: int | None = None,
+        dissipation: int | None = None,
+        random_state: int = 0,
+        threads: int | None = None,
+    ) -> None:
         self.angles = angles
         self.structure = structure
         self.hidden = hidden
@@ -47,7 +57,7 @@ class LagrangianRegressor(RegressorMixin, BaseEstimator):
         self.random_state = random_state
         self.threads = threads
 
-    def __sklearn_tags__(self):
+    def __sklearn_tags__(self) -> Any:
         tags = super().__sklearn_tags__()
         tags.target_tags.multi_output = True
         tags.target_tags.required = True
@@ -55,16 +65,15 @@ class LagrangianRegressor(RegressorMixin, BaseEstimator):
         tags.regressor_tags.poor_score = True
         return tags
 
-    def fit(self, X, y):
+    def fit(self, X: Any, y: Any) -> LagrangianRegressor:
         """Learns from states and accelerations."""
-        X, y = validate_data(self, X, y, dtype=np.float64, y_numeric=True, multi_output=True)
+        X, y = validate_data(self, X, y, dtype=np.float64, y_numeric=True, multi_output=True, ensure_min_samples=3)
         a = y[:, None] if y.ndim == 1 else y
-        if X.shape[1] != 2 * a.shape[1]:
-            found = f"n_samples = {X.shape[0]}, n_features = {X.shape[1]}, targets = {a.shape[1]}"
-            raise ValueError(f"expected two features for each acceleration, coordinates before velocities, found {found}")
+        q, v = self._states(X, a.shape[1])
         names = [f"q{i + 1}" for i in range(a.shape[1])]
         learned = learn(
-            *np.hsplit(X, 2),
+            q,
+            v,
             a,
             angles=[names[i] for i in self.angles],
             structure=self.structure,
@@ -77,9 +86,16 @@ class LagrangianRegressor(RegressorMixin, BaseEstimator):
         self.model_, self.history_, self._flat = learned.model, learned.history, y.ndim == 1
         return self
 
-    def predict(self, X):
+    def predict(self, X: Any) -> np.ndarray:
         """Accelerations of states."""
         check_is_fitted(self)
         X = validate_data(self, X, dtype=np.float64, reset=False)
-        a = self.model_.acceleration(*np.hsplit(X, 2))
+        a = self.model_.acceleration(*self._states(X, len(self.model_.coordinates)))
         return a[:, 0] if self._flat else a
+
+    def _states(self, X: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray]:
+        """Coordinates and velocities of ``X``."""
+        if X.shape[1] != 2 * n:
+            found = f"n_samples = {X.shape[0]}, n_features = {X.shape[1]}, targets = {n}"
+            raise ValueError(f"expected two features for each acceleration, coordinates before velocities, found {found}")
+        return X[:, :n], X[:, n:]

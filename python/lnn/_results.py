@@ -8,10 +8,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
+    import pandas as pd
+    import sympy
+    import xarray as xr
+    from matplotlib.axes import Axes
+
     from ._mechanics import Model, System
 
 
-def _axes(ax):
+def _axes(ax: Axes | None) -> Axes:
     """The axes that are given, or new ones."""
     if ax is not None:
         return ax
@@ -50,7 +55,7 @@ class Trajectory:
         """Whether every motion reached its end."""
         return all(stop is None for stop in np.asarray(self.stop, dtype=object).ravel())
 
-    def to_pandas(self):
+    def to_pandas(self) -> pd.DataFrame:
         """A DataFrame of the samples of one motion, or of a batch under an index ``start``."""
         import pandas as pd
 
@@ -63,7 +68,7 @@ class Trajectory:
         index = pd.MultiIndex.from_product([range(len(rows) // m), self.t], names=["start", "t"])
         return pd.DataFrame(rows, index, names)
 
-    def to_xarray(self):
+    def to_xarray(self) -> xr.Dataset:
         """A Dataset with the dimensions ``t`` and, of a batch, ``start``."""
         import xarray as xr
 
@@ -74,7 +79,7 @@ class Trajectory:
         names = [*self.columns, "energy"]
         return xr.Dataset({name: (dims, state[..., k]) for k, name in enumerate(names)}, {"t": self.t})
 
-    def plot(self, column: str | None = None, *, ax=None, **style):
+    def plot(self, column: str | None = None, *, ax: Axes | None = None, **style: Any) -> Axes:
         """Draws one column over time, ``"energy"`` or by default the first coordinate, into `ax` or new axes of matplotlib, and returns these.
 
         `style` goes to ``Axes.plot``.
@@ -159,7 +164,7 @@ class Symmetries:
     basis: str
     points: int
 
-    def plot(self, *, ax=None, **style):
+    def plot(self, *, ax: Axes | None = None, **style: Any) -> Axes:
         """Draws the singular values, those of symmetries before the gap, into `ax` or new axes of matplotlib, and returns these."""
         ax = _axes(ax)
         ax.semilogy(np.arange(1, len(self.singular_values) + 1), np.sort(self.singular_values), "o", **style)
@@ -307,7 +312,7 @@ class Formula:
         """L, or D, in LaTeX."""
         return self._latex[dissipation]
 
-    def sympy(self, dissipation: bool = False):
+    def sympy(self, dissipation: bool = False) -> sympy.Expr:
         """L, or D, as an expression of SymPy in real symbols: ``x`` for a coordinate, ``x_dot`` for its velocity."""
         from .reader.sympy_functions import expression
 
@@ -321,12 +326,184 @@ class Formula:
 
         return System.from_toml(self.toml)
 
-    def to_pandas(self):
+    def to_pandas(self) -> pd.DataFrame:
         """A DataFrame of the terms."""
         import pandas as pd
 
         names = ["coefficients", "standard_errors", "probabilities", "dissipative", "near"]
         return pd.DataFrame({name: getattr(self, name) for name in names}, pd.Index(self.terms, name="term"))
+
+
+@dataclass(frozen=True)
+class IdentifiedConstant:
+    """A constant of a system.
+
+    Attributes
+    ----------
+    symbol : str
+    value : float
+    standard_error : float or None
+        None where the motion says nothing of it; its value is then the one that the search started with.
+    unit : str
+    start : float
+        Value at which the search started.
+    """
+
+    symbol: str
+    value: float
+    standard_error: float | None
+    unit: str
+    start: float
+
+
+@dataclass(frozen=True)
+class SensorConstant:
+    """A constant of the sensor of a coordinate, whose positions are ``gain * q(t - delay) + offset``.
+
+    Attributes
+    ----------
+    kind : str
+        ``"offset"``, ``"gain"`` or ``"delay"``, which is in s.
+    coordinate : str
+    value : float
+    standard_error : float or None
+        None where the motion says nothing of it.
+    """
+
+    kind: str
+    coordinate: str
+    value: float
+    standard_error: float | None
+
+
+@dataclass(frozen=True)
+class Undetermined:
+    """A direction in which constants change without an effect on the recorded motion.
+
+    Attributes
+    ----------
+    constants : tuple of str
+        The constants.
+    direction : (k,)
+        Relative change of each, the largest 1.
+    known : dict of str to float
+        Combinations that are known nevertheless.
+    relative_error : float or None
+        Standard error along the direction over the values; None where the motion does not depend on it at all.
+    text, cure : str
+        What is open, and what would determine it, in words.
+    """
+
+    constants: tuple[str, ...]
+    direction: np.ndarray
+    known: dict[str, float]
+    relative_error: float | None
+    text: str
+    cure: str
+
+
+@dataclass(frozen=True)
+class Residual:
+    """What the identified system leaves of the motion of one coordinate.
+
+    Attributes
+    ----------
+    coordinate : str
+    rms, noise : float
+        Root mean square, and the standard deviation of the noise as it was known before.
+    autocorrelation : float
+        Correlation of residuals that follow each other; that of noise is 0.
+    white : bool
+        Whether they follow each other as noise does.
+    """
+
+    coordinate: str
+    rms: float
+    noise: float
+    autocorrelation: float
+    white: bool
+
+
+@dataclass(frozen=True)
+class Outlier:
+    """A sample far from the motion.
+
+    Attributes
+    ----------
+    trajectory : str
+    row : int
+        Line of the file, or sample of an array, from 1.
+    time : float
+        In s.
+    coordinate : str
+    size : float
+        Residual over the usual one.
+    """
+
+    trajectory: str
+    row: int
+    time: float
+    coordinate: str
+    size: float
+
+
+@dataclass(frozen=True)
+class Identified:
+    """Constants of a system with their errors, and how far they can be trusted.
+
+    Attributes
+    ----------
+    constants : dict of str to IdentifiedConstant
+        By symbol, in the order of the system.
+    sensors : tuple of SensorConstant
+    correlations : (m, m)
+        Of the errors of the constants, then of the sensors; 0 beside those without an error.
+    undetermined : tuple of Undetermined
+        What the motion leaves open.
+    residuals : dict of str to Residual
+        By coordinate.
+    over_noise : float
+        Residuals over the noise, root mean square, all coordinates together.
+    explained : bool
+        Whether residuals are as large as the noise and white: the form explains the motion.
+    outliers : tuple of Outlier
+        The farthest first, 100 at most of `outlier_count`.
+    inflation : float
+        Factor of the standard errors for residuals that are alike all along a segment; 1 for white ones.
+    samples, segments, segment_seconds, substeps
+        Samples and segments that were followed, the usual length of these in s, integration steps from sample to sample.
+    between : str or None
+        How known forces were taken between the samples.
+    """
+
+    constants: dict[str, IdentifiedConstant]
+    sensors: tuple[SensorConstant, ...]
+    correlations: np.ndarray
+    undetermined: tuple[Undetermined, ...]
+    residuals: dict[str, Residual]
+    over_noise: float
+    explained: bool
+    outliers: tuple[Outlier, ...]
+    outlier_count: int
+    inflation: float
+    samples: int
+    segments: int
+    segment_seconds: float
+    substeps: int
+    between: str | None
+    _form: System = field(repr=False)
+
+    def system(self) -> System:
+        """The system with the constants that were found."""
+        return self._form.with_parameters(**{symbol: constant.value for symbol, constant in self.constants.items()})
+
+    def to_pandas(self) -> pd.DataFrame:
+        """A DataFrame of the constants."""
+        import pandas as pd
+
+        names = ["value", "standard_error", "unit", "start"]
+        rows = [[getattr(constant, name) for name in names] for constant in self.constants.values()]
+        return pd.DataFrame(rows, pd.Index(list(self.constants), name="constant"), names)
 
 
 @dataclass(frozen=True)
@@ -385,7 +562,7 @@ class Learned:
     text: str = field(repr=False)
     stop: str | None = None
 
-    def plot(self, *, ax=None, **style):
+    def plot(self, *, ax: Axes | None = None, **style: Any) -> Axes:
         """Draws the losses over the epochs into `ax` or new axes of matplotlib, and returns these."""
         ax = _axes(ax)
         for name in "training_loss", "validation_loss":

@@ -4,18 +4,20 @@ use crate::attend::attended;
 use crate::errors::{pipeline, runtime, value};
 use crate::recorded::{Motion, Source};
 use crate::subject::{Subject, slice, values};
-use lnn::configuration::{Config, Precision};
+use lnn::configuration::{Config, Known, Precision};
 use lnn::data::Dataset;
 use lnn::network::Structure;
-use lnn::network::file::ModelFile;
-use lnn::pipeline::{Directory, Fit, FitConfig, InMemory, Output, PipelineError, RunOptions};
+use lnn::pipeline::{
+    Directory, Fit, FitConfig, FitConstraints, FitOptions, InMemory, Output, PipelineError, RunOptions,
+};
 use lnn::presets::{Preset, Trainer};
 use lnn::training::{Epoch, StopReason};
 use numpy::PyReadonlyArray2;
 use pyo3::prelude::*;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-use serde_json::Value;
+use serde_json::{Map, Value};
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
 
@@ -37,9 +39,8 @@ fn named<T: DeserializeOwned>(what: &str, name: &str) -> PyResult<T> {
 }
 
 /// A configuration with other values at paths such as `optimizer.batch` and `phase.0.rate`, from a JSON object.
-fn changed<T: Serialize + DeserializeOwned>(config: &T, changes: &str) -> Result<T, String> {
+fn changed<T: Serialize + DeserializeOwned>(config: &T, changes: &Map<String, Value>) -> Result<T, String> {
     let mut whole = serde_json::to_value(config).map_err(|error| error.to_string())?;
-    let changes: serde_json::Map<String, Value> = serde_json::from_str(changes).map_err(|error| error.to_string())?;
     for (path, new) in changes {
         let mut place = &mut whole;
         for key in path.split('.') {
@@ -51,15 +52,23 @@ fn changed<T: Serialize + DeserializeOwned>(config: &T, changes: &str) -> Result
                     .and_then(|index| list.get_mut(index))
                     .ok_or_else(|| format!("{path}: expected the index of an entry, found {key:?}"))?,
                 Value::Null => {
-                    *place = Value::Object(serde_json::Map::new());
+                    *place = Value::Object(Map::new());
                     place.as_object_mut().map(|table| table.entry(key).or_insert(Value::Null)).ok_or("no table")?
                 }
                 _ => return Err(format!("{path}: {key:?} is within a value")),
             };
         }
-        *place = new;
+        *place = new.clone();
     }
-    serde_json::from_value(whole).map_err(|error| error.to_string())
+    serde_json::from_value(whole).map_err(|error| {
+        // The change that is refused alone is the one to name.
+        let alone =
+            |(path, new): (&String, &Value)| changed(config, &Map::from_iter([(path.clone(), new.clone())])).err();
+        match changes.keys().next() {
+            Some(path) if changes.len() == 1 => format!("{path}: {error}"),
+            _ => changes.iter().find_map(alone).unwrap_or_else(|| error.to_string()),
+        }
+    })
 }
 
 /// The configuration of a preset for a system, as JSON.
@@ -83,7 +92,8 @@ pub fn configuration(
         set_epochs(&mut config, epochs);
     }
     config.parameters = values(&instance);
-    let config = changed(&config, changes).map_err(value)?;
+    let changes = serde_json::from_str(changes).map_err(value)?;
+    let config = changed(&config, &changes).map_err(value)?;
     serde_json::to_string(&config).map_err(runtime)
 }
 
@@ -151,7 +161,40 @@ struct Choices {
     dissipation: Option<usize>,
     #[serde(default)]
     friction: bool,
-    changes: Value,
+    #[serde(default)]
+    known: Option<Known>,
+    #[serde(default)]
+    constraints: FitConstraints,
+    changes: Map<String, Value>,
+}
+
+/// Keys of the configuration of a fit that are decided before its data are divided.
+const EARLY: [&str; 5] = ["targets", "held_out", "window", "noise", "constraints"];
+
+impl Choices {
+    /// The choices that come before the configuration of a fit, taken out of the changes.
+    ///
+    /// # Errors
+    /// A value that is none of such a key.
+    fn early(&mut self) -> Result<FitOptions, String> {
+        let given =
+            EARLY.iter().filter_map(|key| self.changes.remove(*key).map(|new| (key.to_string(), new))).collect();
+        let config = FitConfig { constraints: self.constraints.clone(), ..FitConfig::default() };
+        let FitConfig { targets, held_out, window, noise, constraints, .. } = changed(&config, &given)?;
+        Ok(FitOptions { targets, held_out, window, noise, constraints, seed: self.seed })
+    }
+}
+
+/// The table `constraints` of a file, formulas by name.
+#[pyfunction]
+pub fn read_constraints(path: PathBuf) -> PyResult<BTreeMap<String, String>> {
+    #[derive(serde::Deserialize)]
+    struct Table {
+        constraints: BTreeMap<String, String>,
+    }
+    let text = std::fs::read_to_string(&path)?;
+    let table: Table = toml::from_str(&text).map_err(|error| value(format_args!("{}: {error}", path.display())))?;
+    Ok(table.constraints)
 }
 
 /// Learns from states with their accelerations, each `(b, n)`.
@@ -163,7 +206,8 @@ pub fn learn(
     a: PyReadonlyArray2<'_, f64>,
     columns: (Vec<String>, Vec<String>),
     choices: &str,
-) -> PyResult<(Subject, String, f64, f64)> {
+    progress: Option<Py<PyAny>>,
+) -> PyResult<(Subject, String, f64, f64, Option<String>)> {
     let choices: Choices = serde_json::from_str(choices).map_err(value)?;
     let (names, angles) = columns;
     let owned = |array| slice(array).map(<[f64]>::to_vec);
@@ -185,25 +229,28 @@ pub fn learn(
     if let Some(units) = choices.dissipation {
         trainer = trainer.dissipation(units);
     }
+    let formulas: Vec<(&str, &str)> = match &choices.constraints {
+        FitConstraints::None => Vec::new(),
+        FitConstraints::Find => return Err(value("constraints: expected formulas by name, found \"find\"")),
+        FitConstraints::Formulas(all) => all.iter().map(|(name, text)| (name.as_str(), text.as_str())).collect(),
+    };
+    trainer = trainer.constraints(&formulas);
     let mut refused = None;
-    trainer = trainer.configure(|config| match changed(config, &choices.changes.to_string()) {
+    trainer = trainer.configure(|config| match changed(config, &choices.changes) {
         Ok(new) => *config = new,
         Err(problem) => refused = Some(problem),
     });
     if let Some(problem) = refused {
         return Err(value(problem));
     }
-    let learned = attended(py, None, |_| trainer.train())?.map_err(|error| match error {
+    let learned = attended(py, progress.as_ref(), |watch| trainer.train_watched(&watch.hooks()))?;
+    let learned = learned.map_err(|error| match error {
         lnn::presets::TrainerError::Training(_) => runtime(error),
         _ => value(error),
     })?;
-    // The header is known to the file alone.
-    let place = std::env::temp_dir().join(format!("lnn-{}-{:p}.safetensors", std::process::id(), &learned));
-    let loaded = learned.save(&place).and_then(|()| ModelFile::<f64>::load(&place));
-    let _ = std::fs::remove_file(&place);
-    let header = loaded.map_err(runtime)?.header;
-    let result = history(&learned.history)?;
-    Ok((Subject::learned(header, learned.model)?, result, learned.validation_loss, learned.test_loss))
+    let (result, stop) = (history(&learned.history)?, ended(&learned.stop));
+    let subject = Subject::learned(learned.header, learned.model)?;
+    Ok((subject, result, learned.validation_loss, learned.test_loss, stop))
 }
 
 /// Learns from recorded motion: files, or trajectories in memory.
@@ -215,11 +262,14 @@ pub fn fit(
     out: Option<PathBuf>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Learned> {
-    let choices: Choices = serde_json::from_str(choices).map_err(value)?;
+    let mut choices: Choices = serde_json::from_str(choices).map_err(value)?;
+    let options = choices.early().map_err(value)?;
     let source = Source::of(motion)?;
     let refused: Arc<Mutex<Option<String>>> = Arc::default();
     let result = Arc::clone(&refused);
-    let report = attended(py, progress.as_ref(), move |watch| task(source, choices, result, out).watch(watch).run())?;
+    let report = attended(py, progress.as_ref(), move |watch| {
+        task(source, choices, result, out).options(|all| *all = options).watch(watch).run()
+    })?;
     if let Some(problem) = refused.lock().ok().and_then(|mut result| result.take()) {
         return Err(value(problem));
     }
@@ -235,7 +285,7 @@ fn task(source: Source, choices: Choices, refused: Arc<Mutex<Option<String>>>, o
         Source::Files(files, columns) => Fit::files(files).columns(|own| *own = columns),
         Source::Memory(recording) => Fit::recording(recording),
     };
-    task = task.friction(choices.friction).seed(choices.seed).precision(choices.precision).threads(choices.threads);
+    task = task.friction(choices.friction).precision(choices.precision).threads(choices.threads);
     if let Some(structure) = choices.structure {
         task = task.structure(structure);
     }
@@ -243,13 +293,16 @@ fn task(source: Source, choices: Choices, refused: Arc<Mutex<Option<String>>>, o
         task = task.out(out);
     }
     task.configure(move |config: &mut FitConfig| {
+        if choices.known.is_some() {
+            config.take_known(choices.known);
+        }
         if let Some(hidden) = choices.hidden {
             config.training.network.hidden = hidden;
         }
         if let Some(epochs) = choices.epochs {
             set_epochs(&mut config.training, epochs);
         }
-        match changed(config, &choices.changes.to_string()) {
+        match changed(config, &choices.changes) {
             Ok(new) => *config = new,
             Err(problem) => {
                 // The fit refuses this at once.

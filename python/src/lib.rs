@@ -21,5 +21,7 @@ fn _lnn(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(learn::fit, module)?)?;
     module.add_function(wrap_pyfunction!(readings::constraints_of_motion, module)?)?;
     module.add_function(wrap_pyfunction!(readings::formula, module)?)?;
+    module.add_function(wrap_pyfunction!(readings::identify, module)?)?;
+    module.add_function(wrap_pyfunction!(learn::read_constraints, module)?)?;
     Ok(())
 }

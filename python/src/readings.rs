@@ -1,9 +1,12 @@
 //! What is read off recorded motion: its constraints, and its Lagrangian as a formula.
 
+use crate::attend::attended;
 use crate::errors::{runtime, value};
 use crate::recorded::{Motion, Source};
+use crate::subject::Subject;
 use lnn::constraints::{ConstraintSearch, MOST_DEGREE, MotionSamples, find_constraints};
 use lnn::formula::{FormulaOptions, FoundFormula, MOST_BOOTSTRAPS, formula_of_motion};
+use lnn::identification::{IdentifyOptions, identify as identified};
 use lnn::recording::smooth::SmoothOptions;
 use pyo3::prelude::*;
 use serde_json::json;
@@ -19,7 +22,7 @@ pub fn constraints_of_motion(py: Python<'_>, motion: Motion, degrees: (usize, us
     }
     let source = Source::of(motion)?;
     py.detach(|| {
-        let recording = source.read()?;
+        let recording = source.read()?.recording;
         let samples = MotionSamples::of(&recording, &SmoothOptions::default()).map_err(value)?;
         let found = find_constraints(&samples, ConstraintSearch { degree, velocity_degree }).map_err(value)?;
         serde_json::to_string(&found).map_err(runtime)
@@ -32,13 +35,37 @@ pub fn formula(py: Python<'_>, motion: Motion, choices: &str) -> PyResult<String
     let (options, name) = FormulaChoices::read(choices)?;
     let source = Source::of(motion)?;
     py.detach(|| {
-        let recording = source.read()?;
+        let recording = source.read()?.recording;
         let n = recording.coordinates.len();
         if let Some(noise) = options.noise.as_ref().filter(|noise| noise.len() != n) {
             return Err(value(format_args!("noise: expected {n} numbers, found {}", noise.len())));
         }
         Ok(described(&formula_of_motion(&recording, &options).map_err(value)?, &name))
     })
+}
+
+/// The constants of a system whose form is known, as JSON; samples far from the motion by trajectory and row.
+#[pyfunction]
+pub fn identify(py: Python<'_>, motion: Motion, system: &Subject, choices: &str) -> PyResult<String> {
+    // The other choices have their types from Python.
+    let options: IdentifyOptions =
+        serde_json::from_str(choices).map_err(|error| value(format_args!("between: {error}")))?;
+    let (source, instance) = (Source::of(motion)?, system.system_instance()?);
+    attended(py, None, |_| {
+        let loaded = source.read()?;
+        let found = identified(&instance, &loaded.recording, &options).map_err(value)?;
+        let outliers: Vec<_> = found
+            .outliers
+            .iter()
+            .map(|o| {
+                let (trajectory, row) = (&loaded.recording.tracks[o.track].name, loaded.rows[o.track].row(o.sample));
+                json!([trajectory, row, o.time, o.coordinate, o.size])
+            })
+            .collect();
+        let mut whole = serde_json::to_value(&found).map_err(runtime)?;
+        whole["outliers"] = outliers.into();
+        Ok(whole.to_string())
+    })?
 }
 
 /// Choices of a search for a formula, as JSON.
@@ -78,8 +105,18 @@ impl FormulaChoices {
         if scale.iter().any(|(_, x)| !x.is_finite() || *x == 0.0) {
             return Err(value("scale: expected a term and a number that is not 0"));
         }
-        let options =
-            FormulaOptions { families, functions, gyroscopic, friction, noise, scale, bootstraps, seed, threads, ..FormulaOptions::default() };
+        let options = FormulaOptions {
+            families,
+            functions,
+            gyroscopic,
+            friction,
+            noise,
+            scale,
+            bootstraps,
+            seed,
+            threads,
+            ..FormulaOptions::default()
+        };
         Ok((options, name))
     }
 }

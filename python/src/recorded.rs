@@ -3,7 +3,7 @@
 use crate::errors::{pipeline, value};
 use lnn::pipeline::PipelineError;
 use lnn::recording::read::read_recording;
-use lnn::recording::{Columns, RecordedTrajectory, Recording};
+use lnn::recording::{Columns, LoadedRecording, RecordedTrajectory, Recording};
 use pyo3::prelude::*;
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -67,16 +67,16 @@ impl Source {
         Ok(Self::Files(files, columns))
     }
 
-    /// The recording, read from its files if it has some.
+    /// The recording with the rows of its samples, read from its files if it has some.
     ///
     /// # Errors
     /// `OSError` for files that cannot be read, `ValueError` for files that are not as said.
-    pub fn read(self) -> PyResult<Recording> {
+    pub fn read(self) -> PyResult<LoadedRecording> {
         match self {
-            Self::Memory(recording) => Ok(recording),
-            Self::Files(files, columns) => read_recording(&files, &columns)
-                .map(|loaded| loaded.recording)
-                .map_err(|error| pipeline(PipelineError::Data(error))),
+            Self::Memory(recording) => Ok(recording.into()),
+            Self::Files(files, columns) => {
+                read_recording(&files, &columns).map_err(|error| pipeline(PipelineError::Data(error)))
+            }
         }
     }
 }

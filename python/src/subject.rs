@@ -7,9 +7,10 @@ use lnn::certificate::{self, Certificate, Signature, certify_network, certify_sy
 use lnn::constraints::{EXAMINED_STATES, examine};
 use lnn::formula::{MODEL_STATES, formula_of_model};
 use lnn::geometry::geometries;
-use lnn::lagrangian::system::{Bounds, Size, System};
+use lnn::lagrangian::system::{Bounds, Size};
 use lnn::lagrangian::{
-    Description, EulerLagrange, Interruptible, Request, SystemInstance, Terms, configure_system, configure_values, find,
+    Description, EulerLagrange, Interruptible, Request, SystemInstance, Terms, configure, configure_system,
+    configure_values, constrained_systems, find,
 };
 use lnn::network::NetworkLagrangian;
 use lnn::network::file::{Header, ModelFile};
@@ -46,9 +47,10 @@ pub struct Subject {
 /// All systems of the catalogue, as JSON.
 #[pyfunction]
 pub fn systems() -> PyResult<String> {
-    let all: PyResult<Vec<Value>> = lnn::lagrangian::systems()
-        .iter()
-        .map(|system| Ok(Subject::of(Cow::Borrowed(system), &[])?.summary()))
+    let free = lnn::lagrangian::systems().iter().map(Cow::Borrowed);
+    let all: PyResult<Vec<Value>> = free
+        .chain(constrained_systems().into_iter().map(Cow::Owned))
+        .map(|system| Ok(Subject::of(configure_system(system, &[]).map_err(value)?)?.summary()))
         .collect();
     Ok(Value::from(all?).to_string())
 }
@@ -65,8 +67,7 @@ pub fn values(configured: &SystemInstance<f64>) -> BTreeMap<String, f64> {
 }
 
 impl Subject {
-    fn of(system: Cow<'static, System>, parameters: &[(String, String)]) -> PyResult<Self> {
-        let configured = configure_system::<f64>(system, parameters).map_err(value)?;
+    fn of(configured: SystemInstance<f64>) -> PyResult<Self> {
         let columns = configured.system.columns(configured.coordinates);
         let built = configured.build().map_err(value)?;
         Ok(Self { kind: Kind::System(Box::new(configured), built), columns })
@@ -271,7 +272,7 @@ impl Subject {
     /// A system of the catalogue.
     #[staticmethod]
     fn system(name: &str, parameters: Vec<(String, String)>) -> PyResult<Self> {
-        Self::of(Cow::Borrowed(find(name).map_err(value)?), &parameters)
+        Self::of(configure(name, &parameters).map_err(value)?)
     }
 
     /// A system by its description: TOML, or JSON.
@@ -279,7 +280,8 @@ impl Subject {
     fn described(text: &str, json: bool, parameters: Vec<(String, String)>) -> PyResult<Self> {
         let description: Description =
             if json { serde_json::from_str(text).map_err(value)? } else { toml::from_str(text).map_err(value)? };
-        Self::of(Cow::Owned(description.system().map_err(value)?), &parameters)
+        let system = Cow::Owned(description.system().map_err(value)?);
+        Self::of(configure_system(system, &parameters).map_err(value)?)
     }
 
     /// A model from the bytes of its file.

@@ -111,6 +111,10 @@ def kinds():
     add("joint friction", form(joint_friction="dry"))
     sizes = {"velocity": [1.5, 0.25, 3.0], "potential": 7.0, "friction": [0.5, 2.0, 1.25]}
     add("joint friction beside friction", net(dissipation=3), form(joint_friction="stribeck", sizes=sizes))
+    rod = {"rod": "x^2 + y^2 - 2*x*y/3 - 1", "turn": "sin(theta)*x_dot + y_dot - theta_dot/3"}
+    add("under constraints", lambda header: header.update(constraints=rod))
+    own = {**description("own"), "dissipation": "bend*x_dot^2", "constraints": {"turn": "shift*x_dot + y_dot - mass*theta_dot"}}
+    add("learned from a system under constraints with friction", net(dissipation=3), lambda header: header.update(description=own, system="own"))
     add("forces", lambda header: header.update(forces=["f_theta", "f_x", "f_y"]))
     for structure, factor, time in [
         ("black-box", "triangle", None),

@@ -113,7 +113,16 @@ def test_an_exception_of_the_receiver_ends_the_training():
         lnn.train("harmonic-oscillator", **{**SMALL, "epochs": 10_000}, config=STATES, progress=fail)
 
 
-def test_ctrl_c_ends_a_training_with_the_best_model():
+X = np.linspace(-1, 1, 600)[:, None]
+LONG = {
+    "train": lambda choices: lnn.train("harmonic-oscillator", **choices, starts=1, config=STATES),
+    "learn": lambda choices: lnn.learn(X, 0.5 * X[::-1], -X, **choices),
+    "fit": lambda choices: lnn.fit([swing(0.3), swing(0.2)], dt=0.02, **choices),
+}
+
+
+@pytest.mark.parametrize("work", LONG.values(), ids=LONG)
+def test_ctrl_c_ends_a_training_with_the_best_model(work):
     def press():
         time.sleep(1.0)
         os.kill(os.getpid(), signal.SIGINT)
@@ -124,7 +133,7 @@ def test_ctrl_c_ends_a_training_with_the_best_model():
     pressing.start()
     began = time.monotonic()
     try:
-        learned = lnn.train("harmonic-oscillator", **{**SMALL, "epochs": 1_000_000}, starts=1, config=STATES)
+        learned = work({**SMALL, "epochs": 1_000_000})
         pressing.join()
     finally:
         signal.signal(signal.SIGINT, before)
@@ -132,10 +141,20 @@ def test_ctrl_c_ends_a_training_with_the_best_model():
     assert 0 < len(learned.history["epoch"]) < 1_000_000 and np.isfinite(learned.model.acceleration([0.5], [0.0])).all()
 
 
+def test_progress_is_a_line_that_is_written_again(capsys):
+    lnn.train("harmonic-oscillator", **SMALL, starts=1, config=STATES, progress=True)
+    line = capsys.readouterr().err
+    assert "\r" in line and "[##" in line and "100%" in line and "validation loss" in line and line.endswith("\n")
+
+
 def test_states_are_learned():
     rng = np.random.default_rng(0)
     q, v = rng.uniform(0, 2 * np.pi, (600, 1)), rng.uniform(-3, 3, (600, 1))
-    learned = lnn.learn(q, v, -9.81 * np.sin(q), coordinates=["theta"], angles=["theta"], structure="mechanical", **SMALL)
+    seen = []
+    receive = lambda *event: seen.append(event[0])
+    choices = {"coordinates": ["theta"], "angles": ["theta"], "structure": "mechanical", **SMALL}
+    learned = lnn.learn(q, v, -9.81 * np.sin(q), progress=receive, **choices)
+    assert {"step", "epoch"} <= set(seen)
     assert learned.model.columns == ("theta", "theta_dot") and len(learned.history["epoch"]) == 2
     assert np.isfinite(learned.summary["test_loss"])
     for wrong in [(q[:, 0], v, q), (q[:10], v, q), (q, v, q[:10])]:
@@ -155,6 +174,61 @@ def test_recorded_motion_is_fitted():
     again = lnn.fit(tracks, coordinates=["angle"], angles=["angle"], t=times, **SMALL)
     assert again.model.to_bytes() == fitted.model.to_bytes()
     assert lnn.fit(swing(0.3, 900), dt=0.02, friction=True, **SMALL).model.header["architecture"]["dissipation"] == 16
+    # As a fit by the program.
+    assert fitted.model.name == "measured"
+    with pytest.raises(ValueError, match="novelty"):
+        lnn.fit(tracks, dt=0.02, config={"novelty": 1}, **SMALL)
+    with pytest.raises(ValueError, match="targets"):
+        lnn.fit(tracks, dt=0.02, config={"targets": "measured forces"}, **SMALL)
+    more = lnn.fit(tracks, coordinates=["angle"], angles=["angle"], dt=0.02, config={"held_out": 0.5}, **SMALL)
+    assert more.model.to_bytes() != fitted.model.to_bytes()
+
+
+def test_constants_beside_recorded_motion_are_found():
+    kinetic = lnn.System(
+        "known",
+        lagrangian="q_dot^2/2 - k*q^2/2",
+        coordinates=["q"],
+        parameters={"k": {"default": 0.7, "range": "positive", "learn": True}},
+    )
+    fitted = lnn.fit([swing(0.3), swing(0.2)], coordinates=["q"], dt=0.02, known=kinetic, epochs=2, threads=1)
+    # The small network that the program takes beside a known part.
+    assert fitted.model.header["architecture"]["hidden"] == [8] and fitted.model.constants["k"] != 0.7
+
+
+def test_motion_under_constraints_is_fitted(tmp_path):
+    motion = lnn.System("cartesian-chain-1").rollout([[0.6, -0.8], [1.0, 0.0], [0.0, -1.0]], [[0, 0], [0, 0], [2, 0]], 4.0, 0.02)
+    tracks, choices = list(motion.q), {"coordinates": ["x", "y"], "dt": 0.02, "structure": "mechanical", **SMALL}
+    rod = {"rod": "x^2 + y^2 - 1"}
+    fitted = lnn.fit(tracks, constraints=rod, **choices)
+    assert fitted.model.header["constraints"] == rod and fitted.summary["constraints"]["formulas"] == rod
+    held = fitted.model.rollout([0.6, -0.8], [0, 0], 1.0, 0.1)
+    assert np.allclose(np.sum(held.q**2, -1), 1, atol=1e-12)
+    (tmp_path / "rod.toml").write_text('[constraints]\nrod = "x^2 + y^2 - 1"\n')
+    of_file = lnn.fit(tracks, constraints=tmp_path / "rod.toml", **choices)
+    assert of_file.model.to_bytes() == fitted.model.to_bytes()
+    found = lnn.fit(tracks, constraints="find", **choices)
+    (formula,) = found.model.header["constraints"].values()
+    assert found.summary["constraints"]["found"] and "x^2" in formula and "y^2" in formula
+    given = lnn.fit(tracks, constraints=lnn.find_constraints(tracks, coordinates=["x", "y"], dt=0.02), **choices)
+    assert len(given.model.header["constraints"]) == 1
+    free = lnn.fit(tracks, constraints="none", **choices)
+    assert free.model.to_bytes() == lnn.fit(tracks, **choices).model.to_bytes() != fitted.model.to_bytes()
+    for wrong, error in [("rod.toml", OSError), ({"rod": "x^2 + z"}, ValueError), ({"plane": "x - 3"}, ValueError)]:
+        with pytest.raises(error):
+            lnn.fit(tracks, constraints=wrong, **choices)
+    (tmp_path / "none.toml").write_text("a = 1\n")
+    with pytest.raises(ValueError, match="constraints"):
+        lnn.fit(tracks, constraints=tmp_path / "none.toml", **choices)
+    # States with their accelerations, under the same.
+    q, v = motion.q.reshape(-1, 2), motion.v.reshape(-1, 2)
+    learned = lnn.learn(q, v, lnn.System("cartesian-chain-1").acceleration(q, v), coordinates=["x", "y"], constraints=rod, **SMALL)
+    assert learned.model.header["constraints"] == rod
+
+
+def test_a_system_of_the_catalogue_under_constraints_is_learned():
+    learned = lnn.train("cartesian-chain-1", structure="constant-mass", **SMALL, starts=1, config=STATES)
+    assert learned.model.evaluate(starts=1, threads=1)["accelerations"]
 
 
 def test_angles_that_jump_by_a_turn_are_fitted_as_they_go_on():

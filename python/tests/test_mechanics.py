@@ -53,8 +53,32 @@ def test_a_system_under_constraints_moves_on_them():
     assert np.allclose(a, [-4.0, -9.8])
     again = pickle.loads(pickle.dumps(system))
     assert np.array_equal(again.acceleration([1.0, 0.0], [0.0, 2.0]), a)
-    with pytest.raises(ValueError, match="constraints"):
-        system.to_numpy()
+    assert np.allclose(system.to_numpy().acceleration([1.0, 0.0], [0.0, 2.0]), a, rtol=1e-14)
+
+
+def test_systems_of_the_catalogue_under_constraints():
+    listed = lnn.systems()
+    assert {"cartesian-chain-1", "rigid-body", "rolling-disk", "schwarzschild-by-clock"} <= listed.keys()
+    chain = lnn.System("cartesian-chain-2", l=0.5)
+    assert chain.coordinates == ("x1", "y1", "x2", "y2") and chain.parameters["l"] == 0.5
+    assert set(chain.constraints().kinds.values()) == {"holonomic"}
+    again = pickle.loads(pickle.dumps(chain))
+    state = [0.0, -0.5, 0.5, -0.5], [0.5, 0.0, 0.5, 1.0]
+    assert np.array_equal(again.acceleration(*state), chain.acceleration(*state)) and repr(again) == repr(chain)
+    # The rods keep their lengths: x.x' = 0, x.x'' + x'.x' = 0.
+    a, (q, v) = chain.acceleration(*state).reshape(2, 2), np.array(state).reshape(2, 2, 2)
+    for x, dx, ddx in [(q[0], v[0], a[0]), (q[1] - q[0], v[1] - v[0], a[1] - a[0])]:
+        assert abs(x @ ddx + dx @ dx) < 1e-12
+
+
+def test_other_values_of_parameters():
+    for system in [lnn.System("double-pendulum", m2=0.5), lnn.System(**SPRING), lnn.System.from_toml(PENDULUM, l=3)]:
+        name = next(iter(system.parameters))
+        other = system.with_parameters(**{name: 1 / 3})
+        assert other.parameters == {**system.parameters, name: 1 / 3} and other.columns == system.columns
+        assert pickle.loads(pickle.dumps(other)).parameters == other.parameters
+    with pytest.raises(ValueError):
+        lnn.System(**SPRING).with_parameters(mass=1)
 
 
 def test_terms_have_the_shapes_of_the_states(arm):

@@ -138,3 +138,85 @@ def test_pictures_go_into_axes_that_are_given(shipped):
     sphere = lnn.System("sphere-geodesic").symmetries(seed=1)
     assert sphere.plot(ax=pyplot.subplots()[1]).get_yscale() == "log"
     pyplot.close("all")
+
+
+@pytest.fixture(scope="module")
+def swung():
+    """A pendulum of 0.7 m and 1 kg with a little noise, two swings."""
+    truth = lnn.System("n-pendulum", n=1, l=0.7, m=1.5)
+    motion = truth.rollout([[1.0], [0.4]], [[0.0], [0.5]], 6.0, 0.02, rtol=1e-10, atol=1e-12)
+    return [q + np.random.default_rng(k).normal(0, 1e-3, q.shape) for k, q in enumerate(motion.q)]
+
+
+def test_constants_of_a_known_form_are_identified(swung):
+    form = lnn.System("n-pendulum", n=1)
+    found = lnn.identify(swung, form, constants=["l"], dt=0.02, threads=2)
+    length = found.constants["l"]
+    assert abs(length.value - 0.7) <= 4 * length.standard_error < 1e-3 and length.unit == "m" and length.start == 1.0
+    assert found.explained and found.undetermined == () and found.outlier_count == 0 and found.between is None
+    (residual,) = found.residuals.values()
+    assert np.isclose(residual.rms, 1e-3, rtol=0.2) and residual.white
+    assert found.correlations.shape == (1, 1) and found.samples == 602
+    system = found.system()
+    assert system.parameters == {**form.parameters, "l": length.value}
+    assert system.acceleration([0.3], [0.0]) == lnn.System("n-pendulum", n=1, l=length.value).acceleration([0.3], [0.0])
+    again = pickle.loads(pickle.dumps(found))
+    assert again.constants == found.constants and again.system().parameters == system.parameters
+    assert lnn.identify(swung, form, constants=["l"], dt=0.02, threads=1).constants == found.constants
+
+
+def test_what_motion_leaves_open_is_said_with_its_cure(swung):
+    found = lnn.identify(swung, lnn.System("n-pendulum", n=1), dt=0.02)
+    open_ones = [direction for direction in found.undetermined if set(direction.constants) >= {"l", "g"}]
+    assert len(open_ones) == 1 and open_ones[0].direction.shape == (len(open_ones[0].constants),)
+    assert np.isclose(open_ones[0].known["g/l"], 9.8 / 0.7, rtol=1e-3)
+    assert open_ones[0].text and open_ones[0].cure
+    mass = [direction for direction in found.undetermined if direction.constants == ("m",)]
+    assert len(mass) == 1 and found.constants["m"].standard_error is None and found.constants["m"].value == 1.0
+
+
+def test_sensors_outliers_and_files_are_identified(swung, shipped, tmp_path):
+    form = lnn.System("n-pendulum", n=1)
+    off = [0.05 + q for q in swung]
+    off[1][100] += 0.2
+    found = lnn.identify(off, form, constants=["l"], offsets=["theta"], robust=True, dt=0.02)
+    (offset,) = found.sensors
+    assert offset.kind == "offset" and abs(offset.value - 0.05) < 5e-4
+    assert found.outliers[0].trajectory == "trajectory 2" and found.outliers[0].row == 101 and found.outliers[0].size > 10
+    assert found.correlations.shape == (2, 2)
+    path = tmp_path / "swing.csv"
+    rows = [f"{0.02 * k},{q[0]}" for k, q in enumerate(off[1])]
+    path.write_text("\n".join(["t,angle", *rows]) + "\n")
+    of_file = lnn.identify(path, form, constants=["l"], coordinates=["angle"], offsets=["angle"], robust=True)
+    assert of_file.outliers[0].row == 102 and "swing" in of_file.outliers[0].trajectory
+    pandas = pytest.importorskip("pandas")
+    assert list(found.to_pandas().index) == ["l"]
+    frame = pandas.DataFrame({"t": 0.02 * np.arange(len(swung[0])), "theta": swung[0][:, 0]})
+    assert abs(lnn.identify(frame, form, constants=["l"]).constants["l"].value - 0.7) < 1e-3
+    columns = {"coordinates": ["theta1", "theta2"], "trajectory": "run"}
+    pendula = lnn.System.from_toml(shipped.parents[1] / "systems/damped_pendula.toml")
+    arm = lnn.identify(shipped.parent / "pendulum.csv", pendula, **columns)
+    assert abs(arm.constants["l1"].value - 1) < 0.01 and arm.explained
+
+
+def test_mistakes_of_an_identification_are_values(swung):
+    form = lnn.System("n-pendulum", n=1)
+    for wrong in [
+        {"constants": ["length"]},
+        {"constants": ["l", "l"]},
+        {"offsets": ["theta7"]},
+        {"between": "cubic"},
+        {"segment": 0.0},
+        {"noise": [1.0, 1.0]},
+        {"noise": [-1.0]},
+        {"threads": 0},
+        {"dt": None},
+    ]:
+        with pytest.raises(ValueError):
+            lnn.identify(swung, form, **{"constants": ["l"], "dt": 0.02, **wrong})
+    with pytest.raises(ValueError, match="constraints"):
+        lnn.identify(np.zeros((100, 2)), "cartesian-chain-1", dt=0.02)
+    with pytest.raises(ValueError):
+        lnn.identify(swung, "double-pendulum", dt=0.02)
+    with pytest.raises(ValueError):
+        lnn.identify([swung[0][:5]], form, constants=["l"], dt=0.02)

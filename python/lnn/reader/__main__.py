@@ -13,6 +13,7 @@ import sys
 import numpy as np
 
 from . import ModelFile
+from .functions import TERMS
 
 
 def main(model: str, states: str) -> None:
@@ -20,10 +21,10 @@ def main(model: str, states: str) -> None:
     file = ModelFile.load(model)
     with open(states, newline="") as table:
         rows = [[float(row[name]) for name in file.header["columns"]] for row in csv.DictReader(table)]
-    terms = file.to_numpy().terms(*np.split(np.array(rows), 2, axis=1))
-    names = ["lagrangian", "momentum", "dl_dq", "mass_matrix", "coriolis", "force", "acceleration", "energy"]
+    q, v = np.split(np.array(rows), 2, axis=1)
+    terms = file.to_numpy().terms(q, v)
     for k in range(len(rows)):
-        print(json.dumps({name: finite(getattr(terms, name)[k].tolist()) for name in names}))
+        print(json.dumps({name: finite(getattr(terms, name)[k].tolist()) for name in TERMS}))
 
 
 def finite(value):

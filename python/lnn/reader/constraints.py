@@ -26,11 +26,12 @@ class Constraints:
 
     def values(self, xp, q, v):
         """What vanishes, one number of every state for each constraint."""
-        scope = self.described.constants(xp, given=self.parameters) if self.described else {}
-        for i, name in enumerate(self.coordinates):
-            scope |= {name: q[..., i], f"{name}_dot": v[..., i]}
-        for name, node in (self.described.definitions if self.described else {}).items():
-            scope[name] = evaluate(xp, node, scope)
+        if self.described:
+            scope = self.described.scope(xp, self.described.constants(xp, given=self.parameters), q, v)
+        else:
+            scope = {}
+            for i, name in enumerate(self.coordinates):
+                scope |= {name: q[..., i], f"{name}_dot": v[..., i]}
         return [evaluate(xp, node, scope) for node in self.nodes]
 
     def of_jets(self, xp, x, n):

@@ -6,11 +6,9 @@ import math
 import re
 
 # A node of a parsed formula is ("number", x), ("name", text), or a function with its operands.
-UNARY = dict.fromkeys(
-    ["sqrt", "exp", "expm1", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh"]
-    + ["erfc", "logistic", "softplus", "abs", "recip"]
-)
-UNARY = {name: name for name in UNARY} | {"ln": "log", "log": "log", "ln1p": "log1p"}
+PLAIN = ["sqrt", "exp", "expm1", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh"]
+PLAIN += ["erfc", "logistic", "softplus", "abs", "recip"]
+UNARY = {name: name for name in PLAIN} | {"ln": "log", "log": "log", "ln1p": "log1p"}
 UNARY |= {"arcsin": "asin", "arccos": "acos", "arctan": "atan"}
 BINARY = {"atan2": "atan2", "max": "maximum", "min": "minimum"}
 
@@ -117,7 +115,8 @@ def evaluate(xp, node, scope: dict):
             raise ValueError(f"unknown name {operands[0]!r} in a formula")
         return scope[operands[0]]
     if kind == "power":
-        return power(xp, *operands, scope)
+        base, exponent = operands
+        return power(xp, base, exponent, scope)
     a, *rest = (evaluate(xp, operand, scope) for operand in operands)
     if not rest:
         return -a if kind == "neg" else 1 / a if kind == "recip" else getattr(xp, kind)(a)
@@ -150,7 +149,7 @@ class Described:
         self.parameters = dict(sorted(description.get("parameters", {}).items()))
         waiting = {name: Parser(text).whole() for name, text in description.get("definitions", {}).items()}
         # Every definition after those that it needs.
-        self.definitions = {}
+        self.definitions: dict[str, tuple] = {}
         while waiting:
             ready = [name for name, node in waiting.items() if not names(node) & waiting.keys()]
             if not ready:
@@ -159,6 +158,8 @@ class Described:
         metric = description.get("metric")
         self.metric = None if metric is None else {self.pair(key): Parser(text).whole() for key, text in metric.items()}
         self.lagrangian = None if metric is not None else Parser(description["lagrangian"]).whole()
+        dissipation = description.get("dissipation")
+        self.dissipation = None if dissipation is None else Parser(dissipation).whole()
 
     def pair(self, key: str) -> tuple[int, int]:
         i, j = (self.coordinates.index(name.strip()) for name in key.split(","))
@@ -169,7 +170,7 @@ class Described:
         values, next_learned = {}, 0
         for name, entry in self.parameters.items():
             entry = entry if isinstance(entry, dict) else {"default": entry}
-            value = float((given or {}).get(name, entry["default"]))
+            value = float((given or {})[name] if name in (given or {}) else entry["default"])
             values[name] = xp.constant(value)
             if learned is not None and entry.get("learn", False):
                 theta, next_learned = learned[next_learned], next_learned + 1
@@ -179,11 +180,7 @@ class Described:
 
     def evaluate(self, xp, constants: dict, q, v):
         """L of states ``(..., n)``."""
-        scope = dict(constants)
-        for i, name in enumerate(self.coordinates):
-            scope |= {name: q[..., i], f"{name}_dot": v[..., i]}
-        for name, node in self.definitions.items():
-            scope[name] = evaluate(xp, node, scope)
+        scope = self.scope(xp, constants, q, v)
         if self.metric is None:
             return evaluate(xp, self.lagrangian, scope)
         total = 0
@@ -191,3 +188,16 @@ class Described:
             term = evaluate(xp, node, scope) * (v[..., i] * v[..., j])
             total = total + (0.5 * term if i == j else term)
         return total
+
+    def dissipation_of(self, xp, constants: dict, q, v):
+        """D of states ``(..., n)``; None for a description without."""
+        return None if self.dissipation is None else evaluate(xp, self.dissipation, self.scope(xp, constants, q, v))
+
+    def scope(self, xp, constants: dict, q, v) -> dict:
+        """What the names in formulas mean at states ``(..., n)``."""
+        scope = dict(constants)
+        for i, name in enumerate(self.coordinates):
+            scope |= {name: q[..., i], f"{name}_dot": v[..., i]}
+        for name, node in self.definitions.items():
+            scope[name] = evaluate(xp, node, scope)
+        return scope

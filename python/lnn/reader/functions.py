@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from .constraints import Constraints, bordered
 from .jets import NUMPY, Jet
 from .lagrangian import NetworkModel
+
+
+#: The terms, in the order in which they are computed.
+TERMS = ["lagrangian", "momentum", "dl_dq", "mass_matrix", "coriolis", "force", "acceleration", "energy"]
 
 
 @dataclass(frozen=True)
@@ -37,15 +42,15 @@ class Terms:
         States, counted over the batch, whose acceleration is not determined, and why; of compiled code alone.
     """
 
-    lagrangian: object
-    momentum: object
-    dl_dq: object
-    mass_matrix: object
-    coriolis: object
-    force: object
-    acceleration: object
-    energy: object
-    failures: tuple = ()
+    lagrangian: Any
+    momentum: Any
+    dl_dq: Any
+    mass_matrix: Any
+    coriolis: Any
+    force: Any
+    acceleration: Any
+    energy: Any
+    failures: tuple[tuple[int, str], ...] = ()
 
 
 class Functions:
@@ -157,7 +162,8 @@ class NumpyFunctions(Functions):
         parts = [self._chunk(q[k : k + chunk], v[k : k + chunk], weights) for k in range(0, len(q), chunk)]
         parts = parts or [self._chunk(q, v, weights)]
         joined = (np.concatenate(columns) for columns in zip(*parts))
-        return Terms(*(column.reshape(shape + column.shape[1:]) for column in joined))
+        fields: dict[str, Any] = {name: column.reshape(shape + column.shape[1:]) for name, column in zip(TERMS, joined)}
+        return Terms(**fields)
 
     def _chunk(self, q, v, weights):
         n, weights = q.shape[1], self._of(weights)
@@ -189,17 +195,19 @@ def _solve(matrix, right):
 
 
 class DescribedModel:
-    """The Lagrangian of a system file, which has no weights and no dissipation."""
+    """The Lagrangian and the dissipation of a system file, which has no weights."""
 
     def __init__(self, described, parameters: dict):
         self._described, self._parameters = described, parameters
 
     def lagrangian(self, xp, weights, q, v):
-        constants = self._described.constants(xp, given=self._parameters)
-        return self._described.evaluate(xp, {**constants, **weights}, q, v)
+        return self._described.evaluate(xp, self._constants(xp, weights), q, v)
 
     def dissipation(self, xp, weights, q, v):
-        return None
+        return self._described.dissipation_of(xp, self._constants(xp, weights), q, v)
+
+    def _constants(self, xp, weights):
+        return {**self._described.constants(xp, given=self._parameters), **weights}
 
 
 def numpy_functions(header: dict, tensors: dict) -> Functions:

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import json
+from typing import Any
 
 from .activations import ACTIVATIONS, BRANCHES
 
 FORMAT = 1
 
 # A list holds the values that are read, None stands for any.
-KNOWN = dict.fromkeys(
+KNOWN: dict[str, Any] = dict.fromkeys(
     ["name", "title", "time_unit", "lagrangian", "coordinates", "parameters", "definitions", "metric"]
     + ["training", "validation", "trajectory", "shell"]
 )
-FORM = {
+FORM: dict[str, Any] = {
     "structure": ["black-box", "mechanical", "constant-mass", "metric"],
     "factor": ["triangle", "rectangle"],
     "cyclic": None,
@@ -24,17 +25,17 @@ FORM = {
     "joint_friction": ["none", "dry", "stribeck"],
     "sizes": {"velocity": None, "potential": None, "friction": None},
 }
-ARCHITECTURE = {
+ARCHITECTURE: dict[str, Any] = {
     **dict.fromkeys(["coordinates", "hidden", "alpha", "time_like", "scale", "periodic", "embed_periodic", "dissipation"]),
     "activation": [*ACTIVATIONS, *BRANCHES],
     "input_layer": ["none", "dyt"],
     "form": FORM,
 }
-HEADER = {
+HEADER: dict[str, Any] = {
     **dict.fromkeys(["crate_version", "system", "parameters", "columns", "forces", "constraints", "precision"]),
     **dict.fromkeys(["position", "velocity", "seed", "validation_loss"]),
-    # Constraints of a system hold the motion; those of a known part would hold nothing.
-    "description": {**KNOWN, "constraints": None},
+    # Constraints of a system hold the motion, and its dissipation is what the network learned; those of a known part would change nothing.
+    "description": {**KNOWN, "constraints": None, "dissipation": None},
     "format": [FORMAT],
     "architecture": ARCHITECTURE,
 }

@@ -143,8 +143,8 @@ def _softplus(x):
 
 
 def _log_cosh(x):
-    value, slope, _ = np.logaddexp(x, -x) - math.log(2), *_tanh(x)[:2]
-    return value, slope, _tanh(x)[1]
+    slope, second, _ = _tanh(x)
+    return np.logaddexp(x, -x) - math.log(2), slope, second
 
 
 def _join(function):

@@ -6,6 +6,7 @@ States are ``(..., n)``, in physical units; every function works on the last axi
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -20,8 +21,8 @@ class NetworkModel:
         self.net = architecture
         self.n = architecture["coordinates"]
         self.time = architecture.get("time_like")
-        self.form = {"structure": "black-box", "factor": "triangle", "cyclic": [], "radial": []}
-        self.form |= architecture.get("form", {})
+        usual = {"structure": "black-box", "factor": "triangle", "cyclic": [], "radial": []}
+        self.form: dict[str, Any] = usual | architecture.get("form", {})
         known = self.form.get("known")
         self.known = None if known is None else Described(known)
         ones = [1.0] * self.n
@@ -53,8 +54,8 @@ class NetworkModel:
     def outputs(self, xp, weights, x):
         """Outputs of the network, ``(..., outputs)``."""
         kind, total = self.net["activation"], 0
-        branches = BRANCHES.get(kind)
-        branches = {"": kind} if branches is None else {f"branches.{b}.": kind for b, kind in enumerate(branches)}
+        parts = BRANCHES.get(kind)
+        branches = {"": kind} if parts is None else {f"branches.{b}.": kind for b, kind in enumerate(parts)}
         for prefix, activation in branches.items():
             h = x
             if self.net.get("input_layer") == "dyt":

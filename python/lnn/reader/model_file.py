@@ -13,7 +13,7 @@ import numpy as np
 from .functions import Functions, numpy_functions
 from .header import check
 
-TYPES = {"F32": np.dtype("<f4"), "F64": np.dtype("<f8")}
+TYPES: dict[str, np.dtype] = {"F32": np.dtype("<f4"), "F64": np.dtype("<f8")}
 
 
 @dataclass(frozen=True)

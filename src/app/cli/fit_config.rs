@@ -10,7 +10,7 @@ use crate::cli::recording_args::RecordingArgs;
 use crate::cli::resume::{Text, parse, require_same};
 use crate::cli::run_args::{RunArgs, fill_periods, imply, structure};
 use crate::configuration::{Config, Data, Regularizer};
-use crate::network::{Initialization, Structure};
+use crate::network::Structure;
 use crate::pipeline::{FitColumns, FitConfig, FitOptions, PreparedFit, StartModel, shorten};
 use crate::presets::restructure;
 use crate::recording::Targets;
@@ -48,11 +48,6 @@ impl Args {
 
 /// Path of the training in the configuration of a fit.
 const TRAINING: &str = "training.";
-
-/// Width of the network beside a known part, and its weight decay: small, since what network and constants share is not
-/// identifiable and should go to the constants.
-const RESIDUAL_WIDTH: usize = 8;
-const RESIDUAL_DECAY: f64 = 0.01;
 
 /// What files and arguments say of a fit, before its data are read.
 pub struct Plan<'a> {
@@ -246,27 +241,24 @@ impl<'a> Plan<'a> {
     }
 
     /// The layers over this training and what they mean for it.
-    fn over(&self, mut training: Config) -> Result<(FitConfig, Vec<Mistake>), CliError> {
-        let network = &mut training.network;
-        let known = self.layers.has("training.network.known");
-        if known {
-            (network.hidden, network.alpha) = (vec![RESIDUAL_WIDTH], 0.0);
-            network.initialization = Initialization::NearZero;
-            training.optimizer.weight_decay = RESIDUAL_DECAY;
+    fn over(&self, training: Config) -> Result<(FitConfig, Vec<Mistake>), CliError> {
+        let mut config = FitConfig { training, shooting: Some(Shooting::default()), ..FitConfig::default() };
+        if self.layers.has("training.network.known") {
+            config.take_known(None);
         }
-        network.time_like = layers_time(&self.layers).map(str::to_string);
-        if let Some(time) = &network.time_like {
+        let training = &mut config.training;
+        training.network.time_like = layers_time(&self.layers).map(str::to_string);
+        if let Some(time) = &training.network.time_like {
             training.penalty =
                 Regularizer::LorentzianSylvester { lambda: training.penalty.lambda(), time: time.clone() };
         }
         if let Some(structure) = structure(&self.layers, TRAINING) {
-            restructure(&mut training, structure);
+            restructure(training, structure);
         }
         if let Some(from) = self.layers.text("training.from") {
-            StartModel::read(from)?.shape(&mut training);
+            StartModel::read(from)?.shape(training);
         }
-        let shooting = Some(if known { Shooting::grey_box() } else { Shooting::default() });
-        self.layers.over(&FitConfig { training, shooting, ..FitConfig::default() })
+        self.layers.over(&config)
     }
 }
 

@@ -140,6 +140,12 @@ impl Fit {
         self
     }
 
+    /// Changes the choices that come before the configuration: held-out share, smoothing windows, noise.
+    pub fn options(mut self, change: impl FnOnce(&mut FitOptions)) -> Self {
+        change(&mut self.options);
+        self
+    }
+
     /// Precision of weights and arithmetic in training.
     pub fn precision(self, precision: Precision) -> Self {
         Self { precision, ..self }
@@ -175,10 +181,8 @@ impl Fit {
             Source::Files(files) => (read_recording(&files, &columns)?, files),
             Source::Memory(loaded) => (*loaded, Vec::new()),
         };
-        let stem = files.first().and_then(|file| file.file_stem());
-        let name = stem.map_or("recorded".to_string(), |stem| stem.to_string_lossy().into_owned());
         let prepared = PreparedFit::new(&loaded, &options)?;
-        let mut config = prepared.suggest(&name, precision)?;
+        let mut config = prepared.suggest(&FitConfig::default().training.system, precision)?;
         config.recording = FitColumns {
             files: files.iter().map(|file| file.display().to_string()).collect(),
             ..FitColumns::from(&columns)

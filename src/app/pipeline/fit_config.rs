@@ -1,8 +1,9 @@
 //! The configuration of a fit, as `config.toml` holds it.
 
 use crate::configuration::table::{Below, count, table};
-use crate::configuration::{Config, ConfigError, Faults, Ranges as _};
+use crate::configuration::{Config, ConfigError, Faults, Known, Ranges as _};
 use crate::data::PrepareOptions;
+use crate::network::Initialization;
 use crate::recording::smooth::SmoothOptions;
 use crate::recording::{Columns, Targets};
 use crate::shooting::Shooting;
@@ -11,6 +12,11 @@ use std::collections::BTreeMap;
 
 /// Share of the samples that is held out by default.
 pub const HELD_OUT: f64 = 0.2;
+
+/// Width of the network beside a known part, and its weight decay: small, since what network and constants share is not
+/// identifiable and should go to the constants.
+const RESIDUAL_WIDTH: usize = 8;
+const RESIDUAL_DECAY: f64 = 0.01;
 
 /// Samples of a smoothing window at most.
 const MOST_WINDOW: usize = 1_000_001;
@@ -194,6 +200,16 @@ impl From<&Columns> for FitColumns {
 }
 
 impl FitConfig {
+    /// Takes what suits a network beside a known part: a small one, which begins with next to nothing, and the multiple shooting of a
+    /// grey box.
+    pub fn take_known(&mut self, known: Option<Known>) {
+        let network = &mut self.training.network;
+        (network.hidden, network.alpha) = (vec![RESIDUAL_WIDTH], 0.0);
+        (network.initialization, network.known) = (Initialization::NearZero, known);
+        self.training.optimizer.weight_decay = RESIDUAL_DECAY;
+        self.shooting = self.shooting.take().map(|_| Shooting::grey_box());
+    }
+
     /// The same of files that may have other names.
     pub(crate) fn without_files(&self) -> Self {
         let mut other = self.clone();

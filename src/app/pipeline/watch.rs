@@ -89,7 +89,7 @@ impl Watch {
     }
 
     /// The same for a training.
-    pub(crate) fn hooks(&self) -> Hooks {
+    pub fn hooks(&self) -> Hooks {
         let watcher = self.events.clone().map(|events| {
             let watcher: crate::training::Watcher = Arc::new(move |progress: Progress<'_>| match progress {
                 Progress::Step { step, steps, .. } => events(Event::Step { done: step, total: steps }),

@@ -8,7 +8,7 @@ use crate::network::{NetworkError, NetworkLagrangian, Structure};
 use crate::presets::preset::{of_states, take_structure};
 use crate::random::RngStream;
 use crate::scalar::Scalar;
-use crate::training::{Epoch, Hooks, TrainingError, train};
+use crate::training::{Epoch, Hooks, StopReason, TrainingError, train};
 use rand::seq::SliceRandom;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -70,7 +70,10 @@ pub struct Learned {
     pub validation_loss: f64,
     /// The same on the states that chose nothing.
     pub test_loss: f64,
-    header: Header,
+    /// Why the training ended.
+    pub stop: StopReason,
+    /// What the model's file says beside the weights.
+    pub header: Header,
 }
 
 /// Failure of a [`Trainer`].
@@ -190,13 +193,21 @@ impl<'a> Trainer<'a> {
     /// # Errors
     /// [`TrainerError`].
     pub fn train(self) -> Result<Learned, TrainerError> {
+        self.train_watched(&Hooks::default())
+    }
+
+    /// Trains as [`Self::train`] does, under hooks: a flag of theirs that is raised ends the training with the best weights so far.
+    ///
+    /// # Errors
+    /// [`TrainerError`].
+    pub fn train_watched(self, hooks: &Hooks) -> Result<Learned, TrainerError> {
         match self.config.precision {
-            Precision::F32 => self.train_in::<f32>(),
-            Precision::F64 => self.train_in::<f64>(),
+            Precision::F32 => self.train_in::<f32>(hooks),
+            Precision::F64 => self.train_in::<f64>(hooks),
         }
     }
 
-    fn train_in<S: Scalar>(self) -> Result<Learned, TrainerError> {
+    fn train_in<S: Scalar>(self, hooks: &Hooks) -> Result<Learned, TrainerError> {
         let Self { data, names, angles, constraints, mut config, threads } = self;
         let (n, found) = (data.coordinates(), data.len());
         let fault = |field: &str, expected: &'static str, found| ConfigError {
@@ -241,13 +252,14 @@ impl<'a> Trainer<'a> {
         let penalty = config.penalty.resolve(names.iter().map(String::as_str))?;
         let ranges = training.ranges();
         let data = Datasets { training: vec![training; config.phases.len()], validation, test };
-        let trained = train(&config, &architecture, penalty, data, threads, &Hooks::default())?;
+        let trained = train(&config, &architecture, penalty, data, threads, hooks)?;
         let columns = names.iter().cloned().chain(names.iter().map(|name| format!("{name}_dot"))).collect();
         let mut header = config.header(architecture.clone(), columns, ranges, trained.validation_loss);
         header.constraints = constraints.map(|constraints| constraints.formulas().clone()).unwrap_or_default();
         let model = NetworkLagrangian::new(architecture, trained.weights)?.cast::<f64>();
         let (history, validation_loss) = (trained.history, trained.validation_loss);
-        Ok(Learned { model, history, validation_loss, test_loss: trained.test.loss.to_f64(), header })
+        let test_loss = trained.test.loss.to_f64();
+        Ok(Learned { model, history, validation_loss, test_loss, stop: trained.stop, header })
     }
 }
 

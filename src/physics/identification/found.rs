@@ -79,7 +79,7 @@ pub struct Outlier {
 }
 
 /// Constants with their errors, and how far they can be trusted.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Identified {
     /// The constants that were unknown, in the order of the system.
     pub constants: Vec<Constant>,

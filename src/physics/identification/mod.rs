@@ -37,10 +37,10 @@ pub use error::IdentifyError;
 pub use found::{Constant, Identified, Outlier, Residual, SensorConstant, Undetermined};
 pub use stages::identify;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Known forces between the samples.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Between {
@@ -53,7 +53,8 @@ pub enum Between {
 }
 
 /// What is identified, and how.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct IdentifyOptions {
     /// Symbols of the unknown constants; empty for those that the system marks to be learned, or for all if it marks none.
     pub constants: Vec<String>,

@@ -199,7 +199,7 @@ function play(data) {
   function draw() {
     drawStage();
     const scale = (path) => Math.max(...path.map((point) => Math.abs(point.energy)), 1e-300);
-    drawCurves(sheet($("energy")), [["change of the energy, relative", (point, path) => (point.energy - path[0].energy) / scale(path)]]);
+    drawCurves(sheet($("energy")), [[data.time_like === null ? "change of the energy, relative" : "change of the energy, the constraint, relative", (point, path) => (point.energy - path[0].energy) / scale(path)]]);
     if (picture) drawCurves(sheet($("first")), [[data.columns[n > 1 && data.time_like === 0 ? 1 : 0], (point) => point.y[n > 1 && data.time_like === 0 ? 1 : 0]]]);
     const ended = flights.map((flight, k) => (flight.ended ? `${kinds[k][0]}: ${flight.ended}.` : "")).join(" ");
     $("time").textContent = `t = ${flights[0].t.toFixed(2)} ${data.time_unit} ${ended}`;
