@@ -1,9 +1,10 @@
-"""Pages to play with: their JavaScript beside the compiled code, where node is."""
+"""Pages to play with: their JavaScript beside the compiled code, where node is, and what they do in a browser, where Chromium is."""
 
 import json
 import re
 import shutil
 import subprocess
+from html import unescape
 
 import numpy as np
 import pytest
@@ -49,3 +50,114 @@ def test_a_page_computes_what_the_package_computes(models, shipped, kind, tmp_pa
         exact = lnn.System("double-pendulum").terms(q, v)
         found = np.array([row["acceleration"] for row in result["exact"]])
         assert np.abs(found - exact.acceleration).max() <= 1e-12 * np.abs(exact.acceleration).max()
+
+
+CHROMIUM = next(filter(None, map(shutil.which, ["chromium", "chromium-browser", "google-chrome"])), None)
+
+WATCH = "<script>window.problems = []; window.addEventListener('error', (event) => problems.push(event.message))</script>"
+REPORT = """<pre id="result"></pre><script>
+const send = (type, where, more) => where.dispatchEvent(new (more.key ? KeyboardEvent : PointerEvent)(type, { bubbles: true, cancelable: true, ...more }));
+(async () => {
+  const result = await (async () => { %s })();
+  document.getElementById("result").textContent = JSON.stringify({ problems, ...result });
+})();
+</script>"""
+
+
+def in_chromium(page, script, *options):
+    """What a script says that runs at the end of the page, problems of the page among it."""
+    html = page.read_text().replace("<head>", "<head>" + WATCH, 1).replace("</body>", REPORT % script + "</body>")
+    watched = page.with_name("watched.html")
+    watched.write_text(html)
+    command = [CHROMIUM, "--headless", "--no-sandbox", "--disable-gpu", "--allow-file-access-from-files"]
+    command += [f"--user-data-dir={page.parent}", "--virtual-time-budget=3000", *options, "--dump-dom", watched.as_uri()]
+    text = subprocess.run(command, capture_output=True, text=True, timeout=120).stdout
+    return json.loads(unescape(re.search('<pre id="result">(.*?)</pre>', text)[1]))
+
+
+@pytest.fixture
+def play(shipped, tmp_path):
+    if CHROMIUM is None:
+        pytest.skip("there is no Chromium")
+    lnn.Model.load(shipped).page(tmp_path / "play.html")
+    return tmp_path / "play.html"
+
+
+def test_a_page_in_a_browser_computes_what_the_package_computes(play, shipped):
+    states = json.dumps([[q.tolist(), v.tolist()] for q, v in zip(Q[:, :2], V[:, :2])])
+    script = f"""
+      const both = load(JSON.parse(document.getElementById("data").textContent));
+      const of = (motion) => {states}.map(([q, v]) => motion.terms(q, v));
+      return {{ learned: of(both.learned), exact: of(both.exact) }};
+    """
+    found = in_chromium(play, script)
+    assert found["problems"] == []
+    for name, moves, tolerance in [("learned", lnn.Model.load(shipped), 1e-5), ("exact", lnn.System("double-pendulum"), 1e-12)]:
+        terms = moves.terms(Q[:, :2], V[:, :2])
+        for theirs, ours in [("lagrangian",) * 2, ("momentum",) * 2, ("mass", "mass_matrix"), ("acceleration",) * 2]:
+            there, here = np.array([row[theirs] for row in found[name]]), getattr(terms, ours)
+            assert np.abs(there - here).max() <= tolerance * np.abs(here).max(), (name, ours)
+
+
+def test_a_page_is_played_by_keys_and_by_dragging(play):
+    script = """
+      const text = (id) => document.getElementById(id).textContent, stage = document.getElementById("stage");
+      const wait = (time) => new Promise((done) => setTimeout(done, time));
+      const seen = { start: text("time"), drawn: stage.getContext("2d").getImageData(0, 0, stage.width, stage.height).data.some((x) => x > 0) };
+      stage.focus();
+      seen.focus = document.activeElement.id;
+      send("keydown", stage, { key: "." });
+      seen.stepped = text("time");
+      send("keydown", stage, { key: " " });
+      seen.playing = text("run");
+      await wait(500);
+      send("keydown", stage, { key: " " });
+      [seen.played, seen.paused] = [text("time"), text("run")];
+      send("keydown", stage, { key: "r" });
+      seen.again = text("time");
+      // The outer bob is taken to the right of the inner one, hanging straight down, and let go.
+      stage.setPointerCapture = () => {};
+      const box = stage.getBoundingClientRect(), unit = box.width / 2 / 2.2, at = (x, y) => ({
+        clientX: box.left + box.width / 2 + unit * x, clientY: box.top + box.height / 2 - unit * y, pointerId: 1,
+      });
+      player.start.q = [0, 0];
+      send("keydown", stage, { key: "r" });
+      send("pointerdown", stage, at(0, -2));
+      send("pointermove", stage, at(1, -1));
+      seen.dragged = player.start.q.concat(player.start.v);
+      send("pointerup", stage, at(1, -1));
+      seen.dropped = text("run");
+      send("keydown", stage, { key: " " });
+      // A slider of a parameter moves the exact system.
+      const slider = document.querySelector("#parameters input"), before = text("reading");
+      slider.value = 2;
+      send("input", slider, { pointerId: 1 });
+      seen.moved = text("reading") !== before;
+      seen.reached = [...document.querySelectorAll("canvas#stage, button, input")].every((x) => x.tabIndex === 0);
+      return seen;
+    """
+    seen = in_chromium(play, script)
+    assert seen["problems"] == [] and seen["drawn"] and seen["focus"] == "stage" and seen["reached"] and seen["moved"]
+    assert seen["start"].startswith("t = 0.00 s") and seen["stepped"].startswith("t = 0.02 s") and seen["again"] == seen["start"]
+    time_of = lambda text: float(text.split()[2])
+    assert seen["playing"] == "Pause" and seen["paused"] == "Play" and time_of(seen["played"]) > time_of(seen["stepped"])
+    assert np.allclose(seen["dragged"], [0, np.pi / 2, 0, 0], atol=1e-6) and seen["dropped"] == "Pause"
+
+
+@pytest.mark.parametrize("width", [420, 1200])
+@pytest.mark.parametrize("dark", [False, True])
+def test_a_page_fits_its_window_light_and_dark(play, width, dark):
+    frame = play.with_name("frame.html")
+    frame.write_text(f'<html><head></head><body><iframe id="f" src="play.html" width="{width}" height="900" style="border:0"></iframe></body></html>')
+    script = """
+      const frame = document.getElementById("f"), inside = frame.contentDocument;
+      if (inside.readyState !== "complete" || !inside.getElementById("stage")) await new Promise((done) => frame.addEventListener("load", done));
+      const page = frame.contentDocument, box = page.getElementById("stage").getBoundingClientRect();
+      const style = frame.contentWindow.getComputedStyle(page.body);
+      return { wide: page.documentElement.scrollWidth, stage: box.width, ground: style.backgroundColor, text: style.color };
+    """
+    # 0 is dark.
+    seen = in_chromium(frame, script, "--window-size=1300,1000", f"--blink-settings=preferredColorScheme={0 if dark else 1}")
+    assert seen["problems"] == [] and seen["wide"] <= width and seen["stage"] > (360 if width == 420 else 500)
+    light = lambda colour: sum(map(int, re.findall(r"\d+", colour)[:3])) / 3
+    assert (light(seen["ground"]) < 60 and light(seen["text"]) > 200) if dark else (light(seen["ground"]) > 240 and light(seen["text"]) < 60)

@@ -50,8 +50,10 @@ function pictureOf(data) {
   if (r >= 0) {
     const angle = place("phi") >= 0 ? place("phi") : turn, hangs = names[angle] === "theta" || names[angle] === "angle";
     const far = data.ranges.position[r][1];
+    const hole = (values) => (data.time_like !== null && values.M > 0 ? values.M + Math.sqrt(Math.max(0, values.M ** 2 - (values.a || 0) ** 2)) : 0);
     return {
       reach: () => 1.15 * far,
+      hole,
       lines: hangs,
       joints: (q) => {
         const at = angle >= 0 ? q[angle] : 0;
@@ -137,6 +139,13 @@ function play(data) {
     if (picture.globe) {
       pen.beginPath();
       pen.arc(width / 2, height / 2, unit, 0, 7);
+      pen.stroke();
+    } else if (picture.hole && picture.hole(values) > 0) {
+      // The hole, up to its outer horizon.
+      pen.fillStyle = colour("line");
+      pen.beginPath();
+      pen.arc(width / 2, height / 2, unit * picture.hole(values), 0, 7);
+      pen.fill();
       pen.stroke();
     } else if (!picture.lines) {
       // The origin.
@@ -273,11 +282,11 @@ function play(data) {
       dragged = nearest(pointed(event));
       running = false;
       start.q = flights[0].y.slice(0, n);
-      if (data.time_like === null && falls(start.q)) start.v = start.v.map(() => 0);
       move(event);
     });
     const move = (event) => {
       start.q = picture.take(start.q, dragged, pointed(event), values);
+      if (data.time_like === null && falls(start.q)) start.v = start.v.map(() => 0);
       reading = null;
       reset();
     };
