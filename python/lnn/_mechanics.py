@@ -75,7 +75,7 @@ class Mechanics:
         """
         n = self._n
         q, v, shape = states(q, v, n)
-        found, failures = self._subject.terms(q, v, threads)
+        found, failures = self._subject.terms(q, v, threads if threads == 1 else thread_count(threads))
         vector, matrix = (*shape, n), (*shape, n, n)
         lagrangian, momentum, dl_dq, mass_matrix, coriolis, acceleration, energy, *friction = found
         return Terms(
@@ -92,6 +92,7 @@ class Mechanics:
 
     def _term(self, name: str, width: tuple[int, ...], q: Numbers, v: Numbers, threads: int) -> np.ndarray:
         q, v, shape = states(q, v, self._n)
+        threads = threads if threads == 1 else thread_count(threads)
         return self._subject.term(name, q, v, threads).reshape(shape + width)
 
     def lagrangian(self, q: Numbers, v: Numbers, *, threads: int = 1) -> np.ndarray:

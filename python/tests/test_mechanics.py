@@ -125,6 +125,53 @@ def test_arrays_of_any_kind_are_taken(arm):
     assert spring.acceleration(0.5, 0.0) == -2.0 and spring.terms(np.float64(0.5), 0).mass_matrix.shape == (1, 1)
 
 
+def test_arrays_are_taken_without_a_copy():
+    from lnn._arrays import states
+
+    q, v = np.random.default_rng(1).normal(size=(2, 6, 2))
+    taken = states(q, v, 2)
+    assert taken[0] is q and taken[1] is v
+    assert np.shares_memory(states(q.reshape(2, 3, 2), v.reshape(2, 3, 2), 2)[0], q)
+
+
+def test_what_is_huge_is_refused_or_said(arm):
+    many = np.broadcast_to(0.0, (10**14, 2))
+    with pytest.raises(MemoryError):
+        arm.acceleration(many, many)
+    terms = arm.terms([1e308, 0.0], [1e200, 0.0])
+    assert np.isnan(terms.acceleration).all() and len(terms.failures) == 1
+    for wrong in [
+        lambda: lnn.System("n-pendulum", n=10**9),
+        lambda: lnn.System(lagrangian="x_dot^2" + "+(" * 100_000, coordinates=["x"]),
+        lambda: arm.rollout([0, 0], [0, 0], 1e12, 1e-9),
+        lambda: arm.rollout([0, 0], [0, 0], np.inf, 0.1),
+        lambda: arm.acceleration([0, 0], [0, 0], threads=10**6),
+        lambda: lnn.System("kepler", mu=10**400),
+        lambda: lnn.train("harmonic-oscillator", hidden=[10**9], threads=1),
+        lambda: lnn.train("harmonic-oscillator", epochs=10**15, threads=1),
+    ]:
+        with pytest.raises((ValueError, TypeError, MemoryError)):
+            wrong()
+
+
+def test_every_result_is_pickled(shipped, arm):
+    model, sphere = lnn.Model.load(shipped), lnn.System("sphere-geodesic")
+    results = [
+        arm.terms([0.1, 0.2], [0.0, 1.0]),
+        arm.rollout([0.1, 0.2], [0.0, 1.0], 1.0, 0.5),
+        sphere.geometry([0.5, 0.1]),
+        sphere.symmetries(seed=1),
+        lnn.System("cartesian-chain-1").constraints(),
+        model.certify(boxes=100, threads=1),
+        arm.formula(),
+    ]
+    for result in results:
+        again = pickle.loads(pickle.dumps(result))
+        assert type(again) is type(result)
+        for name, value in vars(result).items():
+            np.testing.assert_equal(getattr(again, name), value)
+
+
 @pytest.mark.parametrize(
     "q, v, error",
     [
@@ -207,6 +254,15 @@ def test_tables_of_motion(arm):
     assert batch.shape == (9, 5) and batch.loc[(2, 0.0), "theta2"] == 0.1
 
 
+def test_datasets_of_motion(arm):
+    pytest.importorskip("xarray")
+    motion = arm.rollout([0.3, 0.1], [0.0, 0.0], 1.0, 0.5)
+    data = motion.to_xarray()
+    assert data.sizes == {"t": 3} and set(data) == {*arm.columns, "energy"} and data.theta1.sel(t=0.0) == 0.3
+    batch = arm.rollout([[0.3, 0.1]] * 4, [[0.0, 0.0]] * 4, 1.0, 0.5).to_xarray()
+    assert batch.theta2.dims == ("start", "t") and np.array_equal(batch.energy.isel(start=2), motion.energy)
+
+
 def test_geometry_symmetries_and_certificate(arm):
     space = lnn.System("ads4-geodesic")
     geometry = space.geometry([[0.0, 0.3, -0.2, 1.5], [0.0, 0.0, 0.0, 0.0]])
@@ -234,6 +290,20 @@ def test_models_are_files_and_pickles(shipped, tmp_path):
     motion = model.rollout([0.3, 0.1], [0, 0], 1, 0.5)
     again = pickle.loads(pickle.dumps(motion))
     assert np.array_equal(again.q, motion.q) and again.columns == motion.columns
+
+
+def learned_loss(seed):
+    states = {"data.training": 256, "data.validation": 64, "data.test": 64, "optimizer.batch": 32}
+    return lnn.train("harmonic-oscillator", hidden=[8], epochs=2, threads=2, starts=1, seed=seed, config=states).summary["validation_loss"]
+
+
+def test_trainings_run_side_by_side_in_threads_and_in_forks():
+    """A process that has trained already forks, and its children train."""
+    alone = [learned_loss(seed) for seed in range(2)]
+    with ThreadPoolExecutor(2) as pool:
+        assert list(pool.map(learned_loss, range(2))) == alone
+    with ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("fork")) as pool:
+        assert [run.result(timeout=60) for run in [pool.submit(learned_loss, seed) for seed in range(2)]] == alone
 
 
 def energy_of(model_and_start):

@@ -68,6 +68,23 @@ def test_a_metric_as_known_part_and_a_description(models):
         agree(getattr(found, name), getattr(exact, name), name)
 
 
+@pytest.mark.parametrize("library", ["jax", "torch"])
+def test_arrays_of_other_libraries_are_taken(library):
+    from lnn._arrays import states
+
+    arm, (q, v) = lnn.System("double-pendulum"), np.random.default_rng(1).normal(size=(2, 6, 2))
+    if library == "jax":
+        jax = pytest.importorskip("jax")
+        jax.config.update("jax_enable_x64", True)
+        found = arm.acceleration(jax.numpy.asarray(q), jax.numpy.asarray(v))
+    else:
+        torch = pytest.importorskip("torch")
+        tensor = torch.from_numpy(q)
+        assert np.shares_memory(states(tensor, v, 2)[0], q)
+        found = arm.acceleration(tensor, v)
+    assert isinstance(found, np.ndarray) and np.array_equal(found, arm.acceleration(q, v))
+
+
 @pytest.mark.parametrize("backend", BACKENDS)
 def test_systems_with_friction_and_constraints(backend):
     """Those of the formulas; a constraint that follows from the others has no force of its own."""

@@ -13,10 +13,10 @@ USE = """
 import lnn
 import numpy as np
 
-system = lnn.System("kepler", k=2)
+system = lnn.System("kepler", mu=2)
 learned = lnn.train(system, epochs=1)
 motion: lnn.Trajectory = learned.model.rollout([1.0, 0.0], np.zeros(2), 1.0, 0.1)
-error: float | None = lnn.identify(motion.q, system, dt=0.1).constants["k"].standard_error
+error: float | None = lnn.identify(motion.q, system, dt=0.1).constants["mu"].standard_error
 wrong: int = system.name
 system.terms([1.0, 0.0], [0.0, 1.0], treads=2)
 """
