@@ -60,7 +60,7 @@ def imported(code):
 def fits(program):
     """Processor times of a fit by the program and by the package, in turn, and whether their models are the same."""
     angles, found = "theta1,theta2", {"program": [], "package": []}
-    choices = "trajectory='run', threads=1, epochs=10, config={'training.system': 'measured'}, out=sys.argv[2]"
+    choices = "trajectory='run', threads=1, epochs=10, out=sys.argv[2]"
     code = f"import lnn, sys; a = ['theta1', 'theta2']; lnn.fit(sys.argv[1], coordinates=a, angles=a, {choices})"
     with tempfile.TemporaryDirectory() as folder:
         outs = [Path(folder, name) for name in found]

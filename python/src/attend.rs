@@ -3,6 +3,7 @@
 
 use crate::errors::runtime;
 use lnn::pipeline::{Event, Watch};
+use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -58,6 +59,18 @@ pub fn attended<T: Send>(
             })
         })
     })
+}
+
+/// As [`attended`], for work whose part is worth nothing: after a signal its result is lost.
+///
+/// # Errors
+/// `KeyboardInterrupt` after a signal, and a panic of the work.
+pub fn whole<T: Send>(py: Python<'_>, work: impl FnOnce(&Watch) -> T + Send) -> PyResult<T> {
+    let done = attended(py, None, |watch| (work(&watch), watch.interrupt.load(Ordering::SeqCst)))?;
+    match done {
+        (_, true) => Err(PyKeyboardInterrupt::new_err("interrupted")),
+        (result, false) => Ok(result),
+    }
 }
 
 /// Waits for the end of the work.

@@ -1,6 +1,6 @@
 //! What is read off recorded motion: its constraints, and its Lagrangian as a formula.
 
-use crate::attend::attended;
+use crate::attend::whole;
 use crate::errors::{runtime, value};
 use crate::recorded::{Motion, Source};
 use crate::subject::Subject;
@@ -21,12 +21,12 @@ pub fn constraints_of_motion(py: Python<'_>, motion: Motion, degrees: (usize, us
         }
     }
     let source = Source::of(motion)?;
-    py.detach(|| {
+    whole(py, |_| {
         let recording = source.read()?.recording;
         let samples = MotionSamples::of(&recording, &SmoothOptions::default()).map_err(value)?;
         let found = find_constraints(&samples, ConstraintSearch { degree, velocity_degree }).map_err(value)?;
         serde_json::to_string(&found).map_err(runtime)
-    })
+    })?
 }
 
 /// The Lagrangian of recorded motion as a formula, as JSON.
@@ -34,14 +34,14 @@ pub fn constraints_of_motion(py: Python<'_>, motion: Motion, degrees: (usize, us
 pub fn formula(py: Python<'_>, motion: Motion, choices: &str) -> PyResult<String> {
     let (options, name) = FormulaChoices::read(choices)?;
     let source = Source::of(motion)?;
-    py.detach(|| {
+    whole(py, |_| {
         let recording = source.read()?.recording;
         let n = recording.coordinates.len();
         if let Some(noise) = options.noise.as_ref().filter(|noise| noise.len() != n) {
             return Err(value(format_args!("noise: expected {n} numbers, found {}", noise.len())));
         }
         Ok(described(&formula_of_motion(&recording, &options).map_err(value)?, &name))
-    })
+    })?
 }
 
 /// The constants of a system whose form is known, as JSON; samples far from the motion by trajectory and row.
@@ -51,7 +51,7 @@ pub fn identify(py: Python<'_>, motion: Motion, system: &Subject, choices: &str)
     let options: IdentifyOptions =
         serde_json::from_str(choices).map_err(|error| value(format_args!("between: {error}")))?;
     let (source, instance) = (Source::of(motion)?, system.system_instance()?);
-    attended(py, None, |_| {
+    whole(py, |_| {
         let loaded = source.read()?;
         let found = identified(&instance, &loaded.recording, &options).map_err(value)?;
         let outliers: Vec<_> = found

@@ -1,6 +1,6 @@
 //! Something that moves by a Lagrangian: a system or a model.
 
-use crate::attend::attended;
+use crate::attend::{attended, whole};
 use crate::errors::{pipeline, runtime, value};
 use crate::readings::{FormulaChoices, described};
 use lnn::certificate::{self, Certificate, Signature, certify_network, certify_system};
@@ -19,14 +19,12 @@ use lnn::report::page;
 use lnn::rollout::{Method, Options, Rollout, RolloutError, rollout_many};
 use lnn::symmetry::{Chart, Degrees, Region, bases, enough, middle, most_states, most_symmetries, unknowns};
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray2};
-use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList};
 use serde_json::{Value, json};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
-use std::sync::atomic::Ordering;
 
 /// States whose terms are computed at a time.
 const CHUNK: usize = 4096;
@@ -386,13 +384,8 @@ impl Subject {
         let options = Options { t0, method, rtol, atol, step, domain, ..Options::new(t_end, dt) };
         let starts: Vec<_> = q.chunks(n).zip(v.chunks(n)).map(|(q, v)| (q.to_vec(), v.to_vec())).collect();
         let model = self.moving();
-        let (motions, interrupted) = attended(py, None, |watch| {
-            let motions = rollout_many(&Interruptible::new(model, &watch.interrupt), &starts, &options, threads);
-            (motions, watch.interrupt.load(Ordering::SeqCst))
-        })?;
-        if interrupted {
-            return Err(PyKeyboardInterrupt::new_err("interrupted"));
-        }
+        let motions =
+            whole(py, |watch| rollout_many(&Interruptible::new(model, &watch.interrupt), &starts, &options, threads))?;
         let result = PyList::empty(py);
         for Rollout { trajectory, statistics, stop } in motions {
             if let Some(error @ RolloutError::Invalid { .. }) = &stop {
@@ -497,11 +490,11 @@ impl Subject {
     fn formula(&self, py: Python<'_>, choices: &str) -> PyResult<String> {
         let (options, name) = FormulaChoices::read(choices)?;
         let (names, periodic) = (&self.columns[..self.n()], self.periodic());
-        py.detach(|| {
+        whole(py, |_| {
             let (q, v) = self.sampled(&self.interest(), MODEL_STATES, options.seed)?;
             let found = formula_of_model(self.moving(), (names, &periodic), (&q, &v), &options).map_err(value)?;
             Ok(described(&found, &name))
-        })
+        })?
     }
 
     /// Where the mass matrix is proven to have its signature, as JSON.

@@ -1,6 +1,9 @@
 """Constraints and formulas, of motion and of models."""
 
+import os
 import pickle
+import signal
+import threading
 
 import numpy as np
 import pytest
@@ -197,6 +200,19 @@ def test_sensors_outliers_and_files_are_identified(swung, shipped, tmp_path):
     pendula = lnn.System.from_toml(shipped.parents[1] / "systems/damped_pendula.toml")
     arm = lnn.identify(shipped.parent / "pendulum.csv", pendula, **columns)
     assert abs(arm.constants["l1"].value - 1) < 0.01 and arm.explained
+
+
+def test_ctrl_c_is_raised_when_a_reading_has_ended(swung):
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    pressing = threading.Timer(0.2, os.kill, [os.getpid(), signal.SIGINT])
+    pressing.start()
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            for _ in range(100):
+                lnn.identify(swung, lnn.System("n-pendulum", n=1), dt=0.02, threads=1)
+        pressing.join()
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def test_mistakes_of_an_identification_are_values(swung):
