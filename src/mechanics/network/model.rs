@@ -108,7 +108,8 @@ impl Architecture {
 impl Architecture {
     /// `true` if there is any friction.
     pub(crate) fn has_friction(&self) -> bool {
-        self.dissipation.is_some() || !self.form.joint_friction.is_none()
+        let known = self.form.known.as_ref().is_some_and(|known| known.dissipation.is_some());
+        known || self.dissipation.is_some() || !self.form.joint_friction.is_none()
     }
     /// Outputs of the network.
     pub(crate) fn outputs(&self) -> usize {

@@ -39,13 +39,14 @@ impl Lagrangian for Architecture {
             time_like: self.time_like,
         };
         let learned = self.form.lagrangian(outputs, state);
-        if self.form.known.is_some() { learned + self.known_lagrangian(parameters, q, v) } else { learned }
+        let known = self.known_part(parameters, q, v, false);
+        known.map_or(learned, |known| learned + known)
     }
 }
 
 impl Architecture {
     /// The Rayleigh dissipation `D = sum_k softplus(gamma_k + w_k.f(q)) ln cosh(b_k.(v/s))` of states in physical units, with the
-    /// [joint friction](super::JointFriction) beside it; 0 for a network without friction. Friction is the generalized force `-dD/dv`.
+    /// [joint friction](super::JointFriction) and the known part's own beside it; 0 without friction. Friction is the generalized force `-dD/dv`.
     ///
     /// `f(q)` are the input features made of coordinates, `parameters` the flat weights. The unit of `D` is that of `L` per
     /// unit of time. Angles are taken as they are, not wrapped.
@@ -56,7 +57,9 @@ impl Architecture {
         let sizes = self.form.sizes.as_ref();
         let size = |i: usize| sizes.map_or(1.0, |sizes| sizes.friction[i]);
         let joint = (!joints.is_empty()).then(|| self.form.joint_friction.dissipation(joints, &velocities, size));
-        let Some(dissipation) = layout.dissipation else { return joint.unwrap_or(R::zero()) };
+        let known = self.known_part(parameters, q, v, true);
+        let [joint, known] = [joint, known].map(|part| part.unwrap_or(R::zero()));
+        let Some(dissipation) = layout.dissipation else { return joint + known };
         let gamma = &parameters[dissipation.gamma_range()];
         let strength = R::affine(&parameters[dissipation.weight_range()], gamma, &positions);
         let along = R::affine(&parameters[dissipation.direction_range()], &[], &velocities);
@@ -65,7 +68,7 @@ impl Architecture {
         strength
             .into_iter()
             .zip(along)
-            .fold(joint.unwrap_or(R::zero()), |sum, (strength, along)| sum + strength * along)
+            .fold(joint + known, |sum, (strength, along)| sum + strength * along)
     }
 }
 
@@ -135,11 +138,6 @@ impl Radial {
 /// The system that a known part describes.
 pub(super) fn system(description: &Description, n: usize) -> Result<System, String> {
     let system = description.system().map_err(|error| error.to_string())?;
-    if description.dissipation.is_some() {
-        return Err(
-            "dissipation: a grey box knows a Lagrangian alone; leave the key out, and learn friction beside it".into(),
-        );
-    }
     match description.coordinates.len() {
         found if found == n => Ok(system),
         found => Err(format!("expected {n} coordinates, found {found}")),
@@ -179,13 +177,14 @@ impl Architecture {
         system.parameters.iter().map(own).collect()
     }
 
-    /// The known part of `L`, 0 if there is none.
-    fn known_lagrangian<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> R {
-        let Some(known) = &self.form.known else { return R::zero() };
+    /// The known part of `L`, or with `friction` that of the dissipation function; `None` if there is none.
+    fn known_part<R: Real>(&self, parameters: &[R], q: &[R], v: &[R], friction: bool) -> Option<R> {
+        let known = self.form.known.as_ref()?;
         let described = system(known, self.coordinates).ok();
         let Some((system, described)) = described.and_then(|s| s.described.clone().map(|d| (s, d))) else {
-            return R::constant(R::Scalar::nan());
+            return Some(R::constant(R::Scalar::nan()));
         };
-        described.lagrangian.lagrangian(&self.constants(&system, parameters), q, v)
+        let formula = if friction { described.dissipation.as_ref()? } else { &described.lagrangian };
+        Some(formula.lagrangian(&self.constants(&system, parameters), q, v))
     }
 }

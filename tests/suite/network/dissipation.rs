@@ -7,7 +7,7 @@ use crate::common::{of_scalar, properties};
 use lnn::configuration::{Config, Data, Network, OnFailure, Optimizer, Phase, Precision, Regularizer, Scaling};
 use lnn::data::{Dataset, Datasets};
 use lnn::forward::HyperDual;
-use lnn::lagrangian::{EulerLagrange, Request, Terms};
+use lnn::lagrangian::{Description, EulerLagrange, Request, Terms};
 use lnn::linalg::Workspace;
 use lnn::network::{
     ActivationChoice, Architecture, Factor, Form, Initialization, InputLayer, JointFriction, Layout, NetworkLagrangian,
@@ -44,6 +44,26 @@ fn architecture(n: usize, units: usize) -> Architecture {
         dissipation: Some(units),
         form: Form::default(),
     }
+}
+
+#[test]
+fn the_friction_of_a_known_part_acts_and_its_constants_are_learned() {
+    let text = r#"{"name": "axle", "lagrangian": "a_dot^2", "dissipation": "c*a_dot^2/2", "parameters": {"c": {"default": 0.3, "learn": true}},
+        "coordinates": [{"name": "a", "periodic": true, "velocity_bounds": [-1, 1]}]}"#;
+    let description: Description = serde_json::from_str(text).unwrap();
+    let form = Form { known: Some(Box::new(description)), ..Form::default() };
+    let architecture = Architecture { dissipation: None, alpha: 0.0, form, ..architecture(1, 1) };
+    let mut weights = vec![0.0; Layout::new(&architecture).parameters];
+    let mut force = |learned: f64| {
+        *weights.last_mut().unwrap() = learned;
+        let network = NetworkLagrangian::new(architecture.clone(), weights.clone()).unwrap();
+        assert!(!network.conserves_energy());
+        let mut terms = Terms::default();
+        network.terms(&[0.4], &[1.5], Request::FORCE, &mut terms).unwrap();
+        terms.force[0]
+    };
+    let found = [force(0.0), force(0.1)];
+    assert!((found[0] + 0.45).abs() < 1e-12 && (found[1] + 0.6).abs() < 1e-12, "{found:?}");
 }
 
 fn cases() -> impl Strategy<Value = Case> {
