@@ -30,48 +30,69 @@ impl Equations {
     pub fn record(instance: &SystemInstance<f64>, chosen: &[usize]) -> Result<Option<Self>, TapeError> {
         let (n, count) = (instance.coordinates, instance.parameters.len());
         let Some(value) = instance.visit(Value { parameters: count }).transpose()? else { return Ok(None) };
-        let lagrangian = RecordedValue { value };
-        let dissipation = instance.dissipation().map(|d| Value { parameters: count }.visit(d)).transpose()?;
-        let dissipation = dissipation.map(|value| RecordedValue { value });
+        let mut parts = vec![Part { value: RecordedValue { value }, friction: false }];
+        if let Some(dissipation) = instance.dissipation() {
+            parts.push(Part::record(dissipation, count, true)?);
+        }
+        Self::of(n, count, &parts, (chosen, &[])).map(Some)
+    }
+
+    /// Records the equations of a sum of parts of `count` parameters, with slopes by chosen parameters and then by the factors of
+    /// `terms` that the sum may get.
+    ///
+    /// # Errors
+    /// [`TapeError`] for parts that branch on their data.
+    pub fn of(n: usize, count: usize, parts: &[Part], (chosen, terms): (&[usize], &[Part])) -> Result<Self, TapeError> {
         let motion = Program::record(2 * n, count, |x, p| {
             let (q, v) = x.split_at(n);
             let zero = Tracer::zero();
             let (mut mass_matrix, mut coriolis) = (vec![zero; n * n], vec![zero; n]);
-            let mut rest = vec![zero; n];
-            let need = Request::MASS_MATRIX | Request::CORIOLIS | Request::DL_DQ;
-            let mut state = StateTerms {
-                lagrangian: &mut [],
-                momentum: &mut [],
-                dl_dq: &mut rest,
-                mass_matrix: &mut mass_matrix,
-                coriolis: &mut coriolis,
-            };
-            evaluate(&lagrangian, p, q, v, need, &mut state);
-            let mut friction = vec![zero; n];
-            if let Some(dissipation) = &dissipation {
-                let mut state = StateTerms {
-                    lagrangian: &mut [],
-                    momentum: &mut friction,
-                    dl_dq: &mut [],
-                    mass_matrix: &mut [],
-                    coriolis: &mut [],
+            let (mut rest, mut friction) = (vec![zero; n], vec![zero; n]);
+            for part in parts {
+                let (need, mut state) = if part.friction {
+                    let nothing = StateTerms {
+                        lagrangian: &mut [],
+                        momentum: &mut friction,
+                        dl_dq: &mut [],
+                        mass_matrix: &mut [],
+                        coriolis: &mut [],
+                    };
+                    (Request::MOMENTUM, nothing)
+                } else {
+                    let all = StateTerms {
+                        lagrangian: &mut [],
+                        momentum: &mut [],
+                        dl_dq: &mut rest,
+                        mass_matrix: &mut mass_matrix,
+                        coriolis: &mut coriolis,
+                    };
+                    (Request::MASS_MATRIX | Request::CORIOLIS | Request::DL_DQ, all)
                 };
-                evaluate(dissipation, p, q, v, Request::MOMENTUM, &mut state);
+                evaluate(&part.value, p, q, v, need, &mut state);
             }
             for (rest, (c, f)) in rest.iter_mut().zip(coriolis.into_iter().zip(friction)) {
                 *rest = *rest - c - f;
             }
             mass_matrix.into_iter().chain(rest).collect()
         })?;
-        let equation = Equation { n, lagrangian: &lagrangian, dissipation: dissipation.as_ref() };
         let mut failure = None;
         let slopes = Program::record(3 * n, count, |x, p| {
             let all = [x, p].concat();
             let width = all.len();
-            match jacobian(&equation, &all) {
+            let single = terms.iter().map(|term| {
+                let mut column = vec![Tracer::zero(); n];
+                Equation { n, parts: std::slice::from_ref(term) }.eval(&all, &mut column);
+                column
+            });
+            let single: Vec<Vec<_>> = single.collect();
+            match jacobian(&Equation { n, parts }, &all) {
                 Ok((_, matrix)) => {
                     let columns = || (0..2 * n).chain(chosen.iter().map(|k| 3 * n + k));
-                    (0..n).flat_map(|i| columns().map(move |k| i * width + k)).map(|at| matrix[at]).collect()
+                    let row = |i: usize| columns().map(move |k| i * width + k);
+                    let of = |i: usize| {
+                        row(i).map(|at| matrix[at]).chain(single.iter().map(|column| column[i])).collect::<Vec<_>>()
+                    };
+                    (0..n).flat_map(of).collect()
                 }
                 Err(error) => {
                     failure = Some(error);
@@ -81,8 +102,25 @@ impl Equations {
         })?;
         match failure {
             Some(error) => Err(error),
-            None => Ok(Some(Self { n, motion: Arc::new(motion), slopes: Arc::new(slopes) })),
+            None => Ok(Self { n, motion: Arc::new(motion), slopes: Arc::new(slopes) }),
         }
+    }
+}
+
+/// A recorded function of state and parameters: a part of the Lagrangian, or of the dissipation function.
+#[derive(Debug)]
+pub struct Part {
+    value: RecordedValue<f64>,
+    friction: bool,
+}
+
+impl Part {
+    /// Records a function of `parameters` parameters, a part of the dissipation function if it is `friction`.
+    ///
+    /// # Errors
+    /// [`TapeError`] for one that branches on its data.
+    pub fn record(function: &impl Lagrangian, parameters: usize, friction: bool) -> Result<Self, TapeError> {
+        Ok(Self { value: RecordedValue { value: Value { parameters }.visit(function)? }, friction })
     }
 }
 
@@ -102,8 +140,7 @@ impl LagrangianVisitor for Value {
 /// The residual `r` without `Q`, a function of `(q, v, a, p)`.
 struct Equation<'a> {
     n: usize,
-    lagrangian: &'a RecordedValue<f64>,
-    dissipation: Option<&'a RecordedValue<f64>>,
+    parts: &'a [Part],
 }
 
 impl VectorFunction for Equation<'_> {
@@ -124,16 +161,20 @@ impl VectorFunction for Equation<'_> {
         let (moving_q, mut moving_v) = (moving(q, v), moving(v, a));
         let (mut still_q, mut still_v) = (still(q), still(v));
         for (i, out) in out.iter_mut().enumerate() {
-            moving_v[i].s = R::one();
-            *out = self.lagrangian.lagrangian(&p, &moving_q, &moving_v).st;
-            moving_v[i].s = R::zero();
-            still_q[i].s = R::one();
-            *out -= self.lagrangian.lagrangian(&p, &still_q, &still_v).s;
-            still_q[i].s = R::zero();
-            if let Some(dissipation) = self.dissipation {
-                still_v[i].s = R::one();
-                *out += dissipation.lagrangian(&p, &still_q, &still_v).s;
-                still_v[i].s = R::zero();
+            *out = R::zero();
+            for Part { value, friction } in self.parts {
+                if *friction {
+                    still_v[i].s = R::one();
+                    *out += value.lagrangian(&p, &still_q, &still_v).s;
+                    still_v[i].s = R::zero();
+                    continue;
+                }
+                moving_v[i].s = R::one();
+                *out += value.lagrangian(&p, &moving_q, &moving_v).st;
+                moving_v[i].s = R::zero();
+                still_q[i].s = R::one();
+                *out -= value.lagrangian(&p, &still_q, &still_v).s;
+                still_q[i].s = R::zero();
             }
         }
     }

@@ -41,7 +41,7 @@ pub(crate) use derivatives::metric_jets;
 pub(crate) use description::pair;
 pub use description::{Description, DescriptionError};
 #[cfg(feature = "training")]
-pub(crate) use equations::Equations;
+pub(crate) use equations::{Equations, Part};
 pub use error::MechanicsError;
 #[doc(hidden)]
 pub use euler_lagrange::{ForceParts, InverseDynamics, force_parts, inverse_dynamics};

@@ -65,10 +65,7 @@ impl Architecture {
         let along = R::affine(&parameters[dissipation.direction_range()], &[], &velocities);
         let (strength, along) = (strength.into_iter().map(R::softplus), along.into_iter().map(R::ln_cosh));
         let (strength, along): (Vec<R>, Vec<R>) = (strength.collect(), along.collect());
-        strength
-            .into_iter()
-            .zip(along)
-            .fold(joint + known, |sum, (strength, along)| sum + strength * along)
+        strength.into_iter().zip(along).fold(joint + known, |sum, (strength, along)| sum + strength * along)
     }
 }
 

@@ -4,15 +4,16 @@ use super::error::FormulaError;
 use super::found::{FoundFormula, Left, Verdict};
 use super::function::Notation;
 use super::library::{Extent, Families, Library, Quotient, Values};
-use super::linear::{inverse_with, part, times};
-use super::motion::{BlockSum, Model, Motion, Segment, inflation, total};
+use super::motion::{BlockSum, Model, Motion, inflation, total};
 use super::select::{Path, eliminate_backward};
 use super::wald::{Equations, RIDGE, Survivors, survivors};
 use super::weak::{Stretch, Windows};
+use crate::identification::linear::{inverse_with, part, times};
+use crate::identification::{Segment, joined, spread_of};
 use crate::linalg::{self, Workspace, dot};
 use crate::random::RngStream;
-use crate::recording::Recording;
 use crate::recording::smooth::{SmoothOptions, Smoothed, Smoothing, noise};
+use crate::recording::{RecordedTrajectory, Recording};
 use rand::Rng;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -82,6 +83,8 @@ const MOST_CANDIDATES: usize = 60;
 const MOST_START: usize = 15;
 /// Error of accelerations over the least of all choices that a shorter choice may have to start with.
 const START_ERROR: f64 = 1.3;
+/// The same of a choice with a positive definite mass matrix, if no such one is nearer.
+const DEFINITE_ERROR: f64 = 3.0;
 /// Least determinant of a mass matrix over that of the model before it.
 const LEAST_REGULAR: f64 = 0.05;
 /// Sum of squares in units of noise that a term must explain.
@@ -95,13 +98,19 @@ const ROUNDS: usize = 6;
 const PASSES: usize = 10;
 
 /// Recorded motion with what smoothing says of it.
-struct Prepared<'a> {
-    recording: &'a Recording,
+#[derive(Debug)]
+pub(super) struct Prepared<'a> {
+    pub recording: &'a Recording,
     smoothed: Vec<Option<Smoothed>>,
-    sigma: Vec<f64>,
+    /// Noise of every coordinate.
+    pub sigma: Vec<f64>,
+    /// The same by trajectory: its own where it is plainly another than that of all together.
+    pub sigma_of: Vec<Vec<f64>>,
+    /// Standard deviation of every coordinate.
+    pub spread: Vec<f64>,
+    /// Usual time between samples, in s.
+    pub step: f64,
     resolved: bool,
-    /// `false` if the user gave the noise.
-    estimated: bool,
     bounds: Vec<[f64; 2]>,
     speeds: Vec<f64>,
     /// Time in which the motion changes, in s.
@@ -118,9 +127,8 @@ impl<'a> Prepared<'a> {
         }
         let choice = SmoothOptions { noise: options.noise.clone(), ..SmoothOptions::default() };
         let smoothing = Smoothing::choose(recording, &choice)?;
-        let smooth = |track: &crate::recording::RecordedTrajectory| {
-            (track.len() >= LEAST_SAMPLES).then(|| smoothing.apply(track)).transpose()
-        };
+        let smooth =
+            |track: &RecordedTrajectory| (track.len() >= LEAST_SAMPLES).then(|| smoothing.apply(track)).transpose();
         let smoothed = recording.tracks.iter().map(smooth).collect::<Result<Vec<_>, _>>()?;
         let mut bounds = vec![[f64::INFINITY, f64::NEG_INFINITY]; n];
         for track in &recording.tracks {
@@ -153,22 +161,25 @@ impl<'a> Prepared<'a> {
         let pace = paces.first().copied().unwrap_or(20.0 * step).max(4.0 * step);
         let resolved = smoothing.coordinates.iter().all(|c| c.noise.resolved);
         let speeds = speeds.into_iter().map(|s| if s > 0.0 { s } else { 1.0 }).collect();
-        let sigma = sigma.collect();
-        let estimated = options.noise.is_none();
-        Ok(Self { recording, smoothed, sigma, resolved, estimated, bounds, speeds, pace, n })
+        let sigma: Vec<f64> = sigma.collect();
+        const OTHER: f64 = 1.25;
+        let own = |track: &RecordedTrajectory, i: usize| {
+            let usual = sigma[i];
+            if options.noise.is_some() || track.len() < LEAST_OWN {
+                return usual;
+            }
+            let own = noise(std::iter::once((track.times.as_slice(), track.q.as_slice())), n, i).sigma;
+            let other = !(usual / OTHER..usual * OTHER).contains(&own);
+            if other { own.max(LEAST_NOISE * (bounds[i][1] - bounds[i][0])) } else { usual }
+        };
+        let sigma_of = recording.tracks.iter().map(|track| (0..n).map(|i| own(track, i)).collect()).collect();
+        let spread = (0..n).map(|i| spread_of(recording, i)).collect();
+        Ok(Self { recording, smoothed, sigma_of, sigma, spread, step, resolved, bounds, speeds, pace, n })
     }
 
-    /// Noise of a trajectory: its own where it is plainly another than that of all together.
-    fn noise(&self, track: usize) -> Vec<f64> {
-        const OTHER: f64 = 1.25;
-        let track = &self.recording.tracks[track];
-        let own = |i: usize| noise(std::iter::once((track.times.as_slice(), track.q.as_slice())), self.n, i).sigma;
-        let chosen = |i: usize| {
-            let (own, usual) = (own(i), self.sigma[i]);
-            let other = self.estimated && track.len() >= LEAST_OWN && !(usual / OTHER..usual * OTHER).contains(&own);
-            if other { own.max(LEAST_NOISE * (self.bounds[i][1] - self.bounds[i][0])) } else { usual }
-        };
-        (0..self.n).map(chosen).collect()
+    /// The block of a segment.
+    pub fn block_of(&self, segment: &Segment) -> usize {
+        self.block(segment.track, segment.first)
     }
 
     /// The block of a sample.
@@ -226,35 +237,29 @@ impl<'a> Prepared<'a> {
         let mut segments = Vec::new();
         for (index, track) in self.recording.tracks.iter().enumerate() {
             let Some(smoothed) = &self.smoothed[index] else { continue };
-            let sigma = self.noise(index);
-            for (block, range) in self.pieces(index) {
+            for (_, range) in self.pieces(index) {
                 let times = &track.times[range.clone()];
-                if times.len() < 2 * self.n + 2 {
+                if times.len() < 2 * n + 2 {
                     continue;
                 }
                 let whole = times[times.len() - 1] - times[0];
                 let most = (times.len() / (2 * n + 2).max(8)).max(1);
                 let count = ((whole / seconds).round() as usize).clamp(1, most);
                 for k in 0..count {
-                    let [from, to] = [k, k + 1].map(|k| range.start + k * range.len() / count);
-                    // The last sample of a segment is the first of the next.
-                    let to = (to + 1).min(range.end);
-                    let force = &track.force;
-                    segments.push(Segment {
-                        block,
-                        place: (index, from),
-                        times: track.times[from..to].to_vec(),
-                        q: track.q[from * n..to * n].to_vec(),
-                        force: if force.is_empty() { vec![] } else { force[from * n..to * n].to_vec() },
-                        sigma: sigma.clone(),
-                        start: [&smoothed.q[from * n..(from + 1) * n], &smoothed.v[from * n..(from + 1) * n]].concat(),
-                    });
+                    let [first, end] = [k, k + 1].map(|k| range.start + k * range.len() / count);
+                    let [q, v] = [&smoothed.q, &smoothed.v].map(|values| &values[first * n..(first + 1) * n]);
+                    segments.push(Segment { track: index, first, samples: end - first, start: [q, v].concat() });
                 }
             }
         }
-        let samples: usize = segments.iter().map(|s| s.times.len()).sum();
+        let samples: usize = segments.iter().map(|s| s.samples).sum();
         let stride = samples.div_ceil(MOST_SAMPLES).max(1);
         segments.into_iter().step_by(stride).collect()
+    }
+
+    /// Pairs of segments of a block that follow each other as one.
+    fn joined(&self, segments: &[Segment]) -> Vec<Segment> {
+        segments.chunk_by(|a, b| self.block_of(a) == self.block_of(b)).flat_map(joined).collect()
     }
 }
 
@@ -274,24 +279,30 @@ impl Search<'_> {
         self.candidates.iter().map(of).collect()
     }
 
-    /// `true` if coefficients of the candidates give a mass matrix that is not nearly singular beside the one of a model.
-    fn regular(&self, model: &Model, coefficients: &[f64]) -> bool {
+    /// `true` if terms give a mass matrix that is not nearly singular beside the one of a model, and as definite. Lagrangians of one
+    /// motion may differ in that: with a cyclic coordinate the square of its momentum may be added as often as one likes.
+    fn regular(&self, model: &Model, (terms, coefficients): (&[usize], &[f64])) -> bool {
         let n = self.library.n();
-        // Determinants at all states, as products of eigenvalues.
-        let determinants = |terms: &[usize], coefficients: &[f64]| -> Vec<f64> {
+        let eigenvalues = |terms: &[usize], coefficients: &[f64]| {
             let mut mass = vec![0.0; self.states.len() * n * n];
             for (values, mass) in self.states.iter().zip(mass.chunks_exact_mut(n * n)) {
                 self.library.mass_matrix(terms, coefficients, values, mass);
             }
             let mut eigenvalues = vec![0.0; self.states.len() * n];
-            // States that fail have the determinant NaN.
+            // States that fail are NaN.
             let _ = linalg::eigenvalues(n, &mass, &mut eigenvalues, &mut Workspace::new());
-            eigenvalues.chunks_exact(n).map(|values| values.iter().product()).collect()
+            eigenvalues
         };
-        let own = determinants(&model.terms, &model.coefficients);
-        let other = determinants(&self.candidates, coefficients);
-        let ratios = own.iter().zip(&other).filter(|(own, _)| own.abs() > 0.0).map(|(own, other)| (other / own).abs());
-        let mut ratios: Vec<f64> = ratios.collect();
+        let own = eigenvalues(&model.terms, &model.coefficients);
+        let other = eigenvalues(terms, coefficients);
+        let determinant = |values: &[f64]| values.iter().product::<f64>().abs();
+        let negative = |values: &[f64]| values.iter().filter(|x| **x < 0.0).count();
+        let pairs = own.chunks_exact(n).zip(other.chunks_exact(n)).filter(|(own, _)| determinant(own) > 0.0);
+        let ratio = |(own, other): (&[f64], &[f64])| {
+            let as_definite = negative(other) == 0 || negative(other) == negative(own);
+            if as_definite { determinant(other) / determinant(own) } else { 0.0 }
+        };
+        let mut ratios: Vec<f64> = pairs.map(ratio).collect();
         ratios.sort_by(f64::total_cmp);
         ratios.get(ratios.len() / 4).is_none_or(|ratio| *ratio > LEAST_REGULAR)
     }
@@ -316,7 +327,7 @@ impl Search<'_> {
         let m = self.candidates.len();
         let change = times(m, &inverse_with(m, &sum.matrix, RIDGE)?, &sum.right);
         let noise = inflation(blocks, weight, &sum, &change);
-        survivors(&equations, THRESHOLD * noise, &|x| self.regular(model, x))
+        survivors(&equations, THRESHOLD * noise, &|x| self.regular(model, (&self.candidates, x)))
     }
 
     /// Refits and chooses terms anew until they stay the same; the normal equations at the end, by block.
@@ -324,7 +335,7 @@ impl Search<'_> {
         let mut seen: Vec<Vec<usize>> = Vec::new();
         for round in 0.. {
             self.motion.settle(model, segments, 4);
-            self.motion.fit(model, segments, PASSES, self.driven);
+            self.motion.fit(model, segments, PASSES);
             let blocks = self.motion.blocks(model, &self.candidates, segments);
             if round >= rounds {
                 return blocks;
@@ -378,7 +389,7 @@ pub fn formula_of_motion(recording: &Recording, options: &FormulaOptions) -> Res
     let start = windows.unit_mass(&library, &kept, &data.speeds);
     let path = eliminate_backward(&windows, &start, &data.sigma, &complexity, &|block| held.contains(&block));
     log(&library, &kept, &path);
-    let Some(choice) = beginning(&path) else { return Err(short) };
+    let Some(choice) = beginning(&path, &windows) else { return Err(short) };
     let mut model = Model {
         terms: choice.iter().map(|&(k, _)| kept[k]).collect(),
         coefficients: choice.iter().map(|&(_, c)| c).collect(),
@@ -386,10 +397,10 @@ pub fn formula_of_motion(recording: &Recording, options: &FormulaOptions) -> Res
     let mut candidates: Vec<usize> = path.order.iter().take(MOST_CANDIDATES).map(|&k| kept[k]).collect();
     candidates.extend(model.terms.iter().filter(|k| !candidates.contains(k)).copied().collect::<Vec<_>>());
     candidates.sort_unstable();
-    let motion = Motion { library: &library, substeps: 1, threads: options.threads };
+    let motion = Motion { library: &library, data: &data, substeps: 1, threads: options.threads };
     let short = data.segments(2.5 * data.pace);
     let (mut judges, mut learned): (Vec<Segment>, Vec<Segment>) =
-        short.into_iter().partition(|s| held.contains(&s.block));
+        short.into_iter().partition(|s| held.contains(&data.block_of(s)));
     let states = learned.iter().step_by(learned.len().div_ceil(60).max(1)).map(|s| {
         let mut values = Values::new();
         let all: Vec<usize> = (0..library.functions.len()).collect();
@@ -403,7 +414,7 @@ pub fn formula_of_motion(recording: &Recording, options: &FormulaOptions) -> Res
     // Longer segments say more of the constants; their starts are known by now.
     let before = (model.clone(), learned.clone());
     let short = search.motion.settle(&model, &mut learned, 1);
-    let mut learned = joined(learned);
+    let mut learned = data.joined(&learned);
     search.motion.choose_steps(&model, &learned);
     let mut blocks = search.converge(&mut model, &mut learned, 3);
     let long = search.motion.settle(&model, &mut learned, 1);
@@ -413,13 +424,13 @@ pub fn formula_of_motion(recording: &Recording, options: &FormulaOptions) -> Res
         blocks = search.converge(&mut model, &mut learned, 0);
     }
     search.motion.settle(&model, &mut judges, 6);
-    let mut judges = joined(judges);
+    let mut judges = data.joined(&judges);
     let probabilities = probabilities(&search, &model, &blocks, &learned, options);
     let shortened = shorten(&search, &quotient, &mut model, &mut learned);
     let covariance = covariance(&search, &model, &learned);
     let (square, count) = search.motion.settle(&model, &mut judges, 8);
     let residual = (square / count.max(1.0)).sqrt();
-    let left = left_over(&search.motion, &model, &judges, &data.bounds);
+    let left = left_over(&search.motion, &model, &judges);
     let probability = |k: usize| match shortened.get(&k) {
         Some(replaced) => replaced.iter().map(|r| probabilities.get(r).copied().unwrap_or(0.0)).fold(1.0, f64::min),
         None => probabilities.get(&k).copied().unwrap_or(1.0),
@@ -443,28 +454,6 @@ pub fn formula_of_motion(recording: &Recording, options: &FormulaOptions) -> Res
     Ok(found)
 }
 
-/// Pairs of segments that follow each other as one.
-fn joined(segments: Vec<Segment>) -> Vec<Segment> {
-    let mut joined: Vec<(Segment, bool)> = Vec::new();
-    for segment in segments {
-        let n = segment.start.len() / 2;
-        let fits = |(last, double): &&mut (Segment, bool)| {
-            let end = last.place.1 + last.times.len() - 1;
-            !*double && last.block == segment.block && last.place.0 == segment.place.0 && end == segment.place.1
-        };
-        match joined.last_mut().filter(fits) {
-            Some((last, double)) => {
-                last.times.extend(&segment.times[1..]);
-                last.q.extend(&segment.q[n..]);
-                last.force.extend(segment.force.get(n..).unwrap_or_default());
-                *double = true;
-            }
-            None => joined.push((segment, false)),
-        }
-    }
-    joined.into_iter().map(|(segment, _)| segment).collect()
-}
-
 /// Blocks that are held out: one of so many, drawn.
 fn held_out(data: &Prepared<'_>, seed: u64) -> BTreeSet<usize> {
     let tracks = 0..data.recording.tracks.len();
@@ -475,14 +464,17 @@ fn held_out(data: &Prepared<'_>, seed: u64) -> BTreeSet<usize> {
     (0..count).map(|_| blocks.swap_remove(rng.random_range(0..blocks.len()))).collect()
 }
 
-/// The shortest choice whose error is near the least, with its coefficients.
-fn beginning(path: &Path) -> Option<Vec<(usize, f64)>> {
+/// The shortest choice whose error is near the least, with its coefficients; one with a positive definite mass matrix if there is any that
+/// is not much worse.
+fn beginning(path: &Path, windows: &Windows) -> Option<Vec<(usize, f64)>> {
     let few = || path.best.values().filter(|choice| choice.set.len() <= MOST_START);
     let judged = |choice: &super::select::Choice| {
         if choice.held_out.is_finite() { choice.held_out } else { choice.error }
     };
     let least = few().map(judged).fold(f64::INFINITY, f64::min);
-    let choice = few().find(|choice| judged(choice) <= START_ERROR * least)?;
+    let near = |most: f64| few().filter(move |choice| judged(choice) <= most * least);
+    let definite = |most: f64| near(most).find(|choice| windows.is_definite(&choice.coefficients));
+    let choice = definite(START_ERROR).or_else(|| definite(DEFINITE_ERROR)).or_else(|| near(START_ERROR).next())?;
     Some(choice.set.iter().map(|&k| (k, choice.coefficients[k])).collect())
 }
 
@@ -536,7 +528,7 @@ fn shorten(
             search.motion.pin(model, &model.terms, segments, &mut sum);
         }
         let own: Vec<Option<usize>> = model.terms.iter().map(|k| quotient.kept.iter().position(|t| t == k)).collect();
-        let mut best: Option<(f64, usize, Vec<usize>, Vec<f64>)> = None;
+        let mut best: Option<(f64, Vec<usize>, Vec<usize>, Vec<f64>)> = None;
         for (term, over) in quotient.over_kept.iter().enumerate() {
             let Some(over) = over.as_ref().filter(|_| !model.terms.contains(&term)) else { continue };
             // The new term over the model's own, if it is made up of them.
@@ -560,18 +552,17 @@ fn shorten(
             let x = times(size, &inverse, &right);
             let whole = dot(&model.coefficients, &times(m, &sum.matrix, &model.coefficients));
             let cost = whole - dot(&x, &right);
-            if cost < THRESHOLD * inflation && best.as_ref().is_none_or(|(least, ..)| cost < *least) {
-                best = Some((cost, term, gone, x));
+            let better = cost < THRESHOLD * inflation && best.as_ref().is_none_or(|(least, ..)| cost < *least);
+            let terms: Vec<usize> = rest.iter().map(|&k| model.terms[k]).chain([term]).collect();
+            if better && search.regular(model, (&terms, &x)) {
+                best = Some((cost, terms, gone, x));
             }
         }
-        let Some((_, term, gone, x)) = best else { return replaced };
+        let Some((_, terms, gone, coefficients)) = best else { return replaced };
         let old = gone.iter().flat_map(|&k| replaced.get(&model.terms[k]).cloned().unwrap_or(vec![model.terms[k]]));
-        let old = old.collect();
-        replaced.insert(term, old);
-        let mut terms: Vec<usize> = (0..m).filter(|k| !gone.contains(k)).map(|k| model.terms[k]).collect();
-        terms.push(term);
-        *model = Model { terms, coefficients: x };
-        search.motion.fit(model, segments, PASSES, search.driven);
+        replaced.insert(terms[terms.len() - 1], old.collect());
+        *model = Model { terms, coefficients };
+        search.motion.fit(model, segments, PASSES);
     }
 }
 
@@ -590,15 +581,15 @@ fn covariance(search: &Search<'_>, model: &Model, segments: &[Segment]) -> Vec<f
 }
 
 /// Residuals over noise in eight parts of the range of every coordinate.
-fn left_over(motion: &Motion<'_>, model: &Model, segments: &[Segment], bounds: &[[f64; 2]]) -> Vec<Left> {
+fn left_over(motion: &Motion<'_>, model: &Model, segments: &[Segment]) -> Vec<Left> {
     const PARTS: usize = 8;
-    let n = bounds.len();
+    let (n, bounds) = (motion.data.n, &motion.data.bounds);
     let mut sums = vec![[0.0; 2]; n * PARTS];
     for (segment, residuals) in segments.iter().zip(motion.residuals(model, segments)) {
-        let Some(residuals) = residuals else { continue };
-        for (row, residual) in segment.q.chunks_exact(n).zip(residuals.chunks_exact(n)) {
+        let q = &motion.data.recording.tracks[segment.track].q[segment.first * n..];
+        for (row, residual) in q.chunks_exact(n).zip(residuals.chunks_exact(n)) {
             let square = residual.iter().map(|r| r * r).sum::<f64>() / n as f64;
-            for (i, x) in row.iter().enumerate() {
+            for (i, x) in row.iter().enumerate().filter(|_| square.is_finite()) {
                 let share = (x - bounds[i][0]) / (bounds[i][1] - bounds[i][0]);
                 let at = ((share * PARTS as f64) as usize).min(PARTS - 1);
                 sums[i * PARTS + at][0] += square;

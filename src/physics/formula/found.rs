@@ -4,9 +4,9 @@ use super::error::FormulaError;
 use super::find::FormulaOptions;
 use super::function::Notation;
 use super::library::Library;
-use super::linear::{inverse, part};
 use super::motion::Model;
 use super::units::{Dimension, Units, of_coefficient};
+use crate::identification::linear::{inverse, part};
 use crate::linalg::dot;
 use serde::Serialize;
 

@@ -1,7 +1,8 @@
 //! Functions of the coordinates that terms of a Lagrangian are made of.
 
-use crate::forward::HyperDual;
+use crate::forward::Dual;
 use crate::lagrangian::{ExpressionError, ExpressionLagrangian, Lagrangian};
+use crate::scalar::Real;
 
 /// Coordinates at most.
 pub(super) const MOST_COORDINATES: usize = 8;
@@ -26,81 +27,23 @@ pub(super) enum Function {
     Formula(String, ExpressionLagrangian),
 }
 
-/// Value, gradient and Hessian of a function, the Hessian `(n, n)`.
-#[derive(Clone, Copy, Debug)]
+/// Value and gradient of a function.
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Taylor {
     pub value: f64,
     pub gradient: [f64; MOST_COORDINATES],
-    pub hessian: [[f64; MOST_COORDINATES]; MOST_COORDINATES],
-}
-
-impl Taylor {
-    fn constant(value: f64) -> Self {
-        Self { value, gradient: [0.0; _], hessian: [[0.0; _]; _] }
-    }
-
-    /// `self` times a function with the value `value`, whose gradient and Hessian are given by entry.
-    fn times(
-        &mut self,
-        n: usize,
-        value: f64,
-        gradient: &[f64; MOST_COORDINATES],
-        hessian: impl Fn(usize, usize) -> f64,
-    ) {
-        for i in 0..n {
-            for j in 0..n {
-                self.hessian[i][j] = self.hessian[i][j] * value
-                    + self.gradient[i] * gradient[j]
-                    + gradient[i] * self.gradient[j]
-                    + self.value * hessian(i, j);
-            }
-        }
-        for i in 0..n {
-            self.gradient[i] = self.gradient[i] * value + self.value * gradient[i];
-        }
-        self.value *= value;
-    }
-
-    /// `self` times `f(m.q)` with the derivatives of `f`.
-    fn times_wave(&mut self, n: usize, harmonics: &[i32], [value, first, second]: [f64; 3]) {
-        let m = |i: usize| f64::from(harmonics[i]);
-        let mut gradient = [0.0; MOST_COORDINATES];
-        (0..n).for_each(|i| gradient[i] = first * m(i));
-        self.times(n, value, &gradient, |i, j| second * m(i) * m(j));
-    }
 }
 
 impl Factor {
-    fn multiply(&self, q: &[f64], into: &mut Taylor) {
-        let n = q.len();
+    fn value<R: Real>(&self, q: &[R]) -> R {
         match self {
-            Self::Power(at, k) => {
-                let (x, power) = (q[*at], f64::from(*k));
-                let mut gradient = [0.0; MOST_COORDINATES];
-                gradient[*at] = power * x.powi(k - 1);
-                let second = if *k == 1 { 0.0 } else { power * (power - 1.0) * x.powi(k - 2) };
-                into.times(n, x.powi(*k), &gradient, |i, j| if i == *at && j == *at { second } else { 0.0 });
+            Self::Power(i, k) => q[*i].powi(*k),
+            Self::Radius(list, k) => {
+                let square = list.iter().fold(R::zero(), |sum, &i| sum + q[i] * q[i]);
+                if k % 2 == 0 { square.powi(k / 2) } else { square.sqrt().powi(*k) }
             }
-            Self::Radius(coordinates, k) => {
-                let (square, power) = (coordinates.iter().map(|&i| q[i] * q[i]).sum::<f64>(), f64::from(*k));
-                let value = square.powf(power / 2.0);
-                let (first, second) = (power * value / square, power * (power - 2.0) * value / (square * square));
-                let mut gradient = [0.0; MOST_COORDINATES];
-                coordinates.iter().for_each(|&i| gradient[i] = first * q[i]);
-                let inside = |i: usize| coordinates.contains(&i);
-                into.times(n, value, &gradient, |i, j| {
-                    let both = if inside(i) && inside(j) { second * q[i] * q[j] } else { 0.0 };
-                    if i == j && inside(i) { both + first } else { both }
-                });
-            }
-            Self::Sine(m) => {
-                let (sine, cosine) = phase(m, q).sin_cos();
-                into.times_wave(n, m, [sine, cosine, -sine]);
-            }
-            Self::Cosine(m) => {
-                let (sine, cosine) = phase(m, q).sin_cos();
-                into.times_wave(n, m, [cosine, -sine, -cosine]);
-            }
+            Self::Sine(m) => phase(m, q).sin(),
+            Self::Cosine(m) => phase(m, q).cos(),
         }
     }
 
@@ -129,8 +72,9 @@ impl Factor {
     }
 }
 
-fn phase(harmonics: &[i32], q: &[f64]) -> f64 {
-    harmonics.iter().zip(q).filter(|(m, _)| **m != 0).map(|(m, q)| f64::from(*m) * q).sum()
+fn phase<R: Real>(harmonics: &[i32], q: &[R]) -> R {
+    let parts = harmonics.iter().zip(q).filter(|(m, _)| **m != 0);
+    parts.fold(R::zero(), |sum, (m, &q)| sum + if *m == 1 { q } else { R::of(f64::from(*m)) * q })
 }
 
 /// `2*q1 - q2`.
@@ -221,31 +165,34 @@ impl Function {
         Ok(Self::Formula(text.to_string(), compiled))
     }
 
-    /// Value and derivatives at `q`.
-    pub fn taylor(&self, q: &[f64]) -> Taylor {
-        let n = q.len();
+    /// Value at `q`.
+    pub fn value<R: Real>(&self, q: &[R]) -> R {
         match self {
-            Self::Product(factors) => {
-                let mut product = Taylor::constant(1.0);
-                factors.iter().for_each(|factor| factor.multiply(q, &mut product));
-                product
-            }
-            Self::Formula(_, formula) => {
-                let mut found = Taylor::constant(0.0);
-                let mut point: Vec<HyperDual<f64>> = q.iter().map(|&q| HyperDual::lift(q)).collect();
-                let still = vec![HyperDual::lift(0.0); n];
-                for i in 0..n {
-                    for j in i..n {
-                        (point[i].s, point[j].t) = (1.0, 1.0);
-                        let value = formula.lagrangian(&[], &point, &still);
-                        (point[i].s, point[j].t) = (0.0, 0.0);
-                        (found.value, found.gradient[i]) = (value.value, value.s);
-                        (found.hessian[i][j], found.hessian[j][i]) = (value.st, value.st);
-                    }
-                }
-                found
-            }
+            Self::Product(factors) => match factors.split_first() {
+                Some((first, rest)) => rest.iter().fold(first.value(q), |product, factor| product * factor.value(q)),
+                None => R::one(),
+            },
+            Self::Formula(_, formula) => formula.lagrangian(&[], q, &vec![R::zero(); q.len()]),
         }
+    }
+
+    /// Value and gradient at `q`.
+    pub fn taylor(&self, q: &[f64]) -> Taylor {
+        let mut found = Taylor::default();
+        if self.is_one() {
+            found.value = 1.0;
+            return found;
+        }
+        let mut point = [Dual::lift(0.0); MOST_COORDINATES];
+        let point = &mut point[..q.len()];
+        point.iter_mut().zip(q).for_each(|(point, &q)| point.value = q);
+        for i in 0..q.len() {
+            point[i].tangent = 1.0;
+            let at = self.value(point);
+            point[i].tangent = 0.0;
+            (found.value, found.gradient[i]) = (at.value, at.tangent);
+        }
+        found
     }
 
     /// `true` for a formula that holds a velocity.
@@ -326,10 +273,6 @@ mod tests {
                 };
                 let (up, down) = (moved(1e-5), moved(-1e-5));
                 assert!(((up.value - down.value) / 2e-5 - at.gradient[i]).abs() < 1e-8, "{function:?}");
-                for j in 0..3 {
-                    let slope = (up.gradient[j] - down.gradient[j]) / 2e-5;
-                    assert!((slope - at.hessian[i][j]).abs() < 1e-8, "{function:?} {i} {j}");
-                }
             }
         }
     }

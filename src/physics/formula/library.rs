@@ -2,8 +2,11 @@
 
 use super::error::FormulaError;
 use super::function::{Factor, Function, MOST_COORDINATES, Notation, Taylor};
+use crate::lagrangian::{Equations, Lagrangian, Part};
 use crate::linalg::dot;
 use crate::random::RngStream;
+use crate::scalar::Real;
+use crate::tape::TapeError;
 use rand::Rng;
 
 /// Functions and terms at most.
@@ -205,8 +208,7 @@ impl Library {
     /// Values and derivatives of some functions at `q`; the others keep what they had.
     pub fn evaluate(&self, which: &[usize], q: &[f64], values: &mut Values) {
         if values.len() < self.functions.len() {
-            let nothing = Taylor { value: 0.0, gradient: [0.0; _], hessian: [[0.0; _]; _] };
-            values.resize(self.functions.len(), nothing);
+            values.resize(self.functions.len(), Taylor::default());
         }
         for &k in which {
             values[k] = self.functions[k].taylor(q);
@@ -219,6 +221,35 @@ impl Library {
         functions.sort_unstable();
         functions.dedup();
         functions
+    }
+
+    /// A term as a function of positions and velocities.
+    fn value<R: Real>(&self, k: usize, q: &[R], v: &[R]) -> R {
+        let Term { kind, function } = self.terms[k];
+        let function = self.functions[function].value(q);
+        match kind {
+            Kind::Kinetic(i, j) | Kind::Dissipation(i, j) => v[i] * v[j] * function,
+            Kind::Gyroscopic(i) => v[i] * function,
+            Kind::Potential => function,
+        }
+    }
+
+    /// The equations of motion of some terms, whose coefficients are the first of `count` parameters, with slopes by the coefficients of
+    /// wanted terms.
+    ///
+    /// # Errors
+    /// A formula that branches on its data.
+    pub fn equations(&self, terms: &[usize], count: usize, wanted: &[usize]) -> Result<Equations, TapeError> {
+        let record = |terms: Vec<(usize, Option<usize>)>, friction: bool| {
+            Part::record(&Sum { library: self, terms }, count, friction)
+        };
+        let own = |friction: bool| {
+            let own = terms.iter().enumerate().filter(|(_, k)| self.is_dissipation(**k) == friction);
+            record(own.map(|(at, &k)| (k, Some(at))).collect(), friction)
+        };
+        let single = wanted.iter().map(|&k| record(vec![(k, None)], self.is_dissipation(k)));
+        let single = single.collect::<Result<Vec<_>, _>>()?;
+        Equations::of(self.n(), count, &[own(false)?, own(true)?], (&[], &single))
     }
 
     /// Adds `factor` times `d/dt dL/dv - dL/dq + dD/dv` of a term at a state with an acceleration.
@@ -335,6 +366,26 @@ impl Library {
             Kind::Kinetic(i, j) => Some((i, j)),
             _ => None,
         }
+    }
+}
+
+/// A sum of terms, each times the parameter at a place if it has one.
+struct Sum<'a> {
+    library: &'a Library,
+    terms: Vec<(usize, Option<usize>)>,
+}
+
+impl Lagrangian for Sum<'_> {
+    fn coordinates(&self) -> usize {
+        self.library.n()
+    }
+
+    fn lagrangian<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> R {
+        let of = |&(k, at): &(usize, Option<usize>)| {
+            let value = self.library.value(k, q, v);
+            at.map_or(value, |at| parameters[at] * value)
+        };
+        self.terms.iter().fold(R::zero(), |sum, term| sum + of(term))
     }
 }
 

@@ -33,7 +33,6 @@ mod find;
 mod found;
 mod function;
 mod library;
-pub(crate) mod linear;
 mod motion;
 mod regress;
 mod select;

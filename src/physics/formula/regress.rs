@@ -3,13 +3,14 @@
 use super::error::FormulaError;
 use super::find::FormulaOptions;
 use super::found::{FoundFormula, Verdict};
-use super::library::{Extent, Library};
-use super::linear::{inverse_with, times};
+use super::library::{Extent, Library, Values};
 use super::motion::Model;
-use super::select::{Choice, Path, eliminate_backward};
+use super::select::{Choice, Path, eliminate_backward, mean};
 use super::wald::RIDGE;
 use super::weak::{State, Windows};
+use crate::identification::linear::{inverse_with, times};
 use crate::lagrangian::{EulerLagrange, Request, Terms};
+use crate::linalg::{self, Workspace, dot};
 use crate::random::RngStream;
 use rand::Rng;
 
@@ -24,6 +25,11 @@ const HELD_OUT: usize = 5;
 /// Mean squared error over the least one up to which a choice of terms may be the formula.
 const NEAR: f64 = 100.0;
 
+/// Passes of a refit: each takes the mass matrix of the one before.
+const REFITS: usize = 8;
+/// Error of the motion, over the least that any coefficients have, up to which it says nothing of a direction.
+const OPEN: f64 = 4.0;
+
 /// A state with the mass matrix and the acceleration of a model.
 struct Asked {
     q: Vec<f64>,
@@ -32,7 +38,8 @@ struct Asked {
     own: Vec<f64>,
 }
 
-/// Looks for a formula of a model by its equations of motion at states `(states, n)`: `M (a - a(q, v))` at drawn accelerations `a`.
+/// Looks for a formula of a model by its equations of motion at states `(states, n)`: terms by `M (a - a(q, v))` at drawn accelerations
+/// `a`, or by `a(q, v)` alone if `M` is that of no formula; coefficients by `a(q, v)`.
 ///
 /// Everything that moves by a Lagrangian is asked in the same way: models of a structure, black boxes, systems. Total derivatives do
 /// nothing to the equations, so that neither model nor formula needs a gauge.
@@ -71,6 +78,16 @@ pub fn formula_of_model(
         bounds.iter_mut().zip(q).for_each(|(b, &x)| *b = [b[0].min(x), b[1].max(x)]);
     }
     let (kept, quotient) = library.independent(&bounds, options.seed);
+    let complexity: Vec<f64> = kept.iter().map(|&k| library.complexity(k)).collect();
+    let held_out = |block: usize| block % HELD_OUT == 0;
+    let search = |windows: &Windows, start: &[f64]| eliminate_backward(windows, start, &sigma, &complexity, &held_out);
+    // Its own motion, which holds nothing of the mass matrix but what moves it.
+    let moving = known.iter().map(|Asked { q, v, own, .. }| {
+        let (q, v, a) = (q.clone(), v.clone(), own.clone());
+        State { q, v, a, equation: Vec::new() }
+    });
+    let motion = Windows::of_states(&library, &kept, &moving.collect::<Vec<_>>());
+    let masses = mass_coefficients(&library, &kept, &known);
     let asked: Vec<State> = known
         .into_iter()
         .map(|Asked { q, v, mass, own }| {
@@ -80,22 +97,37 @@ pub fn formula_of_model(
         })
         .collect();
     let windows = Windows::of_states(&library, &kept, &asked);
-    let complexity: Vec<f64> = kept.iter().map(|&k| library.complexity(k)).collect();
-    // The size of the model's mass matrix, for a start.
-    let start = windows.unit_mass(&library, &kept, &vec![1.0; n]);
-    let path = eliminate_backward(&windows, &start, &sigma, &complexity, &|block| block % HELD_OUT == 0);
-    let Some(choice) = elbow(&path, n) else { return Err(FormulaError::NotFinite { failed, states }) };
+    let start = masses.unwrap_or_else(|| windows.unit_mass(&library, &kept, &vec![1.0; n]));
+    let none = || FormulaError::NotFinite { failed, states };
+    let mut path = search(&windows, &start);
+    let mut choice = elbow(&path, n).cloned().ok_or_else(none)?;
+    let residual = |choice: &Choice| (choice.held_out / n as f64).sqrt();
+    choice = refit((&motion, &windows), choice, &sigma);
+    if residual(&choice) > MOST_RESIDUAL {
+        // The mass matrix of the model is not that of a formula, though its motion may be: a function of L moves as L does.
+        let alone = search(&motion, &choice.coefficients);
+        let found = elbow(&alone, n).map(|found| refit((&motion, &windows), found.clone(), &sigma));
+        if let Some(found) = found.filter(|found| residual(found) < residual(&choice)) {
+            (path, choice) = (alone, found);
+        }
+    }
+    let (windows, choice) = (motion, &choice);
     let used = vec![true; windows.len()];
     let normal = windows.normal(&choice.coefficients, &choice.set, &sigma, &used);
     let m = choice.set.len();
     let rest = choice.error * windows.len() as f64 / (windows.len() * n - m).max(1) as f64;
-    let covariance = inverse_with(m, &normal.matrix, RIDGE).unwrap_or(vec![f64::NAN; m * m]);
+    // The motion leaves the common factor free.
+    let weight =
+        (0..m).map(|k| normal.matrix[k * m + k] * choice.coefficients[choice.set[k]].powi(2)).fold(0.0, f64::max);
+    let pinned: Vec<f64> =
+        (0..m * m).map(|at| normal.matrix[at] + weight * normal.size[at / m] * normal.size[at % m]).collect();
+    let covariance = inverse_with(m, &pinned, RIDGE).unwrap_or(vec![f64::NAN; m * m]);
     let covariance: Vec<f64> = covariance.into_iter().map(|x| x * rest).collect();
     let of = Model {
         terms: choice.set.iter().map(|&k| kept[k]).collect(),
         coefficients: choice.set.iter().map(|&k| choice.coefficients[k]).collect(),
     };
-    let residual = (choice.held_out / n as f64).sqrt();
+    let residual = residual(choice);
     let probability = probabilities(&windows, choice, &path, &sigma, options);
     let mut found = FoundFormula::new(&library, periodic, &of, (&covariance, &probability), options);
     found.verdict = if residual <= MOST_RESIDUAL { Verdict::Found } else { Verdict::NotInLibrary };
@@ -106,6 +138,69 @@ pub fn formula_of_model(
     found.rescale(options.scale.as_ref())?;
     found.name_constants();
     Ok(found)
+}
+
+/// Coefficients with which kinetic terms make up the mass matrices of a model, every element in units of its coordinates' usual ones.
+fn mass_coefficients(library: &Library, kept: &[usize], known: &[Asked]) -> Option<Vec<f64>> {
+    let n = library.n();
+    let size = |i: usize| known.iter().map(|k| k.mass[i * n + i].abs()).sum::<f64>() / known.len() as f64;
+    let sizes: Vec<f64> = (0..n).map(size).collect();
+    let kinetic: Vec<(usize, (usize, usize), usize)> = (0..kept.len())
+        .filter_map(|at| library.kinetic(kept[at]).map(|pair| (at, pair, library.terms[kept[at]].function)))
+        .collect();
+    let m = kinetic.len();
+    let functions = library.functions_of(kept);
+    let (mut values, mut matrix, mut right) = (Values::new(), vec![0.0; m * m], vec![0.0; m]);
+    for Asked { q, mass, .. } in known {
+        library.evaluate(&functions, q, &mut values);
+        for (k, &(_, (i, j), f)) in kinetic.iter().enumerate() {
+            // An element that two coordinates share stands twice in the matrix.
+            let weight = if i == j { 4.0 } else { 2.0 } / (sizes[i] * sizes[j]);
+            let value = weight * values[f].value;
+            right[k] += value * mass[i * n + j] * if i == j { 0.5 } else { 1.0 };
+            for (l, &(_, _, g)) in kinetic.iter().enumerate().filter(|(_, (_, pair, _))| *pair == (i, j)) {
+                matrix[k * m + l] += value * values[g].value;
+            }
+        }
+    }
+    let inverse = inverse_with(m, &matrix, RIDGE)?;
+    let mut coefficients = vec![0.0; kept.len()];
+    kinetic.iter().zip(times(m, &inverse, &right)).for_each(|((at, ..), x)| coefficients[*at] = x);
+    Some(coefficients)
+}
+
+/// A choice of terms with the coefficients that the motion of the model asks for; in directions that it leaves open the mass matrix decides.
+fn refit((motion, windows): (&Windows, &Windows), mut choice: Choice, sigma: &[f64]) -> Choice {
+    let held_out: Vec<bool> = motion.blocks.iter().map(|&block| block % HELD_OUT == 0).collect();
+    let learned: Vec<bool> = held_out.iter().map(|held| !held).collect();
+    let (set, m) = (choice.set.clone(), choice.set.len());
+    let principal = |matrix: &[f64]| {
+        let (mut values, mut vectors) = (vec![0.0; m], vec![0.0; m * m]);
+        let done = linalg::eigh(m, matrix, &mut values, &mut vectors, &mut Workspace::new());
+        done.is_ok().then_some((values, vectors))
+    };
+    for _ in 0..REFITS {
+        let [moved, asked] = [motion, windows].map(|of| of.normal(&choice.coefficients, &set, sigma, &learned));
+        // Directions in which the mass matrix changes alike.
+        let Some((sizes, axes)) = principal(&asked.matrix) else { break };
+        let least = RIDGE * sizes.iter().copied().fold(0.0, f64::max);
+        let unit: Vec<f64> = (0..m * m).map(|at| axes[at] / sizes[at / m].max(least).sqrt()).collect();
+        let of = |a: &[f64], b: &[f64]| dot(a, &times(m, &moved.matrix, b));
+        let rows: Vec<&[f64]> = unit.chunks_exact(m).collect();
+        let both: Vec<f64> = (0..m * m).map(|at| of(rows[at / m], rows[at % m])).collect();
+        let Some((costs, turns)) = principal(&both) else { break };
+        let open = OPEN * costs[0].max(RIDGE);
+        let mut x = vec![0.0; m];
+        for (_, turn) in costs.iter().zip(turns.chunks_exact(m)).filter(|(cost, _)| **cost <= open) {
+            let direction: Vec<f64> = (0..m).map(|k| (0..m).map(|i| turn[i] * rows[i][k]).sum()).collect();
+            let part = dot(&direction, &asked.right);
+            x.iter_mut().zip(&direction).for_each(|(x, d)| *x += part * d);
+        }
+        set.iter().zip(x).for_each(|(&k, x)| choice.coefficients[k] = x);
+    }
+    let errors = motion.errors(&choice.coefficients, sigma);
+    (choice.error, choice.held_out) = (mean(&errors, &learned), mean(&errors, &held_out));
+    choice
 }
 
 /// The choice of terms of which none can be given up: the error of the next shorter one is the most times as large.
@@ -133,7 +228,7 @@ fn probabilities(windows: &Windows, choice: &Choice, path: &Path, sigma: &[f64],
         let normal = windows.normal(&choice.coefficients, &all, sigma, &used);
         let mut places: Vec<usize> = (0..all.len()).collect();
         while places.len() > choice.set.len() {
-            let Some(costs) = normal.of(&places).costs(true) else { break };
+            let Some(costs) = normal.of(&places).costs(windows.driven()) else { break };
             let gone = (0..costs.len()).min_by(|&a, &b| costs[a].total_cmp(&costs[b])).unwrap_or(0);
             places.remove(gone);
         }

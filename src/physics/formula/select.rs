@@ -1,7 +1,7 @@
 //! Backward elimination by the weak form, with refits and exchanges.
 
-use super::linear::{inverse, part, times};
 use super::weak::{Normal, Windows};
+use crate::identification::linear::{inverse, part, times};
 use crate::linalg::dot;
 use std::collections::BTreeMap;
 
@@ -77,22 +77,23 @@ impl Normal {
     }
 }
 
+/// Mean of the errors that are used.
+pub(super) fn mean(errors: &[f64], used: &[bool]) -> f64 {
+    let mut of: Vec<f64> = errors.iter().zip(used).filter(|(_, used)| **used).map(|(e, _)| *e).collect();
+    if of.is_empty() {
+        return f64::NAN;
+    }
+    of.sort_by(f64::total_cmp);
+    // A single window next to a pole of the accelerations must not decide.
+    let most = 300.0 * of[of.len() / 2];
+    of.iter().map(|e| e.min(most)).sum::<f64>() / of.len() as f64
+}
+
 impl Search<'_> {
     fn spread(&self, set: &[usize], x: &[f64]) -> Vec<f64> {
         let mut coefficients = vec![0.0; self.windows.terms];
         set.iter().zip(x).for_each(|(&k, x)| coefficients[k] = *x);
         coefficients
-    }
-
-    fn mean(&self, errors: &[f64], used: &[bool]) -> f64 {
-        let mut of: Vec<f64> = errors.iter().zip(used).filter(|(_, used)| **used).map(|(e, _)| *e).collect();
-        if of.is_empty() {
-            return f64::NAN;
-        }
-        of.sort_by(f64::total_cmp);
-        // A single window next to a pole of the accelerations must not decide.
-        let most = 300.0 * of[of.len() / 2];
-        of.iter().map(|e| e.min(most)).sum::<f64>() / of.len() as f64
     }
 
     /// The choice of a set, refitted from coefficients before it; `None` if it moves not all coordinates.
@@ -111,7 +112,7 @@ impl Search<'_> {
 
     fn judged(&self, set: Vec<usize>, coefficients: Vec<f64>) -> Option<Choice> {
         let errors = self.windows.errors(&coefficients, self.sigma);
-        let (error, held_out) = (self.mean(&errors, &self.learned), self.mean(&errors, &self.held_out));
+        let (error, held_out) = (mean(&errors, &self.learned), mean(&errors, &self.held_out));
         error.is_finite().then_some(Choice { set, coefficients, error, held_out })
     }
 

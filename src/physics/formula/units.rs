@@ -81,7 +81,7 @@ impl Units {
                 let q: Vec<f64> = (0..n).map(|i| 0.37 + shift + 0.11 * i as f64).collect();
                 let power = |i: usize| self.coordinates[i].0.get(base).copied().unwrap_or(0.0);
                 let scaled: Vec<f64> = (0..n).map(|i| q[i] * factor.powf(power(i))).collect();
-                (function.taylor(&scaled).value / function.taylor(&q).value).ln() / factor.ln()
+                (function.value(&scaled) / function.value(&q)).ln() / factor.ln()
             };
             let found = [power(1.3, 0.0), power(0.6, 0.0), power(1.3, 0.23)];
             // Halves: of square roots.

@@ -1,6 +1,6 @@
 //! Which terms a fit through the motion needs, from its normal equations alone.
 
-use super::linear::{inverse_with, times};
+use crate::identification::linear::{inverse_with, times};
 
 /// Normal equations at a model.
 pub(super) struct Equations<'a> {
@@ -26,9 +26,14 @@ pub(super) struct Survivors {
 
 /// Part of the diagonal that stands for what the motion does not show.
 pub(super) const RIDGE: f64 = 1e-10;
+/// The same, at most, where coefficients are held at those of the model.
+const MOST_HELD: f64 = 1e-2;
 
 /// Gives up terms as long as one costs less than `threshold` in the sum of squares; `allowed` says whether coefficients still make a
 /// mechanical system.
+///
+/// Coefficients move from those of the model only as far as the motion asks for: a change that is worth less than `threshold` does not,
+/// though giving up a term may ask for it.
 pub(super) fn survivors(
     equations: &Equations<'_>,
     threshold: f64,
@@ -37,12 +42,11 @@ pub(super) fn survivors(
     let Equations { matrix, right, coefficients, complexity } = *equations;
     let m = right.len();
     let mut inverse = inverse_with(m, matrix, RIDGE)?;
-    // Where the motion shows nothing the coefficients stay what they are.
-    let mut aim = times(m, matrix, coefficients);
-    for k in 0..m {
-        aim[k] += right[k] + RIDGE * matrix[k * m + k] * coefficients[k];
-    }
-    let mut x = times(m, &inverse, &aim);
+    let size = (0..m).map(|k| matrix[k * m + k] * coefficients[k].powi(2)).fold(0.0, f64::max);
+    let held = if size > 0.0 { (threshold / size).clamp(RIDGE, MOST_HELD) } else { RIDGE };
+    let change = times(m, &inverse_with(m, matrix, held)?, right);
+    let moved = |share: f64| coefficients.iter().zip(&change).map(|(c, d)| c + share * d).collect::<Vec<_>>();
+    let mut x = [1.0, 0.5, 0.25].into_iter().map(moved).find(|x| allowed(x)).unwrap_or_else(|| coefficients.to_vec());
     let mut set: Vec<usize> = (0..m).collect();
     let mut refused: Vec<usize> = Vec::new();
     loop {

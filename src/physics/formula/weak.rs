@@ -196,6 +196,16 @@ impl Windows {
         masses
     }
 
+    /// `true` if the mass matrix is positive definite in most windows.
+    pub fn is_definite(&self, coefficients: &[f64]) -> bool {
+        let n = self.n;
+        let mut values = vec![0.0; self.len() * n];
+        // Windows that fail are NaN.
+        let _ = linalg::eigenvalues(n, &self.masses(coefficients), &mut values, &mut Workspace::new());
+        let positive = values.chunks_exact(n).filter(|values| values.iter().all(|x| *x > 0.0)).count();
+        4 * positive > 3 * self.len()
+    }
+
     /// Squared errors of the mean accelerations that some coefficients give, by window, in units of `sigma`; infinite where the mass
     /// matrix is singular.
     pub fn errors(&self, coefficients: &[f64], sigma: &[f64]) -> Vec<f64> {

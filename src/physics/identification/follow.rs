@@ -15,7 +15,7 @@ const REACH: isize = 8;
 
 /// Samples that are followed from one start.
 #[derive(Clone, Debug)]
-pub(super) struct Segment {
+pub(crate) struct Segment {
     pub track: usize,
     /// First sample, and number of samples.
     pub first: usize,
@@ -26,7 +26,7 @@ pub(super) struct Segment {
 
 /// What is followed: recorded times and forces, and the equations.
 #[derive(Clone, Debug)]
-pub(super) struct Course<'a> {
+pub(crate) struct Course<'a> {
     pub recording: &'a Recording,
     pub equations: &'a Equations,
     /// Constants that derivatives are taken by.

@@ -26,6 +26,7 @@ mod determined;
 mod error;
 mod follow;
 mod found;
+pub(crate) mod linear;
 mod quality;
 mod smoothed;
 mod solve;
@@ -34,8 +35,11 @@ mod stages;
 mod tests;
 
 pub use error::IdentifyError;
+pub(crate) use follow::{Course, Segment};
 pub use found::{Constant, Identified, Outlier, Residual, SensorConstant, Undetermined};
+pub(crate) use solve::{Linear, Problem};
 pub use stages::identify;
+pub(crate) use stages::{choose_steps, joined, spread_of};
 
 use serde::{Deserialize, Serialize};
 

@@ -1,8 +1,8 @@
 //! Constants by least squares on smoothed accelerations: where the fit through the motion begins.
 
 use super::follow::{Follower, LANES, forces};
+use super::linear::{inverse_with, times};
 use super::solve::{Problem, mute, without_effect};
-use crate::formula::linear::{inverse_with, times};
 use crate::recording::smooth::Smoothed;
 
 /// States at most.

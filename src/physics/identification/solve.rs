@@ -3,7 +3,7 @@
 //! Every segment has a start of its own, which is eliminated from the normal equations.
 
 use super::follow::{Course, Follower, LANES, Segment, State};
-use crate::formula::linear::{inverse_with, times};
+use super::linear::{inverse_with, times};
 use crate::lagrangian::system::Range;
 use crate::linalg::dot;
 
@@ -24,7 +24,7 @@ const CONVERGED: f64 = 1e-9;
 
 /// A constant of a sensor: measured positions are `gain (q - delay v) + offset`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum SensorKind {
+pub(crate) enum SensorKind {
     Offset,
     Gain,
     Delay,
@@ -32,7 +32,7 @@ pub(super) enum SensorKind {
 
 /// Unknown constant of the sensor of a coordinate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Sensor {
+pub(crate) struct Sensor {
     pub kind: SensorKind,
     pub coordinate: usize,
 }
@@ -46,7 +46,7 @@ impl Sensor {
 
 /// Unknowns of the fit beside starts, and how residuals are weighed.
 #[derive(Clone, Debug)]
-pub(super) struct Problem<'a> {
+pub(crate) struct Problem<'a> {
     pub course: Course<'a>,
     /// Values of all parameters of the system; those of `chosen` are replaced by unknowns.
     pub values: Vec<f64>,
@@ -56,6 +56,8 @@ pub(super) struct Problem<'a> {
     pub sensors: Vec<Sensor>,
     /// Standard deviation of every coordinate's noise.
     pub sigma: Vec<f64>,
+    /// The same by trajectory where these differ; empty if they do not.
+    pub sigma_of: Vec<Vec<f64>>,
     /// Spread of every coordinate over all samples.
     pub spread: Vec<f64>,
     pub robust: bool,
@@ -64,7 +66,7 @@ pub(super) struct Problem<'a> {
 
 /// Normal equations of a segment: start, constants, sensors.
 #[derive(Clone, Debug)]
-pub(super) struct Linear {
+pub(crate) struct Linear {
     matrix: Vec<f64>,
     right: Vec<f64>,
     pub square: f64,
@@ -73,7 +75,7 @@ pub(super) struct Linear {
 
 /// Normal equations of constants and sensors, starts eliminated.
 #[derive(Clone, Debug)]
-pub(super) struct Normal {
+pub(crate) struct Normal {
     pub matrix: Vec<f64>,
     pub right: Vec<f64>,
     /// Diagonal with starts held fixed.
@@ -139,13 +141,14 @@ impl Problem<'_> {
                 follower.accelerate(&values, (&state.q, &state.v), &[], &mut a);
             }
             for (lane, segment) in segments.iter().enumerate().filter(|(_, segment)| sample < segment.samples) {
+                let own = self.sigma_of.get(segment.track).unwrap_or(&self.sigma);
                 let measured = &self.course.recording.tracks[segment.track].q[(segment.first + sample) * n..][..n];
                 for i in 0..n {
                     let at = lane * n + i;
                     let [offset, gain, delay] = sensors[i];
                     let (q, v) = (state.q[at], state.v[at]);
                     let seen = q - delay * (v - delay * a[at] / 2.0);
-                    let sigma = self.sigma[i];
+                    let sigma = own[i];
                     let residual = (measured[i] - gain * seen - offset) / sigma;
                     if derivatives {
                         let slopes = at * columns..(at + 1) * columns;

@@ -130,6 +130,7 @@ pub fn identify(
         chosen,
         sensors,
         sigma: noise.clone(),
+        sigma_of: Vec::new(),
         spread,
         robust: options.robust,
         threads: options.threads.max(1),
@@ -209,7 +210,7 @@ fn sensors(recording: &Recording, options: &IdentifyOptions) -> Result<Vec<Senso
 }
 
 /// Standard deviation of a coordinate over all samples; 1 for one that rests.
-fn spread_of(recording: &Recording, i: usize) -> f64 {
+pub(crate) fn spread_of(recording: &Recording, i: usize) -> f64 {
     let n = recording.n();
     let all = || recording.tracks.iter().flat_map(|track| track.q.iter().skip(i).step_by(n));
     let count = recording.samples().max(1) as f64;
@@ -298,7 +299,7 @@ fn log(fitted: &Fitted, what: &str) {
 
 /// As many integration steps from sample to sample as keep the integrator's error below a part of the noise; `true` if that changes
 /// their number.
-fn choose_steps(problem: &mut Problem<'_>, x: &[f64], segments: &[Segment]) -> bool {
+pub(crate) fn choose_steps(problem: &mut Problem<'_>, x: &[f64], segments: &[Segment]) -> bool {
     let before = problem.course.substeps;
     let stride = segments.len().div_ceil(32).max(1);
     let mut probes: Vec<&Segment> = segments.iter().step_by(stride).collect();
@@ -361,7 +362,7 @@ fn weigh(problem: &mut Problem<'_>, fitted: &Fitted) {
 }
 
 /// Pairs of segments that follow each other as one.
-fn joined(segments: &[Segment]) -> Vec<Segment> {
+pub(crate) fn joined(segments: &[Segment]) -> Vec<Segment> {
     let mut joined: Vec<(Segment, bool)> = Vec::new();
     for segment in segments {
         match joined.last_mut() {

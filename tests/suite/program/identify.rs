@@ -34,7 +34,8 @@ fn constants_and_friction_of_the_example_are_found_and_written() {
     let learned = lnn(&["train", &out, "--out", &text(&folder.path("run")), "--epochs", "1", "--hidden", "4"]);
     assert_eq!(learned.code, Some(0), "{}", learned.stderr);
     // A grey box takes it with its friction.
-    let known = ["fit", DATA, "--coords", "theta1,theta2", "--trajectory", "run", "--known", &out, "--epochs", "1", "--out"];
+    let known =
+        ["fit", DATA, "--coords", "theta1,theta2", "--trajectory", "run", "--known", &out, "--epochs", "1", "--out"];
     let known = lnn(&[&known[..], &[&text(&folder.path("fit"))]].concat());
     assert_eq!(known.code, Some(0), "{}", known.stderr);
 }

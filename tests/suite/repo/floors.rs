@@ -11,7 +11,7 @@ const FLOORS: [(&str, &[&str]); 6] = [
     ("learning", &["recording", "optimizers", "configuration", "data", "training", "shooting", "presets"]),
     (
         "physics",
-        &["geometry", "constraints", "symmetry", "certificate", "analysis", "relativity", "formula", "identification"],
+        &["geometry", "constraints", "symmetry", "certificate", "analysis", "relativity", "identification", "formula"],
     ),
     ("app", &["experiments", "report", "pipeline", "cli"]),
 ];

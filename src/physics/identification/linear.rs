@@ -6,7 +6,7 @@ use crate::linalg::{self, Workspace, dot};
 const RIDGE: f64 = 1e-11;
 
 /// Inverse of a symmetric matrix that is positive semi-definite.
-pub(super) fn inverse(n: usize, matrix: &[f64]) -> Option<Vec<f64>> {
+pub(crate) fn inverse(n: usize, matrix: &[f64]) -> Option<Vec<f64>> {
     inverse_with(n, matrix, RIDGE)
 }
 
@@ -29,7 +29,7 @@ pub(crate) fn times(n: usize, matrix: &[f64], x: &[f64]) -> Vec<f64> {
 }
 
 /// Rows and columns of some indices.
-pub(super) fn part(n: usize, matrix: &[f64], indices: &[usize]) -> Vec<f64> {
+pub(crate) fn part(n: usize, matrix: &[f64], indices: &[usize]) -> Vec<f64> {
     indices.iter().flat_map(|&i| indices.iter().map(move |&j| matrix[i * n + j])).collect()
 }
 
