@@ -99,4 +99,17 @@ mod tests {
         let kept = survivors(&equations, 10.0, &|x| x[1] != 0.0).unwrap();
         assert_eq!(kept.set, [0, 1, 2]);
     }
+
+    #[test]
+    fn what_the_motion_leaves_open_stays_until_a_term_goes() {
+        // y = a + b; the model has a = 2, b = 0, and the motion moves both by a little.
+        let matrix = [1e6, 1e6, 1e6, 1e6 + 0.1];
+        let equations =
+            Equations { matrix: &matrix, right: &[0.1, -0.1], coefficients: &[2.0, 0.0], complexity: &[2.0, 1.0] };
+        let all = survivors(&equations, 30.0, &|x| x[0] != 0.0 && x[1] != 0.0).unwrap();
+        assert!(all.set == [0, 1] && (all.coefficients[0] - 2.0).abs() < 0.1, "{all:?}");
+        // Of terms that cost nothing the more involved one goes.
+        let one = survivors(&equations, 30.0, &|_| true).unwrap();
+        assert!(one.set == [1] && (one.coefficients[1] - 2.0).abs() < 1e-2, "{one:?}");
+    }
 }

@@ -68,6 +68,37 @@ fn a_pendulum_is_read_off_its_swings_and_the_file_is_a_system() {
 }
 
 #[test]
+fn of_lagrangians_with_one_motion_the_definite_and_short_one_is_found() {
+    // The momentum of the cart is conserved and a total derivative: its square may be added.
+    let formula = "x_dot^2 + x_dot*a_dot*cos(a) + a_dot^2/2 + 9.81*cos(a)";
+    let cart = Mechanics::new(ExpressionLagrangian::new(&["x", "a"], &[], formula).unwrap(), Vec::<f64>::new());
+    let mut rng = RngStream::Trajectories.generator(2);
+    let mut csv = "run,t,x,a\n".to_string();
+    for (run, start) in [0.5, -1.0, 1.4, -1.8, 2.2, -2.5, 2.8, 3.0].iter().enumerate() {
+        let motion = rollout(&cart, &[0.0, *start], &[0.0; 2], &Options::new(2.0, 0.02)).complete().unwrap();
+        for (t, q) in motion.t.iter().zip(motion.q.chunks_exact(2)) {
+            let mut noisy =
+                |x: f64| x + 1e-3 * <StandardNormal as Distribution<f64>>::sample(&StandardNormal, &mut rng);
+            writeln!(csv, "{run},{t},{},{}", noisy(q[0]), noisy(q[1])).unwrap();
+        }
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("cart.csv").to_str().unwrap().to_string();
+    fs::write(&path, csv).unwrap();
+    let data = ["formula", &path, "--coords", "x,a", "--periodic", "a", "--trajectory", "run", "--json"];
+    let found = lnn(&[&data[..], &["--basis", "trigonometric:2", "--bootstraps", "4"]].concat());
+    assert_eq!(found.code, Some(0), "{}", found.stderr);
+    let found: serde_json::Value = serde_json::from_str(&found.stdout).unwrap();
+    let terms = found["terms"].as_array().unwrap().iter();
+    let terms: Vec<(&str, f64)> =
+        terms.map(|t| (t["term"].as_str().unwrap(), t["coefficient"].as_f64().unwrap())).collect();
+    let truth = [("a_dot^2", 0.25), ("x_dot^2", 0.5), ("x_dot*a_dot*cos(a)", 0.5), ("cos(a)", 4.905)];
+    assert_eq!(terms.len(), truth.len(), "{terms:?}");
+    let near = |(term, c): &(&str, f64)| terms.iter().any(|(t, x)| t == term && (x / c - 1.0).abs() < 0.02);
+    assert!(truth.iter().all(near), "{terms:?}");
+}
+
+#[test]
 fn a_formula_with_friction_is_a_system_that_loses_energy() {
     const DAMPED: &str = "name = \"damped\"\nlagrangian = \"a_dot^2/2 + 4*cos(a)\"\ndissipation = \"0.1*a_dot^2\"\n\
         [[coordinates]]\nname = \"a\"\nunit = \"rad\"\nperiodic = true\nvelocity_bounds = [-9, 9]\n";
