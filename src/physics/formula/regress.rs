@@ -82,20 +82,18 @@ pub fn formula_of_model(
     let held_out = |block: usize| block % HELD_OUT == 0;
     let search = |windows: &Windows, start: &[f64]| eliminate_backward(windows, start, &sigma, &complexity, &held_out);
     // Its own motion, which holds nothing of the mass matrix but what moves it.
-    let weights = weights(&known, &sigma);
-    let moving = known.iter().zip(&weights).map(|(Asked { q, v, own, .. }, &weight)| {
+    let moving = known.iter().map(|Asked { q, v, own, .. }| {
         let (q, v, a) = (q.clone(), v.clone(), own.clone());
-        State { q, v, a, equation: Vec::new(), weight }
+        State { q, v, a, equation: Vec::new() }
     });
     let motion = Windows::of_states(&library, &kept, &moving.collect::<Vec<_>>());
     let masses = mass_coefficients(&library, &kept, &known);
     let asked: Vec<State> = known
         .into_iter()
-        .zip(weights)
-        .map(|(Asked { q, v, mass, own }, weight)| {
+        .map(|Asked { q, v, mass, own }| {
             let a: Vec<f64> = (0..n).map(|i| own[i] + 2.0 * sigma[i] * (rng.random::<f64>() - 0.5)).collect();
             let difference: Vec<f64> = a.iter().zip(&own).map(|(a, own)| a - own).collect();
-            State { equation: times(n, &mass, &difference), q, v, a, weight }
+            State { equation: times(n, &mass, &difference), q, v, a }
         })
         .collect();
     let windows = Windows::of_states(&library, &kept, &asked);
@@ -140,19 +138,6 @@ pub fn formula_of_model(
     found.rescale(options.scale.as_ref())?;
     found.name_constants();
     Ok(found)
-}
-
-/// Weights of states, so that a few huge accelerations do not outweigh the others: errors count by the usual acceleration with that of
-/// the state; weighted accelerations have the mean square of those that are not.
-fn weights(known: &[Asked], sigma: &[f64]) -> Vec<f64> {
-    let size = |k: &Asked| k.own.iter().zip(sigma).map(|(a, s)| (a / s).powi(2)).sum::<f64>().sqrt();
-    let sizes: Vec<f64> = known.iter().map(size).collect();
-    let mut sorted = sizes.clone();
-    sorted.sort_by(f64::total_cmp);
-    let usual = sorted[sorted.len() / 2].max(1e-9);
-    let square = sizes.iter().map(|size| (size / (usual + size)).powi(2)).sum::<f64>() / sizes.len() as f64;
-    let factor = (sigma.len() as f64 / square.max(1e-300)).sqrt();
-    sizes.iter().map(|size| factor / (usual + size)).collect()
 }
 
 /// Coefficients with which kinetic terms make up the mass matrices of a model, every element in units of its coordinates' usual ones.

@@ -22,8 +22,6 @@ pub(super) struct State {
     pub v: Vec<f64>,
     pub a: Vec<f64>,
     pub equation: Vec<f64>,
-    /// Factor of its errors.
-    pub weight: f64,
 }
 
 /// The weak form of all terms over many test functions.
@@ -157,17 +155,17 @@ impl Windows {
         let which = library.functions_of(terms);
         let mut values = Values::new();
         let mut single = vec![0.0; n];
-        for (block, State { q, v, a, equation, weight }) in states.iter().enumerate() {
+        for (block, State { q, v, a, equation }) in states.iter().enumerate() {
             library.evaluate(&which, q, &mut values);
             let start = windows.equations.len();
             windows.equations.resize(start + n * count, 0.0);
             for (at, &k) in terms.iter().enumerate() {
                 single.fill(0.0);
                 library.add_equation(k, 1.0, &values, (v, a), &mut single);
-                (0..n).for_each(|i| windows.equations[start + i * count + at] = weight * single[i]);
+                (0..n).for_each(|i| windows.equations[start + i * count + at] = single[i]);
             }
             windows.functions.extend(which.iter().map(|&f| values[f].value));
-            windows.forces.extend(equation.iter().map(|x| weight * x));
+            windows.forces.extend(equation);
             windows.blocks.push(block);
         }
         windows
