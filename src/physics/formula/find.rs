@@ -528,7 +528,7 @@ fn shorten(
             search.motion.pin(model, &model.terms, segments, &mut sum);
         }
         let own: Vec<Option<usize>> = model.terms.iter().map(|k| quotient.kept.iter().position(|t| t == k)).collect();
-        let mut best: Option<(f64, Vec<usize>, Vec<usize>, Vec<f64>)> = None;
+        let mut best: Option<(f64, Vec<usize>, Model)> = None;
         for (term, over) in quotient.over_kept.iter().enumerate() {
             let Some(over) = over.as_ref().filter(|_| !model.terms.contains(&term)) else { continue };
             // The new term over the model's own, if it is made up of them.
@@ -555,13 +555,13 @@ fn shorten(
             let better = cost < THRESHOLD * inflation && best.as_ref().is_none_or(|(least, ..)| cost < *least);
             let terms: Vec<usize> = rest.iter().map(|&k| model.terms[k]).chain([term]).collect();
             if better && search.regular(model, (&terms, &x)) {
-                best = Some((cost, terms, gone, x));
+                best = Some((cost, gone, Model { terms, coefficients: x }));
             }
         }
-        let Some((_, terms, gone, coefficients)) = best else { return replaced };
+        let Some((_, gone, shorter)) = best else { return replaced };
         let old = gone.iter().flat_map(|&k| replaced.get(&model.terms[k]).cloned().unwrap_or(vec![model.terms[k]]));
-        replaced.insert(terms[terms.len() - 1], old.collect());
-        *model = Model { terms, coefficients };
+        replaced.insert(shorter.terms[shorter.terms.len() - 1], old.collect());
+        *model = shorter;
         search.motion.fit(model, segments, PASSES);
     }
 }

@@ -79,8 +79,7 @@ pub fn formula_of_model(
     }
     let (kept, quotient) = library.independent(&bounds, options.seed);
     let complexity: Vec<f64> = kept.iter().map(|&k| library.complexity(k)).collect();
-    let held_out = |block: usize| block % HELD_OUT == 0;
-    let search = |windows: &Windows, start: &[f64]| eliminate_backward(windows, start, &sigma, &complexity, &held_out);
+    let search = |windows: &Windows, start: &[f64]| eliminate_backward(windows, start, &sigma, &complexity, &judges);
     // Its own motion, which holds nothing of the mass matrix but what moves it.
     let moving = known.iter().map(|Asked { q, v, own, .. }| {
         let (q, v, a) = (q.clone(), v.clone(), own.clone());
@@ -169,9 +168,14 @@ fn mass_coefficients(library: &Library, kept: &[usize], known: &[Asked]) -> Opti
     Some(coefficients)
 }
 
+/// `true` for a state that judges alone.
+fn judges(block: usize) -> bool {
+    block.is_multiple_of(HELD_OUT)
+}
+
 /// A choice of terms with the coefficients that the motion of the model asks for; in directions that it leaves open the mass matrix decides.
 fn refit((motion, windows): (&Windows, &Windows), mut choice: Choice, sigma: &[f64]) -> Choice {
-    let held_out: Vec<bool> = motion.blocks.iter().map(|&block| block % HELD_OUT == 0).collect();
+    let held_out: Vec<bool> = motion.blocks.iter().map(|&block| judges(block)).collect();
     let learned: Vec<bool> = held_out.iter().map(|held| !held).collect();
     let (set, m) = (choice.set.clone(), choice.set.len());
     let principal = |matrix: &[f64]| {

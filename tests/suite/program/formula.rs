@@ -74,11 +74,12 @@ fn of_lagrangians_with_one_motion_the_definite_and_short_one_is_found() {
     let cart = Mechanics::new(ExpressionLagrangian::new(&["x", "a"], &[], formula).unwrap(), Vec::<f64>::new());
     let mut rng = RngStream::Trajectories.generator(2);
     let mut csv = "run,t,x,a\n".to_string();
-    for (run, start) in [0.5, -1.0, 1.4, -1.8, 2.2, -2.5, 2.8, 3.0].iter().enumerate() {
-        let motion = rollout(&cart, &[0.0, *start], &[0.0; 2], &Options::new(2.0, 0.02)).complete().unwrap();
+    let starts = [0.5, -1.0, 1.4, -1.8, 2.2, -2.5, 2.8, 3.0, 0.9, -0.6, -2.1, 1.7];
+    for (run, start) in starts.iter().enumerate() {
+        let motion = rollout(&cart, &[0.0, *start], &[0.0; 2], &Options::new(3.0, 0.01)).complete().unwrap();
         for (t, q) in motion.t.iter().zip(motion.q.chunks_exact(2)) {
             let mut noisy =
-                |x: f64| x + 1e-3 * <StandardNormal as Distribution<f64>>::sample(&StandardNormal, &mut rng);
+                |x: f64| x + 1e-2 * <StandardNormal as Distribution<f64>>::sample(&StandardNormal, &mut rng);
             writeln!(csv, "{run},{t},{},{}", noisy(q[0]), noisy(q[1])).unwrap();
         }
     }
@@ -94,7 +95,7 @@ fn of_lagrangians_with_one_motion_the_definite_and_short_one_is_found() {
         terms.map(|t| (t["term"].as_str().unwrap(), t["coefficient"].as_f64().unwrap())).collect();
     let truth = [("a_dot^2", 0.25), ("x_dot^2", 0.5), ("x_dot*a_dot*cos(a)", 0.5), ("cos(a)", 4.905)];
     assert_eq!(terms.len(), truth.len(), "{terms:?}");
-    let near = |(term, c): &(&str, f64)| terms.iter().any(|(t, x)| t == term && (x / c - 1.0).abs() < 0.02);
+    let near = |(term, c): &(&str, f64)| terms.iter().any(|(t, x)| t == term && (x / c - 1.0).abs() < 0.05);
     assert!(truth.iter().all(near), "{terms:?}");
 }
 
