@@ -41,6 +41,7 @@ macro_rules! page {
             "[recorded-motion]: crate::docs::recorded_motion\n",
             "[recorded]: crate::docs::recorded_motion#ways-to-learn\n",
             "[by-forces]: crate::docs::recorded_motion#residuals-of-force\n",
+            "[tube]: crate::docs::recorded_motion#tubes\n",
             "[structures]: crate::docs::structures\n",
             "[grey-boxes]: crate::docs::structures#grey-boxes\n",
             "[ranges]: crate::docs::recorded_motion#how-well-the-data-determine-the-model\n",

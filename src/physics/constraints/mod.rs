@@ -32,6 +32,10 @@ pub const MOST_DEGREE: usize = 8;
 pub const EXAMINED_STATES: usize = 64;
 /// A row beside others whose part outside of them is, root mean square, below this share follows from them.
 const OUTSIDE: f64 = 0.15;
+/// Share of the states at which a combination has a part outside of what holds the motion, and how large that has to be: of functions that
+/// vanish, and of what is looked for beside them, where their noise is still about.
+const IMPOSED: (f64, f64) = (0.1, 0.1);
+const BESIDE: (f64, f64) = (0.5, OUTSIDE);
 /// States at which gradients are compared.
 const PLACES: usize = 64;
 /// The same for whether they stay independent, for which it takes a state near one where they do not.
@@ -162,17 +166,17 @@ pub fn find_constraints(
     }
     let mut held = Held::at(samples, PLACES);
     let vanishing = Vanishing::of(samples, &of_positions, false, 1.0);
-    let functions = held.take(samples, &of_positions, vanishing.generators(0), false);
+    let functions = held.take(samples, &of_positions, vanishing.generators(0), false, IMPOSED);
     let functions = exchanged(samples, &of_positions, functions, &vanishing);
     let conserved = if samples.trajectories() > 1 {
         let constant = Vanishing::of(samples, &of_positions, true, 1.0);
-        held.take(samples, &of_positions, constant.generators(0), false)
+        held.take(samples, &of_positions, constant.generators(0), false, BESIDE)
     } else {
         Vec::new()
     };
     let by_functions = held.bases.clone();
     let moving = Vanishing::of(samples, &of_velocities, false, samples.shared());
-    let moving = held.take(samples, &of_velocities, moving.generators(0), true);
+    let moving = held.take(samples, &of_velocities, moving.generators(0), true, BESIDE);
     let rows: Vec<&[f64]> = moving.iter().map(|generator| generator.weights.as_slice()).collect();
     let integrable = integrable(&of_velocities, samples, &rows, (&held, by_functions));
     let mut constraints = Vec::new();
@@ -218,6 +222,7 @@ impl Held {
         features: &Features,
         generators: Vec<Generator>,
         velocities: bool,
+        imposed: (f64, f64),
     ) -> Vec<Generator> {
         let row = |generator: &Generator, at: usize| match velocities {
             true => features.velocity_row(samples, at, &generator.weights),
@@ -228,7 +233,7 @@ impl Held {
             (generator, rows)
         };
         let mut left: Vec<(Generator, Vec<Vec<f64>>)> = generators.into_iter().map(rows).collect();
-        let (rank, mut taken) = (self.rank(samples.n(), &left), Vec::new());
+        let (rank, mut taken) = (self.rank(samples.n(), &left, imposed), Vec::new());
         while taken.len() < rank {
             let parts: Vec<f64> = left.iter().map(|(_, rows)| self.outside(rows)).collect();
             let most = parts.iter().fold(0.0, |most: f64, part| most.max(*part));
@@ -246,9 +251,9 @@ impl Held {
         taken
     }
 
-    /// How many directions all of the generators that hold have outside of what holds the motion already, at a tenth of the places. Those
+    /// How many directions all of the generators that hold have outside of what holds the motion already, at a share of the places. Those
     /// taken one after the other may nearly depend on each other somewhere, and noise would be taken for one more there.
-    fn rank(&self, n: usize, generators: &[(Generator, Vec<Vec<f64>>)]) -> usize {
+    fn rank(&self, n: usize, generators: &[(Generator, Vec<Vec<f64>>)], (share, part): (f64, f64)) -> usize {
         let holding: Vec<_> = generators.iter().filter(|(generator, _)| generator.holds).collect();
         let at = |place: usize| {
             let mut sum = vec![0.0; n * n];
@@ -260,11 +265,11 @@ impl Held {
             }
             let (mut squares, mut directions) = (vec![0.0; n], vec![0.0; n * n]);
             let solved = eigh(n, &sum, &mut squares, &mut directions, &mut Workspace::new());
-            solved.map_or(0, |()| squares.iter().filter(|square| **square >= 0.5 * OUTSIDE * OUTSIDE).count())
+            solved.map_or(0, |()| squares.iter().filter(|square| **square >= part * part).count())
         };
         let mut ranks: Vec<usize> = (0..self.places.len()).map(at).collect();
         ranks.sort_unstable();
-        ranks.get(ranks.len() * 9 / 10).copied().unwrap_or(0)
+        ranks.get(((1.0 - share) * ranks.len() as f64) as usize).copied().unwrap_or(0)
     }
 
     /// Root mean square part of vectors at unit length outside of what holds the motion; 0 where a vector vanishes.

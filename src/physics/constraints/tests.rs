@@ -98,7 +98,7 @@ fn what_holds_a_rotation_holds_it_about_every_axis() {
     let features = Features::of_positions(&samples, 2);
     let vanishing = Vanishing::of(&samples, &features, false, 1.0);
     let mut held = Held::at(&samples, PLACES);
-    let simplest = held.take(&samples, &features, vanishing.generators(0), false);
+    let simplest = held.take(&samples, &features, vanishing.generators(0), false, IMPOSED);
     let taken = exchanged(&samples, &features, simplest.clone(), &vanishing);
     assert_eq!((simplest.len(), taken.len()), (6, 6));
     // Orthonormal columns of unit gradients at a turn about the vertical.

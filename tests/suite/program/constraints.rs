@@ -172,12 +172,15 @@ fn recorded_motion_is_learned_under_constraints_that_were_found_or_given() {
     assert!(off_the_rod(&folder, &run) < 1e-12);
     let config = fs::read_to_string(folder.path("run/config.toml")).unwrap();
     assert!(config.contains("[constraints]") && config.contains("rod = \"x^2 + y^2 - 1\""), "{config}");
+    // Through the motion too.
+    fit(&["--constraints", "find", "--targets", "motion", "--shooting-epochs", "2"]).succeeded();
+    assert!(folder.path("run/shooting.csv").exists() && off_the_rod(&folder, &run) < 1e-6);
     // Without constraints nothing is said of them.
     fit(&["--constraints", "none"]).succeeded();
     let summary = json(&fs::read_to_string(folder.path("run/summary.json")).unwrap());
     assert!(summary.get("constraints").is_none());
 
-    // What the motion does not obey, mistakes, contradictions, no motion left, and shooting are refused.
+    // What the motion does not obey, mistakes, contradictions, and no motion left are refused.
     let table = |formulas: &str| folder.file("wrong.toml", format!("[constraints]\n{formulas}\n"));
     for (formulas, parts) in [
         ("rod = \"x^2 + y^2 - 2\"", "does not obey"),
@@ -187,7 +190,6 @@ fn recorded_motion_is_learned_under_constraints_that_were_found_or_given() {
     ] {
         fit(&["--constraints", &table(formulas)]).refused(2, &[parts]);
     }
-    fit(&["--constraints", "find", "--targets", "motion"]).refused(2, &["multiple shooting"]);
     fit(&["--constraints", "nowhere.toml"]).refused(1, &["nowhere.toml"]);
 }
 

@@ -177,7 +177,7 @@ fn numbers_of_motions_are_bounded() {
     let rollout =
         ["rollout", "--system", "double-pendulum", "--out", &out, "--overwrite", "--t-end", "1", "--dt", "0.1"];
     let rollout = [&rollout[..], &["--state", "0.6,0.9,0,0"]].concat();
-    for option in ["--t-end", "--t-start", "--dt", "--rtol", "--atol"] {
+    for option in ["--t-end", "--t-start", "--dt", "--rtol", "--atol", "--tube"] {
         every_value(&rollout, option, &plain);
     }
     every_value(&rollout, "--state", &|value| format!("{value},0.9,0,0"));
