@@ -41,7 +41,7 @@ fn every_value(base: &[&str], option: &str, form: &dyn Fn(&str) -> String) {
 }
 
 /// Options of the commands below that take no number.
-const WORDS: [&str; 51] = [
+const WORDS: [&str; 52] = [
     "acceleration",
     "activation",
     "beside",
@@ -83,6 +83,7 @@ const WORDS: [&str; 51] = [
     "time",
     "timelike",
     "trajectory",
+    "tube-data",
     "units",
     "velocities",
     "velocity",
