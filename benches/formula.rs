@@ -6,7 +6,7 @@
 //! `--part forces` under known forces at 0.06, `--part clean` other systems without noise and with 1e-3, `--part cart-poles` a damped
 //! double cart-pole, `--part outside` systems that the library does not hold, `--part arms` recorded pendula of one, two and three arms (DynamicsLab, University
 //! of Washington), if `--arms DIRECTORY` or `../shared/data/multi-arm-pendulum` has their files, `--part metrics` metrics
-//! of networks that it trains by the preset `quick`. `--seeds 3` takes fewer seeds, `--only NAME`
+//! of networks that it trains by the preset `quick` as metrics, `L = v^T g(q) v/2`, or with `--black-box` as any function. `--seeds 3` takes fewer seeds, `--only NAME`
 //! one system, `--show` prints the formulas. Everything is written to `target/formula/PART.csv` as well. Times are
 //! processor times.
 
@@ -16,6 +16,7 @@ mod cases;
 use cases::{CART_POLES, CLEAN, Case, FRICTION, METRICS, Metric, OUTSIDE, POSITIONS, Recorded};
 use lnn::formula::{FormulaOptions, FoundFormula, Verdict, formula_of_model, formula_of_motion};
 use lnn::lagrangian::configure;
+use lnn::network::Structure;
 use lnn::presets::Preset;
 use lnn::recording::Columns;
 use lnn::recording::read::read_recording;
@@ -228,10 +229,10 @@ fn arms(folder: &Path, only: &str) {
 /// States at which a model is asked.
 const STATES: usize = 1500;
 
-/// The metric of a network of the preset `quick` as a formula, for one seed.
-fn metric(case: &Metric, seed: u64, show: bool) {
+/// The metric of a network of this structure, trained by the preset `quick`, as a formula, for one seed.
+fn metric(case: &Metric, structure: Structure, seed: u64, show: bool) {
     let system = configure::<f64>(case.name, &[]).expect("a system of the catalogue");
-    let mut config = Preset::Quick.config(&system).expect("every system has a quick preset");
+    let mut config = Preset::Quick.config_of(&system, structure).expect("every system has a quick preset");
     config.seed = seed;
     let model = train::<f32>(&config, 2, &Hooks::default()).expect("a training").model.cast::<f64>();
     let n = system.coordinates;
@@ -261,8 +262,9 @@ fn metric(case: &Metric, seed: u64, show: bool) {
     let found = formula_of_model(&model, (&names, &periodic), (&q, &v), &options).expect("a library");
     let (right, error) = judge(case.truth, &found, false);
     println!(
-        "{:24} seed {seed}: right {right}, {:?}, constants within {:.3} %, residual {:.4}, {:.1} s",
+        "{:24} {} seed {seed}: right {right}, {:?}, constants within {:.3} %, residual {:.4}, {:.1} s",
         case.name,
+        structure.name(),
         found.verdict,
         100.0 * error,
         found.residual,
@@ -287,12 +289,14 @@ pub fn trial() {
 fn main() {
     let mut arguments = std::env::args().skip(1);
     let (mut parts, mut seeds, mut only, mut show) = (PARTS.map(String::from).to_vec(), 10, String::new(), false);
+    let mut structure = Structure::Metric;
     let mut folder_of_arms = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/data/multi-arm-pendulum");
     parts.extend(["arms", "metrics"].map(String::from));
     while let Some(argument) = arguments.next() {
         match argument.as_str() {
             "--bench" => {}
             "--show" => show = true,
+            "--black-box" => structure = Structure::BlackBox,
             "--part" => {
                 let known = arguments.next().filter(|part| parts.contains(part));
                 parts = vec![known.unwrap_or_else(|| panic!("--part: expected one of {}", parts.join(", ")))];
@@ -313,7 +317,7 @@ fn main() {
         }
         if part == "metrics" {
             for case in METRICS.iter().filter(|case| case.name.contains(&only)) {
-                (0..seeds).for_each(|seed| metric(case, seed, show));
+                (0..seeds).for_each(|seed| metric(case, structure, seed, show));
             }
             continue;
         }

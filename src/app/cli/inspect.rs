@@ -115,7 +115,7 @@ fn inspect<S: Scalar>(args: &Args) -> Result<(), CliError> {
         let outcome = model.terms(q, v, Request::ALL, &mut terms);
         let failed = terms.drain_failures(outcome).map_err(|error| CliError::data(format_args!("{place}: {error}")))?;
         let spectrum = spectrum(n, &terms.mass_matrix);
-        let held = Held::of(model.as_ref(), q, v, &terms);
+        let held = ConstrainedState::of(model.as_ref(), q, v, &terms);
         let mut failed = failed.into_iter().peekable();
         for (k, &row) in rows.iter().enumerate() {
             let problem = failed.next_if(|failure| failure.row() == Some(k)).map(explain);
@@ -167,7 +167,7 @@ fn spectrum<S: Scalar>(n: usize, matrices: &[S]) -> Vec<S> {
 
 /// What constraints say of a state, and where its Lagrangian is degenerate.
 #[derive(Default)]
-struct Held<S> {
+struct ConstrainedState<S> {
     /// `phi(q)`, and `A v - b`.
     values: Vec<S>,
     rates: Vec<S>,
@@ -182,7 +182,7 @@ const STATES: usize = 24;
 /// An eigenvalue below so many roundings of the largest counts as zero.
 const ROUNDINGS: f64 = 1024.0;
 
-impl<S: Scalar> Held<S> {
+impl<S: Scalar> ConstrainedState<S> {
     /// Of every state of a batch.
     fn of(model: &dyn EulerLagrange<S>, q: &[S], v: &[S], terms: &Terms<S>) -> Vec<Self> {
         let (n, m) = (model.coordinates(), terms.constraints);
@@ -214,7 +214,7 @@ fn fields<'a, S>(
     k: usize,
     terms: &'a Terms<S>,
     spectrum: &'a [S],
-    held: &'a Held<S>,
+    held: &'a ConstrainedState<S>,
     factor: Option<&'a S>,
 ) -> Vec<Field<'a, S>> {
     let part = |values: &'a [S], size: usize| values.get(k * size..(k + 1) * size).unwrap_or(&[]);

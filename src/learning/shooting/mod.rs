@@ -30,7 +30,7 @@ mod objective;
 mod segments;
 mod settings;
 mod starts;
-mod surface;
+mod starts_allowed;
 
 #[doc(hidden)]
 pub use fit::resume;

@@ -14,7 +14,7 @@ use crate::linalg::{Workspace, solve};
 use crate::network::{Dynamics, Model};
 use crate::scalar::{Real, Scalar};
 use crate::tape::{Depth, MixedDirections};
-use crate::training::held::Held;
+use crate::training::constrained_motion::ConstrainedMotion;
 use crate::training::violations::Violations;
 use std::sync::Arc;
 
@@ -35,7 +35,7 @@ pub(super) struct Motion<S> {
     violation: Violation<S>,
     /// Constraints, if there are any, and their rows at the states evaluated last.
     manifold: Option<Arc<dyn Manifold<S>>>,
-    held: Held<S>,
+    held: ConstrainedMotion<S>,
     rows: ManifoldRows<S>,
     pull: Vec<S>,
 }
@@ -56,7 +56,7 @@ impl<S: Scalar> Motion<S> {
             signature: Buffers::default(),
             violation: Violation::default(),
             manifold,
-            held: Held::default(),
+            held: ConstrainedMotion::default(),
             rows: ManifoldRows::default(),
             pull: Vec::new(),
         }

@@ -11,7 +11,7 @@ use crate::network::Architecture;
 use crate::recording::hermite;
 use crate::rollout::SampledForce;
 use crate::scalar::{Real, Scalar};
-use crate::shooting::surface::Surface;
+use crate::shooting::starts_allowed::StartsAllowed;
 use std::f64::consts::TAU;
 use std::ops::Range;
 use std::sync::Arc;
@@ -78,7 +78,7 @@ pub struct Segments<S> {
     /// Estimated starts, `(segments, 2, n)`.
     starts: Vec<S>,
     /// The constraints that starts obey.
-    pub(super) surface: Option<Surface<S>>,
+    pub(super) allowed: Option<StartsAllowed<S>>,
 }
 
 /// Samples of one track that one segment owns, and whether it is followed by another.
@@ -134,7 +134,7 @@ impl<S: Scalar> Segments<S> {
             tau: Vec::new(),
             range: Vec::new(),
             starts: Vec::new(),
-            surface: None,
+            allowed: None,
         };
         // Largest excursion within a segment and speed, physical.
         let mut largest = vec![0.0_f64; 2 * n];
@@ -165,9 +165,9 @@ impl<S: Scalar> Segments<S> {
 
     /// The same under constraints, to which the starts are brought.
     pub fn under(mut self, architecture: &Architecture, manifold: Arc<dyn Manifold<S>>) -> Self {
-        let surface = Surface::new(architecture, manifold);
-        self.starts.chunks_exact_mut(2 * self.n).for_each(|start| surface.bring(start));
-        self.surface = Some(surface);
+        let allowed = StartsAllowed::new(architecture, manifold);
+        self.starts.chunks_exact_mut(2 * self.n).for_each(|start| allowed.bring(start));
+        self.allowed = Some(allowed);
         self
     }
 

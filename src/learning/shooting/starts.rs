@@ -186,8 +186,8 @@ impl<S: Scalar> Curvature<S> {
                 continue;
             }
             // A start whose curvature says nothing stays.
-            let step = match &segments.surface {
-                Some(surface) => surface.step(start, h, g, &mut self.workspace),
+            let step = match &segments.allowed {
+                Some(allowed) => allowed.step(start, h, g, &mut self.workspace),
                 None => {
                     let solved = solve(width, h, g, &mut self.correction, &mut self.workspace);
                     solved.is_ok().then(|| self.correction.clone())
@@ -200,8 +200,8 @@ impl<S: Scalar> Curvature<S> {
             for (x, &d) in start.iter_mut().zip(&step) {
                 *x -= share / excess * d;
             }
-            if let Some(surface) = &segments.surface {
-                surface.bring(start);
+            if let Some(allowed) = &segments.allowed {
+                allowed.bring(start);
             }
         }
     }

@@ -1,8 +1,8 @@
 //! Training: losses, penalties, the solvers hosted by argmin, checkpoints.
 
 pub(crate) mod checkpoint;
+pub(crate) mod constrained_motion;
 pub(crate) mod epoch;
-pub(crate) mod held;
 mod lbfgs;
 pub(crate) mod learner;
 mod memory;

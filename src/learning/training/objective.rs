@@ -27,7 +27,7 @@ use crate::linalg::{SignatureBuffers as Buffers, Violation, Workspace, character
 use crate::network::{Architecture, Dynamics, Model};
 use crate::scalar::{Real, Scalar, Sum};
 use crate::tape::{Depth, MixedDirections, STATES};
-use crate::training::held::Held;
+use crate::training::constrained_motion::ConstrainedMotion;
 use crate::training::reduction::sum_gradients;
 use crate::training::violations::Violations;
 use rayon::prelude::*;
@@ -100,7 +100,7 @@ struct Shard<S> {
     workspace: Workspace<S>,
     signature: Buffers<S>,
     violation: Violation<S>,
-    held: Held<S>,
+    held: ConstrainedMotion<S>,
     /// `|M_ii|` of every state, `(states, n)`, and the states whose signature is in doubt with their matrices.
     diagonal: Vec<S>,
     suspects: Vec<usize>,
@@ -126,7 +126,7 @@ impl<S: Scalar> Shard<S> {
             workspace: Workspace::new(),
             signature: Buffers::default(),
             violation: Violation::default(),
-            held: Held::default(),
+            held: ConstrainedMotion::default(),
             diagonal: Vec::new(),
             suspects: Vec::new(),
             suspect_matrices: Vec::new(),

@@ -30,9 +30,9 @@ impl Equations {
     pub fn record(instance: &SystemInstance<f64>, chosen: &[usize]) -> Result<Option<Self>, TapeError> {
         let (n, count) = (instance.coordinates, instance.parameters.len());
         let Some(value) = instance.visit(Value { parameters: count }).transpose()? else { return Ok(None) };
-        let mut parts = vec![Part { value: RecordedValue { value }, friction: false }];
+        let mut parts = vec![EquationPart { value: RecordedValue { value }, friction: false }];
         if let Some(dissipation) = instance.dissipation() {
-            parts.push(Part::record(dissipation, count, true)?);
+            parts.push(EquationPart::record(dissipation, count, true)?);
         }
         Self::of(n, count, &parts, (chosen, &[])).map(Some)
     }
@@ -42,7 +42,12 @@ impl Equations {
     ///
     /// # Errors
     /// [`TapeError`] for parts that branch on their data.
-    pub fn of(n: usize, count: usize, parts: &[Part], (chosen, terms): (&[usize], &[Part])) -> Result<Self, TapeError> {
+    pub fn of(
+        n: usize,
+        count: usize,
+        parts: &[EquationPart],
+        (chosen, terms): (&[usize], &[EquationPart]),
+    ) -> Result<Self, TapeError> {
         let motion = Program::record(2 * n, count, |x, p| {
             let (q, v) = x.split_at(n);
             let zero = Tracer::zero();
@@ -109,12 +114,12 @@ impl Equations {
 
 /// A recorded function of state and parameters: a part of the Lagrangian, or of the dissipation function.
 #[derive(Debug)]
-pub struct Part {
+pub struct EquationPart {
     value: RecordedValue<f64>,
     friction: bool,
 }
 
-impl Part {
+impl EquationPart {
     /// Records a function of `parameters` parameters, a part of the dissipation function if it is `friction`.
     ///
     /// # Errors
@@ -140,7 +145,7 @@ impl LagrangianVisitor for Value {
 /// The residual `r` without `Q`, a function of `(q, v, a, p)`.
 struct Equation<'a> {
     n: usize,
-    parts: &'a [Part],
+    parts: &'a [EquationPart],
 }
 
 impl VectorFunction for Equation<'_> {
@@ -162,7 +167,7 @@ impl VectorFunction for Equation<'_> {
         let (mut still_q, mut still_v) = (still(q), still(v));
         for (i, out) in out.iter_mut().enumerate() {
             *out = R::zero();
-            for Part { value, friction } in self.parts {
+            for EquationPart { value, friction } in self.parts {
                 if *friction {
                     still_v[i].s = R::one();
                     *out += value.lagrangian(&p, &still_q, &still_v).s;

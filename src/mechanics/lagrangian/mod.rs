@@ -25,8 +25,10 @@ pub use configure::{SystemError, SystemInstance, configure, find, systems};
 #[doc(hidden)]
 pub use configure::{build, configure_system, configure_values};
 pub use constrained_systems::constrained_systems;
+#[cfg(feature = "data")]
+pub(crate) use constraints::take_out;
 #[cfg(feature = "training")]
-pub(crate) use constraints::{Bordered, independent_rows, take_out};
+pub(crate) use constraints::{Bordered, independent_rows};
 pub use constraints::{
     Constrained, ConstraintError, Constraints, ExpressionConstraints, FormulaConstraints, FormulaError,
 };
@@ -41,7 +43,7 @@ pub(crate) use derivatives::metric_jets;
 pub(crate) use description::pair;
 pub use description::{Description, DescriptionError};
 #[cfg(feature = "training")]
-pub(crate) use equations::{Equations, Part};
+pub(crate) use equations::{EquationPart, Equations};
 pub use error::MechanicsError;
 #[doc(hidden)]
 pub use euler_lagrange::{ForceParts, InverseDynamics, force_parts, inverse_dynamics};

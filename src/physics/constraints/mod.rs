@@ -17,7 +17,7 @@ mod tests;
 pub use examine::{ExaminedLagrangian, OwnConstraint, examine};
 pub use samples::MotionSamples;
 
-use crate::lagrangian::ReducedMass;
+use crate::lagrangian::{ReducedMass, take_out};
 use crate::linalg::{Workspace, dot, eigh};
 use features::Features;
 use generators::{Generator, Vanishing};
@@ -164,7 +164,7 @@ pub fn find_constraints(
             return Err(ConstraintSearchError::Samples { terms: found, found: samples.len(), needed });
         }
     }
-    let mut held = Held::at(samples, PLACES);
+    let mut held = RowsTaken::at(samples, PLACES);
     let vanishing = Vanishing::of(samples, &of_positions, false, 1.0);
     let functions = held.take(samples, &of_positions, vanishing.generators(0), false, IMPOSED);
     let functions = exchanged(samples, &of_positions, functions, &vanishing);
@@ -199,7 +199,7 @@ pub fn find_constraints(
 }
 
 /// What holds the motion at some samples.
-struct Held {
+struct RowsTaken {
     places: Vec<usize>,
     /// Orthonormal rows at each place.
     bases: Vec<Vec<f64>>,
@@ -207,7 +207,7 @@ struct Held {
     refuted: usize,
 }
 
-impl Held {
+impl RowsTaken {
     /// Nothing yet.
     fn at(samples: &MotionSamples, places: usize) -> Self {
         let places = samples.places(places);
@@ -352,15 +352,10 @@ fn least_part<'a>(rows: impl Iterator<Item = &'a [f64]>) -> f64 {
     least
 }
 
-/// What a vector is beside orthonormal rows, taken out twice, since once leaves rounding.
+/// What a vector is beside orthonormal rows.
 fn beside(basis: &[f64], vector: &[f64]) -> Vec<f64> {
     let mut rest = vector.to_vec();
-    for _ in 0..2 {
-        for row in basis.chunks_exact(vector.len()) {
-            let along = dot(row, &rest);
-            rest.iter_mut().zip(row).for_each(|(x, a)| *x -= along * a);
-        }
-    }
+    take_out(&mut rest, basis);
     rest
 }
 
@@ -376,7 +371,7 @@ fn integrable(
     features: &Features,
     samples: &MotionSamples,
     rows: &[&[f64]],
-    (held, by_functions): (&Held, Vec<Vec<f64>>),
+    (held, by_functions): (&RowsTaken, Vec<Vec<f64>>),
 ) -> Vec<bool> {
     let (mut left, mut bases) = (vec![true; rows.len()], held.bases.clone());
     loop {

@@ -97,7 +97,7 @@ fn what_holds_a_rotation_holds_it_about_every_axis() {
     let samples = MotionSamples::of(&recording, &SmoothOptions::default()).unwrap();
     let features = Features::of_positions(&samples, 2);
     let vanishing = Vanishing::of(&samples, &features, false, 1.0);
-    let mut held = Held::at(&samples, PLACES);
+    let mut held = RowsTaken::at(&samples, PLACES);
     let simplest = held.take(&samples, &features, vanishing.generators(0), false, IMPOSED);
     let taken = exchanged(&samples, &features, simplest.clone(), &vanishing);
     assert_eq!((simplest.len(), taken.len()), (6, 6));
@@ -187,7 +187,7 @@ fn a_row_beside_others_is_integrable_by_itself_or_not_at_all() {
     };
     let along = row(&[("cos(theta)*x_dot", 1.0), ("sin(theta)*y_dot", 1.0), ("phi_dot", -0.5)]);
     let across = row(&[("sin(theta)*x_dot", 1.0), ("cos(theta)*y_dot", -1.0)]);
-    let mut held = Held::at(&samples, PLACES);
+    let mut held = RowsTaken::at(&samples, PLACES);
     let none = held.bases.clone();
     for weights in [&along, &across] {
         assert_eq!(weights.iter().filter(|weight| **weight != 0.0).count(), if weights == &along { 3 } else { 2 });

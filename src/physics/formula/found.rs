@@ -174,7 +174,8 @@ impl FoundFormula {
         }
     }
 
-    /// Fixes the common factor: a term gets the coefficient that is given, or the first square of a velocity 1/2.
+    /// Fixes the common factor: a term gets the coefficient that is given, or the first square of a velocity 1/2 or -1/2, with the sign
+    /// that makes most of the squares positive, since a time runs against the places.
     pub(super) fn rescale(&mut self, scale: Option<&(String, f64)>) -> Result<(), FormulaError> {
         let plain = |text: &str| text.chars().filter(|c| !c.is_whitespace()).collect::<String>();
         let (at, value) = match scale {
@@ -187,7 +188,14 @@ impl FoundFormula {
                 let square =
                     |name: &String| self.terms.iter().position(|t| !t.dissipation && t.term == format!("{name}_dot^2"));
                 let first = self.coordinates.iter().find_map(square);
-                (first.or(self.terms.iter().position(|t| !t.dissipation)).unwrap_or(0), 0.5)
+                let signs = self
+                    .coordinates
+                    .iter()
+                    .filter_map(square)
+                    .map(|at| self.terms[at].coefficient.signum())
+                    .sum::<f64>();
+                let sign = first.map_or(1.0, |at| if signs * self.terms[at].coefficient < 0.0 { -1.0 } else { 1.0 });
+                (first.or(self.terms.iter().position(|t| !t.dissipation)).unwrap_or(0), 0.5 * sign)
             }
         };
         let m = self.terms.len();

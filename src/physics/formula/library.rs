@@ -2,7 +2,7 @@
 
 use super::error::FormulaError;
 use super::function::{Factor, Function, MOST_COORDINATES, Notation, Taylor};
-use crate::lagrangian::{Equations, Lagrangian, Part};
+use crate::lagrangian::{EquationPart, Equations, Lagrangian};
 use crate::linalg::dot;
 use crate::random::RngStream;
 use crate::scalar::Real;
@@ -241,7 +241,7 @@ impl Library {
     /// A formula that branches on its data.
     pub fn equations(&self, terms: &[usize], count: usize, wanted: &[usize]) -> Result<Equations, TapeError> {
         let record = |terms: Vec<(usize, Option<usize>)>, friction: bool| {
-            Part::record(&Sum { library: self, terms }, count, friction)
+            EquationPart::record(&Sum { library: self, terms }, count, friction)
         };
         let own = |friction: bool| {
             let own = terms.iter().enumerate().filter(|(_, k)| self.is_dissipation(**k) == friction);

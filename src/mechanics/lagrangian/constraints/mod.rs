@@ -34,7 +34,9 @@ pub use manifold::{Manifold, ManifoldRows, RowAdjoint};
 pub use projection::{OffManifold, project, project_acceleration};
 pub use reduced::ReducedMass;
 #[cfg(feature = "training")]
-pub(crate) use rows::{independent_rows, take_out};
+pub(crate) use rows::independent_rows;
+#[cfg(feature = "data")]
+pub(crate) use rows::take_out;
 
 use crate::scalar::Real;
 

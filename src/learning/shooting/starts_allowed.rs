@@ -9,18 +9,18 @@ use std::sync::Arc;
 
 /// The states `phi(q) = 0`, `A v = b` that constraints allow, in scaled coordinates.
 #[derive(Clone)]
-pub(super) struct Surface<S> {
+pub(super) struct StartsAllowed<S> {
     manifold: Arc<dyn Manifold<S>>,
     scale: Vec<S>,
 }
 
-impl<S> fmt::Debug for Surface<S> {
+impl<S> fmt::Debug for StartsAllowed<S> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Surface").finish_non_exhaustive()
+        f.debug_struct("StartsAllowed").finish_non_exhaustive()
     }
 }
 
-impl<S: Scalar> Surface<S> {
+impl<S: Scalar> StartsAllowed<S> {
     pub fn new(architecture: &Architecture, manifold: Arc<dyn Manifold<S>>) -> Self {
         Self { manifold, scale: architecture.scale.iter().map(|&s| S::of_f64(s)).collect() }
     }

@@ -1,7 +1,7 @@
 //! Motion under constraints in the scaled coordinates of a network: rows, loads and what a loss asks of them.
 //!
 //! Of scaled coordinates `q_i = s_i q'_i` the rows are `A_ci s_i`; each is brought to unit length, since coordinates and constraints may
-//! have any size. [`Held::motion`] solves `[M A^T; A 0] [a; -lambda] = [f; -gamma]`, [`Held::adjoint`] the same matrix for `[lam; nu]` with
+//! have any size. [`ConstrainedMotion::motion`] solves `[M A^T; A 0] [a; -lambda] = [f; -gamma]`, [`ConstrainedMotion::adjoint`] the same matrix for `[lam; nu]` with
 //! `[u; 0]` on the right.
 
 use crate::lagrangian::{Bordered, ReducedMass, independent_rows};
@@ -9,7 +9,7 @@ use crate::linalg::{Violation, Workspace};
 use crate::scalar::{Real, Scalar};
 
 /// Constraints of a chunk of states; buffers are reused from chunk to chunk.
-pub(crate) struct Held<S> {
+pub(crate) struct ConstrainedMotion<S> {
     n: usize,
     m: usize,
     /// Rows `A` at unit length, `(states, m, n)`, what they were multiplied with for it, and `-gamma` at that length, `(states, m)`.
@@ -21,14 +21,14 @@ pub(crate) struct Held<S> {
     load: Vec<S>,
 }
 
-impl<S> Default for Held<S> {
+impl<S> Default for ConstrainedMotion<S> {
     fn default() -> Self {
         let (rows, unit, drift, load) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         Self { n: 0, m: 0, rows, unit, drift, bordered: Bordered::default(), load }
     }
 }
 
-impl<S: Scalar> Held<S> {
+impl<S: Scalar> ConstrainedMotion<S> {
     /// Forgets all states; those that follow have `n` coordinates and `m` constraints.
     pub fn clear(&mut self, (n, m): (usize, usize)) {
         (self.n, self.m) = (n, m);
