@@ -11,6 +11,7 @@ mod network;
 mod soak;
 mod systems;
 mod tape;
+mod watch;
 
 #[path = "cost/main.rs"]
 mod cost;
@@ -36,4 +37,5 @@ fn main() {
     work_precision::trial();
     constraints::trial();
     open_tables::trial();
+    watch::trial();
 }
