@@ -22,7 +22,7 @@ use lnn::network::{Initialization, Structure, initial_weights};
 use lnn::presets::Trainer;
 use lnn::recording::smooth::SmoothOptions;
 use lnn::recording::{RecordedTrajectory, Recording};
-use lnn::rollout::{Method, Options, rollout};
+use lnn::rollout::{Integrator, Options, rollout};
 use lnn::training::Objective;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -250,11 +250,11 @@ fn drift(swings: f64) {
     let period = TAU / (a * 9.81f64.sqrt());
     println!("method       step      rod     energy   after a tenth  seconds");
     for (method, step) in [
-        (Method::Dopri5, None),
-        (Method::Dop853, None),
-        (Method::Variational, Some(0.02)),
-        (Method::Gauss4, Some(0.04)),
-        (Method::Gauss6, Some(0.08)),
+        (Integrator::Dopri5, None),
+        (Integrator::Dop853, None),
+        (Integrator::Variational, Some(0.02)),
+        (Integrator::Gauss4, Some(0.04)),
+        (Integrator::Gauss6, Some(0.08)),
     ] {
         let options = Options {
             method,

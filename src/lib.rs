@@ -86,14 +86,14 @@
 //! ```
 //! use lnn::lagrangian::build;
 //! use lnn::prelude::*;
-//! use lnn::rollout::Method;
+//! use lnn::rollout::Integrator;
 //!
 //! let model = build::<f64>("double-pendulum", &[("m2".to_string(), "0.5".to_string())])?;
 //! let motion = model.rollout(&[2.0, 1.0], &[0.0, 0.0], 5.0, 0.1)?; // 5 s, a sample every 0.1 s
 //! assert_eq!(motion.t.len(), 51);
 //!
 //! // With a method that conserves the energy.
-//! let options = Options { method: Method::Gauss6, step: Some(0.01), ..Options::new(5.0, 0.1) };
+//! let options = Options { method: Integrator::Gauss6, step: Some(0.01), ..Options::new(5.0, 0.1) };
 //! let energy = rollout(&*model, &[2.0, 1.0], &[0.0, 0.0], &options).complete()?.energy.unwrap(); // J, at every sample
 //! assert!(energy.iter().all(|e| (e - energy[0]).abs() < 1e-7));
 //! # Ok::<(), Box<dyn std::error::Error>>(())

@@ -5,7 +5,7 @@
 
 use super::problems::Problem;
 use lnn::lagrangian::{Request, Terms};
-use lnn::rollout::{Method, Options, Rollout, Trajectory, rollout, rollout_fixed};
+use lnn::rollout::{Integrator, Options, Rollout, Trajectory, rollout, rollout_fixed};
 use lnn::scalar::{Dd, Scalar};
 
 /// The motion of a problem, good to all digits of `f64`.
@@ -67,7 +67,7 @@ fn extrapolate(coarse: &Trajectory<Dd>, fine: &Trajectory<Dd>, order: i32) -> Tr
 fn run(problem: &Problem, step: f64) -> Result<Trajectory<Dd>, String> {
     let wide = |x: &[f64]| x.iter().map(|&x| Dd::of_f64(x)).collect::<Vec<Dd>>();
     let options = Options {
-        method: Method::Gauss6,
+        method: Integrator::Gauss6,
         step: Some(Dd::of_f64(step)),
         energy: false,
         ..Options::new(Dd::of_f64(problem.t_end), Dd::of_f64(problem.dt))

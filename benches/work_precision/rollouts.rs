@@ -6,18 +6,18 @@ use super::problems::{LEARNED, Problem, TAUGHT_BY, problems};
 use super::reference::{Reference, distance, reference};
 use super::summary::{cost_of, slope};
 use super::timing::Timing;
-use lnn::rollout::{Method, Options, Rollout, Trajectory, rollout};
+use lnn::rollout::{Integrator, Options, Rollout, Trajectory, rollout};
 use lnn::scalar::{Dd, Scalar};
 use std::hint::black_box;
 use std::time::Instant;
 
-const METHODS: [(Method, &str); 6] = [
-    (Method::Dopri5, "Dopri5"),
-    (Method::Dop853, "Dop853"),
-    (Method::Midpoint, "midpoint"),
-    (Method::Variational, "variational"),
-    (Method::Gauss4, "Gauss-4"),
-    (Method::Gauss6, "Gauss-6"),
+const METHODS: [(Integrator, &str); 6] = [
+    (Integrator::Dopri5, "Dopri5"),
+    (Integrator::Dop853, "Dop853"),
+    (Integrator::Midpoint, "midpoint"),
+    (Integrator::Variational, "variational"),
+    (Integrator::Gauss4, "Gauss-4"),
+    (Integrator::Gauss6, "Gauss-6"),
 ];
 
 const TEXT: &str = "\
@@ -148,7 +148,7 @@ fn measure(arguments: &Arguments, problem: &Problem, reference: &Reference, sect
 fn points(
     arguments: &Arguments,
     (problem, reference): (&Problem, &Reference),
-    (method, name): (Method, &str),
+    (method, name): (Integrator, &str),
     section: &mut Section,
 ) -> Vec<Point> {
     // A network is slower, and its longer runs are what there is to see.

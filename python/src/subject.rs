@@ -16,7 +16,7 @@ use lnn::network::NetworkLagrangian;
 use lnn::network::file::{Header, ModelFile};
 use lnn::pipeline::{EvaluationOptions, evaluate, trained_on};
 use lnn::report::page;
-use lnn::rollout::{Method, Options, Rollout, RolloutError, rollout_many};
+use lnn::rollout::{Integrator, Options, Rollout, RolloutError, rollout_many};
 use lnn::symmetry::{Chart, Degrees, Region, bases, enough, middle, most_states, most_symmetries, unknowns};
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
@@ -376,7 +376,7 @@ impl Subject {
         let (q, v) = self.states(&q, &v)?;
         let n = self.n();
         let ((t0, t_end, dt), (rtol, atol, step)) = (times, accuracy);
-        let method: Method = serde_json::from_value(method.into()).map_err(value)?;
+        let method: Integrator = serde_json::from_value(method.into()).map_err(value)?;
         let domain = match &self.kind {
             Kind::Model(header, ..) if bounded => Some(trained_on(header)),
             _ => None,

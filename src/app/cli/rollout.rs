@@ -13,7 +13,7 @@ use crate::cli::tube::{MotionTube, TubeArgs};
 use crate::cli::{CliError, input, interrupt, output};
 use crate::lagrangian::{EulerLagrange, Interruptible, LeastNorm, ReducedMass, Request, Terms};
 use crate::names::{pluralize, rounded};
-use crate::rollout::{Balances, Driven, Method, Options, RolloutError, Trajectory, rollout_in_pieces};
+use crate::rollout::{Balances, Driven, Integrator, Options, RolloutError, Trajectory, rollout_in_pieces};
 use crate::storage::check_target;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
@@ -107,7 +107,7 @@ enum MethodName {
     Variational,
 }
 
-impl From<MethodName> for Method {
+impl From<MethodName> for Integrator {
     fn from(name: MethodName) -> Self {
         match name {
             MethodName::Dopri5 => Self::Dopri5,
@@ -146,7 +146,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     if let Some(file) = &args.constraints {
         subject.model = constrained(subject.model, columns, file, (q, v))?;
     }
-    let method = Method::from(args.method);
+    let method = Integrator::from(args.method);
     if args.step.is_some() && !method.is_structure_preserving() {
         return Err(CliError::usage("--step: dopri5 and dop853 choose their own steps; see --rtol"));
     }
@@ -321,7 +321,7 @@ fn refused(error: &RolloutError) -> CliError {
 }
 
 /// Why a motion ended early, and the option that helps.
-fn ended(stop: &RolloutError, (columns, constraints): (&[String], &[String]), method: Method) -> String {
+fn ended(stop: &RolloutError, (columns, constraints): (&[String], &[String]), method: Integrator) -> String {
     let fixed = method.is_structure_preserving();
     match stop {
         RolloutError::LeftDomain { t, component, value, lower, upper, .. } => format!(

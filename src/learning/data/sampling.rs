@@ -6,7 +6,7 @@ use crate::data::shell::{in_shell, weigh_by_distance};
 use crate::lagrangian::system::Coordinate;
 use crate::lagrangian::{DescriptionError, EulerLagrange, Interruptible, SystemError, SystemInstance, project};
 use crate::random::RngStream;
-use crate::rollout::{Domain, Method, Options, rollout};
+use crate::rollout::{Domain, Integrator, Options, rollout};
 use crate::scalar::Scalar;
 use rand::Rng;
 use std::f64::consts::TAU;
@@ -307,7 +307,7 @@ fn along_motions<'a>(
     let chart = position.iter().zip(&coordinates).map(|(b, c)| (!c.periodic).then_some((b[0], b[1])));
     let pace = velocity.iter().enumerate().map(|(i, b)| (Some(i) != fixed).then_some((b[0], b[1])));
     let options = Options {
-        method: Method::Dop853,
+        method: Integrator::Dop853,
         rtol: 1e-9,
         atol: 1e-9,
         energy: false,

@@ -21,7 +21,7 @@ use crate::tape::Depth;
 use std::sync::Arc;
 
 /// Integrates chunks of segments; buffers are reused from chunk to chunk.
-pub(super) struct Integrator<S> {
+pub(super) struct SegmentIntegrator<S> {
     motion: Motion<S>,
     n: usize,
     rows: usize,
@@ -49,7 +49,7 @@ pub(super) struct Integrator<S> {
     dv: Vec<S>,
 }
 
-impl<S: Scalar> Integrator<S> {
+impl<S: Scalar> SegmentIntegrator<S> {
     pub fn new(model: &Model<S>, manifold: Option<Arc<dyn Manifold<S>>>) -> Self {
         Self {
             motion: Motion::new(model, manifold),

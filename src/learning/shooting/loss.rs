@@ -1,7 +1,7 @@
 //! Residuals of the samples of a chunk of segments, and of the joints at their ends.
 
 use crate::scalar::{Real, Scalar, Sum};
-use crate::shooting::integrator::Integrator;
+use crate::shooting::integrator::SegmentIntegrator;
 use crate::shooting::segments::Segments;
 
 /// `r^2` up to `|r| = bound`, linear beyond with the same slope (Huber 1964, twice his function).
@@ -49,7 +49,7 @@ pub(super) struct Residual<S> {
 
 /// Calls `with` for every residual of row `row` of the chunk that `integrator` holds, segment `segment`.
 pub(super) fn each_residual<S: Scalar>(
-    integrator: &Integrator<S>,
+    integrator: &SegmentIntegrator<S>,
     segments: &Segments<S>,
     (row, segment): (usize, usize),
     mut with: impl FnMut(Residual<S>),
@@ -78,7 +78,7 @@ pub(super) fn each_residual<S: Scalar>(
 
 /// Gap at the end of a segment in units of `tau`: its end minus the start of the next, `next` of `(2, n)`.
 pub(super) fn gap<S: Scalar>(
-    integrator: &Integrator<S>,
+    integrator: &SegmentIntegrator<S>,
     segments: &Segments<S>,
     (row, segment): (usize, usize),
     next: &[S],
@@ -95,7 +95,7 @@ pub(super) fn gap<S: Scalar>(
 ///
 /// `weight` multiplies every residual, `continuity` every gap; the loss is counted without either, gaps apart.
 pub(super) fn add_loss<S: Scalar>(
-    integrator: &mut Integrator<S>,
+    integrator: &mut SegmentIntegrator<S>,
     segments: &Segments<S>,
     (row, segment): (usize, usize),
     starts: &[S],

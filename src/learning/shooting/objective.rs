@@ -7,7 +7,7 @@ use crate::configuration::Penalty;
 use crate::lagrangian::Manifold;
 use crate::network::{Architecture, Model};
 use crate::scalar::{Real, Scalar, Sum};
-use crate::shooting::integrator::Integrator;
+use crate::shooting::integrator::SegmentIntegrator;
 use crate::shooting::loss::{Huber, add_loss, each_residual, gap};
 use crate::shooting::segments::Segments;
 use crate::shooting::starts::{Curvature, Linearisation};
@@ -59,7 +59,7 @@ struct Given<'a, S> {
 
 /// A contiguous part of a batch with its own buffers.
 pub(super) struct Shard<S> {
-    pub integrator: Integrator<S>,
+    pub integrator: SegmentIntegrator<S>,
     gradient: Vec<S>,
     /// Gradients by the starts of the shard's segments and of those that follow them, `(rows, 2, n)`.
     start_gradient: Vec<S>,
@@ -82,7 +82,7 @@ pub(super) struct Shard<S> {
 impl<S: Scalar> Shard<S> {
     fn new(model: &Model<S>, manifold: Option<Arc<dyn Manifold<S>>>) -> Self {
         Self {
-            integrator: Integrator::new(model, manifold),
+            integrator: SegmentIntegrator::new(model, manifold),
             gradient: Vec::new(),
             start_gradient: Vec::new(),
             next_gradient: Vec::new(),
@@ -140,7 +140,7 @@ impl<S: Scalar> Shard<S> {
         let (value, active) = self.integrator.reverse(weights, penalty, &mut self.gradient);
         self.penalty.add(value);
         self.penalised += active;
-        let Integrator { alive, q_adjoint, v_adjoint, .. } = &self.integrator;
+        let SegmentIntegrator { alive, q_adjoint, v_adjoint, .. } = &self.integrator;
         for (row, &alive) in alive.iter().enumerate() {
             let by_start = q_adjoint[row * n..][..n].iter().chain(&v_adjoint[row * n..][..n]);
             self.start_gradient.extend(by_start.map(|&g| if alive { g } else { <S as Real>::zero() }));

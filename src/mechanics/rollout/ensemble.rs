@@ -240,7 +240,7 @@ impl<S: Scalar> EulerLagrange<S> for Member<'_, '_, S> {
 mod tests {
     use super::*;
     use crate::lagrangian::configure;
-    use crate::rollout::{Method, rollout_many};
+    use crate::rollout::{Integrator, rollout_many};
     use std::sync::atomic::{AtomicUsize, Ordering};
 
     fn starts(count: usize) -> Vec<(Vec<f64>, Vec<f64>)> {
@@ -251,7 +251,7 @@ mod tests {
     #[test]
     fn motions_together_are_the_motions_alone() {
         let system = configure::<f64>("double-pendulum", &[]).unwrap().build().unwrap();
-        for method in [Method::Dopri5, Method::Dop853, Method::Gauss4, Method::Variational] {
+        for method in [Integrator::Dopri5, Integrator::Dop853, Integrator::Gauss4, Integrator::Variational] {
             let options = Options { method, step: Some(0.01), ..Options::new(2.0, 0.1) };
             let alone = rollout_many(&*system, &starts(11), &options, 2);
             let together = rollout_together(&*system, &starts(11), &options, 1);

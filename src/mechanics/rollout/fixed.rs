@@ -7,7 +7,7 @@ use super::run::{Keep, into_error};
 use super::spark::Spark;
 use super::trajectory::{Samples, Times};
 use super::variational::Variational;
-use super::{Force, Method, Options, RolloutError, StepCounts, StepFailure};
+use super::{Force, Integrator, Options, RolloutError, StepCounts, StepFailure};
 use crate::lagrangian::EulerLagrange;
 use crate::scalar::{Real, Scalar};
 
@@ -20,23 +20,23 @@ pub(super) enum Stepper<S> {
 
 impl<S: Scalar> Stepper<S> {
     /// The stepper of a method for the coordinates of a model, if it has a fixed step.
-    pub(super) fn new(method: Method, model: &dyn EulerLagrange<S>) -> Option<Self> {
+    pub(super) fn new(method: Integrator, model: &dyn EulerLagrange<S>) -> Option<Self> {
         let n = model.coordinates();
         if let Some(manifold) = model.manifold() {
             let stages = match method {
-                Method::Dopri5 | Method::Dop853 => return None,
-                Method::Midpoint | Method::Variational => 1,
-                Method::Gauss4 => 2,
-                Method::Gauss6 => 3,
+                Integrator::Dopri5 | Integrator::Dop853 => return None,
+                Integrator::Midpoint | Integrator::Variational => 1,
+                Integrator::Gauss4 => 2,
+                Integrator::Gauss6 => 3,
             };
             return Some(Self::Constrained(Spark::new(stages, manifold)));
         }
         match method {
-            Method::Dopri5 | Method::Dop853 => None,
-            Method::Midpoint => Some(Self::Gauss(Gauss::new(1, n))),
-            Method::Gauss4 => Some(Self::Gauss(Gauss::new(2, n))),
-            Method::Gauss6 => Some(Self::Gauss(Gauss::new(3, n))),
-            Method::Variational => Some(Self::Variational(Variational::new(n))),
+            Integrator::Dopri5 | Integrator::Dop853 => None,
+            Integrator::Midpoint => Some(Self::Gauss(Gauss::new(1, n))),
+            Integrator::Gauss4 => Some(Self::Gauss(Gauss::new(2, n))),
+            Integrator::Gauss6 => Some(Self::Gauss(Gauss::new(3, n))),
+            Integrator::Variational => Some(Self::Variational(Variational::new(n))),
         }
     }
 

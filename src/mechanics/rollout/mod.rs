@@ -42,7 +42,7 @@ pub use error::UnderflowCause;
 pub use force::{Driven, Force, SampledForce};
 #[doc(hidden)]
 pub use ode::Integrable;
-pub use options::{Domain, Method, Options};
+pub use options::{Domain, Integrator, Options};
 #[doc(hidden)]
 pub use pieces::{Balances, Ending, EnergyBalance, rollout_in_pieces};
 #[doc(hidden)]

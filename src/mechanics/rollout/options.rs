@@ -8,11 +8,11 @@ use serde::{Deserialize, Serialize};
 ///
 /// The latter are implicit and symplectic in `(q, p)`, `p = dL/dv`, for every Lagrangian with a regular mass matrix:
 /// the energy error stays bounded over long times, where adaptive methods drift. See [`Options::step`]. A motion with
-/// friction has no energy to keep: [`Method::Variational`] refuses it, the Gauss methods keep their order.
+/// friction has no energy to keep: [`Integrator::Variational`] refuses it, the Gauss methods keep their order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
-pub enum Method {
+pub enum Integrator {
     /// Dormand and Prince (1980), order 5(4), interpolation of order 4.
     Dopri5,
     /// Hairer, Norsett and Wanner (1993), order 8(5,3), interpolation of order 7.
@@ -27,7 +27,7 @@ pub enum Method {
     Variational,
 }
 
-impl Method {
+impl Integrator {
     /// Its name, as in a configuration.
     pub(crate) const fn name(self) -> &'static str {
         match self {
@@ -114,7 +114,7 @@ pub struct Options<S> {
     /// Distance of samples.
     pub dt: S,
     /// Integrator.
-    pub method: Method,
+    pub method: Integrator,
     /// Relative tolerance.
     pub rtol: S,
     /// Absolute tolerance in the unit of each component.
@@ -140,7 +140,7 @@ impl<S: Scalar> Options<S> {
             t0: <S as Real>::zero(),
             t_end,
             dt,
-            method: Method::Dopri5,
+            method: Integrator::Dopri5,
             rtol: S::of_f64(1e-6),
             atol: S::of_f64(1e-8),
             step: None,
@@ -153,7 +153,7 @@ impl<S: Scalar> Options<S> {
     /// Ground truth: `Dop853` with rtol = atol = 1e-12, or sixteen roundings where the scalar is coarser.
     pub fn reference(t_end: S, dt: S) -> Self {
         let tolerance = S::max(S::of_f64(1e-12), S::epsilon().ldexp(4));
-        Self { method: Method::Dop853, rtol: tolerance, atol: tolerance, ..Self::new(t_end, dt) }
+        Self { method: Integrator::Dop853, rtol: tolerance, atol: tolerance, ..Self::new(t_end, dt) }
     }
 
     /// Finest relative tolerance that the scalar can keep, about nine of its roundings: 1e-6 in `f32`, 2e-15 in `f64`. Below
@@ -262,12 +262,12 @@ mod tests {
         assert_eq!(name(Options { t0: 1e16, t_end: 1e16 + 10.0, ..good.clone() }), "dt");
         let least = Options::<f64>::least_tolerance();
         assert!(Options { rtol: least, ..good.clone() }.check(1).is_ok());
-        assert!(Options { rtol: 1e-30, method: Method::Gauss4, ..good.clone() }.check(1).is_ok());
+        assert!(Options { rtol: 1e-30, method: Integrator::Gauss4, ..good.clone() }.check(1).is_ok());
         assert!(Options::<f32>::new(1.0, 0.1).check(1).is_ok());
         assert_eq!(name(Options { step: Some(0.0), ..good.clone() }), "step");
         assert_eq!(name(Options { step: Some(f64::NAN), ..good.clone() }), "step");
         assert_eq!(name(Options { max_steps: 0, ..good.clone() }), "max_steps");
-        let fixed = Options { method: Method::Gauss4, ..good.clone() };
+        let fixed = Options { method: Integrator::Gauss4, ..good.clone() };
         assert!(Options { step: Some(1e-6), ..fixed.clone() }.check(1).is_ok());
         assert_eq!(name(Options { step: Some(9e-7), ..fixed.clone() }), "step");
         assert_eq!(name(Options { step: Some(1e-308), ..fixed.clone() }), "step");

@@ -283,7 +283,7 @@ fn integral<S: Scalar>(t: &[S], y: &[S]) -> S {
 #[cfg(test)]
 mod tests {
     use super::super::models::BROKEN;
-    use super::super::{Method, rollout};
+    use super::super::{Integrator, rollout};
     use super::*;
     use crate::lagrangian::build;
 
@@ -308,7 +308,7 @@ mod tests {
 
     #[test]
     fn the_pieces_are_the_whole() {
-        for method in [Method::Dopri5, Method::Dop853, Method::Gauss4, Method::Variational] {
+        for method in [Integrator::Dopri5, Integrator::Dop853, Integrator::Gauss4, Integrator::Variational] {
             for (t_end, energy) in [(10.0, true), (-7.681, false), (0.0, true), (2.559, true)] {
                 let options = Options { method, energy, ..Options::new(t_end, 0.01) };
                 let whole = rollout(&*oscillator(), &[1.0], &[0.2], &options);
@@ -354,7 +354,7 @@ mod tests {
 
     #[test]
     fn a_receiver_that_takes_no_more_ends_the_motion() {
-        for method in [Method::Dopri5, Method::Gauss4] {
+        for method in [Integrator::Dopri5, Integrator::Gauss4] {
             let options = Options { method, ..Options::new(1e3, 0.001) };
             let (trajectory, pieces, ending) = joined(&*oscillator(), &options, 2);
             assert_eq!((trajectory.len(), pieces, ending.samples), (2 * CHUNK, 2, 2 * CHUNK));

@@ -3,7 +3,7 @@
 use super::error::UnderflowCause;
 use super::fixed::Stepper;
 use super::ode::Adaptive;
-use super::{Force, Integrable, Method, Options, RolloutError, StepCounts, Trajectory, adaptive, fixed};
+use super::{Force, Integrable, Integrator, Options, RolloutError, StepCounts, Trajectory, adaptive, fixed};
 use crate::lagrangian::{EulerLagrange, ManifoldRows, MechanicsError, OffManifold, project};
 use crate::scalar::Scalar;
 
@@ -126,9 +126,9 @@ pub(super) fn integrate<S: Integrable>(
     keep: &mut Keep<'_, S>,
 ) -> (StepCounts, Option<RolloutError>) {
     let method = match options.method {
-        Method::Dopri5 => Adaptive::Dopri5,
-        Method::Dop853 => Adaptive::Dop853,
-        Method::Midpoint | Method::Gauss4 | Method::Gauss6 | Method::Variational => {
+        Integrator::Dopri5 => Adaptive::Dopri5,
+        Integrator::Dop853 => Adaptive::Dop853,
+        Integrator::Midpoint | Integrator::Gauss4 | Integrator::Gauss6 | Integrator::Variational => {
             return integrate_fixed(model, force, (q, v), options, keep);
         }
     };
@@ -160,7 +160,7 @@ fn integrate_fixed<S: Scalar>(
         let problem = format!("{} adapts its steps; {} offers fixed steps only", options.method.name(), S::NAME);
         return refused(RolloutError::Invalid { what: "method", problem });
     };
-    if options.method == Method::Variational && !model.conserves_energy() {
+    if options.method == Integrator::Variational && !model.conserves_energy() {
         let problem = "the variational integrator keeps the energy and this model loses it by friction; \
                        dopri5, dop853, midpoint, gauss4 and gauss6 integrate it";
         return refused(RolloutError::Invalid { what: "method", problem: problem.to_string() });

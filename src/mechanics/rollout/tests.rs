@@ -4,9 +4,9 @@ use super::models::{BROKEN, EXPLODING, FOUR, KEPLER, OSCILLATOR, PENDULUM, SINGU
 use super::*;
 use crate::lagrangian::{EulerLagrange, build};
 
-const METHODS: [Method; 2] = [Method::Dopri5, Method::Dop853];
+const METHODS: [Integrator; 2] = [Integrator::Dopri5, Integrator::Dop853];
 
-fn options(method: Method, t_end: f64, dt: f64, tolerance: f64) -> Options<f64> {
+fn options(method: Integrator, t_end: f64, dt: f64, tolerance: f64) -> Options<f64> {
     Options { method, rtol: tolerance, atol: tolerance, ..Options::new(t_end, dt) }
 }
 
@@ -66,7 +66,7 @@ fn sampling_does_not_change_the_steps() {
         assert_eq!(coarse.statistics.rejected, fine.statistics.rejected);
         assert_eq!(coarse.trajectory.q.last(), fine.trajectory.q.last());
         let per_step = match method {
-            Method::Dopri5 => 6,
+            Integrator::Dopri5 => 6,
             _ => 11,
         };
         let least = per_step * (coarse.statistics.accepted + coarse.statistics.rejected);
@@ -207,7 +207,7 @@ fn blow_up_underflows() {
 
 #[test]
 fn too_many_steps_and_bad_starts() {
-    let few = Options { max_steps: 5, ..options(Method::Dopri5, 100.0, 0.1, 1e-10) };
+    let few = Options { max_steps: 5, ..options(Integrator::Dopri5, 100.0, 0.1, 1e-10) };
     let done = rollout(&PENDULUM, &[1.0], &[0.0], &few);
     assert!(matches!(done.stop, Some(RolloutError::TooManySteps { steps: 5, t }) if t > 0.0 && t < 100.0));
     assert!(!done.trajectory.is_empty());
@@ -240,7 +240,7 @@ fn ensembles_do_not_depend_on_threads() {
     assert!(rollout_many(model, &[], &Options::<f64>::new(5.0, 0.1), 3).is_empty());
 }
 
-const FIXED: [Method; 4] = [Method::Midpoint, Method::Gauss4, Method::Gauss6, Method::Variational];
+const FIXED: [Integrator; 4] = [Integrator::Midpoint, Integrator::Gauss4, Integrator::Gauss6, Integrator::Variational];
 
 /// A longest step beyond the distance of samples is that distance.
 fn long_steps_are_cut<S: crate::scalar::Scalar>(model: &dyn EulerLagrange<S>) {

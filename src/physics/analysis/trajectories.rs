@@ -7,7 +7,7 @@ use super::{
 };
 use crate::lagrangian::{EulerLagrange, SystemError, SystemInstance, project};
 use crate::random::RngStream;
-use crate::rollout::{Domain, Integrable, Method, Options, Rollout, RolloutError, Trajectory, rollout_many};
+use crate::rollout::{Domain, Integrable, Integrator, Options, Rollout, RolloutError, Trajectory, rollout_many};
 use crate::scalar::Scalar;
 use rand::Rng;
 use serde::{Deserialize, Serialize};
@@ -57,7 +57,7 @@ pub struct TrajectoryTest<S> {
     /// Energy below which the energy error is not taken relative to `|E(0)|`.
     pub energy_scale: f64,
     /// Integrator of the learned motion.
-    pub method: Method,
+    pub method: Integrator,
     /// Relative tolerance of the learned motion.
     pub rtol: f64,
     /// Absolute tolerance of the learned motion.
@@ -142,7 +142,7 @@ impl<S: Integrable> TrajectoryTest<S> {
             dt: 0.1,
             periodic,
             energy_scale: 0.0,
-            method: Method::Dopri5,
+            method: Integrator::Dopri5,
             rtol: 1e-6,
             atol: 1e-8,
             max_steps: LEARNED_STEPS,

@@ -190,13 +190,13 @@ mod tests {
     #[cfg(feature = "rollout")]
     #[test]
     fn integrators_stop_where_the_certificate_ends() {
-        use crate::rollout::{self, Method, RolloutError, rollout};
+        use crate::rollout::{self, Integrator, RolloutError, rollout};
         let pendulum = configure::<f64>("double-pendulum", &[]).unwrap();
         let region = Bounds::uniform(2, (-3.2, 3.2), (-2.0, 2.0));
         let found = certify_system(&pendulum, &region, &limited(Signature::of(2, false), 1000)).unwrap();
         assert_eq!(found.certified, 1.0);
         let guarded = Guarded::new(pendulum.build().unwrap(), &found);
-        for (method, slack) in [(Method::Dopri5, 1e-3), (Method::Dop853, 1e-3), (Method::Gauss4, 0.2)] {
+        for (method, slack) in [(Integrator::Dopri5, 1e-3), (Integrator::Dop853, 1e-3), (Integrator::Gauss4, 0.2)] {
             let options = rollout::Options { method, ..rollout::Options::new(5.0, 0.01) };
             let motion = rollout(&guarded, &[1.5, 1.0], &[0.0, 0.0], &options);
             let Some(RolloutError::Uncertified { t, state }) = motion.stop else { panic!("{:?}", motion.stop) };

@@ -5,7 +5,7 @@ use super::CentralCoordinates;
 use crate::geometry::{GeometryError, Sense, characters};
 use crate::lagrangian::EulerLagrange;
 use crate::linalg::Inertia;
-use crate::rollout::{Method, Options, RolloutError, rollout, rollout_in_pieces};
+use crate::rollout::{Integrator, Options, RolloutError, rollout, rollout_in_pieces};
 use std::f64::consts::TAU;
 use std::ops::ControlFlow;
 
@@ -27,7 +27,7 @@ pub(super) struct MotionState {
 /// Options of the motions that are followed.
 pub(super) fn options(t_end: f64, dt: f64) -> Options<f64> {
     Options {
-        method: Method::Dop853,
+        method: Integrator::Dop853,
         rtol: TOLERANCE,
         atol: TOLERANCE,
         max_steps: STEPS,

@@ -13,8 +13,8 @@ use lnn::network::{
     ActivationChoice, Architecture, Factor, Form, Initialization, InputLayer, JointFriction, Layout, NetworkLagrangian,
     Structure, initial_weights,
 };
-use lnn::optimizers::{Method as Update, Schedule};
-use lnn::rollout::{Method, Options, RolloutError, rollout, rollout_fixed, rollout_together};
+use lnn::optimizers::{Method, Schedule};
+use lnn::rollout::{Integrator, Options, RolloutError, rollout, rollout_fixed, rollout_together};
 use lnn::scalar::{Dd, Real, Scalar};
 use lnn::tape::{Depth, Evaluation, MixedDirections, ScalarFunction, gradient};
 use lnn::training::{Hooks, train};
@@ -277,7 +277,7 @@ fn the_energy_of_a_motion_goes_where_friction_takes_it() {
     let model = damped::chain(2);
     let (q, v) = ([2.0, 2.5], [0.5, -1.0]);
     let at = |dt: f64| {
-        let options = Options { rtol: 1e-12, atol: 1e-12, method: Method::Dop853, ..Options::new(3.0, dt) };
+        let options = Options { rtol: 1e-12, atol: 1e-12, method: Integrator::Dop853, ..Options::new(3.0, dt) };
         let rolled = rollout(&model, &q, &v, &options);
         assert_eq!(rolled.stop, None);
         rolled.trajectory.energy_balance(&model).unwrap()
@@ -306,12 +306,12 @@ fn gauss_methods_integrate_friction_and_the_variational_one_refuses() {
         let apart = |a: &[f64], b: &[f64]| a.iter().zip(b).fold(0.0, |m: f64, (a, b)| m.max((a - b).abs()));
         apart(&motion.q, &exact.q).max(apart(&motion.v, &exact.v))
     };
-    for (method, order) in [(Method::Midpoint, 2.0), (Method::Gauss4, 4.0), (Method::Gauss6, 6.0)] {
+    for (method, order) in [(Integrator::Midpoint, 2.0), (Integrator::Gauss4, 4.0), (Integrator::Gauss6, 6.0)] {
         let (coarse, fine) = (error(method, 0.02), error(method, 0.01));
         let slope = (coarse / fine).log2();
         assert!((slope - order).abs() < 0.7, "{method:?}: {coarse:.1e}, {fine:.1e}, order {slope:.2}");
     }
-    let options = Options { method: Method::Variational, ..Options::new(1.0, 0.1) };
+    let options = Options { method: Integrator::Variational, ..Options::new(1.0, 0.1) };
     let starts = vec![(q.to_vec(), v.to_vec()); 2];
     let refused = rollout_together(&model, &starts, &options, 1).into_iter().chain([rollout(&model, &q, &v, &options)]);
     for rolled in refused {
@@ -385,7 +385,7 @@ fn config(units: Option<usize>, epochs: usize) -> Config {
         },
         penalty: Regularizer::Sylvester { lambda: 100.0 },
         optimizer: Optimizer {
-            method: Update::Radam,
+            method: Method::Radam,
             batch: 64,
             weight_decay: 1e-6,
             clip: 1.0,

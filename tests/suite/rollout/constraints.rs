@@ -3,11 +3,11 @@
 use lnn::lagrangian::{
     Constrained, EulerLagrange, ExpressionConstraints, ExpressionLagrangian, ManifoldRows, Mechanics, configure,
 };
-use lnn::rollout::{Driven, Method, Options, RolloutError, Trajectory, rollout, rollout_fixed};
+use lnn::rollout::{Driven, Integrator, Options, RolloutError, Trajectory, rollout, rollout_fixed};
 use lnn::scalar::{Dd, Real, Scalar};
 
-const FIXED: [(Method, f64); 4] =
-    [(Method::Midpoint, 2.0), (Method::Variational, 2.0), (Method::Gauss4, 4.0), (Method::Gauss6, 6.0)];
+const FIXED: [(Integrator, f64); 4] =
+    [(Integrator::Midpoint, 2.0), (Integrator::Variational, 2.0), (Integrator::Gauss4, 4.0), (Integrator::Gauss6, 6.0)];
 
 fn model(name: &str) -> Box<dyn EulerLagrange<f64>> {
     configure::<f64>(name, &[]).unwrap().build().unwrap()
@@ -79,7 +79,7 @@ fn adaptive_steps_stay_on_the_constraints_with_their_tolerance() {
         let model = model(name);
         let t_end = if name == "schwarzschild-by-clock" { 100.0 } else { 5.0 };
         let exact = rollout(&*model, &q, &v, &Options::reference(t_end, t_end / 50.0)).complete().unwrap();
-        for method in [Method::Dopri5, Method::Dop853] {
+        for method in [Integrator::Dopri5, Integrator::Dop853] {
             for tolerance in [1e-5, 1e-8] {
                 let options = Options { method, rtol: tolerance, atol: tolerance, ..Options::new(t_end, t_end / 50.0) };
                 let done = rollout(&*model, &q, &v, &options);
@@ -99,7 +99,7 @@ fn adaptive_steps_stay_on_the_constraints_with_their_tolerance() {
 fn energy_stays_in_its_band() {
     let pendulum = model("cartesian-chain-1");
     let (q, v) = ([0.6, -0.8], [0.0, 0.0]);
-    for (method, bound) in [(Method::Midpoint, 2e-2), (Method::Gauss4, 2e-5)] {
+    for (method, bound) in [(Integrator::Midpoint, 2e-2), (Integrator::Gauss4, 2e-5)] {
         let options = Options { method, step: Some(0.05), ..Options::new(400.0, 0.5) };
         let motion = rollout(&*pendulum, &q, &v, &options).complete().unwrap();
         let energy = motion.energy.as_ref().unwrap();
@@ -112,7 +112,7 @@ fn energy_stays_in_its_band() {
     let [q, v] = [q, v].map(|x| x.map(Dd::of));
     let q = [q[0], -(Dd::of(1.0) - q[0] * q[0]).sqrt()];
     let options =
-        Options { method: Method::Gauss6, step: Some(Dd::of(0.02)), ..Options::new(Dd::of(1.0), Dd::of(1.0)) };
+        Options { method: Integrator::Gauss6, step: Some(Dd::of(0.02)), ..Options::new(Dd::of(1.0), Dd::of(1.0)) };
     let end = rollout_fixed(&*wide, &q, &v, &options).complete().unwrap();
     let (q, _) = end.state(1);
     let length = (q[0] * q[0] + q[1] * q[1] - Dd::of(1.0)).to_f64().abs();
@@ -122,7 +122,7 @@ fn energy_stays_in_its_band() {
 #[test]
 fn starts_are_brought_near_or_refused_with_their_distance() {
     let pendulum = model("cartesian-chain-1");
-    for method in [Method::Dopri5, Method::Gauss4] {
+    for method in [Integrator::Dopri5, Integrator::Gauss4] {
         let options = Options { method, ..Options::new(1.0, 0.1) };
         let near = rollout(&*pendulum, &[0.6003, -0.8], &[0.0, 0.0], &options).complete().unwrap();
         let (q, _) = near.state(0);
@@ -153,7 +153,7 @@ fn a_linkage_that_folds_stops_where_its_rows_lose_their_rank() {
     // Both cranks turn alike with one radian per second: flat after one.
     let (s, c) = 1.0f64.sin_cos();
     let start = ([c, s, 2.0 + c, s], [s, -c, s, -c]);
-    let options = Options { method: Method::Dopri5, ..Options::new(2.0, 0.01) };
+    let options = Options { method: Integrator::Dopri5, ..Options::new(2.0, 0.01) };
     let done = rollout(&model, &start.0, &start.1, &options);
     assert!(
         done.stop.is_none() || done.stop.as_ref().and_then(RolloutError::time).is_some_and(|t| (t - 1.0).abs() < 0.05)
@@ -169,7 +169,7 @@ fn forces_from_outside_act_within_the_constraints() {
     let pendulum = model("cartesian-chain-1");
     let push = |_: f64, q: &[f64], _: &[f64], force: &mut [f64]| (force[0], force[1]) = (-3.0 * q[1], 3.0 * q[0]);
     let driven = Driven::new(&*pendulum, &push);
-    for method in [Method::Dop853, Method::Gauss6, Method::Variational] {
+    for method in [Integrator::Dop853, Integrator::Gauss6, Integrator::Variational] {
         let options = Options {
             method,
             step: method.is_structure_preserving().then_some(1e-3),

@@ -5,12 +5,18 @@ use lnn::lagrangian::systems::DoublePendulum;
 use lnn::lagrangian::systems::HarmonicOscillator;
 use lnn::lagrangian::{EulerLagrange, Lagrangian, Mechanics, Request, Terms, force_parts, inverse_dynamics};
 use lnn::rollout::{
-    Driven, Force, Integrable, Method, Options, Rollout, RolloutError, SampledForce, Start, rollout, rollout_each,
+    Driven, Force, Integrable, Integrator, Options, Rollout, RolloutError, SampledForce, Start, rollout, rollout_each,
 };
 use lnn::scalar::{Dd, Real, Scalar};
 
-const METHODS: [Method; 6] =
-    [Method::Dopri5, Method::Dop853, Method::Midpoint, Method::Gauss4, Method::Gauss6, Method::Variational];
+const METHODS: [Integrator; 6] = [
+    Integrator::Dopri5,
+    Integrator::Dop853,
+    Integrator::Midpoint,
+    Integrator::Gauss4,
+    Integrator::Gauss6,
+    Integrator::Variational,
+];
 
 /// A free mass of 1 kg.
 struct Mass;
@@ -43,19 +49,19 @@ fn weight<S: Scalar>(_: S, q: &[S], _: &[S], force: &mut [S]) {
     force[1] = S::of_f64(-9.81) * q[1].sin();
 }
 
-fn options<S: Scalar>(method: Method, t_end: f64, step: f64) -> Options<S> {
+fn options<S: Scalar>(method: Integrator, t_end: f64, step: f64) -> Options<S> {
     let tolerance = S::max(S::of_f64(1e-11), S::epsilon().ldexp(4));
     let base = Options::new(S::of_f64(t_end), S::of_f64(0.1));
     Options { method, rtol: tolerance, atol: tolerance, step: Some(S::of_f64(step)), ..base }
 }
 
 /// What a step of 1/128 leaves of the error of a smooth motion over a few seconds.
-fn bound(method: Method) -> f64 {
+fn bound(method: Integrator) -> f64 {
     match method {
-        Method::Dopri5 | Method::Dop853 => 1e-8,
-        Method::Midpoint | Method::Variational => 2e-3,
-        Method::Gauss4 => 1e-7,
-        Method::Gauss6 => 1e-10,
+        Integrator::Dopri5 | Integrator::Dop853 => 1e-8,
+        Integrator::Midpoint | Integrator::Variational => 2e-3,
+        Integrator::Gauss4 => 1e-7,
+        Integrator::Gauss6 => 1e-10,
         method => panic!("no bound is known for {method:?}"),
     }
 }
@@ -100,7 +106,7 @@ fn a_force_in_time_by_every_method_and_in_both_directions() {
 /// The weight of a double pendulum as a force on one without, in every precision.
 #[test]
 fn a_force_of_the_state_is_the_same_as_in_the_lagrangian() {
-    fn check<S: Integrable>(bound: impl Fn(Method) -> f64) {
+    fn check<S: Integrable>(bound: impl Fn(Integrator) -> f64) {
         let (heavy, light) = (pendulum::<S>(9.81), pendulum::<S>(0.0));
         let (q, v) = ([0.7, -0.4].map(S::of_f64), [0.5, 1.0].map(S::of_f64));
         for method in METHODS {
@@ -112,11 +118,13 @@ fn a_force_of_the_state_is_the_same_as_in_the_lagrangian() {
         }
     }
     // The Gauss methods make the same steps, the others those of the same tolerance.
-    check::<f64>(|method| if method == Method::Variational || method == Method::Midpoint { 1e-11 } else { 1e-9 });
+    check::<f64>(
+        |method| if method == Integrator::Variational || method == Integrator::Midpoint { 1e-11 } else { 1e-9 },
+    );
     check::<f32>(|_| 1e-4);
     let (heavy, light) = (pendulum::<Dd>(9.81), pendulum::<Dd>(0.0));
     let (q, v) = ([0.7, -0.4].map(Dd::of_f64), [0.5, 1.0].map(Dd::of_f64));
-    let (options, gravity) = (options::<Dd>(Method::Gauss6, 0.2, 0.02), weight::<Dd>);
+    let (options, gravity) = (options::<Dd>(Integrator::Gauss6, 0.2, 0.02), weight::<Dd>);
     let by_force = Driven::new(&light, &gravity).rollout_fixed(&q, &v, &options).complete().unwrap();
     let by_lagrangian = lnn::rollout::rollout_fixed(&heavy, &q, &v, &options).complete().unwrap();
     let differences = by_force.q.iter().zip(&by_lagrangian.q).map(|(&a, &b)| (a - b).abs().to_f64());
@@ -206,7 +214,7 @@ fn work_and_friction_make_the_change_of_energy() {
         }
     }
     let driven = Driven::new(&model, &Steps);
-    let motion = driven.rollout(&[0.0], &[0.0], &options(Method::Gauss4, 1.0, 0.1)).complete().unwrap();
+    let motion = driven.rollout(&[0.0], &[0.0], &options(Integrator::Gauss4, 1.0, 0.1)).complete().unwrap();
     let balance = driven.energy_balance(&motion).unwrap();
     assert!((balance.change - 0.5 * 4.0).abs() < 1e-13 && balance.dissipated == 0.0, "{balance:?}");
     assert!(balance.defect().abs() < 0.02, "{balance:?}");
@@ -267,7 +275,7 @@ fn a_force_that_fails_is_named() {
         assert!(rolled.trajectory.len() >= 5 && rolled.trajectory.q.iter().all(|q| q.is_finite()));
     }
     let driven = Driven::new(&model, &late);
-    let few = Options { max_steps: 3, ..options(Method::Dopri5, 0.5, 0.05) };
+    let few = Options { max_steps: 3, ..options(Integrator::Dopri5, 0.5, 0.05) };
     assert!(matches!(driven.rollout(&[0.0], &[0.0], &few).stop, Some(RolloutError::TooManySteps { steps: 3, .. })));
     assert!(driven.acceleration(0.6, &[0.0], &[0.0]).is_err());
 }

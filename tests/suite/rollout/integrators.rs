@@ -5,12 +5,12 @@
 
 use lnn::lagrangian::systems::{DoublePendulum, SpringPendulum};
 use lnn::lagrangian::{EulerLagrange, Lagrangian, Mechanics, Request, Terms, configure};
-use lnn::rollout::{Domain, Method, Options, Rollout, RolloutError, rollout, rollout_fixed};
+use lnn::rollout::{Domain, Integrator, Options, Rollout, RolloutError, rollout, rollout_fixed};
 use lnn::scalar::{Dd, Real, Scalar};
 use std::time::Instant;
 
-const METHODS: [(Method, f64); 4] =
-    [(Method::Midpoint, 2.0), (Method::Variational, 2.0), (Method::Gauss4, 4.0), (Method::Gauss6, 6.0)];
+const METHODS: [(Integrator, f64); 4] =
+    [(Integrator::Midpoint, 2.0), (Integrator::Variational, 2.0), (Integrator::Gauss4, 4.0), (Integrator::Gauss6, 6.0)];
 
 /// `v^2/2 + cos q`.
 struct Pendulum;
@@ -84,7 +84,7 @@ fn spring_pendulum<S: Scalar>() -> Mechanics<SpringPendulum, S> {
     Mechanics::new(SpringPendulum, configure("spring-pendulum", &[]).unwrap().parameters)
 }
 
-fn fixed<S: Scalar>(method: Method, t_end: f64, dt: f64, step: f64) -> Options<S> {
+fn fixed<S: Scalar>(method: Integrator, t_end: f64, dt: f64, step: f64) -> Options<S> {
     let [t_end, dt, step] = [t_end, dt, step].map(S::of_f64);
     Options { method, step: Some(step), max_steps: usize::MAX, ..Options::new(t_end, dt) }
 }
@@ -155,7 +155,7 @@ fn measured_orders_are_the_theoretical_ones() {
         let wide: Vec<Dd> = start.iter().map(|&x| Dd::of_f64(x)).collect();
         let run =
             |method, h| end(&done(rollout_fixed(&*model, &wide[..n], &wide[n..], &fixed(method, t_end, t_end, h))));
-        let exact = run(Method::Gauss6, 0.1 * scale / 32.0);
+        let exact = run(Integrator::Gauss6, 0.1 * scale / 32.0);
         let reference = Options::reference(t_end, t_end);
         let independent = end(&done(rollout(&*system::<f64>(name), &start[..n], &start[n..], &reference)));
         let narrow: Vec<f64> = exact.iter().map(|x| x.to_f64()).collect();
@@ -199,7 +199,7 @@ fn reversible_to_rounding() {
 fn the_variational_integrator_is_the_midpoint_rule() {
     let model = plain::<f64, _>(Magnetic);
     let run = |method| done(rollout(&model, &[0.5, -0.3], &[0.2, 0.7], &fixed(method, 50.0, 1.0, 0.05)));
-    let (one, other) = (run(Method::Midpoint), run(Method::Variational));
+    let (one, other) = (run(Integrator::Midpoint), run(Integrator::Variational));
     assert!(distance(&one.trajectory.q, &other.trajectory.q) < 1e-12);
     assert!(distance(&one.trajectory.v, &other.trajectory.v) < 1e-12);
 }
@@ -312,9 +312,12 @@ fn energy_error_is_bounded_where_runge_kutta_drifts() {
     // 10^5 steps each.
     let (first, last) = runge_kutta(&model, &REGULAR, 0.02, 100_000);
     assert!(last > 5.0 * first, "{first:e} {last:e}");
-    for (method, bound) in
-        [(Method::Midpoint, 1e-2), (Method::Variational, 1e-2), (Method::Gauss4, 1e-5), (Method::Gauss6, 1e-8)]
-    {
+    for (method, bound) in [
+        (Integrator::Midpoint, 1e-2),
+        (Integrator::Variational, 1e-2),
+        (Integrator::Gauss4, 1e-5),
+        (Integrator::Gauss6, 1e-8),
+    ] {
         let rolled = done(rollout(&model, &REGULAR[..2], &REGULAR[2..], &fixed(method, 2000.0, 0.1, 0.02)));
         assert_eq!(rolled.statistics.accepted, 100_000);
         let (worst, growth) = energy_errors(&rolled);
@@ -322,7 +325,7 @@ fn energy_error_is_bounded_where_runge_kutta_drifts() {
         assert!(worst < bound, "{method:?}: {worst:e}");
         assert!(growth < 1.5, "{method:?}: {growth}");
     }
-    let chaotic = done(rollout(&model, &CHAOTIC[..2], &CHAOTIC[2..], &fixed(Method::Gauss4, 500.0, 0.1, 0.005)));
+    let chaotic = done(rollout(&model, &CHAOTIC[..2], &CHAOTIC[2..], &fixed(Integrator::Gauss4, 500.0, 0.1, 0.005)));
     let (worst, growth) = energy_errors(&chaotic);
     assert!(worst < 1e-4 && growth < 5.0, "{worst:e} {growth}");
 }
@@ -335,7 +338,8 @@ fn trend(h: f64, steps: usize, starts: usize) -> (Vec<(f64, f64)>, f64) {
     let mut times = Vec::new();
     for k in 0..starts {
         let y = 0.1 + 0.013 * k as f64;
-        let rolled = done(rollout(&model, &[0.0, y], &[0.2, 0.03], &fixed(Method::Gauss6, t_end, t_end / 1024.0, h)));
+        let rolled =
+            done(rollout(&model, &[0.0, y], &[0.2, 0.03], &fixed(Integrator::Gauss6, t_end, t_end / 1024.0, h)));
         // In double-double, so that rounding the energy itself does not count.
         let energy = rolled.trajectory.cast::<Dd>().energy_by(&plain::<Dd, _>(HenonHeiles));
         squares.resize(energy.len(), 0.0);
@@ -374,7 +378,7 @@ fn rounding_errors_of_the_energy_over_a_million_steps() {
 
 #[test]
 fn every_precision() {
-    fn error<S: Scalar>(method: Method, h: f64) -> f64 {
+    fn error<S: Scalar>(method: Integrator, h: f64) -> f64 {
         let start = [S::of_f64(1.0), S::of_f64(0.5)];
         let model = plain::<S, _>(Pendulum);
         energy_errors(&done(rollout_fixed(&model, &start[..1], &start[1..], &fixed(method, 20.0, 1.0, h)))).0
@@ -382,9 +386,9 @@ fn every_precision() {
     for (method, _) in METHODS {
         assert!(error::<f32>(method, 0.0625) < 1e-3, "{method:?}");
     }
-    assert!(error::<f32>(Method::Gauss6, 0.0625) < 1e-6);
+    assert!(error::<f32>(Integrator::Gauss6, 0.0625) < 1e-6);
     // Order 6 below the rounding of f64: two halvings bring 4096.
-    let (coarse, fine) = (error::<Dd>(Method::Gauss6, 1.0 / 64.0), error::<Dd>(Method::Gauss6, 1.0 / 256.0));
+    let (coarse, fine) = (error::<Dd>(Integrator::Gauss6, 1.0 / 64.0), error::<Dd>(Integrator::Gauss6, 1.0 / 256.0));
     assert!((coarse / fine).log2() > 11.5 && fine < 1e-17, "{coarse:e} {fine:e}");
     let adaptive = rollout_fixed(
         &plain::<Dd, _>(Pendulum),
@@ -484,7 +488,7 @@ fn table_of_variables() {
     for (name, model, start) in models {
         for h in [0.1, 0.05] {
             let (first, last) = gauss4_on_velocities(&*model, &start, h, (10_000.0 / h) as usize);
-            let rolled = done(rollout(&*model, &start[..2], &start[2..], &fixed(Method::Gauss4, 10_000.0, h, h)));
+            let rolled = done(rollout(&*model, &start[..2], &start[2..], &fixed(Integrator::Gauss4, 10_000.0, h, h)));
             let energy = rolled.trajectory.energy.as_ref().unwrap();
             let most = |part: &[f64]| part.iter().map(|e| (e - energy[0]).abs()).fold(0.0, f64::max);
             let tenth = energy.len() / 10;

@@ -2,7 +2,7 @@
 
 use super::record::{LIMIT, Row};
 use lnn::lagrangian::{EulerLagrange, configure};
-use lnn::rollout::{Integrable, Method, Options, rollout, rollout_fixed};
+use lnn::rollout::{Integrable, Integrator, Options, rollout, rollout_fixed};
 use lnn::scalar::{Dd, Real, Scalar};
 
 const ECCENTRICITY: f64 = 0.5;
@@ -25,7 +25,7 @@ fn kepler<S: Scalar>() -> Box<dyn EulerLagrange<S>> {
 }
 
 /// Largest error of the samples of a run at a tolerance.
-fn run<S: Integrable>(method: Method, t_end: f64, tolerance: f64) -> f64 {
+fn run<S: Integrable>(method: Integrator, t_end: f64, tolerance: f64) -> f64 {
     let start = orbit(Dd::of_f64(0.0)).map(|x| x.cast::<S>());
     let tolerance = S::of_f64(tolerance);
     let options =
@@ -50,7 +50,7 @@ fn amplification(t: f64) -> f64 {
 fn tolerances<S: Integrable>(finest: i32) {
     let mut row = Row::new::<S>(34, "Kepler, e = 1/2: error over rtol x amplification");
     let t_end = 10.0;
-    for method in [Method::Dopri5, Method::Dop853] {
+    for method in [Integrator::Dopri5, Integrator::Dop853] {
         let mut last = f64::INFINITY;
         for k in 3..=finest {
             let tolerance = 10f64.powi(-k);
@@ -86,7 +86,7 @@ fn slope(points: &[(f64, f64)]) -> f64 {
 fn case_33_orders_of_the_adaptive_methods() {
     let given = [("m", "1"), ("k", "1")].map(|(symbol, value)| (symbol.into(), value.into()));
     let model = configure::<f64>("harmonic-oscillator", &given).unwrap().build().unwrap();
-    for (method, order, quarters) in [(Method::Dopri5, 5.0, 20..=44), (Method::Dop853, 8.0, 39..=54)] {
+    for (method, order, quarters) in [(Integrator::Dopri5, 5.0, 20..=44), (Integrator::Dop853, 8.0, 39..=54)] {
         let t_end = 60.0;
         let (sin, cos) = Dd::of_f64(t_end).sin_cos();
         let run = |tolerance: f64| {
@@ -116,7 +116,7 @@ fn exponent<S: Scalar>(h: f64, steps: usize, starts: usize) -> f64 {
     for k in 0..starts {
         let [t_end, dt, step] = [t_end, t_end / 1024.0, h].map(S::of_f64);
         let options = Options {
-            method: Method::Gauss6,
+            method: Integrator::Gauss6,
             step: Some(step),
             max_steps: usize::MAX,
             energy: false,
