@@ -307,9 +307,7 @@ pub(crate) fn choose_steps(problem: &mut Problem<'_>, x: &[f64], segments: &[Seg
     let mut probes: Vec<&Segment> = segments.iter().step_by(stride).collect();
     probes.sort_by_key(|segment| std::cmp::Reverse(segment.samples));
     let n = problem.sigma.len();
-    // Errors `e` of the noise add `N e^2` to a sum of squares of `N` residuals, of which single terms of a formula are judged.
-    let residuals = n * segments.iter().map(|segment| segment.samples).sum::<usize>();
-    let most = INTEGRATOR.min((INTEGRATOR_SQUARE / residuals.max(1) as f64).sqrt());
+    let residuals = (n * segments.iter().map(|segment| segment.samples).sum::<usize>()) as f64;
     let mut coarse = problem.ends(x, &probes);
     while problem.course.substeps < MOST_SUBSTEPS {
         let mut finer = problem.clone();
@@ -320,7 +318,10 @@ pub(crate) fn choose_steps(problem: &mut Problem<'_>, x: &[f64], segments: &[Seg
         });
         let mut errors: Vec<f64> = errors.collect();
         errors.sort_by(f64::total_cmp);
-        if errors.get(errors.len() * 9 / 10).is_none_or(|worst| *worst < most) {
+        let near = errors.get(errors.len() * 9 / 10).is_none_or(|worst| *worst < INTEGRATOR);
+        // What they add to the sum of squares, by which single terms of a formula are judged; a segment that is lost counts once.
+        let square = errors.iter().map(|e| e.min(1.0).powi(2)).sum::<f64>() / errors.len().max(1) as f64;
+        if near && square * residuals < INTEGRATOR_SQUARE {
             break;
         }
         (problem.course.substeps, coarse) = (finer.course.substeps, fine);
