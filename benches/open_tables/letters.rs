@@ -206,23 +206,25 @@ fn valid_free(model: &dyn EulerLagrange<f64>, exact: &Motion) -> f64 {
     valid(&exact.q, &found.trajectory, FREE_SPREAD, FREE_STEP)
 }
 
-/// States to learn from for the motion without torques: positions anywhere on the circle, velocities and accelerations in the ranges of
-/// the motions that are followed. Their training file is missing.
+/// States to learn from for the motion without torques: positions anywhere on the circle, velocities in the range of the motions that are
+/// followed, and torques up to the arm's own weight, which say the accelerations. Their training file is missing.
 fn free_states(followed: &[Motion], seed: u64) -> Motion {
-    let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let range = |of: fn(&Motion) -> &[f64], j: usize| {
-        let all = followed.iter().flat_map(|motion| of(motion).iter().skip(j).step_by(2));
+    let (arm, mut rng) = (Mechanics::new(Arm, []), ChaCha8Rng::seed_from_u64(seed));
+    let fastest = |j: usize| {
+        let all = followed.iter().flat_map(|motion| motion.v.iter().skip(j).step_by(2));
         all.fold(0.0, |most: f64, x| most.max(x.abs()))
     };
-    let bounds = [PI, PI, range(|m| &m.v, 0), range(|m| &m.v, 1), range(|m| &m.a, 0), range(|m| &m.a, 1)];
-    let mut found = (Vec::new(), Vec::new(), Vec::new());
+    let bounds = [PI, PI, fastest(0), fastest(1), 4.125, 1.5];
+    let mut found = Motion::default();
     for _ in 0..FREE_STATES {
-        let [q1, q2, v1, v2, a1, a2] = bounds.map(|most| most * (2.0 * rng.random::<f64>() - 1.0));
-        found.0.extend([q1, q2]);
-        found.1.extend([v1, v2]);
-        found.2.extend([a1, a2]);
+        let [q1, q2, v1, v2, t1, t2] = bounds.map(|most| most * (2.0 * rng.random::<f64>() - 1.0));
+        let torque = move |_: f64, _: &[f64], _: &[f64], force: &mut [f64]| force.copy_from_slice(&[t1, t2]);
+        found.a.extend(Driven::new(&arm, &torque).acceleration(0.0, &[q1, q2], &[v1, v2]).expect("smooth forces"));
+        found.q.extend([q1, q2]);
+        found.v.extend([v1, v2]);
+        found.torque.extend([t1, t2]);
     }
-    Motion::of(found)
+    found
 }
 
 /// Largest distance of a joint in rad from a letter that the arm is to draw, under the torques that a model asks for: those of the wanted

@@ -24,8 +24,6 @@ const MOST_SAMPLES: usize = 60_000;
 const LEAST_NOISE: f64 = 1e-9;
 /// Error of the integrator over the noise.
 const INTEGRATOR: f64 = 0.05;
-/// What the errors of the integrator may add to the sum of squares of all residuals.
-const INTEGRATOR_SQUARE: f64 = 3.0;
 const MOST_SUBSTEPS: usize = 64;
 /// Longer segments may be met worse by this factor of the mean square.
 const WORSE: f64 = 1.5;
@@ -299,15 +297,14 @@ fn log(fitted: &Fitted, what: &str) {
     tracing::debug!(?x, samples, segments, substeps, square, spread, failed = fitted.normal.failed, "{what}");
 }
 
-/// As many integration steps from sample to sample as keep the integrator's error below a part of the noise, and, of all residuals
-/// together, below what their scatter shows; `true` if that changes their number.
+/// As many integration steps from sample to sample as keep the integrator's error below a part of the noise; `true` if that changes
+/// their number.
 pub(crate) fn choose_steps(problem: &mut Problem<'_>, x: &[f64], segments: &[Segment]) -> bool {
     let before = problem.course.substeps;
     let stride = segments.len().div_ceil(32).max(1);
     let mut probes: Vec<&Segment> = segments.iter().step_by(stride).collect();
     probes.sort_by_key(|segment| std::cmp::Reverse(segment.samples));
     let n = problem.sigma.len();
-    let residuals = (n * segments.iter().map(|segment| segment.samples).sum::<usize>()) as f64;
     let mut coarse = problem.ends(x, &probes);
     while problem.course.substeps < MOST_SUBSTEPS {
         let mut finer = problem.clone();
@@ -318,10 +315,7 @@ pub(crate) fn choose_steps(problem: &mut Problem<'_>, x: &[f64], segments: &[Seg
         });
         let mut errors: Vec<f64> = errors.collect();
         errors.sort_by(f64::total_cmp);
-        let near = errors.get(errors.len() * 9 / 10).is_none_or(|worst| *worst < INTEGRATOR);
-        // What they add to the sum of squares, by which single terms of a formula are judged; a segment that is lost counts once.
-        let square = errors.iter().map(|e| e.min(1.0).powi(2)).sum::<f64>() / errors.len().max(1) as f64;
-        if near && square * residuals < INTEGRATOR_SQUARE {
+        if errors.get(errors.len() * 9 / 10).is_none_or(|worst| *worst < INTEGRATOR) {
             break;
         }
         (problem.course.substeps, coarse) = (finer.course.substeps, fine);
