@@ -550,7 +550,6 @@ impl Subject {
     /// The page of a model, HTML.
     fn page(&self) -> PyResult<String> {
         let Kind::Model(header, network, _) = &self.kind else { return Err(value("a system has no page")) };
-        self.require_free()?;
         page(header, network, self.system_instance().ok().as_ref()).map_err(value)
     }
 

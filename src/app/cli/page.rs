@@ -28,7 +28,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let path = model_file(&args.model)?;
     require_free(&args.out, &[&path], args.overwrite)?;
     check_target(&args.out).map_err(|e| CliError::file(&args.out, format_args!("cannot write: {e}")))?;
-    let learned = Learned::<f64>::load_free(&path)?;
+    let learned = Learned::<f64>::load(&path)?;
     // Of motion that was only recorded there is nothing exact.
     let system = learned.system(&path).ok();
     let text = page(&learned.header, &learned.network, system.as_ref()).map_err(|e| CliError::file(&path, e))?;

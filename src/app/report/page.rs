@@ -3,9 +3,11 @@
 
 use super::html::{base64, escape};
 use crate::lagrangian::system::Bounds;
-use crate::lagrangian::{Lagrangian, LagrangianVisitor, SystemInstance};
+use crate::lagrangian::{
+    Constraints, EulerLagrange, ExpressionConstraints, Lagrangian, LagrangianVisitor, SystemError, SystemInstance, project,
+};
 use crate::network::NetworkLagrangian;
-use crate::network::file::Header;
+use crate::network::file::{Header, ModelFileError};
 use crate::tape::{Listing, Operation, TapeError};
 use serde_json::{Value, json};
 use thiserror::Error;
@@ -13,12 +15,15 @@ use thiserror::Error;
 const PAGE: &str = include_str!("page/page.html");
 const STYLE: &str = include_str!("page/play.css");
 const ENGINE: &str = include_str!("page/engine.js");
+const PICTURES: &str = include_str!("page/pictures.js");
 const PLAY: &str = include_str!("page/play.js");
 
 /// Largest page, in bytes.
 const MOST_BYTES: usize = 500_000;
 /// Seconds in which a system without seconds crosses what the model knows of it.
 const SECONDS: f64 = 20.0;
+/// States from which a start on the constraints is looked for.
+const STARTS: usize = 24;
 
 /// Why a model has no page.
 #[derive(Debug, Error)]
@@ -26,6 +31,12 @@ pub enum PageError {
     /// Functions that cannot be written as a list of operations.
     #[error(transparent)]
     Tape(#[from] TapeError),
+    /// Constraints that do not fit the model.
+    #[error(transparent)]
+    Header(#[from] ModelFileError),
+    /// Constraints that do not fit the system.
+    #[error(transparent)]
+    System(#[from] SystemError),
     /// More weights than a page holds.
     #[error("the page would have {found} bytes, {MOST_BYTES} at most are written: a smaller network has a page")]
     Large {
@@ -52,6 +63,13 @@ pub fn page(
             architecture.rayleigh_dissipation(p, &x[..n], &x[n..])
         })?),
     };
+    let motion = header.constrain(Box::new(network.clone()))?;
+    let held = match header.constraints()? {
+        Some((constraints, parameters)) => json!({
+            "rows": rows(&constraints, motion.as_ref(), parameters.len())?, "parameters": parameters,
+        }),
+        None => json!({ "rows": [], "parameters": [] }),
+    };
     let single: Vec<u8> = weights.iter().flat_map(|weight| (*weight as f32).to_le_bytes()).collect();
     let exact = system.map(exact).transpose()?.flatten();
     let units = system.map_or_else(
@@ -59,7 +77,7 @@ pub fn page(
         |system| system.system.coordinates(n).into_iter().map(|c| c.unit.into_owned()).collect(),
     );
     let time_unit = system.map_or("s", |system| &system.system.time_unit);
-    let start = start(header, system);
+    let start = start(header, system, motion.as_ref());
     let time_like = architecture.time_like.or(system.and_then(|system| system.system.time_like));
     let t_end = system.map_or(SECONDS, |system| system.system.trajectory(n).t_end);
     let t_end = if time_unit == "s" { t_end } else { t_end.max(crossing(header, &start, time_like)) };
@@ -77,7 +95,9 @@ pub fn page(
         "ranges": { "position": header.position, "velocity": header.velocity },
         "learned": {
             "lagrangian": operations(&lagrangian), "dissipation": dissipation, "weights": base64(&single),
+            "held": held,
         },
+        "constraints": header.held_by(),
         "exact": exact,
     });
     let known = if data["exact"].is_null() { "." } else { ", <b class=\"exact\">exact</b>." };
@@ -85,15 +105,15 @@ pub fn page(
     let data = data.to_string().replace('<', "\\u003c");
     let text = PAGE.replace("{TITLE}", &escape(&format!("{title}: learned")));
     let text = text.replace("{STYLE}", STYLE).replace("{EXACT}", known).replace("{ENGINE}", ENGINE);
-    let text = text.replace("{PLAY}", PLAY).replace("{DATA}", &data);
+    let text = text.replace("{PLAY}", &[PICTURES, PLAY].concat()).replace("{DATA}", &data);
     if text.len() > MOST_BYTES {
         return Err(PageError::Large { found: text.len() });
     }
     Ok(text)
 }
 
-/// The exact Lagrangian with its parameters; none of a system whose Lagrangian alone does not tell its motion.
-fn exact(system: &SystemInstance<f64>) -> Result<Option<Value>, TapeError> {
+/// The exact Lagrangian, dissipation and constraints with their parameters.
+fn exact(system: &SystemInstance<f64>) -> Result<Option<Value>, PageError> {
     struct List {
         n: usize,
         parameters: usize,
@@ -105,32 +125,70 @@ fn exact(system: &SystemInstance<f64>) -> Result<Option<Value>, TapeError> {
             Listing::record::<f64, _>(2 * n, parameters, |x, p| lagrangian.lagrangian(p, &x[..n], &x[n..]))
         }
     }
-    if system.dissipation().is_some() {
-        return Ok(None);
-    }
-    let list = List { n: system.coordinates, parameters: system.parameters.len() };
-    let Some(listing) = system.visit(list).transpose()? else { return Ok(None) };
+    let list = || List { n: system.coordinates, parameters: system.parameters.len() };
+    let Some(listing) = system.visit_unconstrained(list()).transpose()? else { return Ok(None) };
+    let dissipation = match system.dissipation() {
+        Some(function) => operations(&list().visit(function)?),
+        None => Value::Null,
+    };
+    let held = match system.constraints() {
+        Some(constraints) => rows(constraints, system.build()?.as_ref(), system.parameters.len())?,
+        None => Vec::new(),
+    };
     let named = system.system.parameters.iter().zip(&system.parameters);
     let parameters: Vec<Value> =
         named.map(|(p, value)| json!({ "symbol": p.symbol, "unit": p.unit, "value": value })).collect();
-    Ok(Some(json!({ "lagrangian": operations(&listing), "parameters": parameters })))
+    Ok(Some(json!({
+        "lagrangian": operations(&listing), "dissipation": dissipation, "held": { "rows": held }, "parameters": parameters,
+    })))
 }
 
-/// A moving start within what the model knows, of a system among those of its trajectory test and on its mass shell.
-fn start(header: &Header, system: Option<&SystemInstance<f64>>) -> (Vec<f64>, Vec<f64>) {
-    let at = |share: f64| move |&(low, high): &(f64, f64)| low + share * (high - low);
+/// What vanishes along a motion: the rows of its constraints that do not follow from others.
+fn rows(
+    constraints: &ExpressionConstraints,
+    motion: &dyn EulerLagrange<f64>,
+    parameters: usize,
+) -> Result<Vec<Value>, TapeError> {
+    let (n, kept) = (constraints.coordinates(), motion.manifold().map_or(&[][..], |manifold| manifold.names()));
+    let all = constraints.names().into_iter().enumerate().filter(|(_, name)| kept.contains(name));
+    all.map(|(row, name)| {
+        let value =
+            Listing::record::<f64, _>(2 * n, parameters, |x, p| constraints.value(row, p, &x[..n], &x[n..]))?;
+        Ok(json!({ "name": name, "holonomic": constraints.is_holonomic(row), "value": operations(&value) }))
+    })
+    .collect()
+}
+
+/// A moving start within what the model knows, of a system among those of its trajectory test, on its mass shell and its constraints.
+fn start(
+    header: &Header,
+    system: Option<&SystemInstance<f64>>,
+    motion: &dyn EulerLagrange<f64>,
+) -> (Vec<f64>, Vec<f64>) {
     let pairs = |ranges: &[[f64; 2]]| ranges.iter().map(|&[low, high]| (low, high)).collect();
     let Bounds { positions, velocities } = match system {
         Some(system) => system.system.trajectory(system.coordinates).start,
         None => Bounds { positions: pairs(&header.position), velocities: pairs(&header.velocity) },
     };
-    let q: Vec<f64> = positions.iter().map(at(0.3)).collect();
-    let mut v: Vec<f64> = velocities.iter().map(at(0.75)).collect();
+    // Shares of the sides, other ones for every try and, beyond the first, for every coordinate.
+    let inside = |sides: &[(f64, f64)], share: f64, k: usize| -> Vec<f64> {
+        let share = |i: usize| (share + (k * (i + 1)) as f64 * std::f64::consts::SQRT_2).fract();
+        sides.iter().enumerate().map(|(i, (low, high))| low + share(i) * (high - low)).collect()
+    };
+    let (q, mut v) = (inside(&positions, 0.3, 0), inside(&velocities, 0.75, 0));
     if let Some(system) = system {
         // Off the shell there is a motion as well.
         let _ = system.impose_constraint(&q, &mut v);
     }
-    (q, v)
+    let Some(manifold) = motion.manifold() else { return (q, v) };
+    let known = |q: &[f64]| q.iter().zip(&header.position).all(|(q, [low, high])| (low..=high).contains(&q));
+    let tries = (1..=STARTS).filter_map(|k| {
+        let (mut q, mut v) = (inside(&positions, 0.3, k), inside(&velocities, 0.75, k));
+        project(manifold, &mut q, &mut v).ok().map(|_| (q, v))
+    });
+    let mut tries = tries.peekable();
+    let first = tries.peek().cloned().unwrap_or((q, v));
+    tries.find(|(q, _)| known(q)).unwrap_or(first)
 }
 
 /// The least time in which a motion from a start crosses what the model knows of a coordinate, 0 if it crosses nothing.

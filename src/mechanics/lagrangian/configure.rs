@@ -181,7 +181,11 @@ impl<S: Scalar> SystemInstance<S> {
     /// Shows the Lagrangian to a visitor; `None` if the description is not of the catalogue, and of a system with constraints, whose
     /// Lagrangian alone does not tell its motion.
     pub(crate) fn visit<V: LagrangianVisitor>(&self, visitor: V) -> Option<V::Output> {
-        if self.constraints().is_some() { None } else { visit_lagrangian(self, visitor) }
+        if self.constraints().is_some() { None } else { self.visit_unconstrained(visitor) }
+    }
+    /// The same of a system under constraints as well.
+    pub(crate) fn visit_unconstrained<V: LagrangianVisitor>(&self, visitor: V) -> Option<V::Output> {
+        visit_lagrangian(self, visitor)
     }
     /// Acceleration of one state by the closed form, which shares nothing with the Lagrangian but the parameters; of a system by its
     /// description, for which no closed form is known, by differentiating its Lagrangian. `NaN` where the mass matrix is singular.

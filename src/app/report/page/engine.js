@@ -228,14 +228,116 @@ function solve(matrix, right) {
   return { x, determinant };
 }
 
-// Something that moves: a Lagrangian, perhaps a dissipation, angles that are reduced to one turn.
+// Scalar product, length, largest magnitude.
+const dot = (a, b) => a.reduce((sum, x, i) => sum + x * b[i], 0);
+const length = (a) => Math.hypot(...a);
+const largest = (a) => a.reduce((most, x) => Math.max(most, Math.abs(x)), 0);
+
+// Rows at unit length whose part beside the others is below this depend on them.
+const DEPENDENT = 16 * Math.sqrt(Number.EPSILON);
+
+// An orthonormal basis of rows, and what a vector has along it that has given products with the rows; rows that depend on others are
+// left out.
+function orthonormal(rows, products) {
+  const basis = [], along = [];
+  rows.forEach((row, k) => {
+    const size = length(row);
+    if (!(size > 0)) return;
+    let [rest, product] = [row.map((x) => x / size), products[k] / size];
+    // Twice, since once leaves rounding.
+    for (let pass = 0; pass < 2; pass++) {
+      basis.forEach((u, i) => {
+        const part = dot(u, rest);
+        rest = rest.map((x, j) => x - part * u[j]);
+        product -= part * along[i];
+      });
+    }
+    const left = length(rest);
+    if (!(left > DEPENDENT)) return;
+    basis.push(rest.map((x) => x / left));
+    along.push(product / left);
+  });
+  return { basis, along };
+}
+
+// The shortest vector that has given products with rows.
+function shortest(rows, products, n) {
+  const { basis, along } = orthonormal(rows, products), x = Array(n).fill(0);
+  basis.forEach((u, k) => u.forEach((part, i) => (x[i] += along[k] * part)));
+  return x;
+}
+
+// An orthonormal basis of what is perpendicular to rows.
+function perpendicular(rows, n) {
+  const spanned = orthonormal(rows, rows.map(() => 0)).basis, all = spanned.slice();
+  const axis = (i) => Array.from({ length: n }, (_, k) => (k === i ? 1 : 0));
+  const outside = (x) => {
+    for (let pass = 0; pass < 2; pass++) {
+      for (const u of all) {
+        const part = dot(u, x);
+        x = x.map((x, j) => x - part * u[j]);
+      }
+    }
+    return x;
+  };
+  while (all.length < n) {
+    // The axis with the largest part outside what there is.
+    const left = Array.from({ length: n }, (_, i) => outside(axis(i)));
+    const best = left.reduce((a, b) => (length(b) > length(a) ? b : a)), size = length(best);
+    if (!(size > 0)) break;
+    all.push(best.map((x) => x / size));
+  }
+  return all.slice(spanned.length);
+}
+
+// Something that moves: a Lagrangian, perhaps a dissipation and constraints, angles that are reduced to one turn.
 class Motion {
-  constructor({ lagrangian, dissipation }, parameters, n, wrapped) {
+  constructor({ lagrangian, dissipation, held }, parameters, n, wrapped) {
     Object.assign(this, { n, wrapped, parameters });
     this.lagrangian = new Recorded(lagrangian, parameters, 2 * n);
     this.friction = dissipation ? new Recorded(dissipation, parameters, 2 * n) : null;
+    const given = held.parameters ? Float64Array.from(held.parameters) : parameters;
+    this.held = held.rows.map(({ name, holonomic, value }) => ({ name, holonomic, of: new Recorded(value, given, 2 * n) }));
   }
-  // L, p, g, M, c, a, E and det M of a state.
+  // What holds the motion at a state: rows A, values, rates A v - b and drifts gamma.
+  rows(q, v) {
+    const n = this.n, x = q.concat(v), list = (f) => Array.from({ length: n }, (_, i) => f(i));
+    return this.held.map(({ name, holonomic, of }) => {
+      const value = of.evaluate(x);
+      if (!holonomic) {
+        const row = list((i) => of.first(n + i)), drift = dot(list((i) => of.first(i)), v);
+        return { name, holonomic, row, value: 0, rate: value, drift };
+      }
+      const row = list((i) => of.first(i));
+      const drift = v.reduce((sum, a, i) => sum + a * v.reduce((sum, b, j) => sum + of.second(i, j) * b, 0), 0);
+      return { name, holonomic, row, value, rate: dot(row, v), drift };
+    });
+  }
+  // The nearest state on the constraints: q by Newton's method, then v; null where there is none.
+  project(q, v) {
+    const n = this.n, holonomic = ({ holonomic }) => holonomic;
+    if (!this.held.length) return { q, v };
+    for (let step = 0, last = Infinity; step < 60; step++) {
+      const rows = this.rows(q, v).filter(holonomic);
+      const change = shortest(rows.map(({ row }) => row), rows.map(({ value }) => value), n), size = largest(change);
+      q = q.map((x, i) => x - change[i]);
+      const rounding = Number.EPSILON * largest(q);
+      if (!(size > rounding) || (step > 3 && size > last / 2 && size < 1024 * rounding)) break;
+      last = size;
+    }
+    for (let pass = 0; pass < 2; pass++) {
+      const rows = this.rows(q, v);
+      const change = shortest(rows.map(({ row }) => row), rows.map(({ rate }) => rate), n);
+      v = v.map((x, i) => x - change[i]);
+    }
+    return this.distance(q, v) <= 1e-9 * (largest(q.concat(v)) || 1) ? { q, v } : null;
+  }
+  // How far a state is off the constraints, in units of the coordinates or of the velocities.
+  distance(q, v) {
+    const off = ({ row, value, rate }) => Math.max(Math.abs(value), Math.abs(rate)) / (length(row) || 1);
+    return this.rows(q, v).map(off).reduce((most, x) => (x > most || Number.isNaN(x) ? x : most), 0);
+  }
+  // L, p, M, a, E, of a state, and det M, under constraints that of M within them.
   terms(q, v) {
     const { n, lagrangian, wrapped, friction } = this, turn = 2 * Math.PI;
     const x = q.map((q, i) => (wrapped[i] ? q - turn * Math.floor(q / turn) : q)).concat(v);
@@ -247,9 +349,18 @@ class Motion {
     if (friction) friction.evaluate(x);
     const force = list((i) => (friction ? -friction.first(n + i) : 0));
     const right = list((i) => slope[i] - drift[i] + force[i]);
-    const { x: acceleration, determinant } = solve(mass, right);
-    const energy = momentum.reduce((sum, p, i) => sum + p * v[i], 0) - value;
-    return { lagrangian: value, momentum, mass, acceleration, energy, determinant };
+    const energy = dot(momentum, v) - value, found = { lagrangian: value, momentum, mass, energy };
+    if (!this.held.length) {
+      const { x: acceleration, determinant } = solve(mass, right);
+      return { ...found, acceleration, determinant };
+    }
+    // [M A^T; A 0] [a; -lambda] = [f; -gamma]
+    const rows = this.rows(q, v), a = rows.map(({ row }) => row);
+    const matrix = mass.map((row, i) => row.concat(a.map((row) => row[i]))).concat(a.map((row) => row.concat(a.map(() => 0))));
+    const acceleration = solve(matrix, right.concat(rows.map(({ drift }) => -drift))).x.slice(0, n);
+    const free = perpendicular(a, n), images = free.map((z) => mass.map((row) => dot(row, z)));
+    const within = free.map((z) => images.map((image) => dot(z, image)));
+    return { ...found, acceleration, determinant: solve(within, free.map(() => 0)).determinant };
   }
   rate(y) {
     const q = y.slice(0, this.n), v = y.slice(this.n);
@@ -264,10 +375,14 @@ const STAGES = [
 ];
 const ERROR = [71 / 57600, 0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40];
 
-// A motion from a start; `advance` goes on to a time, or as far as its evaluations reach.
+const OFF = "the constraints have no state near this one";
+
+// A motion from a start, brought to its constraints there and after every step; `advance` goes on to a time, or as far as its evaluations
+// reach.
 class Flight {
   constructor(motion, q, v, step) {
-    Object.assign(this, { motion, t: 0, y: q.concat(v), step, ended: null });
+    const on = motion.project(q, v);
+    Object.assign(this, { motion, t: 0, y: on ? on.q.concat(on.v) : q.concat(v), step, ended: on ? null : OFF });
   }
   advance(until, evaluations = Infinity, rtol = 1e-7, atol = 1e-9) {
     const { motion } = this;
@@ -286,12 +401,14 @@ class Flight {
       });
       error = Math.sqrt(error / this.y.length);
       if (error <= 1) {
+        const n = motion.n, on = motion.project(next.slice(0, n), next.slice(n));
         this.t += h;
-        this.y = next;
+        this.y = on ? on.q.concat(on.v) : next;
+        if (!on) this.ended = OFF;
       }
       const factor = Number.isFinite(error) ? Math.min(5, Math.max(0.2, 0.9 * (error || 1e-10) ** -0.2)) : 0.2;
       if (error > 1 || h === this.step || factor < 1) this.step = h * factor;
-      if (!(this.step > 1e-12 * Math.max(1, Math.abs(this.t)))) this.ended = "the motion goes no further: its equations have no solution here";
+      if (!this.ended && !(this.step > 1e-12 * Math.max(1, Math.abs(this.t)))) this.ended = "the motion goes no further: its equations have no solution here";
     }
   }
 }

@@ -1,104 +1,37 @@
 "use strict";
 // The page: what is drawn, what is dragged, what is read off. The numbers are those of engine.js.
 
-// A picture of states by the names of the coordinates: `parts` gives lines and bobs in units of length, `take` the coordinates that put a
-// bob at a point; none of it where nothing but curves over time is known.
-function pictureOf(data) {
-  const n = data.columns.length / 2, names = data.columns.slice(0, n);
-  const constant = (symbol) => ((data.exact && data.exact.parameters) || []).find((p) => p.symbol === symbol);
-  const angles = names.every((name, i) => data.periodic[i] && /^(theta|phi|angle|q)\d*$/.test(name));
-  if (angles && data.time_like === null) {
-    const rods = (values) => names.map((_, i) => {
-      const found = constant(`l${i + 1}`) || constant("l");
-      return found ? values[found.symbol] : 1;
-    });
-    const joints = (q, values) => {
-      let [x, y] = [0, 0];
-      return [[0, 0]].concat(rods(values).map((l, i) => [(x += l * Math.sin(q[i])), (y -= l * Math.cos(q[i]))]));
-    };
-    return {
-      reach: (values) => 1.1 * rods(values).reduce((a, b) => a + b, 0),
-      joints,
-      lines: true,
-      take: (q, k, [x, y], values) => {
-        const [px, py] = joints(q, values)[k - 1];
-        return q.map((old, i) => (i === k - 1 ? near(Math.atan2(x - px, py - y), old) : old));
-      },
-    };
-  }
-  const place = (name) => names.indexOf(name);
-  const [r, turn] = [place("r"), Math.max(place("theta"), place("phi"), place("angle"))];
-  if (place("theta") >= 0 && place("phi") >= 0 && r < 0 && n === 2) {
-    const [a, b] = [place("theta"), place("phi")], tilt = 0.5;
-    return {
-      reach: () => 1.15,
-      globe: true,
-      joints: (q) => {
-        const [s, c] = [Math.sin(q[a]), Math.cos(q[a])], [x, y] = [s * Math.cos(q[b]), s * Math.sin(q[b])];
-        return [[0, 0], [y, c * Math.cos(tilt) - x * Math.sin(tilt)]];
-      },
-      take: (q, k, [x, y]) => {
-        const z = Math.sqrt(Math.max(0, 1 - x * x - y * y));
-        const up = y * Math.cos(tilt) + z * Math.sin(tilt), ahead = z * Math.cos(tilt) - y * Math.sin(tilt);
-        const next = q.slice();
-        next[a] = Math.acos(Math.max(-0.999, Math.min(0.999, up)));
-        next[b] = near(Math.atan2(x, ahead), q[b]);
-        return next;
-      },
-    };
-  }
-  if (r >= 0) {
-    const angle = place("phi") >= 0 ? place("phi") : turn, hangs = names[angle] === "theta" || names[angle] === "angle";
-    const far = data.ranges.position[r][1];
-    const hole = (values) => (data.time_like !== null && values.M > 0 ? values.M + Math.sqrt(Math.max(0, values.M ** 2 - (values.a || 0) ** 2)) : 0);
-    return {
-      reach: () => 1.15 * far,
-      hole,
-      lines: hangs,
-      joints: (q) => {
-        const at = angle >= 0 ? q[angle] : 0;
-        return [[0, 0], hangs ? [q[r] * Math.sin(at), -q[r] * Math.cos(at)] : [q[r] * Math.cos(at), q[r] * Math.sin(at)]];
-      },
-      take: (q, k, [x, y]) => {
-        const next = q.slice();
-        next[r] = Math.hypot(x, y);
-        if (angle >= 0) next[angle] = near(hangs ? Math.atan2(x, -y) : Math.atan2(y, x), q[angle]);
-        return next;
-      },
-    };
-  }
-  const space = names.map((_, i) => i).filter((i) => i !== data.time_like && !data.periodic[i]);
-  if (space.length >= 1 && names.every((_, i) => !data.periodic[i])) {
-    const [a, b] = space, size = (i) => (i === undefined ? 0 : Math.max(...data.ranges.position[i].map(Math.abs)));
-    return {
-      reach: () => 1.2 * Math.max(size(a), size(b)),
-      lines: b === undefined,
-      joints: (q) => [[0, 0], [q[a], b === undefined ? 0 : q[b]]],
-      take: (q, k, [x, y]) => q.map((old, i) => (i === a ? x : i === b ? y : old)),
-    };
-  }
-  return null;
-}
-
-// The angle of the same direction that is nearest to another.
-function near(angle, other) {
-  return angle + 2 * Math.PI * Math.round((other - angle) / (2 * Math.PI));
-}
-
 function play(data) {
   const n = data.columns.length / 2, $ = (id) => document.getElementById(id);
-  const { learned, exact } = load(data), picture = pictureOf(data);
+  const { learned, exact } = load(data), picture = pictureOf(data, learned);
   const values = Object.fromEntries(((data.exact && data.exact.parameters) || []).map((p) => [p.symbol, p.value]));
   const kinds = [["learned", learned]].concat(exact ? [["exact", exact]] : []);
   const start = { q: data.start.q.slice(), v: data.start.v.slice() };
   const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
   const digits = (x) => (Number.isFinite(x) ? Number(x.toPrecision(4)).toString() : "no number");
-  let flights, paths, running = false, last = 0, dragged = 0, speed = 1, reading = null;
+  const held = kinds.some(([, motion]) => motion.held.length);
+  let flights, paths, running = false, last = 0, dragged = 0, speed = 1, reading = null, turning = null;
+
+  // The state that `put` asks for, as near to it as the constraints allow: it is put again after every way to them.
+  function settle(q, v, put) {
+    let on = { q: q.slice(), v: v.slice() };
+    for (let pass = 0; pass < (learned.held.length ? 24 : 1) && on; pass++) {
+      put(on);
+      on = learned.project(on.q, on.v);
+    }
+    return on;
+  }
 
   function reset() {
+    Object.assign(start, learned.project(start.q, start.v));
     flights = kinds.map(([, motion]) => new Flight(motion, start.q, start.v, data.span / 1000));
-    paths = kinds.map(([, motion], k) => [{ t: 0, y: flights[k].y, energy: motion.terms(start.q, start.v).energy }]);
+    paths = kinds.map(([, motion], k) => [point(motion, flights[k])]);
     draw();
+  }
+
+  function point(motion, { t, y }) {
+    const q = y.slice(0, n), v = y.slice(n);
+    return { t, y, energy: motion.terms(q, v).energy, off: motion.distance(q, v) };
   }
 
   function advance(seconds) {
@@ -106,8 +39,7 @@ function play(data) {
     flights.forEach((flight, k) => {
       if (flight.ended) return;
       flight.advance(until, 120);
-      const y = flight.y, terms = kinds[k][1].terms(y.slice(0, n), y.slice(n));
-      paths[k].push({ t: flight.t, y, energy: terms.energy });
+      paths[k].push(point(kinds[k][1], flight));
       if (paths[k].length > 4000) paths[k].splice(1, 1000);
     });
     if (flights.every((flight) => flight.ended)) running = false;
@@ -140,47 +72,73 @@ function play(data) {
       pen.beginPath();
       pen.arc(width / 2, height / 2, unit, 0, 7);
       pen.stroke();
-    } else if (picture.hole && picture.hole(values) > 0) {
+    } else if (picture.hole && picture.hole(values)) {
       // The hole, up to its outer horizon.
+      const [wide, tall] = picture.hole(values), [x, y] = to(picture.centre());
       pen.fillStyle = colour("line");
       pen.beginPath();
-      pen.arc(width / 2, height / 2, unit * picture.hole(values), 0, 7);
+      pen.ellipse(x, y, unit * wide, unit * tall, 0, 0, 7);
       pen.fill();
       pen.stroke();
     } else if (!picture.lines) {
       // The origin.
+      const [x, y] = to(picture.centre());
       pen.beginPath();
-      for (const [x, y] of [[6, 0], [0, 6]]) {
-        pen.moveTo(width / 2 - x, height / 2 - y);
-        pen.lineTo(width / 2 + x, height / 2 + y);
+      for (const [a, b] of [[6, 0], [0, 6]]) {
+        pen.moveTo(x - a, y - b);
+        pen.lineTo(x + a, y + b);
       }
       pen.stroke();
     }
+    if (picture.free) drawSpace(area, to);
     kinds.slice().reverse().forEach(([name]) => {
       const k = kinds.findIndex((kind) => kind[0] === name), path = paths[k];
       pen.strokeStyle = pen.fillStyle = colour(name);
       pen.globalAlpha = 0.45;
       pen.lineWidth = 1.5;
-      pen.beginPath();
-      path.slice(-900).forEach((point) => {
-        const joints = picture.joints(point.y, values);
-        pen.lineTo(...to(joints[joints.length - 1]));
-      });
-      pen.stroke();
-      pen.globalAlpha = name === "learned" ? 1 : 0.75;
-      const joints = picture.joints(path[path.length - 1].y, values).map(to);
-      if (picture.lines) {
-        pen.lineWidth = name === "learned" ? 2.5 : 1.5;
+      const now = path[path.length - 1].y, joints = picture.joints(now, values);
+      const links = picture.links ? picture.links(now.slice(0, n), kinds[k][1]) : picture.lines ? joints.slice(1).map((to, i) => [joints[i], to]) : [];
+      // Of bobs on rods the way of the last one, of others all ways.
+      const trailed = path.slice(-900).map((point) => picture.joints(point.y, values));
+      for (let bob = links.length ? joints.length - 1 : 1; bob < joints.length; bob++) {
         pen.beginPath();
-        joints.forEach((joint) => pen.lineTo(...joint));
+        trailed.forEach((joints) => pen.lineTo(...to(joints[bob])));
         pen.stroke();
       }
-      joints.slice(1).forEach(([x, y]) => {
+      pen.globalAlpha = name === "learned" ? 1 : 0.75;
+      pen.lineWidth = name === "learned" ? 2.5 : 1.5;
+      links.forEach(([from, end]) => {
         pen.beginPath();
-        pen.arc(x, y, name === "learned" ? 9 : 6, 0, 7);
+        pen.moveTo(...to(from));
+        pen.lineTo(...to(end));
+        pen.stroke();
+      });
+      // What is nearer is drawn later and larger.
+      joints.slice(1).sort(([, , a = 0], [, , b = 0]) => a - b).forEach((joint) => {
+        const [x, y] = to(joint), near = 1 + (0.3 * (joint[2] || 0)) / picture.reach(values);
+        pen.beginPath();
+        pen.arc(x, y, near * (name === "learned" ? 9 : 6), 0, 7);
         pen.fill();
       });
       pen.globalAlpha = 1;
+    });
+  }
+
+  // What a point is held to, and the directions of space.
+  function drawSpace({ pen, height }, to) {
+    pen.fillStyle = colour("muted");
+    picture.dots().forEach((dot) => {
+      const [x, y] = to(dot);
+      pen.globalAlpha = dot.length < 3 ? 0.6 : dot[2] > 0 ? 0.75 : 0.25;
+      pen.fillRect(x - 1, y - 1, 2, 2);
+    });
+    pen.globalAlpha = 1;
+    picture.triad().forEach(([name, [x, y]]) => {
+      pen.beginPath();
+      pen.moveTo(48, height - 48);
+      pen.lineTo(48 + 30 * x, height - 48 - 30 * y);
+      pen.stroke();
+      pen.fillText(name, 44 + 40 * x, height - 44 - 40 * y);
     });
   }
 
@@ -208,7 +166,9 @@ function play(data) {
   function draw() {
     drawStage();
     const scale = (path) => Math.max(...path.map((point) => Math.abs(point.energy)), 1e-300);
-    drawCurves(sheet($("energy")), [[data.time_like === null ? "change of the energy, relative" : "change of the energy, the constraint, relative", (point, path) => (point.energy - path[0].energy) / scale(path)]]);
+    const curves = [[data.time_like === null ? "change of the energy, relative" : "change of the energy, the constraint, relative", (point, path) => (point.energy - path[0].energy) / scale(path)]];
+    if (held) curves.push(["distance from the constraints", (point) => point.off]);
+    drawCurves(sheet($("energy")), curves);
     if (picture) drawCurves(sheet($("first")), [[data.columns[n > 1 && data.time_like === 0 ? 1 : 0], (point) => point.y[n > 1 && data.time_like === 0 ? 1 : 0]]]);
     const ended = flights.map((flight, k) => (flight.ended ? `${kinds[k][0]}: ${flight.ended}.` : "")).join(" ");
     $("time").textContent = `t = ${flights[0].t.toFixed(2)} ${data.time_unit} ${ended}`;
@@ -219,12 +179,13 @@ function play(data) {
 
   // det M, or the components of a metric, at a point.
   function read(q, where) {
+    const within = held ? " within the constraints" : "";
     const text = kinds.map(([name, motion]) => {
       const { determinant, mass } = motion.terms(q, start.v);
       const diagonal = mass.map((row, i) => digits(row[i])).join(", ");
       const line = document.createElement("span");
       line.className = name;
-      line.textContent = `${name}: det M = ${digits(determinant)}, diagonal of M ${diagonal}`;
+      line.textContent = `${name}: det M${within} = ${digits(determinant)}, diagonal of M ${diagonal}`;
       return line;
     });
     const place = q.map((x, i) => `${data.columns[i]} = ${digits(x)}`).join(", ");
@@ -251,7 +212,8 @@ function play(data) {
   }
   data.columns.forEach((name, i) => {
     const side = i < n ? "q" : "v", at = i % n, [low, high] = data.ranges[i < n ? "position" : "velocity"][at];
-    slide("states", name, low, high, () => start[side][at], (x) => (start[side][at] = x));
+    const put = (x) => Object.assign(start, settle(start.q, start.v, (state) => (state[side][at] = x)));
+    slide("states", name, low, high, () => start[side][at], put);
   });
   if (exact && data.exact.parameters.length) {
     data.exact.parameters.forEach((p, i) => {
@@ -269,36 +231,57 @@ function play(data) {
   };
   const nearest = (point) => {
     const joints = picture.joints(flights[0].y, values).slice(1);
-    const away = joints.map(([x, y]) => Math.hypot(x - point[0], y - point[1]));
-    return 1 + away.indexOf(Math.min(...away));
+    const away = joints.map(([x, y]) => Math.hypot(x - point[0], y - point[1])), least = Math.min(...away);
+    return { bob: 1 + away.indexOf(least), away: least };
+  };
+  const asked = (q, bob, point) => settle(q, start.v, (state) => (state.q = picture.take(state.q, bob, point, values)));
+  const turn = (by, up) => {
+    picture.view.turn += by;
+    picture.view.lift = Math.max(-1.5, Math.min(1.5, picture.view.lift + up));
+    draw();
   };
   const falls = (q) => {
-    const { acceleration } = kinds[kinds.length - 1][1].terms(q, start.v.map(() => 0));
+    const still = start.v.map(() => 0), motion = kinds[kinds.length - 1][1];
+    const on = motion.project(q, still) || { q, v: still }, { acceleration } = motion.terms(on.q, on.v);
     return acceleration.some((a) => Math.abs(a) > 1e-9);
   };
   if (picture) {
     stage.addEventListener("pointerdown", (event) => {
       stage.setPointerCapture(event.pointerId);
-      dragged = nearest(pointed(event));
+      const { bob, away } = nearest(pointed(event)), box = stage.getBoundingClientRect();
+      // In space the background turns the view.
+      if (picture.view && away * toScreen(box).unit > 24) {
+        turning = [event.clientX, event.clientY];
+        return;
+      }
+      dragged = bob;
       running = false;
       start.q = flights[0].y.slice(0, n);
       move(event);
     });
     const move = (event) => {
-      start.q = picture.take(start.q, dragged, pointed(event), values);
+      const on = asked(start.q, dragged, pointed(event));
+      if (on) start.q = on.q;
       if (data.time_like === null && falls(start.q)) start.v = start.v.map(() => 0);
       reading = null;
       reset();
     };
     stage.addEventListener("pointermove", (event) => {
+      if (turning) {
+        turn((turning[0] - event.clientX) / 150, (event.clientY - turning[1]) / 150);
+        turning = [event.clientX, event.clientY];
+        return;
+      }
       if (dragged) return move(event);
-      reading = picture.take(flights[0].y.slice(0, n), nearest(pointed(event)), pointed(event), values);
-      read(reading, "under the cursor");
+      const on = asked(flights[0].y.slice(0, n), nearest(pointed(event)).bob, pointed(event));
+      reading = on && on.q;
+      if (on) read(reading, "under the cursor");
     });
     stage.addEventListener("pointerleave", () => (reading = null));
     const drop = () => {
       if (dragged) toggle(true);
       dragged = 0;
+      turning = null;
     };
     stage.addEventListener("pointerup", drop);
     stage.addEventListener("pointercancel", drop);
@@ -322,7 +305,9 @@ function play(data) {
   $("reset").addEventListener("click", () => { running = false; reset(); });
   document.addEventListener("keydown", (event) => {
     if (event.target !== document.body && event.target !== stage) return;
-    const act = { " ": () => toggle(), ".": () => $("step").click(), r: () => $("reset").click() }[event.key];
+    const turns = picture && picture.view ? { ArrowLeft: [0.1, 0], ArrowRight: [-0.1, 0], ArrowUp: [0, 0.1], ArrowDown: [0, -0.1] } : {};
+    const keys = { " ": () => toggle(), ".": () => $("step").click(), r: () => $("reset").click() };
+    const act = turns[event.key] ? () => turn(...turns[event.key]) : keys[event.key];
     if (act) {
       event.preventDefault();
       act();
@@ -331,6 +316,10 @@ function play(data) {
   window.addEventListener("resize", draw);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
   if (!picture) $("first").hidden = true;
+  if (held) $("energy").classList.add("tall");
+  $("held").textContent = Object.entries(data.constraints).map(([name, formula]) => `${name}: ${formula} = 0`).join("; ");
+  $("held").hidden = !Object.keys(data.constraints).length;
+  $("turned").hidden = !(picture && picture.view);
   reset();
   return { advance, draw, toggle, flights: () => flights, start };
 }

@@ -42,6 +42,11 @@ impl ExpressionConstraints {
         Self::compiled((coordinates.len(), parameters.len()), formulas.iter().copied(), &mut compiler, &scope)
     }
 
+    /// What vanishes of one row.
+    pub fn value<R: Real>(&self, row: usize, parameters: &[R], q: &[R], v: &[R]) -> R {
+        self.rows[row].value.evaluate(parameters, q, v)
+    }
+
     /// The same without the constraints of these names.
     pub(super) fn without(&self, names: &[String]) -> Self {
         let rows = self.rows.iter().filter(|row| !names.contains(&row.name)).cloned().collect();
@@ -90,8 +95,8 @@ impl Constraints for ExpressionConstraints {
         Some(self.parameters)
     }
     fn values<R: Real>(&self, parameters: &[R], q: &[R], v: &[R], values: &mut [R]) {
-        for (value, row) in values.iter_mut().zip(self.rows.iter()) {
-            *value = row.value.evaluate(parameters, q, v);
+        for (row, value) in values.iter_mut().enumerate().take(self.rows.len()) {
+            *value = self.value(row, parameters, q, v);
         }
     }
 }

@@ -87,6 +87,11 @@ impl FormulaConstraints {
         &self.formulas
     }
 
+    /// The formulas as functions of states.
+    pub fn compiled(&self) -> &ExpressionConstraints {
+        &self.compiled
+    }
+
     /// A model under them.
     ///
     /// # Errors

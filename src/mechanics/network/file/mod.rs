@@ -7,7 +7,9 @@
 
 pub use crate::storage::container::StoredPrecision;
 
-use crate::lagrangian::{Description, EulerLagrange, FormulaConstraints, configure_values};
+use crate::lagrangian::{
+    Description, EulerLagrange, ExpressionConstraints, FormulaConstraints, SystemInstance, configure_values,
+};
 use crate::network::{Architecture, DissipationLayout, Layout, LinearMap};
 use crate::scalar::Scalar;
 use crate::storage::container::{ContainerError, FileKind, Tensor, check_version, pack, unpack};
@@ -294,21 +296,39 @@ impl Header {
         &self,
         network: Box<dyn EulerLagrange<S> + 'a>,
     ) -> Result<Box<dyn EulerLagrange<S> + 'a>, ContainerError> {
-        fn wrong(error: impl std::fmt::Display) -> ContainerError {
-            ContainerError::Header(error.to_string())
-        }
         if let Some(constraints) = self.formulas()? {
             return constraints.constrain(network).map_err(wrong);
         }
-        match self.description.as_ref().filter(|description| !description.constraints.is_empty()) {
+        match self.holding()? {
             None => Ok(network),
-            Some(description) => {
-                let system = description.system().map_err(|error| wrong(format_args!("description.{error}")))?;
-                let system = configure_values::<S>(Cow::Owned(system), &self.parameters).map_err(wrong)?;
-                system.constrain(network).map_err(wrong)
-            }
+            Some(system) => system.constrain(network).map_err(wrong),
         }
     }
+
+    /// The described system whose constraints hold the motion.
+    fn holding<S: Scalar>(&self) -> Result<Option<SystemInstance<S>>, ContainerError> {
+        let described = self.description.as_ref().filter(|description| !description.constraints.is_empty());
+        let Some(description) = described else { return Ok(None) };
+        let system = description.system().map_err(|error| wrong(format_args!("description.{error}")))?;
+        configure_values(Cow::Owned(system), &self.parameters).map(Some).map_err(wrong)
+    }
+
+    /// The constraints that hold the motion as functions of states, with the values of their parameters; none if it is free. Those of
+    /// a description may follow from each other.
+    ///
+    /// # Errors
+    /// [`ContainerError::Header`] for formulas or parameters that do not fit.
+    pub fn constraints(&self) -> Result<Option<(ExpressionConstraints, Vec<f64>)>, ContainerError> {
+        if let Some(formulas) = self.formulas()? {
+            return Ok(Some((formulas.compiled().clone(), Vec::new())));
+        }
+        let system = self.holding::<f64>()?;
+        Ok(system.and_then(|system| Some((system.constraints()?.clone(), system.parameters))))
+    }
+}
+
+fn wrong(error: impl std::fmt::Display) -> ContainerError {
+    ContainerError::Header(error.to_string())
 }
 
 #[cfg(test)]
