@@ -375,10 +375,6 @@ class System(Mechanics):
         if self.description is None:
             raise ValueError("only a system with a formula of its own is a function of other libraries")
         header = {"columns": list(self.columns), "parameters": self.parameters, "description": self.description}
-        if held := self.description.get("constraints"):
-            # Those that follow from others determine no force of their own.
-            redundant = self.constraints().redundant
-            header["constraints"] = {name: formula for name, formula in held.items() if name not in redundant}
         model = DescribedModel(Described(self.description), self.parameters)
         return kind(xp, model, {}, Constraints(header))
 

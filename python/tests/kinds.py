@@ -138,4 +138,8 @@ def kinds():
         add(f"{kind}, known", *shape, form(known=description("known")))
         if structure == "black-box":
             add(f"{kind}, learned alpha", *shape, form(learn_alpha=True))
+    twice = {"again": "turn_and_rod - 3*(sin(theta)*x_dot + y_dot - theta_dot/3)", "rod": rod["rod"], "turn": rod["turn"]}
+    twice = {**description("twice"), "constraints": twice}
+    twice["definitions"] = {**twice["definitions"], "turn_and_rod": "2*(2*x - 2*y/3)*x_dot + 2*(2*y - 2*x/3)*y_dot"}
+    add("under constraints that follow from each other", lambda header: header.update(description=twice, system="twice"))
     return found

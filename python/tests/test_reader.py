@@ -105,6 +105,29 @@ def test_systems_with_friction_and_constraints(backend):
         agree(getattr(terms, name), getattr(exact, name), name)
 
 
+@pytest.mark.parametrize("library", ["jax", "torch"])
+def test_constraints_that_follow_from_each_other_have_derivatives(models, library):
+    """The derivative of a loss of accelerations by a weight, beside a difference."""
+    lagrangian, array = BACKENDS[library](models["under constraints that follow from each other"])
+    q, v = array(Q), array(V)
+    name = next(name for name in lagrangian.weights if name.endswith("layers.1.weight"))
+    loss = lambda w: (lagrangian.acceleration(q, v, weights={**lagrangian.weights, name: w}) ** 2).sum()
+    at = lagrangian.weights[name]
+    if library == "jax":
+        import jax
+
+        slope = jax.grad(loss)(at)
+    else:
+        import torch
+
+        slope = torch.func.grad(loss)(at)
+    step = np.zeros(tuple(at.shape))
+    step[0, 0] = 1e-5
+    difference = (loss(at + array(step)) - loss(at - array(step))) / 2e-5
+    assert np.isfinite(np.asarray(slope)).all() and abs(difference) > 1e-6
+    assert abs(slope[0, 0] - difference) <= 1e-5 * abs(difference)
+
+
 def test_jax_derivatives_vmap_jit_and_weights(models):
     jax = pytest.importorskip("jax")
     jax.config.update("jax_enable_x64", True)
