@@ -20,6 +20,24 @@ def test_a_notebook_runs(path):
     nbclient.NotebookClient(book, timeout=180, resources={"metadata": {"path": path.parent}}).execute()
 
 
+def test_progress_in_a_notebook_is_one_output_that_is_replaced():
+    nbformat, nbclient = pytest.importorskip("nbformat"), pytest.importorskip("nbclient")
+    pytest.importorskip("ipykernel")
+    work = """
+import lnn
+states = {"data.training": 200, "data.validation": 64, "data.test": 64}
+learned = lnn.train("harmonic-oscillator", hidden=[4], epochs=300, starts=1, config=states, progress=True)
+"""
+    book = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(work)])
+    nbclient.NotebookClient(book, timeout=180).execute()
+    (shown,) = book.cells[0].outputs
+    assert shown["output_type"] == "display_data"
+    lines = shown["data"]["text/plain"].splitlines()
+    bars = [line for line in lines if "[" in line and "%" in line]
+    assert len(bars) == 1 and "#" * 30 in bars[0] and "100%" in bars[0] and "epoch 300: validation loss" in bars[0]
+    assert len(lines) < 20
+
+
 def test_notebooks_are_stored_without_what_they_print():
     assert len(NOTEBOOKS) >= 6
     for path in NOTEBOOKS:
